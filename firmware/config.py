@@ -1,0 +1,27 @@
+"""Your settings. Remove the '#' in front of a line to change it; what is not set has the default shown."""
+
+# Which side does the kickstand lean the bike to?
+# SIDE = "left"             # or "right"
+
+# Sensor
+# SAMPLE_HZ = 100           # readings per second: 50, 100, 125 or 200
+# ACCEL_RANGE_G = 8         # 2, 4, 8 or 16
+# GYRO_RANGE_DPS = 500      # 250, 500, 1000 or 2000
+# DLPF = 3                  # low-pass of the chip: 1 (184 Hz) to 6 (5 Hz)
+# ACCEPT_WHO_AM_I = None    # the number on the display, to try a chip that is refused as unknown
+# SENSOR_ADDRESS = 0x68     # 0x69 if AD0 is tied high
+
+# Wiring (GPIO numbers; the defaults are for a Pico, those of an ESP32 in brackets)
+# SENSOR_I2C = 0
+# SENSOR_SDA = 4            # (21)
+# SENSOR_SCL = 5            # (22)
+# SENSOR_BUS_HZ = 400_000
+# LCD_I2C = 1
+# LCD_SDA = 6               # (18) the same two pins as the sensor's put both on one bus, at the slower speed
+# LCD_SCL = 7               # (19)
+# LCD_BUS_HZ = 100_000
+# LCD_ADDRESSES = (0x27, 0x3F)
+# BUTTON_PIN = 15           # (4) between the pin and ground
+
+# Restart by itself when the program hangs
+# WATCHDOG = True

@@ -1,0 +1,230 @@
+"""The device: wires sensor, mathematics, button, store and display, and owns the loop.
+
+sensor -> calibration -> alignment -> lean -> page -> display: once a sample, in one direction.
+"""
+
+from time import sleep_us, ticks_add, ticks_diff, ticks_ms, ticks_us
+
+from machine import Pin
+
+from . import bus, pages, port
+from .align_wizard import AlignWizard
+from .button import LONG, SHORT, Button
+from .calibration import Calibration
+from .errors import SettingsError
+from .hd44780 import Lcd
+from .menu import ALIGN, INFO, RESET, SIX, Menu
+from .meter import LeanMeter
+from .mpu6050 import SATURATED, Mpu6050
+from .sensor import Sensor
+from .six_wizard import SixWizard
+from .store import Store
+
+PAGE_MS = 100
+NOTICE_MS = 2000
+
+
+def open_lcd(settings):
+    """The display of these settings. Raises SettingsError for pins that the controller cannot use."""
+
+    def reopen():
+        if settings.one_bus:  # the display is a 100 kHz part, and sets the pace of a bus that it shares
+            return _open_bus(settings, "SENSOR", min(settings.SENSOR_BUS_HZ, settings.LCD_BUS_HZ))
+        return _open_bus(settings, "LCD", settings.LCD_BUS_HZ)
+
+    return Lcd(reopen, settings.LCD_ADDRESSES)
+
+
+def open_sensor(settings):
+    """The chip of these settings, watched over. Raises SettingsError at its first read() for wrong pins."""
+
+    def reopen():
+        hz = settings.SENSOR_BUS_HZ
+        return _open_bus(settings, "SENSOR", min(hz, settings.LCD_BUS_HZ) if settings.one_bus else hz)
+
+    chip = Mpu6050(
+        None,
+        settings.SENSOR_ADDRESS,
+        settings.ACCEL_RANGE_G,
+        settings.GYRO_RANGE_DPS,
+        settings.DLPF,
+        settings.SAMPLE_HZ,
+        settings.ACCEPT_WHO_AM_I,
+    )
+    return Sensor(chip, reopen, settings.SAMPLE_HZ)
+
+
+def open_button(settings):
+    """The button of these settings."""
+    return Button(Pin(settings.BUTTON_PIN, Pin.IN, Pin.PULL_UP))
+
+
+def _open_bus(settings, name, hz):
+    controller = getattr(settings, name + "_I2C")
+    sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
+    try:
+        return bus.open_i2c(controller, sda, scl, hz)
+    except ValueError as error:
+        raise SettingsError(
+            "config.py: %s_SDA = %d and %s_SCL = %d do not belong to I2C %d (%s)"
+            % (name, sda, name, scl, controller, error),
+            "config.py: wrong",
+            name + "_SDA / SCL",
+        )
+
+
+class App:
+    """The lean meter on a board. settings: a Settings.  lcd: from open_lcd()."""
+
+    def __init__(self, settings, lcd):
+        self.settings = settings
+        self.lcd = lcd
+        self.button = open_button(settings)
+        self.sensor = open_sensor(settings)
+        self.store = None  # until the chip has said who it is: a calibration belongs to one chip
+        self.meter = LeanMeter(Calibration())
+        self._restarts = 0
+        self._last_us = None
+        self._page = 0
+        self._pages = (pages.lean, pages.maxima, pages.acceleration, pages.raw)
+        self._wizard = None
+        self._menu = None
+        self._info = False
+        self._notice = None
+        self._notice_ms = 0
+        self._page_ms = ticks_ms()
+
+    def run(self):
+        """Loop for ever at the sample rate."""
+        period_us = 1_000_000 // self.settings.SAMPLE_HZ
+        watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
+        due_us = ticks_us()
+        while True:
+            self.step()
+            if watchdog:
+                watchdog.feed()
+            due_us = ticks_add(due_us, period_us)
+            wait_us = ticks_diff(due_us, ticks_us())
+            if wait_us > 0:
+                sleep_us(wait_us)
+            else:  # late, as after setting the chip up: count from here instead of racing to catch up
+                due_us = ticks_us()
+
+    def step(self):
+        """One turn of the loop: one sample, one event, at most one transfer to the display."""
+        now_us, now_ms = ticks_us(), ticks_ms()
+        event = self.button.poll(now_ms)
+        if self.sensor.read(now_ms):
+            self._measure(now_us)
+        elif self.sensor.fault is not None:
+            self._last_us = None
+            self._wizard = None
+        self._handle(event, now_ms)
+        if ticks_diff(now_ms, self._page_ms) >= 0:
+            self._page_ms = ticks_add(now_ms, PAGE_MS)
+            line1, line2 = self._lines(now_ms)
+            self.lcd.show(line1, line2)
+        self.lcd.tick(now_ms)
+
+    def _measure(self, now_us):
+        if self._restarts != self.sensor.restarts:
+            self._restarts = self.sensor.restarts
+            self._sensor_started()
+        dt_us = 0 if self._last_us is None else ticks_diff(now_us, self._last_us)
+        self._last_us = now_us
+        self.meter.update(self.sensor.chip.counts, dt_us)
+
+    def _sensor_started(self):
+        """The chip runs, for the first time or again after a fault, perhaps another one."""
+        chip = self.sensor.chip
+        self._last_us = None
+        self.meter.restart()
+        if self.store is None or self.store.who_am_i != chip.who_am_i:
+            self.store = Store(chip.who_am_i, chip.accel_range_g)
+            self._use(self.store.load())
+
+    def _use(self, calibration):
+        chip = self.sensor.chip
+        calibration.set_scale(chip.accel_lsb_per_g, chip.gyro_lsb_per_dps)
+        self.meter.calibration = calibration
+        self.meter.restart()
+        self.meter.reset_maxima()
+
+    def _save(self, calibration):
+        """For the wizards: on flash first, then in use. Raises StoreError."""
+        self.store.save(calibration)
+        self._use(calibration)
+
+    def _handle(self, event, now_ms):
+        """Give the event to the wizard, the menu or the pages, whichever is on the display."""
+        if self._wizard:
+            self._wizard.step(self.sensor.chip.counts, event, now_ms)
+            if self._wizard.ended:
+                self._wizard = None
+        elif self._menu:
+            self._menu.step(event, now_ms)
+            if self._menu.chosen is not None:
+                self._choose(self._menu.chosen, now_ms)
+                self._menu = None
+        elif event == LONG:
+            self._menu = Menu(now_ms)
+        elif event == SHORT:
+            self._turn_page()
+
+    def _turn_page(self):
+        if self._info:
+            self._info = False
+        elif self.meter.calibration.aligned:
+            self._page = (self._page + 1) % len(self._pages)
+        elif self.sensor.fault is None:
+            self._align(pressed=True)
+
+    def _align(self, pressed):
+        self._page = 0
+        self._wizard = AlignWizard(
+            self.sensor.chip,
+            SATURATED,
+            self.settings.SAMPLE_HZ,
+            self.meter.calibration,
+            self.settings.SIDE,
+            self._save,
+            pressed,
+        )
+
+    def _choose(self, entry, now_ms):
+        if entry == RESET:
+            self.meter.reset_maxima()
+            self._notify(("Maxima reset", ""), now_ms)
+        elif entry == INFO:
+            self._info = True
+        elif self.sensor.fault is not None:
+            return
+        elif entry == ALIGN:
+            self._align(pressed=False)
+        elif entry == SIX:
+            self._wizard = SixWizard(self.sensor.chip, SATURATED, self.settings.SAMPLE_HZ, self._save)
+
+    def _notify(self, lines, now_ms):
+        self._notice = lines
+        self._notice_ms = ticks_add(now_ms, NOTICE_MS)
+
+    def _lines(self, now_ms):
+        """What the display should say now."""
+        if self._notice:
+            if ticks_diff(now_ms, self._notice_ms) < 0:
+                return self._notice
+            self._notice = None
+        if self._wizard:
+            return self._wizard.lines
+        if self._menu:
+            return self._menu.lines
+        if self.sensor.fault is not None:
+            return self.sensor.fault
+        if self._info:
+            chip = self.sensor.chip
+            return pages.sensor_info(chip.name, chip.temperature_c(chip.counts[3]), self.meter.calibration)
+        if not self.meter.calibration.aligned:
+            return pages.not_aligned(self.meter, now_ms // 1000)
+        if not self.meter.settled:
+            return pages.WAIT
+        return self._pages[self._page](self.meter)

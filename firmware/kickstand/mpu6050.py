@@ -1,0 +1,137 @@
+"""InvenSense MPU6050 and the chips sold under its name: registers in, counts out.
+
+Register map RM-MPU-6000A rev 4.2, product specification PS-MPU-6000A rev 3.4.
+
+    chip = Mpu6050(i2c)
+    chip.setup()
+    chip.read()          # chip.counts is now: ax ay az temperature gx gy gz
+"""
+
+from array import array
+from time import sleep_ms
+
+from micropython import const
+
+_SMPLRT_DIV = const(0x19)  # p. 11
+_CONFIG = const(0x1A)  # p. 13: DLPF_CFG
+_GYRO_CONFIG = const(0x1B)  # p. 14
+_ACCEL_CONFIG = const(0x1C)  # p. 15
+_ACCEL_CONFIG2 = const(0x1D)  # MPU6500 family only: the accelerometer's own low-pass
+_ACCEL_XOUT_H = const(0x3B)  # p. 29: fourteen bytes from here are one sampling instant
+_PWR_MGMT_1 = const(0x6B)  # p. 40
+_WHO_AM_I = const(0x75)  # p. 45
+
+_RESET = const(0x80)
+_CLOCK_PLL_GYRO_X = const(0x01)  # 1 % accurate; the internal oscillator after reset is off by up to 5 %
+
+ACCEL_LSB_PER_G = {2: 16384, 4: 8192, 8: 4096, 16: 2048}
+GYRO_LSB_PER_DPS = {250: 131.0, 500: 65.5, 1000: 32.8, 2000: 16.4}
+SATURATED = 32700
+
+# WHO_AM_I: name, temperature counts per degree, temperature at 0 counts, has ACCEL_CONFIG2, bytes of FIFO
+CHIPS = {
+    0x68: ("MPU6050", 340.0, 36.53, False, 1024),
+    0x70: ("MPU6500", 333.87, 21.0, True, 512),
+    0x71: ("MPU9250", 333.87, 21.0, True, 512),
+    0x72: ("MPU6500 0x72", 333.87, 21.0, True, 512),
+    0x73: ("MPU9255", 333.87, 21.0, True, 512),
+    0x74: ("MPU6515", 333.87, 21.0, True, 512),
+    0x78: ("MPU6500 0x78", 333.87, 21.0, True, 512),
+    0x98: ("ICM20689", 326.8, 25.0, True, 512),
+    0x19: ("MPU6886", 326.8, 25.0, True, 512),
+}
+
+
+class UnknownChip(Exception):
+    """A chip answers, but its WHO_AM_I (args[0]) is none that is known to be compatible."""
+
+
+class Mpu6050:
+    """One chip on one bus.
+
+    i2c: a machine.I2C.  address: 0x68, or 0x69 with AD0 high.  accel_range_g: 2, 4, 8, 16.  gyro_range_dps:
+    250, 500, 1000, 2000. dlpf: 1 (184 Hz) to 6 (5 Hz).  rate_hz: 1000 divided by 1 to 256.  accept: a further
+    WHO_AM_I to treat as an MPU6500. counts: array('h', 7) of the last read(), in the chip's order.
+    """
+
+    def __init__(
+        self, i2c, address=0x68, accel_range_g=8, gyro_range_dps=500, dlpf=3, rate_hz=100, accept=None
+    ):
+        self._i2c = i2c
+        self._address = address
+        self._accept = accept
+        self.who_am_i = 0
+        self.accel_range_g = accel_range_g
+        self.accel_lsb_per_g = ACCEL_LSB_PER_G[accel_range_g]
+        self.gyro_lsb_per_dps = GYRO_LSB_PER_DPS[gyro_range_dps]
+        accel_bits = (2, 4, 8, 16).index(accel_range_g) << 3
+        gyro_bits = (250, 500, 1000, 2000).index(gyro_range_dps) << 3
+        # 0x19..0x1D as they should read; 0x1D is compared only where it exists
+        self._configuration = bytes((1000 // rate_hz - 1, dlpf, gyro_bits, accel_bits, dlpf))
+        self._one = bytearray(1)
+        self._readback = bytearray(5)
+        self._burst = bytearray(14)
+        self.counts = array("h", [0] * 7)
+
+    @property
+    def name(self):
+        """What the chip is, by its WHO_AM_I."""
+        return self._chip()[0]
+
+    def connect(self, i2c):
+        """Use a bus that was opened again."""
+        self._i2c = i2c
+
+    def identify(self):
+        """Read WHO_AM_I; return it. Raises UnknownChip, OSError."""
+        self.who_am_i = self._read(_WHO_AM_I)
+        if self.who_am_i not in CHIPS and self.who_am_i != self._accept:
+            raise UnknownChip(self.who_am_i)
+        return self.who_am_i
+
+    def setup(self):
+        """Reset and configure the chip: 0.2 s. Raises OSError (also when the configuration does not read
+        back), UnknownChip."""
+        self.identify()
+        self._write(_PWR_MGMT_1, _RESET)
+        sleep_ms(100)
+        self._write(_PWR_MGMT_1, _CLOCK_PLL_GYRO_X)
+        sleep_ms(60)  # writes that come too early are lost without an error
+        for i in range(5 if self._chip()[3] else 4):
+            self._write(_SMPLRT_DIV + i, self._configuration[i])
+        if not self.configured():
+            raise OSError("MPU6050 configuration does not read back")
+        sleep_ms(20)  # until the filter has seen its first samples
+
+    def configured(self):
+        """True if the chip is awake with the configuration written by setup(). Raises OSError."""
+        self._i2c.readfrom_mem_into(self._address, _SMPLRT_DIV, self._readback)
+        # 0x1D only where it is known to exist: an accepted unknown chip is given it, and may ignore it
+        for i in range(5 if self.who_am_i in CHIPS and self._chip()[3] else 4):
+            if self._readback[i] != self._configuration[i]:
+                return False
+        return self._read(_PWR_MGMT_1) == _CLOCK_PLL_GYRO_X
+
+    def read(self):
+        """One burst into counts; allocates nothing. Raises OSError."""
+        burst, counts = self._burst, self.counts
+        self._i2c.readfrom_mem_into(self._address, _ACCEL_XOUT_H, burst)
+        for i in range(7):
+            value = burst[2 * i] << 8 | burst[2 * i + 1]
+            counts[i] = value - 65536 if value > 32767 else value
+
+    def temperature_c(self, counts):
+        """Degrees Celsius from temperature counts (p. 30, and the sheets of the other chips)."""
+        chip = self._chip()
+        return counts / chip[1] + chip[2]
+
+    def _chip(self):
+        return CHIPS.get(self.who_am_i, CHIPS[0x70])
+
+    def _read(self, register):
+        self._i2c.readfrom_mem_into(self._address, register, self._one)
+        return self._one[0]
+
+    def _write(self, register, value):
+        self._one[0] = value
+        self._i2c.writeto_mem(self._address, register, self._one)

@@ -1,0 +1,81 @@
+"""The values of config.py, checked, with a default for each."""
+
+from . import port
+from .errors import SettingsError
+from .hd44780 import ADDRESSES
+from .mpu6050 import ACCEL_LSB_PER_G, GYRO_LSB_PER_DPS
+
+
+def _one_of(*choices):
+    return lambda value: value in choices, "one of " + ", ".join(repr(choice) for choice in choices)
+
+
+def _whole(low, high):
+    return lambda value: isinstance(value, int) and low <= value <= high, "a whole number from %d to %d" % (
+        low,
+        high,
+    )
+
+
+def _sample_rate(value):
+    return isinstance(value, int) and 50 <= value <= 200 and 1000 % value == 0
+
+
+def _addresses(value):
+    return (
+        isinstance(value, tuple) and bool(value) and all(isinstance(a, int) and 8 <= a <= 0x77 for a in value)
+    )
+
+
+_PIN = _whole(0, 48)
+
+# name: default, (check, what is allowed)
+_TABLE = {
+    "SIDE": ("left", _one_of("left", "right")),
+    "SAMPLE_HZ": (100, (_sample_rate, "50, 100, 125 or 200")),
+    "ACCEL_RANGE_G": (8, _one_of(*sorted(ACCEL_LSB_PER_G))),
+    "GYRO_RANGE_DPS": (500, _one_of(*sorted(GYRO_LSB_PER_DPS))),
+    "DLPF": (3, _whole(1, 6)),
+    "ACCEPT_WHO_AM_I": (None, (lambda v: v is None or isinstance(v, int), "None or a number as 0x75")),
+    "SENSOR_ADDRESS": (0x68, _one_of(0x68, 0x69)),
+    "SENSOR_I2C": (0, _one_of(0, 1)),
+    "SENSOR_SDA": (port.SENSOR_PINS[0], _PIN),
+    "SENSOR_SCL": (port.SENSOR_PINS[1], _PIN),
+    "SENSOR_BUS_HZ": (400_000, _whole(10_000, 400_000)),
+    "LCD_ADDRESSES": (ADDRESSES, (_addresses, "I2C addresses as (0x27, 0x3F)")),
+    "LCD_I2C": (1, _one_of(0, 1)),
+    "LCD_SDA": (port.LCD_PINS[0], _PIN),
+    "LCD_SCL": (port.LCD_PINS[1], _PIN),
+    "LCD_BUS_HZ": (100_000, _whole(10_000, 400_000)),
+    "BUTTON_PIN": (port.BUTTON_PIN, _PIN),
+    "WATCHDOG": (True, _one_of(True, False)),
+}
+
+
+class Settings:
+    """One attribute for each name of the table. config: the module config, or None for the defaults. Raises
+    SettingsError."""
+
+    def __init__(self, config=None):
+        for name, (default, (check, allowed)) in _TABLE.items():
+            value = getattr(config, name, default)
+            if not check(value):
+                raise SettingsError(
+                    "config.py: %s = %r, but it must be %s" % (name, value, allowed), "config.py: wrong", name
+                )
+            setattr(self, name, value)
+        for name in dir(config) if config else ():
+            if name.isupper() and name not in _TABLE:
+                raise SettingsError(
+                    "config.py: %s is not a setting; see the list in that file" % name,
+                    "config.py unknown",
+                    name,
+                )
+        self.one_bus = (self.SENSOR_SDA, self.SENSOR_SCL) == (self.LCD_SDA, self.LCD_SCL)
+        if not self.one_bus and self.SENSOR_I2C == self.LCD_I2C:
+            raise SettingsError(
+                "config.py: SENSOR_I2C and LCD_I2C are both %d on different pins; give each its own"
+                % self.LCD_I2C,
+                "config.py: wrong",
+                "LCD_I2C",
+            )

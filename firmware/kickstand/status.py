@@ -1,0 +1,104 @@
+"""The answer to kickstand.status(): how this board is, for a user at the console."""
+
+import gc
+import os
+import sys
+
+from . import __version__, app
+from .errors import SettingsError
+from .mpu6050 import UnknownChip
+from .settings import Settings
+from .store import Store
+
+
+def report():
+    """Print it. Opens sensor and display by itself; the app must not be running."""
+    machine_name = getattr(sys.implementation, "_machine", sys.platform)
+    print(
+        "Kickstand %s on %s, MicroPython %s"
+        % (__version__, machine_name, ".".join(str(n) for n in sys.implementation[1][:3]))
+    )
+    try:
+        try:
+            import config
+        except ImportError:
+            config = None
+        settings = Settings(config)
+        print("Settings     kickstand side %s, %d samples a second" % (settings.SIDE, settings.SAMPLE_HZ))
+        sensor = app.open_sensor(settings)
+        who_am_i = _sensor(sensor, settings)
+        _display(app.open_lcd(settings))
+        print(
+            "Button       GPIO %d, %s"
+            % (settings.BUTTON_PIN, "pressed" if app.open_button(settings).held() else "not pressed")
+        )
+    except SettingsError as error:
+        print("Settings     " + error.reason)
+        return
+    _calibration(who_am_i, settings)
+    gc.collect()
+    space = os.statvfs("/")
+    print("Memory       %d KB free; flash %d KB free" % (gc.mem_free() // 1024, space[0] * space[3] // 1024))
+
+
+def _sensor(sensor, settings):
+    """Print what answers; return its WHO_AM_I, 0 for nothing."""
+    chip = sensor.chip
+    try:
+        chip.connect(sensor.reopen())
+        chip.setup()
+        chip.read()
+    except UnknownChip as error:
+        print(
+            "Sensor       unknown chip, WHO_AM_I %s: set ACCEPT_WHO_AM_I in config.py to try it"
+            % hex(error.args[0])
+        )
+        return 0
+    except OSError as error:
+        print(
+            "Sensor       none answers on SDA %d, SCL %d: check the wiring (%s)"
+            % (settings.SENSOR_SDA, settings.SENSOR_SCL, error)
+        )
+        return 0
+    print(
+        "Sensor       %s (%s), +-%d g, +-%d deg/s, %.1f C"
+        % (
+            chip.name,
+            hex(chip.who_am_i),
+            settings.ACCEL_RANGE_G,
+            settings.GYRO_RANGE_DPS,
+            chip.temperature_c(chip.counts[3]),
+        )
+    )
+    print("Reading      %s g" % " ".join("%.3f" % (chip.counts[i] / chip.accel_lsb_per_g) for i in range(3)))
+    return chip.who_am_i
+
+
+def _display(lcd):
+    lcd.show("Kickstand", "status: console")
+    lcd.flush()
+    print(
+        "Display      "
+        + ("at %s" % hex(lcd.address) if lcd.address else "none answers: check wiring and contrast")
+    )
+
+
+def _calibration(who_am_i, settings):
+    if not who_am_i:
+        print("Calibration  not looked at: it belongs to a sensor")
+        return
+    store = Store(who_am_i, settings.ACCEL_RANGE_G)
+    calibration = store.load()
+    print(
+        "Calibration  six positions: %s, aligned: %s; %s"
+        % ("yes" if calibration.six_done else "no", "yes" if calibration.aligned else "no", store.message)
+    )
+    for name, values in (
+        ("offset, g", calibration.accel_offset),
+        ("slope", calibration.accel_slope),
+        ("gyro bias, deg/s", calibration.gyro_bias),
+        ("left", calibration.vehicle_from_sensor[0:3]),
+        ("up", calibration.vehicle_from_sensor[3:6]),
+        ("forward", calibration.vehicle_from_sensor[6:9]),
+    ):
+        print("  %-17s" % name + " ".join("%9.4f" % value for value in values))
