@@ -1,0 +1,19 @@
+"""The firmware is importable in every test; recorded data is found or its tests are skipped."""
+
+from pathlib import Path
+
+import pytest
+from kickstand_tools import firmware_path
+
+firmware_path.add_to_path()
+
+ROOT = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """The directory of real recordings, which is not part of the repository."""
+    path = ROOT.parent / "shared" / "data"
+    if not path.is_dir():
+        pytest.skip("no recordings: ../shared/data is not beside the checkout")
+    return path

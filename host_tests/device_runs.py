@@ -1,0 +1,105 @@
+"""The whole device on the simulated board: a run described as data, its display recorded. CPython and MicroPython.
+
+As a script: reads the description as JSON from standard input, runs it in the current directory (the board's flash) and prints the
+record as JSON on the last line.
+"""
+
+import json
+import math
+import sys
+
+from kickstand_tools import sensor_errors
+from kickstand_tools.board.simulator import Board
+
+FRAME_S = 0.1
+
+
+def motion_of(plan):
+    """motion(t_s) of a bike that leans as the plan [[from_s, lean_deg, yaw_rate_dps, speed_mps], ...] says, by steps."""
+
+    def motion(t_s):
+        now = plan[0]
+        for entry in plan:
+            if t_s >= entry[0]:
+                now = entry
+        lean, yaw, speed = math.radians(now[1]), math.radians(now[2]), now[3]
+        s = speed * yaw / 9.80665
+        return (
+            math.sin(lean) + s * math.cos(lean),
+            math.cos(lean) - s * math.sin(lean),
+            0.0,
+            now[2] * math.sin(lean),
+            now[2] * math.cos(lean),
+            0.0,
+        )
+
+    return motion
+
+
+def poses_of(seed, steps):
+    """world(t_s) of the bare sensor: steps [[from_s, [up in its own axes] or None while it is being turned], ...]."""
+    part = sensor_errors.Sensor(seed=seed)
+    worlds = [(start, sensor_errors.resting(part, up) if up else None) for start, up in steps]
+    still = sensor_errors.resting(part, (1, 0, 0))
+
+    def world(t_s):
+        now = still
+        for start, candidate in worlds:
+            if t_s >= start:
+                now = candidate
+        if now:
+            return now(t_s)
+        return [value + 0.5 * math.sin(30 * t_s + k) for k, value in enumerate(still(t_s))]
+
+    return world
+
+
+def run_device(plan):
+    """Run it; returns frames [[t_s, line1, line2], ...] as they changed, how each boot ended, and what the LCD says last.
+
+    plan: "until" (s); "lean" as for motion_of with "seed" of the part (None: perfect), or "poses" as for poses_of; "presses"
+    [[at_s, for_s], ...]; "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...].
+    """
+    seed = plan.get("seed")
+    if "poses" in plan:
+        world = poses_of(seed, plan["poses"])
+    else:
+        world = sensor_errors.Sensor(seed=seed).world(motion_of(plan.get("lean", [[0, 0, 0, 0]])))
+    board = Board(world, **plan.get("board", {}))
+    for at_s, for_s in plan.get("presses", []):
+        board.press(at_s, for_s)
+    for method, arguments in plan.get("faults", []):
+        getattr(board.faults, method)(*arguments)
+    frames = []
+
+    def watch():
+        text = board.lcd.text()
+        if not frames or frames[-1][1:] != list(text):
+            frames.append([board.clock.now_us / 1e6] + list(text))
+
+    board.every(FRAME_S, watch)
+    board.install()
+    ends = []
+    try:
+        import main
+        from kickstand.settings import Settings
+
+        class Config:
+            pass
+
+        for name, value in plan.get("config", {}).items():
+            setattr(Config, name, tuple(value) if isinstance(value, list) else value)
+        main.load_settings = lambda: Settings(Config)
+        for until_s in plan.get("power", []) + [plan["until"]]:
+            end = "reset"
+            while end == "reset":
+                end = board.run(main.main, until_s)
+                ends.append(end)
+    finally:
+        board.uninstall()
+    return {"frames": frames, "ends": ends, "last": frames[-1][1:], "too_fast": board.too_fast}
+
+
+if __name__ == "__main__":
+    record = run_device(json.load(sys.stdin))
+    print("\n" + json.dumps(record))

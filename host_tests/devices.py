@@ -1,0 +1,72 @@
+"""Runs a device plan on either engine, in a directory that stands for the board's flash."""
+
+import json
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import device_runs
+from kickstand_tools import unix_port
+
+SCRIPT = Path(device_runs.__file__)
+
+
+class Record:
+    """What was on the display, and when."""
+
+    def __init__(self, answer, console):
+        self.frames = answer["frames"]
+        self.ends = answer["ends"]
+        self.last = tuple(answer["last"])
+        self.too_fast = answer["too_fast"]
+        self.console = console
+
+    def at(self, t_s):
+        """Both lines as they were at t_s."""
+        shown = ["", ""]
+        for start, line1, line2 in self.frames:
+            if start <= t_s + 1e-6:
+                shown = [line1, line2]
+        return shown
+
+    def first(self, pattern, after=0.0):
+        """When a line first matched after a time; None if never."""
+        for start, line1, line2 in self.frames:
+            if start >= after and (re.search(pattern, line1) or re.search(pattern, line2)):
+                return start
+        return None
+
+    def lean_at(self, t_s):
+        """The lean on the display in degrees, > 0 to the right; None if none is shown."""
+        match = re.match(r"Lean +(\d+)° (right|left)?", self.at(t_s)[0])
+        return match and int(match[1]) * (-1 if match[2] == "left" else 1)
+
+    def leans(self, from_s, until_s):
+        """Every lean that was shown between two times."""
+        shown = [self.lean_at(from_s)] + [self.lean_at(f[0]) for f in self.frames if from_s < f[0] < until_s]
+        return [lean for lean in shown if lean is not None]
+
+
+def run(engine, flash, plan, capsys=None):
+    """The Record of a plan. flash: a directory, kept from run to run as a board's is."""
+    if engine == "cpython":
+        before = os.getcwd()
+        os.chdir(flash)
+        try:
+            answer = json.loads(json.dumps(device_runs.run_device(plan)))
+        finally:
+            os.chdir(before)
+        return Record(answer, capsys.readouterr().out if capsys else "")
+    done = subprocess.run(
+        unix_port.command("-X", "heapsize=8M", str(SCRIPT)),
+        input=json.dumps(plan),
+        capture_output=True,
+        text=True,
+        cwd=flash,
+        env=unix_port.environment(),
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    console, _, answer = done.stdout.rstrip("\n").rpartition("\n")
+    return Record(json.loads(answer), console)

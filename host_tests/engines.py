@@ -1,0 +1,35 @@
+"""Both ways to run the firmware's mathematics on the host, so that every test of it can ask both."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import firmware_calls
+import pytest
+from kickstand_tools import unix_port
+
+SCRIPT = Path(firmware_calls.__file__)
+
+ENGINES = [
+    "cpython",
+    pytest.param(
+        "micropython",
+        marks=pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system"),
+    ),
+]
+
+
+def run(engine, calls):
+    """Results of [(name, arguments), ...] as JSON gives them back."""
+    if engine == "cpython":
+        return json.loads(json.dumps([firmware_calls.call(name, arguments) for name, arguments in calls]))
+    done = subprocess.run(
+        unix_port.command("-X", "heapsize=64M", str(SCRIPT)),
+        input=json.dumps(calls),
+        capture_output=True,
+        text=True,
+        env=unix_port.environment(),
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr + done.stdout
+    return json.loads(done.stdout)

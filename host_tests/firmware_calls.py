@@ -1,0 +1,98 @@
+"""The firmware's mathematics, called by name: JSON in, JSON out. Runs on CPython and on MicroPython.
+
+As a script: reads one JSON list of [name, arguments] from standard input and prints the list of results.
+"""
+
+import json
+import sys
+
+from kickstand import alignment, lean, rotation, six_position
+from kickstand.calibration import Calibration
+from kickstand.capture import Capture
+from kickstand.errors import Refusal
+from kickstand.meter import LeanMeter
+
+
+def matrix_of(values):
+    m = rotation.matrix()
+    for i in range(9):
+        m[i] = values[i]
+    return m
+
+
+def _into(size, function, *arguments):
+    out = rotation.matrix() if size == 9 else rotation.vector()
+    function(out, *arguments)
+    return list(out)
+
+
+def two_position(kickstand, upright, side):
+    m = rotation.matrix()
+    tilt = alignment.two_position(m, kickstand, upright, side)
+    return tilt, list(m)
+
+
+def apply(offset, slope, bias, lsb, gyro_lsb, reading):
+    calibration = Calibration()
+    calibration.set_accel(offset, slope)
+    for i in range(3):
+        calibration.gyro_bias[i] = bias[i]
+    calibration.set_scale(lsb, gyro_lsb)
+    force, rate = rotation.vector(), rotation.vector()
+    calibration.apply(reading, force, rate)
+    return list(force) + list(rate)
+
+
+def capture(samples):
+    """samples: rows of seven integers, 8192 counts per g and 65.5 per deg/s."""
+    pose = Capture(8192, 65.5, 32700, len(samples))
+    for sample in samples:
+        pose.add(sample)
+    pose.finish()
+    return pose.accel, pose.gyro
+
+
+def meter(matrix, readings, dt_us):
+    """Readings in g and deg/s through the whole chain: [shown lean, formula lean] for each."""
+    calibration = Calibration()
+    for i in range(9):
+        calibration.vehicle_from_sensor[i] = matrix[i]
+    device = LeanMeter(calibration)
+    out = []
+    for reading in readings:
+        device.update(reading, dt_us)
+        out.append([device.lean_deg, device.lean_formula_deg])
+    return out
+
+
+CALLS = {
+    "cross": lambda a, b: _into(3, rotation.cross, a, b),
+    "rotate": lambda m, a: _into(3, rotation.rotate, matrix_of(m), a),
+    "rotate_back": lambda m, a: _into(3, rotation.rotate_back, matrix_of(m), a),
+    "multiply": lambda a, b: _into(9, rotation.multiply, matrix_of(a), matrix_of(b)),
+    "angle": rotation.angle_deg,
+    "is_rotation": rotation.is_rotation,
+    "two_position": two_position,
+    "static_lean": lean.static_lean_deg,
+    "lean_acos": lean.lean_acos_deg,
+    "formula_lean": lean.formula_lean_deg,
+    "apply": apply,
+    "closed_form": six_position.closed_form,
+    "fit": six_position.fit,
+    "free_pose": six_position.check_free_pose,
+    "side_of": six_position.side_of,
+    "capture": capture,
+    "meter": meter,
+}
+
+
+def call(name, arguments):
+    """The result, or {"refused": reason, "lcd": lines}."""
+    try:
+        return CALLS[name](*arguments)
+    except Refusal as refusal:
+        return {"refused": refusal.reason, "lcd": refusal.lcd}
+
+
+if __name__ == "__main__":
+    json.dump([call(name, arguments) for name, arguments in json.load(sys.stdin)], sys.stdout)

@@ -1,0 +1,170 @@
+"""Counts to g, the pose capture, the six-position fit."""
+
+import engines
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from test_rotation import random_rotation
+
+AXES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
+
+
+def tipped(direction, angle_deg, rng):
+    """The direction turned by an angle about a random axis across it."""
+    across = np.cross(direction, rng.normal(size=3))
+    across /= np.linalg.norm(across)
+    return direction * np.cos(np.radians(angle_deg)) + across * np.sin(np.radians(angle_deg))
+
+
+def worst_lean_error_deg(offset, slope, true_offset, true_slope, rng):
+    """Largest angle between true and calibrated gravity over random poses."""
+    up = np.array([random_rotation(rng)[0] for _ in range(200)])
+    got = (up - true_offset) / true_slope * slope + offset
+    cosine = np.sum(got * up, axis=1) / np.linalg.norm(got, axis=1)
+    return np.degrees(np.max(np.arccos(np.clip(cosine, -1, 1))))
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_counts_become_g_and_degrees_per_second(engine):
+    offset, slope, bias = [0.02, -0.03, 0.05], [0.98, 1.01, 1.03], [3.0, -12.0, 0.5]
+    reading = [8000, -3000, 12, -521, 655, -6550, 1000]
+    got = engines.run(engine, [("apply", (offset, slope, bias, 8192, 65.5, reading))])[0]
+    want = [slope[i] * reading[i] / 8192 + offset[i] for i in range(3)]
+    want += [reading[4 + i] / 65.5 - bias[i] for i in range(3)]
+    assert_allclose(got, want, rtol=1e-6, atol=1e-5)
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_closed_form_is_equations_16_and_17(engine):
+    offset, slope = np.array([0.05, -0.02, 0.1]), np.array([1.02, 0.97, 1.05])
+    readings = ((AXES - offset) / slope).tolist()
+    got = engines.run(engine, [("closed_form", (readings,))])[0]
+    assert_allclose(got, [offset, slope], atol=1e-6)
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+@pytest.mark.parametrize("tilt", [0, 5, 10, 19])
+def test_the_fit_needs_no_exact_poses(engine, tilt):
+    """The closed form errs by 0.6 degrees with poses 10 degrees off; the fit must stay near 0.1."""
+    rng = np.random.default_rng(tilt)
+    calls, truths = [], []
+    for _ in range(30):
+        offset, slope = rng.uniform(-0.08, 0.08, 3), rng.uniform(0.97, 1.03, 3)
+        forces = np.array([tipped(axis, rng.uniform(0, tilt), rng) for axis in AXES])
+        readings = (forces - offset) / slope + rng.normal(scale=0.0003, size=(6, 3))
+        calls.append(("fit", (readings.tolist(),)))
+        truths.append((offset, slope))
+    errors = [
+        worst_lean_error_deg(np.array(got[0]), np.array(got[1]), *truth, rng)
+        for got, truth in zip(engines.run(engine, calls), truths)
+    ]
+    assert np.median(errors) < 0.1
+    assert max(errors) < 0.25
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_impossible_captures_are_refused(engine):
+    dead = AXES.copy()
+    dead[0] = dead[1]
+    far = AXES + [0.6, 0, 0]
+    off = AXES.copy()
+    off[2] = tipped(AXES[2], 25, np.random.default_rng(1))
+    answers = engines.run(engine, [("fit", (p.tolist(),)) for p in (dead, far, off)])
+    for answer, reason in zip(answers, ("axis x barely changes", "axis x: offset", "side +y was 25 degrees off")):
+        assert reason in answer["refused"]
+        assert all(len(line) <= 16 for line in answer["lcd"])
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_the_free_pose_proves_the_fit(engine):
+    pose = (np.array([1, 1, 1]) / np.sqrt(3)).tolist()
+    good, bad = engines.run(
+        engine, [("free_pose", ([0, 0, 0], [1, 1, 1], pose)), ("free_pose", ([0.05, 0, 0], [1, 1, 1], pose))]
+    )
+    assert good == pytest.approx(0, abs=1e-6)
+    assert "reads 1.03" in bad["refused"]
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_every_side_is_found(engine):
+    rng = np.random.default_rng(8)
+    calls = [("side_of", (tipped(axis, 25, rng).tolist(),)) for axis in AXES]
+    assert engines.run(engine, calls) == [0, 1, 2, 3, 4, 5]
+
+
+def still(rng, count=300, accel=(0.1, 0.97, -0.2), gyro=(12.0, -3.0, 0.4)):
+    """Samples of a still chip as the driver gives them: 8192 counts per g, 65.5 per deg/s."""
+    samples = np.zeros((count, 7))
+    samples[:, 0:3] = np.array(accel) * 8192 + rng.normal(scale=27, size=(count, 3))
+    samples[:, 3] = -3000 + rng.normal(scale=5, size=count)
+    samples[:, 4:7] = np.array(gyro) * 65.5 + rng.normal(scale=5, size=(count, 3))
+    return np.rint(samples).astype(int)
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_a_still_pose_is_averaged(engine):
+    samples = still(np.random.default_rng(9))
+    accel, gyro = engines.run(engine, [("capture", (samples.tolist(),))])[0]
+    assert_allclose(accel, samples[:, 0:3].mean(axis=0) / 8192, atol=1e-6)
+    assert_allclose(gyro, samples[:, 4:7].mean(axis=0) / 65.5, atol=1e-5)
+
+
+def knocked(samples):
+    samples[150, 1] += 900
+    return samples
+
+
+def shaken(samples):
+    samples[:, 0] += (250 * np.sin(np.arange(len(samples)))).astype(int)
+    return samples
+
+
+def tilting(samples):
+    """One degree in three seconds."""
+    samples[:, 0] += np.linspace(0, 8192 * np.radians(1.0), len(samples)).astype(int)
+    return samples
+
+
+def turned(samples):
+    samples[100:140, 5] += 500
+    return samples
+
+
+def frozen(samples):
+    samples[:] = samples[0]
+    return samples
+
+
+def saturated(samples):
+    samples[:, 2] = 32767
+    return samples
+
+
+def short(samples):
+    return samples[:10]
+
+
+def spinning(samples):
+    samples[:, 6] += 50 * 65
+    return samples
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+@pytest.mark.parametrize(
+    ("spoil", "reason"),
+    [
+        (knocked, "moved or knocked"),
+        (shaken, "vibration"),
+        (tilting, "slowly tilting"),
+        (turned, "moved or knocked"),
+        (frozen, "frozen"),
+        (saturated, "saturated"),
+        (short, "too short"),
+        (spinning, "gyro offset"),
+    ],
+)
+def test_a_pose_that_is_not_still_is_refused(engine, spoil, reason):
+    samples = spoil(still(np.random.default_rng(10)))
+    answer = engines.run(engine, [("capture", (samples.tolist(),))])[0]
+    assert reason in answer["refused"]
+    assert all(len(line) <= 16 for line in answer["lcd"])
