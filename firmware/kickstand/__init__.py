@@ -9,6 +9,6 @@ __version__ = "0.1.0"
 
 def status():
     """Print what a user needs to know of this board: versions, settings, sensor, display, calibration."""
-    from . import status as report
+    from . import status_report
 
-    report.report()
+    status_report.report()

@@ -52,9 +52,8 @@ class LeanMeter:
         matrix = self.calibration.vehicle_from_sensor
         rotate(self.force, matrix, force)
         rotate(self.rate, matrix, rate)
-        yaw_rate = self.rate[1]
-        self.lean_formula_deg = formula_lean_deg(self.force, yaw_rate)
-        self.lean_deg = self._smoothed.update(self.force, yaw_rate, dt_us)
+        self.lean_formula_deg = formula_lean_deg(self.force, self.rate[1])
+        self.lean_deg = self._smoothed.update(self.force, self.rate, dt_us)
         if self._age_us < SETTLE_US:
             self._age_us += dt_us
         else:

@@ -16,7 +16,7 @@ def report():
     machine_name = getattr(sys.implementation, "_machine", sys.platform)
     print(
         "Kickstand %s on %s, MicroPython %s"
-        % (__version__, machine_name, ".".join(str(n) for n in sys.implementation[1][:3]))
+        % (__version__, machine_name, ".".join(str(n) for n in sys.implementation.version[:3]))
     )
     try:
         try:

@@ -1,0 +1,225 @@
+"""The drivers by themselves: what they put on the bus, what they allocate, what they make of presses."""
+
+import json
+import subprocess
+
+import pytest
+from kickstand_tools import unix_port
+from kickstand_tools.board.simulator import Board
+
+needs_micropython = pytest.mark.skipif(
+    not unix_port.available(), reason="no MicroPython unix port for this system"
+)
+
+HEAP_SCRIPT = """
+import json, sys
+from kickstand_tools.board.simulator import Board
+
+Board(lambda t: (0, 0, 1, 0, 0, 0, 25)).install()  # for machine and time
+import micropython
+from kickstand.mpu6050 import Mpu6050
+
+class Wire:
+    "An I2C that allocates nothing itself."
+    def readfrom_mem_into(self, address, register, buffer):
+        for i in range(len(buffer)):
+            buffer[i] = 0x9F - 13 * i
+
+chip = Mpu6050(Wire())
+chip.read()
+micropython.heap_lock()
+try:
+    chip.read()
+    grew = False
+except MemoryError:
+    grew = True
+micropython.heap_unlock()
+print(json.dumps([grew, list(chip.counts)]))
+"""
+
+
+@needs_micropython
+def test_a_sample_takes_no_heap(tmp_path):
+    script = tmp_path / "heap.py"
+    script.write_text(HEAP_SCRIPT)
+    done = subprocess.run(
+        unix_port.command(str(script)), capture_output=True, text=True, env=unix_port.environment(), check=True
+    )
+    grew, counts = json.loads(done.stdout)
+    assert not grew
+    burst = [0x9F - 13 * i for i in range(14)]
+    words = [burst[2 * i] << 8 | burst[2 * i + 1] & 0xFF for i in range(7)]
+    assert counts == [((word + 0x8000) & 0xFFFF) - 0x8000 for word in words]
+
+
+@pytest.fixture
+def board():
+    made = Board(lambda t_s: (0.25, -0.5, 1.0, 10.0, -20.0, 30.0, 30.0))
+    made.install()
+    yield made
+    made.uninstall()
+
+
+def on(board, function):
+    """Run a function on the board and give back what it returned."""
+    result = []
+    assert board.run(lambda: result.append(function()), 1000) == "returned"
+    return result[0]
+
+
+def sensor_i2c():
+    from kickstand import bus
+
+    return bus.open_i2c(0, 4, 5, 400_000)
+
+
+@pytest.mark.parametrize("accel_range", [2, 4, 8, 16])
+@pytest.mark.parametrize("gyro_range", [250, 500, 1000, 2000])
+def test_every_range_reads_in_units(board, accel_range, gyro_range):
+    from kickstand.mpu6050 import Mpu6050
+
+    def read():
+        chip = Mpu6050(sensor_i2c(), accel_range_g=accel_range, gyro_range_dps=gyro_range)
+        chip.setup()
+        chip.read()
+        accel = [count / chip.accel_lsb_per_g for count in chip.counts[:3]]
+        return accel, [c / chip.gyro_lsb_per_dps for c in chip.counts[4:]], chip.temperature_c(chip.counts[3])
+
+    accel, gyro, temperature = on(board, read)
+    assert accel == pytest.approx([0.25, -0.5, 1.0], abs=1e-3)
+    assert gyro == pytest.approx([10, -20, 30], abs=0.1)
+    assert temperature == pytest.approx(30, abs=0.1)
+
+
+def test_setup_fails_when_the_configuration_does_not_stay(board):
+    from kickstand.mpu6050 import Mpu6050
+
+    board.faults.corrupt(0x68, nth=4, byte=1, mask=0x04, read=False)  # identify, reset, clock, SMPLRT_DIV
+    with pytest.raises(OSError, match="read back"):
+        on(board, lambda: Mpu6050(sensor_i2c()).setup())
+
+
+def test_a_stuck_bus_is_freed_and_a_dead_one_is_reported(board):
+    from kickstand import bus
+
+    def freed(bits):
+        board.sensor_bus.hang(bits)
+        return bus.free(4, 5)
+
+    assert on(board, lambda: freed(8))
+    assert not on(board, lambda: freed(1000))
+
+
+def display():
+    from kickstand import bus
+    from kickstand.hd44780 import Lcd
+
+    return Lcd(lambda: bus.open_i2c(1, 6, 7, 100_000))
+
+
+def test_only_changed_lines_are_sent_one_transfer_each(board):
+    from time import sleep_ms, ticks_ms
+
+    def run():
+        lcd = display()
+        lcd.show("first", "second")
+        lcd.flush()
+        counts = [board.lcd_bus.transfers[0x27]]
+        for line1, line2, ticks in (("first", "second", 20), ("first", "third", 20), ("a", "b", 20)):
+            lcd.show(line1, line2)
+            for _ in range(ticks):
+                sleep_ms(6)
+                lcd.tick(ticks_ms())
+            counts.append(board.lcd_bus.transfers[0x27])
+        return [after - before for before, after in zip(counts, counts[1:])]
+
+    assert on(board, run) == [0, 1, 2]
+    assert board.lcd.text() == ["a" + " " * 15, "b" + " " * 15]
+
+
+def test_a_display_out_of_step_is_put_right_by_the_next_initialisation(board):
+    from time import sleep_ms, ticks_ms
+
+    def run():
+        lcd = display()
+        lcd.show("Lean  12\xdf", "")
+        lcd.flush()
+        board.lcd.slip()
+        lcd.show("Lean  13\xdf", "")
+        garbled = None
+        for _ in range(1100):
+            lcd.tick(ticks_ms())
+            sleep_ms(10)
+            garbled = garbled or board.lcd.text()[0].startswith("Lean  13") is False
+        return garbled
+
+    assert on(board, run)
+    assert board.lcd.text()[0] == "Lean  13°       "
+
+
+@pytest.mark.parametrize(
+    ("held_s", "events"), [(0.005, []), (0.1, ["short"]), (0.7, ["short"]), (1.0, ["long"]), (5.0, ["long"])]
+)
+def test_presses(board, held_s, events):
+    from time import sleep_ms, ticks_ms
+
+    from kickstand.button import LONG, SHORT, Button
+    from machine import Pin
+
+    def run():
+        button = Button(Pin(15, Pin.IN, Pin.PULL_UP))
+        got = []
+        board.press(0.5, held_s)
+        for _ in range(700):
+            event = button.poll(ticks_ms())
+            if event:
+                got.append({SHORT: "short", LONG: "long"}[event])
+            sleep_ms(10)
+        return got
+
+    assert on(board, run) == events
+
+
+def test_ctrl_c_puts_the_watchdog_to_rest(board, monkeypatch, capsys, tmp_path):
+    """After Ctrl-C nothing feeds it; a board that resets in the middle of a copy could not be deployed to."""
+    import main
+    from kickstand import app
+
+    monkeypatch.chdir(tmp_path)
+    calls = []
+
+    def interrupted(self):
+        calls.append(1)
+        if len(calls) == 50:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(app.App, "step", interrupted)
+
+    def use_the_console():
+        from time import sleep_ms
+
+        main.main()
+        sleep_ms(20_000)
+
+    assert board.run(use_the_console, 100) == "returned"
+    assert "stopped" in capsys.readouterr().out
+
+
+def test_status_tells_how_the_board_is(board, monkeypatch, capsys, tmp_path):
+    import gc
+    import os
+
+    import kickstand
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(gc, "mem_free", lambda: 150_000, raising=False)
+    monkeypatch.setattr(os, "statvfs", lambda path: (4096, 4096, 300, 200))
+    on(board, kickstand.status)
+    report = capsys.readouterr().out
+    assert "MPU6050 (0x68), +-8 g, +-500 deg/s" in report
+    assert "Reading      0.250 -0.500 1.000 g" in report
+    assert "at 0x27" in report
+    assert "six positions: no, aligned: no; not calibrated" in report
+    board.remove_sensor()
+    on(board, kickstand.status)
+    assert "none answers on SDA 4, SCL 5" in capsys.readouterr().out
