@@ -1,0 +1,36 @@
+"""Run a script under MicroPython's unix port, with the firmware, the models and these tests on its path."""
+
+import subprocess
+import tempfile
+from pathlib import Path
+
+import pytest
+from kickstand_tools import unix_port
+
+HERE = Path(__file__).resolve().parent
+
+
+def run_mpy(script: str | Path, *args: str, timeout_s: float = 300) -> str:
+    """Standard output of a script (text, or Path). Skips without MicroPython; AssertionError if it fails."""
+    if not unix_port.available():
+        pytest.skip("no MicroPython unix port for this system")
+    environment = unix_port.environment()
+    environment["MICROPYPATH"] = f"{HERE}:{environment['MICROPYPATH']}"
+    with tempfile.TemporaryDirectory() as scratch:
+        if isinstance(script, str):
+            file = Path(scratch) / "script.py"
+            file.write_text(script, encoding="utf-8")
+        else:
+            file = script.resolve()
+        done = subprocess.run(
+            unix_port.command("-X", "heapsize=64M", str(file), *args),
+            env=environment,
+            cwd=scratch,
+            capture_output=True,
+            text=True,
+            timeout=timeout_s,
+        )
+    said = done.stdout + done.stderr
+    # the package's main() does not pass every exit status on
+    assert done.returncode == 0 and "Traceback (most recent" not in said, f"MicroPython says:\n{said}"
+    return done.stdout

@@ -1,0 +1,35 @@
+"""Model of a push button to ground that bounces."""
+
+BOUNCE_US = 4000
+_BOUNCES = 3  # short breaks (or closures) on each edge
+
+
+class Button:
+    """closed: True while its contacts touch. clock: has now_us and at()."""
+
+    def __init__(self, clock, seed=1):
+        self.closed = False
+        self._clock = clock
+        self._random = seed & 0x7FFFFFFF or 1
+
+    def press(self, at_us, for_us):
+        """Pressed from at_us for for_us, bouncing after both edges."""
+        self.turn(True, at_us)
+        self.turn(False, at_us + for_us)
+
+    def turn(self, closed, at_us):
+        """Pressed (True) or let go of (False) at at_us, with bounces within BOUNCE_US."""
+        self._set_at(at_us, closed)
+        step = BOUNCE_US // (2 * _BOUNCES)
+        for i in range(1, 2 * _BOUNCES + 1):
+            self._set_at(at_us + i * step - self._below(step // 2), closed if i % 2 == 0 else not closed)
+
+    def _set_at(self, at_us, closed):
+        def act():
+            self.closed = closed
+
+        self._clock.at(at_us, act)
+
+    def _below(self, limit):
+        self._random = (self._random * 1103515245 + 12345) & 0x7FFFFFFF
+        return (self._random >> 8) % limit

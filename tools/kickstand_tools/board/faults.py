@@ -1,0 +1,182 @@
+"""The fault script: what goes wrong on the board, and when. Seconds on the board's clock, 7-bit addresses."""
+
+import builtins
+import errno
+import io
+
+from .clock import to_us
+
+_NEVER = 1 << 60
+
+
+class TransferFault:
+    """What befalls transfers to one address: transfers first..last, begun in from_us..until_us.
+
+    kind: "nack"; "timeout"; "corrupt": the bits of mask in data byte number byte; "slip": from that byte on.
+    """
+
+    def __init__(self, kind, address, first, last, from_us=0, until_us=_NEVER, byte=0, mask=0, read=True):
+        self.kind = kind
+        self.mask = mask
+        self._address = address
+        self._numbers = (first, last)
+        self._times = (from_us, until_us)
+        self._byte = byte
+        self._read = read
+        self._count = 0
+        self._carry = 0
+
+    def applies(self, address, number, now_us):
+        """Whether the transfer that begins now has this fault."""
+        first, last = self._numbers
+        start, end = self._times
+        return address == self._address and first <= number <= last and start <= now_us < end
+
+    def begin(self, read):
+        """At each START: True, or False (NACK), or None (wires held)."""
+        self._count = 0
+        return {"nack": False, "timeout": None}.get(self.kind, True)
+
+    def on_write(self, value):
+        """What arrives of a byte the controller sends. The first is number 0, be it a register address."""
+        return value if self._read else self._spoil(value)
+
+    def on_read(self, value):
+        """What arrives of a byte a device sends."""
+        return self._spoil(value) if self._read else value
+
+    def _spoil(self, value):
+        number = self._count
+        self._count += 1
+        if self.kind == "corrupt":
+            return value ^ self.mask if number == self._byte else value
+        if number < self._byte:
+            return value
+        # The device missed a clock: the bit on the wire is read twice, and all that follow come one late
+        late = (value & 0x80 if number == self._byte else self._carry << 7) | value >> 1
+        self._carry = value & 1
+        return late
+
+
+class Faults:
+    """The faults of one board. Each method puts one on the script; several may be under way at once."""
+
+    def __init__(self, board):
+        self._board = board
+        self._real_open = None
+
+    # On the wires
+
+    def nack(self, address, nth=1, count=1):
+        """The nth transfer to address from now, and count - 1 more, are not acknowledged."""
+        self._transfers("nack", address, nth, count)
+
+    def nack_for(self, address, at_s, for_s):
+        """No transfer to address is acknowledged for for_s."""
+        self._during("nack", address, at_s, for_s)
+
+    def timeout(self, address, nth=1, count=1):
+        """The nth transfer to address from now, and count - 1 more, hang until the controller gives up."""
+        self._transfers("timeout", address, nth, count)
+
+    def timeout_for(self, address, at_s, for_s):
+        """Every transfer to address hangs until the controller gives up, for for_s."""
+        self._during("timeout", address, at_s, for_s)
+
+    def corrupt(self, address, nth=1, byte=0, mask=0x01, read=True):
+        """In the nth transfer from now the bits of mask in one byte read (read=False: written) turn over."""
+        self._transfers("corrupt", address, nth, 1, byte, mask, read)
+
+    def bit_slip(self, address, nth=1, byte=0):
+        """In the nth transfer from now a clock is lost: what is read from that byte on comes one bit late."""
+        self._transfers("slip", address, nth, 1, byte)
+
+    def stuck_sda(self, at_s, bits=8, lcd=False):
+        """A device on the sensor's (or the LCD's) bus holds SDA low until SCL was clocked `bits` times."""
+        bus = self._board.lcd_bus if lcd else self._board.sensor_bus
+        self._board.at(at_s, lambda: bus.hang(bits))
+
+    # In the devices
+
+    def supply_dip(self, at_s, leaves="asleep"):
+        """The sensor loses its configuration.
+
+        leaves: "asleep" (all zeros), "frozen" (asleep, last data) or "default_ranges" (awake, other scales).
+        """
+        self._board.at(at_s, lambda: self._board.sensor.supply_dip(leaves))
+
+    def freeze(self, at_s, for_s):
+        """The sensor answers, configuration and all, but its data no longer change."""
+        self._override(at_s, for_s, "freeze")
+
+    def all_zero(self, at_s, for_s):
+        """The data registers read 0."""
+        self._override(at_s, for_s, 0x00)
+
+    def all_ones(self, at_s, for_s):
+        """The data registers read 0xFFFF."""
+        self._override(at_s, for_s, 0xFF)
+
+    def unplug_sensor(self, at_s, for_s=None):
+        """The sensor is gone, for good or for for_s; it comes back as from power-on."""
+        self._board.at(at_s, self._board.remove_sensor)
+        if for_s is not None:
+            self._board.at(at_s + for_s, self._board.fit_sensor)
+
+    def unplug_lcd(self, at_s, for_s=None):
+        """The display is gone, for good or for for_s; it comes back as from power-on."""
+        self._board.at(at_s, self._board.remove_lcd)
+        if for_s is not None:
+            self._board.at(at_s + for_s, self._board.fit_lcd)
+
+    def lcd_slip(self, at_s):
+        """A spike on E puts the display's nibbles out of step."""
+        self._board.at(at_s, self._board.lcd.slip)
+
+    # In the file system
+
+    def file_error(self, ending, at_s, for_s):
+        """Files whose name ends so cannot be opened for reading."""
+        self._files(ending, at_s, for_s, False)
+
+    def file_empty(self, ending, at_s, for_s):
+        """Files whose name ends so read as empty, as in a voltage sag."""
+        self._files(ending, at_s, for_s, True)
+
+    def restore_files(self):
+        """End what the two above began."""
+        if self._real_open is not None:
+            builtins.open = self._real_open
+            self._real_open = None
+
+    def _transfers(self, kind, address, nth, count, byte=0, mask=0, read=True):
+        for bus in self._board.buses:
+            first = bus.transfers.get(address, 0) + nth
+            bus.faults.append(
+                TransferFault(kind, address, first, first + count - 1, byte=byte, mask=mask, read=read)
+            )
+
+    def _during(self, kind, address, at_s, for_s):
+        for bus in self._board.buses:
+            bus.faults.append(TransferFault(kind, address, 0, _NEVER, to_us(at_s), to_us(at_s + for_s)))
+
+    def _override(self, at_s, for_s, value):
+        self._board.at(at_s, lambda: self._board.sensor.override(value))
+        self._board.at(at_s + for_s, lambda: self._board.sensor.override(None))
+
+    def _files(self, ending, at_s, for_s, empty):
+        def begin():
+            self.restore_files()
+            self._real_open = real = builtins.open
+
+            def failing(path, mode="r", *more, **named):
+                if not str(path).endswith(ending) or "r" not in mode or "+" in mode:
+                    return real(path, mode, *more, **named)
+                if not empty:
+                    raise OSError(errno.EIO)
+                return io.BytesIO() if "b" in mode else io.StringIO()
+
+            builtins.open = failing
+
+        self._board.at(at_s, begin)
+        self._board.at(at_s + for_s, self.restore_files)

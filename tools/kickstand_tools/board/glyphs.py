@@ -1,0 +1,53 @@
+"""What a character code looks like, as text: ROM A00 of the HD44780 and patterns in its character memory."""
+
+# Beyond ASCII: the codes of ROM A00 that have a plain counterpart (HD44780U data sheet, table 4)
+_ROM_A00 = {
+    0x5C: "\u00a5",  # yen
+    0x7E: "\u2192",  # right arrow
+    0x7F: "\u2190",  # left arrow
+    0xA5: "\u00b7",  # middle dot
+    0xDF: "\u00b0",  # degree
+    0xE0: "\u03b1",  # alpha
+    0xE2: "\u03b2",  # beta
+    0xE4: "\u03bc",  # mu
+    0xF2: "\u03b8",  # theta
+    0xF4: "\u03a9",  # omega
+    0xF6: "\u03a3",  # sigma
+    0xF7: "\u03c0",  # pi
+    0xFD: "\u00f7",  # division
+    0xFF: "\u2588",  # full block
+}
+
+# Unicode's blocks come in eighths, a character has five columns: the nearest
+_FROM_LEFT = " \u258e\u258d\u258b\u258a\u2588"
+_FROM_RIGHT = " \u2595\u2590\u2590\u2590\u2588"  # there is only an eighth and a half
+_FROM_BELOW = " \u2581\u2582\u2583\u2584\u2585\u2586\u2587\u2588"
+
+
+def rom(code):
+    """The ROM character of a code >= 0x10; '?' where text has none like it."""
+    if code in _ROM_A00:
+        return _ROM_A00[code]
+    if 0x20 <= code < 0x7E:
+        return chr(code)
+    return " " if code < 0x20 or 0x80 <= code <= 0xA0 else "?"
+
+
+def drawn(rows):
+    """The character nearest to a 5x8 pattern. rows: eight values, bits 4 (left) to 0 (right)."""
+    rows = [row & 0x1F for row in rows]
+    inked = [row for row in rows if row]
+    if not inked:
+        return " "
+    if all(row == 0x1F for row in rows[8 - len(inked) :]):
+        return _FROM_BELOW[len(inked)]
+    row = inked[0]
+    if len(inked) < 5 or any(r != row for r in inked):
+        return "?"
+    # A bar from side to side, perhaps with a gap above or below
+    for columns in range(1, 6):
+        if row == 0x1F & ~(0x1F >> columns):
+            return _FROM_LEFT[columns]
+        if row == (1 << columns) - 1:
+            return _FROM_RIGHT[columns]
+    return "|" if row in (0x04, 0x08, 0x02) else "?"

@@ -1,0 +1,221 @@
+"""Model of a 16x2 HD44780 character display on a PCF8574 backpack (HD44780U data sheet ADE-207-272).
+
+Wiring of the usual backpack: P0 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7; D0..D3 are open: read as ones.
+What is sent while the controller is busy is lost, as on the chip; lost counts it.
+"""
+
+from .glyphs import drawn, rom
+
+_RS, _RW, _E, _LIGHT = 0x01, 0x02, 0x04, 0x08
+
+POWER_UP_US = 40_000  # at 3.3 V; 15 ms at 5 V
+WAKE_US = (4100, 100)  # after the first and the second "function set, 8 bit" from power-up (figures 23, 24)
+CLEAR_US = 1520  # also home
+COMMAND_US = 37
+DATA_US = 41  # 37 us, and 4 us for the address counter
+
+COLUMNS = 16
+_LINE = 40  # characters a line holds in display memory; 16 of them are seen
+_TWO_LINE_WRAPS = (
+    (0x28, 0x40),
+    (0x68, 0x00),
+    (0x3F, 0x27),
+    (-1, 0x67),
+)  # address past an end, where it goes on
+_ONE_LINE_WRAPS = ((0x50, 0x00), (-1, 0x4F))
+
+
+class Lcd:
+    """One display. clock: has now_us. address: 0x20..0x27 (PCF8574) or 0x38..0x3F (PCF8574A).
+
+    changes counts whatever may be seen to change; lost counts nibbles (bytes in 8-bit mode) sent while busy.
+    """
+
+    max_hz = 100_000  # the PCF8574 is a standard-mode part
+
+    def __init__(self, clock, address=0x27):
+        self.address = address
+        self.clock = clock
+        self.changes = 0
+        self.power_on()
+
+    def power_on(self):
+        """As the internal reset leaves it: 8-bit mode, one line, off. Busy for POWER_UP_US."""
+        self.ddram = bytearray(b" " * 128)  # by address: lines at 0x00..0x27 and 0x40..0x67
+        self.cgram = bytearray(64)
+        self.glyphs = [" "] * 8  # cgram as text
+        self.lost = 0
+        self.on = self.cursor = self.blink = False
+        self.two_lines = False
+        self._port = 0xFF  # the outputs of a PCF8574 come up high
+        self._eight_bit = True
+        self._high = -1  # the first nibble of a byte, while the second is missing
+        self._low_next = False  # the same for reads
+        self._in_cgram = False
+        self._ac = 0  # address counter
+        self._step = 1
+        self._shifts = False
+        self._shift = 0
+        self._wakes = 0
+        self._busy_us = self.clock.now_us + POWER_UP_US
+        self.changes += 1
+
+    def power_off(self):
+        """Nothing is seen any more."""
+        self.on = False
+        self._port = 0
+        self.changes += 1
+
+    def slip(self):
+        """Put the nibbles out of step, as a spike on E does."""
+        if not self._eight_bit:
+            self._high = 0 if self._high < 0 else -1
+
+    @property
+    def backlight(self):
+        """True while it is lit."""
+        return bool(self._port & _LIGHT)
+
+    def codes(self):
+        """Two lists of the 16 character codes in view."""
+        places = [(self._shift + i) % _LINE for i in range(COLUMNS)]
+        return [[self.ddram[start + place] for place in places] for start in (0x00, 0x40)]
+
+    def text(self):
+        """Two strings of 16 characters, as seen: blank while the display is off."""
+        lines = ["".join([self._character(code) for code in line]) for line in self.codes()]
+        if not self.on:
+            lines = [" " * COLUMNS, " " * COLUMNS]
+        elif not self.two_lines:
+            lines[1] = " " * COLUMNS
+        return lines
+
+    def _character(self, code):
+        return self.glyphs[code & 7] if code < 0x10 else rom(code)
+
+    # The I2C side
+
+    def start(self, address, read):
+        """START and address. True: acknowledged."""
+        return True
+
+    def write_byte(self, value):
+        """New levels of the eight pins; when E falls, what stood there before is taken. True: ACK."""
+        before = self._port
+        self._port = value
+        if (before ^ value) & _LIGHT:
+            self.changes += 1
+        if before & _E and not value & _E:
+            self._latch(before)
+        return True
+
+    def read_byte(self):
+        """The eight pins; while R/W and E are high, busy flag and address counter on D7..D4 in two halves."""
+        port = self._port
+        if not (port & _RW and port & _E) or port & _RS:
+            return port
+        status = self._ac | (0x80 if self.clock.now_us < self._busy_us else 0)
+        if self._low_next and not self._eight_bit:
+            status <<= 4
+        return (port & 0x0F) | (status & 0xF0)
+
+    def stop(self):
+        """STOP."""
+
+    # The controller
+
+    def _latch(self, port):
+        if port & _RW:
+            self._low_next = not self._low_next
+            return
+        if self.clock.now_us < self._busy_us:
+            self.lost += 1
+            return
+        nibble = port >> 4
+        if self._eight_bit:
+            self._take(nibble << 4 | 0x0F, port & _RS)
+        elif self._high < 0:
+            self._high = nibble
+        else:
+            value = self._high << 4 | nibble
+            self._high = -1
+            self._take(value, port & _RS)
+
+    def _take(self, value, is_data):
+        if is_data:
+            self._store(value)
+            busy_us = DATA_US
+        else:
+            busy_us = self._command(value)
+        self._busy_us = self.clock.now_us + busy_us
+
+    def _store(self, value):
+        if self._in_cgram:
+            if self.cgram[self._ac] != value:
+                self.cgram[self._ac] = value
+                glyph = self._ac >> 3
+                self.glyphs[glyph] = drawn(self.cgram[glyph * 8 : glyph * 8 + 8])
+                self.changes += 1
+            self._ac = (self._ac + self._step) & 0x3F
+            return
+        if self.ddram[self._ac] != value:
+            self.ddram[self._ac] = value
+            self.changes += 1
+        self._move(self._step)
+        if self._shifts:
+            self._shift_by(self._step)
+
+    def _move(self, step):
+        """The address counter within display memory: from the end of a line to the start of the other."""
+        ac = self._ac + step
+        wraps = _TWO_LINE_WRAPS if self.two_lines else _ONE_LINE_WRAPS
+        for beyond, wrapped in wraps:
+            if ac == beyond:
+                ac = wrapped
+        self._ac = ac & 0x7F
+
+    def _shift_by(self, step):
+        self._shift = (self._shift + step) % _LINE
+        self.changes += 1
+
+    def _command(self, value):
+        """Do a command; how long it takes in us."""
+        if value & 0x80:
+            self._ac = value & 0x7F
+            self._in_cgram = False
+        elif value & 0x40:
+            self._ac = value & 0x3F
+            self._in_cgram = True
+        elif value & 0x20:
+            return self._function_set(value)
+        elif value & 0x10:
+            step = 1 if value & 0x04 else -1
+            if value & 0x08:
+                self._shift_by(-step)  # the text moves right when the window moves left
+            else:
+                self._move(step)
+        elif value & 0x08:
+            self.on, self.cursor, self.blink = bool(value & 4), bool(value & 2), bool(value & 1)
+            self.changes += 1
+        elif value & 0x04:
+            self._step = 1 if value & 2 else -1
+            self._shifts = bool(value & 1)
+        elif value:
+            if value & 0x02 == 0:  # clear
+                self.ddram = bytearray(b" " * 128)
+                self._step = 1
+            self._ac = 0
+            self._in_cgram = False
+            self._shift = 0
+            self.changes += 1
+            return CLEAR_US
+        return COMMAND_US
+
+    def _function_set(self, value):
+        self._eight_bit = bool(value & 0x10)
+        self.two_lines = bool(value & 0x08)
+        self.changes += 1
+        if self._eight_bit and self._wakes < len(WAKE_US):
+            self._wakes += 1
+            return WAKE_US[self._wakes - 1]
+        return COMMAND_US
