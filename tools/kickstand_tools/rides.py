@@ -1,0 +1,223 @@
+"""A motorcycle in balance whose lean is known at every instant: what a perfect sensor on it would feel.
+
+Plain Python for CPython and MicroPython, independent of the firmware's mathematics, so that it can judge it.
+
+Vehicle frame: left, up, forward (right-handed). Lean > 0 to the right, yaw rate > 0 in a left turn, slope > 0
+uphill. The attitude is heading about the vertical, then slope about the lateral axis, lean about forward.
+Leaning to the right turns left towards up, a positive rotation: w_forward = d(lean)/dt on a level road.
+The sensor sits on the roll axis; the tyres have no width.
+
+    ride = Ride([kickstand(8), upright(8), accelerate(15, 5), turn(-30, 5), brake(0, 4)])
+    ride.motion(20.0)   # (left, up, forward in g, then rates about left, up, forward in deg/s)
+    ride.truth(20.0)    # (lean_deg, speed_mps, yaw_rate_dps, phase)
+"""
+
+from math import cos, degrees, pi, radians, sin, sqrt, tan
+
+GRAVITY_MPS2 = 9.80665
+KICKSTAND_DEG = -12.0  # to the left, as most are
+MOVE_S = 2.0  # from the kickstand to upright, or back
+STANDING_SWAY_DEG = 0.1  # a rider holding the bike upright between the knees
+RIDING_SWAY_DEG = 0.5
+WALKING_MPS, RIDING_MPS = 1.0, 4.0  # below the first feet balance the bike, above the second steering alone
+
+_SWAY = ((0.31, 0.6, 0.0), (0.73, 0.4, 1.0))  # Hz, share, phase
+_ROAD_HZ = (2.3, 5.9, 11.7, 19.3, 31.1)
+_ROAD_G = (0.5, 1.0, 0.5)  # left, up, forward: shares of vibration_g
+_ROAD_DPS = (25.0, 10.0, 15.0)  # deg/s per g of vibration
+_IDLE_HZ = 20.0
+_ENGINE_CYCLES_PER_M = 3.7  # 20 Hz at idle, 75 Hz at 15 m/s
+_ENGINE_SHARE = 0.5  # of vibration_g
+
+
+class Segment:
+    """A stretch of the ride in which lean, speed, slope, sway and engine glide to new values (None: stay)."""
+
+    def __init__(
+        self, phase, seconds, lean_deg=None, speed_mps=None, slope_deg=None, sway_deg=None, engine=None
+    ):
+        self.phase = phase
+        self.seconds = seconds
+        self.targets = (lean_deg, speed_mps, slope_deg, sway_deg, engine)
+
+
+def kickstand(seconds, lean_deg=KICKSTAND_DEG, slope_deg=None):
+    """Brought onto the kickstand, then still on it, engine off. lean_deg > 0: a kickstand on the right."""
+    return (
+        Segment("moving", MOVE_S, lean_deg, 0.0, slope_deg, 0.0, 0.0),
+        Segment("kickstand", seconds),
+    )
+
+
+def upright(seconds, lean_deg=0.0, slope_deg=None):
+    """Brought upright, then held there by the rider, engine off. lean_deg: how far off upright."""
+    return (
+        Segment("moving", MOVE_S, lean_deg, 0.0, slope_deg, STANDING_SWAY_DEG, 0.0),
+        Segment("upright", seconds),
+    )
+
+
+def wait(seconds):
+    """Stay as it is."""
+    return (Segment("wait", seconds),)
+
+
+def straight(seconds, slope_deg=None):
+    """Ride straight on; a new slope is reached at the end."""
+    return (Segment("straight", seconds, slope_deg=slope_deg),)
+
+
+def turn(lean_deg, seconds, roll_s=1.5):
+    """Roll to lean_deg within roll_s, hold it for seconds (phase "held turn"), roll back within roll_s."""
+    return (
+        Segment("roll in", roll_s, lean_deg),
+        Segment("held turn", seconds),
+        Segment("roll out", roll_s, 0.0),
+    )
+
+
+def accelerate(speed_mps, seconds):
+    """Speed up to speed_mps, upright."""
+    return (Segment("accelerate", seconds, 0.0, speed_mps, sway_deg=RIDING_SWAY_DEG, engine=1.0),)
+
+
+def brake(speed_mps, seconds):
+    """Slow down to speed_mps, upright; a stop ends in the rider's hands."""
+    sway = RIDING_SWAY_DEG if speed_mps else STANDING_SWAY_DEG
+    return (Segment("brake", seconds, 0.0, speed_mps, sway_deg=sway),)
+
+
+def _glide(start, end, u, seconds):
+    """(value, derivative per second) at 0 <= u <= 1 of a step without jumps in its first two derivatives."""
+    change = end - start
+    if change == 0.0:
+        return start, 0.0
+    value = start + change * u * u * u * (10.0 + u * (6.0 * u - 15.0))
+    return value, change * 30.0 * u * u * (1.0 - u) * (1.0 - u) / seconds
+
+
+def yaw_rate_in_balance(lean, lift_mps2, speed_mps):
+    """Yaw rate in rad/s that balances lean (rad) at this speed; lift: specific force off the road, m/s2."""
+    if speed_mps <= WALKING_MPS:
+        return 0.0
+    share = 1.0
+    if speed_mps < RIDING_MPS:
+        share, _ = _glide(0.0, 1.0, (speed_mps - WALKING_MPS) / (RIDING_MPS - WALKING_MPS), 1.0)
+    return -share * lift_mps2 * tan(lean) / speed_mps
+
+
+def body_motion(lean, lean_rate, speed, acceleration, yaw_rate, slope=0.0, slope_rate=0.0):
+    """What the bike's own axes feel: (left, up, forward) in g and rates about them in deg/s.
+
+    Angles in rad, rates in rad/s, speed in m/s, acceleration in m/s2 along the road.
+    """
+    # In the road's axes: forward along the road, left level, up across both.
+    left = speed * yaw_rate * cos(slope)
+    up = GRAVITY_MPS2 * cos(slope) + speed * slope_rate
+    forward = acceleration + GRAVITY_MPS2 * sin(slope)
+    w_left = -slope_rate  # nose up turns forward towards up: negative about left
+    w_up = yaw_rate * cos(slope)
+    w_forward = yaw_rate * sin(slope) + lean_rate
+    c, s = cos(lean), sin(lean)
+    return (
+        (left * c + up * s) / GRAVITY_MPS2,
+        (up * c - left * s) / GRAVITY_MPS2,
+        forward / GRAVITY_MPS2,
+        degrees(w_left * c + w_up * s),
+        degrees(w_up * c - w_left * s),
+        degrees(w_forward),
+    )
+
+
+class Ride:
+    """segments: what the functions above return, in order from t = 0; the ride starts settled in the first.
+
+    vibration_g: rms of road and engine together on the up axis at 10 m/s and more, before the chip's filter.
+    """
+
+    def __init__(self, segments, vibration_g=0.05):
+        self.vibration_g = vibration_g
+        self.seconds = 0.0
+        self._segments = []  # (start, segment, values at its start, values at its end, distance at its start)
+        distance = 0.0
+        first = segments[0][0].targets
+        values = tuple([0.0 if v is None else v for v in first])
+        for group in segments:
+            for segment in group:
+                targets = segment.targets
+                end = tuple([values[i] if targets[i] is None else targets[i] for i in range(5)])
+                if segment.phase == "moving" and end == values:
+                    continue  # it is there already
+                self._segments.append((self.seconds, segment, values, end, distance))
+                self.seconds += segment.seconds
+                distance += segment.seconds * (values[1] + end[1]) / 2.0
+                values = end
+        self._at = 0
+
+    def _find(self, t_s):
+        """The segment at t_s; before the start the first, after the end the last."""
+        i = self._at
+        while i > 0 and t_s < self._segments[i][0]:
+            i -= 1
+        while i + 1 < len(self._segments) and t_s >= self._segments[i + 1][0]:
+            i += 1
+        self._at = i  # time mostly goes on: start the next search here
+        return self._segments[i]
+
+    def state(self, t_s):
+        """Phase, lean and its rate, speed, acceleration, yaw rate, slope and its rate, distance, engine 0..1.
+
+        In rad, m, s.
+        """
+        start, segment, before, after, distance = self._find(t_s)
+        seconds = segment.seconds
+        u = min(1.0, max(0.0, (t_s - start) / seconds)) if seconds else 1.0
+        lean, lean_rate = _glide(before[0], after[0], u, seconds)
+        speed, acceleration = _glide(before[1], after[1], u, seconds)
+        slope, slope_rate = _glide(before[2], after[2], u, seconds)
+        sway, sway_rate = _glide(before[3], after[3], u, seconds)
+        engine, _ = _glide(before[4], after[4], u, seconds)
+        for hz, share, phase in _SWAY:
+            angle = 2.0 * pi * hz * t_s + phase
+            lean += sway * share * sin(angle)
+            lean_rate += share * (sway_rate * sin(angle) + sway * 2.0 * pi * hz * cos(angle))
+        lean, lean_rate = radians(lean), radians(lean_rate)
+        slope, slope_rate = radians(slope), radians(slope_rate)
+        # the integral of the glide: u^6 - 3 u^5 + 2.5 u^4
+        glided = u * u * u * u * (2.5 + u * (u - 3.0))
+        distance += seconds * (before[1] * u + (after[1] - before[1]) * glided)
+        if t_s > self.seconds:
+            distance += after[1] * (t_s - self.seconds)
+        lift = GRAVITY_MPS2 * cos(slope) + speed * slope_rate
+        yaw = yaw_rate_in_balance(lean, lift, speed) / cos(slope)
+        return segment.phase, lean, lean_rate, speed, acceleration, yaw, slope, slope_rate, distance, engine
+
+    def truth(self, t_s):
+        """(lean_deg, speed_mps, yaw_rate_dps, phase)"""
+        state = self.state(t_s)
+        return degrees(state[1]), state[3], degrees(state[5]), state[0]
+
+    def motion(self, t_s):
+        """Specific force in g (left, up, forward) and rates in deg/s about these axes, with vibration."""
+        state = self.state(t_s)
+        speed, distance, engine = state[3], state[8], state[9]
+        return shaken(body_motion(*state[1:8]), t_s, self.vibration_g, speed, distance, engine)
+
+
+def shaken(motion, t_s, vibration_g, speed_mps, distance_m, engine):
+    """motion with road and engine vibration added. engine: 0 (off) to 1 (running)."""
+    road = vibration_g * min(1.0, speed_mps / 10.0) * sqrt(1.0 - _ENGINE_SHARE * _ENGINE_SHARE)
+    firing = vibration_g * engine * _ENGINE_SHARE
+    if road == 0.0 and firing == 0.0:
+        return motion
+    peak = sqrt(2.0 / len(_ROAD_HZ))  # of each of the equal sines that add up to an rms of 1
+    turns = 2.0 * pi * (_IDLE_HZ * t_s + _ENGINE_CYCLES_PER_M * distance_m)
+    felt = []
+    for axis in range(6):
+        wave = 0.0
+        for k in range(len(_ROAD_HZ)):
+            wave += sin(2.0 * pi * _ROAD_HZ[k] * t_s + 2.4 * (5 * axis + k))
+        shake = road * peak * wave + firing * sqrt(2.0) * sin(turns + 2.4 * axis)
+        share = _ROAD_G[axis] if axis < 3 else _ROAD_DPS[axis - 3]
+        felt.append(motion[axis] + share * shake)
+    return tuple(felt)

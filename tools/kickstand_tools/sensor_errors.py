@@ -1,0 +1,151 @@
+"""An MPU6050 as it leaves the factory, stuck on at any angle: what its own axes read of a given motion.
+
+Plain Python for CPython and MicroPython. Everything random comes from a seed and from the time asked for: the
+same seed gives the same reading at the same instant on either, in any order.
+
+    world = Sensor(seed=3).world(ride.motion)
+    world(20.0)         # (fx, fy, fz, wx, wy, wz, temp_c): g and deg/s in the sensor's axes, errors included
+"""
+
+from math import cos, pi, sin, sqrt
+
+# Data sheet PS-MPU-6000A rev 3.4, section 6.1-6.2
+MAX_OFFSET_G = (0.05, 0.05, 0.08)
+MAX_SCALE_ERROR = 0.03
+MAX_GYRO_BIAS_DPS = 20.0
+ACCEL_NOISE_G = 0.0033  # rms: 400 ug/sqrt(Hz) behind the 44 Hz low-pass
+GYRO_NOISE_DPS = 0.041  # rms: 0.005 deg/s/sqrt(Hz) behind the 42 Hz one
+
+UNTURNED = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+_NOISE_STEP_S = 0.0001  # noise is new every step
+
+
+def scrambled(number):
+    """A whole number's 32-bit hash: the only source of chance here."""
+    number = (number ^ (number >> 16)) & 0xFFFFFFFF
+    number = (number * 0x45D9F3B) & 0xFFFFFFFF
+    number ^= number >> 16
+    number = (number * 0x45D9F3B) & 0xFFFFFFFF
+    return number ^ (number >> 16)
+
+
+def normal(number):
+    """Very nearly normal, mean 0, rms 1, from a 32-bit hash: the sum of its four bytes."""
+    total = (number & 255) + (number >> 8 & 255) + (number >> 16 & 255) + (number >> 24)
+    return (total - 510) / 147.8
+
+
+class Chance:
+    """A stream of random figures from a seed."""
+
+    def __init__(self, seed):
+        self._seed = scrambled(seed + 1)
+        self._count = 0
+
+    def uniform(self, low, high):
+        self._count += 1
+        return low + (high - low) * scrambled(self._seed + self._count) / 0xFFFFFFFF
+
+
+def random_mounting(seed):
+    """Vehicle from sensor (9, rows left, up, forward), all rotations equally likely (K. Shoemake, 1992)."""
+    chance = Chance(seed)
+    u = chance.uniform(0.0, 1.0)
+    a, b = chance.uniform(0.0, 2.0 * pi), chance.uniform(0.0, 2.0 * pi)
+    x, y = sqrt(1.0 - u) * sin(a), sqrt(1.0 - u) * cos(a)
+    z, w = sqrt(u) * sin(b), sqrt(u) * cos(b)
+    return (
+        1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w),
+        2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
+        2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y),
+    )  # fmt: skip
+
+
+def axis_aligned_mountings():
+    """The 24 mountings along the vehicle's axes: vehicle from sensor, 9 each, rows left, up, forward."""
+    axes = [(s * (i == 0), s * (i == 1), s * (i == 2)) for i in range(3) for s in (1.0, -1.0)]
+    found = []
+    for left in axes:
+        for up in axes:
+            if left[0] * up[0] + left[1] * up[1] + left[2] * up[2] == 0.0:
+                forward = (
+                    left[1] * up[2] - left[2] * up[1],
+                    left[2] * up[0] - left[0] * up[2],
+                    left[0] * up[1] - left[1] * up[0],
+                )
+                found.append(left + up + forward)
+    return found
+
+
+class Sensor:
+    """One chip: its errors and how it is mounted. Without a seed a perfect chip but for its noise, unturned.
+
+    reading = scale * true + offset for the accelerometer, scale * true + bias for the gyro, each with noise.
+    share: how much of the data sheet's worst offsets, scales and biases a random part may have.
+    """
+
+    def __init__(self, seed=None, mounting=None, share=1.0, noise=1.0):
+        self.vehicle_from_sensor = mounting or (UNTURNED if seed is None else random_mounting(seed))
+        self.accel_offset_g = (0.0, 0.0, 0.0)
+        self.accel_scale = (1.0, 1.0, 1.0)
+        self.gyro_bias_dps = (0.0, 0.0, 0.0)
+        self.gyro_scale = (1.0, 1.0, 1.0)
+        self.accel_noise_g = noise * ACCEL_NOISE_G
+        self.gyro_noise_dps = noise * GYRO_NOISE_DPS
+        self.temp_c = 25.0
+        self._seed = scrambled(7 if seed is None else seed)
+        if seed is not None:
+            chance = Chance(seed + 1000)
+            self.accel_offset_g = tuple([share * chance.uniform(-m, m) for m in MAX_OFFSET_G])
+            error = share * MAX_SCALE_ERROR
+            self.accel_scale = tuple([1.0 + chance.uniform(-error, error) for _ in range(3)])
+            bias = share * MAX_GYRO_BIAS_DPS
+            self.gyro_bias_dps = tuple([chance.uniform(-bias, bias) for _ in range(3)])
+            self.gyro_scale = tuple([1.0 + chance.uniform(-error, error) for _ in range(3)])
+
+    def read(self, motion, t_s):
+        """World's seven figures for a motion: left, up, forward in g, and the rates about them in deg/s."""
+        m = self.vehicle_from_sensor
+        left, up, forward, w_left, w_up, w_forward = motion
+        instant = self._seed + int(t_s / _NOISE_STEP_S + 0.5) * 6
+        values = []
+        for i in range(3):  # the transpose: sensor from vehicle
+            true = m[i] * left + m[3 + i] * up + m[6 + i] * forward
+            noise = self.accel_noise_g * normal(scrambled(instant + i))
+            values.append(self.accel_scale[i] * true + self.accel_offset_g[i] + noise)
+        for i in range(3):
+            true = m[i] * w_left + m[3 + i] * w_up + m[6 + i] * w_forward
+            noise = self.gyro_noise_dps * normal(scrambled(instant + 3 + i))
+            values.append(self.gyro_scale[i] * true + self.gyro_bias_dps[i] + noise)
+        values.append(self.temp_c)
+        return tuple(values)
+
+    def world(self, motion):
+        """world(t_s) for the simulated chip; motion(t_s) as Ride.motion."""
+        return lambda t_s: self.read(motion(t_s), t_s)
+
+
+def resting(sensor, up):
+    """world(t_s) of this sensor at rest with `up` (sensor's own axes, any length) pointing up."""
+    m = sensor.vehicle_from_sensor
+    size = sqrt(up[0] * up[0] + up[1] * up[1] + up[2] * up[2])
+    force = [(m[3 * i] * up[0] + m[3 * i + 1] * up[1] + m[3 * i + 2] * up[2]) / size for i in range(3)]
+    still = (force[0], force[1], force[2], 0.0, 0.0, 0.0)
+    return sensor.world(lambda t_s: still)
+
+
+def six_poses(sensor, off_deg=0.0, seed=1):
+    """Seven (name, world): the sides up in turn, "+x", "-x", ..., each up to off_deg askew; then "free"."""
+    chance = Chance(seed + 2000)
+    poses = []
+    for axis in range(3):
+        for sign in (1.0, -1.0):
+            askew = chance.uniform(0.0, off_deg) * pi / 180.0
+            around = chance.uniform(0.0, 2.0 * pi)
+            up = [0.0, 0.0, 0.0]
+            up[axis] = sign * cos(askew)
+            up[(axis + 1) % 3] = sin(askew) * cos(around)
+            up[(axis + 2) % 3] = sin(askew) * sin(around)
+            poses.append((("+" if sign > 0 else "-") + "xyz"[axis], resting(sensor, up)))
+    poses.append(("free", resting(sensor, (0.5, 0.6, -0.7))))
+    return poses
