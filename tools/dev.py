@@ -1,0 +1,161 @@
+#!/usr/bin/env python3
+"""One command each, on a machine with nothing but Python 3.11 or newer:
+
+    python3 tools/dev.py demo    the firmware on a simulated board, live in the terminal
+    python3 tools/dev.py test    ruff, pyright and every test; further arguments go to pytest
+
+Both make .venv beside pyproject.toml and install into it, again only when pyproject.toml has changed.
+"""
+
+import hashlib
+import os
+import subprocess
+import sys
+import time
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+VENV = os.path.join(ROOT, ".venv")
+PYTHON = (
+    os.path.join(VENV, "Scripts", "python.exe") if os.name == "nt" else os.path.join(VENV, "bin", "python")
+)
+STAMP = os.path.join(VENV, "installed.txt")
+LOG = os.path.join(VENV, "install.log")
+OLDEST = (3, 11)
+REPORT_S = 5  # a line this often while installing
+
+
+class Stop(Exception):
+    """Set-up cannot go on; the text is one line: why, and what to do."""
+
+
+def main(arguments):
+    if sys.version_info < OLDEST:
+        raise Stop(
+            "Python 3.11 or newer is needed, this is %d.%d: start it with a newer python3"
+            % sys.version_info[:2]
+        )
+    if not arguments or arguments[0] not in ("demo", "test"):
+        raise Stop("say what to do: %s demo, or %s test" % (sys.argv[0], sys.argv[0]))
+    name, rest = arguments[0], arguments[1:]
+    prepare("test" if name == "test" else "")
+    return test(rest) if name == "test" else run("-m", "kickstand_tools.cli", "demo", *rest)
+
+
+def test(arguments):
+    """All three checks, the tests last, even if one before has failed; their exit status."""
+    failed = []
+    for tool, command in (
+        ("ruff", ("-m", "ruff", "check", ".")),
+        ("pyright", ("-m", "pyright", "--pythonpath", PYTHON)),
+        ("pytest", ("-m", "pytest", *arguments)),
+    ):
+        say(tool)
+        if run(*command) != 0:
+            failed.append(tool)
+    if failed:
+        say("failed: " + ", ".join(failed))
+    return 1 if failed else 0
+
+
+def prepare(extra):
+    """Make .venv and install what pyproject.toml asks for, unless that is done."""
+    place = "Python %s in %s" % (sys.version.split()[0], ROOT)
+    with open(os.path.join(ROOT, "pyproject.toml"), "rb") as file:
+        version = hashlib.sha256(file.read()).hexdigest()
+    stamp = (read(STAMP) + "\n\n").split("\n")
+    if stamp[0] == place and stamp[1] in (version + " test", version + " " + extra):
+        return
+    if (stamp[0] and stamp[0] != place) or not has_pip():
+        make_venv()
+    if os.path.exists(STAMP):
+        os.remove(STAMP)  # an installation broken off is begun again
+    install(extra)
+    with open(STAMP, "w", encoding="utf-8") as file:
+        file.write("%s\n%s %s\n" % (place, version, extra))
+
+
+def make_venv():
+    """A fresh .venv with pip in it."""
+    say("making .venv with Python %s" % sys.version.split()[0])
+    made = subprocess.run(
+        [sys.executable, "-m", "venv", "--clear", VENV],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        encoding="utf-8",
+        errors="replace",
+    )
+    if "ensurepip" in made.stdout or "No module named venv" in made.stdout:
+        raise Stop(
+            "this Python has no venv and pip: on Debian or Ubuntu install python3-venv, then repeat this"
+        )
+    if made.returncode != 0:
+        raise Stop(".venv cannot be made: %s" % last_line(made.stdout))
+    if not has_pip():
+        raise Stop(
+            "there is no pip in the new .venv: on Debian or Ubuntu install python3-venv, then repeat this"
+        )
+
+
+def has_pip():
+    """True if .venv is there and its pip runs."""
+    if not os.path.exists(PYTHON):
+        return False
+    command = [PYTHON, "-m", "pip", "--version"]
+    return subprocess.call(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) == 0
+
+
+def install(extra):
+    """pip install --editable; its own words go to install.log, a short line now and then to the terminal."""
+    say("installing %sinto .venv: a few minutes at most" % ("with the test tools " if extra else ""))
+    command = [PYTHON, "-m", "pip", "install", "--no-input", "--disable-pip-version-check"]
+    begin = time.time()
+    with open(LOG, "wb") as log:
+        pip = subprocess.Popen(
+            command + ["--editable", ".[%s]" % extra if extra else "."],
+            cwd=ROOT,
+            stdout=log,
+            stderr=subprocess.STDOUT,
+        )
+        while True:
+            try:
+                status = pip.wait(REPORT_S)
+                break
+            except subprocess.TimeoutExpired:
+                say("  %3.0f s  %s" % (time.time() - begin, last_line(read(LOG))[:70]))
+    if status != 0:
+        errors = [line[6:].strip() for line in read(LOG).split("\n") if line.startswith("ERROR:")]
+        why = errors[-1] if errors else last_line(read(LOG))
+        raise Stop("installing failed: %s (is there a network? the whole story is in %s)" % (why, LOG))
+
+
+def run(*arguments):
+    """Run .venv's Python in the project's root; its exit status."""
+    return subprocess.call([PYTHON] + list(arguments), cwd=ROOT)
+
+
+def read(path):
+    """A text file, empty if it is missing."""
+    if not os.path.exists(path):
+        return ""
+    with open(path, encoding="utf-8", errors="replace") as file:
+        return file.read()
+
+
+def last_line(text):
+    lines = text.strip().split("\n")
+    return lines[-1].strip()
+
+
+def say(text):
+    print(text, flush=True)
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except Stop as stop:
+        sys.exit("dev.py: %s" % stop)
+    except KeyboardInterrupt:
+        sys.exit(130)
+    except OSError as error:
+        sys.exit("dev.py: %s" % error)

@@ -1,0 +1,156 @@
+"""CAL.json: a calibration as the command line reads and writes it."""
+
+import json
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from . import firmware_path
+from .errors import InputError, cause
+from .output import write_whole
+
+firmware_path.add_to_path()
+from kickstand.calibration import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE, Calibration  # noqa: E402
+from kickstand.rotation import is_rotation  # noqa: E402
+from kickstand.store import MAX_BIAS_DPS  # noqa: E402
+
+VERSION = 1
+ROTATION_TOLERANCE = 2e-3  # a matrix copied with three or four decimals is still good to 0.1 degrees
+_IDENTITY = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+
+
+@dataclass
+class CalibrationFile:
+    """The parameters of one mounted sensor: calibrated = slope * reading + offset, Nicolae's (18)-(20).
+
+    offset (3, g), slope (3), bias (3, deg/s), matrix (9, row-major, rows left, up, forward).
+    aligned: the matrix was measured, not left as it was.  notes: what else stands in the file.
+    """
+
+    offset: list[float] = field(default_factory=lambda: [0.0] * 3)
+    slope: list[float] = field(default_factory=lambda: [1.0] * 3)
+    bias: list[float] = field(default_factory=lambda: [0.0] * 3)
+    matrix: list[float] = field(default_factory=lambda: list(_IDENTITY))
+    aligned: bool = False
+    six_done: bool = False
+    notes: dict[str, Any] = field(default_factory=dict)
+
+    def to_firmware(self) -> Calibration:
+        """The same as the firmware's own object, for readings in g and deg/s."""
+        calibration = Calibration()
+        calibration.set_accel(self.offset, self.slope)
+        for i in range(3):
+            calibration.gyro_bias[i] = self.bias[i]
+        for i in range(9):
+            calibration.vehicle_from_sensor[i] = self.matrix[i]
+        calibration.six_done, calibration.aligned = self.six_done, self.aligned
+        return calibration
+
+
+def read_calibration(path: Path) -> CalibrationFile:
+    """Read and check a CAL.json. Raises InputError."""
+    try:
+        data = json.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: there is no such file: make it with kickstand calibrate") from error
+    except OSError as error:
+        raise InputError(f"{path} cannot be read: {cause(error)}") from error
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path} is not JSON: give a file made by kickstand calibrate") from error
+    if not isinstance(data, dict):
+        raise InputError(f"{path} is no calibration: give a file made by kickstand calibrate")
+    if "version" not in data:
+        raise InputError(f"{path}: version is missing: give a file made by kickstand calibrate")
+    if data["version"] != VERSION or isinstance(data["version"], bool):
+        raise InputError(
+            f"{path}: version {_shown(data['version'])}, this program reads {VERSION}: calibrate again"
+        )
+    rows = _list(path, data, "vehicle_from_sensor")
+    matrix = [
+        v for i, row in enumerate(rows) for v in _numbers(path, f"vehicle_from_sensor, row {i + 1},", row)
+    ]
+    calibration = CalibrationFile(
+        _numbers(path, "accel_offset_g", _list(path, data, "accel_offset_g")),
+        _numbers(path, "accel_slope", _list(path, data, "accel_slope")),
+        _numbers(path, "gyro_bias_dps", _list(path, data, "gyro_bias_dps")),
+        matrix,
+    )
+    _check_ranges(path, calibration)
+    calibration.aligned = data.get("aligned", matrix != _IDENTITY) is True
+    neutral = calibration.offset == [0.0] * 3 and calibration.slope == [1.0] * 3
+    calibration.six_done = data.get("six_positions", not neutral) is True
+    return calibration
+
+
+def write_calibration(path: Path, calibration: CalibrationFile) -> None:
+    """Write a CAL.json, whole or not at all. Raises InputError."""
+    m = [_rounded(v) for v in calibration.matrix]
+    data = {
+        "version": VERSION,
+        "accel_offset_g": [_rounded(v) for v in calibration.offset],
+        "accel_slope": [_rounded(v) for v in calibration.slope],
+        "gyro_bias_dps": [_rounded(v) for v in calibration.bias],
+        "vehicle_from_sensor": [m[0:3], m[3:6], m[6:9]],
+        "six_positions": calibration.six_done,
+        "aligned": calibration.aligned,
+    }
+    text = json.dumps(data | calibration.notes, indent=2) + "\n"
+
+    def write(temporary: Path) -> None:
+        temporary.write_text(text, encoding="ascii", newline="\n")
+
+    write_whole(path, write)
+
+
+def _list(path: Path, data: dict[str, Any], name: str) -> list[Any]:
+    if name not in data:
+        raise InputError(f"{path}: {name} is missing: give a file made by kickstand calibrate")
+    if not isinstance(data[name], list) or len(data[name]) != 3:
+        what = "3 rows of 3 numbers" if name == "vehicle_from_sensor" else "3 numbers"
+        raise InputError(f"{path}: {name} has to be {what}: calibrate again")
+    return data[name]
+
+
+def _numbers(path: Path, name: str, values: Any) -> list[float]:
+    """Three finite floats."""
+    if not isinstance(values, list) or len(values) != 3:
+        raise InputError(f"{path}: {name} has to be 3 numbers: calibrate again")
+    for value in values:
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e6:
+            raise InputError(f"{path}: {name} has {_shown(value)} where a number should be: calibrate again")
+    return [float(value) for value in values]
+
+
+def _check_ranges(path: Path, calibration: CalibrationFile) -> None:
+    for i, axis in enumerate("xyz"):
+        offset, slope, bias = calibration.offset[i], calibration.slope[i], calibration.bias[i]
+        if not abs(offset) < MAX_OFFSET_G:
+            raise InputError(
+                f"{path}: offset of {axis} is {offset:g} g, a sensor's is under {MAX_OFFSET_G:g}: "
+                "calibrate again"
+            )
+        if not MIN_SLOPE < slope < MAX_SLOPE:
+            between = f"{MIN_SLOPE:g} to {MAX_SLOPE:g}"
+            raise InputError(
+                f"{path}: slope of {axis} is {slope:g}, a sensor's is {between}: calibrate again"
+            )
+        if not abs(bias) < MAX_BIAS_DPS:
+            raise InputError(
+                f"{path}: gyro bias of {axis} is {bias:g} deg/s, a sensor's is under {MAX_BIAS_DPS:g}: "
+                "calibrate again"
+            )
+    if not is_rotation(calibration.matrix, ROTATION_TOLERANCE):
+        raise InputError(f"{path}: vehicle_from_sensor is no rotation (rows left, up, forward): align again")
+
+
+def _rounded(value: float) -> float:
+    """Nine significant digits: all that the firmware's 32-bit floats hold."""
+    return float(f"{value:.9g}")
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float) and not math.isfinite(value):
+        return str(value)
+    text = ascii(value)
+    return text if len(text) <= 20 else text[:20] + "..."

@@ -1,0 +1,148 @@
+"""The `kickstand` command. What it refuses: one line on standard error, status 2, nothing written."""
+
+import sys
+from pathlib import Path
+
+import click
+
+from .errors import InputError
+
+_PATH = click.Path(path_type=Path)
+_OUT = click.option("--out", required=True, type=_PATH, help="The file to write.")
+_PORT = click.option(
+    "--port", help="Serial port of the board, as COM3 or /dev/ttyACM0; found by itself if only one is there."
+)
+
+
+@click.group(invoke_without_command=True)
+@click.pass_context
+def kickstand(context: click.Context) -> None:
+    """Lean meter for any motorcycle: put it on a board, calibrate it, replay rides."""
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+@kickstand.command()
+@_PORT
+@click.option("--config", is_flag=True, help="Replace the board's config.py too, which is otherwise kept.")
+def flash(port: str | None, config: bool) -> None:
+    """Copy the firmware to a board that runs MicroPython, check it, and start it."""
+    from . import deploy
+
+    deploy.flash(port, config, click.echo)
+
+
+@kickstand.command()
+@_PORT
+def status(port: str | None) -> None:
+    """Ask a board how it is: versions, settings, sensor, display, calibration."""
+    from . import deploy
+
+    deploy.status(port, click.echo)
+
+
+@kickstand.group(no_args_is_help=False)
+def calibrate() -> None:
+    """Compute a calibration from recorded poses."""
+
+
+@calibrate.command()
+@click.argument("poses", nargs=-1, required=True, type=_PATH, metavar="POSE.csv...")
+@_OUT
+def six(poses: tuple[Path, ...], out: Path) -> None:
+    """Accelerometer offset and slope from six still poses, each side up once, in any order.
+
+    A seventh, slanted pose checks the result.
+    """
+    from . import calibrate
+    from .calibration_file import write_calibration
+    from .output import check_output
+
+    check_output(out, list(poses))
+    write_calibration(out, calibrate.six(list(poses), click.echo))
+    click.echo(f"written: {out}")
+
+
+@calibrate.command()
+@click.argument("kickstand", type=_PATH, metavar="KICKSTAND.csv")
+@click.argument("upright", type=_PATH, metavar="UPRIGHT.csv")
+@click.option("--calibration", type=_PATH, help="The result of `kickstand calibrate six`, to build on.")
+@click.option(
+    "--side", type=click.Choice(["left", "right"]), default="left", help="Where the kickstand leans to."
+)
+@_OUT
+def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out: Path) -> None:
+    """How the sensor sits on the bike, from a pose on the kickstand and one upright."""
+    from . import calibrate
+    from .calibration_file import read_calibration, write_calibration
+    from .output import check_output
+
+    check_output(out, [kickstand, upright])
+    before = read_calibration(calibration) if calibration else None
+    write_calibration(out, calibrate.two(kickstand, upright, before, side, click.echo))
+    click.echo(f"written: {out}")
+
+
+@kickstand.command()
+@click.argument("log", type=_PATH, metavar="LOG.csv")
+@click.option("--calibration", required=True, type=_PATH, help="A CAL.json of `kickstand calibrate`.")
+@click.option("--engine", type=click.Choice(["cpython", "micropython", "rp2040"]), default="cpython")
+@_OUT
+def replay(log: Path, calibration: Path, engine: str, out: Path) -> None:
+    """Run the firmware's own lean meter over a recorded log."""
+    from . import replay
+    from .calibration_file import read_calibration
+    from .logs import read_log
+    from .output import check_output
+
+    check_output(out, [log, calibration])
+    parameters = read_calibration(calibration)
+    recording = read_log(log)
+    results = replay.replay(recording, parameters, engine)
+    replay.write_results(out, recording, results)
+    if not parameters.aligned:
+        click.echo(
+            f"warning: {calibration} is not aligned: this is the lean of the sensor, not of the bike",
+            err=True,
+        )
+    click.echo(f"written: {out}, {len(results)} samples")
+
+
+@kickstand.command()
+@click.option("--hand", is_flag=True, help="Lean the bike and press the button yourself, with keys.")
+@click.option("--cpython", is_flag=True, help="Run the firmware on CPython, not on MicroPython.")
+def demo(hand: bool, cpython: bool) -> None:
+    """Watch the firmware on a simulated board: kickstand press, upright press, a ride."""
+    from . import demo
+
+    demo.demo(hand, cpython)
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """The console script: runs a command and leaves with its exit status."""
+    try:
+        sys.exit(kickstand.main(arguments, prog_name="kickstand", standalone_mode=False))
+    except InputError as error:
+        _refuse(str(error))
+    except click.Abort:
+        _refuse("stopped", 130)
+    except click.UsageError as error:
+        command = error.ctx.command_path if error.ctx else "kickstand"
+        _refuse(f"{error.format_message()} See {command} --help.")
+    except click.ClickException as error:
+        _refuse(error.format_message())
+    except Exception as error:
+        if sys.flags.dev_mode:  # python -X dev: for whoever looks for the fault
+            raise
+        _refuse(f"unexpected {type(error).__name__}: {error}: a fault in kickstand, please report it")
+
+
+def _refuse(text: str, status: int = 2) -> None:
+    """Leave with one printable line on standard error."""
+    line = " ".join(text.split())
+    print("kickstand: " + "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line), file=sys.stderr)
+    sys.exit(status)
+
+
+if __name__ == "__main__":
+    main()

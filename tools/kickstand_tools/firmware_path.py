@@ -1,0 +1,31 @@
+"""Where the firmware's files are, in a checkout and in an installed wheel, and how the host runs them."""
+
+import sys
+import traceback
+import types
+from pathlib import Path
+
+TOOLS = Path(__file__).resolve().parent.parent  # the directory kickstand_tools is imported from
+
+
+def directory() -> Path:
+    """The directory that holds main.py, config.py and kickstand/."""
+    packaged = Path(__file__).resolve().parent / "firmware"  # in a wheel
+    return packaged if packaged.is_dir() else TOOLS.parent / "firmware"  # in a checkout
+
+
+def add_to_path() -> None:
+    """Let CPython import the firmware: put it on sys.path, with a do-nothing module `micropython`."""
+    path = str(directory())
+    if path not in sys.path:
+        sys.path.insert(0, path)
+    sys.modules.setdefault("micropython", _shim())
+    if not hasattr(sys, "print_exception"):
+        setattr(sys, "print_exception", traceback.print_exception)  # noqa: B010 as MicroPython has it
+
+
+def _shim() -> types.ModuleType:
+    module = types.ModuleType("micropython")
+    for name in ("const", "native", "viper"):
+        setattr(module, name, lambda x: x)
+    return module

@@ -1,0 +1,36 @@
+"""Files written whole or not at all."""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from .errors import InputError, cause
+
+
+def check_output(path: Path, inputs: list[Path]) -> None:
+    """Refuse, before any work is done, an output that could not be written or that would destroy an input."""
+    if path.is_dir():
+        raise InputError(f"{path} is a directory: give --out the name of a file")
+    if path.exists() and not path.is_file():
+        raise InputError(f"{path} is not an ordinary file: give --out the name of one")
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no directory {path.parent}: make it first")
+    for source in inputs:
+        if path.exists() and source.exists() and path.samefile(source):
+            raise InputError(f"{path} is also an input: give --out another name")
+
+
+def write_whole(path: Path, write: Callable[[Path], None]) -> None:
+    """Let write(temporary path) make the file, then put it in the place of path; an error leaves the old one.
+
+    The temporary name ends as path does, so that write can go by it.
+    """
+    path = path.resolve()  # through a symbolic link, not in its place
+    temporary = path.with_name(f".{os.getpid()}-{path.name}")
+    try:
+        write(temporary)
+        os.replace(temporary, path)
+    except OSError as error:
+        raise InputError(f"{path} cannot be written: {cause(error)}; choose another place") from error
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -1,0 +1,48 @@
+"""A progress bar on standard error, for work that takes over a second, where someone is watching."""
+
+import sys
+import time
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+PATIENCE_S = 1.0
+
+
+class Bar:
+    """with Bar("replaying", total) as bar: bar.advance(n)."""
+
+    def __init__(self, what: str, total: int) -> None:
+        self._progress = Progress(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TaskProgressColumn(),
+            TimeRemainingColumn(),
+            console=Console(stderr=True),
+            transient=True,
+        )
+        self._task = self._progress.add_task(what, total=total)
+        self._begin_s = time.monotonic()
+        self._wanted = sys.stderr.isatty()
+        self._shown = False
+
+    def __enter__(self) -> "Bar":
+        return self
+
+    def advance(self, amount: int) -> None:
+        """amount more of the total is done."""
+        self._progress.advance(self._task, amount)
+        if self._wanted and not self._shown and time.monotonic() - self._begin_s > PATIENCE_S:
+            self._progress.start()
+            self._shown = True
+
+    def describe(self, what: str) -> None:
+        """Say what is being done now."""
+        self._progress.update(self._task, description=what)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._shown:
+            self._progress.stop()
