@@ -8,30 +8,22 @@ import json
 import math
 import sys
 
-from kickstand_tools import sensor_errors
+from kickstand_tools import rides, sensor_errors
 from kickstand_tools.board.simulator import Board
 
 FRAME_S = 0.1
 
 
-def motion_of(plan):
-    """motion(t_s) of a bike that leans as the plan [[from_s, lean_deg, yaw_rate_dps, speed_mps], ...] says, by steps."""
+def standing(plan):
+    """motion(t_s) of a bike that stands at the lean of the plan [[from_s, lean_deg], ...], moved in no time."""
 
     def motion(t_s):
         now = plan[0]
         for entry in plan:
             if t_s >= entry[0]:
                 now = entry
-        lean, yaw, speed = math.radians(now[1]), math.radians(now[2]), now[3]
-        s = speed * yaw / 9.80665
-        return (
-            math.sin(lean) + s * math.cos(lean),
-            math.cos(lean) - s * math.sin(lean),
-            0.0,
-            now[2] * math.sin(lean),
-            now[2] * math.cos(lean),
-            0.0,
-        )
+        lean = math.radians(now[1])
+        return (math.sin(lean), math.cos(lean), 0.0, 0.0, 0.0, 0.0)
 
     return motion
 
@@ -57,14 +49,18 @@ def poses_of(seed, steps):
 def run_device(plan):
     """Run it; returns frames [[t_s, line1, line2], ...] as they changed, how each boot ended, and what the LCD says last.
 
-    plan: "until" (s); "lean" as for motion_of with "seed" of the part (None: perfect), or "poses" as for poses_of; "presses"
-    [[at_s, for_s], ...]; "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...].
+    plan: "until" (s); "lean" as for standing(), or "ride" [[name of a function in rides, arguments...], ...], or "poses" as for
+    poses_of; "seed" of the part (None: perfect); "presses" [[at_s, for_s], ...]; "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...].
     """
     seed = plan.get("seed")
     if "poses" in plan:
         world = poses_of(seed, plan["poses"])
     else:
-        world = sensor_errors.Sensor(seed=seed).world(motion_of(plan.get("lean", [[0, 0, 0, 0]])))
+        if "ride" in plan:
+            motion = rides.Ride([getattr(rides, name)(*more) for name, *more in plan["ride"]]).motion
+        else:
+            motion = standing(plan.get("lean", [[0, 0]]))
+        world = sensor_errors.Sensor(seed=seed).world(motion)
     board = Board(world, **plan.get("board", {}))
     for at_s, for_s in plan.get("presses", []):
         board.press(at_s, for_s)

@@ -13,14 +13,14 @@ LCD_REINIT_S = 11.0
 @pytest.fixture
 def aligned(tmp_path):
     """A flash with an alignment in it, of the part with seed None."""
-    ride = {"lean": [[0, -12, 0, 0], [8, 0, 0, 0]], "presses": [[2, 0.15], [9, 0.15]], "until": 14}
+    ride = {"lean": [[0, -12], [8, 0]], "presses": [[2, 0.15], [9, 0.15]], "until": 14}
     devices.run("cpython", tmp_path, ride)
     return tmp_path
 
 
 def standing(faults, until=10, **more):
     """A bike that stands at 25 degrees, and what happens to the device."""
-    return {"lean": [[0, STATIC, 0, 0]], "faults": faults, "until": until, **more}
+    return {"lean": [[0, STATIC]], "faults": faults, "until": until, **more}
 
 
 def lasting(name):
@@ -108,12 +108,12 @@ def test_either_display_address_and_one_bus_for_both(address, one_bus, aligned):
 
 @pytest.mark.parametrize("who_am_i", [0x68, 0x70, 0x71, 0x72, 0x73, 0x74, 0x78, 0x98, 0x19])
 def test_every_known_chip_is_accepted(who_am_i, tmp_path):
-    plan = {"lean": [[0, STATIC, 0, 0]], "board": {"who_am_i": who_am_i}, "until": 3}
+    plan = {"lean": [[0, STATIC]], "board": {"who_am_i": who_am_i}, "until": 3}
     assert devices.run("cpython", tmp_path, plan).at(1.5)[0].startswith("Raw   25°")
 
 
 def test_an_unknown_chip_is_named_and_refused_unless_accepted(tmp_path):
-    plan = {"lean": [[0, STATIC, 0, 0]], "board": {"who_am_i": 0x75}, "until": 3}
+    plan = {"lean": [[0, STATIC]], "board": {"who_am_i": 0x75}, "until": 3}
     assert devices.run("cpython", tmp_path, plan).last == ("Unknown sensor  ", "WHO_AM_I 0x75   ")
     accepted = {**plan, "config": {"ACCEPT_WHO_AM_I": 0x75}}
     assert devices.run("cpython", tmp_path, accepted).last[0].startswith("Raw   25°")

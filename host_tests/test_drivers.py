@@ -43,7 +43,11 @@ def test_a_sample_takes_no_heap(tmp_path):
     script = tmp_path / "heap.py"
     script.write_text(HEAP_SCRIPT)
     done = subprocess.run(
-        unix_port.command(str(script)), capture_output=True, text=True, env=unix_port.environment(), check=True
+        unix_port.command(str(script)),
+        capture_output=True,
+        text=True,
+        env=unix_port.environment(),
+        check=True,
     )
     grew, counts = json.loads(done.stdout)
     assert not grew

@@ -86,7 +86,7 @@ class App:
         self._restarts = 0
         self._last_us = None
         self._page = 0
-        self._pages = (pages.lean, pages.maxima, pages.acceleration, pages.raw)
+        self._pages = (pages.lean, pages.maxima, pages.acceleration, pages.formula, pages.raw)
         self._wizard = None
         self._menu = None
         self._info = False
@@ -225,6 +225,8 @@ class App:
             return pages.sensor_info(chip.name, chip.temperature_c(chip.counts[3]), self.meter.calibration)
         if not self.meter.calibration.aligned:
             return pages.not_aligned(self.meter, now_ms // 1000)
-        if not self.meter.settled:
-            return pages.WAIT
+        if self.meter.fallen:
+            return pages.FALLEN
+        if not self.meter.trusted:
+            return pages.UNSURE
         return self._pages[self._page](self.meter)

@@ -1,18 +1,23 @@
-"""From one reading of the chip to lean and g: calibration, alignment, lean. The way of a sample, on the
-board and in replay."""
+"""From one reading of the chip to lean and g: calibration, alignment, lean. The way of a sample, on the board and
+in replay."""
 
-from .lean import SmoothedLean, formula_lean_deg
+from .lean import formula_lean_deg
+from .lean_filter import LeanFilter
 from .rotation import rotate, vector
 
-SETTLE_US = 150_000  # before lean is shown and maxima count
+SMOOTH_US = 300_000  # time constant of the g shown
+GAP_US = 500_000  # without readings for so long, the past says nothing about the present
+MAX_SIGMA_DEG = 6.0  # a lean less certain than this is not shown
+FALLEN_DEG = 65.0
+FALLEN_US = 1_000_000
 
 
 class LeanMeter:
     """Lean and acceleration of the vehicle.
 
-    After update(): force (left, up, forward in g), rate (about left, up, forward in deg/s), lean_deg (shown,
-    > 0 right), lean_formula_deg (Nicolae's, sample by sample), smooth_force (g, for display), sensor_force
-    and sensor_rate (calibrated, in the sensor's axes), and the maxima since reset_maxima().
+    After update(): force (left, up, forward in g), rate (about left, up, forward in deg/s), lean_deg (the
+    filter's, > 0 right), lean_formula_deg (Nicolae's, sample by sample), smooth_force (g, for display),
+    sensor_force and sensor_rate (calibrated, in the sensor's axes), fallen, and the maxima since reset_maxima().
     """
 
     def __init__(self, calibration):
@@ -21,14 +26,17 @@ class LeanMeter:
         self.rate = vector()
         self.sensor_force = vector()
         self.sensor_rate = vector()
+        self.smooth_force = vector()
+        self.filter = LeanFilter()
         self.restart()
         self.reset_maxima()
 
     def restart(self):
         """Forget the past: after a new calibration, or after readings were missing."""
-        self._smoothed = SmoothedLean()
-        self.smooth_force = self._smoothed.force
-        self._age_us = 0
+        self.filter.restart()
+        self._fresh = True
+        self._flat_us = 0
+        self.fallen = False
         self.lean_deg = 0.0
         self.lean_formula_deg = 0.0
 
@@ -40,23 +48,29 @@ class LeanMeter:
         self.max_brake_g = 0.0
 
     @property
-    def settled(self):
-        """True once lean_deg has enough readings behind it to be shown."""
-        return self._age_us >= SETTLE_US
+    def trusted(self):
+        """True while lean_deg is certain enough to be shown."""
+        return self.filter.sigma_deg <= MAX_SIGMA_DEG
 
     def update(self, reading, dt_us):
         """reading: 7 numbers in the chip's order; dt_us: integer microseconds since the one before (0 for
         the first)."""
-        force, rate = self.sensor_force, self.sensor_rate
-        self.calibration.apply(reading, force, rate)
-        matrix = self.calibration.vehicle_from_sensor
-        rotate(self.force, matrix, force)
-        rotate(self.rate, matrix, rate)
-        self.lean_formula_deg = formula_lean_deg(self.force, self.rate[1])
-        self.lean_deg = self._smoothed.update(self.force, self.rate, dt_us)
-        if self._age_us < SETTLE_US:
-            self._age_us += dt_us
-        else:
+        if dt_us > GAP_US:
+            self.restart()
+        force = self.force
+        self.calibration.apply(reading, self.sensor_force, self.sensor_rate)
+        rotate(force, self.calibration.vehicle_from_sensor, self.sensor_force)
+        rotate(self.rate, self.calibration.vehicle_from_sensor, self.sensor_rate)
+        gain = 1.0 if self._fresh else dt_us / (SMOOTH_US + dt_us)
+        self._fresh = False
+        smooth = self.smooth_force
+        for i in range(3):
+            smooth[i] += gain * (force[i] - smooth[i])
+        self.lean_formula_deg = formula_lean_deg(force, self.rate[1])
+        self.lean_deg = self.filter.update(force, self.rate, dt_us)
+        self._flat_us = self._flat_us + dt_us if abs(self.lean_deg) > FALLEN_DEG else 0
+        self.fallen = self._flat_us >= FALLEN_US
+        if self.trusted and not self.fallen:
             self._hold_maxima()
 
     def _hold_maxima(self):

@@ -8,7 +8,8 @@ _BLOCK = 0xFF
 _HALF_BAR = 8  # cells to each side of the middle
 _DEG_PER_COLUMN = 1.5  # 8 cells of 5 columns: the bar ends at 60 degrees
 
-WAIT = ("Lean  --", "one moment")
+UNSURE = ("Lean  --", "not sure yet")
+FALLEN = ("Fallen over?", "Lean over 65" + DEGREE)
 
 _bar = bytearray(16)
 
@@ -62,6 +63,14 @@ def acceleration(meter):
     forward = meter.smooth_force[2]
     word = "Brake" if forward < -0.005 else "Accel"
     return "%s   %5.2f g" % (word, abs(forward)), "pk +%.2f / -%.2f" % (meter.max_accel_g, meter.max_brake_g)
+
+
+def formula(meter):
+    """Nicolae's formula as it stands, beside the filter's lean: why there is a filter."""
+    return (
+        "Formula   %4d%s" % (round(meter.lean_formula_deg), DEGREE),
+        "Filter    %4d%s" % (round(meter.lean_deg), DEGREE),
+    )
 
 
 def raw(meter):

@@ -1,0 +1,244 @@
+"""Lean while riding: an extended Kalman filter on what one gyro and one accelerometer say of a motorcycle.
+
+States: lean t, pitch q (of road and suspension together), speed v, gyro bias (3) and the yaw error of the alignment
+y, which a kickstand pose with one degree of pitch makes as large as five. With the vertical u = (cos q sin t,
+cos q cos t, sin q) in the vehicle's axes (left, up, forward), rates w, force f:
+
+    kinematics, exact on any road:  dt/dt = w_z - tan q (w_x sin t + w_y cos t),  dq/dt = w_y sin t - w_x cos t
+    wheels that roll, not slide:    dv/dt = f_z - g sin q + v w_y y
+                                    f_x = g u_x + v w_y + dv/dt y - h dw_z/dt,    f_y = g u_y - v w_x
+    roads are level on average:     0 = q + y sin t
+
+The second line is Nicolae's (22)-(23) with s = v w. In a held turn its two equations are parallel in t and v: there
+the ratio of the two rates tells the lean, through the third line, and v tells it just after entering. Force and
+speed are in g and g seconds, angles in radians. The state follows every sample. Covariance and corrections follow
+ten times a second, a piece a sample, because the whole would take longer than a sample lasts.
+"""
+
+from math import atan2, cos, degrees, radians, sin, sqrt
+
+from .kalman import Covariance
+from .rest import RestDetector
+from .trim import UprightTrim
+
+_G = 9.80665
+T, Q, V, BX, BY, BZ, Y = range(7)
+WINDOW_US = 100_000
+
+# Uncertainties at the start: one sigma
+START_LEAN = radians(3.0)  # where the force looks like that of a standing bike
+START_STILL_G, START_STILL_RADPS = 0.05, 0.1
+START_LEAN_MOVING = radians(15.0)
+START_PITCH = radians(5.0)
+START_SPEED = 15.0 / _G
+START_BIAS = radians(1.0)  # the poses measured it; it has drifted since
+START_YAW_ERROR = radians(5.0)
+
+# Growth of uncertainty per square root of a second
+GROW_ANGLE = radians(0.15)  # gyro scale and vibration
+GROW_SPEED = 0.3 / _G
+GROW_BIAS = radians(0.01)  # warming up: 0.6 deg/s in five minutes
+
+# Measurements, as independent every WINDOW_US: what is wrong with them lasts longer, so they count for less
+SIGMA_LEFT = 0.15
+SIGMA_UP = 0.30
+ROLL_HEIGHT_M = 0.5  # h: of the sensor above the axis the bike rolls about; by how much it may be wrong:
+SIGMA_ROLL_HEIGHT_M = 0.4
+SIGMA_SLOPE = radians(3.0)
+SLOPE_S = 15.0  # how long a slope lasts
+USUAL_SPEED = 15.0 / _G
+SIGMA_SPEED = 20.0 / _G
+SPEED_S = 60.0
+SIGMA_REST_RATE = radians(0.05)
+SIGMA_REST_FORCE = 0.02
+SIGMA_REST_SPEED = 0.02 / _G
+
+GROWTH = (GROW_ANGLE, GROW_ANGLE, GROW_SPEED, GROW_BIAS, GROW_BIAS, GROW_BIAS, 0.0)
+PIECES = 24  # of the work on a window: so many samples, or several pieces a sample
+
+TRIM_SPEED = 4.0 / _G
+TRIM_SIGMA_SPEED = 8.0 / _G
+
+DELAY_S = 0.005  # of the chip's low-pass at 44 Hz: lean is shown as it is by now
+
+
+class LeanFilter:
+    """Estimates lean from force and rate in the vehicle's axes. Fixed memory."""
+
+    def __init__(self):
+        self.trim = UprightTrim()
+        self.restart()
+
+    def restart(self):
+        """Forget everything but the trim: after power-on, or when readings were missing."""
+        self._x = [0.0] * 7
+        self._x[V] = USUAL_SPEED
+        self._p = None
+        self._rest = RestDetector()
+        self._work = None
+        self._pieces = 1
+        self._sums = [0.0] * 8
+        self._count = 0
+        self._window_us = 0
+        self._roll_rate = 0.0
+        self._last_roll_rate = 0.0
+
+    @property
+    def speed_mps(self):
+        """Estimated speed."""
+        return self._x[V] * _G
+
+    @property
+    def pitch_deg(self):
+        """Estimated pitch of road and suspension, nose up > 0."""
+        return degrees(self._x[Q])
+
+    @property
+    def gyro_bias_dps(self):
+        """Estimated change of the gyro's bias since the calibration: left, up, forward."""
+        return [degrees(self._x[i]) for i in (BX, BY, BZ)]
+
+    @property
+    def sigma_deg(self):
+        """Standard deviation of the lean: a quality figure."""
+        return degrees(sqrt(self._p.rows[T][T] + self.trim.variance)) if self._p else 180.0
+
+    @property
+    def at_rest(self):
+        """True while the bike stands still."""
+        return self._rest.resting
+
+    def update(self, force, rate, dt_us):
+        """One sample: force (3, g), rate (3, deg/s), dt_us since the one before. Returns lean in degrees."""
+        fx, fy, fz = force[0], force[1], force[2]
+        x = self._x
+        wx = radians(rate[0]) - x[BX]
+        wy = radians(rate[1]) - x[BY]
+        wz = radians(rate[2]) - x[BZ]
+        t, v = x[T], x[V]
+        st, ct = sin(t), cos(t)
+        sq = sin(x[Q])
+        cq = sqrt(1.0 - sq * sq)
+        dt = dt_us * 1e-6
+        acceleration = fz - sq + v * wy * x[Y]
+        x[T] = t + (wz - sq / cq * (wx * st + wy * ct)) * dt
+        x[Q] += (wy * st - wx * ct) * dt
+        x[V] = max(0.0, v + acceleration * dt)
+        sums = self._sums
+        sums[0] += fx - cq * st - v * wy - acceleration * x[Y]
+        sums[1] += fy - cq * ct + v * wx
+        sums[2] += wx
+        sums[3] += wy
+        sums[4] += wz
+        sums[5] += fx
+        sums[6] += fy
+        sums[7] += fz
+        self._roll_rate = wz
+        self._count += 1
+        self._window_us += dt_us
+        if self._work is not None:
+            for _ in range(self._pieces):
+                if next(self._work, True):
+                    self._work = None
+                    break
+        if self._window_us >= WINDOW_US:
+            self._end_window()
+        if self._p is None:
+            return degrees(atan2(sums[5], sums[6]))
+        return degrees(x[T] + DELAY_S * wz - self.trim.angle)
+
+    def _end_window(self):
+        """Finish the work on the window before, and begin with this one's means."""
+        if self._work is not None:
+            for _ in self._work:
+                pass
+        n = self._count
+        means = [total / n for total in self._sums]
+        seconds = self._window_us * 1e-6
+        for i in range(8):
+            self._sums[i] = 0.0
+        self._count = 0
+        self._window_us = 0
+        self._pieces = 1 + PIECES // n
+        if self._p is None:
+            self._start(means)
+            return
+        roll_acceleration = (self._roll_rate - self._last_roll_rate) / seconds
+        self._last_roll_rate = self._roll_rate
+        self._rest.update(means, seconds)
+        self._work = self._process(means, seconds, roll_acceleration)
+
+    def _start(self, means):
+        _, _, wx, wy, wz, fx, fy, fz = means
+        turning = max(abs(wx), abs(wy), abs(wz)) > START_STILL_RADPS
+        moving = turning or abs(sqrt(fx * fx + fy * fy + fz * fz) - 1.0) > START_STILL_G
+        lean = START_LEAN_MOVING if moving else START_LEAN
+        sigmas = (lean, START_PITCH, START_SPEED, START_BIAS, START_BIAS, START_BIAS, START_YAW_ERROR)
+        self._p = Covariance([sigma * sigma for sigma in sigmas])
+        x = self._x
+        for i in range(7):
+            x[i] = 0.0
+        x[T] = atan2(fx, fy)
+        x[V] = USUAL_SPEED
+
+    def _process(self, means, seconds, roll_acceleration):
+        """Covariance and corrections for one window; a generator of short pieces."""
+        p, x = self._p, self._x
+        left, up, wx, wy, _, fx, fy, fz = means
+        st, ct = sin(x[T]), cos(x[T])
+        sq = sin(x[Q])
+        cq = sqrt(1.0 - sq * sq)
+        yaw_rate = wx * st + wy * ct
+        speed = x[V]
+        acceleration = fz - sq + speed * wy * x[Y]
+        for i, j, slope in (
+            (T, Q, -yaw_rate / (cq * cq)),
+            (T, BZ, -1.0),
+            (T, BX, sq / cq * st),
+            (T, BY, sq / cq * ct),
+            (Q, T, yaw_rate),
+            (Q, BX, ct),
+            (Q, BY, -st),
+            (V, Q, -cq),
+            (V, Y, speed * wy),
+            (V, V, wy * x[Y]),
+        ):
+            p.carry(i, j, slope * seconds)
+            yield
+        for i, growth in enumerate(GROWTH):
+            p.rows[i][i] += growth * growth * seconds
+        left_terms = ((T, cq * ct), (Q, -sq * st - cq * x[Y]), (V, wy), (BY, -speed), (Y, acceleration))
+        up_terms = ((T, -cq * st), (Q, -sq * ct), (V, -wx), (BX, speed))
+        if self._rest.resting:
+            yield from self._measure_rest(left_terms, left + speed * wy, wx, wy, means[4], fz - sq, cq)
+        else:
+            roll = roll_acceleration / _G
+            uncertain = SIGMA_ROLL_HEIGHT_M * roll
+            yield from p.measure(left_terms, left + ROLL_HEIGHT_M * roll * ct, SIGMA_LEFT**2 + uncertain**2)
+            yield from p.measure(up_terms, up, SIGMA_UP**2 + (uncertain * st) ** 2)
+            terms = ((Q, 1.0), (T, x[Y] * ct), (Y, st))
+            yield from p.measure(terms, -x[Q] - x[Y] * st, SIGMA_SLOPE**2 * 2 * SLOPE_S / seconds)
+            yield from p.measure(((V, 1.0),), USUAL_SPEED - x[V], SIGMA_SPEED**2 * 2 * SPEED_S / seconds)
+            if speed > TRIM_SPEED and p.rows[V][V] < TRIM_SIGMA_SPEED**2:
+                self.trim.update((fx - acceleration * x[Y]) / max(fy, 0.5), x[T], yaw_rate, seconds)
+        self._correct(left_terms, up_terms)
+
+    def _measure_rest(self, left_terms, left, wx, wy, wz, forward, cq):
+        """Standing still: no speed, the rates are bias, the force is the vertical."""
+        p, x = self._p, self._x
+        yield from p.measure(((V, 1.0),), -x[V], SIGMA_REST_SPEED**2)
+        for i, rate in ((BX, wx), (BY, wy), (BZ, wz)):
+            yield from p.measure(((i, 1.0),), rate, SIGMA_REST_RATE**2)
+        yield from p.measure(left_terms[0:2], left, SIGMA_REST_FORCE**2)
+        yield from p.measure(((Q, cq),), forward, SIGMA_REST_FORCE**2)
+
+    def _correct(self, left_terms, up_terms):
+        """Put the corrections into the state, and into the innovations already summed up against the old one."""
+        p, x, sums = self._p, self._x, self._sums
+        for j, h in left_terms:
+            sums[0] -= self._count * h * p.correction[j]
+        for j, h in up_terms:
+            sums[1] -= self._count * h * p.correction[j]
+        for i in range(7):
+            x[i] += p.take_correction(i)
+        x[V] = max(0.0, x[V])

@@ -1,0 +1,37 @@
+"""Is the bike standing still? From the means of a tenth of a second, in which an idling engine averages out."""
+
+MAX_FORCE_G = 0.010  # of a mean from the average of the last half second
+MAX_RATE_RADPS = 0.009  # 0.5 deg/s, likewise
+MAX_BIAS_RADPS = 0.02  # 1.2 deg/s: a longer smooth turn is no rest
+MAX_FIRST_BIAS_RADPS = 0.1  # before the first rest the bias may have drifted since the calibration
+REST_S = 1.5
+AVERAGE_S = 0.5
+
+
+class RestDetector:
+    """update() with each mean; resting is True after REST_S of stillness."""
+
+    def __init__(self):
+        self.resting = False
+        self._still_s = 0.0
+        self._average = None
+        self._max_bias = MAX_FIRST_BIAS_RADPS
+
+    def update(self, means, seconds):
+        """means: of the last seconds, where 2..4 are rates (rad/s, bias taken off) and 5..7 forces (g)."""
+        if self._average is None:
+            self._average = list(means)
+        average = self._average
+        gain = min(1.0, seconds / AVERAGE_S)
+        still = True
+        for i in range(2, 8):
+            deviation = means[i] - average[i]
+            average[i] += gain * deviation
+            if i < 5:
+                still = still and abs(deviation) < MAX_RATE_RADPS and abs(average[i]) < self._max_bias
+            else:
+                still = still and abs(deviation) < MAX_FORCE_G
+        self._still_s = self._still_s + seconds if still else 0.0
+        self.resting = self._still_s >= REST_S
+        if self.resting:
+            self._max_bias = MAX_BIAS_RADPS
