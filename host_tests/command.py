@@ -11,7 +11,14 @@ import pytest
 from kickstand_tools import cli
 
 HEADER = "t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps"
-AXES = {"+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1)}
+AXES = {
+    "+x": (1, 0, 0),
+    "-x": (-1, 0, 0),
+    "+y": (0, 1, 0),
+    "-y": (0, -1, 0),
+    "+z": (0, 0, 1),
+    "-z": (0, 0, -1),
+}
 
 
 @dataclass
@@ -43,7 +50,7 @@ def works(*arguments: object) -> Result:
 
 
 def refused(directory: Path, *arguments: object, words: str = "") -> str:
-    """run() of something that has to be refused in one line with these words in it, leaving directory as it was."""
+    """run() of something that is refused in one line with these words in it, leaving directory as it was."""
     before = snapshot(directory)
     result = run(*arguments)
     assert result.status == 2, result.out + result.err
@@ -63,7 +70,13 @@ def snapshot(directory: Path) -> dict[str, bytes]:
 
 
 def still(
-    path: Path, force, bias=(0.0, 0.0, 0.0), seconds: float = 3.0, rate_hz: int = 100, noise: float = 1.0, seed=0
+    path: Path,
+    force,
+    bias=(0.0, 0.0, 0.0),
+    seconds: float = 3.0,
+    rate_hz: int = 100,
+    noise: float = 1.0,
+    seed=0,
 ) -> Path:
     """Write a log of a sensor at rest that reads force (3, g) and bias (3, deg/s) with an MPU6050's noise."""
     rng = np.random.default_rng(seed)

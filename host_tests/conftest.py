@@ -10,6 +10,10 @@ firmware_path.add_to_path()
 ROOT = Path(__file__).resolve().parent.parent
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "chip: runs the firmware on the emulated Pico, which takes its time")
+
+
 @pytest.fixture(scope="session")
 def shared_data() -> Path:
     """The directory of real recordings, which is not part of the repository."""

@@ -52,11 +52,10 @@ class FakeBoard(Transport):
             raise  # the cable, not the board
         except OSError as error:
             number = error.errno or 0
-            text = f"Traceback (most recent call last):\r\nOSError: [Errno {number}] {errno.errorcode[number]}\r\n"
-            raise TransportExecError(b"", text) from None
+            text = f"OSError: [Errno {number}] {errno.errorcode[number]}"
+            raise TransportExecError(b"", f"Traceback\r\n{text}\r\n") from None
         except Exception as error:
-            text = f"Traceback (most recent call last):\r\n{type(error).__name__}: {error}\r\n"
-            raise TransportExecError(b"", text) from None
+            raise TransportExecError(b"", f"Traceback\r\n{type(error).__name__}: {error}\r\n") from None
         data = out.getvalue().encode()
         if data_consumer:
             data_consumer(data)

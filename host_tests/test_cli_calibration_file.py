@@ -75,7 +75,9 @@ def test_a_directory_or_nothing_is_refused(tmp_path, log):
 
 def test_what_is_written_reads_back(tmp_path):
     matrix = [0.6, 0.8, 0.0, -0.8, 0.6, 0.0, 0.0, 0.0, 1.0]
-    written = CalibrationFile([0.012345678, -0.4, 0.0], [1.19, 0.81, 1.0], [1.5, -2.5, 59.0], matrix, True, True)
+    written = CalibrationFile(
+        [0.012345678, -0.4, 0.0], [1.19, 0.81, 1.0], [1.5, -2.5, 59.0], matrix, True, True
+    )
     write_calibration(tmp_path / "CAL.json", written)
     assert read_calibration(tmp_path / "CAL.json") == written
     data = json.loads((tmp_path / "CAL.json").read_text())
@@ -97,7 +99,9 @@ def test_a_byte_order_mark_is_no_hindrance(tmp_path):
 def test_without_word_of_it_an_identity_is_not_aligned(tmp_path):
     """A file of another program need not say; only a matrix that was measured is an alignment."""
     assert not read_calibration(command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=I)).aligned
-    assert read_calibration(command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=I, aligned=True)).aligned
+    assert read_calibration(
+        command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=I, aligned=True)
+    ).aligned
 
 
 def test_a_write_that_fails_leaves_the_old_file_and_no_other(tmp_path, monkeypatch, log):
@@ -128,4 +132,6 @@ def test_outputs_that_would_do_harm_are_refused(tmp_path, log):
 @pytest.mark.skipif(not os.path.exists("/dev/null"), reason="no /dev/null on this system")
 def test_a_device_is_not_replaced_by_a_file(tmp_path, log):
     cal = command.write_cal(tmp_path / "CAL.json")
-    command.refused(tmp_path, "replay", log, "--calibration", cal, "--out", "/dev/null", words="ordinary file")
+    command.refused(
+        tmp_path, "replay", log, "--calibration", cal, "--out", "/dev/null", words="ordinary file"
+    )

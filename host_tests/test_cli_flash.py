@@ -26,6 +26,7 @@ def board(tmp_path, monkeypatch):
     board.path("boot.py").write_text("# boot\n")
     monkeypatch.setattr(list_ports, "comports", lambda: [MODEM, PICO, BUILT_IN, PROBE])
     monkeypatch.setattr(deploy, "SerialTransport", lambda name, timeout: board)
+    monkeypatch.setattr(deploy, "_RESTART_S", 0)
     return board
 
 
@@ -84,7 +85,14 @@ def test_an_edited_config_stays_until_told_otherwise(board):
 
 def test_the_rider_s_files_stay(board):
     """Calibration, own files, other directories: nothing is touched but code of an older version."""
-    own = ("kickstand_a.cal", "kickstand_b.cal", "kickstand/kickstand_a.cal", "kickstand/notes.txt", "lib/x.py", "y.py")
+    own = (
+        "kickstand_a.cal",
+        "kickstand_b.cal",
+        "kickstand/kickstand_a.cal",
+        "kickstand/notes.txt",
+        "lib/x.py",
+        "y.py",
+    )
     board.path("kickstand").mkdir()
     board.path("lib").mkdir()
     for name in own:
@@ -199,8 +207,14 @@ def test_a_port_that_another_program_has_open(tmp_path):
     [
         (serial.SerialException(errno.EACCES, "could not open port"), "no permission for /dev/ttyACM0"),
         (serial.SerialException(errno.EBUSY, "could not open port"), "is in use"),
-        (serial.SerialException("could not open port 'COM3': PermissionError(13, 'denied', None, 5)"), "is in use"),
-        (serial.SerialException("could not open port 'COM3': FileNotFoundError(2, 'no', None, 2)"), "there is no"),
+        (
+            serial.SerialException("could not open port 'COM3': PermissionError(13, 'denied', None, 5)"),
+            "is in use",
+        ),
+        (
+            serial.SerialException("could not open port 'COM3': FileNotFoundError(2, 'no', None, 2)"),
+            "there is no",
+        ),
     ],
 )
 def test_why_a_port_does_not_open(tmp_path, monkeypatch, error, words):
@@ -215,7 +229,9 @@ def test_why_a_port_does_not_open(tmp_path, monkeypatch, error, words):
 
 def test_status_prints_what_the_board_says_and_restarts_it(board):
     board.path("kickstand").mkdir()
-    board.path("kickstand/__init__.py").write_text("def status():\n    print('Lean 3 \u00b0')\n    print('done')\n")
+    board.path("kickstand/__init__.py").write_text(
+        "def status():\n    print('Lean 3 \u00b0')\n    print('done')\n"
+    )
     result = command.works("status")
     assert result.out == "Lean 3 \u00b0\ndone\n"
     assert (board.resets, board.closed) == (1, True)

@@ -34,7 +34,10 @@ BAD = {
     "time goes back.csv": (text(*GOOD[:3], GOOD[0]), "line 5: time goes back from 0.020000 at 0.00 s"),
     "short row.csv": (text(*GOOD[:3], "0.03,0,0"), "line 5: 3 values under 7 column names"),
     "long row.csv": (text(*GOOD[:3], GOOD[3] + ",1"), "line 5: 8 values under 7 column names"),
-    "speed word.csv": (text(ROW + ",fast", header=command.HEADER + ",speed_mps"), "line 2: speed_mps is 'fast'"),
+    "speed word.csv": (
+        text(ROW + ",fast", header=command.HEADER + ",speed_mps"),
+        "line 2: speed_mps is 'fast'",
+    ),
     "open quote.csv": (text(*GOOD[:3], '0.03,"0,0,1,0,0,0', *GOOD[4:]), "column names: is the line cut?"),
     "binary.csv": (bytes(range(256)), "line 2: not text"),
     "zeros.csv": (bytes(100), "no column"),
@@ -82,7 +85,9 @@ def test_a_directory_is_no_log(tmp_path):
 def test_a_log_that_is_not_there(tmp_path):
     cal, log = command.write_cal(tmp_path / "CAL.json"), tmp_path / "none.csv"
     out = tmp_path / "LEAN.csv"
-    command.refused(tmp_path, "replay", log, "--calibration", cal, "--out", out, words="there is no such file")
+    command.refused(
+        tmp_path, "replay", log, "--calibration", cal, "--out", out, words="there is no such file"
+    )
 
 
 PLAIN = text(*GOOD)
@@ -96,7 +101,8 @@ SAME = {
     "optional columns.csv": text(*[g + ",,12.5" for g in GOOD], header=command.HEADER + ",temp_c,speed_mps"),
     "another column.csv": text(*[g + ",hello" for g in GOOD], header=command.HEADER + ",note"),
     "another order.csv": text(
-        *[",".join(reversed(g.split(","))) for g in GOOD], header=",".join(reversed(command.HEADER.split(",")))
+        *[",".join(reversed(g.split(","))) for g in GOOD],
+        header=",".join(reversed(command.HEADER.split(","))),
     ),
 }
 

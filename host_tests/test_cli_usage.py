@@ -15,7 +15,10 @@ MISTAKES = {
     "six without out": (["calibrate", "six", "a.csv"], "Missing option '--out'"),
     "two with one pose": (["calibrate", "two", "a.csv", "--out", "CAL.json"], "UPRIGHT.csv"),
     "two with three": (["calibrate", "two", "a", "b", "c", "--out", "d"], "unexpected extra argument (c)"),
-    "side": (["calibrate", "two", "a.csv", "b.csv", "--side", "up", "--out", "CAL.json"], "'up' is not one of"),
+    "side": (
+        ["calibrate", "two", "a.csv", "b.csv", "--side", "up", "--out", "CAL.json"],
+        "'up' is not one of",
+    ),
     "replay nothing": (["replay"], "Missing argument 'LOG.csv'"),
     "replay without calibration": (["replay", "a.csv", "--out", "b.csv"], "Missing option '--calibration'"),
     "engine": (["replay", "a", "--calibration", "b", "--out", "c", "--engine", "x"], "'x' is not one of"),
@@ -58,7 +61,17 @@ def test_a_fault_of_its_own_is_one_line_too(tmp_path, monkeypatch):
 def test_from_a_shell(tmp_path):
     """Standard output empty, one line on standard error, status 2: as a script sees it."""
     done = subprocess.run(
-        [sys.executable, "-m", "kickstand_tools.cli", "replay", "none.csv", "--calibration", "x", "--out", "y"],
+        [
+            sys.executable,
+            "-m",
+            "kickstand_tools.cli",
+            "replay",
+            "none.csv",
+            "--calibration",
+            "x",
+            "--out",
+            "y",
+        ],
         cwd=tmp_path,
         capture_output=True,
         text=True,

@@ -105,8 +105,8 @@ def two(
         say(f"{name:<10} " + _axes(matrix[row : row + 3], "%+.4f"))
     if tilt < alignment.WARN_TILT_DEG:
         say(
-            f"warning: under {alignment.WARN_TILT_DEG:.0f} degrees, 1 degree of pitch turns forward by over 7: "
-            "lean further"
+            f"warning: under {alignment.WARN_TILT_DEG:.0f} degrees, 1 degree of pitch turns forward by over "
+            "7: lean further"
         )
     if not result.six_done:
         say("warning: no six-position calibration: an offset of 50 mg is 3 degrees of lean")

@@ -62,9 +62,7 @@ class Device:
         return self
 
     def __exit__(self, *_: object) -> None:
-        assert self._process.stdin
-        with contextlib.suppress(OSError):
-            self._process.stdin.close()  # which the device takes for "quit"
+        self.hang_up()
         try:
             self._process.wait(3.0)
         except subprocess.TimeoutExpired:
@@ -77,6 +75,12 @@ class Device:
         for line in self._process.stdout:
             self._lines.put(line)
         self._lines.put(None)
+
+    def hang_up(self) -> None:
+        """No more commands, which the device takes for "quit"."""
+        assert self._process.stdin
+        with contextlib.suppress(OSError):
+            self._process.stdin.close()
 
     def send(self, command: str) -> None:
         """One of demo_device's commands."""

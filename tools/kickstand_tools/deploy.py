@@ -5,6 +5,7 @@ import contextlib
 import errno
 import hashlib
 import io
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -20,6 +21,7 @@ PACKAGE = "/kickstand"
 CONFIG = "/config.py"  # the rider's own once it is on the board
 _CHUNK = 2048  # bytes an exchange; with mpremote's 256 copying takes half as long again
 _ANSWER_S = 10
+_RESTART_S = 2  # until its port is back: the next command may follow at once
 _STATUS_S = 60  # an emulated board takes a while to compile the modules
 
 # Prints {path: (size, SHA-256)} of the files in the root and in the package's directory.
@@ -72,15 +74,9 @@ def status(port: str | None, say: Print) -> None:
     with connected(port) as (transport, name):
         _describe(transport, name)
         try:
-            out, error = transport.exec_raw("import kickstand\nkickstand.status()", timeout=_STATUS_S)
+            say(_status_text(transport, name))
         finally:
             restart(transport)
-        reason = _last_line(error.decode(errors="replace"))
-        if "no module named 'kickstand" in reason:
-            raise InputError(f"Kickstand is not on the board at {name}: kickstand flash puts it there")
-        if error:
-            raise InputError(f"the board cannot tell its status ({reason}): bring it up to date with kickstand flash")
-        say(out.decode(errors="replace").replace("\r\n", "\n").rstrip())
 
 
 def install(transport: SerialTransport, replace_config: bool, say: Print) -> None:
@@ -109,12 +105,13 @@ def install(transport: SerialTransport, replace_config: bool, say: Print) -> Non
             )
     total = sum(len(data) for data in changed.values())
     same = len(wanted) - len(changed)
-    say(f"copied {len(changed)} files, {total / 1000:.1f} kB, and verified them; {same} are as they were")
+    say(f"copied {len(changed)} files, {total / 1000:.1f} kB, and verified them; {same} left as they were")
 
 
 def restart(transport: SerialTransport) -> None:
     """Reset the board, so that it starts as after power-on. Its USB port goes away for a moment."""
     transport.exec_raw_no_follow("import time, machine\ntime.sleep_ms(100)\nmachine.reset()")
+    time.sleep(_RESTART_S)
 
 
 @contextlib.contextmanager
@@ -174,6 +171,18 @@ def _describe(transport: SerialTransport, name: str) -> str:
 def _survey(transport: SerialTransport) -> dict[str, tuple[int, bytes]]:
     """Size and SHA-256 of every file in the board's root and in the package's directory."""
     return ast.literal_eval(transport.exec(_SURVEY).decode())
+
+
+def _status_text(transport: SerialTransport, name: str) -> str:
+    out, error = transport.exec_raw("import kickstand\nkickstand.status()", timeout=_STATUS_S)
+    reason = _last_line(error.decode(errors="replace"))
+    if "no module named 'kickstand" in reason:
+        raise InputError(f"Kickstand is not on the board at {name}: kickstand flash puts it there")
+    if error:
+        raise InputError(
+            f"the board cannot tell its status ({reason}): bring it up to date with kickstand flash"
+        )
+    return out.decode(errors="replace").replace("\r\n", "\n").rstrip()
 
 
 def _fingerprint(data: bytes) -> tuple[int, bytes]:

@@ -14,7 +14,8 @@ def available() -> bool:
 
 def command(script: str, *arguments: str) -> list[str]:
     """The command line that runs a script under MicroPython."""
-    start = "import sys, micropython_unix; sys.exit(micropython_unix.main())"  # its own -m loses the exit status
+    # python -m micropython_unix would lose the exit status
+    start = "import sys, micropython_unix; sys.exit(micropython_unix.main())"
     return [sys.executable, "-c", start, script, *arguments]
 
 

@@ -6,9 +6,13 @@ import tempfile
 from pathlib import Path
 
 from littlefs import LittleFS, UserContext
-from littlefs.errors import LittleFSError
 
+from .. import firmware_path
 from ..deploy import firmware_files
+
+firmware_path.add_to_path()
+from kickstand.calibration import Calibration  # noqa: E402
+from kickstand.store import Store  # noqa: E402
 
 START = 0xA0000  # of the file system in flash
 _BLOCK, _COUNT = 4096, 352
@@ -31,7 +35,7 @@ def build(files: dict[str, bytes]) -> bytes:
 
 
 def read(image: bytes) -> dict[str, bytes]:
-    """Every file of a file system. Raises LittleFSError where there is none."""
+    """Every file of a file system. Raises littlefs.errors.LittleFSError where there is none."""
     context = UserContext(SIZE)
     context.buffer = bytearray(image)
     system = _mount(context, fresh=False)
@@ -57,6 +61,13 @@ def firmware(compiled: bool = False) -> dict[str, bytes]:
     }
 
 
+def stored(calibration: Calibration, who_am_i: int = 0x68, accel_range_g: int = 8) -> dict[str, bytes]:
+    """The files in which a board keeps this calibration."""
+    with tempfile.TemporaryDirectory() as directory:
+        Store(who_am_i, accel_range_g, directory).save(calibration)
+        return {path.name: path.read_bytes() for path in Path(directory).iterdir()}
+
+
 def cross_compiled(source: Path, architecture: str = "armv6m") -> bytes:
     """source as .mpy."""
     with tempfile.TemporaryDirectory() as directory:
@@ -72,6 +83,3 @@ def _mount(context: UserContext, fresh: bool) -> LittleFS:
         system.format()
     system.mount()
     return system
-
-
-__all__ = ["SIZE", "START", "LittleFSError", "build", "cross_compiled", "firmware", "read"]

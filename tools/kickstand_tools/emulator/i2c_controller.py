@@ -51,7 +51,7 @@ class TimedI2C(RPI2C):
 
     def reading(self) -> bool:
         """True in the middle of a byte that a device sends."""
-        return self._then is self._received
+        return self._then == self._received
 
     def let_go(self) -> None:
         """Leave a transfer where it is: the controller idle, the wires released."""

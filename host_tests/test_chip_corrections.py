@@ -1,0 +1,99 @@
+"""What is put right in the emulated Pico: bus and flash take their time, errors are the chip's, the console is quiet."""
+
+import pytest
+from emulated import pico, reset_in_a_read
+
+pytestmark = pytest.mark.chip
+
+_TOOLS = """
+from time import ticks_us, ticks_diff, sleep_ms
+from machine import I2C, SoftI2C, Pin
+sensor = I2C(0, sda=Pin(4), scl=Pin(5), freq=400000, timeout=5000)
+lcd = I2C(1, sda=Pin(6), scl=Pin(7), freq=100000, timeout=20000)
+def timed(f, *a):
+    t = ticks_us()
+    try:
+        r = f(*a)
+    except OSError as e:
+        r = e.errno
+    return ticks_diff(ticks_us(), t), r
+"""
+
+
+@pytest.fixture(scope="module")
+def board():
+    """One Pico without files, with _TOOLS run."""
+    with pico() as emulated:
+        emulated.exec(_TOOLS)
+        yield emulated
+
+
+def ask(board, expression):
+    """The value of an expression on the board."""
+    return eval(board.exec(f"print(repr(({expression})))"))
+
+
+def test_bits_take_their_time(board):
+    """156 bits at 400 kHz are 390 us, and MicroPython adds some; 69 bytes at 100 kHz are 6.2 ms."""
+    us, _ = ask(board, "timed(sensor.readfrom_mem, 0x68, 0x3B, 14)")
+    assert 390 < us < 500
+    us, _ = ask(board, "timed(lcd.writeto, 0x27, bytes(68))")
+    assert 6210 < us < 6500
+
+
+def test_an_absent_device_is_a_quick_error_and_spoils_nothing(board):
+    for call in ("readfrom, 0x55, 1", "writeto, 0x55, b'1'"):
+        us, number = ask(board, f"timed(sensor.{call})")
+        assert number == 5
+        assert us < 400
+        assert ask(board, "timed(sensor.readfrom_mem, 0x68, 0x75, 1)")[1] == b"h"
+
+
+def test_held_wires_time_out_until_they_are_freed(board):
+    """As set: 5 ms. Then nine clocks by hand, and the chip answers again."""
+    board.board.sensor_bus.hang()
+    us, number = ask(board, "timed(sensor.readfrom_mem, 0x68, 0x75, 1)")
+    assert number == 110
+    assert 5000 < us < 5500
+    board.exec(
+        "scl, sda = Pin(5, Pin.OPEN_DRAIN, value=1), Pin(4, Pin.OPEN_DRAIN, value=1)\n"
+        "assert not sda.value()\n"
+        "for _ in range(9):\n    scl(0)\n    scl(1)\n"
+        "assert sda.value()\n"
+        "sensor = I2C(0, sda=Pin(4), scl=Pin(5), freq=400000, timeout=5000)"
+    )
+    assert ask(board, "sensor.readfrom_mem(0x68, 0x75, 1)") == b"h"
+
+
+def test_devices_answer_to_pins_too(board):
+    """scan() sends zero-length writes, which MicroPython does with the pins; so does SoftI2C everything."""
+    assert ask(board, "sensor.scan(), lcd.scan()") == ([0x68], [0x27])
+    board.exec("soft = SoftI2C(sda=Pin(4), scl=Pin(5), freq=100000)\nsoft.writeto_mem(0x68, 0x6B, b'\\x01')")
+    assert ask(board, "soft.readfrom_mem(0x68, 0x6B, 1), soft.readfrom_mem(0x68, 0x75, 1)") == (b"\x01", b"h")
+    board.exec("sensor = I2C(0, sda=Pin(4), scl=Pin(5), freq=400000, timeout=5000)")
+
+
+def test_flash_takes_its_time(board):
+    us, _ = ask(board, "timed(__import__('rp2').Flash().writeblocks, 300, bytes(4096))")
+    assert 45_000 + 16 * 500 < us < 62_000
+    us, _ = ask(board, "timed(__import__('rp2').Flash().writeblocks, 301, bytes(256), 0)")
+    assert 500 < us < 1000
+
+
+def test_the_console_leaves_the_processor_alone(board):
+    """3.1 us for a turn of an empty loop, and the same again: with empty packets it takes three times as long."""
+    code = "def f():\n    t = ticks_us()\n    for i in range(1000): pass\n    return ticks_diff(ticks_us(), t)\nprint(f())"
+    first, second = int(board.exec(code)), int(board.exec(code))
+    assert first < 3500
+    assert abs(first - second) < 10
+
+
+def test_a_reset_in_mid_read_leaves_the_wire_held(board):
+    """And a power-cycle does not."""
+    reset_in_a_read(board, board.time_s + 0.01)
+    board.console.send(b"while True: sensor.readfrom_mem(0x68, 0x3B, 14)\x04")
+    board.run(0.05)
+    assert board.chip.resets == 1
+    assert board.exec("from machine import Pin\nprint(Pin(4, Pin.OPEN_DRAIN, value=1).value())") == "0\n"
+    board.power_cycle()
+    assert board.exec("from machine import Pin\nprint(Pin(4, Pin.OPEN_DRAIN, value=1).value())") == "1\n"

@@ -1,0 +1,65 @@
+"""The whole device on the emulated Pico: MicroPython's own image, its file system, floats and drivers."""
+
+import time
+
+import pytest
+from emulated import PART, calibrated, firmware, leaning, pico, shown_lean
+from kickstand_tools.rides import Ride, accelerate, kickstand, turn, upright
+
+pytestmark = pytest.mark.chip
+
+KICKSTAND, UPRIGHT, RIDE = 5.5, 5.5, [accelerate(15.0, 3.0), turn(-30.0, 3.0)]
+
+
+def test_a_new_board_is_aligned_by_two_presses_and_keeps_it():
+    """Uncalibrated, kickstand, upright, power-cycle, ride: the display reads the lean."""
+    ride = Ride([kickstand(KICKSTAND), upright(UPRIGHT), *RIDE])
+    device = pico(PART.world(ride.motion), firmware())
+    device.power_on()
+    device.run_until(lambda: device.lcd()[0].startswith("Raw"), 1.5)
+    device.run_until(lambda: device.lcd()[1].strip() in ("Not aligned", "On stand: press"), 0.1)
+    device.press()
+    device.run_until(lambda: device.lcd()[0] == "Now upright:    ", 4.5)
+    device.run_until(lambda: ride.truth(device.time_s)[3] == "upright", 4.0)
+    device.press()
+    device.run_until(lambda: device.lcd()[0].startswith("Aligned!"), 4.5)
+    assert 11.0 < float(device.lcd()[0].split()[1].rstrip("°")) < 13.0
+    assert {"kickstand_a.cal", "kickstand_b.cal"} & set(device.files())
+
+    device.power_cycle()
+    device.run_until(lambda: shown_lean(device.lcd()) is not None, 2.0)
+    device.run_until(lambda: ride.truth(device.time_s)[3] == "held turn", 8.0)
+    device.run(1.0)  # for the averages
+    errors = []
+    while ride.truth(device.time_s)[3] == "held turn":
+        errors.append(shown_lean(device.lcd()) - ride.truth(device.time_s)[0])
+        device.run(0.1)
+    assert len(errors) > 10
+    assert max(abs(error) for error in errors) < 3.0
+
+
+def test_its_pages_follow_the_button():
+    """Contacts bounce; each press is one page."""
+    device = pico(leaning(20.0), firmware() | calibrated())
+    device.power_on()
+    device.run_until(lambda: shown_lean(device.lcd()) is not None, 2.0)
+    assert abs(shown_lean(device.lcd()) - 20.0) < 1.0
+    titles = ["Lean"]
+    while titles[-1] != "Lean" or len(titles) == 1:
+        device.press()
+        device.run(0.5)
+        titles.append(device.lcd()[0].split()[0])
+        assert len(titles) < 8
+    assert len(titles) - 1 == len(set(titles)) > 3
+
+
+def test_the_same_program_takes_the_same_time_on_every_host():
+    """On a slow one, too, each cycle is the same."""
+
+    def cycles(pause_s):
+        device = pico(leaning(0.0), firmware() | calibrated())
+        device.power_on()
+        device.run(0.8, lambda: time.sleep(pause_s))
+        return device.chip.rp2040.core.cycles
+
+    assert cycles(0.0) == cycles(0.003)

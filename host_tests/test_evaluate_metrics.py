@@ -1,0 +1,111 @@
+"""The scores of an evaluation on errors that are known."""
+
+import math
+
+import numpy as np
+import pytest
+from kickstand_tools.evaluation.estimators import trailing_mean
+from kickstand_tools.evaluation.metrics import Score, lag_ms, score, slope, straights
+from kickstand_tools.evaluation.picture import ZOOM_S, zoom_start
+from kickstand_tools.evaluation.report import document, pooled
+from kickstand_tools.evaluation.runs import Job, Result
+
+RATE = 200.0
+N = 40000
+TIME = np.arange(N) / RATE
+
+
+def truth() -> dict[str, np.ndarray]:
+    """Leans of up to 35 degrees in the first 80 %, then straight on."""
+    lean = 35.0 * np.sin(2.0 * np.pi * 0.13 * TIME) * np.sin(2.0 * np.pi * 0.031 * TIME)
+    lean[int(0.8 * N) :] = 0.0
+    return {
+        "lean_deg": lean,
+        "speed_mps": np.where(TIME < 5.0, 0.0, 15.0),
+        "yaw_rate_dps": -np.degrees(9.8 / 15.0 * np.tan(np.radians(lean))),
+    }
+
+
+def test_a_constant_error():
+    true = truth()
+    found = score(true["lean_deg"] + 0.7, true, RATE)
+    assert (found.rms, found.p95, found.worst) == pytest.approx((0.7, 0.7, 0.7))
+    assert found.straight_bias == pytest.approx(0.7)
+    assert found.lag_ms == pytest.approx(0.0, abs=0.5)
+
+
+def test_noise_and_one_outlier():
+    true = truth()
+    noise = np.random.default_rng(1).normal(scale=2.0, size=N)
+    noise[30000] = 50.0
+    found = score(true["lean_deg"] + noise, true, RATE)
+    assert found.rms == pytest.approx(2.0, rel=0.03)
+    assert found.p95 == pytest.approx(1.96 * 2.0, rel=0.03)
+    assert found.worst == 50.0
+    assert found.slope == pytest.approx(1.0, abs=0.005)
+
+
+def test_the_slope_is_the_share_shown_where_it_leans():
+    true = truth()
+    shown = np.where(np.abs(true["lean_deg"]) > 10.0, 0.4, 3.0) * true["lean_deg"]
+    assert score(shown, true, RATE).slope == pytest.approx(0.4)
+    assert math.isnan(slope(np.ones(10), np.ones(10)))
+
+
+@pytest.mark.parametrize("late_ms", [-40.0, 0.0, 7.0, 23.0, 180.0])
+def test_the_lag_between_samples(late_ms):
+    def lean(t):
+        return 30.0 * np.sin(2.0 * np.pi * 0.21 * t) + 10.0 * np.sin(2.0 * np.pi * 0.53 * t)
+
+    noise = np.random.default_rng(2).normal(scale=0.1, size=N)
+    assert lag_ms(lean(TIME - late_ms / 1000.0) + noise, lean(TIME), RATE) == pytest.approx(late_ms, abs=2.0)
+
+
+def test_no_lag_of_what_does_not_move():
+    assert math.isnan(lag_ms(np.zeros(N), np.zeros(N), RATE))
+
+
+def test_what_happens_before_setting_off_does_not_count():
+    true = truth()
+    shown = true["lean_deg"] + np.where(TIME < 4.9, 60.0, 0.0)
+    assert score(shown, true, RATE).worst == 0.0
+
+
+def test_the_bias_is_of_the_last_straights_alone():
+    true = truth()
+    shown = true["lean_deg"] + np.where(TIME < 0.85 * TIME[-1], 5.0, -0.25)
+    assert score(shown, true, RATE).straight_bias == pytest.approx(-0.25)
+    true["lean_deg"][:] = 20.0
+    assert not straights(true).any()
+    assert math.isnan(score(shown, true, RATE).straight_bias)
+
+
+def test_a_trailing_mean_starts_short():
+    assert trailing_mean(np.array([2.0, 4.0, 6.0, 8.0, 10.0]), 3.0, 1.0) == pytest.approx([2, 3, 4, 6, 8])
+
+
+def test_pooling_keeps_the_worst():
+    one = Score(1.0, 2.0, 3.0, 0.9, 5.0, 0.1)
+    two = Score(3.0, 4.0, 9.0, 1.1, float("nan"), -0.6)
+    found = pooled([one, two])
+    assert found["rms"] == pytest.approx(math.sqrt(5.0))
+    assert found["worst_ride_rms"] == 3.0
+    assert found["worst"] == 9.0
+    assert (found["slope_low"], found["slope_high"]) == (0.9, 1.1)
+    assert found["straight_bias"] == -0.6
+    assert found["lag_ms"] == 5.0
+
+
+def test_the_document_has_no_nan():
+    results = [Result(Job("street", 0), {"kickstand": Score(1.0, 1.0, 1.0, float("nan"), 1.0, float("nan"))})]
+    made = document(results, None)
+    assert made["profiles"]["street"]["kickstand"]["slope"] is None
+    assert made["rides"][0]["scores"]["kickstand"]["rms"] == 1.0
+
+
+def test_the_zoom_is_where_it_leans():
+    lean = np.zeros(N)
+    lean[20000:24000] = 30.0
+    start = zoom_start(TIME, lean)
+    assert 100.0 - ZOOM_S < start < 120.0
+    assert zoom_start(TIME[:100], lean[:100]) == 0.0

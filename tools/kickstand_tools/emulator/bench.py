@@ -1,0 +1,154 @@
+"""kickstand bench: what the firmware costs on the emulated Pico, in time, memory and flash."""
+
+import ast
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.console import Group
+from rich.table import Table
+
+from .. import firmware_path
+from ..rides import Ride, accelerate, turn, upright
+from ..sensor_errors import Sensor
+from . import flash_image
+from .host_link import GUEST, HostLink
+from .pico import Pico
+from .sample_count import SampleCount
+
+firmware_path.add_to_path()
+from kickstand.calibration import Calibration  # noqa: E402
+
+SAMPLE_HZ = 200  # what bench_guest asks for
+_GUEST = Path(__file__).with_name("bench_guest.py")
+_RIDE = [accelerate(15.0, 1.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 20
+_START_LIMIT_S = 10.0
+
+
+def bench(seconds: float = 10.0) -> dict[str, Any]:
+    """Run everything; figures in the units that their names end with. seconds: of emulated time, each of two runs."""
+    turns = round(seconds * SAMPLE_HZ)
+    plain = _run(turns, detail=False)
+    detail = _run(turns, detail=True)
+    figures = plain["figures"]
+    return {
+        "sample_hz": SAMPLE_HZ,
+        "seconds": figures["elapsed_us"] / 1e6,
+        "turn_us": _spread(plain["took"]),
+        "stage_us": {name: _spread(us) for name, us in _stages(detail).items()},
+        "cpu_share": 1.0 - figures["slept_us"] / figures["elapsed_us"],
+        "samples_taken": plain["taken"],
+        "samples_lost": plain["lost"],
+        "heap_bytes_per_turn": figures["bytes_per_turn"],
+        "collections_by_app": figures["collections_by_app"],
+        "collections_automatic": figures["collections_automatic"],
+        "collection_pause_us": _spread(plain["pauses"]),
+        "free_heap_bytes": figures["free_before"],
+        "free_heap_at_end_bytes": figures["free_after"],
+        "first_lean_s": {kind: _first_lean_s(kind == "mpy") for kind in ("py", "mpy")},
+        "flash_bytes": {kind: _size(kind == "mpy") for kind in ("py", "mpy")},
+    }
+
+
+def tables(result: dict[str, Any]) -> Group:
+    """The result of bench() for a terminal."""
+    times = Table(title=f"One turn of the loop at {result['sample_hz']} Hz, emulated us")
+    times.add_column("stage")
+    for name in ("median", "p99", "max"):
+        times.add_column(name, justify="right")
+    for name, spread in (*result["stage_us"].items(), ("whole turn", result["turn_us"])):
+        times.add_row(name, *(f"{spread[key]:.0f}" for key in ("median", "p99", "max")))
+    figures = Table(show_header=False)
+    pause = result["collection_pause_us"]
+    first, size = result["first_lean_s"], result["flash_bytes"]
+    for name, text in (
+        ("CPU share", f"{100 * result['cpu_share']:.0f} %"),
+        ("samples taken / lost", f"{result['samples_taken']} / {result['samples_lost']} in {result['seconds']:.1f} s"),
+        ("heap taken by a turn", f"{result['heap_bytes_per_turn']} bytes"),
+        ("collections", f"{result['collections_by_app']} by the app, {result['collections_automatic']} by themselves"),
+        ("a collection takes", f"{pause['median'] / 1000:.1f} ms, at most {pause['max'] / 1000:.1f} ms"),
+        (
+            "free heap, start / end",
+            f"{result['free_heap_bytes'] / 1024:.0f} / {result['free_heap_at_end_bytes'] / 1024:.0f} KB",
+        ),
+        ("reset to first lean", f"{first['py']:.2f} s from .py, {first['mpy']:.2f} s from .mpy"),
+        ("size on flash", f"{size['py'] / 1000:.1f} kB as .py, {size['mpy'] / 1000:.1f} kB as .mpy"),
+    ):
+        figures.add_row(name, text)
+    return Group(times, figures)
+
+
+def _run(turns: int, detail: bool) -> dict[str, Any]:
+    """The app's loop for so many turns: arrays and figures of bench_guest, and how the samples fared."""
+    files = flash_image.firmware(compiled=True) | _calibration()
+    del files["/main.py"]
+    files["bench_guest.mpy"] = flash_image.cross_compiled(_GUEST)
+    arrays: list[np.ndarray] = []
+    result: dict[str, Any] = {}
+    with Pico(_world(), files) as pico:
+        samples = SampleCount(pico.board.sensor)
+
+        def take(data: bytes) -> None:
+            if data == b"begin":
+                samples.begin()
+            elif data == b"end":
+                result.update(taken=samples.taken(), lost=samples.lost())
+            else:
+                arrays.append(np.frombuffer(data, np.uint16))
+
+        HostLink(pico.chip, b"", take)
+        code = f"{GUEST}import bench_guest\nbench_guest.run({detail}, {turns}, Sink())\n"
+        result["figures"] = ast.literal_eval(pico.exec(code, limit_s=10.0 * turns / SAMPLE_HZ + 30.0))
+    result["took"] = arrays[0]
+    figures = result["figures"]
+    result["pauses"] = arrays[1][: figures["collections_by_app"]] if figures["collections_by_app"] else np.array([figures["collect_us"]])
+    if detail:
+        result["stages"] = arrays[2].reshape(turns, -1).astype(int)
+    return result
+
+
+def _stages(run: dict[str, Any]) -> dict[str, np.ndarray]:
+    """us of each stage in each turn that had it."""
+    by_name = dict(zip(run["figures"]["stages"], run["stages"].T, strict=True))
+    sampled = by_name["calibrate"] > 0
+    drawn = by_name["page"] > 0
+    return {
+        "read": by_name["bus"][sampled],
+        "decode": (by_name["driver"] - by_name["bus"])[sampled],
+        "calibrate": by_name["calibrate"][sampled],
+        "rotate": by_name["rotate"][sampled],
+        "lean": (by_name["formula"] + by_name["lean"])[sampled],
+        "page": by_name["page"][drawn],
+        "display": by_name["display"],
+    }
+
+
+def _spread(us: np.ndarray) -> dict[str, float]:
+    return {"median": float(np.median(us)), "p99": float(np.percentile(us, 99)), "max": float(us.max())}
+
+
+def _first_lean_s(compiled: bool) -> float:
+    """From power-on to the first lean on the display, calibrated and standing upright."""
+    files = flash_image.firmware(compiled) | _calibration()
+    world = Sensor(seed=1, share=0.0).world(Ride([upright(100.0)]).motion)
+    with Pico(world, files) as pico:
+        pico.run_until(lambda: pico.lcd()[0].startswith("Lean") and "°" in pico.lcd()[0], _START_LIMIT_S, 0.001)
+        return round(pico.time_s, 3)
+
+
+def _world() -> Callable[[float], tuple]:
+    return Sensor(seed=1, share=0.0).world(Ride(_RIDE).motion)
+
+
+def _calibration() -> dict[str, bytes]:
+    """Of that sensor: only its mounting is to be known."""
+    calibration = Calibration()
+    calibration.aligned = True
+    for i, value in enumerate(Sensor(seed=1, share=0.0).vehicle_from_sensor):
+        calibration.vehicle_from_sensor[i] = value
+    return flash_image.stored(calibration)
+
+
+def _size(compiled: bool) -> int:
+    return sum(len(content) for content in flash_image.firmware(compiled).values())

@@ -1,0 +1,60 @@
+"""The emulated board's console as a socket, which mpremote and `kickstand flash --port socket://...` open."""
+
+import contextlib
+import socket
+
+from ..errors import InputError, cause
+from .quiet_usb import QuietConsole
+
+
+class ConsoleServer:
+    """One client at a time, as with a serial port. Call poll() often; port 0 takes a free one, see port."""
+
+    def __init__(self, console: QuietConsole, port: int) -> None:
+        self._console = console
+        self._client: socket.socket | None = None
+        try:
+            self._server = socket.create_server(("127.0.0.1", port))
+        except (OSError, OverflowError) as error:
+            raise InputError(f"port {port} cannot be opened: {cause(error)}; choose another") from error
+        self._server.setblocking(False)
+        self.port: int = self._server.getsockname()[1]
+
+    def close(self) -> None:
+        """No more clients."""
+        self._hang_up()
+        self._server.close()
+
+    def poll(self) -> None:
+        """Take in a client, and what it has sent."""
+        if self._client is None:
+            with contextlib.suppress(BlockingIOError):
+                self._client = self._server.accept()[0]
+                self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                self._client.setblocking(False)
+            return
+        try:
+            data = self._client.recv(4096)
+        except BlockingIOError:
+            return
+        except OSError:
+            data = b""
+        if data:
+            self._console.send(data)
+        else:
+            self._hang_up()
+
+    def say(self, data: bytes) -> None:
+        """What the board says; lost while nobody listens."""
+        if self._client:
+            try:
+                self._client.setblocking(True)
+                self._client.sendall(data)
+                self._client.setblocking(False)
+            except OSError:
+                self._hang_up()
+
+    def _hang_up(self) -> None:
+        if self._client:
+            self._client.close()
+            self._client = None

@@ -1,0 +1,111 @@
+"""kickstand emulate: an emulated Pico with sensor, display and button on a simulated bike, to be deployed to."""
+
+import contextlib
+import sys
+import time
+from collections.abc import Callable
+
+from rich.live import Live
+
+from ..demo_device import (
+    KICKSTAND_PRESS_S,
+    LONG_PRESS_S,
+    PART_SEED,
+    PART_SHARE,
+    SCRIPT,
+    UPRIGHT_PRESS_S,
+)
+from ..demo_screen import lcd_lines, screen
+from ..hand_bike import HandBike
+from ..keyboard import Keyboard
+from ..rides import Ride
+from ..sensor_errors import Sensor
+from .console_server import ConsoleServer
+from .pico import Pico
+
+_STEP_S = 0.02
+_BUTTON = {"b": 0.15, "B": LONG_PRESS_S, " ": LONG_PRESS_S}
+_BIKE = {"a": "left", "left": "left", "d": "right", "right": "right", "k": "kickstand", "u": "upright"}
+_HELP = "b button   B long press   a/d lean   k kickstand   u upright   q quit"
+
+
+class ScriptedBike:
+    """The demo's ride, which begins when the display comes on: the firmware has started."""
+
+    def __init__(self) -> None:
+        self._ride = Ride(SCRIPT)
+        self.begun_s: float | None = None
+
+    def motion(self, t_s: float) -> tuple[float, ...]:
+        """As Ride's."""
+        return self._ride.motion(0.0 if self.begun_s is None else t_s - self.begun_s)
+
+    def follow(self, pico: Pico) -> None:
+        """Begin, if it is time, and press the button where the script says."""
+        if self.begun_s is None and pico.board.lcd.on:
+            self.begun_s = pico.time_s
+            for press_s in (KICKSTAND_PRESS_S, UPRIGHT_PRESS_S):
+                pico.press(self.begun_s + press_s)
+
+
+def emulate(port: int, say: Callable[[str], None]) -> None:
+    """Serve the Pico's console on socket://127.0.0.1:port until the user quits. Raises InputError.
+
+    In a terminal the bike is steered by keys. Elsewhere each new text of the display is printed, and the bike
+    goes on the demo's ride once the firmware runs.
+    """
+    watched = sys.stdin.isatty() and sys.stdout.isatty()
+    bike = HandBike() if watched else ScriptedBike()
+    pico = Pico(Sensor(seed=PART_SEED, share=PART_SHARE).world(bike.motion))
+    server = ConsoleServer(pico.console, port)
+    pico.heard = server.say
+    address = f"socket://127.0.0.1:{server.port}"
+    say(f"an emulated Pico without firmware on {address}: kickstand flash --port {address}")
+    try:
+        with contextlib.suppress(KeyboardInterrupt), pico:
+            if isinstance(bike, HandBike):
+                _watch(pico, server, bike, address)
+            else:
+                _print(pico, server, bike, say)
+    finally:
+        server.close()
+
+
+def _run(pico: Pico, server: ConsoleServer) -> None:
+    """A little time, and never faster than real time: what waits outside goes by the host's clock."""
+    begun, before = time.monotonic(), pico.time_s
+    pico.run(_STEP_S, server.poll)
+    time.sleep(max(0.0, pico.time_s - before - (time.monotonic() - begun)))
+
+
+def _watch(pico: Pico, server: ConsoleServer, bike: HandBike, address: str) -> None:
+    with Keyboard() as keyboard, Live(screen=True, auto_refresh=False) as live:
+        while True:
+            for key in keyboard.keys(0.0):
+                if key == "q":
+                    return
+                if key in _BUTTON:
+                    pico.press(for_s=_BUTTON[key])
+                elif key in _BIKE:
+                    bike.command(_BIKE[key])
+            _run(pico, server)
+            lean_deg, speed_mps, _, phase = bike.truth(pico.time_s)
+            state = {
+                "t_s": pico.time_s,
+                "lcd": pico.lcd(),
+                "lean_deg": lean_deg,
+                "speed_mps": speed_mps,
+                "phase": phase,
+            }
+            live.update(screen(state, f"Pico on {address}", _HELP, False, True), refresh=True)
+
+
+def _print(pico: Pico, server: ConsoleServer, bike: ScriptedBike, say: Callable[[str], None]) -> None:
+    shown: list[str] = pico.lcd()
+    while True:
+        _run(pico, server)
+        bike.follow(pico)
+        if pico.lcd() != shown:
+            shown = pico.lcd()
+            say(f"{pico.time_s:8.2f} s")
+            say("\n".join(lcd_lines(shown)))

@@ -1,0 +1,61 @@
+"""A register block that the real chip has not: through it code on the emulated Pico exchanges bytes with the host.
+
+The console would do, but every byte of it costs the guest time. GUEST is the other end, to be run on the board.
+"""
+
+from collections.abc import Callable
+from typing import Any
+
+from rp2040py.memory_map import RAM_START_ADDRESS
+from rp2040py.peripherals.peripheral import BasePeripheral
+
+from .chip import Chip
+
+_PLACE = 0x40068  # reserved on the chip
+_COUNT, _FILL, _TAKE = 0x0, 0x4, 0x8
+
+GUEST = """
+from machine import mem32
+from uctypes import addressof
+class Source:
+    def __init__(self):
+        self.buffer = bytearray(256)
+        self.address = addressof(self.buffer)
+        self.view = memoryview(self.buffer)
+    def read(self, count):
+        mem32[0x40068000] = count
+        mem32[0x40068004] = self.address
+        return self.view[:mem32[0x40068000]]
+class Sink:
+    def write(self, data):
+        mem32[0x40068000] = len(data)
+        mem32[0x40068008] = addressof(data)
+"""
+
+
+class HostLink(BasePeripheral):
+    """source: what the guest's Source.read() gets, in order.  sink: called with what its Sink.write() is given."""
+
+    def __init__(self, chip: Chip, source: bytes, sink: Callable[[bytes], Any]) -> None:
+        super().__init__(chip.rp2040, "HOST_LINK")
+        self._source = source
+        self._sink = sink
+        self._at = self._count = 0
+        chip.rp2040.peripherals[_PLACE] = self
+
+    def read_uint32(self, offset: int) -> int:
+        """How many bytes the last FILL copied."""
+        return self._count
+
+    def write_uint32(self, offset: int, value: int) -> None:
+        """COUNT: how many bytes; FILL, TAKE: the address in memory to copy them to or from."""
+        start = value - RAM_START_ADDRESS
+        if offset == _COUNT:
+            self._count = value
+        elif offset == _FILL:
+            data = self._source[self._at : self._at + self._count]
+            self._at += len(data)
+            self._count = len(data)
+            self.rp2040.sram[start : start + len(data)] = data
+        elif offset == _TAKE:
+            self._sink(bytes(self.rp2040.sram[start : start + self._count]))

@@ -1,0 +1,111 @@
+"""What is compared: the firmware's own lean, and what hobby projects and the literature use.
+
+Each estimator gets Samples and returns the lean in degrees, > 0 to the right, sample by sample. The filters of
+`ahrs` and `vqf` run as their authors set them up: default gains, started from the first reading.
+"""
+
+from collections.abc import Callable
+from importlib.util import find_spec
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .. import firmware_path, replay, replay_engine
+from ..calibration_file import CalibrationFile
+from ..logs import Log
+from .samples import Samples, calibrated
+
+firmware_path.add_to_path()
+
+AVERAGE_S = 0.3
+COMPLEMENTARY = 0.98  # kept of the old lean at each sample
+GRAVITY_MPS2 = 9.80665
+
+_SHOWN, _FORMULA = (replay_engine.COLUMNS.index(name) for name in ("lean_deg", "lean_formula_deg"))
+_TO_XYZ = [2, 0, 1]  # their body frame is forward, left, up
+_PACKAGES = {"mahony": "ahrs", "madgwick": "ahrs", "vqf": "vqf"}
+
+
+def trailing_mean(x: NDArray, seconds: float, rate_hz: float) -> NDArray[np.float64]:
+    """Mean of the last `seconds`, shorter at the start."""
+    n = max(round(seconds * rate_hz), 1)
+    total = np.cumsum(np.concatenate((np.zeros((1, *x.shape[1:])), x)), axis=0)
+    first = np.maximum(np.arange(1, len(x) + 1) - n, 0)
+    count = np.arange(1, len(x) + 1) - first
+    return (total[1:] - total[first]) / count.reshape(-1, *[1] * (x.ndim - 1))
+
+
+def complementary(samples: Samples) -> NDArray[np.float64]:
+    """The filter of most hobby projects: roll rate integrated, pulled towards the direction of the force."""
+    leaned = np.degrees(np.arctan2(samples.force[:, 0], samples.force[:, 1]))
+    step = samples.rate[:, 2] / samples.rate_hz
+    result = np.empty_like(leaned)
+    now = leaned[0]
+    for k in range(len(leaned)):
+        now = COMPLEMENTARY * (now + step[k]) + (1.0 - COMPLEMENTARY) * leaned[k]
+        result[k] = now
+    return result
+
+
+def mahony(samples: Samples) -> NDArray[np.float64]:
+    from ahrs.filters import Mahony
+
+    gyro, accel = _xyz(samples)
+    return _roll(Mahony(gyr=gyro, acc=accel, frequency=samples.rate_hz).Q)
+
+
+def madgwick(samples: Samples) -> NDArray[np.float64]:
+    from ahrs.filters import Madgwick
+
+    gyro, accel = _xyz(samples)
+    return _roll(Madgwick(gyr=gyro, acc=accel, frequency=samples.rate_hz).Q)
+
+
+def vqf(samples: Samples) -> NDArray[np.float64]:
+    from vqf import VQF
+
+    gyro, accel = _xyz(samples)
+    return _roll(VQF(1.0 / samples.rate_hz).updateBatch(gyro, accel)["quat6D"])
+
+
+OTHERS: dict[str, Callable[[Samples], NDArray[np.float64]]] = {
+    "complementary": complementary,
+    "mahony": mahony,
+    "madgwick": madgwick,
+    "vqf": vqf,
+}
+NAMES = ("kickstand", "formula", "formula 0.3 s", *OTHERS)
+
+
+def missing() -> list[str]:
+    """Packages that are not installed and whose filters are left out."""
+    return sorted({package for package in _PACKAGES.values() if find_spec(package) is None})
+
+
+def estimate(log: Log, calibration: CalibrationFile) -> dict[str, NDArray[np.float64]]:
+    """Lean in degrees by every estimator that is there. The speed in the log is not used."""
+    blind = Log(log.path, log.time_text, log.time_us, log.readings, [None] * len(log.readings))
+    own = np.array(replay.replay(blind, calibration, "cpython"))
+    samples = calibrated(log, calibration)
+    result = {
+        "kickstand": own[:, _SHOWN],
+        "formula": own[:, _FORMULA],
+        "formula 0.3 s": trailing_mean(own[:, _FORMULA], AVERAGE_S, samples.rate_hz),
+    }
+    absent = missing()
+    for name, method in OTHERS.items():
+        if _PACKAGES.get(name) not in absent:
+            result[name] = method(samples)
+    return result
+
+
+def _xyz(samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Rates in rad/s and force in m/s2 along forward, left, up."""
+    gyro = np.ascontiguousarray(np.radians(samples.rate[:, _TO_XYZ]))
+    return gyro, np.ascontiguousarray(samples.force[:, _TO_XYZ] * GRAVITY_MPS2)
+
+
+def _roll(q: NDArray) -> NDArray[np.float64]:
+    """Lean in degrees of body-to-earth quaternions (w, x, y, z) of a forward, left, up body."""
+    w, x, y, z = q.T
+    return np.degrees(np.arctan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)))

@@ -1,0 +1,82 @@
+"""How well a shown lean follows the true one."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+LEANED_DEG = 10.0  # the slope counts only beyond: most of a ride is nearly upright
+_LAG_RANGE_S = (-0.2, 0.8)
+_LAG_SMOOTHING_S = 0.05
+_STILL_DPS = 1.0
+_STRAIGHT_DPS, _STRAIGHT_DEG, _STRAIGHT_MPS = 2.0, 6.0, 5.0
+
+
+@dataclass
+class Score:
+    """Degrees; slope: shown over true; lag in ms, > 0 if the shown lean is late. NaN where it cannot be told."""
+
+    rms: float
+    p95: float
+    worst: float
+    slope: float
+    lag_ms: float
+    straight_bias: float
+
+
+def rms(error: NDArray) -> float:
+    return float(np.sqrt(np.mean(error * error)))
+
+
+def slope(shown: NDArray, true: NDArray, beyond: float = LEANED_DEG) -> float:
+    """Shown over true where the truth is beyond some degrees: least squares through the origin."""
+    leaned = np.abs(true) > beyond
+    square = float(np.sum(true[leaned] ** 2))
+    return float(np.sum(shown[leaned] * true[leaned]) / square) if square > 0.0 else float("nan")
+
+
+def lag_ms(shown: NDArray, true: NDArray, rate_hz: float) -> float:
+    """The delay at which the shown roll rate correlates best with the true one, between samples by a parabola."""
+    width = max(round(_LAG_SMOOTHING_S * rate_hz), 1)
+    window = np.full(width, 1.0 / width)
+    a, b = (np.convolve(np.gradient(x) * rate_hz, window, mode="same") for x in (shown, true))
+    if float(np.std(b)) < _STILL_DPS:
+        return float("nan")
+    shifts = np.arange(round(_LAG_RANGE_S[0] * rate_hz), round(_LAG_RANGE_S[1] * rate_hz) + 1)
+    edge = int(np.max(np.abs(shifts)))
+    inner = b[edge : len(b) - edge]
+    match = np.array([a[edge + k : len(a) - edge + k] @ inner for k in shifts])
+    best = int(np.argmax(match))
+    if not 0 < best < len(shifts) - 1:
+        return float("nan")
+    before, peak, after = match[best - 1 : best + 2]
+    between = 0.5 * (before - after) / (before - 2.0 * peak + after)
+    return float((shifts[best] + between) / rate_hz * 1000.0)
+
+
+def straights(truth: dict[str, NDArray]) -> NDArray[np.bool_]:
+    """Where the bike rides straight on, at over 5 m/s."""
+    return (
+        (np.abs(truth["yaw_rate_dps"]) < _STRAIGHT_DPS)
+        & (np.abs(truth["lean_deg"]) < _STRAIGHT_DEG)
+        & (truth["speed_mps"] > _STRAIGHT_MPS)
+    )
+
+
+def score(shown: NDArray, truth: dict[str, NDArray], rate_hz: float) -> Score:
+    """From setting off to the end; a ride that never sets off counts whole. The bias is the mean error on
+    straights in the last tenth."""
+    off = truth["speed_mps"] > 0.5
+    first = int(np.argmax(off)) if off.any() else round(rate_hz)
+    true = truth["lean_deg"]
+    error = (shown - true)[first:]
+    late = straights(truth)
+    late[: round(0.9 * len(late))] = False
+    return Score(
+        rms(error),
+        float(np.percentile(np.abs(error), 95.0)),
+        float(np.max(np.abs(error))),
+        slope(shown[first:], true[first:]),
+        lag_ms(shown[first:], true[first:], rate_hz),
+        float(np.mean((shown - true)[late])) if late.any() else float("nan"),
+    )

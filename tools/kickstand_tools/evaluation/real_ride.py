@@ -1,0 +1,101 @@
+"""The recorded motorcycle ride, which has neither a calibration nor a reference of its own: both made from it.
+
+Vertical and gyro bias: the means of the first second, at rest. Forward: the horizontal force regressed on dv/dt
+of the 1 Hz speed, with an intercept, where the bike turns slowly; the speed's lateness is the one that fits best.
+Reference: atan(v * yaw rate / g), the yaw rate about the phone's own vertical, averaged over 1 s. It reads low
+(1 Hz speed, wide tyres) and knows no slope or bank: it compares methods and shows decay, it claims no degrees.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibration_file import CalibrationFile
+from ..errors import InputError
+from ..logs import Log, read_log
+from .estimators import GRAVITY_MPS2, estimate
+from .metrics import rms, slope
+from .samples import calibrated
+
+REST_S = 1.0
+AVERAGE_S = 1.0
+_SLOW_DPS = 5.0
+_LATE_S = np.arange(0.0, 2.01, 0.1)
+_RIDING_MPS = 2.0
+_LEANED_DEG = 5.0  # the reference is beyond 10 degrees too seldom
+
+
+@dataclass
+class RealScore:
+    """Against the rough reference: rms in degrees, slope (shown over reference where that is beyond 5 degrees)."""
+
+    rms: float
+    slope: float
+
+
+def compare(path: Path) -> tuple[dict[str, RealScore], dict[str, NDArray[np.float64]]]:
+    """Scores by estimator, and leans by name with "time" and "reference". Raises InputError."""
+    log = read_log(path)
+    speed, calibration = _speed(log), calibration_of(log)
+    reference = reference_lean(log, calibration)
+    time = np.array(log.time_us) * 1e-6
+    riding = speed > _RIDING_MPS
+    shown = estimate(log, calibration)
+    scores = {
+        name: RealScore(rms((lean - reference)[riding]), slope(lean[riding], reference[riding], _LEANED_DEG))
+        for name, lean in shown.items()
+    }
+    return scores, {"time": time, "reference": reference, **shown}
+
+
+def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64]:
+    """atan(v * yaw rate / g) in degrees, > 0 to the right, averaged over 1 s."""
+    samples = calibrated(log, calibration)
+    centripetal = _speed(log) * np.radians(samples.rate[:, 1])
+    return _averaged(-np.degrees(np.arctan(centripetal / GRAVITY_MPS2)), samples.rate_hz)
+
+
+def calibration_of(log: Log) -> CalibrationFile:
+    """Matrix and gyro bias from the ride itself. Raises InputError if it has no straight acceleration."""
+    time = np.array(log.time_us) * 1e-6
+    readings = np.array(log.readings)
+    rest = time < REST_S
+    up = readings[rest, :3].mean(axis=0)
+    up /= np.linalg.norm(up)
+    bias = readings[rest, 4:].mean(axis=0)
+    rate_hz = (len(time) - 1) / (time[-1] - time[0])
+    force = np.column_stack([_averaged(column, rate_hz) for column in readings[:, :3].T])
+    level = force - np.outer(force @ up, up)
+    yaw = _averaged((readings[:, 4:] - bias) @ up, rate_hz)
+    straight = np.abs(yaw) < _SLOW_DPS
+    found, most = np.zeros(3), 0.0
+    for late in _LATE_S:
+        change = np.gradient(_averaged(np.interp(time + late, time, _speed(log)), rate_hz), time)
+        a, b = change[straight] - change[straight].mean(), level[straight] - level[straight].mean(axis=0)
+        along = a @ b / np.sqrt(max(float(a @ a), 1e-9))
+        if np.linalg.norm(along) > most:
+            found, most = along, float(np.linalg.norm(along))
+    if most == 0.0:
+        raise InputError(f"{log.path}: no straight acceleration in it: forward cannot be told")
+    forward = found - up * (found @ up)
+    forward /= np.linalg.norm(forward)
+    matrix = np.concatenate((np.cross(up, forward), up, forward))
+    return CalibrationFile(bias=bias.tolist(), matrix=matrix.tolist(), aligned=True)
+
+
+def _speed(log: Log) -> NDArray[np.float64]:
+    """m/s at each sample, straight lines between the values there are."""
+    time = np.array(log.time_us) * 1e-6
+    at = [k for k, value in enumerate(log.speed_mps) if value is not None]
+    if len(at) < 2:
+        raise InputError(f"{log.path} has no speed: without it there is no reference")
+    return np.interp(time, time[at], [log.speed_mps[k] or 0.0 for k in at])
+
+
+def _averaged(x: NDArray, rate_hz: float) -> NDArray[np.float64]:
+    """Mean over 1 s about each sample."""
+    n = max(round(AVERAGE_S * rate_hz), 1)
+    padded = np.pad(x, (n // 2, n - 1 - n // 2), mode="edge")
+    return np.convolve(padded, np.full(n, 1.0 / n), mode="valid")

@@ -1,0 +1,112 @@
+"""The figures of an evaluation: pooled over seeds, as a table and for machines."""
+
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+
+from .metrics import Score
+from .real_ride import RealScore
+from .runs import Result
+
+CAPTION = (
+    "rms: over all rides; worst ride: rms of the worst; 95 %: mean over rides; worst: of all; "
+    "slope: shown over true beyond 10 deg, mean, then lowest to highest; lag: mean; "
+    "bias: the largest on straights in the last tenth"
+)
+
+
+def pooled(scores: list[Score]) -> dict[str, float]:
+    """One estimator's scores on one profile, over the seeds. Degrees, ms."""
+    rms = np.array([s.rms for s in scores])
+    slopes = np.array([s.slope for s in scores])
+    biases = np.array([s.straight_bias for s in scores])
+    lags = np.array([s.lag_ms for s in scores])
+    known = biases[~np.isnan(biases)]
+    return {
+        "rms": float(np.sqrt(np.mean(rms * rms))),
+        "worst_ride_rms": float(rms.max()),
+        "p95": float(np.mean([s.p95 for s in scores])),
+        "worst": float(max(s.worst for s in scores)),
+        "slope": float(slopes.mean()),
+        "slope_low": float(slopes.min()),
+        "slope_high": float(slopes.max()),
+        "lag_ms": float(np.mean(lags[~np.isnan(lags)])) if not np.isnan(lags).all() else float("nan"),
+        "straight_bias": float(known[np.argmax(np.abs(known))]) if len(known) else float("nan"),
+    }
+
+
+def by_profile(results: list[Result]) -> dict[str, dict[str, dict[str, float]]]:
+    """profile -> estimator -> pooled()."""
+    summary: dict[str, dict[str, dict[str, float]]] = {}
+    for profile in dict.fromkeys(r.job.profile for r in results):
+        rides = [r for r in results if r.job.profile == profile and r.refusal is None]
+        names = rides[0].scores if rides else {}
+        summary[profile] = {name: pooled([r.scores[name] for r in rides]) for name in names}
+    return summary
+
+
+def table(results: list[Result]) -> Table:
+    """A block of lines for each profile."""
+    made = Table(title="Shown lean against the truth of simulated rides", caption=CAPTION)
+    for head in ("profile", "estimator"):
+        made.add_column(head)
+    for head in ("rms", "worst ride", "95 %", "worst", "slope", "range", "lag ms", "bias"):
+        made.add_column(head, justify="right", no_wrap=True)
+    for profile, methods in by_profile(results).items():
+        rides = sum(r.job.profile == profile and r.refusal is None for r in results)
+        for k, (name, s) in enumerate(methods.items()):
+            made.add_row(
+                f"{profile}, {rides} rides" if k == 0 else "",
+                name,
+                f"{s['rms']:.2f}",
+                f"{s['worst_ride_rms']:.2f}",
+                f"{s['p95']:.2f}",
+                f"{s['worst']:.1f}",
+                f"{s['slope']:.3f}",
+                f"{s['slope_low']:.2f}-{s['slope_high']:.2f}",
+                f"{s['lag_ms']:.0f}",
+                f"{s['straight_bias']:+.2f}",
+                style="bold" if name == "kickstand" else "",
+                end_section=k == len(methods) - 1,
+            )
+    return made
+
+
+def real_table(scores: dict[str, RealScore], name: str) -> Table:
+    """The recorded ride."""
+    made = Table(
+        title=f"{name}: against atan(v * yaw rate / g) averaged over 1 s",
+        caption="a rough reference that reads low: it compares methods, it claims no degrees",
+    )
+    made.add_column("estimator")
+    for head in ("rms", "slope beyond 5 deg"):
+        made.add_column(head, justify="right")
+    for method, s in scores.items():
+        made.add_row(method, f"{s.rms:.2f}", f"{s.slope:.3f}", style="bold" if method == "kickstand" else "")
+    return made
+
+
+def document(results: list[Result], real: dict[str, RealScore] | None) -> dict[str, Any]:
+    """Everything for a JSON file; what could not be told is null."""
+    rides = [
+        {
+            "profile": r.job.profile,
+            "seed": r.job.seed,
+            "refusal": r.refusal,
+            "scores": {name: asdict(s) for name, s in r.scores.items()},
+        }
+        for r in results
+    ]
+    recorded = None if real is None else {name: asdict(s) for name, s in real.items()}
+    return _without_nan({"profiles": by_profile(results), "rides": rides, "recorded": recorded})
+
+
+def _without_nan(value: Any) -> Any:
+    """NaN is no JSON."""
+    if isinstance(value, dict):
+        return {key: _without_nan(entry) for key, entry in value.items()}
+    if isinstance(value, list):
+        return [_without_nan(entry) for entry in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value

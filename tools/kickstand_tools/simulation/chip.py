@@ -1,0 +1,100 @@
+"""An MPU6050: what it makes of the motion of its own axes.
+
+Data sheet PS-MPU-6000A rev 3.4, sections 6.1 and 6.2. The chip converts at 1 kHz, filters (DLPF 3: 44 Hz,
+4.9 ms), and every fifth result is read: what the filter leaves above 100 Hz aliases.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+RATE_HZ = 1000
+DIVIDER = 5  # 200 Hz
+_ACCEL_RANGE_G, _ACCEL_LSB = 8.0, 4096.0
+_GYRO_RANGE_DPS, _GYRO_LSB = 500.0, 65.5
+_ACCEL_NOISE_G = 400e-6 * np.sqrt(RATE_HZ / 2)  # per conversion, of 400 ug/sqrt(Hz)
+_GYRO_NOISE_DPS = 0.005 * np.sqrt(RATE_HZ / 2)
+_GYRO_DPS_PER_G = 0.1  # sensitivity to linear acceleration
+_CALIBRATED_C = 25.0
+
+# A Bessel low-pass of second order with -3 dB at 44 Hz has the sheet's 4.9 ms of delay.
+_DLPF_NATURAL_HZ, _DLPF_DAMPING = 44.0 * 1.272, 0.866
+
+
+def _dlpf() -> NDArray[np.float64]:
+    w = 2.0 * np.pi * _DLPF_NATURAL_HZ
+    ringing = w * np.sqrt(1.0 - _DLPF_DAMPING**2)
+    t = np.arange(40) / RATE_HZ
+    response = np.exp(-_DLPF_DAMPING * w * t) * np.sin(ringing * t)
+    return response / response.sum()
+
+
+_DLPF = _dlpf()
+
+
+@dataclass(frozen=True)
+class Chip:
+    """One part: matrices and biases at 25 C and how they change. Sensor axes x, y, z; g, deg/s."""
+
+    accel_matrix: NDArray[np.float64]  # (3, 3) reading per true: scale on the diagonal, cross-axis beside it
+    accel_offset: NDArray[np.float64]
+    gyro_matrix: NDArray[np.float64]
+    gyro_bias: NDArray[np.float64]
+    accel_per_c: NDArray[np.float64]
+    gyro_per_c: NDArray[np.float64]
+    gyro_walk: float = 0.004  # deg/s per sqrt(s): what bias instability adds up to
+
+    @staticmethod
+    def random(chance: np.random.Generator, share: float = 1.0, drift: float = 1.0) -> "Chip":
+        """A part from the reel. share: of the sheet's tolerances; drift: of the usual change with temperature.
+
+        Offsets and biases are spread evenly to the sheet's limits, scale and cross-axis normally with the limit
+        at two standard deviations. Over temperature the sheet allows 35..60 mg and 20 deg/s for 45..60 C; the
+        usual part does a third of the one and a fifth of the other.
+        """
+
+        def near_one(scale: float, cross: float) -> NDArray[np.float64]:
+            spread = chance.standard_normal((3, 3)).clip(-2.0, 2.0) / 2.0
+            return np.eye(3) + share * spread * np.where(np.eye(3) > 0.0, scale, cross)
+
+        return Chip(
+            near_one(0.03, 0.02),
+            share * chance.uniform(-1.0, 1.0, 3) * [0.05, 0.05, 0.08],
+            near_one(0.03, 0.02),
+            share * chance.uniform(-20.0, 20.0, 3),
+            share * drift * chance.uniform(-0.0003, 0.0003, 3),
+            share * drift * chance.uniform(-0.06, 0.06, 3),
+        )
+
+    def read(
+        self,
+        chance: np.random.Generator,
+        force: NDArray[np.float64],
+        rates: NDArray[np.float64],
+        temp_c: NDArray[np.float64],
+    ) -> NDArray[np.float64]:
+        """(n / 5, 7) readings (g, C, deg/s, the chip's order) at 200 Hz of (n, 3) force in g and rates in deg/s,
+        in the sensor's axes at 1 kHz. The first reading is of the first instant.
+        """
+        n = len(force)
+        warm = (temp_c - _CALIBRATED_C)[:, None]
+        walk = np.cumsum(chance.standard_normal((n, 3)), axis=0) * self.gyro_walk / np.sqrt(RATE_HZ)
+        accel = force @ self.accel_matrix.T + self.accel_offset + warm * self.accel_per_c
+        accel += _ACCEL_NOISE_G * chance.standard_normal((n, 3))
+        gyro = rates @ self.gyro_matrix.T + self.gyro_bias + warm * self.gyro_per_c + walk
+        gyro += _GYRO_DPS_PER_G * force + _GYRO_NOISE_DPS * chance.standard_normal((n, 3))
+        temp = np.round(temp_c[::DIVIDER] * 340.0) / 340.0
+        return np.column_stack(
+            (_sampled(accel, _ACCEL_RANGE_G, _ACCEL_LSB), temp, _sampled(gyro, _GYRO_RANGE_DPS, _GYRO_LSB))
+        )
+
+
+def _sampled(values: NDArray[np.float64], limit: float, lsb: float) -> NDArray[np.float64]:
+    """Clipped at the range, filtered, every fifth, in whole counts."""
+    columns = []
+    for column in np.clip(values, -limit, limit).T:
+        led_in = np.concatenate((np.full(len(_DLPF) - 1, column[0]), column))
+        columns.append(np.convolve(led_in, _DLPF, mode="valid")[::DIVIDER])
+    counts = np.round(np.column_stack(columns) * lsb)
+    return np.clip(counts, -32768, 32767) / lsb

@@ -1,0 +1,120 @@
+"""What a rider does, leg by leg, as signals."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .signals import Signal, integral, smoothed, smoothstep
+
+_SPEED_SMOOTHING_S = 0.15  # a hand on throttle or brake
+
+
+@dataclass
+class Leg:
+    """A stretch of a ride. None: stays as it was.
+
+    speed_mps: reached evenly by the end. lean_deg (of the balance, > 0 right): reached within roll_s of the
+    start, then held. slope_percent: of the road at the end of the leg. hang_m: the centre of mass to the
+    right of the bike's plane. lift_deg: the front wheel in the air. engine: 0 off, 1 running. crosswind_mps2:
+    the wind's push to the right. bank_deg: road tilted to the right.
+    """
+
+    phase: str
+    seconds: float
+    speed_mps: float | None = None
+    lean_deg: float | None = None
+    roll_s: float = 1.5
+    slope_percent: float | None = None
+    hang_m: float | None = None
+    lift_deg: float | None = None
+    engine: float | None = None
+    crosswind_mps2: float | None = None
+    bank_deg: float | None = None
+
+
+@dataclass
+class Commands:
+    """Signals of n samples each: rad, m/s, m; phases by number into `phases`."""
+
+    rate_hz: float
+    time: Signal
+    speed: Signal
+    distance: Signal
+    lean: Signal
+    slope: Signal
+    hang: Signal
+    lift: Signal
+    engine: Signal
+    crosswind: Signal
+    bank: Signal
+    phase: np.ndarray
+    phases: list[str]
+
+
+def commands(legs: list[Leg], rate_hz: float) -> Commands:
+    """The legs one after the other from t = 0; the ride starts settled in the first."""
+    ends = np.cumsum([leg.seconds for leg in legs])
+    starts = ends - [leg.seconds for leg in legs]
+    time = np.arange(int(ends[-1] * rate_hz)) / rate_hz
+    speeds = _kept([leg.speed_mps for leg in legs])
+    speed = np.interp(time, np.concatenate(([0.0], ends)), [speeds[0], *speeds])
+    speed = np.maximum(smoothed(speed, _SPEED_SMOOTHING_S, rate_hz), 0.0)
+    speed[speed < 1e-4] = 0.0
+    distance = integral(speed, rate_hz)
+    rolls = [min(leg.roll_s, leg.seconds) for leg in legs]
+
+    def stepped(values: list[float | None], settle_s: list[float]) -> Signal:
+        return _stepped(time, starts, _kept(values), settle_s)
+
+    quick = [min(1.0, leg.seconds) for leg in legs]
+    phases = list(dict.fromkeys(leg.phase for leg in legs))
+    which = np.searchsorted(ends, time, side="right").clip(0, len(legs) - 1)
+    return Commands(
+        rate_hz,
+        time,
+        speed,
+        distance,
+        np.radians(stepped([leg.lean_deg for leg in legs], rolls)),
+        _slope(distance, np.interp(ends, time, distance), _kept([leg.slope_percent for leg in legs])),
+        stepped([leg.hang_m for leg in legs], quick),
+        np.radians(stepped([leg.lift_deg for leg in legs], quick)),
+        stepped([leg.engine for leg in legs], quick),
+        stepped([leg.crosswind_mps2 for leg in legs], quick),
+        np.radians(stepped([leg.bank_deg for leg in legs], [min(3.0, leg.seconds) for leg in legs])),
+        np.array([phases.index(leg.phase) for leg in legs])[which],
+        phases,
+    )
+
+
+def _kept(values: list[float | None]) -> list[float]:
+    """Each None replaced by the value before; 0 at first."""
+    kept, now = [], 0.0
+    for value in values:
+        now = now if value is None else value
+        kept.append(now)
+    return kept
+
+
+def _stepped(time: Signal, starts: Signal, values: list[float], settle_s: list[float]) -> Signal:
+    """Each value reached within settle_s of its start, then held."""
+    result = np.full_like(time, values[0])
+    for start, before, after, settle in zip(starts[1:], values, values[1:], settle_s[1:]):
+        if after != before:
+            first = np.searchsorted(time, start)
+            result[first:] = before + (after - before) * smoothstep((time[first:] - start) / max(settle, 1e-3))
+    return result
+
+
+def _slope(distance: Signal, ends: Signal, percent: list[float]) -> Signal:
+    """Slope in rad along the way, going smoothly from each leg's to the next's: by distance, so never at a stop."""
+    knots, values = [0.0], [percent[0]]
+    for end, value in zip(ends, percent):
+        if end > knots[-1] + 1.0:
+            knots.append(float(end))
+            values.append(value)
+    place = np.searchsorted(knots, distance, side="right").clip(1, len(knots) - 1) if len(knots) > 1 else None
+    if place is None:
+        return np.full_like(distance, np.arctan(percent[0] / 100.0))
+    at, value = np.array(knots), np.array(values)
+    u = (distance - at[place - 1]) / (at[place] - at[place - 1])
+    return np.arctan((value[place - 1] + (value[place] - value[place - 1]) * smoothstep(u)) / 100.0)

@@ -1,0 +1,51 @@
+"""Engine vibration: orders of a crankshaft whose speed follows the road speed through a gearbox."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .signals import Signal, integral, smoothed
+
+_RPM_PER_MPS = (370.0, 260.0, 205.0, 170.0, 150.0, 135.0)
+_ORDERS = (0.5, 1.0, 2.0)  # of a four-stroke twin: firing, primary, secondary
+_IDLE_SHARE = 0.25  # of the vibration at _FULL_RPM
+_FULL_RPM = 6000.0
+_MAX_G = 0.5
+_DPS_PER_G = 15.0  # the sensor's plate rocks too
+
+
+@dataclass(frozen=True)
+class Engine:
+    """rms_g: on each axis at 6000/min, before the chip's filter. shift_rpm: where the rider changes up."""
+
+    rms_g: float = 0.1
+    idle_rpm: float = 1250.0
+    shift_rpm: float = 5000.0
+
+    def rpm(self, speed: Signal, rate_hz: float) -> Signal:
+        """The lowest gear that stays under shift_rpm; the clutch slips below idle."""
+        rpm = speed * _RPM_PER_MPS[-1]
+        for ratio in reversed(_RPM_PER_MPS[:-1]):
+            rpm = np.where(speed * ratio < self.shift_rpm, speed * ratio, rpm)
+        return smoothed(np.maximum(rpm, self.idle_rpm), 0.15, rate_hz)
+
+    def vibration(
+        self, chance: np.random.Generator, speed: Signal, running: Signal, rate_hz: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Specific force (n, 3) in m/s2 and rates (n, 3) in rad/s along left, up, forward."""
+        rpm = self.rpm(speed, rate_hz)
+        turns = integral(rpm / 60.0, rate_hz)
+        growth = _IDLE_SHARE + (1.0 - _IDLE_SHARE) * (rpm / _FULL_RPM) ** 2
+        size = np.minimum(self.rms_g * growth, _MAX_G) * running
+        weights = chance.dirichlet(np.full(len(_ORDERS), 2.0), size=6) ** 0.5
+        phases = chance.uniform(0.0, 2.0 * np.pi, size=(6, len(_ORDERS)))
+        felt = np.zeros((len(speed), 6))
+        for k, order in enumerate(_ORDERS):
+            angle = 2.0 * np.pi * order * turns
+            sine, cosine = np.sin(angle), np.cos(angle)
+            for axis in range(6):
+                phase = phases[axis, k]
+                felt[:, axis] += weights[axis, k] * (sine * np.cos(phase) + cosine * np.sin(phase))
+        felt *= np.sqrt(2.0) * size[:, None]
+        return felt[:, :3] * 9.80665, felt[:, 3:] * np.radians(_DPS_PER_G)

@@ -1,0 +1,79 @@
+"""A simulated ride written as logs."""
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..logs import COLUMNS
+from .profiles import PROFILES
+from .ride import Ride, ride
+
+_LOG = ",".join((*COLUMNS, "temp_c"))
+_FORMATS = ["%.3f", *["%.6f"] * 6, "%.2f"]
+_SPEED_EVERY = 200  # samples: once a second, as GPS
+
+
+def simulate(
+    profile: str,
+    seed: int,
+    out_dir: Path | str,
+    seconds: float = 640.0,
+    upright_error_deg: float = 0.0,
+    pitch_change_deg: float | None = None,
+    share: float = 1.0,
+    speed: bool = False,
+) -> Ride:
+    """Simulate a ride (see ride.ride) and write POSE_1.csv to POSE_7.csv, KICKSTAND.csv, UPRIGHT.csv, RIDE.csv and
+    TRUTH.csv to out_dir. speed: give RIDE.csv a speed, once a second. Raises InputError."""
+    if profile not in PROFILES:
+        raise InputError(f"no profile {profile}: there are {', '.join(PROFILES)}")
+    made = ride(profile, seed, seconds, upright_error_deg, pitch_change_deg, share)
+    directory = Path(out_dir)
+    try:
+        directory.mkdir(parents=True, exist_ok=True)
+        write_poses(directory, made)
+        _write_ride(directory / "RIDE.csv", made, speed)
+        _write_truth(directory / "TRUTH.csv", made)
+    except OSError as error:
+        raise InputError(f"{directory} cannot be written: {error.strerror}") from error
+    return made
+
+
+def write_poses(directory: Path, made: Ride) -> tuple[list[Path], Path, Path]:
+    """The seven poses, kickstand and upright; their paths."""
+    seven = [directory / f"POSE_{k}.csv" for k in range(1, 8)]
+    pair = directory / "KICKSTAND.csv", directory / "UPRIGHT.csv"
+    for path, readings in zip([*seven, *pair], [*made.poses, made.kickstand, made.upright]):
+        _save(path, _log(np.arange(len(readings)) / made.rate_hz, readings), _LOG, _FORMATS)
+    return seven, *pair
+
+
+def _log(time: NDArray, readings: NDArray) -> NDArray:
+    return np.column_stack((time, readings[:, :3], readings[:, 4:], readings[:, 3]))
+
+
+def _save(path: Path, table: NDArray, header: str, formats: list[str]) -> None:
+    np.savetxt(path, table, formats, ",", header=header, comments="")
+
+
+def _write_ride(path: Path, made: Ride, speed: bool) -> None:
+    if not speed:
+        _save(path, _log(made.time, made.readings), _LOG, _FORMATS)
+        return
+    form = ",".join(_FORMATS)
+    lines = [_LOG + ",speed_mps"]
+    for k, row in enumerate(_log(made.time, made.readings).tolist()):
+        value = f"{made.truth['speed_mps'][k]:.2f}" if k % _SPEED_EVERY == 0 else ""
+        lines.append(f"{form % tuple(row)},{value}")
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+
+
+def _write_truth(path: Path, made: Ride) -> None:
+    names = list(made.truth)
+    form = ",".join(["%.3f", *["%.4f"] * len(names)])
+    table = np.column_stack((made.time, *made.truth.values())).tolist()
+    lines = [f"t_s,{','.join(names)},phase"]
+    lines += [f"{form % tuple(row)},{phase}" for row, phase in zip(table, made.phase.tolist())]
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")

@@ -1,0 +1,63 @@
+"""What a perfect sensor on a moving rigid body feels: exact rates and specific force from the attitude.
+
+Vehicle axes: left, up, forward. Attitude: heading about the vertical, then pitch about the lateral axis, then
+lean about the forward axis, so at rest the lean is atan2(left, up) of the force.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .bike import GRAVITY_MPS2, Bike
+from .signals import Signal, derivative
+
+
+@dataclass
+class Motion:
+    """Of the rear contact point and the chassis: m/s, rad, rad/s. heave: the rear's own vertical m/s2."""
+
+    rate_hz: float
+    speed: Signal
+    slope: Signal
+    yaw_rate: Signal
+    lean: Signal
+    pitch: Signal  # of the chassis against the horizontal, nose up > 0
+    heave: Signal
+
+
+def body_rates(motion: Motion) -> NDArray[np.float64]:
+    """(n, 3) rad/s about left, up, forward."""
+    lean_rate = derivative(motion.lean, motion.rate_hz)
+    pitch_rate = derivative(motion.pitch, motion.rate_hz)
+    c, s = np.cos(motion.lean), np.sin(motion.lean)
+    level_yaw = motion.yaw_rate * np.cos(motion.pitch)
+    return np.column_stack(
+        (
+            level_yaw * s - pitch_rate * c,  # nose up turns forward towards up: negative about left
+            level_yaw * c + pitch_rate * s,
+            lean_rate + motion.yaw_rate * np.sin(motion.pitch),
+        )
+    )
+
+
+def specific_force(motion: Motion, bike: Bike) -> NDArray[np.float64]:
+    """(n, 3) m/s2 along left, up, forward where the sensor is: the acceleration of that point, less gravity.
+
+    The point the body turns about is the centre of the rear tyre's cross-section, a tyre radius above the road.
+    """
+    rate, v, slope = motion.rate_hz, motion.speed, motion.slope
+    left = v * motion.yaw_rate * np.cos(slope)
+    up = GRAVITY_MPS2 * np.cos(slope) + v * derivative(slope, rate) + motion.heave
+    forward = GRAVITY_MPS2 * np.sin(slope) + derivative(v, rate)
+    nose = motion.pitch - slope
+    up, forward = (
+        up * np.cos(nose) - forward * np.sin(nose),
+        forward * np.cos(nose) + up * np.sin(nose),
+    )
+    c, s = np.cos(motion.lean), np.sin(motion.lean)
+    force = np.column_stack((left * c + up * s, up * c - left * s, forward))
+    arm = np.array([bike.sensor_left, bike.sensor_height - bike.tyre_radius, bike.sensor_forward])
+    rates = body_rates(motion)
+    turning = np.gradient(rates, 1.0 / rate, axis=0)
+    return force + np.cross(turning, arm) + np.cross(rates, np.cross(rates, arm))

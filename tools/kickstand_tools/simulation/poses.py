@@ -1,0 +1,59 @@
+"""The poses a calibration needs, as a rider captures them: six sides, a free one, kickstand, upright."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .chip import RATE_HZ, Chip
+from .signals import band_noise
+
+POSE_S = 4.0
+_ASKEW_DEG = 4.0  # a box put on its side by hand, by an edge of a table
+_UP_IN_VEHICLE = np.array([0.0, 1.0, 0.0])
+_MOVE_DEG = 0.05  # rms of a bike held upright by hand
+
+
+def still(chance: np.random.Generator, chip: Chip, up: NDArray, temp_c: float) -> NDArray[np.float64]:
+    """Readings with `up` (3, or (n, 3); unit vectors in sensor axes) upward."""
+    n = int(POSE_S * RATE_HZ)
+    force = np.broadcast_to(up, (n, 3))
+    return chip.read(chance, force, np.zeros((n, 3)), np.full(n, temp_c))
+
+
+def seven(chance: np.random.Generator, chip: Chip, temp_c: float) -> list[NDArray[np.float64]]:
+    """Six sides up in any order, each up to 4 degrees askew, then one free pose."""
+    found = []
+    for side in chance.permutation(6):
+        up = chance.standard_normal(3)
+        axis = np.zeros(3)
+        axis[side // 2] = 1.0 if side % 2 == 0 else -1.0
+        off = up - axis * (up @ axis)
+        askew = np.radians(chance.uniform(0.0, _ASKEW_DEG))
+        found.append(still(chance, chip, axis * np.cos(askew) + off / np.linalg.norm(off) * np.sin(askew), temp_c))
+    signs = chance.choice((-1.0, 1.0), 3)
+    free = signs * chance.uniform(0.45, 0.75, 3)
+    found.append(still(chance, chip, free / np.linalg.norm(free), temp_c))
+    return found
+
+
+def up_seen(lean_deg: float | NDArray, pitch_deg: float) -> NDArray[np.float64]:
+    """Upward as seen in the vehicle's axes (left, up, forward) at a lean to the right and a nose up, degrees."""
+    lean, pitch = np.radians(lean_deg), np.radians(pitch_deg)
+    left, up = np.sin(lean) * np.cos(pitch), np.cos(lean) * np.cos(pitch)
+    return np.stack((left, up, np.full_like(np.asarray(left, dtype=float), np.sin(pitch))), axis=-1)
+
+
+def standing(
+    chance: np.random.Generator,
+    chip: Chip,
+    vehicle_from_sensor: NDArray,
+    lean_deg: float,
+    pitch_deg: float,
+    temp_c: float,
+    held: bool,
+) -> NDArray[np.float64]:
+    """Readings of the bike at rest. held: by a rider, whose hands are never quite still."""
+    n = int(POSE_S * RATE_HZ)
+    lean = np.full(n, lean_deg)
+    if held:
+        lean = lean + _MOVE_DEG * band_noise(chance, n, 0.2, 0.6, RATE_HZ)
+    return still(chance, chip, up_seen(lean, pitch_deg) @ vehicle_from_sensor, temp_c)

@@ -1,0 +1,170 @@
+"""The kinds of ride: what is ridden, where. Each fills a plan and returns its conditions."""
+
+from collections.abc import Callable
+
+from . import stress
+from .plan import Conditions, Plan, lean_for
+from .road import CLASS_A, CLASS_B
+
+
+def street(plan: Plan) -> Conditions:
+    """Country road at 45 to 100 km/h: bends of 10 to 38 degrees, esses, lane changes, a traffic light now and then."""
+    plan.begin()
+    cruise = plan.uniform(15.0, 24.0)
+    plan.to_speed(cruise, 2.5)
+    while plan.going_on:
+        what = plan.uniform(0.0, 1.0)
+        if what < 0.12:
+            plan.stop(plan.uniform(4.0, 15.0), plan.uniform(2.0, 4.5))
+            plan.to_speed(plan.uniform(14.0, 22.0), plan.uniform(2.0, 4.0))
+        elif what < 0.24:  # a lane change
+            side, lean = plan.side(), plan.uniform(5.0, 12.0)
+            plan.turn(side * lean, plan.speed, seconds=0.1, roll_s=0.9)
+            plan.turn(-side * lean, plan.speed, seconds=0.1, roll_s=1.2)
+            plan.straight(plan.uniform(2.0, 6.0))
+        else:
+            _bends(plan, plan.uniform(10.0, 38.0), (11.0, 22.0), 0.35, (1.0, 2.0))
+        if plan.likely(0.7):
+            plan.straight(plan.uniform(2.0, 10.0), plan.uniform(14.0, 27.0))
+    plan.finish(plan.uniform(15.0, 22.0), 3.0)
+    return Conditions(roughness=CLASS_B * plan.uniform(0.6, 2.0), engine_rms_g=plan.uniform(0.05, 0.2))
+
+
+def track(plan: Plan) -> Conditions:
+    """A race track: 35 to 55 degrees, side to side within 0.6 to 1.2 s, 0.5 g of drive and up to 0.95 g of braking."""
+    plan.begin()
+    plan.slope_percent, plan.roll_dps = 4.0, 100.0
+    plan.to_speed(30.0, 4.0)
+    while plan.going_on:
+        lean = plan.side() * plan.uniform(33.0, 49.0)
+        corner = plan.uniform(16.0, 38.0)
+        if plan.speed > corner + 4.0:
+            plan.into_turn(lean, corner, plan.uniform(6.0, 9.3))
+        plan.turn(lean, corner, heading_deg=plan.uniform(40.0, 150.0), roll_s=plan.uniform(0.7, 1.2))
+        while plan.likely(0.35):  # flicked to the other side
+            lean = -lean * plan.uniform(0.85, 1.1)
+            lean = max(-49.0, min(49.0, lean))
+            roll_s = plan.uniform(0.7, 1.2)
+            plan.turn(lean, plan.speed, heading_deg=plan.uniform(25.0, 80.0), roll_s=roll_s)
+        plan.out_of_turn(min(plan.speed + plan.uniform(8.0, 25.0), 62.0), plan.uniform(3.5, 5.5), roll_s=1.2)
+        if plan.likely(0.5):
+            plan.straight(plan.uniform(1.0, 6.0), min(plan.speed + 5.0, 65.0))
+    plan.finish(30.0, 5.0)
+    return Conditions(
+        CLASS_A * plan.uniform(0.7, 1.5), plan.uniform(0.08, 0.25), shift_rpm=10000.0, unrest_deg=0.5
+    )
+
+
+def sweeper(plan: Plan) -> Conditions:
+    """Turns held for 60 s at 15 to 45 degrees, with a short straight between."""
+    plan.begin()
+    plan.slope_percent = 1.5
+    speed = plan.uniform(18.0, 28.0)
+    plan.to_speed(speed, 3.0)
+    side = plan.side()
+    while plan.going_on:
+        lean, speed = plan.uniform(15.0, 45.0), plan.uniform(17.0, 32.0)
+        plan.to_speed(speed, 2.5)
+        plan.turn(side * lean, speed, seconds=60.0, roll_s=plan.uniform(1.5, 3.0))
+        plan.out_of_turn(speed, 2.0, roll_s=plan.uniform(1.2, 2.5))
+        plan.straight(plan.uniform(4.0, 12.0))
+        side = -side if plan.likely(0.6) else side
+    plan.finish(speed, 3.0)
+    return Conditions(CLASS_B * plan.uniform(0.4, 1.2), plan.uniform(0.05, 0.2))
+
+
+def city(plan: Plan) -> Conditions:
+    """Town: junctions, roundabouts, lights with a foot down, walking pace in the queue, turning in the road."""
+    plan.begin()
+    plan.slope_percent = 4.0
+    plan.to_speed(plan.uniform(8.0, 13.0), 2.5)
+    while plan.going_on:
+        what = plan.uniform(0.0, 1.0)
+        if what < 0.3:
+            speed = plan.uniform(4.0, 7.5)
+            lean = plan.side() * lean_for(speed, plan.uniform(7.0, 14.0))
+            plan.into_turn(lean, speed, plan.uniform(2.0, 3.5))
+            plan.turn(lean, speed, heading_deg=plan.uniform(70.0, 100.0), roll_s=plan.uniform(0.9, 1.5))
+            plan.out_of_turn(plan.uniform(9.0, 14.0), 2.5)
+        elif what < 0.5:
+            plan.stop(plan.uniform(3.0, 25.0), plan.uniform(2.0, 4.0))
+            plan.to_speed(plan.uniform(8.0, 15.0), plan.uniform(2.0, 3.5))
+        elif what < 0.65:
+            plan.to_speed(plan.uniform(1.2, 2.5), 2.0)
+            plan.walk(plan.uniform(5.0, 20.0), plan.uniform(0.9, 2.5))
+            if plan.likely(0.4):
+                plan.turn(plan.side() * plan.uniform(4.0, 9.0), 2.2, heading_deg=150.0, phase="turning round")
+            plan.to_speed(plan.uniform(7.0, 12.0), 2.5)
+        elif what < 0.8:  # a roundabout: out, round, out again
+            speed, side = plan.uniform(6.0, 9.0), plan.side()
+            lean = lean_for(speed, plan.uniform(12.0, 22.0))
+            plan.into_turn(-side * lean * 0.6, speed, 2.5)
+            plan.turn(side * lean, speed, heading_deg=plan.uniform(90.0, 300.0), roll_s=1.4)
+            plan.turn(-side * lean * 0.6, speed, heading_deg=40.0, roll_s=1.3)
+            plan.out_of_turn(plan.uniform(9.0, 14.0), 2.5)
+        else:
+            plan.straight(plan.uniform(3.0, 15.0), plan.uniform(7.0, 15.0))
+    plan.finish(plan.uniform(8.0, 13.0), 3.0)
+    return Conditions(CLASS_B * plan.uniform(0.8, 3.0), plan.uniform(0.05, 0.2), shift_rpm=4000.0)
+
+
+def hills(plan: Plan) -> Conditions:
+    """A pass: slopes to 12 %, hairpins of 25 to 42 degrees, the slope changing through the turns."""
+    plan.begin()
+    plan.slope_percent = 12.0
+    plan.to_speed(plan.uniform(11.0, 16.0), 2.5)
+    climb = plan.side()
+    while plan.going_on:
+        climb = -climb if plan.likely(0.1) else climb
+        before, after = climb * plan.uniform(3.0, 12.0), climb * plan.uniform(2.0, 12.0)
+        if plan.likely(0.4):  # a hairpin, flatter or steeper inside
+            speed, lean = plan.uniform(5.5, 9.0), plan.side() * plan.uniform(22.0, 40.0)
+            plan.into_turn(lean, speed, plan.uniform(2.5, 5.0))
+            roll_s, inside = plan.uniform(1.0, 1.6), plan.uniform(-2.0, 12.0) * climb
+            heading = plan.uniform(150.0, 190.0)
+            plan.turn(lean, speed, heading / 2, roll_s=roll_s, phase="hairpin", slope_percent=inside)
+            plan.turn(lean, speed, heading / 2, roll_s=0.5, phase="hairpin", slope_percent=after)
+            plan.out_of_turn(plan.uniform(10.0, 17.0), plan.uniform(2.0, 4.0))
+        else:
+            _bends(plan, plan.uniform(12.0, 40.0), (9.0, 18.0), 0.4, (1.0, 2.0))
+        if plan.likely(0.6):
+            plan.add("straight", plan.uniform(2.0, 7.0), plan.uniform(12.0, 20.0), lean_deg=0.0, slope_percent=before)
+    plan.finish(plan.uniform(11.0, 16.0), 3.0)
+    return Conditions(CLASS_B * plan.uniform(0.6, 2.0), plan.uniform(0.05, 0.2))
+
+
+def _bends(
+    plan: Plan, lean_deg: float, speeds: tuple[float, float], linked: float, rolls: tuple[float, float]
+) -> None:
+    """One bend, or several from side to side."""
+    lean, speed = plan.side() * lean_deg, plan.uniform(*speeds)
+    if plan.speed > speed + 2.0:
+        plan.into_turn(lean, speed, plan.uniform(2.0, 5.0))
+    plan.turn(lean, speed, heading_deg=plan.uniform(20.0, 110.0), roll_s=plan.uniform(*rolls))
+    while plan.likely(linked):
+        lean = -lean * plan.uniform(0.7, 1.1)
+        lean = max(-42.0, min(42.0, lean))
+        roll_s = plan.uniform(*rolls)
+        plan.turn(lean, plan.speed * plan.uniform(0.9, 1.1), heading_deg=plan.uniform(20.0, 80.0), roll_s=roll_s)
+    plan.out_of_turn(plan.uniform(*speeds) + 2.0, plan.uniform(1.5, 3.5), roll_s=plan.uniform(*rolls))
+
+
+MAIN: dict[str, Callable[[Plan], Conditions]] = {
+    "street": street,
+    "track": track,
+    "sweeper": sweeper,
+    "city": city,
+    "hills": hills,
+}
+PROFILES: dict[str, Callable[[Plan], Conditions]] = MAIN | {
+    "banked": lambda plan: stress.banked(plan, street),
+    "wheelie": lambda plan: stress.wheelie(plan),
+    "bumps": lambda plan: stress.bumps(plan),
+    "crosswind": lambda plan: stress.crosswind(plan, street),
+    "weight": lambda plan: stress.weight(plan, street),
+    "vibration": lambda plan: stress.vibration(plan, street),
+    "creep": lambda plan: stress.creep(plan, street),
+    "temperature": lambda plan: stress.temperature(plan, street),
+    "fall": lambda plan: stress.fall(plan),
+    "parked": stress.parked,
+}

@@ -1,0 +1,165 @@
+"""A whole ride: plan, bike, road, engine and chip put together."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import balance, poses
+from .bike import GRAVITY_MPS2, Bike
+from .chip import DIVIDER, RATE_HZ, Chip
+from .commands import Commands, commands
+from .engine import Engine
+from .kinematics import Motion, body_rates, specific_force
+from .plan import Conditions, Plan
+from .profiles import PROFILES
+from .road import Shaking, add_bumps, profile_slope, shaking
+from .signals import band_noise, second_order, smoothed
+
+_WARMING_S = 300.0
+_IMPACT_G = 4.0
+
+
+@dataclass
+class Ride:
+    """poses: seven (n, 7), six sides in any order and a free one; kickstand, upright (n, 7); readings (N, 7) at
+    200 Hz, each in the chip's order (g, C, deg/s). truth: N of each name, TRUTH's columns. phase: N names."""
+
+    rate_hz: float
+    poses: list[NDArray[np.float64]]
+    kickstand: NDArray[np.float64]
+    upright: NDArray[np.float64]
+    time: NDArray[np.float64]
+    readings: NDArray[np.float64]
+    truth: dict[str, NDArray[np.float64]]
+    phase: NDArray[np.str_]
+    vehicle_from_sensor: NDArray[np.float64]
+    chip: Chip
+    bike: Bike
+
+
+def ride(
+    profile: str,
+    seed: int,
+    seconds: float = 640.0,
+    upright_error_deg: float = 0.0,
+    pitch_change_deg: float | None = None,
+    share: float = 1.0,
+) -> Ride:
+    """Simulate a ride of about this length; a profile and a seed always give the same one.
+
+    upright_error_deg: how far the bike leaned to the right when pressed upright. pitch_change_deg: nose up on the
+    kickstand against upright, within 1 degree at random if None. share: of the chip's tolerances.
+    """
+    chance = np.random.default_rng([seed, *profile.encode()])
+    plan = Plan(chance, seconds)
+    conditions = PROFILES[profile](plan)
+    bike, chip = Bike.random(chance), Chip.random(chance, share, conditions.drift)
+    mounting = random_rotation(chance)
+    command = commands(plan.legs, RATE_HZ)
+    motion, extra = _motion(chance, command, bike, conditions)
+    force = (specific_force(motion, bike) + extra.force) / GRAVITY_MPS2
+    rates = np.degrees(body_rates(motion) + extra.rates)
+    temp = conditions.start_c + conditions.rise_c * (1.0 - np.exp(-command.time / _WARMING_S))
+    turned = _creep(chance, len(force), conditions.creep_deg)
+    readings = chip.read(chance, _to_sensor(force, mounting, turned), _to_sensor(rates, mounting, turned), temp)
+    home_c = chance.uniform(18.0, 25.0)
+    nose = chance.uniform(-0.5, 0.5)  # the ground where both poses were taken
+    change = chance.uniform(-1.0, 1.0) if pitch_change_deg is None else pitch_change_deg
+    lean = -chance.uniform(8.0, 15.0)
+    seven = poses.seven(chance, chip, home_c)
+    start_c = conditions.start_c
+    return Ride(
+        RATE_HZ / DIVIDER,
+        seven,
+        poses.standing(chance, chip, mounting, lean, nose + change, start_c, held=False),
+        poses.standing(chance, chip, mounting, upright_error_deg, nose, start_c, held=True),
+        command.time[::DIVIDER],
+        readings,
+        {
+            "lean_deg": np.degrees(motion.lean)[::DIVIDER],
+            "speed_mps": motion.speed[::DIVIDER],
+            "yaw_rate_dps": np.degrees(motion.yaw_rate)[::DIVIDER],
+            "pitch_deg": np.degrees(motion.pitch)[::DIVIDER],
+            "slope_deg": np.degrees(motion.slope)[::DIVIDER],
+        },
+        np.array(command.phases)[command.phase][::DIVIDER],
+        mounting,
+        chip,
+        bike,
+    )
+
+
+def random_rotation(chance: np.random.Generator) -> NDArray[np.float64]:
+    """(3, 3) vehicle from sensor, rows left, up, forward: every rotation equally likely."""
+    q, r = np.linalg.qr(chance.standard_normal((3, 3)))
+    q = q * np.sign(np.diag(r))
+    return q * np.linalg.det(q)
+
+
+def _motion(
+    chance: np.random.Generator, command: Commands, bike: Bike, conditions: Conditions
+) -> tuple[Motion, Shaking]:
+    n, rate = len(command.time), command.rate_hz
+    command.crosswind += conditions.gust_mps2 * band_noise(chance, n, 0.05, 0.5, rate)
+    command.hang += conditions.sway_m * band_noise(chance, n, 0.02, 0.3, rate)
+    rolled = balance.roll(command, bike, balance.weave(chance, command, conditions.unrest_deg))
+    surface = profile_slope(chance, float(command.distance[-1]) + 10.0, conditions.roughness)
+    for phase, spacing, height, length in conditions.bumps:
+        add_bumps(surface, _places(command, phase, spacing), height, length)
+    shaken = shaking(chance, command.distance, command.speed, surface, bike, rate)
+    acceleration = np.gradient(command.speed, 1.0 / rate)
+    dive = np.radians(bike.dive_deg_per_mps2) * second_order(
+        acceleration, bike.dive_hz, bike.dive_damping, rate
+    )
+    motion = Motion(
+        rate,
+        command.speed,
+        command.slope,
+        rolled.yaw_rate,
+        rolled.lean,
+        command.slope + dive + shaken.pitch + command.lift,
+        shaken.heave,
+    )
+    engine = Engine(conditions.engine_rms_g, shift_rpm=conditions.shift_rpm)
+    force, rates = engine.vibration(chance, command.speed, command.engine, rate)
+    shaken.force += force + _impact(chance, command)
+    shaken.rates += rates
+    return motion, shaken
+
+
+def _places(command: Commands, phase: str, spacing_m: float) -> list[float]:
+    """Where along the way, every spacing_m, the ride is in a phase."""
+    if phase not in command.phases:
+        return []
+    met = command.distance[command.phase == command.phases.index(phase)]
+    return sorted({float(k) * spacing_m for k in np.floor(met / spacing_m)})
+
+
+def _impact(chance: np.random.Generator, command: Commands) -> NDArray[np.float64]:
+    """The blow at the end of a fall, m/s2."""
+    force = np.zeros((len(command.time), 3))
+    if "lying" in command.phases:
+        since = command.time - command.time[np.argmax(command.phase == command.phases.index("lying"))]
+        ringing = np.where(since >= 0.0, np.exp(-np.clip(since, 0.0, 10.0) / 0.08), 0.0)
+        for axis in range(3):
+            wave = np.sin(2.0 * np.pi * chance.uniform(15.0, 35.0) * since)
+            force[:, axis] = _IMPACT_G * GRAVITY_MPS2 * ringing * wave
+    return force
+
+
+def _creep(chance: np.random.Generator, n: int, degrees: float) -> NDArray[np.float64]:
+    """(n, 3) rotation vector, rad, of a mount that gives: mostly slowly, some of it at once."""
+    axis = chance.standard_normal(3)
+    at_once = np.zeros(n)
+    at_once[int(n * chance.uniform(0.3, 0.7)) :] = 1.0
+    share = 0.6 * np.linspace(0.0, 1.0, n) + 0.4 * smoothed(at_once, 0.3, RATE_HZ)
+    return np.radians(degrees) * share[:, None] * axis / np.linalg.norm(axis)
+
+
+def _to_sensor(vectors: NDArray, mounting: NDArray, turned: NDArray) -> NDArray[np.float64]:
+    """Vehicle (n, 3) to sensor axes; turned: small rotations of the mount, to second order."""
+    if turned.any():
+        first = np.cross(turned, vectors)
+        vectors = vectors + first + 0.5 * np.cross(turned, first)
+    return vectors @ mounting

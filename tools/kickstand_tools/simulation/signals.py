@@ -1,0 +1,62 @@
+"""Signals on a regular time grid: smooth steps, filters by FFT, coloured noise."""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Signal = NDArray[np.float64]
+_NOISE_MARGIN_S = 10.0  # cut off at both ends, where the held value shows
+_PAD_S = 4.0  # held at both ends, so that the FFT does not join the end of a ride to its start
+
+
+def smoothstep(u: Signal) -> Signal:
+    """0 to 1 for u from 0 to 1 and flat outside: no jump in value, first or second derivative."""
+    u = np.clip(u, 0.0, 1.0)
+    return u * u * u * (10.0 + u * (6.0 * u - 15.0))
+
+
+def derivative(x: Signal, rate_hz: float) -> Signal:
+    """Central differences, per second."""
+    return np.gradient(x, 1.0 / rate_hz)
+
+
+def integral(x: Signal, rate_hz: float) -> Signal:
+    """By trapezoids, 0 at the start."""
+    return np.concatenate(([0.0], np.cumsum((x[1:] + x[:-1]) / (2.0 * rate_hz))))
+
+
+def through(x: Signal, transfer: Callable[[Signal], NDArray], rate_hz: float) -> Signal:
+    """x through a linear filter. transfer: complex gain at frequencies in Hz."""
+    pad = int(_PAD_S * rate_hz)
+    size = -(-(len(x) + 2 * pad) // 16384) * 16384  # few small prime factors: a fast FFT
+    padded = np.pad(x, (pad, size - len(x) - pad), mode="edge")
+    spectrum = np.fft.rfft(padded) * transfer(np.fft.rfftfreq(size, 1.0 / rate_hz))
+    return np.fft.irfft(spectrum, size)[pad : pad + len(x)]
+
+
+def smoothed(x: Signal, seconds: float, rate_hz: float) -> Signal:
+    """Mean weighted by a Gaussian of this standard deviation: no lag."""
+    return through(x, lambda f: np.exp(-0.5 * (2.0 * np.pi * f * seconds) ** 2), rate_hz)
+
+
+def second_order(x: Signal, natural_hz: float, damping: float, rate_hz: float) -> Signal:
+    """Low-pass of second order, gain 1 at rest, with its lag."""
+
+    def transfer(f: Signal) -> NDArray:
+        s = 1j * f / natural_hz
+        return 1.0 / (1.0 + 2.0 * damping * s + s * s)
+
+    return through(x, transfer, rate_hz)
+
+
+def band_noise(chance: np.random.Generator, n: int, low_hz: float, high_hz: float, rate_hz: float) -> Signal:
+    """Normal noise of rms 1 (in the long run) between two frequencies, falling by second order beyond them."""
+
+    def transfer(f: Signal) -> NDArray:
+        low = (f / low_hz) ** 2
+        return low / (1.0 + low) / (1.0 + (f / high_hz) ** 2)
+
+    margin = int(_NOISE_MARGIN_S * rate_hz)
+    noise = through(chance.standard_normal(n + 2 * margin), transfer, rate_hz)
+    return noise[margin : margin + n] / np.std(noise)
