@@ -4,7 +4,7 @@
 # SIDE = "left"             # or "right"
 
 # Sensor
-# SAMPLE_HZ = 100           # readings per second: 50, 100, 125 or 200
+# SAMPLE_HZ = 200           # readings per second: 50, 100, 125 or 200
 # ACCEL_RANGE_G = 8         # 2, 4, 8 or 16
 # GYRO_RANGE_DPS = 500      # 250, 500, 1000 or 2000
 # DLPF = 3                  # low-pass of the chip: 1 (184 Hz) to 6 (5 Hz)

@@ -30,7 +30,7 @@ def lasting(name):
         "nack": ([["nack_for", [0x68, FAULT_S, for_s]]], "No sensor"),
         "timeout": ([["timeout_for", [0x68, FAULT_S, for_s]]], "No sensor"),
         "unplugged": ([["unplug_sensor", [FAULT_S, for_s]]], "No sensor"),
-        "frozen": ([["freeze", [FAULT_S, for_s]]], "Sensor frozen"),
+        "frozen": ([["freeze", [FAULT_S, for_s]]], "Sensor silent"),
         "zeros": ([["all_zero", [FAULT_S, for_s]]], "Sensor frozen"),
         "ones": ([["all_ones", [FAULT_S, for_s]]], "Sensor frozen"),
     }[name]

@@ -21,7 +21,7 @@ _TAKING = ("Stand: hold", "Upright: hold")
 
 
 class AlignWizard:
-    """step() once a sample; lines is what to show; ended is True when the pages may come back.
+    """sample() with each sample, step() with each event; lines is what to show; ended: the pages may come back.
 
     chip, saturated, rate_hz: as for PoseTaker.  old: the Calibration in use.  side: "left" or "right".
     save: called with the new Calibration, raises StoreError.  pressed: the press on the kickstand has just
@@ -41,15 +41,18 @@ class AlignWizard:
         if pressed:
             self._begin()
 
-    def step(self, counts, event, now_ms):
-        """Take one sample and a button event (0, SHORT, LONG)."""
+    def sample(self, counts, now_ms):
+        """Take one sample: seven counts, the chip's order."""
+        if self._taking:
+            self._take(counts, now_ms)
+
+    def step(self, event, now_ms):
+        """Take a button event (0, SHORT, LONG)."""
         if event == LONG:
             self.ended = True
-        elif self._taking:
-            self._take(counts, now_ms)
         elif self._leave_ms is not None:
             self.ended = event == SHORT or ticks_diff(now_ms, self._leave_ms) >= 0
-        elif event == SHORT:
+        elif event == SHORT and not self._taking:
             if self._refused:
                 self._ask(self._pose)
             else:

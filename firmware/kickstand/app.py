@@ -15,11 +15,13 @@ from .errors import SettingsError
 from .hd44780 import Lcd
 from .menu import ALIGN, INFO, RESET, SIX, Menu
 from .meter import LeanMeter
-from .mpu6050 import SATURATED, Mpu6050
+from .mpu6050 import MAX_FRAMES, SATURATED, Mpu6050
+from .sample_clock import SampleClock
 from .sensor import Sensor
 from .six_wizard import SixWizard
 from .store import Store
 
+LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
 PAGE_MS = 100
 NOTICE_MS = 2000
 
@@ -36,7 +38,7 @@ def open_lcd(settings):
 
 
 def open_sensor(settings):
-    """The chip of these settings, watched over. Raises SettingsError at its first read() for wrong pins."""
+    """The chip of these settings, watched over. Raises SettingsError at its first fetch() for wrong pins."""
 
     def reopen():
         hz = settings.SENSOR_BUS_HZ
@@ -83,8 +85,8 @@ class App:
         self.sensor = open_sensor(settings)
         self.store = None  # until the chip has said who it is: a calibration belongs to one chip
         self.meter = LeanMeter(Calibration())
+        self._clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self._restarts = 0
-        self._last_us = None
         self._page = 0
         self._pages = (pages.lean, pages.maxima, pages.acceleration, pages.formula, pages.raw)
         self._wizard = None
@@ -93,17 +95,17 @@ class App:
         self._notice = None
         self._notice_ms = 0
         self._page_ms = ticks_ms()
+        self._fault_shown = False
 
     def run(self):
-        """Loop for ever at the sample rate."""
-        period_us = 1_000_000 // self.settings.SAMPLE_HZ
+        """Loop for ever, LOOP_US a turn."""
         watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         due_us = ticks_us()
         while True:
             self.step()
             if watchdog:
                 watchdog.feed()
-            due_us = ticks_add(due_us, period_us)
+            due_us = ticks_add(due_us, LOOP_US)
             wait_us = ticks_diff(due_us, ticks_us())
             if wait_us > 0:
                 sleep_us(wait_us)
@@ -111,33 +113,41 @@ class App:
                 due_us = ticks_us()
 
     def step(self):
-        """One turn of the loop: one sample, one event, at most one transfer to the display."""
+        """One turn of the loop: the samples that wait, one event, at most one transfer to the display."""
         now_us, now_ms = ticks_us(), ticks_ms()
-        event = self.button.poll(now_ms)
-        if self.sensor.read(now_ms):
-            self._measure(now_us)
-        elif self.sensor.fault is not None:
-            self._last_us = None
+        waiting = self.sensor.fetch(now_ms)
+        for k in range(waiting):
+            if not self.sensor.take(k, now_ms):
+                break
+            self._measure(now_us, now_ms)
+        if self.sensor.fault is not None:
+            self._clock.restart()
             self._wizard = None
-        self._handle(event, now_ms)
+            if not self._fault_shown:
+                self._page_ms = now_ms  # at once: the next thing is to start the sensor again
+        elif waiting < MAX_FRAMES:
+            self._clock.emptied(now_us)
+        self._handle(self.button.poll(now_ms), now_ms)
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self._page_ms = ticks_add(now_ms, PAGE_MS)
+            self._fault_shown = self.sensor.fault is not None
             line1, line2 = self._lines(now_ms)
             self.lcd.show(line1, line2)
         self.lcd.tick(now_ms)
 
-    def _measure(self, now_us):
+    def _measure(self, now_us, now_ms):
+        """Take the sample in chip.counts on its way."""
         if self._restarts != self.sensor.restarts:
             self._restarts = self.sensor.restarts
             self._sensor_started()
-        dt_us = 0 if self._last_us is None else ticks_diff(now_us, self._last_us)
-        self._last_us = now_us
-        self.meter.update(self.sensor.chip.counts, dt_us)
+        counts = self.sensor.chip.counts
+        self.meter.update(counts, self._clock.step(now_us))
+        if self._wizard:
+            self._wizard.sample(counts, now_ms)
 
     def _sensor_started(self):
         """The chip runs, for the first time or again after a fault, perhaps another one."""
         chip = self.sensor.chip
-        self._last_us = None
         self.meter.restart()
         if self.store is None or self.store.who_am_i != chip.who_am_i:
             self.store = Store(chip.who_am_i, chip.accel_range_g)
@@ -158,7 +168,7 @@ class App:
     def _handle(self, event, now_ms):
         """Give the event to the wizard, the menu or the pages, whichever is on the display."""
         if self._wizard:
-            self._wizard.step(self.sensor.chip.counts, event, now_ms)
+            self._wizard.step(event, now_ms)
             if self._wizard.ended:
                 self._wizard = None
         elif self._menu:

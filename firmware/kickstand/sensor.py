@@ -1,19 +1,21 @@
 """The chip kept alive: found, set up, watched, and set up again after a fault."""
 
-from time import ticks_add, ticks_diff
+from time import ticks_add, ticks_diff, ticks_ms
 
 from .mpu6050 import UnknownChip
 
 CHECK_MS = 100  # before a page with readings of another range can be drawn; 0.4 ms each
 RETRY_MS = 50
+SAY_MS = 30  # before starting again, which takes 0.2 s: time to get the fault onto the display
 FAILURES = 3  # single failed transfers are ridden out
+SILENT_MS = 100  # without a sample
 FROZEN_MS = 100  # noise changes a living chip's readings in every sample
 
 
 class Sensor:
-    """Readings of one chip that may fail at any time.
+    """Samples of one chip that may fail at any time.
 
-    chip: an Mpu6050.  reopen: called to free the bus, returns it as a machine.I2C.  read() never raises.
+    chip: an Mpu6050.  reopen: called to free the bus, returns it as a machine.I2C.  fetch() never raises.
     fault: None, or two display lines that say what is wrong.  restarts: how often the chip was set up.
     """
 
@@ -25,31 +27,45 @@ class Sensor:
         self._same = 0
         self._checksum = 0
         self._due_ms = None  # of the next check, or of the next attempt while faulty
+        self._sample_ms = 0
         self.restarts = 0
         self.fault = ("Kickstand", "starting")
+        self._running = False
 
-    def read(self, now_ms):
-        """True with a fresh sample in chip.counts; False where there is none, or none to trust."""
-        if self.fault is not None:
+    def fetch(self, now_ms):
+        """How many samples wait to be taken with take(); starts the chip when it is not running."""
+        if not self._running:
             if self._due_ms is None or ticks_diff(now_ms, self._due_ms) >= 0:
                 self._start(now_ms)
-            return False
+            return 0
         try:
-            self.chip.read()
+            if self._failures:
+                self.chip.restart_fifo()  # what broke off may have left half a frame
+            waiting = self.chip.fetch()
             if ticks_diff(now_ms, self._due_ms) >= 0:
                 self._due_ms = ticks_add(now_ms, CHECK_MS)
                 if not self.chip.configured():  # a supply dip: asleep, with the ranges of the factory
                     self._fail("Sensor reset", "starting again", now_ms)
-                    return False
+                    return 0
         except OSError:
             self._failures += 1
             if self._failures >= FAILURES:
                 self._fail("Sensor lost", "check wiring", now_ms)
-            return False
+            return 0
         self._failures = 0
+        if waiting:
+            self._sample_ms = now_ms
+        elif ticks_diff(now_ms, self._sample_ms) > SILENT_MS:
+            self._fail("Sensor silent", "starting again", now_ms)
+        return waiting
+
+    def take(self, k, now_ms):
+        """Sample k into chip.counts; False if it is none to trust."""
+        self.chip.take(k)
         if self._dead():
             self._fail("Sensor frozen", "starting again", now_ms)
             return False
+        self.fault = None
         return True
 
     def _dead(self):
@@ -66,7 +82,8 @@ class Sensor:
 
     def _fail(self, line1, line2, now_ms):
         self.fault = (line1, line2)
-        self._due_ms = now_ms  # the next read() tries at once
+        self._running = False
+        self._due_ms = ticks_add(now_ms, SAY_MS)
 
     def _start(self, now_ms):
         """Free the bus and set the chip up; 0.2 s when it answers."""
@@ -78,8 +95,10 @@ class Sensor:
         except OSError:
             self.fault = ("No sensor", "check wiring")
         else:
-            self.fault = None
+            self._running = True  # the fault stays until there is a good sample
             self.restarts += 1
             self._failures = 0
             self._same = 0
-        self._due_ms = ticks_add(now_ms, RETRY_MS if self.fault else CHECK_MS)
+        now_ms = ticks_ms()  # setting up took its time
+        self._sample_ms = now_ms
+        self._due_ms = ticks_add(now_ms, CHECK_MS if self._running else RETRY_MS)

@@ -32,7 +32,7 @@ _PIN = _whole(0, 48)
 # name: default, (check, what is allowed)
 _TABLE = {
     "SIDE": ("left", _one_of("left", "right")),
-    "SAMPLE_HZ": (100, (_sample_rate, "50, 100, 125 or 200")),
+    "SAMPLE_HZ": (200, (_sample_rate, "50, 100, 125 or 200")),
     "ACCEL_RANGE_G": (8, _one_of(*sorted(ACCEL_LSB_PER_G))),
     "GYRO_RANGE_DPS": (500, _one_of(*sorted(GYRO_LSB_PER_DPS))),
     "DLPF": (3, _whole(1, 6)),

@@ -16,7 +16,7 @@ ROUGH_TILT_DEG = 30.0  # of an uncalibrated side; the fit checks it again with t
 
 
 class SixWizard:
-    """step() once a sample; lines is what to show; ended is True when the pages may come back.
+    """sample() with each sample, step() with each event; lines is what to show; ended: the pages may come back.
 
     chip, saturated, rate_hz: as for PoseTaker.  save: called with the new Calibration, raises StoreError.
     """
@@ -36,8 +36,13 @@ class SixWizard:
         self._fitted = None
         self._next()
 
-    def step(self, counts, event, now_ms):
-        """Take one sample and a button event (0, SHORT, LONG)."""
+    def sample(self, counts, now_ms):
+        """Take one sample: seven counts, the chip's order."""
+        if self._leave_ms is None and self._notice_ms is None and not self._refused:
+            self._take(counts, now_ms)
+
+    def step(self, event, now_ms):
+        """Take a button event (0, SHORT, LONG)."""
         if event == LONG:
             self.ended = True
         elif self._leave_ms is not None:
@@ -46,12 +51,9 @@ class SixWizard:
             if event == SHORT:
                 self._refused = False
                 self._start()
-        elif self._notice_ms is not None:
-            if ticks_diff(now_ms, self._notice_ms) >= 0:
-                self._notice_ms = None
-                self._next()
-        else:
-            self._take(counts, now_ms)
+        elif self._notice_ms is not None and ticks_diff(now_ms, self._notice_ms) >= 0:
+            self._notice_ms = None
+            self._next()
 
     def _next(self):
         """Ask for the next pose and watch for stillness."""
