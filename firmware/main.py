@@ -7,7 +7,6 @@ import sys
 from time import sleep_ms
 
 import machine
-
 from kickstand import __version__, port
 from kickstand.app import App, open_button, open_lcd
 from kickstand.errors import SettingsError

@@ -1,7 +1,8 @@
-"""The whole device on the simulated board: a run described as data, its display recorded. CPython and MicroPython.
+"""The whole device on the simulated board: a run described as data, its display recorded. CPython and
+MicroPython.
 
-As a script: reads the description as JSON from standard input, runs it in the current directory (the board's flash) and prints the
-record as JSON on the last line.
+As a script: reads the description as JSON from standard input, runs it in the current directory (the board's
+flash) and prints the record as JSON on the last line.
 """
 
 import json
@@ -15,7 +16,8 @@ FRAME_S = 0.1
 
 
 def standing(plan):
-    """motion(t_s) of a bike that stands at the lean of the plan [[from_s, lean_deg], ...], moved in no time."""
+    """motion(t_s) of a bike that stands at the lean of the plan [[from_s, lean_deg], ...], moved in no
+    time."""
 
     def motion(t_s):
         now = plan[0]
@@ -29,7 +31,8 @@ def standing(plan):
 
 
 def poses_of(seed, steps):
-    """world(t_s) of the bare sensor: steps [[from_s, [up in its own axes] or None while it is being turned], ...]."""
+    """world(t_s) of the bare sensor: steps [[from_s, [up in its own axes] or None while it is being turned],
+    ...]."""
     part = sensor_errors.Sensor(seed=seed)
     worlds = [(start, sensor_errors.resting(part, up) if up else None) for start, up in steps]
     still = sensor_errors.resting(part, (1, 0, 0))
@@ -47,10 +50,12 @@ def poses_of(seed, steps):
 
 
 def run_device(plan):
-    """Run it; returns frames [[t_s, line1, line2], ...] as they changed, how each boot ended, and what the LCD says last.
+    """Run it; returns frames [[t_s, line1, line2], ...] as they changed, how each boot ended, and what the
+    LCD says last.
 
-    plan: "until" (s); "lean" as for standing(), or "ride" [[name of a function in rides, arguments...], ...], or "poses" as for
-    poses_of; "seed" of the part (None: perfect); "presses" [[at_s, for_s], ...]; "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...].
+    plan: "until" (s); "lean" as for standing(), or "ride" [[name of a function in rides, arguments...], ...],
+    or "poses" as for poses_of; "seed" of the part (None: perfect); "presses" [[at_s, for_s], ...]; "faults"
+    [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...].
     """
     seed = plan.get("seed")
     if "poses" in plan:

@@ -1,4 +1,5 @@
-"""The rider's way through the device: press, press, ride; six positions; the menu; power-off; and what cannot go wrong."""
+"""The rider's way through the device: press, press, ride; six positions; the menu; power-off; and what
+cannot go wrong."""
 
 import devices
 import engines
@@ -21,12 +22,14 @@ ALIGNED = {"ride": RIDE, "presses": PRESSES, "until": 46}
 @pytest.mark.parametrize("engine", engines.ENGINES)
 @pytest.mark.parametrize("seed", [None, 3])
 def test_press_press_ride(engine, seed, tmp_path):
-    """seed None is a perfect part mounted straight; 3 has the data sheet's errors and any mounting, here not calibrated."""
+    """seed None is a perfect part mounted straight; 3 has the data sheet's errors and any mounting, here not
+    calibrated."""
     record = devices.run(engine, tmp_path, {**ALIGNED, "seed": seed})
     assert record.at(1.9)[0].startswith("Raw")
     assert record.first("On stand: press") < 2.5
     assert record.at(6)[0] == "Now upright:    "
-    # 8 s of poses and settling; a part with errors takes 1 g in each pose for what it is not: that costs tilt too
+    # 8 s of poses and settling; a part with errors takes 1 g in each pose for what it is not: that costs
+    # tilt too
     assert record.first("Aligned!") < 16.0
     tolerance = 2 if seed is None else 7
     for t_s, lean in ((LEFT_S, -30), (RIGHT_S, 40), (STRAIGHT_S, 0)):

@@ -1,4 +1,5 @@
-"""Faults of sensor, bus, display and flash on the whole device: shown while they last, gone soon after, nothing wrong shown as good."""
+"""Faults of sensor, bus, display and flash on the whole device: shown while they last, gone soon after,
+nothing wrong shown as good."""
 
 import devices
 import engines

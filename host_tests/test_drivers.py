@@ -1,5 +1,6 @@
 """The drivers by themselves: what they put on the bus, what they allocate, what they make of presses."""
 
+import itertools
 import json
 import subprocess
 
@@ -135,7 +136,7 @@ def test_only_changed_lines_are_sent_one_transfer_each(board):
                 sleep_ms(6)
                 lcd.tick(ticks_ms())
             counts.append(board.lcd_bus.transfers[0x27])
-        return [after - before for before, after in zip(counts, counts[1:])]
+        return [after - before for before, after in itertools.pairwise(counts)]
 
     assert on(board, run) == [0, 1, 2]
     assert board.lcd.text() == ["a" + " " * 15, "b" + " " * 15]

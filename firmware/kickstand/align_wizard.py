@@ -21,7 +21,8 @@ _TAKING = ("Stand: hold", "Upright: hold")
 
 
 class AlignWizard:
-    """sample() with each sample, step() with each event; lines is what to show; ended: the pages may come back.
+    """sample() with each sample, step() with each event; lines is what to show; ended: the pages may come
+    back.
 
     chip, saturated, rate_hz: as for PoseTaker.  old: the Calibration in use.  side: "left" or "right".
     save: called with the new Calibration, raises StoreError.  pressed: the press on the kickstand has just

@@ -11,7 +11,8 @@ GATE = (
 
 
 class Covariance:
-    """Covariance of n states. variances: n initial values. Errors of a linearised state x with correction dx."""
+    """Covariance of n states. variances: n initial values. Errors of a linearised state x with correction
+    dx."""
 
     def __init__(self, variances):
         self.n = len(variances)

@@ -1,18 +1,21 @@
 """Lean while riding: an extended Kalman filter on what one gyro and one accelerometer say of a motorcycle.
 
-States: lean t, pitch q (of road and suspension together), speed v, gyro bias (3) and the yaw error of the alignment
-y, which a kickstand pose with one degree of pitch makes as large as five. With the vertical u = (cos q sin t,
-cos q cos t, sin q) in the vehicle's axes (left, up, forward), rates w, force f:
+States: lean t, pitch q (of road and suspension together), speed v, gyro bias (3) and the yaw error of the
+alignment y, which a kickstand pose with one degree of pitch makes as large as five. With the vertical u =
+(cos q sin t, cos q cos t, sin q) in the vehicle's axes (left, up, forward), rates w, force f:
 
-    kinematics, exact on any road:  dt/dt = w_z - tan q (w_x sin t + w_y cos t),  dq/dt = w_y sin t - w_x cos t
+    kinematics, exact on any road:  dt/dt = w_z - tan q (w_x sin t + w_y cos t)
+                                    dq/dt = w_y sin t - w_x cos t
     wheels that roll, not slide:    dv/dt = f_z - g sin q + v w_y y
-                                    f_x = g u_x + v w_y + dv/dt y - h dw_z/dt,    f_y = g u_y - v w_x
+                                    f_x = g u_x + v w_y + dv/dt y - h dw_z/dt
+                                    f_y = g u_y - v w_x
     roads are level on average:     0 = q + y sin t
 
-The second line is Nicolae's (22)-(23) with s = v w. In a held turn its two equations are parallel in t and v: there
-the ratio of the two rates tells the lean, through the third line, and v tells it just after entering. Force and
-speed are in g and g seconds, angles in radians. The state follows every sample. Covariance and corrections follow
-ten times a second, a piece a sample, because the whole would take longer than a sample lasts.
+The equations of f_x and f_y are Nicolae's (22)-(23) with s = v w. In a held turn they are parallel in t and
+v: there the ratio of the two rates tells the lean, through the last line, and v tells it just after entering.
+Force and speed are in g and g seconds, angles in radians. The state follows every sample. Covariance and
+corrections follow ten times a second, a piece a sample, because the whole would take longer than a sample
+lasts.
 """
 
 from math import atan2, cos, degrees, radians, sin, sqrt
@@ -35,13 +38,13 @@ START_BIAS = radians(1.0)  # the poses measured it; it has drifted since
 START_YAW_ERROR = radians(5.0)
 
 # Growth of uncertainty per square root of a second
-GROW_ANGLE = radians(0.15)  # gyro scale and vibration
-GROW_SPEED = 0.3 / _G
+GROW_ANGLE = radians(0.2)  # gyro scale and vibration
+GROW_SPEED = 0.5 / _G
 GROW_BIAS = radians(0.01)  # warming up: 0.6 deg/s in five minutes
 
 # Measurements, as independent every WINDOW_US: what is wrong with them lasts longer, so they count for less
-SIGMA_LEFT = 0.15
-SIGMA_UP = 0.30
+SIGMA_LEFT = 0.08
+SIGMA_UP = 0.4
 ROLL_HEIGHT_M = 0.5  # h: of the sensor above the axis the bike rolls about; by how much it may be wrong:
 SIGMA_ROLL_HEIGHT_M = 0.4
 SIGMA_SLOPE = radians(3.0)
@@ -233,7 +236,8 @@ class LeanFilter:
         yield from p.measure(((Q, cq),), forward, SIGMA_REST_FORCE**2)
 
     def _correct(self, left_terms, up_terms):
-        """Put the corrections into the state, and into the innovations already summed up against the old one."""
+        """Put the corrections into the state, and into the innovations already summed up against the old
+        one."""
         p, x, sums = self._p, self._x, self._sums
         for j, h in left_terms:
             sums[0] -= self._count * h * p.correction[j]

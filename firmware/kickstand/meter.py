@@ -1,5 +1,5 @@
-"""From one reading of the chip to lean and g: calibration, alignment, lean. The way of a sample, on the board and
-in replay."""
+"""From one reading of the chip to lean and g: calibration, alignment, lean. The way of a sample, on the board
+and in replay."""
 
 from .lean import formula_lean_deg
 from .lean_filter import LeanFilter
@@ -17,7 +17,8 @@ class LeanMeter:
 
     After update(): force (left, up, forward in g), rate (about left, up, forward in deg/s), lean_deg (the
     filter's, > 0 right), lean_formula_deg (Nicolae's, sample by sample), smooth_force (g, for display),
-    sensor_force and sensor_rate (calibrated, in the sensor's axes), fallen, and the maxima since reset_maxima().
+    sensor_force and sensor_rate (calibrated, in the sensor's axes), fallen, and the maxima since
+    reset_maxima().
     """
 
     def __init__(self, calibration):

@@ -139,7 +139,8 @@ class Mpu6050:
     def fetch(self):
         """Read the samples that wait in the FIFO, up to MAX_FRAMES; return how many. Raises OSError.
 
-        After an overflow the FIFO's frames are out of step: it is emptied, overflows counts it, and 0 is returned.
+        After an overflow the FIFO's frames are out of step: it is emptied, overflows counts it, and 0 is
+        returned.
         """
         self._i2c.readfrom_mem_into(self._address, _FIFO_COUNT_H, self._two)
         waiting = self._two[0] << 8 | self._two[1]

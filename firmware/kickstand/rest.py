@@ -1,4 +1,5 @@
-"""Is the bike standing still? From the means of a tenth of a second, in which an idling engine averages out."""
+"""Is the bike standing still? From the means of a tenth of a second, in which an idling engine averages
+out."""
 
 MAX_FORCE_G = 0.010  # of a mean from the average of the last half second
 MAX_RATE_RADPS = 0.009  # 0.5 deg/s, likewise

@@ -1,7 +1,7 @@
 """When each sample was taken: the chip's own steady rate, held to the microcontroller's clock.
 
-The chip samples on time whatever the program does, but its clock may be off by 1 %. Integer microseconds throughout:
-as float32 they would be wrong after 17 seconds.
+The chip samples on time whatever the program does, but its clock may be off by 1 %. Integer microseconds
+throughout: as float32 they would be wrong after 17 seconds.
 """
 
 from time import ticks_add, ticks_diff
@@ -33,7 +33,8 @@ class SampleClock:
         return dt_us
 
     def emptied(self, now_us):
-        """All samples taken before now_us have been stepped over: the last is half a period old on average."""
+        """All samples taken before now_us have been stepped over: the last is half a period old on
+        average."""
         if self.sample_us is None:
             return
         late_us = ticks_diff(now_us, self.sample_us) - self._period_us // 2

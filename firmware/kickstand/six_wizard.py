@@ -16,7 +16,8 @@ ROUGH_TILT_DEG = 30.0  # of an uncalibrated side; the fit checks it again with t
 
 
 class SixWizard:
-    """sample() with each sample, step() with each event; lines is what to show; ended: the pages may come back.
+    """sample() with each sample, step() with each event; lines is what to show; ended: the pages may come
+    back.
 
     chip, saturated, rate_hz: as for PoseTaker.  save: called with the new Calibration, raises StoreError.
     """

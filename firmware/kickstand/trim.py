@@ -1,7 +1,8 @@
 """The lean of an upright pose that was not quite upright, found while riding straight.
 
-A bike in balance feels no force to the side: what it feels on straights, on average, is how far the alignment's
-upright is from the balance, plus what has drifted in the accelerometer. Both are to be taken off the lean.
+A bike in balance feels no force to the side: what it feels on straights, on average, is how far the
+alignment's upright is from the balance, plus what has drifted in the accelerometer. Both are to be taken off
+the lean.
 """
 
 from math import radians, sin
@@ -16,14 +17,16 @@ GROW = radians(0.01)  # per square root of a second
 
 
 class UprightTrim:
-    """A scalar Kalman filter. angle: radians to take off the lean, within MAX_TRIM. variance: its uncertainty."""
+    """A scalar Kalman filter. angle: radians to take off the lean, within MAX_TRIM. variance: its
+    uncertainty."""
 
     def __init__(self):
         self.angle = 0.0
         self.variance = START_SIGMA**2
 
     def update(self, sideways, lean, yaw_rate, seconds):
-        """sideways: lateral over vertical force while riding; lean (rad), yaw_rate (rad/s): how straight it is."""
+        """sideways: lateral over vertical force while riding; lean (rad), yaw_rate (rad/s): how straight it
+        is."""
         turn = SIGMA_TURN * sin(lean - self.angle)
         yaw = SIGMA_YAW_S * yaw_rate
         noise = (SIGMA_STRAIGHT**2 + turn * turn + yaw * yaw) * 2.0 * LASTS_S / seconds
