@@ -1,6 +1,7 @@
 """Short ways to the emulated Pico for its tests."""
 
 import functools
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -71,13 +72,18 @@ def shown_lean(lines: list[str]) -> float | None:
     return float(words[1][:-1]) * (-1 if words[2:] == ["left"] else 1)
 
 
-def reset_in_a_read(pico, at_s: float) -> None:
+def shows(device, pattern: str, limit_s: float) -> re.Match:
+    """Let time pass until the display's two lines, as one text with a bar between, match; the match."""
+    return device.run_until(lambda: re.search(pattern, "|".join(device.lcd())), limit_s)
+
+
+def reset_in_a_read(device, at_s: float) -> None:
     """Reset the processor at at_s or soon after, while the sensor is sending."""
 
     def act() -> None:
-        if pico.chip.controllers[0].reading():
-            pico.chip.reset()
+        if device.chip.controllers[0].reading():
+            device.chip.reset()
         else:
-            pico.board.at(pico.time_s + 5e-6, act)
+            device.board.at(device.time_s + 5e-6, act)
 
-    pico.board.at(at_s, act)
+    device.board.at(at_s, act)

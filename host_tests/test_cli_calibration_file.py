@@ -129,9 +129,21 @@ def test_outputs_that_would_do_harm_are_refused(tmp_path, log):
         command.refused(tmp_path, "replay", log, "--calibration", cal, "--out", out, words=words)
 
 
-@pytest.mark.skipif(not os.path.exists("/dev/null"), reason="no /dev/null on this system")
-def test_a_device_is_not_replaced_by_a_file(tmp_path, log):
+@pytest.mark.skipif(os.name == "nt", reason="named pipes are of Unix")
+def test_what_is_no_ordinary_file_is_not_replaced_by_one(tmp_path, log):
+    """As /dev/null would be, for whoever has the right to; a pipe of our own stands in for it."""
     cal = command.write_cal(tmp_path / "CAL.json")
-    command.refused(
-        tmp_path, "replay", log, "--calibration", cal, "--out", "/dev/null", words="ordinary file"
-    )
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    command.refused(tmp_path, "replay", log, "--calibration", cal, "--out", pipe, words="ordinary file")
+    assert pipe.is_fifo()
+
+
+def test_a_link_is_written_through(tmp_path, log):
+    """Whoever keeps CAL.json elsewhere finds it there afterwards."""
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "LEAN.csv").symlink_to(tmp_path / "kept" / "LEAN.csv")
+    cal = command.write_cal(tmp_path / "CAL.json")
+    command.works("replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv")
+    assert (tmp_path / "LEAN.csv").is_symlink()
+    assert (tmp_path / "kept" / "LEAN.csv").read_text().startswith("t_s,")

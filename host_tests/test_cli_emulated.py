@@ -3,23 +3,24 @@
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import command
 import pytest
 import serial
 from kickstand_tools import deploy, firmware_path
-
-IMAGES = sorted((Path.home() / ".cache" / "rp2040py").glob("RPI_PICO-*-v1.26.1.uf2"))
+from kickstand_tools.emulator import image
+from kickstand_tools.errors import InputError
 
 
 @pytest.fixture
 def port():
     """A freshly booted Pico; its console as a socket."""
-    if not IMAGES:
-        pytest.skip("no image of the Pico: rp2040py micropython --image 1.26.1 --fetch-fw-only gets it")
+    try:
+        path = image.find()
+    except InputError as error:
+        pytest.skip(str(error))
     process = subprocess.Popen(
-        [sys.executable, "-m", "rp2040py", "micropython", "--image", str(IMAGES[0]), "--tcp-port", "0"],
+        [sys.executable, "-m", "rp2040py", "micropython", "--image", str(path), "--tcp-port", "0"],
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,
         text=True,

@@ -1,4 +1,4 @@
-"""What is shipped: the list for mip, the wheel with the firmware in it, and tools/dev.py that sets it all up."""
+"""What is shipped: the list for mip, the wheel with the firmware, and tools/dev.py that sets it all up."""
 
 import importlib.util
 import json

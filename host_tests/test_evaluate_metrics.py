@@ -76,7 +76,7 @@ def test_the_bias_is_of_the_last_straights_alone():
     shown = true["lean_deg"] + np.where(TIME < 0.85 * TIME[-1], 5.0, -0.25)
     assert score(shown, true, RATE).straight_bias == pytest.approx(-0.25)
     true["lean_deg"][:] = 20.0
-    assert not straights(true).any()
+    assert not straights(true, RATE).any()
     assert math.isnan(score(shown, true, RATE).straight_bias)
 
 

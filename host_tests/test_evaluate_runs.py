@@ -14,7 +14,7 @@ from kickstand_tools.evaluation.samples import Samples
 from kickstand_tools.logs import Log
 from kickstand_tools.simulation import ride
 
-FILTERS = [name for name in ("complementary", "mahony", "madgwick", "vqf")]
+FILTERS = ["complementary", "mahony", "madgwick", "vqf"]
 _PACKAGE = {"mahony": "ahrs", "madgwick": "ahrs", "vqf": "vqf"}
 
 
@@ -25,7 +25,7 @@ def needed(name: str) -> None:
 
 
 def leaned(lean_deg: float, roll_s: float = 4.0) -> Samples:
-    """A bike at rest leaned slowly from upright to lean_deg, then held for as long again: no turn, no doubt."""
+    """A bike at rest leaned slowly from upright to lean_deg, then held as long: no turn, no doubt."""
     n = int(roll_s * 200)
     lean = np.radians(np.concatenate((np.linspace(0.0, lean_deg, n), np.full(n, lean_deg))))
     rate = np.zeros((2 * n, 3))
@@ -94,7 +94,7 @@ def test_a_refused_calibration_is_reported_not_scored(monkeypatch):
 
 
 def recorded(rest_s: float = 2.0, turned: float = 0.3) -> Log:
-    """A level ride of a phone turned about the vertical: straight acceleration, then a left turn at 10 m/s."""
+    """A level ride, the phone turned about the vertical: straight acceleration, then a left turn."""
     n, rate = 3000, 50.0
     t = np.arange(n) / rate
     speed = np.clip((t - rest_s) * 2.0, 0.0, 10.0)
@@ -149,7 +149,8 @@ def test_the_command_prints_a_table_and_writes_json_and_picture(tmp_path):
     out = tmp_path / "out"
     result = works("evaluate", "--profiles", "street,parked", "--seeds", 1, "--seconds", 60, "--out", out)
     assert "kickstand" in result.out
-    assert "street, 1 rides" in result.out
+    assert "street (1)" in result.out
+    assert "nan" not in result.out
     assert max(map(len, result.out.splitlines())) <= 110
     data = json.loads((out / "evaluation.json").read_text())
     assert set(data["profiles"]) == {"street", "parked"}
@@ -167,4 +168,6 @@ def test_json_on_standard_output_is_the_same_for_the_same_seed():
 
 
 def test_an_unknown_profile_is_refused(tmp_path):
-    refused(tmp_path, "evaluate", "--profiles", "street,moon", "--out", tmp_path / "x", words="no profile moon")
+    refused(
+        tmp_path, "evaluate", "--profiles", "street,moon", "--out", tmp_path / "x", words="no profile moon"
+    )

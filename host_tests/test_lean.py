@@ -16,7 +16,8 @@ def formula(left, up, yaw_rate):
 
 
 def balanced(lean_deg, speed, forward=0.0):
-    """Force (left, up, forward in g) and rate about up (deg/s) of a bike in balance; lean > 0 is a right turn."""
+    """Force (left, up, forward in g) and rate about up (deg/s) of a bike in balance; lean > 0 is a right
+    turn."""
     t = np.radians(lean_deg)
     s = -np.tan(t)  # centripetal, left > 0
     force = [np.sin(t) + s * np.cos(t), np.cos(t) - s * np.sin(t), forward]

@@ -1,4 +1,4 @@
-"""The simulated motion against numerical differentiation of attitude and position, and the laws of balance."""
+"""The simulated motion against attitude and position differentiated numerically, and the laws of balance."""
 
 import numpy as np
 import pytest
@@ -91,7 +91,9 @@ def test_a_steady_turn_balances_gravity_and_the_centripetal_force(lean_deg):
     narrow = Bike(tyre_radius=0.0, wheel_inertia=0.0)
     rolled, k = held_turn(lean_deg, narrow)
     assert np.degrees(rolled.lean[k]) == pytest.approx(lean_deg, abs=0.01)
-    assert np.degrees(np.arctan(-18.0 * rolled.yaw_rate[k] / GRAVITY_MPS2)) == pytest.approx(lean_deg, abs=0.01)
+    assert np.degrees(np.arctan(-18.0 * rolled.yaw_rate[k] / GRAVITY_MPS2)) == pytest.approx(
+        lean_deg, abs=0.01
+    )
 
 
 def test_wide_tyres_and_spinning_wheels_lean_further_than_the_formula():
@@ -105,7 +107,7 @@ def test_wide_tyres_and_spinning_wheels_lean_further_than_the_formula():
 
 
 def test_the_moments_about_the_contact_point_balance():
-    """Bank, hanging off and tyres together: the line from contact point to centre of mass has the balance lean."""
+    """Bank, hanging off and tyres: the line from contact point to centre of mass has the balance lean."""
     bike, bank, hang, b = Bike(), np.radians(7.0), 0.03, np.radians(31.0)
     lean = balance.chassis_lean(b, bike, bank, hang)
     arm = bike.mass_height - bike.tyre_radius

@@ -11,9 +11,9 @@ RATE = 1000.0
 
 def over(speed: float, roughness: float, seconds: float = 40.0, seed: int = 0) -> road.Shaking:
     chance = np.random.default_rng(seed)
-    distance = speed * np.arange(int(seconds * RATE)) / RATE
+    distance = np.linspace(0.0, speed * seconds, int(seconds * RATE))
     surface = road.profile_slope(chance, float(distance[-1]) + 10.0, roughness)
-    return road.shaking(chance, distance, np.full_like(distance, speed), surface, Bike(), RATE)
+    return road.shaking(chance, distance, np.full(len(distance), speed), surface, Bike(), RATE)
 
 
 def test_the_profile_has_the_standards_density():
@@ -56,7 +56,7 @@ def test_bumps_are_as_high_as_asked():
 
 def test_the_front_wheel_meets_a_bump_first():
     chance = np.random.default_rng(0)
-    distance = 10.0 * np.arange(4000) / RATE
+    distance = np.linspace(0.0, 40.0, 4000)
     slope = np.zeros(3000)
     road.add_bumps(slope, [20.0], 0.05, 0.6)
     shaken = road.shaking(chance, distance, np.full(4000, 10.0), slope, Bike(), RATE)
@@ -75,7 +75,9 @@ def test_the_engine_turns_with_the_road_and_never_below_idle():
 def test_vibration_has_its_size_and_stops_with_the_engine():
     speed = np.full(20000, 6000.0 / 135.0)
     running = np.repeat([1.0, 0.0], 10000)
-    force, rates = Engine(rms_g=0.2, shift_rpm=6500.0).vibration(np.random.default_rng(2), speed, running, RATE)
+    force, rates = Engine(rms_g=0.2, shift_rpm=6500.0).vibration(
+        np.random.default_rng(2), speed, running, RATE
+    )
     assert force[:10000].std(axis=0) / 9.80665 == pytest.approx([0.2] * 3, rel=0.15)
     assert not force[10000:].any()
     assert not rates[10000:].any()

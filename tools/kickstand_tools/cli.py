@@ -109,7 +109,7 @@ def replay(log: Path, calibration: Path, engine: str, out: Path) -> None:
 
 
 @kickstand.command()
-@click.option("--profile", required=True, help="street, track, sweeper, city, hills, or one of the hard ones.")
+@click.option("--profile", required=True, help="street, track, sweeper, city, hills, or a hard one.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Another seed, another ride.")
 @click.option("--seconds", type=click.FloatRange(min=20.0, max=7200.0), default=640.0)
 @click.option("--upright-error", type=click.FloatRange(-30.0, 30.0), default=0.0, help="Degrees, right > 0.")
@@ -137,8 +137,8 @@ def simulate(
 @click.option("--seeds", type=click.IntRange(min=1), default=3, help="Rides of each profile.")
 @click.option("--seconds", type=click.FloatRange(min=60.0, max=7200.0), default=640.0, help="Of each ride.")
 @click.option("--upright-error", type=click.FloatRange(-30.0, 30.0), default=0.0, help="Degrees.")
-@click.option("--pitch-change", type=click.FloatRange(-10.0, 10.0), default=1.0, help="On the stand, degrees.")
-@click.option("--recording", type=_PATH, help="A recorded ride with speed, at rest at first, to compare on too.")
+@click.option("--pitch-change", type=click.FloatRange(-10.0, 10.0), default=1.0, help="Degrees.")
+@click.option("--recording", type=_PATH, help="A recorded ride with speed to compare on too.")
 @click.option("--out", type=_PATH, help="Write evaluation.json and lean.png to this directory.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def evaluate(

@@ -40,7 +40,7 @@ def bench(seconds: float = 10.0) -> dict[str, Any]:
         "cpu_share": 1.0 - figures["slept_us"] / figures["elapsed_us"],
         "samples_taken": plain["taken"],
         "samples_lost": plain["lost"],
-        "heap_bytes_per_turn": figures["bytes_per_turn"],
+        "heap_bytes_per_sample": round(figures["heap_bytes"] / max(1, plain["heap_samples"])),
         "collections_by_app": figures["collections_by_app"],
         "collections_automatic": figures["collections_automatic"],
         "collection_pause_us": _spread(plain["pauses"]),
@@ -53,7 +53,7 @@ def bench(seconds: float = 10.0) -> dict[str, Any]:
 
 def tables(result: dict[str, Any]) -> Group:
     """The result of bench() for a terminal."""
-    times = Table(title=f"One turn of the loop at {result['sample_hz']} Hz, emulated us")
+    times = Table(title=f"Each sample at {result['sample_hz']} Hz, and each turn of the loop: emulated us")
     times.add_column("stage")
     for name in ("median", "p99", "max"):
         times.add_column(name, justify="right")
@@ -65,7 +65,7 @@ def tables(result: dict[str, Any]) -> Group:
     for name, text in (
         ("CPU share", f"{100 * result['cpu_share']:.0f} %"),
         ("samples taken / lost", f"{result['samples_taken']} / {result['samples_lost']} in {result['seconds']:.1f} s"),
-        ("heap taken by a turn", f"{result['heap_bytes_per_turn']} bytes"),
+        ("heap taken by a sample", f"{result['heap_bytes_per_sample']} bytes"),
         ("collections", f"{result['collections_by_app']} by the app, {result['collections_automatic']} by themselves"),
         ("a collection takes", f"{pause['median'] / 1000:.1f} ms, at most {pause['max'] / 1000:.1f} ms"),
         (
@@ -92,6 +92,8 @@ def _run(turns: int, detail: bool) -> dict[str, Any]:
         def take(data: bytes) -> None:
             if data == b"begin":
                 samples.begin()
+            elif data == b"heap":
+                result["heap_samples"] = samples.delivered()
             elif data == b"end":
                 result.update(taken=samples.taken(), lost=samples.lost())
             else:
@@ -109,18 +111,17 @@ def _run(turns: int, detail: bool) -> dict[str, Any]:
 
 
 def _stages(run: dict[str, Any]) -> dict[str, np.ndarray]:
-    """us of each stage in each turn that had it."""
-    by_name = dict(zip(run["figures"]["stages"], run["stages"].T, strict=True))
-    sampled = by_name["calibrate"] > 0
-    drawn = by_name["page"] > 0
-    return {
-        "read": by_name["bus"][sampled],
-        "decode": (by_name["driver"] - by_name["bus"])[sampled],
-        "calibrate": by_name["calibrate"][sampled],
-        "rotate": by_name["rotate"][sampled],
-        "lean": (by_name["formula"] + by_name["lean"])[sampled],
-        "page": by_name["page"][drawn],
-        "display": by_name["display"],
+    """us of each stage: of a sample in each turn that had some, of the display in each turn that drew something."""
+    columns = dict(zip(run["figures"]["stages"], run["stages"].T, strict=True))
+    sampled = columns["samples"] > 0
+    a_sample = {
+        name: columns[name][sampled] / columns["samples"][sampled]
+        for name in ("read", "decode", "calibrate", "rotate", "formula", "filter")
+    }
+    return a_sample | {
+        "sample path": np.sum(list(a_sample.values()), axis=0),
+        "page": columns["page"][columns["page"] > 0],
+        "display": columns["display"],
     }
 
 

@@ -7,27 +7,27 @@ import gc
 from array import array
 from time import ticks_diff, ticks_us
 
+from kickstand import app as app_module
+from kickstand import calibration, hd44780, lean_filter, meter, mpu6050
+from kickstand.settings import Settings
 from machine import mem16
 from uctypes import addressof, bytearray_at
 
-from kickstand import app as app_module
-from kickstand import calibration, hd44780, lean, meter, mpu6050
-from kickstand.settings import Settings
-
 # Name, and where the function is that is timed under it
 STAGES = (
-    ("driver", mpu6050.Mpu6050, "read"),  # the transfer and the decoding
-    ("calibrate", calibration.Calibration, "apply"),
+    ("calibrate", calibration.Calibration, "apply"),  # once a sample: it is counted by this one
+    ("decode", mpu6050.Mpu6050, "take"),
     ("rotate", meter, "rotate"),
     ("formula", meter, "formula_lean_deg"),
-    ("lean", lean.SmoothedLean, "update"),
+    ("filter", lean_filter.LeanFilter, "update"),
     ("page", app_module.App, "_lines"),
     ("display", hd44780.Lcd, "tick"),
 )
-BUS = len(STAGES)  # one more stage: the sensor's transfers
-COLUMNS = BUS + 1
-SETTLE_TURNS = 300  # before anything is recorded
-HEAP_TURNS = 20  # with the collector off
+BUS = len(STAGES)  # two more columns: us of the sensor's transfers, and how many samples there were
+SAMPLES = BUS + 1
+COLUMNS = BUS + 2
+SETTLE_TURNS = 150  # before anything is recorded
+HEAP_TURNS = 5  # with the collector off
 MAX_PAUSES = 2000
 
 
@@ -145,7 +145,8 @@ class MeasuredApp(app_module.App):
                 self.stages[turn * COLUMNS + i] = min(self._spent[i], 65535)
             self._clear()
         if self.count == HEAP_TURNS:
-            self.bytes_per_turn = (gc.mem_alloc() - self._allocated) // HEAP_TURNS
+            self.heap_bytes = gc.mem_alloc() - self._allocated
+            self._out.write(b"heap")
             gc.enable()
             gc.collect()
             self.canary.arm()
@@ -165,6 +166,8 @@ def _time_stages(spent):
             start = ticks_us()
             result = function(*arguments)
             spent[i] += ticks_diff(ticks_us(), start)
+            if i == 0:
+                spent[SAMPLES] += 1
             return result
 
         return run
@@ -206,10 +209,10 @@ def run(detail, turns, out):
         "slept_us": app.slept_us,
         "free_before": app.free_before,
         "free_after": gc.mem_free(),
-        "bytes_per_turn": app.bytes_per_turn,
+        "heap_bytes": app.heap_bytes,
         "collections_by_app": app.n_pauses,
         "collections_automatic": app.automatic,
-        "stages": [stage[0] for stage in STAGES] + ["bus"],
+        "stages": [stage[0] for stage in STAGES] + ["read", "samples"],
     }
     for data in (app.took, app.pauses, app.stages):
         if data:

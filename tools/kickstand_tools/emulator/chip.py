@@ -8,7 +8,7 @@ from rp2040py.device.load_flash import load_uf2
 from rp2040py.execute_batch import execute_batch
 from rp2040py.irq import IRQ
 from rp2040py.memory_map import FLASH_START_ADDRESS
-from rp2040py.peripherals.psm import PSM_BITS_MASK, WDSEL_XOSC
+from rp2040py.peripherals.psm import PSM_BITS_MASK, WDSEL, WDSEL_ROSC, WDSEL_XOSC
 from rp2040py.peripherals.vreg_and_chip_reset import HAD_POR
 from rp2040py.rp2040 import RP2040
 from rp2040py.utils.logging import ConsoleLogger, LogLevel
@@ -19,7 +19,7 @@ from .i2c_controller import TimedI2C
 
 _SSI = 0x18000  # places in rp2040py's table of peripherals: address >> 12
 _I2C = (0x40044, 0x40048)
-_OSCILLATORS = WDSEL_XOSC | 1  # which the SDK spares in a reset by the watchdog
+_OSCILLATORS = WDSEL_XOSC | WDSEL_ROSC  # which the SDK spares in a reset by the watchdog
 _ACCESS = ("read_uint8", "read_uint16", "read_uint32", "write_uint8", "write_uint16", "write_uint32")
 
 
@@ -84,7 +84,7 @@ class Chip:
 
     def reset(self) -> None:
         """As machine.reset() does it, and a watchdog that was not fed."""
-        self.rp2040.psm.wdsel = PSM_BITS_MASK & ~_OSCILLATORS
+        self.rp2040.psm.write_uint32(WDSEL, PSM_BITS_MASK & ~_OSCILLATORS)
         self.resets += 1
         self._reset(from_watchdog=True)
         if self.on_reset:

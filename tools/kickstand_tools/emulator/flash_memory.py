@@ -2,6 +2,8 @@
 And lets the power go in the middle of it.
 """
 
+from collections.abc import Callable
+
 from rp2040py.peripherals.ssi import (
     CMD_BLOCK_ERASE,
     CMD_PAGE_PROGRAM,
@@ -21,12 +23,13 @@ class PowerCut(Exception):
 
 
 class TimedFlash(RPSSI):
-    """rp2040py's flash interface, with the time that operations take. operations: how many were done."""
+    """rp2040py's flash interface, with the time that operations take. operations: how many were begun."""
 
     def __init__(self, rp2040: RP2040, name: str) -> None:
         rp2040.qspi[1]._listeners.clear()  # the interface that this one replaces
         super().__init__(rp2040, name)
         self.operations = 0
+        self.before_operation: Callable[[], None] | None = None
         self._cut_at = 0
         self._cut_share = 0.0
 
@@ -41,6 +44,8 @@ class TimedFlash(RPSSI):
             super()._apply_command()
             return
         self.operations += 1
+        if self.before_operation:
+            self.before_operation()
         if self.operations == self._cut_at:
             self._tear(opcode)
             raise PowerCut

@@ -95,6 +95,10 @@ class Pico:
         except PowerCut:
             self.power_off()
 
+    def stall(self, seconds: float) -> None:
+        """Time passes, and the processor does nothing: as in a long flash operation."""
+        self.chip.sleep(seconds)
+
     def run_until(self, condition: Callable[[], Any], limit_s: float, step_s: float = 0.005) -> Any:
         """Let time pass until condition() is true, looked at every step_s; what it returned. Raises NotReached."""
         end_s = self.time_s + limit_s

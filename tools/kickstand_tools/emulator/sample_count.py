@@ -10,28 +10,32 @@ class SampleCount:
 
     def __init__(self, sensor: Mpu6050) -> None:
         self._sensor: Any = sensor
-        self._start, self._push = sensor.start, sensor.fifo.push
+        self._start, self._pop = sensor.start, sensor.fifo.pop
         sensor.start = self._on_start  # type: ignore[method-assign]
-        sensor.fifo.push = self._on_push  # type: ignore[method-assign]
-        self._first = 0
+        sensor.fifo.pop = self._on_pop  # type: ignore[method-assign]
+        self._first = self._waiting = self._popped = 0
         self._read: set[int] = set()
-        self._pushed_out = 0
 
     def begin(self) -> None:
         """Count from here."""
-        self._first = self._sensor._next
+        self._first, self._waiting = self._sensor._next, self._sensor.fifo.count
+        self._popped = 0
         self._read = set()
-        self._pushed_out = 0
 
     def taken(self) -> int:
         """Samples the sensor took."""
         return self._sensor._next - self._first
 
+    def delivered(self) -> int:
+        """Samples that were read."""
+        return self._popped // (len(self._sensor._fifo_registers) or 1) or len(self._read)
+
     def lost(self) -> int:
-        """Samples that nobody can read any more: overwritten, or pushed out of the FIFO."""
+        """Samples that nobody can read any more: overwritten, pushed out of the FIFO, or thrown away with it."""
         frame = len(self._sensor._fifo_registers)
         if frame:
-            return -(-self._pushed_out // frame)
+            kept = self._popped + self._sensor.fifo.count - self._waiting
+            return self.taken() - kept // frame
         return max(0, self.taken() - 1 - len(self._read))  # the latest can still be read
 
     def _on_start(self, address: int, read: bool) -> bool:
@@ -40,7 +44,6 @@ class SampleCount:
             self._read.add(self._sensor._next)
         return acknowledged
 
-    def _on_push(self, byte: int, keep_old: bool = False) -> bool:
-        lost = self._push(byte, keep_old)
-        self._pushed_out += lost
-        return lost
+    def _on_pop(self) -> int:
+        self._popped += self._sensor.fifo.count > 0
+        return self._pop()

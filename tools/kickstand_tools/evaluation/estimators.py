@@ -1,7 +1,7 @@
 """What is compared: the firmware's own lean, and what hobby projects and the literature use.
 
-Each estimator gets Samples and returns the lean in degrees, > 0 to the right, sample by sample. The filters of
-`ahrs` and `vqf` run as their authors set them up: default gains, started from the first reading.
+Each estimator gets Samples and returns the lean in degrees, > 0 to the right, sample by sample. The filters
+of `ahrs` and `vqf` run as their authors set them up: default gains, started from the first reading.
 """
 
 from collections.abc import Callable

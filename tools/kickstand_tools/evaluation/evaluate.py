@@ -33,6 +33,7 @@ def evaluate(
         if name not in PROFILES:
             raise InputError(f"no profile {name}: there are {', '.join(PROFILES)}")
     if out is not None:
+        picture.check()
         _make(out)
     absent = missing()
     if absent:

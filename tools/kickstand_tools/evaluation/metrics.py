@@ -9,12 +9,12 @@ LEANED_DEG = 10.0  # the slope counts only beyond: most of a ride is nearly upri
 _LAG_RANGE_S = (-0.2, 0.8)
 _LAG_SMOOTHING_S = 0.05
 _STILL_DPS = 1.0
-_STRAIGHT_DPS, _STRAIGHT_DEG, _STRAIGHT_MPS = 2.0, 6.0, 5.0
+_STRAIGHT_DPS, _STRAIGHT_DEG, _STRAIGHT_MPS, _STRAIGHT_S = 2.0, 6.0, 5.0, 1.0
 
 
 @dataclass
 class Score:
-    """Degrees; slope: shown over true; lag in ms, > 0 if the shown lean is late. NaN where it cannot be told."""
+    """Degrees; slope: shown over true; lag in ms, > 0 if shown late. NaN where it cannot be told."""
 
     rms: float
     p95: float
@@ -36,7 +36,7 @@ def slope(shown: NDArray, true: NDArray, beyond: float = LEANED_DEG) -> float:
 
 
 def lag_ms(shown: NDArray, true: NDArray, rate_hz: float) -> float:
-    """The delay at which the shown roll rate correlates best with the true one, between samples by a parabola."""
+    """The delay at which shown and true roll rate correlate best; between samples by a parabola."""
     width = max(round(_LAG_SMOOTHING_S * rate_hz), 1)
     window = np.full(width, 1.0 / width)
     a, b = (np.convolve(np.gradient(x) * rate_hz, window, mode="same") for x in (shown, true))
@@ -54,13 +54,15 @@ def lag_ms(shown: NDArray, true: NDArray, rate_hz: float) -> float:
     return float((shifts[best] + between) / rate_hz * 1000.0)
 
 
-def straights(truth: dict[str, NDArray]) -> NDArray[np.bool_]:
-    """Where the bike rides straight on, at over 5 m/s."""
-    return (
+def straights(truth: dict[str, NDArray], rate_hz: float) -> NDArray[np.bool_]:
+    """Where the bike has ridden straight on for a second, at over 5 m/s."""
+    now = (
         (np.abs(truth["yaw_rate_dps"]) < _STRAIGHT_DPS)
         & (np.abs(truth["lean_deg"]) < _STRAIGHT_DEG)
         & (truth["speed_mps"] > _STRAIGHT_MPS)
     )
+    since = np.arange(len(now)) - np.maximum.accumulate(np.where(now, -1, np.arange(len(now))))
+    return since > _STRAIGHT_S * rate_hz
 
 
 def score(shown: NDArray, truth: dict[str, NDArray], rate_hz: float) -> Score:
@@ -70,7 +72,7 @@ def score(shown: NDArray, truth: dict[str, NDArray], rate_hz: float) -> Score:
     first = int(np.argmax(off)) if off.any() else round(rate_hz)
     true = truth["lean_deg"]
     error = (shown - true)[first:]
-    late = straights(truth)
+    late = straights(truth, rate_hz)
     late[: round(0.9 * len(late))] = False
     return Score(
         rms(error),

@@ -1,5 +1,6 @@
-"""Lean against time by every estimator: the first ride whole, and of each ride the part with the most leaning."""
+"""Lean against time by every estimator: the first ride whole, and of each ride the most leaning minute."""
 
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -22,20 +23,25 @@ _STYLES = {
 }
 
 
+def check() -> None:
+    """Raise InputError if no picture can be drawn."""
+    if not find_spec("matplotlib"):
+        raise InputError("the picture needs matplotlib: pip install matplotlib")
+
+
 def draw(path: Path, rides: dict[str, dict[str, NDArray[np.float64]]]) -> None:
-    """Write a PNG. rides: leans by name, with "time", by title of the ride. Raises InputError without matplotlib."""
-    try:
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-        from matplotlib.figure import Figure
-    except ImportError as error:
-        raise InputError("the picture needs matplotlib: pip install matplotlib") from error
+    """Write a PNG. rides: leans by name, with "time", by title of the ride. Needs matplotlib: see check()."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
     figure = Figure(figsize=(15, 3.7 * (len(rides) + 1)), layout="constrained")
     FigureCanvasAgg(figure)
     axes = figure.subplots(len(rides) + 1, 1, squeeze=False)[:, 0]
     _lines(axes[0], next(iter(rides)), next(iter(rides.values())), whole=True)
     for axis, (title, leans) in zip(axes[1:], rides.items()):
         _lines(axis, f"{title}, the {ZOOM_S:.0f} s with the most leaning", leans, whole=False)
-    axes[0].legend(ncols=9, loc="upper center", fontsize="small")
+    for line in axes[0].legend(ncols=9, loc="upper center", fontsize="small").get_lines():
+        line.set_linewidth(2.0)
     axes[-1].set_xlabel("s")
     figure.savefig(path, dpi=100)
 

@@ -1,9 +1,10 @@
-"""The recorded motorcycle ride, which has neither a calibration nor a reference of its own: both made from it.
+"""The recorded motorcycle ride has neither a calibration nor a reference: both are made from the ride itself.
 
-Vertical and gyro bias: the means of the first second, at rest. Forward: the horizontal force regressed on dv/dt
-of the 1 Hz speed, with an intercept, where the bike turns slowly; the speed's lateness is the one that fits best.
-Reference: atan(v * yaw rate / g), the yaw rate about the phone's own vertical, averaged over 1 s. It reads low
-(1 Hz speed, wide tyres) and knows no slope or bank: it compares methods and shows decay, it claims no degrees.
+Vertical and gyro bias: the means of the first second, at rest. Forward: the horizontal force regressed on
+dv/dt of the 1 Hz speed, with an intercept, where the bike turns slowly; the speed's lateness is the one that
+fits best. Reference: atan(v * yaw rate / g), the yaw rate about the bike's own up axis, averaged over 1 s. It
+reads low (1 Hz speed, wide tyres, an axis that leans with the bike) and knows no slope or bank: it compares
+methods and shows decay, it claims no degrees.
 """
 
 from dataclasses import dataclass
@@ -29,7 +30,7 @@ _LEANED_DEG = 5.0  # the reference is beyond 10 degrees too seldom
 
 @dataclass
 class RealScore:
-    """Against the rough reference: rms in degrees, slope (shown over reference where that is beyond 5 degrees)."""
+    """Against the rough reference: rms in degrees; slope: shown over it where it is beyond 5 degrees."""
 
     rms: float
     slope: float

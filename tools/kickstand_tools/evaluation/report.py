@@ -50,7 +50,7 @@ def by_profile(results: list[Result]) -> dict[str, dict[str, dict[str, float]]]:
 def table(results: list[Result]) -> Table:
     """A block of lines for each profile."""
     made = Table(title="Shown lean against the truth of simulated rides", caption=CAPTION)
-    for head in ("profile", "estimator"):
+    for head in ("profile (rides)", "estimator"):
         made.add_column(head)
     for head in ("rms", "worst ride", "95 %", "worst", "slope", "range", "lag ms", "bias"):
         made.add_column(head, justify="right", no_wrap=True)
@@ -58,16 +58,16 @@ def table(results: list[Result]) -> Table:
         rides = sum(r.job.profile == profile and r.refusal is None for r in results)
         for k, (name, s) in enumerate(methods.items()):
             made.add_row(
-                f"{profile}, {rides} rides" if k == 0 else "",
+                f"{profile} ({rides})" if k == 0 else "",
                 name,
-                f"{s['rms']:.2f}",
-                f"{s['worst_ride_rms']:.2f}",
-                f"{s['p95']:.2f}",
-                f"{s['worst']:.1f}",
-                f"{s['slope']:.3f}",
-                f"{s['slope_low']:.2f}-{s['slope_high']:.2f}",
-                f"{s['lag_ms']:.0f}",
-                f"{s['straight_bias']:+.2f}",
+                _shown(s["rms"], ".2f"),
+                _shown(s["worst_ride_rms"], ".2f"),
+                _shown(s["p95"], ".2f"),
+                _shown(s["worst"], ".1f"),
+                _shown(s["slope"], ".3f"),
+                f"{_shown(s['slope_low'], '.2f')}-{_shown(s['slope_high'], '.2f')}",
+                _shown(s["lag_ms"], ".0f"),
+                _shown(s["straight_bias"], "+.2f"),
                 style="bold" if name == "kickstand" else "",
                 end_section=k == len(methods) - 1,
             )
@@ -101,6 +101,10 @@ def document(results: list[Result], real: dict[str, RealScore] | None) -> dict[s
     ]
     recorded = None if real is None else {name: asdict(s) for name, s in real.items()}
     return _without_nan({"profiles": by_profile(results), "rides": rides, "recorded": recorded})
+
+
+def _shown(value: float, form: str) -> str:
+    return "" if np.isnan(value) else format(value, form)
 
 
 def _without_nan(value: Any) -> Any:

@@ -23,7 +23,7 @@ from .metrics import Score, score
 
 @dataclass(frozen=True)
 class Job:
-    """One ride. The signs of both set-up errors alternate with the seed. traces: keep the leans for a picture."""
+    """One ride. The signs of both set-up errors change with the seed. traces: keep the leans to draw them."""
 
     profile: str
     seed: int
@@ -92,4 +92,6 @@ def _unheard(line: str) -> None:
 
 
 def _silent() -> None:
-    sys.stderr = open(os.devnull, "w", encoding="utf-8")  # the workers' progress bars would overwrite each other
+    sys.stderr = open(
+        os.devnull, "w", encoding="utf-8"
+    )  # the workers' progress bars would overwrite each other

@@ -11,7 +11,7 @@ from ..logs import Log
 
 @dataclass
 class Samples:
-    """time (N, s), force (N, 3, g) and rate (N, 3, deg/s) along and about left, up, forward; evenly spaced."""
+    """time (N, s), force (N, 3, g), rate (N, 3, deg/s); along and about left, up, forward; evenly spaced."""
 
     time: NDArray[np.float64]
     force: NDArray[np.float64]
@@ -23,7 +23,7 @@ class Samples:
 
 
 def calibrated(log: Log, calibration: CalibrationFile) -> Samples:
-    """(18)-(20) and the matrix, in numpy: the estimators that are not the firmware's share its calibration."""
+    """Nicolae's (18)-(20) and the matrix, in numpy: all estimators share the firmware's calibration."""
     readings = np.array(log.readings)
     matrix = np.reshape(calibration.matrix, (3, 3))
     force = readings[:, :3] * calibration.slope + calibration.offset

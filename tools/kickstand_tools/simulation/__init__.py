@@ -1,7 +1,8 @@
 """Motorcycle rides whose lean is known at every instant, as an MPU6050 stuck on the bike would log them.
 
     from kickstand_tools.simulation import simulate
-    simulate("hills", seed=3, out_dir=Path("ride"))   # writes POSE_1..7.csv KICKSTAND.csv UPRIGHT.csv RIDE.csv TRUTH.csv
+    simulate("hills", seed=3, out_dir="ride")
+    # ride/POSE_1.csv to POSE_7.csv (the last one free), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv, TRUTH.csv
 
 The way of a sample: profiles (what the rider does) -> commands -> balance (how the bike leans and turns) ->
 kinematics with road and engine (what a perfect sensor there feels) -> chip (what the MPU6050 makes of it).

@@ -47,11 +47,11 @@ class Chip:
 
     @staticmethod
     def random(chance: np.random.Generator, share: float = 1.0, drift: float = 1.0) -> "Chip":
-        """A part from the reel. share: of the sheet's tolerances; drift: of the usual change with temperature.
+        """A part from the reel. share: of the sheet's tolerances; drift: over temperature, usual is 1.
 
-        Offsets and biases are spread evenly to the sheet's limits, scale and cross-axis normally with the limit
-        at two standard deviations. Over temperature the sheet allows 35..60 mg and 20 deg/s for 45..60 C; the
-        usual part does a third of the one and a fifth of the other.
+        Offsets and biases are spread evenly to the sheet's limits, scale and cross-axis normally with the
+        limit at two standard deviations. Over temperature the sheet allows 35..60 mg and 20 deg/s for
+        45..60 C; the usual part does a third of the one and a fifth of the other.
         """
 
         def near_one(scale: float, cross: float) -> NDArray[np.float64]:
@@ -74,8 +74,9 @@ class Chip:
         rates: NDArray[np.float64],
         temp_c: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """(n / 5, 7) readings (g, C, deg/s, the chip's order) at 200 Hz of (n, 3) force in g and rates in deg/s,
-        in the sensor's axes at 1 kHz. The first reading is of the first instant.
+        """(n / 5, 7) readings (g, C, deg/s, the chip's order) at 200 Hz, the first of the first instant.
+
+        force (n, 3) in g and rates (n, 3) in deg/s: in the sensor's axes at 1 kHz.
         """
         n = len(force)
         warm = (temp_c - _CALIBRATED_C)[:, None]

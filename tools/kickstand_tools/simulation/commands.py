@@ -101,12 +101,14 @@ def _stepped(time: Signal, starts: Signal, values: list[float], settle_s: list[f
     for start, before, after, settle in zip(starts[1:], values, values[1:], settle_s[1:]):
         if after != before:
             first = np.searchsorted(time, start)
-            result[first:] = before + (after - before) * smoothstep((time[first:] - start) / max(settle, 1e-3))
+            result[first:] = before + (after - before) * smoothstep(
+                (time[first:] - start) / max(settle, 1e-3)
+            )
     return result
 
 
 def _slope(distance: Signal, ends: Signal, percent: list[float]) -> Signal:
-    """Slope in rad along the way, going smoothly from each leg's to the next's: by distance, so never at a stop."""
+    """Slope in rad, from each leg's smoothly to the next's: by distance, so it never changes at a stop."""
     knots, values = [0.0], [percent[0]]
     for end, value in zip(ends, percent):
         if end > knots[-1] + 1.0:

@@ -25,8 +25,12 @@ def simulate(
     share: float = 1.0,
     speed: bool = False,
 ) -> Ride:
-    """Simulate a ride (see ride.ride) and write POSE_1.csv to POSE_7.csv, KICKSTAND.csv, UPRIGHT.csv, RIDE.csv and
-    TRUTH.csv to out_dir. speed: give RIDE.csv a speed, once a second. Raises InputError."""
+    """Simulate a ride (see ride.ride) and write it to out_dir. Raises InputError.
+
+    Logs: POSE_1.csv to POSE_7.csv (the last one free), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv. TRUTH.csv has
+    a row for each of RIDE.csv.
+    speed: give RIDE.csv a speed, once a second.
+    """
     if profile not in PROFILES:
         raise InputError(f"no profile {profile}: there are {', '.join(PROFILES)}")
     made = ride(profile, seed, seconds, upright_error_deg, pitch_change_deg, share)

@@ -44,7 +44,7 @@ def body_rates(motion: Motion) -> NDArray[np.float64]:
 def specific_force(motion: Motion, bike: Bike) -> NDArray[np.float64]:
     """(n, 3) m/s2 along left, up, forward where the sensor is: the acceleration of that point, less gravity.
 
-    The point the body turns about is the centre of the rear tyre's cross-section, a tyre radius above the road.
+    The body turns about the centre of the rear tyre's cross-section, a tyre radius above the road.
     """
     rate, v, slope = motion.rate_hz, motion.speed, motion.slope
     left = v * motion.yaw_rate * np.cos(slope)

@@ -42,7 +42,9 @@ class Plan:
         self._seconds = 0.0
         self._until = max(seconds - _CLOSING_S, 20.0)
         self.slope_percent = 3.0  # most that `any_slope` gives
-        self.roll_dps = 60.0  # mean rate of the quickest change from side to side; the peak is nearly twice that
+        self.roll_dps = (
+            60.0  # mean rate of the quickest change from side to side; the peak is nearly twice that
+        )
 
     @property
     def going_on(self) -> bool:
@@ -78,7 +80,9 @@ class Plan:
 
     def begin(self, engine_on: bool = True) -> None:
         """On the kickstand, lifted, upright, engine on."""
-        self.legs.append(Leg("kickstand", self.uniform(4.0, 12.0), 0.0, self.uniform(-13.0, -8.0), engine=0.0))
+        self.legs.append(
+            Leg("kickstand", self.uniform(4.0, 12.0), 0.0, self.uniform(-13.0, -8.0), engine=0.0)
+        )
         self.legs.append(Leg("lifting", 2.0, 0.0, 0.0, roll_s=2.0))
         self.legs.append(Leg("standing", self.uniform(3.0, 8.0), 0.0))
         if engine_on:
@@ -103,8 +107,7 @@ class Plan:
         phase: str = "turn",
         **more: float | None,
     ) -> None:
-        """Roll to lean_deg within roll_s, or as quickly as can be, and hold it for seconds, or until turned by
-        about heading_deg."""
+        """Roll to lean_deg within roll_s, or as fast as can be; hold it for seconds or about heading_deg."""
         roll_s = max(roll_s, abs(lean_deg - self._lean_now()) / self.roll_dps)
         if seconds is None:
             rate = degrees(GRAVITY_MPS2 * tan(radians(abs(lean_deg))) / max(speed_mps, 1.0))

@@ -8,7 +8,7 @@ from .road import CLASS_A, CLASS_B
 
 
 def street(plan: Plan) -> Conditions:
-    """Country road at 45 to 100 km/h: bends of 10 to 38 degrees, esses, lane changes, a traffic light now and then."""
+    """Country road at 45 to 100 km/h: bends of 10 to 38 degrees, esses, lane changes, some traffic lights."""
     plan.begin()
     cruise = plan.uniform(15.0, 24.0)
     plan.to_speed(cruise, 2.5)
@@ -31,7 +31,7 @@ def street(plan: Plan) -> Conditions:
 
 
 def track(plan: Plan) -> Conditions:
-    """A race track: 35 to 55 degrees, side to side within 0.6 to 1.2 s, 0.5 g of drive and up to 0.95 g of braking."""
+    """A race track: 35 to 55 degrees, flicked over within a second, 0.5 g of drive, 0.95 g of braking."""
     plan.begin()
     plan.slope_percent, plan.roll_dps = 4.0, 100.0
     plan.to_speed(30.0, 4.0)
@@ -74,7 +74,7 @@ def sweeper(plan: Plan) -> Conditions:
 
 
 def city(plan: Plan) -> Conditions:
-    """Town: junctions, roundabouts, lights with a foot down, walking pace in the queue, turning in the road."""
+    """Town: junctions, roundabouts, lights with a foot down, walking pace, turning in the road."""
     plan.begin()
     plan.slope_percent = 4.0
     plan.to_speed(plan.uniform(8.0, 13.0), 2.5)
@@ -128,7 +128,13 @@ def hills(plan: Plan) -> Conditions:
         else:
             _bends(plan, plan.uniform(12.0, 40.0), (9.0, 18.0), 0.4, (1.0, 2.0))
         if plan.likely(0.6):
-            plan.add("straight", plan.uniform(2.0, 7.0), plan.uniform(12.0, 20.0), lean_deg=0.0, slope_percent=before)
+            plan.add(
+                "straight",
+                plan.uniform(2.0, 7.0),
+                plan.uniform(12.0, 20.0),
+                lean_deg=0.0,
+                slope_percent=before,
+            )
     plan.finish(plan.uniform(11.0, 16.0), 3.0)
     return Conditions(CLASS_B * plan.uniform(0.6, 2.0), plan.uniform(0.05, 0.2))
 
@@ -145,7 +151,9 @@ def _bends(
         lean = -lean * plan.uniform(0.7, 1.1)
         lean = max(-42.0, min(42.0, lean))
         roll_s = plan.uniform(*rolls)
-        plan.turn(lean, plan.speed * plan.uniform(0.9, 1.1), heading_deg=plan.uniform(20.0, 80.0), roll_s=roll_s)
+        plan.turn(
+            lean, plan.speed * plan.uniform(0.9, 1.1), heading_deg=plan.uniform(20.0, 80.0), roll_s=roll_s
+        )
     plan.out_of_turn(plan.uniform(*speeds) + 2.0, plan.uniform(1.5, 3.5), roll_s=plan.uniform(*rolls))
 
 

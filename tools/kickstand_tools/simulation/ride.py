@@ -22,8 +22,10 @@ _IMPACT_G = 4.0
 
 @dataclass
 class Ride:
-    """poses: seven (n, 7), six sides in any order and a free one; kickstand, upright (n, 7); readings (N, 7) at
-    200 Hz, each in the chip's order (g, C, deg/s). truth: N of each name, TRUTH's columns. phase: N names."""
+    """What was read, each (n, 7) at 200 Hz in the chip's order (g, C, deg/s), and the truth.
+
+    poses: six sides in any order and a free one. time (s), truth (by name), phase: one for each of readings.
+    """
 
     rate_hz: float
     poses: list[NDArray[np.float64]]
@@ -48,8 +50,8 @@ def ride(
 ) -> Ride:
     """Simulate a ride of about this length; a profile and a seed always give the same one.
 
-    upright_error_deg: how far the bike leaned to the right when pressed upright. pitch_change_deg: nose up on the
-    kickstand against upright, within 1 degree at random if None. share: of the chip's tolerances.
+    upright_error_deg: how far the bike leaned to the right when pressed upright. pitch_change_deg: nose up
+    on the kickstand against upright, within 1 degree at random if None. share: of the chip's tolerances.
     """
     chance = np.random.default_rng([seed, *profile.encode()])
     plan = Plan(chance, seconds)
@@ -62,7 +64,9 @@ def ride(
     rates = np.degrees(body_rates(motion) + extra.rates)
     temp = conditions.start_c + conditions.rise_c * (1.0 - np.exp(-command.time / _WARMING_S))
     turned = _creep(chance, len(force), conditions.creep_deg)
-    readings = chip.read(chance, _to_sensor(force, mounting, turned), _to_sensor(rates, mounting, turned), temp)
+    readings = chip.read(
+        chance, _to_sensor(force, mounting, turned), _to_sensor(rates, mounting, turned), temp
+    )
     home_c = chance.uniform(18.0, 25.0)
     nose = chance.uniform(-0.5, 0.5)  # the ground where both poses were taken
     change = chance.uniform(-1.0, 1.0) if pitch_change_deg is None else pitch_change_deg

@@ -1,7 +1,8 @@
 """Road roughness through tyres and suspension.
 
-The road is a random profile of ISO 8608: its slope is white noise in distance, so the same road shakes more at
-speed, and the rear wheel meets what the front met. Each end is a quarter of a car: wheel on tyre, chassis on spring.
+The road is a random profile of ISO 8608: its slope is white noise in distance, so the same road shakes more
+at speed, and the rear wheel meets what the front met. Each end is a quarter of a car: wheel on tyre, chassis
+on spring.
 """
 
 from dataclasses import dataclass
@@ -19,12 +20,14 @@ _CONTACT_M = 0.10  # a tyre does not follow what is shorter than its contact
 # One end of a motorcycle with half its rider: kg, kg, N/m, Ns/m, N/m
 _SPRUNG, _UNSPRUNG, _SPRING, _DAMPER, _TYRE = 120.0, 15.0, 17e3, 1100.0, 150e3
 _LATERAL = 0.35  # of the vertical shaking, along left and forward
-_RATE_DPS = np.array([0.0, 8.0, 14.0])  # about left (that is pitch, done exactly), up, forward; per m/s2 / 9.8
+_RATE_DPS = np.array(
+    [0.0, 8.0, 14.0]
+)  # about left (that is pitch, done exactly), up, forward; per m/s2 / 9.8
 
 
 @dataclass
 class Shaking:
-    """heave: of the rear end, m/s2; pitch: rad; force (n, 3) m/s2 and rates (n, 3) rad/s on top of the motion's."""
+    """heave: of the rear end, m/s2; pitch: rad; on top of that force (n, 3) m/s2 and rates (n, 3) rad/s."""
 
     heave: Signal
     pitch: Signal

@@ -31,7 +31,7 @@ def through(x: Signal, transfer: Callable[[Signal], NDArray], rate_hz: float) ->
     pad = int(_PAD_S * rate_hz)
     size = -(-(len(x) + 2 * pad) // 16384) * 16384  # few small prime factors: a fast FFT
     padded = np.pad(x, (pad, size - len(x) - pad), mode="edge")
-    spectrum = np.fft.rfft(padded) * transfer(np.fft.rfftfreq(size, 1.0 / rate_hz))
+    spectrum = np.fft.rfft(padded) * transfer(np.linspace(0.0, rate_hz / 2.0, size // 2 + 1))
     return np.fft.irfft(spectrum, size)[pad : pad + len(x)]
 
 
@@ -51,7 +51,7 @@ def second_order(x: Signal, natural_hz: float, damping: float, rate_hz: float) -
 
 
 def band_noise(chance: np.random.Generator, n: int, low_hz: float, high_hz: float, rate_hz: float) -> Signal:
-    """Normal noise of rms 1 (in the long run) between two frequencies, falling by second order beyond them."""
+    """Normal noise between two frequencies, falling by second order beyond, of rms 1 in the long run."""
 
     def transfer(f: Signal) -> NDArray:
         low = (f / low_hz) ** 2

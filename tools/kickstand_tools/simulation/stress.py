@@ -52,7 +52,7 @@ def bumps(plan: Plan) -> Conditions:
 
 
 def crosswind(plan: Plan, road: Profile) -> Conditions:
-    """A wind from the side that leans the bike 2 to 4 degrees on the straights, from the left, then the right, with gusts."""
+    """A wind that leans the bike 2 to 4 degrees on straights: from one side, then the other, with gusts."""
     conditions = road(plan)
     push = plan.side() * plan.uniform(0.35, 0.7)
     half = plan.seconds / 2.0
@@ -65,18 +65,20 @@ def crosswind(plan: Plan, road: Profile) -> Conditions:
 
 
 def weight(plan: Plan, road: Profile) -> Conditions:
-    """A rider who hangs off in turns (up to 5 cm, 5 degrees) and a passenger who sits 1 to 2 cm beside the middle."""
+    """A rider who hangs off in turns (up to 5 cm: 5 degrees), and luggage 1 to 2 cm beside the middle."""
     conditions = road(plan)
     beside = plan.side() * plan.uniform(0.01, 0.02)
     for leg in plan.legs:
         turning = leg.lean_deg is not None and abs(leg.lean_deg) > 12.0
-        leg.hang_m = beside + (plan.uniform(0.02, 0.05) * (1.0 if (leg.lean_deg or 0.0) > 0 else -1.0) if turning else 0.0)
+        leg.hang_m = beside + (
+            plan.uniform(0.02, 0.05) * (1.0 if (leg.lean_deg or 0.0) > 0 else -1.0) if turning else 0.0
+        )
     conditions.sway_m = 0.004
     return conditions
 
 
 def vibration(plan: Plan, road: Profile) -> Conditions:
-    """A single of half a g, ridden at 6000/min: its second order is at 200 Hz and aliases to nearly nothing."""
+    """Half a g at 6000/min, where the second order is at 200 Hz and aliases to nearly standing still."""
     conditions = road(plan)
     conditions.engine_rms_g = 0.5
     conditions.shift_rpm = 6600.0
@@ -92,7 +94,7 @@ def creep(plan: Plan, road: Profile) -> Conditions:
 
 
 def temperature(plan: Plan, road: Profile) -> Conditions:
-    """From a cold garage into the sun: 25 C of warming, on a part that drifts three times as much as usual."""
+    """From a cold garage into the sun: 25 C of warming, of a part that drifts three times as usual."""
     conditions = road(plan)
     conditions.start_c, conditions.rise_c, conditions.drift = 8.0, 25.0, 3.0
     return conditions
