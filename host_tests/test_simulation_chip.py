@@ -54,6 +54,14 @@ def test_readings_stop_at_the_range_and_come_in_counts():
         assert np.allclose(columns * lsb, np.round(columns * lsb), atol=1e-6)
 
 
+def test_the_range_ends_before_the_filter():
+    """Shaken past 8 g on one side only: the mean that is read is not the true one."""
+    shaken = np.zeros((N, 3))
+    shaken[:, 0] = 7.0 + np.where(np.arange(N) % 4 < 2, 4.0, -4.0)
+    mean = read(perfect(), shaken, np.zeros((N, 3)))[100:, 0].mean()
+    assert mean == pytest.approx((8.0 + 3.0) / 2.0, abs=0.05)
+
+
 def test_noise_is_the_sheets():
     still = read(perfect(), np.zeros((N, 3)), np.zeros((N, 3)))
     # behind a 44 Hz low-pass of this shape (equivalent bandwidth about 50 Hz)

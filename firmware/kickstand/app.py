@@ -1,8 +1,10 @@
 """The device: wires sensor, mathematics, button, store and display, and owns the loop.
 
-sensor -> calibration -> alignment -> lean -> page -> display: once a sample, in one direction.
+sensor -> calibration and alignment -> lean -> page -> display, in one direction. The chip samples at SAMPLE_HZ by itself; a turn
+of the loop takes what has come in.
 """
 
+from array import array
 from time import sleep_us, ticks_add, ticks_diff, ticks_ms, ticks_us
 
 from machine import Pin
@@ -87,6 +89,9 @@ class App:
         self.meter = LeanMeter(Calibration())
         self._clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self._restarts = 0
+        self._sums = [0] * 7
+        self._dt_us = 0
+        self._reading = array("f", [0.0] * 7)
         self._page = 0
         self._pages = (pages.lean, pages.maxima, pages.acceleration, pages.formula, pages.raw)
         self._wizard = None
@@ -116,10 +121,14 @@ class App:
         """One turn of the loop: the samples that wait, one event, at most one transfer to the display."""
         now_us, now_ms = ticks_us(), ticks_ms()
         waiting = self.sensor.fetch(now_ms)
+        good = 0
         for k in range(waiting):
             if not self.sensor.take(k, now_ms):
                 break
-            self._measure(now_us, now_ms)
+            self._take(good == 0, now_us, now_ms)
+            good += 1
+        if good:
+            self._measure(good)
         if self.sensor.fault is not None:
             self._clock.restart()
             self._wizard = None
@@ -135,15 +144,26 @@ class App:
             self.lcd.show(line1, line2)
         self.lcd.tick(now_ms)
 
-    def _measure(self, now_us, now_ms):
-        """Take the sample in chip.counts on its way."""
+    def _take(self, first, now_us, now_ms):
+        """One sample: to the wizard, and into the sums of this turn. Integers only, no heap."""
         if self._restarts != self.sensor.restarts:
             self._restarts = self.sensor.restarts
             self._sensor_started()
-        counts = self.sensor.chip.counts
-        self.meter.update(counts, self._clock.step(now_us))
+        counts, sums = self.sensor.chip.counts, self._sums
+        for i in range(7):
+            sums[i] = counts[i] if first else sums[i] + counts[i]
+        dt_us = self._clock.step(now_us)
+        self._dt_us = dt_us if first else self._dt_us + dt_us
         if self._wizard:
             self._wizard.sample(counts, now_ms)
+
+    def _measure(self, n):
+        """The mean of this turn's n samples through calibration, alignment and filter: floats cost too much to do
+        it for each."""
+        reading, sums = self._reading, self._sums
+        for i in range(7):
+            reading[i] = sums[i] / n
+        self.meter.update(reading, self._dt_us)
 
     def _sensor_started(self):
         """The chip runs, for the first time or again after a fault, perhaps another one."""
@@ -156,8 +176,7 @@ class App:
     def _use(self, calibration):
         chip = self.sensor.chip
         calibration.set_scale(chip.accel_lsb_per_g, chip.gyro_lsb_per_dps)
-        self.meter.calibration = calibration
-        self.meter.restart()
+        self.meter.use(calibration)
         self.meter.reset_maxima()
 
     def _save(self, calibration):

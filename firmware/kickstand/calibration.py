@@ -46,6 +46,10 @@ class Calibration:
         """Calibrated copy of a mean accelerometer reading in g."""
         return array("f", [self.accel_slope[i] * accel[i] + self.accel_offset[i] for i in range(3)])
 
+    def scales(self):
+        """g per count of each accelerometer axis (3), and deg/s per count of the gyro."""
+        return self._scale, self._gyro_scale
+
     def apply(self, reading, force, rate):
         """reading (7, chip's order: accelerometer, temperature, gyro) -> force (3, g) and rate (3, deg/s)."""
         scale, offset, bias, gyro_scale = self._scale, self.accel_offset, self.gyro_bias, self._gyro_scale

@@ -1,9 +1,8 @@
 """A covariance matrix and its two operations, in pieces short enough for a sample's time.
 
-Plain float32 loops on preallocated rows. Generators yield where the work may be interrupted.
+Lists of floats, not arrays: on a board reading an array's element takes heap, reading a list's does not. Generators
+yield where the work may be interrupted.
 """
-
-from array import array
 
 GATE = (
     25.0  # innovations beyond five sigma are believed less, not thrown away: the model may be what is wrong
@@ -11,46 +10,55 @@ GATE = (
 
 
 class Covariance:
-    """Covariance of n states. variances: n initial values. Errors of a linearised state x with correction
-    dx."""
+    """Covariance of n states, and the correction of the states by what is measured. variances: n initial values."""
 
     def __init__(self, variances):
         self.n = len(variances)
-        self.rows = [array("f", [0.0] * self.n) for _ in variances]
+        self.rows = [[0.0] * self.n for _ in variances]
         for i, variance in enumerate(variances):
             self.rows[i][i] = variance
-        self.correction = array("f", [0.0] * self.n)
-        self._column = array("f", [0.0] * self.n)
+        self.correction = [0.0] * self.n
+        self._column = [0.0] * self.n
 
-    def carry(self, i, j, a):
-        """State i grows by a times the error of state j: P = (I + a e_i e_j^T) P (I + a e_i e_j^T)^T."""
+    def carry(self, i, terms, growth):
+        """Let state i change by the sum of a times state j for ((j, a), ...), j other than i, and its variance grow.
+
+        P = F P F^T with F = I + sum of a e_i e_j^T.
+        """
         rows = self.rows
-        to, source = rows[i], rows[j]
+        row = rows[i]
+        for j, a in terms:
+            source = rows[j]
+            for k in range(self.n):
+                row[k] += a * source[k]
+        variance = row[i] + growth
+        for j, a in terms:
+            variance += a * row[j]
+        row[i] = variance
         for k in range(self.n):
-            to[k] += a * source[k]
-        for row in rows:
-            row[i] += a * row[j]
+            rows[k][i] = row[k]  # P is symmetric
 
     def measure(self, terms, innovation, variance):
         """Correct by one scalar measurement h x with h given as terms ((state, coefficient), ...).
 
-        innovation: measured minus expected with the correction so far left out.  Yields between pieces.
+        innovation: measured minus expected, the correction so far left out.  Yields between pieces.
         """
         rows, column, correction = self.rows, self._column, self.correction
         n = self.n
+        j, h = terms[0]
         for i in range(n):
-            row = rows[i]
-            total = 0.0
-            for j, h in terms:
-                total += h * row[j]
-            column[i] = total
+            column[i] = h * rows[j][i]
+        for j, h in terms[1:]:
+            row = rows[j]
+            for i in range(n):
+                column[i] += h * row[i]
+        yield
         expected = variance
         for j, h in terms:
             expected += h * column[j]
             innovation -= h * correction[j]
-        square = innovation * innovation
-        if square > GATE * expected:
-            expected = square / GATE
+        if innovation * innovation > GATE * expected:
+            expected = innovation * innovation / GATE
         innovation /= expected
         for i in range(n):
             correction[i] += column[i] * innovation
@@ -59,10 +67,8 @@ class Covariance:
             gain = column[i] / expected
             row = rows[i]
             for j in range(i + 1):
-                value = row[j] - gain * column[j]
-                row[j] = value
-                rows[j][i] = value
-            if i == n // 2:
+                rows[j][i] = row[j] = row[j] - gain * column[j]
+            if i == 4:  # half of the products
                 yield
         yield
 

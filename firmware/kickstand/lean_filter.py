@@ -56,13 +56,14 @@ SIGMA_REST_RATE = radians(0.05)
 SIGMA_REST_FORCE = 0.02
 SIGMA_REST_SPEED = 0.02 / _G
 
-GROWTH = (GROW_ANGLE, GROW_ANGLE, GROW_SPEED, GROW_BIAS, GROW_BIAS, GROW_BIAS, 0.0)
-PIECES = 24  # of the work on a window: so many samples, or several pieces a sample
+PIECES = 21  # of the work on a window, spread over the samples of the next one
 
 TRIM_SPEED = 4.0 / _G
 TRIM_SIGMA_SPEED = 8.0 / _G
 
-DELAY_S = 0.005  # of the chip's low-pass at 44 Hz: lean is shown as it is by now
+DELAY_S = (
+    0.0075  # of the chip's low-pass at 44 Hz and of the mean of two samples: lean is shown as it is by now
+)
 
 
 class LeanFilter:
@@ -83,6 +84,7 @@ class LeanFilter:
         self._sums = [0.0] * 8
         self._count = 0
         self._window_us = 0
+        self._axis = 0  # of the gyro, whose bias is measured next at rest
         self._roll_rate = 0.0
         self._last_roll_rate = 0.0
 
@@ -112,12 +114,12 @@ class LeanFilter:
         return self._rest.resting
 
     def update(self, force, rate, dt_us):
-        """One sample: force (3, g), rate (3, deg/s), dt_us since the one before. Returns lean in degrees."""
+        """One sample: force (3, g), rate (3, rad/s), dt_us since the one before. Returns lean in degrees."""
         fx, fy, fz = force[0], force[1], force[2]
         x = self._x
-        wx = radians(rate[0]) - x[BX]
-        wy = radians(rate[1]) - x[BY]
-        wz = radians(rate[2]) - x[BZ]
+        wx = rate[0] - x[BX]
+        wy = rate[1] - x[BY]
+        wz = rate[2] - x[BZ]
         t, v = x[T], x[V]
         st, ct = sin(t), cos(t)
         sq = sin(x[Q])
@@ -144,17 +146,14 @@ class LeanFilter:
                 if next(self._work, True):
                     self._work = None
                     break
-        if self._window_us >= WINDOW_US:
+        elif self._window_us >= WINDOW_US:
             self._end_window()
         if self._p is None:
             return degrees(atan2(sums[5], sums[6]))
         return degrees(x[T] + DELAY_S * wz - self.trim.angle)
 
     def _end_window(self):
-        """Finish the work on the window before, and begin with this one's means."""
-        if self._work is not None:
-            for _ in self._work:
-                pass
+        """The work on the window before is done: begin with this one's means."""
         n = self._count
         means = [total / n for total in self._sums]
         seconds = self._window_us * 1e-6
@@ -162,7 +161,7 @@ class LeanFilter:
             self._sums[i] = 0.0
         self._count = 0
         self._window_us = 0
-        self._pieces = 1 + PIECES // n
+        self._pieces = max(1, PIECES // n)
         if self._p is None:
             self._start(means)
             return
@@ -194,24 +193,19 @@ class LeanFilter:
         yaw_rate = wx * st + wy * ct
         speed = x[V]
         acceleration = fz - sq + speed * wy * x[Y]
-        for i, j, slope in (
-            (T, Q, -yaw_rate / (cq * cq)),
-            (T, BZ, -1.0),
-            (T, BX, sq / cq * st),
-            (T, BY, sq / cq * ct),
-            (Q, T, yaw_rate),
-            (Q, BX, ct),
-            (Q, BY, -st),
-            (V, Q, -cq),
-            (V, Y, speed * wy),
-            (V, V, wy * x[Y]),
-        ):
-            p.carry(i, j, slope * seconds)
-            yield
-        for i, growth in enumerate(GROWTH):
-            p.rows[i][i] += growth * growth * seconds
+        yield
+        grow_angle = GROW_ANGLE * GROW_ANGLE * seconds
+        p.carry(T, ((Q, -yaw_rate / (cq * cq) * seconds), (BZ, -seconds)), grow_angle)
+        yield
+        p.carry(Q, ((T, yaw_rate * seconds), (BX, ct * seconds), (BY, -st * seconds)), grow_angle)
+        yield
+        p.carry(V, ((Q, -cq * seconds), (Y, speed * wy * seconds)), GROW_SPEED * GROW_SPEED * seconds)
+        yield
+        for i in (BX, BY, BZ):
+            p.rows[i][i] += GROW_BIAS * GROW_BIAS * seconds
         left_terms = ((T, cq * ct), (Q, -sq * st - cq * x[Y]), (V, wy), (BY, -speed), (Y, acceleration))
         up_terms = ((T, -cq * st), (Q, -sq * ct), (V, -wx), (BX, speed))
+        yield
         if self._rest.resting:
             yield from self._measure_rest(left_terms, left + speed * wy, wx, wy, means[4], fz - sq, cq)
         else:
@@ -227,11 +221,11 @@ class LeanFilter:
         self._correct(left_terms, up_terms)
 
     def _measure_rest(self, left_terms, left, wx, wy, wz, forward, cq):
-        """Standing still: no speed, the rates are bias, the force is the vertical."""
+        """Standing still: no speed, the rates are bias, the force is the vertical. One axis of the gyro each time."""
         p, x = self._p, self._x
         yield from p.measure(((V, 1.0),), -x[V], SIGMA_REST_SPEED**2)
-        for i, rate in ((BX, wx), (BY, wy), (BZ, wz)):
-            yield from p.measure(((i, 1.0),), rate, SIGMA_REST_RATE**2)
+        self._axis = (self._axis + 1) % 3
+        yield from p.measure(((BX + self._axis, 1.0),), (wx, wy, wz)[self._axis], SIGMA_REST_RATE**2)
         yield from p.measure(left_terms[0:2], left, SIGMA_REST_FORCE**2)
         yield from p.measure(((Q, cq),), forward, SIGMA_REST_FORCE**2)
 

@@ -1,6 +1,7 @@
 """What each page says in two lines of 16 characters. Pure formatting: meter in, text out."""
 
 from .lean import static_lean_deg
+from .rotation import vector
 
 DEGREE = "\xdf"  # in the display's ROM, as are the arrow and the full block
 ARROW = "\x7e"
@@ -75,7 +76,8 @@ def formula(meter):
 
 def raw(meter):
     """Calibrated readings in the sensor's own axes."""
-    force, rate = meter.sensor_force, meter.sensor_rate
+    force, rate = vector(), vector()
+    meter.calibration.apply(meter.reading, force, rate)
     return (
         "%5.2f%5.2f%5.2fg" % (force[0], force[1], force[2]),
         "%4d%4d%4d %s/s" % (int(rate[0]), int(rate[1]), int(rate[2]), DEGREE),

@@ -9,6 +9,7 @@ the doubles of COLUMNS for each. Binary, because a number printed and read again
 
 import struct
 import sys
+from math import degrees
 
 from kickstand.calibration import Calibration
 from kickstand.lean import static_lean_deg
@@ -52,8 +53,8 @@ def run(source, sink):
                 force[1],
                 force[2],
                 static_lean_deg(force),
-                rate[1],
-                rate[2],
+                degrees(rate[1]),
+                degrees(rate[2]),
             )
         )
 

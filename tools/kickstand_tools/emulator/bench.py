@@ -38,6 +38,7 @@ def bench(seconds: float = 10.0) -> dict[str, Any]:
         "turn_us": _spread(plain["took"]),
         "stage_us": {name: _spread(us) for name, us in _stages(detail).items()},
         "cpu_share": 1.0 - figures["slept_us"] / figures["elapsed_us"],
+        "turns": turns,
         "samples_taken": plain["taken"],
         "samples_lost": plain["lost"],
         "heap_bytes_per_sample": round(figures["heap_bytes"] / max(1, plain["heap_samples"])),
@@ -53,7 +54,7 @@ def bench(seconds: float = 10.0) -> dict[str, Any]:
 
 def tables(result: dict[str, Any]) -> Group:
     """The result of bench() for a terminal."""
-    times = Table(title=f"Each sample at {result['sample_hz']} Hz, and each turn of the loop: emulated us")
+    times = Table(title=f"A turn of the loop at {result['sample_hz']} samples a second: emulated us")
     times.add_column("stage")
     for name in ("median", "p99", "max"):
         times.add_column(name, justify="right")
@@ -111,18 +112,23 @@ def _run(turns: int, detail: bool) -> dict[str, Any]:
 
 
 def _stages(run: dict[str, Any]) -> dict[str, np.ndarray]:
-    """us of each stage: of a sample in each turn that had some, of the display in each turn that drew something."""
+    """us of each stage in each turn that had it."""
     columns = dict(zip(run["figures"]["stages"], run["stages"].T, strict=True))
-    sampled = columns["samples"] > 0
-    a_sample = {
-        name: columns[name][sampled] / columns["samples"][sampled]
-        for name in ("read", "decode", "calibrate", "rotate", "formula", "filter")
+    sampled = columns["decode"] > 0
+    sensor = columns["fetch"] + columns["take"]
+    stages = {
+        "read": columns["read"],
+        "decode": columns["decode"],
+        "check": sensor - columns["read"] - columns["decode"],
+        "calibrate and rotate": columns["calibrate and rotate"],
+        "filter": columns["filter"],
+        "rest of the meter": columns["meter"] - columns["calibrate and rotate"] - columns["filter"],
+        "sample path": sensor + columns["meter"],
     }
-    return a_sample | {
-        "sample path": np.sum(list(a_sample.values()), axis=0),
-        "page": columns["page"][columns["page"] > 0],
-        "display": columns["display"],
-    }
+    stages = {name: us[sampled] for name, us in stages.items()}
+    stages["page"] = columns["page"][columns["page"] > 0]
+    stages["display"] = columns["display"]
+    return stages
 
 
 def _spread(us: np.ndarray) -> dict[str, float]:

@@ -8,26 +8,25 @@ from array import array
 from time import ticks_diff, ticks_us
 
 from kickstand import app as app_module
-from kickstand import calibration, hd44780, lean_filter, meter, mpu6050
 from kickstand.settings import Settings
 from machine import mem16
 from uctypes import addressof, bytearray_at
 
-# Name, and where the function is that is timed under it
+# Name, and which function is timed under it: module, class ("" for none), function.
 STAGES = (
-    ("calibrate", calibration.Calibration, "apply"),  # once a sample: it is counted by this one
-    ("decode", mpu6050.Mpu6050, "take"),
-    ("rotate", meter, "rotate"),
-    ("formula", meter, "formula_lean_deg"),
-    ("filter", lean_filter.LeanFilter, "update"),
-    ("page", app_module.App, "_lines"),
-    ("display", hd44780.Lcd, "tick"),
+    ("decode", "mpu6050", "Mpu6050", "take"),
+    ("calibrate and rotate", "transform", "Transform", "apply"),
+    ("filter", "lean_filter", "LeanFilter", "update"),
+    ("meter", "meter", "LeanMeter", "update"),
+    ("fetch", "sensor", "Sensor", "fetch"),
+    ("take", "sensor", "Sensor", "take"),
+    ("page", "app", "App", "_lines"),
+    ("display", "hd44780", "Lcd", "tick"),
 )
-BUS = len(STAGES)  # two more columns: us of the sensor's transfers, and how many samples there were
-SAMPLES = BUS + 1
-COLUMNS = BUS + 2
+BUS = len(STAGES)  # one more column: the sensor's transfers
+COLUMNS = BUS + 1
 SETTLE_TURNS = 150  # before anything is recorded
-HEAP_TURNS = 5  # with the collector off
+HEAP_TURNS = 2  # with the collector off
 MAX_PAUSES = 2000
 
 
@@ -166,14 +165,14 @@ def _time_stages(spent):
             start = ticks_us()
             result = function(*arguments)
             spent[i] += ticks_diff(ticks_us(), start)
-            if i == 0:
-                spent[SAMPLES] += 1
             return result
 
         return run
 
     for i in range(BUS):
-        _, owner, name = STAGES[i]
+        _, module, of, name = STAGES[i]
+        owner = __import__("kickstand." + module, None, None, (module,))
+        owner = getattr(owner, of) if of else owner
         setattr(owner, name, timed(getattr(owner, name), i))
 
 
@@ -212,7 +211,7 @@ def run(detail, turns, out):
         "heap_bytes": app.heap_bytes,
         "collections_by_app": app.n_pauses,
         "collections_automatic": app.automatic,
-        "stages": [stage[0] for stage in STAGES] + ["read", "samples"],
+        "stages": [stage[0] for stage in STAGES] + ["read"],
     }
     for data in (app.took, app.pauses, app.stages):
         if data:

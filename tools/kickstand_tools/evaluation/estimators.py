@@ -74,7 +74,6 @@ OTHERS: dict[str, Callable[[Samples], NDArray[np.float64]]] = {
     "madgwick": madgwick,
     "vqf": vqf,
 }
-NAMES = ("kickstand", "formula", "formula 0.3 s", *OTHERS)
 
 
 def missing() -> list[str]:

@@ -76,8 +76,11 @@ def calibrated_by_poses(made: Ride) -> CalibrationFile:
     """`kickstand calibrate six` and `two` over the ride's poses. Raises InputError."""
     with tempfile.TemporaryDirectory() as directory:
         seven, kickstand, upright = write_poses(Path(directory), made)
-        six = calibrate.six(seven, _unheard)
-        return calibrate.two(kickstand, upright, six, "left", _unheard)
+        try:
+            six = calibrate.six(seven, _unheard)
+            return calibrate.two(kickstand, upright, six, "left", _unheard)
+        except InputError as error:
+            raise InputError(str(error).replace(f"{directory}{os.sep}", "")) from error
 
 
 def as_log(made: Ride) -> Log:

@@ -38,11 +38,6 @@ def chassis_lean(
     return balance + flank - np.arctan2(hang, arm)
 
 
-def steady_balance(yaw_rate: float, speed_mps: float, bike: Bike) -> float:
-    """Balance lean (rad) in a steady turn on a level road: gravity, centripetal force, the wheels' spin."""
-    return float(-np.arctan((1.0 + bike.wheel_inertia) * speed_mps * yaw_rate / GRAVITY_MPS2))
-
-
 def weave(chance: np.random.Generator, command: Commands, riding_deg: float) -> Signal:
     """A rider's unrest in balance, rad: riding_deg rms at speed, more at walking pace, a little with the feet
     down; in a turn the lean wanders with the line taken."""

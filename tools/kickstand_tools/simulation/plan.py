@@ -78,15 +78,14 @@ class Plan:
     def _lean_now(self) -> float:
         return next((leg.lean_deg for leg in reversed(self.legs) if leg.lean_deg is not None), 0.0)
 
-    def begin(self, engine_on: bool = True) -> None:
+    def begin(self) -> None:
         """On the kickstand, lifted, upright, engine on."""
         self.legs.append(
             Leg("kickstand", self.uniform(4.0, 12.0), 0.0, self.uniform(-13.0, -8.0), engine=0.0)
         )
         self.legs.append(Leg("lifting", 2.0, 0.0, 0.0, roll_s=2.0))
         self.legs.append(Leg("standing", self.uniform(3.0, 8.0), 0.0))
-        if engine_on:
-            self.legs.append(Leg("standing", self.uniform(3.0, 8.0), 0.0, engine=1.0))
+        self.legs.append(Leg("standing", self.uniform(3.0, 8.0), 0.0, engine=1.0))
         self._seconds = sum(leg.seconds for leg in self.legs)
 
     def to_speed(self, speed_mps: float, mps2: float, phase: str = "") -> None:

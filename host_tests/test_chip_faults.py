@@ -1,0 +1,132 @@
+"""Each fault of the board's script on the emulated Pico: shown while it lasts, no wrong lean, soon over."""
+
+import pytest
+from emulated import calibrated, firmware, leaning, pico, shown_lean, shows
+
+pytestmark = pytest.mark.chip
+
+LEAN_DEG = 20.0
+NEAR_DEG = 2.0
+SENSOR, LCD = 0x68, 0x27
+RECOVERY_S = 0.5
+LCD_RECOVERY_S = 11.0  # the display is initialised every 10 s
+NO_SENSOR = r"No sensor|Sensor lost|Sensor silent"
+START_AGAIN = r"Sensor (reset|frozen|silent|lost)"
+
+# Name: what happens at_s for for_s, how long, what the display says meanwhile (None: nothing special)
+FAULTS = {
+    "single NACK": (lambda f, at, s: f.nack(SENSOR), 0.0, None),
+    "no ACK": (lambda f, at, s: f.nack_for(SENSOR, at, s), 0.6, NO_SENSOR),
+    "time-outs": (lambda f, at, s: f.timeout_for(SENSOR, at, s), 0.6, NO_SENSOR),
+    "stuck SDA": (lambda f, at, s: f.stuck_sda(at), 0.0, None),
+    "unplugged": (lambda f, at, s: f.unplug_sensor(at, s), 0.6, NO_SENSOR),
+    "supply dip, asleep": (lambda f, at, s: f.supply_dip(at, "asleep"), 0.0, START_AGAIN),
+    "supply dip, frozen": (lambda f, at, s: f.supply_dip(at, "frozen"), 0.0, START_AGAIN),
+    "supply dip, other ranges": (lambda f, at, s: f.supply_dip(at, "default_ranges"), 0.0, START_AGAIN),
+    "frozen data": (lambda f, at, s: f.freeze(at, s), 0.6, START_AGAIN),
+    "all zero": (lambda f, at, s: f.all_zero(at, s), 0.6, START_AGAIN),
+    "all ones": (lambda f, at, s: f.all_ones(at, s), 0.6, START_AGAIN),
+    "a bit slipped": (lambda f, at, s: f.bit_slip(SENSOR), 0.0, None),
+    "LCD unplugged": (lambda f, at, s: f.unplug_lcd(at, s), 0.4, None),
+}
+
+
+@pytest.fixture(scope="module")
+def device():
+    """A calibrated board on a bike that leans to the right."""
+    emulated = pico(leaning(LEAN_DEG), firmware() | calibrated())
+    emulated.power_on()
+    yield emulated
+    emulated.power_off()
+
+
+def lean_is_right(device):
+    """The display shows a lean, and it is the bike's."""
+    shown = shown_lean(device.lcd())
+    return shown is not None and abs(shown - LEAN_DEG) <= NEAR_DEG
+
+
+def watch(device, seconds):
+    """Let time pass; every text of the display, and any wrong lean among them fails."""
+    texts = set()
+    for _ in range(round(seconds / 0.02)):
+        device.run(0.02)
+        texts.add("|".join(device.lcd()))
+        shown = shown_lean(device.lcd())
+        assert shown is None or abs(shown - LEAN_DEG) <= NEAR_DEG, device.lcd()
+    return texts
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_fault(device, name):
+    """The sensor's: 0.5 s after its end the right lean is back, and no other was shown."""
+    device.run_until(lambda: lean_is_right(device), 3.0)
+    inject, for_s, said = FAULTS[name]
+    inject(device.board.faults, device.time_s + 0.01, for_s)
+    texts = watch(device, 0.01 + for_s + RECOVERY_S)
+    assert lean_is_right(device), device.lcd()
+    if said:
+        import re
+
+        assert any(re.search(said, text) for text in texts), texts
+
+
+def test_lcd_out_of_step_is_readable_again(device):
+    """A spike on E: garbled at most until the next initialisation."""
+    device.run_until(lambda: lean_is_right(device), 3.0)
+    device.board.faults.lcd_slip(device.time_s + 0.01)
+    device.run(0.5)
+    assert not lean_is_right(device)
+    device.run_until(lambda: lean_is_right(device), LCD_RECOVERY_S, 0.05)
+
+
+def test_a_stalled_processor_loses_samples_and_no_more(device):
+    """Two seconds without a turn of the loop overflow any FIFO: its frames are in step again."""
+    device.run_until(lambda: lean_is_right(device), 3.0)
+    device.stall(2.0)
+    watch(device, RECOVERY_S)
+    assert lean_is_right(device)
+
+
+def test_a_hung_program_is_restarted_by_the_watchdog(device):
+    """Within 8.4 s; and then the lean is there again."""
+    device.run_until(lambda: lean_is_right(device), 3.0)
+    before = device.chip.resets
+    device.exec("from time import sleep\nfrom kickstand import port")
+    device.console.send(b"port.start_watchdog()\nwhile True: sleep(10)\x04")
+    device.run_until(lambda: device.chip.resets > before, 8.5, 0.01)
+    device.run_until(lambda: lean_is_right(device), 2.0)
+
+
+def test_a_reset_in_mid_read_frees_the_bus(device):
+    """The sensor holds SDA; the restarted firmware clocks it free."""
+    from emulated import reset_in_a_read
+
+    device.run_until(lambda: lean_is_right(device), 3.0)
+    before = device.chip.resets
+    reset_in_a_read(device, device.time_s + 0.01)
+    device.run(0.05)
+    assert device.chip.resets == before + 1
+    assert device.board.sensor_bus.sda_level() == 0
+    device.run_until(lambda: lean_is_right(device), 2.0)
+
+
+@pytest.mark.parametrize("spoil", [b"", b"\xff" * 90, b"KSTD" + bytes(86)])
+def test_corrupt_files(spoil):
+    """Both spoilt: it runs, not calibrated. One spoilt: the other counts."""
+    good = calibrated()
+    names = sorted(good)
+    both = dict.fromkeys(("kickstand_a.cal", "kickstand_b.cal"), spoil)
+    device = pico(leaning(LEAN_DEG), firmware() | both)
+    device.power_on()
+    shows(device, r"Raw", 2.0)
+    device.power_off()
+    device.file_system = _image(firmware() | both | {names[0]: good[names[0]]})
+    device.power_on()
+    device.run_until(lambda: lean_is_right(device), 2.0)
+
+
+def _image(files):
+    from kickstand_tools.emulator import flash_image
+
+    return flash_image.build(files)
