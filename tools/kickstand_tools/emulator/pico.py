@@ -49,7 +49,7 @@ class Pico:
         self._awaited = b""
         self._raw = False  # its console is at the raw prompt
         self.chip.on_reset = self._reset
-        self.file_system = flash_image.build(files or {})
+        self.put_files(files or {})
 
     def __enter__(self) -> "Pico":
         self.power_on()
@@ -128,6 +128,10 @@ class Pico:
     @file_system.setter
     def file_system(self, system: bytes) -> None:
         self.chip.rp2040.flash[flash_image.START : flash_image.START + flash_image.SIZE] = system
+
+    def put_files(self, files: dict[str, bytes]) -> None:
+        """Make these the only files in flash."""
+        self.file_system = flash_image.build(files)
 
     def files(self) -> dict[str, bytes]:
         """Every file in flash, by path."""
