@@ -1,6 +1,7 @@
 """Runs a device plan on either engine, in a directory that stands for the board's flash."""
 
 import json
+import math
 import os
 import re
 import subprocess
@@ -31,11 +32,11 @@ class Record:
         return shown
 
     def first(self, pattern, after=0.0):
-        """When a line first matched after a time; None if never."""
+        """When a line first matched after a time; infinity if never."""
         for start, line1, line2 in self.frames:
             if start >= after and (re.search(pattern, line1) or re.search(pattern, line2)):
                 return start
-        return None
+        return math.inf
 
     def lean_at(self, t_s):
         """The lean on the display in degrees, > 0 to the right; None if none is shown."""

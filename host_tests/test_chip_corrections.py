@@ -1,4 +1,4 @@
-"""What is put right in the emulated Pico: bus and flash take their time, errors are the chip's, the console is quiet."""
+"""What is put right in the emulated Pico: bus and flash take time, errors are the chip's, the console is quiet."""
 
 import pytest
 from emulated import pico, reset_in_a_read
@@ -82,7 +82,9 @@ def test_flash_takes_its_time(board):
 
 def test_the_console_leaves_the_processor_alone(board):
     """3.1 us for a turn of an empty loop, and the same again: with empty packets it takes three times as long."""
-    code = "def f():\n    t = ticks_us()\n    for i in range(1000): pass\n    return ticks_diff(ticks_us(), t)\nprint(f())"
+    code = (
+        "def f():\n    t = ticks_us()\n    for i in range(1000): pass\n    return ticks_diff(ticks_us(), t)\nprint(f())"
+    )
     first, second = int(board.exec(code)), int(board.exec(code))
     assert first < 3500
     assert abs(first - second) < 10

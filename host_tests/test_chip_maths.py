@@ -49,9 +49,7 @@ def test_the_same_log_gives_the_same_lean():
     world = PART.world(Ride([accelerate(15.0, 1.0), turn(-30.0, 1.0, 0.5)]).motion)
     offsets = [-o / s for o, s in zip(PART.accel_offset_g, PART.accel_scale, strict=True)]
     slopes = [1.0 / s for s in PART.accel_scale]
-    records = struct.pack(
-        replay_engine.CALIBRATION, *offsets, *slopes, *PART.gyro_bias_dps, *PART.vehicle_from_sensor
-    )
+    records = struct.pack(replay_engine.CALIBRATION, *offsets, *slopes, *PART.gyro_bias_dps, *PART.vehicle_from_sensor)
     for i in range(300):
         fx, fy, fz, wx, wy, wz, temperature = world(i / 100)
         records += struct.pack(replay_engine.RECORD, i * 10_000, fx, fy, fz, temperature, wx, wy, wz)

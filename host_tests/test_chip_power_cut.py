@@ -1,5 +1,7 @@
 """The supply cut at every flash operation of saves, on the emulated Pico's own file system."""
 
+from itertools import pairwise
+
 import pytest
 from emulated import calibrated, modules, pico
 
@@ -54,7 +56,7 @@ def test_old_or_new_wherever_a_save_is_cut(board):
         board.chip.flash.before_operation = None
         states.append(board.file_system)
         operations += len(states) - 1
-        halves = [torn(*pair, share) for pair in zip(states, states[1:]) for share in (0.05, 0.5, 0.95)]
+        halves = [torn(*pair, share) for pair in pairwise(states) for share in (0.05, 0.5, 0.95)]
         found = []
         for state in states + halves:
             board.file_system = state

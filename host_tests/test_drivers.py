@@ -123,7 +123,7 @@ def display():
 
 
 def test_only_changed_lines_are_sent_one_transfer_each(board):
-    from time import sleep_ms, ticks_ms
+    from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
 
     def run():
         lcd = display()
@@ -143,7 +143,7 @@ def test_only_changed_lines_are_sent_one_transfer_each(board):
 
 
 def test_a_display_out_of_step_is_put_right_by_the_next_initialisation(board):
-    from time import sleep_ms, ticks_ms
+    from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
 
     def run():
         lcd = display()
@@ -166,10 +166,10 @@ def test_a_display_out_of_step_is_put_right_by_the_next_initialisation(board):
     ("held_s", "events"), [(0.005, []), (0.1, ["short"]), (0.7, ["short"]), (1.0, ["long"]), (5.0, ["long"])]
 )
 def test_presses(board, held_s, events):
-    from time import sleep_ms, ticks_ms
+    from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
 
     from kickstand.button import LONG, SHORT, Button
-    from machine import Pin
+    from machine import Pin  # pyright: ignore[reportMissingImports]
 
     def run():
         button = Button(Pin(15, Pin.IN, Pin.PULL_UP))
@@ -201,7 +201,7 @@ def test_ctrl_c_puts_the_watchdog_to_rest(board, monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(app.App, "step", interrupted)
 
     def use_the_console():
-        from time import sleep_ms
+        from time import sleep_ms  # pyright: ignore[reportAttributeAccessIssue]
 
         main.main()
         sleep_ms(20_000)

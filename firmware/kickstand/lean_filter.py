@@ -43,12 +43,16 @@ GROW_SPEED = 0.5 / _G
 GROW_BIAS = radians(0.01)  # warming up: 0.6 deg/s in five minutes
 
 # Measurements, as independent every WINDOW_US: what is wrong with them lasts longer, so they count for less
-SIGMA_LEFT = 0.08
+SIGMA_LEFT = 0.03
 SIGMA_UP = 0.4
+SHAKEN_SHARE = 0.3  # of the variance within a window, for that of its mean: shaking is not all quick
 ROLL_HEIGHT_M = 0.5  # h: of the sensor above the axis the bike rolls about; by how much it may be wrong:
 SIGMA_ROLL_HEIGHT_M = 0.4
-SIGMA_SLOPE = radians(3.0)
-SLOPE_S = 15.0  # how long a slope lasts
+SIGMA_SLOPE = radians(2.0)
+SLOPE_S = 3.0  # how long a slope lasts: fitted, real ones last longer
+STRAIGHT_LEAN, STRAIGHT_RATE = radians(4.0), radians(2.5)  # below both, the road is taken for straight:
+SIGMA_STRAIGHT = radians(1.5)  # a balanced bike that does not turn is upright
+STRAIGHT_S = 3.0
 USUAL_SPEED = 15.0 / _G
 SIGMA_SPEED = 20.0 / _G
 SPEED_S = 60.0
@@ -81,7 +85,7 @@ class LeanFilter:
         self._rest = RestDetector()
         self._work = None
         self._pieces = 1
-        self._sums = [0.0] * 8
+        self._sums = [0.0] * 9
         self._count = 0
         self._window_us = 0
         self._axis = 0  # of the gyro, whose bias is measured next at rest
@@ -130,7 +134,9 @@ class LeanFilter:
         x[Q] += (wy * st - wx * ct) * dt
         x[V] = max(0.0, v + acceleration * dt)
         sums = self._sums
-        sums[0] += fx - cq * st - v * wy - acceleration * x[Y]
+        left = fx - cq * st - v * wy - acceleration * x[Y]
+        sums[0] += left
+        sums[8] += left * left
         sums[1] += fy - cq * ct + v * wx
         sums[2] += wx
         sums[3] += wy
@@ -157,11 +163,11 @@ class LeanFilter:
         n = self._count
         means = [total / n for total in self._sums]
         seconds = self._window_us * 1e-6
-        for i in range(8):
+        for i in range(9):
             self._sums[i] = 0.0
+        self._pieces = max(1, PIECES * self._window_us // (n * WINDOW_US))
         self._count = 0
         self._window_us = 0
-        self._pieces = max(1, PIECES // n)
         if self._p is None:
             self._start(means)
             return
@@ -171,7 +177,7 @@ class LeanFilter:
         self._work = self._process(means, seconds, roll_acceleration)
 
     def _start(self, means):
-        _, _, wx, wy, wz, fx, fy, fz = means
+        _, _, wx, wy, wz, fx, fy, fz, _ = means
         turning = max(abs(wx), abs(wy), abs(wz)) > START_STILL_RADPS
         moving = turning or abs(sqrt(fx * fx + fy * fy + fz * fz) - 1.0) > START_STILL_G
         lean = START_LEAN_MOVING if moving else START_LEAN
@@ -186,7 +192,7 @@ class LeanFilter:
     def _process(self, means, seconds, roll_acceleration):
         """Covariance and corrections for one window; a generator of short pieces."""
         p, x = self._p, self._x
-        left, up, wx, wy, _, fx, fy, fz = means
+        left, up, wx, wy, wz, fx, fy, fz, square = means
         st, ct = sin(x[T]), cos(x[T])
         sq = sin(x[Q])
         cq = sqrt(1.0 - sq * sq)
@@ -207,25 +213,31 @@ class LeanFilter:
         up_terms = ((T, -cq * st), (Q, -sq * ct), (V, -wx), (BX, speed))
         yield
         if self._rest.resting:
-            yield from self._measure_rest(left_terms, left + speed * wy, wx, wy, means[4], fz - sq, cq)
+            yield from self._measure_rest(left_terms, left + speed * wy, (wx, wy, wz), fz - sq, cq)
         else:
             roll = roll_acceleration / _G
             uncertain = SIGMA_ROLL_HEIGHT_M * roll
-            yield from p.measure(left_terms, left + ROLL_HEIGHT_M * roll * ct, SIGMA_LEFT**2 + uncertain**2)
+            shaken = max(0.0, square - left * left)
+            left_variance = SIGMA_LEFT**2 + SHAKEN_SHARE * shaken + uncertain**2
+            yield from p.measure(left_terms, left + ROLL_HEIGHT_M * roll * ct, left_variance)
             yield from p.measure(up_terms, up, SIGMA_UP**2 + (uncertain * st) ** 2)
             terms = ((Q, 1.0), (T, x[Y] * ct), (Y, st))
             yield from p.measure(terms, -x[Q] - x[Y] * st, SIGMA_SLOPE**2 * 2 * SLOPE_S / seconds)
-            yield from p.measure(((V, 1.0),), USUAL_SPEED - x[V], SIGMA_SPEED**2 * 2 * SPEED_S / seconds)
+            upright = x[T] - self.trim.angle
+            if abs(upright) < STRAIGHT_LEAN and abs(yaw_rate) < STRAIGHT_RATE and speed > TRIM_SPEED:
+                yield from p.measure(((T, 1.0),), -upright, SIGMA_STRAIGHT**2 * 2 * STRAIGHT_S / seconds)
+            else:
+                yield from p.measure(((V, 1.0),), USUAL_SPEED - x[V], SIGMA_SPEED**2 * 2 * SPEED_S / seconds)
             if speed > TRIM_SPEED and p.rows[V][V] < TRIM_SIGMA_SPEED**2:
                 self.trim.update((fx - acceleration * x[Y]) / max(fy, 0.5), x[T], yaw_rate, seconds)
         self._correct(left_terms, up_terms)
 
-    def _measure_rest(self, left_terms, left, wx, wy, wz, forward, cq):
+    def _measure_rest(self, left_terms, left, rates, forward, cq):
         """Standing still: no speed, the rates are bias, the force is the vertical. One axis of the gyro each time."""
         p, x = self._p, self._x
         yield from p.measure(((V, 1.0),), -x[V], SIGMA_REST_SPEED**2)
         self._axis = (self._axis + 1) % 3
-        yield from p.measure(((BX + self._axis, 1.0),), (wx, wy, wz)[self._axis], SIGMA_REST_RATE**2)
+        yield from p.measure(((BX + self._axis, 1.0),), rates[self._axis], SIGMA_REST_RATE**2)
         yield from p.measure(left_terms[0:2], left, SIGMA_REST_FORCE**2)
         yield from p.measure(((Q, cq),), forward, SIGMA_REST_FORCE**2)
 

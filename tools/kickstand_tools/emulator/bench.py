@@ -27,7 +27,7 @@ _START_LIMIT_S = 10.0
 
 
 def bench(seconds: float = 10.0) -> dict[str, Any]:
-    """Run everything; figures in the units that their names end with. seconds: of emulated time, each of two runs."""
+    """Run everything; figures in the units that their names end with. seconds: emulated, of each of two runs."""
     turns = round(seconds * SAMPLE_HZ)
     plain = _run(turns, detail=False)
     detail = _run(turns, detail=True)
@@ -105,7 +105,11 @@ def _run(turns: int, detail: bool) -> dict[str, Any]:
         result["figures"] = ast.literal_eval(pico.exec(code, limit_s=10.0 * turns / SAMPLE_HZ + 30.0))
     result["took"] = arrays[0]
     figures = result["figures"]
-    result["pauses"] = arrays[1][: figures["collections_by_app"]] if figures["collections_by_app"] else np.array([figures["collect_us"]])
+    result["pauses"] = (
+        arrays[1][: figures["collections_by_app"]]
+        if figures["collections_by_app"]
+        else np.array([figures["collect_us"]])
+    )
     if detail:
         result["stages"] = arrays[2].reshape(turns, -1).astype(int)
     return result

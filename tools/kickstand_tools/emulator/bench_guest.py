@@ -1,6 +1,6 @@
 """Runs on the emulated Pico: the app's own loop with a stopwatch in it. bench.py is the host's end of it.
 
-run(detail, turns, out): the app for so many turns of its loop; with detail, how long each stage took in each turn.
+run(detail, turns, out): the app for so many turns of its loop; with detail, what each stage took in each.
 """
 
 import gc

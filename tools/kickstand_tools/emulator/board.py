@@ -28,7 +28,7 @@ class WiredButton(Button):
 
 
 class EmulatedBoard(Board):
-    """simulator.Board without its fake `machine`: parts, faults, button and time, for a chip that is emulated.
+    """simulator.Board without its fake `machine`: parts, faults, button, time, for an emulated chip.
 
     fitted: as for Board, but for port and pace.
     """
@@ -36,9 +36,9 @@ class EmulatedBoard(Board):
     def __init__(self, clock: EmulatedClock, world: Callable[[float], tuple], **fitted: Any) -> None:
         super().__init__(world, **fitted)
         self.clock: Any = clock
-        self.sensor.clock = self.lcd.clock = clock  # type: ignore[assignment]
-        for bus in self.buses:
-            bus.clock = clock
+        parts: list[Any] = [self.sensor, self.lcd, *self.buses]
+        for part in parts:
+            part.clock = clock
         self.button: Any = WiredButton(clock, self.seed)
 
     @property

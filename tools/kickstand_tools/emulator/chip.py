@@ -10,6 +10,7 @@ from rp2040py.irq import IRQ
 from rp2040py.memory_map import FLASH_START_ADDRESS
 from rp2040py.peripherals.psm import PSM_BITS_MASK, WDSEL, WDSEL_ROSC, WDSEL_XOSC
 from rp2040py.peripherals.vreg_and_chip_reset import HAD_POR
+from rp2040py.peripherals.watchdog import TIMER
 from rp2040py.rp2040 import RP2040
 from rp2040py.utils.logging import ConsoleLogger, LogLevel
 
@@ -24,7 +25,7 @@ _ACCESS = ("read_uint8", "read_uint16", "read_uint32", "write_uint8", "write_uin
 
 
 class Chip:
-    """rp2040: rp2040py's, its controllers replaced. Switch it on with power_on(), let time pass with run()."""
+    """rp2040: rp2040py's, its controllers replaced. power_on() switches it on, run() lets time pass."""
 
     def __init__(self, image: Path) -> None:
         self.rp2040 = RP2040()
@@ -85,6 +86,7 @@ class Chip:
     def reset(self) -> None:
         """As machine.reset() does it, and a watchdog that was not fed."""
         self.rp2040.psm.write_uint32(WDSEL, PSM_BITS_MASK & ~_OSCILLATORS)
+        self.rp2040.watchdog._reason |= TIMER
         self.resets += 1
         self._reset(from_watchdog=True)
         if self.on_reset:
@@ -102,8 +104,8 @@ class Chip:
     def _hurry(self) -> None:
         """What doubles the speed on the host and changes nothing else.
 
-        rp2040py's compiled core looks up each memory access by name, and makes a method object of what it finds
-        unless the instance has one; and asks both PIO blocks, which MicroPython leaves alone, after every
+        rp2040py's compiled core looks up each memory access by name, and makes a method object of what it
+        finds unless the instance has one; and asks both PIO blocks, which MicroPython leaves alone, after every
         instruction.
         """
         for name in _ACCESS:

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable
 
-from rp2040py.clock.simulation_clock import SimulationClock
+from rp2040py.clock.clock import IClock
 
 
 class EmulatedClock:
     """What board.clock.Clock is to the models, driven by the emulated processor's cycles."""
 
-    def __init__(self, clock: SimulationClock) -> None:
+    def __init__(self, clock: IClock) -> None:
         self._clock = clock
 
     @property

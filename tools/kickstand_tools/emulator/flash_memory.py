@@ -1,4 +1,4 @@
-"""Puts right in rp2040py's flash: that erasing and programming take time, the processor stalled, interrupts off.
+"""Puts right in rp2040py's flash: erasing and programming take time, the processor stalled, interrupts off.
 And lets the power go in the middle of it.
 """
 
@@ -34,7 +34,7 @@ class TimedFlash(RPSSI):
         self._cut_share = 0.0
 
     def cut_power(self, operation: int, share: float = 0.0) -> None:
-        """PowerCut at the operation-th erase or program from now (1: the next), with a share of it done (0..1)."""
+        """PowerCut at the nth erase or program from now (1: the next), with a share of it done (0..1)."""
         self._cut_at = self.operations + operation
         self._cut_share = share
 

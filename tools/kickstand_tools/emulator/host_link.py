@@ -1,6 +1,6 @@
-"""A register block that the real chip has not: through it code on the emulated Pico exchanges bytes with the host.
+"""A register block that the real chip has not: code on the emulated Pico exchanges bytes with the host by it.
 
-The console would do, but every byte of it costs the guest time. GUEST is the other end, to be run on the board.
+The console would do, but every byte of it costs the guest time. GUEST is the other end, for the board.
 """
 
 from collections.abc import Callable
@@ -34,7 +34,7 @@ class Sink:
 
 
 class HostLink(BasePeripheral):
-    """source: what the guest's Source.read() gets, in order.  sink: called with what its Sink.write() is given."""
+    """source: what the guest's Source.read() gets, in order.  sink: called with what Sink.write() is given."""
 
     def __init__(self, chip: Chip, source: bytes, sink: Callable[[bytes], Any]) -> None:
         super().__init__(chip.rp2040, "HOST_LINK")

@@ -26,9 +26,9 @@ _POLLED = (IC_RAW_INTR_STAT, IC_RXFLR, IC_TX_ABRT_SOURCE)
 class TimedI2C(RPI2C):
     """rp2040py's controller, with every bit as long as the SCL counts say, on a bus of board models.
 
-    SDK and MicroPython wait for each byte by reading registers in a loop. Such a read lets the time pass until
-    the byte is over, at once: the loop would find nothing else, and it costs the host ten times as much. An
-    interrupt is late by up to a byte for it.
+    The SDK waits for each byte by reading registers in a loop. Such a read lets the time pass until the byte
+    is over, at once: the loop would find nothing else, and costs the host ten times as much. An interrupt is
+    late by up to a byte for it.
     """
 
     def __init__(self, rp2040: RP2040, name: str, irq: int, bus: Bus) -> None:
@@ -79,12 +79,12 @@ class TimedI2C(RPI2C):
         return super().read_uint32(offset)
 
     def write_uint32(self, offset: int, value: int) -> None:
-        """As the controller's; disabled in the middle of a transfer, as by the SDK after a time-out, it lets go."""
+        """As the controller's; disabled in mid-transfer, as by the SDK after a time-out, it lets go."""
         if offset == IC_ENABLE and not value & ENABLE and self._busy and self._state != I2CState.STOP:
             self.let_go()
         super().write_uint32(offset, value)
 
-    # Interrupts: with TX_EMPTY_CTRL, TX_EMPTY comes when the byte is over, not when it begins; and with an abort
+    # Interrupts: with TX_EMPTY_CTRL, TX_EMPTY comes when the byte is over; and it comes with an abort
 
     def _set_interrupts(self, mask: int) -> None:
         if mask == R_TX_EMPTY and self._busy and self.control & TX_EMPTY_CTRL:
@@ -128,5 +128,3 @@ class TimedI2C(RPI2C):
     def _stopped(self) -> None:
         self.bus.stop()
         self.complete_stop()
-
-

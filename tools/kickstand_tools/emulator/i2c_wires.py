@@ -11,7 +11,7 @@ _IDLE, _LISTENS, _SENDS = 0, 1, 2
 
 
 class Wires:
-    """Watches two pins, plays the devices' part on SDA, and shows the levels on both, pulled up by the board."""
+    """Watches two pins, plays the devices' part on SDA, shows the levels on both, pulled up by the board."""
 
     def __init__(self, bus: Bus, sda: GPIOPin, scl: GPIOPin) -> None:
         self._bus, self._sda, self._scl = bus, sda, scl

@@ -1,4 +1,4 @@
-"""The emulated Pico with all that is soldered to it: what tests, bench, replay and `kickstand emulate` use."""
+"""The emulated Pico with all that is soldered to it: for tests, bench, replay and `kickstand emulate`."""
 
 from collections.abc import Callable
 from typing import Any
@@ -100,7 +100,7 @@ class Pico:
         self.chip.sleep(seconds)
 
     def run_until(self, condition: Callable[[], Any], limit_s: float, step_s: float = 0.005) -> Any:
-        """Let time pass until condition() is true, looked at every step_s; what it returned. Raises NotReached."""
+        """Let time pass until condition() is true, looked at every step_s; what it said. Raises NotReached."""
         end_s = self.time_s + limit_s
         while not (reached := condition()):
             if self.time_s >= end_s:

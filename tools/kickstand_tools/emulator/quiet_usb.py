@@ -1,4 +1,4 @@
-"""Puts right in rp2040py's USB host: that it answers every armed buffer with an empty packet, 34,000 times a second.
+"""Puts right in rp2040py's USB host: it answers every armed buffer with an empty packet, 34,000 a second.
 
 A host sends nothing while it has nothing to send; the empty packets cost the guest two thirds of its time.
 """

@@ -18,12 +18,14 @@ class SampleCount:
 
     def begin(self) -> None:
         """Count from here."""
+        self._sensor._update()
         self._first, self._waiting = self._sensor._next, self._sensor.fifo.count
         self._popped = 0
         self._read = set()
 
     def taken(self) -> int:
         """Samples the sensor took."""
+        self._sensor._update()
         return self._sensor._next - self._first
 
     def delivered(self) -> int:
