@@ -55,8 +55,8 @@ def test_the_fit_needs_no_exact_poses(engine, tilt):
         calls.append(("fit", (readings.tolist(),)))
         truths.append((offset, slope))
     errors = [
-        worst_lean_error_deg(np.array(got[0]), np.array(got[1]), *truth, rng)
-        for got, truth in zip(engines.run(engine, calls), truths)
+        worst_lean_error_deg(np.array(got[0]), np.array(got[1]), true_offset, true_slope, rng)
+        for got, (true_offset, true_slope) in zip(engines.run(engine, calls), truths)
     ]
     assert np.median(errors) < 0.1
     assert max(errors) < 0.25

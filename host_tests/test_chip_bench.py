@@ -13,7 +13,7 @@ def test_bench():
     pico()  # or skip
     from kickstand_tools.emulator import bench
 
-    result = json.loads(json.dumps(bench.bench(0.5)))
+    result = json.loads(json.dumps(bench.bench(1)))
     stages = {name: spread["median"] for name, spread in result["stage_us"].items()}
     parts = ("read", "decode", "check", "calibrate and rotate", "filter", "rest of the meter")
     assert all(stages[name] > 0 for name in parts)

@@ -3,11 +3,12 @@
 import io
 import json
 import struct
+import subprocess
 
 import numpy as np
 import pytest
 from emulated import PART, modules, pico
-from kickstand_tools import replay_engine
+from kickstand_tools import replay_engine, unix_port
 from kickstand_tools.rides import Ride, accelerate, turn
 from kickstand_tools.sensor_errors import random_mounting
 
@@ -41,8 +42,8 @@ def test_composed_rotations_agree_with_numpy():
     assert np.abs(np.array(out) - expected @ v).max() < 1e-6
 
 
-def test_the_same_log_gives_the_same_lean():
-    """Through the whole LeanMeter, on the chip and on CPython: within 0.05 degrees in every sample."""
+def test_the_same_log_gives_the_same_lean(tmp_path):
+    """Through the whole LeanMeter, on chip, unix port and CPython: within 0.05 degrees in every sample."""
     pico()  # or skip
     from kickstand_tools.emulator import replay
 
@@ -56,10 +57,15 @@ def test_the_same_log_gives_the_same_lean():
     on_host, on_chip = io.BytesIO(), bytearray()
     replay_engine.run(io.BytesIO(records), on_host)
     replay.run(records, on_chip.extend)
-    columns = len(replay_engine.COLUMNS)
-    host = np.frombuffer(on_host.getvalue()).reshape(-1, columns)
-    chip = np.frombuffer(bytes(on_chip)).reshape(-1, columns)
-    assert host.shape == chip.shape == (300, columns)
-    assert abs(chip[:, 0]).max() > 25.0
-    assert np.abs(host - chip)[:, :2].max() < 0.05
-    assert np.abs(host - chip)[:, 2:5].max() < 1e-5
+    results = [on_host.getvalue(), bytes(on_chip)]
+    if unix_port.available():
+        (tmp_path / "records").write_bytes(records)
+        command = unix_port.command(replay_engine.__file__, str(tmp_path / "records"))
+        results.append(subprocess.run(command, env=unix_port.environment(), capture_output=True, check=True).stdout)
+    host, *others = (np.frombuffer(result).reshape(-1, len(replay_engine.COLUMNS)) for result in results)
+    assert abs(host[:, 0]).max() > 25.0
+    for other in others:
+        assert host.shape == other.shape
+        assert len(other) == 300
+        assert np.abs(host - other)[:, :2].max() < 0.05
+        assert np.abs(host - other)[:, 2:5].max() < 1e-5

