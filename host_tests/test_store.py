@@ -106,7 +106,7 @@ def test_a_calibration_belongs_to_one_chip_and_range(store, tmp_path):
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [(0, 0.6), (3, 1.3), (3, 0.7), (6, 61.0), (9, 1.1), (17, -1.0), (9, float("nan")), (0, float("inf"))],
+    [(0, 0.6), (3, 1.3), (3, 0.7), (6, 61.0), (9, 1.1), (17, -1.0), (18, 4.0), (9, float("nan")), (0, float("inf"))],
 )
 def test_implausible_values_are_not_used(store, tmp_path, field, value):
     store.save(calibration(1))

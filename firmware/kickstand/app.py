@@ -13,7 +13,7 @@ from . import bus, pages, port
 from .align_wizard import AlignWizard
 from .button import LONG, SHORT, Button
 from .calibration import Calibration
-from .errors import SettingsError
+from .errors import SettingsError, StoreError
 from .hd44780 import Lcd
 from .menu import ALIGN, INFO, RESET, SIX, Menu
 from .meter import LeanMeter
@@ -26,6 +26,7 @@ from .store import Store
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
 PAGE_MS = 100
 NOTICE_MS = 2000
+TRIM_MS = 60_000
 
 
 def open_lcd(settings):
@@ -100,6 +101,7 @@ class App:
         self._notice = None
         self._notice_ms = 0
         self._page_ms = ticks_ms()
+        self._trim_ms = self._page_ms
         self._fault_shown = False
 
     def run(self):
@@ -142,7 +144,19 @@ class App:
             self._fault_shown = self.sensor.fault is not None
             line1, line2 = self._lines(now_ms)
             self.lcd.show(line1, line2)
+            self._keep_trim(now_ms)
         self.lcd.tick(now_ms)
+
+    def _keep_trim(self, now_ms):
+        """What riding taught about upright goes to flash when the bike stands, at most once in TRIM_MS."""
+        if self._wizard or not self.meter.calibration.aligned or ticks_diff(now_ms, self._trim_ms) < TRIM_MS:
+            return
+        if self.meter.keep_trim():
+            self._trim_ms = now_ms
+            try:
+                self.store.save(self.meter.calibration)
+            except StoreError as error:  # the next ride finds it again
+                print(error.reason)
 
     def _take(self, first, now_us, now_ms):
         """One sample: to the wizard, and into the sums of this turn. Integers only, no heap."""

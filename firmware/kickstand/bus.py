@@ -5,7 +5,9 @@ from time import sleep_us
 from machine import I2C, Pin
 
 _HALF_PERIOD_US = 5
-_TIMEOUT_BITS = 2000  # on rp2 this is for a whole transfer: 112 bytes at most. The default of 50 ms would stall the loop
+_TIMEOUT_BITS = (
+    2000  # on rp2 this is for a whole transfer: 112 bytes at most. The default of 50 ms would stall the loop
+)
 
 
 def free(sda_pin, scl_pin):

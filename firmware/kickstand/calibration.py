@@ -20,6 +20,7 @@ class Calibration:
         self.accel_slope = vector(1.0, 1.0, 1.0)
         self.gyro_bias = vector()
         self.vehicle_from_sensor = matrix()
+        self.trim_deg = 0.0
         self.six_done = False
         self.aligned = False
         self._scale = vector()

@@ -4,9 +4,8 @@ Lists of floats, not arrays: on a board reading an array's element takes heap, r
 yield where the work may be interrupted.
 """
 
-GATE = (
-    25.0  # innovations beyond five sigma are believed less, not thrown away: the model may be what is wrong
-)
+MIN_VARIANCE = 1e-10  # rounding in float32 could make it negative
+GATE = 25.0  # beyond five sigma an innovation counts for less, but counts: the model may be what is wrong
 
 
 class Covariance:
@@ -68,6 +67,8 @@ class Covariance:
             row = rows[i]
             for j in range(i + 1):
                 rows[j][i] = row[j] = row[j] - gain * column[j]
+            if row[i] < MIN_VARIANCE:
+                row[i] = MIN_VARIANCE
             if i == 4:  # half of the products
                 yield
         yield

@@ -18,7 +18,7 @@ corrections follow ten times a second, a piece a sample, because the whole would
 lasts.
 """
 
-from math import atan2, cos, degrees, radians, sin, sqrt
+from math import atan2, cos, degrees, pi, radians, sin, sqrt
 
 from .kalman import Covariance
 from .rest import RestDetector
@@ -27,6 +27,8 @@ from .trim import UprightTrim
 _G = 9.80665
 T, Q, V, BX, BY, BZ, Y = range(7)
 WINDOW_US = 100_000
+MAX_PITCH = 1.2  # rad: a motorcycle never, a sensor in the hand may; at 90 degrees lean has no meaning
+MAX_SPEED = 150.0 / _G
 
 # Uncertainties at the start: one sigma
 START_LEAN = radians(3.0)  # where the force looks like that of a standing bike
@@ -131,7 +133,7 @@ class LeanFilter:
         dt = dt_us * 1e-6
         acceleration = fz - sq + v * wy * x[Y]
         x[T] = t + (wz - sq / cq * (wx * st + wy * ct)) * dt
-        x[Q] += (wy * st - wx * ct) * dt
+        x[Q] = max(-MAX_PITCH, min(MAX_PITCH, x[Q] + (wy * st - wx * ct) * dt))
         x[V] = max(0.0, v + acceleration * dt)
         sums = self._sums
         left = fx - cq * st - v * wy - acceleration * x[Y]
@@ -168,6 +170,10 @@ class LeanFilter:
         self._pieces = max(1, PIECES * self._window_us // (n * WINDOW_US))
         self._count = 0
         self._window_us = 0
+        x = self._x
+        if self._p is not None and not (abs(x[T]) < 2 * pi and x[V] < MAX_SPEED):  # also not-a-number
+            self.restart()
+            return
         if self._p is None:
             self._start(means)
             return
@@ -252,3 +258,8 @@ class LeanFilter:
         for i in range(7):
             x[i] += p.take_correction(i)
         x[V] = max(0.0, x[V])
+        x[Q] = max(-MAX_PITCH, min(MAX_PITCH, x[Q]))
+        if x[T] > pi:
+            x[T] -= 2 * pi
+        elif x[T] < -pi:
+            x[T] += 2 * pi

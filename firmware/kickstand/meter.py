@@ -1,5 +1,7 @@
 """From a reading of the chip to lean and g: the way of a sample, on the board and in replay."""
 
+from math import degrees, radians
+
 from .lean import formula_lean_deg
 from .lean_filter import LeanFilter
 from .rotation import vector
@@ -8,6 +10,8 @@ from .transform import Transform
 SMOOTH_US = 300_000  # time constant of the g shown
 GAP_US = 500_000  # without readings for so long, the past says nothing about the present
 MAX_SIGMA_DEG = 6.0  # a lean less certain than this is not shown
+TRIM_SURE = radians(0.5)
+TRIM_STEP_DEG = 0.3  # less is not worth wearing the flash
 FALLEN_DEG = 65.0
 FALLEN_US = 1_000_000
 
@@ -32,6 +36,7 @@ class LeanMeter:
         """Take another calibration, its scale set, and forget what the one before led to."""
         self.calibration = calibration
         self._transform = Transform(calibration)
+        self.filter.trim.start(radians(calibration.trim_deg))
         self.restart()
 
     def restart(self):
@@ -53,6 +58,19 @@ class LeanMeter:
     def trusted(self):
         """True while lean_deg is certain enough to be shown."""
         return self.filter.sigma_deg <= MAX_SIGMA_DEG
+
+    def keep_trim(self):
+        """Take the trim found so far into the calibration, if the bike stands and it is another by now: True then."""
+        trim = self.filter.trim
+        angle = degrees(trim.angle)
+        if (
+            not self.filter.at_rest
+            or trim.variance > TRIM_SURE**2
+            or abs(angle - self.calibration.trim_deg) < TRIM_STEP_DEG
+        ):
+            return False
+        self.calibration.trim_deg = angle
+        return True
 
     @property
     def lean_formula_deg(self):

@@ -1,6 +1,6 @@
 """The calibration in flash: two alternating records, so that a power cut at any byte leaves a whole one.
 
-A record: magic, version, length, sequence, chip identity and range, flags, 18 floats, CRC32 of everything
+A record: magic, version, length, sequence, chip identity and range, flags, 19 floats, CRC32 of everything
 before it. save() writes over the record that is not in use and reads it back; load() takes the newest valid
 one. Nothing is ever written because a read failed: in a voltage sag a good file can read as empty.
 """
@@ -15,10 +15,11 @@ from .rotation import is_rotation
 FILES = ("kickstand_a.cal", "kickstand_b.cal")
 VERSION = 1
 _HEAD = "<4sHHI"  # magic, version, length of the whole record, sequence
-_BODY = "<BBBB18f"  # who_am_i, accelerometer range in g, six_done, aligned; offset, slope, gyro bias, matrix
+_BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, aligned; offset, slope, gyro bias, matrix, trim
 _MAGIC = b"KSTD"
 _LENGTH = struct.calcsize(_HEAD) + struct.calcsize(_BODY) + 4
 MAX_BIAS_DPS = 60.0
+MAX_TRIM_DEG = 3.0
 
 
 class Store:
@@ -101,6 +102,7 @@ class Store:
             *list(calibration.accel_slope),
             *list(calibration.gyro_bias),
             *list(calibration.vehicle_from_sensor),
+            calibration.trim_deg,
         )
         record = struct.pack(_HEAD, _MAGIC, VERSION, _LENGTH, sequence) + body
         return record + struct.pack("<I", crc32(record))
@@ -125,6 +127,7 @@ class Store:
             calibration.gyro_bias[i] = values[6 + i]
         for i in range(9):
             calibration.vehicle_from_sensor[i] = values[9 + i]
+        calibration.trim_deg = values[18]
         if not plausible(calibration):
             return 0, None, "out of range"
         return sequence, calibration, None
@@ -139,4 +142,4 @@ def plausible(calibration):
             return False
         if not abs(calibration.gyro_bias[i]) < MAX_BIAS_DPS:
             return False
-    return is_rotation(calibration.vehicle_from_sensor, 1e-4)
+    return is_rotation(calibration.vehicle_from_sensor, 1e-4) and abs(calibration.trim_deg) <= MAX_TRIM_DEG

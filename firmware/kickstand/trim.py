@@ -9,6 +9,7 @@ from math import radians, sin
 
 MAX_TRIM = radians(2.5)
 START_SIGMA = radians(1.5)
+FOUND_SIGMA = radians(0.7)  # of a trim kept from the ride before: the sensor is colder now
 SIGMA_STRAIGHT = radians(1.5)  # rider, camber and wind
 SIGMA_TURN = 0.4  # of the sine of the lean: tyre width and a rider hanging off add to the force in turns
 SIGMA_YAW_S = 0.2  # per rad/s of yaw rate
@@ -21,8 +22,12 @@ class UprightTrim:
     uncertainty."""
 
     def __init__(self):
-        self.angle = 0.0
-        self.variance = START_SIGMA**2
+        self.start(0.0)
+
+    def start(self, angle):
+        """Begin with what was found on earlier rides; 0 if nothing was."""
+        self.angle = angle
+        self.variance = (START_SIGMA if angle == 0.0 else FOUND_SIGMA) ** 2
 
     def update(self, sideways, lean, yaw_rate, seconds):
         """sideways: lateral over vertical force while riding; lean (rad), yaw_rate (rad/s): how straight it
