@@ -39,6 +39,7 @@ def main():
             print("Kickstand %s: safe mode, the button was held at power-up." % __version__)
             tell(lcd, "Safe mode", "Ready for USB")
             return
+        tell(lcd, "Kickstand", "starting")  # what stood there before a reset must not pass for a reading
         run(settings, lcd)
     except SettingsError as error:
         print("Kickstand stopped. " + error.reason)

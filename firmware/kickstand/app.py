@@ -4,7 +4,7 @@ sensor -> calibration and alignment -> lean -> page -> display, in one direction
 itself; a turn of the loop takes what has come in.
 """
 
-from array import array
+import gc
 from time import sleep_us, ticks_add, ticks_diff, ticks_ms, ticks_us
 
 from machine import Pin
@@ -24,6 +24,7 @@ from .six_wizard import SixWizard
 from .store import Store
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
+COLLECT_TURNS = 25  # 80 KB of heap
 PAGE_MS = 100
 NOTICE_MS = 2000
 TRIM_MS = 60_000
@@ -92,7 +93,7 @@ class App:
         self._restarts = 0
         self._sums = [0] * 7
         self._dt_us = 0
-        self._reading = array("f", [0.0] * 7)
+        self._reading = [0.0] * 7
         self._page = 0
         self._pages = (pages.lean, pages.maxima, pages.acceleration, pages.formula, pages.raw)
         self._wizard = None
@@ -108,8 +109,13 @@ class App:
         """Loop for ever, LOOP_US a turn."""
         watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         due_us = ticks_us()
+        turns = 0
         while True:
             self.step()
+            turns += 1
+            if turns >= COLLECT_TURNS:  # here and not in the middle of a sample; the FIFO keeps what comes meanwhile
+                turns = 0
+                gc.collect()
             if watchdog:
                 watchdog.feed()
             due_us = ticks_add(due_us, LOOP_US)
@@ -163,21 +169,23 @@ class App:
         if self._restarts != self.sensor.restarts:
             self._restarts = self.sensor.restarts
             self._sensor_started()
-        counts, sums = self.sensor.chip.counts, self._sums
-        for i in range(7):
-            sums[i] = counts[i] if first else sums[i] + counts[i]
+        c, sums = self.sensor.chip.counts, self._sums
+        if first:
+            sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6] = c
+        else:
+            for i in range(7):
+                sums[i] += c[i]
         dt_us = self._clock.step(now_us)
         self._dt_us = dt_us if first else self._dt_us + dt_us
         if self._wizard:
-            self._wizard.sample(counts, now_ms)
+            self._wizard.sample(c, now_ms)
 
     def _measure(self, n):
         """The mean of this turn's n samples through calibration, alignment and filter: floats cost too much to do
         it for each."""
-        reading, sums = self._reading, self._sums
         for i in range(7):
-            reading[i] = sums[i] / n
-        self.meter.update(reading, self._dt_us)
+            self._reading[i] = self._sums[i] / n
+        self.meter.update(self._reading, self._dt_us)
 
     def _sensor_started(self):
         """The chip runs, for the first time or again after a fault, perhaps another one."""

@@ -110,9 +110,14 @@ class LeanFilter:
         return [degrees(self._x[i]) for i in (BX, BY, BZ)]
 
     @property
+    def variance(self):
+        """Of the lean, rad^2."""
+        return self._p.rows[T][T] + self.trim.variance if self._p else pi * pi
+
+    @property
     def sigma_deg(self):
         """Standard deviation of the lean: a quality figure."""
-        return degrees(sqrt(self._p.rows[T][T] + self.trim.variance)) if self._p else 180.0
+        return degrees(sqrt(self.variance))
 
     @property
     def at_rest(self):

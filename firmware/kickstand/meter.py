@@ -4,12 +4,11 @@ from math import degrees, radians
 
 from .lean import formula_lean_deg
 from .lean_filter import LeanFilter
-from .rotation import vector
 from .transform import Transform
 
 SMOOTH_US = 300_000  # time constant of the g shown
 GAP_US = 500_000  # without readings for so long, the past says nothing about the present
-MAX_SIGMA_DEG = 6.0  # a lean less certain than this is not shown
+MAX_VARIANCE = radians(6.0) ** 2  # a lean less certain than this is not shown
 TRIM_SURE = radians(0.5)
 TRIM_STEP_DEG = 0.3  # less is not worth wearing the flash
 FALLEN_DEG = 65.0
@@ -24,9 +23,10 @@ class LeanMeter:
     """
 
     def __init__(self, calibration):
-        self.force = vector()
-        self.rate = vector()
-        self.smooth_force = vector()
+        # lists: on a board reading an array's element takes heap, reading a list's does not
+        self.force = [0.0] * 3
+        self.rate = [0.0] * 3
+        self.smooth_force = [0.0] * 3
         self.reading = (0,) * 7
         self.filter = LeanFilter()
         self.reset_maxima()
@@ -57,7 +57,7 @@ class LeanMeter:
     @property
     def trusted(self):
         """True while lean_deg is certain enough to be shown."""
-        return self.filter.sigma_deg <= MAX_SIGMA_DEG
+        return self.filter.variance <= MAX_VARIANCE
 
     def keep_trim(self):
         """Take the trim found so far into the calibration, if the bike stands and it is another by now: True then."""

@@ -56,6 +56,20 @@ CHIPS = {
 }
 
 
+def decode_plainly(frames, at, counts):
+    """Seven big-endian int16 from byte `at` of frames into counts, array('h', 7)."""
+    for i in range(7):
+        value = frames[at] << 8 | frames[at + 1]
+        counts[i] = value - 65536 if value > 32767 else value
+        at += 2
+
+
+try:
+    from .mpu6050_viper import decode  # the same in 8 us instead of 140, twice a turn of the loop
+except (ImportError, NameError, SyntaxError):  # CPython, or a port without viper
+    decode = decode_plainly
+
+
 class UnknownChip(Exception):
     """A chip answers, but its WHO_AM_I (args[0]) is none that is known to be compatible."""
 
@@ -155,12 +169,7 @@ class Mpu6050:
 
     def take(self, k):
         """Frame k of the last fetch() into counts; allocates nothing."""
-        frames, counts = self._frames, self.counts
-        at = k * FRAME
-        for i in range(7):
-            value = frames[at] << 8 | frames[at + 1]
-            counts[i] = value - 65536 if value > 32767 else value
-            at += 2
+        decode(self._frames, k * FRAME, self.counts)
 
     def restart_fifo(self):
         """Empty the FIFO and let it fill: after an overflow, or a transfer that broke off. Raises OSError."""

@@ -25,7 +25,7 @@ class Sensor:
         self._frozen_count = rate_hz * FROZEN_MS // 1000
         self._failures = 0
         self._same = 0
-        self._checksum = 0
+        self._signature = 0
         self._due_ms = None  # of the next check, or of the next attempt while faulty
         self._sample_ms = 0
         self.restarts = 0
@@ -62,22 +62,19 @@ class Sensor:
     def take(self, k, now_ms):
         """Sample k into chip.counts; False if it is none to trust."""
         self.chip.take(k)
-        if self._dead():
+        if self._dead(self.chip.counts):
             self._fail("Sensor frozen", "starting again", now_ms)
             return False
         self.fault = None
         return True
 
-    def _dead(self):
+    def _dead(self, c):
         """All zero or all -1 is no reading; nor is one that has not changed for a while."""
-        counts = self.chip.counts
-        total = 0
-        for i in range(7):
-            total = (total * 31 + counts[i]) & 0xFFFFFF
-        self._same = self._same + 1 if total == self._checksum else 0
-        self._checksum = total
-        if counts[0] == counts[1] == counts[2] and counts[0] in (0, -1):
+        if c[0] == c[1] == c[2] and (c[0] == 0 or c[0] == -1):
             return True
+        signature = 5 * c[0] + 7 * c[1] + 11 * c[2] + 13 * c[4] + 17 * c[5] + 19 * c[6]  # a small integer: no heap
+        self._same = self._same + 1 if signature == self._signature else 0
+        self._signature = signature
         return self._same >= self._frozen_count
 
     def _fail(self, line1, line2, now_ms):

@@ -1,5 +1,6 @@
 """The `kickstand` command. What it refuses: one line on standard error, status 2, nothing written."""
 
+import json
 import sys
 from pathlib import Path
 
@@ -169,6 +170,37 @@ def demo(hand: bool, cpython: bool) -> None:
     from . import demo
 
     demo.demo(hand, cpython)
+
+
+@kickstand.command()
+@click.option("--port", type=click.IntRange(1024, 65535), default=2040, help="On which mpremote finds it.")
+def emulate(port: int) -> None:
+    """An emulated Pico on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
+    from .emulator import image
+
+    image.find()
+    from .emulator.emulate import emulate
+
+    emulate(port, click.echo)
+
+
+@kickstand.command()
+@click.option("--seconds", type=click.IntRange(1, 600), default=10, help="Emulated, of each of two runs.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def bench(seconds: int, as_json: bool) -> None:
+    """What the firmware costs on an emulated Pico: time, memory, flash."""
+    from .emulator import image
+
+    image.find()
+    from rich.console import Console
+
+    from .emulator.bench import bench, tables
+
+    result = bench(seconds)
+    if as_json:
+        click.echo(json.dumps(result))
+    else:
+        Console().print(tables(result))
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -21,14 +21,10 @@ _CHUNK = 500  # samples between two steps of the progress bar
 
 def replay(log: Log, calibration: CalibrationFile, engine: str) -> list[tuple[float, ...]]:
     """replay_engine.COLUMNS for each sample. Raises InputError where the engine is not to be had."""
-    if engine == "rp2040":
-        raise InputError("engine rp2040 is not in this version: use --engine cpython or micropython")
     if engine == "micropython" and not unix_port.available():
         raise InputError("engine micropython has no package for this system: use --engine cpython")
     with Bar("replaying", len(log.readings)) as bar:
-        results = (
-            _cpython(log, calibration, bar) if engine == "cpython" else _micropython(log, calibration, bar)
-        )
+        results = _RUN[engine](log, calibration, bar)
     return list(struct.iter_unpack(replay_engine.RESULT, results))
 
 
@@ -59,6 +55,17 @@ def _cpython(log: Log, calibration: CalibrationFile, bar: Bar) -> bytes:
     return sink.getvalue()
 
 
+def _rp2040(log: Log, calibration: CalibrationFile, bar: Bar) -> bytes:
+    from .emulator import image
+
+    image.find()  # before the rest, which needs what this misses
+    from .emulator import replay as emulated
+
+    sink = _Sink(bar)
+    emulated.run(_records(log, calibration), sink.write)
+    return sink.getvalue()
+
+
 def _micropython(log: Log, calibration: CalibrationFile, bar: Bar) -> bytes:
     results = b""
     with tempfile.TemporaryDirectory() as directory:
@@ -74,6 +81,9 @@ def _micropython(log: Log, calibration: CalibrationFile, bar: Bar) -> bytes:
         reason = results.decode(errors="replace").strip().rpartition("\n")[2]
         raise InputError(f"MicroPython stopped ({reason}): use --engine cpython")
     return results
+
+
+_RUN = {"cpython": _cpython, "micropython": _micropython, "rp2040": _rp2040}
 
 
 def _records(log: Log, calibration: CalibrationFile) -> bytes:
