@@ -7,21 +7,9 @@ import sys
 from time import sleep_ms
 
 import machine
-from kickstand import __version__, port
+from kickstand import __version__, port, settings
 from kickstand.app import App, open_button, open_lcd
 from kickstand.errors import SettingsError
-from kickstand.settings import Settings
-
-
-def load_settings():
-    """config.py as Settings. Raises SettingsError; a missing config.py means the defaults."""
-    try:
-        import config
-    except ImportError:
-        config = None
-    except Exception as error:  # a slip of the pen in the user's file is no reason for a traceback
-        raise SettingsError("config.py cannot be read: %s" % error, "config.py has an", "error: see README")
-    return Settings(config)
 
 
 def tell(lcd, line1, line2=""):
@@ -33,17 +21,17 @@ def tell(lcd, line1, line2=""):
 def main():
     """Run until Ctrl-C, power-off or a reset."""
     try:
-        settings = load_settings()
-        lcd = open_lcd(settings)
-        if open_button(settings).held():
+        chosen = settings.load()
+        lcd = open_lcd(chosen)
+        if open_button(chosen).held():
             print("Kickstand %s: safe mode, the button was held at power-up." % __version__)
             tell(lcd, "Safe mode", "Ready for USB")
             return
         tell(lcd, "Kickstand", "starting")  # what stood there before a reset must not pass for a reading
-        run(settings, lcd)
+        run(chosen, lcd)
     except SettingsError as error:
         print("Kickstand stopped. " + error.reason)
-        tell(open_lcd(Settings()), *error.lcd)
+        tell(open_lcd(settings.Settings()), *error.lcd)
     except KeyboardInterrupt:
         port.rest_watchdog()
         print(
@@ -51,11 +39,11 @@ def main():
         )
 
 
-def run(settings, lcd):
+def run(chosen, lcd):
     """The app; an exception in it is reported, then the board restarts."""
     print("Kickstand %s. Ctrl-C stops it." % __version__)
     try:
-        App(settings, lcd).run()
+        App(chosen, lcd).run()
     except SettingsError:
         raise
     except Exception as error:

@@ -90,12 +90,14 @@ def run_device(plan):
 
         for name, value in plan.get("config", {}).items():
             setattr(Config, name, tuple(value) if isinstance(value, list) else value)
-        main.load_settings = lambda: Settings(Config)
+        load = main.settings.load
+        main.settings.load = lambda: Settings(Config)
         for until_s in plan.get("power", []) + [plan["until"]]:
             end = "reset"
             while end == "reset":
                 end = board.run(main.main, until_s)
                 ends.append(end)
+        main.settings.load = load
     finally:
         board.uninstall()
     return {"frames": frames, "ends": ends, "last": frames[-1][1:], "too_fast": board.too_fast}

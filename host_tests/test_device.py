@@ -87,10 +87,10 @@ def test_a_knock_during_the_pose(tmp_path):
     record = devices.run(
         "cpython",
         tmp_path,
-        {"lean": lean, "presses": [[2, 0.15], [8, 0.15], [9, 0.15], [17, 0.15]], "until": 24},
+        {"lean": lean, "presses": [[2, 0.15], [9, 0.15], [17, 0.15]], "until": 24},
     )
     assert record.at(7)[0].startswith("Moved!")
-    assert record.at(8.5)[0].startswith("On the stand")
+    assert record.at(9.6)[0].startswith("Stand: hold")
     assert record.first("Aligned!") < 22
 
 
@@ -158,7 +158,7 @@ def test_six_positions_then_alignment_of_a_part_with_errors(engine, tmp_path):
     record = devices.run(engine, tmp_path, {**six_positions([0.5, 0.6, -0.7]), "seed": 3})
     assert record.first("any of the six") < math.inf
     assert record.first(r"Side \+x done") < 12
-    assert record.first("Saved, error") < math.inf
+    assert record.first("Saved, err") < math.inf
     ride = devices.run(engine, tmp_path, {**ALIGNED, "seed": 3})
     assert ride.first("Aligned! +12.0°") < math.inf
     for t_s, lean in ((LEFT_S, -30), (RIGHT_S, 40), (STRAIGHT_S, 0)):

@@ -54,15 +54,15 @@ class AlignWizard:
         elif self._leave_ms is not None:
             self.ended = event == SHORT or ticks_diff(now_ms, self._leave_ms) >= 0
         elif event == SHORT and not self._taking:
-            if self._refused:
-                self._ask(self._pose)
+            if self._unlike:  # the two poses did not fit together: from the beginning
+                self._ask(0)
             else:
                 self._begin()
 
     def _ask(self, pose):
         self._pose = pose
         self._taking = False
-        self._refused = False
+        self._unlike = False
         self.lines = _ASK[pose]
 
     def _begin(self):
@@ -73,7 +73,7 @@ class AlignWizard:
     def _take(self, counts, now_ms):
         state = self._taker.step(counts)
         if state == SPOILT:
-            self._refuse(self._taker.problem, self._pose)
+            self._refuse(self._taker.problem)
         elif state == DONE:
             self._pose_done(self._taker.capture, now_ms)
         else:
@@ -89,7 +89,8 @@ class AlignWizard:
         try:
             tilt = self._finish(capture)
         except Refusal as problem:
-            self._refuse(problem, 0)
+            self._refuse(problem)
+            self._unlike = True
             return
         self._taking = False
         self._leave_ms = ticks_add(now_ms, RESULT_MS)
@@ -116,8 +117,7 @@ class AlignWizard:
         self._save(new)
         return tilt
 
-    def _refuse(self, problem, pose):
-        self._pose = pose
+    def _refuse(self, problem):
+        """Say why; the next press does the pose again."""
         self._taking = False
-        self._refused = True
         self.lines = problem.lcd

@@ -24,7 +24,7 @@ from .six_wizard import SixWizard
 from .store import Store
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
-COLLECT_TURNS = 25  # 80 KB of heap
+COLLECT_TURNS = 50  # 100 KB of heap
 PAGE_MS = 100
 NOTICE_MS = 2000
 TRIM_MS = 60_000

@@ -52,6 +52,21 @@ _TABLE = {
 }
 
 
+def load():
+    """The Settings of config.py; a missing config.py means the defaults. Raises SettingsError."""
+    try:
+        import config
+    except ImportError:
+        config = None
+    except Exception as error:  # a slip of the pen in the user's file is no reason for a traceback
+        raise SettingsError(
+            "config.py cannot be read (%s): mend it, then kickstand flash --config" % error,
+            "config.py:",
+            "cannot be read",
+        )
+    return Settings(config)
+
+
 class Settings:
     """One attribute for each name of the table. config: the module config, or None for the defaults. Raises
     SettingsError."""
@@ -68,7 +83,7 @@ class Settings:
             if name.isupper() and name not in _TABLE:
                 raise SettingsError(
                     "config.py: %s is not a setting; see the list in that file" % name,
-                    "config.py unknown",
+                    "config.py: what?",
                     name,
                 )
         self.one_bus = (self.SENSOR_SDA, self.SENSOR_SCL) == (self.LCD_SDA, self.LCD_SCL)

@@ -124,7 +124,7 @@ class SixWizard:
             new.gyro_bias[i] = self._gyro[i]
         self._save(new)
         self._leave_ms = ticks_add(now_ms, RESULT_MS)
-        self.lines = ("Saved, error %dmg" % round(abs(error) * 1000), "Now align it")
+        self.lines = ("Saved, err %d mg" % round(abs(error) * 1000), "Now align it")
 
     def _notice(self, lines, now_ms):
         self.lines = lines

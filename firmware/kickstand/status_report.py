@@ -7,7 +7,7 @@ import sys
 from . import __version__, app
 from .errors import SettingsError
 from .mpu6050 import UnknownChip
-from .settings import Settings
+from .settings import load
 from .store import Store
 
 
@@ -19,11 +19,7 @@ def report():
         % (__version__, machine_name, ".".join(str(n) for n in sys.implementation.version[:3]))
     )
     try:
-        try:
-            import config
-        except ImportError:
-            config = None
-        settings = Settings(config)
+        settings = load()
         print("Settings     kickstand side %s, %d samples a second" % (settings.SIDE, settings.SAMPLE_HZ))
         sensor = app.open_sensor(settings)
         who_am_i = _sensor(sensor, settings)

@@ -15,7 +15,8 @@ _PORT = click.option(
 )
 
 
-@click.group(invoke_without_command=True)
+@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="kickstand")
 @click.pass_context
 def kickstand(context: click.Context) -> None:
     """Lean meter for any motorcycle: put it on a board, calibrate it, replay rides."""
