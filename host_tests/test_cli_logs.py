@@ -123,3 +123,21 @@ def test_a_packed_result_is_packed(tmp_path):
     for name in "LEAN.csv", "LEAN.csv.gz":
         command.works("replay", log, "--calibration", cal, "--out", tmp_path / name)
     assert gzip.decompress((tmp_path / "LEAN.csv.gz").read_bytes()) == (tmp_path / "LEAN.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("row", "step_s", "words"),
+    [
+        ((0.0, 9.81, 0.1, 0.0, 0.0, 0.0), 0.01, "look like m/s2"),
+        ((0.0, 1.0, 0.1, 0.0, 0.0, 0.0), 10.0, "milliseconds"),
+    ],
+)
+def test_units_that_are_easily_mistaken(tmp_path, row, step_s, words):
+    path = command.write(tmp_path / "log.csv", [(n * step_s, *row) for n in range(50)])
+    command.refused(tmp_path, "calibrate", "two", path, path, "--out", tmp_path / "CAL.json", words=words)
+
+
+def test_a_log_saved_with_semicolons(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(command.HEADER.replace(",", ";") + "\n0;0;1;0;0;0;0\n")
+    command.refused(tmp_path, "calibrate", "two", path, path, "--out", tmp_path / "CAL.json", words="commas")

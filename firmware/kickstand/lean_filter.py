@@ -32,6 +32,7 @@ MAX_SPEED = 150.0 / _G
 
 # Uncertainties at the start: one sigma
 START_LEAN = radians(3.0)  # where the force looks like that of a standing bike
+START_STAND = radians(0.5)
 START_STILL_G, START_STILL_RADPS = 0.05, 0.1
 START_LEAN_MOVING = radians(15.0)
 START_PITCH = radians(5.0)
@@ -184,7 +185,10 @@ class LeanFilter:
             return
         roll_acceleration = (self._roll_rate - self._last_roll_rate) / seconds
         self._last_roll_rate = self._roll_rate
+        rested = self._rest.resting
         self._rest.update(means, seconds)
+        if self._rest.resting and not rested:
+            self._stand(means)
         self._work = self._process(means, seconds, roll_acceleration)
 
     def _start(self, means):
@@ -199,6 +203,16 @@ class LeanFilter:
             x[i] = 0.0
         x[T] = atan2(fx, fy)
         x[V] = USUAL_SPEED
+
+    def _stand(self, means):
+        """Coming to rest, the force is the vertical, whatever was believed before; the bias is kept."""
+        _, _, _, _, _, fx, fy, fz, _ = means
+        x, rows = self._x, self._p.rows
+        x[T] = atan2(fx, fy)
+        x[Q] = atan2(fz, sqrt(fx * fx + fy * fy))
+        x[V] = 0.0
+        known = [rows[i][i] for i in (BX, BY, BZ, Y)]
+        self._p = Covariance([START_STAND * START_STAND] * 2 + [SIGMA_REST_SPEED**2] + known)
 
     def _process(self, means, seconds, roll_acceleration):
         """Covariance and corrections for one window; a generator of short pieces."""

@@ -4,6 +4,7 @@ import csv
 import gzip
 import io
 import math
+import statistics
 import zlib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -89,6 +90,8 @@ def _text(path: Path) -> str:
 def _parse(path: Path, rows, minimum: int) -> Log:
     header = [name.strip() for name in next(rows, [])]
     missing = [name for name in COLUMNS if name not in header]
+    if missing and any(mark in "".join(header) for mark in ";\t"):
+        raise InputError(f"{path}, line 1: values stand apart by ; or tab: save it with commas between them")
     if missing:
         raise InputError(
             f"{path}, line 1: no column {', '.join(missing)}: a log starts with {','.join(COLUMNS)}"
@@ -123,7 +126,17 @@ def _parse(path: Path, rows, minimum: int) -> Log:
         log.speed_mps.append(value.get("speed_mps"))
     if len(log.time_us) < minimum:
         raise InputError(f"{path} is too short: {len(log.time_us)} samples, at least {minimum} are needed")
+    _check_units(log)
     return log
+
+
+def _check_units(log: Log) -> None:
+    """Raise InputError for a log in units that are easily taken for the right ones."""
+    sizes = [math.hypot(*reading[:3]) for reading in log.readings]
+    if 5.0 < statistics.median(sizes) < 20.0:
+        raise InputError(f"{log.path}: accelerations look like m/s2: divide them by 9.80665, their unit is g")
+    if len(log.time_us) > 1 and log.time_us[-1] / (len(log.time_us) - 1) >= 4e6:
+        raise InputError(f"{log.path}: seconds between samples: is t_s in milliseconds?")
 
 
 def _number(cell: str, name: str, where: str) -> float | None:
