@@ -4,12 +4,12 @@ import time
 
 import pytest
 from emulated import calibrated, firmware, leaning, pico, shown_lean, shows
-from kickstand_tools.rides import Ride, accelerate, kickstand, turn, upright
+from kickstand_tools.rides import Ride, accelerate, kickstand, turn, upright, wait
 from kickstand_tools.sensor_errors import Sensor
 
 pytestmark = pytest.mark.chip
 
-KICKSTAND, UPRIGHT, RIDE = 5.5, 5.5, [accelerate(15.0, 3.0), turn(-30.0, 3.0)]
+KICKSTAND, UPRIGHT, RIDE = 5.5, 5.5, [wait(2.0), accelerate(15.0, 3.0), turn(-30.0, 3.0)]  # standing: the bias is found
 
 
 def test_a_new_board_is_aligned_by_two_presses_and_keeps_it():

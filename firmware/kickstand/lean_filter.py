@@ -49,7 +49,7 @@ GROW_BIAS = radians(0.01)  # warming up: 0.6 deg/s in five minutes
 SIGMA_LEFT = 0.03
 SIGMA_UP = 0.4
 SHAKEN_SHARE = 0.3  # of the variance within a window, for that of its mean: shaking is not all quick
-ROLL_HEIGHT_M = 0.5  # h: of the sensor above the axis the bike rolls about; by how much it may be wrong:
+ROLL_HEIGHT_M = 0.4  # h: of the sensor above the axis the bike rolls about; by how much it may be wrong:
 SIGMA_ROLL_HEIGHT_M = 0.4
 SIGMA_SLOPE = radians(2.0)
 SLOPE_S = 3.0  # how long a slope lasts: fitted, real ones last longer
@@ -202,7 +202,7 @@ class LeanFilter:
         for i in range(7):
             x[i] = 0.0
         x[T] = atan2(fx, fy)
-        x[V] = USUAL_SPEED
+        x[V] = USUAL_SPEED if moving else 0.0  # most rides begin at rest
 
     def _stand(self, means):
         """Coming to rest, the force is the vertical, whatever was believed before; the bias is kept."""
