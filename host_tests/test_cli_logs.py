@@ -133,11 +133,13 @@ def test_a_packed_result_is_packed(tmp_path):
     ],
 )
 def test_units_that_are_easily_mistaken(tmp_path, row, step_s, words):
+    cal = command.write_cal(tmp_path / "CAL.json")
     path = command.write(tmp_path / "log.csv", [(n * step_s, *row) for n in range(50)])
-    command.refused(tmp_path, "calibrate", "two", path, path, "--out", tmp_path / "CAL.json", words=words)
+    command.refused(tmp_path, "replay", path, "--calibration", cal, "--out", tmp_path / "LEAN.csv", words=words)
 
 
 def test_a_log_saved_with_semicolons(tmp_path):
+    cal = command.write_cal(tmp_path / "CAL.json")
     path = tmp_path / "log.csv"
     path.write_text(command.HEADER.replace(",", ";") + "\n0;0;1;0;0;0;0\n")
-    command.refused(tmp_path, "calibrate", "two", path, path, "--out", tmp_path / "CAL.json", words="commas")
+    command.refused(tmp_path, "replay", path, "--calibration", cal, "--out", tmp_path / "LEAN.csv", words="commas")

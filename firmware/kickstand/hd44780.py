@@ -22,7 +22,7 @@ ADDRESSES = (0x27, 0x3F)  # PCF8574 and PCF8574A with all address jumpers open
 COLUMNS = 16
 _NEVER = const(0xFE)  # a code that no text uses: a line that is said to hold it will be written again
 REINIT_MS = 10_000  # noise can put the nibbles out of step, for ever without this
-PROBE_MS = 1_000
+PROBE_MS = 200
 STEP_MS = 5  # the longest wait that the initialisation asks for is 4.1 ms
 
 # Initialisation by instruction (data sheet, figure 24). One step a tick, STEP_MS apart, so that the loop
