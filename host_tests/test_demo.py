@@ -9,19 +9,10 @@ import sys
 import time
 
 import pytest
+from engines import ENGINES
 from kickstand_tools import unix_port
 from kickstand_tools.demo import Device, demo
 from kickstand_tools.demo_score import shown_lean
-
-ENGINES = [
-    "cpython",
-    pytest.param(
-        "micropython",
-        marks=pytest.mark.skipif(
-            not unix_port.available(), reason="no MicroPython unix port for this system"
-        ),
-    ),
-]
 
 
 def command(engine, hand=False):
