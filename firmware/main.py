@@ -30,6 +30,7 @@ def main():
         tell(lcd, "Kickstand", "starting")  # what stood there before a reset must not pass for a reading
         run(chosen, lcd)
     except SettingsError as error:
+        port.rest_watchdog()  # wrong pins show only when the app opens them
         print("Kickstand stopped. " + error.reason)
         tell(open_lcd(settings.Settings()), *error.lcd)
     except KeyboardInterrupt:

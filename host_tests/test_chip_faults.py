@@ -92,6 +92,7 @@ def test_lcd_unplugged_and_back(device):
 def test_lcd_out_of_step_is_readable_again(device):
     """A spike on E: what is written next is garbled, at most until the next initialisation."""
     device.stall(7.0)  # most of the time to the next initialisation
+    device.run(1.0)  # the samples of that time are lost, and the sensor is started again
     device.run_until(lambda: lean_is_right(device), 3.0)
     device.board.faults.lcd_slip(device.time_s + 0.01)
     device.press(device.time_s + 0.05)

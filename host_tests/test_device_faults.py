@@ -173,3 +173,32 @@ def test_a_loop_that_hangs_is_restarted_by_the_watchdog(aligned, monkeypatch):
     record = devices.run("cpython", aligned, standing([], until=16))
     assert record.ends == ["reset", "off"]
     assert record.lean_at(15) == STATIC
+
+
+@pytest.mark.parametrize("lean", [-14, -30])
+def test_a_sensor_lost_in_a_turn(lean, tmp_path):
+    """A turn is as calm as standing and has no force to the side: coming back, it must not be taken for upright."""
+    ride = [["kickstand", 8.0], ["upright", 8.0], ["accelerate", 20.0, 8.0], ["turn", 25.0, 3.0], ["turn", lean, 20.0]]
+    plan = {"ride": ride, "presses": [[2, 0.15], [12, 0.15]], "until": 53}
+    record = devices.run("cpython", tmp_path, {**plan, "faults": [["unplug_sensor", [40.0, 0.5]]]})
+    assert record.lean_at(39.5) == pytest.approx(lean, abs=2)
+    assert record.first("No sensor|Sensor", 40) < 40.5
+    assert all(abs(shown - lean) < 5 for shown in record.leans(41.5, 52))
+    assert record.lean_at(50) is not None
+
+
+@pytest.mark.parametrize("byte", [1, 2, 5])
+def test_a_fifo_out_of_step_is_noticed(byte, aligned, monkeypatch):
+    """Stray bytes in the FIFO: frames out of step would be read as readings for ever."""
+    from kickstand_tools.board import simulator
+
+    original = simulator.Board.install
+
+    def install(board):
+        board.at(FAULT_S, lambda: [board.sensor.fifo.push(0x55) for _ in range(byte)])
+        original(board)
+
+    monkeypatch.setattr(simulator.Board, "install", install)
+    record = devices.run("cpython", aligned, standing([], until=8))
+    assert record.lean_at(FAULT_S + 0.3) == STATIC
+    assert record.last[0].startswith("Lean  25° right")

@@ -94,7 +94,7 @@ class AlignWizard:
             return
         self._taking = False
         self._leave_ms = ticks_add(now_ms, RESULT_MS)
-        warning = "Little: 8%s better" % pages.DEGREE if tilt < WARN_TILT_DEG else "Ride safely"
+        warning = "Little, 8%s best" % pages.DEGREE if tilt < WARN_TILT_DEG else "Ride safely"
         self.lines = ("Aligned! %5.1f%s" % (tilt, pages.DEGREE), warning)
 
     def _finish(self, capture):

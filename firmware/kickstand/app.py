@@ -16,7 +16,7 @@ from .calibration import Calibration
 from .errors import SettingsError, StoreError
 from .hd44780 import Lcd
 from .menu import ALIGN, INFO, RESET, SIX, Menu
-from .meter import LeanMeter
+from .meter import FALLEN_DEG, LeanMeter
 from .mpu6050 import MAX_FRAMES, SATURATED, Mpu6050
 from .sample_clock import SampleClock
 from .sensor import Sensor
@@ -62,7 +62,14 @@ def open_sensor(settings):
 
 def open_button(settings):
     """The button of these settings."""
-    return Button(Pin(settings.BUTTON_PIN, Pin.IN, Pin.PULL_UP))
+    try:
+        return Button(Pin(settings.BUTTON_PIN, Pin.IN, Pin.PULL_UP))
+    except ValueError as error:
+        raise SettingsError(
+            "config.py: BUTTON_PIN = %d is no pin of this board (%s)" % (settings.BUTTON_PIN, error),
+            "config.py: wrong",
+            "BUTTON_PIN",
+        )
 
 
 def _open_bus(settings, name, hz):
@@ -139,7 +146,9 @@ class App:
             self._measure(good)
         if self.sensor.fault is not None:
             self._clock.restart()
-            self._wizard = None
+            if self._wizard:
+                self._wizard = None
+                self._notify(("Calibration", "stopped: fault"), now_ms)
             if not self._fault_shown:
                 self._page_ms = now_ms  # at once: the next thing is to start the sensor again
         elif waiting < MAX_FRAMES:
@@ -157,7 +166,7 @@ class App:
         """What riding taught about upright goes to flash when the bike stands, at most once in TRIM_MS."""
         if self._wizard or not self.meter.calibration.aligned or ticks_diff(now_ms, self._trim_ms) < TRIM_MS:
             return
-        if self.meter.keep_trim():
+        if self.meter.keep_trim() and self.store.unchanged():
             self._trim_ms = now_ms
             try:
                 self.store.save(self.meter.calibration)
@@ -248,8 +257,8 @@ class App:
             self._notify(("Maxima reset", ""), now_ms)
         elif entry == INFO:
             self._info = True
-        elif self.sensor.fault is not None:
-            return
+        elif self.sensor.fault is not None and entry in (ALIGN, SIX):
+            self._notify(self.sensor.fault, now_ms)
         elif entry == ALIGN:
             self._align(pressed=False)
         elif entry == SIX:
@@ -278,6 +287,6 @@ class App:
             return pages.not_aligned(self.meter, now_ms // 1000)
         if self.meter.fallen:
             return pages.FALLEN
-        if not self.meter.trusted:
+        if not self.meter.trusted or abs(self.meter.lean_deg) > FALLEN_DEG:
             return pages.UNSURE
         return self._pages[self._page](self.meter)

@@ -23,6 +23,7 @@ COLUMNS = 16
 _NEVER = const(0xFE)  # a code that no text uses: a line that is said to hold it will be written again
 REINIT_MS = 10_000  # noise can put the nibbles out of step, for ever without this
 PROBE_MS = 200
+REOPEN_PROBES = 5
 STEP_MS = 5  # the longest wait that the initialisation asks for is 4.1 ms
 
 # Initialisation by instruction (data sheet, figure 24). One step a tick, STEP_MS apart, so that the loop
@@ -62,6 +63,7 @@ class Lcd:
         self._glyphs = _bar_glyphs()
         self.address = None  # None: no display answers
         self._step = 0
+        self._probes = 0
         self._acted_ms = None
         self._init_ms = 0
 
@@ -115,13 +117,16 @@ class Lcd:
                 line[i] = 0x20
 
     def _probe(self):
-        self._i2c = self._reopen()
+        if self._probes % REOPEN_PROBES == 0:  # a stuck bus has to be freed; every time would cost too much
+            self._i2c = self._reopen()
+        self._probes += 1
         for address in self._addresses:
             try:
                 self._i2c.writeto(address, self._light)
             except OSError:
                 continue
             self.address = address
+            self._probes = 0
             self._step = 0
             return
 

@@ -27,13 +27,14 @@ from .trim import UprightTrim
 _G = 9.80665
 T, Q, V, BX, BY, BZ, Y = range(7)
 WINDOW_US = 100_000
+START_US = 50_000  # the first
 MAX_PITCH = 1.2  # rad: a motorcycle never, a sensor in the hand may; at 90 degrees lean has no meaning
 MAX_SPEED = 150.0 / _G
 
 # Uncertainties at the start: one sigma
 START_LEAN = radians(3.0)  # where the force looks like that of a standing bike
 START_STAND = radians(0.5)
-START_STILL_G, START_STILL_RADPS = 0.05, 0.1
+START_STILL_G, START_STILL_RADPS = 0.05, 0.02
 START_LEAN_MOVING = radians(15.0)
 START_PITCH = radians(5.0)
 START_SPEED = 15.0 / _G
@@ -78,14 +79,18 @@ class LeanFilter:
 
     def __init__(self):
         self.trim = UprightTrim()
+        self._p = None
         self.restart()
 
     def restart(self):
-        """Forget everything but the trim: after power-on, or when readings were missing."""
-        self._x = [0.0] * 7
-        self._x[V] = USUAL_SPEED
+        """Forget lean, pitch and speed: readings were missing. What was learned of the sensor stays."""
+        kept = (BX, BY, BZ, Y) if self._p is not None else ()
+        self._kept = [(i, self._x[i], self._p.rows[i][i]) for i in kept]
         self._p = None
-        self._rest = RestDetector()
+        self._rest = RestDetector(not kept)
+        self._x = [0.0] * 7
+        for i, value, _ in self._kept:
+            self._x[i] = value
         self._work = None
         self._pieces = 1
         self._sums = [0.0] * 9
@@ -160,7 +165,7 @@ class LeanFilter:
                 if next(self._work, True):
                     self._work = None
                     break
-        elif self._window_us >= WINDOW_US:
+        elif self._window_us >= (WINDOW_US if self._p is not None else START_US):
             self._end_window()
         if self._p is None:
             return degrees(atan2(sums[5], sums[6]))
@@ -193,15 +198,17 @@ class LeanFilter:
 
     def _start(self, means):
         _, _, wx, wy, wz, fx, fy, fz, _ = means
+        # a long turn is as calm as standing, and gives no force to the side: only the yaw rate tells them apart
         turning = max(abs(wx), abs(wy), abs(wz)) > START_STILL_RADPS
         moving = turning or abs(sqrt(fx * fx + fy * fy + fz * fz) - 1.0) > START_STILL_G
         lean = START_LEAN_MOVING if moving else START_LEAN
         sigmas = (lean, START_PITCH, START_SPEED, START_BIAS, START_BIAS, START_BIAS, START_YAW_ERROR)
         self._p = Covariance([sigma * sigma for sigma in sigmas])
+        for i, _, variance in self._kept:
+            self._p.rows[i][i] = variance
         x = self._x
-        for i in range(7):
-            x[i] = 0.0
         x[T] = atan2(fx, fy)
+        x[Q] = 0.0
         x[V] = USUAL_SPEED if moving else 0.0  # most rides begin at rest
 
     def _stand(self, means):

@@ -28,7 +28,6 @@ class LeanMeter:
         self.rate = [0.0] * 3
         self.smooth_force = [0.0] * 3
         self.reading = (0,) * 7
-        self.filter = LeanFilter()
         self.reset_maxima()
         self.use(calibration)
 
@@ -36,6 +35,7 @@ class LeanMeter:
         """Take another calibration, its scale set, and forget what the one before led to."""
         self.calibration = calibration
         self._transform = Transform(calibration)
+        self.filter = LeanFilter()
         self.filter.trim.start(radians(calibration.trim_deg))
         self.restart()
 
@@ -97,7 +97,7 @@ class LeanMeter:
         else:
             self._flat_us += dt_us
             self.fallen = self._flat_us >= FALLEN_US
-        if self.trusted and not self.fallen:
+        if self.trusted and -FALLEN_DEG < lean < FALLEN_DEG:
             self._hold_maxima(lean, smooth[2])
 
     def _hold_maxima(self, lean, forward):

@@ -35,6 +35,7 @@ _CLOCK_PLL_GYRO_X = const(0x01)  # 1 % accurate; the internal oscillator after r
 
 _FIFO_ALL = const(0xF8)  # temperature, gyro and accelerometer: the same fourteen bytes as a burst
 _FIFO_ENABLE, _FIFO_RESET = const(0x40), const(0x04)
+_FIFO_6886 = const(0x18)
 FRAME = 14
 MAX_FRAMES = 8  # in one transfer: 3 ms at 400 kHz
 
@@ -102,13 +103,15 @@ class Mpu6050:
         self._frames = bytearray(FRAME * MAX_FRAMES)
         # slices made once, because each slice takes heap
         self._some_frames = [memoryview(self._frames)[: FRAME * n] for n in range(MAX_FRAMES + 1)]
-        self.overflows = 0  # of the FIFO
+        self.overflows = 0  # of the FIFO, or its frames out of step
+        self._odd = False
+        self._started = False  # the FIFO too
         self.counts = array("h", [0] * 7)
 
     @property
     def name(self):
         """What the chip is, by its WHO_AM_I."""
-        return self._chip()[0]
+        return self._chip()[0] if self.who_am_i in CHIPS else "WHO 0x%02X" % self.who_am_i
 
     def connect(self, i2c):
         """Use a bus that was opened again."""
@@ -131,10 +134,12 @@ class Mpu6050:
         sleep_ms(60)  # writes that come too early are lost without an error
         for i in range(5 if self._chip()[3] else 4):
             self._write(_SMPLRT_DIV + i, self._configuration[i])
+        self._started = False
         if not self.configured():
             raise OSError("MPU6050 configuration does not read back")
         sleep_ms(20)  # until the filter has seen its first samples
         self.restart_fifo()
+        self._started = True
 
     def configured(self):
         """True if the chip is awake with the configuration written by setup(). Raises OSError."""
@@ -143,7 +148,7 @@ class Mpu6050:
         for i in range(5 if self.who_am_i in CHIPS and self._chip()[3] else 4):
             if self._readback[i] != self._configuration[i]:
                 return False
-        return self._read(_PWR_MGMT_1) == _CLOCK_PLL_GYRO_X
+        return self._read(_PWR_MGMT_1) == _CLOCK_PLL_GYRO_X and (not self._started or self._fifo_runs())
 
     def read(self):
         """The newest sample in one burst into counts; allocates nothing. Raises OSError."""
@@ -158,7 +163,10 @@ class Mpu6050:
         """
         self._i2c.readfrom_mem_into(self._address, _FIFO_COUNT_H, self._two)
         waiting = self._two[0] << 8 | self._two[1]
-        if waiting > self._chip()[4] - FRAME:
+        odd = waiting % FRAME != 0  # once is a frame that just comes in
+        out_of_step = odd and self._odd
+        self._odd = odd
+        if out_of_step or waiting > self._chip()[4] - FRAME:
             self.overflows += 1
             self.restart_fifo()
             return 0
@@ -177,6 +185,13 @@ class Mpu6050:
         self._write(_USER_CTRL, _FIFO_RESET)  # acts only while the FIFO is not enabled
         self._write(_USER_CTRL, _FIFO_ENABLE)
         self._write(_FIFO_EN, _FIFO_ALL)
+        self._odd = False
+        if not self._fifo_runs():
+            raise OSError("MPU6050 FIFO does not read back")
+
+    def _fifo_runs(self):
+        chosen = _FIFO_6886 if self.who_am_i == 0x19 else _FIFO_ALL  # the MPU6886 always adds the temperature
+        return self._read(_FIFO_EN) & chosen == chosen and self._read(_USER_CTRL) & _FIFO_ENABLE != 0
 
     def temperature_c(self, counts):
         """Degrees Celsius from temperature counts (p. 30, and the sheets of the other chips)."""

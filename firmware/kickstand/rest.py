@@ -10,13 +10,16 @@ AVERAGE_S = 0.5
 
 
 class RestDetector:
-    """update() with each mean; resting is True after REST_S of stillness."""
+    """update() with each mean; resting is True after REST_S of stillness.
 
-    def __init__(self):
+    first: no rest has been seen since power-on, so the bias may be off.
+    """
+
+    def __init__(self, first=True):
         self.resting = False
         self._still_s = 0.0
         self._average = None
-        self._max_bias = MAX_FIRST_BIAS_RADPS
+        self._max_bias = MAX_FIRST_BIAS_RADPS if first else MAX_BIAS_RADPS
 
     def update(self, means, seconds):
         """means: of the last seconds, where 2..4 are rates (rad/s, bias taken off) and 5..7 forces (g)."""

@@ -41,12 +41,12 @@ _TABLE = {
     "SENSOR_I2C": (0, _one_of(0, 1)),
     "SENSOR_SDA": (port.SENSOR_PINS[0], _PIN),
     "SENSOR_SCL": (port.SENSOR_PINS[1], _PIN),
-    "SENSOR_BUS_HZ": (400_000, _whole(10_000, 400_000)),
+    "SENSOR_BUS_HZ": (400_000, _whole(100_000, 400_000)),
     "LCD_ADDRESSES": (ADDRESSES, (_addresses, "I2C addresses as (0x27, 0x3F)")),
     "LCD_I2C": (1, _one_of(0, 1)),
     "LCD_SDA": (port.LCD_PINS[0], _PIN),
     "LCD_SCL": (port.LCD_PINS[1], _PIN),
-    "LCD_BUS_HZ": (100_000, _whole(10_000, 400_000)),
+    "LCD_BUS_HZ": (100_000, _whole(100_000, 400_000)),
     "BUTTON_PIN": (port.BUTTON_PIN, _PIN),
     "WATCHDOG": (True, _one_of(True, False)),
 }
@@ -87,6 +87,13 @@ class Settings:
                     name,
                 )
         self.one_bus = (self.SENSOR_SDA, self.SENSOR_SCL) == (self.LCD_SDA, self.LCD_SCL)
+        buses = {self.SENSOR_SDA, self.SENSOR_SCL, self.LCD_SDA, self.LCD_SCL}
+        if self.BUTTON_PIN in buses or len(buses) != (2 if self.one_bus else 4):
+            raise SettingsError(
+                "config.py: a pin is used twice among BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL",
+                "config.py: wrong",
+                "pin used twice",
+            )
         if not self.one_bus and self.SENSOR_I2C == self.LCD_I2C:
             raise SettingsError(
                 "config.py: SENSOR_I2C and LCD_I2C are both %d on different pins; give each its own"

@@ -7,6 +7,7 @@ one. Nothing is ever written because a read failed: in a voltage sag a good file
 
 import struct
 from binascii import crc32
+from errno import ENOENT
 
 from .calibration import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE, Calibration
 from .errors import StoreError
@@ -35,11 +36,13 @@ class Store:
         self._chip = (who_am_i, accel_range_g)
         self._directory = directory
         self.message = ""
+        self._sequence = 0  # of the record in use
 
     def load(self):
         """The newest valid Calibration; a fresh, uncalibrated one where there is none. Never raises, never
         writes."""
         sequence, calibration, problems = self._newest()
+        self._sequence = sequence
         if calibration is None:
             self.message = "not calibrated" + (": " + ", ".join(problems) if problems else "")
             return Calibration()
@@ -47,6 +50,11 @@ class Store:
             " (other record: %s)" % ", ".join(problems) if problems else ""
         )
         return calibration
+
+    def unchanged(self):
+        """True if the record in use is still the newest and both files can be read: not so when load() fell back."""
+        sequence, _, problems = self._newest()
+        return sequence == self._sequence and not problems
 
     def save(self, calibration):
         """Write calibration over the older record and read it back. Raises StoreError; the record in use
@@ -71,6 +79,7 @@ class Store:
                 "Not saved: flash",
                 "Old one is kept",
             )
+        self._sequence = sequence + 1
 
     def _newest(self):
         """(sequence, calibration, problems): sequence 0 and None where no record is valid."""
@@ -79,8 +88,10 @@ class Store:
             try:
                 with open(self._path(name), "rb") as file:
                     record = file.read(_LENGTH + 1)
-            except OSError:
-                continue  # missing: the first save makes it
+            except OSError as error:
+                if error.args[0] != ENOENT:  # missing is no problem: the first save makes it
+                    problems.append("%s unreadable" % name)
+                continue
             sequence, found, problem = self._unpack(record)
             if problem:
                 problems.append("%s %s" % (name, problem))
