@@ -163,14 +163,15 @@ class Mpu6050:
         """
         self._i2c.readfrom_mem_into(self._address, _FIFO_COUNT_H, self._two)
         waiting = self._two[0] << 8 | self._two[1]
-        odd = waiting % FRAME != 0  # once is a frame that just comes in
-        out_of_step = odd and self._odd
-        self._odd = odd
-        if out_of_step or waiting > self._chip()[4] - FRAME:
+        odd = waiting % FRAME != 0
+        if waiting > self._chip()[4] - FRAME or (odd and self._odd):
             self.overflows += 1
             self.restart_fifo()
             return 0
-        n = min(waiting // FRAME, MAX_FRAMES)  # only whole frames: the last may just be coming in
+        self._odd = odd
+        if odd:  # a frame is just coming in; if it still is the next time, the frames are out of step
+            return 0
+        n = min(waiting // FRAME, MAX_FRAMES)
         if n:
             self._i2c.readfrom_mem_into(self._address, _FIFO_R_W, self._some_frames[n])
         return n
