@@ -64,7 +64,8 @@ SIGMA_REST_RATE = radians(0.05)
 SIGMA_REST_FORCE = 0.02
 SIGMA_REST_SPEED = 0.02 / _G
 
-PIECES = 21  # of the work on a window, spread over the samples of the next one
+PIECES = 22  # of the work on a window, spread over the samples of the next one
+SLOW_STEP_US = 12_000
 
 TRIM_SPEED = 4.0 / _G
 TRIM_SIGMA_SPEED = 8.0 / _G
@@ -178,7 +179,9 @@ class LeanFilter:
         seconds = self._window_us * 1e-6
         for i in range(9):
             self._sums[i] = 0.0
-        self._pieces = max(1, PIECES * self._window_us // (n * WINDOW_US))
+        step_us = self._window_us // n
+        # where samples come slowly there is time, and waiting for the rest of the work would cost more
+        self._pieces = PIECES if step_us > SLOW_STEP_US else max(1, PIECES * step_us // WINDOW_US)
         self._count = 0
         self._window_us = 0
         x = self._x
