@@ -70,9 +70,7 @@ SLOW_STEP_US = 12_000
 TRIM_SPEED = 4.0 / _G
 TRIM_SIGMA_SPEED = 8.0 / _G
 
-DELAY_S = (
-    0.0075  # of the chip's low-pass at 44 Hz and of the mean of two samples: lean is shown as it is by now
-)
+DELAY_S = 0.0075  # lean is shown as it is by now: the chip's low-pass at 44 Hz is 5 ms late
 
 
 class LeanFilter:
