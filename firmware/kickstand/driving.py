@@ -1,4 +1,4 @@
-"""Sensor to vehicle from driving: the vertical from standing or straight driving, forward from straight braking (ViriCiti).
+"""Sensor to vehicle from driving: the vertical from standing and straight driving, forward from braking (ViriCiti, improved).
 
     drive = DriveAlignment("car")                  # or ("motorcycle", up): the two presses gave the vertical
     drive.update(force, rate, dt_us)               # some 100 times a second, sensor's axes
@@ -6,28 +6,48 @@
     if drive.ready: drive.matrix(out)
 
 What to show follows from `state`, `brakings` of `needed` and, when REFUSED, from `problem.lcd`. Whether an alignment
-that is there already still fits: `compare(matrix)`.
+that is there already still fits: driving_check.compare(). Fixed memory; each call does a short piece of the work.
 """
 
-from .errors import AlignmentError
+from math import atan2, degrees, pi, sqrt
+
+from .braking import BrakingFinder
+from .braking_regression import BLOCKS, LAG_STEP_US, LAGS, BrakingRegression, Fit
+from .driving_reasons import HALVES_DEG, late, moved, not_ready, units
+from .force_history import BIN_US, COLUMNS, ForceHistory, difference
+from .rotation import angle_deg, cross, dot, norm, normalize, vector
+from .speed_check import SpeedCheck
+from .standing import StandingVertical
+
+_G = 9.80665
+CAR, MOTORCYCLE = "car", "motorcycle"
 
 # state
 WAITING_FOR_SPEED = 0  # none has come yet, or none for STALE_US
 WAITING_FOR_STOP = 1  # a car only: the vertical and the gyro's bias come from standing
 DRIVE = 2  # waits for a braking in a straight line
 BRAKING = 3  # one is going on
-TURNING = 4  # one would be going on, but in a turn: not counted
-READY = 5  # matrix() can be taken; keeps getting better
-REFUSED = 6  # matrix() cannot be had, problem says why; goes on by itself if the reason ends
+TURNING = 4  # one is going on in a turn: not counted
+READY = 5  # matrix() can be taken; it gets better with more brakings
+REFUSED = 6  # matrix() cannot be had, problem says why
 
-# compare()
-UNKNOWN = 0  # not enough brakings yet
-SAME = 1
-REFINED = 2  # differs by what a pitch change on the kickstand makes: take matrix()
-REVERSED = 3  # forward is backward: the kickstand was on the other side
-MOVED = 4  # the mount has moved, or it was never so: align again
+GAP_US = 500_000  # samples are missing
+STALE_US = 5_000_000
+MIN_INTERVAL_US = 400_000  # a GPS at 10 Hz says no more than one at 2 Hz, and differences are noisier
+MAX_INTERVAL_US = 2_200_000  # one value of a GPS at 1 Hz may be missing
+STRAIGHT_DPS = 3.0
+MIN_SPEED_MPS = 1.5  # slower, steering is large and a stop ends with a jerk
+MAX_FORCE_G = 3.0  # a mean beyond is a knock
+PIECE_US = 12_000  # where samples come slower, more pieces of work are done at each
+MEAN_S = 60.0  # of the force, which is the vertical until there is a better one
 
-CAR, MOTORCYCLE = "car", "motorcycle"
+MIN_BRAKINGS = 5
+HALVES_STAY_DEG = 6.0  # to become ready it takes HALVES_DEG
+READY_DEG, READY_STAY_DEG = 1.5, 2.5
+LEVEL_DEG = 8.0  # two halves of a drive, or standing and driving: hills are not so different
+CHECK_BRAKINGS = 3  # before, units and lag of the speed are not judged
+MIN_SLOPE, MAX_SLOPE = 0.75, 1.35  # speed against force: pitch in braking and a coarse speed shift it by 0.2
+MAX_LATE_S = 1.9
 
 
 class DriveAlignment:
@@ -35,31 +55,313 @@ class DriveAlignment:
     (motorcycle; without it the vertical comes from straight riding).
 
     state; brakings: used so far; needed: how many it takes at least; turned: brakings not counted because of a turn;
-    ready; quality_deg: standard error of forward's direction (180 before the first brakings); problem: an
-    AlignmentError with reason and lcd, or None.
+    ready; quality_deg: standard error of forward's direction, 180 until there is one; halves_deg: how far two halves
+    of the drive disagree about it; lag_s: of the speed; problem: an AlignmentError with reason and lcd, or None;
+    standing: a StandingVertical, with the gyro's bias.
     """
 
     def __init__(self, vehicle, up=None):
         self.vehicle = vehicle
-        self.state = WAITING_FOR_SPEED
-        self.brakings = 0
-        self.needed = 5
-        self.turned = 0
+        self.standing = StandingVertical()
+        self.needed = MIN_BRAKINGS
+        self.brakings = self.turned = 0
         self.ready = False
-        self.quality_deg = 180.0
-        self.problem = None
+        self.quality_deg = self.halves_deg = 180.0
+        self.lag_s = 0.0
+        self.top_mps = 0.0
+        self.fit = Fit()
+        self.regression = BrakingRegression()
+        self.lag = 0
+        self._up = vector(up[0], up[1], up[2]) if up is not None else None
+        self._mean = None
+        self._finder = BrakingFinder()
+        self._speed_check = SpeedCheck()
+        self._history = ForceHistory()
+        self._disagrees = None
+        self._part = Fit()
+        self._sums = [0.0] * 6
+        self._sums_us = 0
+        self._second = [0.0] * 3
+        self._second_us = 0
+        self._ends = [[0] * COLUMNS for _ in range(LAGS)]
+        self._end = [0] * COLUMNS
+        self._known = [False] * LAGS
+        self._speed = -1.0  # none yet
+        self._quiet_us = 0  # since the last value
+        self._before = (0.0, 0)  # speed and time at the end of the last interval
+        self._next = None  # likewise, of the one to be worked on
+        self._work = None
+        self._turning = False
+
+    @property
+    def heard(self):
+        """True once there was a speed."""
+        return self._speed >= 0.0
+
+    @property
+    def state(self):
+        """One of the constants above."""
+        if self.problem is not None:
+            return REFUSED
+        if self.ready:
+            return READY
+        if self._speed < 0.0 or self._quiet_us > STALE_US:
+            return WAITING_FOR_SPEED
+        if self.vehicle == CAR and not self.standing.stops:
+            return WAITING_FOR_STOP
+        if not self._finder.braking:
+            return DRIVE
+        return TURNING if self._turning else BRAKING
+
+    @property
+    def problem(self):
+        """What is wrong with speed or mount: an AlignmentError, or None."""
+        if self._speed_check.problem is not None:
+            return self._speed_check.problem
+        if self.standing.moved and self.vehicle == CAR:
+            return moved("two stops differ by over %.0f degrees" % LEVEL_DEG)
+        return self._disagrees
 
     def update(self, force, rate, dt_us):
-        """force (3, g), rate (3, deg/s): calibrated, sensor's axes; dt_us: integer microseconds since the one before."""
+        """force (3, g), rate (3, deg/s): calibrated, sensor's axes; dt_us: integer microseconds since the one
+        before."""
+        if dt_us > GAP_US:
+            self._interrupt()
+            return
+        sums = self._sums
+        sums[0] += force[0] * dt_us
+        sums[1] += force[1] * dt_us
+        sums[2] += force[2] * dt_us
+        sums[3] += rate[0] * dt_us
+        sums[4] += rate[1] * dt_us
+        sums[5] += rate[2] * dt_us
+        self._sums_us += dt_us
+        if self._sums_us >= BIN_US:
+            self._end_bin()
+            return
+        for _ in range(1 + dt_us // PIECE_US):
+            if self._work is not None:
+                if next(self._work, True):
+                    self._work = None
+            elif self._next is not None and difference(self._history.now, self._next[1]) >= 0:
+                self._begin_work()
 
     def measure_speed(self, speed_mps, age_us=0):
         """A new value of the speed source. age_us: how old it is known to be; an unknown lag is found by itself."""
+        self._speed_check.measure(speed_mps)
+        if not speed_mps >= 0.0:
+            speed_mps = 0.0
+        self._speed = speed_mps
+        self._quiet_us = 0
+        self.top_mps = max(self.top_mps, speed_mps)
+        time_us = self._history.now + self._sums_us - age_us
+        if self._next is None and difference(time_us, self._before[1]) >= MIN_INTERVAL_US:
+            self._next = (speed_mps, time_us)
+
+    def vertical(self, out, fit=None):
+        """Fill out (3) with the vertical as well as it is known. False if it is not known yet.
+
+        fit: of straight driving. A car's stops and its driving know it equally well: both have the road's camber.
+        """
+        if self._up is not None:
+            best = self._up
+        elif self.vehicle == CAR and not self.standing.stops:
+            return False
+        elif fit is None:
+            best = self.standing.up if self.vehicle == CAR else self._mean
+        elif self.vehicle == CAR:
+            size = norm(fit.level)
+            best = [self.standing.up[i] + fit.level[i] / size for i in range(3)]
+        else:
+            best = fit.level
+        if best is None:
+            return False
+        for i in range(3):
+            out[i] = best[i]
+        normalize(out)
+        return True
 
     def matrix(self, out):
         """Fill out (9, rows left, up, forward) with vehicle-from-sensor. Raises AlignmentError while not ready."""
-        raise self.problem or AlignmentError("not enough brakings in a straight line", "Brake in a", "straight line")
+        if self.problem is not None:
+            raise self.problem
+        if not self.ready:
+            raise not_ready(self)
+        up, left, forward = vector(), vector(), vector()
+        self.vertical(up, self.fit)
+        cross(left, up, self.fit.forward)
+        normalize(left)
+        cross(forward, left, up)
+        for i in range(3):
+            out[i] = left[i]
+            out[3 + i] = up[i]
+            out[6 + i] = forward[i]
 
-    def compare(self, matrix):
-        """How an alignment (9, rows left, up, forward) fits what driving shows: UNKNOWN, SAME, REFINED, REVERSED or
-        MOVED. Sure of REVERSED after two brakings."""
-        return UNKNOWN
+    def _interrupt(self):
+        """Samples are missing: what follows does not join what came before."""
+        self._sums = [0.0] * 6
+        self._sums_us = 0
+        self._history.clear()
+        self._work = self._next = None
+        self._before = (0.0, self._history.now - MIN_INTERVAL_US)
+        self._known = [False] * LAGS
+        self._finder.interrupt()
+
+    def _end_bin(self):
+        sums, n = self._sums, self._sums_us
+        seconds = n * 1e-6
+        force = [sums[0] / n, sums[1] / n, sums[2] / n]
+        rate = [sums[3] / n, sums[4] / n, sums[5] / n]
+        if self._mean is None:
+            self._mean = vector(force[0], force[1], force[2])
+        gain = seconds / MEAN_S
+        for i in range(3):
+            self._mean[i] += gain * (force[i] - self._mean[i])
+        if self._speed >= 0.0:
+            self.standing.update(force, rate, self._speed, seconds)
+        up = self.standing.up if self.standing.stops and self.vehicle == CAR else self._up or self._mean
+        bias = self.standing.bias
+        turned = (rate[0] - bias[0]) * up[0] + (rate[1] - bias[1]) * up[1] + (rate[2] - bias[2]) * up[2]
+        self._history.add(sums, turned * seconds * 1e5, n)
+        self._seconds(force, n)
+        self.bin(force)
+        self._quiet_us = min(STALE_US + 1, self._quiet_us + n)
+        self._sums_us = 0
+        for i in range(6):
+            sums[i] = 0.0
+
+    def bin(self, force):
+        """For a method that looks at more than integrals: mean force (3, g) of each tenth of a second."""
+
+    def _seconds(self, force, n):
+        """Means of a second each, for the check of the speed."""
+        for i in range(3):
+            self._second[i] += force[i] * n
+        self._second_us += n
+        if self._second_us >= 1_000_000:
+            self._speed_check.second([total / self._second_us for total in self._second])
+            self._second_us = 0
+            for i in range(3):
+                self._second[i] = 0.0
+
+    def _begin_work(self):
+        speed, time_us = self._next
+        before_speed, before_us = self._before
+        self._before = self._next
+        self._next = None
+        length_us = difference(time_us, before_us)
+        if length_us > MAX_INTERVAL_US:
+            self._known = [False] * LAGS
+            self._finder.interrupt()
+        counts = self.vehicle != CAR or self.standing.stops
+        self._work = self._follow(time_us, length_us * 1e-6, before_speed, speed, counts)
+
+    def _follow(self, time_us, seconds, before, speed, counts):
+        """Lay the change of speed beside what was felt, at each lag; a generator of short pieces."""
+        mean = 0.5 * (before + speed)
+        change = speed - before
+        straight = None
+        force = [0.0] * 3
+        end = self._end
+        for lag in range(LAGS):
+            known = self._history.at(end, time_us - lag * LAG_STEP_US)
+            begin = self._ends[lag]
+            if known and self._known[lag] and counts and mean > MIN_SPEED_MPS:
+                for i in range(3):
+                    force[i] = difference(end[i], begin[i]) * 1e-6
+                yaw_dps = difference(end[3], begin[3]) * 1e-5 / seconds
+                turns = abs(yaw_dps) > STRAIGHT_DPS
+                if lag == self.lag:
+                    straight = not turns
+                if not turns and norm(force) < MAX_FORCE_G * seconds:
+                    curve_g = mean * yaw_dps * (pi / 180.0 / _G)
+                    self.regression.add(lag, seconds, change / _G, curve_g, force)
+            for i in range(COLUMNS):
+                begin[i] = end[i]
+            self._known[lag] = known
+            yield
+        self._turning = straight is False
+        ended = self.interval(change, seconds, straight)
+        if ended and counts:
+            if self._finder.was_straight:
+                self.brakings += 1
+            else:
+                self.turned += 1
+            if self._finder.was_straight:
+                yield from self.regression.close_block()
+                yield from self._judge()
+        yield True
+
+    def interval(self, change, seconds, straight):
+        """Look for brakings: True when one has just ended."""
+        return self._finder.update(change, seconds, straight)
+
+    def _judge(self):
+        """After each braking: which lag, how good, ready or not; a generator of short pieces."""
+        regression, part = self.regression, self._part
+        explained = [0.0] * LAGS
+        for lag in range(LAGS):
+            if regression.fit(part, lag):
+                explained[lag] = part.explained
+            yield
+        self.lag = best = explained.index(max(explained))
+        self.lag_s = (best + _peak(explained, best)) * LAG_STEP_US * 1e-6
+        up = vector()
+        if not regression.fit(self.fit, best) or not self.vertical(up, self.fit):
+            return
+        left, forward = vector(), vector()
+        cross(left, up, self.fit.forward)
+        cross(forward, left, up)
+        normalize(left)
+        slope = normalize(forward)
+        yield
+        blocks = regression.filled
+        spread = 0.0
+        for block in range(blocks):
+            if regression.fit(part, best, 0, blocks, block):
+                angle = atan2(dot(left, part.forward), dot(forward, part.forward))
+                spread += angle * angle
+            yield
+        if blocks > 1:  # the jackknife: empirical, where a formal error is optimistic early
+            self.quality_deg = degrees(sqrt(spread * (blocks - 1) / blocks))
+        half = blocks // 2
+        if half and regression.fit(part, best, 0, half):
+            one = atan2(dot(left, part.forward), dot(forward, part.forward))
+            level = vector(part.level[0], part.level[1], part.level[2])
+            yield
+            if regression.fit(part, best, half, blocks):
+                two = atan2(dot(left, part.forward), dot(forward, part.forward))
+                apart = abs(one - two)
+                self.halves_deg = degrees(min(apart, 2 * pi - apart))
+                self._decide(slope, angle_deg(level, part.level))
+
+    def _decide(self, slope, level_deg):
+        stay = self.ready
+        self._disagrees = None
+        if self.brakings >= CHECK_BRAKINGS:
+            against = self.standing.up if self.vehicle == CAR else self._up
+            from_driving = 0.0 if against is None else angle_deg(against, self.fit.level)
+            if self.lag_s >= MAX_LATE_S:
+                self._disagrees = late(self.lag_s)
+            elif not MIN_SLOPE < slope < MAX_SLOPE:
+                self._disagrees = units(slope)
+            elif self.brakings >= MIN_BRAKINGS:
+                if level_deg > LEVEL_DEG:
+                    self._disagrees = moved("the vertical changed by %.0f degrees during the drive" % level_deg)
+                elif from_driving > LEVEL_DEG:
+                    self._disagrees = moved("standing and driving differ by %.0f degrees" % from_driving)
+        self.ready = (
+            self._disagrees is None
+            and self.brakings >= MIN_BRAKINGS
+            and self.halves_deg <= (HALVES_STAY_DEG if stay else HALVES_DEG)
+            and self.quality_deg <= (READY_STAY_DEG if stay else READY_DEG)
+        )
+
+
+def _peak(values, i):
+    """Where between the neighbours of i, its largest value, the peak is: -0.5 to 0.5."""
+    if i == 0 or i == len(values) - 1:
+        return 0.0
+    before, at, after = values[i - 1], values[i], values[i + 1]
+    bend = before - 2.0 * at + after
+    return 0.5 * (before - after) / bend if bend < 0.0 else 0.0

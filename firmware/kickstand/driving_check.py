@@ -1,0 +1,1 @@
+"""Does an alignment that is there already fit what driving shows?"""
