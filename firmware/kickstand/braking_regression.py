@@ -16,7 +16,7 @@ BLOCKS = 8
 LAG_STEP_US = 250_000
 LAGS = 11
 TERMS = 15
-T, A, C, AA, AC, CC, S, AS, CS = 0, 1, 2, 3, 4, 5, 6, 9, 12  # S, AS, CS: three each
+SECONDS, A, C, AA, AC, CC, S, AS, CS = 0, 1, 2, 3, 4, 5, 6, 9, 12  # S, AS, CS: three each
 RIDGE = 1e-6  # g^2: no curve at all leaves the coefficient of c at zero
 
 
@@ -90,7 +90,7 @@ class BrakingRegression:
                 if block != without:
                     value += sums[block * TERMS + k]
             total[k] = value
-        n = total[T]
+        n = total[SECONDS]
         if n <= 0.0:
             return False
         a, c = total[A] / n, total[C] / n

@@ -35,15 +35,15 @@ GAP_US = 500_000  # samples are missing
 STALE_US = 5_000_000
 MIN_INTERVAL_US = 400_000  # a GPS at 10 Hz says no more than one at 2 Hz, and differences are noisier
 MAX_INTERVAL_US = 2_200_000  # one value of a GPS at 1 Hz may be missing
-STRAIGHT_DPS = 3.0
-MIN_SPEED_MPS = 1.5  # slower, steering is large and a stop ends with a jerk
+STRAIGHT_DPS = 2.0  # at 10 m/s 0.036 g to the side, a fifth of a braking; the regression takes off most of that
+MIN_SPEED_MPS = 1.0  # slower, steering is large and a stop ends with a jerk
 MAX_FORCE_G = 3.0  # a mean beyond is a knock
 PIECE_US = 12_000  # where samples come slower, more pieces of work are done at each
-MEAN_S = 60.0  # of the force, which is the vertical until there is a better one
+MEAN_S = 60.0  # of force and rate, which are vertical and gyro bias until a stop shows better ones
 
 MIN_BRAKINGS = 5
 HALVES_STAY_DEG = 6.0  # to become ready it takes HALVES_DEG
-READY_DEG, READY_STAY_DEG = 1.5, 2.5
+READY_DEG, READY_STAY_DEG = 2.0, 3.0
 LEVEL_DEG = 8.0  # two halves of a drive, or standing and driving: hills are not so different
 CHECK_BRAKINGS = 3  # before, units and lag of the speed are not judged
 MIN_SLOPE, MAX_SLOPE = 0.75, 1.35  # speed against force: pitch in braking and a coarse speed shift it by 0.2
@@ -73,7 +73,8 @@ class DriveAlignment:
         self.regression = BrakingRegression()
         self.lag = 0
         self._up = vector(up[0], up[1], up[2]) if up is not None else None
-        self._mean = None
+        self._mean = self._mean_rate = None
+        self._mean_s = 0.0
         self._finder = BrakingFinder()
         self._speed_check = SpeedCheck()
         self._history = ForceHistory()
@@ -213,14 +214,16 @@ class DriveAlignment:
         force = [sums[0] / n, sums[1] / n, sums[2] / n]
         rate = [sums[3] / n, sums[4] / n, sums[5] / n]
         if self._mean is None:
-            self._mean = vector(force[0], force[1], force[2])
-        gain = seconds / MEAN_S
+            self._mean, self._mean_rate = vector(), [0.0] * 3
+        self._mean_s = min(MEAN_S, self._mean_s + seconds)
+        gain = seconds / self._mean_s
         for i in range(3):
             self._mean[i] += gain * (force[i] - self._mean[i])
+            self._mean_rate[i] += gain * (rate[i] - self._mean_rate[i])
         if self._speed >= 0.0:
             self.standing.update(force, rate, self._speed, seconds)
         up = self.standing.up if self.standing.stops and self.vehicle == CAR else self._up or self._mean
-        bias = self.standing.bias
+        bias = self.standing.bias if self.standing.stops else self._mean_rate
         turned = (rate[0] - bias[0]) * up[0] + (rate[1] - bias[1]) * up[1] + (rate[2] - bias[2]) * up[2]
         self._history.add(sums, turned * seconds * 1e5, n)
         self._seconds(force, n)
@@ -253,20 +256,19 @@ class DriveAlignment:
         if length_us > MAX_INTERVAL_US:
             self._known = [False] * LAGS
             self._finder.interrupt()
-        counts = self.vehicle != CAR or self.standing.stops
-        self._work = self._follow(time_us, length_us * 1e-6, before_speed, speed, counts)
+        self._work = self._follow(time_us, length_us * 1e-6, before_speed, speed)
 
-    def _follow(self, time_us, seconds, before, speed, counts):
+    def _follow(self, time_us, seconds, before, speed):
         """Lay the change of speed beside what was felt, at each lag; a generator of short pieces."""
         mean = 0.5 * (before + speed)
         change = speed - before
-        straight = None
+        straight = False
         force = [0.0] * 3
         end = self._end
         for lag in range(LAGS):
             known = self._history.at(end, time_us - lag * LAG_STEP_US)
             begin = self._ends[lag]
-            if known and self._known[lag] and counts and mean > MIN_SPEED_MPS:
+            if known and self._known[lag] and mean > MIN_SPEED_MPS:
                 for i in range(3):
                     force[i] = difference(end[i], begin[i]) * 1e-6
                 yaw_dps = difference(end[3], begin[3]) * 1e-5 / seconds
@@ -280,16 +282,15 @@ class DriveAlignment:
                 begin[i] = end[i]
             self._known[lag] = known
             yield
-        self._turning = straight is False
+        self._turning = not straight
         ended = self.interval(change, seconds, straight)
-        if ended and counts:
+        if ended:
             if self._finder.was_straight:
                 self.brakings += 1
-            else:
-                self.turned += 1
-            if self._finder.was_straight:
                 yield from self.regression.close_block()
                 yield from self._judge()
+            else:
+                self.turned += 1
         yield True
 
     def interval(self, change, seconds, straight):
