@@ -36,10 +36,10 @@ STALE_US = 5_000_000
 MIN_INTERVAL_US = 400_000  # a GPS at 10 Hz says no more than one at 2 Hz, and differences are noisier
 MAX_INTERVAL_US = 2_200_000  # one value of a GPS at 1 Hz may be missing
 STRAIGHT_DPS = 2.0  # at 10 m/s 0.036 g to the side, a fifth of a braking; the regression takes off most of that
-MIN_SPEED_MPS = 1.0  # slower, steering is large and a stop ends with a jerk
+MIN_SPEED_MPS = 1.5  # slower, steering is large and a stop ends with a jerk
 MAX_FORCE_G = 3.0  # a mean beyond is a knock
 PIECE_US = 12_000  # where samples come slower, more pieces of work are done at each
-MEAN_S = 60.0  # of force and rate, which are vertical and gyro bias until a stop shows better ones
+MEAN_S = 60.0  # of the force, which is the vertical until there is a better one
 
 MIN_BRAKINGS = 5
 HALVES_STAY_DEG = 6.0  # to become ready it takes HALVES_DEG
@@ -52,7 +52,8 @@ MAX_LATE_S = 1.9
 
 class DriveAlignment:
     """vehicle: CAR or MOTORCYCLE. up: unit vector of the vertical in the sensor's axes, from the two poses, if known
-    (motorcycle; without it the vertical comes from straight riding).
+    (motorcycle; without it the vertical comes from straight riding). bias: of the gyro (3, deg/s), to be taken off
+    until a stop shows it; zeros for rates that are corrected already. Without it nothing counts before the first stop.
 
     state; brakings: used so far; needed: how many it takes at least; turned: brakings not counted because of a turn;
     ready; quality_deg: standard error of forward's direction, 180 until there is one; halves_deg: how far two halves
@@ -60,9 +61,12 @@ class DriveAlignment:
     standing: a StandingVertical, with the gyro's bias.
     """
 
-    def __init__(self, vehicle, up=None):
+    def __init__(self, vehicle, up=None, bias=None):
         self.vehicle = vehicle
         self.standing = StandingVertical()
+        self._bias_known = bias is not None
+        for i in range(3):
+            self.standing.bias[i] = bias[i] if bias else 0.0
         self.needed = MIN_BRAKINGS
         self.brakings = self.turned = 0
         self.ready = False
@@ -73,9 +77,9 @@ class DriveAlignment:
         self.regression = BrakingRegression()
         self.lag = 0
         self._up = vector(up[0], up[1], up[2]) if up is not None else None
-        self._mean = self._mean_rate = None
+        self._mean = None
         self._mean_s = 0.0
-        self._finder = BrakingFinder()
+        self._finder = BrakingFinder(LAGS)
         self._speed_check = SpeedCheck()
         self._history = ForceHistory()
         self._disagrees = None
@@ -92,7 +96,7 @@ class DriveAlignment:
         self._before = (0.0, 0)  # speed and time at the end of the last interval
         self._next = None  # likewise, of the one to be worked on
         self._work = None
-        self._turning = False
+        self._straight = [False] * LAGS
 
     @property
     def heard(self):
@@ -112,14 +116,14 @@ class DriveAlignment:
             return WAITING_FOR_STOP
         if not self._finder.braking:
             return DRIVE
-        return TURNING if self._turning else BRAKING
+        return BRAKING if self._straight[self.lag] else TURNING
 
     @property
     def problem(self):
         """What is wrong with speed or mount: an AlignmentError, or None."""
         if self._speed_check.problem is not None:
             return self._speed_check.problem
-        if self.standing.moved and self.vehicle == CAR:
+        if self._disagrees is None and self.standing.moved and self.vehicle == CAR:
             return moved("two stops differ by over %.0f degrees" % LEVEL_DEG)
         return self._disagrees
 
@@ -214,16 +218,15 @@ class DriveAlignment:
         force = [sums[0] / n, sums[1] / n, sums[2] / n]
         rate = [sums[3] / n, sums[4] / n, sums[5] / n]
         if self._mean is None:
-            self._mean, self._mean_rate = vector(), [0.0] * 3
+            self._mean = vector()
         self._mean_s = min(MEAN_S, self._mean_s + seconds)
         gain = seconds / self._mean_s
         for i in range(3):
             self._mean[i] += gain * (force[i] - self._mean[i])
-            self._mean_rate[i] += gain * (rate[i] - self._mean_rate[i])
         if self._speed >= 0.0:
             self.standing.update(force, rate, self._speed, seconds)
         up = self.standing.up if self.standing.stops and self.vehicle == CAR else self._up or self._mean
-        bias = self.standing.bias if self.standing.stops else self._mean_rate
+        bias = self.standing.bias
         turned = (rate[0] - bias[0]) * up[0] + (rate[1] - bias[1]) * up[1] + (rate[2] - bias[2]) * up[2]
         self._history.add(sums, turned * seconds * 1e5, n)
         self._seconds(force, n)
@@ -262,40 +265,33 @@ class DriveAlignment:
         """Lay the change of speed beside what was felt, at each lag; a generator of short pieces."""
         mean = 0.5 * (before + speed)
         change = speed - before
-        straight = False
+        straight = self._straight
+        counts = mean > MIN_SPEED_MPS and (self._bias_known or self.standing.stops)
         force = [0.0] * 3
         end = self._end
         for lag in range(LAGS):
             known = self._history.at(end, time_us - lag * LAG_STEP_US)
             begin = self._ends[lag]
-            if known and self._known[lag] and mean > MIN_SPEED_MPS:
+            straight[lag] = False
+            if known and self._known[lag] and counts:
                 for i in range(3):
                     force[i] = difference(end[i], begin[i]) * 1e-6
                 yaw_dps = difference(end[3], begin[3]) * 1e-5 / seconds
-                turns = abs(yaw_dps) > STRAIGHT_DPS
-                if lag == self.lag:
-                    straight = not turns
-                if not turns and norm(force) < MAX_FORCE_G * seconds:
+                straight[lag] = abs(yaw_dps) <= STRAIGHT_DPS
+                if straight[lag] and norm(force) < MAX_FORCE_G * seconds:
                     curve_g = mean * yaw_dps * (pi / 180.0 / _G)
                     self.regression.add(lag, seconds, change / _G, curve_g, force)
             for i in range(COLUMNS):
                 begin[i] = end[i]
             self._known[lag] = known
             yield
-        self._turning = not straight
-        ended = self.interval(change, seconds, straight)
-        if ended:
-            if self._finder.was_straight:
-                self.brakings += 1
-                yield from self.regression.close_block()
-                yield from self._judge()
-            else:
-                self.turned += 1
+        if self.braking_ended(change, seconds):
+            yield from self._judge()
         yield True
 
-    def interval(self, change, seconds, straight):
-        """Look for brakings: True when one has just ended."""
-        return self._finder.update(change, seconds, straight)
+    def braking_ended(self, change, seconds):
+        """True if the last change of speed was the end of a braking."""
+        return self._finder.update(change, seconds, self._straight)
 
     def _judge(self):
         """After each braking: which lag, how good, ready or not; a generator of short pieces."""
@@ -307,6 +303,11 @@ class DriveAlignment:
             yield
         self.lag = best = explained.index(max(explained))
         self.lag_s = (best + _peak(explained, best)) * LAG_STEP_US * 1e-6
+        if not self._finder.was_straight(best):
+            self.turned += 1
+            return
+        self.brakings += 1
+        yield from regression.close_block()
         up = vector()
         if not regression.fit(self.fit, best) or not self.vertical(up, self.fit):
             return

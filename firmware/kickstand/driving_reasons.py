@@ -19,10 +19,8 @@ def units(slope):
     guess = "is it in m/s, and the right vehicle's?"
     if 3.0 < factor < 4.4:
         guess = "it is in km/h, m/s are needed"
-    elif 2.1 < factor < 2.4:
-        guess = "it is in mph, m/s are needed"
-    elif 1.8 < factor < 2.1:
-        guess = "it is in knots, m/s are needed"
+    elif 1.8 < factor < 2.5:
+        guess = "it is in mph or knots, m/s are needed"
     return AlignmentError(
         "the speed changes %.1f times as much as the force says: %s" % (factor, guess),
         "Speed %.1f times" % min(factor, 99.9),

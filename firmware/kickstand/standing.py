@@ -12,6 +12,8 @@ COUNTS_S = 2.0
 STILL_G = 0.02  # of a mean of a tenth of a second from those before: engine, wind, passengers
 STILL_DPS = 1.5
 AVERAGE_S = 0.5
+SAME_STOP_DEG = 1.5  # doors and passengers
+TURNED_S = 6.0  # longer than a speed may be late
 MAX_APART_DEG = 8.0  # 14 %: two stops further apart are not two slopes
 
 
@@ -68,12 +70,16 @@ class StandingVertical:
         self._still_s += seconds
         if self._still_s < SETTLE_S:
             return
+        if self._counted:
+            apart = angle_deg(self._force, self._stop)
+            if apart > SAME_STOP_DEG:
+                # off already, while a late speed still says zero; or the sensor has been turned
+                self.moved = self.moved or (apart > MAX_APART_DEG and self._still_s > TURNED_S)
+                return
         self.standing = True
         self._average(force, rate, seconds)
 
     def _average(self, force, rate, seconds):
-        if self._averaged_s > COUNTS_S and angle_deg(self._force, self._stop) > MAX_APART_DEG:
-            self.moved = True
         self._averaged_s += seconds
         gain = seconds / self._averaged_s
         for i in range(3):
