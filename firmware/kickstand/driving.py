@@ -5,7 +5,7 @@
     drive.measure_speed(speed_mps, age_us)         # each new value of the speed source, 1 to 10 a second
     if drive.ready: drive.matrix(out)
 
-What to show follows from `state`, `brakings` of `needed` and, when REFUSED, from `problem.lcd`. Whether an alignment
+What to show follows from `state`, `counted` of `needed` and, when REFUSED, from `problem.lcd`. Whether an alignment
 that is there already still fits: driving_check.compare(). Fixed memory; each call does a short piece of the work.
 """
 
@@ -41,11 +41,12 @@ MAX_FORCE_G = 3.0  # a mean beyond is a knock
 PIECE_US = 12_000  # where samples come slower, more pieces of work are done at each
 MEAN_S = 60.0  # of the force, which is the vertical until there is a better one
 
-MIN_BRAKINGS = 5
+NEEDED = 5  # brakings and starts
+MAX_STARTS = 2  # count: the others are brakings
 HALVES_STAY_DEG = 6.0  # to become ready it takes HALVES_DEG
 READY_DEG, READY_STAY_DEG = 2.0, 3.0
 LEVEL_DEG = 8.0  # two halves of a drive, or standing and driving: hills are not so different
-CHECK_BRAKINGS = 3  # before, units and lag of the speed are not judged
+CHECKED = 3  # before, units and lag of the speed are not judged
 MIN_SLOPE, MAX_SLOPE = 0.75, 1.35  # speed against force: pitch in braking and a coarse speed shift it by 0.2
 MAX_LATE_S = 1.9
 
@@ -55,7 +56,8 @@ class DriveAlignment:
     (motorcycle; without it the vertical comes from straight riding). bias: of the gyro (3, deg/s), to be taken off
     until a stop shows it; zeros for rates that are corrected already. Without it nothing counts before the first stop.
 
-    state; brakings: used so far; needed: how many it takes at least; turned: brakings not counted because of a turn;
+    state; counted: brakings so far, and up to two starts, of needed; brakings, starts: how many of each; turned:
+    brakings not counted because of a turn;
     ready; quality_deg: standard error of forward's direction, 180 until there is one; halves_deg: how far two halves
     of the drive disagree about it; lag_s: of the speed; problem: an AlignmentError with reason and lcd, or None;
     standing: a StandingVertical, with the gyro's bias.
@@ -67,8 +69,8 @@ class DriveAlignment:
         self._bias_known = bias is not None
         for i in range(3):
             self.standing.bias[i] = bias[i] if bias else 0.0
-        self.needed = MIN_BRAKINGS
-        self.brakings = self.turned = 0
+        self.needed = NEEDED
+        self.brakings = self.starts = self.turned = 0
         self.ready = False
         self.quality_deg = self.halves_deg = 180.0
         self.lag_s = 0.0
@@ -99,6 +101,11 @@ class DriveAlignment:
         self._straight = [False] * LAGS
 
     @property
+    def counted(self):
+        """How much of what is needed is there: each braking, and up to two straight starts."""
+        return self.brakings + min(self.starts, MAX_STARTS)
+
+    @property
     def heard(self):
         """True once there was a speed."""
         return self._speed >= 0.0
@@ -114,7 +121,7 @@ class DriveAlignment:
             return WAITING_FOR_SPEED
         if self.vehicle == CAR and not self.standing.stops:
             return WAITING_FOR_STOP
-        if not self._finder.braking:
+        if not self._finder.going_on or self._finder.change > 0.0:
             return DRIVE
         return BRAKING if self._straight[self.lag] else TURNING
 
@@ -303,10 +310,15 @@ class DriveAlignment:
             yield
         self.lag = best = explained.index(max(explained))
         self.lag_s = (best + _peak(explained, best)) * LAG_STEP_US * 1e-6
+        braked = self._finder.change < 0.0
         if not self._finder.was_straight(best):
-            self.turned += 1
+            if braked:
+                self.turned += 1
             return
-        self.brakings += 1
+        if braked:
+            self.brakings += 1
+        else:
+            self.starts += 1
         yield from regression.close_block()
         up = vector()
         if not regression.fit(self.fit, best) or not self.vertical(up, self.fit):
@@ -340,21 +352,21 @@ class DriveAlignment:
     def _decide(self, slope, level_deg):
         stay = self.ready
         self._disagrees = None
-        if self.brakings >= CHECK_BRAKINGS:
+        if self.counted >= CHECKED:
             against = self.standing.up if self.vehicle == CAR else self._up
             from_driving = 0.0 if against is None else angle_deg(against, self.fit.level)
             if self.lag_s >= MAX_LATE_S:
                 self._disagrees = late(self.lag_s)
             elif not MIN_SLOPE < slope < MAX_SLOPE:
                 self._disagrees = units(slope)
-            elif self.brakings >= MIN_BRAKINGS:
+            elif self.counted >= self.needed:
                 if level_deg > LEVEL_DEG:
                     self._disagrees = moved("the vertical changed by %.0f degrees during the drive" % level_deg)
                 elif from_driving > LEVEL_DEG:
                     self._disagrees = moved("standing and driving differ by %.0f degrees" % from_driving)
         self.ready = (
             self._disagrees is None
-            and self.brakings >= MIN_BRAKINGS
+            and self.counted >= self.needed
             and self.halves_deg <= (HALVES_STAY_DEG if stay else HALVES_DEG)
             and self.quality_deg <= (READY_STAY_DEG if stay else READY_DEG)
         )

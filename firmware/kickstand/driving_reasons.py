@@ -49,12 +49,12 @@ def not_ready(drive):
             "Not stopped yet",
             "Stand for %.0f s" % (SETTLE_S + COUNTS_S),
         )
-    if drive.brakings < drive.needed:
+    if drive.counted < drive.needed:
         return AlignmentError(
-            "only %d of %d brakings in a straight line, %d more while turning: not enough for forward"
-            % (drive.brakings, drive.needed, drive.turned),
+            "only %d of %d brakings in a straight line, %d more were in turns: not enough for forward"
+            % (drive.counted, drive.needed, drive.turned),
             "Brake straight",
-            "%d of %d done" % (drive.brakings, drive.needed),
+            "%d of %d done" % (drive.counted, drive.needed),
         )
     if drive.halves_deg > HALVES_DEG:
         return AlignmentError(
