@@ -71,7 +71,7 @@ class DriveAlignment:
             self.standing.bias[i] = bias[i] if bias else 0.0
         self.needed = NEEDED
         self.brakings = self.starts = self.turned = 0
-        self.ready = False
+        self._good = False
         self.quality_deg = self.halves_deg = 180.0
         self.lag_s = 0.0
         self.top_mps = 0.0
@@ -84,7 +84,7 @@ class DriveAlignment:
         self._finder = BrakingFinder(LAGS)
         self._speed_check = SpeedCheck()
         self._history = ForceHistory()
-        self._disagrees = None
+        self.speed_problem = self._mount_problem = None
         self._part = Fit()
         self._sums = [0.0] * 6
         self._sums_us = 0
@@ -126,13 +126,22 @@ class DriveAlignment:
         return BRAKING if self._straight[self.lag] else TURNING
 
     @property
+    def ready(self):
+        """True while matrix() can be taken."""
+        return self._good and self.problem is None
+
+    @property
     def problem(self):
         """What is wrong with speed or mount: an AlignmentError, or None."""
-        if self._speed_check.problem is not None:
-            return self._speed_check.problem
-        if self._disagrees is None and self.standing.moved and self.vehicle == CAR:
-            return moved("two stops differ by over %.0f degrees" % LEVEL_DEG)
-        return self._disagrees
+        problem = self._speed_check.problem or self.speed_problem or self._mount_problem
+        if problem is None and self.standing.moved and self.vehicle == CAR:
+            problem = moved("two stops differ by over %.0f degrees" % LEVEL_DEG)
+        return problem
+
+    @property
+    def reason(self):
+        """Why matrix() cannot be had yet: an AlignmentError."""
+        return self.problem or not_ready(self, self.counted, self.needed, self.turned)
 
     def update(self, force, rate, dt_us):
         """force (3, g), rate (3, deg/s): calibrated, sensor's axes; dt_us: integer microseconds since the one
@@ -195,10 +204,8 @@ class DriveAlignment:
 
     def matrix(self, out):
         """Fill out (9, rows left, up, forward) with vehicle-from-sensor. Raises AlignmentError while not ready."""
-        if self.problem is not None:
-            raise self.problem
         if not self.ready:
-            raise not_ready(self)
+            raise self.reason
         up, left, forward = vector(), vector(), vector()
         self.vertical(up, self.fit)
         cross(left, up, self.fit.forward)
@@ -237,14 +244,10 @@ class DriveAlignment:
         turned = (rate[0] - bias[0]) * up[0] + (rate[1] - bias[1]) * up[1] + (rate[2] - bias[2]) * up[2]
         self._history.add(sums, turned * seconds * 1e5, n)
         self._seconds(force, n)
-        self.bin(force)
         self._quiet_us = min(STALE_US + 1, self._quiet_us + n)
         self._sums_us = 0
         for i in range(6):
             sums[i] = 0.0
-
-    def bin(self, force):
-        """For a method that looks at more than integrals: mean force (3, g) of each tenth of a second."""
 
     def _seconds(self, force, n):
         """Means of a second each, for the check of the speed."""
@@ -292,13 +295,9 @@ class DriveAlignment:
                 begin[i] = end[i]
             self._known[lag] = known
             yield
-        if self.braking_ended(change, seconds):
+        if self._finder.update(change, seconds, straight):
             yield from self._judge()
         yield True
-
-    def braking_ended(self, change, seconds):
-        """True if the last change of speed was the end of a braking."""
-        return self._finder.update(change, seconds, self._straight)
 
     def _judge(self):
         """After each braking: which lag, how good, ready or not; a generator of short pieces."""
@@ -350,25 +349,25 @@ class DriveAlignment:
                 self._decide(slope, angle_deg(level, part.level))
 
     def _decide(self, slope, level_deg):
-        stay = self.ready
-        self._disagrees = None
+        """level_deg: between the verticals of two halves of the drive."""
+        self.speed_problem = self._mount_problem = None
         if self.counted >= CHECKED:
-            against = self.standing.up if self.vehicle == CAR else self._up
-            from_driving = 0.0 if against is None else angle_deg(against, self.fit.level)
             if self.lag_s >= MAX_LATE_S:
-                self._disagrees = late(self.lag_s)
+                self.speed_problem = late(self.lag_s)
             elif not MIN_SLOPE < slope < MAX_SLOPE:
-                self._disagrees = units(slope)
-            elif self.counted >= self.needed:
-                if level_deg > LEVEL_DEG:
-                    self._disagrees = moved("the vertical changed by %.0f degrees during the drive" % level_deg)
-                elif from_driving > LEVEL_DEG:
-                    self._disagrees = moved("standing and driving differ by %.0f degrees" % from_driving)
-        self.ready = (
-            self._disagrees is None
-            and self.counted >= self.needed
-            and self.halves_deg <= (HALVES_STAY_DEG if stay else HALVES_DEG)
-            and self.quality_deg <= (READY_STAY_DEG if stay else READY_DEG)
+                self.speed_problem = units(slope)
+        if self.counted >= self.needed:
+            before = self.standing.up if self.vehicle == CAR else self._up
+            from_driving = 0.0 if before is None else angle_deg(before, self.fit.level)
+            if level_deg > LEVEL_DEG:
+                self._mount_problem = moved("the vertical changed by %.0f degrees during the drive" % level_deg)
+            elif from_driving > LEVEL_DEG:
+                what = "standing" if self.vehicle == CAR else "the upright pose"
+                self._mount_problem = moved("%s and driving differ by %.0f degrees" % (what, from_driving))
+        self._good = (
+            self.counted >= self.needed
+            and self.halves_deg <= (HALVES_STAY_DEG if self._good else HALVES_DEG)
+            and self.quality_deg <= (READY_STAY_DEG if self._good else READY_DEG)
         )
 
 

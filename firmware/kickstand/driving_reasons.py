@@ -33,13 +33,14 @@ def moved(what):
     return AlignmentError("the mount has moved: " + what, "Mount has moved", "Align again")
 
 
-def not_ready(drive):
-    """What a DriveAlignment that has no problem is still waiting for."""
+def not_ready(drive, counted, needed, turned):
+    """What a DriveAlignment that has no problem is still waiting for. counted, needed,
+    turned: brakings used, needed, and not used."""
     if not drive.heard:
         return AlignmentError("no speed: it needs a speed, from a GPS or a wheel", "No speed", "GPS or wheel?")
     if drive.top_mps < MOVED_MPS:
         return AlignmentError(
-            "it only stood still: drive, and brake in a straight line %d times" % drive.needed,
+            "it only stood still: drive, and brake in a straight line %d times" % needed,
             "Not driven yet",
             "Brake straight",
         )
@@ -49,12 +50,12 @@ def not_ready(drive):
             "Not stopped yet",
             "Stand for %.0f s" % (SETTLE_S + COUNTS_S),
         )
-    if drive.counted < drive.needed:
+    if counted < needed:
         return AlignmentError(
-            "only %d of %d brakings in a straight line, %d more were in turns: not enough for forward"
-            % (drive.counted, drive.needed, drive.turned),
+            "only %d of %d brakings in a straight line, %d more were not straight: not enough for forward"
+            % (counted, needed, turned),
             "Brake straight",
-            "%d of %d done" % (drive.counted, drive.needed),
+            "%d of %d done" % (counted, needed),
         )
     if drive.halves_deg > HALVES_DEG:
         return AlignmentError(
