@@ -21,12 +21,13 @@ RIDGE = 1e-6  # g^2: no curve at all leaves the coefficient of c at zero
 
 
 class Fit:
-    """forward (3, g per g), level (3, g), explained: what forward explains of the force (g^2 s)."""
+    """forward (3, g per g), level (3, g); weight: how much the speed changed (g^2 s); explained: what forward explains
+    of the force (g^2 s)."""
 
     def __init__(self):
         self.forward = [0.0] * 3
         self.level = [0.0] * 3
-        self.explained = 0.0
+        self.weight = self.explained = 0.0
 
 
 class BrakingRegression:
@@ -100,6 +101,7 @@ class BrakingRegression:
         determinant = aa * cc - ac * ac
         if determinant <= 1e-6 * aa * cc:
             return False
+        out.weight = aa - ac * ac / cc
         out.explained = 0.0
         for i in range(3):
             s = total[S + i]
@@ -109,5 +111,5 @@ class BrakingRegression:
             left = (along_c * aa - along_a * ac) / determinant
             out.forward[i] = forward
             out.level[i] = s / n - a * forward - c * left
-            out.explained += forward * forward * (aa - ac * ac / cc)
+            out.explained += forward * forward * out.weight
         return True

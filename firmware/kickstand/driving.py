@@ -1,4 +1,7 @@
-"""Sensor to vehicle from driving: the vertical from standing and straight driving, forward from braking (ViriCiti, improved).
+"""Sensor to vehicle from driving: vertical from standing and straight driving, forward from braking (ViriCiti).
+
+The published method (driving_published.py) put right: forward is regressed on the change of speed, with what is not
+braking taken up by an intercept; turns are left out; the lag of the speed is found; it says how good it is.
 
     drive = DriveAlignment("car")                  # or ("motorcycle", up): the two presses gave the vertical
     drive.update(force, rate, dt_us)               # some 100 times a second, sensor's axes
@@ -12,7 +15,7 @@ that is there already still fits: driving_check.compare(). Fixed memory; each ca
 from math import atan2, degrees, pi, sqrt
 
 from .braking import BrakingFinder
-from .braking_regression import BLOCKS, LAG_STEP_US, LAGS, BrakingRegression, Fit
+from .braking_regression import LAG_STEP_US, LAGS, BrakingRegression, Fit
 from .driving_reasons import HALVES_DEG, late, moved, not_ready, units
 from .force_history import BIN_US, COLUMNS, ForceHistory, difference
 from .rotation import angle_deg, cross, dot, norm, normalize, vector
@@ -46,6 +49,8 @@ MAX_STARTS = 2  # count: the others are brakings
 HALVES_STAY_DEG = 6.0  # to become ready it takes HALVES_DEG
 READY_DEG, READY_STAY_DEG = 2.0, 3.0
 LEVEL_DEG = 8.0  # two halves of a drive, or standing and driving: hills are not so different
+OUTLIER_DEG = 30.0  # of one braking from the others; camber and wind make 10
+MIN_WEIGHT = 0.05  # g^2 s: half a second at 0.3 g
 CHECKED = 3  # before, units and lag of the speed are not judged
 MIN_SLOPE, MAX_SLOPE = 0.75, 1.35  # speed against force: pitch in braking and a coarse speed shift it by 0.2
 MAX_LATE_S = 1.9
@@ -133,10 +138,9 @@ class DriveAlignment:
     @property
     def problem(self):
         """What is wrong with speed or mount: an AlignmentError, or None."""
-        problem = self._speed_check.problem or self.speed_problem or self._mount_problem
-        if problem is None and self.standing.moved and self.vehicle == CAR:
-            problem = moved("two stops differ by over %.0f degrees" % LEVEL_DEG)
-        return problem
+        if self._speed_check.problem is None and self.standing.moved and self.vehicle == CAR:
+            return moved("two stops differ by over %.0f degrees" % LEVEL_DEG)
+        return self._speed_check.problem or self._mount_problem or self.speed_problem
 
     @property
     def reason(self):
@@ -326,36 +330,48 @@ class DriveAlignment:
         cross(left, up, self.fit.forward)
         cross(forward, left, up)
         normalize(left)
-        slope = normalize(forward)
+        normalize(forward)
         yield
         blocks = regression.filled
-        spread = 0.0
+        spread = slopes = weights = 0.0
+        outlier_deg = 0.0
         for block in range(blocks):
-            if regression.fit(part, best, 0, blocks, block):
-                angle = atan2(dot(left, part.forward), dot(forward, part.forward))
-                spread += angle * angle
+            if not regression.fit(part, best, block, block + 1):
+                continue
+            x, y, weight = dot(left, part.forward), dot(forward, part.forward), part.weight
             yield
-        if blocks > 1:  # the jackknife: empirical, where a formal error is optimistic early
-            self.quality_deg = degrees(sqrt(spread * (blocks - 1) / blocks))
+            slope = sqrt(x * x + y * y)
+            slopes += weight * slope
+            weights += weight
+            if blocks > 1 and regression.fit(part, best, 0, blocks, block):
+                p, q = dot(left, part.forward), dot(forward, part.forward)
+                angle = atan2(p, q)
+                spread += angle * angle
+                others = p * p + q * q
+                if weight > MIN_WEIGHT and MIN_SLOPE * MIN_SLOPE < others < MAX_SLOPE * MAX_SLOPE:
+                    if MIN_SLOPE < slope < MAX_SLOPE:
+                        outlier_deg = max(outlier_deg, degrees(_apart(angle, atan2(x, y))))
+                    elif p * x + q * y < 0.5 * others:  # some brakings of this block point elsewhere
+                        outlier_deg = 180.0
+            yield
+        if blocks < 2 or weights <= 0.0:
+            return
+        # the jackknife: empirical, where a formal error is optimistic early
+        self.quality_deg = degrees(sqrt(spread * (blocks - 1) / blocks))
         half = blocks // 2
-        if half and regression.fit(part, best, 0, half):
+        if regression.fit(part, best, 0, half):
             one = atan2(dot(left, part.forward), dot(forward, part.forward))
             level = vector(part.level[0], part.level[1], part.level[2])
             yield
             if regression.fit(part, best, half, blocks):
                 two = atan2(dot(left, part.forward), dot(forward, part.forward))
-                apart = abs(one - two)
-                self.halves_deg = degrees(min(apart, 2 * pi - apart))
-                self._decide(slope, angle_deg(level, part.level))
+                self.halves_deg = degrees(_apart(one, two))
+                self._decide(slopes / weights, angle_deg(level, part.level), outlier_deg)
 
-    def _decide(self, slope, level_deg):
-        """level_deg: between the verticals of two halves of the drive."""
+    def _decide(self, slope, level_deg, outlier_deg):
+        """slope: force per change of speed; level_deg: between the verticals of two halves of the drive; outlier_deg:
+        of one block's forward from that of all others."""
         self.speed_problem = self._mount_problem = None
-        if self.counted >= CHECKED:
-            if self.lag_s >= MAX_LATE_S:
-                self.speed_problem = late(self.lag_s)
-            elif not MIN_SLOPE < slope < MAX_SLOPE:
-                self.speed_problem = units(slope)
         if self.counted >= self.needed:
             before = self.standing.up if self.vehicle == CAR else self._up
             from_driving = 0.0 if before is None else angle_deg(before, self.fit.level)
@@ -364,11 +380,24 @@ class DriveAlignment:
             elif from_driving > LEVEL_DEG:
                 what = "standing" if self.vehicle == CAR else "the upright pose"
                 self._mount_problem = moved("%s and driving differ by %.0f degrees" % (what, from_driving))
+            elif outlier_deg > OUTLIER_DEG:
+                self._mount_problem = moved("forward is no longer where it was")
+        if self.counted >= CHECKED:
+            if self.lag_s >= MAX_LATE_S:
+                self.speed_problem = late(self.lag_s)
+            elif not MIN_SLOPE < slope < MAX_SLOPE:
+                self.speed_problem = units(slope)
         self._good = (
             self.counted >= self.needed
             and self.halves_deg <= (HALVES_STAY_DEG if self._good else HALVES_DEG)
             and self.quality_deg <= (READY_STAY_DEG if self._good else READY_DEG)
         )
+
+
+def _apart(a, b):
+    """Angle between two directions, 0 to pi."""
+    between = abs(a - b)
+    return min(between, 2 * pi - between)
 
 
 def _peak(values, i):

@@ -1,8 +1,8 @@
 """Does the alignment of the two presses fit what driving shows?
 
-A kickstand on the other side than the setting says turns forward into backward, which the poses cannot show and the first
-brakings do. A pitch change between the poses turns it by some degrees, which enough brakings put right. Anything else is
-a mount that has moved.
+A kickstand on the other side than the setting says turns forward into backward, which the poses cannot show and the
+first brakings do. A pitch change between the poses turns it by some degrees, which enough brakings put right. Anything
+else is a mount that has moved.
 """
 
 from math import atan2, degrees
