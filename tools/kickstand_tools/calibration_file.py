@@ -25,7 +25,8 @@ class CalibrationFile:
     """The parameters of one mounted sensor: calibrated = slope * reading + offset, Nicolae's (18)-(20).
 
     offset (3, g), slope (3), bias (3, deg/s), matrix (9, row-major, rows left, up, forward).
-    aligned: the matrix was measured, not left as it was.  notes: what else stands in the file.
+    aligned: the matrix was measured, not left as it was.  vehicle: "car" or "motorcycle" if it was measured by driving,
+    else "".  notes: what else stands in the file.
     """
 
     offset: list[float] = field(default_factory=lambda: [0.0] * 3)
@@ -35,6 +36,7 @@ class CalibrationFile:
     aligned: bool = False
     six_done: bool = False
     notes: dict[str, Any] = field(default_factory=dict)
+    vehicle: str = ""
 
     def to_firmware(self) -> Calibration:
         """The same as the firmware's own object, for readings in g and deg/s."""
@@ -79,6 +81,7 @@ def read_calibration(path: Path) -> CalibrationFile:
     _check_ranges(path, calibration)
     calibration.aligned = data.get("aligned", matrix != _IDENTITY) is True
     neutral = calibration.offset == [0.0] * 3 and calibration.slope == [1.0] * 3
+    calibration.vehicle = data["vehicle"] if data.get("vehicle") in ("car", "motorcycle") else ""
     calibration.six_done = data.get("six_positions", not neutral) is True
     return calibration
 
@@ -95,6 +98,8 @@ def write_calibration(path: Path, calibration: CalibrationFile) -> None:
         "six_positions": calibration.six_done,
         "aligned": calibration.aligned,
     }
+    if calibration.vehicle:
+        data["vehicle"] = calibration.vehicle
     text = json.dumps(data | calibration.notes, indent=2) + "\n"
 
     def write(temporary: Path) -> None:
