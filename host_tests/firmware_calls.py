@@ -6,7 +6,8 @@ As a script: reads one JSON list of [name, arguments] from standard input and pr
 import json
 import sys
 
-from kickstand import alignment, lean, rotation, six_position
+import driving_runs
+from kickstand import alignment, dispersion, lean, rodrigues, rotation, six_position
 from kickstand.calibration import Calibration
 from kickstand.capture import Capture
 from kickstand.errors import Refusal
@@ -65,7 +66,18 @@ def meter(matrix, readings, dt_us):
     return out
 
 
+def circular_dispersion(directions):
+    spread = dispersion.CircularDispersion()
+    for x, y in directions:
+        spread.add(x, y, (x * x + y * y) ** 0.5)
+    return spread.value()
+
+
 CALLS = {
+    "dispersion": circular_dispersion,
+    "drive": driving_runs.drive,
+    "regression": driving_runs.regression,
+    "rotation_between": lambda a, b, axis: _into(9, rodrigues.rotation_between, a, b, axis),
     "cross": lambda a, b: _into(3, rotation.cross, a, b),
     "rotate": lambda m, a: _into(3, rotation.rotate, matrix_of(m), a),
     "rotate_back": lambda m, a: _into(3, rotation.rotate_back, matrix_of(m), a),

@@ -8,7 +8,7 @@ forward, some 3 to 4 degrees, which more brakings do not take away: driving.py d
 from math import degrees, sqrt
 
 from .dispersion import CircularDispersion
-from .driving import GAP_US, MAX_INTERVAL_US, MIN_INTERVAL_US, DriveAlignment
+from .driving import DRIVE, GAP_US, MAX_INTERVAL_US, MIN_INTERVAL_US, READY, DriveAlignment
 from .driving_reasons import not_ready
 from .rodrigues import rotation_between
 from .rotation import matrix, multiply, normalize, rotate, vector
@@ -71,6 +71,14 @@ class PublishedAlignment:
     def problem(self):
         """What is wrong with speed or mount: an AlignmentError, or None."""
         return self._checked.problem
+
+    @property
+    def state(self):
+        """As a DriveAlignment's."""
+        if self.ready:
+            return READY
+        state = self._checked.state
+        return DRIVE if state == READY else state
 
     @property
     def ready(self):
