@@ -38,8 +38,8 @@ def samples(legs, vehicle="car", tilt_deg=0.0, noise_g=0.003, start_mps=0.0):
     left_g = math.sin(math.radians(tilt_deg))
     for seconds, acceleration, yaw_dps in legs:
         for _ in range(round(seconds * RATE_HZ)):
-            speed = max(0.0, speed + acceleration / RATE_HZ)
-            force = [left_g, math.cos(math.radians(tilt_deg)), acceleration / G]
+            before, speed = speed, max(0.0, speed + acceleration / RATE_HZ)
+            force = [left_g, math.cos(math.radians(tilt_deg)), (speed - before) * RATE_HZ / G]
             rate = [0.0, yaw_dps, 0.0]
             side = speed * math.radians(yaw_dps) / G
             if vehicle == "car":

@@ -87,6 +87,7 @@ class DriveAlignment:
         self._mean = None
         self._mean_s = 0.0
         self._finder = BrakingFinder(LAGS)
+        self._judged_stops = 0
         self._speed_check = SpeedCheck()
         self._history = ForceHistory()
         self.speed_problem = self._mount_problem = None
@@ -299,16 +300,21 @@ class DriveAlignment:
                 begin[i] = end[i]
             self._known[lag] = known
             yield
+        events = self.brakings + self.starts
         if self._finder.update(change, seconds, straight):
+            yield from self._count()
+        if self.brakings + self.starts != events or self.standing.stops != self._judged_stops:
+            self._judged_stops = self.standing.stops
             yield from self._judge()
         yield True
 
-    def _judge(self):
-        """After each braking: which lag, how good, ready or not; a generator of short pieces."""
-        regression, part = self.regression, self._part
+    def _count(self):
+        """A braking or a start has ended: which lag fits best by now, and was it straight? A generator of short
+        pieces."""
+        part = self._part
         explained = [0.0] * LAGS
         for lag in range(LAGS):
-            if regression.fit(part, lag):
+            if self.regression.fit(part, lag):
                 explained[lag] = part.explained
             yield
         self.lag = best = explained.index(max(explained))
@@ -322,7 +328,11 @@ class DriveAlignment:
             self.brakings += 1
         else:
             self.starts += 1
-        yield from regression.close_block()
+        yield from self.regression.close_block()
+
+    def _judge(self):
+        """How good is it, ready or not? A generator of short pieces."""
+        regression, part, best = self.regression, self._part, self.lag
         up = vector()
         if not regression.fit(self.fit, best) or not self.vertical(up, self.fit):
             return
