@@ -27,7 +27,13 @@ def _addresses(value):
     )
 
 
+def _pulses(value):
+    return isinstance(value, (int, float)) and 0.1 <= value <= 100
+
+
 _PIN = _whole(0, 48)
+# of each speed source
+_SPEED_PINS = {None: (), "gps": ("GPS_TX", "GPS_RX"), "wheel": ("WHEEL_PIN",)}
 
 # name: default, (check, what is allowed)
 _TABLE = {
@@ -49,6 +55,14 @@ _TABLE = {
     "LCD_BUS_HZ": (100_000, _whole(100_000, 400_000)),
     "BUTTON_PIN": (port.BUTTON_PIN, _PIN),
     "WATCHDOG": (True, _one_of(True, False)),
+    "VEHICLE": ("motorcycle", _one_of("motorcycle", "car")),
+    "SPEED": (None, _one_of(None, "gps", "wheel")),
+    "GPS_UART": (port.GPS_UART, _whole(0, 2)),
+    "GPS_TX": (port.GPS_PINS[0], _PIN),
+    "GPS_RX": (port.GPS_PINS[1], _PIN),
+    "GPS_BAUD": (9600, _whole(4800, 115_200)),
+    "WHEEL_PIN": (port.WHEEL_PIN, _PIN),
+    "PULSES_PER_METRE": (0.5, (_pulses, "pulses along a metre of road, from 0.1 to 100")),
 }
 
 
@@ -87,10 +101,11 @@ class Settings:
                     name,
                 )
         self.one_bus = (self.SENSOR_SDA, self.SENSOR_SCL) == (self.LCD_SDA, self.LCD_SCL)
-        buses = {self.SENSOR_SDA, self.SENSOR_SCL, self.LCD_SDA, self.LCD_SCL}
-        if self.BUTTON_PIN in buses or len(buses) != (2 if self.one_bus else 4):
+        names = ("BUTTON_PIN", "SENSOR_SDA", "SENSOR_SCL") + (() if self.one_bus else ("LCD_SDA", "LCD_SCL"))
+        names += _SPEED_PINS[self.SPEED]
+        if len({getattr(self, name) for name in names}) != len(names):
             raise SettingsError(
-                "config.py: a pin is used twice among BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL",
+                "config.py: a pin is used twice among " + ", ".join(names),
                 "config.py: wrong",
                 "pin used twice",
             )
@@ -100,4 +115,10 @@ class Settings:
                 % self.LCD_I2C,
                 "config.py: wrong",
                 "LCD_I2C",
+            )
+        if self.VEHICLE == "car" and self.SPEED is None:
+            raise SettingsError(
+                'config.py: VEHICLE = "car" needs a speed source to be aligned: SPEED = "gps" or "wheel"',
+                "config.py: wrong",
+                "car needs SPEED",
             )
