@@ -12,6 +12,7 @@ from machine import Pin
 from . import bus, port
 from .button import Button
 from .calibration import Calibration
+from .drive_mode import DriveMode
 from .errors import SettingsError, StoreError
 from .hd44780 import Lcd
 from .meter import LeanMeter
@@ -19,6 +20,7 @@ from .mpu6050 import MAX_FRAMES, Mpu6050
 from .sample_clock import SampleClock
 from .screen import Screen
 from .sensor import Sensor
+from .speed import open_speed
 from .store import Store
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
@@ -92,13 +94,15 @@ class App:
         self.button = open_button(settings)
         self.sensor = open_sensor(settings)
         self.store = None  # until the chip has said who it is: a calibration belongs to one chip
-        self.meter = LeanMeter(Calibration())
+        self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle")
+        speed = open_speed(settings)
+        self.drive = DriveMode(settings.VEHICLE, speed, self.meter, self._keep) if speed else None
         self._clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self._restarts = 0
         self._sums = [0] * 7
         self._dt_us = 0
         self._reading = [0.0] * 7
-        self.screen = Screen(settings, self.sensor, self.meter, self._save)
+        self.screen = Screen(settings, self.sensor, self.meter, self.drive, self._save)
         self._page_ms = ticks_ms()
         self._trim_ms = self._page_ms
         self._fault_shown = False
@@ -135,6 +139,8 @@ class App:
             good += 1
         if good:
             self._measure(good)
+        if self.drive:
+            self.drive.step(self._sums, good, self._dt_us, now_ms)
         if self.sensor.fault is not None:
             self._clock.restart()
             self.screen.interrupt(now_ms)
@@ -196,12 +202,23 @@ class App:
             self._use(self.store.load())
 
     def _use(self, calibration):
+        """From flash or from a wizard: nothing of before counts."""
+        self._set(calibration)
+        self.meter.reset_maxima()
+        if self.drive:
+            self.drive.begin()
+
+    def _set(self, calibration):
         chip = self.sensor.chip
         calibration.set_scale(chip.accel_lsb_per_g, chip.gyro_lsb_per_dps)
         self.meter.use(calibration)
-        self.meter.reset_maxima()
 
     def _save(self, calibration):
         """For the wizards: on flash first, then in use. Raises StoreError."""
         self.store.save(calibration)
         self._use(calibration)
+
+    def _keep(self, calibration):
+        """For alignment by driving, which goes on. Raises StoreError."""
+        self.store.save(calibration)
+        self._set(calibration)

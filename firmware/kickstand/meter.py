@@ -16,13 +16,14 @@ FALLEN_US = 1_000_000
 
 
 class LeanMeter:
-    """Lean and acceleration of the vehicle.
+    """Lean and acceleration of the vehicle. leans: False for a car, whose lean stays 0.
 
     After update(): force (left, up, forward in g), rate (about them in rad/s), lean_deg (the filter's, > 0
     right), smooth_force (g, for display), reading (the last), fallen, and the maxima since reset_maxima().
     """
 
-    def __init__(self, calibration):
+    def __init__(self, calibration, leans=True):
+        self._leans = leans
         # lists: on a board reading an array's element takes heap, reading a list's does not
         self.force = [0.0] * 3
         self.rate = [0.0] * 3
@@ -57,7 +58,7 @@ class LeanMeter:
     @property
     def trusted(self):
         """True while lean_deg is certain enough to be shown."""
-        return self.filter.variance <= MAX_VARIANCE
+        return not self._leans or self.filter.variance <= MAX_VARIANCE
 
     def keep_trim(self):
         """Take the trim found so far into the calibration, if the bike stands and it is another by now: True then."""
@@ -90,7 +91,7 @@ class LeanMeter:
         smooth = self.smooth_force
         for i in range(3):
             smooth[i] += gain * (force[i] - smooth[i])
-        self.lean_deg = lean = self.filter.update(force, self.rate, dt_us)
+        self.lean_deg = lean = self.filter.update(force, self.rate, dt_us) if self._leans else 0.0
         if -FALLEN_DEG < lean < FALLEN_DEG:
             self._flat_us = 0
             self.fallen = False

@@ -5,7 +5,7 @@ from time import ticks_add, ticks_diff
 from . import pages
 from .align_wizard import AlignWizard
 from .button import LONG, SHORT
-from .menu import ALIGN, INFO, RESET, SIX, Menu
+from .menu import ALIGN, DRIVE, INFO, LEAVE, RESET, SIX, Menu
 from .meter import FALLEN_DEG
 from .mpu6050 import SATURATED
 from .six_wizard import SixWizard
@@ -14,20 +14,25 @@ NOTICE_MS = 2000
 
 
 class Screen:
-    """settings: a Settings.  sensor: a Sensor.  meter: a LeanMeter.  save: for the wizards, called with a new
-    Calibration, raises StoreError.
+    """settings: a Settings.  sensor: a Sensor.  meter: a LeanMeter.  drive: a DriveMode, None without a speed source.
+    save: for the wizards, called with a new Calibration, raises StoreError.
 
     wizard: the one under way, which wants every sample, or None.
     """
 
-    def __init__(self, settings, sensor, meter, save):
+    def __init__(self, settings, sensor, meter, drive, save):
         self.settings = settings
         self.sensor = sensor
         self.meter = meter
+        self.drive = drive
         self._save = save
         self.wizard = None
         self._page = 0
         self._pages = (pages.lean, pages.maxima, pages.acceleration, pages.formula, pages.raw)
+        self._entries = (ALIGN, SIX, RESET, INFO) + ((DRIVE,) if drive else ()) + (LEAVE,)
+        if settings.VEHICLE == "car":
+            self._pages = (pages.acceleration, pages.cornering, pages.raw)
+            self._entries = (DRIVE, SIX, RESET, INFO, LEAVE)
         self._menu = None
         self._info = False
         self._notice = None
@@ -50,18 +55,25 @@ class Screen:
             if self._menu.chosen is not None:
                 self._choose(self._menu.chosen, now_ms)
                 self._menu = None
+        elif event and self.drive and self.drive.message:
+            self.drive.answer(event)
         elif event == LONG:
-            self._menu = Menu(now_ms)
+            self._menu = Menu(self._entries, now_ms)
         elif event == SHORT:
             self._turn_page()
 
     def _turn_page(self):
         if self._info:
             self._info = False
-        elif self.meter.calibration.aligned:
-            self._page = (self._page + 1) % len(self._pages)
+        elif self._driving or self.meter.calibration.aligned:
+            self._page += 1
         elif self.sensor.fault is None:
             self._align(pressed=True)
+
+    @property
+    def _driving(self):
+        """True while what alignment by driving waits for is a page, the first until there is an alignment."""
+        return self.drive is not None and self.drive.shown
 
     def _align(self, pressed):
         self._page = 0
@@ -81,10 +93,13 @@ class Screen:
             self._notify(("Maxima reset", ""), now_ms)
         elif entry == INFO:
             self._info = True
-        elif self.sensor.fault is not None and entry in (ALIGN, SIX):
+        elif self.sensor.fault is not None and entry in (ALIGN, SIX, DRIVE):
             self._notify(self.sensor.fault, now_ms)
         elif entry == ALIGN:
             self._align(pressed=False)
+        elif entry == DRIVE:
+            self.drive.ask()
+            self._page = len(self._pages) if self.meter.calibration.aligned else 0
         elif entry == SIX:
             self.wizard = SixWizard(self.sensor.chip, SATURATED, self.settings.SAMPLE_HZ, self._save)
 
@@ -107,10 +122,23 @@ class Screen:
         if self._info:
             chip = self.sensor.chip
             return pages.sensor_info(chip.name, chip.temperature_c(chip.counts[3]), self.meter.calibration)
+        if self.drive and self.drive.message:
+            self._page = 0  # after it
+            return self.drive.message
+        return self._page_lines(now_ms)
+
+    def _page_lines(self, now_ms):
         if not self.meter.calibration.aligned:
-            return pages.not_aligned(self.meter, now_ms // 1000)
+            if not self._driving:
+                return pages.not_aligned(self.meter, now_ms // 1000)
+            if self._page % 2 == 0:
+                return self.drive.lines(now_ms)
+            return pages.not_aligned(self.meter, now_ms // 1000, "drive and brake")
+        page = self._page % (len(self._pages) + self._driving)
+        if page == len(self._pages):
+            return self.drive.lines(now_ms)
         if self.meter.fallen:
             return pages.FALLEN
         if not self.meter.trusted or abs(self.meter.lean_deg) > FALLEN_DEG:
             return pages.UNSURE
-        return self._pages[self._page](self.meter)
+        return self._pages[page](self.meter)

@@ -16,7 +16,8 @@ from .rotation import is_rotation
 FILES = ("kickstand_a.cal", "kickstand_b.cal")
 VERSION = 1
 _HEAD = "<4sHHI"  # magic, version, length of the whole record, sequence
-_BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, aligned; offset, slope, gyro bias, matrix, trim
+_BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, alignment; offset, slope, gyro bias, matrix, trim
+_NOT_ALIGNED, _BY_POSES, _BY_DRIVE = 0, 1, 2
 _MAGIC = b"KSTD"
 _LENGTH = struct.calcsize(_HEAD) + struct.calcsize(_BODY) + 4
 MAX_BIAS_DPS = 60.0
@@ -108,7 +109,7 @@ class Store:
             self._chip[0],
             self._chip[1],
             calibration.six_done,
-            calibration.aligned,
+            (_BY_DRIVE if calibration.by_drive else _BY_POSES) if calibration.aligned else _NOT_ALIGNED,
             *list(calibration.accel_offset),
             *list(calibration.accel_slope),
             *list(calibration.gyro_bias),
@@ -131,7 +132,8 @@ class Store:
         if fields[0:2] != self._chip:
             return 0, None, "of another sensor or range"
         calibration = Calibration()
-        calibration.six_done, calibration.aligned = bool(fields[2]), bool(fields[3])
+        calibration.six_done, calibration.aligned = bool(fields[2]), fields[3] != _NOT_ALIGNED
+        calibration.by_drive = fields[3] == _BY_DRIVE
         values = fields[4:]
         calibration.set_accel(values[0:3], values[3:6])
         for i in range(3):

@@ -10,7 +10,7 @@ from machine import Pin
 MAX_MPS = 100.0  # pulses that follow faster are none
 BOUNCE_US = 3000  # the contact must have been open for so long, or for a quarter of the shortest period
 STOPPED_MPS = 0.5  # slower shows as standing
-MIN_STOP_MS, MAX_STOP_MS = 500, 3000  # without a pulse
+MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # without a pulse: one magnet at walking pace shows as standing
 REPORT_MS = 100
 STANDING_MS = 200  # a speed of zero is told again so often
 _TICKS = _COUNT = 0x3FFFFFFF  # ticks_diff() is negative after nine minutes of standing
@@ -19,7 +19,7 @@ _TICKS = _COUNT = 0x3FFFFFFF  # ticks_diff() is negative after nine minutes of s
 class Wheel:
     """pin: a machine.Pin with pull-up.  pulses_per_metre: along the road.  irq: further arguments of Pin.irq().
 
-    After poll() has returned a speed: age_ms, how long ago it was that, on average.
+    After poll() has returned a speed: age_ms, how long ago that was.
     """
 
     def __init__(self, pin, pulses_per_metre, irq):
@@ -43,10 +43,7 @@ class Wheel:
         now = ticks_us()
         if pin.value():
             self._opened_us = now
-        elif (
-            (now - self._opened_us) & _TICKS >= self._open_us
-            and (now - self._pulse_us) & _TICKS >= self._shortest_us
-        ):
+        elif (now - self._opened_us) & _TICKS >= self._open_us and (now - self._pulse_us) & _TICKS >= self._shortest_us:
             self._pulse_us = now
             self.count = (self.count + 1) & _COUNT
 
@@ -67,7 +64,7 @@ class Wheel:
             return None
         self._report_ms = now_ms
         self._seen_us = None  # the next pulse begins anew
-        self.age_ms = 0
+        self.age_ms = self._stop_ms // 2  # it may have been moving again since, short of a pulse
         return 0.0
 
     def _pulses(self, pulses, count, pulse_us, now_ms):
