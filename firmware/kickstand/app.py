@@ -140,7 +140,9 @@ class App:
         if good:
             self._measure(good)
         if self.drive:
-            self.drive.step(self._sums, good, self._dt_us, now_ms)
+            if good:
+                self.drive.feed(self._sums, good, self._dt_us, now_ms)
+            self.drive.poll(now_ms)
         if self.sensor.fault is not None:
             self._clock.restart()
             self.screen.interrupt(now_ms)

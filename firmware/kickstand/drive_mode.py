@@ -89,8 +89,8 @@ class DriveMode:
         for i in range(7):
             self._total[i] = 0
 
-    def step(self, sums, n, dt_us, now_ms):
-        """One turn of the loop: sums (7) of n samples within dt_us."""
+    def poll(self, now_ms):
+        """Once each turn of the loop: speed, and what there is to do."""
         speed = self.speed.poll(now_ms)
         if speed is not None:
             self._speed_mps = speed
@@ -98,13 +98,12 @@ class DriveMode:
             self.drive.measure_speed(speed, self.speed.age_us)
             if hasattr(self._meter, "measure_speed"):
                 self._meter.measure_speed(speed)
-        if n:
-            self._sum(sums, n, dt_us, now_ms)
         if self._look_ms is None or ticks_diff(now_ms, self._look_ms) >= 0:
             self._look_ms = ticks_add(now_ms, LOOK_MS)
             self._look(now_ms)
 
-    def _sum(self, sums, n, dt_us, now_ms):
+    def feed(self, sums, n, dt_us, now_ms):
+        """Sums (7, counts in the chip's order) of the n samples of a turn, within dt_us."""
         if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > GAP_MS:
             self._clear()
             self.drive.update(self._force, self._rate, GAP_US + 1)
