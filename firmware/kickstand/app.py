@@ -9,24 +9,21 @@ from time import sleep_us, ticks_add, ticks_diff, ticks_ms, ticks_us
 
 from machine import Pin
 
-from . import bus, pages, port
-from .align_wizard import AlignWizard
-from .button import LONG, SHORT, Button
+from . import bus, port
+from .button import Button
 from .calibration import Calibration
 from .errors import SettingsError, StoreError
 from .hd44780 import Lcd
-from .menu import ALIGN, INFO, RESET, SIX, Menu
-from .meter import FALLEN_DEG, LeanMeter
-from .mpu6050 import MAX_FRAMES, SATURATED, Mpu6050
+from .meter import LeanMeter
+from .mpu6050 import MAX_FRAMES, Mpu6050
 from .sample_clock import SampleClock
+from .screen import Screen
 from .sensor import Sensor
-from .six_wizard import SixWizard
 from .store import Store
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
 COLLECT_TURNS = 50  # 100 KB of heap
 PAGE_MS = 100
-NOTICE_MS = 2000
 TRIM_MS = 60_000
 
 
@@ -101,13 +98,7 @@ class App:
         self._sums = [0] * 7
         self._dt_us = 0
         self._reading = [0.0] * 7
-        self._page = 0
-        self._pages = (pages.lean, pages.maxima, pages.acceleration, pages.formula, pages.raw)
-        self._wizard = None
-        self._menu = None
-        self._info = False
-        self._notice = None
-        self._notice_ms = 0
+        self.screen = Screen(settings, self.sensor, self.meter, self._save)
         self._page_ms = ticks_ms()
         self._trim_ms = self._page_ms
         self._fault_shown = False
@@ -146,25 +137,25 @@ class App:
             self._measure(good)
         if self.sensor.fault is not None:
             self._clock.restart()
-            if self._wizard:
-                self._wizard = None
-                self._notify(("Calibration", "stopped: fault"), now_ms)
+            self.screen.interrupt(now_ms)
             if not self._fault_shown:
                 self._page_ms = now_ms  # at once: the next thing is to start the sensor again
         elif waiting < MAX_FRAMES:
             self._clock.emptied(now_us)
-        self._handle(self.button.poll(now_ms), now_ms)
+        self.screen.handle(self.button.poll(now_ms), now_ms)
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self._page_ms = ticks_add(now_ms, PAGE_MS)
             self._fault_shown = self.sensor.fault is not None
-            line1, line2 = self._lines(now_ms)
+            line1, line2 = self.screen.lines(now_ms)
             self.lcd.show(line1, line2)
             self._keep_trim(now_ms)
         self.lcd.tick(now_ms)
 
     def _keep_trim(self, now_ms):
         """What riding taught about upright goes to flash when the bike stands, at most once in TRIM_MS."""
-        if self._wizard or not self.meter.calibration.aligned or ticks_diff(now_ms, self._trim_ms) < TRIM_MS:
+        if self.screen.wizard or not self.meter.calibration.aligned:
+            return
+        if ticks_diff(now_ms, self._trim_ms) < TRIM_MS:
             return
         if self.meter.keep_trim() and self.store.unchanged():
             self._trim_ms = now_ms
@@ -186,8 +177,8 @@ class App:
                 sums[i] += c[i]
         dt_us = self._clock.step(now_us)
         self._dt_us = dt_us if first else self._dt_us + dt_us
-        if self._wizard:
-            self._wizard.sample(c, now_ms)
+        if self.screen.wizard:
+            self.screen.wizard.sample(c, now_ms)
 
     def _measure(self, n):
         """The mean of this turn's n samples through calibration, alignment and filter: floats cost too much to do
@@ -214,79 +205,3 @@ class App:
         """For the wizards: on flash first, then in use. Raises StoreError."""
         self.store.save(calibration)
         self._use(calibration)
-
-    def _handle(self, event, now_ms):
-        """Give the event to the wizard, the menu or the pages, whichever is on the display."""
-        if self._wizard:
-            self._wizard.step(event, now_ms)
-            if self._wizard.ended:
-                self._wizard = None
-        elif self._menu:
-            self._menu.step(event, now_ms)
-            if self._menu.chosen is not None:
-                self._choose(self._menu.chosen, now_ms)
-                self._menu = None
-        elif event == LONG:
-            self._menu = Menu(now_ms)
-        elif event == SHORT:
-            self._turn_page()
-
-    def _turn_page(self):
-        if self._info:
-            self._info = False
-        elif self.meter.calibration.aligned:
-            self._page = (self._page + 1) % len(self._pages)
-        elif self.sensor.fault is None:
-            self._align(pressed=True)
-
-    def _align(self, pressed):
-        self._page = 0
-        self._wizard = AlignWizard(
-            self.sensor.chip,
-            SATURATED,
-            self.settings.SAMPLE_HZ,
-            self.meter.calibration,
-            self.settings.SIDE,
-            self._save,
-            pressed,
-        )
-
-    def _choose(self, entry, now_ms):
-        if entry == RESET:
-            self.meter.reset_maxima()
-            self._notify(("Maxima reset", ""), now_ms)
-        elif entry == INFO:
-            self._info = True
-        elif self.sensor.fault is not None and entry in (ALIGN, SIX):
-            self._notify(self.sensor.fault, now_ms)
-        elif entry == ALIGN:
-            self._align(pressed=False)
-        elif entry == SIX:
-            self._wizard = SixWizard(self.sensor.chip, SATURATED, self.settings.SAMPLE_HZ, self._save)
-
-    def _notify(self, lines, now_ms):
-        self._notice = lines
-        self._notice_ms = ticks_add(now_ms, NOTICE_MS)
-
-    def _lines(self, now_ms):
-        """What the display should say now."""
-        if self._notice:
-            if ticks_diff(now_ms, self._notice_ms) < 0:
-                return self._notice
-            self._notice = None
-        if self._wizard:
-            return self._wizard.lines
-        if self._menu:
-            return self._menu.lines
-        if self.sensor.fault is not None:
-            return self.sensor.fault
-        if self._info:
-            chip = self.sensor.chip
-            return pages.sensor_info(chip.name, chip.temperature_c(chip.counts[3]), self.meter.calibration)
-        if not self.meter.calibration.aligned:
-            return pages.not_aligned(self.meter, now_ms // 1000)
-        if self.meter.fallen:
-            return pages.FALLEN
-        if not self.meter.trusted or abs(self.meter.lean_deg) > FALLEN_DEG:
-            return pages.UNSURE
-        return self._pages[self._page](self.meter)

@@ -20,7 +20,7 @@ STAGES = (
     ("meter", "meter", "LeanMeter", "update"),
     ("fetch", "sensor", "Sensor", "fetch"),
     ("take", "sensor", "Sensor", "take"),
-    ("page", "app", "App", "_lines"),
+    ("page", "screen", "Screen", "lines"),
     ("display", "hd44780", "Lcd", "tick"),
 )
 BUS = len(STAGES)  # one more column: the sensor's transfers
