@@ -77,6 +77,10 @@ class LeanMeter:
         """Nicolae's lean of this one reading."""
         return formula_lean_deg(self.force, self.rate[1])
 
+    def measure_speed(self, speed_mps):
+        """The vehicle's speed where something measures it: it helps the lean, and is never required."""
+        self.filter.measure_speed(speed_mps)
+
     def update(self, reading, dt_us):
         """reading: 7 numbers in the chip's order; dt_us: integer microseconds since the one before (0 for the
         first). On the board the mean of the few samples that came in during one turn of the loop."""
