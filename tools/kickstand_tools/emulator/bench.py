@@ -10,6 +10,7 @@ from rich.console import Group
 from rich.table import Table
 
 from .. import firmware_path
+from ..bytecode import cross_compiled
 from ..rides import Ride, accelerate, turn, upright
 from ..sensor_errors import Sensor
 from . import flash_image
@@ -83,7 +84,7 @@ def _run(seconds: int, detail: bool) -> dict[str, Any]:
     """The app's loop for so long: arrays and figures of bench_guest, and how the samples fared."""
     files = flash_image.firmware(compiled=True) | _calibration()
     del files["/main.py"]
-    files["bench_guest.mpy"] = flash_image.cross_compiled(_GUEST)
+    files["bench_guest.mpy"] = cross_compiled(_GUEST)
     arrays: list[np.ndarray] = []
     result: dict[str, Any] = {}
     with Pico(_world(), files) as pico:
