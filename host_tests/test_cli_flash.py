@@ -172,8 +172,11 @@ def test_machine_code_is_for_the_board(board, monkeypatch):
     monkeypatch.setattr(deploy, "SerialTransport", lambda name, timeout: other)
     command.works("flash")
     found = fake_board.files(board.root)
-    assert {path for path, data in wanted().items() if found[path] != data} == {"/kickstand/mpu6050_viper.mpy"}
-    assert found["/kickstand/mpu6050_viper.mpy"][2] == 0x2B
+    assert {path for path, data in wanted().items() if found[path] != data} == {
+        "/kickstand/frames_viper.mpy",
+        "/kickstand/transform_viper.mpy",
+    }
+    assert found["/kickstand/frames_viper.mpy"][2] == 0x2B
 
 
 def test_what_reads_back_differently_is_told(board):

@@ -22,7 +22,7 @@ from .sensor import Sensor
 from .store import Store
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
-COLLECT_TURNS = 50  # 100 KB of heap
+COLLECT_TURNS = 25  # 70 KB of heap: less than half of what is free
 PAGE_MS = 100
 TRIM_MS = 60_000
 
@@ -54,7 +54,7 @@ def open_sensor(settings):
         settings.SAMPLE_HZ,
         settings.ACCEPT_WHO_AM_I,
     )
-    return Sensor(chip, reopen, settings.SAMPLE_HZ)
+    return Sensor(chip, reopen)
 
 
 def open_button(settings):
@@ -95,9 +95,6 @@ class App:
         self.meter = LeanMeter(Calibration())
         self._clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self._restarts = 0
-        self._sums = [0] * 7
-        self._dt_us = 0
-        self._reading = [0.0] * 7
         self.screen = Screen(settings, self.sensor, self.meter, self._save)
         self._page_ms = ticks_ms()
         self._trim_ms = self._page_ms
@@ -126,21 +123,16 @@ class App:
     def step(self):
         """One turn of the loop: the samples that wait, one event, at most one transfer to the display."""
         now_us, now_ms = ticks_us(), ticks_ms()
-        waiting = self.sensor.fetch(now_ms)
-        good = 0
-        for k in range(waiting):
-            if not self.sensor.take(k, now_ms):
-                break
-            self._take(good == 0, now_us, now_ms)
-            good += 1
-        if good:
-            self._measure(good)
+        n = self.sensor.fetch(now_ms)
+        if n:
+            self._take(n, now_us, now_ms)
+        self.sensor.check(now_ms)
         if self.sensor.fault is not None:
             self._clock.restart()
             self.screen.interrupt(now_ms)
             if not self._fault_shown:
                 self._page_ms = now_ms  # at once: the next thing is to start the sensor again
-        elif waiting < MAX_FRAMES:
+        elif n < MAX_FRAMES:
             self._clock.emptied(now_us)
         self.screen.handle(self.button.poll(now_ms), now_ms)
         if ticks_diff(now_ms, self._page_ms) >= 0:
@@ -164,28 +156,17 @@ class App:
             except StoreError as error:  # the next ride finds it again
                 print(error.reason)
 
-    def _take(self, first, now_us, now_ms):
-        """One sample: to the wizard, and into the sums of this turn. Integers only, no heap."""
+    def _take(self, n, now_us, now_ms):
+        """The n samples that came in: each to the wizard, all at once to the meter."""
         if self._restarts != self.sensor.restarts:
             self._restarts = self.sensor.restarts
             self._sensor_started()
-        c, sums = self.sensor.chip.counts, self._sums
-        if first:
-            sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6] = c
-        else:
-            for i in range(7):
-                sums[i] += c[i]
-        dt_us = self._clock.step(now_us)
-        self._dt_us = dt_us if first else self._dt_us + dt_us
-        if self.screen.wizard:
-            self.screen.wizard.sample(c, now_ms)
-
-    def _measure(self, n):
-        """The mean of this turn's n samples through calibration, alignment and filter: floats cost too much to do
-        it for each."""
-        for i in range(7):
-            self._reading[i] = self._sums[i] / n
-        self.meter.update(self._reading, self._dt_us)
+        chip, wizard = self.sensor.chip, self.screen.wizard
+        self.meter.update(chip.sums, self._clock.step(n, now_us), n)
+        if wizard:
+            for k in range(n):
+                chip.take(k)
+                wizard.sample(chip.counts, now_ms)
 
     def _sensor_started(self):
         """The chip runs, for the first time or again after a fault, perhaps another one."""

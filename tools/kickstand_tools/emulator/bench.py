@@ -119,16 +119,18 @@ def _run(seconds: int, detail: bool) -> dict[str, Any]:
 def _stages(run: dict[str, Any]) -> dict[str, np.ndarray]:
     """us of each stage in each turn that had it."""
     columns = dict(zip(run["figures"]["stages"], run["stages"].T, strict=True))
-    sampled = columns["decode"] > 0
-    sensor = columns["fetch"] + columns["take"]
+    sampled = columns["decode and sum"] > 0
+    watch = run["figures"]["stopwatch_us"]
+    fetch = columns["fetch"] - 3 * watch  # around its two transfers and add_up()
+    meter = columns["meter"] - 2 * watch
     stages = {
         "read": columns["read"],
-        "decode": columns["decode"],
-        "check": sensor - columns["read"] - columns["decode"],
+        "decode and sum": columns["decode and sum"],
+        "check": fetch - columns["read"] - columns["decode and sum"],
         "calibrate and rotate": columns["calibrate and rotate"],
         "filter": columns["filter"],
-        "rest of the meter": columns["meter"] - columns["calibrate and rotate"] - columns["filter"],
-        "sample path": sensor + columns["meter"],
+        "rest of the meter": meter - columns["calibrate and rotate"] - columns["filter"],
+        "sample path": fetch + meter,
     }
     stages = {name: us[sampled] for name, us in stages.items()}
     stages["page"] = columns["page"][columns["page"] > 0]
