@@ -78,6 +78,6 @@ def test_integers_are_as_good_as_floats(engine):
         force = matrix @ (np.array(slope) * mean[:3] / 4096 + offset)
         rate = matrix @ np.radians(mean[4:] / 65.5 - [2.0, 1.0, 0.0])
         assert plain == pytest.approx([*force, *rate], rel=1e-4, abs=1e-4)
-        size = np.linalg.norm(mean[:3]) / 4096
+        size, turn = float(np.linalg.norm(mean[:3])) / 4096, float(np.linalg.norm(mean[4:])) / 65.5
         assert quick[:3] == pytest.approx(force, abs=4.5e-4 * max(1.0, size))
-        assert quick[3:] == pytest.approx(rate, abs=5e-4 * np.linalg.norm(np.radians(mean[4:] / 65.5)))
+        assert quick[3:] == pytest.approx(rate, abs=5e-4 * float(np.radians(turn)))

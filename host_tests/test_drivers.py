@@ -209,7 +209,8 @@ def test_a_display_out_of_step_is_put_right_by_the_next_initialisation(board):
 
 
 @pytest.mark.parametrize(
-    ("held_s", "events"), [(0.005, []), (0.1, ["short"]), (0.7, ["short"]), (1.0, ["long"]), (5.0, ["long"])]
+    ("held_s", "events"),
+    [(0.005, []), (0.013, []), (0.1, ["short"]), (0.7, ["short"]), (1.0, ["long"]), (5.0, ["long"])],
 )
 def test_presses(board, held_s, events):
     from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]

@@ -23,7 +23,7 @@ class Sensor:
         self.reopen = reopen
         self._failures = 0
         self._overflows = 0
-        self._due_ms = None  # of the next check, or of the next attempt while faulty
+        self._due_ms = ticks_ms()  # of the next check, or of the next attempt while faulty
         self._sample_ms = 0
         self.restarts = 0
         self.fault = ("Kickstand", "starting")
@@ -33,7 +33,7 @@ class Sensor:
         """How many samples have come in, at most MAX_FRAMES: their sum is in chip.sums, each can be had by
         chip.take(k). Starts the chip when it is not running. Never raises."""
         if not self._running:
-            if self._due_ms is None or ticks_diff(now_ms, self._due_ms) >= 0:
+            if ticks_diff(now_ms, self._due_ms) >= 0:
                 self._start(now_ms)
             return 0
         try:
