@@ -99,7 +99,7 @@ def test_every_range_reads_in_units(board, accel_range, gyro_range):
 def test_setup_fails_when_the_configuration_does_not_stay(board):
     from kickstand.mpu6050 import Mpu6050
 
-    board.faults.corrupt(0x68, nth=4, byte=1, mask=0x04, read=False)  # identify, reset, clock, SMPLRT_DIV
+    board.faults.corrupt(0x68, nth=5, byte=1, mask=0x04, read=False)  # identify (2), reset, clock, SMPLRT_DIV
     with pytest.raises(OSError, match="read back"):
         on(board, lambda: Mpu6050(sensor_i2c()).setup())
 
@@ -113,6 +113,8 @@ def test_a_stuck_bus_is_freed_and_a_dead_one_is_reported(board):
 
     assert on(board, lambda: freed(8))
     assert not on(board, lambda: freed(1000))
+    with pytest.raises(OSError, match="SDA is held low"):
+        on(board, sensor_i2c)
 
 
 def display():
@@ -275,3 +277,33 @@ def test_status_tells_how_the_board_is(board, monkeypatch, capsys, tmp_path):
     board.remove_sensor()
     on(board, kickstand.status)
     assert "none answers on SDA 4, SCL 5" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("off", [-0.01, 0.0, 0.01])
+def test_the_sample_clock_keeps_to_the_time_that_passes(board, off):
+    """A chip that is 1 % off, samples two or three at a time: all dt together are the time that went by."""
+    from kickstand.sample_clock import SampleClock
+
+    clock, total_us, taken = SampleClock(5000), 0, 0
+    for now_us in range(0, 20_000_000, 10_000):
+        n = int(now_us * (1 + off)) // 5000 - taken
+        taken += n
+        if n:
+            total_us += clock.step(n, now_us)
+        clock.emptied(now_us)
+    assert total_us == pytest.approx(20_000_000, abs=25_000)
+
+
+def test_the_sample_clock_spans_a_gap(board):
+    """After an overflow the next dt is as long as what was lost."""
+    from kickstand.sample_clock import SampleClock
+
+    clock = SampleClock(5000)
+    for now_us in range(0, 1_000_000, 10_000):
+        clock.step(2, now_us)
+        clock.emptied(now_us)
+    clock.emptied(1_700_000)  # nothing but an overflow
+    clock.emptied(1_710_000)
+    assert clock.step(2, 1_720_000) == pytest.approx(1_720_000 - 990_000, abs=10_000)
+    clock.emptied(1_720_000)
+    assert clock.step(2, 1_730_000) == pytest.approx(10_000, abs=1_000)

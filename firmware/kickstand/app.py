@@ -29,22 +29,11 @@ TRIM_MS = 60_000
 
 def open_lcd(settings):
     """The display of these settings. Raises SettingsError for pins that the controller cannot use."""
-
-    def reopen():
-        if settings.one_bus:  # the display is a 100 kHz part, and sets the pace of a bus that it shares
-            return _open_bus(settings, "SENSOR", min(settings.SENSOR_BUS_HZ, settings.LCD_BUS_HZ))
-        return _open_bus(settings, "LCD", settings.LCD_BUS_HZ)
-
-    return Lcd(reopen, settings.LCD_ADDRESSES)
+    return Lcd(lambda: _open_bus(settings, "LCD"), settings.LCD_ADDRESSES)
 
 
 def open_sensor(settings):
     """The chip of these settings, watched over. Raises SettingsError at its first fetch() for wrong pins."""
-
-    def reopen():
-        hz = settings.SENSOR_BUS_HZ
-        return _open_bus(settings, "SENSOR", min(hz, settings.LCD_BUS_HZ) if settings.one_bus else hz)
-
     chip = Mpu6050(
         None,
         settings.SENSOR_ADDRESS,
@@ -54,7 +43,7 @@ def open_sensor(settings):
         settings.SAMPLE_HZ,
         settings.ACCEPT_WHO_AM_I,
     )
-    return Sensor(chip, reopen)
+    return Sensor(chip, lambda: _open_bus(settings, "SENSOR"))
 
 
 def open_button(settings):
@@ -69,11 +58,11 @@ def open_button(settings):
         )
 
 
-def _open_bus(settings, name, hz):
+def _open_bus(settings, name):
     controller = getattr(settings, name + "_I2C")
     sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
     try:
-        return bus.open_i2c(controller, sda, scl, hz)
+        return bus.open_i2c(controller, sda, scl, getattr(settings, name + "_BUS_HZ"))
     except ValueError as error:
         raise SettingsError(
             "config.py: %s_SDA = %d and %s_SCL = %d do not belong to I2C %d (%s)"

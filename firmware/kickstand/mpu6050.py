@@ -114,6 +114,8 @@ class Mpu6050:
     def identify(self):
         """Read WHO_AM_I; return it. Raises UnknownChip, OSError."""
         self.who_am_i = self._read(_WHO_AM_I)
+        if self._read(_WHO_AM_I) != self.who_am_i:  # a calibration belongs to one chip
+            raise OSError("MPU6050 WHO_AM_I reads differently each time")
         if self.who_am_i not in CHIPS and self.who_am_i != self._accept:
             raise UnknownChip(self.who_am_i)
         self._full = self._chip()[4] - FRAME
