@@ -15,7 +15,7 @@ from .calibration import Calibration
 from .errors import SettingsError, StoreError
 from .hd44780 import Lcd
 from .meter import LeanMeter
-from .mpu6050 import MAX_FRAMES, Mpu6050
+from .mpu6050 import Mpu6050
 from .sample_clock import SampleClock
 from .screen import Screen
 from .sensor import Sensor
@@ -121,7 +121,7 @@ class App:
             self.screen.interrupt(now_ms)
             if not self._fault_shown:
                 self._page_ms = now_ms  # at once: the next thing is to start the sensor again
-        elif n < MAX_FRAMES:
+        elif not self.sensor.chip.left:
             self._clock.emptied(now_us)
         self.screen.handle(self.button.poll(now_ms), now_ms)
         if ticks_diff(now_ms, self._page_ms) >= 0:

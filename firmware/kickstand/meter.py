@@ -19,7 +19,7 @@ class LeanMeter:
     """Lean and acceleration of the vehicle.
 
     After update(): force (left, up, forward in g), rate (about them in rad/s), lean_deg (the filter's, > 0
-    right), smooth_force (g, for display), fallen, and the maxima since reset_maxima().
+    right), smooth_force (g, for display; of an aligned one forward alone), fallen, and the maxima since reset_maxima().
     """
 
     def __init__(self, calibration):
@@ -97,9 +97,10 @@ class LeanMeter:
         gain = 1.0 if self._fresh else dt_us / (SMOOTH_US + dt_us)
         self._fresh = False
         smooth = self.smooth_force
-        smooth[0] += gain * (force[0] - smooth[0])
-        smooth[1] += gain * (force[1] - smooth[1])
         smooth[2] += gain * (force[2] - smooth[2])
+        if not self.calibration.aligned:  # then the other two are shown as well
+            smooth[0] += gain * (force[0] - smooth[0])
+            smooth[1] += gain * (force[1] - smooth[1])
         self.lean_deg = lean = self.filter.update(force, self.rate, dt_us)
         if -FALLEN_DEG < lean < FALLEN_DEG:
             self._flat_us = 0

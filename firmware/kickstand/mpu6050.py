@@ -40,7 +40,8 @@ _CLOCK_PLL_GYRO_X = const(0x01)  # 1 % accurate; the internal oscillator after r
 _FIFO_ALL = const(0xF8)  # temperature, gyro and accelerometer: the same fourteen bytes as a burst
 _FIFO_ENABLE, _FIFO_RESET = const(0x40), const(0x04)
 _FIFO_6886 = const(0x18)
-MAX_FRAMES = 8  # in one transfer: 3 ms at 400 kHz
+MAX_FRAMES = 8  # in one transfer: 3 ms at 400 kHz; for catching up
+FEW_FRAMES = 3  # else: a turn of the loop that took longer should not make the next one long too
 FROZEN_MS = 100  # noise changes a living chip's readings in every sample
 
 ACCEL_LSB_PER_G = {2: 16384, 4: 8192, 8: 4096, 16: 2048}
@@ -94,6 +95,7 @@ class Mpu6050:
         self._frames = bytearray(FRAME * MAX_FRAMES)
         # slices made once, because each slice takes heap
         self._some_frames = [memoryview(self._frames)[: FRAME * n] for n in range(MAX_FRAMES + 1)]
+        self.left = 0  # frames that the last fetch() left in the FIFO
         self.overflows = 0  # of the FIFO, or its frames out of step
         self._odd = False
         self._started = False  # the FIFO too
@@ -167,12 +169,22 @@ class Mpu6050:
         odd = waiting % FRAME != 0
         if waiting > self._full or (odd and self._odd):
             self.overflows += 1
+            self.left = 0
             self.restart_fifo()
             return 0
         self._odd = odd
+        n = waiting // FRAME
         if odd:  # a frame is just coming in; if it still is the next time, the frames are out of step
+            self.left = n + 1
             return 0
-        n = min(waiting // FRAME, MAX_FRAMES)
+        if n >= MAX_FRAMES:
+            self.left = n - MAX_FRAMES
+            n = MAX_FRAMES
+        elif n > FEW_FRAMES:
+            self.left = n - FEW_FRAMES
+            n = FEW_FRAMES
+        else:
+            self.left = 0
         if n:
             self._i2c.readfrom_mem_into(self._address, _FIFO_R_W, self._some_frames[n])
         return n
