@@ -105,8 +105,7 @@ class Screen:
         if self.sensor.fault is not None:
             return self.sensor.fault
         if self._info:
-            chip = self.sensor.chip
-            return pages.sensor_info(chip.name, chip.temperature_c(chip.counts[3]), self.meter.calibration)
+            return pages.sensor_info(self.sensor, self.meter, now_ms // 1000)
         if not self.meter.calibration.aligned:
             return pages.not_aligned(self.meter, now_ms // 1000)
         if self.meter.fallen:

@@ -87,6 +87,9 @@ class Settings:
                     name,
                 )
         self.one_bus = (self.SENSOR_SDA, self.SENSOR_SCL) == (self.LCD_SDA, self.LCD_SCL)
+        if self.one_bus:  # the display is a 100 kHz part, and sets the pace of a bus that it shares
+            self.LCD_I2C = self.SENSOR_I2C
+            self.SENSOR_BUS_HZ = self.LCD_BUS_HZ = min(self.SENSOR_BUS_HZ, self.LCD_BUS_HZ)
         buses = {self.SENSOR_SDA, self.SENSOR_SCL, self.LCD_SDA, self.LCD_SCL}
         if self.BUTTON_PIN in buses or len(buses) != (2 if self.one_bus else 4):
             raise SettingsError(
