@@ -45,7 +45,7 @@ MAX_SPEED = 150.0 / _G
 START_LEAN = radians(3.0)  # where the force looks like that of a standing bike
 START_STAND = radians(0.5)
 START_STILL_G, START_STILL_RADPS = 0.05, 0.02
-START_LEAN_MOVING = radians(15.0)
+START_LEAN_MOVING = radians(30.0)
 START_PITCH = radians(5.0)
 START_SPEED = 15.0 / _G
 START_BIAS = radians(1.0)  # the poses measured it; it has drifted since
@@ -78,6 +78,7 @@ SIGMA_REST_SPEED = 0.02 / _G
 SIGMA_GIVEN_SPEED = 1.0 / _G  # of a receiver or a wheel, if there is one
 GIVEN_SPEED_LATE_S = 1.0
 
+ROLLING_SPEED, ROLLING_SIGMAS = 3.0 / _G, 3.0  # a speed as sure as this is no standstill
 BALANCED_SPEED = 4.0 / _G  # beyond, the yaw rate follows from lean and speed, if
 BALANCED_SHARE, BALANCED_RADPS = 0.5, 0.1  # what is measured differs by less than this of it, and this
 MIN_COS = 0.3
@@ -217,7 +218,8 @@ class LeanFilter:
         roll_acceleration = (self._roll_rate - self._last_roll_rate) / seconds
         self._last_roll_rate = self._roll_rate
         rested = self._rest.resting
-        self._rest.update(means, seconds)
+        rolling = x[V] > ROLLING_SPEED and x[V] > ROLLING_SIGMAS * sqrt(self._p.rows[V][V])
+        self._rest.update(means, seconds, rolling)
         if self._rest.resting and not rested:
             self._stand(means)
         self._work = self._process(means, seconds, roll_acceleration)
