@@ -94,20 +94,17 @@ def replay(log: Path, calibration: Path, engine: str, out: Path) -> None:
     """Run the firmware's own lean meter over a recorded log."""
     from . import replay
     from .calibration_file import read_calibration
-    from .logs import read_log
     from .output import check_output
 
     check_output(out, [log, calibration])
     parameters = read_calibration(calibration)
-    recording = read_log(log)
-    results = replay.replay(recording, parameters, engine)
-    replay.write_results(out, recording, results)
+    count = replay.replay(log, parameters, engine, out)
     if not parameters.aligned:
         click.echo(
             f"warning: {calibration} is not aligned: this is the lean of the sensor, not of the bike",
             err=True,
         )
-    click.echo(f"written: {out}, {len(results)} samples")
+    click.echo(f"written: {out}, {count} samples")
 
 
 @kickstand.command()
