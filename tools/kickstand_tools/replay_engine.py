@@ -37,11 +37,15 @@ class Replay:
         self.meter = LeanMeter(calibration)
         self._before = None
 
-    def step(self, time_us, reading):
-        """Take a sample (7, the chip's order; g, C, deg/s): the values of COLUMNS."""
-        meter = self.meter
-        meter.update(reading, 0 if self._before is None else time_us - self._before)
+    def take(self, time_us, reading):
+        """Give the meter a sample (7, the chip's order; g, C, deg/s)."""
+        self.meter.update(reading, 0 if self._before is None else time_us - self._before)
         self._before = time_us
+
+    def step(self, time_us, reading):
+        """The same, and the values of COLUMNS after it."""
+        self.take(time_us, reading)
+        meter = self.meter
         force, rate = meter.force, meter.rate
         return (
             meter.lean_deg,
