@@ -62,6 +62,7 @@ def test_the_maxima_are_those_the_display_held(ride):
     assert summary.right_deg.value == meter.max_right_deg > 38
     assert summary.brake_g.value == meter.max_brake_g > 0.5
     assert summary.accel_g.value == meter.max_accel_g > 0.3
+    assert summary.right_deg.time_s is not None
     assert whole.lean_deg[np.searchsorted(whole.t_s, summary.right_deg.time_s)] == summary.right_deg.value
     assert 3.0 < summary.beyond_s[40.0] < summary.beyond_s[30.0] < 9.0
     assert np.sum(summary.histogram_s) <= summary.riding_s + 1e-6

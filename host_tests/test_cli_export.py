@@ -4,6 +4,7 @@ import csv
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import analysis_rides
 import command
@@ -68,7 +69,7 @@ def test_parquet_names_the_units(ride, tmp_path):
     assert units["speed_mps"] == "m/s"
 
 
-def read_vbo(path: Path) -> tuple[dict[str, list[str]], "pandas.DataFrame"]:
+def read_vbo(path: Path) -> tuple[dict[str, list[str]], Any]:
     """By Racelogic's rules: lines end in CR LF, sections begin with [name], blank lines stand between them."""
     text = path.read_bytes().decode("utf-8")
     assert text.count("\n") == text.count("\r\n")

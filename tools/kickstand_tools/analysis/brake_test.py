@@ -40,8 +40,15 @@ STILL_DPS, STILL_G = 1.0, 0.01  # turns no faster, and is as steep at the end as
 ONSET_SHARE, FAINT_SHARE = 0.15, 0.04  # of the braking: it has begun; it had not
 ONSET_S = 0.6  # from the one to the other, at most
 
+DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # of a speed, that are tried
+ENOUGH_SPEEDS, ENOUGH_CHANGE_MPS = 30, 0.5
+
+# Above the point about which a bike pitches, in the height of its wheels' hubs: the nose going down, a sensor under
+# the seat goes forward.
+SENSOR_HEIGHT_M = 0.65
+
 # One sigma, of what is fitted and of a speed
-SIGMA_SCALE, SIGMA_SLOPE_MPS2, SIGMA_DELAY_S, SIGMA_SPEED_MPS = 0.01, 0.05, 0.2, 0.05
+SIGMA_SCALE, SIGMA_SLOPE_MPS2, SIGMA_DELAY_S, SIGMA_SPEED_MPS = 0.01, 0.05, 0.05, 0.05
 SIGMA_WALK_MPS2, KNOT_S = 0.1, 0.5  # per square root of a second
 
 
@@ -69,12 +76,13 @@ def stops(ride: Channels) -> list[Stop]:
     """Every stop from over 10 km/h with at least 1 m/s2. ride: whole, samples at most RATE_S apart (thin.py)."""
     still = standing(ride)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], still, [False]))))
+    delay_s = speed_delay_s(ride)
     found, after = [], 0
     for start, end in zip(edges[::2], edges[1::2]):  # of each standstill
         first = max(after, int(np.searchsorted(ride.t_s, ride.t_s[start] - LONGEST_S)))
         last = int(np.searchsorted(ride.t_s, min(ride.t_s[end - 1], ride.t_s[start] + REST_S), side="right"))
         if start - first > 10 and last - start > 10:
-            stop = _stop(ride.part(slice(first, last)), start - first)
+            stop = _stop(ride.part(slice(first, last)), start - first, delay_s)
             if stop:
                 found.append(stop)
         after = int(end)
@@ -123,22 +131,21 @@ def _window(values: Array, n: int) -> tuple[Array, Array]:
     return mean + middle, np.sqrt(np.maximum(0.0, (second[n:] - second[:-n]) / n - mean * mean))
 
 
-def _stop(part: Channels, rest: int) -> Stop | None:
+def _stop(part: Channels, rest: int, delay_s: float) -> Stop | None:
     """part: from after the standstill before to some time into this one, which begins at index rest."""
     time = part.t_s
-    acceleration, yaw_rate = _acceleration(part, rest)
-    speed = -_integral(time, acceleration)
-    speed = speed[-1] - speed  # backwards from standstill
+    acceleration, pitch_rate, yaw_rate = _acceleration(part, rest)
+    felt = _integral(time, acceleration)
+    speed = felt - felt[-1] + SENSOR_HEIGHT_M * np.radians(pitch_rate)  # backwards from standstill
     smooth = _smoothed(acceleration, time)
     begin = _onset(smooth, time, rest)
     if begin is None:
         return None
     known = "integrated"
-    fitted = _fitted(part, begin, speed, acceleration)
+    fitted = _fitted(part, begin, speed, acceleration, delay_s)
     if fitted is not None:
-        speed, acceleration = fitted
-        known = "log"
-    smooth = _smoothed(acceleration, time)
+        speed, known = fitted, "log"
+    smooth = _smoothed(np.gradient(speed, time), time)
     v = speed[begin:]
     below = np.flatnonzero(v <= 0.02 * v[0])
     if v[0] < MIN_SPEED_MPS or not len(below):
@@ -160,25 +167,48 @@ def _stop(part: Channels, rest: int) -> Stop | None:
         float(distance[-1] + 0.5 * v[-1] * tail),
         mfdd,
         float(-np.min(smooth[begin : end + 1])),
-        float(np.max(np.abs(np.gradient(smooth, time)[begin : end + 1]))),
+        float(np.max(np.abs(_smoothed(np.gradient(smooth, time), time)[begin : end + 1]))),
         float(_integral(t, v * np.sin(side))[-1]),
         float(heading[-1]),
         known,
     )
 
 
-def _acceleration(part: Channels, rest: int) -> tuple[Array, Array]:
-    """Along the road in m/s2 and the yaw rate in deg/s, with what the standstill says of slope and gyro."""
+def _acceleration(part: Channels, rest: int) -> tuple[Array, Array, Array]:
+    """Of the sensor along the road in m/s2; pitch and yaw rate in deg/s; with what the standstill says of both."""
     time = part.t_s
     settled = int(np.searchsorted(time, time[rest] + SETTLE_S))
     still = slice(settled if settled < len(time) - 5 else rest, len(time))
     lean = np.radians(np.nan_to_num(part.lean_deg))
     pitch_rate = part.pitch_rate_dps - np.mean(part.pitch_rate_dps[still])
     yaw_rate = part.yaw_rate_dps - np.mean(part.yaw_rate_dps[still])
-    turned = _integral(time, np.radians(yaw_rate * np.sin(lean) + pitch_rate * np.cos(lean)))
+    level_pitch_rate = yaw_rate * np.sin(lean) + pitch_rate * np.cos(lean)
+    turned = _integral(time, np.radians(level_pitch_rate))
     stood = np.arcsin(np.clip(np.mean(part.forward_g[still]), -0.5, 0.5))
     pitch = stood + turned - np.mean(turned[still])
-    return G * (part.forward_g - np.sin(pitch)), yaw_rate
+    return G * (part.forward_g - np.sin(pitch)), level_pitch_rate, yaw_rate
+
+
+def speed_delay_s(ride: Channels) -> float:
+    """How late the log's speed is, as that of satellites is: where its changes best fit those felt. 0 if unknown."""
+    there = np.flatnonzero(~np.isnan(ride.speed_mps))
+    if len(there) < ENOUGH_SPEEDS:
+        return 0.0
+    second = np.floor(ride.t_s[there])
+    there = there[np.flatnonzero(np.diff(second, prepend=-1.0))]  # one a second
+    time, changes = ride.t_s[there], np.diff(ride.speed_mps[there])
+    felt = _integral(ride.t_s, G * ride.forward_g)
+    if len(there) < ENOUGH_SPEEDS or np.std(changes) < ENOUGH_CHANGE_MPS:
+        return 0.0
+    left = []
+    for delay in DELAYS_S:
+        pushes = np.diff(np.interp(time - delay, ride.t_s, felt))
+        left.append(1.0 - np.corrcoef(pushes, changes)[0, 1] ** 2)
+    best = int(np.argmin(left))
+    if best in (0, len(left) - 1):
+        return 0.0
+    before, least, after = left[best - 1 : best + 2]  # a parabola through these
+    return float(DELAYS_S[best] + 0.5 * (before - after) / (before - 2.0 * least + after) * (DELAYS_S[1] - DELAYS_S[0]))
 
 
 def _onset(smooth: Array, time: Array, rest: int) -> int | None:
@@ -199,23 +229,27 @@ def _onset(smooth: Array, time: Array, rest: int) -> int | None:
     return begin
 
 
-def _fitted(part: Channels, begin: int, speed: Array, acceleration: Array) -> tuple[Array, Array] | None:
-    """Speed and acceleration that agree with the log's speed; None if that has none there.
+def _fitted(
+    part: Channels, begin: int, speed: Array, acceleration: Array, delay_s: float
+) -> Array | None:
+    """A speed that agrees with the log's; None if that has none there.
 
     Least squares with what was known before: log = (1 + scale) v + integral of slope to the end - delay dv/dt,
     where slope, what the force has of hill and dive that the gyro has not told, is a random walk back in time
     from nearly none at standstill.
     """
     time = part.t_s
-    wanted = np.flatnonzero((time >= time[begin] - LEAD_S) & ~np.isnan(part.speed_mps))
+    values = np.flatnonzero(~np.isnan(part.speed_mps))
+    wanted = np.searchsorted(time, time[values] - delay_s - 1e-6).clip(0, len(time) - 1)  # when they were so
+    values, wanted = (these[time[wanted] >= time[begin] - LEAD_S] for these in (values, wanted))
     if len(wanted) < 2 or wanted[-1] < begin:
         return None
-    knots = np.arange(time[-1], min(time[wanted[0]], time[begin]) - KNOT_S, -KNOT_S)
+    knots = np.arange(float(time[-1]), float(min(time[wanted[0]], time[begin])) - KNOT_S, -KNOT_S)
     hats = np.column_stack([np.interp(time, knots[::-1], row[::-1]) for row in np.eye(len(knots))])
     pushed = np.column_stack([_integral(time, hat) for hat in hats.T])
     pushed = pushed[-1] - pushed  # from each sample to the end
     terms = np.column_stack((speed, pushed, -_smoothed(acceleration, time)))[wanted]
-    error = part.speed_mps[wanted] - speed[wanted]
+    error = part.speed_mps[values] - speed[wanted]
     prior = np.zeros((len(knots) + 2, len(knots) + 2))
     prior[0, 0], prior[-1, -1] = 1.0 / SIGMA_SCALE, 1.0 / SIGMA_DELAY_S
     prior[1, 1] = 1.0 / SIGMA_SLOPE_MPS2
@@ -225,7 +259,7 @@ def _fitted(part: Channels, begin: int, speed: Array, acceleration: Array) -> tu
     known = np.concatenate((error / SIGMA_SPEED_MPS, np.zeros(len(prior))))
     found = np.linalg.lstsq(weighted, known, rcond=None)[0]
     scale, slope = 1.0 + found[0], found[1:-1]
-    return scale * speed + pushed @ slope, scale * acceleration - hats @ slope
+    return scale * speed + pushed @ slope
 
 
 def _integral(time: Array, values: Array) -> Array:
