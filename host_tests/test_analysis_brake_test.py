@@ -8,9 +8,11 @@ import command
 import numpy as np
 import pytest
 from kickstand_tools import calibrate, rides
-from kickstand_tools.analysis import brake_test
-from kickstand_tools.analysis.brake_test import RATE_S, Stop, mfdd_mps2, speed_delay_s, standing, stops
+from kickstand_tools.analysis.brake_test import RATE_S, Stop, mfdd_mps2, stops
 from kickstand_tools.analysis.channels import Channels, open_ride
+from kickstand_tools.analysis.signals import G
+from kickstand_tools.analysis.speed_fit import speed_delay_s
+from kickstand_tools.analysis.standstill import standing
 from kickstand_tools.analysis.thin import joined, thinned
 from kickstand_tools.calibration_file import read_calibration, write_calibration
 from kickstand_tools.simulation import profiles, simulate
@@ -178,9 +180,9 @@ def test_a_pull_to_the_side(tmp_path):
     n = 200
     t = np.arange(0, 24.0, 1 / n)
     v = np.clip(20.0 * np.minimum(t - 3.0, 4.0) / 4.0, 0.0, None) - np.clip(5.0 * (t - 12.0), 0.0, 20.0)
-    acceleration = np.gradient(v, t) / brake_test.G
+    acceleration = np.gradient(v, t) / G
     yaw = np.where((t > 12.0) & (t < 16.0), 0.5, 0.0)
-    left = v * np.radians(yaw) / brake_test.G
+    left = v * np.radians(yaw) / G
     shake = np.random.default_rng(0).normal(size=(6, len(t))) * np.where(v > 0, 1.0, 0.05)
     path = command.write(
         tmp_path / "RIDE.csv",

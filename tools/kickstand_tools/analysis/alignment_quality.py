@@ -16,6 +16,7 @@ from .thin import spacing_s
 SMOOTH_S = 0.5
 STRAIGHT_DPS, STRAIGHT_DEG = 2.0, 8.0  # turning and leaning less is riding straight on
 ENOUGH_S = 10.0  # of such riding
+LEVEL_S = 60.0  # of riding, for hills to even out
 ENOUGH_G = 0.05  # rms of braking and speeding up in it
 
 
@@ -59,7 +60,7 @@ def quality(ride: Channels, standing: NDArray[np.bool_]) -> Quality:
         push = forward[straight] - np.mean(forward[straight])
         if np.std(push) > ENOUGH_G:
             yaw = float(np.degrees(np.arctan(np.mean(push * left[straight]) / np.mean(push * push))))
-    if standing[0] and standing[-1] and np.count_nonzero(moving) * n * step_s > 10 * ENOUGH_S:
+    if standing[0] and standing[-1] and np.count_nonzero(moving) * n * step_s > LEVEL_S:
         pitch = float(np.degrees(np.arcsin(np.mean(forward[moving]))))
     sizes = np.sqrt(left * left + up * up + forward * forward)[still]
     gravity = float(np.mean(sizes)) if len(sizes) else None

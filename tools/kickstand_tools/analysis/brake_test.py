@@ -10,46 +10,31 @@ integrated backwards, so that the dive of the fork is not taken for braking:
 
     dq/dt = w_y sin t - w_x cos t,   dv/dt = f_z - g sin q       (as in kickstand.lean_filter)
 
-Where the log has a speed, scale, slope and delay of the two are fitted to each other over the stop: a speed once
-a second has two or three values in a hard stop, which alone would tell nothing of its shape.
+Where the log has a speed, this one is fitted to it (speed_fit.py).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .channels import Array, Channels
-from .thin import spacing_s
+from .signals import G, integral, smoothed
+from .speed_fit import fitted_speed, speed_delay_s
+from .standstill import standing
 
-G = 9.80665
 RATE_S = 0.02  # of the samples these functions want, at most
 MIN_SPEED_MPS = 10.0 / 3.6
 MIN_MFDD_MPS2 = 1.0
 LONGEST_S = 60.0
-STOPPED_MPS = 0.3  # a speed that counts as standing; satellites never quite say 0
+GAP_S = 0.5  # over missing readings nothing can be integrated
 REST_S = 2.5  # of the standstill that are looked at,
 SETTLE_S = 0.5  # but for its beginning, when the fork comes up again
-LEAD_S = 4.0  # of speed before the braking that are taken into the fit
-SMOOTH_S = 0.2
-QUIET_S = 1.0  # without a speed: what stands shakes for so long by no more than this share of what it does riding,
-QUIET_SHARE = 0.3  # of its turning; and of its jolts up and down, with the engine's:
-QUIET_UP_SHARE = 0.5
-ENGINE_S = 0.1  # an idling engine is quicker
-STILL_DPS, STILL_G = 1.0, 0.01  # turns no faster, and is as steep at the end as at the beginning
 ONSET_SHARE, FAINT_SHARE = 0.15, 0.04  # of the braking: it has begun; it had not
 ONSET_S = 0.6  # from the one to the other, at most
-
-DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # of a speed, that are tried
-ENOUGH_SPEEDS, ENOUGH_CHANGE_MPS = 30, 0.5
 
 # Above the point about which a bike pitches, in the height of its wheels' hubs: the nose going down, a sensor under
 # the seat goes forward.
 SENSOR_HEIGHT_M = 0.65
-
-# One sigma, of what is fitted and of a speed
-SIGMA_SCALE, SIGMA_SLOPE_MPS2, SIGMA_DELAY_S, SIGMA_SPEED_MPS = 0.01, 0.05, 0.05, 0.05
-SIGMA_WALK_MPS2, KNOT_S = 0.1, 0.5  # per square root of a second
 
 
 @dataclass
@@ -81,6 +66,8 @@ def stops(ride: Channels) -> list[Stop]:
     for start, end in zip(edges[::2], edges[1::2]):  # of each standstill
         first = max(after, int(np.searchsorted(ride.t_s, ride.t_s[start] - LONGEST_S)))
         last = int(np.searchsorted(ride.t_s, min(ride.t_s[end - 1], ride.t_s[start] + REST_S), side="right"))
+        gaps = np.flatnonzero(np.diff(ride.t_s[first:last]) > GAP_S)
+        first += int(gaps[-1]) + 1 if len(gaps) else 0
         if start - first > 10 and last - start > 10:
             stop = _stop(ride.part(slice(first, last)), start - first, delay_s)
             if stop:
@@ -97,67 +84,33 @@ def mfdd_mps2(speed_mps: Array, distance_m: Array) -> float:
     return float((3.6**2 * (vb * vb - ve * ve)) / (25.92 * (se - sb)))
 
 
-def standing(ride: Channels) -> NDArray[np.bool_]:
-    """True where the bike stands still: by the log's own speed, or where there is none by how little it shakes."""
-    there = np.flatnonzero(~np.isnan(ride.speed_mps))
-    if len(there):
-        latest = there[np.clip(np.searchsorted(there, np.arange(len(ride.t_s)), side="right") - 1, 0, None)]
-        return ride.speed_mps[latest] < STOPPED_MPS
-    second = max(4, round(QUIET_S / spacing_s(ride)))
-    if len(ride.t_s) < 2 * second:
-        return np.zeros(len(ride.t_s), dtype=bool)
-    pitch, pitch_spread = _window(_smoothed(ride.pitch_rate_dps, ride.t_s, ENGINE_S), second)
-    yaw, yaw_spread = _window(_smoothed(ride.yaw_rate_dps, ride.t_s, ENGINE_S), second)
-    forward, _ = _window(ride.forward_g, second // 2)
-    quiet = (pitch_spread < QUIET_SHARE * np.percentile(pitch_spread, 75)) & (
-        yaw_spread < QUIET_SHARE * np.percentile(yaw_spread, 75)
-    )
-    _, up_spread = _window(ride.up_g, second)
-    quiet &= up_spread < QUIET_UP_SHARE * np.percentile(up_spread, 75)
-    quiet &= (np.abs(pitch) < STILL_DPS) & (np.abs(yaw) < STILL_DPS)
-    quiet &= np.abs(forward[second - second // 2 :][: len(quiet)] - forward[: len(quiet)]) < STILL_G
-    still = np.zeros(len(ride.t_s), dtype=bool)
-    for shift in range(second):  # every sample of a quiet window
-        still[shift : shift + len(quiet)] |= quiet
-    return still
-
-
-def _window(values: Array, n: int) -> tuple[Array, Array]:
-    """Mean and standard deviation of each n values in a row."""
-    middle = float(np.mean(values))  # taken off, or the squares of a large one would hide the spread
-    values = values - middle
-    first, second = (np.cumsum(np.concatenate(([0.0], x))) for x in (values, values * values))
-    mean = (first[n:] - first[:-n]) / n
-    return mean + middle, np.sqrt(np.maximum(0.0, (second[n:] - second[:-n]) / n - mean * mean))
-
-
 def _stop(part: Channels, rest: int, delay_s: float) -> Stop | None:
     """part: from after the standstill before to some time into this one, which begins at index rest."""
     time = part.t_s
     acceleration, pitch_rate, yaw_rate = _acceleration(part, rest)
-    felt = _integral(time, acceleration)
+    felt = integral(time, acceleration)
     speed = felt - felt[-1] + SENSOR_HEIGHT_M * np.radians(pitch_rate)  # backwards from standstill
-    smooth = _smoothed(acceleration, time)
+    smooth = smoothed(acceleration, time)
     begin = _onset(smooth, time, rest)
     if begin is None:
         return None
     known = "integrated"
-    fitted = _fitted(part, begin, speed, acceleration, delay_s)
+    fitted = fitted_speed(part, begin, speed, acceleration, delay_s)
     if fitted is not None:
         speed, known = fitted, "log"
-    smooth = _smoothed(np.gradient(speed, time), time)
+    smooth = smoothed(np.gradient(speed, time), time)
     v = speed[begin:]
     below = np.flatnonzero(v <= 0.02 * v[0])
     if v[0] < MIN_SPEED_MPS or not len(below):
         return None
     end = begin + int(below[0])
     v, t = np.maximum(speed[begin : end + 1], 0.0), time[begin : end + 1]
-    distance = _integral(t, v)
+    distance = integral(t, v)
     mfdd = mfdd_mps2(v, distance)
     if not mfdd >= MIN_MFDD_MPS2:
         return None
-    heading = _integral(t, yaw_rate[begin : end + 1])
-    side = np.radians(heading - _line(t, heading, v))
+    heading = integral(t, yaw_rate[begin : end + 1])
+    side = np.radians(heading - _line(t, heading))
     # the last hundredths of the speed are lost in the fork's rebound: evenly on to zero
     tail = v[-1] / mfdd
     return Stop(
@@ -167,8 +120,8 @@ def _stop(part: Channels, rest: int, delay_s: float) -> Stop | None:
         float(distance[-1] + 0.5 * v[-1] * tail),
         mfdd,
         float(-np.min(smooth[begin : end + 1])),
-        float(np.max(np.abs(_smoothed(np.gradient(smooth, time), time)[begin : end + 1]))),
-        float(_integral(t, v * np.sin(side))[-1]),
+        float(np.max(np.abs(smoothed(np.gradient(smooth, time), time)[begin : end + 1]))),
+        float(integral(t, v * np.sin(side))[-1]),
         float(heading[-1]),
         known,
     )
@@ -183,32 +136,10 @@ def _acceleration(part: Channels, rest: int) -> tuple[Array, Array, Array]:
     pitch_rate = part.pitch_rate_dps - np.mean(part.pitch_rate_dps[still])
     yaw_rate = part.yaw_rate_dps - np.mean(part.yaw_rate_dps[still])
     level_pitch_rate = yaw_rate * np.sin(lean) + pitch_rate * np.cos(lean)
-    turned = _integral(time, np.radians(level_pitch_rate))
+    turned = integral(time, np.radians(level_pitch_rate))
     stood = np.arcsin(np.clip(np.mean(part.forward_g[still]), -0.5, 0.5))
     pitch = stood + turned - np.mean(turned[still])
     return G * (part.forward_g - np.sin(pitch)), level_pitch_rate, yaw_rate
-
-
-def speed_delay_s(ride: Channels) -> float:
-    """How late the log's speed is, as that of satellites is: where its changes best fit those felt. 0 if unknown."""
-    there = np.flatnonzero(~np.isnan(ride.speed_mps))
-    if len(there) < ENOUGH_SPEEDS:
-        return 0.0
-    second = np.floor(ride.t_s[there])
-    there = there[np.flatnonzero(np.diff(second, prepend=-1.0))]  # one a second
-    time, changes = ride.t_s[there], np.diff(ride.speed_mps[there])
-    felt = _integral(ride.t_s, G * ride.forward_g)
-    if len(there) < ENOUGH_SPEEDS or np.std(changes) < ENOUGH_CHANGE_MPS:
-        return 0.0
-    left = []
-    for delay in DELAYS_S:
-        pushes = np.diff(np.interp(time - delay, ride.t_s, felt))
-        left.append(1.0 - np.corrcoef(pushes, changes)[0, 1] ** 2)
-    best = int(np.argmin(left))
-    if best in (0, len(left) - 1):
-        return 0.0
-    before, least, after = left[best - 1 : best + 2]  # a parabola through these
-    return float(DELAYS_S[best] + 0.5 * (before - after) / (before - 2.0 * least + after) * (DELAYS_S[1] - DELAYS_S[0]))
 
 
 def _onset(smooth: Array, time: Array, rest: int) -> int | None:
@@ -229,52 +160,6 @@ def _onset(smooth: Array, time: Array, rest: int) -> int | None:
     return begin
 
 
-def _fitted(
-    part: Channels, begin: int, speed: Array, acceleration: Array, delay_s: float
-) -> Array | None:
-    """A speed that agrees with the log's; None if that has none there.
-
-    Least squares with what was known before: log = (1 + scale) v + integral of slope to the end - delay dv/dt,
-    where slope, what the force has of hill and dive that the gyro has not told, is a random walk back in time
-    from nearly none at standstill.
-    """
-    time = part.t_s
-    values = np.flatnonzero(~np.isnan(part.speed_mps))
-    wanted = np.searchsorted(time, time[values] - delay_s - 1e-6).clip(0, len(time) - 1)  # when they were so
-    values, wanted = (these[time[wanted] >= time[begin] - LEAD_S] for these in (values, wanted))
-    if len(wanted) < 2 or wanted[-1] < begin:
-        return None
-    knots = np.arange(float(time[-1]), float(min(time[wanted[0]], time[begin])) - KNOT_S, -KNOT_S)
-    hats = np.column_stack([np.interp(time, knots[::-1], row[::-1]) for row in np.eye(len(knots))])
-    pushed = np.column_stack([_integral(time, hat) for hat in hats.T])
-    pushed = pushed[-1] - pushed  # from each sample to the end
-    terms = np.column_stack((speed, pushed, -_smoothed(acceleration, time)))[wanted]
-    error = part.speed_mps[values] - speed[wanted]
-    prior = np.zeros((len(knots) + 2, len(knots) + 2))
-    prior[0, 0], prior[-1, -1] = 1.0 / SIGMA_SCALE, 1.0 / SIGMA_DELAY_S
-    prior[1, 1] = 1.0 / SIGMA_SLOPE_MPS2
-    for k in range(2, len(knots) + 1):
-        prior[k, k], prior[k, k - 1] = np.array([1.0, -1.0]) / (SIGMA_WALK_MPS2 * KNOT_S**0.5)
-    weighted = np.vstack((terms / SIGMA_SPEED_MPS, prior))
-    known = np.concatenate((error / SIGMA_SPEED_MPS, np.zeros(len(prior))))
-    found = np.linalg.lstsq(weighted, known, rcond=None)[0]
-    scale, slope = 1.0 + found[0], found[1:-1]
-    return scale * speed + pushed @ slope
-
-
-def _integral(time: Array, values: Array) -> Array:
-    """From the first sample to each, by trapezia."""
-    steps = np.diff(time) * (values[1:] + values[:-1]) / 2.0
-    return np.concatenate(([0.0], np.cumsum(steps)))
-
-
-def _smoothed(values: Array, time: Array, over_s: float = SMOOTH_S) -> Array:
-    """Mean over so much time around each sample."""
-    half = max(0, round(0.5 * over_s / float(np.median(np.diff(time)))))
-    padded = np.concatenate((np.full(half, values[0]), values, np.full(half, values[-1])))
-    return np.convolve(padded, np.full(2 * half + 1, 1.0 / (2 * half + 1)), mode="valid")
-
-
-def _line(time: Array, heading: Array, speed: Array) -> float:
+def _line(time: Array, heading: Array) -> float:
     """The direction ridden just before braking: that of its first tenth of a second."""
     return float(np.mean(heading[time <= time[0] + 0.1]))

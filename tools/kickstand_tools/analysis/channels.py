@@ -80,8 +80,9 @@ def open_ride(log: Path, calibration: Path | None) -> Ride:
     """The ride in log, with the calibration given or else the file beside it. Raises InputError."""
     stem = log.name.removesuffix(".gz").removesuffix(".csv")
     beside = log.with_name(stem + ".cal.json")
-    if calibration is None and not log.exists():
-        raise InputError(f"{log}: there is no such file")
+    if not log.is_file():
+        what = "is a directory: give the name of a ride in it" if log.is_dir() else "there is no such file"
+        raise InputError(f"{log}: {what}")
     if calibration is None and not beside.exists():
         raise InputError(f"{log}: no calibration {beside.name} beside it: give one with --calibration")
     path = calibration or beside

@@ -4,8 +4,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from .alignment_quality import Quality, quality
-from .brake_test import RATE_S, Stop, standing, stops
+from .brake_test import RATE_S, Stop, stops
 from .channels import Channels, Ride
+from .standstill import standing
 from .summary import Summary
 from .thin import joined, thinned
 
