@@ -93,7 +93,7 @@ def _forces(axes: Any, drawn: Traces, seen: Look) -> None:
         axes.plot(*envelope(drawn.time, values, POINTS), color=colour, linewidth=0.7, alpha=0.9, label=name)
     for stop in seen.stops:
         axes.axvspan(stop.start_s, stop.stop_s, color="0.88", linewidth=0)
-    for line in axes.legend(loc="upper right", ncols=2, frameon=False).get_lines():
+    for line in axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=2, frameon=False).get_lines():
         line.set_linewidth(2.5)
     axes.set(title="Acceleration, g" + (" (grey: stops)" if seen.stops else ""))
     axes.margins(x=0.0)
