@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from .brake_test import Stop
 from .envelope import envelope
 from .look import Look
 from .report import clock
@@ -43,16 +44,17 @@ def figure(seen: Look) -> Any:
         row_heights=[0.3, 0.3, 0.4],
         vertical_spacing=0.08,
         subplot_titles=(
-            "Lean, degrees (right > 0)",
+            "Speed, km/h" if seen.ride.car else "Lean, degrees (right > 0)",
             f"Acceleration, g: <span style='color:{BRAKE_COLOUR}'>forward</span> and "
             f"<span style='color:{LATERAL_COLOUR}'>to the left</span>; grey: stops and their MFDD, m/s²",
             "g against g",
-            "How long at which lean, %",
+            "" if seen.ride.car else "How long at which lean, %",
             "Alignment: g on the straights",
         ),
     )
-    time, lean = envelope(drawn.time, drawn.lean, POINTS)
-    made.add_trace(Scatter(x=time, y=_short(lean), name="lean", line={"width": 1, "color": RIGHT_COLOUR}), 1, 1)
+    first, name = (drawn.speed, "speed") if seen.ride.car else (drawn.lean, "lean")
+    x, y = envelope(drawn.time, first, POINTS)
+    made.add_trace(Scatter(x=x, y=_short(y), name=name, line={"width": 1, "color": RIGHT_COLOUR}), 1, 1)
     for peak, sign in maxima(seen):
         text = f"{peak.value:.0f}° {'left' if sign < 0 else 'right'}"
         made.add_annotation(x=peak.time_s, y=sign * peak.value, text=text, row=1, col=1, ay=-20 * sign)
@@ -62,11 +64,6 @@ def figure(seen: Look) -> Any:
     ):
         x, y = envelope(drawn.time, values, POINTS)
         made.add_trace(Scatter(x=x, y=_short(y), name=name, line={"width": 1, "color": colour}), 2, 1)
-    for stop in seen.stops:
-        edges = {"x0": stop.start_s, "x1": stop.stop_s}
-        made.add_vrect(**edges, row=2, col=1, fillcolor="grey", opacity=0.2, line_width=0)
-        label = {"text": f"{stop.mfdd_mps2:.1f}", "showarrow": False, "yanchor": "top"}
-        made.add_annotation(x=(stop.start_s + stop.stop_s) / 2, y=1, yref="y2 domain", xref="x2", **label)
     centres = (drawn.gg_edges[1:] + drawn.gg_edges[:-1]) / 2.0
     logs = np.log10(np.where(drawn.gg > 0.0, drawn.gg, np.nan))
     colours = {"colorscale": "YlGnBu", "reversescale": False, "showscale": False}
@@ -87,7 +84,8 @@ def figure(seen: Look) -> Any:
     limit = lean_limit(seen)
     leaning = float(np.max(share[np.abs(middle) > 5.0], initial=0.0))
     made.update_yaxes(range=[0.0, max(1.0, 1.5 * leaning)], row=3, col=2)
-    made.update_yaxes(range=[-limit, limit], row=1, col=1)
+    if not seen.ride.car:
+        made.update_yaxes(range=[-limit, limit], row=1, col=1)
     made.update_xaxes(matches="x", row=2, col=1)
     seconds = float(drawn.time[-1])
     ticks = np.arange(0.0, seconds, tick_s(seconds))
@@ -98,9 +96,23 @@ def figure(seen: Look) -> Any:
     made.update_xaxes(title_text="left  ·  degrees  ·  right", range=[-limit, limit], row=3, col=2)
     made.update_xaxes(title_text="left  ·  g  ·  right", row=3, col=3)
     made.update_yaxes(scaleanchor="x5", row=3, col=3)
+    made.update_layout(shapes=[_shade(stop) for stop in seen.stops])  # one by one takes minutes for hundreds
+    made.update_layout(annotations=[*made.layout.annotations, *[_label(stop) for stop in seen.stops]])
     made.update_annotations(font_size=12, selector={"showarrow": False})
     made.update_layout(template="simple_white", title=title(seen), showlegend=False, height=1000, bargap=0)
     return made
+
+
+def _shade(stop: Stop) -> dict[str, Any]:
+    """A grey field behind the acceleration."""
+    place = {"x0": stop.start_s, "x1": stop.stop_s, "y0": 0, "y1": 1, "xref": "x2", "yref": "y2 domain"}
+    return place | {"type": "rect", "fillcolor": "grey", "opacity": 0.2, "line": {"width": 0}}
+
+
+def _label(stop: Stop) -> dict[str, Any]:
+    """Its MFDD."""
+    place = {"x": (stop.start_s + stop.stop_s) / 2.0, "y": 1, "xref": "x2", "yref": "y2 domain"}
+    return place | {"text": f"{stop.mfdd_mps2:.1f}", "showarrow": False, "yanchor": "top"}
 
 
 def _short(values: np.ndarray) -> np.ndarray:

@@ -53,10 +53,11 @@ def draw(path: Path, seen: Look) -> None:
         drawn = traces(seen)
         lean = figure.add_subplot(rows[0, :])
         forces = figure.add_subplot(rows[1, :], sharex=lean)
-        _lean(lean, drawn, seen)
+        (_speed if seen.ride.car else _lean)(lean, drawn, seen)
         _forces(forces, drawn, seen)
         _gg(figure.add_subplot(rows[2, 0]), drawn)
-        _histogram(figure.add_subplot(rows[2, 1]), seen)
+        if not seen.ride.car:
+            _histogram(figure.add_subplot(rows[2, 1]), seen)
         _alignment(figure.add_subplot(rows[2, 2]), seen)
         figure.savefig(path, dpi=100)
 
@@ -83,6 +84,14 @@ def _lean(axes: Any, drawn: Traces, seen: Look) -> None:
     axes.tick_params(labelbottom=False)
 
 
+def _speed(axes: Any, drawn: Traces, seen: Look) -> None:
+    axes.plot(*envelope(drawn.time, drawn.speed, POINTS), color=RIGHT_COLOUR, linewidth=1.0)
+    axes.set(title="Speed, km/h" if seen.summary.speed_mps.time_s is not None else "No speed in the log")
+    axes.set_ylim(bottom=0.0)
+    axes.margins(x=0.0)
+    axes.tick_params(labelbottom=False)
+
+
 def _forces(axes: Any, drawn: Traces, seen: Look) -> None:
     from matplotlib.ticker import MultipleLocator
 
@@ -91,8 +100,8 @@ def _forces(axes: Any, drawn: Traces, seen: Look) -> None:
         (drawn.forward, BRAKE_COLOUR, "forward"),
     ):
         axes.plot(*envelope(drawn.time, values, POINTS), color=colour, linewidth=0.7, alpha=0.9, label=name)
-    for stop in seen.stops:
-        axes.axvspan(stop.start_s, stop.stop_s, color="0.88", linewidth=0)
+    shade = [(stop.start_s, stop.duration_s) for stop in seen.stops]
+    axes.broken_barh(shade, (0, 1), transform=axes.get_xaxis_transform(), color="0.88", linewidth=0)
     for line in axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=2, frameon=False).get_lines():
         line.set_linewidth(2.5)
     axes.set(title="Acceleration, g" + (" (grey: stops)" if seen.stops else ""))

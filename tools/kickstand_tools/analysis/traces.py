@@ -18,13 +18,14 @@ GG_BIN_G = 0.025
 
 @dataclass
 class Traces:
-    """time (s) with lean (degrees, NaN where the display shows none), lateral and forward (g, smoothed).
+    """time (s) with lean (degrees, NaN where the display shows none), speed (km/h), lateral and forward (g, smoothed).
 
     gg: seconds in each field of a grid of GG_BIN_G, edges gg_edges: rows forward, columns lateral.
     """
 
     time: Array
     lean: Array
+    speed: Array
     lateral: Array
     forward: Array
     gg: Array
@@ -42,7 +43,7 @@ def traces(seen: Look) -> Traces:
     edges = np.arange(-np.ceil(reach / GG_BIN_G) - 2, np.ceil(reach / GG_BIN_G) + 3) * GG_BIN_G
     gg = np.histogram2d(forward[moving], lateral[moving], bins=(edges, edges))[0] * step_s
     lean = np.where(course.trusted, course.lean_deg, np.nan)
-    return Traces(course.t_s, lean, lateral, forward, gg, edges)
+    return Traces(course.t_s, lean, course.speed_mps * 3.6, lateral, forward, gg, edges)
 
 
 def title(seen: Look) -> str:
