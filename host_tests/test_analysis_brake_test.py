@@ -144,8 +144,28 @@ def test_the_definition():
     """Constant deceleration gives just that; before 0.8 v0 and after 0.1 v0 nothing counts."""
     v = np.linspace(20.0, 0.0, 2001)
     assert mfdd_mps2(v, (20.0**2 - v * v) / (2 * 5.0)) == pytest.approx(5.0, rel=1e-9)
-    bent = np.cumsum(np.where((v > 16.0) | (v < 2.0), 0.03, v * 0.01 / 5.0))
-    assert mfdd_mps2(v, bent) == pytest.approx(5.0, rel=0.002)
+    # 3 m/s2 down to 0.8 v0, then 8 and 5, then 3 again
+    pieces = [(20.0, 16.0, 3.0), (16.0, 9.0, 8.0), (9.0, 2.0, 5.0), (2.0, 0.0, 3.0)]
+    distance = np.cumsum([0.0, *[(high**2 - low**2) / (2 * level) for high, low, level in pieces]])
+    corners = np.array([20.0, *[low for _, low, _ in pieces]])
+    bent = np.interp(-v * v, -corners * corners, distance)
+    want = (16.0**2 - 2.0**2) / (2 * (distance[3] - distance[1]))
+    assert mfdd_mps2(v, bent) == pytest.approx(want, rel=1e-6)
+
+
+def test_a_smooth_road_is_no_standstill(ride):
+    """A stretch without any turning, but with the jolts of riding."""
+    whole, time, speed = ride
+    course = whole.part(slice(None))
+    for name in "pitch_rate_dps", "yaw_rate_dps", "forward_g":
+        setattr(course, name, getattr(course, name).copy())
+    cruising = np.flatnonzero(np.interp(course.t_s, time, speed) > 15.0)
+    smooth = slice(int(cruising[0]) + 50, int(cruising[0]) + 200)
+    course.pitch_rate_dps[smooth] = course.yaw_rate_dps[smooth] = course.forward_g[smooth] = 0.0
+    assert not np.any(standing(course)[smooth])
+    course.up_g = course.up_g.copy()
+    course.up_g[smooth] = 1.0
+    assert np.mean(standing(course)[smooth]) > 0.9
 
 
 @pytest.mark.parametrize("slope_deg", [-4.0, 0.0, 4.0])

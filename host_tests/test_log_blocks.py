@@ -59,7 +59,7 @@ MISTAKES = {
 
 
 @pytest.mark.parametrize("row", MISTAKES)
-@pytest.mark.parametrize("block_bytes", [700, 1 << 22])
+@pytest.mark.parametrize("block_bytes", [1, 700, 1 << 22])  # of 1: a row each
 def test_a_mistake_far_down_is_named(tmp_path, monkeypatch, row, block_bytes):
     monkeypatch.setattr(logs, "BLOCK_BYTES", block_bytes)
     path = tmp_path / "ride.csv"
@@ -67,6 +67,13 @@ def test_a_mistake_far_down_is_named(tmp_path, monkeypatch, row, block_bytes):
     with pytest.raises(InputError) as error:
         list(logs.read_blocks(path))
     assert MISTAKES[row] in str(error.value)
+
+
+def test_time_starts_at_zero(tmp_path):
+    lines = [f"{1_700_000_000 + k / 200:.6f},0,0,1,0,0,0,," for k in range(100)]
+    log = logs.read_log(write(tmp_path / "ride.csv", [HEADER, *lines]))
+    assert log.time_us == [5000 * k for k in range(100)]
+    assert log.time_text[1] == "1700000000.005000"
 
 
 def test_a_gzip_file_cut_in_the_middle_is_refused_after_its_good_part(tmp_path, monkeypatch):
