@@ -24,7 +24,7 @@ from .standstill import standing
 
 RATE_S = 0.02  # of the samples these functions want, at most
 MIN_SPEED_MPS = 10.0 / 3.6
-MIN_MFDD_MPS2 = 1.0
+MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0  # past that it is a fall or a fault
 LONGEST_S = 60.0
 GAP_S = 0.5  # over missing readings nothing can be integrated
 REST_S = 2.5  # of the standstill that are looked at,
@@ -81,6 +81,8 @@ def mfdd_mps2(speed_mps: Array, distance_m: Array) -> float:
     vb, ve = 0.8 * speed_mps[0], 0.1 * speed_mps[0]
     falling = np.minimum.accumulate(speed_mps)
     sb, se = np.interp([-vb, -ve], -falling, distance_m)
+    if not se > sb:
+        return float("inf")
     return float((3.6**2 * (vb * vb - ve * ve)) / (25.92 * (se - sb)))
 
 
@@ -107,7 +109,7 @@ def _stop(part: Channels, rest: int, delay_s: float) -> Stop | None:
     v, t = np.maximum(speed[begin : end + 1], 0.0), time[begin : end + 1]
     distance = integral(t, v)
     mfdd = mfdd_mps2(v, distance)
-    if not mfdd >= MIN_MFDD_MPS2:
+    if not MIN_MFDD_MPS2 <= mfdd < MAX_MFDD_MPS2:
         return None
     heading = integral(t, yaw_rate[begin : end + 1])
     side = np.radians(heading - _line(t, heading))

@@ -32,6 +32,8 @@ def speed_delay_s(ride: Channels) -> float:
     left = []
     for delay in DELAYS_S:
         pushes = np.diff(np.interp(time - delay, ride.t_s, felt))
+        if np.std(pushes) < ENOUGH_CHANGE_MPS:
+            return 0.0
         left.append(1.0 - np.corrcoef(pushes, changes)[0, 1] ** 2)
     best = int(np.argmin(left))
     if best in (0, len(left) - 1):
