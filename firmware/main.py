@@ -1,6 +1,7 @@
 """Starts Kickstand when the board has power.
 
-Button held at power-up: safe mode, nothing is started, so that the board can always be deployed to.
+Button held at power-up: safe mode, nothing is started, so that the board can always be deployed to. Not after a
+reset: a press while an error is shown must not leave a rider without a display.
 """
 
 import sys
@@ -23,7 +24,7 @@ def main():
     try:
         chosen = settings.load()
         lcd = open_lcd(chosen)
-        if open_button(chosen).held():
+        if machine.reset_cause() == machine.PWRON_RESET and open_button(chosen).held():
             print("Kickstand %s: safe mode, the button was held at power-up." % __version__)
             tell(lcd, "Safe mode", "Ready for USB")
             return

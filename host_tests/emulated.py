@@ -41,7 +41,7 @@ def modules() -> dict[str, bytes]:
 
 
 @functools.cache
-def calibrated() -> dict[str, bytes]:
+def calibrated(who_am_i: int = 0x68) -> dict[str, bytes]:
     """The calibration of PART, as its board keeps it: mounting, gyro bias and accelerometer."""
     from kickstand.calibration import Calibration
     from kickstand_tools.emulator import flash_image
@@ -56,7 +56,7 @@ def calibrated() -> dict[str, bytes]:
         calibration.gyro_bias[i] = PART.gyro_bias_dps[i]
     for i in range(9):
         calibration.vehicle_from_sensor[i] = PART.vehicle_from_sensor[i]
-    return flash_image.stored(calibration)
+    return flash_image.stored(calibration, who_am_i)
 
 
 def leaning(lean_deg: float) -> Callable[[float], tuple]:

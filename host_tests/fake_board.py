@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from kickstand_tools.bytecode import PICO
 from mpremote.transport import Transport, TransportError, TransportExecError
 
 
@@ -16,10 +17,11 @@ class FakeBoard(Transport):
     """Takes the place of SerialTransport.
 
     root: the directory that is its flash.  written: paths in the order they were opened for writing.
-    on_write(path, data): called before each write, returns what really lands on the flash.
+    on_write(path, data): called before each write, returns what really lands on the flash.  mpy: as
+    sys.implementation._mpy.
     """
 
-    def __init__(self, root: Path, python: str = "micropython", answers: bool = True) -> None:
+    def __init__(self, root: Path, python: str = "micropython", answers: bool = True, mpy: int = PICO) -> None:
         self.root = root
         self.answers = answers
         self.free_blocks = 300
@@ -27,7 +29,7 @@ class FakeBoard(Transport):
         self.resets = 0
         self.closed = False
         self.on_write: Callable[[str, bytes], bytes] = lambda _path, data: data
-        modules = {"os": self._os(), "sys": types.SimpleNamespace(implementation=_implementation(python))}
+        modules = {"os": self._os(), "sys": types.SimpleNamespace(implementation=_implementation(python, mpy))}
 
         def imports(name: str, *rest: Any) -> Any:
             if name in modules:
@@ -121,8 +123,8 @@ class _Writer:
         self._file.close()
 
 
-def _implementation(name: str) -> types.SimpleNamespace:
-    return types.SimpleNamespace(name=name, version=(1, 26, 1, ""), _machine="Imagined board with RP2040")
+def _implementation(name: str, mpy: int) -> types.SimpleNamespace:
+    return types.SimpleNamespace(name=name, version=(1, 26, 1, ""), _machine="Imagined board with RP2040", _mpy=mpy)
 
 
 def files(root: Path) -> dict[str, bytes]:

@@ -5,13 +5,15 @@ As a script: reads one JSON list of [name, arguments] from standard input and pr
 
 import json
 import sys
+from array import array
 
 import driving_runs
-from kickstand import alignment, dispersion, lean, rodrigues, rotation, six_position
+from kickstand import alignment, dispersion, frames, lean, rodrigues, rotation, six_position
 from kickstand.calibration import Calibration
 from kickstand.capture import Capture
 from kickstand.errors import Refusal
 from kickstand.meter import LeanMeter
+from kickstand.transform import Transform
 
 
 def matrix_of(values):
@@ -42,6 +44,40 @@ def apply(offset, slope, bias, lsb, gyro_lsb, reading):
     force, rate = rotation.vector(), rotation.vector()
     calibration.apply(reading, force, rate)
     return list(force) + list(rate)
+
+
+def transform(offset, slope, matrix, sums, n):
+    """Force and rate of the mean of n samples, as the board does it and with floats; 4096 counts per g."""
+    calibration = Calibration()
+    calibration.set_accel(offset, slope)
+    for i in range(9):
+        calibration.vehicle_from_sensor[i] = matrix[i]
+    for i in range(3):
+        calibration.gyro_bias[i] = 2.0 - i
+    calibration.set_scale(4096, 65.5)
+    both = Transform(calibration)
+    force, rate = [0.0] * 3, [0.0] * 3
+    both.apply_sum(array("i", sums), n, force, rate)
+    plain_force, plain_rate = [0.0] * 3, [0.0] * 3
+    both.apply([value / n for value in sums], plain_force, plain_rate)
+    return force + rate, plain_force + plain_rate
+
+
+def add_up(batches, limit):
+    """Batches of frames of 14 bytes: [how many are good, their sums] of each, as the board does it and plainly."""
+    out = []
+    for function in (frames.add_up, frames.add_up_plainly):
+        watch = array("i", (0, 0, limit))
+        answers = []
+        for batch in batches:
+            sums = array("i", [0] * 7)
+            data = bytearray()
+            for frame in batch:
+                data.extend(bytes(frame))
+            good = function(data, len(batch), sums, watch)
+            answers.append([good, list(sums)])
+        out.append(answers)
+    return out
 
 
 def capture(samples):
@@ -94,6 +130,8 @@ CALLS = {
     "free_pose": six_position.check_free_pose,
     "side_of": six_position.side_of,
     "capture": capture,
+    "transform": transform,
+    "add_up": add_up,
     "meter": meter,
 }
 

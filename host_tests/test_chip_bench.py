@@ -15,7 +15,7 @@ def test_bench():
 
     result = json.loads(json.dumps(bench.bench(1)))
     stages = {name: spread["median"] for name, spread in result["stage_us"].items()}
-    parts = ("read", "decode", "check", "calibrate and rotate", "filter", "rest of the meter")
+    parts = ("read", "decode and sum", "check", "calibrate and rotate", "filter", "rest of the meter")
     assert all(stages[name] > 0 for name in parts)
     assert sum(stages[name] for name in parts) == pytest.approx(stages["sample path"], rel=0.1)
     assert 390 < stages["read"]

@@ -4,6 +4,7 @@ import time
 
 import pytest
 from emulated import calibrated, firmware, leaning, pico, shown_lean, shows
+from kickstand_tools.emulator.sample_count import SampleCount
 from kickstand_tools.rides import Ride, accelerate, kickstand, turn, upright, wait
 from kickstand_tools.sensor_errors import Sensor
 
@@ -19,6 +20,8 @@ def test_a_new_board_is_aligned_by_two_presses_and_keeps_it():
     device = pico(part.world(ride.motion), firmware())
     device.power_on()
     shows(device, r"Raw.*\|(Not aligned|On stand: press)", 1.5)
+    samples = SampleCount(device.board.sensor)
+    samples.begin()
     device.press()
     shows(device, r"Now upright: ", 4.5)
     device.run_until(lambda: ride.truth(device.time_s)[3] == "upright", 4.0)
@@ -26,6 +29,9 @@ def test_a_new_board_is_aligned_by_two_presses_and_keeps_it():
     tilt = shows(device, r"Aligned! +(\d+\.\d)°", 4.5)
     assert 11.0 < float(tilt[1]) < 13.0
     assert {"kickstand_a.cal", "kickstand_b.cal"} & set(device.files())
+    device.run(0.2)
+    assert samples.taken() > 1000
+    assert samples.lost() == 0  # while poses were taken and the flash was written
 
     device.power_cycle()
     device.run_until(lambda: shown_lean(device.lcd()) is not None, 2.0)

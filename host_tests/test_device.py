@@ -123,9 +123,9 @@ def test_pages_and_menu(tmp_path):
         [63, short],
         [64, short],
         [65, long],
-        [67, short],
+        [70, short],
     ]
-    record = devices.run("cpython", tmp_path, {**ALIGNED, "presses": presses, "until": 69})
+    record = devices.run("cpython", tmp_path, {**ALIGNED, "presses": presses, "until": 72})
     assert record.first("Max left +(29|3[0-3])°") == pytest.approx(46.3, abs=0.2)  # the plan rolls in no time
     assert record.first("Max right +(39|4[0-3])°") == pytest.approx(46.3, abs=0.2)
     assert record.at(47.7)[0].startswith(("Accel", "Brake")) and record.at(47.7)[1].startswith("pk +0.")
@@ -136,7 +136,8 @@ def test_pages_and_menu(tmp_path):
     assert record.at(54.7)[0] == "→Reset maxima   "
     assert record.at(56.5)[0] == "Maxima reset    "
     assert record.first("Max left +[01]°", 59) < math.inf
-    assert record.at(66.5) == ["MPU6050   25.0°C", "6pos no  ali yes"]
+    assert record.at(66.5)[0] == "MPU6050   25.0°C"
+    assert {record.at(t_s)[1] for t_s in (66.5, 68.5)} == {"6pos no  ali yes", "0 gaps 1 starts "}
     assert record.last[0].startswith("Max left")
 
 

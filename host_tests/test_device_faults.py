@@ -75,6 +75,13 @@ def test_a_fault_of_a_moment(engine, fault, aligned):
     assert record.ends == ["off"]
 
 
+def test_a_who_am_i_misread_is_read_again(aligned):
+    """Or it would look for the calibration of a chip that is not there."""
+    record = devices.run("cpython", aligned, standing([["corrupt", [0x68, 1, 0, 0x10]]], until=3))
+    assert record.first("Unknown|Not aligned") == math.inf
+    assert record.lean_at(2.5) == STATIC
+
+
 @pytest.mark.parametrize("mask", [0x01, 0x80])
 def test_a_flipped_bit_passes_in_a_moment(mask, aligned):
     record = devices.run("cpython", aligned, standing([["corrupt", [0x68, 400, 0, mask]]], until=10))
@@ -149,7 +156,8 @@ def test_an_exception_is_said_and_the_board_restarts(aligned, monkeypatch, capsy
         original(self)
 
     monkeypatch.setattr(app.App, "step", failing)
-    record = devices.run("cpython", aligned, standing([], until=12), capsys)
+    held = {"presses": [[3.0, 5.0]]}  # the button, all that time: no safe mode, which is for power-up
+    record = devices.run("cpython", aligned, standing([], until=12, **held), capsys)
     assert record.first("Error, restarts") < math.inf
     assert record.first("ZeroDivisionErro") < math.inf
     assert record.ends == ["reset", "off"]

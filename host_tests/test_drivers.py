@@ -99,7 +99,7 @@ def test_every_range_reads_in_units(board, accel_range, gyro_range):
 def test_setup_fails_when_the_configuration_does_not_stay(board):
     from kickstand.mpu6050 import Mpu6050
 
-    board.faults.corrupt(0x68, nth=4, byte=1, mask=0x04, read=False)  # identify, reset, clock, SMPLRT_DIV
+    board.faults.corrupt(0x68, nth=5, byte=1, mask=0x04, read=False)  # identify (2), reset, clock, SMPLRT_DIV
     with pytest.raises(OSError, match="read back"):
         on(board, lambda: Mpu6050(sensor_i2c()).setup())
 
@@ -113,6 +113,8 @@ def test_a_stuck_bus_is_freed_and_a_dead_one_is_reported(board):
 
     assert on(board, lambda: freed(8))
     assert not on(board, lambda: freed(1000))
+    with pytest.raises(OSError, match="SDA is held low"):
+        on(board, sensor_i2c)
 
 
 def display():
@@ -130,9 +132,9 @@ def test_only_changed_lines_are_sent_one_transfer_each(board):
         lcd.show("first", "second")
         lcd.flush()
         counts = [board.lcd_bus.transfers[0x27]]
-        for line1, line2, ticks in (("first", "second", 20), ("first", "third", 20), ("a", "b", 20)):
+        for line1, line2 in (("first", "second"), ("first", "third"), ("a", "b")):
             lcd.show(line1, line2)
-            for _ in range(ticks):
+            for _ in range(8):  # under 0.2 s in all, when it is asked whether it is still there
                 sleep_ms(6)
                 lcd.tick(ticks_ms())
             counts.append(board.lcd_bus.transfers[0x27])
@@ -140,6 +142,52 @@ def test_only_changed_lines_are_sent_one_transfer_each(board):
 
     assert on(board, run) == [0, 1, 2]
     assert board.lcd.text() == ["a" + " " * 15, "b" + " " * 15]
+
+
+def test_only_what_has_changed_of_a_line_is_sent(board):
+    """Four bytes a character, and four for where it stands."""
+    from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
+
+    sent = []
+
+    def run():
+        lcd = display()
+        lcd.show("Lean  23\xdf right", "")
+        lcd.flush()
+        original = board.lcd.write_byte
+        board.lcd.write_byte = lambda value: sent.append(value) or original(value)
+        lcd.show("Lean  24\xdf right", "")
+        sleep_ms(6)
+        lcd.tick(ticks_ms())
+        assert len(sent) == 4 * 2
+        lcd.show("Lean   4\xdf left", "")
+        sleep_ms(6)
+        lcd.tick(ticks_ms())
+
+    on(board, run)
+    assert len(sent) == 8 + 4 * (1 + 9)
+    assert board.lcd.text()[0] == "Lean   4\xb0 left  "
+
+
+@pytest.mark.parametrize("gap_s", [0.001, 0.1])
+def test_a_display_that_lost_its_power_for_a_moment_is_started_again(board, gap_s):
+    """So short that no transfer falls into it: a PCF8574's pins come up high, where E had been left low."""
+    from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
+
+    def run():
+        lcd = display()
+        lcd.show("Lean  12\xdf", "")
+        lcd.flush()
+        board.remove_lcd()
+        board.at(board.clock.now_us / 1e6 + gap_s, board.fit_lcd)
+        sleep_ms(round(gap_s * 1000) + 1)
+        assert board.lcd.text()[0].strip() == ""
+        for _ in range(50):
+            lcd.tick(ticks_ms())
+            sleep_ms(10)
+
+    on(board, run)
+    assert board.lcd.text()[0] == "Lean  12\xb0       "
 
 
 def test_a_display_out_of_step_is_put_right_by_the_next_initialisation(board):
@@ -163,7 +211,8 @@ def test_a_display_out_of_step_is_put_right_by_the_next_initialisation(board):
 
 
 @pytest.mark.parametrize(
-    ("held_s", "events"), [(0.005, []), (0.1, ["short"]), (0.7, ["short"]), (1.0, ["long"]), (5.0, ["long"])]
+    ("held_s", "events"),
+    [(0.005, []), (0.013, []), (0.1, ["short"]), (0.7, ["short"]), (1.0, ["long"]), (5.0, ["long"])],
 )
 def test_presses(board, held_s, events):
     from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
@@ -228,3 +277,33 @@ def test_status_tells_how_the_board_is(board, monkeypatch, capsys, tmp_path):
     board.remove_sensor()
     on(board, kickstand.status)
     assert "none answers on SDA 4, SCL 5" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("off", [-0.01, 0.0, 0.01])
+def test_the_sample_clock_keeps_to_the_time_that_passes(board, off):
+    """A chip that is 1 % off, samples two or three at a time: all dt together are the time that went by."""
+    from kickstand.sample_clock import SampleClock
+
+    clock, total_us, taken = SampleClock(5000), 0, 0
+    for now_us in range(0, 20_000_000, 10_000):
+        n = int(now_us * (1 + off)) // 5000 - taken
+        taken += n
+        if n:
+            total_us += clock.step(n, now_us)
+        clock.emptied(now_us)
+    assert total_us == pytest.approx(20_000_000, abs=25_000)
+
+
+def test_the_sample_clock_spans_a_gap(board):
+    """After an overflow the next dt is as long as what was lost."""
+    from kickstand.sample_clock import SampleClock
+
+    clock = SampleClock(5000)
+    for now_us in range(0, 1_000_000, 10_000):
+        clock.step(2, now_us)
+        clock.emptied(now_us)
+    clock.emptied(1_700_000)  # nothing but an overflow
+    clock.emptied(1_710_000)
+    assert clock.step(2, 1_720_000) == pytest.approx(1_720_000 - 990_000, abs=10_000)
+    clock.emptied(1_720_000)
+    assert clock.step(2, 1_730_000) == pytest.approx(10_000, abs=1_000)

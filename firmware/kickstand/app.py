@@ -16,7 +16,7 @@ from .drive_mode import DriveMode
 from .errors import SettingsError, StoreError
 from .hd44780 import Lcd
 from .meter import LeanMeter
-from .mpu6050 import MAX_FRAMES, Mpu6050
+from .mpu6050 import Mpu6050
 from .sample_clock import SampleClock
 from .screen import Screen
 from .sensor import Sensor
@@ -24,29 +24,18 @@ from .speed import open_speed
 from .store import Store
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
-COLLECT_TURNS = 50  # 100 KB of heap
+COLLECT_TURNS = 25  # 70 KB of heap: less than half of what is free
 PAGE_MS = 100
 TRIM_MS = 60_000
 
 
 def open_lcd(settings):
     """The display of these settings. Raises SettingsError for pins that the controller cannot use."""
-
-    def reopen():
-        if settings.one_bus:  # the display is a 100 kHz part, and sets the pace of a bus that it shares
-            return _open_bus(settings, "SENSOR", min(settings.SENSOR_BUS_HZ, settings.LCD_BUS_HZ))
-        return _open_bus(settings, "LCD", settings.LCD_BUS_HZ)
-
-    return Lcd(reopen, settings.LCD_ADDRESSES)
+    return Lcd(lambda: _open_bus(settings, "LCD"), settings.LCD_ADDRESSES)
 
 
 def open_sensor(settings):
     """The chip of these settings, watched over. Raises SettingsError at its first fetch() for wrong pins."""
-
-    def reopen():
-        hz = settings.SENSOR_BUS_HZ
-        return _open_bus(settings, "SENSOR", min(hz, settings.LCD_BUS_HZ) if settings.one_bus else hz)
-
     chip = Mpu6050(
         None,
         settings.SENSOR_ADDRESS,
@@ -56,7 +45,7 @@ def open_sensor(settings):
         settings.SAMPLE_HZ,
         settings.ACCEPT_WHO_AM_I,
     )
-    return Sensor(chip, reopen, settings.SAMPLE_HZ)
+    return Sensor(chip, lambda: _open_bus(settings, "SENSOR"))
 
 
 def open_button(settings):
@@ -71,11 +60,11 @@ def open_button(settings):
         )
 
 
-def _open_bus(settings, name, hz):
+def _open_bus(settings, name):
     controller = getattr(settings, name + "_I2C")
     sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
     try:
-        return bus.open_i2c(controller, sda, scl, hz)
+        return bus.open_i2c(controller, sda, scl, getattr(settings, name + "_BUS_HZ"))
     except ValueError as error:
         raise SettingsError(
             "config.py: %s_SDA = %d and %s_SCL = %d do not belong to I2C %d (%s)"
@@ -99,9 +88,6 @@ class App:
         self.drive = DriveMode(settings.VEHICLE, speed, self.meter, self._keep) if speed else None
         self._clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self._restarts = 0
-        self._sums = [0] * 7
-        self._dt_us = 0
-        self._reading = [0.0] * 7
         self.screen = Screen(settings, self.sensor, self.meter, self.drive, self._save)
         self._page_ms = ticks_ms()
         self._trim_ms = self._page_ms
@@ -130,25 +116,18 @@ class App:
     def step(self):
         """One turn of the loop: the samples that wait, one event, at most one transfer to the display."""
         now_us, now_ms = ticks_us(), ticks_ms()
-        waiting = self.sensor.fetch(now_ms)
-        good = 0
-        for k in range(waiting):
-            if not self.sensor.take(k, now_ms):
-                break
-            self._take(good == 0, now_us, now_ms)
-            good += 1
-        if good:
-            self._measure(good)
+        n = self.sensor.fetch(now_ms)
+        if n:
+            self._take(n, now_us, now_ms)
         if self.drive:
-            if good:
-                self.drive.feed(self._sums, good, self._dt_us, now_ms)
             self.drive.poll(now_ms)
+        self.sensor.check(now_ms)
         if self.sensor.fault is not None:
             self._clock.restart()
             self.screen.interrupt(now_ms)
             if not self._fault_shown:
                 self._page_ms = now_ms  # at once: the next thing is to start the sensor again
-        elif waiting < MAX_FRAMES:
+        elif not self.sensor.chip.left:
             self._clock.emptied(now_us)
         self.screen.handle(self.button.poll(now_ms), now_ms)
         if ticks_diff(now_ms, self._page_ms) >= 0:
@@ -172,28 +151,20 @@ class App:
             except StoreError as error:  # the next ride finds it again
                 print(error.reason)
 
-    def _take(self, first, now_us, now_ms):
-        """One sample: to the wizard, and into the sums of this turn. Integers only, no heap."""
+    def _take(self, n, now_us, now_ms):
+        """The n samples that came in: each to the wizard, all at once to the meter."""
         if self._restarts != self.sensor.restarts:
             self._restarts = self.sensor.restarts
             self._sensor_started()
-        c, sums = self.sensor.chip.counts, self._sums
-        if first:
-            sums[0], sums[1], sums[2], sums[3], sums[4], sums[5], sums[6] = c
-        else:
-            for i in range(7):
-                sums[i] += c[i]
-        dt_us = self._clock.step(now_us)
-        self._dt_us = dt_us if first else self._dt_us + dt_us
-        if self.screen.wizard:
-            self.screen.wizard.sample(c, now_ms)
-
-    def _measure(self, n):
-        """The mean of this turn's n samples through calibration, alignment and filter: floats cost too much to do
-        it for each."""
-        for i in range(7):
-            self._reading[i] = self._sums[i] / n
-        self.meter.update(self._reading, self._dt_us)
+        chip, wizard = self.sensor.chip, self.screen.wizard
+        dt_us = self._clock.step(n, now_us)
+        self.meter.update(chip.sums, dt_us, n)
+        if self.drive:
+            self.drive.feed(chip.sums, n, dt_us, now_ms)
+        if wizard:
+            for k in range(n):
+                chip.take(k)
+                wizard.sample(chip.counts, now_ms)
 
     def _sensor_started(self):
         """The chip runs, for the first time or again after a fault, perhaps another one."""

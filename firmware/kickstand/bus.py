@@ -36,7 +36,9 @@ def free(sda_pin, scl_pin):
 
 
 def open_i2c(controller, sda_pin, scl_pin, frequency):
-    """A freed bus as machine.I2C. controller: its number; pins: GPIO numbers; frequency in Hz."""
-    free(sda_pin, scl_pin)
+    """A freed bus as machine.I2C. controller: its number; pins: GPIO numbers; frequency in Hz. Raises OSError when it
+    cannot be freed, ValueError for pins that the controller cannot use."""
+    if not free(sda_pin, scl_pin):
+        raise OSError("SDA is held low")
     timeout_us = _TIMEOUT_BITS * 1_000_000 // frequency
     return I2C(controller, sda=Pin(sda_pin), scl=Pin(scl_pin), freq=frequency, timeout=timeout_us)

@@ -14,8 +14,7 @@ class Button:
 
     def __init__(self, pin):
         self._pin = pin
-        self._pressed = False
-        self._raw = False
+        self._pressed = self._raw = self.held()  # a press that began before this was not meant for us
         self._changed_ms = None
         self._pressed_ms = 0
         self._long_sent = True

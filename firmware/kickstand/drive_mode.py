@@ -96,7 +96,7 @@ class DriveMode:
             self._speed_mps = speed
             self._speed_ms = now_ms
             self.drive.measure_speed(speed, self.speed.age_us)
-            if hasattr(self._meter, "measure_speed"):
+            if self.vehicle == MOTORCYCLE:
                 self._meter.measure_speed(speed)
         if self._look_ms is None or ticks_diff(now_ms, self._look_ms) >= 0:
             self._look_ms = ticks_add(now_ms, LOOK_MS)

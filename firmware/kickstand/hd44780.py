@@ -4,8 +4,8 @@
     lcd.show("Lean  23\xdf right", bar)
     lcd.tick()           # one bus transaction at most: a changed line, or a step of the initialisation
 
-Everything is sent in 4-bit mode, whole lines packed into one transfer (6 ms at 100 kHz). Wiring of the
-backpack: P0 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7.
+Everything is sent in 4-bit mode, what has changed of a line packed into one transfer (6 ms at 100 kHz for all of
+it). Wiring of the backpack: P0 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7.
 """
 
 from time import sleep_ms, ticks_diff, ticks_ms
@@ -20,7 +20,7 @@ _CGRAM_ADDRESS = const(0x40)
 
 ADDRESSES = (0x27, 0x3F)  # PCF8574 and PCF8574A with all address jumpers open
 COLUMNS = 16
-_NEVER = const(0xFE)  # a code that no text uses: a line that is said to hold it will be written again
+_NEVER = b"\xfe" * COLUMNS  # a code that no text uses: a line that is said to hold it will be written again
 REINIT_MS = 10_000  # noise can put the nibbles out of step, for ever without this
 PROBE_MS = 200
 REOPEN_PROBES = 5
@@ -59,12 +59,13 @@ class Lcd:
         self._wanted = [bytearray(b" " * COLUMNS), bytearray(b" " * COLUMNS)]
         self._shown = [bytearray(COLUMNS), bytearray(COLUMNS)]
         self._packed = bytearray(4 * (COLUMNS + 1))
-        self._light = bytes((_LIGHT,))
+        self._port = bytearray(1)
         self._glyphs = _bar_glyphs()
         self.address = None  # None: no display answers
         self._step = 0
         self._probes = 0
         self._acted_ms = None
+        self._seen_ms = 0
         self._init_ms = 0
 
     def show(self, line1, line2):
@@ -87,14 +88,15 @@ class Lcd:
                 self._acted_ms = now_ms
                 self._initialise(self._step)
                 self._step += 1
-                self._init_ms = now_ms
+                self._init_ms = self._seen_ms = now_ms
+            elif ticks_diff(now_ms, self._seen_ms) >= PROBE_MS:
+                self._seen_ms = self._acted_ms = now_ms
+                if not self._kept_power():
+                    self._step = 0
             elif self._refresh():
                 self._acted_ms = now_ms
             elif ticks_diff(now_ms, self._init_ms) >= REINIT_MS:
                 self._step = 0
-            elif ticks_diff(now_ms, self._acted_ms) >= PROBE_MS:
-                self._acted_ms = now_ms
-                self._i2c.writeto(self.address, self._light)  # is it still there?
         except OSError:
             self.address = None
 
@@ -122,7 +124,7 @@ class Lcd:
         self._probes += 1
         for address in self._addresses:
             try:
-                self._i2c.writeto(address, self._light)
+                self._i2c.readfrom_into(address, self._port)
             except OSError:
                 continue
             self.address = address
@@ -140,13 +142,26 @@ class Lcd:
             quarter = (step - len(_NIBBLES) - len(_COMMANDS)) * COLUMNS
             self._send(_CGRAM_ADDRESS + quarter, memoryview(self._glyphs)[quarter : quarter + COLUMNS])
             for shown in self._shown:  # whatever is there now is to be written again
-                shown[0] = _NEVER
+                shown[:] = _NEVER
+
+    def _kept_power(self):
+        """False after a loose wire, however short: the pins of a PCF8574 come up high, and E rests low. OSError: it
+        is gone."""
+        self._i2c.readfrom_into(self.address, self._port)
+        return not self._port[0] & _E
 
     def _refresh(self):
+        """Send what has changed of one line. False: nothing has."""
         for i in (0, 1):
-            if self._shown[i] != self._wanted[i]:
-                self._send(_LINE_ADDRESSES[i], self._wanted[i])
-                self._shown[i][:] = self._wanted[i]
+            wanted, shown = self._wanted[i], self._shown[i]
+            if shown != wanted:
+                first, last = 0, COLUMNS - 1
+                while shown[first] == wanted[first]:
+                    first += 1
+                while shown[last] == wanted[last]:
+                    last -= 1
+                self._send(_LINE_ADDRESSES[i] + first, memoryview(wanted)[first : last + 1])
+                shown[:] = wanted
                 return True
         return False
 

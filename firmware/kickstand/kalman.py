@@ -5,6 +5,9 @@ yield where the work may be interrupted.
 """
 
 MIN_VARIANCE = 1e-10  # rounding in float32 could make it negative
+# Pieces of about a millisecond on an RP2040
+TERMS = 3  # of a measurement or a transition
+ROWS = 8  # of the twelve: about half of the products
 GATE = 25.0  # beyond five sigma an innovation counts for less, but counts: the model may be what is wrong
 
 
@@ -19,14 +22,22 @@ class Covariance:
         self.correction = [0.0] * self.n
         self._column = [0.0] * self.n
 
+    def forget(self, i, variance):
+        """State i is known afresh: it no longer has to do with the others."""
+        for k in range(self.n):
+            self.rows[i][k] = self.rows[k][i] = 0.0
+        self.rows[i][i] = variance
+
     def carry(self, i, terms, growth):
         """Let state i change by the sum of a times state j for ((j, a), ...), j other than i, and its variance grow.
 
-        P = F P F^T with F = I + sum of a e_i e_j^T.
+        P = F P F^T with F = I + sum of a e_i e_j^T.  Yields between pieces.
         """
         rows = self.rows
         row = rows[i]
-        for j, a in terms:
+        for m, (j, a) in enumerate(terms):
+            if m == TERMS:
+                yield
             source = rows[j]
             for k in range(self.n):
                 row[k] += a * source[k]
@@ -36,6 +47,7 @@ class Covariance:
         row[i] = variance
         for k in range(self.n):
             rows[k][i] = row[k]  # P is symmetric
+        yield
 
     def measure(self, terms, innovation, variance):
         """Correct by one scalar measurement h x with h given as terms ((state, coefficient), ...).
@@ -47,11 +59,13 @@ class Covariance:
         j, h = terms[0]
         for i in range(n):
             column[i] = h * rows[j][i]
-        for j, h in terms[1:]:
+        for m in range(1, len(terms)):
+            if m == TERMS:
+                yield
+            j, h = terms[m]
             row = rows[j]
             for i in range(n):
                 column[i] += h * row[i]
-        yield
         expected = variance
         for j, h in terms:
             expected += h * column[j]
@@ -69,7 +83,7 @@ class Covariance:
                 rows[j][i] = row[j] = row[j] - gain * column[j]
             if row[i] < MIN_VARIANCE:
                 row[i] = MIN_VARIANCE
-            if i == 4:  # half of the products
+            if i == ROWS - 1:
                 yield
         yield
 

@@ -1,8 +1,10 @@
 """Lean while riding: an extended Kalman filter on what one gyro and one accelerometer say of a motorcycle.
 
-States: lean t, pitch q (of road and suspension together), speed v, gyro bias (3) and the yaw error of the
-alignment y, which a kickstand pose with one degree of pitch makes as large as five. With the vertical u =
-(cos q sin t, cos q cos t, sin q) in the vehicle's axes (left, up, forward), rates w, force f:
+States: lean t, pitch q (of road and suspension together), speed v, gyro bias (3), the yaw error of the
+alignment y, which a kickstand pose with one degree of pitch makes as large as five, and five errors of scale and
+cross-axis sensitivity of the gyro, of which the sheet allows 3 and 2 %: in a long turn they pass for bias, in a
+quick roll for lean. With the vertical u = (cos q sin t, cos q cos t, sin q) in the vehicle's axes (left, up,
+forward), rates w, force f:
 
     kinematics, exact on any road:  dt/dt = w_z - tan q (w_x sin t + w_y cos t)
                                     dq/dt = w_y sin t - w_x cos t
@@ -13,8 +15,13 @@ alignment y, which a kickstand pose with one degree of pitch makes as large as f
 
 The equations of f_x and f_y are Nicolae's (22)-(23) with s = v w. In a held turn they are parallel in t and
 v: there the ratio of the two rates tells the lean, through the last line, and v tells it just after entering.
+
+Where a state is multiplied by a measured rate (v w_y), that rate's noise would be squared, and v and lean would come
+out too small (errors in variables): there the filter takes the rate at which a bike in balance at this lean and speed
+turns, as long as the measured one is near it.
+
 Force and speed are in g and g seconds, angles in radians. The state follows every sample. Covariance and
-corrections follow ten times a second, a piece a sample, because the whole would take longer than a sample
+corrections follow five times a second, a piece a sample, because the whole would take longer than a sample
 lasts.
 """
 
@@ -25,8 +32,11 @@ from .rest import RestDetector
 from .trim import UprightTrim
 
 _G = 9.80665
-T, Q, V, BX, BY, BZ, Y = range(7)
-WINDOW_US = 100_000
+# XY: what the gyro's left axis reads of a rate about up, and so on. Not YY: with the speed unknown it says nothing.
+T, Q, V, BX, BY, BZ, Y, XX, XY, ZX, ZY, ZZ = range(12)
+N = 12
+_KEPT = (BX, BY, BZ, Y, XX, XY, ZX, ZY, ZZ)  # of the sensor, not of the ride
+WINDOW_US = 200_000
 START_US = 50_000  # the first
 MAX_PITCH = 1.2  # rad: a motorcycle never, a sensor in the hand may; at 90 degrees lean has no meaning
 MAX_SPEED = 150.0 / _G
@@ -35,27 +45,29 @@ MAX_SPEED = 150.0 / _G
 START_LEAN = radians(3.0)  # where the force looks like that of a standing bike
 START_STAND = radians(0.5)
 START_STILL_G, START_STILL_RADPS = 0.05, 0.02
-START_LEAN_MOVING = radians(15.0)
+START_LEAN_MOVING = radians(30.0)
 START_PITCH = radians(5.0)
 START_SPEED = 15.0 / _G
 START_BIAS = radians(1.0)  # the poses measured it; it has drifted since
 START_YAW_ERROR = radians(5.0)
+START_SCALE = 0.010  # most parts; the sheet allows 0.03
+START_CROSS_AXIS = 0.010  # the sheet allows 0.02
 
 # Growth of uncertainty per square root of a second
 GROW_ANGLE = radians(0.2)  # gyro scale and vibration
-GROW_SPEED = 0.5 / _G
+GROW_SPEED = 0.35 / _G
 GROW_BIAS = radians(0.01)  # warming up: 0.6 deg/s in five minutes
 
 # Measurements, as independent every WINDOW_US: what is wrong with them lasts longer, so they count for less
-SIGMA_LEFT = 0.03
+SIGMA_LEFT = 0.04
 SIGMA_UP = 0.4
-SHAKEN_SHARE = 0.3  # of the variance within a window, for that of its mean: shaking is not all quick
+SHAKEN_SHARE = 0.1  # of the variance within a window, for that of its mean: shaking is not all quick
 ROLL_HEIGHT_M = 0.4  # h: of the sensor above the axis the bike rolls about; by how much it may be wrong:
 SIGMA_ROLL_HEIGHT_M = 0.4
-SIGMA_SLOPE = radians(2.0)
+SIGMA_SLOPE = radians(1.6)
 SLOPE_S = 3.0  # how long a slope lasts: fitted, real ones last longer
-STRAIGHT_LEAN, STRAIGHT_RATE = radians(4.0), radians(2.5)  # below both, the road is taken for straight:
-SIGMA_STRAIGHT = radians(1.5)  # a balanced bike that does not turn is upright
+STRAIGHT_LEAN, STRAIGHT_RATE = radians(8.0), radians(2.5)  # below both, the road is taken for straight:
+SIGMA_STRAIGHT = radians(0.8)  # a balanced bike that does not turn is upright; wind and camber lean it more
 STRAIGHT_S = 3.0
 USUAL_SPEED = 15.0 / _G
 SIGMA_SPEED = 20.0 / _G
@@ -63,6 +75,13 @@ SPEED_S = 60.0
 SIGMA_REST_RATE = radians(0.05)
 SIGMA_REST_FORCE = 0.02
 SIGMA_REST_SPEED = 0.02 / _G
+SIGMA_GIVEN_SPEED = 1.0 / _G  # of a receiver or a wheel, if there is one
+GIVEN_SPEED_LATE_S = 1.0
+
+ROLLING_SPEED, ROLLING_SIGMAS = 3.0 / _G, 3.0  # a speed as sure as this is no standstill
+BALANCED_SPEED = 4.0 / _G  # beyond, the yaw rate follows from lean and speed, if
+BALANCED_SHARE, BALANCED_RADPS = 0.5, 0.1  # what is measured differs by less than this of it, and this
+MIN_COS = 0.3
 
 PIECES = 22  # of the work on a window, spread over the samples of the next one
 SLOW_STEP_US = 12_000
@@ -70,7 +89,7 @@ SLOW_STEP_US = 12_000
 TRIM_SPEED = 4.0 / _G
 TRIM_SIGMA_SPEED = 8.0 / _G
 
-DELAY_S = 0.0075  # lean is shown as it is by now: the chip's low-pass at 44 Hz is 5 ms late
+DELAY_S = 0.005  # lean is shown as it is by now: the chip's low-pass at 44 Hz is 5 ms late
 
 
 class LeanFilter:
@@ -83,11 +102,12 @@ class LeanFilter:
 
     def restart(self):
         """Forget lean, pitch and speed: readings were missing. What was learned of the sensor stays."""
-        kept = (BX, BY, BZ, Y) if self._p is not None else ()
+        kept = _KEPT if self._p is not None else ()
         self._kept = [(i, self._x[i], self._p.rows[i][i]) for i in kept]
         self._p = None
         self._rest = RestDetector(not kept)
-        self._x = [0.0] * 7
+        self._x = [0.0] * N
+        self._given_speed = None
         for i, value, _ in self._kept:
             self._x[i] = value
         self._work = None
@@ -114,6 +134,10 @@ class LeanFilter:
         """Estimated change of the gyro's bias since the calibration: left, up, forward."""
         return [degrees(self._x[i]) for i in (BX, BY, BZ)]
 
+    def measure_speed(self, speed_mps):
+        """The vehicle's speed, from whatever knows it; never required."""
+        self._given_speed = speed_mps / _G
+
     @property
     def variance(self):
         """Of the lean, rad^2."""
@@ -136,6 +160,8 @@ class LeanFilter:
         wx = rate[0] - x[BX]
         wy = rate[1] - x[BY]
         wz = rate[2] - x[BZ]
+        wz -= x[ZX] * wx + x[ZY] * wy + x[ZZ] * wz
+        wx -= x[XX] * wx + x[XY] * wy
         t, v = x[T], x[V]
         st, ct = sin(t), cos(t)
         sq = sin(x[Q])
@@ -192,7 +218,8 @@ class LeanFilter:
         roll_acceleration = (self._roll_rate - self._last_roll_rate) / seconds
         self._last_roll_rate = self._roll_rate
         rested = self._rest.resting
-        self._rest.update(means, seconds)
+        rolling = x[V] > ROLLING_SPEED and x[V] > ROLLING_SIGMAS * sqrt(self._p.rows[V][V])
+        self._rest.update(means, seconds, rolling)
         if self._rest.resting and not rested:
             self._stand(means)
         self._work = self._process(means, seconds, roll_acceleration)
@@ -203,7 +230,8 @@ class LeanFilter:
         turning = max(abs(wx), abs(wy), abs(wz)) > START_STILL_RADPS
         moving = turning or abs(sqrt(fx * fx + fy * fy + fz * fz) - 1.0) > START_STILL_G
         lean = START_LEAN_MOVING if moving else START_LEAN
-        sigmas = (lean, START_PITCH, START_SPEED, START_BIAS, START_BIAS, START_BIAS, START_YAW_ERROR)
+        sigmas = [lean, START_PITCH, START_SPEED, START_BIAS, START_BIAS, START_BIAS, START_YAW_ERROR]
+        sigmas += [START_SCALE, START_CROSS_AXIS, START_CROSS_AXIS, START_CROSS_AXIS, START_SCALE]
         self._p = Covariance([sigma * sigma for sigma in sigmas])
         for i, _, variance in self._kept:
             self._p.rows[i][i] = variance
@@ -215,12 +243,13 @@ class LeanFilter:
     def _stand(self, means):
         """Coming to rest, the force is the vertical, whatever was believed before; the bias is kept."""
         _, _, _, _, _, fx, fy, fz, _ = means
-        x, rows = self._x, self._p.rows
+        x = self._x
         x[T] = atan2(fx, fy)
         x[Q] = atan2(fz, sqrt(fx * fx + fy * fy))
         x[V] = 0.0
-        known = [rows[i][i] for i in (BX, BY, BZ, Y)]
-        self._p = Covariance([START_STAND * START_STAND] * 2 + [SIGMA_REST_SPEED**2] + known)
+        self._p.forget(T, START_STAND * START_STAND)
+        self._p.forget(Q, START_STAND * START_STAND)
+        self._p.forget(V, SIGMA_REST_SPEED**2)
 
     def _process(self, means, seconds, roll_acceleration):
         """Covariance and corrections for one window; a generator of short pieces."""
@@ -232,19 +261,25 @@ class LeanFilter:
         yaw_rate = wx * st + wy * ct
         speed = x[V]
         acceleration = fz - sq + speed * wy * x[Y]
+        turn_x, turn_y = wx, wy
+        if speed > BALANCED_SPEED:
+            balanced = -cq * st / speed
+            if abs(wy - balanced) < BALANCED_SHARE * abs(balanced) + BALANCED_RADPS:
+                turn_y = balanced
+                turn_x = balanced * st / max(ct, MIN_COS)
         yield
         grow_angle = GROW_ANGLE * GROW_ANGLE * seconds
-        p.carry(T, ((Q, -yaw_rate / (cq * cq) * seconds), (BZ, -seconds)), grow_angle)
-        yield
-        p.carry(Q, ((T, yaw_rate * seconds), (BX, ct * seconds), (BY, -st * seconds)), grow_angle)
-        yield
-        p.carry(V, ((Q, -cq * seconds), (Y, speed * wy * seconds)), GROW_SPEED * GROW_SPEED * seconds)
-        yield
+        turned_x, turned_y = turn_x * seconds, turn_y * seconds
+        gyro = ((BZ, -seconds), (ZX, -turned_x), (ZY, -turned_y), (ZZ, -wz * seconds))
+        yield from p.carry(T, ((Q, -yaw_rate / (cq * cq) * seconds),) + gyro, grow_angle)
+        gyro = ((BX, ct * seconds), (BY, -st * seconds), (XX, ct * turned_x), (XY, ct * turned_y))
+        yield from p.carry(Q, ((T, yaw_rate * seconds),) + gyro, grow_angle)
+        yield from p.carry(V, ((Q, -cq * seconds), (Y, speed * wy * seconds)), GROW_SPEED * GROW_SPEED * seconds)
         for i in (BX, BY, BZ):
             p.rows[i][i] += GROW_BIAS * GROW_BIAS * seconds
-        left_terms = ((T, cq * ct), (Q, -sq * st - cq * x[Y]), (V, wy), (BY, -speed), (Y, acceleration))
-        up_terms = ((T, -cq * st), (Q, -sq * ct), (V, -wx), (BX, speed))
-        yield
+        left_terms = ((T, cq * ct), (Q, -sq * st - cq * x[Y]), (V, turn_y), (BY, -speed), (Y, acceleration))
+        gyro = ((BX, speed), (XX, speed * turn_x), (XY, speed * turn_y))
+        up_terms = ((T, -cq * st), (Q, -sq * ct), (V, -turn_x)) + gyro
         if self._rest.resting:
             yield from self._measure_rest(left_terms, left + speed * wy, (wx, wy, wz), fz - sq, cq)
         else:
@@ -256,14 +291,24 @@ class LeanFilter:
             yield from p.measure(up_terms, up, SIGMA_UP**2 + (uncertain * st) ** 2)
             terms = ((Q, 1.0), (T, x[Y] * ct), (Y, st))
             yield from p.measure(terms, -x[Q] - x[Y] * st, SIGMA_SLOPE**2 * 2 * SLOPE_S / seconds)
-            upright = x[T] - self.trim.angle
-            if abs(upright) < STRAIGHT_LEAN and abs(yaw_rate) < STRAIGHT_RATE and speed > TRIM_SPEED:
-                yield from p.measure(((T, 1.0),), -upright, SIGMA_STRAIGHT**2 * 2 * STRAIGHT_S / seconds)
-            else:
-                yield from p.measure(((V, 1.0),), USUAL_SPEED - x[V], SIGMA_SPEED**2 * 2 * SPEED_S / seconds)
+            yield from self._measure_ride(yaw_rate, acceleration, seconds)
             if speed > TRIM_SPEED and p.rows[V][V] < TRIM_SIGMA_SPEED**2:
                 self.trim.update((fx - acceleration * x[Y]) / max(fy, 0.5), x[T], yaw_rate, seconds)
         self._correct(left_terms, up_terms)
+
+    def _measure_ride(self, yaw_rate, acceleration, seconds):
+        """One of: the speed as something else measured it; upright on a straight; an ordinary speed."""
+        p, x = self._p, self._x
+        upright = x[T] - self.trim.angle
+        if self._given_speed is not None:
+            late = GIVEN_SPEED_LATE_S * acceleration
+            innovation = self._given_speed - x[V]
+            self._given_speed = None
+            yield from p.measure(((V, 1.0),), innovation, SIGMA_GIVEN_SPEED**2 + late * late)
+        elif abs(upright) < STRAIGHT_LEAN and abs(yaw_rate) < STRAIGHT_RATE and x[V] > TRIM_SPEED:
+            yield from p.measure(((T, 1.0),), -upright, SIGMA_STRAIGHT**2 * 2 * STRAIGHT_S / seconds)
+        else:
+            yield from p.measure(((V, 1.0),), USUAL_SPEED - x[V], SIGMA_SPEED**2 * 2 * SPEED_S / seconds)
 
     def _measure_rest(self, left_terms, left, rates, forward, cq):
         """Standing still: no speed, the rates are bias, the force is the vertical. One axis of the gyro each time."""
@@ -282,7 +327,7 @@ class LeanFilter:
             sums[0] -= self._count * h * p.correction[j]
         for j, h in up_terms:
             sums[1] -= self._count * h * p.correction[j]
-        for i in range(7):
+        for i in range(N):
             x[i] += p.take_correction(i)
         x[V] = max(0.0, x[V])
         x[Q] = max(-MAX_PITCH, min(MAX_PITCH, x[Q]))

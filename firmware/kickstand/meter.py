@@ -19,7 +19,7 @@ class LeanMeter:
     """Lean and acceleration of the vehicle. leans: False for a car, whose lean stays 0.
 
     After update(): force (left, up, forward in g), rate (about them in rad/s), lean_deg (the filter's, > 0
-    right), smooth_force (g, for display), reading (the last), fallen, and the maxima since reset_maxima().
+    right), smooth_force (g, for display; of an aligned one forward alone), fallen, and the maxima since reset_maxima().
     """
 
     def __init__(self, calibration, leans=True):
@@ -28,7 +28,7 @@ class LeanMeter:
         self.force = [0.0] * 3
         self.rate = [0.0] * 3
         self.smooth_force = [0.0] * 3
-        self.reading = (0,) * 7
+        self._reading, self._n = (0,) * 7, 0
         self.reset_maxima()
         self.use(calibration)
 
@@ -78,35 +78,52 @@ class LeanMeter:
         """Nicolae's lean of this one reading."""
         return formula_lean_deg(self.force, self.rate[1])
 
-    def update(self, reading, dt_us):
+    def measure_speed(self, speed_mps):
+        """The vehicle's speed where something measures it: it helps the lean, and is never required."""
+        self.filter.measure_speed(speed_mps)
+
+    @property
+    def reading(self):
+        """The last: 7 numbers in the chip's order."""
+        return [value / (self._n or 1) for value in self._reading]
+
+    def update(self, reading, dt_us, n=0):
         """reading: 7 numbers in the chip's order; dt_us: integer microseconds since the one before (0 for the
-        first). On the board the mean of the few samples that came in during one turn of the loop."""
+        first). n: the reading is the sum of n samples in counts, array('i', 7); on the board of those that came in
+        during one turn of the loop, because floats cost too much to do it for each."""
         if dt_us > GAP_US:
             self.restart()
-        self.reading = reading
+        self._reading, self._n = reading, n
         force = self.force
-        self._transform.apply(reading, force, self.rate)
+        if n:
+            self._transform.apply_sum(reading, n, force, self.rate)
+        else:
+            self._transform.apply(reading, force, self.rate)
         gain = 1.0 if self._fresh else dt_us / (SMOOTH_US + dt_us)
         self._fresh = False
         smooth = self.smooth_force
-        for i in range(3):
-            smooth[i] += gain * (force[i] - smooth[i])
+        smooth[2] += gain * (force[2] - smooth[2])
+        if not (self.calibration.aligned and self._leans):  # then the other two are shown as well
+            smooth[0] += gain * (force[0] - smooth[0])
+            smooth[1] += gain * (force[1] - smooth[1])
         self.lean_deg = lean = self.filter.update(force, self.rate, dt_us) if self._leans else 0.0
         if -FALLEN_DEG < lean < FALLEN_DEG:
             self._flat_us = 0
             self.fallen = False
+            self._hold_maxima(lean, smooth[2])
         else:
             self._flat_us += dt_us
             self.fallen = self._flat_us >= FALLEN_US
-        if self.trusted and -FALLEN_DEG < lean < FALLEN_DEG:
-            self._hold_maxima(lean, smooth[2])
 
     def _hold_maxima(self, lean, forward):
-        if lean > self.max_right_deg:
-            self.max_right_deg = lean
-        elif -lean > self.max_left_deg:
-            self.max_left_deg = -lean
-        if forward > self.max_accel_g:
-            self.max_accel_g = forward
-        elif -forward > self.max_brake_g:
-            self.max_brake_g = -forward
+        if (
+            -self.max_left_deg <= lean <= self.max_right_deg
+            and -self.max_brake_g <= forward <= self.max_accel_g
+        ):
+            return
+        if not self.trusted:
+            return
+        self.max_left_deg = max(self.max_left_deg, -lean)
+        self.max_right_deg = max(self.max_right_deg, lean)
+        self.max_accel_g = max(self.max_accel_g, forward)
+        self.max_brake_g = max(self.max_brake_g, -forward)

@@ -100,12 +100,13 @@ def not_aligned(meter, seconds, todo="On stand: press"):
     return "Raw %4d%s %+.2fg" % (round(tilt), DEGREE, meter.smooth_force[2]), hint
 
 
-def sensor_info(name, temperature_c, calibration):
-    """Which chip, how warm, what is calibrated."""
-    return (
-        "%-9s%5.1f%sC" % (name[:9], temperature_c, DEGREE),
-        "6pos %-3s ali %s" % (_yes(calibration.six_done), _yes(calibration.aligned)),
-    )
+def sensor_info(sensor, meter, seconds):
+    """Which chip, how warm; what is calibrated, and in turn how often its FIFO overflowed and it was set up."""
+    chip, calibration = sensor.chip, meter.calibration
+    line1 = "%-9s%5.1f%sC" % (chip.name[:9], chip.temperature_c(meter.reading[3]), DEGREE)
+    if seconds % 4 < 2:
+        return line1, "6pos %-3s ali %s" % (_yes(calibration.six_done), _yes(calibration.aligned))
+    return line1, "%d gaps %d starts" % (min(chip.overflows, 99), min(sensor.restarts, 99))
 
 
 def _yes(flag):

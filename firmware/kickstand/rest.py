@@ -1,16 +1,16 @@
-"""Is the bike standing still? From the means of a tenth of a second, in which an idling engine averages
-out."""
+"""Is the bike standing still? From the means of a fifth of a second, in which an idling engine averages out."""
 
 MAX_FORCE_G = 0.010  # of a mean from the average of the last half second
 MAX_RATE_RADPS = 0.009  # 0.5 deg/s, likewise
 MAX_BIAS_RADPS = 0.02  # 1.2 deg/s: a longer smooth turn is no rest
 MAX_FIRST_BIAS_RADPS = 0.1  # before the first rest the bias may have drifted since the calibration
 REST_S = 1.5
+REST_ROLLING_S = 10.0  # where a bike is known to roll: no road is as smooth for so long
 AVERAGE_S = 0.5
 
 
 class RestDetector:
-    """update() with each mean; resting is True after REST_S of stillness.
+    """update() with each mean; resting is True after REST_S of stillness, or REST_ROLLING_S.
 
     first: no rest has been seen since power-on, so the bias may be off.
     """
@@ -21,8 +21,9 @@ class RestDetector:
         self._average = None
         self._max_bias = MAX_FIRST_BIAS_RADPS if first else MAX_BIAS_RADPS
 
-    def update(self, means, seconds):
-        """means: of the last seconds, where 2..4 are rates (rad/s, bias taken off) and 5..7 forces (g)."""
+    def update(self, means, seconds, rolling=False):
+        """means: of the last seconds, where 2..4 are rates (rad/s, bias taken off) and 5..7 forces (g).
+        rolling: there is good reason to believe that the bike rolls."""
         if self._average is None:
             self._average = list(means)
         average = self._average
@@ -36,6 +37,6 @@ class RestDetector:
             else:
                 still = still and abs(deviation) < MAX_FORCE_G
         self._still_s = self._still_s + seconds if still else 0.0
-        self.resting = self._still_s >= REST_S
+        self.resting = self._still_s >= (REST_ROLLING_S if rolling else REST_S)
         if self.resting:
             self._max_bias = MAX_BIAS_RADPS

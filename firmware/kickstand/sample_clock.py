@@ -22,12 +22,13 @@ class SampleClock:
         self.sample_us = None
         self._pending_us = 0
 
-    def step(self, now_us):
-        """One more sample: microseconds since the one before, 0 for the first. now_us: ticks_us()."""
+    def step(self, n, now_us):
+        """n more samples: microseconds from the one before them to the last, or from the first where there was none.
+        now_us: ticks_us()."""
         if self.sample_us is None:
-            self.sample_us = now_us
-            return 0
-        dt_us = max(1, self._period_us + self._pending_us)
+            n -= 1
+            self.sample_us = ticks_add(now_us, -n * self._period_us)
+        dt_us = max(0, n * self._period_us + self._pending_us)
         self._pending_us = 0
         self.sample_us = ticks_add(self.sample_us, dt_us)
         return dt_us

@@ -120,8 +120,7 @@ class Screen:
         if self.sensor.fault is not None:
             return self.sensor.fault
         if self._info:
-            chip = self.sensor.chip
-            return pages.sensor_info(chip.name, chip.temperature_c(chip.counts[3]), self.meter.calibration)
+            return pages.sensor_info(self.sensor, self.meter, now_ms // 1000)
         if self.drive and self.drive.message:
             self._page = 0  # after it
             return self.drive.message

@@ -101,6 +101,9 @@ class Settings:
                     name,
                 )
         self.one_bus = (self.SENSOR_SDA, self.SENSOR_SCL) == (self.LCD_SDA, self.LCD_SCL)
+        if self.one_bus:  # the display is a 100 kHz part, and sets the pace of a bus that it shares
+            self.LCD_I2C = self.SENSOR_I2C
+            self.SENSOR_BUS_HZ = self.LCD_BUS_HZ = min(self.SENSOR_BUS_HZ, self.LCD_BUS_HZ)
         names = ("BUTTON_PIN", "SENSOR_SDA", "SENSOR_SCL") + (() if self.one_bus else ("LCD_SDA", "LCD_SCL"))
         names += _SPEED_PINS[self.SPEED]
         if len({getattr(self, name) for name in names}) != len(names):

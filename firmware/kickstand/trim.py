@@ -7,13 +7,13 @@ the lean.
 
 from math import radians, sin
 
-MAX_TRIM = radians(2.5)
-START_SIGMA = radians(1.5)
+MAX_TRIM = radians(3.5)  # a pose off by 2 degrees, and what is left of the accelerometer's errors
+START_SIGMA = radians(2.5)
 FOUND_SIGMA = radians(0.7)  # of a trim kept from the ride before: the sensor is colder now
 SIGMA_STRAIGHT = radians(1.5)  # rider, camber and wind
 SIGMA_TURN = 0.4  # of the sine of the lean: tyre width and a rider hanging off add to the force in turns
 SIGMA_YAW_S = 0.2  # per rad/s of yaw rate
-LASTS_S = 3.0  # how long such a disturbance lasts
+LASTS_S = 2.0  # how long such a disturbance lasts
 GROW = radians(0.01)  # per square root of a second
 
 

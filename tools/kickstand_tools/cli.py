@@ -117,20 +117,17 @@ def replay(log: Path, calibration: Path, engine: str, out: Path) -> None:
     """Run the firmware's own lean meter over a recorded log."""
     from . import replay
     from .calibration_file import read_calibration
-    from .logs import read_log
     from .output import check_output
 
     check_output(out, [log, calibration])
     parameters = read_calibration(calibration)
-    recording = read_log(log)
-    results = replay.replay(recording, parameters, engine)
-    replay.write_results(out, recording, results)
+    count = replay.replay(log, parameters, engine, out)
     if not parameters.aligned:
         click.echo(
             f"warning: {calibration} is not aligned: this is the lean of the sensor, not of the bike",
             err=True,
         )
-    click.echo(f"written: {out}, {len(results)} samples")
+    click.echo(f"written: {out}, {count} samples")
 
 
 @kickstand.command()
@@ -225,6 +222,59 @@ def bench(seconds: int, as_json: bool) -> None:
         click.echo(json.dumps(result))
     else:
         Console().print(tables(result))
+
+
+_CALIBRATION = click.option("--calibration", type=_PATH, help="A CAL.json; if not given, the one beside the ride.")
+
+
+@kickstand.command()
+@click.argument("ride", type=_PATH, metavar="RIDE.csv")
+@click.option("--to", "form", required=True, type=click.Choice(["csv", "vbo", "racechrono", "parquet"]))
+@_CALIBRATION
+@_OUT
+def export(ride: Path, form: str, calibration: Path | None, out: Path) -> None:
+    """Write a ride as Circuit Tools (vbo), RaceChrono or data frames (parquet, csv) open it."""
+    from .analysis.channels import open_ride
+    from .analysis.export import export
+    from .output import check_output
+
+    check_output(out, [ride, *([calibration] if calibration else [])])
+    count = export(open_ride(ride, calibration), form, out)
+    click.echo(f"written: {out}, {count} rows")
+
+
+@kickstand.command()
+@click.argument("ride", type=_PATH, metavar="RIDE.csv")
+@_CALIBRATION
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def report(ride: Path, calibration: Path | None, as_json: bool) -> None:
+    """A ride in a page: maxima, time at large leans, and each stop as a brake test has it."""
+    from rich.console import Console
+
+    from .analysis.channels import open_ride
+    from .analysis.look import look
+    from .analysis.report import as_data, page
+
+    seen = look(open_ride(ride, calibration))
+    if as_json:
+        click.echo(json.dumps(as_data(seen)))
+    else:
+        Console().print(page(seen))
+
+
+@kickstand.command()
+@click.argument("ride", type=_PATH, metavar="RIDE.csv")
+@_CALIBRATION
+@click.option("--out", required=True, type=_PATH, help="The directory to write to.")
+def plot(ride: Path, calibration: Path | None, out: Path) -> None:
+    """Draw a ride: a picture (PNG) and a page to zoom into (HTML)."""
+    from .analysis import plot
+    from .analysis.channels import open_ride
+    from .analysis.look import look
+
+    plot.check(out)
+    for path in plot.draw(look(open_ride(ride, calibration)), out):
+        click.echo(f"written: {path}")
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -12,12 +12,13 @@ from pathlib import Path
 from mpremote.transport import TransportError, TransportExecError
 from mpremote.transport_serial import SerialTransport
 
-from . import firmware_path
+from . import bytecode, firmware_path
 from .errors import InputError, cause
 from .ports import find_port, why_closed
 from .progress import Bar
 
 PACKAGE = "/kickstand"
+MAIN = "/main.py"
 CONFIG = "/config.py"  # the rider's own once it is on the board
 _CHUNK = 2048  # bytes an exchange; with mpremote's 256 copying takes half as long again
 _ANSWER_S = 10
@@ -57,14 +58,30 @@ def firmware_files() -> dict[str, Path]:
     """Path on the board of each file of the firmware, in the order to copy them: what starts it is last."""
     root = firmware_path.directory()
     files = {f"{PACKAGE}/{path.name}": path for path in sorted((root / "kickstand").glob("*.py"))}
-    return files | {CONFIG: root / "config.py", "/main.py": root / "main.py"}
+    return files | {CONFIG: root / "config.py", MAIN: root / "main.py"}
+
+
+def contents(mpy: int | None) -> dict[str, bytes]:
+    """firmware_files() as they are copied: the package as .mpy for a board with this sys.implementation._mpy, as
+    .py for None; main.py and config.py, the rider's own, always as .py. Raises CannotCompile."""
+    files = firmware_files()
+    package = {path: source for path, source in files.items() if path.startswith(PACKAGE + "/")}
+    rest = {path: source.read_bytes() for path, source in files.items() if path not in package}
+    if mpy is None:
+        return {path: source.read_bytes() for path, source in package.items()} | rest
+    return bytecode.compiled(package, mpy) | rest
 
 
 def flash(port: str | None, replace_config: bool, say: Print) -> None:
     """Bring a board's files up to date, verify them and restart it. Raises InputError."""
     with connected(port) as (transport, name):
         say(f"{_describe(transport, name)} on {name}")
-        install(transport, replace_config, say)
+        try:
+            wanted = contents(_mpy(transport))
+        except bytecode.CannotCompile as reason:
+            say(f"note: {reason}: it gets the sources, and starts more slowly")
+            wanted = contents(None)
+        install(transport, wanted, replace_config, say)
         restart(transport)
         say("restarted: the display shows the rest")
 
@@ -79,9 +96,12 @@ def status(port: str | None, say: Print) -> None:
             restart(transport)
 
 
-def install(transport: SerialTransport, replace_config: bool, say: Print) -> None:
-    """Copy what differs, verified by its hash, and remove what is no longer part."""
-    wanted = {path: source.read_bytes() for path, source in firmware_files().items()}
+def install(transport: SerialTransport, wanted: dict[str, bytes], replace_config: bool, say: Print) -> None:
+    """Copy what differs from wanted, verified by its hash, and remove what is no longer part.
+
+    main.py goes first and comes back last: broken off at any point, this leaves a board that starts nothing,
+    and so can be deployed to again.
+    """
     present = _survey(transport)
     changed = {path: data for path, data in wanted.items() if present.get(path) != _fingerprint(data)}
     if CONFIG in changed and CONFIG in present and not replace_config:
@@ -90,10 +110,12 @@ def install(transport: SerialTransport, replace_config: bool, say: Print) -> Non
     stale = [
         p for p in present if p.startswith(PACKAGE + "/") and p.endswith((".py", ".mpy")) and p not in wanted
     ]
+    if stale or changed:
+        changed[MAIN] = wanted[MAIN]
     _check_room(transport, changed, present)
-    for path in stale:
-        transport.fs_rmfile(path)
-        say(f"removed: {path[1:]} is no longer part")
+    if MAIN in changed and MAIN in present:
+        transport.fs_rmfile(MAIN)
+    _remove(transport, stale, wanted, say)
     if not transport.fs_isdir(PACKAGE):
         transport.fs_mkdir(PACKAGE)
     _copy(transport, changed)
@@ -168,6 +190,11 @@ def _describe(transport: SerialTransport, name: str) -> str:
     return f"{machine}, MicroPython {version}"
 
 
+def _mpy(transport: SerialTransport) -> int:
+    """Which .mpy files it takes; 0: none."""
+    return int(transport.eval("getattr(__import__('sys').implementation, '_mpy', 0)"))
+
+
 def _survey(transport: SerialTransport) -> dict[str, tuple[int, bytes]]:
     """Size and SHA-256 of every file in the board's root and in the package's directory."""
     return ast.literal_eval(transport.exec(_SURVEY).decode())
@@ -187,6 +214,15 @@ def _status_text(transport: SerialTransport, name: str) -> str:
 
 def _fingerprint(data: bytes) -> tuple[int, bytes]:
     return len(data), hashlib.sha256(data).digest()
+
+
+def _remove(transport: SerialTransport, stale: list[str], wanted: dict[str, bytes], say: Print) -> None:
+    """A .py beside its .mpy would be imported in its place."""
+    modules = {path.rpartition(".")[0] for path in wanted}
+    for path in stale:
+        transport.fs_rmfile(path)
+        if path.rpartition(".")[0] not in modules:
+            say(f"removed: {path[1:]} is no longer part")
 
 
 def _check_room(

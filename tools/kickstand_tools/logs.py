@@ -1,27 +1,25 @@
-"""Recorded logs: CSV with the columns of design's contract, plain or gzipped."""
+"""Recorded logs: CSV with the columns of design's contract, plain or gzipped, read block by block."""
 
 import csv
 import gzip
 import io
-import math
-import statistics
+import itertools
 import zlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
+from . import log_cells
 from .errors import InputError, cause
+from .log_cells import COLUMNS, OPTIONAL
 from .output import write_whole
 
-COLUMNS = ("t_s", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")
-OPTIONAL = ("speed_mps", "temp_c")  # may be empty in a row
 ROOM_TEMP_C = 25.0
-
-# Beyond these it is another unit (m/s2, counts): the sensor's widest ranges are 16 g and 2000 deg/s.
-_LIMITS = {"t_s": 1e10, "ax_g": 20.0, "ay_g": 20.0, "az_g": 20.0, "temp_c": 200.0, "speed_mps": 200.0}
-_LIMITS |= {"gx_dps": 2500.0, "gy_dps": 2500.0, "gz_dps": 2500.0}
-_UNITS = {"t_s": "seconds", "temp_c": "degrees Celsius", "speed_mps": "m/s"}
-_UNITS |= {"ax_g": "g", "ay_g": "g", "az_g": "g", "gx_dps": "deg/s", "gy_dps": "deg/s", "gz_dps": "deg/s"}
+BLOCK_BYTES = 1 << 22  # of text, some 60000 samples
+_NUMERIC = b"0123456789+-.eE, \n"  # where nothing else stands, numpy may read it
 
 
 @dataclass
@@ -40,13 +38,63 @@ class Log:
     speed_mps: list[float | None]
 
 
+@dataclass
+class Block:
+    """Some rows of a log, one after the other; columns as in Log, but readings (n, 7) and NaN for no speed."""
+
+    time_us: NDArray[np.int64]
+    readings: NDArray[np.float64]
+    speed_mps: NDArray[np.float64]
+    has_temp: bool
+    text: str
+    time_place: int
+    bytes_read: int  # of the file so far, as it is packed
+
+    @property
+    def time_text(self) -> list[str]:
+        """The times as they stand in the file."""
+        lines = [line for line in self.text.split("\n") if line]
+        if self.time_place == 0:
+            return [line.partition(",")[0].strip() for line in lines]
+        return [cells[self.time_place].strip() for cells in csv.reader(lines)]
+
+
 def read_log(path: Path, minimum: int = 2) -> Log:
     """Read a log of at least minimum samples. Raises InputError naming the file and the line."""
-    rows = csv.reader(io.StringIO(_text(path), newline=""))
-    try:
-        return _parse(path, rows, minimum)
-    except csv.Error as error:
-        raise InputError(f"{path}, line {rows.line_num}: not CSV ({error}): is it a log?") from error
+    log = Log(path, [], [], [], [])
+    for block in read_blocks(path, minimum):
+        log.time_text += block.time_text
+        log.time_us += block.time_us.tolist()
+        log.readings += map(tuple, block.readings.tolist())
+        log.speed_mps += [value if value == value else None for value in block.speed_mps.tolist()]
+    return log
+
+
+def read_blocks(path: Path, minimum: int = 2) -> Iterator[Block]:
+    """The same, block by block, however long the log is."""
+    chunks = _chunks(path)
+    first, packed = next(chunks, (b"", 0))
+    first = first.removeprefix(b"\xef\xbb\xbf")
+    if not first.strip():
+        raise InputError(f"{path} is empty: a log starts with the line {','.join(COLUMNS)}")
+    log_cells.check_text(path, first, 0)
+    header, _, rest = first.partition(b"\n")
+    names = log_cells.header(path, header.decode())
+    places = {name: names.index(name) for name in COLUMNS + OPTIONAL if name in names}
+    count, line, first_us, last_us = 0, 1, 0, -1
+    for text, done in itertools.chain([(rest, packed)], chunks):
+        table, rows = _numbers(path, text, names, places, line, last_us if count else None)
+        line += text.count(b"\n")
+        if not len(table):
+            continue
+        time_us = np.rint(table[:, 0] * 1e6).astype(np.int64)
+        if not count:
+            first_us = int(time_us[0])
+            _check_units(path, table[:, 1:4], time_us)
+        count, last_us = count + len(table), int(time_us[-1])
+        yield _block(table, time_us - first_us, places, rows, done)
+    if count < minimum:
+        raise InputError(f"{path} is too short: {count} samples, at least {minimum} are needed")
 
 
 def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -62,14 +110,21 @@ def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[obje
     write_whole(path, write)
 
 
-def _text(path: Path) -> str:
-    """The whole file as text, unpacked."""
+def _chunks(path: Path) -> Iterator[tuple[bytes, int]]:
+    """The file's text, unpacked, in pieces of whole lines that end in a line feed; bytes read of the file."""
     if path.is_dir():
         raise InputError(f"{path} is a directory: give the name of a log in it")
+    pending = b""
     try:
-        content = path.read_bytes()
-        if path.suffix == ".gz" and content:
-            content = gzip.decompress(content)
+        with open(path, "rb") as packed, gzip.open(packed) if path.suffix == ".gz" else packed as file:
+            while data := file.read(BLOCK_BYTES):
+                pending += data
+                if len(data) < BLOCK_BYTES:
+                    break  # the end
+                cut = pending.rfind(b"\n") + 1 or pending.rfind(b"\r") + 1
+                if cut:
+                    yield _with_line_feeds(pending[:cut]), packed.tell()
+                    pending = pending[cut:]
     except gzip.BadGzipFile as error:
         raise InputError(f"{path} is not a gzip file: unpacked logs have names without .gz") from error
     except (EOFError, zlib.error) as error:
@@ -78,87 +133,52 @@ def _text(path: Path) -> str:
         raise InputError(f"{path}: there is no such file") from error
     except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read: {cause(error)}") from error
-    if not content.strip():
-        raise InputError(f"{path} is empty: a log starts with the line {','.join(COLUMNS)}")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        line = content.count(b"\n", 0, error.start) + 1
-        raise InputError(f"{path}, line {line}: not text: give a log as CSV or as .csv.gz") from error
+    if pending:
+        yield _with_line_feeds(pending + b"\n"), path.stat().st_size
 
 
-def _parse(path: Path, rows, minimum: int) -> Log:
-    header = [name.strip() for name in next(rows, [])]
-    missing = [name for name in COLUMNS if name not in header]
-    if missing and any(mark in "".join(header) for mark in ";\t"):
-        raise InputError(f"{path}, line 1: values stand apart by ; or tab: save it with commas between them")
-    if missing:
-        raise InputError(
-            f"{path}, line 1: no column {', '.join(missing)}: a log starts with {','.join(COLUMNS)}"
-        )
-    for name in COLUMNS + OPTIONAL:
-        if header.count(name) > 1:
-            raise InputError(f"{path}, line 1: column {name} is there twice: leave one")
-    places = {name: header.index(name) for name in COLUMNS + OPTIONAL if name in header}
-    log = Log(path, [], [], [], [])
-    before = first_us = 0
-    for cells in rows:
-        if not cells:
-            continue  # a blank line, often the last
-        where = f"{path}, line {rows.line_num}"
-        if len(cells) != len(header):
-            raise InputError(
-                f"{where}: {len(cells)} values under {len(header)} column names: is the line cut?"
-            )
-        value = {name: _number(cells[place], name, where) for name, place in places.items()}
-        now = round(_present(value["t_s"]) * 1e6)
-        if not log.time_us:
-            first_us = now
-        elif now <= before:
-            what = "repeats" if now == before else "goes back from %.6f" % (before / 1e6)
-            raise InputError(f"{where}: time {what} at {cells[places['t_s']].strip()} s: it has to increase")
-        before = now
-        ax, ay, az, gx, gy, gz = (_present(value[name]) for name in COLUMNS[1:])
-        temperature = value.get("temp_c")
-        log.time_text.append(cells[places["t_s"]].strip())
-        log.time_us.append(now - first_us)
-        log.readings.append((ax, ay, az, ROOM_TEMP_C if temperature is None else temperature, gx, gy, gz))
-        log.speed_mps.append(value.get("speed_mps"))
-    if len(log.time_us) < minimum:
-        raise InputError(f"{path} is too short: {len(log.time_us)} samples, at least {minimum} are needed")
-    _check_units(log)
-    return log
+def _with_line_feeds(text: bytes) -> bytes:
+    text = text.replace(b"\r\n", b"\n")
+    return text if b"\n" in text else text.replace(b"\r", b"\n")
 
 
-def _check_units(log: Log) -> None:
-    """Raise InputError for a log in units that are easily taken for the right ones."""
-    sizes = [math.hypot(*reading[:3]) for reading in log.readings]
-    if 5.0 < statistics.median(sizes) < 20.0:
-        raise InputError(f"{log.path}: accelerations look like m/s2: divide them by 9.80665, their unit is g")
-    if len(log.time_us) > 1 and log.time_us[-1] / (len(log.time_us) - 1) >= 4e6:
-        raise InputError(f"{log.path}: seconds between samples: is t_s in milliseconds?")
+def _numbers(
+    path: Path, text: bytes, names: list[str], places: dict[str, int], line: int, before_us: int | None
+) -> tuple[NDArray[np.float64], str]:
+    """(n, columns in the order of places) and the rows as CSV. line: lines before this text.
+
+    numpy reads what is plain; whatever is not, or looks wrong, is gone through cell by cell, which names the
+    line of a mistake and is twenty times slower.
+    """
+    if text.strip() and not text.translate(None, _NUMERIC):
+        plain = text.replace(b",,", b",nan,").replace(b",,", b",nan,").replace(b",\n", b",nan\n")
+        try:
+            table = np.loadtxt(io.BytesIO(plain), delimiter=",", comments=None, ndmin=2)
+        except ValueError:
+            table = np.empty((0, 0))
+        if table.shape[1] == len(names):
+            table = table[:, list(places.values())]
+            if log_cells.plausible(table, list(places), before_us):
+                return table, text.decode()
+    log_cells.check_text(path, text, line)
+    return log_cells.read(path, text.decode(), len(names), places, line, before_us)
 
 
-def _number(cell: str, name: str, where: str) -> float | None:
-    """The value of a cell; None for an empty one where that is allowed."""
-    if name in OPTIONAL and not cell.strip():
-        return None
-    try:
-        value = float(cell.replace("_", "?"))  # Python would read 1_0 as 10
-    except ValueError:
-        raise InputError(f"{where}: {name} is {_shown(cell)}, not a number") from None
-    if not math.isfinite(value):
-        raise InputError(f"{where}: {name} is {_shown(cell)}: a number is needed")
-    if abs(value) > _LIMITS[name]:
-        raise InputError(f"{where}: {name} is {_shown(cell)}, past any reading: its unit is {_UNITS[name]}")
-    return value
+def _block(
+    table: NDArray[np.float64], time_us: NDArray[np.int64], places: dict[str, int], text: str, done: int
+) -> Block:
+    column = {name: table[:, k] for k, name in enumerate(places)}
+    none = np.full(len(table), np.nan)
+    temperature = column.get("temp_c", none)
+    order = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")
+    column["temp_c"] = np.where(np.isnan(temperature), ROOM_TEMP_C, temperature)
+    readings = np.column_stack([column[name] for name in order])
+    return Block(time_us, readings, column.get("speed_mps", none), "temp_c" in places, text, places["t_s"], done)
 
 
-def _present(value: float | None) -> float:
-    assert value is not None  # only optional columns may be empty
-    return value
-
-
-def _shown(cell: str) -> str:
-    text = cell.strip()
-    return ascii(text if len(text) <= 20 else text[:20] + "...") if text else "empty"
+def _check_units(path: Path, accelerations: NDArray[np.float64], time_us: NDArray[np.int64]) -> None:
+    """Raise InputError for a log in units that are easily taken for the right ones, by its beginning."""
+    if 5.0 < np.median(np.linalg.norm(accelerations, axis=1)) < 20.0:
+        raise InputError(f"{path}: accelerations look like m/s2: divide them by 9.80665, their unit is g")
+    if len(time_us) > 1 and (time_us[-1] - time_us[0]) / (len(time_us) - 1) >= 4e6:
+        raise InputError(f"{path}: seconds between samples: is t_s in milliseconds?")

@@ -1,95 +1,114 @@
-"""A recorded log through the firmware's own LeanMeter, by one of several engines."""
+"""A recorded log through the firmware's own LeanMeter, by one of several engines, block by block."""
 
 import io
 import struct
 import subprocess
 import tempfile
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from . import firmware_path, unix_port
 from .calibration_file import CalibrationFile
 from .errors import InputError
-from .logs import Log, write_table
+from .logs import Block, read_blocks, write_table
 from .progress import Bar
 
 firmware_path.add_to_path()
 from . import replay_engine  # noqa: E402
 
 ENGINES = ("cpython", "micropython", "rp2040")
-_CHUNK = 500  # samples between two steps of the progress bar
+_CHUNK = 500  # samples between two steps of the progress bar of an emulated Pico
+
+Row = tuple[float, ...]
 
 
-def replay(log: Log, calibration: CalibrationFile, engine: str) -> list[tuple[float, ...]]:
-    """replay_engine.COLUMNS for each sample. Raises InputError where the engine is not to be had."""
+def replay(log: Path, calibration: CalibrationFile, engine: str, out: Path) -> int:
+    """Write LEAN.csv: the log's own times, then replay_engine.COLUMNS. Returns how many samples.
+
+    Raises InputError, also where the engine is not to be had. Memory does not grow with the log, but on the
+    emulated Pico, which no long log is for.
+    """
     if engine == "micropython" and not unix_port.available():
         raise InputError("engine micropython has no package for this system: use --engine cpython")
-    with Bar("replaying", len(log.readings)) as bar:
-        results = _RUN[engine](log, calibration, bar)
-    return list(struct.iter_unpack(replay_engine.RESULT, results))
+    count = 0
+
+    def rows() -> Iterator[list[str]]:
+        nonlocal count
+        for block, results in _RUN[engine](log, calibration):
+            count += len(results)
+            for time, row in zip(block.time_text, results, strict=True):
+                yield [time, *(f"{value:.5f}" for value in row)]
+
+    write_table(out, ("t_s", *replay_engine.COLUMNS), rows())
+    return count
 
 
-def write_results(path: Path, log: Log, results: list[tuple[float, ...]]) -> None:
-    """Write LEAN.csv: the log's own times, then replay_engine.COLUMNS."""
-    rows = ([t, *(f"{value:.5f}" for value in row)] for t, row in zip(log.time_text, results, strict=True))
-    write_table(path, ("t_s", *replay_engine.COLUMNS), rows)
+def with_progress(path: Path, what: str) -> Iterator[Block]:
+    """The blocks of a log with a progress bar, by how much of the file they are."""
+    before, size = 0, path.stat().st_size if path.is_file() else 0
+    with Bar(what, size) as bar:
+        for block in read_blocks(path):
+            yield block
+            bar.advance(block.bytes_read - before)
+            before = block.bytes_read
 
 
-class _Sink(io.BytesIO):
-    """Collects results and moves the bar on."""
-
-    def __init__(self, bar: Bar) -> None:
-        super().__init__()
-        self._bar = bar
-        self._count = 0
-
-    def write(self, data, /) -> int:
-        self._count += 1
-        if self._count % _CHUNK == 0:
-            self._bar.advance(_CHUNK)
-        return super().write(data)
+def _cpython(log: Path, calibration: CalibrationFile) -> Iterator[tuple[Block, list[Row]]]:
+    engine = replay_engine.Replay(calibration.to_firmware())
+    for block in with_progress(log, "replaying"):
+        yield block, [engine.step(*row) for row in zip(block.time_us.tolist(), block.readings.tolist())]
 
 
-def _cpython(log: Log, calibration: CalibrationFile, bar: Bar) -> bytes:
-    sink = _Sink(bar)
-    replay_engine.run(io.BytesIO(_records(log, calibration)), sink)
-    return sink.getvalue()
+def _micropython(log: Path, calibration: CalibrationFile) -> Iterator[tuple[Block, list[Row]]]:
+    size = struct.calcsize(replay_engine.RESULT)
+    with tempfile.TemporaryDirectory() as directory:
+        records = Path(directory) / "records"
+        with records.open("wb") as file:
+            file.writelines(_records(read_blocks(log), calibration))
+        command = unix_port.command(replay_engine.__file__, str(records))
+        with subprocess.Popen(command, env=unix_port.environment(), stdout=subprocess.PIPE) as process:
+            assert process.stdout is not None
+            results = b""
+            for block in with_progress(log, "replaying"):
+                results = process.stdout.read(size * len(block.time_us))
+                if len(results) < size * len(block.time_us):
+                    break
+                yield block, list(struct.iter_unpack(replay_engine.RESULT, results))
+            results += process.stdout.read()
+        if process.returncode != 0:  # its traceback went to standard output too
+            reason = results.decode(errors="replace").strip().rpartition("\n")[2]
+            raise InputError(f"MicroPython stopped ({reason}): use --engine cpython")
 
 
-def _rp2040(log: Log, calibration: CalibrationFile, bar: Bar) -> bytes:
+def _rp2040(log: Path, calibration: CalibrationFile) -> Iterator[tuple[Block, list[Row]]]:
     from .emulator import image
 
     image.find()  # before the rest, which needs what this misses
     from .emulator import replay as emulated
 
-    sink = _Sink(bar)
-    emulated.run(_records(log, calibration), sink.write)
-    return sink.getvalue()
+    size = struct.calcsize(replay_engine.RESULT)
+    records = b"".join(_records(read_blocks(log), calibration))
+    results = io.BytesIO()
+    with Bar("replaying", len(records) // struct.calcsize(replay_engine.RECORD)) as bar:
 
-
-def _micropython(log: Log, calibration: CalibrationFile, bar: Bar) -> bytes:
-    results = b""
-    with tempfile.TemporaryDirectory() as directory:
-        records = Path(directory) / "records"
-        records.write_bytes(_records(log, calibration))
-        command = unix_port.command(replay_engine.__file__, str(records))
-        with subprocess.Popen(command, env=unix_port.environment(), stdout=subprocess.PIPE) as process:
-            assert process.stdout is not None
-            while chunk := process.stdout.read(_CHUNK * struct.calcsize(replay_engine.RESULT)):
-                results += chunk
+        def sink(result: bytes) -> None:
+            results.write(result)
+            if results.tell() % (_CHUNK * size) == 0:
                 bar.advance(_CHUNK)
-    if process.returncode != 0:  # its traceback went to standard output too
-        reason = results.decode(errors="replace").strip().rpartition("\n")[2]
-        raise InputError(f"MicroPython stopped ({reason}): use --engine cpython")
-    return results
+
+        emulated.run(records, sink)
+    results.seek(0)
+    for block in read_blocks(log):
+        yield block, list(struct.iter_unpack(replay_engine.RESULT, results.read(size * len(block.time_us))))
 
 
 _RUN = {"cpython": _cpython, "micropython": _micropython, "rp2040": _rp2040}
 
 
-def _records(log: Log, calibration: CalibrationFile) -> bytes:
+def _records(blocks: Iterable[Block], calibration: CalibrationFile) -> Iterator[bytes]:
     """What replay_engine.run reads."""
     values = calibration.offset + calibration.slope + calibration.bias + calibration.matrix
-    records = [struct.pack(replay_engine.CALIBRATION, *values)]
-    for time_us, reading in zip(log.time_us, log.readings, strict=True):
-        records.append(struct.pack(replay_engine.RECORD, time_us, *reading))
-    return b"".join(records)
+    yield struct.pack(replay_engine.CALIBRATION, *values)
+    for block in blocks:
+        for time_us, reading in zip(block.time_us.tolist(), block.readings.tolist()):
+            yield struct.pack(replay_engine.RECORD, time_us, *reading)

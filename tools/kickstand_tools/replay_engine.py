@@ -30,33 +30,45 @@ RECORD = "<q7d"
 RESULT = "<8d"
 
 
+class Replay:
+    """The meter over one recording. calibration: the firmware's own, for readings in g and deg/s."""
+
+    def __init__(self, calibration):
+        self.meter = LeanMeter(calibration)
+        self._before = None
+
+    def take(self, time_us, reading):
+        """Give the meter a sample (7, the chip's order; g, C, deg/s)."""
+        self.meter.update(reading, 0 if self._before is None else time_us - self._before)
+        self._before = time_us
+
+    def step(self, time_us, reading):
+        """The same, and the values of COLUMNS after it."""
+        self.take(time_us, reading)
+        meter = self.meter
+        force, rate = meter.force, meter.rate
+        return (
+            meter.lean_deg,
+            meter.lean_formula_deg,
+            force[0],
+            force[1],
+            force[2],
+            static_lean_deg(force),
+            degrees(rate[1]),
+            degrees(rate[2]),
+        )
+
+
 def run(source, sink):
     """Read records from source until its end and write results to sink, both binary files."""
-    meter = LeanMeter(_calibration(struct.unpack(CALIBRATION, source.read(struct.calcsize(CALIBRATION)))))
+    replay = Replay(_calibration(struct.unpack(CALIBRATION, source.read(struct.calcsize(CALIBRATION)))))
     size = struct.calcsize(RECORD)
-    before = None
     while True:
         record = source.read(size)
         if len(record) < size:
             return
         values = struct.unpack(RECORD, record)
-        now = values[0]
-        meter.update(values[1:], 0 if before is None else now - before)
-        before = now
-        force, rate = meter.force, meter.rate
-        sink.write(
-            struct.pack(
-                RESULT,
-                meter.lean_deg,
-                meter.lean_formula_deg,
-                force[0],
-                force[1],
-                force[2],
-                static_lean_deg(force),
-                degrees(rate[1]),
-                degrees(rate[2]),
-            )
-        )
+        sink.write(struct.pack(RESULT, *replay.step(values[0], values[1:])))
 
 
 def _calibration(values):

@@ -10,6 +10,7 @@ from rich.console import Group
 from rich.table import Table
 
 from .. import firmware_path
+from ..bytecode import cross_compiled
 from ..rides import Ride, accelerate, turn, upright
 from ..sensor_errors import Sensor
 from . import flash_image
@@ -83,7 +84,7 @@ def _run(seconds: int, detail: bool) -> dict[str, Any]:
     """The app's loop for so long: arrays and figures of bench_guest, and how the samples fared."""
     files = flash_image.firmware(compiled=True) | _calibration()
     del files["/main.py"]
-    files["bench_guest.mpy"] = flash_image.cross_compiled(_GUEST)
+    files["bench_guest.mpy"] = cross_compiled(_GUEST)
     arrays: list[np.ndarray] = []
     result: dict[str, Any] = {}
     with Pico(_world(), files) as pico:
@@ -118,16 +119,18 @@ def _run(seconds: int, detail: bool) -> dict[str, Any]:
 def _stages(run: dict[str, Any]) -> dict[str, np.ndarray]:
     """us of each stage in each turn that had it."""
     columns = dict(zip(run["figures"]["stages"], run["stages"].T, strict=True))
-    sampled = columns["decode"] > 0
-    sensor = columns["fetch"] + columns["take"]
+    sampled = columns["decode and sum"] > 0
+    watch = run["figures"]["stopwatch_us"]
+    fetch = columns["fetch"] - 3 * watch  # around its two transfers and add_up()
+    meter = columns["meter"] - 2 * watch
     stages = {
         "read": columns["read"],
-        "decode": columns["decode"],
-        "check": sensor - columns["read"] - columns["decode"],
+        "decode and sum": columns["decode and sum"],
+        "check": fetch - columns["read"] - columns["decode and sum"],
         "calibrate and rotate": columns["calibrate and rotate"],
         "filter": columns["filter"],
-        "rest of the meter": columns["meter"] - columns["calibrate and rotate"] - columns["filter"],
-        "sample path": sensor + columns["meter"],
+        "rest of the meter": meter - columns["calibrate and rotate"] - columns["filter"],
+        "sample path": fetch + meter,
     }
     stages = {name: us[sampled] for name, us in stages.items()}
     stages["page"] = columns["page"][columns["page"] > 0]

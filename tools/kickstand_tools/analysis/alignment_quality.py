@@ -1,0 +1,67 @@
+"""How well the sensor's axes are those of the bike, judged by the ride itself.
+
+On a straight a balanced bike is upright, so the force across it has the direction of its own up: `roll`. Braking
+and speeding up on a straight push along its own forward: `yaw`. From one standstill to another on level ground
+speeding up and braking cancel out, which leaves `pitch`. Standing still, the force is 1 g: `gravity`.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .channels import Array, Channels
+from .thin import spacing_s
+
+SMOOTH_S = 0.5
+STRAIGHT_DPS, STRAIGHT_DEG = 2.0, 8.0  # turning and leaning less is riding straight on
+ENOUGH_S = 10.0  # of such riding
+LEVEL_S = 60.0  # of riding, for hills to even out
+ENOUGH_G = 0.05  # rms of braking and speeding up in it
+
+
+@dataclass
+class Quality:
+    """Angles in degrees by which the aligned axes seem to be off, None where the ride does not tell.
+
+    roll > 0: "up" leans to the right of the bike's own. pitch > 0: "forward" points up. yaw > 0: it points to
+    the right of the way the bike is pushed. gravity_g: mean force at rest. straight_s: what roll and yaw rest on.
+    lateral_g, forward_g: of the straight stretches, means of SMOOTH_S, for a picture.
+    """
+
+    roll_deg: float | None
+    pitch_deg: float | None
+    yaw_deg: float | None
+    gravity_g: float | None
+    straight_s: float
+    lateral_g: Array
+    forward_g: Array
+
+
+def quality(ride: Channels, standing: NDArray[np.bool_]) -> Quality:
+    """ride: whole, evenly thinned; standing: where it stands still."""
+    step_s = spacing_s(ride)
+    n = min(max(1, round(SMOOTH_S / step_s)), len(ride.t_s))
+    count = len(ride.t_s) // n
+
+    def means(values: Array) -> Array:
+        return np.mean(values[: count * n].reshape(count, n), axis=1)
+
+    left, up, forward = means(ride.left_g), means(ride.up_g), means(ride.forward_g)
+    lateral, yaw_rate = means(ride.lateral_g), means(ride.yaw_rate_dps)
+    moving = means(standing.astype(float)) == 0.0
+    still = means(standing.astype(float)) == 1.0
+    static = np.degrees(np.arctan2(left, up))
+    straight = moving & (np.abs(yaw_rate) < STRAIGHT_DPS) & (np.abs(static) < STRAIGHT_DEG)
+    straight_s = float(np.count_nonzero(straight)) * n * step_s
+    roll = pitch = yaw = None
+    if straight_s >= ENOUGH_S:
+        roll = float(np.mean(static[straight]))
+        push = forward[straight] - np.mean(forward[straight])
+        if np.std(push) > ENOUGH_G:
+            yaw = float(np.degrees(np.arctan(np.mean(push * left[straight]) / np.mean(push * push))))
+    if standing[0] and standing[-1] and np.count_nonzero(moving) * n * step_s > LEVEL_S:
+        pitch = float(np.degrees(np.arcsin(np.mean(forward[moving]))))
+    sizes = np.sqrt(left * left + up * up + forward * forward)[still]
+    gravity = float(np.mean(sizes)) if len(sizes) else None
+    return Quality(roll, pitch, yaw, gravity, straight_s, lateral[straight], forward[straight])

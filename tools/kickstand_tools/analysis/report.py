@@ -1,0 +1,114 @@
+"""A ride in a page of the terminal, or as JSON."""
+
+from typing import Any
+
+from rich.console import Group
+from rich.table import Table
+from rich.text import Text
+
+from .brake_test import Stop
+from .look import Look
+from .summary import Peak
+
+
+def as_data(seen: Look) -> dict[str, Any]:
+    """What the page says, in plain figures; None where there is none."""
+    total, quality = seen.summary, seen.quality
+    data: dict[str, Any] = {
+        "ride": str(seen.ride.log),
+        "vehicle": "car" if seen.ride.car else "motorcycle",
+        "duration_s": round(total.duration_s, 3),
+        "samples": total.samples,
+        "riding_s": round(total.riding_s, 1),
+        "lean_unsure_s": round(total.not_sure_s, 1),
+    }
+    peaks = {"max_brake_g": total.brake_g, "max_accel_g": total.accel_g, "max_speed_mps": total.speed_mps}
+    if not seen.ride.car:
+        peaks = {"max_left_deg": total.left_deg, "max_right_deg": total.right_deg} | peaks
+        data |= {f"beyond_{limit:.0f}_deg_s": round(s, 2) for limit, s in total.beyond_s.items()}
+    for name, peak in peaks.items():
+        there = peak.time_s is not None
+        data[name] = {"value": round(peak.value, 4), "time_s": round(peak.time_s or 0.0, 3)} if there else None
+    data["alignment"] = {
+        name: None if value is None else round(value, 4)
+        for name, value in vars(quality).items()
+        if not name.endswith(("lateral_g", "forward_g"))
+    }
+    data["stops"] = [
+        {name: value if isinstance(value, str) else round(value, 3) for name, value in vars(stop).items()}
+        | {"duration_s": round(stop.duration_s, 3)}
+        for stop in seen.stops
+    ]
+    return data
+
+
+def page(seen: Look) -> Group:
+    """The same for reading."""
+    parts: list[Any] = [Text(f"{seen.ride.log.name}", style="bold"), _ride(seen), Text(), _alignment(seen)]
+    if seen.stops:
+        parts += [Text(), _stops(seen.stops)]
+        if any(stop.speed_from == "integrated" for stop in seen.stops):
+            parts.append(Text("* no speed in the log: integrated from the acceleration", style="dim"))
+    else:
+        parts += [Text(), Text("No stop from over 10 km/h found.")]
+    return Group(*parts)
+
+
+def _ride(seen: Look) -> Table:
+    total = seen.summary
+    table = Table.grid(padding=(0, 3))
+    table.add_row("Duration", clock(total.duration_s), f"riding {clock(total.riding_s)}")
+    if not seen.ride.car:
+        table.add_row("Max left", *_peak(total.left_deg, "{:.0f}°"))
+        table.add_row("Max right", *_peak(total.right_deg, "{:.0f}°"))
+        for limit, seconds in total.beyond_s.items():
+            table.add_row(f"Over {limit:.0f}°", f"{seconds:.1f} s")
+    table.add_row("Max braking", *_peak(total.brake_g, "{:.2f} g"))
+    table.add_row("Max acceleration", *_peak(total.accel_g, "{:.2f} g"))
+    if total.speed_mps.time_s is not None:
+        peak = Peak(total.speed_mps.value * 3.6, total.speed_mps.time_s)
+        table.add_row("Max speed", *_peak(peak, "{:.0f} km/h"))
+    if total.not_sure_s >= 1.0:
+        table.add_row("Lean not sure", clock(total.not_sure_s))
+    return table
+
+
+def _alignment(seen: Look) -> Text:
+    quality = seen.quality
+    angles = {"roll": quality.roll_deg, "pitch": quality.pitch_deg, "yaw": quality.yaw_deg}
+    said = [f"{name} {value:+.1f}°" for name, value in angles.items() if value is not None]
+    if quality.gravity_g is not None:
+        said.append(f"at rest {quality.gravity_g:.3f} g")
+    return Text("Alignment, seems off by: " + (", ".join(said) if said else "not enough straight riding to tell"))
+
+
+def _stops(stops: list[Stop]) -> Table:
+    table = Table(title="Stops (MFDD: UN R13)", title_justify="left", box=None, pad_edge=False, header_style="dim")
+    for name in "at", "from", "time", "distance", "MFDD", "peak", "jerk", "pulls":
+        table.add_column(name, justify="right")
+    for stop in stops:
+        mark = "*" if stop.speed_from == "integrated" else ""
+        table.add_row(
+            clock(stop.start_s),
+            f"{stop.initial_speed_mps * 3.6:.1f} km/h{mark}",
+            f"{stop.duration_s:.2f} s",
+            f"{stop.distance_m:.1f} m",
+            f"{stop.mfdd_mps2:.2f} m/s²",
+            f"{stop.peak_mps2:.2f} m/s²",
+            f"{stop.jerk_mps3:.0f} m/s³",
+            f"{abs(stop.side_m):.1f} m {'left' if stop.side_m > 0 else 'right'}",
+        )
+    return table
+
+
+def _peak(peak: Peak, form: str) -> tuple[str, str]:
+    if peak.time_s is None:
+        return "--", ""
+    return form.format(peak.value), f"at {clock(peak.time_s)}"
+
+
+def clock(seconds: float) -> str:
+    """1:02:03 or 2:03."""
+    whole = round(seconds)
+    hours, minutes = whole // 3600, whole // 60 % 60
+    return f"{hours}:{minutes:02d}:{whole % 60:02d}" if hours else f"{minutes}:{whole % 60:02d}"

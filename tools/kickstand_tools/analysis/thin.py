@@ -1,0 +1,49 @@
+"""Fewer samples, for what needs no more: means of equal stretches of time."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import fields
+
+import numpy as np
+
+from .channels import Array, Channels
+
+
+def joined(parts: list[Channels]) -> Channels:
+    """One after the other."""
+    return Channels(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Channels)))
+
+
+def spacing_s(course: Channels) -> float:
+    """Usual time from sample to sample."""
+    return float(np.median(np.diff(course.t_s))) if len(course.t_s) > 1 else 1.0
+
+
+def thinned(blocks: Iterable[Channels], step_s: float) -> Iterator[Channels]:
+    """Means over each step_s in which there are samples; a channel's NaNs do not count.
+
+    A log slower than that comes through unchanged. Stretches go on from block to block.
+    """
+    rest: Channels | None = None
+    for block in blocks:
+        block = block if rest is None else joined([rest, block])
+        step = np.floor(block.t_s / step_s + 1e-6)
+        last = int(np.searchsorted(step, step[-1]))  # it may go on in the next block
+        rest = block.part(slice(last, None))
+        if last:
+            yield _means(block.part(slice(0, last)), step[:last])
+    if rest is not None:
+        yield _means(rest, np.zeros(len(rest.t_s)))
+
+
+def _means(block: Channels, step: Array) -> Channels:
+    starts = np.flatnonzero(np.diff(step, prepend=-np.inf))
+    if len(starts) == len(step):
+        return block
+    columns = []
+    for field in fields(block):
+        values = getattr(block, field.name)
+        there = ~np.isnan(values)
+        count = np.add.reduceat(there, starts, dtype=float)
+        total = np.add.reduceat(np.where(there, values, 0.0), starts)
+        columns.append(np.divide(total, count, out=np.full(len(starts), np.nan), where=count > 0))
+    return Channels(*columns)

