@@ -57,7 +57,7 @@ class Board:
         self.lcd = Lcd(self.clock, lcd_address or 0x27)
         self.button = Button(self.clock, seed)
         self.watchdog = Watchdog(self.clock)
-        sensor_pins, lcd_pins, self._button_pin, self._gps_pin, self._wheel_pin = WIRING[port]
+        sensor_pins, lcd_pins, self._button_pin, self._gps_pin, self.wheel_pin = WIRING[port]
         self.gps = None  # a Gps and a Wheel, where fitted
         self.wheel = None
         self.sensor_bus = Bus(self.clock, *sensor_pins)
@@ -189,7 +189,7 @@ class Board:
 
     def watch_pin(self, number, edge):
         """Call edge(level) when what is wired to this pin changes it."""
-        if self.wheel and number == self._wheel_pin:
+        if self.wheel and number == self.wheel_pin:
             self.wheel.connect(edge)
 
     def bus_on(self, sda, scl, hz):
@@ -225,7 +225,7 @@ class Board:
         mode, pull, level = self._pins.get(number, (fake_machine.Pin.IN, -1, 0))
         if number == self._button_pin and self.button.closed:
             return 0
-        if number == self._wheel_pin and self.wheel and self.wheel.closed:
+        if number == self.wheel_pin and self.wheel and self.wheel.closed:
             return 0
         if mode == fake_machine.Pin.IN:
             return 1 if pull == fake_machine.Pin.PULL_UP else 0  # a floating pin is taken to read low

@@ -118,6 +118,13 @@ class Pico:
         """Press the button at at_s (now, if None)."""
         self.board.press(at_s, for_s)
 
+    # What else can be soldered on
+
+    def fit_wheel(self, speed: Callable[[float], float], **kind: Any) -> None:
+        """A contact at a wheel on its pin, as simulator.Board.fit_wheel()."""
+        self.board.fit_wheel(speed, **kind)
+        self.board.watch_pin(self.board.wheel_pin, self._wheel_changed)
+
     # The flash
 
     @property
@@ -179,6 +186,13 @@ class Pico:
             self._button.set_input_value(False)
         else:
             self._button.release_input()
+
+    def _wheel_changed(self, level: int) -> None:
+        pin = self.chip.rp2040.gpio[self.board.wheel_pin]
+        if level:
+            pin.release_input()
+        else:
+            pin.set_input_value(False)
 
     def _reset(self) -> None:
         self._raw = False
