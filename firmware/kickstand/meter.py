@@ -82,6 +82,8 @@ class LeanMeter:
         first). On the board the mean of the few samples that came in during one turn of the loop."""
         if dt_us > GAP_US:
             self.restart()
+        if self._fresh:
+            dt_us = 0  # there is no reading before, on the board and in a replay alike
         self.reading = reading
         force = self.force
         self._transform.apply(reading, force, self.rate)

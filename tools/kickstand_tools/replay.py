@@ -88,7 +88,7 @@ _RUN = {"cpython": _cpython, "micropython": _micropython, "rp2040": _rp2040}
 
 def _records(log: Log, calibration: CalibrationFile) -> bytes:
     """What replay_engine.run reads."""
-    values = calibration.offset + calibration.slope + calibration.bias + calibration.matrix
+    values = calibration.offset + calibration.slope + calibration.bias + calibration.matrix + [calibration.trim]
     records = [struct.pack(replay_engine.CALIBRATION, *values)]
     for time_us, reading in zip(log.time_us, log.readings, strict=True):
         records.append(struct.pack(replay_engine.RECORD, time_us, *reading))

@@ -2,7 +2,7 @@
 
     micropython replay_engine.py RECORDS > RESULTS
 
-RECORDS starts with the calibration (18 doubles: offset, slope, gyro bias, matrix), then one record a sample:
+RECORDS starts with the calibration (19 doubles: offset, slope, gyro bias, matrix, trim), then one record a sample:
 its time in microseconds (int64) and seven readings in the chip's order (doubles; g, C, deg/s). RESULTS has
 the doubles of COLUMNS for each. Binary, because a number printed and read again may be another number.
 """
@@ -25,7 +25,7 @@ COLUMNS = (
     "yaw_rate_dps",
     "roll_rate_dps",
 )
-CALIBRATION = "<18d"
+CALIBRATION = "<19d"
 RECORD = "<q7d"
 RESULT = "<8d"
 
@@ -66,6 +66,7 @@ def _calibration(values):
         calibration.gyro_bias[i] = values[6 + i]
     for i in range(9):
         calibration.vehicle_from_sensor[i] = values[9 + i]
+    calibration.trim_deg = values[18]
     return calibration
 
 
