@@ -27,11 +27,14 @@ class FakeBoard(Transport):
         self.resets = 0
         self.closed = False
         self.on_write: Callable[[str, bytes], bytes] = lambda _path, data: data
-        modules = {"os": self._os(), "sys": types.SimpleNamespace(implementation=_implementation(python))}
+        self.modules: dict[str, Any] = {
+            "os": self._os(),
+            "sys": types.SimpleNamespace(implementation=_implementation(python)),
+        }
 
         def imports(name: str, *rest: Any) -> Any:
-            if name in modules:
-                return modules[name]
+            if name in self.modules:
+                return self.modules[name]
             if name == "kickstand":
                 return self._kickstand()
             return __import__(name, *rest)
@@ -95,6 +98,7 @@ class FakeBoard(Transport):
 
         return types.SimpleNamespace(
             ilistdir=ilistdir,
+            listdir=lambda path: [p.name for p in self.path(path).iterdir()],
             stat=stat,
             mkdir=lambda path: self.path(path).mkdir(),
             remove=lambda path: self.path(path).unlink(),

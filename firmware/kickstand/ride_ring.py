@@ -6,7 +6,6 @@ A file RRRRR-PPPP.ride is part P of ride R. There is always room left for the ca
 import os
 from errno import EEXIST
 
-from . import sd_card
 from .ride_file import BLOCK, block_length
 
 ENOSPC = 28  # which errno lacks on a board
@@ -19,7 +18,11 @@ ENDING = ".ride"
 
 def directory(settings):
     """Where the rides are: in flash, or on the SD card that config.py names. Raises CardError."""
-    return "rides" if settings.SD_SPI is None else sd_card.mount(settings) + "/rides"
+    if settings.SD_SPI is None:
+        return "rides"
+    from . import sd_card  # most boards need none of it
+
+    return sd_card.mount(settings) + "/rides"
 
 
 def free_bytes(path):

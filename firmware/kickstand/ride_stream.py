@@ -38,8 +38,10 @@ class RideStream:
 
 def run():
     """The app, its display and button alive, its turns to the console. Ctrl-C ends it."""
-    from . import app, settings
+    from . import app, port, settings
 
     chosen = settings.load()
-    lean_meter = app.App(chosen, app.open_lcd(chosen), RideStream())
-    lean_meter.run()
+    try:
+        app.App(chosen, app.open_lcd(chosen), RideStream()).run()
+    except KeyboardInterrupt:
+        port.rest_watchdog()

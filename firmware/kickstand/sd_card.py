@@ -16,7 +16,8 @@ def mount(settings):
         return MOUNT
     pins = settings.SD_SCK, settings.SD_MOSI, settings.SD_MISO, settings.SD_CS
     try:
-        os.mount(_open(settings.SD_SPI, *[Pin(pin) for pin in pins]), MOUNT)
+        card = _open(settings.SD_SPI, *[Pin(pin) for pin in pins])
+        os.mount(card, MOUNT)
     except ImportError:
         raise CardError(
             "SD card: its driver is not on the board: mpremote mip install sdcard", "SD card:", "no driver"

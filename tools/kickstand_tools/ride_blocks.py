@@ -4,6 +4,7 @@ import struct
 from binascii import crc32
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Any
 
 from . import firmware_path
 
@@ -14,6 +15,9 @@ from kickstand.calibration import Calibration  # noqa: E402
 _HEAD_LENGTH = struct.calcsize(ride_file.HEAD)
 _TAIL_LENGTH = struct.calcsize(ride_file.TAIL)
 _START = _HEAD_LENGTH + store.BODY_LENGTH
+
+
+CUT_SHORT = "cut short"  # by the power, if it is the last
 
 
 class BadBlock(Exception):
@@ -43,6 +47,7 @@ class Block:
     sample_hz: int
     firmware: str
     body: bytes
+    crc: int
     turns: list[Turn] = field(default_factory=list)
 
     @property
@@ -56,7 +61,8 @@ class Block:
 
 
 def read(content: bytes) -> tuple[list[Block], list[str]]:
-    """The whole blocks of a file, and for each place with something else what it is."""
+    """The whole blocks of a file, and for each place with something else what it is: CUT_SHORT for the end of a file
+    whose last block is not complete, which is no damage."""
     blocks, problems = [], []
     at = 0
     while at < len(content):
@@ -65,27 +71,30 @@ def read(content: bytes) -> tuple[list[Block], list[str]]:
             blocks.append(parse(content[at : at + length]))
             at += length
         except BadBlock as problem:
-            problems.append(f"{problem} at byte {at}")
             following = content.find(ride_file.MAGIC, at + 1)
+            last = following < 0 and str(problem) == CUT_SHORT
+            problems.append(CUT_SHORT if last else f"{problem} at byte {at}")
             at = following if following > 0 else len(content)
     return blocks, problems
 
 
 def parse(data: bytes) -> Block:
     """One whole block. Raises BadBlock."""
-    if not data.startswith(ride_file.MAGIC):
+    if not data.startswith(ride_file.MAGIC[: len(data)]):
         raise BadBlock("not of a ride")
     if len(data) < _START + _TAIL_LENGTH:
-        raise BadBlock("cut short")
-    _, version, length, *head = struct.unpack_from(ride_file.HEAD, data)
+        raise BadBlock(CUT_SHORT)
+    _, version, length, *rest, firmware = struct.unpack_from(ride_file.HEAD, data)
     if version != ride_file.VERSION:
         raise BadBlock(f"format {version}, this program reads {ride_file.VERSION}")
     if len(data) < length:
-        raise BadBlock("cut short")
+        raise BadBlock(CUT_SHORT)
     count, crc = struct.unpack_from(ride_file.TAIL, data, len(data) - _TAIL_LENGTH)
     if len(data) != length or crc != crc32(data[:-4]):
         raise BadBlock("damaged")
-    block = Block(*head[:-1], head[-1].rstrip(b"\0").decode("ascii", "replace"), data[_HEAD_LENGTH:_START])
+    firmware = firmware.rstrip(b"\0").decode("ascii", "replace")
+    fields: list[Any] = [*rest, firmware, data[_HEAD_LENGTH:_START], crc]
+    block = Block(*fields)
     try:
         block.turns = list(_turns(block, data[_START : len(data) - _TAIL_LENGTH], count))
     except (ValueError, ZeroDivisionError) as error:  # written so: the check sum is right
