@@ -44,11 +44,14 @@ def record(port: str | None, out: Path, say: Print, warn: Print) -> None:
         try:
             transport.exec_raw_no_follow(_START)
             say(f"recording from {name}: Ctrl-C ends it")
-            recorded = _Recording(warn)
-            write_whole(out, lambda temporary: recorded.write(temporary, _blocks(transport, name, warn)))
+            recorded = _Recording()
+            notes: list[str] = []
+            write_whole(out, lambda temporary: recorded.write(temporary, _blocks(transport, name, notes), notes))
             assert recorded.first
             beside = ride_log.calibration_path(out)
             write_calibration(beside, ride_log.calibration(recorded.first))
+            for note in notes:
+                warn(note)
             say(f"written: {out}, {recorded.seconds:.1f} s, {recorded.count} readings, and {beside.name}")
         finally:
             with contextlib.suppress(Exception):  # the cable may be out
@@ -62,14 +65,13 @@ class _Silence(Exception):
 class _Recording:
     """Blocks into a file. first: the first block; seconds, count: how much there is."""
 
-    def __init__(self, warn: Print) -> None:
-        self._warn = warn
+    def __init__(self) -> None:
         self.first: Block | None = None
         self.seconds = 0.0
         self.count = 0
 
-    def write(self, path: Path, blocks: Iterator[Block]) -> None:
-        """All of them as they come, with the lean live where someone is watching."""
+    def write(self, path: Path, blocks: Iterator[Block], notes: list[str]) -> None:
+        """All of them as they come, with the lean live where someone is watching. notes: what is to be said of it."""
         missing, expected, before = 0, 0, 0
         meter = LeanMeter(CalibrationFile().to_firmware())
         opened = gzip.open if path.suffix == ".gz" else open
@@ -80,7 +82,7 @@ class _Recording:
             for block in blocks:
                 if self.first is None or block.body != self.first.body:
                     if self.first:
-                        self._warn("the board's calibration has changed: the log ends here")
+                        notes.append("the board's calibration has changed: the log ends here")
                         break
                     self.first = block
                     meter = LeanMeter(ride_log.calibration(block).to_firmware())
@@ -100,9 +102,9 @@ class _Recording:
                     span_s = (before - block.time_us) / 1e6
                     live.update(_status(meter, self, len(block.turns) / span_s), refresh=True)
         if self.first is None:
-            raise InputError("nothing was recorded: see on the board's display whether its sensor answers")
+            raise InputError("; ".join(["nothing was recorded: does the display show readings?", *notes]))
         if missing:
-            self._warn(f"{missing} blocks of half a second did not arrive: the log has gaps")
+            notes.append(f"{missing} blocks of half a second did not arrive: the log has gaps")
 
 
 def _live(console: Console, watched: bool) -> Live:
@@ -119,10 +121,10 @@ def _status(meter: LeanMeter, recorded: _Recording, rate: float) -> str:
     )
 
 
-def _blocks(transport: SerialTransport, name: str, warn: Print) -> Iterator[Block]:
+def _blocks(transport: SerialTransport, name: str, notes: list[str]) -> Iterator[Block]:
     """Whole blocks as the board says them, until Ctrl-C here or the connection is lost."""
     parts: list[bytes] = []
-    for line in _lines(transport, name, warn):
+    for line in _lines(transport, name, notes):
         if line != b".":
             parts.append(line)
             continue
@@ -131,16 +133,16 @@ def _blocks(transport: SerialTransport, name: str, warn: Print) -> Iterator[Bloc
         parts = []
 
 
-def _lines(transport: SerialTransport, name: str, warn: Print) -> Iterator[bytes]:
+def _lines(transport: SerialTransport, name: str, notes: list[str]) -> Iterator[bytes]:
     """What the app on the board prints, line by line. Ctrl-C here becomes one there."""
     stopped = threading.Event()
     before = signal.signal(signal.SIGINT, lambda *_: stopped.set())
     try:
         yield from _said(transport, stopped)
     except OSError as error:
-        warn(f"{name}: connection lost ({cause(error)}): what came until then is kept")
+        notes.append(f"{name}: connection lost ({cause(error)}): what came until then is kept")
     except _Silence as silence:
-        warn(f"{name}: {silence}: what came until then is kept")
+        notes.append(f"{name}: {silence}: what came until then is kept")
     finally:
         signal.signal(signal.SIGINT, before)
 
@@ -154,8 +156,7 @@ def _said(transport: SerialTransport, stopped: threading.Event) -> Iterator[byte
         if stopped.is_set() and asked_s is None:
             asked_s = time.monotonic()
             serial.write(_CTRL_C)
-        waiting = serial.inWaiting()
-        if waiting:
+        if waiting := serial.inWaiting():
             heard_s = time.monotonic()
             said += serial.read(waiting)
         elif time.monotonic() - heard_s > _SILENT_S:
@@ -164,9 +165,11 @@ def _said(transport: SerialTransport, stopped: threading.Event) -> Iterator[byte
             return
         else:
             time.sleep(_POLL_S)
-        *lines, said = said.split(b"\n") if _END not in said else [said]
+        output, end, error = said.partition(_END)
+        *lines, output = output.split(b"\n")
+        said = output + end + error
         for line in lines:
             yield line.strip()
     if asked_s is None:
-        last = said.replace(_END, b"").decode(errors="replace").strip().rpartition("\n")[2].strip()
+        last = said.split(_END)[1].decode(errors="replace").strip().rpartition("\n")[2].strip()
         raise _Silence(f"the board stopped by itself ({last or 'without a word'})")
