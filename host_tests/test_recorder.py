@@ -1,5 +1,7 @@
 """Recording on the simulated board: what is pulled from its flash replays as what its display showed."""
 
+from itertools import pairwise
+
 import devices
 import engines
 import pytest
@@ -50,21 +52,27 @@ def lean_matches(record, blocks, leans, slack_s=0.4):
     return compared
 
 
-@pytest.mark.parametrize("engine", engines.ENGINES)
-def test_a_recorded_ride_replays_as_the_display_showed(engine, tmp_path, monkeypatch):
-    """Recorded from power-on: one ride until the alignment, one with it; the power goes at the end."""
-    shown = []
+@pytest.fixture
+def computed(monkeypatch):
+    """Every lean that the firmware computes, on CPython."""
+    leans = []
     update = LeanMeter.update
 
     def noted(self, reading, dt_us):
         update(self, reading, dt_us)
-        shown.append(self.lean_deg)
+        leans.append(self.lean_deg)
 
+    monkeypatch.setattr(LeanMeter, "update", noted)
+    return leans
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_a_recorded_ride_replays_as_the_display_showed(engine, tmp_path, computed):
+    """Recorded from power-on: one ride until the alignment, one with it; the power goes at the end."""
     flash = tmp_path / "flash"
     flash.mkdir()
-    with monkeypatch.context() as patch:
-        patch.setattr(LeanMeter, "update", noted)
-        record = devices.run(engine, flash, {**ALIGNED, "seed": 2, "config": {"RECORD": True}})
+    record = devices.run(engine, flash, {**ALIGNED, "seed": 2, "config": {"RECORD": True}})
+    showed = list(computed)  # and not what the replay computes below
     found, problems = rides(flash)
     assert sorted(found) == [1, 2]
     assert problems == []
@@ -76,9 +84,30 @@ def test_a_recorded_ride_replays_as_the_display_showed(engine, tmp_path, monkeyp
     assert lean_matches(record, found[2], leans) > 50
     if engine == "cpython":
         before = sum(len(block.turns) for block in found[1])
-        exact = shown[before : before + len(leans)]
+        exact = showed[before : before + len(leans)]
         assert max(abs(a - b) for a, b in zip(exact, leans, strict=True)) < 0.01
     assert record.at(40)[0].endswith("*")
+
+
+def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
+    """It is set up again, the filter starts again, and the ride goes on in the same file."""
+    devices.run("cpython", tmp_path, ALIGNED)
+    plan = {
+        "ride": [["upright", 4.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 5.0], ["turn", 40.0, 5.0]],
+        "faults": [["supply_dip", [16.0]]],
+        "config": {"RECORD": True},
+        "until": 30,
+    }
+    computed.clear()
+    record = devices.run("cpython", tmp_path, plan)
+    exact = list(computed)
+    assert record.first("Sensor reset") < 18
+    found, problems = rides(tmp_path)
+    assert (list(found), problems) == ([1], [])
+    steps = [b.time_us - a.time_us for a, b in pairwise(t for block in found[1] for t in block.turns)]
+    assert [step > 500_000 for step in steps].count(True) == 1
+    leans = replayed(found[1], tmp_path)
+    assert max(abs(a - b) for a, b in zip(exact[: len(leans)], leans, strict=True)) < 0.01
 
 
 def test_the_menu_starts_and_ends_a_ride(tmp_path):
@@ -99,3 +128,4 @@ def test_the_menu_starts_and_ends_a_ride(tmp_path):
     assert list(found) == [1]
     seconds = (found[1][-1].turns[-1].time_us - found[1][0].time_us) / 1e6
     assert 20 < seconds < 25
+    assert lean_matches(record, found[1], replayed(found[1], tmp_path)) > 0
