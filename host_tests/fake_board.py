@@ -25,6 +25,7 @@ class FakeBoard(Transport):
         self.free_blocks = 300
         self.written: list[str] = []
         self.resets = 0
+        self.serial = Serial()
         self.closed = False
         self.on_write: Callable[[str, bytes], bytes] = lambda _path, data: data
         self.modules: dict[str, Any] = {
@@ -74,7 +75,11 @@ class FakeBoard(Transport):
         return eval(self.exec(f"print(repr({expression}))"))
 
     def exec_raw_no_follow(self, command: str) -> None:
-        self.resets += "machine.reset()" in command
+        if "machine.reset()" in command:
+            self.resets += 1
+            return
+        output, error = self.exec_raw(command)
+        self.serial.data += output + b"\x04" + error + b"\x04>"
 
     def close(self) -> None:
         self.closed = True
@@ -111,6 +116,25 @@ class FakeBoard(Transport):
         module = types.ModuleType("kickstand")
         exec(self.path("kickstand/__init__.py").read_text(), vars(module))
         return module
+
+
+class Serial:
+    """The port: data that waits to be read, and what was written."""
+
+    def __init__(self) -> None:
+        self.data = b""
+        self.written = b""
+
+    def inWaiting(self) -> int:
+        return len(self.data)
+
+    def read(self, count: int) -> bytes:
+        count = min(count, 700)
+        piece, self.data = self.data[:count], self.data[count:]
+        return piece
+
+    def write(self, data: bytes) -> None:
+        self.written += data
 
 
 class _Writer:

@@ -97,10 +97,10 @@ def test_a_recorded_ride_replays_as_it_was_shown(tmp_path):
         shown = set()
         device.board.at(3.0, samples.begin)
         lost = []
-        device.board.at(9.0, lambda: lost.append(samples.lost()))
-        for i in range(60):
+        device.board.at(6.5, lambda: lost.append(samples.lost()))
+        for i in range(35):
             device.board.at(3.0 + i / 10, lambda: shown.add(tuple(device.lcd())))
-        leans = ast.literal_eval(device.exec(_RUN.replace("SECONDS", "9"), 20.0))
+        leans = ast.literal_eval(device.exec(_RUN.replace("SECONDS", "7"), 20.0))
         found = rides(device.files())
     assert lost == [0]
     assert len(shown) > 15

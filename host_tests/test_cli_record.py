@@ -17,14 +17,14 @@ from kickstand_tools.logs import read_log
 from serial.tools import list_ports
 
 
-class Stream:
+class Stream(fake_board.Serial):
     """A serial port: what the board says, and what it does then. At the end: "ctrl-c", "error", "unplug", "silence"."""
 
     def __init__(self, blocks, end, last=b""):
+        super().__init__()
         self.last = last
         self.data = b"".join(_said(block) for block in blocks)
         self.end = end
-        self.written = b""
 
     def inWaiting(self):
         if not self.data and self.end:
@@ -37,15 +37,17 @@ class Stream:
                 raise OSError(5, "Input/output error")
         return len(self.data)
 
-    def read(self, count):
-        count = min(count, 700)
-        piece, self.data = self.data[:count], self.data[count:]
-        return piece
-
     def write(self, data):
-        self.written += data
+        super().write(data)
         if data == b"\x03":
             self.data += self.last + b"\x04\x04>"
+
+
+class Streaming(fake_board.FakeBoard):
+    """Its app runs until the stream ends."""
+
+    def exec_raw_no_follow(self, command):
+        self.resets += "machine.reset()" in command
 
 
 def _said(block):
@@ -59,8 +61,8 @@ def streaming(tmp_path, monkeypatch):
     """streaming(blocks, end): a board that streams them."""
 
     def fit(blocks, end, last=b""):
-        board = fake_board.FakeBoard(tmp_path)
-        vars(board)["serial"] = Stream(blocks, end, last)
+        board = Streaming(tmp_path)
+        board.serial = Stream(blocks, end, last)
         pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
         monkeypatch.setattr(list_ports, "comports", lambda: [pico])
         monkeypatch.setattr(deploy, "SerialTransport", lambda name, timeout: board)
@@ -80,7 +82,7 @@ def test_ctrl_c_ends_a_whole_log(streaming, tmp_path):
     board = streaming(data[:-1], "ctrl-c", _said(data[-1]))
     result = command.works("record", "--out", tmp_path / "ride.csv")
     assert result.err == ""
-    assert vars(board)["serial"].written == b"\x03"
+    assert board.serial.written == b"\x03"
     assert board.resets == 1
     log = read_log(tmp_path / "ride.csv")
     assert len(log.time_us) == len(turns)  # what the board said after Ctrl-C is in it
@@ -93,7 +95,7 @@ def test_ctrl_c_ends_a_whole_log(streaming, tmp_path):
 @pytest.mark.parametrize(
     ("end", "words"),
     [
-        ("error", "the board stopped by itself (ValueError: bad pin)"),
+        ("error", "the board reports ValueError: bad pin"),
         ("unplug", "connection lost (Input/output error)"),
         ("silence", "the board says nothing any more"),
     ],

@@ -9,12 +9,15 @@ from pathlib import Path
 from mpremote.transport_serial import SerialTransport
 
 from . import ride_log
+from .board_console import BrokenOff, lines
 from .deploy import connected, restart
 from .errors import InputError
 from .progress import Bar
 from .ride_blocks import CUT_SHORT, Block, read
 
 Print = Callable[[str], None]
+
+_SILENT_S = 10.0
 
 # Prints the directory and (name, bytes) of each part of a ride
 _LIST = """
@@ -120,15 +123,12 @@ def _pull_ride(
 
 def _read(transport: SerialTransport, path: str, bar: Bar) -> bytes:
     """A file of the board."""
-    moved = 0
-
-    def count(data: bytes) -> None:
-        nonlocal moved
-        bar.advance((moved + len(data)) * 3 // 4 - moved * 3 // 4)
-        moved += len(data)
-
-    text = transport.exec(_READ.replace("PATH", repr(path)), data_consumer=count)
+    content = b""
     try:
-        return b"".join(binascii.a2b_base64(line) for line in text.split())
-    except binascii.Error as error:
-        raise InputError(f"{path} came over damaged ({error}): try again, with another cable") from error
+        for line in lines(transport, _READ.replace("PATH", repr(path)), _SILENT_S):
+            piece = binascii.a2b_base64(line)
+            content += piece
+            bar.advance(len(piece))
+    except (BrokenOff, binascii.Error) as error:
+        raise InputError(f"{path} did not come over whole ({error}): try again, with another cable") from error
+    return content

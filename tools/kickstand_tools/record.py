@@ -6,16 +6,15 @@ import gzip
 import signal
 import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 from mpremote.transport_serial import SerialTransport
 from rich.console import Console
 from rich.live import Live
 
 from . import firmware_path, ride_log
+from .board_console import BrokenOff, lines
 from .calibration_file import CalibrationFile, write_calibration
 from .deploy import connected, restart
 from .errors import InputError, cause
@@ -28,11 +27,7 @@ from kickstand.meter import LeanMeter  # noqa: E402
 Print = Callable[[str], None]
 
 _START = "from kickstand import ride_stream\nride_stream.run()"
-_CTRL_C = b"\x03"
-_END = b"\x04"  # of the program's output
 _SILENT_S = 10.0  # a board without a sensor says nothing either
-_LAST_S = 2.0  # for what it still says after Ctrl-C
-_POLL_S = 0.01
 
 
 def record(port: str | None, out: Path, say: Print, warn: Print) -> None:
@@ -42,7 +37,6 @@ def record(port: str | None, out: Path, say: Print, warn: Print) -> None:
     check_output(out, [])
     with connected(port) as (transport, name):
         try:
-            transport.exec_raw_no_follow(_START)
             say(f"recording from {name}: Ctrl-C ends it")
             recorded = _Recording()
             notes: list[str] = []
@@ -56,10 +50,6 @@ def record(port: str | None, out: Path, say: Print, warn: Print) -> None:
         finally:
             with contextlib.suppress(Exception):  # the cable may be out
                 restart(transport)
-
-
-class _Silence(Exception):
-    """The board has ended the stream; the text says how."""
 
 
 class _Recording:
@@ -138,38 +128,12 @@ def _lines(transport: SerialTransport, name: str, notes: list[str]) -> Iterator[
     stopped = threading.Event()
     before = signal.signal(signal.SIGINT, lambda *_: stopped.set())
     try:
-        yield from _said(transport, stopped)
+        yield from lines(transport, _START, _SILENT_S, stopped)
+        if not stopped.is_set():
+            notes.append(f"{name}: the board stopped by itself: what came until then is kept")
     except OSError as error:
         notes.append(f"{name}: connection lost ({cause(error)}): what came until then is kept")
-    except _Silence as silence:
-        notes.append(f"{name}: {silence}: what came until then is kept")
+    except BrokenOff as error:
+        notes.append(f"{name}: {error}: what came until then is kept")
     finally:
         signal.signal(signal.SIGINT, before)
-
-
-def _said(transport: SerialTransport, stopped: threading.Event) -> Iterator[bytes]:
-    serial: Any = transport.serial
-    said = b""
-    asked_s = None
-    heard_s = time.monotonic()
-    while said.count(_END) < 2:  # the ends of its output and of its error
-        if stopped.is_set() and asked_s is None:
-            asked_s = time.monotonic()
-            serial.write(_CTRL_C)
-        if waiting := serial.inWaiting():
-            heard_s = time.monotonic()
-            said += serial.read(waiting)
-        elif time.monotonic() - heard_s > _SILENT_S:
-            raise _Silence("the board says nothing any more")
-        elif asked_s is not None and time.monotonic() - asked_s > _LAST_S:
-            return
-        else:
-            time.sleep(_POLL_S)
-        output, end, error = said.partition(_END)
-        *lines, output = output.split(b"\n")
-        said = output + end + error
-        for line in lines:
-            yield line.strip()
-    if asked_s is None:
-        last = said.split(_END)[1].decode(errors="replace").strip().rpartition("\n")[2].strip()
-        raise _Silence(f"the board stopped by itself ({last or 'without a word'})")
