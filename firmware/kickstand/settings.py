@@ -27,7 +27,12 @@ def _addresses(value):
     )
 
 
+def _or_none(check):
+    return lambda value: value is None or check[0](value), check[1]
+
+
 _PIN = _whole(0, 48)
+SD_PINS = ("SD_SCK", "SD_MOSI", "SD_MISO", "SD_CS")
 
 # name: default, (check, what is allowed)
 _TABLE = {
@@ -49,6 +54,12 @@ _TABLE = {
     "LCD_BUS_HZ": (100_000, _whole(100_000, 400_000)),
     "BUTTON_PIN": (port.BUTTON_PIN, _PIN),
     "WATCHDOG": (True, _one_of(True, False)),
+    "RECORD": (False, _one_of(True, False)),
+    "SD_SPI": (None, _or_none(_whole(0, 2))),
+    "SD_SCK": (None, _or_none(_PIN)),
+    "SD_MOSI": (None, _or_none(_PIN)),
+    "SD_MISO": (None, _or_none(_PIN)),
+    "SD_CS": (None, _or_none(_PIN)),
 }
 
 
@@ -90,10 +101,19 @@ class Settings:
         if self.one_bus:  # the display is a 100 kHz part, and sets the pace of a bus that it shares
             self.LCD_I2C = self.SENSOR_I2C
             self.SENSOR_BUS_HZ = self.LCD_BUS_HZ = min(self.SENSOR_BUS_HZ, self.LCD_BUS_HZ)
-        buses = {self.SENSOR_SDA, self.SENSOR_SCL, self.LCD_SDA, self.LCD_SCL}
-        if self.BUTTON_PIN in buses or len(buses) != (2 if self.one_bus else 4):
+        card = [getattr(self, name) for name in ("SD_SPI",) + SD_PINS]
+        if None in card and card != [None] * 5:
             raise SettingsError(
-                "config.py: a pin is used twice among BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL",
+                "config.py: an SD card needs all of SD_SPI, %s" % ", ".join(SD_PINS),
+                "config.py: wrong",
+                SD_PINS[card.index(None) - 1] if card[0] is not None else "SD_SPI",
+            )
+        pins = [self.BUTTON_PIN, self.SENSOR_SDA, self.SENSOR_SCL]
+        pins += [] if self.one_bus else [self.LCD_SDA, self.LCD_SCL]
+        pins += [pin for pin in card[1:] if pin is not None]
+        if len(set(pins)) != len(pins):
+            raise SettingsError(
+                "config.py: a pin is used twice among BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL, SD_*",
                 "config.py: wrong",
                 "pin used twice",
             )

@@ -18,7 +18,8 @@ VERSION = 1
 _HEAD = "<4sHHI"  # magic, version, length of the whole record, sequence
 _BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, aligned; offset, slope, gyro bias, matrix, trim
 _MAGIC = b"KSTD"
-_LENGTH = struct.calcsize(_HEAD) + struct.calcsize(_BODY) + 4
+BODY_LENGTH = struct.calcsize(_BODY)
+_LENGTH = struct.calcsize(_HEAD) + BODY_LENGTH + 4
 MAX_BIAS_DPS = 60.0
 MAX_TRIM_DEG = 3.0
 
@@ -103,19 +104,7 @@ class Store:
         return self._directory + "/" + name if self._directory else name
 
     def _pack(self, calibration, sequence):
-        body = struct.pack(
-            _BODY,
-            self._chip[0],
-            self._chip[1],
-            calibration.six_done,
-            calibration.aligned,
-            *list(calibration.accel_offset),
-            *list(calibration.accel_slope),
-            *list(calibration.gyro_bias),
-            *list(calibration.vehicle_from_sensor),
-            calibration.trim_deg,
-        )
-        record = struct.pack(_HEAD, _MAGIC, VERSION, _LENGTH, sequence) + body
+        record = struct.pack(_HEAD, _MAGIC, VERSION, _LENGTH, sequence) + pack(*self._chip, calibration)
         return record + struct.pack("<I", crc32(record))
 
     def _unpack(self, record):
@@ -127,21 +116,43 @@ class Store:
             return 0, None, "damaged"
         if magic != _MAGIC or version != VERSION or length != _LENGTH or sequence == 0:
             return 0, None, "of another version"
-        fields = struct.unpack_from(_BODY, record, struct.calcsize(_HEAD))
-        if fields[0:2] != self._chip:
+        who_am_i, accel_range_g, calibration = unpack(record, struct.calcsize(_HEAD))
+        if (who_am_i, accel_range_g) != self._chip:
             return 0, None, "of another sensor or range"
-        calibration = Calibration()
-        calibration.six_done, calibration.aligned = bool(fields[2]), bool(fields[3])
-        values = fields[4:]
-        calibration.set_accel(values[0:3], values[3:6])
-        for i in range(3):
-            calibration.gyro_bias[i] = values[6 + i]
-        for i in range(9):
-            calibration.vehicle_from_sensor[i] = values[9 + i]
-        calibration.trim_deg = values[18]
         if not plausible(calibration):
             return 0, None, "out of range"
         return sequence, calibration, None
+
+
+def pack(who_am_i, accel_range_g, calibration):
+    """BODY_LENGTH bytes: a calibration and the chip it belongs to."""
+    return struct.pack(
+        _BODY,
+        who_am_i,
+        accel_range_g,
+        calibration.six_done,
+        calibration.aligned,
+        *list(calibration.accel_offset),
+        *list(calibration.accel_slope),
+        *list(calibration.gyro_bias),
+        *list(calibration.vehicle_from_sensor),
+        calibration.trim_deg,
+    )
+
+
+def unpack(data, at):
+    """(who_am_i, accel_range_g, Calibration) from pack()'s bytes at a place in data."""
+    fields = struct.unpack_from(_BODY, data, at)
+    calibration = Calibration()
+    calibration.six_done, calibration.aligned = bool(fields[2]), bool(fields[3])
+    values = fields[4:]
+    calibration.set_accel(values[0:3], values[3:6])
+    for i in range(3):
+        calibration.gyro_bias[i] = values[6 + i]
+    for i in range(9):
+        calibration.vehicle_from_sensor[i] = values[9 + i]
+    calibration.trim_deg = values[18]
+    return fields[0], fields[1], calibration
 
 
 def plausible(calibration):
