@@ -7,7 +7,8 @@ import json
 import sys
 from array import array
 
-from kickstand import alignment, frames, lean, rotation, six_position
+import driving_runs
+from kickstand import alignment, dispersion, frames, lean, rodrigues, rotation, six_position
 from kickstand.calibration import Calibration
 from kickstand.capture import Capture
 from kickstand.errors import Refusal
@@ -101,7 +102,18 @@ def meter(matrix, readings, dt_us):
     return out
 
 
+def circular_dispersion(directions):
+    spread = dispersion.CircularDispersion()
+    for x, y in directions:
+        spread.add(x, y, (x * x + y * y) ** 0.5)
+    return spread.value()
+
+
 CALLS = {
+    "dispersion": circular_dispersion,
+    "drive": driving_runs.drive,
+    "regression": driving_runs.regression,
+    "rotation_between": lambda a, b, axis: _into(9, rodrigues.rotation_between, a, b, axis),
     "cross": lambda a, b: _into(3, rotation.cross, a, b),
     "rotate": lambda m, a: _into(3, rotation.rotate, matrix_of(m), a),
     "rotate_back": lambda m, a: _into(3, rotation.rotate_back, matrix_of(m), a),

@@ -45,7 +45,7 @@ def six(paths: list[Path], say: Print) -> CalibrationFile:
         raise InputError(
             f"{len(paths)} captures given: six are needed, one for each side up, or seven with a free pose"
         )
-    _refuse_same_file(paths)
+    refuse_same_file(paths)
     captures = [read_pose(path) for path in paths]
     by_side, free = _sides(paths, captures)
     poses = [_accel(captures[k]) for k in by_side]
@@ -85,7 +85,7 @@ def two(
 
     side: where the kickstand leans the bike to, "left" or "right". Raises InputError.
     """
-    _refuse_same_file([kickstand, upright])
+    refuse_same_file([kickstand, upright])
     result = before or CalibrationFile()
     calibration = result.to_firmware()
     first, second = read_pose(kickstand), read_pose(upright)
@@ -152,11 +152,12 @@ def _with_file(reason: str, by_side: list[int], free: int | None, paths: list[Pa
     return f"{paths[free]}: {reason}" if free is not None and "free pose" in reason else reason
 
 
-def _refuse_same_file(paths: list[Path]) -> None:
+def refuse_same_file(paths: list[Path]) -> None:
+    """Raise InputError if a file is given twice."""
     seen: dict[Path, Path] = {}
     for path in paths:
         if path.resolve() in seen:
-            raise InputError(f"{path} is given twice: each pose is a capture of its own")
+            raise InputError(f"{path} is given twice: each one has to be a recording of its own")
         seen[path.resolve()] = path
 
 

@@ -25,8 +25,8 @@ class CalibrationFile:
     """The parameters of one mounted sensor: calibrated = slope * reading + offset, Nicolae's (18)-(20).
 
     offset (3, g), slope (3), bias (3, deg/s), matrix (9, row-major, rows left, up, forward).
-    aligned: the matrix was measured, not left as it was.  notes: what else stands in the file.  trim: degrees that
-    the upright of the alignment was found to be off.
+    aligned: the matrix was measured, not left as it was.  vehicle: "car" or "motorcycle" if it was measured by driving,
+    else "".  notes: what else stands in the file.  trim: degrees that the upright of the alignment was found to be off.
     """
 
     offset: list[float] = field(default_factory=lambda: [0.0] * 3)
@@ -37,6 +37,7 @@ class CalibrationFile:
     six_done: bool = False
     notes: dict[str, Any] = field(default_factory=dict)
     trim: float = 0.0
+    vehicle: str = ""
 
     def to_firmware(self) -> Calibration:
         """The same as the firmware's own object, for readings in g and deg/s."""
@@ -83,6 +84,7 @@ def read_calibration(path: Path) -> CalibrationFile:
     _check_ranges(path, calibration)
     calibration.aligned = data.get("aligned", matrix != _IDENTITY) is True
     neutral = calibration.offset == [0.0] * 3 and calibration.slope == [1.0] * 3
+    calibration.vehicle = data["vehicle"] if data.get("vehicle") in ("car", "motorcycle") else ""
     calibration.six_done = data.get("six_positions", not neutral) is True
     return calibration
 
@@ -100,6 +102,8 @@ def write_calibration(path: Path, calibration: CalibrationFile) -> None:
         "aligned": calibration.aligned,
         "trim_deg": _rounded(calibration.trim),
     }
+    if calibration.vehicle:
+        data["vehicle"] = calibration.vehicle
     text = json.dumps(data | calibration.notes, indent=2) + "\n"
 
     def write(temporary: Path) -> None:

@@ -66,7 +66,7 @@ def record(port: str | None, out: Path) -> None:
 
 @kickstand.group(no_args_is_help=False)
 def calibrate() -> None:
-    """Compute a calibration from recorded poses."""
+    """Compute a calibration from recorded poses or drives."""
 
 
 @calibrate.command()
@@ -103,6 +103,29 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
     check_output(out, [kickstand, upright])
     before = read_calibration(calibration) if calibration else None
     write_calibration(out, calibrate.two(kickstand, upright, before, side, click.echo))
+    click.echo(f"written: {out}")
+
+
+@calibrate.command()
+@click.argument("logs", nargs=-1, required=True, type=_PATH, metavar="LOG.csv...")
+@click.option("--calibration", type=_PATH, help="What is known already: six positions, and a motorcycle's two poses.")
+@click.option(
+    "--vehicle",
+    type=click.Choice(["motorcycle", "car"]),
+    help="motorcycle if the calibration has two poses, else car, if not given.",
+)
+@click.option("--method", type=click.Choice(["improved", "published"]), default="improved")
+@_OUT
+def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None, method: str, out: Path) -> None:
+    """How the sensor sits on the vehicle, from logs of driving with speed: stops and straight brakings."""
+    from . import calibrate, calibrate_drive
+    from .calibration_file import read_calibration, write_calibration
+    from .output import check_output
+
+    check_output(out, list(logs))
+    calibrate.refuse_same_file(list(logs))
+    before = read_calibration(calibration) if calibration else None
+    write_calibration(out, calibrate_drive.drive(list(logs), before, vehicle, method, click.echo))
     click.echo(f"written: {out}")
 
 

@@ -1,0 +1,49 @@
+"""How much a set of directions in a plane spreads: circular dispersion (N. I. Fisher, 1993, section 2.3).
+
+    d = (1 - rho2) / (2 R^2),  R = |mean of e^(i a)|,  rho2 = the mean cosine of 2 (a - mean direction)
+
+About the variance in rad^2: 0.02 is 8 degrees, 0.005 is 4. Running sums: no second pass for rho2.
+"""
+
+NONE = 9.9  # of no direction at all; four directions at right angles have no mean: more than this
+
+
+class CircularDispersion:
+    """Directions of plane vectors, each counting the same whatever its length."""
+
+    def __init__(self):
+        self.clear()
+
+    def clear(self):
+        """Forget all."""
+        self.count = 0
+        self._cos = self._sin = self._cos2 = self._sin2 = 0.0
+
+    def add(self, x, y, length):
+        """A direction: the vector (x, y), whose length > 0 is known already."""
+        c, s = x / length, y / length
+        self.count += 1
+        self._cos += c
+        self._sin += s
+        self._cos2 += c * c - s * s
+        self._sin2 += 2.0 * c * s
+
+    def join(self, other):
+        """Take over the directions of another one."""
+        self.count += other.count
+        self._cos += other._cos
+        self._sin += other._sin
+        self._cos2 += other._cos2
+        self._sin2 += other._sin2
+
+    def value(self):
+        """d, at most NONE."""
+        r2 = self._cos * self._cos + self._sin * self._sin  # (count R)^2
+        n = self.count
+        if r2 <= 1e-6 * n * n:
+            return NONE
+        # cos 2(a - m) = cos 2a cos 2m + sin 2a sin 2m, and e^(2im) = (C + iS)^2 / r2
+        cos2m = (self._cos * self._cos - self._sin * self._sin) / r2
+        sin2m = 2.0 * self._cos * self._sin / r2
+        rho2 = (self._cos2 * cos2m + self._sin2 * sin2m) / n
+        return min(NONE, max(0.0, (1.0 - rho2) * n * n / (2.0 * r2)))

@@ -1,0 +1,49 @@
+"""Is the speed a speed? What can be seen of it without knowing where forward is."""
+
+from math import sqrt
+
+from .errors import AlignmentError
+
+NEGATIVE_MPS = -0.5  # noise around zero is not negative
+LIVELY_G = 0.03  # between the means of two seconds: standing never, driving most of the time
+STUCK_S = 15  # so many lively seconds at the very same speed, and
+STUCK_SHARE = 0.25  # this share of all the seconds it lasted
+
+
+class SpeedCheck:
+    """problem: an AlignmentError, or None."""
+
+    def __init__(self):
+        self.problem = None
+        self._speed = None
+        self._changed()
+        self._before = None
+
+    def _changed(self):
+        self._seconds = self._lively = 0
+
+    def measure(self, speed_mps):
+        """A new value."""
+        if not speed_mps >= NEGATIVE_MPS:  # also not-a-number
+            self.problem = AlignmentError(
+                "the speed is %.1f m/s: it must not be negative" % speed_mps, "Speed negative", "Check its source"
+            )
+        if speed_mps != self._speed:
+            self._speed = speed_mps
+            self._changed()
+
+    def second(self, force):
+        """Mean force (3, g) of the last second."""
+        before, self._before = self._before, list(force)
+        if before is None or self._speed is None:
+            return
+        d0, d1, d2 = force[0] - before[0], force[1] - before[1], force[2] - before[2]
+        self._seconds += 1
+        if sqrt(d0 * d0 + d1 * d1 + d2 * d2) > LIVELY_G:
+            self._lively += 1
+        if self._lively >= STUCK_S and self._lively >= STUCK_SHARE * self._seconds:
+            self.problem = AlignmentError(
+                "the speed is stuck at %.1f m/s while the vehicle speeds up and brakes" % self._speed,
+                "Speed stuck at",
+                "%.1f m/s" % self._speed,
+            )

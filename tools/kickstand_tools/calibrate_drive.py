@@ -1,0 +1,131 @@
+"""Alignment from recorded drives, by the firmware's own module."""
+
+from array import array
+from collections.abc import Callable
+from pathlib import Path
+
+from . import firmware_path
+from .calibration_file import CalibrationFile
+from .errors import InputError
+from .logs import Log, read_log
+from .progress import Bar
+
+firmware_path.add_to_path()
+from kickstand import driving_check  # noqa: E402
+from kickstand.driving import CAR, MOTORCYCLE, DriveAlignment  # noqa: E402
+from kickstand.driving_published import PublishedAlignment  # noqa: E402
+from kickstand.errors import AlignmentError  # noqa: E402
+
+METHODS = {"improved": DriveAlignment, "published": PublishedAlignment}
+VEHICLES = (MOTORCYCLE, CAR)
+_BETWEEN_US = 3_600_000_000  # logs do not join
+_SLOWEST_US = 50_000  # between samples
+_CHUNK = 1000
+
+Print = Callable[[str], None]
+
+
+def drive(
+    paths: list[Path], before: CalibrationFile | None, vehicle: str | None, method: str, say: Print
+) -> CalibrationFile:
+    """Matrix and gyro bias from logs of one mount, with speed; offset and slope as before. Raises InputError.
+
+    vehicle: if None, a motorcycle where before is aligned by two poses, else a car. say: called with each line of the
+    summary.
+    """
+    result = before or CalibrationFile()
+    poses = result.aligned and result.vehicle != CAR
+    kind = vehicle or (MOTORCYCLE if poses else CAR)
+    up = result.matrix[3:6] if kind == MOTORCYCLE and poses else None
+    logs = [_read(path) for path in paths]
+    names = ", ".join(str(path) for path in paths)
+    # the gyro's bias is found at a stop: a first pass looks for one, so that what came before it counts too
+    scout = DriveAlignment(kind, up, [0.0] * 3)
+    with Bar("looking for stops", sum(len(log.time_us) for log in logs)) as bar:
+        _feed(scout, logs, result, bar, lambda seconds: None)
+    known = scout.standing.stops or before is not None
+    alignment = METHODS[method](kind, up, list(scout.standing.bias) if known else None)
+    events = _Events(alignment, say)
+    with Bar("driving", sum(len(log.time_us) for log in logs)) as bar:
+        _feed(alignment, logs, result, bar, events.look)
+    matrix = array("f", [0.0] * 9)
+    try:
+        alignment.matrix(matrix)
+    except AlignmentError as error:
+        raise InputError(f"{names}: {error.reason}") from error
+    bias = [a + b for a, b in zip(result.bias, alignment.standing.bias, strict=True)]
+    say(f"{kind}, method {method}: {alignment.counted} used, {alignment.turned} in turns not used")
+    say(f"stops: {alignment.standing.stops}")
+    say(f"quality: {alignment.quality_deg:.1f} degrees about the vertical; ready after {events.ready_s:.0f} s")
+    if isinstance(alignment, DriveAlignment):
+        say(f"speed: {alignment.lag_s:.1f} s late; its halves differ by {alignment.halves_deg:.1f} degrees")
+        if up is not None:
+            _compare(alignment, result.matrix, say)
+    for name, row in (("left", 0), ("up", 3), ("forward", 6)):
+        x, y, z = matrix[row : row + 3]
+        say(f"{name:<10} x {x:+.4f}  y {y:+.4f}  z {z:+.4f}")
+    if not result.six_done:
+        say("warning: no six-position calibration: an offset of 50 mg tilts the vertical by 3 degrees")
+    return CalibrationFile(
+        result.offset, result.slope, bias, list(matrix), True, result.six_done, result.notes, vehicle=kind
+    )
+
+
+def _read(path: Path) -> Log:
+    log = read_log(path)
+    if all(speed is None for speed in log.speed_mps):
+        raise InputError(f"{path}: no speed: record a column speed_mps, from a GPS or a wheel")
+    step_us = log.time_us[-1] / (len(log.time_us) - 1)
+    if step_us > _SLOWEST_US:
+        raise InputError(f"{path}: a sample every {step_us / 1e6:.2f} s: at least 20 a second are needed")
+    return log
+
+
+def _feed(alignment, logs: list[Log], result: CalibrationFile, bar: Bar, look: Callable[[float], None]) -> None:
+    """Run the logs through an alignment; look is called with the seconds so far after each sample."""
+    calibration = result.to_firmware()
+    force, rate = [0.0] * 3, [0.0] * 3
+    elapsed = 0.0
+    for log in logs:
+        previous = -_BETWEEN_US if log is not logs[0] else 0
+        for i, (now, reading, speed) in enumerate(zip(log.time_us, log.readings, log.speed_mps, strict=True)):
+            calibration.apply(reading, force, rate)
+            alignment.update(force, rate, now - previous)
+            previous = now
+            if speed is not None:
+                alignment.measure_speed(speed)
+            look(elapsed + now / 1e6)
+            if i % _CHUNK == 0:
+                bar.advance(min(_CHUNK, len(log.time_us) - i))
+        elapsed += log.time_us[-1] / 1e6
+
+
+class _Events:
+    """Says what was used and what was not, as it happens."""
+
+    def __init__(self, alignment, say: Print) -> None:
+        self._alignment, self._say = alignment, say
+        self._before = (0, 0)
+        self.ready_s = 0.0
+
+    def look(self, seconds: float) -> None:
+        alignment = self._alignment
+        now = alignment.counted, alignment.turned
+        if now[0] > self._before[0]:
+            self._say(f"{seconds:7.1f} s  straight: used, {now[0]}")
+        elif now[1] > self._before[1]:
+            self._say(f"{seconds:7.1f} s  turning: not counted")
+        self._before = now
+        if not self.ready_s and alignment.ready:
+            self.ready_s = seconds
+
+
+def _compare(alignment: DriveAlignment, matrix: list[float], say: Print) -> None:
+    yaw = driving_check.yaw_deg(alignment.fit, matrix)
+    found = driving_check.compare(alignment, matrix)
+    if found == driving_check.REVERSED:
+        say("warning: the two poses had forward and backward exchanged: the kickstand is on the other side")
+    elif found == driving_check.MOVED:
+        say(f"warning: the mount is {abs(yaw):.0f} degrees from where the two poses saw it: was it moved since?")
+    else:
+        say(f"the two poses had forward {abs(yaw):.1f} degrees off")
