@@ -23,6 +23,16 @@
 # LCD_ADDRESSES = (0x27, 0x3F)
 # BUTTON_PIN = 15           # (4) between the pin and ground
 
+# Speed source and vehicle, to align by driving: a car, bus or trailer needs a source, a motorcycle may have one
+# VEHICLE = "motorcycle"    # or "car": anything that does not lean
+# SPEED = None              # or "gps": a receiver that sends NMEA; "wheel": a contact that closes as a wheel turns
+# GPS_UART = 1              # (2)
+# GPS_RX = 9                # (16) to the receiver's TX
+# GPS_TX = 8                # (17) stays open, but belongs to the UART
+# GPS_BAUD = 9600           # as the receiver sends
+# WHEEL_PIN = 14            # (27) reed contact or open-collector switch between the pin and ground
+# PULSES_PER_METRE = 0.5    # one magnet on a wheel of 2 m circumference: 0.5
+
 # Restart by itself when the program hangs
 # WATCHDOG = True
 

@@ -49,24 +49,42 @@ def poses_of(seed, steps):
     return world
 
 
+def remounted(world, motion, seed, at_s, mounting_seed):
+    """world(t_s) of a part that comes off and is stuck on at another angle."""
+    part = sensor_errors.Sensor(seed=seed)
+    part.vehicle_from_sensor = sensor_errors.random_mounting(mounting_seed)
+    later = part.world(motion)
+    return lambda t_s: world(t_s) if t_s < at_s else later(t_s)
+
+
 def run_device(plan):
     """Run it; returns frames [[t_s, line1, line2], ...] as they changed, how each boot ended, and what the
     LCD says last.
 
     plan: "until" (s); "lean" as for standing(), or "ride" [[name of a function in rides, arguments...], ...],
     or "poses" as for poses_of; "seed" of the part (None: perfect); "presses" [[at_s, for_s], ...]; "faults"
-    [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...].
+    [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...]; "gps" or "wheel"
+    arguments of the models, which are told the speed of the ride; config "VEHICLE" "car": the ride is a car's;
+    "remount" [at_s, seed of the mounting from then on].
     """
     seed = plan.get("seed")
+    ride = None
     if "poses" in plan:
         world = poses_of(seed, plan["poses"])
     else:
         if "ride" in plan:
-            motion = rides.Ride([getattr(rides, name)(*more) for name, *more in plan["ride"]]).motion
+            kind = rides.CarRide if plan.get("config", {}).get("VEHICLE") == "car" else rides.Ride
+            ride = kind([getattr(rides, name)(*more) for name, *more in plan["ride"]])
+            motion = ride.motion
         else:
             motion = standing(plan.get("lean", [[0, 0]]))
         world = sensor_errors.Sensor(seed=seed).world(motion)
+        if "remount" in plan:
+            world = remounted(world, motion, seed, *plan["remount"])
     board = Board(world, **plan.get("board", {}))
+    for source in ("gps", "wheel"):
+        if ride and source in plan:
+            getattr(board, "fit_" + source)(lambda t_s, ride=ride: ride.truth(t_s)[1], **plan[source])
     for at_s, for_s in plan.get("presses", []):
         board.press(at_s, for_s)
     for method, arguments in plan.get("faults", []):

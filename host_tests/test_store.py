@@ -50,6 +50,18 @@ def test_what_is_saved_is_loaded(store):
         assert store.message == f"record {mark}"
 
 
+def test_how_it_was_aligned_is_kept_and_records_of_before_are_read(store, tmp_path):
+    new = calibration(1)
+    new.by_drive = True
+    store.save(new)
+    loaded = store.load()
+    assert loaded.aligned and loaded.by_drive
+    store.save(calibration(2))
+    assert newest_file(tmp_path, store).read_bytes()[15] == 1  # as the first release wrote it
+    loaded = store.load()
+    assert loaded.aligned and not loaded.by_drive
+
+
 @pytest.mark.parametrize("saved_before", [0, 1, 2, 3])
 def test_power_cut_at_every_byte_of_a_save(store, tmp_path, saved_before):
     for mark in range(1, saved_before + 1):

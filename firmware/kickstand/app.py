@@ -12,6 +12,7 @@ from machine import Pin
 from . import bus, port
 from .button import Button
 from .calibration import Calibration
+from .drive_mode import DriveMode
 from .errors import SettingsError, StoreError
 from .hd44780 import Lcd
 from .meter import LeanMeter
@@ -21,6 +22,7 @@ from .ride_ring import RideRing
 from .sample_clock import SampleClock
 from .screen import Screen
 from .sensor import Sensor
+from .speed import open_speed
 from .store import Store
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
@@ -84,12 +86,14 @@ class App:
         self.button = open_button(settings)
         self.sensor = open_sensor(settings)
         self.store = None  # until the chip has said who it is: a calibration belongs to one chip
-        self.meter = LeanMeter(Calibration())
+        self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle")
+        speed = open_speed(settings)
+        self.drive = DriveMode(settings.VEHICLE, speed, self.meter, self._keep) if speed else None
         self._clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self._restarts = 0
         self.recorder = Recorder(keeper or RideRing(settings), settings.SAMPLE_HZ)
         self._record_due = settings.RECORD or keeper is not None
-        self.screen = Screen(settings, self.sensor, self.meter, self._save, self.recorder, self._record)
+        self.screen = Screen(settings, self.sensor, self.meter, self.drive, self._save, self.recorder, self._record)
         self._page_ms = ticks_ms()
         self._trim_ms = self._page_ms
         self._fault_shown = False
@@ -127,6 +131,10 @@ class App:
         n = self.sensor.fetch(now_ms)
         if n:
             self._take(n, now_us, now_ms)
+        if self.drive:
+            speed = self.drive.poll(now_ms)
+            if speed is not None and self.recorder.active:
+                self.recorder.add_speed(int(100 * speed))
         self.sensor.check(now_ms)
         if self.sensor.fault is not None:
             self._clock.restart()
@@ -183,6 +191,8 @@ class App:
         self.meter.update(chip.sums, dt_us, n)
         if self.recorder.active:
             self.recorder.add(chip.sums, n, dt_us)
+        if self.drive:
+            self.drive.feed(chip.sums, n, dt_us, now_ms)
         if wizard:
             for k in range(n):
                 chip.take(k)
@@ -201,10 +211,16 @@ class App:
                 self._record()
 
     def _use(self, calibration):
+        """From flash or from a wizard: nothing of before counts."""
+        self._set(calibration)
+        self.meter.reset_maxima()
+        if self.drive:
+            self.drive.begin()
+
+    def _set(self, calibration):
         chip = self.sensor.chip
         calibration.set_scale(chip.accel_lsb_per_g, chip.gyro_lsb_per_dps)
         self.meter.use(calibration)
-        self.meter.reset_maxima()
         if self.recorder.active:  # a ride has one calibration
             self.recorder.start(chip, calibration)
 
@@ -212,3 +228,8 @@ class App:
         """For the wizards: on flash first, then in use. Raises StoreError."""
         self.store.save(calibration)
         self._use(calibration)
+
+    def _keep(self, calibration):
+        """For alignment by driving, which goes on. Raises StoreError."""
+        self.store.save(calibration)
+        self._set(calibration)

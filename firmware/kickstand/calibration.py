@@ -23,6 +23,7 @@ class Calibration:
         self.trim_deg = 0.0
         self.six_done = False
         self.aligned = False
+        self.by_drive = False  # aligned, or its alignment refined, by driving
         self._scale = vector()
         self._gyro_scale = 1.0
         self._accel_lsb = 1.0

@@ -17,13 +17,14 @@ FALLEN_US = 1_000_000
 
 
 class LeanMeter:
-    """Lean and acceleration of the vehicle.
+    """Lean and acceleration of the vehicle. leans: False for a car, whose lean stays 0.
 
     After update(): force (left, up, forward in g), rate (about them in rad/s), lean_deg (the filter's, > 0
     right), smooth_force (g, for display; of an aligned one forward alone), fallen, and the maxima since reset_maxima().
     """
 
-    def __init__(self, calibration):
+    def __init__(self, calibration, leans=True):
+        self._leans = leans
         # lists: on a board reading an array's element takes heap, reading a list's does not
         self.force = [0.0] * 3
         self.rate = [0.0] * 3
@@ -58,6 +59,8 @@ class LeanMeter:
     @property
     def trusted(self):
         """True while lean_deg is certain enough to be shown."""
+        if not self._leans:
+            return True
         return self.filter.variance <= MAX_VARIANCE and abs(self.filter.pitch_deg) < WHEELIE_DEG
 
     def keep_trim(self):
@@ -106,10 +109,10 @@ class LeanMeter:
         self._fresh = False
         smooth = self.smooth_force
         smooth[2] += gain * (force[2] - smooth[2])
-        if not self.calibration.aligned:  # then the other two are shown as well
+        if not (self.calibration.aligned and self._leans):  # then the other two are shown as well
             smooth[0] += gain * (force[0] - smooth[0])
             smooth[1] += gain * (force[1] - smooth[1])
-        self.lean_deg = lean = self.filter.update(force, self.rate, dt_us)
+        self.lean_deg = lean = self.filter.update(force, self.rate, dt_us) if self._leans else 0.0
         if -FALLEN_DEG < lean < FALLEN_DEG:
             self._flat_us = 0
             self.fallen = False

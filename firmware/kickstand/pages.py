@@ -84,6 +84,15 @@ def acceleration(meter):
     return "%s   %5.2f g" % (word, abs(forward)), "pk +%.2f / -%.2f" % (meter.max_accel_g, meter.max_brake_g)
 
 
+def cornering(meter):
+    """Lateral and vertical g of a car."""
+    left = meter.smooth_force[0]
+    return (
+        "%-5s   %5.2f g" % ("Left" if left > 0.005 else "Right", abs(left)),
+        "Up      %5.2f g" % meter.smooth_force[1],
+    )
+
+
 def formula(meter):
     """Nicolae's formula as it stands, beside the filter's lean: why there is a filter."""
     return (
@@ -102,10 +111,10 @@ def raw(meter):
     )
 
 
-def not_aligned(meter, seconds):
+def not_aligned(meter, seconds, todo="On stand: press"):
     """Before alignment (the paper's figure 3): tilt and g of the sensor's axes, which are not the bike's."""
     tilt = static_lean_deg(meter.smooth_force)
-    hint = "Not aligned" if seconds % 4 < 2 else "On stand: press"
+    hint = "Not aligned" if seconds % 4 < 2 else todo
     return "Raw %4d%s %+.2fg" % (round(tilt), DEGREE, meter.smooth_force[2]), hint
 
 

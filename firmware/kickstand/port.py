@@ -1,5 +1,5 @@
-"""What differs between the boards: default pins, and how a started watchdog is put to rest. Nothing else
-knows the port."""
+"""What differs between the boards: default pins, kind of interrupt, and how a started watchdog is put to rest.
+Nothing else knows the port."""
 
 import sys
 
@@ -9,8 +9,12 @@ IS_ESP32 = sys.platform == "esp32"
 
 if IS_ESP32:
     SENSOR_PINS, LCD_PINS, BUTTON_PIN = (21, 22), (18, 19), 4  # (SDA, SCL)
+    GPS_UART, GPS_PINS, WHEEL_PIN = 2, (17, 16), 27  # (TX, RX)
+    PIN_IRQ = {}  # always soft
 else:  # Raspberry Pi Pico and Pico 2
     SENSOR_PINS, LCD_PINS, BUTTON_PIN = (4, 5), (6, 7), 15
+    GPS_UART, GPS_PINS, WHEEL_PIN = 1, (8, 9), 14
+    PIN_IRQ = {"hard": True}  # a soft one is lost while the display is written to
 
 _WATCHDOG_MS = 8000  # rp2 allows 8388 at most
 _HOUR_MS = 3_600_000

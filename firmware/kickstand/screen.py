@@ -5,7 +5,7 @@ from time import ticks_add, ticks_diff
 from . import pages
 from .align_wizard import AlignWizard
 from .button import LONG, SHORT
-from .menu import ALIGN, INFO, RECORD, RESET, SIX, Menu
+from .menu import ALIGN, DRIVE, INFO, LEAVE, RECORD, RESET, SIX, STOP, Menu
 from .meter import FALLEN_DEG
 from .mpu6050 import SATURATED
 from .six_wizard import SixWizard
@@ -14,22 +14,28 @@ NOTICE_MS = 2000
 
 
 class Screen:
-    """settings: a Settings.  sensor: a Sensor.  meter: a LeanMeter.  save: for the wizards, called with a new
-    Calibration, raises StoreError.  recorder: a Recorder.  record: called to begin a ride.
+    """settings: a Settings.  sensor: a Sensor.  meter: a LeanMeter.  drive: a DriveMode, None without a speed source.
+    save: for the wizards, called with a new Calibration, raises StoreError.  recorder: a Recorder.  record: called to
+    begin a ride.
 
     wizard: the one under way, which wants every sample, or None.
     """
 
-    def __init__(self, settings, sensor, meter, save, recorder, record):
+    def __init__(self, settings, sensor, meter, drive, save, recorder, record):
         self.settings = settings
         self.sensor = sensor
         self.meter = meter
+        self.drive = drive
         self._save = save
         self._recorder = recorder
         self._record = record
         self.wizard = None
         self._page = 0
         self._pages = (pages.lean, pages.maxima, pages.acceleration, pages.formula, pages.raw)
+        self._entries = (ALIGN, SIX, RESET, INFO) + ((DRIVE,) if drive else ())
+        if settings.VEHICLE == "car":
+            self._pages = (pages.acceleration, pages.cornering, pages.raw)
+            self._entries = (DRIVE, SIX, RESET, INFO)
         self._menu = None
         self._info = False
         self._notice = None
@@ -52,18 +58,25 @@ class Screen:
             if self._menu.chosen is not None:
                 self._choose(self._menu.chosen, now_ms)
                 self._menu = None
+        elif event and self.drive and self.drive.message:
+            self.drive.answer(event)
         elif event == LONG:
-            self._menu = Menu(now_ms, self._recorder.active)
+            self._menu = Menu(self._entries + (STOP if self._recorder.active else RECORD, LEAVE), now_ms)
         elif event == SHORT:
             self._turn_page()
 
     def _turn_page(self):
         if self._info:
             self._info = False
-        elif self.meter.calibration.aligned:
-            self._page = (self._page + 1) % (len(self._pages) + self._recorder.active)
+        elif self._driving or self.meter.calibration.aligned:
+            self._page += 1
         elif self.sensor.fault is None:
             self._align(pressed=True)
+
+    @property
+    def _driving(self):
+        """True while what alignment by driving waits for is a page, the first until there is an alignment."""
+        return self.drive is not None and self.drive.shown
 
     def _align(self, pressed):
         self._page = 0
@@ -83,16 +96,18 @@ class Screen:
             self._notify(("Maxima reset", ""), now_ms)
         elif entry == INFO:
             self._info = True
-        elif entry == RECORD and self._recorder.active:
+        elif entry == STOP:
             self._recorder.stop()
             self._notify(("Recording ended", ""), now_ms)
-        elif self.sensor.fault is not None and entry in (ALIGN, SIX, RECORD):
+        elif self.sensor.fault is not None and entry in (ALIGN, SIX, DRIVE, RECORD):
             self._notify(self.sensor.fault, now_ms)
         elif entry == ALIGN:
             self._align(pressed=False)
+        elif entry == DRIVE:
+            self.drive.ask()
+            self._page = len(self._pages) if self.meter.calibration.aligned else 0
         elif entry == SIX:
             self.wizard = SixWizard(self.sensor.chip, SATURATED, self.settings.SAMPLE_HZ, self._save)
-
         elif entry == RECORD:
             self._record()
             if self._recorder.active:
@@ -119,17 +134,28 @@ class Screen:
             return self.sensor.fault
         if self._info:
             return pages.sensor_info(self.sensor, self.meter, now_ms // 1000)
+        if self.drive and self.drive.message:
+            self._page = 0  # after it
+            return self.drive.message
+        return self._page_lines(now_ms)
+
+    def _page_lines(self, now_ms):
         if not self.meter.calibration.aligned:
-            return pages.not_aligned(self.meter, now_ms // 1000)
+            if not self._driving:
+                return pages.not_aligned(self.meter, now_ms // 1000)
+            if self._page % 2 == 0:
+                return self.drive.lines(now_ms)
+            return pages.not_aligned(self.meter, now_ms // 1000, "drive and brake")
+        page = self._page % (len(self._pages) + self._driving + self._recorder.active)
+        if page == len(self._pages) and self._driving:
+            return self.drive.lines(now_ms)
+        if page >= len(self._pages):
+            return pages.recording(self._recorder)
         if self.meter.fallen:
             return pages.FALLEN
         if not self.meter.trusted or abs(self.meter.lean_deg) > FALLEN_DEG:
             return pages.UNSURE
-        if self._page >= len(self._pages):
-            if self._recorder.active:
-                return pages.recording(self._recorder)
-            self._page = 0
-        line1, line2 = self._pages[self._page](self.meter)
-        if self._page == 0 and self._recorder.active:
+        line1, line2 = self._pages[page](self.meter)
+        if page == 0 and self._recorder.active:
             line1 = pages.recorded(line1)
         return line1, line2

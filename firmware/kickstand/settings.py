@@ -31,8 +31,14 @@ def _or_none(check):
     return lambda value: value is None or check[0](value), check[1]
 
 
+def _pulses(value):
+    return isinstance(value, (int, float)) and 0.1 <= value <= 100
+
+
 _PIN = _whole(0, 48)
 SD_PINS = ("SD_SCK", "SD_MOSI", "SD_MISO", "SD_CS")
+# of each speed source
+_SPEED_PINS = {None: (), "gps": ("GPS_TX", "GPS_RX"), "wheel": ("WHEEL_PIN",)}
 
 # name: default, (check, what is allowed)
 _TABLE = {
@@ -60,6 +66,14 @@ _TABLE = {
     "SD_MOSI": (None, _or_none(_PIN)),
     "SD_MISO": (None, _or_none(_PIN)),
     "SD_CS": (None, _or_none(_PIN)),
+    "VEHICLE": ("motorcycle", _one_of("motorcycle", "car")),
+    "SPEED": (None, _one_of(None, "gps", "wheel")),
+    "GPS_UART": (port.GPS_UART, _whole(0, 2)),
+    "GPS_TX": (port.GPS_PINS[0], _PIN),
+    "GPS_RX": (port.GPS_PINS[1], _PIN),
+    "GPS_BAUD": (9600, _whole(4800, 115_200)),
+    "WHEEL_PIN": (port.WHEEL_PIN, _PIN),
+    "PULSES_PER_METRE": (0.5, (_pulses, "pulses along a metre of road, from 0.1 to 100")),
 }
 
 
@@ -108,12 +122,11 @@ class Settings:
                 "config.py: wrong",
                 SD_PINS[card.index(None) - 1] if card[0] is not None else "SD_SPI",
             )
-        pins = [self.BUTTON_PIN, self.SENSOR_SDA, self.SENSOR_SCL]
-        pins += [] if self.one_bus else [self.LCD_SDA, self.LCD_SCL]
-        pins += [pin for pin in card[1:] if pin is not None]
-        if len(set(pins)) != len(pins):
+        names = ("BUTTON_PIN", "SENSOR_SDA", "SENSOR_SCL") + (() if self.one_bus else ("LCD_SDA", "LCD_SCL"))
+        names += _SPEED_PINS[self.SPEED] + (() if None in card else SD_PINS)
+        if len({getattr(self, name) for name in names}) != len(names):
             raise SettingsError(
-                "config.py: a pin is used twice among BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL, SD_*",
+                "config.py: a pin is used twice among " + ", ".join(names),
                 "config.py: wrong",
                 "pin used twice",
             )
@@ -123,4 +136,10 @@ class Settings:
                 % self.LCD_I2C,
                 "config.py: wrong",
                 "LCD_I2C",
+            )
+        if self.VEHICLE == "car" and self.SPEED is None:
+            raise SettingsError(
+                'config.py: VEHICLE = "car" needs a speed source to be aligned: SPEED = "gps" or "wheel"',
+                "config.py: wrong",
+                "car needs SPEED",
             )

@@ -3,12 +3,16 @@
 import gc
 import os
 import sys
+from time import sleep_ms, ticks_ms
 
 from . import __version__, app
 from .errors import SettingsError
 from .mpu6050 import UnknownChip
 from .settings import load
+from .speed import open_speed
 from .store import Store
+
+LISTEN_MS = 3500
 
 
 def report():
@@ -20,7 +24,10 @@ def report():
     )
     try:
         settings = load()
-        print("Settings     kickstand side %s, %d samples a second" % (settings.SIDE, settings.SAMPLE_HZ))
+        print(
+            "Settings     %s, kickstand side %s, %d samples a second"
+            % (settings.VEHICLE, settings.SIDE, settings.SAMPLE_HZ)
+        )
         sensor = app.open_sensor(settings)
         who_am_i = _sensor(sensor, settings)
         _display(app.open_lcd(settings))
@@ -28,6 +35,7 @@ def report():
             "Button       GPIO %d, %s"
             % (settings.BUTTON_PIN, "pressed" if app.open_button(settings).held() else "not pressed")
         )
+        _speed(settings)
     except SettingsError as error:
         print("Settings     " + error.reason)
         return
@@ -79,6 +87,31 @@ def _display(lcd):
     )
 
 
+def _speed(settings):
+    """Listen for as long as it takes to say what is wrong."""
+    speed = open_speed(settings)
+    if speed is None:
+        print("Speed        no source: SPEED is not set, alignment by driving is off")
+        return
+    if settings.SPEED == "gps":
+        print("Speed        GPS on UART %d, RX %d, %d baud:" % (settings.GPS_UART, settings.GPS_RX, settings.GPS_BAUD))
+    else:
+        print("Speed        wheel on GPIO %d, %.2f pulses a metre:" % (settings.WHEEL_PIN, settings.PULSES_PER_METRE))
+    heard = None
+    for _ in range(LISTEN_MS // 10):
+        new = speed.poll(ticks_ms())
+        heard = heard if new is None else new
+        sleep_ms(10)
+    fault = speed.fault(ticks_ms())
+    print("  " + (", ".join(fault) if fault else "nothing yet" if heard is None else "%.1f m/s" % heard))
+
+
+def _aligned(calibration):
+    if not calibration.aligned:
+        return "no"
+    return "yes, by driving" if calibration.by_drive else "yes"
+
+
 def _calibration(who_am_i, settings):
     if not who_am_i:
         print("Calibration  not looked at: it belongs to a sensor")
@@ -87,7 +120,7 @@ def _calibration(who_am_i, settings):
     calibration = store.load()
     print(
         "Calibration  six positions: %s, aligned: %s; %s"
-        % ("yes" if calibration.six_done else "no", "yes" if calibration.aligned else "no", store.message)
+        % ("yes" if calibration.six_done else "no", _aligned(calibration), store.message)
     )
     for name, values in (
         ("offset, g", calibration.accel_offset),

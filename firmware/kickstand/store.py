@@ -8,20 +8,23 @@ one. Nothing is ever written because a read failed: in a voltage sag a good file
 import struct
 from binascii import crc32
 from errno import ENOENT
+from math import degrees
 
 from .calibration import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE, Calibration
 from .errors import StoreError
 from .rotation import is_rotation
+from .trim import MAX_TRIM
 
 FILES = ("kickstand_a.cal", "kickstand_b.cal")
 VERSION = 1
 _HEAD = "<4sHHI"  # magic, version, length of the whole record, sequence
-_BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, aligned; offset, slope, gyro bias, matrix, trim
+_BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, alignment; offset, slope, gyro bias, matrix, trim
+_NOT_ALIGNED, _BY_POSES, _BY_DRIVE = 0, 1, 2
 _MAGIC = b"KSTD"
 BODY_LENGTH = struct.calcsize(_BODY)
 _LENGTH = struct.calcsize(_HEAD) + BODY_LENGTH + 4
 MAX_BIAS_DPS = 60.0
-MAX_TRIM_DEG = 3.0
+MAX_TRIM_DEG = degrees(MAX_TRIM) + 0.1  # rounded to 32 bits on the way
 
 
 class Store:
@@ -131,7 +134,7 @@ def pack(who_am_i, accel_range_g, calibration):
         who_am_i,
         accel_range_g,
         calibration.six_done,
-        calibration.aligned,
+        (_BY_DRIVE if calibration.by_drive else _BY_POSES) if calibration.aligned else _NOT_ALIGNED,
         *list(calibration.accel_offset),
         *list(calibration.accel_slope),
         *list(calibration.gyro_bias),
@@ -144,7 +147,8 @@ def unpack(data, at):
     """(who_am_i, accel_range_g, Calibration) from pack()'s bytes at a place in data."""
     fields = struct.unpack_from(_BODY, data, at)
     calibration = Calibration()
-    calibration.six_done, calibration.aligned = bool(fields[2]), bool(fields[3])
+    calibration.six_done, calibration.aligned = bool(fields[2]), fields[3] != _NOT_ALIGNED
+    calibration.by_drive = fields[3] == _BY_DRIVE
     values = fields[4:]
     calibration.set_accel(values[0:3], values[3:6])
     for i in range(3):

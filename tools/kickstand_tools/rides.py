@@ -204,6 +204,16 @@ class Ride:
         return shaken(body_motion(*state[1:8]), t_s, self.vibration_g, speed, distance, engine)
 
 
+class CarRide(Ride):
+    """The same ways on four wheels: turns as quick as a motorcycle's at that lean, the body rolls a little outwards."""
+
+    ROLL_SHARE = -0.08  # of the lean that a motorcycle would have
+
+    def state(self, t_s):
+        state = super().state(t_s)
+        return state[:1] + (self.ROLL_SHARE * state[1], self.ROLL_SHARE * state[2]) + state[3:]
+
+
 def shaken(motion, t_s, vibration_g, speed_mps, distance_m, engine):
     """motion with road and engine vibration added. engine: 0 (off) to 1 (running)."""
     road = vibration_g * min(1.0, speed_mps / 10.0) * sqrt(1.0 - _ENGINE_SHARE * _ENGINE_SHARE)

@@ -20,10 +20,11 @@ def use(installed):
 
 
 class Pin:
-    """machine.Pin: levels only, no interrupts."""
+    """machine.Pin: levels; interrupts of what is wired to it, which come while time passes."""
 
     IN, OUT, OPEN_DRAIN = 0, 1, 2
     PULL_UP, PULL_DOWN = 1, 2
+    IRQ_FALLING, IRQ_RISING = 4, 8
 
     def __init__(self, id, mode=-1, pull=-1, value=None):
         self.id = id.id if isinstance(id, Pin) else id
@@ -39,6 +40,16 @@ class Pin:
             return board.pin_level(self.id)
         board.drive_pin(self.id, 1 if level else 0)
         return None
+
+    def irq(self, handler=None, trigger=IRQ_FALLING | IRQ_RISING, **hard):
+        if hard and board.port == "esp32":
+            raise TypeError("extra keyword arguments given")
+
+        def edge(level):
+            if handler and trigger & (Pin.IRQ_RISING if level else Pin.IRQ_FALLING):
+                handler(self)
+
+        board.watch_pin(self.id, edge)
 
     def __call__(self, level=None):
         return self.value(level)
@@ -151,6 +162,33 @@ class I2C(SoftI2C):
             if scl is None or Pin(scl).id % 4 != 2 * id + 1:
                 raise ValueError("bad SCL pin")
         super().__init__(scl, sda, freq, timeout)
+
+
+class UART:
+    """machine.UART, to receive. What is not read in time is lost, as on the boards."""
+
+    def __init__(self, id, baudrate=115200, tx=None, rx=None, rxbuf=256, timeout=0):
+        if board.port == "rp2":
+            if tx is None or tx.id % 4 != 0 or (tx.id + 4) // 8 % 2 != id:
+                raise ValueError("bad TX pin")
+            if rx is None or rx.id % 4 != 1 or (rx.id + 4) // 8 % 2 != id:
+                raise ValueError("bad RX pin")
+        self._received = b""
+        self._size = rxbuf
+
+        def receive(data):
+            self._received = (self._received + data)[: self._size]
+
+        board.connect_uart(Pin(rx).id, baudrate, receive)
+
+    def any(self):
+        board.clock.advance(_CALL_US)
+        return len(self._received)
+
+    def read(self, nbytes):
+        data = self._received[:nbytes]
+        self._received = self._received[nbytes:]
+        return data or None
 
 
 class WDT:

@@ -17,15 +17,17 @@ from . import fake_machine, fake_time
 from .button import Button
 from .clock import Clock, PowerOff, Reset, to_us
 from .faults import Faults
+from .gps import Gps
 from .i2c import Bus
 from .lcd import Lcd
 from .mpu6050 import Mpu6050
 from .watchdog import Watchdog
+from .wheel import Wheel
 
 __all__ = ["Board", "PowerOff", "Reset"]
 
-# Pins (SDA, SCL) of the sensor's and of the LCD's bus, and of the button: as the firmware's defaults
-WIRING = {"rp2": ((4, 5), (6, 7), 15), "esp32": ((21, 22), (18, 19), 4)}
+# Pins (SDA, SCL) of the sensor's and of the LCD's bus, of the button, of GPS and wheel: as the firmware's defaults
+WIRING = {"rp2": ((4, 5), (6, 7), 15, 9, 14), "esp32": ((21, 22), (18, 19), 4, 16, 27)}
 
 
 class Board:
@@ -55,7 +57,9 @@ class Board:
         self.lcd = Lcd(self.clock, lcd_address or 0x27)
         self.button = Button(self.clock, seed)
         self.watchdog = Watchdog(self.clock)
-        sensor_pins, lcd_pins, self._button_pin = WIRING[port]
+        sensor_pins, lcd_pins, self._button_pin, self._gps_pin, self._wheel_pin = WIRING[port]
+        self.gps = None  # a Gps and a Wheel, where fitted
+        self.wheel = None
         self.sensor_bus = Bus(self.clock, *sensor_pins)
         self.lcd_bus = self.sensor_bus if one_bus else Bus(self.clock, *lcd_pins)
         self.buses = [self.sensor_bus] if one_bus else [self.sensor_bus, self.lcd_bus]
@@ -129,6 +133,10 @@ class Board:
         finally:
             self.clock.set_deadline(None)
             self.watchdog.stop()
+            if self.gps:
+                self.gps.disconnect()
+            if self.wheel:
+                self.wheel.disconnect()
 
     def at(self, t_s, function):
         """Call function() when the clock reaches t_s."""
@@ -163,7 +171,26 @@ class Board:
         self.lcd_bus.detach(self.lcd)
         self.lcd.power_off()
 
+    def fit_gps(self, speed, **kind):
+        """A receiver on its pin. speed(t_s): of the vehicle, m/s; kind: as for Gps."""
+        self.gps = Gps(self.clock, speed, **kind)
+
+    def fit_wheel(self, speed, **kind):
+        """A contact at a wheel on its pin. speed(t_s): of the vehicle, m/s; kind: as for Wheel."""
+        self.wheel = Wheel(self.clock, speed, **kind)
+
     # What fake_machine needs
+
+    def connect_uart(self, pin, baud, receive):
+        """What arrives on this pin goes to receive(bytes): noise, if the receiver sends at another rate."""
+        if self.gps and pin == self._gps_pin:
+            same = baud == self.gps.baud
+            self.gps.connect(receive if same else lambda data: receive(bytes([b & 0xE6 for b in data])))
+
+    def watch_pin(self, number, edge):
+        """Call edge(level) when what is wired to this pin changes it."""
+        if self.wheel and number == self._wheel_pin:
+            self.wheel.connect(edge)
 
     def bus_on(self, sda, scl, hz):
         """The bus on these pins, driven by a controller at hz from now on; an empty one if none is wired."""
@@ -197,6 +224,8 @@ class Board:
                 return bus.scl_level()
         mode, pull, level = self._pins.get(number, (fake_machine.Pin.IN, -1, 0))
         if number == self._button_pin and self.button.closed:
+            return 0
+        if number == self._wheel_pin and self.wheel and self.wheel.closed:
             return 0
         if mode == fake_machine.Pin.IN:
             return 1 if pull == fake_machine.Pin.PULL_UP else 0  # a floating pin is taken to read low

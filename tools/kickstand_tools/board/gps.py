@@ -1,0 +1,82 @@
+"""Model of a GPS receiver: NMEA sentences on a wire, some time after the fix they tell of."""
+
+_KNOTS = 3600.0 / 1852.0
+_PIECE = 8  # bytes that reach the microcontroller at once
+_START_S = 12 * 3600 - 20  # time of day when the clock is 0
+
+
+def sentence(body):
+    """The line of a body: $, checksum and end added."""
+    total = 0
+    for byte in body.encode():
+        total ^= byte
+    return "$%s*%02X\r\n" % (body, total)
+
+
+class Gps:
+    """speed(t_s): of the vehicle, m/s.  hz: fixes a second.  latency_s: from a fix to its first byte.
+
+    kinds: of the sentences that tell the speed.  talker: their first letters.  faults: [[kind, from_s, until_s], ...];
+    "unplugged"; "garbled": a wrong bit now and then; "void": no fix; "stuck": the last sentence again and again.
+    """
+
+    def __init__(self, clock, speed, hz=1, latency_s=0.2, baud=9600, talker="GP", kinds=("RMC", "VTG"), faults=()):
+        self._clock = clock
+        self._speed = speed
+        self._latency_us = int(latency_s * 1e6)
+        self.baud = baud
+        self._talker = talker
+        self._kinds = kinds
+        self._faults = faults
+        self._last = b""
+        self._sent = 0
+        self._receive = None
+        clock.every(1_000_000 // hz, self._fix)
+
+    def connect(self, receive):
+        """From now on its wire ends at receive(bytes)."""
+        self._receive = receive
+
+    def disconnect(self):
+        """Nobody listens."""
+        self._receive = None
+
+    def _has(self, kind):
+        t_s = self._clock.now_us / 1e6
+        return any(fault[0] == kind and fault[1] <= t_s < fault[2] for fault in self._faults)
+
+    def _fix(self):
+        if not self._has("stuck"):
+            self._last = self._sentences().encode()
+        data = bytearray(self._last)
+        if self._has("garbled"):
+            for i in range(self._sent % 13, len(data), 13):
+                data[i] ^= 1 << self._sent % 7
+        self._sent += 1
+        start_us = self._clock.now_us + self._latency_us
+        for i in range(0, len(data), _PIECE):
+            piece = bytes(data[i : i + _PIECE])
+            self._clock.at(start_us + (i + len(piece)) * 10_000_000 // self.baud, self._sender(piece))
+
+    def _sender(self, piece):
+        def send():
+            if self._receive and not self._has("unplugged"):
+                self._receive(piece)
+
+        return send
+
+    def _sentences(self):
+        now_us = self._clock.now_us
+        knots = self._speed(now_us / 1e6) * _KNOTS
+        seconds = (now_us // 1_000_000 + _START_S) % 86400
+        time = "%02d%02d%02d.%02d" % (seconds // 3600, seconds // 60 % 60, seconds % 60, now_us // 10_000 % 100)
+        valid = not self._has("void")
+        text = ""
+        if "RMC" in self._kinds:
+            fix = "A,4807.0380,N,01131.0000,E,%.3f,84.4" % knots if valid else "V,,,,,,"
+            text += sentence("%sRMC,%s,%s,211126,,,%s" % (self._talker, time, fix, "A" if valid else "N"))
+        text += sentence("%sGSA,A,3,04,05,,09,12,,,24,,,,,2.5,1.3,2.1" % self._talker)
+        if "VTG" in self._kinds:
+            course = "84.4,T,,M,%.3f,N,%.3f,K,A" % (knots, knots * 1.852) if valid else ",,,,,,,,N"
+            text += sentence("%sVTG,%s" % (self._talker, course))
+        return text

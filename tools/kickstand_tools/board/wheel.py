@@ -1,0 +1,63 @@
+"""Model of a reed contact at a wheel: closes once in so many metres, and bounces."""
+
+_CLOSED_SHARE = 0.1  # of a turn, as long as the magnet is near
+_LOOK_US = 20_000  # how often a wheel that stands is looked at
+_CREEP_MPS = 0.02
+
+
+class Wheel:
+    """speed(t_s): of the vehicle, m/s.  bounce_us: how long a contact bounces on each edge, 0 for never.
+
+    closed: True while it connects the pin to ground.
+    until_s: then its wire breaks.
+    """
+
+    def __init__(self, clock, speed, pulses_per_metre=0.5, bounce_us=0, until_s=1e9):
+        self.closed = False
+        self._edge = None
+        self._clock = clock
+        self._speed = speed
+        self._pulses_per_metre = pulses_per_metre
+        self._bounce_us = bounce_us
+        self._until_us = int(until_s * 1e6)
+        self._turned = 0.5  # of the way to the next pulse
+        self._look_us = clock.now_us
+        clock.at(clock.now_us, self._look)
+
+    def connect(self, edge):
+        """From now on edge(level of the pin) hears of each change."""
+        self._edge = edge
+
+    def disconnect(self):
+        """Nobody listens."""
+        self._edge = None
+
+    def _look(self):
+        """Follow the speed; close the contact where a pulse falls before the next look."""
+        now_us = self._clock.now_us
+        speed = self._speed(now_us / 1e6)
+        rate = speed * self._pulses_per_metre / 1e6 if speed > _CREEP_MPS else 0.0  # pulses a us
+        self._turned += rate * (now_us - self._look_us)
+        self._look_us = now_us
+        if self._turned >= 0.999:
+            self._turned -= 1.0
+            self._turn(True, now_us)
+            self._turn(False, now_us + int(_CLOSED_SHARE / rate))
+        left_us = int((1.0 - self._turned) / rate) + 1 if rate else _LOOK_US
+        self._clock.at(now_us + min(_LOOK_US, left_us), self._look)
+
+    def _turn(self, closed, at_us):
+        self._set_at(at_us, closed)
+        if self._bounce_us:
+            for i in range(1, 5):
+                self._set_at(at_us + i * self._bounce_us // 4, closed if i % 2 == 0 else not closed)
+
+    def _set_at(self, at_us, closed):
+        def act():
+            level = closed and self._clock.now_us < self._until_us
+            if level != self.closed:
+                self.closed = level
+                if self._edge:
+                    self._edge(0 if level else 1)
+
+        self._clock.at(at_us, act)
