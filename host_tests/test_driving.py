@@ -106,14 +106,7 @@ def test_which_brakings_count(braking, seconds, yaw_dps, counted):
 
 def test_it_says_what_it_waits_for():
     """Speed, a stop, a braking; that one goes on, straight or not; ready."""
-    legs = [
-        [2.0, 1.0, 0.0],
-        [2.0, -1.0, 0.0],
-        *around(2),
-        [8.0, 1.5, 0.0],
-        [4.0, -2.0, 15.0],
-        *around(6, stands=False),
-    ]
+    legs = [[2.0, 1.0, 0.0], [2.0, -1.0, 0.0], *around(2), [8.0, 1.5, 0.0], [4.0, -2.0, 15.0], *around(6, stands=False)]
     states = drive(legs)["states"]
     assert driving.DriveAlignment("car").state == driving.WAITING_FOR_SPEED
     assert states[0] == driving.WAITING_FOR_STOP
@@ -182,13 +175,10 @@ def test_standing_and_driving_have_to_agree(share, fine):
     assert fine or "standing and driving differ" in result["refused"]
 
 
-@pytest.mark.parametrize(
-    ("degrees", "fine"),
-    [(2.0, True), (0.9 * driving.HALVES_STAY_DEG, True), (1.1 * driving.HALVES_STAY_DEG, False)],
-)
-def test_halves_have_to_agree(degrees, fine):
+@pytest.mark.parametrize(("share", "fine"), [(0.3, True), (0.9, True), (1.1, False)])
+def test_halves_have_to_agree(share, fine):
     """Once ready, up to 6 degrees: an alignment that comes and goes at a threshold helps nobody."""
-    result = drive(around(8), moved=[73.0, turned(MOUNT, 1, degrees)])
+    result = drive(around(8), moved=[73.0, turned(MOUNT, 1, share * driving.HALVES_STAY_DEG)])
     assert result["ready"] is fine
     assert fine or "two halves" in result["refused"]
 
@@ -208,9 +198,7 @@ def test_missing_samples_do_not_join_what_they_part():
         if value is not None:
             alignment.measure_speed(value)
     assert alignment.ready
-    assert np.degrees(np.arctan2(alignment.fit.forward[0], alignment.fit.forward[2])) == pytest.approx(
-        0.0, abs=0.3
-    )
+    assert np.degrees(np.arctan2(alignment.fit.forward[0], alignment.fit.forward[2])) == pytest.approx(0.0, abs=0.3)
 
 
 @pytest.mark.parametrize(

@@ -172,6 +172,12 @@ class DriveAlignment:
             elif self._next is not None and difference(self._history.now, self._next[1]) >= 0:
                 self._begin_work()
 
+    def finish(self):
+        """No more samples will come: do at once what work is left."""
+        while self._work is not None:
+            if next(self._work, True):
+                self._work = None
+
     def measure_speed(self, speed_mps, age_us=0):
         """A new value of the speed source. age_us: how old it is known to be; an unknown lag is found by itself."""
         self._speed_check.measure(speed_mps)
