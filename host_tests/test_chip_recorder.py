@@ -237,7 +237,9 @@ def test_pull_and_record_through_mpremote(tmp_path):
             stderr=subprocess.PIPE,
             text=True,
         )
-        time.sleep(60)
+        assert recording.stdout is not None
+        assert recording.stdout.readline().startswith("recording from socket")
+        time.sleep(45)  # a few emulated seconds
         recording.send_signal(signal.SIGINT)
         out, err = recording.communicate(timeout=120)
         assert (recording.returncode, err) == (0, "")

@@ -9,7 +9,7 @@ from mpremote.transport_serial import SerialTransport
 
 _CTRL_C = b"\x03"
 _END = b"\x04"  # of the program's output, and of its error
-_LAST_S = 2.0  # for what is still said after Ctrl-C
+_LAST_S = 10.0  # for what is still said after Ctrl-C
 _POLL_S = 0.01
 
 

@@ -17,7 +17,7 @@ from .ride_blocks import CUT_SHORT, Block, read
 
 Print = Callable[[str], None]
 
-_SILENT_S = 10.0
+_SILENT_S = 20.0
 
 # Prints the directory and (name, bytes) of each part of a ride
 _LIST = """

@@ -27,7 +27,7 @@ from kickstand.meter import LeanMeter  # noqa: E402
 Print = Callable[[str], None]
 
 _START = "from kickstand import ride_stream\nride_stream.run()"
-_SILENT_S = 10.0  # a board without a sensor says nothing either
+_SILENT_S = 60.0  # an emulated board takes a while to start; one without a sensor says nothing either
 
 
 def record(port: str | None, out: Path, say: Print, warn: Print) -> None:
