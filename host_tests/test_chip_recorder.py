@@ -13,9 +13,9 @@ from pathlib import Path
 import command
 import pytest
 from emulated import PART, calibrated, modules, pico
-from kickstand_tools import replay, ride_blocks, ride_log
+from kickstand_tools import replay_engine, ride_blocks, ride_log
 from kickstand_tools.calibration_file import read_calibration
-from kickstand_tools.logs import read_log
+from kickstand_tools.logs import read_blocks, read_log
 from kickstand_tools.rides import Ride, accelerate, turn, wait
 from test_chip_power_cut import torn
 
@@ -109,8 +109,9 @@ def test_a_recorded_ride_replays_as_it_was_shown(tmp_path):
     assert sum(len(block.turns) for block in found[1]) == len(leans)
     assert len(found[1]) >= 2
     cal = ride_log.write(tmp_path / "ride.csv.gz", found[1])
-    replayed = replay.replay(read_log(tmp_path / "ride.csv.gz"), read_calibration(cal), "cpython")
-    assert max(abs(row[0] - lean) for row, lean in zip(replayed, leans, strict=True)) < 0.05
+    engine = replay_engine.Replay(read_calibration(cal).to_firmware())
+    rows = [row for block in read_blocks(tmp_path / "ride.csv.gz") for row in block.rows()]
+    assert max(abs(engine.step(*row)[0] - lean) for row, lean in zip(rows, leans, strict=True)) < 0.05
     assert max(leans) - min(leans) > 20
 
 

@@ -6,9 +6,9 @@ import devices
 import engines
 import pytest
 from kickstand.meter import LeanMeter
-from kickstand_tools import replay, ride_blocks, ride_log
+from kickstand_tools import replay_engine, ride_blocks, ride_log
 from kickstand_tools.calibration_file import read_calibration
-from kickstand_tools.logs import read_log
+from kickstand_tools.logs import read_blocks
 from test_device import ALIGNED
 
 SHORT, LONG = 0.15, 1.2
@@ -33,8 +33,8 @@ def rides(flash):
 def replayed(blocks, directory):
     """Replay's lean for each row of the ride's log."""
     cal = ride_log.write(directory / "ride.csv.gz", blocks)
-    log = read_log(directory / "ride.csv.gz")
-    return [row[0] for row in replay.replay(log, read_calibration(cal), "cpython")]
+    engine = replay_engine.Replay(read_calibration(cal).to_firmware())
+    return [engine.step(*row)[0] for block in read_blocks(directory / "ride.csv.gz") for row in block.rows()]
 
 
 def lean_matches(record, blocks, leans, slack_s=0.4):
