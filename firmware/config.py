@@ -35,3 +35,14 @@
 
 # Restart by itself when the program hangs
 # WATCHDOG = True
+
+# Record every ride from power-on; without it the menu starts a record
+# RECORD = False
+
+# SD card for the rides, on SPI; without it they are kept in the board's flash. All five, and its driver:
+# mpremote mip install sdcard
+# SD_SPI = 0
+# SD_SCK = 18
+# SD_MOSI = 19
+# SD_MISO = 16
+# SD_CS = 17

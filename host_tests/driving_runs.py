@@ -110,6 +110,7 @@ def drive(legs, mount, options):
             states.append(alignment.state)
         if ready_s is None and alignment.ready:
             ready_s = k / RATE_HZ
+    alignment.finish()
     result = {
         "ready": alignment.ready,
         "ready_s": ready_s,

@@ -27,13 +27,17 @@ class FakeBoard(Transport):
         self.free_blocks = 300
         self.written: list[str] = []
         self.resets = 0
+        self.serial = Serial()
         self.closed = False
         self.on_write: Callable[[str, bytes], bytes] = lambda _path, data: data
-        modules = {"os": self._os(), "sys": types.SimpleNamespace(implementation=_implementation(python, mpy))}
+        self.modules: dict[str, Any] = {
+            "os": self._os(),
+            "sys": types.SimpleNamespace(implementation=_implementation(python, mpy)),
+        }
 
         def imports(name: str, *rest: Any) -> Any:
-            if name in modules:
-                return modules[name]
+            if name in self.modules:
+                return self.modules[name]
             if name == "kickstand":
                 return self._kickstand()
             return __import__(name, *rest)
@@ -73,7 +77,11 @@ class FakeBoard(Transport):
         return eval(self.exec(f"print(repr({expression}))"))
 
     def exec_raw_no_follow(self, command: str) -> None:
-        self.resets += "machine.reset()" in command
+        if "machine.reset()" in command:
+            self.resets += 1
+            return
+        output, error = self.exec_raw(command)
+        self.serial.data += output + b"\x04" + error + b"\x04>"
 
     def close(self) -> None:
         self.closed = True
@@ -97,6 +105,7 @@ class FakeBoard(Transport):
 
         return types.SimpleNamespace(
             ilistdir=ilistdir,
+            listdir=lambda path: [p.name for p in self.path(path).iterdir()],
             stat=stat,
             mkdir=lambda path: self.path(path).mkdir(),
             remove=lambda path: self.path(path).unlink(),
@@ -109,6 +118,25 @@ class FakeBoard(Transport):
         module = types.ModuleType("kickstand")
         exec(self.path("kickstand/__init__.py").read_text(), vars(module))
         return module
+
+
+class Serial:
+    """The port: data that waits to be read, and what was written."""
+
+    def __init__(self) -> None:
+        self.data = b""
+        self.written = b""
+
+    def inWaiting(self) -> int:
+        return len(self.data)
+
+    def read(self, count: int) -> bytes:
+        count = min(count, 700)
+        piece, self.data = self.data[:count], self.data[count:]
+        return piece
+
+    def write(self, data: bytes) -> None:
+        self.written += data
 
 
 class _Writer:

@@ -37,7 +37,7 @@ def test_channels_are_those_of_the_meter(ride, course):
     log = logs.read_log(ride.log)
     engine = replay_engine.Replay(ride.calibration.to_firmware())
     rows, shown, trusted = [], [], []
-    for row in zip(log.time_us, log.readings):
+    for row in zip(log.time_us, log.readings, (np.nan if v is None else v for v in log.speed_mps)):
         rows.append(engine.step(*row))
         shown.append(engine.meter.smooth_force[2])
         trusted.append(engine.meter.trusted)
@@ -52,7 +52,7 @@ def test_the_maxima_are_those_the_display_held(ride):
     """Block by block, in whatever blocks."""
     log = logs.read_log(ride.log)
     engine = replay_engine.Replay(ride.calibration.to_firmware())
-    for row in zip(log.time_us, log.readings):
+    for row in zip(log.time_us, log.readings, (np.nan if v is None else v for v in log.speed_mps)):
         engine.take(*row)
     meter, summary = engine.meter, Summary()
     whole = joined([channels for _, channels in ride.blocks("")])

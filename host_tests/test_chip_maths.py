@@ -2,6 +2,7 @@
 
 import io
 import json
+import math
 import struct
 import subprocess
 
@@ -50,10 +51,11 @@ def test_the_same_log_gives_the_same_lean(tmp_path):
     world = PART.world(Ride([accelerate(15.0, 1.0), turn(-30.0, 1.0, 0.5)]).motion)
     offsets = [-o / s for o, s in zip(PART.accel_offset_g, PART.accel_scale, strict=True)]
     slopes = [1.0 / s for s in PART.accel_scale]
-    records = struct.pack(replay_engine.CALIBRATION, *offsets, *slopes, *PART.gyro_bias_dps, *PART.vehicle_from_sensor)
+    calibration = (*offsets, *slopes, *PART.gyro_bias_dps, *PART.vehicle_from_sensor, 0.0)
+    records = struct.pack(replay_engine.CALIBRATION, *calibration)
     for i in range(300):
         fx, fy, fz, wx, wy, wz, temperature = world(i / 100)
-        records += struct.pack(replay_engine.RECORD, i * 10_000, fx, fy, fz, temperature, wx, wy, wz)
+        records += struct.pack(replay_engine.RECORD, i * 10_000, fx, fy, fz, temperature, wx, wy, wz, math.nan)
     on_host, on_chip = io.BytesIO(), bytearray()
     replay_engine.run(io.BytesIO(records), on_host)
     replay.run(records, on_chip.extend)

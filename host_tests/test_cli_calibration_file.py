@@ -31,6 +31,8 @@ BAD = {
     "short row": ({"vehicle_from_sensor": [[1, 0, 0], [0, 1], [0, 0, 1]]}, "vehicle_from_sensor, row 2,"),
     "mirrored": ({"vehicle_from_sensor": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, "no rotation"),
     "scaled": ({"vehicle_from_sensor": [[1.01, 0, 0], [0, 1, 0], [0, 0, 1]]}, "no rotation"),
+    "trim a word": ({"trim_deg": "none"}, "trim_deg is 'none'"),
+    "trim too large": ({"trim_deg": -4}, "trim_deg is -4"),
     "skewed": ({"vehicle_from_sensor": [[1, 0.01, 0], [0, 1, 0], [0, 0, 1]]}, "no rotation"),
 }
 BROKEN = {
@@ -76,7 +78,7 @@ def test_a_directory_or_nothing_is_refused(tmp_path, log):
 def test_what_is_written_reads_back(tmp_path):
     matrix = [0.6, 0.8, 0.0, -0.8, 0.6, 0.0, 0.0, 0.0, 1.0]
     written = CalibrationFile(
-        [0.012345678, -0.4, 0.0], [1.19, 0.81, 1.0], [1.5, -2.5, 59.0], matrix, True, True
+        [0.012345678, -0.4, 0.0], [1.19, 0.81, 1.0], [1.5, -2.5, 59.0], matrix, True, True, trim=-1.25
     )
     write_calibration(tmp_path / "CAL.json", written)
     assert read_calibration(tmp_path / "CAL.json") == written

@@ -140,6 +140,19 @@ def test_an_unaligned_calibration_works_with_a_warning(tmp_path):
     assert len(read(tmp_path / "LEAN.csv")) == 100
 
 
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_the_trim_that_riding_found_is_used(tmp_path, engine):
+    """Standing still, the lean is what the accelerometer says less what upright was off; without one it is 0."""
+    log, out = command.still(tmp_path / "log.csv", (0.0, 0.0, 1.0), seconds=8.0), tmp_path / "LEAN.csv"
+    leans = []
+    for changed in ({}, {"trim_deg": 2.0}):
+        cal = command.write_cal(tmp_path / "CAL.json", accel_offset_g=[0, 0, 0], gyro_bias_dps=[0, 0, 0], **changed)
+        command.works("replay", log, "--calibration", cal, "--out", out, "--engine", engine)
+        leans.append(read(out)["lean_deg"][-100:].mean())
+    assert abs(leans[0]) < 0.2
+    assert abs(leans[1] - leans[0]) == pytest.approx(2.0, abs=0.3)
+
+
 def test_times_are_those_of_the_log_to_the_letter(tmp_path):
     """A log that starts at a Unix time keeps it, and its microseconds are not lost on the way."""
     t0 = 1_700_000_000.0

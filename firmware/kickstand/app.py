@@ -17,6 +17,8 @@ from .errors import SettingsError, StoreError
 from .hd44780 import Lcd
 from .meter import LeanMeter
 from .mpu6050 import Mpu6050
+from .recorder import Recorder
+from .ride_ring import RideRing
 from .sample_clock import SampleClock
 from .screen import Screen
 from .sensor import Sensor
@@ -75,9 +77,10 @@ def _open_bus(settings, name):
 
 
 class App:
-    """The lean meter on a board. settings: a Settings.  lcd: from open_lcd()."""
+    """The lean meter on a board. settings: a Settings.  lcd: from open_lcd().  keeper: of its rides, see Recorder;
+    one that is given gets a ride from the start."""
 
-    def __init__(self, settings, lcd):
+    def __init__(self, settings, lcd, keeper=None):
         self.settings = settings
         self.lcd = lcd
         self.button = open_button(settings)
@@ -88,13 +91,22 @@ class App:
         self.drive = DriveMode(settings.VEHICLE, speed, self.meter, self._keep) if speed else None
         self._clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self._restarts = 0
-        self.screen = Screen(settings, self.sensor, self.meter, self.drive, self._save)
+        self.recorder = Recorder(keeper or RideRing(settings), settings.SAMPLE_HZ)
+        self._record_due = settings.RECORD or keeper is not None
+        self.screen = Screen(settings, self.sensor, self.meter, self.drive, self._save, self.recorder, self._record)
         self._page_ms = ticks_ms()
         self._trim_ms = self._page_ms
         self._fault_shown = False
 
     def run(self):
-        """Loop for ever, LOOP_US a turn."""
+        """Loop until Ctrl-C, LOOP_US a turn."""
+        try:
+            self._loop()
+        except KeyboardInterrupt:
+            self.recorder.stop()
+            raise
+
+    def _loop(self):
         watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         due_us = ticks_us()
         turns = 0
@@ -120,7 +132,9 @@ class App:
         if n:
             self._take(n, now_us, now_ms)
         if self.drive:
-            self.drive.poll(now_ms)
+            speed = self.drive.poll(now_ms)
+            if speed is not None and self.recorder.active:
+                self.recorder.add_speed(int(100 * speed))
         self.sensor.check(now_ms)
         if self.sensor.fault is not None:
             self._clock.restart()
@@ -137,6 +151,16 @@ class App:
             self.lcd.show(line1, line2)
             self._keep_trim(now_ms)
         self.lcd.tick(now_ms)
+        if self.recorder.active:
+            self.recorder.tick()
+
+    def _record(self):
+        """Begin a ride, which the filter has to begin with, too: where the bike stands it loses nothing by that. A
+        ride begun on the way is replayed with a filter that still has to find what this one knows."""
+        if self.meter.filter.at_rest:
+            self._save_trim()
+            self.meter.use(self.meter.calibration)
+        self.recorder.start(self.sensor.chip, self.meter.calibration)
 
     def _keep_trim(self, now_ms):
         """What riding taught about upright goes to flash when the bike stands, at most once in TRIM_MS."""
@@ -144,12 +168,18 @@ class App:
             return
         if ticks_diff(now_ms, self._trim_ms) < TRIM_MS:
             return
-        if self.meter.keep_trim() and self.store.unchanged():
+        if self._save_trim():
             self._trim_ms = now_ms
-            try:
-                self.store.save(self.meter.calibration)
-            except StoreError as error:  # the next ride finds it again
-                print(error.reason)
+
+    def _save_trim(self):
+        """True if there was something to save."""
+        if not self.meter.keep_trim() or not self.store.unchanged():
+            return False
+        try:
+            self.store.save(self.meter.calibration)
+        except StoreError as error:  # the next ride finds it again
+            print(error.reason)
+        return True
 
     def _take(self, n, now_us, now_ms):
         """The n samples that came in: each to the wizard, all at once to the meter."""
@@ -159,6 +189,8 @@ class App:
         chip, wizard = self.sensor.chip, self.screen.wizard
         dt_us = self._clock.step(n, now_us)
         self.meter.update(chip.sums, dt_us, n)
+        if self.recorder.active:
+            self.recorder.add(chip.sums, n, dt_us)
         if self.drive:
             self.drive.feed(chip.sums, n, dt_us, now_ms)
         if wizard:
@@ -170,9 +202,13 @@ class App:
         """The chip runs, for the first time or again after a fault, perhaps another one."""
         chip = self.sensor.chip
         self.meter.restart()
+        self.recorder.interrupt()
         if self.store is None or self.store.who_am_i != chip.who_am_i:
             self.store = Store(chip.who_am_i, chip.accel_range_g)
             self._use(self.store.load())
+            if self._record_due:
+                self._record_due = False
+                self._record()
 
     def _use(self, calibration):
         """From flash or from a wizard: nothing of before counts."""
@@ -185,6 +221,8 @@ class App:
         chip = self.sensor.chip
         calibration.set_scale(chip.accel_lsb_per_g, chip.gyro_lsb_per_dps)
         self.meter.use(calibration)
+        if self.recorder.active:  # a ride has one calibration
+            self.recorder.start(chip, calibration)
 
     def _save(self, calibration):
         """For the wizards: on flash first, then in use. Raises StoreError."""

@@ -37,6 +37,7 @@ class BrakingRegression:
         self._sums = [array("f", [0.0] * (BLOCKS * TERMS)) for _ in range(LAGS)]
         self._total = [0.0] * TERMS
         self._per_block = 1
+        self._fitted = False
         self._in_last = 0
         self.blocks = 1
 
@@ -72,7 +73,8 @@ class BrakingRegression:
                 to, source = block * TERMS, 2 * block * TERMS
                 for k in range(TERMS):
                     sums[to + k] = sums[source + k] + sums[source + TERMS + k] if 2 * block < BLOCKS else 0.0
-                yield
+                if block & 1:
+                    yield
         self._per_block *= 2
         self.blocks = BLOCKS // 2 + 1
 
@@ -81,16 +83,29 @@ class BrakingRegression:
         """Blocks that have at least one braking."""
         return self.blocks if self._in_last else self.blocks - 1
 
-    def fit(self, out, lag, first=0, last=BLOCKS, without=-1):
-        """Fit blocks first to last - 1 but one into out (Fit). False if there is nothing to fit."""
+    def fit(self, out, lag, first=0, last=BLOCKS):
+        """Fit blocks first to last - 1 into out (Fit), at once. False if there is nothing to fit."""
+        for _ in self.fitting(out, lag, first, last):
+            pass
+        return self._fitted
+
+    def fitting(self, out, lag, first=0, last=BLOCKS, without=-1):
+        """The same, but for one block, as a generator of short pieces that returns True or False."""
         sums, total = self._sums[lag], self._total
-        last = min(last, self.blocks)
+        self._fitted = False
         for k in range(TERMS):
-            value = 0.0
-            for block in range(first, last):
-                if block != without:
-                    value += sums[block * TERMS + k]
-            total[k] = value
+            total[k] = 0.0
+        gathered = 0
+        for block in range(first, min(last, self.blocks)):
+            if block != without:
+                start = block * TERMS
+                for k in range(TERMS):
+                    total[k] += sums[start + k]
+                gathered += 1
+                if gathered % 3 == 0:
+                    yield
+        if gathered % 3:
+            yield
         n = total[SECONDS]
         if n <= 0.0:
             return False
@@ -112,4 +127,5 @@ class BrakingRegression:
             out.forward[i] = forward
             out.level[i] = s / n - a * forward - c * left
             out.explained += forward * forward * out.weight
+        self._fitted = True
         return True

@@ -90,7 +90,7 @@ class DriveMode:
             self._total[i] = 0
 
     def poll(self, now_ms):
-        """Once each turn of the loop: speed, and what there is to do."""
+        """Once each turn of the loop: speed, and what there is to do. Returns a new speed in m/s, or None."""
         speed = self.speed.poll(now_ms)
         if speed is not None:
             self._speed_mps = speed
@@ -101,6 +101,7 @@ class DriveMode:
         if self._look_ms is None or ticks_diff(now_ms, self._look_ms) >= 0:
             self._look_ms = ticks_add(now_ms, LOOK_MS)
             self._look(now_ms)
+        return speed
 
     def feed(self, sums, n, dt_us, now_ms):
         """Sums (7, counts in the chip's order) of the n samples of a turn, within dt_us."""

@@ -172,6 +172,12 @@ class DriveAlignment:
             elif self._next is not None and difference(self._history.now, self._next[1]) >= 0:
                 self._begin_work()
 
+    def finish(self):
+        """No more samples will come: do at once what work is left."""
+        while self._work is not None:
+            if next(self._work, True):
+                self._work = None
+
     def measure_speed(self, speed_mps, age_us=0):
         """A new value of the speed source. age_us: how old it is known to be; an unknown lag is found by itself."""
         self._speed_check.measure(speed_mps)
@@ -314,9 +320,8 @@ class DriveAlignment:
         part = self._part
         explained = [0.0] * LAGS
         for lag in range(LAGS):
-            if self.regression.fit(part, lag):
+            if (yield from self.regression.fitting(part, lag)):
                 explained[lag] = part.explained
-            yield
         self.lag = best = explained.index(max(explained))
         self.lag_s = (best + _peak(explained, best)) * LAG_STEP_US * 1e-6
         braked = self._finder.change < 0.0
@@ -334,7 +339,9 @@ class DriveAlignment:
         """How good is it, ready or not? A generator of short pieces."""
         regression, part, best = self.regression, self._part, self.lag
         up = vector()
-        if not regression.fit(self.fit, best) or not self.vertical(up, self.fit):
+        if not (yield from regression.fitting(self.fit, best)):
+            return
+        if not self.vertical(up, self.fit):
             return
         left, forward = vector(), vector()
         cross(left, up, self.fit.forward)
@@ -346,14 +353,14 @@ class DriveAlignment:
         spread = slopes = weights = 0.0
         outlier_deg = 0.0
         for block in range(blocks):
-            if not regression.fit(part, best, block, block + 1):
+            if not (yield from regression.fitting(part, best, block, block + 1)):
                 continue
             x, y, weight = dot(left, part.forward), dot(forward, part.forward), part.weight
             yield
             slope = sqrt(x * x + y * y)
             slopes += weight * slope
             weights += weight
-            if blocks > 1 and regression.fit(part, best, 0, blocks, block):
+            if blocks > 1 and (yield from regression.fitting(part, best, 0, blocks, block)):
                 p, q = dot(left, part.forward), dot(forward, part.forward)
                 angle = atan2(p, q)
                 spread += angle * angle
@@ -369,11 +376,11 @@ class DriveAlignment:
         # the jackknife: empirical, where a formal error is optimistic early
         self.quality_deg = degrees(sqrt(spread * (blocks - 1) / blocks))
         half = blocks // 2
-        if regression.fit(part, best, 0, half):
+        if (yield from regression.fitting(part, best, 0, half)):
             one = atan2(dot(left, part.forward), dot(forward, part.forward))
             level = vector(part.level[0], part.level[1], part.level[2])
             yield
-            if regression.fit(part, best, half, blocks):
+            if (yield from regression.fitting(part, best, half, blocks)):
                 two = atan2(dot(left, part.forward), dot(forward, part.forward))
                 self.halves_deg = degrees(_apart(one, two))
                 self._decide(slopes / weights, angle_deg(level, part.level), outlier_deg)

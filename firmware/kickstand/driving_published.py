@@ -114,6 +114,10 @@ class PublishedAlignment:
             if self._checked.vertical(self._up):
                 self._sample(list(self._levelled))
 
+    def finish(self):
+        """As DriveAlignment.finish()."""
+        self._checked.finish()
+
     def _forget(self):
         self._braking.clear()
         self._interval.clear()

@@ -29,5 +29,9 @@ class StoreError(Refusal):
     """A record that could not be written and read back."""
 
 
+class CardError(Refusal):
+    """No SD card that can be written, or no driver for it."""
+
+
 class SettingsError(Refusal):
     """A value in config.py that cannot be used."""

@@ -5,8 +5,9 @@ from time import ticks_add, ticks_diff
 from .button import LONG, SHORT
 from .pages import ARROW
 
-NAMES = ("Align the bike", "Six positions", "Reset maxima", "Sensor info", "Align by drive", "Leave menu")
-ALIGN, SIX, RESET, INFO, DRIVE, LEAVE = range(6)
+NAMES = ("Align the bike", "Six positions", "Reset maxima", "Sensor info", "Align by drive", "Record ride")
+NAMES += ("Stop recording", "Leave menu")
+ALIGN, SIX, RESET, INFO, DRIVE, RECORD, STOP, LEAVE = range(8)
 TIMEOUT_MS = 20_000
 
 

@@ -12,6 +12,7 @@ MAX_VARIANCE = radians(5.0) ** 2  # a lean less certain than this is not shown
 TRIM_SURE = radians(0.5)
 TRIM_STEP_DEG = 0.3  # less is not worth wearing the flash
 FALLEN_DEG = 65.0
+WHEELIE_DEG = 20.0  # no road is as steep, and with a wheel in the air nothing holds that the filter knows
 FALLEN_US = 1_000_000
 
 
@@ -58,7 +59,9 @@ class LeanMeter:
     @property
     def trusted(self):
         """True while lean_deg is certain enough to be shown."""
-        return not self._leans or self.filter.variance <= MAX_VARIANCE
+        if not self._leans:
+            return True
+        return self.filter.variance <= MAX_VARIANCE and abs(self.filter.pitch_deg) < WHEELIE_DEG
 
     def keep_trim(self):
         """Take the trim found so far into the calibration, if the bike stands and it is another by now: True then."""
@@ -80,7 +83,8 @@ class LeanMeter:
 
     def measure_speed(self, speed_mps):
         """The vehicle's speed where something measures it: it helps the lean, and is never required."""
-        self.filter.measure_speed(speed_mps)
+        if speed_mps >= 0.0:
+            self.filter.measure_speed(speed_mps)
 
     @property
     def reading(self):
@@ -93,6 +97,8 @@ class LeanMeter:
         during one turn of the loop, because floats cost too much to do it for each."""
         if dt_us > GAP_US:
             self.restart()
+        if self._fresh:
+            dt_us = 0  # there is no reading before, on the board and in a replay alike
         self._reading, self._n = reading, n
         force = self.force
         if n:

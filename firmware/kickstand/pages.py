@@ -5,6 +5,7 @@ from .rotation import vector
 
 DEGREE = "\xdf"  # in the display's ROM, as are the arrow and the full block
 ARROW = "\x7e"
+RECORDING = "*"
 _BLOCK = 0xFF
 _HALF_BAR = 8  # cells to each side of the middle
 _DEG_PER_COLUMN = 1.5  # 8 cells of 5 columns: the bar ends at 60 degrees
@@ -49,6 +50,23 @@ def lean(meter):
     """Lean with its side, and the bar."""
     shown = meter.lean_deg
     return "Lean %3d%s %s" % (int(abs(shown) + 0.5), DEGREE, side_name(shown)), lean_bar(shown)
+
+
+def recorded(line):
+    """The line with the mark of a ride being recorded in its last column."""
+    return line + " " * (15 - len(line)) + RECORDING  # %-15s would count bytes, of which a degree sign is two
+
+
+def recording(recorder):
+    """How long the ride has been recorded, and for how long there is room until its beginning has to go."""
+    seconds, room_s = recorder.seconds(), recorder.room_s()
+    if room_s is None:
+        room = "to USB"
+    elif room_s == 0:
+        room = "oldest is erased"
+    else:
+        room = "room %d min" % (room_s // 60) if room_s < 36_000 else "room %d h" % (room_s // 3600)
+    return "Rec %9d:%02d" % (seconds // 60, seconds % 60), room
 
 
 def maxima(meter):

@@ -5,7 +5,7 @@ from time import ticks_add, ticks_diff
 from . import pages
 from .align_wizard import AlignWizard
 from .button import LONG, SHORT
-from .menu import ALIGN, DRIVE, INFO, LEAVE, RESET, SIX, Menu
+from .menu import ALIGN, DRIVE, INFO, LEAVE, RECORD, RESET, SIX, STOP, Menu
 from .meter import FALLEN_DEG
 from .mpu6050 import SATURATED
 from .six_wizard import SixWizard
@@ -15,24 +15,27 @@ NOTICE_MS = 2000
 
 class Screen:
     """settings: a Settings.  sensor: a Sensor.  meter: a LeanMeter.  drive: a DriveMode, None without a speed source.
-    save: for the wizards, called with a new Calibration, raises StoreError.
+    save: for the wizards, called with a new Calibration, raises StoreError.  recorder: a Recorder.  record: called to
+    begin a ride.
 
     wizard: the one under way, which wants every sample, or None.
     """
 
-    def __init__(self, settings, sensor, meter, drive, save):
+    def __init__(self, settings, sensor, meter, drive, save, recorder, record):
         self.settings = settings
         self.sensor = sensor
         self.meter = meter
         self.drive = drive
         self._save = save
+        self._recorder = recorder
+        self._record = record
         self.wizard = None
         self._page = 0
         self._pages = (pages.lean, pages.maxima, pages.acceleration, pages.formula, pages.raw)
-        self._entries = (ALIGN, SIX, RESET, INFO) + ((DRIVE,) if drive else ()) + (LEAVE,)
+        self._entries = (ALIGN, SIX, RESET, INFO) + ((DRIVE,) if drive else ())
         if settings.VEHICLE == "car":
             self._pages = (pages.acceleration, pages.cornering, pages.raw)
-            self._entries = (DRIVE, SIX, RESET, INFO, LEAVE)
+            self._entries = (DRIVE, SIX, RESET, INFO)
         self._menu = None
         self._info = False
         self._notice = None
@@ -58,7 +61,7 @@ class Screen:
         elif event and self.drive and self.drive.message:
             self.drive.answer(event)
         elif event == LONG:
-            self._menu = Menu(self._entries, now_ms)
+            self._menu = Menu(self._entries + (STOP if self._recorder.active else RECORD, LEAVE), now_ms)
         elif event == SHORT:
             self._turn_page()
 
@@ -93,7 +96,10 @@ class Screen:
             self._notify(("Maxima reset", ""), now_ms)
         elif entry == INFO:
             self._info = True
-        elif self.sensor.fault is not None and entry in (ALIGN, SIX, DRIVE):
+        elif entry == STOP:
+            self._recorder.stop()
+            self._notify(("Recording ended", ""), now_ms)
+        elif self.sensor.fault is not None and entry in (ALIGN, SIX, DRIVE, RECORD):
             self._notify(self.sensor.fault, now_ms)
         elif entry == ALIGN:
             self._align(pressed=False)
@@ -102,6 +108,10 @@ class Screen:
             self._page = len(self._pages) if self.meter.calibration.aligned else 0
         elif entry == SIX:
             self.wizard = SixWizard(self.sensor.chip, SATURATED, self.settings.SAMPLE_HZ, self._save)
+        elif entry == RECORD:
+            self._record()
+            if self._recorder.active:
+                self._notify(pages.recording(self._recorder), now_ms)
 
     def _notify(self, lines, now_ms):
         self._notice = lines
@@ -109,6 +119,9 @@ class Screen:
 
     def lines(self, now_ms):
         """What the display should say now."""
+        if self._recorder.problem:
+            self._notify(self._recorder.problem, now_ms)
+            self._recorder.problem = None
         if self._notice:
             if ticks_diff(now_ms, self._notice_ms) < 0:
                 return self._notice
@@ -133,11 +146,16 @@ class Screen:
             if self._page % 2 == 0:
                 return self.drive.lines(now_ms)
             return pages.not_aligned(self.meter, now_ms // 1000, "drive and brake")
-        page = self._page % (len(self._pages) + self._driving)
-        if page == len(self._pages):
+        page = self._page % (len(self._pages) + self._driving + self._recorder.active)
+        if page == len(self._pages) and self._driving:
             return self.drive.lines(now_ms)
+        if page >= len(self._pages):
+            return pages.recording(self._recorder)
         if self.meter.fallen:
             return pages.FALLEN
         if not self.meter.trusted or abs(self.meter.lean_deg) > FALLEN_DEG:
             return pages.UNSURE
-        return self._pages[page](self.meter)
+        line1, line2 = self._pages[page](self.meter)
+        if page == 0 and self._recorder.active:
+            line1 = pages.recorded(line1)
+        return line1, line2

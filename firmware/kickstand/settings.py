@@ -27,11 +27,16 @@ def _addresses(value):
     )
 
 
+def _or_none(check):
+    return lambda value: value is None or check[0](value), check[1]
+
+
 def _pulses(value):
     return isinstance(value, (int, float)) and 0.1 <= value <= 100
 
 
 _PIN = _whole(0, 48)
+SD_PINS = ("SD_SCK", "SD_MOSI", "SD_MISO", "SD_CS")
 # of each speed source
 _SPEED_PINS = {None: (), "gps": ("GPS_TX", "GPS_RX"), "wheel": ("WHEEL_PIN",)}
 
@@ -55,6 +60,12 @@ _TABLE = {
     "LCD_BUS_HZ": (100_000, _whole(100_000, 400_000)),
     "BUTTON_PIN": (port.BUTTON_PIN, _PIN),
     "WATCHDOG": (True, _one_of(True, False)),
+    "RECORD": (False, _one_of(True, False)),
+    "SD_SPI": (None, _or_none(_whole(0, 2))),
+    "SD_SCK": (None, _or_none(_PIN)),
+    "SD_MOSI": (None, _or_none(_PIN)),
+    "SD_MISO": (None, _or_none(_PIN)),
+    "SD_CS": (None, _or_none(_PIN)),
     "VEHICLE": ("motorcycle", _one_of("motorcycle", "car")),
     "SPEED": (None, _one_of(None, "gps", "wheel")),
     "GPS_UART": (port.GPS_UART, _whole(0, 2)),
@@ -104,8 +115,15 @@ class Settings:
         if self.one_bus:  # the display is a 100 kHz part, and sets the pace of a bus that it shares
             self.LCD_I2C = self.SENSOR_I2C
             self.SENSOR_BUS_HZ = self.LCD_BUS_HZ = min(self.SENSOR_BUS_HZ, self.LCD_BUS_HZ)
+        card = [getattr(self, name) for name in ("SD_SPI",) + SD_PINS]
+        if None in card and card != [None] * 5:
+            raise SettingsError(
+                "config.py: an SD card needs all of SD_SPI, %s" % ", ".join(SD_PINS),
+                "config.py: wrong",
+                SD_PINS[card.index(None) - 1] if card[0] is not None else "SD_SPI",
+            )
         names = ("BUTTON_PIN", "SENSOR_SDA", "SENSOR_SCL") + (() if self.one_bus else ("LCD_SDA", "LCD_SCL"))
-        names += _SPEED_PINS[self.SPEED]
+        names += _SPEED_PINS[self.SPEED] + (() if None in card else SD_PINS)
         if len({getattr(self, name) for name in names}) != len(names):
             raise SettingsError(
                 "config.py: a pin is used twice among " + ", ".join(names),

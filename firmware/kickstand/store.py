@@ -8,10 +8,12 @@ one. Nothing is ever written because a read failed: in a voltage sag a good file
 import struct
 from binascii import crc32
 from errno import ENOENT
+from math import degrees
 
 from .calibration import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE, Calibration
 from .errors import StoreError
 from .rotation import is_rotation
+from .trim import MAX_TRIM
 
 FILES = ("kickstand_a.cal", "kickstand_b.cal")
 VERSION = 1
@@ -19,9 +21,10 @@ _HEAD = "<4sHHI"  # magic, version, length of the whole record, sequence
 _BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, alignment; offset, slope, gyro bias, matrix, trim
 _NOT_ALIGNED, _BY_POSES, _BY_DRIVE = 0, 1, 2
 _MAGIC = b"KSTD"
-_LENGTH = struct.calcsize(_HEAD) + struct.calcsize(_BODY) + 4
+BODY_LENGTH = struct.calcsize(_BODY)
+_LENGTH = struct.calcsize(_HEAD) + BODY_LENGTH + 4
 MAX_BIAS_DPS = 60.0
-MAX_TRIM_DEG = 3.0
+MAX_TRIM_DEG = degrees(MAX_TRIM) + 0.1  # rounded to 32 bits on the way
 
 
 class Store:
@@ -104,19 +107,7 @@ class Store:
         return self._directory + "/" + name if self._directory else name
 
     def _pack(self, calibration, sequence):
-        body = struct.pack(
-            _BODY,
-            self._chip[0],
-            self._chip[1],
-            calibration.six_done,
-            (_BY_DRIVE if calibration.by_drive else _BY_POSES) if calibration.aligned else _NOT_ALIGNED,
-            *list(calibration.accel_offset),
-            *list(calibration.accel_slope),
-            *list(calibration.gyro_bias),
-            *list(calibration.vehicle_from_sensor),
-            calibration.trim_deg,
-        )
-        record = struct.pack(_HEAD, _MAGIC, VERSION, _LENGTH, sequence) + body
+        record = struct.pack(_HEAD, _MAGIC, VERSION, _LENGTH, sequence) + pack(*self._chip, calibration)
         return record + struct.pack("<I", crc32(record))
 
     def _unpack(self, record):
@@ -128,22 +119,44 @@ class Store:
             return 0, None, "damaged"
         if magic != _MAGIC or version != VERSION or length != _LENGTH or sequence == 0:
             return 0, None, "of another version"
-        fields = struct.unpack_from(_BODY, record, struct.calcsize(_HEAD))
-        if fields[0:2] != self._chip:
+        who_am_i, accel_range_g, calibration = unpack(record, struct.calcsize(_HEAD))
+        if (who_am_i, accel_range_g) != self._chip:
             return 0, None, "of another sensor or range"
-        calibration = Calibration()
-        calibration.six_done, calibration.aligned = bool(fields[2]), fields[3] != _NOT_ALIGNED
-        calibration.by_drive = fields[3] == _BY_DRIVE
-        values = fields[4:]
-        calibration.set_accel(values[0:3], values[3:6])
-        for i in range(3):
-            calibration.gyro_bias[i] = values[6 + i]
-        for i in range(9):
-            calibration.vehicle_from_sensor[i] = values[9 + i]
-        calibration.trim_deg = values[18]
         if not plausible(calibration):
             return 0, None, "out of range"
         return sequence, calibration, None
+
+
+def pack(who_am_i, accel_range_g, calibration):
+    """BODY_LENGTH bytes: a calibration and the chip it belongs to."""
+    return struct.pack(
+        _BODY,
+        who_am_i,
+        accel_range_g,
+        calibration.six_done,
+        (_BY_DRIVE if calibration.by_drive else _BY_POSES) if calibration.aligned else _NOT_ALIGNED,
+        *list(calibration.accel_offset),
+        *list(calibration.accel_slope),
+        *list(calibration.gyro_bias),
+        *list(calibration.vehicle_from_sensor),
+        calibration.trim_deg,
+    )
+
+
+def unpack(data, at):
+    """(who_am_i, accel_range_g, Calibration) from pack()'s bytes at a place in data."""
+    fields = struct.unpack_from(_BODY, data, at)
+    calibration = Calibration()
+    calibration.six_done, calibration.aligned = bool(fields[2]), fields[3] != _NOT_ALIGNED
+    calibration.by_drive = fields[3] == _BY_DRIVE
+    values = fields[4:]
+    calibration.set_accel(values[0:3], values[3:6])
+    for i in range(3):
+        calibration.gyro_bias[i] = values[6 + i]
+    for i in range(9):
+        calibration.vehicle_from_sensor[i] = values[9 + i]
+    calibration.trim_deg = values[18]
+    return fields[0], fields[1], calibration
 
 
 def plausible(calibration):

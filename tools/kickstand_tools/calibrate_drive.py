@@ -98,6 +98,8 @@ def _feed(alignment, logs: list[Log], result: CalibrationFile, bar: Bar, look: C
             if i % _CHUNK == 0:
                 bar.advance(min(_CHUNK, len(log.time_us) - i))
         elapsed += log.time_us[-1] / 1e6
+    alignment.finish()
+    look(elapsed)
 
 
 class _Events:

@@ -13,7 +13,7 @@ from .output import write_whole
 firmware_path.add_to_path()
 from kickstand.calibration import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE, Calibration  # noqa: E402
 from kickstand.rotation import is_rotation  # noqa: E402
-from kickstand.store import MAX_BIAS_DPS  # noqa: E402
+from kickstand.store import MAX_BIAS_DPS, MAX_TRIM_DEG  # noqa: E402
 
 VERSION = 1
 ROTATION_TOLERANCE = 2e-3  # a matrix copied with three or four decimals is still good to 0.1 degrees
@@ -26,7 +26,7 @@ class CalibrationFile:
 
     offset (3, g), slope (3), bias (3, deg/s), matrix (9, row-major, rows left, up, forward).
     aligned: the matrix was measured, not left as it was.  vehicle: "car" or "motorcycle" if it was measured by driving,
-    else "".  notes: what else stands in the file.
+    else "".  notes: what else stands in the file.  trim: degrees that the upright of the alignment was found to be off.
     """
 
     offset: list[float] = field(default_factory=lambda: [0.0] * 3)
@@ -36,6 +36,7 @@ class CalibrationFile:
     aligned: bool = False
     six_done: bool = False
     notes: dict[str, Any] = field(default_factory=dict)
+    trim: float = 0.0
     vehicle: str = ""
 
     def to_firmware(self) -> Calibration:
@@ -47,6 +48,7 @@ class CalibrationFile:
         for i in range(9):
             calibration.vehicle_from_sensor[i] = self.matrix[i]
         calibration.six_done, calibration.aligned = self.six_done, self.aligned
+        calibration.trim_deg = self.trim
         return calibration
 
 
@@ -78,6 +80,7 @@ def read_calibration(path: Path) -> CalibrationFile:
         _numbers(path, "gyro_bias_dps", _list(path, data, "gyro_bias_dps")),
         matrix,
     )
+    calibration.trim = _trim(path, data)
     _check_ranges(path, calibration)
     calibration.aligned = data.get("aligned", matrix != _IDENTITY) is True
     neutral = calibration.offset == [0.0] * 3 and calibration.slope == [1.0] * 3
@@ -97,6 +100,7 @@ def write_calibration(path: Path, calibration: CalibrationFile) -> None:
         "vehicle_from_sensor": [m[0:3], m[3:6], m[6:9]],
         "six_positions": calibration.six_done,
         "aligned": calibration.aligned,
+        "trim_deg": _rounded(calibration.trim),
     }
     if calibration.vehicle:
         data["vehicle"] = calibration.vehicle
@@ -125,6 +129,16 @@ def _numbers(path: Path, name: str, values: Any) -> list[float]:
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e6:
             raise InputError(f"{path}: {name} has {_shown(value)} where a number should be: calibrate again")
     return [float(value) for value in values]
+
+
+def _trim(path: Path, data: dict[str, Any]) -> float:
+    """Degrees; 0 where the file says nothing."""
+    value = data.get("trim_deg", 0.0)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= MAX_TRIM_DEG:
+        raise InputError(
+            f"{path}: trim_deg is {_shown(value)}, it is at most {MAX_TRIM_DEG:g} degrees: calibrate again"
+        )
+    return float(value)
 
 
 def _check_ranges(path: Path, calibration: CalibrationFile) -> None:

@@ -43,6 +43,27 @@ def status(port: str | None) -> None:
     deploy.status(port, click.echo)
 
 
+@kickstand.command()
+@_PORT
+@click.option("--out", type=_PATH, default=Path(), help="The directory to write to; this one if not given.")
+@click.option("--delete", is_flag=True, help="Remove from the board what came over whole.")
+def pull(port: str | None, out: Path, delete: bool) -> None:
+    """Fetch the rides that a board has recorded, as logs with their calibration."""
+    from . import pull
+
+    pull.pull(port, out, delete, click.echo, lambda line: click.echo(f"warning: {line}", err=True))
+
+
+@kickstand.command()
+@_PORT
+@_OUT
+def record(port: str | None, out: Path) -> None:
+    """Write a log live over USB until Ctrl-C; the board's display goes on."""
+    from . import record
+
+    record.record(port, out, click.echo, lambda line: click.echo(f"warning: {line}", err=True))
+
+
 @kickstand.group(no_args_is_help=False)
 def calibrate() -> None:
     """Compute a calibration from recorded poses or drives."""

@@ -50,6 +50,10 @@ class Block:
     time_place: int
     bytes_read: int  # of the file so far, as it is packed
 
+    def rows(self) -> Iterator[tuple[int, list[float], float]]:
+        """Time, reading and speed of each row."""
+        return zip(self.time_us.tolist(), self.readings.tolist(), self.speed_mps.tolist())
+
     @property
     def time_text(self) -> list[str]:
         """The times as they stand in the file."""

@@ -56,7 +56,7 @@ def with_progress(path: Path, what: str) -> Iterator[Block]:
 def _cpython(log: Path, calibration: CalibrationFile) -> Iterator[tuple[Block, list[Row]]]:
     engine = replay_engine.Replay(calibration.to_firmware())
     for block in with_progress(log, "replaying"):
-        yield block, [engine.step(*row) for row in zip(block.time_us.tolist(), block.readings.tolist())]
+        yield block, [engine.step(*row) for row in block.rows()]
 
 
 def _micropython(log: Path, calibration: CalibrationFile) -> Iterator[tuple[Block, list[Row]]]:
@@ -107,8 +107,8 @@ _RUN = {"cpython": _cpython, "micropython": _micropython, "rp2040": _rp2040}
 
 def _records(blocks: Iterable[Block], calibration: CalibrationFile) -> Iterator[bytes]:
     """What replay_engine.run reads."""
-    values = calibration.offset + calibration.slope + calibration.bias + calibration.matrix
+    values = calibration.offset + calibration.slope + calibration.bias + calibration.matrix + [calibration.trim]
     yield struct.pack(replay_engine.CALIBRATION, *values)
     for block in blocks:
-        for time_us, reading in zip(block.time_us.tolist(), block.readings.tolist()):
-            yield struct.pack(replay_engine.RECORD, time_us, *reading)
+        for time_us, reading, speed in block.rows():
+            yield struct.pack(replay_engine.RECORD, time_us, *reading, speed)

@@ -2,14 +2,15 @@
 
     micropython replay_engine.py RECORDS > RESULTS
 
-RECORDS starts with the calibration (18 doubles: offset, slope, gyro bias, matrix), then one record a sample:
-its time in microseconds (int64) and seven readings in the chip's order (doubles; g, C, deg/s). RESULTS has
-the doubles of COLUMNS for each. Binary, because a number printed and read again may be another number.
+RECORDS starts with the calibration (19 doubles: offset, slope, gyro bias, matrix, trim), then one record a sample:
+its time in microseconds (int64), seven readings in the chip's order (doubles; g, C, deg/s) and the speed in m/s, not
+a number where there is no new one. RESULTS has the doubles of COLUMNS for each. Binary, because a number printed and
+read again may be another number.
 """
 
 import struct
 import sys
-from math import degrees
+from math import degrees, isnan, nan
 
 from kickstand.calibration import Calibration
 from kickstand.lean import static_lean_deg
@@ -25,8 +26,8 @@ COLUMNS = (
     "yaw_rate_dps",
     "roll_rate_dps",
 )
-CALIBRATION = "<18d"
-RECORD = "<q7d"
+CALIBRATION = "<19d"
+RECORD = "<q8d"
 RESULT = "<8d"
 
 
@@ -37,14 +38,16 @@ class Replay:
         self.meter = LeanMeter(calibration)
         self._before = None
 
-    def take(self, time_us, reading):
-        """Give the meter a sample (7, the chip's order; g, C, deg/s)."""
+    def take(self, time_us, reading, speed_mps=nan):
+        """Give the meter a sample (7, the chip's order; g, C, deg/s) and the speed if there is a new one."""
+        if not isnan(speed_mps):
+            self.meter.measure_speed(speed_mps)
         self.meter.update(reading, 0 if self._before is None else time_us - self._before)
         self._before = time_us
 
-    def step(self, time_us, reading):
+    def step(self, time_us, reading, speed_mps=nan):
         """The same, and the values of COLUMNS after it."""
-        self.take(time_us, reading)
+        self.take(time_us, reading, speed_mps)
         meter = self.meter
         force, rate = meter.force, meter.rate
         return (
@@ -68,7 +71,7 @@ def run(source, sink):
         if len(record) < size:
             return
         values = struct.unpack(RECORD, record)
-        sink.write(struct.pack(RESULT, *replay.step(values[0], values[1:])))
+        sink.write(struct.pack(RESULT, *replay.step(values[0], values[1:8], values[8])))
 
 
 def _calibration(values):
@@ -78,6 +81,7 @@ def _calibration(values):
         calibration.gyro_bias[i] = values[6 + i]
     for i in range(9):
         calibration.vehicle_from_sensor[i] = values[9 + i]
+    calibration.trim_deg = values[18]
     return calibration
 
 

@@ -18,7 +18,7 @@ from ..logs import Block
 from ..replay import with_progress
 
 firmware_path.add_to_path()
-from kickstand.meter import FALLEN_DEG, MAX_VARIANCE  # noqa: E402
+from kickstand.meter import FALLEN_DEG  # noqa: E402
 
 from .. import replay_engine  # noqa: E402
 
@@ -31,7 +31,8 @@ class Channels:
     """n samples each. Axes left, up, forward; lean > 0 to the right; NaN where there is no value.
 
     lateral_g: the acceleration to the left of the road's plane, (23). shown_g: forward, smoothed as on the
-    display. sigma_deg: how uncertain the lean is. resting: the bike stands still (1 or 0).
+    display. sigma_deg: how uncertain the lean is. resting: the bike stands still (1 or 0). sure: the meter trusts
+    its lean (1 or 0).
     """
 
     t_s: Array
@@ -49,12 +50,12 @@ class Channels:
     shown_g: Array
     sigma_deg: Array
     resting: Array
+    sure: Array
 
     @property
     def trusted(self) -> NDArray[np.bool_]:
         """Where the display shows the lean and holds its maxima."""
-        sure = np.radians(self.sigma_deg) ** 2 <= MAX_VARIANCE * (1.0 + 1e-9)
-        return sure & ~(np.abs(self.lean_deg) >= FALLEN_DEG)
+        return (self.sure > 0.0) & ~(np.abs(self.lean_deg) >= FALLEN_DEG)
 
     def part(self, which: slice | NDArray[np.bool_]) -> "Channels":
         """Some of the samples."""
@@ -99,7 +100,7 @@ def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool 
     A car has no lean, and its lateral acceleration is the force to the left.
     """
     if car:
-        lean = lean * [0.0, 1.0, 0.0, 1.0] + [np.nan, 0.0, 0.0, 0.0]
+        lean = lean * [0.0, 1.0, 0.0, 1.0, 1.0] + [np.nan, 0.0, 0.0, 0.0, 0.0]
     matrix = np.reshape(calibration.matrix, (3, 3))
     force = (block.readings[:, :3] * calibration.slope + calibration.offset) @ matrix.T
     rate = (block.readings[:, 4:] - calibration.bias) @ matrix.T
@@ -122,6 +123,7 @@ def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool 
         lean[:, 1],
         np.degrees(np.sqrt(lean[:, 2])),
         lean[:, 3],
+        lean[:, 4],
     )
 
 
@@ -140,12 +142,12 @@ class _Lean:
         self._engine = replay_engine.Replay(calibration.to_firmware())
 
     def follow(self, block: Block) -> Array:
-        """(n, 4): lean in degrees, forward force as shown (g), variance of the lean (rad2), at rest."""
+        """(n, 5): lean in degrees, forward force as shown (g), variance of the lean (rad2), at rest, trusted."""
         take, meter = self._engine.take, self._engine.meter
         smooth = meter.smooth_force
         rows = []
-        for time_us, reading in zip(block.time_us.tolist(), block.readings.tolist()):
-            take(time_us, reading)
+        for row in block.rows():
+            take(*row)
             lean = meter.filter
-            rows.append((meter.lean_deg, smooth[2], lean.variance, lean.at_rest))
+            rows.append((meter.lean_deg, smooth[2], lean.variance, lean.at_rest, meter.trusted))
         return np.array(rows, dtype=float)

@@ -86,6 +86,7 @@ def _run(seconds: int, detail: bool) -> dict[str, Any]:
     del files["/main.py"]
     files["bench_guest.mpy"] = cross_compiled(_GUEST)
     arrays: list[np.ndarray] = []
+    stages: list[np.ndarray] = []
     result: dict[str, Any] = {}
     with Pico(_world(), files) as pico:
         samples = SampleCount(pico.board.sensor)
@@ -97,6 +98,8 @@ def _run(seconds: int, detail: bool) -> dict[str, Any]:
                 result["heap_samples"] = samples.delivered()
             elif data == b"end":
                 result.update(taken=samples.taken(), lost=samples.lost())
+            elif "taken" not in result:
+                stages.append(np.frombuffer(data, np.uint32))
             else:
                 arrays.append(np.frombuffer(data, np.uint16))
 
@@ -112,7 +115,7 @@ def _run(seconds: int, detail: bool) -> dict[str, Any]:
         else np.array([figures["collect_us"]])
     )
     if detail:
-        result["stages"] = arrays[2].reshape(len(arrays[0]), -1)[:turns].astype(int)
+        result["stages"] = np.array(stages).astype(int)
     return result
 
 

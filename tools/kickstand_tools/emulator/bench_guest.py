@@ -109,7 +109,7 @@ class MeasuredApp(app_module.App):
         self._until_us = seconds * 1_000_000
         self.count = -SETTLE_TURNS
         self.took = array("H", bytes(2 * turns))
-        self.stages = array("H", bytes(2 * turns * COLUMNS if spent else 0))
+        self._spent_bytes = bytearray_at(addressof(spent), 4 * COLUMNS) if spent else None
         self.pauses = array("H", bytes(2 * MAX_PAUSES))  # us of each collection that the app called for
         self.n_pauses = 0
         self.automatic = 0  # other collections
@@ -145,8 +145,7 @@ class MeasuredApp(app_module.App):
             raise Done
         self.took[turn] = took
         if self._spent:
-            for i in range(COLUMNS):
-                self.stages[turn * COLUMNS + i] = min(self._spent[i], 65535)
+            self._out.write(self._spent_bytes)  # at once: what is kept here takes room from what is measured
             self._clear()
         if self.count == HEAP_TURNS:
             self.heap_bytes = gc.mem_alloc() - self._allocated
@@ -201,7 +200,8 @@ def _stopwatch_us(spent):
 
 
 def run(detail, seconds, out):
-    """Prints one line, a dictionary of figures. Writes to out "begin", "end", then the arrays."""
+    """Prints one line, a dictionary of figures. Writes to out "begin", with detail an array('I') for each turn, "end",
+    then the other arrays."""
     settings = Settings(Config)
     app = MeasuredApp(settings, app_module.open_lcd(settings))
     spent = array("I", bytes(4 * COLUMNS)) if detail else None
@@ -239,7 +239,6 @@ def run(detail, seconds, out):
         "stopwatch_us": _stopwatch_us(spent) if detail else 0,
         "stages": [stage[0] for stage in STAGES] + ["read"],
     }
-    for data in (app.took, app.pauses, app.stages):
-        if data:
-            out.write(bytearray_at(addressof(data), 2 * len(data)))
+    for data in (app.took, app.pauses):
+        out.write(bytearray_at(addressof(data), 2 * len(data)))
     print(figures)

@@ -34,11 +34,12 @@ class SampleCount:
 
     def lost(self) -> int:
         """Samples that nobody can read any more: overwritten, pushed out of the FIFO, or thrown away with it."""
+        taken = self.taken()  # first: it lets the FIFO fill up to now
         frame = len(self._sensor._fifo_registers)
         if frame:
             kept = self._popped + self._sensor.fifo.count - self._waiting
-            return self.taken() - kept // frame
-        return max(0, self.taken() - 1 - len(self._read))  # the latest can still be read
+            return taken - kept // frame
+        return max(0, taken - 1 - len(self._read))  # the latest can still be read
 
     def _on_start(self, address: int, read: bool) -> bool:
         acknowledged = self._start(address, read)

@@ -1,0 +1,52 @@
+"""What a program on the board prints, as it comes: mpremote itself reads byte by byte, or only after the end."""
+
+import threading
+import time
+from collections.abc import Iterator
+from typing import Any
+
+from mpremote.transport_serial import SerialTransport
+
+_CTRL_C = b"\x03"
+_END = b"\x04"  # of the program's output, and of its error
+_LAST_S = 10.0  # for what is still said after Ctrl-C
+_POLL_S = 0.01
+
+
+class BrokenOff(Exception):
+    """The program has ended with an error, or says nothing any more; the text says which."""
+
+
+def lines(
+    transport: SerialTransport, code: str, silent_s: float, stopped: threading.Event | None = None
+) -> Iterator[bytes]:
+    """Run code on the board; each line that it prints, without its end. Raises BrokenOff, OSError.
+
+    silent_s: so long it may say nothing.  stopped: once set, the program gets a Ctrl-C.
+    """
+    transport.exec_raw_no_follow(code)
+    serial: Any = transport.serial
+    said = b""
+    asked_s = None
+    heard_s = time.monotonic()
+    while said.count(_END) < 2:
+        if stopped and stopped.is_set() and asked_s is None:
+            asked_s = time.monotonic()
+            serial.write(_CTRL_C)
+        if waiting := serial.inWaiting():
+            heard_s = time.monotonic()
+            said += serial.read(waiting)
+        elif time.monotonic() - heard_s > silent_s:
+            raise BrokenOff("the board says nothing any more")
+        elif asked_s is not None and time.monotonic() - asked_s > _LAST_S:
+            return
+        else:
+            time.sleep(_POLL_S)
+        output, end, error = said.partition(_END)
+        *whole, output = output.split(b"\n")
+        said = output + end + error
+        for line in whole:
+            yield line.strip()
+    error = said.split(_END)[1].decode(errors="replace").strip()
+    if error and asked_s is None:
+        raise BrokenOff(f"the board reports {error.rpartition(chr(10))[2].strip()}")
