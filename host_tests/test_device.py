@@ -6,6 +6,7 @@ import math
 import devices
 import engines
 import pytest
+from kickstand_tools.board.simulator import Board
 
 # On the stand to 8 s, upright to 18 s, then turns of 30 degrees to the left and 40 to the right at 15 m/s
 RIDE = [
@@ -192,6 +193,7 @@ def test_safe_mode_starts_nothing(tmp_path, capsys):
     ],
 )
 def test_a_wrong_setting_is_named(config, named, tmp_path, capsys):
+    Board(lambda t: (0, 0, 1, 0, 0, 0, 25)).install()  # for machine
     from kickstand.errors import SettingsError
     from kickstand.settings import Settings
 
