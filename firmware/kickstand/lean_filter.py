@@ -42,7 +42,7 @@ MAX_PITCH = 1.2  # rad: a motorcycle never, a sensor in the hand may; at 90 degr
 MAX_SPEED = 150.0 / _G
 
 # Uncertainties at the start: one sigma
-START_LEAN = radians(3.0)  # where the force looks like that of a standing bike
+START_LEAN = radians(1.5)  # where the force looks like that of a standing bike
 START_STAND = radians(0.5)
 START_STILL_G, START_STILL_RADPS = 0.05, 0.02
 START_LEAN_MOVING = radians(30.0)

@@ -8,7 +8,7 @@ from .transform import Transform
 
 SMOOTH_US = 300_000  # time constant of the g shown
 GAP_US = 500_000  # without readings for so long, the past says nothing about the present
-MAX_VARIANCE = radians(5.0) ** 2  # a lean less certain than this is not shown
+MAX_VARIANCE = radians(3.0) ** 2  # a lean less certain than this is not shown
 TRIM_SURE = radians(0.5)
 TRIM_STEP_DEG = 0.3  # less is not worth wearing the flash
 FALLEN_DEG = 65.0
