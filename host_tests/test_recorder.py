@@ -58,8 +58,8 @@ def computed(monkeypatch):
     leans = []
     update = LeanMeter.update
 
-    def noted(self, reading, dt_us):
-        update(self, reading, dt_us)
+    def noted(self, *arguments):
+        update(self, *arguments)
         leans.append(self.lean_deg)
 
     monkeypatch.setattr(LeanMeter, "update", noted)
