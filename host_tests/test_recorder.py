@@ -58,8 +58,8 @@ def computed(monkeypatch):
     leans = []
     update = LeanMeter.update
 
-    def noted(self, reading, dt_us):
-        update(self, reading, dt_us)
+    def noted(self, *arguments):
+        update(self, *arguments)
         leans.append(self.lean_deg)
 
     monkeypatch.setattr(LeanMeter, "update", noted)
@@ -85,7 +85,7 @@ def test_a_recorded_ride_replays_as_the_display_showed(engine, tmp_path, compute
     if engine == "cpython":
         before = sum(len(block.turns) for block in found[1])
         exact = showed[before : before + len(leans)]
-        assert max(abs(a - b) for a, b in zip(exact, leans, strict=True)) < 0.01
+        assert max(abs(a - b) for a, b in zip(exact, leans, strict=True)) < 0.03
     assert record.at(40)[0].endswith("*")
 
 
@@ -107,7 +107,7 @@ def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
     steps = [b.time_us - a.time_us for a, b in pairwise(t for block in found[1] for t in block.turns)]
     assert [step > 500_000 for step in steps].count(True) == 1
     leans = replayed(found[1], tmp_path)
-    assert max(abs(a - b) for a, b in zip(exact[: len(leans)], leans, strict=True)) < 0.01
+    assert max(abs(a - b) for a, b in zip(exact[: len(leans)], leans, strict=True)) < 0.03
 
 
 def test_the_menu_starts_and_ends_a_ride(tmp_path):

@@ -146,7 +146,10 @@ class Screen:
             if self._page % 2 == 0:
                 return self.drive.lines(now_ms)
             return pages.not_aligned(self.meter, now_ms // 1000, "drive and brake")
-        page = self._page % (len(self._pages) + self._driving + self._recorder.active)
+        count = len(self._pages) + self._driving + self._recorder.active
+        if self._page >= count:  # here and not in each use: when a page goes, the others stay where they are
+            self._page = 0
+        page = self._page
         if page == len(self._pages) and self._driving:
             return self.drive.lines(now_ms)
         if page >= len(self._pages):

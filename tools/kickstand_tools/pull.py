@@ -17,7 +17,7 @@ from .ride_blocks import CUT_SHORT, Block, read
 
 Print = Callable[[str], None]
 
-_SILENT_S = 20.0
+_SILENT_S = 60.0  # an emulated board takes a while
 
 # Prints the directory and (name, bytes) of each part of a ride
 _LIST = """
@@ -66,7 +66,7 @@ def pull(port: str | None, out: Path, delete: bool, say: Print, warn: Print) -> 
 
 def _list(transport: SerialTransport, name: str) -> tuple[str, dict[str, list[tuple[str, int]]]]:
     """Where the rides are, and the parts of each by the number in their names."""
-    listed, error = transport.exec_raw(_LIST)
+    listed, error = transport.exec_raw(_LIST, timeout=_SILENT_S)
     if error:
         reason = error.decode(errors="replace").strip().rpartition("\n")[2]
         if "CardError" in reason or "SettingsError" in reason:
