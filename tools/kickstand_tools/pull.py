@@ -17,7 +17,7 @@ from .ride_blocks import CUT_SHORT, Block, read
 
 Print = Callable[[str], None]
 
-_SILENT_S = 60.0  # an emulated board takes a while
+_SILENT_S = 60  # an emulated board takes a while
 
 # Prints the directory and (name, bytes) of each part of a ride
 _LIST = """
