@@ -12,7 +12,6 @@ from machine import Pin
 from . import bus, port
 from .button import Button
 from .calibration import Calibration
-from .drive_mode import DriveMode
 from .errors import SettingsError, StoreError
 from .hd44780 import Lcd
 from .meter import LeanMeter
@@ -22,7 +21,6 @@ from .ride_ring import RideRing
 from .sample_clock import SampleClock
 from .screen import Screen
 from .sensor import Sensor
-from .speed import open_speed
 from .store import Store
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
@@ -87,8 +85,12 @@ class App:
         self.sensor = open_sensor(settings)
         self.store = None  # until the chip has said who it is: a calibration belongs to one chip
         self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle")
-        speed = open_speed(settings)
-        self.drive = DriveMode(settings.VEHICLE, speed, self.meter, self._keep) if speed else None
+        self.drive = None
+        if settings.SPEED:  # 30 KB that a board without has for itself
+            from .drive_mode import DriveMode
+            from .speed import open_speed
+
+            self.drive = DriveMode(settings.VEHICLE, open_speed(settings), self.meter, self._keep)
         self._clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self._restarts = 0
         self.recorder = Recorder(keeper or RideRing(settings), settings.SAMPLE_HZ)
@@ -134,7 +136,7 @@ class App:
         if self.drive:
             speed = self.drive.poll(now_ms)
             if speed is not None and self.recorder.active:
-                self.recorder.add_speed(int(100 * speed))
+                self.recorder.add_speed(int(100 * speed + 0.5))
         self.sensor.check(now_ms)
         if self.sensor.fault is not None:
             self._clock.restart()

@@ -19,7 +19,7 @@ from .driving import (
     WAITING_FOR_STOP,
     DriveAlignment,
 )
-from .driving_check import MOVED, REFINED, REVERSED, compare, turn_round
+from .driving_check import MOVED, REFINED, REVERSED, SAME, compare, turn_round
 from .errors import StoreError
 from .pages import DEGREE
 from .rotation import matrix
@@ -40,6 +40,8 @@ _WAITS = {
 _KNOWN_BIAS = (0.0, 0.0, 0.0)  # with an alignment the gyro's bias was measured too, and is taken off
 STAND_SIDE = ("Stand was right?", "hold = fix")
 MOUNT_MOVED = ("Mount has moved", "Align again")
+_DOUBTS = {STAND_SIDE: "stand was right?", MOUNT_MOVED: "mount has moved"}  # in place of the lean, until answered
+CHECKED = 2  # brakings whose force fits the speed: a wheel with two magnets shall not spoil the lean
 
 
 class DriveMode:
@@ -90,17 +92,29 @@ class DriveMode:
             self._total[i] = 0
 
     def poll(self, now_ms):
-        """Once each turn of the loop: speed, and what there is to do. Returns a new speed in m/s, or None."""
+        """Once each turn of the loop: speed, and what there is to do. Returns a new speed in m/s that is fit to be
+        kept, or None."""
         speed = self.speed.poll(now_ms)
         if speed is not None:
             self._speed_mps = speed
             self._speed_ms = now_ms
             self.drive.measure_speed(speed, self.speed.age_us)
-            if self.vehicle == MOTORCYCLE:
-                self._meter.measure_speed(speed)
+            speed = self._for_lean(speed)
         if self._look_ms is None or ticks_diff(now_ms, self._look_ms) >= 0:
             self._look_ms = ticks_add(now_ms, LOOK_MS)
             self._look(now_ms)
+        return speed
+
+    def _for_lean(self, speed):
+        """What the lean filter may have: not what no braking has confirmed yet, and no zero, which a broken wire gives
+        too; a standstill it sees by itself. Rounded as a record keeps it. None otherwise."""
+        if self.vehicle != MOTORCYCLE:
+            return speed
+        drive = self.drive
+        if speed <= 0.0 or drive.problem is not None or drive.speed_problem is not None or drive.counted < CHECKED:
+            return None
+        speed = int(100 * speed + 0.5) / 100
+        self._meter.measure_speed(speed)
         return speed
 
     def feed(self, sums, n, dt_us, now_ms):
@@ -145,6 +159,8 @@ class DriveMode:
                 self._say(MOUNT_MOVED)
             elif verdict == REFINED and drive.ready:
                 self._take(False)
+            elif verdict == SAME:
+                self._meter.doubt = None
 
     def _refused(self, lines, aligned):
         """What has gone wrong so far may end: the drive is begun anew, the reason stays on the page until then."""
@@ -156,11 +172,14 @@ class DriveMode:
     def _say(self, lines):
         if lines not in self._told:
             self.message = lines
+            if self.vehicle == MOTORCYCLE:
+                self._meter.doubt = _DOUBTS.get(lines)
 
     def answer(self, event):
         """A press while there is a message."""
         message, self.message = self.message, None
         self._told.append(message)
+        self._meter.doubt = None
         if event == LONG and message == STAND_SIDE:
             old = self._meter.calibration
             turned = matrix()

@@ -21,6 +21,7 @@ class LeanMeter:
 
     After update(): force (left, up, forward in g), rate (about them in rad/s), lean_deg (the filter's, > 0
     right), smooth_force (g, for display; of an aligned one forward alone), fallen, and the maxima since reset_maxima().
+    doubt: None, or for what reason the lean is not to be trusted, set by whoever knows.
     """
 
     def __init__(self, calibration, leans=True):
@@ -31,10 +32,13 @@ class LeanMeter:
         self.smooth_force = [0.0] * 3
         self._reading, self._n = (0,) * 7, 0
         self.reset_maxima()
+        self.calibration = self.doubt = None
         self.use(calibration)
 
     def use(self, calibration):
         """Take another calibration, its scale set, and forget what the one before led to."""
+        if calibration is not self.calibration:
+            self.doubt = None
         self.calibration = calibration
         self._transform = Transform(calibration)
         self.filter = LeanFilter()
@@ -61,6 +65,8 @@ class LeanMeter:
         """True while lean_deg is certain enough to be shown."""
         if not self._leans:
             return True
+        if self.doubt:
+            return False
         return self.filter.variance <= MAX_VARIANCE and abs(self.filter.pitch_deg) < WHEELIE_DEG
 
     def keep_trim(self):

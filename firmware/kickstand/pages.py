@@ -10,10 +10,14 @@ _BLOCK = 0xFF
 _HALF_BAR = 8  # cells to each side of the middle
 _DEG_PER_COLUMN = 1.5  # 8 cells of 5 columns: the bar ends at 60 degrees
 
-UNSURE = ("Lean  --", "not sure yet")
 FALLEN = ("Fallen over?", "Lean over 65" + DEGREE)
 
 _bar = bytearray(16)
+
+
+def unsure(doubt):
+    """No lean. doubt: why, if there is a reason to say."""
+    return "Lean  --", doubt or "not sure yet"
 
 
 def lean_bar(lean_deg):

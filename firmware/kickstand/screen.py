@@ -157,7 +157,7 @@ class Screen:
         if self.meter.fallen:
             return pages.FALLEN
         if not self.meter.trusted or abs(self.meter.lean_deg) > FALLEN_DEG:
-            return pages.UNSURE
+            return pages.unsure(self.meter.doubt)
         line1, line2 = self._pages[page](self.meter)
         if page == 0 and self._recorder.active:
             line1 = pages.recorded(line1)

@@ -6,8 +6,6 @@ from machine import UART, Pin
 
 from . import port
 from .errors import SettingsError
-from .gps import Gps
-from .wheel import Wheel
 
 MAX_MPS = 100.0
 MAX_CHANGE_MPS2 = 15.0  # no tyre holds more
@@ -47,12 +45,14 @@ class Speed:
 
 
 def open_speed(settings):
-    """The Speed of these settings, None if they name no source. Raises SettingsError for pins it cannot use."""
+    """The Speed of these settings, which name a source. Raises SettingsError for pins it cannot use."""
     if settings.SPEED == "gps":
+        from .gps import Gps
+
         return Speed(Gps(_open_uart(settings)))
-    if settings.SPEED == "wheel":
-        return Speed(Wheel(_open_wheel_pin(settings), settings.PULSES_PER_METRE, port.PIN_IRQ))
-    return None
+    from .wheel import Wheel
+
+    return Speed(Wheel(_open_wheel_pin(settings), settings.PULSES_PER_METRE, port.PIN_IRQ))
 
 
 def _open_uart(settings):

@@ -9,7 +9,6 @@ from . import __version__, app
 from .errors import SettingsError
 from .mpu6050 import UnknownChip
 from .settings import load
-from .speed import open_speed
 from .store import Store
 
 LISTEN_MS = 3500
@@ -89,10 +88,12 @@ def _display(lcd):
 
 def _speed(settings):
     """Listen for as long as it takes to say what is wrong."""
-    speed = open_speed(settings)
-    if speed is None:
+    if settings.SPEED is None:
         print("Speed        no source: SPEED is not set, alignment by driving is off")
         return
+    from .speed import open_speed
+
+    speed = open_speed(settings)
     if settings.SPEED == "gps":
         print("Speed        GPS on UART %d, RX %d, %d baud:" % (settings.GPS_UART, settings.GPS_RX, settings.GPS_BAUD))
     else:

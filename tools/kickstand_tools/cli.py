@@ -15,7 +15,10 @@ _PORT = click.option(
 )
 
 
-@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
+)
 @click.version_option(package_name="kickstand")
 @click.pass_context
 def kickstand(context: click.Context) -> None:
@@ -108,7 +111,9 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
 
 @calibrate.command()
 @click.argument("logs", nargs=-1, required=True, type=_PATH, metavar="LOG.csv...")
-@click.option("--calibration", type=_PATH, help="What is known already: six positions, and a motorcycle's two poses.")
+@click.option(
+    "--calibration", type=_PATH, help="What is known already: six positions, and a motorcycle's two poses."
+)
 @click.option(
     "--vehicle",
     type=click.Choice(["motorcycle", "car"]),
@@ -116,7 +121,9 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
 )
 @click.option("--method", type=click.Choice(["improved", "published"]), default="improved")
 @_OUT
-def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None, method: str, out: Path) -> None:
+def drive(
+    logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None, method: str, out: Path
+) -> None:
     """How the sensor sits on the vehicle, from logs of driving with speed: stops and straight brakings."""
     from . import calibrate, calibrate_drive
     from .calibration_file import read_calibration, write_calibration
@@ -155,8 +162,10 @@ def replay(log: Path, calibration: Path, engine: str, out: Path) -> None:
 @click.option("--profile", required=True, help="street, track, sweeper, city, hills, or a hard one.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Another seed, another ride.")
 @click.option("--seconds", type=click.FloatRange(min=20.0, max=7200.0), default=640.0)
-@click.option("--upright-error", type=click.FloatRange(-30.0, 30.0), default=0.0, help="Degrees, right > 0.")
-@click.option("--pitch-change", type=click.FloatRange(-10.0, 10.0), help="Degrees; at random if not given.")
+@click.option("--upright-error", type=click.FloatRange(-30.0, 30.0), default=0.0, help="Of the upright pose.")
+@click.option(
+    "--pitch-change", type=click.FloatRange(-10.0, 10.0), help="Between the poses; at random if not given."
+)
 @click.option("--speed", is_flag=True, help="Write a speed into the log, once a second.")
 @click.option("--out", required=True, type=_PATH, help="The directory to write to.")
 def simulate(
@@ -179,8 +188,12 @@ def simulate(
 @click.option("--profiles", default="street,track,sweeper,city,hills", help="With commas between.")
 @click.option("--seeds", type=click.IntRange(min=1), default=3, help="Rides of each profile.")
 @click.option("--seconds", type=click.FloatRange(min=60.0, max=7200.0), default=640.0, help="Of each ride.")
-@click.option("--upright-error", type=click.FloatRange(-30.0, 30.0), default=0.0, help="Degrees.")
-@click.option("--pitch-change", type=click.FloatRange(-10.0, 10.0), default=1.0, help="Degrees.")
+@click.option(
+    "--upright-error", type=click.FloatRange(-30.0, 30.0), default=0.0, help="Of the upright pose, degrees."
+)
+@click.option(
+    "--pitch-change", type=click.FloatRange(-10.0, 10.0), default=1.0, help="Between the two poses, degrees."
+)
 @click.option("--recording", type=_PATH, help="A recorded ride with speed to compare on too.")
 @click.option("--out", type=_PATH, help="Write evaluation.json and lean.png to this directory.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
@@ -245,7 +258,9 @@ def bench(seconds: int, as_json: bool) -> None:
         Console().print(tables(result))
 
 
-_CALIBRATION = click.option("--calibration", type=_PATH, help="A CAL.json; if not given, the one beside the ride.")
+_CALIBRATION = click.option(
+    "--calibration", type=_PATH, help="A CAL.json; if not given, the one beside the ride."
+)
 
 
 @kickstand.command()

@@ -1,5 +1,7 @@
 """What the command line refuses."""
 
+import sys
+
 
 class InputError(Exception):
     """Something the user gave cannot be used. The text is one line: what is wrong, and what to do."""
@@ -8,3 +10,8 @@ class InputError(Exception):
 def cause(error: BaseException) -> str:
     """A short reason for an error of the operating system, without its number: "Permission denied"."""
     return getattr(error, "strerror", None) or str(error) or type(error).__name__
+
+
+def extra(name: str) -> str:
+    """How to install an optional part of the project."""
+    return f"in the project's directory, {sys.executable} -m pip install \".[{name}]\""

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
 
-from ..errors import InputError
+from ..errors import InputError, extra
 from .channels import Channels
 from .export_csv import COLUMNS
 
@@ -15,7 +15,7 @@ from .export_csv import COLUMNS
 def check() -> None:
     """Raise InputError where Parquet cannot be written."""
     if not find_spec("pyarrow"):
-        raise InputError('Parquet needs pyarrow: pip install "kickstand[rides]"')
+        raise InputError("Parquet needs pyarrow: " + extra("rides"))
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:

