@@ -22,6 +22,7 @@ STAGES = (
     ("page", "screen", "Screen", "lines(self, now_ms)"),
     ("display", "hd44780", "Lcd", "tick(self, now_ms)"),
 )
+NOTHING = ("apply_sum", "tick")  # is what these return
 BUS = len(STAGES)  # one more column: the sensor's transfers
 COLUMNS = BUS + 1
 SETTLE_TURNS = 150  # before anything is recorded
@@ -163,24 +164,40 @@ class MeasuredApp(app_module.App):
                 self._spent[i] = 0
 
 
-# Each parameter by name: a call with *arguments frees memory after it, and the next allocation searches from there
+# No *arguments and few locals: both would take memory that is freed when it returns, and make what is measured search
+# from there for more
 _TIMED = """
 def {name}({parameters}):
-    start = ticks_us()
-    result = function({parameters})
-    spent[{i}] += ticks_diff(ticks_us(), start)
-    return result
+    begin({i})
+    {result}function({parameters})
+    end({i})
+{back}
 """
+
+
+def _timed(spent, function, i, signature, returns):
+    """function with a stopwatch: its time is added to spent[i]."""
+    starts = array("I", bytes(4 * BUS))
+
+    def begin(i):
+        starts[i] = ticks_us()
+
+    def end(i):
+        spent[i] += ticks_diff(ticks_us(), starts[i])
+
+    name, parameters = signature[:-1].split("(")
+    result, back = ("result = ", "    return result") if returns else ("", "")
+    scope = {"function": function, "begin": begin, "end": end}
+    exec(_TIMED.format(name=name, parameters=parameters, i=i, result=result, back=back), scope)
+    return scope[name]
 
 
 def _time_stages(spent):
     for i in range(BUS):
         _, module, of, method = STAGES[i]
-        name, parameters = method[:-1].split("(")
+        name = method.split("(")[0]
         owner = getattr(__import__("kickstand." + module, None, None, (module,)), of)
-        scope = {"function": getattr(owner, name), "spent": spent, "ticks_us": ticks_us, "ticks_diff": ticks_diff}
-        exec(_TIMED.format(name=name, parameters=parameters, i=i), scope)
-        setattr(owner, name, scope[name])
+        setattr(owner, name, _timed(spent, getattr(owner, name), i, method, name not in NOTHING))
 
 
 def _stopwatch_us(spent):
@@ -188,10 +205,8 @@ def _stopwatch_us(spent):
     def function(self, n):
         pass
 
-    scope = {"function": function, "spent": spent, "ticks_us": ticks_us, "ticks_diff": ticks_diff}
-    exec(_TIMED.format(name="timed", parameters="self, n", i=0), scope)
     took = []
-    for call in (function, scope["timed"]):
+    for call in (function, _timed(spent, function, 0, "timed(self, n)", True)):
         start = ticks_us()
         for _ in range(100):
             call(None, 0)
