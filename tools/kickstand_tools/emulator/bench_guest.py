@@ -26,7 +26,7 @@ NOTHING = ("apply_sum", "tick")  # is what these return
 BUS = len(STAGES)  # one more column: the sensor's transfers
 COLUMNS = BUS + 1
 SETTLE_TURNS = 150  # before anything is recorded
-HEAP_TURNS = 20  # with the collector off
+HEAP_TURNS = 10  # with the collector off
 MAX_PAUSES = 2000
 MAX_TURNS_HZ = 200
 
@@ -91,6 +91,7 @@ class TimedGc:
             return
         start = ticks_us()
         gc.collect()
+        app_module.fill_gaps(app_module.SINGLE_GAPS)  # as the app does
         if app.n_pauses < MAX_PAUSES:
             app.pauses[app.n_pauses] = min(ticks_diff(ticks_us(), start), 65535)
             app.n_pauses += 1
@@ -129,6 +130,7 @@ class MeasuredApp(app_module.App):
 
     def _begin(self):
         gc.collect()
+        app_module.fill_gaps(app_module.SINGLE_GAPS)  # as the app does
         self.free_before = gc.mem_free()
         gc.disable()
         self._allocated = gc.mem_alloc()
@@ -153,6 +155,7 @@ class MeasuredApp(app_module.App):
             self._out.write(b"heap")
             gc.enable()
             gc.collect()
+            app_module.fill_gaps(app_module.SINGLE_GAPS)
             self.canary.arm()
         elif self.count > HEAP_TURNS and self.canary.died():
             self.automatic += 1
@@ -214,9 +217,11 @@ def _stopwatch_us(spent):
     return (took[1] - took[0]) // 100
 
 
-def run(detail, seconds, out):
+def run(detail, seconds, out, chosen):
     """Prints one line, a dictionary of figures. Writes to out "begin", with detail an array('I') for each turn, "end",
-    then the other arrays."""
+    then the other arrays. chosen: settings by name."""
+    for name in chosen:
+        setattr(Config, name, chosen[name])
     settings = Settings(Config)
     app = MeasuredApp(settings, app_module.open_lcd(settings))
     spent = array("I", bytes(4 * COLUMNS)) if detail else None
