@@ -2,6 +2,10 @@
 
 sensor -> calibration and alignment -> lean -> page -> display, in one direction. The chip samples at SAMPLE_HZ by
 itself; a turn of the loop takes what has come in.
+
+What lasts for most of a turn (step, _take, LeanMeter.update, Sensor.fetch) needs at most eleven words for locals and
+stack: more of them MicroPython keeps on the heap, and where they were freed the next search for memory begins, before
+all that the turns since the last collection have left. That took up to a millisecond a turn.
 """
 
 import gc
@@ -25,8 +29,17 @@ from .store import Store
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
 COLLECT_TURNS = 25  # 70 KB of heap: less than half of what is free
+SINGLE_GAPS = 300  # that a collection leaves
 PAGE_MS = 100
 TRIM_MS = 60_000
+
+
+def fill_gaps(n):
+    """Take n single places of the heap, one by one and for nothing: else each object that needs more than one place
+    would be searched for past all of them, until samples have filled them. 2 ms here in place of 0.4 in samples."""
+    value = 0.5
+    for _ in range(n):
+        value = -value
 
 
 def open_lcd(settings):
@@ -85,12 +98,7 @@ class App:
         self.sensor = open_sensor(settings)
         self.store = None  # until the chip has said who it is: a calibration belongs to one chip
         self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle")
-        self.drive = None
-        if settings.SPEED:  # 30 KB that a board without has for itself
-            from .drive_mode import DriveMode
-            from .speed import open_speed
-
-            self.drive = DriveMode(settings.VEHICLE, open_speed(settings), self.meter, self._keep)
+        self.drive = self._open_drive() if settings.SPEED else None
         self._clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self._restarts = 0
         self.recorder = Recorder(keeper or RideRing(settings), settings.SAMPLE_HZ)
@@ -99,6 +107,12 @@ class App:
         self._page_ms = ticks_ms()
         self._trim_ms = self._page_ms
         self._fault_shown = False
+
+    def _open_drive(self):
+        from .drive_mode import DriveMode  # 30 KB of heap with all that they import: not for those without a source
+        from .speed import open_speed
+
+        return DriveMode(self.settings.VEHICLE, open_speed(self.settings), self.meter, self._keep)
 
     def run(self):
         """Loop until Ctrl-C, LOOP_US a turn."""
@@ -110,6 +124,7 @@ class App:
 
     def _loop(self):
         watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
+        gc.threshold(-1)
         due_us = ticks_us()
         turns = 0
         while True:
@@ -118,6 +133,7 @@ class App:
             if turns >= COLLECT_TURNS:  # here and not in the middle of a sample; the FIFO keeps what comes meanwhile
                 turns = 0
                 gc.collect()
+                fill_gaps(SINGLE_GAPS)
             if watchdog:
                 watchdog.feed()
             due_us = ticks_add(due_us, LOOP_US)
@@ -132,11 +148,10 @@ class App:
         now_us, now_ms = ticks_us(), ticks_ms()
         n = self.sensor.fetch(now_ms)
         if n:
-            self._take(n, now_us, now_ms)
+            dt_us = self._clock.step(n, now_us)
+            self._take(n, dt_us, now_ms)
         if self.drive:
-            speed = self.drive.poll(now_ms)
-            if speed is not None and self.recorder.active:
-                self.recorder.add_speed(int(100 * speed + 0.5))
+            self._poll_speed(now_ms)
         self.sensor.check(now_ms)
         if self.sensor.fault is not None:
             self._clock.restart()
@@ -147,14 +162,23 @@ class App:
             self._clock.emptied(now_us)
         self.screen.handle(self.button.poll(now_ms), now_ms)
         if ticks_diff(now_ms, self._page_ms) >= 0:
-            self._page_ms = ticks_add(now_ms, PAGE_MS)
-            self._fault_shown = self.sensor.fault is not None
-            line1, line2 = self.screen.lines(now_ms)
-            self.lcd.show(line1, line2)
-            self._keep_trim(now_ms)
+            self._show(now_ms)
         self.lcd.tick(now_ms)
         if self.recorder.active:
             self.recorder.tick()
+
+    def _poll_speed(self, now_ms):
+        speed = self.drive.poll(now_ms)
+        if speed is not None and self.recorder.active:
+            self.recorder.add_speed(int(100 * speed + 0.5))
+
+    def _show(self, now_ms):
+        """The page as it is now."""
+        self._page_ms = ticks_add(now_ms, PAGE_MS)
+        self._fault_shown = self.sensor.fault is not None
+        line1, line2 = self.screen.lines(now_ms)
+        self.lcd.show(line1, line2)
+        self._keep_trim(now_ms)
 
     def _record(self):
         """Begin a ride, which the filter has to begin with, too: where the bike stands it loses nothing by that. A
@@ -183,22 +207,25 @@ class App:
             print(error.reason)
         return True
 
-    def _take(self, n, now_us, now_ms):
-        """The n samples that came in: each to the wizard, all at once to the meter."""
+    def _take(self, n, dt_us, now_ms):
+        """The n samples that came in, dt_us after those before: each to the wizard, all at once to the meter."""
         if self._restarts != self.sensor.restarts:
             self._restarts = self.sensor.restarts
             self._sensor_started()
-        chip, wizard = self.sensor.chip, self.screen.wizard
-        dt_us = self._clock.step(n, now_us)
+        chip = self.sensor.chip
         self.meter.update(chip.sums, dt_us, n)
         if self.recorder.active:
             self.recorder.add(chip.sums, n, dt_us)
         if self.drive:
             self.drive.feed(chip.sums, n, dt_us, now_ms)
-        if wizard:
-            for k in range(n):
-                chip.take(k)
-                wizard.sample(chip.counts, now_ms)
+        if self.screen.wizard:
+            self._teach(n, now_ms)
+
+    def _teach(self, n, now_ms):
+        chip, wizard = self.sensor.chip, self.screen.wizard
+        for k in range(n):
+            chip.take(k)
+            wizard.sample(chip.counts, now_ms)
 
     def _sensor_started(self):
         """The chip runs, for the first time or again after a fault, perhaps another one."""

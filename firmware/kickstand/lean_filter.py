@@ -155,24 +155,30 @@ class LeanFilter:
 
     def update(self, force, rate, dt_us):
         """One sample: force (3, g), rate (3, rad/s), dt_us since the one before. Returns lean in degrees."""
-        fx, fy, fz = force[0], force[1], force[2]
+        fx, fy, fz = force
+        wx, wy, wz = rate
         x = self._x
-        wx = rate[0] - x[BX]
-        wy = rate[1] - x[BY]
-        wz = rate[2] - x[BZ]
-        wz -= x[ZX] * wx + x[ZY] * wy + x[ZZ] * wz
-        wx -= x[XX] * wx + x[XY] * wy
-        t, v = x[T], x[V]
+        t, q, v, bx, by, bz, yaw_error, xx, xy, zx, zy, zz = x
+        wx -= bx
+        wy -= by
+        wz -= bz
+        wz -= zx * wx + zy * wy + zz * wz
+        wx -= xx * wx + xy * wy
         st, ct = sin(t), cos(t)
-        sq = sin(x[Q])
+        sq = sin(q)
         cq = sqrt(1.0 - sq * sq)
         dt = dt_us * 1e-6
-        acceleration = fz - sq + v * wy * x[Y]
+        sideways = v * wy
+        acceleration = fz - sq + sideways * yaw_error
         x[T] = t + (wz - sq / cq * (wx * st + wy * ct)) * dt
-        x[Q] = max(-MAX_PITCH, min(MAX_PITCH, x[Q] + (wy * st - wx * ct) * dt))
-        x[V] = max(0.0, v + acceleration * dt)
+        q += (wy * st - wx * ct) * dt
+        if not -MAX_PITCH <= q <= MAX_PITCH:
+            q = -MAX_PITCH if q < 0.0 else MAX_PITCH
+        x[Q] = q
+        speed = v + acceleration * dt
+        x[V] = speed if speed > 0.0 else 0.0
         sums = self._sums
-        left = fx - cq * st - v * wy - acceleration * x[Y]
+        left = fx - cq * st - sideways - acceleration * yaw_error
         sums[0] += left
         sums[8] += left * left
         sums[1] += fy - cq * ct + v * wx
@@ -185,9 +191,10 @@ class LeanFilter:
         self._roll_rate = wz
         self._count += 1
         self._window_us += dt_us
-        if self._work is not None:
+        work = self._work
+        if work is not None:
             for _ in range(self._pieces):
-                if next(self._work, True):
+                if next(work, True):
                     self._work = None
                     break
         elif self._window_us >= (WINDOW_US if self._p is not None else START_US):

@@ -106,26 +106,27 @@ class LeanMeter:
         if self._fresh:
             dt_us = 0  # there is no reading before, on the board and in a replay alike
         self._reading, self._n = reading, n
-        force = self.force
         if n:
-            self._transform.apply_sum(reading, n, force, self.rate)
+            self._transform.apply_sum(reading, n, self.force, self.rate)
         else:
-            self._transform.apply(reading, force, self.rate)
-        gain = 1.0 if self._fresh else dt_us / (SMOOTH_US + dt_us)
+            self._transform.apply(reading, self.force, self.rate)
+        self._smooth(1.0 if self._fresh else dt_us / (SMOOTH_US + dt_us))
         self._fresh = False
-        smooth = self.smooth_force
+        self.lean_deg = lean = self.filter.update(self.force, self.rate, dt_us) if self._leans else 0.0
+        if -FALLEN_DEG < lean < FALLEN_DEG:
+            self._flat_us = 0
+            self.fallen = False
+            self._hold_maxima(lean, self.smooth_force[2])
+        else:
+            self._flat_us += dt_us
+            self.fallen = self._flat_us >= FALLEN_US
+
+    def _smooth(self, gain):
+        force, smooth = self.force, self.smooth_force
         smooth[2] += gain * (force[2] - smooth[2])
         if not (self.calibration.aligned and self._leans):  # then the other two are shown as well
             smooth[0] += gain * (force[0] - smooth[0])
             smooth[1] += gain * (force[1] - smooth[1])
-        self.lean_deg = lean = self.filter.update(force, self.rate, dt_us) if self._leans else 0.0
-        if -FALLEN_DEG < lean < FALLEN_DEG:
-            self._flat_us = 0
-            self.fallen = False
-            self._hold_maxima(lean, smooth[2])
-        else:
-            self._flat_us += dt_us
-            self.fallen = self._flat_us >= FALLEN_US
 
     def _hold_maxima(self, lean, forward):
         if (

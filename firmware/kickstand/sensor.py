@@ -36,20 +36,12 @@ class Sensor:
             if ticks_diff(now_ms, self._due_ms) >= 0:
                 self._start(now_ms)
             return 0
-        try:
-            if self._failures:
-                self.chip.restart_fifo()  # what broke off may have left half a frame
-            waiting = self.chip.fetch()
-        except OSError:
-            self._missed(now_ms)
+        waiting = self._transfer(now_ms)
+        if waiting < 0:
             return 0
         self._failures = 0
         if not waiting:
-            if self._overflows != self.chip.overflows:  # nobody came to fetch; the FIFO begins again now
-                self._overflows = self.chip.overflows
-                self._sample_ms = now_ms
-            elif ticks_diff(now_ms, self._sample_ms) > SILENT_MS:
-                self._fail("Sensor silent", "starting again", now_ms)
+            self._wait(now_ms)
             return 0
         self._sample_ms = now_ms
         good = self.chip.add_up(waiting)
@@ -58,6 +50,23 @@ class Sensor:
         if good < waiting:
             self._fail("Sensor frozen", "starting again", now_ms)
         return good
+
+    def _transfer(self, now_ms):
+        """How many samples have come in, -1 if that could not be read."""
+        try:
+            if self._failures:
+                self.chip.restart_fifo()  # what broke off may have left half a frame
+            return self.chip.fetch()
+        except OSError:
+            self._missed(now_ms)
+            return -1
+
+    def _wait(self, now_ms):
+        if self._overflows != self.chip.overflows:  # nobody came to fetch; the FIFO begins again now
+            self._overflows = self.chip.overflows
+            self._sample_ms = now_ms
+        elif ticks_diff(now_ms, self._sample_ms) > SILENT_MS:
+            self._fail("Sensor silent", "starting again", now_ms)
 
     def check(self, now_ms):
         """Now and then: is the chip still set up as it was? Never raises. Call it before readings are shown."""

@@ -240,7 +240,7 @@ def emulate(port: int) -> None:
 
 
 @kickstand.command()
-@click.option("--seconds", type=click.IntRange(1, 600), default=10, help="Emulated, of each of two runs.")
+@click.option("--seconds", type=click.IntRange(1, 600), default=10, help="Emulated, of each of four runs.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def bench(seconds: int, as_json: bool) -> None:
     """What the firmware costs on an emulated Pico: time, memory, flash."""

@@ -1,5 +1,6 @@
 """Where the firmware's files are, in a checkout and in an installed wheel, and how the host runs them."""
 
+import gc
 import sys
 import traceback
 import types
@@ -22,6 +23,8 @@ def add_to_path() -> None:
     sys.modules.setdefault("micropython", _shim())
     if not hasattr(sys, "print_exception"):
         setattr(sys, "print_exception", traceback.print_exception)  # noqa: B010 as MicroPython has it
+    if not hasattr(gc, "threshold"):
+        setattr(gc, "threshold", lambda amount: None)  # noqa: B010 likewise
 
 
 def _shim() -> types.ModuleType:

@@ -25,19 +25,22 @@ SAMPLE_HZ = 200  # what bench_guest asks for
 _GUEST = Path(__file__).with_name("bench_guest.py")
 _RIDE = [accelerate(15.0, 1.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 20
 _START_LIMIT_S = 10.0
+_MODES: dict[str, dict[str, Any]] = {"aligning by driving": {"SPEED": "wheel"}, "recording": {"RECORD": True}}
+_WHEEL_PIN, _PULSE_S, _CLOSED_S = 14, 0.133, 0.02  # one magnet on a wheel of 2 m, at 15 m/s
 
 
 def bench(seconds: int = 10) -> dict[str, Any]:
-    """Run everything; figures in the units that their names end with. seconds: emulated, of each of two runs."""
+    """Run everything; figures in the units that their names end with. seconds: emulated, of each of four runs."""
     plain = _run(seconds, detail=False)
     detail = _run(seconds, detail=True)
+    modes = {name: _run(seconds, detail=False, chosen=chosen) for name, chosen in _MODES.items()}
     figures = plain["figures"]
     return {
         "sample_hz": SAMPLE_HZ,
         "seconds": figures["elapsed_us"] / 1e6,
         "turn_us": _spread(plain["took"]),
         "stage_us": {name: _spread(us) for name, us in _stages(detail).items()},
-        "cpu_share": 1.0 - figures["slept_us"] / figures["elapsed_us"],
+        "cpu_share": _cpu_share(plain),
         "turns": figures["turns"],
         "samples_taken": plain["taken"],
         "samples_lost": plain["lost"],
@@ -47,6 +50,7 @@ def bench(seconds: int = 10) -> dict[str, Any]:
         "collection_pause_us": _spread(plain["pauses"]),
         "free_heap_bytes": figures["free_before"],
         "free_heap_at_end_bytes": figures["free_after"],
+        "modes": {name: _compared(mode, plain) for name, mode in modes.items()},
         "first_lean_s": {kind: _first_lean_s(kind == "mpy") for kind in ("py", "mpy")},
         "flash_bytes": {kind: _size(kind == "mpy") for kind in ("py", "mpy")},
     }
@@ -73,6 +77,7 @@ def tables(result: dict[str, Any]) -> Group:
             "free heap, start / end",
             f"{result['free_heap_bytes'] / 1024:.0f} / {result['free_heap_at_end_bytes'] / 1024:.0f} KB",
         ),
+        *((f"while {name}", _mode_text(mode)) for name, mode in result["modes"].items()),
         ("reset to first lean", f"{first['py']:.2f} s from .py, {first['mpy']:.2f} s from .mpy"),
         ("size on flash", f"{size['py'] / 1000:.1f} kB as .py, {size['mpy'] / 1000:.1f} kB as .mpy"),
     ):
@@ -80,8 +85,47 @@ def tables(result: dict[str, Any]) -> Group:
     return Group(times, figures)
 
 
-def _run(seconds: int, detail: bool) -> dict[str, Any]:
-    """The app's loop for so long: arrays and figures of bench_guest, and how the samples fared."""
+def _mode_text(mode: dict[str, Any]) -> str:
+    return (
+        f"CPU {100 * mode['cpu_share']:.0f} %, {mode['us_per_sample']:+.0f} us a sample, {mode['samples_lost']} lost, "
+        f"{mode['free_heap_bytes'] / 1024:.0f} / {mode['free_heap_at_end_bytes'] / 1024:.0f} KB free"
+    )
+
+
+def _cpu_share(run: dict[str, Any]) -> float:
+    return 1.0 - run["figures"]["slept_us"] / run["figures"]["elapsed_us"]
+
+
+def _compared(mode: dict[str, Any], plain: dict[str, Any]) -> dict[str, Any]:
+    """A run in a mode: what it costs more than the plain one."""
+    figures = mode["figures"]
+    return {
+        "cpu_share": _cpu_share(mode),
+        "us_per_sample": (_cpu_share(mode) - _cpu_share(plain)) * 1e6 / SAMPLE_HZ,
+        "turn_us": _spread(mode["took"]),
+        "samples_taken": mode["taken"],
+        "samples_lost": mode["lost"],
+        "collections_automatic": figures["collections_automatic"],
+        "free_heap_bytes": figures["free_before"],
+        "free_heap_at_end_bytes": figures["free_after"],
+    }
+
+
+def _turn_wheel(pico: Pico) -> None:
+    """Its contact closes and opens, from now on."""
+    pin = pico.chip.rp2040.gpio[_WHEEL_PIN]
+
+    def close() -> None:
+        pin.set_input_value(False)
+        pico.board.at(pico.time_s + _CLOSED_S, pin.release_input)
+        pico.board.at(pico.time_s + _PULSE_S, close)
+
+    close()
+
+
+def _run(seconds: int, detail: bool, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
+    """The app's loop for so long: arrays and figures of bench_guest, and how the samples fared. chosen: settings."""
+    chosen = chosen or {}
     files = flash_image.firmware(compiled=True) | _calibration()
     del files["/main.py"]
     files["bench_guest.mpy"] = cross_compiled(_GUEST)
@@ -104,7 +148,9 @@ def _run(seconds: int, detail: bool) -> dict[str, Any]:
                 arrays.append(np.frombuffer(data, np.uint16))
 
         HostLink(pico.chip, b"", take)
-        code = f"{GUEST}import bench_guest\nbench_guest.run({detail}, {seconds}, Sink())\n"
+        if chosen.get("SPEED") == "wheel":
+            _turn_wheel(pico)
+        code = f"{GUEST}import bench_guest\nbench_guest.run({detail}, {seconds}, Sink(), {chosen})\n"
         result["figures"] = ast.literal_eval(pico.exec(code, limit_s=2.0 * seconds + 30.0))
     turns = result["figures"]["turns"]
     result["took"] = arrays[0][:turns]

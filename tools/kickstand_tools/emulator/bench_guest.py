@@ -22,10 +22,11 @@ STAGES = (
     ("page", "screen", "Screen", "lines(self, now_ms)"),
     ("display", "hd44780", "Lcd", "tick(self, now_ms)"),
 )
+NOTHING = ("apply_sum", "tick")  # is what these return
 BUS = len(STAGES)  # one more column: the sensor's transfers
 COLUMNS = BUS + 1
 SETTLE_TURNS = 150  # before anything is recorded
-HEAP_TURNS = 20  # with the collector off
+HEAP_TURNS = 10  # with the collector off
 MAX_PAUSES = 2000
 MAX_TURNS_HZ = 200
 
@@ -90,6 +91,7 @@ class TimedGc:
             return
         start = ticks_us()
         gc.collect()
+        app_module.fill_gaps(app_module.SINGLE_GAPS)  # as the app does
         if app.n_pauses < MAX_PAUSES:
             app.pauses[app.n_pauses] = min(ticks_diff(ticks_us(), start), 65535)
             app.n_pauses += 1
@@ -128,6 +130,7 @@ class MeasuredApp(app_module.App):
 
     def _begin(self):
         gc.collect()
+        app_module.fill_gaps(app_module.SINGLE_GAPS)  # as the app does
         self.free_before = gc.mem_free()
         gc.disable()
         self._allocated = gc.mem_alloc()
@@ -152,6 +155,7 @@ class MeasuredApp(app_module.App):
             self._out.write(b"heap")
             gc.enable()
             gc.collect()
+            app_module.fill_gaps(app_module.SINGLE_GAPS)
             self.canary.arm()
         elif self.count > HEAP_TURNS and self.canary.died():
             self.automatic += 1
@@ -163,24 +167,40 @@ class MeasuredApp(app_module.App):
                 self._spent[i] = 0
 
 
-# Each parameter by name: a call with *arguments frees memory after it, and the next allocation searches from there
+# No *arguments and few locals: both would take memory that is freed when it returns, and make what is measured search
+# from there for more
 _TIMED = """
 def {name}({parameters}):
-    start = ticks_us()
-    result = function({parameters})
-    spent[{i}] += ticks_diff(ticks_us(), start)
-    return result
+    begin({i})
+    {result}function({parameters})
+    end({i})
+{back}
 """
+
+
+def _timed(spent, function, i, signature, returns):
+    """function with a stopwatch: its time is added to spent[i]."""
+    starts = array("I", bytes(4 * BUS))
+
+    def begin(i):
+        starts[i] = ticks_us()
+
+    def end(i):
+        spent[i] += ticks_diff(ticks_us(), starts[i])
+
+    name, parameters = signature[:-1].split("(")
+    result, back = ("result = ", "    return result") if returns else ("", "")
+    scope = {"function": function, "begin": begin, "end": end}
+    exec(_TIMED.format(name=name, parameters=parameters, i=i, result=result, back=back), scope)
+    return scope[name]
 
 
 def _time_stages(spent):
     for i in range(BUS):
         _, module, of, method = STAGES[i]
-        name, parameters = method[:-1].split("(")
+        name = method.split("(")[0]
         owner = getattr(__import__("kickstand." + module, None, None, (module,)), of)
-        scope = {"function": getattr(owner, name), "spent": spent, "ticks_us": ticks_us, "ticks_diff": ticks_diff}
-        exec(_TIMED.format(name=name, parameters=parameters, i=i), scope)
-        setattr(owner, name, scope[name])
+        setattr(owner, name, _timed(spent, getattr(owner, name), i, method, name not in NOTHING))
 
 
 def _stopwatch_us(spent):
@@ -188,10 +208,8 @@ def _stopwatch_us(spent):
     def function(self, n):
         pass
 
-    scope = {"function": function, "spent": spent, "ticks_us": ticks_us, "ticks_diff": ticks_diff}
-    exec(_TIMED.format(name="timed", parameters="self, n", i=0), scope)
     took = []
-    for call in (function, scope["timed"]):
+    for call in (function, _timed(spent, function, 0, "timed(self, n)", True)):
         start = ticks_us()
         for _ in range(100):
             call(None, 0)
@@ -199,9 +217,11 @@ def _stopwatch_us(spent):
     return (took[1] - took[0]) // 100
 
 
-def run(detail, seconds, out):
+def run(detail, seconds, out, chosen):
     """Prints one line, a dictionary of figures. Writes to out "begin", with detail an array('I') for each turn, "end",
-    then the other arrays."""
+    then the other arrays. chosen: settings by name."""
+    for name in chosen:
+        setattr(Config, name, chosen[name])
     settings = Settings(Config)
     app = MeasuredApp(settings, app_module.open_lcd(settings))
     spent = array("I", bytes(4 * COLUMNS)) if detail else None
