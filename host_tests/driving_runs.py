@@ -120,8 +120,9 @@ def drive(legs, mount, options):
         "stops": alignment.standing.stops,
         "bias": list(alignment.standing.bias),
         "quality": alignment.quality_deg,
-        "lag": getattr(alignment, "lag_s", None),
     }
+    if hasattr(alignment, "events"):
+        result["lag"] = alignment.events.lag_s
     if "against" in options:
         result["compare"] = driving_check.compare(alignment, options["against"])
     out = matrix()

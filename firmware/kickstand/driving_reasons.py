@@ -57,15 +57,16 @@ def not_ready(drive, counted, needed, turned):
             "Brake straight",
             "%d of %d done" % (counted, needed),
         )
-    if drive.halves_deg > HALVES_DEG:
+    if drive.quality.halves_deg > HALVES_DEG:
         return AlignmentError(
             "two halves of the drive disagree by %.0f degrees about forward: did the mount move? Else drive on"
-            % drive.halves_deg,
+            % drive.quality.halves_deg,
             "Halves differ",
-            "by %.0f\xdf: go on" % drive.halves_deg,
+            "by %.0f\xdf: go on" % drive.quality.halves_deg,
         )
     return AlignmentError(
-        "forward is known to %.1f degrees only, after %d brakings: drive on" % (drive.quality_deg, drive.brakings),
+        "forward is known to %.1f degrees only, after %d brakings: drive on"
+        % (drive.quality_deg, drive.events.brakings),
         "Only +-%.1f\xdf yet" % min(drive.quality_deg, 180.0),
         "Brake straight",
     )

@@ -58,7 +58,8 @@ def drive(
     say(f"stops: {alignment.standing.stops}")
     say(f"quality: {alignment.quality_deg:.1f} degrees about the vertical; ready after {events.ready_s:.0f} s")
     if isinstance(alignment, DriveAlignment):
-        say(f"speed: {alignment.lag_s:.1f} s late; its halves differ by {alignment.halves_deg:.1f} degrees")
+        halves_deg = alignment.quality.halves_deg
+        say(f"speed: {alignment.events.lag_s:.1f} s late; its halves differ by {halves_deg:.1f} degrees")
         if up is not None:
             _compare(alignment, result.matrix, say)
     for name, row in (("left", 0), ("up", 3), ("forward", 6)):
@@ -123,7 +124,7 @@ class _Events:
 
 
 def _compare(alignment: DriveAlignment, matrix: list[float], say: Print) -> None:
-    yaw = driving_check.yaw_deg(alignment.fit, matrix)
+    yaw = driving_check.yaw_deg(alignment.quality.fit, matrix)
     found = driving_check.compare(alignment, matrix)
     if found == driving_check.REVERSED:
         say("warning: the two poses had forward and backward exchanged: the kickstand is on the other side")
