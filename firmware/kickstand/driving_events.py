@@ -15,6 +15,34 @@ MIN_SPEED_MPS = 1.0  # slower, steering is large and a stop ends with a jerk
 MAX_FORCE_G = 3.0  # a mean beyond is a knock
 
 
+class OneEvent:
+    """Forward from one event, against a vertical that is known: good to some 10 degrees, but at once."""
+
+    def __init__(self):
+        self._force = [0.0] * 3
+        self.clear()
+
+    def clear(self):
+        """The next one begins."""
+        self._weight = self._change = 0.0
+        for i in range(3):
+            self._force[i] = 0.0
+
+    def add(self, seconds, change_g, force):
+        """An interval of it, in a straight line: as BrakingRegression.add()."""
+        a = change_g / seconds
+        self._weight += a * change_g
+        self._change += change_g
+        for i in range(3):
+            self._force[i] += a * force[i]
+
+    def forward(self, out, level):
+        """Fill out (3, g per g). Returns its weight (g^2 s)."""
+        for i in range(3):
+            out[i] = (self._force[i] - self._change * level[i]) / max(self._weight, 1e-6)
+        return self._weight
+
+
 class DrivingEvents:
     """history: the ForceHistory of the same time.
 
@@ -27,6 +55,7 @@ class DrivingEvents:
         self.lag = 0
         self.lag_s = 0.0
         self.regression = BrakingRegression()
+        self.last = OneEvent()
         self._history = history
         self._finder = BrakingFinder(LAGS)
         self._part = Fit()
@@ -86,7 +115,7 @@ class DrivingEvents:
         change = speed - before
         counts = counts and mean > MIN_SPEED_MPS
         straight = self._straight
-        force = [0.0] * 3
+        force = felt = [0.0] * 3
         end = self._end
         for lag in range(LAGS):
             known = self._history.at(end, time_us - lag * LAG_STEP_US)
@@ -97,6 +126,8 @@ class DrivingEvents:
                     force[i] = difference(end[i], begin[i]) * 1e-6
                 yaw_dps = difference(end[3], begin[3]) * 1e-5 / seconds
                 straight[lag] = abs(yaw_dps) <= STRAIGHT_DPS
+                if lag == self.lag:
+                    felt = list(force)
                 if straight[lag] and norm(force) < MAX_FORCE_G * seconds:
                     curve_g = mean * yaw_dps * (pi / 180.0 / _G)
                     self.regression.add(lag, seconds, change / _G, curve_g, force)
@@ -106,6 +137,11 @@ class DrivingEvents:
             yield
         if self._finder.update(change, seconds, straight):
             yield from self._count()
+        elif self._finder.going_on:
+            if self._finder.change == change:
+                self.last.clear()
+            if straight[self.lag]:
+                self.last.add(seconds, change / _G, felt)
 
     def _count(self):
         """A braking or a start has ended: which lag fits best by now, and was it straight?"""

@@ -1,34 +1,40 @@
 """How well driving knows forward, whether that is enough, and what is wrong with the speed or with the mount."""
 
-from math import atan2, degrees, pi, sqrt
+from math import atan2, degrees, sqrt
 
 from .braking_regression import Fit
+from .driving_parts import DriveParts, apart, usual
 from .driving_reasons import HALVES_DEG, late, moved, units
-from .rotation import angle_deg, cross, dot, normalize, vector
+from .rotation import angle_deg, cross, dot, norm, normalize, vector
 
 NEEDED = 5  # brakings and starts
 MAX_STARTS = 2  # count: the others are brakings
 HALVES_STAY_DEG = 6.0  # to become ready it takes HALVES_DEG
-READY_DEG, READY_STAY_DEG = 2.0, 3.0
+READY_DEG, READY_STAY_DEG = 1.5, 2.5  # by experience one in ten is off by twice as much
+CHANCE, CHANCE_STAY = 3.0, 4.0  # sigmas: parts of a drive may differ by so much, or by HALVES_DEG
+MOVED_DEG = 30.0  # two parts of a drive; a highway's long banked curve, taken for straight, made 15
 LEVEL_DEG = 8.0  # two halves of a drive, or standing and driving: hills are not so different
-OUTLIER_DEG = 30.0  # of one braking from the others; camber and wind make 10
-MIN_WEIGHT = 0.05  # g^2 s: half a second at 0.3 g
-CHECKED = 3  # before, units and lag of the speed are not judged
+PITCH_DEG = 7.0  # two parts of a drive: 6 % up, then down
+ROLL_DEG = 6.0  # likewise: that road's curve made 4
+ELSEWHERE_DEG = 70.0  # one event from all; one of at least
+MIN_WEIGHT = 0.03  # g^2 s and
+SMALLEST = 0.5  # of the force that the speed says is never off by more than 40
 MIN_SLOPE, MAX_SLOPE = 0.75, 1.35  # speed against force: pitch in braking and a coarse speed shift it by 0.2
 MAX_LATE_S = 1.9
 
 
 class DrivingQuality:
     """fit: of all straight driving so far. quality_deg: standard error of its forward, 180 until there is one;
-    halves_deg: how far two halves of the drive disagree about it; good: enough for an alignment; speed_problem,
-    mount_problem: an AlignmentError, or None.
+    halves_deg: how far two halves of the drive disagree about it; parts: the DriveParts; agree: halves and parts
+    do; good: enough for an alignment; speed_problem, mount_problem: an AlignmentError, or None.
     """
 
     def __init__(self):
         self.fit = Fit()
         self.quality_deg = self.halves_deg = 180.0
-        self.good = False
+        self.good = self.agree = self._known = False
         self.speed_problem = self.mount_problem = None
+        self.parts = DriveParts()
         self._part = Fit()
 
     def judge(self, drive):
@@ -47,30 +53,27 @@ class DrivingQuality:
         yield
         blocks = regression.filled
         spread = slopes = weights = 0.0
-        outlier_deg = 0.0
+        self.parts.clear()
         for block in range(blocks):
             if not (yield from regression.fitting(part, lag, block, block + 1)):
                 continue
             x, y, weight = dot(left, part.forward), dot(forward, part.forward), part.weight
             yield
+            level = part.level
+            self.parts.add(x, y, dot(left, level), dot(forward, level), weight, part.seconds)
             slope = sqrt(x * x + y * y)
             slopes += weight * slope
             weights += weight
             if blocks > 1 and (yield from regression.fitting(part, lag, 0, blocks, block)):
-                p, q = dot(left, part.forward), dot(forward, part.forward)
-                angle = atan2(p, q)
+                angle = atan2(dot(left, part.forward), dot(forward, part.forward))
                 spread += angle * angle
-                others = p * p + q * q
-                if weight > MIN_WEIGHT and MIN_SLOPE * MIN_SLOPE < others < MAX_SLOPE * MAX_SLOPE:
-                    if MIN_SLOPE < slope < MAX_SLOPE:
-                        outlier_deg = max(outlier_deg, degrees(_apart(angle, atan2(x, y))))
-                    elif p * x + q * y < 0.5 * others:  # some brakings of this block point elsewhere
-                        outlier_deg = 180.0
             yield
         if blocks < 2 or weights <= 0.0:
             return
         # the jackknife: empirical, where a formal error is optimistic early
-        self.quality_deg = degrees(sqrt(spread * (blocks - 1) / blocks))
+        free = blocks - 1
+        self.quality_deg = sqrt(usual(degrees(degrees(spread)) * free / blocks, self.fit.weight, free))
+        yield from self.parts.compare()
         half = blocks // 2
         if (yield from regression.fitting(part, lag, 0, half)):
             one = atan2(dot(left, part.forward), dot(forward, part.forward))
@@ -78,12 +81,11 @@ class DrivingQuality:
             yield
             if (yield from regression.fitting(part, lag, half, blocks)):
                 two = atan2(dot(left, part.forward), dot(forward, part.forward))
-                self.halves_deg = degrees(_apart(one, two))
-                self._decide(drive, slopes / weights, angle_deg(level, part.level), outlier_deg)
+                self.halves_deg = degrees(apart(one, two))
+                self._decide(drive, slopes / weights, angle_deg(level, part.level))
 
-    def _decide(self, drive, slope, level_deg, outlier_deg):
-        """slope: force per change of speed; level_deg: between the verticals of two halves of the drive; outlier_deg:
-        of one block's forward from that of all others."""
+    def _decide(self, drive, slope, level_deg):
+        """slope: force per change of speed; level_deg: between the verticals of two halves of the drive."""
         self.speed_problem = self.mount_problem = None
         counted, lag_s = drive.counted, drive.events.lag_s
         if counted >= NEEDED:
@@ -93,21 +95,27 @@ class DrivingQuality:
                 self.mount_problem = moved("the vertical changed by %.0f degrees during the drive" % level_deg)
             elif from_driving > LEVEL_DEG:
                 self.mount_problem = moved("%s and driving differ by %.0f degrees" % (what, from_driving))
-            elif outlier_deg > OUTLIER_DEG:
+            elif self.parts.roll_deg > ROLL_DEG or self.parts.pitch_deg > PITCH_DEG:
+                self.mount_problem = moved("the vertical is no longer where it was")
+            elif self.parts.forward_deg > MOVED_DEG and self.parts.sigmas > CHANCE_STAY:
                 self.mount_problem = moved("forward is no longer where it was")
-        if counted >= CHECKED:
+            elif self._last_elsewhere(drive.events.last):
+                self.mount_problem = moved("forward is no longer where it was")
             if lag_s >= MAX_LATE_S:
                 self.speed_problem = late(lag_s)
             elif not MIN_SLOPE < slope < MAX_SLOPE:
                 self.speed_problem = units(slope)
-        self.good = (
-            counted >= NEEDED
-            and self.halves_deg <= (HALVES_STAY_DEG if self.good else HALVES_DEG)
-            and self.quality_deg <= (READY_STAY_DEG if self.good else READY_DEG)
+        # each with a hysteresis of its own: what comes and goes at a threshold helps nobody
+        limit_deg, chance = (HALVES_STAY_DEG, CHANCE_STAY) if self.agree else (HALVES_DEG, CHANCE)
+        self.agree = self.halves_deg <= limit_deg and (
+            self.parts.forward_deg <= limit_deg or self.parts.sigmas <= chance
         )
+        self._known = self.quality_deg <= (READY_STAY_DEG if self._known else READY_DEG)
+        self.good = counted >= NEEDED and self._known and self.agree
 
-
-def _apart(a, b):
-    """Angle between two directions, 0 to pi."""
-    between = abs(a - b)
-    return min(between, 2 * pi - between)
+    def _last_elsewhere(self, last):
+        """True if the last event alone says that forward is no longer where it was."""
+        forward = vector()
+        weight = last.forward(forward, self.fit.level)
+        size = norm(forward)
+        return weight > MIN_WEIGHT and size > SMALLEST and angle_deg(forward, self.fit.forward) > ELSEWHERE_DEG
