@@ -175,6 +175,27 @@ def test_standing_and_driving_have_to_agree(share, fine):
     assert fine or "standing and driving differ" in result["refused"]
 
 
+@pytest.mark.parametrize(
+    ("axis", "degrees", "from_s", "words"),
+    [
+        (1, 180.0, 130.0, "no longer where it was"),  # one braking left
+        (1, -100.0, 130.0, "no longer where it was"),
+        (1, 45.0, 100.0, "no longer where it was"),
+        (1, 12.0, 100.0, "two parts of the drive"),
+        (0, 1.3 * driving_quality.PITCH_DEG, 82.0, "vertical"),
+        (2, 1.3 * driving_quality.ROLL_DEG, 82.0, "vertical"),
+        (0, 0.9 * driving_quality.PITCH_DEG, 82.0, None),
+        (2, 0.9 * driving_quality.ROLL_DEG, 82.0, None),
+    ],
+)
+def test_a_mount_that_moved(axis, degrees, from_s, words):
+    """Ten brakings, the last one from 137 s on."""
+    legs = [*around(10), [4.0, 1.5, 20.0], [4.0, -1.5, 20.0]]  # what is not straight puts nothing right
+    result = drive(legs, moved=[from_s, turned(MOUNT, axis, degrees)])
+    assert result["ready"] is (words is None), result
+    assert words is None or words in result["refused"]
+
+
 @pytest.mark.parametrize(("share", "fine"), [(0.3, True), (0.9, True), (1.1, False)])
 def test_halves_have_to_agree(share, fine):
     """Once ready, up to 6 degrees: an alignment that comes and goes at a threshold helps nobody."""

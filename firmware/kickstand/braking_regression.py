@@ -73,8 +73,7 @@ class BrakingRegression:
                 to, source = block * TERMS, 2 * block * TERMS
                 for k in range(TERMS):
                     sums[to + k] = sums[source + k] + sums[source + TERMS + k] if 2 * block < BLOCKS else 0.0
-                if block & 1:
-                    yield
+                yield
         self._per_block *= 2
         self.blocks = BLOCKS // 2 + 1
 

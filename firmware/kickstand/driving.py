@@ -66,6 +66,7 @@ class DriveAlignment:
         self._sums_us = 0
         self._speed = -1.0  # none yet
         self._quiet_us = 0  # since the last value
+        self._bin = None  # means of the last one
         self._work = None
 
     @property
@@ -138,17 +139,24 @@ class DriveAlignment:
             self._end_bin()
             return
         for _ in range(1 + dt_us // PIECE_US):
-            if self._work is not None:
-                if next(self._work, True):
-                    self._work = None
-            elif self.events.due:
-                self._work = self._follow()
+            self._piece()
+
+    def _piece(self):
+        if self._bin is not None:
+            force, rate, seconds = self._bin
+            self._bin = None
+            if self._speed >= 0.0:
+                self.standing.update(force, rate, self._speed, seconds)
+        elif self._work is not None:
+            if next(self._work, True):
+                self._work = None
+        elif self.events.due:
+            self._work = self._follow()
 
     def finish(self):
         """No more samples will come: do at once what work is left."""
-        while self._work is not None:
-            if next(self._work, True):
-                self._work = None
+        while self._bin is not None or self._work is not None:
+            self._piece()
 
     def measure_speed(self, speed_mps, age_us=0):
         """A new value of the speed source. age_us: how old it is known to be; an unknown lag is found by itself."""
@@ -178,8 +186,7 @@ class DriveAlignment:
         elif fit is None:
             best = self.standing.up if self.vehicle == CAR else self._mean
         elif self.vehicle == CAR:
-            size = norm(fit.level)
-            best = [self.standing.up[i] + fit.level[i] / size for i in range(3)]
+            best = [self.standing.up[i] + fit.level[i] / norm(fit.level) for i in range(3)]
         else:
             best = fit.level
         if best is None:
@@ -211,23 +218,23 @@ class DriveAlignment:
         self.events.interrupt()
 
     def _end_bin(self):
+        if self._bin is not None:
+            self._piece()
         sums, n = self._sums, self._sums_us
         seconds = n * 1e-6
         means = [total / n for total in sums]
         force, rate = means[:3], means[3:]
-        if self._mean is None:
-            self._mean = vector()
+        self._mean = self._mean or vector()
         self._mean_s = min(MEAN_S, self._mean_s + seconds)
         gain = seconds / self._mean_s
         for i in range(3):
             self._mean[i] += gain * (force[i] - self._mean[i])
-        if self._speed >= 0.0:
-            self.standing.update(force, rate, self._speed, seconds)
         up = self.standing.up if self.standing.stops and self.vehicle == CAR else self._up or self._mean
         bias = self.standing.bias
         turned = (rate[0] - bias[0]) * up[0] + (rate[1] - bias[1]) * up[1] + (rate[2] - bias[2]) * up[2]
         self._history.add(sums, turned * seconds * 1e5, n)
         self._speed_check.update(force, n)
+        self._bin = (force, rate, seconds)
         self._quiet_us = min(STALE_US + 1, self._quiet_us + n)
         self._sums_us = 0
         for i in range(6):

@@ -150,6 +150,7 @@ class DrivingEvents:
         for lag in range(LAGS):
             if (yield from self.regression.fitting(part, lag)):
                 explained[lag] = part.explained
+        yield
         self.lag = best = explained.index(max(explained))
         self.lag_s = (best + _peak(explained, best)) * LAG_STEP_US * 1e-6
         braked = self._finder.change < 0.0

@@ -6,6 +6,7 @@ what a road's camber and wind do to a long stretch of it. Of a few blocks the sc
 counts like USUAL more.
 """
 
+from array import array
 from math import atan2, degrees, pi, sqrt
 
 from .braking_regression import BLOCKS
@@ -35,7 +36,7 @@ class DriveParts:
     """
 
     def __init__(self):
-        self._blocks = [[0.0] * 6 for _ in range(BLOCKS)]
+        self._blocks = [array("f", [0.0] * 6) for _ in range(BLOCKS)]
         self.clear()
 
     def clear(self):
@@ -65,7 +66,10 @@ class DriveParts:
             if self.count < MIN_BLOCKS or one[4] < MIN_WEIGHT or two[4] < MIN_WEIGHT:
                 continue
             angle, other = atan2(one[0], one[1]), atan2(two[0], two[1])
-            scatter = self._scatter(angle, 0, first) + self._scatter(other, first, self.count)
+            scatter = self._scatter(angle, 0, first)
+            yield
+            scatter += self._scatter(other, first, self.count)
+            yield
             free = self.count - 2
             variance = STRETCH_DEG * STRETCH_DEG * (one[6] / (one[4] * one[4]) + two[6] / (two[4] * two[4]))
             variance += usual(scatter / one[4] / free, one[4], free) + usual(scatter / two[4] / free, two[4], free)

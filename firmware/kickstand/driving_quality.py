@@ -15,10 +15,10 @@ CHANCE, CHANCE_STAY = 3.0, 4.0  # sigmas: parts of a drive may differ by so much
 MOVED_DEG = 30.0  # two parts of a drive; a highway's long banked curve, taken for straight, made 15
 LEVEL_DEG = 8.0  # two halves of a drive, or standing and driving: hills are not so different
 PITCH_DEG = 7.0  # two parts of a drive: 6 % up, then down
-ROLL_DEG = 6.0  # likewise: that road's curve made 4
-ELSEWHERE_DEG = 70.0  # one event from all; one of at least
-MIN_WEIGHT = 0.03  # g^2 s and
-SMALLEST = 0.5  # of the force that the speed says is never off by more than 40
+ROLL_DEG = 6.0  # likewise: that road's curve made 4; a motorcycle leans, so not there
+ELSEWHERE_DEG = 80.0  # one event from all; one of at least
+MIN_WEIGHT = 0.012  # g^2 s and
+SMALLEST = 0.5  # of the force that the speed says was never off by more than 40
 MIN_SLOPE, MAX_SLOPE = 0.75, 1.35  # speed against force: pitch in braking and a coarse speed shift it by 0.2
 MAX_LATE_S = 1.9
 
@@ -32,7 +32,7 @@ class DrivingQuality:
     def __init__(self):
         self.fit = Fit()
         self.quality_deg = self.halves_deg = 180.0
-        self.good = self.agree = self._known = False
+        self.good = self.agree = self._known = self._elsewhere = False
         self.speed_problem = self.mount_problem = None
         self.parts = DriveParts()
         self._part = Fit()
@@ -43,6 +43,7 @@ class DrivingQuality:
         up = vector()
         if not (yield from regression.fitting(self.fit, lag)):
             return
+        yield
         if not drive.vertical(up, self.fit):
             return
         left, forward = vector(), vector()
@@ -82,40 +83,40 @@ class DrivingQuality:
             if (yield from regression.fitting(part, lag, half, blocks)):
                 two = atan2(dot(left, part.forward), dot(forward, part.forward))
                 self.halves_deg = degrees(apart(one, two))
+                yield
                 self._decide(drive, slopes / weights, angle_deg(level, part.level))
 
     def _decide(self, drive, slope, level_deg):
         """slope: force per change of speed; level_deg: between the verticals of two halves of the drive."""
         self.speed_problem = self.mount_problem = None
-        counted, lag_s = drive.counted, drive.events.lag_s
-        if counted >= NEEDED:
-            before, what = drive.known_vertical()
-            from_driving = 0.0 if before is None else angle_deg(before, self.fit.level)
-            if level_deg > LEVEL_DEG:
-                self.mount_problem = moved("the vertical changed by %.0f degrees during the drive" % level_deg)
-            elif from_driving > LEVEL_DEG:
-                self.mount_problem = moved("%s and driving differ by %.0f degrees" % (what, from_driving))
-            elif self.parts.roll_deg > ROLL_DEG or self.parts.pitch_deg > PITCH_DEG:
-                self.mount_problem = moved("the vertical is no longer where it was")
-            elif self.parts.forward_deg > MOVED_DEG and self.parts.sigmas > CHANCE_STAY:
-                self.mount_problem = moved("forward is no longer where it was")
-            elif self._last_elsewhere(drive.events.last):
-                self.mount_problem = moved("forward is no longer where it was")
-            if lag_s >= MAX_LATE_S:
-                self.speed_problem = late(lag_s)
-            elif not MIN_SLOPE < slope < MAX_SLOPE:
-                self.speed_problem = units(slope)
+        self.good = False
+        if drive.counted < NEEDED:
+            return
+        before, what = drive.known_vertical()
+        from_driving = 0.0 if before is None else angle_deg(before, self.fit.level)
+        parts = self.parts
+        if level_deg > LEVEL_DEG:
+            self.mount_problem = moved("the vertical changed by %.0f degrees during the drive" % level_deg)
+        elif from_driving > LEVEL_DEG:
+            self.mount_problem = moved("%s and driving differ by %.0f degrees" % (what, from_driving))
+        elif drive.vehicle == "car" and (parts.roll_deg > ROLL_DEG or parts.pitch_deg > PITCH_DEG):
+            self.mount_problem = moved("the vertical is no longer where it was")
+        elif self._look_at(drive.events.last) or (parts.forward_deg > MOVED_DEG and parts.sigmas > CHANCE_STAY):
+            self.mount_problem = moved("forward is no longer where it was")
+        lag_s = drive.events.lag_s
+        if lag_s >= MAX_LATE_S:
+            self.speed_problem = late(lag_s)
+        elif not MIN_SLOPE < slope < MAX_SLOPE:
+            self.speed_problem = units(slope)
         # each with a hysteresis of its own: what comes and goes at a threshold helps nobody
         limit_deg, chance = (HALVES_STAY_DEG, CHANCE_STAY) if self.agree else (HALVES_DEG, CHANCE)
-        self.agree = self.halves_deg <= limit_deg and (
-            self.parts.forward_deg <= limit_deg or self.parts.sigmas <= chance
-        )
+        self.agree = self.halves_deg <= limit_deg and (parts.forward_deg <= limit_deg or parts.sigmas <= chance)
         self._known = self.quality_deg <= (READY_STAY_DEG if self._known else READY_DEG)
-        self.good = counted >= NEEDED and self._known and self.agree
+        self.good = self._known and self.agree
 
-    def _last_elsewhere(self, last):
-        """True if the last event alone says that forward is no longer where it was."""
+    def _look_at(self, last):
+        """True if the last event that says anything for itself says that forward is no longer where it was."""
         forward = vector()
-        weight = last.forward(forward, self.fit.level)
-        size = norm(forward)
-        return weight > MIN_WEIGHT and size > SMALLEST and angle_deg(forward, self.fit.forward) > ELSEWHERE_DEG
+        if last.forward(forward, self.fit.level) > MIN_WEIGHT and norm(forward) > SMALLEST:
+            self._elsewhere = angle_deg(forward, self.fit.forward) > ELSEWHERE_DEG
+        return self._elsewhere
