@@ -6,6 +6,7 @@ import time
 import numpy as np
 import pytest
 from emulated import modules, pico
+from kickstand import driving
 from kickstand.driving_quality import NEEDED
 from kickstand_tools.sensor_errors import random_mounting
 
@@ -16,7 +17,6 @@ _DRIVE = """
 from kickstand import driving
 from kickstand.rotation import matrix
 drive = driving.DriveAlignment("car", None, [0.0, 0.0, 0.0])
-driving.PIECE_US = 10**9
 rate, force = [0.0] * 3, [0.0] * 3
 speed, longest, updates, memory = 0.0, 0, 0, []
 def sample(ahead, dt_us):
@@ -44,6 +44,7 @@ out = matrix()
 drive.matrix(out)
 result = {"matrix": list(out), "longest": longest, "updates": updates, "memory": memory, "counted": drive.counted}
 """
+_ONE_PIECE = "from kickstand import driving\ndriving.PIECE_US = 10**9\n"
 _ON_CHIP = """
 import gc, json
 from time import ticks_diff, ticks_us as clock
@@ -55,13 +56,14 @@ def allocated():
 """
 
 
-def test_alignment_by_driving_on_the_chip():
+def test_alignment_by_driving_on_the_chip(monkeypatch):
     """A start, then four brakings and starts. An update takes at most 2 ms of the 10 that samples are apart."""
     mount = random_mounting(4)
     host = {"mount": mount, "clock": time.monotonic_ns, "elapsed": lambda began: 0, "allocated": lambda: 0}
+    monkeypatch.setattr(driving, "PIECE_US", 10**9)
     exec(_DRIVE, host)
     with pico(files=modules()) as board:
-        code = f"{_ON_CHIP}mount = {mount!r}\n{_DRIVE}print(json.dumps(result))"
+        code = f"{_ONE_PIECE}{_ON_CHIP}mount = {mount!r}\n{_DRIVE}print(json.dumps(result))"
         chip = json.loads(board.exec(code, 120).splitlines()[-1])
     assert chip["counted"] == host["result"]["counted"] >= NEEDED
     assert chip["updates"] == host["result"]["updates"] > 300

@@ -134,7 +134,7 @@ def test_regression_has_nothing_to_say_without_changes_of_speed():
 def test_parts_of_a_drive(engine):
     """Where forward turned by 12 degrees after five of eight blocks, against numpy; wherever forward of all is."""
     rng = np.random.default_rng(5)
-    weights, seconds = rng.uniform(0.1, 0.5, 8), rng.uniform(15.0, 40.0, 8)
+    weights, seconds = rng.uniform(0.1, 0.5, 8), rng.uniform(25.0, 40.0, 8)
     angles = np.array([0.0] * 5 + [12.0] * 3) + rng.normal(0.0, 1.0, 8)
     one, two = slice(0, 5), slice(5, 8)
     means = [np.average(angles[part], weights=weights[part]) for part in (one, two)]
@@ -157,8 +157,8 @@ def test_parts_of_a_drive(engine):
 @pytest.mark.parametrize(("change", "differ"), [(0, True), (4, False), (5, False)])
 def test_parts_too_short_are_not_compared(change, differ):
     """Too little change of speed for forward, too few seconds for the vertical."""
-    block = [0.0, 1.0, 0.0, 0.0, 0.2, 20.0]
-    last = [0.2, 1.0, 0.2, 0.2, 0.11, 11.0]
+    block = [0.0, 1.0, 0.0, 0.0, 0.2, 40.0]
+    last = [0.2, 1.0, 0.2, 0.2, 0.11, 22.0]
     if change:
         last[change] *= 0.8
     forward_deg, _, roll_deg, pitch_deg = driving_runs.parts([block] * 5 + [last])

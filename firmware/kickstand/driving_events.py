@@ -9,6 +9,7 @@ from .rotation import norm
 
 _G = 9.80665
 MIN_INTERVAL_US = 400_000  # a GPS at 10 Hz says no more than one at 2 Hz, and differences are noisier
+WAITING = 4  # intervals, while others are judged
 MAX_INTERVAL_US = 2_200_000  # one value of a GPS at 1 Hz may be missing
 STRAIGHT_DPS = 2.0  # at 10 m/s 0.036 g to the side, a fifth of a braking; the regression takes off most of that
 MIN_SPEED_MPS = 1.0  # slower, steering is large and a stop ends with a jerk
@@ -64,7 +65,7 @@ class DrivingEvents:
         self._known = [False] * LAGS
         self._straight = [False] * LAGS
         self._before = (0.0, 0)  # speed and time at the end of the last interval
-        self._next = None  # likewise, of the one to be worked on
+        self._next = []  # likewise, of those to be worked on
 
     @property
     def count(self):
@@ -83,7 +84,7 @@ class DrivingEvents:
 
     def interrupt(self):
         """Samples are missing: what follows does not join what came before."""
-        self._next = None
+        self._next.clear()
         self._before = (0.0, self._history.now - MIN_INTERVAL_US)
         self._disjoin()
 
@@ -94,19 +95,19 @@ class DrivingEvents:
 
     def measure_speed(self, speed_mps, time_us):
         """A new speed, and when it was."""
-        if self._next is None and difference(time_us, self._before[1]) >= MIN_INTERVAL_US:
-            self._next = (speed_mps, time_us)
+        before = self._next[-1] if self._next else self._before
+        if len(self._next) < WAITING and difference(time_us, before[1]) >= MIN_INTERVAL_US:
+            self._next.append((speed_mps, time_us))
 
     @property
     def due(self):
         """True if there is an interval to follow() and all that was felt in it is there."""
-        return self._next is not None and difference(self._history.now, self._next[1]) >= 0
+        return bool(self._next) and difference(self._history.now, self._next[0][1]) >= 0
 
     def follow(self, counts):
         """Work on the interval that is due; a generator of short pieces. counts: straight driving may be used."""
         before, before_us = self._before
-        speed, time_us = self._before = self._next
-        self._next = None
+        speed, time_us = self._before = self._next.pop(0)
         length_us = difference(time_us, before_us)
         if length_us > MAX_INTERVAL_US:
             self._disjoin()

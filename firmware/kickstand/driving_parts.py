@@ -15,7 +15,7 @@ USUAL_DEG = 1.0  # of forward, at a weight of 1 g^2 s
 USUAL = 4  # blocks
 STRETCH_DEG = 1.5
 MIN_WEIGHT = 0.1  # g^2 s, in a part
-MIN_S = 10.0  # of straight driving in a part
+MIN_S = 20.0  # of straight driving in a part
 MIN_BLOCKS = 4
 
 
