@@ -9,6 +9,7 @@ import math
 from kickstand import driving_check
 from kickstand.braking_regression import BrakingRegression, Fit
 from kickstand.driving import DriveAlignment
+from kickstand.driving_parts import DriveParts
 from kickstand.driving_published import PublishedAlignment
 from kickstand.errors import Refusal
 from kickstand.rotation import matrix
@@ -120,8 +121,9 @@ def drive(legs, mount, options):
         "stops": alignment.standing.stops,
         "bias": list(alignment.standing.bias),
         "quality": alignment.quality_deg,
-        "lag": getattr(alignment, "lag_s", None),
     }
+    if hasattr(alignment, "events"):
+        result["lag"] = alignment.events.lag_s
     if "against" in options:
         result["compare"] = driving_check.compare(alignment, options["against"])
     out = matrix()
@@ -144,3 +146,13 @@ def regression(rows, lag):
                 pass
     fitted.fit(fit, lag)
     return list(fit.forward), list(fit.level), fitted.blocks
+
+
+def parts(blocks):
+    """blocks [across, along, roll_g, pitch_g, weight, seconds]: forward_deg, sigmas, roll_deg, pitch_deg."""
+    compared = DriveParts()
+    for block in blocks:
+        compared.add(*block)
+    for _ in compared.compare():
+        pass
+    return compared.forward_deg, compared.sigmas, compared.roll_deg, compared.pitch_deg

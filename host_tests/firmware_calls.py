@@ -112,6 +112,7 @@ def circular_dispersion(directions):
 CALLS = {
     "dispersion": circular_dispersion,
     "drive": driving_runs.drive,
+    "parts": driving_runs.parts,
     "regression": driving_runs.regression,
     "rotation_between": lambda a, b, axis: _into(9, rodrigues.rotation_between, a, b, axis),
     "cross": lambda a, b: _into(3, rotation.cross, a, b),

@@ -1,9 +1,10 @@
 """The pieces of alignment by driving, each against numpy, on CPython and MicroPython."""
 
+import driving_runs
 import numpy as np
 import pytest
 from engines import ENGINES, run
-from kickstand import standing
+from kickstand import driving_parts, standing
 from kickstand.braking import BrakingFinder
 from kickstand.braking_regression import BrakingRegression, Fit
 from kickstand.dispersion import NONE
@@ -127,6 +128,42 @@ def test_regression_has_nothing_to_say_without_changes_of_speed():
     for _ in range(20):
         fitted.add(0, 0.5, 0.0, 0.0, [0.0, 0.5, 0.0])
     assert not fitted.fit(fit, 0)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_parts_of_a_drive(engine):
+    """Where forward turned by 12 degrees after five of eight blocks, against numpy; wherever forward of all is."""
+    rng = np.random.default_rng(5)
+    weights, seconds = rng.uniform(0.1, 0.5, 8), rng.uniform(25.0, 40.0, 8)
+    angles = np.array([0.0] * 5 + [12.0] * 3) + rng.normal(0.0, 1.0, 8)
+    one, two = slice(0, 5), slice(5, 8)
+    means = [np.average(angles[part], weights=weights[part]) for part in (one, two)]
+    scatter = sum((weights[p] * (angles[p] - m) ** 2).sum() for p, m in zip((one, two), means, strict=True))
+    unit = (scatter + driving_parts.USUAL * driving_parts.USUAL_DEG**2) / (6 + driving_parts.USUAL)
+    variance = sum(
+        unit / weights[p].sum() + driving_parts.STRETCH_DEG**2 * (weights[p] ** 2).sum() / weights[p].sum() ** 2
+        for p in (one, two)
+    )
+    for whole in (0.0, 175.0):
+        a = np.radians(angles - whole)
+        columns = (np.sin(a), np.cos(a), np.zeros(8), np.radians(np.repeat((0.0, 5.0), 4)), weights, seconds)
+        [(forward_deg, sigmas, roll_deg, pitch_deg)] = run(engine, [("parts", [np.column_stack(columns).tolist()])])
+        assert forward_deg == pytest.approx(means[1] - means[0], abs=0.1)
+        assert sigmas == pytest.approx(forward_deg / np.sqrt(variance), rel=0.01)
+        assert roll_deg == 0.0
+        assert pitch_deg == pytest.approx(5.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(("change", "differ"), [(0, True), (4, False), (5, False)])
+def test_parts_too_short_are_not_compared(change, differ):
+    """Too little change of speed for forward, too few seconds for the vertical."""
+    block = [0.0, 1.0, 0.0, 0.0, 0.2, 40.0]
+    last = [0.2, 1.0, 0.2, 0.2, 0.11, 22.0]
+    if change:
+        last[change] *= 0.8
+    forward_deg, _, roll_deg, pitch_deg = driving_runs.parts([block] * 5 + [last])
+    found = (roll_deg + pitch_deg if change == 5 else forward_deg) > 11.0
+    assert found is differ
 
 
 @pytest.mark.parametrize(("deceleration", "seconds", "found"), [(0.72, 6, False), (0.88, 6, True), (2.0, 0.5, False)])

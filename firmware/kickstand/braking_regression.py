@@ -21,13 +21,13 @@ RIDGE = 1e-6  # g^2: no curve at all leaves the coefficient of c at zero
 
 
 class Fit:
-    """forward (3, g per g), level (3, g); weight: how much the speed changed (g^2 s); explained: what forward explains
-    of the force (g^2 s)."""
+    """forward (3, g per g), level (3, g); weight: how much the speed changed (g^2 s); seconds: of all; explained: what
+    forward explains of the force (g^2 s)."""
 
     def __init__(self):
         self.forward = [0.0] * 3
         self.level = [0.0] * 3
-        self.weight = self.explained = 0.0
+        self.weight = self.seconds = self.explained = 0.0
 
 
 class BrakingRegression:
@@ -73,8 +73,7 @@ class BrakingRegression:
                 to, source = block * TERMS, 2 * block * TERMS
                 for k in range(TERMS):
                     sums[to + k] = sums[source + k] + sums[source + TERMS + k] if 2 * block < BLOCKS else 0.0
-                if block & 1:
-                    yield
+                yield
         self._per_block *= 2
         self.blocks = BLOCKS // 2 + 1
 
@@ -116,6 +115,7 @@ class BrakingRegression:
         determinant = aa * cc - ac * ac
         if determinant <= 1e-6 * aa * cc:
             return False
+        out.seconds = n
         out.weight = aa - ac * ac / cc
         out.explained = 0.0
         for i in range(3):

@@ -25,14 +25,14 @@ UPRIGHT_DEG = 8.0  # an upright pose that was not quite upright, and the road's 
 
 def compare(drive, matrix):
     """UNKNOWN, SAME, REFINED, REVERSED or MOVED. drive: a DriveAlignment; matrix: 9, rows left, up, forward."""
-    if drive.speed_problem is not None or drive.brakings + drive.starts < MIN_BRAKINGS:
+    if drive.quality.speed_problem is not None or drive.events.count < MIN_BRAKINGS:
         return UNKNOWN
-    yaw = abs(yaw_deg(drive.fit, matrix))
+    yaw = abs(yaw_deg(drive.quality.fit, matrix))
     if yaw > REVERSED_DEG and _all_backward(drive, matrix):
         return REVERSED
     if drive.counted < drive.needed:
         return UNKNOWN
-    if angle_deg(drive.fit.level, matrix[3:6]) > UPRIGHT_DEG:
+    if angle_deg(drive.quality.fit.level, matrix[3:6]) > UPRIGHT_DEG:
         return MOVED
     if not drive.ready:
         return UNKNOWN
@@ -49,8 +49,8 @@ def yaw_deg(fit, matrix):
 def _all_backward(drive, matrix):
     """True if each part of the drive says so."""
     part = Fit()
-    for block in range(drive.regression.filled):
-        if drive.regression.fit(part, drive.lag, block, block + 1) and abs(yaw_deg(part, matrix)) < 90.0:
+    for block in range(drive.events.regression.filled):
+        if drive.events.regression.fit(part, drive.events.lag, block, block + 1) and abs(yaw_deg(part, matrix)) < 90.0:
             return False
     return True
 

@@ -8,7 +8,8 @@ forward, some 3 to 4 degrees, which more brakings do not take away: driving.py d
 from math import degrees, sqrt
 
 from .dispersion import CircularDispersion
-from .driving import DRIVE, GAP_US, MAX_INTERVAL_US, MIN_INTERVAL_US, READY, DriveAlignment
+from .driving import DRIVE, GAP_US, READY, DriveAlignment
+from .driving_events import MAX_INTERVAL_US, MIN_INTERVAL_US
 from .driving_reasons import not_ready
 from .rodrigues import rotation_between
 from .rotation import matrix, multiply, normalize, rotate, vector

@@ -57,15 +57,18 @@ def not_ready(drive, counted, needed, turned):
             "Brake straight",
             "%d of %d done" % (counted, needed),
         )
-    if drive.halves_deg > HALVES_DEG:
+    quality = drive.quality
+    if not quality.agree and quality.quality_deg < 180.0:
+        degrees = max(quality.parts.forward_deg, quality.halves_deg)
         return AlignmentError(
-            "two halves of the drive disagree by %.0f degrees about forward: did the mount move? Else drive on"
-            % drive.halves_deg,
-            "Halves differ",
-            "by %.0f\xdf: go on" % drive.halves_deg,
+            "two parts of the drive disagree by %.0f degrees about forward: did the mount move? Else drive on"
+            % degrees,
+            "Parts differ",
+            "by %.0f\xdf: go on" % degrees,
         )
     return AlignmentError(
-        "forward is known to %.1f degrees only, after %d brakings: drive on" % (drive.quality_deg, drive.brakings),
+        "forward is known to %.1f degrees only, after %d brakings: drive on"
+        % (drive.quality_deg, drive.events.brakings),
         "Only +-%.1f\xdf yet" % min(drive.quality_deg, 180.0),
         "Brake straight",
     )

@@ -18,6 +18,8 @@ class SpeedCheck:
         self._speed = None
         self._changed()
         self._before = None
+        self._sums = [0.0] * 3
+        self._sums_us = 0
 
     def _changed(self):
         self._seconds = self._lively = 0
@@ -31,6 +33,18 @@ class SpeedCheck:
         if speed_mps != self._speed:
             self._speed = speed_mps
             self._changed()
+
+    def update(self, force, dt_us):
+        """Mean force (3, g) of the last dt_us."""
+        sums = self._sums
+        for i in range(3):
+            sums[i] += force[i] * dt_us
+        self._sums_us += dt_us
+        if self._sums_us >= 1_000_000:
+            self.second([total / self._sums_us for total in sums])
+            self._sums_us = 0
+            for i in range(3):
+                sums[i] = 0.0
 
     def second(self, force):
         """Mean force (3, g) of the last second."""

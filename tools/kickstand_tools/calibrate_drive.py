@@ -58,7 +58,8 @@ def drive(
     say(f"stops: {alignment.standing.stops}")
     say(f"quality: {alignment.quality_deg:.1f} degrees about the vertical; ready after {events.ready_s:.0f} s")
     if isinstance(alignment, DriveAlignment):
-        say(f"speed: {alignment.lag_s:.1f} s late; its halves differ by {alignment.halves_deg:.1f} degrees")
+        halves_deg = alignment.quality.halves_deg
+        say(f"speed: {alignment.events.lag_s:.1f} s late; two halves of the drive differ by {halves_deg:.1f} degrees")
         if up is not None:
             _compare(alignment, result.matrix, say)
     for name, row in (("left", 0), ("up", 3), ("forward", 6)):
@@ -94,7 +95,7 @@ def _feed(alignment, logs: list[Log], result: CalibrationFile, bar: Bar, look: C
             previous = now
             if speed is not None:
                 alignment.measure_speed(speed)
-            look(elapsed + now / 1e6)
+                look(elapsed + now / 1e6)
             if i % _CHUNK == 0:
                 bar.advance(min(_CHUNK, len(log.time_us) - i))
         elapsed += log.time_us[-1] / 1e6
@@ -103,27 +104,41 @@ def _feed(alignment, logs: list[Log], result: CalibrationFile, bar: Bar, look: C
 
 
 class _Events:
-    """Says what was used and what was not, as it happens."""
+    """Says what was used and what was not, and what became of it, as it happens."""
 
     def __init__(self, alignment, say: Print) -> None:
         self._alignment, self._say = alignment, say
         self._before = (0, 0)
+        self._ready = False
+        self._problem = None
         self.ready_s = 0.0
 
     def look(self, seconds: float) -> None:
         alignment = self._alignment
         now = alignment.counted, alignment.turned
         if now[0] > self._before[0]:
-            self._say(f"{seconds:7.1f} s  straight: used, {now[0]}")
+            needed = f" of {alignment.needed}" if now[0] <= alignment.needed else ""
+            self._say(f"{seconds:7.1f} s  straight: used, {now[0]}{needed}")
         elif now[1] > self._before[1]:
             self._say(f"{seconds:7.1f} s  turning: not counted")
         self._before = now
-        if not self.ready_s and alignment.ready:
-            self.ready_s = seconds
+        problem = alignment.problem
+        if problem and not self._problem:
+            self._say(f"{seconds:7.1f} s  {problem.reason}")
+        self._problem = problem
+        if alignment.ready != self._ready:
+            self._ready = alignment.ready
+            self._say(f"{seconds:7.1f} s  {self._state()}")
+            self.ready_s = self.ready_s or seconds
+
+    def _state(self) -> str:
+        if self._ready:
+            return f"ready: forward known to {self._alignment.quality_deg:.1f} degrees"
+        return "no longer ready" if self._problem else f"no longer ready: {self._alignment.reason.reason}"
 
 
 def _compare(alignment: DriveAlignment, matrix: list[float], say: Print) -> None:
-    yaw = driving_check.yaw_deg(alignment.fit, matrix)
+    yaw = driving_check.yaw_deg(alignment.quality.fit, matrix)
     found = driving_check.compare(alignment, matrix)
     if found == driving_check.REVERSED:
         say("warning: the two poses had forward and backward exchanged: the kickstand is on the other side")
