@@ -181,6 +181,22 @@ def test_a_gap_in_the_readings_is_one_in_the_log(recorder, flash):
     assert steps[49] > 500_000
 
 
+def test_a_speed_source_without_a_sensor_fills_no_block(recorder, flash):
+    """Only turns are counted against the room in a block. The speed that the next turn gets is the newest."""
+    recorder.start(ride_writer.CHIP, ride_writer.calibration())
+    turns = list(ride_writer.turns(20))
+    for sums, n, dt_us in turns[:10]:
+        recorder.add(sums, n, dt_us)
+    for speed in range(20_000):
+        recorder.add_speed(speed % 7)
+    recorder.add_speed(1234)
+    for sums, n, dt_us in turns[10:]:
+        recorder.add(sums, n, dt_us)
+    recorder.stop()
+    block = ride_blocks.read((flash.root / "rides" / "00001-0000.ride").read_bytes())[0][0]
+    assert [turn.speed_mps for turn in block.turns] == [None] * 10 + [12.34] + [None] * 9
+
+
 @pytest.mark.parametrize(
     ("driver", "words", "lcd"),
     [
