@@ -41,7 +41,7 @@ class Recorder:
             self.problem = error.lcd
             print(error.reason)
             return
-        except OSError as error:
+        except (OSError, MemoryError) as error:
             self._fail(error)
             return
         self._chip = chip
@@ -70,7 +70,7 @@ class Recorder:
             self.active = False
             try:
                 self.keeper.end()
-            except OSError as error:
+            except (OSError, MemoryError) as error:
                 self._fail(error)
 
     def interrupt(self):
@@ -115,7 +115,7 @@ class Recorder:
                 self.keeper.end_block()
                 self._bytes += waiting.length
                 self._waiting = None
-        except OSError as error:
+        except (OSError, MemoryError) as error:
             self._fail(error)
 
     def seconds(self):
