@@ -62,9 +62,9 @@ def run_device(plan):
     LCD says last.
 
     plan: "until" (s); "lean" as for standing(), or "ride" [[name of a function in rides, arguments...], ...],
-    or "poses" as for poses_of; "seed" of the part (None: perfect); "presses" [[at_s, for_s], ...]; "faults"
-    [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...]; "gps" or "wheel"
-    arguments of the models, which are told the speed of the ride; config "VEHICLE" "car": the ride is a car's;
+    or "poses" as for poses_of; "seed" of the part (None: perfect); its "temp_c"; "presses" [[at_s, for_s], ...];
+    "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...];
+    "gps" or "wheel" arguments of the models, which are told the speed of the ride; config "VEHICLE" "car": the ride is a car's;
     "remount" [at_s, seed of the mounting from then on].
     """
     seed = plan.get("seed")
@@ -78,7 +78,9 @@ def run_device(plan):
             motion = ride.motion
         else:
             motion = standing(plan.get("lean", [[0, 0]]))
-        world = sensor_errors.Sensor(seed=seed).world(motion)
+        part = sensor_errors.Sensor(seed=seed)
+        part.temp_c = plan.get("temp_c", 25.0)
+        world = part.world(motion)
         if "remount" in plan:
             world = remounted(world, motion, seed, *plan["remount"])
     board = Board(world, **plan.get("board", {}))

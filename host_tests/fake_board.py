@@ -96,8 +96,9 @@ class FakeBoard(Transport):
         return _Writer(self, path)
 
     def _os(self) -> types.SimpleNamespace:
-        def ilistdir(path: str) -> list[tuple[str, int, int]]:
-            return [(p.name, 0x4000 if p.is_dir() else 0x8000, 0) for p in self.path(path).iterdir()]
+        def ilistdir(path: str) -> list[tuple[str, int, int, int]]:
+            found = self.path(path).iterdir()
+            return [(p.name, 0x4000, 0, 0) if p.is_dir() else (p.name, 0x8000, 0, p.stat().st_size) for p in found]
 
         def stat(path: str) -> tuple[int, ...]:
             found = self.path(path).stat()

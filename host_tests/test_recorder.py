@@ -110,6 +110,15 @@ def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
     assert max(abs(a - b) for a, b in zip(exact[: len(leans)], leans, strict=True)) < 0.03
 
 
+@pytest.mark.parametrize("temp_c", [-5.0, 48.0])
+def test_a_ride_tells_how_warm_the_sensor_was(temp_c, tmp_path):
+    plan = {"seed": 3, "temp_c": temp_c, "config": {"RECORD": True}, "until": 12}
+    devices.run("cpython", tmp_path, plan)
+    told = [block.centidegrees / 100 for block in rides(tmp_path)[0][1]]
+    assert told
+    assert told == pytest.approx([temp_c] * len(told), abs=0.2)
+
+
 def test_the_menu_starts_and_ends_a_ride(tmp_path):
     devices.run("cpython", tmp_path, ALIGNED)
     pages = [[16 + i, SHORT] for i in range(6)]

@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import os
 import sys
 import types
 
@@ -10,7 +11,7 @@ import ride_writer
 from kickstand import ride_ring
 from kickstand.ride_ring import NEEDED, RideRing
 from kickstand_tools import ride_blocks
-from kickstand_tools.board import fake_machine, fake_time
+from kickstand_tools.board import fake_machine, fake_os, fake_time
 
 SETTINGS = types.SimpleNamespace(SD_SPI=None)
 
@@ -34,6 +35,7 @@ def flash(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     flash = Flash(tmp_path, NEEDED + 3 * 65536 + 8192)
     monkeypatch.setattr(ride_ring, "free_bytes", flash.free)
+    monkeypatch.setattr("os.ilistdir", fake_os.ilistdir, raising=False)
     return flash
 
 
@@ -100,6 +102,50 @@ def test_a_ride_longer_than_the_flash_keeps_its_end(recorder, flash):
     # what it foretold when it had just begun
     bytes_s = sum(map(len, ride_writer.blocks(20)[0])) / (sum(dt for _, _, dt in ride_writer.blocks(20)[1]) / 1e6)
     assert rooms[2] + 80 == pytest.approx((flash.size - NEEDED) / bytes_s, rel=0.2)
+
+
+def test_a_card_with_many_parts_is_not_searched_for_each(recorder, flash, monkeypatch):
+    """On a FAT, to stat one is to read the directory from its beginning: 300 take longer than the watchdog waits."""
+    (flash.root / "rides").mkdir()
+    names = [f"{1 + i // 20:05}-{i % 20:04}.ride" for i in range(300)]
+    for name in reversed(names):
+        (flash.root / "rides" / name).write_bytes(bytes(4096))
+    flash.size = NEEDED + len(names) * 4096
+    passes, removed = [], []
+
+    def listed(path):
+        passes.append(path)
+        return fake_os.ilistdir(path)
+
+    def remove(path):
+        removed.append(path)
+        os.remove(path)
+
+    monkeypatch.setattr(ride_ring, "os", types.SimpleNamespace(mkdir=os.mkdir, ilistdir=listed, remove=remove))
+    recorder.start(ride_writer.CHIP, ride_writer.calibration())
+    assert len(passes) == 1
+    assert recorder.room_s() == len(names) * 4096 // 1024
+    for sums, n, dt_us in ride_writer.turns(20_000):  # two and a half parts
+        recorder.add(sums, n, dt_us)
+        recorder.tick()
+    recorder.stop()
+    assert recorder.problem is None
+    assert len(removed) >= 32
+    assert removed == ["rides/" + name for name in names[: len(removed)]]
+    assert 1 < len(passes) <= 1 + len(removed) / ride_ring.OLDEST
+    assert (flash.root / "rides" / "00016-0002.ride").exists()
+
+
+def test_no_memory_for_a_ride_is_said_and_the_display_goes_on(recorder, monkeypatch):
+    def listed(_path):
+        raise MemoryError("memory allocation failed")
+
+    monkeypatch.setattr("os.ilistdir", listed)
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        recorder.start(ride_writer.CHIP, ride_writer.calibration())
+    assert recorder.problem == ("Rec. stopped", "no memory")
+    assert said.getvalue().count("\n") == 1
+    assert not recorder.active
 
 
 def test_a_flash_that_is_full_of_other_things_refuses_in_one_line(recorder, flash):
@@ -179,6 +225,22 @@ def test_a_gap_in_the_readings_is_one_in_the_log(recorder, flash):
     steps = [after.time_us - before.time_us for before, after in zip(block.turns, block.turns[1:], strict=False)]
     assert [step > 500_000 for step in steps].count(True) == 1
     assert steps[49] > 500_000
+
+
+def test_a_speed_source_without_a_sensor_fills_no_block(recorder, flash):
+    """Only turns are counted against the room in a block. The speed that the next turn gets is the newest."""
+    recorder.start(ride_writer.CHIP, ride_writer.calibration())
+    turns = list(ride_writer.turns(20))
+    for sums, n, dt_us in turns[:10]:
+        recorder.add(sums, n, dt_us)
+    for speed in range(20_000):
+        recorder.add_speed(speed % 7)
+    recorder.add_speed(1234)
+    for sums, n, dt_us in turns[10:]:
+        recorder.add(sums, n, dt_us)
+    recorder.stop()
+    block = ride_blocks.read((flash.root / "rides" / "00001-0000.ride").read_bytes())[0][0]
+    assert [turn.speed_mps for turn in block.turns] == [None] * 10 + [12.34] + [None] * 9
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ class Recorder:
             self.problem = error.lcd
             print(error.reason)
             return
-        except OSError as error:
+        except (OSError, MemoryError) as error:
             self._fail(error)
             return
         self._chip = chip
@@ -52,6 +52,7 @@ class Recorder:
         self._sequence = 0
         self._bytes = 0
         self._interrupted = False
+        self._speed = None  # cm/s, that has come since the turn before
         self._waiting = None  # the block that is being written, its place in it
         self._at = 0
         self.active = True
@@ -69,7 +70,7 @@ class Recorder:
             self.active = False
             try:
                 self.keeper.end()
-            except OSError as error:
+            except (OSError, MemoryError) as error:
                 self._fail(error)
 
     def interrupt(self):
@@ -84,6 +85,9 @@ class Recorder:
             if self._time_us != self._start_us:
                 dt_us = max(GAP_US + 1, min(MAX_DT_US, ticks_diff(now_ms, self._before_ms) * 1000))
         self._before_ms = now_ms
+        if self._speed is not None:
+            self._block.add_speed(self._speed)
+            self._speed = None
         self._block.add(sums, n, dt_us)
         self._time_us += dt_us
         if self._block.full():
@@ -92,8 +96,8 @@ class Recorder:
                 self._begin_block()
 
     def add_speed(self, cm_per_s):
-        """A new speed, which belongs to the turn added next."""
-        self._block.add_speed(cm_per_s)
+        """A new speed, which belongs to the turn added next: the last that comes before it."""
+        self._speed = cm_per_s
 
     def tick(self):
         """One step of the writing. Call once a turn while active."""
@@ -111,7 +115,7 @@ class Recorder:
                 self.keeper.end_block()
                 self._bytes += waiting.length
                 self._waiting = None
-        except OSError as error:
+        except (OSError, MemoryError) as error:
             self._fail(error)
 
     def seconds(self):

@@ -1,7 +1,7 @@
 """A recorded ride: blocks of a few thousand bytes, each of which can be read without the others. Pure format.
 
 A block: head (magic, format version, length, ride, sequence, time in us since power-on, hundredths of a degree
-Celsius, counts per g, ten times the counts per deg/s, samples per second, firmware version),
+Celsius at its end, counts per g, ten times the counts per deg/s, samples per second, firmware version),
 the calibration as store.pack() writes it, turns, filling, tail (number of entries, CRC32 of everything before it).
 
 An entry is one turn of the loop: how many samples came in (n), the microseconds since the turn before and the sums
@@ -24,6 +24,7 @@ from .store import BODY_LENGTH
 MAGIC = b"KRID"
 VERSION = 1
 HEAD = "<4sHHIIqhHHH12s"
+_TEMPERATURE_AT = struct.calcsize("<4sHHIIq")
 TAIL = "<HI"
 BLOCK = 4096  # of the flash
 FIELDS = 9  # n, dt_us, sums of ax ay az gx gy gz, speed
@@ -134,6 +135,7 @@ class RideBlock:
         self._state = array("i", [0] * (_PERIOD + 1))
         self._state[_PERIOD] = period_us
         self._entry = array("i", [0] * FIELDS)
+        self._temperature = 0  # counts, of the last turn
         self.length = 0
         self.count = 0
 
@@ -158,13 +160,14 @@ class RideBlock:
             ride,
             sequence,
             time_us,
-            int(100 * chip.temperature_c(chip.counts[3])),
+            0,  # temperature, known at close()
             chip.accel_lsb_per_g,
             int(10 * chip.gyro_lsb_per_dps + 0.5),
             sample_hz,
             version,
         )
         self.buffer[_HEAD_LENGTH - BODY_LENGTH : _HEAD_LENGTH] = body
+        self._chip = chip
         self.length = length
         self.count = 0
 
@@ -179,6 +182,7 @@ class RideBlock:
         entry[5] = sums[4]
         entry[6] = sums[5]
         entry[7] = sums[6]
+        self._temperature = sums[3] // n
         _encode(entry, self._state, self.buffer)
         self.count += 1
 
@@ -194,8 +198,9 @@ class RideBlock:
         return self._state[_AT] + _WORST + _TAIL_LENGTH > self.length
 
     def close(self):
-        """Write the last bits and the tail."""
+        """Write the temperature, the last bits and the tail."""
         state, buffer = self._state, self.buffer
+        struct.pack_into("<h", buffer, _TEMPERATURE_AT, int(100 * self._chip.temperature_c(self._temperature)))
         at = state[_AT]
         if state[_BITS]:
             buffer[at] = (state[_PENDING] << (8 - state[_BITS])) & 0xFF

@@ -14,6 +14,7 @@ PART_BYTES = sum(block_length(i) for i in range(PART_BLOCKS))
 RESERVE = 64 * BLOCK  # the firmware takes 50 blocks, and flashing keeps each old file until the new one is in
 NEEDED = RESERVE + (PART_BLOCKS + 2) * BLOCK  # free before a part is begun; the directory grows, too
 ENDING = ".ride"
+OLDEST = 16  # names kept in memory of parts that may go
 
 
 def directory(settings):
@@ -38,7 +39,7 @@ class RideRing:
         self._settings = settings
         self._directory = ""
         self._file = None
-        self._old = []  # parts that may go, oldest first: (name, bytes)
+        self._old = []  # the next parts to go, oldest first: (name, bytes)
         self._free = 0
 
     def begin(self):
@@ -49,10 +50,9 @@ class RideRing:
         except OSError as error:
             if error.args[0] != EEXIST:
                 raise
-        names = sorted(name for name in os.listdir(self._directory) if name.endswith(ENDING))
-        self._old = [(name, os.stat(self._path(name))[6]) for name in names]
-        ride = 0
-        for name in names:
+        ride = self._others = 0  # bytes
+        for name, size in self._find_old():
+            self._others += size
             if name[:5].isdigit():
                 ride = max(ride, int(name[:5]))
         self._ride = ride + 1
@@ -60,7 +60,6 @@ class RideRing:
         self._block = 0  # of the part
         self._free = free_bytes(self._directory)
         self._wrapped = False  # parts of this ride are gone already
-        self._others = sum(size for _, size in self._old)
         return self._ride
 
     def next_length(self):
@@ -79,7 +78,11 @@ class RideRing:
             return True
         if self._free < NEEDED:
             if not self._old:
-                raise OSError(ENOSPC)
+                for _ in self._find_old():
+                    pass
+                if not self._old:
+                    raise OSError(ENOSPC)
+                return False
             name, size = self._old.pop(0)
             os.remove(self._path(name))
             self._free += size
@@ -90,7 +93,7 @@ class RideRing:
             return False
         name = "%05d-%04d%s" % (self._ride, self._part, ENDING)
         self._file = open(self._path(name), "wb")
-        self._name, self._size = name, 0
+        self._size = 0
         self._part += 1
         return False
 
@@ -112,7 +115,6 @@ class RideRing:
         """The end of the ride. Raises OSError."""
         if self._file:
             file, self._file = self._file, None
-            self._old.append((self._name, self._size))
             file.close()
 
     def abandon(self):
@@ -124,7 +126,24 @@ class RideRing:
 
     def name_problem(self, error):
         """At most 16 characters for the display."""
+        if isinstance(error, MemoryError):
+            return "no memory"
         return "no room" if error.args and error.args[0] == ENOSPC else "flash fault"
+
+    def _find_old(self):
+        """(name, bytes) of each part, which leaves the oldest few in _old. In one pass: to stat each takes a FAT
+        a search through the whole directory, and a card has more names than memory has room for."""
+        old = self._old = []
+        for entry in os.ilistdir(self._directory):
+            name, size = entry[0], entry[3]
+            if name.endswith(ENDING):
+                old.append((name, size))
+                if len(old) == 2 * OLDEST:
+                    old.sort()
+                    del old[OLDEST:]
+                yield name, size
+        old.sort()
+        del old[OLDEST:]
 
     def _path(self, name):
         return self._directory + "/" + name

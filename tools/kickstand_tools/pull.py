@@ -25,10 +25,10 @@ import os
 from kickstand import ride_ring, settings
 directory = ride_ring.directory(settings.load())
 try:
-    names = [name for name in sorted(os.listdir(directory)) if name.endswith(ride_ring.ENDING)]
+    parts = sorted((entry[0], entry[3]) for entry in os.ilistdir(directory) if entry[0].endswith(ride_ring.ENDING))
 except OSError:
-    names = []
-print((directory, [(name, os.stat(directory + "/" + name)[6]) for name in names]))
+    parts = []
+print((directory, parts))
 """
 _READ = """
 from binascii import b2a_base64

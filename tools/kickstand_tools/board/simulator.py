@@ -7,13 +7,14 @@
     board.lcd.text()
     board.uninstall()
 
-Import the firmware after the first install(): under MicroPython `time` and `machine` are replaced there.
+Import the firmware after the first install(): under MicroPython `time`, `os` and `machine` are replaced there.
 """
 
+import os
 import sys
 import time
 
-from . import fake_machine, fake_time
+from . import fake_machine, fake_os, fake_time
 from .button import Button
 from .clock import Clock, PowerOff, Reset, to_us
 from .faults import Faults
@@ -28,6 +29,7 @@ __all__ = ["Board", "PowerOff", "Reset"]
 
 # Pins (SDA, SCL) of the sensor's and of the LCD's bus, of the button, of GPS and wheel: as the firmware's defaults
 WIRING = {"rp2": ((4, 5), (6, 7), 15, 9, 14), "esp32": ((21, 22), (18, 19), 4, 16, 27)}
+_ADDED_TO = ((time, fake_time), (os, fake_os))  # under CPython
 
 
 class Board:
@@ -77,15 +79,17 @@ class Board:
             self.fit_lcd()
 
     def install(self):
-        """Make this board what `machine` and `time` mean to code from now on."""
+        """Make this board what `machine`, `time` and `os` mean to code from now on."""
         fake_machine.use(self)
         fake_time.use(self.clock, self.clock.now_us)
         self._replace("machine", fake_machine)
         if sys.implementation.name == "micropython":
             self._replace("time", fake_time)
+            self._replace("os", fake_os)
         else:
-            for name in fake_time.ADDED:
-                setattr(time, name, getattr(fake_time, name))
+            for real, fake in _ADDED_TO:
+                for name in fake.ADDED:
+                    setattr(real, name, getattr(fake, name))
 
     def uninstall(self):
         """Undo install()."""
@@ -97,9 +101,10 @@ class Board:
                 sys.modules[name] = module
         self._real = {}
         if sys.implementation.name != "micropython":
-            for name in fake_time.ADDED:
-                if hasattr(time, name):
-                    delattr(time, name)
+            for real, fake in _ADDED_TO:
+                for name in fake.ADDED:
+                    if hasattr(real, name):
+                        delattr(real, name)
 
     def run(self, function, until_s):
         """Call function(): "returned", or "reset", or "off" if until_s came first, when the supply is cut.
