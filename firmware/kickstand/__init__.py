@@ -6,7 +6,7 @@
 
 import gc
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 # While modules are loaded: what that leaves would push what stays to the far end of the heap, and make every later
 # collection long.
