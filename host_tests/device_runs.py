@@ -64,8 +64,8 @@ def run_device(plan):
     plan: "until" (s); "lean" as for standing(), or "ride" [[name of a function in rides, arguments...], ...],
     or "poses" as for poses_of; "seed" of the part (None: perfect); its "temp_c"; "presses" [[at_s, for_s], ...];
     "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...];
-    "gps" or "wheel" arguments of the models, which are told the speed of the ride; config "VEHICLE" "car": the ride is a car's;
-    "remount" [at_s, seed of the mounting from then on].
+    "gps" or "wheel" arguments of the models, which are told the speed of the ride; config "VEHICLE" "car": the ride
+    is a car's; "remount" [at_s, seed of the mounting from then on].
     """
     seed = plan.get("seed")
     ride = None

@@ -45,7 +45,7 @@ def test_the_wheel_carries_the_firmware(tmp_path):
         for target, source in deploy.firmware_files().items():
             assert archive.read("kickstand_tools/firmware" + target) == source.read_bytes()
     assert "kickstand_tools/cli.py" in names
-    assert {name.split("/")[0] for name in names} == {"kickstand_tools", "kickstand-0.1.0.dist-info"}
+    assert {name.split("/")[0] for name in names} == {"kickstand_tools", "kickstand-0.2.0.dist-info"}
     assert not [name for name in names if "__pycache__" in name or name.endswith(".cal")]
 
 

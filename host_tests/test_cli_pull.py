@@ -8,6 +8,7 @@ import fake_board
 import numpy as np
 import pytest
 import ride_writer
+from kickstand import __version__
 from kickstand_tools import deploy
 from kickstand_tools.logs import read_log
 from serial.tools import list_ports
@@ -61,7 +62,7 @@ def test_rides_become_logs_with_their_calibration(board, tmp_path):
     cal = json.loads((tmp_path / "out" / one.name.replace(".csv.gz", ".cal.json")).read_text())
     assert cal["vehicle_from_sensor"] == [[0, 1, 0], [0, 0, 1], [1, 0, 0]]
     assert cal["accel_offset_g"] == pytest.approx([0.01, -0.02, 0.03])
-    assert (cal["trim_deg"], cal["firmware"], cal["who_am_i"], cal["sample_hz"]) == (1.25, "0.1.0", "0x68", 200)
+    assert (cal["trim_deg"], cal["firmware"], cal["who_am_i"], cal["sample_hz"]) == (1.25, __version__, "0x68", 200)
     assert len(list(board.root.glob("rides/*"))) == 3  # nothing was to be deleted
 
 

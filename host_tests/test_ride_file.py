@@ -6,7 +6,7 @@ import subprocess
 import engines
 import pytest
 import ride_writer
-from kickstand import ride_file
+from kickstand import __version__, ride_file
 from kickstand_tools import ride_blocks, unix_port
 from ride_writer import CHIP
 
@@ -72,7 +72,7 @@ def test_every_turn_comes_back_exactly(engine, tmp_path):
     assert held(block) == [(tuple(s[:3] + s[4:]), n, dt_us) for s, n, dt_us in turns]
     assert (block.ride, block.sequence, block.time_us) == (7, 3, 123456789012)
     assert (block.accel_lsb_per_g, block.gyro_lsb_tenths, block.sample_hz) == (4096, 655, 200)
-    assert (block.centidegrees, block.firmware) == (3125, "0.1.0")
+    assert (block.centidegrees, block.firmware) == (3125, __version__)
 
 
 def test_blocks_hold_speeds_and_the_calibration_and_are_never_overfilled():

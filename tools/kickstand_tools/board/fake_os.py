@@ -4,7 +4,7 @@ import os
 import sys
 
 if sys.implementation.name == "micropython":
-    from os import *  # noqa: F403
+    from os import *  # noqa: F403 # pyright: ignore[reportWildcardImportFromLibrary]
 
 # What CPython's lacks
 ADDED = ("ilistdir",)
