@@ -10,7 +10,7 @@ from kickstand.braking_regression import BrakingRegression, Fit
 from kickstand.dispersion import NONE
 from kickstand.force_history import BIN_US, MASK, SIZE, ForceHistory
 from kickstand.rodrigues import rotation_between
-from kickstand.speed_check import LIVELY_G, STUCK_S, SpeedCheck
+from kickstand.speed_check import LIVELY_G, STUCK_S, TURNING_DPS, SpeedCheck
 from kickstand.standing import StandingVertical
 
 UP = [0.0, 1.0, 0.0]
@@ -258,6 +258,15 @@ def test_a_speed_that_stays_the_same_while_driving_is_stuck(share, stuck):
     for k in range(100):
         check.measure(7.0)
         check.second([0.0, 1.0, share * LIVELY_G / 2 * (-1) ** k])
+    assert (check.problem is not None) is stuck
+
+
+@pytest.mark.parametrize(("share", "stuck"), [(0.9, True), (1.1, False)])
+def test_a_steady_speed_through_bends_is_not_stuck(share, stuck):
+    check = SpeedCheck()
+    for k in range(3 * STUCK_S):
+        check.measure(30.0)
+        check.second([0.0, 1.0, 0.1 * (-1) ** k], share * TURNING_DPS)
     assert (check.problem is not None) is stuck
 
 

@@ -111,7 +111,7 @@ class DriveMode:
         if self.vehicle != MOTORCYCLE:
             return speed
         drive = self.drive
-        if speed <= 0.0 or drive.problem is not None or drive.speed_problem is not None or drive.counted < CHECKED:
+        if speed <= 0.0 or drive.problem is not None or drive.counted < CHECKED:
             return None
         speed = int(100 * speed + 0.5) / 100
         self._meter.measure_speed(speed)

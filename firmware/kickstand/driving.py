@@ -233,7 +233,7 @@ class DriveAlignment:
         bias = self.standing.bias
         turned = (rate[0] - bias[0]) * up[0] + (rate[1] - bias[1]) * up[1] + (rate[2] - bias[2]) * up[2]
         self._history.add(sums, turned * seconds * 1e5, n)
-        self._speed_check.update(force, n)
+        self._speed_check.update(force, turned, n)
         self._bin = (force, rate, seconds)
         self._quiet_us = min(STALE_US + 1, self._quiet_us + n)
         self._sums_us = 0

@@ -6,8 +6,9 @@ from .errors import AlignmentError
 
 NEGATIVE_MPS = -0.5  # noise around zero is not negative
 LIVELY_G = 0.03  # between the means of two seconds: standing never, driving most of the time
-STUCK_S = 15  # so many lively seconds at the very same speed, and
-STUCK_SHARE = 0.25  # this share of all the seconds it lasted
+TURNING_DPS = 5.0  # a turn at a steady speed is lively too
+STUCK_S = 8  # so many lively seconds at the very same speed: the begins and ends of four brakings; and
+STUCK_SHARE = 0.15  # this share of all the seconds it lasted
 
 
 class SpeedCheck:
@@ -19,6 +20,7 @@ class SpeedCheck:
         self._changed()
         self._before = None
         self._sums = [0.0] * 3
+        self._turned = self._turned_before = 0.0
         self._sums_us = 0
 
     def _changed(self):
@@ -34,22 +36,26 @@ class SpeedCheck:
             self._speed = speed_mps
             self._changed()
 
-    def update(self, force, dt_us):
-        """Mean force (3, g) of the last dt_us."""
+    def update(self, force, yaw_dps, dt_us):
+        """Mean force (3, g) and rate about the vertical (deg/s) of the last dt_us."""
         sums = self._sums
         for i in range(3):
             sums[i] += force[i] * dt_us
+        self._turned += abs(yaw_dps) * dt_us
         self._sums_us += dt_us
         if self._sums_us >= 1_000_000:
-            self.second([total / self._sums_us for total in sums])
+            self.second([total / self._sums_us for total in sums], self._turned / self._sums_us)
+            self._turned = 0.0
             self._sums_us = 0
             for i in range(3):
                 sums[i] = 0.0
 
-    def second(self, force):
-        """Mean force (3, g) of the last second."""
+    def second(self, force, yaw_dps=0.0):
+        """Mean force (3, g) and rate of turning (deg/s) of the last second."""
         before, self._before = self._before, list(force)
-        if before is None or self._speed is None:
+        turning = max(yaw_dps, self._turned_before) > TURNING_DPS
+        self._turned_before = yaw_dps
+        if before is None or self._speed is None or turning:
             return
         d0, d1, d2 = force[0] - before[0], force[1] - before[1], force[2] - before[2]
         self._seconds += 1
