@@ -59,6 +59,9 @@ class Gps:
             self._line = self._line[max(beyond, self._line.rfind(b"$")) :]
         return speed
 
+    def skip(self, now_ms):
+        """Bytes until now may be lost: the check sum tells."""
+
     def fault(self, now_ms):
         """None, or two display lines that say why there is no speed."""
         if self._heard_ms is None:

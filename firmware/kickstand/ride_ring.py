@@ -33,10 +33,11 @@ def free_bytes(path):
 
 
 class RideRing:
-    """settings: a Settings, for where the parts are kept."""
+    """settings: a Settings, for where the parts are kept.  stops_interrupts: while it writes, as flash does."""
 
     def __init__(self, settings):
         self._settings = settings
+        self.stops_interrupts = settings.SD_SPI is None
         self._directory = ""
         self._file = None
         self._old = []  # the next parts to go, oldest first: (name, bytes)
