@@ -129,7 +129,9 @@ class RideRing:
         """At most 16 characters for the display."""
         if isinstance(error, MemoryError):
             return "no memory"
-        return "no room" if error.args and error.args[0] == ENOSPC else "flash fault"
+        if error.args and error.args[0] == ENOSPC:
+            return "no room"
+        return "flash fault" if self._settings.SD_SPI is None else "card fault"
 
     def _find_old(self):
         """(name, bytes) of each part, which leaves the oldest few in _old. In one pass: to stat each takes a FAT
