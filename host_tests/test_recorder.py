@@ -144,9 +144,9 @@ def test_a_wheel_is_not_misread_while_flash_is_erased(tmp_path, monkeypatch):
     monkeypatch.setattr(Board, "fit_wheel", fitted)
     monkeypatch.setattr(RideRing, "write", erasing)
     plan = {
-        "ride": [["upright", 2.0], ["accelerate", 6.0, 3.0], ["straight", 300.0]],
+        "ride": [["wait", 2.0], ["accelerate", 6.0, 3.0], ["straight", 300.0]],
         "wheel": {"pulses_per_metre": 3.0},
-        "config": {"SPEED": "wheel", "PULSES_PER_METRE": 3.0, "RECORD": True},
+        "config": {"SPEED": "wheel", "PULSES_PER_METRE": 3.0, "RECORD": True, "VEHICLE": "car"},
         "until": 45,
     }
     devices.run("cpython", tmp_path, plan)

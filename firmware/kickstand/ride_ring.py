@@ -138,7 +138,7 @@ class RideRing:
         a search through the whole directory, and a card has more names than memory has room for."""
         old = self._old = []
         for entry in os.ilistdir(self._directory):
-            name, size = entry[0], entry[3]
+            name, size = entry[0], entry[-1]
             if name.endswith(ENDING):
                 old.append((name, size))
                 if len(old) == 2 * OLDEST:
