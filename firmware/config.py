@@ -39,9 +39,9 @@
 # Record every ride from power-on; without it the menu starts a record
 # RECORD = False
 
-# SD card for the rides, on SPI; without it they are kept in the board's flash. All five, and its driver:
+# SD card for the rides, on SPI; without it they are kept in the board's flash. All five, and on a Pico its driver:
 # mpremote mip install sdcard
-# SD_SPI = 0
+# SD_SPI = 0                # or 1; on an ESP32 2 or 3, the slot of machine.SDCard
 # SD_SCK = 18
 # SD_MOSI = 19
 # SD_MISO = 16

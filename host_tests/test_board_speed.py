@@ -144,9 +144,29 @@ def test_a_fix_that_waited_in_the_receiver_is_refused_and_its_age_told():
         assert hear(gps, 2, 2200) == ([True], 0)
         assert hear(gps, 3, 3700) == ([True], 500)
         assert hear(gps, 4, 6700)[0] == []  # 2.5 s late
-        assert hear(gps, 7, 7210) == ([True], 9)
+        assert hear(gps, 7, 7210) == ([True], 10)
         assert hear(gps, 30, 8210) == ([True], 0)  # its clock was put right
         assert hear(gps, 31, 9210) == ([True], 0)
+    finally:
+        board.uninstall()
+
+
+def test_a_receiver_whose_clock_jumps_is_late_for_seconds_only():
+    board = Board(level)
+    board.install()
+    try:
+        from kickstand.gps import Gps
+
+        for jump in (-6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6):
+            gps = Gps(Listing(b""))
+            for i in range(30):
+                second = 10 + i + (jump if i >= 10 else 0)
+                gps._uart = Listing(sentence(RMC % ("GP", second, "A", "19.438", ",A")).encode())
+                at_ms = 1000 * i + 20 * (i % 3)
+                heard = [gps.poll(at_ms), gps.poll(at_ms)]  # in two pieces
+                if i < 10 or i >= 22 or jump > 0:
+                    assert heard[1] is not None, (jump, i)
+                    assert 0 <= gps.age_ms <= 40, (jump, i, gps.age_ms)
     finally:
         board.uninstall()
 

@@ -124,3 +124,32 @@ def test_a_device_on_an_esp32(tmp_path):
     assert record.at(3.6)[0].startswith("Raw   25°")
     assert record.at(4.4) == [" " * 16] * 2
     assert record.at(5.5)[0].startswith("Raw   25°")
+
+
+_SD_SPI = """
+import sys
+from kickstand_tools import firmware_path
+from kickstand_tools.board.simulator import Board
+Board(lambda t_s: (0, 0, 1, 0, 0, 0), port=PORT).install()
+firmware_path.add_to_path()
+sys.platform = PORT
+from kickstand.errors import SettingsError
+from kickstand.settings import Settings
+taken = []
+for number in range(5):
+    class Config:
+        SD_SPI, SD_SCK, SD_MOSI, SD_MISO, SD_CS = number, 10, 11, 12, 13
+    try:
+        taken.append(Settings(Config).SD_SPI)
+    except SettingsError as error:
+        assert error.lcd[1] == "SD_SPI"
+print(taken)
+"""
+
+
+@pytest.mark.parametrize(("port", "taken"), [("rp2", [0, 1]), ("esp32", [2, 3])])
+def test_an_sd_card_is_on_an_spi_of_the_port(port, taken):
+    """On an ESP32 the number is a slot of machine.SDCard, of which 0 and 1 are not SPI but the chip's SDMMC host."""
+    script = _SD_SPI.replace("PORT", repr(port))
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (done.stdout.strip(), done.stderr) == (str(taken), "")

@@ -6,7 +6,9 @@ import devices
 import engines
 import pytest
 from kickstand.meter import LeanMeter
+from kickstand.ride_ring import RideRing
 from kickstand_tools import replay_engine, ride_blocks, ride_log
+from kickstand_tools.board.simulator import Board
 from kickstand_tools.calibration_file import read_calibration
 from kickstand_tools.logs import read_blocks
 from test_device import ALIGNED
@@ -117,6 +119,42 @@ def test_a_ride_tells_how_warm_the_sensor_was(temp_c, tmp_path):
     told = [block.centidegrees / 100 for block in rides(tmp_path)[0][1]]
     assert told
     assert told == pytest.approx([temp_c] * len(told), abs=0.2)
+
+
+def test_a_wheel_is_not_misread_while_flash_is_erased(tmp_path, monkeypatch):
+    """Interrupts are off for 45 ms once a block: of the edges meanwhile one is left, and it comes late."""
+    boards, writes = [], []
+    fit, write = Board.fit_wheel, RideRing.write
+
+    def fitted(self, *arguments, **kind):
+        fit(self, *arguments, **kind)
+        boards.append(self)
+
+    def erasing(self, piece):
+        write(self, piece)
+        writes.append(piece)
+        if len(writes) % 16 == 0:
+            wheel, missed = boards[0].wheel, []
+            edge, wheel._edge = wheel._edge, missed.append
+            boards[0].clock.advance(45_000)
+            wheel._edge = edge
+            if missed:
+                edge(0 if wheel.closed else 1)
+
+    monkeypatch.setattr(Board, "fit_wheel", fitted)
+    monkeypatch.setattr(RideRing, "write", erasing)
+    plan = {
+        "ride": [["wait", 2.0], ["accelerate", 6.0, 3.0], ["straight", 300.0]],
+        "wheel": {"pulses_per_metre": 3.0},
+        "config": {"SPEED": "wheel", "PULSES_PER_METRE": 3.0, "RECORD": True, "VEHICLE": "car"},
+        "until": 45,
+    }
+    devices.run("cpython", tmp_path, plan)
+    assert len(writes) > 16 * 5
+    turns = [turn for block in rides(tmp_path)[0][1] for turn in block.turns]
+    speeds = [turn.speed_mps for turn in turns if turn.speed_mps is not None and turn.time_us > 8e6]
+    assert len(speeds) > 200
+    assert speeds == pytest.approx([6.0] * len(speeds), abs=0.1)
 
 
 def test_the_menu_starts_and_ends_a_ride(tmp_path):

@@ -212,6 +212,15 @@ def test_a_file_system_that_fails_ends_the_ride_and_keeps_what_was_written(recor
     assert [len(blocks) for blocks in parts.values()] == [5]
 
 
+def test_a_card_that_is_pulled_is_said(recorder, flash, monkeypatch):
+    monkeypatch.setattr(ride_ring, "directory", lambda _settings: "rides")
+    recorder.keeper = RideRing(types.SimpleNamespace(SD_SPI=0))
+    with contextlib.redirect_stdout(io.StringIO()):
+        monkeypatch.setattr(ride_ring, "open", Worn(5).open, raising=False)
+        ride(recorder, flash, 1000)
+    assert recorder.problem == ("Rec. stopped", "card fault")
+
+
 def test_a_gap_in_the_readings_is_one_in_the_log(recorder, flash):
     """After a fault of the sensor the filter starts again, on the board and in the replay: that takes half a second."""
     recorder.start(ride_writer.CHIP, ride_writer.calibration())
@@ -252,14 +261,14 @@ def test_a_speed_source_without_a_sensor_fills_no_block(recorder, flash):
 )
 def test_a_card_that_cannot_be_used_is_said_in_one_line(driver, words, lcd, recorder, monkeypatch):
     monkeypatch.setitem(sys.modules, "machine", fake_machine)
-    from kickstand import sd_card
+    from kickstand import port
 
     pins = types.SimpleNamespace(SD_SPI=0, SD_SCK=18, SD_MOSI=19, SD_MISO=16, SD_CS=17)
 
     def opened(*_):
         raise driver or ImportError("no module named 'sdcard'")
 
-    monkeypatch.setattr(sd_card, "_open", opened)
+    monkeypatch.setattr(port, "open_sd_card", opened)
     recorder.keeper = RideRing(pins)
     with contextlib.redirect_stdout(io.StringIO()) as said:
         recorder.start(ride_writer.CHIP, ride_writer.calibration())

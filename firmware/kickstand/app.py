@@ -166,6 +166,10 @@ class App:
         self.lcd.tick(now_ms)
         if self.recorder.active:
             self.recorder.tick()
+        if self.recorder.stalled:
+            self.recorder.stalled = False
+            if self.drive:
+                self.drive.speed.skip(ticks_ms())
 
     def _poll_speed(self, now_ms):
         speed = self.drive.poll(now_ms)

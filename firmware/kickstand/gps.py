@@ -7,13 +7,14 @@ A sentence: $, two letters for the system (GP, GL, GN, BD, ...: any will do), it
 everything between $ and * as two hexadecimal digits, end of line.
 """
 
-from time import ticks_add, ticks_diff
+from time import ticks_diff
 
 MAX_SENTENCE = 100  # the standard says 82; receivers with many decimals go beyond
 MAX_CHUNK = 64  # of what waits, each turn: at a turn each 10 ms twice what 10 fixes a second need
 SILENT_MS = 3000
 LATE_MS = 2000  # a fix that waited in the receiver for longer says nothing about now
 TIME_JUMP_MS = 5000  # not late: the receiver has corrected its clock
+FIXES = 4  # at least, over more than TIME_JUMP_MS: what all of them are late by, the receiver's clock has gone back
 KNOT_MPS = 1852.0 / 3600.0
 KMH_MPS = 1.0 / 3.6
 
@@ -29,7 +30,9 @@ class Gps:
         self._sentence_ms = self._fix_ms = 0
         self._rmc_ms = None
         self._time = b""  # of the last RMC
-        self._first = None  # (ticks, time of day), ms, of the promptest fix so far
+        self._first = None  # (ticks, time of day), ms, of the fix that age is counted from
+        self._prompt = None  # the same of the promptest fix after it, its age; how many those are, since when
+        self._prompt_age_ms = self._fixes = self._since_ms = 0
         self.age_ms = 0
 
     def poll(self, now_ms):
@@ -55,6 +58,9 @@ class Gps:
         if beyond > 0:  # the end of a line was lost: perhaps another has begun
             self._line = self._line[max(beyond, self._line.rfind(b"$")) :]
         return speed
+
+    def skip(self, now_ms):
+        """Bytes until now may be lost: the check sum tells."""
 
     def fault(self, now_ms):
         """None, or two display lines that say why there is no speed."""
@@ -110,18 +116,23 @@ class Gps:
         return float(fields[7]) * KMH_MPS if fields[8] == b"K" and fields[7] else None
 
     def _late(self, time, now_ms):
-        """True for a fix that comes much later after its time, hhmmss.ss, than the promptest one did. Sets age_ms."""
+        """True for a fix that comes much later after its time, hhmmss.ss, than the promptest of late. Sets age_ms.
+
+        A NEO-6M's clock goes back by 3 s when it learns of the leap seconds."""
         day_ms = (int(time[0:2]) * 60 + int(time[2:4])) * 60_000 + int(float(time[4:]) * 1000.0 + 0.5)
+        self.age_ms = 0
         if self._first is not None:
             first_ms, first_day_ms = self._first
             age_ms = ticks_diff(now_ms, first_ms) - (day_ms - first_day_ms)
             if 0 < age_ms < TIME_JUMP_MS:
                 self.age_ms = age_ms
-                if age_ms <= LATE_MS:  # a millisecond each fix, for clocks that run apart
-                    self._first = ticks_add(now_ms, 1 - age_ms), day_ms
+                if not self._fixes or age_ms <= self._prompt_age_ms:
+                    self._prompt, self._prompt_age_ms = (now_ms, day_ms), age_ms
+                self._fixes += 1
+                if self._fixes >= FIXES and ticks_diff(now_ms, self._since_ms) > TIME_JUMP_MS:
+                    self._first, self._fixes, self._since_ms = self._prompt, 0, now_ms
                 return age_ms > LATE_MS
-        self._first = now_ms, day_ms
-        self.age_ms = 0
+        self._first, self._fixes, self._since_ms = (now_ms, day_ms), 0, now_ms
         return False
 
 

@@ -12,19 +12,22 @@ from .ride_file import MAX_DT_US, RideBlock
 from .store import pack
 
 PIECE = 256  # a page of the flash
+STALL_MS = 10  # an erase of the flash; writing a page takes 1
 
 
 class Recorder:
     """keeper: where blocks go, a RideRing or RideStream.
 
     active: a ride is being recorded.  problem: None, or two display lines on why the recording ended by itself, to be
-    taken by whoever shows it.
+    taken by whoever shows it.  stalled: interrupts were off for longer than STALL_MS, until whoever counts with them
+    sets it back.
     """
 
     def __init__(self, keeper, sample_hz):
         self.keeper = keeper
         self.active = False
         self.problem = None
+        self.stalled = False
         self._sample_hz = sample_hz
         period_us = 1_000_000 // sample_hz
         self._block, self._spare = RideBlock(period_us), RideBlock(period_us)
@@ -68,6 +71,7 @@ class Recorder:
             self.tick()
         if self.active:
             self.active = False
+            self.stalled = self.keeper.stops_interrupts
             try:
                 self.keeper.end()
             except (OSError, MemoryError) as error:
@@ -104,6 +108,12 @@ class Recorder:
         waiting = self._waiting
         if not waiting:
             return
+        begun_ms = ticks_ms()
+        self._write(waiting)
+        if ticks_diff(ticks_ms(), begun_ms) > STALL_MS and self.keeper.stops_interrupts:
+            self.stalled = True
+
+    def _write(self, waiting):
         try:
             if not self.keeper.ready():
                 return

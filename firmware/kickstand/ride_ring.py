@@ -33,10 +33,11 @@ def free_bytes(path):
 
 
 class RideRing:
-    """settings: a Settings, for where the parts are kept."""
+    """settings: a Settings, for where the parts are kept.  stops_interrupts: while it writes, as flash does."""
 
     def __init__(self, settings):
         self._settings = settings
+        self.stops_interrupts = settings.SD_SPI is None
         self._directory = ""
         self._file = None
         self._old = []  # the next parts to go, oldest first: (name, bytes)
@@ -128,14 +129,16 @@ class RideRing:
         """At most 16 characters for the display."""
         if isinstance(error, MemoryError):
             return "no memory"
-        return "no room" if error.args and error.args[0] == ENOSPC else "flash fault"
+        if error.args and error.args[0] == ENOSPC:
+            return "no room"
+        return "flash fault" if self._settings.SD_SPI is None else "card fault"
 
     def _find_old(self):
         """(name, bytes) of each part, which leaves the oldest few in _old. In one pass: to stat each takes a FAT
         a search through the whole directory, and a card has more names than memory has room for."""
         old = self._old = []
         for entry in os.ilistdir(self._directory):
-            name, size = entry[0], entry[3]
+            name, size = entry[0], entry[-1]
             if name.endswith(ENDING):
                 old.append((name, size))
                 if len(old) == 2 * OLDEST:

@@ -8,6 +8,8 @@ LENGTH = 512  # a block of half a second
 class RideStream:
     """Takes the place of a RideRing."""
 
+    stops_interrupts = False
+
     def begin(self):
         return 0
 

@@ -16,7 +16,7 @@ def mount(settings):
         return MOUNT
     pins = settings.SD_SCK, settings.SD_MOSI, settings.SD_MISO, settings.SD_CS
     try:
-        card = _open(settings.SD_SPI, *[Pin(pin) for pin in pins])
+        card = port.open_sd_card(settings.SD_SPI, *[Pin(pin) for pin in pins])
         os.mount(card, MOUNT)
     except ImportError:
         raise CardError(
@@ -27,15 +27,3 @@ def mount(settings):
             "SD card: none that can be read (%s): check card and wiring" % error, "No SD card", "check card"
         )
     return MOUNT
-
-
-def _open(number, sck, mosi, miso, cs):
-    """The card as a block device."""
-    if port.IS_ESP32:
-        from machine import SDCard
-
-        return SDCard(slot=number, sck=sck, mosi=mosi, miso=miso, cs=cs)
-    from machine import SPI
-    from sdcard import SDCard
-
-    return SDCard(SPI(number, sck=sck, mosi=mosi, miso=miso), cs)

@@ -61,7 +61,7 @@ _TABLE = {
     "BUTTON_PIN": (port.BUTTON_PIN, _PIN),
     "WATCHDOG": (True, _one_of(True, False)),
     "RECORD": (False, _one_of(True, False)),
-    "SD_SPI": (None, _or_none(_whole(0, 2))),
+    "SD_SPI": (None, _or_none(_one_of(*port.SD_SPI))),
     "SD_SCK": (None, _or_none(_PIN)),
     "SD_MOSI": (None, _or_none(_PIN)),
     "SD_MISO": (None, _or_none(_PIN)),

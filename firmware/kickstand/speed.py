@@ -39,6 +39,10 @@ class Speed:
         self.age_us = 1000 * self._source.age_ms
         return speed
 
+    def skip(self, now_ms):
+        """Interrupts were off until now."""
+        self._source.skip(now_ms)
+
     def fault(self, now_ms):
         """None, or two display lines that say why no speed comes."""
         return self._source.fault(now_ms)

@@ -77,6 +77,13 @@ class Wheel:
         self.age_ms = (ticks_diff(ticks_us(), pulse_us) + period_us // 2) // 1000
         return pulses * self._metre_us / period_us
 
+    def skip(self, now_ms):
+        """Pulses until now may be lost or late, as interrupts were off: the next one begins anew."""
+        if self._seen_us is not None or self._seen != self.count:
+            self._moved_ms = now_ms
+        self._seen = self.count
+        self._seen_us = None
+
     def fault(self, now_ms):
         """None, or two display lines: a wheel that has never turned may be a wire that is loose."""
         return ("Wheel: no pulse", "ride, or wiring?") if self._moved_ms is None else None
