@@ -47,7 +47,7 @@ def test(arguments):
     for tool, command in (
         ("ruff", ("-m", "ruff", "check", ".")),
         ("pyright", ("-m", "pyright", "--pythonpath", PYTHON)),
-        ("pytest", ("-m", "pytest", *arguments)),
+        ("pytest", ("-m", "pytest", "-n", "auto", "--dist", "worksteal", *arguments)),
     ):
         say(tool)
         if run(*command) != 0:
