@@ -117,6 +117,26 @@ def test_a_stuck_bus_is_freed_and_a_dead_one_is_reported(board):
         on(board, sensor_i2c)
 
 
+def test_a_pause_that_overflows_the_fifo_is_not_taken_for_silence(board):
+    """Nor when it came after the turn had looked at the clock."""
+    from time import sleep_ms, ticks_ms
+
+    from kickstand.mpu6050 import Mpu6050
+    from kickstand.sensor import Sensor
+
+    def pause():
+        sensor = Sensor(Mpu6050(None), sensor_i2c)
+        while not sensor.fetch(ticks_ms()):
+            sleep_ms(5)
+        begun_ms = ticks_ms()
+        sleep_ms(700)
+        for now_ms in (begun_ms, ticks_ms()):
+            assert sensor.fetch(now_ms) == 0
+        return sensor.chip.overflows, sensor.fault
+
+    assert on(board, pause) == (1, None)
+
+
 def display():
     from kickstand import bus
     from kickstand.hd44780 import Lcd
