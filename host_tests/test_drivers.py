@@ -117,6 +117,26 @@ def test_a_stuck_bus_is_freed_and_a_dead_one_is_reported(board):
         on(board, sensor_i2c)
 
 
+def test_a_pause_that_overflows_the_fifo_is_not_taken_for_silence(board):
+    """Nor when it came after the turn had looked at the clock."""
+    from time import sleep_ms, ticks_ms
+
+    from kickstand.mpu6050 import Mpu6050
+    from kickstand.sensor import Sensor
+
+    def pause():
+        sensor = Sensor(Mpu6050(None), sensor_i2c)
+        while not sensor.fetch(ticks_ms()):
+            sleep_ms(5)
+        begun_ms = ticks_ms()
+        sleep_ms(700)
+        for now_ms in (begun_ms, ticks_ms()):
+            assert sensor.fetch(now_ms) == 0
+        return sensor.chip.overflows, sensor.fault
+
+    assert on(board, pause) == (1, None)
+
+
 def display():
     from kickstand import bus
     from kickstand.hd44780 import Lcd
@@ -124,7 +144,8 @@ def display():
     return Lcd(lambda: bus.open_i2c(1, 6, 7, 100_000))
 
 
-def test_only_changed_lines_are_sent_one_transfer_each(board):
+def test_only_changed_lines_are_sent(board):
+    """Two transfers each: whether the display has kept its settings, and the line."""
     from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
 
     def run():
@@ -140,7 +161,7 @@ def test_only_changed_lines_are_sent_one_transfer_each(board):
             counts.append(board.lcd_bus.transfers[0x27])
         return [after - before for before, after in itertools.pairwise(counts)]
 
-    assert on(board, run) == [0, 1, 2]
+    assert on(board, run) == [0, 2, 4]
     assert board.lcd.text() == ["a" + " " * 15, "b" + " " * 15]
 
 
@@ -170,24 +191,30 @@ def test_only_what_has_changed_of_a_line_is_sent(board):
 
 
 @pytest.mark.parametrize("gap_s", [0.001, 0.1])
-def test_a_display_that_lost_its_power_for_a_moment_is_started_again(board, gap_s):
-    """So short that no transfer falls into it: a PCF8574's pins come up high, where E had been left low."""
+@pytest.mark.parametrize("ticks", [12, 18, 22, 30])  # in its initialisation, and after
+@pytest.mark.parametrize("then", ["Lean  12\xdf", "Lean  13\xdf"])
+def test_a_display_that_lost_its_power_for_a_moment_is_started_again(board, gap_s, ticks, then):
+    """So short that no transfer falls into it: a PCF8574's pins come up high, where E had been left low. Also when a
+    text or a step of the initialisation is to be sent next, which leaves E low."""
     from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
 
     def run():
         lcd = display()
         lcd.show("Lean  12\xdf", "")
-        lcd.flush()
+        for _ in range(ticks):
+            lcd.tick(ticks_ms())
+            sleep_ms(10)
         board.remove_lcd()
         board.at(board.clock.now_us / 1e6 + gap_s, board.fit_lcd)
         sleep_ms(round(gap_s * 1000) + 1)
         assert board.lcd.text()[0].strip() == ""
+        lcd.show(then, "")
         for _ in range(50):
             lcd.tick(ticks_ms())
             sleep_ms(10)
 
     on(board, run)
-    assert board.lcd.text()[0] == "Lean  12\xb0       "
+    assert board.lcd.text()[0] == then.replace("\xdf", "\xb0") + "       "
 
 
 def test_a_display_out_of_step_is_put_right_by_the_next_initialisation(board):

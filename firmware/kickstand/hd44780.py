@@ -2,7 +2,7 @@
 
     lcd = Lcd(lambda: i2c)
     lcd.show("Lean  23\xdf right", bar)
-    lcd.tick()           # one bus transaction at most: a changed line, or a step of the initialisation
+    lcd.tick()           # at most one changed line, or a step of the initialisation
 
 Everything is sent in 4-bit mode, what has changed of a line packed into one transfer (6 ms at 100 kHz for all of
 it). Wiring of the backpack: P0 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7.
@@ -25,6 +25,7 @@ REINIT_MS = 10_000  # noise can put the nibbles out of step, for ever without th
 PROBE_MS = 200
 REOPEN_PROBES = 5
 STEP_MS = 5  # the longest wait that the initialisation asks for is 4.1 ms
+_POWER_UP = const(-8)  # steps: after its power came up a display is deaf for 40 ms
 
 # Initialisation by instruction (data sheet, figure 24). One step a tick, STEP_MS apart, so that the loop
 # never waits. First a nibble at a time until the display is in 4-bit mode whatever state it was in, then
@@ -75,7 +76,7 @@ class Lcd:
         self._put(self._wanted[1], line2)
 
     def tick(self, now_ms):
-        """Do the next piece of work, one bus transaction at most; call it about every 10 ms. Never raises."""
+        """Do the next piece of work; call it about every 10 ms. Never raises."""
         if self._acted_ms is not None and ticks_diff(now_ms, self._acted_ms) < (
             STEP_MS if self.address else PROBE_MS
         ):
@@ -86,13 +87,16 @@ class Lcd:
                 self._probe()
             elif self._step < _STEPS:
                 self._acted_ms = now_ms
-                self._initialise(self._step)
+                if self._step > 0 and not self._kept_power():
+                    self._step = _POWER_UP
+                if self._step >= 0:
+                    self._initialise(self._step)
                 self._step += 1
                 self._init_ms = self._seen_ms = now_ms
             elif ticks_diff(now_ms, self._seen_ms) >= PROBE_MS:
                 self._seen_ms = self._acted_ms = now_ms
                 if not self._kept_power():
-                    self._step = 0
+                    self._step = _POWER_UP
             elif self._refresh():
                 self._acted_ms = now_ms
             elif ticks_diff(now_ms, self._init_ms) >= REINIT_MS:
@@ -104,7 +108,7 @@ class Lcd:
         """Tick until everything is on the display: before the loop runs, or when it has failed. About 0.1
         s."""
         self._acted_ms = None
-        for _ in range(_STEPS + 4):
+        for _ in range(_STEPS - _POWER_UP + 4):
             self.tick(ticks_ms())
             if self.address is None:
                 return
@@ -129,7 +133,7 @@ class Lcd:
                 continue
             self.address = address
             self._probes = 0
-            self._step = 0
+            self._step = _POWER_UP
             return
 
     def _initialise(self, step):
@@ -145,8 +149,8 @@ class Lcd:
                 shown[:] = _NEVER
 
     def _kept_power(self):
-        """False after a loose wire, however short: the pins of a PCF8574 come up high, and E rests low. OSError: it
-        is gone."""
+        """False after a loose wire, however short: the pins of a PCF8574 come up high, and E rests low. To be asked
+        before anything is sent, because that leaves E low again. OSError: it is gone."""
         self._i2c.readfrom_into(self.address, self._port)
         return not self._port[0] & _E
 
@@ -155,6 +159,9 @@ class Lcd:
         for i in (0, 1):
             wanted, shown = self._wanted[i], self._shown[i]
             if shown != wanted:
+                if not self._kept_power():
+                    self._step = _POWER_UP
+                    return True
                 first, last = 0, COLUMNS - 1
                 while shown[first] == wanted[first]:
                     first += 1

@@ -64,7 +64,7 @@ class Sensor:
     def _wait(self, now_ms):
         if self._overflows != self.chip.overflows:  # nobody came to fetch; the FIFO begins again now
             self._overflows = self.chip.overflows
-            self._sample_ms = now_ms
+            self._sample_ms = ticks_ms()  # now_ms may be of before the pause
         elif ticks_diff(now_ms, self._sample_ms) > SILENT_MS:
             self._fail("Sensor silent", "starting again", now_ms)
 

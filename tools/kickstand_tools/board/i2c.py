@@ -6,7 +6,7 @@ the bits take is the controller's to know. Pins call set_scl and set_sda.
 
 
 class Bus:
-    """sda, scl: numbers of the pins it is wired to."""
+    """sda, scl: numbers of the pins it is wired to. open: a transfer is under way."""
 
     def __init__(self, clock, sda, scl):
         self.clock = clock
@@ -17,7 +17,7 @@ class Bus:
         self.faults = []  # faults.TransferFault
         self._fault = None  # of the transfer under way
         self._device = None
-        self._open = False
+        self.open = False
         self._driven_scl = 1
         self._driven_sda = 1
         self._stuck_bits = -1  # zero bits a hung device has still to send; 0: waits for ACK; -1: none hangs
@@ -43,8 +43,8 @@ class Bus:
         if self._stuck_bits > 0:
             return None
         self._stuck_bits = -1  # a device that waits for its ACK gives up at a START
-        if not self._open:
-            self._open = True
+        if not self.open:
+            self.open = True
             number = self.transfers.get(address, 0) + 1
             self.transfers[address] = number
             if self.faults:
@@ -76,7 +76,7 @@ class Bus:
         if self._device is not None:
             self._device.stop()
         self._device = self._fault = None
-        self._open = False
+        self.open = False
 
     def hang(self, bits=8):
         """The controller is gone in the middle of a read: a device holds SDA low for `bits` more clocks."""

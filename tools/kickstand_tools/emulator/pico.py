@@ -96,8 +96,16 @@ class Pico:
             self.power_off()
 
     def stall(self, seconds: float) -> None:
-        """Time passes, and the processor does nothing: as in a long flash operation."""
+        """Time passes, and the processor does nothing: as in a long flash operation. That is the program's own doing,
+        so it cannot come in the middle of a transfer, which would time out: once the buses rest for a millisecond."""
+        before = None
+        while before != (begun := [dict(bus.transfers) for bus in self.board.buses]) or self._transferring():
+            before = begun
+            self.run(0.001)
         self.chip.sleep(seconds)
+
+    def _transferring(self) -> bool:
+        return any(bus.open for bus in self.board.buses)
 
     def run_until(self, condition: Callable[[], Any], limit_s: float, step_s: float = 0.005) -> Any:
         """Let time pass until condition() is true, looked at every step_s; what it said. Raises NotReached."""
