@@ -119,7 +119,7 @@ def test_a_stuck_bus_is_freed_and_a_dead_one_is_reported(board):
 
 def test_a_pause_that_overflows_the_fifo_is_not_taken_for_silence(board):
     """Nor when it came after the turn had looked at the clock."""
-    from time import sleep_ms, ticks_ms
+    from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
 
     from kickstand.mpu6050 import Mpu6050
     from kickstand.sensor import Sensor
