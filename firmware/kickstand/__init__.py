@@ -4,13 +4,7 @@
 >>> kickstand.status()
 """
 
-import gc
-
 __version__ = "0.2.0"
-
-# While modules are loaded: what that leaves would push what stays to the far end of the heap, and make every later
-# collection long.
-gc.threshold(32_768)
 
 
 def status():

@@ -1,9 +1,14 @@
 """What differs between the boards: default pins, kind of interrupt, SD card, and how a started watchdog is put to rest.
 Nothing else knows the port."""
 
+import gc
 import sys
 
 import machine
+
+# While the other modules are loaded: what that leaves would push what stays to the far end of the heap, and make
+# every later collection long. The loop sets it back.
+gc.threshold(32_768)
 
 IS_ESP32 = sys.platform == "esp32"
 
