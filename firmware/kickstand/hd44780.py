@@ -103,12 +103,13 @@ class Lcd:
                 self._step = 0
         except OSError:
             self.address = None
+            self._step = _POWER_UP
 
     def flush(self):
         """Tick until everything is on the display: before the loop runs, or when it has failed. About 0.1
         s."""
         self._acted_ms = None
-        for _ in range(_STEPS - _POWER_UP + 4):
+        for _ in range(_STEPS + 4):
             self.tick(ticks_ms())
             if self.address is None:
                 return
@@ -133,8 +134,8 @@ class Lcd:
                 continue
             self.address = address
             self._probes = 0
-            self._step = _POWER_UP
             return
+        self._step = _POWER_UP  # of one that is there at once the power came up with ours
 
     def _initialise(self, step):
         if step < len(_NIBBLES):

@@ -29,8 +29,7 @@ class Recorder:
         self.problem = None
         self.stalled = False
         self._sample_hz = sample_hz
-        period_us = 1_000_000 // sample_hz
-        self._block, self._spare = RideBlock(period_us), RideBlock(period_us)
+        self._block = self._spare = None  # 8 KB of heap from the first start() on
 
     def start(self, chip, calibration):
         """Begin a ride that is measured by this chip (an Mpu6050 that runs) with this Calibration. What went
@@ -39,6 +38,9 @@ class Recorder:
         if self.active:
             return
         try:
+            if not self._spare:
+                period_us = 1_000_000 // self._sample_hz
+                self._block, self._spare = RideBlock(period_us), RideBlock(period_us)
             self._ride = self.keeper.begin()
         except CardError as error:
             self.problem = error.lcd
