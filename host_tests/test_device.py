@@ -204,10 +204,10 @@ def test_a_wrong_setting_is_named(config, named, tmp_path, capsys):
 
 def test_an_upright_pose_that_was_not_upright_is_trimmed_on_the_road_and_stays_so(tmp_path):
     """Two degrees to the right when pressed upright; after a ride it shows the true lean, after power-off too."""
-    ride = [["kickstand", 8.0], ["upright", 8.0, 2.0], ["accelerate", 15.0, 6.0]]
+    ride = [["kickstand", 8.0], ["upright", 14.0, 2.0], ["accelerate", 15.0, 6.0]]
     for _ in range(6):
         ride += [["turn", -25.0, 3.0], ["straight", 25.0], ["turn", 25.0, 3.0], ["straight", 25.0]]
-    plan = {**ALIGNED, "ride": [*ride, ["brake", 0.0, 6.0], ["wait", 10.0]], "until": 420}
+    plan = {**ALIGNED, "ride": [*ride, ["brake", 0.0, 6.0], ["wait", 10.0]], "until": 426}
     record = devices.run("cpython", tmp_path, plan)
     assert record.lean_at(20.2) == pytest.approx(-2, abs=1)  # what it shows of an upright bike at first
     assert record.last[0].startswith("Lean   0°")

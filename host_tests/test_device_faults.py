@@ -192,7 +192,7 @@ def test_a_sensor_lost_in_a_turn(lean, tmp_path):
     assert record.lean_at(39.5) == pytest.approx(lean, abs=2)
     assert record.first("No sensor|Sensor", 40) < 40.5
     assert all(abs(shown - lean) <= 7 for shown in record.leans(40.6, 52))  # "not sure yet" at first
-    assert record.lean_at(48) == pytest.approx(lean, abs=3)
+    assert record.lean_at(51) == pytest.approx(lean, abs=3)
 
 
 @pytest.mark.parametrize("byte", [1, 2, 5])
