@@ -2,7 +2,6 @@
 
 import io
 import json
-import math
 import struct
 import subprocess
 
@@ -55,7 +54,8 @@ def test_the_same_log_gives_the_same_lean(tmp_path):
     records = struct.pack(replay_engine.CALIBRATION, *calibration)
     for i in range(300):
         fx, fy, fz, wx, wy, wz, temperature = world(i / 100)
-        records += struct.pack(replay_engine.RECORD, i * 10_000, fx, fy, fz, temperature, wx, wy, wz, math.nan)
+        reading = (fx, fy, fz, temperature, wx, wy, wz)
+        records += struct.pack(replay_engine.RECORD, i * 10_000, *reading, replay_engine.NO_SPEED)
     on_host, on_chip = io.BytesIO(), bytearray()
     replay_engine.run(io.BytesIO(records), on_host)
     replay.run(records, on_chip.extend)

@@ -111,4 +111,5 @@ def _records(blocks: Iterable[Block], calibration: CalibrationFile) -> Iterator[
     yield struct.pack(replay_engine.CALIBRATION, *values)
     for block in blocks:
         for time_us, reading, speed in block.rows():
-            yield struct.pack(replay_engine.RECORD, time_us, *reading, speed)
+            given = speed if speed >= 0.0 else replay_engine.NO_SPEED  # not so where it is not a number
+            yield struct.pack(replay_engine.RECORD, time_us, *reading, given)

@@ -3,14 +3,14 @@
     micropython replay_engine.py RECORDS > RESULTS
 
 RECORDS starts with the calibration (19 doubles: offset, slope, gyro bias, matrix, trim), then one record a sample:
-its time in microseconds (int64), seven readings in the chip's order (doubles; g, C, deg/s) and the speed in m/s, not
-a number where there is no new one. RESULTS has the doubles of COLUMNS for each. Binary, because a number printed and
+its time in microseconds (int64), seven readings in the chip's order (doubles; g, C, deg/s) and the speed in m/s,
+negative where there is no new one. RESULTS has the doubles of COLUMNS for each. Binary, because a number printed and
 read again may be another number.
 """
 
 import struct
 import sys
-from math import degrees, isnan, nan
+from math import degrees
 
 from kickstand.calibration import Calibration
 from kickstand.lean import static_lean_deg
@@ -29,6 +29,7 @@ COLUMNS = (
 CALIBRATION = "<19d"
 RECORD = "<q8d"
 RESULT = "<8d"
+NO_SPEED = -1.0  # a board reads not-a-number as something else
 
 
 class Replay:
@@ -38,14 +39,14 @@ class Replay:
         self.meter = LeanMeter(calibration)
         self._before = None
 
-    def take(self, time_us, reading, speed_mps=nan):
+    def take(self, time_us, reading, speed_mps=NO_SPEED):
         """Give the meter a sample (7, the chip's order; g, C, deg/s) and the speed if there is a new one."""
-        if not isnan(speed_mps):
+        if speed_mps >= 0.0:
             self.meter.measure_speed(speed_mps)
         self.meter.update(reading, 0 if self._before is None else time_us - self._before)
         self._before = time_us
 
-    def step(self, time_us, reading, speed_mps=nan):
+    def step(self, time_us, reading, speed_mps=NO_SPEED):
         """The same, and the values of COLUMNS after it."""
         self.take(time_us, reading, speed_mps)
         meter = self.meter
