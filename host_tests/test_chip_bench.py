@@ -25,7 +25,7 @@ def test_bench():
     assert result["samples_lost"] == 0
     assert 0.1 < result["cpu_share"] < 1.0
     assert result["free_heap_bytes"] > 120_000
-    assert abs(result["free_heap_at_end_bytes"] - result["free_heap_bytes"]) < 4000
+    assert result["free_heap_at_end_bytes"] > result["free_heap_bytes"] - 4000
     assert result["first_lean_s"]["mpy"] < result["first_lean_s"]["py"] < 5.0
     assert result["flash_bytes"]["mpy"] < result["flash_bytes"]["py"] / 2
     assert bench.tables(result)

@@ -204,7 +204,8 @@ def test_rides_go_to_an_sd_card_where_config_names_one():
 
 # A Pico with the firmware and a config.py, its console a socket, in a process of its own
 _SERVE = """
-import sys
+from kickstand_tools import firmware_path
+firmware_path.add_to_path()
 from emulated import calibrated, firmware, pico, PART
 from kickstand_tools.emulator.console_server import ConsoleServer
 from test_chip_recorder import RIDE

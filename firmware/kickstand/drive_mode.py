@@ -20,6 +20,7 @@ from .driving import (
     DriveAlignment,
 )
 from .driving_check import MOVED, REFINED, REVERSED, SAME, compare, turn_round
+from .driving_quality import CHECKED
 from .errors import StoreError
 from .pages import DEGREE
 from .rotation import matrix
@@ -41,7 +42,6 @@ _KNOWN_BIAS = (0.0, 0.0, 0.0)  # with an alignment the gyro's bias was measured 
 STAND_SIDE = ("Stand was right?", "hold = fix")
 MOUNT_MOVED = ("Mount has moved", "Align again")
 _DOUBTS = {STAND_SIDE: "stand was right?", MOUNT_MOVED: "mount has moved"}  # in place of the lean, until answered
-CHECKED = 2  # brakings whose force fits the speed: a wheel with two magnets shall not spoil the lean
 
 
 class DriveMode:
@@ -106,12 +106,14 @@ class DriveMode:
         return speed
 
     def _for_lean(self, speed):
-        """What the lean filter may have: not what no braking has confirmed yet, and no zero, which a broken wire gives
-        too; a standstill it sees by itself. Rounded as a record keeps it. None otherwise."""
+        """What the lean filter may have: not what no braking has confirmed yet, as a wheel may have two magnets; and no
+        zero, which a broken wire gives too; a standstill it sees by itself. Rounded as a record keeps it. None
+        otherwise."""
         if self.vehicle != MOTORCYCLE:
             return speed
         drive = self.drive
-        if speed <= 0.0 or drive.problem is not None or drive.counted < CHECKED:
+        confirmed = drive.counted >= CHECKED and drive.quality.speed_problem is None
+        if speed <= 0.0 or drive.problem is not None or not confirmed:
             return None
         speed = int(100 * speed + 0.5) / 100
         self._meter.measure_speed(speed)

@@ -114,6 +114,8 @@ class DriveAlignment:
         """What is wrong with speed or mount: an AlignmentError with reason and lcd, or None."""
         if self._speed_check.problem is None and self.standing.moved and self.vehicle == CAR:
             return moved("two stops differ by over %.0f degrees" % LEVEL_DEG)
+        if self.counted < self.needed:
+            return self._speed_check.problem
         return self._speed_check.problem or self.quality.mount_problem or self.quality.speed_problem
 
     @property

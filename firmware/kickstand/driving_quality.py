@@ -8,6 +8,7 @@ from .driving_reasons import HALVES_DEG, late, moved, units
 from .rotation import angle_deg, cross, dot, norm, normalize, vector
 
 NEEDED = 5  # brakings and starts
+CHECKED = 2  # of them show whether the speed is one
 MAX_STARTS = 2  # count: the others are brakings
 HALVES_STAY_DEG = 6.0  # to become ready it takes HALVES_DEG
 READY_DEG, READY_STAY_DEG = 1.5, 2.5  # by experience one in ten is off by twice as much
@@ -26,7 +27,8 @@ MAX_LATE_S = 1.9
 class DrivingQuality:
     """fit: of all straight driving so far. quality_deg: standard error of its forward, 180 until there is one;
     halves_deg: how far two halves of the drive disagree about it; parts: the DriveParts; agree: halves and parts
-    do; good: enough for an alignment; speed_problem, mount_problem: an AlignmentError, or None.
+    do; good: enough for an alignment; speed_problem (from CHECKED on, two can be chance), mount_problem: an
+    AlignmentError, or None.
     """
 
     def __init__(self):
@@ -90,6 +92,13 @@ class DrivingQuality:
         """slope: force per change of speed; level_deg: between the verticals of two halves of the drive."""
         self.speed_problem = self.mount_problem = None
         self.good = False
+        lag_s = drive.events.lag_s
+        if drive.counted < CHECKED:
+            return
+        if lag_s >= MAX_LATE_S:
+            self.speed_problem = late(lag_s)
+        elif not MIN_SLOPE < slope < MAX_SLOPE:
+            self.speed_problem = units(slope)
         if drive.counted < NEEDED:
             return
         before, what = drive.known_vertical()
@@ -103,11 +112,6 @@ class DrivingQuality:
             self.mount_problem = moved("the vertical is no longer where it was")
         elif self._look_at(drive.events.last) or (parts.forward_deg > MOVED_DEG and parts.sigmas > CHANCE_STAY):
             self.mount_problem = moved("forward is no longer where it was")
-        lag_s = drive.events.lag_s
-        if lag_s >= MAX_LATE_S:
-            self.speed_problem = late(lag_s)
-        elif not MIN_SLOPE < slope < MAX_SLOPE:
-            self.speed_problem = units(slope)
         # each with a hysteresis of its own: what comes and goes at a threshold helps nobody
         limit_deg, chance = (HALVES_STAY_DEG, CHANCE_STAY) if self.agree else (HALVES_DEG, CHANCE)
         self.agree = self.halves_deg <= limit_deg and (parts.forward_deg <= limit_deg or parts.sigmas <= chance)

@@ -14,6 +14,7 @@ STILL_DPS = 3.0
 AVERAGE_S = 0.5
 SAME_STOP_DEG = 1.5  # doors and passengers
 TURNED_S = 6.0  # longer than a speed may be late
+TURNING_DPS = 10.0  # from the bias of the last stop, more than warming does: a speed of zero in a bend is no stop
 MAX_APART_DEG = 8.0  # 14 %: two stops further apart are not two slopes
 
 
@@ -56,7 +57,7 @@ class StandingVertical:
         if self._force is None:
             self._force, self._rate = list(force), list(rate)
         gain = min(1.0, seconds / AVERAGE_S)
-        from_force = from_rate = 0.0
+        from_force = from_rate = from_bias = 0.0
         for i in range(3):
             d = force[i] - self._force[i]
             self._force[i] += gain * d
@@ -64,7 +65,10 @@ class StandingVertical:
             d = rate[i] - self._rate[i]
             self._rate[i] += gain * d
             from_rate += d * d
-        if from_force > STILL_G * STILL_G or from_rate > STILL_DPS * STILL_DPS:
+            d = rate[i] - self.bias[i]
+            from_bias += d * d
+        turning = self.stops and from_bias > TURNING_DPS * TURNING_DPS
+        if turning or from_force > STILL_G * STILL_G or from_rate > STILL_DPS * STILL_DPS:
             self._still_s = 0.0
             return
         self._still_s += seconds
