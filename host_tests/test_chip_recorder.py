@@ -37,7 +37,7 @@ class Done(Exception):
 leans = array("f", bytes(4 * 2000))
 count = 0
 until_ms = ticks_add(ticks_ms(), SECONDS * 1000)
-update = LeanMeter.update
+update = LeanMeter.update_sum
 def noted(self, *arguments):
     global count
     if ticks_diff(ticks_ms(), until_ms) > 0:
@@ -45,7 +45,7 @@ def noted(self, *arguments):
     update(self, *arguments)
     leans[count] = self.lean_deg
     count += 1
-LeanMeter.update = noted
+LeanMeter.update_sum = noted
 chosen = settings.Settings(Config)
 try:
     app.App(chosen, app.open_lcd(chosen)).run()

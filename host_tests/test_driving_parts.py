@@ -122,6 +122,23 @@ def test_regression_is_weighted_least_squares(engine, count):
     assert 5 <= blocks <= 8
 
 
+def test_one_fit_in_the_middle_of_another_changes_neither():
+    """The loop compares an alignment while a drive is being judged."""
+    rng = np.random.default_rng(5)
+    regression = BrakingRegression()
+    for k in range(8):
+        for change, curve in rng.normal(size=(6, 2)):
+            regression.add(0, 0.5, 0.1 * change, 0.03 * curve, [0.1 * change * k, 0.5, 0.1 * change])
+        list(regression.close_block())
+    alone, begun, between = Fit(), Fit(), Fit()
+    assert regression.fit(alone, 0)
+    work = regression.fitting(begun, 0)
+    next(work)
+    assert regression.fit(between, 0, 0, 1)
+    list(work)
+    assert begun.found and begun.forward == alone.forward != between.forward
+
+
 def test_regression_has_nothing_to_say_without_changes_of_speed():
     fitted, fit = BrakingRegression(), Fit()
     assert not fitted.fit(fit, 0)
@@ -244,6 +261,17 @@ def test_a_sensor_turned_while_standing_is_seen_a_late_speed_is_not():
     assert np.degrees(np.arcsin(vertical.up[2])) < 0.2
     stand(vertical, level(15.0), 10.0)
     assert vertical.moved
+
+
+@pytest.mark.parametrize(("share", "moved"), [(0.9, True), (1.1, False)])
+def test_a_bend_at_a_stuck_zero_is_no_stop(share, moved):
+    """Against the bias of the stop before, which warms up by less."""
+    vertical = StandingVertical()
+    stand(vertical, level(0.0), 5.0, rate=(1.0, -4.0, 2.0))
+    stand(vertical, level(0.0), 3.0, speed=10.0)
+    stand(vertical, level(15.0), 10.0, rate=(1.0, -4.0 + share * standing.TURNING_DPS, 2.0))
+    assert vertical.moved is moved
+    assert vertical.stops == (2 if moved else 1)
 
 
 @pytest.mark.parametrize(("share", "stuck"), [(0.9, False), (1.1, True)])

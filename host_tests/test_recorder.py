@@ -58,13 +58,13 @@ def lean_matches(record, blocks, leans, slack_s=0.4):
 def computed(monkeypatch):
     """Every lean that the firmware computes, on CPython."""
     leans = []
-    update = LeanMeter.update
+    update = LeanMeter.update_sum
 
     def noted(self, *arguments):
         update(self, *arguments)
         leans.append(self.lean_deg)
 
-    monkeypatch.setattr(LeanMeter, "update", noted)
+    monkeypatch.setattr(LeanMeter, "update_sum", noted)
     return leans
 
 

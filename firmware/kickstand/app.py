@@ -217,7 +217,7 @@ class App:
             self._restarts = self.sensor.restarts
             self._sensor_started()
         chip = self.sensor.chip
-        self.meter.update(chip.sums, dt_us, n)
+        self.meter.update_sum(chip.sums, n, dt_us)
         if self.recorder.active:
             self.recorder.add(chip.sums, n, dt_us)
         if self.drive:

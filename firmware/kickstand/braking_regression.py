@@ -22,12 +22,14 @@ RIDGE = 1e-6  # g^2: no curve at all leaves the coefficient of c at zero
 
 class Fit:
     """forward (3, g per g), level (3, g); weight: how much the speed changed (g^2 s); seconds: of all; explained: what
-    forward explains of the force (g^2 s)."""
+    forward explains of the force (g^2 s); found: False if there was nothing to fit."""
 
     def __init__(self):
         self.forward = [0.0] * 3
         self.level = [0.0] * 3
         self.weight = self.seconds = self.explained = 0.0
+        self.found = False
+        self.total = [0.0] * TERMS  # of its own: one Fit may be made in the middle of another
 
 
 class BrakingRegression:
@@ -35,9 +37,7 @@ class BrakingRegression:
 
     def __init__(self):
         self._sums = [array("f", [0.0] * (BLOCKS * TERMS)) for _ in range(LAGS)]
-        self._total = [0.0] * TERMS
         self._per_block = 1
-        self._fitted = False
         self._in_last = 0
         self.blocks = 1
 
@@ -86,12 +86,12 @@ class BrakingRegression:
         """Fit blocks first to last - 1 into out (Fit), at once. False if there is nothing to fit."""
         for _ in self.fitting(out, lag, first, last):
             pass
-        return self._fitted
+        return out.found
 
     def fitting(self, out, lag, first=0, last=BLOCKS, without=-1):
         """The same, but for one block, as a generator of short pieces that returns True or False."""
-        sums, total = self._sums[lag], self._total
-        self._fitted = False
+        sums, total = self._sums[lag], out.total
+        out.found = False
         for k in range(TERMS):
             total[k] = 0.0
         gathered = 0
@@ -127,5 +127,5 @@ class BrakingRegression:
             out.forward[i] = forward
             out.level[i] = s / n - a * forward - c * left
             out.explained += forward * forward * out.weight
-        self._fitted = True
+        out.found = True
         return True

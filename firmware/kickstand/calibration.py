@@ -44,6 +44,20 @@ class Calibration:
             self.accel_slope[i] = slope[i]
             self._scale[i] = slope[i] / self._accel_lsb
 
+    def parameters(self):
+        """All 19 that were measured: offset, slope, gyro bias, matrix, trim."""
+        measured = list(self.accel_offset) + list(self.accel_slope) + list(self.gyro_bias)
+        return measured + list(self.vehicle_from_sensor) + [self.trim_deg]
+
+    def set_parameters(self, values):
+        """Take those of parameters()."""
+        self.set_accel(values[0:3], values[3:6])
+        for i in range(3):
+            self.gyro_bias[i] = values[6 + i]
+        for i in range(9):
+            self.vehicle_from_sensor[i] = values[9 + i]
+        self.trim_deg = values[18]
+
     def correct(self, accel):
         """Calibrated copy of a mean accelerometer reading in g."""
         return array("f", [self.accel_slope[i] * accel[i] + self.accel_offset[i] for i in range(3)])

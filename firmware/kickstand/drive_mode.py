@@ -63,9 +63,9 @@ class DriveMode:
         self._force, self._rate = [0.0] * 3, [0.0] * 3
         self.begin()
 
-    def begin(self):
-        """With another calibration, from flash or by a wizard: it is to be checked."""
-        self._asked = False
+    def begin(self, asked=False):
+        """With another calibration, from flash or by a wizard: it is to be checked. asked: it is not to be trusted."""
+        self._asked = asked
         self._told = []  # what the rider has seen and needs no more
         self.message = None
         self._restart()
@@ -82,9 +82,8 @@ class DriveMode:
 
     def ask(self):
         """The rider wants it, for a sensor that is mounted anew: nothing of before counts."""
-        self.begin()
-        self._asked = self.shown = True
-        self._restart()
+        self.shown = True
+        self.begin(True)
 
     def _clear(self):
         self._n = self._us = self._turns = 0

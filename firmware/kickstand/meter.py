@@ -19,8 +19,9 @@ FALLEN_US = 1_000_000
 class LeanMeter:
     """Lean and acceleration of the vehicle. leans: False for a car, whose lean stays 0.
 
-    After update(): force (left, up, forward in g), rate (about them in rad/s), lean_deg (the filter's, > 0
-    right), smooth_force (g, for display; of an aligned one forward alone), fallen, and the maxima since reset_maxima().
+    After update() or update_sum(): force (left, up, forward in g), rate (about them in rad/s), lean_deg (the
+    filter's, > 0 right), smooth_force (g, for display; of an aligned one forward alone), fallen, and the maxima since
+    reset_maxima().
     doubt: None, or for what reason the lean is not to be trusted, set by whoever knows.
     """
 
@@ -30,7 +31,7 @@ class LeanMeter:
         self.force = [0.0] * 3
         self.rate = [0.0] * 3
         self.smooth_force = [0.0] * 3
-        self._reading, self._n = (0,) * 7, 0
+        self._reading, self._n = (0,) * 7, 1
         self.reset_maxima()
         self.calibration = self.doubt = None
         self.use(calibration)
@@ -95,21 +96,28 @@ class LeanMeter:
     @property
     def reading(self):
         """The last: 7 numbers in the chip's order."""
-        return [value / (self._n or 1) for value in self._reading]
+        return [value / self._n for value in self._reading]
 
-    def update(self, reading, dt_us, n=0):
+    def update(self, reading, dt_us):
         """reading: 7 numbers in the chip's order; dt_us: integer microseconds since the one before (0 for the
-        first). n: the reading is the sum of n samples in counts, array('i', 7); on the board of those that came in
-        during one turn of the loop, because floats cost too much to do it for each."""
+        first)."""
+        self._reading, self._n = reading, 1
+        self._transform.apply(reading, self.force, self.rate)
+        self._follow(dt_us)
+
+    def update_sum(self, sums, n, dt_us):
+        """The same for the sum of n samples, array('i', 7): on the board of those that came in during one turn of the
+        loop, because floats cost too much to do it for each."""
+        self._reading, self._n = sums, n
+        self._transform.apply_sum(sums, n, self.force, self.rate)
+        self._follow(dt_us)
+
+    def _follow(self, dt_us):
+        """What force and rate lead to."""
         if dt_us > GAP_US:
             self.restart()
         if self._fresh:
             dt_us = 0  # there is no reading before, on the board and in a replay alike
-        self._reading, self._n = reading, n
-        if n:
-            self._transform.apply_sum(reading, n, self.force, self.rate)
-        else:
-            self._transform.apply(reading, self.force, self.rate)
         self._smooth(1.0 if self._fresh else dt_us / (SMOOTH_US + dt_us))
         self._fresh = False
         self.lean_deg = lean = self.filter.update(self.force, self.rate, dt_us) if self._leans else 0.0

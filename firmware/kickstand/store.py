@@ -135,11 +135,7 @@ def pack(who_am_i, accel_range_g, calibration):
         accel_range_g,
         calibration.six_done,
         (_BY_DRIVE if calibration.by_drive else _BY_POSES) if calibration.aligned else _NOT_ALIGNED,
-        *list(calibration.accel_offset),
-        *list(calibration.accel_slope),
-        *list(calibration.gyro_bias),
-        *list(calibration.vehicle_from_sensor),
-        calibration.trim_deg,
+        *calibration.parameters(),
     )
 
 
@@ -149,13 +145,7 @@ def unpack(data, at):
     calibration = Calibration()
     calibration.six_done, calibration.aligned = bool(fields[2]), fields[3] != _NOT_ALIGNED
     calibration.by_drive = fields[3] == _BY_DRIVE
-    values = fields[4:]
-    calibration.set_accel(values[0:3], values[3:6])
-    for i in range(3):
-        calibration.gyro_bias[i] = values[6 + i]
-    for i in range(9):
-        calibration.vehicle_from_sensor[i] = values[9 + i]
-    calibration.trim_deg = values[18]
+    calibration.set_parameters(fields[4:])
     return fields[0], fields[1], calibration
 
 

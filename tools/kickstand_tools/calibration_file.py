@@ -39,16 +39,15 @@ class CalibrationFile:
     trim: float = 0.0
     vehicle: str = ""
 
+    def parameters(self) -> list[float]:
+        """As Calibration.parameters()."""
+        return [*self.offset, *self.slope, *self.bias, *self.matrix, self.trim]
+
     def to_firmware(self) -> Calibration:
         """The same as the firmware's own object, for readings in g and deg/s."""
         calibration = Calibration()
-        calibration.set_accel(self.offset, self.slope)
-        for i in range(3):
-            calibration.gyro_bias[i] = self.bias[i]
-        for i in range(9):
-            calibration.vehicle_from_sensor[i] = self.matrix[i]
+        calibration.set_parameters(self.parameters())
         calibration.six_done, calibration.aligned = self.six_done, self.aligned
-        calibration.trim_deg = self.trim
         return calibration
 
 

@@ -107,8 +107,7 @@ _RUN = {"cpython": _cpython, "micropython": _micropython, "rp2040": _rp2040}
 
 def _records(blocks: Iterable[Block], calibration: CalibrationFile) -> Iterator[bytes]:
     """What replay_engine.run reads."""
-    values = calibration.offset + calibration.slope + calibration.bias + calibration.matrix + [calibration.trim]
-    yield struct.pack(replay_engine.CALIBRATION, *values)
+    yield struct.pack(replay_engine.CALIBRATION, *calibration.parameters())
     for block in blocks:
         for time_us, reading, speed in block.rows():
             given = speed if speed >= 0.0 else replay_engine.NO_SPEED  # not so where it is not a number

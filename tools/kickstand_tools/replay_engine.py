@@ -2,7 +2,7 @@
 
     micropython replay_engine.py RECORDS > RESULTS
 
-RECORDS starts with the calibration (19 doubles: offset, slope, gyro bias, matrix, trim), then one record a sample:
+RECORDS starts with the calibration (19 doubles, Calibration.parameters()), then one record a sample:
 its time in microseconds (int64), seven readings in the chip's order (doubles; g, C, deg/s) and the speed in m/s,
 negative where there is no new one. RESULTS has the doubles of COLUMNS for each. Binary, because a number printed and
 read again may be another number.
@@ -65,7 +65,9 @@ class Replay:
 
 def run(source, sink):
     """Read records from source until its end and write results to sink, both binary files."""
-    replay = Replay(_calibration(struct.unpack(CALIBRATION, source.read(struct.calcsize(CALIBRATION)))))
+    calibration = Calibration()
+    calibration.set_parameters(struct.unpack(CALIBRATION, source.read(struct.calcsize(CALIBRATION))))
+    replay = Replay(calibration)
     size = struct.calcsize(RECORD)
     while True:
         record = source.read(size)
@@ -73,17 +75,6 @@ def run(source, sink):
             return
         values = struct.unpack(RECORD, record)
         sink.write(struct.pack(RESULT, *replay.step(values[0], values[1:8], values[8])))
-
-
-def _calibration(values):
-    calibration = Calibration()
-    calibration.set_accel(values[0:3], values[3:6])
-    for i in range(3):
-        calibration.gyro_bias[i] = values[6 + i]
-    for i in range(9):
-        calibration.vehicle_from_sensor[i] = values[9 + i]
-    calibration.trim_deg = values[18]
-    return calibration
 
 
 if __name__ == "__main__":

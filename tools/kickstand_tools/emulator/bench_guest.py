@@ -17,7 +17,7 @@ STAGES = (
     ("decode and sum", "mpu6050", "Mpu6050", "add_up(self, n)"),
     ("calibrate and rotate", "transform", "Transform", "apply_sum(self, sums, n, force, rate)"),
     ("filter", "lean_filter", "LeanFilter", "update(self, force, rate, dt_us)"),
-    ("meter", "meter", "LeanMeter", "update(self, reading, dt_us, n)"),
+    ("meter", "meter", "LeanMeter", "update_sum(self, sums, n, dt_us)"),
     ("fetch", "sensor", "Sensor", "fetch(self, now_ms)"),
     ("page", "screen", "Screen", "lines(self, now_ms)"),
     ("display", "hd44780", "Lcd", "tick(self, now_ms)"),
