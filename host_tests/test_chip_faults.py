@@ -10,7 +10,7 @@ pytestmark = pytest.mark.chip
 
 LEAN_DEG = 20.0
 NEAR_DEG = 2.0
-SENSOR, LCD = 0x68, 0x27
+SENSOR = 0x68
 RECOVERY_S = 0.5
 DIP_S = 0.1  # the supply is back, and the sensor answers
 LCD_PROBE_S = 1.5  # a missing display is looked for every 0.2 s, its bus freed every second

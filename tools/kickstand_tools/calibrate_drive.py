@@ -17,7 +17,6 @@ from kickstand.driving_published import PublishedAlignment  # noqa: E402
 from kickstand.errors import AlignmentError  # noqa: E402
 
 METHODS = {"improved": DriveAlignment, "published": PublishedAlignment}
-VEHICLES = (MOTORCYCLE, CAR)
 _BETWEEN_US = 3_600_000_000  # logs do not join
 _SLOWEST_US = 50_000  # between samples
 _CHUNK = 1000

@@ -16,7 +16,6 @@ from .progress import Bar
 firmware_path.add_to_path()
 from . import replay_engine  # noqa: E402
 
-ENGINES = ("cpython", "micropython", "rp2040")
 _CHUNK = 500  # samples between two steps of the progress bar of an emulated Pico
 
 Row = tuple[float, ...]

@@ -18,7 +18,6 @@ _WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
     "racechrono": export_racechrono.write,
     "vbo": export_vbo.write,
 }
-FORMATS = tuple(_WRITE)
 
 
 def export(ride: Ride, form: str, out: Path) -> int:
