@@ -16,6 +16,7 @@ from . import log_cells
 from .errors import InputError, cause
 from .log_cells import COLUMNS, OPTIONAL
 from .output import write_whole
+from .speed_unit import SpeedUnit
 
 ROOM_TEMP_C = 25.0
 BLOCK_BYTES = 1 << 22  # of text, some 60000 samples
@@ -86,6 +87,7 @@ def read_blocks(path: Path, minimum: int = 2) -> Iterator[Block]:
     names = log_cells.header(path, header.decode())
     places = {name: names.index(name) for name in COLUMNS + OPTIONAL if name in names}
     count, line, first_us, last_us = 0, 1, 0, -1
+    speed_unit = SpeedUnit(path)
     for text, done in itertools.chain([(rest, packed)], chunks):
         table, rows = _numbers(path, text, names, places, line, last_us if count else None)
         line += text.count(b"\n")
@@ -96,7 +98,10 @@ def read_blocks(path: Path, minimum: int = 2) -> Iterator[Block]:
             first_us = int(time_us[0])
             _check_units(path, table[:, 1:4], time_us)
         count, last_us = count + len(table), int(time_us[-1])
-        yield _block(table, time_us - first_us, places, rows, done)
+        block = _block(table, time_us - first_us, places, rows, done)
+        if "speed_mps" in places:
+            speed_unit.add(block.time_us.astype(float) * 1e-6, block.readings[:, :3], block.speed_mps)
+        yield block
     if count < minimum:
         raise InputError(f"{path} is too short: {count} samples, at least {minimum} are needed")
 
