@@ -3,6 +3,7 @@
 import io
 import struct
 import subprocess
+import sys
 import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -12,6 +13,7 @@ from .calibration_file import CalibrationFile
 from .errors import InputError
 from .logs import Block, read_blocks, write_table
 from .progress import Bar
+from .rate_unit import RateUnit
 
 firmware_path.add_to_path()
 from . import replay_engine  # noqa: E402
@@ -43,13 +45,17 @@ def replay(log: Path, calibration: CalibrationFile, engine: str, out: Path) -> i
 
 
 def with_progress(path: Path, what: str) -> Iterator[Block]:
-    """The blocks of a log with a progress bar, by how much of the file they are."""
+    """The blocks of a log with a progress bar, by how much of the file they are; after them a remark, if need be."""
     before, size = 0, path.stat().st_size if path.is_file() else 0
+    rates = RateUnit()
     with Bar(what, size) as bar:
         for block in read_blocks(path):
+            rates.add(block.time_us.astype(float) * 1e-6, block.readings[:, :3], block.readings[:, 4:])
             yield block
             bar.advance(block.bytes_read - before)
             before = block.bytes_read
+    if rates.remark:
+        print(f"warning: {path}: {rates.remark}", file=sys.stderr)
 
 
 def _cpython(log: Path, calibration: CalibrationFile) -> Iterator[tuple[Block, list[Row]]]:
