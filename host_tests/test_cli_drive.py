@@ -111,6 +111,32 @@ def test_several_logs_of_one_mount_are_put_together(tmp_path):
     assert max(errors(matrix_in(tmp_path / "CAL.json"), MOUNT)) < 0.3
 
 
+def test_what_is_used_of_several_logs_is_told_by_file_and_its_own_time(tmp_path):
+    legs = {"a": around(3), "b": [[30.0, 0.0, 0.0]], "c": around(4)}
+    logs = [record(tmp_path / f"{name}.csv", of, MOUNT) for name, of in legs.items()]
+    said = command.works("calibrate", "drive", *logs, "--out", tmp_path / "CAL.json").out
+    a, b, c = (said.partition(f"{log}:\n")[2].partition(".csv:\n")[0].split("\n") for log in logs)
+    assert b[0].strip() == "no braking in it"
+    whole = record(tmp_path / "alone.csv", around(8), MOUNT)
+    alone = command.works("calibrate", "drive", whole, "--out", tmp_path / "CAL.json").out
+
+    def times(lines):
+        return [float(line.split(" s ")[0]) for line in lines if "straight: used" in line]
+
+    for part in times(a), times(c):
+        assert len(part) >= 3
+        assert part == pytest.approx(times(alone.split("\n"))[: len(part)], abs=1.0)
+    assert "s of all logs" in said
+    assert "alone.csv:" not in alone
+    assert "s of all logs" not in alone
+
+
+def test_a_log_without_speed_among_others(tmp_path):
+    logs = [record(tmp_path / "a.csv", around(6), MOUNT), record(tmp_path / "b.csv", around(6), MOUNT, speed=False)]
+    line = refused(tmp_path, "a GPS or a wheel, or leave this log out", *reversed(logs))
+    assert "b.csv: no speed" in line
+
+
 def test_a_drive_that_begins_in_motion_counts_from_its_beginning(tmp_path):
     """The gyro's bias, known from the stop at its end only, is taken off."""
     legs = [*around(6, stands=False)[1:], [20.0, -1.0, 0.0], list(STAND)]

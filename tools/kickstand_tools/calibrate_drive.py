@@ -36,17 +36,17 @@ def drive(
     poses = result.aligned and result.vehicle != CAR
     kind = vehicle or (MOTORCYCLE if poses else CAR)
     up = result.matrix[3:6] if kind == MOTORCYCLE and poses else None
-    logs = [_read(path) for path in paths]
+    logs = [_read(path, len(paths) > 1) for path in paths]
     names = ", ".join(str(path) for path in paths)
     # the gyro's bias is found at a stop: a first pass looks for one, so that what came before it counts too
     scout = DriveAlignment(kind, up, [0.0] * 3)
     with Bar("looking for stops", sum(len(log.time_us) for log in logs)) as bar:
-        _feed(scout, logs, result, bar, lambda seconds: None)
+        _feed(scout, logs, result, bar, None)
     known = scout.standing.stops or before is not None
     alignment = METHODS[method](kind, up, list(scout.standing.bias) if known else None)
-    events = _Events(alignment, say)
+    events = _Events(alignment, len(logs) > 1, say)
     with Bar("driving", sum(len(log.time_us) for log in logs)) as bar:
-        _feed(alignment, logs, result, bar, events.look)
+        _feed(alignment, logs, result, bar, events)
     matrix = array("f", [0.0] * 9)
     try:
         alignment.matrix(matrix)
@@ -55,7 +55,8 @@ def drive(
     bias = [a + b for a, b in zip(result.bias, alignment.standing.bias, strict=True)]
     say(f"{kind}, method {method}: {alignment.counted} used, {alignment.turned} in turns not used")
     say(f"stops: {alignment.standing.stops}")
-    say(f"quality: {alignment.quality_deg:.1f} degrees about the vertical; ready after {events.ready_s:.0f} s")
+    ready = f"ready after {events.ready_s:.0f} s" + (" of all logs" if len(logs) > 1 else "")
+    say(f"quality: {alignment.quality_deg:.1f} degrees about the vertical; {ready}")
     if isinstance(alignment, DriveAlignment):
         halves_deg = alignment.quality.halves_deg
         say(f"speed: {alignment.events.lag_s:.1f} s late; two halves of the drive differ by {halves_deg:.1f} degrees")
@@ -71,64 +72,88 @@ def drive(
     )
 
 
-def _read(path: Path) -> Log:
+def _read(path: Path, others: bool) -> Log:
     log = read_log(path)
     if all(speed is None for speed in log.speed_mps):
-        raise InputError(f"{path}: no speed: record a column speed_mps, from a GPS or a wheel")
+        instead = ", or leave this log out" if others else ""
+        raise InputError(f"{path}: no speed: record a column speed_mps, from a GPS or a wheel{instead}")
     step_us = log.time_us[-1] / (len(log.time_us) - 1)
     if step_us > _SLOWEST_US:
         raise InputError(f"{path}: a sample every {step_us / 1e6:.2f} s: at least 20 a second are needed")
     return log
 
 
-def _feed(alignment, logs: list[Log], result: CalibrationFile, bar: Bar, look: Callable[[float], None]) -> None:
-    """Run the logs through an alignment; look is called with the seconds so far after each sample."""
+def _feed(alignment, logs: list[Log], result: CalibrationFile, bar: Bar, events: "_Events | None") -> None:
+    """Run the logs through an alignment, and events beside it."""
     calibration = result.to_firmware()
     force, rate = [0.0] * 3, [0.0] * 3
-    elapsed = 0.0
     for log in logs:
         previous = -_BETWEEN_US if log is not logs[0] else 0
+        if events:
+            events.begin(log)
         for i, (now, reading, speed) in enumerate(zip(log.time_us, log.readings, log.speed_mps, strict=True)):
             calibration.apply(reading, force, rate)
             alignment.update(force, rate, now - previous)
             previous = now
             if speed is not None:
                 alignment.measure_speed(speed)
-                look(elapsed + now / 1e6)
+                if events:
+                    events.look(now / 1e6)
             if i % _CHUNK == 0:
                 bar.advance(min(_CHUNK, len(log.time_us) - i))
-        elapsed += log.time_us[-1] / 1e6
-    alignment.finish()
-    look(elapsed)
+        if log is logs[-1]:
+            alignment.finish()
+        if events:
+            events.end(log.time_us[-1] / 1e6)
 
 
 class _Events:
-    """Says what was used and what was not, and what became of it, as it happens."""
+    """Says what was used and what was not, and what became of it, as it happens; of several logs, in which."""
 
-    def __init__(self, alignment, say: Print) -> None:
-        self._alignment, self._say = alignment, say
+    def __init__(self, alignment, several: bool, say: Print) -> None:
+        self._alignment, self._several, self._say = alignment, several, say
         self._before = (0, 0)
         self._ready = False
         self._problem = None
-        self.ready_s = 0.0
+        self._said = 0
+        self._elapsed = 0.0  # in the logs before
+        self.ready_s = 0.0  # of all logs
+
+    def begin(self, log: Log) -> None:
+        """Before the first sample of a log."""
+        self._said = 0
+        if self._several:
+            self._say(f"{log.path}:")
+
+    def end(self, seconds: float) -> None:
+        """After the last one."""
+        self.look(seconds)
+        self._elapsed += seconds
+        if self._several and not self._said:
+            self._say("           no braking in it")
 
     def look(self, seconds: float) -> None:
+        """seconds: in this log."""
         alignment = self._alignment
         now = alignment.counted, alignment.turned
         if now[0] > self._before[0]:
             needed = f" of {alignment.needed}" if now[0] <= alignment.needed else ""
-            self._say(f"{seconds:7.1f} s  straight: used, {now[0]}{needed}")
+            self._event(seconds, f"straight: used, {now[0]}{needed}")
         elif now[1] > self._before[1]:
-            self._say(f"{seconds:7.1f} s  turning: not counted")
+            self._event(seconds, "turning: not counted")
         self._before = now
         problem = alignment.problem
         if problem and not self._problem:
-            self._say(f"{seconds:7.1f} s  {problem.reason}")
+            self._event(seconds, problem.reason)
         self._problem = problem
         if alignment.ready != self._ready:
             self._ready = alignment.ready
-            self._say(f"{seconds:7.1f} s  {self._state()}")
-            self.ready_s = self.ready_s or seconds
+            self._event(seconds, self._state())
+            self.ready_s = self.ready_s or self._elapsed + seconds
+
+    def _event(self, seconds: float, what: str) -> None:
+        self._said += 1
+        self._say(f"{seconds:7.1f} s  {what}")
 
     def _state(self) -> str:
         if self._ready:
