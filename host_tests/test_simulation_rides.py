@@ -167,5 +167,13 @@ def test_the_speed_is_written_once_a_second_where_asked(tmp_path):
     assert not any(read_log(tmp_path / "RIDE.csv").speed_mps)
 
 
+def test_the_calibration_of_the_ride_before_goes_with_it(tmp_path):
+    """It lies where report looks for that of RIDE.csv, and is of a sensor mounted another way."""
+    works("simulate", "--profile", "street", "--seconds", 30, "--out", tmp_path)
+    (tmp_path / "RIDE.cal.json").write_text("{}")
+    works("simulate", "--profile", "street", "--seed", 1, "--seconds", 30, "--out", tmp_path)
+    refused(tmp_path, "report", tmp_path / "RIDE.csv", words="no calibration RIDE.cal.json beside it")
+
+
 def test_an_unknown_profile_is_refused(tmp_path):
     refused(tmp_path, "simulate", "--profile", "moon", "--out", tmp_path / "x", words="street")

@@ -28,7 +28,7 @@ def simulate(
     """Simulate a ride (see ride.ride) and write it to out_dir. Raises InputError.
 
     Logs: POSE_1.csv to POSE_7.csv (the last one free), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv. TRUTH.csv has
-    a row for each of RIDE.csv.
+    a row for each of RIDE.csv. A RIDE.cal.json there, of the ride before, is removed.
     speed: give RIDE.csv a speed, once a second.
     """
     if profile not in PROFILES:
@@ -37,6 +37,8 @@ def simulate(
     directory = Path(out_dir)
     try:
         directory.mkdir(parents=True, exist_ok=True)
+        # report, plot and export take the calibration beside a ride for its own: one of another sensor would be believed
+        (directory / "RIDE.cal.json").unlink(missing_ok=True)
         write_poses(directory, made)
         _write_ride(directory / "RIDE.csv", made, speed)
         _write_truth(directory / "TRUTH.csv", made)
