@@ -5,9 +5,11 @@ from math import cos, radians, sin
 from pathlib import Path
 
 import analysis_rides
+import command
 import numpy as np
 import pytest
 from kickstand_tools import rides
+from kickstand_tools.analysis.alignment_quality import Quality
 from kickstand_tools.analysis.channels import open_ride
 from kickstand_tools.analysis.look import look
 
@@ -49,3 +51,10 @@ def test_a_ride_without_straights_does_not_tell(tmp_path):
     path = analysis_rides.write(tmp_path, [rides.upright(8)])
     quality = look(open_ride(path, None)).quality
     assert (quality.roll_deg, quality.pitch_deg, quality.yaw_deg) == (None, None, None)
+    said = command.works("report", path).out
+    assert "Alignment: not enough straight riding to tell how far it is off." in said
+
+
+def test_nothing_is_a_negative_nothing():
+    quality = Quality(-0.04, None, 2.04, None, 60.0, np.zeros(0), np.zeros(0))
+    assert quality.angles == ["roll +0.0°", "yaw +2.0°"]

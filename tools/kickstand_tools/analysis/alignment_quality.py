@@ -37,6 +37,12 @@ class Quality:
     lateral_g: Array
     forward_g: Array
 
+    @property
+    def angles(self) -> list[str]:
+        """Those that are known, in words."""
+        named = {"roll": self.roll_deg, "pitch": self.pitch_deg, "yaw": self.yaw_deg}
+        return [f"{name} {value:+z.1f}°" for name, value in named.items() if value is not None]
+
 
 def quality(ride: Channels, standing: NDArray[np.bool_]) -> Quality:
     """ride: whole, evenly thinned; standing: where it stands still."""

@@ -75,11 +75,12 @@ def _ride(seen: Look) -> Table:
 
 def _alignment(seen: Look) -> Text:
     quality = seen.quality
-    angles = {"roll": quality.roll_deg, "pitch": quality.pitch_deg, "yaw": quality.yaw_deg}
-    said = [f"{name} {value:+.1f}°" for name, value in angles.items() if value is not None]
+    said = "Alignment: not enough straight riding to tell how far it is off."
+    if quality.angles:
+        said = f"Alignment: it seems off by {', '.join(quality.angles)}."
     if quality.gravity_g is not None:
-        said.append(f"at rest {quality.gravity_g:.3f} g")
-    return Text("Alignment, seems off by: " + (", ".join(said) if said else "not enough straight riding to tell"))
+        said += f" At rest the force is {quality.gravity_g:.3f} g."
+    return Text(said)
 
 
 def _stops(stops: list[Stop]) -> Table:

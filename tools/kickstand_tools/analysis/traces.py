@@ -76,11 +76,8 @@ def histogram(seen: Look) -> tuple[Array, Array]:
 def quality_lines(seen: Look) -> list[str]:
     """What the ride says of the alignment."""
     quality = seen.quality
-    angles = (("roll", quality.roll_deg), ("pitch", quality.pitch_deg), ("yaw", quality.yaw_deg))
-    lines = [f"{name} {value:+.1f}°" for name, value in angles if value is not None]
-    if quality.gravity_g is not None:
-        lines.append(f"at rest {quality.gravity_g:.3f} g")
-    return lines or ["not enough straight riding"]
+    lines = quality.angles or ["not enough straight riding"]
+    return lines if quality.gravity_g is None else [*lines, f"at rest {quality.gravity_g:.3f} g"]
 
 
 def tick_s(seconds: float) -> float:

@@ -37,7 +37,7 @@ def simulate(
     directory = Path(out_dir)
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        # report, plot and export take the calibration beside a ride for its own: one of another sensor would be believed
+        # report, plot and export take the calibration beside a ride for its own: they would believe another sensor's
         (directory / "RIDE.cal.json").unlink(missing_ok=True)
         write_poses(directory, made)
         _write_ride(directory / "RIDE.csv", made, speed)
