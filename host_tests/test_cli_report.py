@@ -9,7 +9,9 @@ import command
 import numpy as np
 import pytest
 from kickstand_tools import rides
-from kickstand_tools.analysis import plot
+from kickstand_tools.analysis import page, picture, plot
+from kickstand_tools.analysis.channels import open_ride
+from kickstand_tools.analysis.look import look
 
 pytest.importorskip("matplotlib")
 pytest.importorskip("plotly")
@@ -42,17 +44,17 @@ def test_a_report_has_the_ride_in_figures(ride):
 
 def test_the_page_says_the_same(ride, monkeypatch):
     monkeypatch.setenv("COLUMNS", "100")
-    page = command.works("report", ride).out
+    said = command.works("report", ride).out
     for words in "Max left", "Max right", "Over 40°", "Max braking", "MFDD", "km/h", "Alignment":
-        assert words in page
-    assert "integrated" not in page
-    assert max(len(line) for line in page.split("\n")) <= 100
+        assert words in said
+    assert "integrated" not in said
+    assert max(len(line) for line in said.split("\n")) <= 100
 
 
 def test_without_a_speed_stops_are_marked(tmp_path):
-    page = command.works("report", analysis_rides.short(tmp_path)).out
-    assert "km/h*" in page
-    assert "* no speed in the log: integrated" in page
+    said = command.works("report", analysis_rides.short(tmp_path)).out
+    assert "km/h*" in said
+    assert "* no speed in the log: integrated" in said
 
 
 def test_a_ride_without_stops(tmp_path):
@@ -64,9 +66,9 @@ def test_a_ride_without_stops(tmp_path):
 def test_a_car_has_no_lean(ride, tmp_path):
     cal = tmp_path / "car.json"
     cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle": "car"}))
-    page = command.works("report", ride, "--calibration", cal).out
-    assert "Max left" not in page
-    assert "Max braking" in page
+    said = command.works("report", ride, "--calibration", cal).out
+    assert "Max left" not in said
+    assert "Max braking" in said
     command.works("plot", ride, "--calibration", cal, "--out", tmp_path)
 
 
@@ -75,11 +77,33 @@ def test_pictures(ride, tmp_path):
     command.works("plot", ride, "--out", out)
     png = (out / "RIDE.png").read_bytes()
     assert png[:8] == b"\x89PNG\r\n\x1a\n"
-    assert struct.unpack(">2I", png[16:24]) == (1100, 800)
+    assert struct.unpack(">2I", png[16:24]) == (1100, 950)
     html = (out / "RIDE.html").read_text()
     assert "Plotly.newPlot" in html
     assert not re.search(r"<(script|link)[^>]*(src|href)=", html)  # all of it is inside
     assert sorted(path.name for path in out.iterdir()) == ["RIDE.html", "RIDE.png"]
+
+
+@pytest.mark.parametrize(("car", "speed_hz"), [(False, 1), (False, 0), (True, 1), (True, 0)])
+def test_a_speed_is_drawn_where_there_is_one(tmp_path, car, speed_hz):
+    ride = analysis_rides.short(tmp_path, speed_hz=speed_hz)
+    cal = tmp_path / "RIDE.cal.json"
+    cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle": "car" if car else "motorcycle"}))
+    seen = look(open_ride(ride, cal))
+    figure = page.figure(seen)
+    row = {trace.name: trace.yaxis for trace in figure.data}
+    assert ("lean" in row) is not car
+    assert ("speed" in row) is bool(speed_hz)
+    above = {"lean", "speed"} & set(row)
+    assert len({row[name] for name in (*above, "forward")}) == len(above) + 1
+    assert row["forward"] == row["to the left"] == ("y", "y2", "y3")[len(above)]
+    assert {shape.xref for shape in figure.layout.shapes} == {row["forward"].replace("y", "x")}
+    if speed_hz:
+        (drawn,) = (trace for trace in figure.data if trace.name == "speed")
+        assert max(drawn.y) == pytest.approx(54.0, abs=0.5)  # km/h
+    picture.draw(tmp_path / "ride.png", seen)
+    height = struct.unpack(">2I", (tmp_path / "ride.png").read_bytes()[16:24])[1]
+    assert height == 550 + 250 * (not car) + 150 * bool(speed_hz)
 
 
 @pytest.mark.parametrize("name", ["report", "plot"])

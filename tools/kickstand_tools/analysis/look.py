@@ -21,6 +21,11 @@ class Look:
     stops: list[Stop]
     quality: Quality
 
+    @property
+    def has_speed(self) -> bool:
+        """The log has one that is not always 0."""
+        return self.summary.speed_mps.time_s is not None
+
 
 def look(ride: Ride) -> Look:
     """Read the ride through. Raises InputError."""

@@ -1,4 +1,4 @@
-"""The ride on one page, for the eye: lean and g over time, g against g, how long at which lean, the alignment."""
+"""The ride on one page, for the eye: lean, speed, g over time, g against g, how long at which lean, the alignment."""
 
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from .traces import (
     LATERAL_COLOUR,
     LEFT_COLOUR,
     RIGHT_COLOUR,
+    SPEED_COLOUR,
     Traces,
     histogram,
     lean_limit,
@@ -45,20 +46,25 @@ def draw(path: Path, seen: Look) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
+    over_time = [] if seen.ride.car else [_lean]
+    over_time += [_speed] if seen.has_speed else []
+    over_time += [_forces]
+    heights = [1.5 if panel is _speed else 2.5 for panel in over_time] + [3.0]  # inches
     with rc_context(_STYLE):
-        figure = Figure(figsize=(11, 8), layout="constrained")
+        figure = Figure(figsize=(11, sum(heights)), layout="constrained")
         FigureCanvasAgg(figure)
         figure.suptitle(title(seen), fontsize=12, x=0.01, ha="left")
-        rows = figure.add_gridspec(3, 3, height_ratios=(1.0, 1.0, 1.25))
+        rows = figure.add_gridspec(len(heights), 3, height_ratios=heights)
         drawn = traces(seen)
-        lean = figure.add_subplot(rows[0, :])
-        forces = figure.add_subplot(rows[1, :], sharex=lean)
-        (_speed if seen.ride.car else _lean)(lean, drawn, seen)
-        _forces(forces, drawn, seen)
-        _gg(figure.add_subplot(rows[2, 0]), drawn)
+        first = None
+        for k, panel in enumerate(over_time):
+            axes = figure.add_subplot(rows[k, :], sharex=first)
+            first = first or axes
+            panel(axes, drawn, seen)
+        _gg(figure.add_subplot(rows[-1, 0]), drawn)
         if not seen.ride.car:
-            _histogram(figure.add_subplot(rows[2, 1]), seen)
-        _alignment(figure.add_subplot(rows[2, 2]), seen)
+            _histogram(figure.add_subplot(rows[-1, 1]), seen)
+        _alignment(figure.add_subplot(rows[-1, 2]), seen)
         figure.savefig(path, dpi=100)
 
 
@@ -85,8 +91,8 @@ def _lean(axes: Any, drawn: Traces, seen: Look) -> None:
 
 
 def _speed(axes: Any, drawn: Traces, seen: Look) -> None:
-    axes.plot(*envelope(drawn.time, drawn.speed, POINTS), color=RIGHT_COLOUR, linewidth=1.0)
-    axes.set(title="Speed, km/h" if seen.summary.speed_mps.time_s is not None else "No speed in the log")
+    axes.plot(*envelope(drawn.time, drawn.speed, POINTS), color=SPEED_COLOUR, linewidth=1.2)
+    axes.set(title="Speed, km/h")
     axes.set_ylim(bottom=0.0)
     axes.margins(x=0.0)
     axes.tick_params(labelbottom=False)

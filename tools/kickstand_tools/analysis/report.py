@@ -65,7 +65,7 @@ def _ride(seen: Look) -> Table:
             table.add_row(f"Over {limit:.0f}°", f"{seconds:.1f} s")
     table.add_row("Max braking", *_peak(total.brake_g, "{:.2f} g"))
     table.add_row("Max acceleration", *_peak(total.accel_g, "{:.2f} g"))
-    if total.speed_mps.time_s is not None:
+    if seen.has_speed:
         peak = Peak(total.speed_mps.value * 3.6, total.speed_mps.time_s)
         table.add_row("Max speed", *_peak(peak, "{:.0f} km/h"))
     if total.not_sure_s >= 1.0:

@@ -12,6 +12,7 @@ from .thin import spacing_s
 
 LEFT_COLOUR, RIGHT_COLOUR = "#2563a8", "#c2571a"
 BRAKE_COLOUR, LATERAL_COLOUR = "#9b2335", "#3d7f6b"
+SPEED_COLOUR = "#5b4b8a"
 SMOOTH_S = 0.3
 GG_BIN_G = 0.025
 
