@@ -6,6 +6,7 @@ import sys
 import command
 import pytest
 from kickstand_tools import logs
+from kickstand_tools.simulation import PROFILES
 
 MISTAKES = {
     "no such command": (["fly"], "No such command 'fly'"),
@@ -43,6 +44,12 @@ def test_alone_it_shows_its_commands():
     result = command.works()
     for name in "flash", "status", "calibrate", "replay", "demo":
         assert f"\n  {name} " in result.out
+
+
+@pytest.mark.parametrize("name", ["simulate", "evaluate"])
+def test_the_profiles_are_in_the_help(name):
+    words = " ".join(command.works(name, "--help").out.split())
+    assert ", ".join(PROFILES) in words.replace("; hard ones:", ",")
 
 
 def test_a_fault_of_its_own_is_one_line_too(tmp_path, monkeypatch):

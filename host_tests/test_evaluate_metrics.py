@@ -1,5 +1,6 @@
 """The scores of an evaluation on errors that are known."""
 
+import io
 import math
 
 import numpy as np
@@ -7,8 +8,10 @@ import pytest
 from kickstand_tools.evaluation.estimators import trailing_mean
 from kickstand_tools.evaluation.metrics import Score, lag_ms, score, slope, straights
 from kickstand_tools.evaluation.picture import ZOOM_S, zoom_start
-from kickstand_tools.evaluation.report import document, pooled
+from kickstand_tools.evaluation.real_ride import RealScore
+from kickstand_tools.evaluation.report import document, pooled, real_table, table
 from kickstand_tools.evaluation.runs import Job, Result
+from rich.console import Console
 
 RATE = 200.0
 N = 40000
@@ -94,6 +97,30 @@ def test_pooling_keeps_the_worst():
     assert (found["slope_low"], found["slope_high"]) == (0.9, 1.1)
     assert found["straight_bias"] == -0.6
     assert found["lag_ms"] == 5.0
+
+
+def test_a_ride_without_a_corner_does_not_hide_the_others():
+    nothing = float("nan")
+    flat, bent = Score(1.0, 2.0, 3.0, nothing, nothing, nothing), Score(1.0, 2.0, 3.0, 0.9, 5.0, 0.1)
+    for scores in [flat, bent], [bent, flat]:
+        found = pooled(scores)
+        assert [found[name] for name in ("slope", "slope_low", "slope_high")] == [0.9] * 3
+        assert (found["lag_ms"], found["straight_bias"]) == (5.0, 0.1)
+
+
+def test_what_no_ride_tells_is_two_dashes():
+    nothing = float("nan")
+    printed = io.StringIO()
+    console = Console(width=120, file=printed)
+    result = Result(Job("street", 0), {"kickstand": Score(1.0, 2.0, 3.0, nothing, nothing, nothing)})
+    console.print(table([result]))
+    console.print(real_table({"kickstand": RealScore(1.0, nothing)}, "ride.csv"))
+    said = printed.getvalue()
+    assert "nan" not in said
+    simulated, recorded = (line.split("│")[3:-1] for line in said.split("\n") if "kickstand" in line)
+    assert [cell.strip() for cell in simulated] == ["1.00", "1.00", "2.00", "3.0", "--", "--", "--", "--"]
+    assert recorded[-1].strip() == "--"
+    assert "--: nothing in these rides tells it" in " ".join(said.split())
 
 
 def test_the_document_has_no_nan():

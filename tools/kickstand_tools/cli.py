@@ -14,6 +14,12 @@ _PORT = click.option(
     "--port", help="Serial port of the board, as COM3 or /dev/ttyACM0; found by itself if only one is there."
 )
 
+# as in simulation.profiles, which takes numpy to read
+_PROFILES = (
+    "street, track, sweeper, city, hills; hard ones: banked, wheelie, bumps, crosswind, weight, vibration, creep, "
+    "temperature, fall, parked"
+)
+
 
 @click.group(
     invoke_without_command=True,
@@ -159,7 +165,7 @@ def replay(log: Path, calibration: Path, engine: str, out: Path) -> None:
 
 
 @kickstand.command()
-@click.option("--profile", required=True, help="street, track, sweeper, city, hills, or a hard one.")
+@click.option("--profile", required=True, help=f"{_PROFILES}.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Another seed, another ride.")
 @click.option("--seconds", type=click.FloatRange(min=20.0, max=7200.0), default=640.0)
 @click.option("--upright-error", type=click.FloatRange(-30.0, 30.0), default=0.0, help="Of the upright pose.")
@@ -185,7 +191,7 @@ def simulate(
 
 
 @kickstand.command()
-@click.option("--profiles", default="street,track,sweeper,city,hills", help="With commas between.")
+@click.option("--profiles", default="street,track,sweeper,city,hills", help=f"With commas between: {_PROFILES}.")
 @click.option("--seeds", type=click.IntRange(min=1), default=3, help="Rides of each profile.")
 @click.option("--seconds", type=click.FloatRange(min=60.0, max=7200.0), default=640.0, help="Of each ride.")
 @click.option(

@@ -13,27 +13,30 @@ from .runs import Result
 CAPTION = (
     "rms: over all rides; worst ride: rms of the worst; 95 %: mean over rides; worst: of all; "
     "slope: shown over true beyond 10 deg, mean, then lowest to highest; lag: mean; "
-    "bias: the largest on straights in the last tenth"
+    "bias: the largest on straights in the last tenth; --: nothing in these rides tells it"
 )
+
+_UNKNOWN = "--"
 
 
 def pooled(scores: list[Score]) -> dict[str, float]:
-    """One estimator's scores on one profile, over the seeds. Degrees, ms."""
+    """One estimator's scores on one profile, over the seeds, NaN where no seed tells. Degrees, ms."""
     rms = np.array([s.rms for s in scores])
-    slopes = np.array([s.slope for s in scores])
-    biases = np.array([s.straight_bias for s in scores])
-    lags = np.array([s.lag_ms for s in scores])
-    known = biases[~np.isnan(biases)]
+    slopes, lags, biases = (
+        [value for s in scores if not np.isnan(value := getattr(s, name))]
+        for name in ("slope", "lag_ms", "straight_bias")
+    )
+    nothing = float("nan")
     return {
         "rms": float(np.sqrt(np.mean(rms * rms))),
         "worst_ride_rms": float(rms.max()),
         "p95": float(np.mean([s.p95 for s in scores])),
         "worst": float(max(s.worst for s in scores)),
-        "slope": float(slopes.mean()),
-        "slope_low": float(slopes.min()),
-        "slope_high": float(slopes.max()),
-        "lag_ms": float(np.mean(lags[~np.isnan(lags)])) if not np.isnan(lags).all() else float("nan"),
-        "straight_bias": float(known[np.argmax(np.abs(known))]) if len(known) else float("nan"),
+        "slope": float(np.mean(slopes)) if slopes else nothing,
+        "slope_low": min(slopes, default=nothing),
+        "slope_high": max(slopes, default=nothing),
+        "lag_ms": float(np.mean(lags)) if lags else nothing,
+        "straight_bias": max(biases, key=abs, default=nothing),
     }
 
 
@@ -65,9 +68,9 @@ def table(results: list[Result]) -> Table:
                 _shown(s["p95"], ".2f"),
                 _shown(s["worst"], ".1f"),
                 _shown(s["slope"], ".3f"),
-                f"{_shown(s['slope_low'], '.2f')}-{_shown(s['slope_high'], '.2f')}",
-                _shown(s["lag_ms"], ".0f"),
-                _shown(s["straight_bias"], "+.2f"),
+                f"{s['slope_low']:.2f}-{s['slope_high']:.2f}" if s["slope"] == s["slope"] else _UNKNOWN,
+                _shown(s["lag_ms"], "z.0f"),
+                _shown(s["straight_bias"], "+z.2f"),
                 style="bold" if name == "kickstand" else "",
                 end_section=k == len(methods) - 1,
             )
@@ -84,7 +87,8 @@ def real_table(scores: dict[str, RealScore], name: str) -> Table:
     for head in ("rms", "slope beyond 5 deg"):
         made.add_column(head, justify="right")
     for method, s in scores.items():
-        made.add_row(method, f"{s.rms:.2f}", f"{s.slope:.3f}", style="bold" if method == "kickstand" else "")
+        style = "bold" if method == "kickstand" else ""
+        made.add_row(method, _shown(s.rms, ".2f"), _shown(s.slope, ".3f"), style=style)
     return made
 
 
@@ -104,7 +108,7 @@ def document(results: list[Result], real: dict[str, RealScore] | None) -> dict[s
 
 
 def _shown(value: float, form: str) -> str:
-    return "" if np.isnan(value) else format(value, form)
+    return _UNKNOWN if np.isnan(value) else format(value, form)
 
 
 def _without_nan(value: Any) -> Any:
