@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import re
 from pathlib import Path
 from typing import Any
@@ -13,12 +14,15 @@ import pytest
 
 pandas = pytest.importorskip("pandas")
 pytest.importorskip("pyarrow")
+WRITTEN_S = 1_700_000_000.7  # 22:13:20 UTC on 14/11/2023
 FORMATS = ["csv", "vbo", "racechrono", "parquet"]
 
 
 @pytest.fixture(scope="module")
 def ride(tmp_path_factory) -> Path:
-    return analysis_rides.short(tmp_path_factory.mktemp("ride"), rate_hz=200, speed_hz=1)
+    made = analysis_rides.short(tmp_path_factory.mktemp("ride"), rate_hz=200, speed_hz=1)
+    os.utime(made, (WRITTEN_S, WRITTEN_S))
+    return made
 
 
 @pytest.fixture(scope="module")
@@ -103,7 +107,7 @@ def test_vbo_by_racelogics_rules(ride, shown, tmp_path):
     assert np.allclose(values["lean-angle"], shown["lean_deg"].reshape(-1, 2).mean(axis=1), atol=1e-3)
     given = analysis_rides.table(ride)
     there = ~np.isnan(given["speed_mps"])
-    speed = np.interp(seconds, given["t_s"][there], given["speed_mps"][there])
+    speed = np.interp(seconds - seconds[0], given["t_s"][there], given["speed_mps"][there])
     assert np.max(np.abs(values["velocity"] / 3.6 - speed)) < 0.03
     right = values["lean-angle"] > 35.0
     assert right.any()
@@ -130,6 +134,21 @@ def test_racechrono_csv_v3(ride, shown, tmp_path):
     assert np.allclose(data["lean_angle"], shown["lean_deg"].reshape(-1, 2).mean(axis=1), atol=0.006)
     assert data["speed"].notna().sum() == 1 + int(analysis_rides.table(ride)["t_s"][-1])
     assert (data["lateral_acc"][data["lean_angle"] > 35.0] < -0.5).all()  # > 0 in a left turn
+
+
+@pytest.mark.parametrize("form", ["vbo", "racechrono"])
+def test_a_log_without_a_clock_ends_when_it_was_written(ride, tmp_path, form):
+    """34 s before: none is dated 1970."""
+    out = export(ride, form, tmp_path)
+    if form == "vbo":
+        sections, data = read_vbo(out)
+        assert sections[""][0] == "File created on 14/11/2023 at 22:12:46"
+        assert data["time"][0] == "221246.00"
+        assert data["time"].is_unique
+    else:
+        lines = out.read_text().split("\n")
+        assert "Created,14/11/2023,22:12" in lines[: lines.index("")]
+        assert float(lines[lines.index("") + 4].split(",")[0]) == pytest.approx(1_699_999_966.0, abs=0.01)
 
 
 @pytest.mark.parametrize("form", FORMATS)

@@ -18,13 +18,21 @@ _WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
     "racechrono": export_racechrono.write,
     "vbo": export_vbo.write,
 }
+_DATED = ("racechrono", "vbo")
+_CLOCK_S = 1e8  # 1973: a log that begins later has the time in it
 
 
 def export(ride: Ride, form: str, out: Path) -> int:
-    """Write out, whole or not at all; how many rows. Raises InputError."""
+    """Write out, whole or not at all; how many rows. Raises InputError.
+
+    racechrono and vbo want date and time. A board has no clock, so such a ride is taken to end when its log was
+    written last: when it was recorded live, or pulled.
+    """
     if form == "parquet":
         export_parquet.check()
-    start_s, speeds = _first_pass(ride.log)
+    start_s, seconds, speeds = _first_pass(ride.log)
+    if form in _DATED and start_s < _CLOCK_S:
+        start_s = float(max(0, int(ride.log.stat().st_mtime - seconds)))
     count = 0
 
     def rows() -> Iterator[Channels]:
@@ -40,13 +48,14 @@ def export(ride: Ride, form: str, out: Path) -> int:
     return count
 
 
-def _first_pass(log: Path) -> tuple[float, Array]:
-    """The log's own time of its first sample, and its speeds: (n, 2), s from there and m/s."""
-    start_s, speeds = None, []
+def _first_pass(log: Path) -> tuple[float, float, Array]:
+    """The log's own time of its first sample, its length in s, and its speeds: (n, 2), s from there and m/s."""
+    start_s, seconds, speeds = None, 0.0, []
     for block in read_blocks(log):
         if start_s is None:
             start_s = float(block.time_text[0])
+        seconds = float(block.time_us[-1]) * 1e-6
         there = ~np.isnan(block.speed_mps)
         speeds.append(np.column_stack((block.time_us[there] * 1e-6, block.speed_mps[there])))
     assert start_s is not None  # an empty log is refused
-    return start_s, np.concatenate(speeds)
+    return start_s, seconds, np.concatenate(speeds)

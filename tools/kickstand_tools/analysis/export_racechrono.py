@@ -7,6 +7,7 @@ acc in G and gyro in deg/s also in https://racechrono.com/article/2572. In those
 a left turn and longitudinal_acc when speeding up, as here. RaceChrono itself imports sessions as .vbo.
 """
 
+import time
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -36,7 +37,7 @@ COLUMNS = (
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """timestamp is the log's own time, which is a Unix time only if the log's is one."""
+    """start_s: Unix time of the first row."""
     head = [
         "This file is created using RaceChrono CSV v3 by Kickstand.",
         "Format,3",
@@ -44,6 +45,7 @@ def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
         "Session type,Lap timing",
         "Track name,",
         "Driver name,",
+        time.strftime("Created,%d/%m/%Y,%H:%M", time.gmtime(start_s)),
         f'Note,"{_NOTE}"',
         "",
     ]

@@ -32,11 +32,10 @@ _ROW = "000 %09.2f +00000.000000 +00000.000000 %07.3f 000.00 +00000.00 %+07.3f %
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """Lines end in CR and LF. Without a speed in the log velocity is 0."""
-    now = time.gmtime(start_s if start_s > 1e8 else 0.0)
+    """Lines end in CR and LF; the date and each row's time are UTC. Without a speed in the log velocity is 0."""
     titles = [title for title, _ in STANDARD] + [name for name, _ in OTHER]
     head = [
-        time.strftime("File created on %d/%m/%Y at %H:%M:%S", now),
+        time.strftime("File created on %d/%m/%Y at %H:%M:%S", time.gmtime(start_s)),
         "",
         "[header]",
         *titles,
