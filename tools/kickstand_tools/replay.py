@@ -103,7 +103,7 @@ def _rp2040(log: Path, calibration: CalibrationFile) -> Iterator[tuple[Block, li
 
         emulated.run(records, sink)
     results.seek(0)
-    for block in read_blocks(log):
+    for block in with_progress(log, "writing"):
         yield block, list(struct.iter_unpack(replay_engine.RESULT, results.read(size * len(block.time_us))))
 
 
