@@ -32,15 +32,15 @@ def around(brakings=6, braking=-2.0, seconds=3.0, yaw_dps=0.0, pause_s=5.0, stan
 
 
 def samples(legs, vehicle="car", tilt_deg=0.0, noise_g=0.003, start_mps=0.0):
-    """(force, rate, speed) at RATE_HZ in the vehicle's axes. tilt_deg: the road's camber; a motorcycle leans into
-    turns."""
+    """(force, rate, speed) at RATE_HZ in the vehicle's axes. tilt_deg: the camber where it stands; a motorcycle
+    leans into turns."""
     seed = 1
     speed = start_mps
-    left_g = math.sin(math.radians(tilt_deg))
     for seconds, acceleration, yaw_dps in legs:
         for _ in range(round(seconds * RATE_HZ)):
             before, speed = speed, max(0.0, speed + acceleration / RATE_HZ)
-            force = [left_g, math.cos(math.radians(tilt_deg)), (speed - before) * RATE_HZ / G]
+            camber = math.radians(tilt_deg) if before == speed == 0.0 else 0.0
+            force = [math.sin(camber), math.cos(camber), (speed - before) * RATE_HZ / G]
             rate = [0.0, yaw_dps, 0.0]
             side = speed * math.radians(yaw_dps) / G
             if vehicle == "car":
@@ -62,13 +62,14 @@ def mounted(m, vector):
 
 
 class SpeedSource:
-    """A GPS with faults: every_s, late_s, scale, step (m/s, what it is rounded to), stuck_from_s, missing_from_s."""
+    """A GPS with faults: every_s, late_s, scale, step (m/s, what it is rounded to), stuck_from_s, silent (from when to
+    when, s)."""
 
-    def __init__(self, every_s=0.5, late_s=0.0, scale=1.0, step=0.0, stuck_from_s=1e9, missing_from_s=1e9, add=0.0):
+    def __init__(self, every_s=0.5, late_s=0.0, scale=1.0, step=0.0, stuck_from_s=1e9, silent=(1e9, 1e9), add=0.0):
         self.every = round(every_s * RATE_HZ)
         self.late = round(late_s * RATE_HZ)
         self.scale, self.step, self.add = scale, step, add
-        self.stuck_from, self.missing_from = stuck_from_s * RATE_HZ, missing_from_s * RATE_HZ
+        self.stuck_from, self.silent = stuck_from_s * RATE_HZ, [s * RATE_HZ for s in silent]
         self.past = []
         self.count = 0
         self.last = 0.0
@@ -79,7 +80,7 @@ class SpeedSource:
         if len(self.past) > self.late + 1:
             self.past.pop(0)
         self.count += 1
-        if (self.count - 1) % self.every or self.count > self.missing_from:
+        if (self.count - 1) % self.every or self.silent[0] < self.count <= self.silent[1]:
             return None
         if self.count < self.stuck_from:
             self.last = self.past[0] * self.scale + self.add

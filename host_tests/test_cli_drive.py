@@ -173,7 +173,7 @@ def refused(tmp_path, words, *arguments):
     ("words", "legs", "how"),
     [
         ("no speed: record a column speed_mps", around(6), {"speed": False}),
-        ("no speed: record a column speed_mps", around(6), {"source": {"missing_from_s": -1.0}}),
+        ("no speed: record a column speed_mps", around(6), {"source": {"silent": (-1.0, 1e9)}}),
         ("it only stood still", [[60.0, 0.0, 0.0]], {}),
         ("it never stood still", around(6, stands=False), {"start_mps": 5.0}),
         ("it is in km/h", around(6), {"source": {"scale": 3.6}}),

@@ -135,12 +135,37 @@ def test_a_side_that_the_rider_stands_by_is_not_asked_for_again(tmp_path):
 
 @pytest.mark.parametrize(("model", "config"), [({"until_s": 65.0}, {}), ({}, {"PULSES_PER_METRE": 0.25})])
 def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
-    """A wire that breaks on the way reads as standing still, a second magnet as twice the speed."""
-    plan = bike("wheel", 5, wheel=model, config={"SPEED": "wheel", **config})
+    """A wire that breaks on the way reads as standing still, a second magnet as twice the speed. Told at a stop."""
+    plan = bike("wheel", 8, wheel=model, config={"SPEED": "wheel", **config})
     record = devices.run("cpython", tmp_path, plan)
-    for town_round, lean in ((2, 20), (3, -25), (4, 20)):
+    for town_round in range(8):
         shown = record.lean_at(POSES_S + 30.0 * town_round + 9.0)
-        assert shown is None or shown == pytest.approx(lean, abs=4)
+        assert shown == pytest.approx(-25 if town_round % 2 else 20, abs=4)
+    told = record.first("Speed (stuck at|2.0 times)")
+    assert stops(told, POSES_S)
+    assert record.at(told + 2.0) == record.at(told)  # until it is answered, or the ride goes on
+
+
+def test_a_question_that_is_not_on_the_display_is_not_answered(tmp_path):
+    """A press meant for the page that is in front of it."""
+    plan = bike("gps", 3, kickstand=(12.0,))
+    asked = devices.run("cpython", tmp_path, plan).first("Stand was right")
+    to_info = [[asked - 14.0, LONG], *([asked - 12.0 + t, SHORT] for t in range(3)), [asked - 9.0, LONG]]
+    presses = [*POSES, *to_info, [asked + 2.0, LONG]]
+    record = devices.run("cpython", tmp_path, {**plan, "presses": presses, "until": asked + 4.0})
+    assert record.at(asked + 1.0)[0].startswith("MPU6050")
+    assert record.at(asked + 3.5)[1].startswith("next")  # the menu
+    assert not stored(tmp_path).by_drive
+
+
+def test_the_trim_of_the_ride_outlives_a_refined_alignment(tmp_path):
+    """Upright was 2 degrees off, which riding finds out; then forward is refined at a stop."""
+    plan = bike("wheel", 7, kickstand=(-12.0, 2.0))
+    plan["ride"][1] = ["upright", 10.0, 2.0, 0.0]
+    record = devices.run("cpython", tmp_path, plan)
+    assert stored(tmp_path).by_drive
+    for town_round in range(3, 7):
+        assert record.lean_at(POSES_S + 30.0 * town_round - 1.0) in (-1, 0, 1)  # stands upright
 
 
 def test_pitch_on_the_kickstand_is_found_while_riding(tmp_path):
@@ -159,6 +184,14 @@ def test_a_mount_that_moved_is_told(tmp_path):
     record = devices.run("cpython", tmp_path, bike("wheel", 6, remount=[POSES_S + 100.0, 8]))
     told = record.first("Mount has moved", POSES_S + 100.0)
     assert told < math.inf and stops(told, POSES_S)
+
+
+def test_another_message_does_not_take_back_that_the_mount_has_moved(tmp_path):
+    """The wire of the wheel breaks after that; nobody has answered."""
+    record = devices.run("cpython", tmp_path, bike("wheel", 12, remount=[POSES_S + 100.0, 8], wheel={"until_s": 215.0}))
+    moved = record.first("Mount has moved")
+    assert moved < record.first("Speed stuck") < math.inf
+    assert not record.leans(moved, 500.0)
 
 
 def test_asked_for_on_a_motorcycle_it_keeps_the_old_alignment_until_the_new_one_is_ready(tmp_path):

@@ -4,6 +4,7 @@ With a speed source it always runs. What is not aligned, or is asked for in the 
 alignment that is there is checked and refined. Flash is written at standstill only.
 """
 
+from math import degrees
 from time import ticks_add, ticks_diff
 
 from .button import LONG
@@ -138,8 +139,9 @@ class DriveMode:
 
     def _look(self, now_ms):
         """Once a second: is there anything to do? Only when the vehicle stands, by its speed and by the sensor."""
-        if self._speed_mps > AWAY_MPS:
+        if self._away():
             self.message = None
+            return
         fresh = self._speed_ms is not None and ticks_diff(now_ms, self._speed_ms) < FRESH_MS
         if not (fresh and self.drive.standing.standing) or self.message:
             return
@@ -163,6 +165,11 @@ class DriveMode:
             elif verdict == SAME:
                 self._meter.doubt = None
 
+    def _away(self):
+        """True while the ride goes on. A source with a fault may say zero for ever: then by the lean filter."""
+        faulty = self.drive.problem is not None or (self.message is not None and self.message not in _DOUBTS)
+        return self._speed_mps > AWAY_MPS or (faulty and self._meter.filter.speed_mps > AWAY_MPS)
+
     def _refused(self, lines, aligned):
         """What has gone wrong so far may end: the drive is begun anew, the reason stays on the page until then."""
         if aligned:
@@ -174,20 +181,21 @@ class DriveMode:
         if lines not in self._told:
             self.message = lines
             if self.vehicle == MOTORCYCLE:
-                self._meter.doubt = _DOUBTS.get(lines)
+                self._meter.doubt = _DOUBTS.get(lines) or self._meter.doubt
 
     def answer(self, event):
         """A press while there is a message."""
         message, self.message = self.message, None
         self._told.append(message)
-        self._meter.doubt = None
+        if message in _DOUBTS:
+            self._meter.doubt = None
         if event == LONG and message == STAND_SIDE:
             old = self._meter.calibration
             turned = matrix()
             for i in range(9):
                 turned[i] = old.vehicle_from_sensor[i]
             turn_round(turned)
-            if self._save(turned, -old.trim_deg):
+            if self._save(turned, -self._trim_deg):
                 self.message = ("Side put right", "Ride safely")
                 self._meter.reset_maxima()
 
@@ -195,13 +203,18 @@ class DriveMode:
         """anew: the vertical is another one too."""
         found = matrix()
         self.drive.matrix(found)
-        if not self._save(found, 0.0 if anew else self._meter.calibration.trim_deg):
+        if not self._save(found, 0.0 if anew else self._trim_deg):
             return
         self._result = ("Aligned by drive", "error about %.1f%s" % (self.drive.quality_deg, DEGREE))
         if anew:
             self.message = self._result
             self._asked = False
             self._meter.reset_maxima()
+
+    @property
+    def _trim_deg(self):
+        """What the ride has found by now, stored or not."""
+        return degrees(self._meter.filter.trim.angle)
 
     def _save(self, vehicle_from_sensor, trim_deg):
         """True once it is in flash."""

@@ -166,6 +166,8 @@ class DriveAlignment:
         if not speed_mps >= 0.0:
             speed_mps = 0.0
         self._speed = speed_mps
+        if self._quiet_us > STALE_US:  # and the history's time may have wrapped round since
+            self.events.interrupt()
         self._quiet_us = 0
         self.top_mps = max(self.top_mps, speed_mps)
         self.events.measure_speed(speed_mps, self._history.now + self._sums_us - age_us)
@@ -235,7 +237,8 @@ class DriveAlignment:
         bias = self.standing.bias
         turned = (rate[0] - bias[0]) * up[0] + (rate[1] - bias[1]) * up[1] + (rate[2] - bias[2]) * up[2]
         self._history.add(sums, turned * seconds * 1e5, n)
-        self._speed_check.update(force, turned, n)
+        if self._quiet_us < STALE_US:  # a silent source is not a stuck one
+            self._speed_check.update(force, turned, n)
         self._bin = (force, rate, seconds)
         self._quiet_us = min(STALE_US + 1, self._quiet_us + n)
         self._sums_us = 0

@@ -4,13 +4,13 @@ from math import atan2, degrees, sqrt
 
 from .braking_regression import Fit
 from .driving_parts import DriveParts, apart, usual
-from .driving_reasons import HALVES_DEG, late, moved, units
+from .driving_reasons import late, moved, units
 from .rotation import angle_deg, cross, dot, norm, normalize, vector
 
 NEEDED = 5  # brakings and starts
 CHECKED = 2  # of them show whether the speed is one
 MAX_STARTS = 2  # count: the others are brakings
-HALVES_STAY_DEG = 6.0  # to become ready it takes HALVES_DEG
+HALVES_DEG, HALVES_STAY_DEG = 4.0, 6.0  # two halves of a drive may disagree by so much to become ready, to stay so
 READY_DEG, READY_STAY_DEG = 1.5, 2.5  # by experience one in ten is off by twice as much
 CHANCE, CHANCE_STAY = 3.0, 4.0  # sigmas: parts of a drive may differ by so much, or by HALVES_DEG
 MOVED_DEG = 30.0  # two parts of a drive; a highway's long banked curve, taken for straight, made 15

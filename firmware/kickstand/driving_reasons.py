@@ -3,8 +3,6 @@
 from .errors import AlignmentError
 from .standing import COUNTS_S, MOVED_MPS, SETTLE_S
 
-HALVES_DEG = 4.0  # by which two halves of a drive may disagree about forward
-
 
 def late(lag_s):
     """The speed comes too late."""

@@ -58,12 +58,24 @@ class Screen:
             if self._menu.chosen is not None:
                 self._choose(self._menu.chosen, now_ms)
                 self._menu = None
-        elif event and self.drive and self.drive.message:
+        elif event and self._asking(now_ms):
             self.drive.answer(event)
         elif event == LONG:
             self._menu = Menu(self._entries + (STOP if self._recorder.active else RECORD, LEAVE), now_ms)
         elif event == SHORT:
             self._turn_page()
+
+    def _asking(self, now_ms):
+        """True while alignment by driving has a message, and nothing else is in front of it."""
+        if self.sensor.fault is not None or self._info or self._noticed(now_ms):
+            return False
+        return self.drive is not None and self.drive.message is not None
+
+    def _noticed(self, now_ms):
+        """The notice, while it lasts, else None."""
+        if self._notice and ticks_diff(now_ms, self._notice_ms) >= 0:
+            self._notice = None
+        return self._notice
 
     def _turn_page(self):
         if self._info:
@@ -122,10 +134,8 @@ class Screen:
         if self._recorder.problem:
             self._notify(self._recorder.problem, now_ms)
             self._recorder.problem = None
-        if self._notice:
-            if ticks_diff(now_ms, self._notice_ms) < 0:
-                return self._notice
-            self._notice = None
+        if self._noticed(now_ms):
+            return self._notice
         if self.wizard:
             return self.wizard.lines
         if self._menu:
@@ -134,7 +144,7 @@ class Screen:
             return self.sensor.fault
         if self._info:
             return pages.sensor_info(self.sensor, self.meter, now_ms // 1000)
-        if self.drive and self.drive.message:
+        if self._asking(now_ms):
             self._page = 0  # after it
             return self.drive.message
         return self._page_lines(now_ms)
