@@ -143,3 +143,37 @@ def test_flash_that_does_not_keep_what_is_written(store, tmp_path, monkeypatch):
     with pytest.raises(StoreError, match="reads back differently"):
         store.save(calibration(2))
     assert mark_of(store.load()) == 1
+
+
+def test_a_trim_may_be_stored_beside_a_record_that_never_was_this_sensors(store, tmp_path):
+    """Another range, aligned once; likewise a record that a power cut left empty."""
+    store.save(calibration(1))
+    store.save(calibration(2))
+    other = Store(0x68, 16, str(tmp_path))
+    other.load()
+    other.save(calibration(3))
+    again = Store(0x68, 16, str(tmp_path))
+    assert mark_of(again.load()) == 3 and "another sensor" in again.message
+    assert again.unchanged()
+    newest = newest_file(tmp_path, other)
+    for name in FILES:
+        if tmp_path / name != newest:
+            (tmp_path / name).write_bytes(b"")
+    again.load()
+    assert again.unchanged()
+    again.save(calibration(4))
+    assert again.unchanged()
+    assert mark_of(Store(0x68, 16, str(tmp_path)).load()) == 4
+
+
+def test_nothing_is_stored_over_a_record_that_misread_for_a_while(store, tmp_path):
+    """A voltage sag while loading: the older record is in use, the newer one is whole."""
+    store.save(calibration(1))
+    store.save(calibration(2))
+    newest = newest_file(tmp_path, store)
+    whole = newest.read_bytes()
+    newest.write_bytes(b"")
+    again = Store(0x68, 8, str(tmp_path))
+    assert mark_of(again.load()) == 1
+    newest.write_bytes(whole)
+    assert not again.unchanged()

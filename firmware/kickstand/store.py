@@ -41,12 +41,13 @@ class Store:
         self._directory = directory
         self.message = ""
         self._sequence = 0  # of the record in use
+        self._problems = []  # of the other
 
     def load(self):
         """The newest valid Calibration; a fresh, uncalibrated one where there is none. Never raises, never
         writes."""
         sequence, calibration, problems = self._newest()
-        self._sequence = sequence
+        self._sequence, self._problems = sequence, problems
         if calibration is None:
             self.message = "not calibrated" + (": " + ", ".join(problems) if problems else "")
             return Calibration()
@@ -56,9 +57,10 @@ class Store:
         return calibration
 
     def unchanged(self):
-        """True if the record in use is still the newest and both files can be read: not so when load() fell back."""
+        """True if both files read as they did before: not so where load() fell back because one misread for a while,
+        as in a voltage sag."""
         sequence, _, problems = self._newest()
-        return sequence == self._sequence and not problems
+        return sequence == self._sequence and problems == self._problems
 
     def save(self, calibration):
         """Write calibration over the older record and read it back. Raises StoreError; the record in use
@@ -83,7 +85,7 @@ class Store:
                 "Not saved: flash",
                 "Old one is kept",
             )
-        self._sequence = sequence + 1
+        self._sequence, _, self._problems = self._newest()
 
     def _newest(self):
         """(sequence, calibration, problems): sequence 0 and None where no record is valid."""
