@@ -117,3 +117,23 @@ def test_an_hour_in_float32_and_in_float64_is_the_same(monkeypatch):
     rounded = leans([list(row) for row in force.astype(np.float32)], [list(row) for row in rate.astype(np.float32)])
     assert np.abs(exact).max() > 30.0
     assert np.abs(rounded - exact).max() < 0.1
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_power_on_in_the_hand_and_laid_down(seed):
+    """Moved about for 20 s from the first sample on, then still: whatever the filter came to believe of the gyro, it
+    finds the rest and the lean, and took no hand for a straight road."""
+    rng = np.random.default_rng(seed)
+    hand = lean_filter.LeanFilter()
+    rate, push, up, lean = np.zeros(3), np.zeros(3), np.array([0.0, 1.0, 0.0]), 0.0
+    for k in range(60 * HZ):
+        moving = k < 20 * HZ
+        rate = 0.98 * rate + math.radians(8.0) * rng.normal(size=3) if moving else np.zeros(3)  # 40 deg/s rms
+        push = 0.95 * push + 0.06 * rng.normal(size=3) if moving else np.zeros(3)  # 0.2 g
+        up = up - np.cross(rate, up) / HZ
+        up /= np.linalg.norm(up)
+        force = up + push + rng.normal(0, 0.003, 3)
+        lean = hand.update(force.tolist(), (rate + rng.normal(0, 5e-4, 3)).tolist(), DT_US if k else 0)
+    assert hand.at_rest
+    if abs(up[2]) < 0.9:  # on its nose it has no lean
+        assert lean == pytest.approx(math.degrees(math.atan2(up[0], up[1])), abs=2.0)

@@ -226,7 +226,7 @@ class LeanFilter:
         self._last_roll_rate = self._roll_rate
         rested = self._rest.resting
         rolling = x[V] > ROLLING_SPEED and x[V] > ROLLING_SIGMAS * sqrt(self._p.rows[V][V])
-        self._rest.update(means, seconds, rolling)
+        self._rest.update(means, (x[BX], x[BY], x[BZ]), seconds, rolling)
         if self._rest.resting and not rested:
             self._stand(means)
         self._work = self._process(means, seconds, roll_acceleration)

@@ -21,22 +21,25 @@ class RestDetector:
         self._average = None
         self._max_bias = MAX_FIRST_BIAS_RADPS if first else MAX_BIAS_RADPS
 
-    def update(self, means, seconds, rolling=False):
-        """means: of the last seconds, where 2..4 are rates (rad/s, bias taken off) and 5..7 forces (g).
-        rolling: there is good reason to believe that the bike rolls."""
+    def update(self, means, bias, seconds, rolling=False):
+        """means: of the last seconds, where 2..4 are rates (rad/s, bias taken off) and 5..7 forces (g). bias: that one
+        (3). rolling: there is good reason to believe that the bike rolls."""
         if self._average is None:
             self._average = list(means)
         average = self._average
         gain = min(1.0, seconds / AVERAGE_S)
-        still = True
+        still = small = as_calibrated = True
         for i in range(2, 8):
             deviation = means[i] - average[i]
             average[i] += gain * deviation
             if i < 5:
-                still = still and abs(deviation) < MAX_RATE_RADPS and abs(average[i]) < self._max_bias
+                still = still and abs(deviation) < MAX_RATE_RADPS
+                small = small and abs(average[i]) < self._max_bias
+                as_calibrated = as_calibrated and abs(average[i] + bias[i - 2]) < self._max_bias
             else:
                 still = still and abs(deviation) < MAX_FORCE_G
-        self._still_s = self._still_s + seconds if still else 0.0
+        # or a bias that went astray, as in the hand, would never be put right
+        self._still_s = self._still_s + seconds if still and (small or as_calibrated) else 0.0
         self.resting = self._still_s >= (REST_ROLLING_S if rolling else REST_S)
         if self.resting:
             self._max_bias = MAX_BIAS_RADPS

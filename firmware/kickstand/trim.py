@@ -13,6 +13,7 @@ FOUND_SIGMA = radians(0.7)  # of a trim kept from the ride before: the sensor is
 SIGMA_STRAIGHT = radians(1.5)  # rider, camber and wind
 SIGMA_TURN = 0.4  # of the sine of the lean: tyre width and a rider hanging off add to the force in turns
 SIGMA_YAW_S = 0.2  # per rad/s of yaw rate
+MAX_SIDEWAYS = 0.1  # more than that is no bike in balance: it is being pushed, or the sensor is in a hand
 LASTS_S = 2.0  # how long such a disturbance lasts
 GROW = radians(0.01)  # per square root of a second
 
@@ -32,6 +33,8 @@ class UprightTrim:
     def update(self, sideways, lean, yaw_rate, seconds):
         """sideways: lateral over vertical force while riding; lean (rad), yaw_rate (rad/s): how straight it
         is."""
+        if not -MAX_SIDEWAYS < sideways < MAX_SIDEWAYS:
+            return
         turn = SIGMA_TURN * sin(lean - self.angle)
         yaw = SIGMA_YAW_S * yaw_rate
         noise = (SIGMA_STRAIGHT**2 + turn * turn + yaw * yaw) * 2.0 * LASTS_S / seconds
