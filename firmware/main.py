@@ -9,8 +9,8 @@ from time import sleep_ms
 
 import machine
 from kickstand import __version__, port, settings
-from kickstand.app import App, open_button, open_lcd
 from kickstand.errors import SettingsError
+from kickstand.hardware import open_button, open_lcd
 
 
 def tell(lcd, line1, line2=""):
@@ -45,6 +45,8 @@ def run(chosen, lcd):
     """The app; an exception in it is reported, then the board restarts."""
     print("Kickstand %s. Ctrl-C stops it." % __version__)
     try:
+        from kickstand.app import App  # half a second, in which the display says something already
+
         App(chosen, lcd).run()
     except SettingsError:
         raise

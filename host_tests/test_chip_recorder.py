@@ -27,7 +27,7 @@ RIDE = Ride([wait(2.0), accelerate(15.0, 3.0), turn(-30.0, 3.0), turn(35.0, 3.0)
 _RUN = """
 from array import array
 from time import ticks_add, ticks_diff, ticks_ms
-from kickstand import app, settings
+from kickstand import app, hardware, settings
 from kickstand.meter import LeanMeter
 class Config:
     RECORD = True
@@ -48,7 +48,7 @@ def noted(self, *arguments):
 LeanMeter.update_sum = noted
 chosen = settings.Settings(Config)
 try:
-    app.App(chosen, app.open_lcd(chosen)).run()
+    app.App(chosen, hardware.open_lcd(chosen)).run()
 except KeyboardInterrupt:
     pass
 print(list(leans[:count]))

@@ -11,20 +11,15 @@ all that the turns since the last collection have left. That took up to a millis
 import gc
 from time import sleep_us, ticks_add, ticks_diff, ticks_ms, ticks_us
 
-from machine import Pin
-
-from . import bus, port
-from .button import Button
+from . import port
 from .calibration import Calibration
-from .errors import SettingsError, StoreError
-from .hd44780 import Lcd
+from .errors import StoreError
+from .hardware import open_button, open_sensor
 from .meter import LeanMeter
-from .mpu6050 import Mpu6050
 from .recorder import Recorder
 from .ride_ring import RideRing
 from .sample_clock import SampleClock
 from .screen import Screen
-from .sensor import Sensor
 from .store import Store
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
@@ -42,54 +37,9 @@ def fill_gaps(n):
         value = -value
 
 
-def open_lcd(settings):
-    """The display of these settings. Raises SettingsError for pins that the controller cannot use."""
-    return Lcd(lambda: _open_bus(settings, "LCD"), settings.LCD_ADDRESSES)
-
-
-def open_sensor(settings):
-    """The chip of these settings, watched over. Raises SettingsError at its first fetch() for wrong pins."""
-    chip = Mpu6050(
-        None,
-        settings.SENSOR_ADDRESS,
-        settings.ACCEL_RANGE_G,
-        settings.GYRO_RANGE_DPS,
-        settings.DLPF,
-        settings.SAMPLE_HZ,
-        settings.ACCEPT_WHO_AM_I,
-    )
-    return Sensor(chip, lambda: _open_bus(settings, "SENSOR"))
-
-
-def open_button(settings):
-    """The button of these settings."""
-    try:
-        return Button(Pin(settings.BUTTON_PIN, Pin.IN, Pin.PULL_UP))
-    except ValueError as error:
-        raise SettingsError(
-            "config.py: BUTTON_PIN = %d is no pin of this board (%s)" % (settings.BUTTON_PIN, error),
-            "config.py: wrong",
-            "BUTTON_PIN",
-        )
-
-
-def _open_bus(settings, name):
-    controller = getattr(settings, name + "_I2C")
-    sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
-    try:
-        return bus.open_i2c(controller, sda, scl, getattr(settings, name + "_BUS_HZ"))
-    except ValueError as error:
-        raise SettingsError(
-            "config.py: %s_SDA = %d and %s_SCL = %d do not belong to I2C %d (%s)"
-            % (name, sda, name, scl, controller, error),
-            "config.py: wrong",
-            name + "_SDA / SCL",
-        )
-
-
 class App:
-    """The lean meter on a board. settings: a Settings.  lcd: from open_lcd().  keeper: of its rides, see Recorder;
-    one that is given gets a ride from the start."""
+    """The lean meter on a board. settings: a Settings.  lcd: of hardware.open_lcd().  keeper: of its rides, see
+    Recorder; one that is given gets a ride from the start. Raises SettingsError for pins that cannot be used."""
 
     def __init__(self, settings, lcd, keeper=None):
         self.settings = settings
@@ -185,8 +135,9 @@ class App:
         self._keep_trim(now_ms)
 
     def _record(self):
-        """Begin a ride, which the filter has to begin with, too: where the bike stands it loses nothing by that. A
-        ride begun on the way is replayed with a filter that still has to find what this one knows."""
+        """Begin a ride. Where the bike stands the filter begins with it, so that a replay shows the same, and finds the
+        gyro's errors anew in the first turns. A ride begun on the way is replayed with a filter that still has to find
+        what this one knows."""
         if self.meter.filter.at_rest:
             self._save_trim()
             self.meter.use(self.meter.calibration)

@@ -11,8 +11,9 @@ MIN_SLOPE, MAX_SLOPE = 0.8, 1.2
 class Calibration:
     """The parameters of one mounted sensor, and their use.
 
-    accel_offset (3, g), accel_slope (3), gyro_bias (3, deg/s), vehicle_from_sensor (9, rows left, up,
-    forward). calibrated = slope * reading + offset, Nicolae's equations 18-20.
+    accel_offset (3, g), accel_slope (3), gyro_bias (3, deg/s), vehicle_from_sensor (9, rows left, up, forward),
+    trim_deg: by how much the lean reads too far right. calibrated = slope * reading + offset, Nicolae's equations
+    18-20. six_done: offset and slope were measured; aligned: the matrix was; by_drive: by driving, or refined by it.
     """
 
     def __init__(self):
@@ -23,18 +24,16 @@ class Calibration:
         self.trim_deg = 0.0
         self.six_done = False
         self.aligned = False
-        self.by_drive = False  # aligned, or its alignment refined, by driving
+        self.by_drive = False
         self._scale = vector()
         self._gyro_scale = 1.0
         self._accel_lsb = 1.0
         self.set_scale(1.0, 1.0)
 
     def set_scale(self, accel_lsb_per_g, gyro_lsb_per_dps):
-        """Say what a count is worth (1, 1: readings are in g and deg/s already). Call again after changing
-        accel_slope."""
+        """Say what a count is worth (1, 1: readings are in g and deg/s already)."""
         self._accel_lsb = accel_lsb_per_g
-        for i in range(3):
-            self._scale[i] = self.accel_slope[i] / accel_lsb_per_g
+        self.set_accel(self.accel_offset, self.accel_slope)
         self._gyro_scale = 1.0 / gyro_lsb_per_dps
 
     def set_accel(self, offset, slope):

@@ -40,10 +40,10 @@ class RideStream:
 
 def run():
     """The app, its display and button alive, its turns to the console. Ctrl-C ends it."""
-    from . import app, port, settings
+    from . import app, hardware, port, settings
 
     chosen = settings.load()
     try:
-        app.App(chosen, app.open_lcd(chosen), RideStream()).run()
+        app.App(chosen, hardware.open_lcd(chosen), RideStream()).run()
     except KeyboardInterrupt:
         port.rest_watchdog()

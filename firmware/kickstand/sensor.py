@@ -31,7 +31,8 @@ class Sensor:
 
     def fetch(self, now_ms):
         """How many samples have come in, at most MAX_FRAMES: their sum is in chip.sums, each can be had by
-        chip.take(k). Starts the chip when it is not running. Never raises."""
+        chip.take(k). Starts the chip when it is not running. Raises SettingsError for pins that cannot be used, and
+        nothing else."""
         if not self._running:
             if ticks_diff(now_ms, self._due_ms) >= 0:
                 self._start(now_ms)

@@ -5,8 +5,9 @@ import os
 import sys
 from time import sleep_ms, ticks_ms
 
-from . import __version__, app
+from . import __version__
 from .errors import SettingsError
+from .hardware import open_button, open_lcd, open_sensor
 from .mpu6050 import UnknownChip
 from .settings import load
 from .store import Store
@@ -27,12 +28,12 @@ def report():
             "Settings     %s, kickstand side %s, %d samples a second"
             % (settings.VEHICLE, settings.SIDE, settings.SAMPLE_HZ)
         )
-        sensor = app.open_sensor(settings)
+        sensor = open_sensor(settings)
         who_am_i = _sensor(sensor, settings)
-        _display(app.open_lcd(settings))
+        _display(open_lcd(settings))
         print(
             "Button       GPIO %d, %s"
-            % (settings.BUTTON_PIN, "pressed" if app.open_button(settings).held() else "not pressed")
+            % (settings.BUTTON_PIN, "pressed" if open_button(settings).held() else "not pressed")
         )
         _speed(settings)
     except SettingsError as error:

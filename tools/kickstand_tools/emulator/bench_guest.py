@@ -8,6 +8,7 @@ from array import array
 from time import ticks_diff, ticks_us
 
 from kickstand import app as app_module
+from kickstand.hardware import open_lcd
 from kickstand.settings import Settings
 from machine import mem16
 from uctypes import addressof, bytearray_at
@@ -223,7 +224,7 @@ def run(detail, seconds, out, chosen):
     for name in chosen:
         setattr(Config, name, chosen[name])
     settings = Settings(Config)
-    app = MeasuredApp(settings, app_module.open_lcd(settings))
+    app = MeasuredApp(settings, open_lcd(settings))
     spent = array("I", bytes(4 * COLUMNS)) if detail else None
     app.prepare(seconds, out, spent)
     if detail:
