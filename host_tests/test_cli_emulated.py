@@ -1,6 +1,7 @@
 """flash and status by mpremote against MicroPython's own image for the Pico, in an emulated RP2040."""
 
 import re
+import socket
 import subprocess
 import sys
 
@@ -10,6 +11,7 @@ import serial
 from kickstand_tools import deploy, firmware_path
 from kickstand_tools.emulator import image
 from kickstand_tools.errors import InputError
+from terminal import Terminal
 
 
 @pytest.fixture
@@ -39,6 +41,24 @@ def port():
         process.wait()
         assert process.stdout is not None
         process.stdout.close()
+
+
+@pytest.mark.chip
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
+def test_emulate_in_a_terminal():
+    """The bike is drawn, the button and the end follow the keys."""
+    try:
+        image.find()
+    except InputError as error:
+        pytest.skip(str(error))
+    with socket.create_server(("127.0.0.1", 0)) as found:
+        free = found.getsockname()[1]
+    with Terminal([sys.executable, "-m", "kickstand_tools.cli", "emulate", "--port", str(free)]) as at:
+        at.wait_for("Kickstand on an emulated Pico, socket://", 60.0)
+        at.press("B")
+        at.wait_for("pressed")
+        at.press("q")
+        assert at.process.wait(10.0) == 0
 
 
 FIRMWARE = {

@@ -1,6 +1,5 @@
 """kickstand demo as a user meets it: printed, in a terminal, by hand."""
 
-import contextlib
 import itertools
 import os
 import re
@@ -13,6 +12,7 @@ from engines import ENGINES
 from kickstand_tools import unix_port
 from kickstand_tools.demo import Device, demo
 from kickstand_tools.demo_score import shown_lean
+from terminal import Terminal
 
 
 def command(engine, hand=False):
@@ -153,45 +153,16 @@ def test_a_device_that_stops_early_is_an_error(monkeypatch, capfd):
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 def test_in_a_terminal_by_hand():
     """Presses, raises the bike, presses, rides off and leans left, all with keys; the LCD follows."""
-    import pty
-
-    master, slave = pty.openpty()
-    environment = os.environ | {"TERM": "xterm", "COLUMNS": "80", "LINES": "24"}
-    process = subprocess.Popen(
-        command("cpython", hand=True), stdin=slave, stdout=slave, stderr=slave, env=environment
-    )
-    os.close(slave)
-    os.set_blocking(master, False)
-    seen = ""
-
-    def wait_for(text):
-        nonlocal seen
-        began = time.monotonic()
-        while text not in seen:
-            assert time.monotonic() - began < 30.0, f"{text!r} never came: {seen[-3000:]}"
-            time.sleep(0.05)
-            with contextlib.suppress(BlockingIOError):
-                seen += os.read(master, 1 << 20).decode(errors="replace")
-        seen = ""
-
-    def press(keys):
-        os.write(master, keys.encode())
-
-    try:
-        wait_for("On stand: press")
-        press("b")
-        wait_for("Now upright")
-        press("u")
+    with Terminal(command("cpython", hand=True)) as at:
+        at.wait_for("On stand: press")
+        at.press("b")
+        at.wait_for("Now upright")
+        at.press("u")
         time.sleep(2.0)
-        press("b")
-        wait_for("Aligned!")
-        press("aaa\x1b[D\x1b[D")
-        wait_for("20° left")
-        press("q")
-        wait_for("against true")
-        assert process.wait(10.0) == 0
-    finally:
-        if process.poll() is None:
-            process.kill()
-            process.wait()
-        os.close(master)
+        at.press("b")
+        at.wait_for("Aligned!")
+        at.press("aaa\x1b[D\x1b[D")
+        at.wait_for("20° left")
+        at.press("q")
+        at.wait_for("against true")
+        assert at.process.wait(10.0) == 0

@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.live import Live
 
 from . import firmware_path, unix_port
-from .demo_score import Score
+from .demo_score import Score, State
 from .demo_screen import lcd_lines, lean_text, screen
 from .errors import InputError
 from .keyboard import Keyboard
@@ -94,7 +94,7 @@ class Device:
         """It ended, and not because time was up."""
         return self.ended and self._outcome != "off"
 
-    def ticks(self, wait_s: float) -> list[dict]:
+    def ticks(self, wait_s: float) -> list[State]:
         """The ticks that have come; waits up to wait_s for one. Sets ended with the last."""
         ticks = []
         with contextlib.suppress(queue.Empty):
@@ -131,7 +131,7 @@ def _watch(device: Device, engine: str, by_hand: bool, score: Score) -> None:
             for state in device.ticks(0.03):
                 score.add(state)
             if state:
-                live.update(screen(state, engine, keys, paused, by_hand), refresh=True)
+                live.update(screen(state, f"Kickstand on a simulated board, {engine}", keys, paused), refresh=True)
 
 
 def _print(device: Device, score: Score) -> None:

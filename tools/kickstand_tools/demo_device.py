@@ -90,10 +90,10 @@ class Demo:
         if by_hand:
             self.bike = HandBike()
             self._steer = self.bike.command
-            self.seconds = HAND_LIMIT_S
+            self.of_s, self.seconds = None, HAND_LIMIT_S
         else:
             self.bike = Ride(SCRIPT)
-            self.seconds = self.bike.seconds
+            self.of_s = self.seconds = self.bike.seconds
         sensor = Sensor(seed=PART_SEED, share=PART_SHARE)
         self.board = Board(sensor.world(self.bike.motion), pace=speed)
         if not by_hand:
@@ -119,7 +119,7 @@ class Demo:
         self._say(
             {
                 "t_s": round(t_s, 3),
-                "of_s": self.seconds,
+                "of_s": self.of_s,
                 "lcd": self.board.lcd.text(),
                 "lean_deg": round(lean_deg, 2),
                 "speed_mps": round(speed_mps, 2),

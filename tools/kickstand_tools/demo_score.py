@@ -2,12 +2,26 @@
 
 import re
 from math import sqrt
+from typing import TypedDict
 
 from rich.table import Table
 
 _LEAN_PAGE = re.compile(r"Lean +(\d+)° *(left|right)?")
 _ROLLING = ("roll in", "roll out", "roll")
 _STANDING = ("kickstand", "upright", "moving", "wait")
+
+
+class State(TypedDict):
+    """One of the device's ticks. of_s: how long it takes in all, None where nobody knows; lcd: both
+    lines; lean_deg: the true one, > 0 to the right; phase: what the bike does; pressed: the button is."""
+
+    t_s: float
+    of_s: float | None
+    lcd: list[str]
+    lean_deg: float
+    speed_mps: float
+    phase: str
+    pressed: bool
 
 
 def shown_lean(lcd: list[str]) -> float | None:
@@ -26,7 +40,7 @@ class Score:
         self._phase = ""
         self._turns = 0
 
-    def add(self, state: dict) -> None:
+    def add(self, state: State) -> None:
         """Take one tick."""
         phase = state["phase"]
         self._turns += phase == "held turn" != self._phase

@@ -11,7 +11,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
-from .demo_score import shown_lean
+from .demo_score import State, shown_lean
 
 WIDTH = 78
 _BIKE_COLUMNS, _BIKE_ROWS = 38, 11
@@ -84,7 +84,7 @@ def bike(lean_deg: float, shown_deg: float | None) -> Text:
     return picture
 
 
-def _figures(state: dict) -> Table:
+def _figures(state: State) -> Table:
     shown = shown_lean(state["lcd"])
     table = Table.grid(padding=(0, 1))
     table.add_column(width=12, justify="right", style="grey70")
@@ -98,14 +98,14 @@ def _figures(state: dict) -> Table:
     return table
 
 
-def screen(state: dict, engine: str, keys: str, paused: bool, by_hand: bool) -> RenderableType:
+def screen(state: State, title: str, keys: str, paused: bool) -> RenderableType:
     """The whole picture for one of the device's ticks."""
+    of_s = state["of_s"]
     head = Table.grid(expand=True)
     head.add_column(no_wrap=True)
     head.add_column(justify="right", no_wrap=True)
-    clock = f"{state['t_s']:.1f} s" if by_hand else f"{state['t_s']:.1f} of {state['of_s']:.0f} s"
-    title = Text(f"Kickstand on a simulated board, {engine}", style="bold")
-    head.add_row(title, "paused" if paused else clock)
+    clock = f"{state['t_s']:.1f} s" if of_s is None else f"{state['t_s']:.1f} of {of_s:.0f} s"
+    head.add_row(Text(title, style="bold"), "paused" if paused else clock)
     body = Table.grid(padding=0)
     body.add_column(width=_LEFT_COLUMNS)
     body.add_column(width=WIDTH - _LEFT_COLUMNS)
@@ -118,7 +118,7 @@ def screen(state: dict, engine: str, keys: str, paused: bool, by_hand: bool) -> 
     frame.add_column(width=WIDTH)
     frame.add_row(head)
     frame.add_row(body)
-    if not by_hand:
-        frame.add_row(ProgressBar(total=state["of_s"], completed=state["t_s"], width=WIDTH))
+    if of_s is not None:
+        frame.add_row(ProgressBar(total=of_s, completed=state["t_s"], width=WIDTH))
     frame.add_row(Text(keys, style="grey70", no_wrap=True))
     return frame

@@ -15,6 +15,7 @@ from ..demo_device import (
     SCRIPT,
     UPRIGHT_PRESS_S,
 )
+from ..demo_score import State
 from ..demo_screen import lcd_lines, screen
 from ..hand_bike import HandBike
 from ..keyboard import Keyboard
@@ -90,14 +91,16 @@ def _watch(pico: Pico, server: ConsoleServer, bike: HandBike, address: str) -> N
                     bike.command(_BIKE[key])
             _run(pico, server)
             lean_deg, speed_mps, _, phase = bike.truth(pico.time_s)
-            state = {
+            state: State = {
                 "t_s": pico.time_s,
+                "of_s": None,
                 "lcd": pico.lcd(),
                 "lean_deg": lean_deg,
                 "speed_mps": speed_mps,
                 "phase": phase,
+                "pressed": pico.board.button.closed,
             }
-            live.update(screen(state, f"Pico on {address}", _HELP, False, True), refresh=True)
+            live.update(screen(state, f"Kickstand on an emulated Pico, {address}", _HELP, False), refresh=True)
 
 
 def _print(pico: Pico, server: ConsoleServer, bike: ScriptedBike, say: Callable[[str], None]) -> None:
