@@ -110,6 +110,7 @@ class FakeBoard(Transport):
             stat=stat,
             mkdir=lambda path: self.path(path).mkdir(),
             remove=lambda path: self.path(path).unlink(),
+            rmdir=lambda path: self.path(path).rmdir(),
             statvfs=lambda _path: (4096, 4096, 350, self.free_blocks, self.free_blocks, 0, 0, 0, 0, 255),
         )
 

@@ -191,10 +191,10 @@ def test_rides_go_to_an_sd_card_where_config_names_one():
         device.exec(_FEED.replace("SD_SPI = None", card))
         device.exec("recorder.start(Chip(), Calibration())\nfeed(3)\nrecorder.stop()\n", 30.0)
         assert "rides" not in {name.partition("/")[0] for name in device.files()}
-        listed = ast.literal_eval(device.exec("import os\nprint(os.listdir('/sd/rides'))"))
-        assert listed == ["00001-0000.ride"]
+        listed = ast.literal_eval(device.exec("import os\nprint(os.listdir('/sd/rides/000/01'))"))
+        assert listed == ["00000.rid"]
         text = device.exec(
-            "from binascii import b2a_base64\nf = open('/sd/rides/00001-0000.ride', 'rb')\n"
+            "from binascii import b2a_base64\nf = open('/sd/rides/000/01/00000.rid', 'rb')\n"
             "while d := f.read(768):\n    print(b2a_base64(d).decode(), end='')\n"
         )
     content = b"".join(binascii.a2b_base64(line) for line in text.split())

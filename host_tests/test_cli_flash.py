@@ -174,7 +174,7 @@ def test_machine_code_is_for_the_board(board, monkeypatch):
     found = fake_board.files(board.root)
     assert {path for path, data in wanted().items() if found[path] != data} == {
         "/kickstand/frames_viper.mpy",
-        "/kickstand/ride_file.mpy",
+        "/kickstand/ride_file_viper.mpy",
         "/kickstand/transform_viper.mpy",
     }
     assert found["/kickstand/frames_viper.mpy"][2] == 0x2B

@@ -8,7 +8,7 @@ import fake_board
 import numpy as np
 import pytest
 import ride_writer
-from kickstand import __version__
+from kickstand import __version__, ride_ring
 from kickstand_tools import deploy
 from kickstand_tools.logs import read_log
 from serial.tools import list_ports
@@ -24,16 +24,24 @@ def board(tmp_path, monkeypatch):
     monkeypatch.setattr(list_ports, "comports", lambda: [pico])
     monkeypatch.setattr(deploy, "SerialTransport", lambda name, timeout: board)
     monkeypatch.setattr(deploy, "_RESTART_S", 0)
+    monkeypatch.setattr(ride_ring, "directory", lambda _settings: "rides")
+    monkeypatch.setattr(ride_ring, "os", board.modules["os"])
     board.modules["kickstand"] = types.SimpleNamespace(
-        ride_ring=types.SimpleNamespace(directory=lambda _settings: "rides", ENDING=".ride"),
+        ride_ring=ride_ring,
         settings=types.SimpleNamespace(load=lambda: None),
     )
     return board
 
 
 def put(board, name, blocks):
-    (board.root / "rides").mkdir(exist_ok=True)
-    (board.root / "rides" / name).write_bytes(b"".join(blocks))
+    path = board.root / "rides" / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(b"".join(blocks))
+
+
+def left(board):
+    """Everything that is in the directory of the rides."""
+    return sorted(path.relative_to(board.root / "rides").as_posix() for path in board.root.glob("rides/**/*"))
 
 
 def logs(tmp_path):
@@ -42,9 +50,9 @@ def logs(tmp_path):
 
 def test_rides_become_logs_with_their_calibration(board, tmp_path):
     first, turns = ride_writer.blocks(20, ride=3, trim_deg=1.25)
-    put(board, "00003-0000.ride", first[:16])
-    put(board, "00003-0001.ride", first[16:])
-    put(board, "00004-0000.ride", ride_writer.blocks(1, ride=4, speed=True)[0])
+    put(board, "000/03/00000.rid", first[:16])
+    put(board, "000/03/00001.rid", first[16:])
+    put(board, "000/04/00000.rid", ride_writer.blocks(1, ride=4, speed=True)[0])
     result = command.works("pull", "--out", tmp_path / "out")
     assert result.err == ""
     assert result.out.count("written: ") == 2
@@ -63,44 +71,60 @@ def test_rides_become_logs_with_their_calibration(board, tmp_path):
     assert cal["vehicle_from_sensor"] == [[0, 1, 0], [0, 0, 1], [1, 0, 0]]
     assert cal["accel_offset_g"] == pytest.approx([0.01, -0.02, 0.03])
     assert (cal["trim_deg"], cal["firmware"], cal["who_am_i"], cal["sample_hz"]) == (1.25, __version__, "0x68", 200)
-    assert len(list(board.root.glob("rides/*"))) == 3  # nothing was to be deleted
+    assert len(list(board.root.glob("rides/*/*/*"))) == 3  # nothing was to be deleted
 
 
 def test_another_ride_of_the_same_number_gets_a_file_of_its_own(board, tmp_path):
     for trim in (0.0, 0.5):
-        put(board, "00001-0000.ride", ride_writer.blocks(1, trim_deg=trim)[0])
+        put(board, "000/01/00000.rid", ride_writer.blocks(1, trim_deg=trim)[0])
         for _ in range(2):
             command.works("pull", "--out", tmp_path / "out", "--delete")
-            put(board, "00001-0000.ride", ride_writer.blocks(1, trim_deg=trim)[0])
+            put(board, "000/01/00000.rid", ride_writer.blocks(1, trim_deg=trim)[0])
     assert len(logs(tmp_path)) == 2
 
 
 def test_only_what_came_over_whole_is_deleted(board, tmp_path):
     """A ride cut short by the power is whole up to there."""
     data = {ride: ride_writer.blocks(4, ride=ride)[0] for ride in range(1, 5)}
-    put(board, "00001-0000.ride", data[1])
-    put(board, "00002-0000.ride", [data[2][0], data[2][1][:1000] + b"?" + data[2][1][1001:], *data[2][2:]])
-    put(board, "00003-0000.ride", [*data[3][:3], data[3][3][:700]])
-    put(board, "00004-0000.ride", [b"something else altogether"])
-    put(board, "notes.txt", [b"the rider's own"])
+    put(board, "000/01/00000.rid", data[1])
+    put(board, "000/02/00000.rid", [data[2][0], data[2][1][:1000] + b"?" + data[2][1][1001:], *data[2][2:]])
+    put(board, "000/03/00000.rid", [*data[3][:3], data[3][3][:700]])
+    put(board, "000/04/00000.rid", [b"something else altogether"])
+    put(board, "000/notes.txt", [b"the rider's own"])
     result = command.works("pull", "--out", tmp_path / "out", "--delete")
-    assert sorted(path.name for path in (board.root / "rides").iterdir()) == [
-        "00002-0000.ride",
-        "00004-0000.ride",
-        "notes.txt",
-    ]
-    assert "00002-0000.ride: damaged at byte 4096: left out" in result.err
+    assert left(board) == ["000", "000/02", "000/02/00000.rid", "000/04", "000/04/00000.rid", "000/notes.txt"]
+    assert "ride 2, part 0: damaged at byte 4096: left out" in result.err
     assert "ride 2: 1 blocks are missing: the log has a gap there" in result.err
     assert "ride 2: not deleted" in result.err
-    assert "00003-0000.ride: the last block is cut short" in result.err
-    assert "ride 4: nothing in it can be read; it stays on the board" in result.err
+    assert "ride 3, part 0: the last block is cut short" in result.err
+    assert "ride 4: nothing in it can be read" in result.err
+    assert "ride 4: not deleted" in result.err
     assert [path.name[:10] for path in logs(tmp_path)] == ["ride-00001", "ride-00002", "ride-00003"]
     log = read_log(logs(tmp_path)[1])
     assert max(np.diff(log.time_us)) > 1_000_000
 
 
+def test_emptied_directories_go_too_unless_something_else_is_in_them(board, tmp_path):
+    for ride in (99, 100, 200):
+        put(board, f"{ride // 100:03}/{ride % 100:02}/00000.rid", ride_writer.blocks(1, ride=ride)[0])
+    for stray in ("002/00/notes.txt", "00007-0000.ride", "000/5/00000.rid"):
+        put(board, stray, [b"the rider's own"])
+    result = command.works("pull", "--out", tmp_path / "out", "--delete")
+    assert result.err == ""
+    assert result.out.count("deleted from the board: ride ") == 3
+    assert left(board) == [
+        "000",
+        "000/5",
+        "000/5/00000.rid",
+        "00007-0000.ride",
+        "002",
+        "002/00",
+        "002/00/notes.txt",
+    ]
+
+
 def test_a_ride_whose_beginning_is_gone(board, tmp_path):
-    put(board, "00001-0003.ride", ride_writer.blocks(2, sequence=48, time_us=300_000_000)[0])
+    put(board, "000/01/00003.rid", ride_writer.blocks(2, sequence=48, time_us=300_000_000)[0])
     result = command.works("pull", "--out", tmp_path / "out")
     assert "ride 1: its beginning had to make room" in result.err
     assert read_log(logs(tmp_path)[0]).time_text[0].startswith("0.")

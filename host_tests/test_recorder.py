@@ -24,7 +24,7 @@ def menu(from_s):
 def rides(flash):
     """Whole blocks of each ride by its number, and every problem."""
     found, problems = {}, []
-    for path in sorted((flash / "rides").glob("*.ride")):
+    for path in sorted((flash / "rides").glob("*/*/*.rid")):
         blocks, bad = ride_blocks.read(path.read_bytes())
         problems += bad
         for block in blocks:

@@ -1,13 +1,16 @@
 """The format of recorded rides: exact on both engines, and what is damaged is left out, and only that."""
 
+import ast
 import json
 import subprocess
+from pathlib import Path
 
 import engines
 import pytest
 import ride_writer
 from kickstand import __version__, ride_file
 from kickstand_tools import ride_blocks, unix_port
+from mpy import run_mpy
 from ride_writer import CHIP
 
 _EXTREMES = [
@@ -33,6 +36,40 @@ for sums, n, dt_us in json.load(sys.stdin):
     block.add(sums, n, dt_us)
 block.close()
 print("".join("%02x" % byte for byte in block.buffer[:block.length]))
+"""
+
+# Random entries, most of them likely ones, coded by machine code and plainly: everything has to be the same
+_BOTH = """
+import random
+from array import array
+from kickstand import ride_file
+from kickstand.ride_file import encode, encode_plainly
+assert encode is not encode_plainly
+random.seed(1)
+for block in range(300):
+    states, outs = [], []
+    for _ in range(2):
+        state = array("i", [0] * (ride_file._PERIOD + 1))
+        state[0] = 1
+        for i in range(ride_file.FIELDS):
+            state[ride_file._MEANS + i] = ride_file.START_MEAN
+        state[ride_file._PERIOD] = 5000
+        states.append(state)
+        outs.append(bytearray(4096))
+    while states[0][ride_file._AT] < 4096 - 60:
+        wide = random.choice((10, 300, 32767))
+        n = random.choice((0, 1, 2, 2, 2, 8))
+        entry = array("i", [n, n * 5000 + random.randint(-200, 200)])
+        if random.random() < 0.01:
+            entry[1] = random.randint(0, ride_file.MAX_DT_US)
+        for _ in range(6):
+            entry.append(max(1, n) * random.randint(-wide - 1, wide))
+        entry.append(random.choice((0, random.randint(0, 30000), random.randint(0, 1 << 24))))
+        for function, state, out in zip((encode, encode_plainly), states, outs):
+            function(entry, state, out)
+        assert states[0] == states[1], (list(entry), states)
+    assert outs[0] == outs[1]
+print("equal")
 """
 
 
@@ -73,6 +110,24 @@ def test_every_turn_comes_back_exactly(engine, tmp_path):
     assert (block.ride, block.sequence, block.time_us) == (7, 3, 123456789012)
     assert (block.accel_lsb_per_g, block.gyro_lsb_tenths, block.sample_hz) == (4096, 655, 200)
     assert (block.centidegrees, block.firmware) == (3125, __version__)
+
+
+def test_machine_code_codes_as_python_does():
+    assert run_mpy(_BOTH) == "equal\n"
+
+
+def test_machine_code_has_the_numbers_of_the_format():
+    """Which stand in its file again, because only there they are built in."""
+    source = Path(ride_file.__file__).with_name("ride_file_viper.py").read_text()
+    constants = {
+        node.targets[0].id.lstrip("_"): eval(ast.unparse(node.value.args[0]))
+        for node in ast.parse(source).body
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name) and isinstance(node.value, ast.Call)
+    }
+    assert constants.pop("LOW_BITS") < 32 - 7
+    names = {name.lstrip("_"): value for name, value in vars(ride_file).items() if name.lstrip("_") in constants}
+    assert len(constants) == 11
+    assert names == constants
 
 
 def test_blocks_hold_speeds_and_the_calibration_and_are_never_overfilled():

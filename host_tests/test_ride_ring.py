@@ -9,11 +9,12 @@ import types
 import pytest
 import ride_writer
 from kickstand import ride_ring
-from kickstand.ride_ring import NEEDED, RideRing
+from kickstand.ride_ring import RideRing, part_path
 from kickstand_tools import ride_blocks
 from kickstand_tools.board import fake_machine, fake_os, fake_time
 
 SETTINGS = types.SimpleNamespace(SD_SPI=None)
+NEEDED = RideRing(SETTINGS).needed
 
 
 class Flash:
@@ -35,6 +36,7 @@ def flash(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     flash = Flash(tmp_path, NEEDED + 3 * 65536 + 8192)
     monkeypatch.setattr(ride_ring, "free_bytes", flash.free)
+    monkeypatch.setattr(ride_ring, "all_bytes", lambda _path: flash.size + ride_ring.FIRMWARE)
     monkeypatch.setattr("os.ilistdir", fake_os.ilistdir, raising=False)
     return flash
 
@@ -67,7 +69,7 @@ def ride(recorder, flash, turns, seed=0):
 def found(flash):
     """{ride: sequence numbers} of all whole blocks."""
     rides = {}
-    for path in sorted(flash.root.glob("rides/*")):
+    for path in sorted(flash.root.glob("rides/*/*/*.rid")):
         blocks, problems = ride_blocks.read(path.read_bytes())
         assert problems == []
         for block in blocks:
@@ -104,36 +106,76 @@ def test_a_ride_longer_than_the_flash_keeps_its_end(recorder, flash):
     assert rooms[2] + 80 == pytest.approx((flash.size - NEEDED) / bytes_s, rel=0.2)
 
 
-def test_a_card_with_many_parts_is_not_searched_for_each(recorder, flash, monkeypatch):
-    """On a FAT, to stat one is to read the directory from its beginning: 300 take longer than the watchdog waits."""
-    (flash.root / "rides").mkdir()
-    names = [f"{1 + i // 20:05}-{i % 20:04}.ride" for i in range(300)]
+def test_the_oldest_go_part_by_part_with_their_directories_and_one_step_a_turn(recorder, flash, monkeypatch):
+    """Rides 98 to 112: two groups. What is not the recorder's stays, and its directory with it."""
+    names = [part_path("rides", ride, part) for ride in range(98, 113) for part in range(4)]
     for name in reversed(names):
-        (flash.root / "rides" / name).write_bytes(bytes(4096))
-    flash.size = NEEDED + len(names) * 4096
-    passes, removed = [], []
+        (flash.root / name).parent.mkdir(parents=True, exist_ok=True)
+        (flash.root / name).write_bytes(bytes(4096))
+    strays = ["00001-0000.ride", "notes.txt", "000/99/._00000.rid", "000/3.rid", "001/notes/1", "001/02/0000.rid"]
+    for name in strays:
+        (flash.root / "rides" / name).parent.mkdir(exist_ok=True)
+        (flash.root / "rides" / name).write_bytes(b"the rider's own")
+    (flash.root / "rides/000/12").mkdir()  # the power went
+    flash.size = NEEDED + (len(names) + len(strays)) * 4096
+    steps = []
 
-    def listed(path):
-        passes.append(path)
-        return fake_os.ilistdir(path)
+    def noted(function):
+        def call(path):
+            steps.append((function.__name__, path))
+            function(path)
 
-    def remove(path):
-        removed.append(path)
-        os.remove(path)
+        return call
 
-    monkeypatch.setattr(ride_ring, "os", types.SimpleNamespace(mkdir=os.mkdir, ilistdir=listed, remove=remove))
+    patched = types.SimpleNamespace(
+        mkdir=os.mkdir, ilistdir=fake_os.ilistdir, remove=noted(os.remove), rmdir=noted(os.rmdir)
+    )
+    monkeypatch.setattr(ride_ring, "os", patched)
     recorder.start(ride_writer.CHIP, ride_writer.calibration())
-    assert len(passes) == 1
-    assert recorder.room_s() == len(names) * 4096 // 1024
+    assert recorder.room_s() == (len(names) + len(strays)) * 4096 // 1024
     for sums, n, dt_us in ride_writer.turns(20_000):  # two and a half parts
         recorder.add(sums, n, dt_us)
+        before = len(steps)
         recorder.tick()
+        assert len(steps) <= before + 1
     recorder.stop()
     assert recorder.problem is None
+    removed = [path for name, path in steps if name == "remove"]
     assert len(removed) >= 32
-    assert removed == ["rides/" + name for name in names[: len(removed)]]
-    assert 1 < len(passes) <= 1 + len(removed) / ride_ring.OLDEST
-    assert (flash.root / "rides" / "00016-0002.ride").exists()
+    assert removed == names[: len(removed)]
+    assert not (flash.root / "rides/000/12").exists()
+    assert not (flash.root / "rides/000/98").exists()
+    assert not (flash.root / "rides/001/00").exists()
+    assert all((flash.root / "rides" / name).exists() for name in strays)
+    assert (flash.root / part_path("rides", 113, 2)).exists()
+    sizes = {ride: sizes for ride, _, sizes in ride_ring.parts("rides")}
+    assert sorted(sizes) == list(range(98 + len(removed) // 4, 114))
+
+
+def test_a_ride_without_a_block_leaves_no_directory_of_its_own(recorder, flash):
+    """The power goes again and again within the first seconds: in flash each would take 8 KB."""
+    for _ in range(5):
+        recorder.start(ride_writer.CHIP, ride_writer.calibration())
+        recorder.active = False
+    assert [path.relative_to(flash.root).as_posix() for path in flash.root.rglob("*")] == [
+        "rides",
+        "rides/000",
+        "rides/000/01",
+    ]
+    ride(recorder, flash, 1000)
+    ride(recorder, flash, 1000)
+    assert sorted(found(flash)) == [1, 2]
+
+
+def test_the_numbers_go_on_after_the_newest(recorder, flash):
+    (flash.root / "rides/000/07").mkdir(parents=True)
+    (flash.root / "rides/002").mkdir()
+    ride(recorder, flash, 1000)
+    assert sorted(found(flash)) == [200]
+    (flash.root / "rides/002/99").mkdir()
+    (flash.root / "rides/002/99/00003.rid").write_bytes(b"")
+    ride(recorder, flash, 1000)
+    assert sorted(found(flash)) == [200, 300]
 
 
 def test_no_memory_for_a_ride_is_said_and_the_display_goes_on(recorder, monkeypatch):
@@ -206,14 +248,15 @@ def test_a_file_system_that_fails_ends_the_ride_and_keeps_what_was_written(recor
     recorder.problem = None
     ride(recorder, flash, 2000, seed=1)
     assert recorder.problem is None
-    parts = {path.name: ride_blocks.read(path.read_bytes())[0] for path in flash.root.glob("rides/*")}
+    parts = {path.parent.name: ride_blocks.read(path.read_bytes())[0] for path in flash.root.glob("rides/*/*/*.rid")}
     if uses:  # it could be made
-        assert len(parts.pop("00001-0000.ride")) >= worn.flushed == (uses - 1) // 17
+        assert len(parts.pop("01")) >= worn.flushed == (uses - 1) // 17
     assert [len(blocks) for blocks in parts.values()] == [5]
 
 
 def test_a_card_that_is_pulled_is_said(recorder, flash, monkeypatch):
     monkeypatch.setattr(ride_ring, "directory", lambda _settings: "rides")
+    flash.size += 1 << 20
     recorder.keeper = RideRing(types.SimpleNamespace(SD_SPI=0))
     with contextlib.redirect_stdout(io.StringIO()):
         monkeypatch.setattr(ride_ring, "open", Worn(5).open, raising=False)
@@ -230,7 +273,7 @@ def test_a_gap_in_the_readings_is_one_in_the_log(recorder, flash):
             dt_us = 0
         recorder.add(sums, n, dt_us)
     recorder.stop()
-    block = ride_blocks.read((flash.root / "rides" / "00001-0000.ride").read_bytes())[0][0]
+    block = ride_blocks.read((flash.root / "rides/000/01/00000.rid").read_bytes())[0][0]
     steps = [after.time_us - before.time_us for before, after in zip(block.turns, block.turns[1:], strict=False)]
     assert [step > 500_000 for step in steps].count(True) == 1
     assert steps[49] > 500_000
@@ -248,7 +291,7 @@ def test_a_speed_source_without_a_sensor_fills_no_block(recorder, flash):
     for sums, n, dt_us in turns[10:]:
         recorder.add(sums, n, dt_us)
     recorder.stop()
-    block = ride_blocks.read((flash.root / "rides" / "00001-0000.ride").read_bytes())[0][0]
+    block = ride_blocks.read((flash.root / "rides/000/01/00000.rid").read_bytes())[0][0]
     assert [turn.speed_mps for turn in block.turns] == [None] * 10 + [12.34] + [None] * 9
 
 

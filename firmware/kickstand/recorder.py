@@ -35,8 +35,6 @@ class Recorder:
         """Begin a ride that is measured by this chip (an Mpu6050 that runs) with this Calibration. What went
         before has to be forgotten by the meter, or its lean cannot be replayed. Ends the ride before."""
         self.stop()
-        if self.active:
-            return
         try:
             if not self._spare:
                 period_us = 1_000_000 // self._sample_hz

@@ -16,8 +16,6 @@ import struct
 from array import array
 from binascii import crc32
 
-import micropython
-
 from . import __version__
 from .store import BODY_LENGTH
 
@@ -28,6 +26,7 @@ _TEMPERATURE_AT = struct.calcsize("<4sHHIIq")
 TAIL = "<HI"
 BLOCK = 4096  # of the flash
 FIELDS = 9  # n, dt_us, sums of ax ay az gx gy gz, speed
+_SPEED = 8
 LIMIT = 12
 RAW_BITS = 31
 MEAN_SHIFT = 4  # the mean of about the last 16 sizes, times 16
@@ -38,8 +37,6 @@ _HEAD_LENGTH = struct.calcsize(HEAD) + BODY_LENGTH
 _TAIL_LENGTH = struct.calcsize(TAIL)
 _WORST = (FIELDS + 1) * (LIMIT + RAW_BITS) // 8 + 2  # bytes of a turn and a speed
 _MEANS, _PENDING, _BITS, _AT, _PERIOD = 9, 18, 19, 20, 21  # the coder's state, after the entry before
-
-ptr8 = ptr32 = None  # viper's own names, for Pythons without it
 
 
 def block_length(index):
@@ -54,74 +51,48 @@ def block_length(index):
     return length
 
 
-@micropython.viper
-def _encode(entry: ptr32, state: ptr32, out: ptr8):
-    """Append an entry. As machine code 0.1 ms instead of 1.5, ten times in a tenth of a second."""
-    n = int(entry[0])
-    before = int(state[0])
-    pending = int(state[18])
-    bits = int(state[19])
-    at = int(state[20])
-    i = 0
-    while i < 9:
-        value = int(entry[i])
-        guess = int(state[i])
+def encode_plainly(entry, state, out):
+    """Append an entry."""
+    n, before = entry[0], state[0]
+    for i in range(_SPEED) if n else (0, _SPEED):
+        value, guess = entry[i], state[i]
         if i == 1:
-            guess = n * int(state[21])
-        elif i < 8 and i > 1:
-            # 24 bits with their sign, however wide an int is
-            value = ((value & 16777215) ^ 8388608) - 8388608
-            guess = ((guess & 16777215) ^ 8388608) - 8388608
-            if n != before:
-                guess = guess * n // before
+            guess = n * state[_PERIOD]
+        elif 1 < i < _SPEED and n != before:
+            guess = guess * n // before
         difference = value - guess
         size = (difference << 1) ^ (difference >> 31)
-        mean = int(state[9 + i])
+        mean = state[_MEANS + i]
         k = 0
-        while mean >> (k + 5):
+        while mean >> (k + MEAN_SHIFT + 1):
             k += 1
         ones = size >> k
-        part = 0
-        while part < 3:
-            code = 0
-            length = 0
-            if ones >= 12:
-                if part == 0:
-                    code = 4095
-                    length = 12
-                elif part == 1:
-                    code = size >> 16
-                    length = 15
-                else:
-                    code = size & 65535
-                    length = 16
-            elif part == 0:
-                code = (1 << (ones + 1)) - 2
-                length = ones + 1
-            elif part == 1:
-                code = size & ((1 << k) - 1)
-                length = k
-            pending = (pending << length) | code
-            bits += length
-            while bits >= 8:
-                bits -= 8
-                out[at] = pending >> bits
-                at += 1
-                pending &= (1 << bits) - 1
-            part += 1
-        if size > 1048576:
-            size = 1048576
-        state[9 + i] = mean + size - (mean >> 4)
-        if i or n:
+        if ones < LIMIT:
+            _append(state, out, (1 << (ones + 1)) - 2, ones + 1)
+            _append(state, out, size & ((1 << k) - 1), k)
+        else:
+            _append(state, out, (1 << LIMIT) - 1, LIMIT)
+            _append(state, out, size, RAW_BITS)
+        state[_MEANS + i] = mean + min(size, MAX_SIZE) - (mean >> MEAN_SHIFT)
+        if i or n:  # a speed leaves the n of the turn before
             state[i] = value
-        i += 1
-        if n == 0 and i == 1:
-            i = 8
-        elif n and i == 8:
-            i = 9
-    state[18] = pending
-    state[19] = bits
-    state[20] = at
+
+
+def _append(state, out, code, length):
+    pending = state[_PENDING] << length | code
+    bits = state[_BITS] + length
+    while bits >= 8:
+        bits -= 8
+        out[state[_AT]] = pending >> bits
+        state[_AT] += 1
+        pending &= (1 << bits) - 1
+    state[_PENDING], state[_BITS] = pending, bits
+
+
+try:
+    from .ride_file_viper import encode
+except (ImportError, NameError, SyntaxError):  # CPython, or a port without viper
+    encode = encode_plainly
 
 
 class RideBlock:
@@ -183,14 +154,14 @@ class RideBlock:
         entry[6] = sums[5]
         entry[7] = sums[6]
         self._temperature = sums[3] // n
-        _encode(entry, self._state, self.buffer)
+        encode(entry, self._state, self.buffer)
         self.count += 1
 
     def add_speed(self, cm_per_s):
         """A new speed, which belongs to the turn after it."""
         self._entry[0] = 0
-        self._entry[8] = cm_per_s
-        _encode(self._entry, self._state, self.buffer)
+        self._entry[_SPEED] = cm_per_s
+        encode(self._entry, self._state, self.buffer)
         self.count += 1
 
     def full(self):

@@ -2,10 +2,13 @@
 
 import ast
 import binascii
+import contextlib
 import itertools
 from collections.abc import Callable
-from pathlib import Path
+from pathlib import Path, PurePosixPath
+from typing import NamedTuple
 
+from mpremote.transport import TransportExecError
 from mpremote.transport_serial import SerialTransport
 
 from . import ride_log
@@ -19,16 +22,19 @@ Print = Callable[[str], None]
 
 _SILENT_S = 60  # an emulated board takes a while
 
-# Prints the directory and (name, bytes) of each part of a ride
+# Prints the directory, and (ride, part, bytes, path) of each part in it
 _LIST = """
 import os
 from kickstand import ride_ring, settings
 directory = ride_ring.directory(settings.load())
+print(repr(directory))
 try:
-    parts = sorted((entry[0], entry[3]) for entry in os.ilistdir(directory) if entry[0].endswith(ride_ring.ENDING))
+    os.stat(directory)
 except OSError:
-    parts = []
-print((directory, parts))
+    pass
+else:
+    for ride, part, size in ride_ring.parts(directory):
+        print((ride, part, size, ride_ring.part_path(directory, ride, part)))
 """
 _READ = """
 from binascii import b2a_base64
@@ -39,6 +45,15 @@ with open(PATH, "rb") as file:
             break
         print(b2a_base64(piece).decode(), end="")
 """
+
+
+class _Part(NamedTuple):
+    """A file on the board. size: bytes."""
+
+    ride: int
+    part: int
+    size: int
+    path: str
 
 
 def pull(port: str | None, out: Path, delete: bool, say: Print, warn: Print) -> None:
@@ -57,68 +72,73 @@ def pull(port: str | None, out: Path, delete: bool, say: Print, warn: Print) -> 
                 say(f"no rides on the board at {name}: its menu's Record ride makes one")
                 return
             out.mkdir(exist_ok=True)
-            with Bar("pulling", sum(size for parts in rides.values() for _, size in parts)) as bar:
-                for parts in rides.values():
-                    _pull_ride(transport, directory, [name for name, _ in parts], out, delete, bar, say, warn)
+            with Bar("pulling", sum(part.size for parts in rides.values() for part in parts)) as bar:
+                for ride, parts in rides.items():
+                    whole = _pull_ride(transport, ride, parts, out, bar, say, warn)
+                    if delete and whole:
+                        _delete(transport, directory, parts)
+                        say(f"deleted from the board: ride {ride}")
+                    elif delete:
+                        warn(f"ride {ride}: not deleted from the board, because not all of it came over")
         finally:
             restart(transport)
 
 
-def _list(transport: SerialTransport, name: str) -> tuple[str, dict[str, list[tuple[str, int]]]]:
-    """Where the rides are, and the parts of each by the number in their names."""
+def _list(transport: SerialTransport, name: str) -> tuple[str, dict[int, list[_Part]]]:
+    """Where the rides are, and the parts of each."""
     listed, error = transport.exec_raw(_LIST, timeout=_SILENT_S)
     if error:
         reason = error.decode(errors="replace").strip().rpartition("\n")[2]
         if "CardError" in reason or "SettingsError" in reason:
             raise InputError(f"{name}: {reason.partition(': ')[2]}")
         raise InputError(f"the board at {name} cannot tell its rides ({reason}): kickstand flash brings it up to date")
-    directory, parts = ast.literal_eval(listed.decode())
-    return directory, {key: list(group) for key, group in itertools.groupby(parts, lambda part: part[0][:5])}
+    directory, *parts = map(ast.literal_eval, listed.decode().splitlines())
+    in_order = sorted(_Part(*part) for part in parts)
+    return directory, {ride: list(group) for ride, group in itertools.groupby(in_order, lambda part: part.ride)}
 
 
 def _pull_ride(
-    transport: SerialTransport,
-    directory: str,
-    names: list[str],
-    out: Path,
-    delete: bool,
-    bar: Bar,
-    say: Print,
-    warn: Print,
-) -> None:
+    transport: SerialTransport, ride: int, parts: list[_Part], out: Path, bar: Bar, say: Print, warn: Print
+) -> bool:
+    """Write its log. True if all of it came over."""
     blocks: list[Block] = []
     whole = True
-    for name in names:
-        bar.describe(f"pulling {name}")
-        found, problems = read(_read(transport, f"{directory}/{name}", bar))
+    for part in parts:
+        title = f"ride {ride}, part {part.part}"
+        bar.describe(f"pulling {title}")
+        found, problems = read(_read(transport, part.path, bar))
         blocks += found
         for problem in problems:
             if problem == CUT_SHORT:
-                warn(f"{name}: the last block is cut short, as by a power cut: left out")
+                warn(f"{title}: the last block is cut short, as by a power cut: left out")
             else:
-                warn(f"{name}: {problem}: left out")
+                warn(f"{title}: {problem}: left out")
                 whole = False
-    title = f"ride {int(names[0][:5])}" if names[0][:5].isdigit() else names[0]
+    title = f"ride {ride}"
     if not blocks:
-        warn(f"{title}: nothing in it can be read; it stays on the board")
-        return
+        warn(f"{title}: nothing in it can be read")
+        return False
     missing = [after.sequence - before.sequence - 1 for before, after in itertools.pairwise(blocks)]
     if any(missing):
         warn(f"{title}: {sum(missing)} blocks are missing: the log has a gap there")
     if blocks[0].sequence:
         warn(f"{title}: its beginning had to make room for later blocks")
-    path = out / f"ride-{names[0][:5]}-{blocks[0].crc & 0xFFFF:04x}.csv.gz"
+    path = out / f"ride-{ride:05}-{blocks[0].crc & 0xFFFF:04x}.csv.gz"
     ride_log.write(path, blocks)
     seconds = (blocks[-1].turns[-1].time_us - blocks[0].time_us) / 1e6
     say(f"written: {path}, {seconds / 60:.1f} min, {sum(len(block.turns) for block in blocks)} readings")
-    if not delete:
-        return
-    if whole:
-        for name in names:
-            transport.fs_rmfile(f"{directory}/{name}")
-        say(f"deleted from the board: {title}")
-    else:
-        warn(f"{title}: not deleted from the board, because not all of it came over")
+    return whole
+
+
+def _delete(transport: SerialTransport, directory: str, parts: list[_Part]) -> None:
+    """Parts of one ride, and the directories that are empty then."""
+    for part in parts:
+        transport.fs_rmfile(part.path)
+    emptied = PurePosixPath(parts[0].path).parent
+    with contextlib.suppress(OSError, TransportExecError):  # something else is in it
+        while str(emptied) != directory:
+            transport.fs_rmdir(str(emptied))
+            emptied = emptied.parent
 
 
 def _read(transport: SerialTransport, path: str, bar: Bar) -> bytes:

@@ -103,7 +103,7 @@ def parse(data: bytes) -> Block:
 
 
 def _turns(block: Block, data: bytes, count: int) -> Iterator[Turn]:
-    """Undo ride_file._encode."""
+    """Undo ride_file.encode_plainly."""
     bits = bin(int.from_bytes(b"\x01" + data, "big"))[3:]
     before = [1] + [0] * (ride_file.FIELDS - 1)
     means = [ride_file.START_MEAN] * ride_file.FIELDS
