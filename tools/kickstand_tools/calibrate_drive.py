@@ -51,7 +51,8 @@ def drive(
     try:
         alignment.matrix(matrix)
     except AlignmentError as error:
-        raise InputError(f"{names}: {error.reason}") from error
+        assumed = " (taken for a car: else --vehicle motorcycle)" if vehicle is None and kind == CAR else ""
+        raise InputError(f"{names}: {error.reason}{assumed}") from error
     bias = [a + b for a, b in zip(result.bias, alignment.standing.bias, strict=True)]
     say(f"{kind}, method {method}: {alignment.counted} used, {alignment.turned} in turns not used")
     say(f"stops: {alignment.standing.stops}")

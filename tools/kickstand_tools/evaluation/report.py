@@ -4,6 +4,7 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
+from rich import box
 from rich.table import Table
 
 from .metrics import Score
@@ -52,17 +53,16 @@ def by_profile(results: list[Result]) -> dict[str, dict[str, dict[str, float]]]:
 
 def table(results: list[Result]) -> Table:
     """A block of lines for each profile."""
-    made = Table(title="Shown lean against the truth of simulated rides", caption=CAPTION)
-    for head in ("profile (rides)", "estimator"):
-        made.add_column(head)
-    for head in ("rms", "worst ride", "95 %", "worst", "slope", "range", "lag ms", "bias"):
-        made.add_column(head, justify="right", no_wrap=True)
+    made = _table("Shown lean against the truth of simulated rides", CAPTION)
+    made.add_column("profile (rides)", no_wrap=True)
+    for head in ("rms", "worst\nride", "95 %", "worst", "slope", "range", "lag ms", "bias"):
+        made.add_column(head, justify="right")
     for profile, methods in by_profile(results).items():
         rides = sum(r.job.profile == profile and r.refusal is None for r in results)
+        made.add_row(f"{profile} ({rides})", style="cyan")
         for k, (name, s) in enumerate(methods.items()):
             made.add_row(
-                f"{profile} ({rides})" if k == 0 else "",
-                name,
+                "  " + name,
                 _shown(s["rms"], ".2f"),
                 _shown(s["worst_ride_rms"], ".2f"),
                 _shown(s["p95"], ".2f"),
@@ -79,17 +79,22 @@ def table(results: list[Result]) -> Table:
 
 def real_table(scores: dict[str, RealScore], name: str) -> Table:
     """The recorded ride."""
-    made = Table(
-        title=f"{name}: against atan(v * yaw rate / g) averaged over 1 s",
-        caption="a rough reference that reads low: it compares methods, it claims no degrees",
+    made = _table(
+        f"{name}: against atan(v * yaw rate / g) averaged over 1 s",
+        "a rough reference that reads low: it compares methods, it claims no degrees",
     )
-    made.add_column("estimator")
-    for head in ("rms", "slope beyond 5 deg"):
+    made.add_column("recorded ride", no_wrap=True)
+    for head in ("rms", "slope beyond\n5 deg"):
         made.add_column(head, justify="right")
     for method, s in scores.items():
         style = "bold" if method == "kickstand" else ""
-        made.add_row(method, _shown(s.rms, ".2f"), _shown(s.slope, ".3f"), style=style)
+        made.add_row("  " + method, _shown(s.rms, ".2f"), _shown(s.slope, ".3f"), style=style)
     return made
+
+
+def _table(title: str, caption: str) -> Table:
+    """Narrow enough for 80 columns."""
+    return Table(title=title, caption=caption, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), min_width=78)
 
 
 def document(results: list[Result], real: dict[str, RealScore] | None) -> dict[str, Any]:
