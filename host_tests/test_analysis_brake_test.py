@@ -163,9 +163,14 @@ def test_a_smooth_road_is_no_standstill(ride):
     smooth = slice(int(cruising[0]) + 50, int(cruising[0]) + 200)
     course.pitch_rate_dps[smooth] = course.yaw_rate_dps[smooth] = course.forward_g[smooth] = 0.0
     assert not np.any(standing(course)[smooth])
-    course.up_g = course.up_g.copy()
+    course.up_g, course.left_g, course.rolling = course.up_g.copy(), course.left_g.copy(), course.rolling.copy()
     course.up_g[smooth] = 1.0
+    course.left_g[smooth] = 0.0
+    assert not np.any(standing(course)[smooth])  # the filter knows that it rolls
+    course.rolling[smooth] = 0.0
     assert np.mean(standing(course)[smooth]) > 0.9
+    course.forward_g[smooth] = -0.4
+    assert not np.any(standing(course)[smooth])  # the force is more than the weight
 
 
 @pytest.mark.parametrize("slope_deg", [-4.0, 0.0, 4.0])

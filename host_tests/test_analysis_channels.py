@@ -36,15 +36,18 @@ def test_the_formula_on_arrays_is_the_firmwares():
 def test_channels_are_those_of_the_meter(ride, course):
     log = logs.read_log(ride.log)
     engine = replay_engine.Replay(ride.calibration.to_firmware())
-    rows, shown, trusted = [], [], []
+    rows, shown, rolling, trusted = [], [], [], []
     for row in zip(log.time_us, log.readings, (np.nan if v is None else v for v in log.speed_mps)):
         rows.append(engine.step(*row))
         shown.append(engine.meter.smooth_force[2])
+        rolling.append(engine.meter.filter.rolling)
         trusted.append(engine.meter.trusted)
     for name, column in zip(replay_engine.COLUMNS, np.transpose(rows)):
         if name not in ("static_lean_deg", "lean_formula_deg"):  # the formula: above
             assert np.max(np.abs(getattr(course, name) - column)) < 1e-5, name
     assert np.array_equal(course.shown_g, shown)
+    assert np.array_equal(course.rolling, rolling)
+    assert 0.2 < np.mean(rolling) < 0.9  # in its turns it knows
     assert np.array_equal(course.trusted, trusted)
 
 

@@ -153,6 +153,12 @@ class LeanFilter:
         """True while the bike stands still."""
         return self._rest.resting
 
+    @property
+    def rolling(self):
+        """True where the estimated speed is as sure as it must be to say that the bike does not stand."""
+        speed = self._x[V]
+        return self._p is not None and speed > ROLLING_SPEED and speed > ROLLING_SIGMAS * sqrt(self._p.rows[V][V])
+
     def update(self, force, rate, dt_us):
         """One sample: force (3, g), rate (3, rad/s), dt_us since the one before. Returns lean in degrees."""
         fx, fy, fz = force
@@ -225,8 +231,7 @@ class LeanFilter:
         roll_acceleration = (self._roll_rate - self._last_roll_rate) / seconds
         self._last_roll_rate = self._roll_rate
         rested = self._rest.resting
-        rolling = x[V] > ROLLING_SPEED and x[V] > ROLLING_SIGMAS * sqrt(self._p.rows[V][V])
-        self._rest.update(means, (x[BX], x[BY], x[BZ]), seconds, rolling)
+        self._rest.update(means, (x[BX], x[BY], x[BZ]), seconds, self.rolling)
         if self._rest.resting and not rested:
             self._stand(means)
         self._work = self._process(means, seconds, roll_acceleration)

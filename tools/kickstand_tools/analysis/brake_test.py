@@ -10,7 +10,7 @@ integrated backwards, so that the dive of the fork is not taken for braking:
 
     dq/dt = w_y sin t - w_x cos t,   dv/dt = f_z - g sin q       (as in kickstand.lean_filter)
 
-Where the log has a speed, this one is fitted to it (speed_fit.py).
+Where the log has a speed, this one is fitted to it (speed_fit.py); else it has to be plausible (plausible.py).
 """
 
 from dataclasses import dataclass
@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .channels import Array, Channels
+from .plausible import closes, plausible
 from .signals import G, integral, smoothed
 from .speed_fit import fitted_speed, speed_delay_s
 from .standstill import standing
@@ -69,7 +70,7 @@ def stops(ride: Channels) -> list[Stop]:
         gaps = np.flatnonzero(np.diff(ride.t_s[first:last]) > GAP_S)
         first += int(gaps[-1]) + 1 if len(gaps) else 0
         if start - first > 10 and last - start > 10:
-            stop = _stop(ride.part(slice(first, last)), start - first, delay_s)
+            stop = _stop(ride.part(slice(first, last)), start - first, delay_s, 0 < first == after)
             if stop:
                 found.append(stop)
         after = int(end)
@@ -86,8 +87,8 @@ def mfdd_mps2(speed_mps: Array, distance_m: Array) -> float:
     return float((3.6**2 * (vb * vb - ve * ve)) / (25.92 * (se - sb)))
 
 
-def _stop(part: Channels, rest: int, delay_s: float) -> Stop | None:
-    """part: from after the standstill before to some time into this one, which begins at index rest."""
+def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | None:
+    """part: to some time into this standstill, which begins at index rest; from_rest: from the one before."""
     time = part.t_s
     acceleration, pitch_rate, yaw_rate = _acceleration(part, rest)
     felt = integral(time, acceleration)
@@ -100,6 +101,8 @@ def _stop(part: Channels, rest: int, delay_s: float) -> Stop | None:
     fitted = fitted_speed(part, begin, speed, acceleration, delay_s)
     if fitted is not None:
         speed, known = fitted, "log"
+    elif from_rest and not closes(float(speed[0]), float(time[rest] - time[0])):
+        return None
     smooth = smoothed(np.gradient(speed, time), time)
     v = speed[begin:]
     below = np.flatnonzero(v <= 0.02 * v[0])
@@ -115,7 +118,7 @@ def _stop(part: Channels, rest: int, delay_s: float) -> Stop | None:
     side = np.radians(heading - _line(t, heading))
     # the last hundredths of the speed are lost in the fork's rebound: evenly on to zero
     tail = v[-1] / mfdd
-    return Stop(
+    stop = Stop(
         float(t[0]),
         float(t[-1] + tail),
         float(v[0]),
@@ -127,6 +130,9 @@ def _stop(part: Channels, rest: int, delay_s: float) -> Stop | None:
         float(heading[-1]),
         known,
     )
+    if known == "integrated" and not plausible(stop.initial_speed_mps, stop.side_m, stop.heading_deg):
+        return None
+    return stop
 
 
 def _acceleration(part: Channels, rest: int) -> tuple[Array, Array, Array]:

@@ -31,8 +31,8 @@ class Channels:
     """n samples each. Axes left, up, forward; lean > 0 to the right; NaN where there is no value.
 
     lateral_g: the acceleration to the left of the road's plane, (23). shown_g: forward, smoothed as on the
-    display. sigma_deg: how uncertain the lean is. resting: the bike stands still (1 or 0). sure: the meter trusts
-    its lean (1 or 0).
+    display. sigma_deg: how uncertain the lean is. resting: the bike stands still (1 or 0). rolling: by how it leans and
+    turns it surely does not (1 or 0). sure: the meter trusts its lean (1 or 0).
     """
 
     t_s: Array
@@ -50,6 +50,7 @@ class Channels:
     shown_g: Array
     sigma_deg: Array
     resting: Array
+    rolling: Array
     sure: Array
 
     @property
@@ -100,7 +101,7 @@ def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool 
     A car has no lean, and its lateral acceleration is the force to the left.
     """
     if car:
-        lean = lean * [0.0, 1.0, 0.0, 1.0, 1.0] + [np.nan, 0.0, 0.0, 0.0, 0.0]
+        lean = lean * [0.0, 1.0, 0.0, 1.0, 0.0, 1.0] + [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
     matrix = np.reshape(calibration.matrix, (3, 3))
     force = (block.readings[:, :3] * calibration.slope + calibration.offset) @ matrix.T
     rate = (block.readings[:, 4:] - calibration.bias) @ matrix.T
@@ -124,6 +125,7 @@ def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool 
         np.degrees(np.sqrt(lean[:, 2])),
         lean[:, 3],
         lean[:, 4],
+        lean[:, 5],
     )
 
 
@@ -142,12 +144,12 @@ class _Lean:
         self._engine = replay_engine.Replay(calibration.to_firmware())
 
     def follow(self, block: Block) -> Array:
-        """(n, 5): lean in degrees, forward force as shown (g), variance of the lean (rad2), at rest, trusted."""
+        """(n, 6): lean (degrees), forward force as shown (g), its variance (rad2), resting, rolling, trusted."""
         take, meter = self._engine.take, self._engine.meter
         smooth = meter.smooth_force
         rows = []
         for row in block.rows():
             take(*row)
             lean = meter.filter
-            rows.append((meter.lean_deg, smooth[2], lean.variance, lean.at_rest, meter.trusted))
+            rows.append((meter.lean_deg, smooth[2], lean.variance, lean.at_rest, lean.rolling, meter.trusted))
         return np.array(rows, dtype=float)
