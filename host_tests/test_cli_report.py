@@ -1,5 +1,6 @@
 """kickstand report and plot: what they say and draw of a ride, and what they refuse."""
 
+import io
 import json
 import re
 import struct
@@ -9,7 +10,8 @@ import command
 import numpy as np
 import pytest
 from kickstand_tools import rides
-from kickstand_tools.analysis import page, picture, plot
+from kickstand_tools.analysis import page, picture, plot, report
+from kickstand_tools.analysis.brake_test import Stop
 from kickstand_tools.analysis.channels import open_ride
 from kickstand_tools.analysis.look import look
 
@@ -43,18 +45,37 @@ def test_a_report_has_the_ride_in_figures(ride):
 
 
 def test_the_page_says_the_same(ride, monkeypatch):
-    monkeypatch.setenv("COLUMNS", "100")
+    monkeypatch.setenv("COLUMNS", "80")
     said = command.works("report", ride).out
     for words in "Max left", "Max right", "Over 40°", "Max braking", "MFDD", "km/h", "Alignment":
         assert words in said
     assert "integrated" not in said
-    assert max(len(line) for line in said.split("\n")) <= 100
+    assert max(len(line) for line in said.split("\n")) <= 80
+    assert re.search(r"^ *0:\d\d +5\d\.\d +2\.\d\d +2\d\.\d( +\d+\.\d\d){2} +\d+ +0\.\d (left|right) *$", said, re.M)
+
+
+def test_the_longest_of_stops_fits_a_line(ride):
+    from rich.console import Console
+
+    seen = look(open_ride(ride, None))
+    seen.stops = [Stop(36000.0, 36030.0, 69.4, 1000.0, 10.5, 20.5, 100.0, -12.5, 9.0, "integrated")]
+    console = Console(width=80, record=True, file=io.StringIO())
+    console.print(report.page(seen))
+    (line,) = [line for line in console.export_text().split("\n") if line.startswith("10:00:00")]
+    assert line.rstrip().endswith("12.5 right")
 
 
 def test_without_a_speed_stops_are_marked(tmp_path):
     said = command.works("report", analysis_rides.short(tmp_path)).out
-    assert "km/h*" in said
+    assert re.search(r" 5\d\.\d\* ", said)
     assert "* no speed in the log: integrated" in said
+
+
+def test_without_a_speed_it_may_be_that_nothing_can_be_told(tmp_path):
+    moving = analysis_rides.write(tmp_path, [rides.upright(4), rides.accelerate(15, 5), rides.straight(20)])
+    assert "no speed in the log: stops cannot be told" in command.works("report", moving).out
+    moving = analysis_rides.write(tmp_path, [rides.upright(4), rides.accelerate(15, 5), rides.straight(20)], speed_hz=1)
+    assert "No stop from over 10 km/h found." in command.works("report", moving).out
 
 
 def test_a_ride_without_stops(tmp_path):
@@ -86,7 +107,8 @@ def test_pictures(ride, tmp_path):
 
 @pytest.mark.parametrize(("car", "speed_hz"), [(False, 1), (False, 0), (True, 1), (True, 0)])
 def test_a_speed_is_drawn_where_there_is_one(tmp_path, car, speed_hz):
-    ride = analysis_rides.short(tmp_path, speed_hz=speed_hz)
+    straight = [rides.upright(4), rides.accelerate(15, 5), rides.straight(4), rides.brake(0, 3), rides.wait(4)]
+    ride = analysis_rides.write(tmp_path, straight, speed_hz=speed_hz)  # the bends of a motorcycle are none of a car
     cal = tmp_path / "RIDE.cal.json"
     cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle": "car" if car else "motorcycle"}))
     seen = look(open_ride(ride, cal))

@@ -10,6 +10,8 @@ from .brake_test import Stop
 from .look import Look
 from .summary import Peak
 
+RIDDEN_S = 10.0  # less is moving it about
+
 
 def as_data(seen: Look) -> dict[str, Any]:
     """What the page says, in plain figures; None where there is none."""
@@ -50,8 +52,14 @@ def page(seen: Look) -> Group:
         if any(stop.speed_from == "integrated" for stop in seen.stops):
             parts.append(Text("* no speed in the log: integrated from the acceleration", style="dim"))
     else:
-        parts += [Text(), Text("No stop from over 10 km/h found.")]
+        parts += [Text(), Text(_no_stops(seen))]
     return Group(*parts)
+
+
+def _no_stops(seen: Look) -> str:
+    if not seen.has_speed and seen.summary.riding_s > RIDDEN_S:
+        return "no speed in the log: stops cannot be told"  # there may have been some: none was sure enough
+    return "No stop from over 10 km/h found."
 
 
 def _ride(seen: Look) -> Table:
@@ -85,19 +93,20 @@ def _alignment(seen: Look) -> Text:
 
 def _stops(stops: list[Stop]) -> Table:
     table = Table(title="Stops (MFDD: UN R13)", title_justify="left", box=None, pad_edge=False, header_style="dim")
-    for name in "at", "from", "time", "distance", "MFDD", "peak", "jerk", "pulls":
-        table.add_column(name, justify="right")
+    units = {"at": "", "from": "km/h", "time": "s", "distance": "m", "MFDD": "m/s²", "peak": "m/s²", "jerk": "m/s³"}
+    for name, unit in (units | {"pulls": "m"}).items():  # one line a stop in 80 columns: no units in it
+        table.add_column(f"{name}\n{unit}", justify="right", no_wrap=True)
     for stop in stops:
         mark = "*" if stop.speed_from == "integrated" else ""
         table.add_row(
             clock(stop.start_s),
-            f"{stop.initial_speed_mps * 3.6:.1f} km/h{mark}",
-            f"{stop.duration_s:.2f} s",
-            f"{stop.distance_m:.1f} m",
-            f"{stop.mfdd_mps2:.2f} m/s²",
-            f"{stop.peak_mps2:.2f} m/s²",
-            f"{stop.jerk_mps3:.0f} m/s³",
-            f"{abs(stop.side_m):.1f} m {'left' if stop.side_m > 0 else 'right'}",
+            f"{stop.initial_speed_mps * 3.6:.1f}{mark}",
+            f"{stop.duration_s:.2f}",
+            f"{stop.distance_m:.1f}",
+            f"{stop.mfdd_mps2:.2f}",
+            f"{stop.peak_mps2:.2f}",
+            f"{stop.jerk_mps3:.0f}",
+            f"{abs(stop.side_m):.1f} {'left' if stop.side_m > 0 else 'right'}",
         )
     return table
 
