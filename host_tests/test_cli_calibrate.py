@@ -6,6 +6,7 @@ import shutil
 import command
 import numpy as np
 import pytest
+from kickstand_tools.calibration_file import read_calibration
 
 OFFSET, SLOPE = np.array([0.06, -0.04, 0.11]), np.array([1.02, 0.97, 0.99])
 BIAS = (4.0, -11.0, 0.7)
@@ -111,6 +112,7 @@ def test_two_alone_assumes_a_perfect_accelerometer(tmp_path):
     data = json.loads((tmp_path / "CAL.json").read_text())
     assert (data["accel_offset_g"], data["accel_slope"]) == ([0, 0, 0], [1, 1, 1])
     assert np.array(data["vehicle_from_sensor"]) == pytest.approx(np.eye(3), abs=0.005)
+    assert data["kickstand_side"] == read_calibration(tmp_path / "CAL.json").side == "left"
     assert "warning: no six-position calibration" in result.out
 
 

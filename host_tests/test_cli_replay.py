@@ -4,6 +4,7 @@ import csv
 import gzip
 import json
 
+import analysis_rides
 import command
 import engines
 import numpy as np
@@ -96,6 +97,20 @@ def test_the_engines_agree(tmp_path):
         results.append(read(tmp_path / f"{engine}.csv"))
     for name in replay_engine.COLUMNS:
         assert np.max(np.abs(results[0][name] - results[1][name])) < 0.002, name
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_forward_and_backward_exchanged_are_remarked_on(tmp_path, engine):
+    log = analysis_rides.short(tmp_path, speed_hz=1)
+    cal = tmp_path / "CAL.json"
+    line = f"warning: {log}: forward and backward are exchanged: calibrate two --side left?"
+    for turned, remark in (1, ""), (-1, line):
+        matrix = [[turned, 0, 0], [0, 1, 0], [0, 0, turned]]
+        data = analysis_rides.CALIBRATION | {"vehicle_from_sensor": matrix, "kickstand_side": "right"}
+        cal.write_text(json.dumps(data))
+        said = command.works("replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv", "--engine", engine)
+        assert said.err.count("\n") == bool(remark)
+        assert said.err.startswith(remark)
 
 
 def test_without_an_emulator_the_engine_is_refused(tmp_path, monkeypatch):

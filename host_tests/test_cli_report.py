@@ -78,6 +78,59 @@ def test_without_a_speed_it_may_be_that_nothing_can_be_told(tmp_path):
     assert "No stop from over 10 km/h found." in command.works("report", moving).out
 
 
+def turned_round(directory, tilt_deg=0.0):
+    """CAL.json with forward and left the wrong way; tilt_deg: and up that far off, as with swapped poses."""
+    s, c = np.sin(np.radians(tilt_deg)), np.cos(np.radians(tilt_deg))
+    cal = directory / "wrong.json"
+    matrix = [[-c, s, 0], [s, c, 0], [0, 0, -1]]
+    data = analysis_rides.CALIBRATION | {"vehicle_from_sensor": matrix, "kickstand_side": "left"}
+    cal.write_text(json.dumps(data))
+    return cal
+
+
+def test_a_kickstand_on_the_other_side_is_told(ride, tmp_path):
+    cal = turned_round(tmp_path)
+    line = "forward and backward are exchanged: calibrate two --side right?"
+    said = command.works("report", ride, "--calibration", cal)
+    assert line in said.out.split("\n")
+    assert "No stop" not in said.out
+    assert "MFDD" not in said.out  # of the wrong way round, no figure is right
+    data = json.loads(command.works("report", ride, "--calibration", cal, "--json").out)
+    assert (data["remark"], data["stops"]) == (line, [])
+    assert f"{line}\n" in command.works("plot", ride, "--calibration", cal, "--out", tmp_path / "pictures").err
+    car = tmp_path / "car.json"
+    car.write_text(json.dumps(json.loads(cal.read_text()) | {"vehicle": "car"}))
+    assert "exchanged: calibrate drive again?" in command.works("report", ride, "--calibration", car).out
+
+
+def test_swapped_poses_are_told(tmp_path):
+    segments = [rides.upright(4)]
+    for _ in range(2):
+        segments += [rides.accelerate(16, 5), rides.straight(8), rides.brake(0, 4), rides.wait(4)]
+    ride = analysis_rides.write(tmp_path, segments, speed_hz=1)
+    cal = turned_round(tmp_path, 11.0)
+    said = " ".join(command.works("report", ride, "--calibration", cal).out.split())
+    assert re.search(r"roll [+-]1[01]\.\d°.*: were the poses swapped\?", said)
+    assert "forward and backward are exchanged: were the poses swapped?" in said
+    right = json.loads(cal.read_text())
+    s, c = np.sin(np.radians(6.0)), np.cos(np.radians(6.0))
+    right["vehicle_from_sensor"] = [[c, s, 0], [-s, c, 0], [0, 0, 1]]
+    cal.write_text(json.dumps(right))
+    said = " ".join(command.works("report", ride, "--calibration", cal).out.split())
+    assert ": was it held upright?" in said
+    assert "swapped" not in said
+
+
+def test_a_stop_that_only_the_speed_knows(ride, tmp_path):
+    """Forward is across: neither right nor exchanged."""
+    cal = tmp_path / "across.json"
+    across = {"vehicle_from_sensor": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]}
+    cal.write_text(json.dumps(analysis_rides.CALIBRATION | across))
+    said = command.works("report", ride, "--calibration", cal).out
+    assert "No stop" not in said
+    assert "The speed falls to a stop, the force says otherwise" in " ".join(said.split())
+
+
 def test_a_ride_without_stops(tmp_path):
     ride = analysis_rides.write(tmp_path, [rides.upright(6)])
     assert "No stop" in command.works("report", ride).out

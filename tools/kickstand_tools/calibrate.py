@@ -111,7 +111,7 @@ def two(
     if not result.six_done:
         say("warning: no six-position calibration: an offset of 50 mg is 3 degrees of lean")
     return CalibrationFile(
-        result.offset, result.slope, bias, list(matrix), True, result.six_done, result.notes
+        result.offset, result.slope, bias, list(matrix), True, result.six_done, result.notes, side=side
     )
 
 

@@ -27,6 +27,7 @@ class CalibrationFile:
     offset (3, g), slope (3), bias (3, deg/s), matrix (9, row-major, rows left, up, forward).
     aligned: the matrix was measured, not left as it was.  vehicle: "car" or "motorcycle" if it was measured by driving,
     else "".  notes: what else stands in the file.  trim: degrees that the upright of the alignment was found to be off.
+    side: "left" or "right", where the kickstand leaned to, or "".
     """
 
     offset: list[float] = field(default_factory=lambda: [0.0] * 3)
@@ -38,6 +39,7 @@ class CalibrationFile:
     notes: dict[str, Any] = field(default_factory=dict)
     trim: float = 0.0
     vehicle: str = ""
+    side: str = ""
 
     def parameters(self) -> list[float]:
         """As Calibration.parameters()."""
@@ -84,6 +86,7 @@ def read_calibration(path: Path) -> CalibrationFile:
     calibration.aligned = data.get("aligned", matrix != _IDENTITY) is True
     neutral = calibration.offset == [0.0] * 3 and calibration.slope == [1.0] * 3
     calibration.vehicle = data["vehicle"] if data.get("vehicle") in ("car", "motorcycle") else ""
+    calibration.side = data["kickstand_side"] if data.get("kickstand_side") in ("left", "right") else ""
     calibration.six_done = data.get("six_positions", not neutral) is True
     return calibration
 
@@ -103,6 +106,8 @@ def write_calibration(path: Path, calibration: CalibrationFile) -> None:
     }
     if calibration.vehicle:
         data["vehicle"] = calibration.vehicle
+    if calibration.side:
+        data["kickstand_side"] = calibration.side
     text = json.dumps(data | calibration.notes, indent=2) + "\n"
 
     def write(temporary: Path) -> None:

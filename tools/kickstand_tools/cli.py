@@ -315,8 +315,11 @@ def plot(ride: Path, calibration: Path | None, out: Path) -> None:
     from .analysis.look import look
 
     plot.check(out)
-    for path in plot.draw(look(open_ride(ride, calibration)), out):
+    seen = look(open_ride(ride, calibration))
+    for path in plot.draw(seen, out):
         click.echo(f"written: {path}")
+    if seen.exchanged:
+        click.echo(f"warning: {ride}: {seen.exchanged}", err=True)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -8,9 +8,12 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+import numpy as np
+
 from . import firmware_path, unix_port
 from .calibration_file import CalibrationFile
 from .errors import InputError
+from .forward_sign import ForwardSign, exchanged_line
 from .logs import Block, read_blocks, write_table
 from .progress import Bar
 from .rate_unit import RateUnit
@@ -20,27 +23,33 @@ from . import replay_engine  # noqa: E402
 
 _CHUNK = 500  # samples between two steps of the progress bar of an emulated Pico
 
+_FORWARD = replay_engine.COLUMNS.index("forward_g")
+
 Row = tuple[float, ...]
 
 
 def replay(log: Path, calibration: CalibrationFile, engine: str, out: Path) -> int:
     """Write LEAN.csv: the log's own times, then replay_engine.COLUMNS. Returns how many samples.
 
-    Raises InputError, also where the engine is not to be had. Memory does not grow with the log, but on the
-    emulated Pico, which no long log is for.
+    Raises InputError, also where the engine is not to be had. Memory does not
+    grow with the log, but on the emulated Pico, which no long log is for.
     """
     if engine == "micropython" and not unix_port.available():
         raise InputError("engine micropython has no package for this system: use --engine cpython")
-    count = 0
+    count, sign, car = 0, ForwardSign(), calibration.vehicle == "car"
 
     def rows() -> Iterator[list[str]]:
         nonlocal count
         for block, results in _RUN[engine](log, calibration):
             count += len(results)
+            forward = np.array([row[_FORWARD] for row in results])
+            sign.add(block.time_us.astype(float) * 1e-6, forward, block.speed_mps[: len(forward)])
             for time, row in zip(block.time_text, results, strict=True):
                 yield [time, *(f"{value:.5f}" for value in row)]
 
     write_table(out, ("t_s", *replay_engine.COLUMNS), rows())
+    if calibration.aligned and sign.exchanged:
+        warn(f"{log}: {exchanged_line(car, calibration.side)}")
     return count
 
 
@@ -55,7 +64,12 @@ def with_progress(path: Path, what: str) -> Iterator[Block]:
             bar.advance(block.bytes_read - before)
             before = block.bytes_read
     if rates.remark:
-        print(f"warning: {path}: {rates.remark}", file=sys.stderr)
+        warn(f"{path}: {rates.remark}")
+
+
+def warn(remark: str) -> None:
+    """A line on standard error."""
+    print(f"warning: {remark}", file=sys.stderr)
 
 
 def _cpython(log: Path, calibration: CalibrationFile) -> Iterator[tuple[Block, list[Row]]]:

@@ -58,7 +58,9 @@ def quality(ride: Channels, standing: NDArray[np.bool_]) -> Quality:
     moving = means(standing.astype(float)) == 0.0
     still = means(standing.astype(float)) == 1.0
     static = np.degrees(np.arctan2(left, up))
-    straight = moving & (np.abs(yaw_rate) < STRAIGHT_DPS) & (np.abs(static) < STRAIGHT_DEG)
+    ahead = moving & (np.abs(yaw_rate) < STRAIGHT_DPS)
+    usual = float(np.median(static[ahead])) if np.any(ahead) else 0.0  # upright, however far off "up" is
+    straight = ahead & (np.abs(static - usual) < STRAIGHT_DEG)
     straight_s = float(np.count_nonzero(straight)) * n * step_s
     roll = pitch = yaw = None
     if straight_s >= ENOUGH_S:

@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from ..forward_sign import ForwardSign, exchanged_line
 from .alignment_quality import Quality, quality
 from .brake_test import RATE_S, Stop, stops
 from .channels import Channels, Ride
@@ -20,6 +21,8 @@ class Look:
     course: Channels
     stops: list[Stop]
     quality: Quality
+    forward: float | None  # how well forward is the way the speed grows: 1, or -1 where it is backward
+    exchanged: str  # what to say where forward is backward; its stops are none
 
     @property
     def has_speed(self) -> bool:
@@ -29,12 +32,17 @@ class Look:
 
 def look(ride: Ride) -> Look:
     """Read the ride through. Raises InputError."""
-    summary = Summary()
+    summary, sign = Summary(), ForwardSign()
 
     def blocks() -> Iterator[Channels]:
         for _, block in ride.blocks("reading"):
             summary.add(block)
+            sign.add(block.t_s, block.forward_g, block.speed_mps)
             yield block
 
     course = joined(list(thinned(blocks(), RATE_S)))
-    return Look(ride, summary, course, stops(course), quality(course, standing(course)))
+    found = quality(course, standing(course))
+    if not sign.exchanged:
+        return Look(ride, summary, course, stops(course), found, sign.correlation, "")
+    line = exchanged_line(ride.car, ride.calibration.side, found.roll_deg)
+    return Look(ride, summary, course, [], found, sign.correlation, line)

@@ -6,8 +6,10 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
+from ..forward_sign import SWAPPED_DEG
 from .brake_test import Stop
 from .look import Look
+from .speed_stops import stops_by_speed
 from .summary import Peak
 
 RIDDEN_S = 10.0  # less is moving it about
@@ -36,6 +38,7 @@ def as_data(seen: Look) -> dict[str, Any]:
         for name, value in vars(quality).items()
         if not name.endswith(("lateral_g", "forward_g"))
     }
+    data["remark"] = seen.exchanged
     data["stops"] = [
         {name: value if isinstance(value, str) else round(value, 3) for name, value in vars(stop).items()}
         | {"duration_s": round(stop.duration_s, 3)}
@@ -52,13 +55,15 @@ def page(seen: Look) -> Group:
         if any(stop.speed_from == "integrated" for stop in seen.stops):
             parts.append(Text("* no speed in the log: integrated from the acceleration", style="dim"))
     else:
-        parts += [Text(), Text(_no_stops(seen))]
+        parts += [Text(), Text(seen.exchanged or _no_stops(seen))]
     return Group(*parts)
 
 
 def _no_stops(seen: Look) -> str:
     if not seen.has_speed and seen.summary.riding_s > RIDDEN_S:
         return "no speed in the log: stops cannot be told"  # there may have been some: none was sure enough
+    if stops_by_speed(seen.course):
+        return "The speed falls to a stop, the force says otherwise: is the calibration this ride's?"
     return "No stop from over 10 km/h found."
 
 
@@ -85,7 +90,11 @@ def _alignment(seen: Look) -> Text:
     quality = seen.quality
     said = "Alignment: not enough straight riding to tell how far it is off."
     if quality.angles:
-        said = f"Alignment: it seems off by {', '.join(quality.angles)}."
+        said = f"Alignment: it seems off by {', '.join(quality.angles)}"
+        far = abs(quality.roll_deg or 0.0) > SWAPPED_DEG and not seen.ride.car
+        # swapped poses turn forward round too
+        swapped = far and (seen.forward is None or seen.forward < 0.0)
+        said += ": were the poses swapped?" if swapped else ": was it held upright?" if far else "."
     if quality.gravity_g is not None:
         said += f" At rest the force is {quality.gravity_g:.3f} g."
     return Text(said)
