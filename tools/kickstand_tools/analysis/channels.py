@@ -111,7 +111,7 @@ def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool 
     return Channels(
         block.time_us.astype(float) * 1e-6,
         lean[:, 0],
-        formula_lean_deg(left, up, rate[:, 1]),
+        np.full(len(rate), np.nan) if car else formula_lean_deg(left, up, rate[:, 1]),
         left,
         up,
         forward,
