@@ -114,6 +114,45 @@ def test_vbo_by_racelogics_rules(ride, shown, tmp_path):
     assert (values["latacc"][right] < -0.5).all()  # > 0 is to the left
 
 
+def test_vbo_makes_nothing_up(tmp_path):
+    """What the log has not, has no column; but velocity, which has to be there, has a comment."""
+    bare = analysis_rides.short(tmp_path)
+    full = tmp_path / "full.csv"
+    header, *rows = bare.read_text().split("\n")[:-1]
+    full.write_text("\n".join([header + ",temp_c,speed_mps", *[row + ",21.5,12.0" for row in rows]]) + "\n")
+    car = tmp_path / "car.json"
+    car.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle": "car"}))
+    without = "no speed in the log"
+    for log, more, missing in (
+        (bare, (), {"temperature", without}),
+        (full, ("--calibration", tmp_path / "RIDE.cal.json"), set()),
+        (full, ("--calibration", car), {"lean-angle"}),
+    ):
+        command.works("export", log, *more, "--to", "vbo", "--out", tmp_path / "out.vbo")
+        sections, data = read_vbo(tmp_path / "out.vbo")
+        there = {"lean-angle", "yaw-rate", "roll-rate", "temperature"} - missing
+        assert set(sections["header"][9:]) == set(data.columns[9:]) == there
+        assert len(sections["channel units"]) == len(there)
+        assert not data.isna().any().any()  # as many cells as columns
+        assert any(line.startswith(without) for line in sections["comments"]) is (without in missing)
+        assert set(data["velocity"].astype(float)) == {0.0 if without in missing else 43.2}
+        assert ("lean-angle" in there) is any("lean-angle" in line for line in sections["comments"])
+
+
+@pytest.mark.parametrize("form", ["csv", "racechrono", "parquet"])
+def test_a_car_has_no_lean_as_in_replay(ride, tmp_path, form):
+    car, out = tmp_path / "car.json", tmp_path / "out"
+    car.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle": "car"}))
+    command.works("export", ride, "--calibration", car, "--to", form, "--out", out)
+    if form == "racechrono":
+        got = pandas.read_csv(out, skiprows=out.read_text().split("\n").index("") + 1)[2:]
+        assert got["lean_angle"].isna().all()
+        return
+    got = pandas.read_csv(out) if form == "csv" else pandas.read_parquet(out)
+    assert got[["lean_deg", "lean_formula_deg"]].isna().all().all()
+    assert got[["left_g", "up_g", "forward_g", "lateral_g"]].notna().all().all()
+
+
 def test_racechrono_csv_v3(ride, shown, tmp_path):
     path = export(ride, "racechrono", tmp_path)
     lines = path.read_text().split("\n")

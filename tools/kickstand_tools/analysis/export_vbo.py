@@ -4,18 +4,20 @@ Sections, standard channels, and units for the others alone, as in
 https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.html; columns and their signs as in
 https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and the VBOX HD Lite's user guide:
 time HHMMSS.SS, velocity in km/h, latitude and longitude in minutes, long accel > 0 forward, lat accel > 0 to the
-left, others with mantissa and exponent. Kickstand has no satellites: their number and the position are 0.
+left, others with mantissa and exponent. Kickstand has no satellites: their number and the position are 0. Any other
+column that a log has nothing for is left out; velocity, which has to be there, is then 0 and a comment says so.
 """
 
 import time
 from collections.abc import Iterator
+from itertools import chain
 from pathlib import Path
 
 import numpy as np
 
 from .channels import Channels
 
-# (title in [header], name in [column names]); the standard ones first, and the units of the others
+# (title in [header], name in [column names]); of the others (both, unit, channel)
 STANDARD = (
     ("satellites", "sats"),
     ("time", "time"),
@@ -27,47 +29,55 @@ STANDARD = (
     ("long accel g", "longacc"),
     ("lat accel g", "latacc"),
 )
-OTHER = (("lean-angle", "deg"), ("yaw-rate", "deg/s"), ("roll-rate", "deg/s"), ("temperature", "C"))
-_ROW = "000 %09.2f +00000.000000 +00000.000000 %07.3f 000.00 +00000.00 %+07.3f %+07.3f" + " %+.6E" * len(OTHER) + "\r\n"
+OTHER = (
+    ("lean-angle", "deg", "lean_deg"),
+    ("yaw-rate", "deg/s", "yaw_rate_dps"),
+    ("roll-rate", "deg/s", "roll_rate_dps"),
+    ("temperature", "C", "temp_c"),
+)
+_STANDARD_ROW = "000 %09.2f +00000.000000 +00000.000000 %07.3f 000.00 +00000.00 %+07.3f %+07.3f"
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """Lines end in CR and LF; the date and each row's time are UTC. Without a speed in the log velocity is 0."""
-    titles = [title for title, _ in STANDARD] + [name for name, _ in OTHER]
+    """Lines end in CR and LF; the date and each row's time are UTC."""
+    first = next(blocks)  # a channel that a log does not have is missing from its beginning
+    other = [column for column in OTHER if not np.all(np.isnan(getattr(first, column[2])))]
+    lean = "lean-angle in degrees, > 0 to the right; " if OTHER[0] in other else ""
+    comments = [f"Kickstand: {lean}no satellites", "Log Rate (Hz) : at most 100.00"]
+    if np.all(np.isnan(first.speed_mps)):
+        comments.append("no speed in the log: velocity 0 stands for none")
+    row_form = _STANDARD_ROW + " %+.6E" * len(other) + "\r\n"
     head = [
         time.strftime("File created on %d/%m/%Y at %H:%M:%S", time.gmtime(start_s)),
         "",
         "[header]",
-        *titles,
+        *[title for title, _ in STANDARD],
+        *[name for name, _, _ in other],
         "",
         "[channel units]",
-        *[unit for _, unit in OTHER],
+        *[unit for _, unit, _ in other],
         "",
         "[comments]",
-        "Kickstand: lean-angle in degrees, > 0 to the right; no satellites",
-        "Log Rate (Hz) : at most 100.00",
+        *comments,
         "",
         "[column names]",
-        " ".join([name for _, name in STANDARD] + [name for name, _ in OTHER]),
+        " ".join([name for _, name in STANDARD] + [name for name, _, _ in other]),
         "",
         "[data]",
     ]
     with open(path, "w", encoding="utf-8", newline="") as file:
         file.write("\r\n".join(head) + "\r\n")
-        for block in blocks:
+        for block in chain([first], blocks):
             table = np.column_stack(
                 (
                     _clock(block.t_s + start_s),
                     block.speed_mps * 3.6,
                     block.forward_g,
                     block.lateral_g,
-                    block.lean_deg,
-                    block.yaw_rate_dps,
-                    block.roll_rate_dps,
-                    block.temp_c,
+                    *[getattr(block, channel) for _, _, channel in other],
                 )
             )
-            file.write("".join([_ROW % tuple(row) for row in np.nan_to_num(table).tolist()]))
+            file.write("".join([row_form % tuple(row) for row in np.nan_to_num(table).tolist()]))
 
 
 def _clock(seconds: np.ndarray) -> np.ndarray:
