@@ -100,22 +100,6 @@ def test_the_engines_agree(tmp_path):
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
-def test_a_car_has_no_lean(tmp_path, engine):
-    """Those cells are empty; the rest is as it was, and as export has it."""
-    log, cal = ride(tmp_path / "log.csv", seconds=3.0), command.write_cal(tmp_path / "CAL.json")
-    tables = []
-    for _ in range(2):
-        command.works("replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv", "--engine", engine)
-        tables.append(list(csv.DictReader((tmp_path / "LEAN.csv").open())))
-        cal.write_text(json.dumps(json.loads(cal.read_text()) | {"vehicle": "car"}))
-    assert list(tables[0][0]) == list(tables[1][0])
-    assert len(tables[0]) == len(tables[1])
-    for bike, car in zip(*tables):
-        assert bike["lean_deg"]
-        assert car == bike | {"lean_deg": "", "lean_formula_deg": ""}
-
-
-@pytest.mark.parametrize("engine", engines.ENGINES)
 def test_forward_and_backward_exchanged_are_remarked_on(tmp_path, engine):
     log = analysis_rides.short(tmp_path, speed_hz=1)
     cal = tmp_path / "CAL.json"

@@ -24,7 +24,6 @@ from . import replay_engine  # noqa: E402
 _CHUNK = 500  # samples between two steps of the progress bar of an emulated Pico
 
 _FORWARD = replay_engine.COLUMNS.index("forward_g")
-_LEANS = [1 + replay_engine.COLUMNS.index(name) for name in ("lean_deg", "lean_formula_deg")]  # after t_s
 
 Row = tuple[float, ...]
 
@@ -32,12 +31,12 @@ Row = tuple[float, ...]
 def replay(log: Path, calibration: CalibrationFile, engine: str, out: Path) -> int:
     """Write LEAN.csv: the log's own times, then replay_engine.COLUMNS. Returns how many samples.
 
-    A car has no lean: its cells are empty. Raises InputError, also where the engine is not to be had. Memory does not
-    grow with the log, but on the emulated Pico, which no long log is for.
+    Raises InputError, also where the engine is not to be had. Memory does not grow with the log, but on the
+    emulated Pico, which no long log is for.
     """
     if engine == "micropython" and not unix_port.available():
         raise InputError("engine micropython has no package for this system: use --engine cpython")
-    count, sign, car = 0, ForwardSign(), calibration.vehicle == "car"
+    count, sign = 0, ForwardSign()
 
     def rows() -> Iterator[list[str]]:
         nonlocal count
@@ -46,12 +45,12 @@ def replay(log: Path, calibration: CalibrationFile, engine: str, out: Path) -> i
             forward = np.array([row[_FORWARD] for row in results])
             sign.add(block.time_us.astype(float) * 1e-6, forward, block.speed_mps[: len(forward)])
             for time, row in zip(block.time_text, results, strict=True):
-                cells = [time, *(f"{value:.5f}" for value in row)]
-                yield cells if not car else [cell if k not in _LEANS else "" for k, cell in enumerate(cells)]
+                yield [time, *(f"{value:.5f}" for value in row)]
 
     write_table(out, ("t_s", *replay_engine.COLUMNS), rows())
     if calibration.aligned and sign.exchanged:
-        warn(f"{log}: {exchanged_line(car, calibration.side)}")
+        line = exchanged_line(calibration.vehicle == "car", calibration.side)
+        warn(f"{log}: {line}")
     return count
 
 
