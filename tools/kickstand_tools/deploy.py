@@ -12,7 +12,7 @@ from pathlib import Path
 from mpremote.transport import TransportError, TransportExecError
 from mpremote.transport_serial import SerialTransport
 
-from . import bytecode, firmware_path
+from . import bytecode, config_check, firmware_path
 from .errors import InputError, cause
 from .ports import find_port, why_closed
 from .progress import Bar
@@ -76,11 +76,16 @@ def flash(port: str | None, replace_config: bool, say: Print) -> None:
     """Bring a board's files up to date, verify them and restart it. Raises InputError."""
     with connected(port) as (transport, name):
         say(f"{_describe(transport, name)} on {name}")
+        config = firmware_path.config()
+        if replace_config or not transport.fs_exists(CONFIG):
+            say(f"config.py is {config}")
+            _check(config, transport)
         try:
             wanted = contents(_mpy(transport))
         except bytecode.CannotCompile as reason:
             say(f"note: {reason}: it gets the sources, and starts more slowly")
             wanted = contents(None)
+        wanted[CONFIG] = config.read_bytes()
         install(transport, wanted, replace_config, say)
         restart(transport)
         say("restarted: the display shows the rest")
@@ -193,6 +198,15 @@ def _describe(transport: SerialTransport, name: str) -> str:
 def _mpy(transport: SerialTransport) -> int:
     """Which .mpy files it takes; 0: none."""
     return int(transport.eval("getattr(__import__('sys').implementation, '_mpy', 0)"))
+
+
+def _check(config: Path, transport: SerialTransport) -> None:
+    """Refuse a config.py that the board would not take; what runs there now goes on."""
+    try:
+        config_check.refuse_faulty(config, str(transport.eval("__import__('sys').platform")))
+    except InputError:
+        restart(transport)
+        raise
 
 
 def _survey(transport: SerialTransport) -> dict[str, tuple[int, bytes]]:
