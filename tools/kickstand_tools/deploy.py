@@ -169,6 +169,12 @@ def connected(port: str | None) -> Iterator[tuple[SerialTransport, str]]:
             transport.close()  # its port may be gone, or just restarting
 
 
+def refuse_absent(reason: str, name: str) -> None:
+    """Raise InputError if this error of the board at that port says that it has no firmware."""
+    if "no module named 'kickstand'" in reason:
+        raise InputError(f"Kickstand is not on the board at {name}: kickstand flash puts it there")
+
+
 def _enter(transport: SerialTransport, name: str) -> None:
     """Ctrl-C, then a soft reset into the raw prompt, which leaves main.py alone."""
     for last in (False, True):  # a board that resets when its port is opened is still starting the first time
@@ -217,8 +223,7 @@ def _survey(transport: SerialTransport) -> dict[str, tuple[int, bytes]]:
 def _status_text(transport: SerialTransport, name: str) -> str:
     out, error = transport.exec_raw("import kickstand\nkickstand.status()", timeout=_STATUS_S)
     reason = _last_line(error.decode(errors="replace"))
-    if "no module named 'kickstand" in reason:
-        raise InputError(f"Kickstand is not on the board at {name}: kickstand flash puts it there")
+    refuse_absent(reason, name)
     if error:
         raise InputError(
             f"the board cannot tell its status ({reason}): bring it up to date with kickstand flash"

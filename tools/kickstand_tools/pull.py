@@ -13,7 +13,7 @@ from mpremote.transport_serial import SerialTransport
 
 from . import ride_log
 from .board_console import BrokenOff, lines
-from .deploy import connected, restart
+from .deploy import connected, refuse_absent, restart
 from .errors import InputError
 from .progress import Bar
 from .ride_blocks import CUT_SHORT, Block, read
@@ -91,6 +91,7 @@ def _list(transport: SerialTransport, name: str) -> tuple[str, dict[int, list[_P
         reason = error.decode(errors="replace").strip().rpartition("\n")[2]
         if "CardError" in reason or "SettingsError" in reason:
             raise InputError(f"{name}: {reason.partition(': ')[2]}")
+        refuse_absent(reason, name)
         raise InputError(f"the board at {name} cannot tell its rides ({reason}): kickstand flash brings it up to date")
     directory, *parts = map(ast.literal_eval, listed.decode().splitlines())
     in_order = sorted(_Part(*part) for part in parts)
