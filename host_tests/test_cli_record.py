@@ -4,7 +4,6 @@ import base64
 import contextlib
 import functools
 import gzip
-import io
 import json
 import os
 import signal
@@ -18,6 +17,7 @@ import ride_writer
 from kickstand_tools import deploy, record
 from kickstand_tools.logs import read_log
 from serial.tools import list_ports
+from watched import Watched, watched
 
 
 class Stream(fake_board.Serial):
@@ -130,31 +130,11 @@ def test_under_nohup_a_closed_terminal_is_not_heard(streaming, tmp_path):
     assert "the board says nothing any more" in result.err
 
 
-class Terminal(io.StringIO):
-    """Standard error that someone watches; closed: until it goes away."""
-
-    closed_after = 10**9
-
-    def isatty(self):
-        return True
-
-    def write(self, text):
-        if self.tell() > self.closed_after:
-            raise OSError(5, "Input/output error")
-        return super().write(text)
-
-
-def watched(monkeypatch, terminal, *arguments):
-    monkeypatch.setenv("TERM", "xterm")
-    monkeypatch.setattr(command.io, "StringIO", lambda: terminal)
-    return command.works(*arguments)
-
-
 @pytest.mark.parametrize(("aligned", "words"), [(True, "lean "), (False, "not aligned")])
 def test_the_lean_is_shown_live_once_there_is_one(aligned, words, streaming, tmp_path, monkeypatch):
     monkeypatch.setattr(ride_writer, "calibration", functools.partial(calibration, ride_writer.calibration(), aligned))
     streaming(half_seconds(3)[0], "ctrl-c")
-    shown = watched(monkeypatch, Terminal(), "record", "--out", tmp_path / "ride.csv").err
+    shown = watched(monkeypatch, Watched(), "record", "--out", tmp_path / "ride.csv")
     assert words in shown
     assert ("deg" in shown) is aligned
     assert "readings/s" in shown
@@ -168,7 +148,7 @@ def calibration(made, aligned, _trim_deg):
 def test_a_terminal_that_goes_away_costs_nothing(streaming, tmp_path, monkeypatch):
     data, turns = half_seconds(6)
     streaming(data, "ctrl-c")
-    terminal = Terminal()
+    terminal = Watched()
     terminal.closed_after = 300
     with contextlib.suppress(OSError):  # its last words have nowhere to go
         watched(monkeypatch, terminal, "record", "--out", tmp_path / "ride.csv")

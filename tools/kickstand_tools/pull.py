@@ -15,6 +15,7 @@ from . import ride_log
 from .board_console import BrokenOff, lines
 from .deploy import connected, refuse_absent, restart
 from .errors import InputError
+from .output import check_directory
 from .progress import Bar
 from .ride_blocks import CUT_SHORT, Block, read
 
@@ -61,8 +62,7 @@ def pull(port: str | None, out: Path, delete: bool, say: Print, warn: Print) -> 
 
     delete: afterwards remove from the board those that came over whole.
     """
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out} is not a directory: give --out the name of one")
+    check_directory(out)
     if not out.parent.is_dir():
         raise InputError(f"{out}: there is no directory {out.parent}: make it first")
     with connected(port) as (transport, name):
