@@ -28,9 +28,9 @@ class Result:
     err: str
 
 
-def run(*arguments: object) -> Result:
-    """The exit status of `kickstand arguments...` and what it printed."""
-    out, err = io.StringIO(), io.StringIO()
+def run(*arguments: object, err: io.StringIO | None = None) -> Result:
+    """The exit status of `kickstand arguments...` and what it printed. err: its standard error."""
+    out, err = io.StringIO(), err or io.StringIO()
     with (
         pytest.raises(SystemExit) as leaving,
         contextlib.redirect_stdout(out),
@@ -42,9 +42,9 @@ def run(*arguments: object) -> Result:
     return Result(code or 0, out.getvalue(), err.getvalue())
 
 
-def works(*arguments: object) -> Result:
+def works(*arguments: object, err: io.StringIO | None = None) -> Result:
     """run() of something that has to succeed."""
-    result = run(*arguments)
+    result = run(*arguments, err=err)
     assert result.status == 0, result.err
     return result
 

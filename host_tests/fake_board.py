@@ -32,7 +32,7 @@ class FakeBoard(Transport):
         self.on_write: Callable[[str, bytes], bytes] = lambda _path, data: data
         self.modules: dict[str, Any] = {
             "os": self._os(),
-            "sys": types.SimpleNamespace(implementation=_implementation(python, mpy)),
+            "sys": types.SimpleNamespace(implementation=_implementation(python, mpy), platform="rp2"),
         }
 
         def imports(name: str, *rest: Any) -> Any:

@@ -255,7 +255,7 @@ def test_a_named_port_is_taken_as_it_is(board, monkeypatch):
     ("port", "words"),
     [
         ("/dev/tty-no-such-port", "there is no port /dev/tty-no-such-port"),
-        ("socket://127.0.0.1:1", "cannot be opened"),
+        ("socket://127.0.0.1:1", "nothing listens at socket://127.0.0.1:1: is kickstand emulate running?"),
         ("socket://nowhere", "cannot be opened"),
         ("telepathy://board", "is no port"),
     ],

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from kickstand_tools import deploy, firmware_path
+from kickstand_tools.errors import extra
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -47,6 +48,13 @@ def test_the_wheel_carries_the_firmware(tmp_path):
     assert "kickstand_tools/cli.py" in names
     assert {name.split("/")[0] for name in names} == {"kickstand_tools", "kickstand-0.2.0.dist-info"}
     assert not [name for name in names if "__pycache__" in name or name.endswith(".cal")]
+
+
+def test_an_installation_stays_that_of_the_checkout():
+    """Without -e `flash --config` would copy a config.py that the rider has never edited."""
+    told = re.findall(r"pip install\b.*", (ROOT / "README.md").read_text(encoding="utf-8")) + [extra("rides")]
+    assert len(told) >= 4
+    assert all("pip install -e " in line for line in told)
 
 
 def test_an_installed_wheel_finds_its_firmware(tmp_path, monkeypatch):

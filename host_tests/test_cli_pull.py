@@ -132,7 +132,7 @@ def test_a_ride_whose_beginning_is_gone(board, tmp_path):
 
 def test_a_board_without_rides_or_without_the_recorder(board, tmp_path):
     assert "no rides on the board" in command.works("pull", "--out", tmp_path / "out").out
-    del board.modules["kickstand"]
+    del board.modules["kickstand"].ride_ring
     words = "kickstand flash brings it up to date"
     command.refused(tmp_path, "pull", "--out", tmp_path / "out", words=words)
     command.refused(tmp_path, "pull", "--out", tmp_path / "out" / "a" / "b", words="make it first")

@@ -1,6 +1,8 @@
 """kickstand record, from an imagined board that streams: a log as it comes, ended by Ctrl-C or by the board."""
 
 import base64
+import contextlib
+import functools
 import gzip
 import json
 import os
@@ -15,10 +17,12 @@ import ride_writer
 from kickstand_tools import deploy, record
 from kickstand_tools.logs import read_log
 from serial.tools import list_ports
+from watched import Watched, watched
 
 
 class Stream(fake_board.Serial):
-    """A serial port: what the board says, and what it does then. At the end: "ctrl-c", "error", "unplug", "silence"."""
+    """A serial port: what the board says, and what it does then. At the end: "ctrl-c" or another signal, "error",
+    "unplug", "silence"."""
 
     def __init__(self, blocks, end, last=b""):
         super().__init__()
@@ -31,6 +35,8 @@ class Stream(fake_board.Serial):
             end, self.end = self.end, None
             if end == "ctrl-c":
                 os.kill(os.getpid(), signal.SIGINT)
+            elif isinstance(end, signal.Signals):
+                os.kill(os.getpid(), end)
             elif end == "error":
                 self.data = b"\x04Traceback (most recent call last):\r\nValueError: bad pin\r\n\x04>"
             elif end == "unplug":
@@ -90,6 +96,82 @@ def test_ctrl_c_ends_a_whole_log(streaming, tmp_path):
     cal = json.loads((tmp_path / "ride.cal.json").read_text())
     assert cal["accel_slope"] == pytest.approx([1.01, 0.99, 1.0])
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.fixture
+def signals():
+    """Whatever a failing test leaves of them is put right; by default these two would end pytest itself."""
+    numbers = [signal.SIGTERM, signal.SIGHUP]
+    before = [signal.signal(number, lambda *_: None) for number in numbers]
+    yield
+    for number, handler in zip(numbers, before):
+        signal.signal(number, handler)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are of Unix")
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+@pytest.mark.usefixtures("signals")
+def test_kill_and_a_closed_terminal_end_it_as_ctrl_c_does(name, streaming, tmp_path):
+    data, turns = half_seconds(3)
+    board = streaming(data, signal.Signals[name])
+    result = command.works("record", "--out", tmp_path / "ride.csv")
+    assert result.err == ""
+    assert board.serial.written == b"\x03"
+    assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
+    assert sorted(command.snapshot(tmp_path)) == [str(tmp_path / name) for name in ("ride.cal.json", "ride.csv")]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are of Unix")
+@pytest.mark.usefixtures("signals")
+def test_under_nohup_a_closed_terminal_is_not_heard(streaming, tmp_path):
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    streaming(half_seconds(3)[0], signal.SIGHUP)
+    result = command.works("record", "--out", tmp_path / "ride.csv")
+    assert "the board says nothing any more" in result.err
+
+
+@pytest.mark.parametrize(("aligned", "words"), [(True, "lean "), (False, "not aligned")])
+def test_the_lean_is_shown_live_once_there_is_one(aligned, words, streaming, tmp_path, monkeypatch):
+    monkeypatch.setattr(ride_writer, "calibration", functools.partial(calibration, ride_writer.calibration(), aligned))
+    streaming(half_seconds(3)[0], "ctrl-c")
+    shown = watched(monkeypatch, Watched(), "record", "--out", tmp_path / "ride.csv")
+    assert words in shown
+    assert ("deg" in shown) is aligned
+    assert "readings/s" in shown
+
+
+def calibration(made, aligned, _trim_deg):
+    made.aligned = aligned
+    return made
+
+
+def test_a_terminal_that_goes_away_costs_nothing(streaming, tmp_path, monkeypatch):
+    data, turns = half_seconds(6)
+    streaming(data, "ctrl-c")
+    terminal = Watched()
+    terminal.closed_after = 300
+    with contextlib.suppress(OSError):  # its last words have nowhere to go
+        watched(monkeypatch, terminal, "record", "--out", tmp_path / "ride.csv")
+    assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
+
+
+@pytest.mark.parametrize("name", ["ride.csv", "ride.cal.json"])
+def test_an_earlier_recording_is_not_overwritten(name, streaming, tmp_path):
+    board = streaming(half_seconds(3)[0], "ctrl-c")
+    (tmp_path / name).write_text("yesterday")
+    out = tmp_path / "ride.csv"
+    command.refused(tmp_path, "record", "--out", out, words=f"{tmp_path / name} is there already: give --out another")
+    assert not board.resets
+
+
+@pytest.mark.parametrize("arguments", [["record", "--out", "ride.csv"], ["pull"], ["status"]])
+def test_a_board_without_the_firmware_is_told_alike(arguments, streaming, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    board = streaming([], None)
+    absent = b"Traceback (most recent call last):\r\nImportError: no module named 'kickstand'\r\n"
+    board.serial.data = b"\x04" + absent + b"\x04>"
+    words = "kickstand: Kickstand is not on the board at /dev/ttyACM0: kickstand flash puts it there\n"
+    assert command.refused(tmp_path, *arguments) == words
 
 
 @pytest.mark.parametrize(

@@ -118,7 +118,7 @@ def test_without_an_emulator_the_engine_is_refused(tmp_path, monkeypatch):
     log, cal = ride(tmp_path / "log.csv", seconds=1), command.write_cal(tmp_path / "CAL.json")
     command.refused(
         *(tmp_path, "replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv", "--engine", "rp2040"),
-        words="-m pip install",
+        words="-m pip install -e ",
     )
 
 

@@ -218,6 +218,15 @@ def test_pictures_go_into_a_directory(ride, tmp_path):
     command.refused(tmp_path, "plot", ride, "--out", tmp_path / "file", words="is a file")
 
 
+def test_broken_off_a_picture_leaves_no_empty_directory(ride, tmp_path, monkeypatch):
+    def ctrl_c(path, seen):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(plot.picture, "draw", ctrl_c)
+    assert command.run("plot", ride, "--out", tmp_path / "pictures").status == 130
+    assert not (tmp_path / "pictures").exists()
+
+
 def test_a_real_ride(shared_data, tmp_path):
     """The phone stood still for its first seconds; which way it faced the test takes from gravity and the drive."""
     log = shared_data / "motorcycle-ride.csv.gz"

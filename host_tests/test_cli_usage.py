@@ -1,5 +1,6 @@
 """How the command is called: help, and one line for every mistake."""
 
+import re
 import subprocess
 import sys
 
@@ -36,7 +37,7 @@ def test_a_mistake_is_told_in_one_line(tmp_path, monkeypatch, name):
     assert (result.status, result.out) == (2, "")
     assert result.err.count("\n") == 1
     assert words in result.err
-    assert "--help" in result.err
+    assert re.search(r"[^.][.?] See kickstand.* --help\.\n$", result.err)
     assert not list(tmp_path.iterdir())
 
 

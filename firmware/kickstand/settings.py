@@ -1,5 +1,8 @@
 """The values of config.py, checked, with a default for each."""
 
+import sys
+from io import StringIO
+
 from . import port
 from .errors import SettingsError
 from .hd44780 import ADDRESSES
@@ -85,11 +88,21 @@ def load():
         config = None
     except Exception as error:  # a slip of the pen in the user's file is no reason for a traceback
         raise SettingsError(
-            "config.py cannot be read (%s): mend it, then kickstand flash --config" % error,
+            "config.py cannot be read (%s%s): mend it, then kickstand flash --config" % (_line_of(error), error),
             "config.py:",
             "cannot be read",
         )
     return Settings(config)
+
+
+def _line_of(error):
+    """Where in config.py: "line 3: ", or nothing where the traceback does not say."""
+    text = StringIO()
+    # the stubs that check this know neither a StringIO's type nor its getvalue
+    sys.print_exception(error, text)  # type: ignore[arg-type]
+    told = text.getvalue()  # type: ignore[attr-defined]
+    _, found, rest = told.rpartition('config.py", line ')
+    return "line %s: " % rest.split("\n")[0].split(",")[0].strip() if found else ""
 
 
 class Settings:
@@ -105,7 +118,7 @@ class Settings:
                 )
             setattr(self, name, value)
         for name in dir(config) if config else ():
-            if name.isupper() and name not in _TABLE:
+            if name not in _TABLE and (name.isupper() or name.upper() in _TABLE):
                 raise SettingsError(
                     "config.py: %s is not a setting; see the list in that file" % name,
                     "config.py: what?",

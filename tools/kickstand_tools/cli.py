@@ -167,10 +167,19 @@ def replay(log: Path, calibration: Path, engine: str, out: Path) -> None:
 @kickstand.command()
 @click.option("--profile", required=True, help=f"{_PROFILES}.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Another seed, another ride.")
-@click.option("--seconds", type=click.FloatRange(min=20.0, max=7200.0), default=640.0)
-@click.option("--upright-error", type=click.FloatRange(-30.0, 30.0), default=0.0, help="Of the upright pose.")
 @click.option(
-    "--pitch-change", type=click.FloatRange(-10.0, 10.0), help="Between the poses; at random if not given."
+    "--seconds",
+    type=click.FloatRange(min=20.0, max=7200.0),
+    default=640.0,
+    help="Of riding; start and stop come on top.",
+)
+@click.option(
+    "--upright-error", type=click.FloatRange(-30.0, 30.0), default=0.0, help="Of the upright pose, degrees."
+)
+@click.option(
+    "--pitch-change",
+    type=click.FloatRange(-10.0, 10.0),
+    help="Between the poses, degrees; at random if not given.",
 )
 @click.option("--speed", is_flag=True, help="Write a speed into the log, once a second.")
 @click.option("--out", required=True, type=_PATH, help="The directory to write to.")
@@ -184,16 +193,23 @@ def simulate(
     out: Path,
 ) -> None:
     """Make up a ride: six poses and a free one, kickstand, upright, the ride, its truth."""
+    from .progress import spinner
     from .simulation import simulate
 
-    made = simulate(profile, seed, out, seconds, upright_error, pitch_change, speed=speed)
+    with spinner("making up a ride"):
+        made = simulate(profile, seed, out, seconds, upright_error, pitch_change, speed=speed)
     click.echo(f"written: {out}, {len(made.time)} samples")
 
 
 @kickstand.command()
 @click.option("--profiles", default="street,track,sweeper,city,hills", help=f"With commas between: {_PROFILES}.")
 @click.option("--seeds", type=click.IntRange(min=1), default=3, help="Rides of each profile.")
-@click.option("--seconds", type=click.FloatRange(min=60.0, max=7200.0), default=640.0, help="Of each ride.")
+@click.option(
+    "--seconds",
+    type=click.FloatRange(min=60.0, max=7200.0),
+    default=640.0,
+    help="Of riding, each; start and stop come on top.",
+)
 @click.option(
     "--upright-error", type=click.FloatRange(-30.0, 30.0), default=0.0, help="Of the upright pose, degrees."
 )
@@ -332,7 +348,8 @@ def main(arguments: list[str] | None = None) -> None:
         _refuse("stopped", 130)
     except click.UsageError as error:
         command = error.ctx.command_path if error.ctx else "kickstand"
-        _refuse(f"{error.format_message()} See {command} --help.")
+        message = error.format_message()
+        _refuse(f"{message}{'' if message.endswith(('.', '?')) else '.'} See {command} --help.")
     except click.ClickException as error:
         _refuse(error.format_message())
     except Exception as error:

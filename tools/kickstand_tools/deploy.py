@@ -12,7 +12,7 @@ from pathlib import Path
 from mpremote.transport import TransportError, TransportExecError
 from mpremote.transport_serial import SerialTransport
 
-from . import bytecode, firmware_path
+from . import bytecode, config_check, firmware_path
 from .errors import InputError, cause
 from .ports import find_port, why_closed
 from .progress import Bar
@@ -76,11 +76,16 @@ def flash(port: str | None, replace_config: bool, say: Print) -> None:
     """Bring a board's files up to date, verify them and restart it. Raises InputError."""
     with connected(port) as (transport, name):
         say(f"{_describe(transport, name)} on {name}")
+        config = firmware_path.config()
+        if replace_config or not transport.fs_exists(CONFIG):
+            say(f"config.py is {config}")
+            _check(config, transport)
         try:
             wanted = contents(_mpy(transport))
         except bytecode.CannotCompile as reason:
             say(f"note: {reason}: it gets the sources, and starts more slowly")
             wanted = contents(None)
+        wanted[CONFIG] = config.read_bytes()
         install(transport, wanted, replace_config, say)
         restart(transport)
         say("restarted: the display shows the rest")
@@ -164,6 +169,12 @@ def connected(port: str | None) -> Iterator[tuple[SerialTransport, str]]:
             transport.close()  # its port may be gone, or just restarting
 
 
+def refuse_absent(reason: str, name: str) -> None:
+    """Raise InputError if this error of the board at that port says that it has no firmware."""
+    if "no module named 'kickstand'" in reason:
+        raise InputError(f"Kickstand is not on the board at {name}: kickstand flash puts it there")
+
+
 def _enter(transport: SerialTransport, name: str) -> None:
     """Ctrl-C, then a soft reset into the raw prompt, which leaves main.py alone."""
     for last in (False, True):  # a board that resets when its port is opened is still starting the first time
@@ -195,6 +206,15 @@ def _mpy(transport: SerialTransport) -> int:
     return int(transport.eval("getattr(__import__('sys').implementation, '_mpy', 0)"))
 
 
+def _check(config: Path, transport: SerialTransport) -> None:
+    """Refuse a config.py that the board would not take; what runs there now goes on."""
+    try:
+        config_check.refuse_faulty(config, str(transport.eval("__import__('sys').platform")))
+    except InputError:
+        restart(transport)
+        raise
+
+
 def _survey(transport: SerialTransport) -> dict[str, tuple[int, bytes]]:
     """Size and SHA-256 of every file in the board's root and in the package's directory."""
     return ast.literal_eval(transport.exec(_SURVEY).decode())
@@ -203,8 +223,7 @@ def _survey(transport: SerialTransport) -> dict[str, tuple[int, bytes]]:
 def _status_text(transport: SerialTransport, name: str) -> str:
     out, error = transport.exec_raw("import kickstand\nkickstand.status()", timeout=_STATUS_S)
     reason = _last_line(error.decode(errors="replace"))
-    if "no module named 'kickstand" in reason:
-        raise InputError(f"Kickstand is not on the board at {name}: kickstand flash puts it there")
+    refuse_absent(reason, name)
     if error:
         raise InputError(
             f"the board cannot tell its status ({reason}): bring it up to date with kickstand flash"

@@ -13,5 +13,6 @@ def cause(error: BaseException) -> str:
 
 
 def extra(name: str) -> str:
-    """How to install an optional part of the project."""
-    return f"in the project's directory, {sys.executable} -m pip install \".[{name}]\""
+    """How to install an optional part of the project. Without -e a copy would take the place of the checkout, and
+    flash would copy that one's firmware."""
+    return f"in the project's directory, {sys.executable} -m pip install -e \".[{name}]\""

@@ -1,7 +1,8 @@
-"""Files written whole or not at all."""
+"""Files written whole or not at all, and the directories for them."""
 
+import contextlib
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from .errors import InputError, cause
@@ -18,6 +19,28 @@ def check_output(path: Path, inputs: list[Path]) -> None:
     for source in inputs:
         if path.exists() and source.exists() and path.samefile(source):
             raise InputError(f"{path} is also an input: give --out another name")
+
+
+def check_directory(path: Path) -> None:
+    """Refuse, before any work is done, a directory to write to that is none."""
+    if path.exists() and not path.is_dir():
+        raise InputError(f"{path} is a file: give --out the name of a directory")
+
+
+@contextlib.contextmanager
+def new_directory(path: Path) -> Iterator[None]:
+    """Make a directory, with those above it, to write to. What it made goes again if nothing was written to it."""
+    made = [one for one in (path, *path.parents) if not one.exists()]
+    try:
+        try:
+            path.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InputError(f"{path} cannot be made: {cause(error)}") from error
+        yield
+    finally:
+        with contextlib.suppress(OSError):  # not empty
+            for one in made:
+                one.rmdir()
 
 
 def write_whole(path: Path, write: Callable[[Path], None]) -> None:

@@ -49,5 +49,7 @@ def why_closed(port: str) -> InputError:
             return InputError(
                 f"there is no port {port}: plug the board in, or leave --port out to have it found"
             )
+        if port.startswith("socket:") and "refused" in text:
+            return InputError(f"nothing listens at {port}: is kickstand emulate running?")
         return InputError(f"{port} cannot be opened: {text}: check the name and the cable")
     return InputError(f"{port} could not be opened at first, and now can: try again")

@@ -1,19 +1,29 @@
-"""A progress bar on standard error, for work that takes over a second, where someone is watching."""
+"""A progress bar or a spinner on standard error, for work that takes over a second, where someone is watching."""
 
+import contextlib
 import sys
 import time
+from collections.abc import Iterator
 from types import TracebackType
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    SpinnerColumn,
+    TaskProgressColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 PATIENCE_S = 1.0
 
 
 class Bar:
-    """with Bar("replaying", total) as bar: bar.advance(n)."""
+    """with Bar("replaying", total) as bar: bar.advance(n). Seen after patience_s."""
 
-    def __init__(self, what: str, total: int) -> None:
+    def __init__(self, what: str, total: int, patience_s: float = PATIENCE_S) -> None:
         self._progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -23,17 +33,19 @@ class Bar:
             transient=True,
         )
         self._task = self._progress.add_task(what, total=total)
+        self._patience_s = patience_s
         self._begin_s = time.monotonic()
         self._wanted = sys.stderr.isatty()
         self._shown = False
 
     def __enter__(self) -> "Bar":
+        self.advance(0)
         return self
 
     def advance(self, amount: int) -> None:
         """amount more of the total is done."""
         self._progress.advance(self._task, amount)
-        if self._wanted and not self._shown and time.monotonic() - self._begin_s > PATIENCE_S:
+        if self._wanted and not self._shown and time.monotonic() - self._begin_s >= self._patience_s:
             self._progress.start()
             self._shown = True
 
@@ -46,3 +58,15 @@ class Bar:
     ) -> None:
         if self._shown:
             self._progress.stop()
+
+
+@contextlib.contextmanager
+def spinner(what: str) -> Iterator[None]:
+    """For work that cannot tell how far it is."""
+    if not sys.stderr.isatty():
+        yield
+        return
+    columns = SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        progress.add_task(what)
+        yield

@@ -13,8 +13,9 @@ from mpremote.transport_serial import SerialTransport
 
 from . import ride_log
 from .board_console import BrokenOff, lines
-from .deploy import connected, restart
+from .deploy import connected, refuse_absent, restart
 from .errors import InputError
+from .output import check_directory
 from .progress import Bar
 from .ride_blocks import CUT_SHORT, Block, read
 
@@ -61,8 +62,7 @@ def pull(port: str | None, out: Path, delete: bool, say: Print, warn: Print) -> 
 
     delete: afterwards remove from the board those that came over whole.
     """
-    if out.exists() and not out.is_dir():
-        raise InputError(f"{out} is not a directory: give --out the name of one")
+    check_directory(out)
     if not out.parent.is_dir():
         raise InputError(f"{out}: there is no directory {out.parent}: make it first")
     with connected(port) as (transport, name):
@@ -91,6 +91,7 @@ def _list(transport: SerialTransport, name: str) -> tuple[str, dict[int, list[_P
         reason = error.decode(errors="replace").strip().rpartition("\n")[2]
         if "CardError" in reason or "SettingsError" in reason:
             raise InputError(f"{name}: {reason.partition(': ')[2]}")
+        refuse_absent(reason, name)
         raise InputError(f"the board at {name} cannot tell its rides ({reason}): kickstand flash brings it up to date")
     directory, *parts = map(ast.literal_eval, listed.decode().splitlines())
     in_order = sorted(_Part(*part) for part in parts)

@@ -4,20 +4,18 @@ import binascii
 import contextlib
 import gzip
 import signal
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from mpremote.transport_serial import SerialTransport
-from rich.console import Console
-from rich.live import Live
 
 from . import firmware_path, ride_log
 from .board_console import BrokenOff, lines
 from .calibration_file import CalibrationFile, write_calibration
-from .deploy import connected, restart
+from .deploy import connected, refuse_absent, restart
 from .errors import InputError, cause
+from .live_line import LiveLine
 from .output import check_output, write_whole
 from .ride_blocks import BadBlock, Block, parse
 
@@ -31,10 +29,17 @@ _SILENT_S = 60.0  # an emulated board takes a while to start; one without a sens
 
 
 def record(port: str | None, out: Path, say: Print, warn: Print) -> None:
-    """Write readings to the log `out`, and NAME.cal.json beside it, until Ctrl-C. Raises InputError."""
+    """Write readings to the log `out`, and NAME.cal.json beside it, until Ctrl-C. Raises InputError.
+
+    Neither takes the place of a file: what was ridden before cannot be ridden again.
+    """
     if not out.name.endswith((".csv", ".csv.gz")):
         raise InputError(f"{out}: give --out a name that ends in .csv or .csv.gz")
     check_output(out, [])
+    beside = ride_log.calibration_path(out)
+    for path in (out, beside):
+        if path.exists():
+            raise InputError(f"{path} is there already: give --out another name")
     with connected(port) as (transport, name):
         try:
             say(f"recording from {name}: Ctrl-C ends it")
@@ -42,7 +47,6 @@ def record(port: str | None, out: Path, say: Print, warn: Print) -> None:
             notes: list[str] = []
             write_whole(out, lambda temporary: recorded.write(temporary, _blocks(transport, name, notes), notes))
             assert recorded.first
-            beside = ride_log.calibration_path(out)
             write_calibration(beside, ride_log.calibration(recorded.first))
             for note in notes:
                 warn(note)
@@ -65,9 +69,8 @@ class _Recording:
         missing, expected, before = 0, 0, 0
         meter = LeanMeter(CalibrationFile().to_firmware())
         opened = gzip.open if path.suffix == ".gz" else open
-        console = Console(stderr=True)
-        watched = sys.stderr.isatty()
-        with opened(path, "wt", encoding="ascii", newline="") as file, _live(console, watched) as live:
+        aligned = False
+        with opened(path, "wt", encoding="ascii", newline="") as file, LiveLine() as live:
             file.write(",".join(ride_log.header(speed=True)) + "\n")
             for block in blocks:
                 if self.first is None or block.body != self.first.body:
@@ -75,7 +78,8 @@ class _Recording:
                         notes.append("the board's calibration has changed: the log ends here")
                         break
                     self.first = block
-                    meter = LeanMeter(ride_log.calibration(block).to_firmware())
+                    calibration = ride_log.calibration(block)
+                    meter, aligned = LeanMeter(calibration.to_firmware()), calibration.aligned
                     before = block.time_us
                 missing += block.sequence - expected
                 expected = block.sequence + 1
@@ -88,27 +92,24 @@ class _Recording:
                     before = turn.time_us
                 self.count += len(block.turns)
                 self.seconds = (before - self.first.time_us) / 1e6
-                if watched:
+                if live.watched:
                     span_s = (before - block.time_us) / 1e6
-                    live.update(_status(meter, self, len(block.turns) / span_s), refresh=True)
+                    live.show(_status(meter if aligned else None, self, len(block.turns) / span_s))
         if self.first is None:
             raise InputError("; ".join(["nothing was recorded: does the display show readings?", *notes]))
         if missing:
             notes.append(f"{missing} blocks of half a second did not arrive: the log has gaps")
 
 
-def _live(console: Console, watched: bool) -> Live:
-    return Live(console=console if watched else Console(quiet=True), auto_refresh=False, transient=True)
-
-
-def _status(meter: LeanMeter, recorded: _Recording, rate: float) -> str:
+def _status(meter: LeanMeter | None, recorded: _Recording, rate: float) -> str:
+    """The live line. meter: None before the first alignment, when there is no lean."""
+    how_long = f"{rate:3.0f} readings/s  {recorded.seconds // 60:.0f}:{recorded.seconds % 60:04.1f}"
+    if meter is None:
+        return f"not aligned  {how_long}"
     lean, forward = meter.lean_deg, meter.smooth_force[2]
     bar = "#" * min(20, round(abs(lean) / 3))
     picture = f"{bar if lean < 0 else '':>20}|{bar if lean > 0 else '':<20}"
-    return (
-        f"{picture} lean {lean:+5.1f} deg  forward {forward:+.2f} g  {rate:3.0f} readings/s  "
-        f"{recorded.seconds // 60:.0f}:{recorded.seconds % 60:04.1f}"
-    )
+    return f"{picture} lean {lean:+5.1f} deg  forward {forward:+.2f} g  {how_long}"
 
 
 def _blocks(transport: SerialTransport, name: str, notes: list[str]) -> Iterator[Block]:
@@ -124,9 +125,9 @@ def _blocks(transport: SerialTransport, name: str, notes: list[str]) -> Iterator
 
 
 def _lines(transport: SerialTransport, name: str, notes: list[str]) -> Iterator[bytes]:
-    """What the app on the board prints, line by line. Ctrl-C here becomes one there."""
+    """What the app on the board prints, line by line. What ends it here becomes a Ctrl-C there."""
     stopped = threading.Event()
-    before = signal.signal(signal.SIGINT, lambda *_: stopped.set())
+    before = {number: signal.signal(number, lambda *_: stopped.set()) for number in _ends()}
     try:
         yield from lines(transport, _START, _SILENT_S, stopped)
         if not stopped.is_set():
@@ -134,6 +135,16 @@ def _lines(transport: SerialTransport, name: str, notes: list[str]) -> Iterator[
     except OSError as error:
         notes.append(f"{name}: connection lost ({cause(error)}): what came until then is kept")
     except BrokenOff as error:
+        refuse_absent(str(error), name)
         notes.append(f"{name}: {error}: what came until then is kept")
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _ends() -> list[signal.Signals]:
+    """What ends a recording: Ctrl-C, kill, a closed terminal (not of Windows; not after nohup)."""
+    ends = [signal.SIGINT, signal.SIGTERM]
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
+        ends.append(signal.SIGHUP)
+    return ends

@@ -3,8 +3,8 @@
 from importlib.util import find_spec
 from pathlib import Path
 
-from ..errors import InputError, cause, extra
-from ..output import write_whole
+from ..errors import InputError, extra
+from ..output import check_directory, new_directory, write_whole
 from . import page, picture
 from .look import Look
 
@@ -14,18 +14,14 @@ def check(directory: Path) -> None:
     missing = [name for name in ("matplotlib", "plotly") if not find_spec(name)]
     if missing:
         raise InputError(f"pictures need {' and '.join(missing)}: {extra('rides')}")
-    if directory.exists() and not directory.is_dir():
-        raise InputError(f"{directory} is a file: give --out the name of a directory")
+    check_directory(directory)
 
 
 def draw(seen: Look, directory: Path) -> list[Path]:
     """Write both; their paths. Raises InputError."""
-    try:
-        directory.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{directory} cannot be made: {cause(error)}") from error
     name = seen.ride.log.name.removesuffix(".gz").removesuffix(".csv")
     paths = [directory / f"{name}.png", directory / f"{name}.html"]
-    write_whole(paths[0], lambda path: picture.draw(path, seen))
-    write_whole(paths[1], lambda path: page.draw(path, seen))
+    with new_directory(directory):
+        write_whole(paths[0], lambda path: picture.draw(path, seen))
+        write_whole(paths[1], lambda path: page.draw(path, seen))
     return paths

@@ -82,8 +82,11 @@ def missing() -> list[str]:
     return sorted({package for package in _PACKAGES.values() if find_spec(package) is None})
 
 
-def estimate(log: Log, calibration: CalibrationFile) -> dict[str, NDArray[np.float64]]:
-    """Lean in degrees by every estimator that is there. The speed in the log is not used."""
+def estimate(
+    log: Log, calibration: CalibrationFile, done: Callable[[], None] = lambda: None
+) -> dict[str, NDArray[np.float64]]:
+    """Lean in degrees by every estimator that is there. The speed in the log is not used. done(): called after each
+    of steps()."""
     engine = replay_engine.Replay(calibration.to_firmware())
     own = np.array([engine.step(*row) for row in zip(log.time_us, log.readings)])
     samples = calibrated(log, calibration)
@@ -92,11 +95,21 @@ def estimate(log: Log, calibration: CalibrationFile) -> dict[str, NDArray[np.flo
         "formula": own[:, _FORMULA],
         "formula 0.3 s": trailing_mean(own[:, _FORMULA], AVERAGE_S, samples.rate_hz),
     }
-    absent = missing()
-    for name, method in OTHERS.items():
-        if _PACKAGES.get(name) not in absent:
-            result[name] = method(samples)
+    done()
+    for name in _others():
+        result[name] = OTHERS[name](samples)
+        done()
     return result
+
+
+def steps() -> int:
+    """The firmware's own, and each of the others."""
+    return 1 + len(_others())
+
+
+def _others() -> list[str]:
+    absent = missing()
+    return [name for name in OTHERS if _PACKAGES.get(name) not in absent]
 
 
 def _xyz(samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

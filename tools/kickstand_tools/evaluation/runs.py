@@ -1,11 +1,13 @@
 """Rides simulated, calibrated by the firmware's own code and scored, on all processors."""
 
+import contextlib
 import multiprocessing
 import os
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from multiprocessing.queues import SimpleQueue
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +19,11 @@ from ..errors import InputError
 from ..logs import Log
 from ..simulation import Ride, ride
 from ..simulation.files import write_poses
-from .estimators import estimate
+from . import estimators
 from .metrics import Score, score
+
+_LOOK_S = 0.2  # at the workers' progress
+_steps_done: SimpleQueue  # of this process, if it is a worker
 
 
 @dataclass(frozen=True)
@@ -43,8 +48,13 @@ class Result:
     refusal: str | None = None
 
 
-def run(job: Job) -> Result:
-    """Simulate, calibrate from the poses alone, estimate, score."""
+def steps() -> int:
+    """Of a job: the ride, and what is estimated from it."""
+    return 1 + estimators.steps()
+
+
+def run(job: Job, done: Callable[[], None] = lambda: None) -> Result:
+    """Simulate, calibrate from the poses alone, estimate, score. done(): called after each of steps()."""
     upright_sign, pitch_sign = (1, -1)[job.seed % 2], (1, -1)[job.seed // 2 % 2]
     made = ride(
         job.profile,
@@ -53,23 +63,33 @@ def run(job: Job) -> Result:
         upright_sign * job.upright_error_deg,
         pitch_sign * job.pitch_change_deg,
     )
+    done()
     try:
         calibration = calibrated_by_poses(made)
     except InputError as error:
+        for _ in range(estimators.steps()):
+            done()
         return Result(job, refusal=str(error))
-    shown = estimate(as_log(made), calibration)
+    shown = estimators.estimate(as_log(made), calibration, done)
     scores = {name: score(lean, made.truth, made.rate_hz) for name, lean in shown.items()}
     traces = {"time": made.time, "true": made.truth["lean_deg"], **shown} if job.traces else {}
     return Result(job, scores, traces)
 
 
-def run_all(jobs: list[Job]) -> Iterator[Result]:
-    """run() of each, as they get done."""
-    if len(jobs) == 1:
-        yield run(jobs[0])
-        return
-    with multiprocessing.Pool(min(len(jobs), os.cpu_count() or 1), _silent) as pool:
-        yield from pool.imap_unordered(run, jobs)
+def run_all(jobs: list[Job], done: Callable[[], None] = lambda: None) -> Iterator[Result]:
+    """run() of each, as they get done. done(): called soon after each of a job's steps()."""
+    steps_done = multiprocessing.SimpleQueue()
+    with multiprocessing.Pool(min(len(jobs), os.cpu_count() or 1), _begin_worker, (steps_done,)) as pool:
+        results = pool.imap_unordered(_work, jobs)
+        for _ in jobs:
+            result = None
+            while result is None:
+                with contextlib.suppress(multiprocessing.TimeoutError):
+                    result = results.next(_LOOK_S)
+                while not steps_done.empty():
+                    steps_done.get()
+                    done()
+            yield result
 
 
 def calibrated_by_poses(made: Ride) -> CalibrationFile:
@@ -94,7 +114,12 @@ def _unheard(line: str) -> None:
     pass
 
 
-def _silent() -> None:
-    sys.stderr = open(
-        os.devnull, "w", encoding="utf-8"
-    )  # the workers' progress bars would overwrite each other
+def _begin_worker(steps_done: SimpleQueue) -> None:
+    """Silent: the workers' progress bars would overwrite each other."""
+    global _steps_done
+    _steps_done = steps_done
+    sys.stderr = open(os.devnull, "w", encoding="utf-8")
+
+
+def _work(job: Job) -> Result:
+    return run(job, lambda: _steps_done.put(None))

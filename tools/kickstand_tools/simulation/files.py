@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..logs import COLUMNS
+from ..output import check_directory
 from .profiles import PROFILES
 from .ride import Ride, ride
 
@@ -33,8 +34,9 @@ def simulate(
     """
     if profile not in PROFILES:
         raise InputError(f"no profile {profile}: there are {', '.join(PROFILES)}")
-    made = ride(profile, seed, seconds, upright_error_deg, pitch_change_deg, share)
     directory = Path(out_dir)
+    check_directory(directory)
+    made = ride(profile, seed, seconds, upright_error_deg, pitch_change_deg, share)
     try:
         directory.mkdir(parents=True, exist_ok=True)
         # report, plot and export take the calibration beside a ride for its own: they would believe another sensor's

@@ -1,0 +1,32 @@
+"""A line on the terminal that is drawn over and over, where someone is watching."""
+
+import contextlib
+import sys
+from types import TracebackType
+
+from rich.console import Console
+from rich.live import Live
+
+
+class LiveLine:
+    """with LiveLine() as line: line.show(text). A terminal that has been closed is no error: work goes on."""
+
+    def __init__(self) -> None:
+        self.watched = sys.stderr.isatty()
+        console = Console(stderr=True) if self.watched else Console(quiet=True)
+        self._live = Live(console=console, auto_refresh=False, transient=True)
+
+    def __enter__(self) -> "LiveLine":
+        self._live.start()
+        return self
+
+    def show(self, text: str) -> None:
+        """This in place of the text before."""
+        with contextlib.suppress(OSError):
+            self._live.update(text, refresh=True)
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        with contextlib.suppress(OSError):
+            self._live.stop()
