@@ -28,7 +28,7 @@ lasts.
 from math import atan2, cos, degrees, pi, radians, sin, sqrt
 
 from .kalman import Covariance
-from .rest import RestDetector
+from .rest import MAX_BIAS_RADPS, RestDetector
 from .trim import UprightTrim
 
 _G = 9.80665
@@ -78,6 +78,7 @@ SIGMA_REST_SPEED = 0.02 / _G
 SIGMA_GIVEN_SPEED = 1.0 / _G  # of a receiver or a wheel, if there is one
 GIVEN_SPEED_LATE_S = 1.0
 
+MAX_REST_PUSH = 0.08  # g from what its pitch makes: more is braking, even if it is as even as standing on a slope
 ROLLING_SPEED, ROLLING_SIGMAS = 3.0 / _G, 3.0  # a speed as sure as this is no standstill
 BALANCED_SPEED = 4.0 / _G  # beyond, the yaw rate follows from lean and speed, if
 BALANCED_SHARE, BALANCED_RADPS = 0.5, 0.1  # what is measured differs by less than this of it, and this
@@ -231,7 +232,8 @@ class LeanFilter:
         roll_acceleration = (self._roll_rate - self._last_roll_rate) / seconds
         self._last_roll_rate = self._roll_rate
         rested = self._rest.resting
-        self._rest.update(means, (x[BX], x[BY], x[BZ]), seconds, self.rolling)
+        pushed = abs(means[7] - sin(x[Q])) > MAX_REST_PUSH
+        self._rest.update(means, (x[BX], x[BY], x[BZ]), seconds, self.rolling or pushed)
         if self._rest.resting and not rested:
             self._stand(means)
         self._work = self._process(means, seconds, roll_acceleration)
@@ -253,8 +255,9 @@ class LeanFilter:
         x[V] = USUAL_SPEED if moving else 0.0  # most rides begin at rest
 
     def _stand(self, means):
-        """Coming to rest, the force is the vertical, whatever was believed before; the bias is kept."""
-        _, _, _, _, _, fx, fy, fz, _ = means
+        """Coming to rest, the force is the vertical, whatever was believed before; the bias is kept, unless it went
+        astray, as in the hand."""
+        fx, fy, fz = means[5:8]
         x = self._x
         x[T] = atan2(fx, fy)
         x[Q] = atan2(fz, sqrt(fx * fx + fy * fy))
@@ -262,6 +265,10 @@ class LeanFilter:
         self._p.forget(T, START_STAND * START_STAND)
         self._p.forget(Q, START_STAND * START_STAND)
         self._p.forget(V, SIGMA_REST_SPEED**2)
+        for i in range(3):
+            if abs(means[2 + i]) > MAX_BIAS_RADPS:
+                x[BX + i] += means[2 + i]
+                self._p.forget(BX + i, START_BIAS**2)
 
     def _process(self, means, seconds, roll_acceleration):
         """Covariance and corrections for one window; a generator of short pieces."""

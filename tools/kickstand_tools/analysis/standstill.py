@@ -24,6 +24,8 @@ UNCALIBRATED_G = 0.12  # from 1 g, where the ride has no rest: a cheap sensor wi
 def standing(ride: Channels) -> NDArray[np.bool_]:
     """True where the bike stands still: by the log's own speed, or where there is none by how little it shakes."""
     still = _quiet(ride)
+    if not np.any(still):
+        still = _rested(ride)
     there = np.flatnonzero(~np.isnan(ride.speed_mps))
     if len(there):
         place = np.searchsorted(there, np.arange(len(still)), side="right") - 1
@@ -52,6 +54,17 @@ def _quiet(ride: Channels) -> NDArray[np.bool_]:
     quiet &= _weight(ride, second) & (rolling < 0.5)
     for shift in range(second):  # every sample of a quiet window
         still[shift : shift + len(quiet)] |= quiet
+    return still
+
+
+def _rested(ride: Channels) -> NDArray[np.bool_]:
+    """On a road so smooth that shaking tells nothing: the filter's rests, each from where its force is there."""
+    still = ride.resting > 0.5
+    forward = smoothed(ride.forward_g, ride.t_s, ENGINE_S)
+    for start in np.flatnonzero(np.diff(still.astype(int), prepend=0) > 0):
+        weight = np.median(forward[start : start + 10])
+        off = np.flatnonzero(np.abs(forward[:start] - weight) > 2 * STILL_G)
+        still[(int(off[-1]) + 1 if len(off) else 0) : start] = True
     return still
 
 
