@@ -43,10 +43,11 @@ def main():
 
 def run(chosen, lcd):
     """The app; an exception in it is reported, then the board restarts."""
+    # half a second, in which the display says something already; firmware that is not whole ends at the prompt
+    from kickstand.app import App
+
     print("Kickstand %s. Ctrl-C stops it." % __version__)
     try:
-        from kickstand.app import App  # half a second, in which the display says something already
-
         App(chosen, lcd).run()
     except SettingsError:
         raise
