@@ -200,6 +200,20 @@ def test_a_perfect_sensor_on_a_slope(tmp_path, slope_deg, speed_hz):
     assert stop.jerk_mps3 == pytest.approx(22.0 / 25.0 * 5.77, rel=0.15)
 
 
+def test_a_road_without_any_vibration(tmp_path):
+    """Nothing shakes, riding or standing, and there is no speed: the filter's rests are the standstills."""
+    rows = [command.HEADER]
+    for seconds, acceleration in ((5, 0.0), (8, 2.5), (6, 0.0), (20 / 6, -6.0), (8, 0.0)):
+        for _ in range(round(100 * seconds)):
+            rows.append(f"{len(rows) / 100:.2f},0,1,{acceleration / G:.5f},0,0,0")
+    path = tmp_path / "RIDE.csv"
+    path.write_text("\n".join(rows) + "\n")
+    (tmp_path / "RIDE.cal.json").write_text(json.dumps(analysis_rides.CALIBRATION))
+    (stop,) = stops(course(path))
+    assert stop.mfdd_mps2 == pytest.approx(6.0, rel=0.01)
+    assert stop.initial_speed_mps == pytest.approx(20.0, rel=0.01)
+
+
 def test_a_pull_to_the_side(tmp_path):
     """A car that turns by 2 degrees to the left while it brakes, 20 m/s in 4 s."""
     n = 200

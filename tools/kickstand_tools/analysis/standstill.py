@@ -60,6 +60,8 @@ def _quiet(ride: Channels) -> NDArray[np.bool_]:
 def _rested(ride: Channels) -> NDArray[np.bool_]:
     """On a road so smooth that shaking tells nothing: the filter's rests, each from where its force is there."""
     still = ride.resting > 0.5
+    if not np.any(still):
+        return still
     forward = smoothed(ride.forward_g, ride.t_s, ENGINE_S)
     for start in np.flatnonzero(np.diff(still.astype(int), prepend=0) > 0):
         weight = np.median(forward[start : start + 10])
