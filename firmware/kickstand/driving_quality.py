@@ -27,7 +27,7 @@ MAX_LATE_S = 1.9
 class DrivingQuality:
     """fit: of all straight driving so far. quality_deg: standard error of its forward, 180 until there is one;
     halves_deg: how far two halves of the drive disagree about it; parts: the DriveParts; agree: halves and parts
-    do; good: enough for an alignment; speed_problem (from CHECKED on, two can be chance), mount_problem: an
+    do; good: enough for an alignment; speed_problem (from CHECKED events on), mount_problem (from NEEDED on): an
     AlignmentError, or None.
     """
 

@@ -76,8 +76,8 @@ class Lcd:
         self._put(self._wanted[1], line2)
 
     def tick(self, now_ms):
-        """Do the next piece of work; call it about every 10 ms. Raises
-        SettingsError for pins that cannot be used, and nothing else."""
+        """Do the next piece of work; call it about every 10 ms. Raises SettingsError for pins that cannot be used, and
+        nothing else."""
         if self._acted_ms is not None and ticks_diff(now_ms, self._acted_ms) < (
             STEP_MS if self.address else PROBE_MS
         ):

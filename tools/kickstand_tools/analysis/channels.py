@@ -144,7 +144,7 @@ class _Lean:
         self._engine = replay_engine.Replay(calibration.to_firmware())
 
     def follow(self, block: Block) -> Array:
-        """(n, 6): lean (degrees), forward force as shown (g), its variance (rad2), resting, rolling, trusted."""
+        """(n, 6): lean (degrees), forward force shown (g), variance of the lean (rad2), resting, rolling, sure."""
         take, meter = self._engine.take, self._engine.meter
         smooth = meter.smooth_force
         rows = []
