@@ -8,9 +8,10 @@ import sys
 from time import sleep_ms
 
 import machine
-from kickstand import __version__, port, settings
+from kickstand import __version__, settings
+from kickstand.board import port
+from kickstand.devices import open_button, open_lcd
 from kickstand.errors import SettingsError
-from kickstand.hardware import open_button, open_lcd
 
 
 def tell(lcd, line1, line2=""):

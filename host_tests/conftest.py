@@ -1,11 +1,11 @@
-"""The firmware is importable in every test; recorded data is found or its tests are skipped."""
+"""The firmware's drivers can be imported in every test; recorded data is found or its tests are skipped."""
 
 from pathlib import Path
 
 import pytest
-from kickstand_tools import firmware_path
+from kickstand_tools.simulated_board.fakes import cpython
 
-firmware_path.add_to_path()
+cpython.supplement()
 
 ROOT = Path(__file__).resolve().parent.parent
 

@@ -11,16 +11,16 @@ all that the turns since the last collection have left. That took up to a millis
 import gc
 from time import sleep_us, ticks_add, ticks_diff, ticks_ms, ticks_us
 
-from . import port
-from .calibration import Calibration
+from .board import port
+from .calibration.parameters import Calibration
+from .calibration.store import Store
+from .devices import open_button, open_sensor
 from .errors import StoreError
-from .hardware import open_button, open_sensor
-from .meter import LeanMeter
-from .recorder import Recorder
-from .ride_ring import RideRing
-from .sample_clock import SampleClock
-from .screen import Screen
-from .store import Store
+from .imu.sample_clock import SampleClock
+from .lean.meter import LeanMeter
+from .rides.flash_ring import RideRing
+from .rides.recorder import Recorder
+from .ui.screen import Screen
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
 COLLECT_TURNS = 25  # 70 KB of heap: less than half of what is free
@@ -59,8 +59,10 @@ class App:
         self._fault_shown = False
 
     def _open_drive(self):
-        from .drive_mode import DriveMode  # 30 KB of heap with all that they import: not for those without a source
-        from .speed import open_speed
+        from .drive_alignment.background import (
+            DriveMode,  # 30 KB of heap with all that they import: not for those without a source
+        )
+        from .speed.source import open_speed
 
         return DriveMode(self.settings.VEHICLE, open_speed(self.settings), self.meter, self._keep)
 

@@ -3,10 +3,10 @@
 import sys
 from io import StringIO
 
-from . import port
+from .board import port
+from .board.hd44780 import ADDRESSES
 from .errors import SettingsError
-from .hd44780 import ADDRESSES
-from .mpu6050 import ACCEL_LSB_PER_G, GYRO_LSB_PER_DPS
+from .imu.mpu6050 import ACCEL_LSB_PER_G, GYRO_LSB_PER_DPS
 
 
 def _one_of(*choices):

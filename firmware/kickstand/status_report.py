@@ -6,11 +6,11 @@ import sys
 from time import sleep_ms, ticks_ms
 
 from . import __version__
+from .calibration.store import Store
+from .devices import open_button, open_lcd, open_sensor
 from .errors import SettingsError
-from .hardware import open_button, open_lcd, open_sensor
-from .mpu6050 import UnknownChip
+from .imu.mpu6050 import UnknownChip
 from .settings import load
-from .store import Store
 
 LISTEN_MS = 3500
 
@@ -92,7 +92,7 @@ def _speed(settings):
     if settings.SPEED is None:
         print("Speed        no source: SPEED is not set, alignment by driving is off")
         return
-    from .speed import open_speed
+    from .speed.source import open_speed
 
     speed = open_speed(settings)
     if settings.SPEED == "gps":

@@ -21,5 +21,5 @@ def command(script: str, *arguments: str) -> list[str]:
 
 def environment() -> dict[str, str]:
     """The environment for it: firmware and tools on MicroPython's path."""
-    path = f"{firmware_path.TOOLS}:{firmware_path.directory()}:.frozen"
+    path = f"{firmware_path.search_path()}:.frozen"
     return os.environ | {"MICROPYPATH": path}

@@ -9,18 +9,14 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
+from kickstand.lean.meter import FALLEN_DEG
 from numpy.typing import NDArray
 
-from .. import firmware_path
-from ..calibration_file import CalibrationFile, read_calibration
+from ..calibration.file import CalibrationFile, read_calibration
 from ..errors import InputError
-from ..logs import Block
-from ..replay import with_progress
-
-firmware_path.add_to_path()
-from kickstand.meter import FALLEN_DEG  # noqa: E402
-
-from .. import replay_engine  # noqa: E402
+from ..logs.reader import Block
+from ..replay import replay_engine
+from ..replay.replay import with_progress
 
 Array = NDArray[np.float64]
 _TOO_SMALL = 0.01  # g2, as in kickstand.lean: in free fall no force tells a direction

@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from ..forward_sign import ForwardSign, exchanged_line
+from ..replay.forward_sign import ForwardSign, exchanged_line
 from .alignment_quality import Quality, quality
-from .brake_test import RATE_S, Stop, stops
 from .channels import Channels, Ride
-from .standstill import standing
+from .stops.brake_test import RATE_S, Stop, stops
+from .stops.standstill import standing
 from .summary import Summary
 from .thin import joined, thinned
 

@@ -6,10 +6,10 @@ from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from ..forward_sign import SWAPPED_DEG
-from .brake_test import Stop
+from ..replay.forward_sign import SWAPPED_DEG
 from .look import Look
-from .speed_stops import stops_by_speed
+from .stops.brake_test import Stop
+from .stops.speed_stops import stops_by_speed
 from .summary import Peak
 
 RIDDEN_S = 10.0  # less is moving it about

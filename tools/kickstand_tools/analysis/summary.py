@@ -3,12 +3,9 @@
 from dataclasses import dataclass, field
 
 import numpy as np
+from kickstand.lean.meter import GAP_US
 
-from .. import firmware_path
 from .channels import Array, Channels
-
-firmware_path.add_to_path()
-from kickstand.meter import GAP_US  # noqa: E402
 
 LEANS_DEG = (30.0, 40.0)
 BIN_DEG = 1.0

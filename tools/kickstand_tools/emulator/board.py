@@ -3,8 +3,8 @@
 from collections.abc import Callable
 from typing import Any
 
-from ..board.button import Button
-from ..board.simulator import Board
+from ..simulated_board.button import Button
+from ..simulated_board.simulator import Board
 from .clock import EmulatedClock
 
 

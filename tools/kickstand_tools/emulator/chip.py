@@ -14,7 +14,7 @@ from rp2040py.peripherals.watchdog import TIMER
 from rp2040py.rp2040 import RP2040
 from rp2040py.utils.logging import ConsoleLogger, LogLevel
 
-from ..board.i2c import Bus
+from ..simulated_board.i2c import Bus
 from .flash_memory import TimedFlash
 from .i2c_controller import TimedI2C
 

@@ -7,20 +7,13 @@ from collections.abc import Callable
 
 from rich.live import Live
 
-from ..demo_device import (
-    KICKSTAND_PRESS_S,
-    LONG_PRESS_S,
-    PART_SEED,
-    PART_SHARE,
-    SCRIPT,
-    UPRIGHT_PRESS_S,
-)
-from ..demo_score import State
-from ..demo_screen import lcd_lines, screen
-from ..hand_bike import HandBike
-from ..keyboard import Keyboard
-from ..rides import Ride
-from ..sensor_errors import Sensor
+from ..demo.device import KICKSTAND_PRESS_S, LONG_PRESS_S, PART_SEED, PART_SHARE, SCRIPT, UPRIGHT_PRESS_S
+from ..demo.hand_bike import HandBike
+from ..demo.keyboard import Keyboard
+from ..demo.score import State
+from ..demo.screen import lcd_lines, screen
+from ..simulation.scripted.script import Ride
+from ..simulation.scripted.sensor_errors import Sensor
 from .console_server import ConsoleServer
 from .pico import Pico
 

@@ -3,13 +3,11 @@
 import tempfile
 from pathlib import Path
 
+from kickstand.calibration.parameters import Calibration
+from kickstand.calibration.store import Store
 from littlefs import LittleFS, UserContext
 
-from .. import bytecode, deploy, firmware_path
-
-firmware_path.add_to_path()
-from kickstand.calibration import Calibration  # noqa: E402
-from kickstand.store import Store  # noqa: E402
+from ..deploy import bytecode, flash
 
 START = 0xA0000  # of the file system in flash
 _BLOCK, _COUNT = 4096, 352
@@ -47,7 +45,7 @@ def read(image: bytes) -> dict[str, bytes]:
 
 def firmware(compiled: bool = False) -> dict[str, bytes]:
     """What `kickstand flash` puts on a board. compiled: the package as .mpy, by mpy-cross."""
-    return deploy.contents(bytecode.PICO if compiled else None)
+    return flash.contents(bytecode.PICO if compiled else None)
 
 
 def stored(calibration: Calibration, who_am_i: int = 0x68, accel_range_g: int = 8) -> dict[str, bytes]:

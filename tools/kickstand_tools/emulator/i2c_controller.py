@@ -17,7 +17,7 @@ from rp2040py.peripherals.i2c import (
 )
 from rp2040py.rp2040 import RP2040
 
-from ..board.i2c import Bus
+from ..simulated_board.i2c import Bus
 
 _CYCLE_NS = 8  # at 125 MHz
 _POLLED = (IC_RAW_INTR_STAT, IC_RXFLR, IC_TX_ABRT_SOURCE)

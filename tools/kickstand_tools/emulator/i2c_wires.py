@@ -5,7 +5,7 @@ rp2040py has the controllers only; MicroPython sends zero-length writes with the
 
 from rp2040py.gpio_pin import GPIOPin, GPIOPinState
 
-from ..board.i2c import Bus
+from ..simulated_board.i2c import Bus
 
 _IDLE, _LISTENS, _SENDS = 0, 1, 2
 

@@ -10,13 +10,10 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import firmware_path
-from ..calibration_file import CalibrationFile
-from ..logs import Log
+from ..calibration.file import CalibrationFile
+from ..logs.reader import Log
+from ..replay import replay_engine
 from .samples import Samples, calibrated
-
-firmware_path.add_to_path()
-from .. import replay_engine  # noqa: E402
 
 AVERAGE_S = 0.3
 COMPLEMENTARY = 0.98  # kept of the old lean at each sample

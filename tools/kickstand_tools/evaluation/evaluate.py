@@ -10,7 +10,7 @@ from rich.console import Console
 from ..errors import InputError, extra
 from ..output import check_directory, new_directory
 from ..progress import Bar
-from ..simulation import PROFILES
+from ..simulation.profiles import PROFILES
 from . import picture, real_ride, report
 from .estimators import missing
 from .runs import Job, Result, run_all, steps

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration_file import CalibrationFile
+from ..calibration.file import CalibrationFile
 from ..errors import InputError
-from ..logs import Log, read_log
+from ..logs.reader import Log, read_log
 from .estimators import GRAVITY_MPS2, estimate
 from .metrics import rms, slope
 from .samples import calibrated

@@ -13,12 +13,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from .. import calibrate
-from ..calibration_file import CalibrationFile
+from ..calibration import poses
+from ..calibration.file import CalibrationFile
 from ..errors import InputError
-from ..logs import Log
-from ..simulation import Ride, ride
+from ..logs.reader import Log
 from ..simulation.files import write_poses
+from ..simulation.ride import Ride, ride
 from . import estimators
 from .metrics import Score, score
 
@@ -97,8 +97,8 @@ def calibrated_by_poses(made: Ride) -> CalibrationFile:
     with tempfile.TemporaryDirectory() as directory:
         seven, kickstand, upright = write_poses(Path(directory), made)
         try:
-            six = calibrate.six(seven, _unheard)
-            return calibrate.two(kickstand, upright, six, "left", _unheard)
+            six = poses.six(seven, _unheard)
+            return poses.two(kickstand, upright, six, "left", _unheard)
         except InputError as error:
             raise InputError(str(error).replace(f"{directory}{os.sep}", "")) from error
 

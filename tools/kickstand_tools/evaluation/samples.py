@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration_file import CalibrationFile
-from ..logs import Log
+from ..calibration.file import CalibrationFile
+from ..logs.reader import Log
 
 
 @dataclass

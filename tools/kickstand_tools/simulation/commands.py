@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .signals import Signal, integral, smoothed, smoothstep
+from .physics.signals import Signal, integral, smoothed, smoothstep
 
 _SPEED_SMOOTHING_S = 0.15  # a hand on throttle or brake
 

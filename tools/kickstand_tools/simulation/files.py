@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..logs import COLUMNS
+from ..logs.reader import COLUMNS
 from ..output import check_directory
 from .profiles import PROFILES
 from .ride import Ride, ride

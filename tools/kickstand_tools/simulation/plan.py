@@ -5,9 +5,9 @@ from math import atan, degrees, radians, tan
 
 import numpy as np
 
-from .bike import GRAVITY_MPS2
 from .commands import Leg
-from .road import CLASS_B
+from .physics.bike import GRAVITY_MPS2
+from .physics.road import CLASS_B
 
 _CLOSING_S = 45.0  # a straight and a stop at the end of every ride
 

@@ -3,8 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from .chip import RATE_HZ, Chip
-from .signals import band_noise
+from .physics.chip import RATE_HZ, Chip
+from .physics.signals import band_noise
 
 POSE_S = 4.0
 _ASKEW_DEG = 4.0  # a box put on its side by hand, by an edge of a table

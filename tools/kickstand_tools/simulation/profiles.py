@@ -3,8 +3,8 @@
 from collections.abc import Callable
 
 from . import stress
+from .physics.road import CLASS_A, CLASS_B
 from .plan import Conditions, Plan, lean_for
-from .road import CLASS_A, CLASS_B
 
 
 def street(plan: Plan) -> Conditions:

@@ -5,16 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from . import balance, poses
-from .bike import GRAVITY_MPS2, Bike
-from .chip import DIVIDER, RATE_HZ, Chip
+from . import poses
 from .commands import Commands, commands
-from .engine import Engine
-from .kinematics import Motion, body_rates, specific_force
+from .physics import balance
+from .physics.bike import GRAVITY_MPS2, Bike
+from .physics.chip import DIVIDER, RATE_HZ, Chip
+from .physics.engine import Engine
+from .physics.kinematics import Motion, body_rates, specific_force
+from .physics.road import Shaking, add_bumps, profile_slope, shaking
+from .physics.signals import band_noise, second_order, smoothed
 from .plan import Conditions, Plan
 from .profiles import PROFILES
-from .road import Shaking, add_bumps, profile_slope, shaking
-from .signals import band_noise, second_order, smoothed
 
 _WARMING_S = 300.0
 _IMPACT_G = 4.0

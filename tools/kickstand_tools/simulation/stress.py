@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
+from .physics.road import CLASS_B, CLASS_C
 from .plan import Conditions, Plan
-from .road import CLASS_B, CLASS_C
 
 Profile = Callable[[Plan], Conditions]
 

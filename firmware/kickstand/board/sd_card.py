@@ -1,0 +1,29 @@
+"""An SD card on SPI, where config.py names its pins."""
+
+import os
+
+from machine import Pin
+
+from ..errors import CardError
+from . import port
+
+MOUNT = "/sd"
+
+
+def mount(settings):
+    """Mount it, unless it is; returns the directory. Raises CardError."""
+    if MOUNT[1:] in os.listdir("/"):
+        return MOUNT
+    pins = settings.SD_SCK, settings.SD_MOSI, settings.SD_MISO, settings.SD_CS
+    try:
+        card = port.open_sd_card(settings.SD_SPI, *[Pin(pin) for pin in pins])
+        os.mount(card, MOUNT)
+    except ImportError:
+        raise CardError(
+            "SD card: its driver is not on the board: mpremote mip install sdcard", "SD card:", "no driver"
+        )
+    except (OSError, ValueError) as error:
+        raise CardError(
+            "SD card: none that can be read (%s): check card and wiring" % error, "No SD card", "check card"
+        )
+    return MOUNT

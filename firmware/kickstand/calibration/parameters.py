@@ -1,0 +1,76 @@
+"""Counts to specific force (g) and angular rate (deg/s) in the sensor's own axes."""
+
+from array import array
+
+from ..rotation import matrix, vector
+
+MAX_OFFSET_G = 0.5  # real boards go past the data sheet's 50..80 mg
+MIN_SLOPE, MAX_SLOPE = 0.8, 1.2
+
+
+class Calibration:
+    """The parameters of one mounted sensor, and their use.
+
+    accel_offset (3, g), accel_slope (3), gyro_bias (3, deg/s), vehicle_from_sensor (9, rows left, up, forward),
+    trim_deg: by how much the lean reads too far right. calibrated = slope * reading + offset, Nicolae's equations
+    18-20. six_done: offset and slope were measured; aligned: the matrix was; by_drive: by driving, or refined by it.
+    """
+
+    def __init__(self):
+        self.accel_offset = vector()
+        self.accel_slope = vector(1.0, 1.0, 1.0)
+        self.gyro_bias = vector()
+        self.vehicle_from_sensor = matrix()
+        self.trim_deg = 0.0
+        self.six_done = False
+        self.aligned = False
+        self.by_drive = False
+        self._scale = vector()
+        self._gyro_scale = 1.0
+        self._accel_lsb = 1.0
+        self.set_scale(1.0, 1.0)
+
+    def set_scale(self, accel_lsb_per_g, gyro_lsb_per_dps):
+        """Say what a count is worth (1, 1: readings are in g and deg/s already)."""
+        self._accel_lsb = accel_lsb_per_g
+        self.set_accel(self.accel_offset, self.accel_slope)
+        self._gyro_scale = 1.0 / gyro_lsb_per_dps
+
+    def set_accel(self, offset, slope):
+        """Take the six-position result: offset (3, g) and slope (3)."""
+        for i in range(3):
+            self.accel_offset[i] = offset[i]
+            self.accel_slope[i] = slope[i]
+            self._scale[i] = slope[i] / self._accel_lsb
+
+    def parameters(self):
+        """All 19 that were measured: offset, slope, gyro bias, matrix, trim."""
+        measured = list(self.accel_offset) + list(self.accel_slope) + list(self.gyro_bias)
+        return measured + list(self.vehicle_from_sensor) + [self.trim_deg]
+
+    def set_parameters(self, values):
+        """Take those of parameters()."""
+        self.set_accel(values[0:3], values[3:6])
+        for i in range(3):
+            self.gyro_bias[i] = values[6 + i]
+        for i in range(9):
+            self.vehicle_from_sensor[i] = values[9 + i]
+        self.trim_deg = values[18]
+
+    def correct(self, accel):
+        """Calibrated copy of a mean accelerometer reading in g."""
+        return array("f", [self.accel_slope[i] * accel[i] + self.accel_offset[i] for i in range(3)])
+
+    def scales(self):
+        """g per count of each accelerometer axis (3), and deg/s per count of the gyro."""
+        return self._scale, self._gyro_scale
+
+    def apply(self, reading, force, rate):
+        """reading (7, chip's order: accelerometer, temperature, gyro) -> force (3, g) and rate (3, deg/s)."""
+        scale, offset, bias, gyro_scale = self._scale, self.accel_offset, self.gyro_bias, self._gyro_scale
+        force[0] = scale[0] * reading[0] + offset[0]
+        force[1] = scale[1] * reading[1] + offset[1]
+        force[2] = scale[2] * reading[2] + offset[2]
+        rate[0] = gyro_scale * reading[4] - bias[0]
+        rate[1] = gyro_scale * reading[5] - bias[1]
+        rate[2] = gyro_scale * reading[6] - bias[2]

@@ -1,0 +1,146 @@
+"""Accelerometer offset and slope from six still poses, one on each side (A. Nicolae, section 4).
+
+The closed form (16)-(17) assumes that each axis points exactly up or down: 10 degrees off costs 0.6 degrees.
+fit() uses the same six means but asks only that each calibrated reading be 1 g long, which holds in any pose;
+it stays near 0.1 degrees (Gauss-Newton from the closed form). Six poses determine six numbers exactly, so
+their residual proves nothing: a seventh, free pose does.
+"""
+
+from math import acos, degrees
+
+from ..errors import CalibrationError
+from .parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE
+
+SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")  # the axis that points up
+MAX_TILT_DEG = 20.0  # of a side from its axis
+FREE_TILT_DEG = 20.0  # a free pose nearer than this to a side says little new
+FREE_GOOD_G = 0.010
+FREE_MAX_G = 0.020  # up to 2 % of cross-axis sensitivity, which offset and slope cannot describe
+SHEET_OFFSET_G = (0.05, 0.05, 0.08)
+SHEET_SLOPE = 0.03
+
+
+def side_of(accel):
+    """Index into SIDES of the axis nearest to up in a mean reading (3, g)."""
+    axis = 0
+    for i in (1, 2):
+        if abs(accel[i]) > abs(accel[axis]):
+            axis = i
+    return 2 * axis + (1 if accel[axis] < 0 else 0)
+
+
+def tilt_deg(force):
+    """How far the nearest axis is from the vertical, degrees. force: 3, any unit; a null vector gives 90."""
+    size = sum(f * f for f in force) ** 0.5
+    if not size > 1e-6:
+        return 90.0
+    return degrees(acos(min(1.0, max(abs(f) for f in force) / size)))
+
+
+def closed_form(poses):
+    """Equations 16-17 in g. poses: six mean readings (3, g) in the order of SIDES. Returns offset (3, g),
+    slope (3)."""
+    offset, slope = [0.0] * 3, [0.0] * 3
+    for i in range(3):
+        high, low = poses[2 * i][i], poses[2 * i + 1][i]
+        if not high - low > 0.5:
+            raise CalibrationError(
+                "axis %s barely changes when turned over: %.2f g" % ("xyz"[i], high - low),
+                "Axis %s is dead" % "xyz"[i],
+                "Check sensor",
+            )
+        offset[i] = -(high + low) / (high - low)
+        slope[i] = 2.0 / (high - low)
+    return offset, slope
+
+
+def fit(poses):
+    """Offset (3, g) and slope (3) that make all six readings 1 g long. poses as for closed_form. Raises
+    CalibrationError."""
+    offset, slope = closed_form(poses)
+    rows = [[0.0] * 7 for _ in range(6)]
+    for _ in range(8):  # it settles in 3 to 5
+        for pose, row in zip(poses, rows):
+            square = 0.0
+            for i in range(3):
+                value = slope[i] * pose[i] + offset[i]
+                square += value * value
+                row[i] = 2.0 * value
+                row[3 + i] = 2.0 * value * pose[i]
+            row[6] = 1.0 - square
+        if not _solve(rows):
+            raise CalibrationError(
+                "the six poses do not determine the calibration: repeat them, each side once",
+                "Poses unclear",
+                "Do them again",
+            )
+        for i in range(3):
+            offset[i] += rows[i][6]
+            slope[i] += rows[3 + i][6]
+        if max(abs(row[6]) for row in rows) < 1e-6:
+            break
+    check(offset, slope, poses)
+    return offset, slope
+
+
+def check(offset, slope, poses):
+    """Raise CalibrationError unless the parameters are plausible and every side was within MAX_TILT_DEG of
+    its axis."""
+    for i in range(3):
+        if not (abs(offset[i]) < MAX_OFFSET_G and MIN_SLOPE < slope[i] < MAX_SLOPE):
+            raise CalibrationError(
+                "axis %s: offset %.3f g, slope %.3f is past any real sensor: repeat the six poses"
+                % ("xyz"[i], offset[i], slope[i]),
+                "Axis %s is off" % "xyz"[i],
+                "Do them again",
+            )
+    for k in range(6):
+        tilt = tilt_deg([slope[i] * poses[k][i] + offset[i] for i in range(3)])
+        if tilt > MAX_TILT_DEG:
+            raise CalibrationError(
+                "side %s was %.0f degrees off: within %.0f is needed" % (SIDES[k], tilt, MAX_TILT_DEG),
+                "Side %s: %.0f\xdf off" % (SIDES[k], tilt),
+                "Do them again",
+            )
+
+
+def check_free_pose(offset, slope, accel):
+    """Check a seventh, slanted pose against 1 g; return the error in g. Raises CalibrationError."""
+    force = [slope[i] * accel[i] + offset[i] for i in range(3)]
+    error = sum(f * f for f in force) ** 0.5 - 1.0
+    if not abs(error) <= FREE_MAX_G:
+        raise CalibrationError(
+            "the free pose reads %.3f g instead of 1: repeat the six poses, held still" % (1.0 + error),
+            "Check: %.3f g" % (1.0 + error),
+            "Do them again",
+        )
+    return error
+
+
+def beyond_sheet(offset, slope):
+    """Names of the axes whose offset or slope is past the data sheet (used, but worth a warning)."""
+    return [
+        "xyz"[i] for i in range(3) if abs(offset[i]) > SHEET_OFFSET_G[i] or abs(slope[i] - 1.0) > SHEET_SLOPE
+    ]
+
+
+def _solve(rows):
+    """Gauss-Jordan with partial pivoting on six rows of [6 coefficients, right side]; the solution ends up
+    in column 6. False if singular."""
+    for k in range(6):
+        pivot = k
+        for r in range(k + 1, 6):
+            if abs(rows[r][k]) > abs(rows[pivot][k]):
+                pivot = r
+        if not abs(rows[pivot][k]) > 1e-4:
+            return False
+        rows[k], rows[pivot] = rows[pivot], rows[k]
+        lead = rows[k][k]
+        for c in range(k, 7):
+            rows[k][c] /= lead
+        for r in range(6):
+            if r != k and rows[r][k] != 0.0:
+                factor = rows[r][k]
+                for c in range(k, 7):
+                    rows[r][c] -= factor * rows[k][c]
+    return True

@@ -1,0 +1,111 @@
+"""One still pose, averaged: raw integer sums, with stillness watched sample by sample.
+
+Integers only until the end: a sum of float32 readings would lose what the averaging is for.
+"""
+
+from ..errors import CaptureError
+
+PEAK_G = 0.08  # a knock; ten times the noise of the chip with its widest filter
+PEAK_DPS = 5.0
+SPREAD_G = 0.02  # standard deviation: being still matters more than being exact
+DRIFT_G = 0.007  # between the means of both halves: 0.4 degrees of slow tilt
+MAX_BIAS_DPS = 45.0  # data sheet: 20, and as much again over temperature
+MIN_SAMPLES = 20
+
+_AXES = (0, 1, 2, 4, 5, 6)  # accelerometer and gyro in the chip's order; 3 is the temperature
+
+
+class Capture:
+    """Collects the samples of one pose.
+
+    accel_lsb_per_g, gyro_lsb_per_dps: counts per unit.  accel_limit: |counts| from which an axis is
+    saturated. expected: how many samples are to come; the drift check compares the halves. After finish():
+    accel (g, sensor axes, uncalibrated), gyro (deg/s), temperature (counts), count.
+    """
+
+    def __init__(self, accel_lsb_per_g, gyro_lsb_per_dps, accel_limit, expected):
+        self._accel_lsb = accel_lsb_per_g
+        self._gyro_lsb = gyro_lsb_per_dps
+        self._limit = accel_limit
+        self._half = expected // 2
+        accel_peak = int(PEAK_G * accel_lsb_per_g)
+        gyro_peak = int(PEAK_DPS * gyro_lsb_per_dps)
+        self._peaks = (accel_peak, accel_peak, accel_peak, 0, gyro_peak, gyro_peak, gyro_peak)
+        self._first = [0] * 7
+        self._sums = [0] * 7  # of the deviations from the first sample, so that they stay small integers
+        self._early = [0] * 7  # the sums at half time
+        self._squares = [0] * 7
+        self.count = 0
+        self.problem = None
+        self.accel = None
+        self.gyro = None
+        self.temperature = 0
+
+    def add(self, counts):
+        """Take one sample (7 integers, the chip's order); False once the pose is spoilt, see problem."""
+        if self.problem is not None:
+            return False
+        if self.count == 0:
+            for i in range(7):
+                self._first[i] = counts[i]
+        for i in _AXES:
+            deviation = counts[i] - self._first[i]
+            if not -self._peaks[i] <= deviation <= self._peaks[i]:
+                self.problem = "moved or knocked"
+                return False
+            if i < 3 and not -self._limit < counts[i] < self._limit:
+                self.problem = "saturated: the accelerometer is at the end of its range"
+                return False
+            self._sums[i] += deviation
+            self._squares[i] += deviation * deviation
+        self._sums[3] += counts[3] - self._first[3]
+        self.count += 1
+        if self.count == self._half:
+            for i in range(7):
+                self._early[i] = self._sums[i]
+        return True
+
+    def finish(self):
+        """Check the whole pose and set accel, gyro and temperature. Raises CaptureError with the reason."""
+        if self.problem is None:
+            self.problem = self._judge()
+        if self.problem is not None:
+            raise CaptureError("pose refused: %s" % self.problem, *_lcd(self.problem))
+        n = self.count
+        mean = [self._first[i] + self._sums[i] / n for i in range(7)]
+        self.accel = [mean[i] / self._accel_lsb for i in range(3)]
+        self.gyro = [mean[i] / self._gyro_lsb for i in range(4, 7)]
+        self.temperature = mean[3]
+        if max(abs(rate) for rate in self.gyro) > MAX_BIAS_DPS:
+            raise CaptureError(
+                "pose refused: turning, or a gyro offset of over %.0f deg/s" % MAX_BIAS_DPS,
+                "Gyro offset big",
+                "Hold still",
+            )
+
+    def _judge(self):
+        n = self.count
+        if n < MIN_SAMPLES:
+            return "too short: %d samples, at least %d needed" % (n, MIN_SAMPLES)
+        if not any(self._squares):
+            return "frozen: every reading is the same, check the sensor and its wires"
+        late = n - self._half
+        for i in range(3):
+            mean = self._sums[i] / n
+            if self._squares[i] / n - mean * mean > (SPREAD_G * self._accel_lsb) ** 2:
+                return "not still: vibration"
+            drift = (self._sums[i] - self._early[i]) / late - self._early[i] / self._half
+            if abs(drift) > DRIFT_G * self._accel_lsb:
+                return "not still: slowly tilting"
+        return None
+
+
+def _lcd(problem):
+    """Two display lines for a problem."""
+    if problem.startswith("frozen"):
+        return "Sensor frozen", "Check wiring"
+    if problem.startswith("saturated"):
+        return "Accel saturated", "Check sensor"
+    if problem.startswith("too short"):
+        return "Too few readings", "Check sensor"
+    return "Moved!", "Hold it still"

@@ -1,0 +1,163 @@
+"""The calibration in flash: two alternating records, so that a power cut at any byte leaves a whole one.
+
+A record: magic, version, length, sequence, chip identity and range, flags, 19 floats, CRC32 of everything
+before it. save() writes over the record that is not in use and reads it back; load() takes the newest valid
+one. Nothing is ever written because a read failed: in a voltage sag a good file can read as empty.
+"""
+
+import struct
+from binascii import crc32
+from errno import ENOENT
+from math import degrees
+
+from ..errors import StoreError
+from ..lean.upright_trim import MAX_TRIM
+from ..rotation import is_rotation
+from .parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE, Calibration
+
+FILES = ("kickstand_a.cal", "kickstand_b.cal")
+VERSION = 1
+_HEAD = "<4sHHI"  # magic, version, length of the whole record, sequence
+_BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, alignment; offset, slope, gyro bias, matrix, trim
+_NOT_ALIGNED, _BY_POSES, _BY_DRIVE = 0, 1, 2
+_MAGIC = b"KSTD"
+BODY_LENGTH = struct.calcsize(_BODY)
+_LENGTH = struct.calcsize(_HEAD) + BODY_LENGTH + 4
+MAX_BIAS_DPS = 60.0
+MAX_TRIM_DEG = degrees(MAX_TRIM) + 0.1  # rounded to 32 bits on the way
+
+
+class Store:
+    """Calibration records of one chip.
+
+    who_am_i, accel_range_g: the chip in use; a record of another chip or range is not this sensor's.
+    directory: where the files are. After load(): message says in a few words where the calibration came from
+    or why there is none.
+    """
+
+    def __init__(self, who_am_i, accel_range_g, directory=""):
+        self.who_am_i = who_am_i
+        self._chip = (who_am_i, accel_range_g)
+        self._directory = directory
+        self.message = ""
+        self._sequence = 0  # of the record in use
+        self._problems = []  # of the other
+
+    def load(self):
+        """The newest valid Calibration; a fresh, uncalibrated one where there is none. Never raises, never
+        writes."""
+        sequence, calibration, problems = self._newest()
+        self._sequence, self._problems = sequence, problems
+        if calibration is None:
+            self.message = "not calibrated" + (": " + ", ".join(problems) if problems else "")
+            return Calibration()
+        self.message = "record %d" % sequence + (
+            " (other record: %s)" % ", ".join(problems) if problems else ""
+        )
+        return calibration
+
+    def unchanged(self):
+        """True if both files read as they did before: not so where load() fell back because one misread for a while,
+        as in a voltage sag."""
+        sequence, _, problems = self._newest()
+        return sequence == self._sequence and problems == self._problems
+
+    def save(self, calibration):
+        """Write calibration over the older record and read it back. Raises StoreError; the record in use
+        stays whole."""
+        sequence, _, _ = self._newest()
+        record = self._pack(calibration, sequence + 1)
+        path = self._path(FILES[(sequence + 1) % 2])
+        try:
+            with open(path, "wb") as file:
+                file.write(record)
+            with open(path, "rb") as file:
+                written = file.read()
+        except OSError as error:
+            raise StoreError(
+                "calibration not saved: %s; the old one is kept" % error,
+                "Not saved: flash",
+                "Old one is kept",
+            )
+        if written != record:
+            raise StoreError(
+                "calibration not saved: it reads back differently; the old one is kept",
+                "Not saved: flash",
+                "Old one is kept",
+            )
+        self._sequence, _, self._problems = self._newest()
+
+    def _newest(self):
+        """(sequence, calibration, problems): sequence 0 and None where no record is valid."""
+        newest, calibration, problems = 0, None, []
+        for name in FILES:
+            try:
+                with open(self._path(name), "rb") as file:
+                    record = file.read(_LENGTH + 1)
+            except OSError as error:
+                if error.args[0] != ENOENT:  # missing is no problem: the first save makes it
+                    problems.append("%s unreadable" % name)
+                continue
+            sequence, found, problem = self._unpack(record)
+            if problem:
+                problems.append("%s %s" % (name, problem))
+            if sequence > newest:
+                newest, calibration = sequence, found
+        return newest, calibration, problems
+
+    def _path(self, name):
+        return self._directory + "/" + name if self._directory else name
+
+    def _pack(self, calibration, sequence):
+        record = struct.pack(_HEAD, _MAGIC, VERSION, _LENGTH, sequence) + pack(*self._chip, calibration)
+        return record + struct.pack("<I", crc32(record))
+
+    def _unpack(self, record):
+        """(sequence, calibration, None) or (0, None, what is wrong)."""
+        if len(record) != _LENGTH:
+            return 0, None, "empty" if not record else "cut short" if len(record) < _LENGTH else "too long"
+        magic, version, length, sequence = struct.unpack_from(_HEAD, record, 0)
+        if struct.unpack_from("<I", record, _LENGTH - 4)[0] != crc32(record[:-4]):
+            return 0, None, "damaged"
+        if magic != _MAGIC or version != VERSION or length != _LENGTH or sequence == 0:
+            return 0, None, "of another version"
+        who_am_i, accel_range_g, calibration = unpack(record, struct.calcsize(_HEAD))
+        if (who_am_i, accel_range_g) != self._chip:
+            return 0, None, "of another sensor or range"
+        if not plausible(calibration):
+            return 0, None, "out of range"
+        return sequence, calibration, None
+
+
+def pack(who_am_i, accel_range_g, calibration):
+    """BODY_LENGTH bytes: a calibration and the chip it belongs to."""
+    return struct.pack(
+        _BODY,
+        who_am_i,
+        accel_range_g,
+        calibration.six_done,
+        (_BY_DRIVE if calibration.by_drive else _BY_POSES) if calibration.aligned else _NOT_ALIGNED,
+        *calibration.parameters(),
+    )
+
+
+def unpack(data, at):
+    """(who_am_i, accel_range_g, Calibration) from pack()'s bytes at a place in data."""
+    fields = struct.unpack_from(_BODY, data, at)
+    calibration = Calibration()
+    calibration.six_done, calibration.aligned = bool(fields[2]), fields[3] != _NOT_ALIGNED
+    calibration.by_drive = fields[3] == _BY_DRIVE
+    calibration.set_parameters(fields[4:])
+    return fields[0], fields[1], calibration
+
+
+def plausible(calibration):
+    """True if every parameter is one that a real sensor could have."""
+    for i in range(3):
+        if not abs(calibration.accel_offset[i]) < MAX_OFFSET_G:  # "not <" also refuses not-a-number
+            return False
+        if not MIN_SLOPE < calibration.accel_slope[i] < MAX_SLOPE:
+            return False
+        if not abs(calibration.gyro_bias[i]) < MAX_BIAS_DPS:
+            return False
+    return is_rotation(calibration.vehicle_from_sensor, 1e-4) and abs(calibration.trim_deg) <= MAX_TRIM_DEG

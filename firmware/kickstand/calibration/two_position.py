@@ -1,0 +1,78 @@
+"""Sensor to vehicle from two still poses: on the kickstand and upright (A. Nicolae, section 2).
+
+The paper's slips, put right: (4) is the cross product upright x tilted; (5) takes y from the upright reading,
+divided by its own length; with the bike leaned to the right, x and z come out reversed and are turned round.
+"""
+
+from math import atan2, degrees
+
+from ..errors import AlignmentError
+from ..rotation import cross, dot, norm, normalize, vector
+
+MIN_TILT_DEG = 5.0  # below, 1 degree of pitch change between the poses turns forward by over 11 degrees
+WARN_TILT_DEG = 8.0
+MAX_TILT_DEG = 60.0
+SAME_POSE_DEG = 1.0
+UNCALIBRATED_TOLERANCE_G = 0.15  # data sheet: 80 mg of offset and 3 % of scale, and a little drift
+CALIBRATED_TOLERANCE_G = 0.05  # after six positions only drift over temperature is left: 35 mg
+
+
+def check_one_g(force, tolerance_g, pose):
+    """Raise AlignmentError unless |force| is within tolerance of 1 g. pose: its name for the rider."""
+    size = norm(force)
+    if not abs(size - 1.0) <= tolerance_g:
+        raise AlignmentError(
+            "%s reading is %.3f g, not 1 g: calibrate six positions first, or check the sensor"
+            % (pose, size),
+            "Reads %.2f g!" % size,
+            "Do six positions",
+        )
+
+
+def two_position(out, kickstand, upright, side="left", tolerance_g=UNCALIBRATED_TOLERANCE_G):
+    """Fill out (9, rows left, up, forward) with vehicle-from-sensor; return the tilt between the poses in
+    degrees.
+
+    kickstand, upright: mean specific force of each pose in the sensor's axes, g. side: where the kickstand
+    leans the bike to. Raises AlignmentError. Equations 3-8.
+    """
+    check_one_g(kickstand, tolerance_g, "kickstand")
+    check_one_g(upright, tolerance_g, "upright")
+    y = vector(upright[0], upright[1], upright[2])
+    tilted = vector(kickstand[0], kickstand[1], kickstand[2])
+    normalize(y)
+    normalize(tilted)
+    z = vector()
+    cross(z, y, tilted)
+    tilt = degrees(atan2(norm(z), dot(y, tilted)))
+    if tilt < SAME_POSE_DEG:
+        raise AlignmentError(
+            "both poses are the same (%.1f degrees apart): one on the kickstand, one upright" % tilt,
+            "Same pose twice",
+            "Stand, then up",
+        )
+    if tilt < MIN_TILT_DEG:
+        raise AlignmentError(
+            "only %.1f degrees between the poses: at least %.0f are needed, lean the bike further"
+            % (tilt, MIN_TILT_DEG),
+            "Tilt only %.1f\xdf" % tilt,
+            "Need %.0f\xdf or more" % MIN_TILT_DEG,
+        )
+    if tilt > MAX_TILT_DEG:
+        raise AlignmentError(
+            "%.0f degrees between the poses: no kickstand leans over %.0f, repeat both poses"
+            % (tilt, MAX_TILT_DEG),
+            "Tilt %.0f\xdf: over" % tilt,
+            "%.0f\xdf, do it again" % MAX_TILT_DEG,
+        )
+    normalize(z)
+    if side == "right":
+        z[0], z[1], z[2] = -z[0], -z[1], -z[2]
+    x = vector()
+    cross(x, y, z)
+    normalize(x)
+    for i in range(3):
+        out[i] = x[i]
+        out[3 + i] = y[i]
+        out[6 + i] = z[i]
+    return tilt

@@ -1,0 +1,50 @@
+"""A ride to the console instead of the flash, for `kickstand record`: lines of base64, a '.' after each block."""
+
+from binascii import b2a_base64
+
+LENGTH = 512  # a block of half a second
+
+
+class RideStream:
+    """Takes the place of a RideRing."""
+
+    stops_interrupts = False
+
+    def begin(self):
+        return 0
+
+    def next_length(self):
+        return LENGTH
+
+    def room(self):
+        return None
+
+    def ready(self):
+        return True
+
+    def write(self, piece):
+        print(b2a_base64(piece).decode(), end="")
+
+    def end_block(self):
+        print(".")
+
+    def end(self):
+        pass
+
+    def abandon(self):
+        pass
+
+    def name_problem(self, error):
+        return "USB"
+
+
+def run():
+    """The app, its display and button alive, its turns to the console. Ctrl-C ends it."""
+    from .. import app, devices, settings
+    from ..board import port
+
+    chosen = settings.load()
+    try:
+        app.App(chosen, devices.open_lcd(chosen), RideStream()).run()
+    except KeyboardInterrupt:
+        port.rest_watchdog()

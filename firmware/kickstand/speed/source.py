@@ -1,0 +1,90 @@
+"""The speed source that config.py names, and what of its values is fit to be used."""
+
+from time import ticks_diff
+
+from machine import UART, Pin
+
+from ..board import port
+from ..errors import SettingsError
+
+MAX_MPS = 100.0
+MAX_CHANGE_MPS2 = 15.0  # no tyre holds more
+NOISE_MPS = 2.0
+GIVE_UP_MS = 3000  # what has been refused for so long is true
+RX_BUFFER = 512  # half a second at 9600 baud: flash is written meanwhile, or the sensor set up
+
+
+class Speed:
+    """source: a Gps or a Wheel. After poll() has returned a speed: age_us, how old it is."""
+
+    def __init__(self, source):
+        self._source = source
+        self._last = None  # accepted, m/s, and when
+        self._last_ms = 0
+        self.age_us = 0
+
+    def poll(self, now_ms):
+        """A new speed in m/s, or None: none has come, or not one that a vehicle can have after the last. Call it each
+        turn of the loop."""
+        speed = self._source.poll(now_ms)
+        if speed is None or not 0.0 <= speed <= MAX_MPS:
+            return None
+        if self._last is not None:
+            waited_ms = ticks_diff(now_ms, self._last_ms)
+            allowed = NOISE_MPS + MAX_CHANGE_MPS2 * waited_ms / 1000.0
+            if waited_ms < GIVE_UP_MS and not -allowed <= speed - self._last <= allowed:
+                return None
+        self._last = speed
+        self._last_ms = now_ms
+        self.age_us = 1000 * self._source.age_ms
+        return speed
+
+    def skip(self, now_ms):
+        """Interrupts were off until now."""
+        self._source.skip(now_ms)
+
+    def fault(self, now_ms):
+        """None, or two display lines that say why no speed comes."""
+        return self._source.fault(now_ms)
+
+
+def open_speed(settings):
+    """The Speed of these settings, which name a source. Raises SettingsError for pins it cannot use."""
+    if settings.SPEED == "gps":
+        from .gps import Gps
+
+        return Speed(Gps(_open_uart(settings)))
+    from .wheel import Wheel
+
+    return Speed(Wheel(_open_wheel_pin(settings), settings.PULSES_PER_METRE, port.PIN_IRQ))
+
+
+def _open_uart(settings):
+    try:
+        return UART(
+            settings.GPS_UART,
+            settings.GPS_BAUD,
+            # nothing is sent, but a UART takes both its pins: on rp2, unless told, the sensor's
+            tx=Pin(settings.GPS_TX),
+            rx=Pin(settings.GPS_RX),
+            rxbuf=RX_BUFFER,
+            timeout=0,
+        )
+    except ValueError as error:
+        raise SettingsError(
+            "config.py: GPS_TX = %d and GPS_RX = %d do not belong to UART %d (%s)"
+            % (settings.GPS_TX, settings.GPS_RX, settings.GPS_UART, error),
+            "config.py: wrong",
+            "GPS_TX / GPS_RX",
+        )
+
+
+def _open_wheel_pin(settings):
+    try:
+        return Pin(settings.WHEEL_PIN, Pin.IN, Pin.PULL_UP)
+    except ValueError as error:
+        raise SettingsError(
+            "config.py: WHEEL_PIN = %d is no pin of this board (%s)" % (settings.WHEEL_PIN, error),
+            "config.py: wrong",
+            "WHEEL_PIN",
+        )

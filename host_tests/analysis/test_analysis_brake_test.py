@@ -1,0 +1,260 @@
+"""Stops of simulated rides against their truth: mean fully developed deceleration within 1 %."""
+
+import json
+from pathlib import Path
+
+import analysis_rides
+import command
+import numpy as np
+import pytest
+from kickstand_tools.analysis.channels import Channels, open_ride
+from kickstand_tools.analysis.signals import G
+from kickstand_tools.analysis.stops.brake_test import RATE_S, Stop, mfdd_mps2, stops
+from kickstand_tools.analysis.stops.speed_fit import speed_delay_s
+from kickstand_tools.analysis.stops.standstill import standing
+from kickstand_tools.analysis.thin import joined, thinned
+from kickstand_tools.calibration import poses as captured
+from kickstand_tools.calibration.file import read_calibration, write_calibration
+from kickstand_tools.simulation import profiles
+from kickstand_tools.simulation.files import simulate
+from kickstand_tools.simulation.plan import Conditions, Plan
+from kickstand_tools.simulation.scripted import script
+
+# Speed in the log: how often, how late, how noisy (m/s)
+PERFECT_1HZ, PERFECT_10HZ = (1, 0.0, 0.0), (10, 0.0, 0.0)
+SATELLITES_1HZ, SATELLITES_10HZ = (1, 0.2, 0.05), (10, 0.2, 0.05)
+
+
+def course(path: Path) -> Channels:
+    return joined(list(thinned((block for _, block in open_ride(path, None).blocks("")), RATE_S)))
+
+
+def brakes(plan: Plan) -> Conditions:
+    """Stop after stop, from 29 to 126 km/h with 2 to 9 m/s2, on slopes of up to 3 %."""
+    plan.begin()
+    while plan.going_on:
+        speed = plan.uniform(8.0, 35.0)
+        plan.to_speed(speed, 3.0)
+        plan.straight(plan.uniform(3.0, 8.0), speed)
+        plan.stop(plan.uniform(3.0, 6.0), plan.uniform(2.0, 9.0))
+    plan.finish(15.0, 3.0)
+    return Conditions()
+
+
+@pytest.fixture(scope="module")
+def ride(tmp_path_factory) -> tuple[Channels, np.ndarray, np.ndarray]:
+    """Read by an MPU6050 stuck on at random, calibrated by its poses: the course, true times and speeds."""
+    directory = tmp_path_factory.mktemp("brakes")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(profiles.PROFILES, "brakes", brakes)
+        made = simulate("brakes", 2, directory, seconds=300.0)
+    poses = [directory / f"POSE_{k}.csv" for k in range(1, 8)]
+    write_calibration(directory / "six.json", captured.six(poses, lambda _: None))
+    pair = directory / "KICKSTAND.csv", directory / "UPRIGHT.csv"
+    six = read_calibration(directory / "six.json")
+    write_calibration(directory / "RIDE.cal.json", captured.two(*pair, six, "left", lambda _: None))
+    return course(directory / "RIDE.csv"), made.time, made.truth["speed_mps"]
+
+
+def with_speed(ride, hz: int, late_s: float, noise_mps: float) -> Channels:
+    """The course with the true speed in it now and then."""
+    whole, time, speed = ride
+    result = whole.part(slice(None))
+    result.speed_mps = np.full(len(result.t_s), np.nan)
+    places = np.arange(0, len(result.t_s), 50 // hz)
+    noise = noise_mps * np.random.default_rng(0).normal(size=len(places))
+    result.speed_mps[places] = np.abs(np.interp(result.t_s[places] - late_s, time, speed) + noise).round(2)
+    return result
+
+
+def truth(time: np.ndarray, speed: np.ndarray, stop: Stop) -> tuple[float, float, float]:
+    """(initial speed, distance from the start found, MFDD) from the true speed around this stop."""
+    near = (time > stop.start_s - 1.0) & (time < stop.stop_s + 1.0)
+    t, v = time[near], speed[near]
+    first = len(v) - 1 - int(np.argmax(v[::-1] > np.max(v) - 0.01))  # the last of the speed before
+    t, v = t[first:], v[first:]
+    distance = np.concatenate(([0.0], np.cumsum(np.diff(t) * (v[1:] + v[:-1]) / 2.0)))
+    kmh = v * 3.6
+    vb, ve = 0.8 * kmh[0], 0.1 * kmh[0]
+    sb, se = np.interp([-vb, -ve], -kmh, distance)
+    before = float(v[0]) * max(0.0, float(t[0]) - stop.start_s)
+    found = before + float(distance[-1] - np.interp(stop.start_s, t, distance))
+    assert abs(t[0] - stop.start_s) < 0.3
+    return float(v[0]), found, float((vb**2 - ve**2) / (25.92 * (se - sb)))
+
+
+def true_stops(time: np.ndarray, speed: np.ndarray) -> np.ndarray:
+    return time[1:][(speed[1:] < 0.01) & (speed[:-1] >= 0.01)]
+
+
+# at most, in per cent: of the MFDD, of the initial speed
+LIMITS = {
+    "1 Hz": (PERFECT_1HZ, 1.0, 0.5),
+    "10 Hz": (PERFECT_10HZ, 1.0, 0.5),
+    "satellites at 1 Hz": (SATELLITES_1HZ, 2.0, 1.5),
+    "satellites at 10 Hz": (SATELLITES_10HZ, 1.5, 1.0),
+}
+
+
+@pytest.mark.parametrize("name", LIMITS)
+def test_with_a_speed(ride, name):
+    source, mfdd_limit, speed_limit = LIMITS[name]
+    found = stops(with_speed(ride, *source))
+    assert len(found) == len(true_stops(ride[1], ride[2])) >= 9
+    errors = []
+    for stop in found:
+        speed, distance, mfdd = truth(ride[1], ride[2], stop)
+        assert stop.speed_from == "log"
+        assert stop.initial_speed_mps == pytest.approx(speed, rel=speed_limit / 100)
+        assert stop.distance_m == pytest.approx(distance, rel=0.02, abs=0.1)
+        errors.append(100.0 * (stop.mfdd_mps2 / mfdd - 1.0))
+        assert abs(stop.side_m) < 1.0
+        assert mfdd < stop.peak_mps2 < 1.6 * mfdd
+    assert np.max(np.abs(errors)) < mfdd_limit
+    assert abs(np.mean(errors)) < 0.5 * mfdd_limit
+
+
+def test_without_a_speed(ride):
+    """Every stop is found, nothing else is; 3 % at worst, 1 % rms."""
+    whole = ride[0]
+    found = stops(whole)
+    assert len(found) == len(true_stops(ride[1], ride[2]))
+    errors = []
+    for stop in found:
+        assert stop.speed_from == "integrated"
+        errors.append(100.0 * (stop.mfdd_mps2 / truth(ride[1], ride[2], stop)[2] - 1.0))
+    assert np.max(np.abs(errors)) < 3.0
+    assert np.sqrt(np.mean(np.square(errors))) < 1.2
+
+
+def test_standing_is_seen_without_a_speed(ride):
+    whole, time, speed = ride
+    still = standing(whole)
+    true = np.interp(whole.t_s, time, speed)
+    assert np.max(true[still]) < 0.5
+    assert np.mean(still[true == 0.0]) > 0.6  # not while the bike is leaned onto a foot
+
+
+def test_the_speed_of_satellites_is_late(ride):
+    for hz in 1, 10:
+        assert speed_delay_s(with_speed(ride, hz, 0.0, 0.0)) == pytest.approx(0.0, abs=0.04)
+        assert speed_delay_s(with_speed(ride, hz, 0.4, 0.05)) == pytest.approx(0.4, abs=0.04)
+    assert speed_delay_s(ride[0]) == 0.0
+
+
+def test_the_definition():
+    """Constant deceleration gives just that; before 0.8 v0 and after 0.1 v0 nothing counts."""
+    v = np.linspace(20.0, 0.0, 2001)
+    assert mfdd_mps2(v, (20.0**2 - v * v) / (2 * 5.0)) == pytest.approx(5.0, rel=1e-9)
+    # 3 m/s2 down to 0.8 v0, then 8 and 5, then 3 again
+    pieces = [(20.0, 16.0, 3.0), (16.0, 9.0, 8.0), (9.0, 2.0, 5.0), (2.0, 0.0, 3.0)]
+    distance = np.cumsum([0.0, *[(high**2 - low**2) / (2 * level) for high, low, level in pieces]])
+    corners = np.array([20.0, *[low for _, low, _ in pieces]])
+    bent = np.interp(-v * v, -corners * corners, distance)
+    want = (16.0**2 - 2.0**2) / (2 * (distance[3] - distance[1]))
+    assert mfdd_mps2(v, bent) == pytest.approx(want, rel=1e-6)
+
+
+def test_a_smooth_road_is_no_standstill(ride):
+    """A stretch without any turning, but with the jolts of riding."""
+    whole, time, speed = ride
+    course = whole.part(slice(None))
+    for name in "pitch_rate_dps", "yaw_rate_dps", "forward_g":
+        setattr(course, name, getattr(course, name).copy())
+    cruising = np.flatnonzero(np.interp(course.t_s, time, speed) > 15.0)
+    smooth = slice(int(cruising[0]) + 50, int(cruising[0]) + 200)
+    course.pitch_rate_dps[smooth] = course.yaw_rate_dps[smooth] = course.forward_g[smooth] = 0.0
+    assert not np.any(standing(course)[smooth])
+    course.up_g, course.left_g, course.rolling = course.up_g.copy(), course.left_g.copy(), course.rolling.copy()
+    course.up_g[smooth] = 1.0
+    course.left_g[smooth] = 0.0
+    assert not np.any(standing(course)[smooth])  # the filter knows that it rolls
+    course.rolling[smooth] = 0.0
+    assert np.mean(standing(course)[smooth]) > 0.9
+    course.forward_g[smooth] = -0.4
+    assert not np.any(standing(course)[smooth])  # the force is more than the weight
+
+
+@pytest.mark.parametrize("slope_deg", [-4.0, 0.0, 4.0])
+@pytest.mark.parametrize("speed_hz", [0, 1])
+def test_a_perfect_sensor_on_a_slope(tmp_path, slope_deg, speed_hz):
+    """The stop of rides.py, whose deceleration is a bell, against its closed form."""
+    path = analysis_rides.write(
+        tmp_path,
+        [
+            script.upright(4),
+            script.accelerate(22, 6),
+            script.straight(8, slope_deg=slope_deg),
+            script.straight(3),
+            script.brake(0, 5),
+            script.wait(5),
+        ],
+        speed_hz=speed_hz,
+        vibration_g=0.01,
+    )
+    (stop,) = stops(course(path))
+    u = np.linspace(0.0, 1.0, 5001)
+    v = 22.0 * (1.0 - u**3 * (10.0 + u * (6.0 * u - 15.0)))
+    want = mfdd_mps2(v, np.concatenate(([0.0], np.cumsum((v[1:] + v[:-1]) / 2.0 * 0.001))))
+    assert stop.mfdd_mps2 == pytest.approx(want, rel=0.01 if speed_hz else 0.02)
+    assert stop.speed_from == ("log" if speed_hz else "integrated")
+    assert stop.peak_mps2 == pytest.approx(22.0 / 5.0 * 1.875, rel=0.03)
+    assert stop.jerk_mps3 == pytest.approx(22.0 / 25.0 * 5.77, rel=0.15)
+
+
+def test_a_road_without_any_vibration(tmp_path):
+    """Nothing shakes, riding or standing, and there is no speed: the filter's rests are the standstills."""
+    rows = [command.HEADER]
+    for seconds, acceleration in ((5, 0.0), (8, 2.5), (6, 0.0), (20 / 6, -6.0), (8, 0.0)):
+        for _ in range(round(100 * seconds)):
+            rows.append(f"{len(rows) / 100:.2f},0,1,{acceleration / G:.5f},0,0,0")
+    path = tmp_path / "RIDE.csv"
+    path.write_text("\n".join(rows) + "\n")
+    (tmp_path / "RIDE.cal.json").write_text(json.dumps(analysis_rides.CALIBRATION))
+    (stop,) = stops(course(path))
+    assert stop.mfdd_mps2 == pytest.approx(6.0, rel=0.01)
+    assert stop.initial_speed_mps == pytest.approx(20.0, rel=0.01)
+
+
+def test_a_pull_to_the_side(tmp_path):
+    """A car that turns by 2 degrees to the left while it brakes, 20 m/s in 4 s."""
+    n = 200
+    t = np.arange(0, 24.0, 1 / n)
+    v = np.clip(20.0 * np.minimum(t - 3.0, 4.0) / 4.0, 0.0, None) - np.clip(5.0 * (t - 12.0), 0.0, 20.0)
+    acceleration = np.gradient(v, t) / G
+    yaw = np.where((t > 12.0) & (t < 16.0), 0.5, 0.0)
+    left = v * np.radians(yaw) / G
+    shake = np.random.default_rng(0).normal(size=(6, len(t))) * np.where(v > 0, 1.0, 0.05)
+    path = command.write(
+        tmp_path / "RIDE.csv",
+        np.column_stack(
+            (
+                t,
+                left + 0.02 * shake[0],
+                1.0 + 0.02 * shake[1],
+                acceleration + 0.02 * shake[2],
+                shake[3],
+                yaw + shake[4],
+                shake[5],
+            )
+        ),
+    )
+    path.with_name("RIDE.cal.json").write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle": "car"}))
+    (stop,) = stops(course(path))
+    assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.02)
+    assert stop.heading_deg == pytest.approx(2.0, abs=0.3)
+    assert stop.side_m == pytest.approx(20.0 * np.radians(0.5) * 16 / 2 - 5.0 * np.radians(0.5) * 64 / 3, abs=0.15)
+
+
+def test_slowing_down_is_no_stop(ride):
+    """Cut out of the ride before it stands."""
+    whole, time, speed = ride
+    first = true_stops(time, speed)[0]
+    part = with_speed(ride, *PERFECT_1HZ).part(whole.t_s < first - 0.5)
+    assert stops(part) == []
+    assert stops(whole.part(whole.t_s < first - 0.5)) == []
+
+
+def test_the_shortest_of_rides(ride):
+    for n in 1, 2, 5, 40:
+        assert stops(ride[0].part(slice(0, n))) == []

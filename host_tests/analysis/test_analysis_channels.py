@@ -1,0 +1,113 @@
+"""What is vectorised is what the firmware says, step by step; thinning and envelopes keep what they should."""
+
+from dataclasses import fields
+
+import analysis_rides
+import numpy as np
+import pytest
+from kickstand.lean import formula
+from kickstand_tools.analysis.channels import Channels, formula_lean_deg, open_ride
+from kickstand_tools.analysis.plot.envelope import envelope
+from kickstand_tools.analysis.summary import Summary
+from kickstand_tools.analysis.thin import joined, thinned
+from kickstand_tools.logs import reader
+from kickstand_tools.replay import replay_engine
+
+
+@pytest.fixture(scope="module")
+def ride(tmp_path_factory):
+    return open_ride(analysis_rides.short(tmp_path_factory.mktemp("ride"), rate_hz=200, speed_hz=1), None)
+
+
+@pytest.fixture(scope="module")
+def course(ride) -> Channels:
+    return joined([channels for _, channels in ride.blocks("")])
+
+
+def test_the_formula_on_arrays_is_the_firmwares():
+    rng = np.random.default_rng(0)
+    left, up, yaw = rng.normal(0.0, 0.7, (3, 5000))
+    yaw[::50], left[:20], up[:20] = 0.0, 0.03, 0.01
+    want = [formula.formula_lean_deg((x, y, 0.0), p) for x, y, p in zip(left, up, yaw)]
+    assert np.max(np.abs(formula_lean_deg(left, up, yaw) - want)) < 1e-6
+
+
+def test_channels_are_those_of_the_meter(ride, course):
+    log = reader.read_log(ride.log)
+    engine = replay_engine.Replay(ride.calibration.to_firmware())
+    rows, shown, rolling, trusted = [], [], [], []
+    for row in zip(log.time_us, log.readings, (np.nan if v is None else v for v in log.speed_mps)):
+        rows.append(engine.step(*row))
+        shown.append(engine.meter.smooth_force[2])
+        rolling.append(engine.meter.filter.rolling)
+        trusted.append(engine.meter.trusted)
+    for name, column in zip(replay_engine.COLUMNS, np.transpose(rows)):
+        if name not in ("static_lean_deg", "lean_formula_deg"):  # the formula: above
+            assert np.max(np.abs(getattr(course, name) - column)) < 1e-5, name
+    assert np.array_equal(course.shown_g, shown)
+    assert np.array_equal(course.rolling, rolling)
+    assert 0.2 < np.mean(rolling) < 0.9  # in its turns it knows
+    assert np.array_equal(course.trusted, trusted)
+
+
+def test_the_maxima_are_those_the_display_held(ride):
+    """Block by block, in whatever blocks."""
+    log = reader.read_log(ride.log)
+    engine = replay_engine.Replay(ride.calibration.to_firmware())
+    for row in zip(log.time_us, log.readings, (np.nan if v is None else v for v in log.speed_mps)):
+        engine.take(*row)
+    meter, summary = engine.meter, Summary()
+    whole = joined([channels for _, channels in ride.blocks("")])
+    for start in range(0, len(whole.t_s), 777):
+        summary.add(whole.part(slice(start, start + 777)))
+    assert summary.left_deg.value == meter.max_left_deg > 25
+    assert summary.right_deg.value == meter.max_right_deg > 38
+    assert summary.brake_g.value == meter.max_brake_g > 0.5
+    assert summary.accel_g.value == meter.max_accel_g > 0.3
+    assert summary.right_deg.time_s is not None
+    assert whole.lean_deg[np.searchsorted(whole.t_s, summary.right_deg.time_s)] == summary.right_deg.value
+    assert 3.0 < summary.beyond_s[40.0] < summary.beyond_s[30.0] < 9.0
+    assert np.sum(summary.histogram_s) <= summary.riding_s + 1e-6
+
+
+def test_time_without_readings_does_not_count(course):
+    part = course.part(slice(0, 400))
+    summary, gone = Summary(), Summary()
+    for total, pause_s in (summary, 0.0), (gone, 60.0):
+        total.add(part)
+        later = part.part(slice(None))
+        later.t_s = part.t_s + part.t_s[-1] + 0.005 + pause_s
+        total.add(later)
+    assert gone.duration_s == pytest.approx(summary.duration_s + 60.0)
+    assert gone.riding_s <= summary.riding_s
+
+
+@pytest.mark.parametrize("block", [7, 1000, 100_000])
+def test_thinning_is_the_mean_of_each_stretch_whatever_the_blocks(course, block):
+    parts = [course.part(slice(start, start + block)) for start in range(0, len(course.t_s), block)]
+    thin = joined(list(thinned(parts, 0.02)))
+    n = len(course.t_s) // 4
+    assert len(thin.t_s) in (n, n + 1)
+    for name in "t_s", "lean_deg", "forward_g":
+        want = getattr(course, name)[: 4 * n].reshape(n, 4).mean(axis=1)
+        assert np.allclose(getattr(thin, name)[:n], want)
+    assert np.count_nonzero(~np.isnan(thin.speed_mps)) == np.count_nonzero(~np.isnan(course.speed_mps))
+
+
+def test_a_slow_log_is_not_thinned(course):
+    slow = course.part(slice(0, None, 10))
+    thin = joined(list(thinned([slow], 0.02)))
+    for field in fields(Channels):
+        assert np.array_equal(getattr(thin, field.name), getattr(slow, field.name), equal_nan=True)
+
+
+def test_an_envelope_keeps_every_peak():
+    time = np.arange(100_003.0)
+    values = np.sin(time / 50.0)
+    values[[17, 55_555, 100_002]] = 9.0, -8.0, 7.0
+    values[30:40] = np.nan
+    x, y = envelope(time, values, 2000)
+    assert 1000 < len(x) <= 2002
+    assert np.all(np.diff(x) > 0)
+    assert {9.0, -8.0, 7.0} <= set(y)
+    assert np.array_equal(envelope(time[:100], values[:100], 2000)[1], values[:100][~np.isnan(values[:100])])

@@ -1,0 +1,67 @@
+"""Without a speed in the log, a standstill has to be proven and a stop plausible: on a fast, smooth track."""
+
+import numpy as np
+import pytest
+from kickstand_tools.analysis.channels import Channels, open_ride
+from kickstand_tools.analysis.stops import brake_test
+from kickstand_tools.analysis.stops.brake_test import RATE_S, stops
+from kickstand_tools.analysis.stops.plausible import closes, plausible
+from kickstand_tools.analysis.stops.standstill import standing
+from kickstand_tools.analysis.thin import joined, thinned
+from kickstand_tools.calibration import poses as captured
+from kickstand_tools.calibration.file import write_calibration
+from kickstand_tools.simulation.files import simulate
+
+
+@pytest.fixture(scope="module", params=[1, 2])
+def track(tmp_path_factory, request) -> Channels:
+    """Without a speed, as an MPU6050 reads it: smooth, fast, with held turns and one stop, the last of it."""
+    directory = tmp_path_factory.mktemp("track")
+    made = simulate("track", request.param, directory, seconds=200.0)
+    pair = directory / "KICKSTAND.csv", directory / "UPRIGHT.csv"
+    write_calibration(directory / "RIDE.cal.json", captured.two(*pair, None, "left", lambda _: None))
+    whole = joined(list(thinned((b for _, b in open_ride(directory / "RIDE.csv", None).blocks("")), RATE_S)))
+    whole.speed_mps = np.interp(whole.t_s, made.time, made.truth["speed_mps"])
+    return whole
+
+
+def without_speed(whole: Channels) -> Channels:
+    result = whole.part(slice(None))
+    result.speed_mps = np.full(len(whole.t_s), np.nan)
+    return result
+
+
+def test_a_fast_smooth_track_is_no_standstill(track):
+    """Not even with a sensor that had no six positions: its weight at rest is known from the ride."""
+    still = standing(without_speed(track))
+    assert np.max(track.speed_mps[still]) < 0.5
+    assert np.mean(still[track.speed_mps == 0.0]) > 0.9
+    (stop,) = stops(without_speed(track))
+    (true,) = stops(track)
+    assert stop.mfdd_mps2 == pytest.approx(true.mfdd_mps2, rel=0.03)
+    assert stop.initial_speed_mps == pytest.approx(true.initial_speed_mps, rel=0.03)
+
+
+def test_what_was_integrated_to_a_standstill_that_was_none_is_not_shown(track, monkeypatch):
+    """Rests made up on the fast straights after hard braking."""
+    braked = (track.shown_g < -0.4) & (track.speed_mps > 20.0)
+    ends = np.flatnonzero(braked[:-1] & ~braked[1:])
+    made_up = np.zeros(len(braked), dtype=bool)
+    for end in ends:
+        made_up[end + 20 : end + 80] = True
+    monkeypatch.setattr(brake_test, "standing", lambda _: made_up)
+    assert len(ends) >= 2
+    shown = len(stops(without_speed(track)))
+    monkeypatch.setattr(brake_test, "plausible", lambda *_: True)
+    monkeypatch.setattr(brake_test, "closes", lambda *_: True)
+    assert shown < 0.5 * len(stops(without_speed(track)))
+
+
+def test_what_is_plausible():
+    assert plausible(60.0, -8.0, 12.0)
+    assert not plausible(70.0, 0.0, 0.0)  # 252 km/h
+    assert not plausible(20.0, -16.0, 0.0)
+    assert not plausible(20.0, 0.0, -31.0)
+    assert closes(-8.0, 12.0)
+    assert not closes(30.0, 12.0)
+    assert closes(58.0, 59.0)  # too long to tell

@@ -1,0 +1,247 @@
+"""kickstand report and plot: what they say and draw of a ride, and what they refuse."""
+
+import io
+import json
+import re
+import struct
+
+import analysis_rides
+import command
+import numpy as np
+import pytest
+from kickstand_tools.analysis import report
+from kickstand_tools.analysis.channels import open_ride
+from kickstand_tools.analysis.look import look
+from kickstand_tools.analysis.plot import page, picture, plot
+from kickstand_tools.analysis.stops.brake_test import Stop
+from kickstand_tools.simulation.scripted import script
+
+pytest.importorskip("matplotlib")
+pytest.importorskip("plotly")
+
+
+@pytest.fixture(scope="module")
+def ride(tmp_path_factory):
+    return analysis_rides.short(tmp_path_factory.mktemp("ride"), speed_hz=1)
+
+
+def test_a_report_has_the_ride_in_figures(ride):
+    data = json.loads(command.works("report", ride, "--json").out)
+    assert data["vehicle"] == "motorcycle"
+    assert data["duration_s"] == pytest.approx(33.99, abs=0.02)
+    assert data["max_left_deg"]["value"] == pytest.approx(30.0, abs=2.5)
+    assert data["max_right_deg"]["value"] == pytest.approx(42.0, abs=2.5)
+    assert 9.0 < data["max_left_deg"]["time_s"] < 16.0
+    assert 18.0 < data["max_right_deg"]["time_s"] < 25.0
+    assert 3.5 < data["beyond_40_deg_s"] < 5.5
+    assert data["beyond_30_deg_s"] > data["beyond_40_deg_s"]
+    assert data["max_brake_g"]["value"] > 0.7
+    (stop,) = data["stops"]
+    assert stop["speed_from"] == "log"
+    assert stop["initial_speed_mps"] == pytest.approx(15.0, abs=0.3)
+    assert stop["distance_m"] == pytest.approx(21.0, abs=1.5)  # where it begins is a matter of taste
+    assert abs(stop["side_m"]) < 0.2
+    assert data["alignment"]["gravity_g"] == pytest.approx(1.0, abs=0.002)
+    assert abs(data["alignment"]["roll_deg"]) < 0.5
+
+
+def test_the_page_says_the_same(ride, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    said = command.works("report", ride).out
+    for words in "Max left", "Max right", "Over 40°", "Max braking", "MFDD", "km/h", "Alignment":
+        assert words in said
+    assert "integrated" not in said
+    assert max(len(line) for line in said.split("\n")) <= 80
+    assert re.search(r"^ *0:\d\d +5\d\.\d +2\.\d\d +2\d\.\d( +\d+\.\d\d){2} +\d+ +0\.\d (left|right) *$", said, re.M)
+
+
+def test_the_longest_of_stops_fits_a_line(ride):
+    from rich.console import Console
+
+    seen = look(open_ride(ride, None))
+    seen.stops = [Stop(36000.0, 36030.0, 69.4, 1000.0, 10.5, 20.5, 100.0, -12.5, 9.0, "integrated")]
+    console = Console(width=80, record=True, file=io.StringIO())
+    console.print(report.page(seen))
+    (line,) = [line for line in console.export_text().split("\n") if line.startswith("10:00:00")]
+    assert line.rstrip().endswith("12.5 right")
+
+
+def test_without_a_speed_stops_are_marked(tmp_path):
+    said = command.works("report", analysis_rides.short(tmp_path)).out
+    assert re.search(r" 5\d\.\d\* ", said)
+    assert "* no speed in the log: integrated" in said
+
+
+def test_without_a_speed_it_may_be_that_nothing_can_be_told(tmp_path):
+    moving = analysis_rides.write(tmp_path, [script.upright(4), script.accelerate(15, 5), script.straight(20)])
+    assert "no speed in the log: stops cannot be told" in command.works("report", moving).out
+    ride = [script.upright(4), script.accelerate(15, 5), script.straight(20)]
+    moving = analysis_rides.write(tmp_path, ride, speed_hz=1)
+    assert "No stop from over 10 km/h found." in command.works("report", moving).out
+
+
+def turned_round(directory, tilt_deg=0.0):
+    """CAL.json with forward and left the wrong way; tilt_deg: and up that far off, as with swapped poses."""
+    s, c = np.sin(np.radians(tilt_deg)), np.cos(np.radians(tilt_deg))
+    cal = directory / "wrong.json"
+    matrix = [[-c, s, 0], [s, c, 0], [0, 0, -1]]
+    data = analysis_rides.CALIBRATION | {"vehicle_from_sensor": matrix, "kickstand_side": "left"}
+    cal.write_text(json.dumps(data))
+    return cal
+
+
+def test_a_kickstand_on_the_other_side_is_told(ride, tmp_path):
+    cal = turned_round(tmp_path)
+    line = "forward and backward are exchanged: calibrate two --side right?"
+    said = command.works("report", ride, "--calibration", cal)
+    assert line in said.out.split("\n")
+    assert "No stop" not in said.out
+    assert "MFDD" not in said.out  # of the wrong way round, no figure is right
+    data = json.loads(command.works("report", ride, "--calibration", cal, "--json").out)
+    assert (data["remark"], data["stops"]) == (line, [])
+    assert f"{line}\n" in command.works("plot", ride, "--calibration", cal, "--out", tmp_path / "pictures").err
+    car = tmp_path / "car.json"
+    car.write_text(json.dumps(json.loads(cal.read_text()) | {"vehicle": "car"}))
+    assert "exchanged: calibrate drive again?" in command.works("report", ride, "--calibration", car).out
+
+
+def test_swapped_poses_are_told(tmp_path):
+    segments = [script.upright(4)]
+    for _ in range(2):
+        segments += [script.accelerate(16, 5), script.straight(8), script.brake(0, 4), script.wait(4)]
+    ride = analysis_rides.write(tmp_path, segments, speed_hz=1)
+    cal = turned_round(tmp_path, 11.0)
+    said = " ".join(command.works("report", ride, "--calibration", cal).out.split())
+    assert re.search(r"roll [+-]1[01]\.\d°.*: were the poses swapped\?", said)
+    assert "forward and backward are exchanged: were the poses swapped?" in said
+    right = json.loads(cal.read_text())
+    s, c = np.sin(np.radians(6.0)), np.cos(np.radians(6.0))
+    right["vehicle_from_sensor"] = [[c, s, 0], [-s, c, 0], [0, 0, 1]]
+    cal.write_text(json.dumps(right))
+    said = " ".join(command.works("report", ride, "--calibration", cal).out.split())
+    assert ": was it held upright?" in said
+    assert "swapped" not in said
+
+
+def test_a_stop_that_only_the_speed_knows(ride, tmp_path):
+    """Forward is across: neither right nor exchanged."""
+    cal = tmp_path / "across.json"
+    across = {"vehicle_from_sensor": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]}
+    cal.write_text(json.dumps(analysis_rides.CALIBRATION | across))
+    said = command.works("report", ride, "--calibration", cal).out
+    assert "No stop" not in said
+    assert "The speed falls to a stop, the force says otherwise" in " ".join(said.split())
+
+
+def test_a_ride_without_stops(tmp_path):
+    ride = analysis_rides.write(tmp_path, [script.upright(6)])
+    assert "No stop" in command.works("report", ride).out
+    assert json.loads(command.works("report", ride, "--json").out)["max_left_deg"]["value"] < 1.0
+
+
+def test_a_car_has_no_lean(ride, tmp_path):
+    cal = tmp_path / "car.json"
+    cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle": "car"}))
+    said = command.works("report", ride, "--calibration", cal).out
+    assert "Max left" not in said
+    assert "Max braking" in said
+    command.works("plot", ride, "--calibration", cal, "--out", tmp_path)
+
+
+def test_pictures(ride, tmp_path):
+    out = tmp_path / "new" / "pictures"
+    command.works("plot", ride, "--out", out)
+    png = (out / "RIDE.png").read_bytes()
+    assert png[:8] == b"\x89PNG\r\n\x1a\n"
+    assert struct.unpack(">2I", png[16:24]) == (1100, 950)
+    html = (out / "RIDE.html").read_text()
+    assert "Plotly.newPlot" in html
+    assert not re.search(r"<(script|link)[^>]*(src|href)=", html)  # all of it is inside
+    assert sorted(path.name for path in out.iterdir()) == ["RIDE.html", "RIDE.png"]
+
+
+@pytest.mark.parametrize(("car", "speed_hz"), [(False, 1), (False, 0), (True, 1), (True, 0)])
+def test_a_speed_is_drawn_where_there_is_one(tmp_path, car, speed_hz):
+    straight = [script.upright(4), script.accelerate(15, 5), script.straight(4), script.brake(0, 3), script.wait(4)]
+    ride = analysis_rides.write(tmp_path, straight, speed_hz=speed_hz)  # the bends of a motorcycle are none of a car
+    cal = tmp_path / "RIDE.cal.json"
+    cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle": "car" if car else "motorcycle"}))
+    seen = look(open_ride(ride, cal))
+    figure = page.figure(seen)
+    row = {trace.name: trace.yaxis for trace in figure.data}
+    assert ("lean" in row) is not car
+    assert ("speed" in row) is bool(speed_hz)
+    above = {"lean", "speed"} & set(row)
+    assert len({row[name] for name in (*above, "forward")}) == len(above) + 1
+    assert row["forward"] == row["to the left"] == ("y", "y2", "y3")[len(above)]
+    assert {shape.xref for shape in figure.layout.shapes} == {row["forward"].replace("y", "x")}
+    if speed_hz:
+        (drawn,) = (trace for trace in figure.data if trace.name == "speed")
+        assert max(drawn.y) == pytest.approx(54.0, abs=0.5)  # km/h
+    picture.draw(tmp_path / "ride.png", seen)
+    height = struct.unpack(">2I", (tmp_path / "ride.png").read_bytes()[16:24])[1]
+    assert height == 550 + 250 * (not car) + 150 * bool(speed_hz)
+
+
+@pytest.mark.parametrize("name", ["report", "plot"])
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "is empty"),
+        (b"PK\x03\x04\x00\xff\xfe", "not text"),
+        (b"lat,lon\n1,2\n", "no column t_s"),
+        ((command.HEADER + "\n0,0,0,1,0,0\n").encode(), "is the line cut?"),
+        ((command.HEADER + "\n0,0,0,1,0,0,0\n").encode(), "too short"),
+    ],
+)
+def test_files_that_are_no_rides(tmp_path, name, content, words):
+    log = tmp_path / "log.csv"
+    log.write_bytes(content)
+    (tmp_path / "log.cal.json").write_text(json.dumps(analysis_rides.CALIBRATION))
+    more = ["--out", tmp_path / "pictures"] if name == "plot" else []
+    command.refused(tmp_path, name, log, *more, words=words)
+
+
+@pytest.mark.parametrize("samples", [2, 3, 30])
+def test_the_shortest_of_logs(tmp_path, samples):
+    log = command.still(tmp_path / "log.csv", (0, 1, 0), seconds=samples / 100)
+    (tmp_path / "log.cal.json").write_text(json.dumps(analysis_rides.CALIBRATION))
+    command.works("report", log)
+    command.works("plot", log, "--out", tmp_path / "pictures")
+
+
+def test_without_the_libraries_there_is_no_picture(ride, tmp_path, monkeypatch):
+    monkeypatch.setattr(plot, "find_spec", lambda name: None)
+    command.refused(tmp_path, "plot", ride, "--out", tmp_path / "x", words="pictures need matplotlib and plotly")
+
+
+def test_pictures_go_into_a_directory(ride, tmp_path):
+    (tmp_path / "file").write_text("")
+    command.refused(tmp_path, "plot", ride, "--out", tmp_path / "file", words="is a file")
+
+
+def test_broken_off_a_picture_leaves_no_empty_directory(ride, tmp_path, monkeypatch):
+    def ctrl_c(path, seen):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(plot.picture, "draw", ctrl_c)
+    assert command.run("plot", ride, "--out", tmp_path / "pictures").status == 130
+    assert not (tmp_path / "pictures").exists()
+
+
+def test_a_real_ride(shared_data, tmp_path):
+    """The phone stood still for its first seconds; which way it faced the test takes from gravity and the drive."""
+    log = shared_data / "motorcycle-ride.csv.gz"
+    given = np.genfromtxt(log, delimiter=",", names=True)
+    up = np.array([np.mean(given[name][:50]) for name in ("ax_g", "ay_g", "az_g")])
+    up /= np.linalg.norm(up)
+    forward = np.cross(np.cross(up, [0.31, 0.5, 0.2]), up)
+    forward /= np.linalg.norm(forward)
+    matrix = [np.cross(up, forward).tolist(), up.tolist(), forward.tolist()]
+    cal = tmp_path / "cal.json"
+    cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": matrix}))
+    data = json.loads(command.works("report", log, "--calibration", cal, "--json").out)
+    assert data["duration_s"] == pytest.approx(105, abs=2)
+    assert data["max_speed_mps"]["value"] == pytest.approx(8.6, abs=0.2)
+    command.works("plot", log, "--calibration", cal, "--out", tmp_path)
+    assert (tmp_path / "motorcycle-ride.png").stat().st_size > 20_000

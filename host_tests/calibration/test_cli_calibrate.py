@@ -1,0 +1,307 @@
+"""kickstand calibrate: from captures to CAL.json, and every pose that cannot be used."""
+
+import json
+import shutil
+
+import command
+import numpy as np
+import pytest
+from kickstand_tools.calibration.file import read_calibration
+
+OFFSET, SLOPE = np.array([0.06, -0.04, 0.11]), np.array([1.02, 0.97, 0.99])
+BIAS = (4.0, -11.0, 0.7)
+
+
+def reads(force):
+    """What the sensor with these errors reads of a true force in its own axes."""
+    return (np.asarray(force, float) - OFFSET) / SLOPE
+
+
+def tipped(direction, angle_deg, rng):
+    """The direction turned by an angle about a random axis across it."""
+    across = np.cross(direction, rng.normal(size=3))
+    across /= np.linalg.norm(across)
+    return np.asarray(direction) * np.cos(np.radians(angle_deg)) + across * np.sin(np.radians(angle_deg))
+
+
+def random_rotation(rng):
+    q, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    return q * np.linalg.det(q)
+
+
+def leaned(angle_deg):
+    """Specific force (left, up, forward) of a standing bike leaned to the right by an angle."""
+    return np.array([np.sin(np.radians(angle_deg)), np.cos(np.radians(angle_deg)), 0.0])
+
+
+@pytest.fixture
+def six_poses(tmp_path):
+    """Each side up once, up to 10 degrees askew."""
+    rng = np.random.default_rng(1)
+    return [
+        command.still(
+            tmp_path / f"side{side}.csv", reads(tipped(axis, rng.uniform(0, 10), rng)), BIAS, seed=k
+        )
+        for k, (side, axis) in enumerate(command.AXES.items())
+    ]
+
+
+@pytest.fixture
+def free_pose(tmp_path):
+    return command.still(tmp_path / "free.csv", reads(np.array([1, -1, 1]) / np.sqrt(3)), BIAS, seed=9)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_six_finds_offset_slope_and_bias_in_any_order(tmp_path, six_poses, free_pose, seed):
+    poses = [*six_poses, free_pose]
+    np.random.default_rng(seed).shuffle(poses)
+    result = command.works("calibrate", "six", *poses, "--out", tmp_path / "CAL.json")
+    data = json.loads((tmp_path / "CAL.json").read_text())
+    assert data["accel_offset_g"] == pytest.approx(OFFSET, abs=0.002)
+    assert data["accel_slope"] == pytest.approx(SLOPE, abs=0.002)
+    assert data["gyro_bias_dps"] == pytest.approx(BIAS, abs=0.02)
+    assert data["vehicle_from_sensor"] == [[1, 0, 0], [0, 1, 0], [0, 0, 1]]
+    assert "free pose: " + str(free_pose) in result.out
+    assert "good" in result.out
+    assert "warning: x, z is beyond the data sheet" in result.out.replace("are", "is")
+
+
+def test_six_without_a_free_pose_says_what_is_unproven(tmp_path, six_poses):
+    result = command.works("calibrate", "six", *six_poses, "--out", tmp_path / "CAL.json")
+    assert "warning: no free pose" in result.out
+
+
+@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("side", ["left", "right"])
+def test_six_and_two_bring_lean_to_0_3_degrees(tmp_path, six_poses, free_pose, seed, side):
+    """Any mounting: the matrix within 0.3 degrees, static lean within 0.3 over +-60."""
+    rng = np.random.default_rng(seed)
+    mounting = random_rotation(rng)  # vehicle from sensor
+    stand = leaned(-12.0 if side == "left" else 12.0)
+    command.still(tmp_path / "stand.csv", reads(mounting.T @ stand), BIAS, seed=seed)
+    command.still(tmp_path / "upright.csv", reads(mounting.T @ leaned(0)), BIAS, seed=seed + 100)
+    command.works("calibrate", "six", *six_poses, free_pose, "--out", tmp_path / "SIX.json")
+    command.works(
+        *("calibrate", "two", tmp_path / "stand.csv", tmp_path / "upright.csv", "--side", side),
+        *("--calibration", tmp_path / "SIX.json", "--out", tmp_path / "CAL.json"),
+    )
+    data, six = (json.loads((tmp_path / name).read_text()) for name in ("CAL.json", "SIX.json"))
+    assert data["accel_offset_g"] == six["accel_offset_g"]
+    assert data["accel_slope"] == six["accel_slope"]
+    assert data["gyro_bias_dps"] == pytest.approx(BIAS, abs=0.02)
+    between = np.array(data["vehicle_from_sensor"]) @ mounting.T
+    error_deg = np.degrees(np.arccos(min(1.0, (np.trace(between) - 1) / 2)))
+    assert error_deg < 0.3
+
+    leans = np.arange(-60.0, 61.0, 5.0)
+    forces = np.array([reads(mounting.T @ leaned(lean)) for lean in leans])
+    rates = np.broadcast_to(np.array(BIAS), forces.shape)
+    command.write(tmp_path / "log.csv", np.column_stack((np.arange(len(leans)), forces, rates)))
+    lean_csv = tmp_path / "LEAN.csv"
+    command.works("replay", tmp_path / "log.csv", "--calibration", tmp_path / "CAL.json", "--out", lean_csv)
+    static = np.genfromtxt(lean_csv, delimiter=",", names=True)["static_lean_deg"]
+    assert np.max(np.abs(static - leans)) < 0.3
+
+
+def test_two_alone_assumes_a_perfect_accelerometer(tmp_path):
+    command.still(tmp_path / "stand.csv", leaned(-10))
+    command.still(tmp_path / "upright.csv", leaned(0), seed=1)
+    result = command.works(
+        "calibrate", "two", tmp_path / "stand.csv", tmp_path / "upright.csv", "--out", tmp_path / "CAL.json"
+    )
+    data = json.loads((tmp_path / "CAL.json").read_text())
+    assert (data["accel_offset_g"], data["accel_slope"]) == ([0, 0, 0], [1, 1, 1])
+    assert np.array(data["vehicle_from_sensor"]) == pytest.approx(np.eye(3), abs=0.005)
+    assert data["kickstand_side"] == read_calibration(tmp_path / "CAL.json").side == "left"
+    assert "warning: no six-position calibration" in result.out
+
+
+def test_two_may_write_over_the_calibration_it_builds_on(tmp_path):
+    cal = command.write_cal(
+        tmp_path / "CAL.json", accel_offset_g=[0.01, 0.0, 0.0], accel_slope=[1.0, 1.0, 1.0]
+    )
+    command.still(tmp_path / "stand.csv", leaned(-10))
+    command.still(tmp_path / "upright.csv", leaned(0), seed=1)
+    command.works(
+        "calibrate",
+        "two",
+        tmp_path / "stand.csv",
+        tmp_path / "upright.csv",
+        "--calibration",
+        cal,
+        "--out",
+        cal,
+    )
+    assert json.loads(cal.read_text())["accel_offset_g"] == [0.01, 0.0, 0.0]
+
+
+def test_a_small_tilt_is_warned_of(tmp_path):
+    command.still(tmp_path / "stand.csv", leaned(-6))
+    command.still(tmp_path / "upright.csv", leaned(0), seed=1)
+    result = command.works(
+        "calibrate", "two", tmp_path / "stand.csv", tmp_path / "upright.csv", "--out", tmp_path / "CAL.json"
+    )
+    assert "warning: under 8 degrees" in result.out
+
+
+def six_refused(tmp_path, poses, words):
+    return command.refused(tmp_path, "calibrate", "six", *poses, "--out", tmp_path / "CAL.json", words=words)
+
+
+@pytest.mark.parametrize("count", [1, 5, 8])
+def test_six_wants_six_or_seven(tmp_path, six_poses, free_pose, count):
+    poses = ([*six_poses, free_pose] * 2)[:count]
+    six_refused(tmp_path, poses, f"{count} captures given")
+
+
+def test_a_side_done_twice_and_the_one_missing_are_named(tmp_path, six_poses):
+    shutil.copy(six_poses[2], tmp_path / "again.csv")
+    line = six_refused(tmp_path, [*six_poses[:5], tmp_path / "again.csv"], "side -z is missing")
+    assert "side +y is there 2 times" in line
+    assert "again.csv" in line
+
+
+def test_a_seventh_pose_on_a_side_proves_nothing(tmp_path, six_poses):
+    flat = command.still(tmp_path / "flat.csv", reads(command.AXES["+y"]), BIAS, seed=5)
+    line = six_refused(tmp_path, [*six_poses, flat], "has to be slanted")
+    assert "flat.csv" in line
+
+
+def test_the_same_file_twice(tmp_path, six_poses):
+    six_refused(tmp_path, [*six_poses[:5], six_poses[0]], "is given twice")
+
+
+def test_a_pose_25_degrees_off_its_side(tmp_path, six_poses):
+    rng = np.random.default_rng(3)
+    command.still(six_poses[4], reads(tipped(command.AXES["+z"], 25, rng)), BIAS)
+    line = six_refused(tmp_path, six_poses, "side +z was 25 degrees off")
+    assert "side+z.csv" in line
+
+
+def test_a_free_pose_that_is_not_1_g(tmp_path, six_poses):
+    wrong = command.still(tmp_path / "free.csv", reads(1.03 * np.array([1, 1, 1]) / np.sqrt(3)), BIAS)
+    line = six_refused(tmp_path, [*six_poses, wrong], "the free pose reads 1.0")
+    assert "free.csv" in line
+
+
+def test_no_real_sensor_has_such_an_offset(tmp_path):
+    poses = [
+        command.still(tmp_path / f"{k}.csv", np.asarray(axis) - np.array([0.6, 0, 0]))
+        for k, axis in enumerate(command.AXES.values())
+    ]
+    six_refused(tmp_path, poses, "axis x: offset 0.600 g")
+
+
+def spoil(path, change):
+    """Change the numbers of a log in place."""
+    rows = np.loadtxt(path, delimiter=",", skiprows=1)
+    command.write(path, change(rows))
+
+
+def moved(rows):
+    rows[150:, 1] += 0.3
+    return rows
+
+
+def tilting(rows):
+    rows[:, 2] += np.linspace(0, 0.03, len(rows))
+    return rows
+
+
+def knocked(rows):
+    rows[100, 3] += 0.5
+    return rows
+
+
+def saturated(rows):
+    rows[:, 3] = 2.0
+    return rows
+
+
+def turning(rows):
+    rows[:, 6] += 60.0
+    return rows
+
+
+def frozen(rows):
+    rows[:, 1:] = rows[0, 1:]
+    return rows
+
+
+SPOILT = {
+    "moved": (moved, "moved or knocked"),
+    "slow tilt": (tilting, "slowly tilting"),
+    "knock": (knocked, "moved or knocked"),
+    "saturated": (saturated, "saturated"),
+    "turning": (turning, "turning"),
+    "frozen": (frozen, "frozen"),
+    "short": (lambda rows: rows[:15], "too short"),
+}
+
+
+@pytest.mark.parametrize("name", SPOILT)
+@pytest.mark.parametrize("which", ["six", "stand", "upright"])
+def test_a_spoilt_pose_is_refused_by_name(tmp_path, six_poses, which, name):
+    change, words = SPOILT[name]
+    if which == "six":
+        spoil(six_poses[3], change)
+        line = six_refused(tmp_path, six_poses, words)
+        assert str(six_poses[3]) in line
+        return
+    command.still(tmp_path / "stand.csv", leaned(-12))
+    command.still(tmp_path / "upright.csv", leaned(0), seed=1)
+    spoil(tmp_path / f"{which}.csv", change)
+    line = two_refused(tmp_path, words)
+    assert f"{which}.csv" in line
+
+
+def two_refused(tmp_path, words, *more):
+    """calibrate two over stand.csv and upright.csv, with an older CAL.json that has to stay."""
+    (tmp_path / "CAL.json").write_text("the one from yesterday\n")
+    poses = tmp_path / "stand.csv", tmp_path / "upright.csv"
+    return command.refused(
+        tmp_path, "calibrate", "two", *poses, *more, "--out", tmp_path / "CAL.json", words=words
+    )
+
+
+@pytest.mark.parametrize(
+    ("stand", "words"),
+    [
+        (leaned(-0.3), "both poses are the same"),
+        (leaned(-4), "only 4.0 degrees between the poses"),
+        (leaned(-65), "65 degrees between the poses"),
+        (leaned(-180), "180 degrees between the poses"),
+        (leaned(-12) * 1.2, "is 1.200 g, not 1 g"),
+        (leaned(-12) * 0.8, "is 0.800 g, not 1 g"),
+    ],
+)
+def test_poses_that_do_not_fix_the_mounting(tmp_path, stand, words):
+    command.still(tmp_path / "stand.csv", stand)
+    command.still(tmp_path / "upright.csv", leaned(0), seed=1)
+    line = two_refused(tmp_path, words)
+    assert "stand.csv" in line
+    assert "upright.csv" in line
+
+
+def test_no_force_at_all(tmp_path):
+    command.still(tmp_path / "stand.csv", leaned(-12))
+    command.still(tmp_path / "upright.csv", (0, 0, 0), seed=1)
+    two_refused(tmp_path, "not 1 g")
+
+
+def test_calibrated_poses_are_held_to_tighter_bounds(tmp_path):
+    """6 % off passes for an uncalibrated sensor, not for one whose offset and slope are known."""
+    command.still(tmp_path / "stand.csv", leaned(-12) * 1.06)
+    command.still(tmp_path / "upright.csv", leaned(0), seed=1)
+    command.works(
+        "calibrate", "two", tmp_path / "stand.csv", tmp_path / "upright.csv", "--out", tmp_path / "OTHER.json"
+    )
+    cal = command.write_cal(tmp_path / "SIX.json", accel_offset_g=[0.001, 0, 0], accel_slope=[1, 1, 1])
+    two_refused(tmp_path, "not 1 g", "--calibration", cal)
+
+
+def test_a_bad_calibration_to_build_on(tmp_path):
+    command.still(tmp_path / "stand.csv", leaned(-12))
+    command.still(tmp_path / "upright.csv", leaned(0), seed=1)
+    cal = command.write_cal(tmp_path / "SIX.json", accel_slope=[2, 1, 1])
+    two_refused(tmp_path, "slope of x is 2", "--calibration", cal)

@@ -1,0 +1,151 @@
+"""CAL.json: what is refused, what is kept."""
+
+import json
+import os
+
+import command
+import pytest
+from kickstand_tools.calibration.file import CalibrationFile, read_calibration, write_calibration
+
+I = [[1, 0, 0], [0, 1, 0], [0, 0, 1]]  # noqa: E741 - its name
+
+BAD = {
+    "no version": ({"version": None}, "version is missing"),
+    "version of tomorrow": ({"version": 2}, "version 2"),
+    "version true": ({"version": True}, "version True"),
+    "no offset": ({"accel_offset_g": None}, "accel_offset_g is missing"),
+    "no matrix": ({"vehicle_from_sensor": None}, "vehicle_from_sensor is missing"),
+    "two offsets": ({"accel_offset_g": [0, 0]}, "accel_offset_g has to be 3 numbers"),
+    "slope a number": ({"accel_slope": 1.0}, "accel_slope has to be 3 numbers"),
+    "bias a word": ({"gyro_bias_dps": [0, "none", 0]}, "gyro_bias_dps has 'none'"),
+    "bias null": ({"gyro_bias_dps": [0, [], 0]}, "gyro_bias_dps has []"),
+    "offset true": ({"accel_offset_g": [True, 0, 0]}, "accel_offset_g has True"),
+    "offset nan": ({"accel_offset_g": [float("nan"), 0, 0]}, "accel_offset_g has nan"),
+    "slope infinite": ({"accel_slope": [1, float("inf"), 1]}, "accel_slope has inf"),
+    "offset very large": ({"accel_offset_g": [10**400, 0, 0]}, "accel_offset_g has 1000"),
+    "offset too large": ({"accel_offset_g": [0, 0.5, 0]}, "offset of y is 0.5 g"),
+    "slope too small": ({"accel_slope": [1, 1, 0.8]}, "slope of z is 0.8"),
+    "slope too large": ({"accel_slope": [1.2, 1, 1]}, "slope of x is 1.2"),
+    "bias too large": ({"gyro_bias_dps": [0, 0, -60.0]}, "gyro bias of z is -60 deg/s"),
+    "flat matrix": ({"vehicle_from_sensor": [1, 0, 0, 0, 1, 0, 0, 0, 1]}, "3 rows of 3 numbers"),
+    "short row": ({"vehicle_from_sensor": [[1, 0, 0], [0, 1], [0, 0, 1]]}, "vehicle_from_sensor, row 2,"),
+    "mirrored": ({"vehicle_from_sensor": [[1, 0, 0], [0, 1, 0], [0, 0, -1]]}, "no rotation"),
+    "scaled": ({"vehicle_from_sensor": [[1.01, 0, 0], [0, 1, 0], [0, 0, 1]]}, "no rotation"),
+    "trim a word": ({"trim_deg": "none"}, "trim_deg is 'none'"),
+    "trim too large": ({"trim_deg": -4}, "trim_deg is -4"),
+    "skewed": ({"vehicle_from_sensor": [[1, 0.01, 0], [0, 1, 0], [0, 0, 1]]}, "no rotation"),
+}
+BROKEN = {
+    "empty": b"",
+    "not JSON": b"version = 1",
+    "cut": b'{"version": 1, "accel_off',
+    "binary": bytes(range(256)),
+    "a list": b"[1, 2]",
+    "a number": b"1",
+    "deep": b"[" * 100_000,
+    "many digits": b'{"version": ' + b"1" * 5000 + b"}",
+}
+
+
+@pytest.fixture
+def log(tmp_path):
+    return command.still(tmp_path / "log.csv", (0, 0, 1))
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_a_bad_calibration_is_refused(tmp_path, log, name):
+    changed, words = BAD[name]
+    cal = command.write_cal(tmp_path / "CAL.json", **changed)
+    out = tmp_path / "LEAN.csv"
+    line = command.refused(tmp_path, "replay", log, "--calibration", cal, "--out", out, words=words)
+    assert "CAL.json" in line
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_what_is_no_calibration_is_refused(tmp_path, log, name):
+    (tmp_path / "CAL.json").write_bytes(BROKEN[name])
+    out = tmp_path / "LEAN.csv"
+    command.refused(
+        tmp_path, "replay", log, "--calibration", tmp_path / "CAL.json", "--out", out, words="CAL.json"
+    )
+
+
+def test_a_directory_or_nothing_is_refused(tmp_path, log):
+    for place in tmp_path, tmp_path / "none.json":
+        command.refused(tmp_path, "replay", log, "--calibration", place, "--out", tmp_path / "LEAN.csv")
+
+
+def test_what_is_written_reads_back(tmp_path):
+    matrix = [0.6, 0.8, 0.0, -0.8, 0.6, 0.0, 0.0, 0.0, 1.0]
+    written = CalibrationFile(
+        [0.012345678, -0.4, 0.0], [1.19, 0.81, 1.0], [1.5, -2.5, 59.0], matrix, True, True, trim=-1.25
+    )
+    write_calibration(tmp_path / "CAL.json", written)
+    assert read_calibration(tmp_path / "CAL.json") == written
+    data = json.loads((tmp_path / "CAL.json").read_text())
+    assert data["version"] == 1
+    assert data["vehicle_from_sensor"] == [matrix[0:3], matrix[3:6], matrix[6:9]]
+
+
+def test_a_matrix_with_four_decimals_will_do(tmp_path):
+    rows = [[0.0124, 0.9995, 0.0302], [-0.0021, -0.0302, 0.9995], [0.9999, -0.0124, 0.0017]]
+    assert read_calibration(command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=rows)).aligned
+
+
+def test_a_byte_order_mark_is_no_hindrance(tmp_path):
+    cal = command.write_cal(tmp_path / "CAL.json")
+    cal.write_bytes(b"\xef\xbb\xbf" + cal.read_bytes())
+    assert read_calibration(cal).slope == [1.01, 0.99, 1.0]
+
+
+def test_without_word_of_it_an_identity_is_not_aligned(tmp_path):
+    """A file of another program need not say; only a matrix that was measured is an alignment."""
+    assert not read_calibration(command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=I)).aligned
+    assert read_calibration(
+        command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=I, aligned=True)
+    ).aligned
+
+
+def test_a_write_that_fails_leaves_the_old_file_and_no_other(tmp_path, monkeypatch, log):
+    cal = command.write_cal(tmp_path / "CAL.json")
+    (tmp_path / "LEAN.csv").write_text("the one from yesterday\n")
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", full)
+    out = tmp_path / "LEAN.csv"
+    command.refused(tmp_path, "replay", log, "--calibration", cal, "--out", out, words="No space left")
+
+
+def test_outputs_that_would_do_harm_are_refused(tmp_path, log):
+    cal = command.write_cal(tmp_path / "CAL.json")
+    (tmp_path / "link.csv").symlink_to(log)
+    for out, words in (
+        (tmp_path, "is a directory"),
+        (tmp_path / "none" / "LEAN.csv", "there is no directory"),
+        (log, "is also an input"),
+        (tmp_path / "link.csv", "is also an input"),
+        (cal, "is also an input"),
+    ):
+        command.refused(tmp_path, "replay", log, "--calibration", cal, "--out", out, words=words)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="named pipes are of Unix")
+def test_what_is_no_ordinary_file_is_not_replaced_by_one(tmp_path, log):
+    """As /dev/null would be, for whoever has the right to; a pipe of our own stands in for it."""
+    cal = command.write_cal(tmp_path / "CAL.json")
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    command.refused(tmp_path, "replay", log, "--calibration", cal, "--out", pipe, words="ordinary file")
+    assert pipe.is_fifo()
+
+
+def test_a_link_is_written_through(tmp_path, log):
+    """Whoever keeps CAL.json elsewhere finds it there afterwards."""
+    (tmp_path / "kept").mkdir()
+    (tmp_path / "LEAN.csv").symlink_to(tmp_path / "kept" / "LEAN.csv")
+    cal = command.write_cal(tmp_path / "CAL.json")
+    command.works("replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv")
+    assert (tmp_path / "LEAN.csv").is_symlink()
+    assert (tmp_path / "kept" / "LEAN.csv").read_text().startswith("t_s,")

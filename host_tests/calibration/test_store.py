@@ -1,0 +1,179 @@
+"""The calibration records: whatever happens to the files, a whole calibration or none, and never a crash."""
+
+import io
+import struct
+from binascii import crc32
+
+import pytest
+from kickstand.calibration.parameters import Calibration
+from kickstand.calibration.store import FILES, Store
+from kickstand.errors import StoreError
+
+
+def calibration(mark):
+    """A plausible calibration that can be told from others."""
+    new = Calibration()
+    new.set_accel((mark / 100, 0, 0), (1.0, 1.01, 0.99))
+    new.gyro_bias[2] = -3.5
+    new.six_done = new.aligned = True
+    return new
+
+
+def mark_of(loaded):
+    return round(loaded.accel_offset[0] * 100)
+
+
+@pytest.fixture
+def store(tmp_path):
+    return Store(0x68, 8, str(tmp_path))
+
+
+def newest_file(tmp_path, store):
+    """The file that the next load would take."""
+    contents = {name: (tmp_path / name).read_bytes() for name in FILES if (tmp_path / name).exists()}
+    return tmp_path / max(contents, key=lambda name: struct.unpack_from("<I", contents[name], 8))
+
+
+def test_nothing_stored(store, tmp_path):
+    loaded = store.load()
+    assert (loaded.aligned, loaded.six_done, store.message) == (False, False, "not calibrated")
+    assert list(tmp_path.iterdir()) == []  # loading never writes
+
+
+def test_what_is_saved_is_loaded(store):
+    for mark in range(1, 6):
+        store.save(calibration(mark))
+        loaded = store.load()
+        assert mark_of(loaded) == mark
+        assert loaded.aligned and loaded.six_done
+        assert loaded.gyro_bias[2] == -3.5
+        assert store.message == f"record {mark}"
+
+
+def test_how_it_was_aligned_is_kept_and_records_of_before_are_read(store, tmp_path):
+    new = calibration(1)
+    new.by_drive = True
+    store.save(new)
+    loaded = store.load()
+    assert loaded.aligned and loaded.by_drive
+    store.save(calibration(2))
+    assert newest_file(tmp_path, store).read_bytes()[15] == 1  # as the first release wrote it
+    loaded = store.load()
+    assert loaded.aligned and not loaded.by_drive
+
+
+@pytest.mark.parametrize("saved_before", [0, 1, 2, 3])
+def test_power_cut_at_every_byte_of_a_save(store, tmp_path, saved_before):
+    for mark in range(1, saved_before + 1):
+        store.save(calibration(mark))
+    before = {name: (tmp_path / name).read_bytes() for name in FILES if (tmp_path / name).exists()}
+    store.save(calibration(9))
+    written = newest_file(tmp_path, store)
+    record = written.read_bytes()
+    for cut in range(len(record)):
+        for name, content in before.items():
+            (tmp_path / name).write_bytes(content)
+        written.write_bytes(record[:cut])
+        assert mark_of(store.load()) == saved_before  # the one before, or none
+        store.save(calibration(5))  # and the next save works
+        assert mark_of(store.load()) == 5
+        assert store.load().aligned
+
+
+def test_every_damaged_byte_is_noticed(store, tmp_path):
+    store.save(calibration(1))
+    store.save(calibration(2))
+    path = newest_file(tmp_path, store)
+    record = path.read_bytes()
+    for at in range(len(record)):
+        path.write_bytes(record[:at] + bytes([record[at] ^ 0x10]) + record[at + 1 :])
+        assert mark_of(store.load()) == 1
+        assert "damaged" in store.message
+
+
+@pytest.mark.parametrize("content", [b"", b"\xff" * 92, b"\0" * 92, b"x" * 5000])
+def test_rubbish_in_both_files_is_not_calibrated(store, tmp_path, content):
+    for name in FILES:
+        (tmp_path / name).write_bytes(content)
+    assert not store.load().aligned
+    assert store.message.startswith("not calibrated: ")
+    assert all((tmp_path / name).read_bytes() == content for name in FILES)  # nothing is rewritten
+
+
+def test_a_file_that_is_a_directory(store, tmp_path):
+    (tmp_path / FILES[0]).mkdir()
+    (tmp_path / FILES[1]).mkdir()
+    assert not store.load().aligned
+    with pytest.raises(StoreError, match="not saved"):
+        store.save(calibration(1))
+
+
+def test_a_calibration_belongs_to_one_chip_and_range(store, tmp_path):
+    store.save(calibration(1))
+    for other in (Store(0x70, 8, str(tmp_path)), Store(0x68, 4, str(tmp_path))):
+        assert not other.load().aligned
+        assert "another sensor or range" in other.message
+    assert store.load().aligned
+
+
+@pytest.mark.parametrize(
+    ("field", "value"),
+    [(0, 0.6), (3, 1.3), (3, 0.7), (6, 61.0), (9, 1.1), (17, -1.0), (18, 4.0), (9, float("nan")), (0, float("inf"))],
+)
+def test_implausible_values_are_not_used(store, tmp_path, field, value):
+    store.save(calibration(1))
+    path = newest_file(tmp_path, store)
+    record = bytearray(path.read_bytes()[:-4])
+    struct.pack_into("<f", record, 16 + 4 * field, value)
+    path.write_bytes(record + struct.pack("<I", crc32(record)))
+    assert not store.load().aligned
+    assert "out of range" in store.message
+
+
+def test_flash_that_does_not_keep_what_is_written(store, tmp_path, monkeypatch):
+    store.save(calibration(1))
+
+    def forgetful(path, mode):
+        if mode == "wb":
+            open(path, mode).close()
+            return io.BytesIO()
+        return open(path, mode)
+
+    monkeypatch.setattr("kickstand.calibration.store.open", forgetful, raising=False)
+    with pytest.raises(StoreError, match="reads back differently"):
+        store.save(calibration(2))
+    assert mark_of(store.load()) == 1
+
+
+def test_a_trim_may_be_stored_beside_a_record_that_never_was_this_sensors(store, tmp_path):
+    """Another range, aligned once; likewise a record that a power cut left empty."""
+    store.save(calibration(1))
+    store.save(calibration(2))
+    other = Store(0x68, 16, str(tmp_path))
+    other.load()
+    other.save(calibration(3))
+    again = Store(0x68, 16, str(tmp_path))
+    assert mark_of(again.load()) == 3 and "another sensor" in again.message
+    assert again.unchanged()
+    newest = newest_file(tmp_path, other)
+    for name in FILES:
+        if tmp_path / name != newest:
+            (tmp_path / name).write_bytes(b"")
+    again.load()
+    assert again.unchanged()
+    again.save(calibration(4))
+    assert again.unchanged()
+    assert mark_of(Store(0x68, 16, str(tmp_path)).load()) == 4
+
+
+def test_nothing_is_stored_over_a_record_that_misread_for_a_while(store, tmp_path):
+    """A voltage sag while loading: the older record is in use, the newer one is whole."""
+    store.save(calibration(1))
+    store.save(calibration(2))
+    newest = newest_file(tmp_path, store)
+    whole = newest.read_bytes()
+    newest.write_bytes(b"")
+    again = Store(0x68, 8, str(tmp_path))
+    assert mark_of(again.load()) == 1
+    newest.write_bytes(whole)
+    assert not again.unchanged()

@@ -1,0 +1,256 @@
+"""The recorder on the emulated Pico: its own littlefs, flash that stalls, 32-bit floats, power cuts, mpremote."""
+
+import ast
+import binascii
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from itertools import pairwise
+
+import command
+import pytest
+from emulated import PART, calibrated, modules, pico
+from kickstand_tools.calibration.file import read_calibration
+from kickstand_tools.logs.reader import read_blocks, read_log
+from kickstand_tools.replay import replay_engine
+from kickstand_tools.rides import block_reader, ride_log
+from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, wait
+from test_chip_power_cut import torn
+
+pytestmark = pytest.mark.chip
+
+RIDE = Ride([wait(2.0), accelerate(15.0, 3.0), turn(-30.0, 3.0), turn(35.0, 3.0)])
+
+# The app as it is, its lean of each turn kept: seconds of it, then the ride is ended
+_RUN = """
+from array import array
+from time import ticks_add, ticks_diff, ticks_ms
+from kickstand import app, devices, settings
+from kickstand.lean.meter import LeanMeter
+class Config:
+    RECORD = True
+    WATCHDOG = False
+class Done(Exception):
+    pass
+leans = array("f", bytes(4 * 2000))
+count = 0
+until_ms = ticks_add(ticks_ms(), SECONDS * 1000)
+update = LeanMeter.update_sum
+def noted(self, *arguments):
+    global count
+    if ticks_diff(ticks_ms(), until_ms) > 0:
+        raise KeyboardInterrupt
+    update(self, *arguments)
+    leans[count] = self.lean_deg
+    count += 1
+LeanMeter.update_sum = noted
+chosen = settings.Settings(Config)
+try:
+    app.App(chosen, devices.open_lcd(chosen)).run()
+except KeyboardInterrupt:
+    pass
+print(list(leans[:count]))
+"""
+
+# Turns of a made-up ride as fast as they can be written
+_FEED = """
+import random
+from kickstand.rides.recorder import Recorder
+from kickstand.rides.flash_ring import RideRing
+from kickstand.calibration.parameters import Calibration
+class Settings:
+    SD_SPI = None
+class Chip:
+    who_am_i, accel_range_g, accel_lsb_per_g, gyro_lsb_per_dps = 0x68, 8, 4096, 65.5
+    counts = [0] * 7
+    def temperature_c(self, counts):
+        return 25.0
+recorder = Recorder(RideRing(Settings), 200)
+def feed(blocks):
+    sums = [0] * 7
+    while recorder.active and recorder._sequence <= blocks:
+        for i in range(7):
+            sums[i] = random.getrandbits(12)
+        recorder.add(sums, 2, 10000)
+        recorder.tick()
+"""
+
+
+def rides(files):
+    """Whole blocks by ride, in their order; nothing else may be in the files."""
+    found = {}
+    for name in sorted(files):
+        if name.startswith("rides/"):
+            blocks, problems = block_reader.read(files[name])
+            assert set(problems) <= {block_reader.CUT_SHORT}
+            for block in blocks:
+                found.setdefault(block.ride, []).append(block)
+    return found
+
+
+def test_a_recorded_ride_replays_as_it_was_shown(tmp_path):
+    """And while it is recorded no sample is lost, and the display goes on."""
+    from kickstand_tools.bench.sample_count import SampleCount
+
+    with pico(PART.world(RIDE.motion), modules() | calibrated()) as device:
+        samples = SampleCount(device.board.sensor)
+        shown = set()
+        device.board.at(3.0, samples.begin)
+        lost = []
+        device.board.at(6.5, lambda: lost.append(samples.lost()))
+        for i in range(35):
+            device.board.at(3.0 + i / 10, lambda: shown.add(tuple(device.lcd())))
+        leans = ast.literal_eval(device.exec(_RUN.replace("SECONDS", "7"), 20.0))
+        found = rides(device.files())
+    assert lost == [0]
+    assert len(shown) > 10
+    assert all(lines[0].endswith("*") for lines in shown if "°" in lines[0])
+    assert list(found) == [1]
+    assert sum(len(block.turns) for block in found[1]) == len(leans)
+    assert len(found[1]) >= 2
+    cal = ride_log.write(tmp_path / "ride.csv.gz", found[1])
+    engine = replay_engine.Replay(read_calibration(cal).to_firmware())
+    rows = [row for block in read_blocks(tmp_path / "ride.csv.gz") for row in block.rows()]
+    assert max(abs(engine.step(*row)[0] - lean) for row, lean in zip(rows, leans, strict=True)) < 0.05
+    assert max(leans) - min(leans) > 10
+
+
+def test_wherever_the_power_goes_all_but_the_last_block_is_kept():
+    """Before, within and after each operation on the flash; the calibration stays whatever happens."""
+    with pico(files=modules() | calibrated()) as device:
+        device.exec(_FEED)
+        states = []
+        device.chip.flash.before_operation = lambda: states.append((device.file_system, None))
+        device.exec("recorder.start(Chip(), Calibration())")
+        written = 0
+        for blocks in range(1, 5):
+            device.exec(f"feed({blocks})")
+            states.append((device.file_system, written))
+            written = blocks
+        device.exec("recorder.stop()")
+        states.append((device.file_system, 4))
+    from kickstand_tools.emulator import flash_image
+
+    kept = calibrated()
+    at_least = 0
+    checked = 0
+    for (before, known), (after, _) in pairwise(states):
+        at_least = max(at_least, known or 0)
+        if before == after:
+            continue
+        for state in (before, *(torn(before, after, share) for share in (0.05, 0.5, 0.95))):
+            files = flash_image.read(state)
+            assert files.items() >= kept.items()
+            sequences = [block.sequence for block in rides(files).get(1, [])]
+            assert sequences == list(range(len(sequences)))
+            assert len(sequences) >= at_least - 1
+            checked += 1
+    assert checked > 4 * 60
+    assert len(rides(flash_image.read(states[-1][0]))[1]) >= 4
+
+
+@pytest.mark.parametrize("operation", [2, 20, 37])
+def test_a_board_records_again_after_a_cut(operation):
+    with pico(files=modules() | calibrated()) as device:
+        device.exec(_FEED)
+        device.chip.flash.cut_power(operation, 0.5)
+        device.console.send(b"recorder.start(Chip(), Calibration())\nfeed(6)\x04")
+        device.run(6.0)
+        assert not device.powered
+        device.power_on()
+        device.exec(_FEED + "recorder.start(Chip(), Calibration())\nfeed(2)\nrecorder.stop()\n", 20.0)
+        found = rides(device.files())
+    assert [len(blocks) for blocks in found.values()][-1] >= 2
+
+
+# A driver of an SD card that is a dictionary in RAM
+_SDCARD = b"""
+import os
+class SDCard:
+    blocks = {}
+    def __init__(self, spi, cs):
+        if not self.blocks:
+            os.VfsFat.mkfs(self)
+    def readblocks(self, n, buf, offset=0):
+        for i in range(len(buf) // 512):
+            buf[i * 512 : i * 512 + 512] = self.blocks.get(n + i, bytes(512))
+    def writeblocks(self, n, buf, offset=0):
+        for i in range(len(buf) // 512):
+            self.blocks[n + i] = bytes(buf[i * 512 : i * 512 + 512])
+    def ioctl(self, op, arg):
+        return {4: 4096, 5: 512}.get(op, 0)
+"""
+
+
+def test_rides_go_to_an_sd_card_where_config_names_one():
+    """Its driver is made up, its FAT is the board's."""
+    with pico(files=modules() | calibrated() | {"sdcard.py": _SDCARD}) as device:
+        card = "SD_SPI, SD_SCK, SD_MOSI, SD_MISO, SD_CS = 0, 18, 19, 16, 17"
+        device.exec(_FEED.replace("SD_SPI = None", card))
+        device.exec("recorder.start(Chip(), Calibration())\nfeed(3)\nrecorder.stop()\n", 30.0)
+        assert "rides" not in {name.partition("/")[0] for name in device.files()}
+        listed = ast.literal_eval(device.exec("import os\nprint(os.listdir('/sd/rides/000/01'))"))
+        assert listed == ["00000.rid"]
+        text = device.exec(
+            "from binascii import b2a_base64\nf = open('/sd/rides/000/01/00000.rid', 'rb')\n"
+            "while d := f.read(768):\n    print(b2a_base64(d).decode(), end='')\n"
+        )
+    content = b"".join(binascii.a2b_base64(line) for line in text.split())
+    blocks, problems = block_reader.read(content)
+    assert (len(blocks), problems) == (3, [])
+
+
+# A Pico with the firmware and a config.py, its console a socket, in a process of its own
+_SERVE = """
+from emulated import calibrated, firmware, pico, PART
+from kickstand_tools.emulator.console_server import ConsoleServer
+from test_chip_recorder import RIDE
+device = pico(PART.world(RIDE.motion), firmware() | calibrated() | {"config.py": b"RECORD = True\\n"})
+server = ConsoleServer(device.console, 0)
+device.heard = server.say
+device.power_on()
+device.run(4.5)
+print(server.port, flush=True)
+while True:
+    device.run(0.02, server.poll)
+"""
+
+
+def test_pull_and_record_through_mpremote(tmp_path):
+    """A ride that is being recorded is ended and pulled; then a log is streamed. Both replay."""
+    pico()  # or skip
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
+    process = subprocess.Popen([sys.executable, "-c", _SERVE], stdout=subprocess.PIPE, text=True, env=environment)
+    try:
+        assert process.stdout is not None
+        port = f"socket://127.0.0.1:{process.stdout.readline().strip()}"
+        result = command.works("pull", "--port", port, "--out", tmp_path, "--delete")
+        assert result.err == ""
+        assert "deleted from the board: ride 1" in result.out
+        pulled = next(tmp_path.glob("ride-00001-*.csv.gz"))
+        assert len(read_log(pulled).time_us) > 150
+        arguments = ["record", "--port", port, "--out", str(tmp_path / "live.csv")]
+        recording = subprocess.Popen(
+            [sys.executable, "-m", "kickstand_tools.cli", *arguments],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        assert recording.stdout is not None
+        assert recording.stdout.readline().startswith("recording from socket")
+        time.sleep(45)  # a few emulated seconds
+        recording.send_signal(signal.SIGINT)
+        out, err = recording.communicate(timeout=120)
+        assert (recording.returncode, err) == (0, "")
+        assert re.search(r"written: .*live\.csv, [\d.]+ s, \d+ readings", out)
+        for log in (pulled, tmp_path / "live.csv"):
+            cal = ride_log.calibration_path(log)
+            command.works("replay", log, "--calibration", cal, "--out", tmp_path / "lean.csv")
+    finally:
+        process.kill()
+        process.wait()
+        if process.stdout:
+            process.stdout.close()

@@ -1,0 +1,88 @@
+"""What is drawn while something takes its time: at once where it is known to, on a terminal only."""
+
+import contextlib
+
+import command
+import pytest
+from kickstand_tools import output, progress
+from kickstand_tools.evaluation import evaluate, runs
+from watched import Watched, watched
+
+
+@pytest.mark.parametrize(("patience_s", "seen"), [(0.0, True), (9.0, False)])
+def test_a_bar_without_patience_begins_with_nothing_done(patience_s, seen, monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+    with contextlib.redirect_stderr(Watched()) as drawn, progress.Bar("riding", 4, patience_s):
+        pass
+    assert ("riding" in drawn.getvalue() and "0%" in drawn.getvalue()) is seen
+
+
+def test_making_up_a_ride_is_seen(tmp_path, monkeypatch):
+    arguments = ["simulate", "--profile", "parked", "--seconds", 20, "--out", tmp_path / "ride"]
+    assert command.works(*arguments).err == ""
+    assert "making up a ride" in watched(monkeypatch, Watched(), *arguments)
+
+
+def test_judging_is_seen_from_the_start(monkeypatch):
+    """From 0 %, not after the first ride only."""
+    arguments = ["evaluate", "--profiles", "parked", "--seeds", 1, "--seconds", 60, "--json"]
+    shown = watched(monkeypatch, Watched(), *arguments)
+    assert "riding" in shown
+    assert " 0%" in shown
+
+
+def test_every_step_of_a_ride_is_told():
+    jobs = [runs.Job("parked", seed, seconds=60.0) for seed in range(2)]
+    before_first, count = 0, 0
+
+    def done():
+        nonlocal count
+        count += 1
+
+    for k, _ in enumerate(runs.run_all(jobs, done)):
+        before_first = before_first if k else count
+    assert before_first >= runs.steps()
+    assert count == 2 * runs.steps() > 4
+
+
+def test_a_refused_ride_has_as_many_steps(monkeypatch):
+    def refuse(*_):
+        raise runs.InputError("1.021 g")
+
+    monkeypatch.setattr(runs.poses, "six", refuse)
+    count = []
+    runs.run(runs.Job("parked", 0, seconds=60.0), lambda: count.append(1))
+    assert len(count) == runs.steps()
+
+
+def test_broken_off_an_evaluation_leaves_no_empty_directory(tmp_path, monkeypatch):
+    def ctrl_c(*_):
+        assert (tmp_path / "a" / "b").is_dir()
+        raise KeyboardInterrupt
+
+    pytest.importorskip("matplotlib")
+    monkeypatch.setattr(evaluate, "run_all", ctrl_c)
+    assert command.run("evaluate", "--profiles", "parked", "--out", tmp_path / "a" / "b").status == 130
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_directory_that_was_there_or_has_something_in_it_stays(tmp_path):
+    (tmp_path / "old").mkdir()
+    for path in (tmp_path / "old", tmp_path / "new"):
+        with contextlib.suppress(KeyboardInterrupt), output.new_directory(path):
+            if path.name == "new":
+                (path / "file").write_text("")
+            raise KeyboardInterrupt
+    assert (tmp_path / "old").is_dir()
+    assert (tmp_path / "new" / "file").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments", [["simulate", "--profile", "parked"], ["evaluate", "--profiles", "parked"], ["pull"]]
+)
+def test_a_file_in_place_of_a_directory_is_refused_before_any_work(arguments, tmp_path, monkeypatch):
+    monkeypatch.setattr("kickstand_tools.simulation.files.ride", None)
+    monkeypatch.setattr(evaluate, "run_all", None)
+    (tmp_path / "file").write_text("")
+    words = f"kickstand: {tmp_path / 'file'} is a file: give --out the name of a directory\n"
+    assert command.refused(tmp_path, *arguments, "--out", tmp_path / "file") == words

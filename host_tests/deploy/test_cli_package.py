@@ -1,0 +1,212 @@
+"""What is shipped: the list for mip, the wheel with the firmware, and tools/dev.py that sets it all up."""
+
+import importlib.util
+import json
+import os
+import re
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+from kickstand_tools import firmware_path
+from kickstand_tools.deploy import flash
+from kickstand_tools.errors import extra
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_mip_installs_every_module_and_nothing_else():
+    listed = json.loads((ROOT / "firmware" / "package.json").read_text())
+    firmware = ROOT / "firmware"
+    modules = {path.relative_to(firmware).as_posix() for path in (firmware / "kickstand").rglob("*.py")}
+    assert {target for target, _ in listed["urls"]} == modules
+    assert all(target == source for target, source in listed["urls"])  # relative: it needs no network
+
+
+def test_one_version_everywhere():
+    listed = json.loads((ROOT / "firmware" / "package.json").read_text())["version"]
+    text = (ROOT / "firmware" / "kickstand" / "__init__.py").read_text()
+    project = re.search(r'^version = "(.*)"', (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
+    assert project
+    assert f'__version__ = "{listed}"' in text
+    assert project[1] == listed
+
+
+def test_the_wheel_carries_the_firmware(tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(tmp_path)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as archive:
+        names = set(archive.namelist())
+        for target, source in flash.firmware_files().items():
+            inside = target[1:] if target.startswith("/kickstand/") else "kickstand_tools/firmware" + target
+            assert archive.read(inside) == source.read_bytes()
+    assert {"kickstand_tools/cli/main.py", "kickstand_tools/py.typed"} <= names
+    assert {name.split("/")[0] for name in names} == {"kickstand", "kickstand_tools", "kickstand-0.2.0.dist-info"}
+    assert not [name for name in names if "__pycache__" in name or name.endswith(".cal")]
+
+
+def test_an_installation_stays_that_of_the_checkout():
+    """Without -e `flash --config` would copy a config.py that the rider has never edited."""
+    told = re.findall(r"pip install\b.*", (ROOT / "README.md").read_text(encoding="utf-8")) + [extra("rides")]
+    assert len(told) >= 4
+    assert all("pip install -e " in line for line in told)
+
+
+def test_an_installed_wheel_finds_its_firmware(tmp_path, monkeypatch):
+    """As in site-packages: beside the package, with no checkout around it."""
+    package = tmp_path / "site-packages" / "kickstand_tools"
+    (package / "firmware" / "kickstand").mkdir(parents=True)
+    monkeypatch.setattr(firmware_path, "__file__", str(package / "firmware_path.py"))
+    assert firmware_path.directory() == package / "firmware"
+
+
+@pytest.fixture
+def dev(monkeypatch, tmp_path):
+    """tools/dev.py as a module, set on a project of its own."""
+    spec = importlib.util.spec_from_file_location("dev", ROOT / "tools" / "dev.py")
+    assert spec
+    assert spec.loader
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    (tmp_path / "pyproject.toml").write_text('[project]\nname = "one"\n')
+    monkeypatch.setattr(module, "ROOT", str(tmp_path))
+    for name in "VENV", "PYTHON", "STAMP", "LOG":
+        monkeypatch.setattr(module, name, str(tmp_path / Path(getattr(module, name)).relative_to(ROOT)))
+    return module
+
+
+@pytest.fixture
+def steps(dev, monkeypatch):
+    """dev.prepare() with the slow parts noted instead of done."""
+    done: list[str] = []
+    monkeypatch.setattr(dev, "has_pip", lambda: os.path.isdir(dev.VENV))
+
+    def make_venv():
+        done.append("venv")
+        os.makedirs(dev.VENV, exist_ok=True)
+
+    monkeypatch.setattr(dev, "make_venv", make_venv)
+    monkeypatch.setattr(dev, "install", lambda extra: done.append("install " + extra))
+    return done
+
+
+def test_it_installs_once(dev, steps):
+    for _ in range(2):
+        dev.prepare("")
+    assert steps == ["venv", "install "]
+
+
+def test_the_tests_need_more_than_the_demo_and_the_demo_nothing_more(dev, steps):
+    dev.prepare("")
+    dev.prepare("test")
+    dev.prepare("")
+    assert steps == ["venv", "install ", "install test"]
+
+
+def test_it_installs_again_when_the_project_has_changed(dev, steps, tmp_path):
+    dev.prepare("test")
+    (tmp_path / "pyproject.toml").write_text('[project]\nname = "two"\n')
+    dev.prepare("test")
+    assert steps == ["venv", "install test", "install test"]
+
+
+def test_a_broken_off_installation_is_begun_again(dev, steps, monkeypatch):
+    dev.prepare("")
+
+    def broken_off(extra):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr(dev, "install", broken_off)
+        dev.prepare("test")
+    dev.prepare("")
+    assert steps == ["venv", "install ", "install "]
+
+
+def test_another_python_or_a_moved_checkout_gets_a_new_venv(dev, steps):
+    dev.prepare("")
+    stamp = Path(dev.STAMP)
+    stamp.write_text(stamp.read_text().replace("Python ", "Python 0.", 1))
+    dev.prepare("")
+    assert steps == ["venv", "install ", "venv", "install "]
+
+
+def test_an_old_python_is_turned_away_in_one_line(dev, monkeypatch):
+    monkeypatch.setattr(dev, "OLDEST", (sys.version_info[0], sys.version_info[1] + 1))
+    with pytest.raises(dev.Stop, match="newer is needed, this is") as stopped:
+        dev.main(["test"])
+    assert "\n" not in str(stopped.value)
+
+
+@pytest.mark.parametrize("arguments", [[], ["fly"]])
+def test_it_says_what_it_can_do(arguments):
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "tools" / "dev.py"), *arguments], capture_output=True, text=True
+    )
+    assert done.returncode != 0
+    assert done.stderr.startswith("dev.py: say what to do")
+    assert done.stderr.count("\n") == 1
+
+
+def fake_python(directory, script):
+    """A command that takes the place of python3."""
+    path = directory / "python"
+    path.write_text("#!/bin/sh\n" + script)
+    path.chmod(0o755)
+    return str(path)
+
+
+needs_sh = pytest.mark.skipif(os.name == "nt", reason="the stand-in for Python is a shell script")
+
+
+@needs_sh
+@pytest.mark.parametrize(
+    ("script", "words"),
+    [
+        (
+            "echo 'The virtual environment was not created: ensurepip is not available.'; exit 1",
+            "python3-venv",
+        ),
+        ("echo 'python3: No module named venv'; exit 1", "python3-venv"),
+        ("echo 'Error: [Errno 13] Permission denied'; exit 1", "Permission denied"),
+        ("exit 0", "no pip"),
+    ],
+)
+def test_a_venv_that_cannot_be_made_is_told_in_one_line(dev, monkeypatch, tmp_path, script, words):
+    monkeypatch.setattr(sys, "executable", fake_python(tmp_path, script))
+    with pytest.raises(dev.Stop, match=words) as stopped:
+        dev.make_venv()
+    assert "\n" not in str(stopped.value)
+
+
+@needs_sh
+def test_a_failed_installation_gives_the_reason_and_the_log(dev, monkeypatch, tmp_path):
+    script = "echo 'Collecting x'; echo 'ERROR: No matching distribution found for x'; exit 1"
+    os.mkdir(dev.VENV)
+    monkeypatch.setattr(dev, "PYTHON", fake_python(tmp_path, script))
+    with pytest.raises(dev.Stop, match="No matching distribution found for x") as stopped:
+        dev.install("test")
+    assert "\n" not in str(stopped.value)
+    assert dev.LOG in str(stopped.value)
+
+
+@pytest.mark.parametrize("failing", ["ruff", "pyright", "pytest"])
+def test_each_check_is_run_and_any_failure_counts(dev, monkeypatch, failing):
+    ran = []
+
+    def run(*command):
+        ran.append(command)
+        return int(failing in command)
+
+    monkeypatch.setattr(dev, "run", run)
+    assert dev.test(["-k", "lean"]) == 1
+    assert [command[1] for command in ran] == ["ruff", "pyright", "pytest"]
+    assert ran[2][-2:] == ("-k", "lean")

@@ -1,0 +1,123 @@
+"""A config.py of the rider's own: which one is flashed, and how a slip in it is told on the host and by the board."""
+
+import os
+import subprocess
+import sys
+import types
+
+import command
+import fake_board
+import mpy
+import pytest
+from kickstand_tools import firmware_path
+from kickstand_tools.deploy import flash
+from serial.tools import list_ports
+
+
+@pytest.fixture
+def board(tmp_path, monkeypatch):
+    """The only board that is plugged in, with a config.py on it."""
+    (tmp_path / "flash").mkdir()
+    board = fake_board.FakeBoard(tmp_path / "flash")
+    board.path("config.py").write_text("# on the board\n")
+    pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
+    monkeypatch.setattr(list_ports, "comports", lambda: [pico])
+    monkeypatch.setattr(flash, "SerialTransport", lambda name, timeout: board)
+    monkeypatch.setattr(flash, "_RESTART_S", 0)
+    return board
+
+
+@pytest.fixture
+def config(tmp_path, monkeypatch):
+    """The config.py of a checkout that the rider stands in, while the command is installed elsewhere."""
+    firmware = tmp_path / "checkout" / "firmware"
+    (firmware / "kickstand").mkdir(parents=True)
+    (firmware / "config.py").write_text('SIDE = "right"\n')
+    monkeypatch.chdir(tmp_path / "checkout")
+    return firmware / "config.py"
+
+
+def test_the_checkout_s_config_is_flashed_and_named(board, config):
+    result = command.works("flash", "--config")
+    assert board.path("config.py").read_text() == 'SIDE = "right"\n'
+    assert f"config.py is {config}\n" in result.out
+
+
+def test_elsewhere_it_is_the_firmware_s_own(board, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    result = command.works("flash", "--config")
+    assert board.path("config.py").read_bytes() == (firmware_path.directory() / "config.py").read_bytes()
+    assert f"config.py is {firmware_path.directory() / 'config.py'}\n" in result.out
+
+
+SLIPS = {
+    "syntax": ('# one\nSIDE = "right\n', 2, "SyntaxError: unterminated string"),
+    "no string": ("# one\n\nSIDE = right\n", 3, "NameError: name 'right' is not defined"),
+    "value": ('# one\nSIDE = "rigth"\n', 2, "SIDE = 'rigth', but it must be one of 'left', 'right'"),
+    "name": ('SIDDE = "right"\n', 1, "SIDDE is not a setting"),
+    "capitals": ('Side = "right"\n', 1, "Side is not a setting"),
+    "no line of its own": ("BUTTON_PIN = 4\n", None, "a pin is used twice"),
+}
+
+
+@pytest.mark.parametrize("slip", SLIPS)
+def test_a_slip_is_refused_with_its_line_before_anything_is_copied(slip, board, config):
+    text, line, reason = SLIPS[slip]
+    config.write_text(text)
+    words = f"{config}, line {line}: {reason}" if line else f"{config}: {reason}"
+    command.refused(board.root, "flash", "--config", words=words)
+    assert board.resets == 1  # what was there before runs on
+
+
+def test_a_new_board_gets_no_faulty_config_either(board, config):
+    board.path("config.py").unlink()
+    config.write_text("SIDE = right\n")
+    command.refused(board.root, "flash", words="line 1: NameError")
+
+
+def test_a_config_that_stays_at_home_is_not_judged(board, config):
+    config.write_text("SIDE = right\n")
+    result = command.works("flash")
+    assert board.path("config.py").read_text() == "# on the board\n"
+    assert "config.py is" not in result.out
+
+
+@pytest.mark.parametrize(("platform", "status"), [("rp2", 2), ("esp32", 0)])
+def test_it_is_judged_for_the_board_s_port(platform, status, board, config):
+    board.modules["sys"].platform = platform
+    config.write_text("BUTTON_PIN = 4\n")  # on a Pico the sensor's SDA
+    assert command.run("flash", "--config").status == status
+
+
+_LOAD = """
+import sys
+from kickstand_tools.simulated_board.simulator import Board
+Board(lambda t_s: (0, 0, 1, 0, 0, 0)).install()
+sys.path.insert(0, DIRECTORY)
+from kickstand import settings
+from kickstand.errors import SettingsError
+try:
+    settings.load()
+except SettingsError as error:
+    print(error.reason)
+"""
+
+
+@pytest.mark.parametrize("engine", ["cpython", "micropython"])
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("# one\n\nSIDE = = 3\n", "config.py cannot be read (line 3: invalid syntax"),
+        ("# one\nSIDE = right\n", "config.py cannot be read (line 2: name 'right' "),
+    ],
+)
+def test_the_board_names_the_line_too(text, said, engine, tmp_path):
+    (tmp_path / "config.py").write_text(text)
+    script = _LOAD.replace("DIRECTORY", repr(str(tmp_path)))
+    if engine == "micropython":
+        printed = mpy.run_mpy(script)
+    else:
+        env = os.environ | {"PYTHONPATH": firmware_path.search_path()}
+        done = subprocess.run([sys.executable, "-c", script], env=env, capture_output=True, text=True)
+        printed = done.stdout + done.stderr
+    assert printed.startswith(said), printed

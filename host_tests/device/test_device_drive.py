@@ -1,0 +1,305 @@
+"""The device aligned by driving: cars from nothing, motorcycles checked and refined, speeds that cannot be used."""
+
+import math
+
+import devices
+import engines
+import pytest
+from board_access import level
+from kickstand_tools.simulated_board.simulator import Board
+from kickstand_tools.simulation.scripted import sensor_errors
+
+SHORT, LONG = 0.15, 1.2
+POSES = [[2, SHORT], [12, SHORT]]
+POSES_S = 20.0
+
+
+def town(blocks):
+    """[[function of rides, arguments], ...]: 30 s each with one straight braking to a stop of 6 s, and a turn."""
+    ride = []
+    for k in range(blocks):
+        ride += [["accelerate", 13.0 + k % 3, 6.0], ["turn", -25.0 if k % 2 else 20.0, 3.0], ["straight", 5.0]]
+        ride += [["brake", 0.0, 4.0 + k % 2], ["wait", 9.0 - k % 2]]
+    return ride
+
+
+def stops(time_s, start_s):
+    """True while the bike of town(), begun at start_s, stands."""
+    return time_s < start_s or (time_s - start_s) % 30.0 > 21.0
+
+
+def car(source, blocks=8, **plan):
+    config = {"VEHICLE": "car", "SPEED": source, **plan.pop("config", {})}
+    ride = [["wait", 6.0], *town(blocks)]
+    return {"ride": ride, "seed": 3, source: {}, "until": 6.0 + 30.0 * blocks, **plan, "config": config}
+
+
+def bike(source, blocks=8, kickstand=(-12.0,), **plan):
+    config = {"SPEED": source, **plan.pop("config", {})}
+    ride = [["kickstand", 8.0, *kickstand], ["upright", 10.0, 0.0, 0.0], *town(blocks)]
+    until = POSES_S + 30.0 * blocks
+    return {"ride": ride, "presses": POSES, source: {}, "until": until, **plan, "config": config}
+
+
+def stored(flash):
+    from kickstand.calibration.store import Store
+
+    return Store(0x68, 8, str(flash)).load()
+
+
+def forward_error_deg(calibration, seed=None):
+    """Of the heading of forward alone: what driving finds."""
+    true = sensor_errors.Sensor(seed=seed).vehicle_from_sensor
+    up, forward = true[3:6], calibration.vehicle_from_sensor[6:9]
+    left = sum(a * b for a, b in zip(true[0:3], forward, strict=True))
+    ahead = sum(a * b for a, b in zip(true[6:9], forward, strict=True))
+    assert abs(sum(a * b for a, b in zip(up, forward, strict=True))) < 0.15
+    return abs(math.degrees(math.atan2(left, ahead)))
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_a_car_finds_its_alignment_and_says_what_it_waits_for(engine, tmp_path):
+    record = devices.run(engine, tmp_path, car("gps", 5, presses=[[60, SHORT], [65, SHORT]]))
+    assert record.at(3.0) == ["Brakings   0/5  ", "stop needed     "]
+    assert record.first("brake straight") < 8.0
+    assert record.first("braking...") < 30.0
+    assert record.at(62.0)[0].startswith("Raw")  # the other page
+    assert record.first("Brakings   [2-4]/5", 65.0) < 67.0
+    saved = record.first("Aligned by drive")
+    assert saved < 150.0 and stops(saved, 6.0)
+    assert record.at(saved)[1].startswith("error about")
+    assert record.first("Accel    0.3", saved) < math.inf  # the first page of a car
+    calibration = stored(tmp_path)
+    assert calibration.aligned and calibration.by_drive
+    assert forward_error_deg(calibration, 3) < 1.5
+    bias = sensor_errors.Sensor(seed=3).gyro_bias_dps
+    assert list(calibration.gyro_bias) == pytest.approx(bias, abs=0.1)
+    assert all(len(line) == 16 for frame in record.frames for line in frame[1:])
+    again = devices.run(engine, tmp_path, car("gps", 1))
+    assert again.at(2.0)[0].startswith(("Accel", "Brake")) and again.at(25.0)[0].startswith("Brake    0.")
+
+
+def test_nothing_is_stored_before_it_is_ready(tmp_path):
+    devices.run("cpython", tmp_path, car("wheel", 2))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_car_by_its_wheel_stores_at_standstill_only(tmp_path):
+    """Ready in the middle of a braking that goes on to a slower speed, not to a stop."""
+    plan = car("wheel", 2, wheel={"bounce_us": 2000})
+    moving = [["brake", 4.0, 3.0], ["straight", 2.0], ["accelerate", 15.0, 6.0], ["straight", 5.0]]
+    plan["ride"] += [["accelerate", 15.0, 6.0], ["straight", 5.0], *moving * 4, ["brake", 0.0, 5.0], ["wait", 8.0]]
+    end = 66.0 + 11.0 + 4 * 16.0 + 13.0
+    devices.run("cpython", tmp_path, {**plan, "until": end - 9.0})
+    assert list(tmp_path.iterdir()) == []
+    record = devices.run("cpython", tmp_path, {**plan, "until": end})
+    assert record.first("Ready:") < end - 20.0 and record.first("Aligned by drive") > end - 9.0
+    assert forward_error_deg(stored(tmp_path), 3) < 1.5
+
+
+def test_a_car_whose_sensor_is_mounted_anew_finds_it_out(tmp_path):
+    devices.run("cpython", tmp_path, car("wheel", 5))
+    before = list(stored(tmp_path).vehicle_from_sensor)
+    record = devices.run("cpython", tmp_path, car("wheel", 8, remount=[70.0, 8]))
+    assert record.first("Aligned by drive") < math.inf
+    after = list(stored(tmp_path).vehicle_from_sensor)
+    true = sensor_errors.random_mounting(8)
+    assert max(abs(a - b) for a, b in zip(after, true, strict=True)) < 0.12  # the part's own errors: 4 degrees
+    assert max(abs(a - b) for a, b in zip(before, true, strict=True)) > 0.5
+
+
+def test_a_wrong_kickstand_side_is_noticed_and_put_right(tmp_path):
+    question = "Stand was right"
+    record = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,)))
+    asked = record.first(question)
+    assert asked < POSES_S + 60.0 and stops(asked, POSES_S)
+    assert record.at(asked)[1] == "hold = fix      "
+    away = record.first("Lean", asked)
+    assert not stops(away, POSES_S)  # it does not stand in the way of riding
+    turned = POSES_S + 30.0 * 2 + 9.0  # in a right turn of 20 degrees
+    assert record.lean_at(turned) is None  # it would be the wrong way round
+    assert record.at(turned) == ["Lean  --        ", "stand was right?"]
+    fixed = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,), presses=[*POSES, [asked + 1, LONG]]))
+    assert fixed.first("Side put right") < asked + 3.0
+    assert fixed.lean_at(turned) == pytest.approx(20, abs=4)
+    assert fixed.first(question, asked + 3.0) == math.inf
+    assert forward_error_deg(stored(tmp_path)) < 2.0
+
+
+def test_a_side_that_the_rider_stands_by_is_not_asked_for_again(tmp_path):
+    asked = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,))).first("Stand was right")
+    record = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,), presses=[*POSES, [asked + 1, SHORT]]))
+    assert record.first("Stand was right", asked + 2.0) == math.inf
+    assert not stored(tmp_path).by_drive
+
+
+@pytest.mark.parametrize(("model", "config"), [({"until_s": 65.0}, {}), ({}, {"PULSES_PER_METRE": 0.25})])
+def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
+    """A wire that breaks on the way reads as standing still, a second magnet as twice the speed. Told at a stop."""
+    plan = bike("wheel", 8, wheel=model, config={"SPEED": "wheel", **config})
+    record = devices.run("cpython", tmp_path, plan)
+    for town_round in range(8):
+        shown = record.lean_at(POSES_S + 30.0 * town_round + 9.0)
+        assert shown == pytest.approx(-25 if town_round % 2 else 20, abs=4)
+    told = record.first("Speed (stuck at|2.0 times)")
+    assert stops(told, POSES_S)
+    assert record.at(told + 2.0) == record.at(told)  # until it is answered, or the ride goes on
+
+
+def test_a_question_that_is_not_on_the_display_is_not_answered(tmp_path):
+    """A press meant for the page that is in front of it."""
+    plan = bike("gps", 3, kickstand=(12.0,))
+    asked = devices.run("cpython", tmp_path, plan).first("Stand was right")
+    to_info = [[asked - 14.0, LONG], *([asked - 12.0 + t, SHORT] for t in range(3)), [asked - 9.0, LONG]]
+    presses = [*POSES, *to_info, [asked + 2.0, LONG]]
+    record = devices.run("cpython", tmp_path, {**plan, "presses": presses, "until": asked + 4.0})
+    assert record.at(asked + 1.0)[0].startswith("MPU6050")
+    assert record.at(asked + 3.5)[1].startswith("next")  # the menu
+    assert not stored(tmp_path).by_drive
+
+
+def test_the_trim_of_the_ride_outlives_a_refined_alignment(tmp_path):
+    """Upright was 2 degrees off, which riding finds out; then forward is refined at a stop."""
+    plan = bike("wheel", 7, kickstand=(-12.0, 2.0))
+    plan["ride"][1] = ["upright", 10.0, 2.0, 0.0]
+    record = devices.run("cpython", tmp_path, plan)
+    assert stored(tmp_path).by_drive
+    for town_round in range(3, 7):
+        assert record.lean_at(POSES_S + 30.0 * town_round - 1.0) in (-1, 0, 1)  # stands upright
+
+
+def test_pitch_on_the_kickstand_is_found_while_riding(tmp_path):
+    """Two degrees turn forward by almost ten; after ten brakings 1.5 at most are left. Held maxima stay."""
+    plan = bike("wheel", 11, kickstand=(-12.0, 2.0))
+    first = devices.run("cpython", tmp_path, {**plan, "until": 19.0})
+    assert first.first("Aligned!") < 19.0
+    assert forward_error_deg(stored(tmp_path)) > 7.0
+    record = devices.run("cpython", tmp_path, {**plan, "presses": [[POSES_S + 300.0, SHORT]]})
+    assert forward_error_deg(stored(tmp_path)) < 1.5
+    assert stored(tmp_path).by_drive
+    assert record.first("Max right +(19|2[0-9])°", POSES_S + 300.0) < math.inf
+
+
+def test_a_mount_that_moved_is_told(tmp_path):
+    record = devices.run("cpython", tmp_path, bike("wheel", 6, remount=[POSES_S + 100.0, 8]))
+    told = record.first("Mount has moved", POSES_S + 100.0)
+    assert told < math.inf and stops(told, POSES_S)
+
+
+def test_another_message_does_not_take_back_that_the_mount_has_moved(tmp_path):
+    """The wire of the wheel breaks after that; nobody has answered."""
+    record = devices.run("cpython", tmp_path, bike("wheel", 12, remount=[POSES_S + 100.0, 8], wheel={"until_s": 215.0}))
+    moved = record.first("Mount has moved")
+    assert moved < record.first("Speed stuck") < math.inf
+    assert not record.leans(moved, 500.0)
+
+
+def test_asked_for_on_a_motorcycle_it_keeps_the_old_alignment_until_the_new_one_is_ready(tmp_path):
+    """The menu, for a sensor that was mounted anew; a sensor fault on the way does no harm."""
+    devices.run("cpython", tmp_path, bike("gps", 0))
+    old = list(stored(tmp_path).vehicle_from_sensor)
+    menu = [[2, LONG], *([4 + t, SHORT] for t in range(4)), [9, LONG]]
+    plan = {"ride": [["upright", 18.0], *town(5)], "seed": 8, "config": {"SPEED": "gps"}, "gps": {"hz": 5}}
+    plan |= {"presses": menu, "faults": [["nack_for", [0x68, 70.0, 2.0]]]}
+    devices.run("cpython", tmp_path, {**plan, "until": 60.0})
+    assert list(stored(tmp_path).vehicle_from_sensor) == old
+    record = devices.run("cpython", tmp_path, {**plan, "until": 170.0})
+    assert record.at(8.5)[0] == "→Align by drive "
+    assert record.first("Brakings") < 12.0
+    assert record.first("Aligned by drive") < math.inf
+    assert forward_error_deg(stored(tmp_path), 8) < 2.0
+
+
+@pytest.mark.parametrize(
+    ("source", "model", "config", "said"),
+    [
+        ("gps", {"faults": [["unplugged", 0, 1000]]}, {}, "GPS silent"),
+        ("gps", {"faults": [["garbled", 0, 1000]]}, {}, "GPS garbled"),
+        ("gps", {"faults": [["void", 0, 1000]]}, {}, "GPS: no fix"),
+        ("gps", {"faults": [["stuck", 40, 1000]]}, {}, "GPS: no fix"),
+        ("gps", {"latency_s": 2.5}, {}, "Speed 2.. s late"),
+        ("wheel", {}, {"PULSES_PER_METRE": 0.5 / 3.6}, "Speed 3.. times"),
+        ("wheel", {"until_s": 40.0}, {}, "Speed stuck at"),
+    ],
+)
+def test_a_speed_that_cannot_be_used_is_told_and_nothing_is_stored(source, model, config, said, tmp_path):
+    plan = car(source, 5, config=config)
+    record = devices.run("cpython", tmp_path, {**plan, source: model})
+    assert record.first(said) < math.inf, {tuple(f[1:]) for f in record.frames}
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_speed_that_fails_for_a_while_is_told_and_does_no_harm(tmp_path):
+    faults = [["unplugged", 15, 30], ["garbled", 45, 62]]
+    record = devices.run("cpython", tmp_path, car("gps", 7, gps={"faults": faults}))
+    assert record.first("GPS silent") == pytest.approx(21.0, abs=3.0)
+    assert record.first("GPS garbled") == pytest.approx(51.0, abs=4.0)
+    assert record.first("Aligned by drive") < math.inf
+    assert forward_error_deg(stored(tmp_path), 3) < 1.5
+
+
+def test_without_a_source_nothing_is_different(tmp_path):
+    presses = [*POSES, [20, LONG]]
+    record = devices.run("cpython", tmp_path, bike("gps", 1, config={"SPEED": None}, presses=presses, until=22.0))
+    assert record.at(21.5)[1] == "next 1/6 hold=ok"
+
+
+@pytest.mark.parametrize(
+    ("config", "named"),
+    [
+        ({"VEHICLE": "car"}, "car needs SPEED"),
+        ({"VEHICLE": "bus", "SPEED": "gps"}, "VEHICLE"),
+        ({"SPEED": "radar"}, "SPEED"),
+        ({"SPEED": "gps", "GPS_RX": 5}, "pin used twice"),
+        ({"SPEED": "gps", "GPS_TX": 15}, "pin used twice"),
+        ({"SPEED": "wheel", "WHEEL_PIN": 7}, "pin used twice"),
+        ({"SPEED": "wheel", "PULSES_PER_METRE": 0}, "PULSES_PER_METRE"),
+        ({"SPEED": "gps", "GPS_BAUD": "9600"}, "GPS_BAUD"),
+        ({"SPEED": "gps", "GPS_RX": 11}, "GPS_TX / GPS_RX"),
+    ],
+)
+def test_a_wrong_setting_of_the_speed_is_named(config, named):
+    board = Board(level)
+    board.install()
+    try:
+        from kickstand.errors import SettingsError
+        from kickstand.settings import Settings
+        from kickstand.speed.source import open_speed
+
+        with pytest.raises(SettingsError) as refusal:
+            open_speed(Settings(type("Config", (), config)))
+        assert refusal.value.lcd[1] == named
+    finally:
+        board.uninstall()
+
+
+def test_pins_of_a_source_that_is_not_used_may_have_another_use(tmp_path):
+    record = devices.run("cpython", tmp_path, {"lean": [[0, 0]], "config": {"BUTTON_PIN": 14}, "until": 2})
+    assert record.last[0].startswith("Raw")
+
+
+@pytest.mark.parametrize(
+    ("config", "fitted", "said"),
+    [
+        ({}, {}, "Speed        no source"),
+        ({"SPEED": "gps"}, {"gps": {}}, "RX 9, 9600 baud:\n  15.0 m/s"),
+        ({"SPEED": "gps"}, {}, "RX 9, 9600 baud:\n  GPS silent, check wiring"),
+        ({"SPEED": "wheel"}, {"wheel": {}}, "GPIO 14, 0.50 pulses a metre:\n  15.0 m/s"),
+    ],
+)
+def test_status_tells_the_speed(config, fitted, said, capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    board = Board(level)
+    for source, kind in fitted.items():
+        getattr(board, "fit_" + source)(lambda t_s: 15.0, **kind)
+    board.install()
+    try:
+        from kickstand import settings, status_report
+
+        monkeypatch.setattr(status_report, "load", lambda: settings.Settings(type("Config", (), config)))
+        monkeypatch.setattr(status_report.gc, "mem_free", lambda: 0, raising=False)
+        assert board.run(status_report.report, 20.0) == "returned"
+    finally:
+        board.uninstall()
+    printed = capsys.readouterr().out
+    assert said in printed and "aligned: no" in printed

@@ -1,0 +1,179 @@
+"""Estimators over simulated and recorded rides, and `kickstand evaluate` as a whole."""
+
+import json
+import math
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command import refused, works
+from kickstand_tools.errors import InputError
+from kickstand_tools.evaluation import estimators, real_ride, runs
+from kickstand_tools.evaluation.samples import Samples
+from kickstand_tools.logs.reader import Log
+from kickstand_tools.simulation.ride import ride
+
+FILTERS = ["complementary", "mahony", "madgwick", "vqf"]
+_PACKAGE = {"mahony": "ahrs", "madgwick": "ahrs", "vqf": "vqf"}
+
+
+def needed(name: str) -> None:
+    package = _PACKAGE.get(name)
+    if package and not find_spec(package):
+        pytest.skip(f"{package} is not installed")
+
+
+def leaned(lean_deg: float, roll_s: float = 1.5) -> Samples:
+    """A bike at rest leaned slowly from upright to lean_deg, then held as long: no turn, no doubt."""
+    n = int(roll_s * 200)
+    lean = np.radians(np.concatenate((np.linspace(0.0, lean_deg, n), np.full(n, lean_deg))))
+    rate = np.zeros((2 * n, 3))
+    rate[:n, 2] = lean_deg / roll_s
+    force = np.column_stack((np.sin(lean), np.cos(lean), np.zeros(2 * n)))
+    return Samples(np.arange(2 * n) / 200.0, force, rate)
+
+
+@pytest.mark.parametrize("name", FILTERS)
+@pytest.mark.parametrize("lean_deg", [30.0, -25.0])
+def test_every_filter_has_the_signs_right(name, lean_deg):
+    needed(name)
+    shown = estimators.OTHERS[name](leaned(lean_deg))
+    assert shown[-1] == pytest.approx(lean_deg, abs=2.0)
+    assert shown[150] == pytest.approx(lean_deg / 2.0, abs=3.0)
+
+
+@pytest.fixture(scope="module")
+def swept():
+    return runs.run(runs.Job("sweeper", 1, seconds=150.0, traces=True))
+
+
+def test_every_estimator_is_scored(swept):
+    assert swept.refusal is None
+    there = {name for name in estimators.OTHERS if _PACKAGE.get(name) not in estimators.missing()}
+    assert set(swept.scores) == {"kickstand", "formula", "formula 0.3 s"} | there
+    for lean in swept.traces.values():
+        assert lean.shape == swept.traces["time"].shape
+        assert np.all(np.isfinite(lean))
+
+
+def test_filters_that_trust_the_force_decay_in_a_held_turn(swept):
+    """What riders complain of: the reason for all this."""
+    assert swept.scores["complementary"].slope < 0.5
+    assert 0.85 < swept.scores["formula"].slope < 1.1
+    assert swept.scores["formula 0.3 s"].rms < 0.5 * swept.scores["formula"].rms
+    assert swept.scores["kickstand"].rms < swept.scores["formula 0.3 s"].rms
+    assert 0.9 < swept.scores["kickstand"].slope < 1.1
+
+
+def test_the_calibration_is_from_the_poses_alone():
+    made = ride("street", 2, 60.0, pitch_change_deg=0.0, share=0.0)
+    calibration = runs.calibrated_by_poses(made)
+    matrix = np.reshape(calibration.matrix, (3, 3))
+    turned = np.degrees(np.arccos((np.trace(matrix @ made.vehicle_from_sensor.T) - 1.0) / 2.0))
+    assert turned < 1.5  # forward by what a hand holds and the ground slopes
+    assert calibration.slope == pytest.approx([1.0] * 3, abs=0.002)
+    assert calibration.six_done and calibration.aligned
+
+
+def test_errors_of_the_set_up_reach_the_calibration():
+    made = ride("street", 2, 60.0, upright_error_deg=1.5, pitch_change_deg=0.0, share=0.0)
+    matrix = np.reshape(runs.calibrated_by_poses(made).matrix, (3, 3))
+    up = matrix[1] @ made.vehicle_from_sensor.T
+    assert np.degrees(np.arctan2(up[0], up[1])) == pytest.approx(1.5, abs=0.15)
+
+
+def test_the_jobs_set_up_errors_are_ridden():
+    jobs = [runs.Job("parked", 0, 60.0, error, pitch_change_deg=0.0, traces=True) for error in (0.0, 1.5)]
+    fair, off = (runs.run(job).traces["complementary"] for job in jobs)
+    assert np.mean(off - fair) == pytest.approx(-1.5, abs=0.3)
+
+
+def test_a_refused_calibration_is_reported_not_scored(monkeypatch):
+    def refuse(*_):
+        raise InputError("the free pose reads 1.021 g")
+
+    monkeypatch.setattr(runs.poses, "six", refuse)
+    result = runs.run(runs.Job("parked", 0, seconds=60.0))
+    assert result.refusal == "the free pose reads 1.021 g"
+    assert not result.scores
+
+
+def recorded(rest_s: float = 2.0, turned: float = 0.3) -> Log:
+    """A level ride, the phone turned about the vertical: straight acceleration, then a left turn."""
+    n, rate = 3000, 50.0
+    t = np.arange(n) / rate
+    speed = np.clip((t - rest_s) * 2.0, 0.0, 10.0)
+    yaw = np.where(t > 20.0, 0.4, 0.0)
+    lean = -np.arctan(speed * yaw / 9.80665)
+    forward = np.gradient(speed, t) / 9.80665
+    size = np.hypot(1.0, speed * yaw / 9.80665)
+    vehicle = np.column_stack((np.zeros(n), size, forward))  # balanced: the force lies in the bike's plane
+    rates = np.degrees(np.column_stack((yaw * np.sin(lean), yaw * np.cos(lean), np.gradient(lean, t))))
+    c, s = np.cos(turned), np.sin(turned)
+    mounting = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    values = np.column_stack((vehicle @ mounting, np.full(n, 25.0), rates @ mounting + [1.0, -2.0, 0.5]))
+    speeds: list[float | None] = [float(speed[k]) if k % 50 == 0 else None for k in range(n)]
+    time_us = [round(x * 1e6) for x in t.tolist()]
+    return Log(Path("made.csv"), [], time_us, [tuple(row) for row in values.tolist()], speeds)
+
+
+def test_the_recordings_calibration_finds_bias_and_forward():
+    calibration = real_ride.calibration_of(recorded(turned=0.3))
+    assert calibration.bias == pytest.approx([1.0, -2.0, 0.5], abs=1e-6)
+    c, s = np.cos(0.3), np.sin(0.3)
+    assert calibration.matrix == pytest.approx([c, 0.0, s, 0.0, 1.0, 0.0, -s, 0.0, c], abs=0.03)
+
+
+def test_the_reference_is_speed_times_yaw_rate():
+    log = recorded()
+    reference = real_ride.reference_lean(log, real_ride.calibration_of(log))
+    lean = np.arctan(10.0 * 0.4 / 9.80665)
+    expected = -np.degrees(np.arctan(10.0 * 0.4 * np.cos(lean) / 9.80665))
+    assert reference[2500] == pytest.approx(expected, abs=0.3)
+    assert abs(reference[900]) < 0.5
+
+
+def test_a_recording_without_speed_is_refused():
+    log = recorded()
+    log.speed_mps = [None] * len(log.readings)
+    with pytest.raises(InputError, match="no speed"):
+        real_ride.calibration_of(log)
+
+
+def test_the_recorded_motorcycle(shared_data):
+    """The complementary filter's share there is known to be 0.40 (measured with another calibration)."""
+    scores, leans = real_ride.compare(shared_data / "motorcycle-ride.csv.gz")
+    assert scores["complementary"].slope == pytest.approx(0.40, abs=0.06)
+    assert 15.0 < np.abs(leans["reference"]).max() < 25.0
+    assert scores["kickstand"].rms < scores["formula 0.3 s"].rms < scores["formula"].rms
+    assert 0.8 < scores["kickstand"].slope < 1.4
+
+
+def test_the_command_prints_a_table_and_writes_json_and_picture(tmp_path):
+    pytest.importorskip("matplotlib")
+    out = tmp_path / "out"
+    result = works("evaluate", "--profiles", "street,parked", "--seeds", 1, "--seconds", 60, "--out", out)
+    assert "kickstand" in result.out
+    assert "street (1)" in result.out
+    assert "nan" not in result.out
+    assert max(map(len, result.out.splitlines())) <= 110
+    data = json.loads((out / "evaluation.json").read_text())
+    assert set(data["profiles"]) == {"street", "parked"}
+    assert data["profiles"]["parked"]["kickstand"]["lag_ms"] is None
+    assert (out / "lean.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_json_on_standard_output_is_the_same_for_the_same_seed():
+    first, second = (
+        json.loads(works("evaluate", "--profiles", "city", "--seeds", 1, "--seconds", 60, "--json").out)
+        for _ in range(2)
+    )
+    assert first == second
+    assert math.isfinite(first["profiles"]["city"]["formula"]["rms"])
+
+
+def test_an_unknown_profile_is_refused(tmp_path):
+    refused(
+        tmp_path, "evaluate", "--profiles", "street,moon", "--out", tmp_path / "x", words="no profile moon"
+    )

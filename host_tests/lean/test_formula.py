@@ -1,0 +1,88 @@
+"""Lean from forces: equations 21-26 against numpy, and what the smoothing must keep."""
+
+import engines
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, upright
+from kickstand_tools.simulation.scripted.sensor_errors import Sensor
+from numpy.testing import assert_allclose
+
+
+def formula(left, up, yaw_rate):
+    """(25)-(26) in numpy, float64."""
+    square = left**2 + up**2
+    s = np.sign(yaw_rate) * np.sqrt(np.maximum(0, square - 1))
+    return np.degrees(np.arcsin(np.clip((left - s * up) / square, -1, 1)))
+
+
+def balanced(lean_deg, speed, forward=0.0):
+    """Force (left, up, forward in g) and rate about up (deg/s) of a bike in balance; lean > 0 is a right
+    turn."""
+    t = np.radians(lean_deg)
+    s = -np.tan(t)  # centripetal, left > 0
+    force = [np.sin(t) + s * np.cos(t), np.cos(t) - s * np.sin(t), forward]
+    return force, np.degrees(s * 9.80665 / speed) * np.cos(t)
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_formula_equals_the_corrected_equations(engine):
+    rng = np.random.default_rng(5)
+    forces = rng.normal([0, 1, 0], [0.7, 0.4, 0.3], size=(2000, 3)).astype(np.float32).astype(float)
+    rates = rng.normal(0, 30, size=2000)
+    forces = forces[np.hypot(forces[:, 0], forces[:, 1]) > 0.2]
+    rates = rates[: len(forces)]
+    calls = [("formula_lean", (f.tolist(), r)) for f, r in zip(forces, rates)]
+    assert_allclose(engines.run(engine, calls), formula(forces[:, 0], forces[:, 1], rates), rtol=0, atol=1e-3)
+
+
+@given(lean=st.floats(-60, 60), speed=st.floats(2, 60), forward=st.floats(-1, 1))
+def test_formula_finds_the_lean_of_a_balanced_turn(lean, speed, forward):
+    force, yaw_rate = balanced(lean, speed, forward)
+    assert engines.firmware_calls.call("formula_lean", (force, yaw_rate)) == pytest.approx(lean, abs=0.01)
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_static_lean(engine):
+    angles = np.linspace(-75, 75, 31)
+    forces = [[np.sin(np.radians(a)), np.cos(np.radians(a)), 0.1] for a in angles]
+    assert_allclose(engines.run(engine, [("static_lean", (f,)) for f in forces]), angles, atol=1e-4)
+    assert_allclose(engines.run(engine, [("lean_acos", (f,)) for f in forces]), abs(angles), atol=1e-4)
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_free_fall_and_huge_forces_give_a_number(engine):
+    calls = [
+        ("formula_lean", (f, r)) for f in ([0, 0, 0], [0.01, -0.01, 0], [16, 16, 16]) for r in (0, 5, -5)
+    ]
+    assert all(-90 <= angle <= 90 for angle in engines.run(engine, calls))
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+@pytest.mark.parametrize("lean", [-45, -20, 20, 45])
+def test_shown_lean_does_not_decay_in_a_held_turn(engine, lean):
+    """Sixty seconds in a turn, with 5 % of vibration: where gravity-seeking filters decay to zero."""
+    ride = Ride([upright(5), accelerate(20, 8), turn(lean, 60)])
+    times = np.arange(0, 5 + 8 + 60, 0.01)
+    motion = Sensor().world(ride.motion)
+    readings = [(*values[:3], 25.0, *values[3:6]) for values in map(motion, times)]
+    truth = np.array([ride.truth(t)[0] for t in times])
+    shown = engines.run(engine, [("meter", ([1, 0, 0, 0, 1, 0, 0, 0, 1], readings, 10_000))])[0]
+    late = times > 40
+    error = np.array(shown)[late, 0] - truth[late]
+    assert np.mean(error) == pytest.approx(0, abs=1.0)
+    assert np.std(error) < 1.0
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+@pytest.mark.parametrize("lean", [-60, -12, 0, 0.5, 30, 60])
+def test_shown_lean_of_a_standing_bike(engine, lean):
+    force = [np.sin(np.radians(lean)), np.cos(np.radians(lean)), 0.0]
+    rng = np.random.default_rng(7)
+    readings = [
+        [*(force + rng.normal(scale=0.004, size=3)), 0, *rng.normal(scale=0.05, size=3)] for _ in range(500)
+    ]
+    shown = engines.run(engine, [("meter", ([1, 0, 0, 0, 1, 0, 0, 0, 1], readings, 10_000))])[0]
+    assert_allclose(np.array(shown)[200:, 0], lean, atol=0.5)
+    assert np.mean(np.array(shown)[200:, 0]) == pytest.approx(lean, abs=0.1)

@@ -1,0 +1,98 @@
+"""A log read block by block is the log read at once, and a mistake far down is found with its line."""
+
+import gzip
+import tracemalloc
+
+import command
+import numpy as np
+import pytest
+from kickstand_tools.errors import InputError
+from kickstand_tools.logs import reader
+
+HEADER = command.HEADER + ",temp_c,speed_mps"
+
+
+def rows(count: int, start: int = 0) -> list[str]:
+    return [
+        f"{k / 200:.3f},{np.sin(k):.6f},-0.5,1e0,{k % 7}.25,-3,.5,{20 + k % 3},{f'{k % 40}.5' if k % 200 == 0 else ''}"
+        for k in range(start, start + count)
+    ]
+
+
+def write(path, lines):
+    text = "\n".join(lines) + "\n"
+    path.write_bytes(gzip.compress(text.encode()) if path.suffix == ".gz" else text.encode())
+    return path
+
+
+@pytest.mark.parametrize("name", ["ride.csv", "ride.csv.gz"])
+@pytest.mark.parametrize("block_bytes", [200, 5000, 1 << 22])
+def test_blocks_add_up_to_the_log(tmp_path, monkeypatch, name, block_bytes):
+    path = write(tmp_path / name, [HEADER, *rows(1500)])
+    whole = reader.read_log(path)
+    monkeypatch.setattr(reader, "BLOCK_BYTES", block_bytes)
+    blocks = list(reader.read_blocks(path))
+    assert len(blocks) >= min(10, 80_000 // block_bytes)
+    assert [t for block in blocks for t in block.time_text] == whole.time_text
+    assert [t for block in blocks for t in block.time_us] == whole.time_us == [5000 * k for k in range(1500)]
+    assert np.array_equal(np.concatenate([block.readings for block in blocks]), np.array(whole.readings))
+    assert [k for k, v in enumerate(whole.speed_mps) if v is not None] == list(range(0, 1500, 200))
+    assert blocks[-1].bytes_read == path.stat().st_size
+
+
+def test_numpy_and_the_reader_of_cells_agree(tmp_path):
+    """A text column sends every row to the cell reader; the numbers are the same to the last bit."""
+    plain = write(tmp_path / "plain.csv", [HEADER, *rows(800)])
+    noted = write(tmp_path / "noted.csv", [HEADER + ",note", *[row + ",hello" for row in rows(800)]])
+    assert reader.read_log(plain).readings == reader.read_log(noted).readings
+    assert reader.read_log(plain).speed_mps == reader.read_log(noted).speed_mps
+
+
+MISTAKES = {
+    "0.0,0,0,1,0,0,0,20,": "line 1002: time goes back from 4.995000 at 0.0 s",
+    "9.0,0,0,1,0,0,20,": "line 1002: 8 values under 9 column names",
+    "9.0,0,0,77,0,0,0,20,": "line 1002: az_g is '77', past any reading",
+    "9.0,0,0,,0,0,0,20,": "line 1002: az_g is empty",
+    "9.0,0,0,1,0,0,0,20,nan": "line 1002: speed_mps is 'nan'",
+    "9.0,0,0,1,0,0,0,20,\xff": "line 1002: not text",
+}
+
+
+@pytest.mark.parametrize("row", MISTAKES)
+@pytest.mark.parametrize("block_bytes", [1, 700, 1 << 22])  # of 1: a row each
+def test_a_mistake_far_down_is_named(tmp_path, monkeypatch, row, block_bytes):
+    monkeypatch.setattr(reader, "BLOCK_BYTES", block_bytes)
+    path = tmp_path / "ride.csv"
+    path.write_bytes("\n".join([HEADER, *rows(1000), row, *rows(300, 2000)]).encode("latin-1") + b"\n")
+    with pytest.raises(InputError) as error:
+        list(reader.read_blocks(path))
+    assert MISTAKES[row] in str(error.value)
+
+
+def test_time_starts_at_zero(tmp_path):
+    lines = [f"{1_700_000_000 + k / 200:.6f},0,0,1,0,0,0,," for k in range(100)]
+    log = reader.read_log(write(tmp_path / "ride.csv", [HEADER, *lines]))
+    assert log.time_us == [5000 * k for k in range(100)]
+    assert log.time_text[1] == "1700000000.005000"
+
+
+def test_a_gzip_file_cut_in_the_middle_is_refused_after_its_good_part(tmp_path, monkeypatch):
+    monkeypatch.setattr(reader, "BLOCK_BYTES", 5000)
+    path = write(tmp_path / "ride.csv.gz", [HEADER, *rows(20000)])
+    path.write_bytes(path.read_bytes()[:-2000])
+    blocks = reader.read_blocks(path)
+    assert len(next(blocks).time_us)
+    with pytest.raises(InputError, match="damaged or cut short"):
+        list(blocks)
+
+
+def test_memory_does_not_grow_with_the_log(tmp_path, monkeypatch):
+    monkeypatch.setattr(reader, "BLOCK_BYTES", 1 << 16)
+    peaks = []
+    for count in 10_000, 60_000:
+        path = write(tmp_path / "ride.csv", [HEADER, *rows(count)])
+        tracemalloc.start()
+        assert sum(len(block.time_us) for block in reader.read_blocks(path)) == count
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < 1.2 * peaks[0]

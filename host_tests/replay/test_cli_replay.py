@@ -1,0 +1,219 @@
+"""kickstand replay: the firmware's own lean over a log, the same by every engine."""
+
+import csv
+import gzip
+import json
+
+import analysis_rides
+import command
+import engines
+import numpy as np
+import pytest
+from kickstand.calibration.two_position import two_position
+from kickstand_tools import unix_port
+from kickstand_tools.emulator import image
+from kickstand_tools.replay import replay, replay_engine
+
+
+def read(path):
+    return np.genfromtxt(path, delimiter=",", names=True)
+
+
+def ride(path, seconds=20.0, rate_hz=100, seed=0):
+    """A log that leans, turns, brakes and shakes, with gaps in time, in the sensor's axes."""
+    rng = np.random.default_rng(seed)
+    t = np.cumsum(rng.uniform(0.5, 1.5, round(seconds * rate_hz))) / rate_hz
+    lean, s = 0.6 * np.sin(t), 0.7 * np.sin(t)
+    left, up = np.sin(lean) + s * np.cos(lean), np.cos(lean) - s * np.sin(lean)
+    force = np.column_stack((0.4 * np.sin(2 * t), left, up)) + rng.normal(scale=0.05, size=(len(t), 3))
+    rate = np.column_stack((np.degrees(0.6) * np.cos(t), 20 * np.sin(t), 20 * s)) + rng.normal(
+        size=(len(t), 3)
+    )
+    return command.write(path, np.column_stack((t, force, rate)))
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_forces_and_rates_are_the_calibrated_and_turned_readings(tmp_path, engine):
+    log, cal = ride(tmp_path / "log.csv"), command.write_cal(tmp_path / "CAL.json")
+    out = tmp_path / "LEAN.csv"
+    result = command.works("replay", log, "--calibration", cal, "--out", out, "--engine", engine)
+    assert result.err == ""
+    header = out.read_text().split("\n")[0]
+    assert header.startswith("t_s,lean_deg,lean_formula_deg,left_g,up_g,forward_g")
+
+    given, got, parameters = read(log), read(out), json.loads(cal.read_text())
+    matrix = np.array(parameters["vehicle_from_sensor"])
+    sensor = np.column_stack([given[name] for name in ("ax_g", "ay_g", "az_g")])
+    force = (sensor * parameters["accel_slope"] + parameters["accel_offset_g"]) @ matrix.T
+    rate = (
+        np.column_stack([given[name] for name in ("gx_dps", "gy_dps", "gz_dps")])
+        - parameters["gyro_bias_dps"]
+    )
+    rate = rate @ matrix.T
+    assert np.array_equal(got["t_s"], given["t_s"])
+    for column, name in enumerate(("left_g", "up_g", "forward_g")):
+        assert np.max(np.abs(got[name] - force[:, column])) < 2e-5
+    assert np.max(np.abs(got["yaw_rate_dps"] - rate[:, 1])) < 2e-4
+    assert np.max(np.abs(got["roll_rate_dps"] - rate[:, 2])) < 2e-4
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_the_formula_is_the_corrected_25_and_26(tmp_path, engine):
+    """Against numpy in doubles, over its own forces; 0.01 degrees."""
+    log, cal = ride(tmp_path / "log.csv", seed=1), command.write_cal(tmp_path / "CAL.json")
+    out = tmp_path / "LEAN.csv"
+    command.works("replay", log, "--calibration", cal, "--out", out, "--engine", engine)
+    calibration = replay_input(cal)
+    readings = np.column_stack([read(log)[n] for n in ("ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")])
+    force = (readings[:, :3] * calibration["accel_slope"] + calibration["accel_offset_g"]) @ calibration[
+        "matrix"
+    ].T
+    yaw = ((readings[:, 3:] - calibration["gyro_bias_dps"]) @ calibration["matrix"].T)[:, 1]
+    x, y = force[:, 0], force[:, 1]
+    s = np.sign(yaw) * np.sqrt(np.maximum(0.0, x * x + y * y - 1.0))
+    want = np.degrees(np.arcsin(np.clip((x - s * y) / (x * x + y * y), -1, 1)))
+    steep = np.abs(x * x + y * y - 1.0) < 1e-4  # there float32 itself moves the square root by more
+    error = np.abs(read(out)["lean_formula_deg"] - want)
+    assert np.max(error[~steep]) < 0.01
+    assert np.sum(steep) < 0.02 * len(error)
+
+
+def replay_input(cal):
+    data = json.loads(cal.read_text())
+    return {key: np.array(value) for key, value in data.items()} | {
+        "matrix": np.array(data["vehicle_from_sensor"])
+    }
+
+
+@pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
+def test_the_engines_agree(tmp_path):
+    log, cal = ride(tmp_path / "log.csv", seconds=60), command.write_cal(tmp_path / "CAL.json")
+    results = []
+    for engine in "cpython", "micropython":
+        command.works(
+            "replay", log, "--calibration", cal, "--out", tmp_path / f"{engine}.csv", "--engine", engine
+        )
+        results.append(read(tmp_path / f"{engine}.csv"))
+    for name in replay_engine.COLUMNS:
+        assert np.max(np.abs(results[0][name] - results[1][name])) < 0.002, name
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_forward_and_backward_exchanged_are_remarked_on(tmp_path, engine):
+    log = analysis_rides.short(tmp_path, speed_hz=1)
+    cal = tmp_path / "CAL.json"
+    line = f"warning: {log}: forward and backward are exchanged: calibrate two --side left?"
+    for turned, remark in (1, ""), (-1, line):
+        matrix = [[turned, 0, 0], [0, 1, 0], [0, 0, turned]]
+        data = analysis_rides.CALIBRATION | {"vehicle_from_sensor": matrix, "kickstand_side": "right"}
+        cal.write_text(json.dumps(data))
+        said = command.works("replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv", "--engine", engine)
+        assert said.err.count("\n") == bool(remark)
+        assert said.err.startswith(remark)
+
+
+def test_without_an_emulator_the_engine_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(image.importlib.util, "find_spec", lambda name: None)
+    log, cal = ride(tmp_path / "log.csv", seconds=1), command.write_cal(tmp_path / "CAL.json")
+    command.refused(
+        *(tmp_path, "replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv", "--engine", "rp2040"),
+        words="-m pip install -e ",
+    )
+
+
+def test_without_a_unix_port_the_engine_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(unix_port, "available", lambda: False)
+    log, cal = ride(tmp_path / "log.csv", seconds=1), command.write_cal(tmp_path / "CAL.json")
+    command.refused(
+        *(tmp_path, "replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv"),
+        *("--engine", "micropython"),
+        words="use --engine cpython",
+    )
+
+
+@pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
+def test_a_fault_inside_micropython_is_told_in_one_line(tmp_path, monkeypatch):
+    broken = tmp_path / "broken.py"
+    broken.write_text("raise ValueError('no such luck')\n")
+    monkeypatch.setattr(replay.replay_engine, "__file__", str(broken))
+    log, cal = ride(tmp_path / "log.csv", seconds=1), command.write_cal(tmp_path / "CAL.json")
+    command.refused(
+        *(tmp_path, "replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv"),
+        *("--engine", "micropython"),
+        words="ValueError: no such luck",
+    )
+
+
+def test_an_unaligned_calibration_works_with_a_warning(tmp_path):
+    log = ride(tmp_path / "log.csv", seconds=1)
+    cal = command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=[[1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    result = command.works("replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv")
+    assert result.err.startswith("warning: ")
+    assert "is not aligned" in result.err
+    assert result.err.count("\n") == 1
+    assert len(read(tmp_path / "LEAN.csv")) == 100
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_the_trim_that_riding_found_is_used(tmp_path, engine):
+    """Standing still, the lean is what the accelerometer says less what upright was off; without one it is 0."""
+    log, out = command.still(tmp_path / "log.csv", (0.0, 0.0, 1.0), seconds=8.0), tmp_path / "LEAN.csv"
+    leans = []
+    for changed in ({}, {"trim_deg": 2.0}):
+        cal = command.write_cal(tmp_path / "CAL.json", accel_offset_g=[0, 0, 0], gyro_bias_dps=[0, 0, 0], **changed)
+        command.works("replay", log, "--calibration", cal, "--out", out, "--engine", engine)
+        leans.append(read(out)["lean_deg"][-100:].mean())
+    assert abs(leans[0]) < 0.2
+    assert abs(leans[1] - leans[0]) == pytest.approx(2.0, abs=0.3)
+
+
+def test_times_are_those_of_the_log_to_the_letter(tmp_path):
+    """A log that starts at a Unix time keeps it, and its microseconds are not lost on the way."""
+    t0 = 1_700_000_000.0
+    rows = [f"{t0 + k / 100:.6f},0.0,1.0,0.1,0,0,0" for k in range(50)]
+    (tmp_path / "log.csv").write_text("\n".join([command.HEADER, *rows]) + "\n")
+    (tmp_path / "zero.csv").write_text(
+        "\n".join([command.HEADER, *[f"{k / 100:.6f},0.0,1.0,0.1,0,0,0" for k in range(50)]]) + "\n"
+    )
+    cal = command.write_cal(tmp_path / "CAL.json")
+    tables = []
+    for name in "log", "zero":
+        out = tmp_path / f"{name}.out.csv"
+        command.works("replay", tmp_path / f"{name}.csv", "--calibration", cal, "--out", out)
+        tables.append(list(csv.reader(out.open())))
+    assert [row[0] for row in tables[0][1:]] == [row.split(",")[0] for row in rows]
+    assert [row[1:] for row in tables[0]] == [row[1:] for row in tables[1]]
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_a_real_recording_leans_as_gravity_says(tmp_path, shared_data, engine):
+    """Held upright, leaned to one side and held, then to the other: gravity gives the true lean."""
+    with gzip.open(shared_data / "hand-leaning.csv.gz", "rt") as file:
+        given = np.genfromtxt(file, delimiter=",", names=True)
+
+    def mean(begin_s, end_s):
+        held = (given["t_s"] >= begin_s) & (given["t_s"] <= end_s)
+        return np.array([np.mean(given[name][held]) for name in ("ax_g", "ay_g", "az_g")])
+
+    upright, first, second = mean(0.0, 0.9), mean(5.0, 6.0), mean(7.4, 7.9)
+    matrix = [0.0] * 9
+    two_position(matrix, first.tolist(), upright.tolist(), "left")
+    rows = np.array(matrix).reshape(3, 3)
+    cal = command.write_cal(
+        tmp_path / "CAL.json",
+        accel_offset_g=[0, 0, 0],
+        accel_slope=[1, 1, 1],
+        gyro_bias_dps=[0, 0, 0],
+        vehicle_from_sensor=rows.tolist(),
+    )
+    out = tmp_path / "LEAN.csv"
+    log = shared_data / "hand-leaning.csv.gz"
+    command.works("replay", log, "--calibration", cal, "--out", out, "--engine", engine)
+    got = read(out)
+    for held, (begin_s, end_s) in ((first, (5.0, 6.0)), (second, (7.4, 7.9))):
+        left, up, _ = rows @ held
+        true_lean = np.degrees(np.arctan2(left, up))
+        shown = got["lean_deg"][(got["t_s"] >= begin_s) & (got["t_s"] <= end_s)]
+        assert abs(true_lean) > 40
+        assert abs(np.mean(shown) - true_lean) < 2.0
+        assert abs(shown[-1] - true_lean) < 2.0

@@ -1,0 +1,139 @@
+"""kickstand pull, from an imagined board: rides become logs, damage is said, nothing unverified is deleted."""
+
+import json
+import types
+
+import command
+import fake_board
+import numpy as np
+import pytest
+import ride_writer
+from kickstand import __version__
+from kickstand.rides import flash_ring
+from kickstand_tools.deploy import flash
+from kickstand_tools.logs.reader import read_log
+from serial.tools import list_ports
+
+
+@pytest.fixture
+def board(tmp_path, monkeypatch):
+    """A board with the firmware, and no rides yet."""
+    (tmp_path / "flash").mkdir()
+    (tmp_path / "out").mkdir()
+    board = fake_board.FakeBoard(tmp_path / "flash")
+    pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
+    monkeypatch.setattr(list_ports, "comports", lambda: [pico])
+    monkeypatch.setattr(flash, "SerialTransport", lambda name, timeout: board)
+    monkeypatch.setattr(flash, "_RESTART_S", 0)
+    monkeypatch.setattr(flash_ring, "directory", lambda _settings: "rides")
+    monkeypatch.setattr(flash_ring, "os", board.modules["os"])
+    board.modules["kickstand"] = types.SimpleNamespace(
+        ride_ring=flash_ring,
+        settings=types.SimpleNamespace(load=lambda: None),
+    )
+    return board
+
+
+def put(board, name, blocks):
+    path = board.root / "rides" / name
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_bytes(b"".join(blocks))
+
+
+def left(board):
+    """Everything that is in the directory of the rides."""
+    return sorted(path.relative_to(board.root / "rides").as_posix() for path in board.root.glob("rides/**/*"))
+
+
+def logs(tmp_path):
+    return sorted(tmp_path.glob("out/*.csv.gz"))
+
+
+def test_rides_become_logs_with_their_calibration(board, tmp_path):
+    first, turns = ride_writer.blocks(20, ride=3, trim_deg=1.25)
+    put(board, "000/03/00000.rid", first[:16])
+    put(board, "000/03/00001.rid", first[16:])
+    put(board, "000/04/00000.rid", ride_writer.blocks(1, ride=4, speed=True)[0])
+    result = command.works("pull", "--out", tmp_path / "out")
+    assert result.err == ""
+    assert result.out.count("written: ") == 2
+    assert board.resets == 1
+    one, other = logs(tmp_path)
+    assert one.name.startswith("ride-00003-")
+    log = read_log(one)
+    assert log.time_us == list(np.cumsum([dt for _, _, dt in turns]) - turns[0][2])
+    counts = np.array([np.array(sums) / n for sums, n, _ in turns])
+    readings = np.array(log.readings)
+    assert np.abs(readings[:, :3] * 4096 - counts[:, :3]).max() < 1e-3
+    assert np.abs(readings[:, 4:] * 65.5 - counts[:, 3:]).max() < 1e-3
+    assert readings[0, 3] == 31.25
+    assert [v for v in read_log(other).speed_mps if v is not None][:3] == [0, 1, 2]
+    cal = json.loads((tmp_path / "out" / one.name.replace(".csv.gz", ".cal.json")).read_text())
+    assert cal["vehicle_from_sensor"] == [[0, 1, 0], [0, 0, 1], [1, 0, 0]]
+    assert cal["accel_offset_g"] == pytest.approx([0.01, -0.02, 0.03])
+    assert (cal["trim_deg"], cal["firmware"], cal["who_am_i"], cal["sample_hz"]) == (1.25, __version__, "0x68", 200)
+    assert len(list(board.root.glob("rides/*/*/*"))) == 3  # nothing was to be deleted
+
+
+def test_another_ride_of_the_same_number_gets_a_file_of_its_own(board, tmp_path):
+    for trim in (0.0, 0.5):
+        put(board, "000/01/00000.rid", ride_writer.blocks(1, trim_deg=trim)[0])
+        for _ in range(2):
+            command.works("pull", "--out", tmp_path / "out", "--delete")
+            put(board, "000/01/00000.rid", ride_writer.blocks(1, trim_deg=trim)[0])
+    assert len(logs(tmp_path)) == 2
+
+
+def test_only_what_came_over_whole_is_deleted(board, tmp_path):
+    """A ride cut short by the power is whole up to there."""
+    data = {ride: ride_writer.blocks(4, ride=ride)[0] for ride in range(1, 5)}
+    put(board, "000/01/00000.rid", data[1])
+    put(board, "000/02/00000.rid", [data[2][0], data[2][1][:1000] + b"?" + data[2][1][1001:], *data[2][2:]])
+    put(board, "000/03/00000.rid", [*data[3][:3], data[3][3][:700]])
+    put(board, "000/04/00000.rid", [b"something else altogether"])
+    put(board, "000/notes.txt", [b"the rider's own"])
+    result = command.works("pull", "--out", tmp_path / "out", "--delete")
+    assert left(board) == ["000", "000/02", "000/02/00000.rid", "000/04", "000/04/00000.rid", "000/notes.txt"]
+    assert "ride 2, part 0: damaged at byte 4096: left out" in result.err
+    assert "ride 2: 1 blocks are missing: the log has a gap there" in result.err
+    assert "ride 2: not deleted" in result.err
+    assert "ride 3, part 0: the last block is cut short" in result.err
+    assert "ride 4: nothing in it can be read" in result.err
+    assert "ride 4: not deleted" in result.err
+    assert [path.name[:10] for path in logs(tmp_path)] == ["ride-00001", "ride-00002", "ride-00003"]
+    log = read_log(logs(tmp_path)[1])
+    assert max(np.diff(log.time_us)) > 1_000_000
+
+
+def test_emptied_directories_go_too_unless_something_else_is_in_them(board, tmp_path):
+    for ride in (99, 100, 200):
+        put(board, f"{ride // 100:03}/{ride % 100:02}/00000.rid", ride_writer.blocks(1, ride=ride)[0])
+    for stray in ("002/00/notes.txt", "00007-0000.ride", "000/5/00000.rid"):
+        put(board, stray, [b"the rider's own"])
+    result = command.works("pull", "--out", tmp_path / "out", "--delete")
+    assert result.err == ""
+    assert result.out.count("deleted from the board: ride ") == 3
+    assert left(board) == [
+        "000",
+        "000/5",
+        "000/5/00000.rid",
+        "00007-0000.ride",
+        "002",
+        "002/00",
+        "002/00/notes.txt",
+    ]
+
+
+def test_a_ride_whose_beginning_is_gone(board, tmp_path):
+    put(board, "000/01/00003.rid", ride_writer.blocks(2, sequence=48, time_us=300_000_000)[0])
+    result = command.works("pull", "--out", tmp_path / "out")
+    assert "ride 1: its beginning had to make room" in result.err
+    assert read_log(logs(tmp_path)[0]).time_text[0].startswith("0.")
+
+
+def test_a_board_without_rides_or_without_the_recorder(board, tmp_path):
+    assert "no rides on the board" in command.works("pull", "--out", tmp_path / "out").out
+    del board.modules["kickstand"].ride_ring
+    words = "kickstand flash brings it up to date"
+    command.refused(tmp_path, "pull", "--out", tmp_path / "out", words=words)
+    command.refused(tmp_path, "pull", "--out", tmp_path / "out" / "a" / "b", words="make it first")

@@ -1,0 +1,209 @@
+"""kickstand record, from an imagined board that streams: a log as it comes, ended by Ctrl-C or by the board."""
+
+import base64
+import contextlib
+import functools
+import gzip
+import json
+import os
+import signal
+import types
+from itertools import pairwise
+
+import command
+import fake_board
+import pytest
+import ride_writer
+from kickstand_tools.deploy import flash
+from kickstand_tools.logs.reader import read_log
+from kickstand_tools.rides import record
+from serial.tools import list_ports
+from watched import Watched, watched
+
+
+class Stream(fake_board.Serial):
+    """A serial port: what the board says, and what it does then. At the end: "ctrl-c" or another signal, "error",
+    "unplug", "silence"."""
+
+    def __init__(self, blocks, end, last=b""):
+        super().__init__()
+        self.last = last
+        self.data = b"".join(_said(block) for block in blocks)
+        self.end = end
+
+    def inWaiting(self):
+        if not self.data and self.end:
+            end, self.end = self.end, None
+            if end == "ctrl-c":
+                os.kill(os.getpid(), signal.SIGINT)
+            elif isinstance(end, signal.Signals):
+                os.kill(os.getpid(), end)
+            elif end == "error":
+                self.data = b"\x04Traceback (most recent call last):\r\nValueError: bad pin\r\n\x04>"
+            elif end == "unplug":
+                raise OSError(5, "Input/output error")
+        return len(self.data)
+
+    def write(self, data):
+        super().write(data)
+        if data == b"\x03":
+            self.data += self.last + b"\x04\x04>"
+
+
+class Streaming(fake_board.FakeBoard):
+    """Its app runs until the stream ends."""
+
+    def exec_raw_no_follow(self, command):
+        self.resets += "machine.reset()" in command
+
+
+def _said(block):
+    """One block as ride_stream prints it."""
+    pieces = [block[at : at + 256] for at in range(0, len(block), 256)]
+    return b"".join(base64.b64encode(piece) + b"\r\n" for piece in pieces) + b".\r\n"
+
+
+@pytest.fixture
+def streaming(tmp_path, monkeypatch):
+    """streaming(blocks, end): a board that streams them."""
+
+    def fit(blocks, end, last=b""):
+        board = Streaming(tmp_path)
+        board.serial = Stream(blocks, end, last)
+        pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
+        monkeypatch.setattr(list_ports, "comports", lambda: [pico])
+        monkeypatch.setattr(flash, "SerialTransport", lambda name, timeout: board)
+        monkeypatch.setattr(flash, "_RESTART_S", 0)
+        monkeypatch.setattr(record, "_SILENT_S", 0.2)
+        return board
+
+    return fit
+
+
+def half_seconds(count):
+    return ride_writer.blocks(count, length=lambda _: 512)
+
+
+def test_ctrl_c_ends_a_whole_log(streaming, tmp_path):
+    data, turns = half_seconds(9)
+    board = streaming(data[:-1], "ctrl-c", _said(data[-1]))
+    result = command.works("record", "--out", tmp_path / "ride.csv")
+    assert result.err == ""
+    assert board.serial.written == b"\x03"
+    assert board.resets == 1
+    log = read_log(tmp_path / "ride.csv")
+    assert len(log.time_us) == len(turns)  # what the board said after Ctrl-C is in it
+    assert log.time_us[-1] == sum(dt for _, _, dt in turns) - turns[0][2]
+    cal = json.loads((tmp_path / "ride.cal.json").read_text())
+    assert cal["accel_slope"] == pytest.approx([1.01, 0.99, 1.0])
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.fixture
+def signals():
+    """Whatever a failing test leaves of them is put right; by default these two would end pytest itself."""
+    numbers = [signal.SIGTERM, signal.SIGHUP]
+    before = [signal.signal(number, lambda *_: None) for number in numbers]
+    yield
+    for number, handler in zip(numbers, before):
+        signal.signal(number, handler)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are of Unix")
+@pytest.mark.parametrize("name", ["SIGTERM", "SIGHUP"])
+@pytest.mark.usefixtures("signals")
+def test_kill_and_a_closed_terminal_end_it_as_ctrl_c_does(name, streaming, tmp_path):
+    data, turns = half_seconds(3)
+    board = streaming(data, signal.Signals[name])
+    result = command.works("record", "--out", tmp_path / "ride.csv")
+    assert result.err == ""
+    assert board.serial.written == b"\x03"
+    assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
+    assert sorted(command.snapshot(tmp_path)) == [str(tmp_path / name) for name in ("ride.cal.json", "ride.csv")]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals are of Unix")
+@pytest.mark.usefixtures("signals")
+def test_under_nohup_a_closed_terminal_is_not_heard(streaming, tmp_path):
+    signal.signal(signal.SIGHUP, signal.SIG_IGN)
+    streaming(half_seconds(3)[0], signal.SIGHUP)
+    result = command.works("record", "--out", tmp_path / "ride.csv")
+    assert "the board says nothing any more" in result.err
+
+
+@pytest.mark.parametrize(("aligned", "words"), [(True, "lean "), (False, "not aligned")])
+def test_the_lean_is_shown_live_once_there_is_one(aligned, words, streaming, tmp_path, monkeypatch):
+    monkeypatch.setattr(ride_writer, "calibration", functools.partial(calibration, ride_writer.calibration(), aligned))
+    streaming(half_seconds(3)[0], "ctrl-c")
+    shown = watched(monkeypatch, Watched(), "record", "--out", tmp_path / "ride.csv")
+    assert words in shown
+    assert ("deg" in shown) is aligned
+    assert "readings/s" in shown
+
+
+def calibration(made, aligned, _trim_deg):
+    made.aligned = aligned
+    return made
+
+
+def test_a_terminal_that_goes_away_costs_nothing(streaming, tmp_path, monkeypatch):
+    data, turns = half_seconds(6)
+    streaming(data, "ctrl-c")
+    terminal = Watched()
+    terminal.closed_after = 300
+    with contextlib.suppress(OSError):  # its last words have nowhere to go
+        watched(monkeypatch, terminal, "record", "--out", tmp_path / "ride.csv")
+    assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
+
+
+@pytest.mark.parametrize("name", ["ride.csv", "ride.cal.json"])
+def test_an_earlier_recording_is_not_overwritten(name, streaming, tmp_path):
+    board = streaming(half_seconds(3)[0], "ctrl-c")
+    (tmp_path / name).write_text("yesterday")
+    out = tmp_path / "ride.csv"
+    command.refused(tmp_path, "record", "--out", out, words=f"{tmp_path / name} is there already: give --out another")
+    assert not board.resets
+
+
+@pytest.mark.parametrize("arguments", [["record", "--out", "ride.csv"], ["pull"], ["status"]])
+def test_a_board_without_the_firmware_is_told_alike(arguments, streaming, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    board = streaming([], None)
+    absent = b"Traceback (most recent call last):\r\nImportError: no module named 'kickstand'\r\n"
+    board.serial.data = b"\x04" + absent + b"\x04>"
+    words = "kickstand: Kickstand is not on the board at /dev/ttyACM0: kickstand flash puts it there\n"
+    assert command.refused(tmp_path, *arguments) == words
+
+
+@pytest.mark.parametrize(
+    ("end", "words"),
+    [
+        ("error", "the board reports ValueError: bad pin"),
+        ("unplug", "connection lost (Input/output error)"),
+        ("silence", "the board says nothing any more"),
+    ],
+)
+def test_what_came_until_the_stream_broke_off_is_kept(end, words, streaming, tmp_path):
+    data, turns = half_seconds(3)
+    streaming(data, end)
+    result = command.works("record", "--out", tmp_path / "ride.csv.gz")
+    assert result.err.startswith("warning: ")
+    assert result.err.count("\n") == 1
+    assert words in result.err
+    assert len(gzip.decompress((tmp_path / "ride.csv.gz").read_bytes()).splitlines()) == len(turns) + 1
+
+
+def test_a_block_that_came_over_damaged_leaves_a_gap(streaming, tmp_path):
+    data, _ = half_seconds(6)
+    data[3] = data[3][:200] + b"!" + data[3][201:]
+    streaming(data, "ctrl-c")
+    result = command.works("record", "--out", tmp_path / "ride.csv")
+    assert "did not arrive: the log has gaps" in result.err
+    times = read_log(tmp_path / "ride.csv").time_us
+    assert max(b - a for a, b in pairwise(times)) > 2e5
+
+
+def test_nothing_recorded_writes_nothing(streaming, tmp_path):
+    streaming([], "silence")
+    command.refused(tmp_path, "record", "--out", tmp_path / "a.csv", words="nothing was recorded")
+    command.refused(tmp_path, "record", "--out", tmp_path / "a.txt", words="ends in .csv or .csv.gz")

@@ -1,0 +1,179 @@
+"""Recording on the simulated board: what is pulled from its flash replays as what its display showed."""
+
+from itertools import pairwise
+
+import devices
+import engines
+import pytest
+from devices import ALIGNED
+from kickstand.lean.meter import LeanMeter
+from kickstand.rides.flash_ring import RideRing
+from kickstand_tools.calibration.file import read_calibration
+from kickstand_tools.logs.reader import read_blocks
+from kickstand_tools.replay import replay_engine
+from kickstand_tools.rides import block_reader, ride_log
+from kickstand_tools.simulated_board.simulator import Board
+
+SHORT, LONG = 0.15, 1.2
+
+
+def menu(from_s):
+    """Through the menu to "Record ride" or "Stop recording", in 8 s."""
+    return [[from_s, LONG], *([from_s + i, SHORT] for i in (2, 3, 4, 5)), [from_s + 6, LONG]]
+
+
+def rides(flash):
+    """Whole blocks of each ride by its number, and every problem."""
+    found, problems = {}, []
+    for path in sorted((flash / "rides").glob("*/*/*.rid")):
+        blocks, bad = block_reader.read(path.read_bytes())
+        problems += bad
+        for block in blocks:
+            found.setdefault(block.ride, []).append(block)
+    return found, problems
+
+
+def replayed(blocks, directory):
+    """Replay's lean for each row of the ride's log."""
+    cal = ride_log.write(directory / "ride.csv.gz", blocks)
+    engine = replay_engine.Replay(read_calibration(cal).to_firmware())
+    return [engine.step(*row)[0] for block in read_blocks(directory / "ride.csv.gz") for row in block.rows()]
+
+
+def lean_matches(record, blocks, leans, slack_s=0.4):
+    """Every lean on the display is one that the replay had not long before; how many there were."""
+    begun = blocks[0].time_us / 1e6
+    times = [turn.time_us / 1e6 for block in blocks for turn in block.turns]
+    compared = 0
+    for t_s, *_ in record.frames:
+        shown = record.lean_at(t_s)
+        if shown is None or not begun + slack_s < t_s < times[-1]:
+            continue
+        late = [lean for t, lean in zip(times, leans, strict=True) if t_s - slack_s <= t <= t_s]
+        assert min(late) - 0.55 <= shown <= max(late) + 0.55, (t_s, shown, late)
+        compared += 1
+    return compared
+
+
+@pytest.fixture
+def computed(monkeypatch):
+    """Every lean that the firmware computes, on CPython."""
+    leans = []
+    update = LeanMeter.update_sum
+
+    def noted(self, *arguments):
+        update(self, *arguments)
+        leans.append(self.lean_deg)
+
+    monkeypatch.setattr(LeanMeter, "update_sum", noted)
+    return leans
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_a_recorded_ride_replays_as_the_display_showed(engine, tmp_path, computed):
+    """Recorded from power-on: one ride until the alignment, one with it; the power goes at the end."""
+    flash = tmp_path / "flash"
+    flash.mkdir()
+    record = devices.run(engine, flash, {**ALIGNED, "seed": 2, "config": {"RECORD": True}})
+    showed = list(computed)  # and not what the replay computes below
+    found, problems = rides(flash)
+    assert sorted(found) == [1, 2]
+    assert problems == []
+    assert [b.sequence for b in found[2]] == list(range(len(found[2])))
+    assert found[2][0].calibration().aligned
+    assert not found[1][0].calibration().aligned
+    leans = replayed(found[2], tmp_path)
+    assert 46 - found[2][-1].turns[-1].time_us / 1e6 < 6.0  # a block at most
+    assert lean_matches(record, found[2], leans) > 50
+    if engine == "cpython":
+        before = sum(len(block.turns) for block in found[1])
+        exact = showed[before : before + len(leans)]
+        assert max(abs(a - b) for a, b in zip(exact, leans, strict=True)) < 0.03
+    assert record.at(40)[0].endswith("*")
+
+
+def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
+    """It is set up again, the filter starts again, and the ride goes on in the same file."""
+    devices.run("cpython", tmp_path, ALIGNED)
+    plan = {
+        "ride": [["upright", 4.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 5.0], ["turn", 40.0, 5.0]],
+        "faults": [["supply_dip", [16.0]]],
+        "config": {"RECORD": True},
+        "until": 30,
+    }
+    computed.clear()
+    record = devices.run("cpython", tmp_path, plan)
+    exact = list(computed)
+    assert record.first("Sensor reset") < 18
+    found, problems = rides(tmp_path)
+    assert (list(found), problems) == ([1], [])
+    steps = [b.time_us - a.time_us for a, b in pairwise(t for block in found[1] for t in block.turns)]
+    assert [step > 500_000 for step in steps].count(True) == 1
+    leans = replayed(found[1], tmp_path)
+    assert max(abs(a - b) for a, b in zip(exact[: len(leans)], leans, strict=True)) < 0.03
+
+
+@pytest.mark.parametrize("temp_c", [-5.0, 48.0])
+def test_a_ride_tells_how_warm_the_sensor_was(temp_c, tmp_path):
+    plan = {"seed": 3, "temp_c": temp_c, "config": {"RECORD": True}, "until": 12}
+    devices.run("cpython", tmp_path, plan)
+    told = [block.centidegrees / 100 for block in rides(tmp_path)[0][1]]
+    assert told
+    assert told == pytest.approx([temp_c] * len(told), abs=0.2)
+
+
+def test_a_wheel_is_not_misread_while_flash_is_erased(tmp_path, monkeypatch):
+    """Interrupts are off for 45 ms once a block: of the edges meanwhile one is left, and it comes late."""
+    boards, writes = [], []
+    fit, write = Board.fit_wheel, RideRing.write
+
+    def fitted(self, *arguments, **kind):
+        fit(self, *arguments, **kind)
+        boards.append(self)
+
+    def erasing(self, piece):
+        write(self, piece)
+        writes.append(piece)
+        if len(writes) % 16 == 0:
+            wheel, missed = boards[0].wheel, []
+            edge, wheel._edge = wheel._edge, missed.append
+            boards[0].clock.advance(45_000)
+            wheel._edge = edge
+            if missed:
+                edge(0 if wheel.closed else 1)
+
+    monkeypatch.setattr(Board, "fit_wheel", fitted)
+    monkeypatch.setattr(RideRing, "write", erasing)
+    plan = {
+        "ride": [["wait", 2.0], ["accelerate", 6.0, 3.0], ["straight", 300.0]],
+        "wheel": {"pulses_per_metre": 3.0},
+        "config": {"SPEED": "wheel", "PULSES_PER_METRE": 3.0, "RECORD": True, "VEHICLE": "car"},
+        "until": 45,
+    }
+    devices.run("cpython", tmp_path, plan)
+    assert len(writes) > 16 * 5
+    turns = [turn for block in rides(tmp_path)[0][1] for turn in block.turns]
+    speeds = [turn.speed_mps for turn in turns if turn.speed_mps is not None and turn.time_us > 8e6]
+    assert len(speeds) > 200
+    assert speeds == pytest.approx([6.0] * len(speeds), abs=0.1)
+
+
+def test_the_menu_starts_and_ends_a_ride(tmp_path):
+    devices.run("cpython", tmp_path, ALIGNED)
+    pages = [[16 + i, SHORT] for i in range(6)]
+    plan = {"lean": [[0, 0], [20, 10]], "presses": [*menu(8), *pages, *menu(30)], "until": 40}
+    record = devices.run("cpython", tmp_path, plan)
+    assert 12 < record.first("Record ride") < 14
+    assert record.at(15.9)[0].startswith("Rec         0:0") or record.at(15.9)[0].endswith("*")
+    assert record.at(20.8)[0] in ("Rec         0:05", "Rec         0:06")
+    assert record.at(20.8)[1].startswith("room ")
+    assert record.at(27)[0] == "Lean  10° right*"  # has settled
+    assert 34 < record.first("Stop recording") < 36
+    assert record.first("Recording ended") < 38
+    assert record.at(39.5)[0] == "Lean  10° right "
+    found, problems = rides(tmp_path)
+    assert problems == []
+    assert list(found) == [1]
+    seconds = (found[1][-1].turns[-1].time_us - found[1][0].time_us) / 1e6
+    assert 20 < seconds < 25
+    assert lean_matches(record, found[1], replayed(found[1], tmp_path)) > 0

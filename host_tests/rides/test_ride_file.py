@@ -1,0 +1,172 @@
+"""The format of recorded rides: exact on both engines, and what is damaged is left out, and only that."""
+
+import ast
+import json
+import subprocess
+from pathlib import Path
+
+import engines
+import pytest
+import ride_writer
+from kickstand import __version__
+from kickstand.rides import block as block_format
+from kickstand_tools import unix_port
+from kickstand_tools.rides import block_reader
+from mpy import run_mpy
+from ride_writer import CHIP
+
+_EXTREMES = [
+    ([32767] * 7, 1, 1),
+    ([-32768] * 7, 1, 5000),
+    ([8 * 32767, -8 * 32768, 0, 0, 8 * 32767, -8 * 32768, 1], 8, 40000),
+    ([0] * 7, 1, block_format.MAX_DT_US),
+    ([1, -1, 4096, 0, 0, -1, 1], 2, 9999),
+]
+
+# Writes one block of the turns on standard input, and says it in hexadecimal
+_WRITE = """
+import json, sys
+from kickstand.rides.block import RideBlock
+class Chip:
+    counts = [0] * 7
+    accel_lsb_per_g, gyro_lsb_per_dps = 4096, 65.5
+    def temperature_c(self, counts):
+        return 31.25
+block = RideBlock(5000)
+block.begin(4092, 7, 3, 123456789012, Chip(), 200, bytes(80))
+for sums, n, dt_us in json.load(sys.stdin):
+    block.add(sums, n, dt_us)
+block.close()
+print("".join("%02x" % byte for byte in block.buffer[:block.length]))
+"""
+
+# Random entries, most of them likely ones, coded by machine code and plainly: everything has to be the same
+_BOTH = """
+import random
+from array import array
+from kickstand.rides import block as block_format
+from kickstand.rides.block import encode, encode_plainly
+assert encode is not encode_plainly
+random.seed(1)
+for block in range(300):
+    states, outs = [], []
+    for _ in range(2):
+        state = array("i", [0] * (block_format._PERIOD + 1))
+        state[0] = 1
+        for i in range(block_format.FIELDS):
+            state[block_format._MEANS + i] = block_format.START_MEAN
+        state[block_format._PERIOD] = 5000
+        states.append(state)
+        outs.append(bytearray(4096))
+    while states[0][block_format._AT] < 4096 - 60:
+        wide = random.choice((10, 300, 32767))
+        n = random.choice((0, 1, 2, 2, 2, 8))
+        entry = array("i", [n, n * 5000 + random.randint(-200, 200)])
+        if random.random() < 0.01:
+            entry[1] = random.randint(0, block_format.MAX_DT_US)
+        for _ in range(6):
+            entry.append(max(1, n) * random.randint(-wide - 1, wide))
+        entry.append(random.choice((0, random.randint(0, 30000), random.randint(0, 1 << 24))))
+        for function, state, out in zip((encode, encode_plainly), states, outs):
+            function(entry, state, out)
+        assert states[0] == states[1], (list(entry), states)
+    assert outs[0] == outs[1]
+print("equal")
+"""
+
+
+def written(turns):
+    block = block_format.RideBlock(5000)
+    block.begin(4092, 7, 3, 123456789012, CHIP, 200, bytes(80))
+    for turn in turns:
+        block.add(*turn)
+    block.close()
+    return bytes(block.buffer[: block.length])
+
+
+def held(block):
+    """(sums, n, dt_us) of its turns."""
+    times = [block.time_us] + [turn.time_us for turn in block.turns]
+    return [(t.sums, t.n, t.time_us - before) for t, before in zip(block.turns, times[:-1], strict=True)]
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_every_turn_comes_back_exactly(engine, tmp_path):
+    """Also where the numbers are as large as they get; the same bytes from viper's code and from Python's."""
+    turns = [*_EXTREMES, *ride_writer.turns(200), *_EXTREMES]
+    data = written(turns)
+    if engine == "micropython":
+        script = tmp_path / "write.py"
+        script.write_text(_WRITE)
+        done = subprocess.run(
+            unix_port.command(str(script)),
+            input=json.dumps(turns),
+            capture_output=True,
+            text=True,
+            env=unix_port.environment(),
+            check=True,
+        )
+        assert bytes.fromhex(done.stdout) == data
+    block = block_reader.parse(data)
+    assert held(block) == [(tuple(s[:3] + s[4:]), n, dt_us) for s, n, dt_us in turns]
+    assert (block.ride, block.sequence, block.time_us) == (7, 3, 123456789012)
+    assert (block.accel_lsb_per_g, block.gyro_lsb_tenths, block.sample_hz) == (4096, 655, 200)
+    assert (block.centidegrees, block.firmware) == (3125, __version__)
+
+
+def test_machine_code_codes_as_python_does():
+    assert run_mpy(_BOTH) == "equal\n"
+
+
+def test_machine_code_has_the_numbers_of_the_format():
+    """Which stand in its file again, because only there they are built in."""
+    source = Path(block_format.__file__).with_name("block_viper.py").read_text()
+    constants = {
+        node.targets[0].id.lstrip("_"): eval(ast.unparse(node.value.args[0]))
+        for node in ast.parse(source).body
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name) and isinstance(node.value, ast.Call)
+    }
+    assert constants.pop("LOW_BITS") < 32 - 7
+    names = {name.lstrip("_"): value for name, value in vars(block_format).items() if name.lstrip("_") in constants}
+    assert len(constants) == 11
+    assert names == constants
+
+
+def test_blocks_hold_speeds_and_the_calibration_and_are_never_overfilled():
+    data, turns = ride_writer.blocks(20, speed=True, trim_deg=1.25)
+    assert [len(block) for block in data] == [4096, 4092, 4088, 4092, 4084] + [
+        4096 - 4 * ((i & -i).bit_length()) for i in range(5, 20)
+    ]
+    found, problems = block_reader.read(b"".join(data))
+    assert problems == []
+    assert [turn for block in found for turn in held(block)] == turns
+    speeds = [(i, t.speed_mps) for i, t in enumerate(t for b in found for t in b.turns) if t.speed_mps is not None]
+    assert speeds == [(i, i / 100) for i in range(0, len(turns), 100)]
+    kept, wanted = found[0].calibration(), ride_writer.calibration(1.25)
+    for name in ("accel_offset", "accel_slope", "gyro_bias", "vehicle_from_sensor"):
+        assert list(getattr(kept, name)) == list(getattr(wanted, name))
+    assert (kept.trim_deg, kept.aligned, kept.six_done) == (1.25, True, True)
+
+
+def test_a_file_cut_at_every_byte_of_its_last_block_keeps_the_others():
+    data, _ = ride_writer.blocks(2, length=lambda i: (512, 4092)[i])
+    whole = b"".join(data)
+    for end in range(len(data[0]), len(whole)):
+        found, problems = block_reader.read(whole[:end])
+        assert [block.sequence for block in found] == [0], end
+        assert problems == ([] if end == len(data[0]) else [block_reader.CUT_SHORT]), end
+
+
+def test_any_damaged_byte_costs_its_own_block_and_is_said():
+    data, _ = ride_writer.blocks(3)
+    for at in [*range(160), *range(160, len(data[1]), 97), *range(len(data[1]) - 10, len(data[1]))]:
+        spoilt = bytearray(data[1])
+        spoilt[at] ^= 0x41
+        found, problems = block_reader.read(data[0] + bytes(spoilt) + data[2])
+        assert [block.sequence for block in found] == [0, 2], at
+        assert len(problems) == 1, at
+    for rubbish in (b"\xff" * 5000, b"\0" * 4096, b"t_s,ax_g\n0.0,1.0\n", data[0][:2000]):
+        found, problems = block_reader.read(rubbish + data[2])
+        assert [block.sequence for block in found] == [2]
+        assert len(problems) == 1
+    assert block_reader.read(b"") == ([], [])

@@ -1,0 +1,123 @@
+"""The virtual clock and the `time` built on it. Also run under MicroPython."""
+
+import time
+
+from board_access import level, on_board, raised
+from kickstand_tools.simulated_board.clock import Clock, PowerOff, to_us
+from kickstand_tools.simulated_board.fakes import fake_time
+from kickstand_tools.simulated_board.simulator import Board
+
+HOST_TIME_NS = time.time_ns
+
+
+def test_events_run_in_order_at_their_time():
+    clock, seen = Clock(), []
+    clock.at(300, lambda: seen.append(("late", clock.now_us)))
+    clock.at(100, lambda: seen.append(("first", clock.now_us)))
+    clock.at(100, lambda: seen.append(("second", clock.now_us)))
+    clock.advance(99)
+    assert seen == []
+    clock.advance(1)
+    assert seen == [("first", 100), ("second", 100)]
+    clock.advance(1000)
+    assert seen[2] == ("late", 300) and clock.now_us == 1100
+
+
+def test_an_event_may_let_time_pass_and_schedule_more():
+    clock, seen = Clock(), []
+
+    def slow():
+        clock.advance(50)
+        clock.at(clock.now_us + 10, lambda: seen.append(clock.now_us))
+
+    clock.at(100, slow)
+    clock.advance(120)
+    assert clock.now_us == 150 and seen == []
+    clock.advance(20)
+    assert seen == [160]
+
+
+def test_an_event_for_the_past_runs_when_time_next_passes():
+    clock, seen = Clock(), []
+    clock.advance(100)
+    clock.at(10, lambda: seen.append(clock.now_us))
+    clock.advance(1)
+    assert seen == [100] and clock.now_us == 101
+
+
+def test_every_repeats():
+    clock, seen = Clock(), []
+    clock.every(1000, lambda: seen.append(clock.now_us))
+    clock.advance(3500)
+    assert seen == [1000, 2000, 3000]
+
+
+def test_the_deadline_stops_the_clock_and_stays():
+    clock, seen = Clock(), []
+    clock.set_deadline(500)
+    clock.at(500, lambda: seen.append(1))  # what is due at the deadline still happens
+    assert isinstance(raised(clock.advance, 1000), PowerOff)
+    assert clock.now_us == 500 and seen == [1]
+    assert isinstance(raised(clock.advance, 1), PowerOff)
+    clock.set_deadline(None)
+    clock.advance(1)
+    assert clock.now_us == 501
+
+
+def test_power_off_is_not_an_exception_that_firmware_catches():
+    assert not issubclass(PowerOff, Exception)
+
+
+def test_pace_follows_the_host():
+    start = HOST_TIME_NS()
+    Clock(pace=4.0).advance(400_000)
+    taken_ms = (HOST_TIME_NS() - start) // 1_000_000
+    assert 90 <= taken_ms < 350
+    start = HOST_TIME_NS()
+    Clock().advance(60_000_000)
+    assert HOST_TIME_NS() - start < 1_000_000_000
+
+
+def test_a_slow_host_does_not_run_fast_afterwards():
+    clock = Clock(pace=1.0)
+    time.sleep(0.2)
+    clock.advance(10_000)
+    start = HOST_TIME_NS()
+    clock.advance(100_000)
+    assert (HOST_TIME_NS() - start) // 1_000_000 >= 85
+
+
+def test_seconds_become_the_nearest_microsecond():
+    assert to_us(0.1 + 0.2) == 300_000
+    assert to_us(1e-6 * 0.6) == 1
+
+
+def test_ticks_wrap_as_on_the_boards():
+    def firmware(board):
+        before = fake_time.ticks_us()
+        fake_time.sleep_ms(2)
+        after = fake_time.ticks_us()
+        assert before > after, "no wrap within the 2 ms"
+        assert fake_time.ticks_diff(after, before) == 2000 + fake_time.CALL_US
+        assert fake_time.ticks_diff(before, after) == -2000 - fake_time.CALL_US
+        assert fake_time.ticks_add(before, 2000 + fake_time.CALL_US) == after
+        assert fake_time.ticks_add(after, -2005) == before
+
+    board = Board(level)
+    board.ticks_at_boot_us = (1 << 30) - 1000
+    board.install()
+    try:
+        assert board.run(lambda: firmware(board), 1.0) == "returned"
+    finally:
+        board.uninstall()
+
+
+def test_a_busy_wait_ends():
+    def firmware(board):
+        start = fake_time.ticks_ms()
+        while fake_time.ticks_diff(fake_time.ticks_ms(), start) < 20:
+            pass
+
+    outcome, board = on_board(firmware)
+    assert outcome == "returned"
+    assert 20_000 <= board.clock.now_us < 21_100

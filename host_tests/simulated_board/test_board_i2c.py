@@ -1,0 +1,220 @@
+"""The wires, and machine.I2C and Pin on them. Also run under MicroPython."""
+
+import errno
+
+from board_access import on_board, raised
+from kickstand_tools.simulated_board.fakes import fake_machine
+from kickstand_tools.simulated_board.fakes.fake_machine import I2C, Pin, SoftI2C
+
+
+def open_sensor(freq=400_000, timeout=5000):
+    return I2C(0, sda=Pin(4), scl=Pin(5), freq=freq, timeout=timeout)
+
+
+def check(firmware, **fitted):
+    """The firmware must get to its end."""
+    outcome, board = on_board(firmware, **fitted)
+    assert outcome == "returned"
+    return board
+
+
+def test_a_burst_takes_its_time_on_the_wire():
+    def firmware(board):
+        for freq, expected_us in ((400_000, 390), (100_000, 1560)):
+            i2c = open_sensor(freq)
+            start = board.clock.now_us
+            i2c.readfrom_mem_into(0x68, 0x3B, bytearray(14))
+            # 17 bytes of nine clocks, START, repeated START, STOP
+            assert board.clock.now_us - start == expected_us, board.clock.now_us - start
+
+    check(firmware)
+
+
+def test_fractions_of_a_microsecond_are_not_lost():
+    def firmware(board):
+        i2c = open_sensor()
+        start = board.clock.now_us
+        for _ in range(1000):
+            i2c.readfrom_mem_into(0x68, 0x75, bytearray(1))  # 39 clocks: 97.5 us
+        assert abs(board.clock.now_us - start - 97_500) <= 1
+
+    check(firmware)
+
+
+def test_a_display_line_takes_its_time():
+    def firmware(board):
+        lcd = I2C(1, sda=Pin(6), scl=Pin(7), freq=100_000)
+        start = board.clock.now_us
+        lcd.writeto(0x27, bytes(68))
+        assert board.clock.now_us - start == (69 * 9 + 1) * 10
+
+    check(firmware)
+
+
+def test_every_way_to_read_and_write():
+    def firmware(board):
+        board.clock.advance(100_000)
+        i2c = open_sensor()
+        assert i2c.readfrom_mem(0x68, 0x75, 1) == b"\x68"
+        i2c.writeto_mem(0x68, 0x6B, b"\x01")
+        board.clock.advance(100_000)
+        assert i2c.writeto(0x68, b"\x19\x07") == 2
+        i2c.writeto(0x68, b"\x19", False)
+        assert i2c.readfrom(0x68, 2) == b"\x07\x00"
+        buffer = bytearray(1)
+        i2c.writeto(0x68, b"\x75", False)
+        i2c.readfrom_into(0x68, buffer)
+        assert buffer == b"\x68"
+        whole = bytearray(4)
+        i2c.readfrom_mem_into(0x68, 0x75, memoryview(whole)[1:2])
+        assert whole == b"\x00\x68\x00\x00"
+
+    check(firmware)
+
+
+def test_scan():
+    def firmware(board):
+        assert open_sensor().scan() == [0x68]
+        assert I2C(1, sda=Pin(6), scl=Pin(7)).scan() == [0x3F]
+
+    check(firmware, lcd_address=0x3F)
+
+
+def test_one_bus():
+    def firmware(board):
+        assert open_sensor().scan() == [0x27, 0x69]
+
+    assert len(check(firmware, one_bus=True, sensor_address=0x69).buses) == 1
+
+
+def test_nobody_home():
+    def firmware(board, sda, scl, number):
+        i2c = I2C(0, sda=Pin(sda), scl=Pin(scl), freq=400_000)
+        start = board.clock.now_us
+        error = raised(i2c.readfrom_mem_into, 0x68, 0x75, bytearray(1))
+        assert isinstance(error, OSError) and error.args[0] == number
+        assert board.clock.now_us - start == 25
+
+    check(lambda board: firmware(board, 4, 5, errno.EIO), sensor_address=None)
+    check(lambda board: firmware(board, 21, 22, errno.ENODEV), sensor_address=None, port="esp32")
+
+
+def test_rp2_controllers_have_their_pins():
+    def firmware(board):
+        for number, sda, scl in ((0, 6, 7), (1, 4, 5), (0, 5, 4), (0, 4, 7)):
+            error = raised(I2C, number, Pin(scl), Pin(sda))
+            assert isinstance(error, ValueError), (number, sda, scl)
+        SoftI2C(sda=Pin(4), scl=Pin(5)).readfrom_mem(0x68, 0x75, 1)
+
+    check(firmware)
+
+
+def test_pins_with_nothing_on_them():
+    def firmware(board):
+        assert I2C(0, sda=Pin(8), scl=Pin(9)).scan() == []
+
+    check(firmware)
+
+
+def test_a_bus_that_is_too_fast_for_the_display_is_seen():
+    def at(freq):
+        return lambda board: open_sensor(freq)
+
+    assert check(at(400_000), one_bus=True).too_fast
+    assert not check(at(100_000), one_bus=True).too_fast
+    assert not check(at(400_000)).too_fast
+
+
+def pulses_until_free(board):
+    """As a driver frees a bus: clock until SDA is high; then STOP."""
+    scl = Pin(5, Pin.OPEN_DRAIN, value=1)
+    sda = Pin(4, Pin.OPEN_DRAIN, value=1)
+    count = 0
+    while not sda.value() and count < 20:
+        scl.value(0)
+        scl.value(1)
+        count += 1
+    sda.value(0)
+    sda.value(1)
+    return count
+
+
+def test_a_stuck_bus_times_out_until_it_is_clocked_free():
+    def firmware(board, bits):
+        board.sensor_bus.hang(bits)
+        i2c = open_sensor(timeout=5000)
+        start = board.clock.now_us
+        error = raised(i2c.readfrom_mem_into, 0x68, 0x75, bytearray(1))
+        assert isinstance(error, OSError) and error.args[0] == errno.ETIMEDOUT
+        assert 5000 <= board.clock.now_us - start < 5100
+        assert i2c.scan() == []
+        assert pulses_until_free(board) == bits
+        assert open_sensor().readfrom_mem(0x68, 0x75, 1) == b"\x68"
+
+    check(lambda board: firmware(board, 1))
+    check(lambda board: firmware(board, 5))
+    check(lambda board: firmware(board, 8))
+
+
+def test_sda_is_let_go_when_scl_falls():
+    def firmware(board):
+        board.sensor_bus.hang(1)
+        scl = Pin(5, Pin.OPEN_DRAIN, value=1)
+        sda = Pin(4, Pin.OPEN_DRAIN, value=1)
+        assert sda() == 0
+        scl(0)
+        assert sda() == 1
+
+    check(firmware)
+
+
+def test_a_device_that_is_acknowledged_goes_on_sending():
+    def firmware(board):
+        board.sensor_bus.hang(8)
+        scl = Pin(5, Pin.OPEN_DRAIN, value=1)
+        sda = Pin(4, Pin.OPEN_DRAIN, value=0)  # held low: every ninth clock says ACK
+        for _ in range(9 * 3):
+            scl.value(0)
+            scl.value(1)
+        sda.value(1)
+        assert sda.value() == 0
+        assert pulses_until_free(board) <= 9
+        assert open_sensor().readfrom_mem(0x68, 0x75, 1) == b"\x68"
+
+    check(firmware)
+
+
+def test_a_reset_in_the_middle_of_a_read_hangs_the_bus():
+    def firmware(board):
+        i2c = open_sensor(100_000)
+        board.clock.at(board.clock.now_us + 1000, fake_machine.reset)
+        i2c.readfrom_mem_into(0x68, 0x3B, bytearray(14))
+
+    outcome, board = on_board(firmware)
+    assert outcome == "reset"
+    assert board.sensor_bus.sda_level() == 0 and board.lcd_bus.sda_level() == 1
+    assert board.clock.now_us == 1000
+
+
+def test_the_button_pin_and_plain_pins():
+    def firmware(board):
+        button = Pin(15, Pin.IN, Pin.PULL_UP)
+        assert button.value() == 1 and button() == 1
+        board.button.closed = True
+        assert button.value() == 0
+        assert Pin(20, Pin.IN).value() == 0
+        led = Pin(25, Pin.OUT, value=1)
+        assert led.value() == 1
+        led.off()
+        assert led() == 0
+        led(1)
+        assert Pin(25).value() == 1
+
+    check(firmware)
+
+
+def test_a_pin_without_pull_up_floats():
+    def firmware(board):
+        assert Pin(15, Pin.IN).value() == 0
+
+    check(firmware)

@@ -1,0 +1,271 @@
+"""The HD44780 behind its PCF8574. Also run under MicroPython."""
+
+from kickstand_tools.simulated_board import glyphs
+from kickstand_tools.simulated_board.clock import Clock
+from kickstand_tools.simulated_board.lcd import CLEAR_US, COMMAND_US, DATA_US, POWER_UP_US, Lcd
+
+RS, RW, E, LIGHT = 0x01, 0x02, 0x04, 0x08
+PORT_US = 90  # a byte at 100 kHz
+
+
+def pins(lcd, value):
+    lcd.write_byte(value)
+    lcd.clock.advance(PORT_US)
+
+
+def nibble(lcd, value, rs=0):
+    """The high four bits of value, strobed."""
+    pins(lcd, value & 0xF0 | LIGHT | rs | E)
+    pins(lcd, value & 0xF0 | LIGHT | rs)
+
+
+def send(lcd, value, rs=0):
+    nibble(lcd, value, rs)
+    nibble(lcd, value << 4 & 0xF0, rs)
+
+
+def wake(lcd):
+    """The data sheet's initialisation by instruction, figure 24."""
+    for wait_us in (4100, 100, 100):
+        nibble(lcd, 0x30)
+        lcd.clock.advance(wait_us)
+    nibble(lcd, 0x20)
+    for command in (0x28, 0x0C, 0x06):
+        send(lcd, command)
+
+
+def ready():
+    """A display that is on, in 4-bit mode with two lines."""
+    clock = Clock()
+    lcd = Lcd(clock)
+    clock.advance(POWER_UP_US)
+    wake(lcd)
+    return lcd
+
+
+def write(lcd, line, text):
+    send(lcd, 0x80 | 0x40 * line)
+    for character in text:
+        send(lcd, character if isinstance(character, int) else ord(character), RS)
+
+
+def test_a_display_comes_up_dark():
+    lcd = Lcd(Clock())
+    assert lcd.text() == [" " * 16] * 2 and not lcd.on
+
+
+def test_two_lines_of_text():
+    lcd = ready()
+    write(lcd, 0, "Lean  23\xdf right")
+    write(lcd, 1, "0123456789ABCDEF")
+    assert lcd.text() == ["Lean  23\u00b0 right ", "0123456789ABCDEF"]
+    assert lcd.lost == 0 and lcd.backlight
+
+
+def test_before_4_bit_mode_the_open_pins_read_as_ones():
+    clock = Clock()
+    lcd = Lcd(clock)
+    clock.advance(POWER_UP_US)
+    nibble(lcd, 0x30)
+    assert lcd.two_lines
+    clock.advance(5000)
+    nibble(lcd, 0x40, RS)
+    assert lcd.codes()[0][0] == 0x4F
+
+
+def test_commands_before_power_up_is_over_are_lost():
+    clock = Clock()
+    lcd = Lcd(clock)
+    clock.advance(POWER_UP_US - 200)
+    nibble(lcd, 0x30)
+    assert lcd.lost == 1
+
+
+def test_the_waits_of_the_initialisation_are_needed():
+    clock = Clock()
+    lcd = Lcd(clock)
+    clock.advance(POWER_UP_US)
+    nibble(lcd, 0x30)
+    clock.advance(4100 - 3 * PORT_US)
+    nibble(lcd, 0x30)
+    assert lcd.lost == 1
+    nibble(lcd, 0x30)
+    assert lcd.lost == 1
+    nibble(lcd, 0x30)
+    assert lcd.lost == 1, "100 us are over after two bytes"
+
+
+def test_home_takes_long_and_what_comes_meanwhile_is_lost():
+    lcd = ready()
+    write(lcd, 0, "abc")
+    send(lcd, 0x02)
+    done_us = lcd.clock.now_us + CLEAR_US - PORT_US
+    send(lcd, ord("x"), RS)
+    assert lcd.lost == 2 and lcd.text()[0].startswith("abc")
+    lcd.clock.advance(done_us - lcd.clock.now_us)
+    send(lcd, ord("x"), RS)
+    assert lcd.text()[0].startswith("xbc")
+
+
+def test_clear():
+    lcd = ready()
+    write(lcd, 1, "abc")
+    send(lcd, 0x04)  # right to left
+    send(lcd, 0x01)
+    lcd.clock.advance(CLEAR_US)
+    assert lcd.text() == [" " * 16] * 2
+    send(lcd, ord("x"), RS)
+    send(lcd, ord("y"), RS)
+    assert lcd.text()[0].startswith("xy"), "clear also sets left to right"
+
+
+def test_data_and_commands_keep_it_busy():
+    lcd = ready()
+    for value, rs, busy_us in ((0x80, 0, COMMAND_US), (ord("a"), RS, DATA_US)):
+        lcd.clock.advance(1000)
+        nibble(lcd, value, rs)
+        lcd.write_byte(value << 4 & 0xF0 | rs | E)
+        lcd.write_byte(value << 4 & 0xF0 | rs)
+        lcd.clock.advance(busy_us - 1)
+        assert busy(lcd)
+        lcd.clock.advance(1)
+        assert not busy(lcd)
+
+
+def busy(lcd):
+    """The busy flag as a driver reads it, without time passing."""
+    lcd.write_byte(0xF0 | RW)
+    lcd.write_byte(0xF0 | RW | E)
+    flag = lcd.read_byte() & 0x80
+    lcd.write_byte(0xF0 | RW)
+    lcd.write_byte(0xF0 | RW | E)
+    lcd.write_byte(0xF0 | RW)
+    return bool(flag)
+
+
+def test_the_address_counter_reads_back():
+    lcd = ready()
+    send(lcd, 0x80 | 0x45)
+    lcd.clock.advance(100)
+    pins(lcd, 0xF0 | RW | E)
+    high = lcd.read_byte() & 0xF0
+    pins(lcd, 0xF0 | RW)
+    pins(lcd, 0xF0 | RW | E)
+    low = lcd.read_byte() & 0xF0
+    pins(lcd, 0xF0 | RW)
+    assert high | low >> 4 == 0x45
+
+
+def test_nibbles_out_of_step_garble_and_the_initialisation_heals():
+    lcd = ready()
+    write(lcd, 0, "hello")
+    lcd.slip()
+    write(lcd, 0, "hello")
+    assert lcd.text()[0] != "hello           "
+    lcd.clock.advance(2000)
+    for wait_us in (5000, 5000, 5000):
+        nibble(lcd, 0x30)
+        lcd.clock.advance(wait_us)
+    nibble(lcd, 0x20)
+    for command in (0x28, 0x0C, 0x06, 0x02):
+        send(lcd, command)
+        lcd.clock.advance(2000)
+    write(lcd, 0, "hello           ")
+    assert lcd.text()[0] == "hello           "
+
+
+def test_e_must_fall_to_take_anything():
+    lcd = ready()
+    write(lcd, 0, "")
+    before = lcd.text()
+    for value in (ord("x"), ord("x") << 4 & 0xF0):
+        pins(lcd, value & 0xF0 | RS | LIGHT)
+        pins(lcd, value & 0xF0 | RS | LIGHT)
+    assert lcd.text() == before
+    # What counts are the levels before the edge: these two nibbles are "A"
+    pins(lcd, 0x40 | RS | E)
+    pins(lcd, 0xF0)
+    pins(lcd, 0x10 | RS | E)
+    pins(lcd, 0xF0)
+    assert lcd.text()[0][0] == "A"
+
+
+def test_lines_run_into_each_other_at_40_characters():
+    lcd = ready()
+    write(lcd, 0, "a" * 40 + "b" * 40 + "c")
+    assert lcd.text() == ["c" + "a" * 15, "b" * 16]
+    send(lcd, 0x04)
+    send(lcd, 0x80)
+    send(lcd, ord("d"), RS)
+    send(lcd, ord("e"), RS)
+    assert lcd.text()[0][0] == "d" and lcd.ddram[0x67] == ord("e")
+
+
+def test_display_shift():
+    lcd = ready()
+    write(lcd, 0, "0123456789abcdefghij")
+    for _ in range(3):
+        send(lcd, 0x18)
+    assert lcd.text()[0] == "3456789abcdefghi"
+    send(lcd, 0x1C)
+    assert lcd.text()[0] == "23456789abcdefgh"
+    send(lcd, 0x02)
+    lcd.clock.advance(CLEAR_US)
+    assert lcd.text()[0] == "0123456789abcdef"
+
+
+def test_off_and_one_line():
+    lcd = ready()
+    write(lcd, 0, "abc")
+    write(lcd, 1, "def")
+    send(lcd, 0x08)
+    assert lcd.text() == [" " * 16] * 2
+    send(lcd, 0x0C)
+    send(lcd, 0x20)
+    assert lcd.text() == ["abc" + " " * 13, " " * 16]
+
+
+def test_own_characters():
+    lcd = ready()
+    send(lcd, 0x40 | 8 * 2)
+    for _ in range(8):
+        send(lcd, 0x18, RS)
+    send(lcd, 0x40 | 8 * 7)
+    for _ in range(8):
+        send(lcd, 0x01, RS)
+    write(lcd, 0, [2, 7, 10, 0])
+    assert lcd.text()[0][:4] == "\u258d\u2595\u258d "
+    assert lcd.glyphs[2] == "\u258d"
+
+
+def test_changes_count_what_can_be_seen():
+    lcd = ready()
+    write(lcd, 0, "abc")
+    before = lcd.changes
+    write(lcd, 0, "abc")
+    assert lcd.changes == before
+    write(lcd, 0, "abd")
+    assert lcd.changes == before + 1
+    lcd.write_byte(0)
+    assert lcd.changes == before + 2 and not lcd.backlight
+
+
+def test_patterns_as_text():
+    def column(bits):
+        return [bits] * 8
+
+    left = [glyphs.drawn(column(0x1F & ~(0x1F >> k))) for k in range(1, 6)]
+    assert left == ["\u258e", "\u258d", "\u258b", "\u258a", "\u2588"]
+    right = [glyphs.drawn(column((1 << k) - 1)) for k in range(1, 5)]
+    assert right == ["\u2595", "\u2590", "\u2590", "\u2590"]
+    assert glyphs.drawn([0] * 8) == " "
+    assert glyphs.drawn([0] * 5 + [0x1F] * 3) == "\u2583"
+    assert glyphs.drawn([0] + [0x1C] * 6 + [0]) == "\u258b"
+    assert glyphs.drawn(column(0x04)) == "|"
+    assert glyphs.drawn([0x04, 0x0E, 0x15, 0x04, 0x04, 0x04, 0x04, 0x00]) == "?"
+
+
+def test_rom_a00():
+    assert [glyphs.rom(c) for c in (0xDF, 0x7E, 0x7F, 0xFF, 0x41, 0x20, 0x5C)] == [
+        "\u00b0", "\u2192", "\u2190", "\u2588", "A", " ", "\u00a5",
+    ]  # fmt: skip

@@ -1,0 +1,276 @@
+"""The MPU6050 at its registers. Also run under MicroPython."""
+
+from board_access import counts, level, read, write
+from kickstand_tools.simulated_board.clock import Clock
+from kickstand_tools.simulated_board.mpu6050 import START_UP_US, VARIANTS, WAKE_US, Mpu6050
+
+
+def ramp(t_s):
+    """Every figure tells the time: 1 count a millisecond in the widest gyro range, and so on."""
+    return (t_s, -t_s, 1.0, t_s * 10.0, 0.0, -t_s * 10.0, 25.0)
+
+
+def awake(world=level, who_am_i=0x68, div=9, dlpf=3):
+    """A clock and a chip that samples at 1000 / (1 + div) Hz, some time after start."""
+    clock = Clock()
+    chip = Mpu6050(clock, world, who_am_i)
+    clock.advance(START_UP_US)
+    write(chip, 0x6B, 0x01)
+    clock.advance(WAKE_US)
+    write(chip, 0x19, div, dlpf)
+    clock.advance(50_000)
+    return clock, chip
+
+
+def test_reset_values():
+    clock = Clock()
+    chip = Mpu6050(clock, level)
+    clock.advance(START_UP_US)
+    expected = [0] * 128
+    expected[0x6B], expected[0x75] = 0x40, 0x68
+    assert read(chip, 0, 0x74) + [0] + read(chip, 0x75, 11) == expected
+
+
+def test_who_am_i_variants():
+    for who_am_i, (power, _, _, _, size, _) in VARIANTS.items():
+        clock = Clock()
+        chip = Mpu6050(clock, level, who_am_i)
+        clock.advance(START_UP_US)
+        assert read(chip, 0x75) == [who_am_i]
+        assert read(chip, 0x6B) == [power]
+        assert chip.fifo.size == size
+    assert set(VARIANTS) == {0x68, 0x70, 0x71, 0x72, 0x73, 0x74, 0x78, 0x98, 0x19}
+
+
+def test_an_unknown_chip_only_has_another_name():
+    _, chip = awake(who_am_i=0x55)
+    assert read(chip, 0x75) == [0x55] and counts(chip)[2] == 16384
+
+
+def test_asleep_after_power_on():
+    clock = Clock()
+    chip = Mpu6050(clock, level)
+    clock.advance(1_000_000)
+    assert counts(chip) == [0] * 7
+
+
+def test_an_mpu6500_runs_after_power_on():
+    clock = Clock()
+    chip = Mpu6050(clock, level, 0x70)
+    clock.advance(1_000_000)
+    assert counts(chip)[2] == 16384
+
+
+def test_writes_during_start_up_are_lost():
+    clock = Clock()
+    chip = Mpu6050(clock, level)
+    clock.advance(START_UP_US - 1)
+    write(chip, 0x6B, 0x01)
+    assert read(chip, 0x6B)[0] & 0x40
+    clock.advance(1)
+    write(chip, 0x6B, 0x01)
+    assert read(chip, 0x6B) == [0x01]
+    clock.advance(WAKE_US - 1)
+    write(chip, 0x1B, 0x08)
+    assert read(chip, 0x1B) == [0]
+    clock.advance(1)
+    write(chip, 0x1B, 0x08)
+    assert read(chip, 0x1B) == [0x08]
+
+
+def test_reset_takes_time_and_forgets_everything():
+    clock, chip = awake()
+    write(chip, 0x1B, 0x18)
+    write(chip, 0x6B, 0x80)
+    assert read(chip, 0x6B) == [0x80 | 0x40]
+    assert read(chip, 0x19, 3) == [0, 0, 0]
+    write(chip, 0x6B, 0x01)
+    clock.advance(START_UP_US)
+    assert read(chip, 0x6B) == [0x40]
+    assert counts(chip) == [0] * 7
+
+
+def test_ranges_and_saturation():
+    def world(t_s):
+        return (1.5, -1.5, 0.5, 200.0, -200.0, 300.0)
+
+    for bits, lsb_per_g, lsb_per_dps in (
+        (0, 16384, 131.0),
+        (1, 8192, 65.5),
+        (2, 4096, 32.8),
+        (3, 2048, 16.4),
+    ):
+        clock, chip = awake(world)
+        write(chip, 0x1B, bits << 3, bits << 3)
+        clock.advance(20_000)
+        values = counts(chip)
+        assert values[:3] == [1.5 * lsb_per_g, -1.5 * lsb_per_g, 0.5 * lsb_per_g]
+        assert values[4:6] == [round(200 * lsb_per_dps), round(-200 * lsb_per_dps)]
+        assert values[6] == (32767 if bits == 0 else round(300 * lsb_per_dps))
+    _, chip = awake(lambda t_s: (9.0, -9.0, 2.0, 0.0, 0.0, -999.0))
+    assert counts(chip)[:3] == [32767, -32768, 32767]
+    assert counts(chip)[6] == -32768
+
+
+def test_temperature_formula_of_each_family():
+    for who_am_i, slope, zero in (
+        (0x68, 340.0, 36.53),
+        (0x70, 333.87, 21.0),
+        (0x98, 326.8, 25.0),
+        (0x19, 326.8, 25.0),
+    ):
+        _, chip = awake(lambda t_s: (0, 0, 1, 0, 0, 0, 40.0), who_am_i)
+        assert abs(counts(chip)[3] / slope + zero - 40.0) < 0.002
+
+
+def test_sample_rate():
+    for div, dlpf, period_us in (
+        (0, 3, 1000),
+        (4, 1, 5000),
+        (9, 6, 10_000),
+        (255, 2, 256_000),
+        (79, 0, 10_000),
+        (7, 7, 1000),
+    ):
+        clock, chip = awake(ramp, div=div, dlpf=dlpf)
+        write(chip, 0x38, 0x01)
+        clock.advance(2 * period_us)
+        seen, times = read(chip, 0x3A)[0], []
+        for _ in range(4 * period_us // 125):
+            clock.advance(125)
+            seen = read(chip, 0x3A)[0]
+            if seen:
+                times.append(clock.now_us)
+        assert len(times) == 4, (div, dlpf, times)
+        assert times[3] - times[0] == 3 * period_us
+
+
+def test_data_hold_between_samples():
+    clock, chip = awake(ramp, div=19)
+    clock.advance(20_000)
+    first = counts(chip)
+    changes = 0
+    for _ in range(40):  # 80 ms: four samples of 20 ms
+        clock.advance(2000)
+        now = counts(chip)
+        changes += now != first
+        first = now
+    assert changes == 4
+
+
+def test_a_clock_error_moves_the_samples():
+    clock, chip = awake(ramp, div=9)
+    chip.clock_error = 0.01
+    write(chip, 0x19, 8)
+    write(chip, 0x19, 9)
+    write(chip, 0x38, 0x01)
+    samples = 0
+    for _ in range(10_000):
+        clock.advance(1000)
+        samples += read(chip, 0x3A)[0]
+    assert samples == 1010
+
+
+def test_one_burst_is_one_sampling_instant():
+    clock, chip = awake(ramp, div=0, dlpf=1)
+    chip.start(0x68, False)
+    chip.write_byte(0x3B)
+    chip.start(0x68, True)
+    high = chip.read_byte()
+    clock.advance(1_000_000)  # a burst that takes for ever
+    rest = [chip.read_byte() for _ in range(13)]
+    x = high << 8 | rest[0]
+    y = rest[1] << 8 | rest[2]
+    assert x + y == 65536 and 0 < x < 8192
+    assert counts(chip)[0] > x + 8000
+
+
+def test_the_low_pass_delays():
+    for dlpf, delay_us in ((1, 1900), (3, 4800), (6, 18_600)):
+        clock, chip = awake(ramp, div=0, dlpf=dlpf)
+        clock.advance(1_000_000)
+        sampled_us = clock.now_us - clock.now_us % 1000  # START_UP_US and WAKE_US are whole milliseconds
+        assert abs(counts(chip)[0] - (sampled_us - delay_us) * 16384 / 1e6) <= 0.5
+
+
+def test_without_low_pass_the_accelerometer_stays_at_1_khz():
+    clock, chip = awake(ramp, div=0, dlpf=0)
+    accel, gyro = [], []
+    for _ in range(16):
+        clock.advance(125)
+        now = counts(chip)
+        accel.append(now[0])
+        gyro.append(now[4])
+    assert len(set(accel)) <= 3
+    clock, chip = awake(lambda t_s: (t_s, 0, 0, t_s * 1000.0, 0, 0), div=0, dlpf=0)
+    for _ in range(16):
+        clock.advance(125)
+        gyro.append(counts(chip)[4])
+    assert len(set(gyro)) >= 16
+
+
+def test_sleep_holds_the_registers():
+    clock, chip = awake(ramp)
+    clock.advance(20_000)
+    before = counts(chip)
+    write(chip, 0x6B, 0x41)
+    clock.advance(1_000_000)
+    assert counts(chip) == before
+    write(chip, 0x6B, 0x01)
+    clock.advance(WAKE_US)
+    assert counts(chip) != before
+
+
+def test_auto_increment_writes_and_read_only_registers():
+    _, chip = awake()
+    write(chip, 0x19, 1, 2, 0x08, 0x10)
+    assert read(chip, 0x19, 5) == [1, 2, 0x08, 0x10, 0]
+    for register in (0x3A, 0x72, 0x73, 0x75):
+        before = read(chip, register)
+        write(chip, register, 0xA5)
+        assert read(chip, register) == before
+    write(chip, 0x3B, 0xA5)
+    assert read(chip, 0x3B) == [0]
+
+
+def test_register_1d_only_where_the_family_has_it():
+    for who_am_i in VARIANTS:
+        _, chip = awake(who_am_i=who_am_i)
+        write(chip, 0x1D, 0x03)
+        assert read(chip, 0x1D) == [0 if who_am_i == 0x68 else 3]
+
+
+def test_data_ready_clears_on_read_and_needs_its_enable():
+    clock, chip = awake()
+    clock.advance(20_000)
+    assert read(chip, 0x3A) == [0]
+    write(chip, 0x38, 0x01)
+    clock.advance(10_000)
+    assert read(chip, 0x3A) == [1]
+    assert read(chip, 0x3A) == [0]
+
+
+def test_supply_dips():
+    for leaves, power, expected_z in (
+        ("asleep", 0x40, 0),
+        ("frozen", 0x40, 4096),
+        ("default_ranges", 0x01, 16384),
+    ):
+        clock, chip = awake()
+        write(chip, 0x1B, 0x08, 0x10)
+        clock.advance(20_000)
+        assert counts(chip)[2] == 4096
+        chip.supply_dip(leaves)
+        clock.advance(200_000)
+        assert counts(chip)[2] == expected_z
+        assert read(chip, 0x1B, 2) == [0, 0]
+        assert read(chip, 0x6B) == [power]
+
+
+def test_frozen_data_are_the_last_before_the_dip():
+    clock, chip = awake(ramp, div=0)
+    clock.advance(1_000_000)
+    dip_s = clock.now_us / 1e6
+    chip.supply_dip("frozen")
+    clock.advance(500_000)
+    assert abs(counts(chip)[0] / 16384 - dip_s) < 0.01

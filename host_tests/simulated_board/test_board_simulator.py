@@ -1,0 +1,273 @@
+"""The board as a whole: power, resets, watchdog, button, and being installed. Also run under MicroPython."""
+
+import sys
+
+from board_access import level, on_board, raised
+from kickstand_tools.simulated_board.fakes import fake_machine, fake_time
+from kickstand_tools.simulated_board.fakes.fake_machine import WDT, Pin, Timer
+from kickstand_tools.simulated_board.simulator import Board
+
+
+def test_the_three_ends_of_a_run():
+    def forever(board):
+        while True:
+            fake_time.sleep_ms(10)
+
+    outcome, board = on_board(forever, 2.5)
+    assert outcome == "off" and board.clock.now_us == 2_500_000
+    assert on_board(lambda board: fake_time.sleep_ms(10))[0] == "returned"
+    assert on_board(lambda board: fake_machine.reset())[0] == "reset"
+
+
+def test_other_exceptions_come_through():
+    def firmware(board):
+        raise KeyError("mistake")
+
+    assert isinstance(raised(on_board, firmware), KeyError)
+
+
+def test_firmware_that_catches_every_exception_is_still_switched_off():
+    def firmware(board):
+        while True:
+            try:
+                fake_time.sleep_ms(10)
+            except Exception:
+                pass
+
+    assert on_board(firmware, 1.0)[0] == "off"
+
+
+def test_a_bus_that_hangs_is_free_after_a_power_cycle():
+    def firmware(board):
+        board.faults.stuck_sda(0.5)
+        fake_time.sleep_ms(5000)
+
+    outcome, board = on_board(firmware, 1.0)
+    assert outcome == "off" and board.sensor_bus.sda_level() == 1
+
+
+def test_power_is_lost_by_off_and_kept_by_reset():
+    seen = []
+
+    def firmware():
+        seen.append((board.sensor.peek(0x1B), fake_machine.reset_cause(), fake_time.ticks_ms(), board.lcd.on))
+        board.clock.advance(200_000)
+        board.sensor.start(0x68, False)
+        for value in (0x1B, 0x18):
+            board.sensor.write_byte(value)
+        board.lcd.on = True
+        if len(seen) == 1:
+            fake_machine.reset()
+        fake_time.sleep_ms(60_000)
+
+    board = Board(level)
+    board.install()
+    try:
+        assert board.run(firmware, 1.0) == "reset"
+        assert board.run(firmware, 2.0) == "off"
+        assert not board.lcd.on
+        assert board.run(firmware, 3.0) == "off"
+    finally:
+        board.uninstall()
+    on, off = fake_machine.PWRON_RESET, fake_machine.WDT_RESET
+    assert seen == [(0, on, 0, False), (0x18, off, 0, True), (0, on, 0, False)], seen
+    assert board.boots == 3 and board.clock.now_us == 3_000_000
+
+
+def test_the_watchdog_bites_when_it_is_not_fed():
+    fed_us = []
+
+    def firmware(board):
+        dog = WDT(timeout=1000)
+        for _ in range(30):
+            fake_time.sleep_ms(100)
+            dog.feed()
+        fed_us.append(board.clock.now_us)
+        fake_time.sleep_ms(5000)
+
+    outcome, board = on_board(firmware, 60.0)
+    assert outcome == "reset"
+    assert board.clock.now_us == fed_us[0] + 1_000_000
+
+
+def test_the_watchdog_can_be_stopped_by_its_register_and_ends_with_the_run():
+    def firmware(board):
+        WDT(timeout=1000)
+        fake_machine.mem32[0x40058000 + 0x3000] = 1 << 30
+        fake_time.sleep_ms(3000)
+        WDT(timeout=1000)
+
+    outcome, board = on_board(firmware, 60.0)
+    assert outcome == "returned"
+    board.clock.advance(5_000_000)
+
+
+def test_the_watchdog_of_rp2_has_a_limit():
+    def firmware(board):
+        WDT(timeout=8388)
+        assert isinstance(raised(lambda: WDT(timeout=8389)), ValueError)
+
+    assert on_board(firmware)[0] == "returned"
+    assert on_board(lambda board: WDT(timeout=3_600_000), port="esp32")[0] == "returned"
+
+
+def levels(board, until_us):
+    """(time, level) at each change of the button's pin."""
+    pin = Pin(15, Pin.IN, Pin.PULL_UP)
+    changes, last = [], 1
+    while board.clock.now_us < until_us:
+        now = pin.value()
+        if now != last:
+            changes.append((board.clock.now_us, now))
+            last = now
+        board.clock.advance(18)
+    return changes
+
+
+def test_a_press_bounces_and_then_holds():
+    def firmware(board):
+        board.press(0.1, 0.2)
+        changes = levels(board, 500_000)
+        down = [t for t, _ in changes if t < 200_000]
+        up = [t for t, _ in changes if t >= 200_000]
+        assert len(down) > 2 and len(up) > 2, "no bounce"
+        assert len(down) % 2 == 1 and len(up) % 2 == 1, "the last level is not the right one"
+        assert 100_000 <= down[0] < 100_100 and down[-1] < 105_000
+        assert 300_000 <= up[0] < 300_100 and up[-1] < 305_000
+        board.press()
+        assert levels(board, 510_000)[0][1] == 0
+
+    assert on_board(firmware, 2.0)[0] == "returned"
+
+
+def test_the_same_seed_bounces_the_same():
+    def seen(seed):
+        found = []
+
+        def firmware(board):
+            board.press(0.1)
+            found.extend(levels(board, 200_000))
+
+        on_board(firmware, seed=seed)
+        return found
+
+    assert seen(1) == seen(1)
+    assert seen(1) != seen(2)
+
+
+def test_a_button_held_at_power_up():
+    def firmware(board):
+        fake_time.sleep_ms(10)
+        assert Pin(15, Pin.IN, Pin.PULL_UP).value() == 0
+
+    board = Board(level)
+    board.press(0.0, 2.0)
+    board.install()
+    try:
+        assert board.run(lambda: firmware(board), 1.0) == "returned"
+    finally:
+        board.uninstall()
+
+
+def test_at_and_every():
+    def firmware(board):
+        seen = []
+        board.at(0.25, lambda: seen.append("at"))
+        board.every(0.1, lambda: seen.append(board.clock.now_us))
+        fake_time.sleep_ms(350)
+        assert seen == [100_000, 200_000, "at", 300_000]
+
+    assert on_board(firmware)[0] == "returned"
+
+
+def test_timers():
+    def firmware(board):
+        seen = []
+        Timer(-1, mode=Timer.ONE_SHOT, period=20, callback=lambda timer: seen.append(board.clock.now_us))
+        ticker = Timer()
+        ticker.init(period=50, callback=lambda timer: seen.append(board.clock.now_us))
+        fake_time.sleep_ms(160)
+        ticker.deinit()
+        fake_time.sleep_ms(200)
+        assert seen == [20_000, 50_000, 100_000, 150_000]
+
+    assert on_board(firmware)[0] == "returned"
+
+
+def test_timers_end_with_a_reset():
+    seen = []
+
+    def firmware():
+        if board.boots == 1:
+            Timer(-1, period=100, callback=lambda timer: seen.append(1))
+            fake_machine.reset()
+        fake_time.sleep_ms(500)
+
+    board = Board(level)
+    board.install()
+    try:
+        assert board.run(firmware, 5.0) == "reset"
+        assert board.run(firmware, 5.0) == "returned"
+    finally:
+        board.uninstall()
+    assert seen == []
+
+
+def test_installed_and_gone_again():
+    machine_was = sys.modules.pop("machine", None)
+
+    def firmware(board):
+        assert __import__("machine").Pin is Pin
+        start = board.clock.now_us
+        __import__("time").sleep_ms(5)
+        assert board.clock.now_us - start == 5000
+
+    assert on_board(firmware)[0] == "returned"
+    assert "machine" not in sys.modules
+    if machine_was is not None:
+        sys.modules["machine"] = machine_was
+    after = __import__("time")
+    assert after.time() > 1_000_000_000, "the host's own time is back"
+    assert sys.implementation.name == "micropython" or not hasattr(after, "ticks_us")
+
+
+def test_code_imported_under_one_board_runs_on_the_next():
+    def firmware(board):
+        assert __import__("machine").Pin is Pin  # the same class, whichever board is installed
+        fake_time.sleep_ms(7)
+        assert board.clock.now_us == 7000
+
+    assert on_board(firmware)[0] == "returned"
+    assert on_board(firmware)[0] == "returned"
+
+
+def test_a_board_without_sensor_and_display():
+    def firmware(board):
+        assert fake_machine.I2C(0, sda=4, scl=5).scan() == []
+        assert fake_machine.I2C(1, sda=6, scl=7).scan() == []
+        assert board.lcd.text() == [" " * 16] * 2
+
+    assert on_board(firmware, 10.0, sensor_address=None, lcd_address=None)[0] == "returned"
+
+
+def test_the_world_is_asked_once_a_sample():
+    times = []
+
+    def world(t_s):
+        times.append(t_s)
+        return (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+
+    def firmware(board):
+        i2c = fake_machine.I2C(0, sda=4, scl=5)
+        fake_time.sleep_ms(100)
+        i2c.writeto_mem(0x68, 0x6B, b"\x01")
+        fake_time.sleep_ms(60)
+        i2c.writeto_mem(0x68, 0x19, b"\x09\x03")
+        del times[:]
+        start = board.clock.now_us
+        while board.clock.now_us < start + 1_000_000:
+            i2c.readfrom_mem_into(0x68, 0x3B, bytearray(14))
+
+    on_board(firmware, 10.0, world=world)
+    assert 100 <= len(times) <= 102
+    assert times == sorted(times)

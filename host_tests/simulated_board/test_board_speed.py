@@ -1,0 +1,285 @@
+"""Speed from GPS and wheel: the firmware's drivers on the simulated board. Runs on MicroPython too."""
+
+from board_access import level
+from kickstand_tools.simulated_board.gps import sentence
+from kickstand_tools.simulated_board.simulator import Board
+
+STEP_US = 10_000
+
+
+class Listing:
+    """A UART that has these bytes to give, no more than a piece at a time."""
+
+    def __init__(self, data, piece=1000):
+        self._data = data
+        self._piece = piece
+
+    def any(self):
+        return min(self._piece, len(self._data))
+
+    def read(self, nbytes):
+        data, self._data = self._data[:nbytes], self._data[nbytes:]
+        return data or None
+
+
+def speeds_of(text, piece=1000, step_ms=10, steps=60):
+    """Every speed that Gps makes of this text, rounded to mm/s."""
+    board = Board(level)
+    board.install()
+    try:
+        from kickstand.speed.gps import Gps
+
+        gps = Gps(Listing(text if isinstance(text, bytes) else text.encode(), piece))
+        found = [gps.poll(1000 + step_ms * i) for i in range(steps)]
+    finally:
+        board.uninstall()
+    return [round(1000 * speed) for speed in found if speed is not None]
+
+
+def drive(config, fit, until_s):
+    """[(t_s, m/s, age_us), ...] that the firmware's Speed gives, and {t_s: fault} each second."""
+    board = Board(level)
+    fit(board)
+    board.install()
+    got, faults = [], {}
+
+    def firmware():
+        from time import sleep_us, ticks_ms  # type: ignore[attr-defined]
+
+        from kickstand.settings import Settings
+        from kickstand.speed.source import open_speed
+
+        class Config:
+            pass
+
+        for name, value in config.items():
+            setattr(Config, name, value)
+        speed = open_speed(Settings(Config))
+        assert speed
+        turn = 0
+        while True:
+            new = speed.poll(ticks_ms())
+            if new is not None:
+                got.append((board.clock.now_us / 1e6, new, speed.age_us))
+            if turn % 100 == 0:
+                faults[turn // 100] = speed.fault(ticks_ms())
+            turn += 1
+            sleep_us(STEP_US - board.clock.now_us % STEP_US)
+
+    try:
+        board.run(firmware, until_s)
+    finally:
+        board.uninstall()
+    return got, faults
+
+
+def rising(t_s):
+    return 2.0 * t_s
+
+
+def constant(t_s):
+    return 15.0
+
+
+RMC = "%sRMC,1200%02d.00,%s,4807.038,N,01131.000,E,%s,084.4,230394,003.1,W%s"
+
+
+def test_speed_of_a_sentence_in_any_system_and_any_version():
+    for talker in ("GP", "GN", "GL", "GA", "BD", "GB"):
+        assert speeds_of(sentence(RMC % (talker, 1, "A", "19.438", ",A"))) == [10000]
+    assert speeds_of(sentence(RMC % ("GP", 1, "A", "0.000", ""))) == [0]
+    assert speeds_of(sentence(RMC % ("GN", 1, "A", "19.438", ",D,V"))) == [10000]
+    assert speeds_of(sentence("GPVTG,84.4,T,,M,19.438,N,36.0,K,A")) == [10000]
+    assert speeds_of(sentence("GPVTG,84.4,T,,M,,N,36.0,K")) == [10000]
+
+
+def test_what_is_no_fix_is_no_speed():
+    assert speeds_of(sentence(RMC % ("GP", 1, "V", "19.438", ",N"))) == []
+    assert speeds_of(sentence(RMC % ("GP", 1, "A", "19.438", ",E"))) == []  # the last fix carried on
+    assert speeds_of(sentence("GPRMC,,V,,,,,,,,,,N")) == []
+    assert speeds_of(sentence(RMC % ("GP", 1, "A", "", ",A"))) == []
+    assert speeds_of(sentence("GPVTG,,,,,,,,,N")) == []
+    void = sentence(RMC % ("GP", 1, "V", "", ",N"))
+    assert speeds_of(void + sentence("GPVTG,84.4,T,,M,19.438,N,36.0,K,A")) == []  # not round the void
+
+
+def test_damaged_lines_are_refused_and_the_next_is_read():
+    good = sentence(RMC % ("GP", 1, "A", "19.438", ",A"))
+    later = sentence(RMC % ("GP", 2, "A", "9.719", ",A"))
+    for at in range(len(good) - 2):
+        bad = good[:at] + chr(ord(good[at]) ^ 1) + good[at + 1 :]
+        assert speeds_of(bad + later, piece=37) in ([5000], [10000, 5000]), bad
+        # a damaged talker or star is no loss; whatever is read is true
+        assert (10000 in speeds_of(bad)) <= (at in (1, 2)), bad
+    for at in range(1, len(good) - 3):
+        assert speeds_of(good[at:] + later) == [5000]  # begun in the middle
+        assert speeds_of(good[:at] + later) == [5000]  # ended in the middle
+    assert speeds_of("$" * 1000 + good) == [10000]
+    assert speeds_of("\x00\xff".encode() * 500 + b"\n" + good.encode()) == [10000]
+
+
+def test_any_pieces_will_do():
+    text = "".join(sentence(RMC % ("GP", i, "A", "%.3f" % (i * 1.9438), ",A")) for i in range(1, 6))
+    for piece in (1, 7, 64, 500):
+        assert speeds_of(text, piece, 1, 500) == [1000, 2000, 3000, 4000, 5000]
+
+
+def test_the_same_fix_again_is_not_new():
+    assert speeds_of(sentence(RMC % ("GP", 1, "A", "19.438", ",A")) * 5) == [10000]
+
+
+def test_a_fix_that_waited_in_the_receiver_is_refused_and_its_age_told():
+    board = Board(level)
+    board.install()
+    try:
+        from kickstand.speed.gps import Gps
+
+        def hear(gps, second, at_ms):
+            gps._uart = Listing(sentence(RMC % ("GP", second, "A", "19.438", ",A")).encode(), 64)
+            heard = [gps.poll(at_ms), gps.poll(at_ms)]
+            return [x is not None for x in heard if x is not None], gps.age_ms
+
+        gps = Gps(Listing(b""))
+        assert hear(gps, 1, 1300) == ([True], 0)
+        assert hear(gps, 2, 2200) == ([True], 0)
+        assert hear(gps, 3, 3700) == ([True], 500)
+        assert hear(gps, 4, 6700)[0] == []  # 2.5 s late
+        assert hear(gps, 7, 7210) == ([True], 10)
+        assert hear(gps, 30, 8210) == ([True], 0)  # its clock was put right
+        assert hear(gps, 31, 9210) == ([True], 0)
+    finally:
+        board.uninstall()
+
+
+def test_a_receiver_whose_clock_jumps_is_late_for_seconds_only():
+    board = Board(level)
+    board.install()
+    try:
+        from kickstand.speed.gps import Gps
+
+        for jump in (-6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6):
+            gps = Gps(Listing(b""))
+            for i in range(30):
+                second = 10 + i + (jump if i >= 10 else 0)
+                gps._uart = Listing(sentence(RMC % ("GP", second, "A", "19.438", ",A")).encode())
+                at_ms = 1000 * i + 20 * (i % 3)
+                heard = [gps.poll(at_ms), gps.poll(at_ms)]  # in two pieces
+                if i < 10 or i >= 22 or jump > 0:
+                    assert heard[1] is not None, (jump, i)
+                    assert 0 <= gps.age_ms <= 40, (jump, i, gps.age_ms)
+    finally:
+        board.uninstall()
+
+
+def test_gps_on_its_pins_at_1_and_10_hz():
+    for hz, baud in ((1, 9600), (10, 38400)):
+        config = {"SPEED": "gps", "GPS_BAUD": baud}
+        got, faults = drive(config, lambda b, hz=hz, baud=baud: b.fit_gps(rising, hz=hz, baud=baud), 12.0)
+        assert 10 * hz <= len(got) <= 12 * hz
+        for t_s, speed, _ in got:
+            assert abs(speed - rising(t_s - 0.3)) < 0.4
+        assert set(faults.values()) == {None}
+
+
+def gps_faults(kind, from_s, until_s):
+    faults = [[kind, from_s, until_s]]
+    return drive({"SPEED": "gps"}, lambda b: b.fit_gps(constant, faults=faults), 30.0)
+
+
+def test_gps_faults_are_named_and_end():
+    for kind, text in (
+        ("unplugged", "GPS silent"),
+        ("void", "GPS: no fix"),
+        ("stuck", "GPS: no fix"),
+        ("garbled", "GPS garbled"),
+    ):
+        got, faults = gps_faults(kind, 10.0, 20.0)
+        assert faults[9] is None and faults[25] is None, kind
+        assert faults[18][0] == text, (kind, faults[18])
+        assert not [t for t, _, _ in got if 11.5 < t < 20.0], kind
+        assert all(abs(speed - 15.0) < 0.01 for _, speed, _ in got)
+
+
+def test_no_receiver_and_a_wrong_baud_rate():
+    _, faults = drive({"SPEED": "gps"}, lambda b: None, 6.0)
+    assert faults[1] is None and faults[5] == ("GPS silent", "check wiring")
+    got, faults = drive({"SPEED": "gps", "GPS_BAUD": 38400}, lambda b: b.fit_gps(constant), 6.0)
+    assert got == [] and faults[5] == ("GPS garbled", "check GPS_BAUD")
+
+
+def ride(t_s):
+    """Stands, 20 m/s, stands."""
+    return 0.0 if t_s < 5.0 or t_s > 45.0 else min(20.0, 2.0 * (t_s - 5.0), 4.0 * (45.0 - t_s))
+
+
+def check_wheel(got, tolerance):
+    assert not [1 for t_s, _, _ in got if t_s < 5.0]  # a wheel that never turned may be unplugged
+    for t_s, speed, age_us in got:
+        true = ride(t_s - age_us / 1e6)
+        assert abs(speed - true) < tolerance or true < 1.5 or t_s > 45.0, (t_s, speed, true)
+    assert [speed for t_s, speed, _ in got if t_s > 49.0] and not any(s for t, s, _ in got if t > 49.0)
+
+
+def test_wheel_pulses_slow_and_quick():
+    for pulses in (0.5, 3.0, 24.0):
+        config = {"SPEED": "wheel", "PULSES_PER_METRE": pulses}
+        got, faults = drive(config, lambda b, p=pulses: b.fit_wheel(ride, pulses_per_metre=p), 55.0)
+        check_wheel(got, 0.5)
+        assert len([1 for t_s, _, _ in got if 15.0 < t_s < 40.0]) > 2.0 * 25.0
+        assert faults[4] == ("Wheel: no pulse", "ride, or wiring?") and faults[20] is None
+
+
+def test_a_contact_that_bounces_is_counted_once():
+    got, _ = drive({"SPEED": "wheel"}, lambda b: b.fit_wheel(ride, bounce_us=2000), 55.0)
+    check_wheel(got, 0.5)
+
+
+def test_wheel_on_an_esp32():
+    board = Board(level, port="esp32")
+    board.install()
+    try:
+        from kickstand.speed.wheel import Wheel
+        from machine import Pin  # type: ignore[import-not-found]
+
+        pin = Pin(27, Pin.IN, Pin.PULL_UP)
+        Wheel(pin, 0.5, {})
+        try:
+            Wheel(pin, 0.5, {"hard": True})
+            raise AssertionError("its interrupts are always soft")
+        except TypeError:
+            pass
+    finally:
+        board.uninstall()
+
+
+def test_jumps_that_no_vehicle_makes_are_refused_until_they_last():
+    class Source:
+        age_ms = 0
+        speed = 0.0
+
+        def poll(self, now_ms):
+            return self.speed
+
+    board = Board(level)
+    board.install()
+    try:
+        from kickstand.speed.source import Speed
+
+        source = Source()
+        speed = Speed(source)
+        for at_ms, value, expected in (
+            (0, 10.0, True),
+            (1000, 18.0, True),
+            (2000, 60.0, False),
+            (3000, 19.0, True),
+            (4000, -5.0, False),
+            (4500, float("nan"), False),
+            (5000, 200.0, False),
+            (5500, 18.0, True),
+            (6000, 70.0, False),
+            (9000, 70.0, True),
+        ):
+            source.speed = value
+            assert (speed.poll(at_ms) is not None) == expected, (at_ms, value)
+    finally:
+        board.uninstall()

@@ -1,0 +1,187 @@
+"""The ride simulator against its own trajectory, differentiated."""
+
+import numpy as np
+import pytest
+from kickstand_tools.demo.hand_bike import CRUISE_MPS, HandBike
+from kickstand_tools.simulation.scripted.script import (
+    GRAVITY_MPS2,
+    KICKSTAND_DEG,
+    Ride,
+    accelerate,
+    brake,
+    kickstand,
+    straight,
+    turn,
+    upright,
+    wait,
+)
+
+HILLY = [
+    kickstand(2),
+    upright(2),
+    accelerate(14, 4),
+    turn(-35, 3),
+    straight(3, slope_deg=6),
+    turn(40, 3),
+    straight(3, slope_deg=-5),
+    accelerate(22, 3),
+    turn(-50, 4),
+    brake(0, 4),
+    wait(2),
+]
+
+
+def about(axis, angle):
+    """Rotation matrix about a coordinate axis, right-handed."""
+    c, s = np.cos(angle), np.sin(angle)
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    matrix = np.eye(3)
+    matrix[i, i] = matrix[j, j] = c
+    matrix[j, i], matrix[i, j] = s, -s
+    return matrix
+
+
+@pytest.fixture(scope="module")
+def flown():
+    """The hilly ride, no vibration: step, attitude (world from body), acceleration in the world, motion."""
+    ride = Ride(HILLY, vibration_g=0.0)
+    dt = 0.0005
+    t = np.arange(0.0, ride.seconds, dt)
+    states = [ride.state(x) for x in t]
+    lean, speed, yaw_rate, slope = (np.array([s[i] for s in states]) for i in (1, 3, 5, 6))
+    heading = np.concatenate([[0.0], np.cumsum((yaw_rate[1:] + yaw_rate[:-1]) / 2 * dt)])
+    # World: left, up, forward at heading 0. A left turn is positive about up, nose up negative about left.
+    attitude = np.array([about(1, h) @ about(0, -e) @ about(2, b) for h, e, b in zip(heading, slope, lean)])
+    road = np.array([(about(1, h) @ about(0, -e))[:, 2] for h, e in zip(heading, slope)])
+    acceleration = np.gradient(road * speed[:, None], dt, axis=0)
+    motion = np.array([ride.motion(x) for x in t])
+    return dt, attitude, acceleration, motion
+
+
+def test_positive_lean_is_to_the_right_and_a_positive_rotation_about_forward():
+    leaned = about(2, np.radians(30.0))
+    assert leaned[1, 0] > 0  # the left side is up
+    assert leaned[0, 1] < 0  # and the top of the bike is to the right of its wheels (left is positive)
+
+
+def test_rates_are_the_derivative_of_the_attitude(flown):
+    dt, attitude, _, motion = flown
+    change = np.einsum("nji,njk->nik", attitude[1:-1], (attitude[2:] - attitude[:-2]) / (2 * dt))
+    rates = np.degrees(np.stack([change[:, 2, 1], change[:, 0, 2], change[:, 1, 0]], axis=1))
+    assert np.abs(rates).max() > 40.0  # something happened
+    assert np.abs(rates - motion[1:-1, 3:]).max() < 0.01
+
+
+def test_forces_are_the_derivative_of_the_velocity(flown):
+    _, attitude, acceleration, motion = flown
+    felt = np.einsum("nji,nj->ni", attitude, acceleration / GRAVITY_MPS2 + [0.0, 1.0, 0.0])
+    assert np.ptp(felt[:, 1]) > 0.3 and np.ptp(felt[:, 2]) > 0.5
+    assert np.abs(felt - motion[:, :3])[1:-1].max() < 1e-3
+
+
+def test_distance_is_the_integral_of_speed():
+    ride = Ride(HILLY)
+    t = np.linspace(0.0, ride.seconds, 20001)
+    speed = np.array([ride.state(x)[3] for x in t])
+    distance = np.array([ride.state(x)[8] for x in t])
+    assert distance[-1] > 300
+    travelled = np.concatenate([[0], np.cumsum((speed[1:] + speed[:-1]) / 2 * np.diff(t))])
+    assert np.abs(travelled - distance).max() < 0.01
+
+
+def test_in_balance_no_force_to_the_side_and_the_yaw_rate_of_the_lean():
+    ride = Ride(HILLY, vibration_g=0.0)
+    seen = set()
+    for t in np.arange(10.0, ride.seconds - 8.0, 0.05):
+        lean, speed, yaw_rate, phase = ride.truth(t)
+        assert speed > 4.0
+        assert abs(ride.motion(t)[0]) < 1e-9
+        if phase == "held turn":
+            assert np.tan(np.radians(lean)) == pytest.approx(-speed * np.radians(yaw_rate) / GRAVITY_MPS2)
+            assert np.sign(yaw_rate) == -np.sign(lean)
+            seen.add(bool(lean > 0))
+    assert seen == {True, False}
+
+
+def test_nothing_jumps():
+    ride = Ride(HILLY, vibration_g=0.0)
+    motion = np.array([ride.motion(x) for x in np.arange(0.0, ride.seconds + 5.0, 0.001)])
+    step = np.abs(np.diff(motion, axis=0)).max(axis=0)
+    assert step[:3].max() < 0.02 and step[3:].max() < 0.5
+
+
+def test_kickstand_and_upright_poses():
+    ride = Ride([kickstand(5), upright(5)])
+    assert ride.truth(0.0)[3] == "kickstand"
+    assert ride.truth(1.0)[0] == pytest.approx(KICKSTAND_DEG)
+    left, up, forward, *rates = ride.motion(1.0)
+    assert left == pytest.approx(np.sin(np.radians(KICKSTAND_DEG))) and left < 0
+    assert up == pytest.approx(np.cos(np.radians(KICKSTAND_DEG)))
+    assert forward == 0.0 and not any(rates)
+    lean = np.array([ride.truth(x)[0] for x in np.arange(7.0, 12.0, 0.01)])
+    assert 0.01 < np.abs(lean).max() < 0.2  # held by a person
+    assert ride.truth(9.0)[1:] == (0.0, 0.0, "upright")
+
+
+def test_kickstand_on_the_right():
+    assert Ride([kickstand(5, lean_deg=15)]).motion(1.0)[0] == pytest.approx(np.sin(np.radians(15)))
+
+
+def test_braking_pushes_backward_and_uphill_forward():
+    script = [upright(1), accelerate(20, 5), brake(5, 4), straight(2, slope_deg=5), straight(2)]
+    ride = Ride(script, vibration_g=0.0)
+    assert max(ride.motion(t)[2] for t in np.arange(1, 6, 0.1)) > 0.4
+    assert min(ride.motion(t)[2] for t in np.arange(6, 10, 0.1)) < -0.4
+    assert ride.motion(13.0)[2] == pytest.approx(np.sin(np.radians(5)))
+
+
+def test_vibration_has_the_size_asked_for_and_stops_with_the_engine():
+    def rms(vibration_g):
+        ride = Ride([upright(4), accelerate(15, 4), straight(20)], vibration_g=vibration_g)
+        clean = Ride([upright(4), accelerate(15, 4), straight(20)], vibration_g=0.0)
+        t = np.arange(10.0, 26.0, 0.0037)
+        shake = np.array([np.subtract(ride.motion(x), clean.motion(x)) for x in t])
+        assert ride.motion(2.0) == clean.motion(2.0)
+        return np.sqrt((shake**2).mean(axis=0))
+
+    assert rms(0.05)[1] == pytest.approx(0.05, rel=0.05)
+    assert rms(0.10)[1] == pytest.approx(0.10, rel=0.05)
+    assert 0.2 < rms(0.05)[3] < 2.0
+
+
+def test_by_hand_the_bike_keeps_the_same_balance():
+    bike = HandBike(vibration_g=0.0)
+    assert bike.truth(1.0)[3] == "kickstand"
+    bike.command("left")
+    assert bike.truth(2.0)[:2] == (pytest.approx(KICKSTAND_DEG), 0.0)  # not from the kickstand
+    bike.command("upright")
+    assert bike.truth(5.0)[0] == pytest.approx(0.0, abs=0.2)
+    for _ in range(5):
+        bike.command("left")  # the first sets off
+    lean, speed, yaw_rate, phase = bike.truth(16.0)
+    assert (lean, speed) == (pytest.approx(-20.0, abs=0.6), pytest.approx(CRUISE_MPS, rel=0.01))
+    assert phase == "held turn" and yaw_rate > 0
+    left, up, _, w_left, w_up, _ = bike.motion(16.0)
+    assert left == pytest.approx(0.0, abs=1e-9) and up == pytest.approx(1 / np.cos(np.radians(lean)))
+    assert np.hypot(w_left, w_up) == pytest.approx(yaw_rate)
+    bike.command("kickstand")
+    assert min(bike.motion(t)[2] for t in np.arange(16.0, 18.0, 0.1)) < -0.4
+    assert bike.truth(30.0) == (pytest.approx(KICKSTAND_DEG), 0.0, 0.0, "kickstand")
+
+
+def test_by_hand_rates_and_forces_follow_from_the_motion():
+    bike = HandBike(vibration_g=0.0)
+    bike.command("upright")
+    seen, dt = [], 0.005
+    for n in range(4000):
+        if n % 300 == 299:
+            bike.command("right" if n < 1600 else "left")
+        t = n * dt
+        seen.append((*bike.motion(t), *bike.truth(t)[:2]))
+    seen = np.array(seen)
+    roll_rate, acceleration = (np.gradient(seen[:, i], dt) for i in (6, 7))
+    assert np.ptp(seen[:, 6]) > 20
+    # but for the instants in which the rider changes his mind
+    assert np.quantile(np.abs(roll_rate - seen[:, 5]), 0.99) < 0.5
+    assert np.quantile(np.abs(acceleration / GRAVITY_MPS2 - seen[:, 2]), 0.99) < 0.005
+    assert np.ptp(seen[:, 2]) > 0.25

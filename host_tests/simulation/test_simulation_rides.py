@@ -1,0 +1,180 @@
+"""Whole simulated rides: the same again from the same seed, within their stated ranges, written as logs."""
+
+import numpy as np
+import pytest
+from command import refused, works
+from kickstand_tools.logs.reader import read_log
+from kickstand_tools.simulation.files import simulate
+from kickstand_tools.simulation.profiles import MAIN, PROFILES
+from kickstand_tools.simulation.ride import random_rotation, ride
+
+SHORT_S = 150.0
+
+
+@pytest.fixture(scope="module")
+def rides():
+    return {name: ride(name, 5, SHORT_S) for name in PROFILES}
+
+
+def felt(made):
+    """Force (N, 3, g) and rates (N, 3, deg/s) in vehicle axes, the part's matrix and biases taken off."""
+    chip, mounting = made.chip, made.vehicle_from_sensor
+    force = (made.readings[:, :3] - chip.accel_offset) @ np.linalg.inv(chip.accel_matrix).T @ mounting.T
+    rates = (made.readings[:, 4:] - chip.gyro_bias) @ np.linalg.inv(chip.gyro_matrix).T @ mounting.T
+    return force, rates
+
+
+def test_a_seed_gives_the_same_ride_again_and_another_seed_another():
+    first, again, other = ride("street", 1, 60.0), ride("street", 1, 60.0), ride("street", 2, 60.0)
+    assert np.array_equal(first.readings, again.readings)
+    assert np.array_equal(first.truth["lean_deg"], again.truth["lean_deg"])
+    assert np.array_equal(first.upright, again.upright)
+    assert len(first.time) != len(other.time) or not np.allclose(first.readings, other.readings)
+    assert not np.allclose(first.vehicle_from_sensor, other.vehicle_from_sensor)
+
+
+@pytest.mark.parametrize("name", list(PROFILES))
+def test_nothing_is_past_a_motorcycle(rides, name):
+    made = rides[name]
+    truth = made.truth
+    assert all(np.all(np.isfinite(values)) for values in [made.readings, *truth.values()])
+    assert made.rate_hz == 200.0
+    assert np.allclose(np.diff(made.time), 0.005)
+    assert SHORT_S - 10.0 < made.time[-1] < SHORT_S + 120.0
+    limit = 85.0 if name in ("fall", "parked") else 60.0
+    assert np.abs(truth["lean_deg"]).max() < limit
+    assert 0.0 <= truth["speed_mps"].min() and truth["speed_mps"].max() < 70.0
+    assert np.abs(truth["slope_deg"]).max() < np.degrees(np.arctan(0.125))
+    assert np.abs(np.gradient(truth["lean_deg"], 0.005)).max() < 250.0
+    standing = truth["speed_mps"] == 0.0
+    assert np.abs(truth["yaw_rate_dps"][standing]).max(initial=0.0) < 0.5
+
+
+@pytest.mark.parametrize(
+    ("name", "lean", "speed", "yaw"),
+    [
+        ("street", (25, 45), (18, 28), (12, 60)),
+        ("track", (40, 58), (30, 66), (20, 90)),
+        ("sweeper", (15, 53), (17, 33), (6, 35)),
+        ("city", (12, 45), (9, 16), (20, 90)),
+        ("hills", (28, 50), (11, 21), (25, 110)),
+    ],
+)
+def test_profiles_reach_their_stated_ranges(rides, name, lean, speed, yaw):
+    truth = rides[name].truth
+    assert lean[0] < np.abs(truth["lean_deg"]).max() < lean[1]
+    assert speed[0] < truth["speed_mps"].max() < speed[1]
+    assert yaw[0] < np.abs(truth["yaw_rate_dps"]).max() < yaw[1]
+
+
+def test_the_main_profiles_last_ten_minutes_and_more():
+    assert list(MAIN) == ["street", "track", "sweeper", "city", "hills"]
+    made = ride("city", 0)
+    assert made.time[-1] > 600.0
+
+
+def test_each_profile_has_what_it_is_named_for(rides):
+    turn = rides["sweeper"].phase == "turn"
+    assert turn.sum() > 60 * 200
+    assert np.abs(rides["sweeper"].truth["lean_deg"][turn]).min() < 60.0
+    city = rides["city"]
+    assert (
+        (city.truth["speed_mps"] == 0.0) & (city.phase == "stopped")
+    ).any() or "walking pace" in city.phase
+    assert np.abs(rides["hills"].truth["slope_deg"]).max() > 4.0
+    assert rides["wheelie"].truth["pitch_deg"].max() > 9.0
+    hard = np.gradient(rides["bumps"].truth["speed_mps"], 0.005)
+    assert hard.min() < -5.5
+    fallen = rides["fall"]
+    assert np.abs(fallen.truth["lean_deg"][-200:]) == pytest.approx(80.0, abs=2.0)
+    assert (fallen.phase == "lying").sum() > 20 * 200
+    assert np.ptp(rides["parked"].truth["lean_deg"]) == 0.0
+    assert np.ptp(rides["temperature"].readings[:, 3]) > 5.0
+    windy = rides["crosswind"]
+    straight = (windy.phase == "straight") & (windy.truth["speed_mps"] > 10.0)
+    straight[: len(straight) // 2] = False  # the wind turns half way
+    assert np.abs(np.mean(windy.truth["lean_deg"][straight])) > 1.8
+
+
+def test_the_sensor_feels_one_g_at_rest_and_the_rates_of_the_truth(rides):
+    made = rides["street"]
+    force, rates = felt(made)
+    rest = made.phase == "kickstand"
+    assert np.linalg.norm(force[rest], axis=1).mean() == pytest.approx(1.0, abs=0.005)
+    lean = np.degrees(np.arctan2(force[rest, 0], force[rest, 1])).mean()
+    assert lean == pytest.approx(made.truth["lean_deg"][rest].mean(), abs=0.4)
+    # integrated over the ride, roll, less the heading's share, comes back to the lean; drift is the chip's
+    turned = (
+        np.cumsum(rates[:, 2] - made.truth["yaw_rate_dps"] * np.sin(np.radians(made.truth["pitch_deg"])))
+        / 200.0
+    )
+    error = turned - made.truth["lean_deg"]
+    drift = np.polyval(np.polyfit(made.time, error, 3), made.time)
+    assert np.std(error - drift) < 1.5
+
+
+def test_the_two_poses_are_what_was_asked_for():
+    made = ride("street", 3, 60.0, upright_error_deg=1.5, pitch_change_deg=1.0, share=0.0)
+
+    def seen(readings):
+        up = readings[:, :3].mean(axis=0) @ made.vehicle_from_sensor.T
+        return np.degrees([np.arctan2(up[0], up[1]), np.arcsin(up[2] / np.linalg.norm(up))])
+
+    kickstand, upright = seen(made.kickstand), seen(made.upright)
+    assert upright[0] == pytest.approx(1.5, abs=0.1)
+    assert -15.1 < kickstand[0] < -7.9
+    assert kickstand[1] - upright[1] == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_creeping_mount_turns_by_some_degrees():
+    """The gravity felt at the end has moved against the truth's lean and pitch."""
+    made = ride("creep", 4, 60.0, share=0.0)
+    force, _ = felt(made)
+    early, late = force[200:600].mean(axis=0), force[-600:-200].mean(axis=0)
+    lean = np.radians(made.truth["lean_deg"])
+    first = np.degrees(np.arctan2(early[0], early[1]) - lean[200:600].mean())
+    moved = np.degrees(np.arctan2(late[0], late[1]) - lean[-600:-200].mean()) - first
+    nose = np.degrees(np.arcsin(late[2])) - made.truth["pitch_deg"][-600:-200].mean()
+    assert max(abs(moved), abs(nose)) > 0.5
+
+
+def test_random_mountings_are_rotations():
+    for seed in range(20):
+        m = random_rotation(np.random.default_rng(seed))
+        assert np.allclose(m @ m.T, np.eye(3))
+        assert np.linalg.det(m) == pytest.approx(1.0)
+
+
+def test_simulate_writes_logs_that_calibrate_and_replay(tmp_path):
+    works("simulate", "--profile", "hills", "--seed", 2, "--seconds", 60, "--out", tmp_path / "r")
+    poses = [tmp_path / "r" / f"POSE_{k}.csv" for k in range(1, 8)]
+    six, both = tmp_path / "six.json", tmp_path / "both.json"
+    works("calibrate", "six", *poses, "--out", six)
+    pair = tmp_path / "r" / "KICKSTAND.csv", tmp_path / "r" / "UPRIGHT.csv"
+    works("calibrate", "two", *pair, "--calibration", six, "--out", both)
+    works("replay", tmp_path / "r" / "RIDE.csv", "--calibration", both, "--out", tmp_path / "lean.csv")
+    truth = (tmp_path / "r" / "TRUTH.csv").read_text().splitlines()
+    assert truth[0] == "t_s,lean_deg,speed_mps,yaw_rate_dps,pitch_deg,slope_deg,phase"
+    assert len(truth) == len((tmp_path / "r" / "RIDE.csv").read_text().splitlines())
+
+
+def test_the_speed_is_written_once_a_second_where_asked(tmp_path):
+    made = simulate("street", 1, tmp_path, seconds=60.0, speed=True)
+    log = read_log(tmp_path / "RIDE.csv")
+    given = [k for k, v in enumerate(log.speed_mps) if v is not None]
+    assert given[:3] == [0, 200, 400]
+    assert log.speed_mps[8000] == pytest.approx(made.truth["speed_mps"][8000], abs=0.01)
+    simulate("street", 1, tmp_path, seconds=60.0)
+    assert not any(read_log(tmp_path / "RIDE.csv").speed_mps)
+
+
+def test_the_calibration_of_the_ride_before_goes_with_it(tmp_path):
+    """It lies where report looks for that of RIDE.csv, and is of a sensor mounted another way."""
+    works("simulate", "--profile", "street", "--seconds", 30, "--out", tmp_path)
+    (tmp_path / "RIDE.cal.json").write_text("{}")
+    works("simulate", "--profile", "street", "--seed", 1, "--seconds", 30, "--out", tmp_path)
+    refused(tmp_path, "report", tmp_path / "RIDE.csv", words="no calibration RIDE.cal.json beside it")
+
+
+def test_an_unknown_profile_is_refused(tmp_path):
+    refused(tmp_path, "simulate", "--profile", "moon", "--out", tmp_path / "x", words="street")

@@ -1,0 +1,83 @@
+"""Road, suspension and engine of the simulated ride."""
+
+import numpy as np
+import pytest
+from kickstand_tools.simulation.physics import road
+from kickstand_tools.simulation.physics.bike import Bike
+from kickstand_tools.simulation.physics.engine import Engine
+
+RATE = 1000.0
+
+
+def over(speed: float, roughness: float, seconds: float = 40.0, seed: int = 0) -> road.Shaking:
+    chance = np.random.default_rng(seed)
+    distance = np.linspace(0.0, speed * seconds, int(seconds * RATE))
+    surface = road.profile_slope(chance, float(distance[-1]) + 10.0, roughness)
+    return road.shaking(chance, distance, np.full(len(distance), speed), surface, Bike(), RATE)
+
+
+def test_the_profile_has_the_standards_density():
+    """ISO 8608: displacement PSD of class B is 64e-6 m3 at 0.1 cycles/m and falls with the square."""
+    step = 0.02
+    slope = road.profile_slope(np.random.default_rng(1), 40000.0, road.CLASS_B)
+    n = 2**14
+    rows = slope[: len(slope) // n * n].reshape(-1, n) * np.hanning(n)
+    density = 2.0 * step * np.mean(np.abs(np.fft.rfft(rows)) ** 2, axis=0) / np.sum(np.hanning(n) ** 2)
+    waves = np.fft.rfftfreq(n, step)
+    for wave in (0.1, 0.5, 1.0):
+        near = np.abs(waves - wave) < 0.05
+        displacement = density[near] / (2.0 * np.pi * waves[near]) ** 2
+        assert np.mean(displacement * (waves[near] / 0.1) ** 2) == pytest.approx(road.CLASS_B, rel=0.25)
+
+
+def test_an_ordinary_road_at_90_shakes_with_peaks_of_0_3_to_0_5_g():
+    heave = over(25.0, road.CLASS_B).heave / 9.80665
+    assert 0.3 < np.percentile(np.abs(heave), 99.9) < 0.6
+
+
+def test_it_shakes_with_the_square_root_of_roughness_and_more_at_speed():
+    fine, rough = over(15.0, road.CLASS_A), over(15.0, road.CLASS_C)
+    assert np.std(rough.heave) / np.std(fine.heave) == pytest.approx(4.0, rel=0.01)
+    assert np.std(over(25.0, road.CLASS_B).heave) > 1.5 * np.std(over(6.0, road.CLASS_B).heave)
+
+
+def test_a_slow_rise_lifts_the_chassis_with_it_and_fast_ripples_do_not():
+    assert abs(road.transmitted(np.array([0.05]))[0]) == pytest.approx(1.0, abs=0.01)
+    assert abs(road.transmitted(np.array([60.0]))[0]) < 0.05
+
+
+def test_bumps_are_as_high_as_asked():
+    slope = np.zeros(2000)
+    road.add_bumps(slope, [10.0], height_m=0.04, length_m=0.8)
+    height = np.cumsum(slope) * 0.02
+    assert height.max() == pytest.approx(0.04, rel=0.02)
+    assert abs(height[-1]) < 1e-4
+
+
+def test_the_front_wheel_meets_a_bump_first():
+    chance = np.random.default_rng(0)
+    distance = np.linspace(0.0, 40.0, 4000)
+    slope = np.zeros(3000)
+    road.add_bumps(slope, [20.0], 0.05, 0.6)
+    shaken = road.shaking(chance, distance, np.full(4000, 10.0), slope, Bike(), RATE)
+    nose_up, lifted = np.argmax(shaken.pitch > 0.003), np.argmax(shaken.heave > 1.0)
+    assert 0.05 < (lifted - nose_up) / RATE < 0.25  # 1.43 m of wheelbase at 10 m/s
+
+
+def test_the_engine_turns_with_the_road_and_never_below_idle():
+    engine = Engine()
+    rpm = engine.rpm(np.concatenate((np.zeros(3000), np.linspace(0.0, 30.0, 9000))), RATE)
+    assert rpm[1000] == pytest.approx(1250.0)
+    assert rpm.max() < 5100.0
+    assert np.diff(rpm).min() < -2.0  # it has been shifted up
+
+
+def test_vibration_has_its_size_and_stops_with_the_engine():
+    speed = np.full(20000, 6000.0 / 135.0)
+    running = np.repeat([1.0, 0.0], 10000)
+    force, rates = Engine(rms_g=0.2, shift_rpm=6500.0).vibration(
+        np.random.default_rng(2), speed, running, RATE
+    )
+    assert force[:10000].std(axis=0) / 9.80665 == pytest.approx([0.2] * 3, rel=0.15)
+    assert not force[10000:].any()
+    assert not rates[10000:].any()

@@ -1,0 +1,57 @@
+"""Simulated rides for the tests of the analysis: a perfect sensor, turned into the vehicle's axes already."""
+
+import json
+from pathlib import Path
+
+import command
+import numpy as np
+from kickstand_tools.simulation.scripted import script
+
+CALIBRATION = {
+    "version": 1,
+    "accel_offset_g": [0, 0, 0],
+    "accel_slope": [1, 1, 1],
+    "gyro_bias_dps": [0, 0, 0],
+    "vehicle_from_sensor": [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
+    "aligned": True,
+}
+
+
+def write(directory: Path, segments: list, rate_hz: int = 100, speed_hz: int = 0, vibration_g: float = 0.02) -> Path:
+    """RIDE.csv and RIDE.cal.json of these segments of rides.py; its path. speed_hz: how often a speed is in it."""
+    ride = script.Ride(segments, vibration_g)
+    header = command.HEADER + (",speed_mps" if speed_hz else "")
+    lines = [header]
+    for n in range(round(ride.seconds * rate_hz)):
+        t_s = n / rate_hz
+        line = ",".join(f"{value:.5f}" for value in (t_s, *ride.motion(t_s)))
+        if speed_hz:
+            line += f",{ride.truth(t_s)[1]:.2f}" if n % (rate_hz // speed_hz) == 0 else ","
+        lines.append(line)
+    path = directory / "RIDE.csv"
+    path.write_text("\n".join(lines) + "\n")
+    (directory / "RIDE.cal.json").write_text(json.dumps(CALIBRATION))
+    return path
+
+
+def short(directory: Path, **more) -> Path:
+    """Standing, off, a turn to each side, a hard stop: under a minute."""
+    return write(
+        directory,
+        [
+            script.upright(4),
+            script.accelerate(15, 5),
+            script.turn(-30, 4),
+            script.straight(2),
+            script.turn(42, 4),
+            script.straight(2),
+            script.brake(0, 3),
+            script.wait(4),
+        ],
+        **more,
+    )
+
+
+def table(path: Path) -> np.ndarray:
+    """A CSV of numbers by the names of its columns."""
+    return np.genfromtxt(path, delimiter=",", names=True)

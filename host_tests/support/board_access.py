@@ -1,0 +1,57 @@
+"""Short ways to the simulated board for its tests. Runs on MicroPython too."""
+
+from kickstand_tools.simulated_board.simulator import Board
+
+LEVEL = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+
+
+def level(t_s):
+    """world() of a chip that lies flat and still."""
+    return LEVEL
+
+
+def raised(function, *args):
+    """What function(*args) raises, or None."""
+    try:
+        function(*args)
+    except BaseException as error:
+        return error
+    return None
+
+
+def read(chip, register, count=1):
+    """One burst from a device model, as a list."""
+    chip.start(chip.address, False)
+    chip.write_byte(register)
+    chip.start(chip.address, True)
+    values = [chip.read_byte() for _ in range(count)]
+    chip.stop()
+    return values
+
+
+def write(chip, register, *values):
+    """One write to a device model."""
+    chip.start(chip.address, False)
+    chip.write_byte(register)
+    for value in values:
+        chip.write_byte(value)
+    chip.stop()
+
+
+def counts(chip):
+    """The seven signed figures of a burst."""
+    data = read(chip, 0x3B, 14)
+    values = [data[2 * i] << 8 | data[2 * i + 1] for i in range(7)]
+    return [value - 65536 if value > 32767 else value for value in values]
+
+
+def on_board(firmware, until_s=1.0, **fitted):
+    """Run firmware(board) on a new Board(**fitted), at rest unless given a world. (outcome, board)"""
+    world = fitted.pop("world", level)
+    board = Board(world, **fitted)
+    board.install()
+    try:
+        outcome = board.run(lambda: firmware(board), until_s)
+    finally:
+        board.uninstall()
+    return outcome, board

@@ -1,0 +1,89 @@
+"""Runs a device plan on either engine, in a directory that stands for the board's flash."""
+
+import gc
+import json
+import math
+import os
+import re
+import subprocess
+from pathlib import Path
+
+import device_runs
+from kickstand_tools import unix_port
+
+SCRIPT = Path(device_runs.__file__)
+
+# On the stand to 8 s, upright to 18 s, then turns of 30 degrees to the left and 40 to the right at 15 m/s
+RIDE = [
+    ["kickstand", 8.0],
+    ["upright", 8.0],
+    ["accelerate", 15.0, 6.0],
+    ["turn", -30.0, 5.0],
+    ["turn", 40.0, 5.0],
+    ["straight", 6.0],
+]
+LEFT_S, RIGHT_S, STRAIGHT_S = 30.0, 38.0, 44.0  # late in each
+PRESSES = [[2, 0.15], [12, 0.15]]
+ALIGNED = {"ride": RIDE, "presses": PRESSES, "until": 46}
+
+
+class Record:
+    """What was on the display, and when."""
+
+    def __init__(self, answer, console):
+        self.frames = answer["frames"]
+        self.ends = answer["ends"]
+        self.last = tuple(answer["last"])
+        self.too_fast = answer["too_fast"]
+        self.console = console
+
+    def at(self, t_s):
+        """Both lines as they were at t_s."""
+        shown = ["", ""]
+        for start, line1, line2 in self.frames:
+            if start <= t_s + 1e-6:
+                shown = [line1, line2]
+        return shown
+
+    def first(self, pattern, after=0.0):
+        """When a line first matched after a time; infinity if never."""
+        for start, line1, line2 in self.frames:
+            if start >= after and (re.search(pattern, line1) or re.search(pattern, line2)):
+                return start
+        return math.inf
+
+    def lean_at(self, t_s):
+        """The lean on the display in degrees, > 0 to the right; None if none is shown."""
+        match = re.match(r"Lean +(\d+)° (right|left)?", self.at(t_s)[0])
+        return match and int(match[1]) * (-1 if match[2] == "left" else 1)
+
+    def leans(self, from_s, until_s):
+        """Every lean that was shown between two times."""
+        shown = [self.lean_at(from_s)] + [self.lean_at(f[0]) for f in self.frames if from_s < f[0] < until_s]
+        return [lean for lean in shown if lean is not None]
+
+
+def run(engine, flash, plan, capsys=None):
+    """The Record of a plan. flash: a directory, kept from run to run as a board's is."""
+    if engine == "cpython":
+        before = os.getcwd()
+        os.chdir(flash)
+        gc.freeze()  # the app collects all the time, and what other tests have left would take it minutes
+        try:
+            answer = json.loads(json.dumps(device_runs.run_device(plan)))
+        finally:
+            gc.unfreeze()
+            os.chdir(before)
+        return Record(answer, capsys.readouterr().out if capsys else "")
+    done = subprocess.run(
+        unix_port.command("-X", "heapsize=8M", str(SCRIPT)),
+        input=json.dumps(plan),
+        capture_output=True,
+        text=True,
+        cwd=flash,
+        env=unix_port.environment(),
+        timeout=300,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    console, _, answer = done.stdout.rstrip("\n").rpartition("\n")
+    return Record(json.loads(answer), console)

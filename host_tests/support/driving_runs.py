@@ -1,0 +1,159 @@
+"""Made-up drives through the firmware's alignment by driving. Runs on CPython and on MicroPython.
+
+A drive is a list of legs [seconds, acceleration in m/s2, yaw rate in deg/s]; what a perfect vehicle without suspension
+feels on a level road follows from it.
+"""
+
+import math
+
+from kickstand.drive_alignment import verdict
+from kickstand.drive_alignment.alignment import DriveAlignment
+from kickstand.drive_alignment.parts import DriveParts
+from kickstand.drive_alignment.regression import BrakingRegression, Fit
+from kickstand.errors import Refusal
+from kickstand.rotation import matrix
+from kickstand_tools.calibration.published.viriciti import PublishedAlignment
+
+STAND = [6.0, 0.0, 0.0]
+G = 9.80665
+RATE_HZ = 100
+METHODS = {"improved": DriveAlignment, "published": PublishedAlignment}
+
+
+def around(brakings=6, braking=-2.0, seconds=3.0, yaw_dps=0.0, pause_s=5.0, stands=True):
+    """Legs of a drive that stands, then speeds up and brakes so many times."""
+    legs = [list(STAND)] if stands else []
+    for k in range(brakings):
+        legs.append([4.0 + (6.0 if k == 0 else 0.0), -braking * seconds / 4.0 if k else 1.2, 12.0])
+        legs.append([pause_s, 0.0, 0.0])
+        legs.append([seconds, braking, yaw_dps])
+        legs.append([2.0, 0.0, 0.0])
+    return legs
+
+
+def samples(legs, vehicle="car", tilt_deg=0.0, noise_g=0.003, start_mps=0.0):
+    """(force, rate, speed) at RATE_HZ in the vehicle's axes. tilt_deg: the camber where it stands; a motorcycle
+    leans into turns."""
+    seed = 1
+    speed = start_mps
+    for seconds, acceleration, yaw_dps in legs:
+        for _ in range(round(seconds * RATE_HZ)):
+            before, speed = speed, max(0.0, speed + acceleration / RATE_HZ)
+            camber = math.radians(tilt_deg) if before == speed == 0.0 else 0.0
+            force = [math.sin(camber), math.cos(camber), (speed - before) * RATE_HZ / G]
+            rate = [0.0, yaw_dps, 0.0]
+            side = speed * math.radians(yaw_dps) / G
+            if vehicle == "car":
+                force[0] += side
+            else:
+                lean = math.atan(side)  # to the left of a left turn
+                force[1] = math.sqrt(1.0 + side * side)
+                rate[0], rate[1] = yaw_dps * math.sin(lean), yaw_dps * math.cos(lean)
+            for i in range(3):
+                seed = (seed * 1103515 + 12345) % 0x1000000
+                force[i] += noise_g * (seed / 0x800000 - 1.0)
+            yield force, rate, speed
+
+
+def mounted(m, vector):
+    """From the vehicle's axes to those of a sensor mounted as m (9, rows left, up, forward) says."""
+    x, y, z = vector
+    return [m[i] * x + m[3 + i] * y + m[6 + i] * z for i in range(3)]
+
+
+class SpeedSource:
+    """A GPS with faults: every_s, late_s, scale, step (m/s, what it is rounded to), stuck_from_s, silent (from when to
+    when, s)."""
+
+    def __init__(self, every_s=0.5, late_s=0.0, scale=1.0, step=0.0, stuck_from_s=1e9, silent=(1e9, 1e9), add=0.0):
+        self.every = round(every_s * RATE_HZ)
+        self.late = round(late_s * RATE_HZ)
+        self.scale, self.step, self.add = scale, step, add
+        self.stuck_from, self.silent = stuck_from_s * RATE_HZ, [s * RATE_HZ for s in silent]
+        self.past = []
+        self.count = 0
+        self.last = 0.0
+
+    def step_to(self, speed):
+        """The next hundredth of a second: a new value, or None."""
+        self.past.append(speed)
+        if len(self.past) > self.late + 1:
+            self.past.pop(0)
+        self.count += 1
+        if (self.count - 1) % self.every or self.silent[0] < self.count <= self.silent[1]:
+            return None
+        if self.count < self.stuck_from:
+            self.last = self.past[0] * self.scale + self.add
+            if self.step:
+                self.last = round(self.last / self.step) * self.step
+        return self.last
+
+
+def drive(legs, mount, options):
+    """What becomes of it. mount: 9, rows left, up, forward. options: vehicle, method, up, bias, source (arguments of
+    SpeedSource), samples (arguments of samples), gyro_bias, moved [from_s, another mount], against (a matrix to
+    compare with)."""
+    vehicle = options.get("vehicle", "car")
+    source = SpeedSource(**options.get("source", {}))
+    alignment = METHODS[options.get("method", "improved")](vehicle, options.get("up"), options.get("bias"))
+    moved_at, other = options.get("moved", [1e9, mount])
+    bias = options.get("gyro_bias", [0.0, 0.0, 0.0])
+    states = []
+    ready_s = None
+    made = samples(legs, vehicle, **options.get("samples", {}))
+    for k, (force, rate, speed) in enumerate(made):
+        m = mount if k < moved_at * RATE_HZ else other
+        turning = mounted(m, rate)
+        alignment.update(mounted(m, force), [turning[i] + bias[i] for i in range(3)], 0 if k == 0 else 10000)
+        value = source.step_to(speed)
+        if value is not None:
+            alignment.measure_speed(value)
+        if not states or alignment.state != states[-1]:
+            states.append(alignment.state)
+        if ready_s is None and alignment.ready:
+            ready_s = k / RATE_HZ
+    alignment.finish()
+    result = {
+        "ready": alignment.ready,
+        "ready_s": ready_s,
+        "states": states,
+        "counted": alignment.counted,
+        "turned": alignment.turned,
+        "stops": alignment.standing.stops,
+        "bias": list(alignment.standing.bias),
+        "quality": alignment.quality_deg,
+    }
+    if hasattr(alignment, "events"):
+        result["lag"] = alignment.events.lag_s
+    if "against" in options:
+        result["compare"] = verdict.compare(alignment, options["against"])
+    out = matrix()
+    try:
+        alignment.matrix(out)
+        result["matrix"] = list(out)
+    except Refusal as refusal:
+        result["refused"] = refusal.reason
+        result["lcd"] = refusal.lcd
+    return result
+
+
+def regression(rows, lag):
+    """rows [seconds, change_g, curve_g, force (3)], a block closed after every tenth: forward, level, blocks."""
+    fitted, fit = BrakingRegression(), Fit()
+    for k, (seconds, change, curve, force) in enumerate(rows):
+        fitted.add(lag, seconds, change, curve, force)
+        if k % 10 == 9:
+            for _ in fitted.close_block():
+                pass
+    fitted.fit(fit, lag)
+    return list(fit.forward), list(fit.level), fitted.blocks
+
+
+def parts(blocks):
+    """blocks [across, along, roll_g, pitch_g, weight, seconds]: forward_deg, sigmas, roll_deg, pitch_deg."""
+    compared = DriveParts()
+    for block in blocks:
+        compared.add(*block)
+    for _ in compared.compare():
+        pass
+    return compared.forward_deg, compared.sigmas, compared.roll_deg, compared.pitch_deg

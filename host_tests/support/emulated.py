@@ -1,0 +1,89 @@
+"""Short ways to the emulated Pico for its tests."""
+
+import functools
+import re
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from kickstand_tools.errors import InputError
+from kickstand_tools.simulation.scripted.script import Ride, upright
+from kickstand_tools.simulation.scripted.sensor_errors import Sensor
+
+PART = Sensor(seed=1, share=0.5)  # an ordinary part, stuck on at some angle
+
+
+def pico(world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any):
+    """An emulator.pico.Pico, without power yet. Skips where emulator or image cannot be had."""
+    try:
+        from kickstand_tools.emulator import image
+        from kickstand_tools.emulator.pico import Pico
+
+        image.find()
+    except InputError as reason:
+        pytest.skip(str(reason))
+    except ImportError as reason:
+        pytest.skip(f"no emulator for this system: {reason}")
+    return Pico(world, files, **fitted)
+
+
+@functools.cache
+def firmware() -> dict[str, bytes]:
+    """The firmware's files, compiled: they start in half the time."""
+    from kickstand_tools.emulator import flash_image
+
+    return flash_image.firmware(compiled=True)
+
+
+def modules() -> dict[str, bytes]:
+    """The firmware without main.py: the board waits at its prompt."""
+    return {path: content for path, content in firmware().items() if path != "/main.py"}
+
+
+@functools.cache
+def calibrated(who_am_i: int = 0x68) -> dict[str, bytes]:
+    """The calibration of PART, as its board keeps it: mounting, gyro bias and accelerometer."""
+    from kickstand.calibration.parameters import Calibration
+    from kickstand_tools.emulator import flash_image
+
+    calibration = Calibration()
+    calibration.six_done = calibration.aligned = True
+    calibration.set_accel(
+        [-o / s for o, s in zip(PART.accel_offset_g, PART.accel_scale, strict=True)],
+        [1.0 / s for s in PART.accel_scale],
+    )
+    for i in range(3):
+        calibration.gyro_bias[i] = PART.gyro_bias_dps[i]
+    for i in range(9):
+        calibration.vehicle_from_sensor[i] = PART.vehicle_from_sensor[i]
+    return flash_image.stored(calibration, who_am_i)
+
+
+def leaning(lean_deg: float) -> Callable[[float], tuple]:
+    """What PART feels on a bike that is held at this lean."""
+    return PART.world(Ride([upright(1e6, lean_deg=lean_deg)]).motion)
+
+
+def shown_lean(lines: list[str]) -> float | None:
+    """Degrees on the display, > 0 to the right; None where it shows no lean."""
+    words = lines[0].split()
+    if len(words) < 2 or words[0] != "Lean" or not words[1].endswith("°"):
+        return None
+    return float(words[1][:-1]) * (-1 if words[2:] == ["left"] else 1)
+
+
+def shows(device, pattern: str, limit_s: float) -> re.Match:
+    """Let time pass until the display's two lines, as one text with a bar between, match; the match."""
+    return device.run_until(lambda: re.search(pattern, "|".join(device.lcd())), limit_s)
+
+
+def reset_in_a_read(device, at_s: float) -> None:
+    """Reset the processor at at_s or soon after, while the sensor is sending."""
+
+    def act() -> None:
+        if device.chip.controllers[0].reading():
+            device.chip.reset()
+        else:
+            device.board.at(device.time_s + 5e-6, act)
+
+    device.board.at(at_s, act)

@@ -1,0 +1,162 @@
+"""A board behind mpremote's own file commands: their scripts run here, on a directory instead of a flash."""
+
+import builtins
+import contextlib
+import errno
+import io
+import types
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from kickstand_tools.deploy.bytecode import PICO
+from mpremote.transport import Transport, TransportError, TransportExecError
+
+
+class FakeBoard(Transport):
+    """Takes the place of SerialTransport.
+
+    root: the directory that is its flash.  written: paths in the order they were opened for writing.
+    on_write(path, data): called before each write, returns what really lands on the flash.  mpy: as
+    sys.implementation._mpy.
+    """
+
+    def __init__(self, root: Path, python: str = "micropython", answers: bool = True, mpy: int = PICO) -> None:
+        self.root = root
+        self.answers = answers
+        self.free_blocks = 300
+        self.written: list[str] = []
+        self.resets = 0
+        self.serial = Serial()
+        self.closed = False
+        self.on_write: Callable[[str, bytes], bytes] = lambda _path, data: data
+        self.modules: dict[str, Any] = {
+            "os": self._os(),
+            "sys": types.SimpleNamespace(implementation=_implementation(python, mpy), platform="rp2"),
+        }
+
+        def imports(name: str, *rest: Any) -> Any:
+            if name in self.modules:
+                return self.modules[name]
+            if name == "kickstand":
+                return self._kickstand()
+            return __import__(name, *rest)
+
+        self._globals = {"__builtins__": vars(builtins) | {"__import__": imports, "open": self._open}}
+
+    def enter_raw_repl(self, soft_reset: bool = True, timeout_overall: int = 10) -> None:
+        if not self.answers:
+            print(b"\x00\x00")  # as mpremote does
+            raise TransportError("could not enter raw repl")
+
+    def exec(self, command: str | bytes, data_consumer: Callable[[bytes], object] | None = None) -> bytes:
+        out = io.StringIO()
+        try:
+            with contextlib.redirect_stdout(out):
+                exec(command, self._globals)
+        except ConnectionError:
+            raise  # the cable, not the board
+        except OSError as error:
+            number = error.errno or 0
+            text = f"OSError: [Errno {number}] {errno.errorcode[number]}"
+            raise TransportExecError(b"", f"Traceback\r\n{text}\r\n") from None
+        except Exception as error:
+            raise TransportExecError(b"", f"Traceback\r\n{type(error).__name__}: {error}\r\n") from None
+        data = out.getvalue().encode()
+        if data_consumer:
+            data_consumer(data)
+        return data
+
+    def exec_raw(self, command: str, timeout: float = 10) -> tuple[bytes, bytes]:
+        try:
+            return self.exec(command), b""
+        except TransportExecError as error:
+            return b"", error.error_output.encode()
+
+    def eval(self, expression: str) -> Any:
+        return eval(self.exec(f"print(repr({expression}))"))
+
+    def exec_raw_no_follow(self, command: str) -> None:
+        if "machine.reset()" in command:
+            self.resets += 1
+            return
+        output, error = self.exec_raw(command)
+        self.serial.data += output + b"\x04" + error + b"\x04>"
+
+    def close(self) -> None:
+        self.closed = True
+
+    def path(self, path: str) -> Path:
+        return self.root / path.lstrip("/")
+
+    def _open(self, path: str, mode: str = "r") -> Any:
+        if "w" not in mode:
+            return open(self.path(path), mode)
+        self.written.append(path)
+        return _Writer(self, path)
+
+    def _os(self) -> types.SimpleNamespace:
+        def ilistdir(path: str) -> list[tuple[str, int, int, int]]:
+            found = self.path(path).iterdir()
+            return [(p.name, 0x4000, 0, 0) if p.is_dir() else (p.name, 0x8000, 0, p.stat().st_size) for p in found]
+
+        def stat(path: str) -> tuple[int, ...]:
+            found = self.path(path).stat()
+            return (0x4000 if self.path(path).is_dir() else 0x8000, 0, 0, 0, 0, 0, found.st_size, 0, 0, 0)
+
+        return types.SimpleNamespace(
+            ilistdir=ilistdir,
+            listdir=lambda path: [p.name for p in self.path(path).iterdir()],
+            stat=stat,
+            mkdir=lambda path: self.path(path).mkdir(),
+            remove=lambda path: self.path(path).unlink(),
+            rmdir=lambda path: self.path(path).rmdir(),
+            statvfs=lambda _path: (4096, 4096, 350, self.free_blocks, self.free_blocks, 0, 0, 0, 0, 255),
+        )
+
+    def _kickstand(self) -> types.ModuleType:
+        if not self.path("kickstand/__init__.py").exists():
+            raise ImportError("no module named 'kickstand'")
+        module = types.ModuleType("kickstand")
+        exec(self.path("kickstand/__init__.py").read_text(), vars(module))
+        return module
+
+
+class Serial:
+    """The port: data that waits to be read, and what was written."""
+
+    def __init__(self) -> None:
+        self.data = b""
+        self.written = b""
+
+    def inWaiting(self) -> int:
+        return len(self.data)
+
+    def read(self, count: int) -> bytes:
+        count = min(count, 700)
+        piece, self.data = self.data[:count], self.data[count:]
+        return piece
+
+    def write(self, data: bytes) -> None:
+        self.written += data
+
+
+class _Writer:
+    def __init__(self, board: FakeBoard, path: str) -> None:
+        self._board, self._path = board, path
+        self._file = open(board.path(path), "wb")
+
+    def write(self, data: bytes) -> int:
+        return self._file.write(self._board.on_write(self._path, data))
+
+    def close(self) -> None:
+        self._file.close()
+
+
+def _implementation(name: str, mpy: int) -> types.SimpleNamespace:
+    return types.SimpleNamespace(name=name, version=(1, 26, 1, ""), _machine="Imagined board with RP2040", _mpy=mpy)
+
+
+def files(root: Path) -> dict[str, bytes]:
+    """Path on the board and content of everything on it."""
+    return {"/" + p.relative_to(root).as_posix(): p.read_bytes() for p in root.rglob("*") if p.is_file()}

@@ -1,0 +1,153 @@
+"""The firmware's mathematics, called by name: JSON in, JSON out. Runs on CPython and on MicroPython.
+
+As a script: reads one JSON list of [name, arguments] from standard input and prints the list of results.
+"""
+
+import json
+import sys
+from array import array
+
+import driving_runs
+from kickstand import rotation
+from kickstand.calibration import six_position, two_position
+from kickstand.calibration.parameters import Calibration
+from kickstand.calibration.still_pose import Capture
+from kickstand.calibration.transform import Transform
+from kickstand.errors import Refusal
+from kickstand.imu import fifo_frames
+from kickstand.lean import formula
+from kickstand.lean.meter import LeanMeter
+from kickstand_tools.calibration.published import dispersion, rodrigues
+
+
+def matrix_of(values):
+    m = rotation.matrix()
+    for i in range(9):
+        m[i] = values[i]
+    return m
+
+
+def _into(size, function, *arguments):
+    out = rotation.matrix() if size == 9 else rotation.vector()
+    function(out, *arguments)
+    return list(out)
+
+
+def align_two_position(kickstand, upright, side):
+    m = rotation.matrix()
+    tilt = two_position.two_position(m, kickstand, upright, side)
+    return tilt, list(m)
+
+
+def apply(offset, slope, bias, lsb, gyro_lsb, reading):
+    calibration = Calibration()
+    calibration.set_accel(offset, slope)
+    for i in range(3):
+        calibration.gyro_bias[i] = bias[i]
+    calibration.set_scale(lsb, gyro_lsb)
+    force, rate = rotation.vector(), rotation.vector()
+    calibration.apply(reading, force, rate)
+    return list(force) + list(rate)
+
+
+def transform(offset, slope, matrix, sums, n):
+    """Force and rate of the mean of n samples, as the board does it and with floats; 4096 counts per g."""
+    calibration = Calibration()
+    calibration.set_accel(offset, slope)
+    for i in range(9):
+        calibration.vehicle_from_sensor[i] = matrix[i]
+    for i in range(3):
+        calibration.gyro_bias[i] = 2.0 - i
+    calibration.set_scale(4096, 65.5)
+    both = Transform(calibration)
+    force, rate = [0.0] * 3, [0.0] * 3
+    both.apply_sum(array("i", sums), n, force, rate)
+    plain_force, plain_rate = [0.0] * 3, [0.0] * 3
+    both.apply([value / n for value in sums], plain_force, plain_rate)
+    return force + rate, plain_force + plain_rate
+
+
+def add_up(batches, limit):
+    """Batches of frames of 14 bytes: [how many are good, their sums] of each, as the board does it and plainly."""
+    out = []
+    for function in (fifo_frames.add_up, fifo_frames.add_up_plainly):
+        watch = array("i", (0, 0, limit))
+        answers = []
+        for batch in batches:
+            sums = array("i", [0] * 7)
+            data = bytearray()
+            for frame in batch:
+                data.extend(bytes(frame))
+            good = function(data, len(batch), sums, watch)
+            answers.append([good, list(sums)])
+        out.append(answers)
+    return out
+
+
+def capture(samples):
+    """samples: rows of seven integers, 8192 counts per g and 65.5 per deg/s."""
+    pose = Capture(8192, 65.5, 32700, len(samples))
+    for sample in samples:
+        pose.add(sample)
+    pose.finish()
+    return pose.accel, pose.gyro
+
+
+def meter(matrix, readings, dt_us):
+    """Readings in g and deg/s through the whole chain: [shown lean, formula lean] for each."""
+    calibration = Calibration()
+    for i in range(9):
+        calibration.vehicle_from_sensor[i] = matrix[i]
+    device = LeanMeter(calibration)
+    out = []
+    for reading in readings:
+        device.update(reading, dt_us)
+        out.append([device.lean_deg, device.lean_formula_deg])
+    return out
+
+
+def circular_dispersion(directions):
+    spread = dispersion.CircularDispersion()
+    for x, y in directions:
+        spread.add(x, y, (x * x + y * y) ** 0.5)
+    return spread.value()
+
+
+CALLS = {
+    "dispersion": circular_dispersion,
+    "drive": driving_runs.drive,
+    "parts": driving_runs.parts,
+    "regression": driving_runs.regression,
+    "rotation_between": lambda a, b, axis: _into(9, rodrigues.rotation_between, a, b, axis),
+    "cross": lambda a, b: _into(3, rotation.cross, a, b),
+    "rotate": lambda m, a: _into(3, rotation.rotate, matrix_of(m), a),
+    "rotate_back": lambda m, a: _into(3, rotation.rotate_back, matrix_of(m), a),
+    "multiply": lambda a, b: _into(9, rotation.multiply, matrix_of(a), matrix_of(b)),
+    "angle": rotation.angle_deg,
+    "is_rotation": rotation.is_rotation,
+    "two_position": align_two_position,
+    "static_lean": formula.static_lean_deg,
+    "lean_acos": formula.lean_acos_deg,
+    "formula_lean": formula.formula_lean_deg,
+    "apply": apply,
+    "closed_form": six_position.closed_form,
+    "fit": six_position.fit,
+    "free_pose": six_position.check_free_pose,
+    "side_of": six_position.side_of,
+    "capture": capture,
+    "transform": transform,
+    "add_up": add_up,
+    "meter": meter,
+}
+
+
+def call(name, arguments):
+    """The result, or {"refused": reason, "lcd": lines}."""
+    try:
+        return CALLS[name](*arguments)
+    except Refusal as refusal:
+        return {"refused": refusal.reason, "lcd": refusal.lcd}
+
+
+if __name__ == "__main__":
+    json.dump([call(name, arguments) for name, arguments in json.load(sys.stdin)], sys.stdout)

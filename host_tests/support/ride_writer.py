@@ -1,0 +1,61 @@
+"""Rides written by the firmware's own recorder, as a board's flash would hold them."""
+
+import math
+import random
+import types
+
+from kickstand.calibration.parameters import Calibration
+from kickstand.calibration.store import pack
+from kickstand.rides.block import RideBlock, block_length
+
+CHIP = types.SimpleNamespace(
+    who_am_i=0x68,
+    accel_range_g=8,
+    accel_lsb_per_g=4096,
+    gyro_lsb_per_dps=65.5,
+    counts=[0] * 7,
+    temperature_c=lambda _counts: 31.25,
+)
+
+
+def calibration(trim_deg=0.0):
+    """Plausible, and none of it neutral."""
+    new = Calibration()
+    new.set_accel((0.01, -0.02, 0.03), (1.01, 0.99, 1.0))
+    new.gyro_bias[1] = 1.5
+    for i, value in enumerate((0, 1, 0, 0, 0, 1, 1, 0, 0)):
+        new.vehicle_from_sensor[i] = value
+    new.six_done = new.aligned = True
+    new.trim_deg = trim_deg
+    return new
+
+
+def turns(count, seed=0):
+    """(sums, n, dt_us) of a bike that leans this way and that, with a road under it."""
+    random.seed(seed)
+    for i in range(count):
+        n = random.choice((2, 2, 2, 2, 2, 1, 3, 8))
+        sway = math.sin(i / 100)
+        means = (300 * sway, 200, 4096, 0, 90, 40 * sway, 600 * math.cos(i / 100))
+        sums = [sum(round(random.gauss(m, 40)) for _ in range(n)) for m in means]
+        yield sums, n, n * 5000 + random.randint(-200, 200)
+
+
+def blocks(count, ride=1, length=block_length, sequence=0, time_us=2_000_000, trim_deg=0.0, speed=False):
+    """So many whole blocks, and the turns that are in them: (sums of six, n, dt_us)."""
+    block = RideBlock(5000)
+    body = pack(CHIP.who_am_i, CHIP.accel_range_g, calibration(trim_deg))
+    written, held = [], []
+    source = turns(1_000_000, seed=ride)
+    for index in range(count):
+        block.begin(length(index), ride, sequence + index, time_us, CHIP, 200, body)
+        while not block.full():
+            sums, n, dt_us = next(source)
+            if speed and len(held) % 100 == 0:
+                block.add_speed(len(held))
+            block.add(sums, n, dt_us)
+            time_us += dt_us
+            held.append((tuple(sums[:3] + sums[4:]), n, dt_us))
+        block.close()
+        written.append(bytes(block.buffer[: block.length]))
+    return written, held

@@ -1,0 +1,37 @@
+"""Apache Parquet for data frames: the columns of export_csv.py, each field with its unit in its metadata.
+
+https://arrow.apache.org/docs/python/parquet.html; pandas.read_parquet and others open it.
+"""
+
+from collections.abc import Iterator
+from importlib.util import find_spec
+from pathlib import Path
+
+from ...errors import InputError, extra
+from ..channels import Channels
+from .export_csv import COLUMNS
+
+
+def check() -> None:
+    """Raise InputError where Parquet cannot be written."""
+    if not find_spec("pyarrow"):
+        raise InputError("Parquet needs pyarrow: " + extra("rides"))
+
+
+def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
+    """One row group a block; time in doubles, the rest in floats. NaN where there is no value."""
+    import pyarrow
+    from pyarrow.parquet import ParquetWriter
+
+    schema = pyarrow.schema(
+        [
+            pyarrow.field(name, pyarrow.float64() if name == "t_s" else pyarrow.float32(), metadata={"unit": unit})
+            for name, (_, unit) in COLUMNS.items()
+        ],
+        metadata={"made_by": "kickstand", "axes": "left, up, forward; lean > 0 to the right"},
+    )
+    with ParquetWriter(path, schema) as writer:
+        for block in blocks:
+            block.t_s = block.t_s + start_s
+            columns = [pyarrow.array(getattr(block, field.name), type=field.type) for field in schema]
+            writer.write_table(pyarrow.table(columns, schema=schema))

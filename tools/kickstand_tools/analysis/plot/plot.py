@@ -1,0 +1,27 @@
+"""A ride drawn: DIR/RIDE.png by matplotlib, DIR/RIDE.html by plotly."""
+
+from importlib.util import find_spec
+from pathlib import Path
+
+from ...errors import InputError, extra
+from ...output import check_directory, new_directory, write_whole
+from ..look import Look
+from . import page, picture
+
+
+def check(directory: Path) -> None:
+    """Raise InputError if nothing can be drawn, or nothing written there."""
+    missing = [name for name in ("matplotlib", "plotly") if not find_spec(name)]
+    if missing:
+        raise InputError(f"pictures need {' and '.join(missing)}: {extra('rides')}")
+    check_directory(directory)
+
+
+def draw(seen: Look, directory: Path) -> list[Path]:
+    """Write both; their paths. Raises InputError."""
+    name = seen.ride.log.name.removesuffix(".gz").removesuffix(".csv")
+    paths = [directory / f"{name}.png", directory / f"{name}.html"]
+    with new_directory(directory):
+        write_whole(paths[0], lambda path: picture.draw(path, seen))
+        write_whole(paths[1], lambda path: page.draw(path, seen))
+    return paths

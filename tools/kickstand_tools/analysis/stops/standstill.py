@@ -1,0 +1,100 @@
+"""When a vehicle stands still."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..channels import Array, Channels
+from ..signals import smoothed
+from ..thin import spacing_s
+
+STOPPED_MPS = 0.3  # a speed that counts as standing; satellites never quite say 0
+STALE_S = 3.0  # a speed says no more after that
+
+# Without a speed, what stands shakes for so long by no more than a share of what it does on the move
+QUIET_S = 1.0
+QUIET_SHARE = 0.15  # in pitch and yaw
+QUIET_UP_SHARE = 0.2  # up and down: a smooth road and an idling engine leave more than a fork that stands
+RIDING_PERCENTILE = 90.0  # which even a test with long pauses moves for
+ENGINE_S, BEND_S = 0.1, 0.5  # an idling engine is quicker, a bend, a hill or the fork's dive slower than the road
+STILL_DPS, STILL_G = 1.0, 0.01  # turns no faster, and is as steep at the end as at the beginning
+MAX_OFF_G = 0.05  # the force from what it is at rest: braking or a bend as smooth as standing adds to it
+UNCALIBRATED_G = 0.12  # from 1 g, where the ride has no rest: a cheap sensor without the six positions
+
+
+def standing(ride: Channels) -> NDArray[np.bool_]:
+    """True where the bike stands still: by the log's own speed, or where there is none by how little it shakes."""
+    still = _quiet(ride)
+    if not np.any(still):
+        still = _rested(ride)
+    there = np.flatnonzero(~np.isnan(ride.speed_mps))
+    if len(there):
+        place = np.searchsorted(there, np.arange(len(still)), side="right") - 1
+        latest = there[np.maximum(place, 0)]
+        known = (place >= 0) & (ride.t_s - ride.t_s[latest] < STALE_S)
+        still = np.where(known, ride.speed_mps[latest] < STOPPED_MPS, still)
+    return still
+
+
+def _quiet(ride: Channels) -> NDArray[np.bool_]:
+    still = np.zeros(len(ride.t_s), dtype=bool)
+    second = max(4, round(QUIET_S / spacing_s(ride)))
+    if len(still) < 2 * second:
+        return still
+    quiet = np.ones(len(still) - second + 1, dtype=bool)
+    for rate in ride.pitch_rate_dps, ride.yaw_rate_dps:
+        slow = smoothed(rate, ride.t_s, ENGINE_S)
+        mean, _ = _window(slow, second)
+        quiet &= (np.abs(mean) < STILL_DPS) & _calm(slow, second, QUIET_SHARE)
+        quiet &= _calm(_road(rate, ride.t_s), second, QUIET_SHARE)
+    quiet &= _calm(_road(ride.up_g, ride.t_s), second, QUIET_UP_SHARE)
+    half = second // 2
+    forward, _ = _window(ride.forward_g, half)
+    quiet &= np.abs(forward[second - half :] - forward[: len(quiet)]) < STILL_G
+    rolling, _ = _window(ride.rolling, second)
+    quiet &= _weight(ride, second) & (rolling < 0.5)
+    for shift in range(second):  # every sample of a quiet window
+        still[shift : shift + len(quiet)] |= quiet
+    return still
+
+
+def _rested(ride: Channels) -> NDArray[np.bool_]:
+    """On a road so smooth that shaking tells nothing: the filter's rests, each from where its force is there."""
+    still = ride.resting > 0.5
+    if not np.any(still):
+        return still
+    forward = smoothed(ride.forward_g, ride.t_s, ENGINE_S)
+    for start in np.flatnonzero(np.diff(still.astype(int), prepend=0) > 0):
+        weight = np.median(forward[start : start + 10])
+        off = np.flatnonzero(np.abs(forward[:start] - weight) > 2 * STILL_G)
+        still[(int(off[-1]) + 1 if len(off) else 0) : start] = True
+    return still
+
+
+def _road(values: Array, time: Array) -> Array:
+    """What shakes as a road does. On a track bends and brakings are so large that next to them a road is quiet."""
+    slow = smoothed(values, time, ENGINE_S)
+    return slow - smoothed(slow, time, BEND_S)
+
+
+def _calm(values: Array, n: int, share: float) -> NDArray[np.bool_]:
+    """Where n in a row shake by less than this share of what they do on the move."""
+    _, spread = _window(values, n)
+    return spread < share * np.percentile(spread, RIDING_PERCENTILE)
+
+
+def _weight(ride: Channels, n: int) -> NDArray[np.bool_]:
+    """Where the force over n in a row is the weight alone, as far as it is calibrated."""
+    size = np.sqrt(sum(_window(axis, n)[0] ** 2 for axis in (ride.left_g, ride.up_g, ride.forward_g)))
+    resting, _ = _window(ride.resting, n)
+    rests = size[resting > 0.99]
+    weight = float(np.median(rests)) if len(rests) else 1.0
+    return np.abs(size - weight) < (MAX_OFF_G if len(rests) else UNCALIBRATED_G)
+
+
+def _window(values: Array, n: int) -> tuple[Array, Array]:
+    """Mean and standard deviation of each n values in a row."""
+    middle = float(np.mean(values))  # taken off, or the squares of a large one would hide the spread
+    values = values - middle
+    first, second = (np.cumsum(np.concatenate(([0.0], x))) for x in (values, values * values))
+    mean = (first[n:] - first[:-n]) / n
+    return mean + middle, np.sqrt(np.maximum(0.0, (second[n:] - second[:-n]) / n - mean * mean))

@@ -1,0 +1,5 @@
+"""python -m kickstand_tools.cli"""
+
+from .main import main
+
+main()

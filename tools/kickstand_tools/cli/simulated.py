@@ -1,0 +1,87 @@
+"""The commands of `kickstand` that make rides up: simulate, and evaluate, which judges the lean on them."""
+
+from pathlib import Path
+
+import click
+
+_PATH = click.Path(path_type=Path)
+_UPRIGHT_ERROR = click.option(
+    "--upright-error", type=click.FloatRange(-30.0, 30.0), default=0.0, help="Of the upright pose, degrees."
+)
+
+# as in simulation.profiles, which takes numpy to read
+_PROFILES = (
+    "street, track, sweeper, city, hills; hard ones: banked, wheelie, bumps, crosswind, weight, vibration, creep, "
+    "temperature, fall, parked"
+)
+
+
+@click.command()
+@click.option("--profile", required=True, help=f"{_PROFILES}.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, help="Another seed, another ride.")
+@click.option(
+    "--seconds",
+    type=click.FloatRange(min=20.0, max=7200.0),
+    default=640.0,
+    help="Of riding; start and stop come on top.",
+)
+@_UPRIGHT_ERROR
+@click.option(
+    "--pitch-change",
+    type=click.FloatRange(-10.0, 10.0),
+    help="Between the poses, degrees; at random if not given.",
+)
+@click.option("--speed", is_flag=True, help="Write a speed into the log, once a second.")
+@click.option("--out", required=True, type=_PATH, help="The directory to write to.")
+def simulate(
+    profile: str,
+    seed: int,
+    seconds: float,
+    upright_error: float,
+    pitch_change: float | None,
+    speed: bool,
+    out: Path,
+) -> None:
+    """Make up a ride: six poses and a free one, kickstand, upright, the ride, its truth."""
+    from ..progress import spinner
+    from ..simulation.files import simulate
+
+    with spinner("making up a ride"):
+        made = simulate(profile, seed, out, seconds, upright_error, pitch_change, speed=speed)
+    click.echo(f"written: {out}, {len(made.time)} samples")
+
+
+@click.command()
+@click.option("--profiles", default="street,track,sweeper,city,hills", help=f"With commas between: {_PROFILES}.")
+@click.option("--seeds", type=click.IntRange(min=1), default=3, help="Rides of each profile.")
+@click.option(
+    "--seconds",
+    type=click.FloatRange(min=60.0, max=7200.0),
+    default=640.0,
+    help="Of riding, each; start and stop come on top.",
+)
+@_UPRIGHT_ERROR
+@click.option(
+    "--pitch-change", type=click.FloatRange(-10.0, 10.0), default=1.0, help="Between the two poses, degrees."
+)
+@click.option("--recording", type=_PATH, help="A recorded ride with speed to compare on too.")
+@click.option("--out", type=_PATH, help="Write evaluation.json and lean.png to this directory.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def evaluate(
+    profiles: str,
+    seeds: int,
+    seconds: float,
+    upright_error: float,
+    pitch_change: float,
+    recording: Path | None,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Compare the shown lean and other filters with the truth of simulated rides."""
+    from ..evaluation.evaluate import evaluate
+
+    def warn(line: str) -> None:
+        click.echo(line, err=True)
+
+    names = [name.strip() for name in profiles.split(",")]
+    evaluate(names, seeds, seconds, upright_error, pitch_change, recording, out, as_json, warn)

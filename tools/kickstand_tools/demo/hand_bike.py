@@ -1,0 +1,102 @@
+"""The bike of rides.py steered by hand, command by command. Plain Python for CPython and MicroPython."""
+
+from math import degrees, pi, radians, sin
+
+from kickstand_tools.simulation.scripted.script import (
+    GRAVITY_MPS2,
+    KICKSTAND_DEG,
+    RIDING_MPS,
+    RIDING_SWAY_DEG,
+    STANDING_SWAY_DEG,
+    body_motion,
+    shaken,
+    yaw_rate_in_balance,
+)
+
+CRUISE_MPS = 15.0
+LEAN_STEP_DEG = 5.0
+MAX_LEAN_DEG = 50.0
+
+_STEP_S = 0.005
+_ROLL_RATE = 4.0  # 1/s: how quickly lean follows the rider's wish (critically damped)
+_SPEED_RATE = 1.5  # 1/s
+_MAX_ACCELERATION, _MAX_BRAKING = 3.0, 5.0  # m/s2
+_SWAY_RADPS = 2.0 * pi * 0.4
+
+
+class HandBike:
+    """Starts on the kickstand; command() steers it. motion() and truth() as Ride's, for times that go on."""
+
+    def __init__(self, vibration_g=0.05):
+        self._vibration_g = vibration_g
+        self._t_s = 0.0
+        self._pose = "kickstand"  # or "upright", "riding"
+        self._lean_wish = 0.0
+        self._lean, self._lean_rate = radians(KICKSTAND_DEG), 0.0
+        self._speed, self._acceleration, self._distance = 0.0, 0.0, 0.0
+        self._sway = 0.0  # rad, amplitude
+
+    def command(self, name):
+        """left, right: set off, then lean 5 degrees further; upright, kickstand: stop there."""
+        if name in ("kickstand", "upright"):
+            self._pose = name
+            self._lean_wish = 0.0
+        elif name in ("left", "right") and self._pose != "kickstand":
+            step = LEAN_STEP_DEG if name == "right" else -LEAN_STEP_DEG
+            if self._pose == "riding":
+                self._lean_wish = max(-MAX_LEAN_DEG, min(MAX_LEAN_DEG, self._lean_wish + step))
+            self._pose = "riding"
+
+    def _advance(self, t_s):
+        while self._t_s < t_s:
+            step = min(_STEP_S, t_s - self._t_s)
+            self._t_s += step
+            cruise = CRUISE_MPS if self._pose == "riding" else 0.0
+            wish = _SPEED_RATE * (cruise - self._speed)
+            self._acceleration = max(-_MAX_BRAKING, min(_MAX_ACCELERATION, wish))
+            if cruise == 0.0 and self._speed < 0.02:
+                self._speed = self._acceleration = 0.0
+            self._distance += self._speed * step
+            self._speed += self._acceleration * step
+            target = 0.0
+            if self._speed > RIDING_MPS:
+                target = radians(self._lean_wish)
+            elif self._speed == 0.0 and self._pose == "kickstand":
+                target = radians(KICKSTAND_DEG)
+            pull = _ROLL_RATE * _ROLL_RATE * (target - self._lean) - 2.0 * _ROLL_RATE * self._lean_rate
+            self._lean_rate += pull * step
+            self._lean += self._lean_rate * step
+            sway = {"kickstand": 0.0, "upright": STANDING_SWAY_DEG, "riding": RIDING_SWAY_DEG}[self._pose]
+            self._sway += (radians(sway) - self._sway) * step
+
+    def _attitude(self, t_s):
+        """(lean, lean rate, yaw rate) in rad and rad/s."""
+        self._advance(t_s)
+        lean = self._lean + self._sway * sin(_SWAY_RADPS * t_s)
+        lean_rate = self._lean_rate + self._sway * _SWAY_RADPS * sin(_SWAY_RADPS * t_s + pi / 2.0)
+        return lean, lean_rate, yaw_rate_in_balance(lean, GRAVITY_MPS2, self._speed)
+
+    def motion(self, t_s):
+        """Specific force (g) and rates (deg/s) in the vehicle's axes, vibration included."""
+        lean, lean_rate, yaw_rate = self._attitude(t_s)
+        clean = body_motion(lean, lean_rate, self._speed, self._acceleration, yaw_rate)
+        engine = min(1.0, self._speed / 2.0)
+        return shaken(clean, t_s, self._vibration_g, self._speed, self._distance, engine)
+
+    def truth(self, t_s):
+        """(lean_deg, speed_mps, yaw_rate_dps, phase)"""
+        lean, _, yaw_rate = self._attitude(t_s)
+        return degrees(lean), self._speed, degrees(yaw_rate), self._phase()
+
+    def _phase(self):
+        settled = abs(self._lean_rate) < 0.02
+        if self._speed == 0.0:
+            pose = radians(KICKSTAND_DEG) if self._pose == "kickstand" else 0.0
+            return self._pose if settled and abs(self._lean - pose) < 0.01 else "moving"
+        if self._pose != "riding":
+            return "brake"
+        if self._speed < CRUISE_MPS - 1.0:
+            return "accelerate"
+        if settled and self._lean_wish and abs(self._lean - radians(self._lean_wish)) < 0.02:
+            return "held turn"
+        return "straight" if abs(self._lean) < 0.02 else "roll"

@@ -1,0 +1,124 @@
+"""What the demo shows in a terminal, 78 columns wide: the LCD, the bike from behind, true against shown."""
+
+from itertools import groupby
+from math import cos, radians, sin
+
+from rich import box
+from rich.align import Align
+from rich.console import Group, RenderableType
+from rich.panel import Panel
+from rich.progress_bar import ProgressBar
+from rich.table import Table
+from rich.text import Text
+
+from .score import State, shown_lean
+
+WIDTH = 78
+_BIKE_COLUMNS, _BIKE_ROWS = 38, 11
+_LEFT_COLUMNS = 34
+_DOTS_PER_M = 23.0
+_LCD_STYLE = "bold bright_white on blue"
+_TRUE, _SHOWN = "cyan", "yellow"
+_BRAILLE = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # bit of row, column within a cell
+
+
+def lean_text(lean_deg: float, digits: int = 1) -> str:
+    """As "12.3° left"."""
+    size = f"{abs(lean_deg):.{digits}f}"
+    side = "" if float(size) == 0.0 else "left" if lean_deg < 0.0 else "right"
+    return f"{size}° {side}".rstrip()
+
+
+def lcd_lines(lcd: list[str]) -> list[str]:
+    """The two lines in a frame, as plain text."""
+    edge = "+" + "-" * 16 + "+"
+    return [edge, *(f"|{line:16}|" for line in lcd), edge]
+
+
+def _lcd(lcd: list[str]) -> RenderableType:
+    lines = ["", *lcd, ""]
+    glass = Text("\n".join(f" {line:16} " for line in lines), style=_LCD_STYLE, no_wrap=True)
+    return Align.center(Panel(glass, box=box.HEAVY, width=20, padding=0, border_style="grey50"))
+
+
+def _on_bike(x: float, y: float) -> bool:
+    """Whether a point (m, right of and above the tyre's contact) is on bike or rider, seen from behind."""
+    return (
+        (abs(x) < 0.08 and 0.0 <= y < 0.62)  # tyre
+        or (abs(x) < 0.17 and 0.5 <= y < 0.85)  # tail
+        or (abs(x) < 0.42 and 0.92 <= y < 0.98)  # handlebar
+        or (abs(x) < 0.24 - 0.1 * (y - 0.85) and 0.85 <= y < 1.28)  # back
+        or x * x + (y - 1.45) ** 2 < 0.0225  # helmet
+    )
+
+
+def bike(lean_deg: float, shown_deg: float | None) -> Text:
+    """The bike from behind at its true lean, with a dashed line at the shown one."""
+    picture = Text(no_wrap=True)
+    middle, ground = _BIKE_COLUMNS, 4 * _BIKE_ROWS - 3  # in dots
+    c, s = cos(radians(lean_deg)), sin(radians(lean_deg))
+    line = {
+        (int(middle + r * sin(radians(shown_deg))), round(ground - r * cos(radians(shown_deg))))
+        for r in range(40)
+        if shown_deg is not None and r % 4 < 2
+    }
+    for row in range(_BIKE_ROWS):
+        cells = []
+        for column in range(_BIKE_COLUMNS):
+            bits, style = 0, "grey50"
+            for dy in range(4):
+                for dx in range(2):
+                    px, py = 2 * column + dx, 4 * row + dy
+                    x, y = (px + 0.5 - middle) / _DOTS_PER_M, (ground - py) / _DOTS_PER_M
+                    solid = _on_bike(x * c - y * s, x * s + y * c)
+                    if solid or py == ground + 1 or (px, py) in line:
+                        bits |= _BRAILLE[dy][dx]
+                    if solid:
+                        style = _TRUE
+                    elif (px, py) in line and style != _TRUE:
+                        style = _SHOWN
+            cells.append((chr(0x2800 + bits) if bits else " ", style))
+        for style, run in groupby(cells, key=lambda cell: cell[1]):
+            picture.append("".join(character for character, _ in run), style)
+        picture.append("\n" if row + 1 < _BIKE_ROWS else "")
+    return picture
+
+
+def _figures(state: State) -> Table:
+    shown = shown_lean(state["lcd"])
+    table = Table.grid(padding=(0, 1))
+    table.add_column(width=12, justify="right", style="grey70")
+    table.add_column(width=_LEFT_COLUMNS - 14, no_wrap=True)
+    table.add_row("true lean", Text(lean_text(state["lean_deg"]), style=_TRUE))
+    table.add_row("shown lean", Text("-" if shown is None else lean_text(shown, digits=0), style=_SHOWN))
+    table.add_row("error", "-" if shown is None else f"{shown - state['lean_deg']:+.1f}°")
+    table.add_row("speed", f"{3.6 * state['speed_mps']:.0f} km/h")
+    table.add_row("bike", state["phase"])
+    table.add_row("button", Text("● pressed", style="bold red") if state["pressed"] else "○")
+    return table
+
+
+def screen(state: State, title: str, keys: str, paused: bool) -> RenderableType:
+    """The whole picture for one of the device's ticks."""
+    of_s = state["of_s"]
+    head = Table.grid(expand=True)
+    head.add_column(no_wrap=True)
+    head.add_column(justify="right", no_wrap=True)
+    clock = f"{state['t_s']:.1f} s" if of_s is None else f"{state['t_s']:.1f} of {of_s:.0f} s"
+    head.add_row(Text(title, style="bold"), "paused" if paused else clock)
+    body = Table.grid(padding=0)
+    body.add_column(width=_LEFT_COLUMNS)
+    body.add_column(width=WIDTH - _LEFT_COLUMNS)
+    picture = bike(state["lean_deg"], shown_lean(state["lcd"]))
+    body.add_row(
+        Group(_lcd(state["lcd"]), "", _figures(state)),
+        Panel(Align.center(picture), title="from behind", box=box.ROUNDED, border_style="grey50"),
+    )
+    frame = Table.grid()
+    frame.add_column(width=WIDTH)
+    frame.add_row(head)
+    frame.add_row(body)
+    if of_s is not None:
+        frame.add_row(ProgressBar(total=of_s, completed=state["t_s"], width=WIDTH))
+    frame.add_row(Text(keys, style="grey70", no_wrap=True))
+    return frame

@@ -1,0 +1,109 @@
+"""The cells of a log: what may stand in them, and where a mistake is."""
+
+import csv
+import io
+import math
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+
+COLUMNS = ("t_s", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")
+OPTIONAL = ("speed_mps", "temp_c")  # may be empty in a row
+
+# Beyond these it is another unit (m/s2, counts): the sensor's widest ranges are 16 g and 2000 deg/s.
+_LIMITS = {"t_s": 1e10, "ax_g": 20.0, "ay_g": 20.0, "az_g": 20.0, "temp_c": 200.0, "speed_mps": 200.0}
+_LIMITS |= {"gx_dps": 2500.0, "gy_dps": 2500.0, "gz_dps": 2500.0}
+_UNITS = {"t_s": "seconds", "temp_c": "degrees Celsius", "speed_mps": "m/s"}
+_UNITS |= {"ax_g": "g", "ay_g": "g", "az_g": "g", "gx_dps": "deg/s", "gy_dps": "deg/s", "gz_dps": "deg/s"}
+
+
+def check_text(path: Path, content: bytes, lines_before: int) -> None:
+    """Raise InputError if the bytes are no UTF-8."""
+    try:
+        content.decode()
+    except UnicodeDecodeError as error:
+        line = lines_before + content.count(b"\n", 0, error.start) + 1
+        raise InputError(f"{path}, line {line}: not text: give a log as CSV or as .csv.gz") from error
+
+
+def header(path: Path, line: str) -> list[str]:
+    """The names of the columns. Raises InputError where one is missing or there twice."""
+    try:
+        names = [name.strip() for name in next(csv.reader([line]), [])]
+    except csv.Error as error:
+        raise InputError(f"{path}, line 1: not CSV ({error}): is it a log?") from error
+    missing = [name for name in COLUMNS if name not in names]
+    if missing and any(mark in "".join(names) for mark in ";\t"):
+        raise InputError(f"{path}, line 1: values stand apart by ; or tab: save it with commas between them")
+    if missing:
+        raise InputError(
+            f"{path}, line 1: no column {', '.join(missing)}: a log starts with {','.join(COLUMNS)}"
+        )
+    for name in COLUMNS + OPTIONAL:
+        if names.count(name) > 1:
+            raise InputError(f"{path}, line 1: column {name} is there twice: leave one")
+    return names
+
+
+def plausible(table: NDArray[np.float64], names: list[str], before_us: int | None) -> bool:
+    """True if read() would find nothing wrong with these values, NaN where a cell was empty."""
+    for k, name in enumerate(names):
+        within = np.abs(table[:, k]) <= _LIMITS[name]
+        if not np.all(within | np.isnan(table[:, k]) if name in OPTIONAL else within):
+            return False
+    time_us = np.rint(table[:, 0] * 1e6)
+    return bool(np.all(np.diff(time_us) > 0) and (before_us is None or time_us[0] > before_us))
+
+
+def read(
+    path: Path, text: str, width: int, places: dict[str, int], lines_before: int, before_us: int | None
+) -> tuple[NDArray[np.float64], str]:
+    """(n, columns in the order of places), NaN for an empty optional cell, and the rows as CSV.
+
+    Raises InputError for the first mistake, naming its line.
+    """
+    rows, values, kept = csv.reader(io.StringIO(text, newline="")), [], io.StringIO()
+    writer = csv.writer(kept, lineterminator="\n")
+    try:
+        for cells in rows:
+            if not cells:
+                continue  # a blank line, often the last
+            where = f"{path}, line {lines_before + rows.line_num}"
+            if len(cells) != width:
+                raise InputError(f"{where}: {len(cells)} values under {width} column names: is the line cut?")
+            value = [_number(cells[place], name, where) for name, place in places.items()]
+            now = round(value[0] * 1e6)
+            if before_us is not None and now <= before_us:
+                what = "repeats" if now == before_us else "goes back from %.6f" % (before_us / 1e6)
+                at = cells[places["t_s"]].strip()
+                raise InputError(f"{where}: time {what} at {at} s: it has to increase")
+            before_us = now
+            values.append(value)
+            writer.writerow([cell.replace("\n", " ") for cell in cells])
+    except csv.Error as error:
+        line = lines_before + rows.line_num
+        raise InputError(f"{path}, line {line}: not CSV ({error}): is it a log?") from error
+    return np.reshape(np.array(values, dtype=float), (-1, len(places))), kept.getvalue()
+
+
+def _number(cell: str, name: str, where: str) -> float:
+    """The value of a cell; NaN for an empty one where that is allowed."""
+    if name in OPTIONAL and not cell.strip():
+        return math.nan
+    try:
+        value = float(cell.replace("_", "?"))  # Python would read 1_0 as 10
+    except ValueError:
+        raise InputError(f"{where}: {name} is {_shown(cell)}, not a number") from None
+    if not math.isfinite(value):
+        raise InputError(f"{where}: {name} is {_shown(cell)}: a number is needed")
+    if abs(value) > _LIMITS[name]:
+        raise InputError(f"{where}: {name} is {_shown(cell)}, past any reading: its unit is {_UNITS[name]}")
+    return value
+
+
+def _shown(cell: str) -> str:
+    text = cell.strip()
+    return ascii(text if len(text) <= 20 else text[:20] + "...") if text else "empty"

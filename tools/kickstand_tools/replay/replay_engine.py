@@ -1,0 +1,82 @@
+"""The firmware's LeanMeter over a recording, on CPython or MicroPython: records in, results out.
+
+    micropython replay_engine.py RECORDS > RESULTS
+
+RECORDS starts with the calibration (19 doubles, Calibration.parameters()), then one record a sample:
+its time in microseconds (int64), seven readings in the chip's order (doubles; g, C, deg/s) and the speed in m/s,
+negative where there is no new one. RESULTS has the doubles of COLUMNS for each. Binary, because a number printed and
+read again may be another number.
+"""
+
+import struct
+import sys
+from math import degrees
+
+from kickstand.calibration.parameters import Calibration
+from kickstand.lean.formula import static_lean_deg
+from kickstand.lean.meter import LeanMeter
+
+COLUMNS = (
+    "lean_deg",
+    "lean_formula_deg",
+    "left_g",
+    "up_g",
+    "forward_g",
+    "static_lean_deg",
+    "yaw_rate_dps",
+    "roll_rate_dps",
+)
+CALIBRATION = "<19d"
+RECORD = "<q8d"
+RESULT = "<8d"
+NO_SPEED = -1.0  # a board reads not-a-number as something else
+
+
+class Replay:
+    """The meter over one recording. calibration: the firmware's own, for readings in g and deg/s."""
+
+    def __init__(self, calibration):
+        self.meter = LeanMeter(calibration)
+        self._before = None
+
+    def take(self, time_us, reading, speed_mps=NO_SPEED):
+        """Give the meter a sample (7, the chip's order; g, C, deg/s) and the speed if there is a new one."""
+        if speed_mps >= 0.0:
+            self.meter.measure_speed(speed_mps)
+        self.meter.update(reading, 0 if self._before is None else time_us - self._before)
+        self._before = time_us
+
+    def step(self, time_us, reading, speed_mps=NO_SPEED):
+        """The same, and the values of COLUMNS after it."""
+        self.take(time_us, reading, speed_mps)
+        meter = self.meter
+        force, rate = meter.force, meter.rate
+        return (
+            meter.lean_deg,
+            meter.lean_formula_deg,
+            force[0],
+            force[1],
+            force[2],
+            static_lean_deg(force),
+            degrees(rate[1]),
+            degrees(rate[2]),
+        )
+
+
+def run(source, sink):
+    """Read records from source until its end and write results to sink, both binary files."""
+    calibration = Calibration()
+    calibration.set_parameters(struct.unpack(CALIBRATION, source.read(struct.calcsize(CALIBRATION))))
+    replay = Replay(calibration)
+    size = struct.calcsize(RECORD)
+    while True:
+        record = source.read(size)
+        if len(record) < size:
+            return
+        values = struct.unpack(RECORD, record)
+        sink.write(struct.pack(RESULT, *replay.step(values[0], values[1:8], values[8])))
+
+
+if __name__ == "__main__":
+    with open(sys.argv[1], "rb") as records:
+        run(records, sys.stdout.buffer)

@@ -1,0 +1,139 @@
+"""Blocks of a recorded ride read back. The format is firmware/kickstand/rides/block.py's."""
+
+import struct
+from binascii import crc32
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from kickstand.calibration import store
+from kickstand.calibration.parameters import Calibration
+from kickstand.rides import block as block_format
+
+_HEAD_LENGTH = struct.calcsize(block_format.HEAD)
+_TAIL_LENGTH = struct.calcsize(block_format.TAIL)
+_START = _HEAD_LENGTH + store.BODY_LENGTH
+
+
+CUT_SHORT = "cut short"  # by the power, if it is the last
+
+
+class BadBlock(Exception):
+    """These bytes are no whole block; the text says why in a few words."""
+
+
+@dataclass
+class Turn:
+    """One turn of the board's loop: sums of n samples' counts (ax ay az gx gy gz), and when the last was taken."""
+
+    time_us: int
+    n: int
+    sums: tuple[int, ...]
+    speed_mps: float | None
+
+
+@dataclass
+class Block:
+    """head of one block. time_us: of the last sample before it, since power-on. body: the calibration's bytes."""
+
+    ride: int
+    sequence: int
+    time_us: int
+    centidegrees: int
+    accel_lsb_per_g: int
+    gyro_lsb_tenths: int
+    sample_hz: int
+    firmware: str
+    body: bytes
+    crc: int
+    turns: list[Turn] = field(default_factory=list)
+
+    @property
+    def who_am_i(self) -> int:
+        """Which chip."""
+        return self.body[0]
+
+    def calibration(self) -> Calibration:
+        """What the lean on the display was computed with."""
+        return store.unpack(self.body, 0)[2]
+
+
+def read(content: bytes) -> tuple[list[Block], list[str]]:
+    """The whole blocks of a file, and for each place with something else what it is: CUT_SHORT for the end of a file
+    whose last block is not complete, which is no damage."""
+    blocks, problems = [], []
+    at = 0
+    while at < len(content):
+        length = int.from_bytes(content[at + 6 : at + 8], "little")
+        try:
+            blocks.append(parse(content[at : at + length]))
+            at += length
+        except BadBlock as problem:
+            following = content.find(block_format.MAGIC, at + 1)
+            last = following < 0 and str(problem) == CUT_SHORT
+            problems.append(CUT_SHORT if last else f"{problem} at byte {at}")
+            at = following if following > 0 else len(content)
+    return blocks, problems
+
+
+def parse(data: bytes) -> Block:
+    """One whole block. Raises BadBlock."""
+    if not data.startswith(block_format.MAGIC[: len(data)]):
+        raise BadBlock("not of a ride")
+    if len(data) < _START + _TAIL_LENGTH:
+        raise BadBlock(CUT_SHORT)
+    _, version, length, *rest, firmware = struct.unpack_from(block_format.HEAD, data)
+    if version != block_format.VERSION:
+        raise BadBlock(f"format {version}, this program reads {block_format.VERSION}")
+    if len(data) < length:
+        raise BadBlock(CUT_SHORT)
+    count, crc = struct.unpack_from(block_format.TAIL, data, len(data) - _TAIL_LENGTH)
+    if len(data) != length or crc != crc32(data[:-4]):
+        raise BadBlock("damaged")
+    firmware = firmware.rstrip(b"\0").decode("ascii", "replace")
+    fields: list[Any] = [*rest, firmware, data[_HEAD_LENGTH:_START], crc]
+    block = Block(*fields)
+    try:
+        block.turns = list(_turns(block, data[_START : len(data) - _TAIL_LENGTH], count))
+    except (ValueError, ZeroDivisionError) as error:  # written so: the check sum is right
+        raise BadBlock("not decodable") from error
+    return block
+
+
+def _turns(block: Block, data: bytes, count: int) -> Iterator[Turn]:
+    """Undo block_format.encode_plainly."""
+    bits = bin(int.from_bytes(b"\x01" + data, "big"))[3:]
+    before = [1] + [0] * (block_format.FIELDS - 1)
+    means = [block_format.START_MEAN] * block_format.FIELDS
+    period_us = 1_000_000 // block.sample_hz
+    now, at, speed = block.time_us, 0, None
+
+    def difference(i: int) -> int:
+        nonlocal at
+        mean = means[i]
+        zero = bits.index("0", at)
+        ones = zero - at
+        if ones < block_format.LIMIT:
+            k = max(0, mean.bit_length() - block_format.MEAN_SHIFT - 1)
+            at = zero + 1 + k
+            size = ones << k | (int(bits[zero + 1 : at], 2) if k else 0)
+        else:
+            start = at + block_format.LIMIT
+            at = start + block_format.RAW_BITS
+            size = int(bits[start:at], 2)
+        means[i] = mean + min(size, block_format.MAX_SIZE) - (mean >> block_format.MEAN_SHIFT)
+        return size >> 1 ^ -(size & 1)
+
+    for _ in range(count):
+        n_before = before[0]
+        n = n_before + difference(0)
+        if n == 0:
+            before[8] += difference(8)
+            speed = before[8] / 100
+            continue
+        now += n * period_us + difference(1)
+        for i in range(2, 8):
+            before[i] = (before[i] if n == n_before else before[i] * n // n_before) + difference(i)
+        before[0] = n
+        yield Turn(now, n, tuple(before[2:8]), speed)
+        speed = None

@@ -1,0 +1,26 @@
+"""What CPython lacks of what the firmware uses: module `micropython`, sys.print_exception and gc.threshold."""
+
+import gc
+import sys
+import traceback
+import types
+
+
+def supplement():
+    """Add it, so that drivers and app can be imported. The mathematics needs nothing of it."""
+    sys.modules.setdefault("micropython", _module())
+    if not hasattr(sys, "print_exception"):
+        setattr(sys, "print_exception", _print_exception)  # noqa: B010 type checkers know no such attribute
+    if not hasattr(gc, "threshold"):
+        setattr(gc, "threshold", lambda amount: None)  # noqa: B010 likewise
+
+
+def _print_exception(error, file=None):
+    traceback.print_exception(error, file=file)
+
+
+def _module():
+    module = types.ModuleType("micropython")
+    for name in ("const", "native", "viper"):
+        setattr(module, name, lambda x: x)
+    return module
