@@ -33,8 +33,11 @@ def main():
         run(chosen, lcd)
     except SettingsError as error:
         port.rest_watchdog()  # wrong pins show only when the app opens them
-        print("Kickstand stopped. " + error.reason)
-        tell(open_lcd(settings.Settings()), *error.lcd)
+        from kickstand.console import sentence
+        from kickstand.ui.messages import lines
+
+        print("Kickstand stopped. " + sentence(error))
+        tell(open_lcd(settings.Settings()), *lines(error))
     except KeyboardInterrupt:
         port.rest_watchdog()
         print(

@@ -1,21 +1,20 @@
-"""The device: wires sensor, mathematics, button, store and display, and owns the loop.
+"""The device: wires sensor, mathematics, button, flash and display, and owns the loop.
 
 sensor -> calibration and alignment -> lean -> page -> display, in one direction. The chip samples at SAMPLE_HZ by
-itself; a turn of the loop takes what has come in.
+itself, and a turn of the loop takes what has come in.
 
-What lasts for most of a turn (step, _take, LeanMeter.update, Sensor.fetch) needs at most eleven words for locals and
-stack: more of them MicroPython keeps on the heap, and where they were freed the next search for memory begins, before
-all that the turns since the last collection have left. That took up to a millisecond a turn.
+The methods that last for most of a turn (turn, _take, LeanMeter.update_sum, Sensor.fetch) need at most eleven words for
+locals and stack. MicroPython keeps larger frames on the heap, and the next search for free memory begins where such a
+frame was freed, before all that the turns since the last collection have left. That took up to a millisecond a turn.
 """
 
 import gc
 from time import sleep_us, ticks_add, ticks_diff, ticks_ms, ticks_us
 
 from .board import port
+from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
-from .calibration.store import Store
 from .devices import open_button, open_sensor
-from .errors import StoreError
 from .imu.sample_clock import SampleClock
 from .lean.meter import LeanMeter
 from .rides.flash_ring import RideRing
@@ -26,45 +25,45 @@ LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
 COLLECT_TURNS = 25  # 70 KB of heap: less than half of what is free
 SINGLE_GAPS = 300  # that a collection leaves
 PAGE_MS = 100
-TRIM_MS = 60_000
 
 
 def fill_gaps(n):
-    """Take n single places of the heap, one by one and for nothing: else each object that needs more than one place
-    would be searched for past all of them, until samples have filled them. 2 ms here in place of 0.4 in samples."""
+    """Allocate n single blocks of the heap and drop them: until samples have filled the single free blocks, each larger
+    object would be searched for past all of them. Costs 2 ms here and saves 0.4 ms in samples."""
     value = 0.5
     for _ in range(n):
         value = -value
 
 
 class App:
-    """The lean meter on a board. settings: a Settings.  lcd: of hardware.open_lcd().  keeper: of its rides, see
-    Recorder; one that is given gets a ride from the start. Raises SettingsError for pins that cannot be used."""
+    """The lean meter on a board.
+
+    settings: a Settings. lcd: of devices.open_lcd(). keeper: where rides are recorded to (see Recorder); if one is
+    given, recording begins with the first readings. Raises SettingsError for pins that cannot be used.
+    """
 
     def __init__(self, settings, lcd, keeper=None):
         self.settings = settings
         self.lcd = lcd
         self.button = open_button(settings)
         self.sensor = open_sensor(settings)
-        self.store = None  # until the chip has said who it is: a calibration belongs to one chip
         self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle")
+        self.calibration = ActiveCalibration(self.meter, self._calibration_changed)
         self.drive = self._open_drive() if settings.SPEED else None
+        self.recorder = Recorder(keeper or RideRing(settings), settings.SAMPLE_HZ)
+        self.screen = Screen(self)
         self._clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self._restarts = 0
-        self.recorder = Recorder(keeper or RideRing(settings), settings.SAMPLE_HZ)
         self._record_due = settings.RECORD or keeper is not None
-        self.screen = Screen(settings, self.sensor, self.meter, self.drive, self._save, self.recorder, self._record)
         self._page_ms = ticks_ms()
-        self._trim_ms = self._page_ms
         self._fault_shown = False
 
     def _open_drive(self):
-        from .drive_alignment.background import (
-            DriveMode,  # 30 KB of heap with all that they import: not for those without a source
-        )
+        # 30 KB of heap with all that they import: not for a board without a speed source
+        from .drive_alignment.background import BackgroundAlignment
         from .speed.source import open_speed
 
-        return DriveMode(self.settings.VEHICLE, open_speed(self.settings), self.meter, self._keep)
+        return BackgroundAlignment(self.settings.VEHICLE, open_speed(self.settings), self.meter, self.calibration)
 
     def run(self):
         """Loop until Ctrl-C, LOOP_US a turn."""
@@ -80,7 +79,7 @@ class App:
         due_us = ticks_us()
         turns = 0
         while True:
-            self.step()
+            self.turn()
             turns += 1
             if turns >= COLLECT_TURNS:  # here and not in the middle of a sample; the FIFO keeps what comes meanwhile
                 turns = 0
@@ -95,8 +94,8 @@ class App:
             else:  # late, as after setting the chip up: count from here instead of racing to catch up
                 due_us = ticks_us()
 
-    def step(self):
-        """One turn of the loop: the samples that wait, one event, at most one transfer to the display."""
+    def turn(self):
+        """One turn of the loop: the samples that wait, one event, at most one transfer to the display. Never waits."""
         now_us, now_ms = ticks_us(), ticks_ms()
         n = self.sensor.fetch(now_ms)
         if n:
@@ -112,7 +111,9 @@ class App:
                 self._page_ms = now_ms  # at once: the next thing is to start the sensor again
         elif not self.sensor.chip.left:
             self._clock.emptied(now_us)
-        self.screen.handle(self.button.poll(now_ms), now_ms)
+        event = self.button.poll(now_ms)
+        if event:
+            self.screen.press(event, now_ms)
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self._show(now_ms)
         self.lcd.tick(now_ms)
@@ -122,6 +123,14 @@ class App:
             self.recorder.stalled = False
             if self.drive:
                 self.drive.speed.skip(ticks_ms())
+
+    def record(self):
+        """Begin to record a ride. Where the bike stands, the filter begins with it, so that a replay shows the same: it
+        finds the gyro's errors anew in the first turns. A ride begun on the way is replayed with a filter that still
+        has to find what this one knows."""
+        if self.meter.filter.at_rest:
+            self.calibration.restart()
+        self.recorder.start(self.sensor.chip, self.calibration.value)
 
     def _poll_speed(self, now_ms):
         speed = self.drive.poll(now_ms)
@@ -134,35 +143,8 @@ class App:
         self._fault_shown = self.sensor.fault is not None
         line1, line2 = self.screen.lines(now_ms)
         self.lcd.show(line1, line2)
-        self._keep_trim(now_ms)
-
-    def _record(self):
-        """Begin a ride. Where the bike stands the filter begins with it, so that a replay shows the same, and finds the
-        gyro's errors anew in the first turns. A ride begun on the way is replayed with a filter that still has to find
-        what this one knows."""
-        if self.meter.filter.at_rest:
-            self._save_trim()
-            self.meter.use(self.meter.calibration)
-        self.recorder.start(self.sensor.chip, self.meter.calibration)
-
-    def _keep_trim(self, now_ms):
-        """What riding taught about upright goes to flash when the bike stands, at most once in TRIM_MS."""
-        if self.screen.wizard or not self.meter.calibration.aligned:
-            return
-        if ticks_diff(now_ms, self._trim_ms) < TRIM_MS:
-            return
-        if self._save_trim():
-            self._trim_ms = now_ms
-
-    def _save_trim(self):
-        """True if there was something to save."""
-        if not self.meter.keep_trim() or not self.store.unchanged():
-            return False
-        try:
-            self.store.save(self.meter.calibration)
-        except StoreError as error:  # the next ride finds it again
-            print(error.reason)
-        return True
+        if not self.screen.wizard:
+            self.calibration.keep_trim(now_ms)
 
     def _take(self, n, dt_us, now_ms):
         """The n samples that came in, dt_us after those before: each to the wizard, all at once to the meter."""
@@ -186,36 +168,16 @@ class App:
 
     def _sensor_started(self):
         """The chip runs, for the first time or again after a fault, perhaps another one."""
-        chip = self.sensor.chip
         self.meter.restart()
         self.recorder.interrupt()
-        if self.store is None or self.store.who_am_i != chip.who_am_i:
-            self.store = Store(chip.who_am_i, chip.accel_range_g)
-            self._use(self.store.load())
-            if self._record_due:
-                self._record_due = False
-                self._record()
+        if self.calibration.chip_started(self.sensor.chip) and self._record_due:
+            self._record_due = False
+            self.record()
 
-    def _use(self, calibration):
-        """From flash or from a wizard: nothing of before counts."""
-        self._set(calibration)
-        self.meter.reset_maxima()
-        if self.drive:
-            self.drive.begin()
-
-    def _set(self, calibration):
-        chip = self.sensor.chip
-        calibration.set_scale(chip.accel_lsb_per_g, chip.gyro_lsb_per_dps)
-        self.meter.use(calibration)
+    def _calibration_changed(self, replaced):
         if self.recorder.active:  # a ride has one calibration
-            self.recorder.start(chip, calibration)
-
-    def _save(self, calibration):
-        """For the wizards: on flash first, then in use. Raises StoreError."""
-        self.store.save(calibration)
-        self._use(calibration)
-
-    def _keep(self, calibration):
-        """For alignment by driving, which goes on. Raises StoreError."""
-        self.store.save(calibration)
-        self._set(calibration)
+            self.recorder.start(self.sensor.chip, self.calibration.value)
+        if replaced:
+            self.meter.reset_maxima()
+            if self.drive:
+                self.drive.begin()

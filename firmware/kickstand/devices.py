@@ -35,11 +35,7 @@ def open_button(settings):
     try:
         return Button(Pin(settings.BUTTON_PIN, Pin.IN, Pin.PULL_UP))
     except ValueError as error:
-        raise SettingsError(
-            "config.py: BUTTON_PIN = %d is no pin of this board (%s)" % (settings.BUTTON_PIN, error),
-            "config.py: wrong",
-            "BUTTON_PIN",
-        )
+        raise SettingsError("no-such-pin", "BUTTON_PIN", settings.BUTTON_PIN, str(error))
 
 
 def _open_bus(settings, name):
@@ -48,9 +44,4 @@ def _open_bus(settings, name):
     try:
         return i2c_bus.open_i2c(controller, sda, scl, getattr(settings, name + "_BUS_HZ"))
     except ValueError as error:
-        raise SettingsError(
-            "config.py: %s_SDA = %d and %s_SCL = %d do not belong to I2C %d (%s)"
-            % (name, sda, name, scl, controller, error),
-            "config.py: wrong",
-            name + "_SDA / SCL",
-        )
+        raise SettingsError("not-i2c-pins", name + "_SDA / SCL", name, sda, scl, controller, str(error))

@@ -1,28 +1,30 @@
-"""What the rider is told when something is refused."""
+"""What is refused and what has failed: a code, and the numbers that belong to it.
+
+A code is a name for programs, never shown. ui/messages.py words it for the display in 2 x 16 characters, console.py
+what a board says on its USB console, and the host's tools word it for a terminal.
+"""
 
 
 class Refusal(Exception):
-    """A request that cannot be carried out, with the reason.
+    """A request that cannot be carried out. code: which reason; values: its numbers and names, in the order that the
+    words for the code use them."""
 
-    reason: one line for a console.  lcd: two lines of at most 16 characters for the display.
-    """
-
-    def __init__(self, reason, line1, line2=""):
-        super().__init__(reason)
-        self.reason = reason
-        self.lcd = (line1, line2)
+    def __init__(self, code, *values):
+        super().__init__(code, *values)
+        self.code = code
+        self.values = values
 
 
 class CaptureError(Refusal):
-    """A pose that was not held still, or readings no still sensor gives."""
+    """A pose that was not held still, or readings that no still sensor gives."""
 
 
 class CalibrationError(Refusal):
-    """Six-position captures that give no believable calibration."""
+    """Six-position poses that give no believable calibration."""
 
 
 class AlignmentError(Refusal):
-    """Two poses that do not fix the sensor's mounting."""
+    """Two poses, or a drive, that do not tell how the sensor is mounted."""
 
 
 class StoreError(Refusal):
@@ -34,4 +36,24 @@ class CardError(Refusal):
 
 
 class SettingsError(Refusal):
-    """A value in config.py that cannot be used."""
+    """A value in config.py that cannot be used. values[0]: the name of the setting."""
+
+
+class SensorFault(Refusal):
+    """Why there are no readings."""
+
+
+class SpeedFault(Refusal):
+    """Why there is no speed."""
+
+
+class RecordingError(Refusal):
+    """Why the recording of a ride has ended by itself."""
+
+
+class Notice:
+    """Something to be told that is no refusal: a code and its values, worded like those of a Refusal."""
+
+    def __init__(self, code, *values):
+        self.code = code
+        self.values = values

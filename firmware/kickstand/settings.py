@@ -87,11 +87,7 @@ def load():
     except ImportError:
         config = None
     except Exception as error:  # a slip of the pen in the user's file is no reason for a traceback
-        raise SettingsError(
-            "config.py cannot be read (%s%s): mend it, then kickstand flash --config" % (_line_of(error), error),
-            "config.py:",
-            "cannot be read",
-        )
+        raise SettingsError("unreadable", "config.py", _line_of(error), str(error))
     return Settings(config)
 
 
@@ -113,46 +109,24 @@ class Settings:
         for name, (default, (check, allowed)) in _TABLE.items():
             value = getattr(config, name, default)
             if not check(value):
-                raise SettingsError(
-                    "config.py: %s = %r, but it must be %s" % (name, value, allowed), "config.py: wrong", name
-                )
+                raise SettingsError("not-allowed", name, value, allowed)
             setattr(self, name, value)
         for name in dir(config) if config else ():
             if name not in _TABLE and (name.isupper() or name.upper() in _TABLE):
-                raise SettingsError(
-                    "config.py: %s is not a setting; see the list in that file" % name,
-                    "config.py: what?",
-                    name,
-                )
+                raise SettingsError("unknown-setting", name)
         self.one_bus = (self.SENSOR_SDA, self.SENSOR_SCL) == (self.LCD_SDA, self.LCD_SCL)
         if self.one_bus:  # the display is a 100 kHz part, and sets the pace of a bus that it shares
             self.LCD_I2C = self.SENSOR_I2C
             self.SENSOR_BUS_HZ = self.LCD_BUS_HZ = min(self.SENSOR_BUS_HZ, self.LCD_BUS_HZ)
         card = [getattr(self, name) for name in ("SD_SPI",) + SD_PINS]
         if None in card and card != [None] * 5:
-            raise SettingsError(
-                "config.py: an SD card needs all of SD_SPI, %s" % ", ".join(SD_PINS),
-                "config.py: wrong",
-                SD_PINS[card.index(None) - 1] if card[0] is not None else "SD_SPI",
-            )
+            missing = SD_PINS[card.index(None) - 1] if card[0] is not None else "SD_SPI"
+            raise SettingsError("card-incomplete", missing, "SD_SPI, " + ", ".join(SD_PINS))
         names = ("BUTTON_PIN", "SENSOR_SDA", "SENSOR_SCL") + (() if self.one_bus else ("LCD_SDA", "LCD_SCL"))
         names += _SPEED_PINS[self.SPEED] + (() if None in card else SD_PINS)
         if len({getattr(self, name) for name in names}) != len(names):
-            raise SettingsError(
-                "config.py: a pin is used twice among " + ", ".join(names),
-                "config.py: wrong",
-                "pin used twice",
-            )
+            raise SettingsError("pin-used-twice", "", ", ".join(names))
         if not self.one_bus and self.SENSOR_I2C == self.LCD_I2C:
-            raise SettingsError(
-                "config.py: SENSOR_I2C and LCD_I2C are both %d on different pins; give each its own"
-                % self.LCD_I2C,
-                "config.py: wrong",
-                "LCD_I2C",
-            )
+            raise SettingsError("same-controller", "LCD_I2C", self.LCD_I2C)
         if self.VEHICLE == "car" and self.SPEED is None:
-            raise SettingsError(
-                'config.py: VEHICLE = "car" needs a speed source to be aligned: SPEED = "gps" or "wheel"',
-                "config.py: wrong",
-                "car needs SPEED",
-            )
+            raise SettingsError("car-needs-speed", "SPEED")

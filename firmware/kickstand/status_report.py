@@ -7,10 +7,12 @@ from time import sleep_ms, ticks_ms
 
 from . import __version__
 from .calibration.store import Store
+from .console import sentence
 from .devices import open_button, open_lcd, open_sensor
 from .errors import SettingsError
 from .imu.mpu6050 import UnknownChip
 from .settings import load
+from .ui import messages
 
 LISTEN_MS = 3500
 
@@ -37,7 +39,7 @@ def report():
         )
         _speed(settings)
     except SettingsError as error:
-        print("Settings     " + error.reason)
+        print("Settings     " + sentence(error))
         return
     _calibration(who_am_i, settings)
     gc.collect()
@@ -105,7 +107,10 @@ def _speed(settings):
         heard = heard if new is None else new
         sleep_ms(10)
     fault = speed.fault(ticks_ms())
-    print("  " + (", ".join(fault) if fault else "nothing yet" if heard is None else "%.1f m/s" % heard))
+    if fault:
+        print("  " + ", ".join(messages.lines(fault)))
+    else:
+        print("  nothing yet" if heard is None else "  %.1f m/s" % heard)
 
 
 def _aligned(calibration):

@@ -104,7 +104,7 @@ def test_a_file_that_is_a_directory(store, tmp_path):
     (tmp_path / FILES[0]).mkdir()
     (tmp_path / FILES[1]).mkdir()
     assert not store.load().aligned
-    with pytest.raises(StoreError, match="not saved"):
+    with pytest.raises(StoreError, match="not-written"):
         store.save(calibration(1))
 
 
@@ -140,7 +140,7 @@ def test_flash_that_does_not_keep_what_is_written(store, tmp_path, monkeypatch):
         return open(path, mode)
 
     monkeypatch.setattr("kickstand.calibration.store.open", forgetful, raising=False)
-    with pytest.raises(StoreError, match="reads back differently"):
+    with pytest.raises(StoreError, match="reads-back-differently"):
         store.save(calibration(2))
     assert mark_of(store.load()) == 1
 

@@ -99,7 +99,8 @@ from kickstand.errors import SettingsError
 try:
     settings.load()
 except SettingsError as error:
-    print(error.reason)
+    from kickstand.console import sentence
+    print(sentence(error))
 """
 
 

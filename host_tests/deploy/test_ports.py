@@ -140,7 +140,7 @@ for number in range(5):
     try:
         taken.append(Settings(Config).SD_SPI)
     except SettingsError as error:
-        assert error.lcd[1] == "SD_SPI"
+        assert error.values[0] == "SD_SPI"
 print(taken)
 """
 

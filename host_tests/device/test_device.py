@@ -187,7 +187,7 @@ def test_a_wrong_setting_is_named(config, named, tmp_path, capsys):
 
     with pytest.raises(SettingsError, match=named) as refusal:
         Settings(type("Config", (), config))
-    assert refusal.value.lcd[1] == named
+    assert refusal.value.values[0] == named
 
 
 def test_an_upright_pose_that_was_not_upright_is_trimmed_on_the_road_and_stays_so(tmp_path):

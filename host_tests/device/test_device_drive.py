@@ -265,10 +265,11 @@ def test_a_wrong_setting_of_the_speed_is_named(config, named):
         from kickstand.errors import SettingsError
         from kickstand.settings import Settings
         from kickstand.speed.source import open_speed
+        from kickstand.ui import messages
 
         with pytest.raises(SettingsError) as refusal:
             open_speed(Settings(type("Config", (), config)))
-        assert refusal.value.lcd[1] == named
+        assert named in (refusal.value.values[0], messages.lines(refusal.value)[1])
     finally:
         board.uninstall()
 

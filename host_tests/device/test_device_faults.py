@@ -147,7 +147,7 @@ def test_a_sagging_supply_while_the_calibration_is_read(fault, aligned):
 def test_an_exception_is_said_and_the_board_restarts(aligned, monkeypatch, capsys):
     from kickstand import app
 
-    original, calls = app.App.step, []
+    original, calls = app.App.turn, []
 
     def failing(self):
         calls.append(1)
@@ -155,7 +155,7 @@ def test_an_exception_is_said_and_the_board_restarts(aligned, monkeypatch, capsy
             raise ZeroDivisionError("divide by zero")
         original(self)
 
-    monkeypatch.setattr(app.App, "step", failing)
+    monkeypatch.setattr(app.App, "turn", failing)
     held = {"presses": [[3.0, 5.0]]}  # the button, all that time: no safe mode, which is for power-up
     record = devices.run("cpython", aligned, standing([], until=12, **held), capsys)
     assert record.first("Error, restarts") < math.inf
@@ -169,7 +169,7 @@ def test_a_loop_that_hangs_is_restarted_by_the_watchdog(aligned, monkeypatch):
 
     from kickstand import app
 
-    original, calls = app.App.step, []
+    original, calls = app.App.turn, []
 
     def hanging(self):
         calls.append(1)
@@ -177,7 +177,7 @@ def test_a_loop_that_hangs_is_restarted_by_the_watchdog(aligned, monkeypatch):
             time.sleep_ms(10)  # pyright: ignore[reportAttributeAccessIssue]
         original(self)
 
-    monkeypatch.setattr(app.App, "step", hanging)
+    monkeypatch.setattr(app.App, "turn", hanging)
     record = devices.run("cpython", aligned, standing([], until=16))
     assert record.ends == ["reset", "off"]
     assert record.lean_at(15) == STATIC

@@ -274,7 +274,7 @@ def test_ctrl_c_puts_the_watchdog_to_rest(board, monkeypatch, capsys, tmp_path):
         if len(calls) == 50:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(app.App, "step", interrupted)
+    monkeypatch.setattr(app.App, "turn", interrupted)
 
     def use_the_console():
         from time import sleep_ms  # pyright: ignore[reportAttributeAccessIssue]

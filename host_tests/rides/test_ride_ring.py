@@ -10,6 +10,7 @@ import pytest
 import ride_writer
 from kickstand.rides import flash_ring
 from kickstand.rides.flash_ring import RideRing, part_path
+from kickstand.ui import messages
 from kickstand_tools.rides import block_reader
 from kickstand_tools.simulated_board.fakes import fake_machine, fake_os, fake_time
 
@@ -185,7 +186,7 @@ def test_no_memory_for_a_ride_is_said_and_the_display_goes_on(recorder, monkeypa
     monkeypatch.setattr("os.ilistdir", listed)
     with contextlib.redirect_stdout(io.StringIO()) as said:
         recorder.start(ride_writer.CHIP, ride_writer.calibration())
-    assert recorder.problem == ("Rec. stopped", "no memory")
+    assert messages.lines(recorder.problem) == ("Rec. stopped", "no memory")
     assert said.getvalue().count("\n") == 1
     assert not recorder.active
 
@@ -194,7 +195,7 @@ def test_a_flash_that_is_full_of_other_things_refuses_in_one_line(recorder, flas
     (flash.root / "map.bin").write_bytes(bytes(flash.size - NEEDED + 4096))
     with contextlib.redirect_stdout(io.StringIO()) as said:
         ride(recorder, flash, 3000)
-    assert recorder.problem == ("Rec. stopped", "no room")
+    assert messages.lines(recorder.problem) == ("Rec. stopped", "no room")
     assert said.getvalue().count("\n") == 1
     assert found(flash) == {}
 
@@ -243,7 +244,7 @@ def test_a_file_system_that_fails_ends_the_ride_and_keeps_what_was_written(recor
         ride(recorder, flash, 1000)
     assert said.getvalue().count("\n") == 1
     assert said.getvalue().startswith("recording stopped")
-    assert recorder.problem == ("Rec. stopped", "flash fault")
+    assert messages.lines(recorder.problem) == ("Rec. stopped", "flash fault")
     assert not recorder.active
     recorder.problem = None
     ride(recorder, flash, 2000, seed=1)
@@ -261,7 +262,7 @@ def test_a_card_that_is_pulled_is_said(recorder, flash, monkeypatch):
     with contextlib.redirect_stdout(io.StringIO()):
         monkeypatch.setattr(flash_ring, "open", Worn(5).open, raising=False)
         ride(recorder, flash, 1000)
-    assert recorder.problem == ("Rec. stopped", "card fault")
+    assert messages.lines(recorder.problem) == ("Rec. stopped", "card fault")
 
 
 def test_a_gap_in_the_readings_is_one_in_the_log(recorder, flash):
@@ -317,6 +318,6 @@ def test_a_card_that_cannot_be_used_is_said_in_one_line(driver, words, lcd, reco
         recorder.start(ride_writer.CHIP, ride_writer.calibration())
     assert words in said.getvalue()
     assert said.getvalue().count("\n") == 1
-    assert recorder.problem == lcd
+    assert messages.lines(recorder.problem) == lcd
     assert all(len(line) <= 16 for line in lcd)
     assert not recorder.active

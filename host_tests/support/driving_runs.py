@@ -12,6 +12,7 @@ from kickstand.drive_alignment.parts import DriveParts
 from kickstand.drive_alignment.regression import BrakingRegression, Fit
 from kickstand.errors import Refusal
 from kickstand.rotation import matrix
+from kickstand.ui import messages
 from kickstand_tools.calibration.published.viriciti import PublishedAlignment
 
 STAND = [6.0, 0.0, 0.0]
@@ -132,8 +133,9 @@ def drive(legs, mount, options):
         alignment.matrix(out)
         result["matrix"] = list(out)
     except Refusal as refusal:
-        result["refused"] = refusal.reason
-        result["lcd"] = refusal.lcd
+        result["refused"] = refusal.code
+        result["values"] = list(refusal.values)
+        result["lcd"] = messages.lines(refusal)
     return result
 
 

@@ -6,7 +6,9 @@ from pathlib import Path
 
 import firmware_calls
 import pytest
+from kickstand.errors import Refusal
 from kickstand_tools import unix_port
+from kickstand_tools.refusals import sentence
 
 SCRIPT = Path(firmware_calls.__file__)
 
@@ -35,3 +37,8 @@ def run(engine, calls):
     )
     assert done.returncode == 0, done.stderr + done.stdout
     return json.loads(done.stdout)
+
+
+def words(answer):
+    """What a terminal says of an answer that is a refusal."""
+    return sentence(Refusal(answer["refused"], *answer["values"]))

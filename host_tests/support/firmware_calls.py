@@ -11,12 +11,13 @@ import driving_runs
 from kickstand import rotation
 from kickstand.calibration import six_position, two_position
 from kickstand.calibration.parameters import Calibration
-from kickstand.calibration.still_pose import Capture
+from kickstand.calibration.still_pose import StillPose
 from kickstand.calibration.transform import Transform
 from kickstand.errors import Refusal
 from kickstand.imu import fifo_frames
 from kickstand.lean import formula
 from kickstand.lean.meter import LeanMeter
+from kickstand.ui import messages
 from kickstand_tools.calibration.published import dispersion, rodrigues
 
 
@@ -86,7 +87,7 @@ def add_up(batches, limit):
 
 def capture(samples):
     """samples: rows of seven integers, 8192 counts per g and 65.5 per deg/s."""
-    pose = Capture(8192, 65.5, 32700, len(samples))
+    pose = StillPose(8192, 65.5, 32700, len(samples))
     for sample in samples:
         pose.add(sample)
     pose.finish()
@@ -142,11 +143,11 @@ CALLS = {
 
 
 def call(name, arguments):
-    """The result, or {"refused": reason, "lcd": lines}."""
+    """The result, or {"refused": code, "values": values, "lcd": lines}."""
     try:
         return CALLS[name](*arguments)
     except Refusal as refusal:
-        return {"refused": refusal.reason, "lcd": refusal.lcd}
+        return {"refused": refusal.code, "values": list(refusal.values), "lcd": messages.lines(refusal)}
 
 
 if __name__ == "__main__":

@@ -19,11 +19,7 @@ def mount(settings):
         card = port.open_sd_card(settings.SD_SPI, *[Pin(pin) for pin in pins])
         os.mount(card, MOUNT)
     except ImportError:
-        raise CardError(
-            "SD card: its driver is not on the board: mpremote mip install sdcard", "SD card:", "no driver"
-        )
+        raise CardError("no-card-driver")
     except (OSError, ValueError) as error:
-        raise CardError(
-            "SD card: none that can be read (%s): check card and wiring" % error, "No SD card", "check card"
-        )
+        raise CardError("no-card", str(error))
     return MOUNT

@@ -30,6 +30,20 @@ class Calibration:
         self._accel_lsb = 1.0
         self.set_scale(1.0, 1.0)
 
+    def with_alignment(self, vehicle_from_sensor, gyro_bias, trim_deg=0.0, by_drive=False):
+        """A new Calibration: offset and slope of this one, aligned by vehicle_from_sensor (9). gyro_bias (3, deg/s)."""
+        new = Calibration()
+        new.set_accel(self.accel_offset, self.accel_slope)
+        new.six_done = self.six_done
+        new.aligned = True
+        new.by_drive = by_drive
+        new.trim_deg = trim_deg
+        for i in range(9):
+            new.vehicle_from_sensor[i] = vehicle_from_sensor[i]
+        for i in range(3):
+            new.gyro_bias[i] = gyro_bias[i]
+        return new
+
     def set_scale(self, accel_lsb_per_g, gyro_lsb_per_dps):
         """Say what a count is worth (1, 1: readings are in g and deg/s already)."""
         self._accel_lsb = accel_lsb_per_g
@@ -74,3 +88,16 @@ class Calibration:
         rate[0] = gyro_scale * reading[4] - bias[0]
         rate[1] = gyro_scale * reading[5] - bias[1]
         rate[2] = gyro_scale * reading[6] - bias[2]
+
+
+def six_position_calibration(offset, slope, gyro_bias):
+    """A new Calibration with the six-position result: offset (3, g), slope (3), gyro_bias (3, deg/s).
+
+    It is not aligned, because the sensor was off the vehicle for the six poses.
+    """
+    new = Calibration()
+    new.set_accel(offset, slope)
+    new.six_done = True
+    for i in range(3):
+        new.gyro_bias[i] = gyro_bias[i]
+    return new

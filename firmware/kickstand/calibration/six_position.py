@@ -9,6 +9,7 @@ their residual proves nothing: a seventh, free pose does.
 from math import acos, degrees
 
 from ..errors import CalibrationError
+from ..units import AXES
 from .parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE
 
 SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")  # the axis that points up
@@ -44,11 +45,7 @@ def closed_form(poses):
     for i in range(3):
         high, low = poses[2 * i][i], poses[2 * i + 1][i]
         if not high - low > 0.5:
-            raise CalibrationError(
-                "axis %s barely changes when turned over: %.2f g" % ("xyz"[i], high - low),
-                "Axis %s is dead" % "xyz"[i],
-                "Check sensor",
-            )
+            raise CalibrationError("dead-axis", AXES[i], high - low)
         offset[i] = -(high + low) / (high - low)
         slope[i] = 2.0 / (high - low)
     return offset, slope
@@ -69,11 +66,7 @@ def fit(poses):
                 row[3 + i] = 2.0 * value * pose[i]
             row[6] = 1.0 - square
         if not _solve(rows):
-            raise CalibrationError(
-                "the six poses do not determine the calibration: repeat them, each side once",
-                "Poses unclear",
-                "Do them again",
-            )
+            raise CalibrationError("poses-unclear")
         for i in range(3):
             offset[i] += rows[i][6]
             slope[i] += rows[3 + i][6]
@@ -88,20 +81,11 @@ def check(offset, slope, poses):
     its axis."""
     for i in range(3):
         if not (abs(offset[i]) < MAX_OFFSET_G and MIN_SLOPE < slope[i] < MAX_SLOPE):
-            raise CalibrationError(
-                "axis %s: offset %.3f g, slope %.3f is past any real sensor: repeat the six poses"
-                % ("xyz"[i], offset[i], slope[i]),
-                "Axis %s is off" % "xyz"[i],
-                "Do them again",
-            )
+            raise CalibrationError("implausible-axis", AXES[i], offset[i], slope[i])
     for k in range(6):
         tilt = tilt_deg([slope[i] * poses[k][i] + offset[i] for i in range(3)])
         if tilt > MAX_TILT_DEG:
-            raise CalibrationError(
-                "side %s was %.0f degrees off: within %.0f is needed" % (SIDES[k], tilt, MAX_TILT_DEG),
-                "Side %s: %.0f\xdf off" % (SIDES[k], tilt),
-                "Do them again",
-            )
+            raise CalibrationError("side-tilted", SIDES[k], tilt, MAX_TILT_DEG)
 
 
 def check_free_pose(offset, slope, accel):
@@ -109,18 +93,14 @@ def check_free_pose(offset, slope, accel):
     force = [slope[i] * accel[i] + offset[i] for i in range(3)]
     error = sum(f * f for f in force) ** 0.5 - 1.0
     if not abs(error) <= FREE_MAX_G:
-        raise CalibrationError(
-            "the free pose reads %.3f g instead of 1: repeat the six poses, held still" % (1.0 + error),
-            "Check: %.3f g" % (1.0 + error),
-            "Do them again",
-        )
+        raise CalibrationError("free-pose-off", 1.0 + error)
     return error
 
 
 def beyond_sheet(offset, slope):
     """Names of the axes whose offset or slope is past the data sheet (used, but worth a warning)."""
     return [
-        "xyz"[i] for i in range(3) if abs(offset[i]) > SHEET_OFFSET_G[i] or abs(slope[i] - 1.0) > SHEET_SLOPE
+        AXES[i] for i in range(3) if abs(offset[i]) > SHEET_OFFSET_G[i] or abs(slope[i] - 1.0) > SHEET_SLOPE
     ]
 
 

@@ -15,7 +15,7 @@ MIN_SAMPLES = 20
 _AXES = (0, 1, 2, 4, 5, 6)  # accelerometer and gyro in the chip's order; 3 is the temperature
 
 
-class Capture:
+class StillPose:
     """Collects the samples of one pose.
 
     accel_lsb_per_g, gyro_lsb_per_dps: counts per unit.  accel_limit: |counts| from which an axis is
@@ -51,10 +51,10 @@ class Capture:
         for i in _AXES:
             deviation = counts[i] - self._first[i]
             if not -self._peaks[i] <= deviation <= self._peaks[i]:
-                self.problem = "moved or knocked"
+                self.problem = CaptureError("moved")
                 return False
             if i < 3 and not -self._limit < counts[i] < self._limit:
-                self.problem = "saturated: the accelerometer is at the end of its range"
+                self.problem = CaptureError("saturated")
                 return False
             self._sums[i] += deviation
             self._squares[i] += deviation * deviation
@@ -70,42 +70,27 @@ class Capture:
         if self.problem is None:
             self.problem = self._judge()
         if self.problem is not None:
-            raise CaptureError("pose refused: %s" % self.problem, *_lcd(self.problem))
+            raise self.problem
         n = self.count
         mean = [self._first[i] + self._sums[i] / n for i in range(7)]
         self.accel = [mean[i] / self._accel_lsb for i in range(3)]
         self.gyro = [mean[i] / self._gyro_lsb for i in range(4, 7)]
         self.temperature = mean[3]
         if max(abs(rate) for rate in self.gyro) > MAX_BIAS_DPS:
-            raise CaptureError(
-                "pose refused: turning, or a gyro offset of over %.0f deg/s" % MAX_BIAS_DPS,
-                "Gyro offset big",
-                "Hold still",
-            )
+            raise CaptureError("gyro-offset", MAX_BIAS_DPS)
 
     def _judge(self):
         n = self.count
         if n < MIN_SAMPLES:
-            return "too short: %d samples, at least %d needed" % (n, MIN_SAMPLES)
+            return CaptureError("too-few-readings", n, MIN_SAMPLES)
         if not any(self._squares):
-            return "frozen: every reading is the same, check the sensor and its wires"
+            return CaptureError("frozen-pose")
         late = n - self._half
         for i in range(3):
             mean = self._sums[i] / n
             if self._squares[i] / n - mean * mean > (SPREAD_G * self._accel_lsb) ** 2:
-                return "not still: vibration"
+                return CaptureError("vibration")
             drift = (self._sums[i] - self._early[i]) / late - self._early[i] / self._half
             if abs(drift) > DRIFT_G * self._accel_lsb:
-                return "not still: slowly tilting"
+                return CaptureError("tilting")
         return None
-
-
-def _lcd(problem):
-    """Two display lines for a problem."""
-    if problem.startswith("frozen"):
-        return "Sensor frozen", "Check wiring"
-    if problem.startswith("saturated"):
-        return "Accel saturated", "Check sensor"
-    if problem.startswith("too short"):
-        return "Too few readings", "Check sensor"
-    return "Moved!", "Hold it still"

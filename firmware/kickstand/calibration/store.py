@@ -74,17 +74,9 @@ class Store:
             with open(path, "rb") as file:
                 written = file.read()
         except OSError as error:
-            raise StoreError(
-                "calibration not saved: %s; the old one is kept" % error,
-                "Not saved: flash",
-                "Old one is kept",
-            )
+            raise StoreError("not-written", str(error))
         if written != record:
-            raise StoreError(
-                "calibration not saved: it reads back differently; the old one is kept",
-                "Not saved: flash",
-                "Old one is kept",
-            )
+            raise StoreError("reads-back-differently")
         self._sequence, _, self._problems = self._newest()
 
     def _newest(self):

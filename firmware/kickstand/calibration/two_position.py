@@ -7,7 +7,7 @@ divided by its own length; with the bike leaned to the right, x and z come out r
 from math import atan2, degrees
 
 from ..errors import AlignmentError
-from ..rotation import cross, dot, norm, normalize, vector
+from ..rotation import cross, dot, matrix, norm, normalize, vector
 
 MIN_TILT_DEG = 5.0  # below, 1 degree of pitch change between the poses turns forward by over 11 degrees
 WARN_TILT_DEG = 8.0
@@ -21,12 +21,7 @@ def check_one_g(force, tolerance_g, pose):
     """Raise AlignmentError unless |force| is within tolerance of 1 g. pose: its name for the rider."""
     size = norm(force)
     if not abs(size - 1.0) <= tolerance_g:
-        raise AlignmentError(
-            "%s reading is %.3f g, not 1 g: calibrate six positions first, or check the sensor"
-            % (pose, size),
-            "Reads %.2f g!" % size,
-            "Do six positions",
-        )
+        raise AlignmentError("not-one-g", pose, size)
 
 
 def two_position(out, kickstand, upright, side="left", tolerance_g=UNCALIBRATED_TOLERANCE_G):
@@ -46,25 +41,11 @@ def two_position(out, kickstand, upright, side="left", tolerance_g=UNCALIBRATED_
     cross(z, y, tilted)
     tilt = degrees(atan2(norm(z), dot(y, tilted)))
     if tilt < SAME_POSE_DEG:
-        raise AlignmentError(
-            "both poses are the same (%.1f degrees apart): one on the kickstand, one upright" % tilt,
-            "Same pose twice",
-            "Stand, then up",
-        )
+        raise AlignmentError("same-pose", tilt)
     if tilt < MIN_TILT_DEG:
-        raise AlignmentError(
-            "only %.1f degrees between the poses: at least %.0f are needed, lean the bike further"
-            % (tilt, MIN_TILT_DEG),
-            "Tilt only %.1f\xdf" % tilt,
-            "Need %.0f\xdf or more" % MIN_TILT_DEG,
-        )
+        raise AlignmentError("tilt-too-small", tilt, MIN_TILT_DEG)
     if tilt > MAX_TILT_DEG:
-        raise AlignmentError(
-            "%.0f degrees between the poses: no kickstand leans over %.0f, repeat both poses"
-            % (tilt, MAX_TILT_DEG),
-            "Tilt %.0f\xdf: over" % tilt,
-            "%.0f\xdf, do it again" % MAX_TILT_DEG,
-        )
+        raise AlignmentError("tilt-too-large", tilt, MAX_TILT_DEG)
     normalize(z)
     if side == "right":
         z[0], z[1], z[2] = -z[0], -z[1], -z[2]
@@ -76,3 +57,20 @@ def two_position(out, kickstand, upright, side="left", tolerance_g=UNCALIBRATED_
         out[3 + i] = y[i]
         out[6 + i] = z[i]
     return tilt
+
+
+def align(calibration, kickstand, upright, side):
+    """A new Calibration, aligned by two finished poses (StillPose each), and the tilt between them in degrees.
+
+    calibration: gives offset and slope. side: where the kickstand leans the bike to, "left" or "right". The gyro's bias
+    is that of the kickstand pose: a stand holds the bike stiller than a rider does. Raises AlignmentError.
+    """
+    vehicle_from_sensor = matrix()
+    tilt = two_position(
+        vehicle_from_sensor,
+        calibration.correct(kickstand.accel),
+        calibration.correct(upright.accel),
+        side,
+        CALIBRATED_TOLERANCE_G if calibration.six_done else UNCALIBRATED_TOLERANCE_G,
+    )
+    return calibration.with_alignment(vehicle_from_sensor, kickstand.gyro), tilt

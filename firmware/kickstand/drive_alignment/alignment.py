@@ -8,15 +8,16 @@ braking taken up by an intercept; turns are left out; the lag of the speed is fo
     drive.measure_speed(speed_mps, age_us)         # each new value of the speed source, 1 to 10 a second
     if drive.ready: drive.matrix(out)
 
-What to show follows from `state`, `counted` of `needed` and, when REFUSED, from `problem.lcd`. Whether an alignment
+What to show follows from `state`, `counted` of `needed` and, when REFUSED, from `problem`. Whether an alignment
 that is there already still fits: driving_check.compare(). Fixed memory; each call does a short piece of the work.
 """
 
+from ..errors import AlignmentError
 from ..rotation import cross, norm, normalize, vector
 from .events import DrivingEvents
 from .history import BIN_US, ForceHistory
 from .quality import LEVEL_DEG, MAX_STARTS, NEEDED, DrivingQuality
-from .reasons import moved, not_ready
+from .reasons import not_ready
 from .speed_check import SpeedCheck
 from .standing import StandingVertical
 
@@ -111,9 +112,9 @@ class DriveAlignment:
 
     @property
     def problem(self):
-        """What is wrong with speed or mount: an AlignmentError with reason and lcd, or None."""
+        """What is wrong with speed or mount: an AlignmentError, or None."""
         if self._speed_check.problem is None and self.standing.moved and self.vehicle == CAR:
-            return moved("two stops differ by over %.0f degrees" % LEVEL_DEG)
+            return AlignmentError("mount-moved", "between-stops", LEVEL_DEG)
         if self.counted < self.needed:
             return self._speed_check.problem
         return self._speed_check.problem or self.quality.mount_problem or self.quality.speed_problem
@@ -173,10 +174,11 @@ class DriveAlignment:
         self.events.measure_speed(speed_mps, self._history.now + self._sums_us - age_us)
 
     def known_vertical(self):
-        """The vertical that does not come from driving, None if there is none, and what it comes from."""
+        """The vertical that does not come from driving, None if there is none, and since when a
+        mount has moved that no longer fits it."""
         if self.vehicle == CAR:
-            return self.standing.up, "standing"
-        return self._up, "the upright pose"
+            return self.standing.up, "since-standing"
+        return self._up, "since-upright-pose"
 
     def vertical(self, out, fit=None):
         """Fill out (3) with the vertical as well as it is known. False if it is not known yet.

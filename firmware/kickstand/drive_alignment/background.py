@@ -7,20 +7,13 @@ alignment that is there is checked and refined. Flash is written at standstill o
 from math import degrees
 from time import ticks_add, ticks_diff
 
-from ..board.button import LONG
-from ..calibration.parameters import Calibration
-from ..errors import StoreError
+from ..errors import AlignmentError, Notice, StoreError
 from ..rotation import matrix
-from ..ui.pages import DEGREE
 from .alignment import (
     BRAKING,
-    DRIVE,
     GAP_US,
     MOTORCYCLE,
-    READY,
     TURNING,
-    WAITING_FOR_SPEED,
-    WAITING_FOR_STOP,
     DriveAlignment,
 )
 from .quality import CHECKED
@@ -32,31 +25,24 @@ LOOK_MS = 1000
 FRESH_MS = 3000  # of a speed that says that the vehicle stands
 AWAY_MPS = 2.0
 
-_WAITS = {
-    WAITING_FOR_SPEED: "waiting: speed",
-    WAITING_FOR_STOP: "stop needed",
-    DRIVE: "brake straight",
-    BRAKING: "braking...",
-    TURNING: "turn not counted",
-}
 _KNOWN_BIAS = (0.0, 0.0, 0.0)  # with an alignment the gyro's bias was measured too, and is taken off
-STAND_SIDE = ("Stand was right?", "hold = fix")
-MOUNT_MOVED = ("Mount has moved", "Align again")
-_DOUBTS = {STAND_SIDE: "stand was right?", MOUNT_MOVED: "mount has moved"}  # in place of the lean, until answered
+STAND_SIDE, MOUNT_MOVED = "stand-on-other-side", "mount-moved"
+_DOUBTS = (STAND_SIDE, MOUNT_MOVED)  # codes of messages until whose answer no lean is to be trusted
 
 
-class DriveMode:
-    """vehicle: "motorcycle" or "car".  speed: a Speed.  meter: a LeanMeter.  keep: called with a Calibration to save
-    and use, raises StoreError.
+class BackgroundAlignment:
+    """vehicle: "motorcycle" or "car".  speed: a Speed.  meter: a LeanMeter.  calibration: the ActiveCalibration.
 
-    shown: lines() is a page now.  message: two lines over everything else until answer(), or until the ride goes on.
+    shown: what it waits for is a page now, see ui/drive_page.py.  message: an AlignmentError, StoreError or Notice that
+    goes before everything else until answer(), or until the ride goes on.  result: the Notice or AlignmentError that
+    the last drive ended with, or None.
     """
 
-    def __init__(self, vehicle, speed, meter, keep):
+    def __init__(self, vehicle, speed, meter, calibration):
         self.vehicle = vehicle
         self.speed = speed
         self._meter = meter
-        self._keep = keep
+        self._active = calibration
         self.shown = False
         self._speed_mps = 0.0
         self._speed_ms = self._fed_ms = self._look_ms = None
@@ -67,7 +53,7 @@ class DriveMode:
     def begin(self, asked=False):
         """With another calibration, from flash or by a wizard: it is to be checked. asked: it is not to be trusted."""
         self._asked = asked
-        self._told = []  # what the rider has seen and needs no more
+        self._told = []  # codes of what the rider has seen and needs no more
         self.message = None
         self._restart()
 
@@ -78,7 +64,7 @@ class DriveMode:
         up = old.vehicle_from_sensor[3:6] if trusted else None
         self.drive = DriveAlignment(self.vehicle, up, _KNOWN_BIAS if old.aligned else None)
         self.shown = self.shown or (self.vehicle != MOTORCYCLE and not old.aligned)
-        self._result = None
+        self.result = None
         self._clear()
 
     def ask(self):
@@ -147,7 +133,7 @@ class DriveMode:
             return
         drive, aligned = self.drive, self._meter.calibration.aligned
         if drive.problem is not None:
-            self._refused(drive.problem.lcd, aligned)
+            self._refused(drive.problem, aligned)
         elif self._asked or not aligned:
             if drive.ready:
                 self._take(True)
@@ -157,9 +143,9 @@ class DriveMode:
                 if drive.ready and verdict in (REFINED, MOVED, REVERSED):
                     self._take(verdict != REFINED)
             elif verdict == REVERSED:
-                self._say(STAND_SIDE)
+                self._say(AlignmentError(STAND_SIDE))
             elif verdict == MOVED:
-                self._say(MOUNT_MOVED)
+                self._say(AlignmentError(MOUNT_MOVED, "since-alignment"))
             elif verdict == REFINED and drive.ready:
                 self._take(False)
             elif verdict == SAME:
@@ -167,36 +153,36 @@ class DriveMode:
 
     def _away(self):
         """True while the ride goes on. A source with a fault may say zero for ever: then by the lean filter."""
-        faulty = self.drive.problem is not None or (self.message is not None and self.message not in _DOUBTS)
+        faulty = self.drive.problem is not None or (self.message is not None and self.message.code not in _DOUBTS)
         return self._speed_mps > AWAY_MPS or (faulty and self._meter.filter.speed_mps > AWAY_MPS)
 
-    def _refused(self, lines, aligned):
+    def _refused(self, problem, aligned):
         """What has gone wrong so far may end: the drive is begun anew, the reason stays on the page until then."""
         if aligned:
-            self._say(lines)
+            self._say(problem)
         self._restart()
-        self._result = lines
+        self.result = problem
 
-    def _say(self, lines):
-        if lines not in self._told:
-            self.message = lines
-            if self.vehicle == MOTORCYCLE:
-                self._meter.doubt = _DOUBTS.get(lines) or self._meter.doubt
+    def _say(self, message):
+        if message.code not in self._told:
+            self.message = message
+            if self.vehicle == MOTORCYCLE and message.code in _DOUBTS:
+                self._meter.doubt = message.code
 
-    def answer(self, event):
-        """A press while there is a message."""
-        message, self.message = self.message, None
-        self._told.append(message)
-        if message in _DOUBTS:
+    def answer(self, agreed):
+        """The rider has read the message. agreed: and wants what it offers."""
+        code, self.message = self.message.code, None
+        self._told.append(code)
+        if code in _DOUBTS:
             self._meter.doubt = None
-        if event == LONG and message == STAND_SIDE:
+        if agreed and code == STAND_SIDE:
             old = self._meter.calibration
             turned = matrix()
             for i in range(9):
                 turned[i] = old.vehicle_from_sensor[i]
             turn_round(turned)
             if self._save(turned, -self._trim_deg):
-                self.message = ("Side put right", "Ride safely")
+                self.message = Notice("side-put-right")
                 self._meter.reset_maxima()
 
     def _take(self, anew):
@@ -205,9 +191,9 @@ class DriveMode:
         self.drive.matrix(found)
         if not self._save(found, 0.0 if anew else self._trim_deg):
             return
-        self._result = ("Aligned by drive", "error about %.1f%s" % (self.drive.quality_deg, DEGREE))
+        self.result = Notice("aligned-by-drive", self.drive.quality_deg)
         if anew:
-            self.message = self._result
+            self.message = self.result
             self._asked = False
             self._meter.reset_maxima()
 
@@ -219,36 +205,17 @@ class DriveMode:
     def _save(self, vehicle_from_sensor, trim_deg):
         """True once it is in flash."""
         old, used = self._meter.calibration, self._calibration
-        new = Calibration()
-        new.set_accel(old.accel_offset, old.accel_slope)
-        new.six_done = old.six_done
-        for i in range(9):
-            new.vehicle_from_sensor[i] = vehicle_from_sensor[i]
-        for i in range(3):  # standing still, the gyro feels its bias alone
-            new.gyro_bias[i] = used.gyro_bias[i] + self.drive.standing.bias[i]
-        new.trim_deg = trim_deg
-        new.aligned = new.by_drive = True
+        # at a stop the gyro feels its bias alone
+        bias = [used.gyro_bias[i] + self.drive.standing.bias[i] for i in range(3)]
         try:
-            self._keep(new)
+            self._active.refine(old.with_alignment(vehicle_from_sensor, bias, trim_deg, True))
         except StoreError as problem:
-            self._say(problem.lcd)
+            self._say(problem)
             return False
         return True
 
-    def lines(self, now_ms):
-        """The page: what it waits for."""
-        drive = self.drive
-        if drive.problem is not None:
-            return drive.problem.lcd
-        if self._result and (drive.ready or not drive.counted):
-            return self._result
-        state = drive.state
-        if state == TURNING and self._speed_mps < AWAY_MPS:
-            state = BRAKING  # its end, too slow to tell
-        if state == READY:
-            return "Ready:", "stop to save it"
-        if state == WAITING_FOR_SPEED:
-            return self.speed.fault(now_ms) or ("Align by drive", _WAITS[state])
-        if drive.counted < drive.needed:
-            return "Brakings %3d/%d" % (drive.counted, drive.needed), _WAITS[state]
-        return "Brake%3d +-%4.1f%s" % (drive.counted, min(drive.quality_deg, 99.9), DEGREE), _WAITS[state]
+    @property
+    def state(self):
+        """The DriveAlignment's state; the end of a braking event, too slow to tell a turn, still counts as braking."""
+        state = self.drive.state
+        return BRAKING if state == TURNING and self._speed_mps < AWAY_MPS else state

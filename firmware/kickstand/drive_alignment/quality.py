@@ -2,9 +2,9 @@
 
 from math import atan2, degrees, sqrt
 
+from ..errors import AlignmentError
 from ..rotation import angle_deg, cross, dot, norm, normalize, vector
 from .parts import DriveParts, apart, usual
-from .reasons import late, moved, units
 from .regression import Fit
 
 NEEDED = 5  # brakings and starts
@@ -22,6 +22,11 @@ MIN_WEIGHT = 0.012  # g^2 s and
 SMALLEST = 0.5  # of the force that the speed says was never off by more than 40
 MIN_SLOPE, MAX_SLOPE = 0.75, 1.35  # speed against force: pitch in braking and a coarse speed shift it by 0.2
 MAX_LATE_S = 1.9
+
+
+def speed_unit_problem(slope):
+    """The speed does not change as the force says. slope: change of force per change of speed, 1 if all is well."""
+    return AlignmentError("speed-unit", min(1.0 / max(slope, 0.01), 99.9))
 
 
 class DrivingQuality:
@@ -96,22 +101,22 @@ class DrivingQuality:
         if drive.counted < CHECKED:
             return
         if lag_s >= MAX_LATE_S:
-            self.speed_problem = late(lag_s)
+            self.speed_problem = AlignmentError("speed-late", lag_s)
         elif not MIN_SLOPE < slope < MAX_SLOPE:
-            self.speed_problem = units(slope)
+            self.speed_problem = speed_unit_problem(slope)
         if drive.counted < NEEDED:
             return
-        before, what = drive.known_vertical()
+        before, since = drive.known_vertical()
         from_driving = 0.0 if before is None else angle_deg(before, self.fit.level)
         parts = self.parts
         if level_deg > LEVEL_DEG:
-            self.mount_problem = moved("the vertical changed by %.0f degrees during the drive" % level_deg)
+            self.mount_problem = AlignmentError("mount-moved", "vertical", level_deg)
         elif from_driving > LEVEL_DEG:
-            self.mount_problem = moved("%s and driving differ by %.0f degrees" % (what, from_driving))
+            self.mount_problem = AlignmentError("mount-moved", since, from_driving)
         elif drive.vehicle == "car" and (parts.roll_deg > ROLL_DEG or parts.pitch_deg > PITCH_DEG):
-            self.mount_problem = moved("the vertical is no longer where it was")
+            self.mount_problem = AlignmentError("mount-moved", "vertical-in-parts")
         elif self._look_at(drive.events.last) or (parts.forward_deg > MOVED_DEG and parts.sigmas > CHANCE_STAY):
-            self.mount_problem = moved("forward is no longer where it was")
+            self.mount_problem = AlignmentError("mount-moved", "forward")
         # each with a hysteresis of its own: what comes and goes at a threshold helps nobody
         limit_deg, chance = (HALVES_STAY_DEG, CHANCE_STAY) if self.agree else (HALVES_DEG, CHANCE)
         self.agree = self.halves_deg <= limit_deg and (parts.forward_deg <= limit_deg or parts.sigmas <= chance)

@@ -29,9 +29,7 @@ class SpeedCheck:
     def measure(self, speed_mps):
         """A new value."""
         if not speed_mps >= NEGATIVE_MPS:  # also not-a-number
-            self.problem = AlignmentError(
-                "the speed is %.1f m/s: it must not be negative" % speed_mps, "Speed negative", "Check its source"
-            )
+            self.problem = AlignmentError("speed-negative", speed_mps)
         if speed_mps != self._speed:
             self._speed = speed_mps
             self._changed()
@@ -62,8 +60,4 @@ class SpeedCheck:
         if sqrt(d0 * d0 + d1 * d1 + d2 * d2) > LIVELY_G:
             self._lively += 1
         if self._lively >= STUCK_S and self._lively >= STUCK_SHARE * self._seconds:
-            self.problem = AlignmentError(
-                "the speed is stuck at %.1f m/s while the vehicle speeds up and brakes" % self._speed,
-                "Speed stuck at",
-                "%.1f m/s" % self._speed,
-            )
+            self.problem = AlignmentError("speed-stuck", self._speed)

@@ -46,7 +46,6 @@ FROZEN_MS = 100  # noise changes a living chip's readings in every sample
 
 ACCEL_LSB_PER_G = {2: 16384, 4: 8192, 8: 4096, 16: 2048}
 GYRO_LSB_PER_DPS = {250: 131.0, 500: 65.5, 1000: 32.8, 2000: 16.4}
-SATURATED = 32700
 
 # WHO_AM_I: name, temperature counts per degree, temperature at 0 counts, has ACCEL_CONFIG2, bytes of FIFO
 CHIPS = {
@@ -74,6 +73,8 @@ class Mpu6050:
     WHO_AM_I to treat as an MPU6500. counts: array('h', 7) of the last read() or take(), in the chip's order;
     sums: array('i', 7) of the last add_up().
     """
+
+    SATURATED = 32700  # |counts|: from here on a reading is at the end of its range
 
     def __init__(
         self, i2c, address=0x68, accel_range_g=8, gyro_range_dps=500, dlpf=3, rate_hz=200, accept=None

@@ -2,6 +2,7 @@
 
 from time import ticks_add, ticks_diff, ticks_ms
 
+from ..errors import SensorFault
 from .mpu6050 import UnknownChip
 
 CHECK_MS = 100  # 0.6 ms each
@@ -15,7 +16,7 @@ class Sensor:
     """Samples of one chip that may fail at any time.
 
     chip: an Mpu6050.  reopen: called to free the bus, returns it as a machine.I2C.
-    fault: None, or two display lines that say what is wrong.  restarts: how often the chip was set up.
+    fault: None, or a SensorFault: what is wrong.  restarts: how often the chip was set up.
     """
 
     def __init__(self, chip, reopen):
@@ -26,7 +27,7 @@ class Sensor:
         self._due_ms = ticks_ms()  # of the next check, or of the next attempt while faulty
         self._sample_ms = 0
         self.restarts = 0
-        self.fault = ("Kickstand", "starting")
+        self.fault = SensorFault("starting")
         self._running = False
 
     def fetch(self, now_ms):
@@ -49,7 +50,7 @@ class Sensor:
         if good:
             self.fault = None
         if good < waiting:
-            self._fail("Sensor frozen", "starting again", now_ms)
+            self._fail("sensor-frozen", now_ms)
         return good
 
     def _transfer(self, now_ms):
@@ -67,7 +68,7 @@ class Sensor:
             self._overflows = self.chip.overflows
             self._sample_ms = ticks_ms()  # now_ms may be of before the pause
         elif ticks_diff(now_ms, self._sample_ms) > SILENT_MS:
-            self._fail("Sensor silent", "starting again", now_ms)
+            self._fail("sensor-silent", now_ms)
 
     def check(self, now_ms):
         """Now and then: is the chip still set up as it was? Never raises. Call it before readings are shown."""
@@ -76,17 +77,17 @@ class Sensor:
         self._due_ms = ticks_add(now_ms, CHECK_MS)
         try:
             if not self.chip.configured():  # a supply dip: asleep, with the ranges of the factory
-                self._fail("Sensor reset", "starting again", now_ms)
+                self._fail("sensor-reset", now_ms)
         except OSError:
             self._missed(now_ms)
 
     def _missed(self, now_ms):
         self._failures += 1
         if self._failures >= FAILURES:
-            self._fail("Sensor lost", "check wiring", now_ms)
+            self._fail("sensor-lost", now_ms)
 
-    def _fail(self, line1, line2, now_ms):
-        self.fault = (line1, line2)
+    def _fail(self, code, now_ms):
+        self.fault = SensorFault(code)
         self._running = False
         self._due_ms = ticks_add(now_ms, SAY_MS)
 
@@ -96,9 +97,9 @@ class Sensor:
             self.chip.connect(self.reopen())
             self.chip.setup()
         except UnknownChip as error:
-            self.fault = ("Unknown sensor", "WHO_AM_I %s" % hex(error.args[0]))
+            self.fault = SensorFault("unknown-chip", error.args[0])
         except OSError:
-            self.fault = ("No sensor", "check wiring")
+            self.fault = SensorFault("no-sensor")
         else:
             self._running = True  # the fault stays until there is a good sample
             self.restarts += 1

@@ -230,10 +230,10 @@ class RideRing:
         except OSError:
             pass
 
-    def name_problem(self, error):
-        """At most 16 characters for the display."""
+    def fault_code(self, error):
+        """The code of the RecordingError for an OSError or MemoryError that came from here."""
         if isinstance(error, MemoryError):
-            return "no memory"
+            return "out-of-memory"
         if error.args and error.args[0] == ENOSPC:
-            return "no room"
-        return "flash fault" if self._settings.SD_SPI is None else "card fault"
+            return "out-of-room"
+        return "flash-fault" if self._settings.SD_SPI is None else "card-fault"

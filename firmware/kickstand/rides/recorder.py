@@ -7,7 +7,7 @@ file a turn, so that no turn waits for more than one erase of the flash (45 ms);
 from time import ticks_diff, ticks_ms
 
 from ..calibration.store import pack
-from ..errors import CardError
+from ..errors import CardError, RecordingError
 from ..lean.meter import GAP_US
 from .block import MAX_DT_US, RideBlock
 
@@ -18,9 +18,9 @@ STALL_MS = 10  # an erase of the flash; writing a page takes 1
 class Recorder:
     """keeper: where blocks go, a RideRing or RideStream.
 
-    active: a ride is being recorded.  problem: None, or two display lines on why the recording ended by itself, to be
-    taken by whoever shows it.  stalled: interrupts were off for longer than STALL_MS, until whoever counts with them
-    sets it back.
+    active: a ride is being recorded.  problem: None, or a CardError or RecordingError: why the recording ended by
+    itself, to be taken by whoever shows it.  stalled: interrupts were off for longer than
+    STALL_MS, until whoever counts with them sets it back.
     """
 
     def __init__(self, keeper, sample_hz):
@@ -41,8 +41,7 @@ class Recorder:
                 self._block, self._spare = RideBlock(period_us), RideBlock(period_us)
             self._ride = self.keeper.begin()
         except CardError as error:
-            self.problem = error.lcd
-            print(error.reason)
+            self._end(error)
             return
         except (OSError, MemoryError) as error:
             self._fail(error)
@@ -164,5 +163,10 @@ class Recorder:
         """No more of this ride; the display goes on."""
         self.active = False
         self.keeper.abandon()
-        self.problem = ("Rec. stopped", self.keeper.name_problem(error))
-        print("recording stopped: %s" % error)
+        self._end(RecordingError(self.keeper.fault_code(error), str(error)))
+
+    def _end(self, problem):
+        from ..console import sentence
+
+        self.problem = problem
+        print(sentence(problem))

@@ -34,8 +34,8 @@ class RideStream:
     def abandon(self):
         pass
 
-    def name_problem(self, error):
-        return "USB"
+    def fault_code(self, error):
+        return "usb-fault"
 
 
 def run():

@@ -9,6 +9,8 @@ everything between $ and * as two hexadecimal digits, end of line.
 
 from time import ticks_diff
 
+from ..errors import SpeedFault
+
 MAX_SENTENCE = 100  # the standard says 82; receivers with many decimals go beyond
 MAX_CHUNK = 64  # of what waits, each turn: at a turn each 10 ms twice what 10 fixes a second need
 SILENT_MS = 3000
@@ -63,15 +65,15 @@ class Gps:
         """Bytes until now may be lost: the check sum tells."""
 
     def fault(self, now_ms):
-        """None, or two display lines that say why there is no speed."""
+        """None, or a SpeedFault: why there is no speed."""
         if self._heard_ms is None:
             return None
         if ticks_diff(now_ms, self._heard_ms) > SILENT_MS:
-            return "GPS silent", "check wiring"
+            return SpeedFault("gps-silent")
         if ticks_diff(now_ms, self._sentence_ms) > SILENT_MS:
-            return "GPS garbled", "check GPS_BAUD"
+            return SpeedFault("gps-garbled")
         if ticks_diff(now_ms, self._fix_ms) > SILENT_MS:
-            return "GPS: no fix", "needs open sky"
+            return SpeedFault("gps-no-fix")
         return None
 
     def _sentence(self, line, now_ms):

@@ -44,7 +44,7 @@ class Speed:
         self._source.skip(now_ms)
 
     def fault(self, now_ms):
-        """None, or two display lines that say why no speed comes."""
+        """None, or a SpeedFault: why no speed comes."""
         return self._source.fault(now_ms)
 
 
@@ -71,20 +71,12 @@ def _open_uart(settings):
             timeout=0,
         )
     except ValueError as error:
-        raise SettingsError(
-            "config.py: GPS_TX = %d and GPS_RX = %d do not belong to UART %d (%s)"
-            % (settings.GPS_TX, settings.GPS_RX, settings.GPS_UART, error),
-            "config.py: wrong",
-            "GPS_TX / GPS_RX",
-        )
+        pins = settings.GPS_TX, settings.GPS_RX
+        raise SettingsError("not-uart-pins", "GPS_TX / GPS_RX", *pins, settings.GPS_UART, str(error))
 
 
 def _open_wheel_pin(settings):
     try:
         return Pin(settings.WHEEL_PIN, Pin.IN, Pin.PULL_UP)
     except ValueError as error:
-        raise SettingsError(
-            "config.py: WHEEL_PIN = %d is no pin of this board (%s)" % (settings.WHEEL_PIN, error),
-            "config.py: wrong",
-            "WHEEL_PIN",
-        )
+        raise SettingsError("no-such-pin", "WHEEL_PIN", settings.WHEEL_PIN, str(error))

@@ -7,6 +7,8 @@ from time import ticks_diff, ticks_us
 
 from machine import Pin
 
+from ..errors import SpeedFault
+
 MAX_MPS = 100.0  # pulses that follow faster are none
 BOUNCE_US = 3000  # the contact must have been open for so long, or for a quarter of the shortest period
 STOPPED_MPS = 0.5  # slower shows as standing
@@ -85,5 +87,5 @@ class Wheel:
         self._seen_us = None
 
     def fault(self, now_ms):
-        """None, or two display lines: a wheel that has never turned may be a wire that is loose."""
-        return ("Wheel: no pulse", "ride, or wiring?") if self._moved_ms is None else None
+        """None, or a SpeedFault: a wheel that has never turned may be a wire that is loose."""
+        return SpeedFault("wheel-no-pulse") if self._moved_ms is None else None

@@ -2,9 +2,10 @@
 
 from ..lean.formula import static_lean_deg
 from ..rotation import vector
+from . import messages
+from .messages import DEGREE
 
-DEGREE = "\xdf"  # in the display's ROM, as are the arrow and the full block
-ARROW = "\x7e"
+ARROW = "\x7e"  # in the display's character ROM, as is the full block
 RECORDING = "*"
 _BLOCK = 0xFF
 _HALF_BAR = 8  # cells to each side of the middle
@@ -16,8 +17,8 @@ _bar = bytearray(16)
 
 
 def unsure(doubt):
-    """No lean. doubt: why, if there is a reason to say."""
-    return "Lean  --", doubt or "not sure yet"
+    """No lean. doubt: the code of the reason, or None."""
+    return "Lean  --", messages.doubt(doubt)
 
 
 def lean_bar(lean_deg):

@@ -1,174 +1,131 @@
-"""What the rider sees and what a press does: pages, menu, wizards, short notices."""
+"""What the rider sees and what a press does: one stack of views. What is in front is shown, and a press is for it."""
 
-from time import ticks_add, ticks_diff
-
-from ..board.button import LONG, SHORT
-from ..imu.mpu6050 import SATURATED
-from ..lean.meter import FALLEN_DEG
-from . import pages
+from ..board.button import LONG
+from . import messages, pages
 from .align_wizard import AlignWizard
-from .menu import ALIGN, DRIVE, INFO, LEAVE, RECORD, RESET, SIX, STOP, Menu
+from .menu import Menu
+from .page_stack import PageStack
 from .six_wizard import SixWizard
-
-NOTICE_MS = 2000
+from .views import FaultView, InfoView, NoticeView, QuestionView
 
 
 class Screen:
-    """settings: a Settings.  sensor: a Sensor.  meter: a LeanMeter.  drive: a DriveMode, None without a speed source.
-    save: for the wizards, called with a new Calibration, raises StoreError.  recorder: a Recorder.  record: called to
-    begin a ride.
+    """app: the App, of which it shows sensor, meter, calibration, alignment by driving and recorder.
 
     wizard: the one under way, which wants every sample, or None.
     """
 
-    def __init__(self, settings, sensor, meter, drive, save, recorder, record):
-        self.settings = settings
-        self.sensor = sensor
-        self.meter = meter
-        self.drive = drive
-        self._save = save
-        self._recorder = recorder
-        self._record = record
+    def __init__(self, app):
+        self._app = app
         self.wizard = None
-        self._page = 0
-        self._pages = (pages.lean, pages.maxima, pages.acceleration, pages.formula, pages.raw)
-        self._entries = (ALIGN, SIX, RESET, INFO) + ((DRIVE,) if drive else ())
-        if settings.VEHICLE == "car":
-            self._pages = (pages.acceleration, pages.cornering, pages.raw)
-            self._entries = (DRIVE, SIX, RESET, INFO)
         self._menu = None
-        self._info = False
-        self._notice = None
-        self._notice_ms = 0
+        self._notice = NoticeView()
+        self._fault = FaultView(app.sensor)
+        self._info = InfoView(app.sensor, app.meter)
+        self._question = QuestionView(app.drive)
+        self._pages = PageStack(app, self._align_now)
+
+    def lines(self, now_ms):
+        """What the display should say now. Call it about every 100 ms."""
+        if self._app.recorder.problem:
+            self._notice.show(messages.lines(self._app.recorder.problem), now_ms)
+            self._app.recorder.problem = None
+        return self._front(now_ms)[1]
+
+    def press(self, event, now_ms):
+        """event: SHORT or LONG. A long press that the view in front has no use for opens the menu."""
+        view = self._front(now_ms)[0]
+        if view is self._notice:  # nobody waits for its end: the press is for what it covers,
+            self._notice.close()
+            view = self._front(now_ms)[0]
+            if view is self._question:  # unless that is a question, which has not been read yet
+                return
+        if not view.press(event, now_ms) and event == LONG:
+            self._menu = Menu(self._entries(), now_ms)
 
     def interrupt(self, now_ms):
         """The sensor fails: what it was calibrated for is broken off."""
         if self.wizard:
             self.wizard = None
-            self._notify(("Calibration", "stopped: fault"), now_ms)
+            self._notice.show(("Calibration", "stopped: fault"), now_ms)
 
-    def handle(self, event, now_ms):
-        """Give the event to the wizard, the menu or the pages, whichever is on the display."""
-        if self.wizard:
-            self.wizard.step(event, now_ms)
-            if self.wizard.ended:
-                self.wizard = None
-        elif self._menu:
-            self._menu.step(event, now_ms)
-            if self._menu.chosen is not None:
-                self._choose(self._menu.chosen, now_ms)
-                self._menu = None
-        elif event and self._asking(now_ms):
-            self.drive.answer(event)
-        elif event == LONG:
-            self._menu = Menu(self._entries + (STOP if self._recorder.active else RECORD, LEAVE), now_ms)
-        elif event == SHORT:
-            self._turn_page()
+    def _front(self, now_ms):
+        """(view, its lines): of those that have something to show, the first in this order."""
+        for view in (
+            self._notice,
+            self.wizard,
+            self._menu,
+            self._fault,
+            self._info,
+            self._question,
+            self._pages,
+        ):
+            lines = view.lines(now_ms) if view else None
+            if lines:
+                break
+        if self.wizard and self.wizard.ended:
+            self.wizard = None
+        if self._menu and self._menu.ended:
+            self._menu = None
+        if view is self._question:
+            self._pages.first()  # to come back to
+        return view, lines
 
-    def _asking(self, now_ms):
-        """True while alignment by driving has a message, and nothing else is in front of it."""
-        if self.sensor.fault is not None or self._info or self._noticed(now_ms):
-            return False
-        return self.drive is not None and self.drive.message is not None
+    def _entries(self):
+        """Of the menu: (name, what to call)."""
+        align = (("Align the bike", self._align),)
+        six = (("Six positions", self._six),)
+        rest = (("Reset maxima", self._reset), ("Sensor info", self._info.show))
+        drive = (("Align by drive", self._drive),) if self._app.drive else ()
+        if self._app.recorder.active:
+            record = (("Stop recording", self._stop),)
+        else:
+            record = (("Record ride", self._record),)
+        if self._app.settings.VEHICLE == "car":
+            return drive + six + rest + record
+        return align + six + rest + drive + record
 
-    def _noticed(self, now_ms):
-        """The notice, while it lasts, else None."""
-        if self._notice and ticks_diff(now_ms, self._notice_ms) >= 0:
-            self._notice = None
-        return self._notice
+    def _ready(self, now_ms):
+        """True if the sensor gives readings; else the rider is told."""
+        fault = self._app.sensor.fault
+        if fault is not None:
+            self._notice.show(messages.lines(fault), now_ms)
+        return fault is None
 
-    def _turn_page(self):
-        if self._info:
-            self._info = False
-        elif self._driving or self.meter.calibration.aligned:
-            self._page += 1
-        elif self.sensor.fault is None:
-            self._align(pressed=True)
+    def _align(self, now_ms):
+        if self._ready(now_ms):
+            self._begin_align(False)
 
-    @property
-    def _driving(self):
-        """True while what alignment by driving waits for is a page, the first until there is an alignment."""
-        return self.drive is not None and self.drive.shown
+    def _align_now(self):
+        """The press was that of the first pose."""
+        self._begin_align(True)
 
-    def _align(self, pressed):
-        self._page = 0
-        self.wizard = AlignWizard(
-            self.sensor.chip,
-            SATURATED,
-            self.settings.SAMPLE_HZ,
-            self.meter.calibration,
-            self.settings.SIDE,
-            self._save,
-            pressed,
-        )
+    def _begin_align(self, pressed):
+        app = self._app
+        self._pages.first()
+        settings, calibration = app.settings, app.calibration
+        self.wizard = AlignWizard(app.sensor.chip, settings.SAMPLE_HZ, calibration, settings.SIDE, pressed)
 
-    def _choose(self, entry, now_ms):
-        if entry == RESET:
-            self.meter.reset_maxima()
-            self._notify(("Maxima reset", ""), now_ms)
-        elif entry == INFO:
-            self._info = True
-        elif entry == STOP:
-            self._recorder.stop()
-            self._notify(("Recording ended", ""), now_ms)
-        elif self.sensor.fault is not None and entry in (ALIGN, SIX, DRIVE, RECORD):
-            self._notify(self.sensor.fault, now_ms)
-        elif entry == ALIGN:
-            self._align(pressed=False)
-        elif entry == DRIVE:
-            self.drive.ask()
-            self._page = len(self._pages) if self.meter.calibration.aligned else 0
-        elif entry == SIX:
-            self.wizard = SixWizard(self.sensor.chip, SATURATED, self.settings.SAMPLE_HZ, self._save)
-        elif entry == RECORD:
-            self._record()
-            if self._recorder.active:
-                self._notify(pages.recording(self._recorder), now_ms)
+    def _six(self, now_ms):
+        if self._ready(now_ms):
+            app = self._app
+            self.wizard = SixWizard(app.sensor.chip, app.settings.SAMPLE_HZ, app.calibration)
 
-    def _notify(self, lines, now_ms):
-        self._notice = lines
-        self._notice_ms = ticks_add(now_ms, NOTICE_MS)
+    def _reset(self, now_ms):
+        self._app.meter.reset_maxima()
+        self._notice.show(("Maxima reset", ""), now_ms)
 
-    def lines(self, now_ms):
-        """What the display should say now."""
-        if self._recorder.problem:
-            self._notify(self._recorder.problem, now_ms)
-            self._recorder.problem = None
-        if self._noticed(now_ms):
-            return self._notice
-        if self.wizard:
-            return self.wizard.lines
-        if self._menu:
-            return self._menu.lines
-        if self.sensor.fault is not None:
-            return self.sensor.fault
-        if self._info:
-            return pages.sensor_info(self.sensor, self.meter, now_ms // 1000)
-        if self._asking(now_ms):
-            self._page = 0  # after it
-            return self.drive.message
-        return self._page_lines(now_ms)
+    def _drive(self, now_ms):
+        if self._ready(now_ms):
+            self._app.drive.ask()
+            self._pages.drive()
 
-    def _page_lines(self, now_ms):
-        if not self.meter.calibration.aligned:
-            if not self._driving:
-                return pages.not_aligned(self.meter, now_ms // 1000)
-            if self._page % 2 == 0:
-                return self.drive.lines(now_ms)
-            return pages.not_aligned(self.meter, now_ms // 1000, "drive and brake")
-        count = len(self._pages) + self._driving + self._recorder.active
-        if self._page >= count:  # here and not in each use: when a page goes, the others stay where they are
-            self._page = 0
-        page = self._page
-        if page == len(self._pages) and self._driving:
-            return self.drive.lines(now_ms)
-        if page >= len(self._pages):
-            return pages.recording(self._recorder)
-        if self.meter.fallen:
-            return pages.FALLEN
-        if not self.meter.trusted or abs(self.meter.lean_deg) > FALLEN_DEG:
-            return pages.unsure(self.meter.doubt)
-        line1, line2 = self._pages[page](self.meter)
-        if page == 0 and self._recorder.active:
-            line1 = pages.recorded(line1)
-        return line1, line2
+    def _record(self, now_ms):
+        if self._ready(now_ms):
+            self._app.record()
+            if self._app.recorder.active:
+                self._notice.show(pages.recording(self._app.recorder), now_ms)
+
+    def _stop(self, now_ms):
+        self._app.recorder.stop()
+        self._notice.show(("Recording ended", ""), now_ms)

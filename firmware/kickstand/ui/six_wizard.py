@@ -3,12 +3,12 @@ proof."""
 
 from time import ticks_add, ticks_diff
 
-from ..board.button import LONG, SHORT
+from ..board.button import LONG
 from ..calibration import six_position
-from ..calibration.parameters import Calibration
+from ..calibration.parameters import six_position_calibration
 from ..calibration.pose_taker import DONE, SETTLED, SPOILT, PoseTaker
 from ..errors import Refusal
-from . import pages
+from . import messages, pages
 
 POSE_SECONDS = 2
 NOTICE_MS = 1500
@@ -17,15 +17,14 @@ ROUGH_TILT_DEG = 30.0  # of an uncalibrated side; the fit checks it again with t
 
 
 class SixWizard:
-    """sample() with each sample, step() with each event; lines is what to show; ended: the pages may come
-    back.
+    """A view (see views.py) that wants each sample too, until it has ended.
 
-    chip, saturated, rate_hz: as for PoseTaker.  save: called with the new Calibration, raises StoreError.
+    chip, rate_hz: as for PoseTaker.  calibration: the ActiveCalibration.
     """
 
-    def __init__(self, chip, saturated, rate_hz, save):
-        self._taker = PoseTaker(chip, saturated, rate_hz, POSE_SECONDS)
-        self._save = save
+    def __init__(self, chip, rate_hz, calibration):
+        self._taker = PoseTaker(chip, rate_hz, POSE_SECONDS)
+        self._calibration = calibration
         self._notice_ms = None
         self._leave_ms = None
         self._refused = False
@@ -43,46 +42,48 @@ class SixWizard:
         if self._leave_ms is None and self._notice_ms is None and not self._refused:
             self._take(counts, now_ms)
 
-    def step(self, event, now_ms):
-        """Take a button event (0, SHORT, LONG)."""
-        if event == LONG:
+    def lines(self, now_ms):
+        if self._leave_ms is not None and ticks_diff(now_ms, self._leave_ms) >= 0:
             self.ended = True
-        elif self._leave_ms is not None:
-            self.ended = event == SHORT or ticks_diff(now_ms, self._leave_ms) >= 0
-        elif self._refused:
-            if event == SHORT:
-                self._refused = False
-                self._start()
         elif self._notice_ms is not None and ticks_diff(now_ms, self._notice_ms) >= 0:
             self._notice_ms = None
             self._next()
+        return None if self.ended else self._lines
+
+    def press(self, event, now_ms):
+        if event == LONG or self._leave_ms is not None:
+            self.ended = True
+        elif self._refused:
+            self._refused = False
+            self._start()
+        return True
 
     def _next(self):
         """Ask for the next pose and watch for stillness."""
         self._taker.restart()
         if self._fitted:
-            self.lines = ("Check: slant it", "and hold still")
+            self._lines = ("Check: slant it", "and hold still")
         else:
             missing = [six_position.SIDES[k] for k in range(6) if self._poses[k] is None]
-            self.lines = ("Side up, still:", "any of the six" if len(missing) == 6 else " ".join(missing))
+            self._lines = ("Side up, still:", "any of the six" if len(missing) == 6 else " ".join(missing))
 
     def _take(self, counts, now_ms):
         state = self._taker.step(counts)
         if state == SPOILT:
-            self._notice(self._taker.problem.lcd, now_ms)
+            self._notice(messages.lines(self._taker.problem), now_ms)
         elif state == SETTLED:
             self._look(now_ms)
         elif state == DONE:
             try:
-                self._pose_done(self._taker.capture, now_ms)
+                self._pose_done(self._taker.pose, now_ms)
             except Refusal as problem:
                 self._refused = True
-                self.lines = problem.lcd
+                self._lines = messages.lines(problem)
         else:
             done, total = self._taker.progress()
             if done:
                 name = "Check" if self._fitted else "Side " + six_position.SIDES[self._side]
-                self.lines = (name + ", hold", pages.progress_bar(done, total))
+                self._lines = (name + ", hold", pages.progress_bar(done, total))
 
     def _look(self, now_ms):
         """Still for half a second: is it a pose that is wanted?"""
@@ -91,42 +92,37 @@ class SixWizard:
             offset, slope = self._fitted
             tilt = six_position.tilt_deg([slope[i] * accel[i] + offset[i] for i in range(3)])
             if tilt < six_position.FREE_TILT_DEG:
-                self._notice(("Slant it more:", "%d%s is too flat" % (tilt, pages.DEGREE)), now_ms)
+                self._notice(("Slant it more:", "%d%s is too flat" % (tilt, messages.DEGREE)), now_ms)
             return
         self._side = six_position.side_of(accel)
         tilt = six_position.tilt_deg(accel)
         if tilt > ROUGH_TILT_DEG:
-            self._notice(("Not on a side:", "%d%s off" % (tilt, pages.DEGREE)), now_ms)
+            self._notice(("Not on a side:", "%d%s off" % (tilt, messages.DEGREE)), now_ms)
         elif self._poses[self._side] is not None:
             done = 6 - self._poses.count(None)
             self._notice(("Side %s is done" % six_position.SIDES[self._side], "%d/6, turn it" % done), now_ms)
 
-    def _pose_done(self, capture, now_ms):
+    def _pose_done(self, pose, now_ms):
         if self._fitted:
-            self._prove(capture, now_ms)
+            self._prove(pose, now_ms)
             return
-        self._poses[self._side] = capture.accel
+        self._poses[self._side] = pose.accel
         for i in range(3):
-            self._gyro[i] += capture.gyro[i] / 6
+            self._gyro[i] += pose.gyro[i] / 6
         done = 6 - self._poses.count(None)
         if done == 6:
             self._fitted = six_position.fit(self._poses)
         self._notice(("Side %s done" % six_position.SIDES[self._side], "%d/6, turn it" % done), now_ms)
 
-    def _prove(self, capture, now_ms):
+    def _prove(self, pose, now_ms):
         """The seventh pose: only a calibration that it confirms is saved. Raises CalibrationError,
         StoreError."""
         offset, slope = self._fitted
-        error = six_position.check_free_pose(offset, slope, capture.accel)
-        new = Calibration()  # not aligned: for this the sensor was off the bike
-        new.set_accel(offset, slope)
-        new.six_done = True
-        for i in range(3):
-            new.gyro_bias[i] = self._gyro[i]
-        self._save(new)
+        error = six_position.check_free_pose(offset, slope, pose.accel)
+        self._calibration.save(six_position_calibration(offset, slope, self._gyro))
         self._leave_ms = ticks_add(now_ms, RESULT_MS)
-        self.lines = ("Saved, err %d mg" % round(abs(error) * 1000), "Now align it")
+        self._lines = ("Saved, err %d mg" % round(abs(error) * 1000), "Now align it")
 
     def _notice(self, lines, now_ms):
-        self.lines = lines
+        self._lines = lines
         self._notice_ms = ticks_add(now_ms, NOTICE_MS)

@@ -119,9 +119,9 @@ class MeasuredApp(app_module.App):
         self.canary = Canary()
         self.slept_us = 0
 
-    def step(self):
+    def turn(self):
         start = ticks_us()
-        app_module.App.step(self)
+        app_module.App.turn(self)
         took = ticks_diff(ticks_us(), start)
         self.count += 1
         if self.count > 0:

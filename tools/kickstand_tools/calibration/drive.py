@@ -13,6 +13,7 @@ from kickstand_tools.calibration.published.viriciti import PublishedAlignment
 from ..errors import InputError
 from ..logs.reader import Log, read_log
 from ..progress import Bar
+from ..refusals import sentence
 from .file import CalibrationFile
 
 METHODS = {"improved": DriveAlignment, "published": PublishedAlignment}
@@ -51,7 +52,7 @@ def drive(
         alignment.matrix(matrix)
     except AlignmentError as error:
         assumed = " (taken for a car: else --vehicle motorcycle)" if vehicle is None and kind == CAR else ""
-        raise InputError(f"{names}: {error.reason}{assumed}") from error
+        raise InputError(f"{names}: {sentence(error)}{assumed}") from error
     bias = [a + b for a, b in zip(result.bias, alignment.standing.bias, strict=True)]
     say(f"{kind}, method {method}: {alignment.counted} used, {alignment.turned} in turns not used")
     say(f"stops: {alignment.standing.stops}")
@@ -144,7 +145,7 @@ class _Events:
         self._before = now
         problem = alignment.problem
         if problem and not self._problem:
-            self._event(seconds, problem.reason)
+            self._event(seconds, sentence(problem))
         self._problem = problem
         if alignment.ready != self._ready:
             self._ready = alignment.ready
@@ -158,7 +159,7 @@ class _Events:
     def _state(self) -> str:
         if self._ready:
             return f"ready: forward known to {self._alignment.quality_deg:.1f} degrees"
-        return "no longer ready" if self._problem else f"no longer ready: {self._alignment.reason.reason}"
+        return "no longer ready" if self._problem else f"no longer ready: {sentence(self._alignment.reason)}"
 
 
 def _compare(alignment: DriveAlignment, matrix: list[float], say: Print) -> None:

@@ -1,36 +1,38 @@
 """Calibration from recorded poses, by the firmware's own modules."""
 
-from array import array
 from collections.abc import Callable
 from pathlib import Path
 from statistics import median
 
 from kickstand.calibration import six_position, two_position
-from kickstand.calibration.still_pose import Capture
+from kickstand.calibration.still_pose import StillPose
 from kickstand.errors import AlignmentError, CalibrationError, CaptureError
 
 from ..errors import InputError
 from ..logs.reader import read_log
+from ..refusals import sentence
 from .file import CalibrationFile
 
-_MICRO = 1_000_000  # Capture sums integers: millionths of g and deg/s
+_MICRO = 1_000_000  # StillPose sums integers: millionths of g and deg/s
 _SATURATED = 1_990_000  # the range a still pose needs is 1 g; an axis at 2 g is at its end
 _EQUAL_TILT_DEG = 3.0  # the free pose has to stand out from its nearest side by this
 
 Print = Callable[[str], None]
 
 
-def read_pose(path: Path) -> Capture:
+def read_pose(path: Path) -> StillPose:
     """One still pose, averaged. Raises InputError naming the file."""
     log = read_log(path)
-    capture = Capture(_MICRO, _MICRO, _SATURATED, len(log.readings))
+    capture = StillPose(_MICRO, _MICRO, _SATURATED, len(log.readings))
+    where = f"{path}: pose refused"
     for line, reading in enumerate(log.readings, 1):
         if not capture.add([round(value * _MICRO) for value in reading]):
-            raise InputError(f"{path}, sample {line}: {capture.problem}: capture this pose again")
+            where = f"{path}, sample {line}"
+            break
     try:
         capture.finish()
     except CaptureError as error:
-        raise InputError(f"{path}: {error.reason}: capture it again") from error
+        raise InputError(f"{where}: {sentence(error)}: capture this pose again") from error
     return capture
 
 
@@ -53,7 +55,7 @@ def six(paths: list[Path], say: Print) -> CalibrationFile:
             None if free is None else six_position.check_free_pose(offset, slope, _accel(captures[free]))
         )
     except CalibrationError as error:
-        raise InputError(_with_file(error.reason, by_side, free, paths)) from error
+        raise InputError(_with_file(error, by_side, free, paths)) from error
     for side, k in zip(six_position.SIDES, by_side, strict=True):
         tilt = six_position.tilt_deg(_accel(captures[k]))
         say(f"{side} up: {paths[k]}, {captures[k].count} samples, {tilt:.1f} degrees off its axis")
@@ -85,17 +87,12 @@ def two(
     """
     refuse_same_file([kickstand, upright])
     result = before or CalibrationFile()
-    calibration = result.to_firmware()
     first, second = read_pose(kickstand), read_pose(upright)
-    tolerance_g = two_position.CALIBRATED_TOLERANCE_G if result.six_done else two_position.UNCALIBRATED_TOLERANCE_G
-    matrix = array("f", [0.0] * 9)
     try:
-        tilt = two_position.two_position(
-            matrix, calibration.correct(_accel(first)), calibration.correct(_accel(second)), side, tolerance_g
-        )
+        aligned, tilt = two_position.align(result.to_firmware(), first, second, side)
     except AlignmentError as error:
-        raise InputError(f"{kickstand} and {upright}: {error.reason}") from error
-    bias = list(_gyro(first))  # as on the board: a stand holds stiller than a rider
+        raise InputError(f"{kickstand} and {upright}: {sentence(error)}") from error
+    matrix, bias = list(aligned.vehicle_from_sensor), list(_gyro(first))
     say(f"kickstand: {kickstand}, {first.count} samples")
     say(f"upright:   {upright}, {second.count} samples, {tilt:.1f} degrees from the kickstand on the {side}")
     say("gyro bias  " + _axes(bias, "%+.2f deg/s"))
@@ -109,11 +106,11 @@ def two(
     if not result.six_done:
         say("warning: no six-position calibration: an offset of 50 mg is 3 degrees of lean")
     return CalibrationFile(
-        result.offset, result.slope, bias, list(matrix), True, result.six_done, result.notes, side=side
+        result.offset, result.slope, bias, matrix, True, result.six_done, result.notes, side=side
     )
 
 
-def _sides(paths: list[Path], captures: list[Capture]) -> tuple[list[int], int | None]:
+def _sides(paths: list[Path], captures: list[StillPose]) -> tuple[list[int], int | None]:
     """Index of the capture of each side in the order of SIDES, and that of the free pose (None without one).
 
     Of seven captures the free one shares its nearest side with another and is further from the axis.
@@ -142,12 +139,13 @@ def _sides(paths: list[Path], captures: list[Capture]) -> tuple[list[int], int |
     return [found[side][0] for side in range(6)], free
 
 
-def _with_file(reason: str, by_side: list[int], free: int | None, paths: list[Path]) -> str:
-    """The firmware's reason with the file it is about in front, where it is about one."""
-    for side, k in zip(six_position.SIDES, by_side, strict=True):
-        if f"side {side} " in reason:
-            return f"{paths[k]}: {reason}: capture this side again"
-    return f"{paths[free]}: {reason}" if free is not None and "free pose" in reason else reason
+def _with_file(error: CalibrationError, by_side: list[int], free: int | None, paths: list[Path]) -> str:
+    """The refusal in words with the file it is about in front, where it is about one."""
+    reason = sentence(error)
+    if error.code == "side-tilted":
+        k = by_side[six_position.SIDES.index(error.values[0])]
+        return f"{paths[k]}: {reason}: capture this side again"
+    return f"{paths[free]}: {reason}" if free is not None and error.code == "free-pose-off" else reason
 
 
 def refuse_same_file(paths: list[Path]) -> None:
@@ -159,12 +157,12 @@ def refuse_same_file(paths: list[Path]) -> None:
         seen[path.resolve()] = path
 
 
-def _accel(capture: Capture) -> list[float]:
+def _accel(capture: StillPose) -> list[float]:
     assert capture.accel is not None  # read_pose has finished it
     return capture.accel
 
 
-def _gyro(capture: Capture) -> list[float]:
+def _gyro(capture: StillPose) -> list[float]:
     assert capture.gyro is not None
     return capture.gyro
 

@@ -37,6 +37,7 @@ def _fault(path: Path, port: str) -> tuple[int | None, str] | None:
     """Line and reason of the first fault. Turns this process into a board's."""
     Board(lambda t_s: (0, 0, 1, 0, 0, 0), port="esp32" if port == "esp32" else "rp2").install()  # for machine
     sys.platform = port
+    from kickstand.console import sentence
     from kickstand.errors import SettingsError
     from kickstand.settings import Settings
 
@@ -53,7 +54,7 @@ def _fault(path: Path, port: str) -> tuple[int | None, str] | None:
     try:
         Settings(module)
     except SettingsError as error:
-        return _line_of(error.lcd[1], source), error.reason.removeprefix("config.py: ")
+        return _line_of(error.values[0], source), sentence(error).removeprefix("config.py: ")
     return None
 
 

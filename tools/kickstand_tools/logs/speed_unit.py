@@ -9,10 +9,11 @@ more.
 from pathlib import Path
 
 import numpy as np
-from kickstand.drive_alignment.reasons import units
+from kickstand.drive_alignment.quality import speed_unit_problem
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..refusals import sentence
 
 MOST = 1.5  # times as much as it should: knots are 1.94, and what was right was never over 1.1
 PUSH_G = 0.15  # beyond the slopes of ordinary roads
@@ -82,7 +83,7 @@ class SpeedUnit:
             return
         if np.median(change[strong] / push[strong]) > MOST:
             slope = float(change @ push / (change @ change))  # as the board's own regression has it
-            raise InputError(f"{self._path}: {units(slope).reason}")
+            raise InputError(f"{self._path}: {sentence(speed_unit_problem(slope))}")
 
 
 def _along(rows: Array) -> tuple[float, Array, Array]:

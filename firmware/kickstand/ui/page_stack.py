@@ -1,0 +1,75 @@
+"""The pages, which a short press turns. A page is a function in pages.py; to add one, name it in MOTORCYCLE or CAR."""
+
+from ..board.button import SHORT
+from ..lean.meter import FALLEN_DEG
+from . import pages
+
+MOTORCYCLE = (pages.lean, pages.maxima, pages.acceleration, pages.formula, pages.raw)
+CAR = (pages.acceleration, pages.cornering, pages.raw)
+
+
+class PageStack:
+    """app: the App. align: called for a press before there is an alignment: the bike is on its stand."""
+
+    def __init__(self, app, align):
+        self._meter = app.meter
+        self._calibration = app.calibration
+        self._drive = app.drive
+        self._recorder = app.recorder
+        self._align = align
+        self._pages = CAR if app.settings.VEHICLE == "car" else MOTORCYCLE
+        self._at = 0
+
+    def first(self):
+        """Back to the first page."""
+        self._at = 0
+
+    def drive(self):
+        """To the page of alignment by driving."""
+        self._at = len(self._pages) if self._calibration.aligned else 0
+
+    def press(self, event, now_ms):
+        if event != SHORT:
+            return False
+        if self._driving or self._calibration.aligned:
+            self._at += 1
+        else:
+            self._align()
+        return True
+
+    @property
+    def _driving(self):
+        """True while what alignment by driving waits for is a page, the first until there is an alignment."""
+        return self._drive is not None and self._drive.shown
+
+    def _drive_lines(self, now_ms):
+        from . import drive_page  # only with a speed source
+
+        return drive_page.lines(self._drive, now_ms)
+
+    def lines(self, now_ms):
+        if not self._calibration.aligned:
+            if not self._driving:
+                return pages.not_aligned(self._meter, now_ms // 1000)
+            if self._at % 2 == 0:
+                return self._drive_lines(now_ms)
+            return pages.not_aligned(self._meter, now_ms // 1000, "drive and brake")
+        count = len(self._pages) + self._driving + self._recorder.active
+        if self._at >= count:  # here and not in each use: when a page goes, the others stay where they are
+            self._at = 0
+        if self._at == len(self._pages) and self._driving:
+            return self._drive_lines(now_ms)
+        if self._at >= len(self._pages):
+            return pages.recording(self._recorder)
+        return self._page(self._pages[self._at])
+
+    def _page(self, page):
+        meter = self._meter
+        if meter.fallen:
+            return pages.FALLEN
+        if not meter.trusted or abs(meter.lean_deg) > FALLEN_DEG:
+            return pages.unsure(meter.doubt)
+        line1, line2 = page(meter)
+        if self._at == 0 and self._recorder.active:
+            line1 = pages.recorded(line1)
+        return line1, line2

@@ -1,0 +1,97 @@
+"""Every reason that the firmware can give has words for the display and for a terminal, and no words are left over."""
+
+import ast
+from pathlib import Path
+
+import pytest
+from kickstand import console, errors
+from kickstand.errors import AlignmentError, Notice, Refusal, SettingsError
+from kickstand.ui import messages
+from kickstand_tools import firmware_path, refusals
+
+CLASSES = {name for name in vars(errors) if name[0].isupper()}
+# Codes that a name or a call gives, not a text beside the class
+INDIRECT = {
+    "stand-on-other-side",
+    "mount-moved",
+    "sensor-lost",
+    "sensor-frozen",
+    "sensor-silent",
+    "sensor-reset",
+    "out-of-memory",
+    "out-of-room",
+    "flash-fault",
+    "card-fault",
+    "usb-fault",
+}
+# Values that fit the words of any code: numbers, names, and long ones of both
+VALUES = {"dead-axis": ("x", 0.1), "implausible-axis": ("x", 0.1, 1.0), "side-tilted": ("+x", 25.0, 20.0)}
+VALUES |= {"not-one-g": ("kickstand", 1.23), "mount-moved": ("between-stops", 12.0), "few-brakings": (4, 5, 12)}
+VALUES |= {"forward-uncertain": (180.0, 12), "unknown-chip": (0x12,), "speed-unit": (99.9,)}
+VALUES |= {"speed-late": (2.5,), "aligned-by-drive": (9.9,)}
+
+
+def codes():
+    """Every code given to one of the classes in errors.py, by the class."""
+    found = {}
+    for path in firmware_path.PACKAGE.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in CLASSES:
+                code = node.args[0] if node.args else None
+                if isinstance(code, ast.Constant):
+                    found.setdefault(code.value, node.func.id)
+    return found
+
+
+def test_each_code_has_words_for_the_display():
+    missing = {code for code, kind in codes().items() if kind != "SettingsError"} - set(messages._LINES)
+    assert not missing
+    assert set(messages._LINES) == set(codes()) - OTHER_SETTINGS | INDIRECT
+
+
+# Of these the display names the setting
+OTHER_SETTINGS = {"not-allowed", "card-incomplete", "same-controller", "no-such-pin", "not-i2c-pins", "not-uart-pins"}
+
+
+def test_other_settings_are_named():
+    for code in OTHER_SETTINGS:
+        assert messages.lines(SettingsError(code, "LCD_SDA", 1, 2, 3, 4)) == ("config.py: wrong", "LCD_SDA")
+
+
+@pytest.mark.parametrize("code", messages._LINES)
+def test_they_fit_into_sixteen_characters(code):
+    values = VALUES.get(code, (99.94, 60.0, 1.0, 1.0))
+    for line in messages.lines(Refusal(code, *values)):
+        assert len(line) <= 16, line
+
+
+def test_each_code_has_a_sentence_for_a_terminal():
+    """Faults of sensor, speed source and display are the display's alone; notices too."""
+    for code, kind in codes().items():
+        if kind not in ("SensorFault", "SpeedFault", "Notice"):
+            values = VALUES.get(code, ("NAME", 2.0, 3.0, 4.0, 5.0, 6.0) if kind == "SettingsError" else (1.0, 2.0, 3.0))
+            assert "{" not in refusals.sentence(Refusal(code, *values))
+
+
+@pytest.mark.parametrize("how", refusals._MOVED)
+def test_a_mount_that_moved(how):
+    assert refusals.sentence(AlignmentError("mount-moved", how, 12.0)).startswith("the mount has moved: ")
+    assert messages.lines(AlignmentError("mount-moved", how, 12.0)) == ("Mount has moved", "Align again")
+    assert f'"{how}"' in "".join(path.read_text() for path in (firmware_path.PACKAGE / "drive_alignment").glob("*.py"))
+
+
+def test_no_sentence_is_left_over():
+    known = set(codes()) | INDIRECT
+    assert set(refusals._SENTENCES) <= known
+    assert set(console._SENTENCES) <= known
+
+
+def test_a_notice_is_worded_like_a_refusal():
+    assert messages.lines(Notice("aligned-by-drive", 1.26)) == ("Aligned by drive", "error about 1.3\xdf")
+
+
+def test_no_mathematics_knows_the_display():
+    """The degree sign of its character ROM, and its sixteen columns, are for ui/ and the driver alone."""
+    for path in Path(firmware_path.PACKAGE).rglob("*.py"):
+        if path.parent.name not in ("ui", "board"):
+            assert "\\xdf" not in path.read_text(encoding="utf-8"), path

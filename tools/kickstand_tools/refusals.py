@@ -1,0 +1,67 @@
+"""The words of a terminal for what the firmware's own modules refuse: one line, by code (see kickstand.errors)."""
+
+from kickstand import console
+from kickstand.errors import Notice, Refusal
+
+# {0}, {1} ... are the refusal's values
+_SENTENCES = {
+    "moved": "moved or knocked",
+    "vibration": "not still: vibration",
+    "tilting": "not still: slowly tilting",
+    "saturated": "saturated: the accelerometer is at the end of its range",
+    "too-few-readings": "too short: {0} samples, at least {1} needed",
+    "frozen-pose": "frozen: every reading is the same, check the sensor and its wires",
+    "gyro-offset": "turning, or a gyro offset of over {0:.0f} deg/s",
+    "dead-axis": "axis {0} barely changes when turned over: {1:.2f} g",
+    "poses-unclear": "the six poses do not determine the calibration: repeat them, each side once",
+    "implausible-axis": "axis {0}: offset {1:.3f} g, slope {2:.3f} is past any real sensor: repeat the six poses",
+    "side-tilted": "side {0} was {1:.0f} degrees off: within {2:.0f} is needed",
+    "free-pose-off": "the free pose reads {0:.3f} g instead of 1: repeat the six poses, held still",
+    "not-one-g": "{0} reading is {1:.3f} g, not 1 g: calibrate six positions first, or check the sensor",
+    "same-pose": "both poses are the same ({0:.1f} degrees apart): one on the kickstand, one upright",
+    "tilt-too-small": "only {0:.1f} degrees between the poses: at least {1:.0f} are needed, lean the bike further",
+    "tilt-too-large": "{0:.0f} degrees between the poses: no kickstand leans over {1:.0f}, repeat both poses",
+    "speed-negative": "the speed is {0:.1f} m/s: it must not be negative",
+    "speed-stuck": "the speed is stuck at {0:.1f} m/s while the vehicle speeds up and brakes",
+    "speed-late": "the speed is {0:.1f} s late: under 2 s are needed",
+    "no-speed": "no speed: it needs a speed, from a GPS or a wheel",
+    "not-driven": "it only stood still: drive, and brake in a straight line {0} times",
+    "not-stopped": "it never stood still: a stop of {0:.0f} s is needed for the vertical",
+    "few-brakings": (
+        "only {0} of {1} brakings in a straight line, {2} more were not straight: not enough for forward"
+    ),
+    "parts-differ": (
+        "two parts of the drive disagree by {0:.0f} degrees about forward: did the mount move? Else drive on"
+    ),
+    "forward-uncertain": "forward is known to {0:.1f} degrees only, after {1} brakings: drive on",
+}
+_MOVED = {
+    "between-stops": "two stops differ by over {0:.0f} degrees",
+    "vertical": "the vertical changed by {0:.0f} degrees during the drive",
+    "vertical-in-parts": "the vertical is no longer where it was",
+    "since-standing": "standing and driving differ by {0:.0f} degrees",
+    "since-upright-pose": "the upright pose and driving differ by {0:.0f} degrees",
+    "forward": "forward is no longer where it was",
+    "since-alignment": "it is no longer as it was aligned",
+}
+
+
+def sentence(refusal: Refusal | Notice) -> str:
+    """One line, without the full stop at its end: what is wrong, and where it helps what to do."""
+    if refusal.code == "mount-moved":
+        how, *numbers = refusal.values
+        return "the mount has moved: " + _MOVED[how].format(*numbers)
+    if refusal.code == "speed-unit":
+        return _speed_unit(*refusal.values)
+    words = _SENTENCES.get(refusal.code)
+    return words.format(*refusal.values) if words else console.sentence(refusal)
+
+
+def _speed_unit(factor: float) -> str:
+    """factor: by which the speed changes more than the force says."""
+    guess = "is it in m/s, and the right vehicle's?"
+    if 3.0 < factor < 4.4:
+        guess = "it is in km/h, m/s are needed"
+    elif 1.8 < factor < 2.5:
+        guess = "it is in mph or knots, m/s are needed"
+    return f"the speed changes {factor:.1f} times as much as the force says: {guess}"
