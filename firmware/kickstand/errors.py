@@ -5,14 +5,33 @@ what a board says on its USB console, and the host's tools word it for a termina
 """
 
 
+class Notice:
+    """Something to be told. code: what; values: its numbers and names, in the order that the words for the code use
+    them."""
+
+    def __init__(self, code, *values):
+        self.code = code
+        self.values = values
+
+    def words(self, table, other=""):
+        """What a table says for this code, with the values in it. table: text, a line code|words for each code.
+        other: the words for a code that is not in the table."""
+        start = table.find("\n%s|" % self.code)
+        if start >= 0:
+            start += len(self.code) + 2
+            other = table[start : table.find("\n", start)]
+        return other.format(*self.values)
+
+
 class Refusal(Exception):
-    """A request that cannot be carried out. code: which reason; values: its numbers and names, in the order that the
-    words for the code use them."""
+    """A request that cannot be carried out, told like a Notice."""
 
     def __init__(self, code, *values):
         super().__init__(code, *values)
         self.code = code
         self.values = values
+
+    words = Notice.words
 
 
 class CaptureError(Refusal):
@@ -49,11 +68,3 @@ class SpeedFault(Refusal):
 
 class RecordingError(Refusal):
     """Why the recording of a ride has ended by itself."""
-
-
-class Notice:
-    """Something to be told that is no refusal: a code and its values, worded like those of a Refusal."""
-
-    def __init__(self, code, *values):
-        self.code = code
-        self.values = values
