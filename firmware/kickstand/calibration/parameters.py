@@ -1,19 +1,23 @@
-"""Counts to specific force (g) and angular rate (deg/s) in the sensor's own axes."""
+"""The parameters that turn counts into specific force (g) and angular rate (deg/s), and the sensor's axes into the
+vehicle's."""
 
 from array import array
 
 from ..rotation import matrix, vector
 
-MAX_OFFSET_G = 0.5  # real boards go past the data sheet's 50..80 mg
+# What a real accelerometer may have. The data sheet allows 50 to 80 mg and 3 %; boards that are sold go beyond it.
+MAX_OFFSET_G = 0.5
 MIN_SLOPE, MAX_SLOPE = 0.8, 1.2
 
 
 class Calibration:
-    """The parameters of one mounted sensor, and their use.
+    """The parameters of one mounted sensor. A new one changes nothing: offset 0, slope 1, bias 0, the identity.
 
-    accel_offset (3, g), accel_slope (3), gyro_bias (3, deg/s), vehicle_from_sensor (9, rows left, up, forward),
-    trim_deg: by how much the lean reads too far right. calibrated = slope * reading + offset, Nicolae's equations
-    18-20. six_done: offset and slope were measured; aligned: the matrix was; by_drive: by driving, or refined by it.
+    accel_offset (3, g) and accel_slope (3): calibrated = slope * reading + offset, Nicolae's equations 18-20.
+    gyro_bias (3, deg/s): what the gyro reads at rest. vehicle_from_sensor (9, row-major, rows left, up, forward): the
+    alignment, a rotation matrix. trim_deg: by how many degrees the lean reads too far to the right.
+    six_done: offset and slope were measured. aligned: vehicle_from_sensor was measured. by_drive: it was measured or
+    refined by driving.
     """
 
     def __init__(self):
@@ -45,25 +49,25 @@ class Calibration:
         return new
 
     def set_scale(self, accel_lsb_per_g, gyro_lsb_per_dps):
-        """Say what a count is worth (1, 1: readings are in g and deg/s already)."""
+        """Set the scale of the readings to come. Of a new Calibration it is 1 and 1: readings in g and deg/s."""
         self._accel_lsb = accel_lsb_per_g
         self.set_accel(self.accel_offset, self.accel_slope)
         self._gyro_scale = 1.0 / gyro_lsb_per_dps
 
     def set_accel(self, offset, slope):
-        """Take the six-position result: offset (3, g) and slope (3)."""
+        """Set offset (3, g) and slope (3)."""
         for i in range(3):
             self.accel_offset[i] = offset[i]
             self.accel_slope[i] = slope[i]
             self._scale[i] = slope[i] / self._accel_lsb
 
     def parameters(self):
-        """All 19 that were measured: offset, slope, gyro bias, matrix, trim."""
+        """The 19 numbers that were measured: offset (3), slope (3), gyro bias (3), matrix (9), trim."""
         measured = list(self.accel_offset) + list(self.accel_slope) + list(self.gyro_bias)
         return measured + list(self.vehicle_from_sensor) + [self.trim_deg]
 
     def set_parameters(self, values):
-        """Take those of parameters()."""
+        """Set the 19 numbers, in the order of parameters()."""
         self.set_accel(values[0:3], values[3:6])
         for i in range(3):
             self.gyro_bias[i] = values[6 + i]
@@ -72,15 +76,16 @@ class Calibration:
         self.trim_deg = values[18]
 
     def correct(self, accel):
-        """Calibrated copy of a mean accelerometer reading in g."""
+        """A mean accelerometer reading (3, g), calibrated: a new array."""
         return array("f", [self.accel_slope[i] * accel[i] + self.accel_offset[i] for i in range(3)])
 
     def scales(self):
-        """g per count of each accelerometer axis (3), and deg/s per count of the gyro."""
+        """What a count is worth: g for each accelerometer axis (3), and deg/s for the gyro."""
         return self._scale, self._gyro_scale
 
     def apply(self, reading, force, rate):
-        """reading (7, chip's order: accelerometer, temperature, gyro) -> force (3, g) and rate (3, deg/s)."""
+        """Fill force (3, g) and rate (3, deg/s), both in the sensor's axes, from a reading (7, the chip's order:
+        accelerometer, temperature, gyro)."""
         scale, offset, bias, gyro_scale = self._scale, self.accel_offset, self.gyro_bias, self._gyro_scale
         force[0] = scale[0] * reading[0] + offset[0]
         force[1] = scale[1] * reading[1] + offset[1]

@@ -4,19 +4,24 @@ from ..errors import CaptureError
 from .still_pose import StillPose
 
 SETTLE_MS = 500
-GIVE_UP_MS = 10_000
+GIVE_UP_MS = 10_000  # of waiting for stillness
 
+# What step() returns
 SETTLING = 0  # waiting for stillness
-SETTLED = 1  # returned once: half a second of stillness is over and `settled` holds its mean; taking begins
-TAKING = 2
-DONE = 3  # pose holds it
-SPOILT = 4  # problem holds the CaptureError
+SETTLED = 1  # for one sample: it has been still for SETTLE_MS, and averaging begins
+TAKING = 2  # averaging
+DONE = 3  # for one sample: the pose is complete
+SPOILT = 4  # for one sample: see problem
 _ENDED = 5
 
 
 class PoseTaker:
-    """Takes a StillPose while the loop runs. chip: an Mpu6050, for its scale and range.  rate_hz: samples a
-    second.  seconds: to average."""
+    """Takes one pose from samples that come one by one.
+
+    chip: an Mpu6050, for its scale and range. rate_hz: samples a second. seconds: how long to average.
+    settled: the mean reading (3, g) of the half second before averaging, once SETTLED. pose: the StillPose, finished
+    once DONE. problem: the CaptureError, once SPOILT.
+    """
 
     def __init__(self, chip, rate_hz, seconds):
         self._chip = chip
@@ -26,7 +31,7 @@ class PoseTaker:
         self.restart()
 
     def restart(self):
-        """Begin again with waiting for stillness."""
+        """Begin again by waiting for stillness."""
         self._state = SETTLING
         self._waited = 0
         self.settled = None
@@ -34,7 +39,7 @@ class PoseTaker:
         self.pose = self._new(self._settle_count)
 
     def step(self, counts):
-        """Take one sample; return the state."""
+        """Take one sample (7 counts, the chip's order); return one of the states above."""
         if self._state == SETTLING:
             return self._settle(counts)
         if self._state == TAKING:
@@ -43,11 +48,11 @@ class PoseTaker:
 
     @property
     def restless(self):
-        """True while stillness is being waited for longer than a still sensor would need."""
+        """True when it has waited for stillness for longer than a sensor at rest would need."""
         return self._state == SETTLING and self._waited > 2 * self._settle_count
 
     def progress(self):
-        """(samples taken, samples wanted) of the pose itself."""
+        """How many samples are averaged by now, and how many are wanted."""
         return (self.pose.count, self._take_count) if self._state == TAKING else (0, self._take_count)
 
     def _new(self, expected):

@@ -1,9 +1,9 @@
 """Accelerometer offset and slope from six still poses, one on each side (A. Nicolae, section 4).
 
-The closed form (16)-(17) assumes that each axis points exactly up or down: 10 degrees off costs 0.6 degrees.
-fit() uses the same six means but asks only that each calibrated reading be 1 g long, which holds in any pose;
-it stays near 0.1 degrees (Gauss-Newton from the closed form). Six poses determine six numbers exactly, so
-their residual proves nothing: a seventh, free pose does.
+The closed form, equations 16-17, assumes that each axis points exactly up or down: a pose that is 10 degrees off costs
+0.6 degrees of lean. fit() uses the same six mean readings, but asks only that each calibrated reading be 1 g long: that
+holds in any pose. It starts from the closed form, takes a few Gauss-Newton steps, and stays near 0.1 degrees.
+Six poses determine six numbers exactly, so that their residual proves nothing. A seventh, free pose does.
 """
 
 from math import acos, degrees
@@ -12,17 +12,17 @@ from ..errors import CalibrationError
 from ..units import AXES
 from .parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE
 
-SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")  # the axis that points up
-MAX_TILT_DEG = 20.0  # of a side from its axis
-FREE_TILT_DEG = 20.0  # a free pose nearer than this to a side says little new
-FREE_GOOD_G = 0.010
-FREE_MAX_G = 0.020  # up to 2 % of cross-axis sensitivity, which offset and slope cannot describe
+SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")  # which axis points up, in the order of the six poses
+MAX_TILT_DEG = 20.0  # largest angle between a side's axis and the vertical
+FREE_TILT_DEG = 20.0  # a free pose that is nearer to one of the sides says little new
+FREE_GOOD_G = 0.010  # of a free pose: |force| - 1 g of a good calibration
+FREE_MAX_G = 0.020  # and the largest allowed: 2 % of cross-axis sensitivity, which offset and slope cannot describe
 SHEET_OFFSET_G = (0.05, 0.05, 0.08)
 SHEET_SLOPE = 0.03
 
 
 def side_of(accel):
-    """Index into SIDES of the axis nearest to up in a mean reading (3, g)."""
+    """Index into SIDES: which side is up in a mean reading (3, g)."""
     axis = 0
     for i in (1, 2):
         if abs(accel[i]) > abs(accel[axis]):
@@ -31,7 +31,7 @@ def side_of(accel):
 
 
 def tilt_deg(force):
-    """How far the nearest axis is from the vertical, degrees. force: 3, any unit; a null vector gives 90."""
+    """Angle between the vertical and the axis nearest to it, in degrees. force: 3, any unit; a null vector gives 90."""
     size = sum(f * f for f in force) ** 0.5
     if not size > 1e-6:
         return 90.0
@@ -39,8 +39,8 @@ def tilt_deg(force):
 
 
 def closed_form(poses):
-    """Equations 16-17 in g. poses: six mean readings (3, g) in the order of SIDES. Returns offset (3, g),
-    slope (3)."""
+    """Offset (3, g) and slope (3) by equations 16-17. poses: six mean readings (3, g) in the order of SIDES. Raises
+    CalibrationError for an axis that does not change."""
     offset, slope = [0.0] * 3, [0.0] * 3
     for i in range(3):
         high, low = poses[2 * i][i], poses[2 * i + 1][i]
@@ -52,11 +52,11 @@ def closed_form(poses):
 
 
 def fit(poses):
-    """Offset (3, g) and slope (3) that make all six readings 1 g long. poses as for closed_form. Raises
+    """Offset (3, g) and slope (3) that make all six calibrated readings 1 g long. poses: as for closed_form(). Raises
     CalibrationError."""
     offset, slope = closed_form(poses)
     rows = [[0.0] * 7 for _ in range(6)]
-    for _ in range(8):  # it settles in 3 to 5
+    for _ in range(8):  # 3 to 5 steps are enough
         for pose, row in zip(poses, rows):
             square = 0.0
             for i in range(3):
@@ -72,13 +72,13 @@ def fit(poses):
             slope[i] += rows[3 + i][6]
         if max(abs(row[6]) for row in rows) < 1e-6:
             break
-    check(offset, slope, poses)
+    check_plausible(offset, slope, poses)
     return offset, slope
 
 
-def check(offset, slope, poses):
-    """Raise CalibrationError unless the parameters are plausible and every side was within MAX_TILT_DEG of
-    its axis."""
+def check_plausible(offset, slope, poses):
+    """Raise CalibrationError unless offset and slope are plausible, and the axis of every side was within MAX_TILT_DEG
+    of the vertical."""
     for i in range(3):
         if not (abs(offset[i]) < MAX_OFFSET_G and MIN_SLOPE < slope[i] < MAX_SLOPE):
             raise CalibrationError("implausible-axis", AXES[i], offset[i], slope[i])
@@ -89,7 +89,8 @@ def check(offset, slope, poses):
 
 
 def check_free_pose(offset, slope, accel):
-    """Check a seventh, slanted pose against 1 g; return the error in g. Raises CalibrationError."""
+    """How far the calibrated reading of a seventh, slanted pose is from 1 g. accel: its mean reading (3, g). Raises
+    CalibrationError beyond FREE_MAX_G."""
     force = [slope[i] * accel[i] + offset[i] for i in range(3)]
     error = sum(f * f for f in force) ** 0.5 - 1.0
     if not abs(error) <= FREE_MAX_G:
@@ -98,15 +99,15 @@ def check_free_pose(offset, slope, accel):
 
 
 def beyond_sheet(offset, slope):
-    """Names of the axes whose offset or slope is past the data sheet (used, but worth a warning)."""
+    """Names of the axes whose offset or slope is beyond what the data sheet allows: usable, but worth a warning."""
     return [
         AXES[i] for i in range(3) if abs(offset[i]) > SHEET_OFFSET_G[i] or abs(slope[i] - 1.0) > SHEET_SLOPE
     ]
 
 
 def _solve(rows):
-    """Gauss-Jordan with partial pivoting on six rows of [6 coefficients, right side]; the solution ends up
-    in column 6. False if singular."""
+    """Solve six linear equations in place (Gauss-Jordan elimination with partial pivoting). rows: six lists of six
+    coefficients and the right-hand side, in whose place the solution comes. False for singular equations."""
     for k in range(6):
         pivot = k
         for r in range(k + 1, 6):

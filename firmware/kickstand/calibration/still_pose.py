@@ -1,26 +1,28 @@
-"""One still pose, averaged: raw integer sums, with stillness watched sample by sample.
+"""The mean reading of one still pose, with a check that it was still.
 
-Integers only until the end: a sum of float32 readings would lose what the averaging is for.
+Sums are kept as integers until the end: 32-bit floats would lose the digits that averaging gains.
 """
 
 from ..errors import CaptureError
 
-PEAK_G = 0.08  # a knock; ten times the noise of the chip with its widest filter
+# No sample may be further from the first: beyond is a knock. Ten times the chip's noise with its widest filter.
+PEAK_G = 0.08
 PEAK_DPS = 5.0
-SPREAD_G = 0.02  # standard deviation: being still matters more than being exact
-DRIFT_G = 0.007  # between the means of both halves: 0.4 degrees of slow tilt
-MAX_BIAS_DPS = 45.0  # data sheet: 20, and as much again over temperature
+SPREAD_G = 0.02  # largest standard deviation: being still matters more than the exact angle of a pose
+DRIFT_G = 0.007  # largest difference between the means of both halves: 0.4 degrees of slow tilt
+MAX_REST_RATE_DPS = 45.0  # the data sheet allows 20 deg/s of gyro offset, and as much again over temperature
 MIN_SAMPLES = 20
 
 _AXES = (0, 1, 2, 4, 5, 6)  # accelerometer and gyro in the chip's order; 3 is the temperature
 
 
 class StillPose:
-    """Collects the samples of one pose.
+    """Averages the samples of one pose.
 
-    accel_lsb_per_g, gyro_lsb_per_dps: counts per unit.  accel_limit: |counts| from which an axis is
-    saturated. expected: how many samples are to come; the drift check compares the halves. After finish():
-    accel (g, sensor axes, uncalibrated), gyro (deg/s), temperature (counts), count.
+    accel_lsb_per_g, gyro_lsb_per_dps: counts per unit. accel_limit: |counts| from which on an axis is saturated.
+    expected: how many samples are to come; the check for drift compares the halves.
+    count: samples taken. problem: a CaptureError once the pose is spoilt, or None.
+    After finish(): accel (3, g, sensor's axes, uncalibrated), gyro (3, deg/s), temperature (counts).
     """
 
     def __init__(self, accel_lsb_per_g, gyro_lsb_per_dps, accel_limit, expected):
@@ -42,7 +44,7 @@ class StillPose:
         self.temperature = 0
 
     def add(self, counts):
-        """Take one sample (7 integers, the chip's order); False once the pose is spoilt, see problem."""
+        """Take one sample (7 integers, the chip's order). False once the pose is spoilt."""
         if self.problem is not None:
             return False
         if self.count == 0:
@@ -66,7 +68,7 @@ class StillPose:
         return True
 
     def finish(self):
-        """Check the whole pose and set accel, gyro and temperature. Raises CaptureError with the reason."""
+        """Check the whole pose and set accel, gyro and temperature. Raises CaptureError."""
         if self.problem is None:
             self.problem = self._judge()
         if self.problem is not None:
@@ -76,8 +78,8 @@ class StillPose:
         self.accel = [mean[i] / self._accel_lsb for i in range(3)]
         self.gyro = [mean[i] / self._gyro_lsb for i in range(4, 7)]
         self.temperature = mean[3]
-        if max(abs(rate) for rate in self.gyro) > MAX_BIAS_DPS:
-            raise CaptureError("gyro-offset", MAX_BIAS_DPS)
+        if max(abs(rate) for rate in self.gyro) > MAX_REST_RATE_DPS:
+            raise CaptureError("gyro-offset", MAX_REST_RATE_DPS)
 
     def _judge(self):
         n = self.count

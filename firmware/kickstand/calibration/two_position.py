@@ -1,7 +1,8 @@
-"""Sensor to vehicle from two still poses: on the kickstand and upright (A. Nicolae, section 2).
+"""Alignment from two still poses, on the kickstand and upright (A. Nicolae, section 2).
 
-The paper's slips, put right: (4) is the cross product upright x tilted; (5) takes y from the upright reading,
-divided by its own length; with the bike leaned to the right, x and z come out reversed and are turned round.
+Where it departs from the paper: (4) is the cross product of the upright and the tilted reading, which as printed is
+zero. (5) takes y from the upright reading and divides by its own length. Where the kickstand leans the bike to the
+right, x and z come out pointing right and backward, and both are turned round.
 """
 
 from math import atan2, degrees
@@ -9,27 +10,31 @@ from math import atan2, degrees
 from ..errors import AlignmentError
 from ..rotation import cross, dot, matrix, norm, normalize, vector
 
-MIN_TILT_DEG = 5.0  # below, 1 degree of pitch change between the poses turns forward by over 11 degrees
+# Between the poses. At 5 degrees, one degree of pitch between them turns forward by 11 degrees; at 8, by 7.
+MIN_TILT_DEG = 5.0
 WARN_TILT_DEG = 8.0
 MAX_TILT_DEG = 60.0
 SAME_POSE_DEG = 1.0
-UNCALIBRATED_TOLERANCE_G = 0.15  # data sheet: 80 mg of offset and 3 % of scale, and a little drift
-CALIBRATED_TOLERANCE_G = 0.05  # after six positions only drift over temperature is left: 35 mg
+# How far a reading at rest may be from 1 g. The data sheet allows 80 mg of offset and 3 % of scale, plus drift; after
+# the six positions only 35 mg of drift over temperature is left.
+UNCALIBRATED_TOLERANCE_G = 0.15
+CALIBRATED_TOLERANCE_G = 0.05
 
 
 def check_one_g(force, tolerance_g, pose):
-    """Raise AlignmentError unless |force| is within tolerance of 1 g. pose: its name for the rider."""
+    """Raise AlignmentError unless the length of force (3, g) is within tolerance_g of 1. pose: "kickstand" or
+    "upright"."""
     size = norm(force)
     if not abs(size - 1.0) <= tolerance_g:
         raise AlignmentError("not-one-g", pose, size)
 
 
 def two_position(out, kickstand, upright, side="left", tolerance_g=UNCALIBRATED_TOLERANCE_G):
-    """Fill out (9, rows left, up, forward) with vehicle-from-sensor; return the tilt between the poses in
-    degrees.
+    """Fill out (9, rows left, up, forward) with the rotation from sensor to vehicle axes; return the tilt between the
+    poses in degrees. Equations 3-8.
 
-    kickstand, upright: mean specific force of each pose in the sensor's axes, g. side: where the kickstand
-    leans the bike to. Raises AlignmentError. Equations 3-8.
+    kickstand, upright: mean specific force of each pose (3, g, sensor's axes). side: where the kickstand leans the bike
+    to, "left" or "right". Raises AlignmentError.
     """
     check_one_g(kickstand, tolerance_g, "kickstand")
     check_one_g(upright, tolerance_g, "upright")

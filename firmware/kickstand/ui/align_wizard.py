@@ -1,4 +1,4 @@
-"""Guides the rider through the two poses, kickstand first, and hands over a new calibration."""
+"""Guides the rider through the two poses, first on the kickstand, then upright, and saves the alignment."""
 
 from time import ticks_add, ticks_diff
 
@@ -15,10 +15,10 @@ _TAKING = ("Stand: hold", "Upright: hold")
 
 
 class AlignWizard:
-    """A view (see views.py) that wants each sample too, until it has ended.
+    """A view (see views.py) that also takes each sample, until it has ended.
 
-    chip, rate_hz: as for PoseTaker.  calibration: the ActiveCalibration.  side: "left" or "right".  pressed: the press
-    on the kickstand has just been made.
+    chip, rate_hz: as for PoseTaker. calibration: the ActiveCalibration. side: where the kickstand leans the bike to,
+    "left" or "right". pressed: the rider has already pressed the button for the pose on the kickstand.
     """
 
     def __init__(self, chip, rate_hz, calibration, side, pressed=False):
@@ -33,7 +33,7 @@ class AlignWizard:
             self._begin()
 
     def sample(self, counts, now_ms):
-        """Take one sample: seven counts, the chip's order."""
+        """Take one sample: 7 counts, the chip's order."""
         if self._taking:
             self._take(counts, now_ms)
 
@@ -46,7 +46,7 @@ class AlignWizard:
         if event == LONG or self._leave_ms is not None:
             self.ended = True
         elif not self._taking:
-            if self._unlike:  # the two poses did not fit together: from the beginning
+            if self._unlike:  # the two poses did not fit together: begin with the first
                 self._ask(0)
             else:
                 self._begin()
@@ -91,6 +91,6 @@ class AlignWizard:
         self._lines = ("Aligned! %5.1f%s" % (tilt, messages.DEGREE), warning)
 
     def _refuse(self, problem):
-        """Say why; the next press does the pose again."""
+        """Say why. The next press takes the pose again."""
         self._taking = False
         self._lines = messages.lines(problem)

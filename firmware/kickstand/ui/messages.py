@@ -2,7 +2,8 @@
 
 DEGREE = "\xdf"  # in the display's character ROM
 
-# code|first line|second line; {0}, {1} ... are the refusal's values. As one text it takes 3 KB of heap, as a dictionary 7.
+# code|first line|second line; {0}, {1} ... are the refusal's values. As one text this takes 3 KB of heap; a dictionary
+# takes 7.
 _LINES = """
 moved|Moved!|Hold it still
 vibration|Moved!|Hold it still

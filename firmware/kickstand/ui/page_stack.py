@@ -9,7 +9,8 @@ CAR = (pages.acceleration, pages.cornering, pages.raw)
 
 
 class PageStack:
-    """app: the App. align: called for a press before there is an alignment: the bike is on its stand."""
+    """The page that is shown, as a view (see views.py). app: the App. align: called for a short press while there is no
+    alignment: it means that the bike is on its kickstand."""
 
     def __init__(self, app, align):
         self._meter = app.meter
@@ -39,7 +40,7 @@ class PageStack:
 
     @property
     def _driving(self):
-        """True while what alignment by driving waits for is a page, the first until there is an alignment."""
+        """True while alignment by driving has a page: the first one until there is an alignment, then the last."""
         return self._drive is not None and self._drive.shown
 
     def _drive_lines(self, now_ms):
@@ -55,7 +56,7 @@ class PageStack:
                 return self._drive_lines(now_ms)
             return pages.not_aligned(self._meter, now_ms // 1000, "drive and brake")
         count = len(self._pages) + self._driving + self._recorder.active
-        if self._at >= count:  # here and not in each use: when a page goes, the others stay where they are
+        if self._at >= count:  # the last page has gone; checked here, so that the other pages keep their places
             self._at = 0
         if self._at == len(self._pages) and self._driving:
             return self._drive_lines(now_ms)

@@ -1,4 +1,7 @@
-"""What each page says in two lines of 16 characters. Pure formatting: meter in, text out."""
+"""What each page says in two lines of 16 characters. A page is a function: meter in, two lines out.
+
+page_stack.py lists the pages that a short press turns.
+"""
 
 from ..lean.formula import static_lean_deg
 from ..rotation import vector
@@ -8,8 +11,8 @@ from .messages import DEGREE
 ARROW = "\x7e"  # in the display's character ROM, as is the full block
 RECORDING = "*"
 _BLOCK = 0xFF
-_HALF_BAR = 8  # cells to each side of the middle
-_DEG_PER_COLUMN = 1.5  # 8 cells of 5 columns: the bar ends at 60 degrees
+_HALF_BAR = 8  # character cells to each side of the middle
+_DEG_PER_COLUMN = 1.5  # 8 cells of 5 dot columns each: the bar ends at 60 degrees
 
 FALLEN = ("Fallen over?", "Lean over 65" + DEGREE)
 
@@ -17,18 +20,18 @@ _bar = bytearray(16)
 
 
 def unsure(doubt):
-    """No lean. doubt: the code of the reason, or None."""
+    """In place of a lean that cannot be trusted. doubt: the code of the reason, or None."""
     return "Lean  --", messages.doubt(doubt)
 
 
 def lean_bar(lean_deg):
-    """16 glyph codes: a bar from the middle to the side of the lean. Glyphs 0..3: 1..4 columns from the
-    left, 4..7 from the right."""
+    """16 character codes: a bar from the middle to the side of the lean. Of the display's own glyphs 0 to 3 have 1 to 4
+    dot columns filled from the left, 4 to 7 from the right."""
     columns = min(5 * _HALF_BAR, int(abs(lean_deg) / _DEG_PER_COLUMN + 0.5))
     right = columns if lean_deg > 0 else 0
     left = columns if lean_deg < 0 else 0
     for cell in range(_HALF_BAR):
-        # one column of each side is always on: the mark in the middle
+        # the innermost dot column of each side is always on: it marks the middle
         _bar[_HALF_BAR + cell] = _cell(max(1, right) - 5 * cell, 0)
         _bar[_HALF_BAR - 1 - cell] = _cell(max(1, left) - 5 * cell, 4)
     return _bar
@@ -41,29 +44,30 @@ def _cell(columns, first_glyph):
 
 
 def progress_bar(done, total):
-    """16 cells, filled up to done of total."""
+    """A bar of up to 16 full cells: done of total."""
     filled = 16 * done // total if total else 0
     return "\xff" * min(16, filled)
 
 
 def side_name(lean_deg):
-    """left, right, or nothing within half a degree of upright."""
+    """left or right; nothing within half a degree of upright."""
     return "right" if lean_deg >= 0.5 else "left" if lean_deg <= -0.5 else ""
 
 
 def lean(meter):
-    """Lean with its side, and the bar."""
+    """The lean with its side, and its bar."""
     shown = meter.lean_deg
     return "Lean %3d%s %s" % (int(abs(shown) + 0.5), DEGREE, side_name(shown)), lean_bar(shown)
 
 
 def recorded(line):
-    """The line with the mark of a ride being recorded in its last column."""
-    return line + " " * (15 - len(line)) + RECORDING  # %-15s would count bytes, of which a degree sign is two
+    """The line with the mark in its last column that says that a ride is being recorded."""
+    # by hand: MicroPython's %-15s counts the bytes of a degree sign, which are two
+    return line + " " * (15 - len(line)) + RECORDING
 
 
 def recording(recorder):
-    """How long the ride has been recorded, and for how long there is room until its beginning has to go."""
+    """For how long the ride has been recorded, and for how much longer there is room before its beginning is erased."""
     seconds, room_s = recorder.seconds(), recorder.room_s()
     if room_s is None:
         room = "to USB"
@@ -75,7 +79,7 @@ def recording(recorder):
 
 
 def maxima(meter):
-    """The largest lean to each side since the reset."""
+    """The largest lean to each side since the last reset of the maxima."""
     return (
         "Max left   %3d%s" % (int(meter.max_left_deg + 0.5), DEGREE),
         "Max right  %3d%s" % (int(meter.max_right_deg + 0.5), DEGREE),
@@ -99,7 +103,7 @@ def cornering(meter):
 
 
 def formula(meter):
-    """Nicolae's formula as it stands, beside the filter's lean: why there is a filter."""
+    """Nicolae's formula as published beside the filter's lean: this shows why there is a filter."""
     return (
         "Formula   %4d%s" % (round(meter.lean_formula_deg), DEGREE),
         "Filter    %4d%s" % (round(meter.lean_deg), DEGREE),
@@ -117,14 +121,16 @@ def raw(meter):
 
 
 def not_aligned(meter, seconds, todo="On stand: press"):
-    """Before alignment (the paper's figure 3): tilt and g of the sensor's axes, which are not the bike's."""
+    """Before alignment: tilt and g in the sensor's own axes, which are not the bike's (Nicolae's figure 3). todo: what
+    to do next; shown in turn with "Not aligned"."""
     tilt = static_lean_deg(meter.smooth_force)
     hint = "Not aligned" if seconds % 4 < 2 else todo
     return "Raw %4d%s %+.2fg" % (round(tilt), DEGREE, meter.smooth_force[2]), hint
 
 
 def sensor_info(sensor, meter, seconds):
-    """Which chip, how warm; what is calibrated, and in turn how often its FIFO overflowed and it was set up."""
+    """Which chip it is and how warm; below that in turn what is calibrated, and how often the chip's FIFO overflowed
+    and the chip was set up."""
     chip, calibration = sensor.chip, meter.calibration
     line1 = "%-9s%5.1f%sC" % (chip.name[:9], chip.temperature_c(meter.reading[3]), DEGREE)
     if seconds % 4 < 2:

@@ -1,4 +1,4 @@
-"""What the rider sees and what a press does: one stack of views. What is in front is shown, and a press is for it."""
+"""What the rider sees and what a press does: a stack of views. The one in front is shown, and a press is for it."""
 
 from ..board.button import LONG
 from . import messages, pages
@@ -10,9 +10,9 @@ from .views import FaultView, InfoView, NoticeView, QuestionView
 
 
 class Screen:
-    """app: the App, of which it shows sensor, meter, calibration, alignment by driving and recorder.
+    """app: the App, whose sensor, meter, calibration, drive and recorder it shows.
 
-    wizard: the one under way, which wants every sample, or None.
+    wizard: the AlignWizard or SixWizard under way, which takes every sample, or None.
     """
 
     def __init__(self, app):
@@ -35,7 +35,7 @@ class Screen:
     def press(self, event, now_ms):
         """event: SHORT or LONG. A long press that the view in front has no use for opens the menu."""
         view = self._front(now_ms)[0]
-        if view is self._notice:  # nobody waits for its end: the press is for what it covers,
+        if view is self._notice:  # nobody waits two seconds: the press is for what the notice covers,
             self._notice.close()
             view = self._front(now_ms)[0]
             if view is self._question:  # unless that is a question, which has not been read yet
@@ -44,13 +44,13 @@ class Screen:
             self._menu = Menu(self._entries(), now_ms)
 
     def interrupt(self, now_ms):
-        """The sensor fails: what it was calibrated for is broken off."""
+        """The sensor has failed: a calibration under way is broken off."""
         if self.wizard:
             self.wizard = None
             self._notice.show(("Calibration", "stopped: fault"), now_ms)
 
     def _front(self, now_ms):
-        """(view, its lines): of those that have something to show, the first in this order."""
+        """The view in front and its two lines: the first in this order that has something to show."""
         for view in (
             self._notice,
             self.wizard,
@@ -68,11 +68,11 @@ class Screen:
         if self._menu and self._menu.ended:
             self._menu = None
         if view is self._question:
-            self._pages.first()  # to come back to
+            self._pages.first()  # where the answer leads to
         return view, lines
 
     def _entries(self):
-        """Of the menu: (name, what to call)."""
+        """The entries of the menu: (name, what to call with now_ms)."""
         align = (("Align the bike", self._align),)
         six = (("Six positions", self._six),)
         rest = (("Reset maxima", self._reset), ("Sensor info", self._info.show))
@@ -86,7 +86,7 @@ class Screen:
         return align + six + rest + drive + record
 
     def _ready(self, now_ms):
-        """True if the sensor gives readings; else the rider is told."""
+        """True if there are readings; if not, the rider is told why."""
         fault = self._app.sensor.fault
         if fault is not None:
             self._notice.show(messages.lines(fault), now_ms)
@@ -97,7 +97,7 @@ class Screen:
             self._begin_align(False)
 
     def _align_now(self):
-        """The press was that of the first pose."""
+        """This press is already that for the pose on the kickstand."""
         self._begin_align(True)
 
     def _begin_align(self, pressed):

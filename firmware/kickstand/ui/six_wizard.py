@@ -1,5 +1,4 @@
-"""Guides the six-position calibration: each side up once, in any order, then one slanted pose as the
-proof."""
+"""Guides the rider through the six positions, each side up once in any order, and a slanted pose as the proof."""
 
 from time import ticks_add, ticks_diff
 
@@ -13,13 +12,13 @@ from . import messages, pages
 POSE_SECONDS = 2
 NOTICE_MS = 1500
 RESULT_MS = 6000
-ROUGH_TILT_DEG = 30.0  # of an uncalibrated side; the fit checks it again with the offsets known
+ROUGH_TILT_DEG = 30.0  # largest tilt of a side before it is calibrated; the fit checks it more strictly
 
 
 class SixWizard:
-    """A view (see views.py) that wants each sample too, until it has ended.
+    """A view (see views.py) that also takes each sample, until it has ended.
 
-    chip, rate_hz: as for PoseTaker.  calibration: the ActiveCalibration.
+    chip, rate_hz: as for PoseTaker. calibration: the ActiveCalibration.
     """
 
     def __init__(self, chip, rate_hz, calibration):
@@ -38,7 +37,7 @@ class SixWizard:
         self._next()
 
     def sample(self, counts, now_ms):
-        """Take one sample: seven counts, the chip's order."""
+        """Take one sample: 7 counts, the chip's order."""
         if self._leave_ms is None and self._notice_ms is None and not self._refused:
             self._take(counts, now_ms)
 
@@ -59,7 +58,7 @@ class SixWizard:
         return True
 
     def _next(self):
-        """Ask for the next pose and watch for stillness."""
+        """Ask for the next pose and wait until the sensor lies still."""
         self._taker.restart()
         if self._fitted:
             self._lines = ("Check: slant it", "and hold still")
@@ -86,7 +85,7 @@ class SixWizard:
                 self._lines = (name + ", hold", pages.progress_bar(done, total))
 
     def _look(self, now_ms):
-        """Still for half a second: is it a pose that is wanted?"""
+        """It has lain still for half a second: is this a pose that is still missing?"""
         accel = self._taker.settled
         if self._fitted:
             offset, slope = self._fitted
@@ -115,7 +114,7 @@ class SixWizard:
         self._notice(("Side %s done" % six_position.SIDES[self._side], "%d/6, turn it" % done), now_ms)
 
     def _prove(self, pose, now_ms):
-        """The seventh pose: only a calibration that it confirms is saved. Raises CalibrationError,
+        """The seventh pose: the calibration is saved only if this pose confirms it. Raises CalibrationError,
         StoreError."""
         offset, slope = self._fitted
         error = six_position.check_free_pose(offset, slope, pose.accel)
