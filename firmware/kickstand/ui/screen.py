@@ -41,6 +41,10 @@ class Screen:
         self._notice = None
         self._notice_ms = 0
 
+    def add_page(self, page):
+        """One more page, after the others. page(meter): its two lines, of at most 16 characters each."""
+        self._pages += (page,)
+
     def interrupt(self, now_ms):
         """The sensor fails: what it was calibrated for is broken off."""
         if self.wizard:
