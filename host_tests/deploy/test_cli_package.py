@@ -55,7 +55,9 @@ def test_the_wheel_carries_the_firmware(tmp_path):
 
 def test_an_installation_stays_that_of_the_checkout():
     """Without -e `flash --config` would copy a config.py that the rider has never edited."""
-    told = re.findall(r"pip install\b.*", (ROOT / "README.md").read_text(encoding="utf-8")) + [extra("rides")]
+    readmes = [ROOT / "README.md", ROOT / "firmware" / "README.md", ROOT / "tools" / "README.md"]
+    text = "\n".join(path.read_text(encoding="utf-8") for path in readmes)
+    told = re.findall(r"pip install\b.*", text) + [extra("rides")]
     assert len(told) >= 4
     assert all("pip install -e " in line for line in told)
 

@@ -21,6 +21,10 @@ class PageStack:
         self._pages = CAR if app.settings.VEHICLE == "car" else MOTORCYCLE
         self._at = 0
 
+    def add(self, page):
+        """Add a page behind the others."""
+        self._pages += (page,)
+
     def first(self):
         """Back to the first page."""
         self._at = 0

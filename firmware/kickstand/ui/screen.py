@@ -43,6 +43,10 @@ class Screen:
         if not view.press(event, now_ms) and event == LONG:
             self._menu = Menu(self._entries(), now_ms)
 
+    def add_page(self, page):
+        """Add a page behind the others. page: a function of the meter that gives two lines of 16 characters."""
+        self._pages.add(page)
+
     def interrupt(self, now_ms):
         """The sensor has failed: a calibration under way is broken off."""
         if self.wizard:

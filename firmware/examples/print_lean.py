@@ -1,0 +1,39 @@
+"""Prints the lean of the bike, ten times a second: the lean meter's mathematics in a program of your own.
+
+The firmware must be on the board (`kickstand flash`), and the bike aligned with it once. Then, on your computer:
+
+    mpremote run firmware/examples/print_lean.py
+
+and you see the lean, positive to the right, and the acceleration along the bike:
+
+    lean  +23.4 deg   forward -0.12 g
+
+Ctrl-C stops the printing; `mpremote reset` starts the lean meter again.
+"""
+
+from time import sleep_ms
+
+from kickstand import settings
+from kickstand.calibration.store import Store
+from kickstand.devices import open_sensor
+from kickstand.lean.meter import LeanMeter
+
+config = settings.load()
+sensor = open_sensor(config)
+chip = sensor.chip
+chip.connect(sensor.reopen())
+chip.setup()  # from now on it samples by itself, SAMPLE_HZ times a second
+
+calibration = Store(chip.who_am_i, chip.accel_range_g).load()  # what the lean meter has stored in flash
+calibration.set_scale(chip.accel_lsb_per_g, chip.gyro_lsb_per_dps)
+if not calibration.aligned:
+    print("Not aligned: this is the lean of the sensor, not of the bike.")
+meter = LeanMeter(calibration)
+
+while True:
+    for _ in range(10):
+        sleep_ms(10)  # the chip keeps its samples for up to 0.17 s
+        n = chip.add_up(chip.fetch())
+        if n:
+            meter.update_sum(chip.sums, n, n * 1_000_000 // config.SAMPLE_HZ)
+    print("lean %+6.1f deg   forward %+.2f g" % (meter.lean_deg, meter.smooth_force[2]))

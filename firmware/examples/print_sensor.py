@@ -1,0 +1,35 @@
+"""Prints what the sensor measures, five times a second.
+
+The firmware must be on the board (`kickstand flash`). Then, on your computer:
+
+    mpremote run firmware/examples/print_sensor.py
+
+and you see acceleration, turning rate and temperature, the first two along the sensor's own x, y and z:
+
+    -0.01  +0.02  +1.01 g     +0.3   -1.2   +0.1 deg/s   25.3 C
+
+At rest the axis that points up shows about 1 g, and all three rates are small. The values are not calibrated.
+Ctrl-C stops the printing; `mpremote reset` starts the lean meter again.
+"""
+
+from time import sleep_ms
+
+from kickstand import settings
+from kickstand.board.i2c_bus import open_i2c
+from kickstand.imu.mpu6050 import Mpu6050
+
+config = settings.load()  # the pins, from the board's config.py
+i2c = open_i2c(config.SENSOR_I2C, config.SENSOR_SDA, config.SENSOR_SCL, config.SENSOR_BUS_HZ)
+chip = Mpu6050(i2c, config.SENSOR_ADDRESS)
+chip.setup()
+print("Found an", chip.name)
+
+while True:
+    chip.read()
+    ax, ay, az, temperature, gx, gy, gz = chip.counts
+    g, dps = chip.accel_lsb_per_g, chip.gyro_lsb_per_dps  # counts in 1 g and in 1 deg/s
+    print(
+        "%+6.2f %+6.2f %+6.2f g   %+6.1f %+6.1f %+6.1f deg/s   %.1f C"
+        % (ax / g, ay / g, az / g, gx / dps, gy / dps, gz / dps, chip.temperature_c(temperature))
+    )
+    sleep_ms(200)

@@ -1,0 +1,30 @@
+"""Shows two lines on the display, and counts the seconds.
+
+The firmware must be on the board (`kickstand flash`). Then, on your computer:
+
+    mpremote run firmware/examples/show_text.py
+
+and the display says:
+
+    Hello, rider!
+    on for 12 s
+
+You may unplug the display and plug it in again: it is found and set up by itself. `mpremote reset` starts the lean
+meter again.
+"""
+
+from time import sleep_ms, ticks_diff, ticks_ms
+
+from kickstand import settings
+from kickstand.devices import open_lcd
+
+lcd = open_lcd(settings.load())  # on the pins of the board's config.py
+start_ms = ticks_ms()
+
+while True:
+    now_ms = ticks_ms()
+    seconds = ticks_diff(now_ms, start_ms) // 1000
+    # notes the text, sends nothing yet; for a degree sign write "\xdf"
+    lcd.show("Hello, rider!", "on for %d s" % seconds)
+    lcd.tick(now_ms)  # sends what has changed, at most one line at a time
+    sleep_ms(10)

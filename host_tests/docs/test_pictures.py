@@ -1,0 +1,69 @@
+"""The pictures of the READMEs are those of the firmware, the settings and the commands as they are now."""
+
+import io
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kickstand_tools.pictures import drawn, lcd, ride
+from PIL import Image
+
+ROOT = Path(__file__).resolve().parents[2]
+PICTURES = ROOT / "tools" / "pictures"
+STALE = "stale: run .venv/bin/python -m kickstand_tools.pictures, look at the pictures, check them in"
+
+
+@pytest.fixture(scope="module")
+def pictures():
+    return drawn.drawn()
+
+
+def test_no_drawing_is_stale(pictures):
+    stale = [
+        name
+        for name, svg in pictures.items()
+        if not (PICTURES / name).exists() or (PICTURES / name).read_text(encoding="utf-8") != svg
+    ]
+    assert not stale, f"{', '.join(stale)}: {STALE}"
+
+
+def test_the_plot_of_the_ride_is_not_stale():
+    """By its look: matplotlib's files differ from version to version."""
+    fresh, kept = (
+        np.asarray(Image.open(io.BytesIO(data)).convert("L"), dtype=float)
+        for data in (ride.draw(), (PICTURES / "ride.png").read_bytes())
+    )
+    assert fresh.shape == kept.shape, STALE
+    difference = float(np.mean(np.abs(fresh - kept)))
+    assert difference < 1.0, STALE  # of 255
+
+
+def test_they_are_small_and_fetch_nothing(pictures):
+    for name, svg in pictures.items():
+        assert len(svg) < 30_000, name
+        assert "@font-face" not in svg, name
+        assert set(re.findall(r"https?://[^\"' ]+", svg)) == {"http://www.w3.org/2000/svg"}, name
+
+
+def test_the_display_is_drawn_dot_by_dot():
+    """A "1" of the ROM has 10 dots, a full block 40, and an own character those of its rows."""
+    codes = [[0x20] * 16, [0x20] * 16]
+
+    def dots():
+        return lcd.draw(codes, bytes([0x1F, 0x01] + [0] * 62)).count("M") - 40  # those of the empty cell
+
+    assert dots() == 0
+    codes[1][15] = ord("1")
+    assert dots() == 10
+    codes[0][0] = 0xFF
+    assert dots() == 50
+    codes[0][1] = 0
+    assert dots() == 56
+
+
+def test_the_wires_go_to_the_pins_of_the_settings(pictures):
+    """Both boards' default pins are emphasized, no other GPIO is."""
+    for name, pins in (("pico", {"GP4", "GP5", "GP6", "GP7", "GP15"}), ("esp32", {"21", "22", "18", "19", "4"})):
+        bold = re.findall(r'font-weight="bold"[^>]*>(?:\d+  )?(GP\d+|\d+)<', pictures[f"wiring_{name}.svg"])
+        assert set(bold) == pins

@@ -1,0 +1,49 @@
+"""Runs one program of firmware/examples on the simulated board, under CPython or MicroPython.
+
+As a script: reads {"program", "until", "presses"} as JSON from standard input and runs it in the current directory (the
+board's flash), on a bike that is aligned and rides a long right turn. What the program prints comes first, then on the
+last line, as JSON, what the display said every second.
+"""
+
+import json
+import sys
+
+from kickstand_tools.simulated_board.simulator import Board
+from kickstand_tools.simulation.scripted.script import Ride, accelerate, kickstand, turn
+from kickstand_tools.simulation.scripted.sensor_errors import Sensor
+
+RIDE = (kickstand(2.0, 0.0), accelerate(15.0, 4.0), turn(35.0, 6.0))
+
+
+def save_calibration(part, directory=""):
+    """In flash, as the device leaves it after the six positions and the alignment of this part."""
+    from kickstand.calibration.parameters import Calibration
+    from kickstand.calibration.store import Store
+
+    calibration = Calibration()
+    slope = [1.0 / scale for scale in part.accel_scale]
+    offset = [-part.accel_offset_g[i] * slope[i] for i in range(3)]
+    calibration.set_parameters(offset + slope + list(part.gyro_bias_dps) + list(part.vehicle_from_sensor) + [0.0])
+    calibration.six_done = calibration.aligned = True
+    Store(0x68, 8, directory).save(calibration)
+
+
+def run(program, until_s, presses):
+    """The display's two lines at each full second of until_s; presses: when the button is pressed, in seconds."""
+    part = Sensor(seed=3)
+    board = Board(part.world(Ride(RIDE).motion))
+    board.install()
+    save_calibration(part)
+    for at_s in presses:
+        board.press(at_s)
+    frames = []
+    board.every(1.0, lambda: frames.append(board.lcd.text()))
+    with open(program, encoding="utf-8") as file:
+        source = file.read()
+    board.run(lambda: exec(source, {"__name__": "__main__"}), until_s)
+    return frames
+
+
+if __name__ == "__main__":
+    plan = json.load(sys.stdin)
+    print("\n" + json.dumps(run(plan["program"], plan["until"], plan["presses"])))

@@ -1,0 +1,89 @@
+"""The programs in firmware/examples: what each prints, or shows on the display."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import engines
+import pytest
+from kickstand_tools import firmware_path, unix_port
+
+HERE = Path(__file__).resolve().parent
+EXAMPLES = HERE.parents[1] / "firmware" / "examples"
+TURN_DEG = 35.0  # of example_run.py's ride
+
+
+def run(engine, flash, name, until, presses=()):
+    """What the program printed, and the display's two lines each second."""
+    script = str(HERE / "example_run.py")
+    if engine == "cpython":
+        command, environment = [sys.executable, script], os.environ | {"PYTHONPATH": firmware_path.search_path()}
+    else:
+        command, environment = unix_port.command("-X", "heapsize=8M", script), unix_port.environment()
+    plan = {"program": str(EXAMPLES / name), "until": until, "presses": presses}
+    done = subprocess.run(
+        command, input=json.dumps(plan), env=environment, cwd=flash, capture_output=True, text=True, timeout=300
+    )
+    assert done.returncode == 0 and "Traceback" not in done.stdout + done.stderr, done.stdout + done.stderr
+    printed, _, frames = done.stdout.rstrip("\n").rpartition("\n")
+    return printed, json.loads(frames)
+
+
+def numbers(line):
+    return [float(number) for number in re.findall(r"[-+]?\d+\.\d+", line)]
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_print_sensor(engine, tmp_path):
+    printed, _ = run(engine, tmp_path, "print_sensor.py", 1.5)
+    found, *lines = printed.split("\n")
+    assert found == "Found an MPU6050"
+    assert len([line for line in lines if line]) == 7  # 0.2 s apart, after 0.2 s of setting up
+    ax, ay, az, gx, gy, gz, temperature = numbers(lines[0])
+    assert (ax * ax + ay * ay + az * az) ** 0.5 == pytest.approx(1.0, abs=0.1)  # an uncalibrated part, at rest
+    assert max(abs(gx), abs(gy), abs(gz)) < 25.0  # and with its bias
+    assert temperature == pytest.approx(25.0, abs=0.1)
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_show_text(engine, tmp_path):
+    _, frames = run(engine, tmp_path, "show_text.py", 4.5)
+    assert frames[-1] == ["Hello, rider!   ", "on for 3 s      "]
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_print_lean(engine, tmp_path):
+    printed, _ = run(engine, tmp_path, "print_lean.py", 12.0)
+    lines = [line for line in printed.split("\n") if line.startswith("lean")]
+    assert len(lines) > 100
+    assert numbers(lines[0])[0] == pytest.approx(0.0, abs=1.0)
+    assert numbers(lines[-1])[0] == pytest.approx(TURN_DEG, abs=3.0)
+    assert max(numbers(line)[1] for line in lines) > 0.2  # setting off
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_own_page(engine, tmp_path):
+    """Five usual pages before it, and the first again behind it."""
+    _, frames = run(engine, tmp_path, "own_page.py", 12.0, presses=[4, 5, 6, 7, 8])
+    shown = re.fullmatch(r"Load     (\d\.\d\d) x", frames[-1][0].rstrip())
+    assert shown and float(shown[1]) == pytest.approx(1.22, abs=0.05)  # 1 / cos(35 degrees)
+    assert re.fullmatch(r"Lean  3\d° right *", frames[-1][1])
+    _, frames = run(engine, tmp_path, "own_page.py", 10.0, presses=[4, 5, 6, 7, 8, 9])
+    assert frames[-1][0].startswith("Lean")
+
+
+@pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.name)
+def test_it_can_be_read_by_a_beginner(path):
+    source = path.read_text(encoding="utf-8")
+    assert len(source.split("\n")) <= 40
+    assert f"mpremote run firmware/examples/{path.name}" in source
+
+
+def test_each_has_its_test():
+    source = Path(__file__).read_text(encoding="utf-8")
+    names = {path.name for path in EXAMPLES.glob("*.py")}
+    assert len(names) == 4
+    assert all(f'"{name}"' in source for name in names)

@@ -1,0 +1,52 @@
+"""A 16x2 character display drawn dot by dot as SVG, from what its controller holds in its memories."""
+
+from .lcd_font import ROM
+
+# In units of 0.1 mm, as on the usual module of 80 x 36 mm
+_DOT = (5, 6)  # width, height
+_PITCH = (6, 7)  # from dot to dot
+_CELL = (36, 62)  # from character to character
+_COLUMNS, _LINES = 16, 2
+_MARGIN = 34  # of glass around the characters
+_FRAME = 22  # of black metal around the glass
+_GLASS = (_COLUMNS * _CELL[0] + 2 * _MARGIN, _LINES * _CELL[1] + 2 * _MARGIN)
+_SIZE = (_GLASS[0] + 2 * _FRAME, _GLASS[1] + 2 * _FRAME)
+
+
+def draw(codes: list[list[int]], cgram: bytes) -> str:
+    """The display as SVG. codes: two lists of 16 character codes; cgram: the 64 bytes of the eight own characters."""
+    lit = [
+        _dot(column * _CELL[0] + x * _PITCH[0], line * _CELL[1] + y * _PITCH[1])
+        for line in range(_LINES)
+        for column in range(_COLUMNS)
+        for y, row in enumerate(_rows(codes[line][column], cgram))
+        for x in range(5)
+        if row & 0x10 >> x
+    ]
+    unlit = [_dot(x * _PITCH[0], y * _PITCH[1]) for y in range(8) for x in range(5)]
+    origin = _FRAME + _MARGIN
+    return f"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_SIZE[0]} {_SIZE[1]}">
+<defs>
+<linearGradient id="glass" x1="0" y1="0" x2="0" y2="1">
+<stop offset="0" stop-color="#2f6bea"/><stop offset="1" stop-color="#1b47b8"/>
+</linearGradient>
+<pattern id="cell" width="{_CELL[0]}" height="{_CELL[1]}" patternUnits="userSpaceOnUse">
+<path d="{"".join(unlit)}" fill="#0d2f8c" fill-opacity="0.28"/>
+</pattern>
+</defs>
+<rect width="{_SIZE[0]}" height="{_SIZE[1]}" rx="18" fill="#16181d"/>
+<rect x="{_FRAME}" y="{_FRAME}" width="{_GLASS[0]}" height="{_GLASS[1]}" rx="8" fill="url(#glass)"/>
+<g transform="translate({origin} {origin})">
+<rect width="{_COLUMNS * _CELL[0]}" height="{_LINES * _CELL[1]}" fill="url(#cell)"/>
+<path d="{"".join(lit)}" fill="#f4f8ff"/>
+</g>
+</svg>
+"""
+
+
+def _rows(code: int, cgram: bytes) -> bytes:
+    return bytes(cgram[code % 8 * 8 : code % 8 * 8 + 8]) if code < 0x10 else ROM[code]
+
+
+def _dot(x: int, y: int) -> str:
+    return f"M{x} {y}h{_DOT[0]}v{_DOT[1]}h-{_DOT[0]}z"
