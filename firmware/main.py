@@ -1,7 +1,7 @@
-"""Starts Kickstand when the board has power.
+"""Starts Kickstand when the board gets power.
 
-Button held at power-up: safe mode, nothing is started, so that the board can always be deployed to. Not after a
-reset: a press while an error is shown must not leave a rider without a display.
+Safe mode: with the button held at power-on nothing is started, so that new firmware can always be copied. After a reset
+the button does not count: a press while an error is shown must not leave the rider without a display.
 """
 
 import sys
@@ -15,7 +15,7 @@ from kickstand.errors import SettingsError
 
 
 def tell(lcd, line1, line2=""):
-    """Say something on the display, now."""
+    """Show two lines on the display, at once."""
     lcd.show(line1, line2)
     lcd.flush()
 
@@ -29,10 +29,10 @@ def main():
             print("Kickstand %s: safe mode, the button was held at power-up." % __version__)
             tell(lcd, "Safe mode", "Ready for USB")
             return
-        tell(lcd, "Kickstand", "starting")  # what stood there before a reset must not pass for a reading
+        tell(lcd, "Kickstand", "starting")  # a lean from before a reset must not pass for a reading
         run(chosen, lcd)
     except SettingsError as error:
-        port.rest_watchdog()  # wrong pins show only when the app opens them
+        port.rest_watchdog()  # it may run: wrong pins show only when the app opens them
         from kickstand.console import sentence
         from kickstand.ui.messages import lines
 
@@ -46,8 +46,9 @@ def main():
 
 
 def run(chosen, lcd):
-    """The app; an exception in it is reported, then the board restarts."""
-    # half a second, in which the display says something already; firmware that is not whole ends at the prompt
+    """Run the app. An exception in it is reported on display and console, then the board restarts."""
+    # Here, because this takes half a second, in which the display already says "starting". And incomplete firmware ends
+    # at the prompt with an ImportError instead of restarting for ever.
     from kickstand.app import App
 
     print("Kickstand %s. Ctrl-C stops it." % __version__)

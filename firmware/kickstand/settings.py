@@ -1,4 +1,7 @@
-"""The values of config.py, checked, with a default for each."""
+"""The settings of config.py: each with its default, and checked.
+
+To add one: a line in _TABLE here, and one in config.py that says what it is for.
+"""
 
 import sys
 from io import StringIO
@@ -40,10 +43,10 @@ def _pulses(value):
 
 _PIN = _whole(0, 48)
 SD_PINS = ("SD_SCK", "SD_MOSI", "SD_MISO", "SD_CS")
-# of each speed source
+# The settings that name pins, for each speed source
 _SPEED_PINS = {None: (), "gps": ("GPS_TX", "GPS_RX"), "wheel": ("WHEEL_PIN",)}
 
-# name: default, (check, what is allowed)
+# name: default, (check, what is allowed in words)
 _TABLE = {
     "SIDE": ("left", _one_of("left", "right")),
     "SAMPLE_HZ": (200, (_sample_rate, "50, 100, 125 or 200")),
@@ -81,18 +84,18 @@ _TABLE = {
 
 
 def load():
-    """The Settings of config.py; a missing config.py means the defaults. Raises SettingsError."""
+    """The Settings of config.py. Without a config.py these are the defaults. Raises SettingsError."""
     try:
         import config
     except ImportError:
         config = None
-    except Exception as error:  # a slip of the pen in the user's file is no reason for a traceback
+    except Exception as error:  # a slip in the rider's file, of whatever kind
         raise SettingsError("unreadable", "config.py", _line_of(error), str(error))
     return Settings(config)
 
 
 def _line_of(error):
-    """Where in config.py: "line 3: ", or nothing where the traceback does not say."""
+    """Where in config.py the error is: "line 3: ", or "" if the traceback does not say."""
     text = StringIO()
     # the stubs that check this know neither a StringIO's type nor its getvalue
     sys.print_exception(error, text)  # type: ignore[arg-type]
@@ -102,8 +105,10 @@ def _line_of(error):
 
 
 class Settings:
-    """One attribute for each name of the table. config: the module config, or None for the defaults. Raises
-    SettingsError."""
+    """One attribute for each name in _TABLE. config: the module config, or None for the defaults. Raises SettingsError.
+
+    one_bus: sensor and display share one I2C bus.
+    """
 
     def __init__(self, config=None):
         for name, (default, (check, allowed)) in _TABLE.items():
@@ -115,7 +120,7 @@ class Settings:
             if name not in _TABLE and (name.isupper() or name.upper() in _TABLE):
                 raise SettingsError("unknown-setting", name)
         self.one_bus = (self.SENSOR_SDA, self.SENSOR_SCL) == (self.LCD_SDA, self.LCD_SCL)
-        if self.one_bus:  # the display is a 100 kHz part, and sets the pace of a bus that it shares
+        if self.one_bus:  # the display's PCF8574 is made for 100 kHz, and sets the speed of a bus that it shares
             self.LCD_I2C = self.SENSOR_I2C
             self.SENSOR_BUS_HZ = self.LCD_BUS_HZ = min(self.SENSOR_BUS_HZ, self.LCD_BUS_HZ)
         card = [getattr(self, name) for name in ("SD_SPI",) + SD_PINS]

@@ -1,4 +1,4 @@
-"""The answer to kickstand.status(): how this board is, for a user at the console."""
+"""What kickstand.status() prints: settings, sensor, display, speed source and calibration of this board."""
 
 import gc
 import os
@@ -18,7 +18,7 @@ LISTEN_MS = 3500
 
 
 def report():
-    """Print it. Opens sensor and display by itself; the app must not be running."""
+    """Print all of it. Opens sensor and display itself: the app must not be running."""
     machine_name = getattr(sys.implementation, "_machine", sys.platform)
     print(
         "Kickstand %s on %s, MicroPython %s"
@@ -48,7 +48,7 @@ def report():
 
 
 def _sensor(sensor, settings):
-    """Print what answers; return its WHO_AM_I, 0 for nothing."""
+    """Print which sensor answers; return its WHO_AM_I, or 0 if none does."""
     chip = sensor.chip
     try:
         chip.connect(sensor.reopen())
@@ -90,7 +90,7 @@ def _display(lcd):
 
 
 def _speed(settings):
-    """Listen for as long as it takes to say what is wrong."""
+    """Print what the speed source says within LISTEN_MS: long enough to tell what is wrong with it."""
     if settings.SPEED is None:
         print("Speed        no source: SPEED is not set, alignment by driving is off")
         return
