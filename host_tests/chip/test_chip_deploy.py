@@ -8,7 +8,7 @@ import sys
 import command
 import pytest
 from emulated import calibrated, leaning, pico, shown_lean
-from kickstand_tools.deploy import bytecode, flash
+from kickstand_tools.deploy import bytecode, firmware_files
 
 pytestmark = pytest.mark.chip
 
@@ -47,7 +47,7 @@ def test_flash_onto_the_emulated_pico():
 
 def test_the_first_lean_stands_there_soon(tmp_path):
     """`kickstand flash` onto a board with an older version and a calibration: within 1.5 s of its reset."""
-    wanted = flash.contents(bytecode.PICO)
+    wanted = firmware_files.contents(bytecode.PICO)
     older = wanted | {"/kickstand/lean.mpy": b"old", "/kickstand/lean.py": b"old"} | calibrated()
     with pico(leaning(20.0), older) as device:
         from kickstand_tools.emulator.console_server import ConsoleServer

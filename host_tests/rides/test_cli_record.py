@@ -14,7 +14,7 @@ import command
 import fake_board
 import pytest
 import ride_writer
-from kickstand_tools.deploy import flash
+from kickstand_tools.deploy import connection
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.rides import record
 from serial.tools import list_ports
@@ -58,7 +58,7 @@ class Streaming(fake_board.FakeBoard):
 
 
 def _said(block):
-    """One block as ride_stream prints it."""
+    """One block as usb_stream prints it."""
     pieces = [block[at : at + 256] for at in range(0, len(block), 256)]
     return b"".join(base64.b64encode(piece) + b"\r\n" for piece in pieces) + b".\r\n"
 
@@ -72,8 +72,8 @@ def streaming(tmp_path, monkeypatch):
         board.serial = Stream(blocks, end, last)
         pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
         monkeypatch.setattr(list_ports, "comports", lambda: [pico])
-        monkeypatch.setattr(flash, "SerialTransport", lambda name, timeout: board)
-        monkeypatch.setattr(flash, "_RESTART_S", 0)
+        monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: board)
+        monkeypatch.setattr(connection, "_RESTART_S", 0)
         monkeypatch.setattr(record, "_SILENT_S", 0.2)
         return board
 
