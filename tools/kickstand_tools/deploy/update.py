@@ -1,6 +1,7 @@
 """What an update changes on a board: which files and folders go, which are made, and whether they fit."""
 
 from dataclasses import dataclass
+from pathlib import PurePosixPath
 
 from ..errors import InputError
 from . import room
@@ -40,7 +41,7 @@ def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> U
     stale = [path for path in board.files if path in left_over or (_is_module(path) and path not in wanted)]
     kept = board.files.keys() - set(stale)
     folders = {folder for path in wanted for folder in _folders(path)}
-    empty = board.folders - folders - {folder for path in kept for folder in _folders(path)}
+    empty = board.folders.difference(folders, *map(_folders, kept))
     _refuse_in_the_way(wanted, folders, kept)
     if copy or stale or empty:
         copy[MAIN] = copy.pop(MAIN, wanted[MAIN])
@@ -94,9 +95,8 @@ def _module(path: str) -> str:
 
 
 def _folders(path: str) -> list[str]:
-    """Every folder that path is in, from the outer to the inner."""
-    parts = path.split("/")[1:-1]
-    return ["/" + "/".join(parts[: i + 1]) for i in range(len(parts))]
+    """Every folder that path is in, but for the root."""
+    return [str(folder) for folder in PurePosixPath(path).parents[:-1]]
 
 
 def _refuse_in_the_way(wanted: dict[str, bytes], folders: set[str], kept: set[str]) -> None:
