@@ -78,6 +78,7 @@ def firmware(tmp_path, monkeypatch):
     for name, text in FIRMWARE.items():
         (tmp_path / name).write_bytes(text.encode())
     monkeypatch.setattr(firmware_path, "directory", lambda: tmp_path)
+    monkeypatch.setattr(firmware_path, "PACKAGE", tmp_path / "kickstand")
 
 
 def running(port):
