@@ -175,6 +175,19 @@ def test_a_board_without_the_firmware_is_told_alike(arguments, streaming, tmp_pa
     assert command.refused(tmp_path, *arguments) == words
 
 
+@pytest.mark.parametrize("arguments", [["record", "--out", "ride.csv"], ["pull"]])
+def test_a_board_with_an_older_version_is_told_to_update(arguments, streaming, tmp_path, monkeypatch):
+    """As 0.2.0, whose modules are all in one folder."""
+    monkeypatch.chdir(tmp_path)
+    board = streaming([], None)
+    board.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: None))
+    old = b"Traceback (most recent call last):\r\nImportError: no module named 'kickstand.rides'\r\n"
+    board.serial.data = b"\x04" + old + b"\x04>"
+    command.refused(tmp_path, *arguments, words="is of another version or not whole (ImportError: no module named")
+    board.serial.data = b"\x04" + old + b"\x04>"
+    command.refused(tmp_path, *arguments, words="kickstand flash brings it up to date")
+
+
 @pytest.mark.parametrize(
     ("end", "words"),
     [
