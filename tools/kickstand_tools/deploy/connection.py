@@ -81,9 +81,10 @@ def refuse_unfit_firmware(reason: str, name: str) -> None:
     """
     if "no module named 'kickstand'" in reason:
         raise NoFirmware(f"Kickstand is not on the board at {name}: kickstand flash puts it there")
-    if "ImportError" in reason and "kickstand" in reason:
+    missing = reason.partition("ImportError: ")[2]
+    if "kickstand" in missing:
         raise OutdatedFirmware(
-            f"the firmware on the board at {name} is of another version or not whole ({reason}): "
+            f"the firmware on the board at {name} is of another version or not whole ({missing}): "
             "kickstand flash brings it up to date"
         )
 
