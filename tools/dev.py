@@ -42,7 +42,7 @@ def main(arguments):
 
 
 def test(arguments):
-    """All three checks, the tests last, even if one before has failed; their exit status."""
+    """Run ruff, pyright and pytest, each even if one before it has failed; 0 if all succeed, else 1."""
     failed = []
     for tool, command in (
         ("ruff", ("-m", "ruff", "check", ".")),
@@ -105,7 +105,7 @@ def has_pip():
 
 
 def install(extra):
-    """pip install --editable; its own words go to install.log, a short line now and then to the terminal."""
+    """pip install --editable. What pip prints goes to install.log; its last line goes to the terminal now and then."""
     say("installing %sinto .venv: a few minutes at most" % ("with the test tools " if extra else ""))
     command = [PYTHON, "-m", "pip", "install", "--no-input", "--disable-pip-version-check"]
     begin = time.time()
@@ -125,7 +125,7 @@ def install(extra):
     if status != 0:
         errors = [line[6:].strip() for line in read(LOG).split("\n") if line.startswith("ERROR:")]
         why = errors[-1] if errors else last_line(read(LOG))
-        raise Stop("installing failed: %s (is there a network? the whole story is in %s)" % (why, LOG))
+        raise Stop("installing failed: %s (is there a network? all that pip said is in %s)" % (why, LOG))
 
 
 def run(*arguments):

@@ -9,7 +9,7 @@ import command
 import pytest
 import serial
 from kickstand_tools import firmware_path
-from kickstand_tools.deploy import flash
+from kickstand_tools.deploy import connection
 from kickstand_tools.emulator import image
 from kickstand_tools.errors import InputError
 from terminal import Terminal
@@ -78,6 +78,7 @@ def firmware(tmp_path, monkeypatch):
     for name, text in FIRMWARE.items():
         (tmp_path / name).write_bytes(text.encode())
     monkeypatch.setattr(firmware_path, "directory", lambda: tmp_path)
+    monkeypatch.setattr(firmware_path, "PACKAGE", tmp_path / "kickstand")
 
 
 def running(port):
@@ -89,7 +90,7 @@ def running(port):
 @pytest.mark.usefixtures("firmware")
 def test_flash_and_status_on_a_pico(port):
     """Onto a chip with an older version, an edited config and a calibration; then its app runs."""
-    with flash.connected(port) as (board, _):
+    with connection.connected(port) as (board, _):
         board.fs_mkdir("/kickstand")
         board.fs_writefile("/kickstand/old_idea.py", b"pass")
         board.fs_writefile("/kickstand/errors.py", FIRMWARE["kickstand/errors.py"].encode())
@@ -108,7 +109,7 @@ def test_flash_and_status_on_a_pico(port):
     assert result.out == "all is well, right\n"
     assert running(port)
 
-    with flash.connected(port) as (board, _):
+    with connection.connected(port) as (board, _):
         assert board.fs_exists("/kickstand/lean.mpy")
         assert board.fs_readfile("/config.py") == b'SIDE = "right"\n'
         assert board.fs_readfile("/kickstand_a.cal") == b"calibration"

@@ -11,7 +11,7 @@ import command
 import fake_board
 import pytest
 import serial
-from kickstand_tools.deploy import bytecode, flash, ports
+from kickstand_tools.deploy import bytecode, connection, firmware_files, ports
 from serial.tools import list_ports
 
 PICO = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
@@ -28,14 +28,14 @@ def board(tmp_path, monkeypatch):
     board = fake_board.FakeBoard(tmp_path / "flash")
     board.path("boot.py").write_text("# boot\n")
     monkeypatch.setattr(list_ports, "comports", lambda: [MODEM, PICO, BUILT_IN, PROBE])
-    monkeypatch.setattr(flash, "SerialTransport", lambda name, timeout: board)
-    monkeypatch.setattr(flash, "_RESTART_S", 0)
+    monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: board)
+    monkeypatch.setattr(connection, "_RESTART_S", 0)
     return board
 
 
 @functools.cache
 def wanted():
-    return flash.contents(bytecode.PICO)
+    return firmware_files.contents(bytecode.PICO)
 
 
 def module(path):
@@ -124,14 +124,14 @@ def test_what_an_older_version_left_is_removed(board):
 @pytest.mark.parametrize("before", ["sources", "another version"])
 def test_broken_off_anywhere_it_leaves_a_board_that_starts_nothing(board, at, before):
     """So the next attempt finds it at its prompt, and brings it up to date."""
-    for path, source in flash.firmware_files().items():
+    for path, source in firmware_files.firmware_files().items():
         target = board.path(path if before == "sources" or not module(path) else path.replace(".py", ".mpy"))
         target.parent.mkdir(exist_ok=True)
         target.write_bytes(source.read_bytes())
     cut = [path for path in wanted() if path != "/config.py"][at]  # main.py itself is the last
 
     def pulled(path, data):
-        if path == cut:
+        if path == firmware_files.unfinished(cut):
             raise ConnectionError("device disconnected")
         return data
 
@@ -144,7 +144,7 @@ def test_broken_off_anywhere_it_leaves_a_board_that_starts_nothing(board, at, be
 
 
 def sources():
-    return flash.contents(None)
+    return firmware_files.contents(None)
 
 
 @pytest.mark.parametrize(
@@ -153,7 +153,7 @@ def sources():
 def test_a_board_that_takes_other_bytecode_gets_the_sources(board, monkeypatch, mpy, words):
     command.works("flash")
     other = fake_board.FakeBoard(board.root, mpy=mpy)
-    monkeypatch.setattr(flash, "SerialTransport", lambda name, timeout: other)
+    monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: other)
     result = command.works("flash")
     assert fake_board.files(board.root) == sources() | {"/boot.py": b"# boot\n"}
     assert re.search(f"note: .*{words}.*: it gets the sources", result.out)
@@ -169,7 +169,7 @@ def test_without_mpy_cross_it_gets_the_sources(board, monkeypatch):
 def test_machine_code_is_for_the_board(board, monkeypatch):
     """Of an ESP32 here: what has machine code in it differs from a Pico's, bytecode does not."""
     other = fake_board.FakeBoard(board.root, mpy=0x2B06)
-    monkeypatch.setattr(flash, "SerialTransport", lambda name, timeout: other)
+    monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: other)
     command.works("flash")
     found = fake_board.files(board.root)
     assert {path for path, data in wanted().items() if found[path] != data} == {
@@ -185,6 +185,7 @@ def test_what_reads_back_differently_is_told(board):
     result = command.run("flash")
     assert (result.status, result.err.count("\n")) == (2, 1)
     assert "kickstand/calibration/store.mpy reads back differently" in result.err
+    assert not board.path("main.py").exists()
     assert board.resets == 0
     assert board.closed
 
@@ -220,7 +221,7 @@ def test_a_cable_pulled_while_copying(board):
 @pytest.mark.parametrize("verb", ["flash", "status"])
 def test_another_python_is_refused(board, monkeypatch, verb):
     other = fake_board.FakeBoard(board.root, python="circuitpython")
-    monkeypatch.setattr(flash, "SerialTransport", lambda name, timeout: other)
+    monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: other)
     refused(other, verb, words="runs circuitpython: put MicroPython on the board")
 
 
@@ -246,7 +247,7 @@ def test_several_boards(tmp_path, monkeypatch):
 def test_a_named_port_is_taken_as_it_is(board, monkeypatch):
     opened = []
     monkeypatch.setattr(list_ports, "comports", list)
-    monkeypatch.setattr(flash, "SerialTransport", lambda name, timeout: opened.append(name) or board)
+    monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: opened.append(name) or board)
     command.works("flash", "--port", "rfc2217://10.0.0.9:2217")
     assert opened == ["rfc2217://10.0.0.9:2217"]
 

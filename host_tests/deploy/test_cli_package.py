@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from kickstand_tools import firmware_path
-from kickstand_tools.deploy import flash
+from kickstand_tools.deploy import firmware_files
 from kickstand_tools.errors import extra
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -23,6 +23,7 @@ def test_mip_installs_every_module_and_nothing_else():
     modules = {path.relative_to(firmware).as_posix() for path in (firmware / "kickstand").rglob("*.py")}
     assert {target for target, _ in listed["urls"]} == modules
     assert all(target == source for target, source in listed["urls"])  # relative: it needs no network
+    assert listed == firmware_files.mip_package(), "python -m kickstand_tools.deploy.firmware_files writes it anew"
 
 
 def test_one_version_everywhere():
@@ -45,7 +46,7 @@ def test_the_wheel_carries_the_firmware(tmp_path):
     (wheel,) = tmp_path.glob("*.whl")
     with zipfile.ZipFile(wheel) as archive:
         names = set(archive.namelist())
-        for target, source in flash.firmware_files().items():
+        for target, source in firmware_files.firmware_files().items():
             inside = target[1:] if target.startswith("/kickstand/") else "kickstand_tools/firmware" + target
             assert archive.read(inside) == source.read_bytes()
     assert {"kickstand_tools/cli/main.py", "kickstand_tools/py.typed"} <= names

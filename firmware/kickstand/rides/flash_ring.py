@@ -13,8 +13,8 @@ from .block import BLOCK, block_length
 ENOSPC = 28  # which errno lacks on a board
 PART_BLOCKS = 16
 CARD_PART_BLOCKS = 256  # a day is 85 parts, not 1300
-FIRMWARE = 50 * BLOCK
-RESERVE = 64 * BLOCK  # flashing keeps each old file until the new one is in
+FIRMWARE = 80 * BLOCK  # compiled: each of its files takes whole blocks, each folder two
+RESERVE = 64 * BLOCK  # what an update needs at most: sources in place of smaller, compiled modules
 GROUP = 100  # rides in a directory
 GROUP_DIGITS = 3
 RIDE_DIGITS = 2

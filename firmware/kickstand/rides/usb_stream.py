@@ -36,15 +36,3 @@ class RideStream:
 
     def fault_code(self, error):
         return "usb-fault"
-
-
-def run():
-    """The app, its display and button alive, its turns to the console. Ctrl-C ends it."""
-    from .. import app, devices, settings
-    from ..board import port
-
-    chosen = settings.load()
-    try:
-        app.App(chosen, devices.open_lcd(chosen), RideStream()).run()
-    except KeyboardInterrupt:
-        port.rest_watchdog()

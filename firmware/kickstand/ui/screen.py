@@ -2,10 +2,8 @@
 
 from ..board.button import LONG
 from . import messages, pages
-from .align_wizard import AlignWizard
 from .menu import Menu
 from .page_stack import PageStack
-from .six_wizard import SixWizard
 from .views import FaultView, InfoView, NoticeView, QuestionView
 
 
@@ -36,7 +34,7 @@ class Screen:
         """event: SHORT or LONG. A long press that the view in front has no use for opens the menu."""
         view = self._front(now_ms)[0]
         if view is self._notice:  # nobody waits two seconds: the press is for what the notice covers,
-            self._notice.close()
+            self._notice.press(event, now_ms)
             view = self._front(now_ms)[0]
             if view is self._question:  # unless that is a question, which has not been read yet
                 return
@@ -104,7 +102,11 @@ class Screen:
         """This press is already that for the pose on the kickstand."""
         self._begin_align(True)
 
+    # The wizards are imported when they are wanted: with what they need they take 10 KB of heap
+
     def _begin_align(self, pressed):
+        from .align_wizard import AlignWizard
+
         app = self._app
         self._pages.first()
         settings, calibration = app.settings, app.calibration
@@ -112,6 +114,8 @@ class Screen:
 
     def _six(self, now_ms):
         if self._ready(now_ms):
+            from .six_wizard import SixWizard
+
             app = self._app
             self.wizard = SixWizard(app.sensor.chip, app.settings.SAMPLE_HZ, app.calibration)
 

@@ -13,7 +13,7 @@ NOTICE_MS = 2000
 
 
 class NoticeView:
-    """Two lines for two seconds, or until close()."""
+    """Two lines for two seconds, or until a press, which is then for what they covered."""
 
     def __init__(self):
         self._lines = None
@@ -29,9 +29,9 @@ class NoticeView:
             self._lines = None
         return self._lines
 
-    def close(self):
-        """Give way to what it covers."""
+    def press(self, event, now_ms):
         self._lines = None
+        return False
 
 
 class FaultView:

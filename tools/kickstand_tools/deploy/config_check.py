@@ -1,6 +1,7 @@
 """A config.py judged by the firmware's own settings.py before it is copied.
 
-In a process of its own, because settings.py asks which board it is on: PORT FILE as arguments, JSON as its answer.
+This runs in a process of its own, which poses as the board: settings.py asks sys.platform and machine. The arguments
+are the board's sys.platform and the file; the last line that it prints is JSON: null, or line and reason of the fault.
 """
 
 import ast
@@ -34,7 +35,7 @@ def refuse_faulty(path: Path, port: str) -> None:
 
 
 def _fault(path: Path, port: str) -> tuple[int | None, str] | None:
-    """Line and reason of the first fault. Turns this process into a board's."""
+    """Line and reason of the first fault, or None. This process cannot be used for anything else afterwards."""
     Board(lambda t_s: (0, 0, 1, 0, 0, 0), port="esp32" if port == "esp32" else "rp2").install()  # for machine
     sys.platform = port
     from kickstand.console import sentence
@@ -59,7 +60,7 @@ def _fault(path: Path, port: str) -> tuple[int | None, str] | None:
 
 
 def _line_of(name: str, source: bytes) -> int | None:
-    """Where a setting gets its value."""
+    """The last line that assigns to this name."""
     named = [n for n in ast.walk(ast.parse(source)) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
     return max((node.lineno for node in named if node.id == name), default=None)
 

@@ -7,7 +7,7 @@ from kickstand.calibration.parameters import Calibration
 from kickstand.calibration.store import Store
 from littlefs import LittleFS, UserContext
 
-from ..deploy import bytecode, flash
+from ..deploy import bytecode, firmware_files
 
 START = 0xA0000  # of the file system in flash
 _BLOCK, _COUNT = 4096, 352
@@ -45,7 +45,7 @@ def read(image: bytes) -> dict[str, bytes]:
 
 def firmware(compiled: bool = False) -> dict[str, bytes]:
     """What `kickstand flash` puts on a board. compiled: the package as .mpy, by mpy-cross."""
-    return flash.contents(bytecode.PICO if compiled else None)
+    return firmware_files.contents(bytecode.PICO if compiled else None)
 
 
 def stored(calibration: Calibration, who_am_i: int = 0x68, accel_range_g: int = 8) -> dict[str, bytes]:

@@ -5,6 +5,7 @@ import binascii
 import contextlib
 import itertools
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
@@ -12,14 +13,11 @@ from mpremote.transport import TransportExecError
 from mpremote.transport_serial import SerialTransport
 
 from ..deploy.board_console import BrokenOff, lines
-from ..deploy.flash import connected, refuse_absent, restart
+from ..deploy.connection import Progress, connected, last_line, refuse_unfit_firmware, restart
 from ..errors import InputError
 from ..output import check_directory
-from ..progress import Bar
 from . import ride_log
 from .block_reader import CUT_SHORT, Block, read
-
-Print = Callable[[str], None]
 
 _SILENT_S = 60  # an emulated board takes a while
 
@@ -58,10 +56,40 @@ class _Part(NamedTuple):
     path: str
 
 
-def pull(port: str | None, out: Path, delete: bool, say: Print, warn: Print) -> None:
-    """Write every ride on the board to a log in the directory out. Raises InputError.
+@dataclass
+class PulledRide:
+    """log: the file it was written to, with its calibration beside it, or None: nothing in it can be read.  seconds,
+    readings: its length.  problems: a line for each thing that is wrong with it.  whole: all of it came over, but for
+    the end of a ride that a power cut has ended.  deleted: it is no longer on the board."""
 
-    delete: afterwards remove from the board those that came over whole.
+    number: int
+    log: Path | None = None
+    seconds: float = 0.0
+    readings: int = 0
+    problems: list[str] = field(default_factory=list)
+    whole: bool = True
+    deleted: bool = False
+
+
+@dataclass(frozen=True)
+class PullResult:
+    """port: its name.  rides: in the order of their numbers."""
+
+    port: str
+    rides: list[PulledRide]
+
+
+def pull(
+    port: str | None,
+    out: Path,
+    delete: bool = False,
+    progress: Progress | None = None,
+    pulled: Callable[[PulledRide], None] | None = None,
+) -> PullResult:
+    """Write every ride on the board to a log in the directory out, then restart the board.
+
+    port: None takes the only board that is plugged in.  delete: remove from the board each ride that came over whole.
+    pulled: called with each ride once it is done.  Raises InputError, NoFirmware, OutdatedFirmware.
     """
     check_directory(out)
     if not out.parent.is_dir():
@@ -69,30 +97,43 @@ def pull(port: str | None, out: Path, delete: bool, say: Print, warn: Print) -> 
     with connected(port) as (transport, name):
         try:
             directory, rides = _list(transport, name)
-            if not rides:
-                say(f"no rides on the board at {name}: its menu's Record ride makes one")
-                return
-            out.mkdir(exist_ok=True)
-            with Bar("pulling", sum(part.size for parts in rides.values() for part in parts)) as bar:
-                for ride, parts in rides.items():
-                    whole = _pull_ride(transport, ride, parts, out, bar, say, warn)
-                    if delete and whole:
-                        _delete(transport, directory, parts)
-                        say(f"deleted from the board: ride {ride}")
-                    elif delete:
-                        warn(f"ride {ride}: not deleted from the board, because not all of it came over")
+            if rides:
+                out.mkdir(exist_ok=True)
+            result = PullResult(name, [])
+            sofar = _SoFar(sum(part.size for parts in rides.values() for part in parts), progress)
+            for number, parts in rides.items():
+                ride = _pull_ride(transport, number, parts, out, sofar)
+                if delete and ride.whole:
+                    _delete(transport, directory, parts)
+                    ride.deleted = True
+                result.rides.append(ride)
+                if pulled:
+                    pulled(ride)
         finally:
             restart(transport)
+    return result
+
+
+class _SoFar:
+    """Bytes that have come over, of total, told to progress."""
+
+    def __init__(self, total: int, progress: Progress | None) -> None:
+        self._done, self._total, self._progress = 0, total, progress
+
+    def add(self, what: str, count: int) -> None:
+        self._done += count
+        if self._progress:
+            self._progress(what, self._done, self._total)
 
 
 def _list(transport: SerialTransport, name: str) -> tuple[str, dict[int, list[_Part]]]:
     """Where the rides are, and the parts of each."""
     listed, error = transport.exec_raw(_LIST, timeout=_SILENT_S)
     if error:
-        reason = error.decode(errors="replace").strip().rpartition("\n")[2]
+        reason = last_line(error.decode(errors="replace"))
         if "CardError" in reason or "SettingsError" in reason:
             raise InputError(f"{name}: {reason.partition(': ')[2]}")
-        refuse_absent(reason, name)
+        refuse_unfit_firmware(reason, name)
         raise InputError(f"the board at {name} cannot tell its rides ({reason}): kickstand flash brings it up to date")
     directory, *parts = map(ast.literal_eval, listed.decode().splitlines())
     in_order = sorted(_Part(*part) for part in parts)
@@ -100,36 +141,36 @@ def _list(transport: SerialTransport, name: str) -> tuple[str, dict[int, list[_P
 
 
 def _pull_ride(
-    transport: SerialTransport, ride: int, parts: list[_Part], out: Path, bar: Bar, say: Print, warn: Print
-) -> bool:
-    """Write its log. True if all of it came over."""
+    transport: SerialTransport, number: int, parts: list[_Part], out: Path, sofar: _SoFar
+) -> PulledRide:
+    """Write its log."""
+    ride = PulledRide(number)
     blocks: list[Block] = []
-    whole = True
     for part in parts:
-        title = f"ride {ride}, part {part.part}"
-        bar.describe(f"pulling {title}")
-        found, problems = read(_read(transport, part.path, bar))
+        title = f"ride {number}, part {part.part}"
+        found, problems = read(_read(transport, part.path, title, sofar))
         blocks += found
         for problem in problems:
             if problem == CUT_SHORT:
-                warn(f"{title}: the last block is cut short, as by a power cut: left out")
+                ride.problems.append(f"{title}: the last block is cut short, as by a power cut: left out")
             else:
-                warn(f"{title}: {problem}: left out")
-                whole = False
-    title = f"ride {ride}"
+                ride.problems.append(f"{title}: {problem}: left out")
+                ride.whole = False
+    title = f"ride {number}"
     if not blocks:
-        warn(f"{title}: nothing in it can be read")
-        return False
+        ride.problems.append(f"{title}: nothing in it can be read")
+        ride.whole = False
+        return ride
     missing = [after.sequence - before.sequence - 1 for before, after in itertools.pairwise(blocks)]
     if any(missing):
-        warn(f"{title}: {sum(missing)} blocks are missing: the log has a gap there")
+        ride.problems.append(f"{title}: {sum(missing)} blocks are missing: the log has a gap there")
     if blocks[0].sequence:
-        warn(f"{title}: its beginning had to make room for later blocks")
-    path = out / f"ride-{ride:05}-{blocks[0].crc & 0xFFFF:04x}.csv.gz"
-    ride_log.write(path, blocks)
-    seconds = (blocks[-1].turns[-1].time_us - blocks[0].time_us) / 1e6
-    say(f"written: {path}, {seconds / 60:.1f} min, {sum(len(block.turns) for block in blocks)} readings")
-    return whole
+        ride.problems.append(f"{title}: its beginning had to make room for later blocks")
+    ride.log = out / f"ride-{number:05}-{blocks[0].crc & 0xFFFF:04x}.csv.gz"
+    ride_log.write(ride.log, blocks)
+    ride.seconds = (blocks[-1].turns[-1].time_us - blocks[0].time_us) / 1e6
+    ride.readings = sum(len(block.turns) for block in blocks)
+    return ride
 
 
 def _delete(transport: SerialTransport, directory: str, parts: list[_Part]) -> None:
@@ -143,14 +184,15 @@ def _delete(transport: SerialTransport, directory: str, parts: list[_Part]) -> N
             emptied = emptied.parent
 
 
-def _read(transport: SerialTransport, path: str, bar: Bar) -> bytes:
+def _read(transport: SerialTransport, path: str, title: str, sofar: _SoFar) -> bytes:
     """A file of the board."""
     content = b""
+    sofar.add(f"pulling {title}", 0)
     try:
         for line in lines(transport, _READ.replace("PATH", repr(path)), _SILENT_S):
             piece = binascii.a2b_base64(line)
             content += piece
-            bar.advance(len(piece))
+            sofar.add(f"pulling {title}", len(piece))
     except (BrokenOff, binascii.Error) as error:
         raise InputError(f"{path} did not come over whole ({error}): try again, with another cable") from error
     return content

@@ -6,6 +6,7 @@ import gzip
 import signal
 import threading
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from kickstand.lean.meter import LeanMeter
@@ -13,23 +14,61 @@ from mpremote.transport_serial import SerialTransport
 
 from ..calibration.file import CalibrationFile, write_calibration
 from ..deploy.board_console import BrokenOff, lines
-from ..deploy.flash import connected, refuse_absent, restart
+from ..deploy.connection import connected, refuse_unfit_firmware, restart
 from ..errors import InputError, cause
 from ..output import check_output, write_whole
 from . import ride_log
 from .block_reader import BadBlock, Block, parse
-from .live_line import LiveLine
 
-Print = Callable[[str], None]
-
-_START = "from kickstand.rides import usb_stream\nusb_stream.run()"
+# The app with its turns sent over USB, its display and button alive; Ctrl-C ends it.
+_START = """
+from kickstand import devices, settings
+from kickstand.app import App
+from kickstand.board import port
+from kickstand.rides.usb_stream import RideStream
+chosen = settings.load()
+try:
+    App(chosen, devices.open_lcd(chosen), RideStream()).run()
+except KeyboardInterrupt:
+    port.rest_watchdog()
+"""
 _SILENT_S = 60.0  # an emulated board takes a while to start; one without a sensor says nothing either
 
 
-def record(port: str | None, out: Path, say: Print, warn: Print) -> None:
-    """Write readings to the log `out`, and NAME.cal.json beside it, until Ctrl-C. Raises InputError.
+@dataclass(frozen=True)
+class LiveReading:
+    """At the end of a block of half a second. lean_deg: > 0 to the right, None before the first alignment.  forward_g:
+    of the specific force.  rate_hz: readings a second.  seconds: since the recording began."""
 
-    Neither takes the place of a file: what was ridden before cannot be ridden again.
+    lean_deg: float | None
+    forward_g: float
+    rate_hz: float
+    seconds: float
+
+
+@dataclass(frozen=True)
+class RecordResult:
+    """log, calibration: the files.  seconds, readings: how much there is.  notes: a line for each thing that the
+    recording lacks."""
+
+    log: Path
+    calibration: Path
+    seconds: float
+    readings: int
+    notes: list[str]
+
+
+def record(
+    port: str | None,
+    out: Path,
+    begin: Callable[[str], None] | None = None,
+    live: Callable[[LiveReading], None] | None = None,
+) -> RecordResult:
+    """Write readings to the log `out`, and NAME.cal.json beside it, until Ctrl-C; then restart the board.
+
+    Neither takes the place of a file: what was ridden before cannot be ridden again. port: None takes the only board
+    that is plugged in.  begin: called with the port's name when readings are about to come.  live: called every half
+    second.  Raises InputError, NoFirmware, OutdatedFirmware.
     """
     if not out.name.endswith((".csv", ".csv.gz")):
         raise InputError(f"{out}: give --out a name that ends in .csv or .csv.gz")
@@ -40,35 +79,35 @@ def record(port: str | None, out: Path, say: Print, warn: Print) -> None:
             raise InputError(f"{path} is there already: give --out another name")
     with connected(port) as (transport, name):
         try:
-            say(f"recording from {name}: Ctrl-C ends it")
-            recorded = _Recording()
+            if begin:
+                begin(name)
+            recorded = _Recording(live)
             notes: list[str] = []
             write_whole(out, lambda temporary: recorded.write(temporary, _blocks(transport, name, notes), notes))
             assert recorded.first
             write_calibration(beside, ride_log.calibration(recorded.first))
-            for note in notes:
-                warn(note)
-            say(f"written: {out}, {recorded.seconds:.1f} s, {recorded.count} readings, and {beside.name}")
         finally:
             with contextlib.suppress(Exception):  # the cable may be out
                 restart(transport)
+    return RecordResult(out, beside, recorded.seconds, recorded.count, notes)
 
 
 class _Recording:
     """Blocks into a file. first: the first block; seconds, count: how much there is."""
 
-    def __init__(self) -> None:
+    def __init__(self, live: Callable[[LiveReading], None] | None) -> None:
         self.first: Block | None = None
         self.seconds = 0.0
         self.count = 0
+        self._live = live
 
     def write(self, path: Path, blocks: Iterator[Block], notes: list[str]) -> None:
-        """All of them as they come, with the lean live where someone is watching. notes: what is to be said of it."""
+        """All of them as they come. notes: gets a line for each thing that is missing."""
         missing, expected, before = 0, 0, 0
         meter = LeanMeter(CalibrationFile().to_firmware())
         opened = gzip.open if path.suffix == ".gz" else open
         aligned = False
-        with opened(path, "wt", encoding="ascii", newline="") as file, LiveLine() as live:
+        with opened(path, "wt", encoding="ascii", newline="") as file:
             file.write(",".join(ride_log.header(speed=True)) + "\n")
             for block in blocks:
                 if self.first is None or block.body != self.first.body:
@@ -90,24 +129,14 @@ class _Recording:
                     before = turn.time_us
                 self.count += len(block.turns)
                 self.seconds = (before - self.first.time_us) / 1e6
-                if live.watched:
-                    span_s = (before - block.time_us) / 1e6
-                    live.show(_status(meter if aligned else None, self, len(block.turns) / span_s))
+                if self._live:
+                    rate_hz = len(block.turns) * 1e6 / max(1, before - block.time_us)
+                    lean_deg = meter.lean_deg if aligned else None
+                    self._live(LiveReading(lean_deg, meter.smooth_force[2], rate_hz, self.seconds))
         if self.first is None:
             raise InputError("; ".join(["nothing was recorded: does the display show readings?", *notes]))
         if missing:
             notes.append(f"{missing} blocks of half a second did not arrive: the log has gaps")
-
-
-def _status(meter: LeanMeter | None, recorded: _Recording, rate: float) -> str:
-    """The live line. meter: None before the first alignment, when there is no lean."""
-    how_long = f"{rate:3.0f} readings/s  {recorded.seconds // 60:.0f}:{recorded.seconds % 60:04.1f}"
-    if meter is None:
-        return f"not aligned  {how_long}"
-    lean, forward = meter.lean_deg, meter.smooth_force[2]
-    bar = "#" * min(20, round(abs(lean) / 3))
-    picture = f"{bar if lean < 0 else '':>20}|{bar if lean > 0 else '':<20}"
-    return f"{picture} lean {lean:+5.1f} deg  forward {forward:+.2f} g  {how_long}"
 
 
 def _blocks(transport: SerialTransport, name: str, notes: list[str]) -> Iterator[Block]:
@@ -133,7 +162,7 @@ def _lines(transport: SerialTransport, name: str, notes: list[str]) -> Iterator[
     except OSError as error:
         notes.append(f"{name}: connection lost ({cause(error)}): what came until then is kept")
     except BrokenOff as error:
-        refuse_absent(str(error), name)
+        refuse_unfit_firmware(str(error), name)
         notes.append(f"{name}: {error}: what came until then is kept")
     finally:
         for number, handler in before.items():

@@ -1,0 +1,222 @@
+"""Updates of a board with an older version: what goes, broken off at any step, and the room that is needed."""
+
+import functools
+import types
+from pathlib import PurePosixPath
+from typing import Any
+
+import command
+import pytest
+from kickstand.rides import flash_ring
+from kickstand_tools.deploy import bytecode, connection, firmware_files, flash, room
+from kickstand_tools.deploy.board_files import BoardFiles, fingerprint, survey
+from kickstand_tools.deploy.update import needed_blocks, plan
+from littlefs_board import BLOCK, PORTS, LittlefsBoard
+from serial.tools import list_ports
+
+# The modules of version 0.2.0, all in one folder.
+FLAT = """
+__init__ align_wizard alignment app braking braking_regression bus button calibration capture dispersion drive_mode
+driving driving_check driving_events driving_parts driving_published driving_quality driving_reasons errors
+force_history frames frames_viper gps hardware hd44780 kalman lean lean_filter menu meter mpu6050 pages port pose
+recorder rest ride_file ride_file_viper ride_ring ride_stream rodrigues rotation sample_clock screen sd_card sensor
+settings six_position six_wizard speed speed_check standing status_report store transform transform_viper trim wheel
+""".split()
+FLAT_BYTES = {".mpy": 1800, ".py": 5000}  # of most of them
+FLAT_SMALL_BYTES = 400  # of every sixth: littlefs may keep so small a file within its folder
+NOTES = {"/kickstand/notes.txt": b"mine", "/kickstand_a.cal": b"calibration"}
+
+
+@functools.cache
+def contents(mpy):
+    return firmware_files.contents(mpy)
+
+
+def wanted(ending):
+    return contents(bytecode.PICO if ending == ".mpy" else None)
+
+
+def before(which):
+    """What an older version has put on a board: flat or nested, its ending; or nothing."""
+    if which == "nothing":
+        return {}
+    layout, ending = which.split()
+    if layout == "nested":  # of which every module has changed
+        return {path: data[:-1] + b"#" for path, data in wanted(ending).items()}
+    modules = {
+        f"/kickstand/{name}{ending}": bytes(FLAT_BYTES[ending] if i % 6 else FLAT_SMALL_BYTES)
+        for i, name in enumerate(FLAT)
+    }
+    return modules | {"/main.py": b"# 0.2.0\n" * 330, "/config.py": b"# 0.2.0\n" * 700}
+
+
+@pytest.fixture
+def plugged(monkeypatch):
+    """plugged(board): the only board that there is."""
+
+    def plug(board):
+        pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
+        monkeypatch.setattr(list_ports, "comports", lambda: [pico])
+        monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: board)
+        monkeypatch.setattr(connection, "_RESTART_S", 0)
+        monkeypatch.setattr(flash, "contents", lambda mpy: dict(contents(mpy or None)))
+        return board
+
+    return plug
+
+
+def fresh(port="rp2", ending=".mpy") -> Any:
+    """A board with nothing on it, that takes compiled files or only .py."""
+    return LittlefsBoard(port, mpy=bytecode.PICO if ending == ".mpy" else 0)
+
+
+@pytest.mark.parametrize("ending", [".mpy", ".py"])
+def test_of_the_modules_in_one_folder_nothing_is_left(plugged, ending):
+    board = plugged(fresh())
+    board.put(before("flat " + ending) | NOTES | {"/kickstand/lean/old/older.py": b"pass", "/kickstand/own/a.txt": b""})
+    board.system.makedirs("/kickstand/errors")  # it would be imported in place of errors.mpy
+    result = command.works("flash")
+    expected = wanted(".mpy") | NOTES | {"/kickstand/own/a.txt": b"", "/config.py": before("flat .py")["/config.py"]}
+    assert board.files() == expected
+    folders = {path.rpartition("/")[0] for path in expected} - {""}
+    assert board.folders() == folders
+    assert "removed: " in result.out
+    assert "kept: config.py" in result.out
+
+
+@pytest.mark.parametrize("name", ["/kickstand/lean", "/kickstand/errors/notes.txt"])
+def test_a_file_in_the_way_is_told_before_anything_is_touched(plugged, name):
+    board = plugged(fresh())
+    files = before("flat .mpy") | {name: b"mine"}
+    board.put(files)
+    result = command.run("flash")
+    assert result.status == 2
+    assert f"{name[1:]} on the board is in the way" in result.err
+    assert board.files() == files
+    assert board.resets == 1
+
+
+SMALL_OLD = {
+    "/kickstand/__init__.mpy": b"old",
+    "/kickstand/errors.mpy": b"same",
+    "/kickstand/lean.mpy": b"old" * 500,
+    "/kickstand/lean_filter.py": b"old",
+    "/kickstand/empty/old.py": b"old",
+    "/main.py": b"old",
+    "/config.py": b"old",
+}
+SMALL_NEW = {
+    "/kickstand/__init__.mpy": b"new",
+    "/kickstand/errors.mpy": b"same",
+    "/kickstand/lean/lean_filter.mpy": b"new" * 1000,
+    "/kickstand/lean/meter.mpy": b"new",
+    "/config.py": b"new" * 1000,
+    "/main.py": b"new" * 1000,
+}
+
+
+class Cut(ConnectionError):
+    """The cable is pulled, or the power goes."""
+
+
+def cut_at(board, number):
+    """Before its nth change."""
+    left = number
+
+    def before_change():
+        nonlocal left
+        if left == 0:
+            raise Cut("device disconnected")
+        left -= 1
+
+    board.before_change = before_change
+
+
+def test_broken_off_before_any_change_of_the_flash_it_starts_nothing_and_can_be_flashed_again():
+    number = 0
+    while True:
+        board = fresh()
+        board.put(SMALL_OLD | NOTES)
+        cut_at(board, number)
+        try:
+            flash.install(board, flash.prepare(board, SMALL_NEW, replace_config=True))
+            break
+        except Cut:
+            pass
+        board.power_cycle()
+        found = board.files()
+        assert ("/main.py" in found) == (number == 0)
+        assert number or found == SMALL_OLD | NOTES
+        assert set(NOTES.items()) <= set(found.items())
+        board.before_change = lambda: None
+        flash.install(board, flash.prepare(board, SMALL_NEW))
+        config = found.get("/config.py", SMALL_NEW["/config.py"])  # whole; kept, since there is no --config now
+        assert config in (SMALL_OLD["/config.py"], SMALL_NEW["/config.py"])
+        assert board.files() == SMALL_NEW | NOTES | {"/config.py": config}, f"after a cut before change {number}"
+        assert board.folders() == {"/kickstand", "/kickstand/lean"}
+        number += 1
+    assert number > 25
+    assert board.files() == SMALL_NEW | NOTES
+    assert board.folders() == {"/kickstand", "/kickstand/lean"}
+
+
+@pytest.mark.parametrize("port", PORTS)
+@pytest.mark.parametrize("ending", [".mpy", ".py"])
+@pytest.mark.parametrize("which", ["nothing", "flat .mpy", "flat .py", "nested .mpy", "nested .py"])
+def test_the_room_that_is_said_to_be_needed_is_enough(plugged, port, ending, which):
+    """With one block less it is refused with nothing touched; full of rides, it says what to do."""
+    board = plugged(fresh(port, ending))
+    board.put(before(which) | {"/rides/000/01/00000.rid": b"ride" * 4096})
+    present = survey(board)
+    blocks = needed_blocks(plan(wanted(ending), present, False), present)
+
+    board.fill("/rides/000/01/00001.rid", blocks - 1)
+    files = board.files()
+    result = command.run("flash")
+    assert result.status == 2
+    assert f"not enough room on the board: {blocks * BLOCK // 1000} kB needed" in result.err
+    advice = "kickstand pull --delete, then flash again" if "nested" in which else "remove files of your own"
+    assert advice in result.err
+    assert result.err.count("\n") == 1
+    assert board.files() == files
+    assert board.resets == 1  # what was on it goes on
+
+    board.fill("/rides/000/01/00001.rid", blocks)
+    command.works("flash")
+    found = board.files()
+    assert {path: found[path] for path in wanted(ending) if path != "/config.py"} == {
+        path: data for path, data in wanted(ending).items() if path != "/config.py"
+    }
+
+
+def on_board(files, free_blocks=0):
+    """A board with these files, as survey() gives it."""
+    folders = frozenset(str(folder) for path in files for folder in PurePosixPath(path).parents) - {"/"}
+    return BoardFiles({path: fingerprint(data) for path, data in files.items()}, folders, BLOCK, free_blocks, True)
+
+
+@pytest.mark.parametrize("ending", [".mpy", ".py"])
+@pytest.mark.parametrize("which", ["flat .mpy", "flat .py", "nested .mpy", "nested .py"])
+def test_a_board_full_of_rides_has_room_for_an_update(which, ending):
+    """The ring of rides leaves RESERVE free: an update never has to wait for rides to be pulled."""
+    board = on_board(before(which))
+    assert needed_blocks(plan(wanted(ending), board, True), board) * BLOCK <= flash_ring.RESERVE
+
+
+def test_the_ring_of_rides_knows_what_the_firmware_takes():
+    """As littlefs lays it out, with its own two blocks; the ring takes what else is in flash for rides."""
+    board = fresh()
+    board.put(wanted(".mpy"))
+    taken = board.system.used_block_count * BLOCK
+    assert taken <= flash_ring.FIRMWARE <= taken + 10 * BLOCK
+
+
+@pytest.mark.parametrize("size", [0, 1, 512, 513, 4096, 4097, 8188, 8189, 12276, 100_000, 400_001])
+@pytest.mark.parametrize("port", PORTS)
+def test_a_file_takes_between_least_and_most(port, size):
+    board = fresh(port)
+    board.put({"/other": b""})
+    free = board.free
+    board.put({"/file": bytes(size)})
+    assert room.least(size, BLOCK) <= free - board.free <= room.most(size, BLOCK)
+    assert room.most(size, BLOCK) - room.least(size, BLOCK) == (size <= BLOCK // 8)

@@ -1,0 +1,142 @@
+"""The commands of `kickstand` that talk to a board: flash, status, pull, record."""
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from ..deploy.connection import Progress
+    from ..rides.pull import PulledRide
+    from ..rides.record import LiveReading
+
+_PATH = click.Path(path_type=Path)
+_PORT = click.option(
+    "--port", help="Serial port of the board, as COM3 or /dev/ttyACM0; found by itself if only one is there."
+)
+_NAMED_ONE_BY_ONE = 5
+
+
+@click.command()
+@_PORT
+@click.option("--config", is_flag=True, help="Replace the board's config.py too, which is otherwise kept.")
+def flash(port: str | None, config: bool) -> None:
+    """Copy the firmware to a board that runs MicroPython, check it, and start it."""
+    from ..deploy.flash import flash
+
+    with _bar() as progress:
+        result = flash(port, config, progress)
+    click.echo(f"{result.board} on {result.port}")
+    if result.config:
+        click.echo(f"config.py is {result.config}")
+    if result.why_sources:
+        click.echo(f"note: {result.why_sources}: it gets the sources, and starts more slowly")
+    done = result.installed
+    if done.config_differs:
+        click.echo("kept: config.py on the board is not this version's; --config would replace it")
+    if len(done.removed) > _NAMED_ONE_BY_ONE:
+        click.echo(f"removed: {len(done.removed)} files that are no longer part")
+    else:
+        for path in done.removed:
+            click.echo(f"removed: {path[1:]} is no longer part")
+    click.echo(
+        f"copied {len(done.copied)} files, {done.copied_bytes / 1000:.1f} kB, and verified them; "
+        f"{len(done.kept)} left as they were"
+    )
+    click.echo("restarted: the display shows the rest")
+
+
+@click.command()
+@_PORT
+def status(port: str | None) -> None:
+    """Ask a board how it is: versions, settings, sensor, display, calibration."""
+    from ..deploy.status import status
+
+    click.echo(status(port))
+
+
+@click.command()
+@_PORT
+@click.option("--out", type=_PATH, default=Path(), help="The directory to write to; this one if not given.")
+@click.option("--delete", is_flag=True, help="Remove from the board what came over whole.")
+def pull(port: str | None, out: Path, delete: bool) -> None:
+    """Fetch the rides that a board has recorded, as logs with their calibration."""
+    from ..rides.pull import pull
+
+    def say(ride: "PulledRide") -> None:
+        for problem in ride.problems:
+            _warn(problem)
+        if ride.log:
+            click.echo(f"written: {ride.log}, {ride.seconds / 60:.1f} min, {ride.readings} readings")
+        if ride.deleted:
+            click.echo(f"deleted from the board: ride {ride.number}")
+        elif delete:
+            _warn(f"ride {ride.number}: not deleted from the board, because not all of it came over")
+
+    with _bar() as progress:
+        result = pull(port, out, delete, progress, say)
+    if not result.rides:
+        click.echo(f"no rides on the board at {result.port}: its menu's Record ride makes one")
+
+
+@click.command()
+@_PORT
+@click.option("--out", required=True, type=_PATH, help="The file to write.")
+def record(port: str | None, out: Path) -> None:
+    """Write a log live over USB until Ctrl-C; the board's display goes on."""
+    from ..rides.live_line import LiveLine
+    from ..rides.record import record
+
+    with contextlib.ExitStack() as stack:
+        line: list[LiveLine] = []
+
+        def begin(name: str) -> None:
+            click.echo(f"recording from {name}: Ctrl-C ends it")
+            line.append(stack.enter_context(LiveLine()))
+
+        def show(reading: "LiveReading") -> None:
+            line[0].show(_live_text(reading))
+
+        result = record(port, out, begin, show)
+    for note in result.notes:
+        _warn(note)
+    click.echo(
+        f"written: {result.log}, {result.seconds:.1f} s, {result.readings} readings, and {result.calibration.name}"
+    )
+
+
+def _live_text(reading: "LiveReading") -> str:
+    """The lean as a bar to the left or right, and how long the recording is."""
+    how_long = f"{reading.rate_hz:3.0f} readings/s  {reading.seconds // 60:.0f}:{reading.seconds % 60:04.1f}"
+    lean = reading.lean_deg
+    if lean is None:
+        return f"not aligned  {how_long}"
+    bar = "#" * min(20, round(abs(lean) / 3))
+    picture = f"{bar if lean < 0 else '':>20}|{bar if lean > 0 else '':<20}"
+    return f"{picture} lean {lean:+5.1f} deg  forward {reading.forward_g:+.2f} g  {how_long}"
+
+
+@contextlib.contextmanager
+def _bar() -> "Iterator[Progress]":
+    """A progress bar, from the first time that it is called on."""
+    from ..progress import Bar
+
+    with contextlib.ExitStack() as stack:
+        bars: list[Bar] = []
+        before = 0
+
+        def show(what: str, done: int, total: int) -> None:
+            nonlocal before
+            if not bars:
+                bars.append(stack.enter_context(Bar(what, total)))
+            bars[0].describe(what)
+            bars[0].advance(done - before)
+            before = done
+
+        yield show
+
+
+def _warn(text: str) -> None:
+    click.echo(f"warning: {text}", err=True)

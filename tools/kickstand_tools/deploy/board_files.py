@@ -1,0 +1,68 @@
+"""What is on a board's flash: its files with their hashes, its folders, its free blocks."""
+
+import ast
+import hashlib
+from dataclasses import dataclass
+
+from mpremote.transport_serial import SerialTransport
+
+from .firmware_files import PACKAGE
+
+# Prints (path, size, SHA-256) of each file in the root and below the package's folder, (path, None, None) of each
+# folder below the package's folder, that folder itself included.
+_SURVEY = """
+import hashlib, os
+def survey(directory):
+    for entry in os.ilistdir(directory or "/"):
+        path = directory + "/" + entry[0]
+        if entry[1] & 0x4000:
+            if (path + "/").startswith("{PACKAGE}/"):
+                print((path, None, None))
+                survey(path)
+            continue
+        digest, size = hashlib.sha256(), 0
+        with open(path, "rb") as file:
+            while True:
+                block = file.read(1024)
+                if not block:
+                    break
+                size += len(block)
+                digest.update(block)
+        print((path, size, digest.digest()))
+survey("")
+""".replace("{PACKAGE}", PACKAGE)
+
+_RIDES = "/rides"  # in flash, see kickstand.rides.flash_ring.directory()
+
+Fingerprint = tuple[int, bytes]
+
+
+@dataclass(frozen=True)
+class BoardFiles:
+    """files: (bytes, SHA-256) by path, of the root and of the package.  folders: the package's folder and those below
+    it.  block: bytes of a block of flash.  free_blocks: how many are free.  has_rides: some are in
+    flash."""
+
+    files: dict[str, Fingerprint]
+    folders: frozenset[str]
+    block: int
+    free_blocks: int
+    has_rides: bool
+
+
+def survey(transport: SerialTransport) -> BoardFiles:
+    """Look at the board's flash."""
+    entries = [ast.literal_eval(line) for line in transport.exec(_SURVEY).decode().splitlines()]
+    block, free_blocks = transport.eval("(lambda s: (s[0], s[3]))(__import__('os').statvfs('/'))")
+    return BoardFiles(
+        {path: (size, digest) for path, size, digest in entries if size is not None},
+        frozenset(path for path, size, _ in entries if size is None),
+        block,
+        free_blocks,
+        transport.fs_isdir(_RIDES) and bool(transport.fs_listdir(_RIDES)),
+    )
+
+
+def fingerprint(data: bytes) -> Fingerprint:
+    """Bytes and SHA-256, as survey() gives them."""
+    return len(data), hashlib.sha256(data).digest()

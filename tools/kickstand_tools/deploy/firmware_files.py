@@ -1,0 +1,57 @@
+"""Which files make up the firmware, as `kickstand flash` and mip put them onto a board.
+
+python -m kickstand_tools.deploy.firmware_files writes mip's list, firmware/package.json, anew.
+"""
+
+import json
+from pathlib import Path
+
+from kickstand import __version__
+
+from .. import firmware_path
+from . import bytecode
+
+PACKAGE = "/kickstand"
+MAIN = "/main.py"
+CONFIG = "/config.py"  # belongs to the rider once it is on the board
+MODULE_ENDINGS = (".py", ".mpy")
+
+
+def firmware_files() -> dict[str, Path]:
+    """Path on the board -> source file, in the order to copy them: main.py, which starts the rest, is the last."""
+    root = firmware_path.directory()
+    package = firmware_path.PACKAGE
+    files = {f"{PACKAGE}/{path.relative_to(package).as_posix()}": path for path in sorted(package.rglob("*.py"))}
+    return files | {CONFIG: root / "config.py", MAIN: root / "main.py"}
+
+
+def contents(mpy: int | None) -> dict[str, bytes]:
+    """Path on the board -> content, in the order of firmware_files().
+
+    mpy: the board's sys.implementation._mpy: the package is compiled to .mpy files for it. None: the package stays .py.
+    main.py and config.py are always .py: MicroPython starts no main.mpy, and the rider edits config.py.
+    Raises CannotCompile.
+    """
+    files = firmware_files()
+    package = {path: source for path, source in files.items() if path.startswith(PACKAGE + "/")}
+    rest = {path: source.read_bytes() for path, source in files.items() if path not in package}
+    if mpy is None:
+        return {path: source.read_bytes() for path, source in package.items()} | rest
+    return bytecode.compiled(package, mpy) | rest
+
+
+def unfinished(path: str) -> str:
+    """The name that a file is written under until it is verified. A main.py that is cut short must not be started, and
+    a config.py that is cut short must not be kept as the rider's own."""
+    return path.removesuffix(".py") + ".new" if path in (CONFIG, MAIN) else path
+
+
+def mip_package() -> dict[str, object]:
+    """What package.json has to say. The URLs are relative: mip takes the modules from where it found the list."""
+    modules = [path.lstrip("/") for path in firmware_files() if path.startswith(PACKAGE + "/")]
+    return {"urls": [[module, module] for module in modules], "deps": [], "version": __version__}
+
+
+if __name__ == "__main__":
+    list_path = firmware_path.directory() / "package.json"
+    list_path.write_text(json.dumps(mip_package(), indent=2) + "\n")

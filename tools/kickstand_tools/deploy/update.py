@@ -1,0 +1,107 @@
+"""What an update changes on a board: which files and folders go, which are made, and whether they fit."""
+
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+
+from ..errors import InputError
+from . import room
+from .board_files import BoardFiles, fingerprint
+from .firmware_files import CONFIG, MAIN, MODULE_ENDINGS, PACKAGE, unfinished
+
+
+@dataclass(frozen=True)
+class Update:
+    """In the order in which it is carried out. Where the board is up to date there is nothing to remove, make or copy.
+
+    remove: files, main.py the first.  remove_folders: emptied by then.  make_folders.  copy: contents by path, main.py
+    the last.  obsolete: those of remove that belong to no module of this version.  keep: files left as they are.
+    config_differs: the rider's config.py, which is kept, is not this version's.
+    """
+
+    remove: list[str]
+    remove_folders: list[str]
+    make_folders: list[str]
+    copy: dict[str, bytes]
+    obsolete: list[str]
+    keep: list[str]
+    config_differs: bool
+
+
+def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> Update:
+    """What makes the board's files those that are wanted. Files of the rider's own stay.
+
+    Whatever is replaced is removed first, which frees its blocks: nothing is lost, since the board starts nothing
+    without main.py, and the firmware can be copied again. Raises InputError for a file in the way.
+    """
+    copy = {path: data for path, data in wanted.items() if board.files.get(path) != fingerprint(data)}
+    config_differs = CONFIG in copy and CONFIG in board.files and not replace_config
+    if config_differs:
+        del copy[CONFIG]
+    left_over = {unfinished(MAIN), unfinished(CONFIG)}  # by an update that was broken off
+    stale = [path for path in board.files if path in left_over or (_is_module(path) and path not in wanted)]
+    kept = board.files.keys() - set(stale)
+    folders = {folder for path in wanted for folder in _folders(path)}
+    empty = board.folders.difference(folders, *map(_folders, kept))
+    _refuse_in_the_way(wanted, folders, kept)
+    if copy or stale or empty:
+        copy[MAIN] = copy.pop(MAIN, wanted[MAIN])
+    in_order = dict.fromkeys([MAIN, *stale, *copy] if copy else [])
+    modules = {_module(path) for path in wanted}
+    return Update(
+        remove=[path for path in in_order if path in board.files],
+        remove_folders=sorted(empty, reverse=True),  # the inner ones first
+        make_folders=sorted(folders - board.folders),
+        copy=copy,
+        obsolete=[path for path in stale if _module(path) not in modules],
+        keep=[path for path in wanted if path not in copy],
+        config_differs=config_differs,
+    )
+
+
+def needed_blocks(update: Update, board: BoardFiles) -> int:
+    """How many blocks have to be free for it."""
+    if not update.copy:
+        return 0
+    takes = sum(room.most(len(data), board.block) for data in update.copy.values())
+    frees = sum(room.least(board.files[path][0], board.block) for path in update.remove)
+    folders = len(update.make_folders) - len(update.remove_folders)
+    return max(0, takes - frees + room.FOLDER * folders) + room.SPARE
+
+
+def refuse_without_room(update: Update, board: BoardFiles) -> None:
+    """Raise NoRoom for an update that would fill the flash."""
+    blocks = needed_blocks(update, board)
+    if blocks <= board.free_blocks:
+        return
+    # Firmware with its modules still in one folder has to be updated before its rides can be pulled.
+    pull = board.has_rides and f"{PACKAGE}/rides" in board.folders
+    raise room.NoRoom(
+        f"not enough room on the board: {blocks * board.block // 1000} kB needed, "
+        f"{board.free_blocks * board.block // 1000} kB free: "
+        + (
+            "pull the rides with kickstand pull --delete, then flash again"
+            if pull
+            else "remove files of your own from it"
+        )
+    )
+
+
+def _is_module(path: str) -> bool:
+    return path.startswith(PACKAGE + "/") and path.endswith(MODULE_ENDINGS)
+
+
+def _module(path: str) -> str:
+    return path.rpartition(".")[0]
+
+
+def _folders(path: str) -> list[str]:
+    """Every folder that path is in, but for the root."""
+    return [str(folder) for folder in PurePosixPath(path).parents[:-1]]
+
+
+def _refuse_in_the_way(wanted: dict[str, bytes], folders: set[str], kept: set[str]) -> None:
+    """MicroPython imports a folder lean/ in place of lean.py, and lean.py in place of lean.mpy."""
+    modules = {_module(path) for path in wanted}
+    for path in sorted(kept):
+        if path in folders or modules.intersection(_folders(path)):
+            raise InputError(f"{path[1:]} on the board is in the way of the firmware: move it, then repeat this")
