@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.demo.hand_bike import CRUISE_MPS, HandBike
 from kickstand_tools.simulation.scripted.script import (
-    GRAVITY_MPS2,
     KICKSTAND_DEG,
     Ride,
     accelerate,
@@ -74,7 +74,7 @@ def test_rates_are_the_derivative_of_the_attitude(flown):
 
 def test_forces_are_the_derivative_of_the_velocity(flown):
     _, attitude, acceleration, motion = flown
-    felt = np.einsum("nji,nj->ni", attitude, acceleration / GRAVITY_MPS2 + [0.0, 1.0, 0.0])
+    felt = np.einsum("nji,nj->ni", attitude, acceleration / STANDARD_GRAVITY + [0.0, 1.0, 0.0])
     assert np.ptp(felt[:, 1]) > 0.3 and np.ptp(felt[:, 2]) > 0.5
     assert np.abs(felt - motion[:, :3])[1:-1].max() < 1e-3
 
@@ -97,7 +97,7 @@ def test_in_balance_no_force_to_the_side_and_the_yaw_rate_of_the_lean():
         assert speed > 4.0
         assert abs(ride.motion(t)[0]) < 1e-9
         if phase == "held turn":
-            assert np.tan(np.radians(lean)) == pytest.approx(-speed * np.radians(yaw_rate) / GRAVITY_MPS2)
+            assert np.tan(np.radians(lean)) == pytest.approx(-speed * np.radians(yaw_rate) / STANDARD_GRAVITY)
             assert np.sign(yaw_rate) == -np.sign(lean)
             seen.add(bool(lean > 0))
     assert seen == {True, False}
@@ -183,5 +183,5 @@ def test_by_hand_rates_and_forces_follow_from_the_motion():
     assert np.ptp(seen[:, 6]) > 20
     # but for the instants in which the rider changes his mind
     assert np.quantile(np.abs(roll_rate - seen[:, 5]), 0.99) < 0.5
-    assert np.quantile(np.abs(acceleration / GRAVITY_MPS2 - seen[:, 2]), 0.99) < 0.005
+    assert np.quantile(np.abs(acceleration / STANDARD_GRAVITY - seen[:, 2]), 0.99) < 0.005
     assert np.ptp(seen[:, 2]) > 0.25

@@ -2,8 +2,9 @@
 
 from math import degrees, pi, radians, sin
 
-from kickstand_tools.simulation.scripted.script import (
-    GRAVITY_MPS2,
+from kickstand.units import STANDARD_GRAVITY
+
+from ..simulation.scripted.script import (
     KICKSTAND_DEG,
     RIDING_MPS,
     RIDING_SWAY_DEG,
@@ -74,7 +75,7 @@ class HandBike:
         self._advance(t_s)
         lean = self._lean + self._sway * sin(_SWAY_RADPS * t_s)
         lean_rate = self._lean_rate + self._sway * _SWAY_RADPS * sin(_SWAY_RADPS * t_s + pi / 2.0)
-        return lean, lean_rate, yaw_rate_in_balance(lean, GRAVITY_MPS2, self._speed)
+        return lean, lean_rate, yaw_rate_in_balance(lean, STANDARD_GRAVITY, self._speed)
 
     def motion(self, t_s):
         """Specific force (g) and rates (deg/s) in the vehicle's axes, vibration included."""

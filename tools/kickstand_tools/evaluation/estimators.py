@@ -8,6 +8,7 @@ from collections.abc import Callable
 from importlib.util import find_spec
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from ..calibration.file import CalibrationFile
@@ -17,7 +18,6 @@ from .samples import Samples, calibrated
 
 AVERAGE_S = 0.3
 COMPLEMENTARY = 0.98  # kept of the old lean at each sample
-GRAVITY_MPS2 = 9.80665
 
 _SHOWN, _FORMULA = (replay_engine.COLUMNS.index(name) for name in ("lean_deg", "lean_formula_deg"))
 _TO_XYZ = [2, 0, 1]  # their body frame is forward, left, up
@@ -112,7 +112,7 @@ def _others() -> list[str]:
 def _xyz(samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Rates in rad/s and force in m/s2 along forward, left, up."""
     gyro = np.ascontiguousarray(np.radians(samples.rate[:, _TO_XYZ]))
-    return gyro, np.ascontiguousarray(samples.force[:, _TO_XYZ] * GRAVITY_MPS2)
+    return gyro, np.ascontiguousarray(samples.force[:, _TO_XYZ] * STANDARD_GRAVITY)
 
 
 def _roll(q: NDArray) -> NDArray[np.float64]:

@@ -11,12 +11,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
 from ..logs.reader import Log, read_log
-from .estimators import GRAVITY_MPS2, estimate
+from .estimators import estimate
 from .metrics import rms, slope
 from .samples import calibrated
 
@@ -55,7 +56,7 @@ def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64
     """atan(v * yaw rate / g) in degrees, > 0 to the right, averaged over 1 s."""
     samples = calibrated(log, calibration)
     centripetal = _speed(log) * np.radians(samples.rate[:, 1])
-    return _averaged(-np.degrees(np.arctan(centripetal / GRAVITY_MPS2)), samples.rate_hz)
+    return _averaged(-np.degrees(np.arctan(centripetal / STANDARD_GRAVITY)), samples.rate_hz)
 
 
 def calibration_of(log: Log) -> CalibrationFile:

@@ -4,9 +4,9 @@ from dataclasses import dataclass, field
 from math import atan, degrees, radians, tan
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 
 from .commands import Leg
-from .physics.bike import GRAVITY_MPS2
 from .physics.road import CLASS_B
 
 _CLOSING_S = 45.0  # a straight and a stop at the end of every ride
@@ -109,7 +109,7 @@ class Plan:
         """Roll to lean_deg within roll_s, or as fast as can be; hold it for seconds or about heading_deg."""
         roll_s = max(roll_s, abs(lean_deg - self._lean_now()) / self.roll_dps)
         if seconds is None:
-            rate = degrees(GRAVITY_MPS2 * tan(radians(abs(lean_deg))) / max(speed_mps, 1.0))
+            rate = degrees(STANDARD_GRAVITY * tan(radians(abs(lean_deg))) / max(speed_mps, 1.0))
             seconds = min(max((heading_deg or 45.0) / rate - roll_s / 2.0, 0.5), 12.0)
         self.add(phase, roll_s + seconds, speed_mps, lean_deg=lean_deg, roll_s=roll_s, **more)
 
@@ -148,4 +148,4 @@ class Plan:
 
 def lean_for(speed_mps: float, radius_m: float) -> float:
     """Lean in degrees that balances a turn of this radius."""
-    return degrees(atan(speed_mps * speed_mps / (GRAVITY_MPS2 * radius_m)))
+    return degrees(atan(speed_mps * speed_mps / (STANDARD_GRAVITY * radius_m)))

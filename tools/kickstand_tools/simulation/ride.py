@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from . import poses
 from .commands import Commands, commands
 from .physics import balance
-from .physics.bike import GRAVITY_MPS2, Bike
+from .physics.bike import Bike
 from .physics.chip import DIVIDER, RATE_HZ, Chip
 from .physics.engine import Engine
 from .physics.kinematics import Motion, body_rates, specific_force
@@ -61,7 +62,7 @@ def ride(
     mounting = random_rotation(chance)
     command = commands(plan.legs, RATE_HZ)
     motion, extra = _motion(chance, command, bike, conditions)
-    force = (specific_force(motion, bike) + extra.force) / GRAVITY_MPS2
+    force = (specific_force(motion, bike) + extra.force) / STANDARD_GRAVITY
     rates = np.degrees(body_rates(motion) + extra.rates)
     temp = conditions.start_c + conditions.rise_c * (1.0 - np.exp(-command.time / _WARMING_S))
     turned = _creep(chance, len(force), conditions.creep_deg)
@@ -149,7 +150,7 @@ def _impact(chance: np.random.Generator, command: Commands) -> NDArray[np.float6
         ringing = np.where(since >= 0.0, np.exp(-np.clip(since, 0.0, 10.0) / 0.08), 0.0)
         for axis in range(3):
             wave = np.sin(2.0 * np.pi * chance.uniform(15.0, 35.0) * since)
-            force[:, axis] = _IMPACT_G * GRAVITY_MPS2 * ringing * wave
+            force[:, axis] = _IMPACT_G * STANDARD_GRAVITY * ringing * wave
     return force
 
 

@@ -7,9 +7,10 @@ the balance lean b; the chassis leans more, because wide tyres carry it on their
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 
 from ..commands import Commands
-from .bike import GRAVITY_MPS2, Bike
+from .bike import Bike
 from .signals import Signal, band_noise, derivative, smoothed, smoothstep
 
 _STEERING_S = 0.04  # a steering that turned faster would be a slap
@@ -58,7 +59,7 @@ def roll(command: Commands, bike: Bike, unrest: Signal) -> Roll:
     so a quick roll to the right begins with a yaw to the left: countersteering.
     """
     rate, v = command.rate_hz, command.speed
-    normal_g = GRAVITY_MPS2 * np.cos(command.slope) + v * derivative(command.slope, rate)
+    normal_g = STANDARD_GRAVITY * np.cos(command.slope) + v * derivative(command.slope, rate)
     wind = command.crosswind * smoothstep(v / 5.0)
     balance = np.arctan(np.tan(command.lean) - wind / normal_g) + unrest
     acceleration = derivative(derivative(balance, rate), rate)

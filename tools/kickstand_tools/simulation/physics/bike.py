@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-GRAVITY_MPS2 = 9.80665
-
 
 @dataclass(frozen=True)
 class Bike:

@@ -9,12 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data_sheet import MAX_GYRO_BIAS_DPS, MAX_OFFSET_G, MAX_SCALE_ERROR
+
 RATE_HZ = 1000
 DIVIDER = 5  # 200 Hz
 _ACCEL_RANGE_G, _ACCEL_LSB = 8.0, 4096.0
 _GYRO_RANGE_DPS, _GYRO_LSB = 500.0, 65.5
 _ACCEL_NOISE_G = 400e-6 * np.sqrt(RATE_HZ / 2)  # per conversion, of 400 ug/sqrt(Hz)
 _GYRO_NOISE_DPS = 0.005 * np.sqrt(RATE_HZ / 2)
+_CROSS_AXIS = 0.02  # sensitivity of an axis to its neighbours
 _GYRO_DPS_PER_G = 0.1  # sensitivity to linear acceleration
 _CALIBRATED_C = 25.0
 
@@ -59,10 +62,10 @@ class Chip:
             return np.eye(3) + share * spread * np.where(np.eye(3) > 0.0, scale, cross)
 
         return Chip(
-            near_one(0.03, 0.02),
-            share * chance.uniform(-1.0, 1.0, 3) * [0.05, 0.05, 0.08],
-            near_one(0.03, 0.02),
-            share * chance.uniform(-20.0, 20.0, 3),
+            near_one(MAX_SCALE_ERROR, _CROSS_AXIS),
+            share * chance.uniform(-1.0, 1.0, 3) * MAX_OFFSET_G,
+            near_one(MAX_SCALE_ERROR, _CROSS_AXIS),
+            share * chance.uniform(-MAX_GYRO_BIAS_DPS, MAX_GYRO_BIAS_DPS, 3),
             share * drift * chance.uniform(-0.0003, 0.0003, 3),
             share * drift * chance.uniform(-0.06, 0.06, 3),
         )

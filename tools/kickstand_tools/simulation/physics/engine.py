@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from .signals import Signal, integral, smoothed
@@ -48,4 +49,4 @@ class Engine:
                 phase = phases[axis, k]
                 felt[:, axis] += weights[axis, k] * (sine * np.cos(phase) + cosine * np.sin(phase))
         felt *= np.sqrt(2.0) * size[:, None]
-        return felt[:, :3] * 9.80665, felt[:, 3:] * np.radians(_DPS_PER_G)
+        return felt[:, :3] * STANDARD_GRAVITY, felt[:, 3:] * np.radians(_DPS_PER_G)

@@ -7,9 +7,10 @@ lean about the forward axis, so at rest the lean is atan2(left, up) of the force
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from .bike import GRAVITY_MPS2, Bike
+from .bike import Bike
 from .signals import Signal, derivative
 
 
@@ -48,8 +49,8 @@ def specific_force(motion: Motion, bike: Bike) -> NDArray[np.float64]:
     """
     rate, v, slope = motion.rate_hz, motion.speed, motion.slope
     left = v * motion.yaw_rate * np.cos(slope)
-    up = GRAVITY_MPS2 * np.cos(slope) + v * derivative(slope, rate) + motion.heave
-    forward = GRAVITY_MPS2 * np.sin(slope) + derivative(v, rate)
+    up = STANDARD_GRAVITY * np.cos(slope) + v * derivative(slope, rate) + motion.heave
+    forward = STANDARD_GRAVITY * np.sin(slope) + derivative(v, rate)
     nose = motion.pitch - slope
     up, forward = (
         up * np.cos(nose) - forward * np.sin(nose),

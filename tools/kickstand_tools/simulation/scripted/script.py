@@ -14,7 +14,8 @@ The sensor sits on the roll axis; the tyres have no width.
 
 from math import cos, degrees, pi, radians, sin, sqrt, tan
 
-GRAVITY_MPS2 = 9.80665
+from kickstand.units import STANDARD_GRAVITY
+
 KICKSTAND_DEG = -12.0  # to the left, as most are
 MOVE_S = 2.0  # from the kickstand to upright, or back
 STANDING_SWAY_DEG = 0.1  # a rider holding the bike upright between the knees
@@ -113,16 +114,16 @@ def body_motion(lean, lean_rate, speed, acceleration, yaw_rate, slope=0.0, slope
     """
     # In the road's axes: forward along the road, left level, up across both.
     left = speed * yaw_rate * cos(slope)
-    up = GRAVITY_MPS2 * cos(slope) + speed * slope_rate
-    forward = acceleration + GRAVITY_MPS2 * sin(slope)
+    up = STANDARD_GRAVITY * cos(slope) + speed * slope_rate
+    forward = acceleration + STANDARD_GRAVITY * sin(slope)
     w_left = -slope_rate  # nose up turns forward towards up: negative about left
     w_up = yaw_rate * cos(slope)
     w_forward = yaw_rate * sin(slope) + lean_rate
     c, s = cos(lean), sin(lean)
     return (
-        (left * c + up * s) / GRAVITY_MPS2,
-        (up * c - left * s) / GRAVITY_MPS2,
-        forward / GRAVITY_MPS2,
+        (left * c + up * s) / STANDARD_GRAVITY,
+        (up * c - left * s) / STANDARD_GRAVITY,
+        forward / STANDARD_GRAVITY,
         degrees(w_left * c + w_up * s),
         degrees(w_up * c - w_left * s),
         degrees(w_forward),
@@ -188,7 +189,7 @@ class Ride:
         distance += seconds * (before[1] * u + (after[1] - before[1]) * glided)
         if t_s > self.seconds:
             distance += after[1] * (t_s - self.seconds)
-        lift = GRAVITY_MPS2 * cos(slope) + speed * slope_rate
+        lift = STANDARD_GRAVITY * cos(slope) + speed * slope_rate
         yaw = yaw_rate_in_balance(lean, lift, speed) / cos(slope)
         return segment.phase, lean, lean_rate, speed, acceleration, yaw, slope, slope_rate, distance, engine
 

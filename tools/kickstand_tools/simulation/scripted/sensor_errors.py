@@ -9,10 +9,10 @@ same seed gives the same reading at the same instant on either, in any order.
 
 from math import cos, pi, sin, sqrt
 
-# Data sheet PS-MPU-6000A rev 3.4, section 6.1-6.2
-MAX_OFFSET_G = (0.05, 0.05, 0.08)
-MAX_SCALE_ERROR = 0.03
-MAX_GYRO_BIAS_DPS = 20.0
+from kickstand.units import AXES
+
+from ..data_sheet import MAX_GYRO_BIAS_DPS, MAX_OFFSET_G, MAX_SCALE_ERROR
+
 ACCEL_NOISE_G = 0.0033  # rms: 400 ug/sqrt(Hz) behind the 44 Hz low-pass
 GYRO_NOISE_DPS = 0.041  # rms: 0.005 deg/s/sqrt(Hz) behind the 42 Hz one
 
@@ -146,6 +146,6 @@ def six_poses(sensor, off_deg=0.0, seed=1):
             up[axis] = sign * cos(askew)
             up[(axis + 1) % 3] = sin(askew) * cos(around)
             up[(axis + 2) % 3] = sin(askew) * sin(around)
-            poses.append((("+" if sign > 0 else "-") + "xyz"[axis], resting(sensor, up)))
+            poses.append((("+" if sign > 0 else "-") + AXES[axis], resting(sensor, up)))
     poses.append(("free", resting(sensor, (0.5, 0.6, -0.7))))
     return poses
