@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..logs.reader import COLUMNS
 from ..output import check_directory
-from .profiles import PROFILES
+from .profiles import check_profile
 from .ride import Ride, ride
 
 _LOG = ",".join((*COLUMNS, "temp_c"))
@@ -32,8 +32,7 @@ def simulate(
     a row for each of RIDE.csv. A RIDE.cal.json there, of the ride before, is removed.
     speed: give RIDE.csv a speed, once a second.
     """
-    if profile not in PROFILES:
-        raise InputError(f"no profile {profile}: there are {', '.join(PROFILES)}")
+    check_profile(profile)
     directory = Path(out_dir)
     check_directory(directory)
     made = ride(profile, seed, seconds, upright_error_deg, pitch_change_deg, share)

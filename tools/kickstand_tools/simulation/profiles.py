@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 
+from ..errors import InputError
 from . import stress
 from .physics.road import CLASS_A, CLASS_B
 from .plan import Conditions, Plan, lean_for
@@ -176,3 +177,9 @@ PROFILES: dict[str, Callable[[Plan], Conditions]] = MAIN | {
     "fall": lambda plan: stress.fall(plan),
     "parked": stress.parked,
 }
+
+
+def check_profile(name: str) -> None:
+    """Raise InputError if there is no such profile."""
+    if name not in PROFILES:
+        raise InputError(f"no profile {name}: there are {', '.join(PROFILES)}")
