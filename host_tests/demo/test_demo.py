@@ -28,7 +28,7 @@ def demo_command(engine, hand=False):
 
 @pytest.fixture(scope="module", params=ENGINES)
 def printed(request):
-    """Output of the demo where it is no terminal, and how long it took."""
+    """The demo's output where standard output is no terminal, and how long it took in s."""
     began = time.monotonic()
     done = subprocess.run(
         demo_command(request.param),

@@ -1,4 +1,4 @@
-"""The ride simulator against its own trajectory, differentiated."""
+"""Scripted rides: what the sensor measures agrees with the trajectory, differentiated numerically."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def about(axis, angle):
 
 
 @pytest.fixture(scope="module")
-def flown():
+def ridden():
     """The hilly ride, no vibration: step, attitude (world from body), acceleration in the world, motion."""
     ride = Ride(HILLY, vibration_g=0.0)
     dt = 0.0005
@@ -64,16 +64,16 @@ def test_positive_lean_is_to_the_right_and_a_positive_rotation_about_forward():
     assert leaned[0, 1] < 0  # and the top of the bike is to the right of its wheels (left is positive)
 
 
-def test_rates_are_the_derivative_of_the_attitude(flown):
-    dt, attitude, _, motion = flown
+def test_rates_are_the_derivative_of_the_attitude(ridden):
+    dt, attitude, _, motion = ridden
     change = np.einsum("nji,njk->nik", attitude[1:-1], (attitude[2:] - attitude[:-2]) / (2 * dt))
     rates = np.degrees(np.stack([change[:, 2, 1], change[:, 0, 2], change[:, 1, 0]], axis=1))
     assert np.abs(rates).max() > 40.0  # something happened
     assert np.abs(rates - motion[1:-1, 3:]).max() < 0.01
 
 
-def test_forces_are_the_derivative_of_the_velocity(flown):
-    _, attitude, acceleration, motion = flown
+def test_forces_are_the_derivative_of_the_velocity(ridden):
+    _, attitude, acceleration, motion = ridden
     felt = np.einsum("nji,nj->ni", attitude, acceleration / STANDARD_GRAVITY + [0.0, 1.0, 0.0])
     assert np.ptp(felt[:, 1]) > 0.3 and np.ptp(felt[:, 2]) > 0.5
     assert np.abs(felt - motion[:, :3])[1:-1].max() < 1e-3
