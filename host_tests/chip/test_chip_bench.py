@@ -1,4 +1,4 @@
-"""kickstand bench on the emulated Pico: its figures hang together, and are within what the issue allows."""
+"""kickstand bench on the emulated Pico: its figures agree with each other and stay within their limits."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""What is put right in the emulated Pico: bus and flash take time, errors are the chip's, the console is quiet."""
+"""The corrections of the emulated Pico: bus and flash take time, errors are the chip's, the console is quiet."""
 
 import pytest
 from emulated import pico, reset_in_a_read
@@ -66,7 +66,7 @@ def test_held_wires_time_out_until_they_are_freed(board):
 
 
 def test_devices_answer_to_pins_too(board):
-    """scan() sends zero-length writes, which MicroPython does with the pins; so does SoftI2C everything."""
+    """MicroPython drives the pins itself for scan(), which writes 0 bytes, and for everything that SoftI2C does."""
     assert ask(board, "sensor.scan(), lcd.scan()") == ([0x68], [0x27])
     board.exec("soft = SoftI2C(sda=Pin(4), scl=Pin(5), freq=100000)\nsoft.writeto_mem(0x68, 0x6B, b'\\x01')")
     assert ask(board, "soft.readfrom_mem(0x68, 0x6B, 1), soft.readfrom_mem(0x68, 0x75, 1)") == (b"\x01", b"h")
@@ -81,7 +81,7 @@ def test_flash_takes_its_time(board):
 
 
 def test_the_console_leaves_the_processor_alone(board):
-    """3.1 us for a turn of an empty loop, and the same again: with empty packets it takes three times as long."""
+    """A turn of an empty loop takes 3.1 us. With empty USB packets it would take three times as long."""
     code = (
         "def f():\n    t = ticks_us()\n    for i in range(1000): pass\n    return ticks_diff(ticks_us(), t)\nprint(f())"
     )
@@ -91,7 +91,7 @@ def test_the_console_leaves_the_processor_alone(board):
 
 
 def test_a_reset_in_mid_read_leaves_the_wire_held(board):
-    """And a power-cycle does not."""
+    """After a power cycle it is free."""
     reset_in_a_read(board, board.time_s + 0.01)
     board.console.send(b"while True: sensor.readfrom_mem(0x68, 0x3B, 14)\x04")
     board.run(0.05)

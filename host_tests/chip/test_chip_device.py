@@ -46,7 +46,7 @@ def test_a_new_board_is_aligned_by_two_presses_and_keeps_it():
 
 
 def test_its_pages_follow_the_button():
-    """Contacts bounce; each press is one page."""
+    """The contacts bounce, but each press turns one page."""
     device = pico(leaning(20.0), firmware() | calibrated())
     device.power_on()
     device.run_until(lambda: shown_lean(device.lcd()) is not None, 2.0)
@@ -61,7 +61,7 @@ def test_its_pages_follow_the_button():
 
 
 def test_the_same_program_takes_the_same_time_on_every_host():
-    """On a slow one, too, each cycle is the same."""
+    """A slow host emulates the same cycles."""
 
     def cycles(pause_s):
         device = pico(leaning(0.0), firmware() | calibrated())

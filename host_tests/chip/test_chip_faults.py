@@ -1,4 +1,5 @@
-"""Each fault of the board's script on the emulated Pico: shown while it lasts, no wrong lean, soon over."""
+"""Each fault of the fault script on the emulated Pico: it is shown while it lasts, no wrong lean is, and the right one
+soon returns."""
 
 import re
 
@@ -51,7 +52,7 @@ def lean_is_right(device):
 
 
 def watch(device, seconds):
-    """Let time pass; every text of the display, and any wrong lean among them fails."""
+    """Let time pass. Returns every text of the display; fails if one shows a wrong lean."""
     texts = set()
     for _ in range(round(seconds / 0.02)):
         device.run(0.02)
@@ -69,7 +70,7 @@ def starts_again(device):
 
 @pytest.mark.parametrize("name", FAULTS)
 def test_fault_of_the_sensor(device, name):
-    """Said while it lasts; RECOVERY_S after its end the right lean is back, and stays; no other was shown."""
+    """It is shown while it lasts. RECOVERY_S after its end the right lean is back and stays. No other was shown."""
     device.run_until(lambda: lean_is_right(device), 3.0)
     inject, for_s, said = FAULTS[name]
     inject(device.board.faults, device.time_s + 0.01, for_s)
@@ -83,7 +84,7 @@ def test_fault_of_the_sensor(device, name):
 
 @pytest.mark.parametrize("for_s", [0.02, 0.4])
 def test_lcd_unplugged_and_back(device, for_s):
-    """Dark meanwhile; the loop goes on, and the display is found again, or found to have lost its settings."""
+    """The loop goes on. The display is found again, or found to have lost its settings."""
     device.run_until(lambda: lean_is_right(device), 3.0)
     device.board.faults.unplug_lcd(device.time_s + 0.01, for_s)
     device.run(for_s)
@@ -162,7 +163,7 @@ def test_a_reset_in_mid_read_frees_the_bus(device):
 
 @pytest.mark.parametrize("spoil", [b"", b"\xff" * 90, b"KSTD" + bytes(86)], ids=["empty", "erased", "zeros"])
 def test_corrupt_files(spoil):
-    """Both spoilt: it runs, not calibrated. One spoilt: the other counts."""
+    """With both spoilt it runs uncalibrated; with one spoilt the other is used."""
     good = calibrated()
     names = sorted(good)
     both = {"kickstand_a.cal": spoil, "kickstand_b.cal": spoil}

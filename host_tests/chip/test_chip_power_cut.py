@@ -1,4 +1,4 @@
-"""The supply cut at every flash operation of saves, on the emulated Pico's own file system."""
+"""The supply is cut at every flash operation of saving a calibration, on the emulated Pico's own file system."""
 
 from itertools import pairwise
 

@@ -92,7 +92,7 @@ def rides(files):
 
 
 def test_a_recorded_ride_replays_as_it_was_shown(tmp_path):
-    """And while it is recorded no sample is lost, and the display goes on."""
+    """While it is recorded no sample is lost, and the display goes on."""
     from kickstand_tools.bench.sample_count import SampleCount
 
     with pico(PART.world(RIDE.motion), modules() | calibrated()) as device:
@@ -186,7 +186,7 @@ class SDCard:
 
 
 def test_rides_go_to_an_sd_card_where_config_names_one():
-    """Its driver is made up, its FAT is the board's."""
+    """The card's driver is a fake, its FAT file system is MicroPython's."""
     with pico(files=modules() | calibrated() | {"sdcard.py": _SDCARD}) as device:
         card = "SD_SPI, SD_SCK, SD_MOSI, SD_MISO, SD_CS = 0, 18, 19, 16, 17"
         device.exec(_FEED.replace("SD_SPI = None", card))

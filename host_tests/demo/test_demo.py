@@ -8,14 +8,16 @@ import sys
 import time
 
 import pytest
+from command import run
 from engines import ENGINES
 from kickstand_tools import unix_port
-from kickstand_tools.demo.demo import Device, demo
+from kickstand_tools.demo.demo import DeviceStopped, demo
+from kickstand_tools.demo.device_process import Device
 from kickstand_tools.demo.score import shown_lean
 from terminal import Terminal
 
 
-def command(engine, hand=False):
+def demo_command(engine, hand=False):
     """Command line of the demo."""
     return [
         sys.executable,
@@ -26,10 +28,10 @@ def command(engine, hand=False):
 
 @pytest.fixture(scope="module", params=ENGINES)
 def printed(request):
-    """Output of the demo where it is no terminal, and how long it took."""
+    """The demo's output where standard output is no terminal, and how long it took in s."""
     began = time.monotonic()
     done = subprocess.run(
-        command(request.param),
+        demo_command(request.param),
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
@@ -103,7 +105,7 @@ def test_printed_it_ends_with_shown_against_true(printed):
 def test_both_engines_show_the_same():
     here, there = (
         subprocess.run(
-            command(engine), stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8", timeout=120
+            demo_command(engine), stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8", timeout=120
         )
         for engine in ("cpython", "micropython")
     )
@@ -112,7 +114,7 @@ def test_both_engines_show_the_same():
 
 def test_by_hand_needs_a_terminal():
     done = subprocess.run(
-        command("cpython", hand=True), stdin=subprocess.DEVNULL, capture_output=True, timeout=20
+        demo_command("cpython", hand=True), stdin=subprocess.DEVNULL, capture_output=True, timeout=20
     )
     assert done.returncode != 0 and b"InputError" in done.stderr and b"in a terminal" in done.stderr
 
@@ -139,21 +141,22 @@ def test_where_there_is_no_micropython_it_says_so_and_runs(monkeypatch, capfd):
     assert "No MicroPython" in first and "CPython" in first
 
 
-def test_a_device_that_stops_early_is_an_error(monkeypatch, capfd):
+def test_a_device_that_stops_early_is_an_error(monkeypatch):
     monkeypatch.setattr(unix_port, "available", lambda: True)
     monkeypatch.setattr(
         unix_port, "command", lambda *_: [sys.executable, "-c", "print('no sensor in the shop')"]
     )
-    with pytest.raises(SystemExit) as ended:
+    with pytest.raises(DeviceStopped, match="no sensor in the shop"):
         demo()
-    assert ended.value.code == 1
-    assert "no sensor in the shop" in capfd.readouterr().err
+    failed = run("demo")
+    assert failed.status == 1
+    assert "no sensor in the shop" in failed.err
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 def test_in_a_terminal_by_hand():
     """Presses, raises the bike, presses, rides off and leans left, all with keys; the LCD follows."""
-    with Terminal(command("cpython", hand=True)) as at:
+    with Terminal(demo_command("cpython", hand=True)) as at:
         at.wait_for("On stand: press")
         at.press("b")
         at.wait_for("Now upright")

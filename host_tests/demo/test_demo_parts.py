@@ -1,10 +1,10 @@
-"""What kickstand demo draws, reads off the LCD, counts and takes for keys."""
+"""Parts of kickstand demo: its picture, the lean read from the LCD, the score, the keys."""
 
 import os
 
 import pytest
 from kickstand_tools.demo.keyboard import split
-from kickstand_tools.demo.score import Score, State, shown_lean
+from kickstand_tools.demo.score import Score, State, shown_lean, table
 from kickstand_tools.demo.screen import bike, lcd_lines, lean_text, screen
 from rich.console import Console
 
@@ -76,7 +76,7 @@ def test_the_score_counts_what_was_shown():
     ):
         score.add({**STATE, "lean_deg": lean_deg, "lcd": [lcd, ""], "phase": phase})
     console = Console(width=100, record=True, file=open(os.devnull, "w"))
-    console.print(score.table())
+    console.print(table(score.figures()))
     rows = [line.strip("│").split("│") for line in console.export_text().splitlines() if line.startswith("│")]
     values = {name.strip(): [cell.strip() for cell in cells] for name, *cells in rows}
     assert values["held turn 1"] == ["2", "-30.0", "-30.5", "2.5", "-3.0"]

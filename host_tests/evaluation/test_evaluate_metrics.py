@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from kickstand_tools.evaluation.estimators import trailing_mean
+from kickstand_tools.evaluation.evaluate import Evaluation
 from kickstand_tools.evaluation.metrics import Score, lag_ms, score, slope, straights
 from kickstand_tools.evaluation.picture import ZOOM_S, zoom_start
 from kickstand_tools.evaluation.real_ride import RealScore
@@ -32,8 +33,8 @@ def truth() -> dict[str, np.ndarray]:
 def test_a_constant_error():
     true = truth()
     found = score(true["lean_deg"] + 0.7, true, RATE)
-    assert (found.rms, found.p95, found.worst) == pytest.approx((0.7, 0.7, 0.7))
-    assert found.straight_bias == pytest.approx(0.7)
+    assert (found.rms_deg, found.p95_deg, found.worst_deg) == pytest.approx((0.7, 0.7, 0.7))
+    assert found.straight_bias_deg == pytest.approx(0.7)
     assert found.lag_ms == pytest.approx(0.0, abs=0.5)
 
 
@@ -42,9 +43,9 @@ def test_noise_and_one_outlier():
     noise = np.random.default_rng(1).normal(scale=2.0, size=N)
     noise[30000] = 50.0
     found = score(true["lean_deg"] + noise, true, RATE)
-    assert found.rms == pytest.approx(2.0, rel=0.03)
-    assert found.p95 == pytest.approx(1.96 * 2.0, rel=0.03)
-    assert found.worst == 50.0
+    assert found.rms_deg == pytest.approx(2.0, rel=0.03)
+    assert found.p95_deg == pytest.approx(1.96 * 2.0, rel=0.03)
+    assert found.worst_deg == 50.0
     assert found.slope == pytest.approx(1.0, abs=0.005)
 
 
@@ -71,16 +72,16 @@ def test_no_lag_of_what_does_not_move():
 def test_what_happens_before_setting_off_does_not_count():
     true = truth()
     shown = true["lean_deg"] + np.where(TIME < 4.9, 60.0, 0.0)
-    assert score(shown, true, RATE).worst == 0.0
+    assert score(shown, true, RATE).worst_deg == 0.0
 
 
 def test_the_bias_is_of_the_last_straights_alone():
     true = truth()
     shown = true["lean_deg"] + np.where(TIME < 0.85 * TIME[-1], 5.0, -0.25)
-    assert score(shown, true, RATE).straight_bias == pytest.approx(-0.25)
+    assert score(shown, true, RATE).straight_bias_deg == pytest.approx(-0.25)
     true["lean_deg"][:] = 20.0
     assert not straights(true, RATE).any()
-    assert math.isnan(score(shown, true, RATE).straight_bias)
+    assert math.isnan(score(shown, true, RATE).straight_bias_deg)
 
 
 def test_a_trailing_mean_starts_short():
@@ -125,7 +126,7 @@ def test_what_no_ride_tells_is_two_dashes():
 
 def test_the_document_has_no_nan():
     results = [Result(Job("street", 0), {"kickstand": Score(1.0, 1.0, 1.0, float("nan"), 1.0, float("nan"))})]
-    made = document(results, None)
+    made = document(Evaluation(results, None))
     assert made["profiles"]["street"]["kickstand"]["slope"] is None
     assert made["rides"][0]["scores"]["kickstand"]["rms"] == 1.0
 

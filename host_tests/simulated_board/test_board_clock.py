@@ -105,11 +105,8 @@ def test_ticks_wrap_as_on_the_boards():
 
     board = Board(level)
     board.ticks_at_boot_us = (1 << 30) - 1000
-    board.install()
-    try:
+    with board:
         assert board.run(lambda: firmware(board), 1.0) == "returned"
-    finally:
-        board.uninstall()
 
 
 def test_a_busy_wait_ends():

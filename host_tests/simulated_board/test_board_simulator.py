@@ -60,15 +60,11 @@ def test_power_is_lost_by_off_and_kept_by_reset():
             fake_machine.reset()
         fake_time.sleep_ms(60_000)
 
-    board = Board(level)
-    board.install()
-    try:
+    with Board(level) as board:
         assert board.run(firmware, 1.0) == "reset"
         assert board.run(firmware, 2.0) == "off"
         assert not board.lcd.on
         assert board.run(firmware, 3.0) == "off"
-    finally:
-        board.uninstall()
     on, off = fake_machine.PWRON_RESET, fake_machine.WDT_RESET
     assert seen == [(0, on, 0, False), (0x18, off, 0, True), (0, on, 0, False)], seen
     assert board.boots == 3 and board.clock.now_us == 3_000_000
@@ -162,11 +158,8 @@ def test_a_button_held_at_power_up():
 
     board = Board(level)
     board.press(0.0, 2.0)
-    board.install()
-    try:
+    with board:
         assert board.run(lambda: firmware(board), 1.0) == "returned"
-    finally:
-        board.uninstall()
 
 
 def test_at_and_every():
@@ -203,13 +196,9 @@ def test_timers_end_with_a_reset():
             fake_machine.reset()
         fake_time.sleep_ms(500)
 
-    board = Board(level)
-    board.install()
-    try:
+    with Board(level) as board:
         assert board.run(firmware, 5.0) == "reset"
         assert board.run(firmware, 5.0) == "returned"
-    finally:
-        board.uninstall()
     assert seen == []
 
 

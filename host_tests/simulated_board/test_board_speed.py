@@ -24,15 +24,11 @@ class Listing:
 
 def speeds_of(text, piece=1000, step_ms=10, steps=60):
     """Every speed that Gps makes of this text, rounded to mm/s."""
-    board = Board(level)
-    board.install()
-    try:
+    with Board(level):
         from kickstand.speed.gps import Gps
 
         gps = Gps(Listing(text if isinstance(text, bytes) else text.encode(), piece))
         found = [gps.poll(1000 + step_ms * i) for i in range(steps)]
-    finally:
-        board.uninstall()
     return [round(1000 * speed) for speed in found if speed is not None]
 
 
@@ -40,7 +36,6 @@ def drive(config, fit, until_s):
     """[(t_s, m/s, age_us), ...] that the firmware's Speed gives, and {t_s: fault} each second."""
     board = Board(level)
     fit(board)
-    board.install()
     got, faults = [], {}
 
     def firmware():
@@ -66,10 +61,8 @@ def drive(config, fit, until_s):
             turn += 1
             sleep_us(STEP_US - board.clock.now_us % STEP_US)
 
-    try:
+    with board:
         board.run(firmware, until_s)
-    finally:
-        board.uninstall()
     return got, faults
 
 
@@ -129,9 +122,7 @@ def test_the_same_fix_again_is_not_new():
 
 
 def test_a_fix_that_waited_in_the_receiver_is_refused_and_its_age_told():
-    board = Board(level)
-    board.install()
-    try:
+    with Board(level):
         from kickstand.speed.gps import Gps
 
         def hear(gps, second, at_ms):
@@ -147,14 +138,10 @@ def test_a_fix_that_waited_in_the_receiver_is_refused_and_its_age_told():
         assert hear(gps, 7, 7210) == ([True], 10)
         assert hear(gps, 30, 8210) == ([True], 0)  # its clock was put right
         assert hear(gps, 31, 9210) == ([True], 0)
-    finally:
-        board.uninstall()
 
 
 def test_a_receiver_whose_clock_jumps_is_late_for_seconds_only():
-    board = Board(level)
-    board.install()
-    try:
+    with Board(level):
         from kickstand.speed.gps import Gps
 
         for jump in (-6, -5, -4, -3, -2, -1, 1, 2, 3, 4, 5, 6):
@@ -167,8 +154,6 @@ def test_a_receiver_whose_clock_jumps_is_late_for_seconds_only():
                 if i < 10 or i >= 22 or jump > 0:
                     assert heard[1] is not None, (jump, i)
                     assert 0 <= gps.age_ms <= 40, (jump, i, gps.age_ms)
-    finally:
-        board.uninstall()
 
 
 def test_gps_on_its_pins_at_1_and_10_hz():
@@ -235,9 +220,7 @@ def test_a_contact_that_bounces_is_counted_once():
 
 
 def test_wheel_on_an_esp32():
-    board = Board(level, port="esp32")
-    board.install()
-    try:
+    with Board(level, port="esp32"):
         from kickstand.speed.wheel import Wheel
         from machine import Pin  # type: ignore[import-not-found]
 
@@ -248,8 +231,6 @@ def test_wheel_on_an_esp32():
             raise AssertionError("its interrupts are always soft")
         except TypeError:
             pass
-    finally:
-        board.uninstall()
 
 
 def test_jumps_that_no_vehicle_makes_are_refused_until_they_last():
@@ -260,9 +241,7 @@ def test_jumps_that_no_vehicle_makes_are_refused_until_they_last():
         def poll(self, now_ms):
             return self.speed
 
-    board = Board(level)
-    board.install()
-    try:
+    with Board(level):
         from kickstand.speed.source import Speed
 
         source = Source()
@@ -281,5 +260,3 @@ def test_jumps_that_no_vehicle_makes_are_refused_until_they_last():
         ):
             source.speed = value
             assert (speed.poll(at_ms) is not None) == expected, (at_ms, value)
-    finally:
-        board.uninstall()

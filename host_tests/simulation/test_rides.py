@@ -1,10 +1,10 @@
-"""The ride simulator against its own trajectory, differentiated."""
+"""Scripted rides: what the sensor measures agrees with the trajectory, differentiated numerically."""
 
 import numpy as np
 import pytest
+from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.demo.hand_bike import CRUISE_MPS, HandBike
 from kickstand_tools.simulation.scripted.script import (
-    GRAVITY_MPS2,
     KICKSTAND_DEG,
     Ride,
     accelerate,
@@ -42,7 +42,7 @@ def about(axis, angle):
 
 
 @pytest.fixture(scope="module")
-def flown():
+def ridden():
     """The hilly ride, no vibration: step, attitude (world from body), acceleration in the world, motion."""
     ride = Ride(HILLY, vibration_g=0.0)
     dt = 0.0005
@@ -64,17 +64,17 @@ def test_positive_lean_is_to_the_right_and_a_positive_rotation_about_forward():
     assert leaned[0, 1] < 0  # and the top of the bike is to the right of its wheels (left is positive)
 
 
-def test_rates_are_the_derivative_of_the_attitude(flown):
-    dt, attitude, _, motion = flown
+def test_rates_are_the_derivative_of_the_attitude(ridden):
+    dt, attitude, _, motion = ridden
     change = np.einsum("nji,njk->nik", attitude[1:-1], (attitude[2:] - attitude[:-2]) / (2 * dt))
     rates = np.degrees(np.stack([change[:, 2, 1], change[:, 0, 2], change[:, 1, 0]], axis=1))
     assert np.abs(rates).max() > 40.0  # something happened
     assert np.abs(rates - motion[1:-1, 3:]).max() < 0.01
 
 
-def test_forces_are_the_derivative_of_the_velocity(flown):
-    _, attitude, acceleration, motion = flown
-    felt = np.einsum("nji,nj->ni", attitude, acceleration / GRAVITY_MPS2 + [0.0, 1.0, 0.0])
+def test_forces_are_the_derivative_of_the_velocity(ridden):
+    _, attitude, acceleration, motion = ridden
+    felt = np.einsum("nji,nj->ni", attitude, acceleration / STANDARD_GRAVITY + [0.0, 1.0, 0.0])
     assert np.ptp(felt[:, 1]) > 0.3 and np.ptp(felt[:, 2]) > 0.5
     assert np.abs(felt - motion[:, :3])[1:-1].max() < 1e-3
 
@@ -97,7 +97,7 @@ def test_in_balance_no_force_to_the_side_and_the_yaw_rate_of_the_lean():
         assert speed > 4.0
         assert abs(ride.motion(t)[0]) < 1e-9
         if phase == "held turn":
-            assert np.tan(np.radians(lean)) == pytest.approx(-speed * np.radians(yaw_rate) / GRAVITY_MPS2)
+            assert np.tan(np.radians(lean)) == pytest.approx(-speed * np.radians(yaw_rate) / STANDARD_GRAVITY)
             assert np.sign(yaw_rate) == -np.sign(lean)
             seen.add(bool(lean > 0))
     assert seen == {True, False}
@@ -183,5 +183,5 @@ def test_by_hand_rates_and_forces_follow_from_the_motion():
     assert np.ptp(seen[:, 6]) > 20
     # but for the instants in which the rider changes his mind
     assert np.quantile(np.abs(roll_rate - seen[:, 5]), 0.99) < 0.5
-    assert np.quantile(np.abs(acceleration / GRAVITY_MPS2 - seen[:, 2]), 0.99) < 0.005
+    assert np.quantile(np.abs(acceleration / STANDARD_GRAVITY - seen[:, 2]), 0.99) < 0.005
     assert np.ptp(seen[:, 2]) > 0.25

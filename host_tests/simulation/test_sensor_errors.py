@@ -8,12 +8,12 @@ import json
 import numpy as np
 import pytest
 from kickstand_tools import unix_port
+from kickstand_tools.simulation.data_sheet import MAX_OFFSET_G
 from kickstand_tools.simulation.scripted.captures import capture
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, brake, kickstand, turn, upright
 from kickstand_tools.simulation.scripted.sensor_errors import (
     ACCEL_NOISE_G,
     GYRO_NOISE_DPS,
-    MAX_OFFSET_G,
     Sensor,
     axis_aligned_mountings,
     random_mounting,

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.simulation.commands import Leg, commands
 from kickstand_tools.simulation.physics import balance
-from kickstand_tools.simulation.physics.bike import GRAVITY_MPS2, Bike
+from kickstand_tools.simulation.physics.bike import Bike
 from kickstand_tools.simulation.physics.kinematics import Motion, body_rates, specific_force
 from kickstand_tools.simulation.physics.signals import integral
 
@@ -64,7 +65,7 @@ def test_force_is_the_second_derivative_of_the_sensors_place():
     centre = np.column_stack([integral(v, RATE) for v in velocity])
     arm = np.array([bike.sensor_left, bike.sensor_height - bike.tyre_radius, bike.sensor_forward])
     acceleration = np.gradient(np.gradient(centre + turned @ arm, 1.0 / RATE, axis=0), 1.0 / RATE, axis=0)
-    acceleration[:, 2] += GRAVITY_MPS2
+    acceleration[:, 2] += STANDARD_GRAVITY
     force = np.einsum("nji,nj->ni", turned, acceleration)
     assert np.abs(force - specific_force(motion, bike))[EDGE:-EDGE].max() < 0.01
 
@@ -74,7 +75,7 @@ def test_at_rest_the_force_is_one_g_along_the_vertical(lean_deg):
     n = 200
     lean, pitch = np.full(n, np.radians(lean_deg)), np.full(n, 0.1)
     motion = Motion(RATE, np.zeros(n), np.full(n, 0.05), np.zeros(n), lean, pitch, np.zeros(n))
-    force = specific_force(motion, Bike()) / GRAVITY_MPS2
+    force = specific_force(motion, Bike()) / STANDARD_GRAVITY
     assert np.allclose(np.linalg.norm(force, axis=1), 1.0)
     assert np.allclose(np.degrees(np.arctan2(force[:, 0], force[:, 1])), lean_deg)
     assert np.allclose(force[:, 2], np.sin(0.1))
@@ -91,7 +92,7 @@ def test_a_steady_turn_balances_gravity_and_the_centripetal_force(lean_deg):
     narrow = Bike(tyre_radius=0.0, wheel_inertia=0.0)
     rolled, k = held_turn(lean_deg, narrow)
     assert np.degrees(rolled.lean[k]) == pytest.approx(lean_deg, abs=0.01)
-    assert np.degrees(np.arctan(-18.0 * rolled.yaw_rate[k] / GRAVITY_MPS2)) == pytest.approx(
+    assert np.degrees(np.arctan(-18.0 * rolled.yaw_rate[k] / STANDARD_GRAVITY)) == pytest.approx(
         lean_deg, abs=0.01
     )
 
@@ -99,7 +100,7 @@ def test_a_steady_turn_balances_gravity_and_the_centripetal_force(lean_deg):
 def test_wide_tyres_and_spinning_wheels_lean_further_than_the_formula():
     bike = Bike()
     rolled, k = held_turn(40.0, bike)
-    centripetal = -18.0 * rolled.yaw_rate[k] / GRAVITY_MPS2
+    centripetal = -18.0 * rolled.yaw_rate[k] / STANDARD_GRAVITY
     assert np.tan(rolled.balance[k]) == pytest.approx((1.0 + bike.wheel_inertia) * centripetal)
     formula = np.degrees(np.arctan(centripetal))
     flank = np.degrees(np.arcsin(0.06 * np.sin(np.radians(40.0)) / (0.62 - 0.06)))
@@ -134,5 +135,5 @@ def test_a_turn_begins_with_countersteering():
 def test_wind_from_the_left_leans_a_straight_ride_to_the_left():
     command = commands([Leg("straight", 6.0, 20.0, 0.0, crosswind_mps2=0.5)], RATE)
     rolled = balance.roll(command, Bike(), np.zeros_like(command.time))
-    assert np.degrees(rolled.balance[3000]) == pytest.approx(-np.degrees(np.arctan(0.5 / GRAVITY_MPS2)))
+    assert np.degrees(rolled.balance[3000]) == pytest.approx(-np.degrees(np.arctan(0.5 / STANDARD_GRAVITY)))
     assert abs(rolled.yaw_rate[3000]) < 1e-6

@@ -169,7 +169,7 @@ def test_the_speed_is_written_once_a_second_where_asked(tmp_path):
 
 
 def test_the_calibration_of_the_ride_before_goes_with_it(tmp_path):
-    """It lies where report looks for that of RIDE.csv, and is of a sensor mounted another way."""
+    """`report` looks there for the calibration of RIDE.csv, but it is of a sensor that was mounted otherwise."""
     works("simulate", "--profile", "street", "--seconds", 30, "--out", tmp_path)
     (tmp_path / "RIDE.cal.json").write_text("{}")
     works("simulate", "--profile", "street", "--seed", 1, "--seconds", 30, "--out", tmp_path)

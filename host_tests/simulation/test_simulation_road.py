@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.simulation.physics import road
 from kickstand_tools.simulation.physics.bike import Bike
 from kickstand_tools.simulation.physics.engine import Engine
@@ -31,7 +32,7 @@ def test_the_profile_has_the_standards_density():
 
 
 def test_an_ordinary_road_at_90_shakes_with_peaks_of_0_3_to_0_5_g():
-    heave = over(25.0, road.CLASS_B).heave / 9.80665
+    heave = over(25.0, road.CLASS_B).heave / STANDARD_GRAVITY
     assert 0.3 < np.percentile(np.abs(heave), 99.9) < 0.6
 
 
@@ -78,6 +79,6 @@ def test_vibration_has_its_size_and_stops_with_the_engine():
     force, rates = Engine(rms_g=0.2, shift_rpm=6500.0).vibration(
         np.random.default_rng(2), speed, running, RATE
     )
-    assert force[:10000].std(axis=0) / 9.80665 == pytest.approx([0.2] * 3, rel=0.15)
+    assert force[:10000].std(axis=0) / STANDARD_GRAVITY == pytest.approx([0.2] * 3, rel=0.15)
     assert not force[10000:].any()
     assert not rates[10000:].any()

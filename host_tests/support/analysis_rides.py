@@ -18,7 +18,10 @@ CALIBRATION = {
 
 
 def write(directory: Path, segments: list, rate_hz: int = 100, speed_hz: int = 0, vibration_g: float = 0.02) -> Path:
-    """RIDE.csv and RIDE.cal.json of these segments of rides.py; its path. speed_hz: how often a speed is in it."""
+    """Write RIDE.csv and RIDE.cal.json of a ride of these script segments; return the path of the former.
+
+    speed_hz: how often the log has a speed, 0 for never.
+    """
     ride = script.Ride(segments, vibration_g)
     header = command.HEADER + (",speed_mps" if speed_hz else "")
     lines = [header]
@@ -35,7 +38,7 @@ def write(directory: Path, segments: list, rate_hz: int = 100, speed_hz: int = 0
 
 
 def short(directory: Path, **more) -> Path:
-    """Standing, off, a turn to each side, a hard stop: under a minute."""
+    """A ride under a minute: stand, set off, a turn to each side, a hard stop."""
     return write(
         directory,
         [

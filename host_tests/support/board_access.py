@@ -1,4 +1,4 @@
-"""Short ways to the simulated board for its tests. Runs on MicroPython too."""
+"""Helpers for the tests of the simulated board. Runs on MicroPython too."""
 
 from kickstand_tools.simulated_board.simulator import Board
 
@@ -39,14 +39,14 @@ def write(chip, register, *values):
 
 
 def counts(chip):
-    """The seven signed figures of a burst."""
+    """The seven signed numbers of a burst: force, temperature, rate."""
     data = read(chip, 0x3B, 14)
     values = [data[2 * i] << 8 | data[2 * i + 1] for i in range(7)]
     return [value - 65536 if value > 32767 else value for value in values]
 
 
 def on_board(firmware, until_s=1.0, **fitted):
-    """Run firmware(board) on a new Board(**fitted), at rest unless given a world. (outcome, board)"""
+    """Run firmware(board) on a new Board(**fitted), at rest unless `world` is given. Returns (outcome, board)."""
     world = fitted.pop("world", level)
     board = Board(world, **fitted)
     board.install()

@@ -16,8 +16,7 @@ FRAME_S = 0.1
 
 
 def standing(plan):
-    """motion(t_s) of a bike that stands at the lean of the plan [[from_s, lean_deg], ...], moved in no
-    time."""
+    """motion(t_s) of a bike that stands at the leans of the plan [[from_s, lean_deg], ...] and jumps between them."""
 
     def motion(t_s):
         now = plan[0]
@@ -50,7 +49,7 @@ def poses_of(seed, steps):
 
 
 def remounted(world, motion, seed, at_s, mounting_seed):
-    """world(t_s) of a part that comes off and is stuck on at another angle."""
+    """world(t_s) of a sensor that is mounted at another angle from at_s on."""
     part = sensor_errors.Sensor(seed=seed)
     part.vehicle_from_sensor = sensor_errors.random_mounting(mounting_seed)
     later = part.world(motion)
@@ -58,8 +57,8 @@ def remounted(world, motion, seed, at_s, mounting_seed):
 
 
 def run_device(plan):
-    """Run it; returns frames [[t_s, line1, line2], ...] as they changed, how each boot ended, and what the
-    LCD says last.
+    """Run a plan. Returns the display's frames [[t_s, line1, line2], ...] as they changed, the last of them, and how
+    each boot ended.
 
     plan: "until" (s); "lean" as for standing(), or "ride" [[name of a function in rides, arguments...], ...],
     or "poses" as for poses_of; "seed" of the part (None: perfect); its "temp_c"; "presses" [[at_s, for_s], ...];

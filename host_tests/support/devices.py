@@ -28,7 +28,7 @@ ALIGNED = {"ride": RIDE, "presses": PRESSES, "until": 46}
 
 
 class Record:
-    """What was on the display, and when."""
+    """What was on the display at which time."""
 
     def __init__(self, answer, console):
         self.frames = answer["frames"]

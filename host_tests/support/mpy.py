@@ -1,4 +1,4 @@
-"""Run a script under MicroPython's unix port, with the firmware, the models and these tests on its path."""
+"""Runs a script under MicroPython's unix port, with the firmware, the tools and these tests on its path."""
 
 import subprocess
 import tempfile

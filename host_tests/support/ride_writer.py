@@ -19,7 +19,7 @@ CHIP = types.SimpleNamespace(
 
 
 def calibration(trim_deg=0.0):
-    """Plausible, and none of it neutral."""
+    """A plausible calibration in which no value is the default."""
     new = Calibration()
     new.set_accel((0.01, -0.02, 0.03), (1.01, 0.99, 1.0))
     new.gyro_bias[1] = 1.5
@@ -31,7 +31,7 @@ def calibration(trim_deg=0.0):
 
 
 def turns(count, seed=0):
-    """(sums, n, dt_us) of a bike that leans this way and that, with a road under it."""
+    """Yield (sums, n, dt_us) of a bike that leans from side to side on a rough road."""
     random.seed(seed)
     for i in range(count):
         n = random.choice((2, 2, 2, 2, 2, 1, 3, 8))
@@ -42,7 +42,7 @@ def turns(count, seed=0):
 
 
 def blocks(count, ride=1, length=block_length, sequence=0, time_us=2_000_000, trim_deg=0.0, speed=False):
-    """So many whole blocks, and the turns that are in them: (sums of six, n, dt_us)."""
+    """`count` full blocks, and the turns of the loop that they hold: (sums of six, n, dt_us)."""
     block = RideBlock(5000)
     body = pack(CHIP.who_am_i, CHIP.accel_range_g, calibration(trim_deg))
     written, held = [], []

@@ -1,4 +1,4 @@
-"""A command in a terminal of 80 by 24, as a user has it: keys in, what is drawn out."""
+"""Runs a command in a terminal of 80 by 24: sends keys and reads what is drawn."""
 
 import contextlib
 import os
@@ -29,7 +29,7 @@ class Terminal:
         os.close(self._master)
 
     def wait_for(self, text: str, limit_s: float = 30.0) -> None:
-        """Fail if it does not come; what came until then is forgotten."""
+        """Wait until the text appears, and drop the output up to then. Fails after limit_s."""
         began = time.monotonic()
         while text not in self._seen:
             assert time.monotonic() - began < limit_s, f"{text!r} never came: {self._seen[-3000:]}"

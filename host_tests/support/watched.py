@@ -1,4 +1,4 @@
-"""Standard error that someone watches."""
+"""A standard error that claims to be a terminal."""
 
 import io
 
@@ -6,7 +6,7 @@ import command
 
 
 class Watched(io.StringIO):
-    """closed_after: so many characters can be written to it, then it is gone."""
+    """closed_after: how many characters can be written before writing fails."""
 
     closed_after = 10**9
 
@@ -20,6 +20,6 @@ class Watched(io.StringIO):
 
 
 def watched(monkeypatch, terminal: Watched, *arguments: object) -> str:
-    """What someone sees of a command that works."""
+    """What a command that works writes to such a terminal."""
     monkeypatch.setenv("TERM", "xterm")
     return command.works(*arguments, err=terminal).err

@@ -1,10 +1,10 @@
-"""What the command line refuses."""
+"""The error for input that cannot be used, and pieces of its text."""
 
 import sys
 
 
 class InputError(Exception):
-    """Something the user gave cannot be used. The text is one line: what is wrong, and what to do."""
+    """Something that the user has given cannot be used. Its text is one line: what is wrong, and what to do."""
 
 
 def cause(error: BaseException) -> str:
@@ -13,6 +13,8 @@ def cause(error: BaseException) -> str:
 
 
 def extra(name: str) -> str:
-    """How to install an optional part of the project. Without -e a copy would take the place of the checkout, and
-    flash would copy that one's firmware."""
+    """How to install an optional part of the project.
+
+    With -e, because otherwise a copy would replace the checkout, and `kickstand flash` would take the copy's firmware.
+    """
     return f"in the project's directory, {sys.executable} -m pip install -e \".[{name}]\""

@@ -1,4 +1,4 @@
-"""Where the firmware's files are, in a checkout and in an installed wheel."""
+"""Where the firmware's files are: in a checkout or in an installed wheel."""
 
 import os
 from pathlib import Path
@@ -16,11 +16,11 @@ def directory() -> Path:
 
 
 def config() -> Path:
-    """The rider's config.py: of the checkout that is the current directory, else the one that is installed."""
+    """The rider's config.py: that of the checkout in the current directory, else the one beside these tools."""
     here = Path("firmware").resolve()
     return (here if (here / "kickstand").is_dir() and (here / "config.py").is_file() else directory()) / "config.py"
 
 
 def search_path() -> str:
-    """What a Python in a process of its own needs on its path to import the firmware and these tools."""
+    """The search path with which another Python process can import the firmware and these tools."""
     return os.pathsep.join((str(TOOLS), str(PACKAGE.parent)))

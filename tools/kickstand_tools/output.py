@@ -1,4 +1,4 @@
-"""Files written whole or not at all, and the directories for them."""
+"""Writes files completely or not at all, and makes the directories for them."""
 
 import contextlib
 import os
@@ -22,14 +22,14 @@ def check_output(path: Path, inputs: list[Path]) -> None:
 
 
 def check_directory(path: Path) -> None:
-    """Refuse, before any work is done, a directory to write to that is none."""
+    """Refuse, before any work is done, a directory to write to if that is a file."""
     if path.exists() and not path.is_dir():
         raise InputError(f"{path} is a file: give --out the name of a directory")
 
 
 @contextlib.contextmanager
 def new_directory(path: Path) -> Iterator[None]:
-    """Make a directory, with those above it, to write to. What it made goes again if nothing was written to it."""
+    """Make a directory and those above it. Those that are empty at the end of the `with` are removed again."""
     made = [one for one in (path, *path.parents) if not one.exists()]
     try:
         try:
@@ -44,11 +44,11 @@ def new_directory(path: Path) -> Iterator[None]:
 
 
 def write_whole(path: Path, write: Callable[[Path], None]) -> None:
-    """Let write(temporary path) make the file, then put it in the place of path; an error leaves the old one.
+    """Call write(temporary path), then rename that file to path. If it fails, a file that was at path stays.
 
-    The temporary name ends as path does, so that write can go by it.
+    The temporary name has the ending of path, from which write may tell the format.
     """
-    path = path.resolve()  # through a symbolic link, not in its place
+    path = path.resolve()  # a symbolic link stays one
     temporary = path.with_name(f".{os.getpid()}-{path.name}")
     try:
         write(temporary)

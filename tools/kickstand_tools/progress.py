@@ -1,4 +1,4 @@
-"""A progress bar or a spinner on standard error, for work that takes over a second, where someone is watching."""
+"""A progress bar or a spinner on standard error for work that takes over a second; only if that is a terminal."""
 
 import contextlib
 import sys
@@ -21,7 +21,7 @@ PATIENCE_S = 1.0
 
 
 class Bar:
-    """with Bar("replaying", total) as bar: bar.advance(n). Seen after patience_s."""
+    """with Bar("replaying", total) as bar: bar.advance(n). It appears after patience_s."""
 
     def __init__(self, what: str, total: int, patience_s: float = PATIENCE_S) -> None:
         self._progress = Progress(
@@ -43,14 +43,14 @@ class Bar:
         return self
 
     def advance(self, amount: int) -> None:
-        """amount more of the total is done."""
+        """Count `amount` more of the total as done."""
         self._progress.advance(self._task, amount)
         if self._wanted and not self._shown and time.monotonic() - self._begin_s >= self._patience_s:
             self._progress.start()
             self._shown = True
 
     def describe(self, what: str) -> None:
-        """Say what is being done now."""
+        """Change the text in front of the bar."""
         self._progress.update(self._task, description=what)
 
     def __exit__(
@@ -62,7 +62,7 @@ class Bar:
 
 @contextlib.contextmanager
 def spinner(what: str) -> Iterator[None]:
-    """For work that cannot tell how far it is."""
+    """A spinner for work whose progress is not known."""
     if not sys.stderr.isatty():
         yield
         return

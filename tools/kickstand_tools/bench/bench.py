@@ -1,7 +1,6 @@
-"""kickstand bench: what the firmware costs on the emulated Pico, in time, memory and flash."""
+"""What the firmware costs on the emulated Pico in time, memory and flash: bench() measures, tables() lays it out."""
 
 import ast
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -18,16 +17,20 @@ from ..simulation.scripted.script import Ride, accelerate, turn, upright
 from ..simulation.scripted.sensor_errors import Sensor
 from .sample_count import SampleCount
 
-SAMPLE_HZ = 200  # what bench_guest asks for
-_GUEST = Path(__file__).with_name("bench_guest.py")
+SAMPLE_HZ = 200  # as bench_guest sets it
+_GUEST = ("bench_guest", "stages_guest")  # modules of this folder that run on the Pico
+_SENSOR = Sensor(seed=1, share=0.0)  # without errors, mounted at some angle
 _RIDE = [accelerate(15.0, 1.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 20
 _START_LIMIT_S = 10.0
 _MODES: dict[str, dict[str, Any]] = {"aligning by driving": {"SPEED": "wheel"}, "recording": {"RECORD": True}}
-_WHEEL_PIN, _PULSE_S, _CLOSED_S = 14, 0.133, 0.02  # one magnet on a wheel of 2 m, at 15 m/s
+_WHEEL_PIN, _PULSE_S, _CLOSED_S = 14, 0.133, 0.02  # one magnet on a wheel of 2 m circumference, at 15 m/s
 
 
 def bench(seconds: int = 10) -> dict[str, Any]:
-    """Run everything; figures in the units that their names end with. seconds: emulated, of each of four runs."""
+    """Measure everything, which takes minutes. The figures' names end with their units.
+
+    seconds: emulated time of each of four runs. Raises GuestError if the program on the Pico fails.
+    """
     plain = _run(seconds, detail=False)
     detail = _run(seconds, detail=True)
     modes = {name: _run(seconds, detail=False, chosen=chosen) for name, chosen in _MODES.items()}
@@ -94,7 +97,7 @@ def _cpu_share(run: dict[str, Any]) -> float:
 
 
 def _compared(mode: dict[str, Any], plain: dict[str, Any]) -> dict[str, Any]:
-    """A run in a mode: what it costs more than the plain one."""
+    """The figures of a run in a mode, and what it costs more than the plain run."""
     figures = mode["figures"]
     return {
         "cpu_share": _cpu_share(mode),
@@ -109,7 +112,7 @@ def _compared(mode: dict[str, Any], plain: dict[str, Any]) -> dict[str, Any]:
 
 
 def _turn_wheel(pico: Pico) -> None:
-    """Its contact closes and opens, from now on."""
+    """Let the wheel contact close and open from now on."""
     pin = pico.chip.rp2040.gpio[_WHEEL_PIN]
 
     def close() -> None:
@@ -121,15 +124,18 @@ def _turn_wheel(pico: Pico) -> None:
 
 
 def _run(seconds: int, detail: bool, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
-    """The app's loop for so long: arrays and figures of bench_guest, and how the samples fared. chosen: settings."""
+    """Run the app's loop for so many emulated seconds. chosen: settings by name.
+
+    Returns the figures and arrays of bench_guest, and how many samples were taken and lost.
+    """
     chosen = chosen or {}
     files = flash_image.firmware(compiled=True) | _calibration()
     del files["/main.py"]
-    files["bench_guest.mpy"] = cross_compiled(_GUEST)
+    files |= {f"{name}.mpy": cross_compiled(Path(__file__).with_name(f"{name}.py")) for name in _GUEST}
     arrays: list[np.ndarray] = []
     stages: list[np.ndarray] = []
     result: dict[str, Any] = {}
-    with Pico(_world(), files) as pico:
+    with Pico(_SENSOR.world(Ride(_RIDE).motion), files) as pico:
         samples = SampleCount(pico.board.sensor)
 
         def take(data: bytes) -> None:
@@ -163,11 +169,11 @@ def _run(seconds: int, detail: bool, chosen: dict[str, Any] | None = None) -> di
 
 
 def _stages(run: dict[str, Any]) -> dict[str, np.ndarray]:
-    """us of each stage in each turn that had it."""
+    """The us that each stage took, in each turn in which it ran."""
     columns = dict(zip(run["figures"]["stages"], run["stages"].T, strict=True))
     sampled = columns["decode and sum"] > 0
     watch = run["figures"]["stopwatch_us"]
-    fetch = columns["fetch"] - 3 * watch  # around its two transfers and add_up()
+    fetch = columns["fetch"] - 3 * watch  # it contains two transfers and add_up()
     meter = columns["meter"] - 2 * watch
     stages = {
         "read": columns["read"],
@@ -189,23 +195,19 @@ def _spread(us: np.ndarray) -> dict[str, float]:
 
 
 def _first_lean_s(compiled: bool) -> float:
-    """From power-on to the first lean on the display, calibrated and standing upright."""
+    """Seconds from power-on to the first lean on the display. The board is calibrated and the bike stands upright."""
     files = flash_image.firmware(compiled) | _calibration()
-    world = Sensor(seed=1, share=0.0).world(Ride([upright(100.0)]).motion)
+    world = _SENSOR.world(Ride([upright(100.0)]).motion)
     with Pico(world, files) as pico:
         pico.run_until(lambda: pico.lcd()[0].startswith("Lean") and "°" in pico.lcd()[0], _START_LIMIT_S, 0.001)
         return round(pico.time_s, 3)
 
 
-def _world() -> Callable[[float], tuple]:
-    return Sensor(seed=1, share=0.0).world(Ride(_RIDE).motion)
-
-
 def _calibration() -> dict[str, bytes]:
-    """Of that sensor: only its mounting is to be known."""
+    """The files with the calibration of _SENSOR, of which only the mounting is unknown."""
     calibration = Calibration()
     calibration.aligned = True
-    for i, value in enumerate(Sensor(seed=1, share=0.0).vehicle_from_sensor):
+    for i, value in enumerate(_SENSOR.vehicle_from_sensor):
         calibration.vehicle_from_sensor[i] = value
     return flash_image.stored(calibration)
 

@@ -1,12 +1,13 @@
-"""Which of the samples that the simulated sensor takes leave it, and which are lost."""
+"""Counts the samples that the simulated sensor takes, and those of them that are lost unread."""
 
 from typing import Any
 
-from ..simulated_board.mpu6050 import ACCEL_XOUT_H, Mpu6050
+from ..simulated_board.mpu6050 import Mpu6050
+from ..simulated_board.mpu6050_registers import ACCEL_XOUT_H
 
 
 class SampleCount:
-    """Watches one sensor from now on, read by register or through its FIFO."""
+    """Counts for one sensor, which may be read through its data registers or through its FIFO."""
 
     def __init__(self, sensor: Mpu6050) -> None:
         self._sensor: Any = sensor
@@ -33,8 +34,8 @@ class SampleCount:
         return self._popped // (len(self._sensor._fifo_registers) or 1) or len(self._read)
 
     def lost(self) -> int:
-        """Samples that nobody can read any more: overwritten, pushed out of the FIFO, or thrown away with it."""
-        taken = self.taken()  # first: it lets the FIFO fill up to now
+        """Samples that can no longer be read: overwritten, pushed out of the FIFO or cleared with it."""
+        taken = self.taken()  # first, because it brings the FIFO up to date
         frame = len(self._sensor._fifo_registers)
         if frame:
             kept = self._popped + self._sensor.fifo.count - self._waiting

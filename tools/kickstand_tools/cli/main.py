@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from ..errors import InputError
-from . import board, simulated
+from . import board, simulated, without_a_board
 
 _PATH = click.Path(path_type=Path)
 _OUT = click.option("--out", required=True, type=_PATH, help="The file to write.")
@@ -29,6 +29,9 @@ for _command in board.flash, board.status, board.pull, board.record:
     kickstand.add_command(_command)
 kickstand.add_command(simulated.simulate)
 kickstand.add_command(simulated.evaluate)
+kickstand.add_command(without_a_board.demo)
+kickstand.add_command(without_a_board.emulate)
+kickstand.add_command(without_a_board.bench)
 
 
 @kickstand.group(no_args_is_help=False)
@@ -120,47 +123,6 @@ def replay(log: Path, calibration: Path, engine: str, out: Path) -> None:
             err=True,
         )
     click.echo(f"written: {out}, {count} samples")
-
-
-@kickstand.command()
-@click.option("--hand", is_flag=True, help="Lean the bike and press the button yourself, with keys.")
-@click.option("--cpython", is_flag=True, help="Run the firmware on CPython, not on MicroPython.")
-def demo(hand: bool, cpython: bool) -> None:
-    """Watch the firmware on a simulated board: kickstand press, upright press, a ride."""
-    from ..demo import demo
-
-    demo.demo(hand, cpython)
-
-
-@kickstand.command()
-@click.option("--port", type=click.IntRange(1024, 65535), default=2040, help="On which mpremote finds it.")
-def emulate(port: int) -> None:
-    """An emulated Pico on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
-    from ..emulator import image
-
-    image.find()
-    from ..emulator.emulate import emulate
-
-    emulate(port, click.echo)
-
-
-@kickstand.command()
-@click.option("--seconds", type=click.IntRange(1, 600), default=10, help="Emulated, of each of four runs.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def bench(seconds: int, as_json: bool) -> None:
-    """What the firmware costs on an emulated Pico: time, memory, flash."""
-    from ..emulator import image
-
-    image.find()
-    from rich.console import Console
-
-    from ..bench.bench import bench, tables
-
-    result = bench(seconds)
-    if as_json:
-        click.echo(json.dumps(result))
-    else:
-        Console().print(tables(result))
 
 
 _CALIBRATION = click.option(

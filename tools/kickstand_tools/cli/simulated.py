@@ -1,15 +1,18 @@
-"""The commands of `kickstand` that make rides up: simulate, and evaluate, which judges the lean on them."""
+"""The commands that simulate rides: simulate, which writes one, and evaluate, which judges the lean on many."""
 
+import contextlib
+import json
 from pathlib import Path
 
 import click
 
 _PATH = click.Path(path_type=Path)
+_WIDTH = 110  # columns of a table that is not printed to a terminal
 _UPRIGHT_ERROR = click.option(
     "--upright-error", type=click.FloatRange(-30.0, 30.0), default=0.0, help="Of the upright pose, degrees."
 )
 
-# as in simulation.profiles, which takes numpy to read
+# The names in simulation.profiles. Importing that needs numpy, which would slow every command down.
 _PROFILES = (
     "street, track, sweeper, city, hills; hard ones: banked, wheelie, bumps, crosswind, weight, vibration, creep, "
     "temperature, fall, parked"
@@ -78,10 +81,38 @@ def evaluate(
     as_json: bool,
 ) -> None:
     """Compare the shown lean and other filters with the truth of simulated rides."""
-    from ..evaluation.evaluate import evaluate
+    from rich.console import Console
 
-    def warn(line: str) -> None:
-        click.echo(line, err=True)
+    from ..errors import extra
+    from ..evaluation import picture, report, runs
+    from ..evaluation.estimators import missing
+    from ..evaluation.evaluate import evaluate
+    from ..output import check_directory, new_directory
+    from ..progress import Bar
 
     names = [name.strip() for name in profiles.split(",")]
-    evaluate(names, seeds, seconds, upright_error, pitch_change, recording, out, as_json, warn)
+    jobs = runs.jobs(names, seeds, seconds, upright_error, pitch_change, traces=out is not None)
+    if out is not None:
+        picture.check()
+        check_directory(out)
+    absent = missing()
+    if absent:
+        click.echo(f"left out, not installed: {', '.join(absent)}: {extra('evaluate')}", err=True)
+    with new_directory(out) if out is not None else contextlib.nullcontext():
+        with Bar("riding", len(jobs) * runs.steps(), patience_s=0.0) as bar:
+            found = evaluate(jobs, recording, lambda: bar.advance(1))
+        for result in found.results:
+            if result.refusal is not None:
+                where = f"{result.job.profile}, seed {result.job.seed}"
+                click.echo(f"{where}, not calibrated: {result.refusal}", err=True)
+        if as_json:
+            click.echo(json.dumps(report.document(found), indent=2))
+        else:
+            console = Console()
+            console = console if console.is_terminal else Console(width=_WIDTH)
+            console.print(report.table(found.results))
+            if found.recorded:
+                console.print(report.real_table(found.recorded.scores, found.recorded.name))
+        if out is not None:
+            figures, drawing = report.write(found, out)
+            click.echo(f"written: {figures} and {drawing}", err=True)

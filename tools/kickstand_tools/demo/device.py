@@ -1,11 +1,10 @@
 """The firmware on the simulated board, on a simulated bike. Runs under MicroPython's unix port or CPython.
 
-    demo_device.py script|hand SPEED
+    device.py script|hand SPEED
 
-SPEED: simulated seconds per second, 0 for as fast as it goes. Every 50 simulated ms a line of JSON goes to
-standard output (LCD, true lean, speed, phase); other lines are the device's own console. Commands come in by
-standard input, one a line: short, long (the button), left, right, kickstand, upright (the bike, if steered by
-hand), pause, quit.
+SPEED: simulated seconds per second, 0 for as fast as possible. Every 50 simulated ms a line of JSON goes to standard
+output (see score.State); other lines are the firmware's console. Commands come from standard input, one a line:
+short, long (presses of the button), left, right, kickstand, upright (if the bike is steered by hand), pause, quit.
 """
 
 import json
@@ -19,11 +18,11 @@ from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 
 TICK_S = 0.05
 PART_SEED = 1
-PART_SHARE = 0.5  # half of the data sheet's worst offset and scale: an ordinary part
+PART_SHARE = 0.5  # errors of up to half of the data sheet's limits: an ordinary sensor
 HAND_LIMIT_S = 3600.0
 LONG_PRESS_S = 1.2
 
-# The rider presses once on the kickstand, once upright, and looks at the other two pages after the ride.
+# The rider presses the button once on the kickstand and once upright, and turns to two other pages after the ride
 SCRIPT = (
     kickstand(8.0),
     upright(7.5),
@@ -40,11 +39,11 @@ SCRIPT = (
 KICKSTAND_PRESS_S, UPRIGHT_PRESS_S = 3.5, 11.5
 PAGES_BEFORE_END_S = (5.0, 2.5)
 
-_real_sleep = time.sleep  # kept before the board puts its own clock in the place of time
+_real_sleep = time.sleep  # kept before Board.install() replaces `time`
 
 
 class Commands:
-    """Lines of standard input, without ever waiting for one."""
+    """Lines of standard input, read without waiting."""
 
     def __init__(self):
         self._waiting = []
@@ -55,7 +54,7 @@ class Commands:
 
             self._poll = select.poll()
             self._poll.register(sys.stdin, select.POLLIN)
-        else:  # select knows no pipes on Windows
+        else:  # on Windows select does not work with pipes
             import threading
 
             threading.Thread(target=self._read_all, daemon=True).start()
@@ -70,7 +69,7 @@ class Commands:
         while self._poll and self._poll.poll(0):
             character = sys.stdin.read(1)
             if not character:
-                self._waiting.append("quit")  # whoever watched is gone
+                self._waiting.append("quit")  # end of input: the other process has ended
                 self._poll = None
             elif character == "\n":
                 self._waiting.append(self._partial)
@@ -81,7 +80,7 @@ class Commands:
 
 
 class Demo:
-    """The bike, the board and the talk with the host."""
+    """Bike and board, and the exchange with the process that draws."""
 
     def __init__(self, by_hand, speed):
         self._commands = Commands()
@@ -104,9 +103,9 @@ class Demo:
         self.board.every(TICK_S, self._tick)
 
     def run(self):
-        """Power on, and on again after every reset, until time is up or the host says quit."""
+        """Power on, and start again after every reset, until time is up or "quit" comes."""
         self.board.install()
-        import main  # after install(), which decides what `machine` and `time` are
+        import main  # after install(), which replaces `machine` and `time`
 
         ended = "reset"
         while ended == "reset":
@@ -152,7 +151,7 @@ class Demo:
 
 
 def run(kind, speed):
-    """kind: "script" or "hand"; speed: see above."""
+    """Run the demo's device. kind: "script" or "hand"; speed: see above."""
     Demo(kind == "hand", float(speed)).run()
 
 

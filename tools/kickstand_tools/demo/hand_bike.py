@@ -1,9 +1,13 @@
-"""The bike of rides.py steered by hand, command by command. Plain Python for CPython and MicroPython."""
+"""A simulated bike that is steered by hand, with commands. Plain Python for CPython and MicroPython.
+
+Its motion follows the same equations as simulation/scripted/script.py.
+"""
 
 from math import degrees, pi, radians, sin
 
-from kickstand_tools.simulation.scripted.script import (
-    GRAVITY_MPS2,
+from kickstand.units import STANDARD_GRAVITY
+
+from ..simulation.scripted.script import (
     KICKSTAND_DEG,
     RIDING_MPS,
     RIDING_SWAY_DEG,
@@ -18,14 +22,15 @@ LEAN_STEP_DEG = 5.0
 MAX_LEAN_DEG = 50.0
 
 _STEP_S = 0.005
-_ROLL_RATE = 4.0  # 1/s: how quickly lean follows the rider's wish (critically damped)
-_SPEED_RATE = 1.5  # 1/s
+_ROLL_RATE = 4.0  # rad/s: natural frequency at which the lean follows the wanted one, critically damped
+_SPEED_RATE = 1.5  # 1/s: how quickly the speed follows the wanted one
 _MAX_ACCELERATION, _MAX_BRAKING = 3.0, 5.0  # m/s2
 _SWAY_RADPS = 2.0 * pi * 0.4
 
 
 class HandBike:
-    """Starts on the kickstand; command() steers it. motion() and truth() as Ride's, for times that go on."""
+    """Starts on the kickstand; command() steers it. motion() and truth() are those of script.Ride, but t_s must not
+    go back."""
 
     def __init__(self, vibration_g=0.05):
         self._vibration_g = vibration_g
@@ -34,10 +39,10 @@ class HandBike:
         self._lean_wish = 0.0
         self._lean, self._lean_rate = radians(KICKSTAND_DEG), 0.0
         self._speed, self._acceleration, self._distance = 0.0, 0.0, 0.0
-        self._sway = 0.0  # rad, amplitude
+        self._sway = 0.0  # amplitude, rad
 
     def command(self, name):
-        """left, right: set off, then lean 5 degrees further; upright, kickstand: stop there."""
+        """left, right: set off, then lean 5 degrees further; upright, kickstand: stop and stand so."""
         if name in ("kickstand", "upright"):
             self._pose = name
             self._lean_wish = 0.0
@@ -74,10 +79,10 @@ class HandBike:
         self._advance(t_s)
         lean = self._lean + self._sway * sin(_SWAY_RADPS * t_s)
         lean_rate = self._lean_rate + self._sway * _SWAY_RADPS * sin(_SWAY_RADPS * t_s + pi / 2.0)
-        return lean, lean_rate, yaw_rate_in_balance(lean, GRAVITY_MPS2, self._speed)
+        return lean, lean_rate, yaw_rate_in_balance(lean, STANDARD_GRAVITY, self._speed)
 
     def motion(self, t_s):
-        """Specific force (g) and rates (deg/s) in the vehicle's axes, vibration included."""
+        """Specific force (g) along, and rates (deg/s) about left, up, forward, vibration included."""
         lean, lean_rate, yaw_rate = self._attitude(t_s)
         clean = body_motion(lean, lean_rate, self._speed, self._acceleration, yaw_rate)
         engine = min(1.0, self._speed / 2.0)

@@ -5,11 +5,14 @@ import sys
 import time
 from types import TracebackType
 
-_LEFT, _RIGHT = ("\x1b[D", "\x1bOD", "\xe0K"), ("\x1b[C", "\x1bOC", "\xe0M")  # the last of each: Windows
+# Key of a bike that is steered by hand, and the command of hand_bike.HandBike
+BIKE_KEYS = {"a": "left", "left": "left", "d": "right", "right": "right", "k": "kickstand", "u": "upright"}
+
+_LEFT, _RIGHT = ("\x1b[D", "\x1bOD", "\xe0K"), ("\x1b[C", "\x1bOC", "\xe0M")  # the last of each: on Windows
 
 
 def split(text: str) -> list[str]:
-    """What was typed, key by key: characters, arrows as "left" and "right", no other special keys."""
+    """What was typed, key by key: characters, and "left" and "right" for arrows. Other special keys are dropped."""
     keys = []
     while text:
         size = 3 if text[:2] in ("\x1b[", "\x1bO") else 2 if text[0] in "\xe0\0" else 1
@@ -25,7 +28,7 @@ if sys.platform == "win32":
     import msvcrt
 
     class Keyboard:
-        """with Keyboard() as keyboard: keyboard.keys()."""
+        """with Keyboard() as keyboard: keyboard.keys(wait_s)"""
 
         def __enter__(self) -> "Keyboard":
             return self
@@ -34,7 +37,7 @@ if sys.platform == "win32":
             pass
 
         def keys(self, wait_s: float) -> list[str]:
-            """Keys pressed by now; waits at least wait_s."""
+            """Keys pressed so far; waits for wait_s."""
             time.sleep(wait_s)
             text = ""
             while msvcrt.kbhit():
@@ -47,7 +50,7 @@ else:
     import tty
 
     class Keyboard:
-        """with Keyboard() as keyboard: keyboard.keys()."""
+        """with Keyboard() as keyboard: keyboard.keys(wait_s)"""
 
         def __enter__(self) -> "Keyboard":
             self._fd = sys.stdin.fileno()
@@ -61,7 +64,7 @@ else:
             termios.tcsetattr(self._fd, termios.TCSADRAIN, self._before)
 
         def keys(self, wait_s: float) -> list[str]:
-            """Keys pressed by now; waits for one up to wait_s."""
+            """Keys pressed so far; waits for one up to wait_s."""
             if not select.select([self._fd], [], [], wait_s)[0]:
                 return []
             return split(os.read(self._fd, 1024).decode(errors="replace"))

@@ -1,6 +1,7 @@
-"""Shown against true lean, from what the LCD said."""
+"""The lean on the LCD compared with the true one."""
 
 import re
+from dataclasses import dataclass
 from math import sqrt
 from typing import TypedDict
 
@@ -12,8 +13,8 @@ _STANDING = ("kickstand", "upright", "moving", "wait")
 
 
 class State(TypedDict):
-    """One of the device's ticks. of_s: how long it takes in all, None where nobody knows; lcd: both
-    lines; lean_deg: the true one, > 0 to the right; phase: what the bike does; pressed: the button is."""
+    """One tick of the device. of_s: how long the run will take, None if steered by hand; lcd: both lines;
+    lean_deg: the true lean, > 0 to the right; phase: what the bike does; pressed: True while the button is."""
 
     t_s: float
     of_s: float | None
@@ -24,8 +25,19 @@ class State(TypedDict):
     pressed: bool
 
 
+@dataclass
+class Figures:
+    """Shown against true lean in one part of the ride. Errors: shown less true."""
+
+    samples: int
+    true_mean_deg: float
+    shown_mean_deg: float
+    rms_error_deg: float
+    worst_error_deg: float
+
+
 def shown_lean(lcd: list[str]) -> float | None:
-    """The lean an LCD shows in degrees, > 0 to the right; None when it shows something else."""
+    """The lean that an LCD shows in degrees, > 0 to the right; None if it shows another page."""
     found = _LEAN_PAGE.match(lcd[0])
     if not found:
         return None
@@ -33,50 +45,67 @@ def shown_lean(lcd: list[str]) -> float | None:
 
 
 class Score:
-    """Collects the device's ticks while the lean page is shown."""
+    """Collects true and shown lean from the ticks in which the lean page is shown."""
 
     def __init__(self) -> None:
-        self._pairs: dict[str, list[tuple[float, float]]] = {}  # stretch: (true, shown)
+        self._pairs: dict[str, list[tuple[float, float]]] = {}  # part of the ride: (true, shown) in degrees
         self._phase = ""
         self._turns = 0
 
     def add(self, state: State) -> None:
-        """Take one tick."""
+        """Add one tick."""
         phase = state["phase"]
         self._turns += phase == "held turn" != self._phase
         self._phase = phase
         shown = shown_lean(state["lcd"])
         if shown is not None:
-            self._pairs.setdefault(self._stretch(phase), []).append((state["lean_deg"], shown))
+            self._pairs.setdefault(self._part(phase), []).append((state["lean_deg"], shown))
 
-    def _stretch(self, phase: str) -> str:
+    def _part(self, phase: str) -> str:
         if phase == "held turn":
             return f"held turn {self._turns}"
         if phase in _ROLLING:
             return "rolling in and out"
         return "standing" if phase in _STANDING else "straight on"
 
-    def table(self) -> Table | str:
-        """One row a held turn, then the other stretches, then the whole."""
-        if not self._pairs:
-            return "The lean was not shown yet."
-        table = Table(title="Lean in degrees, > 0 to the right: shown on the LCD against true")
-        table.add_column("")
-        for name in ("samples", "true mean", "shown mean", "rms error", "worst"):
-            table.add_column(name, justify="right")
+    def figures(self) -> dict[str, Figures]:
+        """By part of the ride, held turns first, then of the whole ride as "all". Empty if no lean was shown."""
         names = sorted(self._pairs, key=lambda name: not name.startswith("held"))
-        for name in names:
-            table.add_row(name, *_figures(self._pairs[name]))
-        table.add_section()
-        table.add_row("all", *_figures([pair for name in names for pair in self._pairs[name]]))
-        return table
+        if not names:
+            return {}
+        parts = {name: _figures(self._pairs[name]) for name in names}
+        return parts | {"all": _figures([pair for name in names for pair in self._pairs[name]])}
 
 
-def _figures(pairs: list[tuple[float, float]]) -> list[str]:
+def table(figures: dict[str, Figures]) -> Table | str:
+    """Score.figures() for a terminal: a row for each part of the ride, then the whole."""
+    if not figures:
+        return "The lean was not shown yet."
+    table = Table(title="Lean in degrees, > 0 to the right: shown on the LCD against true")
+    table.add_column("")
+    for name in ("samples", "true mean", "shown mean", "rms error", "worst"):
+        table.add_column(name, justify="right")
+    for name, part in figures.items():
+        if name == "all":
+            table.add_section()
+        table.add_row(
+            name,
+            str(part.samples),
+            f"{part.true_mean_deg:.1f}",
+            f"{part.shown_mean_deg:.1f}",
+            f"{part.rms_error_deg:.1f}",
+            f"{part.worst_error_deg:+.1f}",
+        )
+    return table
+
+
+def _figures(pairs: list[tuple[float, float]]) -> Figures:
     errors = [shown - true for true, shown in pairs]
     count = len(pairs)
-    true_mean = sum(true for true, _ in pairs) / count
-    shown_mean = sum(shown for _, shown in pairs) / count
-    rms = sqrt(sum(error * error for error in errors) / count)
-    worst = max(errors, key=abs)
-    return [str(count), f"{true_mean:.1f}", f"{shown_mean:.1f}", f"{rms:.1f}", f"{worst:+.1f}"]
+    return Figures(
+        count,
+        sum(true for true, _ in pairs) / count,
+        sum(shown for _, shown in pairs) / count,
+        sqrt(sum(error * error for error in errors) / count),
+        max(errors, key=abs),
+    )

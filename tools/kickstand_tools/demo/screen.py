@@ -1,4 +1,4 @@
-"""What the demo shows in a terminal, 78 columns wide: the LCD, the bike from behind, true against shown."""
+"""The demo's picture in a terminal, 78 columns wide: the LCD, the bike from behind, true and shown lean."""
 
 from itertools import groupby
 from math import cos, radians, sin
@@ -23,14 +23,14 @@ _BRAILLE = ((0x01, 0x08), (0x02, 0x10), (0x04, 0x20), (0x40, 0x80))  # bit of ro
 
 
 def lean_text(lean_deg: float, digits: int = 1) -> str:
-    """As "12.3° left"."""
+    """A lean in words: "12.3° left"."""
     size = f"{abs(lean_deg):.{digits}f}"
     side = "" if float(size) == 0.0 else "left" if lean_deg < 0.0 else "right"
     return f"{size}° {side}".rstrip()
 
 
 def lcd_lines(lcd: list[str]) -> list[str]:
-    """The two lines in a frame, as plain text."""
+    """The two lines in a frame of plain text."""
     edge = "+" + "-" * 16 + "+"
     return [edge, *(f"|{line:16}|" for line in lcd), edge]
 
@@ -42,7 +42,7 @@ def _lcd(lcd: list[str]) -> RenderableType:
 
 
 def _on_bike(x: float, y: float) -> bool:
-    """Whether a point (m, right of and above the tyre's contact) is on bike or rider, seen from behind."""
+    """True if a point is on bike or rider seen from behind. x to the right of and y above the contact point, m."""
     return (
         (abs(x) < 0.08 and 0.0 <= y < 0.62)  # tyre
         or (abs(x) < 0.17 and 0.5 <= y < 0.85)  # tail
@@ -53,7 +53,7 @@ def _on_bike(x: float, y: float) -> bool:
 
 
 def bike(lean_deg: float, shown_deg: float | None) -> Text:
-    """The bike from behind at its true lean, with a dashed line at the shown one."""
+    """The bike from behind at its true lean, with a dashed line at the shown lean."""
     picture = Text(no_wrap=True)
     middle, ground = _BIKE_COLUMNS, 4 * _BIKE_ROWS - 3  # in dots
     c, s = cos(radians(lean_deg)), sin(radians(lean_deg))
@@ -99,7 +99,7 @@ def _figures(state: State) -> Table:
 
 
 def screen(state: State, title: str, keys: str, paused: bool) -> RenderableType:
-    """The whole picture for one of the device's ticks."""
+    """The whole picture for one tick of the device."""
     of_s = state["of_s"]
     head = Table.grid(expand=True)
     head.add_column(no_wrap=True)

@@ -1,4 +1,6 @@
-"""The firmware on an emulated Raspberry Pi Pico: the official MicroPython image, with the board's models.
+"""An emulated Raspberry Pi Pico that runs the official MicroPython image, wired to the models of simulated_board.
+
+The tests in host_tests/chip, `kickstand emulate`, `bench` and `replay --engine rp2040` use it.
 
 with Pico(world, files=flash_image.firmware()) as pico:
     pico.run(2.0)

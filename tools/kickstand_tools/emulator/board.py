@@ -1,4 +1,4 @@
-"""The board's models on the emulated chip's clock, and its button on a pin."""
+"""The models of simulated_board on the emulated chip's clock, and its button on a pin."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,7 +9,7 @@ from .clock import EmulatedClock
 
 
 class WiredButton(Button):
-    """A button that tells when its contacts touch and part."""
+    """A button that calls changed(closed) when its contacts touch and when they part."""
 
     def __init__(self, clock: EmulatedClock, seed: int) -> None:
         self.changed: Callable[[bool], None] | None = None
@@ -28,9 +28,9 @@ class WiredButton(Button):
 
 
 class EmulatedBoard(Board):
-    """simulator.Board without its fake `machine`: parts, faults, button, time, for an emulated chip.
+    """simulator.Board for an emulated chip: its parts, faults, button and time, but not its fake `machine`.
 
-    fitted: as for Board, but for port and pace.
+    fitted: the arguments of Board, except port and pace.
     """
 
     def __init__(self, clock: EmulatedClock, world: Callable[[float], tuple], **fitted: Any) -> None:
@@ -43,16 +43,16 @@ class EmulatedBoard(Board):
 
     @property
     def button_pin(self) -> int:
-        """The GPIO that the button connects to ground."""
+        """The number of the GPIO that the button connects to ground."""
         return self._button_pin
 
     def power_on(self) -> None:
-        """The supply comes up at everything but the processor."""
+        """The supply of everything but the processor comes up."""
         self.sensor.power_on()
         self.lcd.power_on()
 
     def power_off(self) -> None:
-        """And goes."""
+        """The supply of everything but the processor goes down."""
         for bus in self.buses:
             bus.power_off()
         self.lcd.power_off()

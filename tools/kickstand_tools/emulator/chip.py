@@ -1,4 +1,4 @@
-"""An emulated RP2040 with the corrections of this package, and time to run it by."""
+"""An emulated RP2040 with the corrections of this package, and methods that let its time pass."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -18,14 +18,14 @@ from ..simulated_board.i2c import Bus
 from .flash_memory import TimedFlash
 from .i2c_controller import TimedI2C
 
-_SSI = 0x18000  # places in rp2040py's table of peripherals: address >> 12
+_SSI = 0x18000  # keys of rp2040py's table of peripherals: address >> 12
 _I2C = (0x40044, 0x40048)
-_OSCILLATORS = WDSEL_XOSC | WDSEL_ROSC  # which the SDK spares in a reset by the watchdog
+_OSCILLATORS = WDSEL_XOSC | WDSEL_ROSC  # which the SDK excludes from a reset by the watchdog
 _ACCESS = ("read_uint8", "read_uint16", "read_uint32", "write_uint8", "write_uint16", "write_uint32")
 
 
 class Chip:
-    """rp2040: rp2040py's, its controllers replaced. power_on() switches it on, run() lets time pass."""
+    """rp2040: rp2040py's chip with its flash and I2C controllers replaced. run() lets time pass."""
 
     def __init__(self, image: Path) -> None:
         self.rp2040 = RP2040()
@@ -41,10 +41,10 @@ class Chip:
         self.rp2040.watchdog.on_watchdog_trigger = self.reset
         self._pios = self.rp2040.pio
         self._hurry()
-        self.stopped = False  # with rp2040 and clock what execute_batch looks at
+        self.stopped = False  # execute_batch() reads this attribute, rp2040 and clock
 
     def connect(self, number: int, bus: Bus) -> TimedI2C:
-        """Put I2C controller number on a bus."""
+        """Connect the I2C controller with this number to a bus."""
         irq = (IRQ.I2C0, IRQ.I2C1)[number]
         controller = TimedI2C(self.rp2040, f"I2C{number}", irq, bus)
         self.rp2040.i2c[number] = self.rp2040.peripherals[_I2C[number]] = controller
@@ -52,14 +52,14 @@ class Chip:
         return controller
 
     def power_on(self) -> None:
-        """From nothing: memory as it may come up, the cause of the reset power-on."""
+        """Start from power-on, with arbitrary content in RAM."""
         self.rp2040.sram[:] = b"\xa5" * len(self.rp2040.sram)
         self._reset(from_watchdog=False)
         self.rp2040.watchdog.reset()
         self.rp2040.vreg_and_chip_reset.record_reset_cause(HAD_POR)
 
     def power_off(self) -> None:
-        """Nothing runs any more; time can still pass with sleep()."""
+        """Stop the processor. sleep() still lets time pass."""
         self._reset(from_watchdog=False)
 
     def sleep(self, seconds: float) -> None:
@@ -67,7 +67,7 @@ class Chip:
         self.clock.tick(seconds * 1e9)
 
     def run(self, seconds: float, between: Callable[[], None] | None = None) -> None:
-        """Let emulated time pass. between: called every 5 ms of the host's time or so. Raises PowerCut."""
+        """Let emulated time pass. between: called about every 5 ms of the host's time. Raises PowerCut."""
         self.stopped = False
         end = self.clock.create_alarm(self.stop)
         end.schedule(seconds * 1e9)
@@ -84,7 +84,7 @@ class Chip:
         self.stopped = True
 
     def reset(self) -> None:
-        """As machine.reset() does it, and a watchdog that was not fed."""
+        """Reset the chip, as machine.reset() does and a watchdog that is not fed."""
         self.rp2040.psm.write_uint32(WDSEL, PSM_BITS_MASK & ~_OSCILLATORS)
         self.rp2040.watchdog._reason |= TIMER
         self.resets += 1
@@ -96,17 +96,17 @@ class Chip:
         self.rp2040.pio = self._pios
         self.rp2040.enter_reset(from_watchdog=from_watchdog)
         self.rp2040.pio = []
-        # What rp2040py's watchdog keeps: on the chip it rests after a reset until it is started again
+        # rp2040py's watchdog keeps running; on the chip it stands still after a reset until it is started again
         watchdog = self.rp2040.watchdog
         watchdog.timer.enable = watchdog.alarm.enable = False
         self.rp2040.core.pc = FLASH_START_ADDRESS
 
     def _hurry(self) -> None:
-        """What doubles the speed on the host and changes nothing else.
+        """Double the emulation's speed on the host without any other effect.
 
-        rp2040py's compiled core looks up each memory access by name, and makes a method object of what it
-        finds unless the instance has one; and asks both PIO blocks, which MicroPython leaves alone, after every
-        instruction.
+        rp2040py's compiled core looks up the method of each memory access by name, which makes a new method object
+        each time unless the instance holds one. It also polls both PIO blocks, which MicroPython does not use, after
+        every instruction.
         """
         for name in _ACCESS:
             self.rp2040.__dict__[name] = getattr(self.rp2040, name)

@@ -1,4 +1,4 @@
-"""The emulated chip's time as the board's models know it: integer microseconds, and things to do later."""
+"""The emulated chip's time as the models use it: integer microseconds, and calls that are due later."""
 
 from collections.abc import Callable
 
@@ -6,7 +6,7 @@ from rp2040py.clock.clock import IClock
 
 
 class EmulatedClock:
-    """What board.clock.Clock is to the models, driven by the emulated processor's cycles."""
+    """Takes the place of simulated_board.clock.Clock; the emulated processor's cycles drive it."""
 
     def __init__(self, clock: IClock) -> None:
         self._clock = clock
@@ -17,7 +17,7 @@ class EmulatedClock:
         return int(self._clock.nanos + 0.5) // 1000
 
     def at(self, due_us: float, function: Callable[[], None]) -> None:
-        """Call function() when the time is due_us; at once if that has passed."""
+        """Call function() at due_us; at once if that time is over."""
         self._clock.create_alarm(function).schedule(max(0.0, due_us * 1000.0 - self._clock.nanos))
 
     def every(self, period_us: float, function: Callable[[], None]) -> None:

@@ -1,4 +1,4 @@
-"""The emulated board's console as a socket, which mpremote and `kickstand flash --port socket://...` open."""
+"""The emulated board's console as a socket, for mpremote and `kickstand flash --port socket://...`."""
 
 import contextlib
 import socket
@@ -8,7 +8,7 @@ from .quiet_usb import QuietConsole
 
 
 class ConsoleServer:
-    """One client at a time, as with a serial port. Call poll() often; port 0 takes a free one, see port."""
+    """Serves one client at a time, as a serial port does. Call poll() often. Port 0 takes a free one, see `port`."""
 
     def __init__(self, console: QuietConsole, port: int) -> None:
         self._console = console
@@ -21,12 +21,12 @@ class ConsoleServer:
         self.port: int = self._server.getsockname()[1]
 
     def close(self) -> None:
-        """No more clients."""
+        """Disconnect the client and stop listening."""
         self._hang_up()
         self._server.close()
 
     def poll(self) -> None:
-        """Take in a client, and what it has sent."""
+        """Accept a client, or pass on what it has sent."""
         if self._client is None:
             with contextlib.suppress(BlockingIOError):
                 self._client = self._server.accept()[0]
@@ -45,7 +45,7 @@ class ConsoleServer:
             self._hang_up()
 
     def say(self, data: bytes) -> None:
-        """What the board says; lost while nobody listens."""
+        """Send what the board prints to the client; it is lost if there is none."""
         if self._client:
             try:
                 self._client.setblocking(True)

@@ -1,4 +1,4 @@
-"""kickstand emulate: an emulated Pico with sensor, display and button on a simulated bike, to be deployed to."""
+"""kickstand emulate: an emulated Pico with sensor, display and button on a simulated bike, for `kickstand flash`."""
 
 import contextlib
 import sys
@@ -9,7 +9,7 @@ from rich.live import Live
 
 from ..demo.device import KICKSTAND_PRESS_S, LONG_PRESS_S, PART_SEED, PART_SHARE, SCRIPT, UPRIGHT_PRESS_S
 from ..demo.hand_bike import HandBike
-from ..demo.keyboard import Keyboard
+from ..demo.keyboard import BIKE_KEYS, Keyboard
 from ..demo.score import State
 from ..demo.screen import lcd_lines, screen
 from ..simulation.scripted.script import Ride
@@ -18,24 +18,23 @@ from .console_server import ConsoleServer
 from .pico import Pico
 
 _STEP_S = 0.02
-_BUTTON = {"b": 0.15, "B": LONG_PRESS_S, " ": LONG_PRESS_S}
-_BIKE = {"a": "left", "left": "left", "d": "right", "right": "right", "k": "kickstand", "u": "upright"}
+_BUTTON = {"b": 0.15, "B": LONG_PRESS_S, " ": LONG_PRESS_S}  # seconds of a press, by key
 _HELP = "b button   B long press   a/d lean   k kickstand   u upright   q quit"
 
 
 class ScriptedBike:
-    """The demo's ride, which begins when the display comes on: the firmware has started."""
+    """The demo's ride. It begins when the display comes on, which shows that the firmware has started."""
 
     def __init__(self) -> None:
         self._ride = Ride(SCRIPT)
         self.begun_s: float | None = None
 
     def motion(self, t_s: float) -> tuple[float, ...]:
-        """As Ride's."""
+        """See script.Ride.motion()."""
         return self._ride.motion(0.0 if self.begun_s is None else t_s - self.begun_s)
 
     def follow(self, pico: Pico) -> None:
-        """Begin, if it is time, and press the button where the script says."""
+        """Begin the ride once the display is on, and have the button pressed where the script says."""
         if self.begun_s is None and pico.board.lcd.on:
             self.begun_s = pico.time_s
             for press_s in (KICKSTAND_PRESS_S, UPRIGHT_PRESS_S):
@@ -45,8 +44,8 @@ class ScriptedBike:
 def emulate(port: int, say: Callable[[str], None]) -> None:
     """Serve the Pico's console on socket://127.0.0.1:port until the user quits. Raises InputError.
 
-    In a terminal the bike is steered by keys. Elsewhere each new text of the display is printed, and the bike
-    goes on the demo's ride once the firmware runs.
+    In a terminal the bike is steered with keys. Elsewhere say() gets each new text of the display, and the bike goes
+    on the demo's ride once the firmware runs.
     """
     watched = sys.stdin.isatty() and sys.stdout.isatty()
     bike = HandBike() if watched else ScriptedBike()
@@ -66,7 +65,7 @@ def emulate(port: int, say: Callable[[str], None]) -> None:
 
 
 def _run(pico: Pico, server: ConsoleServer) -> None:
-    """A little time, and never faster than real time: what waits outside goes by the host's clock."""
+    """Let a step of time pass, not faster than real time: the time-outs of mpremote go by the host's clock."""
     begun, before = time.monotonic(), pico.time_s
     pico.run(_STEP_S, server.poll)
     time.sleep(max(0.0, pico.time_s - before - (time.monotonic() - begun)))
@@ -80,8 +79,8 @@ def _watch(pico: Pico, server: ConsoleServer, bike: HandBike, address: str) -> N
                     return
                 if key in _BUTTON:
                     pico.press(for_s=_BUTTON[key])
-                elif key in _BIKE:
-                    bike.command(_BIKE[key])
+                elif key in BIKE_KEYS:
+                    bike.command(BIKE_KEYS[key])
             _run(pico, server)
             lean_deg, speed_mps, _, phase = bike.truth(pico.time_s)
             state: State = {

@@ -1,4 +1,4 @@
-"""Files into and out of the Pico's file system, on the host: littlefs as the official image mounts it."""
+"""The Pico's file system, built and read on the host: littlefs with the geometry of the official image."""
 
 import tempfile
 from pathlib import Path
@@ -9,14 +9,14 @@ from littlefs import LittleFS, UserContext
 
 from ..deploy import bytecode, firmware_files
 
-START = 0xA0000  # of the file system in flash
+START = 0xA0000  # address of the file system in flash
 _BLOCK, _COUNT = 4096, 352
 SIZE = _BLOCK * _COUNT
 _PROGRAM_SIZE = 256
 
 
 def build(files: dict[str, bytes]) -> bytes:
-    """A file system with these files: path on the board, with a leading slash or without, and content."""
+    """A file system that holds these files: {path on the board, with or without a leading slash: content}."""
     context = UserContext(SIZE)
     system = _mount(context, fresh=True)
     for path, content in files.items():
@@ -30,7 +30,7 @@ def build(files: dict[str, bytes]) -> bytes:
 
 
 def read(image: bytes) -> dict[str, bytes]:
-    """Every file of a file system. Raises littlefs.errors.LittleFSError where there is none."""
+    """Every file of a file system, by path. Raises littlefs.errors.LittleFSError if it cannot be mounted."""
     context = UserContext(SIZE)
     context.buffer = bytearray(image)
     system = _mount(context, fresh=False)
@@ -44,7 +44,7 @@ def read(image: bytes) -> dict[str, bytes]:
 
 
 def firmware(compiled: bool = False) -> dict[str, bytes]:
-    """What `kickstand flash` puts on a board. compiled: the package as .mpy, by mpy-cross."""
+    """The files that `kickstand flash` copies to a board. compiled: the package as .mpy, made by mpy-cross."""
     return firmware_files.contents(bytecode.PICO if compiled else None)
 
 

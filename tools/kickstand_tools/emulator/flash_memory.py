@@ -1,5 +1,6 @@
-"""Puts right in rp2040py's flash: erasing and programming take time, the processor stalled, interrupts off.
-And lets the power go in the middle of it.
+"""Corrects rp2040py's flash: erasing and programming take time, in which the processor stands still.
+
+It can also cut the power in the middle of such an operation.
 """
 
 from collections.abc import Callable
@@ -23,7 +24,7 @@ class PowerCut(Exception):
 
 
 class TimedFlash(RPSSI):
-    """rp2040py's flash interface, with the time that operations take. operations: how many were begun."""
+    """rp2040py's flash interface, with the time that erasing and programming take. operations: how many were begun."""
 
     def __init__(self, rp2040: RP2040, name: str) -> None:
         rp2040.qspi[1]._listeners.clear()  # the interface that this one replaces
@@ -34,7 +35,7 @@ class TimedFlash(RPSSI):
         self._cut_share = 0.0
 
     def cut_power(self, operation: int, share: float = 0.0) -> None:
-        """PowerCut at the nth erase or program from now (1: the next), with a share of it done (0..1)."""
+        """Raise PowerCut in the nth erase or program from now (1: the next), when a share of it is done (0..1)."""
         self._cut_at = self.operations + operation
         self._cut_share = share
 

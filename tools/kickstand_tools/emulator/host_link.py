@@ -1,6 +1,6 @@
-"""A register block that the real chip has not: code on the emulated Pico exchanges bytes with the host by it.
+"""Registers that the real chip does not have, by which code on the emulated Pico exchanges bytes with the host.
 
-The console would do, but every byte of it costs the guest time. GUEST is the other end, for the board.
+The console would do too, but every byte on it costs the Pico time. GUEST is the code for the Pico's end.
 """
 
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from rp2040py.peripherals.peripheral import BasePeripheral
 
 from .chip import Chip
 
-_PLACE = 0x40068  # reserved on the chip
+_PLACE = 0x40068  # address >> 12, reserved on the chip
 _COUNT, _FILL, _TAKE = 0x0, 0x4, 0x8
 
 GUEST = """
@@ -34,7 +34,7 @@ class Sink:
 
 
 class HostLink(BasePeripheral):
-    """source: what the guest's Source.read() gets, in order.  sink: called with what Sink.write() is given."""
+    """source: what Source.read() on the Pico returns, in order.  sink: called with what Sink.write() is given."""
 
     def __init__(self, chip: Chip, source: bytes, sink: Callable[[bytes], Any]) -> None:
         super().__init__(chip.rp2040, "HOST_LINK")

@@ -1,5 +1,6 @@
-"""Puts right in rp2040py's I2C controllers: that bits take time, that an absent device is a quick EIO, that a
-disabled controller lets go. And connects a controller to the board's bus.
+"""Corrects rp2040py's I2C controllers, and connects them to the models' buses.
+
+On the chip bits take time, an absent device causes EIO at once, and a controller that is disabled releases the wires.
 """
 
 from collections.abc import Callable
@@ -24,11 +25,11 @@ _POLLED = (IC_RAW_INTR_STAT, IC_RXFLR, IC_TX_ABRT_SOURCE)
 
 
 class TimedI2C(RPI2C):
-    """rp2040py's controller, with every bit as long as the SCL counts say, on a bus of board models.
+    """rp2040py's controller on a bus of simulated_board; each bit takes as long as the SCL count registers say.
 
-    The SDK waits for each byte by reading registers in a loop. Such a read lets the time pass until the byte
-    is over, at once: the loop would find nothing else, and costs the host ten times as much. An interrupt is
-    late by up to a byte for it.
+    The SDK waits for the end of each byte by reading registers in a loop. Here the first such read lets the time pass
+    until the byte is over. The loop would do nothing else until then, and emulating it takes the host ten times as
+    long. Interrupts are therefore late by up to a byte.
     """
 
     def __init__(self, rp2040: RP2040, name: str, irq: int, bus: Bus) -> None:
@@ -37,7 +38,7 @@ class TimedI2C(RPI2C):
         self._clock = rp2040.clock
         self._alarm = self._clock.create_alarm(self._over)
         self._due_ns = 0.0
-        self._then: Callable[[], None] | None = None  # what follows the bits under way
+        self._then: Callable[[], None] | None = None  # called when the bits on the wire are over
         self.on_start = lambda repeated: self._after(1, self.complete_start)
         self.on_connect = lambda address, mode: self._after(9, lambda: self._connect(address, bool(mode)))
         self.on_write_byte = lambda value: self._after(9, lambda: self._written(value))
@@ -46,15 +47,15 @@ class TimedI2C(RPI2C):
 
     @property
     def hz(self) -> float:
-        """The clock on SCL."""
+        """The frequency of SCL."""
         return 1e9 / (_CYCLE_NS * max(1, self.scl_low_period + self.scl_high_period))
 
     def reading(self) -> bool:
-        """True in the middle of a byte that a device sends."""
+        """True while a device sends a byte."""
         return self._then == self._received
 
     def let_go(self) -> None:
-        """Leave a transfer where it is: the controller idle, the wires released."""
+        """Abandon the transfer: the controller becomes idle and releases the wires."""
         self._alarm.cancel()
         self._then = None
         self.bus.stop()
@@ -62,7 +63,7 @@ class TimedI2C(RPI2C):
         self._busy = self._stop = self._pending_restart = False
 
     def reset(self) -> None:
-        """With the chip. A device that was sending does not know, and holds SDA."""
+        """Reset with the chip. A device that was sending does not notice it, and holds SDA."""
         if getattr(self, "_then", None) is not None:
             reading = self.reading()
             self.let_go()
@@ -73,18 +74,18 @@ class TimedI2C(RPI2C):
     # Registers
 
     def read_uint32(self, offset: int) -> int:
-        """As the controller's; waits for the byte under way, see the class."""
+        """Read a register; some reads wait for the end of the byte, see the class."""
         if self._then is not None and offset in _POLLED:
             self._clock.tick(max(0.0, self._due_ns - self._clock.nanos))
         return super().read_uint32(offset)
 
     def write_uint32(self, offset: int, value: int) -> None:
-        """As the controller's; disabled in mid-transfer, as by the SDK after a time-out, it lets go."""
+        """Write a register. Disabled in a transfer, as after a time-out, the controller releases the wires."""
         if offset == IC_ENABLE and not value & ENABLE and self._busy and self._state != I2CState.STOP:
             self.let_go()
         super().write_uint32(offset, value)
 
-    # Interrupts: with TX_EMPTY_CTRL, TX_EMPTY comes when the byte is over; and it comes with an abort
+    # Interrupts: with TX_EMPTY_CTRL set, TX_EMPTY is raised at the end of the byte. An abort raises it too
 
     def _set_interrupts(self, mask: int) -> None:
         if mask == R_TX_EMPTY and self._busy and self.control & TX_EMPTY_CTRL:
@@ -114,7 +115,7 @@ class TimedI2C(RPI2C):
 
     def _connect(self, address: int, read: bool) -> None:
         answer = self.bus.start(address, read)
-        if answer is not None:  # None: the wires are held, and the transfer goes on until software gives up
+        if answer is not None:  # None: a device holds SDA, and the transfer lasts until the software gives up
             self.complete_connect(answer)
 
     def _written(self, value: int) -> None:

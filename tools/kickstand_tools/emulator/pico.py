@@ -1,4 +1,4 @@
-"""The emulated Pico with all that is soldered to it: for tests, bench, replay and `kickstand emulate`."""
+"""The emulated Pico with the parts that are wired to it: for tests, bench, replay and `kickstand emulate`."""
 
 from collections.abc import Callable
 from typing import Any
@@ -17,18 +17,18 @@ _PROMPT = b"raw REPL; CTRL-B to exit\r\n>"
 
 
 class NotReached(Exception):
-    """What was waited for did not come in time."""
+    """A condition was not met in time."""
 
 
 class GuestError(Exception):
-    """The code that was given to exec() raised this traceback."""
+    """The code that was given to exec() raised an exception. The text is the board's traceback."""
 
 
 class Pico:
-    """Without power at first. with Pico(...) as pico: switches it on.
+    """Has no power until power_on(); `with Pico(...) as pico:` switches it on, and off at the end.
 
-    world: as for simulator.Board; level and at rest if None.  files: what its flash holds, see flash_image.
-    fitted: as for simulator.Board.  Times are emulated seconds; they go on over resets and power cycles.
+    world: as for simulator.Board; level and at rest if None.  files: what its flash holds, see flash_image.build().
+    fitted: as for EmulatedBoard.  Times are emulated seconds; they continue through resets and power cycles.
     """
 
     def __init__(
@@ -43,11 +43,11 @@ class Pico:
         self._button = pins[self.board.button_pin]
         self.board.button.changed = self._button_changed
         self.console = QuietConsole(self.chip.rp2040.usb_ctrl, self._received)
-        self.said = bytearray()  # by the board, on its console
-        self.heard: Callable[[bytes], None] | None = None  # called with the same as it comes
+        self.said = bytearray()  # what the board printed
+        self.heard: Callable[[bytes], None] | None = None  # called with each piece of it
         self.powered = False
         self._awaited = b""
-        self._raw = False  # its console is at the raw prompt
+        self._raw = False  # True while its console is in the raw REPL
         self.chip.on_reset = self._reset
         self.put_files(files or {})
 
@@ -66,27 +66,27 @@ class Pico:
         return self.chip.clock.nanos / 1e9
 
     def power_on(self) -> None:
-        """A cold start of everything."""
+        """Start everything from power-on."""
         self._reset()
         self.board.power_on()
         self.chip.power_on()
         self.powered = True
 
     def power_off(self) -> None:
-        """Everything but the flash is lost."""
+        """Cut the supply; only the content of the flash is kept."""
         self.powered = False
         self.chip.power_off()
         self.board.power_off()
         self._reset()
 
     def power_cycle(self, off_s: float = 0.5) -> None:
-        """Off, and on again."""
+        """Switch it off, and on again after off_s."""
         self.power_off()
         self.run(off_s)
         self.power_on()
 
     def run(self, seconds: float, between: Callable[[], None] | None = None) -> None:
-        """Let time pass. When the power goes meanwhile, powered is False after it, and it ends there."""
+        """Let time pass. A PowerCut ends it early; `powered` is then False."""
         if not self.powered:
             self.chip.sleep(seconds)
             return
@@ -96,8 +96,11 @@ class Pico:
             self.power_off()
 
     def stall(self, seconds: float) -> None:
-        """Time passes, and the processor does nothing: as in a long flash operation. That is the program's own doing,
-        so it cannot come in the middle of a transfer, which would time out: once the buses rest for a millisecond."""
+        """Let time pass in which the processor stands still, as in a long flash operation.
+
+        The program itself starts such an operation, never in the middle of an I2C transfer. So this waits until there
+        was no transfer for a millisecond.
+        """
         before = None
         while before != (begun := [dict(bus.transfers) for bus in self.board.buses]) or self._transferring():
             before = begun
@@ -108,7 +111,7 @@ class Pico:
         return any(bus.open for bus in self.board.buses)
 
     def run_until(self, condition: Callable[[], Any], limit_s: float, step_s: float = 0.005) -> Any:
-        """Let time pass until condition() is true, looked at every step_s; what it said. Raises NotReached."""
+        """Let time pass until condition() is true; return its value. It is called every step_s. Raises NotReached."""
         end_s = self.time_s + limit_s
         while not (reached := condition()):
             if self.time_s >= end_s:
@@ -119,17 +122,17 @@ class Pico:
     # What a rider sees and does
 
     def lcd(self) -> list[str]:
-        """The two lines."""
+        """The two lines of the display."""
         return self.board.lcd.text()
 
     def press(self, at_s: float | None = None, for_s: float = 0.15) -> None:
         """Press the button at at_s (now, if None)."""
         self.board.press(at_s, for_s)
 
-    # What else can be soldered on
+    # Parts that can be added
 
     def fit_wheel(self, speed: Callable[[float], float], **kind: Any) -> None:
-        """A contact at a wheel on its pin, as simulator.Board.fit_wheel()."""
+        """Connect a wheel contact, as simulator.Board.fit_wheel() does."""
         self.board.fit_wheel(speed, **kind)
         self.board.watch_pin(self.board.wheel_pin, self._wheel_changed)
 
@@ -137,7 +140,7 @@ class Pico:
 
     @property
     def file_system(self) -> bytes:
-        """The part of the flash that holds the files; can be set."""
+        """The part of the flash that holds the files. It can be assigned."""
         return bytes(self.chip.rp2040.flash[flash_image.START : flash_image.START + flash_image.SIZE])
 
     @file_system.setter
@@ -145,7 +148,7 @@ class Pico:
         self.chip.rp2040.flash[flash_image.START : flash_image.START + flash_image.SIZE] = system
 
     def put_files(self, files: dict[str, bytes]) -> None:
-        """Make these the only files in flash."""
+        """Replace the content of the file system with these files."""
         self.file_system = flash_image.build(files)
 
     def files(self) -> dict[str, bytes]:
@@ -155,12 +158,12 @@ class Pico:
     # The console
 
     def exec(self, code: str, limit_s: float = 10.0) -> str:
-        """Run code on the board, as mpremote does, whatever runs there interrupted first; what it printed.
+        """Interrupt what runs on the board, run code there as mpremote does, and return what it printed.
 
-        Raises GuestError with the board's traceback, NotReached.
+        Raises GuestError with the board's traceback, and NotReached if it takes longer than limit_s.
         """
         if not self._raw:
-            self.run(0.1)  # until the board listens
+            self.run(0.1)  # until the board reads its console
             self.console.send(_CTRL_C + _CTRL_C + _CTRL_A)
             self._expect(_PROMPT, 2.0)
             self._raw = True

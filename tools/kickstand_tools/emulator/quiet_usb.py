@@ -1,6 +1,6 @@
-"""Puts right in rp2040py's USB host: it answers every armed buffer with an empty packet, 34,000 a second.
+"""Corrects rp2040py's USB host, which answers every buffer that is ready with an empty packet: 34,000 a second.
 
-A host sends nothing while it has nothing to send; the empty packets cost the guest two thirds of its time.
+A real host sends nothing while it has no data. Handling the empty packets takes the Pico two thirds of its time.
 """
 
 from collections.abc import Callable
@@ -10,18 +10,18 @@ from rp2040py.usb.cdc import USBCDC
 
 
 class QuietConsole(USBCDC):
-    """The board's USB console. received: called with what the board says."""
+    """The board's USB console. received: called with what the board prints."""
 
     def __init__(self, usb: RPUSBController, received: Callable[[bytes], None]) -> None:
         super().__init__(usb)
         self._others = usb.on_endpoint_read
-        self._armed: list[int] = []  # sizes of the buffers that wait for data
+        self._armed: list[int] = []  # sizes of the buffers that are ready for data
         self._waiting = bytearray()
         usb.on_endpoint_read = self._on_armed
         self.on_serial_data = lambda data: received(bytes(data))
 
     def send(self, data: bytes) -> None:
-        """To the board, as fast as it takes it."""
+        """Send data to the board as fast as it takes them."""
         self._waiting += data
         self._give()
 

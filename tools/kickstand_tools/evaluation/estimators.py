@@ -1,13 +1,14 @@
-"""What is compared: the firmware's own lean, and what hobby projects and the literature use.
+"""The estimators that are compared: the firmware's own lean, and the filters of hobby projects and of the literature.
 
-Each estimator gets Samples and returns the lean in degrees, > 0 to the right, sample by sample. The filters
-of `ahrs` and `vqf` run as their authors set them up: default gains, started from the first reading.
+Each takes Samples and returns the lean in degrees of every sample, > 0 to the right. The filters of the packages
+`ahrs` and `vqf` run with their authors' default gains, started from the first reading.
 """
 
 from collections.abc import Callable
 from importlib.util import find_spec
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from ..calibration.file import CalibrationFile
@@ -15,12 +16,11 @@ from ..logs.reader import Log
 from ..replay import replay_engine
 from .samples import Samples, calibrated
 
-AVERAGE_S = 0.3
-COMPLEMENTARY = 0.98  # kept of the old lean at each sample
-GRAVITY_MPS2 = 9.80665
+AVERAGE_S = 0.3  # of the formula's lean
+COMPLEMENTARY = 0.98  # weight of the integrated lean at each sample; the direction of the force has the rest
 
 _SHOWN, _FORMULA = (replay_engine.COLUMNS.index(name) for name in ("lean_deg", "lean_formula_deg"))
-_TO_XYZ = [2, 0, 1]  # their body frame is forward, left, up
+_TO_XYZ = [2, 0, 1]  # left, up, forward to forward, left, up: the body frame of ahrs and vqf
 _PACKAGES = {"mahony": "ahrs", "madgwick": "ahrs", "vqf": "vqf"}
 
 
@@ -34,7 +34,7 @@ def trailing_mean(x: NDArray, seconds: float, rate_hz: float) -> NDArray[np.floa
 
 
 def complementary(samples: Samples) -> NDArray[np.float64]:
-    """The filter of most hobby projects: roll rate integrated, pulled towards the direction of the force."""
+    """The filter of most hobby projects: the integrated roll rate, pulled towards the direction of the force."""
     leaned = np.degrees(np.arctan2(samples.force[:, 0], samples.force[:, 1]))
     step = samples.rate[:, 2] / samples.rate_hz
     result = np.empty_like(leaned)
@@ -75,15 +75,17 @@ OTHERS: dict[str, Callable[[Samples], NDArray[np.float64]]] = {
 
 
 def missing() -> list[str]:
-    """Packages that are not installed and whose filters are left out."""
+    """The packages that are not installed. estimate() leaves their filters out."""
     return sorted({package for package in _PACKAGES.values() if find_spec(package) is None})
 
 
 def estimate(
     log: Log, calibration: CalibrationFile, done: Callable[[], None] = lambda: None
 ) -> dict[str, NDArray[np.float64]]:
-    """Lean in degrees by every estimator that is there. The speed in the log is not used. done(): called after each
-    of steps()."""
+    """Lean in degrees, > 0 to the right, by the name of each estimator that is installed. The log's speed is not used.
+
+    done(): called after each of steps().
+    """
     engine = replay_engine.Replay(calibration.to_firmware())
     own = np.array([engine.step(*row) for row in zip(log.time_us, log.readings)])
     samples = calibrated(log, calibration)
@@ -100,7 +102,7 @@ def estimate(
 
 
 def steps() -> int:
-    """The firmware's own, and each of the others."""
+    """How often estimate() calls done(): once for the firmware's lean and once for each other filter."""
     return 1 + len(_others())
 
 
@@ -110,12 +112,12 @@ def _others() -> list[str]:
 
 
 def _xyz(samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Rates in rad/s and force in m/s2 along forward, left, up."""
+    """Rates in rad/s and force in m/s^2, both (N, 3) along forward, left, up."""
     gyro = np.ascontiguousarray(np.radians(samples.rate[:, _TO_XYZ]))
-    return gyro, np.ascontiguousarray(samples.force[:, _TO_XYZ] * GRAVITY_MPS2)
+    return gyro, np.ascontiguousarray(samples.force[:, _TO_XYZ] * STANDARD_GRAVITY)
 
 
 def _roll(q: NDArray) -> NDArray[np.float64]:
-    """Lean in degrees of body-to-earth quaternions (w, x, y, z) of a forward, left, up body."""
+    """Lean in degrees from body-to-earth quaternions (N, 4: w, x, y, z); body axes forward, left, up."""
     w, x, y, z = q.T
     return np.degrees(np.arctan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)))

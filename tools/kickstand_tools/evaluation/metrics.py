@@ -1,42 +1,44 @@
-"""How well a shown lean follows the true one."""
+"""Figures that say how well a shown lean follows the true one."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-LEANED_DEG = 10.0  # the slope counts only beyond: most of a ride is nearly upright
-_LAG_RANGE_S = (-0.2, 0.8)
+LEANED_DEG = 10.0  # the slope is fitted where the true lean is larger: most of a ride is nearly upright
+_LAG_RANGE_S = (-0.2, 0.8)  # searched
 _LAG_SMOOTHING_S = 0.05
-_STILL_DPS = 1.0
+_STILL_DPS = 1.0  # rms of the true roll rate below which no lag can be found
+# A straight: yaw rate and lean are smaller and the speed larger than this, for so long
 _STRAIGHT_DPS, _STRAIGHT_DEG, _STRAIGHT_MPS, _STRAIGHT_S = 2.0, 6.0, 5.0, 1.0
 
 
 @dataclass
 class Score:
-    """Degrees; slope: shown over true; lag in ms, > 0 if shown late. NaN where it cannot be told."""
+    """Errors in degrees. slope: shown over true lean. lag: > 0 if shown late. NaN where the ride does not tell."""
 
-    rms: float
-    p95: float
-    worst: float
+    rms_deg: float
+    p95_deg: float  # 95 % of the absolute errors are smaller
+    worst_deg: float
     slope: float
     lag_ms: float
-    straight_bias: float
+    straight_bias_deg: float  # mean error on straights in the last tenth of the ride
 
 
 def rms(error: NDArray) -> float:
+    """Root of the mean square."""
     return float(np.sqrt(np.mean(error * error)))
 
 
 def slope(shown: NDArray, true: NDArray, beyond: float = LEANED_DEG) -> float:
-    """Shown over true where the truth is beyond some degrees: least squares through the origin."""
+    """Shown over true lean where the true one is over `beyond` degrees: least squares through the origin. Or NaN."""
     leaned = np.abs(true) > beyond
     square = float(np.sum(true[leaned] ** 2))
     return float(np.sum(shown[leaned] * true[leaned]) / square) if square > 0.0 else float("nan")
 
 
 def lag_ms(shown: NDArray, true: NDArray, rate_hz: float) -> float:
-    """The delay at which shown and true roll rate correlate best; between samples by a parabola."""
+    """The delay in ms at which shown and true roll rate correlate best, refined by a parabola. NaN if none is found."""
     width = max(round(_LAG_SMOOTHING_S * rate_hz), 1)
     window = np.full(width, 1.0 / width)
     a, b = (np.convolve(np.gradient(x) * rate_hz, window, mode="same") for x in (shown, true))
@@ -55,7 +57,7 @@ def lag_ms(shown: NDArray, true: NDArray, rate_hz: float) -> float:
 
 
 def straights(truth: dict[str, NDArray], rate_hz: float) -> NDArray[np.bool_]:
-    """Where the bike has ridden straight on for a second, at over 5 m/s."""
+    """(N,) True where the bike has ridden straight on for at least a second, at over 5 m/s."""
     now = (
         (np.abs(truth["yaw_rate_dps"]) < _STRAIGHT_DPS)
         & (np.abs(truth["lean_deg"]) < _STRAIGHT_DEG)
@@ -66,8 +68,10 @@ def straights(truth: dict[str, NDArray], rate_hz: float) -> NDArray[np.bool_]:
 
 
 def score(shown: NDArray, truth: dict[str, NDArray], rate_hz: float) -> Score:
-    """From setting off to the end; a ride that never sets off counts whole. The bias is the mean error on
-    straights in the last tenth."""
+    """Score a shown lean (N, degrees) from setting off to the end of the ride, or all of it if it never sets off.
+
+    truth: (N,) each of lean_deg, speed_mps, yaw_rate_dps.
+    """
     off = truth["speed_mps"] > 0.5
     first = int(np.argmax(off)) if off.any() else round(rate_hz)
     true = truth["lean_deg"]

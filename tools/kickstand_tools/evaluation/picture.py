@@ -1,4 +1,4 @@
-"""Lean against time by every estimator: the first ride whole, and of each ride the most leaning minute."""
+"""Draws every estimator's lean against time: the first ride whole, and of each ride the minute with most leaning."""
 
 from importlib.util import find_spec
 from pathlib import Path
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..errors import InputError, extra
 
 ZOOM_S = 60.0
-# Colour and line width; drawn in this order, the noisy ones behind
+# Colour and line width, in the order of drawing: the noisy ones lie behind
 _STYLES = {
     "formula": ("0.8", 0.4),
     "formula 0.3 s": ("tab:olive", 0.7),
@@ -24,13 +24,13 @@ _STYLES = {
 
 
 def check() -> None:
-    """Raise InputError if no picture can be drawn."""
+    """Raise InputError if matplotlib is not installed."""
     if not find_spec("matplotlib"):
         raise InputError("the picture needs matplotlib: " + extra("evaluate"))
 
 
 def draw(path: Path, rides: dict[str, dict[str, NDArray[np.float64]]]) -> None:
-    """Write a PNG. rides: leans by name, with "time", by title of the ride. Needs matplotlib: see check()."""
+    """Write a PNG. rides: the traces of Result or of real_ride.Comparison by title of the ride. Needs matplotlib."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -47,7 +47,7 @@ def draw(path: Path, rides: dict[str, dict[str, NDArray[np.float64]]]) -> None:
 
 
 def zoom_start(time: NDArray, true: NDArray) -> float:
-    """Where ZOOM_S with the largest variance of the lean begin."""
+    """The time in s at which the ZOOM_S with the largest variance of the lean begin."""
     n = max(int(np.searchsorted(time, time[0] + ZOOM_S)), 1)
     if n >= len(time):
         return float(time[0])

@@ -1,43 +1,56 @@
-"""The recorded motorcycle ride has neither a calibration nor a reference: both are made from the ride itself.
+"""Estimators compared on a recorded ride, which has neither a calibration nor a true lean: both come from the ride.
 
-Vertical and gyro bias: the means of the first second, at rest. Forward: the horizontal force regressed on
-dv/dt of the 1 Hz speed, with an intercept, where the bike turns slowly; the speed's lateness is the one that
-fits best. Reference: atan(v * yaw rate / g), the yaw rate about the bike's own up axis, averaged over 1 s. It
-reads low (1 Hz speed, wide tyres, an axis that leans with the bike) and knows no slope or bank: it compares
-methods and shows decay, it claims no degrees.
+Vertical and gyro bias are the means of the first second, at rest. Forward is found by regressing the horizontal force
+on dv/dt of the 1 Hz speed, with an intercept, where the bike turns slowly; the delay of the speed is the one that
+fits best. The reference lean is atan(v * yaw rate / g), averaged over 1 s, with the yaw rate about the bike's own up
+axis. It reads low (1 Hz speed, wide tyres, an axis that leans with the bike) and ignores slope and bank of the road:
+it can compare methods and show a lean that decays in a turn, but its degrees are not to be trusted.
 """
 
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
 from ..logs.reader import Log, read_log
-from .estimators import GRAVITY_MPS2, estimate
+from .estimators import estimate
 from .metrics import rms, slope
 from .samples import calibrated
 
 REST_S = 1.0
 AVERAGE_S = 1.0
-_SLOW_DPS = 5.0
-_LATE_S = np.arange(0.0, 2.01, 0.1)
-_RIDING_MPS = 2.0
-_LEANED_DEG = 5.0  # the reference is beyond 10 degrees too seldom
+_SLOW_DPS = 5.0  # yaw rate below which the bike rides straight on
+_DELAY_S = np.arange(0.0, 2.01, 0.1)  # of the speed, tried
+_RIDING_MPS = 2.0  # scored where the speed is higher
+_LEANED_DEG = 5.0  # the slope is fitted beyond: the reference is rarely over 10 degrees
 
 
 @dataclass
 class RealScore:
-    """Against the rough reference: rms in degrees; slope: shown over it where it is beyond 5 degrees."""
+    """Against the rough reference. slope: shown over reference lean where that is over 5 degrees."""
 
-    rms: float
+    rms_deg: float
     slope: float
 
 
-def compare(path: Path) -> tuple[dict[str, RealScore], dict[str, NDArray[np.float64]]]:
-    """Scores by estimator, and leans by name with "time" and "reference". Raises InputError."""
+@dataclass
+class Comparison:
+    """name: of the recording's file. scores: by estimator.
+
+    traces: (N,) each: "time" in s; "reference" and each estimator's lean in degrees, > 0 to the right.
+    """
+
+    name: str
+    scores: dict[str, RealScore]
+    traces: dict[str, NDArray[np.float64]]
+
+
+def compare(path: Path) -> Comparison:
+    """Run every estimator over a recorded ride with speed. Raises InputError if it cannot be used."""
     log = read_log(path)
     speed, calibration = _speed(log), calibration_of(log)
     reference = reference_lean(log, calibration)
@@ -48,18 +61,18 @@ def compare(path: Path) -> tuple[dict[str, RealScore], dict[str, NDArray[np.floa
         name: RealScore(rms((lean - reference)[riding]), slope(lean[riding], reference[riding], _LEANED_DEG))
         for name, lean in shown.items()
     }
-    return scores, {"time": time, "reference": reference, **shown}
+    return Comparison(path.name, scores, {"time": time, "reference": reference, **shown})
 
 
 def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64]:
     """atan(v * yaw rate / g) in degrees, > 0 to the right, averaged over 1 s."""
     samples = calibrated(log, calibration)
     centripetal = _speed(log) * np.radians(samples.rate[:, 1])
-    return _averaged(-np.degrees(np.arctan(centripetal / GRAVITY_MPS2)), samples.rate_hz)
+    return _averaged(-np.degrees(np.arctan(centripetal / STANDARD_GRAVITY)), samples.rate_hz)
 
 
 def calibration_of(log: Log) -> CalibrationFile:
-    """Matrix and gyro bias from the ride itself. Raises InputError if it has no straight acceleration."""
+    """Mounting matrix and gyro bias from the ride itself. Raises InputError if it never accelerates straight on."""
     time = np.array(log.time_us) * 1e-6
     readings = np.array(log.readings)
     rest = time < REST_S
@@ -72,8 +85,8 @@ def calibration_of(log: Log) -> CalibrationFile:
     yaw = _averaged((readings[:, 4:] - bias) @ up, rate_hz)
     straight = np.abs(yaw) < _SLOW_DPS
     found, most = np.zeros(3), 0.0
-    for late in _LATE_S:
-        change = np.gradient(_averaged(np.interp(time + late, time, _speed(log)), rate_hz), time)
+    for delay_s in _DELAY_S:
+        change = np.gradient(_averaged(np.interp(time + delay_s, time, _speed(log)), rate_hz), time)
         a, b = change[straight] - change[straight].mean(), level[straight] - level[straight].mean(axis=0)
         along = a @ b / np.sqrt(max(float(a @ a), 1e-9))
         if np.linalg.norm(along) > most:
@@ -87,7 +100,7 @@ def calibration_of(log: Log) -> CalibrationFile:
 
 
 def _speed(log: Log) -> NDArray[np.float64]:
-    """m/s at each sample, straight lines between the values there are."""
+    """Speed in m/s at each sample, interpolated between the logged values."""
     time = np.array(log.time_us) * 1e-6
     at = [k for k, value in enumerate(log.speed_mps) if value is not None]
     if len(at) < 2:
@@ -96,7 +109,7 @@ def _speed(log: Log) -> NDArray[np.float64]:
 
 
 def _averaged(x: NDArray, rate_hz: float) -> NDArray[np.float64]:
-    """Mean over 1 s about each sample."""
+    """The mean over 1 s around each sample."""
     n = max(round(AVERAGE_S * rate_hz), 1)
     padded = np.pad(x, (n // 2, n - 1 - n // 2), mode="edge")
     return np.convolve(padded, np.full(n, 1.0 / n), mode="valid")

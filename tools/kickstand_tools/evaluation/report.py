@@ -1,12 +1,17 @@
-"""The figures of an evaluation: pooled over seeds, as a table and for machines."""
+"""The figures of an evaluation, pooled over the seeds: as tables for a terminal, as data for JSON, as files."""
 
+import json
+from collections.abc import Mapping
 from dataclasses import asdict
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from rich import box
 from rich.table import Table
 
+from . import picture
+from .evaluate import Evaluation
 from .metrics import Score
 from .real_ride import RealScore
 from .runs import Result
@@ -21,18 +26,18 @@ _UNKNOWN = "--"
 
 
 def pooled(scores: list[Score]) -> dict[str, float]:
-    """One estimator's scores on one profile, over the seeds, NaN where no seed tells. Degrees, ms."""
-    rms = np.array([s.rms for s in scores])
+    """One estimator's scores on one profile, pooled over the seeds: degrees, lag in ms. NaN where no ride tells."""
+    rms = np.array([s.rms_deg for s in scores])
     slopes, lags, biases = (
         [value for s in scores if not np.isnan(value := getattr(s, name))]
-        for name in ("slope", "lag_ms", "straight_bias")
+        for name in ("slope", "lag_ms", "straight_bias_deg")
     )
     nothing = float("nan")
     return {
         "rms": float(np.sqrt(np.mean(rms * rms))),
         "worst_ride_rms": float(rms.max()),
-        "p95": float(np.mean([s.p95 for s in scores])),
-        "worst": float(max(s.worst for s in scores)),
+        "p95": float(np.mean([s.p95_deg for s in scores])),
+        "worst": float(max(s.worst_deg for s in scores)),
         "slope": float(np.mean(slopes)) if slopes else nothing,
         "slope_low": min(slopes, default=nothing),
         "slope_high": max(slopes, default=nothing),
@@ -52,7 +57,7 @@ def by_profile(results: list[Result]) -> dict[str, dict[str, dict[str, float]]]:
 
 
 def table(results: list[Result]) -> Table:
-    """A block of lines for each profile."""
+    """The simulated rides: a block of lines for each profile."""
     made = _table("Shown lean against the truth of simulated rides", CAPTION)
     made.add_column("profile (rides)", no_wrap=True)
     for head in ("rms", "worst\nride", "95 %", "worst", "slope", "range", "lag ms", "bias"):
@@ -78,7 +83,7 @@ def table(results: list[Result]) -> Table:
 
 
 def real_table(scores: dict[str, RealScore], name: str) -> Table:
-    """The recorded ride."""
+    """The recorded ride. name: of its file."""
     made = _table(
         f"{name}: against atan(v * yaw rate / g) averaged over 1 s",
         "a rough reference that reads low: it compares methods, it claims no degrees",
@@ -88,28 +93,44 @@ def real_table(scores: dict[str, RealScore], name: str) -> Table:
         made.add_column(head, justify="right")
     for method, s in scores.items():
         style = "bold" if method == "kickstand" else ""
-        made.add_row("  " + method, _shown(s.rms, ".2f"), _shown(s.slope, ".3f"), style=style)
+        made.add_row("  " + method, _shown(s.rms_deg, ".2f"), _shown(s.slope, ".3f"), style=style)
     return made
 
 
 def _table(title: str, caption: str) -> Table:
-    """Narrow enough for 80 columns."""
+    """An empty table that fits into 80 columns."""
     return Table(title=title, caption=caption, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), min_width=78)
 
 
-def document(results: list[Result], real: dict[str, RealScore] | None) -> dict[str, Any]:
-    """Everything for a JSON file; what could not be told is null."""
+def document(evaluation: Evaluation) -> dict[str, Any]:
+    """All figures for a JSON file; null where no ride tells."""
     rides = [
         {
             "profile": r.job.profile,
             "seed": r.job.seed,
             "refusal": r.refusal,
-            "scores": {name: asdict(s) for name, s in r.scores.items()},
+            "scores": _scores(r.scores),
         }
-        for r in results
+        for r in evaluation.results
     ]
-    recorded = None if real is None else {name: asdict(s) for name, s in real.items()}
-    return _without_nan({"profiles": by_profile(results), "rides": rides, "recorded": recorded})
+    recorded = None if evaluation.recorded is None else _scores(evaluation.recorded.scores)
+    return _without_nan({"profiles": by_profile(evaluation.results), "rides": rides, "recorded": recorded})
+
+
+def write(evaluation: Evaluation, directory: Path) -> tuple[Path, Path]:
+    """Write evaluation.json and lean.png; return their paths. Needs matplotlib: see picture.check()."""
+    figures, drawing = directory / "evaluation.json", directory / "lean.png"
+    figures.write_text(json.dumps(document(evaluation), indent=2) + "\n", encoding="ascii")
+    rides = {r.job.profile: r.traces for r in evaluation.results if r.traces}
+    if evaluation.recorded:
+        rides[evaluation.recorded.name] = evaluation.recorded.traces
+    picture.draw(drawing, rides)
+    return figures, drawing
+
+
+def _scores(scores: Mapping[str, Score | RealScore]) -> dict[str, dict[str, float]]:
+    """The file's entries in degrees have no unit in their names."""
+    return {name: {key.removesuffix("_deg"): value for key, value in asdict(s).items()} for name, s in scores.items()}
 
 
 def _shown(value: float, form: str) -> str:
@@ -117,7 +138,7 @@ def _shown(value: float, form: str) -> str:
 
 
 def _without_nan(value: Any) -> Any:
-    """NaN is no JSON."""
+    """The same with None for NaN, which JSON does not have."""
     if isinstance(value, dict):
         return {key: _without_nan(entry) for key, entry in value.items()}
     if isinstance(value, list):

@@ -1,4 +1,4 @@
-"""Rides simulated, calibrated by the firmware's own code and scored, on all processors."""
+"""Simulates rides, calibrates them with the firmware's own code and scores every estimator, on all processors."""
 
 import contextlib
 import multiprocessing
@@ -18,17 +18,18 @@ from ..calibration.file import CalibrationFile
 from ..errors import InputError
 from ..logs.reader import Log
 from ..simulation.files import write_poses
+from ..simulation.profiles import check_profile
 from ..simulation.ride import Ride, ride
 from . import estimators
 from .metrics import Score, score
 
-_LOOK_S = 0.2  # at the workers' progress
-_steps_done: SimpleQueue  # of this process, if it is a worker
+_POLL_S = 0.2  # the workers' progress is read this often
+_steps_done: SimpleQueue  # in a worker process: what it tells its progress by
 
 
 @dataclass(frozen=True)
 class Job:
-    """One ride. The signs of both set-up errors change with the seed. traces: keep the leans to draw them."""
+    """One ride to simulate. The signs of the two set-up errors depend on the seed. traces: keep the leans."""
 
     profile: str
     seed: int
@@ -40,7 +41,10 @@ class Job:
 
 @dataclass
 class Result:
-    """scores and traces by estimator; refusal: why the calibration was refused, or None."""
+    """scores: by estimator. refusal: why the firmware refused to calibrate from the poses; None if it did not.
+
+    traces: (N,) each: "time" in s; "true" and each estimator's lean in degrees. Empty unless the job asks for them.
+    """
 
     job: Job
     scores: dict[str, Score] = field(default_factory=dict)
@@ -48,13 +52,31 @@ class Result:
     refusal: str | None = None
 
 
+def jobs(
+    profiles: list[str],
+    seeds: int,
+    seconds: float = 640.0,
+    upright_error_deg: float = 0.0,
+    pitch_change_deg: float = 1.0,
+    traces: bool = False,
+) -> list[Job]:
+    """One Job for each profile and seed. traces: for the first seed. Raises InputError for an unknown profile."""
+    for name in profiles:
+        check_profile(name)
+    return [
+        Job(name, seed, seconds, upright_error_deg, pitch_change_deg, traces and seed == 0)
+        for seed in range(seeds)
+        for name in profiles
+    ]
+
+
 def steps() -> int:
-    """Of a job: the ride, and what is estimated from it."""
+    """How often a job calls done(): once for the ride, then for each estimator."""
     return 1 + estimators.steps()
 
 
 def run(job: Job, done: Callable[[], None] = lambda: None) -> Result:
-    """Simulate, calibrate from the poses alone, estimate, score. done(): called after each of steps()."""
+    """Simulate, calibrate from the poses alone, estimate and score. done(): called after each of steps()."""
     upright_sign, pitch_sign = (1, -1)[job.seed % 2], (1, -1)[job.seed // 2 % 2]
     made = ride(
         job.profile,
@@ -77,7 +99,7 @@ def run(job: Job, done: Callable[[], None] = lambda: None) -> Result:
 
 
 def run_all(jobs: list[Job], done: Callable[[], None] = lambda: None) -> Iterator[Result]:
-    """run() of each, as they get done. done(): called soon after each of a job's steps()."""
+    """Yield the result of run() for each job as it is ready. done(): called soon after each of a job's steps()."""
     steps_done = multiprocessing.SimpleQueue()
     with multiprocessing.Pool(min(len(jobs), os.cpu_count() or 1), _begin_worker, (steps_done,)) as pool:
         results = pool.imap_unordered(_work, jobs)
@@ -85,7 +107,7 @@ def run_all(jobs: list[Job], done: Callable[[], None] = lambda: None) -> Iterato
             result = None
             while result is None:
                 with contextlib.suppress(multiprocessing.TimeoutError):
-                    result = results.next(_LOOK_S)
+                    result = results.next(_POLL_S)
                 while not steps_done.empty():
                     steps_done.get()
                     done()
@@ -115,7 +137,7 @@ def _unheard(line: str) -> None:
 
 
 def _begin_worker(steps_done: SimpleQueue) -> None:
-    """Silent: the workers' progress bars would overwrite each other."""
+    """Without standard error: after Ctrl-C every worker would print a traceback."""
     global _steps_done
     _steps_done = steps_done
     sys.stderr = open(os.devnull, "w", encoding="utf-8")

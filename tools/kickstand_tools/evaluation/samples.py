@@ -1,4 +1,4 @@
-"""A recording as the estimators get it: calibrated and in the vehicle's axes."""
+"""A recording as the estimators take it: calibrated, and along the vehicle's axes."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from ..logs.reader import Log
 
 @dataclass
 class Samples:
-    """time (N, s), force (N, 3, g), rate (N, 3, deg/s); along and about left, up, forward; evenly spaced."""
+    """time (N,) in s, evenly spaced; force (N, 3) in g and rate (N, 3) in deg/s along left, up, forward."""
 
     time: NDArray[np.float64]
     force: NDArray[np.float64]
@@ -23,7 +23,7 @@ class Samples:
 
 
 def calibrated(log: Log, calibration: CalibrationFile) -> Samples:
-    """Nicolae's (18)-(20) and the matrix, in numpy: all estimators share the firmware's calibration."""
+    """Apply a calibration with numpy: Nicolae's (18)-(20), then the mounting matrix. All estimators use the same."""
     readings = np.array(log.readings)
     matrix = np.reshape(calibration.matrix, (3, 3))
     force = readings[:, :3] * calibration.slope + calibration.offset

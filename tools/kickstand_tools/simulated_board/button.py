@@ -1,11 +1,11 @@
-"""Model of a push button to ground that bounces."""
+"""Model of a push button to ground whose contacts bounce."""
 
 BOUNCE_US = 4000
-_BOUNCES = 3  # short breaks (or closures) on each edge
+_BOUNCES = 3  # short openings (or closings) after each edge
 
 
 class Button:
-    """closed: True while its contacts touch. clock: has now_us and at()."""
+    """closed: True while its contacts touch. seed: of the random moments at which they bounce."""
 
     def __init__(self, clock, seed=1):
         self.closed = False
@@ -13,12 +13,12 @@ class Button:
         self._random = seed & 0x7FFFFFFF or 1
 
     def press(self, at_us, for_us):
-        """Pressed from at_us for for_us, bouncing after both edges."""
+        """Press it from at_us for for_us."""
         self.turn(True, at_us)
         self.turn(False, at_us + for_us)
 
     def turn(self, closed, at_us):
-        """Pressed (True) or let go of (False) at at_us, with bounces within BOUNCE_US."""
+        """Press (True) or release it (False) at at_us; it bounces for BOUNCE_US."""
         self._set_at(at_us, closed)
         step = BOUNCE_US // (2 * _BOUNCES)
         for i in range(1, 2 * _BOUNCES + 1):

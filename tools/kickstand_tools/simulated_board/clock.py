@@ -1,13 +1,13 @@
-"""The board's time: integer microseconds that pass only when something on the board takes time."""
+"""The board's time in integer microseconds. It passes only when something on the board takes time."""
 
 import time as _host_time
 from heapq import heappop, heappush
 
-# Bound now: under MicroPython the board later puts its own `time` in place of this one
+# Kept here because Board.install() later replaces `time` under MicroPython
 _host_ns, _host_sleep = _host_time.time_ns, _host_time.sleep
 
-_NEVER = 1 << 60
-_PACE_STEP_US = 5000  # how often a paced clock looks at the host's
+NEVER_US = 1 << 60  # later than any run lasts
+_PACE_STEP_US = 5000  # how often a paced clock compares itself with the host's
 
 
 def _host_us():
@@ -15,7 +15,7 @@ def _host_us():
 
 
 class PowerOff(BaseException):
-    """The supply is gone: ends whatever runs on the board. Not an Exception, which firmware might catch."""
+    """The supply is gone: ends whatever runs on the board. A BaseException, because firmware may catch Exception."""
 
 
 class Reset(BaseException):
@@ -28,24 +28,25 @@ def to_us(seconds):
 
 
 class Clock:
-    """now_us: the time, from 0. Models read it and schedule with at(); whatever takes time calls advance().
+    """now_us: the time since the clock was made. Models read it and schedule calls with at(); what takes time calls
+    advance().
 
-    pace: 1.0 runs in real time, 2.0 twice as fast, 0 as fast as the host can.
+    pace: simulated seconds per second of the host: 1.0 for real time, 0 for as fast as the host can.
     """
 
     def __init__(self, pace=0.0):
         self.now_us = 0
         self._events = []  # heap of (due, number, callable): the number keeps equal times in order
         self._number = 0
-        self._deadline_us = _NEVER
-        self._next_us = _NEVER  # when advance() next has something to do
+        self._deadline_us = NEVER_US
+        self._next_us = NEVER_US  # the next deadline, event or comparison with the host's clock
         self._pace = 0
-        self._pace_us = _NEVER
+        self._pace_us = NEVER_US
         self._host_lead_us = 0
         self.set_pace(pace)
 
     def advance(self, us):
-        """Let time pass, running what falls due. Raises PowerOff at the deadline, and what events raise."""
+        """Let time pass and run the events that are due. Raises PowerOff at the deadline, and what events raise."""
         target = self.now_us + us
         if target < self._next_us:
             self.now_us = target
@@ -53,7 +54,7 @@ class Clock:
             self._pass_to(target)
 
     def at(self, due_us, function):
-        """Call function() when the time is due_us; if that has passed, when time next passes."""
+        """Call function() at due_us; if that time is over, as soon as time passes again."""
         self._number += 1
         heappush(self._events, (due_us, self._number, function))
         self._plan()
@@ -68,14 +69,14 @@ class Clock:
         self.at(self.now_us + period_us, again)
 
     def set_deadline(self, due_us):
-        """When PowerOff is raised, and raised again however long the code goes on; None: never."""
-        self._deadline_us = _NEVER if due_us is None else due_us
+        """From due_us on advance() raises PowerOff, each time it is called. None: never."""
+        self._deadline_us = NEVER_US if due_us is None else due_us
         self._plan()
 
     def set_pace(self, pace):
-        """See the class."""
+        """Set the pace from now on, see the class."""
         self._pace = pace
-        self._pace_us = self.now_us if pace else _NEVER
+        self._pace_us = self.now_us if pace else NEVER_US
         self._host_lead_us = _host_us() - self._host_due_us() if pace else 0
         self._plan()
 
@@ -97,7 +98,7 @@ class Clock:
                 raise PowerOff
             else:
                 self._keep_pace()
-        if target > self.now_us:  # an event may have let time pass itself
+        if target > self.now_us:  # an event may have called advance() itself
             self.now_us = target
 
     def _host_due_us(self):
@@ -106,8 +107,8 @@ class Clock:
     def _keep_pace(self):
         late = _host_us() - self._host_lead_us - self._host_due_us()
         if late < 0:
-            _host_sleep(min(-late, 4 * _PACE_STEP_US) / 1e6)  # never long, should the host's clock be set
-        else:  # a slow host loses time once; it does not run fast afterwards to catch up
+            _host_sleep(min(-late, 4 * _PACE_STEP_US) / 1e6)  # a short sleep, in case the host's clock is set meanwhile
+        else:  # a host that was too slow does not run faster afterwards to catch up
             self._host_lead_us += late
         self._pace_us = self.now_us + _PACE_STEP_US
         self._plan()

@@ -1,21 +1,25 @@
-"""The fault script: what goes wrong on the board, and when. Seconds on the board's clock, 7-bit addresses."""
+"""The fault script: what goes wrong on the simulated board, and when.
+
+Times are in seconds of the board's clock, I2C addresses have 7 bits.
+"""
 
 import builtins
 import errno
 import io
 
-from .clock import to_us
+from .clock import NEVER_US, to_us
 
-_NEVER = 1 << 60
+_FOREVER = 1 << 60  # a number of transfers
 
 
 class TransferFault:
-    """What befalls transfers to one address: transfers first..last, begun in from_us..until_us.
+    """A fault in the transfers number first to last to one address, if they begin between from_us and until_us.
 
-    kind: "nack"; "timeout"; "corrupt": the bits of mask in data byte number byte; "slip": from that byte on.
+    kind: "nack"; "timeout"; "corrupt" inverts the bits of mask in the data byte with the number byte; "slip" delays
+    what is read by one bit from that byte on. read: the fault is in what is read, else in what is written.
     """
 
-    def __init__(self, kind, address, first, last, from_us=0, until_us=_NEVER, byte=0, mask=0, read=True):
+    def __init__(self, kind, address, first, last, from_us=0, until_us=NEVER_US, byte=0, mask=0, read=True):
         self.kind = kind
         self.mask = mask
         self._address = address
@@ -33,16 +37,16 @@ class TransferFault:
         return address == self._address and first <= number <= last and start <= now_us < end
 
     def begin(self, read):
-        """At each START: True, or False (NACK), or None (wires held)."""
+        """Called at each START: True (the device may answer), False (NACK) or None (the wires are held)."""
         self._count = 0
         return {"nack": False, "timeout": None}.get(self.kind, True)
 
     def on_write(self, value):
-        """What arrives of a byte the controller sends. The first is number 0, be it a register address."""
+        """What arrives of a byte that the controller sends. Byte 0 is the first, usually the register address."""
         return value if self._read else self._spoil(value)
 
     def on_read(self, value):
-        """What arrives of a byte a device sends."""
+        """What arrives of a byte that a device sends."""
         return self._spoil(value) if self._read else value
 
     def _spoil(self, value):
@@ -52,14 +56,14 @@ class TransferFault:
             return value ^ self.mask if number == self._byte else value
         if number < self._byte:
             return value
-        # The device missed a clock: the bit on the wire is read twice, and all that follow come one late
+        # The device missed a clock: one bit is read twice, and all later bits come one clock late
         late = (value & 0x80 if number == self._byte else self._carry << 7) | value >> 1
         self._carry = value & 1
         return late
 
 
 class Faults:
-    """The faults of one board. Each method puts one on the script; several may be under way at once."""
+    """The faults of one board. Each method adds one to the script; several may act at the same time."""
 
     def __init__(self, board):
         self._board = board
@@ -84,67 +88,67 @@ class Faults:
         self._during("timeout", address, at_s, for_s)
 
     def corrupt(self, address, nth=1, byte=0, mask=0x01, read=True):
-        """In the nth transfer from now the bits of mask in one byte read (read=False: written) turn over."""
+        """In the nth transfer from now the bits of mask are inverted in one byte read (read=False: written)."""
         self._transfers("corrupt", address, nth, 1, byte, mask, read)
 
     def bit_slip(self, address, nth=1, byte=0):
-        """In the nth transfer from now a clock is lost: what is read from that byte on comes one bit late."""
+        """The device misses a clock in the nth transfer from now: what is read from that byte on comes one bit late."""
         self._transfers("slip", address, nth, 1, byte)
 
     def stuck_sda(self, at_s, bits=8, lcd=False):
-        """A device on the sensor's (or the LCD's) bus holds SDA low until SCL was clocked `bits` times."""
+        """A device on the sensor's bus (lcd: on the display's) holds SDA low until SCL was clocked `bits` times."""
         bus = self._board.lcd_bus if lcd else self._board.sensor_bus
         self._board.at(at_s, lambda: bus.hang(bits))
 
     # In the devices
 
     def supply_dip(self, at_s, leaves="asleep"):
-        """The sensor loses its configuration.
+        """The sensor's supply drops for a moment, and its configuration is lost.
 
-        leaves: "asleep" (all zeros), "frozen" (asleep, last data) or "default_ranges" (awake, other scales).
+        leaves: "asleep" (data 0), "frozen" (asleep, the last data) or "default_ranges" (awake, other scales).
         """
         self._board.at(at_s, lambda: self._board.sensor.supply_dip(leaves))
 
     def freeze(self, at_s, for_s):
-        """The sensor answers, configuration and all, but its data no longer change."""
+        """The sensor answers and keeps its configuration, but its data no longer change."""
         self._override(at_s, for_s, "freeze")
 
     def all_zero(self, at_s, for_s):
-        """The data registers read 0."""
+        """Every data register reads 0."""
         self._override(at_s, for_s, 0x00)
 
     def all_ones(self, at_s, for_s):
-        """The data registers read 0xFFFF."""
+        """Every data register reads 0xFF."""
         self._override(at_s, for_s, 0xFF)
 
     def unplug_sensor(self, at_s, for_s=None):
-        """The sensor is gone, for good or for for_s; it comes back as from power-on."""
+        """The sensor is disconnected, for good or for for_s; then it starts as after power-on."""
         self._board.at(at_s, self._board.remove_sensor)
         if for_s is not None:
             self._board.at(at_s + for_s, self._board.fit_sensor)
 
     def unplug_lcd(self, at_s, for_s=None):
-        """The display is gone, for good or for for_s; it comes back as from power-on."""
+        """The display is disconnected, for good or for for_s; then it starts as after power-on."""
         self._board.at(at_s, self._board.remove_lcd)
         if for_s is not None:
             self._board.at(at_s + for_s, self._board.fit_lcd)
 
     def lcd_slip(self, at_s):
-        """A spike on E puts the display's nibbles out of step."""
+        """A spike on E shifts the display's pairing of nibbles by one."""
         self._board.at(at_s, self._board.lcd.slip)
 
     # In the file system
 
     def file_error(self, ending, at_s, for_s):
-        """Files whose name ends so cannot be opened for reading."""
+        """Files whose name has this ending cannot be opened for reading."""
         self._files(ending, at_s, for_s, False)
 
     def file_empty(self, ending, at_s, for_s):
-        """Files whose name ends so read as empty, as in a voltage sag."""
+        """Files whose name has this ending read as empty, as after a loss of supply."""
         self._files(ending, at_s, for_s, True)
 
     def restore_files(self):
-        """End what the two above began."""
+        """End the faults of the file system."""
         if self._real_open is not None:
             builtins.open = self._real_open
             self._real_open = None
@@ -158,7 +162,7 @@ class Faults:
 
     def _during(self, kind, address, at_s, for_s):
         for bus in self._board.buses:
-            bus.faults.append(TransferFault(kind, address, 0, _NEVER, to_us(at_s), to_us(at_s + for_s)))
+            bus.faults.append(TransferFault(kind, address, 0, _FOREVER, to_us(at_s), to_us(at_s + for_s)))
 
     def _override(self, at_s, for_s, value):
         self._board.at(at_s, lambda: self._board.sensor.override(value))

@@ -1,8 +1,8 @@
-"""The sensor's FIFO: a ring of bytes that knows nothing of frames."""
+"""The sensor's FIFO: a ring of bytes. Where a frame begins it does not know, as the chip's does not."""
 
 
 class Fifo:
-    """size in bytes. count: bytes waiting."""
+    """size: how many bytes it holds. count: how many wait to be read."""
 
     def __init__(self, size):
         self.size = size
@@ -12,11 +12,11 @@ class Fifo:
         self._last = 0
 
     def clear(self):
-        """Forget everything."""
+        """Make it empty."""
         self.count = 0
 
     def push(self, byte, keep_old=False):
-        """Add a byte. True if it was one too many: then the oldest is lost, or with keep_old this one."""
+        """Add a byte. True if the FIFO was full: then the oldest byte is lost, or with keep_old the new one."""
         full = self.count == self.size
         if full:
             if keep_old:
@@ -28,7 +28,7 @@ class Fifo:
         return full
 
     def pop(self):
-        """The oldest byte. When there is none, the byte that was read last (register map 4.31)."""
+        """Remove and return the oldest byte. An empty FIFO repeats the byte read last (register map 4.31)."""
         if self.count:
             self._last = self._ring[self._head]
             self._head = (self._head + 1) % self.size

@@ -1,6 +1,6 @@
-"""What a character code looks like, as text: ROM A00 of the HD44780 and patterns in its character memory."""
+"""The HD44780's characters as Unicode text: those of ROM A00, and patterns written to its character memory."""
 
-# Beyond ASCII: the codes of ROM A00 that have a plain counterpart (HD44780U data sheet, table 4)
+# Codes of ROM A00 that differ from ASCII and have a counterpart in Unicode (HD44780U data sheet, table 4)
 _ROM_A00 = {
     0x5C: "\u00a5",  # yen
     0x7E: "\u2192",  # right arrow
@@ -18,14 +18,14 @@ _ROM_A00 = {
     0xFF: "\u2588",  # full block
 }
 
-# Unicode's blocks come in eighths, a character has five columns: the nearest
+# By number of filled columns or rows: the nearest block. Unicode's are eighths wide, a character has five columns
 _FROM_LEFT = " \u258e\u258d\u258b\u258a\u2588"
-_FROM_RIGHT = " \u2595\u2590\u2590\u2590\u2588"  # there is only an eighth and a half
+_FROM_RIGHT = " \u2595\u2590\u2590\u2590\u2588"  # from the right Unicode has only one eighth and one half
 _FROM_BELOW = " \u2581\u2582\u2583\u2584\u2585\u2586\u2587\u2588"
 
 
 def rom(code):
-    """The ROM character of a code >= 0x10; '?' where text has none like it."""
+    """The ROM's character for a code >= 0x10; '?' where Unicode has none like it."""
     if code in _ROM_A00:
         return _ROM_A00[code]
     if 0x20 <= code < 0x7E:
@@ -34,7 +34,7 @@ def rom(code):
 
 
 def drawn(rows):
-    """The character nearest to a 5x8 pattern. rows: eight values, bits 4 (left) to 0 (right)."""
+    """The character that looks most like a 5x8 pattern, or '?'. rows: eight values, bits 4 (left) to 0 (right)."""
     rows = [row & 0x1F for row in rows]
     inked = [row for row in rows if row]
     if not inked:
@@ -44,7 +44,7 @@ def drawn(rows):
     row = inked[0]
     if len(inked) < 5 or any(r != row for r in inked):
         return "?"
-    # A bar from side to side, perhaps with a gap above or below
+    # Vertical bars, perhaps with an empty row above or below
     for columns in range(1, 6):
         if row == 0x1F & ~(0x1F >> columns):
             return _FROM_LEFT[columns]

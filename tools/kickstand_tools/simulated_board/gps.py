@@ -1,12 +1,12 @@
-"""Model of a GPS receiver: NMEA sentences on a wire, some time after the fix they tell of."""
+"""Model of a GPS receiver: NMEA sentences on a serial line, some time after the fix that they describe."""
 
 _KNOTS = 3600.0 / 1852.0
-_PIECE = 8  # bytes that reach the microcontroller at once
-_START_S = 12 * 3600 - 20  # time of day when the clock is 0
+_PIECE = 8  # bytes that are handed over at once
+_START_S = 12 * 3600 - 20  # UTC time of day when the clock is 0
 
 
 def sentence(body):
-    """The line of a body: $, checksum and end added."""
+    """A whole NMEA line: $, body, checksum, line end."""
     total = 0
     for byte in body.encode():
         total ^= byte
@@ -16,8 +16,9 @@ def sentence(body):
 class Gps:
     """speed(t_s): of the vehicle, m/s.  hz: fixes a second.  latency_s: from a fix to its first byte.
 
-    kinds: of the sentences that tell the speed.  talker: their first letters.  faults: [[kind, from_s, until_s], ...];
-    "unplugged"; "garbled": a wrong bit now and then; "void": no fix; "stuck": the last sentence again and again.
+    kinds: which sentences with a speed it sends.  talker: their first letters, the satellite system.
+    faults: [[kind, from_s, until_s], ...] where kind is "unplugged", "garbled" (a wrong bit now and then), "void" (no
+    fix) or "stuck" (the last sentence again and again).
     """
 
     def __init__(self, clock, speed, hz=1, latency_s=0.2, baud=9600, talker="GP", kinds=("RMC", "VTG"), faults=()):
@@ -34,11 +35,11 @@ class Gps:
         clock.every(1_000_000 // hz, self._fix)
 
     def connect(self, receive):
-        """From now on its wire ends at receive(bytes)."""
+        """From now on receive(bytes) is called with what is sent."""
         self._receive = receive
 
     def disconnect(self):
-        """Nobody listens."""
+        """Nobody receives any more."""
         self._receive = None
 
     def _has(self, kind):

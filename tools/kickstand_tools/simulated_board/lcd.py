@@ -1,7 +1,7 @@
 """Model of a 16x2 HD44780 character display on a PCF8574 backpack (HD44780U data sheet ADE-207-272).
 
-Wiring of the usual backpack: P0 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7; D0..D3 are open: read as ones.
-What is sent while the controller is busy is lost, as on the chip; lost counts it.
+Wiring of the usual backpack: P0 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7. D0..D3 are not connected: the
+controller reads them as ones. What is sent while it is busy is lost, as on the chip.
 """
 
 from .glyphs import drawn, rom
@@ -9,26 +9,22 @@ from .glyphs import drawn, rom
 _RS, _RW, _E, _LIGHT = 0x01, 0x02, 0x04, 0x08
 
 POWER_UP_US = 40_000  # at 3.3 V; 15 ms at 5 V
-WAKE_US = (4100, 100)  # after the first and the second "function set, 8 bit" from power-up (figures 23, 24)
-CLEAR_US = 1520  # also home
+WAKE_US = (4100, 100)  # busy after the first and after the second "function set, 8 bit" since power-up (figures 23, 24)
+CLEAR_US = 1520  # "clear display" and "return home"
 COMMAND_US = 37
 DATA_US = 41  # 37 us, and 4 us for the address counter
 
 COLUMNS = 16
-_LINE = 40  # characters a line holds in display memory; 16 of them are seen
-_TWO_LINE_WRAPS = (
-    (0x28, 0x40),
-    (0x68, 0x00),
-    (0x3F, 0x27),
-    (-1, 0x67),
-)  # address past an end, where it goes on
+_LINE = 40  # characters of a line in display memory, of which 16 are visible
+# (address past the end of a line, address where the counter continues)
+_TWO_LINE_WRAPS = ((0x28, 0x40), (0x68, 0x00), (0x3F, 0x27), (-1, 0x67))
 _ONE_LINE_WRAPS = ((0x50, 0x00), (-1, 0x4F))
 
 
 class Lcd:
-    """One display. clock: has now_us. address: 0x20..0x27 (PCF8574) or 0x38..0x3F (PCF8574A).
+    """One display. address: 0x20..0x27 (PCF8574) or 0x38..0x3F (PCF8574A).
 
-    changes counts whatever may be seen to change; lost counts nibbles (bytes in 8-bit mode) sent while busy.
+    changes: counts visible changes. lost: counts nibbles (bytes in 8-bit mode) that were sent while it was busy.
     """
 
     max_hz = 100_000  # the PCF8574 is a standard-mode part
@@ -43,14 +39,14 @@ class Lcd:
         """As the internal reset leaves it: 8-bit mode, one line, off. Busy for POWER_UP_US."""
         self.ddram = bytearray(b" " * 128)  # by address: lines at 0x00..0x27 and 0x40..0x67
         self.cgram = bytearray(64)
-        self.glyphs = [" "] * 8  # cgram as text
+        self.glyphs = [" "] * 8  # the patterns in cgram as text
         self.lost = 0
         self.on = self.cursor = self.blink = False
         self.two_lines = False
         self._port = 0xFF  # the outputs of a PCF8574 come up high
         self._eight_bit = True
-        self._high = -1  # the first nibble of a byte, while the second is missing
-        self._low_next = False  # the same for reads
+        self._high = -1  # the first nibble of a byte until the second arrives, else -1
+        self._low_next = False  # when reading: the low nibble comes next
         self._in_cgram = False
         self._ac = 0  # address counter
         self._step = 1
@@ -61,13 +57,13 @@ class Lcd:
         self.changes += 1
 
     def power_off(self):
-        """Nothing is seen any more."""
+        """The supply is gone: nothing is visible."""
         self.on = False
         self._port = 0
         self.changes += 1
 
     def slip(self):
-        """Put the nibbles out of step, as a spike on E does."""
+        """Shift the pairing of nibbles by one, as a spike on E does."""
         if not self._eight_bit:
             self._high = 0 if self._high < 0 else -1
 
@@ -77,12 +73,12 @@ class Lcd:
         return bool(self._port & _LIGHT)
 
     def codes(self):
-        """Two lists of the 16 character codes in view."""
+        """Two lists of the 16 visible character codes."""
         places = [(self._shift + i) % _LINE for i in range(COLUMNS)]
         return [[self.ddram[start + place] for place in places] for start in (0x00, 0x40)]
 
     def text(self):
-        """Two strings of 16 characters, as seen: blank while the display is off."""
+        """Two strings of 16 characters, as they are visible: blank while the display is off."""
         lines = ["".join([self._character(code) for code in line]) for line in self.codes()]
         if not self.on:
             lines = [" " * COLUMNS, " " * COLUMNS]
@@ -100,7 +96,7 @@ class Lcd:
         return True
 
     def write_byte(self, value):
-        """New levels of the eight pins; when E falls, what stood there before is taken. True: ACK."""
+        """Set the levels of the eight pins. When E falls, the levels before it are taken. True: ACK."""
         before = self._port
         self._port = value
         if (before ^ value) & _LIGHT:
@@ -110,7 +106,7 @@ class Lcd:
         return True
 
     def read_byte(self):
-        """The eight pins; while R/W and E are high, busy flag and address counter on D7..D4 in two halves."""
+        """The eight pins. While R/W and E are high D7..D4 give busy flag and address counter, high nibble first."""
         port = self._port
         if not (port & _RW and port & _E) or port & _RS:
             return port
@@ -166,7 +162,7 @@ class Lcd:
             self._shift_by(self._step)
 
     def _move(self, step):
-        """The address counter within display memory: from the end of a line to the start of the other."""
+        """Move the address counter in display memory: after the end of a line comes the start of the other."""
         ac = self._ac + step
         wraps = _TWO_LINE_WRAPS if self.two_lines else _ONE_LINE_WRAPS
         for beyond, wrapped in wraps:
@@ -179,7 +175,7 @@ class Lcd:
         self.changes += 1
 
     def _command(self, value):
-        """Do a command; how long it takes in us."""
+        """Execute a command; return how long it takes in us."""
         if value & 0x80:
             self._ac = value & 0x7F
             self._in_cgram = False

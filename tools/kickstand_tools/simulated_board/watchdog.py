@@ -1,16 +1,16 @@
-"""Model of the watchdog: Reset when it is not fed in time."""
+"""Model of the watchdog: raises Reset if it is not fed in time."""
 
 from .clock import Reset
 
 
 class Watchdog:
-    """clock: has now_us and at()."""
+    """clock: a Clock. Reset is raised from within the call that lets the time pass."""
 
     def __init__(self, clock):
         self._clock = clock
         self._timeout_us = 0
         self._due_us = 0
-        self._round = 0  # tells the check of this start from those of earlier ones
+        self._round = 0  # counts start() and stop(): checks that an earlier start() has scheduled do nothing
 
     def start(self, timeout_us):
         """From now on feed() must be called within timeout_us."""
@@ -20,11 +20,11 @@ class Watchdog:
         self._check_later(self._round)
 
     def stop(self):
-        """Nobody watches any more."""
+        """Feeding is no longer needed."""
         self._round += 1
 
     def feed(self):
-        """All is well."""
+        """Start the time-out again."""
         self._due_us = self._clock.now_us + self._timeout_us
 
     def _check_later(self, number):

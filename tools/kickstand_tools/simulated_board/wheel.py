@@ -1,15 +1,14 @@
-"""Model of a reed contact at a wheel: closes once in so many metres, and bounces."""
+"""Model of a reed contact at a wheel: it closes at each magnet that passes, and bounces."""
 
-_CLOSED_SHARE = 0.1  # of a turn, as long as the magnet is near
-_LOOK_US = 20_000  # how often a wheel that stands is looked at
-_CREEP_MPS = 0.02
+_CLOSED_SHARE = 0.1  # of the way between two pulses: the magnet is near
+_LOOK_US = 20_000  # the model reads the speed at least this often
+_CREEP_MPS = 0.02  # slower counts as standing
 
 
 class Wheel:
-    """speed(t_s): of the vehicle, m/s.  bounce_us: how long a contact bounces on each edge, 0 for never.
+    """speed(t_s): of the vehicle, m/s.  bounce_us: how long the contact bounces at each edge, 0 for not at all.
 
-    closed: True while it connects the pin to ground.
-    until_s: then its wire breaks.
+    closed: True while it connects the pin to ground.  until_s: when its wire breaks.
     """
 
     def __init__(self, clock, speed, pulses_per_metre=0.5, bounce_us=0, until_s=1e9):
@@ -20,23 +19,23 @@ class Wheel:
         self._pulses_per_metre = pulses_per_metre
         self._bounce_us = bounce_us
         self._until_us = int(until_s * 1e6)
-        self._turned = 0.5  # of the way to the next pulse
+        self._turned = 0.5  # share of the way to the next pulse
         self._look_us = clock.now_us
         clock.at(clock.now_us, self._look)
 
     def connect(self, edge):
-        """From now on edge(level of the pin) hears of each change."""
+        """From now on edge(level of the pin) is called at each change."""
         self._edge = edge
 
     def disconnect(self):
-        """Nobody listens."""
+        """edge() is no longer called."""
         self._edge = None
 
     def _look(self):
-        """Follow the speed; close the contact where a pulse falls before the next look."""
+        """Add the way since the last call; at a pulse schedule closing and opening; schedule the next call."""
         now_us = self._clock.now_us
         speed = self._speed(now_us / 1e6)
-        rate = speed * self._pulses_per_metre / 1e6 if speed > _CREEP_MPS else 0.0  # pulses a us
+        rate = speed * self._pulses_per_metre / 1e6 if speed > _CREEP_MPS else 0.0  # pulses per us
         self._turned += rate * (now_us - self._look_us)
         self._look_us = now_us
         if self._turned >= 0.999:

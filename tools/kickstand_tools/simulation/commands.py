@@ -1,4 +1,4 @@
-"""What a rider does, leg by leg, as signals."""
+"""Turns what a rider does, leg by leg, into signals."""
 
 from dataclasses import dataclass
 
@@ -6,17 +6,17 @@ import numpy as np
 
 from .physics.signals import Signal, integral, smoothed, smoothstep
 
-_SPEED_SMOOTHING_S = 0.15  # a hand on throttle or brake
+_SPEED_SMOOTHING_S = 0.15  # how quickly a hand changes throttle or brake
 
 
 @dataclass
 class Leg:
-    """A stretch of a ride. None: stays as it was.
+    """A part of a ride. None: the value of the leg before.
 
-    speed_mps: reached evenly by the end. lean_deg (of the balance, > 0 right): reached within roll_s of the
-    start, then held. slope_percent: of the road at the end of the leg. hang_m: the centre of mass to the
-    right of the bike's plane. lift_deg: the front wheel in the air. engine: 0 off, 1 running. crosswind_mps2:
-    the wind's push to the right. bank_deg: road tilted to the right.
+    speed_mps: reached at the end, at constant acceleration. lean_deg: lean of the centre of mass, > 0 to the right,
+    reached within roll_s of the start, then held. slope_percent: of the road at the end of the leg. hang_m: how far
+    the centre of mass is to the right of the bike's plane. lift_deg: pitch of a wheelie. engine: 0 off, 1 running.
+    crosswind_mps2: push of the wind to the right. bank_deg: tilt of the road to the right.
     """
 
     phase: str
@@ -34,7 +34,7 @@ class Leg:
 
 @dataclass
 class Commands:
-    """Signals of n samples each: rad, m/s, m; phases by number into `phases`."""
+    """Signals of n samples each, in s, m, m/s, rad. phase: index into `phases` of each sample."""
 
     rate_hz: float
     time: Signal
@@ -52,7 +52,7 @@ class Commands:
 
 
 def commands(legs: list[Leg], rate_hz: float) -> Commands:
-    """The legs one after the other from t = 0; the ride starts settled in the first."""
+    """The legs one after the other from t = 0. At the start the values of the first leg are already reached."""
     ends = np.cumsum([leg.seconds for leg in legs])
     starts = ends - [leg.seconds for leg in legs]
     time = np.arange(int(ends[-1] * rate_hz)) / rate_hz
@@ -87,7 +87,7 @@ def commands(legs: list[Leg], rate_hz: float) -> Commands:
 
 
 def _kept(values: list[float | None]) -> list[float]:
-    """Each None replaced by the value before; 0 at first."""
+    """Each None replaced by the value before it, or by 0 at the start."""
     kept, now = [], 0.0
     for value in values:
         now = now if value is None else value
@@ -96,7 +96,7 @@ def _kept(values: list[float | None]) -> list[float]:
 
 
 def _stepped(time: Signal, starts: Signal, values: list[float], settle_s: list[float]) -> Signal:
-    """Each value reached within settle_s of its start, then held."""
+    """Each value is reached within settle_s of its start, then held."""
     result = np.full_like(time, values[0])
     for start, before, after, settle in zip(starts[1:], values, values[1:], settle_s[1:]):
         if after != before:
@@ -108,7 +108,7 @@ def _stepped(time: Signal, starts: Signal, values: list[float], settle_s: list[f
 
 
 def _slope(distance: Signal, ends: Signal, percent: list[float]) -> Signal:
-    """Slope in rad, from each leg's smoothly to the next's: by distance, so it never changes at a stop."""
+    """Slope in rad, smooth from each leg's to the next one's. A function of distance: constant at a stop."""
     knots, values = [0.0], [percent[0]]
     for end, value in zip(ends, percent):
         if end > knots[-1] + 1.0:

@@ -1,4 +1,4 @@
-"""A simulated ride written as logs."""
+"""Simulates a ride and writes it as logs."""
 
 from pathlib import Path
 
@@ -8,12 +8,12 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..logs.reader import COLUMNS
 from ..output import check_directory
-from .profiles import PROFILES
+from .profiles import check_profile
 from .ride import Ride, ride
 
 _LOG = ",".join((*COLUMNS, "temp_c"))
 _FORMATS = ["%.3f", *["%.6f"] * 6, "%.2f"]
-_SPEED_EVERY = 200  # samples: once a second, as GPS
+_SPEED_EVERY = 200  # samples: once a second, as a GPS receiver does
 
 
 def simulate(
@@ -28,18 +28,16 @@ def simulate(
 ) -> Ride:
     """Simulate a ride (see ride.ride) and write it to out_dir. Raises InputError.
 
-    Logs: POSE_1.csv to POSE_7.csv (the last one free), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv. TRUTH.csv has
-    a row for each of RIDE.csv. A RIDE.cal.json there, of the ride before, is removed.
-    speed: give RIDE.csv a speed, once a second.
+    Logs: POSE_1.csv to POSE_7.csv (the last one slanted), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv. TRUTH.csv has one row
+    for each row of RIDE.csv. A RIDE.cal.json that is there is removed. speed: RIDE.csv gets a speed once a second.
     """
-    if profile not in PROFILES:
-        raise InputError(f"no profile {profile}: there are {', '.join(PROFILES)}")
+    check_profile(profile)
     directory = Path(out_dir)
     check_directory(directory)
     made = ride(profile, seed, seconds, upright_error_deg, pitch_change_deg, share)
     try:
         directory.mkdir(parents=True, exist_ok=True)
-        # report, plot and export take the calibration beside a ride for its own: they would believe another sensor's
+        # It belongs to an earlier ride and another sensor, but report, plot and export would use it for this one
         (directory / "RIDE.cal.json").unlink(missing_ok=True)
         write_poses(directory, made)
         _write_ride(directory / "RIDE.csv", made, speed)
@@ -50,7 +48,7 @@ def simulate(
 
 
 def write_poses(directory: Path, made: Ride) -> tuple[list[Path], Path, Path]:
-    """The seven poses, kickstand and upright; their paths."""
+    """Write the seven poses, kickstand and upright; return their paths."""
     seven = [directory / f"POSE_{k}.csv" for k in range(1, 8)]
     pair = directory / "KICKSTAND.csv", directory / "UPRIGHT.csv"
     for path, readings in zip([*seven, *pair], [*made.poses, made.kickstand, made.upright]):

@@ -1,39 +1,39 @@
-"""A ride put together from what riders do: set off, cruise, corner, stop."""
+"""Builds a ride of what riders do: set off, ride straight on, turn, stop."""
 
 from dataclasses import dataclass, field
 from math import atan, degrees, radians, tan
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 
 from .commands import Leg
-from .physics.bike import GRAVITY_MPS2
 from .physics.road import CLASS_B
 
-_CLOSING_S = 45.0  # a straight and a stop at the end of every ride
+_CLOSING_S = 45.0  # for the straight and the stop at the end of every ride
 
 
 @dataclass
 class Conditions:
-    """Road, engine, weather and set-up of a ride; figures of an ordinary day.
+    """Road, engine, weather and sensor of a ride. The defaults are those of an ordinary day.
 
-    bumps: (phase, spacing m, height m, length m), humps wherever the ride is in that phase.
+    bumps: (phase, spacing m, height m, length m): bumps in the road wherever the ride is in that phase.
     """
 
-    roughness: float = CLASS_B  # ISO 8608, m3
+    roughness: float = CLASS_B  # see road.CLASS_A, m3
     engine_rms_g: float = 0.1  # at 6000/min
-    shift_rpm: float = 5000.0
-    unrest_deg: float = 0.4  # rms of the rider's balance at speed
-    gust_mps2: float = 0.0  # rms of the wind's push
-    sway_m: float = 0.0  # rms of the rider's weight from side to side
+    shift_rpm: float = 5000.0  # where the rider changes up
+    unrest_deg: float = 0.4  # rms of the lean's wavering at speed
+    gust_mps2: float = 0.0  # rms of the crosswind's changes
+    sway_m: float = 0.0  # rms of the centre of mass moving from side to side
     start_c: float = 22.0  # of the chip at power-on
-    rise_c: float = 7.0  # warming of the box, most of it within 10 to 15 minutes
-    drift: float = 1.0  # change of the biases with temperature, of a usual part's
-    creep_deg: float = 0.0  # how far the mount has turned by the end
+    rise_c: float = 7.0  # how far it warms up, most of it within 10 to 15 minutes
+    drift: float = 1.0  # how far the biases change with temperature; an ordinary sensor's is 1
+    creep_deg: float = 0.0  # how far the sensor's mount has turned by the end
     bumps: list[tuple[str, float, float, float]] = field(default_factory=list)
 
 
 class Plan:
-    """Legs being put together. The sampled figures come from `chance`, so that no two rides are alike."""
+    """Collects the legs of a ride. chance: source of the random figures in which rides differ."""
 
     def __init__(self, chance: np.random.Generator, seconds: float) -> None:
         self.chance = chance
@@ -41,18 +41,17 @@ class Plan:
         self.speed = 0.0
         self._seconds = 0.0
         self._until = max(seconds - _CLOSING_S, 20.0)
-        self.slope_percent = 3.0  # most that `any_slope` gives
-        self.roll_dps = (
-            60.0  # mean rate of the quickest change from side to side; the peak is nearly twice that
-        )
+        self.slope_percent = 3.0  # limit of random_slope()
+        self.roll_dps = 60.0  # mean roll rate of the quickest change of lean; its peak is nearly twice as high
 
     @property
     def going_on(self) -> bool:
+        """True until only the end of the ride is missing."""
         return self._seconds < self._until
 
     @property
     def seconds(self) -> float:
-        """So far."""
+        """How long the legs so far last."""
         return self._seconds
 
     def uniform(self, low: float, high: float) -> float:
@@ -64,13 +63,13 @@ class Plan:
     def likely(self, share: float) -> bool:
         return bool(self.chance.random() < share)
 
-    def any_slope(self) -> float:
+    def random_slope(self) -> float:
         return self.uniform(-self.slope_percent, self.slope_percent)
 
     def add(self, phase: str, seconds: float, speed_mps: float | None = None, **more: float | None) -> None:
-        """A leg; its road ends in any slope unless slope_percent is given."""
+        """Add a leg. The road ends in a random slope unless slope_percent is given."""
         if "slope_percent" not in more:
-            more["slope_percent"] = self.any_slope()
+            more["slope_percent"] = self.random_slope()
         self.legs.append(Leg(phase, seconds, speed_mps, **more))  # type: ignore[arg-type]
         self._seconds += seconds
         self.speed = self.speed if speed_mps is None else speed_mps
@@ -79,7 +78,7 @@ class Plan:
         return next((leg.lean_deg for leg in reversed(self.legs) if leg.lean_deg is not None), 0.0)
 
     def begin(self) -> None:
-        """On the kickstand, lifted, upright, engine on."""
+        """Stand on the kickstand, upright, then start the engine."""
         self.legs.append(
             Leg("kickstand", self.uniform(4.0, 12.0), 0.0, self.uniform(-13.0, -8.0), engine=0.0)
         )
@@ -106,21 +105,24 @@ class Plan:
         phase: str = "turn",
         **more: float | None,
     ) -> None:
-        """Roll to lean_deg within roll_s, or as fast as can be; hold it for seconds or about heading_deg."""
+        """Roll to lean_deg within roll_s, but no faster than roll_dps, and hold it.
+
+        For how long: seconds, or until the heading has changed by about heading_deg.
+        """
         roll_s = max(roll_s, abs(lean_deg - self._lean_now()) / self.roll_dps)
         if seconds is None:
-            rate = degrees(GRAVITY_MPS2 * tan(radians(abs(lean_deg))) / max(speed_mps, 1.0))
+            rate = degrees(STANDARD_GRAVITY * tan(radians(abs(lean_deg))) / max(speed_mps, 1.0))
             seconds = min(max((heading_deg or 45.0) / rate - roll_s / 2.0, 0.5), 12.0)
         self.add(phase, roll_s + seconds, speed_mps, lean_deg=lean_deg, roll_s=roll_s, **more)
 
     def out_of_turn(self, speed_mps: float, mps2: float, roll_s: float = 1.4) -> None:
-        """Upright again, on the throttle."""
+        """Speed up while the bike comes upright."""
         roll_s = max(roll_s, abs(self._lean_now()) / self.roll_dps)
         seconds = max(roll_s, abs(speed_mps - self.speed) / mps2)
         self.add("out of turn", seconds, speed_mps, lean_deg=0.0, roll_s=roll_s)
 
     def into_turn(self, lean_deg: float, speed_mps: float, mps2: float) -> None:
-        """Brake, the last third of it leaning in already."""
+        """Brake; in the last third lean in already."""
         seconds = max(1.2, abs(speed_mps - self.speed) / mps2)
         between = speed_mps + 0.35 * (self.speed - speed_mps)
         self.add("braking", 0.65 * seconds, between, lean_deg=0.0, roll_s=0.8)
@@ -139,7 +141,7 @@ class Plan:
         self.add("walking pace", seconds, speed_mps, lean_deg=0.0, roll_s=1.0)
 
     def finish(self, speed_mps: float, mps2: float) -> None:
-        """A straight to the end of the ride, then a stop."""
+        """Ride straight on to the end of the ride, and stop."""
         self.to_speed(speed_mps, mps2)
         self.straight(_CLOSING_S - 15.0)
         self.to_speed(0.0, mps2)
@@ -147,5 +149,5 @@ class Plan:
 
 
 def lean_for(speed_mps: float, radius_m: float) -> float:
-    """Lean in degrees that balances a turn of this radius."""
-    return degrees(atan(speed_mps * speed_mps / (GRAVITY_MPS2 * radius_m)))
+    """The lean in degrees that balances a turn of this radius."""
+    return degrees(atan(speed_mps * speed_mps / (STANDARD_GRAVITY * radius_m)))

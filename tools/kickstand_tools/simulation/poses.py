@@ -1,4 +1,4 @@
-"""The poses a calibration needs, as a rider captures them: six sides, a free one, kickstand, upright."""
+"""The poses that a calibration needs, as a rider captures them: six sides, a slanted one, kickstand, upright."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -7,9 +7,9 @@ from .physics.chip import RATE_HZ, Chip
 from .physics.signals import band_noise
 
 POSE_S = 4.0
-_ASKEW_DEG = 4.0  # a box put on its side by hand, by an edge of a table
+_ASKEW_DEG = 4.0  # how inexactly a box is put on its side by hand
 _UP_IN_VEHICLE = np.array([0.0, 1.0, 0.0])
-_MOVE_DEG = 0.05  # rms of a bike held upright by hand
+_MOVE_DEG = 0.05  # rms lean of a bike that is held upright by hand
 
 
 def still(chance: np.random.Generator, chip: Chip, up: NDArray, temp_c: float) -> NDArray[np.float64]:
@@ -20,7 +20,7 @@ def still(chance: np.random.Generator, chip: Chip, up: NDArray, temp_c: float) -
 
 
 def seven(chance: np.random.Generator, chip: Chip, temp_c: float) -> list[NDArray[np.float64]]:
-    """Six sides up in any order, each up to 4 degrees askew, then one free pose."""
+    """Each of the six sides up once, in random order and up to 4 degrees askew, then a slanted pose."""
     found = []
     for side in chance.permutation(6):
         up = chance.standard_normal(3)
@@ -38,7 +38,7 @@ def seven(chance: np.random.Generator, chip: Chip, temp_c: float) -> list[NDArra
 
 
 def up_seen(lean_deg: float | NDArray, pitch_deg: float) -> NDArray[np.float64]:
-    """Upward in the vehicle's axes (left, up, forward) at a lean to the right and a nose up, degrees."""
+    """The unit vector upward along left, up, forward. lean: > 0 to the right; pitch: > 0 nose up; degrees."""
     lean, pitch = np.radians(lean_deg), np.radians(pitch_deg)
     left, up = np.sin(lean) * np.cos(pitch), np.cos(lean) * np.cos(pitch)
     return np.stack((left, up, np.full_like(np.asarray(left, dtype=float), np.sin(pitch))), axis=-1)
@@ -53,7 +53,7 @@ def standing(
     temp_c: float,
     held: bool,
 ) -> NDArray[np.float64]:
-    """Readings of the bike at rest. held: by a rider, whose hands are never quite still."""
+    """Readings of the bike at rest. held: upright by a rider, whose hands are never quite still."""
     n = int(POSE_S * RATE_HZ)
     lean = np.full(n, lean_deg)
     if held:

@@ -1,14 +1,15 @@
-"""The kinds of ride: what is ridden, where. Each fills a plan and returns its conditions."""
+"""The kinds of ride. Each profile adds its legs to a plan and returns the conditions of the ride."""
 
 from collections.abc import Callable
 
+from ..errors import InputError
 from . import stress
 from .physics.road import CLASS_A, CLASS_B
 from .plan import Conditions, Plan, lean_for
 
 
 def street(plan: Plan) -> Conditions:
-    """Country road at 45 to 100 km/h: bends of 10 to 38 degrees, esses, lane changes, some traffic lights."""
+    """Country road at 45 to 100 km/h: bends of 10 to 38 degrees, s-bends, lane changes, some traffic lights."""
     plan.begin()
     cruise = plan.uniform(15.0, 24.0)
     plan.to_speed(cruise, 2.5)
@@ -31,7 +32,7 @@ def street(plan: Plan) -> Conditions:
 
 
 def track(plan: Plan) -> Conditions:
-    """A race track: 35 to 55 degrees, flicked over within a second, 0.5 g of drive, 0.95 g of braking."""
+    """A race track: 35 to 55 degrees, from side to side within a second, 0.5 g speeding up, 0.95 g braking."""
     plan.begin()
     plan.slope_percent, plan.roll_dps = 4.0, 100.0
     plan.to_speed(30.0, 4.0)
@@ -41,7 +42,7 @@ def track(plan: Plan) -> Conditions:
         if plan.speed > corner + 4.0:
             plan.into_turn(lean, corner, plan.uniform(6.0, 9.3))
         plan.turn(lean, corner, heading_deg=plan.uniform(40.0, 150.0), roll_s=plan.uniform(0.7, 1.2))
-        while plan.likely(0.35):  # flicked to the other side
+        while plan.likely(0.35):  # over to the other side
             lean = -lean * plan.uniform(0.85, 1.1)
             lean = max(-49.0, min(49.0, lean))
             roll_s = plan.uniform(0.7, 1.2)
@@ -56,7 +57,7 @@ def track(plan: Plan) -> Conditions:
 
 
 def sweeper(plan: Plan) -> Conditions:
-    """Turns held for 60 s at 15 to 45 degrees, with a short straight between."""
+    """Turns held for 60 s at 15 to 45 degrees, with short straights between them."""
     plan.begin()
     plan.slope_percent = 1.5
     speed = plan.uniform(18.0, 28.0)
@@ -74,7 +75,7 @@ def sweeper(plan: Plan) -> Conditions:
 
 
 def city(plan: Plan) -> Conditions:
-    """Town: junctions, roundabouts, lights with a foot down, walking pace, turning in the road."""
+    """Town: junctions, roundabouts, traffic lights with a foot down, walking pace, U-turns."""
     plan.begin()
     plan.slope_percent = 4.0
     plan.to_speed(plan.uniform(8.0, 13.0), 2.5)
@@ -95,7 +96,7 @@ def city(plan: Plan) -> Conditions:
             if plan.likely(0.4):
                 plan.turn(plan.side() * plan.uniform(4.0, 9.0), 2.2, heading_deg=150.0, phase="turning round")
             plan.to_speed(plan.uniform(7.0, 12.0), 2.5)
-        elif what < 0.8:  # a roundabout: out, round, out again
+        elif what < 0.8:  # a roundabout: lean out, in, out again
             speed, side = plan.uniform(6.0, 9.0), plan.side()
             lean = lean_for(speed, plan.uniform(12.0, 22.0))
             plan.into_turn(-side * lean * 0.6, speed, 2.5)
@@ -109,7 +110,7 @@ def city(plan: Plan) -> Conditions:
 
 
 def hills(plan: Plan) -> Conditions:
-    """A pass: slopes to 12 %, hairpins of 25 to 42 degrees, the slope changing through the turns."""
+    """A mountain pass: slopes up to 12 %, hairpins of 25 to 42 degrees in which the slope changes."""
     plan.begin()
     plan.slope_percent = 12.0
     plan.to_speed(plan.uniform(11.0, 16.0), 2.5)
@@ -142,7 +143,7 @@ def hills(plan: Plan) -> Conditions:
 def _bends(
     plan: Plan, lean_deg: float, speeds: tuple[float, float], linked: float, rolls: tuple[float, float]
 ) -> None:
-    """One bend, or several from side to side."""
+    """A bend, perhaps followed by more to alternating sides. linked: chance of another one."""
     lean, speed = plan.side() * lean_deg, plan.uniform(*speeds)
     if plan.speed > speed + 2.0:
         plan.into_turn(lean, speed, plan.uniform(2.0, 5.0))
@@ -176,3 +177,9 @@ PROFILES: dict[str, Callable[[Plan], Conditions]] = MAIN | {
     "fall": lambda plan: stress.fall(plan),
     "parked": stress.parked,
 }
+
+
+def check_profile(name: str) -> None:
+    """Raise InputError if there is no such profile."""
+    if name not in PROFILES:
+        raise InputError(f"no profile {name}: there are {', '.join(PROFILES)}")

@@ -1,14 +1,15 @@
-"""A whole ride: plan, bike, road, engine and chip put together."""
+"""Simulates a whole ride from plan, bike, road, engine and chip."""
 
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from . import poses
 from .commands import Commands, commands
 from .physics import balance
-from .physics.bike import GRAVITY_MPS2, Bike
+from .physics.bike import Bike
 from .physics.chip import DIVIDER, RATE_HZ, Chip
 from .physics.engine import Engine
 from .physics.kinematics import Motion, body_rates, specific_force
@@ -17,15 +18,17 @@ from .physics.signals import band_noise, second_order, smoothed
 from .plan import Conditions, Plan
 from .profiles import PROFILES
 
-_WARMING_S = 300.0
-_IMPACT_G = 4.0
+_WARMING_S = 300.0  # time constant of the chip's temperature
+_IMPACT_G = 4.0  # at the end of a fall
 
 
 @dataclass
 class Ride:
-    """What was read, each (n, 7) at 200 Hz in the chip's order (g, C, deg/s), and the truth.
+    """What the sensor read, and the truth.
 
-    poses: six sides in any order and a free one. time (s), truth (by name), phase: one for each of readings.
+    poses, kickstand, upright, readings: each (n, 7) at rate_hz, in the chip's order: force (g), temperature (C), rate
+    (deg/s). poses: six sides in random order and a slanted one. time (s), truth (by name) and phase: (n,), an entry for
+    each row of readings. vehicle_from_sensor: (3, 3), rows left, up, forward.
     """
 
     rate_hz: float
@@ -51,8 +54,8 @@ def ride(
 ) -> Ride:
     """Simulate a ride of about this length; a profile and a seed always give the same one.
 
-    upright_error_deg: how far the bike leaned to the right when pressed upright. pitch_change_deg: nose up
-    on the kickstand against upright, within 1 degree at random if None. share: of the chip's tolerances.
+    upright_error_deg: how far the bike leaned to the right in the upright pose. pitch_change_deg: how much higher the
+    nose was on the kickstand than upright; random within 1 degree if None. share: of the sensor's tolerances.
     """
     chance = np.random.default_rng([seed, *profile.encode()])
     plan = Plan(chance, seconds)
@@ -61,7 +64,7 @@ def ride(
     mounting = random_rotation(chance)
     command = commands(plan.legs, RATE_HZ)
     motion, extra = _motion(chance, command, bike, conditions)
-    force = (specific_force(motion, bike) + extra.force) / GRAVITY_MPS2
+    force = (specific_force(motion, bike) + extra.force) / STANDARD_GRAVITY
     rates = np.degrees(body_rates(motion) + extra.rates)
     temp = conditions.start_c + conditions.rise_c * (1.0 - np.exp(-command.time / _WARMING_S))
     turned = _creep(chance, len(force), conditions.creep_deg)
@@ -69,7 +72,7 @@ def ride(
         chance, _to_sensor(force, mounting, turned), _to_sensor(rates, mounting, turned), temp
     )
     home_c = chance.uniform(18.0, 25.0)
-    nose = chance.uniform(-0.5, 0.5)  # the ground where both poses were taken
+    nose = chance.uniform(-0.5, 0.5)  # slope in degrees of the ground where both poses were taken
     change = chance.uniform(-1.0, 1.0) if pitch_change_deg is None else pitch_change_deg
     lean = -chance.uniform(8.0, 15.0)
     seven = poses.seven(chance, chip, home_c)
@@ -96,7 +99,7 @@ def ride(
 
 
 def random_rotation(chance: np.random.Generator) -> NDArray[np.float64]:
-    """(3, 3) vehicle from sensor, rows left, up, forward: every rotation equally likely."""
+    """A mounting: (3, 3) vehicle from sensor, rows left, up, forward. Every rotation is equally likely."""
     q, r = np.linalg.qr(chance.standard_normal((3, 3)))
     q = q * np.sign(np.diag(r))
     return q * np.linalg.det(q)
@@ -134,7 +137,7 @@ def _motion(
 
 
 def _places(command: Commands, phase: str, spacing_m: float) -> list[float]:
-    """Where along the way, every spacing_m, the ride is in a phase."""
+    """Distances, multiples of spacing_m, at which the ride is in a phase."""
     if phase not in command.phases:
         return []
     met = command.distance[command.phase == command.phases.index(phase)]
@@ -142,19 +145,19 @@ def _places(command: Commands, phase: str, spacing_m: float) -> list[float]:
 
 
 def _impact(chance: np.random.Generator, command: Commands) -> NDArray[np.float64]:
-    """The blow at the end of a fall, m/s2."""
+    """The impact at the end of a fall: (n, 3), m/s^2."""
     force = np.zeros((len(command.time), 3))
     if "lying" in command.phases:
         since = command.time - command.time[np.argmax(command.phase == command.phases.index("lying"))]
         ringing = np.where(since >= 0.0, np.exp(-np.clip(since, 0.0, 10.0) / 0.08), 0.0)
         for axis in range(3):
             wave = np.sin(2.0 * np.pi * chance.uniform(15.0, 35.0) * since)
-            force[:, axis] = _IMPACT_G * GRAVITY_MPS2 * ringing * wave
+            force[:, axis] = _IMPACT_G * STANDARD_GRAVITY * ringing * wave
     return force
 
 
 def _creep(chance: np.random.Generator, n: int, degrees: float) -> NDArray[np.float64]:
-    """(n, 3) rotation vector, rad, of a mount that gives: mostly slowly, some of it at once."""
+    """How a mount has turned that yields: rotation vectors (n, 3), rad. Most of it slowly, the rest at one moment."""
     axis = chance.standard_normal(3)
     at_once = np.zeros(n)
     at_once[int(n * chance.uniform(0.3, 0.7)) :] = 1.0
@@ -163,7 +166,7 @@ def _creep(chance: np.random.Generator, n: int, degrees: float) -> NDArray[np.fl
 
 
 def _to_sensor(vectors: NDArray, mounting: NDArray, turned: NDArray) -> NDArray[np.float64]:
-    """Vehicle (n, 3) to sensor axes; turned: small rotations of the mount, to second order."""
+    """From the vehicle's to the sensor's axes, (n, 3). turned: small rotations of the mount, to second order."""
     if turned.any():
         first = np.cross(turned, vectors)
         vectors = vectors + first + 0.5 * np.cross(turned, first)

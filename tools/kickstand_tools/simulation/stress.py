@@ -1,4 +1,4 @@
-"""What hurts: each a ride with one thing gone to its limit."""
+"""Rides that are hard for a lean meter: in each one condition of the ride is extreme."""
 
 from collections.abc import Callable
 
@@ -9,9 +9,9 @@ Profile = Callable[[Plan], Conditions]
 
 
 def banked(plan: Plan, road: Profile) -> Conditions:
-    """A road banked into its turns by up to 10 degrees, and one cambered by 3 to 6 degrees on the straights.
+    """A road that is banked into its turns by up to 10 degrees and cambered by 3 to 6 degrees on the straights.
 
-    The tyres stand on the flank on a straight, and the change of bank comes with each turn.
+    On a straight the tyres roll beside their middle, and the bank changes at each turn.
     """
     conditions = road(plan)
     camber = plan.uniform(3.0, 6.0)
@@ -22,7 +22,7 @@ def banked(plan: Plan, road: Profile) -> Conditions:
 
 
 def wheelie(plan: Plan) -> Conditions:
-    """Street riding with the front wheel lifted by 10 to 35 degrees for some seconds now and then."""
+    """Street riding with wheelies of 10 to 35 degrees, some seconds long."""
     plan.begin()
     while plan.going_on:
         plan.to_speed(plan.uniform(9.0, 14.0), 3.0)
@@ -52,7 +52,7 @@ def bumps(plan: Plan) -> Conditions:
 
 
 def crosswind(plan: Plan, road: Profile) -> Conditions:
-    """A wind that leans the bike 2 to 4 degrees on straights: from one side, then the other, with gusts."""
+    """A gusty wind that leans the bike by 2 to 4 degrees on straights, first from one side, then from the other."""
     conditions = road(plan)
     push = plan.side() * plan.uniform(0.35, 0.7)
     half = plan.seconds / 2.0
@@ -65,7 +65,10 @@ def crosswind(plan: Plan, road: Profile) -> Conditions:
 
 
 def weight(plan: Plan, road: Profile) -> Conditions:
-    """A rider who hangs off in turns (up to 5 cm: 5 degrees), and luggage 1 to 2 cm beside the middle."""
+    """A rider who hangs off in turns, and luggage on one side.
+
+    Both move the centre of mass: by up to 5 cm, which is 5 degrees of lean, and by 1 to 2 cm.
+    """
     conditions = road(plan)
     beside = plan.side() * plan.uniform(0.01, 0.02)
     for leg in plan.legs:
@@ -78,7 +81,7 @@ def weight(plan: Plan, road: Profile) -> Conditions:
 
 
 def vibration(plan: Plan, road: Profile) -> Conditions:
-    """Half a g at 6000/min, where the second order is at 200 Hz and aliases to nearly standing still."""
+    """0.5 g of engine vibration at 6000/min. Its second order, 200 Hz, aliases to nearly 0 Hz."""
     conditions = road(plan)
     conditions.engine_rms_g = 0.5
     conditions.shift_rpm = 6600.0
@@ -87,21 +90,21 @@ def vibration(plan: Plan, road: Profile) -> Conditions:
 
 
 def creep(plan: Plan, road: Profile) -> Conditions:
-    """The sticky tape gives: by the end the sensor has turned 2 to 5 degrees about any axis."""
+    """The sensor's mount yields: by the end it has turned by 2 to 5 degrees about a random axis."""
     conditions = road(plan)
     conditions.creep_deg = plan.uniform(2.0, 5.0)
     return conditions
 
 
 def temperature(plan: Plan, road: Profile) -> Conditions:
-    """From a cold garage into the sun: 25 C of warming, of a part that drifts three times as usual."""
+    """From a cold garage into the sun: 25 C warmer, with a sensor that drifts three times as far as an ordinary one."""
     conditions = road(plan)
     conditions.start_c, conditions.rise_c, conditions.drift = 8.0, 25.0, 3.0
     return conditions
 
 
 def fall(plan: Plan) -> Conditions:
-    """Some riding in town, then over at walking pace to either side, 80 degrees, and left lying."""
+    """Some riding in town, then a fall at walking pace to either side: 80 degrees of lean, and it stays there."""
     plan.begin()
     while plan.going_on:
         plan.to_speed(plan.uniform(8.0, 13.0), 2.5)
@@ -118,7 +121,7 @@ def fall(plan: Plan) -> Conditions:
 
 
 def parked(plan: Plan) -> Conditions:
-    """Standing still, engine off, at one lean of up to 60 degrees, while the box warms up."""
+    """Standing still with the engine off, at one lean of up to 60 degrees, while the sensor warms up."""
     lean = plan.uniform(-60.0, 60.0)
     while plan.going_on:
         plan.add("parked", 10.0, 0.0, lean_deg=lean, slope_percent=0.0, engine=0.0)

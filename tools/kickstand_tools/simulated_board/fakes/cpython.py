@@ -1,4 +1,4 @@
-"""What CPython lacks of what the firmware uses: module `micropython`, sys.print_exception and gc.threshold."""
+"""Gives CPython what the firmware needs of MicroPython: module `micropython`, sys.print_exception, gc.threshold."""
 
 import gc
 import sys
@@ -7,7 +7,7 @@ import types
 
 
 def supplement():
-    """Add it, so that drivers and app can be imported. The mathematics needs nothing of it."""
+    """Add them, so that drivers and app can be imported. The firmware's mathematics runs without."""
     sys.modules.setdefault("micropython", _module())
     if not hasattr(sys, "print_exception"):
         setattr(sys, "print_exception", _print_exception)  # noqa: B010 type checkers know no such attribute

@@ -1,4 +1,7 @@
-"""A board's `os`, whose ilistdir() tells the size too: replaces `os` under MicroPython, adds to it under CPython."""
+"""MicroPython's `os` with an ilistdir() that gives sizes, as on a board.
+
+Under MicroPython this module takes the place of `os`; under CPython the names in ADDED are added to the real one.
+"""
 
 import os
 import sys
@@ -6,12 +9,12 @@ import sys
 if sys.implementation.name == "micropython":
     from os import *  # noqa: F403 # pyright: ignore[reportWildcardImportFromLibrary]
 
-# What CPython's lacks
+# What CPython's os does not have
 ADDED = ("ilistdir",)
 
 
 def ilistdir(path="."):
-    """(name, type, 0, bytes) of each entry."""
+    """Yield (name, type, 0, size in bytes) for each entry."""
     for name in os.listdir(path):
         status = os.stat(path + "/" + name)
         yield name, status[0] & 0xF000, 0, status[6]

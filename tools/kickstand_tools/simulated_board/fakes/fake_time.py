@@ -1,15 +1,18 @@
-"""MicroPython's `time` on the board's clock: replaces `time` under MicroPython, adds to it under CPython."""
+"""MicroPython's `time` on the simulated board's clock.
 
-CALL_US = 5  # what looking at the time costs, so that a busy wait ends
-_PERIOD = 1 << 30  # of ticks on the boards, in their own unit
+Under MicroPython this module takes the place of `time`; under CPython the names in ADDED are added to the real one.
+"""
+
+CALL_US = 5  # what reading the time takes, so that a loop that waits for a time comes to an end
+_PERIOD = 1 << 30  # where ticks_us() and ticks_ms() start again at 0, as on the boards
 _HALF = _PERIOD // 2
 
-# What CPython's lacks
+# What CPython's time does not have
 ADDED = ("ticks_us", "ticks_ms", "ticks_cpu", "ticks_add", "ticks_diff", "sleep_us", "sleep_ms")
 
 
 def use(board_clock, at_zero_us):
-    """Let everything here mean this clock from now on; ticks are 0 at at_zero_us."""
+    """From now on everything here reads this clock; ticks are 0 when it stands at at_zero_us."""
     global clock, zero_us
     clock = board_clock
     zero_us = at_zero_us

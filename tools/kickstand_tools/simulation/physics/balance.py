@@ -1,25 +1,26 @@
-"""How a two-wheeler leans and turns: roll balance of a rider who wants a certain lean.
+"""How a two-wheeler leans and turns: the roll balance of a bike whose rider wants a certain lean.
 
-Lean > 0 to the right, yaw rate > 0 in a left turn. The line from the contact point to the centre of mass has
-the balance lean b; the chassis leans more, because wide tyres carry it on their flank.
+Lean > 0 to the right, yaw rate > 0 in a left turn. The line from the contact point to the centre of mass leans by the
+balance lean b. The chassis leans more, because wide tyres touch the road beside their middle.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 
 from ..commands import Commands
-from .bike import GRAVITY_MPS2, Bike
+from .bike import Bike
 from .signals import Signal, band_noise, derivative, smoothed, smoothstep
 
-_STEERING_S = 0.04  # a steering that turned faster would be a slap
-_WANDER = 0.06  # of the lean, rms
+_STEERING_S = 0.04  # smoothing of the steering, which cannot turn at any speed
+_WANDER = 0.06  # rms of the lean's wandering in a turn, as a share of the lean
 _STANDS_MPS, _RIDES_MPS = 0.4, 1.5  # the feet hold the bike below, steering balances it above
 
 
 @dataclass
 class Roll:
-    """lean: of the chassis; balance: of the centre of mass (rad); yaw_rate: about the vertical, rad/s."""
+    """lean: of the chassis, rad; balance: lean of the centre of mass, rad; yaw_rate: about the vertical, rad/s."""
 
     lean: Signal
     balance: Signal
@@ -39,8 +40,11 @@ def chassis_lean(
 
 
 def weave(chance: np.random.Generator, command: Commands, riding_deg: float) -> Signal:
-    """A rider's unrest in balance, rad: riding_deg rms at speed, more at walking pace, a little with the feet
-    down; in a turn the lean wanders with the line taken."""
+    """How the lean wavers in a rider's hands, rad.
+
+    riding_deg: rms at speed. At walking pace it is more, with the feet down a little; in a turn the lean also follows
+    the rider's corrections of the line.
+    """
     n, rate = len(command.time), command.rate_hz
     v = command.speed
     slow = smoothstep(v / _RIDES_MPS) * (1.0 + 2.0 * (1.0 - smoothstep((v - 1.0) / 5.0)))
@@ -51,14 +55,14 @@ def weave(chance: np.random.Generator, command: Commands, riding_deg: float) -> 
 
 
 def roll(command: Commands, bike: Bike, unrest: Signal) -> Roll:
-    """Lean and yaw rate. The yaw rate is what the roll equation of the pendulum asks of the steering:
+    """Lean and yaw rate. The yaw rate p is the one that fulfils the roll equation of the pendulum:
 
     pendulum * b'' = g_n sin b + ((1 + wheels) v p + wind) cos b
 
-    so a quick roll to the right begins with a yaw to the left: countersteering.
+    So a quick roll to the right begins with a yaw to the left: countersteering. unrest: see weave().
     """
     rate, v = command.rate_hz, command.speed
-    normal_g = GRAVITY_MPS2 * np.cos(command.slope) + v * derivative(command.slope, rate)
+    normal_g = STANDARD_GRAVITY * np.cos(command.slope) + v * derivative(command.slope, rate)
     wind = command.crosswind * smoothstep(v / 5.0)
     balance = np.arctan(np.tan(command.lean) - wind / normal_g) + unrest
     acceleration = derivative(derivative(balance, rate), rate)
@@ -67,7 +71,7 @@ def roll(command: Commands, bike: Bike, unrest: Signal) -> Roll:
     steered = smoothstep((v - _STANDS_MPS) / (_RIDES_MPS - _STANDS_MPS))
     lock = bike.max_curvature
     wanted = needed / (lock * np.maximum(v, 0.1) ** 2)
-    curvature = steered * lock * wanted / (1.0 + wanted**6) ** (1.0 / 6.0)  # as wanted, until near the lock
+    curvature = steered * lock * wanted / (1.0 + wanted**6) ** (1.0 / 6.0)  # limited smoothly near the steering lock
     yaw_rate = smoothed(curvature * v, _STEERING_S, rate) / np.cos(command.slope)
     hang = command.hang
     return Roll(chassis_lean(balance, bike, command.bank * smoothstep(v / 5.0), hang), balance, yaw_rate)

@@ -4,20 +4,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-GRAVITY_MPS2 = 9.80665
-
 
 @dataclass(frozen=True)
 class Bike:
     """Lengths in m. Figures from V. Cossalter, Motorcycle Dynamics, 2nd ed., chapters 3, 4, 6 and 8.
 
-    The defaults are a middling naked bike with its rider; `random` draws from what is on the road.
+    The defaults are an average naked bike with its rider; random() varies them as bikes on the road do.
     """
 
     mass_height: float = 0.62  # of bike and rider together, above the ground
     roll_gyration: float = 0.27  # radius of gyration about the roll axis through the centre of mass
     tyre_radius: float = 0.06  # of the tyres' cross-section, mean of front and rear
-    wheel_inertia: float = 0.024  # both wheels' I/r over mass * mass_height: their gyroscopic share of a turn
+    wheel_inertia: float = 0.024  # both wheels' I/r over mass * mass_height: their gyroscopic moment in a turn
     wheelbase: float = 1.43
     sensor_height: float = 0.70
     sensor_forward: float = 0.75  # of the rear contact point
@@ -45,5 +43,5 @@ class Bike:
 
     @property
     def pendulum(self) -> float:
-        """Length of the equivalent pendulum in roll, m: how fast the bike can be made to lean."""
+        """Length of the equivalent pendulum in roll, m: the longer, the slower the bike falls into a lean."""
         return (self.mass_height**2 + self.roll_gyration**2) / self.mass_height

@@ -1,7 +1,7 @@
-"""An MPU6050: what it makes of the motion of its own axes.
+"""What an MPU6050 reads of the motion of its own axes.
 
-Data sheet PS-MPU-6000A rev 3.4, sections 6.1 and 6.2. The chip converts at 1 kHz, filters (DLPF 3: 44 Hz,
-4.9 ms), and every fifth result is read: what the filter leaves above 100 Hz aliases.
+Data sheet PS-MPU-6000A rev 3.4, sections 6.1 and 6.2. The chip converts at 1 kHz and filters (DLPF 3: 44 Hz, 4.9 ms);
+every fifth result is read. Of frequencies above 100 Hz, what passes the filter aliases.
 """
 
 from dataclasses import dataclass
@@ -9,12 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..data_sheet import MAX_GYRO_BIAS_DPS, MAX_OFFSET_G, MAX_SCALE_ERROR
+
 RATE_HZ = 1000
 DIVIDER = 5  # 200 Hz
 _ACCEL_RANGE_G, _ACCEL_LSB = 8.0, 4096.0
 _GYRO_RANGE_DPS, _GYRO_LSB = 500.0, 65.5
-_ACCEL_NOISE_G = 400e-6 * np.sqrt(RATE_HZ / 2)  # per conversion, of 400 ug/sqrt(Hz)
+_ACCEL_NOISE_G = 400e-6 * np.sqrt(RATE_HZ / 2)  # rms of a conversion, from 400 ug/sqrt(Hz)
 _GYRO_NOISE_DPS = 0.005 * np.sqrt(RATE_HZ / 2)
+_CROSS_AXIS = 0.02  # sensitivity of an axis to its neighbours
 _GYRO_DPS_PER_G = 0.1  # sensitivity to linear acceleration
 _CALIBRATED_C = 25.0
 
@@ -35,23 +38,23 @@ _DLPF = _dlpf()
 
 @dataclass(frozen=True)
 class Chip:
-    """One part: matrices and biases at 25 C and how they change. Sensor axes x, y, z; g, deg/s."""
+    """One sensor: its errors at 25 C, and how they change with temperature. Axes x, y, z; g, deg/s."""
 
-    accel_matrix: NDArray[np.float64]  # (3, 3) reading per true: scale on the diagonal, cross-axis beside it
+    accel_matrix: NDArray[np.float64]  # (3, 3) reading over true: scale on the diagonal, cross-axis beside it
     accel_offset: NDArray[np.float64]
     gyro_matrix: NDArray[np.float64]
     gyro_bias: NDArray[np.float64]
     accel_per_c: NDArray[np.float64]
     gyro_per_c: NDArray[np.float64]
-    gyro_walk: float = 0.004  # deg/s per sqrt(s): what bias instability adds up to
+    gyro_walk: float = 0.004  # deg/s per sqrt(s): random walk of the bias
 
     @staticmethod
     def random(chance: np.random.Generator, share: float = 1.0, drift: float = 1.0) -> "Chip":
-        """A part from the reel. share: of the sheet's tolerances; drift: over temperature, usual is 1.
+        """A random sensor. share: of the data sheet's tolerances; drift: of an ordinary sensor's over temperature.
 
-        Offsets and biases are spread evenly to the sheet's limits, scale and cross-axis normally with the
-        limit at two standard deviations. Over temperature the sheet allows 35..60 mg and 20 deg/s for
-        45..60 C; the usual part does a third of the one and a fifth of the other.
+        Offsets and biases are uniformly distributed within the sheet's limits; scale and cross-axis sensitivity
+        normally, with the limit at two standard deviations. Over temperature the sheet allows 35..60 mg and 20 deg/s
+        for 45..60 C; an ordinary sensor has a third of the former and a fifth of the latter.
         """
 
         def near_one(scale: float, cross: float) -> NDArray[np.float64]:
@@ -59,10 +62,10 @@ class Chip:
             return np.eye(3) + share * spread * np.where(np.eye(3) > 0.0, scale, cross)
 
         return Chip(
-            near_one(0.03, 0.02),
-            share * chance.uniform(-1.0, 1.0, 3) * [0.05, 0.05, 0.08],
-            near_one(0.03, 0.02),
-            share * chance.uniform(-20.0, 20.0, 3),
+            near_one(MAX_SCALE_ERROR, _CROSS_AXIS),
+            share * chance.uniform(-1.0, 1.0, 3) * MAX_OFFSET_G,
+            near_one(MAX_SCALE_ERROR, _CROSS_AXIS),
+            share * chance.uniform(-MAX_GYRO_BIAS_DPS, MAX_GYRO_BIAS_DPS, 3),
             share * drift * chance.uniform(-0.0003, 0.0003, 3),
             share * drift * chance.uniform(-0.06, 0.06, 3),
         )
@@ -74,9 +77,9 @@ class Chip:
         rates: NDArray[np.float64],
         temp_c: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """(n / 5, 7) readings (g, C, deg/s, the chip's order) at 200 Hz, the first of the first instant.
+        """Readings (n / 5, 7) at 200 Hz in the chip's order: g, C, deg/s. The first is of the first row.
 
-        force (n, 3) in g and rates (n, 3) in deg/s: in the sensor's axes at 1 kHz.
+        force (n, 3) in g and rates (n, 3) in deg/s: true values along the sensor's axes at 1 kHz. temp_c (n,).
         """
         n = len(force)
         warm = (temp_c - _CALIBRATED_C)[:, None]
@@ -92,7 +95,7 @@ class Chip:
 
 
 def _sampled(values: NDArray[np.float64], limit: float, lsb: float) -> NDArray[np.float64]:
-    """Clipped at the range, filtered, every fifth, in whole counts."""
+    """Clip at the range, filter, take every fifth value, round to whole counts."""
     columns = []
     for column in np.clip(values, -limit, limit).T:
         led_in = np.concatenate((np.full(len(_DLPF) - 1, column[0]), column))

@@ -1,30 +1,31 @@
-"""Engine vibration: orders of a crankshaft whose speed follows the road speed through a gearbox."""
+"""Engine vibration: harmonics of the crankshaft's speed, which follows from the road speed and the gear."""
 
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from .signals import Signal, integral, smoothed
 
-_RPM_PER_MPS = (370.0, 260.0, 205.0, 170.0, 150.0, 135.0)
-_ORDERS = (0.5, 1.0, 2.0)  # of a four-stroke twin: firing, primary, secondary
-_IDLE_SHARE = 0.25  # of the vibration at _FULL_RPM
+_RPM_PER_MPS = (370.0, 260.0, 205.0, 170.0, 150.0, 135.0)  # by gear
+_ORDERS = (0.5, 1.0, 2.0)  # a four-stroke twin's multiples of the crankshaft's speed: firing, primary, secondary
+_IDLE_SHARE = 0.25  # vibration at idle over that at _FULL_RPM
 _FULL_RPM = 6000.0
 _MAX_G = 0.5
-_DPS_PER_G = 15.0  # the sensor's plate rocks too
+_DPS_PER_G = 15.0  # the sensor is shaken in rotation too
 
 
 @dataclass(frozen=True)
 class Engine:
-    """rms_g: on each axis at 6000/min, before the chip's filter. shift_rpm: where the rider changes up."""
+    """rms_g: vibration along each axis at 6000/min, before the chip's filter. shift_rpm: where the rider changes up."""
 
     rms_g: float = 0.1
     idle_rpm: float = 1250.0
     shift_rpm: float = 5000.0
 
     def rpm(self, speed: Signal, rate_hz: float) -> Signal:
-        """The lowest gear that stays under shift_rpm; the clutch slips below idle."""
+        """Speed of the crankshaft in the lowest gear that keeps it under shift_rpm. Below idle the clutch slips."""
         rpm = speed * _RPM_PER_MPS[-1]
         for ratio in reversed(_RPM_PER_MPS[:-1]):
             rpm = np.where(speed * ratio < self.shift_rpm, speed * ratio, rpm)
@@ -48,4 +49,4 @@ class Engine:
                 phase = phases[axis, k]
                 felt[:, axis] += weights[axis, k] * (sine * np.cos(phase) + cosine * np.sin(phase))
         felt *= np.sqrt(2.0) * size[:, None]
-        return felt[:, :3] * 9.80665, felt[:, 3:] * np.radians(_DPS_PER_G)
+        return felt[:, :3] * STANDARD_GRAVITY, felt[:, 3:] * np.radians(_DPS_PER_G)

@@ -1,33 +1,37 @@
-"""What a perfect sensor on a moving rigid body feels: exact rates and specific force from the attitude.
+"""What a perfect sensor on a moving rigid body measures: exact rates and specific force, from its attitude.
 
-Vehicle axes: left, up, forward. Attitude: heading about the vertical, then pitch about the lateral axis, then
-lean about the forward axis, so at rest the lean is atan2(left, up) of the force.
+Vehicle axes: left, up, forward. The attitude is heading about the vertical, then pitch about the lateral axis, then
+lean about the forward axis. So at rest the lean is atan2(left, up) of the specific force.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from .bike import GRAVITY_MPS2, Bike
+from .bike import Bike
 from .signals import Signal, derivative
 
 
 @dataclass
 class Motion:
-    """Of the rear contact point and the chassis: m/s, rad, rad/s. heave: the rear's own vertical m/s2."""
+    """Motion of the rear contact point and attitude of the chassis, in m/s, rad, rad/s.
+
+    heave: vertical acceleration of the rear of the chassis against the road, m/s^2.
+    """
 
     rate_hz: float
     speed: Signal
     slope: Signal
     yaw_rate: Signal
     lean: Signal
-    pitch: Signal  # of the chassis against the horizontal, nose up > 0
+    pitch: Signal  # of the chassis against the horizontal, > 0 nose up
     heave: Signal
 
 
 def body_rates(motion: Motion) -> NDArray[np.float64]:
-    """(n, 3) rad/s about left, up, forward."""
+    """Rates (n, 3) in rad/s about left, up, forward."""
     lean_rate = derivative(motion.lean, motion.rate_hz)
     pitch_rate = derivative(motion.pitch, motion.rate_hz)
     c, s = np.cos(motion.lean), np.sin(motion.lean)
@@ -42,14 +46,14 @@ def body_rates(motion: Motion) -> NDArray[np.float64]:
 
 
 def specific_force(motion: Motion, bike: Bike) -> NDArray[np.float64]:
-    """(n, 3) m/s2 along left, up, forward where the sensor is: the acceleration of that point, less gravity.
+    """Specific force (n, 3) in m/s^2 along left, up, forward at the sensor: its acceleration less gravity's.
 
     The body turns about the centre of the rear tyre's cross-section, a tyre radius above the road.
     """
     rate, v, slope = motion.rate_hz, motion.speed, motion.slope
     left = v * motion.yaw_rate * np.cos(slope)
-    up = GRAVITY_MPS2 * np.cos(slope) + v * derivative(slope, rate) + motion.heave
-    forward = GRAVITY_MPS2 * np.sin(slope) + derivative(v, rate)
+    up = STANDARD_GRAVITY * np.cos(slope) + v * derivative(slope, rate) + motion.heave
+    forward = STANDARD_GRAVITY * np.sin(slope) + derivative(v, rate)
     nose = motion.pitch - slope
     up, forward = (
         up * np.cos(nose) - forward * np.sin(nose),

@@ -1,8 +1,8 @@
 """Road roughness through tyres and suspension.
 
-The road is a random profile of ISO 8608: its slope is white noise in distance, so the same road shakes more
-at speed, and the rear wheel meets what the front met. Each end is a quarter of a car: wheel on tyre, chassis
-on spring.
+The road is a random profile of ISO 8608 whose slope is white noise over distance. So the same road shakes more at
+speed, and the rear wheel meets what the front wheel has met. Each end of the bike is a quarter-car model: the wheel on
+its tyre, the chassis on its spring.
 """
 
 from dataclasses import dataclass
@@ -13,21 +13,23 @@ from numpy.typing import NDArray
 from .bike import Bike
 from .signals import Signal, band_noise, smoothed, through
 
-CLASS_A, CLASS_B, CLASS_C = 16e-6, 64e-6, 256e-6  # m3, displacement PSD at 0.1 cycles/m (ISO 8608, table)
+CLASS_A, CLASS_B, CLASS_C = 16e-6, 64e-6, 256e-6  # roughness: PSD of displacement at 0.1 cycles/m, m3 (ISO 8608)
 _STEP_M = 0.02
-_CONTACT_M = 0.10  # a tyre does not follow what is shorter than its contact
+_CONTACT_M = 0.10  # length of a tyre's contact patch, which averages shorter waves
 
-# One end of a motorcycle with half its rider: kg, kg, N/m, Ns/m, N/m
+# One end of a motorcycle with half of its rider: kg, kg, N/m, Ns/m, N/m
 _SPRUNG, _UNSPRUNG, _SPRING, _DAMPER, _TYRE = 120.0, 15.0, 17e3, 1100.0, 150e3
-_LATERAL = 0.35  # of the vertical shaking, along left and forward
-_RATE_DPS = np.array(
-    [0.0, 8.0, 14.0]
-)  # about left (that is pitch, done exactly), up, forward; per m/s2 / 9.8
+_LATERAL = 0.35  # rms along left and along forward over the vertical rms
+# Rates about left, up, forward, rms per 9.8 m/s^2 of vertical rms. That about left is 0 because the pitch is exact
+_RATE_DPS = np.array([0.0, 8.0, 14.0])
 
 
 @dataclass
 class Shaking:
-    """heave: of the rear end, m/s2; pitch: rad; on top of that force (n, 3) m/s2 and rates (n, 3) rad/s."""
+    """What the road does to the chassis. heave: vertical acceleration of the rear, m/s^2; pitch: rad.
+
+    force (n, 3) in m/s^2 and rates (n, 3) in rad/s: what is to be added along and about left, up, forward.
+    """
 
     heave: Signal
     pitch: Signal
@@ -36,14 +38,14 @@ class Shaking:
 
 
 def transmitted(f: Signal) -> NDArray:
-    """Chassis displacement over road displacement of a quarter car, complex, at f in Hz."""
+    """Displacement of the chassis over that of the road in the quarter-car model, complex, at f in Hz."""
     w = 2.0 * np.pi * f
     strut = _SPRING + 1j * w * _DAMPER
     return _TYRE * strut / ((strut - _SPRUNG * w * w) * (strut + _TYRE - _UNSPRUNG * w * w) - strut * strut)
 
 
 def profile_slope(chance: np.random.Generator, length_m: float, roughness: float) -> Signal:
-    """dz/ds every _STEP_M of a road of this ISO 8608 figure (m3)."""
+    """Slope dz/ds every _STEP_M of a road. roughness: PSD as CLASS_A, m3."""
     density = (2.0 * np.pi * 0.1) ** 2 * roughness
     white = chance.standard_normal(int(length_m / _STEP_M) + 200) * np.sqrt(density / (2.0 * _STEP_M))
     taps = round(_CONTACT_M / _STEP_M)
@@ -51,7 +53,7 @@ def profile_slope(chance: np.random.Generator, length_m: float, roughness: float
 
 
 def add_bumps(slope: Signal, places_m: list[float], height_m: float, length_m: float) -> None:
-    """Add humps (1 - cos) to a profile's slope in place: speed bumps, patches, braking bumps."""
+    """Add bumps of the shape 1 - cos to a profile's slope, in place."""
     n = int(length_m / _STEP_M)
     shape = np.pi * height_m / length_m * np.sin(2.0 * np.pi * np.arange(n) / n)
     for place in places_m:
@@ -63,7 +65,7 @@ def add_bumps(slope: Signal, places_m: list[float], height_m: float, length_m: f
 def shaking(
     chance: np.random.Generator, distance: Signal, speed: Signal, slope: Signal, bike: Bike, rate_hz: float
 ) -> Shaking:
-    """What the road does to the chassis of a bike that is at distance (of the rear wheel) at each sample."""
+    """Drive over a profile. distance: of the rear wheel at each sample, m. slope: as profile_slope() gives it."""
     height = np.cumsum(slope) * _STEP_M
     at = np.arange(len(slope)) * _STEP_M
     front = distance + bike.wheelbase

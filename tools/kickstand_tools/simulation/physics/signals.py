@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 Signal = NDArray[np.float64]
-_NOISE_MARGIN_S = 10.0  # cut off at both ends, where the held value shows
-_PAD_S = 4.0  # held at both ends, so that the FFT does not join the end of a ride to its start
+_NOISE_MARGIN_S = 10.0  # made too long by this at both ends and cut off, because there through() pads
+_PAD_S = 4.0  # the first and the last value are held so long, because an FFT joins the end to the start
 
 
 def smoothstep(u: Signal) -> Signal:
-    """0 to 1 for u from 0 to 1 and flat outside: no jump in value, first or second derivative."""
+    """0 to 1 for u from 0 to 1, constant outside. Value, first and second derivative have no jumps."""
     u = np.clip(u, 0.0, 1.0)
     return u * u * u * (10.0 + u * (6.0 * u - 15.0))
 
@@ -22,12 +22,12 @@ def derivative(x: Signal, rate_hz: float) -> Signal:
 
 
 def integral(x: Signal, rate_hz: float) -> Signal:
-    """By trapezoids, 0 at the start."""
+    """Trapezoidal rule, 0 at the start."""
     return np.concatenate(([0.0], np.cumsum((x[1:] + x[:-1]) / (2.0 * rate_hz))))
 
 
 def through(x: Signal, transfer: Callable[[Signal], NDArray], rate_hz: float) -> Signal:
-    """x through a linear filter. transfer: complex gain at frequencies in Hz."""
+    """Filter x. transfer: gives the complex gain at frequencies in Hz."""
     pad = int(_PAD_S * rate_hz)
     size = -(-(len(x) + 2 * pad) // 16384) * 16384  # few small prime factors: a fast FFT
     padded = np.pad(x, (pad, size - len(x) - pad), mode="edge")
@@ -36,12 +36,12 @@ def through(x: Signal, transfer: Callable[[Signal], NDArray], rate_hz: float) ->
 
 
 def smoothed(x: Signal, seconds: float, rate_hz: float) -> Signal:
-    """Mean weighted by a Gaussian of this standard deviation: no lag."""
+    """Smooth with a Gaussian of this standard deviation, without delay."""
     return through(x, lambda f: np.exp(-0.5 * (2.0 * np.pi * f * seconds) ** 2), rate_hz)
 
 
 def second_order(x: Signal, natural_hz: float, damping: float, rate_hz: float) -> Signal:
-    """Low-pass of second order, gain 1 at rest, with its lag."""
+    """A low-pass of second order with gain 1 at 0 Hz, and with its delay."""
 
     def transfer(f: Signal) -> NDArray:
         s = 1j * f / natural_hz
@@ -51,7 +51,7 @@ def second_order(x: Signal, natural_hz: float, damping: float, rate_hz: float) -
 
 
 def band_noise(chance: np.random.Generator, n: int, low_hz: float, high_hz: float, rate_hz: float) -> Signal:
-    """Normal noise between two frequencies, falling by second order beyond, of rms 1 in the long run."""
+    """Normally distributed noise of rms 1 between two frequencies; outside its amplitude falls by second order."""
 
     def transfer(f: Signal) -> NDArray:
         low = (f / low_hz) ** 2

@@ -1,4 +1,4 @@
-"""What a simulated sensor reads, written as a log file: for tests and trials."""
+"""Writes what a simulated sensor reads as a log file."""
 
 import gzip
 

@@ -1,6 +1,6 @@
-"""A motorcycle in balance whose lean is known at every instant: what a perfect sensor on it would feel.
+"""A motorcycle in balance whose lean is known at every instant: what a perfect sensor on it would measure.
 
-Plain Python for CPython and MicroPython, independent of the firmware's mathematics, so that it can judge it.
+Plain Python for CPython and MicroPython, independent of the firmware's mathematics, which it is used to judge.
 
 Vehicle frame: left, up, forward (right-handed). Lean > 0 to the right, yaw rate > 0 in a left turn, slope > 0
 uphill. The attitude is heading about the vertical, then slope about the lateral axis, lean about forward.
@@ -14,12 +14,13 @@ The sensor sits on the roll axis; the tyres have no width.
 
 from math import cos, degrees, pi, radians, sin, sqrt, tan
 
-GRAVITY_MPS2 = 9.80665
+from kickstand.units import STANDARD_GRAVITY
+
 KICKSTAND_DEG = -12.0  # to the left, as most are
 MOVE_S = 2.0  # from the kickstand to upright, or back
-STANDING_SWAY_DEG = 0.1  # a rider holding the bike upright between the knees
-RIDING_SWAY_DEG = 0.5
-WALKING_MPS, RIDING_MPS = 1.0, 4.0  # below the first feet balance the bike, above the second steering alone
+STANDING_SWAY_DEG = 0.1  # the same when the rider holds the bike upright
+RIDING_SWAY_DEG = 0.5  # amplitude with which a rider wavers at speed
+WALKING_MPS, RIDING_MPS = 1.0, 4.0  # below the first the feet balance the bike, above the second steering alone does
 
 _SWAY = ((0.31, 0.6, 0.0), (0.73, 0.4, 1.0))  # Hz, share, phase
 _ROAD_HZ = (2.3, 5.9, 11.7, 19.3, 31.1)
@@ -31,7 +32,7 @@ _ENGINE_SHARE = 0.5  # of vibration_g
 
 
 class Segment:
-    """A stretch of the ride in which lean, speed, slope, sway and engine glide to new values (None: stay)."""
+    """A part of the ride in which lean, speed, slope, sway and engine change smoothly to new values (None: stay)."""
 
     def __init__(
         self, phase, seconds, lean_deg=None, speed_mps=None, slope_deg=None, sway_deg=None, engine=None
@@ -42,7 +43,7 @@ class Segment:
 
 
 def kickstand(seconds, lean_deg=KICKSTAND_DEG, slope_deg=None):
-    """Brought onto the kickstand, then still on it, engine off. lean_deg > 0: a kickstand on the right."""
+    """Move onto the kickstand, then stand on it, engine off. lean_deg > 0: a kickstand on the right."""
     return (
         Segment("moving", MOVE_S, lean_deg, 0.0, slope_deg, 0.0, 0.0),
         Segment("kickstand", seconds),
@@ -50,7 +51,7 @@ def kickstand(seconds, lean_deg=KICKSTAND_DEG, slope_deg=None):
 
 
 def upright(seconds, lean_deg=0.0, slope_deg=None):
-    """Brought upright, then held there by the rider, engine off. lean_deg: how far off upright."""
+    """Move upright, then be held there by the rider, engine off. lean_deg: how far off upright."""
     return (
         Segment("moving", MOVE_S, lean_deg, 0.0, slope_deg, STANDING_SWAY_DEG, 0.0),
         Segment("upright", seconds),
@@ -58,7 +59,7 @@ def upright(seconds, lean_deg=0.0, slope_deg=None):
 
 
 def wait(seconds):
-    """Stay as it is."""
+    """Keep everything as it is."""
     return (Segment("wait", seconds),)
 
 
@@ -82,13 +83,13 @@ def accelerate(speed_mps, seconds):
 
 
 def brake(speed_mps, seconds):
-    """Slow down to speed_mps, upright; a stop ends in the rider's hands."""
+    """Slow down to speed_mps, upright. At a stop the rider holds the bike."""
     sway = RIDING_SWAY_DEG if speed_mps else STANDING_SWAY_DEG
     return (Segment("brake", seconds, 0.0, speed_mps, sway_deg=sway),)
 
 
 def _glide(start, end, u, seconds):
-    """(value, derivative per second) at 0 <= u <= 1 of a step without jumps in its first two derivatives."""
+    """(value, derivative per second) at 0 <= u <= 1 of a change whose first two derivatives have no jumps."""
     change = end - start
     if change == 0.0:
         return start, 0.0
@@ -97,7 +98,7 @@ def _glide(start, end, u, seconds):
 
 
 def yaw_rate_in_balance(lean, lift_mps2, speed_mps):
-    """Yaw rate in rad/s that balances lean (rad) at this speed; lift: specific force off the road, m/s2."""
+    """Yaw rate in rad/s that balances a lean (rad) at this speed. lift_mps2: specific force away from the road."""
     if speed_mps <= WALKING_MPS:
         return 0.0
     share = 1.0
@@ -107,22 +108,22 @@ def yaw_rate_in_balance(lean, lift_mps2, speed_mps):
 
 
 def body_motion(lean, lean_rate, speed, acceleration, yaw_rate, slope=0.0, slope_rate=0.0):
-    """What the bike's own axes feel: (left, up, forward) in g and rates about them in deg/s.
+    """Specific force along the bike's own axes (left, up, forward) in g, and rates about them in deg/s.
 
     Angles in rad, rates in rad/s, speed in m/s, acceleration in m/s2 along the road.
     """
     # In the road's axes: forward along the road, left level, up across both.
     left = speed * yaw_rate * cos(slope)
-    up = GRAVITY_MPS2 * cos(slope) + speed * slope_rate
-    forward = acceleration + GRAVITY_MPS2 * sin(slope)
+    up = STANDARD_GRAVITY * cos(slope) + speed * slope_rate
+    forward = acceleration + STANDARD_GRAVITY * sin(slope)
     w_left = -slope_rate  # nose up turns forward towards up: negative about left
     w_up = yaw_rate * cos(slope)
     w_forward = yaw_rate * sin(slope) + lean_rate
     c, s = cos(lean), sin(lean)
     return (
-        (left * c + up * s) / GRAVITY_MPS2,
-        (up * c - left * s) / GRAVITY_MPS2,
-        forward / GRAVITY_MPS2,
+        (left * c + up * s) / STANDARD_GRAVITY,
+        (up * c - left * s) / STANDARD_GRAVITY,
+        forward / STANDARD_GRAVITY,
         degrees(w_left * c + w_up * s),
         degrees(w_up * c - w_left * s),
         degrees(w_forward),
@@ -130,9 +131,9 @@ def body_motion(lean, lean_rate, speed, acceleration, yaw_rate, slope=0.0, slope
 
 
 class Ride:
-    """segments: what the functions above return, in order from t = 0; the ride starts settled in the first.
+    """segments: what the functions above return, in order from t = 0. The ride starts with the first one's values.
 
-    vibration_g: rms of road and engine together on the up axis at 10 m/s and more, before the chip's filter.
+    vibration_g: rms of road and engine together along the up axis at 10 m/s and more, before the chip's filter.
     """
 
     def __init__(self, segments, vibration_g=0.05):
@@ -147,7 +148,7 @@ class Ride:
                 targets = segment.targets
                 end = tuple([values[i] if targets[i] is None else targets[i] for i in range(5)])
                 if segment.phase == "moving" and end == values:
-                    continue  # it is there already
+                    continue  # the bike is there already
                 self._segments.append((self.seconds, segment, values, end, distance))
                 self.seconds += segment.seconds
                 distance += segment.seconds * (values[1] + end[1]) / 2.0
@@ -161,13 +162,11 @@ class Ride:
             i -= 1
         while i + 1 < len(self._segments) and t_s >= self._segments[i + 1][0]:
             i += 1
-        self._at = i  # time mostly goes on: start the next search here
+        self._at = i  # the next search starts here, because time mostly increases
         return self._segments[i]
 
     def state(self, t_s):
-        """Phase, lean and its rate, speed, acceleration, yaw rate, slope and its rate, distance, engine 0..1.
-
-        In rad, m, s.
+        """(phase, lean, its rate, speed, acceleration, yaw rate, slope, its rate, distance, engine 0..1) in rad, m, s.
         """
         start, segment, before, after, distance = self._find(t_s)
         seconds = segment.seconds
@@ -188,7 +187,7 @@ class Ride:
         distance += seconds * (before[1] * u + (after[1] - before[1]) * glided)
         if t_s > self.seconds:
             distance += after[1] * (t_s - self.seconds)
-        lift = GRAVITY_MPS2 * cos(slope) + speed * slope_rate
+        lift = STANDARD_GRAVITY * cos(slope) + speed * slope_rate
         yaw = yaw_rate_in_balance(lean, lift, speed) / cos(slope)
         return segment.phase, lean, lean_rate, speed, acceleration, yaw, slope, slope_rate, distance, engine
 
@@ -205,7 +204,7 @@ class Ride:
 
 
 class CarRide(Ride):
-    """The same ways on four wheels: turns as quick as a motorcycle's at that lean, the body rolls a little outwards."""
+    """The same way in a car: it turns as a motorcycle at that lean does, and its body rolls a little outwards."""
 
     ROLL_SHARE = -0.08  # of the lean that a motorcycle would have
 
@@ -215,7 +214,7 @@ class CarRide(Ride):
 
 
 def shaken(motion, t_s, vibration_g, speed_mps, distance_m, engine):
-    """motion with road and engine vibration added. engine: 0 (off) to 1 (running)."""
+    """motion with the vibration of road and engine added. engine: 0 (off) to 1 (running)."""
     road = vibration_g * min(1.0, speed_mps / 10.0) * sqrt(1.0 - _ENGINE_SHARE * _ENGINE_SHARE)
     firing = vibration_g * engine * _ENGINE_SHARE
     if road == 0.0 and firing == 0.0:

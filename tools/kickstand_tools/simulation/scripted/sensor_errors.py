@@ -1,7 +1,7 @@
-"""An MPU6050 as it leaves the factory, stuck on at any angle: what its own axes read of a given motion.
+"""What an MPU6050 with its factory errors, mounted at any angle, reads of a given motion.
 
-Plain Python for CPython and MicroPython. Everything random comes from a seed and from the time asked for: the
-same seed gives the same reading at the same instant on either, in any order.
+Plain Python for CPython and MicroPython. All random figures depend on the seed and on the time that is asked for: a
+seed gives the same reading at the same instant on both, whatever was asked before.
 
     world = Sensor(seed=3).world(ride.motion)
     world(20.0)         # (fx, fy, fz, wx, wy, wz, temp_c): g and deg/s in the sensor's axes, errors included
@@ -9,19 +9,19 @@ same seed gives the same reading at the same instant on either, in any order.
 
 from math import cos, pi, sin, sqrt
 
-# Data sheet PS-MPU-6000A rev 3.4, section 6.1-6.2
-MAX_OFFSET_G = (0.05, 0.05, 0.08)
-MAX_SCALE_ERROR = 0.03
-MAX_GYRO_BIAS_DPS = 20.0
+from kickstand.units import AXES
+
+from ..data_sheet import MAX_GYRO_BIAS_DPS, MAX_OFFSET_G, MAX_SCALE_ERROR
+
 ACCEL_NOISE_G = 0.0033  # rms: 400 ug/sqrt(Hz) behind the 44 Hz low-pass
 GYRO_NOISE_DPS = 0.041  # rms: 0.005 deg/s/sqrt(Hz) behind the 42 Hz one
 
 UNTURNED = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-_NOISE_STEP_S = 0.0001  # noise is new every step
+_NOISE_STEP_S = 0.0001  # the noise changes so often
 
 
 def scrambled(number):
-    """A whole number's 32-bit hash: the only source of chance here."""
+    """The 32-bit hash of an integer: the only source of random figures here."""
     number = (number ^ (number >> 16)) & 0xFFFFFFFF
     number = (number * 0x45D9F3B) & 0xFFFFFFFF
     number ^= number >> 16
@@ -30,7 +30,7 @@ def scrambled(number):
 
 
 def normal(number):
-    """Very nearly normal, mean 0, rms 1, from a 32-bit hash: the sum of its four bytes."""
+    """A nearly normal figure of mean 0 and rms 1 from a 32-bit hash: the sum of its four bytes."""
     total = (number & 255) + (number >> 8 & 255) + (number >> 16 & 255) + (number >> 24)
     return (total - 510) / 147.8
 
@@ -48,7 +48,7 @@ class Chance:
 
 
 def random_mounting(seed):
-    """Vehicle from sensor (9, rows left, up, forward), all rotations equally likely (K. Shoemake, 1992)."""
+    """Vehicle from sensor (9, rows left, up, forward); every rotation is equally likely (K. Shoemake, 1992)."""
     chance = Chance(seed)
     u = chance.uniform(0.0, 1.0)
     a, b = chance.uniform(0.0, 2.0 * pi), chance.uniform(0.0, 2.0 * pi)
@@ -78,10 +78,10 @@ def axis_aligned_mountings():
 
 
 class Sensor:
-    """One chip: its errors and how it is mounted. Without a seed a perfect chip but for its noise, unturned.
+    """One sensor: its errors and its mounting. Without a seed it has no error but noise, and is not turned.
 
     reading = scale * true + offset for the accelerometer, scale * true + bias for the gyro, each with noise.
-    share: how much of the data sheet's worst offsets, scales and biases a random part may have.
+    share: the limit of offsets, scale errors and biases over the data sheet's. noise: over the data sheet's.
     """
 
     def __init__(self, seed=None, mounting=None, share=1.0, noise=1.0):
@@ -104,7 +104,7 @@ class Sensor:
             self.gyro_scale = tuple([1.0 + chance.uniform(-error, error) for _ in range(3)])
 
     def read(self, motion, t_s):
-        """World's seven figures for a motion: left, up, forward in g, and the rates about them in deg/s."""
+        """The seven figures of world() for a motion: left, up, forward in g, and the rates about them in deg/s."""
         m = self.vehicle_from_sensor
         left, up, forward, w_left, w_up, w_forward = motion
         instant = self._seed + int(t_s / _NOISE_STEP_S + 0.5) * 6
@@ -121,12 +121,12 @@ class Sensor:
         return tuple(values)
 
     def world(self, motion):
-        """world(t_s) for the simulated chip; motion(t_s) as Ride.motion."""
+        """world(t_s) for the simulated board; motion(t_s) as Ride.motion."""
         return lambda t_s: self.read(motion(t_s), t_s)
 
 
 def resting(sensor, up):
-    """world(t_s) of this sensor at rest with `up` (sensor's own axes, any length) pointing up."""
+    """world(t_s) of this sensor at rest with `up` (a vector of any length in its own axes) pointing up."""
     m = sensor.vehicle_from_sensor
     size = sqrt(up[0] * up[0] + up[1] * up[1] + up[2] * up[2])
     force = [(m[3 * i] * up[0] + m[3 * i + 1] * up[1] + m[3 * i + 2] * up[2]) / size for i in range(3)]
@@ -135,7 +135,7 @@ def resting(sensor, up):
 
 
 def six_poses(sensor, off_deg=0.0, seed=1):
-    """Seven (name, world): the sides up in turn, "+x", "-x", ..., each up to off_deg askew; then "free"."""
+    """Seven (name, world): "+x", "-x", ... with that side up, but up to off_deg askew; then "free", a slanted one."""
     chance = Chance(seed + 2000)
     poses = []
     for axis in range(3):
@@ -146,6 +146,6 @@ def six_poses(sensor, off_deg=0.0, seed=1):
             up[axis] = sign * cos(askew)
             up[(axis + 1) % 3] = sin(askew) * cos(around)
             up[(axis + 2) % 3] = sin(askew) * sin(around)
-            poses.append((("+" if sign > 0 else "-") + "xyz"[axis], resting(sensor, up)))
+            poses.append((("+" if sign > 0 else "-") + AXES[axis], resting(sensor, up)))
     poses.append(("free", resting(sensor, (0.5, 0.6, -0.7))))
     return poses

@@ -1,0 +1,51 @@
+"""The commands that run the firmware without a board: demo, emulate, bench."""
+
+import json
+import sys
+
+import click
+
+
+@click.command()
+@click.option("--hand", is_flag=True, help="Lean the bike and press the button yourself, with keys.")
+@click.option("--cpython", is_flag=True, help="Run the firmware on CPython, not on MicroPython.")
+def demo(hand: bool, cpython: bool) -> None:
+    """Watch the firmware on a simulated board: kickstand press, upright press, a ride."""
+    from ..demo.demo import DeviceStopped, demo
+
+    try:
+        demo(hand, cpython)
+    except DeviceStopped as error:
+        click.echo(str(error), err=True)
+        sys.exit(1)
+
+
+@click.command()
+@click.option("--port", type=click.IntRange(1024, 65535), default=2040, help="On which mpremote finds it.")
+def emulate(port: int) -> None:
+    """An emulated Pico on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
+    from ..emulator import image
+
+    image.find()  # before anything else of the emulator is imported
+    from ..emulator.emulate import emulate
+
+    emulate(port, click.echo)
+
+
+@click.command()
+@click.option("--seconds", type=click.IntRange(1, 600), default=10, help="Emulated, of each of four runs.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def bench(seconds: int, as_json: bool) -> None:
+    """What the firmware costs on an emulated Pico: time, memory, flash."""
+    from ..emulator import image
+
+    image.find()  # before anything else of the emulator is imported
+    from rich.console import Console
+
+    from ..bench.bench import bench, tables
+
+    result = bench(seconds)
+    if as_json:
+        click.echo(json.dumps(result))
+    else:
+        Console().print(tables(result))

@@ -1,0 +1,103 @@
+"""The demo's device (device.py) in a process of its own, under MicroPython or CPython."""
+
+import contextlib
+import json
+import os
+import queue
+import subprocess
+import sys
+import tempfile
+import threading
+from pathlib import Path
+
+from .. import firmware_path, unix_port
+from .score import State
+
+
+class Device:
+    """The firmware on the simulated board. Use it in a `with` statement and call ticks() until ended.
+
+    engine: "micropython" or "cpython". kind and speed: the arguments of device.py.
+    """
+
+    def __init__(self, engine: str, kind: str, speed: float) -> None:
+        self._lines: queue.Queue[str | None] = queue.Queue()
+        self.ended = False
+        self._outcome = ""
+        self.console: list[str] = []  # lines of the device's console, without its ticks
+        self._directory = tempfile.TemporaryDirectory()  # the board's flash
+        if engine == "micropython":
+            script = Path(__file__).resolve().parent / "device.py"
+            command, environment = unix_port.command(str(script), kind, str(speed)), unix_port.environment()
+        else:
+            command = [sys.executable, "-m", "kickstand_tools.demo.device", kind, str(speed)]
+            path = os.pathsep.join(filter(None, [firmware_path.search_path(), os.environ.get("PYTHONPATH")]))
+            environment = os.environ | {"PYTHONPATH": path}
+        self._process = subprocess.Popen(
+            command,
+            env=environment,
+            cwd=self._directory.name,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            encoding="utf-8",
+            errors="replace",
+            start_new_session=True,  # Ctrl-C is for this process alone
+        )
+        threading.Thread(target=self._read, daemon=True).start()
+
+    def __enter__(self) -> "Device":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.hang_up()
+        try:
+            self._process.wait(3.0)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+        self._directory.cleanup()
+
+    def _read(self) -> None:
+        assert self._process.stdout
+        for line in self._process.stdout:
+            self._lines.put(line)
+        self._lines.put(None)
+
+    def hang_up(self) -> None:
+        """Close the device's standard input, at which it quits."""
+        assert self._process.stdin
+        with contextlib.suppress(OSError):
+            self._process.stdin.close()
+
+    def send(self, command: str) -> None:
+        """Send one of the commands of device.py."""
+        assert self._process.stdin
+        with contextlib.suppress(OSError):
+            self._process.stdin.write(command + "\n")
+            self._process.stdin.flush()
+
+    @property
+    def failed(self) -> bool:
+        """True if it ended before its time was up."""
+        return self.ended and self._outcome != "off"
+
+    def ticks(self, wait_s: float) -> list[State]:
+        """The ticks that have arrived; waits up to wait_s for the first. Sets `ended` with the last of all."""
+        ticks = []
+        with contextlib.suppress(queue.Empty):
+            line = self._lines.get(timeout=wait_s)
+            while line is not None:
+                try:
+                    message = json.loads(line)
+                except ValueError:
+                    self.console.append(line.rstrip())
+                else:
+                    if "ended" in message:
+                        self._outcome = message["ended"]
+                    else:
+                        ticks.append(message)
+                line = self._lines.get_nowait()
+            self.ended = True
+        return ticks

@@ -1,0 +1,137 @@
+"""MicroPython's machine.I2C, SoftI2C and UART on the simulated board, with the errors of the rp2 and esp32 ports."""
+
+import errno
+
+from ..clock import Reset
+from . import current
+from .pins import Pin
+
+
+class SoftI2C:
+    """machine.SoftI2C, and the common part of machine.I2C. freq in Hz, timeout in us."""
+
+    def __init__(self, scl, sda, freq=400000, timeout=50000):
+        self._bus = current.board.bus_on(Pin(sda).id, Pin(scl).id, freq)
+        self._clock = current.board.clock
+        self._bit_ns = 1_000_000_000 // freq
+        self._ns = 0  # less than a microsecond: time that has passed but is not on the clock yet
+        self._timeout_us = timeout
+
+    def readfrom_mem_into(self, addr, memaddr, buf, addrsize=8):
+        self._start(addr, False)
+        self._send(memaddr)
+        self._start(addr, True)
+        self._receive(buf)
+        self._bus.stop()
+
+    def readfrom_mem(self, addr, memaddr, nbytes, addrsize=8):
+        buf = bytearray(nbytes)
+        self.readfrom_mem_into(addr, memaddr, buf)
+        return bytes(buf)
+
+    def writeto_mem(self, addr, memaddr, buf, addrsize=8):
+        self._start(addr, False)
+        self._send(memaddr)
+        for value in buf:
+            self._send(value)
+        self._bus.stop()
+
+    def writeto(self, addr, buf, stop=True):
+        self._start(addr, False)
+        for value in buf:
+            self._send(value)
+        if stop:
+            self._bus.stop()
+        return len(buf)
+
+    def readfrom_into(self, addr, buf, stop=True):
+        self._start(addr, True)
+        self._receive(buf)
+        if stop:
+            self._bus.stop()
+
+    def readfrom(self, addr, nbytes, stop=True):
+        buf = bytearray(nbytes)
+        self.readfrom_into(addr, buf, stop)
+        return bytes(buf)
+
+    def scan(self):
+        found = []
+        for address in range(0x08, 0x78):
+            try:
+                self.writeto(address, b"")
+            except OSError:
+                continue
+            found.append(address)
+        return found
+
+    def _spend(self, bits):
+        ns = self._ns + bits * self._bit_ns
+        self._ns = ns % 1000
+        self._clock.advance(ns // 1000)
+
+    def _start(self, address, read):
+        self._spend(10)  # START, seven bits, R/W, ACK
+        answer = self._bus.start(address, read)
+        if not answer:
+            self._bus.stop()
+            if answer is None:
+                self._clock.advance(self._timeout_us)
+                raise OSError(errno.ETIMEDOUT)
+            raise OSError(errno.ENODEV if current.board.port == "esp32" else errno.EIO)
+
+    def _send(self, value):
+        self._spend(9)
+        if not self._bus.write_byte(value):
+            self._bus.stop()
+            raise OSError(errno.EIO)
+
+    def _receive(self, buf):
+        length = len(buf)
+        try:
+            self._spend(9 * length + 1)  # the STOP included
+        except Reset:
+            self._bus.hang()  # the device does not notice the reset and goes on sending
+            raise
+        bus = self._bus  # a local for bus.read_byte would be a bound method, which MicroPython allocates
+        for i in range(length):
+            buf[i] = bus.read_byte()
+
+
+class I2C(SoftI2C):
+    """machine.I2C. On rp2 each controller can use only certain pins."""
+
+    def __init__(self, id, scl=None, sda=None, freq=400000, timeout=50000):
+        if current.board.port == "rp2":
+            if sda is None or Pin(sda).id % 4 != 2 * id:
+                raise ValueError("bad SDA pin")
+            if scl is None or Pin(scl).id % 4 != 2 * id + 1:
+                raise ValueError("bad SCL pin")
+        super().__init__(scl, sda, freq, timeout)
+
+
+class UART:
+    """machine.UART, receiving only. Bytes that do not fit into rxbuf are lost, as on the boards."""
+
+    def __init__(self, id, baudrate=115200, tx=None, rx=None, rxbuf=256, timeout=0):
+        if current.board.port == "rp2":
+            if tx is None or tx.id % 4 != 0 or (tx.id + 4) // 8 % 2 != id:
+                raise ValueError("bad TX pin")
+            if rx is None or rx.id % 4 != 1 or (rx.id + 4) // 8 % 2 != id:
+                raise ValueError("bad RX pin")
+        self._received = b""
+        self._size = rxbuf
+
+        def receive(data):
+            self._received = (self._received + data)[: self._size]
+
+        current.board.connect_uart(Pin(rx).id, baudrate, receive)
+
+    def any(self):
+        current.board.clock.advance(current.CALL_US)
+        return len(self._received)
+
+    def read(self, nbytes):
+        data = self._received[:nbytes]
+        self._received = self._received[nbytes:]
+        return data or None
