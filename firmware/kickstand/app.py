@@ -110,7 +110,7 @@ class App:
             self.screen.interrupt(now_ms)
             if not self._fault_shown:
                 self._page_ms = now_ms  # at once: the next thing is to start the sensor again
-        elif not self.sensor.chip.left:
+        elif self.sensor.emptied:
             self._clock.emptied(now_us)
         self.screen.handle(self.button.poll(now_ms), now_ms)
         if ticks_diff(now_ms, self._page_ms) >= 0:
@@ -118,10 +118,8 @@ class App:
         self.lcd.tick(now_ms)
         if self.recorder.active:
             self.recorder.tick()
-        if self.recorder.stalled:
-            self.recorder.stalled = False
-            if self.drive:
-                self.drive.speed.skip(ticks_ms())
+        if self.recorder.take_stall() and self.drive:
+            self.drive.speed.after_stall(ticks_ms())
 
     def _poll_speed(self, now_ms):
         speed = self.drive.poll(now_ms)

@@ -11,7 +11,7 @@ TURN_S, BEGIN_S = 0.1, 1.0
 # A card of 32 GB in RAM, of which only what is not zero is kept; its clusters are the usual 32 KB
 _CARD = """
 import json, os
-from kickstand.rides import flash_ring
+from kickstand.rides import flash_ring, ride_paths
 from kickstand.rides.flash_ring import RideRing
 
 class Card:
@@ -37,7 +37,7 @@ class Card:
 class Settings:
     SD_SPI = 0
 
-flash_ring.directory = lambda _settings: "/sd/rides"
+ride_paths.directory = lambda _settings: "/sd/rides"
 card = Card()
 os.VfsFat.mkfs(card)
 os.mount(os.VfsFat(card), "/sd")
@@ -115,8 +115,8 @@ def record(blocks):
 
 def held():
     found = {}
-    for ride, part, size in flash_ring.parts("/sd/rides"):
-        with open(flash_ring.part_path("/sd/rides", ride, part), "rb") as file:
+    for ride, part, size in ride_paths.parts("/sd/rides"):
+        with open(ride_paths.part_path("/sd/rides", ride, part), "rb") as file:
             data = file.read()
         assert data == bytes([ride]) * size
         found[ride] = found.get(ride, 0) + size // 4096

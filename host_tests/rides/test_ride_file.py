@@ -40,13 +40,13 @@ block.close()
 print("".join("%02x" % byte for byte in block.buffer[:block.length]))
 """
 
-# Random entries, most of them likely ones, coded by machine code and plainly: everything has to be the same
+# Random entries, most of them likely ones, coded by machine code and by Python: everything has to be the same
 _BOTH = """
 import random
 from array import array
 from kickstand.rides import block as block_format
-from kickstand.rides.block import encode, encode_plainly
-assert encode is not encode_plainly
+from kickstand.rides.block import encode, encode_python
+assert encode is not encode_python
 random.seed(1)
 for block in range(300):
     states, outs = [], []
@@ -67,7 +67,7 @@ for block in range(300):
         for _ in range(6):
             entry.append(max(1, n) * random.randint(-wide - 1, wide))
         entry.append(random.choice((0, random.randint(0, 30000), random.randint(0, 1 << 24))))
-        for function, state, out in zip((encode, encode_plainly), states, outs):
+        for function, state, out in zip((encode, encode_python), states, outs):
             function(entry, state, out)
         assert states[0] == states[1], (list(entry), states)
     assert outs[0] == outs[1]

@@ -8,8 +8,9 @@ import types
 
 import pytest
 import ride_writer
-from kickstand.rides import flash_ring
-from kickstand.rides.flash_ring import RideRing, part_path
+from kickstand.rides import flash_ring, ride_paths
+from kickstand.rides.flash_ring import RideRing
+from kickstand.rides.ride_paths import part_path
 from kickstand_tools.rides import block_reader
 from kickstand_tools.simulated_board.fakes import fake_machine, fake_os, fake_time
 
@@ -127,9 +128,7 @@ def test_the_oldest_go_part_by_part_with_their_directories_and_one_step_a_turn(r
 
         return call
 
-    patched = types.SimpleNamespace(
-        mkdir=os.mkdir, ilistdir=fake_os.ilistdir, remove=noted(os.remove), rmdir=noted(os.rmdir)
-    )
+    patched = types.SimpleNamespace(mkdir=os.mkdir, remove=noted(os.remove), rmdir=noted(os.rmdir))
     monkeypatch.setattr(flash_ring, "os", patched)
     recorder.start(ride_writer.CHIP, ride_writer.calibration())
     assert recorder.room_s() == (len(names) + len(strays)) * 4096 // 1024
@@ -148,7 +147,7 @@ def test_the_oldest_go_part_by_part_with_their_directories_and_one_step_a_turn(r
     assert not (flash.root / "rides/001/00").exists()
     assert all((flash.root / "rides" / name).exists() for name in strays)
     assert (flash.root / part_path("rides", 113, 2)).exists()
-    sizes = {ride: sizes for ride, _, sizes in flash_ring.parts("rides")}
+    sizes = {ride: sizes for ride, _, sizes in ride_paths.parts("rides")}
     assert sorted(sizes) == list(range(98 + len(removed) // 4, 114))
 
 
@@ -245,7 +244,7 @@ def test_a_file_system_that_fails_ends_the_ride_and_keeps_what_was_written(recor
     assert said.getvalue().startswith("recording stopped")
     assert recorder.problem == ("Rec. stopped", "flash fault")
     assert not recorder.active
-    recorder.problem = None
+    assert recorder.take_problem()
     ride(recorder, flash, 2000, seed=1)
     assert recorder.problem is None
     parts = {path.parent.name: block_reader.read(path.read_bytes())[0] for path in flash.root.glob("rides/*/*/*.rid")}
@@ -255,7 +254,7 @@ def test_a_file_system_that_fails_ends_the_ride_and_keeps_what_was_written(recor
 
 
 def test_a_card_that_is_pulled_is_said(recorder, flash, monkeypatch):
-    monkeypatch.setattr(flash_ring, "directory", lambda _settings: "rides")
+    monkeypatch.setattr(ride_paths, "directory", lambda _settings: "rides")
     flash.size += 1 << 20
     recorder.keeper = RideRing(types.SimpleNamespace(SD_SPI=0))
     with contextlib.redirect_stdout(io.StringIO()):

@@ -131,9 +131,9 @@ class Screen:
 
     def lines(self, now_ms):
         """What the display should say now."""
-        if self._recorder.problem:
-            self._notify(self._recorder.problem, now_ms)
-            self._recorder.problem = None
+        problem = self._recorder.take_problem()
+        if problem:
+            self._notify(problem, now_ms)
         if self._noticed(now_ms):
             return self._notice
         if self.wizard:
