@@ -49,8 +49,7 @@ def _sensor(sensor, settings):
     """Print what answers; return its WHO_AM_I, 0 for nothing."""
     chip = sensor.chip
     try:
-        chip.connect(sensor.reopen())
-        chip.setup()
+        sensor.set_up()
         chip.read()
     except UnknownChip as error:
         print(
