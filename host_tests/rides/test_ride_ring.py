@@ -1,4 +1,5 @@
-"""The ring of rides: the oldest go first, there is room left, a file system that fails ends a ride cleanly."""
+"""The ring of rides: the oldest are removed first, some room is always left, and a file system that fails ends a ride
+without an exception."""
 
 import contextlib
 import io
@@ -19,7 +20,7 @@ NEEDED = RideRing(SETTINGS).needed
 
 
 class Flash:
-    """A small flash: as many bytes as it holds, and what its file system does wrong."""
+    """A small flash of `size` bytes. least: the fewest that were free."""
 
     def __init__(self, root, size):
         self.root, self.size = root, size
@@ -102,13 +103,13 @@ def test_a_ride_longer_than_the_flash_keeps_its_end(recorder, flash):
     assert sequences[0] > 0 and sequences[0] % 16 == 0
     assert rooms[2:] == sorted(rooms[2:], reverse=True)
     assert rooms[-1] == 0
-    # what it foretold when it had just begun
+    # the room that it showed when the ride had just begun was right
     bytes_s = sum(map(len, ride_writer.blocks(20)[0])) / (sum(dt for _, _, dt in ride_writer.blocks(20)[1]) / 1e6)
     assert rooms[2] + 80 == pytest.approx((flash.size - NEEDED) / bytes_s, rel=0.2)
 
 
 def test_the_oldest_go_part_by_part_with_their_directories_and_one_step_a_turn(recorder, flash, monkeypatch):
-    """Rides 98 to 112: two groups. What is not the recorder's stays, and its directory with it."""
+    """Rides 98 to 112, which are in two groups. The owner's own files stay, and their directories."""
     names = [part_path("rides", ride, part) for ride in range(98, 113) for part in range(4)]
     for name in reversed(names):
         (flash.root / name).parent.mkdir(parents=True, exist_ok=True)
@@ -152,7 +153,7 @@ def test_the_oldest_go_part_by_part_with_their_directories_and_one_step_a_turn(r
 
 
 def test_a_ride_without_a_block_leaves_no_directory_of_its_own(recorder, flash):
-    """The power goes again and again within the first seconds: in flash each would take 8 KB."""
+    """The power goes again and again within the first seconds. In flash each directory would take 8 KB."""
     for _ in range(5):
         recorder.start(ride_writer.CHIP, ride_writer.calibration())
         recorder.active = False
@@ -199,7 +200,7 @@ def test_a_flash_that_is_full_of_other_things_refuses_in_one_line(recorder, flas
 
 
 class Worn:
-    """Files that can be used so many times, and then no more."""
+    """Files that can be used so many times; then each use fails."""
 
     def __init__(self, uses):
         self.uses = uses
@@ -235,7 +236,7 @@ class WornFile:
 
 @pytest.mark.parametrize("uses", [0, 1, 2, 17, 18, 19, 35, 36, 50, 52])
 def test_a_file_system_that_fails_ends_the_ride_and_keeps_what_was_written(recorder, flash, uses, monkeypatch):
-    """Whenever it does: one notice, no exception, and the next ride is recorded when it works again."""
+    """Whenever it fails there is one notice and no exception, and the next ride is recorded when it works again."""
     worn = Worn(uses)
     with monkeypatch.context() as patch, contextlib.redirect_stdout(io.StringIO()) as said:
         patch.setattr(flash_ring, "open", worn.open, raising=False)
@@ -244,11 +245,11 @@ def test_a_file_system_that_fails_ends_the_ride_and_keeps_what_was_written(recor
     assert said.getvalue().startswith("recording stopped")
     assert recorder.problem == ("Rec. stopped", "flash fault")
     assert not recorder.active
-    assert recorder.take_problem()
+    assert recorder.take_problem() and recorder.take_problem() is None
     ride(recorder, flash, 2000, seed=1)
     assert recorder.problem is None
     parts = {path.parent.name: block_reader.read(path.read_bytes())[0] for path in flash.root.glob("rides/*/*/*.rid")}
-    if uses:  # it could be made
+    if uses:  # the ride's directory could be made
         assert len(parts.pop("01")) >= worn.flushed == (uses - 1) // 17
     assert [len(blocks) for blocks in parts.values()] == [5]
 
@@ -263,8 +264,18 @@ def test_a_card_that_is_pulled_is_said(recorder, flash, monkeypatch):
     assert recorder.problem == ("Rec. stopped", "card fault")
 
 
+@pytest.mark.parametrize("stops_interrupts", [True, False])
+def test_a_stall_is_told_once(stops_interrupts, recorder, flash):
+    """The end of a ride closes a file, which may erase flash."""
+    recorder.keeper.stops_interrupts = stops_interrupts
+    assert not recorder.take_stall()
+    ride(recorder, flash, 10)
+    assert recorder.take_stall() is stops_interrupts
+    assert not recorder.take_stall()
+
+
 def test_a_gap_in_the_readings_is_one_in_the_log(recorder, flash):
-    """After a fault of the sensor the filter starts again, on the board and in the replay: that takes half a second."""
+    """After a fault of the sensor the filter starts again on the board; a gap of half a second makes the replay's do so."""
     recorder.start(ride_writer.CHIP, ride_writer.calibration())
     for i, (sums, n, dt_us) in enumerate(ride_writer.turns(100)):
         if i == 50:
@@ -279,7 +290,7 @@ def test_a_gap_in_the_readings_is_one_in_the_log(recorder, flash):
 
 
 def test_a_speed_source_without_a_sensor_fills_no_block(recorder, flash):
-    """Only turns are counted against the room in a block. The speed that the next turn gets is the newest."""
+    """Speeds are written only with turns. A turn gets the newest speed."""
     recorder.start(ride_writer.CHIP, ride_writer.calibration())
     turns = list(ride_writer.turns(20))
     for sums, n, dt_us in turns[:10]:
