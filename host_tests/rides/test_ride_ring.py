@@ -275,7 +275,7 @@ def test_a_stall_is_told_once(stops_interrupts, recorder, flash):
 
 
 def test_a_gap_in_the_readings_is_one_in_the_log(recorder, flash):
-    """After a fault of the sensor the filter starts again on the board; a gap of half a second makes the replay's do so."""
+    """After a fault of the sensor the board's filter starts again. A gap of half a second restarts the replay's."""
     recorder.start(ride_writer.CHIP, ride_writer.calibration())
     for i, (sums, n, dt_us) in enumerate(ride_writer.turns(100)):
         if i == 50:
