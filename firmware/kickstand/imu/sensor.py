@@ -22,7 +22,7 @@ class Sensor:
         self.chip = chip
         self.reopen = reopen
         self._failures = 0  # transfers that failed in a row
-        self._overflows = 0  # of the chip's, those that are dealt with
+        self._overflows = 0  # of the chip's FIFO, those that are dealt with
         self._due_ms = ticks_ms()  # when the next check is due or, while the chip does not run, the next attempt
         self._sample_ms = 0  # when the last sample was read
         self.restarts = 0

@@ -12,7 +12,7 @@ from time import ticks_diff
 
 MAX_SENTENCE = 100  # bytes: the standard says 82, but receivers with many decimals exceed it
 MAX_CHUNK = 64  # bytes read in one turn of the loop: in turns of 10 ms, twice what 10 fixes a second need
-SILENT_MS = 3000  # without what is waited for: then fault() says so
+SILENT_MS = 3000  # without any byte, without a whole sentence, or without a fix: then fault() tells which
 LATE_MS = 2000  # a fix that waited in the receiver for longer than this says nothing about now
 TIME_JUMP_MS = 5000  # a fix that seems later than this is not: the receiver has corrected its clock
 # The delay of a fix is counted from a fix that was not late, the reference. When at least so many fixes over more than
