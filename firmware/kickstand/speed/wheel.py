@@ -16,8 +16,8 @@ STOPPED_MPS = 0.5  # a wheel slower than this counts as standing
 MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # limits of the time without a pulse that means standing
 REPORT_MS = 100  # poll() returns a speed at most so often
 STANDING_MS = 200  # and a speed of zero at most so often
-# Counts and times wrap at 30 bits. The interrupt subtracts times with this mask and not by ticks_diff(), which would give
-# a negative time after nine minutes of standing.
+# Counts and times wrap at 30 bits. The interrupt subtracts times with this mask and not by ticks_diff(), which would
+# give a negative time after nine minutes of standing.
 _TICKS = _COUNT = 0x3FFFFFFF
 
 
