@@ -20,7 +20,7 @@ ARROWS = {
     "console": set(),
     "board": set(),  # pins, bus, button, display, card: no mathematics
     "imu": set(),
-    "calibration": {"lean.upright_trim"},  # how large a trim may be, to judge a record in flash
+    "calibration": set(),
     "lean": {"calibration"},
     "drive_alignment": {"calibration"},
     "speed": {"board"},

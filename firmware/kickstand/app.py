@@ -113,7 +113,7 @@ class App:
             self.screen.interrupt(now_ms)
             if not self._fault_shown:
                 self._page_ms = now_ms  # at once: the next thing is to start the sensor again
-        elif not self.sensor.chip.left:
+        elif self.sensor.emptied:
             self._clock.emptied(now_us)
         event = self.button.poll(now_ms)
         if event:
@@ -123,10 +123,8 @@ class App:
         self.lcd.tick(now_ms)
         if self.recorder.active:
             self.recorder.tick()
-        if self.recorder.stalled:
-            self.recorder.stalled = False
-            if self.drive:
-                self.drive.speed.skip(ticks_ms())
+        if self.recorder.take_stall() and self.drive:
+            self.drive.speed.after_stall(ticks_ms())
 
     def record(self):
         """Begin to record a ride.

@@ -1,4 +1,4 @@
-"""Display, sensor and button as config.py has them: what the app, kickstand.status() and main.py open."""
+"""Opens the display, the sensor and the button on the pins that config.py names. settings: a Settings."""
 
 from machine import Pin
 
@@ -11,13 +11,12 @@ from .imu.sensor import Sensor
 
 
 def open_lcd(settings):
-    """The display of these settings; pins that the controller cannot use raise SettingsError when it is first spoken
-    to."""
+    """The display, an Lcd. Its tick() raises SettingsError for pins that the I2C controller cannot use."""
     return Lcd(lambda: _open_bus(settings, "LCD"), settings.LCD_ADDRESSES)
 
 
 def open_sensor(settings):
-    """The chip of these settings, watched over; wrong pins raise SettingsError at its first fetch()."""
+    """The chip, as a Sensor. Its fetch() raises SettingsError for pins that the I2C controller cannot use."""
     chip = Mpu6050(
         None,
         settings.SENSOR_ADDRESS,
@@ -31,7 +30,7 @@ def open_sensor(settings):
 
 
 def open_button(settings):
-    """The button of these settings. Raises SettingsError for a pin that the board does not have."""
+    """The button, a Button. Raises SettingsError for a pin that the board does not have."""
     try:
         return Button(Pin(settings.BUTTON_PIN, Pin.IN, Pin.PULL_UP))
     except ValueError as error:
@@ -39,6 +38,7 @@ def open_button(settings):
 
 
 def _open_bus(settings, name):
+    """A machine.I2C. name: "SENSOR" or "LCD", with which the names of its settings begin."""
     controller = getattr(settings, name + "_I2C")
     sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
     try:

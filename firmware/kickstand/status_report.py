@@ -51,8 +51,7 @@ def _sensor(sensor, settings):
     """Print which sensor answers; return its WHO_AM_I, or 0 if none does."""
     chip = sensor.chip
     try:
-        chip.connect(sensor.reopen())
-        chip.setup()
+        sensor.set_up()
         chip.read()
     except UnknownChip as error:
         print(

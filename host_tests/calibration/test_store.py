@@ -1,13 +1,15 @@
-"""The calibration records: whatever happens to the files, a whole calibration or none, and never a crash."""
+"""The calibration records: whatever happens to the files, loading gives a whole calibration or none, and no crash."""
 
 import io
 import struct
 from binascii import crc32
+from math import degrees
 
 import pytest
 from kickstand.calibration.parameters import Calibration
 from kickstand.calibration.store import FILES, Store
 from kickstand.errors import StoreError
+from kickstand.lean.upright_trim import MAX_TRIM
 
 
 def calibration(mark):
@@ -50,7 +52,15 @@ def test_what_is_saved_is_loaded(store):
         assert store.message == f"record {mark}"
 
 
-def test_how_it_was_aligned_is_kept_and_records_of_before_are_read(store, tmp_path):
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_the_largest_trim_that_the_filter_finds_is_loaded_again(store, sign):
+    new = calibration(1)
+    new.trim_deg = sign * degrees(MAX_TRIM)
+    store.save(new)
+    assert store.load().trim_deg == pytest.approx(sign * degrees(MAX_TRIM))
+
+
+def test_how_it_was_aligned_is_kept_and_older_records_are_read(store, tmp_path):
     new = calibration(1)
     new.by_drive = True
     store.save(new)
@@ -146,7 +156,7 @@ def test_flash_that_does_not_keep_what_is_written(store, tmp_path, monkeypatch):
 
 
 def test_a_trim_may_be_stored_beside_a_record_that_never_was_this_sensors(store, tmp_path):
-    """Another range, aligned once; likewise a record that a power cut left empty."""
+    """Such as that of another range, or one that a power cut left empty."""
     store.save(calibration(1))
     store.save(calibration(2))
     other = Store(0x68, 16, str(tmp_path))
@@ -167,7 +177,7 @@ def test_a_trim_may_be_stored_beside_a_record_that_never_was_this_sensors(store,
 
 
 def test_nothing_is_stored_over_a_record_that_misread_for_a_while(store, tmp_path):
-    """A voltage sag while loading: the older record is in use, the newer one is whole."""
+    """A voltage sag while loading: the older record is in use, but the newer one is whole."""
     store.save(calibration(1))
     store.save(calibration(2))
     newest = newest_file(tmp_path, store)

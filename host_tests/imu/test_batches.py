@@ -1,5 +1,5 @@
-"""The samples of one turn of the loop, added up and transformed at once: against numpy, and the plain against the
-quick way, on CPython and MicroPython."""
+"""The samples of one turn of the loop, added up and transformed together: against numpy on CPython and MicroPython, and
+machine code against Python."""
 
 import engines
 import numpy as np
@@ -19,15 +19,15 @@ def noise(count, seed=0):
 
 
 def added(engine, batches, limit=LIMIT):
-    """What add_up says of each batch; the plain way must say the same."""
-    quick, plain = engines.run(engine, [("add_up", (batches, limit))])[0]
-    assert quick == plain
-    return quick
+    """What add_up() gives for each batch; add_up_python() must give the same."""
+    chosen, python = engines.run(engine, [("add_up", (batches, limit))])[0]
+    assert chosen == python
+    return chosen
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_sums(engine):
-    """Of none, of one, of eight; at the ends of the range."""
+    """Of no sample, of one, of eight, and at the ends of the range."""
     ends = np.array([[-32768] * 7, [32767] * 7, [-32768] * 7, [32767] * 7])
     batches = [noise(0), noise(1), noise(8), ends]
     answers = added(engine, [frames(batch) for batch in batches])
@@ -37,7 +37,7 @@ def test_sums(engine):
 @pytest.mark.parametrize("engine", engines.ENGINES)
 @pytest.mark.parametrize("dead", [0, -1])
 def test_zeros_and_ones_are_no_readings(engine, dead):
-    """What stands before them counts; a chip that is weightless in two axes is alive."""
+    """Frames before such a reading count. A chip whose force is zero in two axes only is working."""
     samples = noise(4)
     samples[2, 0:3] = dead
     alive = noise(1)
@@ -50,7 +50,7 @@ def test_zeros_and_ones_are_no_readings(engine, dead):
 @pytest.mark.parametrize("engine", engines.ENGINES)
 @pytest.mark.parametrize("column", [0, 2, 3, 4, 6])
 def test_the_same_again_and_again_is_a_frozen_chip(engine, column):
-    """Through batches; a change in any axis but the temperature is life."""
+    """Repetitions are counted from batch to batch. A change of anything but the temperature begins the count again."""
     still = np.repeat(noise(1), 12, axis=0)
     answers = added(engine, [frames(still[:3]), frames(still[3:7]), frames(still[7:])])
     assert [good for good, _ in answers] == [3, 2, 0]
@@ -61,7 +61,7 @@ def test_the_same_again_and_again_is_a_frozen_chip(engine, column):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_integers_are_as_good_as_floats(engine):
-    """0.03 degrees of lean, 0.05 % of a rate; eight samples at the ends of the range overflow nothing."""
+    """Within 0.03 degrees of lean and 0.05 % of a rate. Eight samples at the ends of the range do not overflow."""
     rng = np.random.default_rng(2)
     calls = []
     for _ in range(30):

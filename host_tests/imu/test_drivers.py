@@ -1,8 +1,10 @@
-"""The drivers by themselves: what they put on the bus, what they allocate, what they make of presses."""
+"""Each driver alone: what it sends on the bus, what it takes of the heap, what the button makes of presses."""
 
 import itertools
 import json
+import re
 import subprocess
+import textwrap
 
 import pytest
 from kickstand_tools import unix_port
@@ -96,10 +98,23 @@ def test_every_range_reads_in_units(board, accel_range, gyro_range):
     assert temperature == pytest.approx(30, abs=0.1)
 
 
+def test_the_example_in_the_drivers_docstring_runs(board, capsys):
+    """For a second: its name and temperature, then 200 samples, give or take those of the start and the end."""
+    from kickstand.imu import mpu6050
+
+    example = re.search(r"\n\n((?:    .*\n|\n)+)", mpu6050.__doc__ or "")
+    assert example
+    assert board.run(lambda: exec(textwrap.dedent(example[1]), {}), 1.3) == "off"
+    first, *samples = capsys.readouterr().out.splitlines()
+    assert first.startswith("MPU6050 30.")
+    assert 190 < len(samples) < 260
+    assert samples[-1] == "[0.25, -0.5, 1.0] g"
+
+
 def test_setup_fails_when_the_configuration_does_not_stay(board):
     from kickstand.imu.mpu6050 import Mpu6050
 
-    board.faults.corrupt(0x68, nth=5, byte=1, mask=0x04, read=False)  # identify (2), reset, clock, SMPLRT_DIV
+    board.faults.corrupt(0x68, nth=5, byte=1, mask=0x04, read=False)  # WHO_AM_I twice, reset, clock, SMPLRT_DIV
     with pytest.raises(OSError, match="read back"):
         on(board, lambda: Mpu6050(sensor_i2c()).setup())
 
@@ -118,7 +133,7 @@ def test_a_stuck_bus_is_freed_and_a_dead_one_is_reported(board):
 
 
 def test_a_pause_that_overflows_the_fifo_is_not_taken_for_silence(board):
-    """Nor when it came after the turn had looked at the clock."""
+    """Also when the pause came after the turn of the loop had read the clock."""
     from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
 
     from kickstand.imu.mpu6050 import Mpu6050
@@ -145,7 +160,7 @@ def display():
 
 
 def test_only_changed_lines_are_sent(board):
-    """Two transfers each: whether the display has kept its settings, and the line."""
+    """Each takes two transfers: one asks whether the display has kept its power, the other writes the line."""
     from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
 
     def run():
@@ -155,7 +170,7 @@ def test_only_changed_lines_are_sent(board):
         counts = [board.lcd_bus.transfers[0x27]]
         for line1, line2 in (("first", "second"), ("first", "third"), ("a", "b")):
             lcd.show(line1, line2)
-            for _ in range(8):  # under 0.2 s in all, when it is asked whether it is still there
+            for _ in range(8):  # under 0.2 s in all: then it is asked whether it is still there
                 sleep_ms(6)
                 lcd.tick(ticks_ms())
             counts.append(board.lcd_bus.transfers[0x27])
@@ -166,7 +181,7 @@ def test_only_changed_lines_are_sent(board):
 
 
 def test_only_what_has_changed_of_a_line_is_sent(board):
-    """Four bytes a character, and four for where it stands."""
+    """That takes four bytes a character, and four for its place."""
     from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
 
     sent = []
@@ -191,11 +206,11 @@ def test_only_what_has_changed_of_a_line_is_sent(board):
 
 
 @pytest.mark.parametrize("gap_s", [0.001, 0.1])
-@pytest.mark.parametrize("ticks", [3, 8, 12, 20])  # in its initialisation, and after
+@pytest.mark.parametrize("ticks", [3, 8, 12, 20])  # during its initialisation, and after
 @pytest.mark.parametrize("then", ["Lean  12\xdf", "Lean  13\xdf"])
 def test_a_display_that_lost_its_power_for_a_moment_is_started_again(board, gap_s, ticks, then):
-    """So short that no transfer falls into it: a PCF8574's pins come up high, where E had been left low. Also when a
-    text or a step of the initialisation is to be sent next, which leaves E low."""
+    """Even if no transfer failed in that moment: the PCF8574's pins are high after power-up, where E had been low. Also
+    if what is sent next is a text or a step of the initialisation, which makes E low again."""
     from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
 
     def run():
@@ -262,7 +277,7 @@ def test_presses(board, held_s, events):
 
 
 def test_ctrl_c_puts_the_watchdog_to_rest(board, monkeypatch, capsys, tmp_path):
-    """After Ctrl-C nothing feeds it; a board that resets in the middle of a copy could not be deployed to."""
+    """After Ctrl-C nothing feeds it, and a board that resets in the middle of a copy could not be deployed to."""
     import main
     from kickstand import app
 
@@ -308,7 +323,7 @@ def test_status_tells_how_the_board_is(board, monkeypatch, capsys, tmp_path):
 
 @pytest.mark.parametrize("off", [-0.01, 0.0, 0.01])
 def test_the_sample_clock_keeps_to_the_time_that_passes(board, off):
-    """A chip that is 1 % off, samples two or three at a time: all dt together are the time that went by."""
+    """The chip's clock is 1 % off and samples come two or three at a time. All dt together are the time that passed."""
     from kickstand.imu.sample_clock import SampleClock
 
     clock, total_us, taken = SampleClock(5000), 0, 0
@@ -322,7 +337,7 @@ def test_the_sample_clock_keeps_to_the_time_that_passes(board, off):
 
 
 def test_the_sample_clock_spans_a_gap(board):
-    """After an overflow the next dt is as long as what was lost."""
+    """After an overflow the next dt is as long as the gap."""
     from kickstand.imu.sample_clock import SampleClock
 
     clock = SampleClock(5000)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import ride_writer
 from kickstand import __version__
-from kickstand.rides import flash_ring
+from kickstand.rides import ride_paths
 from kickstand_tools.deploy import connection
 from kickstand_tools.logs.reader import read_log
 from serial.tools import list_ports
@@ -25,10 +25,10 @@ def board(tmp_path, monkeypatch):
     monkeypatch.setattr(list_ports, "comports", lambda: [pico])
     monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: board)
     monkeypatch.setattr(connection, "_RESTART_S", 0)
-    monkeypatch.setattr(flash_ring, "directory", lambda _settings: "rides")
-    monkeypatch.setattr(flash_ring, "os", board.modules["os"])
+    monkeypatch.setattr(ride_paths, "directory", lambda _settings: "rides")
+    monkeypatch.setattr(ride_paths, "os", board.modules["os"])
     board.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: None))
-    board.modules["kickstand.rides"] = types.SimpleNamespace(flash_ring=flash_ring)
+    board.modules["kickstand.rides"] = types.SimpleNamespace(ride_paths=ride_paths)
     return board
 
 

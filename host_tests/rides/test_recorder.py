@@ -1,4 +1,4 @@
-"""Recording on the simulated board: what is pulled from its flash replays as what its display showed."""
+"""Recording on the simulated board: a replay of the recorded ride gives the lean that the display showed."""
 
 from itertools import pairwise
 
@@ -41,7 +41,7 @@ def replayed(blocks, directory):
 
 
 def lean_matches(record, blocks, leans, slack_s=0.4):
-    """Every lean on the display is one that the replay had not long before; how many there were."""
+    """Each lean on the display has to be one that the replay gave within slack_s before; return how many there were."""
     begun = blocks[0].time_us / 1e6
     times = [turn.time_us / 1e6 for block in blocks for turn in block.turns]
     compared = 0
@@ -71,11 +71,11 @@ def computed(monkeypatch):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_a_recorded_ride_replays_as_the_display_showed(engine, tmp_path, computed):
-    """Recorded from power-on: one ride until the alignment, one with it; the power goes at the end."""
+    """Recorded from power-on: one ride before the alignment and one after it, which a power cut ends."""
     flash = tmp_path / "flash"
     flash.mkdir()
     record = devices.run(engine, flash, {**ALIGNED, "seed": 2, "config": {"RECORD": True}})
-    showed = list(computed)  # and not what the replay computes below
+    showed = list(computed)  # a copy, because the replay below computes leans as well
     found, problems = rides(flash)
     assert sorted(found) == [1, 2]
     assert problems == []
@@ -93,7 +93,7 @@ def test_a_recorded_ride_replays_as_the_display_showed(engine, tmp_path, compute
 
 
 def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
-    """It is set up again, the filter starts again, and the ride goes on in the same file."""
+    """The sensor is set up again, the filter starts again, and the ride goes on in the same file."""
     devices.run("cpython", tmp_path, ALIGNED)
     plan = {
         "ride": [["upright", 4.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 5.0], ["turn", 40.0, 5.0]],
@@ -123,7 +123,7 @@ def test_a_ride_tells_how_warm_the_sensor_was(temp_c, tmp_path):
 
 
 def test_a_wheel_is_not_misread_while_flash_is_erased(tmp_path, monkeypatch):
-    """Interrupts are off for 45 ms once a block: of the edges meanwhile one is left, and it comes late."""
+    """Interrupts are off for 45 ms once a block. Of the edges in that time only one is noticed, and late."""
     boards, writes = [], []
     fit, write = Board.fit_wheel, RideRing.write
 

@@ -1,4 +1,4 @@
-"""Rides on a card with MicroPython's own FAT: no step reads much of it, however many rides there are; power cuts."""
+"""Rides on a card with MicroPython's own FAT: no step reads much, however many rides there are; power cuts."""
 
 import json
 
@@ -8,10 +8,10 @@ from mpy import run_mpy
 SECTOR_S = 3.1e-3  # at 1.32 MHz, with the commands
 TURN_S, BEGIN_S = 0.1, 1.0
 
-# A card of 32 GB in RAM, of which only what is not zero is kept; its clusters are the usual 32 KB
+# A card of 32 GB in RAM, of which only the sectors that are not zero are kept; its clusters have the usual 32 KB
 _CARD = """
 import json, os
-from kickstand.rides import flash_ring
+from kickstand.rides import flash_ring, ride_paths
 from kickstand.rides.flash_ring import RideRing
 
 class Card:
@@ -37,7 +37,7 @@ class Card:
 class Settings:
     SD_SPI = 0
 
-flash_ring.directory = lambda _settings: "/sd/rides"
+ride_paths.directory = lambda _settings: "/sd/rides"
 card = Card()
 os.VfsFat.mkfs(card)
 os.mount(os.VfsFat(card), "/sd")
@@ -89,8 +89,8 @@ def test_no_turn_waits_long_for_a_card(rides, parts):
     assert all(sectors * SECTOR_S < TURN_S for sectors in worst.values()), worst
 
 
-# Four rides of three blocks, the first of which has to make room for the fourth. Then the power cut before each write
-# of a sector: what had been written safely is there, and the next ride is recorded
+# Four rides of three blocks, where the first ride has to make room for the fourth. Then the power is cut before each
+# write of a sector: the blocks that were ended before are there, and the next ride is recorded
 _CUTS = """
 states = []
 safe = {}  # blocks of each ride
@@ -115,8 +115,8 @@ def record(blocks):
 
 def held():
     found = {}
-    for ride, part, size in flash_ring.parts("/sd/rides"):
-        with open(flash_ring.part_path("/sd/rides", ride, part), "rb") as file:
+    for ride, part, size in ride_paths.parts("/sd/rides"):
+        with open(ride_paths.part_path("/sd/rides", ride, part), "rb") as file:
             data = file.read()
         assert data == bytes([ride]) * size
         found[ride] = found.get(ride, 0) + size // 4096

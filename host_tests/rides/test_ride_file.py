@@ -1,4 +1,4 @@
-"""The format of recorded rides: exact on both engines, and what is damaged is left out, and only that."""
+"""The format of recorded rides: exact on both engines; a damaged block is left out, and nothing else."""
 
 import ast
 import json
@@ -23,7 +23,7 @@ _EXTREMES = [
     ([1, -1, 4096, 0, 0, -1, 1], 2, 9999),
 ]
 
-# Writes one block of the turns on standard input, and says it in hexadecimal
+# Writes the turns on standard input into one block, and prints it in hexadecimal
 _WRITE = """
 import json, sys
 from kickstand.rides.block import RideBlock
@@ -40,13 +40,13 @@ block.close()
 print("".join("%02x" % byte for byte in block.buffer[:block.length]))
 """
 
-# Random entries, most of them likely ones, coded by machine code and plainly: everything has to be the same
+# Random entries, most of them typical, coded by machine code and by Python: state and bytes have to be the same
 _BOTH = """
 import random
 from array import array
 from kickstand.rides import block as block_format
-from kickstand.rides.block import encode, encode_plainly
-assert encode is not encode_plainly
+from kickstand.rides.block import encode, encode_python
+assert encode is not encode_python
 random.seed(1)
 for block in range(300):
     states, outs = [], []
@@ -67,7 +67,7 @@ for block in range(300):
         for _ in range(6):
             entry.append(max(1, n) * random.randint(-wide - 1, wide))
         entry.append(random.choice((0, random.randint(0, 30000), random.randint(0, 1 << 24))))
-        for function, state, out in zip((encode, encode_plainly), states, outs):
+        for function, state, out in zip((encode, encode_python), states, outs):
             function(entry, state, out)
         assert states[0] == states[1], (list(entry), states)
     assert outs[0] == outs[1]
@@ -92,7 +92,7 @@ def held(block):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_every_turn_comes_back_exactly(engine, tmp_path):
-    """Also where the numbers are as large as they get; the same bytes from viper's code and from Python's."""
+    """Also the largest numbers. Machine code and Python write the same bytes."""
     turns = [*_EXTREMES, *ride_writer.turns(200), *_EXTREMES]
     data = written(turns)
     if engine == "micropython":
@@ -119,7 +119,7 @@ def test_machine_code_codes_as_python_does():
 
 
 def test_machine_code_has_the_numbers_of_the_format():
-    """Which stand in its file again, because only there they are built in."""
+    """They stand in its file again, because the compiler puts only those into machine code."""
     source = Path(block_format.__file__).with_name("block_viper.py").read_text()
     constants = {
         node.targets[0].id.lstrip("_"): eval(ast.unparse(node.value.args[0]))

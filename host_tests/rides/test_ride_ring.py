@@ -1,4 +1,5 @@
-"""The ring of rides: the oldest go first, there is room left, a file system that fails ends a ride cleanly."""
+"""The ring of rides: the oldest are removed first, some room is always left, and a file system that fails ends a ride
+without an exception."""
 
 import contextlib
 import io
@@ -8,8 +9,9 @@ import types
 
 import pytest
 import ride_writer
-from kickstand.rides import flash_ring
-from kickstand.rides.flash_ring import RideRing, part_path
+from kickstand.rides import flash_ring, ride_paths
+from kickstand.rides.flash_ring import RideRing
+from kickstand.rides.ride_paths import part_path
 from kickstand.ui import messages
 from kickstand_tools.rides import block_reader
 from kickstand_tools.simulated_board.fakes import fake_machine, fake_os, fake_time
@@ -19,7 +21,7 @@ NEEDED = RideRing(SETTINGS).needed
 
 
 class Flash:
-    """A small flash: as many bytes as it holds, and what its file system does wrong."""
+    """A small flash of `size` bytes. least: the fewest that were free."""
 
     def __init__(self, root, size):
         self.root, self.size = root, size
@@ -102,13 +104,13 @@ def test_a_ride_longer_than_the_flash_keeps_its_end(recorder, flash):
     assert sequences[0] > 0 and sequences[0] % 16 == 0
     assert rooms[2:] == sorted(rooms[2:], reverse=True)
     assert rooms[-1] == 0
-    # what it foretold when it had just begun
+    # the room that it showed when the ride had just begun was right
     bytes_s = sum(map(len, ride_writer.blocks(20)[0])) / (sum(dt for _, _, dt in ride_writer.blocks(20)[1]) / 1e6)
     assert rooms[2] + 80 == pytest.approx((flash.size - NEEDED) / bytes_s, rel=0.2)
 
 
 def test_the_oldest_go_part_by_part_with_their_directories_and_one_step_a_turn(recorder, flash, monkeypatch):
-    """Rides 98 to 112: two groups. What is not the recorder's stays, and its directory with it."""
+    """Rides 98 to 112, which are in two groups. The owner's own files stay, and their directories."""
     names = [part_path("rides", ride, part) for ride in range(98, 113) for part in range(4)]
     for name in reversed(names):
         (flash.root / name).parent.mkdir(parents=True, exist_ok=True)
@@ -128,9 +130,7 @@ def test_the_oldest_go_part_by_part_with_their_directories_and_one_step_a_turn(r
 
         return call
 
-    patched = types.SimpleNamespace(
-        mkdir=os.mkdir, ilistdir=fake_os.ilistdir, remove=noted(os.remove), rmdir=noted(os.rmdir)
-    )
+    patched = types.SimpleNamespace(mkdir=os.mkdir, remove=noted(os.remove), rmdir=noted(os.rmdir))
     monkeypatch.setattr(flash_ring, "os", patched)
     recorder.start(ride_writer.CHIP, ride_writer.calibration())
     assert recorder.room_s() == (len(names) + len(strays)) * 4096 // 1024
@@ -149,12 +149,12 @@ def test_the_oldest_go_part_by_part_with_their_directories_and_one_step_a_turn(r
     assert not (flash.root / "rides/001/00").exists()
     assert all((flash.root / "rides" / name).exists() for name in strays)
     assert (flash.root / part_path("rides", 113, 2)).exists()
-    sizes = {ride: sizes for ride, _, sizes in flash_ring.parts("rides")}
+    sizes = {ride: sizes for ride, _, sizes in ride_paths.parts("rides")}
     assert sorted(sizes) == list(range(98 + len(removed) // 4, 114))
 
 
 def test_a_ride_without_a_block_leaves_no_directory_of_its_own(recorder, flash):
-    """The power goes again and again within the first seconds: in flash each would take 8 KB."""
+    """The power goes again and again within the first seconds. In flash each directory would take 8 KB."""
     for _ in range(5):
         recorder.start(ride_writer.CHIP, ride_writer.calibration())
         recorder.active = False
@@ -201,7 +201,7 @@ def test_a_flash_that_is_full_of_other_things_refuses_in_one_line(recorder, flas
 
 
 class Worn:
-    """Files that can be used so many times, and then no more."""
+    """Files that can be used so many times; then each use fails."""
 
     def __init__(self, uses):
         self.uses = uses
@@ -237,7 +237,7 @@ class WornFile:
 
 @pytest.mark.parametrize("uses", [0, 1, 2, 17, 18, 19, 35, 36, 50, 52])
 def test_a_file_system_that_fails_ends_the_ride_and_keeps_what_was_written(recorder, flash, uses, monkeypatch):
-    """Whenever it does: one notice, no exception, and the next ride is recorded when it works again."""
+    """Whenever it fails there is one notice and no exception, and the next ride is recorded when it works again."""
     worn = Worn(uses)
     with monkeypatch.context() as patch, contextlib.redirect_stdout(io.StringIO()) as said:
         patch.setattr(flash_ring, "open", worn.open, raising=False)
@@ -246,17 +246,17 @@ def test_a_file_system_that_fails_ends_the_ride_and_keeps_what_was_written(recor
     assert said.getvalue().startswith("recording stopped")
     assert messages.lines(recorder.problem) == ("Rec. stopped", "flash fault")
     assert not recorder.active
-    recorder.problem = None
+    assert recorder.take_problem() and recorder.take_problem() is None
     ride(recorder, flash, 2000, seed=1)
     assert recorder.problem is None
     parts = {path.parent.name: block_reader.read(path.read_bytes())[0] for path in flash.root.glob("rides/*/*/*.rid")}
-    if uses:  # it could be made
+    if uses:  # the ride's directory could be made
         assert len(parts.pop("01")) >= worn.flushed == (uses - 1) // 17
     assert [len(blocks) for blocks in parts.values()] == [5]
 
 
 def test_a_card_that_is_pulled_is_said(recorder, flash, monkeypatch):
-    monkeypatch.setattr(flash_ring, "directory", lambda _settings: "rides")
+    monkeypatch.setattr(ride_paths, "directory", lambda _settings: "rides")
     flash.size += 1 << 20
     recorder.keeper = RideRing(types.SimpleNamespace(SD_SPI=0))
     with contextlib.redirect_stdout(io.StringIO()):
@@ -265,8 +265,18 @@ def test_a_card_that_is_pulled_is_said(recorder, flash, monkeypatch):
     assert messages.lines(recorder.problem) == ("Rec. stopped", "card fault")
 
 
+@pytest.mark.parametrize("stops_interrupts", [True, False])
+def test_a_stall_is_told_once(stops_interrupts, recorder, flash):
+    """The end of a ride closes a file, which may erase flash."""
+    recorder.keeper.stops_interrupts = stops_interrupts
+    assert not recorder.take_stall()
+    ride(recorder, flash, 10)
+    assert recorder.take_stall() is stops_interrupts
+    assert not recorder.take_stall()
+
+
 def test_a_gap_in_the_readings_is_one_in_the_log(recorder, flash):
-    """After a fault of the sensor the filter starts again, on the board and in the replay: that takes half a second."""
+    """After a fault of the sensor the board's filter starts again. A gap of half a second restarts the replay's."""
     recorder.start(ride_writer.CHIP, ride_writer.calibration())
     for i, (sums, n, dt_us) in enumerate(ride_writer.turns(100)):
         if i == 50:
@@ -281,7 +291,7 @@ def test_a_gap_in_the_readings_is_one_in_the_log(recorder, flash):
 
 
 def test_a_speed_source_without_a_sensor_fills_no_block(recorder, flash):
-    """Only turns are counted against the room in a block. The speed that the next turn gets is the newest."""
+    """Speeds are written only with turns. A turn gets the newest speed."""
     recorder.start(ride_writer.CHIP, ride_writer.calibration())
     turns = list(ride_writer.turns(20))
     for sums, n, dt_us in turns[:10]:

@@ -43,6 +43,7 @@ def drive(config, fit, until_s):
 
         from kickstand.settings import Settings
         from kickstand.speed.source import open_speed
+        from kickstand.ui.messages import lines
 
         class Config:
             pass
@@ -57,7 +58,8 @@ def drive(config, fit, until_s):
             if new is not None:
                 got.append((board.clock.now_us / 1e6, new, speed.age_us))
             if turn % 100 == 0:
-                faults[turn // 100] = speed.fault(ticks_ms())
+                fault = speed.fault(ticks_ms())
+                faults[turn // 100] = None if fault is None else lines(fault)
             turn += 1
             sleep_us(STEP_US - board.clock.now_us % STEP_US)
 

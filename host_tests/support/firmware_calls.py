@@ -69,9 +69,9 @@ def transform(offset, slope, matrix, sums, n):
 
 
 def add_up(batches, limit):
-    """Batches of frames of 14 bytes: [how many are good, their sums] of each, as the board does it and plainly."""
+    """Batches of frames of 14 bytes: [how many are good, their sums] of each, as the board does it and in Python."""
     out = []
-    for function in (fifo_frames.add_up, fifo_frames.add_up_plainly):
+    for function in (fifo_frames.add_up, fifo_frames.add_up_python):
         watch = array("i", (0, 0, limit))
         answers = []
         for batch in batches:
@@ -122,8 +122,7 @@ CALLS = {
     "rotation_between": lambda a, b, axis: _into(9, rodrigues.rotation_between, a, b, axis),
     "cross": lambda a, b: _into(3, rotation.cross, a, b),
     "rotate": lambda m, a: _into(3, rotation.rotate, matrix_of(m), a),
-    "rotate_back": lambda m, a: _into(3, rotation.rotate_back, matrix_of(m), a),
-    "multiply": lambda a, b: _into(9, rotation.multiply, matrix_of(a), matrix_of(b)),
+    "multiply": lambda a, b: _into(9, rodrigues.multiply, matrix_of(a), matrix_of(b)),
     "angle": rotation.angle_deg,
     "is_rotation": rotation.is_rotation,
     "two_position": align_two_position,

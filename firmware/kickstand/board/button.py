@@ -1,30 +1,34 @@
-"""One push button to ground: debounced, short and long presses."""
+"""A push button to ground: debounced, with short and long presses.
+
+>>> button = Button(machine.Pin(15, machine.Pin.IN, machine.Pin.PULL_UP))
+>>> event = button.poll(time.ticks_ms())        # 0, SHORT or LONG
+"""
 
 from time import ticks_diff
 
 SHORT = 1
 LONG = 2
 
-DEBOUNCE_MS = 20
-LONG_MS = 800
+DEBOUNCE_MS = 20  # the contact counts once it has kept its state for so long
+LONG_MS = 800  # a press that lasts longer is a long one
 
 
 class Button:
-    """pin: a machine.Pin with pull-up, low while pressed. Call poll() at least every 20 ms or so."""
+    """pin: a machine.Pin with pull-up, low while pressed. Call poll() about every 20 ms or more often."""
 
     def __init__(self, pin):
         self._pin = pin
-        self._pressed = self._raw = self.held()  # a press that began before this was not meant for us
+        self._pressed = self._raw = self.held()
         self._changed_ms = None
         self._pressed_ms = 0
-        self._long_sent = True
+        self._long_sent = True  # the press has been reported; also one that began before this object was made
 
     def held(self):
-        """The pin as it is now, not debounced."""
+        """True if the button is pressed now, not debounced."""
         return not self._pin.value()
 
     def poll(self, now_ms):
-        """0, SHORT (on release) or LONG (while still held). now_ms: time.ticks_ms()."""
+        """Return SHORT when a short press ends, LONG while a long one is still held, else 0. now_ms: ticks_ms()."""
         raw = not self._pin.value()
         if self._changed_ms is None or raw != self._raw:
             self._raw = raw

@@ -1,44 +1,47 @@
-"""HD44780 character display, 16x2, behind a PCF8574 port expander (the usual I2C backpack).
+"""Driver for an HD44780 character display, 16x2, behind a PCF8574 port expander (the usual I2C backpack).
 
-    lcd = Lcd(lambda: i2c)
-    lcd.show("Lean  23\xdf right", bar)
-    lcd.tick()           # at most one changed line, or a step of the initialisation
+    lcd = Lcd(lambda: machine.I2C(1, sda=machine.Pin(6), scl=machine.Pin(7), freq=100_000))
+    lcd.show("Hello", "world")
+    while True:
+        lcd.tick(time.ticks_ms())  # sends at most one changed line, or does one step of the initialisation
+        time.sleep_ms(10)
 
-Everything is sent in 4-bit mode, what has changed of a line packed into one transfer (6 ms at 100 kHz for all of
-it). Wiring of the backpack: P0 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7.
+Sources: data sheets Hitachi HD44780U (ADE-207-272) and NXP PCF8574. The display is driven in 4-bit mode. The part of a
+line that has changed is sent in one transfer, which takes 6 ms for a whole line at 100 kHz. Wiring of the backpack: P0
+RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7.
 """
 
 from time import sleep_ms, ticks_diff, ticks_ms
 
 from micropython import const
 
-_RS = const(0x01)
+_RS = const(0x01)  # bits of the port expander
 _E = const(0x04)
 _LIGHT = const(0x08)
-_LINE_ADDRESSES = (0x80, 0xC0)  # "set DDRAM address" of each line
-_CGRAM_ADDRESS = const(0x40)
+_LINE_ADDRESSES = (0x80, 0xC0)  # instruction "set DDRAM address" for the beginning of each line (table 6)
+_CGRAM_ADDRESS = const(0x40)  # instruction "set CGRAM address" (table 6)
 
 ADDRESSES = (0x27, 0x3F)  # PCF8574 and PCF8574A with all address jumpers open
 COLUMNS = 16
-_NEVER = b"\xfe" * COLUMNS  # a code that no text uses: a line that is said to hold it will be written again
-REINIT_MS = 10_000  # noise can put the nibbles out of step, for ever without this
-PROBE_MS = 200
-REOPEN_PROBES = 5
-STEP_MS = 5  # the longest wait that the initialisation asks for is 4.1 ms
-_POWER_UP = const(-8)  # steps: after its power came up a display is deaf for 40 ms
+_NEVER = b"\xfe" * COLUMNS  # a character code that no text uses: marks a line as not yet written
+REINIT_MS = 10_000  # initialise again so often: noise can put the nibbles out of step, and nothing else mends that
+PROBE_MS = 200  # how often to see whether a display is there, or still there
+REOPEN_PROBES = 5  # while there is no display the bus is freed once in so many probes
+STEP_MS = 5  # from step to step: the longest wait that the initialisation asks for is 4.1 ms
+_POWER_UP = const(-8)  # the step to begin with after power-up: the display does not listen for the first 40 ms
 
-# Initialisation by instruction (data sheet, figure 24). One step a tick, STEP_MS apart, so that the loop
-# never waits. First a nibble at a time until the display is in 4-bit mode whatever state it was in, then
-# whole bytes: function set 4 bit, 2 lines; display on, no cursor; entry mode left to right; home, which
-# undoes a shifted display.
+# Initialisation by instruction (data sheet, figure 24), one step a tick, STEP_MS apart, so that the loop never waits.
+# First single nibbles, which bring the display into 4-bit mode from whatever state it was in. Then whole bytes:
+# function set (4 bit, 2 lines); display on, no cursor; entry mode left to right; return home, which undoes a shift.
 _NIBBLES = (0x30, 0x30, 0x30, 0x20)
 _COMMANDS = b"\x28\x0c\x06\x02"
-_GLYPH_PARTS = const(4)  # 64 bytes of character patterns, 16 at a time
+_GLYPH_PARTS = const(4)  # the 64 bytes of character patterns are sent 16 at a time
 _STEPS = len(_NIBBLES) + len(_COMMANDS) + _GLYPH_PARTS
 
 
 def _bar_glyphs():
-    """Eight 5x8 patterns: 1 to 4 columns filled from the left, then 1 to 4 from the right."""
+    """64 bytes, the patterns of characters 0 to 7: 1 to 4 of 5 columns filled from the left, then 1 to 4 from the
+    right."""
     rows = bytearray()
     for columns in range(1, 5):
         rows.extend(bytes([0x1F & ~(0x1F >> columns)] * 8))
@@ -50,7 +53,8 @@ def _bar_glyphs():
 class Lcd:
     """A display that may be absent, or come and go.
 
-    reopen: called to free the bus, returns it as a machine.I2C.  addresses: where to look for the display.
+    reopen: called to free the bus, returns it as a machine.I2C.  addresses: I2C addresses to look for it at.
+    address: where it was found, or None while no display answers.
     """
 
     def __init__(self, reopen, addresses=ADDRESSES):
@@ -62,22 +66,25 @@ class Lcd:
         self._packed = bytearray(4 * (COLUMNS + 1))
         self._port = bytearray(1)
         self._glyphs = _bar_glyphs()
-        self.address = None  # None: no display answers
-        self._step = 0
-        self._probes = 0
-        self._acted_ms = None
-        self._seen_ms = 0
-        self._init_ms = 0
+        self.address = None
+        self._step = 0  # of the initialisation; negative: waiting for the display's own power-up
+        self._probes = 0  # in a row that found nothing
+        self._acted_ms = None  # when something was last sent
+        self._seen_ms = 0  # when the display last answered
+        self._init_ms = 0  # when the initialisation last ended
 
     def show(self, line1, line2):
-        """What the lines should say: str, or bytes for glyphs (0..7) and ROM codes. Padded and cut to 16;
-        sent by tick()."""
+        """Set the text of the two lines, to be sent by tick(). Each is padded or cut to 16 characters.
+
+        A str of characters below 256, or bytes. Codes 0 to 7 are the patterns of _bar_glyphs(), the others those of
+        the display's ROM."""
         self._put(self._wanted[0], line1)
         self._put(self._wanted[1], line2)
 
     def tick(self, now_ms):
-        """Do the next piece of work; call it about every 10 ms. Raises SettingsError for pins that cannot be used, and
-        nothing else."""
+        """Do the next piece of work: at most one transfer of a line. Call it about every 10 ms. now_ms: ticks_ms().
+
+        Raises SettingsError for pins that cannot be used, and nothing else."""
         if self._acted_ms is not None and ticks_diff(now_ms, self._acted_ms) < (
             STEP_MS if self.address else PROBE_MS
         ):
@@ -107,8 +114,7 @@ class Lcd:
             self._step = _POWER_UP
 
     def flush(self):
-        """Tick until everything is on the display: before the loop runs, or when it has failed. About 0.1
-        s."""
+        """Send everything now, in about 0.1 s: for texts shown before the loop runs or after it has failed."""
         self._acted_ms = None
         for _ in range(_STEPS + 4):
             self.tick(ticks_ms())
@@ -125,7 +131,8 @@ class Lcd:
                 line[i] = 0x20
 
     def _probe(self):
-        if self._probes % REOPEN_PROBES == 0:  # a stuck bus has to be freed; every time would cost too much
+        """Look for the display at each address."""
+        if self._probes % REOPEN_PROBES == 0:  # a stuck bus has to be freed, but to do so each time would take too long
             self._i2c = self._reopen()
         self._probes += 1
         for address in self._addresses:
@@ -136,7 +143,9 @@ class Lcd:
             self.address = address
             self._probes = 0
             return
-        self._step = _POWER_UP  # of one that is there at once the power came up with ours
+        # Not found: if it answers later it was just powered, so it is given its 40 ms. A display that answers the first
+        # probe was powered together with the board, some time ago.
+        self._step = _POWER_UP
 
     def _initialise(self, step):
         if step < len(_NIBBLES):
@@ -147,17 +156,19 @@ class Lcd:
         else:
             quarter = (step - len(_NIBBLES) - len(_COMMANDS)) * COLUMNS
             self._send(_CGRAM_ADDRESS + quarter, memoryview(self._glyphs)[quarter : quarter + COLUMNS])
-            for shown in self._shown:  # whatever is there now is to be written again
+            for shown in self._shown:  # both lines have to be written again
                 shown[:] = _NEVER
 
     def _kept_power(self):
-        """False after a loose wire, however short: the pins of a PCF8574 come up high, and E rests low. To be asked
-        before anything is sent, because that leaves E low again. OSError: it is gone."""
+        """False if the display lost its power since the last transfer, however short. Raises OSError if it is gone.
+
+        The PCF8574's pins are high after power-up, but every transfer leaves E low. So it must be asked before
+        anything is sent."""
         self._i2c.readfrom_into(self.address, self._port)
         return not self._port[0] & _E
 
     def _refresh(self):
-        """Send what has changed of one line. False: nothing has."""
+        """Send the changed part of one line; False if no line has changed."""
         for i in (0, 1):
             wanted, shown = self._wanted[i], self._shown[i]
             if shown != wanted:
@@ -175,7 +186,7 @@ class Lcd:
         return False
 
     def _send(self, command, data):
-        """One command byte and the data behind it in one transfer."""
+        """Send an instruction and the data that follow it in one transfer."""
         packed = self._packed
         self._pack(0, command, _LIGHT)
         for i in range(len(data)):
@@ -183,8 +194,9 @@ class Lcd:
         self._i2c.writeto(self.address, memoryview(packed)[: 4 * (len(data) + 1)])
 
     def _pack(self, at, value, control):
-        """Two nibbles, each latched by the falling edge of E. RS is set up in the byte that raises E: 90 us
-        before it falls."""
+        """Put a byte into _packed as two nibbles, each with E high and then low: the falling edge latches it.
+
+        RS changes in the byte that raises E: at 100 kHz that is 90 us before E falls."""
         packed = self._packed
         high = value & 0xF0 | control
         low = value << 4 & 0xF0 | control

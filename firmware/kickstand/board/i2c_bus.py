@@ -1,20 +1,20 @@
-"""I2C controllers opened, and stuck buses freed (NXP UM10204, section 3.1.16)."""
+"""Opens I2C buses, and frees one that a device holds (NXP UM10204, section 3.1.16, bus clear)."""
 
 from time import sleep_us
 
 from machine import I2C, Pin
 
-_HALF_PERIOD_US = 5
-_TIMEOUT_BITS = (
-    2000  # on rp2 this is for a whole transfer: 112 bytes at most. The default of 50 ms would stall the loop
-)
+_HALF_PERIOD_US = 5  # of SCL while a bus is freed: 100 kHz
+# Time-out of machine.I2C in bit times. On rp2 it is that of a whole transfer, which has 112 bytes at most. The default
+# of 50 ms would stop the loop for too long.
+_TIMEOUT_BITS = 2000
 
 
 def free(sda_pin, scl_pin):
-    """Clock out whatever a device was sending when the controller was reset, then STOP. True if SDA is
-    released.
+    """Make a device that holds SDA low let go of it; True if SDA is high afterwards. Pins: GPIO numbers.
 
-    MicroPython does not do this; a microcontroller reset in the middle of a read leaves SDA low for ever.
+    A microcontroller that was reset in the middle of a read leaves the device waiting for clocks, with SDA low for
+    ever. Up to nine clocks let it finish its byte; a STOP condition ends the transfer. MicroPython does not do this.
     """
     scl = Pin(scl_pin, Pin.OPEN_DRAIN, value=1)
     sda = Pin(sda_pin, Pin.OPEN_DRAIN, value=1)
@@ -36,8 +36,9 @@ def free(sda_pin, scl_pin):
 
 
 def open_i2c(controller, sda_pin, scl_pin, frequency):
-    """A freed bus as machine.I2C. controller: its number; pins: GPIO numbers; frequency in Hz. Raises OSError when it
-    cannot be freed, ValueError for pins that the controller cannot use."""
+    """Free the bus and return it as a machine.I2C. controller: its number.  Pins: GPIO numbers.  frequency: in Hz.
+
+    Raises OSError if SDA stays low, ValueError for pins that the controller cannot use."""
     if not free(sda_pin, scl_pin):
         raise OSError("SDA is held low")
     timeout_us = _TIMEOUT_BITS * 1_000_000 // frequency

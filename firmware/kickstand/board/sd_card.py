@@ -1,4 +1,4 @@
-"""An SD card on SPI, where config.py names its pins."""
+"""The SD card on SPI whose pins config.py names."""
 
 import os
 
@@ -11,7 +11,7 @@ MOUNT = "/sd"
 
 
 def mount(settings):
-    """Mount it, unless it is; returns the directory. Raises CardError."""
+    """Mount the card, unless that was done before; return its directory. settings: a Settings. Raises CardError."""
     if MOUNT[1:] in os.listdir("/"):
         return MOUNT
     pins = settings.SD_SCK, settings.SD_MOSI, settings.SD_MISO, settings.SD_CS

@@ -1,38 +1,35 @@
-"""The calibration in flash: two alternating records, so that a power cut at any byte leaves a whole one.
+"""The calibration in flash: two files that are written in turn, so that after a power cut one of them is whole.
 
-A record: magic, version, length, sequence, chip identity and range, flags, 19 floats, CRC32 of everything
-before it. save() writes over the record that is not in use and reads it back; load() takes the newest valid
-one. Nothing is ever written because a read failed: in a voltage sag a good file can read as empty.
+Each holds a record: magic, version, length, sequence number, the chip's WHO_AM_I and range, flags, 19 floats, and the
+CRC32 of everything before it. load() takes the newest valid record; save() writes over the other one and reads it back.
+Nothing is ever written because a read failed: while the supply sags a good file can read as empty.
 """
 
 import struct
 from binascii import crc32
 from errno import ENOENT
-from math import degrees
 
 from ..errors import StoreError
-from ..lean.upright_trim import MAX_TRIM
 from ..rotation import is_rotation
 from .parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE, Calibration
 
 FILES = ("kickstand_a.cal", "kickstand_b.cal")
 VERSION = 1
-_HEAD = "<4sHHI"  # magic, version, length of the whole record, sequence
-_BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, alignment; offset, slope, gyro bias, matrix, trim
-_NOT_ALIGNED, _BY_POSES, _BY_DRIVE = 0, 1, 2
 _MAGIC = b"KSTD"
+_HEAD = "<4sHHI"  # magic, version, length of the whole record in bytes, sequence number
+_BODY = "<BBBB19f"  # who_am_i, accelerometer range in g, six_done, how aligned; offset, slope, gyro bias, matrix, trim
+_NOT_ALIGNED, _BY_POSES, _BY_DRIVE = 0, 1, 2  # how aligned
 BODY_LENGTH = struct.calcsize(_BODY)
 _LENGTH = struct.calcsize(_HEAD) + BODY_LENGTH + 4
-MAX_BIAS_DPS = 60.0
-MAX_TRIM_DEG = degrees(MAX_TRIM) + 0.1  # rounded to 32 bits on the way
+MAX_BIAS_DPS = 60.0  # deg/s of the gyro
+MAX_TRIM_DEG = 3.6  # degrees: what lean/upright_trim.py finds at most, and room for rounding to 32 bits
 
 
 class Store:
     """Calibration records of one chip.
 
-    who_am_i, accel_range_g: the chip in use; a record of another chip or range is not this sensor's.
-    directory: where the files are. After load(): message says in a few words where the calibration came from
-    or why there is none.
+    who_am_i, accel_range_g: of the chip in use; records of another chip or range are not valid.  directory: where the
+    files are, "" for the current one.  message: after load(), in a few words, which record is in use or why none is.
     """
 
     def __init__(self, who_am_i, accel_range_g, directory=""):
@@ -40,12 +37,11 @@ class Store:
         self._chip = (who_am_i, accel_range_g)
         self._directory = directory
         self.message = ""
-        self._sequence = 0  # of the record in use
-        self._problems = []  # of the other
+        self._sequence = 0  # number of the record in use, 0 for none
+        self._problems = []  # what is wrong with the others, in words
 
     def load(self):
-        """The newest valid Calibration; a fresh, uncalibrated one where there is none. Never raises, never
-        writes."""
+        """The newest valid Calibration, or a new one if there is none. Raises nothing and writes nothing."""
         sequence, calibration, problems = self._newest()
         self._sequence, self._problems = sequence, problems
         if calibration is None:
@@ -57,14 +53,14 @@ class Store:
         return calibration
 
     def unchanged(self):
-        """True if both files read as they did before: not so where load() fell back because one misread for a while,
-        as in a voltage sag."""
+        """True if both files still read as they did in load() or save(). If not, one had misread, as in a voltage sag,
+        and the older record was loaded: then the newer one must not be written over."""
         sequence, _, problems = self._newest()
         return sequence == self._sequence and problems == self._problems
 
     def save(self, calibration):
-        """Write calibration over the older record and read it back. Raises StoreError; the record in use
-        stays whole."""
+        """Write calibration over the older record and read it back. Raises StoreError; then the record in use is still
+        whole."""
         sequence, _, _ = self._newest()
         record = self._pack(calibration, sequence + 1)
         path = self._path(FILES[(sequence + 1) % 2])
@@ -80,14 +76,14 @@ class Store:
         self._sequence, _, self._problems = self._newest()
 
     def _newest(self):
-        """(sequence, calibration, problems): sequence 0 and None where no record is valid."""
+        """(sequence, calibration, problems) of the newest valid record; (0, None, problems) if there is none."""
         newest, calibration, problems = 0, None, []
         for name in FILES:
             try:
                 with open(self._path(name), "rb") as file:
                     record = file.read(_LENGTH + 1)
             except OSError as error:
-                if error.args[0] != ENOENT:  # missing is no problem: the first save makes it
+                if error.args[0] != ENOENT:  # a missing file is normal: save() makes it
                     problems.append("%s unreadable" % name)
                 continue
             sequence, found, problem = self._unpack(record)
@@ -105,7 +101,7 @@ class Store:
         return record + struct.pack("<I", crc32(record))
 
     def _unpack(self, record):
-        """(sequence, calibration, None) or (0, None, what is wrong)."""
+        """(sequence, calibration, None) of a record's bytes, or (0, None, what is wrong in words)."""
         if len(record) != _LENGTH:
             return 0, None, "empty" if not record else "cut short" if len(record) < _LENGTH else "too long"
         magic, version, length, sequence = struct.unpack_from(_HEAD, record, 0)
@@ -122,7 +118,7 @@ class Store:
 
 
 def pack(who_am_i, accel_range_g, calibration):
-    """BODY_LENGTH bytes: a calibration and the chip it belongs to."""
+    """A Calibration and the chip it belongs to, as BODY_LENGTH bytes. accel_range_g: in g."""
     return struct.pack(
         _BODY,
         who_am_i,
@@ -134,7 +130,7 @@ def pack(who_am_i, accel_range_g, calibration):
 
 
 def unpack(data, at):
-    """(who_am_i, accel_range_g, Calibration) from pack()'s bytes at a place in data."""
+    """(who_am_i, accel_range_g, Calibration) from the bytes of pack() that begin at byte `at` of data."""
     fields = struct.unpack_from(_BODY, data, at)
     calibration = Calibration()
     calibration.six_done, calibration.aligned = bool(fields[2]), fields[3] != _NOT_ALIGNED
@@ -144,7 +140,7 @@ def unpack(data, at):
 
 
 def plausible(calibration):
-    """True if every parameter is one that a real sensor could have."""
+    """True if every parameter of the Calibration is one that a real sensor can have."""
     for i in range(3):
         if not abs(calibration.accel_offset[i]) < MAX_OFFSET_G:  # "not <" also refuses not-a-number
             return False

@@ -1,10 +1,10 @@
-"""Counts of the chip to force and rate of the vehicle in one step: calibration and alignment multiplied out.
+"""From the chip's counts to the vehicle's force and rate in one step: calibration and alignment multiplied out.
 
-    force = R (slope * counts / lsb + offset)          Nicolae's (18)-(20), then (15)
-    rate  = R (counts / lsb - bias)
+    force = R (slope * counts / lsb + offset)          Nicolae's equations (18)-(20), then (15)
+    rate  = R (counts / lsb - bias)                    R: vehicle_from_sensor
 
-Eighteen products a sample instead of twenty-seven. On the board each takes 12 us and 32 bytes of heap, so there
-they are products of integers, in machine code: right to 0.03 degrees.
+That takes eighteen products a sample instead of twenty-seven. On the board a product of floats takes 12 us and 32 bytes
+of heap, so there they are products of integers in machine code, which are right to 0.03 degrees of lean.
 """
 
 from array import array
@@ -12,29 +12,33 @@ from math import radians
 
 from ..rotation import rotate
 
-ONE = 2048  # 1 as such an integer: times the sum of eight samples it still fits into 32 bits
+ONE = 2048  # the integer that stands for the largest scale: times the sum of eight samples it still fits 32 bits
 
 
-def products_plainly(matrices, sums, n, out):
-    """out, array('i', 6) = a 3x4 matrix times (sums[0:3], n), and another times (sums[4:7], n): array('i', 24)."""
+def products_python(matrices, sums, n, out):
+    """out[0:3] = A (sums[0:3], n) and out[3:6] = B (sums[4:7], n), where n multiplies the offsets.
+
+    matrices: array('i', 24), the 3x4 matrices A and B by rows.  sums: array('i', 7).  out: array('i', 6). On the board
+    products() is the machine code of transform_viper.py, elsewhere this.
+    """
     for i in range(6):
-        of = 0 if i < 3 else 4
+        first = 0 if i < 3 else 4
         out[i] = n * matrices[4 * i + 3]
         for k in range(3):
-            out[i] += matrices[4 * i + k] * sums[of + k]
+            out[i] += matrices[4 * i + k] * sums[first + k]
 
 
 try:
     from .transform_viper import products
 except (ImportError, NameError, SyntaxError):  # CPython, or a port without viper
-    products = products_plainly
+    products = products_python
 
 
 class Transform:
-    """calibration: a Calibration, as it is now, with its scale set."""
+    """calibration: a Calibration whose set_scale() was called; later changes to it are not seen."""
 
     def __init__(self, calibration):
-        # lists: on a board reading an array's element takes heap, reading a list's does not
+        # Lists, because on the board reading a float from an array takes heap, and from a list it does not.
         self._force, self._rate = [0.0] * 9, [0.0] * 9
         self._force_offset, self._rate_offset = [0.0] * 3, [0.0] * 3
         r = calibration.vehicle_from_sensor
@@ -54,7 +58,10 @@ class Transform:
             self._integers[12 + i] = round(rate / self._rate_unit)
 
     def apply(self, reading, force, rate):
-        """reading (7, chip's order) -> force (3: left, up, forward in g) and rate (3: about them in rad/s)."""
+        """Put the force and rate of a reading into force and rate.
+
+        reading: 7 numbers in counts, in the chip's order.  force: 3, left, up, forward in g.  rate: 3, about the same
+        axes in rad/s."""
         m, c = self._force, self._force_offset
         x, y, z = reading[0], reading[1], reading[2]
         force[0] = m[0] * x + m[1] * y + m[2] * z + c[0]
@@ -67,7 +74,7 @@ class Transform:
         rate[2] = m[6] * x + m[7] * y + m[8] * z + c[2]
 
     def apply_sum(self, sums, n, force, rate):
-        """The same of the mean of n samples, at most 8, given their sum in counts: array('i', 7)."""
+        """The same for the mean of n samples, at most 8, given the sums of their counts: array('i', 7)."""
         p = self._products
         products(self._integers, sums, n, p)
         unit = self._force_unit / n

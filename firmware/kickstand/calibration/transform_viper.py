@@ -1,4 +1,4 @@
-"""transform.products_plainly as machine code. See there."""
+"""transform.py's products_python() as machine code. Both must give the same integers."""
 
 import micropython
 

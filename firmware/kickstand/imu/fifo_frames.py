@@ -1,34 +1,40 @@
-"""Frames of the chip's FIFO, or of one burst: fourteen bytes, seven big-endian int16, one sampling instant."""
+"""Frames of the chip's FIFO: what their bytes mean, and their sum.
 
-FRAME = 14
+A frame is one sample: 14 bytes, seven big-endian int16 in the order ax ay az temperature gx gy gz (register map
+RM-MPU-6000A rev 4.2, pp. 29 to 31). On the board decode() and add_up() are the machine code of fifo_frames_viper.py;
+elsewhere they are decode_python() and add_up_python(), which give the same results.
+"""
+
+FRAME = 14  # bytes
 
 
-def decode_plainly(frames, at, counts):
-    """Seven big-endian int16 from byte `at` of frames into counts, array('h', 7)."""
+def decode_python(frames, at, counts):
+    """Put the frame that begins at byte `at` of frames into counts, array('h', 7)."""
     for i in range(7):
         value = frames[at] << 8 | frames[at + 1]
         counts[i] = value - 65536 if value > 32767 else value
         at += 2
 
 
-def add_up_plainly(frames, n, sums, watch):
-    """Sum n frames into sums, array('i', 7), up to the first that is no reading; return how many they are.
+def add_up_python(frames, n, sums, watch):
+    """Add n frames into sums, array('i', 7), and return n; stop at the first bad frame and return how many came before.
 
-    No reading is one whose force is all zeros or all ones, nor, after watch[2] times, one that is like the one before.
-    watch: array('i', 3), kept from call to call: a mark of the last frame, how often it has come again, and that limit.
+    A frame is bad if the six bytes of its force are all 0x00 or all 0xFF, or if it is like watch[2] frames before it.
+    watch: array('i', 3) that the caller keeps from call to call: a hash of the last frame, how many times in a row it
+    has been repeated, and how many repetitions make a frame bad.
     """
     for i in range(7):
         sums[i] = 0
     at = 0
     for k in range(n):
         first = frames[at]
-        same = 0
-        mark = 0
+        same = 0  # bytes of the force that are like the first
+        mark = 0  # the hash
         for i in range(FRAME):
             byte = frames[at + i]
             if i < 6 and byte == first:
                 same += 1
-            if i < 6 or i > 7:  # the temperature may well stand still
+            if i < 6 or i > 7:  # without the temperature, which may stay the same in a working chip
                 mark = (mark * 31 + byte) & 0xFFFFFF
         if same == 6 and (first == 0 or first == 255):
             return k
@@ -46,4 +52,4 @@ def add_up_plainly(frames, n, sums, watch):
 try:
     from .fifo_frames_viper import add_up, decode
 except (ImportError, NameError, SyntaxError):  # CPython, or a port without viper
-    add_up, decode = add_up_plainly, decode_plainly
+    add_up, decode = add_up_python, decode_python

@@ -1,19 +1,19 @@
-"""The chip kept alive: found, set up, watched, and set up again after a fault."""
+"""Keeps the chip working: finds it, sets it up, watches it, and sets it up again after a fault."""
 
 from time import ticks_add, ticks_diff, ticks_ms
 
 from ..errors import SensorFault
 from .mpu6050 import UnknownChip
 
-CHECK_MS = 100  # 0.6 ms each
-RETRY_MS = 50
-SAY_MS = 30  # before starting again, which takes 0.2 s: time to get the fault onto the display
-FAILURES = 3  # single failed transfers are ridden out
-SILENT_MS = 100  # without a sample
+CHECK_MS = 100  # from one check of the configuration, which takes 0.6 ms, to the next
+RETRY_MS = 50  # from one attempt to set the chip up to the next
+SAY_MS = 30  # from a fault to the first attempt, which blocks the loop for 0.2 s: time to show the fault
+FAILURES = 3  # transfers that fail in a row make a fault; a NACK or two are tolerated
+SILENT_MS = 100  # without a sample make a fault
 
 
 class Sensor:
-    """Samples of one chip that may fail at any time.
+    """Samples of one chip that may fail at any time. A transfer that fails, by NACK or time-out, ends in _missed().
 
     chip: an Mpu6050.  reopen: called to free the bus, returns it as a machine.I2C.
     fault: None, or a SensorFault: what is wrong.  restarts: how often the chip was set up.
@@ -22,18 +22,29 @@ class Sensor:
     def __init__(self, chip, reopen):
         self.chip = chip
         self.reopen = reopen
-        self._failures = 0
-        self._overflows = 0
-        self._due_ms = ticks_ms()  # of the next check, or of the next attempt while faulty
-        self._sample_ms = 0
+        self._failures = 0  # transfers that failed in a row
+        self._overflows = 0  # of the chip's FIFO, those that are dealt with
+        self._due_ms = ticks_ms()  # when the next check is due or, while the chip does not run, the next attempt
+        self._sample_ms = 0  # when the last sample was read
         self.restarts = 0
         self.fault = SensorFault("starting")
         self._running = False
 
+    @property
+    def emptied(self):
+        """True if the last fetch() left no sample in the chip's FIFO."""
+        return not self.chip.frames_left
+
+    def set_up(self):
+        """Free the bus and set the chip up, in 0.2 s. Raises UnknownChip, OSError, or SettingsError for wrong pins."""
+        self.chip.connect(self.reopen())
+        self.chip.setup()
+
     def fetch(self, now_ms):
-        """How many samples have come in, at most MAX_FRAMES: their sum is in chip.sums, each can be had by
-        chip.take(k). Starts the chip when it is not running. Raises SettingsError for pins that cannot be used, and
-        nothing else."""
+        """Read the samples that have come in; return how many, at most MAX_FRAMES. now_ms: ticks_ms().
+
+        Their sum is in chip.sums; chip.take(k) gives each of them. A chip that does not run is set up first. Raises
+        SettingsError for pins that cannot be used, and nothing else."""
         if not self._running:
             if ticks_diff(now_ms, self._due_ms) >= 0:
                 self._start(now_ms)
@@ -54,34 +65,37 @@ class Sensor:
         return good
 
     def _transfer(self, now_ms):
-        """How many samples have come in, -1 if that could not be read."""
+        """Read the samples that have come in; return how many, or -1 for a transfer that failed."""
         try:
             if self._failures:
-                self.chip.restart_fifo()  # what broke off may have left half a frame
+                self.chip.restart_fifo()  # the transfer that failed may have left half a frame in the FIFO
             return self.chip.fetch()
         except OSError:
             self._missed(now_ms)
             return -1
 
     def _wait(self, now_ms):
-        if self._overflows != self.chip.overflows:  # nobody came to fetch; the FIFO begins again now
+        """There was no sample: after an overflow that is no fault, because the FIFO was just emptied."""
+        if self._overflows != self.chip.overflows:
             self._overflows = self.chip.overflows
-            self._sample_ms = ticks_ms()  # now_ms may be of before the pause
+            self._sample_ms = ticks_ms()  # now_ms may be from before the long pause that led to the overflow
         elif ticks_diff(now_ms, self._sample_ms) > SILENT_MS:
             self._fail("sensor-silent", now_ms)
 
     def check(self, now_ms):
-        """Now and then: is the chip still set up as it was? Never raises. Call it before readings are shown."""
+        """Make sure, every CHECK_MS, that the chip is still configured. Call it before readings are shown. Raises
+        nothing. now_ms: ticks_ms()."""
         if not self._running or ticks_diff(now_ms, self._due_ms) < 0:
             return
         self._due_ms = ticks_add(now_ms, CHECK_MS)
         try:
-            if not self.chip.configured():  # a supply dip: asleep, with the ranges of the factory
+            if not self.chip.configured():  # a supply dip: the chip has reset itself
                 self._fail("sensor-reset", now_ms)
         except OSError:
             self._missed(now_ms)
 
     def _missed(self, now_ms):
+        """A transfer failed: FAILURES of them in a row are a fault."""
         self._failures += 1
         if self._failures >= FAILURES:
             self._fail("sensor-lost", now_ms)
@@ -92,18 +106,17 @@ class Sensor:
         self._due_ms = ticks_add(now_ms, SAY_MS)
 
     def _start(self, now_ms):
-        """Free the bus and set the chip up; 0.2 s when it answers."""
+        """Try to set the chip up."""
         try:
-            self.chip.connect(self.reopen())
-            self.chip.setup()
+            self.set_up()
         except UnknownChip as error:
             self.fault = SensorFault("unknown-chip", error.args[0])
         except OSError:
             self.fault = SensorFault("no-sensor")
         else:
-            self._running = True  # the fault stays until there is a good sample
+            self._running = True  # but the fault stays until there is a good sample
             self.restarts += 1
             self._failures = 0
-        now_ms = ticks_ms()  # setting up took its time
+        now_ms = ticks_ms()  # setting up took 0.2 s
         self._sample_ms = now_ms
         self._due_ms = ticks_add(now_ms, CHECK_MS if self._running else RETRY_MS)

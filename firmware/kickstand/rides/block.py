@@ -1,15 +1,18 @@
-"""A recorded ride: blocks of a few thousand bytes, each of which can be read without the others. Pure format.
+"""The format of a recorded ride: blocks of a few thousand bytes, each of which can be read without the others.
 
-A block: head (magic, format version, length, ride, sequence, time in us since power-on, hundredths of a degree
-Celsius at its end, counts per g, ten times the counts per deg/s, samples per second, firmware version),
-the calibration as store.pack() writes it, turns, filling, tail (number of entries, CRC32 of everything before it).
+A block is: a head (magic, format version, length, ride, sequence, time in us since power-on, temperature at its end in
+hundredths of a degree Celsius, counts per g, ten times the counts per deg/s, samples per second, firmware version); the
+calibration as store.pack() writes it; the entries; zeros; a tail (number of entries, CRC32 of everything before it).
 
-An entry is one turn of the loop: how many samples came in (n), the microseconds since the turn before and the sums
-of their six counts, so that the mean that the lean was computed from is kept exactly. Or it is a speed: n = 0, then
-centimetres a second. Each number is kept as the difference from what was to be expected (the time from n, the
-others from the turn before) by an adaptive Rice code: zigzag, k = log2 of the mean size of late, size >> k in ones
-ended by a zero, then k bits; from LIMIT ones on there is no zero, and RAW_BITS of the size follow. Most significant
-bit first.
+An entry is one turn of the loop: how many samples came in (n), the microseconds since the turn before, and the sums of
+the samples' six counts (ax ay az gx gy gz). So the mean that the lean was computed from is kept exactly. Or an entry is
+a speed: n = 0, then centimetres per second.
+
+Each number is kept as its difference from a prediction: n sample periods for the time, the values of the turn before
+for the others. An adaptive Rice code holds the difference (R. F. Rice, JPL publication 79-22), most significant bit
+first. The difference becomes a size >= 0 by zigzag coding: 0, -1, 1, -2, ... become 0, 1, 2, 3, ... k is log2 of the
+mean of the last sizes. The code is size >> k as that many ones, a zero, and the low k bits of the size. Where that
+would take LIMIT ones or more, it is LIMIT ones and then the size in RAW_BITS bits.
 """
 
 import struct
@@ -24,24 +27,30 @@ VERSION = 1
 HEAD = "<4sHHIIqhHHH12s"
 _TEMPERATURE_AT = struct.calcsize("<4sHHIIq")
 TAIL = "<HI"
-BLOCK = 4096  # of the flash
-FIELDS = 9  # n, dt_us, sums of ax ay az gx gy gz, speed
-_SPEED = 8
+BLOCK = 4096  # bytes in a block of the flash
+FIELDS = 9  # of an entry: n, dt_us, sums of ax ay az gx gy gz, speed
+_SPEED = 8  # the place of the speed among them
 LIMIT = 12
 RAW_BITS = 31
-MEAN_SHIFT = 4  # the mean of about the last 16 sizes, times 16
+MEAN_SHIFT = 4  # a mean is that of about the last 16 sizes, and is kept times 16
 START_MEAN = 128 << MEAN_SHIFT
-MAX_SIZE = 1 << 20  # that a mean is told of
-MAX_DT_US = 1 << 29
+MAX_SIZE = 1 << 20  # a larger size counts as this in the mean, so that it fits 32 bits
+MAX_DT_US = 1 << 29  # the longest time between two turns that an entry can hold
 _HEAD_LENGTH = struct.calcsize(HEAD) + BODY_LENGTH
 _TAIL_LENGTH = struct.calcsize(TAIL)
-_WORST = (FIELDS + 1) * (LIMIT + RAW_BITS) // 8 + 2  # bytes of a turn and a speed
-_MEANS, _PENDING, _BITS, _AT, _PERIOD = 9, 18, 19, 20, 21  # the coder's state, after the entry before
+_WORST = (FIELDS + 1) * (LIMIT + RAW_BITS) // 8 + 2  # the most bytes that a turn and a speed can take
+# Where the coder's state, array('i', 22), keeps what. From 0 on, FIELDS values: the entry before. From _MEANS on,
+# FIELDS values: the mean size of each field. Then: bits that do not yet make a byte, how many those are, the place of
+# the next byte in the buffer, and the sample period in us.
+_MEANS, _PENDING, _BITS, _AT, _PERIOD = 9, 18, 19, 20, 21
 
 
 def block_length(index):
-    """Bytes of block `index` of a file: what littlefs puts into its own block of that number beside 4-byte pointers
-    to blocks before (SPEC.md of littlefs, CTZ skip-lists). Blocks that end where its own do are never copied."""
+    """Bytes in block number `index` of a file: as many as littlefs keeps in its own block of that number.
+
+    Each of those but the first begins with 4-byte pointers to earlier blocks: one, and another for each time that its
+    number can be halved (littlefs, SPEC.md, CTZ skip-lists). A block of a ride that ends where one of littlefs does
+    never has to be copied when the file grows."""
     if index == 0:
         return BLOCK
     length = BLOCK - 4
@@ -51,8 +60,10 @@ def block_length(index):
     return length
 
 
-def encode_plainly(entry, state, out):
-    """Append an entry."""
+def encode_python(entry, state, out):
+    """Append an entry, array('i', FIELDS), to the buffer out. state: the coder's, array('i', 22), is updated.
+
+    On the board encode() is the machine code of block_viper.py, elsewhere this; the bytes are the same."""
     n, before = entry[0], state[0]
     for i in range(_SPEED) if n else (0, _SPEED):
         value, guess = entry[i], state[i]
@@ -74,11 +85,12 @@ def encode_plainly(entry, state, out):
             _append(state, out, (1 << LIMIT) - 1, LIMIT)
             _append(state, out, size, RAW_BITS)
         state[_MEANS + i] = mean + min(size, MAX_SIZE) - (mean >> MEAN_SHIFT)
-        if i or n:  # a speed leaves the n of the turn before
+        if i or n:  # a speed, n = 0, does not replace the n of the turn before
             state[i] = value
 
 
 def _append(state, out, code, length):
+    """Append the `length` bits of code to the buffer out."""
     pending = state[_PENDING] << length | code
     bits = state[_BITS] + length
     while bits >= 8:
@@ -92,13 +104,13 @@ def _append(state, out, code, length):
 try:
     from .block_viper import encode
 except (ImportError, NameError, SyntaxError):  # CPython, or a port without viper
-    encode = encode_plainly
+    encode = encode_python
 
 
 class RideBlock:
-    """One block being filled: begin(), add() until full(), close(); then buffer[:length] is the block.
+    """A block being filled: begin(), add() until full(), close(). Then buffer[:length] is the block.
 
-    period_us: nominal, of one sample.  count: entries so far.
+    period_us: nominal time from one sample to the next.  count: entries so far.
     """
 
     def __init__(self, period_us):
@@ -106,18 +118,19 @@ class RideBlock:
         self._state = array("i", [0] * (_PERIOD + 1))
         self._state[_PERIOD] = period_us
         self._entry = array("i", [0] * FIELDS)
-        self._temperature = 0  # counts, of the last turn
+        self._temperature = 0  # of the last turn, in counts
         self.length = 0
         self.count = 0
 
     def begin(self, length, ride, sequence, time_us, chip, sample_hz, body):
-        """An empty block of so many bytes. time_us: of the last sample before it, since power-on.  chip: an Mpu6050.
-        body: of store.pack()."""
+        """Begin an empty block. length: in bytes, with head and tail.  ride, sequence: the number of the ride, and of
+        the block in it.  time_us: time since power-on of the last sample before it.  chip: an Mpu6050.  sample_hz: its
+        samples a second.  body: the calibration, from store.pack()."""
         state = self._state
         for i in range(FIELDS):
             state[i] = 0
             state[_MEANS + i] = START_MEAN
-        state[0] = 1  # something to divide by
+        state[0] = 1  # the prediction divides by the n of the turn before
         state[_PENDING] = state[_BITS] = 0
         state[_AT] = _HEAD_LENGTH
         version = __version__.encode()[:12]
@@ -131,7 +144,7 @@ class RideBlock:
             ride,
             sequence,
             time_us,
-            0,  # temperature, known at close()
+            0,  # the temperature is written by close()
             chip.accel_lsb_per_g,
             int(10 * chip.gyro_lsb_per_dps + 0.5),
             sample_hz,
@@ -143,7 +156,7 @@ class RideBlock:
         self.count = 0
 
     def add(self, sums, n, dt_us):
-        """One turn: the sums of n samples' seven counts, and the microseconds since the turn before."""
+        """Append a turn: the sums of n samples' seven counts, and the microseconds since the turn before."""
         entry = self._entry
         entry[0] = n
         entry[1] = dt_us
@@ -158,18 +171,18 @@ class RideBlock:
         self.count += 1
 
     def add_speed(self, cm_per_s):
-        """A new speed, which belongs to the turn after it."""
+        """Append a speed in cm/s, which belongs to the turn that is appended next."""
         self._entry[0] = 0
         self._entry[_SPEED] = cm_per_s
         encode(self._entry, self._state, self.buffer)
         self.count += 1
 
     def full(self):
-        """True when there is no room for any entry that might come."""
+        """True when the longest possible turn and speed might not fit any more."""
         return self._state[_AT] + _WORST + _TAIL_LENGTH > self.length
 
     def close(self):
-        """Write the temperature, the last bits and the tail."""
+        """Write the temperature, the last bits and the tail. Then the block is complete."""
         state, buffer = self._state, self.buffer
         struct.pack_into("<h", buffer, _TEMPERATURE_AT, int(100 * self._chip.temperature_c(self._temperature)))
         at = state[_AT]

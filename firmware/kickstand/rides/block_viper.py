@@ -1,9 +1,12 @@
-"""ride_file.encode_plainly as machine code: 0.1 ms in place of 1.2. See there."""
+"""block.py's encode_python() as machine code: 0.1 ms instead of 1.2 ms.
+
+Both must write the same bytes: host_tests/rides/test_ride_file.py compares them.
+"""
 
 import micropython
 from micropython import const
 
-# ride_file's own: machine code has them built in only where they stand in its file
+# The same as in block.py: the compiler puts a constant into machine code only if it stands in the same file.
 _FIELDS = const(9)
 _SPEED = const(8)
 _LIMIT = const(12)
@@ -16,7 +19,7 @@ _BITS = const(19)
 _AT = const(20)
 _PERIOD = const(21)
 
-_LOW_BITS = const(16)  # of a raw size, which is written in two steps: with those pending it has more than 32 bits
+_LOW_BITS = const(16)  # a raw size is written in two parts, because with the pending bits it exceeds 32 bits
 
 
 @micropython.viper
@@ -33,7 +36,7 @@ def encode(entry: ptr32, state: ptr32, out: ptr8):  # noqa: F821 the names are v
         if i == 1:
             guess = n * int(state[_PERIOD])
         elif i < _SPEED and i > 1:
-            # 24 bits with their sign, however wide an int is
+            # sign-extend 24 bits, whether an int has 32 or 64
             value = ((value & 0xFFFFFF) ^ 0x800000) - 0x800000
             guess = ((guess & 0xFFFFFF) ^ 0x800000) - 0x800000
             if n != before:

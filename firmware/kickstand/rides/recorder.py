@@ -1,39 +1,41 @@
-"""The recorder: turns of the loop into blocks, and these to where they are kept, a little in each turn.
+"""Records a ride: puts each turn of the loop into a block, and writes full blocks to flash, a little in each turn.
 
-While one block fills (four seconds or more) the one before is written: a piece, a flush or the removal of an old
-file a turn, so that no turn waits for more than one erase of the flash (45 ms); the chip's FIFO keeps the samples.
+A block takes four seconds or more to fill. Meanwhile the one before is written. In one turn of the loop a piece is
+written, a file is flushed, or an old file is removed, so that no turn waits for more than one erase of the flash
+(45 ms). The chip's FIFO keeps the samples that come during that time.
 """
 
 from time import ticks_diff, ticks_ms
 
 from ..calibration.store import pack
 from ..errors import CardError, RecordingError
-from ..lean.meter import GAP_US
+from ..units import GAP_US
 from .block import MAX_DT_US, RideBlock
 
-PIECE = 256  # a page of the flash
-STALL_MS = 10  # an erase of the flash; writing a page takes 1
+PIECE = 256  # bytes, a page of the flash
+STALL_MS = 10  # a write that took longer was an erase of the flash: to write a page takes 1 ms
 
 
 class Recorder:
-    """keeper: where blocks go, a RideRing or RideStream.
+    """keeper: where blocks are written, a RideRing or RideStream.  sample_hz: the chip's samples a second.
 
-    active: a ride is being recorded.  problem: None, or a CardError or RecordingError: why the recording ended by
-    itself, to be taken by whoever shows it.  stalled: interrupts were off for longer than
-    STALL_MS, until whoever counts with them sets it back.
+    active: True while a ride is being recorded.
+    problem: None, or a CardError or RecordingError: why the recording ended by itself; take_problem() clears it.
     """
 
     def __init__(self, keeper, sample_hz):
         self.keeper = keeper
         self.active = False
         self.problem = None
-        self.stalled = False
+        self._stalled = False
         self._sample_hz = sample_hz
-        self._block = self._spare = None  # 8 KB of heap from the first start() on
+        self._block = self._spare = None  # RideBlocks, 8 KB of heap: made by the first start()
 
     def start(self, chip, calibration):
-        """Begin a ride that is measured by this chip (an Mpu6050 that runs) with this Calibration. What went
-        before has to be forgotten by the meter, or its lean cannot be replayed. Ends the ride before."""
+        """Begin a ride, and end the one before. chip: an Mpu6050 that runs.  calibration: the Calibration in use.
+
+        A replay begins with a new filter. So the caller has to restart the meter's as well, or the replay's lean will
+        differ. Raises nothing: see active and problem."""
         self.stop()
         try:
             if not self._spare:
@@ -54,14 +56,14 @@ class Recorder:
         self._sequence = 0
         self._bytes = 0
         self._interrupted = False
-        self._speed = None  # cm/s, that has come since the turn before
-        self._waiting = None  # the block that is being written, its place in it
+        self._speed = None  # the last speed since the turn before, in cm/s
+        self._waiting = None  # the block that is being written, and how many of its bytes are written
         self._at = 0
         self.active = True
         self._begin_block()
 
     def stop(self):
-        """End the ride: what has been measured until now is written, in at most 0.1 s."""
+        """End the ride, if there is one. All that was added is written first, in at most 0.1 s."""
         if not self.active:
             return
         if self._block.count:
@@ -70,20 +72,32 @@ class Recorder:
             self.tick()
         if self.active:
             self.active = False
-            self.stalled = self.keeper.stops_interrupts
+            self._stalled = self.keeper.stops_interrupts
             try:
                 self.keeper.end()
             except (OSError, MemoryError) as error:
                 self._fail(error)
 
+    def take_problem(self):
+        """Return problem and clear it."""
+        problem, self.problem = self.problem, None
+        return problem
+
+    def take_stall(self):
+        """True if interrupts were off for longer than STALL_MS since the last call: what they measured is not right."""
+        stalled, self._stalled = self._stalled, False
+        return stalled
+
     def interrupt(self):
-        """The chip was started again: the next turn does not follow on the one before."""
+        """Say that the chip was started again: the next turn does not follow on from the one before."""
         self._interrupted = True
 
     def add(self, sums, n, dt_us):
-        """One turn's sums of n samples. dt_us: since the turn before. For an active recorder."""
+        """Add a turn of the loop. sums: of the seven counts of n samples.  dt_us: microseconds since the turn before.
+
+        Only while active."""
         now_ms = ticks_ms()
-        if self._interrupted:  # replay has to start its filter again, too, which it does after a gap
+        if self._interrupted:  # a gap makes the replay start its filter again, as the board did
             self._interrupted = False
             if self._time_us != self._start_us:
                 dt_us = max(GAP_US + 1, min(MAX_DT_US, ticks_diff(now_ms, self._before_ms) * 1000))
@@ -99,20 +113,21 @@ class Recorder:
                 self._begin_block()
 
     def add_speed(self, cm_per_s):
-        """A new speed, which belongs to the turn added next: the last that comes before it."""
+        """Add a speed in cm/s to the turn that is added next; of several speeds the last one counts."""
         self._speed = cm_per_s
 
     def tick(self):
-        """One step of the writing. Call once a turn while active."""
+        """Take one step of the writing. Call it once in each turn of the loop while active."""
         waiting = self._waiting
         if not waiting:
             return
         begun_ms = ticks_ms()
         self._write(waiting)
         if ticks_diff(ticks_ms(), begun_ms) > STALL_MS and self.keeper.stops_interrupts:
-            self.stalled = True
+            self._stalled = True
 
     def _write(self, waiting):
+        """Take one step of writing this block."""
         try:
             if not self.keeper.ready():
                 return
@@ -128,11 +143,11 @@ class Recorder:
             self._fail(error)
 
     def seconds(self):
-        """How long this ride has been recorded."""
+        """How long this ride has been recorded, in seconds."""
         return (self._time_us - self._start_us) // 1_000_000
 
     def room_s(self):
-        """For how many more seconds there is room, or None where that is not known."""
+        """For how many more seconds there is room; None if there is no limit."""
         room = self.keeper.room()
         if room is None:
             return None
@@ -141,6 +156,7 @@ class Recorder:
         return room * self.seconds() // self._bytes
 
     def _begin_block(self):
+        """Let the turns to come fill an empty block."""
         self._block.begin(
             self.keeper.next_length(),
             self._ride,
@@ -153,14 +169,15 @@ class Recorder:
         self._sequence += 1
 
     def _end_block(self):
-        while self._waiting and self.active:  # a keeper slower than the ride
+        """Close the block that was filled, and let it be written."""
+        while self._waiting and self.active:  # the block before is not yet written: flash was slower than the ride
             self.tick()
         self._block.close()
         self._block, self._spare = self._spare, self._block
         self._waiting, self._at = self._spare, 0
 
     def _fail(self, error):
-        """No more of this ride; the display goes on."""
+        """End the ride after an error; the loop goes on."""
         self.active = False
         self.keeper.abandon()
         self._end(RecordingError(self.keeper.fault_code(error), str(error)))

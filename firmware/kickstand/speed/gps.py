@@ -1,44 +1,51 @@
 """Speed from a GPS receiver: its sentences RMC and VTG (NMEA 0183) on a UART.
 
->>> gps = Gps(machine.UART(1, 9600, tx=machine.Pin(8), rx=machine.Pin(9)))
->>> speed_mps = gps.poll(time.ticks_ms())       # None where there is no new one
+>>> gps = Gps(machine.UART(1, 9600, tx=machine.Pin(8), rx=machine.Pin(9), timeout=0))
+>>> speed_mps = gps.poll(time.ticks_ms())       # None: no new speed
 
-A sentence: $, two letters for the system (GP, GL, GN, BD, ...: any will do), its kind, fields, *, the exclusive or of
-everything between $ and * as two hexadecimal digits, end of line.
+A sentence is a line: $, two letters for the satellite system (GP, GL, GN, BD, ...: all are accepted), three letters for
+its kind, fields separated by commas, *, and a checksum of two hexadecimal digits: the exclusive or of all between $
+and *.
 """
 
 from time import ticks_diff
 
 from ..errors import SpeedFault
 
-MAX_SENTENCE = 100  # the standard says 82; receivers with many decimals go beyond
-MAX_CHUNK = 64  # of what waits, each turn: at a turn each 10 ms twice what 10 fixes a second need
-SILENT_MS = 3000
-LATE_MS = 2000  # a fix that waited in the receiver for longer says nothing about now
-TIME_JUMP_MS = 5000  # not late: the receiver has corrected its clock
-FIXES = 4  # at least, over more than TIME_JUMP_MS: what all of them are late by, the receiver's clock has gone back
-KNOT_MPS = 1852.0 / 3600.0
-KMH_MPS = 1.0 / 3.6
+MAX_SENTENCE = 100  # bytes: the standard says 82, but receivers with many decimals exceed it
+MAX_CHUNK = 64  # bytes read in one turn of the loop: in turns of 10 ms, twice what 10 fixes a second need
+SILENT_MS = 3000  # without any byte, without a whole sentence, or without a fix: then fault() tells which
+LATE_MS = 2000  # a fix that waited in the receiver for longer than this says nothing about now
+TIME_JUMP_MS = 5000  # a fix that seems later than this is not: the receiver has corrected its clock
+# The delay of a fix is counted from a fix that was not late, the reference. When at least so many fixes over more than
+# TIME_JUMP_MS all came late, the smallest delay becomes the new zero: the receiver set its clock back.
+MIN_FIXES_FOR_NEW_REFERENCE = 4
+KNOT_MPS = 1852.0 / 3600.0  # one knot in m/s
+KMH_MPS = 1.0 / 3.6  # one km/h in m/s
 
 
 class Gps:
-    """uart: a machine.UART, its time-out 0. After poll() has returned a speed: age_ms, how old it is known to be beyond
-    the receiver's own delay."""
+    """uart: a machine.UART with a time-out of 0. After poll() has returned a speed: age_ms, by how much its sentence
+    came later than the receiver's sentences usually do."""
 
     def __init__(self, uart):
         self._uart = uart
-        self._line = b""
-        self._heard_ms = None  # when last: anything; a whole sentence; one with a fix; an RMC
+        self._line = b""  # the sentence so far
+        # When, in ticks_ms(), the receiver last sent: any byte; a whole sentence; a sentence with a fix; an RMC.
+        self._heard_ms = None
         self._sentence_ms = self._fix_ms = 0
         self._rmc_ms = None
-        self._time = b""  # of the last RMC
-        self._first = None  # (ticks, time of day), ms, of the fix that age is counted from
-        self._prompt = None  # the same of the promptest fix after it, its age; how many those are, since when
-        self._prompt_age_ms = self._fixes = self._since_ms = 0
+        self._time = b""  # of day, in the last RMC
+        # A fix is remembered as (ticks_ms() when it came, its time of day in ms).
+        self._reference = None  # the fix that delays are counted from
+        self._earliest = None  # the fix with the smallest delay since then, and that delay
+        self._earliest_delay_ms = 0
+        self._fixes = 0  # fixes with a delay since the reference was set, and when that was
+        self._since_ms = 0
         self.age_ms = 0
 
     def poll(self, now_ms):
-        """A new speed in m/s, or None. Never waits. now_ms: ticks_ms()."""
+        """Return a new speed in m/s, or None. Never waits. now_ms: ticks_ms()."""
         if self._heard_ms is None:
             self._heard_ms = self._sentence_ms = self._fix_ms = now_ms
         waiting = self._uart.any()
@@ -57,12 +64,12 @@ class Gps:
             end = chunk.find(b"\n")
         self._line += chunk
         beyond = len(self._line) - MAX_SENTENCE
-        if beyond > 0:  # the end of a line was lost: perhaps another has begun
+        if beyond > 0:  # the end of a line was lost: keep what may be the beginning of the next one
             self._line = self._line[max(beyond, self._line.rfind(b"$")) :]
         return speed
 
-    def skip(self, now_ms):
-        """Bytes until now may be lost: the check sum tells."""
+    def after_stall(self, now_ms):
+        """Interrupts were off until now. Nothing to do: if bytes were lost, the checksum of their sentence is wrong."""
 
     def fault(self, now_ms):
         """None, or a SpeedFault: why there is no speed."""
@@ -77,8 +84,8 @@ class Gps:
         return None
 
     def _sentence(self, line, now_ms):
-        """The speed in one line; None if it has none to trust."""
-        start = line.rfind(b"$")  # noise may stand in front
+        """The speed in one line, m/s; None if there is none that can be trusted."""
+        start = line.rfind(b"$")  # there may be noise in front of it
         kind = line[start + 3 : start + 6]
         if start < 0 or kind not in (b"RMC", b"VTG"):
             return None
@@ -96,18 +103,18 @@ class Gps:
         return speed
 
     def _rmc(self, fields, now_ms):
-        """$--RMC,time,A or V,lat,N,lon,E,knots,course,date,variation,E[,mode[,...]]"""
+        """The speed in the fields of $--RMC,time,A or V,lat,N,lon,E,knots,course,date,variation,E[,mode[,...]]"""
         self._rmc_ms = now_ms
         repeated = fields[1] == self._time
         self._time = fields[1]
+        # mode E: estimated from the last fix (dead reckoning); N: not valid
         valid = fields[2] == b"A" and not (len(fields) > 12 and fields[12] in (b"E", b"N"))
-        # E: no fix, but the last one carried on
         if not valid or repeated or self._late(fields[1], now_ms):
             return None
         return float(fields[7]) * KNOT_MPS
 
     def _vtg(self, fields, now_ms):
-        """$--VTG,course,T,course,M,knots,N,km/h,K[,mode]: for receivers that send no RMC."""
+        """The speed in the fields of $--VTG,course,T,course,M,knots,N,km/h,K[,mode], unless the receiver sends RMC."""
         if self._rmc_ms is not None and ticks_diff(now_ms, self._rmc_ms) < SILENT_MS:
             return None
         if len(fields) > 9 and fields[9] in (b"E", b"N"):
@@ -118,27 +125,29 @@ class Gps:
         return float(fields[7]) * KMH_MPS if fields[8] == b"K" and fields[7] else None
 
     def _late(self, time, now_ms):
-        """True for a fix that comes much later after its time, hhmmss.ss, than the promptest of late. Sets age_ms.
+        """True if a fix with this time of day, hhmmss.ss, comes more than LATE_MS later than the reference did. Sets
+        age_ms.
 
-        A NEO-6M's clock goes back by 3 s when it learns of the leap seconds."""
+        Clocks do go back: a NEO-6M's by 3 s when it learns of the leap seconds."""
         day_ms = (int(time[0:2]) * 60 + int(time[2:4])) * 60_000 + int(float(time[4:]) * 1000.0 + 0.5)
         self.age_ms = 0
-        if self._first is not None:
-            first_ms, first_day_ms = self._first
-            age_ms = ticks_diff(now_ms, first_ms) - (day_ms - first_day_ms)
-            if 0 < age_ms < TIME_JUMP_MS:
-                self.age_ms = age_ms
-                if not self._fixes or age_ms <= self._prompt_age_ms:
-                    self._prompt, self._prompt_age_ms = (now_ms, day_ms), age_ms
+        if self._reference is not None:
+            reference_ms, reference_day_ms = self._reference
+            delay_ms = ticks_diff(now_ms, reference_ms) - (day_ms - reference_day_ms)
+            if 0 < delay_ms < TIME_JUMP_MS:
+                self.age_ms = delay_ms
+                if not self._fixes or delay_ms <= self._earliest_delay_ms:
+                    self._earliest, self._earliest_delay_ms = (now_ms, day_ms), delay_ms
                 self._fixes += 1
-                if self._fixes >= FIXES and ticks_diff(now_ms, self._since_ms) > TIME_JUMP_MS:
-                    self._first, self._fixes, self._since_ms = self._prompt, 0, now_ms
-                return age_ms > LATE_MS
-        self._first, self._fixes, self._since_ms = (now_ms, day_ms), 0, now_ms
+                if self._fixes >= MIN_FIXES_FOR_NEW_REFERENCE and ticks_diff(now_ms, self._since_ms) > TIME_JUMP_MS:
+                    self._reference, self._fixes, self._since_ms = self._earliest, 0, now_ms
+                return delay_ms > LATE_MS
+        self._reference, self._fixes, self._since_ms = (now_ms, day_ms), 0, now_ms
         return False
 
 
 def _checksum(line, start, end):
+    """The exclusive or of the bytes from start up to end."""
     total = 0
     for i in range(start, end):
         total ^= line[i]

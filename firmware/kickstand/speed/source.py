@@ -1,4 +1,7 @@
-"""The speed source that config.py names, and what of its values is fit to be used."""
+"""Opens the speed source that config.py names, and refuses speeds that no vehicle can have.
+
+A source is a Gps or a Wheel. Both have poll(now_ms), after_stall(now_ms), fault(now_ms) and age_ms.
+"""
 
 from time import ticks_diff
 
@@ -8,24 +11,24 @@ from ..board import port
 from ..errors import SettingsError
 
 MAX_MPS = 100.0
-MAX_CHANGE_MPS2 = 15.0  # no tyre holds more
-NOISE_MPS = 2.0
-GIVE_UP_MS = 3000  # what has been refused for so long is true
-RX_BUFFER = 512  # half a second at 9600 baud: flash is written meanwhile, or the sensor set up
+MAX_CHANGE_MPS2 = 15.0  # no tyre has more grip
+NOISE_MPS = 2.0  # how much a speed may jump beyond that
+GIVE_UP_MS = 3000  # when speeds have been refused for so long, the last accepted one was wrong
+RX_BUFFER = 512  # bytes, half a second at 9600 baud: the loop may write flash or set up the sensor meanwhile
 
 
 class Speed:
-    """source: a Gps or a Wheel. After poll() has returned a speed: age_us, how old it is."""
+    """Plausible speeds. source: a Gps or a Wheel. After poll() has returned a speed: age_us, how old it is."""
 
     def __init__(self, source):
         self._source = source
-        self._last = None  # accepted, m/s, and when
+        self._last = None  # the last accepted speed in m/s, and when that was
         self._last_ms = 0
         self.age_us = 0
 
     def poll(self, now_ms):
-        """A new speed in m/s, or None: none has come, or not one that a vehicle can have after the last. Call it each
-        turn of the loop."""
+        """Return a new speed in m/s, or None: none has come, or no vehicle could have reached it from the last one.
+        Call it in each turn of the loop. now_ms: ticks_ms()."""
         speed = self._source.poll(now_ms)
         if speed is None or not 0.0 <= speed <= MAX_MPS:
             return None
@@ -39,9 +42,9 @@ class Speed:
         self.age_us = 1000 * self._source.age_ms
         return speed
 
-    def skip(self, now_ms):
-        """Interrupts were off until now."""
-        self._source.skip(now_ms)
+    def after_stall(self, now_ms):
+        """Say that interrupts were off until now, while flash was erased. now_ms: ticks_ms()."""
+        self._source.after_stall(now_ms)
 
     def fault(self, now_ms):
         """None, or a SpeedFault: why no speed comes."""
@@ -49,7 +52,7 @@ class Speed:
 
 
 def open_speed(settings):
-    """The Speed of these settings, which name a source. Raises SettingsError for pins it cannot use."""
+    """The Speed of these settings, whose SPEED is not None. Raises SettingsError for pins that cannot be used."""
     if settings.SPEED == "gps":
         from .gps import Gps
 
@@ -64,7 +67,7 @@ def _open_uart(settings):
         return UART(
             settings.GPS_UART,
             settings.GPS_BAUD,
-            # nothing is sent, but a UART takes both its pins: on rp2, unless told, the sensor's
+            # Nothing is sent, but a UART takes two pins: on rp2 its default is a pin of the sensor.
             tx=Pin(settings.GPS_TX),
             rx=Pin(settings.GPS_RX),
             rxbuf=RX_BUFFER,

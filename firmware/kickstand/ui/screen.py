@@ -25,9 +25,9 @@ class Screen:
 
     def lines(self, now_ms):
         """What the display should say now. Call it about every 100 ms."""
-        if self._app.recorder.problem:
-            self._notice.show(messages.lines(self._app.recorder.problem), now_ms)
-            self._app.recorder.problem = None
+        problem = self._app.recorder.take_problem()
+        if problem:
+            self._notice.show(messages.lines(problem), now_ms)
         return self._front(now_ms)[1]
 
     def press(self, event, now_ms):

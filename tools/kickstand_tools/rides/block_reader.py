@@ -101,7 +101,7 @@ def parse(data: bytes) -> Block:
 
 
 def _turns(block: Block, data: bytes, count: int) -> Iterator[Turn]:
-    """Undo block_format.encode_plainly."""
+    """Undo block_format.encode_python."""
     bits = bin(int.from_bytes(b"\x01" + data, "big"))[3:]
     before = [1] + [0] * (block_format.FIELDS - 1)
     means = [block_format.START_MEAN] * block_format.FIELDS

@@ -25,16 +25,16 @@ _SILENT_S = 60  # an emulated board takes a while
 _LIST = """
 import os
 from kickstand import settings
-from kickstand.rides import flash_ring
-directory = flash_ring.directory(settings.load())
+from kickstand.rides import ride_paths
+directory = ride_paths.directory(settings.load())
 print(repr(directory))
 try:
     os.stat(directory)
 except OSError:
     pass
 else:
-    for ride, part, size in flash_ring.parts(directory):
-        print((ride, part, size, flash_ring.part_path(directory, ride, part)))
+    for ride, part, size in ride_paths.parts(directory):
+        print((ride, part, size, ride_paths.part_path(directory, ride, part)))
 """
 _READ = """
 from binascii import b2a_base64

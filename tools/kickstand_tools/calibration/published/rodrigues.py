@@ -33,3 +33,10 @@ def rotation_between(out, a, b, axis):
     out[6] = (k * p * r - q) * signs[0]
     out[7] = (k * q * r + p) * signs[1]
     out[8] = (1.0 - k * (p * p + q * q)) * signs[2]
+
+
+def multiply(out, a, b):
+    """out (9) = A B, 3x3 matrices by rows: first the rotation B, then A. out must be neither of them."""
+    for row in (0, 3, 6):
+        for column in range(3):
+            out[row + column] = a[row] * b[column] + a[row + 1] * b[3 + column] + a[row + 2] * b[6 + column]

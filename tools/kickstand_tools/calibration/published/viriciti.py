@@ -10,10 +10,10 @@ from math import degrees, sqrt
 from kickstand.drive_alignment.alignment import DRIVE, GAP_US, READY, DriveAlignment
 from kickstand.drive_alignment.events import MAX_INTERVAL_US, MIN_INTERVAL_US
 from kickstand.drive_alignment.reasons import not_ready
-from kickstand.rotation import matrix, multiply, normalize, rotate, vector
+from kickstand.rotation import matrix, normalize, rotate, vector
 
 from .dispersion import CircularDispersion
-from .rodrigues import rotation_between
+from .rodrigues import multiply, rotation_between
 
 MAX_DISPERSION = 0.02  # 8 degrees
 MIN_LEVEL_G = 0.03  # smaller forces point anywhere
