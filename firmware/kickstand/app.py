@@ -16,6 +16,7 @@ from .calibration.parameters import Calibration
 from .calibration.store import Store
 from .devices import open_button, open_sensor
 from .errors import StoreError
+from .imu.mpu6050 import GYRO_DELAY_S
 from .imu.sample_clock import SampleClock
 from .lean.meter import LeanMeter
 from .rides.flash_ring import RideRing
@@ -47,7 +48,7 @@ class App:
         self.button = open_button(settings)
         self.sensor = open_sensor(settings)
         self.store = None  # until the chip has said who it is: a calibration belongs to one chip
-        self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle")
+        self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle", GYRO_DELAY_S[settings.DLPF])
         self.drive = self._open_drive() if settings.SPEED else None
         self._clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self._restarts = 0
@@ -140,7 +141,7 @@ class App:
         """Begin a ride. Where the bike stands the filter begins with it, so that a replay shows the same, and finds the
         gyro's errors anew in the first turns. A ride begun on the way is replayed with a filter that still has to find
         what this one knows."""
-        if self.meter.filter.at_rest:
+        if self.meter.at_rest:
             self._save_trim()
             self.meter.use(self.meter.calibration)
         self.recorder.start(self.sensor.chip, self.meter.calibration)

@@ -4,7 +4,6 @@ With a speed source it always runs. What is not aligned, or is asked for in the 
 alignment that is there is checked and refined. Flash is written at standstill only.
 """
 
-from math import degrees
 from time import ticks_add, ticks_diff
 
 from ..board.button import LONG
@@ -163,12 +162,12 @@ class DriveMode:
             elif verdict == REFINED and drive.ready:
                 self._take(False)
             elif verdict == SAME:
-                self._meter.doubt = None
+                self._meter.trust()
 
     def _away(self):
         """True while the ride goes on. A source with a fault may say zero for ever: then by the lean filter."""
         faulty = self.drive.problem is not None or (self.message is not None and self.message not in _DOUBTS)
-        return self._speed_mps > AWAY_MPS or (faulty and self._meter.filter.speed_mps > AWAY_MPS)
+        return self._speed_mps > AWAY_MPS or (faulty and self._meter.speed_mps > AWAY_MPS)
 
     def _refused(self, lines, aligned):
         """What has gone wrong so far may end: the drive is begun anew, the reason stays on the page until then."""
@@ -180,22 +179,22 @@ class DriveMode:
     def _say(self, lines):
         if lines not in self._told:
             self.message = lines
-            if self.vehicle == MOTORCYCLE:
-                self._meter.doubt = _DOUBTS.get(lines) or self._meter.doubt
+            if self.vehicle == MOTORCYCLE and lines in _DOUBTS:
+                self._meter.distrust(_DOUBTS[lines])
 
     def answer(self, event):
         """A press while there is a message."""
         message, self.message = self.message, None
         self._told.append(message)
         if message in _DOUBTS:
-            self._meter.doubt = None
+            self._meter.trust()
         if event == LONG and message == STAND_SIDE:
             old = self._meter.calibration
             turned = matrix()
             for i in range(9):
                 turned[i] = old.vehicle_from_sensor[i]
             turn_round(turned)
-            if self._save(turned, -self._trim_deg):
+            if self._save(turned, -self._meter.trim_deg):
                 self.message = ("Side put right", "Ride safely")
                 self._meter.reset_maxima()
 
@@ -203,18 +202,13 @@ class DriveMode:
         """anew: the vertical is another one too."""
         found = matrix()
         self.drive.matrix(found)
-        if not self._save(found, 0.0 if anew else self._trim_deg):
+        if not self._save(found, 0.0 if anew else self._meter.trim_deg):
             return
         self._result = ("Aligned by drive", "error about %.1f%s" % (self.drive.quality_deg, DEGREE))
         if anew:
             self.message = self._result
             self._asked = False
             self._meter.reset_maxima()
-
-    @property
-    def _trim_deg(self):
-        """What the ride has found by now, stored or not."""
-        return degrees(self._meter.filter.trim.angle)
 
     def _save(self, vehicle_from_sensor, trim_deg):
         """True once it is in flash."""

@@ -47,6 +47,8 @@ FROZEN_MS = 100  # noise changes a living chip's readings in every sample
 ACCEL_LSB_PER_G = {2: 16384, 4: 8192, 8: 4096, 16: 2048}
 GYRO_LSB_PER_DPS = {250: 131.0, 500: 65.5, 1000: 32.8, 2000: 16.4}
 SATURATED = 32700
+# s, by DLPF: by how much the gyro's low-pass is late (register map p. 13, MPU6050). 0 stands for no low-pass.
+GYRO_DELAY_S = (0.00098, 0.0019, 0.0028, 0.0048, 0.0083, 0.0134, 0.0186)
 
 # WHO_AM_I: name, temperature counts per degree, temperature at 0 counts, has ACCEL_CONFIG2, bytes of FIFO
 CHIPS = {
