@@ -15,6 +15,7 @@ from .board import port
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
 from .devices import open_button, open_sensor
+from .imu.mpu6050 import GYRO_DELAY_S
 from .imu.sample_clock import SampleClock
 from .lean.meter import LeanMeter
 from .rides.flash_ring import RideRing
@@ -50,7 +51,7 @@ class App:
         self.lcd = lcd
         self.button = open_button(settings)
         self.sensor = open_sensor(settings)
-        self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle")
+        self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle", GYRO_DELAY_S[settings.DLPF])
         self.calibration = ActiveCalibration(self.meter, self._calibration_changed)
         self.drive = self._open_drive() if settings.SPEED else None
         self.recorder = Recorder(keeper or RideRing(settings), settings.SAMPLE_HZ)
@@ -133,7 +134,7 @@ class App:
         to find the gyro's errors again in the first turns. A record begun while riding is replayed by a filter that
         knows less at its beginning than the one on the board.
         """
-        if self.meter.filter.at_rest:
+        if self.meter.at_rest:
             self.calibration.restart()
         self.recorder.start(self.sensor.chip, self.calibration.value)
 

@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
-from kickstand.lean import kalman, lean_filter, rest, upright_trim
+from kickstand.lean import bike_model, kalman, lean_filter, measurements, rest, upright_trim
+from kickstand.units import STANDARD_GRAVITY
 
-HZ, GRAVITY_MPS2 = 100, 9.80665
+HZ, GRAVITY_MPS2 = 100, STANDARD_GRAVITY
 DT_US = 1_000_000 // HZ
 
 
@@ -110,7 +111,7 @@ def test_an_hour_in_float32_and_in_float64_is_the_same(monkeypatch):
     force, rate = shaken(*balanced(3600.0, lean, speed))
     rate += [0.002, -0.003, 0.004]
     exact = leans(force.tolist(), rate.tolist())
-    for module in (lean_filter, kalman, rest, upright_trim):
+    for module in (lean_filter, bike_model, measurements, kalman, rest, upright_trim):
         for name in ("sin", "cos", "sqrt", "atan2", "degrees"):
             if hasattr(module, name):
                 monkeypatch.setattr(module, name, single(getattr(math, name)))
@@ -152,6 +153,31 @@ def test_an_even_braking_on_a_smooth_road_is_no_rest(braking_mps2):
         force = np.array([0.0, 1.0, push]) + rng.normal(0, 0.004, 3)
         ridden.update(force.tolist(), rng.normal(0, 1e-3, 3).tolist(), DT_US if k else 0)
         assert not ridden.at_rest or speed[k] < 2.0
-        assert k < HZ or ridden.sigma_deg < 3.0
+        assert k < HZ or math.degrees(math.sqrt(ridden.variance)) < 3.0
     assert ridden.at_rest
     assert abs(ridden.pitch_deg) < 1.0
+
+
+def test_the_work_on_a_window_has_as_many_pieces_as_are_counted_on():
+    """One in each sample; at rest there are fewer."""
+    lean, speed = held_turns(60.0)
+    estimator, taken, pieces = lean_filter.LeanFilter(), 0, {True: set(), False: set()}
+    for f, w in zip(*(values.tolist() for values in balanced(60.0, lean, speed)), strict=True):
+        working = estimator._work is not None
+        estimator.update(f, w, DT_US)
+        taken = taken + 1 if working else 0
+        if working and estimator._work is None:
+            pieces[estimator.at_rest].add(taken)
+    assert pieces[False] == {lean_filter.PIECES}
+    assert max(pieces[True]) < lean_filter.PIECES
+
+
+def test_where_samples_come_slowly_the_work_on_a_window_is_done_in_one():
+    step_us = lean_filter.SLOW_STEP_US + 1000
+    estimator, found = lean_filter.LeanFilter(), False
+    for _ in range(100):
+        working = estimator._work is not None
+        estimator.update((0.0, 1.0, 0.0), (0.0, 0.0, 0.0), step_us)
+        assert not working or estimator._work is None
+        found = found or working
+    assert found

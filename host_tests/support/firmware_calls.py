@@ -127,7 +127,6 @@ CALLS = {
     "is_rotation": rotation.is_rotation,
     "two_position": align_two_position,
     "static_lean": formula.static_lean_deg,
-    "lean_acos": formula.lean_acos_deg,
     "formula_lean": formula.formula_lean_deg,
     "apply": apply,
     "closed_form": six_position.closed_form,

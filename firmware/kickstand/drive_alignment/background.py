@@ -4,7 +4,6 @@ With a speed source it always runs. What is not aligned, or is asked for in the 
 alignment that is there is checked and refined. Flash is written at standstill only.
 """
 
-from math import degrees
 from time import ticks_add, ticks_diff
 
 from ..errors import AlignmentError, Notice, StoreError
@@ -149,12 +148,12 @@ class BackgroundAlignment:
             elif verdict == REFINED and drive.ready:
                 self._take(False)
             elif verdict == SAME:
-                self._meter.doubt = None
+                self._meter.trust()
 
     def _away(self):
         """True while the ride goes on. A source with a fault may say zero for ever: then by the lean filter."""
         faulty = self.drive.problem is not None or (self.message is not None and self.message.code not in _DOUBTS)
-        return self._speed_mps > AWAY_MPS or (faulty and self._meter.filter.speed_mps > AWAY_MPS)
+        return self._speed_mps > AWAY_MPS or (faulty and self._meter.speed_mps > AWAY_MPS)
 
     def _refused(self, problem, aligned):
         """What has gone wrong so far may end: the drive is begun anew, the reason stays on the page until then."""
@@ -167,21 +166,21 @@ class BackgroundAlignment:
         if message.code not in self._told:
             self.message = message
             if self.vehicle == MOTORCYCLE and message.code in _DOUBTS:
-                self._meter.doubt = message.code
+                self._meter.distrust(message.code)
 
     def answer(self, agreed):
         """The rider has read the message. agreed: and wants what it offers."""
         code, self.message = self.message.code, None
         self._told.append(code)
         if code in _DOUBTS:
-            self._meter.doubt = None
+            self._meter.trust()
         if agreed and code == STAND_SIDE:
             old = self._meter.calibration
             turned = matrix()
             for i in range(9):
                 turned[i] = old.vehicle_from_sensor[i]
             turn_round(turned)
-            if self._save(turned, -self._trim_deg):
+            if self._save(turned, -self._meter.trim_deg):
                 self.message = Notice("side-put-right")
                 self._meter.reset_maxima()
 
@@ -189,18 +188,13 @@ class BackgroundAlignment:
         """anew: the vertical is another one too."""
         found = matrix()
         self.drive.matrix(found)
-        if not self._save(found, 0.0 if anew else self._trim_deg):
+        if not self._save(found, 0.0 if anew else self._meter.trim_deg):
             return
         self.result = Notice("aligned-by-drive", self.drive.quality_deg)
         if anew:
             self.message = self.result
             self._asked = False
             self._meter.reset_maxima()
-
-    @property
-    def _trim_deg(self):
-        """What the ride has found by now, stored or not."""
-        return degrees(self._meter.filter.trim.angle)
 
     def _save(self, vehicle_from_sensor, trim_deg):
         """True once it is in flash."""

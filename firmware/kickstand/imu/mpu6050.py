@@ -43,6 +43,7 @@ _FIFO_RESET = const(0x04)  # in USER_CTRL
 
 ACCEL_LSB_PER_G = {2: 16384, 4: 8192, 8: 4096, 16: 2048}  # counts per g for each range in g (p. 29)
 GYRO_LSB_PER_DPS = {250: 131.0, 500: 65.5, 1000: 32.8, 2000: 16.4}  # counts per deg/s for each range in deg/s (p. 31)
+GYRO_DELAY_S = {1: 0.0019, 2: 0.0028, 3: 0.0048, 4: 0.0083, 5: 0.0134, 6: 0.0186}  # by dlpf (p. 13)
 
 # The chips that are known to work, by their WHO_AM_I. To add one, fill in from its data sheet: a name of at most 12
 # characters; temperature counts per degree C; degrees C at 0 counts; True if it has ACCEL_CONFIG2 (0x1D); bytes in its
@@ -89,9 +90,7 @@ class Mpu6050:
 
     SATURATED = 32700  # |counts|: from here on a reading is at the end of its range
 
-    def __init__(
-        self, i2c, address=0x68, accel_range_g=8, gyro_range_dps=500, dlpf=3, rate_hz=200, accept=None
-    ):
+    def __init__(self, i2c, address=0x68, accel_range_g=8, gyro_range_dps=500, dlpf=3, rate_hz=200, accept=None):
         self._i2c = i2c
         self._address = address
         self._accept = accept

@@ -1,4 +1,4 @@
-"""Lean angle from forces and yaw rate in the vehicle frame (A. Nicolae, section 5, signs put right).
+"""Lean angle from one reading of forces and yaw rate in the vehicle frame (A. Nicolae, section 5, signs corrected).
 
 With lean t > 0 to the right, s the centripetal acceleration in g (> 0 in a left turn) and forces in g:
     A_up cos t + A_left sin t = 1        (22)
@@ -6,28 +6,22 @@ With lean t > 0 to the right, s the centripetal acceleration in g (> 0 in a left
     A_left^2 + A_up^2 = 1 + s^2          (24)
 """
 
-from math import acos, asin, atan2, degrees, sqrt
+from math import asin, atan2, degrees, sqrt
 
-_TOO_SMALL = 0.01  # (0.1 g)^2: in free fall no force tells a direction
-
-
-def lean_acos_deg(force):
-    """Lean of a standing bike by (21), acos(A_up / g), as the paper has it: no sign, blind near upright.
-    0..180 degrees."""
-    size = sqrt(force[0] * force[0] + force[1] * force[1])
-    if size * size < _TOO_SMALL:
-        return 0.0
-    return degrees(acos(max(-1.0, min(1.0, force[1] / size))))
+_TOO_SMALL = 0.01  # (0.1 g)^2: in free fall no force gives a direction
 
 
 def static_lean_deg(force):
-    """Lean of a standing bike in degrees, > 0 to the right: (21) with a sign, and exact near upright."""
+    """Lean of a standing bike in degrees, > 0 to the right: (21) with a sign, and exact near upright.
+
+    force: left, up, forward in g.
+    """
     return degrees(atan2(force[0], force[1]))
 
 
 def centripetal_g(left_g, up_g, yaw_rate):
-    """s in g by (26): its size from the force, its sign from the yaw rate about up (left turn > 0; none
-    gives 0)."""
+    """s in g by (26): its size from the force, its sign from the yaw rate about up (left turn > 0; without
+    a yaw rate 0)."""
     excess = left_g * left_g + up_g * up_g - 1.0
     if excess <= 0.0 or yaw_rate == 0.0:
         return 0.0
@@ -38,8 +32,8 @@ def formula_lean_deg(force, yaw_rate):
     """Nicolae's lean (25)-(26) in degrees, > 0 to the right. force: left, up, forward in g; yaw rate in any
     unit.
 
-    Right on average and noisy near upright: 1 % of vibration is 8 degrees. In free fall (under 0.1 g) it
-    says 0.
+    Right on average and noisy near upright, where 1 % of vibration makes an error of 8 degrees. 0 in free fall (under
+    0.1 g).
     """
     left, up = force[0], force[1]
     square = left * left + up * up

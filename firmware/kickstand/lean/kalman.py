@@ -1,18 +1,22 @@
-"""A covariance matrix and its two operations, in pieces short enough for a sample's time.
+"""The covariance of a Kalman filter, in pieces of work short enough for the time of one sample.
 
-Lists of floats, not arrays: on a board reading an array's element takes heap, reading a list's does not. Generators
-yield where the work may be interrupted.
+Matrices are lists of lists of floats, not arrays: on a board reading an array's element takes heap, reading a list's
+does not. The methods that take long are generators, which yield where the work may be interrupted. Rows of Jacobians
+are given as ((state, value), ...), because most of their values are zero.
 """
 
-MIN_VARIANCE = 1e-10  # rounding in float32 could make it negative
-# Pieces of about a millisecond on an RP2040
-TERMS = 3  # of a measurement or a transition
-ROWS = 8  # of the twelve: about half of the products
-GATE = 25.0  # beyond five sigma an innovation counts for less, but counts: the model may be what is wrong
+MIN_VARIANCE = 1e-10  # rounding in 32-bit floats could make a variance negative
+# How much is done between two yields: about a millisecond on an RP2040
+TERMS_PER_PIECE = 3  # of a Jacobian's row
+ROWS_PER_PIECE = 8  # of the covariance, of twelve: its triangle's first eight rows are half of the work
+GATE = 25.0  # 5 sigma, squared. An innovation beyond it is not dropped, because the state may be what is wrong.
 
 
 class Covariance:
-    """Covariance of n states, and the correction of the states by what is measured. variances: n initial values."""
+    """P, the covariance of n states, and the correction of these states that measurements lead to.
+
+    variances: n initial variances, uncorrelated.
+    """
 
     def __init__(self, variances):
         self.n = len(variances)
@@ -22,52 +26,60 @@ class Covariance:
         self.correction = [0.0] * self.n
         self._column = [0.0] * self.n
 
-    def forget(self, i, variance):
-        """State i is known afresh: it no longer has to do with the others."""
+    def set_variance(self, i, variance):
+        """State i was set to a known value: its variance, and no correlation with the other states."""
         for k in range(self.n):
             self.rows[i][k] = self.rows[k][i] = 0.0
         self.rows[i][i] = variance
 
-    def carry(self, i, terms, growth):
-        """Let state i change by the sum of a times state j for ((j, a), ...), j other than i, and its variance grow.
+    def add_noise(self, i, variance):
+        """Process noise of a state that no other one changes."""
+        self.rows[i][i] += variance
 
-        P = F P F^T with F = I + sum of a e_i e_j^T.  Yields between pieces.
+    def propagate_row(self, i, derivatives, seconds, noise):
+        """P = F P F^T for one row of F, plus process noise. A generator.
+
+        derivatives: of state i's rate of change, ((j, d rate_i / d state_j), ...) with j other than i, over seconds.
+        noise: variance that is added to state i's.
         """
         rows = self.rows
         row = rows[i]
-        for m, (j, a) in enumerate(terms):
-            if m == TERMS:
+        for m, (j, a) in enumerate(derivatives):
+            if m == TERMS_PER_PIECE:
                 yield
+            a *= seconds
             source = rows[j]
             for k in range(self.n):
                 row[k] += a * source[k]
-        variance = row[i] + growth
-        for j, a in terms:
-            variance += a * row[j]
+        variance = row[i] + noise
+        for j, a in derivatives:
+            variance += a * seconds * row[j]
         row[i] = variance
         for k in range(self.n):
             rows[k][i] = row[k]  # P is symmetric
         yield
 
-    def measure(self, terms, innovation, variance):
-        """Correct by one scalar measurement h x with h given as terms ((state, coefficient), ...).
+    def update(self, derivatives, innovation, variance):
+        """One scalar measurement: K = P H^T / (H P H^T + R), correction += K innovation, P -= K H P. A generator.
 
-        innovation: measured minus expected, the correction so far left out.  Yields between pieces.
+        derivatives: H, ((state, d measurement / d state), ...).  innovation: measured minus expected, for the states
+        before this window's corrections.  variance: R, in the measurement's unit squared. Beyond GATE the
+        innovation's variance is raised until it lies on it.
         """
         rows, column, correction = self.rows, self._column, self.correction
         n = self.n
-        j, h = terms[0]
+        j, h = derivatives[0]
         for i in range(n):
             column[i] = h * rows[j][i]
-        for m in range(1, len(terms)):
-            if m == TERMS:
+        for m in range(1, len(derivatives)):
+            if m == TERMS_PER_PIECE:
                 yield
-            j, h = terms[m]
+            j, h = derivatives[m]
             row = rows[j]
             for i in range(n):
                 column[i] += h * row[i]
         expected = variance
-        for j, h in terms:
+        for j, h in derivatives:
             expected += h * column[j]
             innovation -= h * correction[j]
         if innovation * innovation > GATE * expected:
@@ -83,12 +95,12 @@ class Covariance:
                 rows[j][i] = row[j] = row[j] - gain * column[j]
             if row[i] < MIN_VARIANCE:
                 row[i] = MIN_VARIANCE
-            if i == ROWS - 1:
+            if i == ROWS_PER_PIECE - 1:
                 yield
         yield
 
     def take_correction(self, i):
-        """The correction of state i, which is then 0 again."""
+        """The correction of state i, which is set back to 0."""
         value = self.correction[i]
         self.correction[i] = 0.0
         return value

@@ -1,53 +1,54 @@
-"""From a reading of the chip to lean and g: the way of a sample, on the board and in replay."""
+"""From a reading of the chip to lean and g: what happens to every sample, on the board and in a replay."""
 
 from math import degrees, radians
 
 from ..calibration.transform import Transform
+from ..units import GAP_US
 from .formula import formula_lean_deg
-from .lean_filter import LeanFilter
+from .lean_filter import DELAY_S, LeanFilter
 
 SMOOTH_US = 300_000  # time constant of the g shown
-GAP_US = 500_000  # without readings for so long, the past says nothing about the present
 MAX_VARIANCE = radians(3.0) ** 2  # a lean less certain than this is not shown
-TRIM_SURE = radians(0.5)
-TRIM_STEP_DEG = 0.3  # less is not worth wearing the flash
+TRIM_MAX_VARIANCE = radians(0.5) ** 2  # a trim less certain than this is not kept
+TRIM_STEP_DEG = 0.3  # a smaller change of the trim is not worth wearing the flash
 FALLEN_DEG = 65.0
-WHEELIE_DEG = 20.0  # no road is as steep, and with a wheel in the air nothing holds that the filter knows
 FALLEN_US = 1_000_000
+WHEELIE_DEG = 20.0  # of pitch: no road is as steep, and with a wheel in the air the filter's equations do not hold
 
 
 class LeanMeter:
-    """Lean and acceleration of the vehicle. leans: False for a car, whose lean stays 0.
+    """Lean and acceleration of the vehicle. leans: False for a car, whose lean stays 0. delay_s: by how much the gyro's
+    low-pass is late.
 
     After update() or update_sum(): force (left, up, forward in g), rate (about them in rad/s), lean_deg (the
-    filter's, > 0 right), smooth_force (g, for display; of an aligned one forward alone), fallen, and the maxima since
-    reset_maxima().
-    doubt: None, or for what reason the lean is not to be trusted, set by whoever knows.
+    filter's, > 0 right), smooth_force (g, for display; of an aligned motorcycle forward alone), fallen, and the maxima
+    since reset_maxima().
     """
 
-    def __init__(self, calibration, leans=True):
+    def __init__(self, calibration, leans=True, delay_s=DELAY_S):
         self._leans = leans
+        self._delay_s = delay_s
         # lists: on a board reading an array's element takes heap, reading a list's does not
         self.force = [0.0] * 3
         self.rate = [0.0] * 3
         self.smooth_force = [0.0] * 3
         self._reading, self._n = (0,) * 7, 1
         self.reset_maxima()
-        self.calibration = self.doubt = None
+        self.calibration = self._doubt = None
         self.use(calibration)
 
     def use(self, calibration):
-        """Take another calibration, its scale set, and forget what the one before led to."""
+        """Take a calibration, its scale set, and forget what was estimated with the one before. A doubt stays with
+        the calibration that it was about."""
         if calibration is not self.calibration:
-            self.doubt = None
+            self._doubt = None
         self.calibration = calibration
         self._transform = Transform(calibration)
-        self.filter = LeanFilter()
-        self.filter.trim.start(radians(calibration.trim_deg))
+        self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg))
         self.restart()
 
     def restart(self):
-        """Forget the past: readings were missing."""
+        """Forget the past, because readings were missing."""
         self.filter.restart()
         self._fresh = True
         self._flat_us = 0
@@ -61,22 +62,50 @@ class LeanMeter:
         self.max_accel_g = 0.0
         self.max_brake_g = 0.0
 
+    def distrust(self, reason):
+        """The lean is not to be shown, for a reason that stands in its place: until trust(), or another calibration."""
+        self._doubt = reason
+
+    def trust(self):
+        """The reason to distrust the lean is gone."""
+        self._doubt = None
+
+    @property
+    def doubt(self):
+        """The reason given to distrust(), or None."""
+        return self._doubt
+
+    @property
+    def at_rest(self):
+        """True while the vehicle stands still, by the sensor alone."""
+        return self.filter.at_rest
+
+    @property
+    def speed_mps(self):
+        """Estimated speed, by the sensor and what measure_speed() was told."""
+        return self.filter.speed_mps
+
+    @property
+    def trim_deg(self):
+        """The lean of upright that riding has found by now, > 0 right; in the calibration or not."""
+        return degrees(self.filter.trim.angle)
+
     @property
     def trusted(self):
         """True while lean_deg is certain enough to be shown."""
         if not self._leans:
             return True
-        if self.doubt:
+        if self._doubt:
             return False
         return self.filter.variance <= MAX_VARIANCE and abs(self.filter.pitch_deg) < WHEELIE_DEG
 
     def keep_trim(self):
-        """Take the trim found so far into the calibration, if the bike stands and it is another by now: True then."""
-        trim = self.filter.trim
-        angle = degrees(trim.angle)
+        """Take the trim found so far into the calibration, if the bike stands, the trim is certain enough and it
+        has changed: True then."""
+        angle = self.trim_deg
         if (
-            not self.filter.at_rest
-            or trim.variance > TRIM_SURE**2
+            not self.at_rest
+            or self.filter.trim.variance > TRIM_MAX_VARIANCE
             or abs(angle - self.calibration.trim_deg) < TRIM_STEP_DEG
         ):
             return False
@@ -85,17 +114,17 @@ class LeanMeter:
 
     @property
     def lean_formula_deg(self):
-        """Nicolae's lean of this one reading."""
+        """Nicolae's lean of the last reading alone."""
         return formula_lean_deg(self.force, self.rate[1])
 
     def measure_speed(self, speed_mps):
-        """The vehicle's speed where something measures it: it helps the lean, and is never required."""
+        """Tell the speed, where something measures it: it helps the lean, and is never required. Below 0: no news."""
         if speed_mps >= 0.0:
             self.filter.measure_speed(speed_mps)
 
     @property
     def reading(self):
-        """The last: 7 numbers in the chip's order."""
+        """The last reading, or the mean of the last sum: 7 numbers in the chip's order."""
         return [value / self._n for value in self._reading]
 
     def update(self, reading, dt_us):
@@ -106,18 +135,18 @@ class LeanMeter:
         self._follow(dt_us)
 
     def update_sum(self, sums, n, dt_us):
-        """The same for the sum of n samples, array('i', 7): on the board of those that came in during one turn of the
-        loop, because floats cost too much to do it for each."""
+        """As update(), with the mean of n samples, of which sums, array('i', 7), is the sum. On the board these are the
+        samples of one turn of the loop, because floats cost too much to do it for each sample."""
         self._reading, self._n = sums, n
         self._transform.apply_sum(sums, n, self.force, self.rate)
         self._follow(dt_us)
 
     def _follow(self, dt_us):
-        """What force and rate lead to."""
+        """Bring everything that is shown up to the new force and rate."""
         if dt_us > GAP_US:
             self.restart()
         if self._fresh:
-            dt_us = 0  # there is no reading before, on the board and in a replay alike
+            dt_us = 0  # nothing was before: the same on the board and in a replay
         self._smooth(1.0 if self._fresh else dt_us / (SMOOTH_US + dt_us))
         self._fresh = False
         self.lean_deg = lean = self.filter.update(self.force, self.rate, dt_us) if self._leans else 0.0
@@ -132,7 +161,7 @@ class LeanMeter:
     def _smooth(self, gain):
         force, smooth = self.force, self.smooth_force
         smooth[2] += gain * (force[2] - smooth[2])
-        if not (self.calibration.aligned and self._leans):  # then the other two are shown as well
+        if not (self.calibration.aligned and self._leans):  # pages then show left and up as well
             smooth[0] += gain * (force[0] - smooth[0])
             smooth[1] += gain * (force[1] - smooth[1])
 

@@ -1,50 +1,53 @@
-"""Is the bike standing still? From the means of a fifth of a second, in which an idling engine averages out."""
+"""Does the bike stand still? Told from means over a fifth of a second, in which an idling engine averages out."""
 
-MAX_FORCE_G = 0.010  # of a mean from the average of the last half second
-MAX_RATE_RADPS = 0.009  # 0.5 deg/s, likewise
-MAX_BIAS_RADPS = 0.02  # 1.2 deg/s: a longer smooth turn is no rest
-MAX_FIRST_BIAS_RADPS = 0.1  # before the first rest the bias may have drifted since the calibration
-REST_S = 1.5
-REST_ROLLING_S = 10.0  # where a bike is known to roll, or to brake: no road is as smooth for so long
-AVERAGE_S = 0.5
+# Symbol = default  # unit: what it is. Larger: what follows.
+MAX_FORCE_G = 0.010  # g: deviation of a mean from the recent average. Larger: smooth roads pass for rest.
+MAX_RATE_RADPS = 0.009  # rad/s (0.5 deg/s): likewise. Larger: likewise.
+MAX_BIAS_RADPS = 0.02  # rad/s (1.2 deg/s): average rate that may be bias. Larger: long smooth turns pass for rest.
+MAX_FIRST_BIAS_RADPS = 0.1  # rad/s: likewise before the first rest, for drift since the calibration. Larger: likewise.
+REST_S = 1.5  # s of stillness that are rest. Larger: rest is seen later, and more surely.
+REST_ROLLING_S = 10.0  # s, where the bike seems to roll or to brake: no road is smooth for so long. Larger: likewise.
+AVERAGE_S = 0.5  # s: time constant of the recent average. Larger: rest is seen later after a movement.
 
 
 class RestDetector:
-    """update() with each mean; resting is True after REST_S of stillness, or REST_ROLLING_S where it seemed to roll.
+    """update() with the means of each window; resting is True after REST_S of stillness, or REST_ROLLING_S where the
+    bike seems to roll. Read only.
 
-    first: no rest has been seen since power-on, so the bias may be off.
+    first: no rest has been seen since power-on, so the bias may be far off.
     """
 
     def __init__(self, first=True):
         self.resting = False
         self._still_s = 0.0
-        self._slow_still_s = 0.0  # of it since it has not been rolling
-        self._average = None
+        self._not_rolling_s = 0.0  # of stillness without a sign of rolling
+        self._average = None  # rates without the estimated bias taken off, and forces
         self._max_bias = MAX_FIRST_BIAS_RADPS if first else MAX_BIAS_RADPS
 
-    def update(self, means, bias, seconds, rolling=False):
-        """means: of the last seconds, where 2..4 are rates (rad/s, bias taken off) and 5..7 forces (g). bias: that one
-        (3). rolling: there is good reason to believe that the bike moves."""
-        felt = [means[2 + i] + bias[i] for i in range(3)] + list(means[5:8])  # whatever is believed of the bias
+    def update(self, rates, force, bias, seconds, rolling=False):
+        """Means of the last seconds: rates (3, rad/s) with the estimated bias (3) taken off, and force (3, g).
+        rolling: there is good reason to believe that the bike moves."""
+        felt = [rates[i] + bias[i] for i in range(3)] + force
         if self._average is None:
             self._average = felt
         average = self._average
         gain = min(1.0, seconds / AVERAGE_S)
-        # as calibrated: or a bias that went astray, as in the hand, would never be put right
-        still = small = as_calibrated = True
+        # The average rate must be small with the estimated bias taken off, or with the calibrated one alone: else an
+        # estimate that went astray, as in the hand, would never be put right.
+        still = near_estimate = near_calibration = True
         for i in range(6):
             deviation = felt[i] - average[i]
             average[i] += gain * deviation
             if i < 3:
                 still = still and abs(deviation) < MAX_RATE_RADPS
-                small = small and abs(average[i] - bias[i]) < self._max_bias
-                as_calibrated = as_calibrated and abs(average[i]) < self._max_bias
+                near_estimate = near_estimate and abs(average[i] - bias[i]) < self._max_bias
+                near_calibration = near_calibration and abs(average[i]) < self._max_bias
             else:
                 still = still and abs(deviation) < MAX_FORCE_G
-        still = still and (small or as_calibrated)
+        still = still and (near_estimate or near_calibration)
         self._still_s = self._still_s + seconds if still else 0.0
-        # the even end of a braking is no rest as soon as it is slow
-        self._slow_still_s = self._slow_still_s + seconds if still and not rolling else 0.0
-        self.resting = self._slow_still_s >= REST_S or self._still_s >= REST_ROLLING_S
+        # A second count, because the even end of a braking must not be rest as soon as the bike is slow.
+        self._not_rolling_s = self._not_rolling_s + seconds if still and not rolling else 0.0
+        self.resting = self._not_rolling_s >= REST_S or self._still_s >= REST_ROLLING_S
         if self.resting:
             self._max_bias = MAX_BIAS_RADPS

@@ -1,0 +1,169 @@
+"""A motorcycle's states, its equations of motion and of what a sensor on it measures, and their partial derivatives.
+
+Axes: left (x), up (y), forward (z). Units: rad, rad/s and s; forces in g, so speeds in g s (m/s divided by 9.80665).
+
+State                                       Measured
+    t  LEAN   roll, > 0 to the right            f    specific force (3)
+    q  PITCH  of road and suspension, nose up   w_m  rate of rotation (3)
+    v  SPEED  forward
+    b  BIAS_LEFT, BIAS_UP, BIAS_FORWARD: change of the gyro's bias since the calibration
+    y  YAW_ERROR of the alignment: one degree of pitch in the kickstand pose makes up to five of it
+    s_x, c_xy        SCALE_LEFT, CROSS_LEFT_UP: scale error of the gyro's left axis, and its reading of a rate about up
+    c_zx, c_zy, s_z  CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD: the same of its forward axis
+The data sheet allows 3 % of scale error and 2 % of cross-axis sensitivity. In a long turn they pass for bias, in a
+quick roll for lean. The up axis has no such states: without a measured speed its scale cannot be told from the speed.
+
+Equations, with ' for the derivative by time
+    rates, corrected         w = w_m - b,  then  w_z -= c_zx w_x + c_zy w_y + s_z w_z,  w_x -= s_x w_x + c_xy w_y
+    rotation, exact          t' = w_z - tan q (w_x sin t + w_y cos t)            (1)
+                             q' = w_y sin t - w_x cos t                          (2)
+    wheels do not slide      v' = f_z - sin q + v w_y y                          (3)
+                             f_x = cos q sin t + v w_y + y v' - h cos t w_z'     (4)
+                             f_y = cos q cos t - v w_x                           (5)
+    roads are level          0 = q + y sin t  on average                         (6)
+
+h is the height of the sensor above the roll axis. (4) and (5) are A. Nicolae's (22) and (23) with s = v w. In a held
+turn the derivatives of both by lean and by speed are in the same proportion, so that they cannot tell lean from
+speed. There the ratio of two rates gives the lean, through (2) and (6); just after entering a turn, the speed does.
+"""
+
+from math import cos, sin, sqrt
+
+from ..units import STANDARD_GRAVITY
+
+STATES = 12
+(
+    LEAN,
+    PITCH,
+    SPEED,
+    BIAS_LEFT,
+    BIAS_UP,
+    BIAS_FORWARD,
+    YAW_ERROR,
+    SCALE_LEFT,
+    CROSS_LEFT_UP,
+    CROSS_FORWARD_LEFT,
+    CROSS_FORWARD_UP,
+    SCALE_FORWARD,
+) = range(STATES)
+
+MAX_PITCH = 1.2  # rad. No motorcycle reaches it, a sensor in the hand may; at 90 degrees lean has no meaning.
+
+# Where the turn rate of a bike in balance replaces the measured one. In the form of measurements.py.
+BALANCE_MIN_SPEED = 4.0 / STANDARD_GRAVITY  # g s. Larger: not in slow turns.
+BALANCE_SHARE = 0.5  # of 1: by how much of the balanced rate the two may differ,
+BALANCE_RATE = 0.1  # rad/s: and by how much besides. Larger, both: also where lean or speed are wrong.
+BALANCE_MIN_COS = 0.3  # of 1: lower bound of cos(lean). Larger: too little rate about left in deep leans.
+
+
+def predict(x, force, rate, seconds, sums):
+    """Move the state x (STATES values) on by one sample of force (3, g) and rate (3, rad/s) with (1) to (3).
+
+    sums (9 values) grows by what a window's means are made of: 0 and 1 the innovations of (4), without h, and of (5) at
+    the state before the step; 2 to 4 the corrected rates; 5 to 7 the force; 8 the square of the first innovation.
+    Returns the corrected roll rate in rad/s. Motion and innovations are one function because they share sines.
+    """
+    fx, fy, fz = force
+    wx, wy, wz = rate
+    t, q, v, bx, by, bz, yaw_error, sx, cxy, czx, czy, sz = x
+    wx -= bx
+    wy -= by
+    wz -= bz
+    wz -= czx * wx + czy * wy + sz * wz
+    wx -= sx * wx + cxy * wy
+    st, ct = sin(t), cos(t)
+    sq = sin(q)
+    cq = sqrt(1.0 - sq * sq)
+    sideways = v * wy
+    acceleration = fz - sq + sideways * yaw_error
+    x[LEAN] = t + (wz - sq / cq * (wx * st + wy * ct)) * seconds
+    q += (wy * st - wx * ct) * seconds
+    if not -MAX_PITCH <= q <= MAX_PITCH:
+        q = -MAX_PITCH if q < 0.0 else MAX_PITCH
+    x[PITCH] = q
+    speed = v + acceleration * seconds
+    x[SPEED] = speed if speed > 0.0 else 0.0
+    left = fx - cq * st - sideways - acceleration * yaw_error
+    sums[0] += left
+    sums[1] += fy - cq * ct + v * wx
+    sums[2] += wx
+    sums[3] += wy
+    sums[4] += wz
+    sums[5] += fx
+    sums[6] += fy
+    sums[7] += fz
+    sums[8] += left * left
+    return wz
+
+
+def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
+    """Rates about left and up, for products of a state and a rate: those of a bike in balance at this lean and speed,
+    v w_y = -cos q sin t, where the measured ones are near them.
+
+    Noise of a measured rate would be squared in such products, and speed and lean would be estimated too small (the
+    problem of errors in variables).
+    """
+    if speed > BALANCE_MIN_SPEED:
+        balanced = -cos_pitch * sin_lean / speed
+        if abs(rate_up - balanced) < BALANCE_SHARE * abs(balanced) + BALANCE_RATE:
+            return balanced * sin_lean / max(cos_lean, BALANCE_MIN_COS), balanced
+    return rate_left, rate_up
+
+
+class Linearisation:
+    """(1) to (6) about the state x, at the corrected rates (3) and the forward force of a window's means.
+
+    Each ..._row of the Jacobians is ((state, partial derivative), ...): lean, pitch and speed of the rates of change
+    (1) to (3), left and up of the forces (4) and (5), level of (6). Derivatives that are zero are left out, and terms
+    that are small because pitch, yaw error, scale and cross-axis errors are. The other attributes are values of terms.
+    """
+
+    def __init__(self, x, rates, forward):
+        wx, wy, wz = rates
+        speed, yaw_error = x[SPEED], x[YAW_ERROR]
+        st, ct, sq = sin(x[LEAN]), cos(x[LEAN]), sin(x[PITCH])
+        cq = sqrt(1.0 - sq * sq)
+        yaw_rate = wx * st + wy * ct  # about the vertical, where there is no pitch
+        sideways = speed * wy
+        acceleration = forward - sq + sideways * yaw_error
+        turn_x, turn_y = turn_rates(speed, st, ct, cq, wx, wy)
+        self.lean_row = (
+            (PITCH, -yaw_rate / (cq * cq)),  # d lean' / d q
+            (BIAS_FORWARD, -1.0),  # d lean' / d b_z
+            (CROSS_FORWARD_LEFT, -turn_x),  # d lean' / d c_zx
+            (CROSS_FORWARD_UP, -turn_y),  # d lean' / d c_zy
+            (SCALE_FORWARD, -wz),  # d lean' / d s_z
+        )
+        self.pitch_row = (
+            (LEAN, yaw_rate),  # d pitch' / d t
+            (BIAS_LEFT, ct),  # d pitch' / d b_x
+            (BIAS_UP, -st),  # d pitch' / d b_y
+            (SCALE_LEFT, ct * turn_x),  # d pitch' / d s_x
+            (CROSS_LEFT_UP, ct * turn_y),  # d pitch' / d c_xy
+        )
+        self.speed_row = (
+            (PITCH, -cq),  # d speed' / d q
+            (YAW_ERROR, sideways),  # d speed' / d y
+        )
+        self.left_row = (
+            (LEAN, cq * ct),  # d left / d t
+            (PITCH, -sq * st - cq * yaw_error),  # d left / d q
+            (SPEED, turn_y),  # d left / d v
+            (BIAS_UP, -speed),  # d left / d b_y
+            (YAW_ERROR, acceleration),  # d left / d y
+        )
+        self.up_row = (
+            (LEAN, -cq * st),  # d up / d t
+            (PITCH, -sq * ct),  # d up / d q
+            (SPEED, -turn_x),  # d up / d v
+            (BIAS_LEFT, speed),  # d up / d b_x
+            (SCALE_LEFT, speed * turn_x),  # d up / d s_x
+            (CROSS_LEFT_UP, speed * turn_y),  # d up / d c_xy
+        )
+        self.level_row = (
+            (PITCH, 1.0),  # d level / d q
+            (LEAN, yaw_error * ct),  # d level / d t
+            (YAW_ERROR, st),  # d level / d y
+        )
+        self.sin_lean, self.cos_lean, self.sin_pitch, self.cos_pitch = st, ct, sq, cq
+        self.speed, self.yaw_rate, self.sideways, self.acceleration = speed, yaw_rate, sideways, acceleration

@@ -1,0 +1,128 @@
+"""The model's partial derivatives against numerical differentiation of its own equations."""
+
+import math
+
+import numpy as np
+import pytest
+from kickstand.lean import bike_model
+from kickstand.lean.bike_model import (
+    BIAS_LEFT,
+    BIAS_UP,
+    CROSS_LEFT_UP,
+    LEAN,
+    PITCH,
+    SCALE_LEFT,
+    SPEED,
+    STATES,
+    YAW_ERROR,
+    Linearisation,
+    predict,
+)
+
+STEP_S = 0.01
+DISTANCE = 1e-4  # of a state, for the difference quotient
+TOLERANCE = 1e-6
+MOTION = ("lean_row", "pitch_row", "speed_row")
+FORCES = ("left_row", "up_row")
+
+
+def random_state(chance):
+    """A state without errors of the gyro's scale and axes, at a speed that no step brings to zero; force; rate."""
+    x = np.zeros(STATES)
+    x[[LEAN, PITCH, SPEED, YAW_ERROR]] = chance.uniform([-1.0, -0.3, 0.5, -0.2], [1.0, 0.3, 4.0, 0.2])
+    x[BIAS_LEFT : BIAS_LEFT + 3] = chance.uniform(-0.05, 0.05, 3)
+    return x, chance.uniform([-0.5, 0.5, -0.8], [0.5, 1.5, 0.8]), chance.uniform(-1.0, 1.0, 3)
+
+
+def equations(x, force, rate):
+    """(1)-(3) and expected (4), (5) and (6) at x, by the model's own step: 6 values."""
+    after, sums = list(x), [0.0] * 9
+    predict(after, force, rate, STEP_S, sums)
+    motion = [(after[i] - x[i]) / STEP_S for i in (LEAN, PITCH, SPEED)]
+    level = x[PITCH] + x[YAW_ERROR] * math.sin(x[LEAN])
+    return np.array([*motion, force[0] - sums[0], force[1] - sums[1], level])
+
+
+def numerical(x, force, rate):
+    """(6, STATES): the partial derivatives of equations()."""
+    out = np.empty((6, STATES))
+    for i in range(STATES):
+        more, less = x.copy(), x.copy()
+        more[i] += DISTANCE
+        less[i] -= DISTANCE
+        out[:, i] = (equations(more, force, rate) - equations(less, force, rate)) / (2.0 * DISTANCE)
+    return out
+
+
+def linearised(x, force, rate):
+    """(6, STATES) by the rows of the model, and the corrected rates that it was given."""
+    sums = [0.0] * 9
+    predict(list(x), force, rate, STEP_S, sums)
+    model = Linearisation(list(x), sums[2:5], sums[7])
+    out = np.zeros((6, STATES))
+    for k, name in enumerate((*MOTION, *FORCES, "level_row")):
+        for state, derivative in getattr(model, name):
+            out[k, state] = derivative
+    return out, sums[2:5]
+
+
+def left_out(x, rates):
+    """(6, STATES): what the model leaves out because pitch and yaw error are small."""
+    (t, q, v), y = x[:3], x[YAW_ERROR]
+    wx, wy, _ = rates
+    s, c, tan = math.sin(t), math.cos(t), math.tan(q)
+    out = np.zeros((6, STATES))
+    out[0, LEAN] = -tan * (wx * c - wy * s)
+    out[0, BIAS_LEFT], out[0, BIAS_UP] = tan * s, tan * c
+    out[0, SCALE_LEFT], out[0, CROSS_LEFT_UP] = tan * s * wx, tan * s * wy
+    out[2, SPEED], out[2, BIAS_UP] = wy * y, -v * y
+    out[3, SPEED], out[3, BIAS_UP], out[3, YAW_ERROR] = wy * y * y, -v * y * y, v * wy * y
+    return out
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_every_partial_derivative_is_that_of_the_equations(seed, monkeypatch):
+    monkeypatch.setattr(bike_model, "turn_rates", lambda *arguments: arguments[-2:])  # the measured ones
+    x, force, rate = random_state(np.random.default_rng(seed))
+    jacobian, rates = linearised(x, force, rate)
+    np.testing.assert_allclose(jacobian + left_out(x, rates), numerical(x, force, rate), rtol=0, atol=TOLERANCE)
+
+
+def test_a_gyro_with_errors_of_scale_changes_the_derivatives_little(monkeypatch):
+    """2 % of each: they are left out of the derivatives, which stay right to a few per cent of the largest."""
+    monkeypatch.setattr(bike_model, "turn_rates", lambda *arguments: arguments[-2:])
+    for seed in range(20):
+        chance = np.random.default_rng(seed)
+        x, force, rate = random_state(chance)
+        x[SCALE_LEFT:] = chance.choice([-0.02, 0.02], STATES - SCALE_LEFT)
+        jacobian, rates = linearised(x, force, rate)
+        np.testing.assert_allclose(jacobian + left_out(x, rates), numerical(x, force, rate), rtol=0, atol=0.15)
+
+
+def rates_at(lean, speed, left=0.0, up=0.0):
+    return bike_model.turn_rates(speed, math.sin(lean), math.cos(lean), 1.0, left, up)
+
+
+@pytest.mark.parametrize("lean", [-0.8, -0.3, 0.4, 0.9])
+def test_near_balance_the_turn_rates_are_those_at_which_no_force_goes_to_the_side(lean):
+    speed = 2.0  # 20 m/s
+    balanced = -math.sin(lean) / speed
+    left, up = rates_at(lean, speed, 0.0, balanced + 0.05)
+    x, sums = [0.0] * STATES, [0.0] * 9
+    x[LEAN], x[SPEED] = lean, speed
+    predict(x, (0.0, 1.0, 0.0), (left, up, 0.0), STEP_S, sums)
+    assert sums[0] == pytest.approx(0.0, abs=1e-12)  # the force to the left that was expected is that of 0 g
+    assert x[PITCH] == pytest.approx(0.0, abs=1e-12)  # and the rates are about the vertical
+
+
+def test_far_from_balance_and_when_slow_the_turn_rates_are_the_measured_ones():
+    assert rates_at(0.5, 2.0, 0.1, 0.4) == (0.1, 0.4)  # a turn to the other side
+    assert rates_at(0.5, 0.3, 0.1, -1.6) == (0.1, -1.6)
+
+
+def test_the_state_stays_within_its_bounds():
+    x, sums = [0.0] * STATES, [0.0] * 9
+    for _ in range(300):
+        predict(x, (0.0, 1.0, -1.0), (-1.0, 0.0, 0.0), STEP_S, sums)
+    assert x[PITCH] == bike_model.MAX_PITCH
+    assert x[SPEED] == 0.0
