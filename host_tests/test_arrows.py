@@ -1,7 +1,7 @@
 """Who may import whom in the firmware: the architecture, written once and held.
 
 A sample goes one way, imu -> calibration -> lean -> ui. drive_alignment, speed and rides stand beside that way. The app
-wires them all, and nothing imports the app.
+wires them all, and nothing but start, which main.py runs, imports the app.
 """
 
 import ast
@@ -30,16 +30,18 @@ ARROWS = {
     "devices": {"board", "imu"},
     "status_report": {"board", "imu", "calibration", "speed", "ui.messages", "console", "devices", "settings"},
     "app": {"board", "imu", "calibration", "lean", "drive_alignment", "speed", "rides", "ui", "console", "devices"},
+    "start": {"board", "devices", "settings"},
     "__init__": {"status_report"},
 }
 # Imported only by a function that needs it, because it costs memory or words that most boards never need
 LATE = {
     "calibration": {"console"},  # a trim that cannot be saved is reported on the console
     "rides": {"console"},  # likewise a recording that ends by itself
+    "start": {"app", "console", "ui.messages"},  # the display says "starting" while the app is imported
 }
 # What only drivers may import: modules of MicroPython that speak to hardware
 HARDWARE = {"machine", "micropython", "esp32", "rp2", "neopixel", "network", "bluetooth"}
-DRIVERS = {"board", "imu", "speed", "devices", "main"}
+DRIVERS = {"board", "imu", "speed", "devices", "start"}
 
 
 def modules():

@@ -101,7 +101,7 @@ def run_device(plan):
     board.install()
     ends = []
     try:
-        import main
+        from kickstand import settings, start
         from kickstand.settings import Settings
 
         class Config:
@@ -109,14 +109,14 @@ def run_device(plan):
 
         for name, value in plan.get("config", {}).items():
             setattr(Config, name, tuple(value) if isinstance(value, list) else value)
-        load = main.settings.load
-        main.settings.load = lambda: Settings(Config)
+        load = settings.load
+        settings.load = lambda: Settings(Config)
         for until_s in plan.get("power", []) + [plan["until"]]:
             end = "reset"
             while end == "reset":
-                end = board.run(main.main, until_s)
+                end = board.run(start.main, until_s)
                 ends.append(end)
-        main.settings.load = load
+        settings.load = load
     finally:
         board.uninstall()
     return {"frames": frames, "ends": ends, "last": frames[-1][1:], "too_fast": board.too_fast}

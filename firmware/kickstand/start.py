@@ -1,0 +1,62 @@
+"""What main.py runs when the board gets power.
+
+Safe mode: with the button held at power-on nothing is started, so that new firmware can always be copied. After a reset
+the button does not count: a press while an error is shown must not leave the rider without a display.
+"""
+
+import sys
+from time import sleep_ms
+
+import machine
+
+from . import __version__, settings
+from .board import port
+from .devices import open_button, open_lcd
+from .errors import SettingsError
+
+
+def tell(lcd, line1, line2=""):
+    """Show two lines on the display, at once."""
+    lcd.show(line1, line2)
+    lcd.flush()
+
+
+def main():
+    """Run until Ctrl-C, power-off or a reset."""
+    try:
+        chosen = settings.load()
+        lcd = open_lcd(chosen)
+        if machine.reset_cause() == machine.PWRON_RESET and open_button(chosen).held():
+            print("Kickstand %s: safe mode, the button was held at power-up." % __version__)
+            tell(lcd, "Safe mode", "Ready for USB")
+            return
+        tell(lcd, "Kickstand", "starting")  # a lean from before a reset must not pass for a reading
+        run(chosen, lcd)
+    except SettingsError as error:
+        port.rest_watchdog()  # it may run: wrong pins show only when the app opens them
+        from .console import sentence
+        from .ui.messages import lines
+
+        print("Kickstand stopped. " + sentence(error))
+        tell(open_lcd(settings.Settings()), *lines(error))
+    except KeyboardInterrupt:
+        port.rest_watchdog()
+        print("Kickstand stopped. Ctrl-D starts it again; import kickstand; kickstand.status() tells how it is.")
+
+
+def run(chosen, lcd):
+    """Run the app. An exception in it is reported on display and console, then the board restarts."""
+    # Here, because this takes half a second, in which the display already says "starting". And incomplete firmware ends
+    # at the prompt with an ImportError instead of restarting for ever.
+    from .app import App
+
+    print("Kickstand %s. Ctrl-C stops it." % __version__)
+    try:
+        App(chosen, lcd).run()
+    except SettingsError:
+        raise
+    except Exception as error:
+        sys.print_exception(error)
+        tell(lcd, "Error, restarts", type(error).__name__)
+        sleep_ms(3000)
+        machine.reset()
