@@ -3,7 +3,6 @@
 import csv
 import io
 import math
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,31 +19,31 @@ _UNITS = {"t_s": "seconds", "temp_c": "degrees Celsius", "speed_mps": "m/s"}
 _UNITS |= {"ax_g": "g", "ay_g": "g", "az_g": "g", "gx_dps": "deg/s", "gy_dps": "deg/s", "gz_dps": "deg/s"}
 
 
-def check_text(path: Path, content: bytes, lines_before: int) -> None:
-    """Raise InputError if the bytes are no UTF-8."""
+def check_text(log: str, content: bytes, lines_before: int) -> None:
+    """Raise InputError if the bytes are no UTF-8. log: its name for messages."""
     try:
         content.decode()
     except UnicodeDecodeError as error:
         line = lines_before + content.count(b"\n", 0, error.start) + 1
-        raise InputError(f"{path}, line {line}: not text: give a log as CSV or as .csv.gz") from error
+        raise InputError(f"{log}, line {line}: not text: give a log as CSV or as .csv.gz") from error
 
 
-def header(path: Path, line: str) -> list[str]:
+def header(log: str, line: str) -> list[str]:
     """The names of the columns. Raises InputError where one is missing or there twice."""
     try:
         names = [name.strip() for name in next(csv.reader([line]), [])]
     except csv.Error as error:
-        raise InputError(f"{path}, line 1: not CSV ({error}): is it a log?") from error
+        raise InputError(f"{log}, line 1: not CSV ({error}): is it a log?") from error
     missing = [name for name in COLUMNS if name not in names]
     if missing and any(mark in "".join(names) for mark in ";\t"):
-        raise InputError(f"{path}, line 1: values stand apart by ; or tab: save it with commas between them")
+        raise InputError(f"{log}, line 1: values stand apart by ; or tab: save it with commas between them")
     if missing:
         raise InputError(
-            f"{path}, line 1: no column {', '.join(missing)}: a log starts with {','.join(COLUMNS)}"
+            f"{log}, line 1: no column {', '.join(missing)}: a log starts with {','.join(COLUMNS)}"
         )
     for name in COLUMNS + OPTIONAL:
         if names.count(name) > 1:
-            raise InputError(f"{path}, line 1: column {name} is there twice: leave one")
+            raise InputError(f"{log}, line 1: column {name} is there twice: leave one")
     return names
 
 
@@ -59,7 +58,7 @@ def plausible(table: NDArray[np.float64], names: list[str], before_us: int | Non
 
 
 def read(
-    path: Path, text: str, width: int, places: dict[str, int], lines_before: int, before_us: int | None
+    log: str, text: str, width: int, places: dict[str, int], lines_before: int, before_us: int | None
 ) -> tuple[NDArray[np.float64], str]:
     """(n, columns in the order of places), NaN for an empty optional cell, and the rows as CSV.
 
@@ -71,7 +70,7 @@ def read(
         for cells in rows:
             if not cells:
                 continue  # a blank line, often the last
-            where = f"{path}, line {lines_before + rows.line_num}"
+            where = f"{log}, line {lines_before + rows.line_num}"
             if len(cells) != width:
                 raise InputError(f"{where}: {len(cells)} values under {width} column names: is the line cut?")
             value = [_number(cells[place], name, where) for name, place in places.items()]
@@ -85,7 +84,7 @@ def read(
             writer.writerow([cell.replace("\n", " ") for cell in cells])
     except csv.Error as error:
         line = lines_before + rows.line_num
-        raise InputError(f"{path}, line {line}: not CSV ({error}): is it a log?") from error
+        raise InputError(f"{log}, line {line}: not CSV ({error}): is it a log?") from error
     return np.reshape(np.array(values, dtype=float), (-1, len(places))), kept.getvalue()
 
 

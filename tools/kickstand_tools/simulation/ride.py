@@ -53,6 +53,10 @@ def ride(
 
     upright_error_deg: how far the bike leaned to the right when pressed upright. pitch_change_deg: nose up
     on the kickstand against upright, within 1 degree at random if None. share: of the chip's tolerances.
+
+    >>> made = ride("parked", seed=1, seconds=20.0)
+    >>> made.rate_hz, len(made.poses), made.readings.shape == (len(made.time), 7)
+    (200.0, 7, True)
     """
     chance = np.random.default_rng([seed, *profile.encode()])
     plan = Plan(chance, seconds)

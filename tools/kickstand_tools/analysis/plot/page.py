@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..look import Look
+from ..overview import Overview
 from ..report import clock
 from ..stops.brake_test import Stop
 from .envelope import envelope
@@ -27,12 +27,12 @@ from .traces import (
 POINTS = 40_000  # of a line: what a browser still moves smoothly
 
 
-def draw(path: Path, seen: Look) -> None:
+def draw(path: Path, seen: Overview) -> None:
     """Write it."""
     figure(seen).write_html(path, include_plotlyjs=True, full_html=True)
 
 
-def figure(seen: Look) -> Any:
+def figure(seen: Overview) -> Any:
     """The plotly figure."""
     from plotly.graph_objects import Bar, Heatmap, Scatter, Scattergl
     from plotly.subplots import make_subplots

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ..look import Look
+from ..overview import Overview
 from ..report import clock
 from .envelope import envelope
 from .traces import (
@@ -40,7 +40,7 @@ _STYLE: Any = {
 }
 
 
-def draw(path: Path, seen: Look) -> None:
+def draw(path: Path, seen: Overview) -> None:
     """Write a PNG."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -68,7 +68,7 @@ def draw(path: Path, seen: Look) -> None:
         figure.savefig(path, dpi=100)
 
 
-def _lean(axes: Any, drawn: Traces, seen: Look) -> None:
+def _lean(axes: Any, drawn: Traces, seen: Overview) -> None:
     time, lean = envelope(drawn.time, drawn.lean, POINTS)
     axes.fill_between(time, np.minimum(lean, 0.0), 0.0, color=LEFT_COLOUR, alpha=0.85, linewidth=0.3)
     axes.fill_between(time, np.maximum(lean, 0.0), 0.0, color=RIGHT_COLOUR, alpha=0.85, linewidth=0.3)
@@ -90,7 +90,7 @@ def _lean(axes: Any, drawn: Traces, seen: Look) -> None:
     axes.tick_params(labelbottom=False)
 
 
-def _speed(axes: Any, drawn: Traces, seen: Look) -> None:
+def _speed(axes: Any, drawn: Traces, seen: Overview) -> None:
     axes.plot(*envelope(drawn.time, drawn.speed, POINTS), color=SPEED_COLOUR, linewidth=1.2)
     axes.set(title="Speed, km/h")
     axes.set_ylim(bottom=0.0)
@@ -98,7 +98,7 @@ def _speed(axes: Any, drawn: Traces, seen: Look) -> None:
     axes.tick_params(labelbottom=False)
 
 
-def _forces(axes: Any, drawn: Traces, seen: Look) -> None:
+def _forces(axes: Any, drawn: Traces, seen: Overview) -> None:
     from matplotlib.ticker import MultipleLocator
 
     for values, colour, name in (
@@ -131,7 +131,7 @@ def _gg(axes: Any, drawn: Traces) -> None:
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
 
 
-def _histogram(axes: Any, seen: Look) -> None:
+def _histogram(axes: Any, seen: Overview) -> None:
     middle, share = histogram(seen)
     colours = np.where(middle < 0.0, LEFT_COLOUR, RIGHT_COLOUR)
     axes.bar(middle, share, width=1.0, color=colours.tolist(), linewidth=0)
@@ -149,7 +149,7 @@ def _histogram(axes: Any, seen: Look) -> None:
     axes.xaxis.set_major_formatter(lambda value, _: f"{abs(value):.0f}")
 
 
-def _alignment(axes: Any, seen: Look) -> None:
+def _alignment(axes: Any, seen: Overview) -> None:
     quality = seen.quality
     axes.plot(-quality.lateral_g, quality.forward_g, ".", color=LATERAL_COLOUR, markersize=3, alpha=0.5)
     if quality.yaw_deg is not None:
