@@ -1,4 +1,4 @@
-"""The cells of a log: what may stand in them, and where a mistake is."""
+"""The cells of a CSV log: which values they may have, and the line in which one has another."""
 
 import csv
 import io
@@ -12,7 +12,7 @@ from ..errors import InputError
 COLUMNS = ("t_s", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")
 OPTIONAL = ("speed_mps", "temp_c")  # may be empty in a row
 
-# Beyond these it is another unit (m/s2, counts): the sensor's widest ranges are 16 g and 2000 deg/s.
+# A larger value is in another unit (m/s2, counts): the sensor's widest ranges are 16 g and 2000 deg/s.
 _LIMITS = {"t_s": 1e10, "ax_g": 20.0, "ay_g": 20.0, "az_g": 20.0, "temp_c": 200.0, "speed_mps": 200.0}
 _LIMITS |= {"gx_dps": 2500.0, "gy_dps": 2500.0, "gz_dps": 2500.0}
 _UNITS = {"t_s": "seconds", "temp_c": "degrees Celsius", "speed_mps": "m/s"}
@@ -48,7 +48,7 @@ def header(log: str, line: str) -> list[str]:
 
 
 def plausible(table: NDArray[np.float64], names: list[str], before_us: int | None) -> bool:
-    """True if read() would find nothing wrong with these values, NaN where a cell was empty."""
+    """True if read() would find no mistake in these values (n, columns of names; NaN for an empty cell)."""
     for k, name in enumerate(names):
         within = np.abs(table[:, k]) <= _LIMITS[name]
         if not np.all(within | np.isnan(table[:, k]) if name in OPTIONAL else within):
@@ -89,7 +89,7 @@ def read(
 
 
 def _number(cell: str, name: str, where: str) -> float:
-    """The value of a cell; NaN for an empty one where that is allowed."""
+    """The value of a cell; NaN for an empty one in a column of OPTIONAL."""
     if name in OPTIONAL and not cell.strip():
         return math.nan
     try:

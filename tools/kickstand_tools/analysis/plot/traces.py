@@ -19,22 +19,22 @@ GG_BIN_G = 0.025
 
 @dataclass
 class Traces:
-    """time (s) with lean (degrees, NaN where the display shows none), speed (km/h), lateral and forward (g, smoothed).
+    """What is drawn over time. lean_deg is NaN where the display shows none; lateral_g, forward_g are smoothed.
 
-    gg: seconds in each field of a grid of GG_BIN_G, edges gg_edges: rows forward, columns lateral.
+    gg_s: seconds in each cell of a grid with the edges gg_edges_g: rows forward_g, columns lateral_g.
     """
 
-    time: Array
-    lean: Array
-    speed: Array
-    lateral: Array
-    forward: Array
-    gg: Array
-    gg_edges: Array
+    time_s: Array
+    lean_deg: Array
+    speed_kmh: Array
+    lateral_g: Array
+    forward_g: Array
+    gg_s: Array
+    gg_edges_g: Array
 
 
 def traces(seen: Overview) -> Traces:
-    """From the course of the ride."""
+    """The traces of a ride."""
     course = seen.course
     step_s = spacing_s(course)
     n = max(1, round(SMOOTH_S / step_s))
@@ -48,7 +48,7 @@ def traces(seen: Overview) -> Traces:
 
 
 def title(seen: Overview) -> str:
-    """Name and length of the ride, and its maxima."""
+    """One line: name and length of the ride, and its maxima."""
     total = seen.summary
     said = [seen.ride.stem, clock(total.duration_s)]
     if not seen.ride.car:
@@ -75,14 +75,14 @@ def histogram(seen: Overview) -> tuple[Array, Array]:
 
 
 def quality_lines(seen: Overview) -> list[str]:
-    """What the ride says of the alignment."""
+    """One line for each thing that the ride says about the alignment."""
     quality = seen.quality
     lines = angles(quality) or ["not enough straight riding"]
     return lines if quality.gravity_g is None else [*lines, f"at rest {quality.gravity_g:.3f} g"]
 
 
 def tick_s(seconds: float) -> float:
-    """Round times for 6 to 12 ticks."""
+    """A round time between ticks, so that there are 6 to 12 of them."""
     return next((tick for tick in (1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800) if seconds < 12 * tick), 3600)
 
 
