@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from kickstand_tools.analysis.alignment_quality import Quality
 from kickstand_tools.analysis.channels import open_ride
-from kickstand_tools.analysis.look import look
+from kickstand_tools.analysis.overview import overview
+from kickstand_tools.analysis.report import angles
 from kickstand_tools.simulation.scripted import script
 
 
@@ -39,7 +40,7 @@ def test_an_error_of_the_alignment_is_seen(log, tmp_path, axis, angle_deg):
     cal = tmp_path / "cal.json"
     matrix = turned(axis, angle_deg)
     cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": matrix.tolist()}))
-    quality = look(open_ride(log, cal)).quality
+    quality = overview(open_ride(log, cal)).quality
     assert quality.straight_s > 30.0
     for name in "roll", "pitch", "yaw":
         value = getattr(quality, f"{name}_deg")
@@ -49,7 +50,7 @@ def test_an_error_of_the_alignment_is_seen(log, tmp_path, axis, angle_deg):
 
 def test_a_ride_without_straights_does_not_tell(tmp_path):
     path = analysis_rides.write(tmp_path, [script.upright(8)])
-    quality = look(open_ride(path, None)).quality
+    quality = overview(open_ride(path, None)).quality
     assert (quality.roll_deg, quality.pitch_deg, quality.yaw_deg) == (None, None, None)
     said = command.works("report", path).out
     assert "Alignment: not enough straight riding to tell how far it is off." in said
@@ -57,4 +58,4 @@ def test_a_ride_without_straights_does_not_tell(tmp_path):
 
 def test_nothing_is_a_negative_nothing():
     quality = Quality(-0.04, None, 2.04, None, 60.0, np.zeros(0), np.zeros(0))
-    assert quality.angles == ["roll +0.0°", "yaw +2.0°"]
+    assert angles(quality) == ["roll +0.0°", "yaw +2.0°"]

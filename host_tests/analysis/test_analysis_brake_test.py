@@ -7,14 +7,15 @@ import analysis_rides
 import command
 import numpy as np
 import pytest
+from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.analysis.channels import Channels, open_ride
-from kickstand_tools.analysis.signals import G
-from kickstand_tools.analysis.stops.brake_test import RATE_S, Stop, mfdd_mps2, stops
+from kickstand_tools.analysis.downsample import downsampled, joined
+from kickstand_tools.analysis.stops.brake_test import RATE_S, Stop, find_stops, mfdd_mps2
 from kickstand_tools.analysis.stops.speed_fit import speed_delay_s
 from kickstand_tools.analysis.stops.standstill import standing
-from kickstand_tools.analysis.thin import joined, thinned
-from kickstand_tools.calibration import poses as captured
 from kickstand_tools.calibration.file import read_calibration, write_calibration
+from kickstand_tools.calibration.six import fit_six_positions
+from kickstand_tools.calibration.two import fit_two_positions
 from kickstand_tools.simulation import profiles
 from kickstand_tools.simulation.files import simulate
 from kickstand_tools.simulation.plan import Conditions, Plan
@@ -26,7 +27,7 @@ SATELLITES_1HZ, SATELLITES_10HZ = (1, 0.2, 0.05), (10, 0.2, 0.05)
 
 
 def course(path: Path) -> Channels:
-    return joined(list(thinned((block for _, block in open_ride(path, None).blocks("")), RATE_S)))
+    return joined(list(downsampled(open_ride(path, None).blocks(), RATE_S)))
 
 
 def brakes(plan: Plan) -> Conditions:
@@ -49,10 +50,10 @@ def ride(tmp_path_factory) -> tuple[Channels, np.ndarray, np.ndarray]:
         patch.setitem(profiles.PROFILES, "brakes", brakes)
         made = simulate("brakes", 2, directory, seconds=300.0)
     poses = [directory / f"POSE_{k}.csv" for k in range(1, 8)]
-    write_calibration(directory / "six.json", captured.six(poses, lambda _: None))
+    write_calibration(directory / "six.json", fit_six_positions(poses).calibration)
     pair = directory / "KICKSTAND.csv", directory / "UPRIGHT.csv"
     six = read_calibration(directory / "six.json")
-    write_calibration(directory / "RIDE.cal.json", captured.two(*pair, six, "left", lambda _: None))
+    write_calibration(directory / "RIDE.cal.json", fit_two_positions(*pair, six).calibration)
     return course(directory / "RIDE.csv"), made.time, made.truth["speed_mps"]
 
 
@@ -99,7 +100,7 @@ LIMITS = {
 @pytest.mark.parametrize("name", LIMITS)
 def test_with_a_speed(ride, name):
     source, mfdd_limit, speed_limit = LIMITS[name]
-    found = stops(with_speed(ride, *source))
+    found = find_stops(with_speed(ride, *source))
     assert len(found) == len(true_stops(ride[1], ride[2])) >= 9
     errors = []
     for stop in found:
@@ -117,7 +118,7 @@ def test_with_a_speed(ride, name):
 def test_without_a_speed(ride):
     """Every stop is found, nothing else is; 3 % at worst, 1 % rms."""
     whole = ride[0]
-    found = stops(whole)
+    found = find_stops(whole)
     assert len(found) == len(true_stops(ride[1], ride[2]))
     errors = []
     for stop in found:
@@ -192,7 +193,7 @@ def test_a_perfect_sensor_on_a_slope(tmp_path, slope_deg, speed_hz):
         speed_hz=speed_hz,
         vibration_g=0.01,
     )
-    (stop,) = stops(course(path))
+    (stop,) = find_stops(course(path))
     u = np.linspace(0.0, 1.0, 5001)
     v = 22.0 * (1.0 - u**3 * (10.0 + u * (6.0 * u - 15.0)))
     want = mfdd_mps2(v, np.concatenate(([0.0], np.cumsum((v[1:] + v[:-1]) / 2.0 * 0.001))))
@@ -207,11 +208,11 @@ def test_a_road_without_any_vibration(tmp_path):
     rows = [command.HEADER]
     for seconds, acceleration in ((5, 0.0), (8, 2.5), (6, 0.0), (20 / 6, -6.0), (8, 0.0)):
         for _ in range(round(100 * seconds)):
-            rows.append(f"{len(rows) / 100:.2f},0,1,{acceleration / G:.5f},0,0,0")
+            rows.append(f"{len(rows) / 100:.2f},0,1,{acceleration / STANDARD_GRAVITY:.5f},0,0,0")
     path = tmp_path / "RIDE.csv"
     path.write_text("\n".join(rows) + "\n")
     (tmp_path / "RIDE.cal.json").write_text(json.dumps(analysis_rides.CALIBRATION))
-    (stop,) = stops(course(path))
+    (stop,) = find_stops(course(path))
     assert stop.mfdd_mps2 == pytest.approx(6.0, rel=0.01)
     assert stop.initial_speed_mps == pytest.approx(20.0, rel=0.01)
 
@@ -221,9 +222,9 @@ def test_a_pull_to_the_side(tmp_path):
     n = 200
     t = np.arange(0, 24.0, 1 / n)
     v = np.clip(20.0 * np.minimum(t - 3.0, 4.0) / 4.0, 0.0, None) - np.clip(5.0 * (t - 12.0), 0.0, 20.0)
-    acceleration = np.gradient(v, t) / G
+    acceleration = np.gradient(v, t) / STANDARD_GRAVITY
     yaw = np.where((t > 12.0) & (t < 16.0), 0.5, 0.0)
-    left = v * np.radians(yaw) / G
+    left = v * np.radians(yaw) / STANDARD_GRAVITY
     shake = np.random.default_rng(0).normal(size=(6, len(t))) * np.where(v > 0, 1.0, 0.05)
     path = command.write(
         tmp_path / "RIDE.csv",
@@ -240,7 +241,7 @@ def test_a_pull_to_the_side(tmp_path):
         ),
     )
     path.with_name("RIDE.cal.json").write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle": "car"}))
-    (stop,) = stops(course(path))
+    (stop,) = find_stops(course(path))
     assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.02)
     assert stop.heading_deg == pytest.approx(2.0, abs=0.3)
     assert stop.side_m == pytest.approx(20.0 * np.radians(0.5) * 16 / 2 - 5.0 * np.radians(0.5) * 64 / 3, abs=0.15)
@@ -251,10 +252,10 @@ def test_slowing_down_is_no_stop(ride):
     whole, time, speed = ride
     first = true_stops(time, speed)[0]
     part = with_speed(ride, *PERFECT_1HZ).part(whole.t_s < first - 0.5)
-    assert stops(part) == []
-    assert stops(whole.part(whole.t_s < first - 0.5)) == []
+    assert find_stops(part) == []
+    assert find_stops(whole.part(whole.t_s < first - 0.5)) == []
 
 
 def test_the_shortest_of_rides(ride):
     for n in 1, 2, 5, 40:
-        assert stops(ride[0].part(slice(0, n))) == []
+        assert find_stops(ride[0].part(slice(0, n))) == []

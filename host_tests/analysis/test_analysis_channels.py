@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from kickstand.lean import formula
 from kickstand_tools.analysis.channels import Channels, formula_lean_deg, open_ride
+from kickstand_tools.analysis.downsample import downsampled, joined
 from kickstand_tools.analysis.plot.envelope import envelope
 from kickstand_tools.analysis.summary import Summary
-from kickstand_tools.analysis.thin import joined, thinned
 from kickstand_tools.logs import reader
 from kickstand_tools.replay import replay_engine
 
@@ -21,7 +21,7 @@ def ride(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def course(ride) -> Channels:
-    return joined([channels for _, channels in ride.blocks("")])
+    return joined(list(ride.blocks()))
 
 
 def test_the_formula_on_arrays_is_the_firmwares():
@@ -36,7 +36,7 @@ def test_channels_are_those_of_the_meter(ride, course):
     log = reader.read_log(ride.log)
     engine = replay_engine.Replay(ride.calibration.to_firmware())
     rows, shown, rolling, trusted = [], [], [], []
-    for row in zip(log.time_us, log.readings, (np.nan if v is None else v for v in log.speed_mps)):
+    for row in log.rows():
         rows.append(engine.step(*row))
         shown.append(engine.meter.smooth_force[2])
         rolling.append(engine.meter.filter.rolling)
@@ -54,10 +54,10 @@ def test_the_maxima_are_those_the_display_held(ride):
     """Block by block, in whatever blocks."""
     log = reader.read_log(ride.log)
     engine = replay_engine.Replay(ride.calibration.to_firmware())
-    for row in zip(log.time_us, log.readings, (np.nan if v is None else v for v in log.speed_mps)):
+    for row in log.rows():
         engine.take(*row)
     meter, summary = engine.meter, Summary()
-    whole = joined([channels for _, channels in ride.blocks("")])
+    whole = joined(list(ride.blocks()))
     for start in range(0, len(whole.t_s), 777):
         summary.add(whole.part(slice(start, start + 777)))
     assert summary.left_deg.value == meter.max_left_deg > 25
@@ -85,7 +85,7 @@ def test_time_without_readings_does_not_count(course):
 @pytest.mark.parametrize("block", [7, 1000, 100_000])
 def test_thinning_is_the_mean_of_each_stretch_whatever_the_blocks(course, block):
     parts = [course.part(slice(start, start + block)) for start in range(0, len(course.t_s), block)]
-    thin = joined(list(thinned(parts, 0.02)))
+    thin = joined(list(downsampled(parts, 0.02)))
     n = len(course.t_s) // 4
     assert len(thin.t_s) in (n, n + 1)
     for name in "t_s", "lean_deg", "forward_g":
@@ -94,9 +94,9 @@ def test_thinning_is_the_mean_of_each_stretch_whatever_the_blocks(course, block)
     assert np.count_nonzero(~np.isnan(thin.speed_mps)) == np.count_nonzero(~np.isnan(course.speed_mps))
 
 
-def test_a_slow_log_is_not_thinned(course):
+def test_a_slow_log_is_not_downsampled(course):
     slow = course.part(slice(0, None, 10))
-    thin = joined(list(thinned([slow], 0.02)))
+    thin = joined(list(downsampled([slow], 0.02)))
     for field in fields(Channels):
         assert np.array_equal(getattr(thin, field.name), getattr(slow, field.name), equal_nan=True)
 

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from kickstand_tools.analysis.channels import Channels, open_ride
+from kickstand_tools.analysis.downsample import downsampled, joined
 from kickstand_tools.analysis.stops import brake_test
-from kickstand_tools.analysis.stops.brake_test import RATE_S, stops
+from kickstand_tools.analysis.stops.brake_test import RATE_S, find_stops
 from kickstand_tools.analysis.stops.plausible import closes, plausible
 from kickstand_tools.analysis.stops.standstill import standing
-from kickstand_tools.analysis.thin import joined, thinned
-from kickstand_tools.calibration import poses as captured
 from kickstand_tools.calibration.file import write_calibration
+from kickstand_tools.calibration.two import fit_two_positions
 from kickstand_tools.simulation.files import simulate
 
 
@@ -19,8 +19,8 @@ def track(tmp_path_factory, request) -> Channels:
     directory = tmp_path_factory.mktemp("track")
     made = simulate("track", request.param, directory, seconds=200.0)
     pair = directory / "KICKSTAND.csv", directory / "UPRIGHT.csv"
-    write_calibration(directory / "RIDE.cal.json", captured.two(*pair, None, "left", lambda _: None))
-    whole = joined(list(thinned((b for _, b in open_ride(directory / "RIDE.csv", None).blocks("")), RATE_S)))
+    write_calibration(directory / "RIDE.cal.json", fit_two_positions(*pair).calibration)
+    whole = joined(list(downsampled(open_ride(directory / "RIDE.csv", None).blocks(), RATE_S)))
     whole.speed_mps = np.interp(whole.t_s, made.time, made.truth["speed_mps"])
     return whole
 
@@ -36,8 +36,8 @@ def test_a_fast_smooth_track_is_no_standstill(track):
     still = standing(without_speed(track))
     assert np.max(track.speed_mps[still]) < 0.5
     assert np.mean(still[track.speed_mps == 0.0]) > 0.9
-    (stop,) = stops(without_speed(track))
-    (true,) = stops(track)
+    (stop,) = find_stops(without_speed(track))
+    (true,) = find_stops(track)
     assert stop.mfdd_mps2 == pytest.approx(true.mfdd_mps2, rel=0.03)
     assert stop.initial_speed_mps == pytest.approx(true.initial_speed_mps, rel=0.03)
 
@@ -51,10 +51,10 @@ def test_what_was_integrated_to_a_standstill_that_was_none_is_not_shown(track, m
         made_up[end + 20 : end + 80] = True
     monkeypatch.setattr(brake_test, "standing", lambda _: made_up)
     assert len(ends) >= 2
-    shown = len(stops(without_speed(track)))
+    shown = len(find_stops(without_speed(track)))
     monkeypatch.setattr(brake_test, "plausible", lambda *_: True)
     monkeypatch.setattr(brake_test, "closes", lambda *_: True)
-    assert shown < 0.5 * len(stops(without_speed(track)))
+    assert shown < 0.5 * len(find_stops(without_speed(track)))
 
 
 def test_what_is_plausible():

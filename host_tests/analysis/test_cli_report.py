@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from kickstand_tools.analysis import report
 from kickstand_tools.analysis.channels import open_ride
-from kickstand_tools.analysis.look import look
+from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.plot import page, picture, plot
 from kickstand_tools.analysis.stops.brake_test import Stop
 from kickstand_tools.simulation.scripted import script
@@ -58,7 +58,7 @@ def test_the_page_says_the_same(ride, monkeypatch):
 def test_the_longest_of_stops_fits_a_line(ride):
     from rich.console import Console
 
-    seen = look(open_ride(ride, None))
+    seen = overview(open_ride(ride, None))
     seen.stops = [Stop(36000.0, 36030.0, 69.4, 1000.0, 10.5, 20.5, 100.0, -12.5, 9.0, "integrated")]
     console = Console(width=80, record=True, file=io.StringIO())
     console.print(report.page(seen))
@@ -166,7 +166,7 @@ def test_a_speed_is_drawn_where_there_is_one(tmp_path, car, speed_hz):
     ride = analysis_rides.write(tmp_path, straight, speed_hz=speed_hz)  # the bends of a motorcycle are none of a car
     cal = tmp_path / "RIDE.cal.json"
     cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle": "car" if car else "motorcycle"}))
-    seen = look(open_ride(ride, cal))
+    seen = overview(open_ride(ride, cal))
     figure = page.figure(seen)
     row = {trace.name: trace.yaxis for trace in figure.data}
     assert ("lean" in row) is not car

@@ -112,7 +112,7 @@ def test_two_alone_assumes_a_perfect_accelerometer(tmp_path):
     data = json.loads((tmp_path / "CAL.json").read_text())
     assert (data["accel_offset_g"], data["accel_slope"]) == ([0, 0, 0], [1, 1, 1])
     assert np.array(data["vehicle_from_sensor"]) == pytest.approx(np.eye(3), abs=0.005)
-    assert data["kickstand_side"] == read_calibration(tmp_path / "CAL.json").side == "left"
+    assert data["kickstand_side"] == read_calibration(tmp_path / "CAL.json").kickstand_side == "left"
     assert "warning: no six-position calibration" in result.out
 
 

@@ -49,7 +49,7 @@ def test_a_refused_ride_has_as_many_steps(monkeypatch):
     def refuse(*_):
         raise runs.InputError("1.021 g")
 
-    monkeypatch.setattr(runs.poses, "six", refuse)
+    monkeypatch.setattr(runs, "fit_six_positions", refuse)
     count = []
     runs.run(runs.Job("parked", 0, seconds=60.0), lambda: count.append(1))
     assert len(count) == runs.steps()

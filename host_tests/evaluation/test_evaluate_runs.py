@@ -3,7 +3,6 @@
 import json
 import math
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +11,7 @@ from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.errors import InputError
 from kickstand_tools.evaluation import estimators, real_ride, runs
 from kickstand_tools.evaluation.samples import Samples
-from kickstand_tools.logs.reader import Log
+from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation.ride import ride
 
 FILTERS = ["complementary", "mahony", "madgwick", "vqf"]
@@ -70,16 +69,16 @@ def test_filters_that_trust_the_force_decay_in_a_held_turn(swept):
 def test_the_calibration_is_from_the_poses_alone():
     made = ride("street", 2, 60.0, pitch_change_deg=0.0, share=0.0)
     calibration = runs.calibrated_by_poses(made)
-    matrix = np.reshape(calibration.matrix, (3, 3))
+    matrix = calibration.vehicle_from_sensor
     turned = np.degrees(np.arccos((np.trace(matrix @ made.vehicle_from_sensor.T) - 1.0) / 2.0))
     assert turned < 1.5  # forward by what a hand holds and the ground slopes
-    assert calibration.slope == pytest.approx([1.0] * 3, abs=0.002)
+    assert calibration.accel_slope == pytest.approx([1.0] * 3, abs=0.002)
     assert calibration.six_done and calibration.aligned
 
 
 def test_errors_of_the_set_up_reach_the_calibration():
     made = ride("street", 2, 60.0, upright_error_deg=1.5, pitch_change_deg=0.0, share=0.0)
-    matrix = np.reshape(runs.calibrated_by_poses(made).matrix, (3, 3))
+    matrix = runs.calibrated_by_poses(made).vehicle_from_sensor
     up = matrix[1] @ made.vehicle_from_sensor.T
     assert np.degrees(np.arctan2(up[0], up[1])) == pytest.approx(1.5, abs=0.15)
 
@@ -94,7 +93,7 @@ def test_a_refused_calibration_is_reported_not_scored(monkeypatch):
     def refuse(*_):
         raise InputError("the free pose reads 1.021 g")
 
-    monkeypatch.setattr(runs.poses, "six", refuse)
+    monkeypatch.setattr(runs, "fit_six_positions", refuse)
     result = runs.run(runs.Job("parked", 0, seconds=60.0))
     assert result.refusal == "the free pose reads 1.021 g"
     assert not result.scores
@@ -113,17 +112,15 @@ def recorded(rest_s: float = 2.0, turned: float = 0.3) -> Log:
     rates = np.degrees(np.column_stack((yaw * np.sin(lean), yaw * np.cos(lean), np.gradient(lean, t))))
     c, s = np.cos(turned), np.sin(turned)
     mounting = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
-    values = np.column_stack((vehicle @ mounting, np.full(n, 25.0), rates @ mounting + [1.0, -2.0, 0.5]))
-    speeds: list[float | None] = [float(speed[k]) if k % 50 == 0 else None for k in range(n)]
-    time_us = [round(x * 1e6) for x in t.tolist()]
-    return Log(Path("made.csv"), [], time_us, [tuple(row) for row in values.tolist()], speeds)
+    speeds = np.where(np.arange(n) % 50 == 0, speed, np.nan)
+    return Log(t, vehicle @ mounting, rates @ mounting + [1.0, -2.0, 0.5], speeds, name="made.csv")
 
 
 def test_the_recordings_calibration_finds_bias_and_forward():
     calibration = real_ride.calibration_of(recorded(turned=0.3))
-    assert calibration.bias == pytest.approx([1.0, -2.0, 0.5], abs=1e-6)
+    assert calibration.gyro_bias_dps == pytest.approx([1.0, -2.0, 0.5], abs=1e-6)
     c, s = np.cos(0.3), np.sin(0.3)
-    assert calibration.matrix == pytest.approx([c, 0.0, s, 0.0, 1.0, 0.0, -s, 0.0, c], abs=0.03)
+    assert calibration.vehicle_from_sensor.ravel() == pytest.approx([c, 0.0, s, 0.0, 1.0, 0.0, -s, 0.0, c], abs=0.03)
 
 
 def test_the_reference_is_speed_times_yaw_rate():
@@ -137,7 +134,7 @@ def test_the_reference_is_speed_times_yaw_rate():
 
 def test_a_recording_without_speed_is_refused():
     log = recorded()
-    log.speed_mps = [None] * len(log.readings)
+    log.speed_mps[:] = np.nan
     with pytest.raises(InputError, match="no speed"):
         real_ride.calibration_of(log)
 

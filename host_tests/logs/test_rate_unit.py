@@ -6,19 +6,24 @@ import numpy as np
 import pytest
 from kickstand_tools.logs.rate_unit import RateUnit
 from kickstand_tools.logs.reader import read_log
+from kickstand_tools.refusals import sentence
 from kickstand_tools.simulation.files import simulate
 from kickstand_tools.simulation.profiles import PROFILES
 from kickstand_tools.simulation.scripted import script
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
 
+def said(unit):
+    return sentence(unit.notice) if unit.notice else ""
+
+
 def judged(log, scale=1.0, block=5000):
     """What is said of a whole log, its rates made smaller."""
-    time, readings = np.array(log.time_us) * 1e-6, np.array(log.readings)
+    time, force, rate = log.t_s, log.accel_g, scale * log.gyro_dps
     unit = RateUnit()
     for k in range(0, len(time), block):
-        unit.add(time[k : k + block], readings[k : k + block, :3], scale * readings[k : k + block, 4:])
-    return unit.remark
+        unit.add(time[k : k + block], force[k : k + block], rate[k : k + block])
+    return said(unit)
 
 
 @pytest.mark.parametrize("profile", PROFILES)
@@ -26,9 +31,9 @@ def test_simulated_rides(tmp_path, profile):
     simulate(profile, 5, tmp_path, 300.0)
     log = read_log(tmp_path / "RIDE.csv")
     assert judged(log) == ""
-    said = judged(log, np.radians(1.0))
+    remark = judged(log, np.radians(1.0))
     if profile in ("track", "hills", "weight"):  # others may lean too little, or hold a bend as if it were the usual
-        assert "are they in rad/s?" in said
+        assert "are they in rad/s?" in remark
 
 
 TURN = np.reshape(random_mounting(3), (3, 3))
@@ -39,7 +44,7 @@ def straight_on(time, forward, up):
     force = np.column_stack((0.05 * np.sin(0.3 * time), up * np.ones(len(time)), forward)) @ TURN
     unit = RateUnit()
     unit.add(time, force, 0.01 * np.column_stack((np.cos(time), np.sin(time), time % 1.0)) @ TURN)
-    return unit.remark
+    return said(unit)
 
 
 @pytest.mark.parametrize("slope", [0.2, 0.0, -0.2])

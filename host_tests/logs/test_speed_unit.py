@@ -1,7 +1,6 @@
 """A speed that is not in m/s is refused by whatever reads a log, and one that is never is."""
 
 import csv
-from pathlib import Path
 
 import command
 import driving_runs
@@ -86,15 +85,12 @@ def test_every_command_refuses_them(tmp_path, name, aligned):
 def test_no_simulated_ride_is_refused(tmp_path, profile):
     simulate(profile, 7, tmp_path, 150.0, speed=True)
     log = read_log(tmp_path / "RIDE.csv")
-    there = [k for k, value in enumerate(log.speed_mps) if value is not None]
-    time, force = np.array(log.time_us) * 1e-6, np.array(log.readings)[:, :3]
-    speed = np.full(len(time), np.nan)
-    speed[there] = [log.speed_mps[k] for k in there]
+    time, force, speed = log.t_s, log.accel_g, log.speed_mps
     rng = np.random.default_rng(1)
     noisy = np.abs(speed + rng.normal(scale=0.5, size=len(speed)))
     lost = np.where(rng.random(len(speed)) < 0.2, 0.0, speed)  # 0 where the satellites are
     for wrong in noisy, np.round(speed), lost, rng.uniform(0.0, 50.0) * rng.random(len(speed)):
-        SpeedUnit(tmp_path).add(time, force, np.where(np.isnan(speed), np.nan, wrong))
+        SpeedUnit("log").add(time, force, np.where(np.isnan(speed), np.nan, wrong))
 
 
 def test_what_was_felt_while_samples_are_missing_is_not_known():
@@ -104,9 +100,9 @@ def test_what_was_felt_while_samples_are_missing_is_not_known():
     speed = np.where(np.arange(len(time)) % 100 == 99, 20.0 + np.cumsum(push) * 0.01 * 9.80665, np.nan)
     force = np.column_stack((push, np.ones(len(time)), np.zeros(len(time))))
     awake = time % 1.0 > 0.5
-    SpeedUnit(Path()).add(time[awake], force[awake], speed[awake])
+    SpeedUnit("log").add(time[awake], force[awake], speed[awake])
     with pytest.raises(InputError, match="km/h"):
-        SpeedUnit(Path()).add(time, force, speed * KMH)
+        SpeedUnit("log").add(time, force, speed * KMH)
 
 
 def test_a_speed_that_has_nothing_to_do_with_the_ride():
@@ -116,16 +112,15 @@ def test_a_speed_that_has_nothing_to_do_with_the_ride():
     for _ in range(100):
         force = np.repeat(rng.normal(scale=0.2, size=(60, 3)), 10, axis=0) + [0.0, 0.0, 1.0]
         speed = np.where(np.arange(len(time)) % 10 == 0, rng.uniform(0.0, 50.0, len(time)), np.nan)
-        SpeedUnit(Path()).add(time, force, speed)
+        SpeedUnit("log").add(time, force, speed)
 
 
 def test_recordings(shared_data, tmp_path):
     for log in sorted(shared_data.glob("*.csv.gz")):
         whole = read_log(log)
-        time, force = np.array(whole.time_us) * 1e-6, np.array(whole.readings)[:, :3]
-        speed = np.array([np.nan if value is None else value for value in whole.speed_mps])
+        time, force, speed = whole.t_s, whole.accel_g, whole.speed_mps
         if log.name.startswith("car-urban"):
             with pytest.raises(InputError, match="it is in km/h"):
-                SpeedUnit(log).add(time, force, speed * KMH)
+                SpeedUnit(log.name).add(time, force, speed * KMH)
             with pytest.raises(InputError, match="it is in mph or knots"):
-                SpeedUnit(log).add(time, force, speed * MPH)
+                SpeedUnit(log.name).add(time, force, speed * MPH)

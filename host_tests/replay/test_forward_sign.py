@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
-from kickstand_tools.replay.forward_sign import ENOUGH, ForwardSign, exchanged_line
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.refusals import sentence
+from kickstand_tools.replay.forward_sign import ENOUGH, ForwardSign, exchanged_notice
 
 G = 9.80665
 
@@ -49,6 +51,11 @@ def test_a_ride_across_does_not_accuse():
     found = ForwardSign()
     found.add(time, np.roll(force, 235), speed)  # a quarter of a period
     assert not found.exchanged
+
+
+def exchanged_line(car, side, roll_deg=None):
+    calibration = CalibrationFile(vehicle="car" if car else "", kickstand_side=side)
+    return sentence(exchanged_notice(calibration, roll_deg))
 
 
 def test_what_is_said():

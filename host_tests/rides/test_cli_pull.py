@@ -59,13 +59,13 @@ def test_rides_become_logs_with_their_calibration(board, tmp_path):
     one, other = logs(tmp_path)
     assert one.name.startswith("ride-00003-")
     log = read_log(one)
-    assert log.time_us == list(np.cumsum([dt for _, _, dt in turns]) - turns[0][2])
+    assert log.time_us.tolist() == list(np.cumsum([dt for _, _, dt in turns]) - turns[0][2])
     counts = np.array([np.array(sums) / n for sums, n, _ in turns])
     readings = np.array(log.readings)
     assert np.abs(readings[:, :3] * 4096 - counts[:, :3]).max() < 1e-3
     assert np.abs(readings[:, 4:] * 65.5 - counts[:, 3:]).max() < 1e-3
     assert readings[0, 3] == 31.25
-    assert [v for v in read_log(other).speed_mps if v is not None][:3] == [0, 1, 2]
+    assert [v for v in read_log(other).speed_mps if v == v][:3] == [0, 1, 2]
     cal = json.loads((tmp_path / "out" / one.name.replace(".csv.gz", ".cal.json")).read_text())
     assert cal["vehicle_from_sensor"] == [[0, 1, 0], [0, 0, 1], [1, 0, 0]]
     assert cal["accel_offset_g"] == pytest.approx([0.01, -0.02, 0.03])
@@ -126,7 +126,7 @@ def test_a_ride_whose_beginning_is_gone(board, tmp_path):
     put(board, "000/01/00003.rid", ride_writer.blocks(2, sequence=48, time_us=300_000_000)[0])
     result = command.works("pull", "--out", tmp_path / "out")
     assert "ride 1: its beginning had to make room" in result.err
-    assert read_log(logs(tmp_path)[0]).time_text[0].startswith("0.")
+    assert 0.0 <= read_log(logs(tmp_path)[0]).start_s < 1.0
 
 
 def test_a_board_without_rides_or_without_the_recorder(board, tmp_path):

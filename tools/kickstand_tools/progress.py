@@ -21,9 +21,12 @@ PATIENCE_S = 1.0
 
 
 class Bar:
-    """with Bar("replaying", total) as bar: bar.advance(n). It appears after patience_s."""
+    """with Bar("replaying", total) as bar: bar.advance(n). It appears after patience_s.
 
-    def __init__(self, what: str, total: int, patience_s: float = PATIENCE_S) -> None:
+    Without a total: bar.reach is the `progress` callback of a function that tells it.
+    """
+
+    def __init__(self, what: str, total: int | None = None, patience_s: float = PATIENCE_S) -> None:
         self._progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -48,6 +51,11 @@ class Bar:
         if self._wanted and not self._shown and time.monotonic() - self._begin_s >= self._patience_s:
             self._progress.start()
             self._shown = True
+
+    def reach(self, done: int, total: int) -> None:
+        """done of total is done; total is 0 if it is not known."""
+        self._progress.update(self._task, completed=done, total=total or None)
+        self.advance(0)
 
     def describe(self, what: str) -> None:
         """Change the text in front of the bar."""

@@ -1,7 +1,12 @@
-"""The words of a terminal for what the firmware's own modules refuse: one line, by code (see kickstand.errors)."""
+"""The words of a terminal for what the firmware's own modules refuse and for what is remarkable in a log: one line,
+by code (see kickstand.errors)."""
 
 from kickstand import console
 from kickstand.errors import Notice, Refusal
+
+from .errors import InputError
+
+SWAPPED_DEG = 4.0  # an upright pose is hardly ever so far off; a pose on the kickstand taken for it is
 
 # {0}, {1} ... are the refusal's values
 _SENTENCES = {
@@ -34,6 +39,7 @@ _SENTENCES = {
         "two parts of the drive disagree by {0:.0f} degrees about forward: did the mount move? Else drive on"
     ),
     "forward-uncertain": "forward is known to {0:.1f} degrees only, after {1} brakings: drive on",
+    "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
 }
 _MOVED = {
     "between-stops": "two stops differ by over {0:.0f} degrees",
@@ -46,13 +52,31 @@ _MOVED = {
 }
 
 
+class RefusedInput(InputError):
+    """Data that the firmware's own modules refuse. code, values: of the refusal, as in kickstand.errors.
+
+    where: put before the sentence, the file as a rule; advice: after it.
+    """
+
+    def __init__(self, refusal: Refusal, where: str = "", advice: str = "") -> None:
+        super().__init__(f"{where}: {sentence(refusal)}{advice}" if where else f"{sentence(refusal)}{advice}")
+        self.code = refusal.code
+        self.values = refusal.values
+
+
 def sentence(refusal: Refusal | Notice) -> str:
-    """One line, without the full stop at its end: what is wrong, and where it helps what to do."""
+    """One line, without the full stop at its end: what is wrong, and where it helps what to do.
+
+    >>> sentence(Notice("same-pose", 0.4))
+    'both poses are the same (0.4 degrees apart): one on the kickstand, one upright'
+    """
     if refusal.code == "mount-moved":
         how, *numbers = refusal.values
         return "the mount has moved: " + _MOVED[how].format(*numbers)
     if refusal.code == "speed-unit":
         return _speed_unit(*refusal.values)
+    if refusal.code == "forward-exchanged":
+        return _forward_exchanged(*refusal.values)
     words = _SENTENCES.get(refusal.code)
     return words.format(*refusal.values) if words else console.sentence(refusal)
 
@@ -65,3 +89,15 @@ def _speed_unit(factor: float) -> str:
     elif 1.8 < factor < 2.5:
         guess = "it is in mph or knots, m/s are needed"
     return f"the speed changes {factor:.1f} times as much as the force says: {guess}"
+
+
+def _forward_exchanged(car: bool, side: str, roll_deg: float | None) -> str:
+    """side: the one that two poses were calibrated for, "" if not known. roll_deg: by how much up is off, None if it is
+    not known."""
+    line = "forward and backward are exchanged: "
+    if car:
+        return line + "calibrate drive again?"
+    if roll_deg is not None and abs(roll_deg) > SWAPPED_DEG:
+        return line + "were the poses swapped?"
+    other = {"left": "--side right", "right": "--side left"}.get(side, "with the other --side")
+    return line + f"calibrate two {other}?" + ("" if roll_deg is not None else " Or were the poses swapped?")

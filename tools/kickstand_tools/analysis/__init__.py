@@ -1,1 +1,1 @@
-"""What a recorded ride says: channels of the vehicle, statistics, brake tests, pictures, other programs' files."""
+"""A recorded ride analysed: the vehicle's channels, statistics, brake tests, pictures, files for other programs."""

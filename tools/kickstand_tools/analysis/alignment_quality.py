@@ -1,4 +1,4 @@
-"""How well the sensor's axes are those of the bike, judged by the ride itself.
+"""How well the aligned axes are those of the bike, judged by the ride itself.
 
 On a straight a balanced bike is upright, so the force across it has the direction of its own up: `roll`. Braking
 and speeding up on a straight push along its own forward: `yaw`. From one standstill to another on level ground
@@ -10,11 +10,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .channels import Array, Channels
-from .thin import spacing_s
+from ..logs.table import Array
+from .channels import Channels
+from .downsample import spacing_s
 
 SMOOTH_S = 0.5
-STRAIGHT_DPS, STRAIGHT_DEG = 2.0, 8.0  # turning and leaning less is riding straight on
+STRAIGHT_DPS, STRAIGHT_DEG = 2.0, 8.0  # riding straight on: turning and leaning by less
 ENOUGH_S = 10.0  # of such riding
 LEVEL_S = 60.0  # of riding, for hills to even out
 ENOUGH_G = 0.05  # rms of braking and speeding up in it
@@ -24,9 +25,9 @@ ENOUGH_G = 0.05  # rms of braking and speeding up in it
 class Quality:
     """Angles in degrees by which the aligned axes seem to be off, None where the ride does not tell.
 
-    roll > 0: "up" leans to the right of the bike's own. pitch > 0: "forward" points up. yaw > 0: it points to
-    the right of the way the bike is pushed. gravity_g: mean force at rest. straight_s: what roll and yaw rest on.
-    lateral_g, forward_g: of the straight stretches, means of SMOOTH_S, for a picture.
+    roll > 0: "up" leans to the right of the bike's own. pitch > 0: "forward" points up. yaw > 0: "forward" points
+    to the right of the direction in which the bike speeds up. gravity_g: mean force at rest. straight_s: seconds of
+    riding straight on, from which roll and yaw are found. lateral_g, forward_g: of that riding, means of SMOOTH_S.
     """
 
     roll_deg: float | None
@@ -37,15 +38,9 @@ class Quality:
     lateral_g: Array
     forward_g: Array
 
-    @property
-    def angles(self) -> list[str]:
-        """Those that are known, in words."""
-        named = {"roll": self.roll_deg, "pitch": self.pitch_deg, "yaw": self.yaw_deg}
-        return [f"{name} {value:+z.1f}°" for name, value in named.items() if value is not None]
-
 
 def quality(ride: Channels, standing: NDArray[np.bool_]) -> Quality:
-    """ride: whole, evenly thinned; standing: where it stands still."""
+    """ride: a whole ride with evenly spaced samples (see downsampled()); standing (n): True where it stands still."""
     step_s = spacing_s(ride)
     n = min(max(1, round(SMOOTH_S / step_s)), len(ride.t_s))
     count = len(ride.t_s) // n

@@ -1,34 +1,38 @@
-"""A recorded ride as channels of the vehicle, block by block: what plot, report and export work on.
+"""A recorded ride in the vehicle's axes, block by block: what plot, report and export work on.
 
-Lean is the firmware's own, step by step; all that needs no memory of the past is numpy, tested equal to it.
+The lean is the firmware's own, sample by sample. Everything that does not depend on the past is computed by numpy; a
+test holds it equal to the firmware.
 """
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
+from kickstand.errors import Notice
 from kickstand.lean.meter import FALLEN_DEG
 from numpy.typing import NDArray
 
-from ..calibration.file import CalibrationFile, read_calibration
+from ..calibration.file import CalibrationFile, calibration_path, read_calibration
 from ..errors import InputError
-from ..logs.reader import Block
+from ..logs.log import ROOM_TEMP_C
+from ..logs.reader import Block, Source, read_blocks
+from ..logs.source import File, Progress, log_stem, name_of
+from ..logs.table import Array, Table
 from ..replay import replay_engine
-from ..replay.replay import with_progress
 
-Array = NDArray[np.float64]
 _TOO_SMALL = 0.01  # g2, as in kickstand.lean: in free fall no force tells a direction
 
 
-@dataclass
-class Channels:
-    """n samples each. Axes left, up, forward; lean > 0 to the right; NaN where there is no value.
+@dataclass(eq=False)
+class Channels(Table):
+    """A ride in the vehicle's axes left, up, forward: n samples each; NaN where there is no value.
 
-    lateral_g: the acceleration to the left of the road's plane, (23). shown_g: forward, smoothed as on the
-    display. sigma_deg: how uncertain the lean is. resting: the bike stands still (1 or 0). rolling: by how it leans and
-    turns it surely does not (1 or 0). sure: the meter trusts its lean (1 or 0).
+    t_s: seconds since the log's first sample. lean_deg: > 0 to the right; lean_formula_deg: by Nicolae's (25)-(26)
+    alone. left_g, up_g, forward_g: specific force; lateral_g: acceleration to the left in the road's plane, (23).
+    pitch_rate_dps: > 0 nose up; yaw_rate_dps: > 0 in a left turn; roll_rate_dps: > 0 to the right. shown_g: the forward
+    force, smoothed as on the display. sigma_deg: standard deviation of the lean. As 1 or 0: resting: the meter knows
+    that the bike stands still; rolling: it knows from leaning and turning that it does not; sure: it trusts its lean.
     """
 
     t_s: Array
@@ -51,61 +55,110 @@ class Channels:
 
     @property
     def trusted(self) -> NDArray[np.bool_]:
-        """Where the display shows the lean and holds its maxima."""
+        """(n) True where the display shows the lean and holds its maxima."""
         return (self.sure > 0.0) & ~(np.abs(self.lean_deg) >= FALLEN_DEG)
 
     def part(self, which: slice | NDArray[np.bool_]) -> "Channels":
-        """Some of the samples."""
+        """The samples of a slice, or those where an array of n is True."""
         return Channels(*(getattr(self, field.name)[which] for field in fields(self)))
 
 
 @dataclass
 class Ride:
-    """A log and the calibration it is read with. car: one, with no lean; else a motorcycle."""
+    """A log and the calibration it is read with."""
 
-    log: Path
+    log: Source
     calibration: CalibrationFile
-    car: bool
 
-    def blocks(self, what: str) -> Iterator[tuple[Block, Channels]]:
-        """The log from its beginning, with a progress bar that says what it is for. Raises InputError."""
+    @property
+    def name(self) -> str:
+        """The log's, with its path if it has one."""
+        return name_of(self.log)
+
+    @property
+    def stem(self) -> str:
+        """The name without path and suffixes."""
+        return log_stem(self.name)
+
+    @property
+    def car(self) -> bool:
+        """A car, which has no lean; else a motorcycle."""
+        return self.calibration.vehicle == "car"
+
+    def blocks(self, progress: Progress | None = None, notices: list[Notice] | None = None) -> Iterator[Channels]:
+        """The ride from its beginning. progress, notices: of read_blocks(). Raises InputError."""
         lean = _Lean(self.calibration)
-        for block in with_progress(self.log, what):
-            yield block, channels(block, self.calibration, lean.follow(block), self.car)
+        for block in read_blocks(self.log, progress=progress, notices=notices):
+            yield channels(block, self.calibration, lean.follow(block), self.car)
 
 
-def open_ride(log: Path, calibration: Path | None) -> Ride:
-    """The ride in log, with the calibration given or else the file beside it. Raises InputError."""
-    stem = log.name.removesuffix(".gz").removesuffix(".csv")
-    beside = log.with_name(stem + ".cal.json")
-    if not log.is_file():
-        what = "is a directory: give the name of a ride in it" if log.is_dir() else "there is no such file"
-        raise InputError(f"{log}: {what}")
-    if calibration is None and not beside.exists():
-        raise InputError(f"{log}: no calibration {beside.name} beside it: give one with --calibration")
-    path = calibration or beside
-    parameters = read_calibration(path)
+def open_ride(log: Source, calibration: CalibrationFile | File | None = None) -> Ride:
+    """A ride to look at: a log (see read_log) with a calibration, or the file of one; None: NAME.cal.json beside it.
+
+    Raises InputError, also for a calibration that is not aligned: lean and braking are then unknown.
+
+    >>> import numpy as np
+    >>> from kickstand_tools.api import CalibrationFile, Log
+    >>> log = Log(np.arange(300) / 100.0, np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3)))
+    >>> open_ride(log, CalibrationFile(aligned=True)).car
+    False
+    """
+    beside = None
+    if isinstance(log, (Path, str)):
+        path = Path(log)
+        beside = calibration_path(path)
+        if not path.is_file():
+            what = "is a directory: give the name of a ride in it" if path.is_dir() else "there is no such file"
+            raise InputError(f"{path}: {what}")
+        if calibration is None and not beside.exists():
+            raise InputError(f"{path}: no calibration {beside.name} beside it: give one with --calibration")
+    source = beside if calibration is None else calibration
+    if source is None:
+        raise InputError(f"{name_of(log)}: an open file has no calibration beside it: give one")
+    parameters = source if isinstance(source, CalibrationFile) else read_calibration(source)
     if not parameters.aligned:
-        raise InputError(f"{path} is not aligned, so lean and braking are unknown: kickstand calibrate two, first")
-    vehicle = json.loads(path.read_text(encoding="utf-8-sig")).get("vehicle")
-    return Ride(log, parameters, vehicle == "car")
+        name = "the calibration" if isinstance(source, CalibrationFile) else name_of(source)
+        raise InputError(f"{name} is not aligned, so lean and braking are unknown: kickstand calibrate two, first")
+    return Ride(log, parameters)
+
+
+def vehicle_channels(
+    log: Source, calibration: CalibrationFile | File | None = None, progress: Progress | None = None
+) -> Channels:
+    """The whole ride in the vehicle's axes, with the firmware's lean. log, calibration and errors: as open_ride().
+
+    progress: called with how much of the log is done of how much. Forces are Nicolae's (18)-(20) and the matrix.
+
+    >>> import numpy as np
+    >>> from kickstand_tools.api import CalibrationFile, Log
+    >>> log = Log(np.arange(300) / 100.0, np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3)))
+    >>> channels = vehicle_channels(log, CalibrationFile(aligned=True))
+    >>> bool(abs(channels.lean_deg).max() < 0.1), float(channels.up_g[-1])
+    (True, 1.0)
+    """
+    from .downsample import joined
+
+    return joined(list(open_ride(log, calibration).blocks(progress)))
 
 
 def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool = False) -> Channels:
-    """Forces by Nicolae's (18)-(20) and the matrix, (25)-(26) and (23). lean: what _Lean.follow() returned.
+    """The block in the vehicle's axes. lean: what _Lean.follow() returned for it.
 
-    A car has no lean, and its lateral acceleration is the force to the left.
+    Forces by Nicolae's (18)-(20) and the matrix, then (25)-(26) and (23). A car has no lean, and its lateral
+    acceleration is the force to the left.
     """
     if car:
         lean = lean * [0.0, 1.0, 0.0, 1.0, 0.0, 1.0] + [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
-    matrix = np.reshape(calibration.matrix, (3, 3))
-    force = (block.readings[:, :3] * calibration.slope + calibration.offset) @ matrix.T
-    rate = (block.readings[:, 4:] - calibration.bias) @ matrix.T
+    matrix = calibration.vehicle_from_sensor
+    force = (block.readings[:, :3] * calibration.accel_slope + calibration.accel_offset_g) @ matrix.T
+    rate = (block.readings[:, 4:] - calibration.gyro_bias_dps) @ matrix.T
     left, up, forward = force.T
     angle = np.radians(np.nan_to_num(lean[:, 0]))
-    temperature = block.readings[:, 3] if block.has_temp else np.full(len(rate), np.nan)
+    temperature = block.readings[:, 3]
+    if block.has_temp:
+        temperature = np.nan_to_num(temperature, nan=ROOM_TEMP_C)
     return Channels(
-        block.time_us.astype(float) * 1e-6,
+        block.t_s,
         lean[:, 0],
         np.full(len(rate), np.nan) if car else formula_lean_deg(left, up, rate[:, 1]),
         left,
@@ -126,7 +179,7 @@ def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool 
 
 
 def formula_lean_deg(left: Array, up: Array, yaw_rate: Array) -> Array:
-    """kickstand.lean.formula_lean_deg on arrays."""
+    """kickstand.lean.formula.formula_lean_deg on arrays: Nicolae's (25)-(26), degrees, > 0 to the right."""
     square = left * left + up * up
     size = np.sqrt(np.maximum(0.0, square - 1.0))
     sine = (left - np.sign(yaw_rate) * size * up) / np.maximum(square, _TOO_SMALL)
@@ -134,13 +187,13 @@ def formula_lean_deg(left: Array, up: Array, yaw_rate: Array) -> Array:
 
 
 class _Lean:
-    """The firmware's meter, led along the ride."""
+    """The firmware's meter, run along the ride."""
 
     def __init__(self, calibration: CalibrationFile) -> None:
         self._engine = replay_engine.Replay(calibration.to_firmware())
 
     def follow(self, block: Block) -> Array:
-        """(n, 6): lean (degrees), forward force shown (g), variance of the lean (rad2), resting, rolling, sure."""
+        """(n, 6): lean (degrees), displayed forward force (g), variance of the lean (rad2), resting, rolling, sure."""
         take, meter = self._engine.take, self._engine.meter
         smooth = meter.smooth_force
         rows = []

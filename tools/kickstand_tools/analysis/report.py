@@ -1,25 +1,27 @@
 """A ride in a page of the terminal, or as JSON."""
 
+from pathlib import Path
 from typing import Any
 
 from rich.console import Group
 from rich.table import Table
 from rich.text import Text
 
-from ..replay.forward_sign import SWAPPED_DEG
-from .look import Look
+from ..refusals import SWAPPED_DEG, sentence
+from .alignment_quality import Quality
+from .overview import Overview
 from .stops.brake_test import Stop
 from .stops.speed_stops import stops_by_speed
 from .summary import Peak
 
-RIDDEN_S = 10.0  # less is moving it about
+RIDDEN_S = 10.0  # a shorter ride is pushing the bike about
 
 
-def as_data(seen: Look) -> dict[str, Any]:
-    """What the page says, in plain figures; None where there is none."""
+def as_data(seen: Overview) -> dict[str, Any]:
+    """What the page says, as JSON has it; None where there is no value."""
     total, quality = seen.summary, seen.quality
     data: dict[str, Any] = {
-        "ride": str(seen.ride.log),
+        "ride": seen.ride.name,
         "vehicle": "car" if seen.ride.car else "motorcycle",
         "duration_s": round(total.duration_s, 3),
         "samples": total.samples,
@@ -38,7 +40,7 @@ def as_data(seen: Look) -> dict[str, Any]:
         for name, value in vars(quality).items()
         if not name.endswith(("lateral_g", "forward_g"))
     }
-    data["remark"] = seen.exchanged
+    data["remark"] = sentence(seen.exchanged) if seen.exchanged else ""
     data["stops"] = [
         {name: value if isinstance(value, str) else round(value, 3) for name, value in vars(stop).items()}
         | {"duration_s": round(stop.duration_s, 3)}
@@ -47,19 +49,19 @@ def as_data(seen: Look) -> dict[str, Any]:
     return data
 
 
-def page(seen: Look) -> Group:
-    """The same for reading."""
-    parts: list[Any] = [Text(f"{seen.ride.log.name}", style="bold"), _ride(seen), Text(), _alignment(seen)]
+def page(seen: Overview) -> Group:
+    """The ride for a terminal."""
+    parts: list[Any] = [Text(Path(seen.ride.name).name, style="bold"), _ride(seen), Text(), _alignment(seen)]
     if seen.stops:
         parts += [Text(), _stops(seen.stops)]
         if any(stop.speed_from == "integrated" for stop in seen.stops):
             parts.append(Text("* no speed in the log: integrated from the acceleration", style="dim"))
     else:
-        parts += [Text(), Text(seen.exchanged or _no_stops(seen))]
+        parts += [Text(), Text(sentence(seen.exchanged) if seen.exchanged else _no_stops(seen))]
     return Group(*parts)
 
 
-def _no_stops(seen: Look) -> str:
+def _no_stops(seen: Overview) -> str:
     if not seen.has_speed and seen.summary.riding_s > RIDDEN_S:
         return "no speed in the log: stops cannot be told"  # there may have been some: none was sure enough
     if stops_by_speed(seen.course):
@@ -67,7 +69,7 @@ def _no_stops(seen: Look) -> str:
     return "No stop from over 10 km/h found."
 
 
-def _ride(seen: Look) -> Table:
+def _ride(seen: Overview) -> Table:
     total = seen.summary
     table = Table.grid(padding=(0, 3))
     table.add_row("Duration", clock(total.duration_s), f"riding {clock(total.riding_s)}")
@@ -86,14 +88,15 @@ def _ride(seen: Look) -> Table:
     return table
 
 
-def _alignment(seen: Look) -> Text:
+def _alignment(seen: Overview) -> Text:
     quality = seen.quality
     said = "Alignment: not enough straight riding to tell how far it is off."
-    if quality.angles:
-        said = f"Alignment: it seems off by {', '.join(quality.angles)}"
+    known = angles(quality)
+    if known:
+        said = f"Alignment: it seems off by {', '.join(known)}"
         far = abs(quality.roll_deg or 0.0) > SWAPPED_DEG and not seen.ride.car
-        # swapped poses turn forward round too
-        swapped = far and (seen.forward is None or seen.forward < 0.0)
+        # swapped poses exchange forward and backward too
+        swapped = far and (seen.speed_correlation is None or seen.speed_correlation < 0.0)
         said += ": were the poses swapped?" if swapped else ": was it held upright?" if far else "."
     if quality.gravity_g is not None:
         said += f" At rest the force is {quality.gravity_g:.3f} g."
@@ -124,6 +127,12 @@ def _peak(peak: Peak, form: str) -> tuple[str, str]:
     if peak.time_s is None:
         return "--", ""
     return form.format(peak.value), f"at {clock(peak.time_s)}"
+
+
+def angles(quality: Quality) -> list[str]:
+    """The angles that are known, in words."""
+    named = {"roll": quality.roll_deg, "pitch": quality.pitch_deg, "yaw": quality.yaw_deg}
+    return [f"{name} {value:+z.1f}°" for name, value in named.items() if value is not None]
 
 
 def clock(seconds: float) -> str:

@@ -1,11 +1,12 @@
-"""What a ride comes to: maxima with their times, time at large leans, the histogram. Block by block."""
+"""A ride in figures: maxima with their times, time at large leans, how long at which lean. Block by block."""
 
 from dataclasses import dataclass, field
 
 import numpy as np
-from kickstand.lean.meter import GAP_US
+from kickstand.units import GAP_US
 
-from .channels import Array, Channels
+from ..logs.table import Array
+from .channels import Channels
 
 LEANS_DEG = (30.0, 40.0)
 BIN_DEG = 1.0
@@ -14,7 +15,7 @@ BINS_DEG = np.arange(-70.0, 70.0 + BIN_DEG, BIN_DEG)
 
 @dataclass
 class Peak:
-    """The largest value so far and when it was, in s from the start; 0 and None if there was none."""
+    """The largest value so far and its time, s from the start; 0 and None if there was none."""
 
     value: float = 0.0
     time_s: float | None = None
@@ -28,7 +29,13 @@ class Peak:
 
 @dataclass
 class Summary:
-    """add() every block. Leans count where the display would show them; g is smoothed as on the display."""
+    """A ride in figures; add() takes it block by block.
+
+    left_deg, right_deg: the largest lean to each side. brake_g, accel_g: the largest forces, smoothed as on the
+    display. These four count where the display would show the lean. riding_s: time not at rest. beyond_s: time at a
+    lean of at least so many degrees, by degrees. histogram_s: time on the move in each bin of BINS_DEG. not_sure_s:
+    time in which the meter does not trust its lean.
+    """
 
     samples: int = 0
     duration_s: float = 0.0
@@ -64,3 +71,18 @@ class Summary:
         self.not_sure_s += float(np.sum(step[~sure]))
         held = riding & sure
         self.histogram_s += np.histogram(block.lean_deg[held], BINS_DEG, weights=step[held])[0]
+
+
+def summary(channels: Channels) -> Summary:
+    """A ride in figures, from its channels (see vehicle_channels).
+
+    >>> import numpy as np
+    >>> from kickstand_tools.api import CalibrationFile, Log, vehicle_channels
+    >>> log = Log(np.arange(251) / 100.0, np.tile([0.0, 1.0, 0.0], (251, 1)), np.zeros((251, 3)))
+    >>> total = summary(vehicle_channels(log, CalibrationFile(aligned=True)))
+    >>> total.samples, total.duration_s, total.speed_mps.time_s
+    (251, 2.5, None)
+    """
+    total = Summary()
+    total.add(channels)
+    return total

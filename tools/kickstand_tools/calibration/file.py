@@ -1,47 +1,68 @@
-"""CAL.json: a calibration as the command line reads and writes it."""
+"""CAL.json: a calibration as the tools read and write it."""
 
 import json
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
+import numpy as np
 from kickstand.calibration.parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE, Calibration
 from kickstand.calibration.store import MAX_BIAS_DPS, MAX_TRIM_DEG
 from kickstand.rotation import is_rotation
+from kickstand.units import AXES
+from numpy.typing import NDArray
 
 from ..errors import InputError, cause
+from ..logs.source import File, log_stem, name_of
 from ..output import write_whole
 
 VERSION = 1
 ROTATION_TOLERANCE = 2e-3  # a matrix copied with three or four decimals is still good to 0.1 degrees
-_IDENTITY = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+
+Array = NDArray[np.float64]
 
 
-@dataclass
+@dataclass(eq=False)
 class CalibrationFile:
     """The parameters of one mounted sensor: calibrated = slope * reading + offset, Nicolae's (18)-(20).
 
-    offset (3, g), slope (3), bias (3, deg/s), matrix (9, row-major, rows left, up, forward).
-    aligned: the matrix was measured, not left as it was.  vehicle: "car" or "motorcycle" if it was measured by driving,
-    else "".  notes: what else stands in the file.  trim: degrees that the upright of the alignment was found to be off.
-    side: "left" or "right", where the kickstand leaned to, or "".
+    accel_offset_g (3), accel_slope (3), gyro_bias_dps (3); vehicle_from_sensor (3, 3): rows left, up, forward.
+    aligned: the matrix was measured; six_done: offset and slope were. trim_deg: by how much the upright pose of the
+    alignment was found to be off. vehicle: "car" or "motorcycle" if the matrix was measured by driving, else "".
+    kickstand_side: "left" or "right", where the kickstand leaned the bike to in the two poses, else "". notes: further
+    entries to write to the file.
+
+    >>> calibration = CalibrationFile(gyro_bias_dps=[1.0, 0.0, 0.0])
+    >>> calibration.vehicle_from_sensor @ [0.0, 1.0, 0.0]
+    array([0., 1., 0.])
     """
 
-    offset: list[float] = field(default_factory=lambda: [0.0] * 3)
-    slope: list[float] = field(default_factory=lambda: [1.0] * 3)
-    bias: list[float] = field(default_factory=lambda: [0.0] * 3)
-    matrix: list[float] = field(default_factory=lambda: list(_IDENTITY))
+    accel_offset_g: Array = field(default_factory=lambda: np.zeros(3))
+    accel_slope: Array = field(default_factory=lambda: np.ones(3))
+    gyro_bias_dps: Array = field(default_factory=lambda: np.zeros(3))
+    vehicle_from_sensor: Array = field(default_factory=lambda: np.eye(3))
     aligned: bool = False
     six_done: bool = False
     notes: dict[str, Any] = field(default_factory=dict)
-    trim: float = 0.0
+    trim_deg: float = 0.0
     vehicle: str = ""
-    side: str = ""
+    kickstand_side: str = ""
+
+    def __post_init__(self) -> None:
+        self.accel_offset_g, self.accel_slope, self.gyro_bias_dps = (
+            np.array(values, dtype=float) for values in (self.accel_offset_g, self.accel_slope, self.gyro_bias_dps)
+        )
+        self.vehicle_from_sensor = np.reshape(np.array(self.vehicle_from_sensor, dtype=float), (3, 3))
+
+    def __eq__(self, other: object) -> bool:
+        """True if both make the same file."""
+        return isinstance(other, CalibrationFile) and self.as_json() == other.as_json()
 
     def parameters(self) -> list[float]:
-        """As Calibration.parameters()."""
-        return [*self.offset, *self.slope, *self.bias, *self.matrix, self.trim]
+        """The 19 numbers of the firmware's Calibration.parameters()."""
+        measured = self.accel_offset_g, self.accel_slope, self.gyro_bias_dps, self.vehicle_from_sensor.ravel()
+        return [*np.concatenate(measured).tolist(), self.trim_deg]
 
     def to_firmware(self) -> Calibration:
         """The same as the firmware's own object, for readings in g and deg/s."""
@@ -50,124 +71,143 @@ class CalibrationFile:
         calibration.six_done, calibration.aligned = self.six_done, self.aligned
         return calibration
 
+    def as_json(self) -> dict[str, Any]:
+        """What a CAL.json holds, in plain numbers and lists."""
+        data = {
+            "version": VERSION,
+            "accel_offset_g": _rounded(self.accel_offset_g),
+            "accel_slope": _rounded(self.accel_slope),
+            "gyro_bias_dps": _rounded(self.gyro_bias_dps),
+            "vehicle_from_sensor": [_rounded(row) for row in self.vehicle_from_sensor],
+            "six_positions": self.six_done,
+            "aligned": self.aligned,
+            "trim_deg": _rounded([self.trim_deg])[0],
+        }
+        data |= {"vehicle": self.vehicle} if self.vehicle else {}
+        data |= {"kickstand_side": self.kickstand_side} if self.kickstand_side else {}
+        return data | self.notes
 
-def read_calibration(path: Path) -> CalibrationFile:
-    """Read and check a CAL.json. Raises InputError."""
+
+def read_calibration(source: File) -> CalibrationFile:
+    """Read and check a CAL.json. source: a path or an open file. Raises InputError naming the file.
+
+    >>> import io
+    >>> file = io.StringIO()
+    >>> write_calibration(file, CalibrationFile(accel_offset_g=[0.01, -0.02, 0.03]))
+    >>> _ = file.seek(0)
+    >>> read_calibration(file).accel_offset_g
+    array([ 0.01, -0.02,  0.03])
+    """
+    name = name_of(source)
     try:
-        data = json.loads(path.read_text(encoding="utf-8-sig"))
+        content = Path(source).read_bytes() if isinstance(source, (Path, str)) else source.read()
+        data = json.loads(content if isinstance(content, str) else content.decode("utf-8-sig"))
     except FileNotFoundError as error:
-        raise InputError(f"{path}: there is no such file: make it with kickstand calibrate") from error
+        raise InputError(f"{name}: there is no such file: make it with kickstand calibrate") from error
     except OSError as error:
-        raise InputError(f"{path} cannot be read: {cause(error)}") from error
+        raise InputError(f"{name} cannot be read: {cause(error)}") from error
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{path} is not JSON: give a file made by kickstand calibrate") from error
+        raise InputError(f"{name} is not JSON: give a file made by kickstand calibrate") from error
     if not isinstance(data, dict):
-        raise InputError(f"{path} is no calibration: give a file made by kickstand calibrate")
+        raise InputError(f"{name} is no calibration: give a file made by kickstand calibrate")
     if "version" not in data:
-        raise InputError(f"{path}: version is missing: give a file made by kickstand calibrate")
+        raise InputError(f"{name}: version is missing: give a file made by kickstand calibrate")
     if data["version"] != VERSION or isinstance(data["version"], bool):
         raise InputError(
-            f"{path}: version {_shown(data['version'])}, this program reads {VERSION}: calibrate again"
+            f"{name}: version {_shown(data['version'])}, this program reads {VERSION}: calibrate again"
         )
-    rows = _list(path, data, "vehicle_from_sensor")
-    matrix = [
-        v for i, row in enumerate(rows) for v in _numbers(path, f"vehicle_from_sensor, row {i + 1},", row)
-    ]
-    calibration = CalibrationFile(
-        _numbers(path, "accel_offset_g", _list(path, data, "accel_offset_g")),
-        _numbers(path, "accel_slope", _list(path, data, "accel_slope")),
-        _numbers(path, "gyro_bias_dps", _list(path, data, "gyro_bias_dps")),
-        matrix,
+    rows = _list(name, data, "vehicle_from_sensor")
+    offset, slope, bias = (
+        np.array(_numbers(name, entry, _list(name, data, entry)))
+        for entry in ("accel_offset_g", "accel_slope", "gyro_bias_dps")
     )
-    calibration.trim = _trim(path, data)
-    _check_ranges(path, calibration)
-    calibration.aligned = data.get("aligned", matrix != _IDENTITY) is True
-    neutral = calibration.offset == [0.0] * 3 and calibration.slope == [1.0] * 3
-    calibration.vehicle = data["vehicle"] if data.get("vehicle") in ("car", "motorcycle") else ""
-    calibration.side = data["kickstand_side"] if data.get("kickstand_side") in ("left", "right") else ""
+    matrix = np.array([_numbers(name, f"vehicle_from_sensor, row {i + 1},", row) for i, row in enumerate(rows)])
+    calibration = CalibrationFile(offset, slope, bias, matrix, trim_deg=_trim(name, data))
+    _check_ranges(name, calibration)
+    calibration.aligned = data.get("aligned", not np.array_equal(matrix, np.eye(3))) is True
+    neutral = not np.any(calibration.accel_offset_g) and bool(np.all(calibration.accel_slope == 1.0))
     calibration.six_done = data.get("six_positions", not neutral) is True
+    calibration.vehicle = data["vehicle"] if data.get("vehicle") in ("car", "motorcycle") else ""
+    calibration.kickstand_side = data["kickstand_side"] if data.get("kickstand_side") in ("left", "right") else ""
     return calibration
 
 
-def write_calibration(path: Path, calibration: CalibrationFile) -> None:
-    """Write a CAL.json, whole or not at all. Raises InputError."""
-    m = [_rounded(v) for v in calibration.matrix]
-    data = {
-        "version": VERSION,
-        "accel_offset_g": [_rounded(v) for v in calibration.offset],
-        "accel_slope": [_rounded(v) for v in calibration.slope],
-        "gyro_bias_dps": [_rounded(v) for v in calibration.bias],
-        "vehicle_from_sensor": [m[0:3], m[3:6], m[6:9]],
-        "six_positions": calibration.six_done,
-        "aligned": calibration.aligned,
-        "trim_deg": _rounded(calibration.trim),
-    }
-    if calibration.vehicle:
-        data["vehicle"] = calibration.vehicle
-    if calibration.side:
-        data["kickstand_side"] = calibration.side
-    text = json.dumps(data | calibration.notes, indent=2) + "\n"
+def write_calibration(target: Path | str | IO[str], calibration: CalibrationFile) -> None:
+    """Write a CAL.json. target: a path, whose file is written whole or not at all, or an open file of text.
+
+    Raises InputError.
+
+    >>> import sys
+    >>> write_calibration(sys.stdout, CalibrationFile())  # doctest: +ELLIPSIS
+    {
+      "version": 1,
+      "accel_offset_g": [
+    ...
+    """
+    text = json.dumps(calibration.as_json(), indent=2) + "\n"
+    if not isinstance(target, (Path, str)):
+        target.write(text)
+        return
 
     def write(temporary: Path) -> None:
         temporary.write_text(text, encoding="ascii", newline="\n")
 
-    write_whole(path, write)
+    write_whole(Path(target), write)
 
 
-def _list(path: Path, data: dict[str, Any], name: str) -> list[Any]:
-    if name not in data:
-        raise InputError(f"{path}: {name} is missing: give a file made by kickstand calibrate")
-    if not isinstance(data[name], list) or len(data[name]) != 3:
-        what = "3 rows of 3 numbers" if name == "vehicle_from_sensor" else "3 numbers"
-        raise InputError(f"{path}: {name} has to be {what}: calibrate again")
-    return data[name]
+def calibration_path(log: Path) -> Path:
+    """NAME.cal.json beside NAME.csv or NAME.csv.gz: the calibration of a recorded ride."""
+    return log.with_name(log_stem(log.name) + ".cal.json")
 
 
-def _numbers(path: Path, name: str, values: Any) -> list[float]:
+def _list(name: str, data: dict[str, Any], entry: str) -> list[Any]:
+    if entry not in data:
+        raise InputError(f"{name}: {entry} is missing: give a file made by kickstand calibrate")
+    if not isinstance(data[entry], list) or len(data[entry]) != 3:
+        what = "3 rows of 3 numbers" if entry == "vehicle_from_sensor" else "3 numbers"
+        raise InputError(f"{name}: {entry} has to be {what}: calibrate again")
+    return data[entry]
+
+
+def _numbers(name: str, entry: str, values: Any) -> list[float]:
     """Three finite floats."""
     if not isinstance(values, list) or len(values) != 3:
-        raise InputError(f"{path}: {name} has to be 3 numbers: calibrate again")
+        raise InputError(f"{name}: {entry} has to be 3 numbers: calibrate again")
     for value in values:
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) < 1e6:
-            raise InputError(f"{path}: {name} has {_shown(value)} where a number should be: calibrate again")
+            raise InputError(f"{name}: {entry} has {_shown(value)} where a number should be: calibrate again")
     return [float(value) for value in values]
 
 
-def _trim(path: Path, data: dict[str, Any]) -> float:
+def _trim(name: str, data: dict[str, Any]) -> float:
     """Degrees; 0 where the file says nothing."""
     value = data.get("trim_deg", 0.0)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= MAX_TRIM_DEG:
         raise InputError(
-            f"{path}: trim_deg is {_shown(value)}, it is at most {MAX_TRIM_DEG:g} degrees: calibrate again"
+            f"{name}: trim_deg is {_shown(value)}, it is at most {MAX_TRIM_DEG:g} degrees: calibrate again"
         )
     return float(value)
 
 
-def _check_ranges(path: Path, calibration: CalibrationFile) -> None:
-    for i, axis in enumerate("xyz"):
-        offset, slope, bias = calibration.offset[i], calibration.slope[i], calibration.bias[i]
+def _check_ranges(name: str, calibration: CalibrationFile) -> None:
+    measured = calibration.accel_offset_g.tolist(), calibration.accel_slope.tolist(), calibration.gyro_bias_dps.tolist()
+    for axis, offset, slope, bias in zip(AXES, *measured, strict=True):
+        wrong = ""
         if not abs(offset) < MAX_OFFSET_G:
-            raise InputError(
-                f"{path}: offset of {axis} is {offset:g} g, a sensor's is under {MAX_OFFSET_G:g}: "
-                "calibrate again"
-            )
-        if not MIN_SLOPE < slope < MAX_SLOPE:
-            between = f"{MIN_SLOPE:g} to {MAX_SLOPE:g}"
-            raise InputError(
-                f"{path}: slope of {axis} is {slope:g}, a sensor's is {between}: calibrate again"
-            )
-        if not abs(bias) < MAX_BIAS_DPS:
-            raise InputError(
-                f"{path}: gyro bias of {axis} is {bias:g} deg/s, a sensor's is under {MAX_BIAS_DPS:g}: "
-                "calibrate again"
-            )
-    if not is_rotation(calibration.matrix, ROTATION_TOLERANCE):
-        raise InputError(f"{path}: vehicle_from_sensor is no rotation (rows left, up, forward): align again")
+            wrong = f"offset of {axis} is {offset:g} g, a sensor's is under {MAX_OFFSET_G:g}"
+        elif not MIN_SLOPE < slope < MAX_SLOPE:
+            wrong = f"slope of {axis} is {slope:g}, a sensor's is {MIN_SLOPE:g} to {MAX_SLOPE:g}"
+        elif not abs(bias) < MAX_BIAS_DPS:
+            wrong = f"gyro bias of {axis} is {bias:g} deg/s, a sensor's is under {MAX_BIAS_DPS:g}"
+        if wrong:
+            raise InputError(f"{name}: {wrong}: calibrate again")
+    if not is_rotation(calibration.vehicle_from_sensor.ravel().tolist(), ROTATION_TOLERANCE):
+        raise InputError(f"{name}: vehicle_from_sensor is no rotation (rows left, up, forward): align again")
 
 
-def _rounded(value: float) -> float:
+def _rounded(values: Any) -> list[float]:
     """Nine significant digits: all that the firmware's 32-bit floats hold."""
-    return float(f"{value:.9g}")
+    return [float(f"{value:.9g}") for value in values]
 
 
 def _shown(value: Any) -> str:

@@ -87,7 +87,7 @@ def estimate(
     done(): called after each of steps().
     """
     engine = replay_engine.Replay(calibration.to_firmware())
-    own = np.array([engine.step(*row) for row in zip(log.time_us, log.readings)])
+    own = np.array([engine.step(time_us, reading) for time_us, reading, _ in log.rows()])
     samples = calibrated(log, calibration)
     result = {
         "kickstand": own[:, _SHOWN],

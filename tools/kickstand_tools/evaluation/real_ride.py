@@ -54,7 +54,7 @@ def compare(path: Path) -> Comparison:
     log = read_log(path)
     speed, calibration = _speed(log), calibration_of(log)
     reference = reference_lean(log, calibration)
-    time = np.array(log.time_us) * 1e-6
+    time = log.t_s
     riding = speed > _RIDING_MPS
     shown = estimate(log, calibration)
     scores = {
@@ -73,16 +73,15 @@ def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64
 
 def calibration_of(log: Log) -> CalibrationFile:
     """Mounting matrix and gyro bias from the ride itself. Raises InputError if it never accelerates straight on."""
-    time = np.array(log.time_us) * 1e-6
-    readings = np.array(log.readings)
+    time = log.t_s
     rest = time < REST_S
-    up = readings[rest, :3].mean(axis=0)
+    up = log.accel_g[rest].mean(axis=0)
     up /= np.linalg.norm(up)
-    bias = readings[rest, 4:].mean(axis=0)
+    bias = log.gyro_dps[rest].mean(axis=0)
     rate_hz = (len(time) - 1) / (time[-1] - time[0])
-    force = np.column_stack([_averaged(column, rate_hz) for column in readings[:, :3].T])
+    force = np.column_stack([_averaged(column, rate_hz) for column in log.accel_g.T])
     level = force - np.outer(force @ up, up)
-    yaw = _averaged((readings[:, 4:] - bias) @ up, rate_hz)
+    yaw = _averaged((log.gyro_dps - bias) @ up, rate_hz)
     straight = np.abs(yaw) < _SLOW_DPS
     found, most = np.zeros(3), 0.0
     for delay_s in _DELAY_S:
@@ -92,20 +91,19 @@ def calibration_of(log: Log) -> CalibrationFile:
         if np.linalg.norm(along) > most:
             found, most = along, float(np.linalg.norm(along))
     if most == 0.0:
-        raise InputError(f"{log.path}: no straight acceleration in it: forward cannot be told")
+        raise InputError(f"{log.name}: no straight acceleration in it: forward cannot be told")
     forward = found - up * (found @ up)
     forward /= np.linalg.norm(forward)
     matrix = np.concatenate((np.cross(up, forward), up, forward))
-    return CalibrationFile(bias=bias.tolist(), matrix=matrix.tolist(), aligned=True)
+    return CalibrationFile(gyro_bias_dps=bias, vehicle_from_sensor=matrix, aligned=True)
 
 
 def _speed(log: Log) -> NDArray[np.float64]:
     """Speed in m/s at each sample, interpolated between the logged values."""
-    time = np.array(log.time_us) * 1e-6
-    at = [k for k, value in enumerate(log.speed_mps) if value is not None]
-    if len(at) < 2:
-        raise InputError(f"{log.path} has no speed: without it there is no reference")
-    return np.interp(time, time[at], [log.speed_mps[k] or 0.0 for k in at])
+    there = ~np.isnan(log.speed_mps)
+    if np.count_nonzero(there) < 2:
+        raise InputError(f"{log.name} has no speed: without it there is no reference")
+    return np.interp(log.t_s, log.t_s[there], log.speed_mps[there])
 
 
 def _averaged(x: NDArray, rate_hz: float) -> NDArray[np.float64]:

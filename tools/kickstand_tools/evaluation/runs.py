@@ -4,20 +4,18 @@ import contextlib
 import multiprocessing
 import os
 import sys
-import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from multiprocessing.queues import SimpleQueue
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..calibration import poses
 from ..calibration.file import CalibrationFile
+from ..calibration.six import fit_six_positions
+from ..calibration.two import fit_two_positions
 from ..errors import InputError
-from ..logs.reader import Log
-from ..simulation.files import write_poses
+from ..logs.log import Log
 from ..simulation.profiles import check_profile
 from ..simulation.ride import Ride, ride
 from . import estimators
@@ -116,24 +114,16 @@ def run_all(jobs: list[Job], done: Callable[[], None] = lambda: None) -> Iterato
 
 def calibrated_by_poses(made: Ride) -> CalibrationFile:
     """`kickstand calibrate six` and `two` over the ride's poses. Raises InputError."""
-    with tempfile.TemporaryDirectory() as directory:
-        seven, kickstand, upright = write_poses(Path(directory), made)
-        try:
-            six = poses.six(seven, _unheard)
-            return poses.two(kickstand, upright, six, "left", _unheard)
-        except InputError as error:
-            raise InputError(str(error).replace(f"{directory}{os.sep}", "")) from error
+    seven = [Log.from_readings(pose, made.rate_hz, f"POSE_{k}.csv") for k, pose in enumerate(made.poses, 1)]
+    kickstand = Log.from_readings(made.kickstand, made.rate_hz, "KICKSTAND.csv")
+    upright = Log.from_readings(made.upright, made.rate_hz, "UPRIGHT.csv")
+    return fit_two_positions(kickstand, upright, fit_six_positions(seven).calibration).calibration
 
 
 def as_log(made: Ride) -> Log:
     """The ride as if read from its file."""
-    time_us = np.round(made.time * 1e6).astype(int).tolist()
-    readings = [tuple(row) for row in made.readings.tolist()]
-    return Log(Path("RIDE.csv"), [], time_us, readings, [None] * len(readings))
-
-
-def _unheard(line: str) -> None:
-    pass
+    readings = made.readings
+    return Log(made.time, readings[:, :3], readings[:, 4:], temperature_c=readings[:, 3], name="RIDE.csv")
 
 
 def _begin_worker(steps_done: SimpleQueue) -> None:

@@ -24,8 +24,7 @@ class Samples:
 
 def calibrated(log: Log, calibration: CalibrationFile) -> Samples:
     """Apply a calibration with numpy: Nicolae's (18)-(20), then the mounting matrix. All estimators use the same."""
-    readings = np.array(log.readings)
-    matrix = np.reshape(calibration.matrix, (3, 3))
-    force = readings[:, :3] * calibration.slope + calibration.offset
-    rate = readings[:, 4:] - calibration.bias
-    return Samples(np.array(log.time_us) * 1e-6, force @ matrix.T, rate @ matrix.T)
+    matrix = calibration.vehicle_from_sensor
+    force = log.accel_g * calibration.accel_slope + calibration.accel_offset_g
+    rate = log.gyro_dps - calibration.gyro_bias_dps
+    return Samples(log.t_s, force @ matrix.T, rate @ matrix.T)

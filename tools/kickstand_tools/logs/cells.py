@@ -1,9 +1,8 @@
-"""The cells of a log: what may stand in them, and where a mistake is."""
+"""The cells of a CSV log: which values they may have, and the line in which one has another."""
 
 import csv
 import io
 import math
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,43 +12,43 @@ from ..errors import InputError
 COLUMNS = ("t_s", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")
 OPTIONAL = ("speed_mps", "temp_c")  # may be empty in a row
 
-# Beyond these it is another unit (m/s2, counts): the sensor's widest ranges are 16 g and 2000 deg/s.
+# A larger value is in another unit (m/s2, counts): the sensor's widest ranges are 16 g and 2000 deg/s.
 _LIMITS = {"t_s": 1e10, "ax_g": 20.0, "ay_g": 20.0, "az_g": 20.0, "temp_c": 200.0, "speed_mps": 200.0}
 _LIMITS |= {"gx_dps": 2500.0, "gy_dps": 2500.0, "gz_dps": 2500.0}
 _UNITS = {"t_s": "seconds", "temp_c": "degrees Celsius", "speed_mps": "m/s"}
 _UNITS |= {"ax_g": "g", "ay_g": "g", "az_g": "g", "gx_dps": "deg/s", "gy_dps": "deg/s", "gz_dps": "deg/s"}
 
 
-def check_text(path: Path, content: bytes, lines_before: int) -> None:
-    """Raise InputError if the bytes are no UTF-8."""
+def check_text(log: str, content: bytes, lines_before: int) -> None:
+    """Raise InputError if the bytes are no UTF-8. log: its name for messages."""
     try:
         content.decode()
     except UnicodeDecodeError as error:
         line = lines_before + content.count(b"\n", 0, error.start) + 1
-        raise InputError(f"{path}, line {line}: not text: give a log as CSV or as .csv.gz") from error
+        raise InputError(f"{log}, line {line}: not text: give a log as CSV or as .csv.gz") from error
 
 
-def header(path: Path, line: str) -> list[str]:
+def header(log: str, line: str) -> list[str]:
     """The names of the columns. Raises InputError where one is missing or there twice."""
     try:
         names = [name.strip() for name in next(csv.reader([line]), [])]
     except csv.Error as error:
-        raise InputError(f"{path}, line 1: not CSV ({error}): is it a log?") from error
+        raise InputError(f"{log}, line 1: not CSV ({error}): is it a log?") from error
     missing = [name for name in COLUMNS if name not in names]
     if missing and any(mark in "".join(names) for mark in ";\t"):
-        raise InputError(f"{path}, line 1: values stand apart by ; or tab: save it with commas between them")
+        raise InputError(f"{log}, line 1: values stand apart by ; or tab: save it with commas between them")
     if missing:
         raise InputError(
-            f"{path}, line 1: no column {', '.join(missing)}: a log starts with {','.join(COLUMNS)}"
+            f"{log}, line 1: no column {', '.join(missing)}: a log starts with {','.join(COLUMNS)}"
         )
     for name in COLUMNS + OPTIONAL:
         if names.count(name) > 1:
-            raise InputError(f"{path}, line 1: column {name} is there twice: leave one")
+            raise InputError(f"{log}, line 1: column {name} is there twice: leave one")
     return names
 
 
 def plausible(table: NDArray[np.float64], names: list[str], before_us: int | None) -> bool:
-    """True if read() would find nothing wrong with these values, NaN where a cell was empty."""
+    """True if read() would find no mistake in these values (n, columns of names; NaN for an empty cell)."""
     for k, name in enumerate(names):
         within = np.abs(table[:, k]) <= _LIMITS[name]
         if not np.all(within | np.isnan(table[:, k]) if name in OPTIONAL else within):
@@ -59,7 +58,7 @@ def plausible(table: NDArray[np.float64], names: list[str], before_us: int | Non
 
 
 def read(
-    path: Path, text: str, width: int, places: dict[str, int], lines_before: int, before_us: int | None
+    log: str, text: str, width: int, places: dict[str, int], lines_before: int, before_us: int | None
 ) -> tuple[NDArray[np.float64], str]:
     """(n, columns in the order of places), NaN for an empty optional cell, and the rows as CSV.
 
@@ -71,7 +70,7 @@ def read(
         for cells in rows:
             if not cells:
                 continue  # a blank line, often the last
-            where = f"{path}, line {lines_before + rows.line_num}"
+            where = f"{log}, line {lines_before + rows.line_num}"
             if len(cells) != width:
                 raise InputError(f"{where}: {len(cells)} values under {width} column names: is the line cut?")
             value = [_number(cells[place], name, where) for name, place in places.items()]
@@ -85,12 +84,12 @@ def read(
             writer.writerow([cell.replace("\n", " ") for cell in cells])
     except csv.Error as error:
         line = lines_before + rows.line_num
-        raise InputError(f"{path}, line {line}: not CSV ({error}): is it a log?") from error
+        raise InputError(f"{log}, line {line}: not CSV ({error}): is it a log?") from error
     return np.reshape(np.array(values, dtype=float), (-1, len(places))), kept.getvalue()
 
 
 def _number(cell: str, name: str, where: str) -> float:
-    """The value of a cell; NaN for an empty one where that is allowed."""
+    """The value of a cell; NaN for an empty one in a column of OPTIONAL."""
     if name in OPTIONAL and not cell.strip():
         return math.nan
     try:

@@ -1,30 +1,31 @@
-"""Are a log's rates in deg/s? On a bike the bends tell.
+"""Are the angular rates of a log in deg/s? The bends of a motorcycle ride tell.
 
-In a bend the bike leans, and the force grows and keeps its direction, which it does not do in braking. A force that
-has grown and a rate of turning make a speed, v = g tan(lean) / rate, and in rad/s the rates are so small that it is one
-that no vehicle has. A car, which does not lean, and what is parked never come to be judged.
+In a bend a motorcycle leans: the specific force grows and keeps its direction in the sensor's axes. Braking turns that
+direction. The lean that belongs to the force and the rate of turning together give the speed, v = g tan(lean) / rate.
+Rates in rad/s are 57 times too small, and the speed becomes one that no vehicle has. A car does not lean and a parked
+vehicle does not turn: they are never judged.
 """
 
 import numpy as np
-from numpy.typing import NDArray
+from kickstand.errors import Notice
+from kickstand.units import STANDARD_GRAVITY
 
-LEANED = 1.15  # times the usual force: 30 degrees
-ALONG = 0.97  # of the force is where it usually is: within 14 degrees
-ENOUGH = 10  # seconds of that
-SAMPLES = 10  # in a second, for its vibration to even out
-FASTEST_MPS = 200.0  # of rides up to 20 were had in deg/s, over 330 in rad/s, in the middle
+from .table import Array
+
+LEANED = 1.15  # times the usual force: a lean of 30 degrees
+ALONG = 0.97  # share of the force along its usual direction: within 14 degrees of it
+ENOUGH = 10  # seconds in bends
+SAMPLES = 10  # at least in a second, so that vibration averages out
+FASTEST_MPS = 200.0  # recorded rides have a median of up to 20 m/s in deg/s, of over 330 m/s in rad/s
 WINDOW = 3600  # seconds that are kept
-_G = 9.80665
-
-Array = NDArray[np.float64]
 
 
 class RateUnit:
-    """add() a log's samples block by block. remark: what there is to be said of them, or ""."""
+    """add() takes a log's samples block by block. notice: that the rates look like rad/s, None if they do not."""
 
     def __init__(self) -> None:
-        self._means = np.zeros((0, 6))  # of force (g) and rates (deg/s), three each, over a second
-        self.remark = ""
+        self._means = np.zeros((0, 6))  # over a second, of force (3, g) and rates (3, deg/s)
+        self.notice: Notice | None = None
 
     def add(self, time_s: Array, force: Array, rate: Array) -> None:
         """force: (n, 3, g); rate: (n, 3, deg/s); in the sensor's axes."""
@@ -34,16 +35,17 @@ class RateUnit:
         self._means = np.vstack((self._means, means[counts >= SAMPLES]))[-WINDOW:]
         speed = self._leaned_speed() if len(self._means) else 0.0
         if speed > FASTEST_MPS:
-            self.remark = f"in bends the rates are those of {speed:.0f} m/s: are they in rad/s? deg/s are needed"
+            self.notice = Notice("rates-in-radians", speed)
 
     def _leaned_speed(self) -> float:
-        """In the middle, in m/s; 0 where it is not enough to tell."""
+        """The median speed in the bends, m/s; 0 where there are too few to tell."""
         force, rate = self._means[:, :3], np.radians(self._means[:, 3:])
         usual = np.median(force, axis=0)
-        along = force @ usual / max(float(np.linalg.norm(usual)), 1e-9)  # a bike in balance has its own up there
+        # in balance the force has the direction of the bike's own up
+        along = force @ usual / max(float(np.linalg.norm(usual)), 1e-9)
         grown = along / max(float(np.median(along)), 1e-9)
         leaned = (grown > LEANED) & (along > ALONG * np.linalg.norm(force, axis=1))
         if np.count_nonzero(leaned) < ENOUGH:
             return 0.0
         tangent = np.sqrt(grown[leaned] ** 2 - 1.0)
-        return float(np.median(_G * tangent / np.maximum(np.linalg.norm(rate[leaned], axis=1), 1e-6)))
+        return float(np.median(STANDARD_GRAVITY * tangent / np.maximum(np.linalg.norm(rate[leaned], axis=1), 1e-6)))

@@ -1,109 +1,166 @@
-"""Recorded logs: CSV with the columns of design's contract, plain or gzipped, read block by block."""
+"""Recorded logs: CSV with the columns of COLUMNS, plain or gzipped, read block by block."""
 
 import csv
 import gzip
 import io
 import itertools
-import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from kickstand.errors import Notice
 from numpy.typing import NDArray
 
-from ..errors import InputError, cause
+from ..errors import InputError
 from ..output import write_whole
 from . import cells
 from .cells import COLUMNS, OPTIONAL
+from .log import FirmwareRow, Log, firmware_rows
+from .rate_unit import RateUnit
+from .source import File, Progress, chunks, name_of, total_bytes
 from .speed_unit import SpeedUnit
+from .table import Array
 
-ROOM_TEMP_C = 25.0
 BLOCK_BYTES = 1 << 22  # of text, some 60000 samples
+BLOCK_SAMPLES = 60_000  # of a log in memory
 _NUMERIC = b"0123456789+-.eE, \n"  # where nothing else stands, numpy may read it
 
-
-@dataclass
-class Log:
-    """One recording in the sensor's axes.
-
-    time_us: n integers, strictly increasing, 0 for the first.  time_text: n, as they stand in the file.
-    readings: n of (ax, ay, az in g, temperature in C, gx, gy, gz in deg/s), the chip's order.
-    speed_mps: n, None where there is no new value.
-    """
-
-    path: Path
-    time_text: list[str]
-    time_us: list[int]
-    readings: list[tuple[float, ...]]
-    speed_mps: list[float | None]
+Source = File | Log  # what can be read as a log
 
 
 @dataclass
 class Block:
-    """Some rows of a log, one after the other; columns as in Log, but readings (n, 7) and NaN for no speed."""
+    """Some rows of a log, one after the other, as the firmware's modules take them.
+
+    time_us (n): since the log's first sample. readings (n, 7): acceleration (3, g), temperature (C), rate (3, deg/s),
+    the chip's order. speed_mps (n). A speed or temperature that the log does not have is NaN. start_s: the recorder's
+    own time at the log's first sample.
+    """
 
     time_us: NDArray[np.int64]
-    readings: NDArray[np.float64]
-    speed_mps: NDArray[np.float64]
+    readings: Array
+    speed_mps: Array
     has_temp: bool
-    text: str
-    time_place: int
-    bytes_read: int  # of the file so far, as it is packed
+    has_speed: bool
+    start_s: float
+    done: int  # bytes of the file so far, as it is packed; of a log in memory, samples
+    text: str = ""  # the rows as CSV, "" for a log in memory
+    time_place: int = 0  # column of the time in text
 
-    def rows(self) -> Iterator[tuple[int, list[float], float]]:
-        """Time, reading and speed of each row."""
-        return zip(self.time_us.tolist(), self.readings.tolist(), self.speed_mps.tolist())
+    def rows(self) -> Iterator[FirmwareRow]:
+        """The samples as the firmware takes them."""
+        return firmware_rows(self.time_us, self.readings, self.speed_mps)
+
+    @property
+    def t_s(self) -> Array:
+        """(n) seconds since the log's first sample."""
+        return self.time_us.astype(float) * 1e-6
 
     @property
     def time_text(self) -> list[str]:
         """The times as they stand in the file."""
+        if not self.text:
+            return [f"{self.start_s + t:.6f}" for t in self.t_s.tolist()]
         lines = [line for line in self.text.split("\n") if line]
         if self.time_place == 0:
             return [line.partition(",")[0].strip() for line in lines]
         return [cells[self.time_place].strip() for cells in csv.reader(lines)]
 
 
-def read_log(path: Path, minimum: int = 2) -> Log:
-    """Read a log of at least minimum samples. Raises InputError naming the file and the line."""
-    log = Log(path, [], [], [], [])
-    for block in read_blocks(path, minimum):
-        log.time_text += block.time_text
-        log.time_us += block.time_us.tolist()
-        log.readings += map(tuple, block.readings.tolist())
-        log.speed_mps += [value if value == value else None for value in block.speed_mps.tolist()]
-    return log
+def read_log(source: Source, minimum: int = 2, progress: Progress | None = None) -> Log:
+    """Read a whole log: CSV with the columns t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps and optionally speed_mps,temp_c.
+
+    source: a path (gzipped if it ends in .gz), an open file of text or bytes, or a Log, which is checked. minimum: the
+    least number of samples. progress: called with the bytes read and those of the file. Raises InputError naming the
+    file, and the line for a mistake in it, also for units that are easily mistaken (m/s2, milliseconds, km/h).
+
+    >>> import io
+    >>> log = read_log(io.StringIO("t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\\n0.00,0,1,0,0,0,0\\n0.01,0,1,0,0,0,0\\n"))
+    >>> log.accel_g.tolist()
+    [[0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]
+    >>> log.to_pandas().columns.tolist()
+    ['t_s', 'ax_g', 'ay_g', 'az_g', 'gx_dps', 'gy_dps', 'gz_dps', 'speed_mps', 'temp_c']
+    """
+    notices: list[Notice] = []
+    blocks = list(read_blocks(source, minimum, progress, notices))
+    readings = np.concatenate([block.readings for block in blocks])
+    return Log(
+        np.concatenate([block.t_s for block in blocks]),
+        readings[:, :3],
+        readings[:, 4:],
+        np.concatenate([block.speed_mps for block in blocks]),
+        readings[:, 3],
+        blocks[0].start_s,
+        name_of(source),
+        notices,
+    )
 
 
-def read_blocks(path: Path, minimum: int = 2) -> Iterator[Block]:
-    """The same, block by block, however long the log is."""
-    chunks = _chunks(path)
-    first, packed = next(chunks, (b"", 0))
+def read_blocks(
+    source: Source, minimum: int = 2, progress: Progress | None = None, notices: list[Notice] | None = None
+) -> Iterator[Block]:
+    """The same block by block, however long the log is.
+
+    notices: what is remarkable in the log is appended to it at the end.
+    """
+    name, count = name_of(source), 0
+    speed_unit, rate_unit = SpeedUnit(name), RateUnit()
+    total = len(source.t_s) if isinstance(source, Log) else total_bytes(source)
+    for block in _blocks_of(source) if isinstance(source, Log) else _parsed(source, name):
+        if not count:
+            _check_units(name, block)
+        count += len(block.time_us)
+        if block.has_speed:
+            speed_unit.add(block.t_s, block.readings[:, :3], block.speed_mps)
+        if notices is not None:
+            rate_unit.add(block.t_s, block.readings[:, :3], block.readings[:, 4:])
+        yield block
+        if progress:
+            progress(block.done, total)
+    if count < minimum:
+        raise InputError(f"{name} is too short: {count} samples, at least {minimum} are needed")
+    if notices is not None and rate_unit.notice:
+        notices.append(rate_unit.notice)
+
+
+def read_twice(source: Source) -> Source:
+    """The same where it can be read again, else a Log: an open file can be read once."""
+    return source if isinstance(source, (Path, str, Log)) else read_log(source)
+
+
+def _blocks_of(log: Log) -> Iterator[Block]:
+    time_us, readings = log.time_us, log.readings
+    has_temp, has_speed = (not np.all(np.isnan(values)) for values in (log.temperature_c, log.speed_mps))
+    for start in range(0, len(time_us), BLOCK_SAMPLES):
+        part = slice(start, start + BLOCK_SAMPLES)
+        done = min(start + BLOCK_SAMPLES, len(time_us))
+        yield Block(
+            time_us[part], readings[part], log.speed_mps[part], has_temp, has_speed, log.start_s, done
+        )
+
+
+def _parsed(source: File, name: str) -> Iterator[Block]:
+    """The blocks of a file; units and number of samples are not checked yet."""
+    pieces = chunks(source, BLOCK_BYTES)
+    first, packed = next(pieces, (b"", 0))
     first = first.removeprefix(b"\xef\xbb\xbf")
     if not first.strip():
-        raise InputError(f"{path} is empty: a log starts with the line {','.join(COLUMNS)}")
-    cells.check_text(path, first, 0)
+        raise InputError(f"{name} is empty: a log starts with the line {','.join(COLUMNS)}")
+    cells.check_text(name, first, 0)
     header, _, rest = first.partition(b"\n")
-    names = cells.header(path, header.decode())
-    places = {name: names.index(name) for name in COLUMNS + OPTIONAL if name in names}
-    count, line, first_us, last_us = 0, 1, 0, -1
-    speed_unit = SpeedUnit(path)
-    for text, done in itertools.chain([(rest, packed)], chunks):
-        table, rows = _numbers(path, text, names, places, line, last_us if count else None)
+    names = cells.header(name, header.decode())
+    places = {column: names.index(column) for column in COLUMNS + OPTIONAL if column in names}
+    line, start_us, last_us = 1, None, None
+    for text, done in itertools.chain([(rest, packed)], pieces):
+        table, rows = _numbers(name, text, names, places, line, last_us)
         line += text.count(b"\n")
         if not len(table):
             continue
         time_us = np.rint(table[:, 0] * 1e6).astype(np.int64)
-        if not count:
-            first_us = int(time_us[0])
-            _check_units(path, table[:, 1:4], time_us)
-        count, last_us = count + len(table), int(time_us[-1])
-        block = _block(table, time_us - first_us, places, rows, done)
-        if "speed_mps" in places:
-            speed_unit.add(block.time_us.astype(float) * 1e-6, block.readings[:, :3], block.speed_mps)
-        yield block
-    if count < minimum:
-        raise InputError(f"{path} is too short: {count} samples, at least {minimum} are needed")
+        start_us = int(time_us[0]) if start_us is None else start_us
+        last_us = int(time_us[-1])
+        yield _block(table, time_us - start_us, places, start_us / 1e6, rows, done)
 
 
 def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -119,45 +176,13 @@ def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[obje
     write_whole(path, write)
 
 
-def _chunks(path: Path) -> Iterator[tuple[bytes, int]]:
-    """The file's text, unpacked, in pieces of whole lines that end in a line feed; bytes read of the file."""
-    if path.is_dir():
-        raise InputError(f"{path} is a directory: give the name of a log in it")
-    pending = b""
-    try:
-        with open(path, "rb") as packed, gzip.open(packed) if path.suffix == ".gz" else packed as file:
-            while data := file.read(BLOCK_BYTES):
-                pending += data
-                if len(data) < BLOCK_BYTES:
-                    break  # the end
-                cut = pending.rfind(b"\n") + 1 or pending.rfind(b"\r") + 1
-                if cut:
-                    yield _with_line_feeds(pending[:cut]), packed.tell()
-                    pending = pending[cut:]
-    except gzip.BadGzipFile as error:
-        raise InputError(f"{path} is not a gzip file: unpacked logs have names without .gz") from error
-    except (EOFError, zlib.error) as error:
-        raise InputError(f"{path} is damaged or cut short: copy it again") from error
-    except FileNotFoundError as error:
-        raise InputError(f"{path}: there is no such file") from error
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be read: {cause(error)}") from error
-    if pending:
-        yield _with_line_feeds(pending + b"\n"), path.stat().st_size
-
-
-def _with_line_feeds(text: bytes) -> bytes:
-    text = text.replace(b"\r\n", b"\n")
-    return text if b"\n" in text else text.replace(b"\r", b"\n")
-
-
 def _numbers(
-    path: Path, text: bytes, names: list[str], places: dict[str, int], line: int, before_us: int | None
-) -> tuple[NDArray[np.float64], str]:
-    """(n, columns in the order of places) and the rows as CSV. line: lines before this text.
+    name: str, text: bytes, names: list[str], places: dict[str, int], line: int, before_us: int | None
+) -> tuple[Array, str]:
+    """(n, columns in the order of places) and the rows as CSV. line: how many lines came before this text.
 
-    numpy reads what is plain; whatever is not, or looks wrong, is gone through cell by cell, which names the
-    line of a mistake and is twenty times slower.
+    numpy reads plain numbers. Any other text, and values that look wrong, are read cell by cell, which tells the line
+    of a mistake and is twenty times slower.
     """
     if text.strip() and not text.translate(None, _NUMERIC):
         plain = text.replace(b",,", b",nan,").replace(b",,", b",nan,").replace(b",\n", b",nan\n")
@@ -169,25 +194,25 @@ def _numbers(
             table = table[:, list(places.values())]
             if cells.plausible(table, list(places), before_us):
                 return table, text.decode()
-    cells.check_text(path, text, line)
-    return cells.read(path, text.decode(), len(names), places, line, before_us)
+    cells.check_text(name, text, line)
+    return cells.read(name, text.decode(), len(names), places, line, before_us)
 
 
 def _block(
-    table: NDArray[np.float64], time_us: NDArray[np.int64], places: dict[str, int], text: str, done: int
+    table: Array, time_us: NDArray[np.int64], places: dict[str, int], start_s: float, text: str, done: int
 ) -> Block:
-    column = {name: table[:, k] for k, name in enumerate(places)}
-    none = np.full(len(table), np.nan)
-    temperature = column.get("temp_c", none)
+    column = dict.fromkeys(OPTIONAL, np.full(len(table), np.nan))
+    column |= {name: table[:, k] for k, name in enumerate(places)}
     order = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")
-    column["temp_c"] = np.where(np.isnan(temperature), ROOM_TEMP_C, temperature)
     readings = np.column_stack([column[name] for name in order])
-    return Block(time_us, readings, column.get("speed_mps", none), "temp_c" in places, text, places["t_s"], done)
+    has_temp, has_speed = "temp_c" in places, "speed_mps" in places
+    return Block(time_us, readings, column["speed_mps"], has_temp, has_speed, start_s, done, text, places["t_s"])
 
 
-def _check_units(path: Path, accelerations: NDArray[np.float64], time_us: NDArray[np.int64]) -> None:
+def _check_units(name: str, block: Block) -> None:
     """Raise InputError for a log in units that are easily taken for the right ones, by its beginning."""
-    if 5.0 < np.median(np.linalg.norm(accelerations, axis=1)) < 20.0:
-        raise InputError(f"{path}: accelerations look like m/s2: divide them by 9.80665, their unit is g")
+    if 5.0 < np.median(np.linalg.norm(block.readings[:, :3], axis=1)) < 20.0:
+        raise InputError(f"{name}: accelerations look like m/s2: divide them by 9.80665, their unit is g")
+    time_us = block.time_us
     if len(time_us) > 1 and (time_us[-1] - time_us[0]) / (len(time_us) - 1) >= 4e6:
-        raise InputError(f"{path}: seconds between samples: is t_s in milliseconds?")
+        raise InputError(f"{name}: seconds between samples: is t_s in milliseconds?")

@@ -1,45 +1,40 @@
-"""Is a log's speed in m/s? Its changes are laid beside the force that made them.
+"""Is the speed of a log in m/s? Its changes are compared with the specific force that caused them.
 
-From one second to the next a speed changes by what pushed the vehicle. Which way the sensor sits does not matter:
-along is where force and change of speed go together best, for one of some lags, as satellites tell a speed late. Turns,
-slopes and a rider who moves about add to the force alone: they make the speed seem to change less than it does, never
-more.
+From one second to the next a speed changes by the acceleration along the vehicle. How the sensor is mounted does not
+matter: the direction along the vehicle is the one in which force and change of speed correlate best. Several lags are
+tried, because a satellite receiver tells the speed late. Turns, slopes and a rider who moves about add to the force
+alone: they can make the speed seem to change too little, never too much.
 """
-
-from pathlib import Path
 
 import numpy as np
 from kickstand.drive_alignment.quality import speed_unit_problem
-from numpy.typing import NDArray
+from kickstand.units import STANDARD_GRAVITY
 
-from ..errors import InputError
-from ..refusals import sentence
+from ..refusals import RefusedInput
+from .table import Array
 
-MOST = 1.5  # times as much as it should: knots are 1.94, and what was right was never over 1.1
-PUSH_G = 0.15  # beyond the slopes of ordinary roads
-ENOUGH = 10  # seconds of such pushes: two or three brakings
-SIGMAS = 5.0  # that force and speed go together by more than chance
+MOST = 1.5  # times the change that the force explains: knots give 1.94, recorded speeds in m/s never over 1.1
+PUSH_G = 0.15  # a stronger force is no slope of an ordinary road
+ENOUGH = 10  # seconds of such forces: two or three braking events
+SIGMAS = 5.0  # by which the correlation of force and change of speed has to be more than chance
 LAGS_S = np.arange(0.0, 2.1, 0.25)
 SHORTEST_S, LONGEST_S = 0.5, 2.2  # between two speeds
-MISSING_S = 0.2  # between samples: what was felt there is not known
-WINDOW = 3600  # of such intervals that are kept
-_G = 9.80665
-
-Array = NDArray[np.float64]
+MISSING_S = 0.2  # a longer gap between samples: the force in it is unknown
+WINDOW = 3600  # intervals between speeds that are kept
 
 
 class SpeedUnit:
-    """add() a log's samples block by block."""
+    """add() takes a log's samples block by block. log: its name for messages."""
 
-    def __init__(self, path: Path) -> None:
-        self._path = path
+    def __init__(self, log: str) -> None:
+        self._log = log
         self._time = np.zeros(0)
         self._felt = np.zeros((0, 4))  # integrals up to each time: force (g s, three), and time with samples (s)
-        self._speeds = np.zeros((0, 2))  # one a second, (s, m/s): those whose change is not in _rows yet
-        self._rows = np.zeros((len(LAGS_S), 0, 4))  # change of speed, then force (three) some lag before; g
+        self._speeds = np.zeros((0, 2))  # the last one (s, m/s): its change to the next is not in _rows yet
+        self._rows = np.zeros((len(LAGS_S), 0, 4))  # by lag: change of speed, mean force (3) so much earlier; g
 
     def add(self, time_s: Array, force: Array, speed_mps: Array) -> None:
-        """force: (n, 3, g); speed_mps: NaN for none. Raises InputError once it is sure that they are no m/s."""
+        """force: (n, 3, g); speed_mps: (n), NaN for none. Raises RefusedInput once it is sure that they are not m/s."""
         self._feel(time_s, force)
         there = ~np.isnan(speed_mps)
         speeds = np.vstack((self._speeds, np.column_stack((time_s[there], speed_mps[there]))))
@@ -50,7 +45,7 @@ class SpeedUnit:
             self._judge()
 
     def _feel(self, time_s: Array, force: Array) -> None:
-        """Carry the integrals on; what no speed will ask for any more is dropped."""
+        """Continue the integrals of the force. Values too old for the next speed are dropped."""
         kept = self._time > time_s[0] - LONGEST_S - LAGS_S[-1] - 1.0
         before, sums = self._time[kept], self._felt[kept]
         last = self._time[-1:] if len(self._time) else time_s[:1]
@@ -69,11 +64,11 @@ class SpeedUnit:
         for lag in LAGS_S:
             felt = np.diff([np.interp(time - lag, self._time, column) for column in self._felt.T]).T
             good &= felt[:, 3] > 0.9 * seconds
-            rows.append(np.column_stack((np.diff(mps) / (_G * seconds), felt[:, :3] / seconds[:, None])))
+            rows.append(np.column_stack((np.diff(mps) / (STANDARD_GRAVITY * seconds), felt[:, :3] / seconds[:, None])))
         return np.array(rows)[:, good]
 
     def _judge(self) -> None:
-        """Raise InputError if most of the strong pushes change the speed too much."""
+        """Raise RefusedInput if the speed changes too much at most of the strong forces."""
         count = self._rows.shape[1]
         if count < SIGMAS * SIGMAS:
             return
@@ -83,11 +78,12 @@ class SpeedUnit:
             return
         if np.median(change[strong] / push[strong]) > MOST:
             slope = float(change @ push / (change @ change))  # as the board's own regression has it
-            raise InputError(f"{self._path}: {sentence(speed_unit_problem(slope))}")
+            raise RefusedInput(speed_unit_problem(slope), self._log)
 
 
 def _along(rows: Array) -> tuple[float, Array, Array]:
-    """Correlation of change of speed and force, and both (g, without their means), the force along its direction."""
+    """Correlation of change of speed and force, then both without their means (g), the force along the direction in
+    which it correlates best."""
     change, *force = (rows - np.mean(rows, axis=0)).T
     direction = np.array(force) @ change
     push = direction @ force / max(float(np.linalg.norm(direction)), 1e-12)

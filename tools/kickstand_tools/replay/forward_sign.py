@@ -1,26 +1,27 @@
-"""Is forward really forward? Where a log has a speed, its changes are those that the force along the vehicle makes.
+"""Is the alignment's forward really forward? Where a log has a speed, its changes have the sign of the force along
+the vehicle.
 
-A kickstand on the other side than `calibrate two` was told turns forward and left round, and so do poses that were
-swapped. No ride tells it by the force alone: braking is then speeding up.
+A kickstand on the other side than `calibrate two` was told exchanges forward with backward and left with right, and so
+do two poses that were swapped. The force alone does not show it, because braking then looks like speeding up.
 """
 
 import numpy as np
-from numpy.typing import NDArray
+from kickstand.errors import Notice
 
-ENOUGH, ENOUGH_MPS = 20, 0.5  # changes of speed from second to second, and their rms
-LATE_S = (0, 1, 2)  # a speed of satellites is late
-CLEARLY = -0.6  # correlation: a right one has over 0.8, hills of 12 % included
+from ..calibration.file import CalibrationFile
+from ..logs.table import Array
+
+ENOUGH, ENOUGH_MPS = 20, 0.5  # at least so many changes of speed from second to second, with at least this rms
+LATE_S = (0, 1, 2)  # delays of the speed that are tried: a satellite receiver tells it late
+CLEARLY = -0.6  # a correlation below this is a reversed forward; a right one has over 0.8, on slopes of 12 % too
 WINDOW = 3600  # seconds that are kept
-SWAPPED_DEG = 4.0  # by which up is off: hardly an upright pose is, the kickstand's is
-
-Array = NDArray[np.float64]
 
 
 class ForwardSign:
-    """add() a ride's samples block by block. exchanged: forward and backward are, as far as the speed tells."""
+    """add() takes a ride's samples block by block. exchanged: the speed says that forward and backward are."""
 
     def __init__(self) -> None:
-        self._seconds = np.zeros((0, 4))  # which; sum and number of its forces (g); its first speed (m/s)
+        self._seconds = np.zeros((0, 4))  # its number; sum and count of its forces (g); its first speed (m/s)
 
     def add(self, time_s: Array, forward_g: Array, speed_mps: Array) -> None:
         """n samples each; speed NaN where there is no new one."""
@@ -31,9 +32,10 @@ class ForwardSign:
         counts = np.diff(np.append(starts, len(time_s))).astype(float)
         speed = np.full(len(starts), np.nan)
         there = np.flatnonzero(~np.isnan(speed_mps))[::-1]
-        speed[np.searchsorted(starts, there, side="right") - 1] = speed_mps[there]  # the first is written last
+        # written backwards: of several speeds in a second the first one stays
+        speed[np.searchsorted(starts, there, side="right") - 1] = speed_mps[there]
         new = np.column_stack((second[starts], np.add.reduceat(forward_g, starts), counts, speed))
-        if len(self._seconds) and self._seconds[-1, 0] == new[0, 0]:  # the block before ended within a second
+        if len(self._seconds) and self._seconds[-1, 0] == new[0, 0]:  # the block before ended within this second
             last, self._seconds = self._seconds[-1], self._seconds[:-1]
             new[0, 1:3] += last[1:3]
             new[0, 3] = new[0, 3] if np.isnan(last[3]) else last[3]
@@ -41,7 +43,7 @@ class ForwardSign:
 
     @property
     def correlation(self) -> float | None:
-        """Of speeding up as felt and as the speed has it, -1 to 1; None if the ride does not tell."""
+        """Between the force along the vehicle and the change of speed, -1 to 1; None if the ride does not tell."""
         if len(self._seconds) < ENOUGH:
             return None
         first = int(self._seconds[0, 0])
@@ -57,20 +59,14 @@ class ForwardSign:
 
     @property
     def exchanged(self) -> bool:
-        """Forward is backward, clearly."""
+        """Forward is clearly backward."""
         correlation = self.correlation
         return correlation is not None and correlation < CLEARLY
 
 
-def exchanged_line(car: bool, side: str, roll_deg: float | None = None) -> str:
-    """What to say and do. side: that the poses were calibrated for, "" if not known; roll_deg: by which up is off."""
-    line = "forward and backward are exchanged: "
-    if car:
-        return line + "calibrate drive again?"
-    if roll_deg is not None and abs(roll_deg) > SWAPPED_DEG:
-        return line + "were the poses swapped?"
-    other = {"left": "--side right", "right": "--side left"}.get(side, "with the other --side")
-    return line + f"calibrate two {other}?" + ("" if roll_deg is not None else " Or were the poses swapped?")
+def exchanged_notice(calibration: CalibrationFile, roll_deg: float | None = None) -> Notice:
+    """roll_deg: by how much the ride says that up is off, None if it was not asked."""
+    return Notice("forward-exchanged", calibration.vehicle == "car", calibration.kickstand_side, roll_deg)
 
 
 def _correlation(felt: Array, changes: Array) -> float | None:

@@ -3,82 +3,121 @@
 import io
 import struct
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from kickstand.errors import Notice
 
 from .. import unix_port
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
-from ..logs.rate_unit import RateUnit
-from ..logs.reader import Block, read_blocks, write_table
-from ..progress import Bar
+from ..logs.reader import Block, Source, read_blocks, read_twice, write_table
+from ..logs.source import Progress
+from ..logs.table import Array, Table
 from . import replay_engine
-from .forward_sign import ForwardSign, exchanged_line
+from .forward_sign import ForwardSign, exchanged_notice
 
-_CHUNK = 500  # samples between two steps of the progress bar of an emulated Pico
+_CHUNK = 500  # samples between two calls of progress while an emulated Pico works
 
 _FORWARD = replay_engine.COLUMNS.index("forward_g")
 
-Row = tuple[float, ...]
+Row = tuple[float, ...]  # of replay_engine.COLUMNS
+Replayed = tuple[Block, list[Row]]
 
 
-def replay(log: Path, calibration: CalibrationFile, engine: str, out: Path) -> int:
-    """Write LEAN.csv: the log's own times, then replay_engine.COLUMNS. Returns how many samples.
+@dataclass(eq=False)
+class LeanTable(Table):
+    """What the board would have shown: n samples, axes left, up, forward; lean > 0 to the right.
 
-    Raises InputError, also where the engine is not to be had. Memory does not grow with the log, but on the
-    emulated Pico, which no long log is for.
+    t_s: seconds since the first sample. lean_deg: the shown lean. lean_formula_deg: Nicolae's (25)-(26) as it stands.
+    left_g, up_g, forward_g: specific force. static_lean_deg: the lean of a vehicle at rest with this force. notices:
+    what is remarkable in the ride (kickstand_tools.refusals.sentence puts a notice into words).
     """
-    if engine == "micropython" and not unix_port.available():
-        raise InputError("engine micropython has no package for this system: use --engine cpython")
-    count, sign = 0, ForwardSign()
+
+    t_s: Array
+    lean_deg: Array
+    lean_formula_deg: Array
+    left_g: Array
+    up_g: Array
+    forward_g: Array
+    static_lean_deg: Array
+    yaw_rate_dps: Array
+    roll_rate_dps: Array
+    notices: list[Notice]
+
+
+def replay(
+    log: Source, calibration: CalibrationFile, engine: str = "cpython", progress: Progress | None = None
+) -> LeanTable:
+    """Run the firmware's own lean meter over a recorded log.
+
+    log: see read_log. engine: "cpython", "micropython" (the unix port) or "rp2040" (an emulated Pico, slow). progress:
+    called with how much is done of how much. Raises InputError, also where the engine is not installed.
+
+    >>> from kickstand_tools.api import Log, fit_two_positions, simulate_ride
+    >>> ride = simulate_ride("street", seed=1, seconds=30.0)
+    >>> poses = [Log.from_readings(pose, ride.rate_hz) for pose in (ride.kickstand, ride.upright)]
+    >>> calibration = fit_two_positions(*poses).calibration
+    >>> lean = replay(Log.from_readings(ride.readings, ride.rate_hz), calibration)
+    >>> float(abs(lean.lean_deg - ride.truth["lean_deg"]).max()) < 10.0
+    True
+    """
+    notices: list[Notice] = []
+    blocks = list(replay_blocks(log, calibration, engine, progress, notices))
+    time_s = np.concatenate([block.t_s for block, _ in blocks])
+    columns = np.concatenate([np.array(results) for _, results in blocks]).T
+    return LeanTable(time_s, *columns, notices=notices)
+
+
+def replay_to_csv(
+    log: Source, calibration: CalibrationFile, engine: str, out: Path, progress: Progress | None = None
+) -> tuple[int, list[Notice]]:
+    """Write LEAN.csv: the log's own times, then replay_engine.COLUMNS. Returns the number of samples and the notices.
+
+    Memory does not grow with the log, except on the emulated Pico, which is too slow for a long one. Raises InputError.
+    """
+    count, notices = 0, []
 
     def rows() -> Iterator[list[str]]:
         nonlocal count
-        for block, results in _RUN[engine](log, calibration):
+        for block, results in replay_blocks(log, calibration, engine, progress, notices):
             count += len(results)
-            forward = np.array([row[_FORWARD] for row in results])
-            sign.add(block.time_us.astype(float) * 1e-6, forward, block.speed_mps[: len(forward)])
             for time, row in zip(block.time_text, results, strict=True):
                 yield [time, *(f"{value:.5f}" for value in row)]
 
     write_table(out, ("t_s", *replay_engine.COLUMNS), rows())
+    return count, notices
+
+
+def replay_blocks(
+    log: Source, calibration: CalibrationFile, engine: str, progress: Progress | None, notices: list[Notice]
+) -> Iterator[Replayed]:
+    """Each block of the log with the engine's results for it. notices is appended to at the end."""
+    sign = ForwardSign()
+    for block, results in _RUN[engine](log, calibration, progress, notices):
+        sign.add(block.t_s, np.array([row[_FORWARD] for row in results]), block.speed_mps)
+        yield block, results
     if calibration.aligned and sign.exchanged:
-        line = exchanged_line(calibration.vehicle == "car", calibration.side)
-        warn(f"{log}: {line}")
-    return count
+        notices.append(exchanged_notice(calibration))
 
 
-def with_progress(path: Path, what: str) -> Iterator[Block]:
-    """The blocks of a log with a progress bar, by how much of the file they are; after them a remark, if need be."""
-    before, size = 0, path.stat().st_size if path.is_file() else 0
-    rates = RateUnit()
-    with Bar(what, size) as bar:
-        for block in read_blocks(path):
-            rates.add(block.time_us.astype(float) * 1e-6, block.readings[:, :3], block.readings[:, 4:])
-            yield block
-            bar.advance(block.bytes_read - before)
-            before = block.bytes_read
-    if rates.remark:
-        warn(f"{path}: {rates.remark}")
-
-
-def warn(remark: str) -> None:
-    """A line on standard error."""
-    print(f"warning: {remark}", file=sys.stderr)
-
-
-def _cpython(log: Path, calibration: CalibrationFile) -> Iterator[tuple[Block, list[Row]]]:
+def _cpython(
+    log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
+) -> Iterator[Replayed]:
     engine = replay_engine.Replay(calibration.to_firmware())
-    for block in with_progress(log, "replaying"):
+    for block in read_blocks(log, 2, progress, notices):
         yield block, [engine.step(*row) for row in block.rows()]
 
 
-def _micropython(log: Path, calibration: CalibrationFile) -> Iterator[tuple[Block, list[Row]]]:
-    size = struct.calcsize(replay_engine.RESULT)
+def _micropython(
+    log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
+) -> Iterator[Replayed]:
+    if not unix_port.available():
+        raise InputError("engine micropython has no package for this system: use --engine cpython")
+    log, size = read_twice(log), struct.calcsize(replay_engine.RESULT)
     with tempfile.TemporaryDirectory() as directory:
         records = Path(directory) / "records"
         with records.open("wb") as file:
@@ -87,36 +126,37 @@ def _micropython(log: Path, calibration: CalibrationFile) -> Iterator[tuple[Bloc
         with subprocess.Popen(command, env=unix_port.environment(), stdout=subprocess.PIPE) as process:
             assert process.stdout is not None
             results = b""
-            for block in with_progress(log, "replaying"):
+            for block in read_blocks(log, 2, progress, notices):
                 results = process.stdout.read(size * len(block.time_us))
                 if len(results) < size * len(block.time_us):
                     break
                 yield block, list(struct.iter_unpack(replay_engine.RESULT, results))
             results += process.stdout.read()
-        if process.returncode != 0:  # its traceback went to standard output too
+        if process.returncode != 0:  # its traceback came over standard output
             reason = results.decode(errors="replace").strip().rpartition("\n")[2]
             raise InputError(f"MicroPython stopped ({reason}): use --engine cpython")
 
 
-def _rp2040(log: Path, calibration: CalibrationFile) -> Iterator[tuple[Block, list[Row]]]:
+def _rp2040(
+    log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
+) -> Iterator[Replayed]:
     from ..emulator import image
 
-    image.find()  # before the rest, which needs what this misses
+    image.find()  # says what is not installed, before the import below fails for want of it
     from . import emulated as emulated
 
-    size = struct.calcsize(replay_engine.RESULT)
+    log, size = read_twice(log), struct.calcsize(replay_engine.RESULT)
     records = b"".join(_records(read_blocks(log), calibration))
-    results = io.BytesIO()
-    with Bar("replaying", len(records) // struct.calcsize(replay_engine.RECORD)) as bar:
+    results, total = io.BytesIO(), len(records) // struct.calcsize(replay_engine.RECORD)
 
-        def sink(result: bytes) -> None:
-            results.write(result)
-            if results.tell() % (_CHUNK * size) == 0:
-                bar.advance(_CHUNK)
+    def sink(result: bytes) -> None:
+        results.write(result)
+        if progress and results.tell() % (_CHUNK * size) == 0:
+            progress(results.tell() // size, total)
 
-        emulated.run(records, sink)
+    emulated.run(records, sink)
     results.seek(0)
-    for block in with_progress(log, "writing"):
+    for block in read_blocks(log, notices=notices):
         yield block, list(struct.iter_unpack(replay_engine.RESULT, results.read(size * len(block.time_us))))
 
 
@@ -124,9 +164,9 @@ _RUN = {"cpython": _cpython, "micropython": _micropython, "rp2040": _rp2040}
 
 
 def _records(blocks: Iterable[Block], calibration: CalibrationFile) -> Iterator[bytes]:
-    """What replay_engine.run reads."""
+    """The bytes that replay_engine.run reads."""
     yield struct.pack(replay_engine.CALIBRATION, *calibration.parameters())
     for block in blocks:
         for time_us, reading, speed in block.rows():
-            given = speed if speed >= 0.0 else replay_engine.NO_SPEED  # not so where it is not a number
+            given = speed if speed >= 0.0 else replay_engine.NO_SPEED  # NaN is not >= 0
             yield struct.pack(replay_engine.RECORD, time_us, *reading, given)

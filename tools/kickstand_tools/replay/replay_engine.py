@@ -4,8 +4,8 @@
 
 RECORDS starts with the calibration (19 doubles, Calibration.parameters()), then one record a sample:
 its time in microseconds (int64), seven readings in the chip's order (doubles; g, C, deg/s) and the speed in m/s,
-negative where there is no new one. RESULTS has the doubles of COLUMNS for each. Binary, because a number printed and
-read again may be another number.
+negative where there is no new one. RESULTS has the doubles of COLUMNS for each. Both are binary, because a number that
+is printed and read again may be another number.
 """
 
 import struct
@@ -29,7 +29,7 @@ COLUMNS = (
 CALIBRATION = "<19d"
 RECORD = "<q8d"
 RESULT = "<8d"
-NO_SPEED = -1.0  # a board reads not-a-number as something else
+NO_SPEED = -1.0  # not NaN, which a board's struct does not read as NaN
 
 
 class Replay:
@@ -47,7 +47,7 @@ class Replay:
         self._before = time_us
 
     def step(self, time_us, reading, speed_mps=NO_SPEED):
-        """The same, and the values of COLUMNS after it."""
+        """take() the sample and return the values of COLUMNS after it."""
         self.take(time_us, reading, speed_mps)
         meter = self.meter
         force, rate = meter.force, meter.rate

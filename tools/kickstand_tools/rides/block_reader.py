@@ -15,11 +15,11 @@ _TAIL_LENGTH = struct.calcsize(block_format.TAIL)
 _START = _HEAD_LENGTH + store.BODY_LENGTH
 
 
-CUT_SHORT = "cut short"  # by the power, if it is the last
+CUT_SHORT = "cut short"  # the last block of a ride often is: the power went off while it was written
 
 
 class BadBlock(Exception):
-    """These bytes are no whole block; the text says why in a few words."""
+    """These bytes are not a whole block; the text says why in a few words."""
 
 
 @dataclass
@@ -34,7 +34,8 @@ class Turn:
 
 @dataclass
 class Block:
-    """head of one block. time_us: of the last sample before it, since power-on. body: the calibration's bytes."""
+    """One block: the fields of its head, and its turns. time_us: of the last sample before it, since power-on.
+    centidegrees: the temperature. body: the calibration's bytes."""
 
     ride: int
     sequence: int
@@ -50,17 +51,19 @@ class Block:
 
     @property
     def who_am_i(self) -> int:
-        """Which chip."""
+        """The chip's WHO_AM_I."""
         return self.body[0]
 
     def calibration(self) -> Calibration:
-        """What the lean on the display was computed with."""
+        """The calibration that the lean on the display was computed with."""
         return store.unpack(self.body, 0)[2]
 
 
 def read(content: bytes) -> tuple[list[Block], list[str]]:
-    """The whole blocks of a file, and for each place with something else what it is: CUT_SHORT for the end of a file
-    whose last block is not complete, which is no damage."""
+    """The whole blocks of a file, and what is wrong at each place where there is no whole block.
+
+    That is CUT_SHORT alone where the last block is not complete, which is no damage.
+    """
     blocks, problems = [], []
     at = 0
     while at < len(content):
@@ -95,7 +98,7 @@ def parse(data: bytes) -> Block:
     block = Block(*fields)
     try:
         block.turns = list(_turns(block, data[_START : len(data) - _TAIL_LENGTH], count))
-    except (ValueError, ZeroDivisionError) as error:  # written so: the check sum is right
+    except (ValueError, ZeroDivisionError) as error:  # the check sum is right: it was written like this
         raise BadBlock("not decodable") from error
     return block
 

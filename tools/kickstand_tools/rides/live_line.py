@@ -1,4 +1,4 @@
-"""A line on the terminal that is drawn over and over, where someone is watching."""
+"""A line on standard error that is drawn again and again, if standard error is a terminal."""
 
 import contextlib
 import sys
@@ -9,7 +9,7 @@ from rich.live import Live
 
 
 class LiveLine:
-    """with LiveLine() as line: line.show(text). A terminal that has been closed is no error: work goes on."""
+    """with LiveLine() as line: line.show(text). A terminal that is closed meanwhile is no error: the work goes on."""
 
     def __init__(self) -> None:
         self.watched = sys.stderr.isatty()
@@ -21,7 +21,7 @@ class LiveLine:
         return self
 
     def show(self, text: str) -> None:
-        """This in place of the text before."""
+        """Draw text in the place of the one before."""
         with contextlib.suppress(OSError):
             self._live.update(text, refresh=True)
 

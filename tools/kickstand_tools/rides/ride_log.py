@@ -3,7 +3,9 @@
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from ..calibration.file import CalibrationFile, write_calibration
+import numpy as np
+
+from ..calibration.file import CalibrationFile, calibration_path, write_calibration
 from ..logs.reader import COLUMNS, write_table
 from .block_reader import Block
 
@@ -16,7 +18,8 @@ def header(speed: bool) -> tuple[str, ...]:
 def rows(blocks: Iterable[Block], speed: bool, from_us: int = 0) -> Iterator[list[str]]:
     """One row a turn of the board's loop: the mean of its samples at the time of the last, in s since from_us.
 
-    With the digits that tell one count from the next; the temperature stands in the first row of each block.
+    Values have enough digits to tell one count of the chip from the next. The temperature stands in the first row of
+    each block.
     """
     for block in blocks:
         lsb, gyro_lsb = block.accel_lsb_per_g, block.gyro_lsb_tenths / 10
@@ -33,7 +36,7 @@ def rows(blocks: Iterable[Block], speed: bool, from_us: int = 0) -> Iterator[lis
 
 
 def calibration(block: Block) -> CalibrationFile:
-    """What the lean on the display was computed with, and where it comes from."""
+    """The calibration that the lean on the display was computed with, with notes on board and chip."""
     c = block.calibration()
     notes = {
         "firmware": block.firmware,
@@ -41,10 +44,10 @@ def calibration(block: Block) -> CalibrationFile:
         "sample_hz": block.sample_hz,
     }
     return CalibrationFile(
-        list(c.accel_offset),
-        list(c.accel_slope),
-        list(c.gyro_bias),
-        list(c.vehicle_from_sensor),
+        np.array(c.accel_offset),
+        np.array(c.accel_slope),
+        np.array(c.gyro_bias),
+        np.array(c.vehicle_from_sensor),
         c.aligned,
         c.six_done,
         notes,
@@ -59,8 +62,3 @@ def write(path: Path, blocks: list[Block]) -> Path:
     beside = calibration_path(path)
     write_calibration(beside, calibration(blocks[0]))
     return beside
-
-
-def calibration_path(path: Path) -> Path:
-    """NAME.cal.json of NAME.csv or NAME.csv.gz."""
-    return path.with_name(path.name.removesuffix(".gz").removesuffix(".csv") + ".cal.json")

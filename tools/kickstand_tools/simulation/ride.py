@@ -56,6 +56,10 @@ def ride(
 
     upright_error_deg: how far the bike leaned to the right in the upright pose. pitch_change_deg: how much higher the
     nose was on the kickstand than upright; random within 1 degree if None. share: of the sensor's tolerances.
+
+    >>> made = ride("parked", seed=1, seconds=20.0)
+    >>> made.rate_hz, len(made.poses), made.readings.shape == (len(made.time), 7)
+    (200.0, 7, True)
     """
     chance = np.random.default_rng([seed, *profile.encode()])
     plan = Plan(chance, seconds)

@@ -1,0 +1,1 @@
+"""A ride in the files of other programs: one module a format."""

@@ -1,17 +1,21 @@
-"""A ride in the files of other programs."""
+"""A ride written in the format of another program."""
 
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
+from kickstand.errors import Notice
 
-from ...logs.reader import read_blocks
+from ...logs.reader import Source, read_blocks, read_twice
+from ...logs.source import Progress
+from ...logs.table import Array
 from ...output import write_whole
-from ..channels import Array, Channels, Ride
-from ..thin import thinned
+from ..channels import Channels, Ride
+from ..downsample import downsampled
 from . import export_csv, export_parquet, export_racechrono, export_vbo
 
-STEP_S = {"csv": 0.0, "parquet": 0.0, "racechrono": 0.01, "vbo": 0.01}  # both know up to 100 samples a second
+STEP_S = {"csv": 0.0, "parquet": 0.0, "racechrono": 0.01, "vbo": 0.01}  # the last two hold up to 100 a second
 _WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
     "csv": export_csv.write,
     "parquet": export_parquet.write,
@@ -19,43 +23,60 @@ _WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
     "vbo": export_vbo.write,
 }
 _DATED = ("racechrono", "vbo")
-_CLOCK_S = 1e8  # 1973: a log that begins later has the time in it
+_CLOCK_S = 1e8  # March 1973: a log that starts later has Unix time in it
 
 
-def export(ride: Ride, form: str, out: Path) -> int:
-    """Write out, whole or not at all; how many rows. Raises InputError.
+def export(
+    ride: Ride,
+    form: str,
+    out: Path | str,
+    progress: Progress | None = None,
+    notices: list[Notice] | None = None,
+) -> int:
+    """Write a ride of open_ride() to a file, whole or not at all. Returns the number of rows. Raises InputError.
 
-    racechrono and vbo want date and time. A board has no clock, so such a ride is taken to end when its log was
+    form: "csv" (gzipped if out ends in .gz), "parquet", "racechrono" or "vbo". progress: called with how much of the
+    log is done of how much. notices: what is remarkable in the log is appended to it.
+
+    racechrono and vbo want date and time. A board has no clock, so such a ride is taken to end when its file was
     written last: when it was recorded live, or pulled.
+
+    >>> import tempfile
+    >>> import numpy as np
+    >>> from kickstand_tools.api import CalibrationFile, Log, open_ride
+    >>> log = Log(np.arange(300) / 100.0, np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3)))
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     export(open_ride(log, CalibrationFile(aligned=True)), "csv", f"{directory}/ride.csv")
+    300
     """
     if form == "parquet":
         export_parquet.check()
+    ride = Ride(read_twice(ride.log), ride.calibration)
     start_s, seconds, speeds = _first_pass(ride.log)
     if form in _DATED and start_s < _CLOCK_S:
-        start_s = float(max(0, int(ride.log.stat().st_mtime - seconds)))
+        written_s = Path(ride.log).stat().st_mtime if isinstance(ride.log, (Path, str)) else time.time()
+        start_s = float(max(0, int(written_s - seconds)))
     count = 0
 
     def rows() -> Iterator[Channels]:
         nonlocal count
-        blocks = (block for _, block in ride.blocks("exporting"))
-        for block in thinned(blocks, STEP_S[form]) if STEP_S[form] else blocks:
+        blocks = ride.blocks(progress, notices)
+        for block in downsampled(blocks, STEP_S[form]) if STEP_S[form] else blocks:
             if form == "vbo" and len(speeds):
-                block.speed_mps = np.interp(block.t_s, *speeds.T)  # a row without a speed would be one at 0
+                # every row of a VBO file has a speed: without this, rows between two values would say 0
+                block.speed_mps = np.interp(block.t_s, *speeds.T)
             count += len(block.t_s)
             yield block
 
-    write_whole(out, lambda temporary: _WRITE[form](temporary, rows(), start_s))
+    write_whole(Path(out), lambda temporary: _WRITE[form](temporary, rows(), start_s))
     return count
 
 
-def _first_pass(log: Path) -> tuple[float, float, Array]:
+def _first_pass(log: Source) -> tuple[float, float, Array]:
     """The log's own time of its first sample, its length in s, and its speeds: (n, 2), s from there and m/s."""
-    start_s, seconds, speeds = None, 0.0, []
+    start_s, seconds, speeds = 0.0, 0.0, []
     for block in read_blocks(log):
-        if start_s is None:
-            start_s = float(block.time_text[0])
-        seconds = float(block.time_us[-1]) * 1e-6
+        start_s, seconds = block.start_s, float(block.t_s[-1])
         there = ~np.isnan(block.speed_mps)
-        speeds.append(np.column_stack((block.time_us[there] * 1e-6, block.speed_mps[there])))
-    assert start_s is not None  # an empty log is refused
+        speeds.append(np.column_stack((block.t_s[there], block.speed_mps[there])))
     return start_s, seconds, np.concatenate(speeds)

@@ -1,4 +1,4 @@
-"""Our own columns: the log's, calibrated and in the vehicle's axes, and what the display shows."""
+"""Kickstand's own columns: the log calibrated and in the vehicle's axes, and the lean that the display shows."""
 
 import gzip
 from collections.abc import Iterator
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ..channels import Channels
-from .text_rows import text_rows
+from .csv_lines import csv_lines
 
 # name: (digits, unit)
 COLUMNS = {
@@ -35,4 +35,4 @@ def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
         file.write(",".join(COLUMNS) + "\n")
         for block in blocks:
             block.t_s = block.t_s + start_s
-            file.write(text_rows(np.column_stack([getattr(block, name) for name in COLUMNS]), digits))
+            file.write(csv_lines(np.column_stack([getattr(block, name) for name in COLUMNS]), digits))

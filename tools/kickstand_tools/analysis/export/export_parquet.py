@@ -19,7 +19,7 @@ def check() -> None:
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """One row group a block; time in doubles, the rest in floats. NaN where there is no value."""
+    """One row group a block; time in 64-bit floats, the rest in 32-bit floats. NaN where there is no value."""
     import pyarrow
     from pyarrow.parquet import ParquetWriter
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..channels import Channels
-from .text_rows import text_rows
+from .csv_lines import csv_lines
 
 _NOTE = "Made by Kickstand. lean_angle > 0 to the right; x left, y up, z forward"
 # name, unit, source, digits
@@ -72,4 +72,4 @@ def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
                     block.roll_rate_dps,
                 )
             )
-            file.write(text_rows(table, [column[3] for column in COLUMNS]))
+            file.write(csv_lines(table, [column[3] for column in COLUMNS]))

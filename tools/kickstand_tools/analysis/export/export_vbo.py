@@ -5,7 +5,8 @@ https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.htm
 https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and the VBOX HD Lite's user guide:
 time HHMMSS.SS, velocity in km/h, latitude and longitude in minutes, long accel > 0 forward, lat accel > 0 to the
 left, others with mantissa and exponent. Kickstand has no satellites: their number and the position are 0. Any other
-column that a log has nothing for is left out; velocity, which has to be there, is then 0 and a comment says so.
+column that the log has no values for is left out, except velocity, which VBO requires: it is then 0, and a comment in
+the file says so.
 """
 
 import time
@@ -40,7 +41,7 @@ _STANDARD_ROW = "000 %09.2f +00000.000000 +00000.000000 %07.3f 000.00 +00000.00 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
     """Lines end in CR and LF; the date and each row's time are UTC."""
-    first = next(blocks)  # a channel that a log does not have is missing from its beginning
+    first = next(blocks)  # a channel that the log does not have is NaN in its first block already
     other = [column for column in OTHER if not np.all(np.isnan(getattr(first, column[2])))]
     lean = "lean-angle in degrees, > 0 to the right; " if OTHER[0] in other else ""
     comments = [f"Kickstand: {lean}no satellites", "Log Rate (Hz) : at most 100.00"]

@@ -1,8 +1,8 @@
-"""Long lines with few points that look the same: the least and the largest of each stretch, where they are."""
+"""A long line drawn with few points that look the same: the smallest and the largest value of each stretch."""
 
 import numpy as np
 
-from ..channels import Array
+from ...logs.table import Array
 
 
 def envelope(time: Array, values: Array, points: int) -> tuple[Array, Array]:

@@ -1,11 +1,11 @@
-"""The ride as one HTML page to zoom into, with all it needs inside."""
+"""The ride as one HTML page to zoom into. The page needs no other file."""
 
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..look import Look
+from ..overview import Overview
 from ..report import clock
 from ..stops.brake_test import Stop
 from .envelope import envelope
@@ -24,22 +24,22 @@ from .traces import (
     traces,
 )
 
-POINTS = 40_000  # of a line: what a browser still moves smoothly
+POINTS = 40_000  # of a line: with more, a browser no longer zooms smoothly
 
 
-def draw(path: Path, seen: Look) -> None:
+def draw(path: Path, seen: Overview) -> None:
     """Write it."""
     figure(seen).write_html(path, include_plotlyjs=True, full_html=True)
 
 
-def figure(seen: Look) -> Any:
+def figure(seen: Overview) -> Any:
     """The plotly figure."""
     from plotly.graph_objects import Bar, Heatmap, Scatter, Scattergl
     from plotly.subplots import make_subplots
 
     drawn, quality = traces(seen), seen.quality
-    lean = ("lean", "Lean, degrees (right > 0)", drawn.lean, RIGHT_COLOUR)
-    speed = ("speed", "Speed, km/h", drawn.speed, SPEED_COLOUR)
+    lean = ("lean", "Lean, degrees (right > 0)", drawn.lean_deg, RIGHT_COLOUR)
+    speed = ("speed", "Speed, km/h", drawn.speed_kmh, SPEED_COLOUR)
     lines = ([] if seen.ride.car else [lean]) + ([speed] if seen.has_speed else [])
     forces = len(lines) + 1  # row of the acceleration, and number of its axes; below it g, share and straights
     axes, below = str(forces) if forces > 1 else "", forces + 1
@@ -59,19 +59,19 @@ def figure(seen: Look) -> Any:
         ),
     )
     for row, (name, _, values, colour) in enumerate(lines, 1):
-        x, y = envelope(drawn.time, values, POINTS)
+        x, y = envelope(drawn.time_s, values, POINTS)
         made.add_trace(Scatter(x=x, y=_short(y), name=name, line={"width": 1, "color": colour}), row, 1)
     for peak, sign in maxima(seen):
         text = f"{peak.value:.0f}° {'left' if sign < 0 else 'right'}"
         made.add_annotation(x=peak.time_s, y=sign * peak.value, text=text, row=1, col=1, ay=-20 * sign)
     for values, colour, name in (
-        (drawn.lateral, LATERAL_COLOUR, "to the left"),
-        (drawn.forward, BRAKE_COLOUR, "forward"),
+        (drawn.lateral_g, LATERAL_COLOUR, "to the left"),
+        (drawn.forward_g, BRAKE_COLOUR, "forward"),
     ):
-        x, y = envelope(drawn.time, values, POINTS)
+        x, y = envelope(drawn.time_s, values, POINTS)
         made.add_trace(Scatter(x=x, y=_short(y), name=name, line={"width": 1, "color": colour}), forces, 1)
-    centres = (drawn.gg_edges[1:] + drawn.gg_edges[:-1]) / 2.0
-    logs = np.log10(np.where(drawn.gg > 0.0, drawn.gg, np.nan))
+    centres = (drawn.gg_edges_g[1:] + drawn.gg_edges_g[:-1]) / 2.0
+    logs = np.log10(np.where(drawn.gg_s > 0.0, drawn.gg_s, np.nan))
     colours = {"colorscale": "YlGnBu", "reversescale": False, "showscale": False}
     made.add_trace(Heatmap(x=-centres, y=centres, z=logs, name="seconds, log10", **colours), below, 1)
     middle, share = histogram(seen)
@@ -96,7 +96,7 @@ def figure(seen: Look) -> Any:
         made.update_yaxes(range=[-limit, limit], row=1, col=1)
     for row in range(2, below):
         made.update_xaxes(matches="x", row=row, col=1)
-    seconds = float(drawn.time[-1])
+    seconds = float(drawn.time_s[-1])
     ticks = np.arange(0.0, seconds, tick_s(seconds))
     for row in range(1, below):
         made.update_xaxes(tickvals=ticks, ticktext=[clock(tick) for tick in ticks], row=row, col=1)

@@ -1,11 +1,11 @@
-"""The ride on one page, for the eye: lean, speed, g over time, g against g, how long at which lean, the alignment."""
+"""The ride as one picture: lean, speed and g over time, g against g, how long at which lean, the alignment."""
 
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..look import Look
+from ..overview import Overview
 from ..report import clock
 from .envelope import envelope
 from .traces import (
@@ -40,7 +40,7 @@ _STYLE: Any = {
 }
 
 
-def draw(path: Path, seen: Look) -> None:
+def draw(path: Path, seen: Overview) -> None:
     """Write a PNG."""
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -68,8 +68,8 @@ def draw(path: Path, seen: Look) -> None:
         figure.savefig(path, dpi=100)
 
 
-def _lean(axes: Any, drawn: Traces, seen: Look) -> None:
-    time, lean = envelope(drawn.time, drawn.lean, POINTS)
+def _lean(axes: Any, drawn: Traces, seen: Overview) -> None:
+    time, lean = envelope(drawn.time_s, drawn.lean_deg, POINTS)
     axes.fill_between(time, np.minimum(lean, 0.0), 0.0, color=LEFT_COLOUR, alpha=0.85, linewidth=0.3)
     axes.fill_between(time, np.maximum(lean, 0.0), 0.0, color=RIGHT_COLOUR, alpha=0.85, linewidth=0.3)
     for peak, sign in maxima(seen):
@@ -90,40 +90,40 @@ def _lean(axes: Any, drawn: Traces, seen: Look) -> None:
     axes.tick_params(labelbottom=False)
 
 
-def _speed(axes: Any, drawn: Traces, seen: Look) -> None:
-    axes.plot(*envelope(drawn.time, drawn.speed, POINTS), color=SPEED_COLOUR, linewidth=1.2)
+def _speed(axes: Any, drawn: Traces, seen: Overview) -> None:
+    axes.plot(*envelope(drawn.time_s, drawn.speed_kmh, POINTS), color=SPEED_COLOUR, linewidth=1.2)
     axes.set(title="Speed, km/h")
     axes.set_ylim(bottom=0.0)
     axes.margins(x=0.0)
     axes.tick_params(labelbottom=False)
 
 
-def _forces(axes: Any, drawn: Traces, seen: Look) -> None:
+def _forces(axes: Any, drawn: Traces, seen: Overview) -> None:
     from matplotlib.ticker import MultipleLocator
 
     for values, colour, name in (
-        (drawn.lateral, LATERAL_COLOUR, "to the left"),
-        (drawn.forward, BRAKE_COLOUR, "forward"),
+        (drawn.lateral_g, LATERAL_COLOUR, "to the left"),
+        (drawn.forward_g, BRAKE_COLOUR, "forward"),
     ):
-        axes.plot(*envelope(drawn.time, values, POINTS), color=colour, linewidth=0.7, alpha=0.9, label=name)
+        axes.plot(*envelope(drawn.time_s, values, POINTS), color=colour, linewidth=0.7, alpha=0.9, label=name)
     shade = [(stop.start_s, stop.duration_s) for stop in seen.stops]
     axes.broken_barh(shade, (0, 1), transform=axes.get_xaxis_transform(), color="0.88", linewidth=0)
     for line in axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=2, frameon=False).get_lines():
         line.set_linewidth(2.5)
     axes.set(title="Acceleration, g" + (" (grey: stops)" if seen.stops else ""))
     axes.margins(x=0.0)
-    axes.xaxis.set_major_locator(MultipleLocator(tick_s(float(drawn.time[-1] - drawn.time[0]))))
+    axes.xaxis.set_major_locator(MultipleLocator(tick_s(float(drawn.time_s[-1] - drawn.time_s[0]))))
     axes.xaxis.set_major_formatter(lambda value, _: clock(value))
 
 
 def _gg(axes: Any, drawn: Traces) -> None:
     from matplotlib.colors import LogNorm
 
-    shown = np.ma.masked_equal(drawn.gg, 0.0)
-    # a bike's rider sees a right turn push to the right: left is on the left
+    shown = np.ma.masked_equal(drawn.gg_s, 0.0)
+    # left turns are drawn on the left, as the rider sees them
     scale = LogNorm(0.2 * float(shown.min()), float(shown.max()))  # so that the rarest is not white
-    axes.pcolormesh(-drawn.gg_edges, drawn.gg_edges, shown, cmap="YlGnBu", norm=scale, rasterized=True)
-    reach = float(drawn.gg_edges[-1])
+    axes.pcolormesh(-drawn.gg_edges_g, drawn.gg_edges_g, shown, cmap="YlGnBu", norm=scale, rasterized=True)
+    reach = float(drawn.gg_edges_g[-1])
     for radius in np.arange(0.5, reach + 0.01, 0.5):
         angle = np.linspace(0.0, 2.0 * np.pi, 100)
         axes.plot(radius * np.cos(angle), radius * np.sin(angle), color="0.8", linewidth=0.6)
@@ -131,7 +131,7 @@ def _gg(axes: Any, drawn: Traces) -> None:
     axes.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
 
 
-def _histogram(axes: Any, seen: Look) -> None:
+def _histogram(axes: Any, seen: Overview) -> None:
     middle, share = histogram(seen)
     colours = np.where(middle < 0.0, LEFT_COLOUR, RIGHT_COLOUR)
     axes.bar(middle, share, width=1.0, color=colours.tolist(), linewidth=0)
@@ -149,7 +149,7 @@ def _histogram(axes: Any, seen: Look) -> None:
     axes.xaxis.set_major_formatter(lambda value, _: f"{abs(value):.0f}")
 
 
-def _alignment(axes: Any, seen: Look) -> None:
+def _alignment(axes: Any, seen: Overview) -> None:
     quality = seen.quality
     axes.plot(-quality.lateral_g, quality.forward_g, ".", color=LATERAL_COLOUR, markersize=3, alpha=0.5)
     if quality.yaw_deg is not None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from ...errors import InputError, extra
 from ...output import check_directory, new_directory, write_whole
-from ..look import Look
+from ..overview import Overview
 from . import page, picture
 
 
@@ -17,10 +17,9 @@ def check(directory: Path) -> None:
     check_directory(directory)
 
 
-def draw(seen: Look, directory: Path) -> list[Path]:
+def draw(seen: Overview, directory: Path) -> list[Path]:
     """Write both; their paths. Raises InputError."""
-    name = seen.ride.log.name.removesuffix(".gz").removesuffix(".csv")
-    paths = [directory / f"{name}.png", directory / f"{name}.html"]
+    paths = [directory / f"{seen.ride.stem}.png", directory / f"{seen.ride.stem}.html"]
     with new_directory(directory):
         write_whole(paths[0], lambda path: picture.draw(path, seen))
         write_whole(paths[1], lambda path: page.draw(path, seen))

@@ -4,11 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..channels import Array
-from ..look import Look
-from ..report import clock
+from ...logs.table import Array
+from ..downsample import spacing_s
+from ..overview import Overview
+from ..report import angles, clock
 from ..summary import BINS_DEG, Peak
-from ..thin import spacing_s
 
 LEFT_COLOUR, RIGHT_COLOUR = "#2563a8", "#c2571a"
 BRAKE_COLOUR, LATERAL_COLOUR = "#9b2335", "#3d7f6b"
@@ -19,22 +19,22 @@ GG_BIN_G = 0.025
 
 @dataclass
 class Traces:
-    """time (s) with lean (degrees, NaN where the display shows none), speed (km/h), lateral and forward (g, smoothed).
+    """What is drawn over time. lean_deg is NaN where the display shows none; lateral_g, forward_g are smoothed.
 
-    gg: seconds in each field of a grid of GG_BIN_G, edges gg_edges: rows forward, columns lateral.
+    gg_s: seconds in each cell of a grid with the edges gg_edges_g: rows forward_g, columns lateral_g.
     """
 
-    time: Array
-    lean: Array
-    speed: Array
-    lateral: Array
-    forward: Array
-    gg: Array
-    gg_edges: Array
+    time_s: Array
+    lean_deg: Array
+    speed_kmh: Array
+    lateral_g: Array
+    forward_g: Array
+    gg_s: Array
+    gg_edges_g: Array
 
 
-def traces(seen: Look) -> Traces:
-    """From the course of the ride."""
+def traces(seen: Overview) -> Traces:
+    """The traces of a ride."""
     course = seen.course
     step_s = spacing_s(course)
     n = max(1, round(SMOOTH_S / step_s))
@@ -47,42 +47,42 @@ def traces(seen: Look) -> Traces:
     return Traces(course.t_s, lean, course.speed_mps * 3.6, lateral, forward, gg, edges)
 
 
-def title(seen: Look) -> str:
-    """Name and length of the ride, and its maxima."""
+def title(seen: Overview) -> str:
+    """One line: name and length of the ride, and its maxima."""
     total = seen.summary
-    said = [seen.ride.log.name.removesuffix(".gz").removesuffix(".csv"), clock(total.duration_s)]
+    said = [seen.ride.stem, clock(total.duration_s)]
     if not seen.ride.car:
         said.append(f"lean {total.left_deg.value:.0f}° left, {total.right_deg.value:.0f}° right")
     said.append(f"braking {total.brake_g.value:.2f} g, acceleration {total.accel_g.value:.2f} g")
     return "  ·  ".join(said)
 
 
-def maxima(seen: Look) -> list[tuple[Peak, float]]:
+def maxima(seen: Overview) -> list[tuple[Peak, float]]:
     """The largest lean to each side, and its sign in the picture."""
     peaks = ((seen.summary.left_deg, -1.0), (seen.summary.right_deg, 1.0))
     return [(peak, sign) for peak, sign in peaks if peak.time_s is not None]
 
 
-def lean_limit(seen: Look) -> float:
+def lean_limit(seen: Overview) -> float:
     """Degrees to each side that the lean's axis shows."""
     return max(20.0, 1.2 * max(seen.summary.left_deg.value, seen.summary.right_deg.value))
 
 
-def histogram(seen: Look) -> tuple[Array, Array]:
+def histogram(seen: Overview) -> tuple[Array, Array]:
     """Middles of the bins in degrees, and the share of the riding time in each in per cent."""
     seconds = seen.summary.histogram_s
     return (BINS_DEG[:-1] + BINS_DEG[1:]) / 2.0, 100.0 * seconds / max(float(np.sum(seconds)), 1e-9)
 
 
-def quality_lines(seen: Look) -> list[str]:
-    """What the ride says of the alignment."""
+def quality_lines(seen: Overview) -> list[str]:
+    """One line for each thing that the ride says about the alignment."""
     quality = seen.quality
-    lines = quality.angles or ["not enough straight riding"]
+    lines = angles(quality) or ["not enough straight riding"]
     return lines if quality.gravity_g is None else [*lines, f"at rest {quality.gravity_g:.3f} g"]
 
 
 def tick_s(seconds: float) -> float:
-    """Round times for 6 to 12 ticks."""
+    """A round time between ticks, so that there are 6 to 12 of them."""
     return next((tick for tick in (1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800) if seconds < 12 * tick), 3600)
 
 

@@ -5,36 +5,40 @@ ve = 0.1 v0 in km/h, and sb and se the distances in metres from there to vb and 
 
     dm = (vb^2 - ve^2) / (25.92 (se - sb))   in m/s2.
 
-Standing still, the force says how the road slopes, the gyro how far it is off. From there speed and pitch are
-integrated backwards, so that the dive of the fork is not taken for braking:
+At the standstill the force tells the slope of the road, and the gyro's readings are its bias. From there speed and
+pitch are integrated backwards, so that the dive of the fork is not taken for braking:
 
-    dq/dt = w_y sin t - w_x cos t,   dv/dt = f_z - g sin q       (as in kickstand.lean_filter)
+    dq/dt = w_y sin t - w_x cos t,   dv/dt = f_z - g sin q       (as in kickstand.lean.lean_filter)
 
-Where the log has a speed, this one is fitted to it (speed_fit.py); else it has to be plausible (plausible.py).
+Where the log has a speed, the integrated one is fitted to it (speed_fit.py). Elsewhere it has to be plausible
+(plausible.py).
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 
-from ..channels import Array, Channels
-from ..signals import G, integral, smoothed
+from ...logs.table import Array
+from ..channels import Channels
+from ..downsample import downsampled, joined
+from ..signals import integral, smoothed
 from .plausible import closes, plausible
 from .speed_fit import fitted_speed, speed_delay_s
 from .standstill import standing
 
-RATE_S = 0.02  # of the samples these functions want, at most
+RATE_S = 0.02  # between the samples that stops are looked for in
 MIN_SPEED_MPS = 10.0 / 3.6
-MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0  # past that it is a fall or a fault
+MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0  # harder is a fall or a fault
 LONGEST_S = 60.0
-GAP_S = 0.5  # over missing readings nothing can be integrated
-REST_S = 2.5  # of the standstill that are looked at,
-SETTLE_S = 0.5  # but for its beginning, when the fork comes up again
-ONSET_SHARE, FAINT_SHARE = 0.15, 0.04  # of the braking: it has begun; it had not
-ONSET_S = 0.6  # from the one to the other, at most
+GAP_S = 0.5  # readings are missing: nothing can be integrated over a longer gap
+REST_S = 2.5  # how much of the standstill is used
+SETTLE_S = 0.5  # how much of its beginning is not, because the fork comes up again
+ONSET_SHARE, FAINT_SHARE = 0.15, 0.04  # of the full deceleration: braking has surely begun; it has not begun yet
+ONSET_S = 0.6  # at most, from the faint share to the other
 
-# Above the point about which a bike pitches, in the height of its wheels' hubs: the nose going down, a sensor under
-# the seat goes forward.
+# Height of the sensor above the point about which a bike pitches, which is as high as the wheels' hubs. When the nose
+# goes down, a sensor under the seat moves forward.
 SENSOR_HEIGHT_M = 0.65
 
 
@@ -58,8 +62,21 @@ class Stop:
         return self.stop_s - self.start_s
 
 
-def stops(ride: Channels) -> list[Stop]:
-    """Every stop from over 10 km/h with at least 1 m/s2. ride: whole, samples at most RATE_S apart (thin.py)."""
+def find_stops(channels: Channels) -> list[Stop]:
+    """Every stop from over 10 km/h with at least 1 m/s2, as UN Regulation No. 13 measures it (see the module).
+
+    channels: a whole ride, of vehicle_channels(). pandas.DataFrame takes the list as it is.
+
+    >>> from kickstand_tools.api import Log, fit_two_positions, simulate_ride, vehicle_channels
+    >>> ride = simulate_ride("street", seed=1, seconds=60.0)
+    >>> poses = [Log.from_readings(pose, ride.rate_hz) for pose in (ride.kickstand, ride.upright)]
+    >>> log = Log.from_readings(ride.readings, ride.rate_hz)
+    >>> log.speed_mps[::200] = ride.truth["speed_mps"][::200]  # once a second
+    >>> stops = find_stops(vehicle_channels(log, fit_two_positions(*poses).calibration))
+    >>> stops[-1].speed_from, stops[-1].initial_speed_mps > 3.0, stops[-1].mfdd_mps2 > 1.0
+    ('log', True, True)
+    """
+    ride = joined(list(downsampled([channels], RATE_S)))
     still = standing(ride)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], still, [False]))))
     delay_s = speed_delay_s(ride)
@@ -78,7 +95,10 @@ def stops(ride: Channels) -> list[Stop]:
 
 
 def mfdd_mps2(speed_mps: Array, distance_m: Array) -> float:
-    """dm above. speed_mps: falling, from the initial speed to at most a tenth of it; distance_m: to each."""
+    """Mean fully developed deceleration, dm in the module's docstring.
+
+    speed_mps (n): falling from the initial speed to at most a tenth of it. distance_m (n): from the beginning to each.
+    """
     vb, ve = 0.8 * speed_mps[0], 0.1 * speed_mps[0]
     falling = np.minimum.accumulate(speed_mps)
     sb, se = np.interp([-vb, -ve], -falling, distance_m)
@@ -88,11 +108,14 @@ def mfdd_mps2(speed_mps: Array, distance_m: Array) -> float:
 
 
 def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | None:
-    """part: to some time into this standstill, which begins at index rest; from_rest: from the one before."""
+    """The stop that ends in the standstill that begins at index rest, None if it is none.
+
+    part: the ride up to some time into that standstill. from_rest: part begins where the standstill before ends.
+    """
     time = part.t_s
     acceleration, pitch_rate, yaw_rate = _acceleration(part, rest)
     felt = integral(time, acceleration)
-    speed = felt - felt[-1] + SENSOR_HEIGHT_M * np.radians(pitch_rate)  # backwards from standstill
+    speed = felt - felt[-1] + SENSOR_HEIGHT_M * np.radians(pitch_rate)  # integrated backwards from the standstill
     smooth = smoothed(acceleration, time)
     begin = _onset(smooth, time, rest)
     if begin is None:
@@ -116,7 +139,7 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
         return None
     heading = integral(t, yaw_rate[begin : end + 1])
     side = np.radians(heading - _line(t, heading))
-    # the last hundredths of the speed are lost in the fork's rebound: evenly on to zero
+    # the fork's rebound hides the last hundredths of the speed: they are assumed to fall evenly to zero
     tail = v[-1] / mfdd
     stop = Stop(
         float(t[0]),
@@ -136,7 +159,7 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
 
 
 def _acceleration(part: Channels, rest: int) -> tuple[Array, Array, Array]:
-    """Of the sensor along the road in m/s2; pitch and yaw rate in deg/s; with what the standstill says of both."""
+    """Acceleration along the road (m/s2), pitch and yaw rate (deg/s), all less those at standstill."""
     time = part.t_s
     settled = int(np.searchsorted(time, time[rest] + SETTLE_S))
     still = slice(settled if settled < len(time) - 5 else rest, len(time))
@@ -147,7 +170,7 @@ def _acceleration(part: Channels, rest: int) -> tuple[Array, Array, Array]:
     turned = integral(time, np.radians(level_pitch_rate))
     stood = np.arcsin(np.clip(np.mean(part.forward_g[still]), -0.5, 0.5))
     pitch = stood + turned - np.mean(turned[still])
-    return G * (part.forward_g - np.sin(pitch)), level_pitch_rate, yaw_rate
+    return STANDARD_GRAVITY * (part.forward_g - np.sin(pitch)), level_pitch_rate, yaw_rate
 
 
 def _onset(smooth: Array, time: Array, rest: int) -> int | None:
@@ -160,7 +183,7 @@ def _onset(smooth: Array, time: Array, rest: int) -> int | None:
     near = slice(int(np.searchsorted(time, time[end] - 2.0)), end + 1)
     level = float(np.percentile(braking[near], 75))
     weak = np.flatnonzero(braking[: end + 1] < max(ONSET_SHARE * level, 0.25))
-    weak = weak[weak < end - int(0.3 / np.median(np.diff(time)))]  # a pause just before standing still is none
+    weak = weak[weak < end - int(0.3 / np.median(np.diff(time)))]  # a pause just before the standstill does not count
     begin = int(weak[-1]) if len(weak) else 0
     earliest = int(np.searchsorted(time, time[begin] - ONSET_S))
     while begin > earliest and braking[begin] > FAINT_SHARE * level:

@@ -1,32 +1,37 @@
-"""A speed integrated from the acceleration, brought into line with the log's.
+"""A speed integrated from the acceleration, corrected by the speed in the log.
 
-A speed once a second has two or three values in a hard stop, which alone tell nothing of its shape; the acceleration
-has the shape, and drifts.
+A log with a speed once a second has two or three values in a hard stop, which do not tell its shape. The acceleration
+tells the shape, but its integral drifts.
 """
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 
-from ..channels import Array, Channels
-from ..signals import G, integral, smoothed
+from ...logs.table import Array
+from ..channels import Channels
+from ..signals import integral, smoothed
 
-LEAD_S = 4.0  # of speed before the braking that are taken into the fit
-DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # of a speed, that are tried
+LEAD_S = 4.0  # how long before the braking the speed is used for the fit
+DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # delays of the speed that are tried
 ENOUGH_SPEEDS, ENOUGH_CHANGE_MPS = 30, 0.5
 
-# One sigma, of what is fitted and of a speed
+# One standard deviation of each fitted parameter and of a speed
 SIGMA_SCALE, SIGMA_SLOPE_MPS2, SIGMA_DELAY_S, SIGMA_SPEED_MPS = 0.01, 0.05, 0.05, 0.05
 SIGMA_WALK_MPS2, KNOT_S = 0.1, 0.5  # per square root of a second
 
 
 def speed_delay_s(ride: Channels) -> float:
-    """How late the log's speed is, as that of satellites is: where its changes best fit those felt. 0 if unknown."""
+    """How late the log's speed is, as a satellite receiver's is: the delay with which its changes fit the force best.
+
+    0 if the ride does not tell.
+    """
     there = np.flatnonzero(~np.isnan(ride.speed_mps))
     if len(there) < ENOUGH_SPEEDS:
         return 0.0
     second = np.floor(ride.t_s[there])
     there = there[np.flatnonzero(np.diff(second, prepend=-1.0))]  # one a second
     time, changes = ride.t_s[there], np.diff(ride.speed_mps[there])
-    felt = integral(ride.t_s, G * ride.forward_g)
+    felt = integral(ride.t_s, STANDARD_GRAVITY * ride.forward_g)
     if len(there) < ENOUGH_SPEEDS or np.std(changes) < ENOUGH_CHANGE_MPS:
         return 0.0
     left = []
@@ -38,24 +43,25 @@ def speed_delay_s(ride: Channels) -> float:
     best = int(np.argmin(left))
     if best in (0, len(left) - 1):
         return 0.0
-    before, least, after = left[best - 1 : best + 2]  # a parabola through these
+    before, least, after = left[best - 1 : best + 2]  # its minimum is that of a parabola through these
     return float(DELAYS_S[best] + 0.5 * (before - after) / (before - 2.0 * least + after) * (DELAYS_S[1] - DELAYS_S[0]))
 
 
 def fitted_speed(
     part: Channels, begin: int, speed: Array, acceleration: Array, delay_s: float
 ) -> Array | None:
-    """speed and acceleration (n, m/s, of part, to a standstill), corrected; None if the log has no speed there.
+    """The speed (n, m/s), corrected by the log's; None if the log has no speed there.
 
-    begin: index at which braking begins. delay_s: of the log's speed.
+    part: the ride up to a standstill; speed, acceleration (n): integrated and measured, m/s and m/s2. begin: index at
+    which braking begins. delay_s: of the log's speed.
 
-    Least squares with what was known before: log = (1 + scale) v + integral of slope to the end - delay dv/dt,
-    where slope, what the force has of hill and dive that the gyro has not told, is a random walk back in time
-    from nearly none at standstill.
+    Least squares with prior knowledge: log = (1 + scale) v + integral of slope to the end - delay dv/dt. The slope is
+    the part of the force that comes from hill and dive and that the gyro has not told: a random walk back in time, from
+    nearly 0 at standstill.
     """
     time = part.t_s
     values = np.flatnonzero(~np.isnan(part.speed_mps))
-    wanted = np.searchsorted(time, time[values] - delay_s - 1e-6).clip(0, len(time) - 1)  # when they were so
+    wanted = np.searchsorted(time, time[values] - delay_s - 1e-6).clip(0, len(time) - 1)  # the samples they belong to
     values, wanted = (these[time[wanted] >= time[begin] - LEAD_S] for these in (values, wanted))
     if len(wanted) < 2 or wanted[-1] < begin:
         return None

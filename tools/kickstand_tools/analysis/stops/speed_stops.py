@@ -1,4 +1,4 @@
-"""Does the log's speed alone fall to a stop? Then one that the force does not tell is no sign that there was none."""
+"""Does the speed in the log alone fall to a stop? Then there was one, even if the force does not show it."""
 
 import numpy as np
 
@@ -7,11 +7,11 @@ from .brake_test import MIN_MFDD_MPS2, MIN_SPEED_MPS
 from .standstill import STOPPED_MPS
 
 LONGEST_S = 15.0
-SURELY = 1.5  # times what a stop has to have at least
+SURELY = 1.5  # times the smallest deceleration of a stop
 
 
 def stops_by_speed(ride: Channels) -> bool:
-    """One at least, from over 10 km/h and surely hard enough to be among the brake tests."""
+    """True if there is one from over 10 km/h, surely hard enough to be a brake test."""
     there = ~np.isnan(ride.speed_mps)
     time, speed = ride.t_s[there], ride.speed_mps[there]
     for end in np.flatnonzero((speed[1:] < STOPPED_MPS) & (speed[:-1] >= STOPPED_MPS)) + 1:

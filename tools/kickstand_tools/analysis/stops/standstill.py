@@ -3,26 +3,27 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from ..channels import Array, Channels
+from ...logs.table import Array
+from ..channels import Channels
+from ..downsample import spacing_s
 from ..signals import smoothed
-from ..thin import spacing_s
 
 STOPPED_MPS = 0.3  # a speed that counts as standing; satellites never quite say 0
-STALE_S = 3.0  # a speed says no more after that
+STALE_S = 3.0  # an older speed tells nothing
 
-# Without a speed, what stands shakes for so long by no more than a share of what it does on the move
+# Without a speed: a vehicle stands still while it shakes, over QUIET_S, by less than a share of its shaking when moving
 QUIET_S = 1.0
 QUIET_SHARE = 0.15  # in pitch and yaw
 QUIET_UP_SHARE = 0.2  # up and down: a smooth road and an idling engine leave more than a fork that stands
-RIDING_PERCENTILE = 90.0  # which even a test with long pauses moves for
-ENGINE_S, BEND_S = 0.1, 0.5  # an idling engine is quicker, a bend, a hill or the fork's dive slower than the road
-STILL_DPS, STILL_G = 1.0, 0.01  # turns no faster, and is as steep at the end as at the beginning
-MAX_OFF_G = 0.05  # the force from what it is at rest: braking or a bend as smooth as standing adds to it
-UNCALIBRATED_G = 0.12  # from 1 g, where the ride has no rest: a cheap sensor without the six positions
+RIDING_PERCENTILE = 90.0  # of the shaking: even in a ride with long pauses it is one of the move
+ENGINE_S, BEND_S = 0.1, 0.5  # the road shakes slower than an idling engine, faster than bends and the fork's dive
+STILL_DPS, STILL_G = 1.0, 0.01  # at standstill: rate of turning, change of the forward force from beginning to end
+MAX_OFF_G = 0.05  # by which the force may differ from that at rest; smooth braking and bends differ by more
+UNCALIBRATED_G = 0.12  # the same from 1 g, for a ride without rest and a sensor without six positions
 
 
 def standing(ride: Channels) -> NDArray[np.bool_]:
-    """True where the bike stands still: by the log's own speed, or where there is none by how little it shakes."""
+    """(n) True where the vehicle stands still: by the log's speed, or where there is none by how little it shakes."""
     still = _quiet(ride)
     if not np.any(still):
         still = _rested(ride)
@@ -58,7 +59,8 @@ def _quiet(ride: Channels) -> NDArray[np.bool_]:
 
 
 def _rested(ride: Channels) -> NDArray[np.bool_]:
-    """On a road so smooth that shaking tells nothing: the filter's rests, each from where its force is there."""
+    """The rests that the lean filter found, for a road so smooth that shaking tells nothing. Each is extended back to
+    where the forward force became that of the rest."""
     still = ride.resting > 0.5
     if not np.any(still):
         return still
@@ -71,19 +73,19 @@ def _rested(ride: Channels) -> NDArray[np.bool_]:
 
 
 def _road(values: Array, time: Array) -> Array:
-    """What shakes as a road does. On a track bends and brakings are so large that next to them a road is quiet."""
+    """The shaking by the road: without the engine's, and without bends and braking, which may be far larger."""
     slow = smoothed(values, time, ENGINE_S)
     return slow - smoothed(slow, time, BEND_S)
 
 
 def _calm(values: Array, n: int, share: float) -> NDArray[np.bool_]:
-    """Where n in a row shake by less than this share of what they do on the move."""
+    """Where n samples in a row spread by less than this share of what they do on the move."""
     _, spread = _window(values, n)
     return spread < share * np.percentile(spread, RIDING_PERCENTILE)
 
 
 def _weight(ride: Channels, n: int) -> NDArray[np.bool_]:
-    """Where the force over n in a row is the weight alone, as far as it is calibrated."""
+    """Where the force over n samples in a row is the weight alone, as far as the sensor is calibrated."""
     size = np.sqrt(sum(_window(axis, n)[0] ** 2 for axis in (ride.left_g, ride.up_g, ride.forward_g)))
     resting, _ = _window(ride.resting, n)
     rests = size[resting > 0.99]
@@ -93,7 +95,7 @@ def _weight(ride: Channels, n: int) -> NDArray[np.bool_]:
 
 def _window(values: Array, n: int) -> tuple[Array, Array]:
     """Mean and standard deviation of each n values in a row."""
-    middle = float(np.mean(values))  # taken off, or the squares of a large one would hide the spread
+    middle = float(np.mean(values))  # subtracted, or rounding of large squares would hide the spread
     values = values - middle
     first, second = (np.cumsum(np.concatenate(([0.0], x))) for x in (values, values * values))
     mean = (first[n:] - first[:-n]) / n

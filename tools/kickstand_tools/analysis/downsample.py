@@ -1,33 +1,34 @@
-"""Fewer samples, for what needs no more: means of equal stretches of time."""
+"""A ride with fewer samples a second: means over equal stretches of time."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import fields
 
 import numpy as np
 
-from .channels import Array, Channels
+from ..logs.table import Array
+from .channels import Channels
 
 
 def joined(parts: list[Channels]) -> Channels:
-    """One after the other."""
+    """The parts of a ride, one after the other, as one."""
     return Channels(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Channels)))
 
 
 def spacing_s(course: Channels) -> float:
-    """Usual time from sample to sample."""
+    """Median time from sample to sample, s."""
     return float(np.median(np.diff(course.t_s))) if len(course.t_s) > 1 else 1.0
 
 
-def thinned(blocks: Iterable[Channels], step_s: float) -> Iterator[Channels]:
-    """Means over each step_s in which there are samples; a channel's NaNs do not count.
+def downsampled(blocks: Iterable[Channels], step_s: float) -> Iterator[Channels]:
+    """Means over each stretch of step_s in which there are samples; a channel's NaNs do not count.
 
-    A log slower than that comes through unchanged. Stretches go on from block to block.
+    A ride with a sample or less in each stretch comes through unchanged. A stretch may go on from block to block.
     """
     rest: Channels | None = None
     for block in blocks:
         block = block if rest is None else joined([rest, block])
         step = np.floor(block.t_s / step_s + 1e-6)
-        last = int(np.searchsorted(step, step[-1]))  # it may go on in the next block
+        last = int(np.searchsorted(step, step[-1]))  # the last stretch may go on in the next block
         rest = block.part(slice(last, None))
         if last:
             yield _means(block.part(slice(0, last)), step[:last])

@@ -1,0 +1,147 @@
+"""kickstand_tools.api: the examples in the docstrings run, and the functions keep what the module promises."""
+
+import doctest
+import gzip
+import inspect
+import io
+import sys
+
+import analysis_rides
+import command
+import numpy as np
+import pytest
+from kickstand_tools import api
+from kickstand_tools.simulation.files import simulate
+
+FUNCTIONS = [name for name in api.__all__ if inspect.isfunction(getattr(api, name))]
+
+
+@pytest.mark.parametrize("name", FUNCTIONS + ["Log", "CalibrationFile"])
+def test_the_example_of_a_function_runs(name):
+    public = getattr(api, name)
+    module = sys.modules[public.__module__]
+    found = [
+        test
+        for test in doctest.DocTestFinder(recurse=False).find(public, name, module=module)
+        if test.examples
+    ]
+    assert found, f"{name} has no example"
+    for test in found:
+        assert doctest.DocTestRunner().run(test).failed == 0
+
+
+@pytest.fixture(scope="module")
+def directory(tmp_path_factory):
+    """A simulated ride with its poses, calibrated by the functions."""
+    made = tmp_path_factory.mktemp("ride")
+    simulate("street", 1, made, seconds=60.0, speed=True)
+    six = api.fit_six_positions([made / f"POSE_{k}.csv" for k in range(1, 8)])
+    two = api.fit_two_positions(made / "KICKSTAND.csv", made / "UPRIGHT.csv", six.calibration)
+    api.write_calibration(made / "RIDE.cal.json", two.calibration)
+    return made
+
+
+def test_nothing_is_printed(directory, capfd):
+    seen = []
+    log = directory / "RIDE.csv"
+    calibration = api.read_calibration(directory / "RIDE.cal.json")
+    api.replay(log, calibration, progress=lambda done, total: seen.append((done, total)))
+    api.overview(api.open_ride(log), lambda done, total: seen.append((done, total)))
+    with pytest.raises(api.RefusedInput, match="only 2 of 5 brakings"):
+        api.fit_drive([log], calibration, progress=lambda done, total: seen.append((done, total)))
+    assert tuple(capfd.readouterr()) == ("", "")
+    assert [done == total for done, total in seen].count(True) == 3  # each ends with all done
+
+
+def test_any_source_gives_the_same_log(directory):
+    content = (directory / "RIDE.csv").read_bytes()
+    (directory / "packed.csv.gz").write_bytes(gzip.compress(content))
+    want = api.read_log(directory / "RIDE.csv")
+    with (directory / "RIDE.csv").open(encoding="ascii") as text:
+        sources = [
+            str(directory / "RIDE.csv"),
+            directory / "packed.csv.gz",
+            text,
+            io.BytesIO(content),
+            io.StringIO(content.decode()),
+            want,
+        ]
+        for source in sources:
+            got = api.read_log(source)
+            for name, values in got.columns().items():
+                assert np.array_equal(values, want.columns()[name], equal_nan=True), name
+    assert want.accel_g.shape == want.gyro_dps.shape == (len(want.t_s), 3)
+
+
+@pytest.mark.parametrize("engine", ["cpython", "micropython"])
+def test_replay_gives_what_the_command_writes(directory, engine):
+    out, cal = directory / "LEAN.csv", directory / "RIDE.cal.json"
+    command.works("replay", directory / "RIDE.csv", "--calibration", cal, "--out", out, "--engine", engine)
+    want = analysis_rides.table(out)
+    with (directory / "RIDE.csv").open("rb") as file:
+        got = api.replay(file, api.read_calibration(cal), engine)
+    for name in want.dtype.names or ():
+        assert np.allclose(getattr(got, name), want[name], atol=1e-5), name
+
+
+def test_stops_and_summary_of_arrays_are_those_of_the_report(directory):
+    """Read whole or block by block, from a file or from arrays."""
+    channels = api.vehicle_channels(api.read_log(directory / "RIDE.csv"), directory / "RIDE.cal.json")
+    seen = api.overview(api.open_ride(directory / "RIDE.csv"))
+    assert seen.stops == api.find_stops(channels) != []
+    assert api.summary(channels).left_deg == seen.summary.left_deg
+
+
+def test_tables_are_data_frames(directory):
+    pytest.importorskip("pandas")
+    log = api.read_log(directory / "RIDE.csv")
+    lean = api.replay(log, api.read_calibration(directory / "RIDE.cal.json"))
+    for table in log, lean, api.vehicle_channels(log, directory / "RIDE.cal.json"):
+        frame = table.to_pandas()
+        assert len(frame) == len(log.t_s)
+        assert frame.columns[0] == "t_s"
+
+
+def test_without_pandas_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    log = api.Log(np.arange(2.0), np.zeros((2, 3)), np.zeros((2, 3)))
+    with pytest.raises(api.InputError, match=r"data frames need pandas: .*\.\[rides\]"):
+        log.to_pandas()
+
+
+def test_a_refusal_has_its_code_and_values(directory):
+    pose = directory / "UPRIGHT.csv"
+    with pytest.raises(api.RefusedInput) as raised:
+        api.fit_two_positions(pose, api.read_log(pose))
+    assert raised.value.code == "same-pose"
+    assert raised.value.values == pytest.approx((0.0,), abs=0.1)
+    assert str(raised.value).startswith(f"{pose} and {pose}: both poses are the same")
+
+
+def test_what_is_wrong_with_arrays_is_said():
+    time, still = np.arange(100) / 100.0, np.tile([0.0, 1.0, 0.0], (100, 1))
+    with pytest.raises(api.InputError, match=r"gyro_dps has the shape \(99, 3\), it has to be \(100, 3\)"):
+        api.Log(time, still, still[1:])
+    with pytest.raises(api.InputError, match="has to increase"):
+        api.Log(time[::-1], still, still)
+    with pytest.raises(api.InputError, match="look like m/s2"):
+        api.read_log(api.Log(time, 9.81 * still, 0.0 * still))
+    with pytest.raises(api.InputError, match="too short"):
+        api.read_log(api.Log(time[:1], still[:1], still[:1]))
+
+
+def test_an_open_file_with_a_mistake_is_refused_by_its_name(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(command.HEADER + "\n0,0,0,one,0,0,0\n")
+    with path.open() as file, pytest.raises(api.InputError, match=r"log\.csv, line 2: az_g is 'one'"):
+        api.read_log(file)
+    with pytest.raises(api.InputError, match="the log, line 2: az_g"):
+        api.read_log(io.StringIO(path.read_text()))
+
+
+def test_the_events_of_a_refused_drive_are_told(directory):
+    events = []
+    with pytest.raises(api.RefusedInput) as raised:
+        api.fit_drive([directory / "RIDE.csv"], vehicle="car", on_event=events.append)
+    assert raised.value.code
+    assert events[0].what == "log-begins"

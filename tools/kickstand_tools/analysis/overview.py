@@ -1,0 +1,67 @@
+"""One pass over a ride: all that its report and its pictures show."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from kickstand.errors import Notice
+
+from ..logs.source import Progress
+from ..replay.forward_sign import ForwardSign, exchanged_notice
+from .alignment_quality import Quality, quality
+from .channels import Channels, Ride
+from .downsample import downsampled, joined
+from .stops.brake_test import RATE_S, Stop, find_stops
+from .stops.standstill import standing
+from .summary import Summary
+
+
+@dataclass
+class Overview:
+    """A ride: the summary of every sample, and its course in means over RATE_S.
+
+    speed_correlation: between the forward force and the changes of the speed, 1 if forward is right, -1 if it is
+    backward, None if the ride does not tell. exchanged: said where forward is backward; stops is then empty. notices:
+    what else is remarkable in the log.
+    """
+
+    ride: Ride
+    summary: Summary
+    course: Channels
+    stops: list[Stop]
+    quality: Quality
+    speed_correlation: float | None
+    exchanged: Notice | None
+    notices: list[Notice]
+
+    @property
+    def has_speed(self) -> bool:
+        """The log has a speed that is not always 0."""
+        return self.summary.speed_mps.time_s is not None
+
+
+def overview(ride: Ride, progress: Progress | None = None) -> Overview:
+    """Read a ride of open_ride() through, block by block: memory hardly grows with its length. Raises InputError.
+
+    progress: called with how much of the log is done of how much.
+
+    >>> import numpy as np
+    >>> from kickstand_tools.api import CalibrationFile, Log, open_ride
+    >>> log = Log(np.arange(251) / 100.0, np.tile([0.0, 1.0, 0.0], (251, 1)), np.zeros((251, 3)))
+    >>> seen = overview(open_ride(log, CalibrationFile(aligned=True)))
+    >>> seen.summary.duration_s, seen.stops
+    (2.5, [])
+    """
+    total, sign = Summary(), ForwardSign()
+    notices: list[Notice] = []
+
+    def blocks() -> Iterator[Channels]:
+        for block in ride.blocks(progress, notices):
+            total.add(block)
+            sign.add(block.t_s, block.forward_g, block.speed_mps)
+            yield block
+
+    course = joined(list(downsampled(blocks(), RATE_S)))
+    found = quality(course, standing(course))
+    exchanged = exchanged_notice(ride.calibration, found.roll_deg) if sign.exchanged else None
+    stops = [] if exchanged else find_stops(course)
+    return Overview(ride, total, course, stops, found, sign.correlation, exchanged, notices)

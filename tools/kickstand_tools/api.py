@@ -1,0 +1,66 @@
+"""Kickstand's functions for a notebook, a page or a cluster. They return data, print nothing and draw nothing.
+
+    from kickstand_tools import api
+
+    six = api.fit_six_positions(["1.csv", "2.csv", "3.csv", "4.csv", "5.csv", "6.csv", "7.csv"])
+    two = api.fit_two_positions("KICKSTAND.csv", "UPRIGHT.csv", six.calibration)
+    lean = api.replay("RIDE.csv.gz", two.calibration)                     # lean.t_s, lean.lean_deg, ...
+    stops = api.find_stops(api.vehicle_channels("RIDE.csv.gz", two.calibration))
+
+A log is a path, an open file of text or bytes, or a Log made of arrays. Tables have to_pandas(). What takes long takes
+`progress`, a function that is called with (done, total).
+
+InputError says in one line what is wrong with what was given. Its subclass RefusedInput has the code and the values of
+a refusal of the firmware's (kickstand.errors). sentence() puts a notice or a refusal into words.
+"""
+
+from .analysis.channels import Channels, Ride, open_ride, vehicle_channels
+from .analysis.export.export import export
+from .analysis.overview import Overview, overview
+from .analysis.stops.brake_test import Stop, find_stops
+from .analysis.summary import Summary, summary
+from .calibration.drive import DriveResult, fit_drive
+from .calibration.drive_events import DriveEvent
+from .calibration.file import CalibrationFile, read_calibration, write_calibration
+from .calibration.six import SixPositions, fit_six_positions
+from .calibration.two import TwoPositions, fit_two_positions
+from .errors import InputError
+from .logs.log import Log
+from .logs.reader import read_log
+from .refusals import RefusedInput, sentence
+from .replay.replay import LeanTable, replay
+from .simulation.ride import Ride as SimulatedRide
+from .simulation.ride import ride as simulate_ride
+
+__all__ = [
+    "CalibrationFile",
+    "Channels",
+    "DriveEvent",
+    "DriveResult",
+    "InputError",
+    "LeanTable",
+    "Log",
+    "Overview",
+    "RefusedInput",
+    "Ride",
+    "SimulatedRide",
+    "SixPositions",
+    "Stop",
+    "Summary",
+    "TwoPositions",
+    "export",
+    "find_stops",
+    "fit_drive",
+    "fit_six_positions",
+    "fit_two_positions",
+    "open_ride",
+    "overview",
+    "read_calibration",
+    "read_log",
+    "replay",
+    "sentence",
+    "simulate_ride",
+    "summary",
+    "vehicle_channels",
+    "write_calibration",
+]

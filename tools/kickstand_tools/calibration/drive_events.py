@@ -1,0 +1,89 @@
+"""What happens while an alignment is found by driving, as a list of events."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from kickstand.drive_alignment.alignment import DriveAlignment
+from kickstand.errors import Refusal
+
+from .published.viriciti import PublishedAlignment
+
+# DriveEvent.what
+LOG_BEGINS = "log-begins"
+LOG_WITHOUT_EVENTS = "log-without-events"
+USED, TURNING = "used", "turning"
+PROBLEM = "problem"
+READY, NOT_READY = "ready", "not-ready"
+
+
+@dataclass
+class DriveEvent:
+    """Something that happened in a drive, t_s seconds from the first sample of the log of that name.
+
+    what: USED (a braking event in a straight line, or a start; counted of needed), TURNING (a braking event in a turn,
+    not counted), PROBLEM (refusal says which), READY (the alignment can be taken, with quality_deg), NOT_READY (it no
+    longer can; refusal says why where no PROBLEM does), LOG_BEGINS, LOG_WITHOUT_EVENTS.
+    """
+
+    log: str
+    t_s: float
+    what: str
+    counted: int
+    needed: int
+    quality_deg: float
+    refusal: Refusal | None = None
+
+
+class DriveWatch:
+    """Makes DriveEvents of the changes in an alignment's state. events: all so far; on_event: called with each."""
+
+    def __init__(
+        self, alignment: DriveAlignment | PublishedAlignment, on_event: Callable[[DriveEvent], None] | None
+    ) -> None:
+        self.events: list[DriveEvent] = []
+        self.ready_s = 0.0  # of all logs
+        self._alignment, self._on_event = alignment, on_event
+        self._log = ""
+        self._counts = (0, 0)  # used, turned
+        self._ready = False
+        self._problem: Refusal | None = None
+        self._elapsed_s = 0.0  # in the logs before this one
+
+    def begin(self, log: str) -> None:
+        """Before the first sample of a log."""
+        self._log = log
+        self._add(0.0, LOG_BEGINS)
+
+    def end(self, t_s: float) -> None:
+        """After its last one."""
+        self.look(t_s)
+        if self.events[-1].what == LOG_BEGINS:
+            self._add(t_s, LOG_WITHOUT_EVENTS)
+        self._elapsed_s += t_s
+
+    def look(self, t_s: float) -> None:
+        """At t_s in this log: what has changed since the last call?"""
+        alignment = self._alignment
+        counts = alignment.counted, alignment.turned
+        if counts[0] > self._counts[0]:
+            self._add(t_s, USED)
+        elif counts[1] > self._counts[1]:
+            self._add(t_s, TURNING)
+        self._counts = counts
+        problem = alignment.problem
+        if problem and not self._problem:
+            self._add(t_s, PROBLEM, problem)
+        self._problem = problem
+        if alignment.ready != self._ready:
+            self._ready = alignment.ready
+            self._add(t_s, READY if self._ready else NOT_READY, None if self._ready or problem else alignment.reason)
+            self.ready_s = self.ready_s or self._elapsed_s + t_s
+
+    def _add(self, t_s: float, what: str, refusal: Refusal | None = None) -> None:
+        alignment = self._alignment
+        event = DriveEvent(
+            self._log, t_s, what, alignment.counted, alignment.needed, alignment.quality_deg, refusal
+        )
+        self.events.append(event)
+        if self._on_event:
+            self._on_event(event)

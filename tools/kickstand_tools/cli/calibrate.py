@@ -1,0 +1,195 @@
+"""The commands of `kickstand calibrate`: six, two, drive."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from ..calibration.drive import DriveResult
+    from ..calibration.drive_events import DriveEvent
+    from ..calibration.six import SixPositions
+    from ..calibration.two import TwoPositions
+
+_PATH = click.Path(path_type=Path)
+_OUT = click.option("--out", required=True, type=_PATH, help="The file to write.")
+
+
+@click.group(no_args_is_help=False)
+def calibrate() -> None:
+    """Compute a calibration from recorded poses or drives."""
+
+
+@calibrate.command()
+@click.argument("poses", nargs=-1, required=True, type=_PATH, metavar="POSE.csv...")
+@_OUT
+def six(poses: tuple[Path, ...], out: Path) -> None:
+    """Accelerometer offset and slope from six still poses, each side up once, in any order.
+
+    A seventh, slanted pose checks the result.
+    """
+    from ..calibration.file import write_calibration
+    from ..calibration.six import fit_six_positions
+    from ..output import check_output
+
+    check_output(out, list(poses))
+    found = fit_six_positions(poses)
+    _print(_six_lines(found))
+    write_calibration(out, found.calibration)
+    click.echo(f"written: {out}")
+
+
+@calibrate.command()
+@click.argument("kickstand", type=_PATH, metavar="KICKSTAND.csv")
+@click.argument("upright", type=_PATH, metavar="UPRIGHT.csv")
+@click.option("--calibration", type=_PATH, help="The result of `kickstand calibrate six`, to build on.")
+@click.option(
+    "--side", type=click.Choice(["left", "right"]), default="left", help="Where the kickstand leans to."
+)
+@_OUT
+def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out: Path) -> None:
+    """How the sensor sits on the bike, from a pose on the kickstand and one upright."""
+    from ..calibration.file import read_calibration, write_calibration
+    from ..calibration.two import fit_two_positions
+    from ..output import check_output
+
+    check_output(out, [kickstand, upright])
+    before = read_calibration(calibration) if calibration else None
+    found = fit_two_positions(kickstand, upright, before, side)
+    _print(_two_lines(found))
+    write_calibration(out, found.calibration)
+    click.echo(f"written: {out}")
+
+
+@calibrate.command()
+@click.argument("logs", nargs=-1, required=True, type=_PATH, metavar="LOG.csv...")
+@click.option(
+    "--calibration", type=_PATH, help="What is known already: six positions, and a motorcycle's two poses."
+)
+@click.option(
+    "--vehicle",
+    type=click.Choice(["motorcycle", "car"]),
+    help="motorcycle if the calibration has two poses, else car, if not given.",
+)
+@click.option("--method", type=click.Choice(["improved", "published"]), default="improved")
+@_OUT
+def drive(
+    logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None, method: str, out: Path
+) -> None:
+    """How the sensor sits on the vehicle, from logs of driving with speed: stops and straight brakings."""
+    from ..calibration.drive import fit_drive
+    from ..calibration.file import read_calibration, write_calibration
+    from ..calibration.poses import refuse_same_file
+    from ..output import check_output
+    from ..progress import Bar
+
+    check_output(out, list(logs))
+    refuse_same_file(logs)
+    before = read_calibration(calibration) if calibration else None
+    several = len(logs) > 1
+    with Bar("driving") as bar:
+        found = fit_drive(
+            logs, before, vehicle, method, bar.reach, lambda event: _print(_event_lines(event, several))
+        )
+    _print(_drive_lines(found, several))
+    write_calibration(out, found.calibration)
+    click.echo(f"written: {out}")
+
+
+def _six_lines(found: "SixPositions") -> Iterable[str]:
+    from kickstand.calibration.six_position import FREE_GOOD_G, SIDES
+
+    for side, pose, tilt in zip(SIDES, found.sides, found.tilt_deg, strict=True):
+        yield f"{side} up: {pose.name}, {pose.samples} samples, {tilt:.1f} degrees off its axis"
+    if found.free_pose and found.free_pose_error_g is not None:
+        good = "good" if abs(found.free_pose_error_g) <= FREE_GOOD_G else "usable; under 10 mg would be good"
+        yield (
+            f"free pose: {found.free_pose.name}, {found.free_pose.samples} samples, "
+            f"{found.free_pose_error_g * 1000:+.1f} mg from 1 g: {good}"
+        )
+    yield "offset     " + _axes(found.calibration.accel_offset_g, "%+.4f g")
+    yield "slope      " + _axes(found.calibration.accel_slope, "%.4f")
+    yield "gyro bias  " + _axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
+    if found.beyond_sheet:
+        axes = ", ".join(found.beyond_sheet)
+        yield f"warning: {axes} is beyond the data sheet (50 mg, z 80 mg, slope 3 %): used anyway"
+    if found.free_pose is None:
+        yield "warning: no free pose: six poses fit exactly whatever they were, only a seventh can tell"
+    yield "not aligned yet: next is kickstand calibrate two"
+
+
+def _two_lines(found: "TwoPositions") -> Iterable[str]:
+    from kickstand.calibration.two_position import WARN_TILT_DEG
+
+    calibration, first, second = found.calibration, found.kickstand, found.upright
+    side = calibration.kickstand_side
+    yield f"kickstand: {first.name}, {first.samples} samples"
+    yield (
+        f"upright:   {second.name}, {second.samples} samples, "
+        f"{found.tilt_deg:.1f} degrees from the kickstand on the {side}"
+    )
+    yield "gyro bias  " + _axes(calibration.gyro_bias_dps, "%+.2f deg/s")
+    yield from _matrix_lines(calibration.vehicle_from_sensor)
+    if found.tilt_deg < WARN_TILT_DEG:
+        yield f"warning: under {WARN_TILT_DEG:.0f} degrees, 1 degree of pitch turns forward by over 7: lean further"
+    if not calibration.six_done:
+        yield "warning: no six-position calibration: an offset of 50 mg is 3 degrees of lean"
+
+
+def _drive_lines(found: "DriveResult", several: bool) -> Iterable[str]:
+    from kickstand.drive_alignment import verdict
+
+    yield f"{found.vehicle}, method {found.method}: {found.used} used, {found.turned} in turns not used"
+    yield f"stops: {found.stops}"
+    ready = f"ready after {found.ready_s:.0f} s" + (" of all logs" if several else "")
+    yield f"quality: {found.quality_deg:.1f} degrees about the vertical; {ready}"
+    if found.lag_s is not None:
+        yield f"speed: {found.lag_s:.1f} s late; two halves of the drive differ by {found.halves_deg:.1f} degrees"
+    if found.poses:
+        yaw_deg = abs(found.poses.yaw_deg)
+        if found.poses.verdict == verdict.REVERSED:
+            yield "warning: the two poses had forward and backward exchanged: the kickstand is on the other side"
+        elif found.poses.verdict == verdict.MOVED:
+            yield f"warning: the mount is {yaw_deg:.0f} degrees from where the two poses saw it: was it moved since?"
+        else:
+            yield f"the two poses had forward {yaw_deg:.1f} degrees off"
+    yield from _matrix_lines(found.calibration.vehicle_from_sensor)
+    if not found.calibration.six_done:
+        yield "warning: no six-position calibration: an offset of 50 mg tilts the vertical by 3 degrees"
+
+
+def _event_lines(event: "DriveEvent", several: bool) -> Iterable[str]:
+    """Of several logs, the name of each is said before its events."""
+    from ..calibration import drive_events as events
+    from ..refusals import sentence
+
+    if event.what in (events.LOG_BEGINS, events.LOG_WITHOUT_EVENTS):
+        if several:
+            yield f"{event.log}:" if event.what == events.LOG_BEGINS else "           no braking in it"
+        return
+    words = {
+        events.USED: f"straight: used, {event.counted}"
+        + (f" of {event.needed}" if event.counted <= event.needed else ""),
+        events.TURNING: "turning: not counted",
+        events.READY: f"ready: forward known to {event.quality_deg:.1f} degrees",
+        events.NOT_READY: "no longer ready" + (f": {sentence(event.refusal)}" if event.refusal else ""),
+        events.PROBLEM: sentence(event.refusal) if event.refusal else "",
+    }
+    yield f"{event.t_s:7.1f} s  {words[event.what]}"
+
+
+def _matrix_lines(vehicle_from_sensor) -> Iterable[str]:
+    for name, row in zip(("left", "up", "forward"), vehicle_from_sensor, strict=True):
+        yield f"{name:<10} " + _axes(row, "%+.4f")
+
+
+def _axes(values, form: str) -> str:
+    from kickstand.units import AXES
+
+    return "  ".join(f"{axis} " + form % value for axis, value in zip(AXES, values, strict=True))
+
+
+def _print(lines: Iterable[str]) -> None:
+    for line in lines:
+        click.echo(line)

@@ -1,0 +1,108 @@
+"""The commands of `kickstand` that read a recorded ride: replay, report, plot, export."""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+
+import click
+from kickstand.errors import Notice
+
+_PATH = click.Path(path_type=Path)
+_OUT = click.option("--out", required=True, type=_PATH, help="The file to write.")
+_CALIBRATION = click.option(
+    "--calibration", type=_PATH, help="A CAL.json; if not given, the one beside the ride."
+)
+
+
+@click.command()
+@click.argument("log", type=_PATH, metavar="LOG.csv")
+@click.option("--calibration", required=True, type=_PATH, help="A CAL.json of `kickstand calibrate`.")
+@click.option("--engine", type=click.Choice(["cpython", "micropython", "rp2040"]), default="cpython")
+@_OUT
+def replay(log: Path, calibration: Path, engine: str, out: Path) -> None:
+    """Run the firmware's own lean meter over a recorded log."""
+    from ..calibration.file import read_calibration
+    from ..output import check_output
+    from ..progress import Bar
+    from ..replay.replay import replay_to_csv
+
+    check_output(out, [log, calibration])
+    parameters = read_calibration(calibration)
+    with Bar("replaying") as bar:
+        count, notices = replay_to_csv(log, parameters, engine, out, bar.reach)
+    _warn(log, notices)
+    if not parameters.aligned:
+        click.echo(
+            f"warning: {calibration} is not aligned: this is the lean of the sensor, not of the bike",
+            err=True,
+        )
+    click.echo(f"written: {out}, {count} samples")
+
+
+@click.command()
+@click.argument("ride", type=_PATH, metavar="RIDE.csv")
+@click.option("--to", "form", required=True, type=click.Choice(["csv", "vbo", "racechrono", "parquet"]))
+@_CALIBRATION
+@_OUT
+def export(ride: Path, form: str, calibration: Path | None, out: Path) -> None:
+    """Write a ride as Circuit Tools (vbo), RaceChrono or data frames (parquet, csv) open it."""
+    from ..analysis.channels import open_ride
+    from ..analysis.export.export import export
+    from ..output import check_output
+    from ..progress import Bar
+
+    check_output(out, [ride, *([calibration] if calibration else [])])
+    notices: list[Notice] = []
+    with Bar("exporting") as bar:
+        count = export(open_ride(ride, calibration), form, out, bar.reach, notices)
+    _warn(ride, notices)
+    click.echo(f"written: {out}, {count} rows")
+
+
+@click.command()
+@click.argument("ride", type=_PATH, metavar="RIDE.csv")
+@_CALIBRATION
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def report(ride: Path, calibration: Path | None, as_json: bool) -> None:
+    """A ride in a page: maxima, time at large leans, and each stop as a brake test has it."""
+    from rich.console import Console
+
+    from ..analysis.channels import open_ride
+    from ..analysis.overview import overview
+    from ..analysis.report import as_data, page
+    from ..progress import Bar
+
+    with Bar("reading") as bar:
+        seen = overview(open_ride(ride, calibration), bar.reach)
+    _warn(ride, seen.notices)
+    if as_json:
+        click.echo(json.dumps(as_data(seen)))
+    else:
+        Console().print(page(seen))
+
+
+@click.command()
+@click.argument("ride", type=_PATH, metavar="RIDE.csv")
+@_CALIBRATION
+@click.option("--out", required=True, type=_PATH, help="The directory to write to.")
+def plot(ride: Path, calibration: Path | None, out: Path) -> None:
+    """Draw a ride: a picture (PNG) and a page to zoom into (HTML)."""
+    from ..analysis.channels import open_ride
+    from ..analysis.overview import overview
+    from ..analysis.plot import plot
+    from ..progress import Bar
+
+    plot.check(out)
+    with Bar("reading") as bar:
+        seen = overview(open_ride(ride, calibration), bar.reach)
+    _warn(ride, seen.notices)
+    for path in plot.draw(seen, out):
+        click.echo(f"written: {path}")
+    _warn(ride, [seen.exchanged] if seen.exchanged else [])
+
+
+def _warn(log: Path, notices: Iterable[Notice]) -> None:
+    from ..refusals import sentence
+
+    for notice in notices:
+        click.echo(f"warning: {log}: {sentence(notice)}", err=True)

@@ -1,0 +1,80 @@
+"""What a log is read from: a file by its path, gzipped if its name ends in .gz, or an open file of text or bytes."""
+
+import gzip
+import os
+import zlib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import IO, Any
+
+from ..errors import InputError, cause
+
+File = Path | str | IO[bytes] | IO[str]
+Progress = Callable[[int, int], None]  # called with (done, total) in one unit; total is 0 where it is not known
+
+
+def name_of(source: object) -> str:
+    """What a message calls it: its path, the name of the file or of the log, or "the log"."""
+    if isinstance(source, (Path, str)):
+        return str(source)
+    name = getattr(source, "name", None)
+    return name if isinstance(name, str) and name else "the log"
+
+
+def log_stem(name: str) -> str:
+    """The name of a log without path and suffixes."""
+    return Path(name).name.removesuffix(".gz").removesuffix(".csv")
+
+
+def chunks(source: File, size: int) -> Iterator[tuple[bytes, int]]:
+    """The text, unpacked, in pieces of about `size` bytes that end at the end of a line, and the bytes read so far.
+
+    Lines end in a line feed, whatever they end in in the file. Raises InputError naming the file.
+    """
+    if not isinstance(source, (Path, str)):
+        try:
+            yield from _pieces(source, source, size)
+        except (OSError, ValueError) as error:
+            raise InputError(f"{name_of(source)} cannot be read: {cause(error)}") from error
+        return
+    path = Path(source)
+    if path.is_dir():
+        raise InputError(f"{path} is a directory: give the name of a log in it")
+    try:
+        with open(path, "rb") as packed, gzip.open(packed) if path.suffix == ".gz" else packed as file:
+            yield from _pieces(file, packed, size)
+    except gzip.BadGzipFile as error:
+        raise InputError(f"{path} is not a gzip file: unpacked logs have names without .gz") from error
+    except (EOFError, zlib.error) as error:
+        raise InputError(f"{path} is damaged or cut short: copy it again") from error
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: there is no such file") from error
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read: {cause(error)}") from error
+
+
+def total_bytes(source: object) -> int:
+    """How much chunks() will read, 0 where that is not known."""
+    if isinstance(source, (Path, str)):
+        return os.path.getsize(source) if os.path.isfile(source) else 0
+    return 0
+
+
+def _pieces(file: Any, packed: Any, size: int) -> Iterator[tuple[bytes, int]]:
+    """packed: the file below `file`, whose position tells the bytes read; the same one where nothing is packed."""
+    pending, read = b"", 0
+    while data := file.read(size):
+        data = data.encode() if isinstance(data, str) else data
+        read += len(data)
+        pending += data
+        cut = pending.rfind(b"\n") + 1 or pending.rfind(b"\r") + 1
+        if len(pending) >= size and cut:
+            yield _with_line_feeds(pending[:cut]), read if packed is file else packed.tell()
+            pending = pending[cut:]
+    if pending:
+        yield _with_line_feeds(pending + b"\n"), read if packed is file else packed.tell()
+
+
+def _with_line_feeds(text: bytes) -> bytes:
+    text = text.replace(b"\r\n", b"\n")
+    return text if b"\n" in text else text.replace(b"\r", b"\n")

@@ -1,0 +1,32 @@
+"""What the results that are tables have in common."""
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, extra
+
+if TYPE_CHECKING:
+    from pandas import DataFrame
+
+Array = NDArray[np.float64]
+
+
+@dataclass
+class Table:
+    """A dataclass whose arrays have one row a sample; its other fields say something of the whole."""
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """The arrays (n,) by the names of their fields."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+
+    def to_pandas(self) -> "DataFrame":
+        """A data frame of columns(). Raises InputError if pandas is not installed."""
+        try:
+            from pandas import DataFrame
+        except ImportError as error:
+            raise InputError("data frames need pandas: " + extra("rides")) from error
+        return DataFrame(self.columns())
