@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from driving_runs import STAND, around
 from engines import ENGINES, run
-from kickstand.drive_alignment import alignment, events, quality, verdict
+from kickstand.drive_alignment import alignment, events, quality, speed_check, verdict, vertical
 
 MOUNT = [0.48, 0.36, 0.8, -0.6, 0.8, 0.0, -0.64, -0.48, 0.6]  # far from every axis
 PLAIN = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
@@ -99,7 +99,7 @@ def test_camber_at_the_stops_does_not_reach_forward(method, yaw_deg):
 )
 def test_which_brakings_count(braking, seconds, yaw_dps, counted):
     result = drive(around(6, -braking, seconds, yaw_dps))
-    assert (result["counted"] >= quality.NEEDED) is counted, result
+    assert (result["counted"] >= quality.MIN_EVENTS) is counted, result
     if not counted:
         assert "brakings in a straight line" in engines.words(result)
         assert result["lcd"][0] == "Brake straight"
@@ -111,7 +111,7 @@ def test_it_says_what_it_waits_for():
     states = drive(legs)["states"]
     assert alignment.DriveAlignment("car").state == alignment.WAITING_FOR_SPEED
     assert states[0] == alignment.WAITING_FOR_STOP
-    assert states[1] == alignment.DRIVE
+    assert states[1] == alignment.WAITING_FOR_BRAKING
     assert {alignment.BRAKING, alignment.TURNING, alignment.READY} <= set(states)
     assert alignment.REFUSED not in states
 
@@ -147,12 +147,12 @@ def test_refusals_name_the_reason(engine):
         ({"every_s": 1.0, "step": 1 / 3.6}, True),
         ({"every_s": 0.1}, True),
         ({"every_s": 1.0, "late_s": 1.0}, True),
-        ({"late_s": 0.9 * quality.MAX_LATE_S}, True),
-        ({"late_s": 1.1 * quality.MAX_LATE_S}, False),
-        ({"scale": 0.9 / quality.MIN_SLOPE}, True),
-        ({"scale": 1.1 / quality.MIN_SLOPE}, False),
-        ({"scale": 1.1 / quality.MAX_SLOPE}, True),
-        ({"scale": 0.9 / quality.MAX_SLOPE}, False),
+        ({"late_s": 0.9 * speed_check.MAX_LAG_S}, True),
+        ({"late_s": 1.1 * speed_check.MAX_LAG_S}, False),
+        ({"scale": 0.9 / speed_check.MIN_FORCE_RATIO}, True),
+        ({"scale": 1.1 / speed_check.MIN_FORCE_RATIO}, False),
+        ({"scale": 1.1 / speed_check.MAX_FORCE_RATIO}, True),
+        ({"scale": 0.9 / speed_check.MAX_FORCE_RATIO}, False),
     ],
 )
 def test_what_a_speed_may_be_like(source, fine):
@@ -171,7 +171,7 @@ def test_how_many_brakings_it_takes(brakings, ready):
 
 @pytest.mark.parametrize(("share", "fine"), [(0.9, True), (1.1, False)])
 def test_standing_and_driving_have_to_agree(share, fine):
-    result = drive(around(8), moved=[5.8, turned(MOUNT, 0, share * quality.LEVEL_DEG)])
+    result = drive(around(8), moved=[5.8, turned(MOUNT, 0, share * vertical.MAX_CHANGE_DEG)])
     assert result["ready"] is fine
     assert fine or "standing and driving differ" in engines.words(result)
 
@@ -200,7 +200,7 @@ def test_a_mount_that_moved(axis, degrees, from_s, words):
 @pytest.mark.parametrize(("share", "fine"), [(0.3, True), (0.9, True), (1.1, False)])
 def test_halves_have_to_agree(share, fine):
     """Once ready, up to 6 degrees: an alignment that comes and goes at a threshold helps nobody."""
-    result = drive(around(8), moved=[73.0, turned(MOUNT, 1, share * quality.HALVES_STAY_DEG)])
+    result = drive(around(8), moved=[73.0, turned(MOUNT, 1, share * quality.STAY_AGREE_DEG)])
     assert result["ready"] is fine
     assert fine or "two parts" in engines.words(result)
 
@@ -210,7 +210,7 @@ def test_however_late_the_first_speed_comes_the_first_braking_counts(silent_s):
     """The history's time wraps round every nine minutes."""
     legs = [[silent_s, 0.0, 0.0], *around(6)]
     result = drive(legs, source={"every_s": 1.0, "silent": (-1.0, silent_s)})
-    assert result["counted"] == 6 + quality.MAX_STARTS - 2  # no start before the first stop, one in a bend
+    assert result["counted"] == 6 + events.MAX_ACCELERATION_EVENTS - 2  # no start before the first stop, one in a bend
     assert result["ready"]
 
 

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from engines import ENGINES, run
 from kickstand.drive_alignment import parts, standing
-from kickstand.drive_alignment.braking import BrakingFinder
+from kickstand.drive_alignment.events import EventFinder
 from kickstand.drive_alignment.history import BIN_US, MASK, SIZE, ForceHistory
-from kickstand.drive_alignment.regression import BrakingRegression, Fit
+from kickstand.drive_alignment.regression import Fit, ForwardRegression
 from kickstand.drive_alignment.speed_check import LIVELY_G, STUCK_S, TURNING_DPS, SpeedCheck
 from kickstand.drive_alignment.standing import StandingVertical
 from kickstand_tools.calibration.published.dispersion import NONE
@@ -125,11 +125,11 @@ def test_regression_is_weighted_least_squares(engine, count):
 def test_one_fit_in_the_middle_of_another_changes_neither():
     """The loop compares an alignment while a drive is being judged."""
     rng = np.random.default_rng(5)
-    regression = BrakingRegression()
+    regression = ForwardRegression()
     for k in range(8):
         for change, curve in rng.normal(size=(6, 2)):
             regression.add(0, 0.5, 0.1 * change, 0.03 * curve, [0.1 * change * k, 0.5, 0.1 * change])
-        list(regression.close_block())
+        list(regression.end_event())
     alone, begun, between = Fit(), Fit(), Fit()
     assert regression.fit(alone, 0)
     work = regression.fitting(begun, 0)
@@ -140,7 +140,7 @@ def test_one_fit_in_the_middle_of_another_changes_neither():
 
 
 def test_regression_has_nothing_to_say_without_changes_of_speed():
-    fitted, fit = BrakingRegression(), Fit()
+    fitted, fit = ForwardRegression(), Fit()
     assert not fitted.fit(fit, 0)
     for _ in range(20):
         fitted.add(0, 0.5, 0.0, 0.0, [0.0, 0.5, 0.0])
@@ -156,7 +156,7 @@ def test_parts_of_a_drive(engine):
     one, two = slice(0, 5), slice(5, 8)
     means = [np.average(angles[part], weights=weights[part]) for part in (one, two)]
     scatter = sum((weights[p] * (angles[p] - m) ** 2).sum() for p, m in zip((one, two), means, strict=True))
-    unit = (scatter + parts.USUAL * parts.USUAL_DEG**2) / (6 + parts.USUAL)
+    unit = (scatter + parts.PRIOR_FREEDOM * parts.PRIOR_DEG**2) / (6 + parts.PRIOR_FREEDOM)
     variance = sum(
         unit / weights[p].sum() + parts.STRETCH_DEG**2 * (weights[p] ** 2).sum() / weights[p].sum() ** 2
         for p in (one, two)
@@ -186,7 +186,7 @@ def test_parts_too_short_are_not_compared(change, differ):
 @pytest.mark.parametrize(("deceleration", "seconds", "found"), [(0.72, 6, False), (0.88, 6, True), (2.0, 0.5, False)])
 def test_what_a_braking_is(deceleration, seconds, found):
     """0.9 and 1.1 of the deceleration that begins one; a short one takes off too little speed."""
-    finder = BrakingFinder(1)
+    finder = EventFinder(1)
     ended = [finder.update(-deceleration * 0.5, 0.5, [True]) for _ in range(round(seconds / 0.5))]
     ended.append(finder.update(0.0, 0.5, [True]))
     assert any(ended) is found
@@ -195,7 +195,7 @@ def test_what_a_braking_is(deceleration, seconds, found):
 @pytest.mark.parametrize(("turning_s", "straight"), [(2.0, True), (2.5, False)])
 def test_a_braking_into_a_turn_counts_if_enough_was_straight(turning_s, straight):
     """Of 6 m/s lost in 3 s; 1.5 have to be straight."""
-    finder = BrakingFinder(1)
+    finder = EventFinder(1)
     for k in range(6):
         finder.update(-1.0, 0.5, [k * 0.5 < 3.0 - turning_s])
     assert finder.update(0.0, 0.5, [False])
@@ -280,12 +280,12 @@ def test_a_speed_that_stays_the_same_while_driving_is_stuck(share, stuck):
     check = SpeedCheck()
     for k in range(round(share * (STUCK_S + 1))):
         check.measure(7.0)
-        check.second([0.0, 1.0, 0.1 * (-1) ** k])
+        check.update_second([0.0, 1.0, 0.1 * (-1) ** k])
     assert (check.problem is not None) is stuck
     check = SpeedCheck()
     for k in range(100):
         check.measure(7.0)
-        check.second([0.0, 1.0, share * LIVELY_G / 2 * (-1) ** k])
+        check.update_second([0.0, 1.0, share * LIVELY_G / 2 * (-1) ** k])
     assert (check.problem is not None) is stuck
 
 
@@ -294,7 +294,7 @@ def test_a_steady_speed_through_bends_is_not_stuck(share, stuck):
     check = SpeedCheck()
     for k in range(3 * STUCK_S):
         check.measure(30.0)
-        check.second([0.0, 1.0, 0.1 * (-1) ** k], share * TURNING_DPS)
+        check.update_second([0.0, 1.0, 0.1 * (-1) ** k], share * TURNING_DPS)
     assert (check.problem is not None) is stuck
 
 

@@ -9,7 +9,7 @@ import math
 from kickstand.drive_alignment import verdict
 from kickstand.drive_alignment.alignment import DriveAlignment
 from kickstand.drive_alignment.parts import DriveParts
-from kickstand.drive_alignment.regression import BrakingRegression, Fit
+from kickstand.drive_alignment.regression import Fit, ForwardRegression
 from kickstand.errors import Refusal
 from kickstand.rotation import matrix
 from kickstand.ui import messages
@@ -141,11 +141,11 @@ def drive(legs, mount, options):
 
 def regression(rows, lag):
     """rows [seconds, change_g, curve_g, force (3)], a block closed after every tenth: forward, level, blocks."""
-    fitted, fit = BrakingRegression(), Fit()
+    fitted, fit = ForwardRegression(), Fit()
     for k, (seconds, change, curve, force) in enumerate(rows):
         fitted.add(lag, seconds, change, curve, force)
         if k % 10 == 9:
-            for _ in fitted.close_block():
+            for _ in fitted.end_event():
                 pass
     fitted.fit(fit, lag)
     return list(fit.forward), list(fit.level), fitted.blocks

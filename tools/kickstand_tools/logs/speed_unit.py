@@ -9,7 +9,7 @@ more.
 from pathlib import Path
 
 import numpy as np
-from kickstand.drive_alignment.quality import speed_unit_problem
+from kickstand.drive_alignment.speed_check import speed_unit_problem
 from numpy.typing import NDArray
 
 from ..errors import InputError
