@@ -57,7 +57,8 @@ def allocated():
 
 
 def test_alignment_by_driving_on_the_chip(monkeypatch):
-    """A start, then four brakings and starts. An update takes at most 2 ms of the 10 that samples are apart."""
+    """Five acceleration events, a braking event between each two. An update takes at most 2 ms of the 10 ms between
+    samples."""
     mount = random_mounting(4)
     host = {"mount": mount, "clock": time.monotonic_ns, "elapsed": lambda began: 0, "allocated": lambda: 0}
     monkeypatch.setattr(alignment, "PIECE_US", 10**9)

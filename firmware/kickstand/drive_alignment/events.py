@@ -13,11 +13,13 @@ from .regression import LAG_STEP_US, LAGS, Fit, ForwardRegression
 # An event begins at the one acceleration, ends at the other, and changes the speed by at least this much.
 BEGIN_MPS2, END_MPS2 = 0.8, 0.4
 CHANGE_MPS = 1.5
-MAX_ACCELERATION_EVENTS = 2  # of them count: braking shows forward better
+MAX_ACCELERATION_EVENTS = 2  # more than these do not count, because braking shows forward better
 MIN_INTERVAL_US = 400_000  # a GPS at 10 Hz tells no more than one at 2 Hz, and its differences are noisier
 MAX_INTERVAL_US = 2_200_000  # one value of a GPS at 1 Hz may be missing
 MAX_WAITING = 4  # intervals that wait while an earlier one is worked on
-STRAIGHT_DPS = 2.0  # at 10 m/s this is 0.036 g sideways, a fifth of a braking event, most of which the fit takes off
+# A larger yaw rate is a turn. At 10 m/s this one makes 0.036 g sideways, a fifth of the force of braking; the
+# regression takes most of it off.
+STRAIGHT_DPS = 2.0
 MIN_SPEED_MPS = 1.0  # slower, steering angles are large and a stop ends with a jerk
 MAX_FORCE_G = 3.0  # a mean over an interval beyond this is a knock
 
