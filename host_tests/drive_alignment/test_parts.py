@@ -4,12 +4,12 @@ import driving_runs
 import numpy as np
 import pytest
 from engines import ENGINES, run
-from kickstand.drive_alignment import parts, standing
+from kickstand.drive_alignment import parts, vertical
 from kickstand.drive_alignment.events import EventFinder
 from kickstand.drive_alignment.history import BIN_US, MASK, SIZE, ForceHistory
 from kickstand.drive_alignment.regression import Fit, ForwardRegression
 from kickstand.drive_alignment.speed_check import LIVELY_G, STUCK_S, TURNING_DPS, SpeedCheck
-from kickstand.drive_alignment.standing import StandingVertical
+from kickstand.drive_alignment.vertical import StandingVertical
 from kickstand_tools.calibration.published.dispersion import NONE
 from kickstand_tools.calibration.published.rodrigues import rotation_between
 
@@ -203,9 +203,9 @@ def test_a_braking_event_into_a_turn_counts_if_enough_was_straight(turning_s, st
     assert finder.was_straight(0) is straight
 
 
-def stand(vertical, force, seconds, speed=0.0, rate=(0.0, 0.0, 0.0)):
+def stand(standing, force, seconds, speed=0.0, rate=(0.0, 0.0, 0.0)):
     for _ in range(round(seconds * 10)):
-        vertical.update(force, rate, speed, 0.1)
+        standing.update(force, rate, speed, 0.1)
 
 
 def level(pitch_deg, roll_deg=0.0):
@@ -214,15 +214,15 @@ def level(pitch_deg, roll_deg=0.0):
 
 
 def test_the_vertical_is_the_mean_direction_of_stops_whatever_their_lengths():
-    vertical = StandingVertical()
+    standing = StandingVertical()
     for k, (pitch, seconds) in enumerate([(3.0, 300.0), (-3.0, 5.0), (2.0, 5.0), (-2.0, 5.0)]):
-        stand(vertical, level(pitch), seconds, rate=(0.1 * k, -0.2, 0.3))
-        assert vertical.standing
-        stand(vertical, level(10.0), 3.0, speed=10.0)
-    assert vertical.stops == 4
-    assert np.degrees(np.arcsin(vertical.up[2])) == pytest.approx(0.0, abs=0.01)
-    assert vertical.bias == pytest.approx((0.3, -0.2, 0.3), abs=1e-5)
-    assert not vertical.moved
+        stand(standing, level(pitch), seconds, rate=(0.1 * k, -0.2, 0.3))
+        assert standing.standing
+        stand(standing, level(10.0), 3.0, speed=10.0)
+    assert standing.stops == 4
+    assert np.degrees(np.arcsin(standing.up[2])) == pytest.approx(0.0, abs=0.01)
+    assert standing.bias == pytest.approx((0.3, -0.2, 0.3), abs=1e-5)
+    assert not standing.moved
 
 
 @pytest.mark.parametrize(
@@ -230,50 +230,50 @@ def test_the_vertical_is_the_mean_direction_of_stops_whatever_their_lengths():
     [
         (0.9 * 3.1, 0.0, 0.0, 0),  # 3.1 s are SETTLE_S, COUNTS_S and the first mean of 0.1 s
         (1.1 * 3.1, 0.0, 0.0, 1),
-        (10.0, 0.9 * standing.SPEED_MPS, 0.0, 1),
-        (10.0, 1.1 * standing.SPEED_MPS, 0.0, 0),
-        (10.0, 0.0, 0.9 * standing.STILL_G, 1),
-        (10.0, 0.0, 1.1 * standing.STILL_G, 0),
+        (10.0, 0.9 * vertical.STANDING_MPS, 0.0, 1),
+        (10.0, 1.1 * vertical.STANDING_MPS, 0.0, 0),
+        (10.0, 0.0, 0.9 * vertical.STILL_G, 1),
+        (10.0, 0.0, 1.1 * vertical.STILL_G, 0),
     ],
 )
 def test_what_a_stop_is(seconds, speed, shake, stops):
-    vertical = StandingVertical()
+    standing = StandingVertical()
     for k in range(round(seconds * 10)):
         # the running mean follows by a fifth each time: from it this shaking is off by 10 / 9 of its size
-        vertical.update([0.0, 1.0, 0.9 * shake * (-1) ** k], (0.0, 0.0, 0.0), speed, 0.1)
-    assert vertical.stops == stops
+        standing.update([0.0, 1.0, 0.9 * shake * (-1) ** k], (0.0, 0.0, 0.0), speed, 0.1)
+    assert standing.stops == stops
 
 
 @pytest.mark.parametrize(("apart", "moved"), [(0.9, False), (1.1, True)])
 def test_stops_too_far_apart_are_a_mount_that_moved(apart, moved):
-    vertical = StandingVertical()
-    for pitch in (0.0, apart * standing.MAX_APART_DEG):
-        stand(vertical, level(pitch), 5.0)
-        stand(vertical, level(0.0), 3.0, speed=10.0)
-    assert vertical.moved is moved
+    standing = StandingVertical()
+    for pitch in (0.0, apart * vertical.MAX_CHANGE_DEG):
+        stand(standing, level(pitch), 5.0)
+        stand(standing, level(0.0), 3.0, speed=10.0)
+    assert standing.moved is moved
 
 
 def test_a_late_speed_is_not_taken_for_a_sensor_turned_while_standing():
     """A vehicle may speed up evenly for some seconds while a late speed still says zero. A sensor that was turned stays
     so for longer."""
-    vertical = StandingVertical()
-    stand(vertical, level(0.0), 5.0)
-    stand(vertical, level(15.0), 2.5)
-    assert not vertical.moved
-    assert np.degrees(np.arcsin(vertical.up[2])) < 0.2
-    stand(vertical, level(15.0), 10.0)
-    assert vertical.moved
+    standing = StandingVertical()
+    stand(standing, level(0.0), 5.0)
+    stand(standing, level(15.0), 2.5)
+    assert not standing.moved
+    assert np.degrees(np.arcsin(standing.up[2])) < 0.2
+    stand(standing, level(15.0), 10.0)
+    assert standing.moved
 
 
 @pytest.mark.parametrize(("share", "moved"), [(0.9, True), (1.1, False)])
 def test_a_bend_at_a_stuck_zero_is_no_stop(share, moved):
     """In a bend the rate is further from the bias of the stop before than warming up can change that bias."""
-    vertical = StandingVertical()
-    stand(vertical, level(0.0), 5.0, rate=(1.0, -4.0, 2.0))
-    stand(vertical, level(0.0), 3.0, speed=10.0)
-    stand(vertical, level(15.0), 10.0, rate=(1.0, -4.0 + share * standing.TURNING_DPS, 2.0))
-    assert vertical.moved is moved
-    assert vertical.stops == (2 if moved else 1)
+    standing = StandingVertical()
+    stand(standing, level(0.0), 5.0, rate=(1.0, -4.0, 2.0))
+    stand(standing, level(0.0), 3.0, speed=10.0)
+    stand(standing, level(15.0), 10.0, rate=(1.0, -4.0 + share * vertical.TURNING_DPS, 2.0))
+    assert standing.moved is moved
+    assert standing.stops == (2 if moved else 1)
 
 
 @pytest.mark.parametrize(("share", "stuck"), [(0.9, False), (1.1, True)])

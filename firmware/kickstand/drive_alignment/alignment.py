@@ -20,8 +20,7 @@ from .events import DrivingEvents
 from .history import BIN_US, ForceHistory
 from .quality import MIN_EVENTS, DrivingQuality
 from .speed_check import SpeedCheck
-from .standing import COUNTS_S, MAX_APART_DEG, MOVED_MPS, SETTLE_S, StandingVertical
-from .vertical import Vertical
+from .vertical import COUNTS_S, MAX_CHANGE_DEG, MOVED_MPS, SETTLE_S, StandingVertical, Vertical
 
 CAR, MOTORCYCLE = "car", "motorcycle"
 
@@ -105,7 +104,7 @@ class DriveAlignment:
     def problem(self):
         """What is wrong with the speed or with the mount: an AlignmentError, or None."""
         if self._speed_check.problem is None and self.standing.moved and self.vehicle == CAR:
-            return AlignmentError("mount-moved", "between-stops", MAX_APART_DEG)
+            return AlignmentError("mount-moved", "between-stops", MAX_CHANGE_DEG)
         if self.counted < self.needed:
             return self._speed_check.problem
         return self._speed_check.problem or self.quality.mount_problem or self.quality.speed_problem
