@@ -204,7 +204,7 @@ class BackgroundAlignment:
 
     @property
     def _trim_deg(self):
-        """The trim as the lean filter has it now, stored or not."""
+        """What the ride has found by now, stored or not."""
         return degrees(self._meter.filter.trim.angle)
 
     def _save(self, vehicle_from_sensor, trim_deg):
