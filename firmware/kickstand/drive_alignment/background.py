@@ -36,7 +36,7 @@ class BackgroundAlignment:
     """
 
     def __init__(self, vehicle, speed, meter, calibration):
-        self._vehicle = vehicle
+        self.vehicle = vehicle
         self.speed = speed
         self._meter = meter
         self._active = calibration
@@ -58,10 +58,10 @@ class BackgroundAlignment:
     def _restart(self):
         old = self._meter.calibration
         self._calibration = old  # is applied to all that is fed to this drive, whatever is saved meanwhile
-        trusted = self._vehicle == MOTORCYCLE and old.aligned and not self._asked
+        trusted = self.vehicle == MOTORCYCLE and old.aligned and not self._asked
         up = old.vehicle_from_sensor[3:6] if trusted else None
-        self.drive = DriveAlignment(self._vehicle, up, _KNOWN_BIAS if old.aligned else None)
-        self.shown = self.shown or (self._vehicle != MOTORCYCLE and not old.aligned)
+        self.drive = DriveAlignment(self.vehicle, up, _KNOWN_BIAS if old.aligned else None)
+        self.shown = self.shown or (self.vehicle != MOTORCYCLE and not old.aligned)
         self.result = None
         self._clear_sums()
 
@@ -96,7 +96,7 @@ class BackgroundAlignment:
         A speed that no braking event has confirmed is not given, because a wheel may have two magnets. Neither is zero,
         which a broken wire gives too: the filter sees a standstill by itself.
         """
-        if self._vehicle != MOTORCYCLE:
+        if self.vehicle != MOTORCYCLE:
             return speed
         drive = self.drive
         confirmed = drive.counted >= MIN_EVENTS_TO_CHECK_SPEED and drive.quality.speed_problem is None
@@ -142,7 +142,7 @@ class BackgroundAlignment:
                 self._take(True)
         else:
             verdict = compare(drive, self._meter.calibration.vehicle_from_sensor)
-            if self._vehicle != MOTORCYCLE:
+            if self.vehicle != MOTORCYCLE:
                 if drive.ready and verdict in (REFINED, MOVED, REVERSED):
                     self._take(verdict != REFINED)
             elif verdict == REVERSED:
@@ -171,7 +171,7 @@ class BackgroundAlignment:
     def _say(self, message):
         if message.code not in self._answered:
             self.message = message
-            if self._vehicle == MOTORCYCLE and message.code in _DOUBTS:
+            if self.vehicle == MOTORCYCLE and message.code in _DOUBTS:
                 self._meter.doubt = message.code
 
     def answer(self, agreed):
