@@ -1,4 +1,5 @@
-"""The device aligned by driving: cars from nothing, motorcycles checked and refined, speeds that cannot be used."""
+"""The whole device aligned by driving: cars without any alignment before, motorcycles whose alignment is checked and
+refined, and speed sources that cannot be used."""
 
 import math
 
@@ -15,7 +16,8 @@ POSES_S = 20.0
 
 
 def town(blocks):
-    """[[function of rides, arguments], ...]: 30 s each with one straight braking to a stop of 6 s, and a turn."""
+    """A ride of blocks of 30 s, each with a turn and one straight braking event to a stop of some 8 s. Each entry is
+    [the name of a manoeuvre, its arguments]."""
     ride = []
     for k in range(blocks):
         ride += [["accelerate", 13.0 + k % 3, 6.0], ["turn", -25.0 if k % 2 else 20.0, 3.0], ["straight", 5.0]]
@@ -24,7 +26,7 @@ def town(blocks):
 
 
 def stops(time_s, start_s):
-    """True while the bike of town(), begun at start_s, stands."""
+    """True while the vehicle stands, in a ride whose town() begins at start_s."""
     return time_s < start_s or (time_s - start_s) % 30.0 > 21.0
 
 
@@ -48,7 +50,7 @@ def stored(flash):
 
 
 def forward_error_deg(calibration, seed=None):
-    """Of the heading of forward alone: what driving finds."""
+    """The yaw error, which is what driving finds. seed: of the sensor's mount and errors."""
     true = sensor_errors.Sensor(seed=seed).vehicle_from_sensor
     up, forward = true[3:6], calibration.vehicle_from_sensor[6:9]
     left = sum(a * b for a, b in zip(true[0:3], forward, strict=True))
@@ -85,7 +87,7 @@ def test_nothing_is_stored_before_it_is_ready(tmp_path):
 
 
 def test_a_car_by_its_wheel_stores_at_standstill_only(tmp_path):
-    """Ready in the middle of a braking that goes on to a slower speed, not to a stop."""
+    """It becomes ready in a braking event that ends at a slower speed, not at a stop."""
     plan = car("wheel", 2, wheel={"bounce_us": 2000})
     moving = [["brake", 4.0, 3.0], ["straight", 2.0], ["accelerate", 15.0, 6.0], ["straight", 5.0]]
     plan["ride"] += [["accelerate", 15.0, 6.0], ["straight", 5.0], *moving * 4, ["brake", 0.0, 5.0], ["wait", 8.0]]
@@ -104,11 +106,11 @@ def test_a_car_whose_sensor_is_mounted_anew_finds_it_out(tmp_path):
     assert record.first("Aligned by drive") < math.inf
     after = list(stored(tmp_path).vehicle_from_sensor)
     true = sensor_errors.random_mounting(8)
-    assert max(abs(a - b) for a, b in zip(after, true, strict=True)) < 0.12  # the part's own errors: 4 degrees
+    assert max(abs(a - b) for a, b in zip(after, true, strict=True)) < 0.12  # the sensor's own errors make 4 degrees
     assert max(abs(a - b) for a, b in zip(before, true, strict=True)) > 0.5
 
 
-def test_a_wrong_kickstand_side_is_noticed_and_put_right(tmp_path):
+def test_a_wrong_kickstand_side_is_noticed_and_corrected(tmp_path):
     question = "Stand was right"
     record = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,)))
     asked = record.first(question)
@@ -126,7 +128,7 @@ def test_a_wrong_kickstand_side_is_noticed_and_put_right(tmp_path):
     assert forward_error_deg(stored(tmp_path)) < 2.0
 
 
-def test_a_side_that_the_rider_stands_by_is_not_asked_for_again(tmp_path):
+def test_a_side_that_the_rider_confirms_is_not_asked_for_again(tmp_path):
     asked = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,))).first("Stand was right")
     record = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,), presses=[*POSES, [asked + 1, SHORT]]))
     assert record.first("Stand was right", asked + 2.0) == math.inf
@@ -135,7 +137,8 @@ def test_a_side_that_the_rider_stands_by_is_not_asked_for_again(tmp_path):
 
 @pytest.mark.parametrize(("model", "config"), [({"until_s": 65.0}, {}), ({}, {"PULSES_PER_METRE": 0.25})])
 def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
-    """A wire that breaks on the way reads as standing still, a second magnet as twice the speed. Told at a stop."""
+    """A wire that breaks during the ride reads as standing still, a second magnet as twice the speed. The display says
+    so at a stop."""
     plan = bike("wheel", 8, wheel=model, config={"SPEED": "wheel", **config})
     record = devices.run("cpython", tmp_path, plan)
     for town_round in range(8):
@@ -146,8 +149,8 @@ def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
     assert record.at(told + 2.0) == record.at(told)  # until it is answered, or the ride goes on
 
 
-def test_a_question_that_is_not_on_the_display_is_not_answered(tmp_path):
-    """A press meant for the page that is in front of it."""
+def test_a_press_for_another_page_does_not_answer_a_hidden_question(tmp_path):
+    """The information page is in front of the question."""
     plan = bike("gps", 3, kickstand=(12.0,))
     asked = devices.run("cpython", tmp_path, plan).first("Stand was right")
     to_info = [[asked - 14.0, LONG], *([asked - 12.0 + t, SHORT] for t in range(3)), [asked - 9.0, LONG]]
@@ -159,7 +162,7 @@ def test_a_question_that_is_not_on_the_display_is_not_answered(tmp_path):
 
 
 def test_the_trim_of_the_ride_outlives_a_refined_alignment(tmp_path):
-    """Upright was 2 degrees off, which riding finds out; then forward is refined at a stop."""
+    """Riding finds that the upright pose was 2 degrees off. Then forward is refined at a stop."""
     plan = bike("wheel", 7, kickstand=(-12.0, 2.0))
     plan["ride"][1] = ["upright", 10.0, 2.0, 0.0]
     record = devices.run("cpython", tmp_path, plan)
@@ -169,7 +172,8 @@ def test_the_trim_of_the_ride_outlives_a_refined_alignment(tmp_path):
 
 
 def test_pitch_on_the_kickstand_is_found_while_riding(tmp_path):
-    """Two degrees turn forward by almost ten; after ten brakings 1.5 at most are left. Held maxima stay."""
+    """Two degrees of pitch give a yaw error of almost ten. After ten braking events at most 1.5 are left. The maxima
+    are kept."""
     plan = bike("wheel", 11, kickstand=(-12.0, 2.0))
     first = devices.run("cpython", tmp_path, {**plan, "until": 19.0})
     assert first.first("Aligned!") < 19.0
@@ -180,14 +184,14 @@ def test_pitch_on_the_kickstand_is_found_while_riding(tmp_path):
     assert record.first("Max right +(19|2[0-9])°", POSES_S + 300.0) < math.inf
 
 
-def test_a_mount_that_moved_is_told(tmp_path):
+def test_the_display_says_that_the_mount_has_moved(tmp_path):
     record = devices.run("cpython", tmp_path, bike("wheel", 6, remount=[POSES_S + 100.0, 8]))
     told = record.first("Mount has moved", POSES_S + 100.0)
     assert told < math.inf and stops(told, POSES_S)
 
 
-def test_another_message_does_not_take_back_that_the_mount_has_moved(tmp_path):
-    """The wire of the wheel breaks after that; nobody has answered."""
+def test_another_message_does_not_bring_the_lean_back_after_the_mount_has_moved(tmp_path):
+    """The wheel's wire breaks later, and nobody has answered the first message."""
     record = devices.run("cpython", tmp_path, bike("wheel", 12, remount=[POSES_S + 100.0, 8], wheel={"until_s": 215.0}))
     moved = record.first("Mount has moved")
     assert moved < record.first("Speed stuck") < math.inf
@@ -195,7 +199,8 @@ def test_another_message_does_not_take_back_that_the_mount_has_moved(tmp_path):
 
 
 def test_asked_for_on_a_motorcycle_it_keeps_the_old_alignment_until_the_new_one_is_ready(tmp_path):
-    """The menu, for a sensor that was mounted anew; a sensor fault on the way does no harm."""
+    """The rider asks for it in the menu, for a sensor that was mounted anew. A fault of the sensor during the drive
+    does no harm."""
     devices.run("cpython", tmp_path, bike("gps", 0))
     old = list(stored(tmp_path).vehicle_from_sensor)
     menu = [[2, LONG], *([4 + t, SHORT] for t in range(4)), [9, LONG]]
@@ -222,14 +227,14 @@ def test_asked_for_on_a_motorcycle_it_keeps_the_old_alignment_until_the_new_one_
         ("wheel", {"until_s": 40.0}, {}, "Speed stuck at"),
     ],
 )
-def test_a_speed_that_cannot_be_used_is_told_and_nothing_is_stored(source, model, config, said, tmp_path):
+def test_a_speed_that_cannot_be_used_is_reported_and_nothing_is_stored(source, model, config, said, tmp_path):
     plan = car(source, 5, config=config)
     record = devices.run("cpython", tmp_path, {**plan, source: model})
     assert record.first(said) < math.inf, {tuple(f[1:]) for f in record.frames}
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_speed_that_fails_for_a_while_is_told_and_does_no_harm(tmp_path):
+def test_a_speed_that_fails_for_a_while_is_reported_and_does_no_harm(tmp_path):
     faults = [["unplugged", 15, 30], ["garbled", 45, 62]]
     record = devices.run("cpython", tmp_path, car("gps", 7, gps={"faults": faults}))
     assert record.first("GPS silent") == pytest.approx(21.0, abs=3.0)
@@ -238,7 +243,7 @@ def test_a_speed_that_fails_for_a_while_is_told_and_does_no_harm(tmp_path):
     assert forward_error_deg(stored(tmp_path), 3) < 1.5
 
 
-def test_without_a_source_nothing_is_different(tmp_path):
+def test_without_a_speed_source_the_menu_has_no_alignment_by_driving(tmp_path):
     presses = [*POSES, [20, LONG]]
     record = devices.run("cpython", tmp_path, bike("gps", 1, config={"SPEED": None}, presses=presses, until=22.0))
     assert record.at(21.5)[1] == "next 1/6 hold=ok"
@@ -274,7 +279,7 @@ def test_a_wrong_setting_of_the_speed_is_named(config, named):
         board.uninstall()
 
 
-def test_pins_of_a_source_that_is_not_used_may_have_another_use(tmp_path):
+def test_pins_of_a_speed_source_that_is_not_used_are_free_for_others(tmp_path):
     record = devices.run("cpython", tmp_path, {"lean": [[0, 0]], "config": {"BUTTON_PIN": 14}, "until": 2})
     assert record.last[0].startswith("Raw")
 
@@ -288,7 +293,7 @@ def test_pins_of_a_source_that_is_not_used_may_have_another_use(tmp_path):
         ({"SPEED": "wheel"}, {"wheel": {}}, "GPIO 14, 0.50 pulses a metre:\n  15.0 m/s"),
     ],
 )
-def test_status_tells_the_speed(config, fitted, said, capsys, monkeypatch, tmp_path):
+def test_status_shows_the_speed(config, fitted, said, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     board = Board(level)
     for source, kind in fitted.items():

@@ -1,15 +1,15 @@
-"""The pieces of alignment by driving, each against numpy, on CPython and MicroPython."""
+"""The pieces of alignment by driving, one by one, against numpy where there is something to compute."""
 
 import driving_runs
 import numpy as np
 import pytest
 from engines import ENGINES, run
-from kickstand.drive_alignment import parts, standing
-from kickstand.drive_alignment.braking import BrakingFinder
+from kickstand.drive_alignment import parts, vertical
+from kickstand.drive_alignment.events import EventFinder
 from kickstand.drive_alignment.history import BIN_US, MASK, SIZE, ForceHistory
-from kickstand.drive_alignment.regression import BrakingRegression, Fit
+from kickstand.drive_alignment.regression import Fit, ForwardRegression
 from kickstand.drive_alignment.speed_check import LIVELY_G, STUCK_S, TURNING_DPS, SpeedCheck
-from kickstand.drive_alignment.standing import StandingVertical
+from kickstand.drive_alignment.vertical import StandingVertical
 from kickstand_tools.calibration.published.dispersion import NONE
 from kickstand_tools.calibration.published.rodrigues import rotation_between
 
@@ -24,7 +24,7 @@ def unit(rng):
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("off_deg", [0.0, 1e-3, 0.01, 0.1, 1.0, 45.0, 89.9, 90.1, 179.0, 179.9, 179.99, 180.0])
 def test_rotation_between_is_safe_at_every_angle(engine, off_deg):
-    """Rotation matrices that take a to b, to 1e-6, up to exactly antiparallel."""
+    """It is a rotation and takes a to b, within 2e-6, even where a and b are exactly antiparallel."""
     rng = np.random.default_rng(3)
     off = np.radians(off_deg)
     calls, pairs = [], []
@@ -44,7 +44,7 @@ def test_rotation_between_is_safe_at_every_angle(engine, off_deg):
 
 
 def test_rotation_between_in_32_bits():
-    """The formula as it stands fails there; with the half turn every entry is good to 1e-6."""
+    """At 0.01 degrees from antiparallel Rodrigues' formula fails. With the half turn every entry is good to 1e-6."""
     a = np.array([np.sin(np.radians(0.01)), -np.cos(np.radians(0.01)), 0.0], np.float32)
     out = np.zeros(9, np.float32)
     rotation_between(out, list(a), [np.float32(v) for v in UP], 0)
@@ -60,7 +60,7 @@ def test_dispersion_is_fishers(engine, sigma_deg):
     angles = 2.5 + np.radians(sigma_deg) * rng.normal(size=400)
     mean = np.angle(np.exp(1j * angles).mean())
     expected = (1 - np.cos(2 * (angles - mean)).mean()) / (2 * abs(np.exp(1j * angles).mean()) ** 2)
-    lengths = rng.uniform(0.1, 3.0, 400)  # do not count
+    lengths = rng.uniform(0.1, 3.0, 400)  # make no difference
     directions = (lengths * [np.cos(angles), np.sin(angles)]).T.tolist()
     [value] = run(engine, [("dispersion", [directions])])
     assert value == pytest.approx(expected, rel=2e-3)
@@ -68,12 +68,12 @@ def test_dispersion_is_fishers(engine, sigma_deg):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-def test_opposite_directions_have_no_dispersion_to_speak_of(engine):
+def test_opposite_directions_have_the_largest_dispersion(engine):
     assert run(engine, [("dispersion", [[[1, 0], [-1, 0]]]), ("dispersion", [[[1, 0]]])]) == [NONE, 0.0]
 
 
 def test_history_is_exact_and_wraps_round():
-    """Differences of the integrals against numpy, across the wrap of time and sums; nothing outside what is kept."""
+    """Differences of the integrals against numpy, across the wrap of time and sums. No answer outside the history."""
     rng = np.random.default_rng(2)
     history = ForceHistory()
     history.now = MASK - 3_000_000
@@ -106,7 +106,7 @@ def test_history_is_exact_and_wraps_round():
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("count", [60, 300])
 def test_regression_is_weighted_least_squares(engine, count):
-    """However often blocks were joined: forward and level as numpy's."""
+    """Forward and level as numpy finds them, however often blocks were joined."""
     rng = np.random.default_rng(count)
     seconds = rng.uniform(0.4, 1.1, count)
     a, c = rng.normal(0, 0.1, count), rng.normal(0, 0.03, count)
@@ -122,14 +122,14 @@ def test_regression_is_weighted_least_squares(engine, count):
     assert 5 <= blocks <= 8
 
 
-def test_one_fit_in_the_middle_of_another_changes_neither():
-    """The loop compares an alignment while a drive is being judged."""
+def test_a_fit_made_while_another_is_half_done_changes_neither():
+    """The loop may compare an alignment with the drive while the quality of the drive is being judged."""
     rng = np.random.default_rng(5)
-    regression = BrakingRegression()
+    regression = ForwardRegression()
     for k in range(8):
         for change, curve in rng.normal(size=(6, 2)):
             regression.add(0, 0.5, 0.1 * change, 0.03 * curve, [0.1 * change * k, 0.5, 0.1 * change])
-        list(regression.close_block())
+        list(regression.end_event())
     alone, begun, between = Fit(), Fit(), Fit()
     assert regression.fit(alone, 0)
     work = regression.fitting(begun, 0)
@@ -139,8 +139,8 @@ def test_one_fit_in_the_middle_of_another_changes_neither():
     assert begun.found and begun.forward == alone.forward != between.forward
 
 
-def test_regression_has_nothing_to_say_without_changes_of_speed():
-    fitted, fit = BrakingRegression(), Fit()
+def test_without_changes_of_speed_there_is_nothing_to_fit():
+    fitted, fit = ForwardRegression(), Fit()
     assert not fitted.fit(fit, 0)
     for _ in range(20):
         fitted.add(0, 0.5, 0.0, 0.0, [0.0, 0.5, 0.0])
@@ -149,14 +149,15 @@ def test_regression_has_nothing_to_say_without_changes_of_speed():
 
 @pytest.mark.parametrize("engine", ENGINES)
 def test_parts_of_a_drive(engine):
-    """Where forward turned by 12 degrees after five of eight blocks, against numpy; wherever forward of all is."""
+    """Forward turns by 12 degrees after five of eight blocks. Against numpy, with two directions of the whole drive's
+    forward."""
     rng = np.random.default_rng(5)
     weights, seconds = rng.uniform(0.1, 0.5, 8), rng.uniform(25.0, 40.0, 8)
     angles = np.array([0.0] * 5 + [12.0] * 3) + rng.normal(0.0, 1.0, 8)
     one, two = slice(0, 5), slice(5, 8)
     means = [np.average(angles[part], weights=weights[part]) for part in (one, two)]
     scatter = sum((weights[p] * (angles[p] - m) ** 2).sum() for p, m in zip((one, two), means, strict=True))
-    unit = (scatter + parts.USUAL * parts.USUAL_DEG**2) / (6 + parts.USUAL)
+    unit = (scatter + parts.PRIOR_FREEDOM * parts.PRIOR_DEG**2) / (6 + parts.PRIOR_FREEDOM)
     variance = sum(
         unit / weights[p].sum() + parts.STRETCH_DEG**2 * (weights[p] ** 2).sum() / weights[p].sum() ** 2
         for p in (one, two)
@@ -173,7 +174,7 @@ def test_parts_of_a_drive(engine):
 
 @pytest.mark.parametrize(("change", "differ"), [(0, True), (4, False), (5, False)])
 def test_parts_too_short_are_not_compared(change, differ):
-    """Too little change of speed for forward, too few seconds for the vertical."""
+    """Forward needs enough change of speed, the vertical enough seconds."""
     block = [0.0, 1.0, 0.0, 0.0, 0.2, 40.0]
     last = [0.2, 1.0, 0.2, 0.2, 0.11, 22.0]
     if change:
@@ -184,27 +185,27 @@ def test_parts_too_short_are_not_compared(change, differ):
 
 
 @pytest.mark.parametrize(("deceleration", "seconds", "found"), [(0.72, 6, False), (0.88, 6, True), (2.0, 0.5, False)])
-def test_what_a_braking_is(deceleration, seconds, found):
-    """0.9 and 1.1 of the deceleration that begins one; a short one takes off too little speed."""
-    finder = BrakingFinder(1)
+def test_what_a_braking_event_is(deceleration, seconds, found):
+    """0.9 and 1.1 of the deceleration that begins one. A third is so short that it takes off too little speed."""
+    finder = EventFinder(1)
     ended = [finder.update(-deceleration * 0.5, 0.5, [True]) for _ in range(round(seconds / 0.5))]
     ended.append(finder.update(0.0, 0.5, [True]))
     assert any(ended) is found
 
 
 @pytest.mark.parametrize(("turning_s", "straight"), [(2.0, True), (2.5, False)])
-def test_a_braking_into_a_turn_counts_if_enough_was_straight(turning_s, straight):
-    """Of 6 m/s lost in 3 s; 1.5 have to be straight."""
-    finder = BrakingFinder(1)
+def test_a_braking_event_into_a_turn_counts_if_enough_was_straight(turning_s, straight):
+    """It takes off 6 m/s in 3 s, of which 1.5 m/s have to be straight."""
+    finder = EventFinder(1)
     for k in range(6):
         finder.update(-1.0, 0.5, [k * 0.5 < 3.0 - turning_s])
     assert finder.update(0.0, 0.5, [False])
     assert finder.was_straight(0) is straight
 
 
-def stand(vertical, force, seconds, speed=0.0, rate=(0.0, 0.0, 0.0)):
+def stand(standing, force, seconds, speed=0.0, rate=(0.0, 0.0, 0.0)):
     for _ in range(round(seconds * 10)):
-        vertical.update(force, rate, speed, 0.1)
+        standing.update(force, rate, speed, 0.1)
 
 
 def level(pitch_deg, roll_deg=0.0):
@@ -212,80 +213,81 @@ def level(pitch_deg, roll_deg=0.0):
     return [np.sin(r), np.cos(p) * np.cos(r), np.sin(p) * np.cos(r)]
 
 
-def test_the_vertical_is_the_mean_direction_of_stops_however_long():
-    vertical = StandingVertical()
+def test_the_vertical_is_the_mean_direction_of_stops_whatever_their_lengths():
+    standing = StandingVertical()
     for k, (pitch, seconds) in enumerate([(3.0, 300.0), (-3.0, 5.0), (2.0, 5.0), (-2.0, 5.0)]):
-        stand(vertical, level(pitch), seconds, rate=(0.1 * k, -0.2, 0.3))
-        assert vertical.standing
-        stand(vertical, level(10.0), 3.0, speed=10.0)
-    assert vertical.stops == 4
-    assert np.degrees(np.arcsin(vertical.up[2])) == pytest.approx(0.0, abs=0.01)
-    assert vertical.bias == pytest.approx((0.3, -0.2, 0.3), abs=1e-5)
-    assert not vertical.moved
+        stand(standing, level(pitch), seconds, rate=(0.1 * k, -0.2, 0.3))
+        assert standing.standing
+        stand(standing, level(10.0), 3.0, speed=10.0)
+    assert standing.stops == 4
+    assert np.degrees(np.arcsin(standing.up[2])) == pytest.approx(0.0, abs=0.01)
+    assert standing.bias == pytest.approx((0.3, -0.2, 0.3), abs=1e-5)
+    assert not standing.moved
 
 
 @pytest.mark.parametrize(
     ("seconds", "speed", "shake", "stops"),
     [
-        (0.9 * 3.1, 0.0, 0.0, 0),  # SETTLE_S and COUNTS_S, and the first mean
+        (0.9 * 3.1, 0.0, 0.0, 0),  # 3.1 s are SETTLE_S, COUNTS_S and the first mean of 0.1 s
         (1.1 * 3.1, 0.0, 0.0, 1),
-        (10.0, 0.9 * standing.SPEED_MPS, 0.0, 1),
-        (10.0, 1.1 * standing.SPEED_MPS, 0.0, 0),
-        (10.0, 0.0, 0.9 * standing.STILL_G, 1),
-        (10.0, 0.0, 1.1 * standing.STILL_G, 0),
+        (10.0, 0.9 * vertical.STANDING_MPS, 0.0, 1),
+        (10.0, 1.1 * vertical.STANDING_MPS, 0.0, 0),
+        (10.0, 0.0, 0.9 * vertical.STILL_G, 1),
+        (10.0, 0.0, 1.1 * vertical.STILL_G, 0),
     ],
 )
 def test_what_a_stop_is(seconds, speed, shake, stops):
-    vertical = StandingVertical()
+    standing = StandingVertical()
     for k in range(round(seconds * 10)):
-        # from a mean that follows by a fifth each time, such shaking is 10 / 9 of its size away
-        vertical.update([0.0, 1.0, 0.9 * shake * (-1) ** k], (0.0, 0.0, 0.0), speed, 0.1)
-    assert vertical.stops == stops
+        # the running mean follows by a fifth each time: from it this shaking is off by 10 / 9 of its size
+        standing.update([0.0, 1.0, 0.9 * shake * (-1) ** k], (0.0, 0.0, 0.0), speed, 0.1)
+    assert standing.stops == stops
 
 
 @pytest.mark.parametrize(("apart", "moved"), [(0.9, False), (1.1, True)])
 def test_stops_too_far_apart_are_a_mount_that_moved(apart, moved):
-    vertical = StandingVertical()
-    for pitch in (0.0, apart * standing.MAX_APART_DEG):
-        stand(vertical, level(pitch), 5.0)
-        stand(vertical, level(0.0), 3.0, speed=10.0)
-    assert vertical.moved is moved
+    standing = StandingVertical()
+    for pitch in (0.0, apart * vertical.MAX_CHANGE_DEG):
+        stand(standing, level(pitch), 5.0)
+        stand(standing, level(0.0), 3.0, speed=10.0)
+    assert standing.moved is moved
 
 
-def test_a_sensor_turned_while_standing_is_seen_a_late_speed_is_not():
-    """A vehicle that speeds up while the speed still says zero, evenly for 2 s, is no sensor that was turned."""
-    vertical = StandingVertical()
-    stand(vertical, level(0.0), 5.0)
-    stand(vertical, level(15.0), 2.5)
-    assert not vertical.moved
-    assert np.degrees(np.arcsin(vertical.up[2])) < 0.2
-    stand(vertical, level(15.0), 10.0)
-    assert vertical.moved
+def test_a_late_speed_is_not_taken_for_a_sensor_turned_while_standing():
+    """A vehicle may speed up evenly for some seconds while a late speed still says zero. A sensor that was turned stays
+    so for longer."""
+    standing = StandingVertical()
+    stand(standing, level(0.0), 5.0)
+    stand(standing, level(15.0), 2.5)
+    assert not standing.moved
+    assert np.degrees(np.arcsin(standing.up[2])) < 0.2
+    stand(standing, level(15.0), 10.0)
+    assert standing.moved
 
 
 @pytest.mark.parametrize(("share", "moved"), [(0.9, True), (1.1, False)])
 def test_a_bend_at_a_stuck_zero_is_no_stop(share, moved):
-    """Against the bias of the stop before, which warms up by less."""
-    vertical = StandingVertical()
-    stand(vertical, level(0.0), 5.0, rate=(1.0, -4.0, 2.0))
-    stand(vertical, level(0.0), 3.0, speed=10.0)
-    stand(vertical, level(15.0), 10.0, rate=(1.0, -4.0 + share * standing.TURNING_DPS, 2.0))
-    assert vertical.moved is moved
-    assert vertical.stops == (2 if moved else 1)
+    """In a bend the rate is further from the bias of the stop before than warming up can change that bias."""
+    standing = StandingVertical()
+    stand(standing, level(0.0), 5.0, rate=(1.0, -4.0, 2.0))
+    stand(standing, level(0.0), 3.0, speed=10.0)
+    stand(standing, level(15.0), 10.0, rate=(1.0, -4.0 + share * vertical.TURNING_DPS, 2.0))
+    assert standing.moved is moved
+    assert standing.stops == (2 if moved else 1)
 
 
 @pytest.mark.parametrize(("share", "stuck"), [(0.9, False), (1.1, True)])
 def test_a_speed_that_stays_the_same_while_driving_is_stuck(share, stuck):
-    """Both ways: too few lively seconds, seconds not lively enough."""
+    """Two ways not to be stuck: too few lively seconds, or a change of force too small for a lively second."""
     check = SpeedCheck()
     for k in range(round(share * (STUCK_S + 1))):
         check.measure(7.0)
-        check.second([0.0, 1.0, 0.1 * (-1) ** k])
+        check.update_second([0.0, 1.0, 0.1 * (-1) ** k])
     assert (check.problem is not None) is stuck
     check = SpeedCheck()
     for k in range(100):
         check.measure(7.0)
-        check.second([0.0, 1.0, share * LIVELY_G / 2 * (-1) ** k])
+        check.update_second([0.0, 1.0, share * LIVELY_G / 2 * (-1) ** k])
     assert (check.problem is not None) is stuck
 
 
@@ -294,7 +296,7 @@ def test_a_steady_speed_through_bends_is_not_stuck(share, stuck):
     check = SpeedCheck()
     for k in range(3 * STUCK_S):
         check.measure(30.0)
-        check.second([0.0, 1.0, 0.1 * (-1) ** k], share * TURNING_DPS)
+        check.update_second([0.0, 1.0, 0.1 * (-1) ** k], share * TURNING_DPS)
     assert (check.problem is not None) is stuck
 
 

@@ -1,7 +1,7 @@
 """Made-up drives through the firmware's alignment by driving. Runs on CPython and on MicroPython.
 
-A drive is a list of legs [seconds, acceleration in m/s2, yaw rate in deg/s]; what a perfect vehicle without suspension
-feels on a level road follows from it.
+A drive is a list of legs [seconds, acceleration in m/s^2, yaw rate in deg/s]. The samples are those of a vehicle
+without suspension on a level road.
 """
 
 import math
@@ -9,7 +9,7 @@ import math
 from kickstand.drive_alignment import verdict
 from kickstand.drive_alignment.alignment import DriveAlignment
 from kickstand.drive_alignment.parts import DriveParts
-from kickstand.drive_alignment.regression import BrakingRegression, Fit
+from kickstand.drive_alignment.regression import Fit, ForwardRegression
 from kickstand.errors import Refusal
 from kickstand.rotation import matrix
 from kickstand.ui import messages
@@ -21,10 +21,11 @@ RATE_HZ = 100
 METHODS = {"improved": DriveAlignment, "published": PublishedAlignment}
 
 
-def around(brakings=6, braking=-2.0, seconds=3.0, yaw_dps=0.0, pause_s=5.0, stands=True):
-    """Legs of a drive that stands, then speeds up and brakes so many times."""
+def around(events=6, braking=-2.0, seconds=3.0, yaw_dps=0.0, pause_s=5.0, stands=True):
+    """Legs of a drive that stands first, then speeds up and brakes events times. braking (m/s^2), seconds and yaw_dps:
+    of each braking event."""
     legs = [list(STAND)] if stands else []
-    for k in range(brakings):
+    for k in range(events):
         legs.append([4.0 + (6.0 if k == 0 else 0.0), -braking * seconds / 4.0 if k else 1.2, 12.0])
         legs.append([pause_s, 0.0, 0.0])
         legs.append([seconds, braking, yaw_dps])
@@ -33,8 +34,8 @@ def around(brakings=6, braking=-2.0, seconds=3.0, yaw_dps=0.0, pause_s=5.0, stan
 
 
 def samples(legs, vehicle="car", tilt_deg=0.0, noise_g=0.003, start_mps=0.0):
-    """(force, rate, speed) at RATE_HZ in the vehicle's axes. tilt_deg: the camber where it stands; a motorcycle
-    leans into turns."""
+    """Yields (force, rate, speed) at RATE_HZ in the vehicle's axes. A motorcycle leans into turns. tilt_deg: the camber
+    where the vehicle stands."""
     seed = 1
     speed = start_mps
     for seconds, acceleration, yaw_dps in legs:
@@ -57,14 +58,14 @@ def samples(legs, vehicle="car", tilt_deg=0.0, noise_g=0.003, start_mps=0.0):
 
 
 def mounted(m, vector):
-    """From the vehicle's axes to those of a sensor mounted as m (9, rows left, up, forward) says."""
+    """A vector of the vehicle's axes in those of the sensor. m: vehicle from sensor (9, rows left, up, forward)."""
     x, y, z = vector
     return [m[i] * x + m[3 + i] * y + m[6 + i] * z for i in range(3)]
 
 
 class SpeedSource:
-    """A GPS with faults: every_s, late_s, scale, step (m/s, what it is rounded to), stuck_from_s, silent (from when to
-    when, s)."""
+    """A GPS that gives a speed every_s, late_s late, times scale, plus add (m/s), rounded to multiples of step (m/s),
+    always the same from stuck_from_s on, and none within silent (from, to; s)."""
 
     def __init__(self, every_s=0.5, late_s=0.0, scale=1.0, step=0.0, stuck_from_s=1e9, silent=(1e9, 1e9), add=0.0):
         self.every = round(every_s * RATE_HZ)
@@ -91,9 +92,9 @@ class SpeedSource:
 
 
 def drive(legs, mount, options):
-    """What becomes of it. mount: 9, rows left, up, forward. options: vehicle, method, up, bias, source (arguments of
-    SpeedSource), samples (arguments of samples), gyro_bias, moved [from_s, another mount], against (a matrix to
-    compare with)."""
+    """Run the legs through an alignment and return its results by name. mount: 9, rows left, up, forward. options:
+    vehicle, method, up, bias, source (arguments of SpeedSource), samples (arguments of samples), gyro_bias, moved
+    [from_s, another mount], against (a matrix to compare with)."""
     vehicle = options.get("vehicle", "car")
     source = SpeedSource(**options.get("source", {}))
     alignment = METHODS[options.get("method", "improved")](vehicle, options.get("up"), options.get("bias"))
@@ -140,19 +141,19 @@ def drive(legs, mount, options):
 
 
 def regression(rows, lag):
-    """rows [seconds, change_g, curve_g, force (3)], a block closed after every tenth: forward, level, blocks."""
-    fitted, fit = BrakingRegression(), Fit()
+    """rows: [seconds, change_g, curve_g, force (3)], an event ends with each tenth. Returns forward, level, blocks."""
+    fitted, fit = ForwardRegression(), Fit()
     for k, (seconds, change, curve, force) in enumerate(rows):
         fitted.add(lag, seconds, change, curve, force)
         if k % 10 == 9:
-            for _ in fitted.close_block():
+            for _ in fitted.end_event():
                 pass
     fitted.fit(fit, lag)
     return list(fit.forward), list(fit.level), fitted.blocks
 
 
 def parts(blocks):
-    """blocks [across, along, roll_g, pitch_g, weight, seconds]: forward_deg, sigmas, roll_deg, pitch_deg."""
+    """blocks: [across, along, roll_g, pitch_g, weight, seconds]. Returns forward_deg, sigmas, roll_deg, pitch_deg."""
     compared = DriveParts()
     for block in blocks:
         compared.add(*block)

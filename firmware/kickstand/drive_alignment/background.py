@@ -1,40 +1,37 @@
-"""Alignment by driving while the device does everything else: feeds it, says what it waits for, saves what it finds.
+"""Alignment by driving while the device does everything else: feeds a DriveAlignment, and saves what it finds.
 
-With a speed source it always runs. What is not aligned, or is asked for in the menu, is taken when it is ready; an
-alignment that is there is checked and refined. Flash is written at standstill only.
+With a speed source it always runs. Where there is no alignment yet, or where the menu asked for a new one, the drive's
+is taken as soon as it is ready; an alignment from before is checked and refined. Flash is written at standstill only.
 """
 
 from time import ticks_add, ticks_diff
 
 from ..errors import AlignmentError, Notice, StoreError
 from ..rotation import matrix
-from .alignment import (
-    BRAKING,
-    GAP_US,
-    MOTORCYCLE,
-    TURNING,
-    DriveAlignment,
-)
-from .quality import CHECKED
+from .alignment import BRAKING, MOTORCYCLE, TURNING, DriveAlignment
+from .quality import MIN_EVENTS_TO_CHECK_SPEED
 from .verdict import MOVED, REFINED, REVERSED, SAME, compare, turn_round
 
-FEED_TURNS = 2  # of the loop: whole numbers are summed in each, floats cost too much
-GAP_MS = 300  # readings are missing
+FEED_TURNS = 2  # turns of the loop whose counts are summed as integers, because floats take time in each turn
+GAP_MS = 300  # after more without readings, some are missing
 LOOK_MS = 1000
-FRESH_MS = 3000  # of a speed that says that the vehicle stands
-AWAY_MPS = 2.0
+FRESH_MS = 3000  # an older speed does not show that the vehicle stands
+AWAY_MPS = 2.0  # the vehicle has driven off
 
-_KNOWN_BIAS = (0.0, 0.0, 0.0)  # with an alignment the gyro's bias was measured too, and is taken off
+_KNOWN_BIAS = (0.0, 0.0, 0.0)  # the gyro's bias was measured with the alignment, and is subtracted already
 STAND_SIDE, MOUNT_MOVED = "stand-on-other-side", "mount-moved"
-_DOUBTS = (STAND_SIDE, MOUNT_MOVED)  # codes of messages until whose answer no lean is to be trusted
+_DOUBTS = (STAND_SIDE, MOUNT_MOVED)  # codes of messages: the lean is not to be trusted until they are answered
 
 
 class BackgroundAlignment:
     """vehicle: "motorcycle" or "car".  speed: a Speed.  meter: a LeanMeter.  calibration: the ActiveCalibration.
 
-    shown: what it waits for is a page now, see ui/drive_page.py.  message: an AlignmentError, StoreError or Notice that
-    goes before everything else until answer(), or until the ride goes on.  result: the Notice or AlignmentError that
-    the last drive ended with, or None.
+    The loop calls poll() and feed() each turn, begin() with another calibration; the menu ask(); a press answer().
+
+    speed: as given.  drive: the DriveAlignment of now, to be read only.  state: which of the states of alignment.py to
+    show.  shown: True if the progress has a page of its own (ui/drive_page.py).  result: the Notice or AlignmentError
+    that the last drive ended with, or None.  message: an AlignmentError, StoreError or Notice to be shown before
+    everything else, until answer() or until the vehicle drives off; or None.
     """
 
     def __init__(self, vehicle, speed, meter, calibration):
@@ -50,54 +47,58 @@ class BackgroundAlignment:
         self.begin()
 
     def begin(self, asked=False):
-        """With another calibration, from flash or by a wizard: it is to be checked. asked: it is not to be trusted."""
+        """Another calibration is in use, from flash or from a wizard: check its alignment in a new drive. asked: do
+        not check the alignment, replace it."""
         self._asked = asked
-        self._told = []  # codes of what the rider has seen and needs no more
+        self._answered = []  # codes of messages that are not shown again
         self.message = None
         self._restart()
 
     def _restart(self):
         old = self._meter.calibration
-        self._calibration = old  # of all that is fed from now on, whatever is saved meanwhile
+        self._calibration = old  # is applied to all that is fed to this drive, whatever is saved meanwhile
         trusted = self.vehicle == MOTORCYCLE and old.aligned and not self._asked
         up = old.vehicle_from_sensor[3:6] if trusted else None
         self.drive = DriveAlignment(self.vehicle, up, _KNOWN_BIAS if old.aligned else None)
         self.shown = self.shown or (self.vehicle != MOTORCYCLE and not old.aligned)
         self.result = None
-        self._clear()
+        self._clear_sums()
 
     def ask(self):
-        """The rider wants it, for a sensor that is mounted anew: nothing of before counts."""
+        """The rider asks for a new alignment, for a sensor that has been mounted anew: forget the drive so far."""
         self.shown = True
         self.begin(True)
 
-    def _clear(self):
+    def _clear_sums(self):
         self._n = self._us = self._turns = 0
         for i in range(7):
             self._total[i] = 0
 
     def poll(self, now_ms):
-        """Once each turn of the loop: speed, and what there is to do. Returns a new speed in m/s that is fit to be
-        kept, or None."""
+        """Once each turn of the loop: read the speed source, and once a second see what there is to do. Returns a new
+        speed (m/s) that a recording may keep, or None."""
         speed = self.speed.poll(now_ms)
         if speed is not None:
             self._speed_mps = speed
             self._speed_ms = now_ms
             self.drive.measure_speed(speed, self.speed.age_us)
-            speed = self._for_lean(speed)
+            speed = self._pass_on(speed)
         if self._look_ms is None or ticks_diff(now_ms, self._look_ms) >= 0:
             self._look_ms = ticks_add(now_ms, LOOK_MS)
             self._look(now_ms)
         return speed
 
-    def _for_lean(self, speed):
-        """What the lean filter may have: not what no braking has confirmed yet, as a wheel may have two magnets; and no
-        zero, which a broken wire gives too; a standstill it sees by itself. Rounded as a record keeps it. None
-        otherwise."""
+    def _pass_on(self, speed):
+        """Give the lean filter a speed (m/s) that it can rely on. Returns that speed, rounded as a recording keeps it,
+        or None if it was not given.
+
+        A speed that no braking event has confirmed is not given, because a wheel may have two magnets. Neither is zero,
+        which a broken wire gives too: the filter sees a standstill by itself.
+        """
         if self.vehicle != MOTORCYCLE:
             return speed
         drive = self.drive
-        confirmed = drive.counted >= CHECKED and drive.quality.speed_problem is None
+        confirmed = drive.counted >= MIN_EVENTS_TO_CHECK_SPEED and drive.quality.speed_problem is None
         if speed <= 0.0 or drive.problem is not None or not confirmed:
             return None
         speed = int(100 * speed + 0.5) / 100
@@ -105,10 +106,11 @@ class BackgroundAlignment:
         return speed
 
     def feed(self, sums, n, dt_us, now_ms):
-        """Sums (7, counts in the chip's order) of the n samples of a turn, within dt_us."""
+        """Once each turn of the loop that has samples. sums (7, counts in the chip's order): of its n samples, which
+        cover dt_us."""
         if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > GAP_MS:
-            self._clear()
-            self.drive.update(self._force, self._rate, GAP_US + 1)
+            self._clear_sums()
+            self.drive.interrupt()
         self._fed_ms = now_ms
         total = self._total
         for i in range(7):
@@ -120,10 +122,11 @@ class BackgroundAlignment:
             n = self._n
             self._calibration.apply([t / n for t in total], self._force, self._rate)
             self.drive.update(self._force, self._rate, self._us)
-            self._clear()
+            self._clear_sums()
 
     def _look(self, now_ms):
-        """Once a second: is there anything to do? Only when the vehicle stands, by its speed and by the sensor."""
+        """Once a second: act on what the drive has found, but only while speed and sensor say that the vehicle
+        stands."""
         if self._away():
             self.message = None
             return
@@ -132,7 +135,7 @@ class BackgroundAlignment:
             return
         drive, aligned = self.drive, self._meter.calibration.aligned
         if drive.problem is not None:
-            self._refused(drive.problem, aligned)
+            self._refuse(drive.problem, aligned)
         elif self._asked or not aligned:
             if drive.ready:
                 self._take(True)
@@ -151,27 +154,29 @@ class BackgroundAlignment:
                 self._meter.trust()
 
     def _away(self):
-        """True while the ride goes on. A source with a fault may say zero for ever: then by the lean filter."""
+        """True while the vehicle drives. A faulty speed source may say zero for ever: then the lean filter's own
+        estimate of the speed decides too."""
         faulty = self.drive.problem is not None or (self.message is not None and self.message.code not in _DOUBTS)
         return self._speed_mps > AWAY_MPS or (faulty and self._meter.speed_mps > AWAY_MPS)
 
-    def _refused(self, problem, aligned):
-        """What has gone wrong so far may end: the drive is begun anew, the reason stays on the page until then."""
+    def _refuse(self, problem, aligned):
+        """Begin a new drive, because the problem may be over by then. Until an event has counted in it, the page shows
+        the problem as the result."""
         if aligned:
             self._say(problem)
         self._restart()
         self.result = problem
 
     def _say(self, message):
-        if message.code not in self._told:
+        if message.code not in self._answered:
             self.message = message
             if self.vehicle == MOTORCYCLE and message.code in _DOUBTS:
                 self._meter.distrust(message.code)
 
     def answer(self, agreed):
-        """The rider has read the message. agreed: and wants what it offers."""
+        """The rider has read the message. agreed: and wants what it offers, with STAND_SIDE to turn forward round."""
         code, self.message = self.message.code, None
-        self._told.append(code)
+        self._answered.append(code)
         if code in _DOUBTS:
             self._meter.trust()
         if agreed and code == STAND_SIDE:
@@ -185,7 +190,7 @@ class BackgroundAlignment:
                 self._meter.reset_maxima()
 
     def _take(self, anew):
-        """anew: the vertical is another one too."""
+        """Save the drive's alignment. anew: the sensor sits differently now, so that trim and maxima start again."""
         found = matrix()
         self.drive.matrix(found)
         if not self._save(found, 0.0 if anew else self._meter.trim_deg):
@@ -197,9 +202,9 @@ class BackgroundAlignment:
             self._meter.reset_maxima()
 
     def _save(self, vehicle_from_sensor, trim_deg):
-        """True once it is in flash."""
+        """True if it is in flash now, else say why not."""
         old, used = self._meter.calibration, self._calibration
-        # at a stop the gyro feels its bias alone
+        # rates fed to the drive had the bias of used subtracted: what a gyro still reads at a stop is added to it
         bias = [used.gyro_bias[i] + self.drive.standing.bias[i] for i in range(3)]
         try:
             self._active.refine(old.with_alignment(vehicle_from_sensor, bias, trim_deg, True))
@@ -210,6 +215,6 @@ class BackgroundAlignment:
 
     @property
     def state(self):
-        """The DriveAlignment's state; the end of a braking event, too slow to tell a turn, still counts as braking."""
+        """The drive's state, but at walking pace, where a turn cannot be told, a braking event stays BRAKING."""
         state = self.drive.state
         return BRAKING if state == TURNING and self._speed_mps < AWAY_MPS else state

@@ -1,36 +1,85 @@
-"""Brakings and starts, and which of them were in a straight line: each change of speed laid beside what was felt."""
+"""Braking and acceleration events, and which of them were in a straight line.
+
+Each change of speed is set against the force and yaw rate of the same interval, for each lag that the speed may have.
+"""
 
 from math import pi
 
 from ..rotation import norm
-from .braking import BrakingFinder
+from ..units import STANDARD_GRAVITY
 from .history import COLUMNS, difference
-from .regression import LAG_STEP_US, LAGS, BrakingRegression, Fit
+from .regression import LAG_STEP_US, LAGS, Fit, ForwardRegression
 
-_G = 9.80665
-MIN_INTERVAL_US = 400_000  # a GPS at 10 Hz says no more than one at 2 Hz, and differences are noisier
-WAITING = 4  # intervals, while others are judged
+# An event begins at the one acceleration, ends at the other, and changes the speed by at least this much.
+BEGIN_MPS2, END_MPS2 = 0.8, 0.4
+CHANGE_MPS = 1.5
+MAX_ACCELERATION_EVENTS = 2  # more than these do not count, because braking shows forward better
+MIN_INTERVAL_US = 400_000  # a GPS at 10 Hz tells no more than one at 2 Hz, and its differences are noisier
 MAX_INTERVAL_US = 2_200_000  # one value of a GPS at 1 Hz may be missing
-STRAIGHT_DPS = 2.0  # at 10 m/s 0.036 g to the side, a fifth of a braking; the regression takes off most of that
-MIN_SPEED_MPS = 1.0  # slower, steering is large and a stop ends with a jerk
-MAX_FORCE_G = 3.0  # a mean beyond is a knock
+MAX_WAITING = 4  # intervals that wait while an earlier one is worked on
+# A larger yaw rate is a turn. At 10 m/s this one makes 0.036 g sideways, a fifth of the force of braking; the
+# regression takes most of it off.
+STRAIGHT_DPS = 2.0
+MIN_SPEED_MPS = 1.0  # slower, steering angles are large and a stop ends with a jerk
+MAX_FORCE_G = 3.0  # a mean over an interval beyond this is a knock
 
 
-class OneEvent:
-    """Forward from one event, against a vertical that is known: good to some 10 degrees, but at once."""
+class EventFinder:
+    """Finds braking and acceleration events from the speed alone.
+
+    going_on: an event is under way; change: of the speed in it, or in the one that ended last (m/s, < 0: braking).
+    Whether it was straight depends on the lag of the speed, so it is answered for each of them.
+    """
+
+    def __init__(self, lags):
+        self._straight_change = [0.0] * lags  # the part of change that was straight
+        self.interrupt()
+
+    def interrupt(self):
+        """Speeds are missing: forget the event that was under way."""
+        self.going_on = False
+        self.change = 0.0
+        for lag in range(len(self._straight_change)):
+            self._straight_change[lag] = 0.0
+
+    def update(self, change_mps, seconds, straight):
+        """One change of speed. straight: for each lag, whether the vehicle did not turn meanwhile. True if an event
+        has just ended."""
+        acceleration = change_mps / seconds
+        if self.going_on and (acceleration if self.change > 0.0 else -acceleration) < END_MPS2:
+            self.going_on = False
+            if abs(self.change) >= CHANGE_MPS:
+                return True
+        if not self.going_on and abs(acceleration) > BEGIN_MPS2:
+            self.interrupt()
+            self.going_on = True
+        if self.going_on:
+            self.change += change_mps
+            for lag in range(len(straight)):
+                if straight[lag]:
+                    self._straight_change[lag] += change_mps
+        return False
+
+    def was_straight(self, lag):
+        """Of the event that ended last: was its straight part alone long enough for an event?"""
+        return abs(self._straight_change[lag]) >= CHANGE_MPS
+
+
+class LastEvent:
+    """Forward from the latest event alone, given the vertical: good to some 10 degrees, but known at once."""
 
     def __init__(self):
         self._force = [0.0] * 3
         self.clear()
 
     def clear(self):
-        """The next one begins."""
+        """A new event begins."""
         self._weight = self._change = 0.0
         for i in range(3):
             self._force[i] = 0.0
 
     def add(self, seconds, change_g, force):
-        """An interval of it, in a straight line: as BrakingRegression.add()."""
+        """One straight interval of it, as for ForwardRegression.add()."""
         a = change_g / seconds
         self._weight += a * change_g
         self._change += change_g
@@ -38,43 +87,51 @@ class OneEvent:
             self._force[i] += a * force[i]
 
     def forward(self, out, level):
-        """Fill out (3, g per g). Returns its weight (g^2 s)."""
+        """Fill out (3, g per g). level (3, g): the vertical. Returns the weight (g^2 s)."""
         for i in range(3):
             out[i] = (self._force[i] - self._change * level[i]) / max(self._weight, 1e-6)
         return self._weight
 
 
 class DrivingEvents:
-    """history: the ForceHistory of the same time.
+    """history: the ForceHistory of the same drive.
 
-    brakings, starts: those in a straight line; turned: brakings that were not; lag_s: of the speed, and lag the nearest
-    of the regression's; regression: of all straight driving.
+    braking_count, acceleration_count: of straight events so far; turning_count: of braking events that were not
+    straight; lag_s: lag of the speed; lag: the nearest of the regression's lags; regression: the ForwardRegression of
+    all straight driving; last: the LastEvent.
     """
 
     def __init__(self, history):
-        self.brakings = self.starts = self.turned = 0
+        self.braking_count = self.acceleration_count = self.turning_count = 0
         self.lag = 0
         self.lag_s = 0.0
-        self.regression = BrakingRegression()
-        self.last = OneEvent()
+        self.regression = ForwardRegression()
+        self.last = LastEvent()
         self._history = history
-        self._finder = BrakingFinder(LAGS)
-        self._part = Fit()
+        self._finder = EventFinder(LAGS)
+        self._fit = Fit()
+        # for each lag: the history's integrals at the end of the last interval, whether they were known, and whether
+        # that interval was straight
         self._ends = [[0] * COLUMNS for _ in range(LAGS)]
-        self._end = [0] * COLUMNS
         self._known = [False] * LAGS
         self._straight = [False] * LAGS
+        self._end = [0] * COLUMNS
         self._before = (0.0, 0)  # speed and time at the end of the last interval
-        self._next = []  # likewise, of those to be worked on
+        self._waiting = []  # speed and time at the ends of those to be worked on
 
     @property
-    def count(self):
-        """All that were straight."""
-        return self.brakings + self.starts
+    def straight_count(self):
+        """All straight events."""
+        return self.braking_count + self.acceleration_count
+
+    @property
+    def counted(self):
+        """The straight events that count towards an alignment: all for braking, only the first few for acceleration."""
+        return self.braking_count + min(self.acceleration_count, MAX_ACCELERATION_EVENTS)
 
     @property
     def braking(self):
-        """True while one goes on."""
+        """True during a braking event."""
         return self._finder.going_on and self._finder.change < 0.0
 
     @property
@@ -83,91 +140,93 @@ class DrivingEvents:
         return self._straight[self.lag]
 
     def interrupt(self):
-        """Samples are missing: what follows does not join what came before."""
-        self._next.clear()
+        """Samples are missing: no interval may reach across the gap."""
+        self._waiting.clear()
         self._before = (0.0, self._history.now - MIN_INTERVAL_US)
-        self._disjoin()
+        self._forget_interval()
 
-    def _disjoin(self):
+    def _forget_interval(self):
         for lag in range(LAGS):
             self._known[lag] = False
         self._finder.interrupt()
 
     def measure_speed(self, speed_mps, time_us):
-        """A new speed, and when it was."""
-        before = self._next[-1] if self._next else self._before
-        if len(self._next) < WAITING and difference(time_us, before[1]) >= MIN_INTERVAL_US:
-            self._next.append((speed_mps, time_us))
+        """A new speed, and its time on the history's clock."""
+        before = self._waiting[-1] if self._waiting else self._before
+        if len(self._waiting) < MAX_WAITING and difference(time_us, before[1]) >= MIN_INTERVAL_US:
+            self._waiting.append((speed_mps, time_us))
 
     @property
     def due(self):
-        """True if there is an interval to follow() and all that was felt in it is there."""
-        return bool(self._next) and difference(self._history.now, self._next[0][1]) >= 0
+        """True if an interval waits whose end is in the history by now."""
+        return bool(self._waiting) and difference(self._history.now, self._waiting[0][1]) >= 0
 
-    def follow(self, counts):
-        """Work on the interval that is due; a generator of short pieces. counts: straight driving may be used."""
+    def follow(self, use):
+        """Work on the interval that is due; a generator of short pieces. use: the gyro's bias is known, so that
+        straight driving can be told from turning."""
         before, before_us = self._before
-        speed, time_us = self._before = self._next.pop(0)
+        speed, time_us = self._before = self._waiting.pop(0)
         length_us = difference(time_us, before_us)
         if length_us > MAX_INTERVAL_US:
-            self._disjoin()
+            self._forget_interval()
         seconds = length_us * 1e-6
         mean = 0.5 * (before + speed)
         change = speed - before
-        counts = counts and mean > MIN_SPEED_MPS
+        change_g = change / STANDARD_GRAVITY
+        use = use and mean > MIN_SPEED_MPS
         straight = self._straight
-        force = felt = [0.0] * 3
+        force, best_force = [0.0] * 3, None
         end = self._end
         for lag in range(LAGS):
             known = self._history.at(end, time_us - lag * LAG_STEP_US)
             begin = self._ends[lag]
             straight[lag] = False
-            if known and self._known[lag] and counts:
+            if known and self._known[lag] and use:
                 for i in range(3):
                     force[i] = difference(end[i], begin[i]) * 1e-6
                 yaw_dps = difference(end[3], begin[3]) * 1e-5 / seconds
                 straight[lag] = abs(yaw_dps) <= STRAIGHT_DPS
                 if lag == self.lag:
-                    felt = list(force)
+                    best_force = list(force)
                 if straight[lag] and norm(force) < MAX_FORCE_G * seconds:
-                    curve_g = mean * yaw_dps * (pi / 180.0 / _G)
-                    self.regression.add(lag, seconds, change / _G, curve_g, force)
+                    curve_g = mean * yaw_dps * (pi / 180.0 / STANDARD_GRAVITY)
+                    self.regression.add(lag, seconds, change_g, curve_g, force)
             for i in range(COLUMNS):
                 begin[i] = end[i]
             self._known[lag] = known
             yield
         if self._finder.update(change, seconds, straight):
-            yield from self._count()
+            yield from self._end_event()
         elif self._finder.going_on:
-            if self._finder.change == change:
+            if self._finder.change == change:  # its first interval
                 self.last.clear()
             if straight[self.lag]:
-                self.last.add(seconds, change / _G, felt)
+                self.last.add(seconds, change_g, best_force)
 
-    def _count(self):
-        """A braking or a start has ended: which lag fits best by now, and was it straight?"""
-        part = self._part
+    def _end_event(self):
+        """An event has ended: find the lag that fits best by now, and count the event if it was straight."""
+        fit = self._fit
         explained = [0.0] * LAGS
         for lag in range(LAGS):
-            if (yield from self.regression.fitting(part, lag)):
-                explained[lag] = part.explained
+            if (yield from self.regression.fitting(fit, lag)):
+                explained[lag] = fit.explained
         yield
         self.lag = best = explained.index(max(explained))
         self.lag_s = (best + _peak(explained, best)) * LAG_STEP_US * 1e-6
         braked = self._finder.change < 0.0
         if not self._finder.was_straight(best):
             if braked:
-                self.turned += 1
+                self.turning_count += 1
             return
         if braked:
-            self.brakings += 1
+            self.braking_count += 1
         else:
-            self.starts += 1
-        yield from self.regression.close_block()
+            self.acceleration_count += 1
+        yield from self.regression.end_event()
 
 
 def _peak(values, i):
-    """Where between the neighbours of i, its largest value, the peak is: -0.5 to 0.5."""
+    """Where the peak of a parabola through values[i], the largest, and its neighbours is: -0.5 to 0.5 from i."""
     if i == 0 or i == len(values) - 1:
         return 0.0
     before, at, after = values[i - 1], values[i], values[i + 1]

@@ -1,16 +1,16 @@
-"""What the sensor felt during the last seconds, so that it can be laid beside a speed that comes late.
+"""Force and yaw rate of the last seconds, so that a speed that arrives late can be compared with what was felt then.
 
-Kept are running integrals in whole numbers that wrap round: differences of them are exact however long the drive, where
-sums in float32 are not; and whole numbers take no heap.
+Kept are running integrals, as integers that wrap round. The difference of two is exact however long the drive lasts,
+while float32 sums lose digits as they grow; and integers need no heap.
 """
 
 from array import array
 
 BIN_US = 100_000
-SIZE = 64  # bins: a late speed, the interval before it, and some time to work on them
+SIZE = 64  # bins: enough for a late speed, the interval before it, and the time to work on both
 MASK = 0x1FFFFFFF
 _HALF = 0x10000000
-COLUMNS = 4  # force (3, in millionths of g s), angle turned about the vertical (in 1e-5 degrees)
+COLUMNS = 4  # integrals of force (3, in 1e-6 g s) and of the yaw rate (in 1e-5 degrees)
 
 
 def difference(a, b):
@@ -19,7 +19,7 @@ def difference(a, b):
 
 
 class ForceHistory:
-    """Integrals of force and yaw rate over time, at the end of every bin. now: time in us, wraps round."""
+    """A ring of the integrals of force and yaw rate at the end of each bin. now: time in us, wraps round at MASK."""
 
     def __init__(self):
         self._times = array("i", [0] * SIZE)
@@ -30,11 +30,11 @@ class ForceHistory:
         self.now = 0
 
     def clear(self):
-        """Samples are missing: what came before does not join what follows."""
+        """Samples are missing: no difference may be taken across the gap."""
         self._count = 1
 
     def add(self, force_us, yaw, dt_us):
-        """One more bin: integrals over it of force (3, g us) and of the yaw rate (1e-5 degrees); its length."""
+        """One more bin of length dt_us: the integrals of force (3, g us) and of the yaw rate (1e-5 degrees) over it."""
         self.now = (self.now + dt_us) & MASK
         total = self._total
         total[0] = (total[0] + round(force_us[0])) & MASK
@@ -48,12 +48,14 @@ class ForceHistory:
         self._count = min(SIZE, self._count + 1)
 
     def at(self, out, time_us):
-        """Fill out (COLUMNS integers) with the integrals up to a time. False if it is not within the history."""
+        """Fill out (COLUMNS integers) with the integrals up to time_us, interpolated within its bin. False if that
+        time is not in the history."""
         behind = difference(self.now, time_us)
         if behind < 0 or behind >= difference(self.now, self._times[(self._newest - self._count + 1) % SIZE]):
             return False
+        # a first guess for the bin: bins may be longer than BIN_US, but hardly twice as long
         i = self._newest
-        step = behind // (2 * BIN_US)  # bins may be longer than BIN_US, but hardly twice as long
+        step = behind // (2 * BIN_US)
         if step < self._count:
             i = (i - step) % SIZE
             if difference(self._times[i], time_us) < 0:

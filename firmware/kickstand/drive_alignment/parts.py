@@ -1,9 +1,9 @@
-"""Do the parts of a drive agree about forward and about the vertical? If not, the mount may have moved between them.
+"""Do two parts of a drive agree about forward and about the vertical? If not, the mount may have moved between them.
 
-Each way to part the drive in two is looked at, because nobody knows when it moved. How far two parts may differ by
-chance follows from how far the blocks within each differ: the error of one falls with the root of its weight, down to
-what a road's camber and wind do to a long stretch of it. Of a few blocks the scatter is not known well: what is usual
-counts like USUAL more.
+Nobody knows when it moved, so the drive is split in two after each of its blocks in turn. How far two parts may differ
+by chance follows from the scatter of forward between the blocks within each part: the variance of a part's forward
+falls with the part's weight, but not below what the road's camber and the wind do to a single long stretch of road. Few
+blocks give a poor sample variance: a prior worth PRIOR_FREEDOM degrees of freedom is blended in.
 """
 
 from array import array
@@ -11,28 +11,30 @@ from math import atan2, degrees, pi, sqrt
 
 from .regression import BLOCKS
 
-USUAL_DEG = 1.0  # of forward, at a weight of 1 g^2 s
-USUAL = 4  # blocks
-STRETCH_DEG = 1.5
-MIN_WEIGHT = 0.1  # g^2 s, in a part
-MIN_S = 20.0  # of straight driving in a part
-MIN_BLOCKS = 4
+PRIOR_DEG = 1.0  # standard deviation of forward that is usual, at a weight of 1 g^2 s
+PRIOR_FREEDOM = 4
+STRETCH_DEG = 1.5  # standard deviation of forward due to camber and wind on one stretch of road, whatever its weight
+MIN_WEIGHT = 0.1  # g^2 s: a part of less says too little about forward
+MIN_S = 20.0  # of straight driving: a part of less says too little about the vertical
+MIN_BLOCKS = 4  # of the whole drive, to compare forward
 
 
-def apart(a, b):
-    """Angle between two directions, 0 to pi."""
-    between = abs(a - b)
-    return min(between, 2 * pi - between)
+def angle_between(a, b):
+    """Between two directions given as angles: 0 to pi."""
+    angle = abs(a - b)
+    return min(angle, 2 * pi - angle)
 
 
-def usual(scatter, weight, free):
-    """Variance (deg^2) of a mean, of its own with so many degrees of freedom, and of what is usual."""
-    return (free * scatter + USUAL * USUAL_DEG * USUAL_DEG / weight) / (free + USUAL)
+def blend_prior(variance, weight, freedom):
+    """Variance (deg^2) of forward: the sample variance, of so many degrees of freedom, averaged with the prior's.
+    weight (g^2 s): of what the forward was found from."""
+    return (freedom * variance + PRIOR_FREEDOM * PRIOR_DEG * PRIOR_DEG / weight) / (freedom + PRIOR_FREEDOM)
 
 
 class DriveParts:
-    """clear(), add() each block, compare(). Then, for the two parts that differ most beyond chance: forward_deg, by
-    how much; sigmas, of what chance does. roll_deg, pitch_deg: the most that the vertical differs between two parts.
+    """clear(), add() each block in the order of time, run compare() to its end. Then, for the split with the most
+    significant difference of forward: forward_deg, that difference; sigmas, the same in standard deviations. And over
+    all splits: roll_deg, pitch_deg, the largest differences of the vertical.
     """
 
     def __init__(self):
@@ -45,7 +47,8 @@ class DriveParts:
         self.forward_deg = self.sigmas = self.roll_deg = self.pitch_deg = 0.0
 
     def add(self, across, along, roll_g, pitch_g, weight, seconds):
-        """A block's forward, across and along that of the whole drive; its vertical, likewise."""
+        """One block. across, along: its forward, resolved to the left of and along the whole drive's forward; roll_g,
+        pitch_g: its vertical, likewise; weight (g^2 s), seconds: as in its Fit."""
         block = self._blocks[self.count]
         self.count += 1
         block[0], block[1] = weight * across, weight * along
@@ -53,34 +56,36 @@ class DriveParts:
         block[4], block[5] = weight, seconds
 
     def compare(self):
-        """A generator of short pieces."""
+        """Look at all splits; a generator of short pieces of work."""
         one, two = [0.0] * 7, [0.0] * 7
-        for first in range(1, self.count):
-            self._gather(one, 0, first)
+        for split in range(1, self.count):
+            self._sum(one, 0, split)
             yield
-            self._gather(two, first, self.count)
+            self._sum(two, split, self.count)
             yield
             if one[5] >= MIN_S and two[5] >= MIN_S:
                 self.roll_deg = max(self.roll_deg, degrees(abs(one[2] / one[5] - two[2] / two[5])))
                 self.pitch_deg = max(self.pitch_deg, degrees(abs(one[3] / one[5] - two[3] / two[5])))
             if self.count < MIN_BLOCKS or one[4] < MIN_WEIGHT or two[4] < MIN_WEIGHT:
                 continue
-            angle, other = atan2(one[0], one[1]), atan2(two[0], two[1])
-            scatter = self._scatter(angle, 0, first)
+            angle_one, angle_two = atan2(one[0], one[1]), atan2(two[0], two[1])
+            scatter = self._scatter(angle_one, 0, split)
             yield
-            scatter += self._scatter(other, first, self.count)
+            scatter += self._scatter(angle_two, split, self.count)
             yield
-            free = self.count - 2
+            freedom = self.count - 2  # two means are taken from the blocks
             variance = STRETCH_DEG * STRETCH_DEG * (one[6] / (one[4] * one[4]) + two[6] / (two[4] * two[4]))
-            variance += usual(scatter / one[4] / free, one[4], free) + usual(scatter / two[4] / free, two[4], free)
-            between = degrees(apart(angle, other))
-            if between > self.sigmas * sqrt(variance):
-                self.sigmas = between / sqrt(variance)
-                self.forward_deg = between
+            sampled = blend_prior(scatter / one[4] / freedom, one[4], freedom)
+            sampled += blend_prior(scatter / two[4] / freedom, two[4], freedom)
+            variance += sampled
+            difference_deg = degrees(angle_between(angle_one, angle_two))
+            if difference_deg > self.sigmas * sqrt(variance):
+                self.sigmas = difference_deg / sqrt(variance)
+                self.forward_deg = difference_deg
             yield
 
-    def _gather(self, sums, first, last):
-        """Sums over some blocks; the last one of weight squared."""
+    def _sum(self, sums, first, last):
+        """Fill sums (7) with those of add()'s values over blocks first to last - 1, and of the weight squared."""
         for i in range(7):
             sums[i] = 0.0
         for k in range(first, last):
@@ -90,10 +95,10 @@ class DriveParts:
             sums[6] += block[4] * block[4]
 
     def _scatter(self, angle, first, last):
-        """Sum over some blocks of weight times (deg^2) from an angle."""
+        """Sum of weight times squared deviation (deg^2) of forward from angle, over blocks first to last - 1."""
         total = 0.0
         for k in range(first, last):
             block = self._blocks[k]
-            off = degrees(apart(angle, atan2(block[0], block[1])))
+            off = degrees(angle_between(angle, atan2(block[0], block[1])))
             total += block[4] * off * off
         return total

@@ -1,57 +1,59 @@
-"""How well driving knows forward, whether that is enough, and what is wrong with the speed or with the mount."""
+"""How well a drive knows forward, whether that is enough, and what is wrong with the speed or with the mount."""
 
 from math import atan2, degrees, sqrt
 
 from ..errors import AlignmentError
 from ..rotation import angle_deg, cross, dot, norm, normalize, vector
-from .parts import DriveParts, apart, usual
+from .parts import DriveParts, angle_between, blend_prior
 from .regression import Fit
+from .speed_check import fit_problem
+from .vertical import MAX_CHANGE_DEG
 
-NEEDED = 5  # brakings and starts
-CHECKED = 2  # of them show whether the speed is one
-MAX_STARTS = 2  # count: the others are brakings
-HALVES_DEG, HALVES_STAY_DEG = 4.0, 6.0  # two halves of a drive may disagree by so much to become ready, to stay so
-READY_DEG, READY_STAY_DEG = 1.5, 2.5  # by experience one in ten is off by twice as much
-CHANCE, CHANCE_STAY = 3.0, 4.0  # sigmas: parts of a drive may differ by so much, or by HALVES_DEG
-MOVED_DEG = 30.0  # two parts of a drive; a highway's long banked curve, taken for straight, made 15
-LEVEL_DEG = 8.0  # two halves of a drive, or standing and driving: hills are not so different
-PITCH_DEG = 7.0  # two parts of a drive: 6 % up, then down
-ROLL_DEG = 7.0  # likewise: that road's curve made 6; a motorcycle leans, so not there
-ELSEWHERE_DEG = 80.0  # one event from all; one of at least
-MIN_WEIGHT = 0.012  # g^2 s and
-SMALLEST = 0.5  # of the force that the speed says was never off by more than 40
-MIN_SLOPE, MAX_SLOPE = 0.75, 1.35  # speed against force: pitch in braking and a coarse speed shift it by 0.2
-MAX_LATE_S = 1.9
-
-
-def speed_unit_problem(slope):
-    """The speed does not change as the force says. slope: change of force per change of speed, 1 if all is well."""
-    return AlignmentError("speed-unit", min(1.0 / max(slope, 0.01), 99.9))
+MIN_EVENTS = 5  # straight braking and acceleration events, for an alignment
+MIN_EVENTS_TO_CHECK_SPEED = 2
+# Limits come in pairs with a hysteresis: to become ready, and to stay so. What flickers at a threshold helps nobody.
+READY_DEG, STAY_READY_DEG = 1.5, 2.5  # standard error of forward; one drive in ten is off by twice as much
+AGREE_DEG, STAY_AGREE_DEG = 4.0, 6.0  # forward in two halves of a drive, or in two parts, unless it is by chance:
+AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0  # between two parts
+# Two parts of a drive that differ by more mean that the mount moved
+MOVED_DEG = 30.0  # forward; a motorway's long banked curve, taken for straight, made 15
+PITCH_DEG = 7.0  # 6 % uphill, then downhill, is within this
+ROLL_DEG = 7.0  # that banked curve made 6. Not used on a motorcycle, which leans
+# An event that points over EVENT_OFF_DEG from the overall forward means that the mount moved. Only events of at least
+# MIN_EVENT_WEIGHT, whose force is at least MIN_EVENT_FORWARD of what the change of speed asks for, are judged: on
+# recorded drives none of these was ever off by more than 40 degrees.
+EVENT_OFF_DEG = 80.0
+MIN_EVENT_WEIGHT = 0.012  # g^2 s
+MIN_EVENT_FORWARD = 0.5  # g per g
 
 
 class DrivingQuality:
-    """fit: of all straight driving so far. quality_deg: standard error of its forward, 180 until there is one;
-    halves_deg: how far two halves of the drive disagree about it; parts: the DriveParts; agree: halves and parts
-    do; good: enough for an alignment; speed_problem (from CHECKED events on), mount_problem (from NEEDED on): an
-    AlignmentError, or None.
+    """events: the DrivingEvents of the drive; vertical: its Vertical.
+
+    fit: the Fit of all straight driving so far; quality_deg: standard error of its forward, 180 until there is one;
+    halves_deg: between the forwards of two halves of the drive; parts: the DriveParts; agree: halves and parts agree
+    about forward; good: enough for an alignment; speed_problem, mount_problem: an AlignmentError, or None.
     """
 
-    def __init__(self):
+    def __init__(self, events, vertical):
         self.fit = Fit()
         self.quality_deg = self.halves_deg = 180.0
-        self.good = self.agree = self._known = self._elsewhere = False
+        self.good = self.agree = False
         self.speed_problem = self.mount_problem = None
         self.parts = DriveParts()
+        self._events = events
+        self._vertical = vertical
+        self._precise = self._event_off = False
         self._part = Fit()
 
-    def judge(self, drive):
-        """After another event or stop of a DriveAlignment; a generator of short pieces."""
-        regression, lag, part = drive.events.regression, drive.events.lag, self._part
+    def judge(self):
+        """After another event or stop: find all the attributes anew. A generator of short pieces of work."""
+        regression, lag, part = self._events.regression, self._events.lag, self._part
         up = vector()
         if not (yield from regression.fitting(self.fit, lag)):
             return
         yield
-        if not drive.vertical(up, self.fit):
+        if not self._vertical.known(up, self.fit):
             return
         left, forward = vector(), vector()
         cross(left, up, self.fit.forward)
@@ -60,7 +62,7 @@ class DrivingQuality:
         normalize(forward)
         yield
         blocks = regression.filled
-        spread = slopes = weights = 0.0
+        squares = ratios = weights = 0.0
         self.parts.clear()
         for block in range(blocks):
             if not (yield from regression.fitting(part, lag, block, block + 1)):
@@ -69,63 +71,65 @@ class DrivingQuality:
             yield
             level = part.level
             self.parts.add(x, y, dot(left, level), dot(forward, level), weight, part.seconds)
-            slope = sqrt(x * x + y * y)
-            slopes += weight * slope
+            ratios += weight * sqrt(x * x + y * y)
             weights += weight
             if blocks > 1 and (yield from regression.fitting(part, lag, 0, blocks, block)):
                 angle = atan2(dot(left, part.forward), dot(forward, part.forward))
-                spread += angle * angle
+                squares += angle * angle
             yield
         if blocks < 2 or weights <= 0.0:
             return
-        # the jackknife: empirical, where a formal error is optimistic early
-        free = blocks - 1
-        self.quality_deg = sqrt(usual(degrees(degrees(spread)) * free / blocks, self.fit.weight, free))
+        # The jackknife: the variance of forward from its changes as each block in turn is left out. It is empirical;
+        # the formal error of the regression is optimistic early in a drive.
+        freedom = blocks - 1
+        variance = degrees(degrees(squares)) * freedom / blocks
+        self.quality_deg = sqrt(blend_prior(variance, self.fit.weight, freedom))
         yield from self.parts.compare()
         half = blocks // 2
         if (yield from regression.fitting(part, lag, 0, half)):
-            one = atan2(dot(left, part.forward), dot(forward, part.forward))
+            angle = atan2(dot(left, part.forward), dot(forward, part.forward))
             level = vector(part.level[0], part.level[1], part.level[2])
             yield
             if (yield from regression.fitting(part, lag, half, blocks)):
-                two = atan2(dot(left, part.forward), dot(forward, part.forward))
-                self.halves_deg = degrees(apart(one, two))
+                other = atan2(dot(left, part.forward), dot(forward, part.forward))
+                self.halves_deg = degrees(angle_between(angle, other))
                 yield
-                self._decide(drive, slopes / weights, angle_deg(level, part.level))
+                self._decide(ratios / weights, angle_deg(level, part.level))
 
-    def _decide(self, drive, slope, level_deg):
-        """slope: force per change of speed; level_deg: between the verticals of two halves of the drive."""
+    def _decide(self, force_ratio, level_change_deg):
+        """force_ratio: change of force per change of speed; level_change_deg: between the verticals of two halves."""
         self.speed_problem = self.mount_problem = None
         self.good = False
-        lag_s = drive.events.lag_s
-        if drive.counted < CHECKED:
+        counted = self._events.counted
+        if counted < MIN_EVENTS_TO_CHECK_SPEED:
             return
-        if lag_s >= MAX_LATE_S:
-            self.speed_problem = AlignmentError("speed-late", lag_s)
-        elif not MIN_SLOPE < slope < MAX_SLOPE:
-            self.speed_problem = speed_unit_problem(slope)
-        if drive.counted < NEEDED:
+        self.speed_problem = fit_problem(self._events.lag_s, force_ratio)
+        if counted < MIN_EVENTS:
             return
-        before, since = drive.known_vertical()
-        from_driving = 0.0 if before is None else angle_deg(before, self.fit.level)
+        self.mount_problem = self._find_mount_problem(level_change_deg)
         parts = self.parts
-        if level_deg > LEVEL_DEG:
-            self.mount_problem = AlignmentError("mount-moved", "vertical", level_deg)
-        elif from_driving > LEVEL_DEG:
-            self.mount_problem = AlignmentError("mount-moved", since, from_driving)
-        elif drive.vehicle == "car" and (parts.roll_deg > ROLL_DEG or parts.pitch_deg > PITCH_DEG):
-            self.mount_problem = AlignmentError("mount-moved", "vertical-in-parts")
-        elif self._look_at(drive.events.last) or (parts.forward_deg > MOVED_DEG and parts.sigmas > CHANCE_STAY):
-            self.mount_problem = AlignmentError("mount-moved", "forward")
-        # each with a hysteresis of its own: what comes and goes at a threshold helps nobody
-        limit_deg, chance = (HALVES_STAY_DEG, CHANCE_STAY) if self.agree else (HALVES_DEG, CHANCE)
-        self.agree = self.halves_deg <= limit_deg and (parts.forward_deg <= limit_deg or parts.sigmas <= chance)
-        self._known = self.quality_deg <= (READY_STAY_DEG if self._known else READY_DEG)
-        self.good = self._known and self.agree
+        limit_deg, sigmas = (STAY_AGREE_DEG, STAY_AGREE_SIGMAS) if self.agree else (AGREE_DEG, AGREE_SIGMAS)
+        self.agree = self.halves_deg <= limit_deg and (parts.forward_deg <= limit_deg or parts.sigmas <= sigmas)
+        self._precise = self.quality_deg <= (STAY_READY_DEG if self._precise else READY_DEG)
+        self.good = self._precise and self.agree
 
-    def _look_at(self, last):
-        """True if the last event that says anything for itself says that forward is no longer where it was."""
-        forward = vector()
-        if last.forward(forward, self.fit.level) > MIN_WEIGHT and norm(forward) > SMALLEST:
-            self._elsewhere = angle_deg(forward, self.fit.forward) > ELSEWHERE_DEG
-        return self._elsewhere
+    def _find_mount_problem(self, level_change_deg):
+        """An AlignmentError if the mount has moved, else None."""
+        parts = self.parts
+        if level_change_deg > MAX_CHANGE_DEG:
+            return AlignmentError("mount-moved", "vertical", level_change_deg)
+        problem = self._vertical.problem(self.fit.level)
+        if problem is not None:
+            return problem
+        if self._vertical.is_car and (parts.roll_deg > ROLL_DEG or parts.pitch_deg > PITCH_DEG):
+            return AlignmentError("mount-moved", "vertical-in-parts")
+        if self._is_last_event_off() or (parts.forward_deg > MOVED_DEG and parts.sigmas > STAY_AGREE_SIGMAS):
+            return AlignmentError("mount-moved", "forward")
+        return None
+
+    def _is_last_event_off(self):
+        """True if the latest of the events that can be judged points away from the overall forward."""
+        forward, last = vector(), self._events.last
+        if last.forward(forward, self.fit.level) > MIN_EVENT_WEIGHT and norm(forward) > MIN_EVENT_FORWARD:
+            self._event_off = angle_deg(forward, self.fit.forward) > EVENT_OFF_DEG
+        return self._event_off

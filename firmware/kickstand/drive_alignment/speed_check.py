@@ -1,63 +1,88 @@
-"""Is the speed a speed? What can be seen of it without knowing where forward is."""
+"""Is the speed of the source the vehicle's speed in m/s, and in time?"""
 
 from math import sqrt
 
 from ..errors import AlignmentError
 
-NEGATIVE_MPS = -0.5  # noise around zero is not negative
-LIVELY_G = 0.03  # between the means of two seconds: standing never, driving most of the time
-TURNING_DPS = 5.0  # a turn at a steady speed is lively too
-STUCK_S = 8  # so many lively seconds at the very same speed: the begins and ends of four brakings; and
-STUCK_SHARE = 0.15  # this share of all the seconds it lasted
+NEGATIVE_MPS = -0.5  # noise around zero does not count as negative
+# A second is lively if its mean force differs from that of the second before by this much. While standing no second
+# is; while driving most are.
+LIVELY_G = 0.03
+TURNING_DPS = 5.0  # seconds in a turn are left out: at a steady speed they are lively too
+# The speed is stuck if it has been the very same for this many lively seconds, the beginnings and ends of four braking
+# events, and these are at least this share of all seconds since it changed last.
+STUCK_S = 8
+STUCK_SHARE = 0.15
+# Change of force per change of speed, 1 if all is well. The pitch of a braking vehicle and a coarse speed shift it by
+# 0.2.
+MIN_FORCE_RATIO, MAX_FORCE_RATIO = 0.75, 1.35
+MAX_LAG_S = 1.9
+
+
+def speed_unit_problem(force_ratio):
+    """The AlignmentError for a speed that does not change as the force says. force_ratio: change of force per change
+    of speed."""
+    return AlignmentError("speed-unit", min(1.0 / max(force_ratio, 0.01), 99.9))
+
+
+def fit_problem(lag_s, force_ratio):
+    """What the fit of force on changes of speed says is wrong with the speed: an AlignmentError, or None."""
+    if lag_s >= MAX_LAG_S:
+        return AlignmentError("speed-late", lag_s)
+    if not MIN_FORCE_RATIO < force_ratio < MAX_FORCE_RATIO:
+        return speed_unit_problem(force_ratio)
+    return None
 
 
 class SpeedCheck:
-    """problem: an AlignmentError, or None."""
+    """Finds a negative or stuck speed, before anybody knows which way is forward. problem: an AlignmentError, or
+    None."""
 
     def __init__(self):
         self.problem = None
         self._speed = None
-        self._changed()
-        self._before = None
-        self._sums = [0.0] * 3
-        self._turned = self._turned_before = 0.0
+        self._start_count()
+        self._force_before = None
+        self._force_us = [0.0] * 3
+        self._turned = self._yaw_dps_before = 0.0
         self._sums_us = 0
 
-    def _changed(self):
-        self._seconds = self._lively = 0
+    def _start_count(self):
+        """The speed has changed."""
+        self._seconds = self._lively_seconds = 0
 
     def measure(self, speed_mps):
-        """A new value."""
+        """A new value of the speed source."""
         if not speed_mps >= NEGATIVE_MPS:  # also not-a-number
             self.problem = AlignmentError("speed-negative", speed_mps)
         if speed_mps != self._speed:
             self._speed = speed_mps
-            self._changed()
+            self._start_count()
 
     def update(self, force, yaw_dps, dt_us):
-        """Mean force (3, g) and rate about the vertical (deg/s) of the last dt_us."""
-        sums = self._sums
+        """Mean force (3, g) and yaw rate (deg/s) over the last dt_us."""
+        sums = self._force_us
         for i in range(3):
             sums[i] += force[i] * dt_us
         self._turned += abs(yaw_dps) * dt_us
         self._sums_us += dt_us
         if self._sums_us >= 1_000_000:
-            self.second([total / self._sums_us for total in sums], self._turned / self._sums_us)
+            self.update_second([total / self._sums_us for total in sums], self._turned / self._sums_us)
             self._turned = 0.0
             self._sums_us = 0
             for i in range(3):
                 sums[i] = 0.0
 
-    def second(self, force, yaw_dps=0.0):
-        """Mean force (3, g) and rate of turning (deg/s) of the last second."""
-        before, self._before = self._before, list(force)
-        turning = max(yaw_dps, self._turned_before) > TURNING_DPS
-        self._turned_before = yaw_dps
+    def update_second(self, force, yaw_dps=0.0):
+        """Mean force (3, g) and mean absolute yaw rate (deg/s) over the last second."""
+        before, self._force_before = self._force_before, list(force)
+        turning = max(yaw_dps, self._yaw_dps_before) > TURNING_DPS
+        self._yaw_dps_before = yaw_dps
         if before is None or self._speed is None or turning:
             return
         d0, d1, d2 = force[0] - before[0], force[1] - before[1], force[2] - before[2]
         self._seconds += 1
         if sqrt(d0 * d0 + d1 * d1 + d2 * d2) > LIVELY_G:
-            self._lively += 1
-        if self._lively >= STUCK_S and self._lively >= STUCK_SHARE * self._seconds:
+            self._lively_seconds += 1
+        if self._lively_seconds >= STUCK_S and self._lively_seconds >= STUCK_SHARE * self._seconds:
             self.problem = AlignmentError("speed-stuck", self._speed)

@@ -1,19 +1,27 @@
 """The page of alignment by driving: what it waits for, how far it is, what came of it."""
 
-from ..drive_alignment.alignment import BRAKING, DRIVE, READY, TURNING, WAITING_FOR_SPEED, WAITING_FOR_STOP
+from ..drive_alignment.alignment import (
+    BRAKING,
+    READY,
+    TURNING,
+    WAITING_FOR_BRAKING,
+    WAITING_FOR_SPEED,
+    WAITING_FOR_STOP,
+)
 from . import messages
 
 _WAITS = {
     WAITING_FOR_SPEED: "waiting: speed",
     WAITING_FOR_STOP: "stop needed",
-    DRIVE: "brake straight",
+    WAITING_FOR_BRAKING: "brake straight",
     BRAKING: "braking...",
     TURNING: "turn not counted",
 }
 
 
 def lines(background, now_ms):
-    """Two lines of 16 characters. background: a BackgroundAlignment."""
+    """Two lines of 16 characters. background: a BackgroundAlignment, of which this reads drive, state, result and the
+    fault of its speed."""
     drive = background.drive
     if drive.problem is not None:
         return messages.lines(drive.problem)

@@ -7,7 +7,7 @@ alone: they can make the speed seem to change too little, never too much.
 """
 
 import numpy as np
-from kickstand.drive_alignment.quality import speed_unit_problem
+from kickstand.drive_alignment.speed_check import speed_unit_problem
 from kickstand.units import STANDARD_GRAVITY
 
 from ..refusals import RefusedInput

@@ -2,25 +2,26 @@
 
     d = (1 - rho2) / (2 R^2),  R = |mean of e^(i a)|,  rho2 = the mean cosine of 2 (a - mean direction)
 
-About the variance in rad^2: 0.02 is 8 degrees, 0.005 is 4. Running sums: no second pass for rho2.
+For small spreads d is about the variance in rad^2: 0.02 is 8 degrees, 0.005 is 4. Running sums are kept, so that rho2
+needs no second pass over the directions.
 """
 
-NONE = 9.9  # of no direction at all; four directions at right angles have no mean: more than this
+NONE = 9.9  # where there is no mean direction, as of opposite ones; also the largest value given
 
 
 class CircularDispersion:
-    """Directions of plane vectors, each counting the same whatever its length."""
+    """Directions of vectors in a plane, all of equal weight whatever the vectors' lengths. count: how many."""
 
     def __init__(self):
         self.clear()
 
     def clear(self):
-        """Forget all."""
+        """Forget all directions."""
         self.count = 0
         self._cos = self._sin = self._cos2 = self._sin2 = 0.0
 
     def add(self, x, y, length):
-        """A direction: the vector (x, y), whose length > 0 is known already."""
+        """Add the direction of the vector (x, y). length: of that vector, > 0."""
         c, s = x / length, y / length
         self.count += 1
         self._cos += c
@@ -29,7 +30,7 @@ class CircularDispersion:
         self._sin2 += 2.0 * c * s
 
     def join(self, other):
-        """Take over the directions of another one."""
+        """Add all directions of another CircularDispersion."""
         self.count += other.count
         self._cos += other._cos
         self._sin += other._sin

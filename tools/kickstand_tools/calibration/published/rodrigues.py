@@ -2,18 +2,18 @@
 
     R = I + K + K^2 / (1 + c),  K the cross product matrix of a x b, c = a . b
 
-In float32 it is 2 degrees off where a and b are 179.9 degrees apart, and fails nearer. So where c < 0 a half turn D
-comes first, which makes it c > 0, and R = Rodrigues(D a, b) D: under 2e-7 everywhere.
+In float32 this is 2 degrees off where a and b are 179.9 degrees apart, and fails nearer to 180. So where c < 0, a half
+turn D about a coordinate axis comes first, after which c > 0: R = Rodrigues(D a, b) D. Its error is under 2e-7
+everywhere.
 """
 
 from kickstand.rotation import dot
 
 
 def rotation_between(out, a, b, axis):
-    """out (9) = the rotation that takes unit vector a to unit vector b.
+    """Fill out (9, row-major) with the rotation that takes unit vector a to unit vector b.
 
-    axis: 0, 1 or 2, about which to turn first where a and b are over 90 degrees apart: a coordinate axis perpendicular
-    to b.
+    axis: 0, 1 or 2, the coordinate axis of the half turn; it has to be perpendicular to b.
     """
     signs = [1.0, 1.0, 1.0]
     if dot(a, b) < 0.0:

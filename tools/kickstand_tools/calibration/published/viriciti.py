@@ -1,32 +1,33 @@
 """Alignment by driving as ViriCiti published it: R = R2 R1, each a rotation by Rodrigues' formula.
 
-R1 turns the mean direction of gravity at the stops upwards. R2 turns the mean force of the brakings, levelled by R1,
-backwards; a braking counts if the directions of its levelled force spread little. A tilt left by the stops leaks into
-forward, some 3 to 4 degrees, which more brakings do not take away: driving.py does. This is here to compare with.
+R1 turns the mean direction of gravity at the stops upwards. R2 turns the mean force of the braking events, levelled by
+R1, backwards. A braking event counts if the directions of its levelled force spread little. A tilt left over from the
+stops leaks into forward, a yaw error of some 3 to 4 degrees that more braking events do not take away. The firmware's
+DriveAlignment does not have this error; the published method is here to be compared with it.
 """
 
 from math import degrees, sqrt
 
-from kickstand.drive_alignment.alignment import DRIVE, GAP_US, READY, DriveAlignment
+from kickstand.drive_alignment.alignment import READY, WAITING_FOR_BRAKING, DriveAlignment
 from kickstand.drive_alignment.events import MAX_INTERVAL_US, MIN_INTERVAL_US
-from kickstand.drive_alignment.reasons import not_ready
 from kickstand.rotation import matrix, normalize, rotate, vector
+from kickstand.units import GAP_US
 
 from .dispersion import CircularDispersion
 from .rodrigues import multiply, rotation_between
 
 MAX_DISPERSION = 0.02  # 8 degrees
-MIN_LEVEL_G = 0.03  # smaller forces point anywhere
-BRAKING_MPS2 = -1.0
+MIN_LEVEL_G = 0.03  # a smaller levelled force points anywhere
+BRAKING_MPS2 = -1.0  # an interval with more deceleration belongs to a braking event
 MEAN_US = 100_000
-LOSS_MPS = 1.5  # a shorter one is noise
-NEEDED = 3
+LOSS_MPS = 1.5  # a braking event that takes off less speed is noise
+MIN_EVENTS = 3
 UP = (0.0, 1.0, 0.0)
 BACKWARD = (0.0, 0.0, -1.0)
 
 
 class _Samples:
-    """Means of a tenth of a second: their sum (3, g) and the directions of their levelled force."""
+    """Mean forces over MEAN_US each: their sum (3, g), and the directions of the levelled ones."""
 
     def __init__(self):
         self.force = [0.0] * 3
@@ -44,22 +45,21 @@ class _Samples:
 
 
 class PublishedAlignment:
-    """Used like a DriveAlignment, which runs beside it: speed and mount are checked by that one.
+    """Used like a DriveAlignment. One runs beside it, which checks speed and mount and finds the vertical.
 
-    counted, turned: brakings accepted, and refused for their dispersion. quality_deg: standard error of the mean
-    direction of those accepted, which says nothing of the leak.
+    counted, turned: braking events accepted, and refused for their dispersion; needed: how many must be accepted.
     """
 
     def __init__(self, vehicle, up=None, bias=None):
-        self._checked = DriveAlignment(vehicle, up, bias)
+        self._improved = DriveAlignment(vehicle, up, bias)
         self.vehicle = vehicle
-        self.standing = self._checked.standing
-        self.needed = NEEDED
+        self.standing = self._improved.standing
+        self.needed = MIN_EVENTS
         self.counted = self.turned = 0
         self._accepted = [0.0] * 3  # sum of their forces
-        self._braking = _Samples()  # the one that goes on
-        self._interval = _Samples()  # since the last speed: nobody knows yet what it was
-        self._means = CircularDispersion()  # of the accepted brakings, each one direction
+        self._event = _Samples()  # of the braking event that goes on
+        self._interval = _Samples()  # since the last speed: the next one will tell whether it was braking
+        self._means = CircularDispersion()  # one direction for each accepted braking event
         self._speed = -1.0
         self._loss = 0.0
         self._interval_us = 0
@@ -71,16 +71,16 @@ class PublishedAlignment:
 
     @property
     def problem(self):
-        """What is wrong with speed or mount: an AlignmentError, or None."""
-        return self._checked.problem
+        """What is wrong with the speed or with the mount: an AlignmentError, or None."""
+        return self._improved.problem
 
     @property
     def state(self):
-        """As a DriveAlignment's."""
+        """As DriveAlignment.state."""
         if self.ready:
             return READY
-        state = self._checked.state
-        return DRIVE if state == READY else state
+        state = self._improved.state
+        return WAITING_FOR_BRAKING if state == READY else state
 
     @property
     def ready(self):
@@ -89,18 +89,19 @@ class PublishedAlignment:
 
     @property
     def quality_deg(self):
-        """See above; 180 until there are two brakings."""
+        """Standard error of the mean direction of the accepted braking events, 180 until there are two. The leaked tilt
+        is not in it."""
         n = self.counted
         return degrees(sqrt(self._means.value() / n)) if n > 1 else 180.0
 
     @property
     def reason(self):
         """Why matrix() cannot be had yet: an AlignmentError."""
-        return self.problem or not_ready(self._checked, self.counted, self.needed, self.turned)
+        return self.problem or self._improved.missing(self.counted, self.needed, self.turned)
 
     def update(self, force, rate, dt_us):
         """As DriveAlignment.update()."""
-        self._checked.update(force, rate, dt_us)
+        self._improved.update(force, rate, dt_us)
         if dt_us > GAP_US:
             self._forget()
             return
@@ -113,15 +114,15 @@ class PublishedAlignment:
                 self._levelled[i] = self._sums[i] / self._sums_us
                 self._sums[i] = 0.0
             self._sums_us = 0
-            if self._checked.vertical(self._up):
+            if self._improved.vertical.known(self._up):
                 self._sample(list(self._levelled))
 
     def finish(self):
         """As DriveAlignment.finish()."""
-        self._checked.finish()
+        self._improved.finish()
 
     def _forget(self):
-        self._braking.clear()
+        self._event.clear()
         self._interval.clear()
         self._speed = -1.0
         self._loss = 0.0
@@ -141,41 +142,41 @@ class PublishedAlignment:
                 self._interval.force[i] += force[i]
 
     def measure_speed(self, speed_mps, age_us=0):
-        """As DriveAlignment.measure_speed(); the published method does not look for a lag."""
-        self._checked.measure_speed(speed_mps, age_us)
+        """As DriveAlignment.measure_speed(), but without an estimate of the lag."""
+        self._improved.measure_speed(speed_mps, age_us)
         seconds = self._interval_us * 1e-6
         if self._interval_us < MIN_INTERVAL_US:
             return
         if self._speed < 0.0 or self._interval_us > MAX_INTERVAL_US:
-            self._braking.clear()
+            self._event.clear()
         elif (speed_mps - self._speed) / seconds < BRAKING_MPS2:
-            self._braking.join(self._interval)
+            self._event.join(self._interval)
             self._loss += self._speed - speed_mps
-        elif self._braking.directions.count:
-            self._end_braking()
+        elif self._event.directions.count:
+            self._end_event()
         self._interval.clear()
         self._interval_us = 0
         self._speed = speed_mps
 
-    def _end_braking(self):
+    def _end_event(self):
         loss, self._loss = self._loss, 0.0
-        if loss >= LOSS_MPS and self._braking.directions.value() <= MAX_DISPERSION:
+        if loss >= LOSS_MPS and self._event.directions.value() <= MAX_DISPERSION:
             self.counted += 1
             mean = self._levelled
             for i in range(3):
-                self._accepted[i] += self._braking.force[i]
-            rotate(mean, self._level, self._braking.force)
+                self._accepted[i] += self._event.force[i]
+            rotate(mean, self._level, self._event.force)
             self._means.add(mean[0], mean[2], sqrt(mean[0] * mean[0] + mean[2] * mean[2]))
         elif loss >= LOSS_MPS:
             self.turned += 1
-        self._braking.clear()
+        self._event.clear()
 
     def matrix(self, out):
         """Fill out (9, rows left, up, forward) with vehicle-from-sensor. Raises AlignmentError while not ready."""
         if not self.ready:
             raise self.reason
         level, turn, braking = matrix(), matrix(), vector()
-        self._checked.vertical(self._up)
+        self._improved.vertical.known(self._up)
         rotation_between(level, self._up, UP, 0)
         rotate(braking, level, self._accepted)
         braking[1] = 0.0

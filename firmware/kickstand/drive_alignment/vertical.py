@@ -1,0 +1,173 @@
+"""The vertical in the sensor's axes: from standing, and from the best source that a drive has so far.
+
+Standing shows it as the mean direction of gravity over many stops, because no city is all uphill (ViriCiti). Each stop
+counts once, however long it was. At a stop the gyro reads its bias alone, which is measured too.
+
+A motorcycle's stops are not level sideways. It has the vertical from the upright pose, or else from riding straight,
+where balance keeps the lateral force at zero. A car has it from its stops and from driving straight, in equal shares:
+the road's camber and slope tilt both alike.
+"""
+
+from ..errors import AlignmentError
+from ..rotation import angle_deg, norm, normalize, vector
+
+STANDING_MPS = 0.5  # a GPS at rest shows up to this
+MOVED_MPS = 2.0  # a vehicle that was faster than this has driven: its next stop is another one
+SETTLE_S = 1.0  # a vehicle rocks back after braking
+COUNTS_S = 2.0  # after settling, a stop has to last this long to count
+# At a stop a mean over 0.1 s is this near to a mean with the time constant AVERAGE_S. A diesel at idle, wind and
+# passengers are within it.
+STILL_G = 0.06
+STILL_DPS = 3.0
+AVERAGE_S = 0.5
+SAME_STOP_DEG = 1.5  # doors and passengers tilt a standing vehicle by less
+TURNED_S = 6.0  # longer than a speed may be late: what is still for so long at another angle was turned, not driven off
+# A rate that differs by more from the bias at the last stop is a turn, and a speed of zero in it is wrong. Warming up
+# changes the bias by less.
+TURNING_DPS = 10.0
+MEAN_S = 60.0  # time constant of the mean force, which serves as the vertical until there is a better one
+MAX_CHANGE_DEG = 8.0  # 14 %: two verticals that differ by more are not two slopes of the road: the mount has moved
+
+
+class StandingVertical:
+    """update() with each mean over about 0.1 s.
+
+    stops: how many; up: the vertical in the sensor's axes (unit vector) once there was a stop; bias: the gyro's (3,
+    deg/s) at the last stop; standing: at a stop now; moved: the mount must have moved, as two stops are so far apart.
+    """
+
+    def __init__(self, bias=(0.0, 0.0, 0.0)):
+        self.stops = 0
+        self.up = vector()
+        self.bias = list(bias)
+        self.standing = False
+        self.moved = False
+        self._sum = [0.0] * 3  # of the directions of the stops before this one
+        self._begin_stop()
+
+    def _begin_stop(self):
+        """The vehicle has driven: what follows belongs to another stop."""
+        self._stop_force = [0.0] * 3  # means of this stop
+        self._stop_bias = [0.0] * 3
+        self._averaged_s = 0.0
+        self._counted = False
+        self._force = None  # mean with the time constant AVERAGE_S
+        self._still_s = 0.0
+
+    def update(self, force, rate, speed_mps, seconds):
+        """force (3, g), rate (3, deg/s): means over the last seconds; speed_mps: the last value of the source."""
+        if speed_mps > MOVED_MPS and self._force is not None:
+            if self._counted:
+                for i in range(3):
+                    self._sum[i] += self._direction[i]
+            self._begin_stop()
+        self.standing = False
+        if speed_mps > STANDING_MPS or not self._is_still(force, rate, seconds):
+            self._still_s = 0.0
+            return
+        self._still_s += seconds
+        if self._still_s < SETTLE_S:
+            return
+        if self._counted:
+            apart_deg = angle_deg(self._force, self._stop_force)
+            if apart_deg > SAME_STOP_DEG:
+                # Either the vehicle drives again while a late speed still says zero, or the sensor has been turned.
+                self.moved = self.moved or (apart_deg > MAX_CHANGE_DEG and self._still_s > TURNED_S)
+                return
+        self.standing = True
+        self._average(force, rate, seconds)
+
+    def _is_still(self, force, rate, seconds):
+        """True if force and rate are near their running means, and rate near the bias of the last stop."""
+        if self._force is None:
+            self._force, self._rate = list(force), list(rate)
+        gain = min(1.0, seconds / AVERAGE_S)
+        from_force = from_rate = from_bias = 0.0  # squared differences
+        for i in range(3):
+            d = force[i] - self._force[i]
+            self._force[i] += gain * d
+            from_force += d * d
+            d = rate[i] - self._rate[i]
+            self._rate[i] += gain * d
+            from_rate += d * d
+            d = rate[i] - self.bias[i]
+            from_bias += d * d
+        turning = self.stops and from_bias > TURNING_DPS * TURNING_DPS
+        return not (turning or from_force > STILL_G * STILL_G or from_rate > STILL_DPS * STILL_DPS)
+
+    def _average(self, force, rate, seconds):
+        self._averaged_s += seconds
+        gain = seconds / self._averaged_s
+        for i in range(3):
+            self._stop_force[i] += gain * (force[i] - self._stop_force[i])
+            self._stop_bias[i] += gain * (rate[i] - self._stop_bias[i])
+        if self._averaged_s < COUNTS_S:
+            return
+        if not self._counted:
+            self._counted = True
+            self.stops += 1
+        size = norm(self._stop_force)
+        self._direction = [component / size for component in self._stop_force]
+        for i in range(3):
+            self.bias[i] = self._stop_bias[i]
+            self.up[i] = self._sum[i] + self._direction[i]
+        normalize(self.up)
+        if self.stops > 1 and angle_deg(self._direction, self._sum) > MAX_CHANGE_DEG:
+            self.moved = True
+
+
+class Vertical:
+    """The best vertical so far. is_car: stops show it. from_pose: unit vector of the upright pose (a motorcycle's), or
+    None. standing: the StandingVertical of the same drive.
+    """
+
+    def __init__(self, is_car, from_pose, standing):
+        self.is_car = is_car
+        self._from_pose = vector(from_pose[0], from_pose[1], from_pose[2]) if from_pose is not None else None
+        self._standing = standing
+        self._mean = None  # force (3, g)
+        self._mean_s = 0.0
+
+    def update(self, force, seconds):
+        """force (3, g): the mean over the last seconds."""
+        self._mean = self._mean or vector()
+        self._mean_s = min(MEAN_S, self._mean_s + seconds)
+        gain = seconds / self._mean_s
+        for i in range(3):
+            self._mean[i] += gain * (force[i] - self._mean[i])
+
+    @property
+    def turn_axis(self):
+        """The axis of the yaw rate (3, length about 1), known from the first update() on."""
+        return self._standing.up if self.is_car and self._standing.stops else self._from_pose or self._mean
+
+    def known(self, out, fit=None):
+        """Fill out (unit vector) with the vertical. False if it is not known yet, as a car's before its first stop.
+
+        fit: the Fit of all straight driving, None if there is none yet.
+        """
+        if self._from_pose is not None:
+            best = self._from_pose
+        elif self.is_car and not self._standing.stops:
+            return False
+        elif fit is None:
+            best = self._standing.up if self.is_car else self._mean
+        elif self.is_car:
+            best = [self._standing.up[i] + fit.level[i] / norm(fit.level) for i in range(3)]
+        else:
+            best = fit.level
+        if best is None:
+            return False
+        for i in range(3):
+            out[i] = best[i]
+        normalize(out)
+        return True
+
+    def problem(self, level):
+        """An AlignmentError if straight driving's vertical is far from that of the stops or of the upright pose, else
+        None. level (3): of the Fit of all straight driving."""
+        before = self._standing.up if self.is_car else self._from_pose
+        change_deg = 0.0 if before is None else angle_deg(before, level)
+        if change_deg > MAX_CHANGE_DEG:
+            return AlignmentError("mount-moved", "since-standing" if self.is_car else "since-upright-pose", change_deg)
+        return None
