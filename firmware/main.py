@@ -1,6 +1,5 @@
-"""Starts Kickstand when the board gets power. Without a whole firmware this ends at the prompt."""
+"""Starts Kickstand when the board gets power."""
 
 from kickstand.start import main
 
-if __name__ == "__main__":
-    main()
+main()

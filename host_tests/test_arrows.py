@@ -22,7 +22,7 @@ ARROWS = {
     "imu": set(),
     "calibration": set(),
     "lean": {"calibration"},
-    "drive_alignment": {"calibration"},
+    "drive_alignment": set(),  # it works on the calibrations that the app hands to it
     "speed": {"board"},
     "rides": {"board", "calibration"},  # each block of a ride holds its calibration's record
     "ui": {"board.button", "lean", "calibration", "drive_alignment"},

@@ -56,15 +56,3 @@ class CardError(Refusal):
 
 class SettingsError(Refusal):
     """A value in config.py that cannot be used. values[0]: the name of the setting."""
-
-
-class SensorFault(Refusal):
-    """Why there are no readings."""
-
-
-class SpeedFault(Refusal):
-    """Why there is no speed."""
-
-
-class RecordingError(Refusal):
-    """Why the recording of a ride has ended by itself."""

@@ -126,7 +126,7 @@ class Settings:
         card = [getattr(self, name) for name in ("SD_SPI",) + SD_PINS]
         if None in card and card != [None] * 5:
             missing = SD_PINS[card.index(None) - 1] if card[0] is not None else "SD_SPI"
-            raise SettingsError("card-incomplete", missing, "SD_SPI, " + ", ".join(SD_PINS))
+            raise SettingsError("card-pins", missing, "SD_SPI, " + ", ".join(SD_PINS))
         names = ("BUTTON_PIN", "SENSOR_SDA", "SENSOR_SCL") + (() if self.one_bus else ("LCD_SDA", "LCD_SCL"))
         names += _SPEED_PINS[self.SPEED] + (() if None in card else SD_PINS)
         if len({getattr(self, name) for name in names}) != len(names):
@@ -134,4 +134,4 @@ class Settings:
         if not self.one_bus and self.SENSOR_I2C == self.LCD_I2C:
             raise SettingsError("same-controller", "LCD_I2C", self.LCD_I2C)
         if self.VEHICLE == "car" and self.SPEED is None:
-            raise SettingsError("car-needs-speed", "SPEED")
+            raise SettingsError("needs-speed", "SPEED")

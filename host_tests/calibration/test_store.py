@@ -150,7 +150,7 @@ def test_flash_that_does_not_keep_what_is_written(store, tmp_path, monkeypatch):
         return open(path, mode)
 
     monkeypatch.setattr("kickstand.calibration.store.open", forgetful, raising=False)
-    with pytest.raises(StoreError, match="reads-back-differently"):
+    with pytest.raises(StoreError, match="read-back"):
         store.save(calibration(2))
     assert mark_of(store.load()) == 1
 

@@ -278,8 +278,7 @@ def test_presses(board, held_s, events):
 
 def test_ctrl_c_puts_the_watchdog_to_rest(board, monkeypatch, capsys, tmp_path):
     """After Ctrl-C nothing feeds it, and a board that resets in the middle of a copy could not be deployed to."""
-    import main
-    from kickstand import app
+    from kickstand import app, start
 
     monkeypatch.chdir(tmp_path)
     calls = []
@@ -294,7 +293,7 @@ def test_ctrl_c_puts_the_watchdog_to_rest(board, monkeypatch, capsys, tmp_path):
     def use_the_console():
         from time import sleep_ms  # pyright: ignore[reportAttributeAccessIssue]
 
-        main.main()
+        start.main()
         sleep_ms(20_000)
 
     assert board.run(use_the_console, 100) == "returned"

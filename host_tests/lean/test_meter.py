@@ -5,7 +5,7 @@ import math
 import pytest
 from kickstand.calibration.parameters import Calibration
 from kickstand.lean import lean_filter
-from kickstand.lean.meter import LeanMeter
+from kickstand_tools.replay.replay_engine import ReplayMeter
 from kickstand_tools.simulated_board.simulator import Board
 
 DT_US = 10_000
@@ -28,7 +28,7 @@ def meter(**options):
     calibration = Calibration()
     for i in range(9):
         calibration.vehicle_from_sensor[i] = 1.0 if i % 4 == 0 else 0.0
-    return LeanMeter(calibration, **options)
+    return ReplayMeter(calibration, **options)
 
 
 def stand(shown, seconds=5.0):
@@ -75,7 +75,7 @@ def test_a_car_has_no_lean_to_doubt():
 def test_the_trim_of_the_calibration_is_taken_off():
     calibration = Calibration()
     calibration.trim_deg = 1.5
-    shown = LeanMeter(calibration)
+    shown = ReplayMeter(calibration)
     assert shown.trim_deg == pytest.approx(1.5)
     for i in range(9):
         calibration.vehicle_from_sensor[i] = 1.0 if i % 4 == 0 else 0.0

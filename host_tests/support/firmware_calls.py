@@ -4,6 +4,7 @@ As a script: reads one JSON list of [name, arguments] from standard input and pr
 """
 
 import json
+import math
 import sys
 from array import array
 
@@ -16,9 +17,9 @@ from kickstand.calibration.transform import Transform
 from kickstand.errors import Refusal
 from kickstand.imu import fifo_frames
 from kickstand.lean import formula
-from kickstand.lean.meter import LeanMeter
 from kickstand.ui import messages
 from kickstand_tools.calibration.published import dispersion, rodrigues
+from kickstand_tools.replay.replay_engine import ReplayMeter
 
 
 def matrix_of(values):
@@ -63,8 +64,11 @@ def transform(offset, slope, matrix, sums, n):
     both = Transform(calibration)
     force, rate = [0.0] * 3, [0.0] * 3
     both.apply_sum(array("i", sums), n, force, rate)
+    sensor_force, sensor_rate = [0.0] * 3, [0.0] * 3
+    calibration.apply([value / n for value in sums], sensor_force, sensor_rate)
     plain_force, plain_rate = [0.0] * 3, [0.0] * 3
-    both.apply([value / n for value in sums], plain_force, plain_rate)
+    rotation.rotate(plain_force, calibration.vehicle_from_sensor, sensor_force)
+    rotation.rotate(plain_rate, calibration.vehicle_from_sensor, [math.radians(r) for r in sensor_rate])
     return force + rate, plain_force + plain_rate
 
 
@@ -99,7 +103,7 @@ def meter(matrix, readings, dt_us):
     calibration = Calibration()
     for i in range(9):
         calibration.vehicle_from_sensor[i] = matrix[i]
-    device = LeanMeter(calibration)
+    device = ReplayMeter(calibration)
     out = []
     for reading in readings:
         device.update(reading, dt_us)

@@ -14,31 +14,31 @@ _SENTENCES = {
     "vibration": "not still: vibration",
     "tilting": "not still: slowly tilting",
     "saturated": "saturated: the accelerometer is at the end of its range",
-    "too-few-readings": "too short: {0} samples, at least {1} needed",
+    "too-few": "too short: {0} samples, at least {1} needed",
     "frozen-pose": "frozen: every reading is the same, check the sensor and its wires",
     "gyro-offset": "turning, or a gyro offset of over {0:.0f} deg/s",
     "dead-axis": "axis {0} barely changes when turned over: {1:.2f} g",
-    "poses-unclear": "the six poses do not determine the calibration: repeat them, each side once",
-    "implausible-axis": "axis {0}: offset {1:.3f} g, slope {2:.3f} is past any real sensor: repeat the six poses",
+    "unclear": "the six poses do not determine the calibration: repeat them, each side once",
+    "odd-axis": "axis {0}: offset {1:.3f} g, slope {2:.3f} is past any real sensor: repeat the six poses",
     "side-tilted": "side {0} was {1:.0f} degrees off: within {2:.0f} is needed",
     "free-pose-off": "the free pose reads {0:.3f} g instead of 1: repeat the six poses, held still",
     "not-one-g": "{0} reading is {1:.3f} g, not 1 g: calibrate six positions first, or check the sensor",
     "same-pose": "both poses are the same ({0:.1f} degrees apart): one on the kickstand, one upright",
-    "tilt-too-small": "only {0:.1f} degrees between the poses: at least {1:.0f} are needed, lean the bike further",
-    "tilt-too-large": "{0:.0f} degrees between the poses: no kickstand leans over {1:.0f}, repeat both poses",
+    "tilt-small": "only {0:.1f} degrees between the poses: at least {1:.0f} are needed, lean the bike further",
+    "tilt-large": "{0:.0f} degrees between the poses: no kickstand leans over {1:.0f}, repeat both poses",
     "speed-negative": "the speed is {0:.1f} m/s: it must not be negative",
     "speed-stuck": "the speed is stuck at {0:.1f} m/s while the vehicle speeds up and brakes",
     "speed-late": "the speed is {0:.1f} s late: under 2 s are needed",
     "no-speed": "no speed: it needs a speed, from a GPS or a wheel",
     "not-driven": "it only stood still: drive, and brake in a straight line {0} times",
     "not-stopped": "it never stood still: a stop of {0:.0f} s is needed for the vertical",
-    "few-brakings": (
+    "few-events": (
         "only {0} of {1} brakings in a straight line, {2} more were not straight: not enough for forward"
     ),
     "parts-differ": (
         "two parts of the drive disagree by {0:.0f} degrees about forward: did the mount move? Else drive on"
     ),
-    "forward-uncertain": "forward is known to {0:.1f} degrees only, after {1} brakings: drive on",
+    "uncertain": "forward is known to {0:.1f} degrees only, after {1} brakings: drive on",
     "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
 }
 _MOVED = {
@@ -46,7 +46,7 @@ _MOVED = {
     "vertical": "the vertical changed by {0:.0f} degrees during the drive",
     "vertical-in-parts": "the vertical is no longer where it was",
     "since-standing": "standing and driving differ by {0:.0f} degrees",
-    "since-upright-pose": "the upright pose and driving differ by {0:.0f} degrees",
+    "since-upright": "the upright pose and driving differ by {0:.0f} degrees",
     "forward": "forward is no longer where it was",
     "since-alignment": "it is no longer as it was aligned",
 }

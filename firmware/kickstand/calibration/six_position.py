@@ -15,10 +15,7 @@ from .parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE
 SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")  # which axis points up, in the order of the six poses
 MAX_TILT_DEG = 20.0  # largest angle between a side's axis and the vertical
 FREE_TILT_DEG = 20.0  # a free pose that is nearer to one of the sides says little new
-FREE_GOOD_G = 0.010  # of a free pose: |force| - 1 g of a good calibration
-FREE_MAX_G = 0.020  # and the largest allowed: 2 % of cross-axis sensitivity, which offset and slope cannot describe
-SHEET_OFFSET_G = (0.05, 0.05, 0.08)
-SHEET_SLOPE = 0.03
+FREE_MAX_G = 0.020  # largest error of a free pose: 2 % of cross-axis sensitivity, which six numbers cannot describe
 
 
 def side_of(accel):
@@ -66,7 +63,7 @@ def fit(poses):
                 row[3 + i] = 2.0 * value * pose[i]
             row[6] = 1.0 - square
         if not _solve(rows):
-            raise CalibrationError("poses-unclear")
+            raise CalibrationError("unclear")
         for i in range(3):
             offset[i] += rows[i][6]
             slope[i] += rows[3 + i][6]
@@ -81,7 +78,7 @@ def check_plausible(offset, slope, poses):
     of the vertical."""
     for i in range(3):
         if not (abs(offset[i]) < MAX_OFFSET_G and MIN_SLOPE < slope[i] < MAX_SLOPE):
-            raise CalibrationError("implausible-axis", AXES[i], offset[i], slope[i])
+            raise CalibrationError("odd-axis", AXES[i], offset[i], slope[i])
     for k in range(6):
         tilt = tilt_deg([slope[i] * poses[k][i] + offset[i] for i in range(3)])
         if tilt > MAX_TILT_DEG:
@@ -96,13 +93,6 @@ def check_free_pose(offset, slope, accel):
     if not abs(error) <= FREE_MAX_G:
         raise CalibrationError("free-pose-off", 1.0 + error)
     return error
-
-
-def beyond_sheet(offset, slope):
-    """Names of the axes whose offset or slope is beyond what the data sheet allows: usable, but worth a warning."""
-    return [
-        AXES[i] for i in range(3) if abs(offset[i]) > SHEET_OFFSET_G[i] or abs(slope[i] - 1.0) > SHEET_SLOPE
-    ]
 
 
 def _solve(rows):

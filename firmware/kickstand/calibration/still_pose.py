@@ -22,7 +22,7 @@ class StillPose:
     accel_lsb_per_g, gyro_lsb_per_dps: counts per unit. accel_limit: |counts| from which on an axis is saturated.
     expected: how many samples are to come; the check for drift compares the halves.
     count: samples taken. problem: a CaptureError once the pose is spoilt, or None.
-    After finish(): accel (3, g, sensor's axes, uncalibrated), gyro (3, deg/s), temperature (counts).
+    After finish(): accel (3, g, sensor's axes, uncalibrated), gyro (3, deg/s).
     """
 
     def __init__(self, accel_lsb_per_g, gyro_lsb_per_dps, accel_limit, expected):
@@ -41,7 +41,6 @@ class StillPose:
         self.problem = None
         self.accel = None
         self.gyro = None
-        self.temperature = 0
 
     def add(self, counts):
         """Take one sample (7 integers, the chip's order). False once the pose is spoilt."""
@@ -60,7 +59,6 @@ class StillPose:
                 return False
             self._sums[i] += deviation
             self._squares[i] += deviation * deviation
-        self._sums[3] += counts[3] - self._first[3]
         self.count += 1
         if self.count == self._half:
             for i in range(7):
@@ -68,7 +66,7 @@ class StillPose:
         return True
 
     def finish(self):
-        """Check the whole pose and set accel, gyro and temperature. Raises CaptureError."""
+        """Check the whole pose, and set accel and gyro. Raises CaptureError."""
         if self.problem is None:
             self.problem = self._judge()
         if self.problem is not None:
@@ -77,14 +75,13 @@ class StillPose:
         mean = [self._first[i] + self._sums[i] / n for i in range(7)]
         self.accel = [mean[i] / self._accel_lsb for i in range(3)]
         self.gyro = [mean[i] / self._gyro_lsb for i in range(4, 7)]
-        self.temperature = mean[3]
         if max(abs(rate) for rate in self.gyro) > MAX_REST_RATE_DPS:
             raise CaptureError("gyro-offset", MAX_REST_RATE_DPS)
 
     def _judge(self):
         n = self.count
         if n < MIN_SAMPLES:
-            return CaptureError("too-few-readings", n, MIN_SAMPLES)
+            return CaptureError("too-few", n, MIN_SAMPLES)
         if not any(self._squares):
             return CaptureError("frozen-pose")
         late = n - self._half

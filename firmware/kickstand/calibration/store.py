@@ -72,7 +72,7 @@ class Store:
         except OSError as error:
             raise StoreError("not-written", str(error))
         if written != record:
-            raise StoreError("reads-back-differently")
+            raise StoreError("read-back")
         self._sequence, _, self._problems = self._newest()
 
     def _newest(self):

@@ -38,43 +38,25 @@ class Transform:
     """calibration: a Calibration whose set_scale() was called; later changes to it are not seen."""
 
     def __init__(self, calibration):
-        # Lists, because on the board reading a float from an array takes heap, and from a list it does not.
-        self._force, self._rate = [0.0] * 9, [0.0] * 9
-        self._force_offset, self._rate_offset = [0.0] * 3, [0.0] * 3
         r = calibration.vehicle_from_sensor
         scale, gyro_scale = calibration.scales()
         self._force_unit, self._rate_unit = max(scale) / ONE, radians(gyro_scale) / ONE
-        for i in range(9):
-            self._force[i] = r[i] * scale[i % 3]
-            self._rate[i] = r[i] * radians(gyro_scale)
-        rotate(self._force_offset, r, calibration.accel_offset)
-        rotate(self._rate_offset, r, [-radians(bias) for bias in calibration.gyro_bias])
+        force_offset, rate_offset = [0.0] * 3, [0.0] * 3
+        rotate(force_offset, r, calibration.accel_offset)
+        rotate(rate_offset, r, [-radians(bias) for bias in calibration.gyro_bias])
         self._integers, self._products = array("i", [0] * 24), array("i", [0] * 6)
         for i in range(12):
             row, k = i // 4, i % 4
-            force = self._force[3 * row + k] if k < 3 else self._force_offset[row]
-            rate = self._rate[3 * row + k] if k < 3 else self._rate_offset[row]
+            force = r[3 * row + k] * scale[k] if k < 3 else force_offset[row]
+            rate = r[3 * row + k] * radians(gyro_scale) if k < 3 else rate_offset[row]
             self._integers[i] = round(force / self._force_unit)
             self._integers[12 + i] = round(rate / self._rate_unit)
 
-    def apply(self, reading, force, rate):
-        """Put the force and rate of a reading into force and rate.
-
-        reading: 7 numbers in counts, in the chip's order.  force: 3, left, up, forward in g.  rate: 3, about the same
-        axes in rad/s."""
-        m, c = self._force, self._force_offset
-        x, y, z = reading[0], reading[1], reading[2]
-        force[0] = m[0] * x + m[1] * y + m[2] * z + c[0]
-        force[1] = m[3] * x + m[4] * y + m[5] * z + c[1]
-        force[2] = m[6] * x + m[7] * y + m[8] * z + c[2]
-        m, c = self._rate, self._rate_offset
-        x, y, z = reading[4], reading[5], reading[6]
-        rate[0] = m[0] * x + m[1] * y + m[2] * z + c[0]
-        rate[1] = m[3] * x + m[4] * y + m[5] * z + c[1]
-        rate[2] = m[6] * x + m[7] * y + m[8] * z + c[2]
-
     def apply_sum(self, sums, n, force, rate):
-        """The same for the mean of n samples, at most 8, given the sums of their counts: array('i', 7)."""
+        """Put the mean force and rate of n samples, at most 8, into force and rate.
+
+        sums: array('i', 7), of the samples' counts, in the chip's order.  force: 3, left, up, forward in g.  rate: 3,
+        about the same axes in rad/s."""
         p = self._products
         products(self._integers, sums, n, p)
         unit = self._force_unit / n

@@ -48,9 +48,9 @@ def two_position(out, kickstand, upright, side="left", tolerance_g=UNCALIBRATED_
     if tilt < SAME_POSE_DEG:
         raise AlignmentError("same-pose", tilt)
     if tilt < MIN_TILT_DEG:
-        raise AlignmentError("tilt-too-small", tilt, MIN_TILT_DEG)
+        raise AlignmentError("tilt-small", tilt, MIN_TILT_DEG)
     if tilt > MAX_TILT_DEG:
-        raise AlignmentError("tilt-too-large", tilt, MAX_TILT_DEG)
+        raise AlignmentError("tilt-large", tilt, MAX_TILT_DEG)
     normalize(z)
     if side == "right":
         z[0], z[1], z[2] = -z[0], -z[1], -z[2]

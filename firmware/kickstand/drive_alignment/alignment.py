@@ -124,11 +124,11 @@ class DriveAlignment:
         if self.vehicle == CAR and not self.standing.stops:
             return AlignmentError("not-stopped", SETTLE_S + COUNTS_S)
         if counted < needed:
-            return AlignmentError("few-brakings", counted, needed, turned)
+            return AlignmentError("few-events", counted, needed, turned)
         quality = self.quality
         if not quality.agree and quality.quality_deg < 180.0:
             return AlignmentError("parts-differ", max(quality.parts.forward_deg, quality.halves_deg))
-        return AlignmentError("forward-uncertain", min(quality.quality_deg, 180.0), self.events.braking_count)
+        return AlignmentError("uncertain", min(quality.quality_deg, 180.0), self.events.braking_count)
 
     def update(self, force, rate, dt_us):
         """force (3, g), rate (3, deg/s): calibrated, sensor's axes; dt_us: microseconds since those before (an

@@ -19,7 +19,7 @@ FRESH_MS = 3000  # an older speed does not show that the vehicle stands
 AWAY_MPS = 2.0  # the vehicle has driven off
 
 _KNOWN_BIAS = (0.0, 0.0, 0.0)  # the gyro's bias was measured with the alignment, and is subtracted already
-STAND_SIDE, MOUNT_MOVED = "stand-on-other-side", "mount-moved"
+STAND_SIDE, MOUNT_MOVED = "other-side", "mount-moved"
 _DOUBTS = (STAND_SIDE, MOUNT_MOVED)  # codes of messages: the lean is not to be trusted until they are answered
 
 
@@ -186,7 +186,7 @@ class BackgroundAlignment:
                 turned[i] = old.vehicle_from_sensor[i]
             turn_round(turned)
             if self._save(turned, -self._meter.trim_deg):
-                self.message = Notice("side-put-right")
+                self.message = Notice("side-fixed")
                 self._meter.reset_maxima()
 
     def _take(self, anew):
@@ -195,7 +195,7 @@ class BackgroundAlignment:
         self.drive.matrix(found)
         if not self._save(found, 0.0 if anew else self._meter.trim_deg):
             return
-        self.result = Notice("aligned-by-drive", self.drive.quality_deg)
+        self.result = Notice("aligned", self.drive.quality_deg)
         if anew:
             self.message = self.result
             self._asked = False

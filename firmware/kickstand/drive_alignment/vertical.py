@@ -169,5 +169,5 @@ class Vertical:
         before = self._standing.up if self.is_car else self._from_pose
         change_deg = 0.0 if before is None else angle_deg(before, level)
         if change_deg > MAX_CHANGE_DEG:
-            return AlignmentError("mount-moved", "since-standing" if self.is_car else "since-upright-pose", change_deg)
+            return AlignmentError("mount-moved", "since-standing" if self.is_car else "since-upright", change_deg)
         return None

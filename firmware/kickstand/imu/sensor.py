@@ -2,7 +2,7 @@
 
 from time import ticks_add, ticks_diff, ticks_ms
 
-from ..errors import SensorFault
+from ..errors import Notice
 from .mpu6050 import UnknownChip
 
 CHECK_MS = 100  # from one check of the configuration, which takes 0.6 ms, to the next
@@ -16,7 +16,7 @@ class Sensor:
     """Samples of one chip that may fail at any time. A transfer that fails, by NACK or time-out, ends in _missed().
 
     chip: an Mpu6050.  reopen: called to free the bus, returns it as a machine.I2C.
-    fault: None, or a SensorFault: what is wrong.  restarts: how often the chip was set up.
+    fault: None, or a Notice: what is wrong.  restarts: how often the chip was set up.
     """
 
     def __init__(self, chip, reopen):
@@ -27,7 +27,7 @@ class Sensor:
         self._due_ms = ticks_ms()  # when the next check is due or, while the chip does not run, the next attempt
         self._sample_ms = 0  # when the last sample was read
         self.restarts = 0
-        self.fault = SensorFault("starting")
+        self.fault = Notice("starting")
         self._running = False
 
     @property
@@ -101,7 +101,7 @@ class Sensor:
             self._fail("sensor-lost", now_ms)
 
     def _fail(self, code, now_ms):
-        self.fault = SensorFault(code)
+        self.fault = Notice(code)
         self._running = False
         self._due_ms = ticks_add(now_ms, SAY_MS)
 
@@ -110,9 +110,9 @@ class Sensor:
         try:
             self.set_up()
         except UnknownChip as error:
-            self.fault = SensorFault("unknown-chip", error.args[0])
+            self.fault = Notice("unknown-chip", error.args[0])
         except OSError:
-            self.fault = SensorFault("no-sensor")
+            self.fault = Notice("no-sensor")
         else:
             self._running = True  # but the fault stays until there is a good sample
             self.restarts += 1

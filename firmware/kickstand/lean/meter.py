@@ -127,16 +127,10 @@ class LeanMeter:
         """The last reading, or the mean of the last sum: 7 numbers in the chip's order."""
         return [value / self._n for value in self._reading]
 
-    def update(self, reading, dt_us):
-        """reading: 7 numbers in the chip's order; dt_us: integer microseconds since the one before (0 for the
-        first)."""
-        self._reading, self._n = reading, 1
-        self._transform.apply(reading, self.force, self.rate)
-        self._follow(dt_us)
-
     def update_sum(self, sums, n, dt_us):
-        """As update(), with the mean of n samples, of which sums, array('i', 7), is the sum. On the board these are the
-        samples of one turn of the loop, because floats cost too much to do it for each sample."""
+        """Take the mean of n samples. sums: array('i', 7), their sum in counts, in the chip's order; dt_us: integer
+        microseconds since the samples before (0 for the first). These are the samples of one turn of the loop, because
+        floats cost too much to do it for each sample."""
         self._reading, self._n = sums, n
         self._transform.apply_sum(sums, n, self.force, self.rate)
         self._follow(dt_us)

@@ -173,7 +173,7 @@ class RideRing:
             pass
 
     def fault_code(self, error):
-        """The code of the RecordingError for an OSError or MemoryError that came from here."""
+        """The code of the Notice for an OSError or MemoryError that came from here."""
         if isinstance(error, MemoryError):
             return "out-of-memory"
         if error.args and error.args[0] == ENOSPC:

@@ -8,7 +8,7 @@ written, a file is flushed, or an old file is removed, so that no turn waits for
 from time import ticks_diff, ticks_ms
 
 from ..calibration.store import pack
-from ..errors import CardError, RecordingError
+from ..errors import CardError, Notice
 from ..units import GAP_US
 from .block import MAX_DT_US, RideBlock
 
@@ -20,7 +20,7 @@ class Recorder:
     """keeper: where blocks are written, a RideRing or RideStream.  sample_hz: the chip's samples a second.
 
     active: True while a ride is being recorded.
-    problem: None, or a CardError or RecordingError: why the recording ended by itself; take_problem() clears it.
+    problem: None, or a CardError or Notice: why the recording ended by itself; take_problem() clears it.
     """
 
     def __init__(self, keeper, sample_hz):
@@ -180,7 +180,7 @@ class Recorder:
         """End the ride after an error; the loop goes on."""
         self.active = False
         self.keeper.abandon()
-        self._end(RecordingError(self.keeper.fault_code(error), str(error)))
+        self._end(Notice(self.keeper.fault_code(error), str(error)))
 
     def _end(self, problem):
         from ..console import sentence

@@ -10,7 +10,7 @@ and *.
 
 from time import ticks_diff
 
-from ..errors import SpeedFault
+from ..errors import Notice
 
 MAX_SENTENCE = 100  # bytes: the standard says 82, but receivers with many decimals exceed it
 MAX_CHUNK = 64  # bytes read in one turn of the loop: in turns of 10 ms, twice what 10 fixes a second need
@@ -72,15 +72,15 @@ class Gps:
         """Interrupts were off until now. Nothing to do: if bytes were lost, the checksum of their sentence is wrong."""
 
     def fault(self, now_ms):
-        """None, or a SpeedFault: why there is no speed."""
+        """None, or a Notice: why there is no speed."""
         if self._heard_ms is None:
             return None
         if ticks_diff(now_ms, self._heard_ms) > SILENT_MS:
-            return SpeedFault("gps-silent")
+            return Notice("gps-silent")
         if ticks_diff(now_ms, self._sentence_ms) > SILENT_MS:
-            return SpeedFault("gps-garbled")
+            return Notice("gps-garbled")
         if ticks_diff(now_ms, self._fix_ms) > SILENT_MS:
-            return SpeedFault("gps-no-fix")
+            return Notice("gps-no-fix")
         return None
 
     def _sentence(self, line, now_ms):

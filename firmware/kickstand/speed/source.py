@@ -47,7 +47,7 @@ class Speed:
         self._source.after_stall(now_ms)
 
     def fault(self, now_ms):
-        """None, or a SpeedFault: why no speed comes."""
+        """None, or a Notice: why no speed comes."""
         return self._source.fault(now_ms)
 
 

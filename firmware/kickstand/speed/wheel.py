@@ -10,7 +10,7 @@ from time import ticks_diff, ticks_us
 
 from machine import Pin
 
-from ..errors import SpeedFault
+from ..errors import Notice
 
 MAX_MPS = 100.0  # pulses that would mean more than this are disturbances
 BOUNCE_US = 3000  # a contact that was open for less than this, or a quarter of the shortest period, is bouncing
@@ -93,5 +93,5 @@ class Wheel:
         self._seen_us = None
 
     def fault(self, now_ms):
-        """None, or a SpeedFault: a wheel that has never turned may be a wire that is loose."""
-        return SpeedFault("wheel-no-pulse") if self._moved_ms is None else None
+        """None, or a Notice: a wheel that has never turned may be a wire that is loose."""
+        return Notice("wheel-no-pulse") if self._moved_ms is None else None

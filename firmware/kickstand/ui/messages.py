@@ -9,23 +9,23 @@ moved|Moved!|Hold it still
 vibration|Moved!|Hold it still
 tilting|Moved!|Hold it still
 saturated|Accel saturated|Check sensor
-too-few-readings|Too few readings|Check sensor
+too-few|Too few readings|Check sensor
 frozen-pose|Sensor frozen|Check wiring
 gyro-offset|Gyro offset big|Hold still
 
 dead-axis|Axis {0} is dead|Check sensor
-poses-unclear|Poses unclear|Do them again
-implausible-axis|Axis {0} is off|Do them again
+unclear|Poses unclear|Do them again
+odd-axis|Axis {0} is off|Do them again
 side-tilted|Side {0}: {1:.0f}\xdf off|Do them again
 free-pose-off|Check: {0:.3f} g|Do them again
 
 not-one-g|Reads {1:.2f} g!|Do six positions
 same-pose|Same pose twice|Stand, then up
-tilt-too-small|Tilt only {0:.1f}\xdf|Need {1:.0f}\xdf or more
-tilt-too-large|Tilt {0:.0f}\xdf: over|{1:.0f}\xdf, do it again
+tilt-small|Tilt only {0:.1f}\xdf|Need {1:.0f}\xdf or more
+tilt-large|Tilt {0:.0f}\xdf: over|{1:.0f}\xdf, do it again
 
 not-written|Not saved: flash|Old one is kept
-reads-back-differently|Not saved: flash|Old one is kept
+read-back|Not saved: flash|Old one is kept
 
 starting|Kickstand|starting
 no-sensor|No sensor|check wiring
@@ -51,7 +51,7 @@ usb-fault|Rec. stopped|USB
 unreadable|config.py:|cannot be read
 unknown-setting|config.py: what?|{0}
 pin-used-twice|config.py: wrong|pin used twice
-car-needs-speed|config.py: wrong|car needs SPEED
+needs-speed|config.py: wrong|car needs SPEED
 
 speed-negative|Speed negative|Check its source
 speed-stuck|Speed stuck at|{0:.1f} m/s
@@ -60,17 +60,17 @@ speed-unit|Speed {0:.1f} times|off: its unit?
 no-speed|No speed|GPS or wheel?
 not-driven|Not driven yet|Brake straight
 not-stopped|Not stopped yet|Stand for {0:.0f} s
-few-brakings|Brake straight|{0} of {1} done
+few-events|Brake straight|{0} of {1} done
 parts-differ|Parts differ|by {0:.0f}\xdf: go on
-forward-uncertain|Only +-{0:.1f}\xdf|Brake straight
+uncertain|Only +-{0:.1f}\xdf|Brake straight
 
-stand-on-other-side|Stand was right?|hold = fix
+other-side|Stand was right?|hold = fix
 mount-moved|Mount has moved|Align again
-side-put-right|Side put right|Ride safely
-aligned-by-drive|Aligned by drive|error about {0:.1f}\xdf
+side-fixed|Side put right|Ride safely
+aligned|Aligned by drive|error about {0:.1f}\xdf
 """
 # In place of the lean while there is a doubt about the alignment
-_DOUBTS = {"stand-on-other-side": "stand was right?", "mount-moved": "mount has moved"}
+_DOUBTS = {"other-side": "stand was right?", "mount-moved": "mount has moved"}
 _OTHER_SETTING = "config.py: wrong|{0}"  # the display names it, the console tells what is wrong with it
 
 

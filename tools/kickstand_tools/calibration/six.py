@@ -7,6 +7,7 @@ import numpy as np
 from kickstand.calibration import six_position
 from kickstand.calibration.six_position import SIDES
 from kickstand.errors import CalibrationError
+from kickstand.units import AXES
 
 from ..errors import InputError
 from ..logs.reader import Source
@@ -14,6 +15,9 @@ from ..refusals import RefusedInput
 from .file import CalibrationFile
 from .poses import Pose, read_pose, refuse_same_file
 
+GOOD_FREE_POSE_G = 0.010  # a free pose that is nearer to 1 g than this confirms a good calibration
+_SHEET_OFFSET_G = (0.05, 0.05, 0.08)  # what the data sheet of the MPU6050 allows, for each axis
+_SHEET_SLOPE_ERROR = 0.03
 _EQUAL_TILT_DEG = 3.0  # by so much the free pose has to be further from its nearest axis than the side pose there
 
 
@@ -67,7 +71,7 @@ def fit_six_positions(poses: Sequence[Source]) -> SixPositions:
         [six_position.tilt_deg(mean) for mean in means],
         free,
         error_g,
-        six_position.beyond_sheet(offset, slope),
+        _beyond_sheet(offset, slope),
     )
 
 
@@ -107,3 +111,12 @@ def _with_file(error: CalibrationError, sides: list[Pose], free: Pose | None) ->
     if error.code == "side-tilted":
         return RefusedInput(error, sides[SIDES.index(error.values[0])].name, ": capture this side again")
     return RefusedInput(error, free.name if free and error.code == "free-pose-off" else "")
+
+
+def _beyond_sheet(offset: Sequence[float], slope: Sequence[float]) -> list[str]:
+    """The axes whose offset or slope is beyond what the data sheet allows: usable, but worth a warning."""
+    return [
+        axis
+        for axis, o, s, most in zip(AXES, offset, slope, _SHEET_OFFSET_G, strict=True)
+        if abs(o) > most or abs(s - 1.0) > _SHEET_SLOPE_ERROR
+    ]

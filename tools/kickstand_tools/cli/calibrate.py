@@ -98,12 +98,14 @@ def drive(
 
 
 def _six_lines(found: "SixPositions") -> Iterable[str]:
-    from kickstand.calibration.six_position import FREE_GOOD_G, SIDES
+    from kickstand.calibration.six_position import SIDES
+
+    from ..calibration.six import GOOD_FREE_POSE_G
 
     for side, pose, tilt in zip(SIDES, found.sides, found.tilt_deg, strict=True):
         yield f"{side} up: {pose.name}, {pose.samples} samples, {tilt:.1f} degrees off its axis"
     if found.free_pose and found.free_pose_error_g is not None:
-        good = "good" if abs(found.free_pose_error_g) <= FREE_GOOD_G else "usable; under 10 mg would be good"
+        good = "good" if abs(found.free_pose_error_g) <= GOOD_FREE_POSE_G else "usable; under 10 mg would be good"
         yield (
             f"free pose: {found.free_pose.name}, {found.free_pose.samples} samples, "
             f"{found.free_pose_error_g * 1000:+.1f} mg from 1 g: {good}"

@@ -105,11 +105,11 @@ class Demo:
     def run(self):
         """Power on, and start again after every reset, until time is up or "quit" comes."""
         self.board.install()
-        import main  # after install(), which replaces `machine` and `time`
+        from kickstand.start import main  # after install(), which replaces `machine` and `time`
 
         ended = "reset"
         while ended == "reset":
-            ended = self.board.run(main.main, self.seconds)
+            ended = self.board.run(main, self.seconds)
         self._say({"ended": ended})
 
     def _tick(self):

@@ -58,9 +58,9 @@ def _run() -> dict[str, tuple[list[list[int]], list[int]]]:
     for name, at_s in MOMENTS_S.items():
         board.at(at_s, lambda name=name: seen.update({name: (board.lcd.codes(), list(board.lcd.cgram))}))
     board.install()
-    import main  # after install(), which decides what `machine` and `time` are
+    from kickstand.start import main  # after install(), which decides what `machine` and `time` are
 
-    board.run(main.main, ride.seconds)
+    board.run(main, ride.seconds)
     return seen
 
 

@@ -10,11 +10,12 @@ is printed and read again may be another number.
 
 import struct
 import sys
-from math import degrees
+from math import degrees, radians
 
 from kickstand.calibration.parameters import Calibration
 from kickstand.lean.formula import static_lean_deg
 from kickstand.lean.meter import LeanMeter
+from kickstand.rotation import rotate
 
 COLUMNS = (
     "lean_deg",
@@ -32,11 +33,42 @@ RESULT = "<8d"
 NO_SPEED = -1.0  # not NaN, which a board's struct does not read as NaN
 
 
+class ReplayMeter(LeanMeter):
+    """The firmware's meter, for single readings in g and deg/s, where a board has sums of counts."""
+
+    def use(self, calibration):
+        """As LeanMeter.use(). The calibration is multiplied out once, (18)-(20) and then (15): 18 products a
+        reading."""
+        LeanMeter.use(self, calibration)
+        r, slope = calibration.vehicle_from_sensor, calibration.accel_slope
+        self._force_offset, self._rate_offset = [0.0] * 3, [0.0] * 3
+        rotate(self._force_offset, r, calibration.accel_offset)
+        rotate(self._rate_offset, r, [-radians(bias) for bias in calibration.gyro_bias])
+        self._force_matrix = [r[i] * slope[i % 3] for i in range(9)]
+        self._rate_matrix = [radians(value) for value in r]
+
+    def update(self, reading, dt_us):
+        """reading: 7 numbers in the chip's order (g, C, deg/s); dt_us: microseconds since the one before, 0 for the
+        first."""
+        self._reading, self._n = reading, 1
+        m, c, out = self._force_matrix, self._force_offset, self.force
+        x, y, z = reading[0], reading[1], reading[2]
+        out[0] = m[0] * x + m[1] * y + m[2] * z + c[0]
+        out[1] = m[3] * x + m[4] * y + m[5] * z + c[1]
+        out[2] = m[6] * x + m[7] * y + m[8] * z + c[2]
+        m, c, out = self._rate_matrix, self._rate_offset, self.rate
+        x, y, z = reading[4], reading[5], reading[6]
+        out[0] = m[0] * x + m[1] * y + m[2] * z + c[0]
+        out[1] = m[3] * x + m[4] * y + m[5] * z + c[1]
+        out[2] = m[6] * x + m[7] * y + m[8] * z + c[2]
+        self._follow(dt_us)
+
+
 class Replay:
     """The meter over one recording. calibration: the firmware's own, for readings in g and deg/s."""
 
     def __init__(self, calibration):
-        self.meter = LeanMeter(calibration)
+        self.meter = ReplayMeter(calibration)
         self._before = None
 
     def take(self, time_us, reading, speed_mps=NO_SPEED):

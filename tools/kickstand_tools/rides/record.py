@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from kickstand.lean.meter import LeanMeter
 from mpremote.transport_serial import SerialTransport
 
 from ..calibration.file import CalibrationFile, write_calibration
@@ -17,6 +16,7 @@ from ..deploy.board_console import BrokenOff, lines
 from ..deploy.connection import connected, refuse_unfit_firmware, restart
 from ..errors import InputError, cause
 from ..output import check_output, write_whole
+from ..replay.replay_engine import ReplayMeter
 from . import ride_log
 from .block_reader import BadBlock, Block, parse
 
@@ -104,7 +104,7 @@ class _Recording:
     def write(self, path: Path, blocks: Iterator[Block], notes: list[str]) -> None:
         """All of them as they come. notes: gets a line for each thing that is missing."""
         missing, expected, before = 0, 0, 0
-        meter = LeanMeter(CalibrationFile().to_firmware())
+        meter = ReplayMeter(CalibrationFile().to_firmware())
         opened = gzip.open if path.suffix == ".gz" else open
         aligned = False
         with opened(path, "wt", encoding="ascii", newline="") as file:
@@ -116,7 +116,7 @@ class _Recording:
                         break
                     self.first = block
                     calibration = ride_log.calibration(block)
-                    meter, aligned = LeanMeter(calibration.to_firmware()), calibration.aligned
+                    meter, aligned = ReplayMeter(calibration.to_firmware()), calibration.aligned
                     before = block.time_us
                 missing += block.sequence - expected
                 expected = block.sequence + 1
