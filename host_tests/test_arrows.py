@@ -28,8 +28,8 @@ ARROWS = {
     "ui": {"board.button", "lean", "calibration", "drive_alignment"},
     "settings": {"board", "imu.mpu6050"},  # ranges and pins that can be chosen
     "devices": {"board", "imu"},
-    "status_report": {"board", "imu", "calibration", "speed", "ui.messages", "console", "devices", "settings"},
-    "app": {"board", "imu", "calibration", "lean", "drive_alignment", "speed", "rides", "ui", "console", "devices"},
+    "status_report": {"imu", "calibration", "speed", "ui.messages", "console", "devices", "settings"},
+    "app": {"board", "imu", "calibration", "lean", "drive_alignment", "speed", "rides", "ui", "devices"},
     "start": {"board", "devices", "settings"},
     "__init__": {"status_report"},
 }
