@@ -47,7 +47,7 @@ def test_nothing_is_printed(directory, capfd):
     calibration = api.read_calibration(directory / "RIDE.cal.json")
     api.replay(log, calibration, progress=lambda done, total: seen.append((done, total)))
     api.overview(api.open_ride(log), lambda done, total: seen.append((done, total)))
-    with pytest.raises(api.RefusedInput, match="only 2 of 5 brakings"):
+    with pytest.raises(api.RefusedInput, match="only 2 of 5 braking events"):
         api.fit_drive([log], calibration, progress=lambda done, total: seen.append((done, total)))
     assert tuple(capfd.readouterr()) == ("", "")
     assert [done == total for done, total in seen].count(True) == 3  # each ends with all done

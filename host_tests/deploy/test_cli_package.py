@@ -50,7 +50,7 @@ def test_the_wheel_carries_the_firmware(tmp_path):
             inside = target[1:] if target.startswith("/kickstand/") else "kickstand_tools/firmware" + target
             assert archive.read(inside) == source.read_bytes()
     assert {"kickstand_tools/cli/main.py", "kickstand_tools/py.typed"} <= names
-    assert {name.split("/")[0] for name in names} == {"kickstand", "kickstand_tools", "kickstand-0.2.0.dist-info"}
+    assert {name.split("/")[0] for name in names} == {"kickstand", "kickstand_tools", "kickstand-0.3.0.dist-info"}
     assert not [name for name in names if "__pycache__" in name or name.endswith(".cal")]
 
 

@@ -106,7 +106,7 @@ def test_a_calibrated_accelerometer_keeps_its_parameters(tmp_path):
 def test_several_logs_of_one_mount_are_put_together(tmp_path):
     """None of them is enough for itself."""
     logs = [record(tmp_path / f"{k}.csv", around(2), MOUNT) for k in range(3)]
-    refused(tmp_path, "brakings in a straight line", logs[0])
+    refused(tmp_path, "braking events in a straight line", logs[0])
     command.works("calibrate", "drive", *logs, "--out", tmp_path / "CAL.json")
     assert max(errors(matrix_in(tmp_path / "CAL.json"), MOUNT)) < 0.3
 
@@ -190,7 +190,8 @@ def test_refusals(tmp_path, words, legs, how, method):
 
 def test_braking_only_while_turning(tmp_path):
     """The published method does not see it: in a steady turn the force does not turn in the vehicle's axes."""
-    refused(tmp_path, "brakings in a straight line", record(tmp_path / "drive.csv", around(6, yaw_dps=20.0), MOUNT))
+    log = record(tmp_path / "drive.csv", around(6, yaw_dps=20.0), MOUNT)
+    refused(tmp_path, "braking events in a straight line", log)
 
 
 def test_the_same_log_twice(tmp_path):
@@ -221,4 +222,4 @@ def test_recorded_cars_remounted_at_random(tmp_path, shared_data, name, seed):
 def test_the_figure_of_eight_is_refused(tmp_path, shared_data):
     log = shared_data / "car-parking-lot-figure8-nominal-001.csv.gz"
     for method in ("improved", "published"):
-        refused(tmp_path, "brakings in a straight line", log, "--method", method)
+        refused(tmp_path, "braking events in a straight line", log, "--method", method)

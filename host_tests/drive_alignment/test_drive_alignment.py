@@ -101,7 +101,7 @@ def test_which_braking_events_count(braking, seconds, yaw_dps, counted):
     result = drive(around(6, -braking, seconds, yaw_dps))
     assert (result["counted"] >= quality.MIN_EVENTS) is counted, result
     if not counted:
-        assert "brakings in a straight line" in engines.words(result)
+        assert "braking events in a straight line" in engines.words(result)
         assert result["lcd"][0] == "Brake straight"
 
 
@@ -124,7 +124,7 @@ def test_refusals_name_the_reason(engine):
         "it only stood still": ([[120.0, 0.0, 0.0]], {}),
         "it never stood still": (around(stands=False), {"samples": {"start_mps": 5.0}}),
         "no speed": (around(), {"source": {"silent": (-1.0, 1e9)}}),
-        "brakings in a straight line": (eight, {}),
+        "braking events in a straight line": (eight, {}),
         "it must not be negative": (around(), {"source": {"scale": -1.0}}),
         "the speed is stuck at": (around(7), {"source": {"stuck_from_s": 20.0}}),
         "it is in km/h": (around(), {"source": {"scale": 3.6}}),

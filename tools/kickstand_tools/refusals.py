@@ -33,12 +33,12 @@ _SENTENCES = {
     "not-driven": "it only stood still: drive, and brake in a straight line {0} times",
     "not-stopped": "it never stood still: a stop of {0:.0f} s is needed for the vertical",
     "few-events": (
-        "only {0} of {1} brakings in a straight line, {2} more were not straight: not enough for forward"
+        "only {0} of {1} braking events in a straight line, {2} more were not straight: not enough for forward"
     ),
     "parts-differ": (
         "two parts of the drive disagree by {0:.0f} degrees about forward: did the mount move? Else drive on"
     ),
-    "uncertain": "forward is known to {0:.1f} degrees only, after {1} brakings: drive on",
+    "uncertain": "forward is known to {0:.1f} degrees only, after {1} braking events: drive on",
     "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
 }
 _MOVED = {

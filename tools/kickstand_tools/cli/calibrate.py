@@ -77,7 +77,7 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
 def drive(
     logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None, method: str, out: Path
 ) -> None:
-    """How the sensor sits on the vehicle, from logs of driving with speed: stops and straight brakings."""
+    """How the sensor sits on the vehicle, from logs of driving with speed: stops and braking in a straight line."""
     from ..calibration.drive import fit_drive
     from ..calibration.file import read_calibration, write_calibration
     from ..calibration.poses import refuse_same_file

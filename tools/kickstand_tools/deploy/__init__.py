@@ -1,0 +1,1 @@
+"""The firmware onto a board by mpremote, and questions to a board."""
