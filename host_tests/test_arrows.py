@@ -35,8 +35,7 @@ ARROWS = {
 }
 # Imported only by a function that needs it, because it costs memory or words that most boards never need
 LATE = {
-    "calibration": {"console"},  # a trim that cannot be saved is reported on the console
-    "rides": {"console"},  # likewise a recording that ends by itself
+    "errors": {"console"},  # report() prints a refusal in words
     "start": {"app", "console", "ui.messages"},  # the display says "starting" while the app is imported
 }
 # What only drivers may import: modules of MicroPython that speak to hardware

@@ -16,19 +16,19 @@ from time import sleep_ms
 from kickstand import settings
 from kickstand.calibration.store import Store
 from kickstand.devices import open_sensor
+from kickstand.imu.mpu6050 import GYRO_DELAY_S
 from kickstand.lean.meter import LeanMeter
 
 config = settings.load()
 sensor = open_sensor(config)
+sensor.set_up()  # from now on the chip samples by itself, SAMPLE_HZ times a second
 chip = sensor.chip
-chip.connect(sensor.reopen())
-chip.setup()  # from now on it samples by itself, SAMPLE_HZ times a second
 
 calibration = Store(chip.who_am_i, chip.accel_range_g).load()  # what the lean meter has stored in flash
 calibration.set_scale(chip.accel_lsb_per_g, chip.gyro_lsb_per_dps)
 if not calibration.aligned:
     print("Not aligned: this is the lean of the sensor, not of the bike.")
-meter = LeanMeter(calibration)
+meter = LeanMeter(calibration, delay_s=GYRO_DELAY_S[config.DLPF])
 
 while True:
     for _ in range(10):

@@ -15,13 +15,11 @@ Ctrl-C stops the printing; `mpremote reset` starts the lean meter again.
 from time import sleep_ms
 
 from kickstand import settings
-from kickstand.board.i2c_bus import open_i2c
-from kickstand.imu.mpu6050 import Mpu6050
+from kickstand.devices import open_sensor
 
-config = settings.load()  # the pins, from the board's config.py
-i2c = open_i2c(config.SENSOR_I2C, config.SENSOR_SDA, config.SENSOR_SCL, config.SENSOR_BUS_HZ)
-chip = Mpu6050(i2c, config.SENSOR_ADDRESS)
-chip.setup()
+sensor = open_sensor(settings.load())  # pins and ranges as in the board's config.py
+sensor.set_up()
+chip = sensor.chip
 print("Found an", chip.name)
 
 while True:

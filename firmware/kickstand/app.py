@@ -75,6 +75,7 @@ class App:
             self._loop()
         except KeyboardInterrupt:
             self.recorder.stop()
+            port.rest_watchdog()  # nothing feeds it from here on
             raise
 
     def _loop(self):

@@ -9,11 +9,6 @@ not-written|calibration not saved: {0}; the old one is kept
 read-back|calibration not saved: it reads back differently; the old one is kept
 no-card-driver|SD card: its driver is not on the board: mpremote mip install sdcard
 no-card|SD card: none that can be read ({0}): check card and wiring
-out-of-memory|recording stopped: {0}
-out-of-room|recording stopped: {0}
-flash-fault|recording stopped: {0}
-card-fault|recording stopped: {0}
-usb-fault|recording stopped: {0}
 unreadable|config.py cannot be read ({1}{2}): mend it, then kickstand flash --config
 not-allowed|config.py: {0} = {1!r}, but it must be {2}
 unknown-setting|config.py: {0} is not a setting; see the list in that file
@@ -25,8 +20,9 @@ no-such-pin|config.py: {0} = {1} is no pin of this board ({2})
 not-i2c-pins|config.py: {1}_SDA = {2} and {1}_SCL = {3} do not belong to I2C {4} ({5})
 not-uart-pins|config.py: GPS_TX = {1} and GPS_RX = {2} do not belong to UART {3} ({4})
 """
+_RECORDING_STOPPED = "recording stopped: {0}"  # for all of its faults, which only the display tells apart
 
 
 def sentence(refusal):
     """One line for a Refusal."""
-    return refusal.words(_SENTENCES)
+    return refusal.words(_SENTENCES, _RECORDING_STOPPED)

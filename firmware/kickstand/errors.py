@@ -34,6 +34,16 @@ class Refusal(Exception):
     words = Notice.words
 
 
+def report(refusal):
+    """Print it on the console: in words, unless a flash or a heap that has failed does not give these any more."""
+    try:
+        from .console import sentence
+
+        print(sentence(refusal))
+    except (ImportError, OSError, MemoryError):
+        print(refusal.code)
+
+
 class CaptureError(Refusal):
     """A pose that was not held still, or readings that no still sensor gives."""
 

@@ -55,6 +55,10 @@ def run(chosen, lcd):
         App(chosen, lcd).run()
     except SettingsError:
         raise
+    except ImportError as error:  # after an update that was broken off: to restart would not help
+        port.rest_watchdog()
+        print("Kickstand stopped. Its firmware is incomplete (%s): kickstand flash completes it." % error)
+        tell(lcd, "Incomplete:", "flash it again")
     except Exception as error:
         sys.print_exception(error)
         tell(lcd, "Error, restarts", type(error).__name__)

@@ -10,7 +10,7 @@ import pytest
 from kickstand.rides import flash_ring
 from kickstand_tools.deploy import bytecode, connection, firmware_files, flash, room
 from kickstand_tools.deploy.board_files import BoardFiles, fingerprint, survey
-from kickstand_tools.deploy.update import needed_blocks, plan
+from kickstand_tools.deploy.update import needed_blocks, plan, refuse_without_room
 from littlefs_board import BLOCK, PORTS, LittlefsBoard
 from serial.tools import list_ports
 
@@ -195,12 +195,18 @@ def on_board(files, free_blocks=0):
     return BoardFiles({path: fingerprint(data) for path, data in files.items()}, folders, BLOCK, free_blocks, True)
 
 
-@pytest.mark.parametrize("ending", [".mpy", ".py"])
 @pytest.mark.parametrize("which", ["flat .mpy", "flat .py", "nested .mpy", "nested .py"])
-def test_a_board_full_of_rides_has_room_for_an_update(which, ending):
-    """The ring of rides leaves RESERVE free: an update never has to wait for rides to be pulled."""
+def test_a_board_full_of_rides_has_room_for_an_update(which):
+    """The ring of rides leaves RESERVE free: compiled firmware never has to wait for rides to be pulled."""
     board = on_board(before(which))
-    assert needed_blocks(plan(wanted(ending), board, True), board) * BLOCK <= flash_ring.RESERVE
+    assert needed_blocks(plan(wanted(".mpy"), board, True), board) * BLOCK <= flash_ring.RESERVE
+
+
+def test_sources_in_place_of_compiled_firmware_may_have_to_wait_for_the_rides():
+    """They take twice the room, and are for computers without mpy-cross: the rider is told what to do."""
+    board = on_board(before("nested .mpy"), flash_ring.RESERVE // BLOCK)
+    with pytest.raises(room.NoRoom, match="kickstand pull --delete, then flash again"):
+        refuse_without_room(plan(wanted(".py"), board, True), board)
 
 
 def test_the_ring_of_rides_knows_what_the_firmware_takes():

@@ -2,7 +2,7 @@
 
 from time import ticks_add, ticks_diff, ticks_ms
 
-from ..errors import StoreError
+from ..errors import StoreError, report
 from .store import Store
 
 TRIM_MS = 60_000  # flash wears: what riding teaches about upright is saved no more often
@@ -65,9 +65,7 @@ class ActiveCalibration:
         try:
             self._store.save(self.value)
         except StoreError as error:  # the next ride finds it again
-            from ..console import sentence
-
-            print(sentence(error))
+            report(error)
         return True
 
     def _use(self, calibration, replaced):

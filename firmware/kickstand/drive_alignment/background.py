@@ -6,7 +6,7 @@ is taken as soon as it is ready; an alignment from before is checked and refined
 
 from time import ticks_add, ticks_diff
 
-from ..errors import AlignmentError, Notice, StoreError
+from ..errors import Notice, StoreError
 from ..rotation import matrix
 from .alignment import BRAKING, MOTORCYCLE, TURNING, DriveAlignment
 from .quality import MIN_EVENTS_TO_CHECK_SPEED
@@ -145,9 +145,9 @@ class BackgroundAlignment:
                 if drive.ready and verdict in (REFINED, MOVED, REVERSED):
                     self._take(verdict != REFINED)
             elif verdict == REVERSED:
-                self._say(AlignmentError(STAND_SIDE))
+                self._say(Notice(STAND_SIDE))
             elif verdict == MOVED:
-                self._say(AlignmentError(MOUNT_MOVED, "since-alignment"))
+                self._say(Notice(MOUNT_MOVED, "since-alignment"))
             elif verdict == REFINED and drive.ready:
                 self._take(False)
             elif verdict == SAME:

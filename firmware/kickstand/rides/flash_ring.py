@@ -14,7 +14,7 @@ ENOSPC = 28  # MicroPython's errno does not have it
 PART_BLOCKS = 16  # in a part in flash
 CARD_PART_BLOCKS = 256  # in a part on a card: a day's ride is 85 files, not 1300
 FIRMWARE = 80 * BLOCK  # compiled: each of its files takes whole blocks, each folder two
-RESERVE = 80 * BLOCK  # what an update needs at most: sources in place of smaller, compiled modules
+RESERVE = 40 * BLOCK  # what an update of compiled firmware needs at most, with some to spare
 
 
 def free_bytes(path):

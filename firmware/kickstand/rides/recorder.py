@@ -8,7 +8,7 @@ written, a file is flushed, or an old file is removed, so that no turn waits for
 from time import ticks_diff, ticks_ms
 
 from ..calibration.store import pack
-from ..errors import CardError, Notice
+from ..errors import CardError, Notice, report
 from ..units import GAP_US
 from .block import MAX_DT_US, RideBlock
 
@@ -183,7 +183,5 @@ class Recorder:
         self._end(Notice(self.keeper.fault_code(error), str(error)))
 
     def _end(self, problem):
-        from ..console import sentence
-
         self.problem = problem
-        print(sentence(problem))
+        report(problem)

@@ -1,5 +1,7 @@
 """What the rider sees and what a press does: a stack of views. The one in front is shown, and a press is for it."""
 
+import gc
+
 from ..board.button import LONG
 from . import messages, pages
 from .menu import Menu
@@ -40,6 +42,7 @@ class Screen:
                 return
         if not view.press(event, now_ms) and event == LONG:
             self._menu = Menu(self._entries(), now_ms)
+        self._drop_ended()
 
     def add_page(self, page):
         """Add a page behind the others. page: a function of the meter that gives two lines of 16 characters."""
@@ -65,13 +68,17 @@ class Screen:
             lines = view.lines(now_ms) if view else None
             if lines:
                 break
+        self._drop_ended()
+        if view is self._question:
+            self._pages.first()  # where the answer leads to
+        return view, lines
+
+    def _drop_ended(self):
+        """What has ended gets no more samples and no more presses."""
         if self.wizard and self.wizard.ended:
             self.wizard = None
         if self._menu and self._menu.ended:
             self._menu = None
-        if view is self._question:
-            self._pages.first()  # where the answer leads to
-        return view, lines
 
     def _entries(self):
         """The entries of the menu: (name, what to call with now_ms)."""
@@ -102,9 +109,11 @@ class Screen:
         """This press is already that for the pose on the kickstand."""
         self._begin_align(True)
 
-    # The wizards are imported when they are wanted: with what they need they take 10 KB of heap
+    # The wizards are imported when they are wanted: with what they need they take 12 KB of heap. After a collection, or
+    # what stays for good would lie at the far end of the heap and make every later collection longer.
 
     def _begin_align(self, pressed):
+        gc.collect()
         from .align_wizard import AlignWizard
 
         app = self._app
@@ -114,6 +123,7 @@ class Screen:
 
     def _six(self, now_ms):
         if self._ready(now_ms):
+            gc.collect()
             from .six_wizard import SixWizard
 
             app = self._app

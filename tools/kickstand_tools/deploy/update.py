@@ -48,7 +48,7 @@ def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> U
     in_order = dict.fromkeys([MAIN, *stale, *copy] if copy else [])
     modules = {_module(path) for path in wanted}
     return Update(
-        remove=[path for path in in_order if path in board.files],
+        remove=[path for path in in_order if path in board.files and path != CONFIG],  # it is the rider's own
         remove_folders=sorted(empty, reverse=True),  # the inner ones first
         make_folders=sorted(folders - board.folders),
         copy=copy,
