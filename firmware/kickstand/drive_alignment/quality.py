@@ -1,7 +1,7 @@
 """How well a drive knows forward, whether that is enough, and what is wrong with the speed or with the mount.
 
-A block is the sums of a few braking and acceleration events (see regression.py). The halves of a drive are its first
-and its last blocks, as many of each. The parts of a drive are all that comes before, and all that comes after, one
+A block is the sums of a few braking and acceleration events (see regression.py). The halves of a drive are the
+first and the second half of its blocks. The parts of a drive are all that comes before, and all that comes after, one
 boundary between blocks; parts.py tries every boundary.
 """
 

@@ -55,7 +55,7 @@ MAX_PITCH = 1.2  # rad. No motorcycle reaches it, a sensor in the hand may; at 9
 
 # Where the turn rate of a bike in balance replaces the measured one. In the form of measurements.py.
 BALANCE_MIN_SPEED = 4.0 / STANDARD_GRAVITY  # g s. Larger: the balanced rate is not used in slow turns.
-BALANCE_SHARE = 0.5  # of 1: they may differ by SHARE x balanced rate + RATE. Larger: as for RATE.
+BALANCE_SHARE = 0.5  # of 1: the two may differ by SHARE x balanced rate + RATE. Larger: as for RATE.
 BALANCE_RATE = 0.1  # rad/s: see SHARE. Larger: the balanced rate is also used where lean or speed are wrong.
 BALANCE_MIN_COS = 0.3  # of 1: lower bound of cos(lean). Larger: too little rate about left in deep leans.
 
