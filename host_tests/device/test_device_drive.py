@@ -120,7 +120,7 @@ def test_a_wrong_kickstand_side_is_noticed_and_corrected(tmp_path):
     assert not stops(away, POSES_S)  # it does not stand in the way of riding
     turned = POSES_S + 30.0 * 2 + 9.0  # in a right turn of 20 degrees
     assert record.lean_at(turned) is None  # it would be the wrong way round
-    assert record.at(turned) == ["Lean  --        ", "side was wrong?"]
+    assert record.at(turned) == ["Lean  --        ", "side was wrong? "]
     fixed = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,), presses=[*POSES, [asked + 1, LONG]]))
     assert fixed.first("Side corrected") < asked + 3.0
     assert fixed.lean_at(turned) == pytest.approx(20, abs=4)
