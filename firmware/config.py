@@ -36,7 +36,7 @@
 # Restart by itself when the program hangs
 # WATCHDOG = True
 
-# Record every ride from power-on; without it the menu starts a record
+# Record every ride from power-on; without it the menu starts a recording
 # RECORD = False
 
 # SD card for the rides, on SPI; without it they are kept in the board's flash. All five, and on a Pico its driver:

@@ -9,8 +9,9 @@ Press the button until the new page comes, after the last of the usual ones:
     Load     1.31 x
     Lean  40° right
 
-`mpremote reset` starts the lean meter without it. To keep the page, put the function into kickstand/ui/pages.py, its
-name into the list of pages in kickstand/ui/page_stack.py, and flash again.
+`mpremote reset` starts the lean meter without it. To keep the page, put the function into kickstand/ui/pages.py, add
+`pages.load` to MOTORCYCLE in kickstand/ui/page_stack.py and a row to the table of pages in firmware/README.md, and
+flash again.
 """
 
 from math import cos, radians

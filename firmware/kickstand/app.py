@@ -4,8 +4,8 @@ sensor -> calibration and alignment -> lean -> page -> display, in one direction
 itself, and a turn of the loop takes what has come in.
 
 The methods that last for most of a turn (turn, _take, LeanMeter.update_sum, Sensor.fetch) need at most eleven words for
-locals and stack. MicroPython keeps larger frames on the heap, and the next search for free memory begins where such a
-frame was freed, before all that the turns since the last collection have left. That took up to a millisecond a turn.
+locals and stack. MicroPython puts a larger frame on the heap. Freeing it moves the start of the allocator's next search
+back, in front of all garbage since the last collection: up to 1 ms a turn.
 """
 
 import gc
@@ -31,19 +31,20 @@ PAGE_MS = 100
 def fill_gaps(n):
     """Allocate n single blocks of the heap and drop them.
 
-    After a collection the heap has many single free blocks, and until these are in use again MicroPython passes all of
-    them for each larger object. This costs 2 ms here and saves 0.4 ms in each of the first samples.
+    After a collection the heap has many single free blocks, and until these are in use again MicroPython scans past all
+    of them for each larger object. This costs 2 ms here and saves 0.4 ms in each of the first samples.
     """
     value = 0.5
     for _ in range(n):
-        value = -value
+        value = -value  # each float is boxed: one block of the heap
 
 
 class App:
     """The lean meter on a board.
 
-    settings: a Settings. lcd: of devices.open_lcd(). keeper: where rides are recorded to (see Recorder); if one is
-    given, recording begins with the first readings. Raises SettingsError for pins that cannot be used.
+    settings: a Settings. lcd: of devices.open_lcd(). keeper: where rides are recorded to (see Recorder), None for flash
+    or SD card; if one is given, recording begins with the first readings. Raises SettingsError for pins that cannot be
+    used.
     """
 
     def __init__(self, settings, lcd, keeper=None):
@@ -131,9 +132,9 @@ class App:
     def record(self):
         """Begin to record a ride.
 
-        Where the bike stands, the lean filter begins anew with the record, so that a replay shows the same lean; it has
-        to find the gyro's errors again in the first turns. A record begun while riding is replayed by a filter that
-        knows less at its beginning than the one on the board.
+        Where the bike stands, the lean filter begins anew with the recording, so that a replay shows the same lean; it
+        has to find the gyro's errors again in the first bends. A recording begun while riding is replayed by a filter
+        that knows less at its beginning than the one on the board.
         """
         if self.meter.at_rest:
             self.calibration.restart()
@@ -145,7 +146,8 @@ class App:
             self.recorder.add_speed(int(100 * speed + 0.5))
 
     def _show(self, now_ms):
-        """Put the page as it is now onto the display."""
+        """Put the page as it is now onto the display. As often, and at standstill only, save the trim that riding has
+        found."""
         self._page_ms = ticks_add(now_ms, PAGE_MS)
         self._fault_shown = self.sensor.fault is not None
         line1, line2 = self.screen.lines(now_ms)
@@ -177,7 +179,7 @@ class App:
     def _sensor_started(self):
         """The chip has been set up, for the first time or again after a fault; it may be another chip."""
         self.meter.restart()
-        self.recorder.interrupt()
+        self.recorder.mark_gap()
         if self.calibration.chip_started(self.sensor.chip) and self._record_due:
             self._record_due = False
             self.record()

@@ -111,7 +111,7 @@ def test_a_car_whose_sensor_is_mounted_anew_finds_it_out(tmp_path):
 
 
 def test_a_wrong_kickstand_side_is_noticed_and_corrected(tmp_path):
-    question = "Stand was right"
+    question = "Side was wrong"
     record = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,)))
     asked = record.first(question)
     assert asked < POSES_S + 60.0 and stops(asked, POSES_S)
@@ -120,18 +120,18 @@ def test_a_wrong_kickstand_side_is_noticed_and_corrected(tmp_path):
     assert not stops(away, POSES_S)  # it does not stand in the way of riding
     turned = POSES_S + 30.0 * 2 + 9.0  # in a right turn of 20 degrees
     assert record.lean_at(turned) is None  # it would be the wrong way round
-    assert record.at(turned) == ["Lean  --        ", "stand was right?"]
+    assert record.at(turned) == ["Lean  --        ", "side was wrong? "]
     fixed = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,), presses=[*POSES, [asked + 1, LONG]]))
-    assert fixed.first("Side put right") < asked + 3.0
+    assert fixed.first("Side corrected") < asked + 3.0
     assert fixed.lean_at(turned) == pytest.approx(20, abs=4)
     assert fixed.first(question, asked + 3.0) == math.inf
     assert forward_error_deg(stored(tmp_path)) < 2.0
 
 
 def test_a_side_that_the_rider_confirms_is_not_asked_for_again(tmp_path):
-    asked = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,))).first("Stand was right")
+    asked = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,))).first("Side was wrong")
     record = devices.run("cpython", tmp_path, bike("gps", 3, kickstand=(12.0,), presses=[*POSES, [asked + 1, SHORT]]))
-    assert record.first("Stand was right", asked + 2.0) == math.inf
+    assert record.first("Side was wrong", asked + 2.0) == math.inf
     assert not stored(tmp_path).by_drive
 
 
@@ -152,7 +152,7 @@ def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
 def test_a_press_for_another_page_does_not_answer_a_hidden_question(tmp_path):
     """The information page is in front of the question."""
     plan = bike("gps", 3, kickstand=(12.0,))
-    asked = devices.run("cpython", tmp_path, plan).first("Stand was right")
+    asked = devices.run("cpython", tmp_path, plan).first("Side was wrong")
     to_info = [[asked - 14.0, LONG], *([asked - 12.0 + t, SHORT] for t in range(3)), [asked - 9.0, LONG]]
     presses = [*POSES, *to_info, [asked + 2.0, LONG]]
     record = devices.run("cpython", tmp_path, {**plan, "presses": presses, "until": asked + 4.0})

@@ -6,6 +6,7 @@ import math
 import devices
 import engines
 import pytest
+from kickstand_tools.simulated_board.mpu6050_registers import VARIANTS
 
 STATIC = 25
 FAULT_S, END_S = 5.0, 7.0
@@ -116,7 +117,7 @@ def test_either_display_address_and_one_bus_for_both(address, one_bus, aligned):
     assert not record.too_fast
 
 
-@pytest.mark.parametrize("who_am_i", [0x68, 0x70, 0x71, 0x72, 0x73, 0x74, 0x78, 0x98, 0x19])
+@pytest.mark.parametrize("who_am_i", sorted(VARIANTS))
 def test_every_known_chip_is_accepted(who_am_i, tmp_path):
     plan = {"lean": [[0, STATIC]], "board": {"who_am_i": who_am_i}, "until": 3}
     assert devices.run("cpython", tmp_path, plan).at(1.5)[0].startswith("Raw   25°")

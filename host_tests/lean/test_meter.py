@@ -59,9 +59,9 @@ def test_the_lean_is_distrusted_for_a_reason_until_it_is_trusted_again():
 
 def test_a_doubt_is_about_one_calibration():
     shown = stand(meter())
-    shown.distrust("stand was right?")
+    shown.distrust("side was wrong?")
     shown.use(shown.calibration)
-    assert shown.doubt == "stand was right?"
+    assert shown.doubt == "side was wrong?"
     shown.use(Calibration())
     assert shown.doubt is None
 

@@ -280,7 +280,7 @@ def test_a_gap_in_the_readings_is_one_in_the_log(recorder, flash):
     recorder.start(ride_writer.CHIP, ride_writer.calibration())
     for i, (sums, n, dt_us) in enumerate(ride_writer.turns(100)):
         if i == 50:
-            recorder.interrupt()
+            recorder.mark_gap()
             dt_us = 0
         recorder.add(sums, n, dt_us)
     recorder.stop()

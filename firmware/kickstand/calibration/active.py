@@ -5,18 +5,21 @@ from time import ticks_add, ticks_diff, ticks_ms
 from ..errors import StoreError, report
 from .store import Store
 
-TRIM_MS = 60_000  # flash wears: what riding teaches about upright is saved no more often
+TRIM_MS = 60_000  # flash wears: the trim is saved no more often
 
 
 class ActiveCalibration:
-    """meter: the LeanMeter that works with it. changed: called as changed(replaced) after each change; replaced: the
-    alignment is another one, so that nothing learned or held before counts; else it was only refined.
+    """meter: the LeanMeter that works with it. changed: called as changed(replaced) after each change.
+    replaced: True for another alignment, so that maxima and what driving has shown are discarded; False for a small
+    correction.
+
+    The trim is a correction of the upright pose, in degrees, which riding finds (see Calibration).
     """
 
     def __init__(self, meter, changed):
         self._meter = meter
         self._changed = changed
-        self._store = None  # a record in flash belongs to one chip, and which one is known once it runs
+        self._store = None  # a stored calibration belongs to one chip, and which one is known once it runs
         self._trim_due_ms = ticks_add(ticks_ms(), TRIM_MS)
 
     @property
@@ -30,7 +33,7 @@ class ActiveCalibration:
         return self.value.aligned
 
     def chip_started(self, chip):
-        """Load the record of this chip (an Mpu6050 that runs), unless it is the one in use. True if it was loaded."""
+        """Load the stored calibration of chip (an Mpu6050 that runs) unless it is in use. True if it was loaded."""
         if self._store and self._store.who_am_i == chip.who_am_i:
             return False
         self._chip = chip
@@ -44,7 +47,7 @@ class ActiveCalibration:
         self._use(calibration, True)
 
     def refine(self, calibration):
-        """The same for one found by driving, which goes on. Raises StoreError."""
+        """Like save(), but the alignment came from driving; what was learned stays valid. Raises StoreError."""
         self._store.save(calibration)
         self._use(calibration, False)
 
@@ -54,7 +57,7 @@ class ActiveCalibration:
         self._meter.use(self.value)
 
     def keep_trim(self, now_ms):
-        """Save the upright that riding has found, when the bike stands. Call it about every 100 ms."""
+        """Save the trim that riding has found, when the bike stands. Call it about every 100 ms."""
         if self.value.aligned and ticks_diff(now_ms, self._trim_due_ms) >= 0 and self._save_trim():
             self._trim_due_ms = ticks_add(now_ms, TRIM_MS)
 

@@ -15,9 +15,9 @@ class Calibration:
 
     accel_offset (3, g) and accel_slope (3): calibrated = slope * reading + offset, Nicolae's equations 18-20.
     gyro_bias (3, deg/s): what the gyro reads at rest. vehicle_from_sensor (9, row-major, rows left, up, forward): the
-    alignment, a rotation matrix. trim_deg: by how many degrees the lean reads too far to the right.
-    six_done: offset and slope were measured. aligned: vehicle_from_sensor was measured. by_drive: it was measured or
-    refined by driving.
+    alignment, a rotation matrix. trim_deg: the trim, a correction of the upright pose that riding has found: degrees by
+    which the lean would read too far to the right. six_done: offset and slope were measured. aligned:
+    vehicle_from_sensor was measured. by_drive: it was measured or refined by driving.
     """
 
     def __init__(self):

@@ -9,7 +9,9 @@ a standard error.
     drive.measure_speed(speed_mps, age_us)         # each new value of the speed source, 1 to 10 a second
     if drive.ready: drive.matrix(out)
 
-What to show follows from `state`, from `counted` of `needed` and, when REFUSED, from `problem`. Whether an alignment
+What to show follows from `state`, from `counted` of `needed` and, when REFUSED, from `problem`. A problem is a fault of
+the speed or of the mount, which driving on does not mend; missing() is what driving on brings; `reason` is the
+problem, or else what is missing. Whether an alignment
 from before still fits: verdict.compare(). Memory is fixed, and each call does a short piece of the work.
 """
 
@@ -39,8 +41,9 @@ PIECE_US = 12_000  # an update does one piece of work, and one more for each who
 
 class DriveAlignment:
     """vehicle: CAR or MOTORCYCLE. up: the vertical in the sensor's axes (unit vector) if two poses have shown it, for a
-    motorcycle; without it the vertical comes from riding straight. bias: of the gyro (3, deg/s), to be subtracted until
-    a stop shows it, zeros for rates that are corrected already; without it nothing counts before the first stop.
+    motorcycle; without it the vertical comes from riding straight. bias: the gyro's (3 values, deg/s), subtracted until
+    a stop shows a newer one. Give zeros for rates that are corrected already. Without a bias no braking event counts
+    before the first stop.
 
     standing: the StandingVertical, which has the gyro's bias too; vertical: the Vertical; events: the DrivingEvents;
     quality: the DrivingQuality; needed: how many events must have counted.
@@ -102,7 +105,7 @@ class DriveAlignment:
 
     @property
     def problem(self):
-        """What is wrong with the speed or with the mount: an AlignmentError, or None."""
+        """What is wrong with the speed or with the mount, and driving on does not mend: an AlignmentError, or None."""
         if self._speed_check.problem is None and self.standing.moved and self.vehicle == CAR:
             return AlignmentError("mount-moved", "between-stops", MAX_CHANGE_DEG)
         if self.counted < self.needed:
@@ -111,7 +114,7 @@ class DriveAlignment:
 
     @property
     def reason(self):
-        """Why matrix() cannot be had yet: an AlignmentError."""
+        """Why matrix() cannot be had: the problem or, without one, what is missing. An AlignmentError."""
         return self.problem or self.missing(self.counted, self.needed, self.turned)
 
     def missing(self, counted, needed, turned):

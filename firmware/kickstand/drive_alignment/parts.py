@@ -48,7 +48,7 @@ class DriveParts:
 
     def add(self, across, along, roll_g, pitch_g, weight, seconds):
         """One block. across, along: its forward, resolved to the left of and along the whole drive's forward; roll_g,
-        pitch_g: its vertical, likewise; weight (g^2 s), seconds: as in its Fit."""
+        pitch_g: its vertical, resolved the same way; weight (g^2 s), seconds: as in its Fit."""
         block = self._blocks[self.count]
         self.count += 1
         block[0], block[1] = weight * across, weight * along

@@ -1,4 +1,9 @@
-"""How well a drive knows forward, whether that is enough, and what is wrong with the speed or with the mount."""
+"""How well a drive knows forward, whether that is enough, and what is wrong with the speed or with the mount.
+
+A block is the sums of a few braking and acceleration events (see regression.py). The halves of a drive are the
+first and the second half of its blocks. The parts of a drive are all that comes before, and all that comes after, one
+boundary between blocks; parts.py tries every boundary.
+"""
 
 from math import atan2, degrees, sqrt
 
@@ -13,9 +18,9 @@ MIN_EVENTS = 5  # straight braking and acceleration events, for an alignment
 MIN_EVENTS_TO_CHECK_SPEED = 2
 # Limits come in pairs with a hysteresis: to become ready, and to stay so. What flickers at a threshold helps nobody.
 READY_DEG, STAY_READY_DEG = 1.5, 2.5  # standard error of forward; one drive in ten is off by twice as much
-AGREE_DEG, STAY_AGREE_DEG = 4.0, 6.0  # forward in two halves of a drive, or in two parts, unless it is by chance:
-AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0  # between two parts
-# Two parts of a drive that differ by more mean that the mount moved
+AGREE_DEG, STAY_AGREE_DEG = 4.0, 6.0  # largest difference of forward between halves, and between parts
+AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0  # between parts a larger difference is accepted if it is within these
+# A larger difference between two parts means that the mount moved
 MOVED_DEG = 30.0  # forward; a motorway's long banked curve, taken for straight, made 15
 PITCH_DEG = 7.0  # 6 % uphill, then downhill, is within this
 ROLL_DEG = 7.0  # that banked curve made 6. Not used on a motorcycle, which leans
@@ -44,11 +49,11 @@ class DrivingQuality:
         self._events = events
         self._vertical = vertical
         self._precise = self._event_off = False
-        self._part = Fit()
+        self._scratch_fit = Fit()
 
     def judge(self):
         """After another event or stop: find all the attributes anew. A generator of short pieces of work."""
-        regression, lag, part = self._events.regression, self._events.lag, self._part
+        regression, lag, part = self._events.regression, self._events.lag, self._scratch_fit
         up = vector()
         if not (yield from regression.fitting(self.fit, lag)):
             return
@@ -82,7 +87,7 @@ class DrivingQuality:
         # The jackknife: the variance of forward from its changes as each block in turn is left out. It is empirical;
         # the formal error of the regression is optimistic early in a drive.
         freedom = blocks - 1
-        variance = degrees(degrees(squares)) * freedom / blocks
+        variance = degrees(degrees(squares)) * freedom / blocks  # rad^2 to deg^2
         self.quality_deg = sqrt(blend_prior(variance, self.fit.weight, freedom))
         yield from self.parts.compare()
         half = blocks // 2

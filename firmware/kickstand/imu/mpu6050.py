@@ -45,10 +45,10 @@ ACCEL_LSB_PER_G = {2: 16384, 4: 8192, 8: 4096, 16: 2048}  # counts per g for eac
 GYRO_LSB_PER_DPS = {250: 131.0, 500: 65.5, 1000: 32.8, 2000: 16.4}  # counts per deg/s for each range in deg/s (p. 31)
 GYRO_DELAY_S = {1: 0.0019, 2: 0.0028, 3: 0.0048, 4: 0.0083, 5: 0.0134, 6: 0.0186}  # by dlpf (p. 13)
 
-# The chips that are known to work, by their WHO_AM_I. To add one, fill in from its data sheet: a name of at most 12
-# characters; temperature counts per degree C; degrees C at 0 counts; True if it has ACCEL_CONFIG2 (0x1D); bytes in its
-# FIFO, or fewer; the bits of FIFO_EN that must read back. Then add it to VARIANTS in the tools' simulated board and
-# its number to test_every_known_chip_is_accepted in host_tests/device/test_device_faults.py.
+# The chips known to work, by WHO_AM_I: a name of at most 12 characters; temperature counts per degree C; degrees C at 0
+# counts; True if it has ACCEL_CONFIG2 (0x1D); bytes in its FIFO, or fewer; the bits of FIFO_EN that must read back.
+# A new one also goes into VARIANTS in tools/kickstand_tools/simulated_board/mpu6050_registers.py and the parts in the
+# README. A chip with other registers (LSM6DS3, BMI160) needs a driver with the same methods, opened by open_sensor().
 CHIPS = {
     0x68: ("MPU6050", 340.0, 36.53, False, 1024, 0xF8),
     0x70: ("MPU6500", 333.87, 21.0, True, 512, 0xF8),
@@ -64,6 +64,7 @@ _NAME = const(0)
 _LSB_PER_C = const(1)
 _ZERO_C = const(2)
 _HAS_ACCEL_CONFIG2 = const(3)
+_FIFO_BYTES = const(4)
 _FIFO_EN_BITS = const(5)
 
 MAX_FRAMES = 8  # read in one transfer, to catch up: 3 ms at 400 kHz
@@ -134,8 +135,7 @@ class Mpu6050:
             raise OSError("MPU6050 WHO_AM_I reads differently each time")
         if self.who_am_i not in CHIPS and self.who_am_i != self._accept:
             raise UnknownChip(self.who_am_i)
-        _, _, _, _, fifo_bytes, _ = self._chip()
-        self._full = fifo_bytes - FRAME
+        self._full = self._chip()[_FIFO_BYTES] - FRAME
         return self.who_am_i
 
     def setup(self):

@@ -9,7 +9,7 @@ CHECK_MS = 100  # from one check of the configuration, which takes 0.6 ms, to th
 RETRY_MS = 50  # from one attempt to set the chip up to the next
 SAY_MS = 30  # from a fault to the first attempt, which blocks the loop for 0.2 s: time to show the fault
 FAILURES = 3  # transfers that fail in a row make a fault; a NACK or two are tolerated
-SILENT_MS = 100  # without a sample make a fault
+SILENT_MS = 100  # a fault after this long without a sample
 
 
 class Sensor:
@@ -54,7 +54,7 @@ class Sensor:
             return 0
         self._failures = 0
         if not waiting:
-            self._wait(now_ms)
+            self._no_sample(now_ms)
             return 0
         self._sample_ms = now_ms
         good = self.chip.add_up(waiting)
@@ -74,8 +74,8 @@ class Sensor:
             self._missed(now_ms)
             return -1
 
-    def _wait(self, now_ms):
-        """There was no sample: after an overflow that is no fault, because the FIFO was just emptied."""
+    def _no_sample(self, now_ms):
+        """The FIFO held no sample. After an overflow that is no fault, because the FIFO was just emptied."""
         if self._overflows != self.chip.overflows:
             self._overflows = self.chip.overflows
             self._sample_ms = ticks_ms()  # now_ms may be from before the long pause that led to the overflow

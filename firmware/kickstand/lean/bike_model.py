@@ -2,29 +2,33 @@
 
 Axes: left (x), up (y), forward (z). Units: rad, rad/s and s; forces in g, so speeds in g s (m/s divided by 9.80665).
 
-State                                       Measured
-    t  LEAN   roll, > 0 to the right            f    specific force (3)
-    q  PITCH  of road and suspension, nose up   w_m  rate of rotation (3)
+State                                       Measured (a vector with [3] has the components left, up, forward)
+    t  LEAN   roll, > 0 to the right            f    specific force [3]
+    q  PITCH  of road and suspension, nose up   w_m  rate of rotation [3]
     v  SPEED  forward
     b  BIAS_LEFT, BIAS_UP, BIAS_FORWARD: change of the gyro's bias since the calibration
-    y  YAW_ERROR of the alignment: one degree of pitch in the kickstand pose makes up to five of it
+    psi  YAW_ERROR of the alignment. Pitch in the kickstand pose causes it, 1/tan(tilt of the stand) times as large:
+         5 degrees per degree of pitch at 11 degrees of tilt, 11 at 5
     s_x, c_xy        SCALE_LEFT, CROSS_LEFT_UP: scale error of the gyro's left axis, and its reading of a rate about up
     c_zx, c_zy, s_z  CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD: the same of its forward axis
-The data sheet allows 3 % of scale error and 2 % of cross-axis sensitivity. In a long turn they pass for bias, in a
-quick roll for lean. The up axis has no such states: without a measured speed its scale cannot be told from the speed.
+The data sheet allows 3 % of scale error and 2 % of cross-axis sensitivity. In a long turn they are mistaken for bias,
+in a quick roll for lean. The up axis has no such states: without a measured speed its scale cannot be told from the
+speed.
 
 Equations, with ' for the derivative by time
     rates, corrected         w = w_m - b,  then  w_z -= c_zx w_x + c_zy w_y + s_z w_z,  w_x -= s_x w_x + c_xy w_y
     rotation, exact          t' = w_z - tan q (w_x sin t + w_y cos t)            (1)
                              q' = w_y sin t - w_x cos t                          (2)
-    wheels do not slide      v' = f_z - sin q + v w_y y                          (3)
-                             f_x = cos q sin t + v w_y + y v' - h cos t w_z'     (4)
+    wheels do not slide      v' = f_z - sin q + v w_y psi                        (3)
+                             f_x = cos q sin t + v w_y + psi v' - h cos t w_z'   (4)
                              f_y = cos q cos t - v w_x                           (5)
-    roads are level          0 = q + y sin t  on average                         (6)
+    roads are level          0 = q + psi sin t  on average                       (6)
 
-h is the height of the sensor above the roll axis. (4) and (5) are A. Nicolae's (22) and (23) with s = v w. In a held
-turn the derivatives of both by lean and by speed are in the same proportion, so that they cannot tell lean from
-speed. There the ratio of two rates gives the lean, through (2) and (6); just after entering a turn, the speed does.
+h is the height of the sensor above the roll axis. (4) and (5) are A. Nicolae's (22) and (23) with s = v w. In a
+steady turn (4) and (5) cannot separate lean from speed, because their derivatives by lean and by speed are in the same
+proportion. There the ratio of two rates gives the lean: pitch does not change, by (6), so that by (2) w_x / w_y is
+tan t. Just after the bike has entered a turn its speed is still known from before, and (4) with this speed gives the
+lean.
 """
 
 from math import cos, sin, sqrt
@@ -50,17 +54,22 @@ STATES = 12
 MAX_PITCH = 1.2  # rad. No motorcycle reaches it, a sensor in the hand may; at 90 degrees lean has no meaning.
 
 # Where the turn rate of a bike in balance replaces the measured one. In the form of measurements.py.
-BALANCE_MIN_SPEED = 4.0 / STANDARD_GRAVITY  # g s. Larger: not in slow turns.
-BALANCE_SHARE = 0.5  # of 1: by how much of the balanced rate the two may differ,
-BALANCE_RATE = 0.1  # rad/s: and by how much besides. Larger, both: also where lean or speed are wrong.
+BALANCE_MIN_SPEED = 4.0 / STANDARD_GRAVITY  # g s. Larger: the balanced rate is not used in slow turns.
+BALANCE_SHARE = 0.5  # of 1: the two may differ by SHARE x balanced rate + RATE. Larger: as for RATE.
+BALANCE_RATE = 0.1  # rad/s: see SHARE. Larger: the balanced rate is also used where lean or speed are wrong.
 BALANCE_MIN_COS = 0.3  # of 1: lower bound of cos(lean). Larger: too little rate about left in deep leans.
 
 
 def predict(x, force, rate, seconds, sums):
-    """Move the state x (STATES values) on by one sample of force (3, g) and rate (3, rad/s) with (1) to (3).
+    """Move the state x (STATES values) on by one sample of force (3 values, g) and rate (3, rad/s) with (1) to (3).
 
-    sums (9 values) grows by what a window's means are made of: 0 and 1 the innovations of (4), without h, and of (5) at
-    the state before the step; 2 to 4 the corrected rates; 5 to 7 the force; 8 the square of the first innovation.
+    sums (9 values) grows by the sample's values. Divided by the number of samples at the end of a window (the samples
+    of a fifth of a second, which make one update of the filter) they are the window's means:
+        0       innovation of (4) without its term in h, at the state before the step, in g
+        1       innovation of (5), at the same state, in g
+        2 to 4  corrected rates about left, up, forward, in rad/s
+        5 to 7  force left, up, forward, in g
+        8       square of innovation 0, in g^2
     Returns the corrected roll rate in rad/s. Motion and innovations are one function because they share sines.
     """
     fx, fy, fz = force
@@ -97,8 +106,8 @@ def predict(x, force, rate, seconds, sums):
 
 
 def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
-    """Rates about left and up, for products of a state and a rate: those of a bike in balance at this lean and speed,
-    v w_y = -cos q sin t, where the measured ones are near them.
+    """Rates about left and up, for products of a state and a rate: those of a bike in balance at this lean and speed
+    (v w_y = -cos q sin t) if the measured rate about up is close to them, else the measured ones.
 
     Noise of a measured rate would be squared in such products, and speed and lean would be estimated too small (the
     problem of errors in variables).
@@ -111,7 +120,7 @@ def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
 
 
 class Linearisation:
-    """(1) to (6) about the state x, at the corrected rates (3) and the forward force of a window's means.
+    """(1) to (6) about the state x, at a window's means of the corrected rates (3 values) and of the forward force.
 
     Each ..._row of the Jacobians is ((state, partial derivative), ...): lean, pitch and speed of the rates of change
     (1) to (3), left and up of the forces (4) and (5), level of (6). Derivatives that are zero are left out, and terms
@@ -143,14 +152,14 @@ class Linearisation:
         )
         self.speed_row = (
             (PITCH, -cq),  # d speed' / d q
-            (YAW_ERROR, sideways),  # d speed' / d y
+            (YAW_ERROR, sideways),  # d speed' / d psi
         )
         self.left_row = (
             (LEAN, cq * ct),  # d left / d t
             (PITCH, -sq * st - cq * yaw_error),  # d left / d q
             (SPEED, turn_y),  # d left / d v
             (BIAS_UP, -speed),  # d left / d b_y
-            (YAW_ERROR, acceleration),  # d left / d y
+            (YAW_ERROR, acceleration),  # d left / d psi
         )
         self.up_row = (
             (LEAN, -cq * st),  # d up / d t
@@ -163,7 +172,7 @@ class Linearisation:
         self.level_row = (
             (PITCH, 1.0),  # d level / d q
             (LEAN, yaw_error * ct),  # d level / d t
-            (YAW_ERROR, st),  # d level / d y
+            (YAW_ERROR, st),  # d level / d psi
         )
         self.sin_lean, self.cos_lean, self.sin_pitch, self.cos_pitch = st, ct, sq, cq
         self.speed, self.yaw_rate, self.sideways, self.acceleration = speed, yaw_rate, sideways, acceleration

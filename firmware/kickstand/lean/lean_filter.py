@@ -6,8 +6,8 @@ linearise   five times a second: the model's partial derivatives at the means of
 update      with them the covariance is propagated over the window and corrected by each of its measurements
 inject      the corrections that were found go into the state
 
-Linearise to inject take longer than a sample lasts: they are a generator, of which every sample of the next window runs
-a piece. Forces are in g, speeds in g s, angles in rad.
+Linearise to inject take longer than a sample lasts. They are a generator, which is spread over the samples of the next
+window: each of them runs it as far as its next yield. Forces are in g, speeds in g s, angles in rad.
 """
 
 from math import atan2, degrees, pi, sin, sqrt
@@ -99,7 +99,7 @@ class LeanFilter:
         self._window_us += dt_us
         if self._work is not None:
             for _ in range(self._pieces):
-                if next(self._work, True):
+                if next(self._work, True):  # a yield gives None, the end gives True
                     self._work = None
                     break
         elif self._window_us >= (WINDOW_US if self._p is not None else FIRST_WINDOW_US):
@@ -125,7 +125,8 @@ class LeanFilter:
         if not (abs(x[LEAN]) < 2 * pi and x[SPEED] < MAX_SPEED):  # also not-a-number
             self.restart()
             return
-        roll_acceleration = (self._roll_rate - self._last_roll_rate) / seconds / STANDARD_GRAVITY  # see forces()
+        # see forces(): divided by standard gravity, so that metres times this are g
+        roll_acceleration = (self._roll_rate - self._last_roll_rate) / seconds / STANDARD_GRAVITY
         self._last_roll_rate = self._roll_rate
         rested = self._rest.resting
         pushed = abs(means[7] - sin(x[PITCH])) > measurements.MAX_REST_PUSH
@@ -205,8 +206,8 @@ class LeanFilter:
             self.trim.update(sideways, x[LEAN], model.yaw_rate, seconds)
 
     def _inject(self, model):
-        """Put the corrections into the state, and into the innovations that were summed up meanwhile with the state
-        before."""
+        """Put the corrections into the state. Adjust the innovations that were summed up during the calculation too:
+        they were measured against the old state."""
         p, x, sums = self._p, self._x, self._sums
         for j, h in model.left_row:
             sums[0] -= self._count * h * p.correction[j]

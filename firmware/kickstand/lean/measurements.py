@@ -14,12 +14,12 @@ from math import radians
 from ..units import STANDARD_GRAVITY
 from .bike_model import BIAS_LEFT, LEAN, PITCH, SPEED, YAW_ERROR
 
-# Symbol = default  # unit: what it is. Larger: what follows.
+# Symbol = default  # unit: what it is. "Larger:" says what raising it does.
 
 # The start: before anything is measured
-START_MAX_RATE = 0.02  # rad/s: of a bike that stands. Larger: a start in a long even turn is taken for standing.
-START_MAX_FORCE = 0.05  # g: of the force from 1 g, likewise. Larger: a start under way is taken for standing.
-SIGMA_START = (  # Larger, each: found sooner, but the other states' errors pass for it.
+START_MAX_RATE = 0.02  # rad/s: largest rate that counts as standing. Larger: riding is mistaken for it.
+START_MAX_FORCE = 0.05  # g: largest deviation from 1 g that counts as standing. Larger: as above.
+SIGMA_START = (  # Larger, each: found sooner, but the other states' errors are mistaken for it.
     radians(1.5),  # rad: lean of a bike that stands, by the force
     radians(5.0),  # rad: pitch
     15.0 / STANDARD_GRAVITY,  # g s: speed
@@ -34,42 +34,44 @@ SIGMA_START = (  # Larger, each: found sooner, but the other states' errors pass
     0.010,  # of 1: scale of the forward axis
 )
 SIGMA_START_LEAN_MOVING = radians(30.0)  # rad: lean under way. Larger: lean is shown later, and follows forces more.
-USUAL_SPEED = 15.0 / STANDARD_GRAVITY  # g s: where nothing tells it. Larger: leans that begin unseen are shown larger.
+USUAL_SPEED = 15.0 / STANDARD_GRAVITY  # g s: where nothing tells it. Larger: leans begun before the start are larger.
 
 # Process noise, per square root of a second
 NOISE_ANGLE = radians(0.2)  # rad: vibration of the gyro. Larger: lean follows the forces more and the gyro less.
 NOISE_SPEED = 0.35 / STANDARD_GRAVITY  # g s. Larger: speed follows turns sooner, and is less steady on straights.
-NOISE_BIAS = radians(0.01)  # rad/s: 0.6 deg/s in five minutes of warming up. Larger: long turns pass for bias.
+NOISE_BIAS = radians(0.01)  # rad/s: 0.6 deg/s in five minutes of warming up. Larger: long turns are mistaken for bias.
 
 # Measurement noise while riding
 SIGMA_LEFT = 0.04  # g: of the force to the left. Larger: lean follows it less, and the gyro and level roads more.
 SIGMA_UP = 0.4  # g: of the force up, which bumps disturb. Larger: speed is found later.
 SHAKEN_SHARE = 0.1  # of 1: of vibration's variance that a mean keeps. Larger: forces count less on rough roads.
-ROLL_HEIGHT_M = 0.4  # m: h, of the sensor above the roll axis. Larger: more of the force is put down to rolling.
+ROLL_HEIGHT_M = 0.4  # m: h, of the sensor above the roll axis. Larger: roll acceleration explains more of the force.
 SIGMA_ROLL_HEIGHT_M = 0.4  # m. Larger: forces count less while the bike rolls quickly.
 SIGMA_GIVEN_SPEED = 1.0 / STANDARD_GRAVITY  # g s: of a receiver or a wheel sensor. Larger: it counts for less.
 GIVEN_SPEED_LATE_S = 1.0  # s: how late it may be. Larger: it counts for less while speeding up and braking.
 
 # Assumptions that take the place of measurements
 SIGMA_SLOPE = radians(1.6)  # rad: of roads' slopes. Larger: slopes are followed better, turns told from them worse.
-SLOPE_S = 3.0  # s: how long a slope lasts; fitted, real ones last longer. Larger: likewise.
-STRAIGHT_MAX_LEAN = radians(8.0)  # rad: below this and the next, the bike rides straight on.
-STRAIGHT_MAX_RATE = radians(2.5)  # rad/s, about the vertical. Larger, both: slow turns are drawn towards upright.
-STRAIGHT_MIN_SPEED = 4.0 / STANDARD_GRAVITY  # g s: and above this. Larger: drift in slow straights stays.
+SLOPE_S = 3.0  # s: how long a slope lasts; fitted, real ones last longer. Larger: as for SIGMA_SLOPE.
+# Riding straight is all three: less lean than this, less yaw rate than this, more speed than this.
+STRAIGHT_MAX_LEAN = radians(8.0)  # rad. Larger: the lean of wide turns is drawn towards upright.
+STRAIGHT_MAX_RATE = radians(2.5)  # rad/s, about the vertical. Larger: the lean of slow turns is drawn towards upright.
+STRAIGHT_MIN_SPEED = 4.0 / STANDARD_GRAVITY  # g s. Larger: drift on slow straights is not taken off.
 SIGMA_STRAIGHT = radians(0.8)  # rad: of lean on straights, by wind and camber. Larger: drift is taken off later.
-STRAIGHT_S = 3.0  # s: how long such a lean lasts. Larger: likewise.
+STRAIGHT_S = 3.0  # s: how long such a lean lasts. Larger: drift is taken off later.
 SIGMA_USUAL_SPEED = 20.0 / STANDARD_GRAVITY  # g s: of speed from USUAL_SPEED. Larger: less pull towards it.
-USUAL_SPEED_S = 60.0  # s: how long a speed lasts. Larger: likewise.
+USUAL_SPEED_S = 60.0  # s: how long a speed lasts. Larger: less pull towards USUAL_SPEED.
 
 # Standing still
 SIGMA_STAND = radians(0.5)  # rad: of lean and pitch by the force on coming to rest. Larger: later forces count more.
 SIGMA_REST_RATE = radians(0.05)  # rad/s: of the gyro. Larger: bias is found later.
 SIGMA_REST_FORCE = 0.02  # g: of the force, with the engine idling. Larger: lean settles later.
 SIGMA_REST_SPEED = 0.02 / STANDARD_GRAVITY  # g s: of a speed of zero. Larger: it is less surely zero.
-MAX_REST_PUSH = 0.08  # g: forward force not from pitch; more is braking. Larger: even braking passes for standing.
-ROLLING_SPEED = 3.0 / STANDARD_GRAVITY  # g s: no standstill, if the estimate is certain enough to say so:
-ROLLING_SIGMAS = 3.0  # standard deviations. Larger, both: rest is seen sooner, and a smooth road passes for it.
-SIGMA_TRIM_SPEED = 8.0 / STANDARD_GRAVITY  # g s: a speed as certain allows trimming. Larger: found sooner, less surely.
+MAX_REST_PUSH = 0.08  # g: forward force not from pitch; more is braking. Larger: steady braking is taken for standing.
+ROLLING_SPEED = 3.0 / STANDARD_GRAVITY  # g s: an estimate above it is no standstill, if the next line holds too.
+ROLLING_SIGMAS = 3.0  # speed over its standard deviation. Larger, both: a smooth road is mistaken for rest.
+# g s: the trim is measured while the speed is more certain than this. Larger: found sooner, less surely.
+SIGMA_TRIM_SPEED = 8.0 / STANDARD_GRAVITY
 
 
 def forces(model, means, roll_acceleration):
@@ -108,6 +110,6 @@ def at_rest(model, means, speed, axis):
     return (
         (((SPEED, 1.0),), -speed, SIGMA_REST_SPEED**2),
         (((BIAS_LEFT + axis, 1.0),), means[2 + axis], SIGMA_REST_RATE**2),
-        (model.left_row[0:2], means[0] + model.sideways, SIGMA_REST_FORCE**2),
+        (model.left_row[0:2], means[0] + model.sideways, SIGMA_REST_FORCE**2),  # only LEAN and PITCH
         (((PITCH, model.cos_pitch),), means[7] - model.sin_pitch, SIGMA_REST_FORCE**2),
     )

@@ -1,18 +1,18 @@
 """Does the bike stand still? Told from means over a fifth of a second, in which an idling engine averages out."""
 
-# Symbol = default  # unit: what it is. Larger: what follows.
-MAX_FORCE_G = 0.010  # g: deviation of a mean from the recent average. Larger: smooth roads pass for rest.
-MAX_RATE_RADPS = 0.009  # rad/s (0.5 deg/s): likewise. Larger: likewise.
-MAX_BIAS_RADPS = 0.02  # rad/s (1.2 deg/s): average rate that may be bias. Larger: long smooth turns pass for rest.
-MAX_FIRST_BIAS_RADPS = 0.1  # rad/s: likewise before the first rest, for drift since the calibration. Larger: likewise.
+# Symbol = default  # unit: what it is. "Larger:" says what raising it does.
+MAX_FORCE_G = 0.010  # g: deviation of a mean from the recent average. Larger: smooth roads are mistaken for rest.
+MAX_RATE_RADPS = 0.009  # rad/s (0.5 deg/s): the same of rates. Larger: smooth roads are mistaken for rest.
+MAX_BIAS_RADPS = 0.02  # rad/s (1.2 deg/s): mean rate that may be bias. Larger: smooth turns are mistaken for rest.
+MAX_FIRST_BIAS_RADPS = 0.1  # rad/s: before the first rest, after drift since the calibration. Larger: the same.
 REST_S = 1.5  # s of stillness that are rest. Larger: rest is seen later, and more surely.
-REST_ROLLING_S = 10.0  # s, where the bike seems to roll or to brake: no road is smooth for so long. Larger: likewise.
+REST_ROLLING_S = 10.0  # s: the same where the bike seems to move or to brake: no road is smooth for so long.
 AVERAGE_S = 0.5  # s: time constant of the recent average. Larger: rest is seen later after a movement.
 
 
 class RestDetector:
     """update() with the means of each window; resting is True after REST_S of stillness, or REST_ROLLING_S where the
-    bike seems to roll. Read only.
+    bike seems to move. Read only.
 
     first: no rest has been seen since power-on, so the bias may be far off.
     """
@@ -20,12 +20,12 @@ class RestDetector:
     def __init__(self, first=True):
         self.resting = False
         self._still_s = 0.0
-        self._not_rolling_s = 0.0  # of stillness without a sign of rolling
+        self._not_rolling_s = 0.0  # of stillness without a sign of moving
         self._average = None  # rates without the estimated bias taken off, and forces
         self._max_bias = MAX_FIRST_BIAS_RADPS if first else MAX_BIAS_RADPS
 
     def update(self, rates, force, bias, seconds, rolling=False):
-        """Means of the last seconds: rates (3, rad/s) with the estimated bias (3) taken off, and force (3, g).
+        """Means of the last seconds: rates (rad/s) with the estimated bias taken off, that bias, and force (g).
         rolling: there is good reason to believe that the bike moves."""
         felt = [rates[i] + bias[i] for i in range(3)] + force
         if self._average is None:

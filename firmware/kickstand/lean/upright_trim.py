@@ -7,9 +7,9 @@ alignment's upright and the balance, plus the accelerometer's drift. Both are to
 from math import radians, sin
 
 MAX_TRIM = radians(3.5)  # rad: a pose off by 2 degrees, and the rest of the accelerometer's errors
-# Symbol = default  # unit: what it is. Larger: what follows.
+# Symbol = default  # unit: what it is. "Larger:" says what raising it does.
 SIGMA_START = radians(2.5)  # rad: of a new pose. Larger: trim is found sooner, and less steady.
-SIGMA_KEPT = radians(0.7)  # rad: of a trim kept from the ride before, at another temperature. Larger: likewise.
+SIGMA_KEPT = radians(0.7)  # rad: of a trim kept from an earlier, colder or hotter ride. Larger: as above.
 SIGMA_STRAIGHT = radians(1.5)  # rad: of the balance, by rider, camber and wind. Larger: found later, steadier.
 SIGMA_TURN = 0.4  # of sin(lean): in turns tyre width and hanging off add to the force. Larger: turns count less.
 SIGMA_YAW_S = 0.2  # rad per rad/s of yaw rate. Larger: turns count less.

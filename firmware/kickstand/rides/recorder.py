@@ -17,7 +17,8 @@ STALL_MS = 10  # a write that took longer was an erase of the flash: to write a 
 
 
 class Recorder:
-    """keeper: where blocks are written, a RideRing or RideStream.  sample_hz: the chip's samples a second.
+    """keeper: where blocks are written, a RideRing (flash or SD card) or a RideStream (USB).  sample_hz: the chip's
+    samples a second.
 
     active: True while a ride is being recorded.
     problem: None, or a CardError or Notice: why the recording ended by itself; take_problem() clears it.
@@ -88,7 +89,7 @@ class Recorder:
         stalled, self._stalled = self._stalled, False
         return stalled
 
-    def interrupt(self):
+    def mark_gap(self):
         """Say that the chip was started again: the next turn does not follow on from the one before."""
         self._interrupted = True
 
@@ -152,7 +153,7 @@ class Recorder:
         if room is None:
             return None
         if not self._bytes:
-            return room // 1024
+            return room // 1024  # assume 1 KB/s until the first block is measured
         return room * self.seconds() // self._bytes
 
     def _begin_block(self):

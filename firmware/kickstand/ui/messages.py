@@ -61,16 +61,16 @@ no-speed|No speed|GPS or wheel?
 not-driven|Not driven yet|Brake straight
 not-stopped|Not stopped yet|Stand for {0:.0f} s
 few-events|Brake straight|{0} of {1} done
-parts-differ|Parts differ|by {0:.0f}\xdf: go on
+parts-differ|Brakings differ|{0:.0f}\xdf: drive on
 uncertain|Only +-{0:.1f}\xdf|Brake straight
 
-other-side|Stand was right?|hold = fix
+other-side|Side was wrong?|hold = fix
 mount-moved|Mount has moved|Align again
-side-fixed|Side put right|Ride safely
+side-fixed|Side corrected|Set SIDE too
 aligned|Aligned by drive|error about {0:.1f}\xdf
 """
 # In place of the lean while there is a doubt about the alignment
-_DOUBTS = {"other-side": "stand was right?", "mount-moved": "mount has moved"}
+_DOUBTS = {"other-side": "side was wrong?", "mount-moved": "mount has moved"}
 _OTHER_SETTING = "config.py: wrong|{0}"  # the display names it, the console tells what is wrong with it
 
 

@@ -1,4 +1,5 @@
-"""The pages, which a short press turns. A page is a function in pages.py; to add one, name it in MOTORCYCLE or CAR."""
+"""The pages, which a short press turns. A page is a function in pages.py. To add one called load, add
+pages.load to MOTORCYCLE or CAR, and a row to the table of pages in firmware/README.md."""
 
 from ..board.button import SHORT
 from ..lean.meter import FALLEN_DEG

@@ -30,15 +30,15 @@ class Screen:
         problem = self._app.recorder.take_problem()
         if problem:
             self._notice.show(messages.lines(problem), now_ms)
-        return self._front(now_ms)[1]
+        return self._update_front(now_ms)[1]
 
     def press(self, event, now_ms):
         """event: SHORT or LONG. A long press that the view in front has no use for opens the menu."""
-        view = self._front(now_ms)[0]
-        if view is self._notice:  # nobody waits two seconds: the press is for what the notice covers,
+        view = self._update_front(now_ms)[0]
+        if view is self._notice:  # the press dismisses the notice, and goes to the view below it,
             self._notice.press(event, now_ms)
-            view = self._front(now_ms)[0]
-            if view is self._question:  # unless that is a question, which has not been read yet
+            view = self._update_front(now_ms)[0]
+            if view is self._question:  # except to a question, which has not been seen yet
                 return
         if not view.press(event, now_ms) and event == LONG:
             self._menu = Menu(self._entries(), now_ms)
@@ -49,13 +49,14 @@ class Screen:
         self._pages.add(page)
 
     def interrupt(self, now_ms):
-        """The sensor has failed: a calibration under way is broken off."""
+        """The sensor has failed: a calibration under way is cancelled."""
         if self.wizard:
             self.wizard = None
             self._notice.show(("Calibration", "stopped: fault"), now_ms)
 
-    def _front(self, now_ms):
-        """The view in front and its two lines: the first in this order that has something to show."""
+    def _update_front(self, now_ms):
+        """Return the view in front and its two lines: the first in this order that has something to show. Drop a
+        wizard or menu that has ended, and go back to the first page when a question is shown."""
         for view in (
             self._notice,
             self.wizard,

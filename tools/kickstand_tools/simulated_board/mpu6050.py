@@ -26,7 +26,7 @@ class Mpu6050:
         self.clock_error = 0.0
         self._override = None
         self.who_am_i = who_am_i
-        self._variant = reg.VARIANTS.get(who_am_i, reg.VARIANTS[0x68])
+        self._variant = reg.VARIANTS.get(who_am_i, reg.VARIANTS[0x68])  # a chip unknown to the driver too
         self.fifo = Fifo(self._variant.fifo_bytes)
         self._regs = bytearray(128)
         self._pointer = 0

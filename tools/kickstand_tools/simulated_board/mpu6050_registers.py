@@ -27,14 +27,14 @@ Variant = namedtuple(
     "Variant",
     ("power_after_reset", "counts_per_c", "zero_c", "has_accel_config2", "fifo_bytes", "temperature_in_fifo"),
 )
-VARIANTS = {  # by WHO_AM_I
+VARIANTS = {  # by WHO_AM_I, the same ones as in CHIPS of firmware/kickstand/imu/mpu6050.py
     0x68: Variant(0x40, 340.0, 36.53, False, 1024, False),  # MPU6050
     0x70: Variant(0x01, 333.87, 21.0, True, 512, False),  # MPU6500
     0x71: Variant(0x01, 333.87, 21.0, True, 512, False),  # MPU9250
     0x72: Variant(0x01, 333.87, 21.0, True, 512, False),  # MPU6500 clone
     0x73: Variant(0x01, 333.87, 21.0, True, 512, False),  # MPU9255
     0x74: Variant(0x01, 333.87, 21.0, True, 512, False),  # MPU6515
-    0x78: Variant(0x40, 333.87, 21.0, True, 512, False),  # MPU6880
+    0x78: Variant(0x40, 333.87, 21.0, True, 512, False),  # MPU6500 clone
     0x98: Variant(0x40, 326.8, 25.0, True, 512, False),  # ICM20689
     0x19: Variant(0x40, 326.8, 25.0, True, 1024, True),  # MPU6886
 }

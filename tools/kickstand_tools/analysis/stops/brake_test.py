@@ -8,7 +8,10 @@ ve = 0.1 v0 in km/h, and sb and se the distances in metres from there to vb and 
 At the standstill the force tells the slope of the road, and the gyro's readings are its bias. From there speed and
 pitch are integrated backwards, so that the dive of the fork is not taken for braking:
 
-    dq/dt = w_y sin t - w_x cos t,   dv/dt = f_z - g sin q       (as in kickstand.lean.lean_filter)
+    dq/dt = w_y sin t - w_x cos t,   dv/dt = f_z - g sin q       (as in kickstand.lean.bike_model)
+
+with lean t (> 0 to the right), pitch q (nose up), speed v, rates w and specific force f along left (x), up (y) and
+forward (z).
 
 Where the log has a speed, the integrated one is fitted to it (speed_fit.py). Elsewhere it has to be plausible
 (plausible.py).
