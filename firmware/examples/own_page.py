@@ -10,7 +10,7 @@ Press the button until the new page comes, after the last of the usual ones:
     Lean  40° right
 
 `mpremote reset` starts the lean meter without it. To keep the page, put the function into kickstand/ui/pages.py, add
-`pages.load` to MOTORCYCLE in kickstand/ui/page_stack.py and a row to the table of pages in firmware/README.md, and
+`pages.load` to MOTORCYCLE in kickstand/ui/page_ring.py and a row to the table of pages in firmware/README.md, and
 flash again.
 """
 

@@ -8,7 +8,7 @@ and you see the lean, positive to the right, and the acceleration along the bike
 
     lean  +23.4 deg   forward -0.12 g
 
-Ctrl-C stops the printing; `mpremote reset` starts the lean meter again.
+Ctrl-C ends mpremote; the program runs on until `mpremote reset`, which starts the lean meter again.
 """
 
 from time import sleep_ms

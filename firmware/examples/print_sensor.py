@@ -9,7 +9,7 @@ and you see acceleration, turning rate and temperature, the first two along the 
     -0.01  +0.02  +1.01 g     +0.3   -1.2   +0.1 deg/s   25.3 C
 
 At rest the axis that points up shows about 1 g, and all three rates are small. The values are not calibrated.
-Ctrl-C stops the printing; `mpremote reset` starts the lean meter again.
+Ctrl-C ends mpremote; the program runs on until `mpremote reset`, which starts the lean meter again.
 """
 
 from time import sleep_ms

@@ -44,4 +44,4 @@ def _open_bus(settings, name):
     try:
         return i2c_bus.open_i2c(controller, sda, scl, getattr(settings, name + "_BUS_HZ"))
     except ValueError as error:
-        raise SettingsError("not-i2c-pins", name + "_SDA / SCL", name, sda, scl, controller, str(error))
+        raise SettingsError("i2c-pins", name + "_SDA / SCL", name, sda, scl, controller, str(error))

@@ -118,7 +118,7 @@ class Settings:
             setattr(self, name, value)
         for name in dir(config) if config else ():
             if name not in _TABLE and (name.isupper() or name.upper() in _TABLE):
-                raise SettingsError("unknown-setting", name)
+                raise SettingsError("no-setting", name)
         self.one_bus = (self.SENSOR_SDA, self.SENSOR_SCL) == (self.LCD_SDA, self.LCD_SCL)
         if self.one_bus:  # the display's PCF8574 is made for 100 kHz, and sets the speed of a bus that it shares
             self.LCD_I2C = self.SENSOR_I2C
@@ -130,8 +130,8 @@ class Settings:
         names = ("BUTTON_PIN", "SENSOR_SDA", "SENSOR_SCL") + (() if self.one_bus else ("LCD_SDA", "LCD_SCL"))
         names += _SPEED_PINS[self.SPEED] + (() if None in card else SD_PINS)
         if len({getattr(self, name) for name in names}) != len(names):
-            raise SettingsError("pin-used-twice", "", ", ".join(names))
+            raise SettingsError("pin-twice", "", ", ".join(names))
         if not self.one_bus and self.SENSOR_I2C == self.LCD_I2C:
-            raise SettingsError("same-controller", "LCD_I2C", self.LCD_I2C)
+            raise SettingsError("one-i2c", "LCD_I2C", self.LCD_I2C)
         if self.VEHICLE == "car" and self.SPEED is None:
             raise SettingsError("needs-speed", "SPEED")

@@ -57,7 +57,7 @@ def run(chosen, lcd):
         raise
     except ImportError as error:  # after an update that was broken off: to restart would not help
         port.rest_watchdog()
-        print("Kickstand stopped. Its firmware is incomplete (%s): kickstand flash completes it." % error)
+        print("Kickstand stopped: incomplete firmware (%s). Run kickstand flash." % error)
         tell(lcd, "Incomplete:", "flash it again")
     except Exception as error:
         sys.print_exception(error)

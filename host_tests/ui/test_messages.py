@@ -56,7 +56,7 @@ def test_each_code_has_words_for_the_display():
 
 
 # Of these the display names the setting
-OTHER_SETTINGS = {"not-allowed", "card-pins", "same-controller", "no-such-pin", "not-i2c-pins", "not-uart-pins"}
+OTHER_SETTINGS = {"not-allowed", "card-pins", "one-i2c", "no-such-pin", "i2c-pins", "uart-pins"}
 
 
 def test_other_settings_are_named():

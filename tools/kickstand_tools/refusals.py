@@ -44,7 +44,7 @@ _SENTENCES = {
 _MOVED = {
     "between-stops": "two stops differ by over {0:.0f} degrees",
     "vertical": "the vertical changed by {0:.0f} degrees during the drive",
-    "vertical-in-parts": "the vertical is no longer where it was",
+    "parts": "the vertical is no longer where it was",
     "since-standing": "standing and driving differ by {0:.0f} degrees",
     "since-upright": "the upright pose and driving differ by {0:.0f} degrees",
     "forward": "forward is no longer where it was",

@@ -19,7 +19,7 @@ def mount(settings):
         card = port.open_sd_card(settings.SD_SPI, *[Pin(pin) for pin in pins])
         os.mount(card, MOUNT)
     except ImportError:
-        raise CardError("no-card-driver")
+        raise CardError("no-driver")
     except (OSError, ValueError) as error:
         raise CardError("no-card", str(error))
     return MOUNT

@@ -127,7 +127,7 @@ class DrivingQuality:
         if problem is not None:
             return problem
         if self._vertical.is_car and (parts.roll_deg > ROLL_DEG or parts.pitch_deg > PITCH_DEG):
-            return AlignmentError("mount-moved", "vertical-in-parts")
+            return AlignmentError("mount-moved", "parts")
         if self._is_last_event_off() or (parts.forward_deg > MOVED_DEG and parts.sigmas > STAY_AGREE_SIGMAS):
             return AlignmentError("mount-moved", "forward")
         return None

@@ -64,7 +64,6 @@ _NAME = const(0)
 _LSB_PER_C = const(1)
 _ZERO_C = const(2)
 _HAS_ACCEL_CONFIG2 = const(3)
-_FIFO_BYTES = const(4)
 _FIFO_EN_BITS = const(5)
 
 MAX_FRAMES = 8  # read in one transfer, to catch up: 3 ms at 400 kHz
@@ -135,7 +134,8 @@ class Mpu6050:
             raise OSError("MPU6050 WHO_AM_I reads differently each time")
         if self.who_am_i not in CHIPS and self.who_am_i != self._accept:
             raise UnknownChip(self.who_am_i)
-        self._full = self._chip()[_FIFO_BYTES] - FRAME
+        _, _, _, _, fifo_bytes, _ = self._chip()
+        self._full = fifo_bytes - FRAME
         return self.who_am_i
 
     def setup(self):

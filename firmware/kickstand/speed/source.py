@@ -75,7 +75,7 @@ def _open_uart(settings):
         )
     except ValueError as error:
         pins = settings.GPS_TX, settings.GPS_RX
-        raise SettingsError("not-uart-pins", "GPS_TX / GPS_RX", *pins, settings.GPS_UART, str(error))
+        raise SettingsError("uart-pins", "GPS_TX / GPS_RX", *pins, settings.GPS_UART, str(error))
 
 
 def _open_wheel_pin(settings):

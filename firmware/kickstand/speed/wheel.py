@@ -94,4 +94,4 @@ class Wheel:
 
     def fault(self, now_ms):
         """None, or a Notice: a wheel that has never turned may be a wire that is loose."""
-        return Notice("wheel-no-pulse") if self._moved_ms is None else None
+        return Notice("no-pulse") if self._moved_ms is None else None

@@ -38,9 +38,9 @@ sensor-reset|Sensor reset|starting again
 gps-silent|GPS silent|check wiring
 gps-garbled|GPS garbled|check GPS_BAUD
 gps-no-fix|GPS: no fix|needs open sky
-wheel-no-pulse|Wheel: no pulse|ride, or wiring?
+no-pulse|Wheel: no pulse|ride, or wiring?
 
-no-card-driver|SD card:|no driver
+no-driver|SD card:|no driver
 no-card|No SD card|check card
 out-of-memory|Rec. stopped|no memory
 out-of-room|Rec. stopped|no room
@@ -49,8 +49,8 @@ card-fault|Rec. stopped|card fault
 usb-fault|Rec. stopped|USB
 
 unreadable|config.py:|cannot be read
-unknown-setting|config.py: what?|{0}
-pin-used-twice|config.py: wrong|pin used twice
+no-setting|config.py: what?|{0}
+pin-twice|config.py: wrong|pin used twice
 needs-speed|config.py: wrong|car needs SPEED
 
 speed-negative|Speed negative|Check its source

@@ -1,6 +1,6 @@
 """What each page says in two lines of 16 characters. A page is a function: meter in, two lines out.
 
-page_stack.py lists the pages that a short press turns.
+page_ring.py lists the pages that a short press turns.
 """
 
 from ..lean.formula import static_lean_deg

@@ -5,7 +5,7 @@ import gc
 from ..board.button import LONG
 from . import messages, pages
 from .menu import Menu
-from .page_stack import PageStack
+from .page_ring import PageRing
 from .views import FaultView, InfoView, NoticeView, QuestionView
 
 
@@ -23,7 +23,7 @@ class Screen:
         self._fault = FaultView(app.sensor)
         self._info = InfoView(app.sensor, app.meter)
         self._question = QuestionView(app.drive)
-        self._pages = PageStack(app, self._align_now)
+        self._pages = PageRing(app, self._align_now)
 
     def lines(self, now_ms):
         """What the display should say now. Call it about every 100 ms."""

@@ -9,7 +9,7 @@ MOTORCYCLE = (pages.lean, pages.maxima, pages.acceleration, pages.formula, pages
 CAR = (pages.acceleration, pages.cornering, pages.raw)
 
 
-class PageStack:
+class PageRing:
     """The page that is shown, as a view (see views.py). app: the App. align: called for a short press while there is no
     alignment: it means that the bike is on its kickstand."""
 
