@@ -46,12 +46,11 @@ def main():
 
 def run(chosen, lcd):
     """Run the app. An exception in it is reported on display and console, then the board restarts."""
-    # Here, because this takes half a second, in which the display already says "starting". And incomplete firmware ends
-    # at the prompt with an ImportError instead of restarting for ever.
-    from .app import App
-
-    print("Kickstand %s. Ctrl-C stops it." % __version__)
     try:
+        # Here, because this takes half a second, in which the display already says "starting".
+        from .app import App
+
+        print("Kickstand %s. Ctrl-C stops it." % __version__)
         App(chosen, lcd).run()
     except SettingsError:
         raise

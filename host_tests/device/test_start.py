@@ -1,0 +1,43 @@
+"""What main.py runs, when something is missing or broken."""
+
+import math
+import sys
+
+import pytest
+from kickstand import errors
+from kickstand_tools.simulated_board.simulator import Board
+
+
+@pytest.fixture
+def board(tmp_path, monkeypatch):
+    """A board with nothing in its flash."""
+    monkeypatch.chdir(tmp_path)
+    made = Board(lambda t_s: (0.002 * math.sin(700 * t_s), 0.0, 1.0, 0.0, 0.0, 0.0, 25.0))
+    with made:
+        yield made
+
+
+@pytest.mark.parametrize("module", ["kickstand.app", "kickstand.ui.align_wizard"])
+def test_incomplete_firmware_ends_at_the_prompt_and_says_so(module, board, monkeypatch, capsys):
+    """Not in restarts for ever: also where what is missing is only imported for the first press."""
+    from time import sleep_ms  # pyright: ignore[reportAttributeAccessIssue]
+
+    from kickstand import start
+
+    def use_the_console():
+        start.main()
+        sleep_ms(20_000)  # a watchdog that is not fed would reset the board
+
+    monkeypatch.setitem(sys.modules, module, None)
+    board.press(2.0)
+    assert board.run(use_the_console, 60.0) == "returned"
+    assert board.lcd.text() == ["Incomplete:     ", "flash it again  "]
+    assert "Run kickstand flash." in capsys.readouterr().out
+
+
+def test_a_report_that_cannot_be_worded_gives_its_code(monkeypatch, capsys):
+    """A flash or a heap that has failed may not give the words: that must not end the ride."""
+    errors.report(errors.StoreError("not-written", "EIO"))
+    monkeypatch.setitem(sys.modules, "kickstand.console", None)
+    errors.report(errors.StoreError("not-written", "EIO"))
+    assert capsys.readouterr().out == "calibration not saved: EIO; the old one is kept\nnot-written\n"

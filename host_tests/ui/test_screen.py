@@ -1,0 +1,115 @@
+"""The stack of views: what is in front is shown, a press is for it, and what has ended is gone at once."""
+
+import types
+
+import pytest
+from kickstand.errors import Notice
+from kickstand_tools.simulated_board.simulator import Board
+
+SHORT, LONG = 1, 2  # as in board/button.py
+
+
+class Recorder:
+    """Records nothing."""
+
+    active = False
+    problem = None
+
+    def take_problem(self):
+        problem, self.problem = self.problem, None
+        return problem
+
+
+class Drive:
+    """Alignment by driving that has a question, until it is answered."""
+
+    shown = False
+
+    def __init__(self):
+        self.message = None
+        self.answers = []
+
+    def answer(self, agreed):
+        self.answers.append(agreed)
+        self.message = None
+
+
+@pytest.fixture
+def app():
+    """An aligned motorcycle's App, as far as the screen asks it."""
+    settings = types.SimpleNamespace(VEHICLE="motorcycle", SAMPLE_HZ=200, SIDE="left")
+    chip = types.SimpleNamespace(accel_lsb_per_g=4096, gyro_lsb_per_dps=65.5, SATURATED=32700)
+    meter = types.SimpleNamespace(fallen=False, trusted=True, lean_deg=12.0, doubt=None, reset_maxima=lambda: None)
+    meter.max_left_deg = meter.max_right_deg = 0.0
+    return types.SimpleNamespace(
+        settings=settings,
+        sensor=types.SimpleNamespace(chip=chip, fault=None),
+        meter=meter,
+        calibration=types.SimpleNamespace(aligned=True, value=None),
+        drive=Drive(),
+        recorder=Recorder(),
+    )
+
+
+@pytest.fixture
+def screen(app):
+    """Its Screen, on a simulated board, for MicroPython's clock."""
+    with Board(lambda t_s: (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 25.0)):
+        from kickstand.ui.screen import Screen
+
+        yield Screen(app)
+
+
+def first_line(screen, now_ms):
+    return screen.lines(now_ms)[0]
+
+
+def test_a_cancelled_alignment_gets_no_more_samples(screen):
+    """Not even those of the 100 ms until the display is written again: the last one would save it."""
+    screen.press(LONG, 0)
+    screen.press(LONG, 100)
+    assert screen.wizard is not None
+    assert first_line(screen, 200) == "On the stand,"
+    screen.press(LONG, 300)
+    assert screen.wizard is None
+    assert first_line(screen, 300).startswith("Lean")
+
+
+def test_a_menu_that_is_left_is_gone_at_once(screen):
+    screen.press(LONG, 0)
+    for k in range(6):
+        screen.press(SHORT, 100 * k)
+    assert "Leave menu" in first_line(screen, 600)
+    screen.press(LONG, 700)
+    assert first_line(screen, 700).startswith("Lean")
+
+
+def test_a_press_is_for_what_a_notice_covers(app, screen):
+    app.recorder.problem = Notice("out-of-room", "28")
+    assert screen.lines(0) == ("Rec. stopped", "no room")
+    screen.press(SHORT, 100)
+    assert first_line(screen, 100).startswith("Max left")
+
+
+def test_a_question_under_a_notice_is_not_answered_unread(app, screen):
+    app.recorder.problem = Notice("out-of-room", "28")
+    app.drive.message = Notice("other-side")
+    assert screen.lines(0)[0] == "Rec. stopped"
+    screen.press(LONG, 100)
+    assert app.drive.answers == []
+    assert first_line(screen, 100) == "Side was wrong?"
+    screen.press(LONG, 200)
+    assert app.drive.answers == [True]
+
+
+def test_a_fault_is_before_the_pages_and_the_menu_before_the_fault(app, screen):
+    app.sensor.fault = Notice("sensor-lost")
+    assert screen.lines(0) == ("Sensor lost", "check wiring")
+    screen.press(SHORT, 100)
+    screen.press(LONG, 200)
+    assert "Align the bike" in first_line(screen, 200)
+    screen.press(LONG, 300)
+    assert screen.wizard is None
+    assert screen.lines(300) == ("Sensor lost", "check wiring")
+    app.sensor.fault = None
+    assert first_line(screen, 2400).startswith("Lean")
