@@ -14,18 +14,17 @@ from time import sleep_us, ticks_add, ticks_diff, ticks_ms, ticks_us
 from .board import port
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
-from .devices import open_button, open_sensor
+from .devices import open_button
 from .imu.mpu6050 import GYRO_DELAY_S
 from .imu.sample_clock import SampleClock
 from .lean.meter import LeanMeter
-from .rides.flash_ring import RideRing
-from .rides.recorder import Recorder
 from .ui.screen import Screen
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
 COLLECT_TURNS = 25  # in which 70 KB of heap are used: less than half of what is free
 SINGLE_GAPS = 300  # single free blocks that a collection leaves
 PAGE_MS = 100
+FIRST_PAGE_MS = 60  # from the start of the sensor: then the lean filter's first window is over
 
 
 def fill_gaps(n):
@@ -42,26 +41,28 @@ def fill_gaps(n):
 class App:
     """The lean meter on a board.
 
-    settings: a Settings. lcd: of devices.open_lcd(). keeper: where rides are recorded to (see Recorder), None for flash
-    or SD card; if one is given, recording begins with the first readings. Raises SettingsError for pins that cannot be
-    used.
+    settings: a Settings. lcd, sensor: of devices.open_lcd() and open_sensor(). keeper: where rides are recorded to (see
+    Recorder), None for flash or SD card; if one is given, recording begins with the first readings. Raises
+    SettingsError for pins that cannot be used.
+
+    recorder: a Recorder, or None before the first ride is recorded.
     """
 
-    def __init__(self, settings, lcd, keeper=None):
+    def __init__(self, settings, lcd, sensor, keeper=None):
         self.settings = settings
         self.lcd = lcd
         self.button = open_button(settings)
-        self.sensor = open_sensor(settings)
+        self.sensor = sensor
         self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle", GYRO_DELAY_S[settings.DLPF])
         self.calibration = ActiveCalibration(self.meter, self._calibration_changed)
         self.drive = self._open_drive() if settings.SPEED else None
-        self.recorder = Recorder(keeper or RideRing(settings), settings.SAMPLE_HZ)
+        self.recorder = None
+        self._keeper = keeper
         self.screen = Screen(self)
         self._clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self._restarts = 0
         self._record_due = settings.RECORD or keeper is not None
         self._page_ms = ticks_ms()
-        self._fault_shown = False
 
     def _open_drive(self):
         # 30 KB of heap with all that they import: not for a board without a speed source
@@ -75,7 +76,8 @@ class App:
         try:
             self._loop()
         except KeyboardInterrupt:
-            self.recorder.stop()
+            if self.recording:
+                self.recorder.stop()
             port.rest_watchdog()  # nothing feeds it from here on
             raise
 
@@ -114,8 +116,6 @@ class App:
         if self.sensor.fault is not None:
             self._clock.restart()
             self.screen.interrupt(now_ms)
-            if not self._fault_shown:
-                self._page_ms = now_ms  # at once: the next thing is to start the sensor again
         elif self.sensor.emptied:
             self._clock.emptied(now_us)
         event = self.button.poll(now_ms)
@@ -124,10 +124,15 @@ class App:
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self._show(now_ms)
         self.lcd.tick(now_ms)
-        if self.recorder.active:
+        if self.recording:
             self.recorder.tick()
-        if self.recorder.take_stall() and self.drive:
-            self.drive.speed.after_stall(ticks_ms())
+            if self.recorder.take_stall() and self.drive:
+                self.drive.speed.after_stall(ticks_ms())
+
+    @property
+    def recording(self):
+        """True while a ride is being recorded."""
+        return self.recorder is not None and self.recorder.active
 
     def record(self):
         """Begin to record a ride.
@@ -138,18 +143,30 @@ class App:
         """
         if self.meter.at_rest:
             self.calibration.restart()
+        if self.recorder is None:
+            self.recorder = self._open_recorder()
         self.recorder.start(self.sensor.chip, self.calibration.value)
+
+    def _open_recorder(self):
+        gc.collect()  # as before each import while the loop runs: what stays must not lie behind garbage
+        from .rides.recorder import Recorder
+
+        keeper = self._keeper
+        if keeper is None:
+            from .rides.flash_ring import RideRing
+
+            keeper = RideRing(self.settings)
+        return Recorder(keeper, self.settings.SAMPLE_HZ)
 
     def _poll_speed(self, now_ms):
         speed = self.drive.poll(now_ms)
-        if speed is not None and self.recorder.active:
+        if speed is not None and self.recording:
             self.recorder.add_speed(int(100 * speed + 0.5))
 
     def _show(self, now_ms):
         """Put the page as it is now onto the display. As often, and at standstill only, save the trim that riding has
         found."""
         self._page_ms = ticks_add(now_ms, PAGE_MS)
-        self._fault_shown = self.sensor.fault is not None
         line1, line2 = self.screen.lines(now_ms)
         self.lcd.show(line1, line2)
         if not self.screen.wizard:
@@ -163,7 +180,7 @@ class App:
             self._sensor_started()
         chip = self.sensor.chip
         self.meter.update_sum(chip.sums, n, dt_us)
-        if self.recorder.active:
+        if self.recording:
             self.recorder.add(chip.sums, n, dt_us)
         if self.drive:
             self.drive.feed(chip.sums, n, dt_us, now_ms)
@@ -179,13 +196,15 @@ class App:
     def _sensor_started(self):
         """The chip has been set up, for the first time or again after a fault; it may be another chip."""
         self.meter.restart()
-        self.recorder.mark_gap()
+        if self.recording:
+            self.recorder.mark_gap()
         if self.calibration.chip_started(self.sensor.chip) and self._record_due:
             self._record_due = False
             self.record()
+        self._page_ms = ticks_add(ticks_ms(), FIRST_PAGE_MS)  # no page that says no more than that there is no lean yet
 
     def _calibration_changed(self, replaced):
-        if self.recorder.active:  # a ride has one calibration
+        if self.recording:  # a ride has one calibration
             self.recorder.start(self.sensor.chip, self.calibration.value)
         if replaced:
             self.meter.reset_maxima()

@@ -116,6 +116,8 @@ def run_device(plan):
             while end == "reset":
                 end = board.run(start.main, until_s)
                 ends.append(end)
+        if ends[-1] == "returned":  # with power on: what stays on the display
+            watch()
         settings.load = load
     finally:
         board.uninstall()

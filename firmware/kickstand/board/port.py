@@ -10,7 +10,7 @@ import machine
 
 # Collect garbage often while the other modules are loaded. Else their garbage would push what stays to the far end of
 # the heap, and every later collection would have to walk all of it. App resets the threshold before its loop begins.
-gc.threshold(32_768)
+gc.threshold(49_152)
 
 IS_ESP32 = sys.platform == "esp32"
 

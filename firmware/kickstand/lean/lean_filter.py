@@ -14,7 +14,18 @@ from math import atan2, degrees, pi, sin, sqrt
 
 from ..units import STANDARD_GRAVITY
 from . import measurements
-from .bike_model import BIAS_LEFT, LEAN, MAX_PITCH, PITCH, SPEED, STATES, YAW_ERROR, Linearisation, predict
+from .bike_model import (
+    BALANCE_SIGMA,
+    BIAS_LEFT,
+    LEAN,
+    MAX_PITCH,
+    PITCH,
+    SPEED,
+    STATES,
+    YAW_ERROR,
+    Linearisation,
+    predict,
+)
 from .kalman import Covariance
 from .rest import MAX_BIAS_RADPS, RestDetector
 from .upright_trim import UprightTrim
@@ -172,7 +183,8 @@ class LeanFilter:
     def _process(self, means, seconds, roll_acceleration):
         """Linearise, update and inject for one window; a generator of short pieces."""
         p = self._p
-        model = Linearisation(self._x, means[2:5], means[7])
+        known = p.rows[LEAN][LEAN] < BALANCE_SIGMA**2
+        model = Linearisation(self._x, means[2:5], means[7], known)
         yield
         noise = measurements.NOISE_ANGLE**2 * seconds
         yield from p.propagate_row(LEAN, model.lean_row, seconds, noise)

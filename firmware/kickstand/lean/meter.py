@@ -4,7 +4,6 @@ from math import degrees, radians
 
 from ..calibration.transform import Transform
 from ..units import GAP_US
-from .formula import formula_lean_deg
 from .lean_filter import DELAY_S, LeanFilter
 
 SMOOTH_US = 300_000  # time constant of the g shown
@@ -115,6 +114,8 @@ class LeanMeter:
     @property
     def lean_formula_deg(self):
         """Nicolae's lean of the last reading alone."""
+        from .formula import formula_lean_deg  # one page shows it
+
         return formula_lean_deg(self.force, self.rate[1])
 
     def measure_speed(self, speed_mps):
