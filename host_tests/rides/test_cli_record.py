@@ -14,9 +14,8 @@ import command
 import fake_board
 import pytest
 import ride_writer
-from kickstand_tools.deploy import connection
+from kickstand_tools.deploy import board_console, connection
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.rides import record
 from serial.tools import list_ports
 from watched import Watched, watched
 
@@ -35,9 +34,9 @@ class Stream(fake_board.Serial):
         if not self.data and self.end:
             end, self.end = self.end, None
             if end == "ctrl-c":
-                os.kill(os.getpid(), signal.SIGINT)
+                signal.raise_signal(signal.SIGINT)
             elif isinstance(end, signal.Signals):
-                os.kill(os.getpid(), end)
+                signal.raise_signal(end)
             elif end == "error":
                 self.data = b"\x04Traceback (most recent call last):\r\nValueError: bad pin\r\n\x04>"
             elif end == "unplug":
@@ -65,7 +64,13 @@ def _said(block):
 
 @pytest.fixture
 def streaming(tmp_path, monkeypatch):
-    """streaming(blocks, end): a board that streams them."""
+    """streaming(blocks, end): a board that streams them. Only waiting for it takes time."""
+    waited_s = [0.0]
+
+    def sleep(seconds):
+        waited_s[0] += seconds
+
+    clock = types.SimpleNamespace(monotonic=lambda: waited_s[0], sleep=sleep)
 
     def fit(blocks, end, last=b""):
         board = Streaming(tmp_path)
@@ -74,7 +79,7 @@ def streaming(tmp_path, monkeypatch):
         monkeypatch.setattr(list_ports, "comports", lambda: [pico])
         monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: board)
         monkeypatch.setattr(connection, "_RESTART_S", 0)
-        monkeypatch.setattr(record, "_SILENT_S", 0.2)
+        monkeypatch.setattr(board_console, "time", clock)
         return board
 
     return fit
@@ -84,29 +89,33 @@ def half_seconds(count):
     return ride_writer.blocks(count, length=lambda _: 512)
 
 
-def test_ctrl_c_ends_a_whole_log(streaming, tmp_path):
+@pytest.fixture
+def signals():
+    """Whatever a test leaves of them is put right; by default these would end pytest itself."""
+    numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    before = [signal.signal(number, lambda *_: None) for number in numbers]
+    yield
+    for number, handler in zip(numbers, before):
+        signal.signal(number, handler)
+
+
+@pytest.mark.parametrize("before", [signal.default_int_handler, signal.SIG_IGN], ids=["shell", "background"])
+@pytest.mark.usefixtures("signals")
+def test_ctrl_c_ends_a_whole_log(before, streaming, tmp_path):
+    """Also where a shell has started it with the signal ignored; it is left as it was found."""
+    signal.signal(signal.SIGINT, before)
     data, turns = half_seconds(9)
     board = streaming(data[:-1], "ctrl-c", _said(data[-1]))
     result = command.works("record", "--out", tmp_path / "ride.csv")
     assert result.err == ""
-    assert board.serial.written == b"\x03"
+    assert board.serial.written == b"\x03\x01"
     assert board.resets == 1
     log = read_log(tmp_path / "ride.csv")
     assert len(log.time_us) == len(turns)  # what the board said after Ctrl-C is in it
     assert log.time_us[-1] == sum(dt for _, _, dt in turns) - turns[0][2]
     cal = json.loads((tmp_path / "ride.cal.json").read_text())
     assert cal["accel_slope"] == pytest.approx([1.01, 0.99, 1.0])
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-
-
-@pytest.fixture
-def signals():
-    """Whatever a failing test leaves of them is put right; by default these two would end pytest itself."""
-    numbers = [signal.SIGTERM, signal.SIGHUP]
-    before = [signal.signal(number, lambda *_: None) for number in numbers]
-    yield
-    for number, handler in zip(numbers, before):
-        signal.signal(number, handler)
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals are of Unix")
@@ -117,7 +126,7 @@ def test_kill_and_a_closed_terminal_end_it_as_ctrl_c_does(name, streaming, tmp_p
     board = streaming(data, signal.Signals[name])
     result = command.works("record", "--out", tmp_path / "ride.csv")
     assert result.err == ""
-    assert board.serial.written == b"\x03"
+    assert board.serial.written == b"\x03\x01"
     assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
     assert sorted(command.snapshot(tmp_path)) == [str(tmp_path / name) for name in ("ride.cal.json", "ride.csv")]
 

@@ -7,8 +7,9 @@ from typing import Any
 
 from mpremote.transport_serial import SerialTransport
 
-_CTRL_C = b"\x03"
+_CTRL_A, _CTRL_C = b"\x01", b"\x03"
 _END = b"\x04"  # of the program's output, and of its error
+_PROMPT = b">"  # after both
 _LAST_S = 10.0  # for what the program still prints after Ctrl-C
 _POLL_S = 0.01
 
@@ -29,7 +30,7 @@ def lines(
     said = b""
     asked_s = None
     heard_s = time.monotonic()
-    while said.count(_END) < 2:
+    while said.count(_END) < 2 or not said.endswith(_PROMPT):
         if stopped and stopped.is_set() and asked_s is None:
             asked_s = time.monotonic()
             serial.write(_CTRL_C)
@@ -47,6 +48,7 @@ def lines(
         said = output + end + error
         for line in whole:
             yield line.strip()
+    serial.write(_CTRL_A)  # the prompt has been read with the rest, and mpremote waits for one: this brings it again
     error = said.split(_END)[1].decode(errors="replace").strip()
     if error and asked_s is None:
         raise BrokenOff(f"the board reports {error.rpartition(chr(10))[2].strip()}")
