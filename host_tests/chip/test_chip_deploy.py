@@ -25,10 +25,12 @@ class Emulating(threading.Thread):
         from kickstand_tools.emulator import emulate
         from kickstand_tools.emulator.pico import Pico
 
+        emulating = self
+
         class Limited(Pico):
-            def run(pico, seconds, between=None):
-                self.pico = pico
-                if pico.time_s > self.end_s:
+            def run(self, seconds, between=None):
+                emulating.pico = self
+                if self.time_s > emulating.end_s:
                     raise KeyboardInterrupt
                 super().run(seconds, between)
 

@@ -5,6 +5,7 @@ import errno
 import io
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from mpremote.transport import TransportError, TransportExecError
 from mpremote.transport_serial import SerialTransport
@@ -34,8 +35,8 @@ class _SlowBoard(SerialTransport):
 
     def read_until(self, min_num_bytes, ending, timeout=10, data_consumer=None, timeout_overall=None):
         """See SerialTransport."""
-        silence, overall = (limit and limit * _SLOWER for limit in (timeout, timeout_overall))
-        return super().read_until(min_num_bytes, ending, silence, data_consumer, overall)
+        limits: list[Any] = [limit and limit * _SLOWER for limit in (timeout, timeout_overall)]
+        return super().read_until(min_num_bytes, ending, limits[0], data_consumer, limits[1])
 
 
 @contextlib.contextmanager
