@@ -100,6 +100,11 @@ def run_device(plan):
     board.every(FRAME_S, watch)
     board.install()
     ends = []
+    # A board that poses as another one needs firmware that is imported on it
+    before = {}
+    for name in list(sys.modules) if board.poses else ():
+        if name.split(".")[0] == "kickstand":
+            before[name] = sys.modules.pop(name)
     try:
         from kickstand import settings, start
         from kickstand.settings import Settings
@@ -117,9 +122,18 @@ def run_device(plan):
                 end = board.run(start.main, until_s)
                 ends.append(end)
         settings.load = load
+        if ends[-1] == "returned":  # what it leaves on the display
+            watch()
     finally:
         board.uninstall()
-    return {"frames": frames, "ends": ends, "last": frames[-1][1:], "too_fast": board.too_fast}
+        sys.modules.update(before)
+    return {
+        "frames": frames,
+        "ends": ends,
+        "last": frames[-1][1:],
+        "too_fast": board.too_fast,
+        "touched": sorted(board.touched),
+    }
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from unittest import mock
 
 from .. import firmware_path
-from ..simulated_board.fakes import cpython
+from ..simulated_board.fakes import chips, cpython
 from .drawing import Drawing
 
 
@@ -16,6 +16,7 @@ class Board(NamedTuple):
 
     title: str
     port: str  # sys.platform
+    machine: str  # in chips.MACHINES
     pin_prefix: str  # before the GPIO number in a pin's name
     near: tuple[str, ...]
     far: tuple[str, ...]
@@ -26,6 +27,7 @@ class Board(NamedTuple):
 PICO = Board(
     "Raspberry Pi Pico",
     "rp2",
+    "pico",
     "GP",
     tuple("GP0 GP1 GND GP2 GP3 GP4 GP5 GND GP6 GP7 GP8 GP9 GND GP10 GP11 GP12 GP13 GND GP14 GP15".split()),
     tuple("VBUS VSYS GND 3V3_EN 3V3 VREF GP28 GND GP27 GP26 RUN GP22 GND GP21 GP20 GP19 GP18 GND GP17 GP16".split()),
@@ -34,6 +36,7 @@ PICO = Board(
 )
 ESP32 = Board(
     "ESP32-DevKitC",
+    "esp32",
     "esp32",
     "",
     tuple("GND 23 22 TX RX 21 GND 19 18 5 17 16 4 0 2 15 D1 D0 CLK".split()),
@@ -112,7 +115,8 @@ def _default_pins(board: Board) -> dict[str, dict[str, str]]:
     """{module: {pin of the module: name of the board's pin}}, from port.py as it is on this board."""
     cpython.supplement()
     machine = mock.patch.dict(sys.modules, machine=types.ModuleType("machine"))
-    with machine, mock.patch.object(sys, "platform", board.port):
+    named = mock.patch.object(sys.implementation, "_machine", chips.MACHINES[board.machine], create=True)
+    with machine, named, mock.patch.object(sys, "platform", board.port):
         port = runpy.run_path(str(firmware_path.PACKAGE / "board" / "port.py"))
 
     def name(number: int) -> str:
