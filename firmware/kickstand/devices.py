@@ -41,9 +41,7 @@ def _open_bus(settings, name):
     """A machine.I2C. name: "SENSOR" or "LCD", with which the names of its settings begin."""
     controller = getattr(settings, name + "_I2C")
     sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
-    if sda is None or scl is None:
-        raise SettingsError("no-pins", name + "_SDA", name + "_SDA, " + name + "_SCL", "")
     try:
         return i2c_bus.open_i2c(controller, sda, scl, getattr(settings, name + "_BUS_HZ"))
-    except ValueError as error:
+    except (ValueError, TypeError) as error:  # a Pico's Pin(None), where no pin is set, is a TypeError
         raise SettingsError("i2c-pins", name + "_SDA / SCL", name, sda, scl, controller, str(error))

@@ -9,7 +9,7 @@ from io import StringIO
 from .board import port
 from .board.hd44780 import ADDRESSES
 from .errors import SettingsError
-from .imu.mpu6050 import ACCEL_LSB_PER_G, BANDWIDTH_HZ, GYRO_LSB_PER_DPS
+from .imu.mpu6050 import ACCEL_LSB_PER_G, GYRO_LSB_PER_DPS, MIN_DLPF
 
 
 def _one_of(*choices):
@@ -24,7 +24,7 @@ def _whole(low, high):
 
 
 def _sample_rate(value):
-    return isinstance(value, int) and 50 <= value <= 200 and 1000 % value == 0
+    return isinstance(value, int) and value in MIN_DLPF
 
 
 def _addresses(value):
@@ -45,8 +45,7 @@ def _pin(value):
     return isinstance(value, int) and 0 <= value <= 48 and value not in port.USB_PINS
 
 
-_USB = ", not %d or %d, which are the chip's USB" % port.USB_PINS if port.USB_PINS else ""
-_PIN = _pin, "a number from 0 to 48" + _USB
+_PIN = _pin, "a number from 0 to 48, no pin of the chip's own USB"
 SD_PINS = ("SD_SCK", "SD_MOSI", "SD_MISO", "SD_CS")
 # The settings that name pins, for each speed source
 _SPEED_PINS = {None: (), "gps": ("GPS_TX", "GPS_RX"), "wheel": ("WHEEL_PIN",)}
@@ -155,6 +154,6 @@ class Settings:
             raise SettingsError("one-i2c", "LCD_I2C", self.LCD_I2C)
         if self.VEHICLE == "car" and self.SPEED is None:
             raise SettingsError("needs-speed", "SPEED")
-        if 2 * BANDWIDTH_HZ[self.DLPF] >= self.SAMPLE_HZ:  # what is faster would come out as a slow motion: aliasing
-            fitting = min(dlpf for dlpf in BANDWIDTH_HZ if 2 * BANDWIDTH_HZ[dlpf] < self.SAMPLE_HZ)
-            raise SettingsError("aliasing", "DLPF", self.DLPF, BANDWIDTH_HZ[self.DLPF], self.SAMPLE_HZ, fitting)
+        fitting = MIN_DLPF[self.SAMPLE_HZ]
+        if self.DLPF < fitting:  # the engine's vibration would come out as a slow motion
+            raise SettingsError("aliasing", "DLPF", self.DLPF, self.SAMPLE_HZ, fitting)

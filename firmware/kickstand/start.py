@@ -41,7 +41,7 @@ def main():
         print("Kickstand stopped. " + sentence(error))
         try:
             tell(lcd or open_lcd(error.settings), *lines(error))
-        except SettingsError:  # the display's own pins are wrong or not set: the console has said it
+        except SettingsError:  # the display's own pins are wrong, or not set, which Pin() refuses
             pass
     except KeyboardInterrupt:
         port.rest_watchdog()

@@ -23,6 +23,10 @@ if IS_ESP32:
     PIN_IRQ = {}  # further arguments of Pin.irq(): this port has soft interrupts only
     I2C_NUMBERED = False  # see open_i2c()
     SD_SPI = (2, 3)  # the slots of machine.SDCard that are SPI
+    # Those of the chip's own USB: driving one of them cuts the board off from the computer until BOOT is held
+    USB_PINS = {"S2": (19, 20), "S3": (19, 20), "C3": (18, 19), "C6": (12, 13), "H2": (26, 27)}.get(
+        MACHINE.split(" with ESP32")[-1].lstrip("-")[:2], ()
+    )
 else:  # Raspberry Pi Pico and Pico 2, and boards of other makers that have its pins and its name
     _KNOWN = sys.platform != "rp2" or "Pico" in MACHINE
     SENSOR_PINS, LCD_PINS, BUTTON_PIN = (4, 5), (6, 7), 15
@@ -30,15 +34,12 @@ else:  # Raspberry Pi Pico and Pico 2, and boards of other makers that have its 
     PIN_IRQ = {"hard": True}  # a soft interrupt is lost while the display is written to
     I2C_NUMBERED = True  # two buses need two numbers
     SD_SPI = (0, 1)  # the numbers of machine.SPI
+    USB_PINS = ()
 if not _KNOWN:  # these pins may be missing, or belong to what else is on the board
-    SENSOR_PINS = LCD_PINS = GPS_PINS = (None, None)
+    SENSOR_PINS = LCD_PINS = GPS_PINS = None, None
     BUTTON_PIN = WHEEL_PIN = None
     GPS_UART = 1
 
-# The pins of a chip's own USB: driving one of them cuts the board off from the computer until BOOT is held
-USB_PINS = {"S2": (19, 20), "S3": (19, 20), "C3": (18, 19), "C6": (12, 13), "H2": (26, 27)}.get(
-    MACHINE.split(" with ESP32")[-1].lstrip("-")[:2], ()
-)
 
 _SOFT_I2C_HZ = 250_000  # half a period of 2 us: at 400 kHz SoftI2C's would be 1 us, and the MPU6050 needs 1.3
 _WATCHDOG_MS = 8000  # rp2 allows 8388 at most

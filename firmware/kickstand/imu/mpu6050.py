@@ -43,7 +43,7 @@ _FIFO_RESET = const(0x04)  # in USER_CTRL
 
 ACCEL_LSB_PER_G = {2: 16384, 4: 8192, 8: 4096, 16: 2048}  # counts per g for each range in g (p. 29)
 GYRO_LSB_PER_DPS = {250: 131.0, 500: 65.5, 1000: 32.8, 2000: 16.4}  # counts per deg/s for each range in deg/s (p. 31)
-BANDWIDTH_HZ = {1: 188, 2: 98, 3: 44, 4: 21, 5: 10, 6: 5}  # by dlpf, the wider of accelerometer and gyro (p. 13)
+MIN_DLPF = {50: 4, 100: 3, 125: 3, 200: 2}  # by rate_hz: passes less than half of it, 98, 44 or 21 Hz (p. 13)
 GYRO_DELAY_S = {1: 0.0019, 2: 0.0028, 3: 0.0048, 4: 0.0083, 5: 0.0134, 6: 0.0186}  # by dlpf (p. 13)
 
 # The chips known to work, by WHO_AM_I: a name of at most 12 characters; temperature counts per degree C; degrees C at 0

@@ -3,21 +3,19 @@
 import sys
 
 
-class Implementation:
-    """sys.implementation. machine: as chips.MACHINES."""
-
-    def __init__(self, machine):
-        self.name = sys.implementation.name
-        self.version = sys.implementation.version
-        self._machine = machine
+class _Namespace:
+    """What MicroPython takes for a module."""
 
 
-class Sys:
-    """The module. port: its platform."""
-
-    def __init__(self, port, machine):
-        for name in dir(sys):
-            if name not in ("__class__", "__dict__", "__doc__"):
-                setattr(self, name, getattr(sys, name))
-        self.platform = port
-        self.implementation = Implementation(machine)
+def posing(port, machine):
+    """A module sys. port: its platform.  machine: its implementation._machine, as in chips.MACHINES."""
+    module = _Namespace() if sys.implementation.name == "micropython" else type(sys)("sys")
+    for name in dir(sys):
+        if not name.startswith("__"):
+            setattr(module, name, getattr(sys, name))
+    module.platform = port
+    module.implementation = _Namespace()
+    module.implementation.name = sys.implementation.name
+    module.implementation.version = sys.implementation.version
+    module.implementation._machine = machine
+    return module

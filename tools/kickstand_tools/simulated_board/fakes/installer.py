@@ -21,7 +21,7 @@ class Installer:
         fake_time.use(board.clock, board.clock.now_us)
         self._replace("machine", fake_machine)
         if board.poses:
-            self._replace("sys", fake_sys.Sys(board.port, board.machine))
+            self._replace("sys", fake_sys.posing(board.port, board.machine))
         if sys.implementation.name == "micropython":
             self._replace("time", fake_time)
             self._replace("os", fake_os)
