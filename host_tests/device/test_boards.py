@@ -58,6 +58,15 @@ def test_a_display_with_wrong_pins_leaves_the_others_alone(wrong, tmp_path, caps
     assert set(record.touched) <= {6, 7, 10}
 
 
+@pytest.mark.parametrize("machine", ["pico", "esp32", "xiao rp2040"])
+@pytest.mark.parametrize("wrong", ["LCD_SDA", "LCD_SCL"])
+def test_a_wrong_pin_is_not_replaced_by_the_usual_one(machine, wrong, tmp_path, capsys):
+    config = {"LCD_SDA": 2, "LCD_SCL": 3, wrong: "GP2"}
+    record = devices.run("cpython", tmp_path, {"board": {"machine": machine}, "config": config, "until": 3}, capsys)
+    assert f"Kickstand stopped. config.py: {wrong} = 'GP2'" in record.console
+    assert set(record.touched) <= {2, 3}
+
+
 def test_a_refusal_is_shown_on_a_board_with_usual_pins(tmp_path, capsys):
     plan = {"board": {"machine": "pico"}, "config": {"SENSOR_SDA": 5}, "until": 3}  # a pin that is used twice
     record = devices.run("cpython", tmp_path, plan, capsys)
