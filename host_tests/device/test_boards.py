@@ -1,9 +1,12 @@
 """The whole device on boards other than a Pico: their pins, and how the I2C of each behaves."""
 
+import sys
+
 import devices
 import pytest
 from engines import ENGINES
 from kickstand_tools.simulated_board.fakes import chips
+from kickstand_tools.simulated_board.simulator import Board
 
 PINS = {"SENSOR_SDA": 4, "SENSOR_SCL": 5, "LCD_SDA": 6, "LCD_SCL": 7, "BUTTON_PIN": 10}
 WIRED = {"sensor_pins": [4, 5], "lcd_pins": [6, 7], "button_pin": 10}
@@ -118,3 +121,21 @@ def test_a_device_that_hangs_on_an_esp32_is_freed(bits, engine, tmp_path):
     assert record.first("Raw   3[1-5]°", 3.2) < 4.0
     shown = {int(line[5:8]) for t_s, line, _ in record.frames if t_s > 1.0 and line.startswith("Raw")}
     assert shown <= set(range(25, 36))  # never what was read meanwhile
+
+
+def test_status_says_which_pins_are_missing(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for name in [name for name in sys.modules if name.split(".")[0] == "kickstand"]:
+        monkeypatch.delitem(sys.modules, name)
+    board = Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine="s3")
+    with board:
+        from kickstand import status_report
+
+        assert board.run(status_report.report, 5.0) == "returned"
+    loaded = [name for name in sys.modules if name.split(".")[0] == "kickstand"]
+    for name in loaded:
+        sys.modules.pop(name)
+    names = "BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL"
+    said = capsys.readouterr().out
+    assert f"Settings     config.py: no usual pins are known for this board ({board.machine}): set {names}" in said
+    assert board.touched == set()

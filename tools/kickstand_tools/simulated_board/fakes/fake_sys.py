@@ -9,13 +9,14 @@ class _Namespace:
 
 def posing(port, machine):
     """A module sys. port: its platform.  machine: its implementation._machine, as in chips.MACHINES."""
-    module = _Namespace() if sys.implementation.name == "micropython" else type(sys)("sys")
-    for name in dir(sys):
-        if not name.startswith("__"):
-            setattr(module, name, getattr(sys, name))
-    module.platform = port
-    module.implementation = _Namespace()
-    module.implementation.name = sys.implementation.name
-    module.implementation.version = sys.implementation.version
-    module.implementation._machine = machine
-    return module
+    real = {name: getattr(sys, name) for name in dir(sys) if not name.startswith("__")}
+    of = sys.implementation
+    implementation = _filled(_Namespace(), {"name": of.name, "version": of.version, "_machine": machine})
+    module = _Namespace() if of.name == "micropython" else type(sys)("sys")
+    return _filled(_filled(module, real), {"platform": port, "implementation": implementation})
+
+
+def _filled(made, attributes):
+    for name, value in attributes.items():
+        setattr(made, name, value)
+    return made

@@ -13,6 +13,8 @@ _LEGACY_MS = 100  # for each byte that the legacy driver of an ESP32 waits, and 
 class _Controller:
     """The common part of I2C and SoftI2C. freq in Hz, timeout in us."""
 
+    _NO_DEVICE = errno.ENODEV
+
     def __init__(self, scl, sda, freq, timeout):
         self._bus = current.board.bus_on(Pin(sda).id, Pin(scl).id, freq)
         self._clock = current.board.clock
@@ -113,8 +115,6 @@ class _Controller:
 class SoftI2C(_Controller):
     """machine.SoftI2C, in software on any two pins. It does not look whether SDA is held: the clocks of a transfer let
     the device that holds it finish its byte, and the zeros that it sends meanwhile pass for answers."""
-
-    _NO_DEVICE = errno.ENODEV
 
     def __init__(self, scl, sda, freq=400000, timeout=50000):
         super().__init__(scl, sda, freq, timeout)
