@@ -56,7 +56,8 @@ def flash(port: str | None, replace_config: bool = False, progress: Progress | N
         try:
             if config:
                 names = "(lambda s: (s.platform, getattr(s.implementation, '_machine', '')))(__import__('sys'))"
-                config_check.refuse_faulty(config, *transport.eval(names))
+                platform, machine = transport.eval(names)
+                config_check.refuse_faulty(config, str(platform), str(machine))
             wanted, why_sources = _contents(transport)
             wanted[CONFIG] = source.read_bytes()
             update = prepare(transport, wanted, replace_config)
