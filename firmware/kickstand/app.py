@@ -15,7 +15,6 @@ from .board import port
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
 from .devices import open_button, open_sensor
-from .imu.mpu6050 import GYRO_DELAY_S
 from .imu.sample_clock import SampleClock
 from .lean.meter import LeanMeter
 from .rides.flash_ring import RideRing
@@ -52,7 +51,7 @@ class App:
         self.lcd = lcd
         self.button = open_button(settings)
         self.sensor = open_sensor(settings)
-        self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle", GYRO_DELAY_S[settings.DLPF])
+        self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle", self.sensor.chip.gyro_delay_s)
         self.calibration = ActiveCalibration(self.meter, self._calibration_changed)
         self.drive = self._open_drive() if settings.SPEED else None
         self.recorder = Recorder(keeper or RideRing(settings), settings.SAMPLE_HZ)

@@ -13,6 +13,8 @@ unreadable|config.py cannot be read ({1}{2}): mend it, then kickstand flash --co
 not-allowed|config.py: {0} = {1!r}, but it must be {2}
 no-setting|config.py: {0} is not a setting; see the list in that file
 card-pins|config.py: an SD card needs all of {1}
+no-pins|config.py: no usual pins are known for this board ({2}): set {1}
+aliasing|config.py: DLPF = {1} lets vibration alias at SAMPLE_HZ = {2}: set DLPF = {3} or higher
 pin-twice|config.py: a pin is used twice among {1}
 one-i2c|config.py: SENSOR_I2C and LCD_I2C are both {1} on different pins; give each its own
 needs-speed|config.py: VEHICLE = "car" needs a speed source to be aligned: SPEED = "gps" or "wheel"

@@ -65,4 +65,8 @@ class CardError(Refusal):
 
 
 class SettingsError(Refusal):
-    """A value in config.py that cannot be used. values[0]: the name of the setting."""
+    """A value in config.py that cannot be used. values[0]: the name of the setting.
+
+    settings: of an error that settings.load() raises, the Settings with what is right, to open the display with."""
+
+    settings = None

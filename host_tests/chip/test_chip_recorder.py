@@ -62,6 +62,7 @@ class Settings:
     SD_SPI = None
 class Chip:
     who_am_i, accel_range_g, accel_lsb_per_g, gyro_lsb_per_dps = 0x68, 8, 4096, 65.5
+    gyro_delay_s = 0.0048
     counts = [0] * 7
     def temperature_c(self, counts):
         return 25.0

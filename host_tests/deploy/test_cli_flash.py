@@ -58,7 +58,7 @@ def test_an_empty_board_gets_everything_and_starts(board):
     assert board.written[-1] == "/main.py"  # cut off half-way, an old main.py never meets new parts of itself
     assert (board.resets, board.closed) == (1, True)
     assert f"copied {len(wanted())} files" in result.out
-    assert "Imagined board with RP2040, MicroPython 1.26.1 on /dev/ttyACM0" in result.out
+    assert "Imagined Pico with RP2040, MicroPython 1.26.1 on /dev/ttyACM0" in result.out
     assert result.err == ""
 
 

@@ -56,6 +56,12 @@ def remounted(world, motion, seed, at_s, mounting_seed):
     return lambda t_s: world(t_s) if t_s < at_s else later(t_s)
 
 
+def take_firmware():
+    """Forget the firmware's modules that are imported, and return them by name."""
+    names = [name for name in sys.modules if name.split(".")[0] == "kickstand"]
+    return {name: sys.modules.pop(name) for name in names}
+
+
 def run_device(plan):
     """Run a plan. Returns the display's frames [[t_s, line1, line2], ...] as they changed, the last of them, and how
     each boot ended.
@@ -100,6 +106,7 @@ def run_device(plan):
     board.every(FRAME_S, watch)
     board.install()
     ends = []
+    before = take_firmware() if board.poses else {}  # it needs firmware that is imported on it
     try:
         from kickstand import settings, start
         from kickstand.settings import Settings
@@ -117,9 +124,20 @@ def run_device(plan):
                 end = board.run(start.main, until_s)
                 ends.append(end)
         settings.load = load
+        if ends[-1] == "returned":  # what it leaves on the display
+            watch()
     finally:
         board.uninstall()
-    return {"frames": frames, "ends": ends, "last": frames[-1][1:], "too_fast": board.too_fast}
+        if board.poses:
+            take_firmware()
+            sys.modules.update(before)
+    return {
+        "frames": frames,
+        "ends": ends,
+        "last": frames[-1][1:],
+        "too_fast": board.too_fast,
+        "touched": sorted(board.touched),
+    }
 
 
 if __name__ == "__main__":

@@ -35,6 +35,7 @@ class Record:
         self.ends = answer["ends"]
         self.last = tuple(answer["last"])
         self.too_fast = answer["too_fast"]
+        self.touched = answer["touched"]
         self.console = console
 
     def at(self, t_s):

@@ -50,6 +50,7 @@ usb-fault|Rec. stopped|USB
 
 unreadable|config.py:|cannot be read
 no-setting|config.py: what?|{0}
+no-pins|config.py: set|{0}
 pin-twice|config.py: wrong|pin used twice
 needs-speed|config.py: wrong|car needs SPEED
 

@@ -35,7 +35,8 @@ class Turn:
 @dataclass
 class Block:
     """One block: the fields of its head, and its turns. time_us: of the last sample before it, since power-on.
-    centidegrees: the temperature. body: the calibration's bytes."""
+    centidegrees: the temperature. delay_tenths_ms: of the gyro's low-pass, 0 where the firmware did not store it. body:
+    the calibration's bytes."""
 
     ride: int
     sequence: int
@@ -45,6 +46,7 @@ class Block:
     gyro_lsb_tenths: int
     sample_hz: int
     firmware: str
+    delay_tenths_ms: int
     body: bytes
     crc: int
     turns: list[Turn] = field(default_factory=list)
@@ -85,7 +87,7 @@ def parse(data: bytes) -> Block:
         raise BadBlock("not of a ride")
     if len(data) < _START + _TAIL_LENGTH:
         raise BadBlock(CUT_SHORT)
-    _, version, length, *rest, firmware = struct.unpack_from(block_format.HEAD, data)
+    _, version, length, *rest, firmware, delay = struct.unpack_from(block_format.HEAD, data)
     if version != block_format.VERSION:
         raise BadBlock(f"format {version}, this program reads {block_format.VERSION}")
     if len(data) < length:
@@ -94,7 +96,7 @@ def parse(data: bytes) -> Block:
     if len(data) != length or crc != crc32(data[:-4]):
         raise BadBlock("damaged")
     firmware = firmware.rstrip(b"\0").decode("ascii", "replace")
-    fields: list[Any] = [*rest, firmware, data[_HEAD_LENGTH:_START], crc]
+    fields: list[Any] = [*rest, firmware, delay, data[_HEAD_LENGTH:_START], crc]
     block = Block(*fields)
     try:
         block.turns = list(_turns(block, data[_START : len(data) - _TAIL_LENGTH], count))
