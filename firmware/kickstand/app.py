@@ -56,8 +56,8 @@ class App:
         self.calibration = ActiveCalibration(self.meter, self._calibration_changed)
         self.drive = self._open_drive() if settings.SPEED else None
         self.recorder = Recorder(keeper or RideRing(settings), settings.SAMPLE_HZ)
+        self.clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self.screen = Screen(self)
-        self._clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self._restarts = 0
         self._record_due = settings.RECORD or keeper is not None
         self._page_ms = ticks_ms()
@@ -106,18 +106,18 @@ class App:
         now_us, now_ms = ticks_us(), ticks_ms()
         n = self.sensor.fetch(now_ms)
         if n:
-            dt_us = self._clock.step(n, now_us)
+            dt_us = self.clock.step(n, now_us)
             self._take(n, dt_us, now_ms)
         if self.drive:
             self._poll_speed(now_ms)
         self.sensor.check(now_ms)
         if self.sensor.fault is not None:
-            self._clock.restart()
+            self.clock.restart()
             self.screen.interrupt(now_ms)
             if not self._fault_shown:
                 self._page_ms = now_ms  # at once: the next thing is to start the sensor again
         elif self.sensor.emptied:
-            self._clock.emptied(now_us)
+            self.clock.emptied(now_us)
         event = self.button.poll(now_ms)
         if event:
             self.screen.press(event, now_ms)

@@ -10,6 +10,8 @@ import io
 from .clock import NEVER_US, to_us
 
 _FOREVER = 1 << 60  # a number of transfers
+_BLOCK = 4096  # bytes of flash that are erased at once
+_STALL_S = 0.5  # that a print waits for a host which takes nothing (shared/tinyusb/mp_usbd_cdc.h of MicroPython)
 
 
 class TransferFault:
@@ -62,12 +64,41 @@ class TransferFault:
         return late
 
 
+class _ErasedFile:
+    """A file that is written to flash: erase() is called for each block that it begins."""
+
+    def __init__(self, file, erase):
+        self._file = file
+        self._erase = erase
+        self._room = 0  # bytes that are left in the block
+
+    def write(self, data):
+        self._room -= len(data)
+        while self._room < 0:
+            self._erase()
+            self._room += _BLOCK
+        return self._file.write(data)
+
+    def flush(self):
+        self._file.flush()
+
+    def close(self):
+        self._file.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.close()
+
+
 class Faults:
     """The faults of one board. Each method adds one to the script; several may act at the same time."""
 
     def __init__(self, board):
         self._board = board
         self._real_open = None
+        self._real_print = None
 
     # On the wires
 
@@ -147,11 +178,41 @@ class Faults:
         """Files whose name has this ending read as empty, as after a loss of supply."""
         self._files(ending, at_s, for_s, True)
 
+    def slow_flash(self, at_s, for_s, erase_s):
+        """Each block of a file that is written is erased for erase_s, in which the program stands."""
+
+        def erase():
+            self._board.clock.advance(to_us(erase_s))
+
+        def opened(real, path, mode="r", *more, **named):
+            file = real(path, mode, *more, **named)
+            return _ErasedFile(file, erase) if "w" in mode else file
+
+        self._opened_by(at_s, for_s, opened)
+
     def restore_files(self):
         """End the faults of the file system."""
         if self._real_open is not None:
             builtins.open = self._real_open
             self._real_open = None
+
+    # On USB
+
+    def usb_asleep(self, at_s, for_s):
+        """The host takes nothing: what is printed waits, and is lost."""
+
+        def begin():
+            self._real_print = builtins.print
+            builtins.print = lambda *_, **__: self._board.clock.advance(to_us(_STALL_S))
+
+        self._board.at(at_s, begin)
+        self._board.at(at_s + for_s, self.restore_print)
+
+    def restore_print(self):
+        """End usb_asleep()."""
+        if self._real_print is not None:
+            builtins.print = self._real_print
+            self._real_print = None
 
     def _transfers(self, kind, address, nth, count, byte=0, mask=0, read=True):
         for bus in self._board.buses:
@@ -169,18 +230,22 @@ class Faults:
         self._board.at(at_s + for_s, lambda: self._board.sensor.override(None))
 
     def _files(self, ending, at_s, for_s, empty):
+        def failing(real, path, mode="r", *more, **named):
+            if not str(path).endswith(ending) or "r" not in mode or "+" in mode:
+                return real(path, mode, *more, **named)
+            if not empty:
+                raise OSError(errno.EIO)
+            return io.BytesIO() if "b" in mode else io.StringIO()
+
+        self._opened_by(at_s, for_s, failing)
+
+    def _opened_by(self, at_s, for_s, opened):
+        """For for_s files are opened by opened(the real open(), its arguments)."""
+
         def begin():
             self.restore_files()
             self._real_open = real = builtins.open
-
-            def failing(path, mode="r", *more, **named):
-                if not str(path).endswith(ending) or "r" not in mode or "+" in mode:
-                    return real(path, mode, *more, **named)
-                if not empty:
-                    raise OSError(errno.EIO)
-                return io.BytesIO() if "b" in mode else io.StringIO()
-
-            builtins.open = failing
+            builtins.open = lambda *arguments, **named: opened(real, *arguments, **named)
 
         self._board.at(at_s, begin)
         self._board.at(at_s + for_s, self.restore_files)
