@@ -7,6 +7,7 @@ import gzip
 import json
 import os
 import signal
+import time
 import types
 from itertools import pairwise
 
@@ -14,7 +15,7 @@ import command
 import fake_board
 import pytest
 import ride_writer
-from kickstand_tools.deploy import connection
+from kickstand_tools.deploy import board_console, connection
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.rides import record
 from serial.tools import list_ports
@@ -23,7 +24,7 @@ from watched import Watched, watched
 
 class Stream(fake_board.Serial):
     """A serial port: what the board says, and what it does then. At the end: "ctrl-c" or another signal, "error",
-    "unplug", "silence"."""
+    "unplug", "silence", "asleep"."""
 
     def __init__(self, blocks, end, last=b""):
         super().__init__()
@@ -40,6 +41,8 @@ class Stream(fake_board.Serial):
                 os.kill(os.getpid(), end)
             elif end == "error":
                 self.data = b"\x04Traceback (most recent call last):\r\nValueError: bad pin\r\n\x04>"
+            elif end == "asleep":
+                board_console.time.asleep_s += 300
             elif end == "unplug":
                 raise OSError(5, "Input/output error")
         return len(self.data)
@@ -204,6 +207,30 @@ def test_what_came_until_the_stream_broke_off_is_kept(end, words, streaming, tmp
     assert result.err.count("\n") == 1
     assert words in result.err
     assert len(gzip.decompress((tmp_path / "ride.csv.gz").read_bytes()).splitlines()) == len(turns) + 1
+
+
+class Clocks:
+    """`time` of a computer that may sleep: its monotonic clock stands meanwhile."""
+
+    asleep_s = 0.0
+    monotonic = staticmethod(time.monotonic)
+    sleep = staticmethod(time.sleep)
+
+    def time(self):
+        return time.monotonic() + self.asleep_s
+
+
+def test_a_computer_that_slept_is_told(streaming, tmp_path, monkeypatch):
+    """The board has stopped streaming by itself. That is not waited for as long as a sensor that is off."""
+    monkeypatch.setattr(board_console, "time", Clocks())
+    monkeypatch.setattr(board_console, "_AWAY_SILENT_S", 0.1)
+    data, turns = half_seconds(3)
+    streaming(data, "asleep")
+    monkeypatch.setattr(record, "_SILENT_S", 60.0)
+    result = command.works("record", "--out", tmp_path / "ride.csv")
+    assert "this computer took nothing for 300 s: keep it awake: what came until then is kept" in result.err
+    assert result.err.count("\n") == 1
+    assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
 
 
 def test_a_block_that_came_over_damaged_leaves_a_gap(streaming, tmp_path):

@@ -64,7 +64,7 @@ def run_device(plan):
     or "poses" as for poses_of; "seed" of the part (None: perfect); its "temp_c"; "presses" [[at_s, for_s], ...];
     "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...];
     "gps" or "wheel" arguments of the models, which are told the speed of the ride; config "VEHICLE" "car": the ride
-    is a car's; "remount" [at_s, seed of the mounting from then on].
+    is a car's; "remount" [at_s, seed of the mounting from then on]; "stream" True: as `kickstand record` starts it.
     """
     seed = plan.get("seed")
     ride = None
@@ -101,7 +101,9 @@ def run_device(plan):
     board.install()
     ends = []
     try:
-        from kickstand import settings, start
+        from kickstand import devices, settings, start
+        from kickstand.app import App
+        from kickstand.rides.usb_stream import RideStream
         from kickstand.settings import Settings
 
         class Config:
@@ -109,12 +111,17 @@ def run_device(plan):
 
         for name, value in plan.get("config", {}).items():
             setattr(Config, name, tuple(value) if isinstance(value, list) else value)
+        def stream():
+            chosen = settings.load()
+            App(chosen, devices.open_lcd(chosen), RideStream()).run()
+
+        main = stream if "stream" in plan else start.main
         load = settings.load
         settings.load = lambda: Settings(Config)
         for until_s in plan.get("power", []) + [plan["until"]]:
             end = "reset"
             while end == "reset":
-                end = board.run(start.main, until_s)
+                end = board.run(main, until_s)
                 ends.append(end)
         settings.load = load
     finally:

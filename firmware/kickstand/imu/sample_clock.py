@@ -44,7 +44,7 @@ class SampleClock:
             return
         late_us = ticks_diff(now_us, self._sample_us) - self._period_us // 2
         if late_us > 2 * self._period_us:  # samples were lost in an overflow: the next step() spans the gap
+            self.lost += (late_us - self._pending_us) // self._period_us
             self._pending_us = late_us
-            self.lost += late_us // self._period_us
         else:
             self._pending_us = late_us >> CORRECTION_SHIFT

@@ -46,7 +46,7 @@ out-of-memory|Rec. stopped|no memory
 out-of-room|Rec. stopped|no room
 flash-fault|Rec. stopped|flash fault
 card-fault|Rec. stopped|card fault
-usb-fault|Rec. stopped|USB
+usb-fault|Rec. stopped|USB not read
 
 unreadable|config.py:|cannot be read
 no-setting|config.py: what?|{0}

@@ -139,7 +139,7 @@ def sensor_info(app, seconds):
         return line1, "6pos %-3s ali %s" % (_yes(calibration.six_done), _yes(calibration.aligned))
     if turn == 1:
         return line1, "%d gaps %d starts" % (min(chip.overflows, 99), min(sensor.restarts, 9))
-    return line1, "lost %d samples" % min(app.clock.lost, 999)
+    return line1, "samples lost%4d" % min(app.clock.lost, 9999)
 
 
 def _yes(flag):

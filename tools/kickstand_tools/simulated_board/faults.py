@@ -8,9 +8,9 @@ import errno
 import io
 
 from .clock import NEVER_US, to_us
+from .fakes.erased_file import ErasedFile
 
 _FOREVER = 1 << 60  # a number of transfers
-_BLOCK = 4096  # bytes of flash that are erased at once
 _STALL_S = 0.5  # that a print waits for a host which takes nothing (shared/tinyusb/mp_usbd_cdc.h of MicroPython)
 
 
@@ -62,34 +62,6 @@ class TransferFault:
         late = (value & 0x80 if number == self._byte else self._carry << 7) | value >> 1
         self._carry = value & 1
         return late
-
-
-class _ErasedFile:
-    """A file that is written to flash: erase() is called for each block that it begins."""
-
-    def __init__(self, file, erase):
-        self._file = file
-        self._erase = erase
-        self._room = 0  # bytes that are left in the block
-
-    def write(self, data):
-        self._room -= len(data)
-        while self._room < 0:
-            self._erase()
-            self._room += _BLOCK
-        return self._file.write(data)
-
-    def flush(self):
-        self._file.flush()
-
-    def close(self):
-        self._file.close()
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.close()
 
 
 class Faults:
@@ -186,7 +158,7 @@ class Faults:
 
         def opened(real, path, mode="r", *more, **named):
             file = real(path, mode, *more, **named)
-            return _ErasedFile(file, erase) if "w" in mode else file
+            return ErasedFile(file, erase) if "w" in mode else file
 
         self._opened_by(at_s, for_s, opened)
 
