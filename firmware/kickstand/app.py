@@ -60,6 +60,7 @@ class App:
         self.screen = Screen(self)
         self._restarts = 0
         self._record_due = settings.RECORD or keeper is not None
+        self._on_card = settings.SD_SPI is not None and keeper is None
         self._page_ms = ticks_ms()
         self._fault_shown = False
 
@@ -80,6 +81,10 @@ class App:
             raise
 
     def _loop(self):
+        if self._on_card:
+            self.lcd.show("SD card", "is being read")
+            self.lcd.flush()
+            self.recorder.prepare()
         watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         gc.threshold(-1)
         due_us = ticks_us()

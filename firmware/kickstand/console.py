@@ -13,7 +13,7 @@ _SENTENCES = """
 not-written|calibration not saved: {0}; the old one is kept
 read-back|calibration not saved: it reads back differently; the old one is kept
 no-driver|SD card: its driver is not on the board: mpremote mip install sdcard
-no-card|SD card: none that can be read ({0}): check card and wiring
+no-card|SD card: none that can be used ({0}): check wiring and card, which has to be FAT32; then restart the board
 unreadable|config.py cannot be read ({1}{2}): mend it, then kickstand flash --config
 not-allowed|config.py: {0} = {1!r}, but it must be {2}
 no-setting|config.py: {0} is not a setting; see the list in that file

@@ -9,6 +9,7 @@ import json
 import math
 import sys
 
+import cards
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted import script, sensor_errors
 
@@ -64,7 +65,9 @@ def run_device(plan):
     or "poses" as for poses_of; "seed" of the part (None: perfect); its "temp_c"; "presses" [[at_s, for_s], ...];
     "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...];
     "gps" or "wheel" arguments of the models, which are told the speed of the ride; config "VEHICLE" "car": the ride
-    is a car's; "remount" [at_s, seed of the mounting from then on]; "stream" True: as `kickstand record` starts it.
+    is a car's; "remount" [at_s, seed of the mounting from then on]; "stream" True: as `kickstand record` starts it;
+    "card" arguments of the model of an SD card, which is formatted, and whose content is returned as "rides"; "card
+    faults" [[at_s, attribute, value], ...].
     """
     seed = plan.get("seed")
     ride = None
@@ -86,6 +89,9 @@ def run_device(plan):
     for source in ("gps", "wheel"):
         if ride and source in plan:
             getattr(board, "fit_" + source)(lambda t_s, ride=ride: ride.truth(t_s)[1], **plan[source])
+    if "card" in plan:
+        board.fit_card(**plan["card"])
+        cards.format_card(board, plan)
     for at_s, for_s in plan.get("presses", []):
         board.press(at_s, for_s)
     for method, arguments in plan.get("faults", []):
@@ -121,12 +127,17 @@ def run_device(plan):
         for until_s in plan.get("power", []) + [plan["until"]]:
             end = "reset"
             while end == "reset":
+                cards.eject()
                 end = board.run(main, until_s)
                 ends.append(end)
         settings.load = load
     finally:
         board.uninstall()
-    return {"frames": frames, "ends": ends, "last": frames[-1][1:], "too_fast": board.too_fast}
+    answer = {"frames": frames, "ends": ends, "last": frames[-1][1:], "too_fast": board.too_fast}
+    if board.card:
+        answer["rides"] = cards.rides(board)
+        answer["card_hz"] = board.card.most_hz
+    return answer
 
 
 if __name__ == "__main__":

@@ -63,6 +63,7 @@ def open_sd_card(number, sck, mosi, miso, cs):
 
         return SDCard(slot=number, sck=sck, mosi=mosi, miso=miso, cs=cs)
     from machine import SPI
-    from sdcard import SDCard  # type: ignore[import-not-found]
 
-    return SDCard(SPI(number, sck=sck, mosi=mosi, miso=miso), cs)
+    from .spi_card import CheckedCard
+
+    return CheckedCard(SPI(number, sck=sck, mosi=mosi, miso=miso), cs)

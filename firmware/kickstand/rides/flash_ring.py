@@ -5,8 +5,9 @@ always left free, for the calibration and for new firmware.
 """
 
 import os
-from errno import EEXIST
+from errno import EEXIST, EIO
 
+from ..errors import CardError
 from . import ride_paths
 from .block import BLOCK, block_length
 
@@ -15,6 +16,8 @@ PART_BLOCKS = 16  # in a part in flash
 CARD_PART_BLOCKS = 256  # in a part on a card: a day's ride is 85 files, not 1300
 FIRMWARE = 80 * BLOCK  # compiled: each of its files takes whole blocks, each folder two
 RESERVE = 40 * BLOCK  # what an update of compiled firmware needs at most, with some to spare
+
+_PROBE = b"Kickstand"
 
 
 def free_bytes(path):
@@ -46,6 +49,16 @@ def _remove_emptied(path):
         pass
 
 
+def _try_out(path):
+    """Write a file, read it back and remove it: a new card looks for free room the first time. Raises OSError."""
+    with open(path, "wb") as file:
+        file.write(_PROBE)
+    with open(path, "rb") as file:
+        if file.read() != _PROBE:
+            raise OSError(EIO)
+    os.remove(path)
+
+
 class RideRing:
     """The files of the ride that is being recorded, for a Recorder. settings: a Settings.
 
@@ -62,9 +75,29 @@ class RideRing:
         self._directory = ""
         self._file = None
         self._free = 0
+        self._refused = None
+
+    def prepare(self):
+        """Mount the SD card, count its free room and write to it once. Raises CardError, and from then on begin() does.
+
+        It takes a fifth of a second; where the card does not say how much is free, all its FAT is read, in half a
+        minute; where it does not get ready, 5 s. So it has its time before the watchdog runs, and only then."""
+        try:
+            directory = ride_paths.directory(self._settings)
+            _make(directory)
+            free_bytes(directory)
+            _try_out(directory + "/probe")
+        except CardError as error:
+            self._refused = error
+        except Exception as error:  # also what a driver raises that is mistaken about the card
+            self._refused = CardError("no-card", str(error))
+        if self._refused:
+            raise self._refused
 
     def begin(self):
         """Begin a new ride; return its number. Raises OSError, CardError."""
+        if self._refused:
+            raise self._refused
         self._directory = ride_paths.directory(self._settings)
         _make(self._directory)
         self._use(ride_paths.newest_ride(self._directory) or 1)

@@ -41,7 +41,7 @@ gps-no-fix|GPS: no fix|needs open sky
 no-pulse|Wheel: no pulse|ride, or wiring?
 
 no-driver|SD card:|no driver
-no-card|No SD card|check card
+no-card|No SD card|check, restart
 out-of-memory|Rec. stopped|no memory
 out-of-room|Rec. stopped|no room
 flash-fault|Rec. stopped|flash fault

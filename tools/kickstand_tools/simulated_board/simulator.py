@@ -12,6 +12,7 @@ from .button import Button
 from .clock import Clock, PowerOff, Reset, to_us
 from .fakes import fake_machine, fake_time
 from .fakes.installer import Installer
+from .fakes.sd_card import SdCard
 from .faults import Faults
 from .gps import Gps
 from .i2c import Bus
@@ -56,6 +57,7 @@ class Board:
         sensor_pins, lcd_pins, self._button_pin, self._gps_pin, self.wheel_pin = WIRING[port]
         self.gps = None  # a Gps, if fitted
         self.wheel = None  # a Wheel, if fitted
+        self.card = None  # an SdCard, if fitted
         self.sensor_bus = Bus(self.clock, *sensor_pins)
         self.lcd_bus = self.sensor_bus if one_bus else Bus(self.clock, *lcd_pins)
         self.buses = [self.sensor_bus] if one_bus else [self.sensor_bus, self.lcd_bus]
@@ -167,6 +169,10 @@ class Board:
         """Connect a wheel contact. speed(t_s): of the vehicle, m/s. kind: arguments of Wheel."""
         self.wheel = Wheel(self.clock, speed, **kind)
 
+    def fit_card(self, **kind):
+        """Connect an SD card; with its driver on the board, if done before install(). kind: arguments of SdCard."""
+        self.card = SdCard(self.clock, **kind)
+
     # Called by the fake `machine`
 
     def connect_uart(self, pin, baud, receive):
@@ -220,6 +226,8 @@ class Board:
         return level
 
     def _drive_wire(self, number, level):
+        if self.card and number == self.card.cs:
+            self.card.select(level)
         for bus in self.buses:
             if number == bus.sda:
                 bus.set_sda(level)

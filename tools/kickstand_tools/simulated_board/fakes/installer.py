@@ -20,6 +20,10 @@ class Installer:
         current.use(board)
         fake_time.use(board.clock, board.clock.now_us)
         self._replace("machine", fake_machine)
+        if board.card and board.card.driver:
+            from . import sdcard
+
+            self._replace("sdcard", sdcard)
         if sys.implementation.name == "micropython":
             self._replace("time", fake_time)
             self._replace("os", fake_os)
