@@ -88,14 +88,14 @@ class App:
         watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         gc.threshold(-1)
         due_us = ticks_us()
-        turns = 0
+        turns = port.turns_to_collect(COLLECT_TURNS)
         while True:
             self.turn()
-            turns += 1
-            if turns >= COLLECT_TURNS:  # here, not in the middle of a sample: meanwhile the FIFO keeps what comes
-                turns = 0
+            turns -= 1
+            if turns <= 0:  # here, not in the middle of a sample: meanwhile the FIFO keeps what comes
                 gc.collect()
                 fill_gaps(SINGLE_GAPS)
+                turns = port.turns_to_collect(COLLECT_TURNS)
             if watchdog:
                 watchdog.feed()
             due_us = ticks_add(due_us, LOOP_US)

@@ -1,4 +1,5 @@
-"""What differs between ESP32 and RP2: default pins, interrupts, the SD card's driver, and how a watchdog is disarmed.
+"""What differs between ESP32 and RP2: default pins, interrupts, the SD card's driver, how a watchdog is disarmed, and
+how the heap grows.
 
 No other module asks which board it runs on.
 """
@@ -25,10 +26,27 @@ else:  # Raspberry Pi Pico and Pico 2
     PIN_IRQ = {"hard": True}  # a soft interrupt is lost while the display is written to
     SD_SPI = (0, 1)  # the numbers of machine.SPI
 
+_TURN_BYTES = 2800  # of heap that a turn of the app's loop uses
+_FEWEST_TURNS = 3
+
 _WATCHDOG_MS = 8000  # rp2 allows 8388 at most
 _HOUR_MS = 3_600_000
 
 _watchdog = None
+
+
+def turns_to_collect(most):
+    """After how many turns of the app's loop the garbage is to be collected: most, or fewer where the heap is small.
+
+    An ESP32's heap starts with 64 KB and grows only when a collection has not helped. It would be collected again and
+    again in the middle of a turn."""
+    if not IS_ESP32:
+        return most
+    import esp32
+
+    # mem_free() counts what the heap could grow by, the largest block of ESP-IDF's heap, as free
+    grow = max(region[2] for region in esp32.idf_heap_info(esp32.HEAP_DATA))
+    return max(_FEWEST_TURNS, min(most, (gc.mem_free() - grow) // (2 * _TURN_BYTES)))
 
 
 def start_watchdog():

@@ -14,8 +14,10 @@ class SdCard:
     """sectors: how many.  cs: the pin that selects it.  init_s: how long it takes to get ready after CMD0; None: for
     ever.  read_s: from the command to the data.  busy_s: for how long it is busy after each sector written.
 
+    driver: False if the board lacks the driver.
+
     Faults, to be set at any time: rejects: how many of the next writes it rejects.  busy_next_s: for how long it is
-    busy after the next sector alone.  stuck: once busy, it stays so.  removed: nothing answers.  driver: False if the board lacks the driver.
+    busy after the next sector alone.  stuck: once busy, it stays so.  removed: nothing answers.
 
     data: what is written, by sector, those of zeros left out.  most_hz: the quickest that it was clocked.
     """
