@@ -82,9 +82,11 @@ class App:
 
     def _loop(self):
         if self._on_card:
+            from .rides import card_trial
+
             self.lcd.show("SD card", "is being read")
             self.lcd.flush()
-            self.recorder.prepare()
+            card_trial.prepare(self.recorder, self.settings)
         watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         gc.threshold(-1)
         due_us = ticks_us()

@@ -1,6 +1,8 @@
 """A flash that takes 400 ms to erase a block, longer than the chip's FIFO lasts: what is lost is counted and said, and
 a lean that is wrong for it is not shown as good."""
 
+import gc
+
 import devices
 import pytest
 from kickstand.lean.meter import LeanMeter
@@ -94,3 +96,15 @@ def test_a_normal_flash_loses_nothing(tmp_path):
     recorded = blocks(tmp_path)
     assert len(recorded) > 2
     assert not [seconds for block in recorded for seconds in block.missing_s()]
+
+
+def test_the_status_says_how_long_a_block_takes(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(gc, "mem_free", lambda: 150_000, raising=False)
+    with Board(lambda t_s: (0, 1, 0, 0, 0, 0)) as board:
+        import kickstand
+
+        board.faults.slow_flash(0.0, 1000.0, 0.4)
+        board.run(kickstand.status, 60.0)
+    assert "KB free, 400 ms to write a block" in capsys.readouterr().out
+    assert not list(tmp_path.iterdir())

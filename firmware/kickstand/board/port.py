@@ -42,7 +42,7 @@ def turns_to_collect(most):
     again in the middle of a turn."""
     if not IS_ESP32:
         return most
-    import esp32
+    import esp32  # type: ignore[import-not-found]
 
     # mem_free() counts what the heap could grow by, the largest block of ESP-IDF's heap, as free
     grow = max(region[2] for region in esp32.idf_heap_info(esp32.HEAP_DATA))

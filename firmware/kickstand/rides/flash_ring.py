@@ -5,9 +5,8 @@ always left free, for the calibration and for new firmware.
 """
 
 import os
-from errno import EEXIST, EIO
+from errno import EEXIST
 
-from ..errors import CardError
 from . import ride_paths
 from .block import BLOCK, block_length
 
@@ -16,8 +15,6 @@ PART_BLOCKS = 16  # in a part in flash
 CARD_PART_BLOCKS = 256  # in a part on a card: a day's ride is 85 files, not 1300
 FIRMWARE = 80 * BLOCK  # compiled: each of its files takes whole blocks, each folder two
 RESERVE = 40 * BLOCK  # what an update of compiled firmware needs at most, with some to spare
-
-_PROBE = b"Kickstand"
 
 
 def free_bytes(path):
@@ -32,7 +29,7 @@ def all_bytes(path):
     return space[1] * space[2]
 
 
-def _make(path):
+def make(path):
     """Make a directory, unless it is there. Raises OSError."""
     try:
         os.mkdir(path)
@@ -49,22 +46,12 @@ def _remove_emptied(path):
         pass
 
 
-def _try_out(path):
-    """Write a file, read it back and remove it: a new card looks for free room the first time. Raises OSError."""
-    with open(path, "wb") as file:
-        file.write(_PROBE)
-    with open(path, "rb") as file:
-        if file.read() != _PROBE:
-            raise OSError(EIO)
-    os.remove(path)
-
-
 class RideRing:
     """The files of the ride that is being recorded, for a Recorder. settings: a Settings.
 
     Use: begin(); for each block next_length(), ready() until it is True, write() until the block is whole,
     end_block(); at last end(). stops_interrupts: True if interrupts are off during a write, as they are for flash.
-    needed: bytes that have to be free before a part is begun.
+    needed: bytes that have to be free before a part is begun.  refused: None, or the CardError that begin() raises.
     """
 
     def __init__(self, settings):
@@ -75,31 +62,14 @@ class RideRing:
         self._directory = ""
         self._file = None
         self._free = 0
-        self._refused = None
-
-    def prepare(self):
-        """Mount the SD card, count its free room and write to it once. Raises CardError, and from then on begin() does.
-
-        It takes a fifth of a second; where the card does not say how much is free, all its FAT is read, in half a
-        minute; where it does not get ready, 5 s. So it has its time before the watchdog runs, and only then."""
-        try:
-            directory = ride_paths.directory(self._settings)
-            _make(directory)
-            free_bytes(directory)
-            _try_out(directory + "/probe")
-        except CardError as error:
-            self._refused = error
-        except Exception as error:  # also what a driver raises that is mistaken about the card
-            self._refused = CardError("no-card", str(error))
-        if self._refused:
-            raise self._refused
+        self.refused = None
 
     def begin(self):
         """Begin a new ride; return its number. Raises OSError, CardError."""
-        if self._refused:
-            raise self._refused
+        if self.refused:
+            raise self.refused
         self._directory = ride_paths.directory(self._settings)
-        _make(self._directory)
+        make(self._directory)
         self._use(ride_paths.newest_ride(self._directory) or 1)
         if ride_paths.first_part(self._path):  # else the power went before its first block: use its number again
             self._use(self._ride + 1)
@@ -117,8 +87,8 @@ class RideRing:
         """Make the directory of this ride, for the parts to come."""
         self._ride = ride
         self._path = ride_paths.ride_path(self._directory, ride)
-        _make(ride_paths.group_path(self._directory, ride // ride_paths.RIDES_IN_GROUP))
-        _make(self._path)
+        make(ride_paths.group_path(self._directory, ride // ride_paths.RIDES_IN_GROUP))
+        make(self._path)
 
     def next_length(self):
         """How many bytes the next block of the ride has to have. The block before it may still be being written."""

@@ -32,13 +32,6 @@ class Recorder:
         self._sample_hz = sample_hz
         self._block = self._spare = None  # RideBlocks, 8 KB of heap: made by the first start()
 
-    def prepare(self):
-        """Get an SD card ready, see RideRing.prepare(). Raises nothing: see problem."""
-        try:
-            self.keeper.prepare()
-        except CardError as error:
-            self._end(error)
-
     def start(self, chip, calibration):
         """Begin a ride, and end the one before. chip: an Mpu6050 that runs.  calibration: the Calibration in use.
 
