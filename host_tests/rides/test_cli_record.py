@@ -42,7 +42,7 @@ class Stream(fake_board.Serial):
             elif end == "error":
                 self.data = b"\x04Traceback (most recent call last):\r\nValueError: bad pin\r\n\x04>"
             elif end == "asleep":
-                board_console.time.asleep_s += 300
+                Clocks.asleep_s += 300
             elif end == "unplug":
                 raise OSError(5, "Input/output error")
         return len(self.data)
@@ -222,6 +222,7 @@ class Clocks:
 
 def test_a_computer_that_slept_is_told(streaming, tmp_path, monkeypatch):
     """The board has stopped streaming by itself. That is not waited for as long as a sensor that is off."""
+    monkeypatch.setattr(Clocks, "asleep_s", 0.0)
     monkeypatch.setattr(board_console, "time", Clocks())
     monkeypatch.setattr(board_console, "_AWAY_SILENT_S", 0.1)
     data, turns = half_seconds(3)

@@ -1,5 +1,8 @@
 """The simulated board's SD card with MicroPython's own FAT: formatted before a run, read after it."""
 
+# pyright: reportAttributeAccessIssue=false
+# the os is MicroPython's
+
 import binascii
 import os
 
