@@ -35,11 +35,12 @@ class Refusal(Exception):
 
 
 def report(refusal):
-    """Print it on the console: in words, unless a flash or a heap that has failed does not give these any more."""
+    """Print it on the console, unless that was slow lately: in words, unless a flash or a heap that has failed does not
+    give these any more."""
     try:
-        from .console import sentence
+        from . import console
 
-        print(sentence(refusal))
+        console.tell(refusal)
     except (ImportError, OSError, MemoryError):
         print(refusal.code)
 

@@ -169,7 +169,7 @@ _SDCARD = b"""
 import os
 class SDCard:
     blocks = {}
-    def __init__(self, spi, cs):
+    def __init__(self, spi, cs, baudrate=1_320_000):
         if not self.blocks:
             os.VfsFat.mkfs(self)
     def readblocks(self, n, buf, offset=0):

@@ -16,13 +16,32 @@ import pytest
 import ride_writer
 from kickstand_tools.deploy import board_console, connection
 from kickstand_tools.logs.reader import read_log
+from kickstand_tools.rides import record
 from serial.tools import list_ports
 from watched import Watched, watched
 
 
+class Clocks:
+    """`time` of a computer on which only waiting takes time, and that may sleep: its monotonic clock stands then."""
+
+    waited_s = asleep_s = 0.0
+
+    @classmethod
+    def monotonic(cls):
+        return cls.waited_s
+
+    @classmethod
+    def time(cls):
+        return cls.waited_s + cls.asleep_s
+
+    @classmethod
+    def sleep(cls, seconds):
+        cls.waited_s += seconds
+
+
 class Stream(fake_board.Serial):
     """A serial port: what the board says, and what it does then. At the end: "ctrl-c" or another signal, "error",
-    "unplug", "silence"."""
+    "unplug", "silence", "asleep"."""
 
     def __init__(self, blocks, end, last=b""):
         super().__init__()
@@ -39,6 +58,8 @@ class Stream(fake_board.Serial):
                 signal.raise_signal(end)
             elif end == "error":
                 self.data = b"\x04Traceback (most recent call last):\r\nValueError: bad pin\r\n\x04>"
+            elif end == "asleep":
+                Clocks.asleep_s += 300
             elif end == "unplug":
                 raise OSError(5, "Input/output error")
         return len(self.data)
@@ -65,12 +86,8 @@ def _said(block):
 @pytest.fixture
 def streaming(tmp_path, monkeypatch):
     """streaming(blocks, end): a board that streams them. Only waiting for it takes time."""
-    waited_s = [0.0]
-
-    def sleep(seconds):
-        waited_s[0] += seconds
-
-    clock = types.SimpleNamespace(monotonic=lambda: waited_s[0], sleep=sleep)
+    monkeypatch.setattr(Clocks, "waited_s", 0.0)
+    monkeypatch.setattr(Clocks, "asleep_s", 0.0)
 
     def fit(blocks, end, last=b""):
         board = Streaming(tmp_path)
@@ -79,7 +96,7 @@ def streaming(tmp_path, monkeypatch):
         monkeypatch.setattr(list_ports, "comports", lambda: [pico])
         monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: board)
         monkeypatch.setattr(connection, "_RESTART_S", 0)
-        monkeypatch.setattr(board_console, "time", clock)
+        monkeypatch.setattr(board_console, "time", Clocks)
         return board
 
     return fit
@@ -213,6 +230,18 @@ def test_what_came_until_the_stream_broke_off_is_kept(end, words, streaming, tmp
     assert result.err.count("\n") == 1
     assert words in result.err
     assert len(gzip.decompress((tmp_path / "ride.csv.gz").read_bytes()).splitlines()) == len(turns) + 1
+
+
+def test_a_computer_that_slept_is_told(streaming, tmp_path, monkeypatch):
+    """The board has stopped streaming by itself. That is not waited for as long as a sensor that is off."""
+    monkeypatch.setattr(board_console, "_AWAY_SILENT_S", 0.1)
+    data, turns = half_seconds(3)
+    streaming(data, "asleep")
+    monkeypatch.setattr(record, "_SILENT_S", 60.0)
+    result = command.works("record", "--out", tmp_path / "ride.csv")
+    assert "this computer took nothing for 300 s: keep it awake: what came until then is kept" in result.err
+    assert result.err.count("\n") == 1
+    assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
 
 
 def test_a_block_that_came_over_damaged_leaves_a_gap(streaming, tmp_path):

@@ -9,6 +9,7 @@ import json
 import math
 import sys
 
+import cards
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted import script, sensor_errors
 
@@ -70,7 +71,9 @@ def run_device(plan):
     or "poses" as for poses_of; "seed" of the part (None: perfect); its "temp_c"; "presses" [[at_s, for_s], ...];
     "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...];
     "gps" or "wheel" arguments of the models, which are told the speed of the ride; config "VEHICLE" "car": the ride
-    is a car's; "remount" [at_s, seed of the mounting from then on].
+    is a car's; "remount" [at_s, seed of the mounting from then on]; "stream" True: as `kickstand record` starts it;
+    "card" arguments of the model of an SD card, which is formatted, and whose content is returned as "rides"; "card
+    faults" [[at_s, attribute, value], ...].
     """
     seed = plan.get("seed")
     ride = None
@@ -92,6 +95,9 @@ def run_device(plan):
     for source in ("gps", "wheel"):
         if ride and source in plan:
             getattr(board, "fit_" + source)(lambda t_s, ride=ride: ride.truth(t_s)[1], **plan[source])
+    if "card" in plan:
+        board.fit_card(**plan["card"])
+        cards.format_card(board, plan)
     for at_s, for_s in plan.get("presses", []):
         board.press(at_s, for_s)
     for method, arguments in plan.get("faults", []):
@@ -108,7 +114,9 @@ def run_device(plan):
     ends = []
     before = take_firmware() if board.poses else {}  # it needs firmware that is imported on it
     try:
-        from kickstand import settings, start
+        from kickstand import devices, settings, start
+        from kickstand.app import App
+        from kickstand.rides.usb_stream import RideStream
         from kickstand.settings import Settings
 
         class Config:
@@ -116,12 +124,18 @@ def run_device(plan):
 
         for name, value in plan.get("config", {}).items():
             setattr(Config, name, tuple(value) if isinstance(value, list) else value)
+        def stream():
+            chosen = settings.load()
+            App(chosen, devices.open_lcd(chosen), RideStream()).run()
+
+        main = stream if "stream" in plan else start.main
         load = settings.load
         settings.load = lambda: Settings(Config)
         for until_s in plan.get("power", []) + [plan["until"]]:
             end = "reset"
             while end == "reset":
-                end = board.run(start.main, until_s)
+                cards.eject()
+                end = board.run(main, until_s)
                 ends.append(end)
         settings.load = load
         if ends[-1] == "returned":  # what it leaves on the display
@@ -131,13 +145,17 @@ def run_device(plan):
         if board.poses:
             take_firmware()
             sys.modules.update(before)
-    return {
+    answer = {
         "frames": frames,
         "ends": ends,
         "last": frames[-1][1:],
         "too_fast": board.too_fast,
         "touched": sorted(board.touched),
     }
+    if board.card:
+        answer["rides"] = cards.rides(board)
+        answer["card_hz"] = board.card.most_hz
+    return answer
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
-"""What differs from board to board: default pins, I2C, interrupts, the SD card's driver, how a watchdog is disarmed.
+"""What differs from board to board: default pins, I2C, interrupts, the SD card's driver, how a watchdog is disarmed,
+and how the heap grows.
 
 No other module asks which board it runs on.
 """
@@ -42,6 +43,9 @@ if not _KNOWN:  # these pins may be missing, or belong to what else is on the bo
 
 
 _SOFT_I2C_HZ = 250_000  # half a period of 2 us: at 400 kHz SoftI2C's would be 1 us, and the MPU6050 needs 1.3
+_TURN_BYTES = 2800  # of heap that a turn of the app's loop uses
+_FEWEST_TURNS = 3
+
 _WATCHDOG_MS = 8000  # rp2 allows 8388 at most
 _HOUR_MS = 3_600_000
 
@@ -57,6 +61,18 @@ def open_i2c(controller, sda, scl, frequency, timeout_us):
     if IS_ESP32:
         return machine.SoftI2C(scl, sda, freq=min(frequency, _SOFT_I2C_HZ), timeout=timeout_us)
     return machine.I2C(controller, sda=sda, scl=scl, freq=frequency, timeout=timeout_us)
+def turns_to_collect(most):
+    """After how many turns of the app's loop the garbage is to be collected: most, or fewer where the heap is small.
+
+    An ESP32's heap starts with 64 KB and grows only when a collection has not helped. It would be collected again and
+    again in the middle of a turn."""
+    if not IS_ESP32:
+        return most
+    import esp32  # type: ignore[import-not-found]
+
+    # mem_free() counts what the heap could grow by, the largest block of ESP-IDF's heap, as free
+    grow = max(region[2] for region in esp32.idf_heap_info(esp32.HEAP_DATA))
+    return max(_FEWEST_TURNS, min(most, (gc.mem_free() - grow) // (2 * _TURN_BYTES)))
 
 
 def start_watchdog():
@@ -91,6 +107,7 @@ def open_sd_card(number, sck, mosi, miso, cs):
 
         return SDCard(slot=number, sck=sck, mosi=mosi, miso=miso, cs=cs)
     from machine import SPI
-    from sdcard import SDCard  # type: ignore[import-not-found]
 
-    return SDCard(SPI(number, sck=sck, mosi=mosi, miso=miso), cs)
+    from .spi_card import CheckedCard
+
+    return CheckedCard(SPI(number, sck=sck, mosi=mosi, miso=miso), cs)

@@ -41,12 +41,12 @@ gps-no-fix|GPS: no fix|needs open sky
 no-pulse|Wheel: no pulse|ride, or wiring?
 
 no-driver|SD card:|no driver
-no-card|No SD card|check card
+no-card|No SD card|check, restart
 out-of-memory|Rec. stopped|no memory
 out-of-room|Rec. stopped|no room
 flash-fault|Rec. stopped|flash fault
 card-fault|Rec. stopped|card fault
-usb-fault|Rec. stopped|USB
+usb-fault|Rec. stopped|USB not read
 
 unreadable|config.py:|cannot be read
 no-setting|config.py: what?|{0}

@@ -12,6 +12,8 @@ _END = b"\x04"  # of the program's output, and of its error
 _PROMPT = b">"  # after both
 _LAST_S = 10.0  # for what the program still prints after Ctrl-C
 _POLL_S = 0.01
+_AWAY_S = 1.0  # this computer slept, or was too busy to read: a board that streams stops itself then
+_AWAY_SILENT_S = 5.0  # after that, how long the board may print nothing
 
 
 class BrokenOff(Exception):
@@ -30,15 +32,19 @@ def lines(
     said = b""
     asked_s = None
     heard_s = time.monotonic()
+    away_s, polled_s = 0.0, time.time()  # unlike the monotonic clock it goes on while the computer sleeps
     while said.count(_END) < 2 or not said.endswith(_PROMPT):
         if stopped and stopped.is_set() and asked_s is None:
             asked_s = time.monotonic()
             serial.write(_CTRL_C)
+        away_s, polled_s = max(away_s, time.time() - polled_s), time.time()
         if waiting := serial.inWaiting():
             heard_s = time.monotonic()
             said += serial.read(waiting)
         elif time.monotonic() - heard_s > silent_s:
             raise BrokenOff("the board says nothing any more")
+        elif away_s > _AWAY_S and time.monotonic() - heard_s > min(silent_s, _AWAY_SILENT_S):
+            raise BrokenOff(f"the board stopped because this computer took nothing for {away_s:.0f} s: keep it awake")
         elif asked_s is not None and time.monotonic() - asked_s > _LAST_S:
             return
         else:

@@ -13,8 +13,7 @@ from kickstand.rides import block as block_format
 _HEAD_LENGTH = struct.calcsize(block_format.HEAD)
 _TAIL_LENGTH = struct.calcsize(block_format.TAIL)
 _START = _HEAD_LENGTH + store.BODY_LENGTH
-
-
+_LATE_PERIODS = 2  # sample periods, as in kickstand.imu.sample_clock: samples were lost
 CUT_SHORT = "cut short"  # the last block of a ride often is: the power went off while it was written
 
 
@@ -59,6 +58,16 @@ class Block:
     def calibration(self) -> Calibration:
         """The calibration that the lean on the display was computed with."""
         return store.unpack(self.body, 0)[2]
+
+    def missing_s(self) -> list[float]:
+        """Each time without readings, in seconds: turns of the loop that came later than their samples explain."""
+        period_us, before_us, found = 1_000_000 // self.sample_hz, self.time_us, []
+        for turn in self.turns:
+            late_us = turn.time_us - before_us - turn.n * period_us
+            if late_us > _LATE_PERIODS * period_us:
+                found.append(late_us / 1e6)
+            before_us = turn.time_us
+        return found
 
 
 def read(content: bytes) -> tuple[list[Block], list[str]]:
@@ -142,3 +151,12 @@ def _turns(block: Block, data: bytes, count: int) -> Iterator[Turn]:
         before[0] = n
         yield Turn(now, n, tuple(before[2:8]), speed)
         speed = None
+
+
+def missing_note(missing_s: list[float]) -> str:
+    """A line for these times without readings."""
+    times = "once" if len(missing_s) == 1 else f"{len(missing_s)} times"
+    return (
+        f"readings are missing {times}, {sum(missing_s):.1f} s in all: the sensor was set up again, "
+        "or the board was busy for longer than the sensor keeps samples"
+    )

@@ -12,6 +12,7 @@ from .button import Button
 from .clock import Clock, PowerOff, Reset, to_us
 from .fakes import chips, fake_machine, fake_time
 from .fakes.installer import Installer
+from .fakes.sd_card import SdCard
 from .faults import Faults
 from .gps import Gps
 from .i2c import Bus
@@ -67,14 +68,11 @@ class Board:
         self.lcd = Lcd(self.clock, lcd_address or 0x27)
         self.button = Button(self.clock, seed)
         self.watchdog = Watchdog(self.clock)
-        usual = WIRING[port]
-        _, _, self._button_pin, self._gps_pin, self.wheel_pin = usual
-        sensor_pins, lcd_pins = sensor_pins or usual[0], lcd_pins or usual[1]
-        self._button_pin = self._button_pin if button_pin is None else button_pin
-        self.gps = None  # a Gps, if fitted
-        self.wheel = None  # a Wheel, if fitted
-        self.sensor_bus = Bus(self.clock, *sensor_pins)
-        self.lcd_bus = self.sensor_bus if one_bus else Bus(self.clock, *lcd_pins)
+        usual_sensor, usual_lcd, usual_button, self._gps_pin, self.wheel_pin = WIRING[port]
+        self._button_pin = usual_button if button_pin is None else button_pin
+        self.gps = self.wheel = self.card = None  # a Gps, a Wheel, an SdCard, if fitted
+        self.sensor_bus = Bus(self.clock, *(sensor_pins or usual_sensor))
+        self.lcd_bus = self.sensor_bus if one_bus else Bus(self.clock, *(lcd_pins or usual_lcd))
         self.buses = [self.sensor_bus] if one_bus else [self.sensor_bus, self.lcd_bus]
         self.too_fast = False  # True once a bus was clocked faster than a device on it allows
         self.faults = Faults(self)
@@ -96,6 +94,7 @@ class Board:
     def uninstall(self):
         """Undo install()."""
         self.faults.restore_files()
+        self.faults.restore_print()
         self._fakes.uninstall()
 
     def __enter__(self):
@@ -183,6 +182,10 @@ class Board:
         """Connect a wheel contact. speed(t_s): of the vehicle, m/s. kind: arguments of Wheel."""
         self.wheel = Wheel(self.clock, speed, **kind)
 
+    def fit_card(self, **kind):
+        """Connect an SD card; with its driver on the board, if done before install(). kind: arguments of SdCard."""
+        self.card = SdCard(self.clock, **kind)
+
     # Called by the fake `machine`
 
     def connect_uart(self, pin, baud, receive):
@@ -238,6 +241,8 @@ class Board:
         return level
 
     def _drive_wire(self, number, level):
+        if self.card and number == self.card.cs:
+            self.card.select(level)
         for bus in self.buses:
             if number == bus.sda:
                 bus.set_sda(level)

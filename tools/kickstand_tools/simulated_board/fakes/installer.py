@@ -22,6 +22,10 @@ class Installer:
         self._replace("machine", fake_machine)
         if board.poses:
             self._replace("sys", fake_sys.posing(board.port, board.machine))
+        if board.card and board.card.driver:
+            from . import sdcard
+
+            self._replace("sdcard", sdcard)
         if sys.implementation.name == "micropython":
             self._replace("time", fake_time)
             self._replace("os", fake_os)
