@@ -22,6 +22,7 @@ from .wheel import Wheel
 
 __all__ = ["Board", "PowerOff", "Reset"]
 
+RELEASED_US = 150_000  # at least so long between two presses
 # The firmware's default pins: (SDA, SCL) of the sensor's bus and of the display's, button, GPS (RX), wheel
 WIRING = {"rp2": ((4, 5), (6, 7), 15, 9, 14), "esp32": ((21, 22), (18, 19), 4, 16, 27)}
 
@@ -52,6 +53,7 @@ class Board:
         self.sensor = Mpu6050(self.clock, world, who_am_i, sensor_address or 0x68)
         self.lcd = Lcd(self.clock, lcd_address or 0x27)
         self.button = Button(self.clock, seed)
+        self._released_us = 0  # when the last press is over that was asked for now
         self.watchdog = Watchdog(self.clock)
         sensor_pins, lcd_pins, self._button_pin, self._gps_pin, self.wheel_pin = WIRING[port]
         self.gps = None  # a Gps, if fitted
@@ -134,8 +136,13 @@ class Board:
         self.clock.every(to_us(period_s), function)
 
     def press(self, at_s=None, for_s=0.15):
-        """Press the button at at_s (now, if None) for for_s."""
-        self.button.press(self.clock.now_us if at_s is None else to_us(at_s), to_us(for_s))
+        """Press the button at at_s for for_s. None: now, or once the last such press is over: a finger cannot press
+        what it holds."""
+        at_us = to_us(at_s or 0.0)
+        if at_s is None:
+            at_us = max(self.clock.now_us, self._released_us)
+            self._released_us = at_us + to_us(for_s) + RELEASED_US
+        self.button.press(at_us, to_us(for_s))
 
     # Parts that are connected and disconnected
 
