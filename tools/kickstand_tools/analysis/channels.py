@@ -88,8 +88,13 @@ class Ride:
     def blocks(self, progress: Progress | None = None, notices: list[Notice] | None = None) -> Iterator[Channels]:
         """The ride from its beginning. progress, notices: of read_blocks(). Raises InputError."""
         lean = _Lean(self.calibration)
+        told = notices is None
         for block in read_blocks(self.log, progress=progress, notices=notices):
-            yield channels(block, self.calibration, lean.follow(block), self.car)
+            rows = lean.follow(block)
+            if not told and np.any(rows[:, 2] < 0.0):
+                told = True
+                notices.append(_absurd(block, int(np.argmax(rows[:, 2] < 0.0))))
+            yield channels(block, self.calibration, rows, self.car)
 
 
 def open_ride(log: Source, calibration: CalibrationFile | File | None = None) -> Ride:
@@ -171,11 +176,18 @@ def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool 
         block.speed_mps,
         temperature,
         lean[:, 1],
-        np.degrees(np.sqrt(lean[:, 2])),
+        np.degrees(np.sqrt(np.where(lean[:, 2] >= 0.0, lean[:, 2], np.nan))),
         lean[:, 3],
         lean[:, 4],
         lean[:, 5],
     )
+
+
+def _absurd(block: Block, at: int) -> Notice:
+    """The lean filter has lost itself at this row: what the readings of the second before it were."""
+    before = slice(int(np.searchsorted(block.time_us, block.time_us[at] - 1_000_000)), at + 1)
+    most = np.max(np.abs(block.readings[before]), axis=0)
+    return Notice("absurd-readings", block.time_us[at] / 1e6, float(np.max(most[4:])), float(np.max(most[:3])))
 
 
 def formula_lean_deg(left: Array, up: Array, yaw_rate: Array) -> Array:
