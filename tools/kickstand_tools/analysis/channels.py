@@ -13,7 +13,7 @@ from kickstand.errors import Notice
 from kickstand.lean.meter import FALLEN_DEG
 from numpy.typing import NDArray
 
-from ..calibration.file import CalibrationFile, calibration_path, read_calibration
+from ..calibration.file import CalibrationFile, calibration_beside, read_calibration
 from ..errors import InputError
 from ..logs.log import ROOM_TEMP_C
 from ..logs.reader import Block, Source, read_blocks
@@ -108,16 +108,9 @@ def open_ride(log: Source, calibration: CalibrationFile | File | None = None) ->
     >>> open_ride(log, CalibrationFile(aligned=True)).car
     False
     """
-    beside = None
-    if isinstance(log, (Path, str)):
-        path = Path(log)
-        beside = calibration_path(path)
-        if not path.is_file():
-            what = "is a directory: give the name of a ride in it" if path.is_dir() else "there is no such file"
-            raise InputError(f"{path}: {what}")
-        if calibration is None and not beside.exists():
-            raise InputError(f"{path}: no calibration {beside.name} beside it: give one with --calibration")
-    source = beside if calibration is None else calibration
+    source = calibration
+    if source is None and isinstance(log, (Path, str)):
+        source = calibration_beside(Path(log))
     if source is None:
         raise InputError(f"{name_of(log)}: an open file has no calibration beside it: give one")
     parameters = source if isinstance(source, CalibrationFile) else read_calibration(source)
