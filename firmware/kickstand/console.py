@@ -9,7 +9,7 @@ not-written|calibration not saved: {0}; the old one is kept
 read-back|calibration not saved: it reads back differently; the old one is kept
 no-driver|SD card: its driver is not on the board: mpremote mip install sdcard
 no-card|SD card: none that can be read ({0}): check card and wiring
-unreadable|config.py cannot be read ({1}{2}): mend it, then kickstand flash --config
+unreadable|config.py cannot be read ({1}{2}): correct it, then kickstand flash --config
 not-allowed|config.py: {0} = {1!r}, but it must be {2}
 no-setting|config.py: {0} is not a setting; see the list in that file
 card-pins|config.py: an SD card needs all of {1}

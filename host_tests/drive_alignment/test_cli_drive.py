@@ -82,7 +82,7 @@ def test_a_car(tmp_path, method):
     data = json.loads(out.read_text())
     assert data["gyro_bias_dps"] == pytest.approx([1.0, -2.0, 3.0], abs=0.02)
     assert (data["vehicle"], data["aligned"], data["six_positions"]) == ("car", True, False)
-    assert "straight: used, 1" in result.out
+    assert "in a straight line: event 1" in result.out
     assert "quality: " in result.out
     assert "ready after" in result.out
 
