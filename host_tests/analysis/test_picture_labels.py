@@ -2,6 +2,7 @@
 
 import itertools
 import types
+from typing import Any
 
 import numpy as np
 import pytest
@@ -22,7 +23,8 @@ def test_labels_of_the_share_of_each_lean(most, monkeypatch):
     figure = Figure(figsize=(11, 3), layout="constrained")
     canvas = backend.FigureCanvasAgg(figure)
     axes = figure.add_subplot(1, 3, 2)
-    picture._histogram(axes, None)
+    seen: Any = None  # what would be asked of it is given above
+    picture._histogram(axes, seen)
     canvas.draw()
     boxes = [text.get_window_extent() for text in axes.texts]
     assert len(boxes) == 3

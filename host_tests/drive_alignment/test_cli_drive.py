@@ -121,7 +121,7 @@ def test_what_is_used_of_several_logs_is_told_by_file_and_its_own_time(tmp_path)
     alone = command.works("calibrate", "drive", whole, "--out", tmp_path / "CAL.json").out
 
     def times(lines):
-        return [float(line.split(" s ")[0]) for line in lines if "straight: used" in line]
+        return [float(line.split(" s ")[0]) for line in lines if "in a straight line: event" in line]
 
     for part in times(a), times(c):
         assert len(part) >= 3

@@ -88,10 +88,10 @@ class Ride:
     def blocks(self, progress: Progress | None = None, notices: list[Notice] | None = None) -> Iterator[Channels]:
         """The ride from its beginning. progress, notices: of read_blocks(). Raises InputError."""
         lean = _Lean(self.calibration)
-        told = notices is None
+        told = False
         for block in read_blocks(self.log, progress=progress, notices=notices):
             rows = lean.follow(block)
-            if not told and np.any(rows[:, 2] < 0.0):
+            if notices is not None and not told and np.any(rows[:, 2] < 0.0):
                 told = True
                 notices.append(_absurd(block, int(np.argmax(rows[:, 2] < 0.0))))
             yield channels(block, self.calibration, rows, self.car)
