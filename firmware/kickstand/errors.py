@@ -45,6 +45,16 @@ def report(refusal):
         print(refusal.code)
 
 
+def checked(machine_code, plain, *arguments):
+    """machine_code, if it does with these arguments what plain does with copies of them; else plain, and the console
+    says so: MicroPython's compilers had errors on some boards."""
+    copies = [a if isinstance(a, (int, bytes)) else a[:] for a in arguments]
+    if machine_code(*arguments) == plain(*copies) and list(arguments) == copies:
+        return machine_code
+    report(Notice("wrong-code", plain.__name__))
+    return plain
+
+
 class CaptureError(Refusal):
     """A pose that was not held still, or readings that no still sensor gives."""
 

@@ -108,12 +108,14 @@ def test_a_kickstand_on_the_other_side_is_told(ride, tmp_path):
     cal = turned_round(tmp_path)
     line = "forward and backward are exchanged: calibrate two --side right?"
     said = command.works("report", ride, "--calibration", cal)
-    assert line in said.out.split("\n")
+    assert line in said.out
+    assert "do all accelerations have the opposite sign?" in " ".join(said.out.split())
     assert "No stop" not in said.out
     assert "MFDD" not in said.out  # of the wrong way round, no figure is right
     data = json.loads(command.works("report", ride, "--calibration", cal, "--json").out)
-    assert (data["remark"], data["stops"]) == (line, [])
-    assert f"{line}\n" in command.works("plot", ride, "--calibration", cal, "--out", tmp_path / "pictures").err
+    assert data["remark"].startswith(line)
+    assert data["stops"] == []
+    assert line in command.works("plot", ride, "--calibration", cal, "--out", tmp_path / "pictures").err
     car = tmp_path / "car.json"
     car.write_text(json.dumps(json.loads(cal.read_text()) | {"vehicle": "car"}))
     assert "exchanged: calibrate drive again?" in command.works("report", ride, "--calibration", car).out

@@ -97,7 +97,7 @@ class LeanMeter:
             return True
         if self._doubt:
             return False
-        return self.filter.variance <= MAX_VARIANCE and abs(self.filter.pitch_deg) < WHEELIE_DEG
+        return 0.0 <= self.filter.variance <= MAX_VARIANCE and abs(self.filter.pitch_deg) < WHEELIE_DEG
 
     def keep_trim(self):
         """Take the trim found so far into the calibration, if the bike stands, the trim is certain enough and it
