@@ -15,13 +15,13 @@ from .board import port
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
 from .devices import open_button
-from .imu.mpu6050 import GYRO_DELAY_S
 from .imu.sample_clock import SampleClock
 from .lean.meter import LeanMeter
 from .ui.screen import Screen
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
-COLLECT_TURNS = 25  # in which 70 KB of heap are used: less than half of what is free
+COLLECT_TURNS = 36  # in which 100 KB of heap are used, of 120 that are free while recording
+COLLECT_TURNS_DRIVING = 25  # while aligning by driving: 85 KB of heap are free
 SINGLE_GAPS = 300  # single free blocks that a collection leaves
 PAGE_MS = 100
 FIRST_PAGE_MS = 60  # from the start of the sensor: then the lean filter's first window is over
@@ -53,15 +53,16 @@ class App:
         self.lcd = lcd
         self.button = open_button(settings)
         self.sensor = sensor
-        self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle", GYRO_DELAY_S[settings.DLPF])
+        self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle", sensor.chip.gyro_delay_s)
         self.calibration = ActiveCalibration(self.meter, self._calibration_changed)
         self.drive = self._open_drive() if settings.SPEED else None
         self.recorder = None
         self._keeper = keeper
+        self.clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self.screen = Screen(self)
-        self._clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self._restarts = 0
         self._record_due = settings.RECORD or keeper is not None
+        self._on_card = settings.SD_SPI is not None and keeper is None
         self._page_ms = ticks_ms()
 
     def _open_drive(self):
@@ -82,42 +83,50 @@ class App:
             raise
 
     def _loop(self):
+        if self._on_card:
+            from .rides import card_trial
+
+            self.lcd.show("SD card", "is being read")
+            self.lcd.flush()
+            self.recorder = self._open_recorder()
+            card_trial.prepare(self.recorder, self.settings)
         watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         gc.threshold(-1)
         due_us = ticks_us()
-        turns = 0
+        most = COLLECT_TURNS_DRIVING if self.drive else COLLECT_TURNS
+        turns = port.turns_to_collect(most)
         while True:
             self.turn()
-            turns += 1
-            if turns >= COLLECT_TURNS:  # here, not in the middle of a sample: meanwhile the FIFO keeps what comes
-                turns = 0
+            turns -= 1
+            if turns <= 0:  # here, not in the middle of a sample: meanwhile the FIFO keeps what comes
                 gc.collect()
                 fill_gaps(SINGLE_GAPS)
+                turns = port.turns_to_collect(most)
             if watchdog:
                 watchdog.feed()
             due_us = ticks_add(due_us, LOOP_US)
             wait_us = ticks_diff(due_us, ticks_us())
             if wait_us > 0:
                 sleep_us(wait_us)
-            else:  # late, as after setting the chip up: count from here instead of racing to catch up
+            else:  # late, as after writing to flash: count from here instead of racing to catch up
                 due_us = ticks_us()
 
     def turn(self):
         """One turn of the loop: the samples that wait, one press, at most one transfer to the display. It waits for
-        nothing but the start of the sensor (0.2 s)."""
+        nothing."""
         now_us, now_ms = ticks_us(), ticks_ms()
         n = self.sensor.fetch(now_ms)
         if n:
-            dt_us = self._clock.step(n, now_us)
+            dt_us = self.clock.step(n, now_us)
             self._take(n, dt_us, now_ms)
         if self.drive:
             self._poll_speed(now_ms)
         self.sensor.check(now_ms)
         if self.sensor.fault is not None:
-            self._clock.restart()
+            self.clock.restart()
             self.screen.interrupt(now_ms)
         elif self.sensor.emptied:
-            self._clock.emptied(now_us)
+            self.clock.emptied(now_us)
         event = self.button.poll(now_ms)
         if event:
             self.screen.press(event, now_ms)
