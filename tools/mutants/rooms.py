@@ -17,7 +17,14 @@ class Room(NamedTuple):
 ROOMS = {
     "imu": Room(
         (FIRMWARE + "imu/*.py",),
-        (TESTS + "imu/*.py", TESTS + "device/test_device_faults.py"),
+        (
+            TESTS + "imu/test_sensor.py",
+            TESTS + "imu/test_sample_clock.py",
+            TESTS + "imu/test_registers.py",
+            TESTS + "imu/test_batches.py",
+            TESTS + "imu/test_drivers.py",
+            TESTS + "device/test_device_faults.py",
+        ),
     ),
     "calibration": Room(
         (FIRMWARE + "calibration/*.py", FIRMWARE + "rotation.py"),
