@@ -52,7 +52,7 @@ def test_before_the_first_sample_there_is_nothing_to_correct():
 
 
 def test_the_last_of_the_first_samples_is_the_newest():
-    """Four of them at once: emptied at the same time, the clock is half a period early, and 1/16 of that is put right."""
+    """Four of them at once: emptied at the same time, the clock is half a period early; 1/16 of that is put right."""
     own = clock()
     own.step(4, 100_000)
     own.emptied(100_000)
