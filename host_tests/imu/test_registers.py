@@ -4,6 +4,7 @@ The values are those of the register map, RM-MPU-6000A rev 4.2, and of the other
 """
 
 import pytest
+from kickstand_tools.simulated_board.mpu6050_registers import DLPF_DELAY_US
 from kickstand_tools.simulated_board.simulator import Board
 
 SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, ACCEL_CONFIG2, FIFO_EN = 0x19, 0x1A, 0x1B, 0x1C, 0x1D, 0x23
@@ -84,6 +85,38 @@ def test_the_low_pass_of_the_accelerometer_of_an_mpu6500_is_set_too():
         (ACCEL_CONFIG, 0x10),
         (ACCEL_CONFIG2, 4),
     ]
+
+
+@pytest.mark.parametrize(
+    ("accel_g", "accel_bits", "lsb_per_g"), [(2, 0x00, 16384), (4, 0x08, 8192), (8, 0x10, 4096), (16, 0x18, 2048)]
+)
+@pytest.mark.parametrize(
+    ("gyro_dps", "gyro_bits", "lsb_per_dps"),
+    [(250, 0x00, 131.0), (500, 0x08, 65.5), (1000, 0x10, 32.8), (2000, 0x18, 16.4)],
+)
+def test_ranges_and_their_counts(accel_g, accel_bits, lsb_per_g, gyro_dps, gyro_bits, lsb_per_dps):
+    """Register map pp. 14, 15, 29 and 31."""
+    wires = Wires()
+    chip = started(wires, accel_range_g=accel_g, gyro_range_dps=gyro_dps)
+    assert (wires.registers[ACCEL_CONFIG], wires.registers[GYRO_CONFIG]) == (accel_bits, gyro_bits)
+    assert (chip.accel_range_g, chip.accel_lsb_per_g, chip.gyro_lsb_per_dps) == (accel_g, lsb_per_g, lsb_per_dps)
+
+
+def test_one_burst_is_one_reading():
+    """Registers 0x3B to 0x48 (p. 29): accelerometer, temperature, gyro."""
+    wires = Wires()
+    chip = started(wires)
+    wires.registers[0x3B:0x49] = bytes(range(0x70, 0x70 + 28, 2))
+    chip.read()
+    assert list(chip.counts[:2]) == [0x7072, 0x7476]
+    assert list(chip.counts[4:]) == [(high << 8 | high + 2) - 65536 for high in (0x80, 0x84, 0x88)]
+
+
+def test_the_delay_of_each_low_pass():
+    """Of the gyro, p. 13, in seconds."""
+    from kickstand.imu.mpu6050 import GYRO_DELAY_S
+
+    assert GYRO_DELAY_S == {dlpf: DLPF_DELAY_US[dlpf] / 1e6 for dlpf in range(1, 7)}
 
 
 def test_the_defaults_are_8_g_500_dps_and_200_samples_a_second():
@@ -264,6 +297,22 @@ def test_readings_that_repeat_for_100_ms_are_frozen(rate_hz, good):
     chip.setup()
     wires.waiting = 14
     assert accepted() == good - 1  # the reading that it knows repeats once more
+
+
+def test_samples_of_a_fetch_are_taken_and_added_up():
+    wires = Wires()
+    chip = started(wires)
+    wires.waiting = 42
+    assert chip.fetch() == 3
+    for k in range(3):
+        for i in range(7):
+            value = 1000 * (k + 1) - 500 * i
+            chip._frames[14 * k + 2 * i : 14 * k + 2 * i + 2] = value.to_bytes(2, "big", signed=True)
+    for k in range(3):
+        chip.take(k)
+        assert list(chip.counts) == [1000 * (k + 1) - 500 * i for i in range(7)]
+    assert chip.add_up(2) == 2
+    assert list(chip.sums) == [3000 - 1000 * i for i in range(7)]
 
 
 def test_another_bus_may_take_its_place():
