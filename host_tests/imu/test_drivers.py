@@ -8,7 +8,6 @@ import textwrap
 
 import pytest
 from kickstand_tools import unix_port
-from kickstand_tools.simulated_board.mpu6050_registers import VARIANTS
 from kickstand_tools.simulated_board.simulator import Board
 
 needs_micropython = pytest.mark.skipif(
@@ -97,17 +96,6 @@ def test_every_range_reads_in_units(board, accel_range, gyro_range):
     assert accel == pytest.approx([0.25, -0.5, 1.0], abs=1e-3)
     assert gyro == pytest.approx([10, -20, 30], abs=0.1)
     assert temperature == pytest.approx(30, abs=0.1)
-
-
-def test_the_simulated_board_models_every_chip_of_the_driver(board):
-    """Without a model of its own a chip would be tested as an MPU6050."""
-    from kickstand.imu.mpu6050 import CHIPS
-
-    assert set(CHIPS) == set(VARIANTS)
-    for who_am_i, (_, counts_per_c, zero_c, has_accel_config2, fifo_bytes, _) in CHIPS.items():
-        model = VARIANTS[who_am_i]
-        assert (counts_per_c, zero_c, has_accel_config2) == (model.counts_per_c, model.zero_c, model.has_accel_config2)
-        assert fifo_bytes <= model.fifo_bytes
 
 
 def test_the_example_in_the_drivers_docstring_runs(board, capsys):

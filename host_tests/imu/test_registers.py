@@ -4,7 +4,7 @@ The values are those of the register map, RM-MPU-6000A rev 4.2, and of the other
 """
 
 import pytest
-from kickstand_tools.simulated_board.mpu6050_registers import DLPF_DELAY_US
+from kickstand_tools.simulated_board.mpu6050_registers import DLPF_DELAY_US, VARIANTS
 from kickstand_tools.simulated_board.simulator import Board
 
 SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, ACCEL_CONFIG2, FIFO_EN = 0x19, 0x1A, 0x1B, 0x1C, 0x1D, 0x23
@@ -229,6 +229,19 @@ def test_temperature_by_the_data_sheet(who_am_i, name, zero_c, per_degree):
     assert chip.name == name
     assert chip.temperature_c(0) == zero_c
     assert chip.temperature_c(10 * per_degree) == pytest.approx(zero_c + 10.0)
+
+
+def test_the_simulated_board_models_every_chip_of_the_driver():
+    """Without a model of its own a chip would be tested as an MPU6050. The driver may use less of a FIFO than there
+    is."""
+    from kickstand.imu.mpu6050 import CHIPS
+
+    assert set(CHIPS) == set(VARIANTS)
+    for who_am_i, (_, counts_per_c, zero_c, has_accel_config2, fifo_bytes, bits) in CHIPS.items():
+        model = VARIANTS[who_am_i]
+        assert (counts_per_c, zero_c, has_accel_config2) == (model.counts_per_c, model.zero_c, model.has_accel_config2)
+        assert fifo_bytes == (512 if who_am_i == MPU6886 else model.fifo_bytes)
+        assert bits == (0x18 if model.temperature_in_fifo else 0xF8)
 
 
 @pytest.mark.parametrize(
