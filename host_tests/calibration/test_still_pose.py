@@ -4,7 +4,7 @@ import pytest
 from kickstand.calibration.still_pose import StillPose
 from kickstand.errors import CaptureError
 
-LEVEL = (100, -200, 8192, -521, 65, -131, 655)
+LEVEL: tuple[int, ...] = (100, -200, 8192, -521, 65, -131, 655)
 WITHIN, BEYOND = 0.98, 1.02
 
 
@@ -55,6 +55,7 @@ def test_an_axis_at_the_end_of_its_range_is_saturated(axis, sign):
         for row in rows:
             row[axis] = sign * count
         assert problem_of(rows) == code
+        assert StillPose(8192, 65.5, 32700, 100).add(rows[0]) is (code is None)
 
 
 @pytest.mark.parametrize("axis", [4, 5, 6])

@@ -95,7 +95,7 @@ def test_a_set_up_that_fails_is_tried_again_50_ms_later(board):
     sensor.fetch(ended_ms + 49)
     assert chip.calls.count("setup") == 1
     sensor.fetch(ended_ms + 51)
-    assert (code(sensor), sensor.fault.values) == ("unknown-chip", (0x55,))
+    assert sensor.fault and (sensor.fault.code, sensor.fault.values) == ("unknown-chip", (0x55,))
     sensor.fetch(board.clock.now_us // 1000 + 51)
     assert (chip.calls.count("setup"), sensor.restarts) == (3, 1)
     assert code(sensor) == "unknown-chip"  # until a sample has come
