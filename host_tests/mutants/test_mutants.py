@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.append(str(ROOT / "tools" / "mutants"))
 
-import rooms  # noqa: E402  # pyright: ignore[reportMissingImports]
+import rooms  # noqa: E402
 
 
 @pytest.mark.parametrize("name", rooms.ROOMS)
@@ -26,7 +26,7 @@ def test_every_pattern_of_the_table_has_files(name):
 def changed(tmp_path):
     """Every changed text of a file, by the lines that differ."""
     pytest.importorskip("cosmic_ray", reason="needs the extra mutants")
-    from changes import changes  # pyright: ignore[reportMissingImports]
+    from changes import changes
 
     def all_of(text):
         (tmp_path / "code.py").write_text(text)
