@@ -217,3 +217,19 @@ def test_a_real_recording_leans_as_gravity_says(tmp_path, shared_data, engine):
         assert abs(true_lean) > 40
         assert abs(np.mean(shown) - true_lean) < 2.0
         assert abs(shown[-1] - true_lean) < 2.0
+
+
+def test_the_calibration_beside_the_log_is_taken(tmp_path):
+    """As report, plot and export take it; and what replay has written is not taken for a log."""
+    log = analysis_rides.short(tmp_path)
+    beside = log.with_name(log.name.split(".")[0] + ".cal.json")
+    beside.unlink(missing_ok=True)
+    lean = tmp_path / "LEAN.csv"
+    command.refused(tmp_path, "replay", log, "--out", lean, words=f"no calibration {beside.name} beside it")
+    beside.write_text(json.dumps(analysis_rides.CALIBRATION))
+    command.works("replay", log, "--out", lean)
+    for name in "replay", "report":
+        more = ["--out", tmp_path / "x.csv"] if name == "replay" else []
+        words = "LEAN.csv holds the lean that kickstand has computed: give the log that it was made from"
+        command.refused(tmp_path, name, lean, *more, words=words)
+    command.refused(tmp_path, "report", lean, "--calibration", beside, words=words)

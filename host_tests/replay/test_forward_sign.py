@@ -53,15 +53,20 @@ def test_a_ride_across_does_not_accuse():
     assert not found.exchanged
 
 
+SIGN = " Or, if no board wrote this log, do all accelerations have the opposite sign? At rest up reads +1 g"
+
+
 def exchanged_line(car, side, roll_deg=None):
     calibration = CalibrationFile(vehicle="car" if car else "", kickstand_side=side)
     return sentence(exchanged_notice(calibration, roll_deg))
 
 
 def test_what_is_said():
-    assert exchanged_line(False, "left", 0.0).endswith("exchanged: calibrate two --side right?")
-    assert exchanged_line(False, "right", -3.9).endswith("exchanged: calibrate two --side left?")
-    assert exchanged_line(False, "", 0.0).endswith("calibrate two with the other --side?")
+    """Where both forward and left may be reversed, the sign of the log is named as the other cause: the other side of
+    the kickstand would make a clean report of it, mirrored."""
+    assert exchanged_line(False, "left", 0.0).endswith("exchanged: calibrate two --side right?" + SIGN)
+    assert exchanged_line(False, "right", -3.9).endswith("exchanged: calibrate two --side left?" + SIGN)
+    assert exchanged_line(False, "", 0.0).endswith("calibrate two with the other --side?" + SIGN)
     assert exchanged_line(False, "left", -4.1).endswith("exchanged: were the poses swapped?")
-    assert exchanged_line(False, "left").endswith("calibrate two --side right? Or were the poses swapped?")
+    assert exchanged_line(False, "left").endswith("calibrate two --side right? Or were the poses swapped?" + SIGN)
     assert exchanged_line(True, "").endswith("exchanged: calibrate drive again?")
