@@ -68,7 +68,7 @@ ROOMS = {
     ),
     "export": Room(
         (TOOLS + "analysis/export/*.py",),
-        (TESTS + "analysis/test_cli_export.py",),
+        (TESTS + "analysis/test_export_formats.py", TESTS + "analysis/test_cli_export.py"),
     ),
     "stops": Room(
         (TOOLS + "analysis/stops/*.py",),
