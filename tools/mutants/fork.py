@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 WARM = ("numpy", "hypothesis", "click", "rich.console", "matplotlib.pyplot", "pandas", "plotly.graph_objects")
+WARM += ("pyarrow.parquet",)
 # Without MicroPython, where a test can choose: a process each is slow, and the same tests run on CPython.
 ARGUMENTS = ("-x", "-q", "-k", "not micropython", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0")
 KILLED, SURVIVED, TIMED_OUT = "killed", "survived", "timed out"

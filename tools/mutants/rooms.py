@@ -73,9 +73,9 @@ ROOMS = {
     "stops": Room(
         (TOOLS + "analysis/stops/*.py",),
         (
-            TESTS + "analysis/test_analysis_brake_test.py",
+            TESTS + "analysis/test_stops_closed_form.py",
             TESTS + "analysis/test_analysis_standstill.py",
-            TESTS + "analysis/test_cli_report.py",
+            TESTS + "analysis/test_analysis_brake_test.py",
         ),
     ),
     "simulation": Room(
