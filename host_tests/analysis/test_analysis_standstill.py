@@ -58,7 +58,7 @@ def test_what_was_integrated_to_a_standstill_that_was_none_is_not_shown(track, m
 
 
 def test_what_is_plausible():
-    """Up to 250 km/h, 15 m to a side, 30 degrees; 3 m/s left over, and 0.7 m/s more for each second of half a minute."""
+    """Up to 250 km/h, 15 m to a side, 30 degrees; 3 m/s left over, and 0.7 m/s more each second of half a minute."""
     for sign in 1.0, -1.0:
         assert plausible(69.4, 14.9 * sign, 29.9 * sign)
         assert not plausible(69.5, 0.0, 0.0)
