@@ -74,6 +74,7 @@ ROOMS = {
         (TOOLS + "analysis/stops/*.py",),
         (
             TESTS + "analysis/test_stops_closed_form.py",
+            TESTS + "analysis/test_speed_fit.py",
             TESTS + "analysis/test_analysis_standstill.py",
             TESTS + "analysis/test_analysis_brake_test.py",
         ),
