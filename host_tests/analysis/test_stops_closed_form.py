@@ -288,3 +288,25 @@ def test_satellites_never_quite_say_0(mps, stands):
     ride = road.channels(speed_mps=np.full(len(road.t_s), mps))
     assert standing(ride).all() == stands
     assert standing(ride).any() == stands
+
+
+def test_a_log_that_begins_on_the_move():
+    """No standstill before tells that the speed there was 0."""
+    ride = braking(20.0, 5.0).channels()
+    (stop,) = find_stops(ride.part(ride.t_s >= 11.0))
+    assert stop.initial_speed_mps == pytest.approx(20.0, rel=0.003)
+
+
+def test_stops_are_looked_for_in_fifty_samples_a_second():
+    """Of a log with 200, each the mean of four: of a time of 13.88, 13.885, 13.89 and 13.895 s."""
+    road = Road((REST_S, 0.0), (5.0, 4.0), (4.0, 0.0), (4.0, -5.0), (REST_S, 0.0), rate_hz=200.0)
+    (stop,) = find_stops(road.channels())
+    assert stop.start_s == pytest.approx(13.8875, abs=1e-6)
+    assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.002)
+
+
+@pytest.mark.parametrize(("samples", "counts"), [(10, False), (11, True)])
+def test_a_standstill_that_is_too_short_tells_no_slope(samples, counts):
+    """A fifth of a second."""
+    road = Road((REST_S, 0.0), (5.0, 4.0), (4.0, 0.0), (4.0, -5.0), (samples / RATE_HZ, 0.0), (10.0, 2.0))
+    assert len(find_stops(road.channels())) == counts
