@@ -310,3 +310,13 @@ def test_a_standstill_that_is_too_short_tells_no_slope(samples, counts):
     """A fifth of a second."""
     road = Road((REST_S, 0.0), (5.0, 4.0), (4.0, 0.0), (4.0, -5.0), (samples / RATE_HZ, 0.0), (10.0, 2.0))
     assert len(find_stops(road.channels())) == counts
+
+
+def test_the_straight_line_is_the_direction_just_before_braking():
+    """That of the first tenth of a second of the stop, in which the vehicle here turns by half a degree: in the mean a
+    quarter is behind it and a quarter before it."""
+    road = braking(20.0, 5.0)
+    begin = 14.0 - 0.12
+    ride = road.channels(yaw_rate_dps=np.where((road.t_s > begin - 0.01) & (road.t_s < begin + 0.09), 5.0, 0.0))
+    (stop,) = find_stops(ride)
+    assert stop.side_m == pytest.approx(42.4 * np.sin(np.radians(0.25)), rel=0.1)
