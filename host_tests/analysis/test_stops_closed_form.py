@@ -321,3 +321,23 @@ def test_the_straight_line_is_the_direction_just_before_braking():
     ride = road.channels(yaw_rate_dps=np.where((road.t_s > begin - 0.01) & (road.t_s < begin + 0.09), 5.0, 0.0))
     (stop,) = find_stops(ride)
     assert stop.side_m == pytest.approx(42.4 * np.sin(np.radians(0.25)), rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("hard", "easy", "earlier_s"),
+    [((2.0, -6.0), (1.4, -2.0), 0.71), ((10.0 / 9.0, -9.0), (2.4, -2.0), 4.08)],
+)
+def test_how_hard_the_braking_was_is_that_of_its_last_two_seconds(hard, easy, earlier_s):
+    """A quarter of them at 6 m/s2 is enough before it is eased to 2: 15 % are 0.9, more than the engine's 0.8. What is
+    over before them does not count: 15 % are 0.3, and it began with the engine's."""
+    legs = (REST_S, 0.0), (6.0, 3.0), (3.0, 0.0), (4.0, -0.8), hard, easy, (REST_S, 0.0)
+    (stop,) = find_stops(Road(*legs).channels())
+    assert REST_S + 6.0 + 3.0 + 4.0 - stop.start_s == pytest.approx(earlier_s, abs=0.025)
+
+
+def test_the_vehicle_may_roll_out():
+    """The last metre a second at 0.4 m/s2: the brakes are off, and the stop is that before it."""
+    legs = (REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (1.25, -0.4), (REST_S, 0.0)
+    (stop,) = find_stops(Road(*legs).channels())
+    assert stop.initial_speed_mps == pytest.approx(20.0, rel=1e-3)
+    assert stop.mfdd_mps2 == pytest.approx(5.0, rel=1e-3)
