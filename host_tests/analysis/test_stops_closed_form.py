@@ -341,3 +341,13 @@ def test_the_vehicle_may_roll_out():
     (stop,) = find_stops(Road(*legs).channels())
     assert stop.initial_speed_mps == pytest.approx(20.0, rel=1e-3)
     assert stop.mfdd_mps2 == pytest.approx(5.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(("samples", "settled"), [(30, False), (31, True)])
+def test_a_short_standstill_is_used_from_its_beginning(samples, settled):
+    """After half a second, in which the fork comes up, six samples are needed. With less, it is in the slope."""
+    road = Road((REST_S, 0.0), (5.0, 4.0), (4.0, 0.0), (4.0, -5.0), (samples / RATE_HZ, 0.0), (10.0, 2.0))
+    ride = road.channels()
+    ride.forward_g[(road.t_s > 18.01) & (road.t_s < 18.45)] += 0.05
+    (stop,) = find_stops(ride)
+    assert (stop.mfdd_mps2 == pytest.approx(5.0, rel=0.003)) is settled

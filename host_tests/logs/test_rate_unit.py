@@ -4,7 +4,6 @@ import analysis_rides
 import command
 import numpy as np
 import pytest
-from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.logs.rate_unit import RateUnit
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.refusals import sentence
@@ -81,42 +80,3 @@ def test_the_commands_say_so_in_one_line(tmp_path, name):
 def test_recordings(shared_data):
     for log in shared_data.glob("*.csv.gz"):
         assert judged(read_log(log)) == "", log
-
-
-def bends(
-    mps=300.0, grown=1.4142, along=1.0, seconds=12, straight_s=200, hz=50, before_s=0, rest_s=0
-) -> RateUnit:
-    """A ride at 0.04 of this speed whose rates are so much too small; bends at the end, after straight riding.
-
-    grown: force in a bend, times the usual one. along: share of it along its usual direction. before_s: of bends at
-    the very beginning, rest_s later; both are given in blocks of 100 s.
-    """
-    time = np.arange(0.0, before_s + rest_s + straight_s + seconds, 1.0 / hz)
-    leaned = (time < before_s) | (time >= before_s + rest_s + straight_s)
-    rate = np.degrees(STANDARD_GRAVITY * np.sqrt(grown**2 - 1.0) / mps)
-    force = np.where(leaned[:, None], np.array([0.0, grown, grown * np.sqrt(1.0 / along**2 - 1.0)]), [0.0, 1.0, 0.0])
-    rates = np.where(leaned[:, None], [0.6 * rate, 0.8 * rate, 0.0], 0.0)
-    unit = RateUnit()
-    for start in range(0, len(time), 100 * hz):
-        part = slice(start, start + 100 * hz)
-        unit.add(time[part], force[part], rates[part])
-    return unit
-
-
-@pytest.mark.parametrize(
-    ("wrong", "right"),
-    [
-        ({"mps": 201.0}, {"mps": 199.0}),  # 200 m/s: no motorcycle is as fast
-        ({"grown": 1.16}, {"grown": 1.14}),  # 30 degrees of lean
-        ({"along": 0.975}, {"along": 0.965}),  # braking turns the force by more than 14 degrees
-        ({"seconds": 10}, {"seconds": 9}),  # enough of bends
-        ({"hz": 10}, {"hz": 9}),  # samples in a second, so that vibration averages out
-        ({"before_s": 5, "rest_s": 3300, "seconds": 5}, {"before_s": 5, "rest_s": 3500, "seconds": 5}),  # one hour
-    ],
-)
-def test_what_it_takes_to_be_sure(wrong, right):
-    notice = bends(**wrong).notice
-    assert notice
-    assert notice.code == "rates-in-radians"
-    assert notice.values[0] == pytest.approx(wrong.get("mps", 300.0), rel=0.01)
-    assert bends(**right).notice is None
