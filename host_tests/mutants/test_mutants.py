@@ -31,11 +31,14 @@ def changed(tmp_path):
     def all_of(text):
         (tmp_path / "code.py").write_text(text)
         before = text.splitlines()
-        found = changes(Path("code.py"), tmp_path)
-        for change in found:
-            differing = [k for k, line in enumerate(change.mutant.splitlines()) if line != before[k]]
-            assert differing == [change.line - 1]
-        return [change.mutant.splitlines()[change.line - 1].strip() for change in found]
+        lines = []
+        for change in changes(Path("code.py"), tmp_path):
+            mutant = change.mutant(text)
+            if mutant is not None:
+                after = mutant.splitlines()
+                assert [k for k, line in enumerate(after, 1) if line != before[k - 1]] == [change.line]
+                lines.append(after[change.line - 1].strip())
+        return lines
 
     return all_of
 

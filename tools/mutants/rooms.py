@@ -8,7 +8,7 @@ FIRMWARE, TOOLS, TESTS = "firmware/kickstand/", "tools/kickstand_tools/", "host_
 
 class Room(NamedTuple):
     """sources, tests: patterns of files, from the project's root; the tests in the order in which they run, so those
-    that notice most in least time first."""
+    that notice most in least time first; before them all that of the same name as the code."""
 
     sources: tuple[str, ...]
     tests: tuple[str, ...]
@@ -29,7 +29,8 @@ ROOMS = {
         (
             TESTS + "calibration/test_rotation.py",
             TESTS + "calibration/test_calibration.py",
-            TESTS + "calibration/test_poses.py",
+            TESTS + "calibration/test_still_pose.py",
+            TESTS + "calibration/test_pose_taker.py",
             TESTS + "calibration/test_active.py",
             TESTS + "calibration/test_two_position.py",
             TESTS + "imu/test_batches.py",
