@@ -27,7 +27,7 @@ def test_times_count_from_the_first_sample():
     again = log_of(3, 5.0)
     again = Log(again.t_s, again.accel_g, again.gyro_dps, start_s=again.start_s)
     assert again.start_s == 5.0
-    assert Log([2.0, 3.0], [FORCE] * 2, [RATE] * 2, start_s=10.0).start_s == 12.0
+    assert Log(np.array([2.0, 3.0]), log.accel_g[:2], log.gyro_dps[:2], start_s=10.0).start_s == 12.0
 
 
 def test_the_chips_order_and_the_names_of_the_columns():
@@ -64,7 +64,7 @@ def test_what_does_not_fit_is_refused(changed, words):
 
 
 def test_a_microsecond_apart_is_enough():
-    assert Log([0.0, 1e-6], [FORCE] * 2, [RATE] * 2).time_us.tolist() == [0, 1]
+    assert Log(np.array([0.0, 1e-6]), np.tile(FORCE, (2, 1)), np.tile(RATE, (2, 1))).time_us.tolist() == [0, 1]
 
 
 def test_a_log_in_memory_comes_in_blocks(monkeypatch):
