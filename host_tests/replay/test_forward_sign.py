@@ -151,3 +151,14 @@ def test_seconds_without_a_speed_or_without_samples():
     assert told(time[:0], force[:0], speed[:0]).correlation is None
     far = told(np.concatenate((time, time + 4e5)), np.tile(force, 2), np.tile(speed, 2))
     assert far.correlation is None  # four days: not one ride
+
+
+@pytest.mark.parametrize("block", [3, 4, 7, 16])
+def test_a_block_may_end_within_a_second_before_its_speed(block):
+    time, force, speed = jerky()
+    columns = time, force, np.roll(speed, 5)
+    found = ForwardSign()
+    for start in range(0, len(time), block):
+        found.add(*(column[start : start + block] for column in columns))
+    assert np.allclose(found._seconds, told(*columns)._seconds, equal_nan=True)
+    assert found.correlation == pytest.approx(told(*columns).correlation)
