@@ -123,14 +123,14 @@ def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
 
 class Linearisation:
     """(1) to (6) about the state x, at a window's means of the corrected rates (3 values) and of the forward force.
-    known: the lean is certain enough to tell the turn rate of a bike in balance.
+    lean_variance: rad^2, of the lean, which tells the turn rate of a bike in balance only where it is known.
 
     Each ..._row of the Jacobians is ((state, partial derivative), ...): lean, pitch and speed of the rates of change
     (1) to (3), left and up of the forces (4) and (5), level of (6). Derivatives that are zero are left out, and terms
     that are small because pitch, yaw error, scale and cross-axis errors are. The other attributes are values of terms.
     """
 
-    def __init__(self, x, rates, forward, known=True):
+    def __init__(self, x, rates, forward, lean_variance=0.0):
         wx, wy, wz = rates
         speed, yaw_error = x[SPEED], x[YAW_ERROR]
         st, ct, sq = sin(x[LEAN]), cos(x[LEAN]), sin(x[PITCH])
@@ -138,7 +138,7 @@ class Linearisation:
         yaw_rate = wx * st + wy * ct  # about the vertical, where there is no pitch
         sideways = speed * wy
         acceleration = forward - sq + sideways * yaw_error
-        turn_x, turn_y = turn_rates(speed if known else 0.0, st, ct, cq, wx, wy)
+        turn_x, turn_y = turn_rates(speed if lean_variance < BALANCE_SIGMA**2 else 0.0, st, ct, cq, wx, wy)
         self.lean_row = (
             (PITCH, -yaw_rate / (cq * cq)),  # d lean' / d q
             (BIAS_FORWARD, -1.0),  # d lean' / d b_z

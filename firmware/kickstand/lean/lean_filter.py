@@ -14,25 +14,14 @@ from math import atan2, degrees, pi, sin, sqrt
 
 from ..units import STANDARD_GRAVITY
 from . import measurements
-from .bike_model import (
-    BALANCE_SIGMA,
-    BIAS_LEFT,
-    LEAN,
-    MAX_PITCH,
-    PITCH,
-    SPEED,
-    STATES,
-    YAW_ERROR,
-    Linearisation,
-    predict,
-)
+from .bike_model import BIAS_LEFT, LEAN, MAX_PITCH, PITCH, SPEED, STATES, YAW_ERROR, Linearisation, predict
 from .kalman import Covariance
 from .rest import MAX_BIAS_RADPS, RestDetector
 from .upright_trim import UprightTrim
 
 WINDOW_US = 200_000
 FIRST_WINDOW_US = 50_000
-PIECES = 21  # of the work on a window; a test counts them
+PIECES = 18  # of the work on a window; a test counts them
 SLOW_STEP_US = 12_000  # samples that are further apart leave time for all pieces at once
 DELAY_S = 0.0048  # of the MPU6050's gyro at DLPF 3
 MAX_SPEED = 150.0 / STANDARD_GRAVITY
@@ -196,8 +185,7 @@ class LeanFilter:
     def _process(self, means, seconds, roll_acceleration):
         """Linearise, update and inject for one window; a generator of short pieces."""
         p = self._p
-        known = p.rows[LEAN][LEAN] < BALANCE_SIGMA**2
-        model = Linearisation(self._x, means[2:5], means[7], known)
+        model = Linearisation(self._x, means[2:5], means[7], p.rows[LEAN][LEAN])
         yield
         noise = measurements.NOISE_ANGLE**2 * seconds
         yield from p.propagate_row(LEAN, model.lean_row, seconds, noise)
