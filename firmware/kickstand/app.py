@@ -20,7 +20,7 @@ from .lean.meter import LeanMeter
 from .ui.screen import Screen
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
-COLLECT_TURNS = 36  # in which 100 KB of heap are used, of 120 that are free while recording
+COLLECT_TURNS = 42  # in which 90 KB of heap are used, of 120 that are free while recording
 COLLECT_TURNS_DRIVING = 25  # while aligning by driving: 85 KB of heap are free
 SINGLE_GAPS = 300  # single free blocks that a collection leaves
 PAGE_MS = 100
@@ -133,7 +133,7 @@ class App:
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self._show(now_ms)
         self.lcd.tick(now_ms)
-        if self.recording:
+        if self.recorder and self.recorder.active:  # recording() would cost 20 us
             self.recorder.tick()
             if self.recorder.take_stall() and self.drive:
                 self.drive.speed.after_stall(ticks_ms())
@@ -189,7 +189,7 @@ class App:
             self._sensor_started()
         chip = self.sensor.chip
         self.meter.update_sum(chip.sums, n, dt_us)
-        if self.recording:
+        if self.recorder and self.recorder.active:
             self.recorder.add(chip.sums, n, dt_us)
         if self.drive:
             self.drive.feed(chip.sums, n, dt_us, now_ms)

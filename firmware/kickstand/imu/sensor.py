@@ -51,8 +51,12 @@ class Sensor:
             if self._ready:
                 self._start(now_ms)
             return 0
-        waiting = self._transfer(now_ms)
-        if waiting < 0:
+        try:
+            if self._failures:
+                self.chip.restart_fifo()  # the transfer that failed may have left half a frame in the FIFO
+            waiting = self.chip.fetch()
+        except OSError:
+            self._missed(now_ms)
             return 0
         self._failures = 0
         if not waiting:
@@ -65,16 +69,6 @@ class Sensor:
         if good < waiting:
             self._fail("sensor-frozen", now_ms)
         return good
-
-    def _transfer(self, now_ms):
-        """Read the samples that have come in; return how many, or -1 for a transfer that failed."""
-        try:
-            if self._failures:
-                self.chip.restart_fifo()  # the transfer that failed may have left half a frame in the FIFO
-            return self.chip.fetch()
-        except OSError:
-            self._missed(now_ms)
-            return -1
 
     def _no_sample(self, now_ms):
         """The FIFO held no sample. After an overflow that is no fault, because the FIFO was just emptied."""

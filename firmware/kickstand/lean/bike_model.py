@@ -57,7 +57,7 @@ MAX_PITCH = 1.2  # rad. No motorcycle reaches it, a sensor in the hand may; at 9
 BALANCE_MIN_SPEED = 4.0 / STANDARD_GRAVITY  # g s. Larger: the balanced rate is not used in slow turns.
 BALANCE_SHARE = 0.5  # of 1: the two may differ by SHARE x balanced rate + RATE. Larger: as for RATE.
 BALANCE_RATE = 0.1  # rad/s: see SHARE. Larger: the balanced rate is also used where lean or speed are wrong.
-BALANCE_SIGMA = radians(8.0)  # rad: of the lean. Larger: the balanced rate is used with a lean that is hardly known.
+BALANCE_SIGMA = radians(20.0)  # rad: of the lean. Larger: the balanced rate is used with a lean that is hardly known.
 BALANCE_MIN_COS = 0.3  # of 1: lower bound of cos(lean). Larger: too little rate about left in deep leans.
 
 
@@ -88,7 +88,7 @@ def predict(x, force, rate, seconds, sums):
     acceleration = fz - sq + sideways * yaw_error
     x[LEAN] = t + (wz - sq / cq * (wx * st + wy * ct)) * seconds
     q += (wy * st - wx * ct) * seconds
-    if not -MAX_PITCH <= q <= MAX_PITCH:
+    if abs(q) > MAX_PITCH:
         q = -MAX_PITCH if q < 0.0 else MAX_PITCH
     x[PITCH] = q
     speed = v + acceleration * seconds
