@@ -39,6 +39,7 @@ gps-silent|GPS silent|check wiring
 gps-garbled|GPS garbled|check GPS_BAUD
 gps-no-fix|GPS: no fix|needs open sky
 no-pulse|Wheel: no pulse|ride, or wiring?
+wheel-storm|Wheel: noise|check wiring
 
 no-driver|SD card:|no driver
 no-card|No SD card|check card

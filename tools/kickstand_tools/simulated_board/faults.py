@@ -137,6 +137,16 @@ class Faults:
         """A spike on E shifts the display's pairing of nibbles by one."""
         self._board.at(at_s, self._board.lcd.slip)
 
+    def wheel_storm(self, at_s, for_s, pulses_per_s):
+        """An ignition cable induces pulses in the cable of the wheel contact."""
+        wheel = self._board.wheel
+
+        def set_to(pulses_per_s):
+            wheel.noise_hz = pulses_per_s
+
+        self._board.at(at_s, lambda: set_to(pulses_per_s))
+        self._board.at(at_s + for_s, lambda: set_to(0))
+
     # In the file system
 
     def file_error(self, ending, at_s, for_s):
