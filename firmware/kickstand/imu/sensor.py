@@ -10,6 +10,7 @@ RETRY_MS = 50  # from one attempt to set the chip up to the next
 SAY_MS = 30  # from a fault to the first attempt, which blocks the loop for 0.2 s: time to show the fault
 FAILURES = 3  # transfers that fail in a row make a fault; a NACK or two are tolerated
 SILENT_MS = 100  # a fault after this long without a sample
+STALE_MS = 500  # likewise where each was lost in an overflow, because the board had no time to read
 
 
 class Sensor:
@@ -25,7 +26,8 @@ class Sensor:
         self._failures = 0  # transfers that failed in a row
         self._overflows = 0  # of the chip's FIFO, those that are dealt with
         self._due_ms = ticks_ms()  # when the next check is due or, while the chip does not run, the next attempt
-        self._sample_ms = 0  # when the last sample was read
+        self._sample_ms = 0  # when the last sample was read, or the FIFO was emptied after an overflow
+        self._emptied_ms = self._read_ms = 0  # of the last overflow; of the last sample that was read before it
         self.restarts = 0
         self.fault = Notice("starting")
         self._running = False
@@ -78,7 +80,12 @@ class Sensor:
         """The FIFO held no sample. After an overflow that is no fault, because the FIFO was just emptied."""
         if self._overflows != self.chip.overflows:
             self._overflows = self.chip.overflows
-            self._sample_ms = ticks_ms()  # now_ms may be from before the long pause that led to the overflow
+            if self._sample_ms != self._emptied_ms:  # there were samples since the last overflow
+                self._read_ms = self._sample_ms
+            # now_ms may be from before the long pause that led to the overflow
+            self._sample_ms = self._emptied_ms = ticks_ms()
+            if ticks_diff(self._emptied_ms, self._read_ms) > STALE_MS:
+                self.fault = Notice("readings-lost")
         elif ticks_diff(now_ms, self._sample_ms) > SILENT_MS:
             self._fail("sensor-silent", now_ms)
 

@@ -34,6 +34,7 @@ sensor-lost|Sensor lost|check wiring
 sensor-frozen|Sensor frozen|starting again
 sensor-silent|Sensor silent|starting again
 sensor-reset|Sensor reset|starting again
+readings-lost|Readings lost|board too busy
 
 gps-silent|GPS silent|check wiring
 gps-garbled|GPS garbled|check GPS_BAUD
