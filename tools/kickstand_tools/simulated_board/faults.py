@@ -7,7 +7,7 @@ import builtins
 import errno
 import io
 
-from .clock import NEVER_US, to_us
+from .clock import NEVER_US, PowerOff, to_us
 
 _FOREVER = 1 << 60  # a number of transfers
 
@@ -15,7 +15,7 @@ _FOREVER = 1 << 60  # a number of transfers
 class TransferFault:
     """A fault in the transfers number first to last to one address, if they begin between from_us and until_us.
 
-    kind: "nack"; "timeout"; "corrupt" inverts the bits of mask in the data byte with the number byte; "slip" delays
+    kind: "nack"; "timeout"; "cut" is not acknowledged from the byte with the number byte on; "corrupt" inverts the bits of mask in the data byte with the number byte; "slip" delays
     what is read by one bit from that byte on. read: the fault is in what is read, else in what is written.
     """
 
@@ -42,7 +42,11 @@ class TransferFault:
         return {"nack": False, "timeout": None}.get(self.kind, True)
 
     def on_write(self, value):
-        """What arrives of a byte that the controller sends. Byte 0 is the first, usually the register address."""
+        """What arrives of a byte that the controller sends, None if it is not acknowledged. Byte 0 is the first,
+        usually the register address."""
+        if self.kind == "cut":
+            self._count += 1
+            return value if self._count <= self._byte else None
         return value if self._read else self._spoil(value)
 
     def on_read(self, value):
@@ -62,12 +66,40 @@ class TransferFault:
         return late
 
 
+class _Failing:
+    """A file of which `length` bytes can be written, then `error` is raised."""
+
+    def __init__(self, file, length, error):
+        self._file, self._left, self._error = file, length, error
+
+    def write(self, data):
+        count = self._file.write(data[: self._left])
+        self._left -= count
+        if count < len(data):
+            self._file.flush()
+            raise self._error
+        return count
+
+    def flush(self):
+        self._file.flush()
+
+    def close(self):
+        self._file.close()
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._file.close()
+
+
 class Faults:
     """The faults of one board. Each method adds one to the script; several may act at the same time."""
 
     def __init__(self, board):
         self._board = board
         self._real_open = None
+        self.files_cut = 0
 
     # On the wires
 
@@ -94,6 +126,14 @@ class Faults:
     def bit_slip(self, address, nth=1, byte=0):
         """The device misses a clock in the nth transfer from now: what is read from that byte on comes one bit late."""
         self._transfers("slip", address, nth, 1, byte)
+
+    def cut(self, address, at_s, byte):
+        """From byte `byte` on, the first transfer to address that has so many, at at_s or later, is not acknowledged."""
+
+        def begin():
+            self._transfers("cut", address, 1, 1, byte, read=False)
+
+        self._board.at(at_s, begin)
 
     def stuck_sda(self, at_s, bits=8, lcd=False):
         """A device on the sensor's bus (lcd: on the display's) holds SDA low until SCL was clocked `bits` times."""
@@ -147,7 +187,37 @@ class Faults:
         self._board.at(at_s, lambda: set_to(pulses_per_s))
         self._board.at(at_s + for_s, lambda: set_to(0))
 
+    def busy(self, at_s, for_s, times=1):
+        """Something else takes all of the processor's time for for_s, `times` times with 10 ms between them."""
+
+        def begin(left):
+            self._board.clock.advance(to_us(for_s))
+            if left > 1:
+                self._board.clock.at(self._board.clock.now_us + 10_000, lambda: begin(left - 1))
+
+        self._board.at(at_s, lambda: begin(times))
+
     # In the file system
+
+    def disk_full(self, at_s, for_s):
+        """Nothing can be written to a file."""
+
+        def begin():
+            self._replace_open(lambda file, path: _Failing(file, 0, OSError(errno.ENOSPC)))
+
+        self._board.at(at_s, begin)
+        self._board.at(at_s + for_s, self.restore_files)
+
+    def cut_file(self, ending, length):
+        """The supply is cut when `length` bytes of the next file with this ending are written. files_cut counts them."""
+
+        def wrap(file, path):
+            if not path.endswith(ending):
+                return file
+            self.files_cut += 1
+            return _Failing(file, length, PowerOff())
+
+        self._replace_open(wrap)
 
     def file_error(self, ending, at_s, for_s):
         """Files whose name has this ending cannot be opened for reading."""
@@ -162,6 +232,17 @@ class Faults:
         if self._real_open is not None:
             builtins.open = self._real_open
             self._real_open = None
+
+    def _replace_open(self, wrap):
+        """Files opened for writing become wrap(file, path)."""
+        self.restore_files()
+        self._real_open = real = builtins.open
+
+        def opening(path, mode="r", *more, **named):
+            file = real(path, mode, *more, **named)
+            return wrap(file, str(path)) if "w" in mode else file
+
+        builtins.open = opening
 
     def _transfers(self, kind, address, nth, count, byte=0, mask=0, read=True):
         for bus in self._board.buses:

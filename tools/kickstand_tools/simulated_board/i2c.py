@@ -62,6 +62,8 @@ class Bus:
             return False
         if self._fault is not None:
             value = self._fault.on_write(value)
+            if value is None:
+                return False
         return self._device.write_byte(value)
 
     def read_byte(self):
