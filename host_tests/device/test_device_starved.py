@@ -1,5 +1,5 @@
-"""What takes the board's time away: an erase of the flash, slow USB, a storm of wheel pulses; and a display that fails in
-the middle of a line. No lean stands that is over half a second old, and none is ever half old and half new."""
+"""What takes the board's time away: an erase of the flash, slow USB, a storm of wheel pulses; and a display that fails
+in the middle of a line. No lean stands that is over half a second old, and none is ever half old and half new."""
 
 import devices
 import engines
@@ -20,7 +20,7 @@ NEAR_DEG = 5.0
 
 STARVED = {
     "flash erase": ([["busy", [FROM_S, 0.4, 6]]], {}),
-    "slow USB": ([["busy", [FROM_S, 0.48, 6]]], {}),
+    "slow USB": ([["busy", [FROM_S + 0.45, 0.48, 6]]], {}),
     "slow turns": ([["busy", [FROM_S, 0.12, 30]]], {}),
     "a hang": ([["busy", [FROM_S + 0.3, 1.5]]], {}),
     "few samples a second": ([["busy", [FROM_S, 0.3, 12]]], {"SAMPLE_HZ": 50, "DLPF": 5}),

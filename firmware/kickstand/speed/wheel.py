@@ -21,8 +21,8 @@ MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # limits of the time without a pulse that 
 REPORT_MS = 100  # poll() returns a speed at most so often
 STANDING_MS = 200  # and a speed of zero at most so often
 # So many edges in less than STORM_US are a storm: over 8,000 a second. The interrupt takes 33 us on a Pico, so that at
-# 30,000 a second nothing else would run: for 2 ms before this ends it, less than the time-out of a transfer. 50 pulses a
-# metre at 70 m/s are allowed.
+# 30,000 a second nothing else would run: for 2 ms before this ends it, less than the time-out of a transfer. 50 pulses
+# a metre at 70 m/s are allowed.
 STORM_EDGES, STORM_US = 64, 8_000
 STORM_PAUSE_MS = 5000  # the interrupt is off for so long after a storm, and again if it lasts
 # Counts and times wrap at 30 bits. The interrupt subtracts times with this mask and not by ticks_diff(), which would

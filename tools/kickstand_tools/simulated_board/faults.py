@@ -15,7 +15,8 @@ _FOREVER = 1 << 60  # a number of transfers
 class TransferFault:
     """A fault in the transfers number first to last to one address, if they begin between from_us and until_us.
 
-    kind: "nack"; "timeout"; "cut" is not acknowledged from the byte with the number byte on; "corrupt" inverts the bits of mask in the data byte with the number byte; "slip" delays
+    kind: "nack"; "timeout"; "cut" acknowledges no byte from that
+    number on, once; "corrupt" inverts the bits of mask in the data byte with the number byte; "slip" delays
     what is read by one bit from that byte on. read: the fault is in what is read, else in what is written.
     """
 
@@ -46,7 +47,10 @@ class TransferFault:
         usually the register address."""
         if self.kind == "cut":
             self._count += 1
-            return value if self._count <= self._byte else None
+            if self._count <= self._byte:
+                return value
+            self._numbers = (0, -1)
+            return None
         return value if self._read else self._spoil(value)
 
     def on_read(self, value):
@@ -128,10 +132,10 @@ class Faults:
         self._transfers("slip", address, nth, 1, byte)
 
     def cut(self, address, at_s, byte):
-        """From byte `byte` on, the first transfer to address that has so many, at at_s or later, is not acknowledged."""
+        """The first transfer to address after at_s that has so many bytes breaks off at byte `byte`."""
 
         def begin():
-            self._transfers("cut", address, 1, 1, byte, read=False)
+            self._transfers("cut", address, 1, _FOREVER, byte, read=False)
 
         self._board.at(at_s, begin)
 
@@ -209,7 +213,7 @@ class Faults:
         self._board.at(at_s + for_s, self.restore_files)
 
     def cut_file(self, ending, length):
-        """The supply is cut when `length` bytes of the next file with this ending are written. files_cut counts them."""
+        """The supply is cut when `length` bytes of the next file with this ending are written. Then files_cut is 1."""
 
         def wrap(file, path):
             if not path.endswith(ending):

@@ -36,7 +36,7 @@ def table(figures: Figures) -> str:
 @click.option("--seed", default=1, show_default=True, help="Of all that is random.")
 def main(hours: float, seed: int) -> None:
     """Random rides, faults and presses on the simulated board, for hours."""
-    figures = soak(hours, seed, lambda line: click.echo(line, err=True))
+    figures = soak(hours, seed, say=lambda line: click.echo(line, err=True))
     click.echo(table(figures))
     for line in figures.found:
         click.echo(line, err=True)

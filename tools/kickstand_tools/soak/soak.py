@@ -10,7 +10,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from contextlib import redirect_stdout
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -20,9 +20,10 @@ from .trip import Trip, make_trip
 from .watch import Watch
 
 TRIPS_WITH_A_BIKE = 8  # then another sensor, mounting and speed source, and an empty flash
-PART_SHARE = 0.5  # errors of up to half of the data sheet's limits, of which the six positions have removed offset and scale
+PART_SHARE = 0.5  # errors of up to half of the data sheet's limits; the six positions have found offset and scale
 WHO_AM_I, RANGE_G = 0x68, 8
-WARM_TRIPS = 3  # after so many of a bike all that is loaded when it is wanted has been loaded
+WARM_TRIPS = 3  # in the first ones modules are loaded that are wanted now and then
+MAX_GROWTH = 3000  # blocks of memory from the second minute of a trip to its end: a ride's recording takes some hundred
 
 
 @dataclass
@@ -61,8 +62,7 @@ class Bike:
         }
         if self.config["SAMPLE_HZ"] < 200:
             self.config["DLPF"] = 4 if self.config["SAMPLE_HZ"] == 100 else 5
-        self.aligned = False
-        self.seen_parameters: list[Any] = []
+        self.aligned = False  # as its flash says
 
     def store(self) -> Any:
         from kickstand.calibration.store import Store
@@ -82,8 +82,11 @@ class Bike:
         self.store().save(calibration)
 
 
-def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: None) -> Figures:
-    """Run trips until they add up to so many hours of the board's time. say: is told how far it is."""
+def soak(hours: float, seed: int = 1, enough: int = 10**6, say: Callable[[str], None] = lambda line: None) -> Figures:
+    """Run trips until they add up to so many hours of the board's time, or until so much was found that is enough.
+    say: is told how far it is.
+
+    The same seed gives the same trips. It works in a directory of its own, which is gone afterwards."""
     figures = Figures(seed)
     begun, told = time.monotonic(), 0.0
     chance = random.Random(seed)
@@ -91,7 +94,7 @@ def soak(hours: float, seed: int = 1, say: Callable[[str], None] = lambda line: 
     before = os.getcwd()
     with tempfile.TemporaryDirectory() as folder:
         try:
-            while figures.hours < hours:
+            while figures.hours < hours and len(figures.found) < enough:
                 if figures.trips % TRIPS_WITH_A_BIKE == 0:
                     flash = Path(folder, str(figures.trips))
                     flash.mkdir()
@@ -169,10 +172,13 @@ def _run(bike: Bike, trip: Trip, figures: Figures) -> None:
     if "Traceback" in console.getvalue():
         watch.found.append("a traceback: " + console.getvalue()[-400:])
     lasted_s = board.clock.now_us / 1e6
-    _check_calibration(bike, trip, watch, lasted_s, saves_cut, figures)
+    if len(blocks) > 2 and figures.trips >= WARM_TRIPS:
+        growth = blocks[-1] - blocks[1]
+        figures.keep_worst("memory_growth_blocks", growth)
+        if growth > MAX_GROWTH:
+            watch.found.append(f"memory has grown by {growth} blocks")
+    _check_calibration(bike, watch, figures)
     _count(figures, trip, watch, lasted_s, saves_cut)
-    if len(blocks) > 2 and figures.trips % TRIPS_WITH_A_BIKE >= WARM_TRIPS:
-        figures.keep_worst("memory_growth_blocks", blocks[-1] - blocks[1])
 
 
 def _blocks() -> int:
@@ -181,9 +187,7 @@ def _blocks() -> int:
     return sys.getallocatedblocks()
 
 
-def _check_calibration(
-    bike: Bike, trip: Trip, watch: Watch, lasted_s: float, saves_cut: int, figures: Figures
-) -> None:
+def _check_calibration(bike: Bike, watch: Watch, figures: Figures) -> None:
     """After a power cut at whatever moment there is the old calibration or a new one, never none."""
     calibration = bike.store().load()
     if bike.aligned and not calibration.aligned:
@@ -206,8 +210,3 @@ def _count(figures: Figures, trip: Trip, watch: Watch, lasted_s: float, saves_cu
     for name in ("wrong_s", "error_deg", "stale_s", "without_s"):
         figures.keep_worst(name, getattr(watch, name))
     figures.found += [f"trip {figures.trips} ({trip.kind}): {line}" for line in watch.found]
-
-
-def as_data(figures: Figures) -> dict[str, Any]:
-    """The figures for JSON."""
-    return asdict(figures)

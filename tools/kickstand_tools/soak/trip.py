@@ -19,7 +19,7 @@ RIDES = {
     "walking pace": ((0, 4), (1.5, 3.5), (-2, 2)),
 }
 
-# name: (method of Faults, or of Soak for those in the file system; its arguments from at_s, for_s and a random source)
+# name: (method of Faults; its arguments from when it begins, how long it lasts and a random source)
 FAULTS: dict[str, tuple[str, Any]] = {
     "sensor unplugged": ("unplug_sensor", lambda at, s, r: (at, s)),
     "sensor not acknowledging": ("nack_for", lambda at, s, r: (SENSOR, at, s)),
@@ -44,9 +44,9 @@ GPS_FAULTS = ("unplugged", "garbled", "void", "stuck")
 
 @dataclass
 class Trip:
-    """until_s: when the supply is cut.  align_s: when the poses of an alignment are taken, or None.  faults: (name,
-    when it begins, when it is over).  cut_save: how many bytes of the next calibration are written before the supply is
-    cut, or None.  gps_faults: as Gps takes them."""
+    """until_s: when the supply is cut.  presses: (when, how long).  faults: (name, when it begins, when it is over).
+    calls: (method of Faults, its arguments), which make them.  gps_faults: as Gps takes them.  cut_save: how many bytes
+    of the next calibration are written before the supply is cut, or None."""
 
     kind: str
     ride: script.Ride
@@ -65,12 +65,13 @@ def make_trip(chance: random.Random, speed: str | None, aligned: bool) -> Trip:
     ride = script.Ride(_manoeuvres(chance, kind), vibration_g=chance.uniform(0.01, 0.08))
     ride_s = KICKSTAND_S + UPRIGHT_S + 2 * script.MOVE_S
     presses: list[tuple[float, float]] = []
-    again = aligned and chance.random() < 0.2
+    again = aligned and chance.random() < 0.3
     if not aligned:
         presses += [(3.0, SHORT_S), (ride_s - 6.0, SHORT_S)]
     elif again:  # through the menu, whose first entry it is
         presses += [(2.0, LONG_S), (4.5, LONG_S), (7.0, SHORT_S), (ride_s - 6.0, SHORT_S)]
-    t_s = ride_s + chance.uniform(5, 40)
+    # in most trips none, because they turn the page with the lean away
+    t_s = ride_s + chance.uniform(5, 40) if chance.random() < 0.4 else ride.seconds
     while t_s < ride.seconds - 5.0:
         presses.append((t_s, chance.choice((SHORT_S, SHORT_S, SHORT_S, LONG_S))))
         t_s += chance.choice((1.0, 3.0, 20.0, 60.0))
@@ -90,7 +91,7 @@ def make_trip(chance: random.Random, speed: str | None, aligned: bool) -> Trip:
         gps_faults.append([chance.choice(GPS_FAULTS), start_s, start_s + 20.0])
         faults.append(("GPS " + gps_faults[0][0], start_s, start_s + 20.0))
     until_s = ride.seconds if chance.random() < 0.6 else chance.uniform(1.0, ride.seconds)  # switched off while riding
-    cut_save = chance.randint(0, 150) if aligned and chance.random() < 0.4 else None
+    cut_save = chance.randint(0, 150) if aligned and chance.random() < 0.5 else None
     return Trip(kind, ride, until_s, presses, faults, calls, gps_faults, cut_save)
 
 

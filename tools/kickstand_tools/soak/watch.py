@@ -24,13 +24,12 @@ def shown_lean(line: str) -> float | None:
 class Watch:
     """found: lines that say what was wrong.  wrong_s, error_deg: the longest time of a lean over WRONG_DEG wrong, and
     the largest error of one that stood for a second.  stale_s: the longest time that a lean stood while no sample was
-    read.  without_s: the longest time without a lean while the bike rode, with no fault.  pages: texts that were seen.
+    read.  without_s: the longest time without a lean while the bike rode, with no fault.  changes: of the display.
     """
 
     def __init__(self, board: Board, trip: Trip, readings: Callable[[], int]) -> None:
         self.found: list[str] = []
         self.wrong_s = self.error_deg = self.stale_s = self.without_s = 0.0
-        self.pages: set[str] = set()
         self.changes = 0
         self._board, self._trip, self._readings = board, trip, readings
         self._text = ["", ""]
@@ -54,7 +53,6 @@ class Watch:
         if text != self._text:
             self._text = text
             self.changes += 1
-            self.pages.add(re.sub(r"[\d.]+", "0", text[0]).rstrip())
         if text[0].startswith(("Error", "Incomplete", "config.py")):
             self._say("the program has failed")
         busy = self._during_fault(t_s, 0.0)
@@ -91,11 +89,18 @@ class Watch:
     def _fresh(self, t_s: float, lean: float | None) -> None:
         """A lean goes when no readings come any more. Not where the display cannot be reached."""
         count = self._readings()
-        reached = not any("display" in name and begin <= t_s < end + QUIET_S for name, begin, end in self._trip.faults)
-        if count != self._read[0] or lean is None or not reached:
+        # nothing that the program does can change a display that is not reached, or one while it gets no time at all
+        excused = any(
+            begin <= t_s < end + (QUIET_S if "display" in name else 0.0)
+            for name, begin, end in self._trip.faults
+            if "display" in name or name == "FIFO overflows"
+        )
+        if count != self._read[0] or lean is None or excused:
             self._read = (count, t_s)
             return
         self.stale_s = max(self.stale_s, t_s - self._read[1])
+        if t_s - self._read[1] > STALE_S:
+            self._say("an old lean is shown")
 
     def _explained(self, t_s: float, line: str) -> None:
         """What is shown in place of the lean goes again when the fault is over."""
