@@ -24,7 +24,7 @@ STARVED = {
     "slow turns": ([["busy", [FROM_S, 0.12, 30]]], {}),
     "a hang": ([["busy", [FROM_S + 0.3, 1.5]]], {}),
     "few samples a second": ([["busy", [FROM_S, 0.3, 12]]], {"SAMPLE_HZ": 50, "DLPF": 5}),
-    "display breaks off": ([["cut", [0x27, FROM_S + 0.3 * k, 1 + 7 * k % 60]] for k in range(20)], {}),
+    "display breaks off": ([["cut", [0x27, FROM_S + 0.3 + k, 9 + 11 * k]] for k in range(5)], {}),
 }
 
 

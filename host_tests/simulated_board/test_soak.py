@@ -25,7 +25,7 @@ def reversed_lean(monkeypatch):
 def one_record(monkeypatch):
     from kickstand.calibration import store
 
-    monkeypatch.setattr(store, "FILES", ("only.bin", "only.bin"))
+    monkeypatch.setattr(store, "FILES", ("only.cal", "only.cal"))
 
 
 def raises(monkeypatch):

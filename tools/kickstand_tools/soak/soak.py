@@ -157,7 +157,7 @@ def _run(bike: Bike, trip: Trip, figures: Figures) -> None:
             settings.load = lambda: settings.Settings(type("Config", (), bike.config))
             try:
                 if trip.cut_save is not None:
-                    board.faults.cut_file(".bin", trip.cut_save)
+                    board.faults.cut_file(".cal", trip.cut_save)
                 end = board.run(start.main, trip.until_s)
                 saves_cut = board.faults.files_cut
             finally:
