@@ -115,8 +115,6 @@ class App:
         self.sensor.check(now_ms)
         if self.sensor.fault is not None:
             self._clock.restart()
-            self.meter.restart()  # readings are missing, whether the chip is set up again or not
-            self.recorder.mark_gap()
             self.screen.interrupt(now_ms)
             if not self._fault_shown:
                 self._page_ms = now_ms  # at once: the next thing is to start the sensor again
@@ -184,6 +182,8 @@ class App:
 
     def _sensor_started(self):
         """The chip has been set up, for the first time or again after a fault; it may be another chip."""
+        self.meter.restart()
+        self.recorder.mark_gap()
         if self.calibration.chip_started(self.sensor.chip) and self._record_due:
             self._record_due = False
             self.record()

@@ -17,7 +17,8 @@ class Sensor:
     """Samples of one chip that may fail at any time. A transfer that fails, by NACK or time-out, ends in _missed().
 
     chip: an Mpu6050.  reopen: called to free the bus, returns it as a machine.I2C.
-    fault: None, or a Notice: what is wrong.  restarts: how often the chip was set up.
+    fault: None, or a Notice: what is wrong.  restarts: how often the chip was set up or, without that, no sample could
+    be read for STALE_MS: samples do not follow on from those before.
     """
 
     def __init__(self, chip, reopen):
@@ -86,6 +87,7 @@ class Sensor:
             self._sample_ms = self._emptied_ms = ticks_ms()
             if ticks_diff(self._emptied_ms, self._read_ms) > STALE_MS:
                 self.fault = Notice("readings-lost")
+                self.restarts += 1
         elif ticks_diff(now_ms, self._sample_ms) > SILENT_MS:
             self._fail("sensor-silent", now_ms)
 

@@ -7,67 +7,10 @@ import builtins
 import errno
 import io
 
-from .clock import NEVER_US, PowerOff, to_us
+from .clock import PowerOff, to_us
+from .i2c import TransferFault
 
 _FOREVER = 1 << 60  # a number of transfers
-
-
-class TransferFault:
-    """A fault in the transfers number first to last to one address, if they begin between from_us and until_us.
-
-    kind: "nack"; "timeout"; "cut" acknowledges no byte from that
-    number on, once; "corrupt" inverts the bits of mask in the data byte with the number byte; "slip" delays
-    what is read by one bit from that byte on. read: the fault is in what is read, else in what is written.
-    """
-
-    def __init__(self, kind, address, first, last, from_us=0, until_us=NEVER_US, byte=0, mask=0, read=True):
-        self.kind = kind
-        self.mask = mask
-        self._address = address
-        self._numbers = (first, last)
-        self._times = (from_us, until_us)
-        self._byte = byte
-        self._read = read
-        self._count = 0
-        self._carry = 0
-
-    def applies(self, address, number, now_us):
-        """Whether the transfer that begins now has this fault."""
-        first, last = self._numbers
-        start, end = self._times
-        return address == self._address and first <= number <= last and start <= now_us < end
-
-    def begin(self, read):
-        """Called at each START: True (the device may answer), False (NACK) or None (the wires are held)."""
-        self._count = 0
-        return {"nack": False, "timeout": None}.get(self.kind, True)
-
-    def on_write(self, value):
-        """What arrives of a byte that the controller sends, None if it is not acknowledged. Byte 0 is the first,
-        usually the register address."""
-        if self.kind == "cut":
-            self._count += 1
-            if self._count <= self._byte:
-                return value
-            self._numbers = (0, -1)
-            return None
-        return value if self._read else self._spoil(value)
-
-    def on_read(self, value):
-        """What arrives of a byte that a device sends."""
-        return self._spoil(value) if self._read else value
-
-    def _spoil(self, value):
-        number = self._count
-        self._count += 1
-        if self.kind == "corrupt":
-            return value ^ self.mask if number == self._byte else value
-        if number < self._byte:
-            return value
-        # The device missed a clock: one bit is read twice, and all later bits come one clock late
-        late = (value & 0x80 if number == self._byte else self._carry << 7) | value >> 1
-        self._carry = value & 1
-        return late
 
 
 class _Failing:
@@ -192,12 +135,12 @@ class Faults:
         self._board.at(at_s + for_s, lambda: set_to(0))
 
     def busy(self, at_s, for_s, times=1):
-        """Something else takes all of the processor's time for for_s, `times` times with 10 ms between them."""
+        """Something else takes all of the processor's time for for_s, `times` times with 30 ms between them."""
 
         def begin(left):
             self._board.clock.advance(to_us(for_s))
             if left > 1:
-                self._board.clock.at(self._board.clock.now_us + 10_000, lambda: begin(left - 1))
+                self._board.clock.at(self._board.clock.now_us + 30_000, lambda: begin(left - 1))
 
         self._board.at(at_s, lambda: begin(times))
 

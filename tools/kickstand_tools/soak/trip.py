@@ -30,7 +30,7 @@ FAULTS: dict[str, tuple[str, Any]] = {
     "readings of zeros": ("all_zero", lambda at, s, r: (at, s)),
     "readings of ones": ("all_ones", lambda at, s, r: (at, s)),
     "FIFO overflows": ("busy", lambda at, s, r: (at, r.uniform(0.4, 2.5))),
-    "board busy, again and again": ("busy", lambda at, s, r: (at, 0.45, int(s / 0.46) + 1)),
+    "board busy, again and again": ("busy", lambda at, s, r: (at, 0.45, int(s / 0.48) + 1)),
     "display unplugged": ("unplug_lcd", lambda at, s, r: (at, s)),
     "display not acknowledging": ("nack_for", lambda at, s, r: (LCD, at, s)),
     "display's SDA low": ("stuck_sda", lambda at, s, r: (at, r.randint(1, 9), True)),
