@@ -26,7 +26,7 @@ LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
 COLLECT_TURNS = 25  # in which 70 KB of heap are used: less than half of what is free
 SINGLE_GAPS = 300  # single free blocks that a collection leaves
 PAGE_MS = 100
-LATE_MS = 400  # when a page comes so late, or its readings are so old, the lean on the display is too old to stay
+LATE_MS = 400  # by which page and readings together may be late: with a page's time a lean is then half a second old
 
 
 def fill_gaps(n):
@@ -151,7 +151,7 @@ class App:
         """Put the page as it is now onto the display. As often, and at standstill only, save the trim that riding has
         found."""
         waiting_ms = 1000 * self.sensor.chip.frames_left // self.settings.SAMPLE_HZ
-        self.late = ticks_diff(now_ms, self._page_ms) > LATE_MS or waiting_ms > LATE_MS
+        self.late = ticks_diff(now_ms, self._page_ms) + waiting_ms > LATE_MS
         self._page_ms = ticks_add(now_ms, PAGE_MS)
         self._fault_shown = self.sensor.fault is not None
         line1, line2 = self.screen.lines(now_ms)
