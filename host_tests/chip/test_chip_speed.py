@@ -44,8 +44,13 @@ def test_a_storm_of_pulses_costs_no_reading(pulses_per_s):
     with pico(leaning(20.0), files) as device:
         device.fit_wheel(lambda t_s: pulses_per_s / 0.5 if t_s >= storm_s else 0.0)
         shows(device, "Lean +20", 8.0)
-        samples, reset = SampleCount(device.board.sensor), device.chip.on_reset
-        device.chip.on_reset = lambda: (resets.append(device.time_s), reset())
+        samples, reset = SampleCount(device.board.sensor), device._reset
+
+        def count_reset():
+            resets.append(device.time_s)
+            reset()
+
+        device.chip.on_reset = count_reset
         samples.begin()
         storm_s = device.time_s
         shows(device, "Wheel: noise *.check wiring", 0.4)

@@ -97,7 +97,8 @@ def make_trip(chance: random.Random, speed: str | None, aligned: bool) -> Trip:
 
 def _manoeuvres(chance: random.Random, kind: str) -> list[tuple[script.Segment, ...]]:
     leans, speeds, slopes = RIDES[kind]
-    parts = [script.kickstand(KICKSTAND_S), script.upright(UPRIGHT_S, chance.uniform(-1.0, 1.0))]
+    parts: list[tuple[script.Segment, ...]] = [script.kickstand(KICKSTAND_S)]
+    parts.append(script.upright(UPRIGHT_S, chance.uniform(-1.0, 1.0)))
     for _ in range(chance.randint(1, 4)):
         parts.append(script.accelerate(chance.uniform(*speeds), chance.uniform(4, 8)))
         for _ in range(chance.randint(3, 8)):

@@ -42,7 +42,7 @@ class Pin:
                 return
             running = True
             try:
-                while waiting and self._handler is handler:
+                while waiting and handler and self._handler is handler:
                     waiting = False
                     handler(self)
                     current.board.clock.advance(IRQ_US)
