@@ -24,7 +24,7 @@ ARROWS = {
     "lean": {"calibration"},
     "drive_alignment": set(),  # it works on the calibrations that the app hands to it
     "speed": {"board"},
-    "rides": {"board", "calibration"},  # each block of a ride holds its calibration's record
+    "rides": {"board", "calibration", "console"},  # each block of a ride holds its calibration's record
     "ui": {"board.button", "lean", "calibration", "drive_alignment"},
     "settings": {"board", "imu.mpu6050"},  # ranges and pins that can be chosen
     "devices": {"board", "imu"},
@@ -36,6 +36,7 @@ ARROWS = {
 # Imported only by a function that needs it, because it costs memory or words that most boards never need
 LATE = {
     "errors": {"console"},  # report() prints a refusal in words
+    "status_report": {"rides"},  # is its machine code used?
     "start": {"app", "console", "ui.messages"},  # the display says "starting" while the app is imported
 }
 # What only drivers may import: modules of MicroPython that speak to hardware

@@ -144,6 +144,23 @@ def test_a_small_tilt_is_warned_of(tmp_path):
     assert "warning: under 8 degrees" in result.out
 
 
+def test_the_bias_of_the_six_positions_is_the_median(tmp_path, six_poses):
+    """A hand at the table in one pose does not count."""
+    command.still(six_poses[2], reads(command.AXES["+y"]), np.array(BIAS) + 20.0, seed=2)
+    command.works("calibrate", "six", *six_poses, "--out", tmp_path / "CAL.json")
+    assert json.loads((tmp_path / "CAL.json").read_text())["gyro_bias_dps"] == pytest.approx(BIAS, abs=0.05)
+
+
+def test_the_bias_of_the_two_poses_is_that_of_the_kickstand(tmp_path):
+    """It holds the bike stiller than a rider does."""
+    poses = [
+        command.still(tmp_path / "stand.csv", leaned(-10), BIAS),
+        command.still(tmp_path / "upright.csv", leaned(0), np.array(BIAS) + 2.0, seed=1),
+    ]
+    command.works("calibrate", "two", *poses, "--out", tmp_path / "CAL.json")
+    assert json.loads((tmp_path / "CAL.json").read_text())["gyro_bias_dps"] == pytest.approx(BIAS, abs=0.02)
+
+
 def six_refused(tmp_path, poses, words):
     return command.refused(tmp_path, "calibrate", "six", *poses, "--out", tmp_path / "CAL.json", words=words)
 
@@ -165,6 +182,16 @@ def test_a_seventh_pose_on_a_side_proves_nothing(tmp_path, six_poses):
     flat = command.still(tmp_path / "flat.csv", reads(command.AXES["+y"]), BIAS, seed=5)
     line = six_refused(tmp_path, [*six_poses, flat], "has to be slanted")
     assert "flat.csv" in line
+
+
+@pytest.mark.parametrize(("tilt", "serves"), [(18, False), (24, True)])
+def test_the_seventh_pose_is_20_degrees_from_every_side(tmp_path, six_poses, tilt, serves):
+    slanted = np.array([np.sin(np.radians(tilt)), 0.0, np.cos(np.radians(tilt))])
+    free = command.still(tmp_path / "slanted.csv", reads(slanted), BIAS, seed=5)
+    if serves:
+        command.works("calibrate", "six", *six_poses, free, "--out", tmp_path / "CAL.json")
+    else:
+        six_refused(tmp_path, [*six_poses, free], "over 20 degrees from every side")
 
 
 def test_the_same_file_twice(tmp_path, six_poses):

@@ -9,8 +9,9 @@ import command
 import fake_board
 import mpy
 import pytest
-from kickstand_tools import firmware_path
+from kickstand_tools import errors, firmware_path
 from kickstand_tools.deploy import connection
+from kickstand_tools.simulated_board.fakes import chips
 from serial.tools import list_ports
 
 
@@ -50,11 +51,47 @@ def test_elsewhere_it_is_the_firmware_s_own(board, tmp_path, monkeypatch):
     assert f"config.py is {firmware_path.directory() / 'config.py'}\n" in result.out
 
 
+def test_an_installed_package_takes_a_config_from_the_current_folder(board, tmp_path, monkeypatch):
+    """What stands in site-packages is not the rider's to edit, and goes with the next update."""
+    package = tmp_path / "site-packages" / "kickstand_tools"
+    (package / "firmware").mkdir(parents=True)
+    (package / "firmware" / "config.py").write_text("# as shipped\n")
+    (package / "firmware" / "main.py").write_text("")
+    (tmp_path / "mine").mkdir()
+    monkeypatch.chdir(tmp_path / "mine")
+    monkeypatch.setattr(firmware_path, "__file__", str(package / "firmware_path.py"))
+    assert "to change settings, copy that file into a folder of yours" in command.works("flash", "--config").out
+    (tmp_path / "mine" / "config.py").write_text('SIDE = "right"\n')
+    result = command.works("flash", "--config")
+    assert f"config.py is {tmp_path / 'mine' / 'config.py'}\n" in result.out
+    assert "to change settings" not in result.out
+    assert board.path("config.py").read_text() == 'SIDE = "right"\n'
+    assert '-m pip install "kickstand[rides]"' in errors.extra("rides")
+
+
+@pytest.mark.parametrize("arguments", [["flash"], ["flash", "--config"]])
+def test_a_setting_behind_a_mark_is_pointed_at(arguments, board, config):
+    """With its line, also where config.py is not copied; none of the file as it is shipped is."""
+    shipped = (firmware_path.directory() / "config.py").read_text()
+    config.write_text(shipped.replace('# SIDE = "left" ', '# SIDE = "right"'))
+    said = f"note: {config}, line 4: SIDE = \"right\" is not used, because a '#' is in front of it"
+    result = command.works(*arguments)
+    assert said in result.out
+    assert result.out.count("note: ") == 1
+    config.write_text(shipped)
+    assert "note: " not in command.works(*arguments).out
+
+
 SLIPS = {
     "syntax": ('# one\nSIDE = "right\n', 2, "SyntaxError: unterminated string"),
     "no string": ("# one\n\nSIDE = right\n", 3, "NameError: name 'right' is not defined"),
     "value": ('# one\nSIDE = "rigth"\n', 2, "SIDE = 'rigth', but it must be one of 'left', 'right'"),
     "name": ('SIDDE = "right"\n', 1, "SIDDE is not a setting"),
+    "low-pass": (
+        "# one\nSAMPLE_HZ = 50\nDLPF = 3\n",
+        3,
+        "DLPF = 3 lets vibration alias at SAMPLE_HZ = 50: set DLPF = 4 or higher",
+    ),
     "capitals": ('Side = "right"\n', 1, "Side is not a setting"),
     "no line of its own": ("BUTTON_PIN = 4\n", None, "a pin is used twice"),
 }
@@ -82,11 +119,35 @@ def test_a_config_that_stays_at_home_is_not_judged(board, config):
     assert "config.py is" not in result.out
 
 
-@pytest.mark.parametrize(("platform", "status"), [("rp2", 2), ("esp32", 0)])
-def test_it_is_judged_for_the_board_s_port(platform, status, board, config):
-    board.modules["sys"].platform = platform
+def pose(board, machine):
+    """Be this board. machine: in chips.MACHINES."""
+    system = board.modules["sys"]
+    system.implementation._machine = chips.MACHINES[machine]
+    system.platform = "esp32" if "ESP32" in chips.MACHINES[machine] else "rp2"
+
+
+@pytest.mark.parametrize(("machine", "status"), [("pico", 2), ("pico 2", 2), ("esp32", 0)])
+def test_it_is_judged_for_the_board(machine, status, board, config):
+    pose(board, machine)
     config.write_text("BUTTON_PIN = 4\n")  # on a Pico the sensor's SDA
     assert command.run("flash", "--config").status == status
+
+
+@pytest.mark.parametrize("machine", ["s2", "s3", "c3", "c6", "h2", "lora32", "xiao rp2040"])
+def test_a_board_without_usual_pins_needs_them_named(machine, board, config):
+    pose(board, machine)
+    names = "BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL"
+    words = f"{config}: no usual pins are known for this board ({chips.MACHINES[machine]}): set {names}: correct it"
+    command.refused(board.root, "flash", "--config", words=words)
+    config.write_text("\n".join(f"{name} = {number}" for number, name in enumerate(names.split(", "))) + "\n")
+    command.works("flash", "--config")
+
+
+def test_a_pin_of_the_chip_s_own_usb_is_refused(board, config):
+    pose(board, "s3")
+    config.write_text("BUTTON_PIN = 4\nSENSOR_SDA = 8\nSENSOR_SCL = 9\nLCD_SDA = 18\nLCD_SCL = 19\n")
+    words = f"{config}, line 5: LCD_SCL = 19, but it must be a number from 0 to 48, no pin of"
+    command.refused(board.root, "flash", "--config", words=words)
 
 
 _LOAD = """

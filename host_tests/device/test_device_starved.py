@@ -16,13 +16,14 @@ RIDE = [
 ]
 TRUE = script.Ride([getattr(script, name)(*more) for name, *more in RIDE])
 OLDEST_S = 0.5 + 0.1 + 0.1  # half a second, a page, and the time between two looks at the display
+HANG_S = 1.46  # the first page after it, which tells why, then stands when the next frame is taken
 NEAR_DEG = 10.0  # readings lost while the bike rolls cost up to 8 degrees until the filter has made up for them
 
 STARVED = {
     "flash erase": ([["busy", [FROM_S, 0.4, 6]]], {}),
     "slow USB": ([["busy", [FROM_S + 0.45, 0.48, 6]]], {}),
     "slow turns": ([["busy", [FROM_S, 0.12, 30]]], {}),
-    "a hang": ([["busy", [FROM_S + 0.3, 1.5]]], {}),
+    "a hang": ([["busy", [FROM_S + 0.3, HANG_S]]], {}),
     "few samples a second": ([["busy", [FROM_S, 0.3, 12]]], {"SAMPLE_HZ": 50, "DLPF": 5}),
     "display breaks off": ([["cut", [0x27, FROM_S + 0.3 + k, 9 + 11 * k]] for k in range(5)], {}),
 }
@@ -51,7 +52,7 @@ def test_no_lean_stands_that_is_too_old(engine, name, tmp_path):
     record = run(engine, tmp_path, faults, config)
     assert record.ends == ["off"]
     # nothing that the program does can change the display while it hangs
-    hang_s = (FROM_S + 0.3, FROM_S + 0.3 + 1.5 + 0.05) if name == "a hang" else (0, 0)
+    hang_s = (FROM_S + 0.3, FROM_S + 0.3 + HANG_S + 0.05) if name == "a hang" else (0, 0)
     assert [found for found in too_old(record) if not hang_s[0] < found[0] < hang_s[1]] == []
     if name == "a hang":
         assert record.first("Readings lost", FROM_S) < hang_s[1] + 0.1

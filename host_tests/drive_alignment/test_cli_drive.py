@@ -9,6 +9,8 @@ import driving_runs
 import numpy as np
 import pytest
 from driving_runs import RATE_HZ, STAND, around, mounted
+from kickstand_tools.calibration.drive import fit_drive
+from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.simulation.files import simulate
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
@@ -82,7 +84,7 @@ def test_a_car(tmp_path, method):
     data = json.loads(out.read_text())
     assert data["gyro_bias_dps"] == pytest.approx([1.0, -2.0, 3.0], abs=0.02)
     assert (data["vehicle"], data["aligned"], data["six_positions"]) == ("car", True, False)
-    assert "straight: used, 1" in result.out
+    assert "in a straight line: event 1" in result.out
     assert "quality: " in result.out
     assert "ready after" in result.out
 
@@ -103,6 +105,15 @@ def test_a_calibrated_accelerometer_keeps_its_parameters(tmp_path):
     assert result.out.count("car, method improved") == 1
 
 
+def test_what_is_noted_in_a_calibration_stays_in_it(tmp_path):
+    """As the board and the chip that a ride was recorded with."""
+    log = record(tmp_path / "drive.csv", around(7), MOUNT)
+    before = CalibrationFile(notes={"board": "Raspberry Pi Pico", "sensor": "MPU6050"})
+    found = fit_drive([log], before).calibration
+    assert found.notes == before.notes
+    assert found.as_json()["board"] == "Raspberry Pi Pico"
+
+
 def test_several_logs_of_one_mount_are_put_together(tmp_path):
     """None of them is enough for itself."""
     logs = [record(tmp_path / f"{k}.csv", around(2), MOUNT) for k in range(3)]
@@ -121,7 +132,7 @@ def test_what_is_used_of_several_logs_is_told_by_file_and_its_own_time(tmp_path)
     alone = command.works("calibrate", "drive", whole, "--out", tmp_path / "CAL.json").out
 
     def times(lines):
-        return [float(line.split(" s ")[0]) for line in lines if "straight: used" in line]
+        return [float(line.split(" s ")[0]) for line in lines if "in a straight line: event" in line]
 
     for part in times(a), times(c):
         assert len(part) >= 3

@@ -50,6 +50,7 @@ def app():
         drive=Drive(),
         late=False,
         recorder=Recorder(),
+        recording=False,
     )
 
 

@@ -14,7 +14,18 @@ from math import atan2, degrees, pi, sin, sqrt
 
 from ..units import STANDARD_GRAVITY
 from . import measurements
-from .bike_model import BIAS_LEFT, LEAN, MAX_PITCH, PITCH, SPEED, STATES, YAW_ERROR, Linearisation, predict
+from .bike_model import (
+    BALANCE_SIGMA,
+    BIAS_LEFT,
+    LEAN,
+    MAX_PITCH,
+    PITCH,
+    SPEED,
+    STATES,
+    YAW_ERROR,
+    Linearisation,
+    predict,
+)
 from .kalman import Covariance
 from .rest import MAX_BIAS_RADPS, RestDetector
 from .upright_trim import UprightTrim
@@ -57,8 +68,21 @@ class LeanFilter:
         self._count = 0
         self._window_us = 0
         self._axis = 0  # of the gyro, whose bias is measured next at rest
+        self._road = False  # the last window was updated by the road
         self._roll_rate = 0.0
         self._last_roll_rate = 0.0
+
+    def doubt(self, seconds):
+        """The readings of so many seconds are lost: what the bike did meanwhile is not known."""
+        p = self._p
+        if p is None:
+            return
+        for _ in self._work or ():  # it changes the covariance: end it first
+            pass
+        self._work = None
+        p.add_noise(LEAN, (measurements.SIGMA_LOST_RATE * seconds) ** 2)
+        p.add_noise(PITCH, (measurements.SIGMA_LOST_RATE * seconds) ** 2 / 16)
+        p.add_noise(SPEED, (measurements.SIGMA_LOST_FORCE * seconds) ** 2)
 
     @property
     def speed_mps(self):
@@ -172,7 +196,8 @@ class LeanFilter:
     def _process(self, means, seconds, roll_acceleration):
         """Linearise, update and inject for one window; a generator of short pieces."""
         p = self._p
-        model = Linearisation(self._x, means[2:5], means[7])
+        known = p.rows[LEAN][LEAN] < BALANCE_SIGMA**2
+        model = Linearisation(self._x, means[2:5], means[7], known)
         yield
         noise = measurements.NOISE_ANGLE**2 * seconds
         yield from p.propagate_row(LEAN, model.lean_row, seconds, noise)
@@ -189,17 +214,22 @@ class LeanFilter:
         self._inject(model)
 
     def _update_ride(self, model, means, seconds, roll_acceleration):
-        """By the forces, the road, the speed or a straight; and the trim of upright."""
+        """By the forces, the speed, the road or a straight; and the trim of upright.
+
+        What is assumed lasts for seconds: the road and the straight take turns, each for two windows at once."""
         p, x = self._p, self._x
         for measurement in measurements.forces(model, means, roll_acceleration):
             yield from p.update(*measurement)
-        yield from p.update(*measurements.level_road(model, x, seconds))
-        lean, speed, given = x[LEAN] - self.trim.angle, x[SPEED], self._given_speed
+        speed, given = x[SPEED], self._given_speed
         if given is not None:
             self._given_speed = None
             yield from p.update(*measurements.given_speed(given, speed, model.acceleration))
-        else:
-            yield from p.update(*measurements.straight_or_usual_speed(lean, speed, model.yaw_rate, seconds))
+        self._road = not self._road
+        if self._road:
+            yield from p.update(*measurements.level_road(model, x, 2.0 * seconds))
+        elif given is None:
+            lean = x[LEAN] - self.trim.angle
+            yield from p.update(*measurements.straight_or_usual_speed(lean, speed, model.yaw_rate, 2.0 * seconds))
         certain = p.rows[SPEED][SPEED] < measurements.SIGMA_TRIM_SPEED**2
         if certain and model.speed > measurements.STRAIGHT_MIN_SPEED:
             sideways = (means[5] - model.acceleration * x[YAW_ERROR]) / max(means[6], 0.5)

@@ -1,7 +1,8 @@
 """The format of a recorded ride: blocks of a few thousand bytes, each of which can be read without the others.
 
 A block is: a head (magic, format version, length, ride, sequence, time in us since power-on, temperature at its end in
-hundredths of a degree Celsius, counts per g, ten times the counts per deg/s, samples per second, firmware version); the
+hundredths of a degree Celsius, counts per g, ten times the counts per deg/s, samples per second, firmware version, how
+late the gyro's low-pass is in tenths of a millisecond, 0 in rides of version 0.3.0 and before); the
 calibration as store.pack() writes it; the entries; zeros; a tail (number of entries, CRC32 of everything before it).
 
 An entry is one turn of the loop: how many samples came in (n), the microseconds since the turn before, and the sums of
@@ -21,10 +22,11 @@ from binascii import crc32
 
 from .. import __version__
 from ..calibration.store import BODY_LENGTH
+from ..errors import checked
 
 MAGIC = b"KRID"
 VERSION = 1
-HEAD = "<4sHHIIqhHHH12s"
+HEAD = "<4sHHIIqhHHH11sB"
 _TEMPERATURE_AT = struct.calcsize("<4sHHIIq")
 TAIL = "<HI"
 BLOCK = 4096  # bytes in a block of the flash
@@ -105,6 +107,11 @@ try:
     from .block_viper import encode
 except (ImportError, NameError, SyntaxError):  # CPython, or a port without viper
     encode = encode_python
+else:
+    _ENTRY = array("i", (2, 9999, -30000, 30000, -1, 0, 255, -256, 0))
+    # the entry before, means from small to large, and three bits that wait
+    _STATE = array("i", (3, 1, -1, 29000, 70, -7, 254, 77, 0) + tuple(range(16, 160, 16)) + (5, 3, 0, 5000))
+    encode = checked(encode, encode_python, _ENTRY, _STATE, bytearray(40))
 
 
 class RideBlock:
@@ -133,7 +140,7 @@ class RideBlock:
         state[0] = 1  # the prediction divides by the n of the turn before
         state[_PENDING] = state[_BITS] = 0
         state[_AT] = _HEAD_LENGTH
-        version = __version__.encode()[:12]
+        version = __version__.encode()[:11]
         struct.pack_into(
             HEAD,
             self.buffer,
@@ -149,6 +156,7 @@ class RideBlock:
             int(10 * chip.gyro_lsb_per_dps + 0.5),
             sample_hz,
             version,
+            int(10_000 * chip.gyro_delay_s + 0.5),
         )
         self.buffer[_HEAD_LENGTH - BODY_LENGTH : _HEAD_LENGTH] = body
         self._chip = chip

@@ -3,7 +3,6 @@
 page_ring.py lists the pages that a short press turns.
 """
 
-from ..lean.formula import static_lean_deg
 from ..rotation import vector
 from . import messages
 from .messages import DEGREE
@@ -123,19 +122,25 @@ def raw(meter):
 def not_aligned(meter, seconds, todo="On stand: press"):
     """Before alignment: tilt and g in the sensor's own axes, which are not the bike's (Nicolae's figure 3). todo: what
     to do next; shown in turn with "Not aligned"."""
+    from ..lean.formula import static_lean_deg  # not needed once there is an alignment
+
     tilt = static_lean_deg(meter.smooth_force)
     hint = "Not aligned" if seconds % 4 < 2 else todo
     return "Raw %4d%s %+.2fg" % (round(tilt), DEGREE, meter.smooth_force[2]), hint
 
 
-def sensor_info(sensor, meter, seconds):
-    """Which chip it is and how warm; below that in turn what is calibrated, and how often the chip's FIFO overflowed
-    and the chip was set up."""
+def sensor_info(app, seconds):
+    """Which chip it is and how warm; below that in turn what is calibrated, how often the chip's FIFO overflowed and
+    the chip was set up, and how many samples the overflows have cost."""
+    sensor, meter = app.sensor, app.meter
     chip, calibration = sensor.chip, meter.calibration
     line1 = "%-9s%5.1f%sC" % (chip.name[:9], chip.temperature_c(meter.reading[3]), DEGREE)
-    if seconds % 4 < 2:
+    turn = seconds // 2 % 3
+    if turn == 0:
         return line1, "6pos %-3s ali %s" % (_yes(calibration.six_done), _yes(calibration.aligned))
-    return line1, "%d gaps %d starts" % (min(chip.overflows, 99), min(sensor.restarts, 99))
+    if turn == 1:
+        return line1, "%d gaps %d starts" % (min(chip.overflows, 99), min(sensor.restarts, 9))
+    return line1, "samples lost%4d" % min(app.clock.lost, 9999)
 
 
 def _yes(flag):

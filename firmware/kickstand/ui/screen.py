@@ -4,13 +4,12 @@ import gc
 
 from ..board.button import LONG
 from . import messages, pages
-from .menu import Menu
 from .page_ring import PageRing
 from .views import FaultView, InfoView, NoticeView, QuestionView
 
 
 class Screen:
-    """app: the App, whose sensor, meter, calibration, drive and recorder it shows.
+    """app: the App, whose sensor, clock, meter, calibration, drive and recorder it shows.
 
     wizard: the AlignWizard or SixWizard under way, which takes every sample, or None.
     """
@@ -21,14 +20,14 @@ class Screen:
         self._menu = None
         self._notice = NoticeView()
         self._fault = FaultView(app.sensor)
-        self._info = InfoView(app.sensor, app.meter)
+        self._info = InfoView(app)
         self._question = QuestionView(app.drive)
         self._pages = PageRing(app, self._align_now)
 
     def lines(self, now_ms):
         """What the display should say now. Call it about every 100 ms."""
         app = self._app
-        problem = app.recorder.take_problem() or (app.drive and app.drive.speed.take_problem())
+        problem = (app.recorder and app.recorder.take_problem()) or (app.drive and app.drive.speed.take_problem())
         if problem:
             self._notice.show(messages.lines(problem), now_ms)
         return self._update_front(now_ms)[1]
@@ -42,7 +41,7 @@ class Screen:
             if view is self._question:  # except to a question, which has not been seen yet
                 return
         if not view.press(event, now_ms) and event == LONG:
-            self._menu = Menu(self._entries(), now_ms)
+            self._open_menu(now_ms)
         self._drop_ended()
 
     def add_page(self, page):
@@ -82,13 +81,18 @@ class Screen:
         if self._menu and self._menu.ended:
             self._menu = None
 
+    def _open_menu(self, now_ms):
+        from .menu import Menu  # with the first long press
+
+        self._menu = Menu(self._entries(), now_ms)
+
     def _entries(self):
         """The entries of the menu: (name, what to call with now_ms)."""
         align = (("Align the bike", self._align),)
         six = (("Six positions", self._six),)
         rest = (("Reset maxima", self._reset), ("Sensor info", self._info.show))
         drive = (("Align by drive", self._drive),) if self._app.drive else ()
-        if self._app.recorder.active:
+        if self._app.recording:
             record = (("Stop recording", self._stop),)
         else:
             record = (("Record ride", self._record),)
@@ -143,7 +147,7 @@ class Screen:
     def _record(self, now_ms):
         if self._ready(now_ms):
             self._app.record()
-            if self._app.recorder.active:
+            if self._app.recording:
                 self._notice.show(pages.recording(self._app.recorder), now_ms)
 
     def _stop(self, now_ms):

@@ -8,36 +8,12 @@ import errno
 import io
 
 from .clock import PowerOff, to_us
+from .fakes.erased_file import ErasedFile
+from .fakes.failing_file import FailingFile
 from .i2c import TransferFault
 
 _FOREVER = 1 << 60  # a number of transfers
-
-
-class _Failing:
-    """A file of which `length` bytes can be written, then `error` is raised."""
-
-    def __init__(self, file, length, error):
-        self._file, self._left, self._error = file, length, error
-
-    def write(self, data):
-        count = self._file.write(data[: self._left])
-        self._left -= count
-        if count < len(data):
-            self._file.flush()
-            raise self._error
-        return count
-
-    def flush(self):
-        self._file.flush()
-
-    def close(self):
-        self._file.close()
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self._file.close()
+_STALL_S = 0.5  # that a print waits for a host which takes nothing (shared/tinyusb/mp_usbd_cdc.h of MicroPython)
 
 
 class Faults:
@@ -47,6 +23,7 @@ class Faults:
         self._board = board
         self._real_open = None
         self.files_cut = 0
+        self._real_print = None
 
     # On the wires
 
@@ -150,7 +127,7 @@ class Faults:
         """Nothing can be written to a file."""
 
         def begin():
-            self._replace_open(lambda file, path: _Failing(file, 0, OSError(errno.ENOSPC)))
+            self._replace_open(lambda file, path: FailingFile(file, 0, OSError(errno.ENOSPC)))
 
         self._board.at(at_s, begin)
         self._board.at(at_s + for_s, self.restore_files)
@@ -162,7 +139,7 @@ class Faults:
             if not path.endswith(ending):
                 return file
             self.files_cut += 1
-            return _Failing(file, length, PowerOff())
+            return FailingFile(file, length, PowerOff())
 
         self._replace_open(wrap)
 
@@ -173,6 +150,18 @@ class Faults:
     def file_empty(self, ending, at_s, for_s):
         """Files whose name has this ending read as empty, as after a loss of supply."""
         self._files(ending, at_s, for_s, True)
+
+    def slow_flash(self, at_s, for_s, erase_s):
+        """Each block of a file that is written is erased for erase_s, in which the program stands."""
+
+        def erase():
+            self._board.clock.advance(to_us(erase_s))
+
+        def opened(real, path, mode="r", *more, **named):
+            file = real(path, mode, *more, **named)
+            return ErasedFile(file, erase) if "w" in mode else file
+
+        self._opened_by(at_s, for_s, opened)
 
     def restore_files(self):
         """End the faults of the file system."""
@@ -190,6 +179,23 @@ class Faults:
             return wrap(file, str(path)) if "w" in mode else file
 
         builtins.open = opening
+    # On USB
+
+    def usb_asleep(self, at_s, for_s):
+        """The host takes nothing: what is printed waits, and is lost."""
+
+        def begin():
+            self._real_print = builtins.print
+            builtins.print = lambda *_, **__: self._board.clock.advance(to_us(_STALL_S))
+
+        self._board.at(at_s, begin)
+        self._board.at(at_s + for_s, self.restore_print)
+
+    def restore_print(self):
+        """End usb_asleep()."""
+        if self._real_print is not None:
+            builtins.print = self._real_print
+            self._real_print = None
 
     def _transfers(self, kind, address, nth, count, byte=0, mask=0, read=True):
         for bus in self._board.buses:
@@ -207,18 +213,22 @@ class Faults:
         self._board.at(at_s + for_s, lambda: self._board.sensor.override(None))
 
     def _files(self, ending, at_s, for_s, empty):
+        def failing(real, path, mode="r", *more, **named):
+            if not str(path).endswith(ending) or "r" not in mode or "+" in mode:
+                return real(path, mode, *more, **named)
+            if not empty:
+                raise OSError(errno.EIO)
+            return io.BytesIO() if "b" in mode else io.StringIO()
+
+        self._opened_by(at_s, for_s, failing)
+
+    def _opened_by(self, at_s, for_s, opened):
+        """For for_s files are opened by opened(the real open(), its arguments)."""
+
         def begin():
             self.restore_files()
             self._real_open = real = builtins.open
-
-            def failing(path, mode="r", *more, **named):
-                if not str(path).endswith(ending) or "r" not in mode or "+" in mode:
-                    return real(path, mode, *more, **named)
-                if not empty:
-                    raise OSError(errno.EIO)
-                return io.BytesIO() if "b" in mode else io.StringIO()
-
-            builtins.open = failing
+            builtins.open = lambda *arguments, **named: opened(real, *arguments, **named)
 
         self._board.at(at_s, begin)
         self._board.at(at_s + for_s, self.restore_files)
