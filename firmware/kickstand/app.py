@@ -24,6 +24,7 @@ COLLECT_TURNS = 42  # in which 90 KB of heap are used, of 120 that are free whil
 COLLECT_TURNS_DRIVING = 25  # while aligning by driving: 85 KB of heap are free
 SINGLE_GAPS = 300  # single free blocks that a collection leaves
 PAGE_MS = 100
+LATE_MS = 400  # by which page and readings together may be late: with a page's time a lean is then half a second old
 FIRST_PAGE_MS = 60  # from the start of the sensor: then the lean filter's first window is over
 
 
@@ -64,6 +65,7 @@ class App:
         self._record_due = settings.RECORD or keeper is not None
         self._on_card = settings.SD_SPI is not None and keeper is None
         self._page_ms = ticks_ms()
+        self.late = False  # the page that is due is to show no lean
 
     def _open_drive(self):
         # 30 KB of heap with all that they import: not for a board without a speed source
@@ -175,6 +177,8 @@ class App:
     def _show(self, now_ms):
         """Put the page as it is now onto the display. As often, and at standstill only, save the trim that riding has
         found."""
+        waiting_ms = 1000 * self.sensor.chip.frames_left // self.settings.SAMPLE_HZ
+        self.late = ticks_diff(now_ms, self._page_ms) + waiting_ms > LATE_MS
         self._page_ms = ticks_add(now_ms, PAGE_MS)
         line1, line2 = self.screen.lines(now_ms)
         self.lcd.show(line1, line2)

@@ -3,7 +3,8 @@
 import json
 
 import pytest
-from emulated import modules, pico
+from emulated import calibrated, firmware, leaning, modules, pico, shown_lean, shows
+from kickstand_tools.bench.sample_count import SampleCount
 
 pytestmark = pytest.mark.chip
 
@@ -32,3 +33,28 @@ def test_wheel_pulses_on_the_chip():
     assert len(got) >= 10
     assert got == pytest.approx([15.0] * len(got), abs=0.2)
     assert fault is None
+
+
+@pytest.mark.parametrize("pulses_per_s", [20_000, 50_000])
+def test_a_storm_of_pulses_costs_no_reading(pulses_per_s):
+    """A contact beside an ignition cable. Without its limit the interrupt leaves the loop next to no time, and with
+    the quicker storm none at all."""
+    storm_s, resets = 1e9, []
+    files = firmware() | calibrated() | {"/config.py": b'SPEED = "wheel"\n'}
+    with pico(leaning(20.0), files) as device:
+        device.fit_wheel(lambda t_s: pulses_per_s / 0.5 if t_s >= storm_s else 0.0)
+        shows(device, "Lean +20", 8.0)
+        samples, reset = SampleCount(device.board.sensor), device._reset
+
+        def count_reset():
+            resets.append(device.time_s)
+            reset()
+
+        device.chip.on_reset = count_reset
+        samples.begin()
+        storm_s = device.time_s
+        shows(device, "Wheel: noise *.check wiring", 0.4)
+        device.run_until(lambda: shown_lean(device.lcd()) == 20.0, 2.5)  # the notice stands for 2 s
+        assert samples.taken() > 400
+        assert samples.lost() <= 4  # those of one transfer to the sensor that may have timed out
+    assert resets == []

@@ -234,6 +234,30 @@ def test_a_display_that_lost_its_power_for_a_moment_is_started_again(board, gap_
     assert board.lcd.text()[0] == then.replace("\xdf", "\xb0") + "       "
 
 
+@pytest.mark.parametrize("byte", range(1, 130, 3))
+def test_a_line_that_breaks_off_is_no_reading(board, byte):
+    """Half of the new lean beside half of the old one could pass for a third. It is written again within 0.4 s."""
+    from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
+
+    old, new = "Lean  19° right ", "Lean  28° left  "
+    seen = set()
+
+    def run():
+        lcd = display()
+        lcd.show(old.replace("°", "\xdf"), "")
+        lcd.flush()
+        board.faults.cut(0x27, 0.0, byte)
+        lcd.show(new.replace("°", "\xdf"), "")
+        for _ in range(40):
+            lcd.tick(ticks_ms())
+            sleep_ms(10)
+            seen.add(board.lcd.text()[0])
+
+    on(board, run)
+    assert board.lcd.text()[0] == new
+    assert all(line in (old, new) or "-" in line[:14] for line in seen), seen
+
+
 def test_a_display_out_of_step_is_put_right_by_the_next_initialisation(board):
     from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
 

@@ -221,6 +221,30 @@ def test_a_contact_that_bounces_is_counted_once():
     check_wheel(got, 0.5)
 
 
+def test_a_storm_of_pulses_is_named_and_the_speed_returns():
+    """Twice as long as the pause, so that the interrupt is tried in the middle of it."""
+    for pulses_per_s in (5_000, 20_000, 50_000):
+
+        def fit(board, pulses_per_s=pulses_per_s):
+            board.fit_wheel(constant)
+            board.faults.wheel_storm(10.0, 8.0, pulses_per_s)
+
+        got, faults = drive({"SPEED": "wheel"}, fit, 25.0)
+        assert faults[9] is None and faults[23] is None
+        for second in range(11, 20):
+            assert faults[second] == ("Wheel: noise", "check wiring"), second
+        assert not [t for t, _, _ in got if 10.2 < t < 20.0]
+        assert len([t for t, _, _ in got if t > 20.5]) > 20
+        assert all(abs(speed - 15.0) < 0.5 for _, speed, _ in got)
+
+
+def test_the_wheel_of_a_quick_vehicle_is_no_storm():
+    config = {"SPEED": "wheel", "PULSES_PER_METRE": 50}
+    got, faults = drive(config, lambda b: b.fit_wheel(lambda t_s: 70.0, pulses_per_metre=50), 3.0)
+    assert faults[2] is None and len(got) > 20
+    assert all(abs(speed - 70.0) < 1.0 for _, speed, _ in got)
+
+
 def test_wheel_on_an_esp32():
     with Board(level, port="esp32"):
         from kickstand.speed.wheel import Wheel

@@ -56,9 +56,9 @@ class Record:
         return math.inf
 
     def lean_at(self, t_s):
-        """The lean on the display in degrees, > 0 to the right; None if none is shown."""
-        match = re.match(r"Lean +(\d+)° (right|left)?", self.at(t_s)[0])
-        return match and int(match[1]) * (-1 if match[2] == "left" else 1)
+        """The lean on the display in degrees, > 0 to the right; None if none is shown, or one half written."""
+        match = re.fullmatch(r"Lean +(\d+)° (right|left |     )[ *]", self.at(t_s)[0])
+        return match and int(match[1]) * (-1 if match[2] == "left " else 1)
 
     def leans(self, from_s, until_s):
         """Every lean that was shown between two times."""

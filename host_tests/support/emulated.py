@@ -65,11 +65,9 @@ def leaning(lean_deg: float) -> Callable[[float], tuple]:
 
 
 def shown_lean(lines: list[str]) -> float | None:
-    """Degrees on the display, > 0 to the right; None where it shows no lean."""
-    words = lines[0].split()
-    if len(words) < 2 or words[0] != "Lean" or not words[1].endswith("°"):
-        return None
-    return float(words[1][:-1]) * (-1 if words[2:] == ["left"] else 1)
+    """Degrees on the display, > 0 to the right; None where it shows no lean, or one that is only half written."""
+    match = re.fullmatch(r"Lean +(\d+)° (right|left |     )[ *]", lines[0])
+    return match and float(match[1]) * (-1 if match[2] == "left " else 1)
 
 
 def shows(device, pattern: str, limit_s: float) -> re.Match:

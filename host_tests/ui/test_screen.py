@@ -24,6 +24,7 @@ class Drive:
     """Alignment by driving that has a question, until it is answered."""
 
     shown = False
+    speed = types.SimpleNamespace(take_problem=lambda: None)
 
     def __init__(self):
         self.message = None
@@ -47,6 +48,7 @@ def app():
         meter=meter,
         calibration=types.SimpleNamespace(aligned=True, value=None),
         drive=Drive(),
+        late=False,
         recorder=Recorder(),
         recording=False,
     )

@@ -23,6 +23,7 @@ _CGRAM_ADDRESS = const(0x40)  # instruction "set CGRAM address" (table 6)
 
 ADDRESSES = (0x27, 0x3F)  # PCF8574 and PCF8574A with all address jumpers open
 COLUMNS = 16
+_DASHES = b"-" * COLUMNS
 _NEVER = b"\xfe" * COLUMNS  # a character code that no text uses: marks a line as not yet written
 REINIT_MS = 10_000  # initialise again so often: noise can put the nibbles out of step, and nothing else mends that
 PROBE_MS = 200  # how often to see whether a display is there, or still there
@@ -85,7 +86,7 @@ class Lcd:
         self._put(self._wanted[1], line2)
 
     def tick(self, now_ms):
-        """Do the next piece of work: at most one transfer of a line. Call it about every 10 ms. now_ms: ticks_ms().
+        """Do the next piece of work: at most one line. Call it about every 10 ms. now_ms: ticks_ms().
 
         Raises SettingsError for pins that cannot be used, and nothing else."""
         if self._acted_ms is not None and ticks_diff(now_ms, self._acted_ms) < (
@@ -104,12 +105,12 @@ class Lcd:
                     self._initialise(self._step)
                 self._step += 1
                 self._init_ms = self._seen_ms = now_ms
+            elif self._refresh():  # first: what is shown may be too old to stay
+                self._seen_ms = self._acted_ms = now_ms
             elif ticks_diff(now_ms, self._seen_ms) >= PROBE_MS:
                 self._seen_ms = self._acted_ms = now_ms
                 if not self._kept_power():
                     self._step = _POWER_UP
-            elif self._refresh():
-                self._acted_ms = now_ms
             elif ticks_diff(now_ms, self._init_ms) >= REINIT_MS:
                 self._step = 0
         except OSError:
@@ -183,7 +184,10 @@ class Lcd:
                     first += 1
                 while shown[last] == wanted[last]:
                     last -= 1
-                self._send(_LINE_ADDRESSES[i] + first, memoryview(wanted)[first : last + 1])
+                at = _LINE_ADDRESSES[i] + first
+                if last > first:  # if this breaks off, half a number or another side must not look like a reading
+                    self._send(at, memoryview(_DASHES)[first : last + 1])
+                self._send(at, memoryview(wanted)[first : last + 1])
                 shown[:] = wanted
                 return True
         return False

@@ -9,13 +9,15 @@ CHECK_MS = 100  # from one check of the configuration, which takes 0.6 ms, to th
 RETRY_MS = 50  # from one attempt to set the chip up to the next
 FAILURES = 3  # transfers that fail in a row make a fault; a NACK or two are tolerated
 SILENT_MS = 100  # a fault after this long without a sample
+STALE_MS = 500  # likewise where each was lost in an overflow, because the board had no time to read
 
 
 class Sensor:
     """Samples of one chip that may fail at any time. A transfer that fails, by NACK or time-out, ends in _missed().
 
     chip: an Mpu6050.  reopen: called to free the bus, returns it as a machine.I2C.
-    fault: None, or a Notice: what is wrong.  restarts: how often the chip was set up.
+    fault: None, or a Notice: what is wrong.  restarts: how often the chip was set up or, without that, no sample could
+    be read for STALE_MS: samples do not follow on from those before.
     """
 
     def __init__(self, chip, reopen):
@@ -26,7 +28,8 @@ class Sensor:
         self._due_ms = ticks_ms()  # when the next check is due or, while the chip does not run, the next step to that
         self._steps = None  # of setting the chip up, a generator
         self._ready = False  # the chip is set up, but its FIFO does not fill yet
-        self._sample_ms = 0  # when the last sample was read
+        self._sample_ms = 0  # when the last sample was read, or the FIFO was emptied after an overflow
+        self._emptied_ms = self._read_ms = 0  # of the last overflow; of the last sample that was read before it
         self.restarts = 0
         self.fault = Notice("starting")
         self._running = False
@@ -74,7 +77,13 @@ class Sensor:
         """The FIFO held no sample. After an overflow that is no fault, because the FIFO was just emptied."""
         if self._overflows != self.chip.overflows:
             self._overflows = self.chip.overflows
-            self._sample_ms = ticks_ms()  # now_ms may be from before the long pause that led to the overflow
+            if self._sample_ms != self._emptied_ms:  # there were samples since the last overflow
+                self._read_ms = self._sample_ms
+            # now_ms may be from before the long pause that led to the overflow
+            self._sample_ms = self._emptied_ms = ticks_ms()
+            if ticks_diff(self._emptied_ms, self._read_ms) > STALE_MS:
+                self.fault = Notice("readings-lost")
+                self.restarts += 1
         elif ticks_diff(now_ms, self._sample_ms) > SILENT_MS:
             self._fail("sensor-silent", now_ms)
 

@@ -28,6 +28,8 @@ class Gps:
     """uart: a machine.UART with a time-out of 0. After poll() has returned a speed: age_ms, by how much its sentence
     came later than the receiver's sentences usually do."""
 
+    problem = None  # as a Wheel has it; whatever is wrong here, fault() tells
+
     def __init__(self, uart):
         self._uart = uart
         self._line = b""  # the sentence so far

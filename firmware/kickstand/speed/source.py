@@ -1,6 +1,6 @@
 """Opens the speed source that config.py names, and refuses speeds that no vehicle can have.
 
-A source is a Gps or a Wheel. Both have poll(now_ms), after_stall(now_ms), fault(now_ms) and age_ms.
+A source is a Gps or a Wheel. Both have poll(now_ms), after_stall(now_ms), fault(now_ms), problem and age_ms.
 """
 
 from time import ticks_diff
@@ -49,6 +49,11 @@ class Speed:
     def fault(self, now_ms):
         """None, or a Notice: why no speed comes."""
         return self._source.fault(now_ms)
+
+    def take_problem(self):
+        """Return what the source has to say once, a Notice or None, and clear it."""
+        problem, self._source.problem = self._source.problem, None
+        return problem
 
 
 def open_speed(settings):

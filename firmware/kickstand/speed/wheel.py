@@ -1,6 +1,8 @@
 """Speed from pulses: a reed contact or Hall switch to ground at a wheel, or a vehicle's speed signal.
 
-The interrupt only counts pulses and keeps the time of the last one, in integers: a hard interrupt must take no heap.
+The interrupt only counts pulses and keeps the time of the last one, in integers: a hard interrupt must take no heap. In
+a storm of pulses, as from an ignition cable, it would leave no time for anything else: it turns itself off, and poll()
+turns it on again later.
 
 >>> wheel = Wheel(machine.Pin(14, machine.Pin.IN, machine.Pin.PULL_UP), 0.5, {"hard": True})
 >>> speed_mps = wheel.poll(time.ticks_ms())     # None: no new speed
@@ -18,6 +20,11 @@ STOPPED_MPS = 0.5  # a wheel slower than this counts as standing
 MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # limits of the time without a pulse that means standing
 REPORT_MS = 100  # poll() returns a speed at most so often
 STANDING_MS = 200  # and a speed of zero at most so often
+# So many edges in less than STORM_US are a storm: over 8,000 a second. The interrupt takes 33 us on a Pico, so that at
+# 30,000 a second nothing else would run: for 2 ms before this ends it, less than the time-out of a transfer. 50 pulses
+# a metre at 70 m/s are allowed.
+STORM_EDGES, STORM_US = 64, 8_000
+STORM_PAUSE_MS = 5000  # the interrupt is off for so long after a storm, and again if it lasts
 # Counts and times wrap at 30 bits. The interrupt subtracts times with this mask and not by ticks_diff(), which would
 # give a negative time after nine minutes of standing.
 _TICKS = _COUNT = 0x3FFFFFFF
@@ -26,7 +33,8 @@ _TICKS = _COUNT = 0x3FFFFFFF
 class Wheel:
     """pin: a machine.Pin with pull-up.  pulses_per_metre: of road.  irq: dict of further arguments of Pin.irq().
 
-    After poll() has returned a speed: age_ms, how old it is.
+    After poll() has returned a speed: age_ms, how old it is.  problem: None, or a Notice to be shown once; who shows it
+    clears it.
     """
 
     def __init__(self, pin, pulses_per_metre, irq):
@@ -44,10 +52,28 @@ class Wheel:
         self._moved_ms = None  # when it last saw a pulse
         self.age_ms = 0
         self._pin = pin
-        pin.irq(self._edge, Pin.IRQ_FALLING | Pin.IRQ_RISING, **irq)
+        self._irq = irq
+        self._noisy = False  # there was a storm, and no speed since then
+        self.problem = None
+        self._listen()
+
+    def _listen(self):
+        """Turn the interrupt on."""
+        self._off = False  # the interrupt has turned itself off, and when poll() found that
+        self._off_ms = None
+        self._edges = STORM_EDGES  # left of those that are timed together, since _edges_us
+        self._edges_us = ticks_us()
+        self._pin.irq(self._edge, Pin.IRQ_FALLING | Pin.IRQ_RISING, **self._irq)
 
     def _edge(self, pin):
         now = ticks_us()
+        self._edges -= 1
+        if not self._edges:
+            self._edges = STORM_EDGES
+            if (now - self._edges_us) & _TICKS < STORM_US:
+                self._off = True
+                pin.irq(None)  # here, because the loop may get no time at all; it takes no heap
+            self._edges_us = now
         if pin.value():
             self._opened_us = now
         elif (now - self._opened_us) & _TICKS >= self._open_us and (now - self._pulse_us) & _TICKS >= self._shortest_us:
@@ -56,6 +82,8 @@ class Wheel:
 
     def poll(self, now_ms):
         """Return a new speed in m/s, or None. now_ms: ticks_ms()."""
+        if self._off:
+            return self._wait(now_ms)
         if self._report_ms is None:
             self._report_ms = now_ms
         waited_ms = ticks_diff(now_ms, self._report_ms)
@@ -70,9 +98,22 @@ class Wheel:
         if self._moved_ms is None or ticks_diff(now_ms, self._moved_ms) < self._stop_ms or waited_ms < STANDING_MS:
             return None
         self._report_ms = now_ms
+        self._noisy = False
         self._seen_us = None  # the next period begins with the next pulse
         self.age_ms = self._stop_ms // 2  # the wheel may have stopped, or moved again, at any time since the last pulse
         return 0.0
+
+    def _wait(self, now_ms):
+        """The interrupt is off: turn it on when STORM_PAUSE_MS are over. What it counted in the storm is no speed."""
+        if self._off_ms is None:
+            self._off_ms = now_ms
+            if not self._noisy:
+                self._noisy, self.problem = True, Notice("wheel-storm")
+        elif ticks_diff(now_ms, self._off_ms) >= STORM_PAUSE_MS:
+            self._seen, self._seen_us = self.count, None
+            if self._moved_ms is not None:
+                self._moved_ms = now_ms
+            self._listen()
 
     def _pulses(self, pulses, count, pulse_us, now_ms):
         """The speed in m/s from so many new pulses, the last of which came at pulse_us."""
@@ -81,6 +122,7 @@ class Wheel:
         self._report_ms = self._moved_ms = now_ms
         if before_us is None:
             return None
+        self._noisy = False
         period_us = ticks_diff(pulse_us, before_us)
         self.age_ms = (ticks_diff(ticks_us(), pulse_us) + period_us // 2) // 1000
         return pulses * self._metre_us / period_us
@@ -94,4 +136,6 @@ class Wheel:
 
     def fault(self, now_ms):
         """None, or a Notice: a wheel that has never turned may be a wire that is loose."""
+        if self._noisy:
+            return Notice("wheel-storm")
         return Notice("no-pulse") if self._moved_ms is None else None

@@ -34,11 +34,13 @@ sensor-lost|Sensor lost|check wiring
 sensor-frozen|Sensor frozen|starting again
 sensor-silent|Sensor silent|starting again
 sensor-reset|Sensor reset|starting again
+readings-lost|Readings lost|board too busy
 
 gps-silent|GPS silent|check wiring
 gps-garbled|GPS garbled|check GPS_BAUD
 gps-no-fix|GPS: no fix|needs open sky
 no-pulse|Wheel: no pulse|ride, or wiring?
+wheel-storm|Wheel: noise|check wiring
 
 no-driver|SD card:|no driver
 no-card|No SD card|check, restart

@@ -14,6 +14,7 @@ class PageRing:
     alignment: it means that the bike is on its kickstand."""
 
     def __init__(self, app, align):
+        self._app = app
         self._meter = app.meter
         self._calibration = app.calibration
         self._drive = app.drive
@@ -73,7 +74,7 @@ class PageRing:
         meter = self._meter
         if meter.fallen:
             return pages.FALLEN
-        if not meter.trusted or abs(meter.lean_deg) > FALLEN_DEG:
+        if self._app.late or not meter.trusted or abs(meter.lean_deg) > FALLEN_DEG:
             return pages.unsure(meter.doubt)
         line1, line2 = page(meter)
         if self._at == 0 and self._app.recording:

@@ -26,7 +26,8 @@ class Screen:
 
     def lines(self, now_ms):
         """What the display should say now. Call it about every 100 ms."""
-        problem = self._app.recorder and self._app.recorder.take_problem()
+        app = self._app
+        problem = (app.recorder and app.recorder.take_problem()) or (app.drive and app.drive.speed.take_problem())
         if problem:
             self._notice.show(messages.lines(problem), now_ms)
         return self._update_front(now_ms)[1]

@@ -7,7 +7,7 @@ from typing import TypedDict
 
 from rich.table import Table
 
-_LEAN_PAGE = re.compile(r"Lean +(\d+)° *(left|right)?")
+_LEAN_PAGE = re.compile(r"Lean +(\d+)° (left|right)?[ *]*$")
 _ROLLING = ("roll in", "roll out", "roll")
 _STANDING = ("kickstand", "upright", "moving", "wait")
 

@@ -7,61 +7,13 @@ import builtins
 import errno
 import io
 
-from .clock import NEVER_US, to_us
+from .clock import PowerOff, to_us
 from .fakes.erased_file import ErasedFile
+from .fakes.failing_file import FailingFile
+from .i2c import TransferFault
 
 _FOREVER = 1 << 60  # a number of transfers
 _STALL_S = 0.5  # that a print waits for a host which takes nothing (shared/tinyusb/mp_usbd_cdc.h of MicroPython)
-
-
-class TransferFault:
-    """A fault in the transfers number first to last to one address, if they begin between from_us and until_us.
-
-    kind: "nack"; "timeout"; "corrupt" inverts the bits of mask in the data byte with the number byte; "slip" delays
-    what is read by one bit from that byte on. read: the fault is in what is read, else in what is written.
-    """
-
-    def __init__(self, kind, address, first, last, from_us=0, until_us=NEVER_US, byte=0, mask=0, read=True):
-        self.kind = kind
-        self.mask = mask
-        self._address = address
-        self._numbers = (first, last)
-        self._times = (from_us, until_us)
-        self._byte = byte
-        self._read = read
-        self._count = 0
-        self._carry = 0
-
-    def applies(self, address, number, now_us):
-        """Whether the transfer that begins now has this fault."""
-        first, last = self._numbers
-        start, end = self._times
-        return address == self._address and first <= number <= last and start <= now_us < end
-
-    def begin(self, read):
-        """Called at each START: True (the device may answer), False (NACK) or None (the wires are held)."""
-        self._count = 0
-        return {"nack": False, "timeout": None}.get(self.kind, True)
-
-    def on_write(self, value):
-        """What arrives of a byte that the controller sends. Byte 0 is the first, usually the register address."""
-        return value if self._read else self._spoil(value)
-
-    def on_read(self, value):
-        """What arrives of a byte that a device sends."""
-        return self._spoil(value) if self._read else value
-
-    def _spoil(self, value):
-        number = self._count
-        self._count += 1
-        if self.kind == "corrupt":
-            return value ^ self.mask if number == self._byte else value
-        if number < self._byte:
-            return value
-        # The device missed a clock: one bit is read twice, and all later bits come one clock late
-        late = (value & 0x80 if number == self._byte else self._carry << 7) | value >> 1
-        self._carry = value & 1
-        return late
 
 
 class Faults:
@@ -70,6 +22,7 @@ class Faults:
     def __init__(self, board):
         self._board = board
         self._real_open = None
+        self.files_cut = 0
         self._real_print = None
 
     # On the wires
@@ -97,6 +50,14 @@ class Faults:
     def bit_slip(self, address, nth=1, byte=0):
         """The device misses a clock in the nth transfer from now: what is read from that byte on comes one bit late."""
         self._transfers("slip", address, nth, 1, byte)
+
+    def cut(self, address, at_s, byte):
+        """The first transfer to address after at_s that has so many bytes breaks off at byte `byte`."""
+
+        def begin():
+            self._transfers("cut", address, 1, _FOREVER, byte, read=False)
+
+        self._board.at(at_s, begin)
 
     def stuck_sda(self, at_s, bits=8, lcd=False):
         """A device on the sensor's bus (lcd: on the display's) holds SDA low until SCL was clocked `bits` times."""
@@ -140,7 +101,47 @@ class Faults:
         """A spike on E shifts the display's pairing of nibbles by one."""
         self._board.at(at_s, self._board.lcd.slip)
 
+    def wheel_storm(self, at_s, for_s, pulses_per_s):
+        """An ignition cable induces pulses in the cable of the wheel contact."""
+        wheel = self._board.wheel
+
+        def set_to(pulses_per_s):
+            wheel.noise_hz = pulses_per_s
+
+        self._board.at(at_s, lambda: set_to(pulses_per_s))
+        self._board.at(at_s + for_s, lambda: set_to(0))
+
+    def busy(self, at_s, for_s, times=1):
+        """Something else takes all of the processor's time for for_s, `times` times with 30 ms between them."""
+
+        def begin(left):
+            self._board.clock.advance(to_us(for_s))
+            if left > 1:
+                self._board.clock.at(self._board.clock.now_us + 30_000, lambda: begin(left - 1))
+
+        self._board.at(at_s, lambda: begin(times))
+
     # In the file system
+
+    def disk_full(self, at_s, for_s):
+        """Nothing can be written to a file."""
+
+        def begin():
+            self._replace_open(lambda file, path: FailingFile(file, 0, OSError(errno.ENOSPC)))
+
+        self._board.at(at_s, begin)
+        self._board.at(at_s + for_s, self.restore_files)
+
+    def cut_file(self, ending, length):
+        """The supply is cut when `length` bytes of the next file with this ending are written. Then files_cut is 1."""
+
+        def wrap(file, path):
+            if not path.endswith(ending):
+                return file
+            self.files_cut += 1
+            return FailingFile(file, length, PowerOff())
+
+        self._replace_open(wrap)
 
     def file_error(self, ending, at_s, for_s):
         """Files whose name has this ending cannot be opened for reading."""
@@ -168,6 +169,16 @@ class Faults:
             builtins.open = self._real_open
             self._real_open = None
 
+    def _replace_open(self, wrap):
+        """Files opened for writing become wrap(file, path)."""
+        self.restore_files()
+        self._real_open = real = builtins.open
+
+        def opening(path, mode="r", *more, **named):
+            file = real(path, mode, *more, **named)
+            return wrap(file, str(path)) if "w" in mode else file
+
+        builtins.open = opening
     # On USB
 
     def usb_asleep(self, at_s, for_s):

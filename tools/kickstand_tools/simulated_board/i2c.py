@@ -4,6 +4,66 @@ A controller (the fake machine.I2C or that of an emulated chip) calls start, wri
 the time pass that the bits take. Pins that drive the wires directly call set_scl and set_sda.
 """
 
+from .clock import NEVER_US
+
+
+class TransferFault:
+    """A fault in the transfers number first to last to one address, if they begin between from_us and until_us.
+
+    kind: "nack"; "timeout"; "cut" acknowledges no byte from that
+    number on, once; "corrupt" inverts the bits of mask in the data byte with the number byte; "slip" delays
+    what is read by one bit from that byte on. read: the fault is in what is read, else in what is written.
+    """
+
+    def __init__(self, kind, address, first, last, from_us=0, until_us=NEVER_US, byte=0, mask=0, read=True):
+        self.kind = kind
+        self.mask = mask
+        self._address = address
+        self._numbers = (first, last)
+        self._times = (from_us, until_us)
+        self._byte = byte
+        self._read = read
+        self._count = 0
+        self._carry = 0
+
+    def applies(self, address, number, now_us):
+        """Whether the transfer that begins now has this fault."""
+        first, last = self._numbers
+        start, end = self._times
+        return address == self._address and first <= number <= last and start <= now_us < end
+
+    def begin(self, read):
+        """Called at each START: True (the device may answer), False (NACK) or None (the wires are held)."""
+        self._count = 0
+        return {"nack": False, "timeout": None}.get(self.kind, True)
+
+    def on_write(self, value):
+        """What arrives of a byte that the controller sends, None if it is not acknowledged. Byte 0 is the first,
+        usually the register address."""
+        if self.kind == "cut":
+            self._count += 1
+            if self._count <= self._byte:
+                return value
+            self._numbers = (0, -1)
+            return None
+        return value if self._read else self._spoil(value)
+
+    def on_read(self, value):
+        """What arrives of a byte that a device sends."""
+        return self._spoil(value) if self._read else value
+
+    def _spoil(self, value):
+        number = self._count
+        self._count += 1
+        if self.kind == "corrupt":
+            return value ^ self.mask if number == self._byte else value
+        if number < self._byte:
+            return value
+        # The device missed a clock: one bit is read twice, and all later bits come one clock late
+        late = (value & 0x80 if number == self._byte else self._carry << 7) | value >> 1
+        self._carry = value & 1
+        return late
+
 
 class Bus:
     """sda, scl: numbers of the microcontroller's pins. open: True during a transfer."""
@@ -14,7 +74,7 @@ class Bus:
         self.scl = scl
         self.devices = {}  # by address
         self.transfers = {}  # by address: how many were begun
-        self.faults = []  # of faults.TransferFault
+        self.faults = []  # of TransferFault
         self._fault = None  # of the transfer under way
         self._device = None
         self.open = False
@@ -66,6 +126,8 @@ class Bus:
             return False
         if self._fault is not None:
             value = self._fault.on_write(value)
+            if value is None:
+                return False
         return self._device.write_byte(value)
 
     def read_byte(self):

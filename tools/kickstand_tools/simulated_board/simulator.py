@@ -195,7 +195,7 @@ class Board:
             self.gps.connect(receive if same else lambda data: receive(bytes([b & 0xE6 for b in data])))
 
     def watch_pin(self, number, edge):
-        """Call edge(level) when the part that is wired to this pin changes its level."""
+        """Call edge(level) when the part that is wired to this pin changes its level. None: no more calls."""
         if self.wheel and number == self.wheel_pin:
             self.wheel.connect(edge)
 

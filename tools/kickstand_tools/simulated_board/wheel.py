@@ -8,11 +8,13 @@ _CREEP_MPS = 0.02  # slower counts as standing
 class Wheel:
     """speed(t_s): of the vehicle, m/s.  bounce_us: how long the contact bounces at each edge, 0 for not at all.
 
-    closed: True while it connects the pin to ground.  until_s: when its wire breaks.
+    closed: True while it connects the pin to ground.  until_s: when its wire breaks.  noise_hz: pulses a second that a
+    cable beside its own induces, in place of the wheel's; 0 for none.
     """
 
     def __init__(self, clock, speed, pulses_per_metre=0.5, bounce_us=0, until_s=1e9):
         self.closed = False
+        self.noise_hz = 0
         self._edge = None
         self._clock = clock
         self._speed = speed
@@ -24,7 +26,7 @@ class Wheel:
         clock.at(clock.now_us, self._look)
 
     def connect(self, edge):
-        """From now on edge(level of the pin) is called at each change."""
+        """From now on edge(level of the pin) is called at each change. None: nothing is."""
         self._edge = edge
 
     def disconnect(self):
@@ -36,6 +38,8 @@ class Wheel:
         now_us = self._clock.now_us
         speed = self._speed(now_us / 1e6)
         rate = speed * self._pulses_per_metre / 1e6 if speed > _CREEP_MPS else 0.0  # pulses per us
+        if self.noise_hz:
+            rate = self.noise_hz / 1e6 if self._edge else 0.0  # nobody listens: spare the time
         self._turned += rate * (now_us - self._look_us)
         self._look_us = now_us
         if self._turned >= 0.999:

@@ -2,6 +2,8 @@
 
 from . import current
 
+IRQ_US = 26  # that an interrupt takes beside its calls into `machine` and `time`: 33 in all, as on a Pico
+
 
 class Pin:
     """machine.Pin: levels, and interrupts from what is wired to the pin. Handlers run while simulated time passes."""
@@ -33,11 +35,26 @@ class Pin:
         if hard and current.board.port == "esp32":
             raise TypeError("extra keyword arguments given")
 
-        def edge(level):
-            if handler and trigger & (Pin.IRQ_RISING if level else Pin.IRQ_FALLING):
-                handler(self)
+        running, waiting = False, False  # as on the chip one more edge is kept while the handler runs, and no others
 
-        current.board.watch_pin(self.id, edge)
+        def edge(level):
+            nonlocal running, waiting
+            if not trigger & (Pin.IRQ_RISING if level else Pin.IRQ_FALLING):
+                return
+            waiting = True
+            if running:
+                return
+            running = True
+            try:
+                while waiting and handler and self._handler is handler:
+                    waiting = False
+                    handler(self)
+                    current.board.clock.advance(IRQ_US)
+            finally:
+                running = False
+
+        self._handler = handler
+        current.board.watch_pin(self.id, edge if handler else None)
 
     def __call__(self, level=None):
         return self.value(level)

@@ -1,0 +1,71 @@
+"""What takes the board's time away: an erase of the flash, slow USB, a storm of wheel pulses; and a display that fails
+in the middle of a line. No lean stands that is over half a second old, and none is ever half old and half new."""
+
+import devices
+import engines
+import pytest
+from kickstand_tools.simulation.scripted import script
+
+FROM_S = 32.0
+# From FROM_S on the bike rolls from side to side, so quickly that the lean that is shown tells how old it is
+RIDE = [
+    *devices.RIDE[:3],
+    ["turn", -30.0, 2.0],
+    ["turn", 40.0, 0.0],
+    *[["turn", 40.0 * (-1) ** k, 0.3] for k in range(8)],
+]
+TRUE = script.Ride([getattr(script, name)(*more) for name, *more in RIDE])
+OLDEST_S = 0.5 + 0.1 + 0.1  # half a second, a page, and the time between two looks at the display
+HANG_S = 1.46  # the first page after it, which tells why, then stands when the next frame is taken
+NEAR_DEG = 10.0  # readings lost while the bike rolls cost up to 8 degrees until the filter has made up for them
+
+STARVED = {
+    "flash erase": ([["busy", [FROM_S, 0.4, 6]]], {}),
+    "slow USB": ([["busy", [FROM_S + 0.45, 0.48, 6]]], {}),
+    "slow turns": ([["busy", [FROM_S, 0.12, 30]]], {}),
+    "a hang": ([["busy", [FROM_S + 0.3, HANG_S]]], {}),
+    "few samples a second": ([["busy", [FROM_S, 0.3, 12]]], {"SAMPLE_HZ": 50, "DLPF": 5}),
+    "display breaks off": ([["cut", [0x27, FROM_S + 0.3 + k, 9 + 11 * k]] for k in range(5)], {}),
+}
+
+
+def run(engine, flash, faults, config, **more):
+    plan = {"ride": RIDE, "presses": devices.PRESSES, "until": FROM_S + 8.0, "faults": faults, "config": config}
+    return devices.run(engine, flash, {**plan, **more})
+
+
+def too_old(record, from_s=FROM_S - 5.0):
+    """[(t_s, line), ...] of each lean on the display that the bike has not had for OLDEST_S."""
+    found = []
+    for k in range(int(10 * (FROM_S + 8.0 - from_s))):
+        t_s = from_s + k / 10
+        shown = record.lean_at(t_s)
+        recent = [TRUE.truth(t_s - OLDEST_S * i / 20)[0] for i in range(21)]
+        if shown is not None and not min(recent) - NEAR_DEG <= shown <= max(recent) + NEAR_DEG:
+            found.append((t_s, record.at(t_s)[0], min(recent), max(recent)))
+    return found
+
+
+@pytest.mark.parametrize("engine, name", [("cpython", n) for n in STARVED] + [("micropython", "a hang")])
+def test_no_lean_stands_that_is_too_old(engine, name, tmp_path):
+    faults, config = STARVED[name]
+    record = run(engine, tmp_path, faults, config)
+    assert record.ends == ["off"]
+    # nothing that the program does can change the display while it hangs
+    hang_s = (FROM_S + 0.3, FROM_S + 0.3 + HANG_S + 0.05) if name == "a hang" else (0, 0)
+    assert [found for found in too_old(record) if not hang_s[0] < found[0] < hang_s[1]] == []
+    if name == "a hang":
+        assert record.first("Readings lost", FROM_S) < hang_s[1] + 0.1
+    assert record.lean_at(FROM_S - 0.5) is not None
+    assert len(record.leans(FROM_S + 7.0, FROM_S + 8.0)) > 3
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_a_storm_of_wheel_pulses_is_told_and_leaves_the_lean(engine, tmp_path):
+    """50,000 a second leave the loop no time at all, until the interrupt turns itself off."""
+    storm = [["wheel_storm", [FROM_S, 3.0, 50_000]]]
+    record = run(engine, tmp_path, storm, {"SPEED": "wheel"}, wheel={})
+    assert record.ends == ["off"]
+    assert record.first("Wheel: noise") < FROM_S + 0.3
+    assert too_old(record, FROM_S + 2.5) == []
+    assert len(record.leans(FROM_S + 2.5, FROM_S + 4.0)) > 3
