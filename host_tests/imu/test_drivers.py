@@ -146,7 +146,7 @@ def test_a_pause_that_overflows_the_fifo_is_not_taken_for_silence(board):
         while not sensor.fetch(ticks_ms()):
             sleep_ms(5)
         begun_ms = ticks_ms()
-        sleep_ms(700)
+        sleep_ms(450)
         for now_ms in (begun_ms, ticks_ms()):
             assert sensor.fetch(now_ms) == 0
         return sensor.chip.overflows, sensor.fault
@@ -162,7 +162,7 @@ def display():
 
 
 def test_only_changed_lines_are_sent(board):
-    """Each takes two transfers: one asks whether the display has kept its power, the other writes the line."""
+    """Each takes three transfers: one asks whether the display has kept its power, one writes dashes, one the line."""
     from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
 
     def run():
@@ -178,12 +178,12 @@ def test_only_changed_lines_are_sent(board):
             counts.append(board.lcd_bus.transfers[0x27])
         return [after - before for before, after in itertools.pairwise(counts)]
 
-    assert on(board, run) == [0, 2, 4]
+    assert on(board, run) == [0, 3, 6]
     assert board.lcd.text() == ["a" + " " * 15, "b" + " " * 15]
 
 
 def test_only_what_has_changed_of_a_line_is_sent(board):
-    """That takes four bytes a character, and four for its place."""
+    """That takes four bytes a character, and four for its place; twice, if it is more than one character."""
     from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
 
     sent = []
@@ -203,7 +203,7 @@ def test_only_what_has_changed_of_a_line_is_sent(board):
         lcd.tick(ticks_ms())
 
     on(board, run)
-    assert len(sent) == 8 + 4 * (1 + 9)
+    assert len(sent) == 8 + 2 * 4 * (1 + 9)
     assert board.lcd.text()[0] == "Lean   4\xb0 left  "
 
 
