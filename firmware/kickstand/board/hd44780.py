@@ -66,6 +66,8 @@ class Lcd:
         self._addresses = addresses
         self._wanted = [bytearray(b" " * COLUMNS), bytearray(b" " * COLUMNS)]
         self._shown = [bytearray(COLUMNS), bytearray(COLUMNS)]
+        self._texts = [None, None]  # of each line, what was shown last, if it was a str
+        self._changed = True  # a line may have to be sent
         self._packed = bytearray(4 * (COLUMNS + 1))
         self._port = bytearray(1)
         self._glyphs = _bar_glyphs()
@@ -82,8 +84,8 @@ class Lcd:
 
         A str of characters below 256, or bytes. Codes 0 to 7 are the patterns of _bar_glyphs(), the others those of
         the display's ROM."""
-        self._put(self._wanted[0], line1)
-        self._put(self._wanted[1], line2)
+        self._put(0, line1)
+        self._put(1, line2)
 
     def tick(self, now_ms):
         """Do the next piece of work: at most one line. Call it about every 10 ms. now_ms: ticks_ms().
@@ -105,7 +107,7 @@ class Lcd:
                     self._initialise(self._step)
                 self._step += 1
                 self._init_ms = self._seen_ms = now_ms
-            elif self._refresh():  # first: what is shown may be too old to stay
+            elif self._changed and self._refresh():  # first: what is shown may be too old to stay
                 self._seen_ms = self._acted_ms = now_ms
             elif ticks_diff(now_ms, self._seen_ms) >= PROBE_MS:
                 self._seen_ms = self._acted_ms = now_ms
@@ -126,11 +128,20 @@ class Lcd:
                 return
             sleep_ms(STEP_MS)
 
-    def _put(self, line, text):
+    def _put(self, number, text):
+        is_str = isinstance(text, str)
+        if is_str and text == self._texts[number]:  # as mostly: to convert it takes 0.2 ms
+            return
+        self._texts[number] = text if is_str else None
+        self._changed = True
+        line = self._wanted[number]
+        if not is_str and len(text) == COLUMNS:
+            line[:] = text
+            return
         for i in range(COLUMNS):
             if i < len(text):
                 code = text[i]
-                line[i] = code if isinstance(code, int) else ord(code) & 0xFF
+                line[i] = ord(code) & 0xFF if is_str else code
             else:
                 line[i] = 0x20
 
@@ -162,6 +173,7 @@ class Lcd:
             self._send(_CGRAM_ADDRESS + quarter, memoryview(self._glyphs)[quarter : quarter + COLUMNS])
             for shown in self._shown:  # both lines have to be written again
                 shown[:] = _NEVER
+            self._changed = True
 
     def _kept_power(self):
         """False if the display lost its power since the last transfer, however short. Raises OSError if it is gone.
@@ -190,6 +202,7 @@ class Lcd:
                 self._send(at, memoryview(wanted)[first : last + 1])
                 shown[:] = wanted
                 return True
+        self._changed = False
         return False
 
     def _send(self, command, data):

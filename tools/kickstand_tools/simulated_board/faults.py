@@ -8,8 +8,7 @@ import errno
 import io
 
 from .clock import PowerOff, to_us
-from .fakes.erased_file import ErasedFile
-from .fakes.failing_file import FailingFile
+from .fakes.files import ErasedFile, FailingFile
 from .i2c import TransferFault
 
 _FOREVER = 1 << 60  # a number of transfers
