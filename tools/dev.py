@@ -1,10 +1,11 @@
 #!/usr/bin/env python3
 """One command each, on a machine with nothing but Python 3.11 or newer:
 
-    python3 tools/dev.py demo    the firmware on a simulated board, live in the terminal
-    python3 tools/dev.py test    ruff, pyright and every test; further arguments go to pytest
+    python3 tools/dev.py demo         the firmware on a simulated board, live in the terminal
+    python3 tools/dev.py test         ruff, pyright and every test; further arguments go to pytest
+    python3 tools/dev.py mutants imu  which single changes of a room's code its tests do not notice (tools/mutants)
 
-Both make .venv beside pyproject.toml and install into it, again only when pyproject.toml has changed.
+They make .venv beside pyproject.toml and install into it, again only when pyproject.toml has changed.
 """
 
 import hashlib
@@ -21,6 +22,7 @@ PYTHON = (
 STAMP = os.path.join(VENV, "installed.txt")
 LOG = os.path.join(VENV, "install.log")
 OLDEST = (3, 11)
+EXTRAS = ("", "test", "mutants")  # of pyproject.toml; each has all of those before it
 REPORT_S = 5  # a line this often while installing
 
 
@@ -34,11 +36,15 @@ def main(arguments):
             "Python 3.11 or newer is needed, this is %d.%d: start it with a newer python3"
             % sys.version_info[:2]
         )
-    if not arguments or arguments[0] not in ("demo", "test"):
-        raise Stop("say what to do: %s demo, or %s test" % (sys.argv[0], sys.argv[0]))
+    if not arguments or arguments[0] not in ("demo", "test", "mutants"):
+        raise Stop("say what to do: %s demo, test or mutants" % sys.argv[0])
     name, rest = arguments[0], arguments[1:]
-    prepare("test" if name == "test" else "")
-    return test(rest) if name == "test" else run("-m", "kickstand_tools.cli", "demo", *rest)
+    prepare("" if name == "demo" else name)
+    if name == "test":
+        return test(rest)
+    if name == "mutants":
+        return run(os.path.join("tools", "mutants"), *rest)
+    return run("-m", "kickstand_tools.cli", "demo", *rest)
 
 
 def test(arguments):
@@ -63,7 +69,7 @@ def prepare(extra):
     with open(os.path.join(ROOT, "pyproject.toml"), "rb") as file:
         version = hashlib.sha256(file.read()).hexdigest()
     stamp = (read(STAMP) + "\n\n").split("\n")
-    if stamp[0] == place and stamp[1] in (version + " test", version + " " + extra):
+    if stamp[0] == place and stamp[1] in [version + " " + e for e in EXTRAS[EXTRAS.index(extra) :]]:
         return
     if (stamp[0] and stamp[0] != place) or not has_pip():
         make_venv()
@@ -106,7 +112,7 @@ def has_pip():
 
 def install(extra):
     """pip install --editable. What pip prints goes to install.log; its last line goes to the terminal now and then."""
-    say("installing %sinto .venv: a few minutes at most" % ("with the test tools " if extra else ""))
+    say("installing %sinto .venv: a few minutes at most" % ("with the %s tools " % extra if extra else ""))
     command = [PYTHON, "-m", "pip", "install", "--no-input", "--disable-pip-version-check"]
     begin = time.time()
     with open(LOG, "wb") as log:

@@ -1,0 +1,165 @@
+"""The single changes made to a file: cosmic-ray's operators where it has them, a few of each kind, and two of our own.
+
+One or two neighbours stand for each operator; all eleven would say the same eleven times.
+"""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import parso.python.tree
+from cosmic_ray.ast import ast_nodes, get_ast, is_number
+from cosmic_ray.mutating import mutate_code
+from cosmic_ray.operators import (
+    binary_operator_replacement as binary,
+)
+from cosmic_ray.operators import (
+    boolean_replacer,
+    break_continue,
+    exception_replacer,
+    zero_iteration_for_loop,
+)
+from cosmic_ray.operators import (
+    comparison_operator_replacement as comparison,
+)
+from cosmic_ray.operators import (
+    unary_operator_replacement as unary,
+)
+from cosmic_ray.operators.operator import Operator
+
+BINARY = (
+    ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "FloorDiv_Mul", "Mod_FloorDiv", "Pow_Mul")
+    + ("RShift_LShift", "LShift_RShift", "BitOr_BitAnd", "BitAnd_BitOr", "BitXor_BitOr")
+)  # fmt: skip
+COMPARISON = (
+    ("Lt_LtE", "LtE_Lt", "Gt_GtE", "GtE_Gt")  # the neighbour
+    + ("Lt_GtE", "GtE_Lt", "Gt_LtE", "LtE_Gt", "Eq_NotEq", "NotEq_Eq", "Is_IsNot", "IsNot_Is")  # the opposite
+)
+UNARY = ("USub", "Not", "Invert")  # left out
+SMALL = 16  # whole numbers up to this are counts and indices: one more and one less. Others: the double and the half
+
+
+class Change(NamedTuple):
+    """path: of the file, from the project's root. line: its number, from 1. mutant: the changed text of the file."""
+
+    path: Path
+    line: int
+    mutant: str
+
+
+class Negate(boolean_replacer.AddNot):
+    """Conditions that are no comparison: those have opposites of their own."""
+
+    def mutation_positions(self, node):
+        for position in super().mutation_positions(node):
+            if node.children[2 if node.type == "test" else 1].type != "comparison":
+                yield position
+
+
+class Number(Operator):
+    """Other numbers: a limit that could be doubled unnoticed is no limit."""
+
+    def mutation_positions(self, node):
+        if is_number(node):
+            for _ in self._others(node):
+                yield node.start_pos, node.end_pos
+
+    def mutate(self, node, index):
+        return parso.python.tree.Number(repr(self._others(node)[index]), node.start_pos, node.prefix)
+
+    @staticmethod
+    def _others(node):
+        value = ast.literal_eval(node.value)
+        if value in (0, 1):
+            return (type(value)(value + 1), type(value)(0))[: int(value) + 1]
+        if isinstance(value, int):
+            return (value + 1, value - 1) if value <= SMALL else (value * 2, value // 2)
+        return (value * 2, value / 2)
+
+    @classmethod
+    def examples(cls):
+        return ()
+
+
+class Drop(Operator):
+    """Statements left out: calls, raises, returns from the middle, assignments to attributes and elements."""
+
+    def mutation_positions(self, node):
+        if node.type == "simple_stmt" and self._matters(node.children[0]):
+            yield node.children[0].start_pos, node.children[0].end_pos
+
+    def mutate(self, node, index):
+        old = node.children[0]
+        node.children[0] = parso.python.tree.Name("pass", old.start_pos, old.get_first_leaf().prefix)
+        return node
+
+    @staticmethod
+    def _matters(statement):
+        if statement.type in ("raise_stmt", "atom_expr") or statement.get_first_leaf().value == "raise":
+            return True
+        if statement.get_first_leaf().value == "return":
+            return statement.parent.parent.parent.type != "funcdef"
+        if statement.type != "expr_stmt":
+            return False
+        if statement.children[1].type == "operator" and statement.children[1].value != "=":
+            return True
+        function = statement.search_ancestor("funcdef")
+        return statement.children[0].type == "atom_expr" and function and function.name.value != "__init__"
+
+    @classmethod
+    def examples(cls):
+        return ()
+
+
+def operators() -> list[Operator]:
+    """One of each kind of change."""
+    return [
+        *[getattr(binary, "ReplaceBinaryOperator_" + name)() for name in BINARY],
+        *[getattr(comparison, "ReplaceComparisonOperator_" + name)() for name in COMPARISON],
+        *[getattr(unary, "ReplaceUnaryOperator_Delete_" + name)() for name in UNARY],
+        boolean_replacer.ReplaceTrueWithFalse(),
+        boolean_replacer.ReplaceFalseWithTrue(),
+        boolean_replacer.ReplaceAndWithOr(),
+        boolean_replacer.ReplaceOrWithAnd(),
+        break_continue.ReplaceBreakWithContinue(),
+        break_continue.ReplaceContinueWithBreak(),
+        exception_replacer.ExceptionReplacer(),
+        zero_iteration_for_loop.ZeroIterationForLoop(),
+        Negate(),
+        Number(),
+        Drop(),
+    ]
+
+
+def changes(path: Path, root: Path) -> list[Change]:
+    """Every change of the file path, relative to root, in the order of its lines."""
+    source = (root / path).read_text("utf-8")
+    original = _bare(source)
+    found = []
+    for operator in operators():
+        for occurrence, line in enumerate(_lines(operator, source)):
+            mutant = mutate_code(source, operator, occurrence)
+            if mutant is not None and _bare(mutant) not in (None, original):
+                found.append(Change(path, line, mutant))
+    return sorted(found, key=lambda change: change.line)
+
+
+def _lines(operator: Operator, source: str) -> Iterator[int]:
+    """The number of the line of each place where the operator changes something."""
+    for node in ast_nodes(get_ast(source)):
+        for (line, _), _ in operator.mutation_positions(node):
+            yield line
+
+
+def _bare(source: str) -> str | None:
+    """What the text does, as a tree without annotations and decorators; None if it is no Python."""
+    try:
+        tree = ast.parse(source)
+    except SyntaxError:
+        return None
+    for node in ast.walk(tree):
+        for field, nothing in (("annotation", None), ("returns", None), ("decorator_list", [])):
+            if hasattr(node, field):
+                setattr(node, field, nothing)
+    return ast.dump(tree)

@@ -1,0 +1,101 @@
+"""The rooms whose tests are judged by mutants: the code of each and the tests that ought to notice a change in it."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+FIRMWARE, TOOLS, TESTS = "firmware/kickstand/", "tools/kickstand_tools/", "host_tests/"
+
+
+class Room(NamedTuple):
+    """sources, tests: patterns of files, from the project's root; the tests in the order in which they run, so those
+    that notice most in least time first."""
+
+    sources: tuple[str, ...]
+    tests: tuple[str, ...]
+
+
+ROOMS = {
+    "imu": Room(
+        (FIRMWARE + "imu/*.py",),
+        (TESTS + "imu/*.py", TESTS + "device/test_device_faults.py"),
+    ),
+    "calibration": Room(
+        (FIRMWARE + "calibration/*.py", FIRMWARE + "rotation.py"),
+        (
+            TESTS + "calibration/test_rotation.py",
+            TESTS + "calibration/test_two_position.py",
+            TESTS + "calibration/test_calibration.py",
+            TESTS + "calibration/test_store.py",
+            TESTS + "imu/test_batches.py",
+            TESTS + "device/test_device.py",
+        ),
+    ),
+    "board": Room(
+        (FIRMWARE + "board/*.py",),
+        (TESTS + "imu/test_drivers.py", TESTS + "simulated_board/test_board_lcd.py", TESTS + "device/*.py"),
+    ),
+    "lean": Room(
+        (FIRMWARE + "lean/*.py",),
+        (TESTS + "lean/*.py",),
+    ),
+    "drive_alignment": Room(
+        (FIRMWARE + "drive_alignment/*.py",),
+        (TESTS + "drive_alignment/*.py",),
+    ),
+    "speed": Room(
+        (FIRMWARE + "speed/*.py",),
+        (TESTS + "simulated_board/test_board_speed.py",),
+    ),
+    "rides": Room(
+        (FIRMWARE + "rides/*.py", TOOLS + "rides/*.py"),
+        (TESTS + "rides/*.py",),
+    ),
+    "calibrate": Room(
+        (TOOLS + "calibration/*.py",),
+        (TESTS + "calibration/test_cli*.py", TESTS + "drive_alignment/test_cli_drive.py"),
+    ),
+    "logs": Room(
+        (TOOLS + "logs/*.py",),
+        (TESTS + "logs/*.py",),
+    ),
+    "replay": Room(
+        (TOOLS + "replay/*.py",),
+        (TESTS + "replay/*.py",),
+    ),
+    "analysis": Room(
+        (TOOLS + "analysis/*.py", TOOLS + "analysis/plot/*.py"),
+        (TESTS + "analysis/*.py",),
+    ),
+    "export": Room(
+        (TOOLS + "analysis/export/*.py",),
+        (TESTS + "analysis/test_cli_export.py",),
+    ),
+    "stops": Room(
+        (TOOLS + "analysis/stops/*.py",),
+        (
+            TESTS + "analysis/test_analysis_brake_test.py",
+            TESTS + "analysis/test_analysis_standstill.py",
+            TESTS + "analysis/test_cli_report.py",
+        ),
+    ),
+    "simulation": Room(
+        (TOOLS + "simulation/*.py", TOOLS + "simulation/physics/*.py", TOOLS + "simulation/scripted/*.py"),
+        (TESTS + "simulation/*.py",),
+    ),
+}
+UNTESTABLE = ("_viper.py", "_guest.py")  # they run on a board or on MicroPython only
+
+
+def sources(room: Room, root: Path) -> list[Path]:
+    """The files of the room's code, relative to root."""
+    return [path for path in _files(room.sources, root) if not path.name.endswith(UNTESTABLE)]
+
+
+def tests(room: Room, root: Path) -> list[Path]:
+    """The files of the room's tests, relative to root."""
+    return [path for path in _files(room.tests, root) if path.name.startswith("test_")]
+
+
+def _files(patterns: tuple[str, ...], root: Path) -> list[Path]:
+    found = {path.relative_to(root): None for pattern in patterns for path in sorted(root.glob(pattern))}
+    return list(found)
