@@ -11,7 +11,7 @@ DT_S = DT_US * 1e-6
 
 
 def felt(lean_deg=0.0, speed_mps=0.0, roll_dps=0.0, forward_mps2=0.0):
-    """Force (left, up, forward in g) and rate (rad/s) of a bike on a level road: standing, or from 1 m/s on in balance."""
+    """Force (left, up, forward in g) and rate (rad/s) of a bike on a level road, in balance from 1 m/s on."""
     t = radians(lean_deg)
     yaw = -GRAVITY_MPS2 * tan(t) / speed_mps if speed_mps > 1.0 else 0.0
     left = speed_mps * yaw / GRAVITY_MPS2

@@ -230,6 +230,14 @@ def test_the_reading_is_the_mean_of_the_last_sum():
     calibration.set_scale(4096, 65.5)
     shown = meter(calibration)
     shown.update_sum(array("i", [8, 3 * 4096, 4, 100, -2, 6, 131]), 3, 0)
-    assert [round(value, 6) for value in shown.reading] == [2.666667, 4096.0, 1.333333, 33.333333, -0.666667, 2.0, 43.666667]
+    assert [round(value, 6) for value in shown.reading] == [
+        2.666667,
+        4096.0,
+        1.333333,
+        33.333333,
+        -0.666667,
+        2.0,
+        43.666667,
+    ]
     near(shown.force[1], 1.0, 0.001)
     near(degrees(shown.rate[2]), 131 / 3 / 65.5, 0.01)
