@@ -23,7 +23,9 @@ class Wire:
 
 
 def rmc(time="120001.00", knots="19.438", status="A", mode=",A"):
-    return sentence("GPRMC,%s,%s,4807.038,N,01131.000,E,%s,084.4,230394,003.1,W%s" % (time, status, knots, mode))
+    return sentence(
+        "GPRMC," + time + "," + status + ",4807.038,N,01131.000,E," + knots + ",084.4,230394,003.1,W" + mode
+    )
 
 
 def vtg(mode=",A"):
@@ -163,7 +165,7 @@ def ages(delays, step_s=2):
     found = []
     for i, late_ms in enumerate(delays):
         second = step_s * i
-        hear(wire, gps, rmc("12%02d%02d.00" % (second // 60, second % 60)), 100_000 + 1000 * second + late_ms)
+        hear(wire, gps, rmc("1200" + str(10 + second) + ".00"), 100_000 + 1000 * second + late_ms)
         found.append(gps.age_ms)
     return found
 
