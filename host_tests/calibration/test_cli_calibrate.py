@@ -144,6 +144,23 @@ def test_a_small_tilt_is_warned_of(tmp_path):
     assert "warning: under 8 degrees" in result.out
 
 
+def test_the_bias_of_the_six_positions_is_the_median(tmp_path, six_poses):
+    """A hand at the table in one pose does not count."""
+    command.still(six_poses[2], reads(command.AXES["+y"]), np.array(BIAS) + 20.0, seed=2)
+    command.works("calibrate", "six", *six_poses, "--out", tmp_path / "CAL.json")
+    assert json.loads((tmp_path / "CAL.json").read_text())["gyro_bias_dps"] == pytest.approx(BIAS, abs=0.05)
+
+
+def test_the_bias_of_the_two_poses_is_that_of_the_kickstand(tmp_path):
+    """It holds the bike stiller than a rider does."""
+    poses = [
+        command.still(tmp_path / "stand.csv", leaned(-10), BIAS),
+        command.still(tmp_path / "upright.csv", leaned(0), np.array(BIAS) + 2.0, seed=1),
+    ]
+    command.works("calibrate", "two", *poses, "--out", tmp_path / "CAL.json")
+    assert json.loads((tmp_path / "CAL.json").read_text())["gyro_bias_dps"] == pytest.approx(BIAS, abs=0.02)
+
+
 def six_refused(tmp_path, poses, words):
     return command.refused(tmp_path, "calibrate", "six", *poses, "--out", tmp_path / "CAL.json", words=words)
 

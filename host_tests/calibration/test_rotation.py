@@ -3,6 +3,7 @@
 import engines
 import numpy as np
 import pytest
+from kickstand import rotation
 from numpy.testing import assert_allclose
 
 FLOAT32 = {"rtol": 0, "atol": 1e-6}
@@ -51,3 +52,43 @@ def test_what_is_a_rotation(engine):
         False,
     ]
     assert not engines.firmware_calls.call("is_rotation", (missing,))
+
+
+def test_every_entry_of_a_rotation_is_checked():
+    """A rotation off by just under and just over the tolerance, in any entry."""
+    rng = np.random.default_rng(6)
+    truth = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    truth *= np.linalg.det(truth)
+    assert rotation.is_rotation(truth.ravel().tolist(), 1e-9)
+    assert not rotation.is_rotation((-truth).ravel().tolist())
+    for k in range(3):
+        longer = truth.copy()
+        longer[k] *= 1.0 + 4.5e-5  # its square is twice as far off
+        assert rotation.is_rotation(longer.ravel().tolist())
+        longer[k] *= 1.0 + 1e-5
+        assert not rotation.is_rotation(longer.ravel().tolist())
+        askew = truth.copy()
+        askew[k] += 0.9e-4 * truth[k - 1]
+        assert rotation.is_rotation(askew.ravel().tolist())
+        askew[k] += 0.2e-4 * truth[k - 1]
+        assert not rotation.is_rotation(askew.ravel().tolist())
+    assert not rotation.is_rotation([float("nan")] * 9)
+    assert not rotation.is_rotation([0.0] * 9)
+
+
+def test_a_direction_has_length_1_and_a_null_vector_has_none():
+    for vector in ([3.0, -4.0, 12.0], [0.0, 0.0, 2e-9]):
+        got = rotation.vector(*vector)
+        length = rotation.normalize(got)
+        assert length == pytest.approx(np.linalg.norm(vector), rel=1e-6)
+        assert_allclose(got, np.array(vector) / np.linalg.norm(vector), rtol=1e-6)
+        assert rotation.norm(got) == pytest.approx(1.0, abs=1e-6)
+    for vector in ([0.0, 0.0, 0.0], [5e-10, 0.0, 0.0], [float("nan"), 0.0, 1.0]):
+        with pytest.raises(ValueError, match="no direction"):
+            rotation.normalize(rotation.vector(*vector))
+
+
+def test_dot_and_the_identity():
+    assert rotation.dot([1.0, 2.0, 3.0], [4.0, -5.0, 6.0]) == 12.0
+    assert list(rotation.matrix()) == np.eye(3).ravel().tolist()
+    assert list(rotation.vector()) == [0.0, 0.0, 0.0]

@@ -112,6 +112,10 @@ def test_the_tests_need_more_than_the_demo_and_the_demo_nothing_more(dev, steps)
     dev.prepare("test")
     dev.prepare("")
     assert steps == ["venv", "install ", "install test"]
+    dev.prepare("mutants")
+    dev.prepare("test")
+    dev.prepare("")
+    assert steps == ["venv", "install ", "install test", "install mutants"]
 
 
 def test_it_installs_again_when_the_project_has_changed(dev, steps, tmp_path):

@@ -9,6 +9,8 @@ import driving_runs
 import numpy as np
 import pytest
 from driving_runs import RATE_HZ, STAND, around, mounted
+from kickstand_tools.calibration.drive import fit_drive
+from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.simulation.files import simulate
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
@@ -101,6 +103,15 @@ def test_a_calibrated_accelerometer_keeps_its_parameters(tmp_path):
     assert errors(matrix_in(out), MOUNT)[1] > 5.0  # the offset was used
     assert "no six-position" not in result.out
     assert result.out.count("car, method improved") == 1
+
+
+def test_what_is_noted_in_a_calibration_stays_in_it(tmp_path):
+    """As the board and the chip that a ride was recorded with."""
+    log = record(tmp_path / "drive.csv", around(7), MOUNT)
+    before = CalibrationFile(notes={"board": "Raspberry Pi Pico", "sensor": "MPU6050"})
+    found = fit_drive([log], before).calibration
+    assert found.notes == before.notes
+    assert found.as_json()["board"] == "Raspberry Pi Pico"
 
 
 def test_several_logs_of_one_mount_are_put_together(tmp_path):

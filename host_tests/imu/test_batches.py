@@ -35,26 +35,40 @@ def test_sums(engine):
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
+def test_a_frame_is_seven_big_endian_numbers(engine):
+    """At any place in the FIFO's bytes, and at the ends of the range and of its halves."""
+    edges = [[value] * 7 for value in (-32768, -32767, -1, 0, 1, 255, 256, 16383, 16384, 32766, 32767)]
+    samples = np.vstack((noise(5), edges))
+    chosen, python = engines.run(engine, [("decode", (frames(samples),))])[0]
+    assert chosen == python == samples.tolist()
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
 @pytest.mark.parametrize("dead", [0, -1])
 def test_zeros_and_ones_are_no_readings(engine, dead):
-    """Frames before such a reading count. A chip whose force is zero in two axes only is working."""
+    """Frames before such a reading count, whatever temperature and gyro say. A chip whose force is zero in two axes
+    only is working."""
     samples = noise(4)
     samples[2, 0:3] = dead
     alive = noise(1)
     alive[0, 0:2] = dead
-    answers = added(engine, [frames(samples), frames(alive)])
+    silent = noise(2)
+    silent[1] = dead
+    answers = added(engine, [frames(samples), frames(alive), frames(silent)])
     assert answers[0] == [2, samples[:2].sum(axis=0).tolist()]
     assert answers[1][0] == 1
+    assert answers[2][0] == 1
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
-@pytest.mark.parametrize("column", [0, 2, 3, 4, 6])
-def test_the_same_again_and_again_is_a_frozen_chip(engine, column):
-    """Repetitions are counted from batch to batch. A change of anything but the temperature begins the count again."""
+@pytest.mark.parametrize("column", range(7))
+@pytest.mark.parametrize("bit", [1, 256])
+def test_the_same_again_and_again_is_a_frozen_chip(engine, column, bit):
+    """Repetitions are counted from batch to batch. A change of any byte but the temperature's ends them."""
     still = np.repeat(noise(1), 12, axis=0)
     answers = added(engine, [frames(still[:3]), frames(still[3:7]), frames(still[7:])])
     assert [good for good, _ in answers] == [3, 2, 0]
-    still[4:, column] += 1
+    still[4:, column] ^= bit
     answers = added(engine, [frames(still[:3]), frames(still[3:9])])
     assert [good for good, _ in answers] == [3, 2 if column == 3 else 6]
 

@@ -77,14 +77,28 @@ def add_up(batches, limit):
     out = []
     for function in (fifo_frames.add_up, fifo_frames.add_up_python):
         watch = array("i", (0, 0, limit))
+        sums = array("i", [99] * 7)  # whatever was in it before
         answers = []
         for batch in batches:
-            sums = array("i", [0] * 7)
             data = bytearray()
             for frame in batch:
                 data.extend(bytes(frame))
             good = function(data, len(batch), sums, watch)
             answers.append([good, list(sums)])
+        out.append(answers)
+    return out
+
+
+def decode(batch):
+    """Frames of 14 bytes: the counts of each, as the board does it and in Python."""
+    data = b"".join([bytes(frame) for frame in batch])
+    out = []
+    for function in (fifo_frames.decode, fifo_frames.decode_python):
+        counts = array("h", [0] * 7)
+        answers = []
+        for k in range(len(batch)):
+            function(data, 14 * k, counts)
+            answers.append(list(counts))
         out.append(answers)
     return out
 
@@ -140,6 +154,7 @@ CALLS = {
     "capture": capture,
     "transform": transform,
     "add_up": add_up,
+    "decode": decode,
     "meter": meter,
 }
 

@@ -13,6 +13,7 @@ import difflib
 import os
 import random
 import shutil
+import signal
 import sys
 import tempfile
 import time
@@ -27,6 +28,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 
 def main() -> int:
     options = _options()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit("stopped"))  # so that the copy goes
     room = ROOMS[options.room]
     with tempfile.TemporaryDirectory(prefix="mutants-") as directory:
         copy = Path(directory) / "project"

@@ -1,6 +1,7 @@
 """Runs tests in forks of a process that has already imported numpy and the like, which takes longer than most tests."""
 
 import contextlib
+import gc
 import importlib
 import os
 import resource
@@ -36,6 +37,7 @@ class Tests:
         for name in WARM:
             with contextlib.suppress(ImportError):
                 importlib.import_module(name)
+        gc.freeze()  # pytest collects garbage at its end, and has not to look through all this each time
 
     def pass_unchanged(self) -> bool:
         """True if the tests pass as they are. Leaves their bytecode in the copy."""

@@ -17,17 +17,23 @@ class Room(NamedTuple):
 ROOMS = {
     "imu": Room(
         (FIRMWARE + "imu/*.py",),
-        (TESTS + "imu/*.py", TESTS + "device/test_device_faults.py"),
+        (
+            TESTS + "imu/test_batches.py",
+            TESTS + "imu/test_sensor.py",
+            TESTS + "imu/test_sample_clock.py",
+            TESTS + "imu/test_registers.py",
+        ),
     ),
     "calibration": Room(
         (FIRMWARE + "calibration/*.py", FIRMWARE + "rotation.py"),
         (
             TESTS + "calibration/test_rotation.py",
-            TESTS + "calibration/test_two_position.py",
             TESTS + "calibration/test_calibration.py",
-            TESTS + "calibration/test_store.py",
+            TESTS + "calibration/test_poses.py",
+            TESTS + "calibration/test_active.py",
+            TESTS + "calibration/test_two_position.py",
             TESTS + "imu/test_batches.py",
-            TESTS + "device/test_device.py",
+            TESTS + "calibration/test_store.py",
         ),
     ),
     "board": Room(

@@ -1,0 +1,156 @@
+"""The calibration in use: what is loaded, stored and put into use, and when the trim goes to flash."""
+
+import pytest
+from kickstand.calibration.parameters import Calibration
+from kickstand.calibration.store import FILES, Store
+from kickstand_tools.simulated_board.simulator import Board
+
+
+class Meter:
+    """new_trim: what keep_trim() finds, in degrees; None for nothing new."""
+
+    def __init__(self):
+        self.calibration = Calibration()
+        self.new_trim = None
+        self.used = 0
+
+    def use(self, calibration):
+        self.calibration = calibration
+        self.used += 1
+
+    def keep_trim(self):
+        if self.new_trim is None:
+            return False
+        self.calibration.trim_deg, self.new_trim = self.new_trim, None
+        return True
+
+
+class Chip:
+    def __init__(self, who_am_i=0x68):
+        self.who_am_i = who_am_i
+        self.accel_range_g, self.accel_lsb_per_g, self.gyro_lsb_per_dps = 8, 4096, 65.5
+
+
+@pytest.fixture
+def made(tmp_path, monkeypatch):
+    """An ActiveCalibration that was made at 0 ms, its meter, and what changed() was told."""
+    monkeypatch.chdir(tmp_path)
+    with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):
+        from kickstand.calibration.active import ActiveCalibration
+
+        meter, changes = Meter(), []
+        yield ActiveCalibration(meter, changes.append), meter, changes
+
+
+def aligned(offset=0.0):
+    calibration = Calibration()
+    calibration.set_accel((offset, 0, 0), (1, 1, 1))
+    calibration.aligned = True
+    return calibration
+
+
+def stored(who_am_i=0x68):
+    return Store(who_am_i, 8).load()
+
+
+def test_what_is_stored_for_the_chip_is_loaded_once(made):
+    active, meter, changes = made
+    Store(0x68, 8).save(aligned(0.125))
+    assert not active.aligned
+    assert active.chip_started(Chip())
+    assert active.aligned
+    assert active.value is meter.calibration
+    assert active.value.accel_offset[0] == 0.125
+    assert active.value.scales()[0][1] == 1 / 4096
+    assert active.value.scales()[1] == 1 / 65.5
+    assert not active.chip_started(Chip())
+    assert (meter.used, changes) == (1, [True])
+    assert active.chip_started(Chip(0x70))
+    assert not active.aligned
+    assert changes == [True, True]
+
+
+def test_save_replaces_and_refine_corrects(made):
+    active, meter, changes = made
+    active.chip_started(Chip())
+    active.save(aligned(0.25))
+    assert stored().accel_offset[0] == meter.calibration.accel_offset[0] == 0.25
+    active.refine(aligned(0.5 - 1 / 64))
+    assert stored().accel_offset[0] == meter.calibration.accel_offset[0] == 0.5 - 1 / 64
+    assert changes == [True, True, False]
+    assert active.value.scales()[1] == 1 / 65.5
+
+
+def test_the_trim_is_saved_once_a_minute_at_most(made):
+    """Flash wears. Not in the first minute; where there was nothing to save, the next chance is taken."""
+    active, meter, _ = made
+    active.chip_started(Chip())
+    active.save(aligned())
+    for now_ms, trim, kept in (
+        (59_999, 1.0, 0.0),
+        (60_001, 1.0, 1.0),
+        (60_101, 2.0, 1.0),
+        (120_000, 2.0, 1.0),
+        (120_002, 2.0, 2.0),
+        (200_000, None, 2.0),
+        (200_100, 3.0, 3.0),
+        (260_099, 1.5, 3.0),
+        (260_100, 1.5, 1.5),
+    ):
+        meter.new_trim = trim
+        active.keep_trim(now_ms)
+        assert stored().trim_deg == kept, now_ms
+
+
+def test_without_an_alignment_there_is_no_trim(made, tmp_path):
+    active, meter, _ = made
+    active.chip_started(Chip())
+    meter.new_trim = 1.0
+    active.keep_trim(100_000)
+    assert meter.new_trim == 1.0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_restart_saves_the_trim_and_begins_with_what_is_stored(made):
+    active, meter, changes = made
+    active.chip_started(Chip())
+    active.save(aligned())
+    used, told = meter.used, len(changes)
+    meter.new_trim = 1.25
+    active.restart()
+    assert stored().trim_deg == active.value.trim_deg == 1.25
+    assert (meter.used, len(changes)) == (used + 1, told)
+    active.restart()
+    assert meter.used == used + 2
+
+
+def test_no_trim_is_stored_over_a_record_that_misread_while_loading(made, tmp_path):
+    active, meter, _ = made
+    for offset in (0.1, 0.2):
+        Store(0x68, 8).save(aligned(offset))
+    newest = tmp_path / FILES[0]
+    whole = newest.read_bytes()
+    newest.write_bytes(b"")
+    active.chip_started(Chip())
+    newest.write_bytes(whole)
+    meter.new_trim = 1.0
+    active.keep_trim(100_000)
+    assert newest.read_bytes() == whole
+    assert stored().trim_deg == 0.0
+
+
+def test_a_flash_that_cannot_be_written_is_reported_and_not_tried_each_time(made, tmp_path, capsys):
+    active, meter, _ = made
+    for name in FILES:
+        (tmp_path / name).unlink(missing_ok=True)
+        (tmp_path / name).mkdir()
+    active.chip_started(Chip())
+    meter.calibration.aligned = True
+    meter.new_trim = 1.0
+    active.keep_trim(100_000)
+    assert capsys.readouterr().out.startswith("calibration not saved")
+    meter.new_trim = 2.0
+    active.keep_trim(159_999)
+    assert meter.new_trim == 2.0
+    active.keep_trim(160_000)
+    assert meter.new_trim is None

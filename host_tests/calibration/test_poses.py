@@ -1,0 +1,206 @@
+"""Limits of a still pose, each axis by itself, just within and just beyond; and how the device waits for one.
+
+8192 counts per g, 65.5 per deg/s.
+"""
+
+import pytest
+from kickstand.calibration.pose_taker import DONE, SETTLED, SETTLING, SPOILT, TAKING, PoseTaker
+from kickstand.calibration.still_pose import StillPose
+from kickstand.errors import CaptureError
+
+LEVEL = (100, -200, 8192, -521, 65, -131, 655)
+WITHIN, BEYOND = 0.98, 1.02
+
+
+def samples(count=100):
+    """At rest, with a count of noise in each reading, which has no mean in either half."""
+    return [[value + (-1) ** k for value in LEVEL] for k in range(count)]
+
+
+def finished(rows, expected=None, limit=32700):
+    pose = StillPose(8192, 65.5, limit, expected or len(rows))
+    for row in rows:
+        pose.add(row)
+    pose.finish()
+    return pose
+
+
+def problem_of(rows, **settings):
+    try:
+        finished(rows, **settings)
+    except CaptureError as error:
+        return error.code
+    return None
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2, 4, 5, 6])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_a_knock_is_more_than_80_mg_or_5_degrees_per_second(axis, sign):
+    """From the first sample; it may come with any sample. One shock alone does not move the mean past other limits."""
+    peak = 0.08 * 8192 if axis < 3 else 5.0 * 65.5
+    for at in (1, 50, 99):
+        for share, code in ((WITHIN, None), (BEYOND, "moved")):
+            rows = samples()
+            rows[at][axis] = rows[0][axis] + sign * round(share * peak)
+            assert problem_of(rows) == code
+
+
+def test_the_temperature_may_change():
+    rows = samples()
+    rows[60][3] += 5000
+    assert problem_of(rows) is None
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_an_axis_at_the_end_of_its_range_is_saturated(axis, sign):
+    for count, code in ((32699, None), (32700, "saturated"), (32767, "saturated")):
+        rows = samples()
+        for row in rows:
+            row[axis] = sign * count
+        assert problem_of(rows) == code
+
+
+@pytest.mark.parametrize("axis", [4, 5, 6])
+def test_the_gyro_has_a_limit_of_its_own(axis):
+    """Of 45 deg/s in the mean: 20 of offset by the data sheet, as much over temperature, and some."""
+    refused = "gyro-offset"
+    for rate, code in ((44.9, None), (45.1, refused), (-44.9, None), (-45.1, refused), (499, refused)):
+        rows = samples()
+        for k, row in enumerate(rows):
+            row[axis] = round(rate * 65.5) + k % 2
+        assert problem_of(rows) == code
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_vibration_is_a_standard_deviation_over_20_mg(axis):
+    for share, code in ((WITHIN, None), (BEYOND, "vibration")):
+        rows = samples()
+        for k, row in enumerate(rows):
+            row[axis] = LEVEL[axis] + round((-1) ** k * share * 0.02 * 8192)
+        assert problem_of(rows) == code
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("sign", [-1, 1])
+@pytest.mark.parametrize("count", [100, 101])
+def test_tilting_is_7_mg_between_the_halves(axis, sign, count):
+    for share, code in ((0.95, None), (1.05, "tilting")):
+        rows = samples(count)
+        for row in rows[count // 2 :]:
+            row[axis] += sign * round(share * 0.007 * 8192)
+        assert problem_of(rows) == code
+
+
+def test_a_pose_has_at_least_20_samples():
+    assert problem_of(samples(20)) is None
+    with pytest.raises(CaptureError) as refusal:
+        finished(samples(19))
+    assert (refusal.value.code, refusal.value.values) == ("too-few", (19, 20))
+    assert problem_of(samples(21)) is None
+
+
+def test_readings_that_never_change_are_frozen_and_one_that_does_is_enough():
+    rows = [list(LEVEL) for _ in range(100)]
+    assert problem_of(rows) == "frozen-pose"
+    for row in rows:
+        row[3] = row[3] + 1  # only the temperature
+    rows[50][3] += 7
+    assert problem_of(rows) == "frozen-pose"
+    rows[50][5] += 1
+    assert problem_of(rows) is None
+
+
+def test_the_mean_is_that_of_all_samples():
+    rows = samples()
+    for k, row in enumerate(rows):
+        row[0] += k % 3
+        row[6] += k % 4
+    pose = finished(rows)
+    assert pose.count == 100
+    assert pose.accel == pytest.approx([sum(row[i] for row in rows) / 100 / 8192 for i in range(3)], abs=1e-9)
+    assert pose.gyro == pytest.approx([sum(row[i] for row in rows) / 100 / 65.5 for i in (4, 5, 6)], abs=1e-9)
+
+
+def test_a_spoilt_pose_stays_spoilt():
+    pose = StillPose(8192, 65.5, 32700, 100)
+    rows = samples()
+    rows[30][0] += 900
+    assert [pose.add(row) for row in rows] == [True] * 30 + [False] * 70
+    assert pose.count == 30
+    assert pose.accel is None
+    with pytest.raises(CaptureError):
+        pose.finish()
+    assert pose.accel is None
+
+
+class Chip:
+    accel_lsb_per_g, gyro_lsb_per_dps, SATURATED = 8192, 65.5, 32700
+
+
+def taker():
+    """At 100 samples a second: 50 to settle, 1000 to give up, 300 to average."""
+    return PoseTaker(Chip, 100, 3.0)
+
+
+def moving(k):
+    row = list(LEVEL)
+    row[k % 3] += 2000 * (k % 5)
+    return row
+
+
+def test_half_a_second_of_stillness_then_three_seconds_are_taken():
+    taking = taker()
+    assert taking.progress() == (0, 300)
+    rows = samples(351)
+    states = []
+    for k, row in enumerate(rows):
+        states.append(taking.step(row))
+        assert not taking.restless
+        if k == 60:
+            assert taking.progress() == (11, 300)
+    assert states[:350] == [SETTLING] * 49 + [SETTLED] + [TAKING] * 299 + [DONE]
+    assert states[350] not in (SETTLING, SETTLED, TAKING, DONE, SPOILT)
+    assert taking.settled == pytest.approx([LEVEL[i] / 8192 for i in range(3)])
+    assert taking.pose.count == 300
+    assert taking.pose.gyro == pytest.approx([LEVEL[i] / 65.5 for i in (4, 5, 6)])
+    assert taking.problem is None
+
+
+def test_stillness_is_waited_for_and_said_to_be_missing_after_a_second():
+    taking = taker()
+    for k in range(100):
+        assert taking.step(moving(k)) == SETTLING
+        assert not taking.restless
+    for k in range(100, 130):
+        assert taking.step(moving(k)) == SETTLING
+        assert taking.restless
+    states = [taking.step(row) for row in samples(60)]
+    assert states.count(SETTLED) == 1
+    assert states[-1] == TAKING
+    assert not taking.restless
+
+
+@pytest.mark.parametrize("code", ["moved", "frozen-pose"])
+def test_it_gives_up_after_10_seconds(code):
+    taking = taker()
+    states = [taking.step(moving(k) if code == "moved" else list(LEVEL)) for k in range(1200)]
+    assert states.count(SPOILT) == 1
+    assert 1000 <= states.index(SPOILT) + 1 <= 1050
+    assert set(states[: states.index(SPOILT)]) == {SETTLING}
+    assert taking.problem.code == code
+    assert not taking.restless
+
+
+def test_a_knock_while_averaging_spoils_the_pose_and_it_can_be_taken_again():
+    taking = taker()
+    rows = samples(100)
+    rows[80][1] += 1000
+    states = [taking.step(row) for row in rows]
+    assert states[79:81] == [TAKING, SPOILT]
+    assert SPOILT not in states[81:]
+    assert taking.problem.code == "moved"
+    assert taking.progress() == (0, 300)
+    taking.restart()
+    assert (taking.problem, taking.settled) == (None, None)
+    assert [taking.step(row) for row in samples(350)][-1] == DONE

@@ -1,0 +1,335 @@
+"""The driver against registers that stand still: what it writes, what it checks, what it makes of the FIFO's count.
+
+The values are those of the register map, RM-MPU-6000A rev 4.2, and of the other chips' data sheets.
+"""
+
+import pytest
+from kickstand_tools.simulated_board.mpu6050_registers import DLPF_DELAY_US, VARIANTS
+from kickstand_tools.simulated_board.simulator import Board
+
+SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, ACCEL_CONFIG2, FIFO_EN = 0x19, 0x1A, 0x1B, 0x1C, 0x1D, 0x23
+USER_CTRL, PWR_MGMT_1, FIFO_COUNT_H, FIFO_R_W, WHO_AM_I = 0x6A, 0x6B, 0x72, 0x74, 0x75
+MPU6500, MPU6886 = 0x70, 0x19
+
+
+@pytest.fixture(autouse=True)
+def time():
+    """Of a board, which the driver waits for."""
+    with Board(lambda t_s: (0, 0, 1, 0, 0, 0)) as board:
+        yield board.clock
+
+
+class Wires:
+    """A machine.I2C with nothing but registers behind it. stuck: those that keep their value whatever is written.
+    log: what was written, [(register, value), ...]. waiting: bytes in the FIFO."""
+
+    def __init__(self, who_am_i=0x68, stuck=()):
+        self.registers = bytearray(128)
+        self.registers[WHO_AM_I] = who_am_i
+        self.stuck = stuck
+        self.log = []
+        self.waiting = 0
+        self.read_of_fifo = []
+
+    def writeto_mem(self, address, register, data):
+        assert address == 0x68
+        for value in data:
+            self.log.append((register, value))
+            if register not in self.stuck:
+                self.registers[register] = value
+
+    def readfrom_mem_into(self, address, register, buffer):
+        assert address == 0x68
+        self.registers[FIFO_COUNT_H], self.registers[FIFO_COUNT_H + 1] = divmod(self.waiting, 256)
+        if register == FIFO_R_W:
+            self.read_of_fifo.append(len(buffer))
+            return
+        buffer[:] = self.registers[register : register + len(buffer)]
+
+
+def started(wires, **settings):
+    from kickstand.imu.mpu6050 import Mpu6050
+
+    chip = Mpu6050(wires, **settings)
+    chip.setup()
+    return chip
+
+
+def test_setup_writes_what_the_register_map_says(time):
+    wires = Wires()
+    before_us = time.now_us
+    chip = started(wires, accel_range_g=16, gyro_range_dps=1000, dlpf=2, rate_hz=100)
+    assert wires.log == [
+        (PWR_MGMT_1, 0x80),  # reset
+        (PWR_MGMT_1, 0x01),  # awake, clock from the gyro's X axis, which the register map recommends (p. 40)
+        (SMPLRT_DIV, 9),  # 1 kHz / (1 + 9)
+        (CONFIG, 2),
+        (GYRO_CONFIG, 0x10),
+        (ACCEL_CONFIG, 0x18),
+        (FIFO_EN, 0),
+        (USER_CTRL, 0x04),  # FIFO_RESET, while FIFO_EN is 0
+        (USER_CTRL, 0x40),
+        (FIFO_EN, 0xF8),
+    ]
+    assert (chip.accel_lsb_per_g, chip.gyro_lsb_per_dps) == (2048, 32.8)
+    assert 0.1 < (time.now_us - before_us) / 1e6 < 0.25  # the reset takes up to 100 ms (p. 41)
+
+
+def test_the_low_pass_of_the_accelerometer_of_an_mpu6500_is_set_too():
+    wires = Wires(MPU6500)
+    started(wires, dlpf=4)
+    assert wires.log[2:7] == [
+        (SMPLRT_DIV, 4),
+        (CONFIG, 4),
+        (GYRO_CONFIG, 0x08),
+        (ACCEL_CONFIG, 0x10),
+        (ACCEL_CONFIG2, 4),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("accel_g", "accel_bits", "lsb_per_g"), [(2, 0x00, 16384), (4, 0x08, 8192), (8, 0x10, 4096), (16, 0x18, 2048)]
+)
+@pytest.mark.parametrize(
+    ("gyro_dps", "gyro_bits", "lsb_per_dps"),
+    [(250, 0x00, 131.0), (500, 0x08, 65.5), (1000, 0x10, 32.8), (2000, 0x18, 16.4)],
+)
+def test_ranges_and_their_counts(accel_g, accel_bits, lsb_per_g, gyro_dps, gyro_bits, lsb_per_dps):
+    """Register map pp. 14, 15, 29 and 31."""
+    wires = Wires()
+    chip = started(wires, accel_range_g=accel_g, gyro_range_dps=gyro_dps)
+    assert (wires.registers[ACCEL_CONFIG], wires.registers[GYRO_CONFIG]) == (accel_bits, gyro_bits)
+    assert (chip.accel_range_g, chip.accel_lsb_per_g, chip.gyro_lsb_per_dps) == (accel_g, lsb_per_g, lsb_per_dps)
+
+
+def test_one_burst_is_one_reading():
+    """Registers 0x3B to 0x48 (p. 29): accelerometer, temperature, gyro."""
+    wires = Wires()
+    chip = started(wires)
+    wires.registers[0x3B:0x49] = bytes(range(0x70, 0x70 + 28, 2))
+    chip.read()
+    assert list(chip.counts[:2]) == [0x7072, 0x7476]
+    assert list(chip.counts[4:]) == [(high << 8 | high + 2) - 65536 for high in (0x80, 0x84, 0x88)]
+
+
+def test_the_delay_of_each_low_pass():
+    """Of the gyro, p. 13, in seconds."""
+    from kickstand.imu.mpu6050 import GYRO_DELAY_S
+
+    assert GYRO_DELAY_S == {dlpf: DLPF_DELAY_US[dlpf] / 1e6 for dlpf in range(1, 7)}
+
+
+def test_the_defaults_are_8_g_500_dps_and_200_samples_a_second():
+    wires = Wires()
+    chip = started(wires)
+    assert wires.log[2:6] == [(SMPLRT_DIV, 4), (CONFIG, 3), (GYRO_CONFIG, 0x08), (ACCEL_CONFIG, 0x10)]
+    assert chip.accel_range_g == 8
+    assert (chip.who_am_i, chip.frames_left, chip.overflows) == (0x68, 0, 0)
+
+
+@pytest.mark.parametrize(
+    ("who_am_i", "register"),
+    [(0x68, r) for r in (SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, PWR_MGMT_1)] + [(MPU6500, ACCEL_CONFIG2)],
+)
+def test_a_register_that_does_not_keep_its_setting_fails_setup(who_am_i, register):
+    with pytest.raises(OSError, match="configuration does not read back"):
+        started(Wires(who_am_i, stuck=(register,)))
+
+
+@pytest.mark.parametrize("register", [FIFO_EN, USER_CTRL])
+def test_a_fifo_that_does_not_start_fails_setup(register):
+    with pytest.raises(OSError, match="FIFO does not read back"):
+        started(Wires(stuck=(register,)))
+
+
+@pytest.mark.parametrize("who_am_i", [0x68, MPU6500, MPU6886, 0x98])
+def test_whatever_register_changes_the_chip_is_no_longer_configured(who_am_i):
+    wires = Wires(who_am_i)
+    chip = started(wires)
+    registers = [SMPLRT_DIV, CONFIG, GYRO_CONFIG, ACCEL_CONFIG, FIFO_EN, USER_CTRL, PWR_MGMT_1]
+    if who_am_i != 0x68:
+        registers.append(ACCEL_CONFIG2)
+    assert chip.configured()
+    for register in registers:
+        kept = wires.registers[register]
+        for other in (0, 0xFF, kept ^ 0x01) if register not in (FIFO_EN, USER_CTRL) else (0,):
+            wires.registers[register] = other
+            assert chip.configured() == (other == kept), hex(register)
+        wires.registers[register] = kept
+        assert chip.configured()
+
+
+def test_an_mpu6050_has_no_second_low_pass_to_check():
+    wires = Wires()
+    chip = started(wires)
+    wires.registers[ACCEL_CONFIG2] = 0x55
+    assert chip.configured()
+
+
+@pytest.mark.parametrize(("who_am_i", "bits"), [(0x68, 0xF8), (MPU6500, 0xF8), (0x98, 0xF8), (MPU6886, 0x18)])
+def test_each_bit_of_the_fifo_that_the_chip_has_must_stay(who_am_i, bits):
+    """Bits 7 to 3: temperature, gyro x, y, z, accelerometer. The MPU6886 has 4 (gyro) and 3 only."""
+    wires = Wires(who_am_i)
+    chip = started(wires)
+    for bit in range(8):
+        wires.registers[FIFO_EN] = 0xF8 & ~(1 << bit)
+        assert chip.configured() == (not bits & 1 << bit)
+
+
+def test_an_unknown_number_is_an_unknown_chip_unless_accepted():
+    from kickstand.imu.mpu6050 import Mpu6050, UnknownChip
+
+    chip = Mpu6050(Wires(0x55))
+    with pytest.raises(UnknownChip) as unknown:
+        chip.setup()
+    assert unknown.value.args == (0x55,)
+    assert chip.name == "WHO 0x55"
+    wires = Wires(0x55)
+    accepted = started(wires, accept=0x55, dlpf=4)
+    assert (ACCEL_CONFIG2, 4) in wires.log
+    wires.registers[ACCEL_CONFIG2] = 0  # a register that it need not have
+    assert accepted.configured()
+    assert accepted.temperature_c(333.87) == pytest.approx(22.0)
+    assert Mpu6050(Wires(0x68), accept=0x55).identify() == 0x68
+
+
+def test_a_number_that_reads_differently_each_time_is_an_error():
+    """0x78 is another known chip, one bit away from 0x68."""
+    from kickstand.imu.mpu6050 import Mpu6050
+
+    wires = Wires(0x68)
+    chip = Mpu6050(wires)
+    read = wires.readfrom_mem_into
+    for first, second in ((0x78, 0x68), (0x68, 0x78)):
+        answers = [first, second]
+
+        def misread(address, register, buffer, answers=answers):
+            read(address, register, buffer)
+            buffer[0] = answers.pop(0)
+
+        wires.readfrom_mem_into = misread
+        with pytest.raises(OSError, match="reads differently"):
+            chip.identify()
+    wires.readfrom_mem_into = read
+    assert chip.identify() == 0x68
+
+
+@pytest.mark.parametrize(
+    ("who_am_i", "name", "zero_c", "per_degree"),
+    [
+        (0x68, "MPU6050", 36.53, 340.0),  # RM-MPU-6000A p. 30
+        (MPU6500, "MPU6500", 21.0, 333.87),  # MPU-6500 register map p. 33, with the sheet's sensitivity
+        (0x71, "MPU9250", 21.0, 333.87),
+        (0x98, "ICM20689", 25.0, 326.8),  # data sheet table 3
+        (MPU6886, "MPU6886", 25.0, 326.8),
+    ],
+)
+def test_temperature_by_the_data_sheet(who_am_i, name, zero_c, per_degree):
+    chip = started(Wires(who_am_i))
+    assert chip.name == name
+    assert chip.temperature_c(0) == zero_c
+    assert chip.temperature_c(10 * per_degree) == pytest.approx(zero_c + 10.0)
+
+
+def test_the_simulated_board_models_every_chip_of_the_driver():
+    """Without a model of its own a chip would be tested as an MPU6050. The driver may use less of a FIFO than there
+    is."""
+    from kickstand.imu.mpu6050 import CHIPS
+
+    assert set(CHIPS) == set(VARIANTS)
+    for who_am_i, (_, counts_per_c, zero_c, has_accel_config2, fifo_bytes, bits) in CHIPS.items():
+        model = VARIANTS[who_am_i]
+        assert (counts_per_c, zero_c, has_accel_config2) == (model.counts_per_c, model.zero_c, model.has_accel_config2)
+        assert fifo_bytes == (512 if who_am_i == MPU6886 else model.fifo_bytes)
+        assert bits == (0x18 if model.temperature_in_fifo else 0xF8)
+
+
+@pytest.mark.parametrize(
+    ("frames", "read", "left"),
+    [(0, 0, 0), (1, 1, 0), (3, 3, 0), (4, 3, 1), (7, 3, 4), (8, 8, 0), (9, 8, 1), (20, 8, 12), (72, 8, 64)],
+)
+def test_how_many_frames_are_read_and_left(frames, read, left):
+    """Three at a time, eight to catch up. The MPU6050's 1024 bytes hold 73 frames: 72 are no overflow."""
+    wires = Wires()
+    chip = started(wires)
+    wires.waiting = 14 * frames
+    assert chip.fetch() == read
+    assert (chip.frames_left, chip.overflows) == (left, 0)
+    assert wires.read_of_fifo == ([14 * read] if read else [])
+
+
+@pytest.mark.parametrize(("who_am_i", "most"), [(0x68, 72), (MPU6500, 35), (0x98, 35), (MPU6886, 35)])
+def test_a_fifo_that_may_have_overflowed_is_emptied(who_am_i, most):
+    """Of 1024 bytes, or of 512 (MPU-6500 register map p. 31): when fewer than 14 are free."""
+    wires = Wires(who_am_i)
+    chip = started(wires)
+    wires.waiting = 14 * most
+    assert chip.fetch() == 8
+    for number, waiting in enumerate((14 * (most + 1), 1024 if who_am_i == 0x68 else 512), 1):
+        del wires.log[:]
+        wires.waiting = waiting
+        assert chip.fetch() == 0
+        assert (chip.overflows, chip.frames_left) == (number, 0)
+        assert wires.log == [(FIFO_EN, 0), (USER_CTRL, 0x04), (USER_CTRL, 0x40), (FIFO_EN, 0xF8)]
+    assert len(wires.read_of_fifo) == 1
+
+
+def test_a_frame_that_is_being_written_is_waited_for_once():
+    wires = Wires()
+    chip = started(wires)
+    for waiting, read, left in ((28 + 5, 0, 3), (42, 3, 0), (14 + 13, 0, 2), (28, 2, 0)):
+        wires.waiting = waiting
+        assert chip.fetch() == read
+        assert (chip.frames_left, chip.overflows) == (left, 0)
+    wires.waiting = 33
+    assert chip.fetch() == 0
+    wires.waiting = 47  # still odd: an overflow cut a frame short
+    assert chip.fetch() == 0
+    assert (chip.overflows, chip.frames_left) == (1, 0)
+    wires.waiting = 5
+    assert chip.fetch() == 0
+    assert chip.overflows == 1  # the first odd count after the FIFO was emptied
+
+
+@pytest.mark.parametrize(("rate_hz", "good"), [(200, 20), (100, 10)])
+def test_readings_that_repeat_for_100_ms_are_frozen(rate_hz, good):
+    """The first of them is new. After a set-up the count begins again."""
+    wires = Wires()
+    chip = started(wires, rate_hz=rate_hz)
+    wires.waiting = 14
+    chip._frames[0:14] = bytes(range(1, 15))
+
+    def accepted():
+        count = 0
+        while chip.fetch() == 1 and chip.add_up(1) == 1:
+            count += 1
+        return count
+
+    assert accepted() == good
+    wires.waiting = 0
+    chip.setup()
+    wires.waiting = 14
+    assert accepted() == good - 1  # the reading that it knows repeats once more
+
+
+def test_samples_of_a_fetch_are_taken_and_added_up():
+    wires = Wires()
+    chip = started(wires)
+    wires.waiting = 42
+    assert chip.fetch() == 3
+    for k in range(3):
+        for i in range(7):
+            value = 1000 * (k + 1) - 500 * i
+            chip._frames[14 * k + 2 * i : 14 * k + 2 * i + 2] = value.to_bytes(2, "big", signed=True)
+    for k in range(3):
+        chip.take(k)
+        assert list(chip.counts) == [1000 * (k + 1) - 500 * i for i in range(7)]
+    assert chip.add_up(2) == 2
+    assert list(chip.sums) == [3000 - 1000 * i for i in range(7)]
+
+
+def test_another_bus_may_take_its_place():
+    first, second = Wires(), Wires(MPU6500)
+    chip = started(first)
+    chip.connect(second)
+    assert chip.identify() == MPU6500

@@ -1,0 +1,115 @@
+"""When samples were taken: the chip's even rate, put right by a clock that it does not share."""
+
+import numpy as np
+import pytest
+from kickstand_tools.simulated_board.simulator import Board
+
+PERIOD_US = 5000
+
+
+@pytest.fixture(autouse=True)
+def board():
+    with Board(lambda t_s: (0, 0, 1, 0, 0, 0)) as made:
+        yield made
+
+
+def clock():
+    from kickstand.imu.sample_clock import SampleClock
+
+    return SampleClock(PERIOD_US)
+
+
+def elapsed(own, samples_us, looks_us):
+    """Sum of the steps of SampleClock own when the FIFO is emptied at looks_us, and the chip samples at samples_us."""
+    total, taken = 0, 0
+    for now_us in looks_us:
+        ready = int(np.searchsorted(samples_us, now_us, side="right"))
+        if ready > taken:
+            total += own.step(ready - taken, now_us)
+            taken = ready
+        own.emptied(now_us)
+    return total, samples_us[taken - 1] - samples_us[0]
+
+
+def test_samples_are_a_period_apart():
+    own = clock()
+    assert own.step(1, 10_000) == 0  # nothing before the first sample
+    assert own.step(1, 15_000) == PERIOD_US
+    assert own.step(3, 30_000) == 3 * PERIOD_US
+    own.restart()
+    assert own.step(4, 100_000) == 3 * PERIOD_US  # from the first of them
+    assert own.step(1, 105_000) == PERIOD_US
+
+
+def test_before_the_first_sample_there_is_nothing_to_correct():
+    own = clock()
+    own.emptied(1000)
+    assert own.step(1, 2000) == 0
+    own.emptied(50_000)  # a long gap
+    own.restart()  # and it is forgotten
+    assert own.step(1, 60_000) == 0
+    assert own.step(1, 65_000) == PERIOD_US
+
+
+def test_the_last_of_the_first_samples_is_the_newest():
+    """Four of them at once: emptied at the same time, the clock is half a period early; 1/16 of that is put right."""
+    own = clock()
+    own.step(4, 100_000)
+    own.emptied(100_000)
+    assert own.step(1, 105_000) == PERIOD_US + (-PERIOD_US // 2 >> 4)
+
+
+def test_a_correction_is_made_once():
+    own = clock()
+    own.step(1, 0)
+    own.emptied(PERIOD_US // 2 + 1600)
+    assert [own.step(1, 0) for _ in range(2)] == [PERIOD_US + 100, PERIOD_US]
+
+
+@pytest.mark.parametrize("error", [0.01, 0.0, -0.01])
+def test_a_chip_that_is_1_percent_off_keeps_the_boards_time(error):
+    """Over 20 s, looked at at random moments, up to 10 ms apart."""
+    rng = np.random.default_rng(1)
+    samples_us = (np.arange(4000) * PERIOD_US / (1 + error)).astype(int)
+    looks_us = np.cumsum(rng.integers(2000, 10_000, 3000))
+    looks_us = looks_us[looks_us < samples_us[-1]].tolist()
+    total, true = elapsed(clock(), samples_us, looks_us)
+    assert total == pytest.approx(true, abs=3000)
+
+
+def test_a_sample_is_half_a_period_old_on_average():
+    """The first look comes just when a sample is taken; the later ones at any time, evenly spread over the period."""
+    rng = np.random.default_rng(2)
+    errors = []
+    samples_us = np.arange(1200) * PERIOD_US
+    for _ in range(10):
+        looks_us = [0, *(samples_us[1:-1] + rng.integers(0, PERIOD_US, 1198)).tolist()]
+        total, true = elapsed(clock(), samples_us, looks_us)
+        errors.append(total - true)
+    assert np.mean(errors) == pytest.approx(0, abs=300)
+
+
+@pytest.mark.parametrize(("late_us", "counted"), [(2 * PERIOD_US, False), (2 * PERIOD_US + 1, True)])
+def test_a_gap_of_lost_samples_is_spanned(late_us, counted):
+    """More than two periods late, samples were lost; up to there the clocks may differ, and are brought together."""
+    own = clock()
+    own.step(1, 0)
+    own.emptied(PERIOD_US // 2 + late_us)
+    assert own.step(1, 0) == PERIOD_US + (late_us if counted else late_us // 16)
+
+
+def test_time_never_runs_backward():
+    own = clock()
+    own.step(1, 1_000_000)
+    own.emptied(1_000_000 - 40 * PERIOD_US)
+    assert own.step(1, 1_000_000) == 0
+
+
+def test_ticks_that_begin_again_at_0_are_no_gap():
+    own = clock()
+    end = 1 << 30
+    own.step(1, end - 2 * PERIOD_US)
+    for k in range(-1, 5):
+        now_us = (end + k * PERIOD_US + PERIOD_US // 2) % end
+        assert own.step(1, now_us) == PERIOD_US
+        own.emptied(now_us)

@@ -1,0 +1,240 @@
+"""Sensor, which keeps the chip working, with a chip that does what the test says."""
+
+import pytest
+from kickstand_tools.simulated_board.simulator import Board
+
+
+@pytest.fixture(autouse=True)
+def board():
+    with Board(lambda t_s: (0, 0, 1, 0, 0, 0)) as made:
+        yield made
+
+
+class Chip:
+    """waiting: what the next fetches find, samples or an exception; then always one sample. bad: how many samples are
+    spoilt. setups: what set-ups raise, None for nothing. calls: what was done."""
+
+    def __init__(self, clock):
+        self._clock = clock
+        self.waiting, self.setups, self.states = [], [], []
+        self.bad = 0
+        self.overflows = self.frames_left = 0
+        self.calls = []
+
+    def connect(self, i2c):
+        self.calls.append(("connect", i2c))
+
+    def setup(self):
+        self.calls.append("setup")
+        self._clock.advance(200_000)
+        error = self.setups.pop(0) if self.setups else None
+        if error:
+            raise error
+
+    def fetch(self):
+        self.calls.append("fetch")
+        return raised_or(self.waiting.pop(0)) if self.waiting else 1
+
+    def add_up(self, n):
+        return n - self.bad
+
+    def restart_fifo(self):
+        self.calls.append("restart_fifo")
+
+    def configured(self):
+        self.calls.append("configured")
+        return raised_or(self.states.pop(0)) if self.states else True
+
+
+def raised_or(value):
+    if isinstance(value, Exception):
+        raise value
+    return value
+
+
+def made(board):
+    from kickstand.imu.sensor import Sensor
+
+    chip = Chip(board.clock)
+    return Sensor(chip, lambda: "bus"), chip
+
+
+def running(board):
+    """A sensor whose chip runs, and the time in ms: its first sample has just come."""
+    sensor, chip = made(board)
+    assert sensor.fetch(0) == 0
+    now_ms = board.clock.now_us // 1000
+    assert sensor.fetch(now_ms) == 1
+    assert sensor.fault is None
+    del chip.calls[:]
+    return sensor, chip, now_ms
+
+
+def code(sensor):
+    return sensor.fault and sensor.fault.code
+
+
+def test_the_chip_is_set_up_on_a_freed_bus_and_is_at_fault_until_its_first_sample(board):
+    sensor, chip = made(board)
+    assert code(sensor) == "starting"
+    assert sensor.fetch(0) == 0
+    assert chip.calls == [("connect", "bus"), "setup"]
+    assert (sensor.restarts, code(sensor)) == (1, "starting")
+    assert sensor.fetch(200) == 1
+    assert code(sensor) is None
+
+
+def test_a_set_up_that_fails_is_tried_again_50_ms_later(board):
+    from kickstand.imu.mpu6050 import UnknownChip
+
+    sensor, chip = made(board)
+    chip.setups = [OSError(5), UnknownChip(0x55), None]
+    sensor.fetch(0)
+    assert (code(sensor), sensor.restarts) == ("no-sensor", 0)
+    ended_ms = board.clock.now_us // 1000
+    sensor.fetch(ended_ms + 49)
+    assert chip.calls.count("setup") == 1
+    sensor.fetch(ended_ms + 51)
+    assert (code(sensor), sensor.fault.values) == ("unknown-chip", (0x55,))
+    sensor.fetch(board.clock.now_us // 1000 + 51)
+    assert (chip.calls.count("setup"), sensor.restarts) == (3, 1)
+    assert code(sensor) == "unknown-chip"  # until a sample has come
+    sensor.fetch(board.clock.now_us // 1000)
+    assert code(sensor) is None
+
+
+def test_a_chip_that_starts_has_time_for_its_first_sample(board):
+    """It counts as silent 100 ms after the set-up, not after the loop read the clock before it."""
+    sensor, chip = made(board)
+    chip.waiting = [0, 0, 0]
+    sensor.fetch(0)
+    ended_ms = board.clock.now_us // 1000
+    for after_ms, said in ((1, "starting"), (100, "starting"), (101, "sensor-silent")):
+        assert sensor.fetch(ended_ms + after_ms) == 0
+        assert code(sensor) == said
+
+
+def test_silence_is_a_fault_after_100_ms(board):
+    sensor, chip, now_ms = running(board)
+    chip.waiting = [0, 0, 3, 0, 0, 0]
+    for after_ms, samples, said in ((5, 0, None), (100, 0, None), (100, 3, None), (105, 0, None), (200, 0, None)):
+        assert sensor.fetch(now_ms + after_ms) == samples
+        assert code(sensor) == said
+    assert sensor.fetch(now_ms + 201) == 0
+    assert code(sensor) == "sensor-silent"
+
+
+def test_an_overflow_is_no_silence(board):
+    """The FIFO was emptied just now, whatever time the loop has read before."""
+    sensor, chip, now_ms = running(board)
+    board.clock.advance(1_000_000)
+    chip.waiting = [0, 0, 0]
+    chip.overflows = 1
+    assert sensor.fetch(now_ms + 500) == 0
+    assert code(sensor) is None
+    assert sensor.fetch(now_ms + 1100) == 0
+    assert code(sensor) is None
+    assert sensor.fetch(now_ms + 1102) == 0
+    assert code(sensor) == "sensor-silent"
+
+
+def test_two_lost_transfers_are_tolerated_and_three_are_a_fault(board):
+    sensor, chip, now_ms = running(board)
+    lost = OSError(5)
+    chip.waiting = [lost, lost, 1, lost, lost, lost]
+    said = []
+    for k in range(6):
+        samples = sensor.fetch(now_ms + 10 * k)
+        assert samples == (1 if k == 2 else 0)
+        said.append(code(sensor))
+    assert said == [None] * 5 + ["sensor-lost"]
+
+
+def test_the_fifo_is_emptied_after_a_transfer_that_broke_off(board):
+    """It may have taken half a frame with it. Only once."""
+    sensor, chip, now_ms = running(board)
+    chip.waiting = [OSError(110), 1, 1]
+    for k in range(3):
+        sensor.fetch(now_ms + 10 * k)
+    assert chip.calls == ["fetch", "restart_fifo", "fetch", "fetch"]
+
+
+def test_a_fault_is_shown_30_ms_before_the_set_up_that_blocks(board):
+    sensor, chip, now_ms = running(board)
+    chip.bad = 1
+    sensor.fetch(now_ms + 50)
+    assert code(sensor) == "sensor-frozen"
+    chip.bad = 0
+    assert sensor.fetch(now_ms + 79) == 0
+    assert "setup" not in chip.calls
+    assert sensor.fetch(now_ms + 80) == 0
+    assert chip.calls[-2:] == [("connect", "bus"), "setup"]
+    assert (sensor.restarts, code(sensor)) == (2, "sensor-frozen")
+    assert sensor.fetch(now_ms + 300) == 1
+    assert code(sensor) is None
+
+
+def test_samples_before_a_frozen_one_count(board):
+    sensor, chip, now_ms = running(board)
+    chip.waiting, chip.bad = [5], 2
+    assert sensor.fetch(now_ms) == 3
+    assert code(sensor) == "sensor-frozen"
+
+
+def test_the_configuration_is_checked_every_100_ms(board):
+    sensor, chip, now_ms = running(board)
+    for after_ms in range(0, 1000, 10):
+        sensor.check(now_ms + after_ms)
+    assert 9 <= chip.calls.count("configured") <= 10
+
+
+def test_a_chip_that_does_not_run_is_not_checked(board):
+    sensor, chip = made(board)
+    sensor.check(1000)
+    assert chip.calls == []
+
+
+def test_a_chip_that_has_reset_itself_is_set_up_again(board):
+    sensor, chip, now_ms = running(board)
+    chip.states = [True, False]
+    sensor.check(now_ms + 100)
+    assert code(sensor) is None
+    sensor.check(now_ms + 199)  # not due
+    assert code(sensor) is None
+    sensor.check(now_ms + 200)
+    assert code(sensor) == "sensor-reset"
+    assert sensor.fetch(now_ms + 229) == 0
+    assert "setup" not in chip.calls
+    sensor.fetch(now_ms + 230)
+    assert "setup" in chip.calls
+
+
+def test_a_check_that_is_lost_counts_as_a_lost_transfer(board):
+    sensor, chip, now_ms = running(board)
+    chip.states = [OSError(5)] * 3
+    for k in (1, 2, 3):
+        assert code(sensor) is None
+        sensor.check(now_ms + 100 * k)
+    assert code(sensor) == "sensor-lost"
+
+
+def test_failures_before_a_set_up_do_not_count_after_it(board):
+    sensor, chip, now_ms = running(board)
+    chip.waiting = [OSError(5)] * 3
+    for k in range(3):
+        sensor.fetch(now_ms + k)
+    sensor.fetch(now_ms + 100)  # sets up
+    now_ms = board.clock.now_us // 1000
+    chip.waiting = [1, OSError(5), 1]
+    del chip.calls[:]
+    for k in range(3):
+        sensor.fetch(now_ms + k)
+        assert code(sensor) is None
+    assert chip.calls == ["fetch", "fetch", "restart_fifo", "fetch"]
+
+
+def test_it_tells_whether_samples_were_left(board):
+    sensor, chip, _ = running(board)
+    assert sensor.emptied is True
+    chip.frames_left = 2
+    assert sensor.emptied is False
