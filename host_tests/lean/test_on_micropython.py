@@ -21,6 +21,7 @@ for name in sorted(dir(module)):
 MODULES = (
     "test_meter_limits",
     "test_filter_limits",
+    "test_formula_limits",
     "test_rest",
     "test_upright_trim",
     "test_measurements",

@@ -43,11 +43,10 @@ ROOMS = {
     "lean": Room(
         (FIRMWARE + "lean/*.py",),
         (
-            TESTS + "lean/test_*_limits.py",
             TESTS + "lean/test_known_ride.py",
+            TESTS + "lean/test_*_limits.py",
             TESTS + "lean/test_[bkmru]*.py",
-            TESTS + "lean/test_formula.py",
-        ),  # not test_lean_filter.py, which takes longer than all of them
+        ),  # not test_lean_filter.py and test_formula.py, which take longer than all of them
     ),
     "drive_alignment": Room(
         (FIRMWARE + "drive_alignment/*.py",),
@@ -55,7 +54,7 @@ ROOMS = {
     ),
     "speed": Room(
         (FIRMWARE + "speed/*.py",),
-        (TESTS + "simulated_board/test_board_speed.py",),
+        (TESTS + "simulated_board/test_board_speed_limits.py", TESTS + "simulated_board/test_board_speed.py"),
     ),
     "rides": Room(
         (FIRMWARE + "rides/*.py", TOOLS + "rides/*.py"),
