@@ -233,3 +233,15 @@ def test_a_large_correction_is_made_once():
     assert abs(leans[30]) < 1.0
     assert leans[60] > 28.0
     assert max(leans) < 30.5
+
+
+def test_where_samples_come_slowly_rest_and_ride_are_seen_as_well():
+    """At 50 Hz all work on a window is done in the sample after it."""
+    estimator = LeanFilter()
+    force, rate = felt(-20.0)
+    for k in range(400):
+        lean = estimator.update(force, rate, 20_000 if k else 0)
+    assert estimator.at_rest
+    near(lean, -20.0, 0.05)
+    near(feel(estimator, 6.0, [sin(radians(-20.0)), cos(radians(-20.0)), 0.2], NO_RATE, 20_000), -20.0, 2.0)
+    assert estimator.rolling

@@ -98,3 +98,8 @@ def test_long_work_is_done_in_short_pieces():
     p, _ = some()
     assert [len(list(p.propagate_row(5, tuple(RATES[:k]), 0.2, 0.0))) for k in (1, 3, 4, 5)] == [1, 1, 2, 2]
     assert [len(list(p.update(tuple(H[:k]), 0.0, 1.0))) for k in (1, 3, 4, 5)] == [3, 3, 4, 4]
+    work, before = p.update(tuple(H[:2]), 0.0, 1.0), [p.rows[i][i] for i in range(N)]
+    changed = []
+    for _ in work:
+        changed.append(sum(p.rows[i][i] != before[i] for i in range(N)))
+    assert changed == [0, 8, 12]

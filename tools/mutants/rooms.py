@@ -57,8 +57,12 @@ ROOMS = {
         (TESTS + "simulated_board/test_board_speed_limits.py", TESTS + "simulated_board/test_board_speed.py"),
     ),
     "rides": Room(
-        (FIRMWARE + "rides/*.py", TOOLS + "rides/*.py"),
-        (TESTS + "rides/*.py",),
+        (FIRMWARE + "rides/*.py",),
+        (TESTS + "rides/test_ride_limits.py", TESTS + "rides/test_ride_file.py"),  # the others take longer
+    ),
+    "pull": Room(
+        (TOOLS + "rides/*.py",),
+        (TESTS + "rides/test_ride_file.py", TESTS + "rides/test_cli_*.py"),
     ),
     "calibrate": Room(
         (TOOLS + "calibration/*.py",),
