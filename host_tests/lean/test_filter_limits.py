@@ -216,7 +216,9 @@ def test_a_lean_beyond_half_a_turn_comes_from_the_other_side():
         for k in range(1500):
             a = sign * min(2.0 * pi, 0.006 * k)
             turning = sign * 0.6 if 0.006 * k < 2.0 * pi else 0.0
-            estimator.update([sin(a), cos(a), 0.0], [0.0, 0.0, turning], DT_US)
+            lean = estimator.update([sin(a), cos(a), 0.0], [0.0, 0.0, turning], DT_US)
+            if abs(a) > radians(210.0):
+                near(lean, degrees(a) - sign * 360.0, 3.0)
         near(feel(estimator, 4.0), 0.0, 0.5)
 
 
@@ -245,3 +247,33 @@ def test_where_samples_come_slowly_rest_and_ride_are_seen_as_well():
     near(lean, -20.0, 0.05)
     near(feel(estimator, 6.0, [sin(radians(-20.0)), cos(radians(-20.0)), 0.2], NO_RATE, 20_000), -20.0, 2.0)
     assert estimator.rolling
+
+
+def test_a_bias_that_is_far_off_is_put_right_at_once_where_rest_is_seen():
+    """Of 5 deg/s, on a bike that stands at 20 degrees: neither lean nor pitch drifts from then on."""
+    force, _ = felt(20.0)
+    for axis in range(3):
+        estimator, rate = LeanFilter(), vector(axis, 0.08)
+        while not estimator.at_rest:
+            estimator.update(force, rate, DT_US)
+        for _ in range(60):
+            near(estimator.update(force, rate, DT_US), 20.0, 0.25)
+            near(estimator.pitch_deg, 0.0, 0.15)
+
+
+def trim_after(forward_g):
+    """Whether the trim is measured on a straight; the speed was told while it sped up so."""
+    estimator = LeanFilter()
+    feel(estimator, 0.1, [0.0, 1.1, 0.0])
+    for _ in range(50):
+        estimator.measure_speed(15.0)
+        estimator.update([0.0, 1.0, forward_g], NO_RATE, DT_US)
+    before = estimator.trim.variance
+    feel(estimator, 1.0)
+    return estimator.trim.variance < before
+
+
+def test_the_trim_is_measured_while_the_speed_is_certain_to_8_mps():
+    """A speed that is told a second late, while the speed changes by so much."""
+    assert trim_after(1.3)
+    assert not trim_after(2.5)
