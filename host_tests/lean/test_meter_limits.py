@@ -224,21 +224,28 @@ def test_another_calibration_or_a_restart_forgets_the_ride_and_keeps_the_maxima(
     near(shown.max_right_deg, 20.0, 0.5)
 
 
-def test_the_reading_is_the_mean_of_the_last_sum():
+def test_a_meter_takes_sums_of_counts():
     from array import array
 
     calibration = Calibration()
     calibration.set_scale(4096, 65.5)
     shown = meter(calibration)
+    assert shown.reading == [0] * 7
     shown.update_sum(array("i", [8, 3 * 4096, 4, 100, -2, 6, 131]), 3, 0)
-    assert [round(value, 6) for value in shown.reading] == [
-        2.666667,
-        4096.0,
-        1.333333,
-        33.333333,
-        -0.666667,
-        2.0,
-        43.666667,
-    ]
+    assert [round(3 * value, 6) for value in shown.reading] == [8, 12288, 4, 100, -2, 6, 131]
     near(shown.force[1], 1.0, 0.001)
     near(degrees(shown.rate[2]), 131 / 3 / 65.5, 0.01)
+    shown.restart()
+    counts = array("i", [2 * 1401, 2 * 3849, 0, 0, 0, 0, 0])  # 20 degrees
+    for _ in range(200):
+        shown.update_sum(counts, 2, DT_US)
+    near(shown.lean_deg, 20.0, 0.1)
+    assert shown.at_rest
+
+
+def test_the_formulas_lean_takes_the_yaw_rate():
+    """A turn of 30 degrees that a bike leans into: the rate about left has its other sign at the nose down."""
+    force, rate = felt(30.0, 15.0)
+    shown = meter()
+    shown.update(reading(force, [-rate[0], rate[1], rate[2]]), 0)
+    near(shown.lean_formula_deg, 30.0, 0.01)

@@ -359,6 +359,33 @@ def test_a_block_takes_what_fits_and_the_worst_turn_always_does():
         assert len(data) - len(data.rstrip(b"\0")) < 60
 
 
+def quiet(count, length):
+    """A block of so many turns that differ little from one another, so that each takes few bits."""
+    block = RideBlock(5000)
+    block.begin(length, 1, 0, 0, ride_writer.CHIP, 200, bytes(80))
+    for _ in range(count):
+        block.add([800] * 7, 8, 40_000)
+    return block
+
+
+@pytest.mark.parametrize("length", range(400, 416))
+def test_however_full_a_block_is_the_worst_turn_fits(length):
+    """After quiet turns every number of a violent one takes the longest code."""
+    count = 0
+    while not quiet(count, length).full():
+        count += 1
+    block = quiet(count - 1, length)
+    block.add_speed(1 << 24)
+    block.add([-32768] * 7, 1, 1 << 29)
+    assert block.full()
+    block.close()
+    found = block_reader.parse(bytes(block.buffer[:length])).turns
+    assert len(found) == count > 10
+    assert (found[-1].sums, found[-1].n, found[-1].speed_mps) == ((-32768,) * 6, 1, (1 << 24) / 100)
+    assert found[-1].time_us == (count - 1) * 40_000 + (1 << 29)
+    assert {turn.sums for turn in found[:-1]} == {(800,) * 6}
+
+
 def test_a_block_begins_without_anything_of_the_one_before():
     """Each can be read without the others. What is left of a longer one is overwritten with zeros."""
     first, again = RideBlock(5000), RideBlock(5000)

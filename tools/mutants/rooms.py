@@ -50,15 +50,19 @@ ROOMS = {
     ),
     "drive_alignment": Room(
         (FIRMWARE + "drive_alignment/*.py",),
-        (TESTS + "drive_alignment/*.py",),
+        (TESTS + "drive_alignment/test_drive_limits.py", TESTS + "drive_alignment/*.py"),
     ),
     "speed": Room(
         (FIRMWARE + "speed/*.py",),
         (TESTS + "simulated_board/test_board_speed_limits.py", TESTS + "simulated_board/test_board_speed.py"),
     ),
+    "ui": Room(
+        (FIRMWARE + "ui/*.py",),
+        (TESTS + "ui/*.py",),
+    ),
     "rides": Room(
         (FIRMWARE + "rides/*.py",),
-        (TESTS + "rides/test_ride_limits.py", TESTS + "rides/test_ride_file.py"),  # the others take longer
+        (TESTS + "rides/test_ride_limits.py",),  # the others take longer
     ),
     "pull": Room(
         (TOOLS + "rides/*.py",),
