@@ -72,6 +72,77 @@ def test_how_it_was_aligned_is_kept_and_older_records_are_read(store, tmp_path):
     assert loaded.aligned and not loaded.by_drive
 
 
+IDENTITY = [1, 0, 0, 0, 1, 0, 0, 0, 1]
+NUMBERS = [0.25, -0.125, 0.375, 1.125, 0.875, 1.0, 3.5, -2.5, 1.5, *IDENTITY, 2.5]  # exact in 32 bits
+
+
+def record(*, magic=b"KSTD", version=1, sequence=7, chip=(0x68, 8), six_done=1, how=1, numbers=NUMBERS):
+    """A record as every release since the first has written it: 96 bytes, little-endian."""
+    body = struct.pack("<4sHHI", magic, version, 96, sequence) + struct.pack("<4B19f", *chip, six_done, how, *numbers)
+    return body + struct.pack("<I", crc32(body))
+
+
+@pytest.mark.parametrize(("six_done", "how"), [(1, 1), (1, 2), (0, 1), (0, 0)])
+def test_records_are_read_and_written_as_by_the_first_release(store, tmp_path, six_done, how):
+    """how: 0 not aligned, 1 by two poses, 2 by driving."""
+    (tmp_path / FILES[1]).write_bytes(record(sequence=7, six_done=six_done, how=how))
+    loaded = store.load()
+    assert loaded.parameters() == NUMBERS
+    assert (loaded.six_done, loaded.aligned, loaded.by_drive) == (six_done == 1, how > 0, how == 2)
+    assert store.message == "record 7"
+    store.save(loaded)
+    assert (tmp_path / FILES[0]).read_bytes() == record(sequence=8, six_done=six_done, how=how)
+    store.save(loaded)
+    assert (tmp_path / FILES[1]).read_bytes() == record(sequence=9, six_done=six_done, how=how)
+
+
+@pytest.mark.parametrize(
+    ("content", "problem"),
+    [
+        (b"", "empty"),
+        (record()[:-1], "cut short"),
+        (record() + b"\0", "too long"),
+        (record()[:-1] + b"\0", "damaged"),
+        (record(magic=b"KSTE"), "of another version"),
+        (record(version=2), "of another version"),
+        (record(sequence=0), "of another version"),
+        (record(chip=(0x70, 8)), "of another sensor or range"),
+        (record(chip=(0x68, 16)), "of another sensor or range"),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_what_is_wrong_with_a_record_is_said(store, tmp_path, content, problem):
+    (tmp_path / FILES[1]).write_bytes(content)
+    assert not store.load().aligned
+    assert store.message == f"not calibrated: {FILES[1]} {problem}"
+    (tmp_path / FILES[0]).write_bytes(record())
+    assert store.load().aligned
+    assert store.message == f"record 7 (other record: {FILES[1]} {problem})"
+
+
+def skewed(by):
+    """A matrix whose first and second row are no longer at right angles."""
+    return [1, by, 0, 0, 1, 0, 0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("at", "values", "good"),
+    [
+        *[(k, [sign * 0.49], True) for k in range(3) for sign in (-1, 1)],
+        *[(k, [sign * 0.51], False) for k in range(3) for sign in (-1, 1)],
+        *[(k, [slope], 0.8 < slope < 1.2) for k in range(3, 6) for slope in (0.79, 0.81, 1.19, 1.21)],
+        *[(k, [bias], abs(bias) < 60) for k in range(6, 9) for bias in (-61.0, -59.0, 59.0, 61.0)],
+        *[(9, skewed(by), abs(by) < 1e-4) for by in (-1.1e-4, -0.9e-4, 0.9e-4, 1.1e-4)],
+        *[(18, [trim], abs(trim) < 3.6) for trim in (-3.65, -3.55, 3.55, 3.65)],
+    ],
+)
+def test_what_a_real_sensor_can_have(store, tmp_path, at, values, good):
+    numbers = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0, *IDENTITY, 0.0]
+    numbers[at : at + len(values)] = values
+    (tmp_path / FILES[0]).write_bytes(record(numbers=numbers))
+    assert store.load().aligned is good
+
+
 @pytest.mark.parametrize("saved_before", [0, 1, 2, 3])
 def test_power_cut_at_every_byte_of_a_save(store, tmp_path, saved_before):
     for mark in range(1, saved_before + 1):

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kickstand.calibration.parameters import Calibration
-from kickstand.calibration.two_position import align, check_one_g, two_position
+from kickstand.calibration.two_position import MIN_TILT_DEG, WARN_TILT_DEG, align, check_one_g, two_position
 from kickstand.errors import AlignmentError
 from numpy.testing import assert_allclose
 from test_rotation import random_rotation
@@ -129,6 +129,18 @@ def test_the_poses_are_5_to_60_degrees_apart(angle_deg, code):
     assert refusal.value.code == code
     assert refusal.value.values[0] == pytest.approx(angle_deg, abs=1e-4)
     assert refusal.value.values[1:] == {"tilt-small": (5.0,), "tilt-large": (60.0,)}.get(code, ())
+
+
+@pytest.mark.parametrize(("tilt_deg", "turned_deg"), [(MIN_TILT_DEG, 11), (WARN_TILT_DEG, 7)])
+def test_what_a_degree_of_pitch_between_the_poses_costs(tilt_deg, turned_deg):
+    """The two limits stand for this: forward is turned by 1 / tan(tilt)."""
+    pitch = np.radians(1.0)
+    tilted = np.array(at(tilt_deg))
+    pitched = [tilted[0], tilted[1] * np.cos(pitch), tilted[1] * np.sin(pitch)]
+    truth, found = [0.0] * 9, [0.0] * 9
+    two_position(truth, at(tilt_deg + 0.01), at(0))
+    two_position(found, pitched, at(0))
+    assert rotation_angle_deg(found, truth) == pytest.approx(turned_deg, abs=0.6)
 
 
 @pytest.mark.parametrize(("size", "tolerance", "good"), [(1.1, 0.11, True), (1.1, 0.09, False), (0.9, 0.09, False)])

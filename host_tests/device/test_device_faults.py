@@ -211,3 +211,28 @@ def test_a_fifo_out_of_step_is_noticed(byte, aligned, monkeypatch):
     record = devices.run("cpython", aligned, standing([], until=8))
     assert record.lean_at(FAULT_S + 0.3) == STATIC
     assert record.last[0].startswith("Lean  25° right")
+
+
+@pytest.mark.parametrize(("register", "value"), [(0x1B, 0x18), (0x1C, 0x00), (0x1A, 0x06)])
+def test_a_setting_that_changed_by_itself_is_put_right(register, value, aligned, monkeypatch):
+    """Ranges and low-pass: the readings still come and look like readings, so that only a look at the registers
+    tells."""
+    from kickstand_tools.simulated_board import simulator
+
+    original, boards = simulator.Board.install, []
+
+    def install(board):
+        def spike():
+            board.sensor.start(0x68, False)
+            board.sensor.write_byte(register)
+            board.sensor.write_byte(value)
+
+        boards.append(board)
+        board.at(FAULT_S, spike)
+        original(board)
+
+    monkeypatch.setattr(simulator.Board, "install", install)
+    record = devices.run("cpython", aligned, standing([], until=8))
+    assert record.first("Sensor", FAULT_S) < FAULT_S + 0.3
+    assert boards[0].sensor.peek(register) != value
+    assert record.lean_at(FAULT_S + 0.1 + RECOVERY_S + 0.1) == STATIC

@@ -21,13 +21,14 @@ def time():
 
 class Wires:
     """A machine.I2C with nothing but registers behind it. stuck: those that keep their value whatever is written.
-    log: what was written, [(register, value), ...]. waiting: bytes in the FIFO."""
+    log: what was written, [(register, value), ...], at times_us by clock. waiting: bytes in the FIFO."""
 
-    def __init__(self, who_am_i=0x68, stuck=()):
+    def __init__(self, who_am_i=0x68, stuck=(), clock=None):
         self.registers = bytearray(128)
         self.registers[WHO_AM_I] = who_am_i
         self.stuck = stuck
-        self.log = []
+        self.log, self.times_us = [], []
+        self.clock = clock
         self.waiting = 0
         self.read_of_fifo = []
 
@@ -35,15 +36,20 @@ class Wires:
         assert address == 0x68
         for value in data:
             self.log.append((register, value))
+            self.times_us.append(self.clock.now_us if self.clock else 0)
             if register not in self.stuck:
                 self.registers[register] = value
 
     def readfrom_mem_into(self, address, register, buffer):
         assert address == 0x68
+        if register not in (FIFO_R_W, USER_CTRL):  # no byte more than is used: each takes 25 us
+            assert len(buffer) == {SMPLRT_DIV: 11, 0x3B: 14, FIFO_COUNT_H: 2}.get(register, 1)
         self.registers[FIFO_COUNT_H], self.registers[FIFO_COUNT_H + 1] = divmod(self.waiting, 256)
         if register == FIFO_R_W:
             self.read_of_fifo.append(len(buffer))
             return
+        if register == USER_CTRL:
+            assert len(buffer) <= 2
         buffer[:] = self.registers[register : register + len(buffer)]
 
 
@@ -56,8 +62,7 @@ def started(wires, **settings):
 
 
 def test_setup_writes_what_the_register_map_says(time):
-    wires = Wires()
-    before_us = time.now_us
+    wires = Wires(clock=time)
     chip = started(wires, accel_range_g=16, gyro_range_dps=1000, dlpf=2, rate_hz=100)
     assert wires.log == [
         (PWR_MGMT_1, 0x80),  # reset
@@ -72,7 +77,11 @@ def test_setup_writes_what_the_register_map_says(time):
         (FIFO_EN, 0xF8),
     ]
     assert (chip.accel_lsb_per_g, chip.gyro_lsb_per_dps) == (2048, 32.8)
-    assert 0.1 < (time.now_us - before_us) / 1e6 < 0.25  # the reset takes up to 100 ms (p. 41)
+    reset, awake, configured, *_ = wires.times_us
+    assert awake - reset >= 100_000  # what a reset takes at most (p. 41)
+    assert configured - awake >= 30_000  # the gyro's start-up time (PS-MPU-6000A, 6.1)
+    assert wires.times_us[6] - wires.times_us[5] >= 4 * 4800  # four delays of the slowest low-pass that is usual
+    assert wires.times_us[-1] - reset < 200_000
 
 
 def test_the_low_pass_of_the_accelerometer_of_an_mpu6500_is_set_too():
@@ -176,6 +185,14 @@ def test_each_bit_of_the_fifo_that_the_chip_has_must_stay(who_am_i, bits):
         assert chip.configured() == (not bits & 1 << bit)
 
 
+def test_the_end_of_the_range_is_that_of_16_bits():
+    """Readings of 99 % of it are good."""
+    from kickstand.imu.mpu6050 import Mpu6050
+
+    assert 0.99 * 32768 < Mpu6050.SATURATED <= 32767
+    assert Mpu6050(Wires()).who_am_i == 0  # before setup()
+
+
 def test_an_unknown_number_is_an_unknown_chip_unless_accepted():
     from kickstand.imu.mpu6050 import Mpu6050, UnknownChip
 
@@ -265,13 +282,17 @@ def test_a_fifo_that_may_have_overflowed_is_emptied(who_am_i, most):
     chip = started(wires)
     wires.waiting = 14 * most
     assert chip.fetch() == 8
+    wires.waiting = (1024 if who_am_i == 0x68 else 512) - 14  # still room for a frame: one is being written
+    assert (chip.fetch(), chip.overflows) == (0, 0)
+    wires.waiting = 14
+    assert chip.fetch() == 1
     for number, waiting in enumerate((14 * (most + 1), 1024 if who_am_i == 0x68 else 512), 1):
         del wires.log[:]
         wires.waiting = waiting
         assert chip.fetch() == 0
         assert (chip.overflows, chip.frames_left) == (number, 0)
         assert wires.log == [(FIFO_EN, 0), (USER_CTRL, 0x04), (USER_CTRL, 0x40), (FIFO_EN, 0xF8)]
-    assert len(wires.read_of_fifo) == 1
+    assert len(wires.read_of_fifo) == 2
 
 
 def test_a_frame_that_is_being_written_is_waited_for_once():
