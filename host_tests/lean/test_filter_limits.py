@@ -241,6 +241,7 @@ def test_where_samples_come_slowly_rest_and_ride_are_seen_as_well():
     """At 50 Hz all work on a window is done in the sample after it."""
     estimator = LeanFilter()
     force, rate = felt(-20.0)
+    lean = 0.0
     for k in range(400):
         lean = estimator.update(force, rate, 20_000 if k else 0)
     assert estimator.at_rest

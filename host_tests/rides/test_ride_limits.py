@@ -483,11 +483,11 @@ def test_the_room_is_what_is_free_and_what_older_rides_have(root):
 
 
 def old_ride(root, ride, parts=1, size=KB_4):
+    directory = root.path / ride_paths.ride_path("rides", ride)
+    directory.mkdir(parents=True, exist_ok=True)
     for part in range(parts):
-        path = root.path / ride_paths.part_path("rides", ride, part)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_bytes(bytes(size))
-    return path.parent
+        (root.path / ride_paths.part_path("rides", ride, part)).write_bytes(bytes(size))
+    return directory
 
 
 def test_room_is_made_exactly_when_a_part_does_not_fit(root):
@@ -542,19 +542,37 @@ def test_a_flash_without_rides_to_remove_is_full(root):
     assert not list((root.path / "rides").rglob("*.rid"))
 
 
-def test_a_write_that_is_cut_short_says_that_there_is_no_room(root):
+class File:
+    """An open file. short: by how much each write falls short. closed: how often it was."""
+
+    def __init__(self, short=0, error=None):
+        self.short, self.error, self.closed = short, error, 0
+
+    def write(self, piece):
+        return len(piece) - self.short
+
+    def close(self):
+        self.closed += 1
+        if self.error:
+            raise self.error
+
+
+def begun(file, monkeypatch):
+    """A ring whose first part is this file."""
+    monkeypatch.setattr(flash_ring, "open", lambda path, mode: file, raising=False)
     ring = RideRing(FLASH)
     ring.begin()
     while not ring.ready():
         pass
-    ring._file.close()
-    ring._file = types.SimpleNamespace(write=lambda piece: len(piece) - 1, close=lambda: None)
+    return ring
+
+
+def test_a_write_that_is_cut_short_says_that_there_is_no_room(root, monkeypatch):
+    begun(File(), monkeypatch).write(b"abc")
+    ring = begun(File(short=1), monkeypatch)
     with pytest.raises(OSError) as error:
         ring.write(b"abc")
     assert ring.fault_code(error.value) == "out-of-room"
-    ring.abandon()
-    ring._file = types.SimpleNamespace(write=len, close=lambda: None)
-    ring.write(b"abc")
 
 
 def test_faults_have_their_codes():
@@ -566,18 +584,15 @@ def test_faults_have_their_codes():
         assert ring.fault_code(MemoryError()) == "out-of-memory"
 
 
-def test_ending_closes_once_and_abandoning_raises_nothing(root):
-    ring, closed = RideRing(FLASH), []
-    ring.end()
-
-    def close():
-        closed.append(1)
-        raise OSError(5)
-
-    ring._file = types.SimpleNamespace(close=close)
+def test_ending_closes_once_and_abandoning_raises_nothing(root, monkeypatch):
+    RideRing(FLASH).end()  # there is nothing to close
+    file = File(error=OSError(5))
+    ring = begun(file, monkeypatch)
     ring.abandon()
     ring.abandon()
-    assert closed == [1]
+    assert file.closed == 1
+    with pytest.raises(OSError):
+        begun(file, monkeypatch).end()
 
 
 def test_a_directory_that_cannot_be_made_ends_in_its_error(root, monkeypatch):
