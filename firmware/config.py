@@ -7,16 +7,18 @@
 # SAMPLE_HZ = 200           # readings per second: 50, 100, 125 or 200
 # ACCEL_RANGE_G = 8         # 2, 4, 8 or 16
 # GYRO_RANGE_DPS = 500      # 250, 500, 1000 or 2000
-# DLPF = 3                  # low-pass of the chip: 1 (184 Hz) to 6 (5 Hz)
+# DLPF = 3                  # low-pass of the chip, which has to keep what is faster than half of SAMPLE_HZ out:
+#                           # 2 (98 Hz) to 6 (5 Hz) at 200; 3 (44 Hz) to 6 at 100 and 125; 4 (21 Hz) to 6 at 50
 # ACCEPT_WHO_AM_I = None    # the number on the display, to try a chip that is refused as unknown
 # SENSOR_ADDRESS = 0x68     # 0x69 if AD0 is tied high
 
-# Wiring (GPIO numbers; the defaults are for a Pico, those of an ESP32 in brackets)
-# SENSOR_I2C = 0
+# Wiring (GPIO numbers; the defaults are for a Pico and Pico 2, those of a classic ESP32 in brackets). Every other
+# board needs the five pins of sensor, display and button named here: not each board has all pins, and some are taken.
+# SENSOR_I2C = 0            # (not used) on a Pico GP4 / GP5 belong to I2C 0, GP6 / GP7 to I2C 1, and so on by turns
 # SENSOR_SDA = 4            # (21)
 # SENSOR_SCL = 5            # (22)
-# SENSOR_BUS_HZ = 400_000
-# LCD_I2C = 1
+# SENSOR_BUS_HZ = 400_000   # (250_000 at most)
+# LCD_I2C = 1               # (not used)
 # LCD_SDA = 6               # (18) the same two pins as the sensor's put both on one bus, at the slower speed
 # LCD_SCL = 7               # (19)
 # LCD_BUS_HZ = 100_000

@@ -24,7 +24,7 @@ ARROWS = {
     "lean": {"calibration"},
     "drive_alignment": set(),  # it works on the calibrations that the app hands to it
     "speed": {"board"},
-    "rides": {"board", "calibration"},  # each block of a ride holds its calibration's record
+    "rides": {"board", "calibration", "console"},  # each block of a ride holds its calibration's record
     "ui": {"board.button", "lean", "calibration", "drive_alignment"},
     "settings": {"board", "imu.mpu6050"},  # ranges and pins that can be chosen
     "devices": {"board", "imu"},

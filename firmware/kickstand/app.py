@@ -15,7 +15,6 @@ from .board import port
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
 from .devices import open_button, open_sensor
-from .imu.mpu6050 import GYRO_DELAY_S
 from .imu.sample_clock import SampleClock
 from .lean.meter import LeanMeter
 from .rides.flash_ring import RideRing
@@ -52,14 +51,15 @@ class App:
         self.lcd = lcd
         self.button = open_button(settings)
         self.sensor = open_sensor(settings)
-        self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle", GYRO_DELAY_S[settings.DLPF])
+        self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle", self.sensor.chip.gyro_delay_s)
         self.calibration = ActiveCalibration(self.meter, self._calibration_changed)
         self.drive = self._open_drive() if settings.SPEED else None
         self.recorder = Recorder(keeper or RideRing(settings), settings.SAMPLE_HZ)
+        self.clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self.screen = Screen(self)
-        self._clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self._restarts = 0
         self._record_due = settings.RECORD or keeper is not None
+        self._on_card = settings.SD_SPI is not None and keeper is None
         self._page_ms = ticks_ms()
         self._fault_shown = False
 
@@ -80,17 +80,23 @@ class App:
             raise
 
     def _loop(self):
+        if self._on_card:
+            from .rides import card_trial
+
+            self.lcd.show("SD card", "is being read")
+            self.lcd.flush()
+            card_trial.prepare(self.recorder, self.settings)
         watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         gc.threshold(-1)
         due_us = ticks_us()
-        turns = 0
+        turns = port.turns_to_collect(COLLECT_TURNS)
         while True:
             self.turn()
-            turns += 1
-            if turns >= COLLECT_TURNS:  # here, not in the middle of a sample: meanwhile the FIFO keeps what comes
-                turns = 0
+            turns -= 1
+            if turns <= 0:  # here, not in the middle of a sample: meanwhile the FIFO keeps what comes
                 gc.collect()
                 fill_gaps(SINGLE_GAPS)
+                turns = port.turns_to_collect(COLLECT_TURNS)
             if watchdog:
                 watchdog.feed()
             due_us = ticks_add(due_us, LOOP_US)
@@ -106,18 +112,18 @@ class App:
         now_us, now_ms = ticks_us(), ticks_ms()
         n = self.sensor.fetch(now_ms)
         if n:
-            dt_us = self._clock.step(n, now_us)
+            dt_us = self.clock.step(n, now_us)
             self._take(n, dt_us, now_ms)
         if self.drive:
             self._poll_speed(now_ms)
         self.sensor.check(now_ms)
         if self.sensor.fault is not None:
-            self._clock.restart()
+            self.clock.restart()
             self.screen.interrupt(now_ms)
             if not self._fault_shown:
                 self._page_ms = now_ms  # at once: the next thing is to start the sensor again
         elif self.sensor.emptied:
-            self._clock.emptied(now_us)
+            self.clock.emptied(now_us)
         event = self.button.poll(now_ms)
         if event:
             self.screen.press(event, now_ms)

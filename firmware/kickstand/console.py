@@ -3,16 +3,23 @@
 Imported only when there is something to say: on most boards never.
 """
 
+SLOW_MS = 100  # a print takes a few ms, but 500 where the USB host sleeps: longer than the chip's FIFO lasts
+QUIET_MS = 60_000  # after a slow print no refusal is told for so long
+
+_slow_ms = None  # when a print was slow
+
 # code|sentence; {0}, {1} ... are the refusal's values, of a setting first its name
 _SENTENCES = """
 not-written|calibration not saved: {0}; the old one is kept
 read-back|calibration not saved: it reads back differently; the old one is kept
 no-driver|SD card: its driver is not on the board: mpremote mip install sdcard
-no-card|SD card: none that can be read ({0}): check card and wiring
+no-card|SD card: none that can be used ({0}): check wiring and card, which has to be FAT32; then restart the board
 unreadable|config.py cannot be read ({1}{2}): mend it, then kickstand flash --config
 not-allowed|config.py: {0} = {1!r}, but it must be {2}
 no-setting|config.py: {0} is not a setting; see the list in that file
 card-pins|config.py: an SD card needs all of {1}
+no-pins|config.py: no usual pins are known for this board ({2}): set {1}
+aliasing|config.py: DLPF = {1} lets vibration alias at SAMPLE_HZ = {2}: set DLPF = {3} or higher
 pin-twice|config.py: a pin is used twice among {1}
 one-i2c|config.py: SENSOR_I2C and LCD_I2C are both {1} on different pins; give each its own
 needs-speed|config.py: VEHICLE = "car" needs a speed source to be aligned: SPEED = "gps" or "wheel"
@@ -26,3 +33,24 @@ _RECORDING_STOPPED = "recording stopped: {0}"  # for all of its faults, which on
 def sentence(refusal):
     """One line for a Refusal."""
     return refusal.words(_SENTENCES, _RECORDING_STOPPED)
+
+
+def say(text, end="\n"):
+    """Print text; return True if that was slow."""
+    from time import ticks_diff, ticks_ms  # here, because the host's tools need the words only
+
+    global _slow_ms
+    begun_ms = ticks_ms()
+    print(text, end=end)
+    if ticks_diff(ticks_ms(), begun_ms) < SLOW_MS:
+        return False
+    _slow_ms = begun_ms
+    return True
+
+
+def tell(refusal):
+    """Print its sentence, unless printing was slow lately."""
+    from time import ticks_diff, ticks_ms
+
+    if _slow_ms is None or ticks_diff(ticks_ms(), _slow_ms) >= QUIET_MS:
+        say(sentence(refusal))

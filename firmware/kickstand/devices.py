@@ -43,5 +43,5 @@ def _open_bus(settings, name):
     sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
     try:
         return i2c_bus.open_i2c(controller, sda, scl, getattr(settings, name + "_BUS_HZ"))
-    except ValueError as error:
+    except (ValueError, TypeError) as error:  # a Pico's Pin(None), where no pin is set, is a TypeError
         raise SettingsError("i2c-pins", name + "_SDA / SCL", name, sda, scl, controller, str(error))

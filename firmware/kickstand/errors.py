@@ -35,11 +35,12 @@ class Refusal(Exception):
 
 
 def report(refusal):
-    """Print it on the console: in words, unless a flash or a heap that has failed does not give these any more."""
+    """Print it on the console, unless that was slow lately: in words, unless a flash or a heap that has failed does not
+    give these any more."""
     try:
-        from .console import sentence
+        from . import console
 
-        print(sentence(refusal))
+        console.tell(refusal)
     except (ImportError, OSError, MemoryError):
         print(refusal.code)
 
@@ -65,4 +66,8 @@ class CardError(Refusal):
 
 
 class SettingsError(Refusal):
-    """A value in config.py that cannot be used. values[0]: the name of the setting."""
+    """A value in config.py that cannot be used. values[0]: the name of the setting.
+
+    settings: of an error that settings.load() raises, the Settings with what is right, to open the display with."""
+
+    settings = None

@@ -9,7 +9,7 @@ from io import StringIO
 from .board import port
 from .board.hd44780 import ADDRESSES
 from .errors import SettingsError
-from .imu.mpu6050 import ACCEL_LSB_PER_G, GYRO_LSB_PER_DPS
+from .imu.mpu6050 import ACCEL_LSB_PER_G, GYRO_LSB_PER_DPS, MIN_DLPF
 
 
 def _one_of(*choices):
@@ -24,7 +24,7 @@ def _whole(low, high):
 
 
 def _sample_rate(value):
-    return isinstance(value, int) and 50 <= value <= 200 and 1000 % value == 0
+    return isinstance(value, int) and value in MIN_DLPF
 
 
 def _addresses(value):
@@ -41,7 +41,11 @@ def _pulses(value):
     return isinstance(value, (int, float)) and 0.1 <= value <= 100
 
 
-_PIN = _whole(0, 48)
+def _pin(value):
+    return isinstance(value, int) and 0 <= value <= 48 and value not in port.USB_PINS
+
+
+_PIN = _pin, "a number from 0 to 48, no pin of the chip's own USB"
 SD_PINS = ("SD_SCK", "SD_MOSI", "SD_MISO", "SD_CS")
 # The settings that name pins, for each speed source
 _SPEED_PINS = {None: (), "gps": ("GPS_TX", "GPS_RX"), "wheel": ("WHEEL_PIN",)}
@@ -85,13 +89,14 @@ _TABLE = {
 
 def load():
     """The Settings of config.py. Without a config.py these are the defaults. Raises SettingsError."""
+    config = refusal = None
     try:
         import config
     except ImportError:
-        config = None
+        pass
     except Exception as error:  # a slip in the rider's file, of whatever kind
-        raise SettingsError("unreadable", "config.py", _line_of(error), str(error))
-    return Settings(config)
+        refusal = SettingsError("unreadable", "config.py", _line_of(error), str(error))
+    return Settings(config, refusal)
 
 
 def _line_of(error):
@@ -105,33 +110,50 @@ def _line_of(error):
 
 
 class Settings:
-    """One attribute for each name in _TABLE. config: the module config, or None for the defaults. Raises SettingsError.
+    """One attribute for each name in _TABLE. config: the module config, or None for the defaults. refusal: why there is
+    no config. Raises SettingsError.
 
     one_bus: sensor and display share one I2C bus.
     """
 
-    def __init__(self, config=None):
+    def __init__(self, config=None, refusal=None):
         for name, (default, (check, allowed)) in _TABLE.items():
             value = getattr(config, name, default)
-            if not check(value):
-                raise SettingsError("not-allowed", name, value, allowed)
+            if value is not default and not check(value):
+                refusal = refusal or SettingsError("not-allowed", name, value, allowed)
+                value = None if check is _pin else default
             setattr(self, name, value)
-        for name in dir(config) if config else ():
-            if name not in _TABLE and (name.isupper() or name.upper() in _TABLE):
-                raise SettingsError("no-setting", name)
-        self.one_bus = (self.SENSOR_SDA, self.SENSOR_SCL) == (self.LCD_SDA, self.LCD_SCL)
+        self.one_bus = (self.SENSOR_SDA, self.SENSOR_SCL) == (self.LCD_SDA, self.LCD_SCL) != (None, None)
         if self.one_bus:  # the display's PCF8574 is made for 100 kHz, and sets the speed of a bus that it shares
             self.LCD_I2C = self.SENSOR_I2C
             self.SENSOR_BUS_HZ = self.LCD_BUS_HZ = min(self.SENSOR_BUS_HZ, self.LCD_BUS_HZ)
+        try:
+            if refusal:
+                raise refusal
+            self._check(config)
+        except SettingsError as error:
+            error.settings = self
+            raise
+
+    def _check(self, config):
+        for name in dir(config) if config else ():
+            if name not in _TABLE and (name.isupper() or name.upper() in _TABLE):
+                raise SettingsError("no-setting", name)
         card = [getattr(self, name) for name in ("SD_SPI",) + SD_PINS]
         if None in card and card != [None] * 5:
             missing = SD_PINS[card.index(None) - 1] if card[0] is not None else "SD_SPI"
             raise SettingsError("card-pins", missing, "SD_SPI, " + ", ".join(SD_PINS))
         names = ("BUTTON_PIN", "SENSOR_SDA", "SENSOR_SCL") + (() if self.one_bus else ("LCD_SDA", "LCD_SCL"))
         names += _SPEED_PINS[self.SPEED] + (() if None in card else SD_PINS)
+        missing = [name for name in names if getattr(self, name) is None]
+        if missing:
+            raise SettingsError("no-pins", missing[0], ", ".join(missing), port.MACHINE)
         if len({getattr(self, name) for name in names}) != len(names):
             raise SettingsError("pin-twice", "", ", ".join(names))
-        if not self.one_bus and self.SENSOR_I2C == self.LCD_I2C:
+        if port.I2C_NUMBERED and not self.one_bus and self.SENSOR_I2C == self.LCD_I2C:
             raise SettingsError("one-i2c", "LCD_I2C", self.LCD_I2C)
         if self.VEHICLE == "car" and self.SPEED is None:
             raise SettingsError("needs-speed", "SPEED")
+        fitting = MIN_DLPF[self.SAMPLE_HZ]
+        if self.DLPF < fitting:  # the engine's vibration would come out as a slow motion
+            raise SettingsError("aliasing", "DLPF", self.DLPF, self.SAMPLE_HZ, fitting)

@@ -23,6 +23,7 @@ def tell(lcd, line1, line2=""):
 
 def main():
     """Run until Ctrl-C, power-off or a reset."""
+    lcd = None
     try:
         chosen = settings.load()
         lcd = open_lcd(chosen)
@@ -38,7 +39,10 @@ def main():
         from .ui.messages import lines
 
         print("Kickstand stopped. " + sentence(error))
-        tell(open_lcd(settings.Settings()), *lines(error))
+        try:
+            tell(lcd or open_lcd(error.settings), *lines(error))
+        except SettingsError:  # the display's own pins are wrong, or not set, which Pin() refuses
+            pass
     except KeyboardInterrupt:
         port.rest_watchdog()
         print("Kickstand stopped. Ctrl-D starts it again; import kickstand; kickstand.status() tells how it is.")

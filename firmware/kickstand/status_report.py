@@ -3,7 +3,7 @@
 import gc
 import os
 import sys
-from time import sleep_ms, ticks_ms
+from time import sleep_ms, ticks_diff, ticks_ms
 
 from . import __version__
 from .calibration.store import Store
@@ -15,6 +15,7 @@ from .settings import load
 from .ui import messages
 
 LISTEN_MS = 3500
+_TRIAL = "trial.tmp"  # written and removed
 
 
 def report():
@@ -44,7 +45,20 @@ def report():
     _calibration(who_am_i, settings)
     gc.collect()
     space = os.statvfs("/")
-    print("Memory       %d KB free; flash %d KB free" % (gc.mem_free() // 1024, space[0] * space[3] // 1024))
+    print(
+        "Memory       %d KB free; flash %d KB free, %d ms to write a block"
+        % (gc.mem_free() // 1024, space[0] * space[3] // 1024, _write_ms())
+    )
+
+
+def _write_ms():
+    """How long it takes to erase and write a block of the flash. Longer than the chip's FIFO lasts loses readings."""
+    begun_ms = ticks_ms()
+    with open(_TRIAL, "wb") as file:
+        file.write(bytes(4096))
+    took_ms = ticks_diff(ticks_ms(), begun_ms)
+    os.remove(_TRIAL)
+    return took_ms
 
 
 def _sensor(sensor, settings):

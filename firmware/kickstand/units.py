@@ -6,3 +6,4 @@ The sensor's axes are x, y, z as printed on the chip. The vehicle's are left, up
 STANDARD_GRAVITY = 9.80665  # m/s^2 in 1 g
 AXES = ("x", "y", "z")  # of the sensor
 GAP_US = 500_000  # without a reading for longer, the past says nothing about the present
+LOST_US = 170_000  # a longer step spans lost readings: the loop takes at most eight at once, 160 ms at 50 a second

@@ -45,6 +45,20 @@ def test_a_report_has_the_ride_in_figures(ride):
     assert abs(data["alignment"]["roll_deg"]) < 0.5
 
 
+def test_time_without_readings_is_said(ride, tmp_path):
+    assert json.loads(command.works("report", ride, "--json").out)["missing_s"] == 0.0
+    assert "No readings" not in command.works("report", ride).out
+    header, *rows = ride.read_text().splitlines()
+    log = tmp_path / "gap.csv"
+    log.write_text("\n".join([header, *rows[:1200], *rows[1240:]]) + "\n")
+    beside = ride.with_name(ride.name.replace(".csv", ".cal.json"))
+    (tmp_path / "gap.cal.json").write_bytes(beside.read_bytes())
+    step_s = float(rows[1].split(",")[0]) - float(rows[0].split(",")[0])
+    data = json.loads(command.works("report", log, "--json").out)
+    assert data["missing_s"] == pytest.approx(41 * step_s, abs=0.06)
+    assert "No readings" in command.works("report", log).out
+
+
 def test_the_page_says_the_same(ride, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     said = command.works("report", ride).out

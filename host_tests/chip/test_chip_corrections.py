@@ -28,6 +28,27 @@ def board():
         yield emulated
 
 
+def test_quicker_division_is_rp2040pys_own():
+    """The same results, flags and cycles, also of a division by zero and of signed numbers."""
+    device = pico()  # or skip
+    from rp2040py.rp2040 import RP2040
+
+    quick, own = device.chip.rp2040, RP2040()
+    results = []
+    for chip in (quick, own):
+        chip.sio.reset()
+        began = chip.core.cycles
+        seen = []
+        for signed in (0, 8):  # the registers of signed numbers are the next two
+            for dividend in (0, 1, 7, 1000, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF):
+                for divisor in (1, 3, 0, 0x7FFFFFFF, 0xFFFFFFF9, 0xFFFFFFFF):
+                    for register, value in ((0x60 + signed, dividend), (0x64 + signed, divisor)):
+                        chip.write_uint32(0xD0000000 + register, value)
+                        seen += [chip.read_uint32(0xD0000000 + r) for r in (0x60, 0x64, 0x78, 0x74, 0x70, 0x78, 0)]
+        results.append((seen, chip.core.cycles - began))
+    assert results[0] == results[1]
+
+
 def ask(board, expression):
     """The value of an expression on the board."""
     return eval(board.exec(f"print(repr(({expression})))"))

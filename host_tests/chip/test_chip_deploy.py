@@ -1,95 +1,99 @@
 """The emulated Pico as a board to deploy to: mpremote over a socket, and how soon the firmware shows a lean."""
 
-import os
+import math
+import queue
 import re
-import subprocess
-import sys
+import threading
+import time
+import types
 
 import command
+import emulated_port
 import pytest
 from emulated import calibrated, leaning, pico, shown_lean
-from kickstand_tools.deploy import bytecode, firmware_files
+from kickstand_tools.deploy import bytecode, connection, firmware_files
+from mpremote import transport_serial
 
 pytestmark = pytest.mark.chip
 
-_EMULATE = "from kickstand_tools.emulator.emulate import emulate; emulate(0, lambda text: print(text, flush=True))"
+
+class Emulating(threading.Thread):
+    """`kickstand emulate` beside the test. It ends at end_s of its own time."""
+
+    def __init__(self, patch):
+        super().__init__(daemon=True)
+        from kickstand_tools.emulator import emulate
+        from kickstand_tools.emulator.pico import Pico
+
+        emulating = self
+
+        class Limited(Pico):
+            def run(self, seconds, between=None):
+                emulating.pico = self
+                if self.time_s > emulating.end_s:
+                    raise KeyboardInterrupt
+                super().run(seconds, between)
+
+        self.pico: Pico | None = None
+        self.end_s = math.inf
+        self.said = queue.Queue()
+        patch.setattr(emulate, "Pico", Limited)
+        self._emulate = emulate.emulate
+
+    def run(self):
+        try:
+            self._emulate(0, self.said.put)
+        finally:
+            self.said.put(None)
+
+    def time_s(self):
+        """The emulated board's."""
+        return self.pico.time_s if self.pico else 0.0
 
 
-def test_flash_onto_the_emulated_pico():
+def test_flash_onto_the_emulated_pico(monkeypatch):
     """`kickstand flash` as onto a board; then the bike's ride begins, and the display says what it is to do."""
     pico()  # or skip
-    process = subprocess.Popen(
-        [sys.executable, "-c", _EMULATE],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        text=True,
-        encoding="utf-8",
-        env={**os.environ, "PYTHONIOENCODING": "utf-8"},
-    )
+    emulating = Emulating(monkeypatch)
+    emulating.start()
     try:
-        assert process.stdout is not None
-        address = re.search(r"socket://\S+?:\d+", process.stdout.readline())
+        address = re.search(r"socket://\S+?:\d+", emulating.said.get())
         assert address
+        clock = types.SimpleNamespace(monotonic=emulating.time_s, sleep=lambda seconds: time.sleep(seconds / 10))
+        monkeypatch.setattr(transport_serial, "time", clock)
         result = command.works("flash", "--port", address[0])
         assert "and verified them" in result.out
+        emulating.end_s = emulating.time_s() + 30.0
         shown = ""
-        for line in process.stdout:
-            shown += line
-            if "Stand: hold" in shown:  # the script's press on the kickstand
-                return
-        pytest.fail(f"the display never asked to hold still: {shown}")
+        while "Stand: hold" not in shown:  # the script's press on the kickstand
+            text = emulating.said.get()
+            assert text is not None, f"the display never asked to hold still: {shown}"
+            shown += text
     finally:
-        process.kill()
-        process.wait()
-        if process.stdout:
-            process.stdout.close()
+        emulating.end_s = 0.0
+        emulating.join()
 
 
-class Flashing:
-    """`kickstand flash` to this emulated Pico, in a process of its own."""
-
-    def __init__(self, device, directory):
-        from kickstand_tools.emulator.console_server import ConsoleServer
-
-        self.device = device
-        self.server = ConsoleServer(device.console, 0)
-        device.heard = self.server.say
-        port = f"socket://127.0.0.1:{self.server.port}"
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "kickstand_tools.cli", "flash", "--port", port],
-            cwd=directory,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.process.kill()
-        self.process.communicate()
-        self.server.close()
-
-    def finish(self):
-        """Until the board has been reset, or has lost its power; when that was."""
-        resets = self.device.chip.resets
-        while self.process.poll() is None and self.device.chip.resets == resets and self.device.powered:
-            self.device.run(0.02, self.server.poll)
-        return self.device.time_s - 0.02
+def flash(device):
+    """What `kickstand flash` onto this Pico says. The Pico is just about to be reset, or has lost its power."""
+    device.run(0.3)  # until its USB port is there
+    with pytest.MonkeyPatch.context() as patch:
+        emulated_port.plug_in(patch, device)
+        patch.setattr(connection, "_RESTART_S", 0)
+        return command.run("flash", "--port", emulated_port.NAME)
 
 
-def test_the_first_lean_stands_there_soon(tmp_path):
+def test_the_first_lean_stands_there_soon():
     """`kickstand flash` onto a board with an older version and a calibration: within 1.5 s of its reset."""
     wanted = firmware_files.contents(bytecode.PICO)
     formula = "/kickstand/lean/formula"
     older = wanted | {formula + ".mpy": b"old", formula + ".py": b"old"} | calibrated()
     with pico(leaning(20.0), older) as device:
-        with Flashing(device, tmp_path) as flashing:
-            reset_s = flashing.finish()
-            assert device.chip.resets == 1
-            device.run_until(lambda: shown_lean(device.lcd()) == 20.0, 2.0)
-            assert device.time_s - reset_s < 1.5
-            assert "copied 2 files" in flashing.process.communicate(timeout=20)[0]
+        assert "copied 2 files" in flash(device).out
+        device.run_until(lambda: device.chip.resets == 1, 0.5, 0.001)
+        reset_s = device.time_s
+        device.run_until(lambda: shown_lean(device.lcd()) == 20.0, 2.0)
+        assert device.time_s - reset_s < 1.5
         assert device.files() == {path.lstrip("/"): data for path, data in (wanted | calibrated()).items()}
 
 
@@ -97,16 +101,15 @@ def test_the_first_lean_stands_there_soon(tmp_path):
 FLAT = "__init__ alignment app calibration driving errors lean lean_filter meter rotation settings speed ui".split()
 
 
-def test_the_power_goes_while_an_older_version_is_updated(tmp_path):
+def test_the_power_goes_while_an_older_version_is_updated():
     """It starts nothing then. Flashed again it starts, and nothing of the older version is left."""
     wanted = firmware_files.contents(bytecode.PICO)
     rest = {"/" + path: data for path, data in calibrated().items()} | {"/kickstand/notes.txt": b"mine"}
     older = {f"/kickstand/{name}.mpy": b"old" * 500 for name in FLAT} | {"/main.py": b"print('old')\n", **rest}
     with pico(leaning(20.0), older) as device:
-        with Flashing(device, tmp_path) as flashing:
-            device.chip.flash.cut_power(500, 0.5)
-            flashing.finish()
-            assert not device.powered
+        device.chip.flash.cut_power(500, 0.5)
+        assert "connection lost" in flash(device).err
+        assert not device.powered
         cut = {"/" + path for path in device.files()}
         assert any("/lean/" in path for path in cut)
         assert cut <= (wanted | rest).keys()
@@ -114,9 +117,8 @@ def test_the_power_goes_while_an_older_version_is_updated(tmp_path):
         device.power_on()
         device.run(2.0)
         assert shown_lean(device.lcd()) is None
-        with Flashing(device, tmp_path) as flashing:
-            flashing.finish()
-            device.run_until(lambda: shown_lean(device.lcd()) == 20.0, 2.0)
+        assert "and verified them" in flash(device).out
+        device.run_until(lambda: shown_lean(device.lcd()) == 20.0, 2.0)
         assert device.files() == {path.lstrip("/"): data for path, data in (wanted | rest).items()}
 
 

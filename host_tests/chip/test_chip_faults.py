@@ -109,7 +109,7 @@ def test_lcd_out_of_step_is_readable_again(device):
 
 def sensor_info(device):
     """The second line of that page while it counts gaps and starts; back to the lean after it."""
-    for press_s, after_s in ((1.0, 0.3), (0.15, 0.4), (0.15, 0.4), (0.15, 0.4), (1.0, 0.3)):
+    for press_s, after_s in ((0.85, 0.1), (0.1, 0.2), (0.1, 0.2), (0.1, 0.2), (0.85, 0.1)):
         device.press(for_s=press_s)
         device.run(press_s + after_s)
     found = shows(device, r"\d+ gaps \d+ starts", 4.5)[0]

@@ -51,7 +51,7 @@ def test_the_same_log_gives_the_same_lean(tmp_path):
     world = PART.world(Ride([accelerate(15.0, 1.0), turn(-30.0, 1.0, 0.5)]).motion)
     offsets = [-o / s for o, s in zip(PART.accel_offset_g, PART.accel_scale, strict=True)]
     slopes = [1.0 / s for s in PART.accel_scale]
-    calibration = (*offsets, *slopes, *PART.gyro_bias_dps, *PART.vehicle_from_sensor, 0.0)
+    calibration = (*offsets, *slopes, *PART.gyro_bias_dps, *PART.vehicle_from_sensor, 0.0, 0.0048)
     records = struct.pack(replay_engine.CALIBRATION, *calibration)
     for i in range(300):
         fx, fy, fz, wx, wy, wz, temperature = world(i / 100)

@@ -2,17 +2,14 @@
 
 import ast
 import binascii
-import os
 import re
 import signal
-import subprocess
-import sys
-import time
 from itertools import pairwise
 
 import command
+import emulated_port
 import pytest
-from emulated import PART, calibrated, modules, pico
+from emulated import PART, calibrated, firmware, modules, pico
 from kickstand_tools.calibration.file import read_calibration
 from kickstand_tools.logs.reader import read_blocks, read_log
 from kickstand_tools.replay import replay_engine
@@ -65,6 +62,7 @@ class Settings:
     SD_SPI = None
 class Chip:
     who_am_i, accel_range_g, accel_lsb_per_g, gyro_lsb_per_dps = 0x68, 8, 4096, 65.5
+    gyro_delay_s = 0.0048
     counts = [0] * 7
     def temperature_c(self, counts):
         return 25.0
@@ -171,7 +169,7 @@ _SDCARD = b"""
 import os
 class SDCard:
     blocks = {}
-    def __init__(self, spi, cs):
+    def __init__(self, spi, cs, baudrate=1_320_000):
         if not self.blocks:
             os.VfsFat.mkfs(self)
     def readblocks(self, n, buf, offset=0):
@@ -203,54 +201,29 @@ def test_rides_go_to_an_sd_card_where_config_names_one():
     assert (len(blocks), problems) == (3, [])
 
 
-# A Pico with the firmware and a config.py, its console a socket, in a process of its own
-_SERVE = """
-from emulated import calibrated, firmware, pico, PART
-from kickstand_tools.emulator.console_server import ConsoleServer
-from test_chip_recorder import RIDE
-device = pico(PART.world(RIDE.motion), firmware() | calibrated() | {"config.py": b"RECORD = True\\n"})
-server = ConsoleServer(device.console, 0)
-device.heard = server.say
-device.power_on()
-device.run(4.5)
-print(server.port, flush=True)
-while True:
-    device.run(0.02, server.poll)
-"""
-
-
-def test_pull_and_record_through_mpremote(tmp_path):
+def test_pull_and_record_through_mpremote(tmp_path, monkeypatch):
     """A ride that is being recorded is ended and pulled; then a log is streamed. Both replay."""
-    pico()  # or skip
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(sys.path)}
-    process = subprocess.Popen([sys.executable, "-c", _SERVE], stdout=subprocess.PIPE, text=True, env=environment)
-    try:
-        assert process.stdout is not None
-        port = f"socket://127.0.0.1:{process.stdout.readline().strip()}"
-        result = command.works("pull", "--port", port, "--out", tmp_path, "--delete")
+    with pico(PART.world(RIDE.motion), firmware() | calibrated() | {"config.py": b"RECORD = True\n"}) as device:
+        ends = []  # when Ctrl-C is pressed here, seconds
+
+        def ctrl_c():
+            if ends and device.time_s > ends[0]:
+                ends.clear()
+                signal.raise_signal(signal.SIGINT)
+
+        emulated_port.plug_in(monkeypatch, device, ctrl_c)
+        device.run(4.5)
+        result = command.works("pull", "--port", emulated_port.NAME, "--out", tmp_path, "--delete")
         assert result.err == ""
         assert "deleted from the board: ride 1" in result.out
         pulled = next(tmp_path.glob("ride-00001-*.csv.gz"))
         assert len(read_log(pulled).time_us) > 150
-        arguments = ["record", "--port", port, "--out", str(tmp_path / "live.csv")]
-        recording = subprocess.Popen(
-            [sys.executable, "-m", "kickstand_tools.cli", *arguments],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        assert recording.stdout is not None
-        assert recording.stdout.readline().startswith("recording from socket")
-        time.sleep(45)  # a few emulated seconds
-        recording.send_signal(signal.SIGINT)
-        out, err = recording.communicate(timeout=120)
-        assert (recording.returncode, err) == (0, "")
-        assert re.search(r"written: .*live\.csv, [\d.]+ s, \d+ readings", out)
-        for log in (pulled, tmp_path / "live.csv"):
-            cal = ride_log.calibration_path(log)
-            command.works("replay", log, "--calibration", cal, "--out", tmp_path / "lean.csv")
-    finally:
-        process.kill()
-        process.wait()
-        if process.stdout:
-            process.stdout.close()
+
+        ends.append(device.time_s + 6.0)
+        result = command.works("record", "--port", emulated_port.NAME, "--out", tmp_path / "live.csv")
+        assert result.err == ""
+        assert result.out.startswith("recording from ")
+        assert re.search(r"written: .*live\.csv, [\d.]+ s, \d+ readings", result.out)
+    for log in (pulled, tmp_path / "live.csv"):
+        cal = ride_log.calibration_path(log)
+        command.works("replay", log, "--calibration", cal, "--out", tmp_path / "lean.csv")

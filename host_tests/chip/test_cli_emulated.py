@@ -1,13 +1,12 @@
 """flash and status by mpremote against MicroPython's own image for the Pico, in an emulated RP2040."""
 
-import re
 import socket
-import subprocess
 import sys
 
 import command
+import emulated_port
 import pytest
-import serial
+from emulated import pico
 from kickstand_tools import firmware_path
 from kickstand_tools.deploy import connection
 from kickstand_tools.emulator import image
@@ -16,32 +15,12 @@ from terminal import Terminal
 
 
 @pytest.fixture
-def port():
-    """A freshly booted Pico; its console as a socket."""
-    try:
-        path = image.find()
-    except InputError as error:
-        pytest.skip(str(error))
-    process = subprocess.Popen(
-        [sys.executable, "-m", "rp2040py", "micropython", "--image", str(path), "--tcp-port", "0"],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-    )
-    try:
-        said = ""
-        assert process.stdout is not None
-        for line in process.stdout:
-            said += line
-            if found := re.search(r"listening on (\S+?:\d+)", line):
-                yield "socket://" + found[1]
-                return
-        pytest.fail(f"the emulator did not start: {said}")
-    finally:
-        process.kill()
-        process.wait()
-        assert process.stdout is not None
-        process.stdout.close()
+def device(monkeypatch):
+    """A freshly booted Pico, at emulated_port.NAME."""
+    with pico() as device:
+        emulated_port.plug_in(monkeypatch, device)
+        device.run(0.5)
+        yield device
 
 
 @pytest.mark.chip
@@ -55,11 +34,11 @@ def test_emulate_in_a_terminal():
     with socket.create_server(("127.0.0.1", 0)) as found:
         free = found.getsockname()[1]
     with Terminal([sys.executable, "-m", "kickstand_tools.cli", "emulate", "--port", str(free)]) as at:
-        at.wait_for("Kickstand on an emulated Pico, socket://", 60.0)
+        at.wait_for("Kickstand on an emulated Pico, socket://")
         at.press("B")
         at.wait_for("pressed")
         at.press("q")
-        assert at.process.wait(10.0) == 0
+        assert at.end() == 0
 
 
 FIRMWARE = {
@@ -73,7 +52,7 @@ FIRMWARE = {
 
 @pytest.fixture
 def firmware(tmp_path, monkeypatch):
-    """A small firmware, because an emulated Pico takes a minute for the real one."""
+    """A small firmware: copying the real one takes an emulated Pico long."""
     (tmp_path / "kickstand").mkdir()
     for name, text in FIRMWARE.items():
         (tmp_path / name).write_bytes(text.encode())
@@ -81,15 +60,16 @@ def firmware(tmp_path, monkeypatch):
     monkeypatch.setattr(firmware_path, "PACKAGE", tmp_path / "kickstand")
 
 
-def running(port):
-    """True if main.py is heard of within a minute."""
-    with serial.serial_for_url(port, timeout=60) as console:
-        return console.read_until(b"running").endswith(b"running")
+def running(device):
+    """True if main.py is heard of within two seconds."""
+    del device.said[:]
+    return device.run_until(lambda: b"running" in device.said, 2.0)
 
 
 @pytest.mark.usefixtures("firmware")
-def test_flash_and_status_on_a_pico(port):
+def test_flash_and_status_on_a_pico(device):
     """Onto a chip with an older version, an edited config and a calibration; then its app runs."""
+    port = emulated_port.NAME
     with connection.connected(port) as (board, _):
         board.fs_mkdir("/kickstand")
         board.fs_writefile("/kickstand/old_idea.py", b"pass")
@@ -104,13 +84,21 @@ def test_flash_and_status_on_a_pico(port):
     assert "copied 4 files" in result.out
     assert "1 left as they were" in result.out
 
-    assert running(port)
+    assert running(device)
     result = command.works("status", "--port", port)
     assert result.out == "all is well, right\n"
-    assert running(port)
+    assert running(device)
 
     with connection.connected(port) as (board, _):
         assert board.fs_exists("/kickstand/lean.mpy")
         assert board.fs_readfile("/config.py") == b'SIDE = "right"\n'
         assert board.fs_readfile("/kickstand_a.cal") == b"calibration"
         assert not board.fs_exists("/kickstand/old_idea.py")
+
+
+def test_a_board_that_hears_nothing_is_given_up_by_its_own_time(device, monkeypatch):
+    """Refused after two tries of ten seconds of the board's time, however long those take here."""
+    monkeypatch.setattr(device.console, "send", lambda _data: None)
+    began_s = device.time_s
+    assert "no MicroPython answers" in command.run("status", "--port", emulated_port.NAME).err
+    assert 20.0 <= device.time_s - began_s < 21.0

@@ -12,6 +12,7 @@ import fake_board
 import pytest
 import serial
 from kickstand_tools.deploy import bytecode, connection, firmware_files, ports
+from mpremote import transport_serial
 from serial.tools import list_ports
 
 PICO = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
@@ -57,7 +58,7 @@ def test_an_empty_board_gets_everything_and_starts(board):
     assert board.written[-1] == "/main.py"  # cut off half-way, an old main.py never meets new parts of itself
     assert (board.resets, board.closed) == (1, True)
     assert f"copied {len(wanted())} files" in result.out
-    assert "Imagined board with RP2040, MicroPython 1.26.1 on /dev/ttyACM0" in result.out
+    assert "Imagined Pico with RP2040, MicroPython 1.26.1 on /dev/ttyACM0" in result.out
     assert result.err == ""
 
 
@@ -263,6 +264,26 @@ def test_a_named_port_is_taken_as_it_is(board, monkeypatch):
 )
 def test_a_port_that_is_not_there(tmp_path, port, words):
     command.refused(tmp_path, "flash", "--port", port, words=words)
+
+
+@pytest.mark.parametrize(("port", "limit_s"), [("/dev/ttyACM0", 10), ("socket://127.0.0.1:2040", 120)])
+def test_an_emulated_board_is_given_longer_to_answer(port, limit_s, tmp_path, monkeypatch):
+    """Twice, because a board may be starting."""
+    waited_s = [0.0]
+
+    def sleep(seconds):
+        waited_s[0] += seconds
+
+    def open_port(_name, timeout, **_options):
+        assert timeout == limit_s
+        silent = fake_board.Serial()
+        return types.SimpleNamespace(inWaiting=silent.inWaiting, write=silent.write, close=list, isOpen=lambda: True)
+
+    monkeypatch.setattr(transport_serial.serial, "serial_for_url", open_port)
+    clock = types.SimpleNamespace(monotonic=lambda: waited_s[0], sleep=sleep)
+    monkeypatch.setattr(transport_serial, "time", clock)
+    command.refused(tmp_path, "status", "--port", port, words=f"no MicroPython answers on {port}")
+    assert waited_s[0] == pytest.approx(2 * limit_s, abs=0.1)
 
 
 @pytest.mark.skipif(os.name == "nt", reason="pseudo-terminals are of Unix")

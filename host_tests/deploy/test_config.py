@@ -11,6 +11,7 @@ import mpy
 import pytest
 from kickstand_tools import firmware_path
 from kickstand_tools.deploy import connection
+from kickstand_tools.simulated_board.fakes import chips
 from serial.tools import list_ports
 
 
@@ -55,6 +56,11 @@ SLIPS = {
     "no string": ("# one\n\nSIDE = right\n", 3, "NameError: name 'right' is not defined"),
     "value": ('# one\nSIDE = "rigth"\n', 2, "SIDE = 'rigth', but it must be one of 'left', 'right'"),
     "name": ('SIDDE = "right"\n', 1, "SIDDE is not a setting"),
+    "low-pass": (
+        "# one\nSAMPLE_HZ = 50\nDLPF = 3\n",
+        3,
+        "DLPF = 3 lets vibration alias at SAMPLE_HZ = 50: set DLPF = 4 or higher",
+    ),
     "capitals": ('Side = "right"\n', 1, "Side is not a setting"),
     "no line of its own": ("BUTTON_PIN = 4\n", None, "a pin is used twice"),
 }
@@ -82,11 +88,35 @@ def test_a_config_that_stays_at_home_is_not_judged(board, config):
     assert "config.py is" not in result.out
 
 
-@pytest.mark.parametrize(("platform", "status"), [("rp2", 2), ("esp32", 0)])
-def test_it_is_judged_for_the_board_s_port(platform, status, board, config):
-    board.modules["sys"].platform = platform
+def pose(board, machine):
+    """Be this board. machine: in chips.MACHINES."""
+    system = board.modules["sys"]
+    system.implementation._machine = chips.MACHINES[machine]
+    system.platform = "esp32" if "ESP32" in chips.MACHINES[machine] else "rp2"
+
+
+@pytest.mark.parametrize(("machine", "status"), [("pico", 2), ("pico 2", 2), ("esp32", 0)])
+def test_it_is_judged_for_the_board(machine, status, board, config):
+    pose(board, machine)
     config.write_text("BUTTON_PIN = 4\n")  # on a Pico the sensor's SDA
     assert command.run("flash", "--config").status == status
+
+
+@pytest.mark.parametrize("machine", ["s2", "s3", "c3", "c6", "h2", "lora32", "xiao rp2040"])
+def test_a_board_without_usual_pins_needs_them_named(machine, board, config):
+    pose(board, machine)
+    names = "BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL"
+    words = f"{config}: no usual pins are known for this board ({chips.MACHINES[machine]}): set {names}: mend it"
+    command.refused(board.root, "flash", "--config", words=words)
+    config.write_text("\n".join(f"{name} = {number}" for number, name in enumerate(names.split(", "))) + "\n")
+    command.works("flash", "--config")
+
+
+def test_a_pin_of_the_chip_s_own_usb_is_refused(board, config):
+    pose(board, "s3")
+    config.write_text("BUTTON_PIN = 4\nSENSOR_SDA = 8\nSENSOR_SCL = 9\nLCD_SDA = 18\nLCD_SCL = 19\n")
+    words = f"{config}, line 5: LCD_SCL = 19, but it must be a number from 0 to 48, no pin of"
+    command.refused(board.root, "flash", "--config", words=words)
 
 
 _LOAD = """

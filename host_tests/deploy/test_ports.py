@@ -115,9 +115,8 @@ def test_only_port_py_knows_the_port():
 
 def test_a_device_on_an_esp32(tmp_path):
     """Its pins, and its number for a device that does not answer, which is not the Pico's."""
-    pins = {"SENSOR_SDA": 21, "SENSOR_SCL": 22, "LCD_SDA": 18, "LCD_SCL": 19, "BUTTON_PIN": 4}
     faults = [["unplug_sensor", [2.0, 1.0]], ["unplug_lcd", [4.0, 0.5]]]
-    plan = {"lean": [[0, 25]], "board": {"port": "esp32"}, "config": pins, "faults": faults, "until": 6}
+    plan = {"lean": [[0, 25]], "board": {"machine": "esp32"}, "faults": faults, "until": 6}
     record = devices.run("cpython", tmp_path, plan)
     assert record.at(1.9)[0].startswith("Raw   25°")
     assert record.first("No sensor", 2.0) < 2.5
@@ -127,10 +126,8 @@ def test_a_device_on_an_esp32(tmp_path):
 
 
 _SD_SPI = """
-import sys
 from kickstand_tools.simulated_board.simulator import Board
-Board(lambda t_s: (0, 0, 1, 0, 0, 0), port=PORT).install()
-sys.platform = PORT
+Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=MACHINE).install()
 from kickstand.errors import SettingsError
 from kickstand.settings import Settings
 taken = []
@@ -145,9 +142,9 @@ print(taken)
 """
 
 
-@pytest.mark.parametrize(("port", "taken"), [("rp2", [0, 1]), ("esp32", [2, 3])])
-def test_an_sd_card_is_on_an_spi_of_the_port(port, taken):
+@pytest.mark.parametrize(("machine", "taken"), [("pico", [0, 1]), ("esp32", [2, 3])])
+def test_an_sd_card_is_on_an_spi_of_the_port(machine, taken):
     """On an ESP32 the number is a slot of machine.SDCard, of which 0 and 1 are not SPI but the chip's SDMMC host."""
-    script = _SD_SPI.replace("PORT", repr(port))
+    script = _SD_SPI.replace("MACHINE", repr(machine))
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
     assert (done.stdout.strip(), done.stderr) == (str(taken), "")

@@ -13,6 +13,7 @@ CHIP = types.SimpleNamespace(
     accel_range_g=8,
     accel_lsb_per_g=4096,
     gyro_lsb_per_dps=65.5,
+    gyro_delay_s=0.0134,
     counts=[0] * 7,
     temperature_c=lambda _counts: 31.25,
 )

@@ -129,6 +129,20 @@ def test_a_ride_whose_beginning_is_gone(board, tmp_path):
     assert 0.0 <= read_log(logs(tmp_path)[0]).start_s < 1.0
 
 
+def test_readings_that_are_missing_in_a_ride_are_told(board, tmp_path, monkeypatch):
+    turns = ride_writer.turns
+
+    def with_gaps(count, seed=0):
+        for i, (sums, n, dt_us) in enumerate(turns(count, seed)):
+            yield sums, n, dt_us + (400_000 if i in (50, 90) else 9_000 if i == 70 else 0)
+
+    monkeypatch.setattr(ride_writer, "turns", with_gaps)
+    put(board, "000/01/00000.rid", ride_writer.blocks(1)[0])
+    result = command.works("pull", "--out", tmp_path)
+    assert "ride 1: readings are missing 2 times, 0.8 s in all: the sensor was set up again, or" in result.err
+    assert result.err.count("\n") == 1
+
+
 def test_a_board_without_rides_or_without_the_recorder(board, tmp_path):
     assert "no rides on the board" in command.works("pull", "--out", tmp_path / "out").out
     del board.modules["kickstand.rides"]  # as in 0.2.0, whose modules are all in one folder

@@ -14,16 +14,34 @@ import command
 import fake_board
 import pytest
 import ride_writer
-from kickstand_tools.deploy import connection
+from kickstand_tools.deploy import board_console, connection
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.rides import record
 from serial.tools import list_ports
 from watched import Watched, watched
 
 
+class Clocks:
+    """`time` of a computer on which only waiting takes time, and that may sleep: its monotonic clock stands then."""
+
+    waited_s = asleep_s = 0.0
+
+    @classmethod
+    def monotonic(cls):
+        return cls.waited_s
+
+    @classmethod
+    def time(cls):
+        return cls.waited_s + cls.asleep_s
+
+    @classmethod
+    def sleep(cls, seconds):
+        cls.waited_s += seconds
+
+
 class Stream(fake_board.Serial):
     """A serial port: what the board says, and what it does then. At the end: "ctrl-c" or another signal, "error",
-    "unplug", "silence"."""
+    "unplug", "silence", "asleep"."""
 
     def __init__(self, blocks, end, last=b""):
         super().__init__()
@@ -35,11 +53,13 @@ class Stream(fake_board.Serial):
         if not self.data and self.end:
             end, self.end = self.end, None
             if end == "ctrl-c":
-                os.kill(os.getpid(), signal.SIGINT)
+                signal.raise_signal(signal.SIGINT)
             elif isinstance(end, signal.Signals):
-                os.kill(os.getpid(), end)
+                signal.raise_signal(end)
             elif end == "error":
                 self.data = b"\x04Traceback (most recent call last):\r\nValueError: bad pin\r\n\x04>"
+            elif end == "asleep":
+                Clocks.asleep_s += 300
             elif end == "unplug":
                 raise OSError(5, "Input/output error")
         return len(self.data)
@@ -65,7 +85,9 @@ def _said(block):
 
 @pytest.fixture
 def streaming(tmp_path, monkeypatch):
-    """streaming(blocks, end): a board that streams them."""
+    """streaming(blocks, end): a board that streams them. Only waiting for it takes time."""
+    monkeypatch.setattr(Clocks, "waited_s", 0.0)
+    monkeypatch.setattr(Clocks, "asleep_s", 0.0)
 
     def fit(blocks, end, last=b""):
         board = Streaming(tmp_path)
@@ -74,7 +96,7 @@ def streaming(tmp_path, monkeypatch):
         monkeypatch.setattr(list_ports, "comports", lambda: [pico])
         monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: board)
         monkeypatch.setattr(connection, "_RESTART_S", 0)
-        monkeypatch.setattr(record, "_SILENT_S", 0.2)
+        monkeypatch.setattr(board_console, "time", Clocks)
         return board
 
     return fit
@@ -84,29 +106,33 @@ def half_seconds(count):
     return ride_writer.blocks(count, length=lambda _: 512)
 
 
-def test_ctrl_c_ends_a_whole_log(streaming, tmp_path):
+@pytest.fixture
+def signals():
+    """Whatever a test leaves of them is put right; by default these would end pytest itself."""
+    numbers = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    before = [signal.signal(number, lambda *_: None) for number in numbers]
+    yield
+    for number, handler in zip(numbers, before):
+        signal.signal(number, handler)
+
+
+@pytest.mark.parametrize("before", [signal.default_int_handler, signal.SIG_IGN], ids=["shell", "background"])
+@pytest.mark.usefixtures("signals")
+def test_ctrl_c_ends_a_whole_log(before, streaming, tmp_path):
+    """Also where a shell has started it with the signal ignored; it is left as it was found."""
+    signal.signal(signal.SIGINT, before)
     data, turns = half_seconds(9)
     board = streaming(data[:-1], "ctrl-c", _said(data[-1]))
     result = command.works("record", "--out", tmp_path / "ride.csv")
     assert result.err == ""
-    assert board.serial.written == b"\x03"
+    assert board.serial.written == b"\x03\x01"
     assert board.resets == 1
     log = read_log(tmp_path / "ride.csv")
     assert len(log.time_us) == len(turns)  # what the board said after Ctrl-C is in it
     assert log.time_us[-1] == sum(dt for _, _, dt in turns) - turns[0][2]
     cal = json.loads((tmp_path / "ride.cal.json").read_text())
     assert cal["accel_slope"] == pytest.approx([1.01, 0.99, 1.0])
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
-
-
-@pytest.fixture
-def signals():
-    """Whatever a failing test leaves of them is put right; by default these two would end pytest itself."""
-    numbers = [signal.SIGTERM, signal.SIGHUP]
-    before = [signal.signal(number, lambda *_: None) for number in numbers]
-    yield
-    for number, handler in zip(numbers, before):
-        signal.signal(number, handler)
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 @pytest.mark.skipif(os.name == "nt", reason="signals are of Unix")
@@ -117,7 +143,7 @@ def test_kill_and_a_closed_terminal_end_it_as_ctrl_c_does(name, streaming, tmp_p
     board = streaming(data, signal.Signals[name])
     result = command.works("record", "--out", tmp_path / "ride.csv")
     assert result.err == ""
-    assert board.serial.written == b"\x03"
+    assert board.serial.written == b"\x03\x01"
     assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
     assert sorted(command.snapshot(tmp_path)) == [str(tmp_path / name) for name in ("ride.cal.json", "ride.csv")]
 
@@ -204,6 +230,18 @@ def test_what_came_until_the_stream_broke_off_is_kept(end, words, streaming, tmp
     assert result.err.count("\n") == 1
     assert words in result.err
     assert len(gzip.decompress((tmp_path / "ride.csv.gz").read_bytes()).splitlines()) == len(turns) + 1
+
+
+def test_a_computer_that_slept_is_told(streaming, tmp_path, monkeypatch):
+    """The board has stopped streaming by itself. That is not waited for as long as a sensor that is off."""
+    monkeypatch.setattr(board_console, "_AWAY_SILENT_S", 0.1)
+    data, turns = half_seconds(3)
+    streaming(data, "asleep")
+    monkeypatch.setattr(record, "_SILENT_S", 60.0)
+    result = command.works("record", "--out", tmp_path / "ride.csv")
+    assert "this computer took nothing for 300 s: keep it awake: what came until then is kept" in result.err
+    assert result.err.count("\n") == 1
+    assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
 
 
 def test_a_block_that_came_over_damaged_leaves_a_gap(streaming, tmp_path):

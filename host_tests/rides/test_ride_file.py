@@ -2,16 +2,22 @@
 
 import ast
 import json
+import struct
 import subprocess
+from binascii import crc32
+from dataclasses import replace
 from pathlib import Path
 
 import engines
+import numpy as np
 import pytest
 import ride_writer
 from kickstand import __version__
 from kickstand.rides import block as block_format
 from kickstand_tools import unix_port
-from kickstand_tools.rides import block_reader
+from kickstand_tools.calibration.file import read_calibration
+from kickstand_tools.replay.replay import replay
+from kickstand_tools.rides import block_reader, ride_log
 from mpy import run_mpy
 from ride_writer import CHIP
 
@@ -29,7 +35,7 @@ import json, sys
 from kickstand.rides.block import RideBlock
 class Chip:
     counts = [0] * 7
-    accel_lsb_per_g, gyro_lsb_per_dps = 4096, 65.5
+    accel_lsb_per_g, gyro_lsb_per_dps, gyro_delay_s = 4096, 65.5, 0.0134
     def temperature_c(self, counts):
         return 31.25
 block = RideBlock(5000)
@@ -111,7 +117,29 @@ def test_every_turn_comes_back_exactly(engine, tmp_path):
     assert held(block) == [(tuple(s[:3] + s[4:]), n, dt_us) for s, n, dt_us in turns]
     assert (block.ride, block.sequence, block.time_us) == (7, 3, 123456789012)
     assert (block.accel_lsb_per_g, block.gyro_lsb_tenths, block.sample_hz) == (4096, 655, 200)
-    assert (block.centidegrees, block.firmware) == (3125, __version__)
+    assert (block.centidegrees, block.firmware, block.delay_tenths_ms) == (3125, __version__, 134)
+
+
+def test_a_ride_of_version_0_3_0_has_no_delay(tmp_path):
+    """There the byte was the last of twelve of the firmware's version, and always 0."""
+    data = bytearray(ride_writer.blocks(1)[0][0])
+    data[43] = 0
+    data[-4:] = struct.pack("<I", crc32(data[:-4]))
+    block = block_reader.parse(bytes(data))
+    assert (block.firmware, block.delay_tenths_ms) == (__version__, 0)
+    cal = read_calibration(ride_log.write(tmp_path / "ride.csv", [block]))
+    assert (cal.gyro_delay_s, cal.delay_s()) == (None, 0.0048)
+
+
+def test_a_replay_takes_off_the_delay_of_the_ride(tmp_path):
+    cal = read_calibration(ride_log.write(tmp_path / "ride.csv", [block_reader.parse(ride_writer.blocks(1)[0][0])]))
+    assert cal.gyro_delay_s == 0.0134  # DLPF 5
+    late, early = (replay(tmp_path / "ride.csv", replace(cal, gyro_delay_s=delay_s)) for delay_s in (None, 0.0134))
+    ahead = early.lean_deg - late.lean_deg
+    assert np.abs(ahead - (0.0134 - 0.0048) * early.roll_rate_dps)[200:].max() < 0.02
+    assert np.abs(ahead).max() > 0.02
+    again = replay(tmp_path / "ride.csv", cal, engine="micropython")
+    assert np.abs(again.lean_deg - early.lean_deg).max() < 0.01
 
 
 def test_machine_code_codes_as_python_does():

@@ -310,7 +310,7 @@ def test_a_speed_source_without_a_sensor_fills_no_block(recorder, flash):
     ("driver", "words", "lcd"),
     [
         (None, "its driver is not on the board: mpremote mip install sdcard", ("SD card:", "no driver")),
-        (OSError("no SD card"), "none that can be read", ("No SD card", "check card")),
+        (OSError("no SD card"), "none that can be used", ("No SD card", "check, restart")),
     ],
 )
 def test_a_card_that_cannot_be_used_is_said_in_one_line(driver, words, lcd, recorder, monkeypatch):

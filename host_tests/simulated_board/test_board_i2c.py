@@ -99,6 +99,83 @@ def test_nobody_home():
     check(lambda board: firmware(board, 21, 22, errno.ENODEV), sensor_address=None, port="esp32")
 
 
+def transfer_us(board, i2c, count, error_number):
+    """How long a burst of count bytes takes; it must end with this error, None for none."""
+    start = board.clock.now_us
+    error = raised(i2c.readfrom_mem_into, 0x68, 0x3B, bytearray(count))
+    assert (error.args[0] if error else None) == error_number, error
+    return board.clock.now_us - start
+
+
+def test_the_new_driver_of_an_esp32_counts_ticks_of_10_ms():
+    def firmware(board):
+        for timeout, ticks in ((5000, 0), (9999, 0), (10_000, 1), (20_000, 2)):
+            i2c = I2C(0, sda=Pin(21), scl=Pin(22), timeout=timeout)
+            assert transfer_us(board, i2c, 14, None if ticks else errno.ENODEV) == (390 if ticks else 0)
+            board.faults.timeout(0x68)
+            assert transfer_us(board, i2c, 112, errno.ENODEV) // 10_000 == ticks
+            board.sensor_bus.faults.clear()
+
+    check(firmware, machine="esp32", i2c_driver="new")
+
+
+def test_the_legacy_driver_of_an_esp32_waits_longer_than_a_watchdog():
+    def firmware(board):
+        i2c = I2C(0, sda=Pin(21), scl=Pin(22), timeout=5000)
+        assert transfer_us(board, i2c, 14, None) == 390
+        board.faults.timeout(0x68)
+        assert transfer_us(board, i2c, 112, errno.ETIMEDOUT) // 100_000 == 114
+
+    check(firmware, until_s=20.0, machine="esp32", i2c_driver="legacy")
+
+
+def test_soft_i2c_keeps_its_time_out():
+    def firmware(board):
+        i2c = SoftI2C(sda=Pin(21), scl=Pin(22), timeout=5000)
+        board.faults.timeout(0x68)
+        assert transfer_us(board, i2c, 112, errno.ETIMEDOUT) // 1000 == 5
+
+    for driver in ("legacy", "new"):
+        check(firmware, machine="esp32", i2c_driver=driver)
+
+
+def test_soft_i2c_does_not_notice_that_sda_is_held():
+    """Its clocks free the device; one that holds on reads as zeros."""
+
+    def firmware(board):
+        i2c = SoftI2C(sda=Pin(21), scl=Pin(22))
+        for bits, freed in ((1, True), (8, True), (60, False)):
+            board.sensor_bus.hang(bits)
+            data = bytearray(b"\xff")
+            error = raised(i2c.readfrom_mem_into, 0x68, 0x75, data)
+            assert (error is not None) == freed, bits
+            if not freed:
+                assert data == b"\x00"
+        while board.sensor_bus.stuck():
+            raised(i2c.readfrom_mem_into, 0x68, 0x75, data)
+        assert i2c.readfrom_mem(0x68, 0x75, 1) == b"\x68"
+
+    check(firmware, machine="esp32")
+
+
+def test_boards_have_their_pins_and_controllers():
+    def firmware(machine, missing, controllers):
+        for number in missing:
+            assert isinstance(raised(Pin, number), ValueError), number
+        for number in range(3):
+            error = raised(I2C, number, Pin(5), Pin(4))
+            assert (error is None) == (number < controllers), number
+
+    for machine, missing, controllers in (
+        ("esp32", (6, 20, 24, 40), 2),
+        ("s3", (22, 25, 26, 49), 2),
+        ("c3", (12, 17, 22), 1),
+        ("c6", (24,), 1),
+        ("h2", (6, 15, 28), 2),
+    ):
+        check(lambda board: firmware(machine, missing, controllers), machine=machine)  # noqa: B023 called at once
+
+
 def test_rp2_controllers_have_their_pins():
     def firmware(board):
         for number, sda, scl in ((0, 6, 7), (1, 4, 5), (0, 5, 4), (0, 4, 7)):

@@ -9,6 +9,7 @@ import json
 import math
 import sys
 
+import cards
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted import script, sensor_errors
 
@@ -56,6 +57,12 @@ def remounted(world, motion, seed, at_s, mounting_seed):
     return lambda t_s: world(t_s) if t_s < at_s else later(t_s)
 
 
+def take_firmware():
+    """Forget the firmware's modules that are imported, and return them by name."""
+    names = [name for name in sys.modules if name.split(".")[0] == "kickstand"]
+    return {name: sys.modules.pop(name) for name in names}
+
+
 def run_device(plan):
     """Run a plan. Returns the display's frames [[t_s, line1, line2], ...] as they changed, the last of them, and how
     each boot ended.
@@ -64,7 +71,9 @@ def run_device(plan):
     or "poses" as for poses_of; "seed" of the part (None: perfect); its "temp_c"; "presses" [[at_s, for_s], ...];
     "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...];
     "gps" or "wheel" arguments of the models, which are told the speed of the ride; config "VEHICLE" "car": the ride
-    is a car's; "remount" [at_s, seed of the mounting from then on].
+    is a car's; "remount" [at_s, seed of the mounting from then on]; "stream" True: as `kickstand record` starts it;
+    "card" arguments of the model of an SD card, which is formatted, and whose content is returned as "rides"; "card
+    faults" [[at_s, attribute, value], ...].
     """
     seed = plan.get("seed")
     ride = None
@@ -86,6 +95,9 @@ def run_device(plan):
     for source in ("gps", "wheel"):
         if ride and source in plan:
             getattr(board, "fit_" + source)(lambda t_s, ride=ride: ride.truth(t_s)[1], **plan[source])
+    if "card" in plan:
+        board.fit_card(**plan["card"])
+        cards.format_card(board, plan)
     for at_s, for_s in plan.get("presses", []):
         board.press(at_s, for_s)
     for method, arguments in plan.get("faults", []):
@@ -100,8 +112,11 @@ def run_device(plan):
     board.every(FRAME_S, watch)
     board.install()
     ends = []
+    before = take_firmware() if board.poses else {}  # it needs firmware that is imported on it
     try:
-        from kickstand import settings, start
+        from kickstand import devices, settings, start
+        from kickstand.app import App
+        from kickstand.rides.usb_stream import RideStream
         from kickstand.settings import Settings
 
         class Config:
@@ -109,17 +124,38 @@ def run_device(plan):
 
         for name, value in plan.get("config", {}).items():
             setattr(Config, name, tuple(value) if isinstance(value, list) else value)
+        def stream():
+            chosen = settings.load()
+            App(chosen, devices.open_lcd(chosen), RideStream()).run()
+
+        main = stream if "stream" in plan else start.main
         load = settings.load
         settings.load = lambda: Settings(Config)
         for until_s in plan.get("power", []) + [plan["until"]]:
             end = "reset"
             while end == "reset":
-                end = board.run(start.main, until_s)
+                cards.eject()
+                end = board.run(main, until_s)
                 ends.append(end)
         settings.load = load
+        if ends[-1] == "returned":  # what it leaves on the display
+            watch()
     finally:
         board.uninstall()
-    return {"frames": frames, "ends": ends, "last": frames[-1][1:], "too_fast": board.too_fast}
+        if board.poses:
+            take_firmware()
+            sys.modules.update(before)
+    answer = {
+        "frames": frames,
+        "ends": ends,
+        "last": frames[-1][1:],
+        "too_fast": board.too_fast,
+        "touched": sorted(board.touched),
+    }
+    if board.card:
+        answer["rides"] = cards.rides(board)
+        answer["card_hz"] = board.card.most_hz
+    return answer
 
 
 if __name__ == "__main__":

@@ -35,6 +35,9 @@ class Record:
         self.ends = answer["ends"]
         self.last = tuple(answer["last"])
         self.too_fast = answer["too_fast"]
+        self.touched = answer["touched"]
+        self.rides = answer.get("rides")  # on the SD card: {path: content}
+        self.card_hz = answer.get("card_hz")
         self.console = console
 
     def at(self, t_s):

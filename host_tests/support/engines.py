@@ -33,7 +33,7 @@ def run(engine, calls):
         capture_output=True,
         text=True,
         env=unix_port.environment(),
-        timeout=120,
+        timeout=300,
     )
     assert done.returncode == 0, done.stderr + done.stdout
     return json.loads(done.stdout)

@@ -169,7 +169,7 @@ class _Writer:
 
 
 def _implementation(name: str, mpy: int) -> types.SimpleNamespace:
-    return types.SimpleNamespace(name=name, version=(1, 26, 1, ""), _machine="Imagined board with RP2040", _mpy=mpy)
+    return types.SimpleNamespace(name=name, version=(1, 26, 1, ""), _machine="Imagined Pico with RP2040", _mpy=mpy)
 
 
 def files(root: Path) -> dict[str, bytes]:

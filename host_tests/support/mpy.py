@@ -10,7 +10,7 @@ from kickstand_tools import unix_port
 HERE = Path(__file__).resolve().parent
 
 
-def run_mpy(script: str | Path, *args: str, timeout_s: float = 300) -> str:
+def run_mpy(script: str | Path, *args: str, timeout_s: float = 300, heap: str = "64M") -> str:
     """Standard output of a script (text, or Path). Skips without MicroPython; AssertionError if it fails."""
     if not unix_port.available():
         pytest.skip("no MicroPython unix port for this system")
@@ -23,7 +23,7 @@ def run_mpy(script: str | Path, *args: str, timeout_s: float = 300) -> str:
         else:
             file = script.resolve()
         done = subprocess.run(
-            unix_port.command("-X", "heapsize=64M", str(file), *args),
+            unix_port.command("-X", f"heapsize={heap}", str(file), *args),
             env=environment,
             cwd=scratch,
             capture_output=True,

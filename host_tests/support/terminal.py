@@ -2,8 +2,12 @@
 
 import contextlib
 import os
+import re
 import subprocess
 import time
+
+SILENT_S = 120.0
+DRAWN = 4_000_000  # characters: more than a minute of a screen that is drawn all the time
 
 
 class Terminal:
@@ -28,15 +32,37 @@ class Terminal:
             self.process.wait()
         os.close(self._master)
 
-    def wait_for(self, text: str, limit_s: float = 30.0) -> None:
-        """Wait until the text appears, and drop the output up to then. Fails after limit_s."""
-        began = time.monotonic()
-        while text not in self._seen:
-            assert time.monotonic() - began < limit_s, f"{text!r} never came: {self._seen[-3000:]}"
+    def wait_for(self, pattern: str) -> re.Match:
+        """Wait until a text that matches appears; drop the output up to then and return the match.
+
+        What limits it is what is drawn, not the time, which depends on how busy the machine is. Only one that has
+        drawn nothing for SILENT_S is taken for dead.
+        """
+        drawn, heard_s = 0, time.monotonic()
+        while not (found := re.search(pattern, self._seen)):
+            piece = self._read()
+            drawn += len(piece)
+            heard_s = time.monotonic() if piece else heard_s
+            self._seen += piece
+            why = f"{pattern!r} never came: {self._seen[-3000:]}"
+            assert drawn < DRAWN and time.monotonic() - heard_s < SILENT_S, why
             time.sleep(0.05)
-            with contextlib.suppress(OSError):  # nothing is there, or it has ended
-                self._seen += os.read(self._master, 1 << 20).decode(errors="replace")
         self._seen = ""
+        return found
+
+    def end(self) -> int:
+        """Its exit status; what it still draws is read, so that it can end."""
+        heard_s = time.monotonic()
+        while self.process.poll() is None:
+            self._read()
+            assert time.monotonic() - heard_s < SILENT_S, "it does not end"
+            time.sleep(0.05)
+        return self.process.returncode
+
+    def _read(self) -> str:
+        with contextlib.suppress(OSError):  # nothing is there, or it has ended
+            return os.read(self._master, 1 << 20).decode(errors="replace")
+        return ""
 
     def press(self, keys: str) -> None:
         """Send keys."""

@@ -28,6 +28,7 @@ INDIRECT = {
 VALUES = {"dead-axis": ("x", 0.1), "odd-axis": ("x", 0.1, 1.0), "side-tilted": ("+x", 25.0, 20.0)}
 VALUES |= {"not-one-g": ("kickstand", 1.23), "mount-moved": ("between-stops", 12.0), "few-events": (4, 5, 12)}
 VALUES |= {"uncertain": (180.0, 12), "unknown-chip": (0x12,), "speed-unit": (99.9,)}
+VALUES |= {"no-pins": ("SENSOR_SDA", "SENSOR_SDA, SENSOR_SCL", "a board")}
 VALUES |= {"speed-late": (2.5,), "aligned": (9.9,)}
 
 
@@ -56,7 +57,7 @@ def test_each_code_has_words_for_the_display():
 
 
 # Of these the display names the setting
-OTHER_SETTINGS = {"not-allowed", "card-pins", "one-i2c", "no-such-pin", "i2c-pins", "uart-pins"}
+OTHER_SETTINGS = {"not-allowed", "card-pins", "one-i2c", "no-such-pin", "i2c-pins", "uart-pins", "aliasing"}
 
 
 def test_other_settings_are_named():

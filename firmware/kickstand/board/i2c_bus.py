@@ -2,11 +2,13 @@
 
 from time import sleep_us
 
-from machine import I2C, Pin
+from machine import Pin
+
+from . import port
 
 _HALF_PERIOD_US = 5  # of SCL while a bus is freed: 100 kHz
-# Time-out of machine.I2C in bit times. On rp2 it is that of a whole transfer, which has 112 bytes at most. The default
-# of 50 ms would stop the loop for too long.
+# Time-out in bit times. On rp2 it is that of a whole transfer, which has 112 bytes at most, on an ESP32 that of a bit.
+# The default of 50 ms would stop the loop for too long.
 _TIMEOUT_BITS = 2000
 
 
@@ -36,10 +38,10 @@ def free(sda_pin, scl_pin):
 
 
 def open_i2c(controller, sda_pin, scl_pin, frequency):
-    """Free the bus and return it as a machine.I2C. controller: its number.  Pins: GPIO numbers.  frequency: in Hz.
+    """Free the bus and return it, see port.open_i2c(). controller: its number.  Pins: GPIO numbers.  frequency: in Hz.
 
     Raises OSError if SDA stays low, ValueError for pins that the controller cannot use."""
     if not free(sda_pin, scl_pin):
         raise OSError("SDA is held low")
     timeout_us = _TIMEOUT_BITS * 1_000_000 // frequency
-    return I2C(controller, sda=Pin(sda_pin), scl=Pin(scl_pin), freq=frequency, timeout=timeout_us)
+    return port.open_i2c(controller, Pin(sda_pin), Pin(scl_pin), frequency, timeout_us)

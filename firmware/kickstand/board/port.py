@@ -1,4 +1,5 @@
-"""What differs between ESP32 and RP2: default pins, interrupts, the SD card's driver, and how a watchdog is disarmed.
+"""What differs from board to board: default pins, I2C, interrupts, the SD card's driver, how a watchdog is disarmed,
+and how the heap grows.
 
 No other module asks which board it runs on.
 """
@@ -13,22 +14,65 @@ import machine
 gc.threshold(32_768)
 
 IS_ESP32 = sys.platform == "esp32"
+# The board and then its chip, as "Raspberry Pi Pico with RP2040" or "ESP32C3 module with ESP32-C3"
+MACHINE = getattr(sys.implementation, "_machine", "")
 
 if IS_ESP32:
+    _KNOWN = MACHINE.startswith("Generic ESP32 module")  # ESP32-DevKitC and its like, of the classic chip
     SENSOR_PINS, LCD_PINS, BUTTON_PIN = (21, 22), (18, 19), 4  # (SDA, SCL)
     GPS_UART, GPS_PINS, WHEEL_PIN = 2, (17, 16), 27  # (TX, RX)
     PIN_IRQ = {}  # further arguments of Pin.irq(): this port has soft interrupts only
+    I2C_NUMBERED = False  # see open_i2c()
     SD_SPI = (2, 3)  # the slots of machine.SDCard that are SPI
-else:  # Raspberry Pi Pico and Pico 2
+    # Those of the chip's own USB: driving one of them cuts the board off from the computer until BOOT is held
+    USB_PINS = {"S2": (19, 20), "S3": (19, 20), "C3": (18, 19), "C6": (12, 13), "H2": (26, 27)}.get(
+        MACHINE.split(" with ESP32")[-1].lstrip("-")[:2], ()
+    )
+else:  # Raspberry Pi Pico and Pico 2, and boards of other makers that have its pins and its name
+    _KNOWN = sys.platform != "rp2" or "Pico" in MACHINE
     SENSOR_PINS, LCD_PINS, BUTTON_PIN = (4, 5), (6, 7), 15
     GPS_UART, GPS_PINS, WHEEL_PIN = 1, (8, 9), 14
     PIN_IRQ = {"hard": True}  # a soft interrupt is lost while the display is written to
+    I2C_NUMBERED = True  # two buses need two numbers
     SD_SPI = (0, 1)  # the numbers of machine.SPI
+    USB_PINS = ()
+if not _KNOWN:  # these pins may be missing, or belong to what else is on the board
+    SENSOR_PINS = LCD_PINS = GPS_PINS = None, None
+    BUTTON_PIN = WHEEL_PIN = None
+    GPS_UART = 1
+
+
+_SOFT_I2C_HZ = 250_000  # half a period of 2 us: at 400 kHz SoftI2C's would be 1 us, and the MPU6050 needs 1.3
+_TURN_BYTES = 2800  # of heap that a turn of the app's loop uses
+_FEWEST_TURNS = 3
 
 _WATCHDOG_MS = 8000  # rp2 allows 8388 at most
 _HOUR_MS = 3_600_000
 
 _watchdog = None
+
+
+def open_i2c(controller, sda, scl, frequency, timeout_us):
+    """A machine.I2C or SoftI2C. controller: its number, which an ESP32 does not need.  Pins: machine.Pin.
+
+    Raises ValueError for pins that the controller cannot use. An ESP32's machine.I2C is not used. Up to MicroPython
+    1.28 it waits up to 0.1 s for each byte of a transfer that stalls, whatever the time-out: longer than the watchdog.
+    Later ones count the time-out in ticks of 10 ms, so that with 5 ms every transfer fails. And a C3 has only one."""
+    if IS_ESP32:
+        return machine.SoftI2C(scl, sda, freq=min(frequency, _SOFT_I2C_HZ), timeout=timeout_us)
+    return machine.I2C(controller, sda=sda, scl=scl, freq=frequency, timeout=timeout_us)
+def turns_to_collect(most):
+    """After how many turns of the app's loop the garbage is to be collected: most, or fewer where the heap is small.
+
+    An ESP32's heap starts with 64 KB and grows only when a collection has not helped. It would be collected again and
+    again in the middle of a turn."""
+    if not IS_ESP32:
+        return most
+    import esp32  # type: ignore[import-not-found]
+
+    # mem_free() counts what the heap could grow by, the largest block of ESP-IDF's heap, as free
+    grow = max(region[2] for region in esp32.idf_heap_info(esp32.HEAP_DATA))
+    return max(_FEWEST_TURNS, min(most, (gc.mem_free() - grow) // (2 * _TURN_BYTES)))
 
 
 def start_watchdog():
@@ -63,6 +107,7 @@ def open_sd_card(number, sck, mosi, miso, cs):
 
         return SDCard(slot=number, sck=sck, mosi=mosi, miso=miso, cs=cs)
     from machine import SPI
-    from sdcard import SDCard  # type: ignore[import-not-found]
 
-    return SDCard(SPI(number, sck=sck, mosi=mosi, miso=miso), cs)
+    from .spi_card import CheckedCard
+
+    return CheckedCard(SPI(number, sck=sck, mosi=mosi, miso=miso), cs)

@@ -43,6 +43,7 @@ _FIFO_RESET = const(0x04)  # in USER_CTRL
 
 ACCEL_LSB_PER_G = {2: 16384, 4: 8192, 8: 4096, 16: 2048}  # counts per g for each range in g (p. 29)
 GYRO_LSB_PER_DPS = {250: 131.0, 500: 65.5, 1000: 32.8, 2000: 16.4}  # counts per deg/s for each range in deg/s (p. 31)
+MIN_DLPF = {50: 4, 100: 3, 125: 3, 200: 2}  # by rate_hz: passes less than half of it, 98, 44 or 21 Hz (p. 13)
 GYRO_DELAY_S = {1: 0.0019, 2: 0.0028, 3: 0.0048, 4: 0.0083, 5: 0.0134, 6: 0.0186}  # by dlpf (p. 13)
 
 # The chips known to work, by WHO_AM_I: a name of at most 12 characters; temperature counts per degree C; degrees C at 0
@@ -84,8 +85,8 @@ class Mpu6050:
 
     who_am_i: what the chip answered, 0 before setup().  counts: array('h', 7) of the last read() or take(), ax ay az
     temperature gx gy gz.  sums: array('i', 7) of the last add_up(), in the same order.  accel_lsb_per_g and
-    gyro_lsb_per_dps: counts per g and per deg/s.  overflows: how often the FIFO had to be emptied, samples lost.
-    frames_left: samples that the last fetch() left in the FIFO.
+    gyro_lsb_per_dps: counts per g and per deg/s.  gyro_delay_s: how late the low-pass makes the gyro.  overflows: how
+    often the FIFO had to be emptied, samples lost.  frames_left: samples that the last fetch() left in the FIFO.
     """
 
     SATURATED = 32700  # |counts|: from here on a reading is at the end of its range
@@ -98,6 +99,7 @@ class Mpu6050:
         self.accel_range_g = accel_range_g
         self.accel_lsb_per_g = ACCEL_LSB_PER_G[accel_range_g]
         self.gyro_lsb_per_dps = GYRO_LSB_PER_DPS[gyro_range_dps]
+        self.gyro_delay_s = GYRO_DELAY_S[dlpf]
         accel_bits = (2, 4, 8, 16).index(accel_range_g) << 3
         gyro_bits = (250, 500, 1000, 2000).index(gyro_range_dps) << 3
         # SMPLRT_DIV to ACCEL_CONFIG2, as they are written and should read back

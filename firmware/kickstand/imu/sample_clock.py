@@ -10,10 +10,11 @@ CORRECTION_SHIFT = 4  # emptied() corrects by 1/16 of the difference between the
 
 
 class SampleClock:
-    """period_us: nominal time from one sample to the next."""
+    """period_us: nominal time from one sample to the next.  lost: samples lost in overflows, since power-on."""
 
     def __init__(self, period_us):
         self._period_us = period_us
+        self.lost = 0
         self._pending_us = 0  # correction that the next step() adds
         self._sample_us = None  # when the last sample was taken, in ticks_us(); None: no sample yet
 
@@ -43,6 +44,7 @@ class SampleClock:
             return
         late_us = ticks_diff(now_us, self._sample_us) - self._period_us // 2
         if late_us > 2 * self._period_us:  # samples were lost in an overflow: the next step() spans the gap
+            self.lost += (late_us - self._pending_us) // self._period_us
             self._pending_us = late_us
         else:
             self._pending_us = late_us >> CORRECTION_SHIFT

@@ -60,6 +60,18 @@ class LeanFilter:
         self._roll_rate = 0.0
         self._last_roll_rate = 0.0
 
+    def doubt(self, seconds):
+        """The readings of so many seconds are lost: what the bike did meanwhile is not known."""
+        p = self._p
+        if p is None:
+            return
+        for _ in self._work or ():  # it changes the covariance: end it first
+            pass
+        self._work = None
+        p.add_noise(LEAN, (measurements.SIGMA_LOST_RATE * seconds) ** 2)
+        p.add_noise(PITCH, (measurements.SIGMA_LOST_RATE * seconds) ** 2 / 16)
+        p.add_noise(SPEED, (measurements.SIGMA_LOST_FORCE * seconds) ** 2)
+
     @property
     def speed_mps(self):
         """Estimated speed."""

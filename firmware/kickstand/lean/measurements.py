@@ -40,6 +40,9 @@ USUAL_SPEED = 15.0 / STANDARD_GRAVITY  # g s: where nothing tells it. Larger: le
 NOISE_ANGLE = radians(0.2)  # rad: vibration of the gyro. Larger: lean follows the forces more and the gyro less.
 NOISE_SPEED = 0.35 / STANDARD_GRAVITY  # g s. Larger: speed follows turns sooner, and is less steady on straights.
 NOISE_BIAS = radians(0.01)  # rad/s: 0.6 deg/s in five minutes of warming up. Larger: long turns are mistaken for bias.
+# Where readings are lost
+SIGMA_LOST_RATE = radians(30.0)  # rad/s: roll rate, against the one after the gap; pitch a quarter. Larger: see below.
+SIGMA_LOST_FORCE = 0.3  # g: forward. Larger, both: after a gap the lean is hidden longer, and follows the forces more.
 
 # Measurement noise while riding
 SIGMA_LEFT = 0.04  # g: of the force to the left. Larger: lean follows it less, and the gyro and level roads more.

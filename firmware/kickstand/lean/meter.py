@@ -3,7 +3,7 @@
 from math import degrees, radians
 
 from ..calibration.transform import Transform
-from ..units import GAP_US
+from ..units import GAP_US, LOST_US
 from .formula import formula_lean_deg
 from .lean_filter import DELAY_S, LeanFilter
 
@@ -137,8 +137,11 @@ class LeanMeter:
 
     def _follow(self, dt_us):
         """Bring everything that is shown up to the new force and rate."""
-        if dt_us > GAP_US:
-            self.restart()
+        if dt_us > LOST_US:
+            if dt_us > GAP_US:
+                self.restart()
+            else:
+                self.filter.doubt(dt_us * 1e-6)
         if self._fresh:
             dt_us = 0  # nothing was before: the same on the board and in a replay
         self._smooth(1.0 if self._fresh else dt_us / (SMOOTH_US + dt_us))

@@ -1,7 +1,8 @@
 """The format of a recorded ride: blocks of a few thousand bytes, each of which can be read without the others.
 
 A block is: a head (magic, format version, length, ride, sequence, time in us since power-on, temperature at its end in
-hundredths of a degree Celsius, counts per g, ten times the counts per deg/s, samples per second, firmware version); the
+hundredths of a degree Celsius, counts per g, ten times the counts per deg/s, samples per second, firmware version, how
+late the gyro's low-pass is in tenths of a millisecond, 0 in rides of version 0.3.0 and before); the
 calibration as store.pack() writes it; the entries; zeros; a tail (number of entries, CRC32 of everything before it).
 
 An entry is one turn of the loop: how many samples came in (n), the microseconds since the turn before, and the sums of
@@ -24,7 +25,7 @@ from ..calibration.store import BODY_LENGTH
 
 MAGIC = b"KRID"
 VERSION = 1
-HEAD = "<4sHHIIqhHHH12s"
+HEAD = "<4sHHIIqhHHH11sB"
 _TEMPERATURE_AT = struct.calcsize("<4sHHIIq")
 TAIL = "<HI"
 BLOCK = 4096  # bytes in a block of the flash
@@ -133,7 +134,7 @@ class RideBlock:
         state[0] = 1  # the prediction divides by the n of the turn before
         state[_PENDING] = state[_BITS] = 0
         state[_AT] = _HEAD_LENGTH
-        version = __version__.encode()[:12]
+        version = __version__.encode()[:11]
         struct.pack_into(
             HEAD,
             self.buffer,
@@ -149,6 +150,7 @@ class RideBlock:
             int(10 * chip.gyro_lsb_per_dps + 0.5),
             sample_hz,
             version,
+            int(10_000 * chip.gyro_delay_s + 0.5),
         )
         self.buffer[_HEAD_LENGTH - BODY_LENGTH : _HEAD_LENGTH] = body
         self._chip = chip

@@ -29,7 +29,7 @@ def all_bytes(path):
     return space[1] * space[2]
 
 
-def _make(path):
+def make(path):
     """Make a directory, unless it is there. Raises OSError."""
     try:
         os.mkdir(path)
@@ -51,7 +51,7 @@ class RideRing:
 
     Use: begin(); for each block next_length(), ready() until it is True, write() until the block is whole,
     end_block(); at last end(). stops_interrupts: True if interrupts are off during a write, as they are for flash.
-    needed: bytes that have to be free before a part is begun.
+    needed: bytes that have to be free before a part is begun.  refused: None, or the CardError that begin() raises.
     """
 
     def __init__(self, settings):
@@ -62,11 +62,14 @@ class RideRing:
         self._directory = ""
         self._file = None
         self._free = 0
+        self.refused = None
 
     def begin(self):
         """Begin a new ride; return its number. Raises OSError, CardError."""
+        if self.refused:
+            raise self.refused
         self._directory = ride_paths.directory(self._settings)
-        _make(self._directory)
+        make(self._directory)
         self._use(ride_paths.newest_ride(self._directory) or 1)
         if ride_paths.first_part(self._path):  # else the power went before its first block: use its number again
             self._use(self._ride + 1)
@@ -84,8 +87,8 @@ class RideRing:
         """Make the directory of this ride, for the parts to come."""
         self._ride = ride
         self._path = ride_paths.ride_path(self._directory, ride)
-        _make(ride_paths.group_path(self._directory, ride // ride_paths.RIDES_IN_GROUP))
-        _make(self._path)
+        make(ride_paths.group_path(self._directory, ride // ride_paths.RIDES_IN_GROUP))
+        make(self._path)
 
     def next_length(self):
         """How many bytes the next block of the ride has to have. The block before it may still be being written."""

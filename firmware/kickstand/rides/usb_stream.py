@@ -1,8 +1,16 @@
-"""Writes a ride to the console instead of flash, for `kickstand record`: lines of base64, a '.' after each block."""
+"""Writes a ride to the console instead of flash, for `kickstand record`: lines of base64, a '.' after each block.
+
+A host that sleeps takes nothing, and each print waits half a second for it. Then the second slow one ends the ride.
+"""
 
 from binascii import b2a_base64
+from errno import ETIMEDOUT
+from time import ticks_diff, ticks_ms
+
+from ..console import say
 
 LENGTH = 512  # bytes in a block: half a second
+SLOW_APART_MS = 60_000  # a slow print after a longer time does not count as the second
 
 
 class RideStream:
@@ -12,6 +20,7 @@ class RideStream:
 
     def begin(self):
         """Begin a ride; its number is always 0."""
+        self._slow_ms = None
         return 0
 
     def next_length(self):
@@ -26,12 +35,19 @@ class RideStream:
         return True
 
     def write(self, piece):
-        """Write the next piece of the block, bytes, as a line."""
-        print(b2a_base64(piece).decode(), end="")
+        """Write the next piece of the block, bytes, as a line. Raises OSError."""
+        self._say(b2a_base64(piece).decode())
 
     def end_block(self):
-        """End a block."""
-        print(".")
+        """End a block. Raises OSError."""
+        self._say(".\n")
+
+    def _say(self, text):
+        if not say(text, ""):
+            return
+        before_ms, self._slow_ms = self._slow_ms, ticks_ms()
+        if before_ms is not None and ticks_diff(self._slow_ms, before_ms) < SLOW_APART_MS:
+            raise OSError(ETIMEDOUT)
 
     def end(self):
         """End the ride: there is nothing to close."""
@@ -40,4 +56,4 @@ class RideStream:
         """End the ride after an error: there is nothing to close."""
 
     def fault_code(self, error):
-        return "usb-fault"
+        return "out-of-memory" if isinstance(error, MemoryError) else "usb-fault"

@@ -41,15 +41,16 @@ gps-no-fix|GPS: no fix|needs open sky
 no-pulse|Wheel: no pulse|ride, or wiring?
 
 no-driver|SD card:|no driver
-no-card|No SD card|check card
+no-card|No SD card|check, restart
 out-of-memory|Rec. stopped|no memory
 out-of-room|Rec. stopped|no room
 flash-fault|Rec. stopped|flash fault
 card-fault|Rec. stopped|card fault
-usb-fault|Rec. stopped|USB
+usb-fault|Rec. stopped|USB not read
 
 unreadable|config.py:|cannot be read
 no-setting|config.py: what?|{0}
+no-pins|config.py: set|{0}
 pin-twice|config.py: wrong|pin used twice
 needs-speed|config.py: wrong|car needs SPEED
 

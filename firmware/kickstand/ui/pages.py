@@ -128,14 +128,18 @@ def not_aligned(meter, seconds, todo="On stand: press"):
     return "Raw %4d%s %+.2fg" % (round(tilt), DEGREE, meter.smooth_force[2]), hint
 
 
-def sensor_info(sensor, meter, seconds):
-    """Which chip it is and how warm; below that in turn what is calibrated, and how often the chip's FIFO overflowed
-    and the chip was set up."""
+def sensor_info(app, seconds):
+    """Which chip it is and how warm; below that in turn what is calibrated, how often the chip's FIFO overflowed and
+    the chip was set up, and how many samples the overflows have cost."""
+    sensor, meter = app.sensor, app.meter
     chip, calibration = sensor.chip, meter.calibration
     line1 = "%-9s%5.1f%sC" % (chip.name[:9], chip.temperature_c(meter.reading[3]), DEGREE)
-    if seconds % 4 < 2:
+    turn = seconds // 2 % 3
+    if turn == 0:
         return line1, "6pos %-3s ali %s" % (_yes(calibration.six_done), _yes(calibration.aligned))
-    return line1, "%d gaps %d starts" % (min(chip.overflows, 99), min(sensor.restarts, 99))
+    if turn == 1:
+        return line1, "%d gaps %d starts" % (min(chip.overflows, 99), min(sensor.restarts, 9))
+    return line1, "samples lost%4d" % min(app.clock.lost, 9999)
 
 
 def _yes(flag):

@@ -10,7 +10,7 @@ from .views import FaultView, InfoView, NoticeView, QuestionView
 
 
 class Screen:
-    """app: the App, whose sensor, meter, calibration, drive and recorder it shows.
+    """app: the App, whose sensor, clock, meter, calibration, drive and recorder it shows.
 
     wizard: the AlignWizard or SixWizard under way, which takes every sample, or None.
     """
@@ -21,7 +21,7 @@ class Screen:
         self._menu = None
         self._notice = NoticeView()
         self._fault = FaultView(app.sensor)
-        self._info = InfoView(app.sensor, app.meter)
+        self._info = InfoView(app)
         self._question = QuestionView(app.drive)
         self._pages = PageRing(app, self._align_now)
 

@@ -51,9 +51,8 @@ class FaultView:
 class InfoView:
     """Which chip it is, how warm, what is calibrated; until a short press."""
 
-    def __init__(self, sensor, meter):
-        self._sensor = sensor
-        self._meter = meter
+    def __init__(self, app):
+        self._app = app
         self.open = False
 
     def show(self, now_ms):
@@ -61,7 +60,7 @@ class InfoView:
         self.open = True
 
     def lines(self, now_ms):
-        return pages.sensor_info(self._sensor, self._meter, now_ms // 1000) if self.open else None
+        return pages.sensor_info(self._app, now_ms // 1000) if self.open else None
 
     def press(self, event, now_ms):
         if event == SHORT:

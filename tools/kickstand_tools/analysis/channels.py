@@ -190,7 +190,7 @@ class _Lean:
     """The firmware's meter, run along the ride."""
 
     def __init__(self, calibration: CalibrationFile) -> None:
-        self._engine = replay_engine.Replay(calibration.to_firmware())
+        self._engine = replay_engine.Replay(calibration.to_firmware(), calibration.delay_s())
 
     def follow(self, block: Block) -> Array:
         """(n, 6): lean (degrees), displayed forward force (g), variance of the lean (rad2), resting, rolling, sure."""

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from kickstand.units import GAP_US
+from kickstand.units import GAP_US, LOST_US
 
 from ..logs.table import Array
 from .channels import Channels
@@ -34,7 +34,7 @@ class Summary:
     left_deg, right_deg: the largest lean to each side. brake_g, accel_g: the largest forces, smoothed as on the
     display. These four count where the display would show the lean. riding_s: time not at rest. beyond_s: time at a
     lean of at least so many degrees, by degrees. histogram_s: time on the move in each bin of BINS_DEG. not_sure_s:
-    time in which the meter does not trust its lean.
+    time in which the meter does not trust its lean.  missing_s: time without readings, longer than LOST_US each.
     """
 
     samples: int = 0
@@ -48,11 +48,14 @@ class Summary:
     beyond_s: dict[float, float] = field(default_factory=lambda: dict.fromkeys(LEANS_DEG, 0.0))
     histogram_s: Array = field(default_factory=lambda: np.zeros(len(BINS_DEG) - 1))
     not_sure_s: float = 0.0
+    missing_s: float = 0.0
 
     def add(self, block: Channels) -> None:
         """The next part of the ride."""
         t = block.t_s
         step = np.diff(t, prepend=self.duration_s if self.samples else t[0])
+        longest_s = max(LOST_US / 1e6, 4.0 * float(np.median(step)))  # of a slow log that is whole
+        self.missing_s += float(np.sum(step[step > longest_s]))
         step = np.where(step * 1e6 > GAP_US, 0.0, step)  # readings were missing
         self.samples += len(t)
         self.duration_s = float(t[-1])

@@ -9,6 +9,7 @@ from typing import IO, Any
 import numpy as np
 from kickstand.calibration.parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE, Calibration
 from kickstand.calibration.store import MAX_BIAS_DPS, MAX_TRIM_DEG
+from kickstand.lean.lean_filter import DELAY_S
 from kickstand.rotation import is_rotation
 from kickstand.units import AXES
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from ..logs.source import File, log_stem, name_of
 from ..output import write_whole
 
 VERSION = 1
+MAX_DELAY_S = 0.05  # of a chip's low-pass: the slowest has 33 ms
 ROTATION_TOLERANCE = 2e-3  # a matrix copied with three or four decimals is still good to 0.1 degrees
 
 Array = NDArray[np.float64]
@@ -31,7 +33,8 @@ class CalibrationFile:
     aligned: the matrix was measured; six_done: offset and slope were. trim_deg: by how much the upright pose of the
     alignment was found to be off. vehicle: "car" or "motorcycle" if the matrix was measured by driving, else "".
     kickstand_side: "left" or "right", where the kickstand leaned the bike to in the two poses, else "". notes: further
-    entries to write to the file.
+    entries to write to the file. gyro_delay_s: how late the low-pass DLPF of a recorded ride made the gyro, None if
+    that is not known.
 
     >>> calibration = CalibrationFile(gyro_bias_dps=[1.0, 0.0, 0.0])
     >>> calibration.vehicle_from_sensor @ [0.0, 1.0, 0.0]
@@ -48,6 +51,7 @@ class CalibrationFile:
     trim_deg: float = 0.0
     vehicle: str = ""
     kickstand_side: str = ""
+    gyro_delay_s: float | None = None
 
     def __post_init__(self) -> None:
         self.accel_offset_g, self.accel_slope, self.gyro_bias_dps = (
@@ -71,6 +75,10 @@ class CalibrationFile:
         calibration.six_done, calibration.aligned = self.six_done, self.aligned
         return calibration
 
+    def delay_s(self) -> float:
+        """gyro_delay_s, or that of the default DLPF."""
+        return DELAY_S if self.gyro_delay_s is None else self.gyro_delay_s
+
     def as_json(self) -> dict[str, Any]:
         """What a CAL.json holds, in plain numbers and lists."""
         data = {
@@ -85,6 +93,7 @@ class CalibrationFile:
         }
         data |= {"vehicle": self.vehicle} if self.vehicle else {}
         data |= {"kickstand_side": self.kickstand_side} if self.kickstand_side else {}
+        data |= {"gyro_delay_s": self.gyro_delay_s} if self.gyro_delay_s is not None else {}
         return data | self.notes
 
 
@@ -122,7 +131,9 @@ def read_calibration(source: File) -> CalibrationFile:
         for entry in ("accel_offset_g", "accel_slope", "gyro_bias_dps")
     )
     matrix = np.array([_numbers(name, f"vehicle_from_sensor, row {i + 1},", row) for i, row in enumerate(rows)])
-    calibration = CalibrationFile(offset, slope, bias, matrix, trim_deg=_trim(name, data))
+    calibration = CalibrationFile(offset, slope, bias, matrix, trim_deg=_within(name, data, "trim_deg", MAX_TRIM_DEG))
+    if "gyro_delay_s" in data:
+        calibration.gyro_delay_s = _within(name, data, "gyro_delay_s", MAX_DELAY_S)
     _check_ranges(name, calibration)
     calibration.aligned = data.get("aligned", not np.array_equal(matrix, np.eye(3))) is True
     neutral = not np.any(calibration.accel_offset_g) and bool(np.all(calibration.accel_slope == 1.0))
@@ -179,13 +190,11 @@ def _numbers(name: str, entry: str, values: Any) -> list[float]:
     return [float(value) for value in values]
 
 
-def _trim(name: str, data: dict[str, Any]) -> float:
-    """Degrees; 0 where the file says nothing."""
-    value = data.get("trim_deg", 0.0)
-    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= MAX_TRIM_DEG:
-        raise InputError(
-            f"{name}: trim_deg is {_shown(value)}, it is at most {MAX_TRIM_DEG:g} degrees: calibrate again"
-        )
+def _within(name: str, data: dict[str, Any], entry: str, limit: float) -> float:
+    """A number from -limit to limit; 0 where the file says nothing."""
+    value = data.get(entry, 0.0)
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= limit:
+        raise InputError(f"{name}: {entry} is {_shown(value)}, it is at most {limit:g}: calibrate again")
     return float(value)
 
 

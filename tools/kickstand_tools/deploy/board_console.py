@@ -7,10 +7,13 @@ from typing import Any
 
 from mpremote.transport_serial import SerialTransport
 
-_CTRL_C = b"\x03"
+_CTRL_A, _CTRL_C = b"\x01", b"\x03"
 _END = b"\x04"  # of the program's output, and of its error
+_PROMPT = b">"  # after both
 _LAST_S = 10.0  # for what the program still prints after Ctrl-C
 _POLL_S = 0.01
+_AWAY_S = 1.0  # this computer slept, or was too busy to read: a board that streams stops itself then
+_AWAY_SILENT_S = 5.0  # after that, how long the board may print nothing
 
 
 class BrokenOff(Exception):
@@ -29,15 +32,19 @@ def lines(
     said = b""
     asked_s = None
     heard_s = time.monotonic()
-    while said.count(_END) < 2:
+    away_s, polled_s = 0.0, time.time()  # unlike the monotonic clock it goes on while the computer sleeps
+    while said.count(_END) < 2 or not said.endswith(_PROMPT):
         if stopped and stopped.is_set() and asked_s is None:
             asked_s = time.monotonic()
             serial.write(_CTRL_C)
+        away_s, polled_s = max(away_s, time.time() - polled_s), time.time()
         if waiting := serial.inWaiting():
             heard_s = time.monotonic()
             said += serial.read(waiting)
         elif time.monotonic() - heard_s > silent_s:
             raise BrokenOff("the board says nothing any more")
+        elif away_s > _AWAY_S and time.monotonic() - heard_s > min(silent_s, _AWAY_SILENT_S):
+            raise BrokenOff(f"the board stopped because this computer took nothing for {away_s:.0f} s: keep it awake")
         elif asked_s is not None and time.monotonic() - asked_s > _LAST_S:
             return
         else:
@@ -47,6 +54,7 @@ def lines(
         said = output + end + error
         for line in whole:
             yield line.strip()
+    serial.write(_CTRL_A)  # the prompt has been read with the rest, and mpremote waits for one: this brings it again
     error = said.split(_END)[1].decode(errors="replace").strip()
     if error and asked_s is None:
         raise BrokenOff(f"the board reports {error.rpartition(chr(10))[2].strip()}")

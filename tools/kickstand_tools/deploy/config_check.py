@@ -1,7 +1,8 @@
 """A config.py judged by the firmware's own settings.py before it is copied.
 
-This runs in a process of its own, which poses as the board: settings.py asks sys.platform and machine. The arguments
-are the board's sys.platform and the file; the last line that it prints is JSON: null, or line and reason of the fault.
+This runs in a process of its own, which poses as the board: settings.py asks sys and machine. The arguments are the
+board's sys.platform, its sys.implementation._machine and the file; the last line that it prints is JSON: null, or line
+and reason of the fault.
 """
 
 import ast
@@ -18,10 +19,11 @@ from ..errors import InputError
 from ..simulated_board.simulator import Board
 
 
-def refuse_faulty(path: Path, port: str) -> None:
-    """Raise InputError, with the line, for what a board of this port (its sys.platform) would not take."""
+def refuse_faulty(path: Path, port: str, machine: str) -> None:
+    """Raise InputError, with the line, for what a board would not take. port: its sys.platform.  machine: its
+    sys.implementation._machine."""
     done = subprocess.run(
-        [sys.executable, "-P", "-m", __name__, port, str(path)],
+        [sys.executable, "-P", "-m", __name__, port, machine, str(path)],
         env=os.environ | {"PYTHONPATH": firmware_path.search_path()},
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
@@ -34,10 +36,11 @@ def refuse_faulty(path: Path, port: str) -> None:
         raise InputError(f"{path}{f', line {line}' if line else ''}: {reason}: mend it, then repeat this")
 
 
-def _fault(path: Path, port: str) -> tuple[int | None, str] | None:
+def _fault(path: Path, port: str, machine: str) -> tuple[int | None, str] | None:
     """Line and reason of the first fault, or None. This process cannot be used for anything else afterwards."""
     Board(lambda t_s: (0, 0, 1, 0, 0, 0), port="esp32" if port == "esp32" else "rp2").install()  # for machine
     sys.platform = port
+    vars(sys.implementation)["_machine"] = machine
     from kickstand.console import sentence
     from kickstand.errors import SettingsError
     from kickstand.settings import Settings
@@ -66,4 +69,4 @@ def _line_of(name: str, source: bytes) -> int | None:
 
 
 if __name__ == "__main__":
-    print("\n" + json.dumps(_fault(Path(sys.argv[2]), sys.argv[1])))
+    print("\n" + json.dumps(_fault(Path(sys.argv[3]), *sys.argv[1:3])))

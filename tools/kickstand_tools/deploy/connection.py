@@ -5,6 +5,7 @@ import errno
 import io
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from mpremote.transport import TransportError, TransportExecError
 from mpremote.transport_serial import SerialTransport
@@ -16,6 +17,8 @@ from .ports import find_port, why_closed
 Progress = Callable[[str, int, int], None]
 
 _ANSWER_S = 10
+_EMULATED = "socket:"  # begins the name of an emulated board's port
+_SLOWER = 12  # how much longer than a board an emulated one may take: its seconds last longer where the host is busy
 _RESTART_S = 2  # until the board's USB port is back: the next command may follow at once
 
 
@@ -27,6 +30,15 @@ class OutdatedFirmware(InputError):
     """The firmware on the board lacks a module that these tools ask for."""
 
 
+class _SlowBoard(SerialTransport):
+    """A board whose seconds last longer than ours: mpremote's limits on silence are stretched alike."""
+
+    def read_until(self, min_num_bytes, ending, timeout=10, data_consumer=None, timeout_overall=None):
+        """See SerialTransport."""
+        limits: list[Any] = [limit and limit * _SLOWER for limit in (timeout, timeout_overall)]
+        return super().read_until(min_num_bytes, ending, limits[0], data_consumer, limits[1])
+
+
 @contextlib.contextmanager
 def connected(port: str | None) -> Iterator[tuple[SerialTransport, str]]:
     """A board at its raw prompt, its program interrupted, and the name of its port.
@@ -36,7 +48,10 @@ def connected(port: str | None) -> Iterator[tuple[SerialTransport, str]]:
     """
     name = port or find_port()
     try:
-        transport = SerialTransport(name, timeout=_ANSWER_S)
+        if name.startswith(_EMULATED):
+            transport = _SlowBoard(name, timeout=_ANSWER_S * _SLOWER)
+        else:
+            transport = SerialTransport(name, timeout=_ANSWER_S)
     except (TransportError, ValueError):
         raise why_closed(name) from None
     try:

@@ -55,7 +55,9 @@ def flash(port: str | None, replace_config: bool = False, progress: Progress | N
         config = source if replace_config or not transport.fs_exists(CONFIG) else None
         try:
             if config:
-                config_check.refuse_faulty(config, str(transport.eval("__import__('sys').platform")))
+                names = "(lambda s: (s.platform, getattr(s.implementation, '_machine', '')))(__import__('sys'))"
+                platform, machine = transport.eval(names)
+                config_check.refuse_faulty(config, str(platform), str(machine))
             wanted, why_sources = _contents(transport)
             wanted[CONFIG] = source.read_bytes()
             update = prepare(transport, wanted, replace_config)

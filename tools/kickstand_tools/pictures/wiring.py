@@ -7,7 +7,7 @@ from typing import NamedTuple
 from unittest import mock
 
 from .. import firmware_path
-from ..simulated_board.fakes import cpython
+from ..simulated_board.fakes import chips, cpython
 from .drawing import Drawing
 
 
@@ -16,6 +16,7 @@ class Board(NamedTuple):
 
     title: str
     port: str  # sys.platform
+    machine: str  # in chips.MACHINES
     pin_prefix: str  # before the GPIO number in a pin's name
     near: tuple[str, ...]
     far: tuple[str, ...]
@@ -26,6 +27,7 @@ class Board(NamedTuple):
 PICO = Board(
     "Raspberry Pi Pico",
     "rp2",
+    "pico",
     "GP",
     tuple("GP0 GP1 GND GP2 GP3 GP4 GP5 GND GP6 GP7 GP8 GP9 GND GP10 GP11 GP12 GP13 GND GP14 GP15".split()),
     tuple("VBUS VSYS GND 3V3_EN 3V3 VREF GP28 GND GP27 GP26 RUN GP22 GND GP21 GP20 GP19 GP18 GND GP17 GP16".split()),
@@ -34,6 +36,7 @@ PICO = Board(
 )
 ESP32 = Board(
     "ESP32-DevKitC",
+    "esp32",
     "esp32",
     "",
     tuple("GND 23 22 TX RX 21 GND 19 18 5 17 16 4 0 2 15 D1 D0 CLK".split()),
@@ -86,7 +89,8 @@ def draw(board: Board, display: str) -> str:
     _draw_board(page, board, used_near, used_far)
     _draw_module(page, 68, 122, "Sensor: MPU6050 (GY-521)", [*sensor, "GND"], _SENSOR_PINS_Y, _SENSOR_SUPPLY_Y)
     page.text(_MODULE_MIDDLE, _SENSOR_SUPPLY_Y, "XDA, XCL, AD0, INT: open", 12, "middle", "#d7e4ff")
-    _draw_module(page, 248, 130, "Display with I2C backpack", ["GND", *screen], _DISPLAY_PINS_Y, _DISPLAY_SUPPLY_Y)
+    title = "Display for 3.3 V, I2C backpack"
+    _draw_module(page, 248, 130, title, ["GND", *screen], _DISPLAY_PINS_Y, _DISPLAY_SUPPLY_Y)
     page.picture(_MODULE_MIDDLE - 85, _DISPLAY_SUPPLY_Y - 30, 176, 62, display)
     _draw_module(page, 432, 96, "Push button", ["", ""], _BUTTON_PINS_Y)
     page.box(_MODULE_MIDDLE - 24, 464, 48, 48, "#c9ccd2", 6)
@@ -112,7 +116,8 @@ def _default_pins(board: Board) -> dict[str, dict[str, str]]:
     """{module: {pin of the module: name of the board's pin}}, from port.py as it is on this board."""
     cpython.supplement()
     machine = mock.patch.dict(sys.modules, machine=types.ModuleType("machine"))
-    with machine, mock.patch.object(sys, "platform", board.port):
+    named = mock.patch.object(sys.implementation, "_machine", chips.MACHINES[board.machine], create=True)
+    with machine, named, mock.patch.object(sys, "platform", board.port):
         port = runpy.run_path(str(firmware_path.PACKAGE / "board" / "port.py"))
 
     def name(number: int) -> str:

@@ -107,7 +107,7 @@ def replay_blocks(
 def _cpython(
     log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
 ) -> Iterator[Replayed]:
-    engine = replay_engine.Replay(calibration.to_firmware())
+    engine = replay_engine.Replay(calibration.to_firmware(), calibration.delay_s())
     for block in read_blocks(log, 2, progress, notices):
         yield block, [engine.step(*row) for row in block.rows()]
 
@@ -165,7 +165,7 @@ _RUN = {"cpython": _cpython, "micropython": _micropython, "rp2040": _rp2040}
 
 def _records(blocks: Iterable[Block], calibration: CalibrationFile) -> Iterator[bytes]:
     """The bytes that replay_engine.run reads."""
-    yield struct.pack(replay_engine.CALIBRATION, *calibration.parameters())
+    yield struct.pack(replay_engine.CALIBRATION, *calibration.parameters(), calibration.delay_s())
     for block in blocks:
         for time_us, reading, speed in block.rows():
             given = speed if speed >= 0.0 else replay_engine.NO_SPEED  # NaN is not >= 0

@@ -2,7 +2,8 @@
 
     micropython replay_engine.py RECORDS > RESULTS
 
-RECORDS starts with the calibration (19 doubles, Calibration.parameters()), then one record a sample:
+RECORDS starts with the calibration (19 doubles, Calibration.parameters()) and the gyro's delay in seconds (a double),
+then one record a sample:
 its time in microseconds (int64), seven readings in the chip's order (doubles; g, C, deg/s) and the speed in m/s,
 negative where there is no new one. RESULTS has the doubles of COLUMNS for each. Both are binary, because a number that
 is printed and read again may be another number.
@@ -14,6 +15,7 @@ from math import degrees, radians
 
 from kickstand.calibration.parameters import Calibration
 from kickstand.lean.formula import static_lean_deg
+from kickstand.lean.lean_filter import DELAY_S
 from kickstand.lean.meter import LeanMeter
 from kickstand.rotation import rotate
 
@@ -27,7 +29,7 @@ COLUMNS = (
     "yaw_rate_dps",
     "roll_rate_dps",
 )
-CALIBRATION = "<19d"
+CALIBRATION = "<20d"
 RECORD = "<q8d"
 RESULT = "<8d"
 NO_SPEED = -1.0  # not NaN, which a board's struct does not read as NaN
@@ -65,10 +67,11 @@ class ReplayMeter(LeanMeter):
 
 
 class Replay:
-    """The meter over one recording. calibration: the firmware's own, for readings in g and deg/s."""
+    """The meter over one recording. calibration: the firmware's own, for readings in g and deg/s.  delay_s: by how much
+    the gyro's low-pass is late."""
 
-    def __init__(self, calibration):
-        self.meter = ReplayMeter(calibration)
+    def __init__(self, calibration, delay_s=DELAY_S):
+        self.meter = ReplayMeter(calibration, delay_s=delay_s)
         self._before = None
 
     def take(self, time_us, reading, speed_mps=NO_SPEED):
@@ -98,8 +101,9 @@ class Replay:
 def run(source, sink):
     """Read records from source until its end and write results to sink, both binary files."""
     calibration = Calibration()
-    calibration.set_parameters(struct.unpack(CALIBRATION, source.read(struct.calcsize(CALIBRATION))))
-    replay = Replay(calibration)
+    *parameters, delay_s = struct.unpack(CALIBRATION, source.read(struct.calcsize(CALIBRATION)))
+    calibration.set_parameters(parameters)
+    replay = Replay(calibration, delay_s)
     size = struct.calcsize(RECORD)
     while True:
         record = source.read(size)

@@ -13,8 +13,7 @@ from kickstand.rides import block as block_format
 _HEAD_LENGTH = struct.calcsize(block_format.HEAD)
 _TAIL_LENGTH = struct.calcsize(block_format.TAIL)
 _START = _HEAD_LENGTH + store.BODY_LENGTH
-
-
+_LATE_PERIODS = 2  # sample periods, as in kickstand.imu.sample_clock: samples were lost
 CUT_SHORT = "cut short"  # the last block of a ride often is: the power went off while it was written
 
 
@@ -35,7 +34,8 @@ class Turn:
 @dataclass
 class Block:
     """One block: the fields of its head, and its turns. time_us: of the last sample before it, since power-on.
-    centidegrees: the temperature. body: the calibration's bytes."""
+    centidegrees: the temperature. delay_tenths_ms: of the gyro's low-pass, 0 where the firmware did not store it. body:
+    the calibration's bytes."""
 
     ride: int
     sequence: int
@@ -45,6 +45,7 @@ class Block:
     gyro_lsb_tenths: int
     sample_hz: int
     firmware: str
+    delay_tenths_ms: int
     body: bytes
     crc: int
     turns: list[Turn] = field(default_factory=list)
@@ -57,6 +58,16 @@ class Block:
     def calibration(self) -> Calibration:
         """The calibration that the lean on the display was computed with."""
         return store.unpack(self.body, 0)[2]
+
+    def missing_s(self) -> list[float]:
+        """Each time without readings, in seconds: turns of the loop that came later than their samples explain."""
+        period_us, before_us, found = 1_000_000 // self.sample_hz, self.time_us, []
+        for turn in self.turns:
+            late_us = turn.time_us - before_us - turn.n * period_us
+            if late_us > _LATE_PERIODS * period_us:
+                found.append(late_us / 1e6)
+            before_us = turn.time_us
+        return found
 
 
 def read(content: bytes) -> tuple[list[Block], list[str]]:
@@ -85,7 +96,7 @@ def parse(data: bytes) -> Block:
         raise BadBlock("not of a ride")
     if len(data) < _START + _TAIL_LENGTH:
         raise BadBlock(CUT_SHORT)
-    _, version, length, *rest, firmware = struct.unpack_from(block_format.HEAD, data)
+    _, version, length, *rest, firmware, delay = struct.unpack_from(block_format.HEAD, data)
     if version != block_format.VERSION:
         raise BadBlock(f"format {version}, this program reads {block_format.VERSION}")
     if len(data) < length:
@@ -94,7 +105,7 @@ def parse(data: bytes) -> Block:
     if len(data) != length or crc != crc32(data[:-4]):
         raise BadBlock("damaged")
     firmware = firmware.rstrip(b"\0").decode("ascii", "replace")
-    fields: list[Any] = [*rest, firmware, data[_HEAD_LENGTH:_START], crc]
+    fields: list[Any] = [*rest, firmware, delay, data[_HEAD_LENGTH:_START], crc]
     block = Block(*fields)
     try:
         block.turns = list(_turns(block, data[_START : len(data) - _TAIL_LENGTH], count))
@@ -140,3 +151,12 @@ def _turns(block: Block, data: bytes, count: int) -> Iterator[Turn]:
         before[0] = n
         yield Turn(now, n, tuple(before[2:8]), speed)
         speed = None
+
+
+def missing_note(missing_s: list[float]) -> str:
+    """A line for these times without readings."""
+    times = "once" if len(missing_s) == 1 else f"{len(missing_s)} times"
+    return (
+        f"readings are missing {times}, {sum(missing_s):.1f} s in all: the sensor was set up again, "
+        "or the board was busy for longer than the sensor keeps samples"
+    )

@@ -17,7 +17,7 @@ from ..deploy.connection import Progress, connected, last_line, refuse_unfit_fir
 from ..errors import InputError
 from ..output import check_directory
 from . import ride_log
-from .block_reader import CUT_SHORT, Block, read
+from .block_reader import CUT_SHORT, Block, missing_note, read
 
 _SILENT_S = 60  # an emulated board takes a while
 
@@ -164,6 +164,8 @@ def _pull_ride(
     missing = [after.sequence - before.sequence - 1 for before, after in itertools.pairwise(blocks)]
     if any(missing):
         ride.problems.append(f"{title}: {sum(missing)} blocks are missing: the log has a gap there")
+    if missing_s := [seconds for block in blocks for seconds in block.missing_s()]:
+        ride.problems.append(f"{title}: {missing_note(missing_s)}")
     if blocks[0].sequence:
         ride.problems.append(f"{title}: its beginning had to make room for later blocks")
     ride.log = out / f"ride-{number:05}-{blocks[0].crc & 0xFFFF:04x}.csv.gz"

@@ -18,7 +18,7 @@ from ..errors import InputError, cause
 from ..output import check_output, write_whole
 from ..replay.replay_engine import ReplayMeter
 from . import ride_log
-from .block_reader import BadBlock, Block, parse
+from .block_reader import BadBlock, Block, missing_note, parse
 
 # The app with its turns sent over USB, its display and button alive; Ctrl-C ends it.
 _START = """
@@ -104,6 +104,7 @@ class _Recording:
     def write(self, path: Path, blocks: Iterator[Block], notes: list[str]) -> None:
         """All of them as they come. notes: gets a line for each thing that is missing."""
         missing, expected, before = 0, 0, 0
+        missing_s: list[float] = []
         meter = ReplayMeter(CalibrationFile().to_firmware())
         opened = gzip.open if path.suffix == ".gz" else open
         aligned = False
@@ -120,6 +121,7 @@ class _Recording:
                     before = block.time_us
                 missing += block.sequence - expected
                 expected = block.sequence + 1
+                missing_s += block.missing_s()
                 for row, turn in zip(
                     ride_log.rows([block], True, self.first.time_us), block.turns, strict=True
                 ):
@@ -137,6 +139,8 @@ class _Recording:
             raise InputError("; ".join(["nothing was recorded: does the display show readings?", *notes]))
         if missing:
             notes.append(f"{missing} blocks of half a second did not arrive: the log has gaps")
+        if missing_s:
+            notes.append(missing_note(missing_s))
 
 
 def _blocks(transport: SerialTransport, name: str, notes: list[str]) -> Iterator[Block]:

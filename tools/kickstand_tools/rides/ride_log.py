@@ -52,6 +52,7 @@ def calibration(block: Block) -> CalibrationFile:
         c.six_done,
         notes,
         c.trim_deg,
+        gyro_delay_s=block.delay_tenths_ms / 10_000 if block.delay_tenths_ms else None,
     )
 
 

@@ -8,8 +8,10 @@ import errno
 import io
 
 from .clock import NEVER_US, to_us
+from .fakes.erased_file import ErasedFile
 
 _FOREVER = 1 << 60  # a number of transfers
+_STALL_S = 0.5  # that a print waits for a host which takes nothing (shared/tinyusb/mp_usbd_cdc.h of MicroPython)
 
 
 class TransferFault:
@@ -68,6 +70,7 @@ class Faults:
     def __init__(self, board):
         self._board = board
         self._real_open = None
+        self._real_print = None
 
     # On the wires
 
@@ -147,11 +150,41 @@ class Faults:
         """Files whose name has this ending read as empty, as after a loss of supply."""
         self._files(ending, at_s, for_s, True)
 
+    def slow_flash(self, at_s, for_s, erase_s):
+        """Each block of a file that is written is erased for erase_s, in which the program stands."""
+
+        def erase():
+            self._board.clock.advance(to_us(erase_s))
+
+        def opened(real, path, mode="r", *more, **named):
+            file = real(path, mode, *more, **named)
+            return ErasedFile(file, erase) if "w" in mode else file
+
+        self._opened_by(at_s, for_s, opened)
+
     def restore_files(self):
         """End the faults of the file system."""
         if self._real_open is not None:
             builtins.open = self._real_open
             self._real_open = None
+
+    # On USB
+
+    def usb_asleep(self, at_s, for_s):
+        """The host takes nothing: what is printed waits, and is lost."""
+
+        def begin():
+            self._real_print = builtins.print
+            builtins.print = lambda *_, **__: self._board.clock.advance(to_us(_STALL_S))
+
+        self._board.at(at_s, begin)
+        self._board.at(at_s + for_s, self.restore_print)
+
+    def restore_print(self):
+        """End usb_asleep()."""
+        if self._real_print is not None:
+            builtins.print = self._real_print
+            self._real_print = None
 
     def _transfers(self, kind, address, nth, count, byte=0, mask=0, read=True):
         for bus in self._board.buses:
@@ -169,18 +202,22 @@ class Faults:
         self._board.at(at_s + for_s, lambda: self._board.sensor.override(None))
 
     def _files(self, ending, at_s, for_s, empty):
+        def failing(real, path, mode="r", *more, **named):
+            if not str(path).endswith(ending) or "r" not in mode or "+" in mode:
+                return real(path, mode, *more, **named)
+            if not empty:
+                raise OSError(errno.EIO)
+            return io.BytesIO() if "b" in mode else io.StringIO()
+
+        self._opened_by(at_s, for_s, failing)
+
+    def _opened_by(self, at_s, for_s, opened):
+        """For for_s files are opened by opened(the real open(), its arguments)."""
+
         def begin():
             self.restore_files()
             self._real_open = real = builtins.open
-
-            def failing(path, mode="r", *more, **named):
-                if not str(path).endswith(ending) or "r" not in mode or "+" in mode:
-                    return real(path, mode, *more, **named)
-                if not empty:
-                    raise OSError(errno.EIO)
-                return io.BytesIO() if "b" in mode else io.StringIO()
-
-            builtins.open = failing
+            builtins.open = lambda *arguments, **named: opened(real, *arguments, **named)
 
         self._board.at(at_s, begin)
         self._board.at(at_s + for_s, self.restore_files)

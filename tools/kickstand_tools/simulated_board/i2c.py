@@ -38,6 +38,10 @@ class Bus:
 
     # For a controller
 
+    def stuck(self):
+        """True while a device that was interrupted holds SDA low."""
+        return self._stuck_bits > 0
+
     def start(self, address, read):
         """START or repeated START, and address. True: acknowledged. False: not. None: a device holds SDA low."""
         if self._stuck_bits > 0:

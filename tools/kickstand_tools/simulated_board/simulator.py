@@ -10,8 +10,9 @@ Within the `with` statement `machine` is the board's, and `time` and `os` too. I
 
 from .button import Button
 from .clock import Clock, PowerOff, Reset, to_us
-from .fakes import fake_machine, fake_time
+from .fakes import chips, fake_machine, fake_time
 from .fakes.installer import Installer
+from .fakes.sd_card import SdCard
 from .faults import Faults
 from .gps import Gps
 from .i2c import Bus
@@ -32,6 +33,10 @@ class Board:
     world(t_s): (fx, fy, fz, wx, wy, wz[, temp_c]) in g and deg/s along the chip's own axes, with the chip's errors.
     who_am_i: which chip is fitted.  sensor_address, lcd_address: None if it is not fitted.
     one_bus: the display is on the sensor's wires.  port: "rp2" or "esp32".  pace: see Clock.
+    machine: a name in chips.MACHINES, which gives the port. Firmware that is imported first after install() takes it
+    for the board it runs on; without one the firmware runs on what it was imported for, a Pico as a rule.
+    i2c_driver: of MicroPython on an ESP32, "new" or (up to 1.28) "legacy".  sensor_pins, lcd_pins: (SDA, SCL), if not
+    those of WIRING.  touched: the pins that the firmware has used since the board was made.
     Times in seconds are those of the board's clock, which continues through resets and power cycles.
     """
 
@@ -45,19 +50,29 @@ class Board:
         port="rp2",
         seed=1,
         pace=0.0,
+        machine=None,
+        i2c_driver="new",
+        sensor_pins=None,
+        lcd_pins=None,
+        button_pin=None,
     ):
-        self.port = port
+        self.poses = machine is not None
+        self.machine = chips.MACHINES[machine or ("pico" if port == "rp2" else "esp32")]
+        self.port = port = "esp32" if "ESP32" in self.machine else "rp2"
+        self.i2c_driver = i2c_driver
+        self.pins = chips.pins_of(self.machine)
+        self.touched = set()
         self.seed = seed
         self.clock = Clock(pace)
         self.sensor = Mpu6050(self.clock, world, who_am_i, sensor_address or 0x68)
         self.lcd = Lcd(self.clock, lcd_address or 0x27)
         self.button = Button(self.clock, seed)
         self.watchdog = Watchdog(self.clock)
-        sensor_pins, lcd_pins, self._button_pin, self._gps_pin, self.wheel_pin = WIRING[port]
-        self.gps = None  # a Gps, if fitted
-        self.wheel = None  # a Wheel, if fitted
-        self.sensor_bus = Bus(self.clock, *sensor_pins)
-        self.lcd_bus = self.sensor_bus if one_bus else Bus(self.clock, *lcd_pins)
+        usual_sensor, usual_lcd, usual_button, self._gps_pin, self.wheel_pin = WIRING[port]
+        self._button_pin = usual_button if button_pin is None else button_pin
+        self.gps = self.wheel = self.card = None  # a Gps, a Wheel, an SdCard, if fitted
+        self.sensor_bus = Bus(self.clock, *(sensor_pins or usual_sensor))
+        self.lcd_bus = self.sensor_bus if one_bus else Bus(self.clock, *(lcd_pins or usual_lcd))
         self.buses = [self.sensor_bus] if one_bus else [self.sensor_bus, self.lcd_bus]
         self.too_fast = False  # True once a bus was clocked faster than a device on it allows
         self.faults = Faults(self)
@@ -79,6 +94,7 @@ class Board:
     def uninstall(self):
         """Undo install()."""
         self.faults.restore_files()
+        self.faults.restore_print()
         self._fakes.uninstall()
 
     def __enter__(self):
@@ -166,6 +182,10 @@ class Board:
         """Connect a wheel contact. speed(t_s): of the vehicle, m/s. kind: arguments of Wheel."""
         self.wheel = Wheel(self.clock, speed, **kind)
 
+    def fit_card(self, **kind):
+        """Connect an SD card; with its driver on the board, if done before install(). kind: arguments of SdCard."""
+        self.card = SdCard(self.clock, **kind)
+
     # Called by the fake `machine`
 
     def connect_uart(self, pin, baud, receive):
@@ -181,6 +201,7 @@ class Board:
 
     def bus_on(self, sda, scl, hz):
         """The bus on these pins, which a controller clocks at hz from now on. Without devices if none is wired."""
+        self.touched.update((sda, scl))
         for bus in self.buses:
             if (bus.sda, bus.scl) == (sda, scl):
                 bus.set_scl(1)
@@ -192,6 +213,7 @@ class Board:
 
     def set_up_pin(self, number, mode, pull, level):
         """Pin.init()."""
+        self.touched.add(number)
         self._pins[number] = [mode, pull, level or 0]
         self._drive_wire(number, 1 if mode == fake_machine.Pin.IN else level or 0)
 
@@ -219,6 +241,8 @@ class Board:
         return level
 
     def _drive_wire(self, number, level):
+        if self.card and number == self.card.cs:
+            self.card.select(level)
         for bus in self.buses:
             if number == bus.sda:
                 bus.set_sda(level)

@@ -3,9 +3,10 @@
 from ..clock import Reset
 from . import current
 from .pins import Pin
+from .sd_card import SPI
 from .serial_buses import I2C, UART, SoftI2C
 
-__all__ = ["I2C", "UART", "Pin", "SoftI2C"]
+__all__ = ["I2C", "SPI", "UART", "Pin", "SoftI2C"]
 
 PWRON_RESET = 1
 WDT_RESET = 3  # the rp2 port reports this after machine.reset() too

@@ -4,7 +4,7 @@ import os
 import sys
 import time
 
-from . import current, fake_machine, fake_os, fake_time
+from . import current, fake_machine, fake_os, fake_sys, fake_time
 
 _ADDED_TO = ((time, fake_time), (os, fake_os))  # under CPython
 
@@ -20,6 +20,12 @@ class Installer:
         current.use(board)
         fake_time.use(board.clock, board.clock.now_us)
         self._replace("machine", fake_machine)
+        if board.poses:
+            self._replace("sys", fake_sys.posing(board.port, board.machine))
+        if board.card and board.card.driver:
+            from . import sdcard
+
+            self._replace("sdcard", sdcard)
         if sys.implementation.name == "micropython":
             self._replace("time", fake_time)
             self._replace("os", fake_os)

@@ -12,6 +12,10 @@ class Pin:
 
     def __init__(self, id, mode=-1, pull=-1, value=None):
         self.id = id.id if isinstance(id, Pin) else id
+        if self.id is None and current.board.port == "rp2":
+            raise TypeError("can't convert NoneType to int")
+        if self.id not in current.board.pins:
+            raise ValueError("invalid pin")
         if mode != -1:
             self.init(mode, pull, value)
 

@@ -3,21 +3,28 @@
 import errno
 
 from ..clock import Reset
-from . import current
+from . import chips, current
 from .pins import Pin
 
+_TICK_MS = 10  # of FreeRTOS on an ESP32
+_LEGACY_MS = 100  # for each byte that the legacy driver of an ESP32 waits, and once more
 
-class SoftI2C:
-    """machine.SoftI2C, and the common part of machine.I2C. freq in Hz, timeout in us."""
 
-    def __init__(self, scl, sda, freq=400000, timeout=50000):
+class _Controller:
+    """The common part of I2C and SoftI2C. freq in Hz, timeout in us."""
+
+    _NO_DEVICE = errno.ENODEV
+
+    def __init__(self, scl, sda, freq, timeout):
         self._bus = current.board.bus_on(Pin(sda).id, Pin(scl).id, freq)
         self._clock = current.board.clock
         self._bit_ns = 1_000_000_000 // freq
         self._ns = 0  # less than a microsecond: time that has passed but is not on the clock yet
         self._timeout_us = timeout
+        self._bytes = 0  # of the transfer under way, without the address
 
     def readfrom_mem_into(self, addr, memaddr, buf, addrsize=8):
+        self._bytes = 1 + len(buf)
         self._start(addr, False)
         self._send(memaddr)
         self._start(addr, True)
@@ -30,6 +37,7 @@ class SoftI2C:
         return bytes(buf)
 
     def writeto_mem(self, addr, memaddr, buf, addrsize=8):
+        self._bytes = 1 + len(buf)
         self._start(addr, False)
         self._send(memaddr)
         for value in buf:
@@ -37,6 +45,7 @@ class SoftI2C:
         self._bus.stop()
 
     def writeto(self, addr, buf, stop=True):
+        self._bytes = len(buf)
         self._start(addr, False)
         for value in buf:
             self._send(value)
@@ -45,6 +54,7 @@ class SoftI2C:
         return len(buf)
 
     def readfrom_into(self, addr, buf, stop=True):
+        self._bytes = len(buf)
         self._start(addr, True)
         self._receive(buf)
         if stop:
@@ -76,9 +86,13 @@ class SoftI2C:
         if not answer:
             self._bus.stop()
             if answer is None:
-                self._clock.advance(self._timeout_us)
-                raise OSError(errno.ETIMEDOUT)
-            raise OSError(errno.ENODEV if current.board.port == "esp32" else errno.EIO)
+                self._stall()
+            raise OSError(self._NO_DEVICE)
+
+    def _stall(self):
+        """Wait as long as the controller does for wires that are held; raises OSError."""
+        self._clock.advance(self._timeout_us)
+        raise OSError(errno.ETIMEDOUT)
 
     def _send(self, value):
         self._spend(9)
@@ -98,16 +112,81 @@ class SoftI2C:
             buf[i] = bus.read_byte()
 
 
-class I2C(SoftI2C):
-    """machine.I2C. On rp2 each controller can use only certain pins."""
+class SoftI2C(_Controller):
+    """machine.SoftI2C, in software on any two pins. It does not look whether SDA is held: the clocks of a transfer let
+    the device that holds it finish its byte, and the zeros that it sends meanwhile pass for answers."""
+
+    def __init__(self, scl, sda, freq=400000, timeout=50000):
+        super().__init__(scl, sda, freq, timeout)
+        self._held = False
+
+    def _start(self, address, read):
+        self._held = self._bus.stuck()
+        if self._held:
+            self._spend(10)
+            self._clock_byte()
+        else:
+            super()._start(address, read)
+
+    def _send(self, value):
+        if self._held:
+            self._spend(9)
+            self._clock_byte()
+        else:
+            super()._send(value)
+
+    def _receive(self, buf):
+        if not self._held:
+            super()._receive(buf)
+            return
+        self._spend(9 * len(buf) + 1)
+        for i in range(len(buf)):
+            buf[i] = 0
+            self._clock_byte()
+
+    def _clock_byte(self):
+        """Nine clocks; raises OSError if SDA is high at the last one, which is no acknowledgement."""
+        for _ in range(9):
+            self._bus.set_scl(0)
+            self._bus.set_scl(1)
+        if not self._bus.stuck():
+            self._bus.power_off()  # STOP
+            raise OSError(self._NO_DEVICE)
+
+
+class I2C(_Controller):
+    """machine.I2C. On rp2 each controller can use only certain pins. An ESP32 has one of two drivers, see
+    MicroPython's ports/esp32/machine_i2c.c."""
 
     def __init__(self, id, scl=None, sda=None, freq=400000, timeout=50000):
-        if current.board.port == "rp2":
+        board = current.board
+        if board.port == "rp2":
             if sda is None or Pin(sda).id % 4 != 2 * id:
                 raise ValueError("bad SDA pin")
             if scl is None or Pin(scl).id % 4 != 2 * id + 1:
                 raise ValueError("bad SCL pin")
+        elif not 0 <= id < chips.i2c_controllers(board.machine):
+            raise ValueError("I2C(%d) doesn't exist" % id)
+        self._NO_DEVICE = errno.ENODEV if board.port == "esp32" else errno.EIO
+        self._driver = board.i2c_driver if board.port == "esp32" else None
         super().__init__(scl, sda, freq, timeout)
+
+    def _start(self, address, read):
+        if self._driver == "new" and self._ticks() == 0:
+            raise OSError(errno.ENODEV)  # IDF does not even wait for the address to be sent
+        super()._start(address, read)
+
+    def _stall(self):
+        if self._driver == "legacy":  # the time-out of the constructor is not that of a transfer
+            self._clock.advance(1000 * _LEGACY_MS * (1 + self._bytes))
+            raise OSError(errno.ETIMEDOUT)
+        if self._driver == "new":
+            self._clock.advance(1000 * _TICK_MS * self._ticks())
+            raise OSError(errno.ENODEV)
+        super()._stall()
+
+    def _ticks(self):
+        return self._timeout_us // 1000 // _TICK_MS
 
 
 class UART:

@@ -1,0 +1,70 @@
+"""micropython-lib's driver of an SD card on SPI, with what its writing lacks.
+
+It returns silently when the card rejects the data, waits without limit while the card is busy, and takes heap for each
+byte that it waits.
+"""
+
+from errno import EIO, ETIMEDOUT
+from time import ticks_diff, ticks_ms
+
+from sdcard import SDCard  # type: ignore[import-not-found]
+
+CLOCK_HZ = 10_000_000  # by default 1.32 MHz, at which a block takes 25 ms
+BUSY_MS = 1000  # cards may take 250 to 500 ms (SD Physical Layer Simplified Specification, section 4.6.2.2)
+_ACCEPTED = 0x05  # data response, section 7.3.3.1
+
+
+class CheckedCard(SDCard):
+    """spi: a machine.SPI.  cs: a machine.Pin. Raises OSError."""
+
+    def __init__(self, spi, cs):
+        self._byte = bytearray(1)
+        self._fault = 0
+        super().__init__(spi, cs, baudrate=CLOCK_HZ)
+
+    def writeblocks(self, block_num, buf):
+        """For the file system. Raises OSError, also for data that the card rejects."""
+        self._fault = 0
+        super().writeblocks(block_num, buf)
+        if self._fault:
+            raise OSError(self._fault)
+
+    def write(self, token, buf):
+        """Write one sector; the driver calls it for each. After a fault the rest is left out."""
+        if self._fault:
+            return
+        self._send(token)
+        self.spi.write(buf)
+        self.spi.write(b"\xff\xff")  # a check sum, which the card ignores
+        if self._receive() & 0x1F == _ACCEPTED:
+            self._wait()
+        else:
+            self._fault = EIO
+        self._release()
+
+    def write_token(self, token):
+        """End the writing of several sectors; the driver calls it."""
+        self._send(token)
+        self._receive()
+        self._wait()
+        self._release()
+
+    def _send(self, token):
+        self.cs(0)
+        self._byte[0] = token
+        self.spi.write(self._byte)
+
+    def _receive(self):
+        self.spi.readinto(self._byte, 0xFF)
+        return self._byte[0]
+
+    def _wait(self):
+        begun_ms = ticks_ms()
+        while self._receive() == 0:
+            if ticks_diff(ticks_ms(), begun_ms) > BUSY_MS:
+                self._fault = ETIMEDOUT
+                return
+
+    def _release(self):
+        self.cs(1)
+        self.spi.write(b"\xff")

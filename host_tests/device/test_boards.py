@@ -1,0 +1,141 @@
+"""The whole device on boards other than a Pico: their pins, and how the I2C of each behaves."""
+
+import sys
+
+import devices
+import pytest
+from engines import ENGINES
+from kickstand_tools.simulated_board.fakes import chips
+from kickstand_tools.simulated_board.simulator import Board
+
+PINS = {"SENSOR_SDA": 4, "SENSOR_SCL": 5, "LCD_SDA": 6, "LCD_SCL": 7, "BUTTON_PIN": 10}
+WIRED = {"sensor_pins": [4, 5], "lcd_pins": [6, 7], "button_pin": 10}
+WITH_PINS = ["pico", "pico w", "pico 2", "pico lipo", "esp32", "esp32 spiram", "esp32 unicore"]
+WITHOUT = sorted(set(chips.MACHINES) - set(WITH_PINS))
+LEANING = [[0, 25]]
+SENSOR, LCD = 0x68, 0x27
+
+
+@pytest.mark.parametrize("machine", WITH_PINS)
+def test_usual_pins(machine, tmp_path):
+    record = devices.run("cpython", tmp_path, {"lean": LEANING, "board": {"machine": machine}, "until": 2})
+    assert record.last[0].startswith("Raw   25°")
+    assert record.touched == ([4, 18, 19, 21, 22] if "esp32" in machine else [4, 5, 6, 7, 15])
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("machine", WITHOUT)
+def test_a_board_without_usual_pins_touches_none(machine, engine, tmp_path, capsys):
+    """It names what is missing, in safe mode too: the button is held at power-on."""
+    plan = {"board": {"machine": machine, **WIRED}, "presses": [[0, 2]], "until": 3}
+    record = devices.run(engine, tmp_path, plan, capsys)
+    assert record.ends == ["returned"]
+    assert record.touched == []
+    names = "BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL"
+    assert f"for this board ({chips.MACHINES[machine]}): set {names}" in record.console
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize(
+    ("config", "lines"),
+    [
+        ({}, ["config.py: set  ", "BUTTON_PIN      "]),
+        ({"BUTTON_PIN": 10}, ["config.py: set  ", "SENSOR_SDA      "]),
+        ({**PINS, "SIDE": "rigth"}, ["config.py: wrong", "SIDE            "]),
+        ({**PINS, "SENSOR_SDA": 18}, ["config.py: wrong", "SENSOR_SDA      "]),
+    ],
+)
+def test_the_refusal_is_shown_where_the_display_s_pins_are_set(config, lines, engine, tmp_path):
+    config = {"LCD_SDA": 6, "LCD_SCL": 7, **config}
+    record = devices.run(engine, tmp_path, {"board": {"machine": "c3", **WIRED}, "config": config, "until": 3})
+    assert list(record.last) == lines
+    assert record.touched == [6, 7]
+
+
+@pytest.mark.parametrize("wrong", [{"LCD_SDA": "6"}, {"LCD_SDA": 18}, {"LCD_SCL": 12}])
+def test_a_display_with_wrong_pins_leaves_the_others_alone(wrong, tmp_path, capsys):
+    plan = {"board": {"machine": "c3", **WIRED}, "config": {**PINS, **wrong}, "until": 3}
+    record = devices.run("cpython", tmp_path, plan, capsys)
+    assert record.ends == ["returned"]
+    assert "Kickstand stopped. config.py: LCD_S" in record.console
+    assert set(record.touched) <= {6, 7, 10}
+
+
+@pytest.mark.parametrize("machine", ["pico", "esp32", "xiao rp2040"])
+@pytest.mark.parametrize("wrong", ["LCD_SDA", "LCD_SCL"])
+def test_a_wrong_pin_is_not_replaced_by_the_usual_one(machine, wrong, tmp_path, capsys):
+    config = {"LCD_SDA": 2, "LCD_SCL": 3, wrong: "GP2"}
+    record = devices.run("cpython", tmp_path, {"board": {"machine": machine}, "config": config, "until": 3}, capsys)
+    assert f"Kickstand stopped. config.py: {wrong} = 'GP2'" in record.console
+    assert set(record.touched) <= {2, 3}
+
+
+def test_a_refusal_is_shown_on_a_board_with_usual_pins(tmp_path, capsys):
+    plan = {"board": {"machine": "pico"}, "config": {"SENSOR_SDA": 5}, "until": 3}  # a pin that is used twice
+    record = devices.run("cpython", tmp_path, plan, capsys)
+    assert list(record.last) == ["config.py: wrong", "pin used twice  "]
+    assert record.touched == [6, 7]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("driver", ["legacy", "new"])
+@pytest.mark.parametrize("machine", ["esp32", "s3", "c3"])
+def test_an_esp32_measures_with_either_driver(machine, driver, engine, tmp_path):
+    board = {"machine": machine, "i2c_driver": driver, **(WIRED if machine != "esp32" else {})}
+    config = PINS if machine != "esp32" else {}
+    record = devices.run(engine, tmp_path, {"lean": LEANING, "board": board, "config": config, "until": 3})
+    assert record.last[0].startswith("Raw   25°")
+
+
+def test_sensor_and_display_on_one_bus_of_a_c3(tmp_path):
+    config = {**PINS, "LCD_SDA": 4, "LCD_SCL": 5}
+    board = {"machine": "c3", "one_bus": True, **WIRED}
+    record = devices.run("cpython", tmp_path, {"lean": LEANING, "board": board, "config": config, "until": 3})
+    assert record.last[0].startswith("Raw   25°")
+    assert not record.too_fast
+    assert record.touched == [4, 5, 10]
+
+
+@pytest.mark.parametrize("driver", ["legacy", "new"])
+def test_a_bus_that_stalls_never_stops_the_loop_of_an_esp32(driver, tmp_path):
+    """The sensor's wires are held for a second, then the display's for a moment: no reset, and both come back."""
+    faults = [["timeout_for", [SENSOR, 3.0, 1.0]], ["timeout_for", [LCD, 6.0, 0.05]], ["stuck_sda", [7.0]]]
+    board = {"machine": "esp32", "i2c_driver": driver}
+    plan = {"lean": [[0, 25], [6, 30]], "board": board, "faults": faults, "until": 9}
+    record = devices.run("cpython", tmp_path, plan)
+    assert record.ends == ["off"]
+    assert record.first("No sensor|Sensor lost", 3.0) < 3.3
+    assert record.first("Raw   25°", 3.5) < 4.8
+    assert record.first("Raw   30°", 6.0) < 7.0
+    assert record.last[0].startswith("Raw   30°")
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("bits", [3, 8, 60])
+def test_a_device_that_hangs_on_an_esp32_is_freed(bits, engine, tmp_path):
+    """SoftI2C does not notice that SDA is held. Its own clocks free the device, or what it reads is not believed."""
+    faults = [["stuck_sda", [3.0, bits]], ["stuck_sda", [3.0, bits, True]]]
+    plan = {"lean": [[0, 25], [3.2, 35]], "board": {"machine": "esp32"}, "faults": faults, "until": 5}
+    record = devices.run(engine, tmp_path, plan)
+    assert record.ends == ["off"]
+    assert record.first("Raw   3[1-5]°", 3.2) < 4.0
+    shown = {int(line[5:8]) for t_s, line, _ in record.frames if t_s > 1.0 and line.startswith("Raw")}
+    assert shown <= set(range(25, 36))  # never what was read meanwhile
+
+
+def test_status_says_which_pins_are_missing(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for name in [name for name in sys.modules if name.split(".")[0] == "kickstand"]:
+        monkeypatch.delitem(sys.modules, name)
+    board = Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine="s3")
+    with board:
+        from kickstand import status_report
+
+        assert board.run(status_report.report, 5.0) == "returned"
+    loaded = [name for name in sys.modules if name.split(".")[0] == "kickstand"]
+    for name in loaded:
+        sys.modules.pop(name)
+    names = "BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL"
+    said = capsys.readouterr().out
+    assert f"Settings     config.py: no usual pins are known for this board ({board.machine}): set {names}" in said
+    assert board.touched == set()

@@ -1,0 +1,76 @@
+"""An ESP32's heap starts small: garbage is collected between turns of the loop all the same, never within one.
+
+MicroPython's unix port with a heap that is nearly full, as an ESP32's is. Its objects are twice as large, and the
+models of the parts are on it too, so what a turn uses is measured first."""
+
+import json
+
+import pytest
+from mpy import run_mpy
+
+_SCRIPT = """
+import gc, json, sys
+from kickstand_tools.simulated_board.simulator import Board
+board = Board(lambda t_s: (0.0, 1.0, 0.0, 0.0, 0.0, 0.0))
+board.install()
+
+class Esp32:
+    HEAP_DATA = 4
+    could_grow = 60000
+    def idf_heap_info(self, capabilities):
+        return [(90000, 70000, self.could_grow, 1000), (9000, 5000, 4000, 1000)]
+
+sys.modules["esp32"] = Esp32()
+from kickstand import devices
+from kickstand.app import App
+from kickstand.board import port
+from kickstand.settings import Settings
+
+port.IS_ESP32 = True
+real_free = gc.mem_free
+class Gc:  # as the ESP32's, which counts what the heap could grow by
+    collect, threshold, mem_alloc = gc.collect, gc.threshold, gc.mem_alloc
+    def mem_free():
+        return real_free() + Esp32.could_grow
+port.gc = Gc
+
+settings = Settings(object)
+turns = []
+class Watched(App):
+    def turn(self):
+        before = gc.mem_alloc()
+        super().turn()
+        turns.append(gc.mem_alloc() - before)
+
+app = Watched(settings, devices.open_lcd(settings))
+board.run(app.run, 4.0)
+used = sorted(turns)[len(turns) * 9 // 10]  # of heap, by a turn and by the models in it
+port._TURN_BYTES = used
+TURNS = port.turns_to_collect
+if not PLAN:
+    port.turns_to_collect = lambda most: most
+gc.collect()
+ballast = []
+for size in (1 << 20, 1 << 14, 1 << 10):
+    for _ in range((real_free() - 15 * used) // (size + 64)):
+        ballast.append(bytearray(size))
+    gc.collect()
+gc.collect()
+free = real_free() // used
+del turns[:]
+app = Watched(settings, devices.open_lcd(settings))
+plan = TURNS(25)
+board.run(app.run, 12.0)
+within = len([change for change in turns[100:] if change < 0])
+print(json.dumps({"free": free, "turns": len(turns), "within": within, "plan": plan, "used": used}))
+"""
+
+
+@pytest.mark.parametrize("plan", [True, False])
+def test_the_garbage_is_collected_between_turns(plan):
+    """Without asking how much is free, it would be collected within turns: this checks that the heap is that small."""
+    found = json.loads(run_mpy(_SCRIPT.replace("PLAN", str(plan)), heap="4M").splitlines()[-1])
+    assert 8 < found["free"] < 20  # turns until the heap is full: fewer than 25
+    assert 3 <= found["plan"] <= 10
+    assert found["turns"] > 500
+    assert (found["within"] == 0) is plan, found

@@ -1,0 +1,129 @@
+"""Rides on an SD card as cards are: busy for long, rejecting data, slow to start, slow to count, never ready again.
+The whole device on the simulated board, with MicroPython's own FAT."""
+
+import base64
+
+import devices
+import pytest
+from kickstand_tools import unix_port
+from kickstand_tools.rides import block_reader
+
+pytestmark = pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
+
+PINS = {"SD_SPI": 0, "SD_SCK": 18, "SD_MOSI": 19, "SD_MISO": 16, "SD_CS": 17, "RECORD": True}
+RIDE = {"lean": [[0, 0], [8, 20]], "until": 35, "config": PINS}
+
+
+def run(flash, card=None, **plan):
+    """A ride with this card, on a board that was aligned before if the plan says so."""
+    return devices.run("micropython", flash, {**RIDE, "card": card or {}, **plan})
+
+
+def blocks(record):
+    """Those on the card."""
+    found = []
+    for _, content in sorted((record.rides or {}).items()):
+        whole, problems = block_reader.read(base64.b64decode(content))
+        assert set(problems) <= {block_reader.CUT_SHORT}
+        found += whole
+    return found
+
+
+def missing_s(record):
+    return [seconds for block in blocks(record) for seconds in block.missing_s()]
+
+
+def leans_on(record, since_s):
+    """The display goes on changing: the board neither hangs nor restarts."""
+    return record.ends == ["off"] and record.at(since_s + 9.5)[0].startswith("Raw   20°")
+
+
+def test_a_card_records_and_costs_no_reading_and_little_time(tmp_path):
+    record = run(tmp_path)
+    assert len(blocks(record)) >= 3
+    assert missing_s(record) == []
+    assert record.first("Raw") < 1.5
+    assert leans_on(record, 9)
+
+
+def test_without_a_card_nothing_waits_for_one(tmp_path):
+    plan = {**RIDE, "config": {"RECORD": True}, "until": 5}
+    shown = devices.run("micropython", tmp_path, plan).first("Raw")
+    plan["config"] = {}
+    assert shown == devices.run("micropython", tmp_path, plan).first("Raw") < 0.7
+
+
+def test_a_card_that_is_busy_as_cards_may_be_loses_nothing(tmp_path):
+    """Now and then, for 250 ms: the chip's FIFO lasts longer."""
+    record = run(tmp_path, **{"card faults": [[3.0 + 2.7 * i, "busy_next_s", 0.25] for i in range(11)]})
+    assert len(blocks(record)) >= 3
+    assert missing_s(record) == []
+    assert leans_on(record, 9)
+
+
+def test_what_a_card_loses_that_is_busy_after_each_sector_is_told(tmp_path):
+    record = run(tmp_path, **{"card faults": [[3.0, "busy_s", 0.25]]})
+    assert len(blocks(record)) >= 2
+    assert len(missing_s(record)) >= 2
+    assert leans_on(record, 12)
+
+
+def test_data_that_the_card_rejects_end_the_ride_and_are_told(tmp_path):
+    record = run(tmp_path, **{"card faults": [[10.0, "rejects", 1]]})
+    assert 10 < record.first("card fault") < 18
+    assert blocks(record)
+    assert leans_on(record, 20)
+
+
+def test_a_card_that_stays_busy_ends_the_ride_and_nothing_restarts(tmp_path):
+    record = run(tmp_path, **{"card faults": [[10.0, "stuck", True]]})
+    assert 10 < record.first("card fault") < 19
+    assert leans_on(record, 20)
+    assert blocks(record)
+
+
+def test_a_card_whose_room_must_be_counted_is_counted_before_the_watchdog_runs(tmp_path):
+    """Its FSINFO is not valid, and reading its whole FAT takes longer than the watchdog waits."""
+    card = {"sectors": 1 << 24, "read_s": 0.006}
+    record = run(tmp_path, card, fsinfo=False, until=45)
+    assert record.first("SD card") < 1.0
+    assert record.first("Raw   20°") < 30
+    assert record.ends == ["off"]
+    assert len(blocks(record)) >= 2
+
+
+@pytest.mark.parametrize(
+    ("card", "plan"),
+    [
+        ({"init_s": None}, {}),  # the driver waits 5 s for it
+        ({"init_s": 4.5}, {"formatted": False}),
+        ({}, {"card faults": [[0.0, "removed", True]]}),
+        ({"driver": False}, {}),
+        ({}, {"card faults": [[0.0, "rejects", 1000]]}),
+        ({}, {"card faults": [[0.0, "stuck", True]]}),
+    ],
+    ids=["never ready", "no file system", "removed", "no driver", "rejects all", "stuck"],
+)
+def test_a_card_that_cannot_be_used_is_told_and_nothing_restarts(card, plan, tmp_path):
+    record = run(tmp_path, card, **plan)
+    assert record.first("No SD card|SD card:") < 12
+    assert leans_on(record, 20)
+    assert record.console.count("SD card: ") in (1, 2)
+    assert not blocks(record)
+
+
+def test_a_card_that_failed_at_the_start_is_not_waited_for_again(tmp_path):
+    """The driver waits for seconds, in which the lean would stand. So it is told, also for a press that asks for it."""
+    menu = [[14, 1.2], *([16 + i, 0.15] for i in range(4)), [21, 1.2]]
+    plan = {"config": {**PINS, "RECORD": False}, "presses": menu, "lean": [[0, 0], [23, 20]]}
+    record = run(tmp_path, {"init_s": None}, **plan)
+    assert record.first("No SD card") < 8
+    assert 21 < record.first("No SD card", 20.0) < 23
+    assert 23 < record.first("Raw   20°") < 25
+    assert record.ends == ["off"]
+
+
+def test_the_card_is_clocked_quickly(tmp_path):
+    """The driver's default takes 25 ms for a block, and 25 s for the FAT of a card of 32 GB."""
+    record = run(tmp_path, until=6)
+    assert record.card_hz >= 8_000_000

@@ -1,0 +1,75 @@
+"""The host sleeps while a ride is streamed to it: each print then takes half a second. The stream ends itself, and the
+lean goes on."""
+
+import binascii
+import contextlib
+
+import devices
+import engines
+import pytest
+from kickstand import console, errors
+from kickstand_tools.rides.block_reader import parse
+from kickstand_tools.simulated_board.simulator import Board
+
+FROM_S, FOR_S = 20.0, 600.0
+
+
+@pytest.fixture(autouse=True)
+def just_booted(monkeypatch):
+    monkeypatch.setattr(console, "_slow_ms", None)
+
+
+def blocks(said):
+    """The whole blocks in what the board has printed."""
+    data = b""
+    for line in said.splitlines():
+        if line == ".":
+            yield parse(data)
+            data = b""
+        else:
+            with contextlib.suppress(binascii.Error):
+                data += binascii.a2b_base64(line)
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_the_stream_ends_itself_and_the_lean_goes_on(engine, tmp_path, capsys):
+    devices.run(engine, tmp_path, devices.ALIGNED)
+    capsys.readouterr()
+    plan = {
+        "stream": True,
+        "lean": [[0, 0], [24, 20]],
+        "faults": [["usb_asleep", [FROM_S, FOR_S]]],
+        "until": 40,
+    }
+    record = devices.run(engine, tmp_path, plan, capsys)
+    assert FROM_S < record.first("USB not read") < FROM_S + 3.0
+    assert record.at(39)[0] == "Lean  20° right "
+    assert record.first("Lean  20° right ") < 28  # as soon as without the stream: it stalls no more
+    streamed = list(blocks(record.console))
+    assert [block.sequence for block in streamed] == list(range(len(streamed)))
+    assert 35 < len(streamed) < 42
+    assert record.ends[-1] == "off"  # no watchdog
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_one_slow_print_does_not_end_it(engine, tmp_path, capsys):
+    plan = {"stream": True, "faults": [["usb_asleep", [5.0, 0.2]], ["usb_asleep", [75.0, 0.2]]], "until": 90}
+    record = devices.run(engine, tmp_path, plan, capsys)
+    assert record.first("USB not read") > 90
+    assert "recording stopped" not in record.console
+
+
+def test_refusals_do_not_stall_the_loop_again_and_again():
+    """Whatever goes on failing: one slow print in a minute."""
+    with Board(lambda t_s: (0, 1, 0, 0, 0, 0)) as board:
+
+        def main():
+            board.clock.advance(100_000)
+            begun_us = board.clock.now_us
+            for _ in range(600):
+                board.clock.advance(100_000)
+                errors.report(errors.StoreError("read-back"))
+            assert board.clock.now_us - begun_us < 62_000_000
+
+        board.faults.usb_asleep(0.0, 1000.0)
+        assert board.run(main, 1000.0) == "returned"

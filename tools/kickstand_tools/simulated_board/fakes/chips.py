@@ -1,0 +1,55 @@
+"""The boards that can be simulated: what MicroPython calls them, and which pins and I2C controllers their chips have.
+
+Sources: data sheets of the chips; mpconfigboard.h of each board in ports/rp2/boards and ports/esp32/boards of
+MicroPython.
+"""
+
+# sys.implementation._machine, by a short name
+MACHINES = {
+    "pico": "Raspberry Pi Pico with RP2040",
+    "pico w": "Raspberry Pi Pico W with RP2040",
+    "pico 2": "Raspberry Pi Pico2 with RP2350",
+    "pico lipo": "Pimoroni Pico LiPo 4MB with RP2040",
+    "xiao rp2040": "Seeed Studio XIAO RP2040 with RP2040",
+    "esp32": "Generic ESP32 module with ESP32",
+    "esp32 spiram": "Generic ESP32 module with SPIRAM with ESP32",
+    "esp32 unicore": "Generic ESP32 module with ESP32-UNICORE",
+    "lora32": "LILYGO TTGO LoRa32 with ESP32",
+    "s2": "Generic ESP32S2 module with ESP32-S2",
+    "s2 mini": "LOLIN_S2_MINI with ESP32-S2FN4R2",
+    "s3": "Generic ESP32S3 module with ESP32-S3",
+    "s3 of 1.25": "Generic ESP32S3 module with ESP32S3",
+    "c3": "ESP32C3 module with ESP32-C3",
+    "c6": "ESP32C6 module with ESP32-C6",
+    "h2": "ESP32H2 module with ESP32-H2",
+}
+
+
+def pins_of(machine):
+    """The GPIO numbers of this machine's chip that can be used: not those of its flash."""
+    chip = _chip(machine)
+    if chip.startswith("RP2"):
+        return frozenset(range(30))
+    for kind, ranges in _ESP32_PINS.items():
+        if chip.startswith("ESP32" + kind):
+            return frozenset(pin for first, last in ranges for pin in range(first, last + 1))
+    return frozenset(pin for first, last in _CLASSIC_PINS for pin in range(first, last + 1))
+
+
+def i2c_controllers(machine):
+    """How many machine.I2C can drive."""
+    return 1 if _chip(machine)[:7] in ("ESP32C3", "ESP32C6") else 2  # the second of a C6 is its low-power one
+
+
+def _chip(machine):
+    return machine[machine.rindex(" with ") + 6 :].replace("-", "")
+
+
+_CLASSIC_PINS = ((0, 5), (12, 19), (21, 23), (25, 27), (32, 39))
+_ESP32_PINS = {
+    "S2": ((0, 21), (33, 46)),
+    "S3": ((0, 21), (33, 48)),
+    "C3": ((0, 10), (18, 21)),
+    "C6": ((0, 23),),
+    "H2": ((0, 5), (8, 14), (22, 27)),
+}
