@@ -123,7 +123,7 @@ def test_an_event_80_degrees_off_shows_that_the_mount_moved(weight, angle_deg, s
 
 def test_the_speed_is_judged_from_two_events_on():
     assert decided(quality(counted=1), force_ratio=3.0).speed_problem is None
-    assert told(decided(quality(counted=2), force_ratio=3.0).speed_problem)[0] == "speed-unit"
+    assert told(decided(quality(counted=2), force_ratio=3.0).speed_problem) == ("speed-unit", pytest.approx(1 / 3))
 
 
 @pytest.mark.parametrize(

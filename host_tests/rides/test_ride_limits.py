@@ -3,6 +3,7 @@
 import contextlib
 import io
 import os
+import shutil
 import types
 from binascii import a2b_base64, crc32
 from itertools import pairwise
@@ -15,7 +16,6 @@ from kickstand.rides import block as block_format
 from kickstand.rides import flash_ring, ride_paths
 from kickstand.rides.block import RideBlock, block_length
 from kickstand.rides.flash_ring import RideRing
-from kickstand.rides.usb_stream import RideStream
 from kickstand_tools.rides import block_reader
 from kickstand_tools.simulated_board.clock import Clock
 from kickstand_tools.simulated_board.fakes import fake_os, fake_time
@@ -211,6 +211,14 @@ def test_a_write_of_over_10_ms_was_an_erase_of_the_flash(ms, stops_interrupts, s
     assert not recorder.take_stall()
 
 
+def test_the_end_of_a_ride_closes_a_file_and_may_erase_flash(recorder, keeper):
+    for stops_interrupts in (True, False):
+        keeper.stops_interrupts = stops_interrupts
+        start(recorder)
+        recorder.stop()
+        assert recorder.take_stall() is stops_interrupts
+
+
 @pytest.mark.parametrize(("waited_us", "step_us"), [(100_000, 500_001), (3_000_000, 3_000_000), (600_000_000, 1 << 29)])
 def test_after_a_gap_the_time_is_the_clocks_and_more_than_half_a_second(waited_us, step_us, recorder, keeper, clock):
     start(recorder)
@@ -314,7 +322,7 @@ def some_turns(count):
         yield [n * (i * k * 7919 % 4001 - 2000) for k in range(1, 8)], n, n * 5000 + i * 37 % 400 - 200
 
 
-FORMAT_1 = 3995806631  # the check sum of what the test below writes
+FORMAT_1 = 1672459265  # the check sum of what the test below writes
 
 
 def test_the_bytes_of_a_block_are_those_of_format_1(monkeypatch):
@@ -405,7 +413,8 @@ def test_a_block_begins_without_anything_of_the_one_before():
 
 
 def test_the_temperature_is_that_of_the_last_turns_mean():
-    chip = types.SimpleNamespace(accel_lsb_per_g=4096, gyro_lsb_per_dps=16.4, temperature_c=lambda counts: counts / 4)
+    chip = types.SimpleNamespace(accel_lsb_per_g=4096, gyro_lsb_per_dps=16.4, gyro_delay_s=0.0186)
+    chip.temperature_c = lambda counts: counts / 4
     block = RideBlock(5000)
     block.begin(1024, 1, 0, 0, chip, 200, bytes(80))
     block.add([0, 0, 0, 900, 0, 0, 0], 3, 15_000)
@@ -414,6 +423,7 @@ def test_the_temperature_is_that_of_the_last_turns_mean():
     found = block_reader.parse(bytes(block.buffer[:1024]))
     assert found.centidegrees == -2525
     assert found.gyro_lsb_tenths == 164
+    assert found.delay_tenths_ms == 186
 
 
 @pytest.mark.parametrize("index", [1, 2, 3, 4, 6, 8, 96, 1 << 12])
@@ -529,6 +539,56 @@ def test_its_own_first_parts_go_last_and_then_there_is_no_room(root):
     assert [room > 0 for room in rooms] == [True] * 5 + [False] * 2
     assert [part for part in ride_paths.parts("rides") if part[1] == 0] == []
     assert not (root.path / "rides/000/01").exists()
+
+
+def test_the_oldest_go_ride_by_ride_and_group_by_group(root):
+    """One step removes one thing. What has no parts left is passed over, and what the owner put there stays."""
+    for ride in (98, 99, 100, 345):
+        old_ride(root, ride)
+    (root.path / "rides/000/98/notes.txt").write_bytes(b"the rider's own")
+    (root.path / "rides/002").mkdir()
+    (root.path / "rides/000/00").mkdir()
+    root.free = 10 * KB_4
+    ring = RideRing(FLASH)
+    assert ring.begin() == 346
+
+    def left():
+        return sorted(path.relative_to("rides").as_posix() for path in Path("rides").rglob("*"))
+
+    gone, before = [], left()
+    with pytest.raises(OSError):
+        for _ in range(50):
+            assert not ring.ready()
+            now = left()
+            gone.append([path for path in before if path not in now])
+            before = now
+    assert all(len(paths) <= 1 for paths in gone)
+    assert [path for paths in gone for path in paths] == [
+        "000/00",
+        "000/98/00000.rid",
+        "000/99/00000.rid",
+        "000/99",
+        "001/00/00000.rid",
+        "001/00",
+        "001",
+        "002",
+        "003/45/00000.rid",
+        "003/45",
+    ]
+    assert before == ["000", "000/98", "000/98/notes.txt", "003", "003/46"]
+    # ride 0 found and removed; of each other found, its part and its directory removed; groups 1 and 2 found empty; the
+    # ride itself found
+    assert len(gone) == 2 + 4 * 3 + 2 + 1
+
+
+def test_where_somebody_has_removed_the_ride_there_is_no_room(root):
+    root.free = 0
+    ring = RideRing(FLASH)
+    ring.begin()
+    shutil.rmtree("rides/000")
+    with pytest.raises(OSError) as error:
+        ring.ready()
+    assert ring.fault_code(error.value) == "out-of-room"
 
 
 def test_a_flash_without_rides_to_remove_is_full(root):
@@ -650,7 +710,9 @@ def test_numbers_of_rides_go_on(root):
     assert ring.begin() == 201
 
 
-def test_the_stream_is_base64_in_lines_and_a_point_after_each_block():
+def test_the_stream_is_base64_in_lines_and_a_point_after_each_block(clock):
+    from kickstand.rides.usb_stream import RideStream
+
     stream = RideStream()
     assert not stream.stops_interrupts
     assert stream.begin() == 0
