@@ -197,7 +197,7 @@ def test_a_turn_that_fills_a_block_waits_for_the_one_before(recorder, keeper):
 
 
 @pytest.mark.parametrize(
-    ("ms", "stops_interrupts", "stalled"), [(9, True, False), (12, True, True), (12, False, False)]
+    ("ms", "stops_interrupts", "stalled"), [(10, True, False), (12, True, True), (12, False, False)]
 )
 def test_a_write_of_over_10_ms_was_an_erase_of_the_flash(ms, stops_interrupts, stalled, recorder, keeper):
     keeper.slow_us = ms * 1000
@@ -395,6 +395,17 @@ def test_however_full_a_block_is_the_worst_turn_fits(length):
     assert {turn.sums for turn in found[:-1]} == {(800,) * 6}
 
 
+@pytest.mark.parametrize("count", range(1, 17))
+def test_a_block_may_end_within_any_byte(count):
+    block = RideBlock(5000)
+    block.begin(1024, 1, 0, 0, ride_writer.CHIP, 200, bytes(80))
+    for turn in some_turns(count):
+        block.add(*turn)
+    block.close()
+    found = block_reader.parse(bytes(block.buffer[:1024])).turns
+    assert [(turn.sums, turn.n) for turn in found] == [((*s[:3], *s[4:]), n) for s, n, _ in some_turns(count)]
+
+
 def test_a_block_begins_without_anything_of_the_one_before():
     """Each can be read without the others. What is left of a longer one is overwritten with zeros."""
     first, again = RideBlock(5000), RideBlock(5000)
@@ -543,14 +554,14 @@ def test_its_own_first_parts_go_last_and_then_there_is_no_room(root):
 
 def test_the_oldest_go_ride_by_ride_and_group_by_group(root):
     """One step removes one thing. What has no parts left is passed over, and what the owner put there stays."""
-    for ride in (98, 99, 100, 345):
+    for ride in (98, 99, 100, 300):
         old_ride(root, ride)
     (root.path / "rides/000/98/notes.txt").write_bytes(b"the rider's own")
     (root.path / "rides/002").mkdir()
     (root.path / "rides/000/00").mkdir()
     root.free = 10 * KB_4
     ring = RideRing(FLASH)
-    assert ring.begin() == 346
+    assert ring.begin() == 301
 
     def left():
         return sorted(path.relative_to("rides").as_posix() for path in Path("rides").rglob("*"))
@@ -572,10 +583,10 @@ def test_the_oldest_go_ride_by_ride_and_group_by_group(root):
         "001/00",
         "001",
         "002",
-        "003/45/00000.rid",
-        "003/45",
+        "003/00/00000.rid",
+        "003/00",
     ]
-    assert before == ["000", "000/98", "000/98/notes.txt", "003", "003/46"]
+    assert before == ["000", "000/98", "000/98/notes.txt", "003", "003/01"]
     # ride 0 found and removed; of each other found, its part and its directory removed; groups 1 and 2 found empty; the
     # ride itself found
     assert len(gone) == 2 + 4 * 3 + 2 + 1
@@ -731,3 +742,53 @@ def test_the_stream_is_base64_in_lines_and_a_point_after_each_block(clock):
     assert lines[2] == "."
     assert lines[4:] == [""]
     assert stream.fault_code(OSError(5)) == "usb-fault"
+
+
+def tried(root, monkeypatch, **failing):
+    """The problem that the trial of a card finds. failing: what raises which error."""
+    from kickstand.rides import card_trial
+
+    def raised(error):
+        def call(*_):
+            raise error
+
+        return call
+
+    if "mount" in failing:
+        monkeypatch.setattr(ride_paths, "directory", raised(failing["mount"]))
+    if "free" in failing:
+        monkeypatch.setattr(flash_ring, "free_bytes", raised(failing["free"]))
+    recorder = types.SimpleNamespace(problem=None, keeper=types.SimpleNamespace(refused=None))
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        card_trial.prepare(recorder, CARD)
+    assert recorder.problem is recorder.keeper.refused
+    assert said.getvalue().count("\n") == (recorder.problem is not None)
+    return recorder.problem
+
+
+def test_a_card_is_tried_out_before_it_is_needed(root, monkeypatch):
+    assert tried(root, monkeypatch) is None
+    assert os.listdir("card") == []  # what was written is gone
+
+
+def test_whatever_a_card_does_in_the_trial_is_its_own_refusal(root, monkeypatch):
+    refusal = CardError("no-driver")
+    with monkeypatch.context() as patch:
+        assert tried(root, patch, mount=refusal) is refusal
+    for error in (OSError(5), ValueError("a driver's own"), MemoryError()):
+        with monkeypatch.context() as patch:
+            problem = tried(root, patch, free=error)
+        assert isinstance(problem, CardError)
+        assert problem.code == "no-card"
+        assert problem.values == (str(error),)
+
+
+def test_a_card_that_reads_other_than_it_was_written_is_refused(root, monkeypatch):
+    from kickstand.rides import card_trial
+
+    class Wrong(io.BytesIO):
+        def read(self, *_):
+            return b"something"
+
+    monkeypatch.setattr(card_trial, "open", lambda path, mode: Wrong(), raising=False)
+    assert tried(root, monkeypatch).code == "no-card"

@@ -165,17 +165,18 @@ def test_before_alignment_tilt_and_g_are_the_sensors_own():
     assert pages.not_aligned(shown, 3, "Drive: brake")[1] == "Drive: brake"
 
 
-def test_the_sensor_page_counts_gaps_and_starts():
+def test_the_sensor_page_counts_gaps_starts_and_lost_samples():
+    """Two seconds each."""
     chip = types.SimpleNamespace(name="MPU6050", temperature_c=lambda counts: counts / 10.0, overflows=3)
     calibration = types.SimpleNamespace(six_done=True, aligned=False)
     shown = meter(reading=[1, 2, 3, 285, 5, 6, 7], calibration=calibration)
     sensor = types.SimpleNamespace(chip=chip, restarts=1)
-    first = f"MPU6050   28.5{DEGREE}C"
-    assert pages.sensor_info(sensor, shown, 0) == (first, "6pos yes ali no")
-    assert pages.sensor_info(sensor, shown, 1) == (first, "6pos yes ali no")
-    assert pages.sensor_info(sensor, shown, 2) == (first, "3 gaps 1 starts")
-    assert pages.sensor_info(sensor, shown, 4) == (first, "6pos yes ali no")
-    chip.overflows, sensor.restarts, chip.name = 12345, 678, "MPU6050 clone"
-    line1, line2 = pages.sensor_info(sensor, shown, 3)
-    assert line2 == "99 gaps 99 starts"
-    assert len(line1) == 16
+    app = types.SimpleNamespace(sensor=sensor, meter=shown, clock=types.SimpleNamespace(lost=0))
+    seen = [pages.sensor_info(app, seconds) for seconds in range(7)]
+    assert {line1 for line1, _ in seen} == {f"MPU6050   28.5{DEGREE}C"}
+    words = ["6pos yes ali no", "3 gaps 1 starts", "samples lost   0"]
+    assert [line2 for _, line2 in seen] == [words[seconds // 2 % 3] for seconds in range(7)]
+    chip.overflows, sensor.restarts, app.clock.lost, chip.name = 12345, 678, 123456, "MPU6050 clone"
+    assert pages.sensor_info(app, 2)[1] == "99 gaps 9 starts"
+    assert pages.sensor_info(app, 4)[1] == "samples lost9999"
+    assert len(pages.sensor_info(app, 0)[0]) == 16
