@@ -1,7 +1,7 @@
 """The lean filter's figures over one ride: whatever changes them changes every rider's lean, so it has to be meant.
 
 The ride has all that the filter knows: rest, bias, a yaw error, scale errors, slopes, vibration, turns, told speeds,
-slow samples, a restart under way. Other tests say what each parameter does; this one notices that any has changed.
+slow samples, lost ones, a restart under way. Other tests say what each parameter does; this one notices that any has changed.
 After a change that is meant, in host_tests/lean, with firmware and tools on PYTHONPATH:
 python test_known_ride.py > known_ride.csv
 Runs on MicroPython too.
@@ -42,6 +42,7 @@ LEGS = (
     (10, 0, 24, 0, False),
 )
 RESTART_S = 95.0
+LOST = (0.01, 0.3), (60.07, 0.2), (119.12, 0.4)  # when readings of so many seconds were lost
 SLOW_S = 30.0, 44.0  # where samples are 20 ms apart
 BIAS = radians(0.4), radians(-0.3), radians(0.6)
 YAW_ERROR = radians(4.0)
@@ -82,6 +83,9 @@ def figures():
             estimator.measure_speed(values[1] + 0.4)
         if abs(t_s - RESTART_S) < 1e-6:
             estimator.restart()
+        for lost_s, seconds in LOST:
+            if abs(t_s - lost_s) < 1e-6:
+                estimator.doubt(seconds)
         lean = estimator.update(*sensed(t_s, values, rates), int((t_s - before_s) * 1e6 + 0.5))
         before_s = t_s
         if k % 100 == 0 and k:

@@ -154,6 +154,24 @@ def test_a_gap_of_more_than_half_a_second_begins_anew():
     assert not shown.at_rest
 
 
+def test_what_is_lost_for_over_170_ms_makes_the_lean_uncertain_by_30_degrees_a_second():
+    for lost_us, degrees_lost in ((170_000, 0.0), (170_001, 5.1), (300_000, 9.0), (500_000, 15.0)):
+        shown = ride(meter(), 3.0)
+        before = shown.filter.variance
+        shown.update(STILL, lost_us)
+        near(degrees(sqrt(max(0.0, shown.filter.variance - before))), degrees_lost, 0.1)
+        assert shown.trusted is (degrees_lost < 3.0)
+
+
+def test_the_speed_becomes_uncertain_by_3_mps_a_second():
+    """So that 4 m/s may be none after half a second, and not after a quarter of one."""
+    for lost_us, rolls in ((250_000, True), (500_000, False)):
+        shown = speed_up(ride(meter(), 3.0), 0.0, 4.0, 2.0)
+        assert shown.filter.rolling
+        shown.update(STILL, lost_us)
+        assert shown.filter.rolling is rolls
+
+
 def trimmed(angle_deg, sigma_deg, kept_deg=0.0):
     """A bike that stands, whose ride has found this trim so surely."""
     calibration = Calibration()
