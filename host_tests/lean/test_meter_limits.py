@@ -95,9 +95,12 @@ def test_a_bike_over_65_degrees_for_a_second_has_fallen():
         assert not shown.fallen
         roll(shown, sign * 64.0, sign * 66.0)
         assert not ride(shown, 0.8, lean_deg=sign * 66.0).fallen  # the second counts from its latest fall
+        assert ride(shown, 0.5, lean_deg=sign * 66.0).fallen
         shown.restart()
         assert not shown.fallen
         assert shown.lean_deg == 0.0
+        assert not ride(shown, 0.9, lean_deg=sign * 66.0).fallen
+        assert ride(shown, 0.2, lean_deg=sign * 66.0).fallen
 
 
 def test_the_lean_of_a_fall_is_no_maximum():
