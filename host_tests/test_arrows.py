@@ -36,6 +36,7 @@ ARROWS = {
 # Imported only by a function that needs it, because it costs memory or words that most boards never need
 LATE = {
     "errors": {"console"},  # report() prints a refusal in words
+    "status_report": {"rides"},  # is its machine code used?
     "start": {"app", "console", "ui.messages"},  # the display says "starting" while the app is imported
 }
 # What only drivers may import: modules of MicroPython that speak to hardware

@@ -69,6 +69,10 @@ def prepare(extra):
     with open(os.path.join(ROOT, "pyproject.toml"), "rb") as file:
         version = hashlib.sha256(file.read()).hexdigest()
     stamp = (read(STAMP) + "\n\n").split("\n")
+    if stamp[0] != place and stamp[0].endswith(" in " + ROOT) and has_pip():
+        was, now = stamp[0].split(" in ")[0], place.split(" in ")[0]
+        say(".venv has %s, which is used; for %s remove .venv first" % (was, now))
+        place = stamp[0]
     if stamp[0] == place and stamp[1] in [version + " " + e for e in EXTRAS[EXTRAS.index(extra) :]]:
         return
     if (stamp[0] and stamp[0] != place) or not has_pip():

@@ -18,7 +18,7 @@ from math import cos, radians
 
 from kickstand import settings
 from kickstand.app import App
-from kickstand.devices import open_lcd
+from kickstand.devices import open_lcd, open_sensor
 from kickstand.ui import pages
 
 
@@ -30,6 +30,6 @@ def load(meter):
 
 
 config = settings.load()
-app = App(config, open_lcd(config))
+app = App(config, open_lcd(config), open_sensor(config))
 app.screen.add_page(load)
 app.run()

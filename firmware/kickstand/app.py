@@ -14,17 +14,17 @@ from time import sleep_us, ticks_add, ticks_diff, ticks_ms, ticks_us
 from .board import port
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
-from .devices import open_button, open_sensor
+from .devices import open_button
 from .imu.sample_clock import SampleClock
 from .lean.meter import LeanMeter
-from .rides.flash_ring import RideRing
-from .rides.recorder import Recorder
 from .ui.screen import Screen
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
-COLLECT_TURNS = 25  # in which 70 KB of heap are used: less than half of what is free
+COLLECT_TURNS = 36  # in which 100 KB of heap are used, of 120 that are free while recording
+COLLECT_TURNS_DRIVING = 25  # while aligning by driving: 85 KB of heap are free
 SINGLE_GAPS = 300  # single free blocks that a collection leaves
 PAGE_MS = 100
+FIRST_PAGE_MS = 60  # from the start of the sensor: then the lean filter's first window is over
 
 
 def fill_gaps(n):
@@ -41,27 +41,29 @@ def fill_gaps(n):
 class App:
     """The lean meter on a board.
 
-    settings: a Settings. lcd: of devices.open_lcd(). keeper: where rides are recorded to (see Recorder), None for flash
-    or SD card; if one is given, recording begins with the first readings. Raises SettingsError for pins that cannot be
-    used.
+    settings: a Settings. lcd, sensor: of devices.open_lcd() and open_sensor(). keeper: where rides are recorded to (see
+    Recorder), None for flash or SD card; if one is given, recording begins with the first readings. Raises
+    SettingsError for pins that cannot be used.
+
+    recorder: a Recorder, or None before the first ride is recorded.
     """
 
-    def __init__(self, settings, lcd, keeper=None):
+    def __init__(self, settings, lcd, sensor, keeper=None):
         self.settings = settings
         self.lcd = lcd
         self.button = open_button(settings)
-        self.sensor = open_sensor(settings)
-        self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle", self.sensor.chip.gyro_delay_s)
+        self.sensor = sensor
+        self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle", sensor.chip.gyro_delay_s)
         self.calibration = ActiveCalibration(self.meter, self._calibration_changed)
         self.drive = self._open_drive() if settings.SPEED else None
-        self.recorder = Recorder(keeper or RideRing(settings), settings.SAMPLE_HZ)
+        self.recorder = None
+        self._keeper = keeper
         self.clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self.screen = Screen(self)
         self._restarts = 0
         self._record_due = settings.RECORD or keeper is not None
         self._on_card = settings.SD_SPI is not None and keeper is None
         self._page_ms = ticks_ms()
-        self._fault_shown = False
 
     def _open_drive(self):
         # 30 KB of heap with all that they import: not for a board without a speed source
@@ -75,7 +77,8 @@ class App:
         try:
             self._loop()
         except KeyboardInterrupt:
-            self.recorder.stop()
+            if self.recording:
+                self.recorder.stop()
             port.rest_watchdog()  # nothing feeds it from here on
             raise
 
@@ -85,30 +88,32 @@ class App:
 
             self.lcd.show("SD card", "is being read")
             self.lcd.flush()
+            self.recorder = self._open_recorder()
             card_trial.prepare(self.recorder, self.settings)
         watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         gc.threshold(-1)
         due_us = ticks_us()
-        turns = port.turns_to_collect(COLLECT_TURNS)
+        most = COLLECT_TURNS_DRIVING if self.drive else COLLECT_TURNS
+        turns = port.turns_to_collect(most)
         while True:
             self.turn()
             turns -= 1
             if turns <= 0:  # here, not in the middle of a sample: meanwhile the FIFO keeps what comes
                 gc.collect()
                 fill_gaps(SINGLE_GAPS)
-                turns = port.turns_to_collect(COLLECT_TURNS)
+                turns = port.turns_to_collect(most)
             if watchdog:
                 watchdog.feed()
             due_us = ticks_add(due_us, LOOP_US)
             wait_us = ticks_diff(due_us, ticks_us())
             if wait_us > 0:
                 sleep_us(wait_us)
-            else:  # late, as after setting the chip up: count from here instead of racing to catch up
+            else:  # late, as after writing to flash: count from here instead of racing to catch up
                 due_us = ticks_us()
 
     def turn(self):
         """One turn of the loop: the samples that wait, one press, at most one transfer to the display. It waits for
-        nothing but the start of the sensor (0.2 s)."""
+        nothing."""
         now_us, now_ms = ticks_us(), ticks_ms()
         n = self.sensor.fetch(now_ms)
         if n:
@@ -120,8 +125,6 @@ class App:
         if self.sensor.fault is not None:
             self.clock.restart()
             self.screen.interrupt(now_ms)
-            if not self._fault_shown:
-                self._page_ms = now_ms  # at once: the next thing is to start the sensor again
         elif self.sensor.emptied:
             self.clock.emptied(now_us)
         event = self.button.poll(now_ms)
@@ -130,10 +133,15 @@ class App:
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self._show(now_ms)
         self.lcd.tick(now_ms)
-        if self.recorder.active:
+        if self.recording:
             self.recorder.tick()
-        if self.recorder.take_stall() and self.drive:
-            self.drive.speed.after_stall(ticks_ms())
+            if self.recorder.take_stall() and self.drive:
+                self.drive.speed.after_stall(ticks_ms())
+
+    @property
+    def recording(self):
+        """True while a ride is being recorded."""
+        return self.recorder is not None and self.recorder.active
 
     def record(self):
         """Begin to record a ride.
@@ -144,18 +152,30 @@ class App:
         """
         if self.meter.at_rest:
             self.calibration.restart()
+        if self.recorder is None:
+            self.recorder = self._open_recorder()
         self.recorder.start(self.sensor.chip, self.calibration.value)
+
+    def _open_recorder(self):
+        gc.collect()  # as before each import while the loop runs: what stays must not lie behind garbage
+        from .rides.recorder import Recorder
+
+        keeper = self._keeper
+        if keeper is None:
+            from .rides.flash_ring import RideRing
+
+            keeper = RideRing(self.settings)
+        return Recorder(keeper, self.settings.SAMPLE_HZ)
 
     def _poll_speed(self, now_ms):
         speed = self.drive.poll(now_ms)
-        if speed is not None and self.recorder.active:
+        if speed is not None and self.recording:
             self.recorder.add_speed(int(100 * speed + 0.5))
 
     def _show(self, now_ms):
         """Put the page as it is now onto the display. As often, and at standstill only, save the trim that riding has
         found."""
         self._page_ms = ticks_add(now_ms, PAGE_MS)
-        self._fault_shown = self.sensor.fault is not None
         line1, line2 = self.screen.lines(now_ms)
         self.lcd.show(line1, line2)
         if not self.screen.wizard:
@@ -169,7 +189,7 @@ class App:
             self._sensor_started()
         chip = self.sensor.chip
         self.meter.update_sum(chip.sums, n, dt_us)
-        if self.recorder.active:
+        if self.recording:
             self.recorder.add(chip.sums, n, dt_us)
         if self.drive:
             self.drive.feed(chip.sums, n, dt_us, now_ms)
@@ -185,13 +205,15 @@ class App:
     def _sensor_started(self):
         """The chip has been set up, for the first time or again after a fault; it may be another chip."""
         self.meter.restart()
-        self.recorder.mark_gap()
+        if self.recording:
+            self.recorder.mark_gap()
         if self.calibration.chip_started(self.sensor.chip) and self._record_due:
             self._record_due = False
             self.record()
+        self._page_ms = ticks_add(ticks_ms(), FIRST_PAGE_MS)  # no page that says no more than that there is no lean yet
 
     def _calibration_changed(self, replaced):
-        if self.recorder.active:  # a ride has one calibration
+        if self.recording:  # a ride has one calibration
             self.recorder.start(self.sensor.chip, self.calibration.value)
         if replaced:
             self.meter.reset_maxima()

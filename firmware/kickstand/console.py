@@ -14,7 +14,7 @@ not-written|calibration not saved: {0}; the old one is kept
 read-back|calibration not saved: it reads back differently; the old one is kept
 no-driver|SD card: its driver is not on the board: mpremote mip install sdcard
 no-card|SD card: none that can be used ({0}): check wiring and card, which has to be FAT32; then restart the board
-unreadable|config.py cannot be read ({1}{2}): mend it, then kickstand flash --config
+unreadable|config.py cannot be read ({1}{2}): correct it, then kickstand flash --config
 not-allowed|config.py: {0} = {1!r}, but it must be {2}
 no-setting|config.py: {0} is not a setting; see the list in that file
 card-pins|config.py: an SD card needs all of {1}
@@ -22,6 +22,7 @@ no-pins|config.py: no usual pins are known for this board ({2}): set {1}
 aliasing|config.py: DLPF = {1} lets vibration alias at SAMPLE_HZ = {2}: set DLPF = {3} or higher
 pin-twice|config.py: a pin is used twice among {1}
 one-i2c|config.py: SENSOR_I2C and LCD_I2C are both {1} on different pins; give each its own
+wrong-code|the machine code for {0}() gives wrong results on this board: slower code runs instead
 needs-speed|config.py: VEHICLE = "car" needs a speed source to be aligned: SPEED = "gps" or "wheel"
 no-such-pin|config.py: {0} = {1} is no pin of this board ({2})
 i2c-pins|config.py: {1}_SDA = {2} and {1}_SCL = {3} do not belong to I2C {4} ({5})

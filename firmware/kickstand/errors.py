@@ -38,11 +38,21 @@ def report(refusal):
     """Print it on the console, unless that was slow lately: in words, unless a flash or a heap that has failed does not
     give these any more."""
     try:
-        from . import console
+        from .console import tell
 
-        console.tell(refusal)
+        tell(refusal)
     except (ImportError, OSError, MemoryError):
         print(refusal.code)
+
+
+def checked(machine_code, plain, *arguments):
+    """machine_code, if it does with these arguments what plain does with copies of them; else plain, and the console
+    says so: MicroPython's compilers had errors on some boards."""
+    copies = [a if isinstance(a, (int, bytes)) else a[:] for a in arguments]
+    if machine_code(*arguments) == plain(*copies) and list(arguments) == copies:
+        return machine_code
+    report(Notice("wrong-code", plain.__name__))
+    return plain
 
 
 class CaptureError(Refusal):

@@ -5,14 +5,35 @@ the button does not count: a press while an error is shown must not leave the ri
 """
 
 import sys
-from time import sleep_ms
+from time import sleep_ms, ticks_ms
 
 import machine
 
 from . import __version__, settings
 from .board import port
-from .devices import open_button, open_lcd
+from .devices import open_button, open_lcd, open_sensor
 from .errors import SettingsError
+
+# What the app imports, one module after the other: between two of them, display and chip are set up a step further
+STEPS = (
+    "calibration.parameters",
+    "calibration.store",
+    "calibration.active",
+    "calibration.transform",
+    "lean.bike_model",
+    "lean.kalman",
+    "lean.measurements",
+    "lean.rest",
+    "lean.upright_trim",
+    "lean.lean_filter",
+    "lean.meter",
+    "ui.messages",
+    "ui.pages",
+    "ui.views",
+    "ui.page_ring",
+    "ui.screen",
+    "app",
+)
 
 
 def tell(lcd, line1, line2=""):
@@ -31,7 +52,7 @@ def main():
             print("Kickstand %s: safe mode, the button was held at power-up." % __version__)
             tell(lcd, "Safe mode", "Ready for USB")
             return
-        tell(lcd, "Kickstand", "starting")  # a lean from before a reset must not pass for a reading
+        lcd.show("Kickstand", "starting")  # a lean from before a reset must not pass for a reading
         run(chosen, lcd)
     except SettingsError as error:
         port.rest_watchdog()  # it may run: wrong pins show only when the app opens them
@@ -51,11 +72,16 @@ def main():
 def run(chosen, lcd):
     """Run the app. An exception in it is reported on display and console, then the board restarts."""
     try:
-        # Here, because this takes half a second, in which the display already says "starting".
+        sensor = open_sensor(chosen)
+        for name in STEPS:
+            now_ms = ticks_ms()
+            lcd.tick(now_ms)
+            sensor.prepare(now_ms)
+            __import__("kickstand." + name)
         from .app import App
 
         print("Kickstand %s. Ctrl-C stops it." % __version__)
-        App(chosen, lcd).run()
+        App(chosen, lcd, sensor).run()
     except SettingsError:
         raise
     except ImportError as error:  # after an update that was broken off: to restart would not help

@@ -43,6 +43,7 @@ def report():
         print("Settings     " + sentence(error))
         return
     _calibration(who_am_i, settings)
+    _machine_code()
     gc.collect()
     space = os.statvfs("/")
     print(
@@ -124,6 +125,17 @@ def _speed(settings):
         print("  " + ", ".join(messages.lines(fault)))
     else:
         print("  nothing yet" if heard is None else "  %.1f m/s" % heard)
+
+
+def _machine_code():
+    from .calibration.transform import products, products_python
+    from .imu.fifo_frames import add_up, add_up_python, decode, decode_python
+    from .rides.block import encode, encode_python
+
+    used = (decode, add_up, products, encode)
+    plain = (decode_python, add_up_python, products_python, encode_python)
+    slow = [b.__name__ for a, b in zip(used, plain) if a is b]
+    print("Machine code " + ("not used for %s: slower code runs instead" % ", ".join(slow) if slow else "used"))
 
 
 def _aligned(calibration):

@@ -154,6 +154,7 @@ def test_the_definition():
     bent = np.interp(-v * v, -corners * corners, distance)
     want = (16.0**2 - 2.0**2) / (2 * (distance[3] - distance[1]))
     assert mfdd_mps2(v, bent) == pytest.approx(want, rel=1e-6)
+    assert mfdd_mps2(np.array([9.0, 0.0]), np.zeros(2)) == float("inf")  # from one sample to the next
 
 
 def test_a_smooth_road_is_no_standstill(ride):

@@ -111,3 +111,42 @@ def test_an_envelope_keeps_every_peak():
     assert np.all(np.diff(x) > 0)
     assert {9.0, -8.0, 7.0} <= set(y)
     assert np.array_equal(envelope(time[:100], values[:100], 2000)[1], values[:100][~np.isnan(values[:100])])
+
+
+def part(n=100, **changed) -> Channels:
+    """A second at 100 Hz, riding straight on, everything known."""
+    zero = np.zeros(n)
+    columns = {field.name: zero for field in fields(Channels)}
+    columns |= {"t_s": np.arange(n) / 100.0, "sure": np.ones(n), "speed_mps": np.full(n, np.nan)}
+    return Channels(**columns | {name: np.asarray(values, dtype=float) for name, values in changed.items()})
+
+
+def test_what_the_meter_is_not_sure_of_counts_as_unsure_alone():
+    """30 of 100 samples; among them the largest values of the ride. Fallen over, it is not sure either."""
+    sure = np.ones(100)
+    sure[20:50] = 0.0
+    lean = np.where(sure > 0.0, 32.0, 50.0)
+    lean[90:] = -64.9
+    lean[95:] = -65.1
+    total = Summary()
+    total.add(part(sure=sure, lean_deg=lean, shown_g=np.where(sure > 0.0, -0.3, 0.9)))
+    assert total.not_sure_s == pytest.approx(0.30 + 0.05)
+    assert (total.right_deg.value, total.left_deg.value) == (32.0, 64.9)
+    assert (total.right_deg.time_s, total.left_deg.time_s) == (0.0, 0.9)
+    assert (total.brake_g.value, total.accel_g.value) == (0.3, 0.0)
+    assert total.accel_g.time_s is None
+    assert total.beyond_s == {30.0: pytest.approx(0.64), 40.0: pytest.approx(0.05)}
+    assert np.sum(total.histogram_s) == pytest.approx(0.64)
+    assert total.histogram_s[70 + 32] == pytest.approx(0.59)
+    assert total.histogram_s[70 - 65] == pytest.approx(0.05)
+    assert total.riding_s == pytest.approx(0.99)
+
+
+def test_time_at_rest_is_none_of_the_ride():
+    resting = np.zeros(100)
+    resting[60:] = 1.0
+    total = Summary()
+    total.add(part(resting=resting, lean_deg=np.full(100, 12.0)))
+    assert total.riding_s == pytest.approx(0.59)
+    assert np.sum(total.histogram_s) == pytest.approx(0.59)
+    assert total.duration_s == pytest.approx(0.99)

@@ -58,10 +58,13 @@ def test_what_was_integrated_to_a_standstill_that_was_none_is_not_shown(track, m
 
 
 def test_what_is_plausible():
-    assert plausible(60.0, -8.0, 12.0)
-    assert not plausible(70.0, 0.0, 0.0)  # 252 km/h
-    assert not plausible(20.0, -16.0, 0.0)
-    assert not plausible(20.0, 0.0, -31.0)
-    assert closes(-8.0, 12.0)
-    assert not closes(30.0, 12.0)
-    assert closes(58.0, 59.0)  # too long to tell
+    """Up to 250 km/h, 15 m to a side, 30 degrees; 3 m/s left over, and 0.7 m/s more each second of half a minute."""
+    for sign in 1.0, -1.0:
+        assert plausible(69.4, 14.9 * sign, 29.9 * sign)
+        assert not plausible(69.5, 0.0, 0.0)
+        assert not plausible(20.0, 15.1 * sign, 0.0)
+        assert not plausible(20.0, 0.0, 30.1 * sign)
+        assert closes(11.3 * sign, 12.0)
+        assert not closes(11.5 * sign, 12.0)
+        assert not closes(24.1 * sign, 30.0)
+        assert closes(58.0 * sign, 30.1)  # too long to tell

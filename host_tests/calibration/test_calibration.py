@@ -7,6 +7,7 @@ from kickstand.calibration import six_position
 from kickstand.calibration.parameters import Calibration, six_position_calibration
 from kickstand.errors import CalibrationError
 from numpy.testing import assert_allclose
+from numpy.typing import ArrayLike
 from test_rotation import random_rotation
 
 AXES = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
@@ -175,9 +176,9 @@ def test_a_pose_that_is_not_still_is_refused(engine, spoil, reason):
     assert all(len(line) <= 16 for line in answer["lcd"])
 
 
-def readings(offset=(0.0,) * 3, slope=(1.0,) * 3, forces=AXES):
+def readings(offset=(0.0,) * 3, slope=(1.0,) * 3, forces: ArrayLike = AXES):
     """What a sensor with these errors reads of the forces."""
-    return ((np.array(forces) - offset) / slope).tolist()
+    return ((np.asarray(forces) - offset) / slope).tolist()
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
@@ -263,6 +264,11 @@ def test_six_poses_that_say_the_same_give_no_parameters():
     rows = np.eye(6, 7).tolist()
     rows[5] = list(rows[4])
     assert not six_position._solve(rows)
+    poses = AXES.copy()
+    poses[0] = poses[2] = [0.9, 0.9, 0.0]  # two that are one and the same, though each axis changes enough
+    with pytest.raises(CalibrationError) as refusal:
+        six_position.fit(poses.tolist())
+    assert refusal.value.code == "unclear"
 
 
 def test_the_equations_are_solved_whatever_their_order():

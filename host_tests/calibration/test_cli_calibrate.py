@@ -184,6 +184,16 @@ def test_a_seventh_pose_on_a_side_proves_nothing(tmp_path, six_poses):
     assert "flat.csv" in line
 
 
+@pytest.mark.parametrize(("tilt", "serves"), [(18, False), (24, True)])
+def test_the_seventh_pose_is_20_degrees_from_every_side(tmp_path, six_poses, tilt, serves):
+    slanted = np.array([np.sin(np.radians(tilt)), 0.0, np.cos(np.radians(tilt))])
+    free = command.still(tmp_path / "slanted.csv", reads(slanted), BIAS, seed=5)
+    if serves:
+        command.works("calibrate", "six", *six_poses, free, "--out", tmp_path / "CAL.json")
+    else:
+        six_refused(tmp_path, [*six_poses, free], "over 20 degrees from every side")
+
+
 def test_the_same_file_twice(tmp_path, six_poses):
     six_refused(tmp_path, [*six_poses[:5], six_poses[0]], "is given twice")
 

@@ -76,6 +76,15 @@ def test_every_entry_of_a_rotation_is_checked():
     assert not rotation.is_rotation([0.0] * 9)
 
 
+def test_no_rotation_is_refused_and_no_mirror_is_taken():
+    rng = np.random.default_rng(7)
+    for _ in range(100):
+        truth = random_rotation(rng)
+        assert rotation.is_rotation(truth.ravel().tolist())
+        for mirror in (-truth, truth[[1, 0, 2]], truth[:, [0, 2, 1]]):
+            assert not rotation.is_rotation(mirror.ravel().tolist())
+
+
 def test_a_direction_has_length_1_and_a_null_vector_has_none():
     for vector in ([3.0, -4.0, 12.0], [0.0, 0.0, 2e-9]):
         got = rotation.vector(*vector)

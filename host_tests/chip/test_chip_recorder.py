@@ -46,7 +46,7 @@ def noted(self, *arguments):
 LeanMeter.update_sum = noted
 chosen = settings.Settings(Config)
 try:
-    app.App(chosen, devices.open_lcd(chosen)).run()
+    app.App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen)).run()
 except KeyboardInterrupt:
     pass
 print(list(leans[:count]))

@@ -35,6 +35,8 @@ def test_emulate_in_a_terminal():
         free = found.getsockname()[1]
     with Terminal([sys.executable, "-m", "kickstand_tools.cli", "emulate", "--port", str(free)]) as at:
         at.wait_for("Kickstand on an emulated Pico, socket://")
+        at.wait_for("No firmware on it yet, so the display is blank. In another terminal:")
+        at.wait_for(f"kickstand flash --port socket://127.0.0.1:{free}")
         at.press("B")
         at.wait_for("pressed")
         at.press("q")

@@ -22,7 +22,6 @@ MISTAKES = {
         "'up' is not one of",
     ),
     "replay nothing": (["replay"], "Missing argument 'LOG.csv'"),
-    "replay without calibration": (["replay", "a.csv", "--out", "b.csv"], "Missing option '--calibration'"),
     "engine": (["replay", "a", "--calibration", "b", "--out", "c", "--engine", "x"], "'x' is not one of"),
     "flash what": (["flash", "now"], "unexpected extra argument (now)"),
     "port without a name": (["status", "--port"], "requires an argument"),

@@ -5,6 +5,7 @@ import contextlib
 import command
 import pytest
 from kickstand_tools import output, progress
+from kickstand_tools.cli import simulated
 from kickstand_tools.evaluation import evaluate, runs
 from watched import Watched, watched
 
@@ -15,6 +16,12 @@ def test_a_bar_without_patience_begins_with_nothing_done(patience_s, seen, monke
     with contextlib.redirect_stderr(Watched()) as drawn, progress.Bar("riding", 4, patience_s):
         pass
     assert ("riding" in drawn.getvalue() and "0%" in drawn.getvalue()) is seen
+
+
+def test_lines_come_only_as_often_as_asked_for(capsys):
+    with progress.Bar("riding", 4, lines_s=9.0) as bar:
+        bar.advance(4)
+    assert capsys.readouterr().err == ""
 
 
 def test_making_up_a_ride_is_seen(tmp_path, monkeypatch):
@@ -29,6 +36,15 @@ def test_judging_is_seen_from_the_start(monkeypatch):
     shown = watched(monkeypatch, Watched(), *arguments)
     assert "riding" in shown
     assert " 0%" in shown
+
+
+def test_judging_says_its_progress_where_there_is_no_terminal(monkeypatch):
+    """A line now and then."""
+    arguments = ["evaluate", "--profiles", "parked", "--seeds", 1, "--seconds", 60, "--json"]
+    monkeypatch.setattr(simulated, "_LINES_S", 0.0)
+    lines = command.works(*arguments).err.splitlines()
+    assert len(lines) == runs.steps()
+    assert (lines[0], lines[-1]) == (f"riding: {100 / runs.steps():.0f} %", "riding: 100 %")
 
 
 def test_every_step_of_a_ride_is_told():

@@ -138,12 +138,27 @@ def test_a_broken_off_installation_is_begun_again(dev, steps, monkeypatch):
     assert steps == ["venv", "install ", "install "]
 
 
-def test_another_python_or_a_moved_checkout_gets_a_new_venv(dev, steps):
+def test_a_moved_checkout_gets_a_new_venv(dev, steps):
+    dev.prepare("")
+    stamp = Path(dev.STAMP)
+    stamp.write_text(stamp.read_text().replace(dev.ROOT, "/elsewhere", 1))
+    dev.prepare("")
+    assert steps == ["venv", "install ", "venv", "install "]
+
+
+def test_a_venv_of_another_python_stays_while_it_works(dev, steps, monkeypatch, capsys):
+    """It may have been made on purpose, and holds what was installed into it."""
     dev.prepare("")
     stamp = Path(dev.STAMP)
     stamp.write_text(stamp.read_text().replace("Python ", "Python 0.", 1))
     dev.prepare("")
-    assert steps == ["venv", "install ", "venv", "install "]
+    assert steps == ["venv", "install "]
+    assert capsys.readouterr().out.startswith(".venv has Python 0.3")
+    dev.prepare("test")
+    assert steps == ["venv", "install ", "install test"]
+    monkeypatch.setattr(dev, "has_pip", lambda: False)
+    dev.prepare("test")
+    assert steps[3:] == ["venv", "install test"]
 
 
 def test_an_old_python_is_turned_away_in_one_line(dev, monkeypatch):

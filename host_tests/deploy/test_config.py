@@ -9,7 +9,7 @@ import command
 import fake_board
 import mpy
 import pytest
-from kickstand_tools import firmware_path
+from kickstand_tools import errors, firmware_path
 from kickstand_tools.deploy import connection
 from kickstand_tools.simulated_board.fakes import chips
 from serial.tools import list_ports
@@ -49,6 +49,37 @@ def test_elsewhere_it_is_the_firmware_s_own(board, tmp_path, monkeypatch):
     result = command.works("flash", "--config")
     assert board.path("config.py").read_bytes() == (firmware_path.directory() / "config.py").read_bytes()
     assert f"config.py is {firmware_path.directory() / 'config.py'}\n" in result.out
+
+
+def test_an_installed_package_takes_a_config_from_the_current_folder(board, tmp_path, monkeypatch):
+    """What stands in site-packages is not the rider's to edit, and goes with the next update."""
+    package = tmp_path / "site-packages" / "kickstand_tools"
+    (package / "firmware").mkdir(parents=True)
+    (package / "firmware" / "config.py").write_text("# as shipped\n")
+    (package / "firmware" / "main.py").write_text("")
+    (tmp_path / "mine").mkdir()
+    monkeypatch.chdir(tmp_path / "mine")
+    monkeypatch.setattr(firmware_path, "__file__", str(package / "firmware_path.py"))
+    assert "to change settings, copy that file into a folder of yours" in command.works("flash", "--config").out
+    (tmp_path / "mine" / "config.py").write_text('SIDE = "right"\n')
+    result = command.works("flash", "--config")
+    assert f"config.py is {tmp_path / 'mine' / 'config.py'}\n" in result.out
+    assert "to change settings" not in result.out
+    assert board.path("config.py").read_text() == 'SIDE = "right"\n'
+    assert '-m pip install "kickstand[rides]"' in errors.extra("rides")
+
+
+@pytest.mark.parametrize("arguments", [["flash"], ["flash", "--config"]])
+def test_a_setting_behind_a_mark_is_pointed_at(arguments, board, config):
+    """With its line, also where config.py is not copied; none of the file as it is shipped is."""
+    shipped = (firmware_path.directory() / "config.py").read_text()
+    config.write_text(shipped.replace('# SIDE = "left" ', '# SIDE = "right"'))
+    said = f"note: {config}, line 4: SIDE = \"right\" is not used, because a '#' is in front of it"
+    result = command.works(*arguments)
+    assert said in result.out
+    assert result.out.count("note: ") == 1
+    config.write_text(shipped)
+    assert "note: " not in command.works(*arguments).out
 
 
 SLIPS = {
@@ -106,7 +137,7 @@ def test_it_is_judged_for_the_board(machine, status, board, config):
 def test_a_board_without_usual_pins_needs_them_named(machine, board, config):
     pose(board, machine)
     names = "BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL"
-    words = f"{config}: no usual pins are known for this board ({chips.MACHINES[machine]}): set {names}: mend it"
+    words = f"{config}: no usual pins are known for this board ({chips.MACHINES[machine]}): set {names}: correct it"
     command.refused(board.root, "flash", "--config", words=words)
     config.write_text("\n".join(f"{name} = {number}" for number, name in enumerate(names.split(", "))) + "\n")
     command.works("flash", "--config")

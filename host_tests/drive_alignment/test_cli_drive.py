@@ -84,7 +84,7 @@ def test_a_car(tmp_path, method):
     data = json.loads(out.read_text())
     assert data["gyro_bias_dps"] == pytest.approx([1.0, -2.0, 3.0], abs=0.02)
     assert (data["vehicle"], data["aligned"], data["six_positions"]) == ("car", True, False)
-    assert "straight: used, 1" in result.out
+    assert "in a straight line: event 1" in result.out
     assert "quality: " in result.out
     assert "ready after" in result.out
 
@@ -132,7 +132,7 @@ def test_what_is_used_of_several_logs_is_told_by_file_and_its_own_time(tmp_path)
     alone = command.works("calibrate", "drive", whole, "--out", tmp_path / "CAL.json").out
 
     def times(lines):
-        return [float(line.split(" s ")[0]) for line in lines if "straight: used" in line]
+        return [float(line.split(" s ")[0]) for line in lines if "in a straight line: event" in line]
 
     for part in times(a), times(c):
         assert len(part) >= 3

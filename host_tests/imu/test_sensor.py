@@ -12,10 +12,9 @@ def board():
 
 class Chip:
     """waiting: what the next fetches find, samples or an exception; then always one sample. bad: how many samples are
-    spoilt. setups: what set-ups raise, None for nothing. calls: what was done."""
+    spoilt. setups: what set-ups raise in their last step, None for nothing. calls: what was done."""
 
-    def __init__(self, clock):
-        self._clock = clock
+    def __init__(self):
         self.waiting, self.setups, self.states = [], [], []
         self.bad = 0
         self.overflows = self.frames_left = 0
@@ -24,12 +23,17 @@ class Chip:
     def connect(self, i2c):
         self.calls.append(("connect", i2c))
 
-    def setup(self):
-        self.calls.append("setup")
-        self._clock.advance(200_000)
+    def configure(self):
+        self.calls.append("configure")
+        yield 100
+        yield 60
         error = self.setups.pop(0) if self.setups else None
         if error:
             raise error
+        yield 20
+
+    def start(self):
+        self.calls.append("start")
 
     def fetch(self):
         self.calls.append("fetch")
@@ -55,15 +59,22 @@ def raised_or(value):
 def made(board):
     from kickstand.imu.sensor import Sensor
 
-    chip = Chip(board.clock)
+    chip = Chip()
     return Sensor(chip, lambda: "bus"), chip
+
+
+def set_up(sensor, now_ms):
+    """Let the chip be set up from now_ms on, in turns of 10 ms; return when that is done."""
+    for _ in range(19):
+        assert sensor.fetch(now_ms) == 0
+        now_ms += 10
+    return now_ms - 10
 
 
 def running(board):
     """A sensor whose chip runs, and the time in ms: its first sample has just come."""
     sensor, chip = made(board)
-    assert sensor.fetch(0) == 0
-    now_ms = board.clock.now_us // 1000
+    now_ms = set_up(sensor, 0)
     assert sensor.fetch(now_ms) == 1
     assert sensor.fault is None
     del chip.calls[:]
@@ -77,11 +88,25 @@ def code(sensor):
 def test_the_chip_is_set_up_on_a_freed_bus_and_is_at_fault_until_its_first_sample(board):
     sensor, chip = made(board)
     assert code(sensor) == "starting"
-    assert sensor.fetch(0) == 0
-    assert chip.calls == [("connect", "bus"), "setup"]
+    for now_ms in (0, 99, 100, 159, 160, 179):
+        assert sensor.fetch(now_ms) == 0
+        assert chip.calls == [("connect", "bus"), "configure"]
+    assert sensor.fetch(180) == 0
+    assert chip.calls == [("connect", "bus"), "configure", "start"]
     assert (sensor.restarts, code(sensor)) == (1, "starting")
     assert sensor.fetch(200) == 1
     assert code(sensor) is None
+
+
+def test_a_chip_that_is_prepared_starts_with_the_first_fetch(board):
+    """So that no samples wait that were taken before the loop began."""
+    sensor, chip = made(board)
+    for now_ms in range(0, 1000, 15):
+        sensor.prepare(now_ms)
+    assert chip.calls == [("connect", "bus"), "configure"]
+    assert sensor.fetch(1000) == 0
+    assert chip.calls == [("connect", "bus"), "configure", "start"]
+    assert sensor.fetch(1100) == 1
 
 
 def test_a_set_up_that_fails_is_tried_again_50_ms_later(board):
@@ -89,26 +114,43 @@ def test_a_set_up_that_fails_is_tried_again_50_ms_later(board):
 
     sensor, chip = made(board)
     chip.setups = [OSError(5), UnknownChip(0x55), None]
-    sensor.fetch(0)
+    for now_ms in (0, 100, 160):
+        sensor.fetch(now_ms)
     assert (code(sensor), sensor.restarts) == ("no-sensor", 0)
-    ended_ms = board.clock.now_us // 1000
-    sensor.fetch(ended_ms + 49)
-    assert chip.calls.count("setup") == 1
-    sensor.fetch(ended_ms + 51)
-    assert (code(sensor), sensor.fault.values) == ("unknown-chip", (0x55,))
-    sensor.fetch(board.clock.now_us // 1000 + 51)
-    assert (chip.calls.count("setup"), sensor.restarts) == (3, 1)
+    sensor.fetch(209)
+    assert chip.calls.count("configure") == 1
+    for now_ms in (210, 310, 370):
+        sensor.fetch(now_ms)
+    assert sensor.fault and (sensor.fault.code, sensor.fault.values) == ("unknown-chip", (0x55,))
+    for now_ms in (420, 520, 580, 600):
+        sensor.fetch(now_ms)
+    assert (chip.calls.count("configure"), sensor.restarts) == (3, 1)
     assert code(sensor) == "unknown-chip"  # until a sample has come
-    sensor.fetch(board.clock.now_us // 1000)
+    sensor.fetch(605)
     assert code(sensor) is None
 
 
+def test_a_fifo_that_does_not_start_is_tried_again_with_the_bus(board):
+    sensor, chip = made(board)
+    broken = [OSError(5)]
+
+    def start():
+        if broken:
+            raise broken.pop()
+
+    chip.start = start
+    for now_ms in (0, 100, 160, 180):
+        assert sensor.fetch(now_ms) == 0
+    assert (code(sensor), sensor.restarts) == ("no-sensor", 0)
+    sensor.fetch(230)
+    assert chip.calls == [("connect", "bus"), "configure"] * 2
+
+
 def test_a_chip_that_starts_has_time_for_its_first_sample(board):
-    """It counts as silent 100 ms after the set-up, not after the loop read the clock before it."""
+    """It counts as silent 100 ms after its FIFO has started."""
     sensor, chip = made(board)
     chip.waiting = [0, 0, 0]
-    sensor.fetch(0)
-    ended_ms = board.clock.now_us // 1000
+    ended_ms = set_up(sensor, 0)
     for after_ms, said in ((1, "starting"), (100, "starting"), (101, "sensor-silent")):
         assert sensor.fetch(ended_ms + after_ms) == 0
         assert code(sensor) == said
@@ -127,7 +169,7 @@ def test_silence_is_a_fault_after_100_ms(board):
 def test_an_overflow_is_no_silence(board):
     """The FIFO was emptied just now, whatever time the loop has read before."""
     sensor, chip, now_ms = running(board)
-    board.clock.advance(1_000_000)
+    board.clock.advance(now_ms * 1000 + 1_000_000)
     chip.waiting = [0, 0, 0]
     chip.overflows = 1
     assert sensor.fetch(now_ms + 500) == 0
@@ -159,16 +201,14 @@ def test_the_fifo_is_emptied_after_a_transfer_that_broke_off(board):
     assert chip.calls == ["fetch", "restart_fifo", "fetch", "fetch"]
 
 
-def test_a_fault_is_shown_30_ms_before_the_set_up_that_blocks(board):
+def test_a_chip_at_fault_is_set_up_at_once(board):
     sensor, chip, now_ms = running(board)
     chip.bad = 1
     sensor.fetch(now_ms + 50)
     assert code(sensor) == "sensor-frozen"
     chip.bad = 0
-    assert sensor.fetch(now_ms + 79) == 0
-    assert "setup" not in chip.calls
-    assert sensor.fetch(now_ms + 80) == 0
-    assert chip.calls[-2:] == [("connect", "bus"), "setup"]
+    assert set_up(sensor, now_ms + 50) == now_ms + 230
+    assert chip.calls[-3:] == [("connect", "bus"), "configure", "start"]
     assert (sensor.restarts, code(sensor)) == (2, "sensor-frozen")
     assert sensor.fetch(now_ms + 300) == 1
     assert code(sensor) is None
@@ -203,10 +243,9 @@ def test_a_chip_that_has_reset_itself_is_set_up_again(board):
     assert code(sensor) is None
     sensor.check(now_ms + 200)
     assert code(sensor) == "sensor-reset"
-    assert sensor.fetch(now_ms + 229) == 0
-    assert "setup" not in chip.calls
-    sensor.fetch(now_ms + 230)
-    assert "setup" in chip.calls
+    assert "configure" not in chip.calls
+    assert sensor.fetch(now_ms + 200) == 0
+    assert "configure" in chip.calls
 
 
 def test_a_check_that_is_lost_counts_as_a_lost_transfer(board):
@@ -223,8 +262,7 @@ def test_failures_before_a_set_up_do_not_count_after_it(board):
     chip.waiting = [OSError(5)] * 3
     for k in range(3):
         sensor.fetch(now_ms + k)
-    sensor.fetch(now_ms + 100)  # sets up
-    now_ms = board.clock.now_us // 1000
+    now_ms = set_up(sensor, now_ms + 100)
     chip.waiting = [1, OSError(5), 1]
     del chip.calls[:]
     for k in range(3):

@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path.append(str(ROOT / "tools" / "mutants"))
 
-import rooms  # noqa: E402  # pyright: ignore[reportMissingImports]
+import rooms  # noqa: E402
 
 
 @pytest.mark.parametrize("name", rooms.ROOMS)
@@ -26,16 +26,19 @@ def test_every_pattern_of_the_table_has_files(name):
 def changed(tmp_path):
     """Every changed text of a file, by the lines that differ."""
     pytest.importorskip("cosmic_ray", reason="needs the extra mutants")
-    from changes import changes  # pyright: ignore[reportMissingImports]
+    from changes import changes
 
     def all_of(text):
         (tmp_path / "code.py").write_text(text)
         before = text.splitlines()
-        found = changes(Path("code.py"), tmp_path)
-        for change in found:
-            differing = [k for k, line in enumerate(change.mutant.splitlines()) if line != before[k]]
-            assert differing == [change.line - 1]
-        return [change.mutant.splitlines()[change.line - 1].strip() for change in found]
+        lines = []
+        for change in changes(Path("code.py"), tmp_path):
+            mutant = change.mutant(text)
+            if mutant is not None:
+                after = mutant.splitlines()
+                assert [k for k, line in enumerate(after, 1) if line != before[k - 1]] == [change.line]
+                lines.append(after[change.line - 1].strip())
+        return lines
 
     return all_of
 

@@ -11,7 +11,9 @@ import numpy as np
 import pytest
 from kickstand.calibration.two_position import two_position
 from kickstand_tools import unix_port
+from kickstand_tools.calibration.file import read_calibration
 from kickstand_tools.emulator import image
+from kickstand_tools.logs.reader import read_log
 from kickstand_tools.replay import replay, replay_engine
 
 
@@ -96,6 +98,38 @@ def test_the_engines_agree(tmp_path):
         results.append(read(tmp_path / f"{engine}.csv"))
     for name in replay_engine.COLUMNS:
         assert np.max(np.abs(results[0][name] - results[1][name])) < 0.002, name
+
+
+def with_speed(log, speed):
+    """The log once more, with this in the last column of each row."""
+    header, *rows = log.read_text().split("\n")[:-1]
+    text = [header + ",speed_mps", *[f"{row},{mps}" for row, mps in zip(rows, speed, strict=True)]]
+    (log.with_name("speed.csv")).write_text("\n".join(text) + "\n")
+    return log.with_name("speed.csv")
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+@pytest.mark.parametrize("mps", ["14.0", "0", "0.0"])
+def test_a_speed_in_the_log_reaches_the_meter(tmp_path, engine, mps):
+    """Once a second, a 0 too, and none where a cell is empty: the lean is that of the firmware told the same."""
+    log, cal = ride(tmp_path / "log.csv", seconds=10), command.write_cal(tmp_path / "CAL.json")
+    told = {second * 100 for second in range(10)}
+    speed = with_speed(log, [mps if k in told else "" for k in range(1000)])
+    out = tmp_path / "LEAN.csv"
+    parameters = read_calibration(cal).to_firmware()
+    leans = {}
+    for name, path in ("without", log), ("with", speed):
+        meter = replay_engine.ReplayMeter(parameters)
+        before, leans[name] = None, []
+        for k, (time_us, reading, _) in enumerate(read_log(path).rows()):
+            if name == "with" and k in told:
+                meter.measure_speed(float(mps))
+            meter.update(reading, 0 if before is None else time_us - before)
+            before = time_us
+            leans[name].append(meter.lean_deg)
+        command.works("replay", path, "--calibration", cal, "--out", out, "--engine", engine)
+        assert np.max(np.abs(read(out)["lean_deg"] - leans[name])) < (1e-5 if engine == "cpython" else 0.01), name
+    assert np.max(np.abs(np.subtract(leans["with"], leans["without"]))) > 1.0  # it tells the meter something
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
@@ -217,3 +251,19 @@ def test_a_real_recording_leans_as_gravity_says(tmp_path, shared_data, engine):
         assert abs(true_lean) > 40
         assert abs(np.mean(shown) - true_lean) < 2.0
         assert abs(shown[-1] - true_lean) < 2.0
+
+
+def test_the_calibration_beside_the_log_is_taken(tmp_path):
+    """As report, plot and export take it; and what replay has written is not taken for a log."""
+    log = analysis_rides.short(tmp_path)
+    beside = log.with_name(log.name.split(".")[0] + ".cal.json")
+    beside.unlink(missing_ok=True)
+    lean = tmp_path / "LEAN.csv"
+    command.refused(tmp_path, "replay", log, "--out", lean, words=f"no calibration {beside.name} beside it")
+    beside.write_text(json.dumps(analysis_rides.CALIBRATION))
+    command.works("replay", log, "--out", lean)
+    for name in "replay", "report":
+        more = ["--out", tmp_path / "x.csv"] if name == "replay" else []
+        words = "LEAN.csv holds the lean that kickstand has computed: give the log that it was made from"
+        command.refused(tmp_path, name, lean, *more, words=words)
+    command.refused(tmp_path, "report", lean, "--calibration", beside, words=words)

@@ -71,7 +71,7 @@ for block in range(300):
         if random.random() < 0.01:
             entry[1] = random.randint(0, block_format.MAX_DT_US)
         for _ in range(6):
-            entry.append(max(1, n) * random.randint(-wide - 1, wide))
+            entry.append(random.randint(-max(1, n) * (wide + 1), max(1, n) * wide))
         entry.append(random.choice((0, random.randint(0, 30000), random.randint(0, 1 << 24))))
         for function, state, out in zip((encode, encode_python), states, outs):
             function(entry, state, out)

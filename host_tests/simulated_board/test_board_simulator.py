@@ -260,3 +260,18 @@ def test_the_world_is_asked_once_a_sample():
     on_board(firmware, 10.0, world=world)
     assert 100 <= len(times) <= 102
     assert times == sorted(times)
+
+
+def test_a_press_during_a_long_press_comes_after_it():
+    """Else its end would end the long one."""
+    seen = []
+
+    def firmware(board):
+        board.press(for_s=1.2)
+        board.press()
+        for _ in range(160):
+            fake_time.sleep_ms(10)  # longer than the contacts bounce
+            seen.append(board.button.closed)
+
+    on_board(firmware, 3.0)
+    assert all(seen[:118]) and not any(seen[121:134]) and all(seen[136:148]) and not any(seen[151:])

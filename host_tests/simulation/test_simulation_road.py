@@ -82,3 +82,44 @@ def test_vibration_has_its_size_and_stops_with_the_engine():
     assert force[:10000].std(axis=0) / STANDARD_GRAVITY == pytest.approx([0.2] * 3, rel=0.15)
     assert not force[10000:].any()
     assert not rates[10000:].any()
+
+
+@pytest.mark.parametrize(
+    ("mps", "rpm"),
+    [
+        (0.0, 1250.0),  # the clutch slips
+        (3.0, 1250.0),
+        (10.0, 3700.0),  # 370 /min per m/s in first gear
+        (15.0, 3900.0),  # 260 in second: in first it would be over 5000
+        (24.0, 4920.0),  # 205
+        (29.0, 4930.0),  # 170
+        (33.0, 4950.0),  # 150
+        (40.0, 5400.0),  # 135 in the last, whatever comes of it
+    ],
+)
+def test_the_lowest_gear_that_keeps_the_engine_under_where_it_is_shifted_up(mps, rpm):
+    assert Engine().rpm(np.full(2000, mps), RATE)[1000] == pytest.approx(rpm)
+
+
+def test_it_shakes_at_half_once_and_twice_the_crankshafts_speed():
+    """A four-stroke engine fires every other turn; 3900 /min are 65 Hz."""
+    n = 20000
+    force, rates = Engine().vibration(np.random.default_rng(2), np.full(n, 15.0), np.ones(n), RATE)
+    for shaken in np.column_stack((force, rates)).T:
+        power = np.abs(np.fft.rfft(shaken)) ** 2
+        waves = np.fft.rfftfreq(n, 1.0 / RATE)
+        shares = [np.sum(power[np.abs(waves - at) < 0.2]) / np.sum(power) for at in (32.5, 65.0, 130.0)]
+        assert sum(shares) == pytest.approx(1.0, abs=0.01)
+        assert min(shares) > 1e-4
+    assert np.std(rates) / np.std(force) == pytest.approx(np.radians(15.0) / STANDARD_GRAVITY, rel=0.2)
+
+
+def test_it_shakes_with_the_square_of_its_speed_up_to_half_a_g():
+    def size(mps: float, rms_g: float) -> float:
+        force, _ = Engine(rms_g).vibration(np.random.default_rng(2), np.full(4000, mps), np.ones(4000), RATE)
+        return float(np.sqrt(np.mean(force**2)) / STANDARD_GRAVITY)
+
+    full = 6000.0 / 135.0
+    assert size(full, 0.1) == pytest.approx(0.1, rel=0.02)
+    assert size(15.0, 0.1) == pytest.approx(0.1 * (0.25 + 0.75 * (3900.0 / 6000.0) ** 2), rel=0.02)
+    assert size(full, 0.7) == pytest.approx(0.5, rel=0.02)

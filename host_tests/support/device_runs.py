@@ -137,6 +137,8 @@ def run_device(plan):
                 cards.eject()
                 end = board.run(main, until_s)
                 ends.append(end)
+        if ends[-1] == "returned":  # with power on: what stays on the display
+            watch()
         settings.load = load
         if ends[-1] == "returned":  # what it leaves on the display
             watch()

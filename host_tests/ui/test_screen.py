@@ -48,6 +48,7 @@ def app():
         calibration=types.SimpleNamespace(aligned=True, value=None),
         drive=Drive(),
         recorder=Recorder(),
+        recording=False,
     )
 
 

@@ -11,14 +11,26 @@ PACKAGE = Path(kickstand.__file__).resolve().parent  # the firmware's package, w
 
 def directory() -> Path:
     """The directory that holds main.py and config.py."""
-    packaged = Path(__file__).resolve().parent / "firmware"  # in a wheel
-    return packaged if packaged.is_dir() else TOOLS.parent / "firmware"  # in a checkout
+    return _packaged() if installed() else TOOLS.parent / "firmware"
+
+
+def _packaged() -> Path:
+    return Path(__file__).resolve().parent / "firmware"  # in a wheel
+
+
+def installed() -> bool:
+    """True if these tools were installed as a package: they are no checkout, whose files a rider may edit."""
+    return _packaged().is_dir()
 
 
 def config() -> Path:
-    """The rider's config.py: that of the checkout in the current directory, else the one beside these tools."""
+    """The rider's config.py: that of the checkout in the current directory, for an installed package also the one in
+    the current directory itself; else the one beside these tools."""
     here = Path("firmware").resolve()
-    return (here if (here / "kickstand").is_dir() and (here / "config.py").is_file() else directory()) / "config.py"
+    if (here / "kickstand").is_dir() and (here / "config.py").is_file():
+        return here / "config.py"
+    own = Path("config.py").resolve()
+    return own if installed() and own.is_file() else directory() / "config.py"
 
 
 def search_path() -> str:

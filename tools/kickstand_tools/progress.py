@@ -1,4 +1,7 @@
-"""A progress bar or a spinner on standard error for work that takes over a second; only if that is a terminal."""
+"""A progress bar or a spinner on standard error for work that takes over a second; only if that is a terminal.
+
+Work of minutes says its progress in lines elsewhere: Bar's lines_s.
+"""
 
 import contextlib
 import sys
@@ -24,9 +27,12 @@ class Bar:
     """with Bar("replaying", total) as bar: bar.advance(n). It appears after patience_s.
 
     Without a total: bar.reach is the `progress` callback of a function that tells it.
+    lines_s: where standard error is no terminal, print a line so often; None for never.
     """
 
-    def __init__(self, what: str, total: int | None = None, patience_s: float = PATIENCE_S) -> None:
+    def __init__(
+        self, what: str, total: int | None = None, patience_s: float = PATIENCE_S, lines_s: float | None = None
+    ) -> None:
         self._progress = Progress(
             TextColumn("{task.description}"),
             BarColumn(),
@@ -40,6 +46,8 @@ class Bar:
         self._begin_s = time.monotonic()
         self._wanted = sys.stderr.isatty()
         self._shown = False
+        self._lines_s = None if self._wanted else lines_s
+        self._said_s = self._begin_s
 
     def __enter__(self) -> "Bar":
         self.advance(0)
@@ -51,6 +59,10 @@ class Bar:
         if self._wanted and not self._shown and time.monotonic() - self._begin_s >= self._patience_s:
             self._progress.start()
             self._shown = True
+        if amount and self._lines_s is not None and time.monotonic() - self._said_s >= self._lines_s:
+            self._said_s = time.monotonic()
+            task = self._progress.tasks[0]
+            print(f"{task.description}: {task.percentage:.0f} %", file=sys.stderr, flush=True)
 
     def reach(self, done: int, total: int) -> None:
         """done of total is done; total is 0 if it is not known."""

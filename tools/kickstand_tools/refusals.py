@@ -10,6 +10,8 @@ SWAPPED_DEG = 4.0  # an upright pose is hardly ever so far off; a pose on the ki
 
 # {0}, {1} ... are the refusal's values
 _SENTENCES = {
+    "absurd-readings": "readings that no vehicle gives, at {0:.1f} s up to {1:.0f} deg/s and {2:.1f} g, where the lean "
+    "is not known: check the sensor, and the units in the log",
     "moved": "moved or knocked",
     "vibration": "not still: vibration",
     "tilting": "not still: slowly tilting",
@@ -100,4 +102,5 @@ def _forward_exchanged(car: bool, side: str, roll_deg: float | None) -> str:
     if roll_deg is not None and abs(roll_deg) > SWAPPED_DEG:
         return line + "were the poses swapped?"
     other = {"left": "--side right", "right": "--side left"}.get(side, "with the other --side")
-    return line + f"calibrate two {other}?" + ("" if roll_deg is not None else " Or were the poses swapped?")
+    line += f"calibrate two {other}?" + ("" if roll_deg is not None else " Or were the poses swapped?")
+    return line + " Or, if no board wrote this log, do all accelerations have the opposite sign? At rest up reads +1 g"

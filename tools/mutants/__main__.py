@@ -42,7 +42,8 @@ def main() -> int:
         ]
         total = len(wanted)
         if options.sample and options.sample < total:
-            wanted = sorted(random.Random(options.seed).sample(wanted, options.sample))
+            chosen = random.Random(options.seed).sample(range(total), options.sample)
+            wanted = [wanted[k] for k in sorted(chosen)]
         runner = Tests(copy, [str(path) for path in tests(room, copy)])
         if not runner.pass_unchanged():
             print(runner.output(), "The tests must pass before the code is changed.", sep="\n")
@@ -57,10 +58,13 @@ def _judge(wanted: list[Change], runner: Tests) -> int:
     begin = time.monotonic()
     for number, change in enumerate(wanted, 1):
         original = (runner.root / change.path).read_text("utf-8")
-        result = runner.judge(change.path, change.mutant)
+        mutant = change.mutant(original)
+        if mutant is None:
+            continue
+        result = runner.judge(change.path, mutant)
         counts[str(change.path)][result] += 1
         if result == SURVIVED:
-            print(f"{change.path}:{change.line}", *_diff(original, change.mutant), sep="\n  ", flush=True)
+            print(f"{change.path}:{change.line}", *_diff(original, mutant), sep="\n  ", flush=True)
         if number % 20 == 0:
             print(f"{number} of {len(wanted)}, {time.monotonic() - begin:.0f} s", file=sys.stderr, flush=True)
     print(f"{'killed':>8}{'timed out':>10}{'survived':>10}{'total':>8}{'noticed':>9}")

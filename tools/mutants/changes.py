@@ -4,7 +4,6 @@ One or two neighbours stand for each operator; all eleven would say the same ele
 """
 
 import ast
-from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -41,11 +40,20 @@ SMALL = 16  # whole numbers up to this are counts and indices: one more and one 
 
 
 class Change(NamedTuple):
-    """path: of the file, from the project's root. line: its number, from 1. mutant: the changed text of the file."""
+    """path: of the file, from the project's root. line: its number, from 1. The change is the operator's occurrence."""
 
     path: Path
     line: int
-    mutant: str
+    operator: Operator
+    occurrence: int
+
+    def mutant(self, source: str) -> str | None:
+        """The changed text of the file; None if it is no Python, or differs in annotations and decorators only."""
+        try:
+            text = mutate_code(source, self.operator, self.occurrence)
+        except AttributeError:  # cosmic-ray replaces exceptions that have a plain name, not gzip.BadGzipFile
+            return None
+        return None if text is None or _bare(text) in (None, _bare(source)) else text
 
 
 class Negate(boolean_replacer.AddNot):
@@ -134,22 +142,12 @@ def operators() -> list[Operator]:
 
 def changes(path: Path, root: Path) -> list[Change]:
     """Every change of the file path, relative to root, in the order of its lines."""
-    source = (root / path).read_text("utf-8")
-    original = _bare(source)
+    nodes = list(ast_nodes(get_ast((root / path).read_text("utf-8"))))
     found = []
     for operator in operators():
-        for occurrence, line in enumerate(_lines(operator, source)):
-            mutant = mutate_code(source, operator, occurrence)
-            if mutant is not None and _bare(mutant) not in (None, original):
-                found.append(Change(path, line, mutant))
+        positions = [begin for node in nodes for begin, _ in operator.mutation_positions(node)]
+        found += [Change(path, line, operator, number) for number, (line, _) in enumerate(positions)]
     return sorted(found, key=lambda change: change.line)
-
-
-def _lines(operator: Operator, source: str) -> Iterator[int]:
-    """The number of the line of each place where the operator changes something."""
-    for node in ast_nodes(get_ast(source)):
-        for (line, _), _ in operator.mutation_positions(node):
-            yield line
 
 
 def _bare(source: str) -> str | None:

@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 WARM = ("numpy", "hypothesis", "click", "rich.console", "matplotlib.pyplot", "pandas", "plotly.graph_objects")
+WARM += ("pyarrow.parquet",)
 # Without MicroPython, where a test can choose: a process each is slow, and the same tests run on CPython.
 ARGUMENTS = ("-x", "-q", "-k", "not micropython", "-p", "no:cacheprovider", "-p", "no:xdist", "--hypothesis-seed=0")
 KILLED, SURVIVED, TIMED_OUT = "killed", "survived", "timed out"
@@ -41,9 +42,9 @@ class Tests:
 
     def pass_unchanged(self) -> bool:
         """True if the tests pass as they are. Leaves their bytecode in the copy."""
-        self._run()  # once without bytecode, once to take the time
+        self._run(self._files)  # once without bytecode, once to take the time
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        passed = self._run() == SURVIVED
+        passed = self._run(self._files) == SURVIVED
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         self.seconds = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
         os.environ["PYTHONDONTWRITEBYTECODE"] = "1"
@@ -51,14 +52,15 @@ class Tests:
         return passed
 
     def judge(self, path: Path, mutant: str) -> str:
-        """KILLED, SURVIVED or TIMED_OUT: what the tests make of this text of the file path, relative to root."""
+        """KILLED, SURVIVED or TIMED_OUT: what the tests make of this text of the file path, relative to root. The tests
+        of the same name come first."""
         file = self.root / path
         original = file.read_text("utf-8")
         for bytecode in file.parent.glob(f"__pycache__/{file.stem}.*"):
             bytecode.unlink()  # it is taken for that of any text of the same length and second
         try:
             file.write_text(mutant, "utf-8")
-            return self._run()
+            return self._run(sorted(self._files, key=lambda name: file.stem not in name))
         finally:
             file.write_text(original, "utf-8")
 
@@ -67,12 +69,12 @@ class Tests:
         self._output.seek(0)
         return self._output.read()
 
-    def _run(self) -> str:
+    def _run(self, files: list[str]) -> str:
         self._output.seek(0)
         self._output.truncate()
         child = os.fork()
         if child == 0:
-            self._test()
+            self._test(files)
         limit = time.monotonic() + WALL_TIMES * (self.seconds + EXTRA_S)
         status = None
         while status is None:
@@ -89,7 +91,7 @@ class Tests:
             return TIMED_OUT
         return SURVIVED if os.WEXITSTATUS(status) == 0 else KILLED
 
-    def _test(self):
+    def _test(self, files: list[str]):
         """Never returns."""
         status = 3
         try:
@@ -99,7 +101,7 @@ class Tests:
             os.chdir(self.root)
             seconds = int(TIMES * self.seconds + EXTRA_S)
             resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-            status = int(pytest.main([*ARGUMENTS, *self._files]))
+            status = int(pytest.main([*ARGUMENTS, *files]))
         finally:
             sys.stdout.flush()
             os._exit(status)

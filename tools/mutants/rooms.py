@@ -8,7 +8,7 @@ FIRMWARE, TOOLS, TESTS = "firmware/kickstand/", "tools/kickstand_tools/", "host_
 
 class Room(NamedTuple):
     """sources, tests: patterns of files, from the project's root; the tests in the order in which they run, so those
-    that notice most in least time first."""
+    that notice most in least time first; before them all that of the same name as the code."""
 
     sources: tuple[str, ...]
     tests: tuple[str, ...]
@@ -29,7 +29,8 @@ ROOMS = {
         (
             TESTS + "calibration/test_rotation.py",
             TESTS + "calibration/test_calibration.py",
-            TESTS + "calibration/test_poses.py",
+            TESTS + "calibration/test_still_pose.py",
+            TESTS + "calibration/test_pose_taker.py",
             TESTS + "calibration/test_active.py",
             TESTS + "calibration/test_two_position.py",
             TESTS + "imu/test_batches.py",
@@ -73,12 +74,16 @@ ROOMS = {
         (TESTS + "calibration/test_cli*.py", TESTS + "drive_alignment/test_cli_drive.py"),
     ),
     "logs": Room(
-        (TOOLS + "logs/*.py",),
-        (TESTS + "logs/*.py",),
+        tuple(TOOLS + f"logs/{name}.py" for name in ("cells", "log", "reader", "source", "table")),
+        tuple(TESTS + f"logs/{name}.py" for name in ("test_log", "test_cells", "test_cli_logs", "test_log_blocks")),
+    ),
+    "units": Room(
+        (TOOLS + "logs/*_unit.py",),
+        (TESTS + "logs/test_unit_limits.py", TESTS + "logs/test_rate_unit.py", TESTS + "logs/test_speed_unit.py"),
     ),
     "replay": Room(
         (TOOLS + "replay/*.py",),
-        (TESTS + "replay/*.py",),
+        (TESTS + "replay/test_forward_sign.py", TESTS + "replay/test_cli_replay.py"),
     ),
     "analysis": Room(
         (TOOLS + "analysis/*.py", TOOLS + "analysis/plot/*.py"),
@@ -86,14 +91,16 @@ ROOMS = {
     ),
     "export": Room(
         (TOOLS + "analysis/export/*.py",),
-        (TESTS + "analysis/test_cli_export.py",),
+        (TESTS + "analysis/test_export_formats.py", TESTS + "analysis/test_cli_export.py"),
     ),
     "stops": Room(
         (TOOLS + "analysis/stops/*.py",),
         (
-            TESTS + "analysis/test_analysis_brake_test.py",
+            TESTS + "analysis/test_stops_closed_form.py",
+            TESTS + "analysis/test_speed_fit.py",
+            TESTS + "analysis/test_quiet.py",
             TESTS + "analysis/test_analysis_standstill.py",
-            TESTS + "analysis/test_cli_report.py",
+            TESTS + "analysis/test_analysis_brake_test.py",
         ),
     ),
     "simulation": Room(

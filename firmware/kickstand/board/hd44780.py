@@ -28,15 +28,17 @@ REINIT_MS = 10_000  # initialise again so often: noise can put the nibbles out o
 PROBE_MS = 200  # how often to see whether a display is there, or still there
 REOPEN_PROBES = 5  # while there is no display the bus is freed once in so many probes
 STEP_MS = 5  # from step to step: the longest wait that the initialisation asks for is 4.1 ms
-_POWER_UP = const(-8)  # the step to begin with after power-up: the display does not listen for the first 40 ms
+_POWER_UP_MS = const(40)  # for so long after power-up the display does not listen
+_POWER_UP = const(-8)  # the step to begin with then
 
 # Initialisation by instruction (data sheet, figure 24), one step a tick, STEP_MS apart, so that the loop never waits.
 # First single nibbles, which bring the display into 4-bit mode from whatever state it was in. Then whole bytes:
-# function set (4 bit, 2 lines); display on, no cursor; entry mode left to right; return home, which undoes a shift.
+# function set (4 bit, 2 lines); display on, no cursor; entry mode left to right; return home, which undoes a shift. The
+# first three take 37 us each, less than a transfer.
 _NIBBLES = (0x30, 0x30, 0x30, 0x20)
 _COMMANDS = b"\x28\x0c\x06\x02"
 _GLYPH_PARTS = const(4)  # the 64 bytes of character patterns are sent 16 at a time
-_STEPS = len(_NIBBLES) + len(_COMMANDS) + _GLYPH_PARTS
+_STEPS = len(_NIBBLES) + 1 + _GLYPH_PARTS
 
 
 def _bar_glyphs():
@@ -67,7 +69,8 @@ class Lcd:
         self._port = bytearray(1)
         self._glyphs = _bar_glyphs()
         self.address = None
-        self._step = 0  # of the initialisation; negative: waiting for the display's own power-up
+        # of the initialisation; negative: waiting for the display's own power-up, which came with the board's
+        self._step = _POWER_UP if ticks_ms() < _POWER_UP_MS else 0
         self._probes = 0  # in a row that found nothing
         self._acted_ms = None  # when something was last sent
         self._seen_ms = 0  # when the display last answered
@@ -116,7 +119,7 @@ class Lcd:
     def flush(self):
         """Send everything now, in about 0.1 s: for texts shown before the loop runs or after it has failed."""
         self._acted_ms = None
-        for _ in range(_STEPS + 4):
+        for _ in range(_STEPS - _POWER_UP + 4):
             self.tick(ticks_ms())
             if self.address is None:
                 return
@@ -143,18 +146,18 @@ class Lcd:
             self.address = address
             self._probes = 0
             return
-        # Not found: if it answers later it was just powered, so it is given its 40 ms. A display that answers the first
-        # probe was powered together with the board, some time ago.
+        # Not found: if it answers later it was just powered, so it is given its 40 ms.
         self._step = _POWER_UP
 
     def _initialise(self, step):
         if step < len(_NIBBLES):
             nibble = _NIBBLES[step] | _LIGHT
             self._i2c.writeto(self.address, bytes((nibble | _E, nibble)))
-        elif step < len(_NIBBLES) + len(_COMMANDS):
-            self._send(_COMMANDS[step - len(_NIBBLES)], b"")
+        elif step == len(_NIBBLES):
+            for command in _COMMANDS:
+                self._send(command, b"")
         else:
-            quarter = (step - len(_NIBBLES) - len(_COMMANDS)) * COLUMNS
+            quarter = (step - len(_NIBBLES) - 1) * COLUMNS
             self._send(_CGRAM_ADDRESS + quarter, memoryview(self._glyphs)[quarter : quarter + COLUMNS])
             for shown in self._shown:  # both lines have to be written again
                 shown[:] = _NEVER

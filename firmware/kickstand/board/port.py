@@ -11,7 +11,7 @@ import machine
 
 # Collect garbage often while the other modules are loaded. Else their garbage would push what stays to the far end of
 # the heap, and every later collection would have to walk all of it. App resets the threshold before its loop begins.
-gc.threshold(32_768)
+gc.threshold(80_000)
 
 IS_ESP32 = sys.platform == "esp32"
 # The board and then its chip, as "Raspberry Pi Pico with RP2040" or "ESP32C3 module with ESP32-C3"

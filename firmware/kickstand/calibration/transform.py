@@ -10,6 +10,7 @@ of heap, so there they are products of integers in machine code, which are right
 from array import array
 from math import radians
 
+from ..errors import checked
 from ..rotation import rotate
 
 ONE = 2048  # the integer that stands for the largest scale: times the sum of eight samples it still fits 32 bits
@@ -32,6 +33,9 @@ try:
     from .transform_viper import products
 except (ImportError, NameError, SyntaxError):  # CPython, or a port without viper
     products = products_python
+else:
+    _SUMS = array("i", range(-260000, 260000, 74300))
+    products = checked(products, products_python, array("i", range(2047, -2047, -171)), _SUMS, 8, array("i", range(6)))
 
 
 class Transform:

@@ -5,6 +5,10 @@ RM-MPU-6000A rev 4.2, pp. 29 to 31). On the board decode() and add_up() are the 
 elsewhere they are decode_python() and add_up_python(), which give the same results.
 """
 
+from array import array
+
+from ..errors import checked
+
 FRAME = 14  # bytes
 
 
@@ -53,3 +57,8 @@ try:
     from .fifo_frames_viper import add_up, decode
 except (ImportError, NameError, SyntaxError):  # CPython, or a port without viper
     add_up, decode = add_up_python, decode_python
+else:
+    _ENDS = b"\x7f\xff\x80\x00\xff\xff\x00\x80\x80\xff\x01\x00\xab\xcd"
+    decode = checked(decode, decode_python, _ENDS, 0, array("h", range(7)))
+    # The watch: a frame with this hash came before
+    add_up = checked(add_up, add_up_python, _ENDS, 1, array("i", range(7)), array("i", (12493472, 3, 9)))

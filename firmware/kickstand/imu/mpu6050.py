@@ -102,21 +102,17 @@ class Mpu6050:
         self.gyro_delay_s = GYRO_DELAY_S[dlpf]
         accel_bits = (2, 4, 8, 16).index(accel_range_g) << 3
         gyro_bits = (250, 500, 1000, 2000).index(gyro_range_dps) << 3
-        # SMPLRT_DIV to ACCEL_CONFIG2, as they are written and should read back
-        self._configuration = bytes((1000 // rate_hz - 1, dlpf, gyro_bits, accel_bits, dlpf))
-        self._one = bytearray(1)
+        self._configuration = bytes((1000 // rate_hz - 1, dlpf, gyro_bits, accel_bits, dlpf))  # from SMPLRT_DIV on
+        self._one, self._two = bytearray(1), bytearray(2)
         self._readback = bytearray(_FIFO_EN - _SMPLRT_DIV + 1)
-        self._two = bytearray(2)
         self._frames = bytearray(FRAME * MAX_FRAMES)
         # The first n frames, for each n: made once, because each slice takes heap.
         self._some_frames = [memoryview(self._frames)[: FRAME * n] for n in range(MAX_FRAMES + 1)]
-        self.frames_left = 0
-        self.overflows = 0
+        self.frames_left = self.overflows = 0
         self._odd = False  # the last fetch() found a frame that was not complete
         self._started = False  # setup() has run to its end: the FIFO is filling
         self._full = 0  # bytes in the FIFO from which on it may have overflowed
-        self.counts = array("h", [0] * 7)
-        self.sums = array("i", [0] * 7)
+        self.counts, self.sums = array("h", [0] * 7), array("i", [0] * 7)
         self._watch = array("i", (0, 0, rate_hz * FROZEN_MS // 1000))
 
     @property
@@ -143,17 +139,27 @@ class Mpu6050:
     def setup(self):
         """Identify, reset and configure the chip and start its FIFO, in 0.2 s. Raises UnknownChip, or OSError from the
         bus or when the configuration does not read back."""
+        for wait_ms in self.configure():
+            sleep_ms(wait_ms)
+        self.start()
+
+    def configure(self):
+        """Do what setup() does except start(), as a generator: it yields the milliseconds to wait before it is
+        continued, so that the caller can do something else meanwhile. Raises the same."""
+        self._started = False
         self.identify()
         self._write(_PWR_MGMT_1, _RESET)
-        sleep_ms(100)
+        yield 100
         self._write(_PWR_MGMT_1, _CLOCK_PLL_GYRO_X)
-        sleep_ms(60)  # a write that comes too early after a reset is lost without an error
+        yield 60  # a write that comes too early after a reset is lost without an error
         for i in range(5 if self._chip()[_HAS_ACCEL_CONFIG2] else 4):
             self._write(_SMPLRT_DIV + i, self._configuration[i])
-        self._started = False
         if not self.configured():
             raise OSError("MPU6050 configuration does not read back")
-        sleep_ms(20)  # until the low-pass has settled
+        yield 20  # until the low-pass has settled
+
+    def start(self):
+        """Let the FIFO of a chip that is configured fill from now on. Raises OSError as restart_fifo() does."""
         self.restart_fifo()
         self._started = True
         self._watch[1] = 0
@@ -194,17 +200,11 @@ class Mpu6050:
         if odd:  # the chip is just writing a frame; if the next count is odd as well, an overflow cut one short
             self.frames_left = n + 1
             return 0
-        if n >= MAX_FRAMES:
-            self.frames_left = n - MAX_FRAMES
-            n = MAX_FRAMES
-        elif n > FEW_FRAMES:
-            self.frames_left = n - FEW_FRAMES
-            n = FEW_FRAMES
-        else:
-            self.frames_left = 0
-        if n:
-            self._i2c.readfrom_mem_into(self._address, _FIFO_R_W, self._some_frames[n])
-        return n
+        taken = MAX_FRAMES if n >= MAX_FRAMES else FEW_FRAMES if n > FEW_FRAMES else n
+        self.frames_left = n - taken
+        if taken:
+            self._i2c.readfrom_mem_into(self._address, _FIFO_R_W, self._some_frames[taken])
+        return taken
 
     def take(self, k):
         """Put sample k of the last fetch() into counts; 0 is the oldest. Takes no heap."""

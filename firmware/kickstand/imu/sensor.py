@@ -7,7 +7,6 @@ from .mpu6050 import UnknownChip
 
 CHECK_MS = 100  # from one check of the configuration, which takes 0.6 ms, to the next
 RETRY_MS = 50  # from one attempt to set the chip up to the next
-SAY_MS = 30  # from a fault to the first attempt, which blocks the loop for 0.2 s: time to show the fault
 FAILURES = 3  # transfers that fail in a row make a fault; a NACK or two are tolerated
 SILENT_MS = 100  # a fault after this long without a sample
 
@@ -24,7 +23,9 @@ class Sensor:
         self.reopen = reopen
         self._failures = 0  # transfers that failed in a row
         self._overflows = 0  # of the chip's FIFO, those that are dealt with
-        self._due_ms = ticks_ms()  # when the next check is due or, while the chip does not run, the next attempt
+        self._due_ms = ticks_ms()  # when the next check is due or, while the chip does not run, the next step to that
+        self._steps = None  # of setting the chip up, a generator
+        self._ready = False  # the chip is set up, but its FIFO does not fill yet
         self._sample_ms = 0  # when the last sample was read
         self.restarts = 0
         self.fault = Notice("starting")
@@ -43,10 +44,11 @@ class Sensor:
     def fetch(self, now_ms):
         """Read the samples that have come in; return how many, at most MAX_FRAMES. now_ms: ticks_ms().
 
-        Their sum is in chip.sums; chip.take(k) gives each of them. A chip that does not run is set up first. Raises
-        SettingsError for pins that cannot be used, and nothing else."""
+        Their sum is in chip.sums; chip.take(k) gives each of them. A chip that does not run is set up first, which
+        takes 0.2 s of calls. Raises SettingsError for pins that cannot be used, and nothing else."""
         if not self._running:
-            if ticks_diff(now_ms, self._due_ms) >= 0:
+            self.prepare(now_ms)
+            if self._ready:
                 self._start(now_ms)
             return 0
         waiting = self._transfer(now_ms)
@@ -102,21 +104,42 @@ class Sensor:
 
     def _fail(self, code, now_ms):
         self.fault = Notice(code)
-        self._running = False
-        self._due_ms = ticks_add(now_ms, SAY_MS)
+        self._running = self._ready = False
+        self._due_ms = now_ms
+
+    def prepare(self, now_ms):
+        """Do the next step of setting the chip up, if it is time for it; none is left to do once fetch() only has to
+        start the FIFO. Raises SettingsError for pins that cannot be used, and nothing else. now_ms: ticks_ms()."""
+        if self._ready or ticks_diff(now_ms, self._due_ms) < 0:
+            return
+        wait_ms = RETRY_MS
+        try:
+            if self._steps is None:
+                self.chip.connect(self.reopen())
+                self._steps = self.chip.configure()
+            wait_ms = next(self._steps)
+        except StopIteration:
+            self._ready = True
+            self._steps = None
+        except (UnknownChip, OSError) as error:
+            self._not_set_up(error)
+        self._due_ms = ticks_add(now_ms, wait_ms)
+
+    def _not_set_up(self, error):
+        """An attempt to set the chip up ended with this error: the next one begins with the bus."""
+        self._ready = False
+        self._steps = None
+        self.fault = Notice("unknown-chip", error.args[0]) if isinstance(error, UnknownChip) else Notice("no-sensor")
 
     def _start(self, now_ms):
-        """Try to set the chip up."""
+        """The chip is set up: let its FIFO fill."""
         try:
-            self.set_up()
-        except UnknownChip as error:
-            self.fault = Notice("unknown-chip", error.args[0])
-        except OSError:
-            self.fault = Notice("no-sensor")
-        else:
-            self._running = True  # but the fault stays until there is a good sample
-            self.restarts += 1
-            self._failures = 0
-        now_ms = ticks_ms()  # setting up took 0.2 s
+            self.chip.start()
+        except OSError as error:
+            self._not_set_up(error)
+            return
+        self._running = True  # but the fault stays until there is a good sample
+        self.restarts += 1
+        self._failures = 0
         self._sample_ms = now_ms
-        self._due_ms = ticks_add(now_ms, CHECK_MS if self._running else RETRY_MS)
+        self._due_ms = ticks_add(now_ms, CHECK_MS)

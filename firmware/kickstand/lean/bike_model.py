@@ -31,7 +31,7 @@ tan t. Just after the bike has entered a turn its speed is still known from befo
 lean.
 """
 
-from math import cos, sin, sqrt
+from math import cos, radians, sin, sqrt
 
 from ..units import STANDARD_GRAVITY
 
@@ -57,6 +57,7 @@ MAX_PITCH = 1.2  # rad. No motorcycle reaches it, a sensor in the hand may; at 9
 BALANCE_MIN_SPEED = 4.0 / STANDARD_GRAVITY  # g s. Larger: the balanced rate is not used in slow turns.
 BALANCE_SHARE = 0.5  # of 1: the two may differ by SHARE x balanced rate + RATE. Larger: as for RATE.
 BALANCE_RATE = 0.1  # rad/s: see SHARE. Larger: the balanced rate is also used where lean or speed are wrong.
+BALANCE_SIGMA = radians(8.0)  # rad: of the lean. Larger: the balanced rate is used with a lean that is hardly known.
 BALANCE_MIN_COS = 0.3  # of 1: lower bound of cos(lean). Larger: too little rate about left in deep leans.
 
 
@@ -107,7 +108,8 @@ def predict(x, force, rate, seconds, sums):
 
 def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
     """Rates about left and up, for products of a state and a rate: those of a bike in balance at this lean and speed
-    (v w_y = -cos q sin t) if the measured rate about up is close to them, else the measured ones.
+    (v w_y = -cos q sin t) if the measured rate about up is close to them, else the measured ones. speed: 0 for the
+    measured ones in any case.
 
     Noise of a measured rate would be squared in such products, and speed and lean would be estimated too small (the
     problem of errors in variables).
@@ -121,13 +123,14 @@ def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
 
 class Linearisation:
     """(1) to (6) about the state x, at a window's means of the corrected rates (3 values) and of the forward force.
+    lean_variance: rad^2, of the lean, which tells the turn rate of a bike in balance only where it is known.
 
     Each ..._row of the Jacobians is ((state, partial derivative), ...): lean, pitch and speed of the rates of change
     (1) to (3), left and up of the forces (4) and (5), level of (6). Derivatives that are zero are left out, and terms
     that are small because pitch, yaw error, scale and cross-axis errors are. The other attributes are values of terms.
     """
 
-    def __init__(self, x, rates, forward):
+    def __init__(self, x, rates, forward, lean_variance=0.0):
         wx, wy, wz = rates
         speed, yaw_error = x[SPEED], x[YAW_ERROR]
         st, ct, sq = sin(x[LEAN]), cos(x[LEAN]), sin(x[PITCH])
@@ -135,7 +138,7 @@ class Linearisation:
         yaw_rate = wx * st + wy * ct  # about the vertical, where there is no pitch
         sideways = speed * wy
         acceleration = forward - sq + sideways * yaw_error
-        turn_x, turn_y = turn_rates(speed, st, ct, cq, wx, wy)
+        turn_x, turn_y = turn_rates(speed if lean_variance < BALANCE_SIGMA**2 else 0.0, st, ct, cq, wx, wy)
         self.lean_row = (
             (PITCH, -yaw_rate / (cq * cq)),  # d lean' / d q
             (BIAS_FORWARD, -1.0),  # d lean' / d b_z

@@ -21,7 +21,7 @@ from .upright_trim import UprightTrim
 
 WINDOW_US = 200_000
 FIRST_WINDOW_US = 50_000
-PIECES = 21  # of the work on a window; a test counts them
+PIECES = 18  # of the work on a window; a test counts them
 SLOW_STEP_US = 12_000  # samples that are further apart leave time for all pieces at once
 DELAY_S = 0.0048  # of the MPU6050's gyro at DLPF 3
 MAX_SPEED = 150.0 / STANDARD_GRAVITY
@@ -57,6 +57,7 @@ class LeanFilter:
         self._count = 0
         self._window_us = 0
         self._axis = 0  # of the gyro, whose bias is measured next at rest
+        self._road = False  # the last window was updated by the road
         self._roll_rate = 0.0
         self._last_roll_rate = 0.0
 
@@ -186,7 +187,7 @@ class LeanFilter:
     def _process(self, means, seconds, roll_acceleration):
         """Linearise, update and inject for one window; a generator of short pieces."""
         p = self._p
-        model = Linearisation(self._x, means[2:5], means[7])
+        model = Linearisation(self._x, means[2:5], means[7], p.rows[LEAN][LEAN])
         yield
         noise = measurements.NOISE_ANGLE**2 * seconds
         yield from p.propagate_row(LEAN, model.lean_row, seconds, noise)
@@ -203,17 +204,22 @@ class LeanFilter:
         self._inject(model)
 
     def _update_ride(self, model, means, seconds, roll_acceleration):
-        """By the forces, the road, the speed or a straight; and the trim of upright."""
+        """By the forces, the speed, the road or a straight; and the trim of upright.
+
+        What is assumed lasts for seconds: the road and the straight take turns, each for two windows at once."""
         p, x = self._p, self._x
         for measurement in measurements.forces(model, means, roll_acceleration):
             yield from p.update(*measurement)
-        yield from p.update(*measurements.level_road(model, x, seconds))
-        lean, speed, given = x[LEAN] - self.trim.angle, x[SPEED], self._given_speed
+        speed, given = x[SPEED], self._given_speed
         if given is not None:
             self._given_speed = None
             yield from p.update(*measurements.given_speed(given, speed, model.acceleration))
-        else:
-            yield from p.update(*measurements.straight_or_usual_speed(lean, speed, model.yaw_rate, seconds))
+        self._road = not self._road
+        if self._road:
+            yield from p.update(*measurements.level_road(model, x, 2.0 * seconds))
+        elif given is None:
+            lean = x[LEAN] - self.trim.angle
+            yield from p.update(*measurements.straight_or_usual_speed(lean, speed, model.yaw_rate, 2.0 * seconds))
         certain = p.rows[SPEED][SPEED] < measurements.SIGMA_TRIM_SPEED**2
         if certain and model.speed > measurements.STRAIGHT_MIN_SPEED:
             sideways = (means[5] - model.acceleration * x[YAW_ERROR]) / max(means[6], 0.5)

@@ -4,7 +4,6 @@ from math import degrees, radians
 
 from ..calibration.transform import Transform
 from ..units import GAP_US, LOST_US
-from .formula import formula_lean_deg
 from .lean_filter import DELAY_S, LeanFilter
 
 SMOOTH_US = 300_000  # time constant of the g shown
@@ -43,6 +42,7 @@ class LeanMeter:
         if calibration is not self.calibration:
             self._doubt = None
         self.calibration = calibration
+        self._smooth_all = not (calibration.aligned and self._leans)  # pages then show left and up as well
         self._transform = Transform(calibration)
         self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg))
         self.restart()
@@ -97,7 +97,7 @@ class LeanMeter:
             return True
         if self._doubt:
             return False
-        return self.filter.variance <= MAX_VARIANCE and abs(self.filter.pitch_deg) < WHEELIE_DEG
+        return 0.0 <= self.filter.variance <= MAX_VARIANCE and abs(self.filter.pitch_deg) < WHEELIE_DEG
 
     def keep_trim(self):
         """Take the trim found so far into the calibration, if the bike stands, the trim is certain enough and it
@@ -115,6 +115,8 @@ class LeanMeter:
     @property
     def lean_formula_deg(self):
         """Nicolae's lean of the last reading alone."""
+        from .formula import formula_lean_deg  # one page shows it
+
         return formula_lean_deg(self.force, self.rate[1])
 
     def measure_speed(self, speed_mps):
@@ -143,31 +145,33 @@ class LeanMeter:
             else:
                 self.filter.doubt(dt_us * 1e-6)
         if self._fresh:
+            self._fresh = False
             dt_us = 0  # nothing was before: the same on the board and in a replay
-        self._smooth(1.0 if self._fresh else dt_us / (SMOOTH_US + dt_us))
-        self._fresh = False
-        self.lean_deg = lean = self.filter.update(self.force, self.rate, dt_us) if self._leans else 0.0
-        if -FALLEN_DEG < lean < FALLEN_DEG:
-            self._flat_us = 0
-            self.fallen = False
-            self._hold_maxima(lean, self.smooth_force[2])
+            self._smooth(1.0)
         else:
+            self._smooth(dt_us / (SMOOTH_US + dt_us))
+        self.lean_deg = lean = self.filter.update(self.force, self.rate, dt_us) if self._leans else 0.0
+        if abs(lean) >= FALLEN_DEG:
             self._flat_us += dt_us
             self.fallen = self._flat_us >= FALLEN_US
+            return
+        if self._flat_us:
+            self._flat_us = 0
+            self.fallen = False
+        if not (
+            -self.max_left_deg <= lean <= self.max_right_deg
+            and -self.max_brake_g <= self.smooth_force[2] <= self.max_accel_g
+        ):
+            self._hold_maxima(lean, self.smooth_force[2])
 
     def _smooth(self, gain):
         force, smooth = self.force, self.smooth_force
         smooth[2] += gain * (force[2] - smooth[2])
-        if not (self.calibration.aligned and self._leans):  # pages then show left and up as well
+        if self._smooth_all:
             smooth[0] += gain * (force[0] - smooth[0])
             smooth[1] += gain * (force[1] - smooth[1])
 
     def _hold_maxima(self, lean, forward):
-        if (
-            -self.max_left_deg <= lean <= self.max_right_deg
-            and -self.max_brake_g <= forward <= self.max_accel_g
-        ):
-            return
         if not self.trusted:
             return
         self.max_left_deg = max(self.max_left_deg, -lean)

@@ -22,6 +22,7 @@ from binascii import crc32
 
 from .. import __version__
 from ..calibration.store import BODY_LENGTH
+from ..errors import checked
 
 MAGIC = b"KRID"
 VERSION = 1
@@ -106,6 +107,11 @@ try:
     from .block_viper import encode
 except (ImportError, NameError, SyntaxError):  # CPython, or a port without viper
     encode = encode_python
+else:
+    _ENTRY = array("i", (2, 9999, -30000, 30000, -1, 0, 255, -256, 0))
+    # the entry before, means from small to large, and three bits that wait
+    _STATE = array("i", (3, 1, -1, 29000, 70, -7, 254, 77, 0) + tuple(range(16, 160, 16)) + (5, 3, 0, 5000))
+    encode = checked(encode, encode_python, _ENTRY, _STATE, bytearray(40))
 
 
 class RideBlock:

@@ -47,10 +47,12 @@ class Gps:
     def poll(self, now_ms):
         """Return a new speed in m/s, or None. Never waits. now_ms: ticks_ms()."""
         if self._heard_ms is None:
-            self._heard_ms = self._sentence_ms = self._fix_ms = now_ms
+            self._begin(now_ms)
         waiting = self._uart.any()
         if not waiting:
             return None
+        if ticks_diff(now_ms, self._heard_ms) > SILENT_MS:
+            self._begin(now_ms)
         self._heard_ms = now_ms
         chunk = self._uart.read(min(waiting, MAX_CHUNK)) or b""
         speed = None
@@ -67,6 +69,10 @@ class Gps:
         if beyond > 0:  # the end of a line was lost: keep what may be the beginning of the next one
             self._line = self._line[max(beyond, self._line.rfind(b"$")) :]
         return speed
+
+    def _begin(self, now_ms):
+        """From now on there is time for a whole sentence and for a fix, before their absence is a fault."""
+        self._heard_ms = self._sentence_ms = self._fix_ms = now_ms
 
     def after_stall(self, now_ms):
         """Interrupts were off until now. Nothing to do: if bytes were lost, the checksum of their sentence is wrong."""

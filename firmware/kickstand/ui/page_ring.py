@@ -17,7 +17,7 @@ class PageRing:
         self._meter = app.meter
         self._calibration = app.calibration
         self._drive = app.drive
-        self._recorder = app.recorder
+        self._app = app
         self._align = align
         self._pages = CAR if app.settings.VEHICLE == "car" else MOTORCYCLE
         self._at = 0
@@ -60,13 +60,13 @@ class PageRing:
             if self._at % 2 == 0:
                 return self._drive_lines(now_ms)
             return pages.not_aligned(self._meter, now_ms // 1000, "drive and brake")
-        count = len(self._pages) + self._driving + self._recorder.active
+        count = len(self._pages) + self._driving + self._app.recording
         if self._at >= count:  # the last page has gone; checked here, so that the other pages keep their places
             self._at = 0
         if self._at == len(self._pages) and self._driving:
             return self._drive_lines(now_ms)
         if self._at >= len(self._pages):
-            return pages.recording(self._recorder)
+            return pages.recording(self._app.recorder)
         return self._page(self._pages[self._at])
 
     def _page(self, page):
@@ -76,6 +76,6 @@ class PageRing:
         if not meter.trusted or abs(meter.lean_deg) > FALLEN_DEG:
             return pages.unsure(meter.doubt)
         line1, line2 = page(meter)
-        if self._at == 0 and self._recorder.active:
+        if self._at == 0 and self._app.recording:
             line1 = pages.recorded(line1)
         return line1, line2

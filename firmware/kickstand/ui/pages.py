@@ -3,7 +3,6 @@
 page_ring.py lists the pages that a short press turns.
 """
 
-from ..lean.formula import static_lean_deg
 from ..rotation import vector
 from . import messages
 from .messages import DEGREE
@@ -123,6 +122,8 @@ def raw(meter):
 def not_aligned(meter, seconds, todo="On stand: press"):
     """Before alignment: tilt and g in the sensor's own axes, which are not the bike's (Nicolae's figure 3). todo: what
     to do next; shown in turn with "Not aligned"."""
+    from ..lean.formula import static_lean_deg  # not needed once there is an alignment
+
     tilt = static_lean_deg(meter.smooth_force)
     hint = "Not aligned" if seconds % 4 < 2 else todo
     return "Raw %4d%s %+.2fg" % (round(tilt), DEGREE, meter.smooth_force[2]), hint

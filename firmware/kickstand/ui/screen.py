@@ -4,7 +4,6 @@ import gc
 
 from ..board.button import LONG
 from . import messages, pages
-from .menu import Menu
 from .page_ring import PageRing
 from .views import FaultView, InfoView, NoticeView, QuestionView
 
@@ -27,7 +26,7 @@ class Screen:
 
     def lines(self, now_ms):
         """What the display should say now. Call it about every 100 ms."""
-        problem = self._app.recorder.take_problem()
+        problem = self._app.recorder and self._app.recorder.take_problem()
         if problem:
             self._notice.show(messages.lines(problem), now_ms)
         return self._update_front(now_ms)[1]
@@ -41,7 +40,7 @@ class Screen:
             if view is self._question:  # except to a question, which has not been seen yet
                 return
         if not view.press(event, now_ms) and event == LONG:
-            self._menu = Menu(self._entries(), now_ms)
+            self._open_menu(now_ms)
         self._drop_ended()
 
     def add_page(self, page):
@@ -81,13 +80,18 @@ class Screen:
         if self._menu and self._menu.ended:
             self._menu = None
 
+    def _open_menu(self, now_ms):
+        from .menu import Menu  # with the first long press
+
+        self._menu = Menu(self._entries(), now_ms)
+
     def _entries(self):
         """The entries of the menu: (name, what to call with now_ms)."""
         align = (("Align the bike", self._align),)
         six = (("Six positions", self._six),)
         rest = (("Reset maxima", self._reset), ("Sensor info", self._info.show))
         drive = (("Align by drive", self._drive),) if self._app.drive else ()
-        if self._app.recorder.active:
+        if self._app.recording:
             record = (("Stop recording", self._stop),)
         else:
             record = (("Record ride", self._record),)
@@ -142,7 +146,7 @@ class Screen:
     def _record(self, now_ms):
         if self._ready(now_ms):
             self._app.record()
-            if self._app.recorder.active:
+            if self._app.recording:
                 self._notice.show(pages.recording(self._app.recorder), now_ms)
 
     def _stop(self, now_ms):

@@ -13,7 +13,7 @@ from kickstand.errors import Notice
 from kickstand.lean.meter import FALLEN_DEG
 from numpy.typing import NDArray
 
-from ..calibration.file import CalibrationFile, calibration_path, read_calibration
+from ..calibration.file import CalibrationFile, calibration_beside, read_calibration
 from ..errors import InputError
 from ..logs.log import ROOM_TEMP_C
 from ..logs.reader import Block, Source, read_blocks
@@ -88,8 +88,13 @@ class Ride:
     def blocks(self, progress: Progress | None = None, notices: list[Notice] | None = None) -> Iterator[Channels]:
         """The ride from its beginning. progress, notices: of read_blocks(). Raises InputError."""
         lean = _Lean(self.calibration)
+        told = False
         for block in read_blocks(self.log, progress=progress, notices=notices):
-            yield channels(block, self.calibration, lean.follow(block), self.car)
+            rows = lean.follow(block)
+            if notices is not None and not told and np.any(rows[:, 2] < 0.0):
+                told = True
+                notices.append(_absurd(block, int(np.argmax(rows[:, 2] < 0.0))))
+            yield channels(block, self.calibration, rows, self.car)
 
 
 def open_ride(log: Source, calibration: CalibrationFile | File | None = None) -> Ride:
@@ -103,16 +108,9 @@ def open_ride(log: Source, calibration: CalibrationFile | File | None = None) ->
     >>> open_ride(log, CalibrationFile(aligned=True)).car
     False
     """
-    beside = None
-    if isinstance(log, (Path, str)):
-        path = Path(log)
-        beside = calibration_path(path)
-        if not path.is_file():
-            what = "is a directory: give the name of a ride in it" if path.is_dir() else "there is no such file"
-            raise InputError(f"{path}: {what}")
-        if calibration is None and not beside.exists():
-            raise InputError(f"{path}: no calibration {beside.name} beside it: give one with --calibration")
-    source = beside if calibration is None else calibration
+    source = calibration
+    if source is None and isinstance(log, (Path, str)):
+        source = calibration_beside(Path(log))
     if source is None:
         raise InputError(f"{name_of(log)}: an open file has no calibration beside it: give one")
     parameters = source if isinstance(source, CalibrationFile) else read_calibration(source)
@@ -171,11 +169,18 @@ def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool 
         block.speed_mps,
         temperature,
         lean[:, 1],
-        np.degrees(np.sqrt(lean[:, 2])),
+        np.degrees(np.sqrt(np.where(lean[:, 2] >= 0.0, lean[:, 2], np.nan))),
         lean[:, 3],
         lean[:, 4],
         lean[:, 5],
     )
+
+
+def _absurd(block: Block, at: int) -> Notice:
+    """The lean filter has lost itself at this row: what the readings of the second before it were."""
+    before = slice(int(np.searchsorted(block.time_us, block.time_us[at] - 1_000_000)), at + 1)
+    most = np.max(np.abs(block.readings[before]), axis=0)
+    return Notice("absurd-readings", block.time_us[at] / 1e6, float(np.max(most[4:])), float(np.max(most[:3])))
 
 
 def formula_lean_deg(left: Array, up: Array, yaw_rate: Array) -> Array:

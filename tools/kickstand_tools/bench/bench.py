@@ -1,6 +1,7 @@
 """What the firmware costs on the emulated Pico in time, memory and flash: bench() measures, tables() lays it out."""
 
 import ast
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +16,13 @@ from ..emulator.host_link import GUEST, HostLink
 from ..emulator.pico import Pico
 from ..simulation.scripted.script import Ride, accelerate, turn, upright
 from ..simulation.scripted.sensor_errors import Sensor
+from . import boot
 from .sample_count import SampleCount
 
 SAMPLE_HZ = 200  # as bench_guest sets it
 _GUEST = ("bench_guest", "stages_guest")  # modules of this folder that run on the Pico
 _SENSOR = Sensor(seed=1, share=0.0)  # without errors, mounted at some angle
 _RIDE = [accelerate(15.0, 1.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 20
-_START_LIMIT_S = 10.0
 _MODES: dict[str, dict[str, Any]] = {"aligning by driving": {"SPEED": "wheel"}, "recording": {"RECORD": True}}
 _WHEEL_PIN, _PULSE_S, _CLOSED_S = 14, 0.133, 0.02  # one magnet on a wheel of 2 m circumference, at 15 m/s
 
@@ -51,7 +52,10 @@ def bench(seconds: int = 10) -> dict[str, Any]:
         "free_heap_bytes": figures["free_before"],
         "free_heap_at_end_bytes": figures["free_after"],
         "modes": {name: _compared(mode, plain) for name, mode in modes.items()},
-        "first_lean_s": {kind: _first_lean_s(kind == "mpy") for kind in ("py", "mpy")},
+        "boot": {
+            kind: asdict(boot.boot(_SENSOR.world(Ride([upright(100.0)]).motion), _calibration(), kind == "mpy"))
+            for kind in ("py", "mpy")
+        },
         "flash_bytes": {kind: _size(kind == "mpy") for kind in ("py", "mpy")},
     }
 
@@ -66,7 +70,7 @@ def tables(result: dict[str, Any]) -> Group:
         times.add_row(name, *(f"{spread[key]:.0f}" for key in ("median", "p99", "max")))
     figures = Table(show_header=False)
     pause = result["collection_pause_us"]
-    first, size = result["first_lean_s"], result["flash_bytes"]
+    starts, size = result["boot"], result["flash_bytes"]
     for name, text in (
         ("CPU share", f"{100 * result['cpu_share']:.0f} %"),
         ("samples taken / lost", f"{result['samples_taken']} / {result['samples_lost']} in {result['seconds']:.1f} s"),
@@ -78,11 +82,11 @@ def tables(result: dict[str, Any]) -> Group:
             f"{result['free_heap_bytes'] / 1024:.0f} / {result['free_heap_at_end_bytes'] / 1024:.0f} KB",
         ),
         *((f"while {name}", _mode_text(mode)) for name, mode in result["modes"].items()),
-        ("reset to first lean", f"{first['py']:.2f} s from .py, {first['mpy']:.2f} s from .mpy"),
+        ("reset to first lean", f"{starts['py']['lean_s']:.2f} s from .py, {starts['mpy']['lean_s']:.2f} s from .mpy"),
         ("size on flash", f"{size['py'] / 1000:.1f} kB as .py, {size['mpy'] / 1000:.1f} kB as .mpy"),
     ):
         figures.add_row(name, text)
-    return Group(times, figures)
+    return Group(times, boot.table(starts["mpy"]), figures)
 
 
 def _mode_text(mode: dict[str, Any]) -> str:
@@ -192,15 +196,6 @@ def _stages(run: dict[str, Any]) -> dict[str, np.ndarray]:
 
 def _spread(us: np.ndarray) -> dict[str, float]:
     return {"median": float(np.median(us)), "p99": float(np.percentile(us, 99)), "max": float(us.max())}
-
-
-def _first_lean_s(compiled: bool) -> float:
-    """Seconds from power-on to the first lean on the display. The board is calibrated and the bike stands upright."""
-    files = flash_image.firmware(compiled) | _calibration()
-    world = _SENSOR.world(Ride([upright(100.0)]).motion)
-    with Pico(world, files) as pico:
-        pico.run_until(lambda: pico.lcd()[0].startswith("Lean") and "°" in pico.lcd()[0], _START_LIMIT_S, 0.001)
-        return round(pico.time_s, 3)
 
 
 def _calibration() -> dict[str, bytes]:

@@ -5,7 +5,7 @@ from array import array
 from time import ticks_diff, ticks_us
 
 from kickstand import app as app_module
-from kickstand.devices import open_lcd
+from kickstand.devices import open_lcd, open_sensor
 from kickstand.settings import Settings
 from machine import mem16
 from uctypes import addressof, bytearray_at
@@ -140,7 +140,7 @@ def run(detail, seconds, out, chosen):
     for name in chosen:
         setattr(Config, name, chosen[name])
     settings = Settings(Config)
-    app = MeasuredApp(settings, open_lcd(settings))
+    app = MeasuredApp(settings, open_lcd(settings), open_sensor(settings))
     spent = None
     if detail:
         import stages_guest

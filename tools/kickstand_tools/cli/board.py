@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from .. import firmware_path
+
 if TYPE_CHECKING:
     from ..deploy.connection import Progress
     from ..rides.pull import PulledRide
@@ -31,6 +33,10 @@ def flash(port: str | None, config: bool) -> None:
     click.echo(f"{result.board} on {result.port}")
     if result.config:
         click.echo(f"config.py is {result.config}")
+        if firmware_path.installed() and result.config.parent == firmware_path.directory():
+            click.echo("to change settings, copy that file into a folder of yours, edit it, and run this command there")
+    for setting in result.unused:
+        click.echo(f"note: {setting} is not used, because a '#' is in front of it: remove it, and flash --config")
     if result.why_sources:
         click.echo(f"note: {result.why_sources}: it gets the sources, and starts more slowly")
     done = result.installed

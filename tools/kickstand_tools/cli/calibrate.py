@@ -171,9 +171,9 @@ def _event_lines(event: "DriveEvent", several: bool) -> Iterable[str]:
             yield f"{event.log}:" if event.what == events.LOG_BEGINS else "           no braking in it"
         return
     words = {
-        events.USED: f"straight: used, {event.counted}"
-        + (f" of {event.needed}" if event.counted <= event.needed else ""),
-        events.TURNING: "turning: not counted",
+        events.USED: f"in a straight line: event {event.counted}"
+        + (f" of {event.needed} needed" if event.counted <= event.needed else ""),
+        events.TURNING: "in a turn: not counted",
         events.READY: f"ready: forward known to {event.quality_deg:.1f} degrees",
         events.NOT_READY: "no longer ready" + (f": {sentence(event.refusal)}" if event.refusal else ""),
         events.PROBLEM: sentence(event.refusal) if event.refusal else "",

@@ -16,16 +16,17 @@ _CALIBRATION = click.option(
 
 @click.command()
 @click.argument("log", type=_PATH, metavar="LOG.csv")
-@click.option("--calibration", required=True, type=_PATH, help="A CAL.json of `kickstand calibrate`.")
+@_CALIBRATION
 @click.option("--engine", type=click.Choice(["cpython", "micropython", "rp2040"]), default="cpython")
 @_OUT
-def replay(log: Path, calibration: Path, engine: str, out: Path) -> None:
+def replay(log: Path, calibration: Path | None, engine: str, out: Path) -> None:
     """Run the firmware's own lean meter over a recorded log."""
-    from ..calibration.file import read_calibration
+    from ..calibration.file import calibration_beside, read_calibration
     from ..output import check_output
     from ..progress import Bar
     from ..replay.replay import replay_to_csv
 
+    calibration = calibration or calibration_beside(log)
     check_output(out, [log, calibration])
     parameters = read_calibration(calibration)
     with Bar("replaying") as bar:

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 _PATH = click.Path(path_type=Path)
+_LINES_S = 10.0  # between two lines of progress where there is no terminal for a bar
 _WIDTH = 110  # columns of a table that is not printed to a terminal
 _UPRIGHT_ERROR = click.option(
     "--upright-error", type=click.FloatRange(-30.0, 30.0), default=0.0, help="Of the upright pose, degrees."
@@ -99,7 +100,7 @@ def evaluate(
     if absent:
         click.echo(f"left out, not installed: {', '.join(absent)}: {extra('evaluate')}", err=True)
     with new_directory(out) if out is not None else contextlib.nullcontext():
-        with Bar("riding", len(jobs) * runs.steps(), patience_s=0.0) as bar:
+        with Bar("riding", len(jobs) * runs.steps(), patience_s=0.0, lines_s=_LINES_S) as bar:
             found = evaluate(jobs, recording, lambda: bar.advance(1))
         for result in found.results:
             if result.refusal is not None:

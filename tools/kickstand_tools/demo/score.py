@@ -81,7 +81,11 @@ def table(figures: dict[str, Figures]) -> Table | str:
     """Score.figures() for a terminal: a row for each part of the ride, then the whole."""
     if not figures:
         return "The lean was not shown yet."
-    table = Table(title="Lean in degrees, > 0 to the right: shown on the LCD against true")
+    table = Table(
+        title="Lean in degrees, > 0 to the right: shown on the LCD against true",
+        caption="The LCD has whole degrees, about 0.1 s old: in a quick roll that is most of the error. "
+        "The README's figures are of the lean filter, sample by sample.",
+    )
     table.add_column("")
     for name in ("samples", "true mean", "shown mean", "rms error", "worst"):
         table.add_column(name, justify="right")

@@ -1,27 +1,37 @@
 """A config.py judged by the firmware's own settings.py before it is copied.
 
 This runs in a process of its own, which poses as the board: settings.py asks sys and machine. The arguments are the
-board's sys.platform, its sys.implementation._machine and the file; the last line that it prints is JSON: null, or line
-and reason of the fault.
+board's sys.platform, its sys.implementation._machine and the file; the last line that it prints is JSON: the fault,
+null or [line, reason], and the lines that are not used.
 """
 
 import ast
+import contextlib
 import json
 import os
+import re
 import subprocess
 import sys
 import traceback
 import types
+from dataclasses import dataclass
 from pathlib import Path
 
 from .. import firmware_path
-from ..errors import InputError
 from ..simulated_board.simulator import Board
 
 
-def refuse_faulty(path: Path, port: str, machine: str) -> None:
-    """Raise InputError, with the line, for what a board would not take. port: its sys.platform.  machine: its
-    sys.implementation._machine."""
+@dataclass(frozen=True)
+class Judged:
+    """fault: what a board would not take, with line and remedy, or None.  unused: settings that differ from their
+    defaults but are behind a '#', each with its line."""
+
+    fault: str | None
+    unused: list[str]
+
+
+def judge(path: Path, port: str, machine: str) -> Judged:
+    """Judge a config.py for a board. port: its sys.platform.  machine: its sys.implementation._machine."""
     done = subprocess.run(
         [sys.executable, "-P", "-m", __name__, port, machine, str(path)],
         env=os.environ | {"PYTHONPATH": firmware_path.search_path()},
@@ -30,17 +40,15 @@ def refuse_faulty(path: Path, port: str, machine: str) -> None:
         text=True,
         check=True,
     )
-    answer = json.loads(done.stdout.splitlines()[-1])  # config.py may print too
-    if answer:
-        line, reason = answer
-        raise InputError(f"{path}{f', line {line}' if line else ''}: {reason}: mend it, then repeat this")
+    fault, unused = json.loads(done.stdout.splitlines()[-1])  # config.py may print too
+    if fault:
+        line, reason = fault
+        fault = f"{path}{f', line {line}' if line else ''}: {reason}: correct it and run this command again"
+    return Judged(fault, [f"{path}, line {line}: {text}" for line, text in unused])
 
 
-def _fault(path: Path, port: str, machine: str) -> tuple[int | None, str] | None:
-    """Line and reason of the first fault, or None. This process cannot be used for anything else afterwards."""
-    Board(lambda t_s: (0, 0, 1, 0, 0, 0), port="esp32" if port == "esp32" else "rp2").install()  # for machine
-    sys.platform = port
-    vars(sys.implementation)["_machine"] = machine
+def _fault(path: Path, port: str) -> tuple[int | None, str] | None:
+    """Line and reason of the first fault, or None."""
     from kickstand.console import sentence
     from kickstand.errors import SettingsError
     from kickstand.settings import Settings
@@ -62,11 +70,42 @@ def _fault(path: Path, port: str, machine: str) -> tuple[int | None, str] | None
     return None
 
 
+def _unused(path: Path, port: str) -> list[tuple[int, str]]:
+    """Lines "# NAME = value" whose value is not the default: the '#' was forgotten there."""
+    from kickstand.errors import SettingsError
+    from kickstand.settings import Settings
+
+    try:
+        defaults = Settings(None)
+    except SettingsError as error:  # a board without usual pins
+        defaults = error.settings
+    found = []
+    for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
+        match = re.match(r"#\s*([A-Z_]+) = (.*)", line)
+        if not match or (port != "rp2" and re.search(r"# \(\d+\)", line)):  # its default depends on the board
+            continue
+        name, value = match[1], match[2].split("#")[0].strip()
+        with contextlib.suppress(ValueError, SyntaxError, AttributeError):
+            chosen, default = ast.literal_eval(value), getattr(defaults, name)
+            if chosen != default and not (default is None and isinstance(chosen, int)):  # an example of a pin
+                found.append((number, f"{name} = {value}"))
+    return found
+
+
 def _line_of(name: str, source: bytes) -> int | None:
     """The last line that assigns to this name."""
     named = [n for n in ast.walk(ast.parse(source)) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)]
     return max((node.lineno for node in named if node.id == name), default=None)
 
 
+def _main(port: str, machine: str, path: Path) -> None:
+    """This process cannot be used for anything else afterwards."""
+    Board(lambda t_s: (0, 0, 1, 0, 0, 0), port="esp32" if port == "esp32" else "rp2").install()  # for machine
+    sys.platform = port
+    vars(sys.implementation)["_machine"] = machine
+    unused = _unused(path, port)
+    print("\n" + json.dumps([_fault(path, port), unused]))
+
+
 if __name__ == "__main__":
-    print("\n" + json.dumps(_fault(Path(sys.argv[3]), *sys.argv[1:3])))
+    _main(sys.argv[1], sys.argv[2], Path(sys.argv[3]))

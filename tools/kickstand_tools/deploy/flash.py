@@ -34,11 +34,13 @@ class InstallResult:
 @dataclass(frozen=True)
 class FlashResult:
     """board: its name and version of MicroPython.  port: its name.  config: which config.py was checked, because it
-    was due to be copied, or None.  why_sources: why the firmware was not compiled, or None.  installed: the rest."""
+    was due to be copied, or None.  unused: settings in the rider's config.py that are behind a '#'.  why_sources: why
+    the firmware was not compiled, or None.  installed: the rest."""
 
     board: str
     port: str
     config: Path | None
+    unused: list[str]
     why_sources: str | None
     installed: InstallResult
 
@@ -54,10 +56,11 @@ def flash(port: str | None, replace_config: bool = False, progress: Progress | N
         source = firmware_path.config()
         config = source if replace_config or not transport.fs_exists(CONFIG) else None
         try:
-            if config:
-                names = "(lambda s: (s.platform, getattr(s.implementation, '_machine', '')))(__import__('sys'))"
-                platform, machine = transport.eval(names)
-                config_check.refuse_faulty(config, str(platform), str(machine))
+            names = "(lambda s: (s.platform, getattr(s.implementation, '_machine', '')))(__import__('sys'))"
+            platform, machine = transport.eval(names)
+            judged = config_check.judge(source, str(platform), str(machine))
+            if config and judged.fault:
+                raise InputError(judged.fault)
             wanted, why_sources = _contents(transport)
             wanted[CONFIG] = source.read_bytes()
             update = prepare(transport, wanted, replace_config)
@@ -66,7 +69,7 @@ def flash(port: str | None, replace_config: bool = False, progress: Progress | N
             raise
         installed = install(transport, update, progress)
         restart(transport)
-    return FlashResult(board, name, config, why_sources, installed)
+    return FlashResult(board, name, config, judged.unused, why_sources, installed)
 
 
 def prepare(transport: SerialTransport, wanted: dict[str, bytes], replace_config: bool = False) -> Update:

@@ -20,6 +20,7 @@ from .pico import Pico
 _STEP_S = 0.02
 _BUTTON = {"b": 0.15, "B": LONG_PRESS_S, " ": LONG_PRESS_S}  # seconds of a press, by key
 _HELP = "b button   B long press   a/d lean   k kickstand   u upright   q quit"
+_NO_FIRMWARE = "No firmware on it yet, so the display is blank. In another terminal:\n  kickstand flash --port {}\n"
 
 
 class ScriptedBike:
@@ -92,7 +93,13 @@ def _watch(pico: Pico, server: ConsoleServer, bike: HandBike, address: str) -> N
                 "phase": phase,
                 "pressed": pico.board.button.closed,
             }
-            live.update(screen(state, f"Kickstand on an emulated Pico, {address}", _HELP, False), refresh=True)
+            title = f"Kickstand on an emulated Pico, {address}"
+            live.update(screen(state, title, below(pico.board.lcd.on, address), False), refresh=True)
+
+
+def below(on: bool, address: str) -> str:
+    """What stands below the picture. on: is the display switched on, which only the firmware does?"""
+    return _HELP if on else _NO_FIRMWARE.format(address) + _HELP
 
 
 def _print(pico: Pico, server: ConsoleServer, bike: ScriptedBike, say: Callable[[str], None]) -> None:

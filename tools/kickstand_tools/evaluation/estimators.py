@@ -87,12 +87,15 @@ def estimate(
     done(): called after each of steps().
     """
     engine = replay_engine.Replay(calibration.to_firmware())
-    own = np.array([engine.step(time_us, reading) for time_us, reading, _ in log.rows()])
+    shown, formula = np.empty(len(log.t_s)), np.empty(len(log.t_s))
+    for i, (time_us, reading, _) in enumerate(log.rows()):
+        values = engine.step(time_us, reading)
+        shown[i], formula[i] = values[_SHOWN], values[_FORMULA]
     samples = calibrated(log, calibration)
     result = {
-        "kickstand": own[:, _SHOWN],
-        "formula": own[:, _FORMULA],
-        "formula 0.3 s": trailing_mean(own[:, _FORMULA], AVERAGE_S, samples.rate_hz),
+        "kickstand": shown,
+        "formula": formula,
+        "formula 0.3 s": trailing_mean(formula, AVERAGE_S, samples.rate_hz),
     }
     done()
     for name in _others():

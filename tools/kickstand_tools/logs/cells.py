@@ -35,6 +35,8 @@ def header(log: str, line: str) -> list[str]:
     except csv.Error as error:
         raise InputError(f"{log}, line 1: not CSV ({error}): is it a log?") from error
     missing = [name for name in COLUMNS if name not in names]
+    if missing and "lean_deg" in names:
+        raise InputError(f"{log} holds the lean that kickstand has computed: give the log that it was made from")
     if missing and any(mark in "".join(names) for mark in ";\t"):
         raise InputError(f"{log}, line 1: values stand apart by ; or tab: save it with commas between them")
     if missing:

@@ -28,7 +28,7 @@ from kickstand.board import port
 from kickstand.rides.usb_stream import RideStream
 chosen = settings.load()
 try:
-    App(chosen, devices.open_lcd(chosen), RideStream()).run()
+    App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen), RideStream()).run()
 except KeyboardInterrupt:
     port.rest_watchdog()
 """

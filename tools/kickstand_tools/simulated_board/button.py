@@ -1,6 +1,7 @@
 """Model of a push button to ground whose contacts bounce."""
 
 BOUNCE_US = 4000
+RELEASED_US = 150_000  # at least so long between two presses
 _BOUNCES = 3  # short openings (or closings) after each edge
 
 
@@ -10,10 +11,15 @@ class Button:
     def __init__(self, clock, seed=1):
         self.closed = False
         self._clock = clock
+        self._free_us = 0  # when a press that is asked for now can begin
         self._random = seed & 0x7FFFFFFF or 1
 
     def press(self, at_us, for_us):
-        """Press it from at_us for for_us."""
+        """Press it from at_us for for_us. at_us: None for now, or once the last such press is over, because a finger
+        cannot press what it holds."""
+        if at_us is None:
+            at_us = max(self._clock.now_us, self._free_us)
+            self._free_us = at_us + for_us + RELEASED_US
         self.turn(True, at_us)
         self.turn(False, at_us + for_us)
 

@@ -150,8 +150,8 @@ class Board:
         self.clock.every(to_us(period_s), function)
 
     def press(self, at_s=None, for_s=0.15):
-        """Press the button at at_s (now, if None) for for_s."""
-        self.button.press(self.clock.now_us if at_s is None else to_us(at_s), to_us(for_s))
+        """Press the button at at_s for for_s. None: now, or once the last such press is over."""
+        self.button.press(None if at_s is None else to_us(at_s), to_us(for_s))
 
     # Parts that are connected and disconnected
 

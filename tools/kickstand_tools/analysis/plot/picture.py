@@ -139,11 +139,13 @@ def _histogram(axes: Any, seen: Overview) -> None:
     top = max(1.5 * float(np.max(leaning, initial=0.0)), 1.0)
     if np.max(share) > top:
         upright = f"{np.sum(share[np.abs(middle) <= 5.0]):.0f} % upright"
-        axes.text(4.0, 0.98 * top, upright, va="top", fontsize=8)
+        axes.text(0.98, 0.99, upright, transform=axes.transAxes, ha="right", va="top", fontsize=8)
         axes.set_ylim(0.0, top)
     for peak, sign in maxima(seen):
         axes.axvline(sign * peak.value, color="0.3", linewidth=0.8, linestyle=":")
-        axes.text(sign * peak.value, 0.9 * axes.get_ylim()[1], f"{peak.value:.0f}°", ha="center", backgroundcolor="w")
+        # outwards of its line and below the text in the corner, so that small leans do not stand on one another
+        place = (sign * peak.value, 0.82 * axes.get_ylim()[1])
+        axes.text(*place, f" {peak.value:.0f}° ", ha="right" if sign < 0 else "left")
     limit = lean_limit(seen)
     axes.set(title="How long at which lean, % of the ride", xlabel="left  ·  degrees  ·  right", xlim=(-limit, limit))
     axes.xaxis.set_major_formatter(lambda value, _: f"{abs(value):.0f}")

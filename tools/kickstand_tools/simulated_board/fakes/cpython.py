@@ -1,4 +1,4 @@
-"""Gives CPython what the firmware needs of MicroPython: module `micropython`, sys.print_exception, gc.threshold."""
+"""Gives CPython what the firmware needs of MicroPython: module `micropython`, sys.print_exception, what gc has more."""
 
 import gc
 import sys
@@ -13,6 +13,7 @@ def supplement():
         setattr(sys, "print_exception", _print_exception)  # noqa: B010 type checkers know no such attribute
     if not hasattr(gc, "threshold"):
         setattr(gc, "threshold", lambda amount: None)  # noqa: B010 likewise
+        setattr(gc, "mem_free", lambda: 120_000)  # noqa: B010 likewise
 
 
 def _print_exception(error, file=None):

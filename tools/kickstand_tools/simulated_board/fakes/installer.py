@@ -20,6 +20,8 @@ class Installer:
         current.use(board)
         fake_time.use(board.clock, board.clock.now_us)
         self._replace("machine", fake_machine)
+        if board.port == "esp32":
+            self._replace("esp32", fake_sys.Esp32)
         if board.poses:
             self._replace("sys", fake_sys.posing(board.port, board.machine))
         if board.card and board.card.driver:

@@ -83,22 +83,40 @@ class Chip:
         """
         n = len(force)
         warm = (temp_c - _CALIBRATED_C)[:, None]
-        walk = np.cumsum(chance.standard_normal((n, 3)), axis=0) * self.gyro_walk / np.sqrt(RATE_HZ)
-        accel = force @ self.accel_matrix.T + self.accel_offset + warm * self.accel_per_c
-        accel += _ACCEL_NOISE_G * chance.standard_normal((n, 3))
-        gyro = rates @ self.gyro_matrix.T + self.gyro_bias + warm * self.gyro_per_c + walk
-        gyro += _GYRO_DPS_PER_G * force + _GYRO_NOISE_DPS * chance.standard_normal((n, 3))
+        walk = chance.standard_normal((n, 3))
+        np.cumsum(walk, axis=0, out=walk)
+        walk *= self.gyro_walk
+        walk /= np.sqrt(RATE_HZ)
+        felt = force @ self.accel_matrix.T
+        felt += self.accel_offset
+        felt += warm * self.accel_per_c
+        felt += _noise(chance, n, _ACCEL_NOISE_G)
+        accel = _sampled(felt, _ACCEL_RANGE_G, _ACCEL_LSB)
+        felt = rates @ self.gyro_matrix.T
+        felt += self.gyro_bias
+        felt += warm * self.gyro_per_c
+        felt += walk
+        del walk
+        noise = _noise(chance, n, _GYRO_NOISE_DPS)
+        noise += _GYRO_DPS_PER_G * force
+        felt += noise
+        del noise
         temp = np.round(temp_c[::DIVIDER] * 340.0) / 340.0
-        return np.column_stack(
-            (_sampled(accel, _ACCEL_RANGE_G, _ACCEL_LSB), temp, _sampled(gyro, _GYRO_RANGE_DPS, _GYRO_LSB))
-        )
+        return np.column_stack((accel, temp, _sampled(felt, _GYRO_RANGE_DPS, _GYRO_LSB)))
+
+
+def _noise(chance: np.random.Generator, n: int, rms: float) -> NDArray[np.float64]:
+    values = chance.standard_normal((n, 3))
+    values *= rms
+    return values
 
 
 def _sampled(values: NDArray[np.float64], limit: float, lsb: float) -> NDArray[np.float64]:
     """Clip at the range, filter, take every fifth value, round to whole counts."""
     columns = []
-    for column in np.clip(values, -limit, limit).T:
+    for column in values.T:
+        column = np.clip(column, -limit, limit)
         led_in = np.concatenate((np.full(len(_DLPF) - 1, column[0]), column))
-        columns.append(np.convolve(led_in, _DLPF, mode="valid")[::DIVIDER])
+        columns.append(np.convolve(led_in, _DLPF, mode="valid")[::DIVIDER].copy())
     counts = np.round(np.column_stack(columns) * lsb)
     return np.clip(counts, -32768, 32767) / lsb

@@ -13,6 +13,7 @@ _ORDERS = (0.5, 1.0, 2.0)  # a four-stroke twin's multiples of the crankshaft's 
 _IDLE_SHARE = 0.25  # vibration at idle over that at _FULL_RPM
 _FULL_RPM = 6000.0
 _MAX_G = 0.5
+_BLOCK = 100_000  # rows at a time, for the sake of memory
 _DPS_PER_G = 15.0  # the sensor is shaken in rotation too
 
 
@@ -42,11 +43,15 @@ class Engine:
         weights = chance.dirichlet(np.full(len(_ORDERS), 2.0), size=6) ** 0.5
         phases = chance.uniform(0.0, 2.0 * np.pi, size=(6, len(_ORDERS)))
         felt = np.zeros((len(speed), 6))
-        for k, order in enumerate(_ORDERS):
-            angle = 2.0 * np.pi * order * turns
-            sine, cosine = np.sin(angle), np.cos(angle)
-            for axis in range(6):
-                phase = phases[axis, k]
-                felt[:, axis] += weights[axis, k] * (sine * np.cos(phase) + cosine * np.sin(phase))
+        for start in range(0, len(speed), _BLOCK):
+            part = slice(start, start + _BLOCK)
+            for k, order in enumerate(_ORDERS):
+                angle = 2.0 * np.pi * order * turns[part]
+                sine, cosine = np.sin(angle), np.cos(angle)
+                for axis in range(6):
+                    phase = phases[axis, k]
+                    felt[part, axis] += weights[axis, k] * (sine * np.cos(phase) + cosine * np.sin(phase))
         felt *= np.sqrt(2.0) * size[:, None]
-        return felt[:, :3] * STANDARD_GRAVITY, felt[:, 3:] * np.radians(_DPS_PER_G)
+        felt[:, :3] *= STANDARD_GRAVITY
+        felt[:, 3:] *= np.radians(_DPS_PER_G)
+        return felt[:, :3], felt[:, 3:]

@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from .bike import Bike
 from .signals import Signal, derivative
 
+_BLOCK = 100_000  # rows
+
 
 @dataclass
 class Motion:
@@ -64,4 +66,8 @@ def specific_force(motion: Motion, bike: Bike) -> NDArray[np.float64]:
     arm = np.array([bike.sensor_left, bike.sensor_height - bike.tyre_radius, bike.sensor_forward])
     rates = body_rates(motion)
     turning = np.gradient(rates, 1.0 / rate, axis=0)
-    return force + np.cross(turning, arm) + np.cross(rates, np.cross(rates, arm))
+    for start in range(0, len(force), _BLOCK):  # np.cross makes many arrays of the size of its arguments
+        part = slice(start, start + _BLOCK)
+        force[part] += np.cross(turning[part], arm)
+        force[part] += np.cross(rates[part], np.cross(rates[part], arm))
+    return force

@@ -74,7 +74,9 @@ def shaking(
         return 2j * np.pi * f * transmitted(f)
 
     heave = through(speed * np.interp(distance, at, slope), lifted, rate_hz)
-    difference = np.interp(front, at, height) - np.interp(distance, at, height)
+    difference = np.interp(front, at, height)
+    difference -= np.interp(distance, at, height)
+    del front, at, height
     pitch = through(difference / bike.wheelbase, transmitted, rate_hz)
     n = len(distance)
     size = np.sqrt(smoothed(heave * heave, 0.5, rate_hz).clip(0.0))

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 Signal = NDArray[np.float64]
 _NOISE_MARGIN_S = 10.0  # made too long by this at both ends and cut off, because there through() pads
+_BLOCK = 100_000  # frequencies at a time
 _PAD_S = 4.0  # the first and the last value are held so long, because an FFT joins the end to the start
 
 
@@ -31,8 +32,14 @@ def through(x: Signal, transfer: Callable[[Signal], NDArray], rate_hz: float) ->
     pad = int(_PAD_S * rate_hz)
     size = -(-(len(x) + 2 * pad) // 16384) * 16384  # few small prime factors: a fast FFT
     padded = np.pad(x, (pad, size - len(x) - pad), mode="edge")
-    spectrum = np.fft.rfft(padded) * transfer(np.linspace(0.0, rate_hz / 2.0, size // 2 + 1))
-    return np.fft.irfft(spectrum, size)[pad : pad + len(x)]
+    spectrum = np.fft.rfft(padded)
+    del padded
+    frequency = np.linspace(0.0, rate_hz / 2.0, len(spectrum))
+    for start in range(0, len(spectrum), _BLOCK):  # a transfer function makes many arrays of the size of its argument
+        part = slice(start, start + _BLOCK)
+        spectrum[part] *= transfer(frequency[part])
+    del frequency
+    return np.fft.irfft(spectrum, size)[pad : pad + len(x)].copy()
 
 
 def smoothed(x: Signal, seconds: float, rate_hz: float) -> Signal:

@@ -1,0 +1,45 @@
+"""Rides without any noise, of which every figure is known."""
+
+from dataclasses import fields
+
+import numpy as np
+from kickstand.units import STANDARD_GRAVITY
+from kickstand_tools.analysis.channels import Channels
+
+RATE_HZ = 50.0  # that in which stops are looked for
+REST_S = 5.0
+
+
+class Road:
+    """A ride made of stretches of constant acceleration, m/s2, on the level and upright unless channels are changed."""
+
+    def __init__(self, *legs: tuple[float, float], rate_hz: float = RATE_HZ):
+        """legs: seconds and m/s2. Without acceleration at no speed the vehicle stands."""
+        self.t_s = np.arange(0.0, sum(seconds for seconds, _ in legs) - 1e-9, 1.0 / rate_hz)
+        ends = np.cumsum([seconds for seconds, _ in legs])
+        steps = np.array([mps2 for _, mps2 in legs] + [0.0])
+        before, after = (steps[np.searchsorted(ends, self.t_s + off)] for off in (-1e-9, 1e-9))
+        self.mps2 = (before + after) / 2.0  # at a corner the mean, so that the trapezoidal rule is exact
+        corners = np.concatenate(([0.0], np.cumsum([seconds * mps2 for seconds, mps2 in legs])))
+        self.mps = np.interp(self.t_s, np.concatenate(([0.0], ends)), corners)
+        self.mps[np.abs(self.mps) < 1e-9] = 0.0
+        self.rests = (self.mps == 0.0) & (after == 0.0)
+
+    def channels(self, **changed: np.ndarray) -> Channels:
+        """Without a speed in the log."""
+        n = len(self.t_s)
+        columns = {field.name: np.zeros(n) for field in fields(Channels)}
+        columns |= {
+            "t_s": self.t_s.copy(),
+            "up_g": np.ones(n),
+            "forward_g": self.mps2 / STANDARD_GRAVITY,
+            "speed_mps": np.full(n, np.nan),
+            "resting": self.rests.astype(float),
+            "sure": np.ones(n),
+        }
+        return Channels(**columns | changed)
+
+
+def braking(mps: float, mps2: float, before_s: float = 4.0) -> Road:
+    """Standing, up to this speed at 4 m/s2, straight on, and a stop with this deceleration."""
+    return Road((REST_S, 0.0), (mps / 4.0, 4.0), (before_s, 0.0), (mps / mps2, -mps2), (REST_S, 0.0))

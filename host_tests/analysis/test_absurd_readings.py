@@ -1,0 +1,42 @@
+"""Readings that no vehicle gives: the lean is not trusted, a warning says where and what, and numpy says nothing."""
+
+import re
+import warnings
+
+import numpy as np
+import pytest
+from kickstand_tools.analysis.channels import open_ride
+from kickstand_tools.analysis.downsample import joined
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.logs.log import Log
+from kickstand_tools.refusals import sentence
+
+
+def spinning(seed):
+    """Upright, and turned at up to 2500 deg/s to another side in each sample."""
+    rates = np.random.default_rng(seed).uniform(-2500, 2500, (600, 3))
+    return Log(np.arange(600) / 100.0, np.tile([0.0, 1.0, 0.0], (600, 1)), rates, name="spin.csv")
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_lean_filter_that_has_lost_itself(seed):
+    notices = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        ride = joined(list(open_ride(spinning(seed), CalibrationFile(aligned=True)).blocks(notices=notices)))
+    lost = np.isnan(ride.sigma_deg)
+    assert not np.any(ride.trusted[lost])
+    assert not np.any(ride.sure[lost])
+    said = [sentence(notice) for notice in notices if notice.code == "absurd-readings"]
+    assert len(said) == np.any(lost)
+    if said:
+        told = re.match(r"readings that no vehicle gives, at (\S+) s up to 2\d\d\d deg/s and 1.0 g", said[0])
+        assert told
+        assert float(told[1]) == pytest.approx(ride.t_s[np.argmax(lost)], abs=0.06)
+
+
+def test_some_of_them_do():
+    assert any(
+        np.isnan(joined(list(open_ride(spinning(seed), CalibrationFile(aligned=True)).blocks())).sigma_deg).any()
+        for seed in range(6)
+    )

@@ -1,0 +1,315 @@
+"""Each format to the letter: which channel stands in which column, in which unit, with which sign and how many digits.
+
+The columns and signs are those of the formats' own descriptions, named in the modules; the signs are checked once more
+on readings of a sensor that sits squarely in the vehicle.
+"""
+
+import gzip
+import time
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+from kickstand_tools.analysis.channels import Channels, open_ride
+from kickstand_tools.analysis.export import export_csv, export_racechrono, export_vbo
+from kickstand_tools.analysis.export.export import export
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.logs import reader
+from kickstand_tools.logs.log import Log
+
+EVENING_S = 1_700_000_000.0  # 22:13:20 UTC on 14/11/2023
+VALUES = {
+    "lean_deg": -12.34567,
+    "lean_formula_deg": 23.4567,
+    "left_g": 0.123456,
+    "up_g": 0.987654,
+    "forward_g": -0.234567,
+    "lateral_g": 0.345678,
+    "pitch_rate_dps": 1.23456,
+    "yaw_rate_dps": -2.34567,
+    "roll_rate_dps": 3.45678,
+    "speed_mps": 10.5,
+    "temp_c": 21.456,
+    "shown_g": 7.0,
+    "sigma_deg": 0.98765,
+    "resting": 5.0,
+    "rolling": 6.0,
+    "sure": 8.0,
+}
+
+
+def block(*times_s: float, **changed: float) -> Channels:
+    """Samples that have VALUES in every channel but for what is changed."""
+    columns = {"t_s": np.array(times_s)}
+    columns |= {name: np.full(len(times_s), value) for name, value in (VALUES | changed).items()}
+    return Channels(*(columns[field.name] for field in fields(Channels)))
+
+
+def written(write, path: Path, *blocks: Channels, start_s: float = EVENING_S) -> str:
+    write(path, iter(blocks), start_s)
+    return path.read_bytes().decode()
+
+
+def test_csv_to_the_letter(tmp_path):
+    none = block(0.5, 1.25, speed_mps=np.nan, temp_c=np.nan, lean_formula_deg=np.nan)
+    lines = written(export_csv.write, tmp_path / "x.csv", block(0.25), none, start_s=100.0).split("\n")
+    assert lines == [
+        "t_s,lean_deg,lean_formula_deg,left_g,up_g,forward_g,lateral_g,pitch_rate_dps,yaw_rate_dps,roll_rate_dps,"
+        "speed_mps,temp_c,sigma_deg",
+        "100.250000,-12.346,23.457,0.12346,0.98765,-0.23457,0.34568,1.2346,-2.3457,3.4568,10.500,21.46,0.988",
+        "100.500000,-12.346,,0.12346,0.98765,-0.23457,0.34568,1.2346,-2.3457,3.4568,,,0.988",
+        "101.250000,-12.346,,0.12346,0.98765,-0.23457,0.34568,1.2346,-2.3457,3.4568,,,0.988",
+        "",
+    ]
+
+
+def test_racechrono_to_the_letter(tmp_path):
+    """Elapsed time from the first sample; z is forward; a speed only where there is a new one."""
+    text = written(export_racechrono.write, tmp_path / "x", block(0.25), block(0.5, speed_mps=np.nan))
+    assert text.split("\n") == [
+        "This file is created using RaceChrono CSV v3 by Kickstand.",
+        "Format,3",
+        'Session title,"Ride"',
+        "Session type,Lap timing",
+        "Track name,",
+        "Driver name,",
+        "Created,14/11/2023,22:13",
+        'Note,"Made by Kickstand. lean_angle > 0 to the right; x left, y up, z forward"',
+        "",
+        "timestamp,fragment_id,lap_number,elapsed_time,speed,lateral_acc,lean_angle,longitudinal_acc,x_acc,y_acc,z_acc,"
+        "x_rate_of_rotation,y_rate_of_rotation,z_rate_of_rotation",
+        "unix time,,,s,m/s,G,deg,G,G,G,G,deg/s,deg/s,deg/s",
+        ",,,,100: gps,calc,calc,calc,101: acc,101: acc,101: acc,102: gyro,102: gyro,102: gyro",
+        "1700000000.250,0,,0.250,10.500,0.3457,-12.35,-0.2346,0.1235,0.9877,-0.2346,-1.235,-2.346,3.457",
+        "1700000000.500,0,,0.500,,0.3457,-12.35,-0.2346,0.1235,0.9877,-0.2346,-1.235,-2.346,3.457",
+        "",
+    ]
+
+
+def test_vbo_to_the_letter(tmp_path):
+    """10.5 m/s are 37.8 km/h. The clock starts again at midnight."""
+    evening = EVENING_S + 6400.0 - 0.25  # the second before midnight
+    text = written(export_vbo.write, tmp_path / "x", block(0.0), block(0.25, 61.5, 3661.75), start_s=evening)
+    values = " -1.234567E+01 -2.345670E+00 +3.456780E+00 +2.145600E+01"
+    row = " +00000.000000 +00000.000000 037.800 000.00 +00000.00 -00.235 +00.346" + values
+    assert text.split("\r\n") == [
+        "File created on 14/11/2023 at 23:59:59",
+        "",
+        "[header]",
+        "satellites",
+        "time",
+        "latitude",
+        "longitude",
+        "velocity kmh",
+        "heading",
+        "height",
+        "long accel g",
+        "lat accel g",
+        "lean-angle",
+        "yaw-rate",
+        "roll-rate",
+        "temperature",
+        "",
+        "[channel units]",
+        "deg",
+        "deg/s",
+        "deg/s",
+        "C",
+        "",
+        "[comments]",
+        "Kickstand: lean-angle in degrees, > 0 to the right; no satellites",
+        "Log Rate (Hz) : at most 100.00",
+        "",
+        "[column names]",
+        "sats time lat long velocity heading height longacc latacc lean-angle yaw-rate roll-rate temperature",
+        "",
+        "[data]",
+        "000 235959.75" + row,
+        "000 000000.00" + row,
+        "000 000101.25" + row,
+        "000 010101.50" + row,
+        "",
+    ]
+
+
+def test_vbo_without_lean_speed_and_temperature(tmp_path):
+    bare = block(0.0, lean_deg=np.nan, speed_mps=np.nan, temp_c=np.nan)
+    lines = written(export_vbo.write, tmp_path / "x", bare).split("\r\n")
+    assert lines[12:14] == ["yaw-rate", "roll-rate"]
+    assert lines[16:18] == ["deg/s", "deg/s"]
+    assert lines[20:23] == [
+        "Kickstand: no satellites",
+        "Log Rate (Hz) : at most 100.00",
+        "no speed in the log: velocity 0 stands for none",
+    ]
+    row = "000 221320.00 +00000.000000 +00000.000000 000.000 000.00 +00000.00 -00.235 +00.346"
+    assert lines[-2] == row + " -2.345670E+00 +3.456780E+00"
+
+
+def test_vbo_decides_by_values_not_by_their_mean(tmp_path):
+    """A channel that has gaps in its first block is there, and 0 in the gaps."""
+    first = block(0.0, 0.1, speed_mps=np.nan)
+    first.temp_c[1] = np.nan
+    first.speed_mps[0] = 10.0
+    lines = written(export_vbo.write, tmp_path / "x", first).split("\r\n")
+    assert "temperature" in lines
+    assert not any(line.startswith("no speed") for line in lines)
+    assert lines[-3].split(" ")[4] == "036.000"
+    assert lines[-2].endswith(" +0.000000E+00")
+
+
+RATE_HZ = 100.0
+SQUARE = CalibrationFile(aligned=True, vehicle="car")  # sensor axes left, up, forward: its readings are the vehicle's
+
+
+def squarely(seconds: float = 2.0, start_s: float = 0.0, speed_mps=()) -> Log:
+    """Braking in a left turn, each axis another reading."""
+    n = round(seconds * RATE_HZ)
+    force, rate = np.tile([0.2, 1.0, -0.4], (n, 1)), np.tile([5.0, 7.0, 9.0], (n, 1))
+    return Log(start_s + np.arange(n) / RATE_HZ, force, rate, np.asarray(speed_mps, dtype=float))
+
+
+def test_a_left_turn_under_braking_has_the_signs_of_each_format(tmp_path):
+    """Rates about x left, y up, z forward are positive as the gyro has them; nose up is the other way round x."""
+    ride = open_ride(squarely(), SQUARE)
+    out = tmp_path / "out"
+    export(ride, "racechrono", out)
+    row = dict(zip([name for name, *_ in export_racechrono.COLUMNS], out.read_text().split("\n")[-2].split(",")))
+    found = {name: float(row[name]) for name in row if "acc" in name or "rate" in name}
+    assert found == pytest.approx(
+        {
+            "lateral_acc": 0.2,
+            "longitudinal_acc": -0.4,
+            "x_acc": 0.2,
+            "y_acc": 1.0,
+            "z_acc": -0.4,
+            "x_rate_of_rotation": 5.0,
+            "y_rate_of_rotation": 7.0,
+            "z_rate_of_rotation": 9.0,
+        },
+        abs=1e-3,
+    )
+    export(ride, "vbo", out)
+    cells = [float(cell) for cell in out.read_text().split("\n")[-2].split(" ")]
+    assert cells[7:9] == [-0.4, 0.2]  # long accel > 0 forward, lat accel > 0 in a left turn
+    assert cells[9:] == pytest.approx([7.0, 9.0])  # yaw > 0 in a left turn, roll > 0 to the right
+    export(ride, "csv", out)
+    row = dict(zip(export_csv.COLUMNS, out.read_text().split("\n")[-2].split(",")))
+    assert [float(row[f"{name}_rate_dps"]) for name in ("pitch", "yaw", "roll")] == pytest.approx([-5.0, 7.0, 9.0])
+
+
+def test_sigma_is_what_the_filter_believes_in_degrees(tmp_path):
+    from kickstand_tools.replay.replay_engine import Replay
+
+    motorcycle = CalibrationFile(aligned=True)
+    log = squarely()
+    engine = Replay(motorcycle.to_firmware())
+    variance = []
+    for row in log.rows():
+        engine.take(*row)
+        variance.append(engine.meter.filter.variance)
+    export(open_ride(log, motorcycle), "csv", tmp_path / "out")
+    sigma = np.genfromtxt(tmp_path / "out", delimiter=",", names=True)["sigma_deg"]
+    assert sigma == pytest.approx(np.sqrt(variance) * 180.0 / np.pi, abs=1e-3)
+    assert sigma.max() > 0.5
+
+
+def first_time(path: Path, form: str) -> float:
+    """Unix time of the first row; for vbo within the day."""
+    lines = path.read_text().split("\n")
+    if form == "racechrono":
+        return float(lines[lines.index("") + 4].partition(",")[0])
+    clock = lines[lines.index("[data]") + 1].split(" ")[1]
+    return int(clock[:2]) * 3600 + int(clock[2:4]) * 60 + float(clock[4:])
+
+
+@pytest.mark.parametrize("form", ["racechrono", "vbo"])
+@pytest.mark.parametrize(
+    ("start_s", "now_s", "first_s"),
+    [
+        (1e8, EVENING_S, 1e8),  # 3 March 1973: Unix time
+        (1e8 - 1.0, EVENING_S, EVENING_S - 2.0),  # three years and two months after power-on
+        (0.0, EVENING_S + 0.985, EVENING_S - 2.0),  # 1.99 s before, in whole seconds
+        (0.0, 1.0, 0.0),  # a computer whose clock was never set: not before 1970
+    ],
+)
+def test_a_log_in_memory_without_a_clock_ended_now(tmp_path, monkeypatch, form, start_s, now_s, first_s):
+    monkeypatch.setattr(time, "time", lambda: now_s)
+    export(open_ride(squarely(start_s=start_s), SQUARE), form, tmp_path / "out")
+    assert first_time(tmp_path / "out", form) == pytest.approx(first_s % (86400 if form == "vbo" else 1e12), abs=0.006)
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_columns_for_data_frames_keep_the_logs_own_time(tmp_path, form):
+    pandas = pytest.importorskip("pandas")
+    export(open_ride(squarely(start_s=5.0), SQUARE), form, tmp_path / "out")
+    read = pandas.read_csv if form == "csv" else pandas.read_parquet
+    assert read(tmp_path / "out")["t_s"].iloc[0] == 5.0
+
+
+def test_every_row_of_a_vbo_has_a_speed(tmp_path):
+    """Between two values those on the line between them; elsewhere the format leaves gaps."""
+    speed = np.full(200, np.nan)
+    speed[[50, 150]] = 10.0, 20.0
+    ride = open_ride(squarely(speed_mps=speed), SQUARE)
+    assert export(ride, "vbo", tmp_path / "vbo") == 200
+    lines = (tmp_path / "vbo").read_text().split("\n")
+    kmh = [float(line.split(" ")[4]) for line in lines[lines.index("[data]") + 1 : -1]]
+    assert kmh == pytest.approx(np.interp(np.arange(200), [50, 150], [36.0, 72.0]), abs=2e-3)
+    export(ride, "racechrono", tmp_path / "racechrono")
+    cells = [line.split(",")[4] for line in (tmp_path / "racechrono").read_text().split("\n")[12:-1]]
+    assert [(k, cell) for k, cell in enumerate(cells) if cell] == [(50, "10.000"), (150, "20.000")]
+
+
+@pytest.mark.parametrize(("form", "rows"), [("csv", 400), ("parquet", 400), ("racechrono", 200), ("vbo", 200)])
+def test_two_formats_hold_a_hundred_a_second(tmp_path, form, rows):
+    """Counted are the rows that were written, in whatever blocks the log comes."""
+    if form == "parquet":
+        pytest.importorskip("pyarrow")
+    n = 400
+    log = Log(np.arange(n) / 200.0, np.tile([0.0, 1.0, 0.0], (n, 1)), np.zeros((n, 3)))
+    for size in 60_000, 150:
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(reader, "BLOCK_SAMPLES", size)
+            assert export(open_ride(log, SQUARE), form, tmp_path / "out") == rows
+
+
+def test_progress_and_notices_are_passed_on(tmp_path):
+    """A ride whose rates are in rad/s: 12 m/s in a bend of 45 degrees of lean."""
+    n = 3000
+    bend = (np.arange(n) // 1000 == 1)[:, None]
+    force = np.where(bend, [0.0, 2.0**0.5, 0.0], [0.0, 1.0, 0.0])
+    rate = np.where(bend, [0.0, 9.81 / 12.0, 0.0], 0.0)
+    done, notices = [], []
+    ride = open_ride(Log(np.arange(n) / 100.0, force, rate), SQUARE)
+    export(ride, "csv", tmp_path / "out", lambda *both: done.append(both), notices)
+    assert done == [(n, n)]
+    assert [notice.code for notice in notices] == ["rates-in-radians"]
+
+
+def test_a_name_with_gz_is_packed_and_others_are_not(tmp_path):
+    for name in "x.csv.gz", "x.csv":
+        export(open_ride(squarely(), SQUARE), "csv", tmp_path / name)
+    assert gzip.decompress((tmp_path / "x.csv.gz").read_bytes()) == (tmp_path / "x.csv").read_bytes()
+
+
+def test_parquet_has_the_same_columns_with_their_units(tmp_path):
+    pytest.importorskip("pyarrow")
+    from kickstand_tools.analysis.export import export_parquet
+    from pyarrow.parquet import ParquetFile
+
+    export_parquet.write(tmp_path / "x", iter([block(0.25), block(0.5, 0.75, speed_mps=np.nan)]), EVENING_S)
+    file = ParquetFile(tmp_path / "x")
+    assert file.num_row_groups == 2
+    units = "s deg deg g g g g deg/s deg/s deg/s m/s Cel deg".split()
+    assert {field.name: field.metadata[b"unit"].decode() for field in file.schema_arrow} == dict(
+        zip(export_csv.COLUMNS, units, strict=True)
+    )
+    assert [str(field.type) for field in file.schema_arrow] == ["double", *["float"] * 12]
+    assert file.schema_arrow.metadata[b"axes"] == b"left, up, forward; lean > 0 to the right"
+    table = file.read()
+    assert table["t_s"].to_pylist() == [EVENING_S + 0.25, EVENING_S + 0.5, EVENING_S + 0.75]
+    assert np.isnan(table["speed_mps"].to_pylist()[1:]).all()
+    for name in list(export_csv.COLUMNS)[1:]:
+        assert table[name][0].as_py() == pytest.approx(VALUES[name], rel=1e-6), name

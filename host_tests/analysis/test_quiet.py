@@ -1,0 +1,122 @@
+"""A standstill told by how little the vehicle shakes: each condition on its own, a little to either side of its limit.
+
+Ten seconds of riding, four of what may be a standstill, ten of riding; no speed in the log.
+"""
+
+import numpy as np
+import pytest
+from kickstand_tools.analysis.channels import Channels
+from kickstand_tools.analysis.stops.standstill import standing
+from roads import RATE_HZ, Road
+
+BEGIN_S, END_S = 10.0, 14.0
+SHAKEN = {"pitch_rate_dps": 3.0, "yaw_rate_dps": 2.0, "up_g": 0.1}  # by the road; 4.5 Hz
+ROAD_HZ, ENGINE_HZ = RATE_HZ / 11.0, 3.0 * RATE_HZ / 7.0
+
+
+def maybe(**changed: float) -> Channels:
+    """NAME=share: how much of its riding the channel shakes in the middle, 5 % if not said. Other words: below."""
+    road = Road((24.0, 0.0))
+    road.rests[:] = False
+    ride = road.channels()
+    t = road.t_s
+    middle = (t >= BEGIN_S) & (t < END_S)
+    for name, size in SHAKEN.items():
+        shaking = np.where(middle, changed.get(name, 0.05), 1.0) * size * np.sin(2.0 * np.pi * ROAD_HZ * t)
+        setattr(ride, name, getattr(ride, name) + shaking)
+    engine = np.sin(2.0 * np.pi * ENGINE_HZ * t + 0.3)
+    ride.pitch_rate_dps += changed.get("engine", 0.0) * engine * middle
+    ride.pitch_rate_dps += changed.get("pitching", 0.0) * middle
+    ride.yaw_rate_dps += changed.get("yawing", 0.0) * middle
+    ride.yaw_rate_dps += changed.get("bends", 0.0) * np.sin(0.4 * np.pi * t) * ~middle
+    ride.up_g += changed.get("heavier", 0.0) * middle
+    ride.forward_g += changed.get("drifting", 0.0) * np.where(middle, t - BEGIN_S, 0.0)
+    ride.rolling[middle] = np.arange(np.count_nonzero(middle)) % 10 < changed.get("rolling", 0.0)
+    if "rested" in changed:  # in the ride there is a rest, that the filter found, with this force
+        rest = (t >= 5.0) & (t < 7.0)
+        ride.resting[rest] = 1.0
+        ride.up_g[rest] = changed["rested"]
+        ride.forward_g[t < 5.0] = 0.1
+    return ride
+
+
+def share(ride: Channels) -> float:
+    """How much of the middle is a standstill; of the rest nothing may be."""
+    still = standing(ride)
+    t = ride.t_s
+    assert not still[(t < 5.0) | (t > END_S + 0.5)].any()
+    return float(np.mean(still[(t >= BEGIN_S + 0.5) & (t < END_S - 0.5)]))
+
+
+@pytest.mark.parametrize(
+    ("stands", "does_not"),
+    [
+        ({"pitch_rate_dps": 0.14}, {"pitch_rate_dps": 0.16}),  # 15 % of the shaking on the move
+        ({"yaw_rate_dps": 0.14}, {"yaw_rate_dps": 0.16}),
+        ({"up_g": 0.19}, {"up_g": 0.21}),  # 20 % of it
+        ({"engine": 3.0}, {"pitch_rate_dps": 1.0}),  # idling: as much, but faster
+        ({"pitching": 0.95}, {"pitching": 1.05}),  # 1 deg/s
+        ({"pitching": -0.95}, {"pitching": -1.05}),
+        ({"yawing": 0.95}, {"yawing": 1.05}),
+        ({"yawing": -0.95}, {"yawing": -1.05}),
+        ({"bends": 15.0}, {"bends": 15.0, "yaw_rate_dps": 0.5}),  # slow: they hide no shaking by the road
+        ({"drifting": 0.018}, {"drifting": 0.022}),  # the forward force, 0.01 g in half a second
+        ({"drifting": -0.018}, {"drifting": -0.022}),
+        ({"rolling": 4.0}, {"rolling": 6.0}),  # the filter knows: half of a second
+        ({"heavier": 0.115}, {"heavier": 0.125}),  # 0.12 g, of a sensor without six positions
+        ({"heavier": -0.115}, {"heavier": -0.125}),
+        ({"heavier": 0.145, "rested": 1.1}, {"heavier": 0.155, "rested": 1.1}),  # 0.05 g, where a rest tells more
+        ({"heavier": 0.055, "rested": 1.1}, {"heavier": 0.045, "rested": 1.1}),
+    ],
+)
+def test_each_condition(stands, does_not):
+    assert share(maybe(**stands)) == 1.0
+    assert share(maybe(**does_not)) < 0.2
+
+
+def test_it_begins_and_ends_within_half_a_second():
+    still = standing(maybe())
+    times = maybe().t_s[still]
+    assert times[0] == pytest.approx(BEGIN_S, abs=0.5)
+    assert times[-1] == pytest.approx(END_S, abs=0.5)
+
+
+@pytest.mark.parametrize(("seconds", "stands"), [(0.7, False), (2.0, True)])
+def test_a_second_of_quiet_is_needed(seconds, stands):
+    quiet, ridden = maybe(), maybe(pitch_rate_dps=1.0, yaw_rate_dps=1.0, up_g=1.0)
+    there = (quiet.t_s >= BEGIN_S) & (quiet.t_s < BEGIN_S + seconds)
+    for name in SHAKEN:
+        setattr(ridden, name, np.where(there, getattr(quiet, name), getattr(ridden, name)))
+    assert standing(ridden).any() == stands
+
+
+@pytest.mark.parametrize(("samples", "told"), [(99, False), (100, True)])
+def test_a_ride_of_less_than_two_seconds_tells_nothing(samples, told):
+    """There has to be riding to compare with."""
+    ride = maybe()
+    part = ride.part(slice(round(BEGIN_S * RATE_HZ), round(BEGIN_S * RATE_HZ) + samples))
+    part.pitch_rate_dps[:10] += 50.0 * np.sin(np.arange(10.0))
+    assert standing(part).any() in ((True, False) if told else (False,))
+
+
+def test_a_rest_of_the_filter_goes_back_to_where_the_force_became_that_of_the_rest():
+    """On a road without any shaking: braked to 12 s, a fork that comes up for 0.3 s, and a rest seen from 13.5 s on."""
+    road = Road((8.0, 0.0), (4.0, -4.0), (4.0, 0.0))
+    ride = road.channels(resting=(road.t_s >= 13.5).astype(float))
+    ride.forward_g += 0.03
+    ride.forward_g[(road.t_s >= 12.0) & (road.t_s < 12.3)] += 0.1
+    still = standing(ride)
+    assert ride.t_s[still][0] == pytest.approx(12.3, abs=0.07)
+    assert still[ride.t_s > 12.4].all()
+    ride.forward_g[(road.t_s >= 12.6) & (road.t_s < 12.9)] += 0.018  # within 0.02 g
+    assert ride.t_s[standing(ride)][0] == pytest.approx(12.3, abs=0.07)
+    ride.forward_g[(road.t_s >= 12.6) & (road.t_s < 12.9)] += 0.006
+    assert ride.t_s[standing(ride)][0] == pytest.approx(12.9, abs=0.07)
+
+
+def test_a_rest_from_the_beginning_on():
+    road = Road((4.0, 0.0), (4.0, 3.0))
+    ride = road.channels(resting=((road.t_s >= 2.0) & (road.t_s < 4.0)).astype(float))
+    still = standing(ride)
+    assert still[road.t_s < 3.99].all()
+    assert not still[road.t_s > 4.01].any()

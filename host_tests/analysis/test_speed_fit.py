@@ -1,0 +1,129 @@
+"""The speed of a log, fitted to what was felt: against the same estimate made in another way, and its delay."""
+
+import numpy as np
+import pytest
+from kickstand.units import STANDARD_GRAVITY
+from kickstand_tools.analysis.stops.speed_fit import fitted_speed, speed_delay_s
+from roads import RATE_HZ, Road, braking
+
+BEGIN_S, STOP_S = 14.0, 18.0  # of the braking
+
+
+def part_of(road: Road, every: int, scale=1.0, off_mps=0.0, late_s=0.0):
+    """The ride up to 2.5 s of rest, with a speed at every so many samples: that of so much earlier, and wrong."""
+    ride = road.channels()
+    ride.speed_mps[::every] = scale * np.interp(ride.t_s[::every] - late_s, road.t_s, road.mps) + off_mps
+    return ride.part(ride.t_s < STOP_S + 2.5)
+
+
+def conditioned(part, speed, acceleration, delay_s):
+    """The estimate as the mean of a normal distribution, given what was measured.
+
+    Before any speed is known: the scale is off by 1 %, the log's delay by 0.05 s, and the slope of the force by
+    0.05 m/s2 at the end of the part, from where it walks by 0.1 m/s2 per root second backwards, straight on between
+    points half a second apart. A speed is off by 0.05 m/s.
+    """
+    time = part.t_s
+    values = np.flatnonzero(~np.isnan(part.speed_mps))
+    values = values[time[values] - delay_s >= BEGIN_S - 4.0 - 1e-6]
+    wanted = np.array([int(np.argmin(np.abs(time - (time[value] - delay_s)))) for value in values])
+    count = int(np.ceil((time[-1] - min(time[wanted[0]], BEGIN_S) + 0.5) / 0.5 - 1e-9))
+    knots = time[-1] - 0.5 * np.arange(count)
+    back = np.arange(count)
+    covariance = 0.05**2 + 0.1**2 * 0.5 * np.minimum(back[:, None], back[None, :])
+    slopes = []  # m/s by which each of them makes the speed at a sample differ
+    for k in range(count):
+        hat = np.interp(-time, -knots, np.eye(count)[k])
+        steps = np.append(np.diff(time) * (hat[1:] + hat[:-1]) / 2.0, 0.0)
+        slopes.append(np.cumsum(steps[::-1])[::-1])
+    slopes = np.array(slopes).T
+    full = np.zeros((len(time), count + 2))
+    full[:, 0], full[:, 1:-1] = speed, slopes
+    told = full[wanted]
+    n = 5  # samples on each side of 0.2 s
+    told[:, -1] = [-np.mean(np.pad(acceleration, n, mode="edge")[k : k + 2 * n + 1]) for k in wanted]
+    prior = np.zeros((count + 2, count + 2))
+    prior[0, 0], prior[-1, -1], prior[1:-1, 1:-1] = 0.01**2, 0.05**2, covariance
+    gain = prior @ told.T @ np.linalg.inv(told @ prior @ told.T + 0.05**2 * np.eye(len(told)))
+    return speed + full @ (gain @ (part.speed_mps[values] - speed[wanted]))
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"every": 50},
+        {"every": 10, "scale": 1.05},
+        {"every": 50, "scale": 0.97, "off_mps": 0.3},
+        {"every": 25, "late_s": 0.3},
+        {"every": 50, "late_s": 0.5, "off_mps": -0.4},
+    ],
+)
+@pytest.mark.parametrize("delay_s", [0.0, 0.4])
+def test_the_fit_is_the_mean_of_what_can_be(wrong, delay_s):
+    part = part_of(braking(20.0, 5.0), **wrong)
+    acceleration = STANDARD_GRAVITY * part.forward_g
+    integrated = np.concatenate(([0.0], np.cumsum((acceleration[1:] + acceleration[:-1]) / 2.0 / RATE_HZ)))
+    begin = int(np.searchsorted(part.t_s, BEGIN_S))
+    fitted = fitted_speed(part, begin, integrated, acceleration, delay_s)
+    assert fitted is not None
+    want = conditioned(part, integrated, acceleration, delay_s)
+    shown = slice(begin - 50, None)
+    assert fitted[shown] == pytest.approx(want[shown], abs=1e-6)
+    assert np.max(np.abs(fitted[shown] - integrated[shown])) > 0.01 or wrong == {"every": 50}
+
+
+def test_one_speed_is_not_enough_nor_are_those_before_the_braking():
+    part = part_of(braking(20.0, 5.0), 50)
+    acceleration = STANDARD_GRAVITY * part.forward_g
+    begin = int(np.searchsorted(part.t_s, BEGIN_S))
+
+    def fit(*times_s: float):
+        part.speed_mps[:] = np.nan
+        part.speed_mps[np.searchsorted(part.t_s, np.array(times_s) - 1e-6)] = 10.0
+        return fitted_speed(part, begin, np.zeros(len(part.t_s)), acceleration, 0.0)
+
+    assert fit(BEGIN_S + 1.0) is None
+    assert fit(BEGIN_S - 4.1, BEGIN_S + 1.0) is None  # four seconds of the ride before are used
+    assert fit(BEGIN_S - 3.9, BEGIN_S + 1.0) is not None
+    assert fit(BEGIN_S - 3.0, BEGIN_S - 1.0) is None
+    assert fit(BEGIN_S - 3.0, BEGIN_S) is not None
+
+
+def waves(seconds=60.0, late_s=0.0, size_mps2=1.5, every_s=1.0, period_s=5.0):
+    """Faster and slower, with a speed as late as this."""
+    road = Road((seconds, 0.0))
+    t, omega = road.t_s, 2.0 * np.pi / period_s
+    ride = road.channels(forward_g=size_mps2 * np.cos(omega * t) / STANDARD_GRAVITY)
+    step = round(every_s * RATE_HZ)
+    ride.speed_mps[::step] = 20.0 + size_mps2 / omega * np.sin(omega * (t[::step] - late_s))
+    return ride
+
+
+@pytest.mark.parametrize("late_s", [-0.4, 0.0, 0.1, 0.42, 1.0, 1.43])
+@pytest.mark.parametrize("every_s", [0.2, 1.0])
+def test_how_late_a_speed_is(late_s, every_s):
+    assert speed_delay_s(waves(300.0, late_s, every_s=every_s)) == pytest.approx(late_s, abs=0.005)
+
+
+@pytest.mark.parametrize("late_s", [-0.7, 1.7])
+def test_a_speed_that_is_later_than_any_receivers_tells_no_delay(late_s):
+    assert speed_delay_s(waves(late_s=late_s)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("tells", "does_not"),
+    [
+        ({"seconds": 30.0}, {"seconds": 29.0}),  # thirty speeds
+        ({"seconds": 30.0, "every_s": 0.5}, {"seconds": 29.0, "every_s": 0.5}),  # one a second of them
+        ({"size_mps2": 0.80}, {"size_mps2": 0.70}),  # that change by 0.5 m/s rms: 0.66 of the acceleration's size
+    ],
+)
+def test_what_it_takes_to_tell_a_delay(tells, does_not):
+    assert speed_delay_s(waves(late_s=0.4, **tells)) == pytest.approx(0.4, abs=0.02)
+    assert speed_delay_s(waves(late_s=0.4, **does_not)) == 0.0
+
+
+def test_without_any_force_there_is_no_delay():
+    ride = waves(late_s=0.4)
+    ride.forward_g[:] = 0.01
+    assert speed_delay_s(ride) == 0.0

@@ -1,0 +1,353 @@
+"""Stops without any noise, against their closed form: what counts as a stop, and each figure that is told of it.
+
+Nothing shakes, so a standstill is where the lean filter says that the vehicle rests, or where the log's speed is 0.
+"""
+
+import numpy as np
+import pytest
+from kickstand.units import STANDARD_GRAVITY
+from kickstand_tools.analysis.stops.brake_test import find_stops
+from kickstand_tools.analysis.stops.speed_stops import stops_by_speed
+from kickstand_tools.analysis.stops.standstill import standing
+from roads import RATE_HZ, REST_S, Road, braking
+
+
+@pytest.mark.parametrize(
+    ("mps", "mps2", "counts"),
+    [
+        (9.8 / 3.6, 3.0, False),
+        (10.2 / 3.6, 3.0, True),  # 10 km/h
+        (20.0, 0.97, False),
+        (20.0, 1.03, True),  # 1 m/s2
+        (30.0, 28.5, True),
+        (30.0, 31.5, False),  # 30 m/s2
+    ],
+)
+def test_what_counts_as_a_stop(mps, mps2, counts):
+    found = find_stops(braking(mps, mps2).channels())
+    assert len(found) == counts
+    if counts:
+        assert found[0].initial_speed_mps == pytest.approx(mps, rel=0.01, abs=0.05)
+        assert found[0].mfdd_mps2 == pytest.approx(mps2, rel=0.01)
+
+
+@pytest.mark.parametrize("speed", ["log", "integrated"])
+def test_every_figure_of_a_stop(speed):
+    """20 m/s at 5 m/s2: 4 s and 40 m, straight on."""
+    road = braking(20.0, 5.0)
+    ride = road.channels()
+    if speed == "log":
+        ride.speed_mps[::10] = road.mps[::10]
+    (stop,) = find_stops(ride)
+    assert stop.speed_from == speed
+    assert stop.start_s == pytest.approx(14.0 - 0.12, abs=1e-6)  # the force is a mean over 0.2 s; a sample before it
+    near = 1e-6 if speed == "integrated" else 2e-3
+    assert stop.stop_s == pytest.approx(18.0, abs=near)
+    assert stop.duration_s == stop.stop_s - stop.start_s
+    assert stop.initial_speed_mps == pytest.approx(20.0, rel=near)
+    assert stop.distance_m == pytest.approx(40.0 + 20.0 * 0.12 - 5.0 * 0.02**2 / 4.0, rel=near)  # a sample's corner
+    assert stop.mfdd_mps2 == pytest.approx(5.0, rel=near)
+    assert stop.peak_mps2 == pytest.approx(5.0, rel=near)
+    assert stop.side_m == stop.heading_deg == 0.0
+
+
+def test_the_end_is_hidden_by_the_forks_rebound():
+    """From a fiftieth of the speed on the vehicle is taken to stop evenly: here the sensor is thrown back and forth.
+
+    60 m/s at 5 m/s2: 12 s and 360 m.
+    """
+    road = braking(60.0, 5.0)
+    ride = road.channels()
+    end = int(np.argmax(road.rests & (road.t_s > 20.0)))
+    ride.forward_g[end - 6 : end] += 0.1 * np.array([1.0, -1.0, -1.0, 1.0, 1.0, -1.0])  # no speed is left of it
+    (stop,) = find_stops(ride)
+    assert stop.stop_s == pytest.approx(REST_S + 15.0 + 4.0 + 12.0, abs=1e-6)
+    assert stop.distance_m == pytest.approx(360.0 + 60.0 * 0.12, abs=0.002)
+
+
+def test_jerk_is_the_steepest_change_of_the_force():
+    """Braking that grows by 10 m/s3 to 6 m/s2, stays, and lets go by 20 m/s3, 3 m/s at the end."""
+    t = np.arange(0.0, 30.0, 1.0 / RATE_HZ)
+    braked = np.interp(t, [15.0, 15.6, 17.6, 17.9, 19.0], [0.0, 6.0, 6.0, 0.0, 0.0])
+    lost = np.concatenate(([0.0], np.cumsum((braked[1:] + braked[:-1]) / 2.0 / RATE_HZ)))[-1]
+    road = Road((REST_S, 0.0), (lost / 2.0, 2.0), (30.0 - REST_S - lost / 2.0, 0.0))
+    road.mps2 = road.mps2 - braked[: len(road.t_s)]
+    road.rests = (road.t_s < REST_S) | (road.t_s > 17.9)
+    (stop,) = find_stops(road.channels())
+    assert stop.jerk_mps3 == pytest.approx(20.0, rel=0.15)  # smoothed twice over 0.2 s
+    assert stop.peak_mps2 == pytest.approx(6.0, rel=0.01)
+    assert stop.initial_speed_mps == pytest.approx(lost, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("engine_mps2", "mps2", "earlier_s"),
+    [
+        (0.2, 6.0, 0.12),  # under 4 % of the braking: the rider has not begun
+        (0.3, 6.0, 0.71),  # over it, for 0.6 s at most from where that of 15 % begins
+        (0.8, 6.0, 0.71),
+        (1.0, 6.0, 4.08),  # over 15 %: it is braking
+        (0.24, 1.4, 0.71),  # under 0.25 m/s2, though over 15 %: a slope or the wind
+        (0.27, 1.4, 4.08),
+    ],
+)
+def test_where_braking_begins(engine_mps2, mps2, earlier_s):
+    """After 4 s of braking with the engine alone."""
+    mps = 18.0
+    seconds = (mps - 4.0 * engine_mps2) / mps2
+    road = Road((REST_S, 0.0), (6.0, 3.0), (3.0, 0.0), (4.0, -engine_mps2), (seconds, -mps2), (REST_S, 0.0))
+    (stop,) = find_stops(road.channels())
+    assert REST_S + 6.0 + 3.0 + 4.0 - stop.start_s == pytest.approx(earlier_s, abs=0.025)
+
+
+@pytest.mark.parametrize(("pause_s", "counts"), [(0.26, True), (0.8, False)])
+def test_a_pause_just_before_the_standstill(pause_s, counts):
+    """Short, the stop goes on; longer, it ends there, and what follows is too slow to count."""
+    road = Road(
+        *((REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (pause_s, 0.0), (0.1, -5.0), (REST_S, 0.0)),
+    )
+    found = find_stops(road.channels())
+    assert len(found) == counts
+    if counts:
+        assert found[0].initial_speed_mps == pytest.approx(20.0, rel=0.01)
+
+
+def test_no_stop_is_longer_than_a_minute():
+    """67.6 m/s at 1.04 m/s2 take 65 s, of which the last 60 are looked at."""
+    (stop,) = find_stops(braking(67.6, 1.04).channels())
+    assert stop.initial_speed_mps == pytest.approx(1.04 * 60.0, rel=0.005)
+
+
+@pytest.mark.parametrize(("missing_s", "initial_mps"), [(0.46, 20.0), (0.56, 12.2)])
+def test_readings_that_are_missing(missing_s, initial_mps):
+    """Up to half a second is bridged. After a longer gap the stop begins: 14 + 1 s and the gap after the start."""
+    road = braking(20.0, 5.0)
+    there = (road.t_s < 15.001) | (road.t_s > 15.0 + missing_s - 1e-6)
+    (stop,) = find_stops(road.channels().part(there))
+    assert stop.initial_speed_mps == pytest.approx(initial_mps, rel=0.01)
+
+
+def test_after_a_gap_only_what_is_whole_is_integrated():
+    """Two gaps: the last one counts."""
+    road = braking(20.0, 2.0)
+    there = ~((road.t_s > 14.5) & (road.t_s < 15.4)) & ~((road.t_s > 17.0) & (road.t_s < 17.9))
+    (stop,) = find_stops(road.channels().part(there))
+    assert stop.start_s == pytest.approx(17.9, abs=0.03)
+
+
+class TestStandstill:
+    """What the rest after the stop tells: the slope, and what the gyro reads at rest."""
+
+    def disturbed(self, begin_s: float, end_s: float, off_g: float = 0.1) -> float:
+        """Deceleration found where the force is off from begin_s to end_s after the standstill at 18 s."""
+        road = braking(20.0, 5.0)
+        ride = road.channels()
+        ride.forward_g[(road.t_s > 18.0 + begin_s - 0.01) & (road.t_s < 18.0 + end_s - 0.01)] += off_g
+        (stop,) = find_stops(ride)
+        return stop.mfdd_mps2
+
+    def test_its_first_half_second_and_what_comes_after_two_and_a_half_count_for_nothing(self):
+        right = self.disturbed(9.0, 9.0)
+        assert right == pytest.approx(5.0, rel=0.002)
+        assert self.disturbed(2.56, 4.0) == pytest.approx(right, rel=1e-4)
+        # in between it is taken for the slope: 0.1 g for 1 of 2 s, 0.49 m/s2
+        assert self.disturbed(0.5, 1.5) == pytest.approx(right + 0.49, rel=0.02)
+        assert self.disturbed(1.5, 2.5) == pytest.approx(right + 0.49, rel=0.02)
+
+    def test_the_forks_rebound_is_none_of_the_slope(self):
+        """Zero in the mean, so that it changes no speed, but only in the first half second."""
+        road = braking(20.0, 5.0)
+        ride = road.channels()
+        after = road.t_s - 18.0
+        ride.forward_g += np.where((after > -0.01) & (after < 0.45), 0.2 * np.sin(2 * np.pi * after / 0.46), 0.0)
+        (stop,) = find_stops(ride)
+        assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.004)
+
+    @pytest.mark.parametrize("slope_deg", [-8.0, 8.0])
+    def test_a_slope(self, slope_deg):
+        """At rest the force along the vehicle is that of the slope: it is no deceleration."""
+        road = braking(20.0, 5.0)
+        ride = road.channels()
+        ride.forward_g += np.sin(np.radians(slope_deg))
+        (stop,) = find_stops(ride)
+        assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.002)
+
+    def test_what_the_gyro_reads_at_rest_is_its_bias(self):
+        road = braking(20.0, 5.0)
+        ride = road.channels(
+            pitch_rate_dps=np.full(len(road.t_s), 1.5), yaw_rate_dps=np.full(len(road.t_s), -2.5)
+        )
+        (stop,) = find_stops(ride)
+        assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.002)
+        assert stop.heading_deg == pytest.approx(0.0, abs=1e-6)
+        assert stop.side_m == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_dive_is_no_braking():
+    """The nose is 4 degrees down while the bike brakes: the sensor feels its weight along the bike, which is no
+    deceleration. Going down at 10 deg/s where braking begins, a sensor 0.65 m above the hubs is 0.11 m/s faster than
+    the bike."""
+    road = braking(20.0, 5.0)
+    ride = road.channels()
+    pitch = np.interp(road.t_s, [13.7, 14.1, 17.8, 18.0], [0.0, -4.0, -4.0, 0.0])
+    rate = np.gradient(np.radians(pitch), road.t_s)
+    ride.pitch_rate_dps = np.degrees(rate)
+    ride.forward_g += np.sin(np.radians(pitch)) - 0.65 * np.gradient(rate, road.t_s) / STANDARD_GRAVITY
+    (stop,) = find_stops(ride)
+    assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.005)
+    assert stop.initial_speed_mps == pytest.approx(20.0, abs=0.05)
+
+
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_bend_is_no_dive(side):
+    """Braking in a bend at 30 degrees of lean: turned about the vertical by 8 deg/s for 2 s, the gyro reads a rate of
+    pitch, but the nose stays level."""
+    road = braking(20.0, 5.0)
+    turning = (road.t_s >= 14.5) & (road.t_s < 16.5)
+    lean = np.where(turning, 30.0 * side, 0.0)
+    rate = np.where(turning, -8.0 * side, 0.0)  # > 0 to the left
+    ride = road.channels(
+        lean_deg=lean,
+        pitch_rate_dps=-rate * np.sin(np.radians(lean)),
+        yaw_rate_dps=rate * np.cos(np.radians(lean)),
+    )
+    (stop,) = find_stops(ride)
+    assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.004)
+    assert stop.heading_deg == pytest.approx(-16.0 * side * np.cos(np.radians(30.0)), rel=0.01)
+    assert np.sign(stop.side_m) == -side
+
+
+def test_how_far_off_the_straight_line():
+    """0.5 deg/s to the left over the 4 s: the integral of (20 - 5 t) sin(0.5 deg/s t), with t from braking's begin."""
+    road = braking(20.0, 5.0)
+    ride = road.channels(yaw_rate_dps=np.where((road.t_s >= 14.0) & (road.t_s < 18.0), 0.5, 0.0))
+    (stop,) = find_stops(ride)
+    assert stop.heading_deg == pytest.approx(0.5 * (0.98 * 4.0 + 0.01), abs=0.002)  # down to 2 % of the speed
+    t = np.linspace(0.0, 4.0, 4001)
+    assert stop.side_m == pytest.approx(np.trapezoid((20.0 - 5.0 * t) * np.sin(np.radians(0.5 * t)), t), abs=0.02)
+
+
+def test_each_stop_begins_after_the_standstill_before():
+    """Its initial speed and start are its own, in whatever order of hardness."""
+    legs = []
+    for mps, mps2 in (20.0, 6.0), (12.0, 3.0), (25.0, 8.0):
+        legs += [(3.0, 0.0), (mps / 4.0, 4.0), (3.0, 0.0), (mps / mps2, -mps2), (3.0, 0.0)]
+    found = find_stops(Road(*legs).channels())
+    assert [stop.mfdd_mps2 for stop in found] == pytest.approx([6.0, 3.0, 8.0], rel=0.01)
+    assert [stop.initial_speed_mps for stop in found] == pytest.approx([20.0, 12.0, 25.0], rel=0.01)
+
+
+@pytest.mark.parametrize(("off_g", "counts"), [(0.11, True), (0.15, False)])
+def test_a_speed_that_does_not_close(off_g, counts):
+    """0.15 g felt in excess for 8.8 s of riding on would be 13 m/s at the standstill before: over 3 + 0.7 m/s a s."""
+    road = braking(20.0, 5.0, before_s=4.0)
+    ride = road.channels()
+    ride.forward_g[(road.t_s > 5.0) & (road.t_s < 14.0)] -= off_g
+    assert len(find_stops(ride)) == counts
+
+
+def test_a_speed_in_the_log_has_the_last_word():
+    """The accelerometer's slope is 3 % too large: the log's speed corrects it."""
+    road = braking(20.0, 5.0)
+    ride = road.channels(forward_g=1.03 * road.mps2 / STANDARD_GRAVITY)
+    (stop,) = find_stops(ride)
+    assert stop.mfdd_mps2 == pytest.approx(5.15, rel=0.003)
+    ride.speed_mps[::10] = road.mps[::10]
+    (stop,) = find_stops(ride)
+    assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.003)
+    assert stop.initial_speed_mps == pytest.approx(20.0, rel=0.002)
+
+
+@pytest.mark.parametrize(("mps2", "counts"), [(1.45, False), (1.55, True)])
+def test_a_stop_that_the_speed_alone_shows(mps2, counts):
+    """Surely one, from 1.5 m/s2, and from over 10 km/h."""
+    road = braking(20.0, mps2)
+    ride = road.channels()
+    ride.speed_mps[::50] = road.mps[::50]
+    assert stops_by_speed(ride) is counts
+    slow = braking(2.7, 4.0)
+    ride = slow.channels()
+    ride.speed_mps[::5] = slow.mps[::5]
+    assert not stops_by_speed(ride)
+
+
+@pytest.mark.parametrize(("age_s", "stands"), [(2.9, True), (3.1, False)])
+def test_an_old_speed_tells_nothing(age_s, stands):
+    """0 m/s, and then nothing: three seconds later the vehicle may ride again."""
+    road = Road((10.0, 0.0), (20.0, 0.5))
+    road.rests[:] = False
+    ride = road.channels()
+    ride.speed_mps[[0, 50]] = 5.0, 0.0
+    still = standing(ride)
+    assert not still[:50].any()
+    assert still[round((1.0 + age_s) * RATE_HZ)] == stands
+
+
+@pytest.mark.parametrize(("mps", "stands"), [(0.29, True), (0.31, False)])
+def test_satellites_never_quite_say_0(mps, stands):
+    road = Road((3.0, 0.0))
+    road.rests[:] = False
+    ride = road.channels(speed_mps=np.full(len(road.t_s), mps))
+    assert standing(ride).all() == stands
+    assert standing(ride).any() == stands
+
+
+def test_a_log_that_begins_on_the_move():
+    """No standstill before tells that the speed there was 0."""
+    ride = braking(20.0, 5.0).channels()
+    (stop,) = find_stops(ride.part(ride.t_s >= 11.0))
+    assert stop.initial_speed_mps == pytest.approx(20.0, rel=0.003)
+
+
+def test_stops_are_looked_for_in_fifty_samples_a_second():
+    """Of a log with 200, each the mean of four: of a time of 13.88, 13.885, 13.89 and 13.895 s."""
+    road = Road((REST_S, 0.0), (5.0, 4.0), (4.0, 0.0), (4.0, -5.0), (REST_S, 0.0), rate_hz=200.0)
+    (stop,) = find_stops(road.channels())
+    assert stop.start_s == pytest.approx(13.8875, abs=1e-6)
+    assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.002)
+
+
+@pytest.mark.parametrize(("samples", "counts"), [(10, False), (11, True)])
+def test_a_standstill_that_is_too_short_tells_no_slope(samples, counts):
+    """A fifth of a second."""
+    road = Road((REST_S, 0.0), (5.0, 4.0), (4.0, 0.0), (4.0, -5.0), (samples / RATE_HZ, 0.0), (10.0, 2.0))
+    assert len(find_stops(road.channels())) == counts
+
+
+def test_the_straight_line_is_the_direction_just_before_braking():
+    """That of the first tenth of a second of the stop, in which the vehicle here turns by half a degree: in the mean a
+    quarter is behind it and a quarter before it."""
+    road = braking(20.0, 5.0)
+    begin = 14.0 - 0.12
+    ride = road.channels(yaw_rate_dps=np.where((road.t_s > begin - 0.01) & (road.t_s < begin + 0.09), 5.0, 0.0))
+    (stop,) = find_stops(ride)
+    assert stop.side_m == pytest.approx(42.4 * np.sin(np.radians(0.25)), rel=0.25)
+
+
+@pytest.mark.parametrize(
+    ("hard", "easy", "earlier_s"),
+    [((2.0, -6.0), (1.4, -2.0), 0.71), ((10.0 / 9.0, -9.0), (2.4, -2.0), 4.08)],
+)
+def test_how_hard_the_braking_was_is_that_of_its_last_two_seconds(hard, easy, earlier_s):
+    """A quarter of them at 6 m/s2 is enough before it is eased to 2: 15 % are 0.9, more than the engine's 0.8. What is
+    over before them does not count: 15 % are 0.3, and it began with the engine's."""
+    legs = (REST_S, 0.0), (6.0, 3.0), (3.0, 0.0), (4.0, -0.8), hard, easy, (REST_S, 0.0)
+    (stop,) = find_stops(Road(*legs).channels())
+    assert REST_S + 6.0 + 3.0 + 4.0 - stop.start_s == pytest.approx(earlier_s, abs=0.025)
+
+
+def test_the_vehicle_may_roll_out():
+    """The last metre a second at 0.4 m/s2: the brakes are off, and the stop is that before it."""
+    legs = (REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (1.25, -0.4), (REST_S, 0.0)
+    (stop,) = find_stops(Road(*legs).channels())
+    assert stop.initial_speed_mps == pytest.approx(20.0, rel=1e-3)
+    assert stop.mfdd_mps2 == pytest.approx(5.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(("samples", "settled"), [(30, False), (31, True)])
+def test_a_short_standstill_is_used_from_its_beginning(samples, settled):
+    """After half a second, in which the fork comes up, six samples are needed. With less, it is in the slope."""
+    road = Road((REST_S, 0.0), (5.0, 4.0), (4.0, 0.0), (4.0, -5.0), (samples / RATE_HZ, 0.0), (10.0, 2.0))
+    ride = road.channels()
+    ride.forward_g[(road.t_s > 18.01) & (road.t_s < 18.45)] += 0.05
+    (stop,) = find_stops(ride)
+    assert (stop.mfdd_mps2 == pytest.approx(5.0, rel=0.003)) is settled

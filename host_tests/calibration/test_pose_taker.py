@@ -1,0 +1,82 @@
+"""How the device waits for a still pose and takes it. 8192 counts per g, 65.5 per deg/s."""
+
+import pytest
+from kickstand.calibration.pose_taker import DONE, SETTLED, SETTLING, SPOILT, TAKING, PoseTaker
+from test_still_pose import LEVEL, samples
+
+
+class Chip:
+    accel_lsb_per_g, gyro_lsb_per_dps, SATURATED = 8192, 65.5, 32700
+
+
+def taker():
+    """At 100 samples a second: 50 to settle, 1000 to give up, 300 to average."""
+    return PoseTaker(Chip, 100, 3.0)
+
+
+def moving(k):
+    row = list(LEVEL)
+    row[k % 3] += 2000 * (k % 5)
+    return row
+
+
+def test_the_states_can_be_told_apart():
+    assert len({SETTLING, SETTLED, TAKING, DONE, SPOILT}) == 5
+
+
+def test_half_a_second_of_stillness_then_three_seconds_are_taken():
+    taking = taker()
+    assert taking.progress() == (0, 300)
+    rows = samples(351)
+    states = []
+    for k, row in enumerate(rows):
+        states.append(taking.step(row))
+        assert not taking.restless
+        if k == 60:
+            assert taking.progress() == (11, 300)
+    assert states[:350] == [SETTLING] * 49 + [SETTLED] + [TAKING] * 299 + [DONE]
+    assert states[350] not in (SETTLING, SETTLED, TAKING, DONE, SPOILT)
+    assert taking.settled == pytest.approx([LEVEL[i] / 8192 for i in range(3)])
+    assert taking.pose.count == 300
+    assert taking.pose.gyro == pytest.approx([LEVEL[i] / 65.5 for i in (4, 5, 6)])
+    assert taking.problem is None
+
+
+def test_stillness_is_waited_for_and_said_to_be_missing_after_a_second():
+    taking = taker()
+    for k in range(100):
+        assert taking.step(moving(k)) == SETTLING
+        assert not taking.restless
+    for k in range(100, 130):
+        assert taking.step(moving(k)) == SETTLING
+        assert taking.restless
+    states = [taking.step(row) for row in samples(60)]
+    assert states.count(SETTLED) == 1
+    assert states[-1] == TAKING
+    assert not taking.restless
+
+
+@pytest.mark.parametrize("code", ["moved", "frozen-pose"])
+def test_it_gives_up_after_10_seconds(code):
+    taking = taker()
+    states = [taking.step(moving(k) if code == "moved" else list(LEVEL)) for k in range(1200)]
+    assert states.count(SPOILT) == 1
+    waited = states.index(SPOILT) + 1
+    assert waited == 1000 if code == "frozen-pose" else 1000 <= waited <= 1050
+    assert set(states[: states.index(SPOILT)]) == {SETTLING}
+    assert taking.problem and taking.problem.code == code
+    assert not taking.restless
+
+
+def test_a_knock_while_averaging_spoils_the_pose_and_it_can_be_taken_again():
+    taking = taker()
+    rows = samples(100)
+    rows[80][1] += 1000
+    states = [taking.step(row) for row in rows]
+    assert states[79:81] == [TAKING, SPOILT]
+    assert SPOILT not in states[81:]
+    assert taking.problem and taking.problem.code == "moved"
+    assert taking.progress() == (0, 300)
+    taking.restart()
+    assert (taking.problem, taking.settled) == (None, None)
+    assert [taking.step(row) for row in samples(350)][-1] == DONE

@@ -1,0 +1,84 @@
+"""The largest values that a log may have: a little more is refused with its unit, read quickly or cell by cell."""
+
+import io
+
+import command
+import numpy as np
+import pytest
+from kickstand_tools.errors import InputError
+from kickstand_tools.logs.log import Log
+from kickstand_tools.logs.reader import read_blocks, read_log
+
+HEADER = command.HEADER + ",speed_mps,temp_c"
+# The widest ranges of the chips are 16 g and 2000 deg/s, of which more is another unit; their data sheets end at 85 C.
+LIMITS = {
+    "t_s": (1e10, "seconds"),
+    "ax_g": (20.0, "g"),
+    "ay_g": (20.0, "g"),
+    "az_g": (20.0, "g"),
+    "gx_dps": (2500.0, "deg/s"),
+    "gy_dps": (2500.0, "deg/s"),
+    "gz_dps": (2500.0, "deg/s"),
+    "speed_mps": (200.0, "m/s"),
+    "temp_c": (200.0, "degrees Celsius"),
+}
+
+
+@pytest.mark.parametrize("quoted", [False, True])  # numpy reads the one, Python the other
+@pytest.mark.parametrize("name", LIMITS)
+def test_past_any_reading(name, quoted):
+    limit, unit = LIMITS[name]
+    for sign in (1.0, -1.0) if name != "t_s" else (1.0,):
+        for factor, good in (1.0, True), (1.001, False):
+            rows = []
+            for time in range(5):  # the last of them is extreme
+                cells = dict.fromkeys(HEADER.split(","), "0") | {"t_s": f"{time}", "az_g": "1"}
+                cells |= {name: f"{sign * factor * limit:.10g}"} if time == 4 else {}
+                rows.append(",".join(cells.values()))
+            if quoted:
+                rows[0] = rows[0].replace("0", '"0"', 1)
+            log = io.StringIO("\n".join([HEADER, *rows]) + "\n")
+            if name == "t_s":  # from one second to a far one: milliseconds, which another check refuses
+                words = "milliseconds" if good else "line 6: t_s is '.*', past any reading: its unit is seconds"
+                with pytest.raises(InputError, match=words):
+                    read_log(log)
+            elif good:
+                assert len(read_log(log).t_s) == 5
+            else:
+                with pytest.raises(InputError, match=f"line 6: {name} is '.*', past any reading: its unit is {unit}$"):
+                    read_log(log)
+
+
+def test_a_firmware_that_is_told_no_temperature_is_told_25():
+    n = 3
+    log = Log(np.arange(n) / 100.0, np.tile([0.1, 0.2, 0.9], (n, 1)), np.tile([1.0, 2.0, 3.0], (n, 1)))
+    log.temperature_c[1] = 31.5
+    temperatures = [row[1][3] for row in log.rows()]
+    assert temperatures == [25.0, 31.5, 25.0]
+    assert [row for block in read_blocks(log) for row in block.rows()][1][:2] == (
+        10_000,
+        [0.1, 0.2, 0.9, 31.5, 1.0, 2.0, 3.0],
+    )
+
+
+@pytest.mark.parametrize(("size_g", "refused"), [(4.9, False), (5.1, True), (19.9, True), (20.1, False)])
+def test_accelerations_that_look_like_m_per_s2(size_g, refused):
+    """By their size, not by an axis, and by the usual one: 5 to 20."""
+    force = np.tile([size_g * 0.6, 0.0, size_g * 0.8], (9, 1))
+    force[:4] = [0.0, 1.0, 0.0]
+    log = Log(np.arange(9) / 100.0, force, np.zeros((9, 3)))
+    if refused:
+        with pytest.raises(InputError, match="look like m/s2"):
+            read_log(log)
+    else:
+        read_log(log)
+
+
+@pytest.mark.parametrize(("step_s", "refused"), [(3.9, False), (4.0, True)])
+def test_times_that_look_like_milliseconds(step_s, refused):
+    log = Log(np.arange(4) * step_s, np.tile([0.0, 1.0, 0.0], (4, 1)), np.zeros((4, 3)))
+    if refused:
+        with pytest.raises(InputError, match="is t_s in milliseconds"):
+            read_log(log)
+    else:
+        read_log(log)

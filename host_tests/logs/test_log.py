@@ -1,0 +1,166 @@
+"""A log in memory and its blocks: times, orders of columns, and what does not fit."""
+
+import gzip
+import io
+
+import command
+import numpy as np
+import pytest
+from kickstand_tools.errors import InputError
+from kickstand_tools.logs import reader
+from kickstand_tools.logs.log import Log
+from kickstand_tools.logs.reader import read_blocks, read_log, read_twice
+from kickstand_tools.logs.source import log_stem, name_of, total_bytes
+
+FORCE, RATE = [0.1, 0.2, 0.9], [1.0, 2.0, 3.0]
+
+
+def log_of(n: int, start_s: float = 0.0, **more) -> Log:
+    return Log(start_s + np.arange(n) / 100.0, np.tile(FORCE, (n, 1)), np.tile(RATE, (n, 1)), **more)
+
+
+def test_times_count_from_the_first_sample():
+    log = log_of(3, 1_700_000_000.25)
+    assert log.t_s == pytest.approx([0.0, 0.01, 0.02], abs=1e-6)
+    assert log.start_s == 1_700_000_000.25
+    assert log.time_us.tolist() == [0, 10_000, 20_000]
+    again = log_of(3, 5.0)
+    again = Log(again.t_s, again.accel_g, again.gyro_dps, start_s=again.start_s)
+    assert again.start_s == 5.0
+    assert Log(np.array([2.0, 3.0]), log.accel_g[:2], log.gyro_dps[:2], start_s=10.0).start_s == 12.0
+
+
+def test_the_chips_order_and_the_names_of_the_columns():
+    log = log_of(2, temperature_c=[20.0, 21.0], speed_mps=[5.0, np.nan])
+    assert log.readings[1].tolist() == [0.1, 0.2, 0.9, 21.0, 1.0, 2.0, 3.0]
+    first = {name: values[0] for name, values in log.columns().items()}
+    assert first == {
+        "t_s": 0.0, "ax_g": 0.1, "ay_g": 0.2, "az_g": 0.9, "gx_dps": 1.0, "gy_dps": 2.0, "gz_dps": 3.0,
+        "speed_mps": 5.0, "temp_c": 20.0,
+    }
+    again = Log.from_readings(log.readings, 50.0, "mine")
+    assert again.t_s.tolist() == [0.0, 0.02]
+    assert again.name == "mine"
+    assert again.readings.tolist() == log.readings.tolist()
+    assert np.isnan(again.speed_mps).all()
+    assert np.isnan(log_of(2).temperature_c).all()
+
+
+@pytest.mark.parametrize(
+    ("changed", "words"),
+    [
+        ({"t_s": [[0.0], [1.0]]}, r"t_s has the shape \(2, 1\), it has to be \(2,\)"),
+        ({"accel_g": [[0.0, 1.0]] * 2}, r"accel_g has the shape \(2, 2\), it has to be \(2, 3\)"),
+        ({"gyro_dps": [RATE]}, r"gyro_dps has the shape \(1, 3\), it has to be \(2, 3\)"),
+        ({"speed_mps": [1.0]}, r"speed_mps has the shape \(1,\), it has to be \(2,\)"),
+        ({"t_s": [0.0, 0.0]}, "has to increase"),
+        ({"t_s": [1.0, 0.5]}, "has to increase"),
+        ({"t_s": [0.0, 4e-7]}, "has to increase"),  # the same microsecond
+    ],
+)
+def test_what_does_not_fit_is_refused(changed, words):
+    with pytest.raises(InputError, match="the log: .*" + words):
+        Log(**({"t_s": [0.0, 1.0], "accel_g": [FORCE] * 2, "gyro_dps": [RATE] * 2} | changed))
+
+
+def test_a_microsecond_apart_is_enough():
+    assert Log(np.array([0.0, 1e-6]), np.tile(FORCE, (2, 1)), np.tile(RATE, (2, 1))).time_us.tolist() == [0, 1]
+
+
+def test_a_log_in_memory_comes_in_blocks(monkeypatch):
+    monkeypatch.setattr(reader, "BLOCK_SAMPLES", 4)
+    done = []
+    log = log_of(10, 7.0, speed_mps=[5.0, *[np.nan] * 9])
+    blocks = list(read_blocks(log, progress=lambda *both: done.append(both)))
+    assert done == [(4, 10), (8, 10), (10, 10)]
+    assert [len(block.time_us) for block in blocks] == [4, 4, 2]
+    assert np.concatenate([block.time_us for block in blocks]).tolist() == log.time_us.tolist()
+    assert [(block.has_speed, block.has_temp) for block in blocks] == [(True, False)] * 3
+    assert [block.start_s for block in blocks] == [7.0] * 3
+    assert blocks[1].time_text == ["7.040000", "7.050000", "7.060000", "7.070000"]
+    assert blocks[1].t_s == pytest.approx([0.04, 0.05, 0.06, 0.07])
+
+
+def text_of(n: int, header: str = command.HEADER, row: str = "{t:.2f},0.1,0.2,0.9,1,2,3") -> str:
+    return "\n".join([header, *[row.format(t=k / 100) for k in range(n)]]) + "\n"
+
+
+def test_a_file_comes_in_blocks_of_whole_lines(tmp_path, monkeypatch):
+    monkeypatch.setattr(reader, "BLOCK_BYTES", 100)
+    path, packed = tmp_path / "log.csv", tmp_path / "log.csv.gz"
+    path.write_text(text_of(40))
+    packed.write_bytes(gzip.compress(path.read_bytes()))
+    for source in path, packed, str(path):
+        done = []
+        blocks = list(read_blocks(source, progress=lambda *both: done.append(both)))  # noqa: B023
+        size = path.stat().st_size if source is not packed else packed.stat().st_size
+        assert len(blocks) > 5
+        assert done[-1] == (size, size)
+        assert [total for _, total in done] == [size] * len(blocks)
+        assert [read for read, _ in done] == sorted(read for read, _ in done)
+        assert [text for block in blocks for text in block.time_text] == [f"{k / 100:.2f}" for k in range(40)]
+        assert np.concatenate([block.time_us for block in blocks]).tolist() == [k * 10_000 for k in range(40)]
+    whole = read_log(path)
+    assert whole.readings[5][[0, 1, 2, 4, 5, 6]].tolist() == FORCE + RATE
+    assert whole.name == str(path)
+
+
+def test_mistakes_are_told_by_their_line_in_any_block(tmp_path, monkeypatch):
+    monkeypatch.setattr(reader, "BLOCK_BYTES", 100)
+    path = tmp_path / "log.csv"
+    rows = text_of(40).split("\n")
+    for line in 3, 20, 41:
+        path.write_text("\n".join([*rows[: line - 1], "x" + rows[line - 1], *rows[line:]]))
+        with pytest.raises(InputError, match=f", line {line}: t_s is 'x"):
+            read_log(path)
+        path.write_text("\n".join([*rows[: line - 1], rows[line - 1], rows[line - 1], *rows[line:]]))
+        with pytest.raises(InputError, match=f", line {line + 1}: time repeats at "):
+            read_log(path)
+        path.write_bytes("\n".join([*rows[: line - 1], "\xff" + rows[line - 1], *rows[line:]]).encode("latin-1"))
+        with pytest.raises(InputError, match=f", line {line}: not text"):
+            read_log(path)
+
+
+def test_the_time_may_stand_in_any_column():
+    blocks = list(read_blocks(io.StringIO(text_of(3, "note,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps,t_s",
+                                                  '"a, b",0.1,0.2,0.9,1,2,3, {t:.3f} '))))  # fmt: skip
+    assert blocks[0].time_text == ["0.000", "0.010", "0.020"]
+    assert blocks[0].time_us.tolist() == [0, 10_000, 20_000]
+
+
+def test_optional_columns_may_be_empty_anywhere():
+    header = "t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps,speed_mps,temp_c"
+    text = header + "\n0,0,1,0,0,0,0,,\n1,0,1,0,0,0,0,5,\n2,0,1,0,0,0,0,,20.5\n3,0,1,0,0,0,0,6,21\n"
+    log = read_log(io.BytesIO(text.encode()))
+    assert log.speed_mps == pytest.approx([np.nan, 5.0, np.nan, 6.0], nan_ok=True)
+    assert log.temperature_c == pytest.approx([np.nan, np.nan, 20.5, 21.0], nan_ok=True)
+    (block,) = read_blocks(io.BytesIO(text.encode()))
+    assert (block.has_speed, block.has_temp) == (True, True)
+    (block,) = read_blocks(io.StringIO(text_of(3)))
+    assert (block.has_speed, block.has_temp) == (False, False)
+
+
+@pytest.mark.parametrize(("n", "minimum", "enough"), [(2, 2, True), (1, 2, False), (299, 300, False), (300, 300, True)])
+def test_how_many_samples_are_needed(n, minimum, enough):
+    if enough:
+        assert len(read_log(log_of(n), minimum).t_s) == n
+        return
+    with pytest.raises(InputError, match=f"the log is too short: {n} samples, at least {minimum} are needed"):
+        read_log(log_of(n), minimum)
+
+
+def test_an_open_file_is_read_once_and_kept():
+    source = io.StringIO(text_of(5))
+    kept = read_twice(source)
+    assert isinstance(kept, Log)
+    assert len(kept.t_s) == 5
+    assert read_twice(kept) is kept
+    assert read_twice("log.csv") == "log.csv"
+
+
+def test_names():
+    assert log_stem("rides/monday.csv.gz") == "monday"
+    assert log_stem("monday.csv") == log_stem("monday") == "monday"
+    assert name_of(io.StringIO()) == "the log"
+    assert name_of(log_of(2, name="mine")) == "mine"
+    assert total_bytes(io.StringIO("abc")) == total_bytes("there is none") == 0

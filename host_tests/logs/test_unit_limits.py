@@ -1,0 +1,106 @@
+"""When a log's rates are said to be in rad/s, and its speed not in m/s: each condition from both sides of its limit."""
+
+import numpy as np
+import pytest
+from kickstand.units import STANDARD_GRAVITY
+from kickstand_tools.errors import InputError
+from kickstand_tools.logs.rate_unit import RateUnit
+from kickstand_tools.logs.speed_unit import SpeedUnit
+
+KMH, KNOTS = 3.6, 1.9438
+
+
+def bends(
+    mps=300.0, grown=1.4142, along=1.0, seconds=12, straight_s=200, hz=50, before_s=0, rest_s=0
+) -> RateUnit:
+    """A ride at 0.04 of this speed whose rates are so much too small; bends at the end, after straight riding.
+
+    grown: force in a bend, times the usual one. along: share of it along its usual direction. before_s: of bends at
+    the very beginning, rest_s later; both are given in blocks of 100 s.
+    """
+    time = np.arange(0.0, before_s + rest_s + straight_s + seconds, 1.0 / hz)
+    leaned = (time < before_s) | (time >= before_s + rest_s + straight_s)
+    rate = np.degrees(STANDARD_GRAVITY * np.sqrt(grown**2 - 1.0) / mps)
+    force = np.where(leaned[:, None], np.array([0.0, grown, grown * np.sqrt(1.0 / along**2 - 1.0)]), [0.0, 1.0, 0.0])
+    rates = np.where(leaned[:, None], [0.6 * rate, 0.8 * rate, 0.0], 0.0)
+    unit = RateUnit()
+    for start in range(0, len(time), 100 * hz):
+        part = slice(start, start + 100 * hz)
+        unit.add(time[part], force[part], rates[part])
+    return unit
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [
+        ({"mps": 201.0}, {"mps": 199.0}),  # 200 m/s: no motorcycle is as fast
+        ({"grown": 1.16}, {"grown": 1.14}),  # 30 degrees of lean
+        ({"along": 0.975}, {"along": 0.965}),  # braking turns the force by more than 14 degrees
+        ({"seconds": 10}, {"seconds": 9}),  # enough of bends
+        ({"hz": 10}, {"hz": 9}),  # samples in a second, so that vibration averages out
+        ({"before_s": 5, "rest_s": 3300, "seconds": 5}, {"before_s": 5, "rest_s": 3500, "seconds": 5}),  # one hour
+    ],
+)
+def test_what_it_takes_to_be_sure_of_rates_in_radians(wrong, right):
+    notice = bends(**wrong).notice
+    assert notice
+    assert notice.code == "rates-in-radians"
+    assert notice.values[0] == pytest.approx(wrong.get("mps", 300.0), rel=0.01)
+    assert bends(**right).notice is None
+
+
+def jerky(
+    scale=KMH, late_s=0.0, every_s=1.0, step_s=0.1, seconds=60, size_g=0.3, pushed=None, noise_g=0.0, blocks=1
+) -> str:
+    """What is said of a log with another push each second, +size_g or -size_g by chance, along (0.6, 0, 0.8).
+
+    pushed: only so many of the seconds are. noise_g: of the force in each second. blocks: in which it comes.
+    """
+    chance = np.random.default_rng(7)
+    push = size_g * np.sign(chance.normal(size=seconds))
+    if pushed is not None:
+        push[np.argsort(chance.random(seconds))[pushed:]] = 0.0
+        push[np.flatnonzero(push)] *= np.resize([1.0, -1.0], np.count_nonzero(push)) * np.sign(push[push != 0.0])
+    time = np.arange(0.0, seconds, step_s)
+    second = np.clip(np.ceil(time - 1e-9).astype(int) - 1, 0, seconds - 1)  # a force lasts from the sample before
+    force = np.outer((push + noise_g * chance.normal(size=seconds))[second], [0.6, 0.0, 0.8]) + [0.0, 1.0, 0.0]
+    mps = 50.0 + STANDARD_GRAVITY * np.concatenate(([0.0], np.cumsum(push)))
+    speed = np.full(len(time), np.nan)
+    given = np.arange(0.0, seconds - every_s / 2.0, every_s)
+    speed[np.searchsorted(time, given - 1e-9)] = scale * np.interp(given - late_s, np.arange(seconds + 1.0), mps)
+    unit = SpeedUnit("log")
+    try:
+        for part in np.array_split(np.arange(len(time)), blocks):
+            unit.add(time[part], force[part], speed[part])
+    except InputError as refused:
+        return str(refused)
+    return ""
+
+
+@pytest.mark.parametrize(
+    ("refused", "not_refused"),
+    [
+        ({"scale": 1.52}, {"scale": 1.48}),  # 1.5 times as much as the force explains; knots are 1.94
+        ({"size_g": 0.175}, {"size_g": 0.125}),  # 0.15 g is no slope of an ordinary road
+        ({"seconds": 300, "pushed": 11}, {"seconds": 300, "pushed": 8}),  # ten seconds of it
+        ({"seconds": 28}, {"seconds": 24}),  # 25 seconds: five sigmas of the correlation cannot be reached before
+        ({"late_s": 2.0}, {"late_s": 3.0}),  # a satellite receiver's delay
+        ({"every_s": 2.1, "seconds": 120, "late_s": 0.1}, {"every_s": 2.3, "seconds": 120, "late_s": 0.1}),
+        ({"step_s": 0.19}, {"step_s": 0.21, "seconds": 120}),  # a gap: the force in it is unknown
+        ({"blocks": 7}, {"blocks": 7, "scale": 1.0}),
+    ],
+)
+def test_what_it_takes_to_be_sure_of_another_unit_of_speed(refused, not_refused):
+    assert "the speed changes" in jerky(**refused)
+    assert jerky(**not_refused) == ""
+
+
+@pytest.mark.parametrize(("noise_g", "told"), [(0.7, True), (1.6, False)])
+def test_what_could_be_chance(noise_g, told):
+    """Over 100 s five sigmas are a correlation of 0.5: 0.6 is told, 0.35 is not."""
+    assert bool(jerky(scale=20.0, noise_g=noise_g, seconds=101, size_g=0.5)) is told
+
+
+def test_how_much_it_says_is_how_much_it_is():
+    assert "3.6 times as much" in jerky()
+    assert "1.9 times as much" in jerky(scale=KNOTS)

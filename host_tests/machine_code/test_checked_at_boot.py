@@ -1,0 +1,61 @@
+"""Machine code that gives wrong results is found out when its module is imported: then the plain function is used, and
+the console says so."""
+
+import shutil
+import subprocess
+
+import broken
+import emulated
+import pytest
+from kickstand_tools import firmware_path, unix_port
+from kickstand_tools.deploy import bytecode
+
+# What is chosen of each pair: (function, the plain one's name)
+_CHOSEN = """
+from kickstand.calibration import transform
+from kickstand.imu import fifo_frames
+from kickstand.rides import block
+for module, name in (fifo_frames, "decode"), (fifo_frames, "add_up"), (transform, "products"), (block, "encode"):
+    plain = getattr(module, name + "_python")
+    print(name, "plain" if getattr(module, name) is plain else "quick")
+"""
+_NAMES = [name for _, name in broken.MISTAKES]
+
+
+def imported(tmp_path, path="", name=""):
+    """What MicroPython prints when the firmware is imported, and then chosen, with a mistake in that function."""
+    if not unix_port.available():
+        pytest.skip("no MicroPython unix port for this system")
+    shutil.copytree(firmware_path.PACKAGE, tmp_path / "kickstand")
+    if name:
+        broken.write(path, name, tmp_path / "kickstand" / path)
+    environment = unix_port.environment() | {"MICROPYPATH": str(tmp_path)}
+    done = subprocess.run(
+        unix_port.command("-c", _CHOSEN), capture_output=True, text=True, env=environment, cwd=tmp_path, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.splitlines()
+
+
+def test_right_machine_code_is_used(tmp_path):
+    assert imported(tmp_path) == [f"{name} quick" for name in _NAMES]
+
+
+@pytest.mark.parametrize(("path", "name"), broken.MISTAKES)
+def test_wrong_machine_code_is_not_used(tmp_path, path, name):
+    said, *chosen = imported(tmp_path, path, name)
+    assert said.startswith(f"the machine code for {name}_python() gives wrong results on this board")
+    assert chosen == [f"{other} {'plain' if other == name else 'quick'}" for other in _NAMES]
+
+
+@pytest.mark.chip
+def test_a_pico_with_wrong_machine_code_shows_the_right_lean(tmp_path):
+    """The display shows it as always, and kickstand.status() says what is slower."""
+    path = "imu/fifo_frames_viper.py"
+    broken.write(path, "add_up", tmp_path / "broken.py")
+    wrong = {f"/kickstand/{path[:-3]}.mpy": bytecode.cross_compiled(tmp_path / "broken.py")}
+    with emulated.pico(emulated.leaning(20), emulated.firmware() | emulated.calibrated() | wrong) as pico:
+        emulated.shows(pico, "Lean  20° right", 10)
+    with emulated.pico(emulated.leaning(20), emulated.modules() | emulated.calibrated() | wrong) as pico:
+        said = pico.exec("import kickstand\nkickstand.status()", 20)
+    assert "Machine code not used for add_up_python: slower code runs instead" in said
