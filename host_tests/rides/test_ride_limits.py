@@ -4,6 +4,7 @@ import contextlib
 import io
 import os
 import shutil
+import sys
 import types
 from binascii import a2b_base64, crc32
 from itertools import pairwise
@@ -18,7 +19,7 @@ from kickstand.rides.block import RideBlock, block_length
 from kickstand.rides.flash_ring import RideRing
 from kickstand_tools.rides import block_reader
 from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.fakes import fake_os, fake_time
+from kickstand_tools.simulated_board.fakes import fake_machine, fake_os, fake_time
 
 TURN_US = 10_000
 
@@ -557,6 +558,7 @@ def test_the_oldest_go_ride_by_ride_and_group_by_group(root):
     for ride in (98, 99, 100, 300):
         old_ride(root, ride)
     (root.path / "rides/000/98/notes.txt").write_bytes(b"the rider's own")
+    (root.path / "rides/001/notes.txt").write_bytes(b"the rider's own")
     (root.path / "rides/002").mkdir()
     (root.path / "rides/000/00").mkdir()
     root.free = 10 * KB_4
@@ -581,12 +583,11 @@ def test_the_oldest_go_ride_by_ride_and_group_by_group(root):
         "000/99",
         "001/00/00000.rid",
         "001/00",
-        "001",
         "002",
         "003/00/00000.rid",
         "003/00",
     ]
-    assert before == ["000", "000/98", "000/98/notes.txt", "003", "003/01"]
+    assert before == ["000", "000/98", "000/98/notes.txt", "001", "001/notes.txt", "003", "003/01"]
     # ride 0 found and removed; of each other found, its part and its directory removed; groups 1 and 2 found empty; the
     # ride itself found
     assert len(gone) == 2 + 4 * 3 + 2 + 1
@@ -792,3 +793,34 @@ def test_a_card_that_reads_other_than_it_was_written_is_refused(root, monkeypatc
 
     monkeypatch.setattr(card_trial, "open", lambda path, mode: Wrong(), raising=False)
     assert tried(root, monkeypatch).code == "no-card"
+
+
+def test_rides_are_in_flash_without_a_card_and_else_on_it(clock, monkeypatch):
+    monkeypatch.setitem(sys.modules, "machine", fake_machine)
+    from kickstand.board import sd_card
+
+    monkeypatch.setattr(sd_card, "mount", lambda settings: "/sd")
+    assert ride_paths.directory(FLASH) == "rides"
+    assert ride_paths.directory(CARD) == "/sd/rides"
+
+
+def test_the_second_slow_print_within_a_minute_ends_the_stream(clock, monkeypatch):
+    from kickstand.rides import usb_stream
+
+    slow = []
+    monkeypatch.setattr(usb_stream, "say", lambda text, end: slow.pop(0))
+    stream = usb_stream.RideStream()
+    stream.begin()
+    slow += [False, True, False]
+    for _ in range(3):
+        stream.write(b"x")
+    clock.advance(60_100_000)
+    slow += [True]
+    stream.end_block()
+    clock.advance(59_000_000)
+    slow += [True]
+    with pytest.raises(OSError):
+        stream.write(b"x")
+    stream.begin()  # a new ride begins anew
+    slow += [True]
+    stream.write(b"x")
