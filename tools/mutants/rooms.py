@@ -43,19 +43,31 @@ ROOMS = {
     ),
     "lean": Room(
         (FIRMWARE + "lean/*.py",),
-        (TESTS + "lean/*.py",),
+        (
+            TESTS + "lean/test_known_ride.py",
+            TESTS + "lean/test_*_limits.py",
+            TESTS + "lean/test_[bkmru]*.py",
+        ),  # not test_lean_filter.py and test_formula.py, which take longer than all of them
     ),
     "drive_alignment": Room(
         (FIRMWARE + "drive_alignment/*.py",),
-        (TESTS + "drive_alignment/*.py",),
+        (TESTS + "drive_alignment/test_drive_limits.py", TESTS + "drive_alignment/*.py"),
     ),
     "speed": Room(
         (FIRMWARE + "speed/*.py",),
-        (TESTS + "simulated_board/test_board_speed.py",),
+        (TESTS + "simulated_board/test_board_speed_limits.py", TESTS + "simulated_board/test_board_speed.py"),
+    ),
+    "ui": Room(
+        (FIRMWARE + "ui/*.py",),
+        (TESTS + "ui/*.py",),
     ),
     "rides": Room(
-        (FIRMWARE + "rides/*.py", TOOLS + "rides/*.py"),
-        (TESTS + "rides/*.py",),
+        (FIRMWARE + "rides/*.py",),
+        (TESTS + "rides/test_ride_limits.py",),  # the others take longer
+    ),
+    "pull": Room(
+        (TOOLS + "rides/*.py",),
+        (TESTS + "rides/test_ride_file.py", TESTS + "rides/test_cli_*.py"),
     ),
     "calibrate": Room(
         (TOOLS + "calibration/*.py",),

@@ -135,6 +135,7 @@ class LeanFilter:
             self._start(means)
             return
         if not (abs(x[LEAN]) < 2 * pi and x[SPEED] < MAX_SPEED):  # also not-a-number
+            self._p = None  # so that nothing is kept: the sensor's errors may be no numbers either
             self.restart()
             return
         # see forces(): divided by standard gravity, so that metres times this are g
@@ -146,6 +147,7 @@ class LeanFilter:
         self._rest.update(means[2:5], means[5:8], bias, seconds, self.rolling or pushed)
         if self._rest.resting and not rested:
             self._stand(means)
+            return  # these innovations were measured against the state before
         self._work = self._process(means, seconds, roll_acceleration)
 
     def _start(self, means):

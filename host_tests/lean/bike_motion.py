@@ -1,0 +1,74 @@
+"""What a sensor on a bike feels, by the equations of motion alone: for tests that MicroPython runs too."""
+
+from math import cos, degrees, pi, radians, sin, tan
+
+from kickstand.calibration.parameters import Calibration
+from kickstand_tools.replay.replay_engine import ReplayMeter
+
+GRAVITY_MPS2 = 9.80665
+DT_US = 10_000
+DT_S = DT_US * 1e-6
+
+
+def felt(lean_deg=0.0, speed_mps=0.0, roll_dps=0.0, forward_mps2=0.0):
+    """Force (left, up, forward in g) and rate (rad/s) of a bike on a level road, in balance from 1 m/s on."""
+    t = radians(lean_deg)
+    yaw = -GRAVITY_MPS2 * tan(t) / speed_mps if speed_mps > 1.0 else 0.0
+    left = speed_mps * yaw / GRAVITY_MPS2
+    force = [left * cos(t) + sin(t), cos(t) - left * sin(t), forward_mps2 / GRAVITY_MPS2]
+    return force, [yaw * sin(t), yaw * cos(t), radians(roll_dps)]
+
+
+def reading(force, rate):
+    """Seven numbers in the chip's order: g, C, deg/s."""
+    return list(force) + [25.0] + [degrees(value) for value in rate]
+
+
+def meter(calibration=None, **options):
+    """A meter whose sensor is mounted along the bike's axes: x left, y up, z forward."""
+    calibration = calibration or Calibration()
+    for i in range(9):
+        calibration.vehicle_from_sensor[i] = 1.0 if i % 4 == 0 else 0.0
+    return ReplayMeter(calibration, **options)
+
+
+def ride(shown, seconds, speed_mps=None, **motion):
+    """Let the meter feel a steady motion; speed_mps is felt, not told."""
+    felt_now = reading(*felt(speed_mps=speed_mps or 0.0, **motion))
+    for _ in range(int(seconds / DT_S + 0.5)):
+        shown.update(felt_now, DT_US)
+    return shown
+
+
+def roll(shown, from_deg, to_deg, speed_mps=0.0, dps=60.0):
+    """Lean it over, at so many degrees a second."""
+    steps = int(abs(to_deg - from_deg) / (dps * DT_S) + 0.5)
+    rate = (to_deg - from_deg) / (steps * DT_S)
+    for k in range(steps):
+        lean = from_deg + (to_deg - from_deg) * (k + 1) / steps
+        shown.update(reading(*felt(lean, speed_mps, rate)), DT_US)
+    return shown
+
+
+def speed_up(shown, from_mps, to_mps, seconds):
+    """Straight on, from one speed to another."""
+    rate = (to_mps - from_mps) / seconds
+    steps = int(seconds / DT_S + 0.5)
+    for k in range(steps):
+        shown.update(reading(*felt(0.0, from_mps + rate * DT_S * (k + 1), 0.0, rate)), DT_US)
+    return shown
+
+
+def nose_up(shown, from_deg, to_deg, dps=30.0):
+    """Pitch a bike that stands or rolls evenly, upright."""
+    steps = int(abs(to_deg - from_deg) / (dps * DT_S) + 0.5)
+    rate = (to_deg - from_deg) / (steps * DT_S) * pi / 180.0
+    for k in range(steps):
+        q = radians(from_deg + (to_deg - from_deg) * (k + 1) / steps)
+        shown.update(reading((0.0, cos(q), sin(q)), (-rate, 0.0, 0.0)), DT_US)
+    return shown
+
+
+def near(value, expected, within):
+    """Both are equal within this: a plain assert, because MicroPython has no pytest."""
+    assert abs(value - expected) <= within, (value, expected)

@@ -1,0 +1,111 @@
+"""The lean filter's figures over one ride: whatever changes them changes every rider's lean, so it has to be meant.
+
+The ride has all that the filter knows: rest, bias, a yaw error, scale errors, slopes, vibration, turns, told speeds,
+slow samples, lost ones, a restart under way. Other tests say what each parameter does; this one notices that any has
+changed. After a change that is meant, in host_tests/lean, with firmware and tools on PYTHONPATH:
+python test_known_ride.py > known_ride.csv
+Runs on MicroPython too.
+"""
+
+from math import cos, degrees, radians, sin, sqrt
+
+from bike_motion import felt
+from kickstand.lean.lean_filter import LeanFilter
+
+# seconds, then at their end: lean in degrees, speed in m/s, slope in degrees; whether the speed is told each second
+LEGS = (
+    (6, 3, 0, 2, False),
+    (6, 0, 16, 0, False),
+    (8, 0, 18, 1, False),
+    (1, -30, 17, 0, False),
+    (7, -32, 16, 0, False),
+    (2, 38, 15, 1, False),
+    (6, 36, 16, 3, False),
+    (1, 0, 17, 3, False),
+    (10, 1, 18, 0, False),
+    (2, 20, 18, 0, True),
+    (8, 22, 12, 0, True),
+    (2, 0, 12, -2, True),
+    (8, 0, 19, -2, True),
+    (5, 0, 4, 0, False),
+    (8, -6, 3.5, 0, False),
+    (4, 0, 0, 0, False),
+    (6, 0, 0, 0, False),
+    (4, 0, 14, 0, False),
+    (2, -35, 14, 0, False),  # the restart comes here
+    (6, -33, 15, 0, False),
+    (2, 7, 16, 0, False),
+    (12, 7, 16, 0, False),
+    (2, 40, 16, 0, False),
+    (4, 40, 16, 0, True),
+    (3, 0, 16, 0, False),
+    (10, 0, 24, 0, False),
+)
+RESTART_S = 95.0
+LOST = (0.01, 0.3), (60.07, 0.2), (119.12, 0.4)  # when readings of so many seconds were lost
+SLOW_S = 30.0, 44.0  # where samples are 20 ms apart
+BIAS = radians(0.4), radians(-0.3), radians(0.6)
+YAW_ERROR = radians(4.0)
+TOLERANCES = 0.02, 0.02, 0.02, 0.02, 0.005  # of a row's values
+
+
+def states():
+    """(seconds, lean in degrees, speed in m/s, slope in degrees; their rates of change; told) at every 10 ms."""
+    t_s, before = 0.0, (3, 0, 2)
+    for seconds, *after, told in LEGS:
+        rates = [(b - a) / seconds for a, b in zip(before, after)]
+        for k in range(100 * seconds):
+            yield t_s + k / 100.0, [a + r * k / 100.0 for a, r in zip(before, rates)], rates, told
+        t_s, before = t_s + seconds, after
+
+
+def sensed(t_s, values, rates):
+    """Force and rate as a part with errors feels them."""
+    lean, speed, slope = values
+    (left, up, forward), (x, y, z) = felt(lean, speed, rates[0], rates[1])
+    forward += sin(radians(slope))
+    x -= radians(rates[2]) * cos(radians(lean))
+    y += radians(rates[2]) * sin(radians(lean))
+    shake = (0.02 if speed > 1.0 else 0.003) * sin(61.0 * t_s) + 0.02 * sin(7.1 * t_s) * (speed > 10.0)
+    force = [left + forward * YAW_ERROR + shake, up + 2.0 * shake, forward - left * YAW_ERROR - shake]
+    x, z = x + z * YAW_ERROR, z - x * YAW_ERROR
+    x, z = 1.015 * x + 0.012 * y, 0.985 * z - 0.01 * y + 0.01 * x
+    return force, [x + BIAS[0] + 0.1 * shake, y + BIAS[1], z + BIAS[2] - shake]
+
+
+def figures():
+    """Each second: lean and 1 sigma in degrees, speed in m/s, pitch and trim in degrees, 1 at rest."""
+    estimator, before_s, rows = LeanFilter(), 0.0, []
+    for k, (t_s, values, rates, told) in enumerate(states()):
+        if SLOW_S[0] <= t_s < SLOW_S[1] and k % 2:
+            continue
+        if told and k % 100 == 50:
+            estimator.measure_speed(values[1] + 0.4)
+        if abs(t_s - RESTART_S) < 1e-6:
+            estimator.restart()
+        for lost_s, seconds in LOST:
+            if abs(t_s - lost_s) < 1e-6:
+                estimator.doubt(seconds)
+        lean = estimator.update(*sensed(t_s, values, rates), int((t_s - before_s) * 1e6 + 0.5))
+        before_s = t_s
+        if k % 100 == 0 and k:
+            sigma = degrees(sqrt(estimator.variance))
+            trim = degrees(estimator.trim.angle)
+            rows.append((lean, sigma, estimator.speed_mps, estimator.pitch_deg, trim, int(estimator.at_rest)))
+    return rows
+
+
+def test_the_figures_of_the_known_ride_are_what_they_were():
+    with open(__file__.rpartition("/")[0] + "/known_ride.csv") as file:
+        known = [[float(value) for value in line.split(",")] for line in file]
+    found = figures()
+    assert len(found) == len(known)
+    for t_s, (now, then) in enumerate(zip(found, known), 1):
+        assert now[5] == then[5], t_s
+        for a, b, tolerance in zip(now, then, TOLERANCES):
+            assert abs(a - b) < tolerance * max(1.0, abs(b) / 10.0), (t_s, now, then)
+
+
+if __name__ == "__main__":
+    for row in figures():
+        print(",".join(str(round(value, 4)) for value in row))

@@ -1,0 +1,182 @@
+"""What each page says: units, signs, rounding, and 16 characters a line."""
+
+import types
+
+import pytest
+from kickstand.calibration.parameters import Calibration
+from kickstand.lean.meter import LeanMeter
+from kickstand.ui import pages
+
+DEGREE = pages.DEGREE
+FULL = "#"
+
+
+def bar(lean_deg):
+    """The bar as text: # a full cell, 1 to 4 its columns from the left, a to d from the right, a space nothing."""
+    names = {0x20: " ", 0xFF: FULL, **{i: str(i + 1) for i in range(4)}, **{4 + i: "abcd"[i] for i in range(4)}}
+    return "".join(names[code] for code in pages.lean_bar(lean_deg))
+
+
+def meter(**values):
+    return types.SimpleNamespace(**values)
+
+
+def measured(counts, calibrate=None):
+    """A meter after one reading in counts, 4096 per g and 65.5 per deg/s."""
+    from array import array
+
+    calibration = Calibration()
+    if calibrate:
+        calibrate(calibration)
+    calibration.set_scale(4096, 65.5)
+    shown = LeanMeter(calibration)
+    shown.update_sum(array("i", counts), 1, 0)
+    return shown
+
+
+def test_the_raw_page_shows_g_and_degrees_a_second_in_the_sensors_own_axes():
+    counts = [2048, -4096, 1024, 0, 6550, -655, 131]
+    assert pages.raw(measured(counts)) == (" 0.50-1.00 0.25g", f" 100 -10   2 {DEGREE}/s")
+
+
+def test_the_raw_page_is_calibrated_and_not_turned():
+    def calibrate(calibration):
+        calibration.set_accel((0.1, 0.0, 0.0), (1.0, 1.0, 2.0))
+        calibration.gyro_bias[1] = 3.0
+        for i, value in enumerate((0, 1, 0, 0, 0, 1, 1, 0, 0)):
+            calibration.vehicle_from_sensor[i] = value
+
+    counts = [2048, -4096, 1024, 0, 6550, -655, 131]
+    assert pages.raw(measured(counts, calibrate)) == (" 0.60-1.00 0.50g", f" 100 -13   2 {DEGREE}/s")
+
+
+@pytest.mark.parametrize(
+    ("lean_deg", "line"),
+    [
+        (0.4, "Lean   0° "),
+        (0.5, "Lean   1° right"),
+        (-0.4, "Lean   0° "),
+        (-0.5, "Lean   1° left"),
+        (32.4, "Lean  32° right"),
+        (-32.6, "Lean  33° left"),
+        (-120.0, "Lean 120° left"),
+    ],
+)
+def test_the_lean_is_rounded_and_has_its_side(lean_deg, line):
+    assert pages.lean(meter(lean_deg=lean_deg))[0] == line.replace("°", DEGREE)
+
+
+@pytest.mark.parametrize(
+    ("lean_deg", "shown"),
+    [
+        (0.0, "       a1       "),
+        (0.7, "       a1       "),
+        (1.5, "       a1       "),
+        (2.3, "       a2       "),
+        (-2.2, "       a1       "),
+        (-2.3, "       b1       "),
+        (7.5, "       a#       "),
+        (9.0, "       a#1      "),
+        (-12.0, "      c#1       "),
+        (30.0, "       a####    "),
+        (59.0, "       a#######4"),
+        (60.0, "       a########"),
+        (-75.0, "########1       "),
+    ],
+)
+def test_a_column_of_the_bar_is_one_and_a_half_degrees(lean_deg, shown):
+    assert bar(lean_deg) == shown
+
+
+@pytest.mark.parametrize(
+    ("done", "total", "cells"), [(0, 100, 0), (1, 100, 0), (7, 100, 1), (50, 100, 8), (99, 100, 15), (100, 100, 16)]
+)
+def test_progress_fills_sixteen_cells(done, total, cells):
+    assert pages.progress_bar(done, total) == "\xff" * cells
+
+
+def test_progress_of_nothing_or_more_than_all_stays_on_the_display():
+    assert pages.progress_bar(0, 0) == pages.progress_bar(5, 0) == ""
+    assert pages.progress_bar(300, 100) == "\xff" * 16
+
+
+def recorder(seconds, room_s):
+    return types.SimpleNamespace(seconds=lambda: seconds, room_s=lambda: room_s)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "room_s", "lines"),
+    [
+        (0, None, ("Rec         0:00", "to USB")),
+        (59, 0, ("Rec         0:59", "oldest is erased")),
+        (60, 59, ("Rec         1:00", "room 0 min")),
+        (3661, 1140, ("Rec        61:01", "room 19 min")),
+        (3661, 35_999, ("Rec        61:01", "room 599 min")),
+        (3661, 36_000, ("Rec        61:01", "room 10 h")),
+        (1, 86_400, ("Rec         0:01", "room 24 h")),
+    ],
+)
+def test_recording_tells_minutes_and_room(seconds, room_s, lines):
+    assert pages.recording(recorder(seconds, room_s)) == lines
+
+
+def test_a_recorded_line_has_its_star_in_the_last_column():
+    assert pages.recorded("Lean  32" + DEGREE) == "Lean  32" + DEGREE + "      *"
+    assert pages.recorded("x" * 15) == "x" * 15 + "*"
+
+
+def test_maxima_are_rounded_each_on_its_line():
+    shown = pages.maxima(meter(max_left_deg=30.4, max_right_deg=41.5))
+    assert shown == (f"Max left    30{DEGREE}", f"Max right   42{DEGREE}")
+
+
+@pytest.mark.parametrize(
+    ("forward", "line"),
+    [
+        (0.312, "Accel    0.31 g"),
+        (-0.004, "Accel    0.00 g"),
+        (-0.006, "Brake    0.01 g"),
+        (-0.85, "Brake    0.85 g"),
+    ],
+)
+def test_speeding_up_and_braking_have_their_words(forward, line):
+    shown = meter(smooth_force=[0.5, 0.9, forward], max_accel_g=0.42, max_brake_g=0.91)
+    assert pages.acceleration(shown) == (line, "pk +0.42 / -0.91")
+
+
+@pytest.mark.parametrize(
+    ("left", "line"), [(0.31, "Left     0.31 g"), (-0.42, "Right    0.42 g"), (0.006, "Left     0.01 g")]
+)
+def test_a_car_has_a_side_and_an_up(left, line):
+    assert pages.cornering(meter(smooth_force=[left, 1.02, 0.3])) == (line, "Up       1.02 g")
+
+
+def test_the_formula_stands_beside_the_filter():
+    shown = pages.formula(meter(lean_formula_deg=-7.6, lean_deg=12.4))
+    assert shown == (f"Formula     -8{DEGREE}", f"Filter      12{DEGREE}")
+
+
+def test_before_alignment_tilt_and_g_are_the_sensors_own():
+    """Two seconds each: that it is not aligned, and what to do."""
+    shown = meter(smooth_force=[0.5, 0.866, -0.25])
+    lines = [pages.not_aligned(shown, seconds) for seconds in range(5)]
+    assert {line for line, _ in lines} == {f"Raw   30{DEGREE} -0.25g"}
+    assert [hint for _, hint in lines] == ["Not aligned"] * 2 + ["On stand: press"] * 2 + ["Not aligned"]
+    assert pages.not_aligned(shown, 3, "Drive: brake")[1] == "Drive: brake"
+
+
+def test_the_sensor_page_counts_gaps_starts_and_lost_samples():
+    """Two seconds each."""
+    chip = types.SimpleNamespace(name="MPU6050", temperature_c=lambda counts: counts / 10.0, overflows=3)
+    calibration = types.SimpleNamespace(six_done=True, aligned=False)
+    shown = meter(reading=[1, 2, 3, 285, 5, 6, 7], calibration=calibration)
+    sensor = types.SimpleNamespace(chip=chip, restarts=1)
+    app = types.SimpleNamespace(sensor=sensor, meter=shown, clock=types.SimpleNamespace(lost=0))
+    seen = [pages.sensor_info(app, seconds) for seconds in range(7)]
+    assert {line1 for line1, _ in seen} == {f"MPU6050   28.5{DEGREE}C"}
+    words = ["6pos yes ali no", "3 gaps 1 starts", "samples lost   0"]
+    assert [line2 for _, line2 in seen] == [words[seconds // 2 % 3] for seconds in range(7)]
+    chip.overflows, sensor.restarts, app.clock.lost, chip.name = 12345, 678, 123456, "MPU6050 clone"
+    assert pages.sensor_info(app, 2)[1] == "99 gaps 9 starts"
+    assert pages.sensor_info(app, 4)[1] == "samples lost9999"
+    assert len(pages.sensor_info(app, 0)[0]) == 16
