@@ -126,7 +126,7 @@ def run_device(plan):
             setattr(Config, name, tuple(value) if isinstance(value, list) else value)
         def stream():
             chosen = settings.load()
-            App(chosen, devices.open_lcd(chosen), RideStream()).run()
+            App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen), RideStream()).run()
 
         main = stream if "stream" in plan else start.main
         load = settings.load
