@@ -4,7 +4,7 @@
 >>> kickstand.status()
 """
 
-__version__ = "0.3.0"
+__version__ = "0.4.0"
 
 
 def status():
