@@ -146,7 +146,8 @@ def test_speeding_up_and_braking_have_their_words(forward, line):
 
 
 @pytest.mark.parametrize(
-    ("left", "line"), [(0.31, "Left     0.31 g"), (-0.42, "Right    0.42 g"), (0.006, "Left     0.01 g"), (0.004, "Right    0.00 g")]
+    ("left", "line"),
+    [(0.31, "Left     0.31 g"), (-0.42, "Right    0.42 g"), (0.006, "Left     0.01 g"), (0.004, "Right    0.00 g")],
 )
 def test_a_car_has_a_side_and_an_up(left, line):
     assert pages.cornering(meter(smooth_force=[left, 1.02, 0.3])) == (line, "Up       1.02 g")
