@@ -23,9 +23,15 @@ def test_bench():
         assert 0 < spread["median"] <= spread["p99"] <= spread["max"]
     assert result["samples_taken"] == pytest.approx(result["seconds"] * result["sample_hz"], abs=2)
     assert result["samples_lost"] == 0
-    assert 0.1 < result["cpu_share"] < 1.0
+    assert 0.1 < result["cpu_share"] < 0.5
     assert result["free_heap_bytes"] > 120_000
     assert result["free_heap_at_end_bytes"] > result["free_heap_bytes"] - 4000
-    assert result["first_lean_s"]["mpy"] < result["first_lean_s"]["py"] < 5.0
+    boots = result["boot"]
+    assert boots["mpy"]["lean_s"] < 0.95
+    assert boots["mpy"]["lean_s"] < boots["py"]["lean_s"] < 5.0
+    assert 0 < boots["mpy"]["micropython_s"] < 0.1
+    assert 0.2 < boots["mpy"]["starting_s"] < boots["mpy"]["sampling_s"] < boots["mpy"]["lean_s"]
+    assert 0.4 < sum(boots["mpy"]["import_s"].values()) < boots["mpy"]["sampling_s"]
+    assert "kickstand.lean.lean_filter" in boots["mpy"]["import_s"]
     assert result["flash_bytes"]["mpy"] < result["flash_bytes"]["py"] / 2
     assert bench.tables(result)

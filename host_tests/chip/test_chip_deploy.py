@@ -84,7 +84,7 @@ def flash(device):
 
 
 def test_the_first_lean_stands_there_soon():
-    """`kickstand flash` onto a board with an older version and a calibration: within 1.5 s of its reset."""
+    """`kickstand flash` onto a board with an older version and a calibration: within 1.2 s of its reset."""
     wanted = firmware_files.contents(bytecode.PICO)
     formula = "/kickstand/lean/formula"
     older = wanted | {formula + ".mpy": b"old", formula + ".py": b"old"} | calibrated()
@@ -93,7 +93,7 @@ def test_the_first_lean_stands_there_soon():
         device.run_until(lambda: device.chip.resets == 1, 0.5, 0.001)
         reset_s = device.time_s
         device.run_until(lambda: shown_lean(device.lcd()) == 20.0, 2.0)
-        assert device.time_s - reset_s < 1.5
+        assert device.time_s - reset_s < 1.2
         assert device.files() == {path.lstrip("/"): data for path, data in (wanted | calibrated()).items()}
 
 

@@ -5,6 +5,7 @@ import sys
 
 import pytest
 from kickstand import errors
+from kickstand_tools.bench.boot import in_order
 from kickstand_tools.simulated_board.simulator import Board
 
 
@@ -41,3 +42,22 @@ def test_a_report_that_cannot_be_worded_gives_its_code(board, monkeypatch, capsy
     monkeypatch.setitem(sys.modules, "kickstand.console", None)
     errors.report(errors.StoreError("not-written", "EIO"))
     assert capsys.readouterr().out == "calibration not saved: EIO; the old one is kept\nnot-written\n"
+
+
+def test_the_imports_of_the_app_are_in_small_steps(board):
+    """Between two of them display and chip are set up. No step may import much more than its own module."""
+    from kickstand import start
+
+    loaded = set(in_order("kickstand.start", []))
+    for step in start.STEPS:
+        found = set(in_order("kickstand." + step, []))
+        assert f"kickstand.{step}" not in loaded, step
+        assert len(found - loaded) <= 3, (step, found - loaded)
+        loaded |= found
+    assert start.STEPS[-1] == "app"
+
+
+def test_what_the_first_lean_does_not_need_is_imported_later():
+    early = {name.split(".", 1)[1] for name in in_order("kickstand.app", [])[1:] if "." in name}
+    late = {"rides.recorder", "ui.menu", "ui.align_wizard", "lean.formula", "drive_alignment.background", "console"}
+    assert not early & late
