@@ -31,8 +31,8 @@ print("took", took)
 @dataclass(frozen=True)
 class Boot:
     """Seconds since the board got power. micropython_s: main.py begins.  starting_s: the display says that Kickstand
-    starts.  sampling_s: the sensor is set up and samples.  lean_s: the display shows the first lean.  import_s: {module:
-    seconds that it takes}."""
+    starts.  sampling_s: the sensor is set up and samples.  lean_s: the display shows the first lean.  import_s: seconds
+    that each module takes."""
 
     micropython_s: float
     starting_s: float

@@ -20,7 +20,7 @@ from ..simulation.scripted.sensor_errors import Sensor
 PRESSES_S = (KICKSTAND_PRESS_S, UPRIGHT_PRESS_S, 48.0, 51.0)  # stand, upright, page of maxima, page of braking
 LONG_PRESS_AT_S = 58.0
 MOMENTS_S = {
-    "starting": 0.3,
+    "starting": 0.22,
     "on_stand": 3.0,
     "hold_still": 5.5,
     "upright": 9.0,
