@@ -46,7 +46,7 @@ class App:
     Recorder), None for flash or SD card; if one is given, recording begins with the first readings. Raises
     SettingsError for pins that cannot be used.
 
-    recorder: a Recorder, or None before the first ride is recorded.
+    recorder: a Recorder, or None before prepare_recorder().
     """
 
     def __init__(self, settings, lcd, sensor, keeper=None):
@@ -64,6 +64,8 @@ class App:
         self._restarts = 0
         self._record_due = settings.RECORD or keeper is not None
         self._on_card = settings.SD_SPI is not None and keeper is None
+        if self._record_due or self._on_card:
+            self.prepare_recorder()
         self._page_ms = ticks_ms()
         self.late = False  # the page that is due is to show no lean
 
@@ -90,7 +92,6 @@ class App:
 
             self.lcd.show("SD card", "is being read")
             self.lcd.flush()
-            self.recorder = self._open_recorder()
             card_trial.prepare(self.recorder, self.settings)
         watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         gc.threshold(-1)
@@ -154,11 +155,13 @@ class App:
         """
         if self.meter.at_rest:
             self.calibration.restart()
-        if self.recorder is None:
-            self.recorder = self._open_recorder()
+        self.prepare_recorder()
         self.recorder.start(self.sensor.chip, self.calibration.value)
 
-    def _open_recorder(self):
+    def prepare_recorder(self):
+        """Import what records rides, unless that was done. It takes 0.2 s, so it is done before a recording begins."""
+        if self.recorder is not None:
+            return
         gc.collect()  # as before each import while the loop runs: what stays must not lie behind garbage
         from .rides.recorder import Recorder
 
@@ -167,7 +170,7 @@ class App:
             from .rides.flash_ring import RideRing
 
             keeper = RideRing(self.settings)
-        return Recorder(keeper, self.settings.SAMPLE_HZ)
+        self.recorder = Recorder(keeper, self.settings.SAMPLE_HZ)
 
     def _poll_speed(self, now_ms):
         speed = self.drive.poll(now_ms)

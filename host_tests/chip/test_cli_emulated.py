@@ -8,7 +8,7 @@ import emulated_port
 import pytest
 from emulated import pico
 from kickstand_tools import firmware_path
-from kickstand_tools.deploy import connection
+from kickstand_tools.deploy import config_check, connection
 from kickstand_tools.emulator import image
 from kickstand_tools.errors import InputError
 from terminal import Terminal
@@ -60,6 +60,8 @@ def firmware(tmp_path, monkeypatch):
         (tmp_path / name).write_bytes(text.encode())
     monkeypatch.setattr(firmware_path, "directory", lambda: tmp_path)
     monkeypatch.setattr(firmware_path, "PACKAGE", tmp_path / "kickstand")
+    judged = config_check.Judged(None, [])
+    monkeypatch.setattr(config_check, "judge", lambda *_: judged)  # there is no settings.py to do that with
 
 
 def running(device):

@@ -169,15 +169,28 @@ def test_silence_is_a_fault_after_100_ms(board):
 def test_an_overflow_is_no_silence(board):
     """The FIFO was emptied just now, whatever time the loop has read before."""
     sensor, chip, now_ms = running(board)
-    board.clock.advance(now_ms * 1000 + 1_000_000)
+    board.clock.advance(now_ms * 1000 + 400_000)
     chip.waiting = [0, 0, 0]
     chip.overflows = 1
+    assert sensor.fetch(now_ms + 390) == 0
+    assert code(sensor) is None
     assert sensor.fetch(now_ms + 500) == 0
     assert code(sensor) is None
-    assert sensor.fetch(now_ms + 1100) == 0
-    assert code(sensor) is None
-    assert sensor.fetch(now_ms + 1102) == 0
+    assert sensor.fetch(now_ms + 502) == 0
     assert code(sensor) == "sensor-silent"
+
+
+def test_readings_that_are_all_lost_for_half_a_second_are_a_fault(board):
+    """The FIFO overflowed again and again: the board had no time to read."""
+    sensor, chip, now_ms = running(board)
+    for after_ms, said in ((300, None), (500, None), (502, "readings-lost")):
+        board.clock.advance(max(0, (now_ms + after_ms) * 1000 - board.clock.now_us))
+        chip.waiting, chip.overflows = [0], chip.overflows + 1
+        assert sensor.fetch(now_ms + after_ms) == 0
+        assert code(sensor) == said
+    assert sensor.restarts == 2  # what comes does not follow on from what was before
+    assert sensor.fetch(now_ms + 510) == 1
+    assert code(sensor) is None
 
 
 def test_two_lost_transfers_are_tolerated_and_three_are_a_fault(board):

@@ -75,7 +75,7 @@ def plug_in(monkeypatch, device, meanwhile=lambda: None):
         port.timeout_s = timeout
         return port
 
-    clock = types.SimpleNamespace(monotonic=lambda: device.time_s, sleep=port.sleep)
+    clock = types.SimpleNamespace(monotonic=lambda: device.time_s, time=lambda: device.time_s, sleep=port.sleep)
     monkeypatch.setattr(transport_serial.serial, "serial_for_url", open_port)
     for module in (transport_serial, board_console, connection):
         monkeypatch.setattr(module, "time", clock)

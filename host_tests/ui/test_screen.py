@@ -51,6 +51,7 @@ def app():
         late=False,
         recorder=Recorder(),
         recording=False,
+        prepare_recorder=lambda: None,
     )
 
 

@@ -24,6 +24,7 @@ _CGRAM_ADDRESS = const(0x40)  # instruction "set CGRAM address" (table 6)
 ADDRESSES = (0x27, 0x3F)  # PCF8574 and PCF8574A with all address jumpers open
 COLUMNS = 16
 _DASHES = b"-" * COLUMNS
+_NO_TEXT = "\n"
 _NEVER = b"\xfe" * COLUMNS  # a character code that no text uses: marks a line as not yet written
 REINIT_MS = 10_000  # initialise again so often: noise can put the nibbles out of step, and nothing else mends that
 PROBE_MS = 200  # how often to see whether a display is there, or still there
@@ -66,7 +67,7 @@ class Lcd:
         self._addresses = addresses
         self._wanted = [bytearray(b" " * COLUMNS), bytearray(b" " * COLUMNS)]
         self._shown = [bytearray(COLUMNS), bytearray(COLUMNS)]
-        self._texts = [None, None]  # of each line, what was shown last, if it was a str
+        self._texts = [_NO_TEXT, _NO_TEXT]  # of each line, what was shown last, if it was a str
         self._changed = True  # a line may have to be sent
         self._packed = bytearray(4 * (COLUMNS + 1))
         self._port = bytearray(1)
@@ -129,21 +130,18 @@ class Lcd:
             sleep_ms(STEP_MS)
 
     def _put(self, number, text):
-        is_str = isinstance(text, str)
-        if is_str and text == self._texts[number]:  # as mostly: to convert it takes 0.2 ms
-            return
-        self._texts[number] = text if is_str else None
-        self._changed = True
         line = self._wanted[number]
-        if not is_str and len(text) == COLUMNS:
-            line[:] = text
-            return
-        for i in range(COLUMNS):
-            if i < len(text):
-                code = text[i]
-                line[i] = ord(code) & 0xFF if is_str else code
-            else:
-                line[i] = 0x20
+        if isinstance(text, str):
+            if text == self._texts[number]:  # as mostly: to convert it takes 0.2 ms
+                return
+            self._texts[number] = text
+            for i in range(COLUMNS):
+                line[i] = ord(text[i]) & 0xFF if i < len(text) else 0x20
+        else:
+            self._texts[number] = _NO_TEXT
+            for i in range(COLUMNS):
+                line[i] = text[i] if i < len(text) else 0x20
+        self._changed = True
 
     def _probe(self):
         """Look for the display at each address."""

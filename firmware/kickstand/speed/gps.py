@@ -48,12 +48,13 @@ class Gps:
 
     def poll(self, now_ms):
         """Return a new speed in m/s, or None. Never waits. now_ms: ticks_ms()."""
-        if self._heard_ms is None:
+        heard_ms = self._heard_ms
+        if heard_ms is None:
             self._begin(now_ms)
         waiting = self._uart.any()
         if not waiting:
             return None
-        if ticks_diff(now_ms, self._heard_ms) > SILENT_MS:
+        if heard_ms is not None and ticks_diff(now_ms, heard_ms) > SILENT_MS:
             self._begin(now_ms)
         self._heard_ms = now_ms
         chunk = self._uart.read(min(waiting, MAX_CHUNK)) or b""

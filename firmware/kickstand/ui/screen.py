@@ -84,6 +84,7 @@ class Screen:
     def _open_menu(self, now_ms):
         from .menu import Menu  # with the first long press
 
+        self._app.prepare_recorder()
         self._menu = Menu(self._entries(), now_ms)
 
     def _entries(self):
