@@ -46,7 +46,7 @@ class App:
     Recorder), None for flash or SD card; if one is given, recording begins with the first readings. Raises
     SettingsError for pins that cannot be used.
 
-    recorder: a Recorder, or None before prepare_recorder().
+    recorder: a Recorder, or None before prepare_recorder() has made it.
     """
 
     def __init__(self, settings, lcd, sensor, keeper=None):
@@ -64,8 +64,11 @@ class App:
         self._restarts = 0
         self._record_due = settings.RECORD or keeper is not None
         self._on_card = settings.SD_SPI is not None and keeper is None
+        self._recorder_parts = ["block", "recorder"]  # modules of rides/ that are still to be imported
+        if keeper is None:
+            self._recorder_parts[1:1] = ["ride_paths", "flash_ring"]
         if self._record_due or self._on_card:
-            self.prepare_recorder()
+            self._make_recorder()
         self._page_ms = ticks_ms()
         self.late = False  # the page that is due is to show no lean
 
@@ -155,14 +158,22 @@ class App:
         """
         if self.meter.at_rest:
             self.calibration.restart()
-        self.prepare_recorder()
+        self._make_recorder()
         self.recorder.start(self.sensor.chip, self.calibration.value)
 
+    def _make_recorder(self):
+        while self.recorder is None:
+            self.prepare_recorder()
+
     def prepare_recorder(self):
-        """Import what records rides, unless that was done. It takes 0.2 s, so it is done before a recording begins."""
+        """Import the next module that recording needs, and after the last make the recorder. The open menu calls this
+        again and again: the chip's FIFO bridges one import (0.1 s), not all of them."""
         if self.recorder is not None:
             return
         gc.collect()  # as before each import while the loop runs: what stays must not lie behind garbage
+        if self._recorder_parts:
+            __import__("kickstand.rides." + self._recorder_parts.pop(0))
+            return
         from .rides.recorder import Recorder
 
         keeper = self._keeper

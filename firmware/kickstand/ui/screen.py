@@ -27,6 +27,8 @@ class Screen:
     def lines(self, now_ms):
         """What the display should say now. Call it about every 100 ms."""
         app = self._app
+        if self._menu:  # in which a recording can be begun, at once
+            app.prepare_recorder()
         problem = (app.recorder and app.recorder.take_problem()) or (app.drive and app.drive.speed.take_problem())
         if problem:
             self._notice.show(messages.lines(problem), now_ms)
@@ -84,7 +86,6 @@ class Screen:
     def _open_menu(self, now_ms):
         from .menu import Menu  # with the first long press
 
-        self._app.prepare_recorder()
         self._menu = Menu(self._entries(), now_ms)
 
     def _entries(self):
