@@ -1,4 +1,4 @@
-"""Your settings. Remove the '#' in front of a line to change it; what is not set has the default shown."""
+"""Your settings. Remove the '#' and the space behind it to change a line; what is not set has the default shown."""
 
 # Which side does the kickstand lean the bike to?
 # SIDE = "left"             # or "right"
@@ -44,7 +44,9 @@
 
 # SD card for the rides, on SPI; without it they are kept in the board's flash. All five, and on a Pico its driver:
 # mpremote mip install sdcard
-# SD_SPI = 0                # or 1; on an ESP32 2 or 3, the slot of machine.SDCard
+# No defaults: these are for a Pico. ESP32: SD_SPI = 2 (the slot of machine.SDCard; 3 too on a classic one, S2 and S3)
+# and free pins, on a classic one as SCK 25, MOSI 26, MISO 33, CS 32
+# SD_SPI = 0                # or 1
 # SD_SCK = 18
 # SD_MOSI = 19
 # SD_MISO = 16

@@ -99,7 +99,7 @@ def _display(lcd):
     lcd.flush()
     print(
         "Display      "
-        + ("at %s" % hex(lcd.address) if lcd.address else "none answers: check wiring and contrast")
+        + ("at %s" % hex(lcd.address) if lcd.address else "none answers: check wiring and LCD_ADDRESSES")
     )
 
 

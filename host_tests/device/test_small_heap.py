@@ -49,8 +49,10 @@ class Watched(App):
         super().turn()
         turns.append(gc.mem_alloc() - before)
 
-app = Watched(settings, devices.open_lcd(settings), devices.open_sensor(settings))
-board.run(app.run, 4.0)
+def run():  # all parts opened after power-on, which forgets the pins
+    Watched(settings, devices.open_lcd(settings), devices.open_sensor(settings)).run()
+
+board.run(run, 4.0)
 used = sorted(turns.changes[:turns.n])[turns.n * 9 // 10]  # of heap, by a turn and by the models in it
 port._TURN_BYTES = used
 TURNS = port.turns_to_collect
@@ -68,9 +70,8 @@ for size in (1 << 20, 1 << 14, 1 << 10):
 gc.collect()
 free = real_free() // used
 turns.n = 0
-app = Watched(settings, devices.open_lcd(settings), devices.open_sensor(settings))
 plan = TURNS(25)
-board.run(app.run, 12.0)
+board.run(run, 12.0)
 ballast = None
 within = len([change for change in turns.changes[100:turns.n] if change < 0])
 print(json.dumps({"free": free, "turns": turns.n, "within": within, "plan": plan, "used": used}))
