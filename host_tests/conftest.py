@@ -19,6 +19,12 @@ ROOT = Path(__file__).resolve().parent.parent
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "chip: runs the firmware on the emulated Pico, which takes its time")
+    config.addinivalue_line("markers", "long: for over half a minute")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Long tests first: begun last, one of them would keep one processor busy while the others idle."""
+    items.sort(key=lambda item: (item.get_closest_marker("long") is None, item.get_closest_marker("chip") is None))
 
 
 @pytest.fixture(scope="session")

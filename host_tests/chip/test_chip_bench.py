@@ -8,6 +8,7 @@ from emulated import pico
 pytestmark = pytest.mark.chip
 
 
+@pytest.mark.long
 def test_bench():
     """A short run: stages add up, nothing is lost, the heap does not shrink."""
     pico()  # or skip

@@ -51,6 +51,7 @@ class Emulating(threading.Thread):
         return self.pico.time_s if self.pico else 0.0
 
 
+@pytest.mark.long
 def test_flash_onto_the_emulated_pico(monkeypatch):
     """`kickstand flash` as onto a board; then the bike's ride begins, and the display says what it is to do."""
     pico()  # or skip
@@ -101,6 +102,7 @@ def test_the_first_lean_stands_there_soon():
 FLAT = "__init__ alignment app calibration driving errors lean lean_filter meter rotation settings speed ui".split()
 
 
+@pytest.mark.long
 def test_the_power_goes_while_an_older_version_is_updated():
     """It starts nothing then. Flashed again it starts, and nothing of the older version is left."""
     wanted = firmware_files.contents(bytecode.PICO)

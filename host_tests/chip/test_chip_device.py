@@ -13,6 +13,7 @@ pytestmark = pytest.mark.chip
 KICKSTAND, UPRIGHT, RIDE = 5.5, 5.5, [wait(2.0), accelerate(15.0, 3.0), turn(-30.0, 3.0)]  # standing: the bias is found
 
 
+@pytest.mark.long
 def test_a_new_board_is_aligned_by_two_presses_and_keeps_it():
     """Uncalibrated, kickstand, upright, power-cycle, ride: the display reads the lean."""
     ride = Ride([kickstand(KICKSTAND), upright(UPRIGHT), *RIDE])

@@ -46,6 +46,7 @@ def torn(before, after, share):
     return before[:first] + after[first:middle] + before[middle:]
 
 
+@pytest.mark.long
 def test_old_or_new_wherever_a_save_is_cut(board):
     """Before, within and after each operation of SAVES saves: it mounts, holds one of the two, and takes another."""
     operations = 0

@@ -89,6 +89,7 @@ def rides(files):
     return found
 
 
+@pytest.mark.long
 def test_a_recorded_ride_replays_as_it_was_shown(tmp_path):
     """While it is recorded no sample is lost, and the display goes on."""
     from kickstand_tools.bench.sample_count import SampleCount
@@ -201,6 +202,7 @@ def test_rides_go_to_an_sd_card_where_config_names_one():
     assert (len(blocks), problems) == (3, [])
 
 
+@pytest.mark.long
 def test_pull_and_record_through_mpremote(tmp_path, monkeypatch):
     """A ride that is being recorded is ended and pulled; then a log is streamed. Both replay."""
     with pico(PART.world(RIDE.motion), firmware() | calibrated() | {"config.py": b"RECORD = True\n"}) as device:

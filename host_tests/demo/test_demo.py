@@ -164,6 +164,7 @@ def test_a_device_that_stops_early_is_an_error(monkeypatch):
 CLOCK = r"(\d+\.\d) s\s"  # the ride's, drawn in the corner
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 def test_in_a_terminal_by_hand():
     """Presses, raises the bike, presses, rides off and leans left, all with keys; the LCD follows."""
