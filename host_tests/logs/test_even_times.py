@@ -75,7 +75,7 @@ def test_a_line_that_is_there_twice_moves_no_other_by_more_than_rounding():
     ("times", "words"),
     [
         ([0.0, 0.01, 0.005], "the log: time goes back at 0.005 s"),
-        ([7.0] * 5, "the time is 7 s in all samples"),
+        ([7.0] * 5, "the time is the same in all samples"),
         ([*np.arange(100) / 100.0, *[0.99] * 600, *(1.0 + np.arange(100) / 100.0)], "time stands still at 0.99 s"),
     ],
 )

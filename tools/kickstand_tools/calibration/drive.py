@@ -10,6 +10,7 @@ from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE, DriveAlignment
 from kickstand.errors import AlignmentError
 
 from ..errors import InputError
+from ..logs.mended.frozen import believed
 from ..logs.reader import Log, Source, read_log
 from ..logs.source import Progress
 from ..refusals import RefusedInput
@@ -133,7 +134,7 @@ def fit_drive(
 
 
 def _read(source: Source, others: bool) -> Log:
-    log = read_log(source)
+    log = believed(read_log(source))
     if np.all(np.isnan(log.speed_mps)):
         instead = ", or leave this log out" if others else ""
         raise InputError(f"{log.name}: no speed: record a column speed_mps, from a GPS or a wheel{instead}")

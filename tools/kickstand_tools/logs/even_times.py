@@ -51,7 +51,7 @@ def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
         raise InputError(f"{name}: time goes back at {at:g} s: it has to increase")
     starts = np.flatnonzero(np.diff(time_us, prepend=time_us[0] - 1))  # of the samples of each time
     if len(starts) == 1:
-        raise InputError(f"{name}: the time is {recorded[0]:g} s in all samples: it has to increase")
+        raise InputError(f"{name}: the time is the same in all samples: it has to increase")
     counts = np.diff(np.append(starts, len(recorded)))
     between_us = np.diff(time_us[starts])
     usual_us = float(np.median(between_us))
