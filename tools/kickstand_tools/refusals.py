@@ -44,7 +44,8 @@ _SENTENCES = {
     "nul-end": "its end is {0} NUL bytes, as after a loss of power: they are left out",
     "cut-gzip": "the file was cut: what is missing at its end is lost, copy it again if you can",
     "cut-line": "line {0}, the last one, was cut: it is left out",
-    "times-spread": "the times are rounded ({0} of {1} repeat the one before): they are spread evenly, by up to {2:.3f} s",
+    "times-spread": "the times are rounded ({0} of {1} repeat the one before): they are spread evenly, by up to "
+    "{2:.3f} s",
     "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
 }
 _MOVED = {

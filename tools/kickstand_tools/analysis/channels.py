@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from ..calibration.file import CalibrationFile, calibration_beside, read_calibration
 from ..errors import InputError
-from ..logs.log import ROOM_TEMP_C
 from ..logs.block import Block
+from ..logs.log import ROOM_TEMP_C
 from ..logs.reader import Source, read_blocks
 from ..logs.source import File, Progress, log_stem, name_of
 from ..logs.stretch import Stretch

@@ -37,8 +37,9 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None)
     """Read a whole log: CSV with the columns t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps and optionally speed_mps,temp_c.
 
     source: a path (gzipped if it ends in .gz), an open file of text or bytes, a Log, which is checked, or a Stretch of
-    one of these. minimum: the least number of samples. progress: called with the bytes read and those of the file. Raises InputError naming the
-    file, and the line for a mistake in it, also for units that are easily mistaken (m/s2, milliseconds, km/h).
+    one of these. minimum: the least number of samples. progress: called with the bytes read and those of the file.
+    Times that repeat are spread, a cut end is left out. Raises InputError naming the file, and the line for a mistake
+    in it, also for units that are easily mistaken (m/s2, milliseconds, km/h).
 
     >>> import io
     >>> log = read_log(io.StringIO("t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\\n0.00,0,1,0,0,0,0\\n0.01,0,1,0,0,0,0\\n"))
@@ -95,7 +96,11 @@ def read_blocks(
 def read_twice(source: Source) -> Source:
     """The same where it can be read again, else a Log: an open file can be read once."""
     if isinstance(source, Stretch):
-        return Stretch(read_twice(source.source), source.from_s, source.to_s)
+        return Stretch(_again(source.source), source.from_s, source.to_s)
+    return _again(source)
+
+
+def _again(source: File | Log) -> File | Log:
     return source if isinstance(source, (Path, str, Log)) else read_log(source)
 
 
@@ -106,8 +111,7 @@ def _unchecked(source: Source, remarks: list[Notice]) -> Iterator[Block]:
     if not isinstance(source, Stretch):
         return _parsed(source, name_of(source), remarks)
     if source.from_its_end:
-        whole = read_twice(source.source)
-        assert not isinstance(whole, Stretch)
+        whole = _again(source.source)
         last_s = [float(block.t_s[-1]) for block in _unchecked(whole, [])]
         source = Stretch(whole, source.from_s, source.to_s).of_length(max(last_s, default=0.0))
     return source.cut(_unchecked(source.source, remarks))

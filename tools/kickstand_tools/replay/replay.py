@@ -34,7 +34,8 @@ Replayed = tuple[Block, list[Row]]
 class LeanTable(Table):
     """What the board would have shown: n samples, axes left, up, forward; lean > 0 to the right.
 
-    NaN where the readings froze. t_s: seconds since the first sample. lean_deg: the shown lean. lean_formula_deg: Nicolae's (25)-(26) as it stands.
+    t_s: seconds since the first sample; where the readings froze all else is NaN. lean_deg: the shown lean.
+    lean_formula_deg: Nicolae's (25)-(26) as it stands.
     left_g, up_g, forward_g: specific force. static_lean_deg: the lean of a vehicle at rest with this force. notices:
     what is remarkable in the ride (kickstand_tools.refusals.sentence puts a notice into words).
     """
@@ -169,7 +170,8 @@ def _rp2040(
     emulated.run(records, sink)
     results.seek(0)
     for block in read_blocks(log, notices=notices):
-        yield block, list(struct.iter_unpack(replay_engine.RESULT, results.read(size * int(np.count_nonzero(~block.frozen)))))
+        wanted = size * int(np.count_nonzero(~block.frozen))
+        yield block, list(struct.iter_unpack(replay_engine.RESULT, results.read(wanted)))
 
 
 _RUN = {"cpython": _cpython, "micropython": _micropython, "rp2040": _rp2040}
