@@ -160,7 +160,11 @@ def _feed(
             watch.begin(log.name)
         for i, (now, reading, speed) in enumerate(log.rows(), 1):
             firmware.apply(reading, force, rate)
-            alignment.update(force, rate, now - previous)
+            try:
+                alignment.update(force, rate, now - previous)
+            except ValueError as error:  # of a null vector
+                where = f"{log.name}, at {now / 1e6:.1f} s"
+                raise InputError(f"{where}: accelerations of nearly 0: at rest 1 g is needed, check the sensor") from error
             previous = now
             if speed == speed:  # not NaN
                 alignment.measure_speed(speed)

@@ -51,16 +51,15 @@ class Block:
         if not self.lines or not self.own_times:
             return [f"{self.start_s + t:.6f}" for t in self.t_s.tolist()]
         place = self.names.index("t_s")
-        if place == 0:
-            return [line.partition(",")[0].strip() for line in self.lines]
-        return [cells[place].strip() for cells in csv.reader(self.lines)]
+        rows = (next(csv.reader([line])) if '"' in line else line.split(",", place + 1) for line in self.lines)
+        return [cells[place].strip() for cells in rows]
 
     def part(self, which: slice | NDArray[np.bool_]) -> "Block":
         """The rows of a slice, or those where an array of n is True."""
         if isinstance(which, slice):
             lines = self.lines[which]
         else:
-            lines = [line for line, wanted in zip(self.lines, which.tolist(), strict=True) if wanted]
+            lines = [line for line, wanted in zip(self.lines, which.tolist()) if wanted]
         return replace(
             self,
             time_us=self.time_us[which],

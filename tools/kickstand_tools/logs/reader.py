@@ -27,6 +27,7 @@ from .stretch import Stretch
 from .table import Array
 
 BLOCK_BYTES = 1 << 22  # of text, some 60000 samples
+LEAST_G = 0.3  # less than this is usual where gravity was taken off
 BLOCK_SAMPLES = 60_000  # of a log in memory
 _NUMERIC = b"0123456789+-.eE, \n"  # where nothing else stands, numpy may read it
 
@@ -229,7 +230,12 @@ def _block(
 
 def _check_units(name: str, block: Block) -> None:
     """Raise InputError for a log in units that are easily taken for the right ones, by its beginning."""
-    if 5.0 < np.median(np.linalg.norm(block.readings[:, :3], axis=1)) < 20.0:
+    usual_g = np.median(np.linalg.norm(block.readings[:, :3], axis=1))
+    if usual_g < LEAST_G:
+        raise InputError(
+            f"{name}: accelerations of usually {usual_g:.2f} g: was gravity taken off? At rest 1 g is needed"
+        )
+    if 5.0 < usual_g < 20.0:
         raise InputError(f"{name}: accelerations look like m/s2: divide them by 9.80665, their unit is g")
     time_us = block.time_us
     if len(time_us) > 1 and (time_us[-1] - time_us[0]) / (len(time_us) - 1) >= 4e6:
