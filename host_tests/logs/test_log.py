@@ -113,8 +113,8 @@ def test_mistakes_are_told_by_their_line_in_any_block(tmp_path, monkeypatch):
         path.write_text("\n".join([*rows[: line - 1], "x" + rows[line - 1], *rows[line:]]))
         with pytest.raises(InputError, match=f", line {line}: t_s is 'x"):
             read_log(path)
-        path.write_text("\n".join([*rows[: line - 1], rows[line - 1], rows[line - 1], *rows[line:]]))
-        with pytest.raises(InputError, match=f", line {line + 1}: time repeats at "):
+        path.write_text("\n".join([*rows[: line - 1], rows[line - 1], "-1" + rows[line - 1], *rows[line:]]))
+        with pytest.raises(InputError, match=f", line {line + 1}: time goes back from "):
             read_log(path)
         path.write_bytes("\n".join([*rows[: line - 1], "\xff" + rows[line - 1], *rows[line:]]).encode("latin-1"))
         with pytest.raises(InputError, match=f", line {line}: not text"):

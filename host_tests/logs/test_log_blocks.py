@@ -79,13 +79,14 @@ def test_time_starts_at_zero(tmp_path):
     assert block.time_text[1] == "1700000000.005000"
 
 
-def test_a_gzip_file_cut_in_the_middle_is_refused_after_its_good_part(tmp_path, monkeypatch):
+def test_a_damaged_gzip_file_is_refused_after_its_good_part(tmp_path, monkeypatch):
     monkeypatch.setattr(reader, "BLOCK_BYTES", 5000)
     path = write(tmp_path / "ride.csv.gz", [HEADER, *rows(20000)])
-    path.write_bytes(path.read_bytes()[:-2000])
+    packed = path.read_bytes()
+    path.write_bytes(packed[:-2000] + b"\xff" * 2000)
     blocks = reader.read_blocks(path)
     assert len(next(blocks).time_us)
-    with pytest.raises(InputError, match="damaged or cut short"):
+    with pytest.raises(InputError, match="damaged"):
         list(blocks)
 
 

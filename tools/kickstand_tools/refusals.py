@@ -41,6 +41,11 @@ _SENTENCES = {
         "two parts of the drive disagree by {0:.0f} degrees about forward: did the mount move? Else drive on"
     ),
     "uncertain": "forward is known to {0:.1f} degrees only, after {1} braking events: drive on",
+    "nul-end": "its end is {0} NUL bytes, as after a loss of power: they are left out",
+    "cut-gzip": "the file was cut: what is missing at its end is lost, copy it again if you can",
+    "cut-line": "line {0}, the last one, was cut: it is left out",
+    "times-spread": "the times are rounded ({0} of {1} repeat the one before): they are spread evenly, by up to "
+    "{2:.3f} s",
     "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
 }
 _MOVED = {
@@ -75,12 +80,22 @@ def sentence(refusal: Refusal | Notice) -> str:
     if refusal.code == "mount-moved":
         how, *numbers = refusal.values
         return "the mount has moved: " + _MOVED[how].format(*numbers)
+    if refusal.code == "frozen-readings":
+        return _frozen(*refusal.values)
     if refusal.code == "speed-unit":
         return _speed_unit(*refusal.values)
     if refusal.code == "forward-exchanged":
         return _forward_exchanged(*refusal.values)
     words = _SENTENCES.get(refusal.code)
     return words.format(*refusal.values) if words else console.sentence(refusal)
+
+
+def _frozen(stretches: int, seconds: float, begin_s: float, end_s: float) -> str:
+    """begin_s, end_s: of the first of the stretches."""
+    line = f"the readings froze from {begin_s:.1f} to {end_s:.1f} s"
+    if stretches > 1:
+        line += f" and {stretches - 1} times more, {seconds:.1f} s in all"
+    return line + ": they are not believed, and the lean begins anew after each"
 
 
 def _speed_unit(factor: float) -> str:

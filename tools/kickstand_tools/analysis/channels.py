@@ -15,9 +15,11 @@ from numpy.typing import NDArray
 
 from ..calibration.file import CalibrationFile, calibration_beside, read_calibration
 from ..errors import InputError
+from ..logs.block import Block
 from ..logs.log import ROOM_TEMP_C
-from ..logs.reader import Block, Source, read_blocks
+from ..logs.reader import Source, read_blocks
 from ..logs.source import File, Progress, log_stem, name_of
+from ..logs.stretch import Stretch
 from ..logs.table import Array, Table
 from ..replay import replay_engine
 
@@ -86,10 +88,14 @@ class Ride:
         return self.calibration.vehicle == "car"
 
     def blocks(self, progress: Progress | None = None, notices: list[Notice] | None = None) -> Iterator[Channels]:
-        """The ride from its beginning. progress, notices: of read_blocks(). Raises InputError."""
+        """The ride from its beginning, without the readings that froze: they are a gap. progress, notices: of
+        read_blocks(). Raises InputError."""
         lean = _Lean(self.calibration)
         told = False
-        for block in read_blocks(self.log, progress=progress, notices=notices):
+        for whole in read_blocks(self.log, progress=progress, notices=notices):
+            block = whole.believed
+            if not len(block.time_us):
+                continue
             rows = lean.follow(block)
             if notices is not None and not told and np.any(rows[:, 2] < 0.0):
                 told = True
@@ -109,8 +115,9 @@ def open_ride(log: Source, calibration: CalibrationFile | File | None = None) ->
     False
     """
     source = calibration
-    if source is None and isinstance(log, (Path, str)):
-        source = calibration_beside(Path(log))
+    file = log.source if isinstance(log, Stretch) else log
+    if source is None and isinstance(file, (Path, str)):
+        source = calibration_beside(Path(file))
     if source is None:
         raise InputError(f"{name_of(log)}: an open file has no calibration beside it: give one")
     parameters = source if isinstance(source, CalibrationFile) else read_calibration(source)

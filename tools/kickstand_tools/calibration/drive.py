@@ -10,6 +10,7 @@ from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE, DriveAlignment
 from kickstand.errors import AlignmentError
 
 from ..errors import InputError
+from ..logs.mended.frozen import believed
 from ..logs.reader import Log, Source, read_log
 from ..logs.source import Progress
 from ..refusals import RefusedInput
@@ -133,7 +134,7 @@ def fit_drive(
 
 
 def _read(source: Source, others: bool) -> Log:
-    log = read_log(source)
+    log = believed(read_log(source))
     if np.all(np.isnan(log.speed_mps)):
         instead = ", or leave this log out" if others else ""
         raise InputError(f"{log.name}: no speed: record a column speed_mps, from a GPS or a wheel{instead}")
@@ -159,7 +160,11 @@ def _feed(
             watch.begin(log.name)
         for i, (now, reading, speed) in enumerate(log.rows(), 1):
             firmware.apply(reading, force, rate)
-            alignment.update(force, rate, now - previous)
+            try:
+                alignment.update(force, rate, now - previous)
+            except ValueError as error:  # of a null vector
+                where = f"{log.name}, at {now / 1e6:.1f} s"
+                raise InputError(f"{where}: accelerations of nearly 0: at rest 1 g is needed, check the sensor") from error
             previous = now
             if speed == speed:  # not NaN
                 alignment.measure_speed(speed)

@@ -1,25 +1,42 @@
-"""The commands of `kickstand` that read a recorded ride: replay, report, plot, export."""
+"""The commands of `kickstand` that read a recorded ride: replay, report, plot, export, cut."""
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 from kickstand.errors import Notice
+
+if TYPE_CHECKING:
+    from ..logs.reader import Source
 
 _PATH = click.Path(path_type=Path)
 _OUT = click.option("--out", required=True, type=_PATH, help="The file to write.")
 _CALIBRATION = click.option(
     "--calibration", type=_PATH, help="A CAL.json; if not given, the one beside the ride."
 )
+_FROM = click.option(
+    "--from", "from_s", type=float, metavar="S", help="Leave out what is before: seconds from the beginning."
+)
+_TO = click.option(
+    "--to", "to_s", type=float, metavar="S", help="Leave out what is after; a negative S counts from the end."
+)
+
+
+def _stretch(command: Callable[..., Any]) -> Callable[..., Any]:
+    return _FROM(_TO(command))
 
 
 @click.command()
 @click.argument("log", type=_PATH, metavar="LOG.csv")
 @_CALIBRATION
+@_stretch
 @click.option("--engine", type=click.Choice(["cpython", "micropython", "rp2040"]), default="cpython")
 @_OUT
-def replay(log: Path, calibration: Path | None, engine: str, out: Path) -> None:
+def replay(
+    log: Path, calibration: Path | None, from_s: float | None, to_s: float | None, engine: str, out: Path
+) -> None:
     """Run the firmware's own lean meter over a recorded log."""
     from ..calibration.file import calibration_beside, read_calibration
     from ..output import check_output
@@ -30,7 +47,7 @@ def replay(log: Path, calibration: Path | None, engine: str, out: Path) -> None:
     check_output(out, [log, calibration])
     parameters = read_calibration(calibration)
     with Bar("replaying") as bar:
-        count, notices = replay_to_csv(log, parameters, engine, out, bar.reach)
+        count, notices = replay_to_csv(_part(log, from_s, to_s), parameters, engine, out, bar.reach)
     _warn(log, notices)
     if not parameters.aligned:
         click.echo(
@@ -63,8 +80,11 @@ def export(ride: Path, form: str, calibration: Path | None, out: Path) -> None:
 @click.command()
 @click.argument("ride", type=_PATH, metavar="RIDE.csv")
 @_CALIBRATION
+@_stretch
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def report(ride: Path, calibration: Path | None, as_json: bool) -> None:
+def report(
+    ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, as_json: bool
+) -> None:
     """A ride in a page: maxima, time at large leans, and each stop as a brake test has it."""
     from rich.console import Console
 
@@ -74,7 +94,7 @@ def report(ride: Path, calibration: Path | None, as_json: bool) -> None:
     from ..progress import Bar
 
     with Bar("reading") as bar:
-        seen = overview(open_ride(ride, calibration), bar.reach)
+        seen = overview(open_ride(_part(ride, from_s, to_s), calibration), bar.reach)
     _warn(ride, seen.notices)
     if as_json:
         click.echo(json.dumps(as_data(seen)))
@@ -85,8 +105,11 @@ def report(ride: Path, calibration: Path | None, as_json: bool) -> None:
 @click.command()
 @click.argument("ride", type=_PATH, metavar="RIDE.csv")
 @_CALIBRATION
+@_stretch
 @click.option("--out", required=True, type=_PATH, help="The directory to write to.")
-def plot(ride: Path, calibration: Path | None, out: Path) -> None:
+def plot(
+    ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, out: Path
+) -> None:
     """Draw a ride: a picture (PNG) and a page to zoom into (HTML)."""
     from ..analysis.channels import open_ride
     from ..analysis.overview import overview
@@ -95,11 +118,37 @@ def plot(ride: Path, calibration: Path | None, out: Path) -> None:
 
     plot.check(out)
     with Bar("reading") as bar:
-        seen = overview(open_ride(ride, calibration), bar.reach)
+        seen = overview(open_ride(_part(ride, from_s, to_s), calibration), bar.reach)
     _warn(ride, seen.notices)
     for path in plot.draw(seen, out):
         click.echo(f"written: {path}")
     _warn(ride, [seen.exchanged] if seen.exchanged else [])
+
+
+@click.command()
+@click.argument("log", type=_PATH, metavar="LOG.csv")
+@_stretch
+@_OUT
+def cut(log: Path, from_s: float | None, to_s: float | None, out: Path) -> None:
+    """Cut a stretch out of a log: a still pose for calibrate two or six, or one ride of several."""
+    from ..logs.cut import cut_log
+    from ..output import check_output
+    from ..progress import Bar
+
+    if from_s is None and to_s is None:
+        raise click.UsageError("Give --from, --to or both: seconds from the beginning of the log.")
+    check_output(out, [log])
+    notices: list[Notice] = []
+    with Bar("cutting") as bar:
+        count, seconds = cut_log(log, out, from_s, to_s, bar.reach, notices)
+    _warn(log, notices)
+    click.echo(f"written: {out}, {count} samples, {seconds:.1f} s")
+
+
+def _part(log: Path, from_s: float | None, to_s: float | None) -> "Source":
+    from ..logs.stretch import Stretch
+
+    return log if from_s is None and to_s is None else Stretch(log, from_s, to_s)
 
 
 def _warn(log: Path, notices: Iterable[Notice]) -> None:

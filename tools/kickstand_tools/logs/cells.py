@@ -56,7 +56,7 @@ def plausible(table: NDArray[np.float64], names: list[str], before_us: int | Non
         if not np.all(within | np.isnan(table[:, k]) if name in OPTIONAL else within):
             return False
     time_us = np.rint(table[:, 0] * 1e6)
-    return bool(np.all(np.diff(time_us) > 0) and (before_us is None or time_us[0] > before_us))
+    return bool(np.all(np.diff(time_us) >= 0) and (before_us is None or time_us[0] >= before_us))
 
 
 def read(
@@ -70,17 +70,18 @@ def read(
     writer = csv.writer(kept, lineterminator="\n")
     try:
         for cells in rows:
-            if not cells:
+            if not "".join(cells).strip() and len(cells) < 2:
                 continue  # a blank line, often the last
             where = f"{log}, line {lines_before + rows.line_num}"
             if len(cells) != width:
                 raise InputError(f"{where}: {len(cells)} values under {width} column names: is the line cut?")
             value = [_number(cells[place], name, where) for name, place in places.items()]
             now = round(value[0] * 1e6)
-            if before_us is not None and now <= before_us:
-                what = "repeats" if now == before_us else "goes back from %.6f" % (before_us / 1e6)
+            if before_us is not None and now < before_us:
                 at = cells[places["t_s"]].strip()
-                raise InputError(f"{where}: time {what} at {at} s: it has to increase")
+                raise InputError(
+                    f"{where}: time goes back from {before_us / 1e6:.6f} at {at} s: it has to increase"
+                )
             before_us = now
             values.append(value)
             writer.writerow([cell.replace("\n", " ") for cell in cells])

@@ -5,7 +5,6 @@ import gzip
 import io
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -15,65 +14,33 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..output import write_whole
 from . import cells
+from .block import Block
 from .cells import COLUMNS, OPTIONAL
-from .log import FirmwareRow, Log, firmware_rows
+from .log import Log
+from .mended.even_blocks import even_blocks
+from .mended.frozen import FrozenReadings
+from .mended.last_line import without_cut_line
 from .rate_unit import RateUnit
 from .source import File, Progress, chunks, name_of, total_bytes
 from .speed_unit import SpeedUnit
+from .stretch import Stretch
 from .table import Array
 
 BLOCK_BYTES = 1 << 22  # of text, some 60000 samples
+LEAST_G = 0.3  # less than this is usual where gravity was taken off
 BLOCK_SAMPLES = 60_000  # of a log in memory
 _NUMERIC = b"0123456789+-.eE, \n"  # where nothing else stands, numpy may read it
 
-Source = File | Log  # what can be read as a log
-
-
-@dataclass
-class Block:
-    """Some rows of a log, one after the other, as the firmware's modules take them.
-
-    time_us (n): since the log's first sample. readings (n, 7): acceleration (3, g), temperature (C), rate (3, deg/s),
-    the chip's order. speed_mps (n). A speed or temperature that the log does not have is NaN. start_s: the recorder's
-    own time at the log's first sample.
-    """
-
-    time_us: NDArray[np.int64]
-    readings: Array
-    speed_mps: Array
-    has_temp: bool
-    has_speed: bool
-    start_s: float
-    done: int  # bytes of the file so far, as it is packed; of a log in memory, samples
-    text: str = ""  # the rows as CSV, "" for a log in memory
-    time_place: int = 0  # column of the time in text
-
-    def rows(self) -> Iterator[FirmwareRow]:
-        """The samples as the firmware takes them."""
-        return firmware_rows(self.time_us, self.readings, self.speed_mps)
-
-    @property
-    def t_s(self) -> Array:
-        """(n) seconds since the log's first sample."""
-        return self.time_us.astype(float) * 1e-6
-
-    @property
-    def time_text(self) -> list[str]:
-        """The times as they stand in the file."""
-        if not self.text:
-            return [f"{self.start_s + t:.6f}" for t in self.t_s.tolist()]
-        lines = [line for line in self.text.split("\n") if line]
-        if self.time_place == 0:
-            return [line.partition(",")[0].strip() for line in lines]
-        return [cells[self.time_place].strip() for cells in csv.reader(lines)]
+Source = File | Log | Stretch  # what can be read as a log
 
 
 def read_log(source: Source, minimum: int = 2, progress: Progress | None = None) -> Log:
     """Read a whole log: CSV with the columns t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps and optionally speed_mps,temp_c.
 
-    source: a path (gzipped if it ends in .gz), an open file of text or bytes, or a Log, which is checked. minimum: the
-    least number of samples. progress: called with the bytes read and those of the file. Raises InputError naming the
-    file, and the line for a mistake in it, also for units that are easily mistaken (m/s2, milliseconds, km/h).
+    source: a path (gzipped if it ends in .gz), an open file of text or bytes, a Log, which is checked, or a Stretch of
+    one of these. minimum: the least number of samples. progress: called with the bytes read and those of the file.
+    Times that repeat are spread, a cut end is left out. Raises InputError naming the file, and the line for a mistake
+    in it, also for units that are easily mistaken (m/s2, milliseconds, km/h).
 
     >>> import io
     >>> log = read_log(io.StringIO("t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\\n0.00,0,1,0,0,0,0\\n0.01,0,1,0,0,0,0\\n"))
@@ -100,17 +67,20 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None)
 def read_blocks(
     source: Source, minimum: int = 2, progress: Progress | None = None, notices: list[Notice] | None = None
 ) -> Iterator[Block]:
-    """The same block by block, however long the log is.
+    """The same block by block, however long the log is. Readings that froze are marked in each block.
 
     notices: what is remarkable in the log is appended to it at the end.
     """
     name, count = name_of(source), 0
-    speed_unit, rate_unit = SpeedUnit(name), RateUnit()
-    total = len(source.t_s) if isinstance(source, Log) else total_bytes(source)
-    for block in _blocks_of(source) if isinstance(source, Log) else _parsed(source, name):
+    remarks: list[Notice] = []
+    speed_unit, rate_unit, frozen = SpeedUnit(name), RateUnit(), FrozenReadings()
+    whole = source.source if isinstance(source, Stretch) else source
+    total = len(whole.t_s) if isinstance(whole, Log) else total_bytes(whole)
+    for block in _unchecked(source, remarks):
         if not count:
             _check_units(name, block)
         count += len(block.time_us)
+        block.frozen = frozen.mark(block)
         if block.has_speed:
             speed_unit.add(block.t_s, block.readings[:, :3], block.speed_mps)
         if notices is not None:
@@ -120,13 +90,32 @@ def read_blocks(
             progress(block.done, total)
     if count < minimum:
         raise InputError(f"{name} is too short: {count} samples, at least {minimum} are needed")
-    if notices is not None and rate_unit.notice:
-        notices.append(rate_unit.notice)
+    if notices is not None:
+        notices += remarks + frozen.notices() + ([rate_unit.notice] if rate_unit.notice else [])
 
 
 def read_twice(source: Source) -> Source:
     """The same where it can be read again, else a Log: an open file can be read once."""
+    if isinstance(source, Stretch):
+        return Stretch(_again(source.source), source.from_s, source.to_s)
+    return _again(source)
+
+
+def _again(source: File | Log) -> File | Log:
     return source if isinstance(source, (Path, str, Log)) else read_log(source)
+
+
+def _unchecked(source: Source, remarks: list[Notice]) -> Iterator[Block]:
+    """The blocks; units and number of samples are not checked yet. remarks: on what is broken in the file."""
+    if isinstance(source, Log):
+        return _blocks_of(source)
+    if not isinstance(source, Stretch):
+        return _parsed(source, name_of(source), remarks)
+    if source.from_its_end:
+        whole = _again(source.source)
+        last_s = [float(block.t_s[-1]) for block in _unchecked(whole, [])]
+        source = Stretch(whole, source.from_s, source.to_s).of_length(max(last_s, default=0.0))
+    return source.cut(_unchecked(source.source, remarks))
 
 
 def _blocks_of(log: Log) -> Iterator[Block]:
@@ -140,19 +129,31 @@ def _blocks_of(log: Log) -> Iterator[Block]:
         )
 
 
-def _parsed(source: File, name: str) -> Iterator[Block]:
-    """The blocks of a file; units and number of samples are not checked yet."""
-    pieces = chunks(source, BLOCK_BYTES)
+def _parsed(source: File, name: str, remarks: list[Notice]) -> Iterator[Block]:
+    pieces = chunks(source, BLOCK_BYTES, remarks)
     first, packed = next(pieces, (b"", 0))
     first = first.removeprefix(b"\xef\xbb\xbf")
     if not first.strip():
         raise InputError(f"{name} is empty: a log starts with the line {','.join(COLUMNS)}")
-    cells.check_text(name, first, 0)
     header, _, rest = first.partition(b"\n")
-    names = cells.header(name, header.decode())
+    cells.check_text(name, header, 0)
+    try:
+        names = cells.header(name, header.decode())
+    except InputError:
+        cells.check_text(name, first, 0)
+        raise
+    return even_blocks(_rows(itertools.chain([(rest, packed)], pieces), name, names, remarks), name, remarks)
+
+
+def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], remarks: list[Notice]) -> Iterator[Block]:
+    """The blocks with their times as they stand in the file, which may repeat."""
     places = {column: names.index(column) for column in COLUMNS + OPTIONAL if column in names}
     line, start_us, last_us = 1, None, None
-    for text, done in itertools.chain([(rest, packed)], pieces):
+    for text, done, is_last in _last_marked(pieces):
+        cut = b""
+        if is_last:
+            text, cut = without_cut_line(text, names, places)
+            remarks += [Notice("cut-line", line + text.count(b"\n") + 1)] if cut else []
         table, rows = _numbers(name, text, names, places, line, last_us)
         line += text.count(b"\n")
         if not len(table):
@@ -160,7 +161,18 @@ def _parsed(source: File, name: str) -> Iterator[Block]:
         time_us = np.rint(table[:, 0] * 1e6).astype(np.int64)
         start_us = int(time_us[0]) if start_us is None else start_us
         last_us = int(time_us[-1])
-        yield _block(table, time_us - start_us, places, start_us / 1e6, rows, done)
+        yield _block(table, time_us - start_us, places, start_us / 1e6, rows, names, done)
+
+
+def _last_marked(pieces: Iterator[tuple[bytes, int]]) -> Iterator[tuple[bytes, int, bool]]:
+    """Each piece, and whether it is the last one."""
+    before = next(pieces, None)
+    for piece in pieces:
+        if before:
+            yield *before, False
+        before = piece
+    if before:
+        yield *before, True
 
 
 def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -199,19 +211,31 @@ def _numbers(
 
 
 def _block(
-    table: Array, time_us: NDArray[np.int64], places: dict[str, int], start_s: float, text: str, done: int
+    table: Array,
+    time_us: NDArray[np.int64],
+    places: dict[str, int],
+    start_s: float,
+    text: str,
+    names: list[str],
+    done: int,
 ) -> Block:
     column = dict.fromkeys(OPTIONAL, np.full(len(table), np.nan))
     column |= {name: table[:, k] for k, name in enumerate(places)}
     order = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")
     readings = np.column_stack([column[name] for name in order])
     has_temp, has_speed = "temp_c" in places, "speed_mps" in places
-    return Block(time_us, readings, column["speed_mps"], has_temp, has_speed, start_s, done, text, places["t_s"])
+    lines = [line for line in text.split("\n") if line]
+    return Block(time_us, readings, column["speed_mps"], has_temp, has_speed, start_s, done, lines, tuple(names))
 
 
 def _check_units(name: str, block: Block) -> None:
     """Raise InputError for a log in units that are easily taken for the right ones, by its beginning."""
-    if 5.0 < np.median(np.linalg.norm(block.readings[:, :3], axis=1)) < 20.0:
+    usual_g = np.median(np.linalg.norm(block.readings[:, :3], axis=1))
+    if usual_g < LEAST_G:
+        raise InputError(
+            f"{name}: accelerations of usually {usual_g:.2f} g: was gravity taken off? At rest 1 g is needed"
+        )
+    if 5.0 < usual_g < 20.0:
         raise InputError(f"{name}: accelerations look like m/s2: divide them by 9.80665, their unit is g")
     time_us = block.time_us
     if len(time_us) > 1 and (time_us[-1] - time_us[0]) / (len(time_us) - 1) >= 4e6:

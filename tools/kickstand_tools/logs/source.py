@@ -7,6 +7,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, Any
 
+from kickstand.errors import Notice
+
 from ..errors import InputError, cause
 
 File = Path | str | IO[bytes] | IO[str]
@@ -26,14 +28,16 @@ def log_stem(name: str) -> str:
     return Path(name).name.removesuffix(".gz").removesuffix(".csv")
 
 
-def chunks(source: File, size: int) -> Iterator[tuple[bytes, int]]:
+def chunks(source: File, size: int, remarks: list[Notice] | None = None) -> Iterator[tuple[bytes, int]]:
     """The text, unpacked, in pieces of about `size` bytes that end at the end of a line, and the bytes read so far.
 
-    Lines end in a line feed, whatever they end in in the file. Raises InputError naming the file.
+    Lines end in a line feed, whatever they end in in the file; the last one of all may have no end. remarks: what is
+    broken at the end of the file is appended to it: NUL bytes, which are left out, and a gzip file that was cut. Where
+    it is not given, that one is refused. Raises InputError naming the file.
     """
     if not isinstance(source, (Path, str)):
         try:
-            yield from _pieces(source, source, size)
+            yield from _pieces(source, source, size, remarks)
         except (OSError, ValueError) as error:
             raise InputError(f"{name_of(source)} cannot be read: {cause(error)}") from error
         return
@@ -42,9 +46,11 @@ def chunks(source: File, size: int) -> Iterator[tuple[bytes, int]]:
         raise InputError(f"{path} is a directory: give the name of a log in it")
     try:
         with open(path, "rb") as packed, gzip.open(packed) if path.suffix == ".gz" else packed as file:
-            yield from _pieces(file, packed, size)
+            yield from _pieces(file, packed, size, remarks)
     except gzip.BadGzipFile as error:
-        raise InputError(f"{path} is not a gzip file: unpacked logs have names without .gz") from error
+        if "Not a gzipped" in str(error):
+            raise InputError(f"{path} is not a gzip file: unpacked logs have names without .gz") from error
+        raise InputError(f"{path} is damaged: copy it again") from error
     except (EOFError, zlib.error) as error:
         raise InputError(f"{path} is damaged or cut short: copy it again") from error
     except FileNotFoundError as error:
@@ -60,19 +66,41 @@ def total_bytes(source: object) -> int:
     return 0
 
 
-def _pieces(file: Any, packed: Any, size: int) -> Iterator[tuple[bytes, int]]:
+def _pieces(file: Any, packed: Any, size: int, remarks: list[Notice] | None) -> Iterator[tuple[bytes, int]]:
     """packed: the file below `file`, whose position tells the bytes read; the same one where nothing is packed."""
     pending, read = b"", 0
-    while data := file.read(size):
-        data = data.encode() if isinstance(data, str) else data
+    for data in _data(file, size, remarks):
         read += len(data)
         pending += data
-        cut = pending.rfind(b"\n") + 1 or pending.rfind(b"\r") + 1
-        if len(pending) >= size and cut:
-            yield _with_line_feeds(pending[:cut]), read if packed is file else packed.tell()
-            pending = pending[cut:]
+        if len(pending) >= size:
+            cut = pending.rfind(b"\n") + 1 or pending.rfind(b"\r") + 1
+            if cut:
+                yield _with_line_feeds(pending[:cut]), read if packed is file else packed.tell()
+                pending = pending[cut:]
+    kept = pending.rstrip(b"\0")
+    if remarks is not None and len(kept) < len(pending):
+        remarks.append(Notice("nul-end", len(pending) - len(kept)))
+        pending = kept
     if pending:
-        yield _with_line_feeds(pending + b"\n"), read if packed is file else packed.tell()
+        yield _with_line_feeds(pending), read if packed is file else packed.tell()
+
+
+def _data(file: Any, size: int, remarks: list[Notice] | None) -> Iterator[bytes]:
+    """What the file holds. A gzip file that was cut ends where it was cut, if anything could be unpacked."""
+    packed, there = isinstance(file, gzip.GzipFile), False
+    while True:
+        try:
+            # read() would keep to itself what came before the cut
+            data = file.read1(size) if packed else file.read(size)
+        except EOFError:
+            if remarks is None or not there:
+                raise
+            remarks.append(Notice("cut-gzip"))
+            return
+        if not data:
+            return
+        there = True
+        yield data.encode() if isinstance(data, str) else data
 
 
 def _with_line_feeds(text: bytes) -> bytes:

@@ -14,7 +14,8 @@ from kickstand.errors import Notice
 from .. import unix_port
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
-from ..logs.reader import Block, Source, read_blocks, read_twice, write_table
+from ..logs.block import Block
+from ..logs.reader import Source, read_blocks, read_twice, write_table
 from ..logs.source import Progress
 from ..logs.table import Array, Table
 from . import replay_engine
@@ -23,6 +24,7 @@ from .forward_sign import ForwardSign, exchanged_notice
 _CHUNK = 500  # samples between two calls of progress while an emulated Pico works
 
 _FORWARD = replay_engine.COLUMNS.index("forward_g")
+_UNKNOWN = (float("nan"),) * len(replay_engine.COLUMNS)
 
 Row = tuple[float, ...]  # of replay_engine.COLUMNS
 Replayed = tuple[Block, list[Row]]
@@ -32,7 +34,8 @@ Replayed = tuple[Block, list[Row]]
 class LeanTable(Table):
     """What the board would have shown: n samples, axes left, up, forward; lean > 0 to the right.
 
-    t_s: seconds since the first sample. lean_deg: the shown lean. lean_formula_deg: Nicolae's (25)-(26) as it stands.
+    t_s: seconds since the first sample; where the readings froze all else is NaN. lean_deg: the shown lean.
+    lean_formula_deg: Nicolae's (25)-(26) as it stands.
     left_g, up_g, forward_g: specific force. static_lean_deg: the lean of a vehicle at rest with this force. notices:
     what is remarkable in the ride (kickstand_tools.refusals.sentence puts a notice into words).
     """
@@ -95,13 +98,22 @@ def replay_to_csv(
 def replay_blocks(
     log: Source, calibration: CalibrationFile, engine: str, progress: Progress | None, notices: list[Notice]
 ) -> Iterator[Replayed]:
-    """Each block of the log with the engine's results for it. notices is appended to at the end."""
+    """Each block of the log with the engine's results for it, NaN where the readings froze: there the engine is told of
+    a gap. notices is appended to at the end."""
     sign = ForwardSign()
     for block, results in _RUN[engine](log, calibration, progress, notices):
-        sign.add(block.t_s, np.array([row[_FORWARD] for row in results]), block.speed_mps)
-        yield block, results
+        believed = block.believed
+        sign.add(believed.t_s, np.array([row[_FORWARD] for row in results]), believed.speed_mps)
+        yield block, _with_frozen(block, results)
     if calibration.aligned and sign.exchanged:
         notices.append(exchanged_notice(calibration))
+
+
+def _with_frozen(block: Block, results: list[Row]) -> list[Row]:
+    if len(results) == len(block.time_us):
+        return results
+    given = iter(results)
+    return [_UNKNOWN if frozen else next(given) for frozen in block.frozen.tolist()]
 
 
 def _cpython(
@@ -109,7 +121,7 @@ def _cpython(
 ) -> Iterator[Replayed]:
     engine = replay_engine.Replay(calibration.to_firmware(), calibration.delay_s())
     for block in read_blocks(log, 2, progress, notices):
-        yield block, [engine.step(*row) for row in block.rows()]
+        yield block, [engine.step(*row) for row in block.believed.rows()]
 
 
 def _micropython(
@@ -127,8 +139,9 @@ def _micropython(
             assert process.stdout is not None
             results = b""
             for block in read_blocks(log, 2, progress, notices):
-                results = process.stdout.read(size * len(block.time_us))
-                if len(results) < size * len(block.time_us):
+                wanted = size * int(np.count_nonzero(~block.frozen))
+                results = process.stdout.read(wanted)
+                if len(results) < wanted:
                     break
                 yield block, list(struct.iter_unpack(replay_engine.RESULT, results))
             results += process.stdout.read()
@@ -157,7 +170,8 @@ def _rp2040(
     emulated.run(records, sink)
     results.seek(0)
     for block in read_blocks(log, notices=notices):
-        yield block, list(struct.iter_unpack(replay_engine.RESULT, results.read(size * len(block.time_us))))
+        wanted = size * int(np.count_nonzero(~block.frozen))
+        yield block, list(struct.iter_unpack(replay_engine.RESULT, results.read(wanted)))
 
 
 _RUN = {"cpython": _cpython, "micropython": _micropython, "rp2040": _rp2040}
@@ -167,6 +181,6 @@ def _records(blocks: Iterable[Block], calibration: CalibrationFile) -> Iterator[
     """The bytes that replay_engine.run reads."""
     yield struct.pack(replay_engine.CALIBRATION, *calibration.parameters(), calibration.delay_s())
     for block in blocks:
-        for time_us, reading, speed in block.rows():
+        for time_us, reading, speed in block.believed.rows():
             given = speed if speed >= 0.0 else replay_engine.NO_SPEED  # NaN is not >= 0
             yield struct.pack(replay_engine.RECORD, time_us, *reading, given)

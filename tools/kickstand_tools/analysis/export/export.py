@@ -9,6 +9,7 @@ from kickstand.errors import Notice
 
 from ...logs.reader import Source, read_blocks, read_twice
 from ...logs.source import Progress
+from ...logs.stretch import Stretch
 from ...logs.table import Array
 from ...output import write_whole
 from ..channels import Channels, Ride
@@ -54,8 +55,13 @@ def export(
     ride = Ride(read_twice(ride.log), ride.calibration)
     start_s, seconds, speeds = _first_pass(ride.log)
     if form in _DATED and start_s < _CLOCK_S:
-        written_s = Path(ride.log).stat().st_mtime if isinstance(ride.log, (Path, str)) else time.time()
-        start_s = float(max(0, int(written_s - seconds)))
+        file = ride.log.source if isinstance(ride.log, Stretch) else ride.log
+        written_s = Path(file).stat().st_mtime if isinstance(file, (Path, str)) else time.time()
+        after_s = 0.0
+        if isinstance(ride.log, Stretch):  # the file ends later than the stretch
+            whole_start_s, whole_s, _ = _first_pass(ride.log.source)
+            after_s = whole_start_s + whole_s - start_s - seconds
+        start_s = float(max(0, int(written_s - after_s - seconds)))
     count = 0
 
     def rows() -> Iterator[Channels]:

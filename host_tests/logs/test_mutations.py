@@ -1,0 +1,144 @@
+"""2,000 logs broken in many ways: each ends in a result or in one line, and a file is whole or not there."""
+
+import io
+import json
+import warnings
+from pathlib import Path
+
+import analysis_rides
+import command
+import mutations
+import numpy as np
+import pytest
+from kickstand_tools.analysis import report
+from kickstand_tools.analysis.channels import open_ride
+from kickstand_tools.analysis.export.export import export
+from kickstand_tools.analysis.overview import overview
+from kickstand_tools.analysis.plot import traces
+from kickstand_tools.calibration.drive import fit_drive
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.calibration.poses import read_pose
+from kickstand_tools.errors import InputError
+from kickstand_tools.logs.cut import cut_log
+from kickstand_tools.replay.replay import replay_to_csv
+from kickstand_tools.simulation.scripted import script
+from rich.console import Console
+
+COUNT = 2000
+OF_THE_COMMAND = 40  # every so many-th of them goes through the command, too
+CALIBRATION = CalibrationFile(aligned=True)
+
+
+def _report(log: Path, out: Path) -> None:
+    seen = overview(open_ride(log, CALIBRATION))
+    json.dumps(report.as_data(seen), allow_nan=False)
+    Console(file=io.StringIO(), width=80).print(report.page(seen))
+    seen.summary.samples += len(traces.traces(seen).time_s)
+    traces.title(seen)
+
+
+def _export(form: str):
+    return lambda log, out: export(open_ride(log, CALIBRATION), form, out)
+
+
+# What is done with a log: (log, the file to write). A new command that reads logs belongs in here.
+USES = {
+    "replay": lambda log, out: replay_to_csv(log, CALIBRATION, "cpython", out),
+    "report and plot": _report,
+    "export csv": _export("csv"),
+    "export vbo": _export("vbo"),
+    "export racechrono": _export("racechrono"),
+    "cut": lambda log, out: cut_log(log, out, 0.3, -0.2),
+    "pose": lambda log, out: read_pose(log),
+    "drive": lambda log, out: fit_drive([log], CALIBRATION, "motorcycle"),
+}
+# The same by the command: its arguments behind the log
+COMMANDS = [
+    lambda log, out: ("replay", log, "--out", out / "LEAN.csv"),
+    lambda log, out: ("report", log, "--from", "0.5"),
+    lambda log, out: ("report", log, "--json"),
+    lambda log, out: ("export", log, "--to", "vbo", "--out", out / "RIDE.vbo"),
+    lambda log, out: ("cut", log, "--to", "1.5", "--out", out / "CUT.csv.gz"),
+    lambda log, out: ("calibrate", "six", log, log, log, log, log, log, "--out", out / "CAL.json"),
+]
+
+
+@pytest.fixture(scope="module")
+def bases(tmp_path_factory) -> list[bytes]:
+    """Three logs of two seconds: a ride with speed and temperature, one of the seven columns, a pose."""
+    chance = np.random.default_rng(12)
+    ride = script.Ride([script.upright(0.5), script.accelerate(8, 0.6), script.turn(-25, 0.6), script.brake(0, 0.5)], 0.02)
+    lines, plain = [command.HEADER + ",speed_mps,temp_c"], [command.HEADER]
+    for n in range(110):
+        t_s = n / 50.0
+        values = np.array(ride.motion(t_s)) + chance.normal(scale=0.003, size=6)
+        row = f"{t_s:.4f}," + ",".join(f"{value:.5f}" for value in values)
+        plain.append(row)
+        lines.append(row + (f",{ride.truth(t_s)[1]:.2f},25.1" if n % 10 == 0 else ",,"))
+    pose = command.still(tmp_path_factory.mktemp("pose") / "POSE.csv", (0.1, 0.9, 0.4), seconds=2.5)
+    return [("\n".join(lines) + "\n").encode(), ("\n".join(plain) + "\n").encode(), pose.read_bytes()]
+
+
+def test_each_ends_in_a_result_or_in_one_line(bases, tmp_path):
+    results, lines = 0, set()
+    use_of = list(USES)
+    for number in range(COUNT):
+        name, content, ways = mutations.broken(bases, number)
+        log, out = tmp_path / name, tmp_path / "OUT"
+        log.write_bytes(content)
+        uses = [use_of[(number // len(mutations.WAYS) + k) % len(use_of)] for k in (0, 3)]
+        for use in uses:
+            where = f"number {number} ({ways}) in {use}"
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("error")
+                    USES[use](log, out)
+            except InputError as refused:
+                text = str(refused)
+                assert "\n" not in text.replace(str(log), ""), where
+                assert "unexpected" not in text, where
+                assert not out.exists(), where
+                lines.add(text.partition(":")[2][:12])
+            except Exception as error:
+                pytest.fail(f"{where}: {type(error).__name__}: {error}")
+            else:
+                results += 1
+                if out.exists():
+                    assert out.read_bytes().endswith(b"\n"), where
+                    out.unlink()
+        assert [path.name for path in tmp_path.iterdir()] == [name], f"number {number}: {ways}"
+        log.unlink()
+    assert 0.2 * COUNT < results < 1.8 * COUNT  # both happen, and often
+    assert len(lines) > 20
+
+
+def test_the_command_says_one_line(bases, tmp_path):
+    (tmp_path / "RIDE.cal.json").write_text(json.dumps(analysis_rides.CALIBRATION))
+    out = tmp_path / "out"
+    out.mkdir()
+    for number in range(0, COUNT, OF_THE_COMMAND):
+        name, content, ways = mutations.broken(bases, number + number // OF_THE_COMMAND % len(mutations.WAYS))
+        log = tmp_path / name
+        log.write_bytes(content)
+        arguments = COMMANDS[number // OF_THE_COMMAND % len(COMMANDS)](log, out)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            result = command.run(*arguments)
+        where = f"{arguments[0]} of {ways}: {result.err}"
+        assert "unexpected" not in result.err, where
+        written = [path for path in out.rglob("*") if path.is_file()]
+        if result.status:
+            assert result.status == 2, where
+            assert result.err.count("\n") == 1, where
+            assert not written, where
+        else:
+            assert all(line.startswith("warning: ") for line in result.err.splitlines()), where
+        for path in written:
+            path.unlink()
+        log.unlink()
+
+
+def test_a_number_always_breaks_a_log_in_the_same_way(bases):
+    assert [mutations.broken(bases, number) for number in range(50)] == [
+        mutations.broken(bases, number) for number in range(50)
+    ]

@@ -1,0 +1,88 @@
+"""Some rows of a log, one after the other."""
+
+import csv
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .log import FirmwareRow, firmware_rows
+from .table import Array
+
+
+@dataclass
+class Block:
+    """Some rows of a log, one after the other, as the firmware's modules take them.
+
+    time_us (n): since the log's first sample. readings (n, 7): acceleration (3, g), temperature (C), rate (3, deg/s),
+    the chip's order. speed_mps (n). A speed or temperature that the log does not have is NaN. start_s: the recorder's
+    own time at the log's first sample. frozen (n): True where the readings are not believed, see mended.frozen.
+    """
+
+    time_us: NDArray[np.int64]
+    readings: Array
+    speed_mps: Array
+    has_temp: bool
+    has_speed: bool
+    start_s: float
+    done: int  # bytes of the file so far, as it is packed; of a log in memory, samples
+    lines: list[str] = field(default_factory=list)  # the rows as CSV, none for a log in memory
+    names: tuple[str, ...] = ()  # of the columns in lines
+    own_times: bool = True  # the times are those that stand in lines
+    frozen: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+
+    def __post_init__(self) -> None:
+        if len(self.frozen) != len(self.time_us):
+            self.frozen = np.zeros(len(self.time_us), dtype=bool)
+
+    def rows(self) -> Iterator[FirmwareRow]:
+        """The samples as the firmware takes them."""
+        return firmware_rows(self.time_us, self.readings, self.speed_mps)
+
+    @property
+    def t_s(self) -> Array:
+        """(n) seconds since the log's first sample."""
+        return self.time_us.astype(float) * 1e-6
+
+    @property
+    def time_text(self) -> list[str]:
+        """The times as they stand in the file, or as they were spread."""
+        if not self.lines or not self.own_times:
+            return [f"{self.start_s + t:.6f}" for t in self.t_s.tolist()]
+        place = self.names.index("t_s")
+        rows = (next(csv.reader([line])) if '"' in line else line.split(",", place + 1) for line in self.lines)
+        return [cells[place].strip() for cells in rows]
+
+    def part(self, which: slice | NDArray[np.bool_]) -> "Block":
+        """The rows of a slice, or those where an array of n is True."""
+        if isinstance(which, slice):
+            lines = self.lines[which]
+        else:
+            lines = [line for line, wanted in zip(self.lines, which.tolist()) if wanted]
+        return replace(
+            self,
+            time_us=self.time_us[which],
+            readings=self.readings[which],
+            speed_mps=self.speed_mps[which],
+            lines=lines,
+            frozen=self.frozen[which],
+        )
+
+    @property
+    def believed(self) -> "Block":
+        """The rows that are not frozen."""
+        return self.part(~self.frozen) if np.any(self.frozen) else self
+
+
+def joined(first: Block, second: Block) -> Block:
+    """Two blocks that follow on as one."""
+    return replace(
+        second,
+        time_us=np.concatenate((first.time_us, second.time_us)),
+        readings=np.concatenate((first.readings, second.readings)),
+        speed_mps=np.concatenate((first.speed_mps, second.speed_mps)),
+        lines=first.lines + second.lines,
+        own_times=first.own_times and second.own_times,
+        frozen=np.concatenate((first.frozen, second.frozen)),
+    )

@@ -1,0 +1,56 @@
+"""A stretch of a log: what lies between two times."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from ..errors import InputError
+from .block import Block
+from .log import Log
+from .source import File, name_of
+
+
+@dataclass
+class Stretch:
+    """From from_s to to_s of a log, seconds since its first sample; negative: before its last one. None: its end there.
+
+    It can be given wherever a log can. Its times count from its own first sample.
+    """
+
+    source: File | Log
+    from_s: float | None = None
+    to_s: float | None = None
+
+    @property
+    def name(self) -> str:
+        """The log's."""
+        return name_of(self.source)
+
+    @property
+    def from_its_end(self) -> bool:
+        """One of the times is negative: the length of the log has to be known."""
+        return min(self.from_s or 0.0, self.to_s or 0.0) < 0.0
+
+    def of_length(self, length_s: float) -> "Stretch":
+        """The same with times from the beginning. length_s: of the log."""
+        times = [None if t is None else t if t >= 0.0 else length_s + t for t in (self.from_s, self.to_s)]
+        return Stretch(self.source, *times)
+
+    def cut(self, blocks: Iterator[Block]) -> Iterator[Block]:
+        """The blocks of the whole log, cut. Raises InputError where nothing is left."""
+        begin_us = round(1e6 * (self.from_s or 0.0))
+        end_us = float("inf") if self.to_s is None else round(1e6 * self.to_s)
+        if end_us <= begin_us:
+            raise InputError(f"{self.name}: the stretch ends before it begins: give --from the smaller time")
+        from_us, length_s = None, 0.0
+        for block in blocks:
+            length_s = float(block.t_s[-1])
+            if block.time_us[0] > end_us:
+                break
+            within = (block.time_us >= begin_us) & (block.time_us <= end_us)
+            if not within.any():
+                continue
+            part = block if within.all() else block.part(within)
+            from_us = int(part.time_us[0]) if from_us is None else from_us
+            yield replace(part, time_us=part.time_us - from_us, start_s=part.start_s + from_us / 1e6)
+        if from_us is None:
+            raise InputError(f"{self.name}: no samples in this stretch: the log is {length_s:.1f} s long")
