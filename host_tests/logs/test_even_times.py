@@ -1,0 +1,84 @@
+"""Times that were rounded, or stamped on several samples at once, against the even times that they came from."""
+
+import numpy as np
+import pytest
+from kickstand_tools.errors import InputError
+from kickstand_tools.logs.even_times import even_times
+
+ROUND = {"down": lambda x: np.floor(x + 1e-9), "to nearest": np.rint}
+
+
+def errors(true, recorded):
+    """Largest relative error of the steps, and of the times without a constant (s): away from the ends."""
+    found = even_times(recorded)
+    assert np.all(np.diff(found) > 0.0)
+    inner = slice(200, -200)
+    away = (found - true)[inner]
+    return np.max(np.abs(np.diff(found) / np.diff(true) - 1.0)[inner]), np.max(np.abs(away - np.mean(away)))
+
+
+@pytest.mark.parametrize("how", ROUND)
+@pytest.mark.parametrize("rate_hz", [52, 95, 101, 104, 208, 416])
+@pytest.mark.parametrize("tick_s", [0.01, 0.001, 1.0, 1.0 / 64.0])
+def test_rounded_times_are_even_again(rate_hz, tick_s, how):
+    true = 0.123 + np.arange(5000) / rate_hz
+    recorded = ROUND[how](true / tick_s) * tick_s
+    step_error, time_error = errors(true, recorded)
+    assert step_error < 0.03  # as recorded up to 1 and more: steps of 0 and of twice the right length
+    assert time_error < 0.07 * tick_s
+    found = even_times(recorded)
+    assert np.max(np.abs(found - recorded)) <= 0.6 * tick_s + 1e-9
+
+
+def test_a_time_for_several_samples_at_once():
+    true = np.arange(5000) / 104
+    step_error, time_error = errors(true, np.repeat(true[9::10], 10))
+    assert step_error < 0.01
+    assert time_error < 0.001
+
+
+def test_times_that_are_fine_or_even_come_back_as_they_are():
+    chance = np.random.default_rng(1)
+    for times in (
+        np.arange(1000) / 100.0,
+        np.delete(np.arange(1000) / 100.0, [5, 500, 501]),  # samples were lost
+        np.round(np.cumsum(0.01 + 0.002 * chance.random(1000)), 4),
+        1.7e9 + np.arange(1000) / 200.0,
+    ):
+        assert np.array_equal(even_times(times), times)
+    assert len(even_times([])) == 0
+    assert even_times([3.0]).tolist() == [3.0]
+
+
+def test_gaps_stay_gaps():
+    true = np.concatenate((np.arange(1500) / 104, 60.0 + np.arange(1500) / 104))
+    found = even_times(np.round(true, 2))
+    steps = np.diff(found)
+    assert steps[1499] == pytest.approx(true[1500] - true[1499], abs=0.01)
+    assert np.max(np.abs(np.delete(steps, 1499) * 104 - 1.0)) < 0.1
+
+
+def test_a_line_that_is_there_twice_moves_no_other_by_more_than_rounding():
+    times = np.arange(1000) / 100.0
+    twice = np.insert(times, 500, times[500])
+    found = even_times(twice)
+    assert np.all(np.diff(found) > 0.004)
+    assert np.max(np.abs(found - twice)) <= 0.006
+    assert np.max(np.abs(found - twice)[:400]) < 1e-3
+    fine = times + 1e-6 * np.random.default_rng(2).integers(0, 900, 1000)
+    found = even_times(np.insert(fine, 500, fine[500]))
+    assert np.delete(found, 501) == pytest.approx(fine, abs=1e-5)
+    assert fine[500] < found[501] < fine[501]
+
+
+@pytest.mark.parametrize(
+    ("times", "words"),
+    [
+        ([0.0, 0.01, 0.005], "the log: time goes back at 0.005 s"),
+        ([7.0] * 5, "the time is 7 s in all samples"),
+        ([*np.arange(100) / 100.0, *[0.99] * 600, *(1.0 + np.arange(100) / 100.0)], "time stands still at 0.99 s"),
+    ],
+)
+def test_what_is_no_time_is_refused(times, words):
+    with pytest.raises(InputError, match=words):
+        even_times(times)

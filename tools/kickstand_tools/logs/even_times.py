@@ -1,0 +1,120 @@
+"""Times that a recorder has rounded, spread evenly within what its rounding allows.
+
+Some recorders write times in whole hundredths or thousandths of a second, or stamp several samples with the time at
+which they were handed over. Steps are then uneven, and some are 0. A sensor samples evenly: its times are the mean
+recorded times around each sample, as near to the recorded one as the tick of the recorder's clock allows.
+"""
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import InputError
+
+Array = NDArray[np.float64]
+
+COARSE = 0.05  # ticks of a smaller share of the time between samples are good enough as they are
+OFTEN = 0.05  # share of repeated times from which they are the recorder's habit: it stamps several samples at once
+EXACT = 0.98  # share of steps of one size in a log that is on its grid, with a sample lost here and there
+GAP = 1.5  # times the usual step, and a tick: samples are missing
+AROUND = 64  # samples at least over which the mean is taken, and
+TICKS = 8  # ticks at least
+CROWDED = 10.0  # times the usual number of samples in a tick, and
+CROWD = 50  # samples: so many of one time are a clock that stood still
+ALLOWED = 0.6  # of a tick, from the recorded time: half of it, and some more for the ends, where the mean is less sure
+SHORTEST_S = 2e-6  # step: times are handed on in whole microseconds
+
+
+def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
+    """Recorded times of samples (n, s) that rounding has made uneven, or has repeated, spread evenly (n, s).
+
+    Each stays within 0.6 ticks of what was recorded, the tick being what all times are multiples of, or the usual
+    step between different times where many are repeated. Steps are over 0. Gaps stay, and times that are fine enough
+    come back as they are. Raises InputError for a time that goes back or is no number, and for a clock that
+    stands still. name: what messages call the log.
+
+    >>> even_times([0.0, 0.01, 0.01, 0.02, 0.03, 0.03, 0.04]).round(4).tolist()
+    [0.0007, 0.0071, 0.0136, 0.02, 0.0264, 0.0329, 0.0393]
+    >>> even_times([0.0, 0.01, 0.02, 0.5, 0.51]).tolist()
+    [0.0, 0.01, 0.02, 0.5, 0.51]
+    """
+    recorded = np.asarray(t_s, dtype=float)
+    if len(recorded) < 2:
+        return recorded
+    if not np.all(np.isfinite(recorded)):
+        raise InputError(f"{name}: some times are no numbers")
+    time_us = np.rint(recorded * 1e6).astype(np.int64)
+    steps_us = np.diff(time_us)
+    if np.any(steps_us < 0):
+        at = recorded[int(np.argmax(steps_us < 0)) + 1]
+        raise InputError(f"{name}: time goes back at {at:g} s: it has to increase")
+    starts = np.flatnonzero(np.diff(time_us, prepend=time_us[0] - 1))  # of the samples of each time
+    if len(starts) == 1:
+        raise InputError(f"{name}: the time is {recorded[0]:g} s in all samples: it has to increase")
+    counts = np.diff(np.append(starts, len(recorded)))
+    between_us = np.diff(time_us[starts])
+    usual_us = float(np.median(between_us))
+    whole = between_us <= 5.0 * usual_us
+    period_us = float(np.sum(between_us[whole])) / float(np.sum(counts[:-1][whole]))
+    repeated = len(recorded) - len(starts)
+    tick_us = float(np.gcd.reduce(between_us))
+    if repeated > OFTEN * len(recorded):
+        tick_us = max(tick_us, usual_us)
+    if np.any((counts > CROWD) & (counts > CROWDED * max(1.0, tick_us / period_us))):
+        at = recorded[starts[int(np.argmax(counts))]]
+        raise InputError(f"{name}: time stands still at {at:g} s, in {np.max(counts)} samples: it has to increase")
+    if not repeated and (tick_us < COARSE * period_us or _one_step(between_us)):
+        return recorded
+    times = _apart(recorded, starts, counts, period_us * 1e-6)
+    if tick_us >= COARSE * period_us:
+        times = _smooth(recorded, times, tick_us * 1e-6, period_us * 1e-6)
+    order = SHORTEST_S * np.arange(len(times))
+    return np.asarray(np.maximum.accumulate(times - order) + order, dtype=float)
+
+
+def _one_step(between_us: NDArray[np.int64]) -> bool:
+    return bool(np.count_nonzero(between_us == np.median(between_us)) >= EXACT * len(between_us))
+
+
+def _apart(recorded: Array, starts: NDArray[np.intp], counts: NDArray[np.intp], period_s: float) -> Array:
+    """Samples of the same time spread up to the next time, or over as long as they usually last."""
+    until = np.append(recorded[starts[1:]], np.inf)
+    room = np.minimum((until - recorded[starts]) / counts, np.maximum(period_s, 0.0))
+    number = np.arange(len(recorded)) - np.repeat(starts, counts)
+    return recorded + number * np.repeat(room, counts)
+
+
+def _smooth(recorded: Array, times: Array, tick_s: float, period_s: float) -> Array:
+    """The mean recorded time around each sample, between one gap and the next, no further from it than ALLOWED."""
+    half = max(AROUND, round(TICKS * tick_s / period_s)) // 2
+    cuts = np.flatnonzero(np.diff(recorded) > GAP * period_s + tick_s) + 1
+    found = times.copy()
+    for begin, end in zip([0, *cuts], [*cuts, len(times)]):
+        part = recorded[begin:end]
+        if len(part) > 1:
+            mean = _mean(_mean(part, half), half)
+            found[begin:end] = np.clip(mean, part - ALLOWED * tick_s, part + ALLOWED * tick_s)
+    return found
+
+
+def _mean(values: Array, half: int) -> Array:
+    """Over half samples to each side; the ends go on along straight lines."""
+    n = len(values)
+    span = min(n, 2 * half + 1)
+    k = np.arange(n, dtype=float)
+    first, last = _line(k[:span], values[:span]), _line(k[-span:], values[-span:])
+    if n <= 2 * half:
+        return first(k)
+    before, after = first(np.arange(-half, 0.0)), last(np.arange(n, n + half, dtype=float))
+    base = values[0]  # sums of small numbers are exact enough
+    sums = np.cumsum(np.concatenate(([0.0], before - base, values - base, after - base)))
+    return base + (sums[2 * half + 1 :] - sums[: -2 * half - 1]) / (2 * half + 1)
+
+
+def _line(k: Array, values: Array) -> Callable[[Array], Array]:
+    """The straight line of least squares, as a function of k."""
+    middle, mean = float(np.mean(k)), float(np.mean(values))
+    away = k - middle
+    slope = float(away @ (values - mean)) / max(float(away @ away), 1e-12)
+    return lambda at: mean + slope * (at - middle)
