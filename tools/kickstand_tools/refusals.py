@@ -42,6 +42,10 @@ _SENTENCES = {
     ),
     "uncertain": "forward is known to {0:.1f} degrees only, after {1} braking events: drive on",
     "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
+    "import-speed-unit": "{0} has no unit, and the positions do not tell it, so the speed is left out: add --units "
+    "speed=km/h, mph or m/s",
+    "import-mirrored": "the sensor turns against the track, so left and right are exchanged: were all its "
+    "accelerations turned? {0} has +1 g where up is",
 }
 _MOVED = {
     "between-stops": "two stops differ by over {0:.0f} degrees",
