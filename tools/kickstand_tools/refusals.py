@@ -44,6 +44,8 @@ _SENTENCES = {
     "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
     "import-speed-unit": "{0} has no unit, and the positions do not tell it, so the speed is left out: add --units "
     "speed=km/h, mph or m/s",
+    "import-sign": "which sign accelerations have in {0} is not certain, and no track with turns tells it: at rest the "
+    "axis that points up has to read +1 g, else the ride is mirrored and --units a=-g or a=-m/s2 puts it right",
     "import-mirrored": "the sensor turns against the track, so left and right are exchanged: were all its "
     "accelerations turned? {0} has +1 g where up is",
 }

@@ -18,7 +18,7 @@ from .files import Piece, read_pieces
 from .join import GAP_NS, Joined, join
 from .recording import Array, Recording, Taken
 from .sheets import check_pandas
-from .units import SPEEDS, unit
+from .units import ACCELERATIONS, SPEEDS, factor, unit
 
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
 WITHOUT_GRAVITY_G = 0.4  # median force: a ride's is over 0.9
@@ -69,8 +69,8 @@ def import_recording(
     Known are phyphox, Sensor Logger, SensorLog, Sensor Kinetics, RaceChrono (CSV), RaceBox, VBO, AiM and Kickstand's
     own files. Of any other table columns says which is which ({"t": "time", "ax": "accX", ...}: t, ax, ay, az, gx, gy,
     gz, and speed, lat, lon, temp where there are), and units in which unit ({"a": "m/s2", "g": "rad/s", "speed":
-    "km/h"}; a - before a unit turns the sign). start_s, end_s: the stretch to take, from the recording's own start. Raises
-    InputError.
+    "km/h"}; a - before a unit turns the sign). start_s, end_s: the stretch to take, from the recording's own start.
+    Raises InputError.
 
     >>> import pathlib, tempfile
     >>> rows = [f"{10 * k},0.0,9.81,0.0,0.0,0.0,0.1" for k in range(300)]
@@ -141,18 +141,19 @@ def _recording(pieces: list[Piece], name: str, columns: Mapping[str, str] | None
         more = ", ..." if len(found) > 4 else ""
         raise InputError(f"{name} holds {len(found)} recordings ({which}{more}): give one of them")
     app, files = found[0]
-    if app is racebox and set(units) <= {"speed"}:
-        return racebox.read(files, name, _speed_unit(units))
-    if units:
+    said = units.get("speed", "") if app is racebox else ""
+    if said:
+        factor(said, SPEEDS, "speed")
+    recording = racebox.read(files, name, unit(said)) if app is racebox else app.read(files, name)
+    asked = {"speed"} if app is racebox else set() if recording.sign_known else {"a"}
+    if not set(units) <= asked:
         raise InputError(f"{name} is {app.NAME}'s, whose units are known: leave --units out, or add --columns, too")
-    return app.read(files, name)
-
-
-def _speed_unit(units: dict[str, str]) -> str:
-    said = unit(units.get("speed", ""))
-    if said and said not in SPEEDS:
-        raise InputError(f"speed: unit {said!a} is not known: write one of {', '.join(SPEEDS)}")
-    return said
+    if "a" in units:
+        recording.sign_known = True
+        if factor(units["a"], ACCELERATIONS, "a") < 0.0:
+            recording.accel.values = -recording.accel.values
+            _say_sign(recording, "turned")
+    return recording
 
 
 def _check_force(joined: Joined, name: str) -> None:
@@ -172,15 +173,22 @@ def _check_force(joined: Joined, name: str) -> None:
 def _check_sign(recording: Recording, joined: Joined) -> None:
     """Where the track shows a mirrored accelerometer: turn it if its sign was only likely, else remark on it."""
     agrees = course_agrees(_seconds(joined), joined.accel_g, joined.gyro_dps, joined.lat_deg, joined.lon_deg)
-    if agrees is not False:
-        return
     if recording.sign_known:
-        recording.notices.append(Notice("import-mirrored", recording.app))
-        return
-    joined.accel_g = -joined.accel_g
+        if agrees is False:
+            recording.notices.append(Notice("import-mirrored", recording.app))
+    elif agrees is None:
+        recording.notices.append(Notice("import-sign", recording.app))
+    elif agrees:
+        _say_sign(recording, "+1 g up, by the turns of the track")
+    else:
+        joined.accel_g = -joined.accel_g
+        _say_sign(recording, "-1 g up, by the turns of the track: sign turned")
+
+
+def _say_sign(recording: Recording, sign: str) -> None:
     for taken in recording.taken:
         if taken.quantity == "accelerometer":
-            taken.sign = "-1 g up, by the turns of the track: sign turned"
+            taken.sign = sign
 
 
 def _seconds(joined: Joined) -> Array:

@@ -68,12 +68,12 @@ def on_clock(sensor: Sensor, clock_ns: NDArray[np.int64], period_ns: float) -> A
     """
     import pandas
 
-    frame: pandas.DataFrame = pandas.DataFrame(sensor.values, index=pandas.to_timedelta(sensor.time_ns, unit="ns"))
+    frame = pandas.DataFrame(sensor.values, index=pandas.to_timedelta(sensor.time_ns, unit="ns"))
     clock = pandas.to_timedelta(clock_ns, unit="ns")
     if _period_ns(sensor) * FASTER < period_ns:
-        frame = frame.rolling(f"{round(period_ns)}ns", center=True).mean()
-    filled = frame.reindex(frame.index.union(clock)).interpolate(method="index", limit_area="inside")
-    values = filled.loc[clock].to_numpy(dtype=float).copy()
+        frame = pandas.DataFrame(frame.rolling(f"{round(period_ns)}ns", center=True).mean())
+    both = frame.reindex(frame.index.union(clock)).interpolate(method="index", limit_area="inside")
+    values = np.array(both.loc[clock], dtype=float)
     own = sensor.time_ns
     after = np.searchsorted(own, clock_ns, side="left")
     next_ns = own[np.minimum(after, len(own) - 1)]

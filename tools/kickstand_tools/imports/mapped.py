@@ -104,7 +104,7 @@ def guessed(columns: list[str]) -> tuple[dict[str, str], list[str]]:
         axis = next((axis for axis in "xyz" if re.search(_AXIS.format(axis), re.sub(r"[(\[].*", "", low).strip())), "")
         if sensor and axis:
             found.setdefault(sensor + axis, column)
-        elif re.search(r"time|^t$|^ts$|epoch|utc", bare):
+        elif re.search(r"time|milli|micro|^(t|ts|ms|us|ns|s|sec|seconds)$|epoch|utc|clock", bare):
             found.setdefault("t", column)
         elif re.search(r"speed|velocity|kmh|kph", bare) and "accuracy" not in bare:
             found.setdefault("speed", column)

@@ -29,10 +29,12 @@ class Taken:
 
 
 def rate_hz(time_ns: Nanoseconds) -> float:
-    """Samples in a second, 0 where there are too few to tell."""
+    """Samples in a second, without gaps; 0 where there are too few to tell."""
     steps = np.diff(time_ns[time_ns != NO_TIME])
-    steps = steps[steps > 0]
-    return SECOND_NS * len(steps) / float(np.sum(np.minimum(steps, 10 * np.median(steps)))) if len(steps) else 0.0
+    if not np.any(steps > 0):
+        return 0.0
+    whole = (steps >= 0) & (steps < 5.0 * np.median(steps[steps > 0]))
+    return SECOND_NS * int(np.count_nonzero(whole)) / float(np.sum(steps[whole]))
 
 
 @dataclass
