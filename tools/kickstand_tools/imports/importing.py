@@ -1,5 +1,6 @@
 """A recording of another app or logger as a log: what it is, joined on one clock, checked, written."""
 
+import gzip
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -7,10 +8,12 @@ from pathlib import Path
 import numpy as np
 from kickstand.errors import Notice
 
+from ..analysis.export.csv_lines import csv_lines
 from ..errors import InputError
 from ..logs.cells import COLUMNS
 from ..logs.log import Log
-from ..logs.reader import read_log, write_table
+from ..logs.reader import BLOCK_SAMPLES, read_log
+from ..output import write_whole
 from . import mapped
 from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo
 from .course import course_agrees
@@ -24,7 +27,7 @@ _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_ki
 WITHOUT_GRAVITY_G = 0.4  # median force: a ride's is over 0.9
 WRONG_UNIT_G = 3.0  # median force: m/s2 taken for g give 9.8
 TRACK = ("speed_mps", "lat_deg", "lon_deg", "utc_s")
-_FORMATS = {"t_s": "%.6f", "speed_mps": "%.3f", "temp_c": "%.2f", "lat_deg": "%.7f", "lon_deg": "%.7f", "utc_s": "%.3f"}
+_DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
 
 
 @dataclass(eq=False)
@@ -112,15 +115,33 @@ def import_recording(
 
 
 def write_imported(path: Path | str, imported: Imported) -> None:
-    """Write the log, gzipped if its name ends in .gz, whole or not at all: a log's columns, those of TRACK and temp_c
-    as far as there are values, t_s from the recording's own start. Raises InputError."""
-    table = imported.log.columns()
-    table["t_s"] = table["t_s"] + imported.log.start_s
-    table |= {"lat_deg": imported.lat_deg, "lon_deg": imported.lon_deg, "utc_s": imported.utc_s}
-    names = [*COLUMNS, *[name for name in (*TRACK, "temp_c") if np.any(np.isfinite(table[name]))]]
-    text = [np.char.mod(_FORMATS.get(name, "%.6f"), table[name]) for name in names]
-    cells = [np.where(np.isfinite(table[name]), column, "") for name, column in zip(names, text)]
-    write_table(Path(path), names, (row for row in zip(*(column.tolist() for column in cells))))
+    """Write the log, gzipped if its name ends in .gz, whole or not at all. Raises InputError.
+
+    Columns: a log's, and those of TRACK and temp_c as far as there are values; t_s from the recording's own start.
+
+    >>> import tempfile
+    >>> log = Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2)
+    >>> none = np.full(2, np.nan)
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     write_imported(f"{directory}/ride.csv", Imported("none", log, none, none, none, []))
+    ...     print(Path(f"{directory}/ride.csv").read_text().splitlines()[1])
+    0.000000,0.000000,1.000000,0.000000,0.000000,0.000000,0.000000
+    """
+    values = imported.log.columns()
+    values["t_s"] = values["t_s"] + imported.log.start_s
+    values |= {"lat_deg": imported.lat_deg, "lon_deg": imported.lon_deg, "utc_s": imported.utc_s}
+    names = [*COLUMNS, *[name for name in (*TRACK, "temp_c") if np.any(np.isfinite(values[name]))]]
+    digits = [_DIGITS.get(name, 6) for name in names]
+    table = np.column_stack([values[name] for name in names])
+
+    def write(temporary: Path) -> None:
+        opened = gzip.open if Path(path).suffix == ".gz" else open
+        with opened(temporary, "wt", encoding="ascii", newline="") as file:
+            file.write(",".join(names) + "\n")
+            for begin in range(0, len(table), BLOCK_SAMPLES):
+                file.write(csv_lines(table[begin : begin + BLOCK_SAMPLES], digits))
+
+    write_whole(Path(path), write)
 
 
 def _recording(pieces: list[Piece], name: str, columns: Mapping[str, str] | None, units: dict[str, str]) -> Recording:
