@@ -47,13 +47,14 @@ def read_pieces(source: Path | str) -> list[Piece]:
     path = Path(source)
     try:
         pieces = [_piece(name, content) for name, content in _contents(path)]
+        pieces = [piece for piece in pieces if piece is not None] or _no_text(path)
     except FileNotFoundError as error:
         raise InputError(f"{path}: there is no such file") from error
     except gzip.BadGzipFile as error:
         raise InputError(f"{path} is not a gzip file: unpacked recordings have names without .gz") from error
     except (zipfile.BadZipFile, zlib.error, EOFError) as error:
         raise InputError(f"{path} is damaged or cut short: copy it again") from error
-    except (OSError, ValueError, RuntimeError, NotImplementedError) as error:  # zipfile's for a password, among others
+    except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read: {cause(error)}") from error
     pieces = [piece for piece in pieces if piece.text.strip() or piece.name.endswith(".parquet")]
     if not pieces:
@@ -85,7 +86,16 @@ def _unzipped(path: Path) -> Iterator[tuple[str, bytes]]:
     with zipfile.ZipFile(path) as archive:
         for entry in archive.infolist():
             if not entry.is_dir() and _wanted(entry.filename):
-                yield entry.filename.replace("\\", "/"), archive.read(entry)
+                yield entry.filename.replace("\\", "/"), _unpacked(archive, entry)
+
+
+def _unpacked(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> bytes:
+    try:
+        return archive.read(entry)
+    except RuntimeError as error:  # NotImplementedError is one, too
+        raise InputError(f"{archive.filename} is packed with a password, or in another way: unpack it first") from error
+    except (OSError, ValueError) as error:  # an entry that points outside the file
+        raise zipfile.BadZipFile(str(error)) from error
 
 
 def _wanted(name: str) -> bool:
@@ -95,22 +105,28 @@ def _wanted(name: str) -> bool:
     return not hidden and name.lower().removesuffix(".gz").endswith(SUFFIXES)
 
 
-def _piece(name: str, content: bytes) -> Piece:
+def _no_text(path: Path) -> list[Piece]:
+    if path.is_file():
+        raise InputError(f"{path}: not text: give what an app has exported as CSV or VBO")
+    return []
+
+
+def _piece(name: str, content: bytes) -> Piece | None:
+    """None for what is no text."""
     if content.startswith(b"PAR1"):
         return Piece(name, content, "")
-    text = _decoded(name, content)
+    text = _decoded(content)
+    if sum(character < " " and character not in "\t\r\n" for character in text[:4000]) > 3:
+        return None
     return Piece(name, content, text.replace("\r\n", "\n").replace("\r", "\n"))
 
 
-def _decoded(name: str, content: bytes) -> str:
+def _decoded(content: bytes) -> str:
     encoding = next((encoding for bom, encoding in _BOMS if content.startswith(bom)), "")
     sample = content[:1000]
     if not encoding and sample.count(0) > len(sample) // 4:  # UTF-16 without its mark: every other byte is 0
         encoding = "utf-16-le" if sample[1::2].count(0) > sample[::2].count(0) else "utf-16-be"
     try:
-        text = content.decode(encoding or "utf-8")
+        return content.decode(encoding or "utf-8")
     except UnicodeDecodeError:
-        text = content.decode("cp1252", errors="replace")  # a degree sign of Windows
-    if sum(character < " " and character not in "\t\r\n" for character in text[:4000]) > 3:
-        raise InputError(f"{name}: not text: give what an app has exported as CSV or VBO")
-    return text
+        return content.decode("cp1252", errors="replace")  # a degree sign of Windows

@@ -91,6 +91,8 @@ def import_recording(
     joined = join(recording, name)
     _check_force(joined, name)
     _check_sign(recording, joined)
+    if joined.damaged:
+        recording.notices.append(Notice("import-damaged", joined.damaged))
     rows = _stretch(joined, start_s, end_s, name)
     log = read_log(
         Log(

@@ -12,6 +12,7 @@ from .units import SPEEDS
 
 Array = NDArray[np.float64]
 SECOND_NS = 10**9
+_ABSURD = 1e6  # g or deg/s: a damaged cell
 
 
 @dataclass
@@ -47,7 +48,7 @@ class Sensor:
     values: Array
 
     def __post_init__(self) -> None:
-        good = (self.time_ns != NO_TIME) & np.all(np.isfinite(self.values), axis=1)
+        good = (self.time_ns != NO_TIME) & np.all(np.abs(self.values) < _ABSURD, axis=1)  # no NaN either
         self.time_ns, self.values = self.time_ns[good], self.values[good]
 
 

@@ -108,21 +108,22 @@ def read_sheet(piece: Piece, header: int = 0, skipped: int = 0) -> Sheet:
 def _frame(name: str, text: str, separator: str, width: int) -> "DataFrame":
     import pandas
 
-    comma = separator != "," and bool(_DECIMAL_COMMA.search(text[:20000]))
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # lines that end in a separator, and columns of several kinds
-            return pandas.read_csv(
-                io.StringIO(text),
-                sep=separator,
-                decimal="," if comma else ".",
-                header=None,
-                names=list(range(max(width, 1))),
-                index_col=False,
-                skipinitialspace=True,
-                low_memory=False,
-                on_bad_lines="skip",
-            )
-    except (ValueError, OverflowError, pandas.errors.ParserError) as error:
-        reason = str(error).strip().split("\n")[0]
-        raise InputError(f"{name}: no table of numbers ({reason}): export it again as CSV") from error
+    if separator != "," and _DECIMAL_COMMA.search(text[:20000]):
+        text = text.replace(",", ".")
+    for tried in (text, text.replace('"', "")):  # a quotation mark that is not closed swallows what follows
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # lines that end in a separator, and columns of several kinds
+                return pandas.read_csv(
+                    io.StringIO(tried),
+                    sep=separator,
+                    header=None,
+                    names=list(range(max(width, 1))),
+                    index_col=False,
+                    skipinitialspace=True,
+                    low_memory=False,
+                    on_bad_lines="skip",
+                )
+        except (ValueError, OverflowError):  # ParserError is a ValueError
+            continue
+    raise InputError(f"{name}: no table of numbers: export it again as CSV")

@@ -18,7 +18,7 @@ Nanoseconds = NDArray[np.int64]
 NO_TIME = np.iinfo(np.int64).min  # of a cell that holds none
 EPOCH_NS = 10**17  # 1973: a later time counts from 1970
 DAY_NS = 86400 * 10**9
-_LATEST_NS = 9.0e18  # that 64 bits hold
+_LATEST_NS = 4.0e18  # the year 2096; twice as much still fits into 64 bits
 _CLOCK = re.compile(r"^\s*(?:(\d+):)?(\d{1,2}):(\d{1,2}(?:\.\d+)?)\s*$")
 
 
@@ -34,7 +34,7 @@ def times_ns(cells: "Series", unit_name: str = "", where: str = "the recording")
     if np.count_nonzero(np.isfinite(numbers)) > len(cells) // 2:
         return _of_numbers(numbers, unit_name, where)
     texts = cells.astype(str)
-    clocks = [_CLOCK.match(text) for text in texts.tolist()]
+    clocks = [_CLOCK.match(str(text)) for text in texts.tolist()]
     if sum(map(bool, clocks)) > len(cells) // 2:
         parts = [[float(part or 0.0) for part in match.groups()] if match else [np.nan] * 3 for match in clocks]
         return _after_midnight(np.array(parts) @ np.array([3600.0, 60.0, 1.0]))
@@ -49,7 +49,7 @@ def times_ns(cells: "Series", unit_name: str = "", where: str = "the recording")
 
 def of_seconds(seconds: NDArray[np.float64]) -> Nanoseconds:
     """Seconds (n) as ns; NO_TIME for what is no number."""
-    good = np.isfinite(seconds) & (np.abs(seconds) < _LATEST_NS * 1e-9)
+    good = np.abs(seconds) < _LATEST_NS * 1e-9
     whole = np.floor(np.where(good, seconds, 0.0))
     part = np.where(good, seconds, 0.0) - whole
     return np.where(good, whole.astype(np.int64) * 10**9 + np.rint(part * 1e9).astype(np.int64), NO_TIME)
@@ -75,9 +75,9 @@ def _of_numbers(values: NDArray[Any], unit_name: str, where: str) -> Nanoseconds
         raise InputError(f"{where}: unit {unit_name!a} is not known: write one of {', '.join(TIMES)}")
     scale = TIMES[known]
     if values.dtype.kind in "iu":
-        good = np.abs(values.astype(float)) * scale < _LATEST_NS
+        good = np.abs(values.astype(float)) < _LATEST_NS / scale
         return np.where(good, values.astype(np.int64) * scale, NO_TIME)
-    good = np.isfinite(values) & (np.abs(values) * scale < _LATEST_NS)
+    good = np.abs(values) < _LATEST_NS / scale
     whole = np.floor(np.where(good, values, 0.0))
     part = np.where(good, values, 0.0) - whole
     return np.where(good, whole.astype(np.int64) * scale + np.rint(part * scale).astype(np.int64), NO_TIME)

@@ -14,7 +14,7 @@ from ..files import Piece
 from ..join import added
 from ..recording import Recording, Sensor, Taken, Track, sensor_of, track_of
 from ..sheets import Sheet, cells_of, plain, read_sheet, unit_in
-from ..times import Nanoseconds, of_seconds, times_ns
+from ..times import EPOCH_NS, Nanoseconds, of_seconds, times_ns
 from ..units import ACCELERATIONS, RATES, factor, unit
 
 NAME = "phyphox"
@@ -141,7 +141,8 @@ class _Pauses:
         at = of_seconds(sheet.numbers(own)).tolist()
         clock = of_seconds(sheet.numbers(utc)).tolist()
         starts = [k for k, event in enumerate(events) if event == "START" and k < len(clock)]
-        if starts and clock[starts[0]] > 0:
+        starts = [k for k in starts if 0 <= at[k] < EPOCH_NS < clock[k]]
+        if starts:
             self.utc_ns = clock[starts[0]] - at[starts[0]]
             self._resumed = [(at[k], max(0, clock[k] - clock[starts[0]] - (at[k] - at[starts[0]]))) for k in starts[1:]]
 

@@ -13,7 +13,7 @@ from ..course import distance_m
 from ..files import Piece
 from ..recording import SECOND_NS, Array, Recording, sensor_of, track_of
 from ..sheets import Sheet, cells_of, plain, read_sheet, unit_in
-from ..times import Nanoseconds, times_ns
+from ..times import NO_TIME, Nanoseconds, times_ns
 from ..units import SPEEDS, factor, unit
 
 NAME = "RaceBox"
@@ -83,7 +83,8 @@ def _told_unit(sheet: Sheet, time_ns: Nanoseconds, speed: int, lat: int | None, 
 
 def _moved_mps(time_ns: Nanoseconds, lat: Array, lon: Array) -> Array:
     """(n) speed from a second before each row, NaN where it is not known."""
-    before = np.maximum(np.searchsorted(time_ns, time_ns - SECOND_NS), 0)
+    time_ns = np.maximum.accumulate(np.where(time_ns == NO_TIME, 0, time_ns))  # a damaged cell stands still
+    before = np.minimum(np.searchsorted(time_ns, time_ns - SECOND_NS), len(time_ns) - 1)
     apart_s = (time_ns - time_ns[before]) / SECOND_NS
     east, north = distance_m(lat[before], lon[before], lat, lon)
-    return np.where(apart_s > 0.5, np.hypot(east, north) / np.maximum(apart_s, 0.1), np.nan)
+    return np.where((apart_s > 0.5) & (apart_s < 2.0), np.hypot(east, north) / np.maximum(apart_s, 0.5), np.nan)
