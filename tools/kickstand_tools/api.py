@@ -25,6 +25,7 @@ from .calibration.file import CalibrationFile, read_calibration, write_calibrati
 from .calibration.six import SixPositions, fit_six_positions
 from .calibration.two import TwoPositions, fit_two_positions
 from .errors import InputError
+from .imports.importing import Imported, import_recording, write_imported
 from .logs.log import Log
 from .logs.reader import read_log
 from .refusals import RefusedInput, sentence
@@ -37,6 +38,7 @@ __all__ = [
     "Channels",
     "DriveEvent",
     "DriveResult",
+    "Imported",
     "InputError",
     "LeanTable",
     "Log",
@@ -53,6 +55,7 @@ __all__ = [
     "fit_drive",
     "fit_six_positions",
     "fit_two_positions",
+    "import_recording",
     "open_ride",
     "overview",
     "read_calibration",
@@ -63,4 +66,5 @@ __all__ = [
     "summary",
     "vehicle_channels",
     "write_calibration",
+    "write_imported",
 ]

@@ -47,6 +47,13 @@ _SENTENCES = {
     "times-spread": "the times are rounded ({0} of {1} repeat the one before): they are spread evenly, by up to "
     "{2:.3f} s",
     "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
+    "import-speed-unit": "{0} has no unit, and the positions do not tell it, so the speed is left out: add --units "
+    "speed=km/h, mph or m/s",
+    "import-sign": "which sign accelerations have in {0} is not certain, and no track with turns tells it: at rest the "
+    "axis that points up has to read +1 g, else the ride is mirrored and --units a=-g or a=-m/s2 puts it right",
+    "import-damaged": "{0} damaged rows are left out: a time out of order, or readings past any sensor's",
+    "import-mirrored": "the sensor turns against the track, so left and right are exchanged: were all its "
+    "accelerations turned? {0} has +1 g where up is",
 }
 _MOVED = {
     "between-stops": "two stops differ by over {0:.0f} degrees",

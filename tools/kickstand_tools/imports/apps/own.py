@@ -1,0 +1,81 @@
+"""Kickstand's own files: a log, also one saved by a spreadsheet, and what `kickstand export` writes as CSV or Parquet.
+
+RaceChrono's form, which it writes too, is read by racechrono.py. Its VBO holds neither the vertical force nor the
+pitch rate.
+"""
+
+import io
+
+import numpy as np
+
+from ...errors import InputError, extra
+from ...logs.cells import COLUMNS
+from ..files import Piece
+from ..recording import Recording, sensor_of, track_of
+from ..sheets import Sheet, cells_of, read_sheet
+from ..times import times_ns
+
+NAME = "Kickstand"
+_FORCES = ("left_g", "up_g", "forward_g")
+_RATES = ("pitch_rate_dps", "yaw_rate_dps", "roll_rate_dps")
+_RATE_SIGNS = np.array([-1.0, 1.0, 1.0])  # pitch is positive nose up, which is against the axis to the left
+
+
+def finds(pieces: list[Piece]) -> list[list[Piece]]:
+    """Each of Kickstand's logs and exports is a recording."""
+    return [[piece] for piece in pieces if _is_ours(piece)]
+
+
+def read(pieces: list[Piece], name: str) -> Recording:
+    """Raises InputError for a replay's output, which does not hold all that was measured."""
+    sheet = _sheet(pieces[0])
+    log = [sheet.columns.index(column) for column in COLUMNS[1:] if column in sheet.columns]
+    exported = [sheet.columns.index(column) for column in (*_FORCES, *_RATES) if column in sheet.columns]
+    time_ns = times_ns(sheet.series(sheet.columns.index("t_s")), "s", sheet.name)
+    if len(log) == 6:
+        accel, first = sensor_of(sheet, time_ns, log[:3], 1.0, ("accelerometer", "g", "+1 g up"))
+        gyro, second = sensor_of(sheet, time_ns, log[3:], 1.0, ("gyro", "deg/s", "right-handed"))
+    elif len(exported) == 6:
+        said = "left, up, forward"
+        accel, first = sensor_of(sheet, time_ns, exported[:3], 1.0, ("accelerometer", "g", said))
+        gyro, second = sensor_of(sheet, time_ns, exported[3:], _RATE_SIGNS, ("gyro", "deg/s", said))
+    else:
+        raise InputError(f"{name} holds the lean that kickstand has computed: give the log that it was made from")
+    speed, lat, lon = (sheet.place(column) for column in ("speed_mps", "lat_deg", "lon_deg"))
+    track, places = track_of(sheet, time_ns, speed, lat, lon)
+    temp_c = sheet.numbers(sheet.place("temp_c"))
+    from_1970 = bool(len(time_ns)) and float(np.median(time_ns)) > 1e17
+    return Recording(
+        NAME,
+        accel,
+        gyro,
+        track,
+        temp_c,
+        [first, second, *places],
+        utc_ns=0 if from_1970 else None,
+        vehicle_axes=len(log) < 6,
+    )
+
+
+def _is_ours(piece: Piece) -> bool:
+    if piece.content.startswith(b"PAR1"):
+        return True
+    head = cells_of(next(iter(piece.first_lines(1)), ""))
+    return "t_s" in head and (set(COLUMNS) <= set(head) or set(_FORCES) <= set(head))
+
+
+def _sheet(piece: Piece) -> Sheet:
+    if not piece.content.startswith(b"PAR1"):
+        return read_sheet(piece)
+    import pandas
+
+    try:
+        frame = pandas.read_parquet(io.BytesIO(piece.content))
+    except ImportError as error:
+        raise InputError("Parquet needs pyarrow: " + extra("rides")) from error
+    except (ValueError, OSError) as error:
+        raise InputError(f"{piece.name} is damaged or cut short: copy it again") from error
+    columns = [str(column) for column in frame.columns]
+    if "t_s" not in columns:
+        raise InputError(f"{piece.name}: not a ride that kickstand has exported: its columns are {', '.join(columns)}")
+    return Sheet(piece.name, columns, frame.set_axis(range(len(columns)), axis=1))

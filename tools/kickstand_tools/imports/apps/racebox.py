@@ -1,0 +1,90 @@
+"""RaceBox's CSV: GForceX to Z in g, GyroX to Z in deg/s; x forward, y left, z up, at rest GForceZ is +1.
+
+Heads of the presets: docs of https://github.com/beadon/RacePlex; that X is forward, Y to the left and Z up, and that
+GyroZ is positive in a left turn, is measured on the ride in its src/lib/__fixtures__/racebox-session.csv. Quantities:
+https://www.racebox.pro/products/mini-micro-protocol-documentation. The column Speed says no unit; the positions do.
+"""
+
+import numpy as np
+from kickstand.errors import Notice
+
+from ...errors import InputError
+from ..course import distance_m
+from ..files import Piece
+from ..recording import SECOND_NS, Array, Recording, sensor_of, track_of
+from ..sheets import Sheet, cells_of, plain, read_sheet, unit_in
+from ..times import NO_TIME, Nanoseconds, times_ns
+from ..units import SPEEDS, factor, unit
+
+NAME = "RaceBox"
+_WHERE = np.array([1, 2, 0])  # left, up, forward among x, y, z
+_NEAR = 1.25  # times another unit's speed: the units are a factor of 1.6 and more apart
+
+
+def finds(pieces: list[Piece]) -> list[list[Piece]]:
+    """Each file that has RaceBox's columns is a recording."""
+    return [[piece] for piece in pieces if _header(piece) is not None]
+
+
+def read(pieces: list[Piece], name: str, speed_unit: str = "") -> Recording:
+    """Raises InputError for what is missing. speed_unit: of the column Speed, "" if the positions are to tell it."""
+    sheet = read_sheet(pieces[0], _header(pieces[0]) or 0)
+    accel = [sheet.place(f"GForce{axis}") for axis in "XYZ"]
+    gyro = [sheet.place(f"Gyro{axis}") for axis in "XYZ"]
+    if accel[1] is None or accel[2] is None:
+        raise InputError(f"{name}: no GForceY or GForceZ, as in its motorcycle mode: export it with that mode off")
+    if None in gyro:
+        raise InputError(f"{name}: no GyroX to GyroZ: export it from RaceBox's app on the phone, which writes them")
+    time_ns = times_ns(sheet.series(sheet.place("Time") or 0), "", sheet.name)
+    order = [[places[k] for k in _WHERE] for places in (accel, gyro)]
+    there = [[place for place in places if place is not None] for places in order]
+    box = "box's x forward, y left, z up; +1 g up"
+    accel_sensor, accel_taken = sensor_of(sheet, time_ns, there[0], 1.0, ("accelerometer", "g", box))
+    gyro_sensor, gyro_taken = sensor_of(sheet, time_ns, there[1], 1.0, ("gyro", "deg/s", "right-handed"))
+    lat, lon, speed = sheet.place("Latitude"), sheet.place("Longitude"), sheet.place("Speed", "KPH")
+    notices: list[Notice] = []
+    if speed is not None:
+        speed_unit = speed_unit or _said_unit(sheet.columns[speed]) or _told_unit(sheet, time_ns, speed, lat, lon)
+        if not speed_unit:
+            notices.append(Notice("import-speed-unit", sheet.columns[speed]))
+            speed = None
+    track, places = track_of(sheet, time_ns, speed, lat, lon, speed_unit or "m/s")
+    return Recording(NAME, accel_sensor, gyro_sensor, track, None, [accel_taken, gyro_taken, *places], notices, 0, True)
+
+
+def _header(piece: Piece) -> int | None:
+    """The number of the line of names: there may be lines about the laps before it."""
+    for number, line in enumerate(piece.text.split("\n", 200)[:200]):
+        names = {plain(cell) for cell in cells_of(line)}
+        if {"gforcex", "gforcez", "time"} <= names:
+            return number
+    return None
+
+
+def _said_unit(column: str) -> str:
+    said = "km/h" if plain(column) == "kph" else unit(unit_in(column))
+    return said if said in SPEEDS else ""
+
+
+def _told_unit(sheet: Sheet, time_ns: Nanoseconds, speed: int, lat: int | None, lon: int | None) -> str:
+    """The unit in which the speeds are those with which the positions change; "" where that does not tell."""
+    if lat is None or lon is None:
+        return ""
+    moved = _moved_mps(time_ns, sheet.numbers(lat), sheet.numbers(lon))
+    said = sheet.numbers(speed)
+    fast = np.isfinite(moved) & np.isfinite(said) & (moved > 3.0)
+    if np.count_nonzero(fast) < 20:
+        return ""
+    ratio = float(np.median(said[fast] / moved[fast]))
+    near = {name: max(ratio * factor(name, SPEEDS, ""), 1.0 / (ratio * SPEEDS[name])) for name in SPEEDS if ratio > 0.0}
+    best = min(near, key=lambda name: near[name]) if near else ""
+    return best if best and near[best] < _NEAR else ""
+
+
+def _moved_mps(time_ns: Nanoseconds, lat: Array, lon: Array) -> Array:
+    """(n) speed from a second before each row, NaN where it is not known."""
+    time_ns = np.maximum.accumulate(np.where(time_ns == NO_TIME, 0, time_ns))  # a damaged cell stands still
+    before = np.minimum(np.searchsorted(time_ns, time_ns - SECOND_NS), len(time_ns) - 1)
+    apart_s = (time_ns - time_ns[before]) / SECOND_NS
+    east, north = distance_m(lat[before], lon[before], lat, lon)
+    return np.where((apart_s > 0.5) & (apart_s < 2.0), np.hypot(east, north) / np.maximum(apart_s, 0.5), np.nan)

@@ -1,0 +1,91 @@
+"""RaceChrono's CSV, versions 2 and 3: an accelerometer's and a gyro's three axes beside what a receiver says.
+
+Version 3 has three lines of heads, names, units and sources, and some names twice: see
+https://github.com/jLynx/RaceChrono-to-CSV, Short_RaceChrono_Offical_App_Data.csv; with x_acc to z_acc of "101: acc" in
+G and x_rate_of_rotation of "102: gyro" in deg/s https://github.com/ClassicMiniDIY/UltraLog/pull/85. lateral_acc and
+longitudinal_acc are calculated from positions and say nothing of gravity. The axes are those of the phone or the box
+that measured. Kickstand's own export has this form, too.
+"""
+
+from ...errors import InputError
+from ..files import Piece
+from ..recording import Recording, sensor_of, track_of
+from ..sheets import Sheet, cells_of, plain, read_sheet
+from ..times import times_ns
+from ..units import ACCELERATIONS, RATES, factor
+
+NAME = "RaceChrono"
+_FIRST = "This file is created using RaceChrono"
+_TIMES = ("timestamp", "elapsedtime", "time")
+
+
+def finds(pieces: list[Piece]) -> list[list[Piece]]:
+    """Each file that says that RaceChrono has made it is a recording."""
+    return [[piece] for piece in pieces if piece.text[:200].lstrip().startswith(_FIRST)]
+
+
+def read(pieces: list[Piece], name: str) -> Recording:
+    """Raises InputError for what is missing."""
+    lines = piece_lines(pieces[0])
+    header = next((k for k, line in enumerate(lines) if _is_header(line)), None)
+    if header is None:
+        raise InputError(f"{name}: no line with the names of its columns: export it again as CSV v3")
+    units, more = _units(lines, header)
+    sheet = read_sheet(pieces[0], header, more)
+    accel = [sheet.place(f"{axis}_acc", f"{axis} acceleration", f"{axis}-acceleration") for axis in "xyz"]
+    gyro = [sheet.place(f"{axis}_rate_of_rotation", f"{axis} rate of rotation", f"gyro {axis}") for axis in "xyz"]
+    if None in accel or None in gyro:
+        raise InputError(
+            f"{name}: no x_acc to z_acc and x_rate_of_rotation to z_rate_of_rotation in it; its lateral_acc is "
+            "calculated from positions, without gravity: record an accelerometer and a gyro, and export all channels"
+        )
+    by_kickstand = "by Kickstand" in lines[0]
+    axes = "left, up, forward" if by_kickstand else "+1 g up"
+    time_place = next(place for place, column in enumerate(sheet.columns) if plain(column) in _TIMES)
+    time_ns = times_ns(sheet.series(time_place), "s", sheet.name)
+    found = []
+    for places, kinds, what in ((accel, ACCELERATIONS, "accelerometer"), (gyro, RATES, "gyro")):
+        there = [place for place in places if place is not None]
+        unit_name = units.get(there[0]) or ("G" if what == "accelerometer" else "deg/s")
+        sign = axes if what == "accelerometer" else "right-handed"
+        scale = factor(unit_name, kinds, sheet.name)
+        found.append(sensor_of(sheet, time_ns, there, scale, (what, unit_name.lower(), sign)))
+    speed, speed_unit = _speed(sheet)
+    track, places = track_of(sheet, time_ns, speed, sheet.place("latitude"), sheet.place("longitude"), speed_unit)
+    return Recording(
+        NAME,
+        found[0][0],
+        found[1][0],
+        track,
+        taken=[found[0][1], found[1][1], *places],
+        utc_ns=0 if plain(sheet.columns[time_place]) == "timestamp" else None,
+        vehicle_axes=by_kickstand,
+        sign_known=by_kickstand,
+    )
+
+
+def piece_lines(piece: Piece) -> list[str]:
+    """The first 60 lines, blank ones among them: their numbers count."""
+    return piece.text.split("\n", 60)[:60]
+
+
+def _is_header(line: str) -> bool:
+    first = [plain(cell) for cell in cells_of(line)]
+    return len(first) > 4 and any(name in first[:5] for name in _TIMES)
+
+
+def _units(lines: list[str], header: int) -> tuple[dict[int, str], int]:
+    """The units by the numbers of their columns, and how many lines of heads follow the first."""
+    following = [cells_of(line) for line in lines[header + 1 : header + 3]]
+    if len(following) == 2 and following[0] and following[0][0] == "unix time":
+        return {place: cell for place, cell in enumerate(following[0]) if cell}, 2
+    names = cells_of(lines[header])
+    return {place: name.rpartition("(")[2].rstrip(")") for place, name in enumerate(names) if name.endswith(")")}, 0
+
+
+def _speed(sheet: Sheet) -> tuple[int | None, str]:
+    """Version 2 has the speed in three units; version 3 in m/s."""
+    for place, column in enumerate(sheet.columns):
+        if plain(column) == "speed" and ("(" not in column or "m/s" in column):
+            return place, "m/s"
+    return None, "m/s"

@@ -1,0 +1,114 @@
+"""SensorLog (Bernd Thomas) on an iPhone or a Watch: one wide CSV, each sensor with its own time since the start of iOS.
+
+Columns as in the example logs at http://sensorlog.berndthomas.net. Values are Core Motion's: accelerations in g that
+read -1 along the axis that points up at rest (https://developer.apple.com/reference/uikit/uiacceleration), also
+gravity and the user's acceleration, whose sum they are; rates in rad/s, right-handed.
+"""
+
+import numpy as np
+
+from ...errors import InputError
+from ..files import Piece
+from ..recording import Recording, Sensor, Taken, Track, sensor_of, track_of
+from ..sheets import Sheet, cells_of, plain, read_sheet
+from ..times import NO_TIME, Nanoseconds, times_ns
+from ..units import RATES
+
+NAME = "SensorLog"
+_UP = "Core Motion, -1 g up: sign turned"
+_ACCEL = [f"accelerometerAcceleration{axis}" for axis in "XYZ"]
+_GYRO = [f"gyroRotation{axis}" for axis in "XYZ"]
+_USER = [f"motionUserAcceleration{axis}" for axis in "XYZ"]
+_GRAVITY = [f"motionGravity{axis}" for axis in "XYZ"]
+_RATE = [f"motionRotationRate{axis}" for axis in "XYZ"]
+
+
+def finds(pieces: list[Piece]) -> list[list[Piece]]:
+    """Each file that has SensorLog's columns is a recording."""
+    return [[piece] for piece in pieces if _is_ours(piece)]
+
+
+def read(pieces: list[Piece], name: str) -> Recording:
+    """Raises InputError for what is missing."""
+    sheet = read_sheet(pieces[0])
+    accel, accel_taken = _accelerometer(sheet, name)
+    gyro, gyro_taken = _gyro(sheet, name)
+    utc_ns = _utc_ns(sheet)
+    track, places = _location(sheet)
+    return Recording(NAME, accel, gyro, track, None, [*accel_taken, gyro_taken, *places], utc_ns=utc_ns)
+
+
+def _is_ours(piece: Piece) -> bool:
+    head = {plain(cell) for cell in cells_of(next(iter(piece.first_lines(1)), ""))}
+    return bool(head & {plain(_ACCEL[0]), plain(_USER[0])})
+
+
+def _places(sheet: Sheet, names: list[str]) -> list[int]:
+    """The columns of three axes, none where one is missing or holds nothing."""
+    found = [place for place in (sheet.place(name) for name in names) if place is not None]
+    full = len(found) == 3 and np.any(np.isfinite(sheet.table(found)).all(axis=1))
+    return found if full else []
+
+
+def _clock(sheet: Sheet, sensor: str) -> Nanoseconds:
+    """A sensor's own times; only the first row of each of its samples has one, for a row repeats what is not new."""
+    time_ns = _times(sheet, sensor)
+    return np.where(np.diff(time_ns, prepend=NO_TIME) == 0, NO_TIME, time_ns)
+
+
+def _times(sheet: Sheet, sensor: str) -> Nanoseconds:
+    place = sheet.place(f"{sensor}Timestamp_sinceReboot", "accelerometerTimestamp_sinceReboot", "loggingTime")
+    if place is None:
+        raise InputError(f"{sheet.name}: no column {sensor}Timestamp_sinceReboot(s): export it with the timestamps")
+    return times_ns(sheet.series(place), "s", sheet.name)
+
+
+def _accelerometer(sheet: Sheet, name: str) -> tuple[Sensor, list[Taken]]:
+    places = _places(sheet, _ACCEL)
+    if places:
+        sensor, taken = sensor_of(sheet, _clock(sheet, "accelerometer"), places, -1.0, ("accelerometer", "g", _UP))
+        return sensor, [taken]
+    user, gravity = _places(sheet, _USER), _places(sheet, _GRAVITY)
+    if not user or not gravity:
+        raise InputError(
+            f"{name}: gravity has been taken off its acceleration, and without it there is no lean: log the "
+            "accelerometer, or gravity beside the user's acceleration"
+        )
+    time_ns = _clock(sheet, "motion")
+    _, first = sensor_of(sheet, time_ns, user, -1.0, ("accelerometer", "g", "without gravity: gravity added"))
+    _, second = sensor_of(sheet, time_ns, gravity, -1.0, ("accelerometer", "g", _UP))
+    total = Sensor("accelerometer", time_ns, -sheet.table(user) - sheet.table(gravity))
+    return total, [first, second]
+
+
+def _gyro(sheet: Sheet, name: str) -> tuple[Sensor, Taken]:
+    for sensor, names in (("gyro", _GYRO), ("motion", _RATE)):
+        places = _places(sheet, names)
+        if places:
+            return sensor_of(sheet, _clock(sheet, sensor), places, RATES["rad/s"], ("gyro", "rad/s", "right-handed"))
+    raise InputError(f"{name}: no gyroRotation or motionRotationRate in it: log the gyro, too")
+
+
+def _utc_ns(sheet: Sheet) -> int | None:
+    """What makes UTC of the time since the start of iOS: by when the rows were logged."""
+    logged = sheet.place("loggingTime")
+    if logged is None:
+        return None
+    try:
+        written = times_ns(sheet.series(logged), "", sheet.name)
+    except InputError:
+        return None
+    own = _times(sheet, "accelerometer" if _places(sheet, _ACCEL) else "motion")
+    both = (written != NO_TIME) & (own != NO_TIME)
+    return int(np.median(written[both] - own[both])) if np.any(both) else None
+
+
+def _location(sheet: Sheet) -> tuple[Track | None, list[Taken]]:
+    """A fix is new in the row in which its own time has changed."""
+    row_ns = _times(sheet, "accelerometer" if _places(sheet, _ACCEL) else "motion")
+    fix = sheet.place("locationTimestamp_since1970")
+    if fix is not None:
+        values = sheet.numbers(fix)
+        row_ns = np.where(np.diff(values, prepend=np.nan) == 0.0, NO_TIME, row_ns)
+    lat, lon = sheet.place("locationLatitude"), sheet.place("locationLongitude")
+    return track_of(sheet, row_ns, sheet.place("locationSpeed"), lat, lon)

@@ -1,0 +1,229 @@
+"""A recording of another app or logger as a log: what it is, joined on one clock, checked, written."""
+
+import gzip
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from kickstand.errors import Notice
+
+from ..analysis.export.csv_lines import csv_lines
+from ..errors import InputError
+from ..logs.cells import COLUMNS
+from ..logs.log import Log
+from ..logs.reader import BLOCK_SAMPLES, read_log
+from ..output import write_whole
+from . import mapped
+from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo
+from .course import course_agrees
+from .files import Piece, read_pieces
+from .join import GAP_NS, Joined, join
+from .recording import Array, Recording, Taken
+from .sheets import check_pandas
+from .units import ACCELERATIONS, SPEEDS, factor, unit
+
+_APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
+WITHOUT_GRAVITY_G = 0.4  # median force: a ride's is over 0.9
+WRONG_UNIT_G = 3.0  # median force: m/s2 taken for g give 9.8
+TRACK = ("speed_mps", "lat_deg", "lon_deg", "utc_s")
+_DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
+
+
+@dataclass(eq=False)
+class Imported:
+    """app: whose recording it was. log: n samples, from the recording's own start. lat_deg, lon_deg, utc_s (n): NaN
+    where there is no new value; UTC in s since 1970. taken: what was taken for what. notices: what is remarkable
+    (kickstand_tools.refusals.sentence puts a notice into words). gaps_s: how long each gap lasts.
+
+    vehicle_axes: x points left, y up, z forward on the vehicle already, as far as its logger was mounted so.
+    """
+
+    app: str
+    log: Log
+    lat_deg: Array
+    lon_deg: Array
+    utc_s: Array
+    taken: list[Taken]
+    notices: list[Notice] = field(default_factory=list)
+    vehicle_axes: bool = False
+
+    @property
+    def rate_hz(self) -> float:
+        """Samples in a second, without the gaps."""
+        return 1.0 / float(np.median(np.diff(self.log.t_s)))
+
+    @property
+    def gaps_s(self) -> Array:
+        """How long each gap lasts, s."""
+        steps = np.diff(self.log.t_s)
+        return steps[steps * 1e9 > GAP_NS]
+
+
+def import_recording(
+    source: Path | str,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    start_s: float | None = None,
+    end_s: float | None = None,
+) -> Imported:
+    """Read a recording of another app or logger: a file, a folder or a zip.
+
+    Known are phyphox, Sensor Logger, SensorLog, Sensor Kinetics, RaceChrono (CSV), RaceBox, VBO, AiM and Kickstand's
+    own files. Of any other table columns says which is which ({"t": "time", "ax": "accX", ...}: t, ax, ay, az, gx, gy,
+    gz, and speed, lat, lon, temp where there are), and units in which unit ({"a": "m/s2", "g": "rad/s", "speed":
+    "km/h"}; a - before a unit turns the sign). start_s, end_s: the stretch to take, from the recording's own start.
+    Raises InputError.
+
+    >>> import pathlib, tempfile
+    >>> rows = [f"{10 * k},0.0,9.81,0.0,0.0,0.0,0.1" for k in range(300)]
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     path = pathlib.Path(directory, "ride.csv")
+    ...     _ = path.write_text("\\n".join(["ms,X,Y,Z,P,Q,R", *rows]))
+    ...     names = dict(t="ms", ax="X", ay="Y", az="Z", gx="P", gy="Q", gz="R")
+    ...     found = import_recording(path, names, {"t": "ms", "a": "m/s2", "g": "rad/s"})
+    >>> round(found.rate_hz), found.log.accel_g[0].round(3).tolist(), found.log.gyro_dps[0].round(2).tolist()
+    (100, [0.0, 1.0, 0.0], [0.0, 0.0, 5.73])
+    """
+    check_pandas()
+    name = str(source)
+    recording = _recording(read_pieces(source), name, columns, dict(units or {}))
+    joined = join(recording, name)
+    _check_force(joined, name)
+    _check_sign(recording, joined)
+    if joined.damaged:
+        recording.notices.append(Notice("import-damaged", joined.damaged))
+    rows = _stretch(joined, start_s, end_s, name)
+    log = read_log(
+        Log(
+            _seconds(joined)[rows],
+            joined.accel_g[rows],
+            joined.gyro_dps[rows],
+            joined.speed_mps[rows],
+            joined.temp_c[rows],
+            name=name,
+        )
+    )
+    return Imported(
+        recording.app,
+        log,
+        joined.lat_deg[rows],
+        joined.lon_deg[rows],
+        joined.utc_s[rows],
+        recording.taken,
+        [*recording.notices, *log.notices],
+        recording.vehicle_axes,
+    )
+
+
+def write_imported(path: Path | str, imported: Imported) -> None:
+    """Write the log, gzipped if its name ends in .gz, whole or not at all. Raises InputError.
+
+    Columns: a log's, and those of TRACK and temp_c as far as there are values; t_s from the recording's own start.
+
+    >>> import tempfile
+    >>> log = Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2)
+    >>> none = np.full(2, np.nan)
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     write_imported(f"{directory}/ride.csv", Imported("none", log, none, none, none, []))
+    ...     print(Path(f"{directory}/ride.csv").read_text().splitlines()[1])
+    0.000000,0.000000,1.000000,0.000000,0.000000,0.000000,0.000000
+    """
+    values = imported.log.columns()
+    values["t_s"] = values["t_s"] + imported.log.start_s
+    values |= {"lat_deg": imported.lat_deg, "lon_deg": imported.lon_deg, "utc_s": imported.utc_s}
+    names = [*COLUMNS, *[name for name in (*TRACK, "temp_c") if np.any(np.isfinite(values[name]))]]
+    digits = [_DIGITS.get(name, 6) for name in names]
+    table = np.column_stack([values[name] for name in names])
+
+    def write(temporary: Path) -> None:
+        opened = gzip.open if Path(path).suffix == ".gz" else open
+        with opened(temporary, "wt", encoding="ascii", newline="") as file:
+            file.write(",".join(names) + "\n")
+            for begin in range(0, len(table), BLOCK_SAMPLES):
+                file.write(csv_lines(table[begin : begin + BLOCK_SAMPLES], digits))
+
+    write_whole(Path(path), write)
+
+
+def _recording(pieces: list[Piece], name: str, columns: Mapping[str, str] | None, units: dict[str, str]) -> Recording:
+    if columns is not None:
+        if len(pieces) > 1:
+            raise InputError(f"{name} holds {len(pieces)} files: give --columns with one, such as {pieces[0].name}")
+        return mapped.read_mapped(pieces[0], columns, units, name)
+    found, left = [], pieces
+    for app in _APPS:
+        for files in app.finds(left):
+            found.append((app, files))
+        claimed = {id(piece) for _, files in found for piece in files}
+        left = [piece for piece in left if id(piece) not in claimed]
+    if not found:
+        raise InputError(mapped.unknown(pieces, name))
+    if len(found) > 1:
+        which = ", ".join(files[0].folder or files[0].name for _, files in found[:4])
+        more = ", ..." if len(found) > 4 else ""
+        raise InputError(f"{name} holds {len(found)} recordings ({which}{more}): give one of them")
+    app, files = found[0]
+    said = units.get("speed", "") if app is racebox else ""
+    if said:
+        factor(said, SPEEDS, "speed")
+    recording = racebox.read(files, name, unit(said)) if app is racebox else app.read(files, name)
+    asked = {"speed"} if app is racebox else set() if recording.sign_known else {"a"}
+    if not set(units) <= asked:
+        raise InputError(f"{name} is {app.NAME}'s, whose units are known: leave --units out, or add --columns, too")
+    if "a" in units:
+        recording.sign_known = True
+        if factor(units["a"], ACCELERATIONS, "a") < 0.0:
+            recording.accel.values = -recording.accel.values
+            _say_sign(recording, "turned")
+    return recording
+
+
+def _check_force(joined: Joined, name: str) -> None:
+    """Raise InputError where the acceleration has no gravity in it, or is in another unit than it says."""
+    usual = float(np.median(np.linalg.norm(joined.accel_g, axis=1)))
+    if usual < WITHOUT_GRAVITY_G:
+        raise InputError(
+            f"{name}: its acceleration is {usual:.2f} g as a rule, where gravity makes it 1: gravity has been taken "
+            "off, and without it there is no lean; record the acceleration with gravity"
+        )
+    if usual > WRONG_UNIT_G:
+        raise InputError(
+            f"{name}: its acceleration is {usual:.1f} g as a rule, where gravity makes it 1: check its unit"
+        )
+
+
+def _check_sign(recording: Recording, joined: Joined) -> None:
+    """Where the track shows a mirrored accelerometer: turn it if its sign was only likely, else remark on it."""
+    agrees = course_agrees(_seconds(joined), joined.accel_g, joined.gyro_dps, joined.lat_deg, joined.lon_deg)
+    if recording.sign_known:
+        if agrees is False:
+            recording.notices.append(Notice("import-mirrored", recording.app))
+    elif agrees is None:
+        recording.notices.append(Notice("import-sign", recording.app))
+    elif agrees:
+        _say_sign(recording, "+1 g up, by the turns of the track")
+    else:
+        joined.accel_g = -joined.accel_g
+        _say_sign(recording, "-1 g up, by the turns of the track: sign turned")
+
+
+def _say_sign(recording: Recording, sign: str) -> None:
+    for taken in recording.taken:
+        if taken.quantity == "accelerometer":
+            taken.sign = sign
+
+
+def _seconds(joined: Joined) -> Array:
+    """(n) from the recording's own start."""
+    return np.asarray((joined.time_ns - joined.start_ns) * 1e-9, dtype=float)
+
+
+def _stretch(joined: Joined, start_s: float | None, end_s: float | None, name: str) -> slice:
+    since_s = _seconds(joined)
+    begin = int(np.searchsorted(since_s, start_s)) if start_s is not None else 0
+    end = int(np.searchsorted(since_s, end_s, side="right")) if end_s is not None else len(since_s)
+    if end - begin < 2:
+        asked = f"from {start_s or 0.0:g} to {since_s[-1] if end_s is None else end_s:g} s"
+        raise InputError(f"{name} lasts {since_s[-1]:.1f} s: there is nothing {asked}")
+    return slice(begin, end)

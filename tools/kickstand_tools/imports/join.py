@@ -1,0 +1,140 @@
+"""The sensors of a recording, each on its own clock and at its own rate, joined on the accelerometer's."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from kickstand.units import LOST_US
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..logs.even_times import even_times
+from .recording import Array, Recording, Sensor, Track
+
+MOST_MPS = 200.0  # no speed, and no degrees of a position, are more
+GAP_NS = LOST_US * 1000  # between samples that are further apart nothing is interpolated
+FASTER = 1.5  # times the accelerometer's rate: a gyro so fast is averaged over each of its samples
+MOST_G, MOST_DPS = 20.0, 2500.0  # as in kickstand_tools.logs.cells: more is a damaged cell,
+MANY = 0.02  # or, in a larger share of the rows, another unit
+SHUFFLED_NS = 500_000_000  # samples that come later than younger ones by less are put in order
+
+
+@dataclass
+class Joined:
+    """n rows on the accelerometer's clock: time_ns; accel_g, gyro_dps (n, 3); speed, position, UTC and temperature (n),
+    NaN where there is no new value. start_ns: the accelerometer's first sample, from which the recording counts."""
+
+    time_ns: NDArray[np.int64]
+    start_ns: int
+    accel_g: Array
+    gyro_dps: Array
+    speed_mps: Array
+    lat_deg: Array
+    lon_deg: Array
+    utc_s: Array
+    temp_c: Array
+    damaged: int  # rows that were left out
+
+
+def join(recording: Recording, name: str) -> Joined:
+    """Raises InputError where the sensors have no time in common. name: of the recording, for messages."""
+    accel = in_order(recording.accel, name)
+    gyro = in_order(recording.gyro, name)
+    rates = on_clock(gyro, accel.time_ns, _period_ns(accel))
+    there = np.all(np.isfinite(rates), axis=1)
+    past = np.any(np.abs(accel.values) > MOST_G, axis=1) | np.any(np.abs(np.nan_to_num(rates)) > MOST_DPS, axis=1)
+    if np.count_nonzero(past) > MANY * len(past):
+        raise InputError(f"{name}: its readings are past any sensor's, {_most(accel.values, rates)}: check their units")
+    there &= ~past
+    lost = int(np.count_nonzero(past)) + len(recording.accel.time_ns) - len(accel.time_ns)
+    if np.count_nonzero(there) < 2:
+        raise InputError(f"{name}: accelerometer and gyro have no time in common: were they recorded together?")
+    temp_c = np.full(len(there), np.nan) if recording.temp_c is None else recording.temp_c
+    if len(temp_c) != len(there):
+        temp_c = np.full(len(there), np.nan)
+    time_ns = accel.time_ns[there]
+    track = _on_rows(recording.track, time_ns, recording.utc_ns)
+    return Joined(time_ns, int(accel.time_ns[0]), accel.values[there], rates[there], *track, temp_c[there], lost)
+
+
+def in_order(sensor: Sensor, name: str) -> Sensor:
+    """A sensor with times that increase, rounded ones spread evenly. Raises InputError where they cannot."""
+    if len(sensor.time_ns) < 2:
+        raise InputError(f"{name}: {sensor.name} has {len(sensor.time_ns)} samples: was it recorded?")
+    time_ns, values = sensor.time_ns, sensor.values
+    kept = ~_damaged(time_ns)
+    time_ns, values = time_ns[kept], values[kept]
+    late = np.maximum.accumulate(time_ns) - time_ns
+    if np.any(late) and np.max(late) < SHUFFLED_NS:
+        order = np.argsort(time_ns, kind="stable")
+        time_ns, values = time_ns[order], values[order]
+    since_s = (time_ns - time_ns[0]) * 1e-9
+    even_ns = np.rint(even_times(since_s, f"{name}, {sensor.name}") * 1e9).astype(np.int64) + time_ns[0]
+    return Sensor(sensor.name, even_ns, values)
+
+
+def _damaged(time_ns: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """(n) True for a time that fits neither the one before nor the one after it, which fit each other."""
+    wrong = np.zeros(len(time_ns), dtype=bool)
+    if len(time_ns) > 2:
+        before, now, after = time_ns[:-2], time_ns[1:-1], time_ns[2:]
+        far = SHUFFLED_NS
+        fits = (after >= before) & (after - before < 2 * far)
+        wrong[1:-1] = fits & ((now < before - far) | (now > after + far))
+        wrong[0] = time_ns[0] > time_ns[1] + far and time_ns[2] >= time_ns[1]
+        wrong[-1] = time_ns[-1] < time_ns[-2] - far and time_ns[-2] >= time_ns[-3]
+    return wrong
+
+
+def on_clock(sensor: Sensor, clock_ns: NDArray[np.int64], period_ns: float) -> Array:
+    """A sensor's values (n, 3) at the times of another clock (n); NaN outside its own and in its gaps.
+
+    Interpolated along straight lines; a sensor that is faster than the clock, whose period is given, is averaged.
+    """
+    import pandas
+
+    frame = pandas.DataFrame(sensor.values, index=pandas.to_timedelta(sensor.time_ns, unit="ns"))
+    clock = pandas.to_timedelta(clock_ns, unit="ns")
+    if _period_ns(sensor) * FASTER < period_ns:
+        frame = pandas.DataFrame(frame.rolling(f"{round(period_ns)}ns", center=True).mean())
+    both = frame.reindex(frame.index.union(clock)).interpolate(method="index", limit_area="inside")
+    values = np.array(both.loc[clock], dtype=float)
+    own = sensor.time_ns
+    after = np.searchsorted(own, clock_ns, side="left")
+    next_ns = own[np.minimum(after, len(own) - 1)]
+    exact = next_ns == clock_ns
+    apart = next_ns - own[np.maximum(after - 1, 0)]
+    values[~exact & (apart > GAP_NS)] = np.nan
+    return values
+
+
+def added(first: Sensor, second: Sensor, name: str) -> Sensor:
+    """The sum of two sensors on the first one's clock, where there are both: what moves the phone, and gravity."""
+    first, second = in_order(first, name), in_order(second, name)
+    values = first.values + on_clock(second, first.time_ns, _period_ns(first))
+    return Sensor("accelerometer", first.time_ns, values)
+
+
+def _most(accel_g: Array, rates_dps: Array) -> str:
+    return f"up to {np.max(np.abs(accel_g)):.3g} g and {np.nanmax(np.abs(rates_dps)):.3g} deg/s"
+
+
+def _period_ns(sensor: Sensor) -> float:
+    return float(np.median(np.diff(sensor.time_ns)))
+
+
+def _on_rows(track: Track | None, time_ns: NDArray[np.int64], utc_ns: int | None) -> tuple[Array, Array, Array, Array]:
+    """Speed, latitude, longitude and UTC (n each): each of the track's values in the row nearest to it in time."""
+    speed, lat, lon, utc = (np.full(len(time_ns), np.nan) for _ in range(4))
+    if utc_ns is not None:
+        utc[0] = (time_ns[0] + utc_ns) * 1e-9
+    if track is None or not len(track.time_ns):
+        return speed, lat, lon, utc
+    after = np.clip(np.searchsorted(time_ns, track.time_ns), 1, len(time_ns) - 1)
+    row = after - (track.time_ns - time_ns[after - 1] < time_ns[after] - track.time_ns)
+    near = np.abs(time_ns[row] - track.time_ns) <= GAP_NS
+    for values, found in ((speed, track.speed_mps), (lat, track.lat_deg), (lon, track.lon_deg)):
+        good = near & np.isfinite(found) & (np.abs(found) < MOST_MPS)
+        values[row[good]] = found[good]
+    if utc_ns is not None:
+        utc[row[near]] = (time_ns[row[near]] + utc_ns) * 1e-9
+    return speed, lat, lon, utc

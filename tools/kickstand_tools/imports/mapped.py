@@ -1,0 +1,166 @@
+"""Any other table: its columns named by whoever knows them, or guessed for the line that is to be typed."""
+
+import re
+import shlex
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..errors import InputError
+from .files import Piece
+from .recording import Recording, Sensor, Taken, rate_hz, track_of
+from .sheets import Sheet, cells_of, plain, read_sheet, unit_in
+from .times import EPOCH_NS, Nanoseconds, times_ns
+from .units import ACCELERATIONS, ANGLES, RATES, SPEEDS, TIMES, factor, unit
+
+NAME = "a table"
+ACCEL, GYRO = ("ax", "ay", "az"), ("gx", "gy", "gz")
+REQUIRED = ("t", *ACCEL, *GYRO)
+OPTIONAL = ("speed", "lat", "lon", "temp")
+UNIT_KEYS = {"t": TIMES, "a": ACCELERATIONS, "g": RATES, "speed": SPEEDS, "lat": ANGLES, "lon": ANGLES}
+UNIT_KEYS |= dict.fromkeys(ACCEL, ACCELERATIONS) | dict.fromkeys(GYRO, RATES)
+_AXIS = r"(?:^|[^a-z]){0}(?:$|[^a-z])|{0}$"
+_ACCEL_NAME = re.compile(r"acc|gforce|^a_?[xyz]\b|^a[xyz]$")
+_GYRO_NAME = re.compile(r"gyr|rotation|omega|angular|^[gw]_?[xyz]\b|^[gw][xyz]$")
+_HEADER_LINES = 60  # among which the line of names is looked for
+
+
+def read_mapped(piece: Piece, columns: Mapping[str, str], units: Mapping[str, str], name: str) -> Recording:
+    """A table with the columns named for t, ax to az, gx to gz and, as there are, speed, lat, lon and temp.
+
+    columns: by these, the name of each in the file, or #1, #2 ... for its number. units: of t, a (all of ax to az) or
+    ax, ay, az, g (of gx to gz) or gx, gy, gz, speed, lat, lon; a - before one turns the sign. A unit that is not given
+    is the one in brackets in the column's name. Raises InputError.
+    """
+    _check_keys(columns, units)
+    sheet = read_sheet(piece, header_line(piece, columns))
+    places = {key: _place(sheet, key, wanted) for key, wanted in columns.items()}
+    t_unit = units.get("t") or unit_in(sheet.columns[places["t"]])
+    time_ns = times_ns(sheet.series(places["t"]), t_unit if unit(t_unit) in TIMES else "", sheet.name)
+    accel, first = _sensor(sheet, time_ns, places, units, "accelerometer")
+    gyro, second = _sensor(sheet, time_ns, places, units, "gyro")
+    for key in ("lat", "lon"):
+        if key in places:
+            scale = factor(units.get(key, "deg"), ANGLES, key)
+            sheet.frame[places[key]] = scale * sheet.numbers(places[key])
+    speed_unit = "m/s"
+    if "speed" in places:
+        speed_unit = unit(_unit(units, ("speed",), sheet.columns[places["speed"]], SPEEDS))
+    track, more = track_of(sheet, time_ns, places.get("speed"), places.get("lat"), places.get("lon"), speed_unit)
+    temp_c = sheet.numbers(places["temp"]) if "temp" in places else None
+    utc_ns = 0 if len(time_ns) and int(np.median(time_ns)) > EPOCH_NS else None
+    taken = [first, second, *more]
+    return Recording(NAME, accel, gyro, track, temp_c, taken, utc_ns=utc_ns, sign_known=_turned(units))
+
+
+def unknown(pieces: list[Piece], source: str) -> str:
+    """What to say of a file that no app is known for: its columns, what is missing among them, the line to type."""
+    piece = max(pieces, key=lambda piece: len(piece.text))
+    columns = cells_of(piece.text.split("\n", _HEADER_LINES)[header_line(piece, {})])
+    found, missing = guessed(columns)
+    several = f" (of {len(pieces)} files, the largest is {piece.name})" if len(pieces) > 1 else ""
+    shown = ", ".join(columns[:40]) + (", ..." if len(columns) > 40 else "")
+    line = f"{source}: not a file of an app that is known{several}. Its columns: {shown}"
+    lacking = ["time"] if "t" in missing else []
+    lacking += [word for word, axes in (("acceleration", ACCEL), ("gyro", GYRO)) if set(axes) & set(missing)]
+    line += f"; not found: {', '.join(lacking)}" if lacking else ""
+    given = [f"{key}={found.get(key, '?')}" for key in REQUIRED] + [
+        f"{key}={found[key]}" for key in OPTIONAL if key in found
+    ]
+    stated = {key: unit_in(found.get(key, "")) for key in ("ax", "gx")}
+    units = [f"a={stated['ax'] if unit(stated['ax']) in ACCELERATIONS else 'm/s2'}"]
+    units += [f"g={stated['gx'] if unit(stated['gx']) in RATES else 'rad/s'}"]
+    units += ["speed=km/h"] if "speed" in found and unit(unit_in(found["speed"])) not in SPEEDS else []
+    where = source if len(pieces) == 1 else f"{source}/{piece.name}"
+    ask = "Put in what is not right" if not missing else "Put in what the ? stand for"
+    return (
+        f"{line}. {ask}, and type: kickstand import {shlex.quote(where)} --out RIDE.csv "
+        f"--columns {shlex.quote(','.join(given))} --units {','.join(units)}"
+    )
+
+
+def header_line(piece: Piece, columns: Mapping[str, str]) -> int:
+    """Number of the line of names: the first that holds all that are asked for, else the widest before the numbers."""
+    wanted = {name.strip() for name in columns.values() if not name.strip().startswith("#")}
+    widest, width = 0, 0
+    for number, line in enumerate(piece.text.split("\n", _HEADER_LINES)[:_HEADER_LINES]):
+        cells = cells_of(line)
+        if wanted and wanted <= set(cells):
+            return number
+        numbers = sum(bool(re.fullmatch(r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?", cell)) for cell in cells)
+        if len(cells) > width and numbers < len(cells) / 2:
+            widest, width = number, len(cells)
+    return widest
+
+
+def guessed(columns: list[str]) -> tuple[dict[str, str], list[str]]:
+    """Columns that seem to be the ones asked for, and which of the required are not found."""
+    found: dict[str, str] = {}
+    for column in columns:
+        low, bare = column.lower(), plain(column)
+        if any(mark in column for mark in ",="):
+            continue
+        sensor = "g" if _GYRO_NAME.search(low) else "a" if _ACCEL_NAME.search(low) else ""
+        axis = next((axis for axis in "xyz" if re.search(_AXIS.format(axis), re.sub(r"[(\[].*", "", low).strip())), "")
+        if sensor and axis:
+            found.setdefault(sensor + axis, column)
+        elif re.search(r"time|milli|micro|^(t|ts|ms|us|ns|s|sec|seconds)$|epoch|utc|clock", bare):
+            found.setdefault("t", column)
+        elif re.search(r"speed|velocity|kmh|kph", bare) and "accuracy" not in bare:
+            found.setdefault("speed", column)
+        elif bare.startswith("lat") and "acc" not in bare:
+            found.setdefault("lat", column)
+        elif bare.startswith("lon") and "acc" not in bare:
+            found.setdefault("lon", column)
+    return found, [key for key in REQUIRED if key not in found]
+
+
+def _check_keys(columns: Mapping[str, str], units: Mapping[str, str]) -> None:
+    strange = [key for key in columns if key not in (*REQUIRED, *OPTIONAL)]
+    if strange:
+        raise InputError(f"--columns: {strange[0]!a} is not one of {', '.join((*REQUIRED, *OPTIONAL))}")
+    missing = [key for key in REQUIRED if key not in columns]
+    if missing:
+        raise InputError(f"--columns: {', '.join(missing)} is missing: three axes of both sensors are needed, and t")
+    strange = [key for key in units if key not in UNIT_KEYS]
+    if strange:
+        raise InputError(f"--units: {strange[0]!a} is not one of {', '.join(UNIT_KEYS)}")
+
+
+def _place(sheet: Sheet, key: str, wanted: str) -> int:
+    wanted = wanted.strip()
+    if re.fullmatch(r"#\d+", wanted) and 0 < int(wanted[1:]) <= len(sheet.columns):
+        return int(wanted[1:]) - 1
+    if wanted in sheet.columns:
+        return sheet.columns.index(wanted)
+    place = sheet.place(wanted) if plain(wanted) else None
+    if place is None:
+        have = ", ".join(sheet.columns[:40])
+        raise InputError(f"{sheet.name}: no column {wanted!a} for {key}: its columns are {have}")
+    return place
+
+
+def _sensor(
+    sheet: Sheet, time_ns: Nanoseconds, places: dict[str, int], units: Mapping[str, str], quantity: str
+) -> tuple[Sensor, Taken]:
+    axes, all_of, kinds = (ACCEL, "a", ACCELERATIONS) if quantity == "accelerometer" else (GYRO, "g", RATES)
+    names = [_unit(units, (axis, all_of), sheet.columns[places[axis]], kinds) for axis in axes]
+    scale = np.array([factor(text, kinds, axis) for text, axis in zip(names, axes)])
+    values = sheet.table([places[axis] for axis in axes]) * scale
+    source = f"{sheet.name}: {', '.join(sheet.columns[places[axis]] for axis in axes)}"
+    sign = "as it is" if np.all(scale > 0.0) else "turned" if np.all(scale < 0.0) else "turned in part"
+    shown = ", ".join(dict.fromkeys(text.lstrip("-") for text in names))
+    return Sensor(quantity, time_ns, values), Taken(quantity, source, shown, rate_hz(time_ns), sign)
+
+
+def _unit(units: Mapping[str, str], keys: tuple[str, ...], column: str, kinds: Mapping[str, float]) -> str:
+    said = next((units[key] for key in keys if key in units), unit_in(column))
+    if not said or (said == unit_in(column) and unit(said) not in kinds):
+        first = next(iter(kinds))
+        raise InputError(f"{column}: its unit is not known: add --units {keys[-1]}={first} (one of {', '.join(kinds)})")
+    return said
+
+
+def _turned(units: Mapping[str, str]) -> bool:
+    """A sign that was asked for is meant."""
+    return any(units.get(key, "").startswith("-") for key in ("a", *ACCEL))

@@ -1,0 +1,126 @@
+"""What a reader finds in an app's files: each sensor on its own clock, in a log's units and signs."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from kickstand.errors import Notice
+from numpy.typing import NDArray
+
+from .sheets import Sheet
+from .times import NO_TIME, Nanoseconds
+from .units import SPEEDS
+
+Array = NDArray[np.float64]
+SECOND_NS = 10**9
+_ABSURD = 1e6  # g or deg/s: a damaged cell
+
+
+@dataclass
+class Taken:
+    """What was taken for what: a quantity, the file and the columns it stands in, their unit, and how it was turned.
+
+    rate_hz: samples in a second, 0 for none.
+    """
+
+    quantity: str
+    source: str
+    unit: str
+    rate_hz: float = 0.0
+    sign: str = ""
+
+
+def rate_hz(time_ns: Nanoseconds) -> float:
+    """Samples in a second, without gaps; 0 where there are too few to tell."""
+    steps = np.diff(time_ns[time_ns != NO_TIME])
+    if not np.any(steps > 0):
+        return 0.0
+    whole = (steps >= 0) & (steps < 5.0 * np.median(steps[steps > 0]))
+    return SECOND_NS * int(np.count_nonzero(whole)) / float(np.sum(steps[whole]))
+
+
+@dataclass
+class Sensor:
+    """n samples: time_ns (n) of the recorder's clock, values (n, 3): g, +1 where the axis points up at rest, or deg/s,
+    right-handed. name: for messages."""
+
+    name: str
+    time_ns: Nanoseconds
+    values: Array
+
+    def __post_init__(self) -> None:
+        good = (self.time_ns != NO_TIME) & np.all(np.abs(self.values) < _ABSURD, axis=1)  # no NaN either
+        self.time_ns, self.values = self.time_ns[good], self.values[good]
+
+
+def sensor_of(
+    sheet: Sheet, time_ns: Nanoseconds, places: list[int], scale: float | Array, what: tuple[str, str, str]
+) -> tuple[Sensor, Taken]:
+    """Three columns of a sheet, times scale, one number or one an axis. what: quantity, unit, what its sign was."""
+    quantity, unit, sign = what
+    source = f"{sheet.name}: {', '.join(sheet.columns[place] for place in places)}"
+    values = sheet.table(places) * scale
+    return Sensor(quantity, time_ns, values), Taken(quantity, source, unit, rate_hz(time_ns), sign)
+
+
+@dataclass
+class Track:
+    """A satellite receiver's m values on the same clock: speed in m/s, degrees north and east; NaN for none."""
+
+    time_ns: Nanoseconds
+    speed_mps: Array
+    lat_deg: Array
+    lon_deg: Array
+
+    def __post_init__(self) -> None:
+        """Only rows that say something new stay, and no speed below 0: a phone's mark for a speed it does not know."""
+        self.speed_mps = np.where(self.speed_mps >= 0.0, self.speed_mps, np.nan)
+        nowhere = (self.lat_deg == 0.0) & (self.lon_deg == 0.0)
+        nowhere |= ~((np.abs(self.lat_deg) <= 90.0) & (np.abs(self.lon_deg) <= 180.0))
+        self.lat_deg, self.lon_deg = (np.where(nowhere, np.nan, place) for place in (self.lat_deg, self.lon_deg))
+        rows = np.column_stack((self.speed_mps, self.lat_deg, self.lon_deg))
+        there = (self.time_ns != NO_TIME) & ~np.all(np.isnan(rows), axis=1)
+        self.keep(there)
+        same = np.all((rows[there][1:] == rows[there][:-1]) | np.isnan(rows[there][1:]), axis=1)
+        same &= np.diff(self.time_ns // SECOND_NS) == 0  # a standstill is said once a second
+        self.keep(np.concatenate(([True], ~same)) if len(self.time_ns) else np.zeros(0, dtype=bool))
+
+    def keep(self, which: NDArray[np.bool_]) -> None:
+        """Drop the other rows."""
+        for name in ("time_ns", "speed_mps", "lat_deg", "lon_deg"):
+            setattr(self, name, getattr(self, name)[which])
+
+
+def track_of(
+    sheet: Sheet, time_ns: Nanoseconds, speed: int | None, lat: int | None, lon: int | None, speed_unit: str = "m/s"
+) -> tuple[Track | None, list[Taken]]:
+    """Speed and position of a sheet, by the numbers of their columns; None where there is neither."""
+    if speed is None and (lat is None or lon is None):
+        return None, []
+    scale = SPEEDS[speed_unit]
+    track = Track(time_ns, sheet.numbers(speed) * scale, sheet.numbers(lat), sheet.numbers(lon))
+    taken, hz = [], rate_hz(track.time_ns)
+    if speed is not None:
+        taken.append(Taken("speed", f"{sheet.name}: {sheet.columns[speed]}", speed_unit, hz))
+    if lat is not None and lon is not None:
+        taken.append(Taken("position", f"{sheet.name}: {sheet.columns[lat]}, {sheet.columns[lon]}", "degrees", hz))
+    return track, taken
+
+
+@dataclass
+class Recording:
+    """app: whose. utc_ns: what makes UTC of the recorder's clock, in ns since 1970; None if that is not known.
+
+    vehicle_axes: x points left, y up, z forward on the vehicle already, as far as its logger was mounted so.
+    sign_known: at rest up reads +1 g, by what the app's maker or its files say; else it is only likely.
+    """
+
+    app: str
+    accel: Sensor
+    gyro: Sensor
+    track: Track | None = None
+    temp_c: Array | None = None
+    taken: list[Taken] = field(default_factory=list)
+    notices: list[Notice] = field(default_factory=list)
+    utc_ns: int | None = None
+    vehicle_axes: bool = False
+    sign_known: bool = True

@@ -1,0 +1,129 @@
+"""A table of text as columns of numbers: which separator, which decimal mark, under which names."""
+
+import csv
+import io
+import re
+import warnings
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError, extra
+from .files import Piece
+
+if TYPE_CHECKING:
+    from pandas import DataFrame, Series
+
+Array = NDArray[np.float64]
+_DECIMAL_COMMA = re.compile(r"(?:^|[;\t\"])\s*[+-]?\d+,\d")
+
+
+@dataclass
+class Sheet:
+    """name: of the file, for messages. columns: as they are called in it, some perhaps twice. frame: the cells, its
+    columns numbered from 0."""
+
+    name: str
+    columns: list[str]
+    frame: "DataFrame"
+
+    def place(self, *names: str) -> int | None:
+        """Number of the first column of one of these names, compared by plain()."""
+        wanted = [plain(name) for name in names]
+        found = [plain(column) for column in self.columns]
+        return next((found.index(name) for name in wanted if name in found), None)
+
+    def series(self, place: int) -> "Series":
+        """A column as it was read."""
+        return self.frame.iloc[:, place]
+
+    def numbers(self, place: int | None) -> Array:
+        """A column as numbers (n), NaN where a cell has none; all NaN for None."""
+        if place is None:
+            return np.full(len(self.frame), np.nan)
+        return numbers_of(self.series(place)).astype(float)
+
+    def table(self, places: list[int]) -> Array:
+        """Several columns as numbers (n, columns)."""
+        return np.column_stack([self.numbers(place) for place in places])
+
+
+def numbers_of(cells: "Series") -> NDArray[Any]:
+    """Cells (n) as whole numbers where all of them are, else as floats, NaN for what is no number."""
+    import pandas
+
+    values = np.asarray(pandas.to_numeric(cells, errors="coerce"))
+    return values if values.dtype.kind in "iuf" else values.astype(float)
+
+
+def plain(name: str) -> str:
+    """A column's name as names are compared: small letters and digits only, without its unit in brackets."""
+    return re.sub(r"[^a-z0-9]", "", re.sub(r"[(\[].*?[)\]]", "", name).lower())
+
+
+def unit_in(name: str) -> str:
+    """The unit that stands in brackets in a column's name, "" for none."""
+    found = re.search(r"[(\[]([^)\]]*)[)\]]\s*$", name)
+    return found[1].strip() if found else ""
+
+
+def check_pandas() -> None:
+    """Raise InputError where pandas is not installed: it reads the tables and joins the sensors."""
+    try:
+        import pandas as pandas
+    except ImportError as error:
+        raise InputError("import needs pandas: " + extra("rides")) from error
+
+
+def separator_of(line: str) -> str:
+    """The one of , ; and tab that parts the cells of a line, by what stands outside quotation marks."""
+    bare = re.sub(r'"[^"]*"', "", line)
+    return max(",;\t", key=bare.count)
+
+
+def cells_of(line: str) -> list[str]:
+    """The cells of one line."""
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator_of(line)), [])]
+    except csv.Error:
+        return [cell.strip() for cell in line.split(separator_of(line))]
+
+
+def read_sheet(piece: Piece, header: int = 0, skipped: int = 0) -> Sheet:
+    """The table of a piece. header: number of the line of names; skipped: lines after it that are no data.
+
+    Raises InputError where there is none.
+    """
+    lines = piece.text.split("\n", header + skipped + 1)
+    if len(lines) < header + skipped + 2 or not lines[-1].strip():
+        raise InputError(f"{piece.name}: no rows under the names of the columns: was anything recorded?")
+    columns = cells_of(lines[header])
+    while columns and not columns[-1]:
+        columns.pop()  # lines that end in a separator
+    return Sheet(piece.name, columns, _frame(piece.name, lines[-1], separator_of(lines[header]), len(columns)))
+
+
+def _frame(name: str, text: str, separator: str, width: int) -> "DataFrame":
+    import pandas
+
+    if separator != "," and _DECIMAL_COMMA.search(text[:20000]):
+        text = text.replace(",", ".")
+    for tried in (text, text.replace('"', "")):  # a quotation mark that is not closed swallows what follows
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore")  # lines that end in a separator, and columns of several kinds
+                return pandas.read_csv(
+                    io.StringIO(tried),
+                    sep=separator,
+                    header=None,
+                    names=list(range(max(width, 1))),
+                    index_col=False,
+                    skipinitialspace=True,
+                    low_memory=False,
+                    on_bad_lines="skip",
+                )
+        except (ValueError, OverflowError):  # ParserError is a ValueError
+            continue
+    raise InputError(f"{name}: no table of numbers: export it again as CSV")

@@ -1,0 +1,63 @@
+"""Units as apps write them, by what they make of a log's own: g, deg/s, m/s, seconds, degrees."""
+
+import math
+import re
+
+from kickstand.units import STANDARD_GRAVITY
+
+from ..errors import InputError
+
+ACCELERATIONS = {"g": 1.0, "m/s2": 1.0 / STANDARD_GRAVITY, "mg": 1e-3}
+RATES = {"deg/s": 1.0, "rad/s": math.degrees(1.0), "mdeg/s": 1e-3}
+SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704, "knots": 1852.0 / 3600.0}
+TIMES = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "ns": 1}  # in ns
+ANGLES = {"deg": 1.0, "min": 1.0 / 60.0}
+_SAME = {
+    "m/s/s": "m/s2",
+    "m/sec2": "m/s2",
+    "mps2": "m/s2",
+    "gs": "g",
+    "dps": "deg/s",
+    "°/s": "deg/s",
+    "deg/sec": "deg/s",
+    "degrees/s": "deg/s",
+    "mdps": "mdeg/s",
+    "radians/s": "rad/s",
+    "rad/sec": "rad/s",
+    "rps": "rad/s",
+    "kmh": "km/h",
+    "kph": "km/h",
+    "km/hr": "km/h",
+    "mps": "m/s",
+    "mi/h": "mph",
+    "knot": "knots",
+    "kn": "knots",
+    "kt": "knots",
+    "kts": "knots",
+    "sec": "s",
+    "seconds": "s",
+    "msec": "ms",
+    "µs": "us",
+    "μs": "us",
+    "°": "deg",
+    "degrees": "deg",
+    "minutes": "min",
+}
+
+
+def unit(text: str) -> str:
+    """A unit in the spelling of the tables above, where it is one of theirs: "m/s^2" is "m/s2"."""
+    short = re.sub(r"[\s^*·]", "", text.strip().lower()).replace("²", "2").replace("s-2", "/s2").replace("//", "/")
+    return _SAME.get(short, short)
+
+
+def factor(text: str, kinds: dict[str, float], where: str) -> float:
+    """What a value in a unit is multiplied by; a - before the unit turns the sign. Raises InputError for another unit.
+
+    >>> factor("-m/s^2", {"g": 1.0, "m/s2": 0.102}, "ax")
+    -0.102
+    """
+    sign, bare = (-1.0, text.strip()[1:]) if text.strip().startswith("-") else (1.0, text)
+    if unit(bare) not in kinds:
+        raise InputError(f"{where}: unit {text!a} is not known: write one of {', '.join(kinds)}")
+    return sign * kinds[unit(bare)]
