@@ -83,6 +83,13 @@ def test_speeds_and_places_that_mean_none():
     assert track.lat_deg.tolist() == [52.0, 52.1]
 
 
+def test_a_standstill_is_said_once_a_second():
+    """A logger that repeats its receiver's values in each row says nothing new with them."""
+    track = Track(np.arange(80) * 50 * MS, np.repeat([0.0, 5.0], 40), np.full(80, 52.0), np.full(80, 13.0))
+    assert (track.time_ns // MS).tolist() == [0, 1000, 2000, 3000]
+    assert track.speed_mps.tolist() == [0.0, 0.0, 5.0, 5.0]
+
+
 def test_rounded_and_repeated_times_are_spread(tmp_path):
     """Sensor Kinetics writes four decimals, and one time for several samples."""
     ride = riding()

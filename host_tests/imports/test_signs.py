@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from app_exports import PHONE, riding
 from kickstand_tools import api
+from kickstand_tools.imports.course import course_agrees
 
 pytest.importorskip("pandas")
 
@@ -133,3 +134,17 @@ def test_the_track_may_be_late(tmp_path, late_s):
         setattr(ride, name, np.interp(ride.t_s - late_s, ride.t_s, getattr(ride, name)))
     (tmp_path / "r.csv").write_text(app_exports.racechrono(ride, -1.0))
     assert up_at_rest(api.import_recording(tmp_path / "r.csv")) == pytest.approx(UP, abs=0.02)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 1.0, 1.5, 2.0])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_swerves_that_come_late_are_not_taken_for_the_opposite_ones(sign, late_s):
+    """Four seconds from left to right and back: 2 s late, the track turns the other way."""
+    t_s = np.arange(0.0, 60.0, 0.02)
+    yaw_dps = 20.0 * np.sin(2 * np.pi * t_s / 4.0 + np.sin(t_s / 7.0))
+    course = np.cumsum(np.radians(yaw_dps)) * 0.02
+    east, north = (np.cumsum(10.0 * wave(course)) * 0.02 for wave in (np.cos, np.sin))
+    places = 1e-5 * north, 1e-5 * east
+    lat, lon = (np.where(np.arange(3000) % 50 == 0, np.interp(t_s - late_s, t_s, place), np.nan) for place in places)
+    rates = np.column_stack((0 * t_s, yaw_dps, 0 * t_s))
+    assert course_agrees(t_s, np.tile([0.0, sign, 0.0], (3000, 1)), rates, lat, lon) is (sign > 0)
