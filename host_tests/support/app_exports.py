@@ -122,6 +122,7 @@ def phyphox(
             text.append(separator.join(cell.replace(".", ",") if comma else cell for cell in cells))
         return "\n".join(text)  # no line feed at the end
 
+    utc = f"{START_UTC_S:.15E}".replace(".", "," if comma else ".")
     gyro = ride.every(2, 1)
     linear = ride.phone_g - ride.gravity_g
     metres = [f"{axis} (m/s^2)" for axis in "XYZ"]
@@ -132,7 +133,7 @@ def phyphox(
         "Linear Accelerometer.csv": table(["Time (s)", *metres], np.column_stack((ride.t_s, 9.81 * linear))),
         "meta/device.csv": f'"property"{separator}"value"\n"deviceModel"{separator}"Pixel"\n',
         "meta/time.csv": separator.join(f'"{name}"' for name in ("event", "experiment time", "system time", "text"))
-        + f'\n"START"{separator}{number(0.0)}{separator}{number(START_UTC_S)}{separator}"2024"\n',
+        + f'\n"START"{separator}{number(0.0)}{separator}{utc}{separator}"2024"\n',
     }
     if gravity:
         files["Accelerometer.csv"] = table(["Time (s)", *metres], np.column_stack((ride.t_s, 9.81 * ride.phone_g)))

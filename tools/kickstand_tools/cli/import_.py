@@ -49,7 +49,8 @@ def import_(
     for notice in found.notices:
         click.echo(f"warning: {source}: {sentence(notice)}", err=True)
     t_s, gaps_s = found.log.t_s, found.gaps_s
-    gaps = f", {len(gaps_s)} gaps of {gaps_s.sum():.1f} s in all" if len(gaps_s) else ""
+    count = "1 gap" if len(gaps_s) == 1 else f"{len(gaps_s)} gaps"
+    gaps = f", {count} of {gaps_s.sum():.1f} s in all" if len(gaps_s) else ""
     click.echo(f"written: {out}, {len(t_s)} samples in {t_s[-1]:.1f} s, {found.rate_hz:.0f} a second{gaps}")
     if found.vehicle_axes:
         click.echo("x is left, y up, z forward, as far as the logger was mounted so")

@@ -52,7 +52,7 @@ def read_pieces(source: Path | str) -> list[Piece]:
         raise InputError(f"{path}: there is no such file") from error
     except gzip.BadGzipFile as error:
         raise InputError(f"{path} is not a gzip file: unpacked recordings have names without .gz") from error
-    except (zipfile.BadZipFile, zlib.error, EOFError) as error:
+    except (zipfile.BadZipFile, NotImplementedError, zlib.error, EOFError) as error:
         raise InputError(f"{path} is damaged or cut short: copy it again") from error
     except (OSError, ValueError) as error:
         raise InputError(f"{path} cannot be read: {cause(error)}") from error

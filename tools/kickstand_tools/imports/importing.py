@@ -224,6 +224,6 @@ def _stretch(joined: Joined, start_s: float | None, end_s: float | None, name: s
     begin = int(np.searchsorted(since_s, start_s)) if start_s is not None else 0
     end = int(np.searchsorted(since_s, end_s, side="right")) if end_s is not None else len(since_s)
     if end - begin < 2:
-        asked = f"from {start_s or 0.0:g} to {since_s[-1] if end_s is None else end_s:g} s"
+        asked = f"from {start_s or 0.0:g} s on" if end_s is None else f"from {start_s or 0.0:g} to {end_s:g} s"
         raise InputError(f"{name} lasts {since_s[-1]:.1f} s: there is nothing {asked}")
     return slice(begin, end)

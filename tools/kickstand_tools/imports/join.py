@@ -115,7 +115,7 @@ def added(first: Sensor, second: Sensor, name: str) -> Sensor:
 
 
 def _most(accel_g: Array, rates_dps: Array) -> str:
-    return f"up to {np.max(np.abs(accel_g)):.3g} g and {np.nanmax(np.abs(rates_dps)):.3g} deg/s"
+    return f"up to {np.max(np.abs(accel_g)):.3g} g and {np.max(np.abs(np.nan_to_num(rates_dps))):.3g} deg/s"
 
 
 def _period_ns(sensor: Sensor) -> float:

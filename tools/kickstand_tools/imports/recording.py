@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from .sheets import Sheet
 from .times import NO_TIME, Nanoseconds
-from .units import SPEEDS
+from .units import SPEEDS, factor
 
 Array = NDArray[np.float64]
 SECOND_NS = 10**9
@@ -96,7 +96,7 @@ def track_of(
     """Speed and position of a sheet, by the numbers of their columns; None where there is neither."""
     if speed is None and (lat is None or lon is None):
         return None, []
-    scale = SPEEDS[speed_unit]
+    scale = factor(speed_unit, SPEEDS, "speed")
     track = Track(time_ns, sheet.numbers(speed) * scale, sheet.numbers(lat), sheet.numbers(lon))
     taken, hz = [], rate_hz(track.time_ns)
     if speed is not None:

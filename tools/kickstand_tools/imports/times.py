@@ -31,17 +31,18 @@ def times_ns(cells: "Series", unit_name: str = "", where: str = "the recording")
     import pandas
 
     numbers = numbers_of(cells)
-    if np.count_nonzero(np.isfinite(numbers)) > len(cells) // 2:
+    filled = int(np.count_nonzero(cells.notna()))
+    if np.count_nonzero(np.isfinite(numbers)) > filled // 2:
         return _of_numbers(numbers, unit_name, where)
     texts = cells.astype(str)
     clocks = [_CLOCK.match(str(text)) for text in texts.tolist()]
-    if sum(map(bool, clocks)) > len(cells) // 2:
+    if sum(map(bool, clocks)) > filled // 2:
         parts = [[float(part or 0.0) for part in match.groups()] if match else [np.nan] * 3 for match in clocks]
         return _after_midnight(np.array(parts) @ np.array([3600.0, 60.0, 1.0]))
     zoned = texts.str.replace(r"\s+(?=[+-]\d\d:?\d\d$)", "", regex=True).str.replace(" UTC", "+00:00", regex=False)
     dates = pandas.to_datetime(zoned, errors="coerce", utc=True, format="ISO8601")
     known = np.asarray(dates.notna(), dtype=bool)
-    if np.count_nonzero(known) <= len(cells) // 2:
+    if np.count_nonzero(known) <= filled // 2:
         shown = ascii(str(cells.iloc[0])[:30]) if len(cells) else "empty"
         raise InputError(f"{where}: {shown} is no time: numbers, or dates such as 2024-05-17T09:30:00.25Z, are needed")
     return np.where(known, np.asarray(dates.dt.tz_localize(None), dtype="datetime64[ns]").astype(np.int64), NO_TIME)

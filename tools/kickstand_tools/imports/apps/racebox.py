@@ -13,7 +13,7 @@ from ..course import distance_m
 from ..files import Piece
 from ..recording import SECOND_NS, Array, Recording, sensor_of, track_of
 from ..sheets import Sheet, cells_of, plain, read_sheet, unit_in
-from ..times import NO_TIME, Nanoseconds, times_ns
+from ..times import Nanoseconds, times_ns
 from ..units import SPEEDS, factor, unit
 
 NAME = "RaceBox"
@@ -82,9 +82,10 @@ def _told_unit(sheet: Sheet, time_ns: Nanoseconds, speed: int, lat: int | None, 
 
 
 def _moved_mps(time_ns: Nanoseconds, lat: Array, lon: Array) -> Array:
-    """(n) speed from a second before each row, NaN where it is not known."""
-    time_ns = np.maximum.accumulate(np.where(time_ns == NO_TIME, 0, time_ns))  # a damaged cell stands still
-    before = np.minimum(np.searchsorted(time_ns, time_ns - SECOND_NS), len(time_ns) - 1)
-    apart_s = (time_ns - time_ns[before]) / SECOND_NS
-    east, north = distance_m(lat[before], lon[before], lat, lon)
+    """(n) speed from about a second before each row, NaN where it is not known."""
+    steps = np.diff(time_ns)
+    back = max(1, round(SECOND_NS / max(float(np.median(steps)), 1.0))) if len(steps) else 1
+    apart_s = np.full(len(time_ns), np.nan)
+    apart_s[back:] = (time_ns[back:] - time_ns[:-back]) / SECOND_NS
+    east, north = distance_m(np.roll(lat, back), np.roll(lon, back), lat, lon)
     return np.where((apart_s > 0.5) & (apart_s < 2.0), np.hypot(east, north) / np.maximum(apart_s, 0.5), np.nan)

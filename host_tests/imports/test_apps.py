@@ -1,0 +1,193 @@
+"""Each app's export is imported and replays as the ride that it was made from. Nothing in an export is copied: the
+writers in support/app_exports.py follow what the makers have published.
+
+phyphox: https://github.com/phyphox/phyphox-ios, SimpleExperimentTemplete.swift and ExperimentExport.swift
+Sensor Logger: https://github.com/tszheichoi/awesome-sensor-logger, UNITS.md, COORDINATES.md and CROSSPLATFORM.md
+SensorLog: http://sensorlog.berndthomas.net (example logs); signs https://developer.apple.com/reference/uikit/uiacceleration
+Sensor Kinetics: https://rotoview.com/multi-sensor-file-system.html; samples in
+    https://github.com/Intelligent-Systems-Phystech/MobileSensorData
+RaceChrono: https://github.com/jLynx/RaceChrono-to-CSV and https://github.com/ClassicMiniDIY/UltraLog/pull/85
+RaceBox: https://www.racebox.pro/info/session-export; a ride in https://github.com/beadon/RacePlex
+VBO: https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format, and "CAN Output - IMU04" there
+AiM: a session in https://github.com/m3rlin45/libxrk, tests/test_data/SFJ
+"""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import app_exports
+import numpy as np
+import pytest
+from app_exports import PHONE, START_UTC_S, Riding
+from kickstand_tools import api
+
+pytest.importorskip("pandas")
+
+ON_PHONE = api.CalibrationFile(vehicle_from_sensor=PHONE.T, aligned=True)
+ON_BIKE = api.CalibrationFile(aligned=True)
+WITHIN_DEG = (
+    0.5  # rms of a replay against the true lean; the ride itself, not exported, has 0.28 at 100 samples a second
+)
+
+
+def one(name: str, write: Callable[..., str], encoding: str = "utf-8", **options) -> Callable[[Path, Riding], Path]:
+    def file(directory: Path, ride: Riding) -> Path:
+        (directory / name).write_bytes(write(ride, **options).encode(encoding))
+        return directory / name
+
+    return file
+
+
+def several(name: str, write: Callable[..., dict[str, str]], **options) -> Callable[[Path, Riding], Path]:
+    return lambda directory, ride: app_exports.into(directory / name, write(ride, **options))
+
+
+# name: (app, how it is written, sampled each so many of 200 a second, calibration)
+EXPORTS = {
+    "phyphox zip": ("phyphox", several("p.zip", app_exports.phyphox), 2, ON_PHONE),
+    "phyphox folder, ; and decimal comma": (
+        "phyphox",
+        several("p", app_exports.phyphox, separator=";", comma=True),
+        2,
+        ON_PHONE,
+    ),
+    "phyphox folder, tabs": ("phyphox", several("p", app_exports.phyphox, separator="\t"), 2, ON_PHONE),
+    "Sensor Logger, Android": ("Sensor Logger", several("s.zip", app_exports.sensor_logger), 2, ON_PHONE),
+    "Sensor Logger, iPhone": ("Sensor Logger", several("s", app_exports.sensor_logger, platform="ios"), 2, ON_PHONE),
+    "Sensor Logger, iPhone, standardised": (
+        "Sensor Logger",
+        several("s.zip", app_exports.sensor_logger, platform="ios", standard=True),
+        2,
+        ON_PHONE,
+    ),
+    "SensorLog": ("SensorLog", one("s.csv", app_exports.sensorlog), 2, ON_PHONE),
+    "SensorLog, motion only, ;": (
+        "SensorLog",
+        one("s.csv", app_exports.sensorlog, separator=";", accelerometer=False),
+        2,
+        ON_PHONE,
+    ),
+    "Sensor Kinetics": ("Sensor Kinetics", several("k", app_exports.sensor_kinetics), 1, ON_PHONE),
+    "Sensor Kinetics, ; and decimal comma": (
+        "Sensor Kinetics",
+        several("k.zip", app_exports.sensor_kinetics, semicolon=True),
+        1,
+        ON_PHONE,
+    ),
+    "RaceChrono 3": ("RaceChrono", one("r.csv", app_exports.racechrono, "utf-8-sig"), 2, ON_PHONE),
+    "RaceChrono 2": ("RaceChrono", one("r.csv", app_exports.racechrono, version=2), 2, ON_PHONE),
+    "RaceBox": ("RaceBox", one("r.csv", app_exports.racebox), 8, ON_BIKE),
+    "RaceBox, laps and mph": (
+        "RaceBox",
+        one("r.csv", app_exports.racebox, per_mps=1 / 0.44704, laps=True),
+        8,
+        ON_BIKE,
+    ),
+    "RaceBox, m/s": ("RaceBox", one("r.csv", app_exports.racebox, per_mps=1.0), 8, ON_BIKE),
+    "VBO": ("VBO", one("v.vbo", app_exports.vbo), 2, ON_BIKE),
+    "VBO, knots, Windows' letters": ("VBO", one("v.VBO", app_exports.vbo, "cp1252", speed="knots"), 2, ON_BIKE),
+    "AiM": ("AiM", one("a.csv", app_exports.aim), 4, ON_BIKE),
+    "AiM saved by a spreadsheet, vertical +1": (
+        "AiM",
+        one("a.csv", app_exports.aim, quoted=False, up_sign=1.0),
+        4,
+        ON_BIKE,
+    ),
+}
+
+
+@pytest.mark.parametrize("name", EXPORTS)
+def test_an_export_replays_as_the_ride_it_was_made_from(tmp_path, name):
+    app, write, every, calibration = EXPORTS[name]
+    ride = app_exports.riding().every(every)
+    found = api.import_recording(write(tmp_path, ride))
+    assert found.app == app
+    api.write_imported(tmp_path / "RIDE.csv", found)
+    log = api.read_log(tmp_path / "RIDE.csv")
+    t_s = log.t_s + log.start_s
+    lean = api.replay(log, calibration).lean_deg
+    assert np.sqrt(np.mean((lean - np.interp(t_s, ride.t_s, ride.lean_deg)) ** 2)) < WITHIN_DEG
+    force = log.accel_g @ calibration.vehicle_from_sensor.T
+    rates = log.gyro_dps @ calibration.vehicle_from_sensor.T
+    for axis in range(3):
+        assert np.median(np.abs(force[:, axis] - np.interp(t_s, ride.t_s, ride.force_g[:, axis]))) < 0.01
+        assert np.median(np.abs(rates[:, axis] - np.interp(t_s, ride.t_s, ride.rates_dps[:, axis]))) < 0.3
+    there = np.isfinite(log.speed_mps)
+    if app != "Sensor Kinetics":  # it has no satellite receiver
+        assert np.count_nonzero(there) >= 27
+        wrong = log.speed_mps[there] - np.interp(t_s[there], ride.t_s, ride.speed_mps)
+        assert np.max(np.abs(wrong)) < 0.05
+        at = np.isfinite(found.lat_deg)
+        north_m = (found.lat_deg[at] - np.interp(t_s[at], ride.t_s, ride.lat_deg)) * 111_195.0
+        east_m = (found.lon_deg[at] - np.interp(t_s[at], ride.t_s, ride.lon_deg)) * 67_700.0
+        assert np.max(np.hypot(north_m, east_m)) < 1.0
+
+
+@pytest.mark.parametrize("name", [name for name in EXPORTS if "AiM" not in name and "Kinetics" not in name])
+def test_utc_is_that_of_the_recording(tmp_path, name):
+    _, write, every, _ = EXPORTS[name]
+    found = api.import_recording(write(tmp_path, app_exports.riding().every(every)))
+    told = np.isfinite(found.utc_s)
+    t_s = found.log.t_s + found.log.start_s
+    assert np.max(np.abs(found.utc_s[told] - START_UTC_S - t_s[told])) < 0.02
+
+
+def test_one_file_with_all_sensors_of_phyphox(tmp_path):
+    """ "Raw Data.csv" of a combined experiment: each sensor has the time that stands before it."""
+    ride = app_exports.riding().every(2)
+    late = ride.every(2, 1)
+    names = ["Time (s)", *[f"Acceleration {axis} (m/s^2)" for axis in "xyz"]]
+    names += ["Gyroscope time (s)", *[f"Gyroscope {axis} (rad/s)" for axis in "xyz"]]
+    rows = []
+    for k, t in enumerate(ride.t_s):
+        row = [f"{value:.6f}" for value in (t, *(9.81 * ride.phone_g[k]))]
+        row += [f"{v:.6f}" for v in (late.t_s[k], *late.phone_rad[k])] if k < len(late.t_s) else [""] * 4
+        rows.append(row)
+    (tmp_path / "Raw Data.csv").write_text(app_exports.lines([f'"{name}"' for name in names], rows))
+    found = api.import_recording(tmp_path / "Raw Data.csv")
+    assert [round(taken.rate_hz) for taken in found.taken] == [100, 50]
+    want = np.interp(found.log.t_s + found.log.start_s, ride.t_s, np.degrees(ride.phone_rad[:, 1]))
+    assert np.max(np.abs(found.log.gyro_dps[:, 1] - want)) < 3.0
+
+
+def test_a_pause_of_phyphox_is_a_gap(tmp_path):
+    """The experiment's own time stands still in a pause; meta/time.csv says for how long."""
+    files = app_exports.phyphox(app_exports.riding().every(2))
+    rows = [("START", 0.0, 0.0), ("PAUSE", 12.0, 12.0), ("START", 12.0, 72.0), ("PAUSE", 28.0, 88.0)]
+    files["meta/time.csv"] = '"event","experiment time","system time","system time text"\n' + "\n".join(
+        f'"{event}",{own:.9E},{START_UTC_S + utc:.15E},""' for event, own, utc in rows
+    )
+    found = api.import_recording(app_exports.into(tmp_path / "p.zip", files))
+    assert found.gaps_s == pytest.approx([60.0], abs=0.05)
+    assert found.log.t_s[-1] == pytest.approx(87.9, abs=0.1)
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet", "racechrono"])
+def test_kickstands_own_exports_come_back(tmp_path, form):
+    if form == "parquet":
+        pytest.importorskip("pyarrow")
+    ride = app_exports.riding().every(2)
+    speed = np.where(np.arange(len(ride.t_s)) % 100 == 0, ride.speed_mps, np.nan)
+    log = api.Log(ride.t_s, ride.phone_g, ride.rates_dps @ PHONE.T, speed)
+    out = tmp_path / f"out.{'parquet' if form == 'parquet' else 'csv'}"
+    api.export(api.open_ride(log, ON_PHONE), form, out)
+    found = api.import_recording(out)
+    assert found.vehicle_axes
+    assert np.allclose(found.log.accel_g, ride.force_g[: len(found.log.t_s)], atol=1e-3)
+    assert np.allclose(found.log.gyro_dps, ride.rates_dps[: len(found.log.t_s)], atol=2e-3)
+    there = np.isfinite(found.log.speed_mps)
+    assert np.allclose(found.log.speed_mps[there], ride.speed_mps[: len(there)][there], atol=2e-3)
+
+
+def test_a_log_comes_back_as_it_was_also_from_a_spreadsheet(tmp_path):
+    """Semicolons, decimal commas, and the columns that only an imported log has."""
+    ride = app_exports.riding().every(8)
+    names = "t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps,speed_mps,temp_c,lat_deg,lon_deg".split(",")
+    rows = np.column_stack((ride.t_s, ride.force_g, ride.rates_dps, ride.speed_mps, np.full(len(ride.t_s), 21.5)))
+    rows = np.column_stack((rows, ride.lat_deg, ride.lon_deg)).tolist()
+    (tmp_path / "log.csv").write_text(app_exports.lines(names, rows, ";", comma=True), encoding="utf-16")
+    found = api.import_recording(tmp_path / "log.csv")
+    assert found.app == "Kickstand"
+    assert np.allclose(found.log.accel_g, ride.force_g, atol=1e-6)
+    assert np.allclose(found.log.temperature_c, 21.5)
+    assert np.count_nonzero(np.isfinite(found.lat_deg)) > 500

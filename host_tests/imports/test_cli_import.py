@@ -1,0 +1,106 @@
+"""The command: what it took for what, and a log that every other command reads."""
+
+import json
+
+import app_exports
+import command
+import numpy as np
+import pytest
+from app_exports import PHONE, riding
+from kickstand_tools import api
+
+pytest.importorskip("pandas")
+
+
+def test_it_says_what_it_took_for_what(tmp_path):
+    source = app_exports.into(tmp_path / "p.zip", app_exports.phyphox(riding().every(2)))
+    result = command.works("import", source, "--out", tmp_path / "RIDE.csv")
+    words = " ".join(result.out.split())
+    assert words.startswith("phyphox quantity from unit rate axes and sign accelerometer Accelerometer.csv: X")
+    for part in ("m/s2", "100 Hz", "+1 g up, on every phone", "rad/s", "50 Hz", "Location.csv: Velocity", "1 Hz"):
+        assert part in words
+    assert f"written: {tmp_path / 'RIDE.csv'}, 2799 samples in 28.0 s, 100 a second" in result.out
+    assert result.err == ""
+
+
+def test_gaps_are_told(tmp_path):
+    ride = riding().every(2).without(10.0, 12.0)
+    result = command.works(
+        "import", app_exports.into(tmp_path / "p", app_exports.phyphox(ride)), "--out", tmp_path / "R.csv"
+    )
+    assert "100 a second, 1 gap of 2.0 s in all\n" in result.out
+
+
+def test_the_log_is_read_by_every_other_command(tmp_path):
+    """Packed, too."""
+    source = app_exports.into(tmp_path / "s.zip", app_exports.sensor_logger(riding().every(2), "ios"))
+    log, cal = tmp_path / "RIDE.csv.gz", tmp_path / "RIDE.cal.json"
+    command.works("import", source, "--out", log)
+    api.write_calibration(cal, api.CalibrationFile(vehicle_from_sensor=PHONE.T, aligned=True))
+    command.works("replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv")
+    lean = np.genfromtxt(tmp_path / "LEAN.csv", delimiter=",", names=True)
+    ride = riding()
+    wrong = lean["lean_deg"] - np.interp(lean["t_s"], ride.t_s, ride.lean_deg)
+    assert np.sqrt(np.mean(wrong**2)) < 0.5
+    report = json.loads(command.works("report", log, "--json").out)
+    assert report
+    for form in ("csv", "vbo", "racechrono"):
+        command.works("export", log, "--to", form, "--out", tmp_path / f"out.{form}")
+
+
+def test_vehicle_axes_are_said_and_need_no_other_alignment(tmp_path):
+    (tmp_path / "v.vbo").write_text(app_exports.vbo(riding().every(2)))
+    result = command.works("import", tmp_path / "v.vbo", "--out", tmp_path / "RIDE.csv")
+    assert "x is left, y up, z forward, as far as the logger was mounted so" in result.out
+    assert "VBO" in result.out
+    (position,) = [taken for taken in api.import_recording(tmp_path / "v.vbo").taken if taken.quantity == "position"]
+    assert position.unit == "minutes, west positive"
+
+
+def test_the_convention_is_in_the_help():
+    words = " ".join(command.works("import", "--help").out.split())
+    assert "At rest the axis that points up reads +1 g, and a rate is positive right-handed about its axis." in words
+
+
+@pytest.mark.filterwarnings("error::RuntimeWarning")
+def test_a_mutated_export_ends_in_a_log_or_in_one_line(tmp_path):
+    """Never in a traceback, a warning of numpy's, or a log that cannot be read."""
+    ride = riding().every(8).every(1, 100)
+    exports = [app_exports.racebox(ride), app_exports.vbo(ride), app_exports.aim(ride), app_exports.sensorlog(ride)]
+    exports += [app_exports.racechrono(ride), app_exports.sensor_kinetics(ride)["Ride_accm.csv"]]
+    random = np.random.default_rng(5)
+    tokens = [
+        b"nan",
+        b"inf",
+        b"1e308",
+        b"99999999999999999999",
+        b'"',
+        b",",
+        b";",
+        b"\n",
+        b"\x00",
+        b"-",
+        b"\xff\xfe",
+        b"25:61:99",
+    ]
+    gyro = app_exports.sensor_kinetics(ride)["Ride_gyrm.csv"]
+    ended = {"read": 0, "refused": 0}
+    for k in range(120):
+        content = exports[k % len(exports)].encode()
+        at = int(random.integers(500 if k % 3 else len(content)))
+        length = int(random.integers(300))
+        cut = [content[:at], content[at:], content[:at] + content[at + length :], content[: at + length] + content[at:]]
+        cut += [content[:at] + tokens[int(random.integers(len(tokens)))] + content[at + 2 :]] * 3
+        files = {"Ride_gyrm.csv": gyro} if k % len(exports) == 5 else {}
+        folder = app_exports.into(tmp_path / str(k), files)
+        folder.mkdir(exist_ok=True)
+        (folder / "Ride_accm.csv").write_bytes(cut[int(random.integers(len(cut)))])
+        try:
+            api.write_imported(tmp_path / "R.csv", api.import_recording(folder))
+        except api.InputError as error:
+            assert "\n" not in str(error).strip()
+            ended["refused"] += 1
+        else:
+            api.read_log(tmp_path / "R.csv")
+            ended["read"] += 1
+    assert min(ended.values()) > 20

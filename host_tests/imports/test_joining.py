@@ -1,0 +1,154 @@
+"""Sensors at rates of their own on one clock: nothing across a gap, nothing where one of them is missing."""
+
+import app_exports
+import command
+import numpy as np
+import pytest
+from app_exports import PHONE, riding
+from kickstand_tools import api
+from kickstand_tools.imports.join import join, on_clock
+from kickstand_tools.imports.recording import Recording, Sensor, Track
+
+pytest.importorskip("pandas")
+
+MS = 10**6
+
+
+def sensor(name: str, t_s: np.ndarray, column: np.ndarray | None = None) -> Sensor:
+    """One whose values are the time itself, times 1, 2 and 3."""
+    values = t_s if column is None else column
+    return Sensor(name, np.rint(t_s * 1e9).astype(np.int64), np.outer(values, [1.0, 2.0, 3.0]))
+
+
+def test_a_slower_gyro_is_interpolated_and_only_within_its_own_time():
+    accel = sensor("accelerometer", np.arange(0.0, 2.0, 0.01))
+    joined = join(Recording("none", accel, sensor("gyro", np.arange(0.333, 1.5, 0.025))), "log")
+    at_s = joined.time_ns * 1e-9
+    assert at_s[[0, -1]] == pytest.approx([0.34, 1.48])
+    assert joined.start_ns == 0
+    assert np.allclose(joined.gyro_dps, np.outer(at_s, [1.0, 2.0, 3.0]), atol=1e-9)
+    assert np.allclose(joined.accel_g, np.outer(at_s, [1.0, 2.0, 3.0]), atol=1e-9)
+
+
+def test_a_faster_gyro_is_averaged_over_each_sample():
+    """Vibration between two samples would else become a slow rate."""
+    t_s = np.arange(0.0, 4.0, 0.0025)
+    gyro = sensor("gyro", t_s, 10.0 * t_s + 50.0 * np.sin(2 * np.pi * 99.0 * t_s))
+    clock = np.arange(100, 390) * 10 * MS
+    found = on_clock(gyro, clock, 10.0 * MS)[:, 0]
+    assert np.max(np.abs(found - clock * 1e-8)) < 15.0
+    point = np.interp(clock * 1e-9, t_s, gyro.values[:, 0])
+    assert np.std(found - clock * 1e-8) < 0.3 * np.std(point - clock * 1e-8)
+
+
+def test_nothing_is_made_up_in_a_gap_of_either_sensor():
+    t_s = np.arange(0.0, 4.0, 0.01)
+    accel = sensor("accelerometer", t_s[(t_s < 1.0) | (t_s > 1.5)])
+    gyro = sensor("gyro", t_s[(t_s < 2.0) | (t_s > 2.6)])
+    joined = join(Recording("none", accel, gyro), "log")
+    steps_s = np.diff(joined.time_ns) * 1e-9
+    assert steps_s[steps_s > 0.02] == pytest.approx([0.52, 0.62], abs=0.02)
+
+
+def test_a_gyro_that_misses_a_sample_or_two_is_no_gap():
+    t_s = np.arange(0.0, 2.0, 0.01)
+    joined = join(Recording("none", sensor("a", t_s), sensor("g", t_s[(t_s < 1.0) | (t_s > 1.1)])), "log")
+    assert len(joined.time_ns) == len(t_s)
+
+
+def test_a_fix_stands_in_the_row_nearest_to_it_and_nowhere_else():
+    t_s = np.arange(0.0, 5.0, 0.01)
+    fix_s = np.array([-3.0, 0.504, 1.5, 2.507, 9.0])
+    track = Track(
+        np.rint(fix_s * 1e9).astype(np.int64),
+        fix_s + 10.0,
+        np.full(5, 52.0),
+        np.array([13.0, 13.1, np.nan, 13.3, 13.4]),
+    )
+    joined = join(Recording("none", sensor("a", t_s), sensor("g", t_s), track, utc_ns=10**18), "log")
+    rows = np.flatnonzero(np.isfinite(joined.speed_mps))
+    assert rows.tolist() == [50, 150, 251]
+    assert joined.speed_mps[rows] == pytest.approx([10.504, 11.5, 12.507])
+    assert np.flatnonzero(np.isfinite(joined.lon_deg)).tolist() == [50, 251]
+    assert joined.utc_s[rows] - 1e9 == pytest.approx([0.5, 1.5, 2.51])
+
+
+def test_speeds_and_places_that_mean_none():
+    """A phone writes -1 for a speed that it does not know; 0, 0 is in the sea."""
+    t_ns = np.arange(4) * 10**9
+    track = Track(
+        t_ns, np.array([-1.0, 3.0, -1.0, 4.0]), np.array([0.0, 52.0, 91.0, 52.1]), np.array([0.0, 13.0, 13.0, 13.1])
+    )
+    assert track.speed_mps.tolist() == [3.0, 4.0]
+    assert track.lat_deg.tolist() == [52.0, 52.1]
+
+
+def test_a_standstill_is_said_once_a_second():
+    """A logger that repeats its receiver's values in each row says nothing new with them."""
+    track = Track(np.arange(80) * 50 * MS, np.repeat([0.0, 5.0], 40), np.full(80, 52.0), np.full(80, 13.0))
+    assert (track.time_ns // MS).tolist() == [0, 1000, 2000, 3000]
+    assert track.speed_mps.tolist() == [0.0, 0.0, 5.0, 5.0]
+
+
+def test_rounded_and_repeated_times_are_spread(tmp_path):
+    """Sensor Kinetics writes four decimals, and one time for several samples."""
+    ride = riding()
+    found = api.import_recording(app_exports.into(tmp_path / "k", app_exports.sensor_kinetics(ride)))
+    steps = np.diff(found.log.t_s)
+    assert steps.min() > 0.002
+    assert len(found.log.t_s) >= len(ride.t_s) - 3
+
+
+def test_samples_that_come_late_are_put_in_order(tmp_path):
+    ride = riding().every(4)
+    lines = app_exports.any_table(ride).splitlines()
+    lines[101], lines[103] = lines[103], lines[101]
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    names = {"t": "Millis", "ax": "Acc_X", "ay": "Acc_Y", "az": "Acc_Z", "gx": "Gyro_X", "gy": "Gyro_Y", "gz": "Gyro_Z"}
+    found = api.import_recording(tmp_path / "log.csv", names, {"a": "m/s2", "g": "rad/s"})
+    assert np.allclose(found.log.accel_g, ride.phone_g, atol=1e-5)
+
+
+def test_a_damaged_row_costs_no_more_than_itself(tmp_path):
+    """A cut last line, a time from nowhere, a reading past any sensor's, a word."""
+    ride = riding().every(4)
+    lines = app_exports.racebox(ride).splitlines()
+    lines[200] = lines[200].replace("2024-05-17", "2031-05-17")
+    lines[300] = ",".join([*lines[300].split(",")[:6], "99.9", *lines[300].split(",")[7:]])
+    lines[400] = lines[400].replace(lines[400].split(",")[6], "oops", 1)
+    lines[-1] = lines[-1][:60]
+    (tmp_path / "r.csv").write_text("\n".join(lines))
+    found = api.import_recording(tmp_path / "r.csv")
+    assert len(found.log.t_s) == len(ride.t_s) - 4
+    assert [(notice.code, notice.values) for notice in found.notices] == [("import-damaged", (2,))]
+    assert np.max(np.abs(found.log.accel_g)) < 2.0
+
+
+def test_from_and_to_count_from_the_recordings_own_start(tmp_path):
+    source = app_exports.into(tmp_path / "s.zip", app_exports.sensor_logger(riding().every(2)))
+    out = tmp_path / "RIDE.csv"
+    command.works("import", source, "--out", out, "--from", 5, "--to", 12.5)
+    table = np.genfromtxt(out, delimiter=",", names=True)
+    assert table["t_s"][[0, -1]] == pytest.approx([5.0, 12.5])
+    whole = api.import_recording(source)
+    assert table["ax_g"][0] == pytest.approx(whole.log.accel_g[np.searchsorted(whole.log.t_s + 0.01, 5.0), 0], abs=1e-5)
+    told = np.flatnonzero(np.isfinite(table["utc_s"]))
+    assert table["utc_s"][told[0]] - table["t_s"][told[0]] == pytest.approx(app_exports.START_UTC_S, abs=0.02)
+    late = ["--from", 100]
+    command.refused(
+        tmp_path, "import", source, "--out", out, *late, words="lasts 28.0 s: there is nothing from 100 s on"
+    )
+
+
+def test_a_real_ride_as_a_phone_would_export_it(tmp_path, shared_data):
+    """The same readings from the log and from an iPhone's Sensor Logger export of it."""
+    log = api.read_log(shared_data / "motorcycle-ride.csv.gz")
+    none = np.zeros(len(log.t_s))
+    turned = app_exports.Riding(log.t_s, log.accel_g @ PHONE, log.gyro_dps @ PHONE, none, none, none, none)
+    files = app_exports.sensor_logger(turned, "ios")
+    found = api.import_recording(app_exports.into(tmp_path / "s.zip", files | {"Location.csv": ""}))
+    at_s = found.log.t_s + found.log.start_s
+    for axis in range(3):
+        assert np.max(np.abs(found.log.accel_g[:, axis] - np.interp(at_s, log.t_s, log.accel_g[:, axis]))) < 1e-4
+        between = np.abs(found.log.gyro_dps[:, axis] - np.interp(at_s, log.t_s, log.gyro_dps[:, axis]))
+        assert np.median(between) < 1.0  # its gyro has half the rate

@@ -1,0 +1,227 @@
+"""What cannot be imported is refused in one line that says what to do, and nothing is written."""
+
+import sys
+import zipfile
+
+import app_exports
+import command
+import numpy as np
+import pytest
+from app_exports import riding
+from kickstand_tools import api
+
+pytest.importorskip("pandas")
+
+
+@pytest.fixture
+def ride():
+    return riding().every(4)
+
+
+def refused(directory, source, words, *more):
+    return command.refused(directory, "import", source, "--out", directory / "RIDE.csv", *more, words=words)
+
+
+def test_what_is_not_there(tmp_path):
+    refused(tmp_path, tmp_path / "none.zip", "there is no such file")
+
+
+def test_an_empty_folder_and_one_of_pictures(tmp_path):
+    (tmp_path / "in").mkdir()
+    refused(
+        tmp_path, tmp_path / "in", "holds no recording: give the file, the folder or the zip that an app has exported"
+    )
+    (tmp_path / "in" / "a.jpg").write_bytes(b"\xff\xd8")
+    refused(tmp_path, tmp_path / "in", "holds no recording")
+
+
+@pytest.mark.parametrize("keep", [0.1, 0.5, 0.99])
+def test_a_cut_zip(tmp_path, ride, keep):
+    source = app_exports.into(tmp_path / "p.zip", app_exports.phyphox(ride))
+    source.write_bytes(source.read_bytes()[: int(keep * source.stat().st_size)])
+    refused(tmp_path, source, "p.zip is damaged or cut short: copy it again")
+
+
+def test_a_zip_with_damaged_bytes(tmp_path, ride):
+    source = app_exports.into(tmp_path / "p.zip", app_exports.phyphox(ride))
+    content = bytearray(source.read_bytes())
+    content[2000:2050] = bytes(50)
+    source.write_bytes(content)
+    refused(tmp_path, source, "p.zip is damaged or cut short: copy it again")
+
+
+def test_a_cut_gzip_and_a_picture(tmp_path):
+    (tmp_path / "a.csv.gz").write_bytes(b"\x1f\x8b\x08\x00\x00\x00\x00\x00")
+    refused(tmp_path, tmp_path / "a.csv.gz", "a.csv.gz is damaged or cut short")
+    (tmp_path / "a.png").write_bytes(bytes(range(256)) * 4)
+    refused(tmp_path, tmp_path / "a.png", "not text: give what an app has exported as CSV or VBO")
+    (tmp_path / "a.csv").write_text("")
+    refused(tmp_path, tmp_path / "a.csv", "holds no recording")
+
+
+def test_two_recordings_in_one_folder(tmp_path, ride):
+    for name in "monday", "tuesday":
+        app_exports.into(tmp_path / "all" / name, app_exports.phyphox(ride))
+    line = refused(tmp_path, tmp_path / "all", "holds 2 recordings (monday, tuesday): give one of them")
+    assert line.count("\n") == 1
+    assert api.import_recording(tmp_path / "all" / "monday").app == "phyphox"
+
+
+def test_two_recordings_of_different_apps_and_two_of_one_folder(tmp_path, ride):
+    folder = app_exports.into(tmp_path / "in", {"a.csv": app_exports.racebox(ride), "b.vbo": app_exports.vbo(ride)})
+    refused(tmp_path, folder, "holds 2 recordings (b.vbo, a.csv): give one of them")
+    files = app_exports.sensor_kinetics(ride)
+    files |= {name.replace("Ride", "Home"): text for name, text in files.items()}
+    refused(tmp_path, app_exports.into(tmp_path / "k", files), "holds 2 recordings")
+
+
+def test_two_zips_in_a_folder_and_one(tmp_path, ride):
+    (tmp_path / "in").mkdir()
+    app_exports.into(tmp_path / "in" / "a.zip", app_exports.phyphox(ride))
+    assert api.import_recording(tmp_path / "in").app == "phyphox"
+    app_exports.into(tmp_path / "in" / "b.zip", app_exports.phyphox(ride))
+    refused(tmp_path, tmp_path / "in", "holds 2 zip files: give one of them, such as")
+
+
+def test_other_files_in_the_folder_do_not_matter(tmp_path, ride):
+    files = app_exports.phyphox(ride) | {
+        "notes.txt": "it rained",
+        "__MACOSX/._Gyroscope.csv": "x",
+        "Camera/list.csv": "a,b\n",
+    }
+    folder = app_exports.into(tmp_path / "in", files)
+    (folder / "strange.csv").write_bytes(bytes(range(256)))
+    assert api.import_recording(folder).app == "phyphox"
+
+
+def without(files, *names):
+    return {name: text for name, text in files.items() if name not in names}
+
+
+def column_cut(text, name):
+    """A CSV in which a column has another name."""
+    head, _, rest = text.partition("\n")
+    return head.replace(name, "Other") + "\n" + rest
+
+
+LACKING = {
+    "phyphox gyro": (
+        lambda r: without(app_exports.phyphox(r), "Gyroscope.csv"),
+        "no gyroscope: add it to the experiment",
+    ),
+    "phyphox accelerometer": (
+        lambda r: without(app_exports.phyphox(r), "Accelerometer.csv", "Linear Accelerometer.csv"),
+        "no acceleration: add the accelerometer",
+    ),
+    "Sensor Logger gyro": (
+        lambda r: without(app_exports.sensor_logger(r), "Gyroscope.csv"),
+        "no Gyroscope.csv: switch the gyroscope on",
+    ),
+    "Sensor Logger accelerometer": (
+        lambda r: without(app_exports.sensor_logger(r), "TotalAcceleration.csv", "Accelerometer.csv", "Gravity.csv"),
+        "no acceleration: switch Accelerometer and Gravity on",
+    ),
+    "Sensor Kinetics gyro": (
+        lambda r: without(app_exports.sensor_kinetics(r), "Ride_gyrm.csv"),
+        "no gyroscope: give the folder or the zip with NAME_accm.csv and NAME_gyrm.csv",
+    ),
+    "SensorLog gyro": (
+        lambda r: {"s.csv": app_exports.sensorlog(r).replace("RotationRate", "Turning")},
+        "no gyroRotation or motionRotationRate in it: log the gyro, too",
+    ),
+    "RaceChrono": (
+        lambda r: {"r.csv": app_exports.racechrono(r).replace("x_acc", "w_acc")},
+        "no x_acc to z_acc and x_rate_of_rotation to z_rate_of_rotation in it",
+    ),
+    "RaceBox gyro": (
+        lambda r: {"r.csv": column_cut(app_exports.racebox(r), "GyroZ")},
+        "no GyroX to GyroZ: export it from RaceBox's app on the phone",
+    ),
+    "RaceBox motorcycle mode": (
+        lambda r: {"r.csv": app_exports.racebox(r, motorcycle=True)},
+        "no GForceY or GForceZ, as in its motorcycle mode: export it with that mode off",
+    ),
+    "VBO": (
+        lambda r: {"v.vbo": app_exports.vbo(r, inertial=False)},
+        "no channel Y_Accel, Z_Accel, X_Accel, PitchRate, YawRate, RollRate",
+    ),
+    "AiM": (
+        lambda r: {"a.csv": app_exports.aim(r).replace('"YawRate"', '"Oil"')},
+        "no channel YawRate: export the accelerometer's and the gyro's three channels each",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LACKING)
+def test_what_a_recording_lacks_is_said(tmp_path, ride, name):
+    files, words = LACKING[name]
+    refused(tmp_path, app_exports.into(tmp_path / "in.zip", files(ride)), words)
+
+
+def test_sensors_that_were_not_recorded_together(tmp_path, ride):
+    files = app_exports.sensor_kinetics(ride)
+    later = app_exports.sensor_kinetics(ride)["Ride_gyrm.csv"].splitlines()
+    rows = [f"{float(row.split(',')[0]) + 600:.4f},{row.partition(',')[2]}" for row in later[1:]]
+    files["Ride_gyrm.csv"] = "\n".join([later[0], *rows])
+    refused(tmp_path, app_exports.into(tmp_path / "k", files), "have no time in common: were they recorded together?")
+
+
+def test_a_table_without_rows(tmp_path):
+    (tmp_path / "r.csv").write_text("Record,Time,Latitude,Longitude,Speed,GForceX,GForceY,GForceZ,GyroX,GyroY,GyroZ\n")
+    refused(tmp_path, tmp_path / "r.csv", "no rows under the names of the columns: was anything recorded?")
+
+
+def test_a_replays_output_and_kickstands_own_vbo(tmp_path, ride):
+    log = api.Log(ride.t_s, ride.force_g, ride.rates_dps)
+    calibration = api.CalibrationFile(aligned=True)
+    api.export(api.open_ride(log, calibration), "vbo", tmp_path / "r.vbo")
+    words = "no channel Y_Accel, Z_Accel, X_Accel, PitchRate"
+    line = refused(tmp_path, tmp_path / "r.vbo", words)
+    assert "take the log that it was made from" in line
+    command.still(tmp_path / "log.csv", (0, 1, 0))
+    cal = command.write_cal(tmp_path / "CAL.json")
+    command.works("replay", tmp_path / "log.csv", "--calibration", cal, "--out", tmp_path / "LEAN.csv")
+    refused(tmp_path, tmp_path / "LEAN.csv", "holds the lean that kickstand has computed: give the log")
+
+
+def test_units_that_are_known_are_not_asked_for(tmp_path, ride):
+    source = app_exports.into(tmp_path / "p.zip", app_exports.phyphox(ride))
+    refused(tmp_path, source, "is phyphox's, whose units are known: leave --units out", "--units", "a=g")
+    refused(tmp_path, source, "holds 6 files: give --columns with one, such as", "--columns", "t=a")
+
+
+def test_a_speed_whose_unit_nothing_tells_is_left_out_or_given(tmp_path, ride):
+    ride.lat_deg = ride.lon_deg = np.zeros(len(ride.t_s))
+    (tmp_path / "r.csv").write_text(app_exports.racebox(ride))
+    out = tmp_path / "RIDE.csv"
+    result = command.works("import", tmp_path / "r.csv", "--out", out)
+    assert "Speed has no unit, and the positions do not tell it, so the speed is left out" in result.err
+    assert "speed_mps" not in out.read_text()[:200]
+    result = command.works("import", tmp_path / "r.csv", "--out", out, "--units", "speed=km/h")
+    assert result.err == ""
+    assert np.nanmax(api.read_log(out).speed_mps) == pytest.approx(14.0, abs=0.05)
+    command.refused(tmp_path, "import", tmp_path / "r.csv", "--out", out, "--units", "speed=furlongs", words="km/h")
+
+
+def test_an_input_is_never_written_over(tmp_path, ride):
+    folder = app_exports.into(tmp_path / "in", app_exports.phyphox(ride))
+    out = ["--out", folder / "Gyroscope.csv"]
+    command.refused(tmp_path, "import", folder, *out, words="is also an input: give --out another name")
+    out = ["--out", tmp_path / "no" / "RIDE.csv"]
+    command.refused(tmp_path, "import", folder, *out, words="make it first")
+
+
+def test_a_zip_with_a_password(tmp_path):
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as archive:
+        archive.writestr("a.csv", "time,x\n0,1\n")
+    content = bytearray((tmp_path / "a.zip").read_bytes())
+    for mark, place in ((b"PK\x03\x04", 6), (b"PK\x01\x02", 8)):
+        content[content.index(mark) + place] |= 1  # the flag of an encrypted entry
+    (tmp_path / "a.zip").write_bytes(content)
+    refused(tmp_path, tmp_path / "a.zip", "is packed with a password, or in another way: unpack it first")
+
+
+def test_without_pandas_the_extra_is_named(tmp_path, ride, monkeypatch):
+    (tmp_path / "r.csv").write_text(app_exports.racebox(ride))
+    monkeypatch.setitem(sys.modules, "pandas", None)
+    refused(tmp_path, tmp_path / "r.csv", "import needs pandas: ")

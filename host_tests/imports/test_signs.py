@@ -1,0 +1,150 @@
+"""At rest the axis that points up reads +1 g, whatever the app writes; and gravity is never missing."""
+
+import app_exports
+import command
+import numpy as np
+import pytest
+from app_exports import PHONE, riding
+from kickstand_tools import api
+from kickstand_tools.imports.course import course_agrees
+
+pytest.importorskip("pandas")
+
+
+def up_at_rest(found: api.Imported) -> np.ndarray:
+    """The mean force of the first second, in which the motorcycle stands upright."""
+    return found.log.accel_g[found.log.t_s < 1.0].mean(axis=0)
+
+
+UP = PHONE @ [0.0, 1.0, 0.0]
+
+
+@pytest.mark.parametrize(("platform", "standard"), [("android", False), ("ios", False), ("ios", True)])
+def test_sensor_logger_says_whose_signs_it_has(tmp_path, platform, standard):
+    files = app_exports.sensor_logger(riding().every(4), platform, standard)
+    found = api.import_recording(app_exports.into(tmp_path / "s", files))
+    assert up_at_rest(found) == pytest.approx(UP, abs=0.02)
+    assert not found.notices
+
+
+def test_sensor_loggers_raw_accelerometer_is_in_g_on_an_iphone(tmp_path):
+    ride = riding().every(4)
+    files = app_exports.sensor_logger(ride, "ios")
+    rows = [
+        (f"{1715938200250 + 20 * k}000000", t, *row[::-1]) for k, (t, row) in enumerate(zip(ride.t_s, -ride.phone_g))
+    ]
+    files["AccelerometerUncalibrated.csv"] = app_exports.lines(["time", "seconds_elapsed", "z", "y", "x"], rows)
+    del files["Gravity.csv"]
+    found = api.import_recording(app_exports.into(tmp_path / "s", files))
+    assert up_at_rest(found) == pytest.approx(UP, abs=0.02)
+
+
+def test_without_the_platform_sensor_logger_is_refused(tmp_path):
+    files = app_exports.sensor_logger(riding().every(4), "ios")
+    del files["Metadata.csv"]
+    with pytest.raises(api.InputError, match=r"Metadata\.csv is missing.*opposite signs"):
+        api.import_recording(app_exports.into(tmp_path / "s", files))
+
+
+@pytest.mark.parametrize("app", ["phyphox", "sensor_logger", "sensor_kinetics", "sensorlog"])
+def test_acceleration_without_gravity_is_put_together_or_refused(tmp_path, app):
+    ride = riding().every(4)
+    if app == "sensorlog":
+        whole = app_exports.sensorlog(ride, accelerometer=False)
+        files = [{"s.csv": whole}, {"s.csv": whole.replace("motionGravity", "motionHeading")}]
+    else:
+        exported = getattr(app_exports, app)(ride, **({"platform": "ios"} if app == "sensor_logger" else {}))
+        exported.pop("Accelerometer.csv" if app == "phyphox" else "Ride_accm.csv", None)
+        if app == "phyphox":
+            exported["Gravity.csv"] = app_exports.lines(
+                ["Time (s)", *[f"Gravity {axis} (m/s^2)" for axis in "XYZ"]],
+                np.column_stack((ride.t_s, 9.81 * ride.gravity_g)).tolist(),
+            )
+        gone = [name for name in exported if name in ("Gravity.csv", "Ride_grvm.csv")]
+        files = [exported, {name: text for name, text in exported.items() if name not in gone}]
+    found = api.import_recording(app_exports.into(tmp_path / "both", files[0]))
+    assert up_at_rest(found) == pytest.approx(UP, abs=0.02)
+    assert "gravity added" in found.taken[0].sign
+    out = tmp_path / "RIDE.csv"
+    linear = app_exports.into(tmp_path / "linear", files[1])
+    words = "gravity has been taken off its"
+    assert "without it there is no lean: " in command.refused(tmp_path, "import", linear, "--out", out, words=words)
+
+
+def test_a_table_without_gravity_is_refused(tmp_path):
+    """By its size, where no name says it."""
+    ride = riding().every(4)
+    rows = np.column_stack((ride.t_s, ride.phone_g - ride.gravity_g, ride.phone_rad)).tolist()
+    (tmp_path / "log.csv").write_text(app_exports.lines(list("tabcpqr"), rows))
+    columns = {"t": "t", "ax": "a", "ay": "b", "az": "c", "gx": "p", "gy": "q", "gz": "r"}
+    with pytest.raises(api.InputError, match="gravity has been taken off, and without it there is no lean"):
+        api.import_recording(tmp_path / "log.csv", columns, {"a": "g", "g": "rad/s"})
+
+
+def test_a_unit_that_is_wrong_is_noticed(tmp_path):
+    (tmp_path / "log.csv").write_text(app_exports.any_table(riding().every(4)))
+    names = {"t": "Millis", "ax": "Acc_X", "ay": "Acc_Y", "az": "Acc_Z", "gx": "Gyro_X", "gy": "Gyro_Y", "gz": "Gyro_Z"}
+    with pytest.raises(api.InputError, match=r"its acceleration is 1\d\.\d g as a rule, where gravity makes it 1"):
+        api.import_recording(tmp_path / "log.csv", names, {"a": "g", "g": "rad/s"})
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_turns_of_the_track_tell_the_sign_where_no_maker_does(tmp_path, sign):
+    (tmp_path / "r.csv").write_text(app_exports.racechrono(riding().every(2), sign))
+    found = api.import_recording(tmp_path / "r.csv")
+    assert up_at_rest(found) == pytest.approx(UP, abs=0.02)
+    assert found.taken[0].sign.startswith(f"{sign:+.0f} g up, by the turns of the track")
+    assert not found.notices
+
+
+def test_a_mirrored_export_of_a_known_app_is_remarked_on(tmp_path):
+    """Its sign is known, so that something else is wrong: nothing is turned."""
+    ride = riding().every(2)
+    ride.force_g = -ride.force_g
+    found = api.import_recording(app_exports.into(tmp_path / "p.zip", app_exports.phyphox(ride)))
+    assert [notice.code for notice in found.notices] == ["import-mirrored"]
+    assert "left and right are exchanged" in api.sentence(found.notices[0])
+    assert up_at_rest(found) == pytest.approx(-UP, abs=0.02)
+
+
+def test_without_a_track_an_uncertain_sign_is_said_and_can_be_turned(tmp_path):
+    ride = riding().every(2)
+    ride.force_g = -ride.force_g  # as an iPhone might
+    folder = app_exports.into(tmp_path / "k", app_exports.sensor_kinetics(ride))
+    result = command.works("import", folder, "--out", tmp_path / "RIDE.csv")
+    assert "warning: " in result.err
+    assert "--units a=-g or a=-m/s2 puts it right" in result.err
+    found = api.import_recording(folder, units={"a": "-m/s2"})
+    assert up_at_rest(found) == pytest.approx(UP, abs=0.02)
+    assert not found.notices
+
+
+def test_no_turns_tell_no_sign(tmp_path):
+    """Straight on: the same warning as without a track."""
+    ride = riding().every(2)
+    ride.lat_deg, ride.lon_deg = 52.5 + 1e-5 * ride.t_s, np.full(len(ride.t_s), 13.4)
+    (tmp_path / "r.csv").write_text(app_exports.racechrono(ride))
+    assert [notice.code for notice in api.import_recording(tmp_path / "r.csv").notices] == ["import-sign"]
+
+
+@pytest.mark.parametrize("late_s", [0.0, 1.0, 2.0])
+def test_the_track_may_be_late(tmp_path, late_s):
+    ride = riding().every(2)
+    for name in ("lat_deg", "lon_deg"):
+        setattr(ride, name, np.interp(ride.t_s - late_s, ride.t_s, getattr(ride, name)))
+    (tmp_path / "r.csv").write_text(app_exports.racechrono(ride, -1.0))
+    assert up_at_rest(api.import_recording(tmp_path / "r.csv")) == pytest.approx(UP, abs=0.02)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 1.0, 1.5, 2.0])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_swerves_that_come_late_are_not_taken_for_the_opposite_ones(sign, late_s):
+    """Four seconds from left to right and back: 2 s late, the track turns the other way."""
+    t_s = np.arange(0.0, 60.0, 0.02)
+    yaw_dps = 20.0 * np.sin(2 * np.pi * t_s / 4.0 + np.sin(t_s / 7.0))
+    course = np.cumsum(np.radians(yaw_dps)) * 0.02
+    east, north = (np.cumsum(10.0 * wave(course)) * 0.02 for wave in (np.cos, np.sin))
+    places = 1e-5 * north, 1e-5 * east
+    lat, lon = (np.where(np.arange(3000) % 50 == 0, np.interp(t_s - late_s, t_s, place), np.nan) for place in places)
+    rates = np.column_stack((0 * t_s, yaw_dps, 0 * t_s))
+    assert course_agrees(t_s, np.tile([0.0, sign, 0.0], (3000, 1)), rates, lat, lon) is (sign > 0)

@@ -1,0 +1,199 @@
+"""Tables of anybody: separators, decimal marks, letters, units, times; what is said of a file that nobody knows."""
+
+import shlex
+
+import app_exports
+import command
+import numpy as np
+import pytest
+from app_exports import riding
+from kickstand_tools import api
+from kickstand_tools.imports import times, units
+
+pandas = pytest.importorskip("pandas")
+
+NAMES = {
+    "t": "Millis",
+    "ax": "Acc_X",
+    "ay": "Acc_Y",
+    "az": "Acc_Z",
+    "gx": "Gyro_X",
+    "gy": "Gyro_Y",
+    "gz": "Gyro_Z",
+    "speed": "Speed_kmh",
+}
+UNITS = {"a": "m/s2", "g": "rad/s", "speed": "km/h"}
+COLUMNS = ",".join(f"{key}={name}" for key, name in NAMES.items())
+DRESSES = {
+    "commas": (",", False, "utf-8", "\n"),
+    "semicolons": (";", False, "utf-8", "\r\n"),
+    "semicolons and decimal commas": (";", True, "utf-8", "\n"),
+    "tabs and decimal commas": ("\t", True, "utf-8", "\n"),
+    "byte order mark": (",", False, "utf-8-sig", "\n"),
+    "UTF-16": (";", True, "utf-16", "\r\n"),
+    "UTF-16 without its mark": (",", False, "utf-16-le", "\n"),
+    "carriage returns": (",", False, "utf-8", "\r"),
+}
+
+
+@pytest.mark.parametrize("name", DRESSES)
+def test_the_same_table_in_another_dress_is_the_same_ride(tmp_path, name):
+    separator, comma, encoding, end = DRESSES[name]
+    ride = riding().every(4)
+    text = app_exports.any_table(ride, separator, comma).replace("\n", end)
+    (tmp_path / "log.csv").write_bytes(text.encode(encoding))
+    found = api.import_recording(tmp_path / "log.csv", NAMES, UNITS)
+    assert np.allclose(found.log.accel_g, ride.phone_g, atol=1e-5)
+    assert np.allclose(found.log.gyro_dps, np.degrees(ride.phone_rad), atol=1e-4)
+    there = np.isfinite(found.log.speed_mps)
+    assert np.count_nonzero(there) == 14
+    assert np.allclose(found.log.speed_mps[there], ride.speed_mps[there], atol=1e-3)
+
+
+def test_lines_before_the_names_and_columns_by_number(tmp_path):
+    ride = riding().every(4)
+    (tmp_path / "log.csv").write_text("Logger 3000\n\nMade,by nobody\n" + app_exports.any_table(ride))
+    by_number = {key: f"#{k + 1}" for k, key in enumerate(NAMES)}
+    for names in NAMES, by_number:
+        found = api.import_recording(tmp_path / "log.csv", names, UNITS)
+        assert np.allclose(found.log.accel_g, ride.phone_g, atol=1e-5)
+
+
+def test_units_in_brackets_need_no_others(tmp_path):
+    ride = riding().every(4)
+    head = ["Time [ms]", "X (m/s^2)", "Y (m/s²)", "Z (m/s2)", "P (°/s)", "Q (dps)", "R (deg/s)", "v (km/h)"]
+    columns = (1000 * ride.t_s, app_exports.G * ride.phone_g, np.degrees(ride.phone_rad), 3.6 * ride.speed_mps)
+    (tmp_path / "log.csv").write_text(app_exports.lines(head, np.column_stack(columns).tolist()), encoding="utf-8")
+    names = dict(zip((*list(NAMES),), ("Time", "X", "Y", "Z", "P", "Q", "R", "v")))
+    found = api.import_recording(tmp_path / "log.csv", names)
+    assert np.allclose(found.log.accel_g, ride.phone_g, atol=1e-5)
+    assert np.allclose(found.log.gyro_dps, np.degrees(ride.phone_rad), atol=1e-4)
+    assert [taken.unit for taken in found.taken] == ["m/s^2, m/s², m/s2", "°/s, dps, deg/s", "km/h"]
+
+
+def test_a_minus_turns_all_axes_or_one(tmp_path):
+    ride = riding().every(4)
+    (tmp_path / "log.csv").write_text(app_exports.any_table(ride))
+    found = api.import_recording(tmp_path / "log.csv", NAMES, UNITS | {"a": "-m/s2", "gz": "-rad/s"})
+    assert np.allclose(found.log.accel_g, -ride.phone_g, atol=1e-5)
+    assert np.allclose(found.log.gyro_dps, np.degrees(ride.phone_rad) * [1.0, 1.0, -1.0], atol=1e-4)
+    assert [taken.sign for taken in found.taken] == ["turned", "turned in part", ""]
+
+
+SPEEDS = {"m/s": 1.0, "km/h": 3.6, "kph": 3.6, "mph": 2.236936, "knots": 1.943844, "kt": 1.943844}
+
+
+@pytest.mark.parametrize("unit", SPEEDS)
+def test_speeds(tmp_path, unit):
+    ride = riding().every(4)
+    rows = np.column_stack((ride.t_s, ride.phone_g, np.degrees(ride.phone_rad), SPEEDS[unit] * ride.speed_mps))
+    (tmp_path / "log.csv").write_text(app_exports.lines(list("tabcpqrv"), rows.tolist()))
+    names = dict(zip(NAMES, "tabcpqrv"))
+    found = api.import_recording(tmp_path / "log.csv", names, {"a": "g", "g": "deg/s", "speed": unit})
+    assert np.nanmax(found.log.speed_mps) == pytest.approx(14.0, abs=0.01)
+
+
+def test_positions_in_minutes(tmp_path):
+    ride = riding().every(4)
+    columns = (ride.t_s, ride.phone_g, np.degrees(ride.phone_rad), 60 * ride.lat_deg, -60 * ride.lon_deg)
+    (tmp_path / "log.csv").write_text(app_exports.lines(list("tabcpqruv"), np.column_stack(columns).tolist()))
+    keys: list[str] = ["t", "ax", "ay", "az", "gx", "gy", "gz", "lat", "lon"]
+    names = dict(zip(keys, "tabcpqruv"))
+    found = api.import_recording(tmp_path / "log.csv", names, {"a": "g", "g": "deg/s", "lat": "min", "lon": "-min"})
+    assert np.nanmin(found.lat_deg) == pytest.approx(ride.lat_deg.min(), abs=1e-5)
+    assert np.nanmin(found.lon_deg) == pytest.approx(ride.lon_deg.min(), abs=1e-5)
+
+
+START_NS = 1_715_938_200_250_000_000
+TIMES = {
+    "s": [f"{0.01 * k:.2f}" for k in range(9)],
+    "ms": [str(10 * k) for k in range(9)],
+    "us": [str(10_000 * k) for k in range(9)],
+    "ns": [str(10_000_000 * k) for k in range(9)],
+    "s since 1970": [f"{1_715_938_200.25 + 0.01 * k:.2f}" for k in range(9)],
+    "ms since 1970": [str(START_NS // 10**6 + 10 * k) for k in range(9)],
+    "us since 1970": [str(START_NS // 1000 + 10_000 * k) for k in range(9)],
+    "ns since 1970": [str(START_NS + 10_000_000 * k) for k in range(9)],
+    "UTC": [f"2024-05-17T09:30:00.{25 + k}Z" for k in range(9)],
+    "a zone": [f"2024-05-17 11:30:00.{25 + k}0 +0200" for k in range(9)],
+    "no zone": [f"2024-05-17 09:30:00.{25 + k}" for k in range(9)],
+    "a clock": [f"23:59:59.{96 + k}" if k < 4 else f"00:00:00.0{k - 4}" for k in range(9)],
+    "minutes": [f"12:00.0{k}" for k in range(9)],
+}
+
+
+@pytest.mark.parametrize("name", TIMES)
+def test_times_of_any_kind_without_a_unit(name):
+    found = times.times_ns(pandas.Series(TIMES[name]))
+    assert np.allclose(np.diff(found), 10_000_000, atol=600)  # of a double in ns since 1970
+    if "1970" in name or "zone" in name or name == "UTC":
+        assert found[0] == pytest.approx(START_NS, abs=600)
+
+
+def test_slow_recorders_in_ms_are_not_taken_for_seconds():
+    """Ten and twenty-five samples a second, and as fast as 400."""
+    for step, unit in ((100, 1e6), (40, 1e6), (2.5, 1e6), (0.1, 1e9), (0.0025, 1e9), (100_000, 1e3), (2500, 1e3)):
+        found = times.times_ns(pandas.Series([step * k for k in range(20)]))
+        assert np.allclose(np.diff(found), step * unit), (step, unit)
+
+
+def test_a_cell_without_a_time():
+    found = times.times_ns(pandas.Series(["0.0", "0.01", "", "x", "1e300", "inf", "0.06"]))
+    assert (found == times.NO_TIME).tolist() == [False, False, True, True, True, True, False]
+
+
+@pytest.mark.parametrize(
+    ("text", "want"),
+    [("m/s^2", "m/s2"), ("m s-2", "m/s2"), ("G", "g"), ("°/s", "deg/s"), ("KM/H", "km/h"), ("μs", "us")],
+)
+def test_spellings_of_units(text, want):
+    assert units.unit(text) == want
+
+
+def test_a_table_that_nobody_knows_is_met_with_the_line_to_type(tmp_path, monkeypatch):
+    """And the line, typed as it stands, works."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "my log.csv").write_text(app_exports.any_table(riding().every(4)))
+    line = command.refused(
+        tmp_path, "import", "my log.csv", "--out", "R.csv", words="not a file of an app that is known"
+    )
+    assert "Its columns: Millis, Acc_X, Acc_Y, Acc_Z, Gyro_X, Gyro_Y, Gyro_Z, Speed_kmh, Note" in line
+    typed = line.partition("type: kickstand ")[2]
+    assert typed.startswith("import 'my log.csv' --out RIDE.csv --columns t=Millis,ax=Acc_X,")
+    result = command.works(*shlex.split(typed))
+    assert "written: RIDE.csv, 1400 samples in 28.0 s, 50 a second" in result.out
+    assert api.read_log("RIDE.csv").accel_g[0] == pytest.approx(riding().phone_g[0], abs=1e-4)
+
+
+def test_what_a_table_lacks_is_said(tmp_path):
+    (tmp_path / "log.csv").write_text("time,ax,ay,az,speed\n0,0,1,0,3\n1,0,1,0,3\n")
+    line = command.refused(
+        tmp_path, "import", tmp_path / "log.csv", "--out", tmp_path / "R.csv", words="not found: gyro."
+    )
+    assert "t=time,ax=ax,ay=ay,az=az,gx=?,gy=?,gz=?,speed=speed" in line
+
+
+MISTAKES = {
+    "no such column": (
+        COLUMNS.replace("Acc_Y", "Acc_W"),
+        "a=g,g=deg/s",
+        "no column 'Acc_W' for ay: its columns are Millis",
+    ),
+    "one missing": (COLUMNS.replace("gz=Gyro_Z,", ""), "a=g,g=deg/s", "--columns: gz is missing"),
+    "strange key": (COLUMNS + ",roll=Note", "a=g", "--columns: 'roll' is not one of t, ax"),
+    "strange unit": (COLUMNS, "a=stone,g=deg/s", "unit 'stone' is not known: write one of g, m/s2, mg"),
+    "strange unit key": (COLUMNS, "accel=g", "--units: 'accel' is not one of t, a, g"),
+    "no unit": (COLUMNS, "a=m/s2", "Gyro_X: its unit is not known: add --units g=deg/s (one of deg/s, rad/s, mdeg/s)"),
+    "no pair": (COLUMNS, "m/s2", "--units: 'm/s2' is not NAME=VALUE; commas part the pairs"),
+    "twice": ("t=Millis,t=Millis", "a=g", "--columns: 't' is there twice"),
+    "no time in it": (COLUMNS.replace("t=Millis", "t=Note"), "a=g,g=deg/s,speed=m/s", "no time"),
+}
+
+
+@pytest.mark.parametrize("name", MISTAKES)
+def test_a_mistake_in_the_options(tmp_path, name):
+    columns, given, words = MISTAKES[name]
+    (tmp_path / "log.csv").write_text(app_exports.any_table(riding().every(8)))
+    out = tmp_path / "R.csv"
+    arguments = ["--out", out, "--columns", columns, "--units", given]
+    command.refused(tmp_path, "import", tmp_path / "log.csv", *arguments, words=words)
