@@ -2,6 +2,7 @@
 
 import sys
 
+import device_runs
 import devices
 import pytest
 from engines import ENGINES
@@ -121,6 +122,33 @@ def test_a_device_that_hangs_on_an_esp32_is_freed(bits, engine, tmp_path):
     assert record.first("Raw   3[1-5]°", 3.2) < 4.0
     shown = {int(line[5:8]) for t_s, line, _ in record.frames if t_s > 1.0 and line.startswith("Raw")}
     assert shown <= set(range(25, 36))  # never what was read meanwhile
+
+
+def on(machine, function, until_s):
+    """Run function(board) on this board, with firmware that is imported on it. Returns (outcome, board)."""
+    before = device_runs.take_firmware()
+    try:
+        with Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=machine) as board:
+            return board.run(lambda: function(board), until_s), board
+    finally:
+        device_runs.take_firmware()
+        sys.modules.update(before)
+
+
+@pytest.mark.parametrize("machine", ["pico", "esp32", "s3"])
+def test_a_watchdog_at_rest_lets_the_console_be_open_for_days(machine):
+    """An ESP32's cannot be stopped, and a soft reset does not stop it either."""
+
+    def use_the_console(board):
+        from kickstand.board import port
+        from time import sleep_ms  # pyright: ignore[reportAttributeAccessIssue]
+
+        port.start_watchdog()
+        port.rest_watchdog()
+        for _ in range(5 * 24):
+            sleep_ms(3_600_000)
+
+    assert on(machine, use_the_console, 1e6)[0] == "returned"
 
 
 def test_status_says_which_pins_are_missing(tmp_path, monkeypatch, capsys):

@@ -47,7 +47,7 @@ _TURN_BYTES = 2800  # of heap that a turn of the app's loop uses
 _FEWEST_TURNS = 3
 
 _WATCHDOG_MS = 8000  # rp2 allows 8388 at most
-_HOUR_MS = 3_600_000
+_WEEK_MS = 604_800_000  # an ESP32 counts it in 32 bits, four to a millisecond: twelve days at most
 
 _watchdog = None
 
@@ -90,7 +90,7 @@ def rest_watchdog():
     if _watchdog is None:
         return
     if IS_ESP32:
-        machine.WDT(timeout=_HOUR_MS)  # an ESP32 accepts a new time-out
+        machine.WDT(timeout=_WEEK_MS)  # an ESP32 accepts a new time-out, and keeps it through a soft reset
         return
     # Data sheets RP2040 section 4.7.6 and RP2350 section 12.9.7: ENABLE is bit 30 of the watchdog's CTRL, at its base
     # address. Sections 2.1.2 and 2.1.3: a write to an address plus 0x3000 clears the bits that are 1.
