@@ -160,6 +160,23 @@ def test_the_same_seed_bounces_the_same():
     assert seen(1) != seen(2)
 
 
+def test_a_capacitor_at_the_button_is_charged_by_the_pull_up():
+    seen = []
+
+    def firmware(board):
+        fake_time.sleep_ms(20)
+        pin = Pin(15, Pin.IN, Pin.PULL_UP)
+        for _ in range(3):
+            seen.append(pin())
+            fake_time.sleep_ms(4)
+            pin = Pin(15, Pin.IN, Pin.PULL_UP)
+
+    with Board(level) as board:
+        board.button.charge_us = 7000
+        board.run(lambda: firmware(board), 1.0)
+    assert seen == [0, 0, 1]
+
+
 def test_a_button_held_at_power_up():
     def firmware(board):
         fake_time.sleep_ms(10)
