@@ -83,6 +83,18 @@ def test_what_is_only_read_may_be_on_a_pin_that_is_an_input_only(config, pin, tm
     assert devices.run("cpython", tmp_path, plan).last[0].startswith("Raw   25°")
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_board_with_psram_has_no_usual_pins_for_a_gps_receiver(engine, tmp_path, capsys):
+    """Its PSRAM takes them. So config.py has to name others, and the display says so."""
+    plan = {"lean": LEANING, "board": {"machine": "esp32 spiram"}, "config": {"SPEED": "gps"}, "until": 3}
+    record = devices.run(engine, tmp_path, plan, capsys)
+    assert record.ends == ["returned"]
+    assert record.last == ("config.py: set  ", "GPS_TX          ")
+    assert "set GPS_TX, GPS_RX" in record.console
+    record = devices.run(engine, tmp_path, {**plan, "config": _SPEED})
+    assert record.last[0].startswith("Raw   25°")
+
+
 @pytest.mark.parametrize("machine", ["pico", "pico 2", "xiao rp2040", "s2", "s2 mini", "s3", "s3 of 1.25", "c3", "c6"])
 def test_pins_6_to_11_are_free_on_other_chips(machine, tmp_path):
     config = {"SENSOR_SDA": 8, "SENSOR_SCL": 9, "LCD_SDA": 6, "LCD_SCL": 7, "BUTTON_PIN": 10}

@@ -168,6 +168,7 @@ def test_boards_have_their_pins_and_controllers():
 
     for machine, missing, controllers in (
         ("esp32", (24, 31, 40), 2),
+        ("esp32 spiram", (16, 17, 24), 2),
         ("s3", (22, 25, 26, 49), 2),
         ("c3", (12, 17, 22), 1),
         ("c6", (24,), 1),

@@ -21,6 +21,8 @@ if IS_ESP32:
     _KNOWN = MACHINE.startswith("Generic ESP32 module")  # ESP32-DevKitC and its like, of the classic chip
     SENSOR_PINS, LCD_PINS, BUTTON_PIN = (21, 22), (18, 19), 4  # (SDA, SCL)
     GPS_UART, GPS_PINS, WHEEL_PIN = 2, (17, 16), 27  # (TX, RX)
+    if "SPIRAM" in MACHINE:  # MicroPython's image for PSRAM, which takes 16 and 17, has no Pin for these
+        GPS_PINS = None, None
     PIN_IRQ = {}  # further arguments of Pin.irq(): this port has soft interrupts only
     I2C_NUMBERED = False  # see open_i2c()
     SD_SPI = (2, 3)  # the slots of machine.SDCard that are SPI

@@ -33,7 +33,8 @@ def pins_of(machine):
     for kind, ranges in _ESP32_PINS.items():
         if chip.startswith("ESP32" + kind):
             return frozenset(pin for first, last in ranges for pin in range(first, last + 1))
-    return frozenset(pin for first, last in _CLASSIC_PINS for pin in range(first, last + 1))
+    pins = frozenset(pin for first, last in _CLASSIC_PINS for pin in range(first, last + 1))
+    return pins - {16, 17} if "SPIRAM" in machine else pins
 
 
 def flash_pins(machine):
