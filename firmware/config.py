@@ -29,7 +29,7 @@
 # VEHICLE = "motorcycle"    # or "car": anything that does not lean
 # SPEED = None              # or "gps": a receiver that sends NMEA; "wheel": a contact that closes as a wheel turns
 # GPS_UART = 1              # (2)
-# GPS_RX = 9                # (16) to the receiver's TX
+# GPS_RX = 9                # (16; with PSRAM none: name both, as 25 and 26) to the receiver's TX
 # GPS_TX = 8                # (17) stays open, but belongs to the UART
 # GPS_BAUD = 9600           # as the receiver sends
 # WHEEL_PIN = 14            # (27) reed contact or open-collector switch to ground, at most 4000 pulses a second;

@@ -84,9 +84,9 @@ class App:
         try:
             self._loop()
         except KeyboardInterrupt:
+            port.rest_watchdog()  # nothing feeds it from here on; first, for a second Ctrl-C may interrupt what follows
             if self.recording:
                 self.recorder.stop()
-            port.rest_watchdog()  # nothing feeds it from here on
             raise
 
     def _loop(self):

@@ -4,6 +4,10 @@ A code is a name for programs, never shown. ui/messages.py words it for the disp
 what a board says on its USB console, and the host's tools word it for a terminal.
 """
 
+# What importing machine code raises where there can be none: CPython or a port without viper, an ESP32 that has no free
+# memory to run it from, a chip that it was not compiled for.
+NO_MACHINE_CODE = (ImportError, NameError, SyntaxError, MemoryError, ValueError)
+
 
 class Notice:
     """Something to be told. code: what; values: its numbers and names, in the order that the words for the code use

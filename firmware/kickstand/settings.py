@@ -42,10 +42,15 @@ def _pulses(value):
 
 
 def _pin(value):
-    return isinstance(value, int) and 0 <= value <= 48 and value not in port.USB_PINS
+    return isinstance(value, int) and 0 <= value <= 48 and value not in port.TAKEN_PINS
 
 
-_PIN = _pin, "a number from 0 to 48, no pin of the chip's own USB"
+def _whole_pin(value):
+    return _pin(value) and value not in port.INPUT_PINS
+
+
+_INPUT = _pin, "a number from 0 to 48, no pin of the chip's own USB, flash or console"
+_PIN = _whole_pin, _INPUT[1] + ", and none that is an input only"  # a button needs a pull-up, which these have not
 SD_PINS = ("SD_SCK", "SD_MOSI", "SD_MISO", "SD_CS")
 # The settings that name pins, for each speed source
 _SPEED_PINS = {None: (), "gps": ("GPS_TX", "GPS_RX"), "wheel": ("WHEEL_PIN",)}
@@ -74,13 +79,13 @@ _TABLE = {
     "SD_SPI": (None, _or_none(_one_of(*port.SD_SPI))),
     "SD_SCK": (None, _or_none(_PIN)),
     "SD_MOSI": (None, _or_none(_PIN)),
-    "SD_MISO": (None, _or_none(_PIN)),
+    "SD_MISO": (None, _or_none(_INPUT)),
     "SD_CS": (None, _or_none(_PIN)),
     "VEHICLE": ("motorcycle", _one_of("motorcycle", "car")),
     "SPEED": (None, _one_of(None, "gps", "wheel")),
     "GPS_UART": (port.GPS_UART, _whole(0, 2)),
     "GPS_TX": (port.GPS_PINS[0], _PIN),
-    "GPS_RX": (port.GPS_PINS[1], _PIN),
+    "GPS_RX": (port.GPS_PINS[1], _INPUT),
     "GPS_BAUD": (9600, _whole(4800, 115_200)),
     "WHEEL_PIN": (port.WHEEL_PIN, _PIN),
     "PULSES_PER_METRE": (0.5, (_pulses, "pulses along a metre of road, from 0.1 to 100")),
@@ -121,7 +126,7 @@ class Settings:
             value = getattr(config, name, default)
             if value is not default and not check(value):
                 refusal = refusal or SettingsError("not-allowed", name, value, allowed)
-                value = None if check is _pin else default
+                value = None if check in (_pin, _whole_pin) else default
             setattr(self, name, value)
         self.one_bus = (self.SENSOR_SDA, self.SENSOR_SCL) == (self.LCD_SDA, self.LCD_SCL) != (None, None)
         if self.one_bus:  # the display's PCF8574 is made for 100 kHz, and sets the speed of a bus that it shares

@@ -14,6 +14,8 @@ from .board import port
 from .devices import open_button, open_lcd, open_sensor
 from .errors import SettingsError
 
+CHARGE_MS = 100
+
 # What the app imports, one module after the other: between two of them, display and chip are set up a step further
 STEPS = (
     "calibration.parameters",
@@ -42,13 +44,21 @@ def tell(lcd, line1, line2=""):
     lcd.flush()
 
 
+def _held(button):
+    """True if it is pressed, now and a moment later: the pin's weak pull-up first has to charge what is between it and
+    ground, as a capacitor against bouncing (with 1 uF and 80 kOhm in 75 ms)."""
+    if button.held():
+        sleep_ms(CHARGE_MS)
+    return button.held()
+
+
 def main():
     """Run until Ctrl-C, power-off or a reset."""
     lcd = None
     try:
         chosen = settings.load()
         lcd = open_lcd(chosen)
-        if machine.reset_cause() == machine.PWRON_RESET and open_button(chosen).held():
+        if machine.reset_cause() == machine.PWRON_RESET and _held(open_button(chosen)):
             print("Kickstand %s: safe mode, the button was held at power-up." % __version__)
             tell(lcd, "Safe mode", "Ready for USB")
             return

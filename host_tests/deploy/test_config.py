@@ -139,14 +139,15 @@ def test_a_board_without_usual_pins_needs_them_named(machine, board, config):
     names = "BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL"
     words = f"{config}: no usual pins are known for this board ({chips.MACHINES[machine]}): set {names}: correct it"
     command.refused(board.root, "flash", "--config", words=words)
-    config.write_text("\n".join(f"{name} = {number}" for number, name in enumerate(names.split(", "))) + "\n")
+    pins = zip(names.split(", "), (0, 2, 4, 5, 14), strict=True)
+    config.write_text("".join(f"{name} = {number}\n" for name, number in pins))
     command.works("flash", "--config")
 
 
 def test_a_pin_of_the_chip_s_own_usb_is_refused(board, config):
     pose(board, "s3")
     config.write_text("BUTTON_PIN = 4\nSENSOR_SDA = 8\nSENSOR_SCL = 9\nLCD_SDA = 18\nLCD_SCL = 19\n")
-    words = f"{config}, line 5: LCD_SCL = 19, but it must be a number from 0 to 48, no pin of"
+    words = f"{config}, line 5: LCD_SCL = 19, but it must be a number from 0 to 48, no pin of the chip's own USB"
     command.refused(board.root, "flash", "--config", words=words)
 
 

@@ -2,6 +2,7 @@
 
 import sys
 
+import device_runs
 import devices
 import pytest
 from engines import ENGINES
@@ -50,6 +51,56 @@ def test_the_refusal_is_shown_where_the_display_s_pins_are_set(config, lines, en
     record = devices.run(engine, tmp_path, {"board": {"machine": "c3", **WIRED}, "config": config, "until": 3})
     assert list(record.last) == lines
     assert record.touched == [6, 7]
+
+
+TAKEN = [1, 3, 6, 9, 11]  # of the console and the flash of a classic ESP32
+INPUTS = [34, 39]
+_SPEED = {"SPEED": "gps", "GPS_TX": 25, "GPS_RX": 26}
+_CARD = {"SD_SPI": 2, "SD_SCK": 25, "SD_MOSI": 26, "SD_MISO": 33, "SD_CS": 32}
+
+
+@pytest.mark.parametrize("pin", TAKEN + INPUTS)
+@pytest.mark.parametrize("name", ["SENSOR_SDA", "SENSOR_SCL", "BUTTON_PIN", "WHEEL_PIN", "GPS_TX", "SD_CS"])
+@pytest.mark.parametrize("machine", ["esp32", "esp32 unicore"])
+def test_a_classic_esp32_keeps_its_flash_and_its_console(machine, name, pin, tmp_path, capsys):
+    """To drive a pin of the flash crashes the board, at each start. Pins that are inputs only have no pull-up: a button
+    there would be pressed at all times."""
+    config = {**(_CARD if name == "SD_CS" else {}), **({"SPEED": "wheel"} if name == "WHEEL_PIN" else {}), name: pin}
+    if name == "GPS_TX":
+        config = {**_SPEED, **config}
+    record = devices.run("cpython", tmp_path, {"board": {"machine": machine}, "config": config, "until": 3}, capsys)
+    assert record.ends == ["returned"]
+    assert record.last == ("config.py: wrong", f"{name:16}")
+    assert f"{name} = {pin}, but it must be a number from 0 to 48, no pin of the chip's own" in record.console
+    assert record.touched == [18, 19]
+
+
+@pytest.mark.parametrize("pin", INPUTS)
+@pytest.mark.parametrize("config", [{**_SPEED, "GPS_RX": None}, {**_CARD, "SD_MISO": None}])
+def test_what_is_only_read_may_be_on_a_pin_that_is_an_input_only(config, pin, tmp_path):
+    config = {name: pin if value is None else value for name, value in config.items()}
+    plan = {"lean": LEANING, "board": {"machine": "esp32"}, "config": config, "until": 4}
+    assert devices.run("cpython", tmp_path, plan).last[0].startswith("Raw   25°")
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_board_with_psram_has_no_usual_pins_for_a_gps_receiver(engine, tmp_path, capsys):
+    """Its PSRAM takes them. So config.py has to name others, and the display says so."""
+    plan = {"lean": LEANING, "board": {"machine": "esp32 spiram"}, "config": {"SPEED": "gps"}, "until": 3}
+    record = devices.run(engine, tmp_path, plan, capsys)
+    assert record.ends == ["returned"]
+    assert record.last == ("config.py: set  ", "GPS_TX          ")
+    assert "set GPS_TX, GPS_RX" in record.console
+    record = devices.run(engine, tmp_path, {**plan, "config": _SPEED})
+    assert record.last[0].startswith("Raw   25°")
+
+
+@pytest.mark.parametrize("machine", ["pico", "pico 2", "xiao rp2040", "s2", "s2 mini", "s3", "s3 of 1.25", "c3", "c6"])
+def test_pins_6_to_11_are_free_on_other_chips(machine, tmp_path):
+    config = {"SENSOR_SDA": 8, "SENSOR_SCL": 9, "LCD_SDA": 6, "LCD_SCL": 7, "BUTTON_PIN": 10}
+    board = {"machine": machine, "sensor_pins": [8, 9], "lcd_pins": [6, 7], "button_pin": 10}
+    record = devices.run("cpython", tmp_path, {"lean": LEANING, "board": board, "config": config, "until": 3})
+    assert record.last[0].startswith("Raw   25°")
 
 
 @pytest.mark.parametrize("wrong", [{"LCD_SDA": "6"}, {"LCD_SDA": 18}, {"LCD_SCL": 12}])
@@ -121,6 +172,34 @@ def test_a_device_that_hangs_on_an_esp32_is_freed(bits, engine, tmp_path):
     assert record.first("Raw   3[1-5]°", 3.2) < 4.0
     shown = {int(line[5:8]) for t_s, line, _ in record.frames if t_s > 1.0 and line.startswith("Raw")}
     assert shown <= set(range(25, 36))  # never what was read meanwhile
+
+
+def on(machine, function, until_s):
+    """Run function(board) on this board, with firmware that is imported on it. Returns (outcome, board)."""
+    before = device_runs.take_firmware()
+    try:
+        with Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine=machine) as board:
+            return board.run(lambda: function(board), until_s), board
+    finally:
+        device_runs.take_firmware()
+        sys.modules.update(before)
+
+
+@pytest.mark.parametrize("machine", ["pico", "esp32", "s3"])
+def test_a_watchdog_at_rest_lets_the_console_be_open_for_days(machine):
+    """An ESP32's cannot be stopped, and a soft reset does not stop it either."""
+
+    def use_the_console(board):
+        from time import sleep_ms  # pyright: ignore[reportAttributeAccessIssue]
+
+        from kickstand.board import port
+
+        port.start_watchdog()
+        port.rest_watchdog()
+        for _ in range(5 * 24):
+            sleep_ms(3_600_000)
+
+    assert on(machine, use_the_console, 1e6)[0] == "returned"
 
 
 def test_status_says_which_pins_are_missing(tmp_path, monkeypatch, capsys):

@@ -36,6 +36,24 @@ def test_incomplete_firmware_ends_at_the_prompt_and_says_so(module, board, monke
     assert "Run kickstand flash." in capsys.readouterr().out
 
 
+@pytest.mark.parametrize("charge_us", [0, 7_000, 75_000])
+@pytest.mark.parametrize("held", [False, True])
+def test_a_capacitor_at_the_button_does_not_pass_for_a_press_at_power_on(held, charge_us, board):
+    """The pull-up of the pin needs its time to charge it. A button that is held starts nothing all the same."""
+    from kickstand import start
+
+    board.button.charge_us = charge_us
+    if held:
+        board.press(0.0, 1.0)
+    shown = []
+    board.at(1.9, lambda: shown.extend(board.lcd.text()))
+    assert board.run(start.main, 2.0) == ("returned" if held else "off")
+    if held:
+        assert board.lcd.text() == ["Safe mode       ", "Ready for USB   "]
+    else:
+        assert shown[0].startswith("Raw")
+
+
 def test_a_report_that_cannot_be_worded_gives_its_code(board, monkeypatch, capsys):
     """A flash or a heap that has failed may not give the words: that must not end the ride."""
     errors.report(errors.StoreError("not-written", "EIO"))

@@ -326,6 +326,40 @@ def test_ctrl_c_puts_the_watchdog_to_rest(board, monkeypatch, capsys, tmp_path):
     assert "stopped" in capsys.readouterr().out
 
 
+def test_a_second_ctrl_c_while_the_ride_is_being_ended_leaves_the_watchdog_at_rest(board, monkeypatch, tmp_path):
+    from kickstand import app, devices
+    from kickstand.rides.recorder import Recorder
+    from kickstand.settings import Settings
+
+    monkeypatch.chdir(tmp_path)
+    ended = []
+
+    def interrupted(self):
+        if self.recording:
+            raise KeyboardInterrupt
+        turn(self)
+
+    def interrupted_again(self):
+        if self.active:
+            ended.append(True)
+            raise KeyboardInterrupt
+
+    turn = app.App.turn
+    monkeypatch.setattr(app.App, "turn", interrupted)
+    monkeypatch.setattr(Recorder, "stop", interrupted_again)
+
+    def use_the_console():
+        from time import sleep_ms  # pyright: ignore[reportAttributeAccessIssue]
+
+        settings = Settings(type("Config", (), {"RECORD": True}))
+        with pytest.raises(KeyboardInterrupt):
+            app.App(settings, devices.open_lcd(settings), devices.open_sensor(settings)).run()
+        sleep_ms(20_000)
+
+    assert board.run(use_the_console, 100) == "returned"
+    assert ended
+
+
 def test_status_tells_how_the_board_is(board, monkeypatch, capsys, tmp_path):
     import gc
     import os

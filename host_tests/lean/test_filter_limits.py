@@ -263,6 +263,18 @@ def test_a_bias_that_is_far_off_is_put_right_at_once_where_rest_is_seen():
             near(estimator.pitch_deg, 0.0, 0.15)
 
 
+def test_a_sensor_whose_forward_axis_points_up_or_down_comes_to_rest():
+    """A board on the table, not aligned: where pitch is a right angle, lean has no meaning, but nothing may fail."""
+    for forward in (1.0, -1.0):
+        for left, up in ((0.0, 0.0), (1e-5, 0.0), (1e-4, -1e-4), (0.01, 0.02), (0.0, -0.3)):
+            estimator, rested = LeanFilter(), False
+            for _ in range(1500):
+                estimator.update([left, up, forward * sqrt(1.0 - left * left - up * up)], NO_RATE, DT_US)
+                rested = rested or estimator.at_rest
+                assert abs(estimator.pitch_deg) < 68.8
+            assert rested, (left, up)
+
+
 def trim_after(forward_g):
     """Whether the trim is measured on a straight; the speed was told while it sped up so."""
     estimator = LeanFilter()

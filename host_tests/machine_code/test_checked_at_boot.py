@@ -22,12 +22,15 @@ for module, name in (fifo_frames, "decode"), (fifo_frames, "add_up"), (transform
 _NAMES = [name for _, name in broken.MISTAKES]
 
 
-def imported(tmp_path, path="", name=""):
-    """What MicroPython prints when the firmware is imported, and then chosen, with a mistake in that function."""
+def imported(tmp_path, path="", name="", error=""):
+    """What MicroPython prints when the firmware is imported, and then chosen, with a mistake in that function or with
+    an error that importing its module raises."""
     if not unix_port.available():
         pytest.skip("no MicroPython unix port for this system")
     shutil.copytree(firmware_path.PACKAGE, tmp_path / "kickstand")
-    if name:
+    if error:
+        (tmp_path / "kickstand" / path).write_text(f"raise {error}\n", encoding="utf-8")
+    elif name:
         broken.write(path, name, tmp_path / "kickstand" / path)
     environment = unix_port.environment() | {"MICROPYPATH": str(tmp_path)}
     done = subprocess.run(
@@ -46,6 +49,15 @@ def test_wrong_machine_code_is_not_used(tmp_path, path, name):
     said, *chosen = imported(tmp_path, path, name)
     assert said.startswith(f"the machine code for {name}_python() gives wrong results on this board")
     assert chosen == [f"{other} {'plain' if other == name else 'quick'}" for other in _NAMES]
+
+
+@pytest.mark.parametrize("error", ['MemoryError("no memory to run it from")', 'ValueError("incompatible .mpy arch")'])
+@pytest.mark.parametrize("path", sorted({path for path, _ in broken.MISTAKES}))
+def test_machine_code_that_cannot_be_loaded_is_not_used(tmp_path, path, error):
+    """An ESP32 runs it from a memory of its own, of which there may be too little; the meter works all the same."""
+    without = [name for other, name in broken.MISTAKES if other == path]
+    chosen = imported(tmp_path, path, error=error)
+    assert chosen == [f"{name} {'plain' if name in without else 'quick'}" for name in _NAMES]
 
 
 @pytest.mark.chip

@@ -146,3 +146,53 @@ print(len(states))
 
 def test_wherever_the_power_goes_a_card_keeps_all_but_the_last_block():
     assert int(run_mpy(_CARD + _CUTS)) > 300
+
+
+# A flash with a folder /sd of its own, and the card
+_FOLDER = """
+import os
+from kickstand_tools.simulated_board.simulator import Board
+Board(lambda t_s: (0, 0, 1, 0, 0, 0)).install()
+from kickstand.board import port, sd_card
+
+class Ram:
+    def __init__(self, size):
+        self.data = bytearray(size)
+    def readblocks(self, n, buf, offset=0):
+        buf[:] = self.data[n * 512 + offset : n * 512 + offset + len(buf)]
+    def writeblocks(self, n, buf, offset=0):
+        self.data[n * 512 + offset : n * 512 + offset + len(buf)] = buf
+    def ioctl(self, op, arg):
+        return {4: len(self.data) // 512, 5: 512}.get(op, 0)
+
+opened = []
+def open_sd_card(*pins):
+    opened.append(pins)
+    return card
+class Settings:
+    SD_SPI, SD_SCK, SD_MOSI, SD_MISO, SD_CS = 0, 18, 19, 16, 17
+
+port.open_sd_card = open_sd_card
+flash, card = Ram(1 << 16), Ram(1 << 18)
+os.VfsFat.mkfs(card)
+os.VfsLfs2.mkfs(flash)
+os.umount("/")
+os.mount(os.VfsLfs2(flash), "/")
+os.mkdir("/sd")
+for _ in range(3):
+    assert sd_card.mount(Settings) == "/sd"
+with open("/sd/ride", "w") as file:
+    file.write("on the card")
+assert len(opened) == 1
+os.umount("/sd")
+assert os.listdir("/sd") == [], os.listdir("/sd")
+os.mount(os.VfsFat(card), "/sd")  # as the board's own boot.py may do it
+assert sd_card.mount(Settings) == "/sd"
+assert os.listdir("/sd") == ["ride"]
+print(len(opened))
+"""
+
+
+def test_a_folder_in_the_flash_does_not_pass_for_the_card():
+    """One called /sd, as a copy of a card's files leaves it: rides would go to the flash."""
+    assert int(run_mpy(_FOLDER)) == 1

@@ -167,13 +167,36 @@ def test_boards_have_their_pins_and_controllers():
             assert (error is None) == (number < controllers), number
 
     for machine, missing, controllers in (
-        ("esp32", (6, 20, 24, 40), 2),
+        ("esp32", (24, 31, 40), 2),
+        ("esp32 spiram", (16, 17, 24), 2),
         ("s3", (22, 25, 26, 49), 2),
         ("c3", (12, 17, 22), 1),
         ("c6", (24,), 1),
         ("h2", (6, 15, 28), 2),
     ):
         check(lambda board: firmware(machine, missing, controllers), machine=machine)  # noqa: B023 called at once
+
+
+def test_a_classic_esp32_crashes_where_a_pin_of_its_flash_is_driven_and_some_pins_are_inputs_only():
+    def drive(number):
+        Pin(number)  # which alone does no harm
+        Pin(number, Pin.OPEN_DRAIN)
+
+    for machine, number, outcome in (
+        ("esp32", 6, "reset"),
+        ("lora32", 11, "reset"),
+        ("esp32", 12, "returned"),
+        ("c3", 6, "returned"),
+        ("pico", 6, "returned"),
+    ):
+        assert on_board(lambda board: drive(number), machine=machine)[0] == outcome  # noqa: B023 called at once
+
+    def read(board):
+        assert isinstance(raised(drive, 34), ValueError)
+        assert Pin(34, Pin.IN, Pin.PULL_UP).value() == 0  # it floats
+        assert Pin(33, Pin.IN, Pin.PULL_UP).value() == 1
+
+    check(read, machine="esp32")
 
 
 def test_rp2_controllers_have_their_pins():

@@ -107,6 +107,15 @@ def test_the_watchdog_of_rp2_has_a_limit():
     assert on_board(lambda board: WDT(timeout=3_600_000), port="esp32")[0] == "returned"
 
 
+def test_the_watchdog_of_an_esp32_counts_in_32_bits():
+    def wait(days):
+        WDT(timeout=days * 86_400_000)
+        fake_time.sleep_ms(60_000_000)
+
+    assert on_board(lambda board: wait(12), 100_000.0, port="esp32")[0] == "returned"
+    assert on_board(lambda board: wait(13), 100_000.0, port="esp32")[0] == "reset"
+
+
 def levels(board, until_us):
     """(time, level) at each change of the button's pin."""
     pin = Pin(15, Pin.IN, Pin.PULL_UP)
@@ -149,6 +158,23 @@ def test_the_same_seed_bounces_the_same():
 
     assert seen(1) == seen(1)
     assert seen(1) != seen(2)
+
+
+def test_a_capacitor_at_the_button_is_charged_by_the_pull_up():
+    seen = []
+
+    def firmware(board):
+        fake_time.sleep_ms(20)
+        pin = Pin(15, Pin.IN, Pin.PULL_UP)
+        for _ in range(3):
+            seen.append(pin())
+            fake_time.sleep_ms(4)
+            pin = Pin(15, Pin.IN, Pin.PULL_UP)
+
+    with Board(level) as board:
+        board.button.charge_us = 7000
+        board.run(lambda: firmware(board), 1.0)
+    assert seen == [0, 0, 1]
 
 
 def test_a_button_held_at_power_up():

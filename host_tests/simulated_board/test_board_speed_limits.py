@@ -50,6 +50,16 @@ def hear(wire, gps, text, at_ms):
     return found
 
 
+def hear_none(wire, gps, text, at_ms):
+    """No speed in this text can be used: what a Gps gives for it, Speed refuses."""
+    from kickstand.speed.source import Speed
+
+    wire.data += text.encode()
+    speed = Speed(gps)
+    while wire.any():
+        assert speed.poll(at_ms) is None, text
+
+
 def test_a_speed_that_is_estimated_or_not_valid_is_none():
     with Board(level):
         for mode, expected in ((",A", 10000), (",D", 10000), ("", 10000), (",E", None), (",N", None)):
@@ -80,6 +90,20 @@ def test_vtg_counts_once_no_rmc_has_come_for_three_seconds():
         assert gps.age_ms == 0
         assert hear(wire, gps, rmc(status="V"), 5000) is None  # it sends RMC again, though it has no fix
         assert hear(wire, gps, vtg(), 6000) is None
+
+
+def test_numbers_that_no_receiver_sends_are_no_speed_and_the_next_sentence_counts():
+    """Each with a right checksum: too large for a float, which a board's is at 3e38, not a number, none at all."""
+    with Board(level):
+        for time in ("1200011e999", "12351e39", "1200inf", "1200nan", "12000-1e999", "1200e", "12:00:01", "-99999.0"):
+            wire, gps = receiver()
+            hear(wire, gps, rmc(time), 1000)
+            assert hear(wire, gps, rmc("120002.00"), 2000) == 10000, time
+        for knots in ("1e999", "inf", "nan", "-inf", "e", "1e"):
+            wire, gps = receiver()
+            hear_none(wire, gps, rmc(knots=knots), 1000)
+            hear_none(wire, gps, sentence("GPVTG,84.4,T,,M," + knots + ",N,36.0,K,A"), 9000)
+            assert hear(wire, gps, rmc("120010.00"), 10_000) == 10000, knots
 
 
 def long_rmc(length):

@@ -21,13 +21,19 @@ if IS_ESP32:
     _KNOWN = MACHINE.startswith("Generic ESP32 module")  # ESP32-DevKitC and its like, of the classic chip
     SENSOR_PINS, LCD_PINS, BUTTON_PIN = (21, 22), (18, 19), 4  # (SDA, SCL)
     GPS_UART, GPS_PINS, WHEEL_PIN = 2, (17, 16), 27  # (TX, RX)
+    if "SPIRAM" in MACHINE:  # MicroPython's image for PSRAM, which takes 16 and 17, has no Pin for these
+        GPS_PINS = None, None
     PIN_IRQ = {}  # further arguments of Pin.irq(): this port has soft interrupts only
     I2C_NUMBERED = False  # see open_i2c()
     SD_SPI = (2, 3)  # the slots of machine.SDCard that are SPI
-    # Those of the chip's own USB: driving one of them cuts the board off from the computer until BOOT is held
-    USB_PINS = {"S2": (19, 20), "S3": (19, 20), "C3": (18, 19), "C6": (12, 13), "H2": (26, 27)}.get(
-        MACHINE.split(" with ESP32")[-1].lstrip("-")[:2], ()
+    # Pins that the chip itself needs. Those of its own USB: driving one cuts the board off from the computer until BOOT
+    # is held. Those of a classic chip's flash (6 to 11): driving one crashes the board, at each start. Its console's.
+    _CHIP = MACHINE.split(" with ESP32")[-1].lstrip("-")[:2]  # "S2", "C3", ...; of a classic one "", "UN", "D2" or "PI"
+    _CLASSIC = not (_CHIP[:1] in ("S", "C", "H", "P") and _CHIP[1:].isdigit())
+    TAKEN_PINS = {"S2": (19, 20), "S3": (19, 20), "C3": (18, 19), "C6": (12, 13), "H2": (26, 27)}.get(
+        _CHIP, (1, 3, 6, 7, 8, 9, 10, 11) if _CLASSIC else ()
     )
+    INPUT_PINS = (34, 35, 36, 37, 38, 39) if _CLASSIC else ()  # they have no output and no pull-up
 else:  # Raspberry Pi Pico and Pico 2, and boards of other makers that have its pins and its name
     _KNOWN = sys.platform != "rp2" or "Pico" in MACHINE
     SENSOR_PINS, LCD_PINS, BUTTON_PIN = (4, 5), (6, 7), 15
@@ -35,7 +41,7 @@ else:  # Raspberry Pi Pico and Pico 2, and boards of other makers that have its 
     PIN_IRQ = {"hard": True}  # a soft interrupt is lost while the display is written to
     I2C_NUMBERED = True  # two buses need two numbers
     SD_SPI = (0, 1)  # the numbers of machine.SPI
-    USB_PINS = ()
+    TAKEN_PINS = INPUT_PINS = ()
 if not _KNOWN:  # these pins may be missing, or belong to what else is on the board
     SENSOR_PINS = LCD_PINS = GPS_PINS = None, None
     BUTTON_PIN = WHEEL_PIN = None
@@ -47,7 +53,7 @@ _TURN_BYTES = 2800  # of heap that a turn of the app's loop uses
 _FEWEST_TURNS = 3
 
 _WATCHDOG_MS = 8000  # rp2 allows 8388 at most
-_HOUR_MS = 3_600_000
+_WEEK_MS = 604_800_000  # an ESP32 counts it in 32 bits, four to a millisecond: twelve days at most
 
 _watchdog = None
 
@@ -90,7 +96,7 @@ def rest_watchdog():
     if _watchdog is None:
         return
     if IS_ESP32:
-        machine.WDT(timeout=_HOUR_MS)  # an ESP32 accepts a new time-out
+        machine.WDT(timeout=_WEEK_MS)  # an ESP32 accepts a new time-out, and keeps it through a soft reset
         return
     # Data sheets RP2040 section 4.7.6 and RP2350 section 12.9.7: ENABLE is bit 30 of the watchdog's CTRL, at its base
     # address. Sections 2.1.2 and 2.1.3: a write to an address plus 0x3000 clears the bits that are 1.

@@ -14,7 +14,8 @@ def mount(settings):
     """Mount the card, unless that was done before; return its directory. settings: a Settings. Raises CardError.
 
     A card that does not get ready takes 5 s or more."""
-    if MOUNT[1:] in os.listdir("/"):
+    # What is mounted is listed without a size, unlike a folder in the flash: a card's files, copied there, may be one.
+    if any(entry[0] == MOUNT[1:] and len(entry) == 3 for entry in os.ilistdir("/")):
         return MOUNT
     pins = settings.SD_SCK, settings.SD_MOSI, settings.SD_MISO, settings.SD_CS
     try:

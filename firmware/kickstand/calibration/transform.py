@@ -10,7 +10,7 @@ of heap, so there they are products of integers in machine code, which are right
 from array import array
 from math import radians
 
-from ..errors import checked
+from ..errors import NO_MACHINE_CODE, checked
 from ..rotation import rotate
 
 ONE = 2048  # the integer that stands for the largest scale: times the sum of eight samples it still fits 32 bits
@@ -31,7 +31,7 @@ def products_python(matrices, sums, n, out):
 
 try:
     from .transform_viper import products
-except (ImportError, NameError, SyntaxError):  # CPython, or a port without viper
+except NO_MACHINE_CODE:
     products = products_python
 else:
     _SUMS = array("i", range(-260000, 260000, 74300))

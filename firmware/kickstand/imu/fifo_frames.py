@@ -7,7 +7,7 @@ elsewhere they are decode_python() and add_up_python(), which give the same resu
 
 from array import array
 
-from ..errors import checked
+from ..errors import NO_MACHINE_CODE, checked
 
 FRAME = 14  # bytes
 
@@ -55,7 +55,7 @@ def add_up_python(frames, n, sums, watch):
 
 try:
     from .fifo_frames_viper import add_up, decode
-except (ImportError, NameError, SyntaxError):  # CPython, or a port without viper
+except NO_MACHINE_CODE:
     add_up, decode = add_up_python, decode_python
 else:
     _ENDS = b"\x7f\xff\x80\x00\xff\xff\x00\x80\x80\xff\x01\x00\xab\xcd"

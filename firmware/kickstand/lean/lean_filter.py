@@ -173,7 +173,7 @@ class LeanFilter:
         fx, fy, fz = means[5:8]
         x, p = self._x, self._p
         x[LEAN] = atan2(fx, fy)
-        x[PITCH] = atan2(fz, sqrt(fx * fx + fy * fy))
+        x[PITCH] = _possible_pitch(atan2(fz, sqrt(fx * fx + fy * fy)))
         x[SPEED] = 0.0
         p.set_variance(LEAN, measurements.SIGMA_STAND**2)
         p.set_variance(PITCH, measurements.SIGMA_STAND**2)
@@ -230,8 +230,13 @@ class LeanFilter:
         for i in range(STATES):
             x[i] += p.take_correction(i)
         x[SPEED] = max(0.0, x[SPEED])
-        x[PITCH] = max(-MAX_PITCH, min(MAX_PITCH, x[PITCH]))
+        x[PITCH] = _possible_pitch(x[PITCH])
         if x[LEAN] > pi:
             x[LEAN] -= 2 * pi
         elif x[LEAN] < -pi:
             x[LEAN] += 2 * pi
+
+
+def _possible_pitch(pitch):
+    """The pitch within its limits: at a right angle, as of a board that lies flat, predict() would divide by zero."""
+    return max(-MAX_PITCH, min(MAX_PITCH, pitch))

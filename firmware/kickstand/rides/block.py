@@ -22,7 +22,7 @@ from binascii import crc32
 
 from .. import __version__
 from ..calibration.store import BODY_LENGTH
-from ..errors import checked
+from ..errors import NO_MACHINE_CODE, checked
 
 MAGIC = b"KRID"
 VERSION = 1
@@ -105,7 +105,7 @@ def _append(state, out, code, length):
 
 try:
     from .block_viper import encode
-except (ImportError, NameError, SyntaxError):  # CPython, or a port without viper
+except NO_MACHINE_CODE:
     encode = encode_python
 else:
     _ENTRY = array("i", (2, 9999, -30000, 30000, -1, 0, 255, -256, 0))

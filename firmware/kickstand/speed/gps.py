@@ -104,7 +104,7 @@ class Gps:
                 return None
             fields = line[start:star].split(b",")
             speed = self._rmc(fields, now_ms) if kind == b"RMC" else self._vtg(fields, now_ms)
-        except (ValueError, IndexError):
+        except (ValueError, IndexError, OverflowError):  # the last: of a number beyond all bounds, as 1e999
             return None
         self._sentence_ms = now_ms
         if speed is not None:

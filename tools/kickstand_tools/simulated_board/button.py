@@ -6,13 +6,21 @@ _BOUNCES = 3  # short openings (or closings) after each edge
 
 
 class Button:
-    """closed: True while its contacts touch. seed: of the random moments at which they bounce."""
+    """closed: True while its contacts touch. seed: of the random moments at which they bounce.
+
+    charge_us: how long the pin's pull-up takes to charge a capacitor that is soldered to them, 0 for none.
+    """
 
     def __init__(self, clock, seed=1):
         self.closed = False
+        self.charge_us = 0
         self._clock = clock
         self._free_us = 0  # when a press that is asked for now can begin
         self._random = seed & 0x7FFFFFFF or 1
+
+    def low(self, pulled_us):
+        """True if its pin is low. pulled_us: since when the pin has a pull-up."""
+        return self.closed or self._clock.now_us < pulled_us + self.charge_us
 
     def press(self, at_us, for_us):
         """Press it from at_us for for_us. at_us: None for now, or once the last such press is over, because a finger

@@ -80,7 +80,7 @@ class Board:
         self.ticks_at_boot_us = 0  # what ticks_us() starts at; a value near 1 << 30 makes ticks wrap soon
         self.reset_cause = fake_machine.PWRON_RESET
         self._off = True
-        self._pins = {}  # number: [mode, pull, level driven]
+        self._pins = {}  # number: [mode, pull, level driven, since when it is in use]
         self._fakes = Installer()
         if sensor_address is not None:
             self.fit_sensor()
@@ -214,12 +214,12 @@ class Board:
     def set_up_pin(self, number, mode, pull, level):
         """Pin.init()."""
         self.touched.add(number)
-        self._pins[number] = [mode, pull, level or 0]
+        self._pins.setdefault(number, [0, 0, 0, self.clock.now_us])[:3] = mode, pull, level or 0
         self._drive_wire(number, 1 if mode == fake_machine.Pin.IN else level or 0)
 
     def drive_pin(self, number, level):
         """Pin.value(level). A pin in mode IN drives the level once its mode is OUT, as on the chip."""
-        pin = self._pins.setdefault(number, [fake_machine.Pin.IN, -1, 0])
+        pin = self._pins.setdefault(number, [fake_machine.Pin.IN, -1, 0, 0])
         pin[2] = level
         if pin[0] != fake_machine.Pin.IN:
             self._drive_wire(number, level)
@@ -231,8 +231,8 @@ class Board:
                 return bus.sda_level()
             if number == bus.scl:
                 return bus.scl_level()
-        mode, pull, level = self._pins.get(number, (fake_machine.Pin.IN, -1, 0))
-        if number == self._button_pin and self.button.closed:
+        mode, pull, level, since_us = self._pins.get(number, (fake_machine.Pin.IN, -1, 0, 0))
+        if number == self._button_pin and self.button.low(since_us):
             return 0
         if number == self.wheel_pin and self.wheel and self.wheel.closed:
             return 0

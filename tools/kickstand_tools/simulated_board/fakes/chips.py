@@ -26,14 +26,25 @@ MACHINES = {
 
 
 def pins_of(machine):
-    """The GPIO numbers of this machine's chip that can be used: not those of its flash."""
+    """The GPIO numbers that MicroPython on this machine has a Pin for: on a classic ESP32 also those of its flash."""
     chip = _chip(machine)
     if chip.startswith("RP2"):
         return frozenset(range(30))
     for kind, ranges in _ESP32_PINS.items():
         if chip.startswith("ESP32" + kind):
             return frozenset(pin for first, last in ranges for pin in range(first, last + 1))
-    return frozenset(pin for first, last in _CLASSIC_PINS for pin in range(first, last + 1))
+    pins = frozenset(pin for first, last in _CLASSIC_PINS for pin in range(first, last + 1))
+    return pins - {16, 17} if "SPIRAM" in machine else pins
+
+
+def flash_pins(machine):
+    """The pins of the flash that it runs from, of those that pins_of() gives."""
+    return frozenset(range(6, 12)) if _is_classic(machine) else frozenset()
+
+
+def inputs_only(machine):
+    """The pins that have neither an output nor a pull-up."""
+    return frozenset(range(34, 40)) if _is_classic(machine) else frozenset()
 
 
 def i2c_controllers(machine):
@@ -41,11 +52,16 @@ def i2c_controllers(machine):
     return 1 if _chip(machine)[:7] in ("ESP32C3", "ESP32C6") else 2  # the second of a C6 is its low-power one
 
 
+def _is_classic(machine):
+    chip = _chip(machine)
+    return chip.startswith("ESP32") and not any(chip.startswith("ESP32" + kind) for kind in _ESP32_PINS)
+
+
 def _chip(machine):
     return machine[machine.rindex(" with ") + 6 :].replace("-", "")
 
 
-_CLASSIC_PINS = ((0, 5), (12, 19), (21, 23), (25, 27), (32, 39))
+_CLASSIC_PINS = ((0, 23), (25, 27), (32, 39))
 _ESP32_PINS = {
     "S2": ((0, 21), (33, 46)),
     "S3": ((0, 21), (33, 48)),

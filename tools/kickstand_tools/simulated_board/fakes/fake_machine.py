@@ -12,6 +12,7 @@ PWRON_RESET = 1
 WDT_RESET = 3  # the rp2 port reports this after machine.reset() too
 
 _RP2_MAX_WATCHDOG_MS = 8388
+_ESP32_TICKS = 4  # of its watchdog's second stage in a millisecond, counted in 32 bits (ESP-IDF)
 _WATCHDOG_CTRL_CLEAR = 0x40058000 + 0x3000  # RP2040: writing bit 30 here stops the watchdog
 _WATCHDOG_ENABLE = 1 << 30
 
@@ -22,6 +23,8 @@ class WDT:
     def __init__(self, id=0, timeout=5000):
         if current.board.port == "rp2" and timeout > _RP2_MAX_WATCHDOG_MS:
             raise ValueError("timeout exceeds %d" % _RP2_MAX_WATCHDOG_MS)
+        if current.board.port == "esp32":
+            timeout = (timeout * _ESP32_TICKS & 0xFFFFFFFF) // _ESP32_TICKS
         current.board.watchdog.start(timeout * 1000)
 
     def feed(self):

@@ -14,7 +14,13 @@ ADDED = ("ilistdir",)
 
 
 def ilistdir(path="."):
-    """Yield (name, type, 0, size in bytes) for each entry."""
+    """Yield (name, type, 0, size in bytes) for each entry, and (name, type, 0) for what is mounted."""
+    mounted = []
+    if path == "/" and hasattr(os, "mount"):
+        mounted = [entry for entry in os.ilistdir(path) if len(entry) == 3 and entry[2] == 0]
+        yield from mounted
     for name in os.listdir(path):
+        if any(entry[0] == name for entry in mounted):
+            continue
         status = os.stat(path + "/" + name)
         yield name, status[0] & 0xF000, 0, status[6]

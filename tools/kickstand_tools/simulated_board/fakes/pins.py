@@ -1,6 +1,7 @@
 """MicroPython's machine.Pin on the simulated board."""
 
-from . import current
+from ..clock import Reset
+from . import chips, current
 
 IRQ_US = 26  # that an interrupt takes beside its calls into `machine` and `time`: 33 in all, as on a Pico
 
@@ -22,6 +23,13 @@ class Pin:
             self.init(mode, pull, value)
 
     def init(self, mode=-1, pull=-1, value=None):
+        machine = current.board.machine
+        if self.id in chips.flash_pins(machine):
+            raise Reset  # a crash: the next instruction cannot be read
+        if self.id in chips.inputs_only(machine):
+            if mode in (Pin.OUT, Pin.OPEN_DRAIN):
+                raise ValueError("pin can only be input")
+            pull = -1
         current.board.set_up_pin(self.id, mode, pull, 1 if value is None and mode == Pin.OPEN_DRAIN else value)
 
     def value(self, level=None):
