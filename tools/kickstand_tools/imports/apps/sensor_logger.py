@@ -29,7 +29,7 @@ def read(pieces: list[Piece], name: str) -> Recording:
     files = {piece.stem: piece for piece in pieces}
     apple, standard = _platform(files)
     turned = apple is not False and not standard
-    if turned and apple is None:
+    if turned and apple is None and (_RAW in files or _GRAVITY in files):
         raise InputError(
             f"{name}: Metadata.csv is missing, which says whether an iPhone or an Android phone recorded this: their "
             "accelerations have opposite signs; give all files of the export"
