@@ -27,7 +27,8 @@ def as_data(seen: Overview) -> dict[str, Any]:
         "samples": total.samples,
         "riding_s": round(total.riding_s, 1),
         "lean_unsure_s": round(total.not_sure_s, 1),
-        "missing_s": round(total.missing_s, 1),
+        "missing_s": round(max(0.0, total.missing_s - total.frozen_s), 1),
+        "frozen_s": round(total.frozen_s, 1),
     }
     peaks = {"max_brake_g": total.brake_g, "max_accel_g": total.accel_g, "max_speed_mps": total.speed_mps}
     if not seen.ride.car:
@@ -86,8 +87,10 @@ def _ride(seen: Overview) -> Table:
         table.add_row("Max speed", *_peak(peak, "{:.0f} km/h"))
     if total.not_sure_s >= 1.0:
         table.add_row("Lean not sure", clock(total.not_sure_s))
-    if total.missing_s >= 0.1:
-        table.add_row("No readings", f"{total.missing_s:.1f} s")
+    if total.missing_s - total.frozen_s >= 0.1:
+        table.add_row("No readings", f"{total.missing_s - total.frozen_s:.1f} s")
+    if total.frozen_s >= 0.1:
+        table.add_row("Readings frozen", f"{total.frozen_s:.1f} s")
     return table
 
 
