@@ -33,8 +33,8 @@ def ride(request):
     readings = made.readings[: len(made.readings) // n * n].reshape(-1, n, 7).mean(axis=1)
     log = Log.from_readings(readings, made.rate_hz / n)
     log.speed_mps[::100] = made.truth["speed_mps"][n - 1 :: n][: len(readings)][::100]
-    poses = (Log.from_readings(pose, made.rate_hz) for pose in (made.kickstand, made.upright))
-    calibration = fit_drive([log], fit_two_positions(*poses).calibration, "motorcycle").calibration
+    kickstand, upright = (Log.from_readings(pose, made.rate_hz) for pose in (made.kickstand, made.upright))
+    calibration = fit_drive([log], fit_two_positions(kickstand, upright).calibration, "motorcycle").calibration
     return log, calibration, made.truth["lean_deg"][n - 1 :: n][: len(readings)], request.param
 
 

@@ -112,7 +112,8 @@ def test_a_freeze_is_no_standstill(profile):
     """20 s in the middle of a ride: believed, it leaves the lean wrong by up to 50 degrees, and long after it."""
     ride = simulate_ride(profile, seed=1, seconds=100.0)
     hz = round(ride.rate_hz)
-    calibration = fit_two_positions(*(Log.from_readings(p, hz) for p in (ride.kickstand, ride.upright))).calibration
+    kickstand, upright = (Log.from_readings(pose, hz) for pose in (ride.kickstand, ride.upright))
+    calibration = fit_two_positions(kickstand, upright).calibration
     readings, begin, end = ride.readings.copy(), 50 * hz, 70 * hz
     readings[begin:end] = readings[begin]
     found = replay(Log.from_readings(readings, ride.rate_hz), calibration)
