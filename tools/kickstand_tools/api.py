@@ -7,8 +7,8 @@
     lean = api.replay("RIDE.csv.gz", two.calibration)                     # lean.t_s, lean.lean_deg, ...
     stops = api.find_stops(api.vehicle_channels("RIDE.csv.gz", two.calibration))
 
-A log is a path, an open file of text or bytes, a Log made of arrays, or a Stretch of one of these. Tables have to_pandas(). What takes long takes
-`progress`, a function that is called with (done, total).
+A log is a path, an open file of text or bytes, a Log made of arrays, or a Stretch of one of these. Tables have
+to_pandas(). What takes long takes `progress`, a function that is called with (done, total).
 
 InputError says in one line what is wrong with what was given. Its subclass RefusedInput has the code and the values of
 a refusal of the firmware's (kickstand.errors). sentence() puts a notice or a refusal into words.
