@@ -184,3 +184,14 @@ def test_blocks_are_marked_once():
     (block,) = read_blocks(log_of(readings))
     assert np.count_nonzero(marks.mark(block)) == 199
     assert marks.notices()[0].values[0] == 1
+
+
+def test_real_logs_are_believed_and_a_freeze_in_one_is_not(shared_data):
+    for path in sorted(shared_data.glob("*.csv.gz")):
+        log = reader.read_log(path)
+        assert log.notices == []
+        assert believed(log) is log
+    log = reader.read_log(shared_data / "motorcycle-ride.csv.gz")
+    begin, end = np.searchsorted(log.t_s, [40.0, 60.0])
+    log.accel_g[begin:end], log.gyro_dps[begin:end] = log.accel_g[begin], log.gyro_dps[begin]
+    assert np.flatnonzero(frozen(log)).tolist() == list(range(begin + 1, end))
