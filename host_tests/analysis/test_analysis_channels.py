@@ -113,6 +113,17 @@ def test_an_envelope_keeps_every_peak():
     assert np.array_equal(envelope(time[:100], values[:100], 2000)[1], values[:100][~np.isnan(values[:100])])
 
 
+def test_a_line_is_broken_where_there_is_nothing():
+    """Readings are missing from 40 to 60 s, and the lean is not shown from 70 to 75."""
+    time = np.concatenate((np.arange(0.0, 40.0, 0.02), np.arange(60.0, 100.0, 0.02)))
+    values = np.where((time > 70.0) & (time < 75.0), np.nan, 5.0)
+    for points in 10_000, 500:
+        x, y = envelope(time, values, points, 1.0)
+        assert x[np.isnan(y)] == pytest.approx([50.0, 72.5], abs=0.05)
+        assert np.all(np.diff(x) > 0.0)
+        assert not np.any(np.isnan(envelope(time, values, points)[1]))
+
+
 def part(n=100, **changed) -> Channels:
     """A second at 100 Hz, riding straight on, everything known."""
     zero = np.zeros(n)

@@ -16,7 +16,7 @@ from kickstand_tools.simulation.files import simulate
 FUNCTIONS = [name for name in api.__all__ if inspect.isfunction(getattr(api, name))]
 
 
-@pytest.mark.parametrize("name", FUNCTIONS + ["Log", "CalibrationFile"])
+@pytest.mark.parametrize("name", FUNCTIONS + ["Log", "Stretch", "CalibrationFile"])
 def test_the_example_of_a_function_runs(name):
     public = getattr(api, name)
     module = sys.modules[public.__module__]

@@ -1,5 +1,8 @@
 """Times that were rounded, or stamped on several samples at once, against the even times that they came from."""
 
+import doctest
+import sys
+
 import numpy as np
 import pytest
 from kickstand_tools.errors import InputError
@@ -82,3 +85,7 @@ def test_a_line_that_is_there_twice_moves_no_other_by_more_than_rounding():
 def test_what_is_no_time_is_refused(times, words):
     with pytest.raises(InputError, match=words):
         even_times(times)
+
+
+def test_its_example():
+    assert doctest.testmod(sys.modules[even_times.__module__]).failed == 0

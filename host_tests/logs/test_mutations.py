@@ -67,7 +67,8 @@ COMMANDS = [
 def bases(tmp_path_factory) -> list[bytes]:
     """Three logs of two seconds: a ride with speed and temperature, one of the seven columns, a pose."""
     chance = np.random.default_rng(12)
-    ride = script.Ride([script.upright(0.5), script.accelerate(8, 0.6), script.turn(-25, 0.6), script.brake(0, 0.5)], 0.02)
+    parts = [script.upright(0.5), script.accelerate(8, 0.6), script.turn(-25, 0.6), script.brake(0, 0.5)]
+    ride = script.Ride(parts, 0.02)
     lines, plain = [command.HEADER + ",speed_mps,temp_c"], [command.HEADER]
     for n in range(110):
         t_s = n / 50.0

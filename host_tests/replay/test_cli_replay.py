@@ -262,8 +262,26 @@ def test_the_calibration_beside_the_log_is_taken(tmp_path):
     command.refused(tmp_path, "replay", log, "--out", lean, words=f"no calibration {beside.name} beside it")
     beside.write_text(json.dumps(analysis_rides.CALIBRATION))
     command.works("replay", log, "--out", lean)
-    for name in "replay", "report":
-        more = ["--out", tmp_path / "x.csv"] if name == "replay" else []
-        words = "LEAN.csv holds the lean that kickstand has computed: give the log that it was made from"
-        command.refused(tmp_path, name, lean, *more, words=words)
-    command.refused(tmp_path, "report", lean, "--calibration", beside, words=words)
+    words = f"LEAN.csv holds the lean that kickstand has computed: give the log that it was made from, {log}\n"
+    exported = tmp_path / "EXPORTED.csv"
+    command.works("export", log, "--to", "csv", "--out", exported)
+    out = tmp_path / "x.csv"
+    for arguments in (
+        ("replay", lean, "--out", out),
+        ("report", lean),
+        ("report", lean, "--calibration", beside),
+        ("export", lean, "--to", "csv", "--out", out),
+        ("cut", lean, "--to", "5", "--out", out),
+    ):
+        command.refused(tmp_path, *arguments, words=words)
+    command.refused(tmp_path, "report", exported, words=words.replace("LEAN", "EXPORTED"))
+    (tmp_path / "OTHER.csv").write_bytes(log.read_bytes())  # it may be the one or the other
+    (tmp_path / "OTHER.cal.json").write_bytes(beside.read_bytes())
+    command.refused(tmp_path, "report", lean, words="give the log that it was made from\n")
+
+
+def test_no_command_writes_over_the_calibration_beside_the_log(tmp_path):
+    log = analysis_rides.short(tmp_path)
+    beside = log.with_name("RIDE.cal.json")
+    command.refused(tmp_path, "replay", log, "--out", beside, words="is also an input")
+    command.refused(tmp_path, "export", log, "--to", "csv", "--out", beside, words="is also an input")

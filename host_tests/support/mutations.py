@@ -121,6 +121,17 @@ def round_the_time(text: bytes, chance: random.Random) -> bytes:
     return _text(rows)
 
 
+def go_wild(text: bytes, chance: random.Random) -> bytes:
+    """Readings up to the ends of the widest ranges."""
+    rows = _cells(text)
+    begin = chance.choice((1, len(rows) // 3))
+    g, dps = chance.choice(((19.0, 2400.0), (4.0, 2400.0), (19.0, 10.0)))
+    for row in rows[begin : begin + chance.choice((1, 20, 1000))]:
+        if len(row) > 6:
+            row[1:7] = [b"%.4f" % chance.uniform(-most, most) for most in (g, g, g, dps, dps, dps)]
+    return _text(rows)
+
+
 def freeze(text: bytes, chance: random.Random) -> bytes:
     rows = _cells(text)
     at = chance.randrange(len(rows))
@@ -171,8 +182,8 @@ def pack(text: bytes, chance: random.Random) -> bytes:
 
 WAYS = [
     *(flip_bytes, cut_end, cut_a_piece, double_lines, exchange_lines, shuffle_lines, lose_a_column, exchange_columns),
-    *(rename_a_column, put_a_word, scale_a_column, shift_the_time, round_the_time, freeze, other_separators),
-    *(other_lines, other_encoding, put_nul_bytes, quote, a_long_line, nearly_nothing, pack),
+    *(rename_a_column, put_a_word, scale_a_column, shift_the_time, round_the_time, freeze, go_wild),
+    *(other_separators, other_lines, other_encoding, put_nul_bytes, quote, a_long_line, nearly_nothing, pack),
 ]
 
 

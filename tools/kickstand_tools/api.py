@@ -7,8 +7,8 @@
     lean = api.replay("RIDE.csv.gz", two.calibration)                     # lean.t_s, lean.lean_deg, ...
     stops = api.find_stops(api.vehicle_channels("RIDE.csv.gz", two.calibration))
 
-A log is a path, an open file of text or bytes, or a Log made of arrays. Tables have to_pandas(). What takes long takes
-`progress`, a function that is called with (done, total).
+A log is a path, an open file of text or bytes, a Log made of arrays, or a Stretch of one of these. Tables have
+to_pandas(). What takes long takes `progress`, a function that is called with (done, total).
 
 InputError says in one line what is wrong with what was given. Its subclass RefusedInput has the code and the values of
 a refusal of the firmware's (kickstand.errors). sentence() puts a notice or a refusal into words.
@@ -26,8 +26,10 @@ from .calibration.six import SixPositions, fit_six_positions
 from .calibration.two import TwoPositions, fit_two_positions
 from .errors import InputError
 from .imports.importing import Imported, import_recording, write_imported
+from .logs.cut import cut_log
 from .logs.log import Log
 from .logs.reader import read_log
+from .logs.stretch import Stretch
 from .refusals import RefusedInput, sentence
 from .replay.replay import LeanTable, replay
 from .simulation.ride import Ride as SimulatedRide
@@ -48,8 +50,10 @@ __all__ = [
     "SimulatedRide",
     "SixPositions",
     "Stop",
+    "Stretch",
     "Summary",
     "TwoPositions",
+    "cut_log",
     "export",
     "find_stops",
     "fit_drive",

@@ -8,11 +8,18 @@ speeding up and braking cancel out, which leaves `pitch`. Standing still, the fo
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand.lean.upright_trim import MAX_TRIM
 from numpy.typing import NDArray
 
 from ..logs.table import Array
 from .channels import Channels
 from .downsample import spacing_s
+
+# What a degree of each costs the shown lean, measured with simulated rides whose calibrations were turned on purpose.
+# Forward turned by yaw takes pitching for rolling: roll rate' = roll rate cos(yaw) + pitch rate sin(yaw), and the lean
+# is off by the bike's pitching times sin(yaw). Forward turned by pitch takes turning for rolling likewise, of which the
+# filter corrects most. Roll adds to the lean as it is, but riding takes MAX_TRIM of it out.
+YAW_COSTS_DEG, PITCH_COSTS_DEG = 3.0, 5.0  # times the sine
 
 SMOOTH_S = 0.5
 STRAIGHT_DPS, STRAIGHT_DEG = 2.0, 8.0  # riding straight on: turning and leaning by less
@@ -37,6 +44,36 @@ class Quality:
     straight_s: float
     lateral_g: Array
     forward_g: Array
+
+
+@dataclass
+class LeanCost:
+    """By how much each angle puts the shown lean off at most, rms in degrees, None where that is unknown."""
+
+    roll_deg: float | None
+    pitch_deg: float | None
+    yaw_deg: float | None
+
+
+def lean_cost(found: Quality) -> LeanCost:
+    """What the angles by which the axes are off cost the shown lean of a motorcycle.
+
+    >>> cost = lean_cost(Quality(0.2, None, 5.1, 1.0, 60.0, np.zeros(1), np.zeros(1)))
+    >>> cost.roll_deg, cost.pitch_deg, round(cost.yaw_deg, 2)
+    (0.0, None, 0.27)
+    """
+
+    roll, pitch, yaw = found.roll_deg, found.pitch_deg, found.yaw_deg
+    return LeanCost(
+        None if roll is None else max(0.0, abs(roll) - float(np.degrees(MAX_TRIM))),
+        None if pitch is None else PITCH_COSTS_DEG * abs(float(np.sin(np.radians(pitch)))),
+        None if yaw is None else yaw_cost_deg(yaw),
+    )
+
+
+def yaw_cost_deg(yaw_deg: float) -> float:
+    """What a forward that is turned by so much about the vertical costs the shown lean at most: rms, degrees."""
+    return YAW_COSTS_DEG * abs(float(np.sin(np.radians(yaw_deg))))
 
 
 def quality(ride: Channels, standing: NDArray[np.bool_]) -> Quality:

@@ -61,6 +61,7 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
             yield block
 
     course = joined(list(downsampled(blocks(), RATE_S)))
+    total.frozen_s = sum(float(notice.values[1]) for notice in notices if notice.code == "frozen-readings")
     found = quality(course, standing(course))
     exchanged = exchanged_notice(ride.calibration, found.roll_deg) if sign.exchanged else None
     stops = [] if exchanged else find_stops(course)

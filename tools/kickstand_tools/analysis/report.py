@@ -8,12 +8,13 @@ from rich.table import Table
 from rich.text import Text
 
 from ..refusals import SWAPPED_DEG, sentence
-from .alignment_quality import Quality
+from .alignment_quality import LeanCost, Quality, lean_cost
 from .overview import Overview
 from .stops.brake_test import Stop
 from .stops.speed_stops import stops_by_speed
 from .summary import Peak
 
+COSTS_DEG = 0.1  # of lean: less is not worth a word
 RIDDEN_S = 10.0  # a shorter ride is pushing the bike about
 
 
@@ -27,7 +28,8 @@ def as_data(seen: Overview) -> dict[str, Any]:
         "samples": total.samples,
         "riding_s": round(total.riding_s, 1),
         "lean_unsure_s": round(total.not_sure_s, 1),
-        "missing_s": round(total.missing_s, 1),
+        "missing_s": round(max(0.0, total.missing_s - total.frozen_s), 1),
+        "frozen_s": round(total.frozen_s, 1),
     }
     peaks = {"max_brake_g": total.brake_g, "max_accel_g": total.accel_g, "max_speed_mps": total.speed_mps}
     if not seen.ride.car:
@@ -41,6 +43,9 @@ def as_data(seen: Overview) -> dict[str, Any]:
         for name, value in vars(quality).items()
         if not name.endswith(("lateral_g", "forward_g"))
     }
+    if not seen.ride.car:
+        costs = vars(lean_cost(quality))
+        data["lean_cost"] = {name: None if value is None else round(value, 2) for name, value in costs.items()}
     data["remark"] = sentence(seen.exchanged) if seen.exchanged else ""
     data["stops"] = [
         {name: value if isinstance(value, str) else round(value, 3) for name, value in vars(stop).items()}
@@ -86,8 +91,10 @@ def _ride(seen: Overview) -> Table:
         table.add_row("Max speed", *_peak(peak, "{:.0f} km/h"))
     if total.not_sure_s >= 1.0:
         table.add_row("Lean not sure", clock(total.not_sure_s))
-    if total.missing_s >= 0.1:
-        table.add_row("No readings", f"{total.missing_s:.1f} s")
+    if total.missing_s - total.frozen_s >= 0.1:
+        table.add_row("No readings", f"{total.missing_s - total.frozen_s:.1f} s")
+    if total.frozen_s >= 0.1:
+        table.add_row("Readings frozen", f"{total.frozen_s:.1f} s")
     return table
 
 
@@ -101,9 +108,27 @@ def _alignment(seen: Overview) -> Text:
         # swapped poses exchange forward and backward too
         swapped = far and (seen.speed_correlation is None or seen.speed_correlation < 0.0)
         said += ": were the poses swapped?" if swapped else ": was it held upright?" if far else "."
+        if not seen.ride.car:
+            said += _cost(lean_cost(quality), seen.has_speed)
     if quality.gravity_g is not None:
         said += f" At rest the force is {quality.gravity_g:.3f} g."
     return Text(said)
+
+
+def _cost(cost: LeanCost, speed: bool) -> str:
+    """What the angles cost, and what to do against it. speed: the log has one."""
+    drive = "calibrate drive takes it out" if speed else "calibrate two again, leaned further, the bike not rolling"
+    remedies = {
+        "Roll": (cost.roll_deg, "calibrate two again, held upright"),
+        "Pitch": (cost.pitch_deg, "calibrate two again, on level ground"),
+        "Yaw": (cost.yaw_deg, drive),
+    }
+    said = [
+        f" {name} costs up to about {value:.1f}° of lean; {remedy}."
+        for name, (value, remedy) in remedies.items()
+        if value is not None and value >= COSTS_DEG
+    ]
+    return "".join(said) or f" That costs less than {COSTS_DEG}° of lean: nothing to do."
 
 
 def _stops(stops: list[Stop]) -> Table:

@@ -35,6 +35,7 @@ class Summary:
     display. These four count where the display would show the lean. riding_s: time not at rest. beyond_s: time at a
     lean of at least so many degrees, by degrees. histogram_s: time on the move in each bin of BINS_DEG. not_sure_s:
     time in which the meter does not trust its lean.  missing_s: time without readings, longer than LOST_US each.
+    frozen_s: of that, the time in which there were readings, but frozen ones.
     """
 
     samples: int = 0
@@ -49,6 +50,7 @@ class Summary:
     histogram_s: Array = field(default_factory=lambda: np.zeros(len(BINS_DEG) - 1))
     not_sure_s: float = 0.0
     missing_s: float = 0.0
+    frozen_s: float = 0.0
 
     def add(self, block: Channels) -> None:
         """The next part of the ride."""

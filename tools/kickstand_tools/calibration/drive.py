@@ -163,8 +163,8 @@ def _feed(
             try:
                 alignment.update(force, rate, now - previous)
             except ValueError as error:  # of a null vector
-                where = f"{log.name}, at {now / 1e6:.1f} s"
-                raise InputError(f"{where}: accelerations of nearly 0: at rest 1 g is needed, check the sensor") from error
+                what = f"{log.name}, at {now / 1e6:.1f} s: accelerations of nearly 0"
+                raise InputError(f"{what}: at rest 1 g is needed, check the sensor") from error
             previous = now
             if speed == speed:  # not NaN
                 alignment.measure_speed(speed)

@@ -124,6 +124,8 @@ def _six_lines(found: "SixPositions") -> Iterable[str]:
 def _two_lines(found: "TwoPositions") -> Iterable[str]:
     from kickstand.calibration.two_position import WARN_TILT_DEG
 
+    from ..analysis import alignment_quality
+
     calibration, first, second = found.calibration, found.kickstand, found.upright
     side = calibration.kickstand_side
     yield f"kickstand: {first.name}, {first.samples} samples"
@@ -134,13 +136,19 @@ def _two_lines(found: "TwoPositions") -> Iterable[str]:
     yield "gyro bias  " + _axes(calibration.gyro_bias_dps, "%+.2f deg/s")
     yield from _matrix_lines(calibration.vehicle_from_sensor)
     if found.tilt_deg < WARN_TILT_DEG:
-        yield f"warning: under {WARN_TILT_DEG:.0f} degrees, 1 degree of pitch turns forward by over 7: lean further"
+        cost_deg = alignment_quality.yaw_cost_deg(7.0)
+        yield (
+            f"warning: under {WARN_TILT_DEG:.0f} degrees, 1 degree of pitch turns forward by over 7, which costs up to "
+            f"about {cost_deg:.1f} degrees of lean: lean further, or calibrate drive after it"
+        )
     if not calibration.six_done:
-        yield "warning: no six-position calibration: an offset of 50 mg is 3 degrees of lean"
+        yield "warning: no six-position calibration: an offset of 50 mg is 3 degrees of lean: calibrate six first"
 
 
 def _drive_lines(found: "DriveResult", several: bool) -> Iterable[str]:
     from kickstand.drive_alignment import verdict
+
+    from ..analysis import alignment_quality
 
     yield f"{found.vehicle}, method {found.method}: {found.used} used, {found.turned} in turns not used"
     yield f"stops: {found.stops}"
@@ -155,10 +163,13 @@ def _drive_lines(found: "DriveResult", several: bool) -> Iterable[str]:
         elif found.poses.verdict == verdict.MOVED:
             yield f"warning: the mount is {yaw_deg:.0f} degrees from where the two poses saw it: was it moved since?"
         else:
-            yield f"the two poses had forward {yaw_deg:.1f} degrees off"
+            cost_deg = alignment_quality.yaw_cost_deg(yaw_deg)
+            costs = f", which costs up to about {cost_deg:.1f} degrees of lean" if cost_deg >= 0.05 else ""
+            yield f"the two poses had forward {yaw_deg:.1f} degrees off{costs}: now it is put right"
     yield from _matrix_lines(found.calibration.vehicle_from_sensor)
     if not found.calibration.six_done:
-        yield "warning: no six-position calibration: an offset of 50 mg tilts the vertical by 3 degrees"
+        what = "warning: no six-position calibration: an offset of 50 mg tilts the vertical by 3 degrees"
+        yield f"{what}: calibrate six first"
 
 
 def _event_lines(event: "DriveEvent", several: bool) -> Iterable[str]:

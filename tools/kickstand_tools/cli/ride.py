@@ -66,10 +66,12 @@ def export(ride: Path, form: str, calibration: Path | None, out: Path) -> None:
     """Write a ride as Circuit Tools (vbo), RaceChrono or data frames (parquet, csv) open it."""
     from ..analysis.channels import open_ride
     from ..analysis.export.export import export
+    from ..calibration.file import calibration_beside
     from ..output import check_output
     from ..progress import Bar
 
-    check_output(out, [ride, *([calibration] if calibration else [])])
+    calibration = calibration or calibration_beside(ride)
+    check_output(out, [ride, calibration])
     notices: list[Notice] = []
     with Bar("exporting") as bar:
         count = export(open_ride(ride, calibration), form, out, bar.reach, notices)

@@ -3,6 +3,7 @@
 import csv
 import io
 import math
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +37,8 @@ def header(log: str, line: str) -> list[str]:
         raise InputError(f"{log}, line 1: not CSV ({error}): is it a log?") from error
     missing = [name for name in COLUMNS if name not in names]
     if missing and "lean_deg" in names:
-        raise InputError(f"{log} holds the lean that kickstand has computed: give the log that it was made from")
+        what = f"{log} holds the lean that kickstand has computed"
+        raise InputError(f"{what}: give the log that it was made from{_made_from(log)}")
     if missing and any(mark in "".join(names) for mark in ";\t"):
         raise InputError(f"{log}, line 1: values stand apart by ; or tab: save it with commas between them")
     if missing:
@@ -47,6 +49,17 @@ def header(log: str, line: str) -> list[str]:
         if names.count(name) > 1:
             raise InputError(f"{log}, line 1: column {name} is there twice: leave one")
     return names
+
+
+def _made_from(log: str) -> str:
+    """", RIDE.csv", if that is the only ride beside it that has a calibration."""
+    rides = [
+        path.with_name(path.name.removesuffix(".cal.json") + ending)
+        for path in Path(log).parent.glob("*.cal.json")
+        for ending in (".csv", ".csv.gz")
+    ]
+    found = [path for path in rides if path.is_file() and path != Path(log)]
+    return f", {found[0]}" if len(found) == 1 else ""
 
 
 def plausible(table: NDArray[np.float64], names: list[str], before_us: int | None) -> bool:

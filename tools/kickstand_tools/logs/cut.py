@@ -6,7 +6,6 @@ from pathlib import Path
 from kickstand.errors import Notice
 
 from ..output import write_whole
-from .log import Log
 from .reader import read_blocks
 from .source import File, Progress
 from .stretch import Stretch
@@ -23,9 +22,15 @@ def cut_log(
     """Write from from_s to to_s of a log to out, line for line, gzipped if its name ends in .gz, whole or not at all.
 
     from_s, to_s: seconds since the log's first sample; negative: before its last one; None: to its end there. Returns
-    the number of samples and the seconds that they last. Raises InputError.
+    the number of samples and the seconds that they last. progress, notices: of read_blocks(). Raises InputError.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     log = Path(directory, "log.csv")
+    ...     _ = log.write_text("t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\\n0,0,1,0,0,0,0\\n1,0,1,0,0,0,0\\n")
+    ...     cut_log(log, Path(directory, "cut.csv"), from_s=0.5)
+    (1, 0.0)
     """
-    assert not isinstance(source, Log)
     count, seconds = 0, 0.0
 
     def write(temporary: Path) -> None:

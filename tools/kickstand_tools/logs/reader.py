@@ -233,7 +233,7 @@ def _check_units(name: str, block: Block) -> None:
     usual_g = np.median(np.linalg.norm(block.readings[:, :3], axis=1))
     if usual_g < LEAST_G:
         raise InputError(
-            f"{name}: accelerations of usually {usual_g:.2f} g: was gravity taken off? At rest 1 g is needed"
+            f"{name}: accelerations are usually {usual_g:.2f} g, not 1 g: was gravity taken off? It has to be in them"
         )
     if 5.0 < usual_g < 20.0:
         raise InputError(f"{name}: accelerations look like m/s2: divide them by 9.80665, their unit is g")

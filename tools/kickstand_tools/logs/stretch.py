@@ -14,6 +14,12 @@ class Stretch:
     """From from_s to to_s of a log, seconds since its first sample; negative: before its last one. None: its end there.
 
     It can be given wherever a log can. Its times count from its own first sample.
+
+    >>> import numpy as np
+    >>> from kickstand_tools.api import Log, read_log
+    >>> log = Log(np.arange(300) / 100.0, np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3)))
+    >>> len(read_log(Stretch(log, 1.0, 2.0)).t_s), len(read_log(Stretch(log, from_s=-0.5)).t_s)
+    (101, 51)
     """
 
     source: File | Log

@@ -8,7 +8,7 @@ import numpy as np
 from ..overview import Overview
 from ..report import clock
 from ..stops.brake_test import Stop
-from .envelope import envelope
+from .envelope import GAP_S, SPEED_GAP_S, envelope
 from .traces import (
     BRAKE_COLOUR,
     LATERAL_COLOUR,
@@ -59,7 +59,7 @@ def figure(seen: Overview) -> Any:
         ),
     )
     for row, (name, _, values, colour) in enumerate(lines, 1):
-        x, y = envelope(drawn.time_s, values, POINTS)
+        x, y = envelope(drawn.time_s, values, POINTS, SPEED_GAP_S if name == "speed" else GAP_S)
         made.add_trace(Scatter(x=x, y=_short(y), name=name, line={"width": 1, "color": colour}), row, 1)
     for peak, sign in maxima(seen):
         text = f"{peak.value:.0f}° {'left' if sign < 0 else 'right'}"
@@ -68,7 +68,7 @@ def figure(seen: Overview) -> Any:
         (drawn.lateral_g, LATERAL_COLOUR, "to the left"),
         (drawn.forward_g, BRAKE_COLOUR, "forward"),
     ):
-        x, y = envelope(drawn.time_s, values, POINTS)
+        x, y = envelope(drawn.time_s, values, POINTS, GAP_S)
         made.add_trace(Scatter(x=x, y=_short(y), name=name, line={"width": 1, "color": colour}), forces, 1)
     centres = (drawn.gg_edges_g[1:] + drawn.gg_edges_g[:-1]) / 2.0
     logs = np.log10(np.where(drawn.gg_s > 0.0, drawn.gg_s, np.nan))

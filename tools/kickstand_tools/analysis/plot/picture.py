@@ -7,7 +7,7 @@ import numpy as np
 
 from ..overview import Overview
 from ..report import clock
-from .envelope import envelope
+from .envelope import GAP_S, SPEED_GAP_S, envelope
 from .traces import (
     BRAKE_COLOUR,
     LATERAL_COLOUR,
@@ -69,7 +69,7 @@ def draw(path: Path, seen: Overview) -> None:
 
 
 def _lean(axes: Any, drawn: Traces, seen: Overview) -> None:
-    time, lean = envelope(drawn.time_s, drawn.lean_deg, POINTS)
+    time, lean = envelope(drawn.time_s, drawn.lean_deg, POINTS, GAP_S)
     axes.fill_between(time, np.minimum(lean, 0.0), 0.0, color=LEFT_COLOUR, alpha=0.85, linewidth=0.3)
     axes.fill_between(time, np.maximum(lean, 0.0), 0.0, color=RIGHT_COLOUR, alpha=0.85, linewidth=0.3)
     for peak, sign in maxima(seen):
@@ -91,7 +91,7 @@ def _lean(axes: Any, drawn: Traces, seen: Overview) -> None:
 
 
 def _speed(axes: Any, drawn: Traces, seen: Overview) -> None:
-    axes.plot(*envelope(drawn.time_s, drawn.speed_kmh, POINTS), color=SPEED_COLOUR, linewidth=1.2)
+    axes.plot(*envelope(drawn.time_s, drawn.speed_kmh, POINTS, SPEED_GAP_S), color=SPEED_COLOUR, linewidth=1.2)
     axes.set(title="Speed, km/h")
     axes.set_ylim(bottom=0.0)
     axes.margins(x=0.0)
@@ -105,7 +105,7 @@ def _forces(axes: Any, drawn: Traces, seen: Overview) -> None:
         (drawn.lateral_g, LATERAL_COLOUR, "to the left"),
         (drawn.forward_g, BRAKE_COLOUR, "forward"),
     ):
-        axes.plot(*envelope(drawn.time_s, values, POINTS), color=colour, linewidth=0.7, alpha=0.9, label=name)
+        axes.plot(*envelope(drawn.time_s, values, POINTS, GAP_S), color=colour, linewidth=0.7, alpha=0.9, label=name)
     shade = [(stop.start_s, stop.duration_s) for stop in seen.stops]
     axes.broken_barh(shade, (0, 1), transform=axes.get_xaxis_transform(), color="0.88", linewidth=0)
     for line in axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.97), ncols=2, frameon=False).get_lines():

@@ -1,0 +1,138 @@
+"""What a report says that an alignment costs is what it costs, and what it says to do takes it out."""
+
+import dataclasses
+import json
+import re
+
+import analysis_rides
+import command
+import numpy as np
+import pytest
+from kickstand_tools.analysis.alignment_quality import Quality, lean_cost, yaw_cost_deg
+from kickstand_tools.api import Log, fit_drive, fit_two_positions, open_ride, overview, simulate_ride, vehicle_channels
+
+NONE = np.zeros(1)
+AXES = {"roll": (0, 1), "pitch": (1, 2), "yaw": (0, 2)}
+
+
+def turned(calibration, name, degrees):
+    """The calibration with two of its axes turned into one another."""
+    a, b = AXES[name]
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    turn = np.eye(3)
+    turn[a, a] = turn[b, b] = c
+    turn[a, b], turn[b, a] = -s, s
+    return dataclasses.replace(calibration, vehicle_from_sensor=turn @ calibration.vehicle_from_sensor)
+
+
+@pytest.fixture(scope="module", params=["street", "track", "city"])
+def ride(request):
+    """Log of 100 samples a second with a speed, its true calibration and true lean."""
+    made = simulate_ride(request.param, seed=2, seconds=150.0)
+    n = round(made.rate_hz / 100.0)
+    readings = made.readings[: len(made.readings) // n * n].reshape(-1, n, 7).mean(axis=1)
+    log = Log.from_readings(readings, made.rate_hz / n)
+    log.speed_mps[::100] = made.truth["speed_mps"][n - 1 :: n][: len(readings)][::100]
+    kickstand, upright = (Log.from_readings(pose, made.rate_hz) for pose in (made.kickstand, made.upright))
+    calibration = fit_drive([log], fit_two_positions(kickstand, upright).calibration, "motorcycle").calibration
+    return log, calibration, made.truth["lean_deg"][n - 1 :: n][: len(readings)], request.param
+
+
+def error_deg(ride, calibration, from_share=0.0):
+    """rms of the shown lean where it is trusted and the bike moves."""
+    log, _, true, _ = ride
+    shown = vehicle_channels(log, calibration)
+    there = shown.trusted & (shown.resting < 0.5)
+    there[: round(from_share * len(there))] = False
+    return float(np.sqrt(np.mean((shown.lean_deg - true)[there] ** 2)))
+
+
+@pytest.mark.parametrize(("name", "degrees"), [("yaw", 6.0), ("yaw", 15.0), ("pitch", 6.0), ("pitch", 12.0)])
+def test_yaw_and_pitch_cost_what_is_said(ride, name, degrees):
+    """Both ways round: an error may also make up for another one."""
+    usual = error_deg(ride, ride[1])
+    more = [error_deg(ride, turned(ride[1], name, angle)) for angle in (degrees, -degrees)]
+    cost = np.sqrt(max(0.0, np.mean(np.square(more)) - usual**2))
+    angles = {"roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0} | {f"{name}_deg": degrees}
+    said = vars(lean_cost(Quality(**angles, gravity_g=1.0, straight_s=60.0, lateral_g=NONE, forward_g=NONE)))
+    most = said.pop(f"{name}_deg")
+    assert cost < 1.75 * most + 0.15
+    if ride[3] != "city":  # slow rides lose less
+        assert cost > 0.3 * most
+    assert set(said.values()) == {0.0}
+
+
+def test_riding_takes_roll_out_up_to_a_limit(ride):
+    usual = error_deg(ride, ride[1], 0.5)
+    assert error_deg(ride, turned(ride[1], "roll", 3.0), 0.5) < usual + 0.3
+    assert error_deg(ride, turned(ride[1], "roll", 12.0), 0.5) > 8.0
+
+
+def test_calibrate_drive_takes_yaw_out(ride):
+    log, calibration, *_ = ride
+    found = fit_drive([log], turned(calibration, "yaw", 9.0), "motorcycle").calibration
+    before, after = (
+        overview(open_ride(log, one)).quality.yaw_deg for one in (turned(calibration, "yaw", 9.0), found)
+    )
+    assert before is not None
+    assert after is not None
+    assert abs(abs(before) - 9.0) < 2.5
+    assert abs(after) < 2.0
+    assert found.vehicle_from_sensor == pytest.approx(calibration.vehicle_from_sensor, abs=0.02)
+
+
+def with_calibration(ride, name, degrees):
+    """The path of a CAL.json in which that is wrong."""
+    sine, cosine = np.sin(np.radians(degrees)), np.cos(np.radians(degrees))
+    a, b = AXES[name]
+    matrix = np.eye(3)
+    matrix[a, a] = matrix[b, b] = cosine
+    matrix[a, b], matrix[b, a] = -sine, sine
+    path = ride.with_name(f"{name}.json")
+    path.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": matrix.tolist()}))
+    return path
+
+
+@pytest.fixture(scope="module")
+def scripted(tmp_path_factory):
+    from kickstand_tools.simulation.scripted import script
+
+    segments = [script.upright(4)]
+    for _ in range(4):
+        segments += [script.accelerate(16, 5), script.straight(8), script.brake(0, 4), script.wait(4)]
+    return analysis_rides.write(tmp_path_factory.mktemp("ride"), segments, speed_hz=1)
+
+
+@pytest.mark.parametrize(
+    ("name", "degrees", "words"),
+    [
+        ("yaw", 5.0, r"yaw [+-]5\.\d°\. Yaw costs up to about 0\.3° of lean; calibrate drive takes it out\."),
+        ("yaw", 1.0, r"yaw [+-]1\.0°\. That costs less than 0\.1° of lean: nothing to do\."),
+        ("roll", 3.0, r"roll [+-]3\.0°.*\. That costs less than 0\.1° of lean: nothing to do\."),
+        ("roll", 9.0, r"roll [+-]9\.0°.*: was it held upright\? Roll costs up to about 5\.5° of lean; calibrate two"),
+        ("pitch", 4.0, r"pitch [+-]3\.\d°.* Pitch costs up to about 0\.3° of lean; calibrate two again, on level"),
+    ],
+)
+def test_a_report_says_what_it_costs_and_what_to_do(scripted, name, degrees, words):
+    cal = with_calibration(scripted, name, degrees)
+    said = " ".join(command.works("report", scripted, "--calibration", cal).out.split())
+    assert re.search(words, said), said
+    data = json.loads(command.works("report", scripted, "--calibration", cal, "--json").out)
+    cost = data["lean_cost"][f"{name}_deg"]
+    most = {"yaw": yaw_cost_deg(degrees), "roll": max(0.0, degrees - 3.5), "pitch": 0.33}[name]
+    assert cost == pytest.approx(most, abs=0.05)
+
+
+def test_without_a_speed_calibrate_drive_is_no_help(scripted, tmp_path):
+    log = tmp_path / "RIDE.csv"
+    log.write_text("\n".join(row.rpartition(",")[0] for row in scripted.read_text().splitlines()) + "\n")
+    said = " ".join(command.works("report", log, "--calibration", with_calibration(scripted, "yaw", 5.0)).out.split())
+    assert "calibrate two again, leaned further" in said
+    assert "calibrate drive" not in said
+
+
+def test_a_car_has_no_lean_to_lose(scripted, tmp_path):
+    cal = tmp_path / "car.json"
+    cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle": "car"}))
+    assert "of lean" not in command.works("report", scripted, "--calibration", cal).out
+    assert "lean_cost" not in json.loads(command.works("report", scripted, "--calibration", cal, "--json").out)

@@ -1,0 +1,197 @@
+"""Readings that froze are a gap, not a standstill; a quiet sensor at rest is no frozen one."""
+
+import json
+
+import analysis_rides
+import command
+import numpy as np
+import pytest
+from kickstand_tools.api import Log, fit_two_positions, open_ride, overview, replay, simulate_ride, vehicle_channels
+from kickstand_tools.calibration import drive
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.logs import reader
+from kickstand_tools.logs.mended.frozen import FrozenReadings, believed
+from kickstand_tools.logs.reader import read_blocks
+from kickstand_tools.refusals import sentence
+
+HZ = 100
+REST = np.array([0.012, 0.985, 0.171, 0.4, -1.1, 0.2])  # g, deg/s: at rest, with a gyro's bias
+
+
+def log_of(readings, hz=HZ) -> Log:
+    return Log(np.arange(len(readings)) / hz, readings[:, :3], readings[:, 3:])
+
+
+def frozen(log: Log) -> np.ndarray:
+    return np.concatenate([block.frozen for block in read_blocks(log)])
+
+
+def riding(seconds, seed=0, digits=5):
+    """Vibration and bends, not at rest."""
+    chance = np.random.default_rng(seed)
+    n = round(seconds * HZ)
+    values = REST + chance.normal(scale=[0.1, 0.1, 0.1, 4.0, 4.0, 4.0], size=(n, 6))
+    return np.round(values + 0.2 * np.sin(np.arange(n) / HZ)[:, None], digits)
+
+
+def resting(seconds, seed=0, noise=1.0, digits=5):
+    """noise: times that of a phone's sensor, 1 mg and 0.03 deg/s."""
+    chance = np.random.default_rng(seed)
+    return np.round(REST + noise * chance.normal(scale=[0.001] * 3 + [0.03] * 3, size=(round(seconds * HZ), 6)), digits)
+
+
+@pytest.mark.parametrize("blocks_of", [60_000, 130, 7])
+def test_a_freeze_is_marked_to_the_sample(monkeypatch, blocks_of):
+    monkeypatch.setattr(reader, "BLOCK_SAMPLES", blocks_of)
+    readings = riding(8)
+    readings[300:500] = readings[300]
+    found = np.flatnonzero(frozen(log_of(readings)))
+    first = 301 if blocks_of == 60_000 else found[0]  # at the end of a block the start may be taken for a reading
+    assert found.tolist() == list(range(first, 500))
+    assert first < 360
+    notices = []
+    list(read_blocks(log_of(readings), notices=notices))
+    (notice,) = notices
+    assert sentence(notice).startswith("the readings froze from 3.")
+    assert sentence(notice).endswith("to 5.0 s: they are not believed, and the lean begins anew after each")
+
+
+@pytest.mark.parametrize(("samples", "is_one"), [(50, False), (52, True)])
+def test_how_long_it_takes(samples, is_one):
+    readings = riding(8)
+    readings[300 : 300 + samples] = readings[300]
+    assert np.any(frozen(log_of(readings))) == is_one
+
+
+def test_at_each_end_and_twice():
+    readings = riding(10)
+    readings[:200], readings[400:500], readings[900:] = readings[0], readings[400], readings[900]
+    found = np.flatnonzero(frozen(log_of(readings)))
+    assert found.tolist() == [*range(1, 200), *range(401, 500), *range(901, 1000)]
+    notices = []
+    list(read_blocks(log_of(readings), notices=notices))
+    assert "from 0.0 to 2.0 s and 2 times more, 4.0 s in all" in sentence(notices[0])
+
+
+@pytest.mark.parametrize("digits", [5, 4, 3, 2, 1])
+@pytest.mark.parametrize("noise", [1.0, 0.3])
+def test_a_vehicle_at_rest_is_believed(digits, noise):
+    """A quiet sensor, the engine off, in logs with fewer and fewer digits: with one, most readings are the same."""
+    idling = resting(1, 5, 30.0, digits)  # its engine shakes it
+    readings = np.vstack((riding(5, 1, digits), idling, resting(20, 2, noise, digits), idling, riding(5, 3, digits)))
+    same = np.all(np.diff(readings[600:2600], axis=0) == 0.0, axis=1)
+    assert not np.any(frozen(log_of(readings)))
+    if digits == 1 and noise < 1.0:
+        assert np.all(same)
+
+
+@pytest.mark.parametrize("digits", [5, 3, 2, 1])
+def test_a_phone_that_freezes_in_a_ride_is_not(digits):
+    readings = riding(30, 4, digits)
+    readings[1000:2000] = readings[1000]
+    assert np.count_nonzero(frozen(log_of(readings))) == 999
+
+
+def test_what_never_changes_is_not_judged():
+    """There is nothing to compare it with. A pose of it is refused where it is used, see test_still_pose."""
+    assert not np.any(frozen(log_of(np.tile(REST, (500, 1)))))
+
+
+def test_a_log_without_what_froze():
+    readings = riding(8)
+    whole = log_of(readings)
+    assert believed(whole) is whole
+    readings[300:500] = readings[300]
+    left = believed(log_of(readings))
+    assert len(left.t_s) == 601
+    assert np.max(np.diff(left.t_s)) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize("profile", ["street", "track"])
+def test_a_freeze_is_no_standstill(profile):
+    """20 s in the middle of a ride: believed, it leaves the lean wrong by up to 50 degrees, and long after it."""
+    ride = simulate_ride(profile, seed=1, seconds=100.0)
+    hz = round(ride.rate_hz)
+    kickstand, upright = (Log.from_readings(pose, hz) for pose in (ride.kickstand, ride.upright))
+    calibration = fit_two_positions(kickstand, upright).calibration
+    readings, begin, end = ride.readings.copy(), 50 * hz, 70 * hz
+    readings[begin:end] = readings[begin]
+    found = replay(Log.from_readings(readings, ride.rate_hz), calibration)
+    whole = replay(Log.from_readings(ride.readings, ride.rate_hz), calibration)
+    assert np.all(np.isnan(found.lean_deg[begin + 1 : end]))
+    assert np.all(np.isnan(found.forward_g[begin + 1 : end]))
+    shown = vehicle_channels(Log.from_readings(readings, ride.rate_hz), calibration)
+    there = np.searchsorted(shown.t_s, np.arange(end, end + 15 * hz) / ride.rate_hz - 1e-6)
+    sure = shown.trusted[there]
+    assert np.mean(sure) > 0.6
+    away = (found.lean_deg - ride.truth["lean_deg"])[end : end + 15 * hz][sure]
+    usual = (whole.lean_deg - ride.truth["lean_deg"])[end : end + 15 * hz][sure]
+    assert np.sqrt(np.mean(away**2)) < 1.3 * np.sqrt(np.mean(usual**2)) + 0.3
+    assert np.array_equal(found.lean_deg[:begin], whole.lean_deg[:begin])
+
+
+def test_the_commands_say_it(tmp_path):
+    ride = analysis_rides.short(tmp_path, speed_hz=1)
+    header, *rows = ride.read_text().splitlines()
+    for k in range(1300, 1500):  # in the first turn
+        rows[k] = rows[k].partition(",")[0] + "," + ",".join(rows[1300].split(",")[1:7]) + ","
+    ride.write_text("\n".join([header, *rows]) + "\n")
+    out = tmp_path / "LEAN.csv"
+    words = f"warning: {ride}: the readings froze from 13.0 to 15.0 s: they are not believed"
+    assert words in command.works("replay", ride, "--out", out).err
+    lean = analysis_rides.table(out)
+    assert len(lean) == len(rows)
+    assert np.flatnonzero(np.isnan(lean["lean_deg"])).tolist() == list(range(1301, 1500))
+    said = command.works("report", ride)
+    assert words in said.err
+    assert "Readings frozen" in said.out
+    data = json.loads(command.works("report", ride, "--json").out)
+    assert data["frozen_s"] == pytest.approx(2.0, abs=0.05)
+    assert data["missing_s"] == pytest.approx(0.0, abs=0.05)
+    exported = tmp_path / "out.csv"
+    assert words in command.works("export", ride, "--to", "csv", "--out", exported).err
+    assert len(analysis_rides.table(exported)) == len(rows) - 199
+    seen = overview(open_ride(ride))
+    assert not np.any((seen.course.t_s > 13.1) & (seen.course.t_s < 14.9))
+
+
+@pytest.mark.parametrize("engine", ["cpython", "micropython"])
+def test_every_engine_is_told_of_a_gap(engine):
+    from kickstand_tools import unix_port
+
+    if engine == "micropython" and not unix_port.available():
+        pytest.skip("no MicroPython for this system")
+    readings = riding(6)
+    readings[200:400] = readings[200]
+    found = replay(log_of(readings), CalibrationFile(aligned=True), engine)
+    assert np.flatnonzero(np.isnan(found.lean_deg)).tolist() == list(range(201, 400))
+    gap = replay(believed(log_of(readings)), CalibrationFile(aligned=True))
+    assert np.array_equal(found.lean_deg[400:], gap.lean_deg[201:])
+
+
+def test_a_freeze_is_no_stop_for_calibrate_drive():
+    readings = riding(60)
+    readings[2000:4000] = readings[2000]
+    log = log_of(readings)
+    log.speed_mps[::100] = 12.0
+    assert len(drive._read(log, False).t_s) == 4001
+
+
+def test_blocks_are_marked_once():
+    marks = FrozenReadings()
+    readings = riding(4)
+    readings[100:300] = readings[100]
+    (block,) = read_blocks(log_of(readings))
+    assert np.count_nonzero(marks.mark(block)) == 199
+    assert marks.notices()[0].values[0] == 1
+
+
+def test_real_logs_are_believed_and_a_freeze_in_one_is_not(shared_data):
+    for path in sorted(shared_data.glob("*.csv.gz")):
+        log = reader.read_log(path)
+        assert log.notices == []
+        assert believed(log) is log
+    log = reader.read_log(shared_data / "motorcycle-ride.csv.gz")
+    begin, end = np.searchsorted(log.t_s, [40.0, 60.0])
+    log.accel_g[begin:end], log.gyro_dps[begin:end] = log.accel_g[begin], log.gyro_dps[begin]
+    assert np.flatnonzero(frozen(log)).tolist() == list(range(begin + 1, end))

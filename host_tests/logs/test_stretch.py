@@ -1,0 +1,130 @@
+"""A stretch of a log: its samples and times, cut out by `kickstand cut` or taken by --from and --to."""
+
+import gzip
+import io
+import json
+
+import analysis_rides
+import command
+import numpy as np
+import pytest
+from kickstand_tools.errors import InputError
+from kickstand_tools.logs import reader
+from kickstand_tools.logs.reader import read_blocks, read_log, read_twice
+from kickstand_tools.logs.stretch import Stretch
+
+ROWS = [f"{7 + k / 100:.2f}, 0.{k % 9}1,-0.02,1.01,0.5,-0.5,0.1{k % 7},note {k}" for k in range(1000)]
+HEADER = command.HEADER + ",note"
+
+
+@pytest.fixture
+def log(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([HEADER, *ROWS]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize(
+    ("from_s", "to_s", "first", "last"),
+    [
+        (2.0, 3.0, 200, 300),
+        (None, 1.0, 0, 100),
+        (9.0, None, 900, 999),
+        (-1.0, None, 899, 999),
+        (None, -9.0, 0, 99),
+        (-5.0, -4.0, 499, 599),
+        (0.0, 100.0, 0, 999),
+    ],
+)
+@pytest.mark.parametrize("block_bytes", [500, 1 << 22])
+def test_which_samples(log, monkeypatch, from_s, to_s, first, last, block_bytes):
+    monkeypatch.setattr(reader, "BLOCK_BYTES", block_bytes)
+    for source in log, io.StringIO(log.read_text()), read_log(log):
+        found = read_log(Stretch(source, from_s, to_s))
+        assert found.start_s == pytest.approx(7.0 + first / 100)
+        assert found.time_us.tolist() == [10_000 * k for k in range(last - first + 1)]
+        assert found.accel_g[0, 0] == float(f"0.{first % 9}1")
+    blocks = list(read_blocks(Stretch(log, from_s, to_s)))
+    assert [line for block in blocks for line in block.lines] == ROWS[first : last + 1]
+    assert blocks[0].time_text[0] == ROWS[first].partition(",")[0]
+
+
+def test_what_is_no_stretch(log):
+    for from_s, to_s, words in (
+        (3.0, 2.0, "the stretch ends before it begins"),
+        (2.0, 2.0, "the stretch ends before it begins"),
+        (20.0, None, "no samples in this stretch: the log is 10.0 s long"),
+        (None, -20.0, "the stretch ends before it begins"),
+    ):
+        with pytest.raises(InputError, match=words):
+            read_log(Stretch(log, from_s, to_s))
+    with pytest.raises(InputError, match="too short: 1 samples"):
+        read_log(Stretch(log, 2.0, 2.005))
+
+
+def test_an_open_file_can_be_read_twice():
+    kept = read_twice(Stretch(io.StringIO("\n".join([HEADER, *ROWS])), 1.0, 2.0))
+    for _ in range(2):
+        assert len(read_log(kept).t_s) == 101
+
+
+def test_cut_writes_the_lines_as_they_are(log, tmp_path):
+    out = tmp_path / "cut.csv"
+    said = command.works("cut", log, "--from", "2", "--to", "3", "--out", out)
+    assert said.out == f"written: {out}, 101 samples, 1.0 s\n"
+    assert out.read_text().splitlines() == [HEADER, *ROWS[200:301]]
+    packed = tmp_path / "cut.csv.gz"
+    command.works("cut", log, "--to", "-9", "--out", packed)
+    assert gzip.decompress(packed.read_bytes()).decode().splitlines() == [HEADER, *ROWS[:100]]
+
+
+def test_what_cut_refuses(log, tmp_path):
+    out = tmp_path / "cut.csv"
+    command.refused(tmp_path, "cut", log, "--out", out, words="Give --from, --to or both")
+    command.refused(tmp_path, "cut", log, "--from", "60", "--out", out, words="the log is 10.0 s long")
+    command.refused(tmp_path, "cut", log, "--from", "1", "--out", log, words="is also an input")
+    command.refused(tmp_path, "cut", log, "--from", "early", "--out", out, words="not a valid float")
+
+
+def test_poses_cut_out_of_one_log_align_the_sensor(tmp_path):
+    """Kickstand and upright, with the bike pushed about between them."""
+    chance = np.random.default_rng(4)
+    lean = np.interp(np.arange(1200) / 100.0, [0.0, 4.0, 6.0, 12.0], [-12.0, -12.0, 0.0, 0.0])
+    force = np.column_stack((np.sin(np.radians(lean)), np.cos(np.radians(lean)), np.zeros(1200)))
+    rates = np.column_stack((np.zeros((1200, 2)), np.gradient(lean, 0.01)))
+    values = np.hstack((force, rates)) + chance.normal(scale=[0.003] * 3 + [0.04] * 3, size=(1200, 6))
+    log = command.write(tmp_path / "log.csv", np.column_stack((np.arange(1200) / 100.0, values)))
+    stand, upright, cal = (tmp_path / name for name in ("STAND.csv", "UPRIGHT.csv", "CAL.json"))
+    command.works("cut", log, "--to", "3.5", "--out", stand)
+    command.works("cut", log, "--from", "-5", "--out", upright)
+    assert "12.0 degrees from the kickstand" in command.works("calibrate", "two", stand, upright, "--out", cal).out
+
+
+def test_replay_report_and_plot_take_a_stretch(tmp_path):
+    ride = analysis_rides.short(tmp_path, speed_hz=1)
+    out = tmp_path / "LEAN.csv"
+    command.works("replay", ride, "--from", "18", "--to", "26", "--out", out)
+    lean = analysis_rides.table(out)
+    assert (lean["t_s"][0], lean["t_s"][-1]) == (18.0, 26.0)
+    data = json.loads(command.works("report", ride, "--from", "18", "--to", "26", "--json").out)
+    assert data["duration_s"] == 8.0
+    assert data["stops"] == []
+    pytest.importorskip("matplotlib")
+    pytest.importorskip("plotly")
+    command.works("plot", ride, "--to", "26", "--out", tmp_path / "pictures")
+    assert (tmp_path / "pictures" / "RIDE.png").exists()
+
+
+def test_a_stretch_exported_keeps_its_time_of_day(tmp_path):
+    """A log without a clock ends when it was written; a stretch of it ends earlier by what is left out."""
+    import os
+
+    from kickstand_tools.analysis.channels import open_ride
+    from kickstand_tools.analysis.export.export import export
+
+    ride = analysis_rides.short(tmp_path)  # 34 s
+    os.utime(ride, (1_700_000_100, 1_700_000_100))
+    out = tmp_path / "out.csv"
+    export(open_ride(Stretch(ride, 10.0, 20.0)), "racechrono", out)
+    first = out.read_text().splitlines()[12]
+    assert float(first.split(",")[0]) == pytest.approx(1_700_000_100 - 34 + 10, abs=1.5)
