@@ -141,8 +141,6 @@ class App:
         self.lcd.tick(now_ms)
         if self.recorder and self.recorder.active:  # recording() would cost 20 us
             self.recorder.tick()
-            if self.recorder.take_stall() and self.drive:
-                self.drive.speed.after_stall(ticks_ms())
 
     @property
     def recording(self):
@@ -184,6 +182,9 @@ class App:
         self.recorder = Recorder(keeper, self.settings.SAMPLE_HZ)
 
     def _poll_speed(self, now_ms):
+        if self.recorder and self.recorder.stalled:  # also by what began or ended a ride
+            self.recorder.stalled = False
+            self.drive.speed.after_stall(now_ms)
         speed = self.drive.poll(now_ms)
         if speed is not None and self.recording:
             self.recorder.add_speed(int(100 * speed + 0.5))

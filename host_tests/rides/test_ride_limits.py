@@ -35,10 +35,12 @@ class Keeper:
     def __init__(self, clock, length=1024):
         self.clock, self.length = clock, length
         self.steps, self.taken, self.begun = [], [], b""
+        self.takes_ms = {}  # by the name of a step
         self.is_ready, self.slow_us, self.free = True, 0, 1_000_000
 
     def _step(self, name):
         self.steps.append(name)
+        self.clock.advance(1000 * self.takes_ms.get(name, 0))
         if name == self.fails:
             raise self.error
 
@@ -96,6 +98,12 @@ def recorder(clock, keeper):
     from kickstand.rides.recorder import Recorder
 
     return Recorder(keeper, 200)
+
+
+def take_stall(recorder):
+    """As the app does it."""
+    stalled, recorder.stalled = recorder.stalled, False
+    return stalled
 
 
 def start(recorder):
@@ -204,12 +212,35 @@ def test_a_write_of_over_10_ms_was_an_erase_of_the_flash(ms, stops_interrupts, s
     keeper.slow_us = ms * 1000
     keeper.stops_interrupts = stops_interrupts
     start(recorder)
-    assert not recorder.take_stall()
+    assert not take_stall(recorder)
     while "write" not in keeper.steps:
-        assert not recorder.take_stall()
+        assert not take_stall(recorder)
         add(recorder, 1)
-    assert recorder.take_stall() is stalled
-    assert not recorder.take_stall()
+    assert take_stall(recorder) is stalled
+    assert not take_stall(recorder)
+
+
+@pytest.mark.parametrize("stops_interrupts", [True, False])
+@pytest.mark.parametrize(("step", "fails"), [("begin", ""), ("begin", "begin"), ("abandon", "begin")])
+def test_the_beginning_of_a_ride_may_erase_flash_also_one_that_fails(step, fails, stops_interrupts, recorder, keeper):
+    keeper.stops_interrupts, keeper.fails = stops_interrupts, fails
+    for ms, stalled in ((9, False), (12, True)):
+        keeper.takes_ms = {step: ms}
+        start(recorder)
+        assert recorder.active is (not fails)
+        assert take_stall(recorder) is (stalled and stops_interrupts)
+        keeper.takes_ms = {}
+        recorder.stop()
+        take_stall(recorder)
+
+
+def test_a_write_that_fails_may_have_erased_flash(recorder, keeper):
+    start(recorder)
+    keeper.fails, keeper.takes_ms = "write", {"abandon": 45}
+    while recorder.active:
+        assert not take_stall(recorder)
+        add(recorder, 1)
+    assert take_stall(recorder)
 
 
 def test_the_end_of_a_ride_closes_a_file_and_may_erase_flash(recorder, keeper):
@@ -217,7 +248,7 @@ def test_the_end_of_a_ride_closes_a_file_and_may_erase_flash(recorder, keeper):
         keeper.stops_interrupts = stops_interrupts
         start(recorder)
         recorder.stop()
-        assert recorder.take_stall() is stops_interrupts
+        assert take_stall(recorder) is stops_interrupts
 
 
 @pytest.mark.parametrize(("waited_us", "step_us"), [(100_000, 500_001), (3_000_000, 3_000_000), (600_000_000, 1 << 29)])

@@ -22,13 +22,15 @@ class Recorder:
 
     active: True while a ride is being recorded.
     problem: None, or a CardError or Notice: why the recording ended by itself; take_problem() clears it.
+    stalled: True if interrupts were off for longer than STALL_MS, so that what they measured is not right. Who has been
+    told clears it.
     """
 
     def __init__(self, keeper, sample_hz):
         self.keeper = keeper
         self.active = False
         self.problem = None
-        self._stalled = False
+        self.stalled = False
         self._sample_hz = sample_hz
         self._block = self._spare = None  # RideBlocks, 8 KB of heap: made by the first start()
 
@@ -38,6 +40,7 @@ class Recorder:
         A replay begins with a new filter. So the caller has to restart the meter's as well, or the replay's lean will
         differ. Raises nothing: see active and problem."""
         self.stop()
+        begun_ms = ticks_ms()
         try:
             if not self._spare:
                 period_us = 1_000_000 // self._sample_hz
@@ -49,6 +52,8 @@ class Recorder:
         except (OSError, MemoryError) as error:
             self._fail(error)
             return
+        finally:
+            self._note_stall(begun_ms)  # a new directory, or closing a file after an error
         self._chip = chip
         self._body = pack(chip.who_am_i, chip.accel_range_g, calibration)
         now_ms = ticks_ms()
@@ -73,7 +78,7 @@ class Recorder:
             self.tick()
         if self.active:
             self.active = False
-            self._stalled = self.keeper.stops_interrupts
+            self.stalled = self.keeper.stops_interrupts
             try:
                 self.keeper.end()
             except (OSError, MemoryError) as error:
@@ -83,11 +88,6 @@ class Recorder:
         """Return problem and clear it."""
         problem, self.problem = self.problem, None
         return problem
-
-    def take_stall(self):
-        """True if interrupts were off for longer than STALL_MS since the last call: what they measured is not right."""
-        stalled, self._stalled = self._stalled, False
-        return stalled
 
     def mark_gap(self):
         """Say that the chip was started again: the next turn does not follow on from the one before."""
@@ -124,8 +124,12 @@ class Recorder:
             return
         begun_ms = ticks_ms()
         self._write(waiting)
+        self._note_stall(begun_ms)
+
+    def _note_stall(self, begun_ms):
+        """What was begun then may have erased flash."""
         if ticks_diff(ticks_ms(), begun_ms) > STALL_MS and self.keeper.stops_interrupts:
-            self._stalled = True
+            self.stalled = True
 
     def _write(self, waiting):
         """Take one step of writing this block."""
