@@ -15,6 +15,7 @@ from .board import port
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
 from .devices import open_button
+from .errors import attempt
 from .imu.sample_clock import SampleClock
 from .lean.meter import LeanMeter
 from .ui.screen import Screen
@@ -44,9 +45,8 @@ class App:
 
     settings: a Settings. lcd, sensor: of devices.open_lcd() and open_sensor(). keeper: where rides are recorded to (see
     Recorder), None for flash or SD card; if one is given, recording begins with the first readings. Raises
-    SettingsError for pins that cannot be used.
-
-    recorder: a Recorder, or None before prepare_recorder() has made it.
+    SettingsError for pins that cannot be used. recorder: a Recorder, or None before prepare_recorder() has made it.
+    no_recorder: None, or a Notice why it cannot.
     """
 
     def __init__(self, settings, lcd, sensor, keeper=None):
@@ -57,16 +57,17 @@ class App:
         self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle", sensor.chip.gyro_delay_s)
         self.calibration = ActiveCalibration(self.meter, self._calibration_changed)
         self.drive = self._open_drive() if settings.SPEED else None
-        self.recorder = None
+        self.recorder = self.no_recorder = None
         self._keeper = keeper
         self.clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self.screen = Screen(self)
         self._restarts = 0
         self._record_due = settings.RECORD or keeper is not None
         self._on_card = settings.SD_SPI is not None and keeper is None
-        self._recorder_parts = ["block", "recorder"]  # modules of rides/ that are still to be imported
-        if keeper is None:
-            self._recorder_parts[1:1] = ["ride_paths", "flash_ring"]
+        # Modules of rides/ that are still to be imported
+        self._recorder_parts = ["block", "recorder"] if keeper else ["block", "ride_paths", "flash_ring", "recorder"]
+        if self._on_card:
+            self._recorder_parts.append("card_trial")
         if self._record_due or self._on_card:
             self._make_recorder()
         self._page_ms = ticks_ms()
@@ -90,7 +91,7 @@ class App:
             raise
 
     def _loop(self):
-        if self._on_card:
+        if self._on_card and self.recorder:
             from .rides import card_trial
 
             self.lcd.show("SD card", "is being read")
@@ -148,29 +149,36 @@ class App:
         return self.recorder is not None and self.recorder.active
 
     def record(self):
-        """Begin to record a ride.
-
-        Where the bike stands, the lean filter begins anew with the recording, so that a replay shows the same lean; it
-        has to find the gyro's errors again in the first bends. A recording begun while riding is replayed by a filter
-        that knows less at its beginning than the one on the board.
-        """
+        """Begin to record a ride. Where the bike stands, the lean filter begins anew too, so that a replay shows the
+        same lean; it has to find the gyro's errors again in the first bends. A recording begun while riding is replayed
+        by a filter that knows less at its beginning than the one on the board."""
         if self.meter.at_rest:
             self.calibration.restart()
+        if not self._on_card:  # a card has to be tried out before the watchdog runs
+            self.no_recorder = None
         self._make_recorder()
-        self.recorder.start(self.sensor.chip, self.calibration.value)
+        if self.recorder:
+            self.recorder.start(self.sensor.chip, self.calibration.value)
+        else:
+            self.screen.tell(self.no_recorder, ticks_ms())
 
     def _make_recorder(self):
-        while self.recorder is None:
-            self.prepare_recorder()
+        step = self._prepare if self._keeper else self.prepare_recorder  # a computer that waits is told by an exception
+        while self.recorder is None and self.no_recorder is None:
+            step()
 
     def prepare_recorder(self):
         """Import the next module that recording needs, and after the last make the recorder. The open menu calls this
-        again and again: the chip's FIFO bridges one import (0.1 s), not all of them."""
-        if self.recorder is not None:
-            return
+        again and again: the chip's FIFO bridges one import (0.1 s), not all of them. If that fails, record() tells
+        why."""
+        if self.recorder is None and self.no_recorder is None:
+            self.no_recorder = attempt(self._prepare)
+
+    def _prepare(self):
         gc.collect()  # as before each import while the loop runs: what stays must not lie behind garbage
         if self._recorder_parts:
-            __import__("kickstand.rides." + self._recorder_parts.pop(0))
+            __import__("kickstand.rides." + self._recorder_parts[0])
+            self._recorder_parts.pop(0)
             return
         from .rides.recorder import Recorder
 

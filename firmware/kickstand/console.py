@@ -12,6 +12,8 @@ _slow_ms = None  # when a print was slow
 _SENTENCES = """
 not-written|calibration not saved: {0}; the old one is kept
 read-back|calibration not saved: it reads back differently; the old one is kept
+incomplete|incomplete firmware ({0}): run kickstand flash
+no-memory|no memory for that ({0}): restart the board
 no-driver|SD card: its driver is not on the board: mpremote mip install sdcard
 no-card|SD card: none that can be used ({0}): check wiring and card, which has to be FAT32; then restart the board
 unreadable|config.py cannot be read ({1}{2}): correct it, then kickstand flash --config

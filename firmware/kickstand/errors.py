@@ -4,6 +4,9 @@ A code is a name for programs, never shown. ui/messages.py words it for the disp
 what a board says on its USB console, and the host's tools word it for a terminal.
 """
 
+import gc
+import sys
+
 # What importing machine code raises where there can be none: CPython or a port without viper, an ESP32 that has no free
 # memory to run it from, a chip that it was not compiled for.
 NO_MACHINE_CODE = (ImportError, NameError, SyntaxError, MemoryError, ValueError)
@@ -47,6 +50,22 @@ def report(refusal):
         tell(refusal)
     except (ImportError, OSError, MemoryError):
         print(refusal.code)
+
+
+def attempt(function, *arguments):
+    """Call function, which may import modules that nothing has needed before. Return None, or a Notice if there is no
+    memory or the firmware is incomplete. What it imported is forgotten then: MicroPython would keep half a module."""
+    before = tuple(sys.modules)
+    try:
+        function(*arguments)
+        return None
+    except (ImportError, MemoryError) as error:
+        for name in [name for name in sys.modules if name not in before]:
+            del sys.modules[name]
+        gc.collect()
+        problem = Notice("incomplete" if isinstance(error, ImportError) else "no-memory", str(error))
+    report(problem)
+    return problem
 
 
 def checked(machine_code, plain, *arguments):

@@ -1,10 +1,15 @@
 """What main.py runs, when something is missing or broken."""
 
+import builtins
 import math
+import os
+import subprocess
 import sys
 
+import mpy
 import pytest
 from kickstand import errors
+from kickstand_tools import firmware_path
 from kickstand_tools.bench.boot import in_order
 from kickstand_tools.simulated_board.simulator import Board
 
@@ -18,9 +23,9 @@ def board(tmp_path, monkeypatch):
         yield made
 
 
-@pytest.mark.parametrize("module", ["kickstand.app", "kickstand.ui.align_wizard"])
+@pytest.mark.parametrize("module", ["kickstand.app", "kickstand.lean.lean_filter"])
 def test_incomplete_firmware_ends_at_the_prompt_and_says_so(module, board, monkeypatch, capsys):
-    """Not in restarts for ever: also where what is missing is only imported for the first press."""
+    """Not in restarts for ever."""
     from time import sleep_ms  # pyright: ignore[reportAttributeAccessIssue]
 
     from kickstand import start
@@ -52,6 +57,123 @@ def test_a_capacitor_at_the_button_does_not_pass_for_a_press_at_power_on(held, c
         assert board.lcd.text() == ["Safe mode       ", "Ready for USB   "]
     else:
         assert shown[0].startswith("Raw")
+
+
+INCOMPLETE, NO_MEMORY = ["Incomplete:     ", "flash it again  "], ["No memory for it", "restart it      "]
+ALIGN, SIX, RECORD = 0, 1, 4  # places in the menu
+
+
+@pytest.fixture(params=["missing", "no memory"])
+def without(request, monkeypatch):
+    """Call it with the end of a module's name: from then on that cannot be imported. Returns what is said then."""
+
+    def take_away(ending):
+        real = builtins.__import__
+
+        def importing(name, globals=None, locals=None, fromlist=(), level=0):
+            if name == ending or name.endswith("." + ending):
+                if request.param == "missing":
+                    raise ImportError(f"no module named '{name}'")
+                raise MemoryError("memory allocation failed")
+            return real(name, globals, locals, fromlist, level)
+
+        monkeypatch.setattr(builtins, "__import__", importing)
+        return INCOMPLETE if request.param == "missing" else NO_MEMORY
+
+    return take_away
+
+
+def watch(board):
+    """[(t_s, lines), ...] of its display as it changes, from now on."""
+    seen = []
+
+    def look():
+        if not seen or seen[-1][1] != board.lcd.text():
+            seen.append((board.clock.now_us / 1e6, board.lcd.text()))
+
+    board.every(0.1, look)
+    return seen
+
+
+def choose(board, at_s, place):
+    """Presses for this entry of the menu, in 8 s at most."""
+    for t_s in range(place):
+        board.press(at_s + 2 + t_s)
+    board.press(at_s, 1.2)
+    board.press(at_s + 2 + place, 1.2)
+
+
+@pytest.mark.parametrize(
+    ("module", "place"),
+    [("align_wizard", ALIGN), ("six_wizard", SIX), ("pose_taker", SIX), ("flash_ring", RECORD), ("recorder", RECORD)],
+)
+def test_what_a_menu_entry_cannot_import_is_said_and_the_meter_goes_on(module, place, without, board, capsys):
+    """Each time that it is chosen, and never before."""
+    from kickstand import start
+
+    if module == "pose_taker":
+        sys.modules.pop("kickstand.ui.six_wizard", None)
+    said, seen = without(module), watch(board)
+    for at_s in (3, 15):
+        choose(board, at_s, place)
+    assert board.run(start.main, 28.0) == "off"
+    told = [t_s for t_s, lines in seen if lines == said]
+    for t_s in told:  # it is in front for two seconds; a look may catch a line half written
+        assert min(abs(t_s - (at_s + 4 + place)) for at_s in (3, 15)) < 2
+    assert min(told) < 12 < max(told)
+    assert seen[-1][1][0].startswith("Raw")
+    assert ("run kickstand flash" if said is INCOMPLETE else "no memory for that") in capsys.readouterr().out
+
+
+def test_a_menu_that_cannot_be_imported_is_said_and_the_meter_goes_on(without, board):
+    from kickstand import start
+
+    said, seen = without("menu"), watch(board)
+    board.press(3.0, 1.2)
+    assert board.run(start.main, 8.0) == "off"
+    assert [t_s for t_s, lines in seen if lines == said] == [pytest.approx(4.0, abs=0.3)]
+    assert seen[-1][1][0].startswith("Raw")
+
+
+@pytest.mark.parametrize("module", ["block", "flash_ring", "recorder", "card_trial"])
+def test_a_board_that_is_to_record_from_power_on_and_cannot_shows_the_lean(module, without, board, monkeypatch):
+    from kickstand import settings, start
+
+    pins = {"SD_SPI": 0, "SD_SCK": 18, "SD_MOSI": 19, "SD_MISO": 16, "SD_CS": 17} if module == "card_trial" else {}
+    monkeypatch.setattr(settings, "load", lambda: settings.Settings(type("Config", (), {"RECORD": True, **pins})))
+    said, seen = without(module), watch(board)
+    assert board.run(start.main, 8.0) == "off"
+    assert [t_s for t_s, lines in seen if lines == said] == [pytest.approx(0.6, abs=0.5)]
+    assert seen[-1][1][0].startswith("Raw")
+
+
+def test_what_was_imported_in_vain_is_forgotten_and_can_be_tried_again(tmp_path):
+    """MicroPython keeps a module whose import was broken off, without what it had not come to."""
+    (tmp_path / "outer.py").write_text("import inner\n\n\nclass Outer:\n    inner = inner.Inner\n")
+    (tmp_path / "inner.py").write_text("import memory\n\nmemory.take()\n\n\nclass Inner:\n    pass\n")
+    (tmp_path / "memory.py").write_text(
+        "left = [0, 1]\n\n\ndef take():\n    if not left.pop():\n        raise MemoryError('none')\n"
+    )
+    script = f"""
+import sys
+sys.path.append({str(tmp_path)!r})
+import memory
+from kickstand.errors import attempt
+def use():
+    from outer import Outer
+    made.append(Outer())
+made = []
+memory.left.reverse()
+first = attempt(use)
+print(first.code, first.values, made, sorted(name for name in sys.modules if name in ("outer", "inner", "memory")))
+print(attempt(use), len(made))
+"""
+    environment = os.environ | {"PYTHONPATH": firmware_path.search_path()}
+    done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True, text=True, check=True)
+    for said in (done.stdout, mpy.run_mpy(script)):
+        _, first, second = said.splitlines()
+        assert first == "no-memory ('none',) [] ['memory']"
+        assert second == "None 1"
 
 
 def test_a_report_that_cannot_be_worded_gives_its_code(board, monkeypatch, capsys):

@@ -23,6 +23,8 @@ INDIRECT = {
     "flash-fault",
     "card-fault",
     "usb-fault",
+    "incomplete",
+    "no-memory",
 }
 # Values that fit the words of any code: numbers, names, and long ones of both
 VALUES = {"dead-axis": ("x", 0.1), "odd-axis": ("x", 0.1, 1.0), "side-tilted": ("+x", 25.0, 20.0)}

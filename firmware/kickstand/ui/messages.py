@@ -27,6 +27,9 @@ tilt-large|Tilt {0:.0f}\xdf: over|{1:.0f}\xdf, do it again
 not-written|Not saved: flash|Old one is kept
 read-back|Not saved: flash|Old one is kept
 
+incomplete|Incomplete:|flash it again
+no-memory|No memory for it|restart it
+
 starting|Kickstand|starting
 no-sensor|No sensor|check wiring
 unknown-chip|Unknown sensor|WHO_AM_I 0x{0:02x}

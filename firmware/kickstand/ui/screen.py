@@ -3,6 +3,7 @@
 import gc
 
 from ..board.button import LONG
+from ..errors import attempt
 from . import messages, pages
 from .page_ring import PageRing
 from .views import FaultView, InfoView, NoticeView, QuestionView
@@ -31,11 +32,21 @@ class Screen:
             app.prepare_recorder()
         problem = (app.recorder and app.recorder.take_problem()) or (app.drive and app.drive.speed.take_problem())
         if problem:
-            self._notice.show(messages.lines(problem), now_ms)
+            self.tell(problem, now_ms)
         return self._update_front(now_ms)[1]
 
     def press(self, event, now_ms):
-        """event: SHORT or LONG. A long press that the view in front has no use for opens the menu."""
+        """event: SHORT or LONG. A long press that the view in front has no use for opens the menu. What it wants may be
+        missing, or have no memory: that must not end the ride."""
+        problem = attempt(self._press, event, now_ms)
+        if problem:
+            self.tell(problem, now_ms)
+
+    def tell(self, notice, now_ms):
+        """Show a Notice for two seconds."""
+        self._notice.show(messages.lines(notice), now_ms)
+
+    def _press(self, event, now_ms):
         view = self._update_front(now_ms)[0]
         if view is self._notice:  # the press dismisses the notice, and goes to the view below it,
             self._notice.press(event, now_ms)
@@ -106,7 +117,7 @@ class Screen:
         """True if there are readings; if not, the rider is told why."""
         fault = self._app.sensor.fault
         if fault is not None:
-            self._notice.show(messages.lines(fault), now_ms)
+            self.tell(fault, now_ms)
         return fault is None
 
     def _align(self, now_ms):
