@@ -1,0 +1,99 @@
+"""A ride as means over a fifth of a second, in which the vibration of the engine has averaged out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...logs.log import Log
+from ...logs.table import Array
+
+WINDOW_S = 0.2
+_STILL_S, _CALM_S = 1.6, 1.0  # shorter standstills are not told from smooth riding
+# A bike at rest, held by its rider with the engine idling, moves less. A speed of zero allows more.
+_STILL_RADPS, _STILL_G, _STILL_MPS, _STANDS = np.radians(0.6), 0.03, 0.3, 4.0
+_ONE_BIAS_RADPS = np.radians(1.0)  # the rates of standstills differ by less: a steady bend is none
+
+
+@dataclass
+class Windows:
+    """n windows. time_s (n): their middles. rate (n, 3, rad/s) and force (n, 3, g): means, in the sensor's axes.
+    shaken (n): variance of the force within each window, g^2. speed (n): m/s, NaN where there is none. linked (n):
+    False where samples are missing between this window and the next. still (n): True where the bike stands. calm (n):
+    True where it stands or rides straight on so smoothly that the gyro reads its bias. unrest (n): standard deviation
+    of the rate within a second, rad/s.
+    """
+
+    time_s: Array
+    rate: Array
+    force: Array
+    shaken: Array
+    speed: Array
+    linked: NDArray[np.bool_]
+    still: NDArray[np.bool_]
+    calm: NDArray[np.bool_]
+    unrest: Array
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+    def part(self, which: slice) -> "Windows":
+        """Some of them."""
+        return Windows(**{name: values[which] for name, values in vars(self).items()})
+
+
+def windows_of(log: Log) -> Windows:
+    """The windows of a log that have samples in them."""
+    number = np.floor(log.t_s / WINDOW_S + 1e-9).astype(int)
+    starts = np.flatnonzero(np.diff(number, prepend=-1))
+    count = np.diff(np.append(starts, len(number)))[:, None]
+
+    def means(values: Array) -> Array:
+        return np.add.reduceat(values, starts, axis=0) / count
+
+    rate, force = means(np.radians(log.gyro_dps)), means(log.accel_g)
+    shaken = np.maximum(np.mean(means(log.accel_g**2) - force**2, axis=1), 0.0)
+    there = ~np.isnan(log.speed_mps)
+    speed = np.full(len(starts), np.nan)
+    speed[np.searchsorted(starts, np.flatnonzero(there), side="right") - 1] = log.speed_mps[there]
+    numbers = number[starts]
+    linked = np.append(np.diff(numbers) == 1, False)
+    known = known_speed(numbers * WINDOW_S, speed)
+    still, calm = _still(rate, force, known, _STILL_S), _still(rate, force, known, _CALM_S)
+    return Windows(
+        (numbers + 0.5) * WINDOW_S, rate, force, shaken, speed, linked, still, calm, _unrest(rate, _CALM_S)
+    )
+
+
+def known_speed(time_s: Array, speed: Array) -> Array:
+    """(n) m/s, interpolated between the logged values; NaN everywhere if there are fewer than two."""
+    there = ~np.isnan(speed)
+    if np.count_nonzero(there) < 2:
+        return np.full(len(speed), np.nan)
+    return np.interp(time_s, time_s[there], speed[there])
+
+
+def averaged(values: Array, seconds: float) -> Array:
+    """Mean over so many seconds around each window; (n) or (n, k)."""
+    half = max(1, round(seconds / WINDOW_S / 2.0))
+    padded = np.concatenate((np.repeat(values[:1], half + 1, 0), values, np.repeat(values[-1:], half, 0)))
+    total = np.cumsum(padded, axis=0)
+    return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
+
+
+def _unrest(values: Array, over_s: float) -> Array:
+    """(n): standard deviation within over_s, of the component that has the largest; values (n, 3)."""
+    centred = values - values.mean(axis=0)
+    variance = averaged(centred**2, over_s) - averaged(centred, over_s) ** 2
+    return np.sqrt(np.maximum(variance, 0.0)).max(axis=1)
+
+
+def _still(rate: Array, force: Array, speed: Array, over_s: float) -> NDArray[np.bool_]:
+    """Nothing changes for over_s, and the rates are those of most such places. speed: m/s, NaN if unknown."""
+    allowed = np.where(speed < _STILL_MPS, _STANDS, 1.0)
+    calm = (_unrest(rate, over_s) < allowed * _STILL_RADPS) & (_unrest(force, over_s) < allowed * _STILL_G)
+    calm &= ~(speed >= _STILL_MPS)
+    if not np.any(calm):
+        return calm
+    bias = np.median(rate[calm], axis=0)
+    return calm & (np.linalg.norm(averaged(rate, over_s) - bias, axis=1) < allowed * _ONE_BIAS_RADPS)
