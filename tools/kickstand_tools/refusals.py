@@ -42,20 +42,21 @@ _SENTENCES = {
     ),
     "uncertain": "forward is known to {0:.1f} degrees only, after {1} braking events: drive on",
     "ride-short": "only {0:.0f} s of riding: at least {1:.0f} s with bends are needed",
-    "no-bends": "it hardly leans ({0:.1f} degrees rms): some bends to both sides are needed, or it is no ride of a "
-    "motorcycle",
-    "not-leaning": "in bends it is pushed sideways and does not lean: no motorcycle's ride; for a car, with a speed, take "
-    "kickstand calibrate drive --vehicle car",
-    "left-handed": "leaned in a bend it turns the wrong way: the axes are left-handed, or all rates have the opposite sign",
-    "ride-contradicts": "no mounting explains these readings: are axes exchanged between accelerometer and gyro, or is "
-    "there more in it than one ride? kickstand cut takes a part out",
-    "ride-halves": "the two halves of the ride disagree by {0:.0f} degrees: did the mount move, or was the sensor in a "
-    "hand? Give a part in which it sat still",
-    "ride-uncertain": "the alignment is only known to {0:.1f} degrees in roll, {1:.1f} in pitch and {2:.1f} in yaw: a longer "
-    "ride with bends to both sides is needed",
-    "phone-otherwise": "the phone was not mounted {0}: by the ride it is turned by {1:.0f} degrees against that",
-    "phone-upside-down": "mounted {0}, the phone's accelerations have the opposite sign: at rest the axis that points up "
-    "has to read +1 g",
+    "no-bends": "it hardly leans ({0:.1f} degrees rms): a motorcycle's ride with bends to both sides is needed",
+    "not-leaning": "in bends it is pushed aside and does not lean, as a car: with a speed in the log take kickstand "
+    "calibrate drive --vehicle car",
+    "left-handed": "leaned in bends it turns the wrong way: the axes are left-handed, or the rates have the opposite "
+    "sign",
+    "ride-contradicts": "no one mounting explains these readings: was the sensor moved, or are axes exchanged between "
+    "accelerometer and gyro?",
+    "ride-halves": "two halves of the ride disagree by {0:.0f} degrees: did the mount move? Give a part in which "
+    "it did not",
+    "ride-uncertain": "the alignment is known to {0:.1f} degrees in roll, {1:.1f} in pitch and {2:.1f} in yaw "
+    "only: a longer ride is needed, with bends to both sides",
+    "phone-otherwise": "by the ride the phone is turned by {1:.0f} degrees against {0}: mounted another way? Then "
+    "leave out --phone",
+    "phone-upside-down": "for a phone mounted {0} all accelerations have the opposite sign: at rest the axis that "
+    "points up has to read +1 g",
     "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
 }
 _MOVED = {

@@ -1,4 +1,4 @@
-"""The commands of `kickstand calibrate`: six, two, drive, ride."""
+"""The commands of `kickstand calibrate`: six, two, drive; ride is in calibrate_ride.py."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -9,7 +9,6 @@ import click
 if TYPE_CHECKING:
     from ..calibration.drive import DriveResult
     from ..calibration.drive_events import DriveEvent
-    from ..calibration.ride.fit import RideFit
     from ..calibration.six import SixPositions
     from ..calibration.two import TwoPositions
 
@@ -98,32 +97,6 @@ def drive(
     click.echo(f"written: {out}")
 
 
-@calibrate.command()
-@click.argument("log", type=_PATH, metavar="LOG.csv")
-@click.option(
-    "--phone",
-    type=click.Choice(["portrait", "landscape", "flat"]),
-    help="How a phone was mounted, to check the result: upright or on its side with the screen to the rider, or flat.",
-)
-@_OUT
-def ride(log: Path, phone: str | None, out: Path) -> None:
-    """How the sensor sits on a motorcycle, from any ride with bends: no poses, and no speed, are needed.
-
-    All axes have to be right-handed, with +1 g at rest along the one that points up.
-    """
-    from ..calibration.file import write_calibration
-    from ..calibration.ride.fit import fit_ride
-    from ..output import check_output
-    from ..progress import Bar
-
-    check_output(out, [log])
-    with Bar("aligning") as bar:
-        found = fit_ride(log, phone, bar.reach)
-    _print(_ride_lines(found))
-    write_calibration(out, found.calibration)
-    click.echo(f"written: {out}")
-
-
 def _six_lines(found: "SixPositions") -> Iterable[str]:
     from kickstand.calibration.six_position import SIDES
 
@@ -186,24 +159,6 @@ def _drive_lines(found: "DriveResult", several: bool) -> Iterable[str]:
     yield from _matrix_lines(found.calibration.vehicle_from_sensor)
     if not found.calibration.six_done:
         yield "warning: no six-position calibration: an offset of 50 mg tilts the vertical by 3 degrees"
-
-
-def _ride_lines(found: "RideFit") -> Iterable[str]:
-    speed = "no speed" if found.lag_s is None else f"speed {found.lag_s:.1f} s late"
-    yield (
-        f"riding: {found.riding_s:.0f} s, leaning {found.lean_deg:.0f} degrees rms; standing: {found.standing_s:.0f} s; "
-        + speed
-    )
-    yield (
-        f"quality: roll {found.roll_deg:.1f}, pitch {found.pitch_deg:.1f}, yaw {found.yaw_deg:.1f} degrees; two halves of "
-        "the ride differ by " + ", ".join(f"{abs(angle):.1f}" for angle in found.halves_deg)
-    )
-    yield "gyro bias  " + _axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
-    yield "offset     " + _axes(found.calibration.accel_offset_g, "%+.4f g")
-    yield from _matrix_lines(found.calibration.vehicle_from_sensor)
-    if found.phone_deg is not None:
-        yield f"the phone is turned by {found.phone_deg:.0f} degrees against the way that was said"
-    yield "upright is where the bike is balanced on straights; scale errors of the accelerometer are not told by a ride"
 
 
 def _event_lines(event: "DriveEvent", several: bool) -> Iterable[str]:

@@ -18,9 +18,12 @@ _SMOOTH_S = 0.6  # of the rates whose changes are compared
 _SLOW_S = 12.0  # leans that last longer are not told from the drift of the gyro
 _MIN_RIDING_S = 30.0
 _MIN_LEAN = np.radians(3.0)  # rms: riding straight on tells nothing
-_MIN_LIKENESS = 0.5  # correlation between leaning and turning; bikes have over 0.8
-_MAX_SIDEWAYS = 0.5  # of the lean: force to the side in bends; bikes have 0.1 to 0.2 by their tyres' width
-_FASTEST_MPS = 100.0
+_MIN_LIKENESS = 0.5  # correlation between leaning and turning; bikes have over 0.75
+_MAX_PUSHED = 0.5  # force to the side over the lean in bends; bikes have 0.1 to 0.2 by their tyres' width
+_CAR_G, _CAR_LEAN = 0.045, np.radians(5.0)  # a car's rms of the force to the side is above, of its lean below
+_RADIANS_LEAN, _RADIANS_LIKENESS = np.radians(1.0), 0.75  # so little, and still it goes with turning
+_STUCK_MPS = 0.5
+_MAX_SPEED_FACTOR = 1.8  # of the log's speed and that of the bends, either way
 
 
 @dataclass
@@ -53,8 +56,7 @@ def first_guess(windows: Windows) -> FirstGuess:
     _refuse_no_motorcycle(rolled, turned, _without_drift(windows.force @ left), riding)
     known = known_speed(windows.time_s, windows.speed)
     usual = -float(rolled[riding] @ turned[riding] / (turned[riding] @ turned[riding])) * STANDARD_GRAVITY
-    if not usual < _FASTEST_MPS:
-        raise Refusal("rates-in-radians", usual)
+    _refuse_wrong_speed(known[riding], rolled[riding], turned[riding])
     speed = np.where(np.isnan(known), np.where(riding, usual, 0.0), known)
     slow = np.arctan(-speed * (rate @ up) / STANDARD_GRAVITY)
     lean = rolled + slow - _without_drift(slow)
@@ -71,14 +73,33 @@ def _bias(windows: Windows) -> Array:
 
 
 def _refuse_no_motorcycle(rolled: Array, turned: Array, sideways: Array, riding: Array) -> None:
+    """rolled (rad), turned (rad/s), sideways (g): (n), changes within some seconds only."""
     rolled, turned, sideways = rolled[riding], turned[riding], sideways[riding]
-    lean = float(np.sqrt(np.mean(rolled**2)))
-    likeness = -float(rolled @ turned / np.sqrt(max(float(rolled @ rolled) * float(turned @ turned), 1e-30)))
-    pushed = abs(float(sideways @ turned)) / max(abs(float(rolled @ turned)), 1e-30)
-    if pushed > _MAX_SIDEWAYS:
-        raise Refusal("not-leaning", pushed)
-    if lean < _MIN_LEAN or likeness < _MIN_LIKENESS:
-        raise Refusal("no-bends", np.degrees(lean))
+    lean, side = float(np.sqrt(np.mean(rolled**2))), float(np.sqrt(np.mean(sideways**2)))
+    both = -float(rolled @ turned)
+    likeness = both / np.sqrt(max(float(rolled @ rolled) * float(turned @ turned), 1e-30))
+    pushed = abs(float(sideways @ turned)) / max(abs(both), 1e-30)
+    if lean < _RADIANS_LEAN and likeness > _RADIANS_LIKENESS:
+        usual_mps = both / float(turned @ turned) * STANDARD_GRAVITY
+        raise Refusal("rates-in-radians", float(np.degrees(usual_mps)))
+    if pushed > _MAX_PUSHED and side > _CAR_G and lean < _CAR_LEAN:
+        raise Refusal("not-leaning")
+    if lean < _MIN_LEAN:
+        raise Refusal("no-bends", float(np.degrees(lean)))
+    if pushed > _MAX_PUSHED or likeness < _MIN_LIKENESS:
+        raise Refusal("ride-contradicts")
+
+
+def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array) -> None:
+    """known: m/s, NaN if unknown. The speed of the bends is the one whose yaw rates go with the lean."""
+    if not len(known) or np.isnan(known[0]):
+        return
+    if np.ptp(known) < _STUCK_MPS:
+        raise Refusal("speed-stuck", float(known[0]))
+    expected = known * turned
+    factor = -float(expected @ expected) / (STANDARD_GRAVITY * float(expected @ rolled))
+    if not 1.0 / _MAX_SPEED_FACTOR < factor < _MAX_SPEED_FACTOR:
+        raise Refusal("speed-unit", factor)
 
 
 def _refuse_left_handed(pitch_rate: Array, yaw: Array, lean: Array, riding: Array) -> None:
@@ -86,7 +107,7 @@ def _refuse_left_handed(pitch_rate: Array, yaw: Array, lean: Array, riding: Arra
     expected = (yaw * np.sin(lean))[riding]
     share = float((expected - expected.mean()) @ pitch_rate[riding] / (expected @ expected))
     if share < 0.0:
-        raise Refusal("left-handed", share)
+        raise Refusal("left-handed")
 
 
 def _without_drift(values: Array) -> Array:

@@ -1,10 +1,9 @@
 """Alignment of a motorcycle's sensor from an ordinary ride, without poses."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from kickstand.errors import Refusal
-from kickstand.units import STANDARD_GRAVITY
 
 from ...errors import InputError
 from ...logs.reader import Source, read_log
@@ -20,8 +19,6 @@ from .rotations import rotation_between
 from .windows import WINDOW_S, Windows, windows_of
 
 _SLOWEST_HZ = 20.0
-_LONGEST_S = 1800.0  # more than half an hour of a ride tells no more
-_BEFORE_S = 20.0  # kept of the time before it moves
 _ODD_SIGMAS, _ABSURD_SIGMAS = 4.0, 20.0  # of a sensor's errors that the fit needs: beyond, its quality is worse
 _MAX_DEG = np.array([5.0, 5.0, 3.5])  # pitch, yaw, roll: known less exactly, an alignment is not given
 _MOVED_DEG = 12.0
@@ -31,12 +28,13 @@ _MOVED_DEG = 12.0
 class RideFit:
     """What a ride gives. Angles in degrees.
 
-    roll_deg, pitch_deg, yaw_deg: standard errors of the alignment about forward, left and up, of which the larger part
-    are errors of the sensor that a ride does not tell. halves_deg: by how much the two halves of the ride differ in
-    these three. upright is where the bike is balanced on a straight. offset_g (3): of the accelerometer along left, up
-    and forward, taken off by the calibration; offset_sigma_g (3). riding_s, standing_s: seconds that were used. lean_deg:
-    rms of the ride's lean. speed: whether the log has it; lag_s: by how much it is late, None without. phone_deg: by
-    how much the phone is turned against the way that was said, None if nothing was.
+    roll_deg, pitch_deg, yaw_deg: standard errors of the alignment about forward, left and up. The larger part of them
+    are errors of the sensor that a ride does not tell. Upright is where the bike is balanced on straights. halves_deg:
+    by how much two halves of the ride differ in these three. offset_g (3): of the accelerometer along left, up and
+    forward, which the calibration takes off; offset_sigma_g (3): standard errors. used_s: from and to which second of
+    the log the sensor was mounted. riding_s, standing_s: seconds of it. lean_deg: rms of the ride's lean. lag_s: by how
+    much the log's speed is late, None without a speed. phone_deg: by how much the phone is turned against the way that
+    was said, None if nothing was.
     """
 
     calibration: CalibrationFile
@@ -46,6 +44,7 @@ class RideFit:
     halves_deg: tuple[float, float, float]
     offset_g: Array
     offset_sigma_g: Array
+    used_s: tuple[float, float]
     riding_s: float
     standing_s: float
     lean_deg: float
@@ -78,7 +77,7 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
         for notice in log.notices:
             if notice.code == "rates-in-radians":
                 raise Refusal(notice.code, *notice.values)
-        windows = _most_telling(windows_of(log))
+        windows = windows_of(log)
         guess = first_guess(windows)
         expected = mounting(phone, guess.matrix) if phone else None
         found = adjust(windows, guess, expected, progress)
@@ -87,16 +86,9 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
         raise RefusedInput(refusal, log.name) from refusal
 
 
-def _most_telling(windows: Windows) -> Windows:
-    """Half an hour from when the bike begins to move, and a while before: it often stands there."""
-    moving = np.flatnonzero(~windows.still)
-    first = max(0, (moving[0] if len(moving) else 0) - round(_BEFORE_S / WINDOW_S))
-    return windows.part(slice(first, first + round(_LONGEST_S / WINDOW_S)))
-
-
 def _checked(windows: Windows, found: Adjustment, expected: Array | None) -> RideFit:
     """The result with its quality. Raises Refusal where that is too low."""
-    odd = float(np.max(np.abs(found.parameters - m.USUAL)[m.GYRO.start : m.OFFSET.stop] / m.SIGMA[m.GYRO.start : m.OFFSET.stop]))
+    odd = float(np.max(np.abs((found.parameters - m.USUAL) / m.SIGMA)[m.SENSOR]))
     if odd > _ABSURD_SIGMAS:
         raise Refusal("ride-contradicts")
     halves = np.degrees(found.halves)
@@ -107,7 +99,7 @@ def _checked(windows: Windows, found: Adjustment, expected: Array | None) -> Rid
     if np.any(error > _MAX_DEG):
         raise Refusal("ride-uncertain", *(float(error[i]) for i in (2, 0, 1)))
     pitch, yaw, roll = (float(angle) for angle in error)
-    # of a level, upright bike the calibrated force is 1 g up
+    # so that the calibrated force on a level, upright bike is 1 g up, whatever the scale errors are
     offset = found.parameters[m.OFFSET] + found.parameters[m.ACCEL].reshape(3, 3)[:, 1]
     notes = {"ride_quality_deg": {"roll": round(roll, 2), "pitch": round(pitch, 2), "yaw": round(yaw, 2)}}
     calibration = CalibrationFile(
@@ -129,6 +121,7 @@ def _checked(windows: Windows, found: Adjustment, expected: Array | None) -> Rid
         (float(halves[2]), float(halves[0]), float(halves[1])),
         offset,
         found.sigma[m.OFFSET],
+        (float(windows.time_s[0] - WINDOW_S / 2.0), float(windows.time_s[-1] + WINDOW_S / 2.0)),
         float(np.count_nonzero(~windows.still)) * WINDOW_S,
         float(np.count_nonzero(windows.still)) * WINDOW_S,
         float(np.degrees(np.sqrt(np.mean(lean**2)))),

@@ -8,11 +8,13 @@ firmware's kickstand.lean.bike_model, integrated over a window; the alignment an
     t' = w_z - tan q (w_x sin t + w_y cos t)        q' = w_y sin t - w_x cos t        v' = f_z - sin q
     wheels do not slide:            f_x = cos q sin t + v w_y,     f_y = cos q cos t - v w_x
     roads are level on average:     q = 0
-    a bike that rides is balanced:  f_x = tyres x sin t
+    a bike that rides is balanced:  f_x = tyres x sin t + beside
     a bike that stands:             v = 0, w = 0
 
-The gyro tells the lean in bends by the ratio of two rates, with its up; the force tells it by (f_x, f_y), with the
-accelerometer's. So both are told apart where the ride has bends, and the offset across the bike is found.
+The gyro follows the direction of gravity through the bends, by (f_x, f_y) with the speed or, without one, with the
+speed that fits them. The mean of that direction on straights is the bike's own up, because it is balanced there, and
+what force is then left across the bike is the offset of the accelerometer. Without the gyro, an offset of 50 mg would
+tilt up by 3 degrees. No ride tells a bike that is balanced beside its own middle from one whose sensor is tilted.
 """
 
 from dataclasses import dataclass
@@ -28,7 +30,8 @@ LEAN, PITCH, SPEED, BIAS = 0, 1, 2, slice(3, 6)
 STATE_COUNT = 6
 STATE_STEPS = np.array([1e-4, 1e-4, 1e-3, 1e-5, 1e-5, 1e-5])
 
-# Parameters: rotation, gyro errors, accelerometer errors, offset (g), tyres, delay of the speed (s), place (m), beside (g)
+# Parameters: rotation (rad), errors of gyro and accelerometer (3 x 3 each), offset (g), tyres, delay of the speed (s),
+# place (m), and beside (g): the push to the side on straights, of luggage or camber.
 ROTATION, GYRO, ACCEL, OFFSET, TYRES, DELAY, PLACE, BESIDE = (
     slice(0, 3),
     slice(3, 12),
@@ -39,6 +42,7 @@ ROTATION, GYRO, ACCEL, OFFSET, TYRES, DELAY, PLACE, BESIDE = (
     slice(26, 29),
     29,
 )
+SENSOR = slice(GYRO.start, OFFSET.stop)
 COUNT = 30
 PARAMETER_STEPS = np.full(COUNT, 1e-4)
 # What is known of them before. Scale errors of 3 % and cross-axis sensitivity of 2 % are a sensor's limits (data sheet
@@ -71,8 +75,8 @@ _OUTLIER = 3.0  # sigmas; further off a residual counts less and less
 
 @dataclass
 class Model:
-    """The windows in the axes of the alignment so far: rate (n, 3, rad/s, less the first bias), force (n, 3, g), turning
-    (n, 3): change of the rate, rad/s^2."""
+    """The windows in the axes of the alignment so far. rate (n, 3): rad/s, less the first bias. force (n, 3): g.
+    turning (n, 3): change of the rate, rad/s^2. balanced (n): True where the bike rides."""
 
     windows: Windows
     rate: Array
