@@ -52,7 +52,7 @@ USUAL = np.zeros(COUNT)
 USUAL[TYRES], USUAL[DELAY], USUAL[PLACE] = 0.1, 0.5, (0.0, 0.7, 0.7)
 SIGMA = np.full(COUNT, 0.012)
 SIGMA[ROTATION], SIGMA[OFFSET], SIGMA[TYRES], SIGMA[DELAY], SIGMA[PLACE] = 10.0, 0.04, 0.05, 0.5, (0.1, 0.3, 0.4)
-SIGMA[BESIDE] = 0.01
+SIGMA[BESIDE] = 0.005
 
 # Noise over a window, or per square root of a second (..._ROOT)
 _ANGLE_ROOT = np.radians(0.2)  # rad: gyro, of vibration too
