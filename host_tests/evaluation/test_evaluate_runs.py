@@ -120,9 +120,8 @@ def recorded(rest_s: float = 2.0, turned: float = 0.3) -> Log:
 def mounted(turned: float) -> CalibrationFile:
     """The calibration of recorded()."""
     c, s = np.cos(turned), np.sin(turned)
-    return CalibrationFile(
-        gyro_bias_dps=[1.0, -2.0, 0.5], vehicle_from_sensor=[[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]], aligned=True
-    )
+    matrix = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    return CalibrationFile(gyro_bias_dps=np.array([1.0, -2.0, 0.5]), vehicle_from_sensor=matrix, aligned=True)
 
 
 def test_the_reference_is_speed_times_yaw_rate():

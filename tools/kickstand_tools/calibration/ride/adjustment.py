@@ -41,6 +41,7 @@ def adjust(
 ) -> Adjustment:
     """expected: the matrix as the user says it, None if unknown. Raises Refusal if no alignment fits."""
     fit = _Fit(windows, guess, expected)
+    size = np.inf
     for done in range(_ROUNDS):
         size = fit.step()
         if progress:
@@ -111,9 +112,7 @@ class _Fit:
 
     def _linearised(self) -> tuple[Array, Array]:
         """Jacobian and residuals, weighted."""
-        model = Model.of(
-            self._windows, self._matrix, self._guess.bias, self._states[:, m.SPEED] * STANDARD_GRAVITY
-        )
+        model = Model.of(self._windows, self._matrix, self._guess.bias, self._states)
         residual = model.residuals(self._states, self._parameters)
         weights = model.weights(residual)
         slopes = jacobian(model.residuals, self._states, self._parameters, m.STATE_STEPS, m.PARAMETER_STEPS)

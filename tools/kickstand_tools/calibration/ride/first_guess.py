@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from kickstand.errors import Refusal
 from kickstand.units import STANDARD_GRAVITY
+from numpy.typing import NDArray
 
 from ...logs.table import Array
 from .windows import WINDOW_S, Windows, averaged, known_speed
@@ -21,7 +22,8 @@ _MIN_LEAN = np.radians(3.0)  # rms: riding straight on tells nothing
 _MIN_LIKENESS = 0.5  # correlation between leaning and turning; bikes have over 0.75
 _MAX_PUSHED = 0.5  # force to the side over the lean in bends; bikes have 0.1 to 0.2 by their tyres' width
 _CAR_G, _CAR_LEAN = 0.045, np.radians(5.0)  # a car's rms of the force to the side is above, of its lean below
-_RADIANS_LEAN, _RADIANS_LIKENESS = np.radians(1.0), 0.75  # so little, and still it goes with turning
+# So little, and still it goes with turning as at the speed of a ride: a car's lean is that of 1 m/s.
+_RADIANS_LEAN, _RADIANS_LIKENESS, _RADIANS_MPS = np.radians(1.0), 0.75, 3.0
 _STUCK_MPS = 0.5
 _MAX_SPEED_FACTOR = 1.8  # of the log's speed and that of the bends, either way
 
@@ -72,15 +74,15 @@ def _bias(windows: Windows) -> Array:
     return np.median(averaged(windows.rate, 1.0), axis=0)
 
 
-def _refuse_no_motorcycle(rolled: Array, turned: Array, sideways: Array, riding: Array) -> None:
+def _refuse_no_motorcycle(rolled: Array, turned: Array, sideways: Array, riding: NDArray[np.bool_]) -> None:
     """rolled (rad), turned (rad/s), sideways (g): (n), changes within some seconds only."""
     rolled, turned, sideways = rolled[riding], turned[riding], sideways[riding]
     lean, side = float(np.sqrt(np.mean(rolled**2))), float(np.sqrt(np.mean(sideways**2)))
     both = -float(rolled @ turned)
     likeness = both / np.sqrt(max(float(rolled @ rolled) * float(turned @ turned), 1e-30))
     pushed = abs(float(sideways @ turned)) / max(abs(both), 1e-30)
-    if lean < _RADIANS_LEAN and likeness > _RADIANS_LIKENESS:
-        usual_mps = both / float(turned @ turned) * STANDARD_GRAVITY
+    usual_mps = both / max(float(turned @ turned), 1e-30) * STANDARD_GRAVITY
+    if lean < _RADIANS_LEAN and likeness > _RADIANS_LIKENESS and usual_mps > _RADIANS_MPS:
         raise Refusal("rates-in-radians", float(np.degrees(usual_mps)))
     if pushed > _MAX_PUSHED and side > _CAR_G and lean < _CAR_LEAN:
         raise Refusal("not-leaning")
@@ -97,12 +99,13 @@ def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array) -> None:
     if np.ptp(known) < _STUCK_MPS:
         raise Refusal("speed-stuck", float(known[0]))
     expected = known * turned
-    factor = -float(expected @ expected) / (STANDARD_GRAVITY * float(expected @ rolled))
+    both = -float(expected @ rolled) * STANDARD_GRAVITY
+    factor = float(expected @ expected) / both if both > 0.0 else 0.0
     if not 1.0 / _MAX_SPEED_FACTOR < factor < _MAX_SPEED_FACTOR:
         raise Refusal("speed-unit", factor)
 
 
-def _refuse_left_handed(pitch_rate: Array, yaw: Array, lean: Array, riding: Array) -> None:
+def _refuse_left_handed(pitch_rate: Array, yaw: Array, lean: Array, riding: NDArray[np.bool_]) -> None:
     """A leaned bike that turns also turns about its own left, by yaw rate x sin(lean), where the axes are right."""
     expected = (yaw * np.sin(lean))[riding]
     share = float((expected - expected.mean()) @ pitch_rate[riding] / (expected @ expected))

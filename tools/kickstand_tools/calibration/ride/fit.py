@@ -21,7 +21,7 @@ from .windows import WINDOW_S, Windows, windows_of
 _SLOWEST_HZ = 20.0
 _ODD_SIGMAS, _ABSURD_SIGMAS = 4.0, 20.0  # of a sensor's errors that the fit needs: beyond, its quality is worse
 _MAX_DEG = np.array([5.0, 5.0, 3.5])  # pitch, yaw, roll: known less exactly, an alignment is not given
-_MOVED_DEG = 12.0
+_MOVED_DEG = 8.0
 
 
 @dataclass
@@ -88,12 +88,12 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
 
 def _checked(windows: Windows, found: Adjustment, expected: Array | None) -> RideFit:
     """The result with its quality. Raises Refusal where that is too low."""
-    odd = float(np.max(np.abs((found.parameters - m.USUAL) / m.SIGMA)[m.SENSOR]))
-    if odd > _ABSURD_SIGMAS:
-        raise Refusal("ride-contradicts")
     halves = np.degrees(found.halves)
     if np.max(np.abs(halves)) > _MOVED_DEG:
         raise Refusal("ride-halves", float(np.max(np.abs(halves))))
+    odd = float(np.max(np.abs((found.parameters - m.USUAL) / m.SIGMA)[m.SENSOR]))
+    if odd > _ABSURD_SIGMAS:
+        raise Refusal("ride-contradicts")
     # where a half differs by more than its error, something that the model does not know was at work
     error = np.hypot(np.degrees(found.sigma[m.ROTATION]), 0.5 * halves) * max(1.0, odd / _ODD_SIGMAS)
     if np.any(error > _MAX_DEG):

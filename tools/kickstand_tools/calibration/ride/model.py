@@ -61,7 +61,8 @@ _BIAS_ROOT = np.radians(0.01)
 _LEFT, _UP = 0.04, 0.15  # g
 _SHAKEN_SHARE = 0.1  # of the variance within a window that its mean keeps
 _SLOPE, _SLOPE_S = np.radians(2.0), 4.0  # of roads, and how long one lasts
-_BALANCE, _BALANCE_S = 0.03, 3.0  # g: wind, camber, the rider's weight
+_BALANCE, _BALANCE_S = 0.02, 3.0  # g: wind, camber, the rider's weight
+_BALANCE_LEANED = 0.1  # g at 90 degrees of lean: the rider hangs off, and tyres are not as round as assumed
 _BALANCE_ROLLING_S2 = 0.05  # g per rad/s^2 of roll acceleration: a bike that is falling into a bend is not balanced
 _BALANCED_MPS = 4.0  # below, steering and feet count
 _USUAL_MPS, _ANY_MPS, _ANY_S = 15.0, 20.0, 60.0  # speed where nothing tells it
@@ -76,21 +77,24 @@ _OUTLIER = 3.0  # sigmas; further off a residual counts less and less
 @dataclass
 class Model:
     """The windows in the axes of the alignment so far. rate (n, 3): rad/s, less the first bias. force (n, 3): g.
-    turning (n, 3): change of the rate, rad/s^2. balanced (n): True where the bike rides."""
+    turning (n, 3): change of the rate, rad/s^2. balanced (n): True where the bike rides.
+    leaned (n): sin(lean)."""
 
     windows: Windows
     rate: Array
     force: Array
     turning: Array
     balanced: NDArray[np.bool_]
+    leaned: Array
 
     @classmethod
-    def of(cls, windows: Windows, matrix: Array, bias: Array, speed: Array) -> "Model":
-        """speed (n + 1): m/s, roughly."""
+    def of(cls, windows: Windows, matrix: Array, bias: Array, states: Array) -> "Model":
+        """states: roughly."""
         rate = (windows.rate - bias) @ matrix.T
-        middle = 0.5 * (speed[1:] + speed[:-1])
-        balanced = ~windows.still & (middle > _BALANCED_MPS)
-        return cls(windows, rate, windows.force @ matrix.T, np.gradient(rate, WINDOW_S, axis=0), balanced)
+        middle = 0.5 * (states[1:] + states[:-1])
+        balanced = ~windows.still & (middle[:, SPEED] * STANDARD_GRAVITY > _BALANCED_MPS)
+        turning = np.gradient(rate, WINDOW_S, axis=0)
+        return cls(windows, rate, windows.force @ matrix.T, turning, balanced, np.sin(middle[:, LEAN]))
 
     def residuals(self, states: Array, parameters: Array) -> Array:
         """(n, 16) over their standard deviations, without regard to outliers."""
@@ -107,6 +111,7 @@ class Model:
         st, ct, sq, cq = np.sin(t), np.cos(t), np.sin(q), np.cos(q)
         root = np.sqrt(WINDOW_S) * np.where(w.linked, 1.0, _LOST)
         rest = np.where(w.still, 1.0, 0.0)
+        balance = np.hypot(_BALANCE, _BALANCE_LEANED * self.leaned)
         rolling = _BALANCE_ROLLING_S2 * np.abs(self.turning[:, 2])
         shaken = _SHAKEN_SHARE * w.shaken
         there = np.where(np.isnan(w.speed), 0.0, 1.0)
@@ -122,7 +127,7 @@ class Model:
                 q / (_SLOPE * np.sqrt(2.0 * _SLOPE_S / WINDOW_S)),
                 np.where(self.balanced, 1.0, 0.0)
                 * (fx - parameters[TYRES] * st - parameters[BESIDE])
-                / np.sqrt((_BALANCE**2 * 2.0 * _BALANCE_S / WINDOW_S) + rolling**2),
+                / np.sqrt(balance**2 * 2.0 * _BALANCE_S / WINDOW_S + rolling**2),
                 (v - _USUAL_MPS / STANDARD_GRAVITY) / (_ANY_MPS / STANDARD_GRAVITY * np.sqrt(2.0 * _ANY_S / WINDOW_S)),
                 there * (given - v + parameters[DELAY] * (fz - sq)) * STANDARD_GRAVITY / _GIVEN_MPS,
                 rest * v * STANDARD_GRAVITY / _REST_MPS,

@@ -19,7 +19,7 @@ PHONES = {
     "flat": [np.array([-_X, _Z, _Y])],
 }
 SIGMA_DEG = 20.0  # of a holder that is tilted towards the rider's eyes
-_MAX_DEG = 65.0  # the three ways are at least 90 degrees apart
+_MAX_DEG = 45.0  # the ways are at least 90 degrees apart
 
 
 def mounting(phone: str, found: Array) -> Array:

@@ -7,6 +7,7 @@ solved by eliminating one state after the other, so that work and memory grow wi
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...logs.table import Array
 
@@ -58,7 +59,7 @@ def eliminate(slopes: Array, residual: Array, s: int) -> tuple[Array, list[Array
     return known[s:, s:] - known[s:, :s] @ gains[-1], gains
 
 
-def back(gains: list[Array], s: int, change: Array) -> Array:
+def back(gains: list[Array], s: int, change: NDArray[np.floating]) -> Array:
     """The changes of all states (n + 1, s) that belong to this change of the parameters."""
     states = np.zeros((len(gains), s))
     states[-1] = -(gains[-1][:, :-1] @ change + gains[-1][:, -1])
