@@ -29,7 +29,7 @@ def simulated(profile="street", seed=21, seconds=240.0):
 
 def log_of(made, speed=True):
     """As recorded, with speed once a second."""
-    log = api.Log.from_readings(made.readings, RATE_HZ, "RIDE.csv")
+    log = api.Log.from_readings(made.readings.copy(), RATE_HZ, "RIDE.csv")
     if speed:
         log.speed_mps[::RATE_HZ] = made.truth["speed_mps"][::RATE_HZ]
     return log
@@ -132,6 +132,18 @@ def test_only_the_way_a_phone_is_mounted_tells_an_accelerometer_of_the_opposite_
         api.fit_ride(mirrored, phone="portrait")
 
 
+def test_a_phone_draws_the_result_towards_the_way_it_is_mounted():
+    """A little: the ride knows better."""
+    made = simulated()
+    tilted = turned(np.eye(3), np.radians([35.0, 0.0, 0.0])) @ PHONES["flat"][0]
+    log = mounted(log_of(made, speed=False), tilted.T @ made.vehicle_from_sensor)
+    with_it, without = (
+        np.degrees(np.linalg.norm(rotation_between(found.calibration.vehicle_from_sensor, PHONES["flat"][0])))
+        for found in (api.fit_ride(log, "flat"), api.fit_ride(log))
+    )
+    assert without - 0.3 < with_it < without - 0.005
+
+
 @pytest.mark.parametrize("phone", PHONES)
 def test_the_way_a_phone_is_mounted_is_checked(phone):
     """Within what a holder is tilted."""
@@ -174,6 +186,16 @@ def test_frozen_absurd_and_missing_readings_are_left_out():
     check(
         api.fit_ride(Log(log.t_s[kept], log.accel_g[kept], log.gyro_dps[kept])), made.vehicle_from_sensor, roll_deg=2.0
     )
+
+
+def test_windows_with_frozen_or_absurd_readings_are_no_windows():
+    log = log_of(simulated(), speed=False)
+    log.accel_g[10000:14000], log.gyro_dps[10000:14000] = log.accel_g[10000], log.gyro_dps[10000]
+    log.gyro_dps[20000, 1] = 1e5
+    windows = windows_of(log)
+    gone = np.setdiff1d(np.round(np.arange(0.1, log.t_s[-1], 0.2), 1), np.round(windows.time_s, 1))
+    assert gone == pytest.approx([*np.arange(50.3, 70.0, 0.2), 100.1])
+    assert np.flatnonzero(~windows.linked[:-1]).tolist() == [250, 400]
 
 
 def test_a_phones_rate_and_a_late_rough_speed_will_do():
