@@ -22,6 +22,7 @@ from .analysis.summary import Summary, summary
 from .calibration.drive import DriveResult, fit_drive
 from .calibration.drive_events import DriveEvent
 from .calibration.file import CalibrationFile, read_calibration, write_calibration
+from .calibration.ride.fit import RideFit, fit_ride
 from .calibration.six import SixPositions, fit_six_positions
 from .calibration.two import TwoPositions, fit_two_positions
 from .errors import InputError
@@ -47,6 +48,7 @@ __all__ = [
     "Overview",
     "RefusedInput",
     "Ride",
+    "RideFit",
     "SimulatedRide",
     "SixPositions",
     "Stop",
@@ -57,6 +59,7 @@ __all__ = [
     "export",
     "find_stops",
     "fit_drive",
+    "fit_ride",
     "fit_six_positions",
     "fit_two_positions",
     "import_recording",

@@ -46,6 +46,22 @@ _SENTENCES = {
     "cut-line": "line {0}, the last one, was cut: it is left out",
     "times-spread": "the times are rounded ({0} of {1} repeat the one before): they are spread evenly, by up to "
     "{2:.3f} s",
+    "ride-short": "only {0:.0f} s of riding: at least {1:.0f} s with bends are needed",
+    "no-bends": "it hardly leans ({0:.1f} degrees rms): a motorcycle's ride with bends to both sides is needed",
+    "not-leaning": "in bends it is pushed aside and does not lean, as a car: with a speed in the log take kickstand "
+    "calibrate drive --vehicle car",
+    "left-handed": "leaned in bends it turns the wrong way: the axes are left-handed, or the rates have the opposite "
+    "sign",
+    "ride-contradicts": "no one mounting explains these readings: was the sensor moved, or are axes exchanged between "
+    "accelerometer and gyro?",
+    "ride-halves": "two halves of the ride disagree by {0:.0f} degrees: did the mount move? Give a part in which "
+    "it did not",
+    "ride-uncertain": "the alignment is known to {0:.1f} degrees in roll, {1:.1f} in pitch and {2:.1f} in yaw "
+    "only: a longer ride is needed, with bends to both sides",
+    "phone-otherwise": "by the ride the phone is turned by {1:.0f} degrees against {0}: mounted another way? Then "
+    "leave out --phone",
+    "phone-upside-down": "for a phone mounted {0} all accelerations have the opposite sign: at rest the axis that "
+    "points up has to read +1 g",
     "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
     "import-speed-unit": "{0} has no unit, and the positions do not tell it, so the speed is left out: add --units "
     "speed=km/h, mph or m/s",

@@ -1,4 +1,4 @@
-"""The commands of `kickstand calibrate`: six, two, drive."""
+"""The commands of `kickstand calibrate`: six, two, drive; ride is in calibrate_ride.py."""
 
 from collections.abc import Iterable
 from pathlib import Path

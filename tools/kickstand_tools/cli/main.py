@@ -5,7 +5,7 @@ import sys
 import click
 
 from ..errors import InputError
-from . import board, calibrate, import_, ride, simulated, without_a_board
+from . import board, calibrate, calibrate_ride, import_, ride, simulated, without_a_board
 
 
 @click.group(
@@ -27,6 +27,7 @@ for _command in (
     *(without_a_board.demo, without_a_board.emulate, without_a_board.bench),
 ):
     kickstand.add_command(_command)
+calibrate.calibrate.add_command(calibrate_ride.ride)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -1,10 +1,9 @@
 """Estimators compared on a recorded ride, which has neither a calibration nor a true lean: both come from the ride.
 
-Vertical and gyro bias are the means of the first second, at rest. Forward is found by regressing the horizontal force
-on dv/dt of the 1 Hz speed, with an intercept, where the bike turns slowly; the delay of the speed is the one that
-fits best. The reference lean is atan(v * yaw rate / g), averaged over 1 s, with the yaw rate about the bike's own up
-axis. It reads low (1 Hz speed, wide tyres, an axis that leans with the bike) and ignores slope and bank of the road:
-it can compare methods and show a lean that decays in a turn, but its degrees are not to be trusted.
+The calibration is what `kickstand calibrate ride` finds. The reference lean is atan(v * yaw rate / g), averaged over
+1 s, with the yaw rate about the bike's own up axis. It reads low (1 Hz speed, wide tyres, an axis that leans with the
+bike) and ignores slope and bank of the road: it can compare methods and show a lean that decays in a turn, but its
+degrees are not to be trusted.
 """
 
 from dataclasses import dataclass
@@ -15,16 +14,14 @@ from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from ..calibration.file import CalibrationFile
+from ..calibration.ride.fit import fit_ride
 from ..errors import InputError
 from ..logs.reader import Log, read_log
 from .estimators import estimate
 from .metrics import rms, slope
 from .samples import calibrated
 
-REST_S = 1.0
 AVERAGE_S = 1.0
-_SLOW_DPS = 5.0  # yaw rate below which the bike rides straight on
-_DELAY_S = np.arange(0.0, 2.01, 0.1)  # of the speed, tried
 _RIDING_MPS = 2.0  # scored where the speed is higher
 _LEANED_DEG = 5.0  # the slope is fitted beyond: the reference is rarely over 10 degrees
 
@@ -72,30 +69,8 @@ def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64
 
 
 def calibration_of(log: Log) -> CalibrationFile:
-    """Mounting matrix and gyro bias from the ride itself. Raises InputError if it never accelerates straight on."""
-    time = log.t_s
-    rest = time < REST_S
-    up = log.accel_g[rest].mean(axis=0)
-    up /= np.linalg.norm(up)
-    bias = log.gyro_dps[rest].mean(axis=0)
-    rate_hz = (len(time) - 1) / (time[-1] - time[0])
-    force = np.column_stack([_averaged(column, rate_hz) for column in log.accel_g.T])
-    level = force - np.outer(force @ up, up)
-    yaw = _averaged((log.gyro_dps - bias) @ up, rate_hz)
-    straight = np.abs(yaw) < _SLOW_DPS
-    found, most = np.zeros(3), 0.0
-    for delay_s in _DELAY_S:
-        change = np.gradient(_averaged(np.interp(time + delay_s, time, _speed(log)), rate_hz), time)
-        a, b = change[straight] - change[straight].mean(), level[straight] - level[straight].mean(axis=0)
-        along = a @ b / np.sqrt(max(float(a @ a), 1e-9))
-        if np.linalg.norm(along) > most:
-            found, most = along, float(np.linalg.norm(along))
-    if most == 0.0:
-        raise InputError(f"{log.name}: no straight acceleration in it: forward cannot be told")
-    forward = found - up * (found @ up)
-    forward /= np.linalg.norm(forward)
-    matrix = np.concatenate((np.cross(up, forward), up, forward))
-    return CalibrationFile(gyro_bias_dps=bias, vehicle_from_sensor=matrix, aligned=True)
+    """What `kickstand calibrate ride` finds in it. Raises InputError where the ride does not tell it."""
+    return fit_ride(log).calibration
 
 
 def _speed(log: Log) -> NDArray[np.float64]:

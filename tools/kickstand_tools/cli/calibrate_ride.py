@@ -1,0 +1,57 @@
+"""The command `kickstand calibrate ride`."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .calibrate import _OUT, _PATH, _axes, _matrix_lines, _print
+
+if TYPE_CHECKING:
+    from ..calibration.ride.fit import RideFit
+
+
+@click.command()
+@click.argument("log", type=_PATH, metavar="LOG.csv")
+@click.option(
+    "--phone",
+    type=click.Choice(["portrait", "landscape", "flat"]),
+    help="How a phone was mounted, to check the result: upright or on its side with the screen to the rider, or flat.",
+)
+@_OUT
+def ride(log: Path, phone: str | None, out: Path) -> None:
+    """How the sensor sits on a motorcycle, from any ride with bends: no poses, and no speed, are needed.
+
+    All axes have to be right-handed, with +1 g at rest along the one that points up.
+    """
+    from ..calibration.file import write_calibration
+    from ..calibration.ride.fit import fit_ride
+    from ..output import check_output
+    from ..progress import Bar
+
+    check_output(out, [log])
+    with Bar("aligning") as bar:
+        found = fit_ride(log, phone, bar.reach)
+    _print(_ride_lines(found))
+    write_calibration(out, found.calibration)
+    click.echo(f"written: {out}")
+
+
+def _ride_lines(found: "RideFit") -> Iterable[str]:
+    begin, end = found.used_s
+    yield (
+        f"used: {begin:.0f} to {end:.0f} s of the log, {found.riding_s:.0f} s of it riding, "
+        f"leaning {found.lean_deg:.0f} degrees rms"
+    )
+    yield f"quality: roll {found.roll_deg:.1f}, pitch {found.pitch_deg:.1f}, yaw {found.yaw_deg:.1f} degrees"
+    roll, pitch, yaw = (abs(angle) for angle in found.halves_deg)
+    yield f"two halves of the ride differ by: roll {roll:.1f}, pitch {pitch:.1f}, yaw {yaw:.1f} degrees"
+    if found.lag_s is not None:
+        yield f"speed: {found.lag_s:.1f} s late"
+    if found.phone_deg is not None:
+        yield f"phone: turned by {found.phone_deg:.0f} degrees against the way that was said"
+    yield "gyro bias  " + _axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
+    yield "offset     " + _axes(found.calibration.accel_offset_g, "%+.4f g")
+    yield from _matrix_lines(found.calibration.vehicle_from_sensor)
+    yield "upright is where the bike is balanced on straights; a ride does not tell the accelerometer's slopes"
