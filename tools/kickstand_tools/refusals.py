@@ -42,6 +42,10 @@ _SENTENCES = {
     ),
     "uncertain": "forward is known to {0:.1f} degrees only, after {1} braking events: drive on",
     "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
+    "left-handed": "the rates turn the force the wrong way, so the lean is wrong: are the axes left-handed (reverse "
+    "one in both sensors) or the gyro of the opposite sign (reverse all its rates)? At rest up reads +1 g",
+    "rates-misfit": "the rates do not belong to the accelerations, so the lean is wrong: the rates {0}; instead of "
+    "gx, gy, gz right would be {1}",
 }
 _MOVED = {
     "between-stops": "two stops differ by over {0:.0f} degrees",

@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..output import write_whole
 from . import cells
 from .cells import COLUMNS, OPTIONAL
+from .handedness import Handedness
 from .log import FirmwareRow, Log, firmware_rows
 from .rate_unit import RateUnit
 from .source import File, Progress, chunks, name_of, total_bytes
@@ -105,7 +106,7 @@ def read_blocks(
     notices: what is remarkable in the log is appended to it at the end.
     """
     name, count = name_of(source), 0
-    speed_unit, rate_unit = SpeedUnit(name), RateUnit()
+    speed_unit, rate_unit, handedness = SpeedUnit(name), RateUnit(), Handedness()
     total = len(source.t_s) if isinstance(source, Log) else total_bytes(source)
     for block in _blocks_of(source) if isinstance(source, Log) else _parsed(source, name):
         if not count:
@@ -115,13 +116,14 @@ def read_blocks(
             speed_unit.add(block.t_s, block.readings[:, :3], block.speed_mps)
         if notices is not None:
             rate_unit.add(block.t_s, block.readings[:, :3], block.readings[:, 4:])
+            handedness.add(block.t_s, block.readings[:, :3], block.readings[:, 4:], block.speed_mps)
         yield block
         if progress:
             progress(block.done, total)
     if count < minimum:
         raise InputError(f"{name} is too short: {count} samples, at least {minimum} are needed")
-    if notices is not None and rate_unit.notice:
-        notices.append(rate_unit.notice)
+    if notices is not None:
+        notices += [notice for notice in (rate_unit.notice, handedness.notice()) if notice]
 
 
 def read_twice(source: Source) -> Source:
