@@ -50,8 +50,6 @@ _SENTENCES = {
     "no-bends": "it hardly leans ({0:.1f} degrees rms): a motorcycle's ride with bends to both sides is needed",
     "not-leaning": "in bends it is pushed aside and does not lean, as a car: with a speed in the log take kickstand "
     "calibrate drive --vehicle car",
-    "left-handed": "leaned in bends it turns the wrong way: the axes are left-handed, or the rates have the opposite "
-    "sign",
     "ride-contradicts": "no one mounting explains these readings: was the sensor moved, or are axes exchanged between "
     "accelerometer and gyro?",
     "ride-halves": "two halves of the ride disagree by {0:.0f} degrees: did the mount move? Give a part in which "
@@ -70,6 +68,10 @@ _SENTENCES = {
     "import-damaged": "{0} damaged rows are left out: a time out of order, or readings past any sensor's",
     "import-mirrored": "the sensor turns against the track, so left and right are exchanged: were all its "
     "accelerations turned? {0} has +1 g where up is",
+    "left-handed": "the rates turn the force the wrong way, so the lean is wrong: are the axes left-handed (reverse "
+    "one in both sensors) or the gyro of the opposite sign (reverse all its rates)? At rest up reads +1 g",
+    "rates-misfit": "the rates do not belong to the accelerations, so the lean is wrong: the rates {0}; instead of "
+    "gx, gy, gz right would be {1}",
 }
 _MOVED = {
     "between-stops": "two stops differ by over {0:.0f} degrees",

@@ -16,6 +16,7 @@ from ..output import write_whole
 from . import cells
 from .block import Block
 from .cells import COLUMNS, OPTIONAL
+from .handedness import Handedness
 from .log import Log
 from .mended.even_blocks import even_blocks
 from .mended.frozen import FrozenReadings
@@ -73,7 +74,7 @@ def read_blocks(
     """
     name, count = name_of(source), 0
     remarks: list[Notice] = []
-    speed_unit, rate_unit, frozen = SpeedUnit(name), RateUnit(), FrozenReadings()
+    speed_unit, rate_unit, handedness, frozen = SpeedUnit(name), RateUnit(), Handedness(), FrozenReadings()
     whole = source.source if isinstance(source, Stretch) else source
     total = len(whole.t_s) if isinstance(whole, Log) else total_bytes(whole)
     for block in _unchecked(source, remarks):
@@ -85,13 +86,15 @@ def read_blocks(
             speed_unit.add(block.t_s, block.readings[:, :3], block.speed_mps)
         if notices is not None:
             rate_unit.add(block.t_s, block.readings[:, :3], block.readings[:, 4:])
+            handedness.add(block.t_s, block.readings[:, :3], block.readings[:, 4:], block.speed_mps)
         yield block
         if progress:
             progress(block.done, total)
     if count < minimum:
         raise InputError(f"{name} is too short: {count} samples, at least {minimum} are needed")
     if notices is not None:
-        notices += remarks + frozen.notices() + ([rate_unit.notice] if rate_unit.notice else [])
+        judged = [notice for notice in (rate_unit.notice, handedness.notice()) if notice]
+        notices += remarks + frozen.notices() + judged
 
 
 def read_twice(source: Source) -> Source:
