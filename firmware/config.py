@@ -32,7 +32,7 @@
 # GPS_RX = 9                # (16; with PSRAM none: name both, as 25 and 26) to the receiver's TX
 # GPS_TX = 8                # (17) stays open, but belongs to the UART
 # GPS_BAUD = 9600           # as the receiver sends
-# WHEEL_PIN = 14            # (27) reed contact or open-collector switch to ground, at most 4000 pulses a second;
+# WHEEL_PIN = 14            # (27) reed contact or open-collector switch to ground, at most 4000 (300) pulses a second;
 #                           never 12 V. Near an ignition: 4.7 kOhm to 3V3 and 10 nF to ground at the pin
 # PULSES_PER_METRE = 0.5    # one magnet on a wheel of 2 m circumference: 0.5
 

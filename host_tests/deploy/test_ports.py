@@ -151,7 +151,7 @@ from kickstand.settings import Settings
 taken = []
 for number in range(5):
     class Config:
-        SD_SPI, SD_SCK, SD_MOSI, SD_MISO, SD_CS = number, 10, 11, 12, 13
+        SD_SPI, SD_SCK, SD_MOSI, SD_MISO, SD_CS = number, 12, 13, 14, 27
     try:
         taken.append(Settings(Config).SD_SPI)
     except SettingsError as error:

@@ -3,7 +3,7 @@
 import errno
 
 from board_access import on_board, raised
-from kickstand_tools.simulated_board.fakes import fake_machine
+from kickstand_tools.simulated_board.fakes import fake_machine, fake_time
 from kickstand_tools.simulated_board.fakes.fake_machine import I2C, Pin, SoftI2C
 
 
@@ -156,6 +156,33 @@ def test_soft_i2c_does_not_notice_that_sda_is_held():
         assert i2c.readfrom_mem(0x68, 0x75, 1) == b"\x68"
 
     check(firmware, machine="esp32")
+
+
+def edges_in_a_transfer(machine, pulses_per_s):
+    """How many interrupts came in 10 ms of a transfer, and the levels that those saw that came after it, in 0.3 ms."""
+    seen, counted = [], []
+
+    def firmware(board):
+        board.fit_wheel(lambda t_s: 10.0, pulses_per_metre=pulses_per_s / 10.0)
+        pins = {"sda": Pin(4), "scl": Pin(5), "freq": 100_000}
+        i2c = I2C(0, **pins) if machine == "pico" else SoftI2C(**pins)
+        fake_time.sleep_ms(200)
+        Pin(board.wheel_pin, Pin.IN, Pin.PULL_UP).irq(lambda pin: seen.append(pin.value()))
+        i2c.readfrom_mem_into(0x68, 0x3B, bytearray(108))
+        counted.append(len(seen))
+        fake_time.sleep_us(300)
+
+    check(firmware, machine=machine, sensor_pins=[4, 5])
+    return counted[0], seen[counted[0] :]
+
+
+def test_interrupts_of_an_esp32_wait_for_the_end_of_a_transfer():
+    """Eight at most, and they see the level that the pin has then. On a Pico they come at once."""
+    assert edges_in_a_transfer("pico", 300)[0] in (5, 6, 7)
+    during, after = edges_in_a_transfer("esp32", 300)
+    assert during == 0 and len(after) in (5, 6, 7) and len(set(after)) == 1
+    during, after = edges_in_a_transfer("esp32", 1000)
+    assert during == 0 and len(after) in (8, 9)  # one more may have come since
 
 
 def test_boards_have_their_pins_and_controllers():

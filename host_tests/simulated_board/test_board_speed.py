@@ -32,28 +32,49 @@ def speeds_of(text, piece=1000, step_ms=10, steps=60):
     return [round(1000 * speed) for speed in found if speed is not None]
 
 
-def drive(config, fit, until_s):
-    """[(t_s, m/s, age_us), ...] that the firmware's Speed gives, and {t_s: fault} each second."""
-    board = Board(level)
+def busy_with_transfers():
+    """Call it in each turn of the loop: what an ESP32's SoftI2C sends and receives there, 1.3 ms and each 100 ms 12."""
+    from machine import Pin, SoftI2C  # type: ignore[import-not-found]
+
+    sensor = SoftI2C(Pin(22), Pin(21), freq=250_000)
+    lcd = SoftI2C(Pin(19), Pin(18), freq=100_000)
+    frames, line = bytearray(30), bytes(68)
+
+    def turn(number):
+        sensor.readfrom_mem_into(0x68, 0x74, frames)
+        if number % 10 < 2:
+            lcd.writeto(0x27, line)
+
+    return turn
+
+
+def drive(config, fit, until_s, port="rp2"):
+    """[(t_s, m/s, age_us), ...] that the firmware's Speed gives, and {t_s: fault} each second. On an ESP32 while sensor
+    and display are read and written."""
+    board = Board(level, port=port)
     fit(board)
     got, faults = [], {}
 
     def firmware():
         from time import sleep_us, ticks_ms  # type: ignore[attr-defined]
 
+        from kickstand.board import port as of_board
         from kickstand.settings import Settings
-        from kickstand.speed.source import open_speed
+        from kickstand.speed import source
         from kickstand.ui.messages import lines
 
         class Config:
             pass
 
-        for name, value in config.items():
+        for name, value in [("WHEEL_PIN", board.wheel_pin)] + list(config.items()):
             setattr(Config, name, value)
-        speed = open_speed(Settings(Config))
-        assert speed
+        hard, of_board.PIN_IRQ = of_board.PIN_IRQ, {"hard": True} if port == "rp2" else {}
+        speed = source.open_speed(Settings(Config))
+        of_board.PIN_IRQ = hard
+        transfer = busy_with_transfers() if port == "esp32" else lambda number: None
         turn = 0
         while True:
+            transfer(turn)
             new = speed.poll(ticks_ms())
             if new is not None:
                 got.append((board.clock.now_us / 1e6, new, speed.age_us))
@@ -243,6 +264,66 @@ def test_the_wheel_of_a_quick_vehicle_is_no_storm():
     got, faults = drive(config, lambda b: b.fit_wheel(lambda t_s: 70.0, pulses_per_metre=50), 3.0)
     assert faults[2] is None and len(got) > 20
     assert all(abs(speed - 70.0) < 1.0 for _, speed, _ in got)
+
+
+def wheel_on_an_esp32(pulses_per_metre, speed_mps, seconds=21.0, **kind):
+    """The mean of the speeds in 20 s, the standard deviation of one, and the faults."""
+    config = {"SPEED": "wheel", "PULSES_PER_METRE": pulses_per_metre}
+
+    def fit(board):
+        board.fit_wheel(lambda t_s: speed_mps, pulses_per_metre=pulses_per_metre, **kind)
+
+    got, faults = drive(config, fit, seconds, "esp32")
+    found = [speed for t_s, speed, _ in got if t_s > 1.0]
+    mean = sum(found) / max(1, len(found))
+    return mean, (sum((speed - mean) ** 2 for speed in found) / max(1, len(found))) ** 0.5, faults
+
+
+def test_an_esp32_counts_pulses_that_fall_into_a_transfer():
+    """Its interrupts wait meanwhile: of a contact that closed and opened again only the opening is seen, twice."""
+    for pulses, hz in ((0.5, 13.3), (1.0, 23.7), (2.0, 71.9), (3.0, 149.3), (5.0, 121.7), (10.0, 203.1), (50.0, 290.0)):
+        mean, deviation, faults = wheel_on_an_esp32(pulses, hz / pulses)
+        assert abs(mean * pulses - hz) < 0.025 * hz, (pulses, hz, mean)
+        assert deviation < 0.1 * mean
+        assert faults[20] is None
+
+
+def test_a_contact_that_bounces_is_counted_once_on_an_esp32_too():
+    """Also where it bounces during a transfer: at any speed, and at any time of the loop's turn."""
+    for speed in (1.3, 2.0, 4.1, 7.77, 15.0, 33.3):
+        mean, _, _ = wheel_on_an_esp32(0.5, speed, bounce_us=2000)
+        assert abs(mean - speed) < 0.01 * speed, (speed, mean)
+
+
+def test_a_wheel_that_is_too_quick_for_an_esp32_is_named_and_gives_no_speed():
+    """A part of its pulses is lost, which would read as a speed that is too low."""
+
+    def speed_of(t_s):
+        return 20.0 if 8.0 < t_s < 14.0 else 5.0
+
+    for pulses in (20, 50, 100):
+        config = {"SPEED": "wheel", "PULSES_PER_METRE": pulses}
+        got, faults = drive(config, lambda b, p=pulses: b.fit_wheel(speed_of, pulses_per_metre=p), 20.0, "esp32")
+        assert faults[12] == ("Wheel: too quick", "fewer pulses/m"), pulses
+        assert not [1 for t_s, _, _ in got if 8.4 < t_s < 14.0]
+        slow = [speed for t_s, speed, _ in got if 1.0 < t_s < 8.0 or t_s > 15.0]
+        assert (len(slow) > 50 and faults[6] is faults[18] is None) == (pulses < 60)
+        assert all(abs(speed - 5.0) < 0.7 for speed in slow)
+
+
+def test_a_storm_of_pulses_is_cut_off_on_an_esp32_too():
+    for pulses_per_s in (6_000, 20_000, 50_000):
+
+        def fit(board, pulses_per_s=pulses_per_s):
+            board.fit_wheel(constant)
+            board.faults.wheel_storm(10.0, 8.0, pulses_per_s)
+
+        got, faults = drive({"SPEED": "wheel"}, fit, 25.0, "esp32")
+        assert faults[9] is None and faults[23] is None
+        for second in range(11, 20):
+            assert faults[second] == ("Wheel: noise", "check wiring"), second
+        assert not [t for t, _, _ in got if 10.2 < t < 20.0]
+        assert all(abs(speed - 15.0) < 0.5 for _, speed, _ in got)
 
 
 def test_wheel_on_an_esp32():

@@ -23,7 +23,7 @@ if IS_ESP32:
     GPS_UART, GPS_PINS, WHEEL_PIN = 2, (17, 16), 27  # (TX, RX)
     if "SPIRAM" in MACHINE:  # MicroPython's image for PSRAM, which takes 16 and 17, has no Pin for these
         GPS_PINS = None, None
-    PIN_IRQ = {}  # further arguments of Pin.irq(): this port has soft interrupts only
+    PIN_IRQ = {}  # further arguments of Pin.irq(): this port has soft interrupts only, which SoftI2C keeps waiting
     I2C_NUMBERED = False  # see open_i2c()
     SD_SPI = (2, 3)  # the slots of machine.SDCard that are SPI
     # Pins that the chip itself needs. Those of its own USB: driving one cuts the board off from the computer until BOOT

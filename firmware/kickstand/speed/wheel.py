@@ -25,6 +25,7 @@ STANDING_MS = 200  # and a speed of zero at most so often
 # a metre at 70 m/s are allowed.
 STORM_EDGES, STORM_US = 64, 8_000
 STORM_PAUSE_MS = 5000  # the interrupt is off for so long after a storm, and again if it lasts
+SOFT_PERIOD_US = 3333  # of pulses that are closer together, soft interrupts, as an ESP32's, lose over 2 in 100
 # Counts and times wrap at 30 bits. The interrupt subtracts times with this mask and not by ticks_diff(), which would
 # give a negative time after nine minutes of standing.
 _TICKS = _COUNT = 0x3FFFFFFF
@@ -54,6 +55,8 @@ class Wheel:
         self._pin = pin
         self._irq = irq
         self._noisy = False  # there was a storm, and no speed since then
+        self._soft = not irq.get("hard")
+        self._too_quick = None  # True while pulses come too quickly for a soft interrupt; None: never yet
         self.problem = None
         self._listen()
 
@@ -63,7 +66,12 @@ class Wheel:
         self._off_ms = None
         self._edges = STORM_EDGES  # left of those that are timed together, since _edges_us
         self._edges_us = ticks_us()
-        self._pin.irq(self._edge, Pin.IRQ_FALLING | Pin.IRQ_RISING, **self._irq)
+        # For soft interrupts: the level at the last one; True if that was the first to find it the same again; the
+        # usual time from pulse to pulse, 0 if that is not known
+        self._level = None
+        self._same = False
+        self._usual_us = 0
+        self._pin.irq(self._soft_edge if self._soft else self._edge, Pin.IRQ_FALLING | Pin.IRQ_RISING, **self._irq)
 
     def _edge(self, pin):
         now = ticks_us()
@@ -79,6 +87,24 @@ class Wheel:
         elif (now - self._opened_us) & _TICKS >= self._open_us and (now - self._pulse_us) & _TICKS >= self._shortest_us:
             self._pulse_us = now
             self.count = (self.count + 1) & _COUNT
+
+    def _soft_edge(self, pin):
+        """A soft interrupt waits while sensor or display are read or written. Of a contact that closes and opens again
+        meanwhile only the last level is seen, twice: that is a pulse too, unless it comes so early that the contact is
+        bouncing."""
+        level = pin.value()
+        if level != self._level or self._edges == 1:
+            self._level, self._same = level, False
+            self._edge(pin)
+            return
+        self._edges -= 1
+        self._same = not self._same
+        usual_us = self._usual_us
+        if usual_us and not self._same:
+            waited_us = (ticks_us() - self._pulse_us) & _TICKS
+            if waited_us >= usual_us - (usual_us >> 2):
+                self._pulse_us = (self._pulse_us + min(waited_us, usual_us)) & _TICKS
+                self.count = (self.count + 1) & _COUNT
 
     def poll(self, now_ms):
         """Return a new speed in m/s, or None. now_ms: ticks_ms()."""
@@ -99,6 +125,7 @@ class Wheel:
             return None
         self._report_ms = now_ms
         self._noisy = False
+        self._usual_us = 0
         self._seen_us = None  # the next period begins with the next pulse
         self.age_ms = self._stop_ms // 2  # the wheel may have stopped, or moved again, at any time since the last pulse
         return 0.0
@@ -124,6 +151,13 @@ class Wheel:
             return None
         self._noisy = False
         period_us = ticks_diff(pulse_us, before_us)
+        self._usual_us = period_us // pulses
+        if self._soft and self._usual_us < SOFT_PERIOD_US:
+            if self._too_quick is None:
+                self.problem = Notice("wheel-quick")
+            self._too_quick = True
+            return None
+        self._too_quick = False
         self.age_ms = (ticks_diff(ticks_us(), pulse_us) + period_us // 2) // 1000
         return pulses * self._metre_us / period_us
 
@@ -138,4 +172,6 @@ class Wheel:
         """None, or a Notice: a wheel that has never turned may be a wire that is loose."""
         if self._noisy:
             return Notice("wheel-storm")
+        if self._too_quick:
+            return Notice("wheel-quick")
         return Notice("no-pulse") if self._moved_ms is None else None

@@ -44,6 +44,7 @@ gps-garbled|GPS garbled|check GPS_BAUD
 gps-no-fix|GPS: no fix|needs open sky
 no-pulse|Wheel: no pulse|ride, or wiring?
 wheel-storm|Wheel: noise|check wiring
+wheel-quick|Wheel: too quick|fewer pulses/m
 
 no-driver|SD card:|no driver
 no-card|No SD card|check, restart

@@ -17,7 +17,8 @@ def ilistdir(path="."):
     """Yield (name, type, 0, size in bytes) for each entry, and (name, type, 0) for what is mounted."""
     mounted = []
     if path == "/" and hasattr(os, "mount"):
-        mounted = [entry for entry in os.ilistdir(path) if len(entry) == 3 and entry[2] == 0]
+        listed = os.ilistdir(path)  # pyright: ignore[reportAttributeAccessIssue]
+        mounted = [entry for entry in listed if len(entry) == 3 and entry[2] == 0]
         yield from mounted
     for name in os.listdir(path):
         if any(entry[0] == name for entry in mounted):

@@ -3,8 +3,6 @@
 from ..clock import Reset
 from . import chips, current
 
-IRQ_US = 26  # that an interrupt takes beside its calls into `machine` and `time`: 33 in all, as on a Pico
-
 
 class Pin:
     """machine.Pin: levels, and interrupts from what is wired to the pin. Handlers run while simulated time passes."""
@@ -43,6 +41,11 @@ class Pin:
         if hard and current.board.port == "esp32":
             raise TypeError("extra keyword arguments given")
 
+        if current.board.port == "esp32":
+            self._handler = handler
+            current.board.watch_pin(self.id, (lambda level: self._schedule(level, trigger)) if handler else None)
+            return
+
         running, waiting = False, False  # as on the chip one more edge is kept while the handler runs, and no others
 
         def edge(level):
@@ -57,12 +60,16 @@ class Pin:
                 while waiting and handler and self._handler is handler:
                     waiting = False
                     handler(self)
-                    current.board.clock.advance(IRQ_US)
+                    current.board.clock.advance(current.IRQ_US)
             finally:
                 running = False
 
         self._handler = handler
         current.board.watch_pin(self.id, edge if handler else None)
+
+    def _schedule(self, level, trigger):
+        if trigger & (Pin.IRQ_RISING if level else Pin.IRQ_FALLING):
+            current.soft_irqs.add(self._handler, self)
 
     def __call__(self, level=None):
         return self.value(level)

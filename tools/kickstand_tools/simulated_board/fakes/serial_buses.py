@@ -112,6 +112,20 @@ class _Controller:
             buf[i] = bus.read_byte()
 
 
+def _in_one_go(method):
+    """The same transfer of a SoftI2C, during which no handler of an interrupt is called."""
+
+    def transfer(self, *arguments, **named):
+        irqs = current.soft_irqs
+        irqs.held = True
+        try:
+            return method(self, *arguments, **named)
+        finally:
+            irqs.release()
+
+    return transfer
+
+
 class SoftI2C(_Controller):
     """machine.SoftI2C, in software on any two pins. It does not look whether SDA is held: the clocks of a transfer let
     the device that holds it finish its byte, and the zeros that it sends meanwhile pass for answers."""
@@ -119,6 +133,11 @@ class SoftI2C(_Controller):
     def __init__(self, scl, sda, freq=400000, timeout=50000):
         super().__init__(scl, sda, freq, timeout)
         self._held = False
+
+    readfrom_mem_into = _in_one_go(_Controller.readfrom_mem_into)
+    writeto_mem = _in_one_go(_Controller.writeto_mem)
+    writeto = _in_one_go(_Controller.writeto)
+    readfrom_into = _in_one_go(_Controller.readfrom_into)
 
     def _start(self, address, read):
         self._held = self._bus.stuck()
