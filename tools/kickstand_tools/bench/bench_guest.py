@@ -69,6 +69,7 @@ class MeasuredApp(app_module.App):
 
     def prepare(self, seconds, out, spent):
         """seconds: how long to take notes.  out: a Sink to the host.  spent: us of each stage in this turn, or None."""
+        gc.collect()  # or the arrays would lie behind garbage, and make each collection longer
         turns = seconds * MAX_TURNS_HZ
         self._out, self._spent, self._turns = out, spent, turns
         self._until_us = seconds * 1_000_000
