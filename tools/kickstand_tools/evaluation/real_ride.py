@@ -7,16 +7,18 @@ axis. It reads low (1 Hz speed, wide tyres, an axis that leans with the bike) an
 it can compare methods and show a lean that decays in a turn, but its degrees are not to be trusted.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from kickstand.errors import Notice
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
 from ..logs.reader import Log, read_log
+from ..replay.mount_check import contradiction
 from .estimators import estimate
 from .metrics import rms, slope
 from .samples import calibrated
@@ -41,12 +43,14 @@ class RealScore:
 class Comparison:
     """name: of the recording's file. scores: by estimator.
 
-    traces: (N,) each: "time" in s; "reference" and each estimator's lean in degrees, > 0 to the right.
+    traces: (N,) each: "time" in s; "reference" and each estimator's lean in degrees, > 0 to the right. notices: what is
+    remarkable in the recording, or contradicts the calibration that was found in it.
     """
 
     name: str
     scores: dict[str, RealScore]
     traces: dict[str, NDArray[np.float64]]
+    notices: list[Notice] = field(default_factory=list)
 
 
 def compare(path: Path) -> Comparison:
@@ -61,7 +65,9 @@ def compare(path: Path) -> Comparison:
         name: RealScore(rms((lean - reference)[riding]), slope(lean[riding], reference[riding], _LEANED_DEG))
         for name, lean in shown.items()
     }
-    return Comparison(path.name, scores, {"time": time, "reference": reference, **shown})
+    wrong = contradiction(log, calibration)
+    notices = [*log.notices, *([wrong] if wrong else [])]
+    return Comparison(path.name, scores, {"time": time, "reference": reference, **shown}, notices)
 
 
 def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64]:

@@ -18,11 +18,9 @@ from ..logs.reader import Block, Source, read_blocks, read_twice, write_table
 from ..logs.source import Progress
 from ..logs.table import Array, Table
 from . import replay_engine
-from .forward_sign import ForwardSign, exchanged_notice
+from .mount_check import MountCheck
 
 _CHUNK = 500  # samples between two calls of progress while an emulated Pico works
-
-_FORWARD = replay_engine.COLUMNS.index("forward_g")
 
 Row = tuple[float, ...]  # of replay_engine.COLUMNS
 Replayed = tuple[Block, list[Row]]
@@ -96,12 +94,12 @@ def replay_blocks(
     log: Source, calibration: CalibrationFile, engine: str, progress: Progress | None, notices: list[Notice]
 ) -> Iterator[Replayed]:
     """Each block of the log with the engine's results for it. notices is appended to at the end."""
-    sign = ForwardSign()
+    mount = MountCheck(calibration)
     for block, results in _RUN[engine](log, calibration, progress, notices):
-        sign.add(block.t_s, np.array([row[_FORWARD] for row in results]), block.speed_mps)
+        mount.add(block.t_s, *calibration.in_vehicle(block.readings), block.speed_mps)
         yield block, results
-    if calibration.aligned and sign.exchanged:
-        notices.append(exchanged_notice(calibration))
+    contradiction = mount.notice()
+    notices += [contradiction] if contradiction else []
 
 
 def _cpython(
