@@ -62,20 +62,17 @@ class MountCheck:
         if not self._calibration.aligned or len(self._cells) < 3:
             return None
         car = self._calibration.vehicle == "car"
-        up = self.up_deg()
-        exchanged = self.sign.exchanged and (up is None or up < LEANED_DEG)
-        if up is not None and up > UP_DEG and not exchanged:
-            return Notice("up-off", up, car)
-        if exchanged:
-            return exchanged_notice(self._calibration, roll_deg)
-        found, by = self.forward_by_speed(), "speed"
+        up, found, by = self.up_deg(), self.forward_by_speed(), "speed"
+        if found is None and self.sign.exchanged:
+            found = 180.0
         if found is None and not car:
             found, by = self.forward_by_bends(), "bends"
+        exchanged = found is not None and abs(found) > BACKWARD_DEG
+        if up is not None and up > (LEANED_DEG if exchanged else UP_DEG):
+            return Notice("up-off", up, car)
         if found is None or abs(found) < FORWARD_DEG:
             return None
-        if abs(found) > BACKWARD_DEG:
-            return exchanged_notice(self._calibration, roll_deg)
-        return Notice("forward-off", found, by, car)
+        return exchanged_notice(self._calibration, roll_deg) if exchanged else Notice("forward-off", found, by, car)
 
     def up_deg(self) -> float | None:
         """The angle between the calibration's up and the ride's, None where it hardly turns."""
