@@ -234,3 +234,28 @@ def test_the_figure_of_eight_is_refused(tmp_path, shared_data):
     log = shared_data / "car-parking-lot-figure8-nominal-001.csv.gz"
     for method in ("improved", "published"):
         refused(tmp_path, "braking events in a straight line", log, "--method", method)
+
+
+UPSIDE_DOWN = [0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0]  # rows left, up, forward: z points down
+
+
+def test_a_log_of_the_opposite_sign_looks_like_a_sensor_upside_down(tmp_path):
+    """Nothing else in a car's log tells it: without the remark its mirror image would pass."""
+    log, out = record(tmp_path / "drive.csv", around(8), UPSIDE_DOWN), tmp_path / "CAL.json"
+    said = command.works("calibrate", "drive", log, "--out", out)
+    assert "the sensor's z points down: if it is not mounted upside down, all accelerations are of the" in said.err
+    right = record(tmp_path / "right.csv", around(8), [0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0, 0.0])
+    assert command.works("calibrate", "drive", right, "--out", out).err == ""
+
+
+def test_a_calibration_that_the_drive_contradicts(tmp_path):
+    log, cal = record(tmp_path / "drive.csv", around(8), MOUNT), tmp_path / "CAL.json"
+    command.works("calibrate", "drive", log, "--out", cal)
+    again = "calibrate", "drive", log, "--vehicle", "car", "--out", tmp_path / "AGAIN.json"
+    assert command.works(*again, "--calibration", cal).err == ""
+    data = json.loads(cal.read_text())
+    left, up, forward = data["vehicle_from_sensor"]
+    cal.write_text(json.dumps(data | {"vehicle_from_sensor": [forward, up, [-value for value in left]]}))
+    said = command.works(*again, "--calibration", cal).err
+    assert f"warning: {log}: by the speed of this ride forward is " in said
+    assert "calibrate drive" in said

@@ -62,14 +62,14 @@ def exchanged_line(car, side, roll_deg=None):
 
 
 def test_what_is_said():
-    """Where both forward and left may be reversed, the sign of the log is named as the other cause: the other side of
-    the kickstand would make a clean report of it, mirrored."""
+    """The sign of the log is always named as the other cause: the other side of the kickstand would make a clean report
+    of it, mirrored."""
     assert exchanged_line(False, "left", 0.0).endswith("exchanged: calibrate two --side right?" + SIGN)
     assert exchanged_line(False, "right", -3.9).endswith("exchanged: calibrate two --side left?" + SIGN)
     assert exchanged_line(False, "", 0.0).endswith("calibrate two with the other --side?" + SIGN)
-    assert exchanged_line(False, "left", -4.1).endswith("exchanged: were the poses swapped?")
+    assert exchanged_line(False, "left", -4.1).endswith("exchanged: were the poses swapped?" + SIGN)
     assert exchanged_line(False, "left").endswith("calibrate two --side right? Or were the poses swapped?" + SIGN)
-    assert exchanged_line(True, "").endswith("exchanged: calibrate drive again?")
+    assert exchanged_line(True, "").endswith("exchanged: calibrate drive again?" + SIGN)
 
 
 def jerky(late_s: int = 0, sign: float = 1.0, noise_g: float = 0.0, seconds: int = 240, mps2: float = 2.0):

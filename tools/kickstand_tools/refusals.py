@@ -8,6 +8,9 @@ from .errors import InputError
 
 SWAPPED_DEG = 4.0  # an upright pose is hardly ever so far off; a pose on the kickstand taken for it is
 
+UPSIDE_DOWN_DEG = 150.0
+OPPOSITE_SIGN = "do all accelerations have the opposite sign? At rest up reads +1 g"
+
 # {0}, {1} ... are the refusal's values
 _SENTENCES = {
     "absurd-readings": "readings that no vehicle gives, at {0:.1f} s up to {1:.0f} deg/s and {2:.1f} g, where the lean "
@@ -72,6 +75,9 @@ _SENTENCES = {
     "one in both sensors) or the gyro of the opposite sign (reverse all its rates)? At rest up reads +1 g",
     "rates-misfit": "the rates do not belong to the accelerations, so the lean is wrong: the rates {0}; instead of "
     "gx, gy, gz right would be {1}",
+    "upside-down": "the sensor's {0} points down: if it is not mounted upside down, all accelerations are of the "
+    "opposite sign, and left and right get exchanged: reverse them (at rest up reads +1 g)",
+    "another-mount": "the calibration given is of a mount {0:.0f} degrees from this one: its offset and slope are used",
 }
 _MOVED = {
     "between-stops": "two stops differ by over {0:.0f} degrees",
@@ -111,6 +117,10 @@ def sentence(refusal: Refusal | Notice) -> str:
         return _speed_unit(*refusal.values)
     if refusal.code == "forward-exchanged":
         return _forward_exchanged(*refusal.values)
+    if refusal.code == "up-off":
+        return _up_off(*refusal.values)
+    if refusal.code == "forward-off":
+        return _forward_off(*refusal.values)
     words = _SENTENCES.get(refusal.code)
     return words.format(*refusal.values) if words else console.sentence(refusal)
 
@@ -138,9 +148,31 @@ def _forward_exchanged(car: bool, side: str, roll_deg: float | None) -> str:
     not known."""
     line = "forward and backward are exchanged: "
     if car:
-        return line + "calibrate drive again?"
-    if roll_deg is not None and abs(roll_deg) > SWAPPED_DEG:
-        return line + "were the poses swapped?"
-    other = {"left": "--side right", "right": "--side left"}.get(side, "with the other --side")
-    line += f"calibrate two {other}?" + ("" if roll_deg is not None else " Or were the poses swapped?")
-    return line + " Or, if no board wrote this log, do all accelerations have the opposite sign? At rest up reads +1 g"
+        line += "calibrate drive again?"
+    elif roll_deg is not None and abs(roll_deg) > SWAPPED_DEG:
+        line += "were the poses swapped?"
+    else:
+        other = {"left": "--side right", "right": "--side left"}.get(side, "with the other --side")
+        line += f"calibrate two {other}?" + ("" if roll_deg is not None else " Or were the poses swapped?")
+    return line + " Or, if no board wrote this log, " + OPPOSITE_SIGN
+
+
+def _up_off(angle_deg: float, car: bool) -> str:
+    line = f"the calibration's up is {angle_deg:.0f} degrees off, so nothing computed with it is right: "
+    if angle_deg > UPSIDE_DOWN_DEG:
+        return line + f"is it another mount's? {_again(car)}. Or {OPPOSITE_SIGN}"
+    return line + f"is it another mount's? {_again(car)}"
+
+
+def _forward_off(angle_deg: float, by: str, car: bool) -> str:
+    """angle_deg: from the calibration's forward to the ride's, > 0 to the left."""
+    side = "left" if angle_deg > 0.0 else "right"
+    wrong = "braking and cornering are" if car else "lean, braking and cornering are"
+    return (
+        f"by the {by} of this ride forward is {abs(angle_deg):.0f} degrees to the {side} of the calibration's, so "
+        f"{wrong} wrong: is it another mount's? {_again(car)}"
+    )
+
+
+def _again(car: bool) -> str:
+    return "Calibrate again: calibrate drive" if car else "Calibrate again: calibrate two, or calibrate ride"

@@ -60,6 +60,16 @@ class Channels(Table):
         """(n) True where the display shows the lean and holds its maxima."""
         return (self.sure > 0.0) & ~(np.abs(self.lean_deg) >= FALLEN_DEG)
 
+    @property
+    def force_g(self) -> Array:
+        """(n, 3): left, up, forward."""
+        return np.column_stack((self.left_g, self.up_g, self.forward_g))
+
+    @property
+    def rate_dps(self) -> Array:
+        """(n, 3): about left, up, forward."""
+        return np.column_stack((-self.pitch_rate_dps, self.yaw_rate_dps, self.roll_rate_dps))
+
     def part(self, which: slice | NDArray[np.bool_]) -> "Channels":
         """The samples of a slice, or those where an array of n is True."""
         return Channels(*(getattr(self, field.name)[which] for field in fields(self)))
@@ -154,9 +164,7 @@ def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool 
     """
     if car:
         lean = lean * [0.0, 1.0, 0.0, 1.0, 0.0, 1.0] + [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
-    matrix = calibration.vehicle_from_sensor
-    force = (block.readings[:, :3] * calibration.accel_slope + calibration.accel_offset_g) @ matrix.T
-    rate = (block.readings[:, 4:] - calibration.gyro_bias_dps) @ matrix.T
+    force, rate = calibration.in_vehicle(block.readings)
     left, up, forward = force.T
     angle = np.radians(np.nan_to_num(lean[:, 0]))
     temperature = block.readings[:, 3]

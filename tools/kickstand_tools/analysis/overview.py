@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from kickstand.errors import Notice
 
 from ..logs.source import Progress
-from ..replay.forward_sign import ForwardSign, exchanged_notice
+from ..replay.mount_check import MountCheck
 from .alignment_quality import Quality, quality
 from .channels import Channels, Ride
 from .downsample import downsampled, joined
@@ -51,18 +51,20 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     >>> seen.summary.duration_s, seen.stops
     (2.5, [])
     """
-    total, sign = Summary(), ForwardSign()
+    total, mount = Summary(), MountCheck(ride.calibration)
     notices: list[Notice] = []
 
     def blocks() -> Iterator[Channels]:
         for block in ride.blocks(progress, notices):
             total.add(block)
-            sign.add(block.t_s, block.forward_g, block.speed_mps)
+            mount.add(block.t_s, block.force_g, block.rate_dps, block.speed_mps)
             yield block
 
     course = joined(list(downsampled(blocks(), RATE_S)))
     total.frozen_s = sum(float(notice.values[1]) for notice in notices if notice.code == "frozen-readings")
     found = quality(course, standing(course))
-    exchanged = exchanged_notice(ride.calibration, found.roll_deg) if sign.exchanged else None
+    contradiction = mount.notice(found.roll_deg)
+    exchanged = contradiction if contradiction and contradiction.code == "forward-exchanged" else None
+    notices += [contradiction] if contradiction and not exchanged else []
     stops = [] if exchanged else find_stops(course)
-    return Overview(ride, total, course, stops, found, sign.correlation, exchanged, notices)
+    return Overview(ride, total, course, stops, found, mount.sign.correlation, exchanged, notices)

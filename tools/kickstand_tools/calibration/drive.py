@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from kickstand.drive_alignment import verdict
 from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE, DriveAlignment
-from kickstand.errors import AlignmentError
+from kickstand.errors import AlignmentError, Notice
 
 from ..errors import InputError
 from ..logs.mended.frozen import believed
@@ -41,7 +41,8 @@ class DriveResult:
     vehicle: "car" or "motorcycle". used, turned: braking events that were counted, and those in turns that were not.
     quality_deg: standard error of forward about the vertical. ready_s: seconds of all logs until the alignment was
     ready. lag_s: by how much the speed is late; halves_deg: by how much two halves of the drive differ; None for the
-    published method. poses: for a motorcycle that two poses had aligned before.
+    published method. poses: for a motorcycle that two poses had aligned before. notices: what is remarkable in the
+    logs, with the log's name.
     """
 
     calibration: CalibrationFile
@@ -56,6 +57,7 @@ class DriveResult:
     halves_deg: float | None
     poses: PoseCheck | None
     events: list[DriveEvent]
+    notices: list[tuple[str, Notice]]
 
 
 def fit_drive(
@@ -130,6 +132,7 @@ def fit_drive(
         improved.quality.halves_deg if improved else None,
         pose_check,
         watch.events,
+        [(log.name, notice) for log in drives for notice in log.notices],
     )
 
 

@@ -76,6 +76,11 @@ class CalibrationFile:
         calibration.six_done, calibration.aligned = self.six_done, self.aligned
         return calibration
 
+    def in_vehicle(self, readings: Array) -> tuple[Array, Array]:
+        """Force (n, 3, g) and rate (n, 3, deg/s) along left, up, forward of readings (n, 7) in the chip's order."""
+        force = (readings[:, :3] * self.accel_slope + self.accel_offset_g) @ self.vehicle_from_sensor.T
+        return force, (readings[:, 4:] - self.gyro_bias_dps) @ self.vehicle_from_sensor.T
+
     def delay_s(self) -> float:
         """gyro_delay_s, or that of the default DLPF."""
         return DELAY_S if self.gyro_delay_s is None else self.gyro_delay_s

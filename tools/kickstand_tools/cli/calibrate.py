@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 import click
 
 if TYPE_CHECKING:
+    from kickstand.errors import Notice
+
     from ..calibration.drive import DriveResult
     from ..calibration.drive_events import DriveEvent
     from ..calibration.six import SixPositions
@@ -49,8 +51,12 @@ def six(poses: tuple[Path, ...], out: Path) -> None:
 )
 @_OUT
 def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out: Path) -> None:
-    """How the sensor sits on the bike, from a pose on the kickstand and one upright."""
+    """How the sensor sits on the bike, from a pose on the kickstand and one upright.
+
+    Axes are right-handed, and at rest the one that points up reads +1 g.
+    """
     from ..calibration.file import read_calibration, write_calibration
+    from ..calibration.remarks import remarks
     from ..calibration.two import fit_two_positions
     from ..output import check_output
 
@@ -58,6 +64,7 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
     before = read_calibration(calibration) if calibration else None
     found = fit_two_positions(kickstand, upright, before, side)
     _print(_two_lines(found))
+    _warn((str(upright), notice) for notice in remarks(found.calibration, before))
     write_calibration(out, found.calibration)
     click.echo(f"written: {out}")
 
@@ -77,12 +84,18 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
 def drive(
     logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None, method: str, out: Path
 ) -> None:
-    """How the sensor sits on the vehicle, from logs of driving with speed: stops and braking in a straight line."""
+    """How the sensor sits on the vehicle, from logs of driving with speed: stops and braking in a straight line.
+
+    Axes are right-handed, and at rest the one that points up reads +1 g.
+    """
     from ..calibration.drive import fit_drive
     from ..calibration.file import read_calibration, write_calibration
     from ..calibration.poses import refuse_same_file
+    from ..calibration.remarks import remarks
+    from ..logs.reader import read_log
     from ..output import check_output
     from ..progress import Bar
+    from ..replay.mount_check import contradiction
 
     check_output(out, list(logs))
     refuse_same_file(logs)
@@ -92,6 +105,10 @@ def drive(
         found = fit_drive(
             logs, before, vehicle, method, bar.reach, lambda event: _print(_event_lines(event, several))
         )
+    _warn(found.notices)
+    _warn((str(logs[0]), notice) for notice in remarks(found.calibration))
+    if before and not found.poses:
+        _warn((str(log), notice) for log in logs if (notice := contradiction(read_log(log), before)))
     _print(_drive_lines(found, several))
     write_calibration(out, found.calibration)
     click.echo(f"written: {out}")
@@ -149,6 +166,7 @@ def _drive_lines(found: "DriveResult", several: bool) -> Iterable[str]:
     from kickstand.drive_alignment import verdict
 
     from ..analysis import alignment_quality
+    from ..refusals import OPPOSITE_SIGN
 
     yield f"{found.vehicle}, method {found.method}: {found.used} used, {found.turned} in turns not used"
     yield f"stops: {found.stops}"
@@ -159,7 +177,10 @@ def _drive_lines(found: "DriveResult", several: bool) -> Iterable[str]:
     if found.poses:
         yaw_deg = abs(found.poses.yaw_deg)
         if found.poses.verdict == verdict.REVERSED:
-            yield "warning: the two poses had forward and backward exchanged: the kickstand is on the other side"
+            yield (
+                "warning: the two poses had forward and backward exchanged: the kickstand is on the other side, "
+                f"or, if no board wrote this log, {OPPOSITE_SIGN}"
+            )
         elif found.poses.verdict == verdict.MOVED:
             yield f"warning: the mount is {yaw_deg:.0f} degrees from where the two poses saw it: was it moved since?"
         else:
@@ -201,6 +222,14 @@ def _axes(values, form: str) -> str:
     from kickstand.units import AXES
 
     return "  ".join(f"{axis} " + form % value for axis, value in zip(AXES, values, strict=True))
+
+
+def _warn(notices: "Iterable[tuple[str, Notice]]") -> None:
+    """Of each log."""
+    from ..refusals import sentence
+
+    for log, notice in notices:
+        click.echo(f"warning: {log}: {sentence(notice)}", err=True)
 
 
 def _print(lines: Iterable[str]) -> None:

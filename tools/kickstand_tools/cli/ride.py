@@ -37,7 +37,10 @@ def _stretch(command: Callable[..., Any]) -> Callable[..., Any]:
 def replay(
     log: Path, calibration: Path | None, from_s: float | None, to_s: float | None, engine: str, out: Path
 ) -> None:
-    """Run the firmware's own lean meter over a recorded log."""
+    """Run the firmware's own lean meter over a recorded log.
+
+    The log's axes are right-handed, and so are its rates; at rest the axis that points up reads +1 g.
+    """
     from ..calibration.file import calibration_beside, read_calibration
     from ..output import check_output
     from ..progress import Bar
@@ -63,7 +66,10 @@ def replay(
 @_CALIBRATION
 @_OUT
 def export(ride: Path, form: str, calibration: Path | None, out: Path) -> None:
-    """Write a ride as Circuit Tools (vbo), RaceChrono or data frames (parquet, csv) open it."""
+    """Write a ride as Circuit Tools (vbo), RaceChrono or data frames (parquet, csv) open it.
+
+    The log's axes are right-handed, and so are its rates; at rest the axis that points up reads +1 g.
+    """
     from ..analysis.channels import open_ride
     from ..analysis.export.export import export
     from ..calibration.file import calibration_beside
@@ -87,7 +93,10 @@ def export(ride: Path, form: str, calibration: Path | None, out: Path) -> None:
 def report(
     ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, as_json: bool
 ) -> None:
-    """A ride in a page: maxima, time at large leans, and each stop as a brake test has it."""
+    """A ride in a page: maxima, time at large leans, and each stop as a brake test has it.
+
+    The log's axes are right-handed, and so are its rates; at rest the axis that points up reads +1 g.
+    """
     from rich.console import Console
 
     from ..analysis.channels import open_ride
@@ -112,7 +121,10 @@ def report(
 def plot(
     ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, out: Path
 ) -> None:
-    """Draw a ride: a picture (PNG) and a page to zoom into (HTML)."""
+    """Draw a ride: a picture (PNG) and a page to zoom into (HTML).
+
+    The log's axes are right-handed, and so are its rates; at rest the axis that points up reads +1 g.
+    """
     from ..analysis.channels import open_ride
     from ..analysis.overview import overview
     from ..analysis.plot import plot

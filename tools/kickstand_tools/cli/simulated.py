@@ -90,6 +90,7 @@ def evaluate(
     from ..evaluation.evaluate import evaluate
     from ..output import check_directory, new_directory
     from ..progress import Bar
+    from ..refusals import sentence
 
     names = [name.strip() for name in profiles.split(",")]
     jobs = runs.jobs(names, seeds, seconds, upright_error, pitch_change, traces=out is not None)
@@ -106,6 +107,8 @@ def evaluate(
             if result.refusal is not None:
                 where = f"{result.job.profile}, seed {result.job.seed}"
                 click.echo(f"{where}, not calibrated: {result.refusal}", err=True)
+        for notice in found.recorded.notices if found.recorded else ():
+            click.echo(f"warning: {recording}: {sentence(notice)}", err=True)
         if as_json:
             click.echo(json.dumps(report.document(found), indent=2))
         else:

@@ -6,10 +6,11 @@ bike) and ignores slope and bank of the road: it can compare methods and show a 
 degrees are not to be trusted.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+from kickstand.errors import Notice
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
@@ -17,6 +18,7 @@ from ..calibration.file import CalibrationFile
 from ..calibration.ride.fit import fit_ride
 from ..errors import InputError
 from ..logs.reader import Log, read_log
+from ..replay.mount_check import contradiction
 from .estimators import estimate
 from .metrics import rms, slope
 from .samples import calibrated
@@ -38,12 +40,14 @@ class RealScore:
 class Comparison:
     """name: of the recording's file. scores: by estimator.
 
-    traces: (N,) each: "time" in s; "reference" and each estimator's lean in degrees, > 0 to the right.
+    traces: (N,) each: "time" in s; "reference" and each estimator's lean in degrees, > 0 to the right. notices: what is
+    remarkable in the recording, or contradicts the calibration that was found in it.
     """
 
     name: str
     scores: dict[str, RealScore]
     traces: dict[str, NDArray[np.float64]]
+    notices: list[Notice] = field(default_factory=list)
 
 
 def compare(path: Path) -> Comparison:
@@ -58,7 +62,9 @@ def compare(path: Path) -> Comparison:
         name: RealScore(rms((lean - reference)[riding]), slope(lean[riding], reference[riding], _LEANED_DEG))
         for name, lean in shown.items()
     }
-    return Comparison(path.name, scores, {"time": time, "reference": reference, **shown})
+    wrong = contradiction(log, calibration)
+    notices = [*log.notices, *([wrong] if wrong else [])]
+    return Comparison(path.name, scores, {"time": time, "reference": reference, **shown}, notices)
 
 
 def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64]:

@@ -33,7 +33,7 @@ TRIED = 6  # of the 48 ways are looked at closely
 # By how much a way has to explain the forces better than the log as it is: the mean square (g2) of what is unexplained.
 # Right logs, simulated and recorded, stay under 1.03 times; a gyro of the opposite sign gives 1.7 to 50.
 CLEARLY, LIKELY, SIGMAS = 2.0, 1.25, 3.0  # so many times; or so many, if the windows agree by so many sigmas
-FEW_WINDOWS, FEW_CLEARLY = 3, 5.0  # with so few windows, so many times
+FEW_WINDOWS, FEW_CLEARLY = 3, 5.0  # with so few windows, so many times, and a bias near 0, as a phone's is
 LEAST_G2 = 0.001  # at least: a parked vehicle's drift is under 0.0002
 UNLIKELY = 1.0, 1.3, 1.6  # of ways that explain about as well: all reversed, some reversed, others; times what is left
 
@@ -93,7 +93,7 @@ class Handedness:
         if more < LEAST_G2 or best == 0:
             return None
         if len(gain) <= FEW_WINDOWS:
-            return best if times > FEW_CLEARLY else None
+            return best if times > FEW_CLEARLY and turning.unbiased else None
         agree = more > SIGMAS * float(np.std(gain)) / np.sqrt(len(gain))
         return best if times > CLEARLY or (times > LIKELY and agree) else None
 

@@ -38,6 +38,11 @@ class Turning:
             self._velocities = [_given(speed, places, late_s) for late_s in LATE_S]
             self._usual = DIRECTION
 
+    @property
+    def unbiased(self) -> bool:
+        """The gyro's bias is about 0."""
+        return bool(np.max(np.abs(self._bias)) < BIAS_DPS)
+
     def rough(self, ways: Array) -> Array:
         """ways (k, 3, 3): rate = way @ reading. (k): mean square, g2, of what the turn alone leaves of the force."""
         sizes = np.mean(np.sum(self._force**2, axis=2))

@@ -19,11 +19,10 @@ from ..logs.reader import Source, read_blocks, read_twice, write_table
 from ..logs.source import Progress
 from ..logs.table import Array, Table
 from . import replay_engine
-from .forward_sign import ForwardSign, exchanged_notice
+from .mount_check import MountCheck
 
 _CHUNK = 500  # samples between two calls of progress while an emulated Pico works
 
-_FORWARD = replay_engine.COLUMNS.index("forward_g")
 _UNKNOWN = (float("nan"),) * len(replay_engine.COLUMNS)
 
 Row = tuple[float, ...]  # of replay_engine.COLUMNS
@@ -100,13 +99,13 @@ def replay_blocks(
 ) -> Iterator[Replayed]:
     """Each block of the log with the engine's results for it, NaN where the readings froze: there the engine is told of
     a gap. notices is appended to at the end."""
-    sign = ForwardSign()
+    mount = MountCheck(calibration)
     for block, results in _RUN[engine](log, calibration, progress, notices):
         believed = block.believed
-        sign.add(believed.t_s, np.array([row[_FORWARD] for row in results]), believed.speed_mps)
+        mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
         yield block, _with_frozen(block, results)
-    if calibration.aligned and sign.exchanged:
-        notices.append(exchanged_notice(calibration))
+    contradiction = mount.notice()
+    notices += [contradiction] if contradiction else []
 
 
 def _with_frozen(block: Block, results: list[Row]) -> list[Row]:

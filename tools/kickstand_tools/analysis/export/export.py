@@ -12,6 +12,7 @@ from ...logs.source import Progress
 from ...logs.stretch import Stretch
 from ...logs.table import Array
 from ...output import write_whole
+from ...replay.mount_check import MountCheck
 from ..channels import Channels, Ride
 from ..downsample import downsampled
 from . import export_csv, export_parquet, export_racechrono, export_vbo
@@ -62,11 +63,16 @@ def export(
             whole_start_s, whole_s, _ = _first_pass(ride.log.source)
             after_s = whole_start_s + whole_s - start_s - seconds
         start_s = float(max(0, int(written_s - after_s - seconds)))
-    count = 0
+    count, mount = 0, MountCheck(ride.calibration)
+
+    def checked(blocks: Iterator[Channels]) -> Iterator[Channels]:
+        for block in blocks:
+            mount.add(block.t_s, block.force_g, block.rate_dps, block.speed_mps)
+            yield block
 
     def rows() -> Iterator[Channels]:
         nonlocal count
-        blocks = ride.blocks(progress, notices)
+        blocks = checked(ride.blocks(progress, notices))
         for block in downsampled(blocks, STEP_S[form]) if STEP_S[form] else blocks:
             if form == "vbo" and len(speeds):
                 # every row of a VBO file has a speed: without this, rows between two values would say 0
@@ -75,6 +81,9 @@ def export(
             yield block
 
     write_whole(Path(out), lambda temporary: _WRITE[form](temporary, rows(), start_s))
+    contradiction = mount.notice()
+    if notices is not None and contradiction:
+        notices.append(contradiction)
     return count
 
 

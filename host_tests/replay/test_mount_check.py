@@ -1,0 +1,163 @@
+"""A calibration of another mount is noticed by every command that takes one; a right one never is."""
+
+import json
+
+import analysis_rides
+import command
+import numpy as np
+import pytest
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.evaluation.real_ride import calibration_of
+from kickstand_tools.evaluation.runs import calibrated_by_poses
+from kickstand_tools.logs.log import Log
+from kickstand_tools.logs.reader import read_log
+from kickstand_tools.refusals import RefusedInput, sentence
+from kickstand_tools.replay.mount_check import MountCheck, contradiction
+from kickstand_tools.simulation.profiles import PROFILES
+from kickstand_tools.simulation.ride import ride
+from kickstand_tools.simulation.scripted import script
+
+
+def turned(matrix, left=0.0, up=0.0, forward=0.0):
+    """A mount's matrix, wrongly turned about the vehicle's axes by so many degrees."""
+    found = np.eye(3)
+    for axis, angle in enumerate((left, up, forward)):
+        s, c = np.sin(np.radians(angle)), np.cos(np.radians(angle))
+        turn = np.eye(3)
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        turn[i, i], turn[j, j], turn[i, j], turn[j, i] = c, c, -s, s
+        found = turn @ found
+    return found @ matrix
+
+
+def made(profile, upright_error_deg=0.0, speed=True, seed=4):
+    """A ride at 50 Hz and its calibration by six, then two poses, which are far enough apart."""
+    simulated = ride(profile, seed, 150.0, upright_error_deg)
+    try:
+        calibration = calibrated_by_poses(simulated)
+    except RefusedInput:
+        return made(profile, upright_error_deg, speed, seed + 1)
+    mps = np.full(len(simulated.time), np.nan)
+    if speed:
+        mps[::200] = simulated.truth["speed_mps"][::200]
+    every = slice(None, None, 4)
+    readings = simulated.readings[every]
+    log = Log(simulated.time[every], readings[:, :3], readings[:, 4:], mps[every])
+    return log, calibration
+
+
+def other(calibration, vehicle="", **turns):
+    return CalibrationFile(
+        calibration.accel_offset_g,
+        calibration.accel_slope,
+        calibration.gyro_bias_dps,
+        turned(calibration.vehicle_from_sensor, **turns),
+        aligned=True,
+        vehicle=vehicle,
+    )
+
+
+def said(log, calibration):
+    notice = contradiction(log, calibration)
+    return sentence(notice) if notice else ""
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_right_calibrations_are_never_accused(profile):
+    for error in -3.5, 3.5:
+        log, calibration = made(profile, error)
+        silent = Log(log.t_s, log.accel_g, log.gyro_dps)
+        for each in log, silent:
+            assert said(each, calibration) == "", error
+            assert said(each, other(calibration, up=8.0)) == ""  # what two poses may be off
+
+
+@pytest.mark.parametrize(("profile", "speed"), [("street", True), ("city", False), ("track", False), ("hills", True)])
+def test_wrong_ones_are(profile, speed):
+    log, calibration = made(profile, speed=speed)
+    by = "speed" if speed else "bends"
+    for turns, words in (
+        ({"up": 180.0}, "forward and backward are exchanged: calibrate two with the other --side?"),
+        ({"up": 90.0}, f"by the {by} of this ride forward is "),
+        ({"up": -30.0}, " so lean, braking and cornering are wrong: is it another mount's? Calibrate again: "),
+        ({"left": 40.0}, "the calibration's up is "),
+        ({"forward": 90.0, "up": 70.0}, "so nothing computed with it is right: is it another mount's? "),
+    ):
+        assert words in said(log, other(calibration, **turns)), turns
+    for angle, side in (90.0, "left"), (-90.0, "right"):
+        notice = contradiction(log, other(calibration, up=angle))
+        assert notice is not None
+        found, how, car = notice.values
+        assert (found, how, car) == (pytest.approx(angle, abs=8.0), by, False)
+        assert f" degrees to the {side} of the calibration's" in sentence(notice)
+    upside_down = Log(log.t_s, -log.accel_g, log.gyro_dps, log.speed_mps)
+    assert "do all accelerations have the opposite sign? At rest up reads +1 g" in said(upside_down, calibration)
+
+
+def test_another_seeds_calibration(rides=("street", "sweeper", "city")):
+    """Of another bike, whose sensor is mounted in another way."""
+    pairs = [made(profile) for profile in rides]
+    for (log, _), (_, calibration) in zip(pairs, pairs[1:] + pairs[:1]):
+        assert "is it another mount's?" in said(log, calibration)
+
+
+def test_blocks_and_gaps():
+    log, calibration = made("street")
+    wrong = other(calibration, up=90.0)
+    force, rate = wrong.in_vehicle(log.readings)
+    checks = []
+    for block in 777, 1_000_000:
+        check = MountCheck(wrong)
+        for k in range(0, len(log.t_s), block):
+            part = slice(k, k + block)
+            check.add(log.t_s[part], force[part], rate[part], log.speed_mps[part])
+        checks.append(check)
+    assert checks[0].forward_by_speed() == pytest.approx(checks[1].forward_by_speed())
+    assert checks[0].forward_by_bends() == pytest.approx(checks[1].forward_by_bends())
+    assert checks[0].up_deg() == pytest.approx(checks[1].up_deg())
+    kept = (log.t_s % 30.0) < 24.0
+    gaps = Log(log.t_s[kept], log.accel_g[kept], log.gyro_dps[kept], log.speed_mps[kept])
+    assert said(gaps, calibration) == ""
+    assert "by the speed of this ride forward is " in said(gaps, wrong)
+
+
+def test_what_does_not_tell():
+    assert MountCheck(CalibrationFile(aligned=True)).notice() is None
+    log, calibration = made("street")
+    assert said(log, CalibrationFile()) == ""  # not aligned: that is said elsewhere
+    short = slice(0, 500)
+    few = Log(log.t_s[short], log.accel_g[short], log.gyro_dps[short], log.speed_mps[short])
+    assert said(few, other(calibration, up=90.0)) == ""
+    silent = Log(log.t_s, log.accel_g, log.gyro_dps)
+    assert said(silent, other(calibration, "car", up=90.0)) == ""  # a car does not lean
+
+
+@pytest.mark.parametrize("name", ["replay", "report", "plot", "export"])
+def test_the_commands_say_so_in_one_line(tmp_path, name):
+    legs = [script.upright(4)]
+    for side in (-1, 1, -1, 1):
+        legs += [script.accelerate(15, 5), script.turn(30 * side, 5), script.straight(2), script.brake(5, 3)]
+    path = analysis_rides.write(tmp_path, legs, speed_hz=1)
+    cal = tmp_path / "wrong.json"
+    cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]}))
+    more = {"replay": ("--out", tmp_path / "LEAN.csv"), "plot": ("--out", tmp_path)}
+    more |= {"export": ("--to", "csv", "--out", tmp_path / "ride.csv")}
+    assert command.works(name, path, *more.get(name, ())).err == ""
+    line = command.works(name, path, "--calibration", cal, *more.get(name, ())).err
+    assert line.startswith(f"warning: {path}: by the speed of this ride forward is 9")
+    assert line.count("\n") == 1
+
+
+def test_recordings(shared_data):
+    path = shared_data / "motorcycle-ride.csv.gz"
+    log = read_log(path)
+    calibration = calibration_of(log)
+    assert said(log, calibration) == ""
+    assert "by the bends of this ride forward is 88 degrees to the left" in said(log, other(calibration, up=90.0))
+    assert "forward and backward are exchanged" in said(log, other(calibration, up=180.0))
+    name = "car-urban-medium-turn-loop-nominal-001.csv.gz"
+    rows = [[0.0473, 0.9987, 0.0204], [-0.0003, -0.0204, 0.9998], [0.9989, -0.0473, -0.0006]]
+    car, log = CalibrationFile(vehicle_from_sensor=rows, aligned=True, vehicle="car"), read_log(shared_data / name)
+    assert said(log, car) == ""
+    assert "so braking and cornering are wrong" in said(log, other(car, "car", up=90.0))
+    assert "calibrate drive again?" in said(log, other(car, "car", up=180.0))
