@@ -185,3 +185,50 @@ def test_the_commands_say_so_in_one_line(tmp_path, rides):
     said = command.works("replay", path, "--calibration", cal, "--out", tmp_path / "LEAN.csv").err.splitlines()
     line = f"warning: {path}: the rates turn the force the wrong way, so the lean is wrong: "
     assert sum(each.startswith(line) for each in said) == 1
+
+
+class Found:
+    """What Turning says: so much is left of each window as it is, and with everything reversed."""
+
+    def __init__(self, as_it_is, reversed_all, unbiased=True):
+        self.left, self.unbiased = (np.array(as_it_is), np.array(reversed_all)), unbiased
+
+    def rough(self, ways):
+        return np.arange(48.0)
+
+    def unexplained(self, way):
+        return (
+            self.left[0] if way[0, 0] == 1.0 and np.trace(way) == 3.0 else self.left[1] * (1.0 + (np.trace(way) > -3.0))
+        )
+
+
+@pytest.mark.parametrize(
+    ("as_it_is", "reversed_all", "unbiased", "told"),
+    [
+        ([0.10, 0.01, 0.01, 0.09], [0.025] * 4, False, True),  # 2.1 times
+        ([0.10, 0.01, 0.01, 0.07], [0.025] * 4, False, False),  # 1.9 times, and the windows do not agree
+        ([0.032, 0.033, 0.034, 0.033], [0.025] * 4, False, True),  # 1.3 times, and they do
+        ([0.030, 0.030, 0.031, 0.030], [0.025] * 4, False, False),  # 1.2 times
+        ([0.0016] * 5, [0.0005] * 5, False, True),  # 0.0011 g2 more
+        ([0.0014] * 5, [0.0005] * 5, False, False),  # 0.0009: this may be drift
+        ([0.051] * 3, [0.01] * 3, True, True),  # few windows: 5.1 times
+        ([0.049] * 3, [0.01] * 3, True, False),
+        ([0.200] * 3, [0.01] * 3, False, False),  # with a bias that is not sure
+    ],
+)
+def test_how_clear_it_has_to_be(monkeypatch, as_it_is, reversed_all, unbiased, told):
+    monkeypatch.setattr(Handedness, "_turning", lambda self: Found(as_it_is, reversed_all, unbiased))
+    notice = Handedness().notice()
+    assert (notice is not None and notice.code == "left-handed") is told
+
+
+def test_a_bias_is_found_while_fitting():
+    """The hand is never calm, so nothing else tells it."""
+    log = hand(seed=0)
+    turning = {}
+    for bias in 0.0, 2.5:
+        found = Handedness()
+        found.add(log.t_s, log.accel_g, log.gyro_dps + bias, log.speed_mps)
+        turning[bias] = found._turning()
+    known, unknown = (float(np.mean(turning[bias].unexplained(WAYS[0]))) for bias in (0.0, 2.5))
+    assert unknown < 2.0 * known

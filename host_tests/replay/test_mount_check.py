@@ -1,6 +1,7 @@
 """A calibration of another mount is noticed by every command that takes one; a right one never is."""
 
 import json
+from dataclasses import replace
 
 import analysis_rides
 import command
@@ -47,14 +48,8 @@ def made(profile, upright_error_deg=0.0, speed=True, seed=4):
 
 
 def other(calibration, vehicle="", **turns):
-    return CalibrationFile(
-        calibration.accel_offset_g,
-        calibration.accel_slope,
-        calibration.gyro_bias_dps,
-        turned(calibration.vehicle_from_sensor, **turns),
-        aligned=True,
-        vehicle=vehicle,
-    )
+    matrix = turned(calibration.vehicle_from_sensor, **turns)
+    return replace(calibration, vehicle_from_sensor=matrix, vehicle=vehicle, kickstand_side="")
 
 
 def said(log, calibration):
@@ -83,7 +78,7 @@ def test_wrong_ones_are(profile, speed):
         ({"left": 40.0}, "the calibration's up is "),
         ({"forward": 90.0, "up": 70.0}, "so nothing computed with it is right: is it another mount's? "),
     ):
-        assert words in said(log, other(calibration, **turns)), turns
+        assert words in said(log, other(calibration, "", **turns)), turns
     for angle, side in (90.0, "left"), (-90.0, "right"):
         notice = contradiction(log, other(calibration, up=angle))
         assert notice is not None
@@ -157,7 +152,10 @@ def test_recordings(shared_data):
     assert "forward and backward are exchanged" in said(log, other(calibration, up=180.0))
     name = "car-urban-medium-turn-loop-nominal-001.csv.gz"
     rows = [[0.0473, 0.9987, 0.0204], [-0.0003, -0.0204, 0.9998], [0.9989, -0.0473, -0.0006]]
-    car, log = CalibrationFile(vehicle_from_sensor=rows, aligned=True, vehicle="car"), read_log(shared_data / name)
+    car, log = (
+        CalibrationFile(vehicle_from_sensor=np.array(rows), aligned=True, vehicle="car"),
+        read_log(shared_data / name),
+    )
     assert said(log, car) == ""
     assert "so braking and cornering are wrong" in said(log, other(car, "car", up=90.0))
     assert "calibrate drive again?" in said(log, other(car, "car", up=180.0))

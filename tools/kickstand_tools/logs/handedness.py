@@ -31,7 +31,7 @@ KNOWN_DPS = 3.0  # a bias that is wrong by less is found while fitting
 TRIED = 6  # of the 48 ways are looked at closely
 
 # By how much a way has to explain the forces better than the log as it is: the mean square (g2) of what is unexplained.
-# Right logs, simulated and recorded, stay under 1.03 times; a gyro of the opposite sign gives 1.7 to 50.
+# Right logs, simulated and recorded, stay under 1.1 times; a gyro of the opposite sign gives 1.7 to 470.
 CLEARLY, LIKELY, SIGMAS = 2.0, 1.25, 3.0  # so many times; or so many, if the windows agree by so many sigmas
 FEW_WINDOWS, FEW_CLEARLY = 3, 5.0  # with so few windows, so many times, and a bias near 0, as a phone's is
 LEAST_G2 = 0.001  # at least: a parked vehicle's drift is under 0.0002
