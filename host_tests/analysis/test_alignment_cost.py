@@ -127,7 +127,7 @@ def test_without_a_speed_calibrate_drive_is_no_help(scripted, tmp_path):
     log = tmp_path / "RIDE.csv"
     log.write_text("\n".join(row.rpartition(",")[0] for row in scripted.read_text().splitlines()) + "\n")
     said = " ".join(command.works("report", log, "--calibration", with_calibration(scripted, "yaw", 5.0)).out.split())
-    assert "calibrate two again, leaned further" in said
+    assert "calibrate ride takes it out" in said
     assert "calibrate drive" not in said
 
 

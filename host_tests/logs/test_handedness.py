@@ -5,7 +5,7 @@ import itertools
 import command
 import numpy as np
 import pytest
-from kickstand_tools.logs.handedness import WAYS, Handedness
+from kickstand_tools.logs.axes.handedness import WAYS, Handedness
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.refusals import sentence

@@ -18,7 +18,9 @@ from kickstand_tools.analysis.plot import traces
 from kickstand_tools.calibration.drive import fit_drive
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.calibration.poses import read_pose
+from kickstand_tools.calibration.ride.fit import fit_ride
 from kickstand_tools.errors import InputError
+from kickstand_tools.imports.importing import import_recording, write_imported
 from kickstand_tools.logs.cut import cut_log
 from kickstand_tools.replay.replay import replay_to_csv
 from kickstand_tools.simulation.scripted import script
@@ -51,6 +53,8 @@ USES = {
     "cut": lambda log, out: cut_log(log, out, 0.3, -0.2),
     "pose": lambda log, out: read_pose(log),
     "drive": lambda log, out: fit_drive([log], CALIBRATION, "motorcycle"),
+    "ride": lambda log, out: fit_ride(log),
+    "import": lambda log, out: write_imported(out, import_recording(log)),
 }
 # The same by the command: its arguments behind the log
 COMMANDS = [
@@ -59,6 +63,8 @@ COMMANDS = [
     lambda log, out: ("report", log, "--json"),
     lambda log, out: ("export", log, "--to", "vbo", "--out", out / "RIDE.vbo"),
     lambda log, out: ("cut", log, "--to", "1.5", "--out", out / "CUT.csv.gz"),
+    lambda log, out: ("import", log, "--out", out / "RIDE.csv"),
+    lambda log, out: ("calibrate", "ride", log, "--out", out / "CAL.json"),
     lambda log, out: ("calibrate", "six", log, log, log, log, log, log, "--out", out / "CAL.json"),
 ]
 

@@ -133,7 +133,8 @@ def open_ride(log: Source, calibration: CalibrationFile | File | None = None) ->
     parameters = source if isinstance(source, CalibrationFile) else read_calibration(source)
     if not parameters.aligned:
         name = "the calibration" if isinstance(source, CalibrationFile) else name_of(source)
-        raise InputError(f"{name} is not aligned, so lean and braking are unknown: kickstand calibrate two, first")
+        todo = "kickstand calibrate two, or calibrate ride, first"
+        raise InputError(f"{name} is not aligned, so lean and braking are unknown: {todo}")
     return Ride(log, parameters)
 
 

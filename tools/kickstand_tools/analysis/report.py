@@ -117,7 +117,7 @@ def _alignment(seen: Overview) -> Text:
 
 def _cost(cost: LeanCost, speed: bool) -> str:
     """What the angles cost, and what to do against it. speed: the log has one."""
-    drive = "calibrate drive takes it out" if speed else "calibrate two again, leaned further, the bike not rolling"
+    drive = "calibrate drive takes it out" if speed else "calibrate ride takes it out"
     remedies = {
         "Roll": (cost.roll_deg, "calibrate two again, held upright"),
         "Pitch": (cost.pitch_deg, "calibrate two again, on level ground"),

@@ -35,6 +35,7 @@ def import_(
     """
     from rich.console import Console
 
+    from ..calibration.file import calibration_path
     from ..imports.importing import import_recording, write_imported
     from ..output import check_output
     from ..progress import spinner
@@ -54,6 +55,9 @@ def import_(
     click.echo(f"written: {out}, {len(t_s)} samples in {t_s[-1]:.1f} s, {found.rate_hz:.0f} a second{gaps}")
     if found.vehicle_axes:
         click.echo("x is left, y up, z forward, as far as the logger was mounted so")
+    beside = calibration_path(out)
+    if not beside.exists():
+        click.echo(f"next: kickstand calibrate ride {out} --out {beside}, then kickstand report {out}")
 
 
 def _pairs(text: str, option: str) -> dict[str, str]:

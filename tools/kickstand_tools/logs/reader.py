@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..output import write_whole
 from . import cells
+from .axes.handedness import Handedness
 from .block import Block
 from .cells import COLUMNS, OPTIONAL
-from .handedness import Handedness
 from .log import Log
 from .mended.even_blocks import even_blocks
 from .mended.frozen import FrozenReadings

@@ -15,6 +15,7 @@ from kickstand.units import STANDARD_GRAVITY
 from ..calibration.file import CalibrationFile
 from ..logs.log import Log
 from ..logs.table import Array
+from ..logs.time_cells import no_cells, with_block
 from .forward_sign import ForwardSign, exchanged_notice
 
 CELL_S = 0.5  # means over it
@@ -36,26 +37,14 @@ class MountCheck:
     def __init__(self, calibration: CalibrationFile) -> None:
         self.sign = ForwardSign()
         self._calibration = calibration
-        self._cells = np.zeros((0, 9))  # number; sums of force (3) and rate (3); count; last speed, NaN for none
+        self._cells = no_cells()
 
     def add(self, time_s: Array, force: Array, rate: Array, speed_mps: Array) -> None:
         """n samples. force (n, 3, g), rate (n, 3, deg/s): left, up, forward; speed NaN where there is no new one."""
         if not len(time_s):
             return
         self.sign.add(time_s, force[:, 2], speed_mps)
-        number = np.floor(time_s / CELL_S + 1e-6)
-        starts = np.flatnonzero(np.diff(number, prepend=-1.0))
-        new = np.full((len(starts), 9), np.nan)
-        new[:, 0] = number[starts]
-        new[:, 1:7] = np.add.reduceat(np.hstack((force, rate)), starts)
-        new[:, 7] = np.diff(np.append(starts, len(number)))
-        there = np.flatnonzero(~np.isnan(speed_mps))
-        new[np.searchsorted(starts, there, side="right") - 1, 8] = speed_mps[there]
-        if len(self._cells) and self._cells[-1, 0] == new[0, 0]:  # the block before ended within this cell
-            new[0, 1:8] += self._cells[-1, 1:8]
-            new[0, 8] = self._cells[-1, 8] if np.isnan(new[0, 8]) else new[0, 8]
-            self._cells = self._cells[:-1]
-        self._cells = np.vstack((self._cells, new))[-KEPT:]
+        self._cells = with_block(self._cells, CELL_S, time_s, force, rate, speed_mps)[-KEPT:]
 
     def notice(self, roll_deg: float | None = None) -> Notice | None:
         """What contradicts the calibration; None where nothing does. roll_deg: as exchanged_notice() takes it."""

@@ -18,7 +18,8 @@ from kickstand.errors import Notice
 from kickstand.units import AXES
 from numpy.typing import NDArray
 
-from .table import Array
+from ..table import Array
+from ..time_cells import no_cells, with_block
 from .turning import CELL_S, Turning
 
 WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # the second one where the log has none of the first
@@ -54,23 +55,11 @@ class Handedness:
     """add() takes a log's samples block by block; notice() judges them."""
 
     def __init__(self) -> None:
-        self._cells = np.zeros((0, 9))  # number; sums of force (3) and rate (3); count; last speed, NaN for none
+        self._cells = no_cells()
 
     def add(self, time_s: Array, force: Array, rate: Array, speed_mps: Array) -> None:
         """force: (n, 3, g); rate: (n, 3, deg/s), in the sensor's axes; speed_mps: (n), NaN for none."""
-        number = np.floor(time_s / CELL_S + 1e-6)
-        starts = np.flatnonzero(np.diff(number, prepend=-1.0))
-        new = np.full((len(starts), 9), np.nan)
-        new[:, 0] = number[starts]
-        new[:, 1:7] = np.add.reduceat(np.hstack((force, rate)), starts)
-        new[:, 7] = np.diff(np.append(starts, len(number)))
-        there = np.flatnonzero(~np.isnan(speed_mps))
-        new[np.searchsorted(starts, there, side="right") - 1, 8] = speed_mps[there]
-        if len(self._cells) and self._cells[-1, 0] == new[0, 0]:  # the block before ended within this cell
-            new[0, 1:8] += self._cells[-1, 1:8]
-            new[0, 8] = self._cells[-1, 8] if np.isnan(new[0, 8]) else new[0, 8]
-            self._cells = self._cells[:-1]
-        self._cells = np.vstack((self._cells, new))[-KEPT:]
+        self._cells = with_block(self._cells, CELL_S, time_s, force, rate, speed_mps)[-KEPT:]
 
     def notice(self) -> Notice | None:
         """What is wrong with the axes; None if nothing is, or if the log does not tell."""

@@ -13,7 +13,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from .table import Array
+from ..table import Array
 
 CELL_S = 0.1  # means over it are used: what shakes faster is vibration
 KNOT_S = 5.0  # between two knots an unknown velocity changes evenly

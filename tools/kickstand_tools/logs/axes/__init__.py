@@ -1,0 +1,1 @@
+"""Do axes and signs of a log belong together?"""
