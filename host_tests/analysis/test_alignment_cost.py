@@ -106,7 +106,7 @@ def scripted(tmp_path_factory):
 @pytest.mark.parametrize(
     ("name", "degrees", "words"),
     [
-        ("yaw", 5.0, r"yaw [+-]5\.\d°\. Yaw costs up to about 0\.3° of lean; calibrate drive takes it out\."),
+        ("yaw", 5.0, r"yaw [+-]5\.\d°\. Yaw costs up to about 0\.3° of lean; calibrate ride or drive takes it out\."),
         ("yaw", 1.0, r"yaw [+-]1\.0°\. That costs less than 0\.1° of lean: nothing to do\."),
         ("roll", 3.0, r"roll [+-]3\.0°.*\. That costs less than 0\.1° of lean: nothing to do\."),
         ("roll", 9.0, r"roll [+-]9\.0°.*: was it held upright\? Roll costs up to about 5\.5° of lean; calibrate two"),

@@ -101,7 +101,8 @@ def quality(ride: Channels, standing: NDArray[np.bool_]) -> Quality:
         if np.std(push) > ENOUGH_G:
             yaw = float(np.degrees(np.arctan(np.mean(push * left[straight]) / np.mean(push * push))))
     if standing[0] and standing[-1] and np.count_nonzero(moving) * n * step_s > LEVEL_S:
-        pitch = float(np.degrees(np.arcsin(np.mean(forward[moving]))))
+        push = float(np.mean(forward[moving]))
+        pitch = float(np.degrees(np.arcsin(push))) if abs(push) < 1.0 else None
     sizes = np.sqrt(left * left + up * up + forward * forward)[still]
     gravity = float(np.mean(sizes)) if len(sizes) else None
     return Quality(roll, pitch, yaw, gravity, straight_s, lateral[straight], forward[straight])

@@ -14,6 +14,7 @@ from .stops.brake_test import Stop
 from .stops.speed_stops import stops_by_speed
 from .summary import Peak
 
+CONTRADICTED = ("up-off", "forward-off", "left-handed", "rates-misfit", "rates-in-radians")  # by the ride
 COSTS_DEG = 0.1  # of lean: less is not worth a word
 RIDDEN_S = 10.0  # a shorter ride is pushing the bike about
 
@@ -100,6 +101,8 @@ def _ride(seen: Overview) -> Table:
 
 def _alignment(seen: Overview) -> Text:
     quality = seen.quality
+    if any(notice.code in CONTRADICTED for notice in seen.notices):
+        return Text("Alignment: not judged, see the warning.")
     said = "Alignment: not enough straight riding to tell how far it is off."
     known = angles(quality)
     if known:
@@ -108,7 +111,7 @@ def _alignment(seen: Overview) -> Text:
         # swapped poses exchange forward and backward too
         swapped = far and (seen.speed_correlation is None or seen.speed_correlation < 0.0)
         said += ": were the poses swapped?" if swapped else ": was it held upright?" if far else "."
-        if not seen.ride.car:
+        if not seen.ride.car and not seen.exchanged:
             said += _cost(lean_cost(quality), seen.has_speed)
     if quality.gravity_g is not None:
         said += f" At rest the force is {quality.gravity_g:.3f} g."
@@ -117,7 +120,7 @@ def _alignment(seen: Overview) -> Text:
 
 def _cost(cost: LeanCost, speed: bool) -> str:
     """What the angles cost, and what to do against it. speed: the log has one."""
-    drive = "calibrate drive takes it out" if speed else "calibrate ride takes it out"
+    drive = "calibrate ride or drive takes it out" if speed else "calibrate ride takes it out"
     remedies = {
         "Roll": (cost.roll_deg, "calibrate two again, held upright"),
         "Pitch": (cost.pitch_deg, "calibrate two again, on level ground"),

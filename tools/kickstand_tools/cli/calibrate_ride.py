@@ -44,13 +44,13 @@ def _ride_lines(found: "RideFit") -> Iterable[str]:
         f"used: {begin:.0f} to {end:.0f} s of the log, {found.riding_s:.0f} s of it riding, "
         f"leaning {found.lean_deg:.0f} degrees rms"
     )
-    yield f"quality: roll {found.roll_deg:.1f}, pitch {found.pitch_deg:.1f}, yaw {found.yaw_deg:.1f} degrees"
+    yield f"known to: roll {found.roll_deg:.1f}, pitch {found.pitch_deg:.1f}, yaw {found.yaw_deg:.1f} degrees"
     roll, pitch, yaw = (abs(angle) for angle in found.halves_deg)
     yield f"two halves of the ride differ by: roll {roll:.1f}, pitch {pitch:.1f}, yaw {yaw:.1f} degrees"
     if found.lag_s is not None:
-        yield f"speed: {found.lag_s:.1f} s late"
+        yield f"speed: {max(0.0, found.lag_s):.1f} s late"
     if found.phone_deg is not None:
-        yield f"phone: turned by {found.phone_deg:.0f} degrees against the way that was said"
+        yield f"phone: mounted as said, turned by {found.phone_deg:.0f} degrees"
     yield "gyro bias  " + _axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
     yield "offset     " + _axes(found.calibration.accel_offset_g, "%+.4f g")
     yield from _matrix_lines(found.calibration.vehicle_from_sensor)

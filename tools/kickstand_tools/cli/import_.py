@@ -20,7 +20,7 @@ _UNITS = "Of t, a (or ax, ay, az), g (or gx, gy, gz), speed; -UNIT turns the sig
 @click.option("--out", required=True, type=_PATH, help="The log to write, packed if it ends in .gz.")
 @click.option("--columns", metavar="t=NAME,ax=NAME,...", help=_COLUMNS)
 @click.option("--units", metavar="a=UNIT,g=UNIT,...", help=_UNITS)
-@click.option("--from", "start_s", type=float, metavar="S", help="Seconds from the recording's own start.")
+@click.option("--from", "start_s", type=float, metavar="S", help="Seconds from the start, or if negative from the end.")
 @click.option("--to", "end_s", type=float, metavar="S", help="The same, for the end.")
 def import_(
     source: Path, out: Path, columns: str | None, units: str | None, start_s: float | None, end_s: float | None
@@ -56,8 +56,14 @@ def import_(
     if found.vehicle_axes:
         click.echo("x is left, y up, z forward, as far as the logger was mounted so")
     beside = calibration_path(out)
-    if not beside.exists():
-        click.echo(f"next: kickstand calibrate ride {out} --out {beside}, then kickstand report {out}")
+    if beside.exists():
+        click.echo(f"{beside} is of an earlier ride: after the mount has moved, kickstand calibrate ride makes it anew")
+    elif not any(notice.code in _WRONG for notice in found.notices):
+        click.echo(f"next: kickstand calibrate ride {out} --out {beside}")
+        click.echo(f"      kickstand report {out}")
+
+
+_WRONG = ("import-mirrored", "left-handed", "rates-misfit", "rates-in-radians")  # the axes are to be put right first
 
 
 def _pairs(text: str, option: str) -> dict[str, str]:

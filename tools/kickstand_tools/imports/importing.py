@@ -221,6 +221,7 @@ def _seconds(joined: Joined) -> Array:
 
 def _stretch(joined: Joined, start_s: float | None, end_s: float | None, name: str) -> slice:
     since_s = _seconds(joined)
+    start_s, end_s = (s if s is None or s >= 0.0 else max(0.0, s + float(since_s[-1])) for s in (start_s, end_s))
     begin = int(np.searchsorted(since_s, start_s)) if start_s is not None else 0
     end = int(np.searchsorted(since_s, end_s, side="right")) if end_s is not None else len(since_s)
     if end - begin < 2:

@@ -43,7 +43,8 @@ def header(log: str, line: str) -> list[str]:
         raise InputError(f"{log}, line 1: values stand apart by ; or tab: save it with commas between them")
     if missing:
         raise InputError(
-            f"{log}, line 1: no column {', '.join(missing)}: a log starts with {','.join(COLUMNS)}"
+            f"{log}, line 1: no column {', '.join(missing)}: a log starts with {','.join(COLUMNS)}; "
+            "an app's export has to go through kickstand import first"
         )
     for name in COLUMNS + OPTIONAL:
         if names.count(name) > 1:
