@@ -1,5 +1,6 @@
 """The firmware's drivers can be imported in every test; recorded data is found or its tests are skipped."""
 
+import gc
 from pathlib import Path
 
 import hypothesis
@@ -25,6 +26,12 @@ def pytest_configure(config: pytest.Config) -> None:
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Long tests first: begun last, one of them would keep one processor busy while the others idle."""
     items.sort(key=lambda item: (item.get_closest_marker("long") is None, item.get_closest_marker("chip") is None))
+
+
+def pytest_collection_finish() -> None:
+    """What is there by now stays. The app collects often, which takes CPython 0.2 s for all that the tests import."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")
