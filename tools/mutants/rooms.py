@@ -63,7 +63,7 @@ ROOMS = {
     ),
     "rides": Room(
         (FIRMWARE + "rides/*.py",),
-        (TESTS + "rides/test_ride_limits.py",),  # the others take longer
+        (TESTS + "rides/limits/*.py",),  # the others take longer
     ),
     "pull": Room(
         (TOOLS + "rides/*.py",),
@@ -91,7 +91,7 @@ ROOMS = {
     ),
     "analysis": Room(
         (TOOLS + "analysis/*.py", TOOLS + "analysis/plot/*.py"),
-        (TESTS + "analysis/*.py",),
+        (TESTS + "analysis/*.py", TESTS + "analysis/stops/*.py"),
     ),
     "export": Room(
         (TOOLS + "analysis/export/*.py",),
@@ -100,11 +100,11 @@ ROOMS = {
     "stops": Room(
         (TOOLS + "analysis/stops/*.py",),
         (
-            TESTS + "analysis/test_stops_closed_form.py",
-            TESTS + "analysis/test_speed_fit.py",
-            TESTS + "analysis/test_quiet.py",
-            TESTS + "analysis/test_analysis_standstill.py",
-            TESTS + "analysis/test_analysis_brake_test.py",
+            TESTS + "analysis/stops/test_stops_closed_form.py",
+            TESTS + "analysis/stops/test_speed_fit.py",
+            TESTS + "analysis/stops/test_quiet.py",
+            TESTS + "analysis/stops/test_analysis_standstill.py",
+            TESTS + "analysis/stops/test_analysis_brake_test.py",
         ),
     ),
     "simulation": Room(

@@ -1,0 +1,26 @@
+"""What the tests of rides in flash and on a card have in common."""
+
+import types
+
+from kickstand.rides import ride_paths
+
+FLASH = types.SimpleNamespace(SD_SPI=None)
+CARD = types.SimpleNamespace(SD_SPI=1)
+KB_4 = 4096
+
+
+def write_block(ring, size=100):
+    steps = 0
+    while not ring.ready():
+        steps += 1
+    ring.write(b"x" * size)
+    ring.end_block()
+    return steps
+
+
+def old_ride(root, ride, parts=1, size=KB_4):
+    directory = root.path / ride_paths.ride_path("rides", ride)
+    directory.mkdir(parents=True, exist_ok=True)
+    for part in range(parts):
+        (root.path / ride_paths.part_path("rides", ride, part)).write_bytes(bytes(size))
+    return directory

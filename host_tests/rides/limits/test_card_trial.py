@@ -1,0 +1,71 @@
+"""An SD card is tried out before it is needed."""
+
+import contextlib
+import io
+import os
+import sys
+import types
+
+from kickstand.errors import CardError
+from kickstand.rides import flash_ring, ride_paths
+from kickstand_tools.simulated_board.fakes import fake_machine
+from rings import CARD, FLASH
+
+
+def tried(root, monkeypatch, **failing):
+    """The problem that the trial of a card finds. failing: what raises which error."""
+    from kickstand.rides import card_trial
+
+    def raised(error):
+        def call(*_):
+            raise error
+
+        return call
+
+    if "mount" in failing:
+        monkeypatch.setattr(ride_paths, "directory", raised(failing["mount"]))
+    if "free" in failing:
+        monkeypatch.setattr(flash_ring, "free_bytes", raised(failing["free"]))
+    recorder = types.SimpleNamespace(problem=None, keeper=types.SimpleNamespace(refused=None))
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        card_trial.prepare(recorder, CARD)
+    assert recorder.problem is recorder.keeper.refused
+    assert said.getvalue().count("\n") == (recorder.problem is not None)
+    return recorder.problem
+
+
+def test_a_card_is_tried_out_before_it_is_needed(root, monkeypatch):
+    assert tried(root, monkeypatch) is None
+    assert os.listdir("card") == []  # what was written is gone
+
+
+def test_whatever_a_card_does_in_the_trial_is_its_own_refusal(root, monkeypatch):
+    refusal = CardError("no-driver")
+    with monkeypatch.context() as patch:
+        assert tried(root, patch, mount=refusal) is refusal
+    for error in (OSError(5), ValueError("a driver's own"), MemoryError()):
+        with monkeypatch.context() as patch:
+            problem = tried(root, patch, free=error)
+        assert isinstance(problem, CardError)
+        assert problem.code == "no-card"
+        assert problem.values == (str(error),)
+
+
+def test_a_card_that_reads_other_than_it_was_written_is_refused(root, monkeypatch):
+    from kickstand.rides import card_trial
+
+    class Wrong(io.BytesIO):
+        def read(self, *_):
+            return b"something"
+
+    monkeypatch.setattr(card_trial, "open", lambda path, mode: Wrong(), raising=False)
+    assert tried(root, monkeypatch).code == "no-card"
+
+
+def test_rides_are_in_flash_without_a_card_and_else_on_it(clock, monkeypatch):
+    monkeypatch.setitem(sys.modules, "machine", fake_machine)
+    from kickstand.board import sd_card
+
+    monkeypatch.setattr(sd_card, "mount", lambda settings: "/sd")
+    assert ride_paths.directory(FLASH) == "rides"
+    assert ride_paths.directory(CARD) == "/sd/rides"
