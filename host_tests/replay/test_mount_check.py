@@ -9,7 +9,7 @@ import command
 import numpy as np
 import pytest
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.evaluation.real_ride import calibration_of
+from kickstand_tools.calibration.ride.fit import fit_ride
 from kickstand_tools.evaluation.runs import calibrated_by_poses
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
@@ -147,7 +147,7 @@ def test_the_commands_say_so_in_one_line(tmp_path, name):
 def test_recordings(shared_data):
     path = shared_data / "motorcycle-ride.csv.gz"
     log = read_log(path)
-    calibration = calibration_of(log)
+    calibration = fit_ride(log).calibration
     assert said(log, calibration) == ""
     told = said(log, other(calibration, up=90.0))
     found = re.search(r"by the bends of this ride forward is (\d+) degrees to the left", told)

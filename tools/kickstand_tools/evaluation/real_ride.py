@@ -53,7 +53,7 @@ class Comparison:
 def compare(path: Path) -> Comparison:
     """Run every estimator over a recorded ride with speed. Raises InputError if it cannot be used."""
     log = read_log(path)
-    speed, calibration = _speed(log), calibration_of(log)
+    speed, calibration = _speed(log), fit_ride(log).calibration
     reference = reference_lean(log, calibration)
     time = log.t_s
     riding = speed > _RIDING_MPS
@@ -72,11 +72,6 @@ def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64
     samples = calibrated(log, calibration)
     centripetal = _speed(log) * np.radians(samples.rate[:, 1])
     return _averaged(-np.degrees(np.arctan(centripetal / STANDARD_GRAVITY)), samples.rate_hz)
-
-
-def calibration_of(log: Log) -> CalibrationFile:
-    """What `kickstand calibrate ride` finds in it. Raises InputError where the ride does not tell it."""
-    return fit_ride(log).calibration
 
 
 def _speed(log: Log) -> NDArray[np.float64]:

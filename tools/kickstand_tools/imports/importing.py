@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from kickstand.errors import Notice
 
-from ..analysis.export.csv_lines import csv_lines
 from ..errors import InputError
 from ..logs.cells import COLUMNS
+from ..logs.csv_lines import csv_lines
 from ..logs.log import Log
 from ..logs.reader import BLOCK_SAMPLES, read_log
 from ..output import write_whole

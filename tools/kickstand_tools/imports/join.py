@@ -7,14 +7,14 @@ from kickstand.units import LOST_US
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..logs.cells import MOST_DPS, MOST_G
 from ..logs.even_times import even_times
 from .recording import Array, Recording, Sensor, Track
 
 MOST_MPS = 200.0  # no speed, and no degrees of a position, are more
 GAP_NS = LOST_US * 1000  # between samples that are further apart nothing is interpolated
 FASTER = 1.5  # times the accelerometer's rate: a gyro so fast is averaged over each of its samples
-MOST_G, MOST_DPS = 20.0, 2500.0  # as in kickstand_tools.logs.cells: more is a damaged cell,
-MANY = 0.02  # or, in a larger share of the rows, another unit
+MANY = 0.02  # share of readings past MOST_G and MOST_DPS from which they are no damaged cells, but in another unit
 SHUFFLED_NS = 500_000_000  # samples that come later than younger ones by less are put in order
 
 

@@ -6,11 +6,11 @@ import numpy as np
 from kickstand.errors import Notice
 from numpy.typing import NDArray
 
+from ..logs.table import Array
 from .sheets import Sheet
 from .times import NO_TIME, Nanoseconds
 from .units import SPEEDS, factor
 
-Array = NDArray[np.float64]
 SECOND_NS = 10**9
 _ABSURD = 1e6  # g or deg/s: a damaged cell
 

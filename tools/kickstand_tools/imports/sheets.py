@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, extra
+from ..logs.table import Array
 from .files import Piece
 
 if TYPE_CHECKING:
     from pandas import DataFrame, Series
 
-Array = NDArray[np.float64]
 _DECIMAL_COMMA = re.compile(r"(?:^|[;\t\"])\s*[+-]?\d+,\d")
 
 

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
-
-Array = NDArray[np.float64]
+from .table import Array
 
 COARSE = 0.05  # ticks of a smaller share of the time between samples are good enough as they are
 OFTEN = 0.05  # share of repeated times from which they are the recorder's habit: it stamps several samples at once

@@ -178,6 +178,7 @@ class Faults:
             return wrap(file, str(path)) if "w" in mode else file
 
         builtins.open = opening
+
     # On USB
 
     def usb_asleep(self, at_s, for_s):

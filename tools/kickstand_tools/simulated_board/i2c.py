@@ -10,9 +10,9 @@ from .clock import NEVER_US
 class TransferFault:
     """A fault in the transfers number first to last to one address, if they begin between from_us and until_us.
 
-    kind: "nack"; "timeout"; "cut" acknowledges no byte from that
-    number on, once; "corrupt" inverts the bits of mask in the data byte with the number byte; "slip" delays
-    what is read by one bit from that byte on. read: the fault is in what is read, else in what is written.
+    kind: "nack"; "timeout"; "cut" acknowledges no byte from the number byte on, once; "corrupt" inverts the bits of
+    mask in the data byte with the number byte; "slip" delays what is read by one bit from that byte on. read: the fault
+    is in what is read, else in what is written.
     """
 
     def __init__(self, kind, address, first, last, from_us=0, until_us=NEVER_US, byte=0, mask=0, read=True):

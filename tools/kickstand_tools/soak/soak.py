@@ -1,4 +1,4 @@
-"""Runs trips on the simulated board one after another, and counts. soak() returns figures, table() lays them out."""
+"""Runs trips on the simulated board one after another, and counts; __main__.py lays the figures out."""
 
 import gc
 import io

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ...logs.csv_lines import csv_lines
 from ..channels import Channels
-from .csv_lines import csv_lines
 
 # name: (digits, unit)
 COLUMNS = {

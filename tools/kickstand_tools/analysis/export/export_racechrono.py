@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ...logs.csv_lines import csv_lines
 from ..channels import Channels
-from .csv_lines import csv_lines
 
 _NOTE = "Made by Kickstand. lean_angle > 0 to the right; x left, y up, z forward"
 # name, unit, source, digits

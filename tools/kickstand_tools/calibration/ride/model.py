@@ -135,7 +135,6 @@ class Model:
             )
         )
 
-
     def weights(self, residual: Array) -> Array:
         """(n, 16) square roots of weights: outliers of the measurements count less (Cauchy); the motion does not."""
         weights = 1.0 / np.sqrt(1.0 + (residual * _LASTING / _OUTLIER) ** 2)

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...logs.cells import MOST_DPS, MOST_G
 from ...logs.log import Log
 from ...logs.table import Array
 
 WINDOW_S = 0.2
-_MAX_G, _MAX_DPS = 20.0, 2500.0  # no sensor of a phone or a hobbyist reads more: a fault of the log
-_FROZEN_S = 1.0  # readings that are all the same for so long are not believed
 _MOUNTED_S, _MOUNTED_DEG = 10.0, 35.0  # over so long the mean force of a ride keeps within this of the usual one
 _LONGEST_S = 1800.0  # more than half an hour of a ride tells no more
 _STILL_S, _CALM_S = 1.6, 1.0  # shorter standstills are not told from smooth riding
@@ -45,7 +44,7 @@ class Windows:
 def windows_of(log: Log) -> Windows:
     """The windows of the longest stretch of a log in which the sensor stays mounted as it is, of half an hour at most.
 
-    Those without samples, and with frozen or absurd ones, are left out.
+    Those without samples, and with absurd ones, are left out.
     """
     number = np.floor(log.t_s / WINDOW_S + 1e-9).astype(int)
     starts = np.flatnonzero(np.diff(number, prepend=-1))
@@ -59,8 +58,7 @@ def windows_of(log: Log) -> Windows:
     there = np.flatnonzero(~np.isnan(log.speed_mps))
     speed = np.full(len(starts), np.nan)
     speed[np.searchsorted(starts, there, side="right") - 1] = log.speed_mps[there]
-    good = _plausible(log, starts) & ~_frozen(np.hstack((log.accel_g, log.gyro_dps)), starts)
-    kept = np.flatnonzero(good)
+    kept = np.flatnonzero(_plausible(log, starts))
     kept = kept[_mounted(force[kept])] if len(kept) else kept
     number = number[starts][kept]
     time, rate, force, speed = (number + 0.5) * WINDOW_S, rate[kept], force[kept], speed[kept]
@@ -98,18 +96,8 @@ def averaged(values: Array, seconds: float) -> Array:
 
 def _plausible(log: Log, starts: NDArray[np.intp]) -> NDArray[np.bool_]:
     """(windows) False where a reading is one that no ride gives."""
-    absurd = np.any(np.abs(log.accel_g) > _MAX_G, axis=1) | np.any(np.abs(log.gyro_dps) > _MAX_DPS, axis=1)
+    absurd = np.any(np.abs(log.accel_g) > MOST_G, axis=1) | np.any(np.abs(log.gyro_dps) > MOST_DPS, axis=1)
     return ~np.logical_or.reduceat(absurd, starts)
-
-
-def _frozen(readings: Array, starts: NDArray[np.intp]) -> NDArray[np.bool_]:
-    """(windows) True where all readings are the same, from one window to the next too, for some time."""
-    same = np.concatenate(([False], np.all(readings[1:] == readings[:-1], axis=1)))
-    frozen = np.logical_and.reduceat(same, starts)
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], frozen, [False]))))
-    for begin, end in zip(edges[::2], edges[1::2], strict=True):
-        frozen[begin:end] = (end - begin) * WINDOW_S > _FROZEN_S
-    return frozen
 
 
 def _mounted(force: Array) -> slice:

@@ -1,6 +1,6 @@
 """A table of numbers as lines of CSV, quickly."""
 
-from ...logs.table import Array
+from .table import Array
 
 
 def csv_lines(table: Array, digits: list[int]) -> str:
