@@ -48,7 +48,7 @@ class Quality:
 
 @dataclass
 class LeanCost:
-    """By how much each angle puts the shown lean off at most, rms in degrees, None where that is unknown."""
+    """By about how much each angle puts the shown lean off, rms in degrees, None where that is unknown."""
 
     roll_deg: float | None
     pitch_deg: float | None
@@ -72,7 +72,7 @@ def lean_cost(found: Quality) -> LeanCost:
 
 
 def yaw_cost_deg(yaw_deg: float) -> float:
-    """What a forward that is turned by so much about the vertical costs the shown lean at most: rms, degrees."""
+    """What a forward that is turned by so much about the vertical usually costs the shown lean: rms, degrees."""
     return YAW_COSTS_DEG * abs(float(np.sin(np.radians(yaw_deg))))
 
 

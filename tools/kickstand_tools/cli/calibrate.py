@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-if TYPE_CHECKING:
-    from kickstand.errors import Notice
+from .warnings import warn
 
+if TYPE_CHECKING:
     from ..calibration.drive import DriveResult
     from ..calibration.drive_events import DriveEvent
     from ..calibration.six import SixPositions
@@ -64,7 +64,7 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
     before = read_calibration(calibration) if calibration else None
     found = fit_two_positions(kickstand, upright, before, side)
     _print(_two_lines(found))
-    _warn((str(upright), notice) for notice in remarks(found.calibration, before))
+    warn(upright, remarks(found.calibration, before))
     write_calibration(out, found.calibration)
     click.echo(f"written: {out}")
 
@@ -105,10 +105,13 @@ def drive(
         found = fit_drive(
             logs, before, vehicle, method, bar.reach, lambda event: _print(_event_lines(event, several))
         )
-    _warn(found.notices)
-    _warn((str(logs[0]), notice) for notice in remarks(found.calibration))
+    for name, notice in found.notices:
+        warn(name, [notice])
+    warn(logs[0], remarks(found.calibration))
     if before and not found.poses:
-        _warn((str(log), notice) for log in logs if (notice := contradiction(read_log(log), before)))
+        for log in logs:
+            wrong = contradiction(read_log(log), before)
+            warn(log, [wrong] if wrong else [])
     _print(_drive_lines(found, several))
     write_calibration(out, found.calibration)
     click.echo(f"written: {out}")
@@ -222,14 +225,6 @@ def _axes(values, form: str) -> str:
     from kickstand.units import AXES
 
     return "  ".join(f"{axis} " + form % value for axis, value in zip(AXES, values, strict=True))
-
-
-def _warn(notices: "Iterable[tuple[str, Notice]]") -> None:
-    """Of each log."""
-    from ..refusals import sentence
-
-    for log, notice in notices:
-        click.echo(f"warning: {log}: {sentence(notice)}", err=True)
 
 
 def _print(lines: Iterable[str]) -> None:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..errors import InputError
+from .warnings import warn
 
 if TYPE_CHECKING:
     from ..imports.importing import Imported
@@ -39,7 +40,6 @@ def import_(
     from ..imports.importing import import_recording, write_imported
     from ..output import check_output
     from ..progress import spinner
-    from ..refusals import sentence
 
     check_output(out, [source] if source.is_file() else sorted(source.rglob("*")) if source.is_dir() else [])
     named = _pairs(columns, "--columns") if columns is not None else None
@@ -47,8 +47,7 @@ def import_(
         found = import_recording(source, named, _pairs(units or "", "--units"), start_s, end_s)
         write_imported(out, found)
     Console().print(_table(found))
-    for notice in found.notices:
-        click.echo(f"warning: {source}: {sentence(notice)}", err=True)
+    warn(source, found.notices)
     t_s, gaps_s = found.log.t_s, found.gaps_s
     count = "1 gap" if len(gaps_s) == 1 else f"{len(gaps_s)} gaps"
     gaps = f", {count} of {gaps_s.sum():.1f} s in all" if len(gaps_s) else ""

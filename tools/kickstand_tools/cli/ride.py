@@ -1,12 +1,14 @@
 """The commands of `kickstand` that read a recorded ride: replay, report, plot, export, cut."""
 
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 from kickstand.errors import Notice
+
+from .warnings import warn
 
 if TYPE_CHECKING:
     from ..logs.reader import Source
@@ -51,7 +53,7 @@ def replay(
     parameters = read_calibration(calibration)
     with Bar("replaying") as bar:
         count, notices = replay_to_csv(_part(log, from_s, to_s), parameters, engine, out, bar.reach)
-    _warn(log, notices)
+    warn(log, notices)
     if not parameters.aligned:
         click.echo(
             f"warning: {calibration} is not aligned: this is the lean of the sensor, not of the bike",
@@ -81,7 +83,7 @@ def export(ride: Path, form: str, calibration: Path | None, out: Path) -> None:
     notices: list[Notice] = []
     with Bar("exporting") as bar:
         count = export(open_ride(ride, calibration), form, out, bar.reach, notices)
-    _warn(ride, notices)
+    warn(ride, notices)
     click.echo(f"written: {out}, {count} rows")
 
 
@@ -106,7 +108,7 @@ def report(
 
     with Bar("reading") as bar:
         seen = overview(open_ride(_part(ride, from_s, to_s), calibration), bar.reach)
-    _warn(ride, seen.notices)
+    warn(ride, seen.notices)
     if as_json:
         click.echo(json.dumps(as_data(seen)))
     else:
@@ -133,10 +135,10 @@ def plot(
     plot.check(out)
     with Bar("reading") as bar:
         seen = overview(open_ride(_part(ride, from_s, to_s), calibration), bar.reach)
-    _warn(ride, seen.notices)
+    warn(ride, seen.notices)
     for path in plot.draw(seen, out):
         click.echo(f"written: {path}")
-    _warn(ride, [seen.exchanged] if seen.exchanged else [])
+    warn(ride, [seen.exchanged] if seen.exchanged else [])
 
 
 @click.command()
@@ -155,7 +157,7 @@ def cut(log: Path, from_s: float | None, to_s: float | None, out: Path) -> None:
     notices: list[Notice] = []
     with Bar("cutting") as bar:
         count, seconds = cut_log(log, out, from_s, to_s, bar.reach, notices)
-    _warn(log, notices)
+    warn(log, notices)
     click.echo(f"written: {out}, {count} samples, {seconds:.1f} s")
 
 
@@ -163,10 +165,3 @@ def _part(log: Path, from_s: float | None, to_s: float | None) -> "Source":
     from ..logs.stretch import Stretch
 
     return log if from_s is None and to_s is None else Stretch(log, from_s, to_s)
-
-
-def _warn(log: Path, notices: Iterable[Notice]) -> None:
-    from ..refusals import sentence
-
-    for notice in notices:
-        click.echo(f"warning: {log}: {sentence(notice)}", err=True)

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from .warnings import warn
+
 _PATH = click.Path(path_type=Path)
 _LINES_S = 10.0  # between two lines of progress where there is no terminal for a bar
 _WIDTH = 110  # columns of a table that is not printed to a terminal
@@ -90,7 +92,6 @@ def evaluate(
     from ..evaluation.evaluate import evaluate
     from ..output import check_directory, new_directory
     from ..progress import Bar
-    from ..refusals import sentence
 
     names = [name.strip() for name in profiles.split(",")]
     jobs = runs.jobs(names, seeds, seconds, upright_error, pitch_change, traces=out is not None)
@@ -107,8 +108,7 @@ def evaluate(
             if result.refusal is not None:
                 where = f"{result.job.profile}, seed {result.job.seed}"
                 click.echo(f"{where}, not calibrated: {result.refusal}", err=True)
-        for notice in found.recorded.notices if found.recorded else ():
-            click.echo(f"warning: {recording}: {sentence(notice)}", err=True)
+        warn(str(recording), found.recorded.notices if found.recorded else ())
         if as_json:
             click.echo(json.dumps(report.document(found), indent=2))
         else:
