@@ -75,9 +75,6 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
     if step_s * _SLOWEST_HZ > 1.0:
         raise InputError(f"{log.name}: a sample every {step_s:.2f} s: at least {_SLOWEST_HZ:.0f} a second are needed")
     try:
-        for notice in log.notices:
-            if notice.code == "rates-in-radians":
-                raise Refusal(notice.code, *notice.values)
         windows = windows_of(log)
         guess = first_guess(windows)
         expected = mounting(phone, guess.matrix) if phone else None
