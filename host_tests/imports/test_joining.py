@@ -110,7 +110,7 @@ def test_samples_that_come_late_are_put_in_order(tmp_path):
 
 
 def test_a_damaged_row_costs_no_more_than_itself(tmp_path):
-    """A time from nowhere, a reading past any sensor's and a word are told; a last line that was cut is only left out."""
+    """A time from nowhere, a reading past any sensor's and a word are counted; a cut last line is left out."""
     ride = riding().every(4)
     lines = app_exports.racebox(ride).splitlines()
     lines[200] = lines[200].replace("2024-05-17", "2031-05-17")
