@@ -101,6 +101,11 @@ class RefusedInput(InputError):
         super().__init__(f"{where}: {sentence(refusal)}{advice}" if where else f"{sentence(refusal)}{advice}")
         self.code = refusal.code
         self.values = refusal.values
+        self._given = Refusal(refusal.code, *refusal.values), where, advice
+
+    def __reduce__(self) -> tuple[type["RefusedInput"], tuple[Refusal, str, str]]:
+        """Pickled as it was made: another process may raise it."""
+        return RefusedInput, self._given
 
 
 def sentence(refusal: Refusal | Notice) -> str:
