@@ -19,7 +19,7 @@ from .analysis.export.export import export
 from .analysis.overview import Overview, overview
 from .analysis.stops.brake_test import Stop, find_stops
 from .analysis.summary import Summary, summary
-from .calibration.drive import DriveResult, fit_drive
+from .calibration.drive import DriveFit, fit_drive
 from .calibration.drive_events import DriveEvent
 from .calibration.file import CalibrationFile, read_calibration, write_calibration
 from .calibration.ride.fit import RideFit, fit_ride
@@ -41,7 +41,7 @@ __all__ = [
     "CalibrationFile",
     "Channels",
     "DriveEvent",
-    "DriveResult",
+    "DriveFit",
     "Imported",
     "InputError",
     "LeanTable",
