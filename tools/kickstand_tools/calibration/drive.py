@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..logs.mended.frozen import believed
 from ..logs.reader import Log, Source, read_log
 from ..logs.source import Progress
+from ..logs.table import Array
 from ..refusals import RefusedInput
 from .drive_events import DriveEvent, DriveWatch
 from .drive_feed import Steps, feed, standing
@@ -42,7 +43,7 @@ class DriveFit:
     quality_deg: standard error of forward about the vertical. ready_s: seconds of all logs until the alignment was
     ready. lag_s: by how much the speed is late; halves_deg: by how much two halves of the drive differ; None for the
     published method. poses: for a motorcycle that two poses had aligned before. notices: what is remarkable in the
-    logs, with the log's name.
+    logs, with the log's name. bias_dps (3): the gyro's.
     """
 
     calibration: CalibrationFile
@@ -58,6 +59,7 @@ class DriveFit:
     poses: PoseCheck | None
     events: list[DriveEvent]
     notices: list[tuple[str, Notice]]
+    bias_dps: Array
     refusal: RefusedInput | None = None
 
     @property
@@ -160,6 +162,7 @@ def fit_logs(
         pose_check,
         watch.events,
         [(log.name, notice) for log in logs for notice in log.notices],
+        before.gyro_bias_dps + np.array(alignment.standing.bias),
         refusal,
     )
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from kickstand.drive_alignment.alignment import DriveAlignment
+from kickstand.drive_alignment.alignment import STALE_US, DriveAlignment
 from kickstand.drive_alignment.history import BIN_US
 from kickstand.drive_alignment.vertical import StandingVertical
 
@@ -20,13 +20,15 @@ _CHUNK = 1000  # samples between two calls of progress, at least
 def standing(logs: Sequence[Log], calibration: CalibrationFile, steps: "Steps") -> StandingVertical:
     """What the stops of all logs show. Looks at nothing else, so it is much faster than an alignment."""
     standing = StandingVertical()
-    speed_mps = -1.0  # none yet
+    speed_mps, silent_us = -1.0, 0  # none yet
     for log in logs:
         for part in drive_bins(log, calibration, BIN_US):
+            length_us = part.first_us + part.last_us
             new = [part.start_mps, *(mps for _, mps in part.speeds), part.end_mps]
-            speed_mps = next((max(0.0, mps) for mps in reversed(new) if mps is not None), speed_mps)
-            if speed_mps >= 0.0 and part.last_us:
-                standing.update(part.force, part.rate, speed_mps, (part.first_us + part.last_us) * 1e-6)
+            last_mps = next((max(0.0, mps) for mps in reversed(new) if mps is not None), None)
+            speed_mps, silent_us = (speed_mps, silent_us + length_us) if last_mps is None else (last_mps, 0)
+            if speed_mps >= 0.0 and silent_us <= STALE_US and part.last_us:
+                standing.update(part.force, part.rate, speed_mps, length_us * 1e-6)
             steps.more(part.samples)
     return standing
 

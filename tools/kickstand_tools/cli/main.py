@@ -5,7 +5,7 @@ import sys
 import click
 
 from ..errors import InputError
-from . import board, calibrate, calibrate_ride, import_, ride, simulated, without_a_board
+from . import board, calibrate, calibrate_ride, fleet, import_, ride, simulated, without_a_board
 
 
 @click.group(
@@ -23,7 +23,7 @@ def kickstand(context: click.Context) -> None:
 for _command in (
     *(board.flash, board.status, board.pull, board.record),
     *(import_.import_, calibrate.calibrate, ride.replay, ride.report, ride.plot, ride.export, ride.cut),
-    *(simulated.simulate, simulated.evaluate),
+    *(fleet.fleet, simulated.simulate, simulated.evaluate),
     *(without_a_board.demo, without_a_board.emulate, without_a_board.bench),
 ):
     kickstand.add_command(_command)
