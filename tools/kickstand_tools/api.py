@@ -26,6 +26,10 @@ from .calibration.ride.fit import RideFit, fit_ride
 from .calibration.six import SixPositions, fit_six_positions
 from .calibration.two import TwoPositions, fit_two_positions
 from .errors import InputError
+from .fleet.brake_tests import brake_tests
+from .fleet.manifest import Period, by_pattern, read_manifest
+from .fleet.period import PeriodResult, work_on_period
+from .fleet.run import FleetRun, run_fleet
 from .imports.importing import Imported, import_recording, write_imported
 from .logs.csv_lines import write_log
 from .logs.cut import cut_log
@@ -42,11 +46,14 @@ __all__ = [
     "Channels",
     "DriveEvent",
     "DriveFit",
+    "FleetRun",
     "Imported",
     "InputError",
     "LeanTable",
     "Log",
     "Overview",
+    "Period",
+    "PeriodResult",
     "RefusedInput",
     "Ride",
     "RideFit",
@@ -56,6 +63,8 @@ __all__ = [
     "Stretch",
     "Summary",
     "TwoPositions",
+    "brake_tests",
+    "by_pattern",
     "cut_log",
     "export",
     "find_stops",
@@ -68,11 +77,14 @@ __all__ = [
     "overview",
     "read_calibration",
     "read_log",
+    "read_manifest",
     "replay",
+    "run_fleet",
     "sentence",
     "simulate_ride",
     "summary",
     "vehicle_channels",
+    "work_on_period",
     "write_calibration",
     "write_imported",
     "write_log",

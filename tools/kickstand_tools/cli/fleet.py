@@ -42,9 +42,11 @@ def fleet(
     before = found.vehicles - found.new
     done = f", {before} of them finished before" if before else ""
     click.echo(f"{found.vehicles} vehicles and mounts{done}")
-    counts = found.statuses
+    seen = found.seen
+    counts = seen.statuses
     click.echo(f"aligned: {counts['aligned']}, refused: {counts['refused']}, errors: {counts['error']}")
-    for reason, count in found.reasons.most_common():
-        click.echo(f"{count:7}  {reason}")
-    click.echo(f"mounts that moved: {found.moved}; brake tests: {found.brake_tests}; rows of errors: {found.errors}")
+    for (status, reason), count in seen.reasons.most_common():
+        click.echo(f"{count:7}  {status}: {reason}")
+    tests = len(seen.decelerations[1])
+    click.echo(f"mounts that moved: {seen.moved_count}; brake tests: {tests}; rows of errors: {seen.errors}")
     click.echo(f"written: {out}/index.html, alignments.parquet, moved.parquet, brake_tests.parquet, errors.parquet")

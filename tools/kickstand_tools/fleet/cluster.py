@@ -20,7 +20,22 @@ CRASHED, TIMED_OUT = "crashed", "timed-out"
 _PER_WORKER = 2  # tasks under way: one runs, one waits
 _LOOK_S = 0.5  # between two looks for tasks that take too long
 _TOPIC = "kickstand-fleet"  # of the messages in which a worker says that it begins a task
+Outcome = tuple[int, Any | None, str, str]
 _LOCAL_PATIENCE_S, _REMOTE_PATIENCE_S = 60.0, 20.0  # for workers
+
+
+def run_tasks(
+    function: Callable[..., Any],
+    items: Sequence[tuple[Any, ...]],
+    scheduler: str | None = None,
+    workers: int | None = None,
+    timeout_s: float = 600.0,
+) -> Iterator[Outcome]:
+    """(index, result, "", "") of function(*item) for each item, in any order; (index, None, CRASHED or TIMED_OUT, what
+    happened) where there is none. Starts no workers where there are no items. See Cluster."""
+    if items:
+        with Cluster(scheduler, workers, timeout_s) as cluster:
+            yield from cluster.run(function, items)
 
 
 class Cluster:
@@ -77,10 +92,8 @@ class Cluster:
 
     def run(
         self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]]
-    ) -> Iterator[tuple[int, Any | None, str, str]]:
-        """(index, result, "", "") of function(*item) for each item, as they come; (index, None, CRASHED or TIMED_OUT,
-        what happened) where there is none. function and items have to be picklable. Raises InputError if the scheduler
-        is lost."""
+    ) -> Iterator[Outcome]:
+        """As run_tasks(). function and items have to be picklable. Raises InputError if the scheduler is lost."""
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._under_way: dict[str, tuple[int, Any]] = {}
         suspects: list[int] = []
@@ -103,12 +116,12 @@ class Cluster:
         self._under_way[key] = index, future
         future.add_done_callback(self._ended.put)
 
-    def _collect(self, suspects: list[int]) -> Iterator[tuple[int, Any | None, str, str]]:
+    def _collect(self, suspects: list[int]) -> Iterator[Outcome]:
         """Wait for a result, or a while. suspects: those whose worker died are appended to it."""
         with contextlib.suppress(queue.Empty):
             future = self._ended.get(timeout=_LOOK_S)
             place = self._under_way.pop(future.key, None)
-            began = self._started.pop(future.key, None)
+            self._started.pop(future.key, None)
             if place is None:
                 return
             index, status = place[0], future.status
@@ -121,7 +134,6 @@ class Cluster:
                 else:
                     yield index, None, CRASHED, f"{type(error).__name__}: {error}"
             else:
-                del began
                 raise InputError(
                     f"the cluster{f' at {self._address}' if self._address else ''} was lost; what is finished is kept, "
                     "the same command goes on"
@@ -129,7 +141,7 @@ class Cluster:
             future.release()
         yield from self._end_late_ones()
 
-    def _end_late_ones(self) -> Iterator[tuple[int, None, str, str]]:
+    def _end_late_ones(self) -> Iterator[Outcome]:
         now = time.monotonic()
         for key, (began_s, worker) in list(self._started.items()):
             if key not in self._under_way:

@@ -32,6 +32,13 @@ def read_manifest(path: str) -> list[Period]:
 
     Rows of the same vehicle and mount are one period. Paths are seen from the manifest's directory and may be patterns
     (logs/*.csv.gz). Raises InputError naming the line.
+
+    >>> import tempfile
+    >>> with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
+    ...     _ = file.write("vehicle,path,kind\\nbus 12,/logs/1.csv,car\\nbus 12,/logs/2.csv,car\\n")
+    ...     file.flush()
+    ...     read_manifest(file.name)
+    [Period(vehicle='bus 12', mount='', kind='car', paths=('/logs/1.csv', '/logs/2.csv'))]
     """
     try:
         text = files.read_bytes(path).decode("utf-8-sig")
@@ -71,7 +78,13 @@ def read_manifest(path: str) -> list[Period]:
 
 
 def by_pattern(pattern: str, kind: str = CAR) -> list[Period]:
-    """Each file that the pattern matches is a vehicle of its own, named by its path. Raises InputError."""
+    """Each file that the pattern matches is a vehicle of its own, named by its path. Raises InputError.
+
+    >>> import tempfile
+    >>> with tempfile.NamedTemporaryFile(suffix=".csv") as file:
+    ...     [period.vehicle == file.name for period in by_pattern(file.name[:-6] + "*.csv")]
+    [True]
+    """
     found = files.matches(pattern)
     if not found:
         raise InputError(f"{pattern} matches no file")

@@ -11,7 +11,6 @@ from kickstand.errors import AlignmentError
 
 from ..analysis.stops.brake_test import Stop
 from ..calibration.drive import DriveFit, fit_logs, usable
-from ..calibration.file import CalibrationFile
 from ..errors import InputError, cause
 from ..logs.log import Log
 from ..refusals import RefusedInput
@@ -90,8 +89,9 @@ def _result(period: Period, signals_to: str | None) -> PeriodResult:
             status, reason, message = "refused", LEFT_HANDED, wrong
     result = PeriodResult(_alignment(period, status, reason, message, logs, len(errors), fit), errors=errors)
     result.moved = [whose | _moved_row(move, logs) for move in moves]
+    if driven:
+        result.picture = _picture(driven, fit)
     if status == "aligned":
-        result.picture = _picture(driven, fit.calibration)
         for log in logs:
             try:
                 tests = brake_tests(log, fit.calibration)
@@ -196,11 +196,15 @@ def _utc_s(log: Log, at_s: float) -> float | None:
     return float(np.median(starts)) + at_s if len(starts) else None
 
 
-def _picture(driven: list[evidence.Intervals], calibration: CalibrationFile) -> list[list[float]]:
+def _picture(driven: list[evidence.Intervals], fit: DriveFit) -> list[list[float]]:
+    frame = fit.calibration.vehicle_from_sensor
+    if fit.status != "aligned":  # the mean of what it was: the points show that it is none
+        whole = evidence.blocks(driven)
+        frame = evidence.frames(*evidence.fits(np.sum(whole.square, axis=0), np.sum(whole.product, axis=0)))
     used = [log.weight > 0.0 for log in driven]
     terms = np.concatenate([log.terms[which] for log, which in zip(driven, used)])
     force = np.concatenate([log.force[which] for log, which in zip(driven, used)])
-    felt = force @ calibration.vehicle_from_sensor.T
+    felt = force @ frame.T
     table = np.column_stack((terms[:, 1], felt[:, 2], terms[:, 2], felt[:, 0]))
     step = max(1, math.ceil(len(table) / _PLOTTED))
     return table[::step].round(3).tolist()

@@ -3,21 +3,21 @@
 import hashlib
 import json
 import time
-from collections import Counter
-from collections.abc import Callable, Iterable
-from contextlib import ExitStack
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from kickstand import __version__
 
 from ..errors import InputError, cause
 from ..output import check_directory
-from . import files, page, plot, schema, tables
-from .cluster import Cluster
+from . import files, tables
+from .cluster import run_tasks
 from .journal import Journal
 from .manifest import Period
 from .period import PeriodResult, failed, work_on_period
+from .show import plot
+from .show.page import Glance, write_page
 
 RESULTS_VERSION = 1  # another one makes all results of before obsolete
 SIGNALS = "signals"
@@ -27,16 +27,12 @@ _WRITE_S, _SHARE = 15.0, 20.0  # tables are written so often, and at most every 
 
 @dataclass
 class FleetRun:
-    """statuses: how many are aligned, refused, error, by status; reasons: by reason. new: how many were worked on now,
-    the others were finished before. moved, brake_tests, errors: rows in these tables."""
+    """vehicles: how many mounts of vehicles there are; new: how many of them were worked on now, the others were
+    finished before. seen: what all results show at one glance."""
 
     vehicles: int
     new: int
-    statuses: Counter[str] = field(default_factory=Counter)
-    reasons: Counter[str] = field(default_factory=Counter)
-    moved: int = 0
-    brake_tests: int = 0
-    errors: int = 0
+    seen: Glance
 
 
 def run_fleet(
@@ -54,6 +50,14 @@ def run_fleet(
     with_signals: also write each log's accelerations along the vehicle's axes, to out/signals. timeout_s: for one
     period. progress: called with (done, all). What an earlier run into the same directory has finished is not done
     again, as long as its logs have not changed. Raises InputError; what is finished is kept and shown then, too.
+
+    A script has to call it below `if __name__ == "__main__":`, because workers on this computer import the script.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     run = run_fleet([], directory)
+    ...     run.new, run.seen.count, sorted(path.name for path in Path(directory).glob("*.parquet"))
+    (0, 0, ['alignments.parquet', 'brake_tests.parquet', 'errors.parquet', 'moved.parquet'])
     """
     directory = Path(out)
     tables.check()
@@ -70,32 +74,37 @@ def run_fleet(
         if progress:
             progress(done, len(keys))
         last_s, pause_s = time.monotonic(), _WRITE_S
-        with ExitStack() as stack:
-            stack.callback(lambda: write_results(directory, journal.results(keys), len(keys)))
-            if todo:
-                cluster = stack.enter_context(Cluster(scheduler, workers, timeout_s))
-                items = [(periods[k], signals_to) for k in todo]
-                for index, result, reason, message in cluster.run(work_on_period, items):
-                    k = todo[index]
-                    _keep(directory, journal, keys[k], periods[k], result, reason, message)
-                    done += 1
-                    if progress:
-                        progress(done, len(keys))
-                    if time.monotonic() - last_s > pause_s:
-                        journal.sync()
-                        before_s = time.monotonic()
-                        write_results(directory, journal.results(keys), len(keys))
-                        last_s = time.monotonic()
-                        pause_s = max(_WRITE_S, _SHARE * (last_s - before_s))
-        return _counted(journal.results(keys), len(keys), len(todo))
+        try:
+            items = [(periods[k], signals_to) for k in todo]
+            for index, result, reason, message in run_tasks(work_on_period, items, scheduler, workers, timeout_s):
+                k = todo[index]
+                _keep(directory, journal, keys[k], periods[k], result, reason, message)
+                done += 1
+                if progress:
+                    progress(done, len(keys))
+                if time.monotonic() - last_s > pause_s:
+                    journal.sync()
+                    before_s = time.monotonic()
+                    write_results(directory, journal.results(keys), len(keys))
+                    last_s = time.monotonic()
+                    pause_s = max(_WRITE_S, _SHARE * (last_s - before_s))
+        finally:  # also when it was stopped
+            seen = write_results(directory, journal.results(keys), len(keys))
+        return FleetRun(len(keys), len(todo), seen)
 
 
-def write_results(directory: Path, results: Iterable[PeriodResult], expected: int) -> None:
+def write_results(directory: Path, results: Iterable[PeriodResult], expected: int) -> Glance:
     """Write the tables and the page of the results so far. expected: how many there will be. Raises InputError."""
-    known = list(results)
-    for table in schema.TABLES:
-        tables.write_table(directory / f"{table}.parquet", table, tables.rows_of(known, table))
-    page.write_page(directory / "index.html", known, expected)
+    glance = Glance()
+
+    def seen() -> Iterator[PeriodResult]:
+        for result in results:
+            glance.add(result)
+            yield result
+
+    tables.write_tables(directory, seen())
+    write_page(directory / "index.html", glance, expected)
+    return glance
 
 
 def _keep(
@@ -108,7 +117,7 @@ def _keep(
     message: str,
 ) -> None:
     kept = result or failed(period, reason, message)
-    if kept.alignment["status"] == "aligned":
+    if kept.picture:
         kept.alignment["plot"] = f"plots/{plot.file_name(period.vehicle, period.mount)}"
         plot.write_plot(directory / kept.alignment["plot"], kept)
     journal.add(key, kept, again=result is None)
@@ -123,15 +132,3 @@ def _keys(periods: list[Period], with_signals: bool) -> list[str]:
         told = [RESULTS_VERSION, __version__, period.vehicle, period.mount, period.kind, logs, with_signals]
         keys.append(hashlib.sha256(json.dumps(told).encode()).hexdigest()[:32])
     return keys
-
-
-def _counted(results: Iterable[PeriodResult], vehicles: int, new: int) -> FleetRun:
-    found = FleetRun(vehicles, new)
-    for result in results:
-        found.statuses[result.alignment["status"]] += 1
-        if result.alignment["reason"]:
-            found.reasons[result.alignment["reason"]] += 1
-        found.moved += len(result.moved)
-        found.brake_tests += len(result.brake_tests)
-        found.errors += len(result.errors)
-    return found

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from pathlib import Path
+from typing import Any
 
 from ..errors import InputError, extra
 from ..output import write_whole
@@ -19,30 +20,47 @@ def check() -> None:
         raise InputError("a fleet needs pyarrow: " + extra("fleet")) from error
 
 
-def write_table(path: Path, table: str, rows: Iterable[Row]) -> None:
-    """Write one of schema.TABLES, whole or not at all; memory does not grow with its length. Raises InputError."""
-    import pyarrow
+def write_tables(directory: Path, results: Iterable[PeriodResult]) -> None:
+    """Write a file NAME.parquet for each of schema.TABLES, whole or not at all. Memory does not grow with the number of
+    results, which are gone through once. Raises InputError."""
+    _open_next(directory, list(schema.TABLES), {}, results)
+
+
+def _open_next(directory: Path, names: list[str], tables: dict[str, "_Table"], results: Iterable[PeriodResult]) -> None:
+    """Open the table of the first name, then the others, then write all."""
+    if not names:
+        for result in results:
+            for name, table in tables.items():
+                table.add([result.alignment] if name == "alignments" else getattr(result, name))
+        return
     from pyarrow.parquet import ParquetWriter
 
-    columns = schema.schema(table)
+    name, *others = names
+    columns = schema.schema(name)
 
     def write(temporary: Path) -> None:
         with ParquetWriter(temporary, columns, compression="zstd") as writer:
-            group: list[Row] = []
-            for row in rows:
-                group.append(row)
-                if len(group) == _GROUP:
-                    writer.write_table(pyarrow.Table.from_pylist(group, schema=columns))
-                    group = []
-            writer.write_table(pyarrow.Table.from_pylist(group, schema=columns))
+            tables[name] = _Table(writer, columns)
+            _open_next(directory, others, tables, results)
+            tables[name].flush()
 
-    write_whole(path, write)
+    write_whole(directory / f"{name}.parquet", write)
 
 
-def rows_of(results: Iterable[PeriodResult], table: str) -> Iterable[Row]:
-    """The rows of one table."""
-    for result in results:
-        if table == "alignments":
-            yield result.alignment
-        else:
-            yield from getattr(result, table)
+class _Table:
+    """Rows on their way into a file."""
+
+    def __init__(self, writer: Any, columns: Any) -> None:
+        self._writer, self._columns = writer, columns
+        self._rows: list[Row] = []
+
+    def add(self, rows: list[Row]) -> None:
+        self._rows += rows
+        if len(self._rows) >= _GROUP:
+            self.flush()
+
+    def flush(self) -> None:
+        from pyarrow import Table
+
+        self._writer.write_table(Table.from_pylist(self._rows, schema=self._columns))
+        self._rows = []

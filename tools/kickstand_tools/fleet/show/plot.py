@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from ..output import write_whole
-from .period import PeriodResult
-from .signals import safe_name
+from ...output import write_whole
+from ..period import PeriodResult
+from ..signals import safe_name
 from .svg import Panel, date_text
 
 _WIDTH, _HEIGHT = 960, 380
@@ -21,7 +21,7 @@ def file_name(vehicle: str, mount: str) -> str:
 
 
 def write_plot(path: Path, result: PeriodResult) -> None:
-    """Write the picture of a result that is aligned. Raises InputError."""
+    """Write the picture of a result that has one. Raises InputError."""
     write_whole(path, lambda temporary: temporary.write_text(draw(result), encoding="utf-8") and None)
 
 
@@ -29,7 +29,7 @@ def draw(result: PeriodResult) -> str:
     """The picture as SVG."""
     row = result.alignment
     name = row["vehicle"] + (f", mount {row['mount']}" if row["mount"] else "")
-    said = (
+    said = row["message"] or (
         f"forward known to {row['quality_deg']:.1f}°, {row['events_used']} events, {row['stops']} stops, "
         f"speed {row['speed_lag_s']:.1f} s late"
     )
