@@ -69,7 +69,7 @@ class Cluster:
         )
         try:
             if self._address is None:
-                cluster = LocalCluster(n_workers=self._wanted, threads_per_worker=1, dashboard_address=None)
+                cluster = LocalCluster(n_workers=self._wanted, threads_per_worker=1, dashboard_address=":0")
                 self._stack.callback(lambda: cluster.close(timeout=5))
                 self._client = Client(cluster)
             else:
