@@ -9,6 +9,7 @@ at a time: what kills its worker then has done so itself.
 import contextlib
 import logging
 import queue
+import signal
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
@@ -52,9 +53,17 @@ class Cluster:
     def __enter__(self) -> "Cluster":
         try:
             import dask
-            from distributed import Client, LocalCluster
+            from distributed import Client, LocalCluster, WorkerPlugin
         except ImportError as error:
             raise InputError("a fleet needs Dask: " + extra("fleet")) from error
+
+        class Undisturbed(WorkerPlugin):
+            """A terminal's Ctrl-C goes to the workers, too, which are ended by this process."""
+
+            def setup(self, worker: Any) -> None:
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
+                logging.getLogger("distributed").setLevel(logging.CRITICAL)
+
         # what happens to workers is told by the results
         logging.getLogger("distributed").setLevel(logging.CRITICAL)
         self._stack = contextlib.ExitStack()
@@ -72,6 +81,7 @@ class Cluster:
                 cluster = LocalCluster(n_workers=self._wanted, threads_per_worker=1, dashboard_address=":0")
                 self._stack.callback(lambda: cluster.close(timeout=5))
                 self._client = Client(cluster)
+                self._client.register_plugin(Undisturbed())
             else:
                 self._client = Client(self._address, timeout=_REMOTE_PATIENCE_S)
             self._stack.callback(lambda: self._client.close(timeout=2))
