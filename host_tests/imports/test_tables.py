@@ -100,8 +100,8 @@ def test_positions_in_minutes(tmp_path):
     keys: list[str] = ["t", "ax", "ay", "az", "gx", "gy", "gz", "lat", "lon"]
     names = dict(zip(keys, "tabcpqruv"))
     found = api.import_recording(tmp_path / "log.csv", names, {"a": "g", "g": "deg/s", "lat": "min", "lon": "-min"})
-    assert np.nanmin(found.lat_deg) == pytest.approx(ride.lat_deg.min(), abs=1e-5)
-    assert np.nanmin(found.lon_deg) == pytest.approx(ride.lon_deg.min(), abs=1e-5)
+    assert np.nanmin(found.log.lat_deg) == pytest.approx(ride.lat_deg.min(), abs=1e-5)
+    assert np.nanmin(found.log.lon_deg) == pytest.approx(ride.lon_deg.min(), abs=1e-5)
 
 
 START_NS = 1_715_938_200_250_000_000
