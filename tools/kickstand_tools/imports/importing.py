@@ -98,6 +98,8 @@ def import_recording(
             utc_s=joined.utc_s[rows],
         )
     )
+    if any(notice.code in ("left-handed", "rates-misfit") for notice in log.notices):
+        recording.notices = [notice for notice in recording.notices if notice.code != "import-mirrored"]  # so it seems
     return Imported(
         recording.app,
         log,

@@ -41,14 +41,18 @@ def rate_hz(time_ns: Nanoseconds) -> float:
 @dataclass
 class Sensor:
     """n samples: time_ns (n) of the recorder's clock, values (n, 3): g, +1 where the axis points up at rest, or deg/s,
-    right-handed. name: for messages."""
+    right-handed. name: for messages. damaged: rows of its file that are left out, because of a time or a value that
+    cannot be read; a row without any value is another sensor's."""
 
     name: str
     time_ns: Nanoseconds
     values: Array
+    damaged: int = 0
 
     def __post_init__(self) -> None:
-        good = (self.time_ns != NO_TIME) & np.all(np.abs(self.values) < _ABSURD, axis=1)  # no NaN either
+        timed, empty = self.time_ns != NO_TIME, np.all(np.isnan(self.values), axis=1)
+        good = timed & np.all(np.abs(self.values) < _ABSURD, axis=1)  # no NaN either
+        self.damaged += int(np.count_nonzero(~timed | (~good & ~empty)))
         self.time_ns, self.values = self.time_ns[good], self.values[good]
 
 

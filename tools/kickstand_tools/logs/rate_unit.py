@@ -1,51 +1,54 @@
 """Are the angular rates of a log in deg/s? The bends of a motorcycle ride tell.
 
-In a bend a motorcycle leans: the specific force grows and keeps its direction in the sensor's axes. Braking turns that
-direction. The lean that belongs to the force and the rate of turning together give the speed, v = g tan(lean) / rate.
-Rates in rad/s are 57 times too small, and the speed becomes one that no vehicle has. A car does not lean and a parked
-vehicle does not turn: they are never judged.
+Leaned, a turning bike also turns about its own left, by its yaw rate times the sine of its lean. All of these come from
+the rates. Where they are in rad/s, which is 57 times too small, the product is 57 x 57 times too small, but the rate
+about left only 57 times. A car does not lean and a parked vehicle does not turn: they are never judged.
 """
 
 import numpy as np
 from kickstand.errors import Notice
-from kickstand.units import STANDARD_GRAVITY
 
+from .axes.calm import calm_rates
+from .axes.leaning import WINDOW_S, Leaning, leaning_of, unrest
 from .table import Array
+from .time_cells import no_cells, with_block
 
-LEANED = 1.15  # times the usual force: a lean of 30 degrees
-ALONG = 0.97  # share of the force along its usual direction: within 14 degrees of it
-ENOUGH = 10  # seconds in bends
-SAMPLES = 10  # at least in a second, so that vibration averages out
-FASTEST_MPS = 200.0  # recorded rides have a median of up to 20 m/s in deg/s, of over 330 m/s in rad/s
-WINDOW = 3600  # seconds that are kept
+KEPT_S, RIDING_S = 1800.0, 15.0  # half an hour is judged; less riding tells nothing
+MOVES_S, MOVES = 1.6, 0.1  # within so long a ride changes the rates by over so much of their liveliest changes
+# Simulated rides and recordings in deg/s have a share of 1.0 to 1.6 and in rad/s of 57 to 92, of over 5 sigmas; cars
+# have a likeness under 0.6.
+SHARE, SIGMAS, LIKENESS = 15.0, 4.5, 0.65
+LEAST_LEAN = np.radians(2.0 / 57.3)  # rms: less is nearly straight
 
 
 class RateUnit:
-    """add() takes a log's samples block by block. notice: that the rates look like rad/s, None if they do not."""
+    """add() takes a log's samples block by block; notice() judges them."""
 
     def __init__(self) -> None:
-        self._means = np.zeros((0, 6))  # over a second, of force (3, g) and rates (3, deg/s)
-        self.notice: Notice | None = None
+        self._cells = no_cells()
 
-    def add(self, time_s: Array, force: Array, rate: Array) -> None:
-        """force: (n, 3, g); rate: (n, 3, deg/s); in the sensor's axes."""
-        starts = np.flatnonzero(np.diff(np.floor(time_s), prepend=-1.0))
-        counts = np.diff(np.append(starts, len(time_s)))
-        means = np.add.reduceat(np.hstack((force, rate)), starts) / counts[:, None]
-        self._means = np.vstack((self._means, means[counts >= SAMPLES]))[-WINDOW:]
-        speed = self._leaned_speed() if len(self._means) else 0.0
-        if speed > FASTEST_MPS:
-            self.notice = Notice("rates-in-radians", speed)
+    def add(self, time_s: Array, force: Array, rate: Array, speed_mps: Array) -> None:
+        """force: (n, 3, g); rate: (n, 3, deg/s), in the sensor's axes; speed_mps: (n), NaN for none."""
+        added = with_block(self._cells, WINDOW_S, time_s, force, rate, speed_mps)
+        self._cells = added[-round(KEPT_S / WINDOW_S) :]
 
-    def _leaned_speed(self) -> float:
-        """The median speed in the bends, m/s; 0 where there are too few to tell."""
-        force, rate = self._means[:, :3], np.radians(self._means[:, 3:])
-        usual = np.median(force, axis=0)
-        # in balance the force has the direction of the bike's own up
-        along = force @ usual / max(float(np.linalg.norm(usual)), 1e-9)
-        grown = along / max(float(np.median(along)), 1e-9)
-        leaned = (grown > LEANED) & (along > ALONG * np.linalg.norm(force, axis=1))
-        if np.count_nonzero(leaned) < ENOUGH:
-            return 0.0
-        tangent = np.sqrt(grown[leaned] ** 2 - 1.0)
-        return float(np.median(STANDARD_GRAVITY * tangent / np.maximum(np.linalg.norm(rate[leaned], axis=1), 1e-6)))
+    def notice(self) -> Notice | None:
+        """That the rates look like rad/s; None if they do not, or if the log does not tell."""
+        force, rate = self._cells[:, 1:4] / self._cells[:, 7:8], np.radians(self._cells[:, 4:7] / self._cells[:, 7:8])
+        if len(rate) * WINDOW_S < RIDING_S:
+            return None
+        changes = unrest(rate, MOVES_S)
+        moves = MOVES * np.percentile(changes, 95)  # whatever the unit is
+        if np.count_nonzero(changes > moves) * WINDOW_S < RIDING_S:
+            return None
+        seconds = [values[: len(values) // 5 * 5].reshape(-1, 5, 3) for values in (force, rate)]
+        rate -= np.median(calm_rates(*seconds, moves), axis=0)
+        speed = speed_in_radians(leaning_of(rate, force, changes > moves))
+        return None if speed is None else Notice("rates-in-radians", speed)
+
+
+def speed_in_radians(found: Leaning) -> float | None:
+    """The speed of the bends, m/s, if the rates, which are 57 times too small, are deg/s; None where they may be."""
+    wrong = found.share > SHARE and found.sigmas > SIGMAS and found.likeness > LIKENESS
+    wrong &= float(np.sqrt(np.mean(found.rolled**2))) > LEAST_LEAN
+    return float(np.degrees(found.speed)) if wrong else None

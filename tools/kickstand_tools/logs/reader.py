@@ -86,15 +86,15 @@ def read_blocks(
         if block.has_speed:
             speed_unit.add(block.t_s, block.readings[:, :3], block.speed_mps)
         if notices is not None:
-            rate_unit.add(block.t_s, block.readings[:, :3], block.readings[:, 4:])
-            handedness.add(block.t_s, block.readings[:, :3], block.readings[:, 4:], block.speed_mps)
+            for judge in (rate_unit, handedness):
+                judge.add(block.t_s, block.readings[:, :3], block.readings[:, 4:], block.speed_mps)
         yield block
         if progress:
             progress(block.done, total)
     if count < minimum:
         raise InputError(f"{name} is too short: {count} samples, at least {minimum} are needed")
     if notices is not None:
-        judged = [notice for notice in (rate_unit.notice, handedness.notice()) if notice]
+        judged = [notice for notice in (rate_unit.notice(), handedness.notice()) if notice]
         notices += remarks + frozen.notices() + judged
 
 
