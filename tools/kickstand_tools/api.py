@@ -27,6 +27,9 @@ from .calibration.six import SixPositions, fit_six_positions
 from .calibration.two import TwoPositions, fit_two_positions
 from .errors import InputError
 from .imports.importing import Imported, import_recording, write_imported
+from .joining.joined import Joined, join_track, write_joined
+from .joining.track import Track
+from .joining.track_files import read_track
 from .logs.csv_lines import write_log
 from .logs.cut import cut_log
 from .logs.log import Log
@@ -44,6 +47,7 @@ __all__ = [
     "DriveResult",
     "Imported",
     "InputError",
+    "Joined",
     "LeanTable",
     "Log",
     "Overview",
@@ -55,6 +59,7 @@ __all__ = [
     "Stop",
     "Stretch",
     "Summary",
+    "Track",
     "TwoPositions",
     "cut_log",
     "export",
@@ -64,10 +69,12 @@ __all__ = [
     "fit_six_positions",
     "fit_two_positions",
     "import_recording",
+    "join_track",
     "open_ride",
     "overview",
     "read_calibration",
     "read_log",
+    "read_track",
     "replay",
     "sentence",
     "simulate_ride",
@@ -75,5 +82,6 @@ __all__ = [
     "vehicle_channels",
     "write_calibration",
     "write_imported",
+    "write_joined",
     "write_log",
 ]

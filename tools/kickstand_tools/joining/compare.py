@@ -55,8 +55,8 @@ def _double_sums(motion: Motion, course: Course, shift_s: float) -> Array:
     """(n + 1, 6): integrals over time of what the ride has turned (degrees; up and two axes across it) and of the
     integrated force (m/s; the sensor's axes): their differences are means between two times.
 
-    The rate about up is the yaw rate times the cosine of the lean. The track's speed tells the lean, because a bike leans
-    as its turn demands.
+    The rate about up is the yaw rate times the cosine of the lean. The track's speed tells the lean, because a bike
+    leans as its turn demands.
     """
     up = motion.up
     across = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])

@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..logs.table import Array
-from .track import FASTEST_MPS, LONGEST_S, Track
+from .track import FASTEST_MPS, LONGEST_S, SLOWEST_MPS, Track
 
-SLOWEST_MPS = 2.5  # of a step whose direction is more than the positions' errors
 STEP_ERROR_M = 1.0  # of a step's length across it (1 sigma), as phones' receivers err from one second to the next
 COURSE_ERROR_DEG = 4.0  # of the rest: yaw by a gyro whose slope is off, and how positions are smoothed
 
@@ -18,8 +17,8 @@ class Course:
     """m steps between the m + 1 points of a track.
 
     begin_s, end_s (m): of each step, s since the track's first point. course_deg (m): to the left of east, of a step
-    that is good. sigma_deg (m): its standard deviation. speed_mps (m): length by time. good (m): neither too slow, nor a
-    gap or a jump. turn_deg (m): to the left against the step before; 0 unless both are good.
+    that is good. sigma_deg (m): its standard deviation. speed_mps (m): length by time. good (m): neither too slow, nor
+    a gap or a jump. turn_deg (m): to the left against the step before; 0 unless both are good.
     """
 
     begin_s: Array

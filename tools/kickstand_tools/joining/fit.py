@@ -1,7 +1,7 @@
 """The shift between the clocks of a ride and a track, found to hundredths of a second, and how sure it is.
 
-First the shifts around a rough one are tried. Then all that is unknown is fitted at once by least squares: shift, drift,
-a tilt of the ride's up and the sensor's forward axis.
+First the shifts around a rough one are tried. Then all that is unknown is fitted at once by least squares: shift,
+drift, a tilt of the ride's up and the sensor's forward axis.
 """
 
 from dataclasses import dataclass
@@ -32,8 +32,8 @@ class Fit:
     """shift_s: the track's time at the ride's first sample, s since the track's first point. drift: by how many seconds
     a second the ride's clock loses. sigma_s: standard deviation of where a point of the track lies in the ride, at the
     end of the ride where it is larger. correlation: of the courses' changes. evidence: natural logarithm of how much
-    likelier the courses are with the ride's turns than without. tilt: of the ride's up to both sides, rad. pieces: how many
-    were compared."""
+    likelier the courses are with the ride's turns than without. tilt (2): of the ride's up, rad. pieces: how many were
+    compared."""
 
     shift_s: float
     drift: float

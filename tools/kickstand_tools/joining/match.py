@@ -7,12 +7,13 @@ from kickstand.units import STANDARD_GRAVITY
 
 from ..errors import InputError
 from ..logs.table import Array
-from .course import SLOWEST_MPS, Course, course
+from ..refusals import OPPOSITE_SIGN
+from .course import Course, course
 from .fit import AROUND_S, Fit, apart, fitted
 from .motion import STEP_S, Motion
 from .pieces import STEPS, pieces
 from .search import correlations, evidence, peaks
-from .track import Track
+from .track import LONGEST_S, SLOWEST_MPS, Track
 
 _GRID_S = 0.5
 _SPAN_S = 4.0  # over which a change of course is compared first
@@ -24,6 +25,7 @@ _LEAST_TURN_DEG = 360.0  # in all
 _LEAST_EVIDENCE = 15.0  # other rides' tracks reach 9
 _LEAST_LEAD = 6.0  # of the best shift's evidence before another one's
 _MOST_APART = 3.0
+_MOST_DRIFT = 400e-6  # of a crystal in the heat of an engine it is 100e-6
 _ALIKE = 0.9  # a higher correlation is no chance, but may be one bend like another
 _LEAST_CORRELATION = 0.6
 _MOST_SIGMA_S = 0.3
@@ -66,17 +68,17 @@ def match(motion: Motion, track: Track) -> Match:
     if best.evidence < _LEAST_EVIDENCE or best.correlation < _LEAST_CORRELATION:
         if mirrored:
             raise InputError(
-                "the ride turns left where the track turns right: have all accelerations of the log the opposite sign? At "
-                "rest up reads +1 g"
+                "the ride turns left where the track turns right: " + OPPOSITE_SIGN
             )
         if best.correlation > _ALIKE:
-            raise InputError(f"they have {best.pieces * STEPS:.0f} s with too few bends in common to be sure: {_LONGER}")
+            common_s = best.pieces * STEPS
+            raise InputError(f"they have {common_s} s with too few bends in common to be sure: {_LONGER}")
         raise InputError(f"nowhere does the ride turn as the track does: {_OTHER}")
     others = [fit for fit in found if abs(fit.shift_s - best.shift_s) > AROUND_S]
     if others and others[0].evidence > best.evidence - _LEAST_LEAD:
         far_s = abs(others[0].shift_s - best.shift_s)
-        raise InputError(f"the track fits at two times, {far_s:.0f} s from each other, as its bends are alike: {_LONGER}")
-    if apart(motion, steps, parts, best) > _MOST_APART:
+        raise InputError(f"the track fits at two times, {far_s:.0f} s apart, as its bends are alike: {_LONGER}")
+    if abs(best.drift) > _MOST_DRIFT or apart(motion, steps, parts, best) > _MOST_APART:
         raise InputError(
             "the ride turns as the track does, but at other times: it is the same road on another day, or other bends "
             "that are alike"
@@ -100,8 +102,8 @@ def _check_turns(motion: Motion, steps: Course) -> None:
     moving_s = float((steps.end_s - steps.begin_s)[steps.good].sum())
     if moving_s < _LEAST_S:
         raise InputError(
-            f"the track moves for {moving_s:.0f} s only, faster than {SLOWEST_MPS} m/s and with a point every 6 s or more "
-            f"often: at least {_LEAST_S:.0f} s are needed"
+            f"the track moves for {moving_s:.0f} s only, faster than {SLOWEST_MPS} m/s and with a point at least every "
+            f"{LONGEST_S:.0f} s: {_LEAST_S:.0f} s are needed"
         )
     second = round(1.0 / STEP_S)
     yaw_dps = motion.rate_dps @ motion.up

@@ -26,14 +26,14 @@ class Motion:
     """A ride in n cells of STEP_S from its first sample.
 
     force_g, rate_dps (n, 3): means in the sensor's axes, the gyro's bias taken off. there (n): False where the log has
-    no sample, or readings that froze; force and rate are 0 there. speed_mps (n): NaN where there is none. positions: the
-    log has some.
+    no sample, or readings that froze; force and rate are 0 there. speed, positions: does the log have any?
     """
 
     force_g: Array
     rate_dps: Array
     there: NDArray[np.bool_]
-    speed_mps: Array
+    speed: bool
+    positions: bool
 
     @property
     def t_s(self) -> Array:
@@ -47,7 +47,7 @@ class Motion:
 
     @property
     def up(self) -> Array:
-        """(3) the bike's up in the sensor's axes, known to some degrees, as far as the accelerometer's offset lets it."""
+        """(3) the bike's up in the sensor's axes, to some degrees, as the accelerometer's offset has it."""
         turning = np.minimum(np.linalg.norm(self.rate_dps, axis=1), _MOST_DPS)
         up = turning @ self.force_g
         return up / max(float(np.linalg.norm(up)), 1e-9)
@@ -55,8 +55,10 @@ class Motion:
 
 def motion(ride: Source, progress: Progress | None = None, notices: list[Notice] | None = None) -> Motion:
     """Of a log (see read_log). progress, notices: of read_blocks(). Raises InputError."""
-    done, last = [], no_cells()
+    done, last, speed, positions = [], no_cells(), False, False
     for block in read_blocks(ride, 2, progress, notices):
+        speed |= bool(np.any(np.isfinite(block.speed_mps)))
+        positions |= bool(np.any(np.isfinite(block.lat_deg)))
         good = block.believed
         if len(good.time_us):
             if good.t_s[-1] > _LONGEST_S:
@@ -70,10 +72,9 @@ def motion(ride: Source, progress: Progress | None = None, notices: list[Notice]
         raise InputError(f"{name_of(ride)}: all readings are frozen: check the sensor")
     place = table[:, 0].astype(int)
     n = int(place[-1]) + 1
-    force, rate, speed = np.zeros((n, 3)), np.zeros((n, 3)), np.full(n, np.nan)
-    there = np.zeros(n, dtype=bool)
+    force, rate, there = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n, dtype=bool)
     force[place] = table[:, 1:4] / table[:, 7:8]
     measured = table[:, 4:7] / table[:, 7:8]
     rate[place] = measured - np.median(measured, axis=0)
-    speed[place], there[place] = table[:, 8], True
-    return Motion(force, rate, there, speed)
+    there[place] = True
+    return Motion(force, rate, there, speed, positions)

@@ -4,11 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..logs.axes.course import distance_m
 from ..logs.table import Array, Table
 
-EARTH_M = 6_371_000.0
 LONGEST_S = 6.0  # between two points of one course: watches write one so rarely on straights
+SLOWEST_MPS = 2.5  # of a step that is more than the positions' errors
 FASTEST_MPS = 100.0  # a quicker step is a jump of the receiver
+_AROUND = 2  # points before and after, from which a speed is taken
 
 
 @dataclass(eq=False)
@@ -26,17 +28,18 @@ class Track(Table):
     name: str
 
     def speeds_mps(self) -> Array:
-        """(n) those of the file, or where it has none by how far the points before and after are from here."""
-        if np.any(np.isfinite(self.speed_mps)) or len(self.utc_s) < 3:
+        """(n) those of the file. Where it has none: by how far the points around are apart, as far as that is more than
+        their errors."""
+        if np.any(np.isfinite(self.speed_mps)):
             return self.speed_mps
-        length_m, step_s = np.hypot(*self.steps_m()), np.diff(self.utc_s)
         speed = np.full(len(self.utc_s), np.nan)
-        speed[1:-1] = (length_m[1:] + length_m[:-1]) / (step_s[1:] + step_s[:-1])
-        gap = step_s > LONGEST_S
-        speed[1:-1][gap[1:] | gap[:-1]] = np.nan
+        way_m = np.append(0.0, np.cumsum(np.hypot(*self.steps_m())))
+        span_s = self.utc_s[2 * _AROUND :] - self.utc_s[: -2 * _AROUND]
+        mean = (way_m[2 * _AROUND :] - way_m[: -2 * _AROUND]) / span_s
+        told = (span_s <= LONGEST_S) & (mean > SLOWEST_MPS) & (mean < FASTEST_MPS)
+        speed[_AROUND:-_AROUND] = np.where(told, mean, np.nan)
         return speed
 
     def steps_m(self) -> tuple[Array, Array]:
         """(n - 1) each: how far east and north every point is of the one before."""
-        east = np.radians((np.diff(self.lon_deg) + 180.0) % 360.0 - 180.0) * np.cos(np.radians(self.lat_deg[1:]))
-        return EARTH_M * east, EARTH_M * np.radians(np.diff(self.lat_deg))
+        return distance_m(self.lat_deg[:-1], self.lon_deg[:-1], self.lat_deg[1:], self.lon_deg[1:])

@@ -42,9 +42,10 @@ def read_track(path: Path | str, progress: Progress | None = None) -> Track:
     except OSError as error:
         raise InputError(f"{path} cannot be read: {cause(error)}") from error
     table = np.array(points, dtype=float).reshape(-1, 4)
-    table = table[np.all(np.isfinite(table[:, :3]), axis=1) & (np.abs(table[:, 1]) <= 90) & (np.abs(table[:, 2]) <= 180)]
+    on_earth = (np.abs(table[:, 1]) <= 90.0) & (np.abs(table[:, 2]) <= 180.0)
+    table = table[np.all(np.isfinite(table[:, :3]), axis=1) & on_earth]
     if not len(table):
-        raise InputError(f"{path} has no point with a position and a time: is it a route that was planned? Give a recording")
+        raise InputError(f"{path} has no point with a position and a time: give a recorded track, not a planned route")
     table = table[np.unique(table[:, 0], return_index=True)[1]]
     if len(table) < _FEWEST:
         raise InputError(f"{path} has {len(table)} points with a time: at least {_FEWEST} are needed")
