@@ -68,7 +68,7 @@ def test_a_watch_that_writes_a_point_now_and_then(rides):
     assert abs(error_s(api.join_track(log_of(rides["street"]), thin), 0.5)) < 0.25
 
 
-@pytest.mark.parametrize(("profile", "other"), zip(PROFILES, PROFILES[1:] + PROFILES[:1]))
+@pytest.mark.parametrize(("profile", "other"), list(zip(PROFILES, PROFILES[1:] + PROFILES[:1])))
 def test_another_rides_track_is_refused(rides, profile, other):
     with pytest.raises(api.InputError, match="the track of another ride"):
         api.join_track(log_of(rides[profile]), phone_tracks.track(rides[other]))

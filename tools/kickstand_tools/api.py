@@ -35,6 +35,7 @@ from .logs.cut import cut_log
 from .logs.log import Log
 from .logs.reader import read_log
 from .logs.stretch import Stretch
+from .overlay.overlay import Overlaid, overlay
 from .refusals import RefusedInput, sentence
 from .replay.replay import LeanTable, replay
 from .simulation.ride import Ride as SimulatedRide
@@ -50,6 +51,7 @@ __all__ = [
     "Joined",
     "LeanTable",
     "Log",
+    "Overlaid",
     "Overview",
     "RefusedInput",
     "Ride",
@@ -71,6 +73,7 @@ __all__ = [
     "import_recording",
     "join_track",
     "open_ride",
+    "overlay",
     "overview",
     "read_calibration",
     "read_log",

@@ -51,13 +51,15 @@ def join_track(ride: Source, track: Path | str | Track, progress: Progress | Non
     by any time and drift. progress: called with how much of the ride has been read. Raises InputError where the track
     is another ride's, and where that cannot be told.
 
-    >>> import numpy as np
-    >>> from kickstand_tools.api import Log
-    >>> still = Log(np.arange(3000) / 50.0, np.tile([0.0, 1.0, 0.0], (3000, 1)), np.zeros((3000, 3)))
-    >>> utc_s = 1.7e9 + np.arange(100.0)
-    >>> join_track(still, Track(utc_s, np.full(100, 48.0), np.full(100, 11.0), np.zeros(100), "track"))
-    Traceback (most recent call last):
-    kickstand_tools.errors.InputError: the log, track: the track moves for 0 s only, ...
+    >>> from kickstand_tools.api import simulate_ride
+    >>> ride = simulate_ride("hills", seed=1, seconds=120.0)
+    >>> course = np.cumsum(np.radians(ride.truth["yaw_rate_dps"])) / ride.rate_hz  # to the left of east
+    >>> north, east = (np.cumsum(ride.truth["speed_mps"] * way(course)) / ride.rate_hz for way in (np.sin, np.cos))
+    >>> lat, lon = np.degrees(north / 6_371_000.0)[::200], np.degrees(east / 6_371_000.0)[::200]
+    >>> track = Track(1.7e9 + np.arange(len(lat)), lat, lon, np.full(len(lat), np.nan), "track")
+    >>> joined = join_track(Log.from_readings(ride.readings, ride.rate_hz), track)
+    >>> round(joined.match.start_utc_s - 1.7e9)
+    0
     """
     given = track if isinstance(track, Track) else read_track(track)
     ride = read_twice(ride)
@@ -77,6 +79,15 @@ def write_joined(out: Path | str, joined: Joined, progress: Progress | None = No
 
     Gzipped if the name ends in .gz. Returns how many positions there are in it. progress: called with how much of the
     ride is done. Raises InputError.
+
+    >>> import tempfile
+    >>> log = Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2)
+    >>> track = Track(*(np.array([value]) for value in (1.7e9, 48.0, 11.0, 9.0)), name="track")
+    >>> joined = Joined(log, track, Match(1.7e9, 0.0, 0.1, 0.9, 0.0), own_speed=False, notices=[])
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     count = write_joined(f"{directory}/ride.csv", joined)
+    ...     print(Path(f"{directory}/ride.csv").read_text().splitlines()[1].partition(",0.000000,9")[2])
+    .000,48.0000000,11.0000000,1700000000.000
     """
     out, columns = Path(out), joined.columns
     at_us = np.rint(joined.match.ride_s(joined.track.utc_s) * 1e6).astype(np.int64)
