@@ -55,7 +55,8 @@ class Shown:
             at_s = self.t_s[known]
             place = np.clip(np.searchsorted(at_s, t_s, side="right") - 1, 0, len(known) - 2)
             speed = _between(at_s, self.speed_mps[known], place, t_s, _SPEED_S)
-        held = [np.where(t_s >= self.t_s[0], value[before], 0.0) for value in (self.left_deg, self.right_deg)]
+        last = np.searchsorted(self.t_s, t_s, side="right") - 1
+        held = [np.where(last >= 0, value[last], 0.0) for value in (self.left_deg, self.right_deg)]
         return Shown(t_s, *values, speed, *held)
 
 

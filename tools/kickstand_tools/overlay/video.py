@@ -50,11 +50,11 @@ def open_video(path: Path) -> Video:
         raise InputError(f"{path} has no pictures: give a video")
     size = re.search(r"\b(\d{2,5})x(\d{2,5})\b", stream[1])
     rate = re.search(r"([\d.]+)(k?) fps", stream[1]) or re.search(r"([\d.]+)(k?) tbr", stream[1])
-    counted = _run([*_QUIET[:1], "-nostdin", "-i", str(path), "-map", "0:v:0", "-c", "copy", "-f", "null", "-"])
-    times = re.findall(r"time=(\d+):(\d+):([\d.]+)", counted.stderr.decode(errors="replace"))
-    if not size or not rate or not times or counted.returncode:
+    counted = _run(["-hide_banner", "-nostdin", "-i", str(path), "-map", "0:v:0", "-c", "copy", "-f", "null", "-"])
+    pictures = re.findall(r"frame= *(\d+)", counted.stderr.decode(errors="replace"))
+    if not size or not rate or not pictures or not int(pictures[-1]) or counted.returncode:
         raise InputError(f"{path} is a damaged video: copy it again")
-    hours, minutes, seconds = times[-1]
+    fps = float(rate[1]) * (1000.0 if rate[2] else 1.0)
     width, height = int(size[1]), int(size[2])
     turned = re.search(r"rotation of (-?[\d.]+) degrees", said)
     if turned and round(float(turned[1])) % 180 == 90:
@@ -64,8 +64,8 @@ def open_video(path: Path) -> Video:
         path,
         width,
         height,
-        float(rate[1]) * (1000.0 if rate[2] else 1.0),
-        int(hours) * 3600.0 + int(minutes) * 60.0 + float(seconds),
+        fps,
+        int(pictures[-1]) / fps,
         int(telemetry[1]) if telemetry else None,
     )
 
