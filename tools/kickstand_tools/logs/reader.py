@@ -28,7 +28,7 @@ from .stretch import Stretch
 from .table import Array
 
 BLOCK_BYTES = 1 << 22  # of text, some 60000 samples
-LEAST_G = 0.3  # less than this is usual where gravity was taken off
+LEAST_G = 0.4  # median force; less is usual where gravity was taken off, a ride's is over 0.9
 BLOCK_SAMPLES = 60_000  # of a log in memory
 _NUMERIC = b"0123456789+-.eE, \n"  # where nothing else stands, numpy may read it
 
