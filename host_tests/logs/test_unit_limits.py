@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.errors import InputError
-from kickstand_tools.logs.rate_unit import RateUnit
+from kickstand_tools.logs.axes.bends import Bends
 from kickstand_tools.logs.speed_unit import SpeedUnit
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
@@ -14,7 +14,7 @@ KMH, KNOTS = 3.6, 1.9438
 TURNED = np.reshape(random_mounting(3), (3, 3))
 
 
-def weaving(scale=57.0, noise_dps=0.0, unlike=0.0, seconds=40.0, rest_s=8.0) -> RateUnit:
+def weaving(scale=57.0, noise_dps=0.0, unlike=0.0, seconds=40.0, rest_s=8.0) -> Bends:
     """A ride of bends to both sides at 15 m/s, its rates so many times too small; noise in that about left.
 
     unlike: part of the rolling that has nothing to do with turning. rest_s: at rest, after the ride.
@@ -28,7 +28,7 @@ def weaving(scale=57.0, noise_dps=0.0, unlike=0.0, seconds=40.0, rest_s=8.0) -> 
     about_left = yaw * np.sin(lean) + np.radians(noise_dps) * chance.normal(size=len(time)) * moving
     rate = np.degrees(np.column_stack((about_left, yaw * np.cos(lean), rolling))) / scale
     force = np.column_stack((0.0 * time, 1.0 / np.cos(lean), 0.3 * np.sin(2.0 * time) * moving))
-    unit = RateUnit()
+    unit = Bends()
     for part in np.array_split(np.arange(len(time)), 7):
         unit.add(time[part], force[part] @ TURNED, rate[part] @ TURNED, np.full(len(part), np.nan))
     return unit

@@ -4,7 +4,7 @@ import analysis_rides
 import command
 import numpy as np
 import pytest
-from kickstand_tools.logs.rate_unit import RateUnit
+from kickstand_tools.logs.axes.bends import Bends
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.refusals import sentence
 from kickstand_tools.simulation.files import simulate
@@ -21,7 +21,7 @@ def said(unit):
 def judged(log, scale=1.0, block=5000):
     """What is said of a whole log, its rates made smaller."""
     time, force, rate = log.t_s, log.accel_g, scale * log.gyro_dps
-    unit = RateUnit()
+    unit = Bends()
     for k in range(0, len(time), block):
         unit.add(time[k : k + block], force[k : k + block], rate[k : k + block], log.speed_mps[k : k + block])
     return said(unit)
@@ -36,8 +36,10 @@ def test_simulated_rides(tmp_path, profile):
 
 
 def test_a_short_ride_tells_it_too(tmp_path):
-    simulate("city", 5, tmp_path, 120.0)
-    assert "are they in rad/s?" in judged(read_log(tmp_path / "RIDE.csv"), np.radians(1.0))
+    simulate("city", 9, tmp_path, 120.0)
+    log = read_log(tmp_path / "RIDE.csv")
+    assert "are they in rad/s?" in judged(log, np.radians(1.0))
+    assert "the gyro of the opposite sign" in judged(log, -1.0)
 
 
 TURN = np.reshape(random_mounting(3), (3, 3))
@@ -46,7 +48,7 @@ TURN = np.reshape(random_mounting(3), (3, 3))
 def straight_on(time, forward, up):
     """What is said of a vehicle that hardly turns at all."""
     force = np.column_stack((0.05 * np.sin(0.3 * time), up * np.ones(len(time)), forward)) @ TURN
-    unit = RateUnit()
+    unit = Bends()
     rate = 0.01 * np.column_stack((np.cos(time), np.sin(time), time % 1.0)) @ TURN
     unit.add(time, force, rate, np.full(len(time), np.nan))
     return said(unit)
