@@ -8,13 +8,13 @@ from numpy.typing import NDArray
 
 from ..analysis.channels import Ride
 from ..analysis.signals import smoothed
+from ..analysis.summary import HELD_S
 from ..logs.source import Progress
 from ..logs.table import Array
 
 _FORCE_S = 0.3  # over which forces are averaged: engine and road shake them
 _GAP_S = 0.2  # a reading that is older is not shown
 _SPEED_S = 3.0  # the same of a speed, which comes once a second as a rule
-_HELD_S = 0.15  # a lean has to last so long to be a maximum: a pothole's does not
 
 
 @dataclass
@@ -75,9 +75,8 @@ def shown(ride: Ride, progress: Progress | None = None, notices: list[Notice] | 
 
 
 def _maximum(t_s: Array, lean: Array) -> Array:
-    """(n) the largest lean so far that lasted for _HELD_S."""
-    usual_s = float(np.median(np.diff(t_s)))
-    count = max(1, round(_HELD_S / usual_s))
+    """(n) the largest lean so far that lasted for HELD_S."""
+    count = round(HELD_S / float(np.median(np.diff(t_s)))) + 1
     value = np.where(np.isfinite(lean), lean, 0.0)
     padded = np.append(np.zeros(count - 1), value)
     lasted = np.min(np.lib.stride_tricks.sliding_window_view(padded, count), axis=1)
