@@ -8,6 +8,7 @@ import numpy as np
 import phone_tracks
 import pytest
 from kickstand_tools import api
+from kickstand_tools.joining import joined
 
 pytest.importorskip("fitdecode")
 
@@ -48,12 +49,23 @@ def test_each_point_is_in_the_row_nearest_to_it(tmp_path, log, ride, track):
     assert len(there) == pytest.approx(ride.time[-1], abs=2)
     assert np.allclose(np.diff(there["t_s"]), 1.0, atol=0.006)
     assert np.allclose(there["utc_s"] - there["t_s"], phone_tracks.START_UTC_S + 0.5, atol=0.2)
+    found = api.join_track(log, track).match
+    assert np.all(np.abs(found.ride_s(there["utc_s"]) - there["t_s"]) < 0.0026)  # half of 5 ms
     first = int(np.argmin(np.abs(track.utc_s - there["utc_s"][0])))
     part = slice(first, first + len(there))
     assert np.allclose(there["utc_s"], track.utc_s[part], atol=1e-3)
     assert np.allclose(there["lat_deg"], track.lat_deg[part], atol=1e-7)
     assert np.allclose(there["lon_deg"], track.lon_deg[part], atol=1e-7)
     assert np.allclose(there["speed_mps"], track.speed_mps[part], atol=1e-3)
+
+
+def test_the_nearest_row_is_the_one_before_or_the_one_after():
+    time_us, at_us = np.arange(0, 50_000, 5000), np.array([-1, 0, 2400, 2600, 12_400, 44_000, 45_000, 45_001])
+    rows, points = joined._nearest(time_us, at_us)
+    assert rows.tolist() == [0, 1, 2, 9]  # of two points in a row the later one
+    assert points.tolist() == [2, 3, 4, 6]
+    gap_us = np.array([0, 1_000_000, 1_005_000])
+    assert joined._nearest(gap_us, np.array([100_000, 500_000, 900_000]))[1].tolist() == [0, 2]
 
 
 def test_the_ride_stays_as_it_is(tmp_path, log, track):
@@ -76,9 +88,9 @@ def test_the_logs_own_speed_stays(tmp_path, ride, track):
     gpx = phone_tracks.write_gpx(tmp_path / "track.gpx", track)
     said = command.works("join", tmp_path / "RIDE.csv", gpx, "--out", tmp_path / "JOINED.csv").out
     assert "the log's own speed stays" in said
-    joined = api.read_log(tmp_path / "JOINED.csv")
-    assert np.array_equal(joined.speed_mps, made.speed_mps, equal_nan=True)
-    assert np.count_nonzero(np.isfinite(joined.lat_deg)) > 150
+    written = api.read_log(tmp_path / "JOINED.csv")
+    assert np.array_equal(written.speed_mps, made.speed_mps, equal_nan=True)
+    assert np.count_nonzero(np.isfinite(written.lat_deg)) > 150
 
 
 def test_columns_without_values_are_replaced(tmp_path, log, track):

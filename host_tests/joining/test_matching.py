@@ -123,12 +123,14 @@ def test_frozen_readings_and_gaps_are_left_out(rides):
     ride = rides["hills"]
     log = log_of(ride)
     accel, gyro = log.accel_g.copy(), log.gyro_dps.copy()
-    accel[20_000:24_000], gyro[20_000:24_000] = accel[20_000], gyro[20_000]
+    fast = 6000 + int(np.argmax(np.linalg.norm(gyro[6000:30_000], axis=1)))
+    accel[fast : fast + 4000], gyro[fast : fast + 4000] = accel[fast], gyro[fast]
     kept = np.abs(np.arange(len(log.t_s)) - 35_000) > 1500
     broken = api.Log(log.t_s[kept], accel[kept], gyro[kept])
     joined = api.join_track(broken, phone_tracks.track(ride))
     assert [notice.code for notice in joined.notices] == ["frozen-readings"]
     assert abs(error_s(joined, 0.5)) < 0.2
+    assert joined.match.correlation > 0.97  # as if the frozen readings had turned on it would be 0.8
 
 
 def test_correlations_are_those_of_the_parts_that_both_have():

@@ -15,8 +15,10 @@ pytest.importorskip("PIL")
 import gopro
 import imageio_ffmpeg
 from kickstand_tools.overlay.gauge import Gauge
+from kickstand_tools.overlay.gpmf import telemetry
 from kickstand_tools.overlay.overlay import MARGIN
 from kickstand_tools.overlay.shown import shown
+from kickstand_tools.overlay.video import open_video
 
 
 @pytest.fixture(scope="module")
@@ -106,14 +108,14 @@ def test_a_gopros_gyro_finds_the_offset(tmp_path):
     log = tmp_path / "RIDE.csv"
     api.write_log(log, api.Log.from_readings(made.readings, made.rate_hz))
     api.write_calibration(tmp_path / "RIDE.cal.json", api.fit_two_positions(*poses(made)).calibration)
-    begin = 9000
+    begin = 9005  # between two of the cells of 0.05 s that are compared
     turned = made.readings[begin : begin + 30 * 200, 4:] @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     noise = np.random.default_rng(2).normal(0.0, 0.5, turned.shape)
     film = gopro.with_telemetry(gopro.film(tmp_path / "GX01.mp4", 30.0), turned + noise + [1.0, -2.0, 0.5], 200.0)
     more = "--from", 50, "--to", 52, "--out", tmp_path / "out.mp4"
     said = command.works("overlay", log, "--video", film, *more).out
     found = float(said.partition("--offset ")[2].split()[0])
-    assert found == pytest.approx(begin / 200.0, abs=0.05)
+    assert found == pytest.approx(begin / 200.0, abs=0.015)
     other = gopro.with_telemetry(gopro.film(tmp_path / "GX02.mp4", 30.0), walk(30 * 200), 200.0)
     given = "overlay", log, "--video", other, "--out", tmp_path / "2.mp4"
     said = command.refused(tmp_path, *given, words="give --offset")
@@ -196,3 +198,14 @@ def test_a_disk_that_is_full_is_told(tmp_path, ride, monkeypatch):
     monkeypatch.setitem(overlay._TRANSPARENT, ".mov", ("-c:v", "no-such-codec"))
     given = "overlay", ride, "--from", 1, "--to", 2, "--out", tmp_path / "clip.mov"
     command.refused(tmp_path, *given, words="ffmpeg has stopped: ")
+
+
+def test_a_gopros_readings_are_read_in_deg_s_on_the_videos_time(tmp_path):
+    rate = walk(3 * 150)
+    film = open_video(gopro.with_telemetry(gopro.film(tmp_path / "GX.mp4", 3.0), rate, 150.0))
+    assert (film.width, film.height, film.fps, film.seconds) == (320, 240, 10.0, pytest.approx(3.0))
+    read = telemetry(film)
+    assert read is not None
+    assert np.allclose(read.rate_dps, rate, atol=0.02)
+    assert np.allclose(read.t_s, (np.arange(450) + 0.5) / 150.0, atol=0.002)
+    assert telemetry(open_video(gopro.film(tmp_path / "plain.mp4", 1.0))) is None

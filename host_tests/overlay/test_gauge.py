@@ -42,6 +42,18 @@ def test_a_lean_fills_its_own_side_as_far_as_it_goes(gauge, lean):
     assert right == pytest.approx(whole * min(lean, 60.0) / 60.0, rel=0.1, abs=40)
 
 
+def test_the_bike_leans_to_that_side(gauge):
+    """By the white between its feet and the dial: the rider's head is on the side of the lean."""
+    rows, middle = slice(round(0.25 * gauge.height), round(0.5 * gauge.height)), round(0.6 * gauge.height)
+    for lean in (-35.0, 35.0):
+        picture, still = (np.asarray(gauge.picture(**(KNOWN | {"lean_deg": d})), dtype=int) for d in (lean, math.nan))
+        changed = np.abs(picture - still).max(axis=2) > 100
+        changed &= picture[..., :3].min(axis=2) > 240
+        columns = np.argwhere(changed[rows])[:, 1]
+        assert len(columns) > 200
+        assert np.sign(columns.mean() - middle) == np.sign(lean)
+
+
 def test_the_word_of_the_side_is_lit(gauge):
     below = slice(round(0.75 * gauge.height), None)
     for lean, side in ((-25.0, 0), (25.0, 1)):
