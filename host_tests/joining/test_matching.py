@@ -4,7 +4,12 @@ import numpy as np
 import phone_tracks
 import pytest
 from kickstand_tools import api
+from kickstand_tools.joining.compare import Comparison
+from kickstand_tools.joining.course import course
+from kickstand_tools.joining.motion import motion
+from kickstand_tools.joining.pieces import pieces
 from kickstand_tools.joining.search import correlations
+from kickstand_tools.logs.axes.course import EARTH_M
 
 PROFILES = ("street", "track", "sweeper", "city", "hills")
 SECONDS = {"sweeper": 500.0, "city": 400.0}  # of a ride that has few bends for its length
@@ -131,6 +136,22 @@ def test_frozen_readings_and_gaps_are_left_out(rides):
     assert [notice.code for notice in joined.notices] == ["frozen-readings"]
     assert abs(error_s(joined, 0.5)) < 0.2
     assert joined.match.correlation > 0.97  # as if the frozen readings had turned on it would be 0.8
+
+
+def test_a_leaning_bikes_gyro_tells_how_the_course_turns():
+    """At 45 degrees of lean the rate about the bike's up is 0.7 of the yaw rate."""
+    t_s, speed = np.arange(0.0, 300.0, 0.01), 20.0
+    yaw = np.radians(25.0) * np.sin(2.0 * np.pi * t_s / 11.0) * np.sin(2.0 * np.pi * t_s / 70.0)
+    lean = -np.arctan(speed * yaw / 9.80665)
+    rates = np.degrees(np.column_stack((np.zeros(len(t_s)), yaw * np.cos(lean), np.gradient(lean, 0.01))))
+    force = np.outer(1.0 / np.cos(lean), [0.0, 1.0, 0.0])
+    heading = np.cumsum(yaw) * 0.01
+    lat, lon = (np.degrees(np.cumsum(speed * turn(heading)) * 0.01 / EARTH_M)[::100] for turn in (np.sin, np.cos))
+    steps = course(api.Track(1.7e9 + np.arange(300.0), lat, lon, np.full(300, speed), "exact"))
+    compared = Comparison(motion(api.Log(t_s, force, rates)), steps, pieces(steps), 0.0, 3.0)
+    error = compared.turned(0.0)[0] - compared.given.turned_deg
+    assert np.abs(compared.given.turned_deg).max() > 40.0
+    assert np.abs(error[compared.given.course_weight > 0.0]).max() < 3.0
 
 
 def test_correlations_are_those_of_the_parts_that_both_have():
