@@ -12,12 +12,12 @@ from kickstand_tools.joining.search import correlations
 from kickstand_tools.logs.axes.course import EARTH_M
 
 PROFILES = ("street", "track", "sweeper", "city", "hills")
-SECONDS = {"sweeper": 500.0, "city": 400.0}  # of a ride that has few bends for its length
+SECONDS = {"sweeper": 450.0, "city": 300.0, "street": 300.0}  # of a ride that has few bends for its length
 
 
 @pytest.fixture(scope="module")
 def rides():
-    return {name: api.simulate_ride(name, seed=11, seconds=SECONDS.get(name, 240.0)) for name in PROFILES}
+    return {name: api.simulate_ride(name, seed=11, seconds=SECONDS.get(name, 200.0)) for name in PROFILES}
 
 
 def log_of(ride, part: slice = slice(None), slow_ppm: float = 0.0) -> api.Log:
@@ -33,7 +33,7 @@ def error_s(joined, late_s: float, at_s: float = 0.0) -> float:
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-@pytest.mark.parametrize(("late_s", "smooth_s", "seed"), [(0.2, 0.2, 1), (1.0, 0.5, 2), (0.6, 0.0, 3)])
+@pytest.mark.parametrize(("late_s", "smooth_s", "seed"), [(0.2, 0.2, 1), (1.0, 0.4, 2)])
 def test_a_phones_track_is_found_within_a_fifth_of_a_second(rides, profile, late_s, smooth_s, seed):
     track = phone_tracks.track(rides[profile], late_s, smooth_s=smooth_s, seed=seed, error_m=3.0 + seed % 3)
     joined = api.join_track(log_of(rides[profile]), track)
@@ -56,14 +56,27 @@ def test_any_offset_and_half_of_the_ride(rides):
     assert joined.match.common_s < ride.time[-1] - 79.0
 
 
-def test_clocks_that_drift(rides):
-    """300 ppm are 0.27 s in 15 minutes: a match without drift would be off by half of it at both ends."""
-    ride = api.simulate_ride("street", seed=3, seconds=900.0)
-    joined = api.join_track(log_of(ride, slow_ppm=300.0), phone_tracks.track(ride, smooth_s=0.0, error_m=3.0))
-    assert joined.match.drift == pytest.approx(300e-6, abs=80e-6)
-    for at_s in (0.0, 900.0):
-        there = joined.match.ride_s(np.array([phone_tracks.START_UTC_S + 0.5 + at_s]))[0]
-        assert there == pytest.approx(at_s * (1.0 - 300e-6), abs=0.12)
+def winding(seconds: float, slow_ppm: float = 0.0) -> tuple[api.Log, api.Track]:
+    """A road of random bends at 20 m/s by an exact sensor and, ten times a second, an exact receiver; a slow log."""
+    t_s, speed = np.arange(0.0, seconds, 0.02), 20.0
+    knots_s = np.arange(0.0, seconds + 12.0, 6.0)
+    yaw = np.interp(t_s, knots_s, np.radians(25.0) * np.random.default_rng(1).uniform(-1.0, 1.0, len(knots_s)))
+    lean = -np.arctan(speed * yaw / 9.80665)
+    rates = np.degrees(np.column_stack((np.zeros(len(t_s)), yaw * np.cos(lean), np.gradient(lean, 0.02))))
+    force = np.outer(1.0 / np.cos(lean), [0.0, 1.0, 0.0])
+    heading = np.cumsum(yaw) * 0.02
+    lat, lon = (np.degrees(np.cumsum(speed * turn(heading)) * 0.02 / EARTH_M)[::5] for turn in (np.sin, np.cos))
+    track = api.Track(1.7e9 + 0.1 * np.arange(len(lat)), lat, lon, np.full(len(lat), speed), "exact")
+    return api.Log(t_s * (1.0 - slow_ppm * 1e-6), force, rates), track
+
+
+def test_clocks_that_drift():
+    """300 ppm are 0.5 s in half an hour: a match without drift would be off by half of it at both ends."""
+    log, track = winding(1800.0, slow_ppm=300.0)
+    found = api.join_track(log, track).match
+    assert found.drift == pytest.approx(300e-6, abs=20e-6)
+    for at_s in (0.0, 1800.0):
+        assert found.ride_s(np.array([1.7e9 + at_s]))[0] == pytest.approx(at_s * (1.0 - 300e-6), abs=0.12)
 
 
 def test_a_watch_that_writes_a_point_now_and_then(rides):
@@ -140,15 +153,9 @@ def test_frozen_readings_and_gaps_are_left_out(rides):
 
 def test_a_leaning_bikes_gyro_tells_how_the_course_turns():
     """At 45 degrees of lean the rate about the bike's up is 0.7 of the yaw rate."""
-    t_s, speed = np.arange(0.0, 300.0, 0.01), 20.0
-    yaw = np.radians(25.0) * np.sin(2.0 * np.pi * t_s / 11.0) * np.sin(2.0 * np.pi * t_s / 70.0)
-    lean = -np.arctan(speed * yaw / 9.80665)
-    rates = np.degrees(np.column_stack((np.zeros(len(t_s)), yaw * np.cos(lean), np.gradient(lean, 0.01))))
-    force = np.outer(1.0 / np.cos(lean), [0.0, 1.0, 0.0])
-    heading = np.cumsum(yaw) * 0.01
-    lat, lon = (np.degrees(np.cumsum(speed * turn(heading)) * 0.01 / EARTH_M)[::100] for turn in (np.sin, np.cos))
-    steps = course(api.Track(1.7e9 + np.arange(300.0), lat, lon, np.full(300, speed), "exact"))
-    compared = Comparison(motion(api.Log(t_s, force, rates)), steps, pieces(steps), 0.0, 3.0)
+    log, track = winding(300.0)
+    steps = course(track.once_a_second())
+    compared = Comparison(motion(log), steps, pieces(steps), 0.0, 3.0)
     error = compared.turned(0.0)[0] - compared.given.turned_deg
     assert np.abs(compared.given.turned_deg).max() > 40.0
     assert np.abs(error[compared.given.course_weight > 0.0]).max() < 3.0

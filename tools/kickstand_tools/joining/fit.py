@@ -23,6 +23,8 @@ _USUAL_TILT = 0.05  # 1 sigma, rad: of up by an accelerometer's offset
 _BELIEVED = 1.0 / np.array([np.inf, _USUAL_DRIFT, _USUAL_TILT, _USUAL_TILT, np.inf, np.inf, np.inf]) ** 2
 _SAME_TRACK_S = 0.05  # 1 sigma, of what a receiver smooths more in bends than on straights
 _DOUBTS = 4.0  # degrees of freedom of Student's distribution, by which errors over two sigma count less
+_LEAST_ERROR = 0.5  # of its weight's: a better receiver does not make the gyro's slope and the lean exact
+_LEAST_COST = 0.5 * (_DOUBTS + 1.0) * np.log1p(_LEAST_ERROR**2 / _DOUBTS)  # of a step
 _ROUNDS = 8
 _FEWEST = 2  # pieces to compare
 _STEPS_ALIKE = 4.0  # neighbouring steps whose errors are alike, because courses are smooth
@@ -65,7 +67,7 @@ def apart(motion: Motion, course: Course, pieces: Pieces, fit: Fit) -> float:
     shift_s = fit.shift_s * (1.0 - fit.drift) + fit.drift * compared.middle_s
     costs = _costs(compared, shift_s, fit.drift, np.append(1.0, fit.tilt))
     together = float(costs[len(_SHIFTS) // 2].sum())
-    usual = max(together / np.count_nonzero(given.course_weight), 1e-9)
+    usual = max(together / np.count_nonzero(given.course_weight), _LEAST_COST)
     return (together - float(costs.min(axis=0).sum())) / len(given.begin_s) / usual
 
 
@@ -196,5 +198,5 @@ def _least(columns: Array, values: Array, weight: Array) -> Array:
 def _counts(error: Array, weight: Array) -> Array:
     """(p, STEPS) the weight of each error: by its own variance, and less the more unusual it is."""
     scaled = error * np.sqrt(weight)
-    usual = max(float(np.median(np.abs(scaled[weight > 0.0]))) / 0.6745, 1e-9)
+    usual = max(float(np.median(np.abs(scaled[weight > 0.0]))) / 0.6745, _LEAST_ERROR)
     return weight / usual**2 * (1.0 + 1.0 / _DOUBTS) / (1.0 + (scaled / usual) ** 2 / _DOUBTS)

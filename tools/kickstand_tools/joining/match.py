@@ -53,6 +53,7 @@ class Match:
 def match(motion: Motion, track: Track) -> Match:
     """Raises InputError where the track does not belong to the ride, or where that cannot be told. The names of both
     stand before what it says."""
+    track = track.once_a_second()
     steps = course(track)
     parts = pieces(steps)
     _check_turns(motion, steps)

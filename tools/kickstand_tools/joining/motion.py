@@ -49,8 +49,8 @@ class Motion:
     def up(self) -> Array:
         """(3) the bike's up in the sensor's axes, to some degrees, as the accelerometer's offset has it."""
         turning = np.minimum(np.linalg.norm(self.rate_dps, axis=1), _MOST_DPS)
-        up = turning @ self.force_g
-        return np.asarray(up / max(float(np.linalg.norm(up)), 1e-9), dtype=float)
+        up: Array = turning @ self.force_g
+        return up / max(float(np.linalg.norm(up)), 1e-9)
 
 
 def motion(ride: Source, progress: Progress | None = None, notices: list[Notice] | None = None) -> Motion:

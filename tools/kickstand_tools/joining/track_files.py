@@ -102,8 +102,8 @@ def _fit(path: Path, progress: Progress | None) -> Iterator[Point]:
                 at, lat, lon, plain, speed = (frame.get_value(name, fallback=None) for name in _FIT_FIELDS)
                 speed = plain if speed is None else speed
                 if isinstance(at, datetime) and isinstance(lat, int) and isinstance(lon, int):
-                    known = isinstance(speed, (int, float))
-                    yield _utc_s(at), lat * _DEGREES, lon * _DEGREES, float(speed) if known else np.nan
+                    mps = float(speed) if isinstance(speed, (int, float)) else np.nan
+                    yield _utc_s(at), lat * _DEGREES, lon * _DEGREES, mps
                 if progress:
                     progress(min(file.tell(), total), total)
     except (fitdecode.FitError, TypeError, ValueError) as error:
