@@ -102,6 +102,7 @@ def test_an_export_replays_as_the_ride_it_was_made_from(tmp_path, name):
     ride = app_exports.riding().every(every)
     found = api.import_recording(write(tmp_path, ride))
     assert found.app == app
+    assert [notice.code for notice in found.notices if notice.code != "import-sign"] == []
     api.write_imported(tmp_path / "RIDE.csv", found)
     log = api.read_log(tmp_path / "RIDE.csv")
     t_s = log.t_s + log.start_s

@@ -108,7 +108,7 @@ def report(
 
     with Bar("reading") as bar:
         seen = overview(open_ride(_part(ride, from_s, to_s), calibration), bar.reach)
-    warn(ride, seen.notices)
+    warn(ride, [*seen.notices, *([seen.exchanged] if seen.exchanged else [])])
     if as_json:
         click.echo(json.dumps(as_data(seen)))
     else:

@@ -30,6 +30,8 @@ def check_text(log: str, content: bytes, lines_before: int) -> None:
         content.decode()
     except UnicodeDecodeError as error:
         line = lines_before + content.count(b"\n", 0, error.start) + 1
+        if content.startswith(b"PK\x03\x04"):
+            raise InputError(f"{log} is a zip: if an app has exported it, kickstand import makes a log of it") from None
         raise InputError(f"{log}, line {line}: not text: give a log as CSV or as .csv.gz") from error
 
 

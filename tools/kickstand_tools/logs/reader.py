@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..output import write_whole
 from . import cells
+from .axes.bends import Bends
 from .axes.handedness import Handedness
 from .block import Block
 from .cells import COLUMNS, OPTIONAL, TRACK
@@ -21,14 +22,13 @@ from .log import Log
 from .mended.even_blocks import even_blocks
 from .mended.frozen import FrozenReadings
 from .mended.last_line import last_marked, without_cut_line
-from .rate_unit import RateUnit
 from .source import File, Progress, chunks, name_of, total_bytes
 from .speed_unit import SpeedUnit
 from .stretch import Stretch
 from .table import Array
 
 BLOCK_BYTES = 1 << 22  # of text, some 60000 samples
-LEAST_G = 0.3  # less than this is usual where gravity was taken off
+LEAST_G = 0.4  # median force; less is usual where gravity was taken off, a ride's is over 0.9
 BLOCK_SAMPLES = 60_000  # of a log in memory
 _NUMERIC = b"0123456789+-.eE, \n"  # where nothing else stands, numpy may read it
 
@@ -75,7 +75,8 @@ def read_blocks(
     """
     name, count = name_of(source), 0
     remarks: list[Notice] = []
-    speed_unit, rate_unit, handedness, frozen = SpeedUnit(name), RateUnit(), Handedness(), FrozenReadings()
+    speed_unit, frozen = SpeedUnit(name), FrozenReadings()
+    axes = Handedness(), Bends()
     whole = source.source if isinstance(source, Stretch) else source
     total = len(whole.t_s) if isinstance(whole, Log) else total_bytes(whole)
     for block in _unchecked(source, remarks):
@@ -86,16 +87,16 @@ def read_blocks(
         if block.has_speed:
             speed_unit.add(block.t_s, block.readings[:, :3], block.speed_mps)
         if notices is not None:
-            rate_unit.add(block.t_s, block.readings[:, :3], block.readings[:, 4:])
-            handedness.add(block.t_s, block.readings[:, :3], block.readings[:, 4:], block.speed_mps)
+            for judge in axes:
+                judge.add(block.t_s, block.readings[:, :3], block.readings[:, 4:], block.speed_mps)
         yield block
         if progress:
             progress(block.done, total)
     if count < minimum:
         raise InputError(f"{name} is too short: {count} samples, at least {minimum} are needed")
     if notices is not None:
-        judged = [notice for notice in (rate_unit.notice, handedness.notice()) if notice]
-        notices += remarks + frozen.notices() + judged
+        judged = [notice for notice in (judge.notice() for judge in axes) if notice]
+        notices += remarks + frozen.notices() + judged[:1]  # one cause is told once
 
 
 def read_twice(source: Source) -> Source:
