@@ -158,12 +158,12 @@ def test_a_recorded_ride_tells_where_it_was(engine, tmp_path):
 
 
 def test_a_log_has_the_columns_that_there_is_something_in(tmp_path):
-    for name, more, columns in (
-        ("none", {}, []),
-        ("places", {"places_every": 10}, ["lat_deg", "lon_deg", "utc_s"]),
-        ("all", {"places_every": 10, "speed": True}, ["speed_mps", "lat_deg", "lon_deg", "utc_s"]),
+    for name, speed, every, columns in (
+        ("none", False, 0, []),
+        ("places", False, 10, ["lat_deg", "lon_deg", "utc_s"]),
+        ("all", True, 10, ["speed_mps", "lat_deg", "lon_deg", "utc_s"]),
     ):
-        blocks, _ = block_reader.read(b"".join(ride_writer.blocks(2, **more)[0]))
+        blocks, _ = block_reader.read(b"".join(ride_writer.blocks(2, speed=speed, places_every=every)[0]))
         ride_log.write(tmp_path / f"{name}.csv", blocks)
         header, first = (tmp_path / f"{name}.csv").read_text().splitlines()[:2]
         assert header.split(",")[7:] == [*columns, "temp_c"]

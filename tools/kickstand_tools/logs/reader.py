@@ -6,6 +6,7 @@ import io
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from kickstand.errors import Notice
@@ -219,13 +220,12 @@ def _block(
     names: list[str],
     done: int,
 ) -> Block:
-    column = dict.fromkeys(OPTIONAL, np.full(len(table), np.nan))
+    column: dict[str, Any] = dict.fromkeys(OPTIONAL, np.full(len(table), np.nan))
     column |= {name: table[:, k] for k, name in enumerate(places)}
     order = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")
-    readings = np.column_stack([column[name] for name in order])
     return Block(
         time_us,
-        readings,
+        np.column_stack([column[name] for name in order]),
         has_temp="temp_c" in places,
         has_speed="speed_mps" in places,
         start_s=start_s,

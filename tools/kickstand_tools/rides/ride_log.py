@@ -39,7 +39,7 @@ def rows(blocks: Iterable[Block], track: Sequence[str], from_us: int = 0) -> Ite
 
 def _told(turn: Turn) -> dict[str, str]:
     """What came from the speed source with a turn: the cells of TRACK."""
-    cells = dict.fromkeys(TRACK, "")
+    cells: dict[str, str] = dict.fromkeys(TRACK, "")
     if turn.speed_mps is not None:
         cells["speed_mps"] = f"{turn.speed_mps:.2f}"
     if turn.place:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...logs.axes.course import EARTH_M
 from ...logs.table import Array
@@ -57,7 +58,7 @@ def map_points(seen: Overview) -> MapPoints | None:
     north = scale_m * (_mercator(lat) - _mercator(np.array([lat_deg])))
     kept = _moved(east, north)
     t_s, east, north = t_s[kept], east[kept], north[kept]
-    row = np.clip(np.searchsorted(drawn.time_s, t_s), 0, len(drawn.time_s) - 1)
+    row = np.minimum(np.searchsorted(drawn.time_s, t_s), len(drawn.time_s) - 1)
     told = ~np.isnan(drawn.speed_kmh)
     none = np.full(len(t_s), np.nan)
     speed = np.interp(t_s, drawn.time_s[told], drawn.speed_kmh[told]) if np.any(told) else none
@@ -75,8 +76,8 @@ def figure(points: MapPoints, seen: Overview) -> Any:
 
     x, y = points.east_m.round(1), points.north_m.round(1)
     values = np.column_stack((points.t_s, points.lean_deg, points.speed_kmh)).round(1)
-    told = [[None if value != value else value for value in row] for row in values.tolist()]
-    none_for_nan = {"x": np.where(np.isnan(x), None, x).tolist(), "y": np.where(np.isnan(y), None, y).tolist()}
+    told = [_none_for_nan(row) for row in values.tolist()]
+    none_for_nan = {name: _none_for_nan(row) for name, row in (("x", x.tolist()), ("y", y.tolist()))}
     made: Any = Figure()
     line = {"width": 1.5, "color": "#8a8a8a"}
     made.add_trace(Scattergl(mode="lines", line=line, customdata=told, hoverinfo="skip", **none_for_nan))
@@ -119,6 +120,11 @@ def figure(points: MapPoints, seen: Overview) -> Any:
     return made
 
 
+def _none_for_nan(values: list[float]) -> list[float | None]:
+    """As JSON can hold them."""
+    return [None if value != value else value for value in values]
+
+
 def _times(places: Track, seconds: float) -> Array:
     """Evenly over the ride, and no more than POINTS."""
     first, last = float(places.t_s[0]), min(seconds, float(places.t_s[-1]))
@@ -130,7 +136,7 @@ def _mercator(lat_deg: Array) -> Array:
     return np.arcsinh(np.tan(np.radians(lat_deg)))
 
 
-def _moved(east: Array, north: Array) -> Array:
+def _moved(east: Array, north: Array) -> NDArray[np.intp]:
     """The numbers of the points to keep: those over SAME_M from the last that is kept, the first in each gap, and the
     first after it."""
     kept, (last_x, last_y) = [0], (east[0], north[0])
