@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+from typing import Any
 
 import analysis_rides
 import command
@@ -107,7 +108,8 @@ def test_a_gopros_gyro_finds_the_offset(tmp_path):
     made = api.simulate_ride("street", seed=4, seconds=120.0)
     log = tmp_path / "RIDE.csv"
     api.write_log(log, api.Log.from_readings(made.readings, made.rate_hz))
-    api.write_calibration(tmp_path / "RIDE.cal.json", api.fit_two_positions(*poses(made)).calibration)
+    kickstand, upright = (api.Log.from_readings(pose, made.rate_hz) for pose in (made.kickstand, made.upright))
+    api.write_calibration(tmp_path / "RIDE.cal.json", api.fit_two_positions(kickstand, upright).calibration)
     begin = 9005  # between two of the cells of 0.05 s that are compared
     turned = made.readings[begin : begin + 30 * 200, 4:] @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
     noise = np.random.default_rng(2).normal(0.0, 0.5, turned.shape)
@@ -120,10 +122,6 @@ def test_a_gopros_gyro_finds_the_offset(tmp_path):
     given = "overlay", log, "--video", other, "--out", tmp_path / "2.mp4"
     said = command.refused(tmp_path, *given, words="give --offset")
     assert "turn as the camera does" in said or "two times" in said
-
-
-def poses(made) -> list[api.Log]:
-    return [api.Log.from_readings(pose, made.rate_hz) for pose in (made.kickstand, made.upright)]
 
 
 def walk(count: int) -> np.ndarray:
@@ -181,7 +179,8 @@ def test_when_it_is_stopped_nothing_is_left(tmp_path, ride):
         if total == 50 and done == 20:
             raise KeyboardInterrupt
 
-    over, clip = {"video": film, "offset_s": 1.0}, {"from_s": 0.0, "to_s": 5.0, "fps": 10.0}
+    over: dict[str, Any] = {"video": film, "offset_s": 1.0}
+    clip: dict[str, Any] = {"from_s": 0.0, "to_s": 5.0, "fps": 10.0}
     for name, more in (("out.mp4", over), ("clip.mov", clip)):
         with pytest.raises(KeyboardInterrupt):
             api.overlay(ride, tmp_path / name, progress=stop, **more)

@@ -59,7 +59,7 @@ def _double_sums(motion: Motion, course: Course, shift_s: float) -> Array:
     leans as its turn demands.
     """
     up = motion.up
-    across = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
+    across = np.asarray(np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))]), dtype=float)
     across /= np.linalg.norm(across)
     rates = motion.rate_dps @ np.vstack((up, across, np.cross(up, across))).T
     second = round(1.0 / STEP_S)
@@ -67,7 +67,8 @@ def _double_sums(motion: Motion, course: Course, shift_s: float) -> Array:
     middle_s = (course.begin_s + course.end_s) / 2.0
     speed = np.interp(motion.t_s + shift_s, middle_s, np.where(course.good, course.speed_mps, 0.0))
     sine = np.minimum(np.abs(speed * np.radians(yaw_dps)) / STANDARD_GRAVITY, _MOST_SINE)
-    turned = _sums(rates / np.sqrt(1.0 - sine * sine)[:, None])
+    cosine = np.asarray(np.sqrt(1.0 - sine * sine), dtype=float)
+    turned = _sums(rates / cosine[:, None])
     sped_up = _sums(motion.force_g * STANDARD_GRAVITY)
     sped_up -= np.linspace(0.0, 1.0, len(sped_up))[:, None] * sped_up[-1]  # of gravity: it would cost digits
     once = np.hstack((turned, sped_up))

@@ -20,6 +20,7 @@ _SHIFTS = np.arange(-AROUND_S, AROUND_S + _TRIED_S / 2.0, _TRIED_S)
 _DRIFTS = np.arange(-300e-6, 301e-6, 20e-6)
 _USUAL_DRIFT = 100e-6  # 1 sigma: two crystals, one of them hot
 _USUAL_TILT = 0.05  # 1 sigma, rad: of up by an accelerometer's offset
+_BELIEVED = 1.0 / np.array([np.inf, _USUAL_DRIFT, _USUAL_TILT, _USUAL_TILT, np.inf, np.inf, np.inf]) ** 2
 _SAME_TRACK_S = 0.05  # 1 sigma, of what a receiver smooths more in bends than on straights
 _DOUBTS = 4.0  # degrees of freedom of Student's distribution, by which errors over two sigma count less
 _ROUNDS = 8
@@ -114,67 +115,73 @@ def _cost(given: Pieces, error_deg: Array) -> Array:
     return 0.5 * (_DOUBTS + 1.0) * np.log1p(square / _DOUBTS).sum(axis=1)
 
 
+@dataclass
+class _Step:
+    """What is known at one state of the seven unknowns: shift, drift, tilt (2), the sensor's forward axis (3).
+
+    model_deg (p, STEPS): the turned courses. pulls (p, 7): to where each piece pulls the unknowns. inverse (7, 7): of
+    the curvature.
+    """
+
+    model_deg: Array
+    pulls: Array
+    inverse: Array
+
+
 def _polished(compared: Comparison, tried: _Tried) -> Fit:
     """Gauss-Newton steps, in each of which an error counts by how usual it is."""
     given = compared.given
-    since_s = given.middle_s - compared.middle_s
-    shift_s, drift, tilt = tried.shift_s, tried.drift, np.zeros(2)
-    forward = _least(compared.sped_up(shift_s, drift), given.speed_mps, given.speed_weight)
-    believed = 1.0 / np.array([np.inf, _USUAL_DRIFT, _USUAL_TILT, _USUAL_TILT, np.inf, np.inf, np.inf]) ** 2
+    forward = _least(compared.sped_up(tried.shift_s, tried.drift), given.speed_mps, given.speed_weight)
+    now = np.array([tried.shift_s, tried.drift, 0.0, 0.0, *forward])
+    step = _step(compared, now)
     for _ in range(_ROUNDS):
-        turned, sped_up = compared.turned(shift_s, drift), compared.sped_up(shift_s, drift)
-        later = compared.turned(shift_s + _TRIED_S, drift) - compared.turned(shift_s - _TRIED_S, drift)
-        faster = compared.sped_up(shift_s + _TRIED_S, drift) - compared.sped_up(shift_s - _TRIED_S, drift)
-        along = np.append(1.0, tilt)
-        model_deg = np.tensordot(along, turned, 1)
-        course_error = given.turned_deg - model_deg
-        speed_error = given.speed_mps - np.tensordot(forward, sped_up, 1)
-        course_slope = np.tensordot(along, later, 1) / (2.0 * _TRIED_S)
-        speed_slope = np.tensordot(forward, faster, 1) / (2.0 * _TRIED_S)
-        none = np.zeros_like(since_s)
-        by_course = np.array([course_slope, course_slope * since_s, turned[1], turned[2], none, none, none])
-        by_speed = np.array([speed_slope, speed_slope * since_s, none, none, *sped_up])
-        counts = _counts(course_error, given.course_weight), _counts(speed_error, given.speed_weight)
-        square = sum(
-            np.einsum("ips,jps,ps->ij", by, by, count) for by, count in zip((by_course, by_speed), counts)
-        )
-        pulls = np.einsum("ips,ps->pi", by_course, counts[0] * course_error)
-        pulls += np.einsum("ips,ps->pi", by_speed, counts[1] * speed_error)
-        square = square + np.diag(believed + 1e-9)
-        now = np.array([0.0, drift, *tilt, 0.0, 0.0, 0.0])
-        step = np.linalg.solve(square, pulls.sum(axis=0) - believed * now)
-        shift_s += float(np.clip(step[0], -1.0, 1.0))
-        drift, tilt, forward = drift + float(step[1]), tilt + step[2:4], forward + step[4:]
-    return _judged(compared, tried.evidence, shift_s, drift, tilt, model_deg, np.linalg.inv(square), pulls, believed)
+        by = step.inverse @ (step.pulls.sum(axis=0) - _BELIEVED * now)
+        by[0] = np.clip(by[0], -1.0, 1.0)
+        now = now + by
+        step = _step(compared, now)
+    return _judged(compared, tried.evidence, now, step)
 
 
-def _judged(
-    compared: Comparison,
-    evidence: float,
-    shift_s: float,
-    drift: float,
-    tilt: Array,
-    model_deg: Array,
-    inverse: Array,
-    pulls: Array,
-    believed: Array,
-) -> Fit:
-    """inverse, pulls (p, 7), believed: of the last step. The errors within a piece may belong together: the variance
-    comes from how much the pieces pull at the solution, each on its own."""
-    given, count = compared.given, len(pulls)
-    spread = pulls.T @ pulls * count / max(count - 2, 1) + np.diag(believed)
-    covariance = (inverse @ spread @ inverse)[:2, :2]
+def _step(compared: Comparison, now: Array) -> _Step:
+    given, shift_s, drift, along, forward = compared.given, now[0], now[1], np.append(1.0, now[2:4]), now[4:]
+    turned, sped_up = compared.turned(shift_s, drift), compared.sped_up(shift_s, drift)
+    later = compared.turned(shift_s + _TRIED_S, drift) - compared.turned(shift_s - _TRIED_S, drift)
+    faster = compared.sped_up(shift_s + _TRIED_S, drift) - compared.sped_up(shift_s - _TRIED_S, drift)
+    model_deg = np.tensordot(along, turned, 1)
+    course_error, speed_error = given.turned_deg - model_deg, given.speed_mps - np.tensordot(forward, sped_up, 1)
+    course_slope, speed_slope = (
+        np.tensordot(axes, change, 1) / (2.0 * _TRIED_S) for axes, change in ((along, later), (forward, faster))
+    )
+    since_s = given.middle_s - compared.middle_s
+    none = np.zeros_like(since_s)
+    by_course = np.array([course_slope, course_slope * since_s, turned[1], turned[2], none, none, none])
+    by_speed = np.array([speed_slope, speed_slope * since_s, none, none, *sped_up])
+    course_counts = _counts(course_error, given.course_weight)
+    speed_counts = _counts(speed_error, given.speed_weight)
+    curvature = np.einsum("ips,jps,ps->ij", by_course, by_course, course_counts)
+    curvature += np.einsum("ips,jps,ps->ij", by_speed, by_speed, speed_counts) + np.diag(_BELIEVED + 1e-9)
+    pulls = np.einsum("ips,ps->pi", by_course, course_counts * course_error)
+    pulls += np.einsum("ips,ps->pi", by_speed, speed_counts * speed_error)
+    return _Step(model_deg, pulls, np.asarray(np.linalg.inv(curvature), dtype=float))
+
+
+def _judged(compared: Comparison, evidence: float, now: Array, step: _Step) -> Fit:
+    """The errors within a piece may belong together: the variance comes from how much the pieces pull at the solution,
+    each on its own."""
+    given, count, drift = compared.given, len(step.pulls), float(now[1])
+    spread = step.pulls.T @ step.pulls * count / max(count - 2, 1) + np.diag(_BELIEVED)
+    covariance = (step.inverse @ spread @ step.inverse)[:2, :2]
     ends_s = np.array([given.begin_s.min(), given.end_s.max()]) - compared.middle_s
     variance = max(float(np.array([1.0, end]) @ covariance @ np.array([1.0, end])) for end in ends_s)
     weight = given.course_weight
-    size = np.sqrt((weight * given.turned_deg**2).sum() * (weight * model_deg**2).sum())
+    size = np.sqrt((weight * given.turned_deg**2).sum() * (weight * step.model_deg**2).sum())
     return Fit(
-        (shift_s - drift * compared.middle_s) / (1.0 - drift),
+        (float(now[0]) - drift * compared.middle_s) / (1.0 - drift),
         drift,
         float(np.hypot(np.sqrt(variance), _SAME_TRACK_S)),
-        float((weight * given.turned_deg * model_deg).sum() / max(size, 1e-9)),
+        float((weight * given.turned_deg * step.model_deg).sum() / max(size, 1e-9)),
         evidence,
-        tilt,
+        now[2:4],
         count,
     )
 
@@ -182,7 +189,8 @@ def _judged(
 def _least(columns: Array, values: Array, weight: Array) -> Array:
     """(k) the combination of columns (k, p, STEPS) that is nearest to values."""
     root = np.sqrt(weight)
-    return np.linalg.lstsq((columns * root).reshape(len(columns), -1).T, (values * root).ravel(), rcond=None)[0]
+    found = np.linalg.lstsq((columns * root).reshape(len(columns), -1).T, (values * root).ravel(), rcond=None)[0]
+    return np.asarray(found, dtype=float)
 
 
 def _counts(error: Array, weight: Array) -> Array:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from kickstand.errors import Notice
 from kickstand.units import LOST_US
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..logs.block import Block
@@ -23,6 +24,7 @@ from .track import Track
 from .track_files import read_track
 
 SPEED = "speed_mps"
+Integers = NDArray[np.int64]
 _FORMAT = {SPEED: "%.3f", "lat_deg": "%.7f", "lon_deg": "%.7f", "utc_s": "%.3f"}
 
 
@@ -122,7 +124,7 @@ def write_joined(out: Path | str, joined: Joined, progress: Progress | None = No
     return count
 
 
-def _nearest(time_us: Array, at_us: Array) -> tuple[Array, Array]:
+def _nearest(time_us: Integers, at_us: Integers) -> tuple[Integers, Integers]:
     """Rows, and which points belong into them: those within the rows' time and not in a gap of the log."""
     points = np.flatnonzero((at_us >= time_us[0]) & (at_us <= time_us[-1]))
     after = np.clip(np.searchsorted(time_us, at_us[points]), 1, max(len(time_us) - 1, 1))
@@ -134,7 +136,7 @@ def _nearest(time_us: Array, at_us: Array) -> tuple[Array, Array]:
     return rows, points[near][::-1][last]
 
 
-def _placed(values: Array, rows: Array, count: int) -> Array:
+def _placed(values: Array, rows: Integers, count: int) -> Array:
     placed = np.full(count, np.nan)
     placed[rows] = values
     return placed

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
+from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..logs.table import Array
@@ -126,7 +127,7 @@ def _rough_shifts(motion: Motion, steps: Course) -> tuple[bool, list[float]]:
     return bool(other.max() > _LEAST_EVIDENCE and other.max() > 2.0 * likely.max()), shifts
 
 
-def _changes_of_track(steps: Course) -> tuple[Array, Array]:
+def _changes_of_track(steps: Course) -> tuple[Array, NDArray[np.bool_]]:
     """Every _GRID_S by how much the course changes within _SPAN_S, in degrees as a leaning bike's gyro sees it; and
     whether that is known."""
     middle_s, at_s = (steps.begin_s + steps.end_s) / 2.0, np.arange(0.0, steps.end_s[-1], _GRID_S)
@@ -140,7 +141,7 @@ def _changes_of_track(steps: Course) -> tuple[Array, Array]:
     return change * np.cos(np.arctan(speed * np.radians(change / _SPAN_S) / STANDARD_GRAVITY)), known
 
 
-def _changes_of_ride(motion: Motion) -> tuple[Array, Array]:
+def _changes_of_ride(motion: Motion) -> tuple[Array, NDArray[np.bool_]]:
     """The same of the ride's sensor."""
     at_s, half = np.arange(0.0, motion.seconds, _GRID_S), _SPAN_S / 2.0
     edges_s = np.arange(len(motion.there) + 1) * STEP_S

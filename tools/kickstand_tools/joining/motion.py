@@ -50,7 +50,7 @@ class Motion:
         """(3) the bike's up in the sensor's axes, to some degrees, as the accelerometer's offset has it."""
         turning = np.minimum(np.linalg.norm(self.rate_dps, axis=1), _MOST_DPS)
         up = turning @ self.force_g
-        return up / max(float(np.linalg.norm(up)), 1e-9)
+        return np.asarray(up / max(float(np.linalg.norm(up)), 1e-9), dtype=float)
 
 
 def motion(ride: Source, progress: Progress | None = None, notices: list[Notice] | None = None) -> Motion:

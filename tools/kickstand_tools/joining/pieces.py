@@ -7,6 +7,7 @@ which the ride began and the hills do not matter then.
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..logs.table import Array
 from .course import Course
@@ -36,7 +37,7 @@ class Pieces:
         """(p, STEPS) of each step."""
         return (self.begin_s + self.end_s) / 2.0
 
-    def part(self, which: Array) -> "Pieces":
+    def part(self, which: NDArray[np.bool_]) -> "Pieces":
         """The pieces for which an array of p is True."""
         arrays = self.begin_s, self.end_s, self.turned_deg, self.course_weight, self.speed_mps, self.speed_weight
         return Pieces(*(array[which] for array in arrays))

@@ -99,18 +99,18 @@ def _fit(path: Path, progress: Progress | None) -> Iterator[Point]:
             for frame in frames:
                 if not isinstance(frame, fitdecode.FitDataMessage) or frame.name != "record":
                     continue
-                at, lat, lon = (frame.get_value(name, fallback=None) for name in _FIT_FIELDS)
-                if at is None or lat is None or lon is None or not isinstance(at, datetime):
-                    continue
-                speed = frame.get_value("enhanced_speed", fallback=frame.get_value("speed", fallback=None))
-                yield _utc_s(at), lat * _DEGREES, lon * _DEGREES, np.nan if speed is None else float(speed)
+                at, lat, lon, plain, speed = (frame.get_value(name, fallback=None) for name in _FIT_FIELDS)
+                speed = plain if speed is None else speed
+                if isinstance(at, datetime) and isinstance(lat, int) and isinstance(lon, int):
+                    known = isinstance(speed, (int, float))
+                    yield _utc_s(at), lat * _DEGREES, lon * _DEGREES, float(speed) if known else np.nan
                 if progress:
                     progress(min(file.tell(), total), total)
     except (fitdecode.FitError, TypeError, ValueError) as error:
         raise InputError(f"{path} is no FIT file, or a damaged one: {error}") from error
 
 
-_FIT_FIELDS = ("timestamp", "position_lat", "position_long")
+_FIT_FIELDS = ("timestamp", "position_lat", "position_long", "speed", "enhanced_speed")
 
 
 def _utc_s(time: datetime) -> float:

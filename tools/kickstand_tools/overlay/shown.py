@@ -46,9 +46,9 @@ class Shown:
     def at(self, t_s: Array) -> "Shown":
         """The same at other times (m); NaN before the ride, after it and in gaps."""
         before = np.clip(np.searchsorted(self.t_s, t_s, side="right") - 1, 0, len(self.t_s) - 2)
-        values = []
-        for value in (self.lean_deg, self.forward_g, self.left_g):
-            values.append(_between(self.t_s, value, before, t_s, _GAP_S))
+        lean, forward, left = (
+            _between(self.t_s, value, before, t_s, _GAP_S) for value in (self.lean_deg, self.forward_g, self.left_g)
+        )
         known = np.flatnonzero(np.isfinite(self.speed_mps))
         speed = np.full(len(t_s), np.nan)
         if len(known) > 1:
@@ -56,8 +56,8 @@ class Shown:
             place = np.clip(np.searchsorted(at_s, t_s, side="right") - 1, 0, len(known) - 2)
             speed = _between(at_s, self.speed_mps[known], place, t_s, _SPEED_S)
         last = np.searchsorted(self.t_s, t_s, side="right") - 1
-        held = [np.where(last >= 0, value[last], 0.0) for value in (self.left_deg, self.right_deg)]
-        return Shown(t_s, *values, speed, *held)
+        most_left, most_right = (np.where(last >= 0, value[last], 0.0) for value in (self.left_deg, self.right_deg))
+        return Shown(t_s, lean, forward, left, speed, most_left, most_right)
 
 
 def shown(ride: Ride, progress: Progress | None = None, notices: list[Notice] | None = None) -> Shown:
