@@ -24,7 +24,7 @@ for _command in (
     *(board.flash, board.status, board.pull, board.record),
     *(import_.import_, calibrate.calibrate, ride.replay, ride.report, ride.plot, ride.export, ride.cut),
     *(simulated.simulate, simulated.evaluate),
-    *(without_a_board.demo, without_a_board.emulate, without_a_board.bench),
+    *(without_a_board.demo, without_a_board.web, without_a_board.emulate, without_a_board.bench),
 ):
     kickstand.add_command(_command)
 calibrate.calibrate.add_command(calibrate_ride.ride)
