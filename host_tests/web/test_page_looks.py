@@ -32,6 +32,25 @@ def test_on_a_phone_everything_for_the_first_minute_is_on_its_first_screen(chrom
     rider.context.close()
 
 
+def test_a_phone_leans_the_motorcycle(chromium, address):
+    rider = Rider(chromium, address, **PHONE)
+    rider.reads("Raw")
+    phone = rider.context.new_cdp_session(rider.page)
+
+    def tilt(gamma):
+        phone.send("DeviceOrientation.setDeviceOrientationOverride", {"alpha": 0, "beta": 40, "gamma": gamma})
+
+    tilt(3)
+    rider.page.tap("#tilt")
+    rider.page.wait_for_function("document.querySelector('#tilt').ariaPressed === 'true'")
+    assert rider.page.is_checked("input[value=ride]")
+    rider.page.wait_for_timeout(200)
+    tilt(23)
+    rider.page.wait_for_function("document.querySelector('#lean-out').value === '20° right'")
+    rider.page.wait_for_function("seen.last.lean_deg > 15")
+    rider.context.close()
+
+
 def test_a_screen_reader_presses_the_button_too(chromium, address):
     """It sends a click that no pointer has made."""
     rider = Rider(chromium, address, **LAPTOP)

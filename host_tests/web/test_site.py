@@ -5,6 +5,7 @@ import http.client
 import json
 import re
 import threading
+import urllib.request
 from pathlib import Path
 
 import pytest
@@ -30,6 +31,21 @@ def test_it_is_written_to_a_folder(files, tmp_path):
     assert f"written: {out}" in told.out
     written = {path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("*") if path.is_file()}
     assert written == files
+
+
+def test_it_is_served_and_opened(files, monkeypatch):
+    opened, seen = [], []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+
+    def look(server):
+        """In place of serving until Ctrl-C."""
+        threading.Thread(target=server.handle_request, daemon=True).start()
+        seen.append(urllib.request.urlopen(opened[0]).read())
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(serve.Server, "serve_forever", look)
+    assert works("web").out == f"Kickstand in the browser: {opened[0]} (Ctrl-C ends it)\n"
+    assert seen == [files["index.html"]]
 
 
 def test_it_may_lie_anywhere(files):

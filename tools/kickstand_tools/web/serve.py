@@ -1,8 +1,11 @@
 """Serves the site to the browser of this computer."""
 
 import errno
+import os
+import sys
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import PurePosixPath
+from typing import Any
 from urllib.parse import unquote, urlsplit
 
 HOST = "127.0.0.1"
@@ -22,7 +25,17 @@ TYPES = {
 }
 
 
-def server(files: dict[str, bytes], port: int = PORT) -> ThreadingHTTPServer:
+class Server(ThreadingHTTPServer):
+    """Says nothing of a browser that hangs up."""
+
+    allow_reuse_address = os.name != "nt"  # there it would share the port with whoever has it
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        if not isinstance(sys.exc_info()[1], ConnectionError):
+            super().handle_error(request, client_address)
+
+
+def server(files: dict[str, bytes], port: int = PORT) -> Server:
     """A server of {path: content}, on `port` or, if that is taken, on a free one. Its port is server_address[1]."""
 
     class Handler(BaseHTTPRequestHandler):
@@ -49,10 +62,9 @@ def server(files: dict[str, bytes], port: int = PORT) -> ThreadingHTTPServer:
         def log_message(self, format: str, *args: object) -> None:
             """Say nothing of each request."""
 
-    ThreadingHTTPServer.allow_reuse_address = False
     try:
-        return ThreadingHTTPServer((HOST, port), Handler)
+        return Server((HOST, port), Handler)
     except OSError as error:
         if error.errno not in (errno.EADDRINUSE, errno.EACCES) or not port:
             raise
-        return ThreadingHTTPServer((HOST, 0), Handler)
+        return Server((HOST, 0), Handler)

@@ -3,6 +3,7 @@
 const RIDE_S = 3; // that the lean is held before the last step counts as done
 const WELL_DEG = 15;
 
+const REFUSED = /^(Moved!|Same pose|Tilt |Gyro offset|Not saved)/; // lines of firmware/kickstand/ui/messages.py
 const MENU = "→"; // begins a line of the menu
 
 /** A step: number (1 to 4, 0 for none), text, and the action that its button does: [label, what], or none. */
@@ -43,6 +44,7 @@ export class Guide {
     }
     if (first.startsWith("Upright: hold")) return step(2, "Keep it still, until the bar is full.");
     if (first.startsWith("Aligned")) return step(3, "Done: the meter knows how the sensor sits. Ride!", pose === "ride" ? null : ["Ride", "ride"]);
+    if (REFUSED.test(first)) return step(0, "The meter says why it does not take this. Stand still, and press the button again.");
     if (state.armed) return this.#save(first, second, pose);
     if (first.startsWith("Lean")) return this.#ride(shown, pose, state);
     return null;

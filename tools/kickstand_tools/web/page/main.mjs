@@ -9,6 +9,7 @@ import { Road } from "./road.mjs";
 
 const byId = (id) => document.getElementById(id);
 const SLOW = 0.9; // of real time
+const MOST_S = 0.1; // that the road moves on from one picture to the next
 const settled = { kickstand: "kickstand", upright: "upright" };
 
 const bike = new Bike(byId("bike"));
@@ -18,7 +19,7 @@ const state = { powered: true, plugged: true, armed: false, time: 0 };
 let display;
 let tick = { t_s: 0, lean_deg: -12, speed_mps: 0, yaw_rate_dps: 0, phase: "kickstand" };
 let screen = { text: ["", ""], shown_deg: null };
-let drawn = { t_s: 0, speed_mps: 0 };
+let drawn = { t_s: -1 };
 let told = null;
 
 const board = new Board({
@@ -105,7 +106,7 @@ function draw() {
   const { t_s, lean_deg, speed_mps, yaw_rate_dps, phase } = tick;
   if (t_s !== drawn.t_s) {
     bike.draw(lean_deg, screen.shown_deg, steering.pose, speed_mps, phase === "brake");
-    road.draw(speed_mps, yaw_rate_dps, Math.min(0.1, t_s - drawn.t_s));
+    road.draw(speed_mps, yaw_rate_dps, Math.min(MOST_S, t_s - drawn.t_s));
     put("true-lean", leanText(lean_deg));
     put("shown-lean", screen.shown_deg === null ? "no lean" : leanText(screen.shown_deg, 0));
     put("speed-now", `${Math.round(speed_mps * 3.6)} km/h`);

@@ -11,7 +11,7 @@ const SLICE_S = 0.1; // of the board's time at once: garbage is collected only b
 const LATE_S = 0.2; // a browser that was busy for longer does not race to catch up
 const RATE_MS = 2000; // over which the pace is measured
 
-let device;
+let device; // its functions: each look-up would make a new one
 let boardS = 0; // up to where the board's time has come
 let beganMs; // what performance.now() was, or would have been, when the board's time was 0
 let awake = true;
@@ -24,20 +24,21 @@ async function load() {
     loadMicroPython({ stdout: (line) => console.log(line), linebuffer: true }),
     fetch("./python.json").then((answer) => answer.json()),
   ]);
-  const made = new Set();
+  const folders = new Set();
   for (const [name, source] of Object.entries(python)) {
     const parts = `lib/${name}`.split("/");
     for (let depth = 1; depth < parts.length; depth++) {
       const folder = parts.slice(0, depth).join("/");
-      if (!made.has(folder)) micropython.FS.mkdir(`/${folder}`);
-      made.add(folder);
+      if (!folders.has(folder)) micropython.FS.mkdir(`/${folder}`);
+      folders.add(folder);
     }
     micropython.FS.writeFile(`/lib/${name}`, source);
   }
   micropython.FS.mkdir("/flash"); // of the board: calibration and rides
   micropython.FS.chdir("/flash");
   micropython.runPython("import sys; sys.path.insert(0, '/lib')");
-  device = micropython.pyimport("kickstand_tools.web.device").PageDevice();
+  const made = micropython.pyimport("kickstand_tools.web.device").PageDevice();
+  device = { order: made.order, run_to: made.run_to, take: made.take };
 }
 
 /** Let the board's time follow ours, and send what is to be seen. */
