@@ -27,6 +27,7 @@ from .calibration.six import SixPositions, fit_six_positions
 from .calibration.two import TwoPositions, fit_two_positions
 from .errors import InputError
 from .imports.importing import Imported, import_recording, write_imported
+from .logs.csv_lines import write_log
 from .logs.cut import cut_log
 from .logs.log import Log
 from .logs.reader import read_log
@@ -76,5 +77,6 @@ __all__ = [
     "vehicle_channels",
     "write_calibration",
     "write_imported",
+    "write_log",
     "write_site",
 ]

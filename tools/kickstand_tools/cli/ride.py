@@ -64,11 +64,11 @@ def replay(
 
 @click.command()
 @click.argument("ride", type=_PATH, metavar="RIDE.csv")
-@click.option("--to", "form", required=True, type=click.Choice(["csv", "vbo", "racechrono", "parquet"]))
+@click.option("--to", "form", required=True, type=click.Choice(["csv", "gpx", "vbo", "racechrono", "parquet"]))
 @_CALIBRATION
 @_OUT
 def export(ride: Path, form: str, calibration: Path | None, out: Path) -> None:
-    """Write a ride as Circuit Tools (vbo), RaceChrono or data frames (parquet, csv) open it.
+    """Write a ride as maps (gpx), Circuit Tools (vbo), RaceChrono or data frames (parquet, csv) open it.
 
     The log's axes are right-handed, and so are its rates; at rest the axis that points up reads +1 g.
     """
@@ -108,7 +108,7 @@ def report(
 
     with Bar("reading") as bar:
         seen = overview(open_ride(_part(ride, from_s, to_s), calibration), bar.reach)
-    warn(ride, seen.notices)
+    warn(ride, [*seen.notices, *([seen.exchanged] if seen.exchanged else [])])
     if as_json:
         click.echo(json.dumps(as_data(seen)))
     else:

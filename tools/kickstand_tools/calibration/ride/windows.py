@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...logs.axes.leaning import WINDOW_S, averaged, unrest
 from ...logs.cells import MOST_DPS, MOST_G
 from ...logs.log import Log
 from ...logs.table import Array
 
-WINDOW_S = 0.2
 _MOUNTED_S, _MOUNTED_DEG = 10.0, 35.0  # over so long the mean force of a ride keeps within this of the usual one
 _LONGEST_S = 1800.0  # more than half an hour of a ride tells no more
 _STILL_S, _CALM_S = 1.6, 1.0  # shorter standstills are not told from smooth riding
@@ -72,7 +72,7 @@ def windows_of(log: Log) -> Windows:
         np.append(np.diff(number) == 1, False)[: len(kept)],
         _still(rate, force, known, _STILL_S),
         _still(rate, force, known, _CALM_S),
-        _unrest(rate, _CALM_S),
+        unrest(rate, _CALM_S),
     )
 
 
@@ -82,16 +82,6 @@ def known_speed(time_s: Array, speed: Array) -> Array:
     if np.count_nonzero(there) < 2:
         return np.full(len(speed), np.nan)
     return np.interp(time_s, time_s[there], speed[there])
-
-
-def averaged(values: Array, seconds: float) -> Array:
-    """Mean over so many seconds around each window; (n) or (n, k)."""
-    half = max(1, round(seconds / WINDOW_S / 2.0))
-    if not len(values):
-        return values
-    padded = np.concatenate((np.repeat(values[:1], half + 1, 0), values, np.repeat(values[-1:], half, 0)))
-    total = np.cumsum(padded, axis=0)
-    return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
 
 
 def _plausible(log: Log, starts: NDArray[np.intp]) -> NDArray[np.bool_]:
@@ -116,19 +106,10 @@ def _mounted(force: Array) -> slice:
     return slice(begin, min(end, begin + round(_LONGEST_S / WINDOW_S)))
 
 
-def _unrest(values: Array, over_s: float) -> Array:
-    """(n): standard deviation within over_s, of the component that has the largest; values (n, 3)."""
-    if not len(values):
-        return np.zeros(0)
-    centred = values - values.mean(axis=0)
-    variance = averaged(centred**2, over_s) - averaged(centred, over_s) ** 2
-    return np.sqrt(np.maximum(variance, 0.0)).max(axis=1)
-
-
 def _still(rate: Array, force: Array, speed: Array, over_s: float) -> NDArray[np.bool_]:
     """Nothing changes for over_s, and the rates are those of most such places. speed: m/s, NaN if unknown."""
     allowed = np.where(speed < _STILL_MPS, _STANDS, 1.0)
-    calm = (_unrest(rate, over_s) < allowed * _STILL_RADPS) & (_unrest(force, over_s) < allowed * _STILL_G)
+    calm = (unrest(rate, over_s) < allowed * _STILL_RADPS) & (unrest(force, over_s) < allowed * _STILL_G)
     calm &= ~(speed >= _STILL_MPS)
     if not np.any(calm):
         return calm

@@ -72,10 +72,12 @@ const actions = {
   },
 };
 
-byId("do").addEventListener("click", () => actions[byId("do").dataset.action]?.());
-for (const id of ["wire", "cut", "power"]) byId(id).addEventListener("click", () => state.armed && id === "cut" ? null : actions[id]());
-// After a click the space bar is the board's button again
-addEventListener("pointerup", () => setTimeout(() => document.activeElement?.matches("button:not(#press)") && document.activeElement.blur()));
+byId("do").addEventListener("click", () => actions[byId("do").dataset.action]());
+for (const id of ["wire", "cut", "power"]) byId(id).addEventListener("click", actions[id]);
+// After a click with the mouse the space bar is the board's button again
+addEventListener("click", (event) => {
+  if (event.detail && event.target.matches("button:not(#press)")) event.target.blur();
+});
 
 /** The guide's step and the faults, where they have changed. */
 function tell() {
@@ -95,11 +97,9 @@ function tell() {
   }
 }
 
-function toggle(id, pressed, text) {
-  const button = byId(id);
-  if (button.textContent === text) return;
-  button.textContent = text;
-  button.setAttribute("aria-pressed", String(pressed));
+function toggle(id, on, text) {
+  put(id, text);
+  byId(id).classList.toggle("on", on);
 }
 
 function draw() {
