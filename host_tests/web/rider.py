@@ -70,6 +70,7 @@ class Rider:
         self.page.keyboard.down("Space")
         self.wait(seconds)
         self.page.keyboard.up("Space")
+        self.wait(0.3)  # as a finger does, which does not press again at once
 
     def click(self, selector):
         self.page.click(selector)
