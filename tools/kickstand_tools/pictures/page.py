@@ -1,5 +1,6 @@
 """The page of `kickstand web` as Chromium shows it, riding through a bend."""
 
+import hashlib
 import io
 import threading
 from pathlib import Path
@@ -10,6 +11,7 @@ _CHROMIUM = Path("/usr/bin/chromium")
 _LAPTOP, _PHONE = (1440, 900), (390, 844)
 _WAIT_MS = 60_000
 _COLOURS = 256  # of the file, so that it is small
+_DRAWN = ("index.html", "style.css", "bike.mjs", "road.mjs", "display.mjs")  # what decides how it looks
 _SAYS = "text => document.querySelector('#display').ariaLabel.includes(text)"
 _TOLD = "text => document.querySelector('#todo').textContent.includes(text)"
 
@@ -19,9 +21,14 @@ def available() -> bool:
     return _CHROMIUM.exists()
 
 
+def looks() -> str:
+    """A hash of the page's files that decide how it looks. The picture carries it, so that a test knows a stale one."""
+    return hashlib.sha256(b"".join((site.PAGE / name).read_bytes() for name in _DRAWN)).hexdigest()
+
+
 def draw(size: tuple[int, int] = _LAPTOP, dark: bool = False) -> bytes:
     """The page as a PNG file. size: in pixels."""
-    from PIL import Image
+    from PIL import Image, PngImagePlugin
     from playwright.sync_api import sync_playwright
 
     with serve.server(site.site_files(), 0) as server, sync_playwright() as playwright:
@@ -47,6 +54,7 @@ def draw(size: tuple[int, int] = _LAPTOP, dark: bool = False) -> bytes:
         shot = page.screenshot()
         browser.close()
         server.shutdown()
-    small = io.BytesIO()
-    Image.open(io.BytesIO(shot)).convert("RGB").quantize(_COLOURS).save(small, "PNG", optimize=True)
+    small, marked = io.BytesIO(), PngImagePlugin.PngInfo()
+    marked.add_text("looks", looks())
+    Image.open(io.BytesIO(shot)).convert("RGB").quantize(_COLOURS).save(small, "PNG", optimize=True, pnginfo=marked)
     return small.getvalue()
