@@ -1,4 +1,4 @@
-"""The files of the site: ours, the Python that the page runs, the display's characters, MicroPython."""
+"""The files of the site: ours, the Python that the page runs, the display's characters, and what comes from npm."""
 
 import hashlib
 import json
@@ -7,7 +7,7 @@ from pathlib import Path
 from .. import firmware_path
 from ..output import check_directory, new_directory, write_whole
 from ..pictures.lcd_font import ROM
-from . import micropython
+from . import install_archive, npm_packages
 
 PAGE = Path(__file__).resolve().parent / "page"
 # The tools' modules and folders that device.py imports
@@ -23,6 +23,8 @@ MODULES = (
     "web/__init__.py",
     "web/device.py",
 )
+INSTALLING = ("pyodide/", "install.zip")  # large, and only for those who have a board: fetched when they ask for it
+_NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first by itself, the second as "./"
 _LISTED = "__FILES__", "__VERSION__"  # in service_worker.js
 
 
@@ -40,13 +42,14 @@ def site_files() -> dict[str, bytes]:
     >>> sorted(site_files())[:2]  # doctest: +SKIP
     ['bike.mjs', 'board.mjs']
     """
-    files = {f"micropython/{name}": data for name, data in micropython.find().items()}
+    files = npm_packages.find()
     files |= {path.name: path.read_bytes() for path in sorted(PAGE.iterdir()) if path.is_file()}
     files["python.json"] = json.dumps(python_files()).encode()
+    files["install.zip"] = install_archive.archive()
     files["font.json"] = json.dumps({code: list(rows) for code, rows in ROM.items()}).encode()
     version = hashlib.sha256(b"".join(name.encode() + data for name, data in sorted(files.items()))).hexdigest()[:12]
     worker = files["service_worker.js"].decode()
-    kept = sorted(["./", *(set(files) - {"service_worker.js", "index.html"})])
+    kept = sorted(["./", *(name for name in files if name not in _NOT_KEPT and not name.startswith(INSTALLING))])
     for mark, text in zip(_LISTED, (json.dumps(kept), version)):
         worker = worker.replace(f'"{mark}"', text if text.startswith("[") else f'"{text}"')
     files["service_worker.js"] = worker.encode()

@@ -5,6 +5,7 @@ import { Board } from "./board.mjs";
 import { Steering, connectButton, leanText } from "./controls.mjs";
 import { Display } from "./display.mjs";
 import { Guide } from "./guide.mjs";
+import { connectInstall } from "./install.mjs";
 import { Road } from "./road.mjs";
 
 const byId = (id) => document.getElementById(id);
@@ -56,6 +57,7 @@ const board = new Board({
 
 const steering = new Steering((name, value) => board.order(name, value));
 connectButton((down) => board.button(down));
+connectInstall();
 
 const actions = {
   kickstand: () => steering.stand("kickstand"),

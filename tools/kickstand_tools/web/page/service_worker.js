@@ -32,5 +32,9 @@ async function forget() {
 
 async function answer(request) {
   const cache = await caches.open(CACHE);
-  return (await cache.match(request, { ignoreSearch: true })) ?? fetch(request);
+  const kept = await cache.match(request, { ignoreSearch: true });
+  if (kept) return kept;
+  const fetched = await fetch(request); // what installs the firmware is kept once it was asked for
+  if (fetched.ok) await cache.put(request, fetched.clone());
+  return fetched;
 }

@@ -1,4 +1,5 @@
-"""MicroPython for browsers: a package from npm, of the version and with the hash that npm/package-lock.json names."""
+"""MicroPython and CPython for browsers: packages from npm, of the versions and with the hashes in
+npm/package-lock.json."""
 
 import hashlib
 import importlib.util
@@ -12,13 +13,22 @@ from ..errors import InputError, cause, extra
 
 NPM = Path(__file__).resolve().parent / "npm"
 LISTS = ("package.json", "package-lock.json")
-FILES = ("micropython.mjs", "micropython.wasm")
-_FOLDER = Path("node_modules", "@micropython", "micropython-webassembly-pyscript")
+# Folder in the site: package, and which of its files
+PACKAGES = {
+    "micropython": (
+        "@micropython/micropython-webassembly-pyscript",
+        ("micropython.mjs", "micropython.wasm"),
+    ),
+    "pyodide": (
+        "pyodide",
+        ("pyodide.mjs", "pyodide.asm.mjs", "pyodide.asm.wasm", "python_stdlib.zip", "pyodide-lock.json"),
+    ),
+}
 _TIMEOUT_S = 300
 
 
 def find() -> dict[str, bytes]:
-    """{file name: content} of MicroPython's module and of its WebAssembly.
+    """{path in the site: content} of PACKAGES.
 
     npm installs it once, into .cache/kickstand of the home directory. Raises InputError if that is not possible.
     """
@@ -27,7 +37,11 @@ def find() -> dict[str, bytes]:
     if not kept.is_dir():
         _install(kept)
     try:
-        return {name: (kept / _FOLDER / name).read_bytes() for name in FILES}
+        return {
+            f"{folder}/{name}": (kept / "node_modules" / package / name).read_bytes()
+            for folder, (package, names) in PACKAGES.items()
+            for name in names
+        }
     except OSError as error:
         raise InputError(f"{kept} is not whole: remove it, and it is fetched again") from error
 
