@@ -27,11 +27,15 @@ from .calibration.six import SixPositions, fit_six_positions
 from .calibration.two import TwoPositions, fit_two_positions
 from .errors import InputError
 from .imports.importing import Imported, import_recording, write_imported
+from .joining.joined import Joined, join_track, write_joined
+from .joining.track import Track
+from .joining.track_files import read_track
 from .logs.csv_lines import write_log
 from .logs.cut import cut_log
 from .logs.log import Log
 from .logs.reader import read_log
 from .logs.stretch import Stretch
+from .overlay.overlay import Overlaid, overlay
 from .refusals import RefusedInput, sentence
 from .replay.replay import LeanTable, replay
 from .simulation.ride import Ride as SimulatedRide
@@ -45,8 +49,10 @@ __all__ = [
     "DriveResult",
     "Imported",
     "InputError",
+    "Joined",
     "LeanTable",
     "Log",
+    "Overlaid",
     "Overview",
     "RefusedInput",
     "Ride",
@@ -56,6 +62,7 @@ __all__ = [
     "Stop",
     "Stretch",
     "Summary",
+    "Track",
     "TwoPositions",
     "cut_log",
     "export",
@@ -65,10 +72,13 @@ __all__ = [
     "fit_six_positions",
     "fit_two_positions",
     "import_recording",
+    "join_track",
     "open_ride",
+    "overlay",
     "overview",
     "read_calibration",
     "read_log",
+    "read_track",
     "replay",
     "sentence",
     "simulate_ride",
@@ -77,6 +87,7 @@ __all__ = [
     "vehicle_channels",
     "write_calibration",
     "write_imported",
+    "write_joined",
     "write_log",
     "write_site",
 ]

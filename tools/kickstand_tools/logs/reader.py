@@ -6,6 +6,7 @@ import io
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from kickstand.errors import Notice
@@ -15,6 +16,7 @@ from ..errors import InputError
 from ..output import write_whole
 from . import cells
 from .axes.bends import Bends
+from .axes.course import Course
 from .axes.handedness import Handedness
 from .block import Block
 from .cells import COLUMNS, OPTIONAL, TRACK
@@ -27,7 +29,7 @@ from .speed_unit import SpeedUnit
 from .stretch import Stretch
 from .table import Array
 
-BLOCK_BYTES = 1 << 22  # of text, some 60000 samples
+BLOCK_BYTES = 1 << 20  # of text, some 15000 samples
 LEAST_G = 0.4  # median force; less is usual where gravity was taken off, a ride's is over 0.9
 BLOCK_SAMPLES = 60_000  # of a log in memory
 _NUMERIC = b"0123456789+-.eE, \n"  # where nothing else stands, numpy may read it
@@ -76,7 +78,7 @@ def read_blocks(
     name, count = name_of(source), 0
     remarks: list[Notice] = []
     speed_unit, frozen = SpeedUnit(name), FrozenReadings()
-    axes = Handedness(), Bends()
+    axes, course = (Handedness(), Bends()), Course()
     whole = source.source if isinstance(source, Stretch) else source
     total = len(whole.t_s) if isinstance(whole, Log) else total_bytes(whole)
     for block in _unchecked(source, remarks):
@@ -89,21 +91,21 @@ def read_blocks(
         if notices is not None:
             for judge in axes:
                 judge.add(block.t_s, block.readings[:, :3], block.readings[:, 4:], block.speed_mps)
+            course.add(block.t_s, block.readings[:, :3], block.readings[:, 4:], block.lat_deg, block.lon_deg)
         yield block
         if progress:
             progress(block.done, total)
     if count < minimum:
         raise InputError(f"{name} is too short: {count} samples, at least {minimum} are needed")
     if notices is not None:
-        judged = [notice for notice in (judge.notice() for judge in axes) if notice]
+        judged = [notice for notice in (judge.notice() for judge in (*axes, course)) if notice]
         notices += remarks + frozen.notices() + judged[:1]  # one cause is told once
 
 
 def read_twice(source: Source) -> Source:
     """The same where it can be read again, else a Log: an open file can be read once."""
-    if isinstance(source, Stretch):
-        return Stretch(_again(source.source), source.from_s, source.to_s)
-    return _again(source)
+    stretch = isinstance(source, Stretch)
+    return Stretch(_again(source.source), source.from_s, source.to_s) if stretch else _again(source)
 
 
 def _again(source: File | Log) -> File | Log:
@@ -218,13 +220,12 @@ def _block(
     names: list[str],
     done: int,
 ) -> Block:
-    column = dict.fromkeys(OPTIONAL, np.full(len(table), np.nan))
+    column: dict[str, Any] = dict.fromkeys(OPTIONAL, np.full(len(table), np.nan))
     column |= {name: table[:, k] for k, name in enumerate(places)}
     order = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")
-    readings = np.column_stack([column[name] for name in order])
     return Block(
         time_us,
-        readings,
+        np.column_stack([column[name] for name in order]),
         has_temp="temp_c" in places,
         has_speed="speed_mps" in places,
         start_s=start_s,
