@@ -40,6 +40,7 @@ from .refusals import RefusedInput, sentence
 from .replay.replay import LeanTable, replay
 from .simulation.ride import Ride as SimulatedRide
 from .simulation.ride import ride as simulate_ride
+from .web.site import site_files, write_site
 
 __all__ = [
     "CalibrationFile",
@@ -81,10 +82,12 @@ __all__ = [
     "replay",
     "sentence",
     "simulate_ride",
+    "site_files",
     "summary",
     "vehicle_channels",
     "write_calibration",
     "write_imported",
     "write_joined",
     "write_log",
+    "write_site",
 ]

@@ -25,7 +25,7 @@ for _command in (
     *(import_.import_, join.join, calibrate.calibrate, ride.replay, ride.report, ride.plot, ride.export, ride.cut),
     overlay.overlay,
     *(simulated.simulate, simulated.evaluate),
-    *(without_a_board.demo, without_a_board.emulate, without_a_board.bench),
+    *(without_a_board.demo, without_a_board.web, without_a_board.emulate, without_a_board.bench),
 ):
     kickstand.add_command(_command)
 calibrate.calibrate.add_command(calibrate_ride.ride)
