@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from kickstand.units import STANDARD_GRAVITY
-from numpy.typing import NDArray
 
-from ..calibration.ride.windows import averaged
 from ..logs.table import Array
 from . import model as m
+from .first_guess import first_guess, standing
 from .model import Model
 from .solver import back, eliminate, solve_chain, variances
 from .windows import WINDOW_S, Windows
@@ -53,7 +51,8 @@ def adjust(windows: Windows, six_done: bool, rounds: int = ROUNDS, verbose: bool
     length = -(-n // blocks)
     w = laid_out(windows, length)
     blocks = len(w) // length
-    lean, speed, still = first_guess(w)
+    still = standing(w)
+    lean, speed = first_guess(w, still)
     states = np.zeros((len(w) + 1, m.STATES))
     states[:, m.LEAN], states[:, m.FORWARD] = _edges(lean), _edges(speed)
     sigma = m.SIGMA.copy()
@@ -96,33 +95,6 @@ def _hold(left: Array, state: Array, sigma: Array) -> None:
     left[0, rows, rows] += 1.0 / sigma**2
     pulled = np.array([0, m.PITCH, m.LEFT, m.UP, 5, 6, 7])
     left[0, s + pulled, -1] += state[pulled] / sigma[pulled] ** 2 * (pulled != 0)
-
-
-def first_guess(w: Windows) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Lean (n, rad), speed (n, m/s) and where the bike stands, roughly."""
-    from ..calibration.ride.windows import _still, known_speed
-
-    middle = 0.5 * (w.edges[1:] + w.edges[:-1])
-    known = known_speed(middle, w.speed)
-    still = _still(w.rate, w.force, known, 1.6) & ~w.gap & (np.linalg.norm(w.rate, axis=1) < np.radians(4.0))
-    size = averaged(np.linalg.norm(w.force[:, :2], axis=1), 2.0)
-    yaw = averaged(w.rate[:, 1], 1.0)
-    steep = np.tan(np.arccos(np.clip(1.0 / np.maximum(size, 0.1), 0.3, 1.0)))
-    turning = np.abs(yaw)
-    usual = 10.0
-    prior = 0.02
-    speed = (averaged(steep * STANDARD_GRAVITY * turning, 40.0) + prior * usual) / (
-        averaged(turning**2, 40.0) + prior
-    )
-    speed = np.where(np.isnan(known), np.clip(speed, 3.0, 50.0), known)
-    speed = np.where(still, 0.0, speed)
-    slow = np.arctan(-speed * w.rate[:, 1] / STANDARD_GRAVITY)
-    slow = np.where(still, np.arctan2(w.force[:, 0], w.force[:, 1]), slow)
-    rolled = np.cumsum(w.rate[:, 2] * w.seconds)
-    wander = rolled - slow
-    for _ in range(2):
-        wander = averaged(wander, 4.0)
-    return np.clip(rolled - wander, -1.3, 1.3), speed, still
 
 
 def _edges(values: Array) -> Array:

@@ -35,10 +35,10 @@ PARAMETERS = 22
 USUAL = np.zeros(PARAMETERS)
 USUAL[HEIGHT], USUAL[AHEAD], USUAL[TYRES], USUAL[DELAY], USUAL[DIVE] = 0.5, 0.6, 0.07, 0.4, np.radians(0.2)
 SIGMA = np.empty(PARAMETERS)
-SIGMA[ROTATION] = np.radians([1.5, 5.0, 1.7])
+SIGMA[ROTATION] = np.radians([1.5, 5.0, 2.5])
 SIGMA[GYRO] = 0.012
-SIGMA[OFFSET], SIGMA[SCALE] = 0.008, 0.006
-SIGMA[HEIGHT], SIGMA[AHEAD], SIGMA[TYRES], SIGMA[BESIDE] = 0.3, 0.5, 0.06, 0.01
+SIGMA[OFFSET], SIGMA[SCALE] = 0.006, 0.006
+SIGMA[HEIGHT], SIGMA[AHEAD], SIGMA[TYRES], SIGMA[BESIDE] = 0.3, 0.5, 0.06, 0.004
 SIGMA[DELAY], SIGMA[DIVE] = 0.4, np.radians(0.2)
 WITHOUT_SIX_G, WITHOUT_SIX_SCALE = 0.04, 0.015  # sigma of offset and scale where the six positions were not done
 DRIFT = np.full(PARAMETERS, 1e-4)  # share of sigma by which each may change from block to block
@@ -46,14 +46,14 @@ DRIFT[ROTATION], DRIFT[OFFSET] = 0.02, 0.05
 
 # Noise per square root of a second
 ANGLE_ROOT = np.radians(0.08)
-VELOCITY_ROOT = np.array([0.10, 0.10, 0.15])
+VELOCITY_ROOT = np.array([0.05, 0.05, 0.10])
 BIAS_ROOT = np.radians(0.01)
 GAP_ROOT = np.array([np.radians(30.0), np.radians(5.0), 3.0, 1.0, 4.0])
 GAP_MOST = np.array([np.radians(60.0), np.radians(8.0), 20.0, 2.0, 20.0])  # of noise in a gap
 
 # Measurements: sigma, and how long an error lasts
 SLIDE, SLIDE_SHARE, SLIDE_S = 0.1, 0.01, 0.5  # m/s, and share of v tan(lean)
-DIVE_MPS, DIVE_ANGLE, DIVE_S = 0.1, np.radians(0.7), 0.5
+DIVE_MPS, DIVE_ANGLE, DIVE_S = 0.1, np.radians(1.0), 0.5
 SLOPE_MPS, SLOPE_ANGLE, SLOPE_S = 0.1, np.radians(2.0), 4.0
 BALANCE, BALANCE_S = 0.02, 3.0
 BALANCE_LEANED, BALANCE_ROLLING = 0.1, 0.05
@@ -62,7 +62,7 @@ USUAL_MPS, ANY_MPS, ANY_S = 15.0, 20.0, 60.0
 GIVEN_MPS = 0.5
 REST_MPS, REST_RADPS = 0.05, np.radians(0.15)
 BACKWARD_MPS = 0.3
-OUTLIER = 3.0
+OUTLIER = 2.0
 
 MEASURED = 13  # rows of residuals after those of the motion
 ROWS = STATES + MEASURED

@@ -72,7 +72,7 @@ def windows_of(log: Log) -> Windows:
         np.append(np.diff(number) == 1, False)[: len(kept)],
         _still(rate, force, known, _STILL_S),
         _still(rate, force, known, _CALM_S),
-        _unrest(rate, _CALM_S),
+        unrest(rate, _CALM_S),
     )
 
 
@@ -116,7 +116,7 @@ def _mounted(force: Array) -> slice:
     return slice(begin, min(end, begin + round(_LONGEST_S / WINDOW_S)))
 
 
-def _unrest(values: Array, over_s: float) -> Array:
+def unrest(values: Array, over_s: float) -> Array:
     """(n): standard deviation within over_s, of the component that has the largest; values (n, 3)."""
     if not len(values):
         return np.zeros(0)
@@ -128,7 +128,7 @@ def _unrest(values: Array, over_s: float) -> Array:
 def _still(rate: Array, force: Array, speed: Array, over_s: float) -> NDArray[np.bool_]:
     """Nothing changes for over_s, and the rates are those of most such places. speed: m/s, NaN if unknown."""
     allowed = np.where(speed < _STILL_MPS, _STANDS, 1.0)
-    calm = (_unrest(rate, over_s) < allowed * _STILL_RADPS) & (_unrest(force, over_s) < allowed * _STILL_G)
+    calm = (unrest(rate, over_s) < allowed * _STILL_RADPS) & (unrest(force, over_s) < allowed * _STILL_G)
     calm &= ~(speed >= _STILL_MPS)
     if not np.any(calm):
         return calm
