@@ -8,95 +8,98 @@ from ..logs.table import Array
 from . import model as m
 from .first_guess import first_guess, standing
 from .model import Model
-from .solver import back, eliminate, solve_chain, variances
-from .windows import WINDOW_S, Windows
+from .solver import Chain, Eliminated, back, eliminate, solve_chain, variances
+from .windows import WINDOW_S, Windows, padded
 
-BLOCK = 200  # windows of a block, at least; solver.py
-ROUNDS = 6
+BLOCK = 200  # windows of a block, at least; see solver.py
+ROUNDS, PLAIN_ROUNDS = 8, 2  # at most; the first ones without regard to outliers
+CONVERGED = np.radians(0.03)
+MAX_LEAN = 0.5  # rad: of one step. The equations are linear no further.
+MAX_PITCH = 1.2  # rad: as in the firmware
+# Standard deviations of the first state of all
+START = np.array([1.0, 0.3, 1.0, 1.0, 20.0, 0.03, 0.03, 0.03])
 
 
 @dataclass
 class Adjusted:
-    """states, sigma (n + 1, STATES): at the edges of the windows. parameters (n, PARAMETERS)."""
+    """The motion at the edges of n windows, and the sensor's errors in each of them.
+
+    states, sigma (n + 1, STATES): see model.py, and standard deviations. parameters (n, PARAMETERS).
+    """
 
     states: Array
     sigma: Array
     parameters: Array
 
 
-def laid_out(windows: Windows, length: int) -> Windows:
-    """With windows without readings and without length at the end, to a multiple of `length`."""
-    n = len(windows)
-    more = -n % length
-
-    def longer(values: Array, fill: float) -> Array:
-        return np.concatenate((values, np.full((more, *values.shape[1:]), fill)))
-
-    edges = np.append(windows.edges, np.full(more, windows.edges[-1]))
-    gap = np.append(windows.gap, np.ones(more, dtype=bool))
-    return Windows(
-        edges,
-        longer(windows.rate, 0.0),
-        longer(windows.force, 0.0),
-        longer(windows.shaken, 0.0),
-        longer(windows.speed, np.nan),
-        gap,
-        windows.number,
-    )
-
-
-def adjust(windows: Windows, six_done: bool, rounds: int = ROUNDS, verbose: bool = False) -> Adjusted:
-    n = len(windows)
-    blocks = max(1, n // BLOCK)
-    length = -(-n // blocks)
-    w = laid_out(windows, length)
-    blocks = len(w) // length
-    still = standing(w)
-    lean, speed = first_guess(w, still)
-    states = np.zeros((len(w) + 1, m.STATES))
-    states[:, m.LEAN], states[:, m.FORWARD] = _edges(lean), _edges(speed)
-    sigma = m.SIGMA.copy()
-    if not six_done:
-        sigma[m.OFFSET], sigma[m.SCALE] = m.WITHOUT_SIX_G, m.WITHOUT_SIX_SCALE
-    p = np.tile(m.USUAL, (blocks, 1))
-    rolling = np.gradient(w.rate[:, 2]) / WINDOW_S
-    start = np.array([1.0, 0.3, 1.0, 1.0, 20.0, 0.03, 0.03, 0.03])
-    for k in range(rounds + 1):
-        middle = 0.5 * (states[1:] + states[:-1])
-        balanced = middle[:, m.FORWARD] > m.BALANCED_MPS
-        model = Model(w, still, balanced, rolling, middle[:, m.LEAN], middle[:, m.FORWARD])
-        ends = np.stack((states[:-1], states[1:]), axis=1)
-        slopes = model.linearised(ends, np.repeat(p, length, axis=0), robust=k >= 2)
-        slopes = slopes.reshape(blocks, length, m.ROWS, -1).transpose(1, 0, 2, 3)
-        prior = np.column_stack((np.diag(1.0 / sigma**2), (p[0] - m.USUAL) / sigma**2))
-        reduced = eliminate(slopes, m.STATES)
-        _hold(reduced.left, states[0], start)
-        chain = solve_chain(reduced.left, m.STATES, prior, (m.DRIFT * sigma) ** 2, np.diff(p, axis=0))
-        if k == rounds:
+def adjust(windows: Windows, six_done: bool) -> Adjusted:
+    """six_done: the accelerometer was calibrated by six positions. Raises LinAlgError where nothing can be found."""
+    count = max(1, len(windows) // BLOCK)
+    fit = _Fit(padded(windows, -(-len(windows) // count)), count, six_done)
+    for k in range(ROUNDS):
+        if fit.step(robust=k >= PLAIN_ROUNDS) < CONVERGED and k > PLAIN_ROUNDS:
             break
-        change = back(reduced, chain)
-        flat = np.concatenate((change[:-1].transpose(1, 0, 2).reshape(-1, m.STATES), change[-1:, -1]))
-        most = float(np.max(np.abs(flat[:, m.LEAN])))
-        share = min(1.0, 0.5 / max(most, 1e-9))
-        states += share * flat
-        states[:, m.PITCH] = np.clip(states[:, m.PITCH], -1.2, 1.2)
-        p = p + share * chain.parameters
-        if verbose:
-            print(k, f"largest change {np.degrees(most):.3f}", p[0].round(3))
-    spread = np.sqrt(np.maximum(variances(reduced, chain), 0.0))
-    flat = np.concatenate((spread[:-1].transpose(1, 0, 2).reshape(-1, m.STATES), spread[-1:, -1]))
-    return Adjusted(states[: n + 1], flat[: n + 1], np.repeat(p, length, axis=0)[:n])
+    n = len(windows)
+    return Adjusted(fit.states[: n + 1], fit.sigma()[: n + 1], np.repeat(fit.parameters, fit.length, axis=0)[:n])
 
 
-def _hold(left: Array, state: Array, sigma: Array) -> None:
-    """What is known of the first state of all: little."""
-    s = m.STATES
-    rows = np.arange(s, 2 * s)
-    left[0, rows, rows] += 1.0 / sigma**2
-    pulled = np.array([0, m.PITCH, m.LEFT, m.UP, 5, 6, 7])
-    left[0, s + pulled, -1] += state[pulled] / sigma[pulled] ** 2 * (pulled != 0)
+class _Fit:
+    def __init__(self, windows: Windows, blocks: int, six_done: bool) -> None:
+        self._windows, self._blocks, self.length = windows, blocks, len(windows) // blocks
+        self._still = standing(windows)
+        lean, speed = first_guess(windows, self._still)
+        self.states = np.zeros((len(windows) + 1, m.STATES))
+        self.states[:, m.LEAN], self.states[:, m.FORWARD] = _at_edges(lean), _at_edges(speed)
+        self.parameters = np.tile(m.USUAL, (blocks, 1))
+        self._known = m.SIGMA.copy() if six_done else m.sigma_without_six()
+        self._rolling = np.gradient(windows.rate[:, 2]) / WINDOW_S if len(windows) > 1 else np.zeros(1)
+
+    def step(self, robust: bool) -> float:
+        """Returns the largest change of lean, rad."""
+        reduced, chain = self._solve(robust)
+        change = _in_a_row(back(reduced, chain))
+        most = float(np.max(np.abs(change[:, m.LEAN])))
+        if not np.isfinite(most):
+            raise np.linalg.LinAlgError
+        share = min(1.0, MAX_LEAN / max(most, 1e-9))
+        self.states += share * change
+        self.states[:, m.PITCH] = np.clip(self.states[:, m.PITCH], -MAX_PITCH, MAX_PITCH)
+        self.parameters = self.parameters + share * chain.parameters
+        return most
+
+    def sigma(self) -> Array:
+        """(n + 1, STATES) standard deviations."""
+        return np.sqrt(np.maximum(_in_a_row(variances(*self._solve(robust=True))), 0.0))
+
+    def _solve(self, robust: bool) -> tuple[Eliminated, Chain]:
+        states, p = self.states, self.parameters
+        middle = 0.5 * (states[1:] + states[:-1])
+        model = Model(self._windows, self._still, self._rolling, middle[:, m.LEAN], middle[:, m.FORWARD])
+        slopes = model.linearised(states, np.repeat(p, self.length, axis=0), robust)
+        reduced = eliminate(
+            slopes.reshape(self._blocks, self.length, *slopes.shape[1:]).transpose(1, 0, 2, 3), m.STATES
+        )
+        _hold_start(reduced.left, states[0])
+        prior = np.column_stack((np.diag(1.0 / self._known**2), (p[0] - m.USUAL) / self._known**2))
+        return reduced, solve_chain(
+            reduced.left, m.STATES, prior, (m.DRIFT * self._known) ** 2, np.diff(p, axis=0)
+        )
 
 
-def _edges(values: Array) -> Array:
+def _hold_start(left: Array, state: Array) -> None:
+    """What is known of the first state of all: little. The lean and the speed are not drawn towards anything."""
+    rows = np.arange(m.STATES, 2 * m.STATES)
+    left[0, rows, rows] += 1.0 / START**2
+    drawn = [m.PITCH, m.LEFT, m.UP, 5, 6, 7]
+    left[0, rows[drawn], -1] += state[drawn] / START[drawn] ** 2
+
+
+def _in_a_row(blocks: Array) -> Array:
+    """(K + 1, B, s) with shared ends -> (B K + 1, s)."""
+    s = blocks.shape[2]
+    return np.concatenate((blocks[:-1].transpose(1, 0, 2).reshape(-1, s), blocks[-1:, -1]))
+
+
+def _at_edges(values: Array) -> Array:
     inner = 0.5 * (values[1:] + values[:-1])
     return np.concatenate((values[:1], inner, values[-1:]))

@@ -68,37 +68,56 @@ MEASURED = 13  # rows of residuals after those of the motion
 ROWS = STATES + MEASURED
 
 
+def sigma_without_six() -> Array:
+    """SIGMA where the accelerometer was not calibrated by six positions."""
+    sigma = SIGMA.copy()
+    sigma[OFFSET], sigma[SCALE] = WITHOUT_SIX_G, WITHOUT_SIX_SCALE
+    return sigma
+
+
+def corrected_rates(rate: Array, states: Array, p: Array) -> tuple[Array, Array, Array]:
+    """Rates about left, up, forward (rad/s) without the gyro's errors. rate (n, 3), states (n, STATES), p (n,
+    PARAMETERS)."""
+    x, y, z = rate.T
+    a, b, c = p[:, ROTATION].T
+    g = p[:, GYRO].T
+    bias = states[:, BIAS].T
+    return (
+        x + b * z - c * y + g[0] * x + g[1] * y + g[2] * z - bias[0],
+        y + c * x - a * z + g[3] * x + g[4] * y + g[5] * z - bias[1],
+        z + a * y - b * x + g[6] * x + g[7] * y + g[8] * z - bias[2],
+    )
+
+
+def _corrected_force(force: Array, p: Array) -> tuple[Array, Array, Array]:
+    """Forces to the left, up and forward (g) without the accelerometer's errors."""
+    x, y, z = force.T
+    a, b, c = p[:, ROTATION].T
+    off = p[:, OFFSET].T
+    return (
+        x + b * z - c * y + off[0],
+        (1.0 + p[:, SCALE]) * y + c * x - a * z + off[1],
+        z + a * y - b * x + off[2],
+    )
+
+
 @dataclass
 class Model:
-    """windows (n) laid out for the solver, and what is known of each. still (n): the bike stands; balanced (n): it
-    rides."""
+    """windows (n) laid out for the solver, and what is known of each: still, the bike stands; rolling: roll
+    acceleration, rad/s^2; leaned (rad) and speed (m/s): roughly."""
 
     windows: Windows
     still: NDArray[np.bool_]
-    balanced: NDArray[np.bool_]
-    rolling: Array  # rad/s^2
-    leaned: Array  # rad
+    rolling: Array
+    leaned: Array
     speed: Array
-
-    def _corrected(self, middle: Array, p: Array) -> tuple[Array, ...]:
-        """Rates (rad/s) and forces (g) along left, up, forward, without the sensor's errors."""
-        x, y, z = self.windows.rate.T
-        fx, fy, fz = self.windows.force.T
-        a, b, c = p[:, 0], p[:, 1], p[:, 2]
-        g = p[:, GYRO].T
-        wx = x + b * z - c * y + g[0] * x + g[1] * y + g[2] * z - middle[:, 5]
-        wy = y + c * x - a * z + g[3] * x + g[4] * y + g[5] * z - middle[:, 6]
-        wz = z + a * y - b * x + g[6] * x + g[7] * y + g[8] * z - middle[:, 7]
-        rx = fx + b * fz - c * fy + p[:, 12]
-        ry = (1.0 + p[:, SCALE]) * fy + c * fx - a * fz + p[:, 13]
-        rz = fz + a * fy - b * fx + p[:, 14]
-        return wx, wy, wz, rx, ry, rz
 
     def values(self, middle: Array, p: Array) -> tuple[Array, Array]:
         """Rates of change (n, STATES) of the states, and measurements (n, MEASURED), which should be 0 (measured minus
         expected). middle (n, STATES): states in the middle of each window; p (n, PARAMETERS)."""
         t, q, left, up, forward = middle[:, :5].T
-        wx, wy, wz, fx, fy, fz = self._corrected(middle, p)
+        wx, wy, wz = corrected_rates(self.windows.rate, middle, p)
+        fx, fy, fz = _corrected_force(self.windows.force, p)
         st, ct, sq, cq = np.sin(t), np.cos(t), np.sin(q), np.cos(q)
         turn = wx * st + wy * ct
         yaw = turn / cq
@@ -136,7 +155,7 @@ class Model:
         root = np.sqrt(seconds)[:, None]
         motion = np.empty((len(w), STATES))
         motion[:, :2] = ANGLE_ROOT
-        motion[:, 2:5] = np.hypot(VELOCITY_ROOT, 0.0 * w.shaken)
+        motion[:, 2:5] = VELOCITY_ROOT
         motion[:, :5] *= root
         motion[:, BIAS] = BIAS_ROOT * root
         motion[w.gap, :5] = np.minimum(GAP_ROOT * root[w.gap], GAP_MOST) + 1e-4
@@ -152,7 +171,7 @@ class Model:
         measured[riding, 1] = lasting(np.hypot(DIVE_MPS, DIVE_ANGLE * speed), DIVE_S)[riding]
         measured[riding, 2] = lasting(np.hypot(SLOPE_MPS, SLOPE_ANGLE * speed), SLOPE_S)[riding]
         balance = np.hypot(BALANCE, BALANCE_LEANED * np.sin(self.leaned))
-        balanced = riding & self.balanced
+        balanced = riding & (self.speed > BALANCED_MPS)
         measured[balanced, 3] = np.hypot(lasting(balance, BALANCE_S), BALANCE_ROLLING * self.rolling)[balanced]
         measured[riding, 4] = lasting(ANY_MPS, ANY_S)[riding]
         given = ~np.isnan(w.speed) & ~w.gap
@@ -165,8 +184,8 @@ class Model:
 
     def linearised(self, states: Array, p: Array, robust: bool) -> Array:
         """(n, ROWS, 2 STATES + PARAMETERS + 1): derivatives of the weighted residuals, and the residuals. states
-        (n, 2, STATES): at both ends of each window."""
-        middle, step = states.mean(axis=1), states[:, 1] - states[:, 0]
+        (n + 1, STATES): at the windows' edges."""
+        middle, step = 0.5 * (states[1:] + states[:-1]), states[1:] - states[:-1]
         seconds = self.windows.seconds[:, None]
         seconds = np.where(self.windows.gap[:, None], 0.0, seconds)
         motion_sigma, measured_sigma = self.sigmas()
