@@ -6,7 +6,7 @@ import numpy as np
 
 from ..logs.table import Array
 from . import model as m
-from .first_guess import first_guess, standing
+from .first_guess import first_guess, in_hand, standing
 from .model import Model
 from .solver import Chain, Eliminated, back, eliminate, solve_chain, variances
 from .windows import WINDOW_S, Windows, padded
@@ -47,10 +47,12 @@ class _Fit:
     def __init__(self, windows: Windows, blocks: int, six_done: bool) -> None:
         self._windows, self._blocks, self.length = windows, blocks, len(windows) // blocks
         self._still = standing(windows)
+        self._in_hand, self._not_riding = in_hand(windows)
         lean, speed = first_guess(windows, self._still)
         self.states = np.zeros((len(windows) + 1, m.STATES))
         self.states[:, m.LEAN], self.states[:, m.FORWARD] = _at_edges(lean), _at_edges(speed)
         self.parameters = np.tile(m.USUAL, (blocks, 1))
+        self._unrest = np.ones(len(windows))
         self._known = m.SIGMA.copy() if six_done else m.sigma_without_six()
         self._rolling = np.gradient(windows.rate[:, 2]) / WINDOW_S if len(windows) > 1 else np.zeros(1)
 
@@ -69,17 +71,24 @@ class _Fit:
 
     def sigma(self) -> Array:
         """(n + 1, STATES) standard deviations."""
+        model, slopes = self._linearised(robust=True)
+        self._unrest = model.unrest_of(slopes[:, :, -1])
         return np.sqrt(np.maximum(_in_a_row(variances(*self._solve(robust=True))), 0.0))
 
+    def _linearised(self, robust: bool) -> tuple[Model, Array]:
+        middle = 0.5 * (self.states[1:] + self.states[:-1])
+        leaned, speed = middle[:, m.LEAN], middle[:, m.FORWARD]
+        held = self._in_hand, self._not_riding
+        model = Model(self._windows, self._still, *held, self._rolling, leaned, speed, self._unrest)
+        return model, model.linearised(self.states, np.repeat(self.parameters, self.length, axis=0), robust)
+
     def _solve(self, robust: bool) -> tuple[Eliminated, Chain]:
-        states, p = self.states, self.parameters
-        middle = 0.5 * (states[1:] + states[:-1])
-        model = Model(self._windows, self._still, self._rolling, middle[:, m.LEAN], middle[:, m.FORWARD])
-        slopes = model.linearised(states, np.repeat(p, self.length, axis=0), robust)
+        _, slopes = self._linearised(robust)
+        p = self.parameters
         reduced = eliminate(
             slopes.reshape(self._blocks, self.length, *slopes.shape[1:]).transpose(1, 0, 2, 3), m.STATES
         )
-        _hold_start(reduced.left, states[0])
+        _hold_start(reduced.left, self.states[0])
         prior = np.column_stack((np.diag(1.0 / self._known**2), (p[0] - m.USUAL) / self._known**2))
         return reduced, solve_chain(
             reduced.left, m.STATES, prior, (m.DRIFT * self._known) ** 2, np.diff(p, axis=0)

@@ -12,6 +12,8 @@ STILL_S = 1.6  # shorter standstills are not told from smooth riding
 STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # rms of the means of windows, over STILL_S
 STILL_MPS, STANDS = 0.3, 4.0  # a speed of less allows so much more
 BIAS_RADPS = np.radians(4.0)  # of the gyro, since its calibration: a rate above is a turn
+MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # the mean force of a ride over so long keeps within this of up
+BETWEEN_S = 20.0
 SLOW_S = 4.0  # changes of lean that take longer follow from turning, quicker ones from the roll rate
 TURNS_S = 40.0  # over which turns tell a speed
 USUAL_MPS, USUAL_RADPS = 10.0, 0.14  # where there are no turns; yaw rate of turns that count as much
@@ -24,6 +26,24 @@ def standing(w: Windows) -> NDArray[np.bool_]:
     calm = (unrest(w.rate, STILL_S) < allowed * STILL_RADPS) & (unrest(w.force, STILL_S) < allowed * STILL_G)
     calm &= np.linalg.norm(averaged(w.rate, STILL_S), axis=1) < BIAS_RADPS
     return calm & ~w.gap & ~(known >= STILL_MPS)
+
+
+def in_hand(w: Windows) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """(n) True where the sensor is moved about in a hand, or the bike lies: up is far from the calibration's. And the
+    same with the seconds before and after, which may not be riding either.
+
+    A bike in balance feels the force along its own up, however far it leans.
+    """
+    there = ~w.gap
+    mean = averaged(w.force * there[:, None], MOUNTED_S)
+    off = there & (mean[:, 1] < np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(mean, axis=1))
+    places = np.flatnonzero(off)
+    if len(places):  # between two of them, and between one and an end of the log, it need not be mounted
+        ends = np.concatenate(([0], places, [len(w) - 1]))
+        for begin, end in zip(ends[:-1], ends[1:]):
+            if w.edges[end + 1] - w.edges[begin] < BETWEEN_S:
+                off[begin : end + 1] = True
+    return off, averaged(off.astype(float), MOUNTED_S) > 0.01
 
 
 def first_guess(w: Windows, still: NDArray[np.bool_]) -> tuple[Array, Array]:

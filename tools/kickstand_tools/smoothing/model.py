@@ -19,6 +19,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
+from ..calibration.ride.windows import averaged
 from ..logs.table import Array
 from .windows import Windows
 
@@ -37,12 +38,12 @@ USUAL[HEIGHT], USUAL[AHEAD], USUAL[TYRES], USUAL[DELAY], USUAL[DIVE] = 0.5, 0.6,
 SIGMA = np.empty(PARAMETERS)
 SIGMA[ROTATION] = np.radians([1.5, 5.0, 2.5])
 SIGMA[GYRO] = 0.012
-SIGMA[OFFSET], SIGMA[SCALE] = 0.006, 0.006
-SIGMA[HEIGHT], SIGMA[AHEAD], SIGMA[TYRES], SIGMA[BESIDE] = 0.3, 0.5, 0.06, 0.004
+SIGMA[OFFSET], SIGMA[SCALE] = (0.001, 0.003, 0.003), 0.004
+SIGMA[HEIGHT], SIGMA[AHEAD], SIGMA[TYRES], SIGMA[BESIDE] = 0.3, 0.5, 0.06, 0.001
 SIGMA[DELAY], SIGMA[DIVE] = 0.4, np.radians(0.2)
 WITHOUT_SIX_G, WITHOUT_SIX_SCALE = 0.04, 0.015  # sigma of offset and scale where the six positions were not done
 DRIFT = np.full(PARAMETERS, 1e-4)  # share of sigma by which each may change from block to block
-DRIFT[ROTATION], DRIFT[OFFSET] = 0.02, 0.05
+DRIFT[ROTATION], DRIFT[OFFSET] = 0.04, (0.3, 0.1, 0.1)
 
 # Noise per square root of a second
 ANGLE_ROOT = np.radians(0.08)
@@ -55,14 +56,21 @@ GAP_MOST = np.array([np.radians(60.0), np.radians(8.0), 20.0, 2.0, 20.0])  # of 
 SLIDE, SLIDE_SHARE, SLIDE_S = 0.1, 0.01, 0.5  # m/s, and share of v tan(lean)
 DIVE_MPS, DIVE_ANGLE, DIVE_S = 0.1, np.radians(1.0), 0.5
 SLOPE_MPS, SLOPE_ANGLE, SLOPE_S = 0.1, np.radians(2.0), 4.0
-BALANCE, BALANCE_S = 0.02, 3.0
-BALANCE_LEANED, BALANCE_ROLLING = 0.1, 0.05
+BALANCE, BALANCE_S = 0.010, 3.0
+BALANCE_LEANED, BALANCE_ROLLING = 0.06, 0.05
 BALANCED_MPS = 4.0
 USUAL_MPS, ANY_MPS, ANY_S = 15.0, 20.0, 60.0
 GIVEN_MPS = 0.5
-REST_MPS, REST_RADPS = 0.05, np.radians(0.15)
+REST_MPS, REST_RADPS, HAND_MPS = 0.05, np.radians(0.15), 0.5
 BACKWARD_MPS = 0.3
 OUTLIER = 2.0
+JOLTED_RADPS, JOLTED_S = np.radians(150.0), 0.06  # a rate so far from its mean is one, and how long its error lasts
+JOLT = 4.0  # sigmas of the motion within a window: what is more is a jolt to the sensor
+
+# The ride itself tells how rough it is: the rms of these residuals over what is expected of the sigmas above
+CALMED = [LEAN, PITCH, LEFT, UP, FORWARD, STATES, STATES + 1]
+EXPECTED = np.array([0.38, 0.38, 0.38, 0.38, 0.38, 0.5, 0.5])
+UNREST_S, LEAST_UNREST, MOST_UNREST = 60.0, 0.1, 4.0
 
 MEASURED = 13  # rows of residuals after those of the motion
 ROWS = STATES + MEASURED
@@ -73,6 +81,11 @@ def sigma_without_six() -> Array:
     sigma = SIGMA.copy()
     sigma[OFFSET], sigma[SCALE] = WITHOUT_SIX_G, WITHOUT_SIX_SCALE
     return sigma
+
+
+def jolted(windows: Windows) -> Array:
+    """(n) rad: by how much a jolt, or a gyro at the end of its range, may have falsified the angles in each window."""
+    return JOLTED_S * np.maximum(windows.jolt - JOLTED_RADPS, 0.0)
 
 
 def corrected_rates(rate: Array, states: Array, p: Array) -> tuple[Array, Array, Array]:
@@ -103,14 +116,24 @@ def _corrected_force(force: Array, p: Array) -> tuple[Array, Array, Array]:
 
 @dataclass
 class Model:
-    """windows (n) laid out for the solver, and what is known of each: still, the bike stands; rolling: roll
-    acceleration, rad/s^2; leaned (rad) and speed (m/s): roughly."""
+    """windows (n) laid out for the solver, and what is known of each: still, the bike stands; in_hand and not_riding:
+    of first_guess.in_hand(); rolling: roll
+    acceleration, rad/s^2; leaned (rad) and speed (m/s): roughly;
+    unrest: of unrest_of(), 1 at first."""
 
     windows: Windows
     still: NDArray[np.bool_]
+    in_hand: NDArray[np.bool_]
+    not_riding: NDArray[np.bool_]
     rolling: Array
     leaned: Array
     speed: Array
+    unrest: Array
+
+    @property
+    def riding(self) -> NDArray[np.bool_]:
+        """(n) True where the bike rides, or may."""
+        return ~self.windows.gap & ~self.still & ~self.not_riding
 
     def values(self, middle: Array, p: Array) -> tuple[Array, Array]:
         """Rates of change (n, STATES) of the states, and measurements (n, MEASURED), which should be 0 (measured minus
@@ -156,19 +179,23 @@ class Model:
         motion = np.empty((len(w), STATES))
         motion[:, :2] = ANGLE_ROOT
         motion[:, 2:5] = VELOCITY_ROOT
-        motion[:, :5] *= root
+        motion[:, :5] *= root * self.unrest[:, None]
+        motion[:, :2] = np.hypot(motion[:, :2], jolted(w)[:, None])
         motion[:, BIAS] = BIAS_ROOT * root
-        motion[w.gap, :5] = np.minimum(GAP_ROOT * root[w.gap], GAP_MOST) + 1e-4
+        moved = ~self.still
+        for loose, rows in ((w.gap | (self.in_hand & moved), slice(0, 5)), (self.not_riding & moved, slice(2, 5))):
+            motion[loose, rows] = np.minimum(GAP_ROOT * root[loose], GAP_MOST)[:, rows] + 1e-4
 
         def lasting(sigma: Array | float, over_s: float) -> Array:
             return sigma * np.sqrt(np.maximum(1.0, 2.0 * over_s / seconds))
 
         speed = np.maximum(self.speed, 0.0)
-        riding = ~w.gap & ~self.still
+        riding = self.riding
         measured = np.full((len(w), MEASURED), np.inf)
         slide = np.hypot(SLIDE, SLIDE_SHARE * speed * np.tan(np.clip(self.leaned, -1.0, 1.0)))
-        measured[riding, 0] = lasting(slide, SLIDE_S)[riding]
-        measured[riding, 1] = lasting(np.hypot(DIVE_MPS, DIVE_ANGLE * speed), DIVE_S)[riding]
+        measured[riding, 0] = (self.unrest * lasting(slide, SLIDE_S))[riding]
+        dive = lasting(np.hypot(DIVE_MPS, DIVE_ANGLE * speed), DIVE_S)
+        measured[riding, 1] = (self.unrest * dive)[riding]
         measured[riding, 2] = lasting(np.hypot(SLOPE_MPS, SLOPE_ANGLE * speed), SLOPE_S)[riding]
         balance = np.hypot(BALANCE, BALANCE_LEANED * np.sin(self.leaned))
         balanced = riding & (self.speed > BALANCED_MPS)
@@ -180,6 +207,7 @@ class Model:
         measured[rest, 6:9] = REST_MPS
         measured[rest, 9:12] = REST_RADPS
         measured[riding, 12] = BACKWARD_MPS
+        measured[self.not_riding & moved & ~w.gap, 6:9] = HAND_MPS
         return motion, measured
 
     def linearised(self, states: Array, p: Array, robust: bool) -> Array:
@@ -192,6 +220,8 @@ class Model:
         motion, measured = self.values(middle, p)
         weight = 1.0 / measured_sigma
         if robust:
+            off = np.abs(step - seconds * motion)[:, :BIAS.start] / motion_sigma[:, :BIAS.start]
+            motion_sigma[:, :BIAS.start] *= np.sqrt(1.0 + (off / JOLT) ** 2)
             weight = weight / np.sqrt(1.0 + (self._standing(measured * weight) / OUTLIER) ** 2)
         n = len(middle)
         out = np.zeros((n, ROWS, 2 * STATES + PARAMETERS + 1))
@@ -215,6 +245,15 @@ class Model:
         out[:, :STATES, -1] = step / motion_sigma - scale * motion
         out[:, STATES:, -1] = weight * measured
         return out
+
+    def unrest_of(self, residual: Array) -> Array:
+        """(n) how large errors are around each window, over the sigmas of a rough ride. residual (n, ROWS): weighted,
+        as linearised() gives it."""
+        riding = self.riding
+        squares = np.mean((residual[:, CALMED] / EXPECTED) ** 2, axis=1) * self.unrest**2
+        share = averaged(riding.astype(float), UNREST_S)
+        found = averaged(np.where(riding, squares, 0.0), UNREST_S) / np.maximum(share, 1e-9)
+        return np.where(share > 0.02, np.clip(np.sqrt(found), LEAST_UNREST, MOST_UNREST), 1.0)
 
     def _standing(self, residual: Array) -> Array:
         """An assumption that holds for long is judged by its own sigma, not by its share of a window."""

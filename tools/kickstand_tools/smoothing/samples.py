@@ -4,7 +4,7 @@ import numpy as np
 
 from ..logs.table import Array
 from .adjust import Adjusted
-from .model import FORWARD, LEAN, PITCH, corrected_rates
+from .model import FORWARD, LEAN, PITCH, corrected_rates, jolted
 from .windows import Windows
 
 TIMING_S = 0.004  # s: of what the delay of the gyro's low-pass, and the times of samples, are off
@@ -34,4 +34,5 @@ def at_samples(windows: Windows, rate: Array, found: Adjusted, delay_s: float) -
     lean = before[:, LEAN] + until + share * ((after - before)[:, LEAN] - whole)
     sigma = found.sigma[number, LEAN] + share * (found.sigma[number + 1] - found.sigma[number])[:, LEAN]
     sigma = np.hypot(sigma, TIMING_S * roll_rate)
+    sigma = np.hypot(sigma, 2.0 * np.sqrt(np.clip(share * (1.0 - share), 0.0, 1.0)) * jolted(windows)[number])
     return np.column_stack((lean + delay_s * roll_rate, sigma, pitch, speed))

@@ -15,14 +15,15 @@ GAP_S = 0.17  # a longer step between two samples: readings are missing
 class Windows:
     """n windows, one following on the other; where readings are missing a window without readings lies between two.
 
-    edges (n + 1, s): their times. rate (n, 3, rad/s), force (n, 3, g): means, along the vehicle's axes. speed (n): m/s,
-    NaN where there is none. gap (n): True where there are no readings. Of each sample: number, in which window it lies;
+    edges (n + 1, s): their times. rate (n, 3, rad/s), force (n, 3, g): means, along the vehicle's axes. jolt (n): by how
+    much the rate differs from its mean at most, rad/s. speed (n): m/s, NaN where there is none. gap (n): True where there are no readings. Of each sample: number, in which window it lies;
     before and after (s): the time that it stands for.
     """
 
     edges: Array
     rate: Array
     force: Array
+    jolt: Array
     speed: Array
     gap: NDArray[np.bool_]
     number: NDArray[np.intp]
@@ -62,13 +63,16 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array) -> Windows:
     given = np.full(len(starts), np.nan)
     given[np.searchsorted(starts, there, side="right") - 1] = speed[there]
     place = np.searchsorted(starts, np.arange(len(t_s)), side="right") - 1
+    mean_rate = mean(rate)
+    jolt = np.maximum.reduceat(np.linalg.norm(rate - mean_rate[place], axis=1), starts)
     at = np.flatnonzero(begins[starts])[1:]  # before these windows readings are missing
     ends = np.append(starts[1:], len(t_s)) - 1
     edges = np.insert((t_s - before)[starts], at, (t_s + after)[ends[at - 1]])
     return Windows(
         np.append(edges, t_s[-1] + after[-1]),
-        np.insert(mean(rate), at, 0.0, axis=0),
+        np.insert(mean_rate, at, 0.0, axis=0),
         np.insert(mean(force), at, 0.0, axis=0),
+        np.insert(jolt, at, 0.0),
         np.insert(given, at, np.nan),
         np.insert(np.zeros(len(starts), dtype=bool), at, True),
         place + np.searchsorted(at, place, side="right"),
@@ -88,6 +92,7 @@ def padded(windows: Windows, length: int) -> Windows:
         np.append(windows.edges, np.full(more, windows.edges[-1])),
         longer(windows.rate, 0.0),
         longer(windows.force, 0.0),
+        longer(windows.jolt, 0.0),
         longer(windows.speed, np.nan),
         np.append(windows.gap, np.ones(more, dtype=bool)),
         windows.number,
