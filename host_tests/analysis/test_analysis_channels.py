@@ -128,7 +128,8 @@ def part(n=100, **changed) -> Channels:
     """A second at 100 Hz, riding straight on, everything known."""
     zero = np.zeros(n)
     columns = {field.name: zero for field in fields(Channels)}
-    columns |= {"t_s": np.arange(n) / 100.0, "sure": np.ones(n), "speed_mps": np.full(n, np.nan)}
+    columns |= {"t_s": np.arange(n) / 100.0, "sure": np.ones(n)}
+    columns |= dict.fromkeys(("speed_mps", "lat_deg", "lon_deg", "utc_s"), np.full(n, np.nan))
     return Channels(**columns | {name: np.asarray(values, dtype=float) for name, values in changed.items()})
 
 

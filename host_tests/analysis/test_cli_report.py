@@ -122,9 +122,9 @@ def test_a_kickstand_on_the_other_side_is_told(ride, tmp_path):
     cal = turned_round(tmp_path)
     line = "forward and backward are exchanged: calibrate two --side right?"
     said = command.works("report", ride, "--calibration", cal)
-    assert line in said.out
-    assert "do all accelerations have the opposite sign?" in " ".join(said.out.split())
-    assert "No stop" not in said.out
+    assert line in said.err
+    assert "do all accelerations have the opposite sign?" in said.err
+    assert "Stops: not told" in said.out
     assert "MFDD" not in said.out  # of the wrong way round, no figure is right
     data = json.loads(command.works("report", ride, "--calibration", cal, "--json").out)
     assert data["remark"].startswith(line)
@@ -132,7 +132,7 @@ def test_a_kickstand_on_the_other_side_is_told(ride, tmp_path):
     assert line in command.works("plot", ride, "--calibration", cal, "--out", tmp_path / "pictures").err
     car = tmp_path / "car.json"
     car.write_text(json.dumps(json.loads(cal.read_text()) | {"vehicle": "car"}))
-    assert "exchanged: calibrate drive again?" in command.works("report", ride, "--calibration", car).out
+    assert "exchanged: calibrate drive again?" in command.works("report", ride, "--calibration", car).err
 
 
 def test_swapped_poses_are_told(tmp_path):
@@ -141,7 +141,8 @@ def test_swapped_poses_are_told(tmp_path):
         segments += [script.accelerate(16, 5), script.straight(8), script.brake(0, 4), script.wait(4)]
     ride = analysis_rides.write(tmp_path, segments, speed_hz=1)
     cal = turned_round(tmp_path, 11.0)
-    said = " ".join(command.works("report", ride, "--calibration", cal).out.split())
+    shown = command.works("report", ride, "--calibration", cal)
+    said = " ".join((shown.out + shown.err).split())
     assert re.search(r"roll [+-]1[01]\.\d°.*: were the poses swapped\?", said)
     assert "forward and backward are exchanged: were the poses swapped?" in said
     right = json.loads(cal.read_text())

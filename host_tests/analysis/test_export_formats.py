@@ -36,7 +36,11 @@ VALUES = {
     "resting": 5.0,
     "rolling": 6.0,
     "sure": 8.0,
+    "lat_deg": 52.123456789,
+    "lon_deg": -0.5,
+    "utc_s": 1_700_000_123.4567,
 }
+NOWHERE = dict.fromkeys(("lat_deg", "lon_deg", "utc_s"), np.nan)
 
 
 def block(*times_s: float, **changed: float) -> Channels:
@@ -52,21 +56,23 @@ def written(write, path: Path, *blocks: Channels, start_s: float = EVENING_S) ->
 
 
 def test_csv_to_the_letter(tmp_path):
-    none = block(0.5, 1.25, speed_mps=np.nan, temp_c=np.nan, lean_formula_deg=np.nan)
+    none = block(0.5, 1.25, speed_mps=np.nan, temp_c=np.nan, lean_formula_deg=np.nan, **NOWHERE)
     lines = written(export_csv.write, tmp_path / "x.csv", block(0.25), none, start_s=100.0).split("\n")
     assert lines == [
         "t_s,lean_deg,lean_formula_deg,left_g,up_g,forward_g,lateral_g,pitch_rate_dps,yaw_rate_dps,roll_rate_dps,"
-        "speed_mps,temp_c,sigma_deg",
-        "100.250000,-12.346,23.457,0.12346,0.98765,-0.23457,0.34568,1.2346,-2.3457,3.4568,10.500,21.46,0.988",
-        "100.500000,-12.346,,0.12346,0.98765,-0.23457,0.34568,1.2346,-2.3457,3.4568,,,0.988",
-        "101.250000,-12.346,,0.12346,0.98765,-0.23457,0.34568,1.2346,-2.3457,3.4568,,,0.988",
+        "speed_mps,temp_c,sigma_deg,lat_deg,lon_deg,utc_s",
+        "100.250000,-12.346,23.457,0.12346,0.98765,-0.23457,0.34568,1.2346,-2.3457,3.4568,10.500,21.46,0.988,"
+        "52.1234568,-0.5000000,1700000123.457",
+        "100.500000,-12.346,,0.12346,0.98765,-0.23457,0.34568,1.2346,-2.3457,3.4568,,,0.988,,,",
+        "101.250000,-12.346,,0.12346,0.98765,-0.23457,0.34568,1.2346,-2.3457,3.4568,,,0.988,,,",
         "",
     ]
 
 
 def test_racechrono_to_the_letter(tmp_path):
-    """Elapsed time from the first sample; z is forward; a speed only where there is a new one."""
-    text = written(export_racechrono.write, tmp_path / "x", block(0.25), block(0.5, speed_mps=np.nan))
+    """Elapsed time from the first sample; z is forward; speed and position only where there are new ones."""
+    none = block(0.5, speed_mps=np.nan, **NOWHERE)
+    text = written(export_racechrono.write, tmp_path / "x", block(0.25), none)
     assert text.split("\n") == [
         "This file is created using RaceChrono CSV v3 by Kickstand.",
         "Format,3",
@@ -77,22 +83,26 @@ def test_racechrono_to_the_letter(tmp_path):
         "Created,14/11/2023,22:13",
         'Note,"Made by Kickstand. lean_angle > 0 to the right; x left, y up, z forward"',
         "",
-        "timestamp,fragment_id,lap_number,elapsed_time,speed,lateral_acc,lean_angle,longitudinal_acc,x_acc,y_acc,z_acc,"
-        "x_rate_of_rotation,y_rate_of_rotation,z_rate_of_rotation",
-        "unix time,,,s,m/s,G,deg,G,G,G,G,deg/s,deg/s,deg/s",
-        ",,,,100: gps,calc,calc,calc,101: acc,101: acc,101: acc,102: gyro,102: gyro,102: gyro",
-        "1700000000.250,0,,0.250,10.500,0.3457,-12.35,-0.2346,0.1235,0.9877,-0.2346,-1.235,-2.346,3.457",
-        "1700000000.500,0,,0.500,,0.3457,-12.35,-0.2346,0.1235,0.9877,-0.2346,-1.235,-2.346,3.457",
+        "timestamp,fragment_id,lap_number,elapsed_time,latitude,longitude,speed,lateral_acc,lean_angle,longitudinal_acc,"
+        "x_acc,y_acc,z_acc,x_rate_of_rotation,y_rate_of_rotation,z_rate_of_rotation",
+        "unix time,,,s,deg,deg,m/s,G,deg,G,G,G,G,deg/s,deg/s,deg/s",
+        ",,,,100: gps,100: gps,100: gps,calc,calc,calc,101: acc,101: acc,101: acc,102: gyro,102: gyro,102: gyro",
+        "1700000000.250,0,,0.250,52.1234568,-0.5000000,10.500,0.3457,-12.35,-0.2346,"
+        "0.1235,0.9877,-0.2346,-1.235,-2.346,3.457",
+        "1700000000.500,0,,0.500,,,,0.3457,-12.35,-0.2346,0.1235,0.9877,-0.2346,-1.235,-2.346,3.457",
         "",
     ]
 
 
 def test_vbo_to_the_letter(tmp_path):
-    """10.5 m/s are 37.8 km/h. The clock starts again at midnight."""
+    """10.5 m/s are 37.8 km/h. The clock starts again at midnight. Minutes of longitude are positive in the west."""
     evening = EVENING_S + 6400.0 - 0.25  # the second before midnight
-    text = written(export_vbo.write, tmp_path / "x", block(0.0), block(0.25, 61.5, 3661.75), start_s=evening)
+    moved = block(0.25, 61.5, 3661.75)
+    moved.lon_deg[0] += 1e-5  # 0.68 m to the east
+    moved.lat_deg[2] = moved.lon_deg[2] = np.nan
+    text = written(export_vbo.write, tmp_path / "x", block(0.0), moved, start_s=evening)
     values = " -1.234567E+01 -2.345670E+00 +3.456780E+00 +2.145600E+01"
-    row = " +00000.000000 +00000.000000 037.800 000.00 +00000.00 -00.235 +00.346" + values
+    row = " 037.800 {} +00000.00 -00.235 +00.346" + values
     assert text.split("\r\n") == [
         "File created on 14/11/2023 at 23:59:59",
         "",
@@ -118,28 +128,28 @@ def test_vbo_to_the_letter(tmp_path):
         "C",
         "",
         "[comments]",
-        "Kickstand: lean-angle in degrees, > 0 to the right; no satellites",
+        "Kickstand: lean-angle in degrees, > 0 to the right; satellites 4 stands for a position, 0 for none",
         "Log Rate (Hz) : at most 100.00",
         "",
         "[column names]",
         "sats time lat long velocity heading height longacc latacc lean-angle yaw-rate roll-rate temperature",
         "",
         "[data]",
-        "000 235959.75" + row,
-        "000 000000.00" + row,
-        "000 000101.25" + row,
-        "000 010101.50" + row,
+        "004 235959.75 +03127.407407 +00030.000000" + row.format("000.00"),
+        "004 000000.00 +03127.407407 +00029.999400" + row.format("090.00"),
+        "004 000101.25 +03127.407407 +00030.000000" + row.format("270.00"),
+        "000 010101.50 +00000.000000 +00000.000000" + row.format("000.00"),
         "",
     ]
 
 
 def test_vbo_without_lean_speed_and_temperature(tmp_path):
-    bare = block(0.0, lean_deg=np.nan, speed_mps=np.nan, temp_c=np.nan)
+    bare = block(0.0, lean_deg=np.nan, speed_mps=np.nan, temp_c=np.nan, **NOWHERE)
     lines = written(export_vbo.write, tmp_path / "x", bare).split("\r\n")
     assert lines[12:14] == ["yaw-rate", "roll-rate"]
     assert lines[16:18] == ["deg/s", "deg/s"]
     assert lines[20:23] == [
-        "Kickstand: no satellites",
+        "Kickstand: satellites 4 stands for a position, 0 for none",
         "Log Rate (Hz) : at most 100.00",
         "no speed in the log: velocity 0 stands for none",
     ]
@@ -258,7 +268,7 @@ def test_every_row_of_a_vbo_has_a_speed(tmp_path):
     kmh = [float(line.split(" ")[4]) for line in lines[lines.index("[data]") + 1 : -1]]
     assert kmh == pytest.approx(np.interp(np.arange(200), [50, 150], [36.0, 72.0]), abs=2e-3)
     export(ride, "racechrono", tmp_path / "racechrono")
-    cells = [line.split(",")[4] for line in (tmp_path / "racechrono").read_text().split("\n")[12:-1]]
+    cells = [line.split(",")[6] for line in (tmp_path / "racechrono").read_text().split("\n")[12:-1]]
     assert [(k, cell) for k, cell in enumerate(cells) if cell] == [(50, "10.000"), (150, "20.000")]
 
 
@@ -276,17 +286,15 @@ def test_two_formats_hold_a_hundred_a_second(tmp_path, form, rows):
 
 
 def test_progress_and_notices_are_passed_on(tmp_path):
-    """A ride whose rates are in rad/s: 12 m/s in a bend of 45 degrees of lean."""
+    """Of a ride whose readings freeze for two seconds."""
     n = 3000
-    bend = (np.arange(n) // 1000 == 1)[:, None]
-    force = np.where(bend, [0.0, 2.0**0.5, 0.0], [0.0, 1.0, 0.0])
-    rate = np.where(bend, [0.0, 9.81 / 12.0, 0.0], 0.0)
-    rate[::2] += 1e-4  # what stays the same is frozen
+    force, rate = np.tile([0.0, 1.0, 0.0], (n, 1)), np.zeros((n, 3))
+    rate[200::2] += 1e-4
     done, notices = [], []
     ride = open_ride(Log(np.arange(n) / 100.0, force, rate), SQUARE)
     export(ride, "csv", tmp_path / "out", lambda *both: done.append(both), notices)
     assert done == [(n, n)]
-    assert [notice.code for notice in notices] == ["rates-in-radians"]
+    assert [notice.code for notice in notices] == ["frozen-readings"]
 
 
 def test_a_name_with_gz_is_packed_and_others_are_not(tmp_path):
@@ -303,11 +311,11 @@ def test_parquet_has_the_same_columns_with_their_units(tmp_path):
     export_parquet.write(tmp_path / "x", iter([block(0.25), block(0.5, 0.75, speed_mps=np.nan)]), EVENING_S)
     file = ParquetFile(tmp_path / "x")
     assert file.num_row_groups == 2
-    units = "s deg deg g g g g deg/s deg/s deg/s m/s Cel deg".split()
+    units = "s deg deg g g g g deg/s deg/s deg/s m/s Cel deg deg deg s".split()
     assert {field.name: field.metadata[b"unit"].decode() for field in file.schema_arrow} == dict(
         zip(export_csv.COLUMNS, units, strict=True)
     )
-    assert [str(field.type) for field in file.schema_arrow] == ["double", *["float"] * 12]
+    assert [str(field.type) for field in file.schema_arrow] == ["double", *["float"] * 12, *["double"] * 3]
     assert file.schema_arrow.metadata[b"axes"] == b"left, up, forward; lean > 0 to the right"
     table = file.read()
     assert table["t_s"].to_pylist() == [EVENING_S + 0.25, EVENING_S + 0.5, EVENING_S + 0.75]

@@ -102,6 +102,7 @@ def test_an_export_replays_as_the_ride_it_was_made_from(tmp_path, name):
     ride = app_exports.riding().every(every)
     found = api.import_recording(write(tmp_path, ride))
     assert found.app == app
+    assert [notice.code for notice in found.notices if notice.code != "import-sign"] == []
     api.write_imported(tmp_path / "RIDE.csv", found)
     log = api.read_log(tmp_path / "RIDE.csv")
     t_s = log.t_s + log.start_s
@@ -117,9 +118,9 @@ def test_an_export_replays_as_the_ride_it_was_made_from(tmp_path, name):
         assert np.count_nonzero(there) >= 27
         wrong = log.speed_mps[there] - np.interp(t_s[there], ride.t_s, ride.speed_mps)
         assert np.max(np.abs(wrong)) < 0.05
-        at = np.isfinite(found.lat_deg)
-        north_m = (found.lat_deg[at] - np.interp(t_s[at], ride.t_s, ride.lat_deg)) * 111_195.0
-        east_m = (found.lon_deg[at] - np.interp(t_s[at], ride.t_s, ride.lon_deg)) * 67_700.0
+        at = np.isfinite(found.log.lat_deg)
+        north_m = (found.log.lat_deg[at] - np.interp(t_s[at], ride.t_s, ride.lat_deg)) * 111_195.0
+        east_m = (found.log.lon_deg[at] - np.interp(t_s[at], ride.t_s, ride.lon_deg)) * 67_700.0
         assert np.max(np.hypot(north_m, east_m)) < 1.0
 
 
@@ -127,9 +128,9 @@ def test_an_export_replays_as_the_ride_it_was_made_from(tmp_path, name):
 def test_utc_is_that_of_the_recording(tmp_path, name):
     _, write, every, _ = EXPORTS[name]
     found = api.import_recording(write(tmp_path, app_exports.riding().every(every)))
-    told = np.isfinite(found.utc_s)
+    told = np.isfinite(found.log.utc_s)
     t_s = found.log.t_s + found.log.start_s
-    assert np.max(np.abs(found.utc_s[told] - START_UTC_S - t_s[told])) < 0.02
+    assert np.max(np.abs(found.log.utc_s[told] - START_UTC_S - t_s[told])) < 0.02
 
 
 def test_one_file_with_all_sensors_of_phyphox(tmp_path):
@@ -168,7 +169,10 @@ def test_kickstands_own_exports_come_back(tmp_path, form):
         pytest.importorskip("pyarrow")
     ride = app_exports.riding().every(2)
     speed = np.where(np.arange(len(ride.t_s)) % 100 == 0, ride.speed_mps, np.nan)
-    log = api.Log(ride.t_s, ride.phone_g, ride.rates_dps @ PHONE.T, speed)
+    each_s = np.where(np.isfinite(speed), 1.0, np.nan)
+    track = {"lat_deg": each_s * ride.lat_deg, "lon_deg": each_s * ride.lon_deg}
+    track["utc_s"] = each_s * ride.t_s + START_UTC_S
+    log = api.Log(ride.t_s, ride.phone_g, ride.rates_dps @ PHONE.T, speed, **track)
     out = tmp_path / f"out.{'parquet' if form == 'parquet' else 'csv'}"
     api.export(api.open_ride(log, ON_PHONE), form, out)
     found = api.import_recording(out)
@@ -177,6 +181,13 @@ def test_kickstands_own_exports_come_back(tmp_path, form):
     assert np.allclose(found.log.gyro_dps, ride.rates_dps[: len(found.log.t_s)], atol=2e-3)
     there = np.isfinite(found.log.speed_mps)
     assert np.allclose(found.log.speed_mps[there], ride.speed_mps[: len(there)][there], atol=2e-3)
+    t_s = found.log.t_s + found.log.start_s
+    for name in ("lat_deg", "lon_deg"):
+        given = getattr(ride, name)[: len(there)]
+        assert np.allclose(getattr(found.log, name)[there], given[there], rtol=0.0, atol=1e-7)
+    told = np.isfinite(found.log.utc_s)
+    assert np.count_nonzero(told) >= np.count_nonzero(there)
+    assert np.allclose(found.log.utc_s[told] - START_UTC_S, t_s[told], rtol=0.0, atol=2e-3)
 
 
 def test_a_log_comes_back_as_it_was_also_from_a_spreadsheet(tmp_path):
@@ -190,4 +201,4 @@ def test_a_log_comes_back_as_it_was_also_from_a_spreadsheet(tmp_path):
     assert found.app == "Kickstand"
     assert np.allclose(found.log.accel_g, ride.force_g, atol=1e-6)
     assert np.allclose(found.log.temperature_c, 21.5)
-    assert np.count_nonzero(np.isfinite(found.lat_deg)) > 500
+    assert np.count_nonzero(np.isfinite(found.log.lat_deg)) > 500

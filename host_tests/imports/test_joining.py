@@ -110,7 +110,7 @@ def test_samples_that_come_late_are_put_in_order(tmp_path):
 
 
 def test_a_damaged_row_costs_no_more_than_itself(tmp_path):
-    """A cut last line, a time from nowhere, a reading past any sensor's, a word."""
+    """A time from nowhere, a reading past any sensor's and a word are counted; a cut last line is left out."""
     ride = riding().every(4)
     lines = app_exports.racebox(ride).splitlines()
     lines[200] = lines[200].replace("2024-05-17", "2031-05-17")
@@ -120,7 +120,7 @@ def test_a_damaged_row_costs_no_more_than_itself(tmp_path):
     (tmp_path / "r.csv").write_text("\n".join(lines))
     found = api.import_recording(tmp_path / "r.csv")
     assert len(found.log.t_s) == len(ride.t_s) - 4
-    assert [(notice.code, notice.values) for notice in found.notices] == [("import-damaged", (2,))]
+    assert [(notice.code, notice.values) for notice in found.notices] == [("import-damaged", (3,))]
     assert np.max(np.abs(found.log.accel_g)) < 2.0
 
 

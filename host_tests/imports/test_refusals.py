@@ -225,3 +225,26 @@ def test_without_pandas_the_extra_is_named(tmp_path, ride, monkeypatch):
     (tmp_path / "r.csv").write_text(app_exports.racebox(ride))
     monkeypatch.setitem(sys.modules, "pandas", None)
     refused(tmp_path, tmp_path / "r.csv", "import needs pandas: ")
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("mk.py", b"import os\nprint('x')\n", "no table of sensors ('import os')"),
+        ("old.xls", b"\xd0\xcf\x11\xe0" + bytes(600), "a table of Excel: export it as CSV"),
+    ],
+)
+def test_what_is_no_recording_at_all(tmp_path, name, content, words):
+    (tmp_path / name).write_bytes(content)
+    command.refused(tmp_path, "import", tmp_path / name, "--out", tmp_path / "R.csv", words=words)
+
+
+def test_a_workbook_of_excel(tmp_path):
+    with zipfile.ZipFile(tmp_path / "new.xlsx", "w") as archive:
+        archive.writestr("[Content_Types].xml", "<Types/>")
+    command.refused(tmp_path, "import", tmp_path / "new.xlsx", "--out", tmp_path / "R.csv", words="a table of Excel")
+
+
+def test_other_commands_name_import_for_a_zip(tmp_path):
+    source = app_exports.into(tmp_path / "p.zip", app_exports.phyphox(riding().every(8)))
+    command.refused(tmp_path, "report", source, words="kickstand import makes a log of it")

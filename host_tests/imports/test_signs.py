@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from app_exports import PHONE, riding
 from kickstand_tools import api
-from kickstand_tools.imports.course import course_agrees
+from kickstand_tools.logs.axes.course import course_agrees
 
 pytest.importorskip("pandas")
 

@@ -68,7 +68,7 @@ def test_units_in_brackets_need_no_others(tmp_path):
     found = api.import_recording(tmp_path / "log.csv", names)
     assert np.allclose(found.log.accel_g, ride.phone_g, atol=1e-5)
     assert np.allclose(found.log.gyro_dps, np.degrees(ride.phone_rad), atol=1e-4)
-    assert [taken.unit for taken in found.taken] == ["m/s^2, m/s², m/s2", "°/s, dps, deg/s", "km/h"]
+    assert [taken.unit for taken in found.taken] == ["ms", "m/s^2, m/s², m/s2", "°/s, dps, deg/s", "km/h"]
 
 
 def test_a_minus_turns_all_axes_or_one(tmp_path):
@@ -77,7 +77,7 @@ def test_a_minus_turns_all_axes_or_one(tmp_path):
     found = api.import_recording(tmp_path / "log.csv", NAMES, UNITS | {"a": "-m/s2", "gz": "-rad/s"})
     assert np.allclose(found.log.accel_g, -ride.phone_g, atol=1e-5)
     assert np.allclose(found.log.gyro_dps, np.degrees(ride.phone_rad) * [1.0, 1.0, -1.0], atol=1e-4)
-    assert [taken.sign for taken in found.taken] == ["turned", "turned in part", ""]
+    assert [taken.sign for taken in found.taken] == ["", "turned", "turned in part", ""]
 
 
 SPEEDS = {"m/s": 1.0, "km/h": 3.6, "kph": 3.6, "mph": 2.236936, "knots": 1.943844, "kt": 1.943844}
@@ -100,8 +100,8 @@ def test_positions_in_minutes(tmp_path):
     keys: list[str] = ["t", "ax", "ay", "az", "gx", "gy", "gz", "lat", "lon"]
     names = dict(zip(keys, "tabcpqruv"))
     found = api.import_recording(tmp_path / "log.csv", names, {"a": "g", "g": "deg/s", "lat": "min", "lon": "-min"})
-    assert np.nanmin(found.lat_deg) == pytest.approx(ride.lat_deg.min(), abs=1e-5)
-    assert np.nanmin(found.lon_deg) == pytest.approx(ride.lon_deg.min(), abs=1e-5)
+    assert np.nanmin(found.log.lat_deg) == pytest.approx(ride.lat_deg.min(), abs=1e-5)
+    assert np.nanmin(found.log.lon_deg) == pytest.approx(ride.lon_deg.min(), abs=1e-5)
 
 
 START_NS = 1_715_938_200_250_000_000
@@ -183,7 +183,12 @@ MISTAKES = {
     "strange key": (COLUMNS + ",roll=Note", "a=g", "--columns: 'roll' is not one of t, ax"),
     "strange unit": (COLUMNS, "a=stone,g=deg/s", "unit 'stone' is not known: write one of g, m/s2, mg"),
     "strange unit key": (COLUMNS, "accel=g", "--units: 'accel' is not one of t, a, g"),
-    "no unit": (COLUMNS, "a=m/s2", "Gyro_X: its unit is not known: add --units g=deg/s (one of deg/s, rad/s, mdeg/s)"),
+    "no unit": (
+        COLUMNS,
+        "a=m/s2",
+        "the unit is not known of Gyro_X, Gyro_Y, Gyro_Z, Speed_kmh: add --units g=deg/s,speed=m/s (g is one of deg/s, "
+        "rad/s, mdeg/s; speed is one of m/s, km/h, mph, knots)",
+    ),
     "no pair": (COLUMNS, "m/s2", "--units: 'm/s2' is not NAME=VALUE; commas part the pairs"),
     "twice": ("t=Millis,t=Millis", "a=g", "--columns: 't' is there twice"),
     "no time in it": (COLUMNS.replace("t=Millis", "t=Note"), "a=g,g=deg/s,speed=m/s", "no time"),

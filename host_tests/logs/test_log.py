@@ -31,12 +31,13 @@ def test_times_count_from_the_first_sample():
 
 
 def test_the_chips_order_and_the_names_of_the_columns():
-    log = log_of(2, temperature_c=[20.0, 21.0], speed_mps=[5.0, np.nan])
+    track = {"lat_deg": [52.1, np.nan], "lon_deg": [-0.5, np.nan], "utc_s": [1.7e9, np.nan]}
+    log = log_of(2, temperature_c=[20.0, 21.0], speed_mps=[5.0, np.nan], **track)
     assert log.readings[1].tolist() == [0.1, 0.2, 0.9, 21.0, 1.0, 2.0, 3.0]
     first = {name: values[0] for name, values in log.columns().items()}
     assert first == {
         "t_s": 0.0, "ax_g": 0.1, "ay_g": 0.2, "az_g": 0.9, "gx_dps": 1.0, "gy_dps": 2.0, "gz_dps": 3.0,
-        "speed_mps": 5.0, "temp_c": 20.0,
+        "speed_mps": 5.0, "lat_deg": 52.1, "lon_deg": -0.5, "utc_s": 1.7e9, "temp_c": 20.0,
     }
     again = Log.from_readings(log.readings, 50.0, "mine")
     assert again.t_s.tolist() == [0.0, 0.02]
@@ -52,6 +53,7 @@ def test_the_chips_order_and_the_names_of_the_columns():
         ({"t_s": [[0.0], [1.0]]}, r"t_s has the shape \(2, 1\), it has to be \(2,\)"),
         ({"accel_g": [[0.0, 1.0]] * 2}, r"accel_g has the shape \(2, 2\), it has to be \(2, 3\)"),
         ({"gyro_dps": [RATE]}, r"gyro_dps has the shape \(1, 3\), it has to be \(2, 3\)"),
+        ({"lat_deg": [1.0]}, r"lat_deg has the shape \(1,\), it has to be \(2,\)"),
         ({"speed_mps": [1.0]}, r"speed_mps has the shape \(1,\), it has to be \(2,\)"),
         ({"t_s": [0.0, 0.0]}, "has to increase"),
         ({"t_s": [1.0, 0.5]}, "has to increase"),

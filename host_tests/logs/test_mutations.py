@@ -50,6 +50,7 @@ USES = {
     "export csv": _export("csv"),
     "export vbo": _export("vbo"),
     "export racechrono": _export("racechrono"),
+    "export gpx": _export("gpx"),
     "cut": lambda log, out: cut_log(log, out, 0.3, -0.2),
     "pose": lambda log, out: read_pose(log),
     "drive": lambda log, out: fit_drive([log], CALIBRATION, "motorcycle"),

@@ -4,49 +4,52 @@ import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.errors import InputError
-from kickstand_tools.logs.rate_unit import RateUnit
+from kickstand_tools.logs.axes.bends import Bends
 from kickstand_tools.logs.speed_unit import SpeedUnit
+from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
 KMH, KNOTS = 3.6, 1.9438
 
 
-def bends(
-    mps=300.0, grown=1.4142, along=1.0, seconds=12, straight_s=200, hz=50, before_s=0, rest_s=0
-) -> RateUnit:
-    """A ride at 0.04 of this speed whose rates are so much too small; bends at the end, after straight riding.
+TURNED = np.reshape(random_mounting(3), (3, 3))
 
-    grown: force in a bend, times the usual one. along: share of it along its usual direction. before_s: of bends at
-    the very beginning, rest_s later; both are given in blocks of 100 s.
+
+def weaving(scale=57.0, noise_dps=0.0, unlike=0.0, seconds=40.0, rest_s=8.0) -> Bends:
+    """A ride of bends to both sides at 15 m/s, its rates so many times too small; noise in that about left.
+
+    unlike: part of the rolling that has nothing to do with turning. rest_s: at rest, after the ride.
     """
-    time = np.arange(0.0, before_s + rest_s + straight_s + seconds, 1.0 / hz)
-    leaned = (time < before_s) | (time >= before_s + rest_s + straight_s)
-    rate = np.degrees(STANDARD_GRAVITY * np.sqrt(grown**2 - 1.0) / mps)
-    force = np.where(leaned[:, None], np.array([0.0, grown, grown * np.sqrt(1.0 / along**2 - 1.0)]), [0.0, 1.0, 0.0])
-    rates = np.where(leaned[:, None], [0.6 * rate, 0.8 * rate, 0.0], 0.0)
-    unit = RateUnit()
-    for start in range(0, len(time), 100 * hz):
-        part = slice(start, start + 100 * hz)
-        unit.add(time[part], force[part], rates[part])
+    chance = np.random.default_rng(7)
+    time = np.arange(0.0, seconds + rest_s, 0.02)
+    moving = np.where(time < seconds, 1.0, 0.0)
+    lean = 0.4 * np.sin(1.1 * time) * moving
+    yaw = -STANDARD_GRAVITY * np.tan(lean) / 15.0
+    rolling = (0.44 * np.cos(1.1 * time) + unlike * np.cos(2.3 * time)) * moving
+    about_left = yaw * np.sin(lean) + np.radians(noise_dps) * chance.normal(size=len(time)) * moving
+    rate = np.degrees(np.column_stack((about_left, yaw * np.cos(lean), rolling))) / scale
+    force = np.column_stack((0.0 * time, 1.0 / np.cos(lean), 0.3 * np.sin(2.0 * time) * moving))
+    unit = Bends()
+    for part in np.array_split(np.arange(len(time)), 7):
+        unit.add(time[part], force[part] @ TURNED, rate[part] @ TURNED, np.full(len(part), np.nan))
     return unit
 
 
 @pytest.mark.parametrize(
     ("wrong", "right"),
     [
-        ({"mps": 201.0}, {"mps": 199.0}),  # 200 m/s: no motorcycle is as fast
-        ({"grown": 1.16}, {"grown": 1.14}),  # 30 degrees of lean
-        ({"along": 0.975}, {"along": 0.965}),  # braking turns the force by more than 14 degrees
-        ({"seconds": 10}, {"seconds": 9}),  # enough of bends
-        ({"hz": 10}, {"hz": 9}),  # samples in a second, so that vibration averages out
-        ({"before_s": 5, "rest_s": 3300, "seconds": 5}, {"before_s": 5, "rest_s": 3500, "seconds": 5}),  # one hour
+        ({"scale": 16.0}, {"scale": 13.0}),  # a share of 15
+        ({"noise_dps": 15.0}, {"noise_dps": 60.0}),  # by under 4.5 sigmas it is chance
+        ({"unlike": 0.3}, {"unlike": 1.0}),  # a bike's rolling goes with its turning
+        ({"seconds": 16.0}, {"seconds": 12.0}),  # a quarter of a minute of riding
+        ({"rest_s": 1770.0}, {"rest_s": 1800.0}),  # half an hour is kept
     ],
 )
 def test_what_it_takes_to_be_sure_of_rates_in_radians(wrong, right):
-    notice = bends(**wrong).notice
+    notice = weaving(**wrong).notice()
     assert notice
     assert notice.code == "rates-in-radians"
-    assert notice.values[0] == pytest.approx(wrong.get("mps", 300.0), rel=0.01)
-    assert bends(**right).notice is None
+    assert notice.values[0] == pytest.approx(15.0 * 57.3, rel=0.2)
+    assert weaving(**right).notice() is None
 
 
 def jerky(

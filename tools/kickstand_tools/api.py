@@ -5,6 +5,7 @@
     six = api.fit_six_positions(["1.csv", "2.csv", "3.csv", "4.csv", "5.csv", "6.csv", "7.csv"])
     two = api.fit_two_positions("KICKSTAND.csv", "UPRIGHT.csv", six.calibration)
     lean = api.replay("RIDE.csv.gz", two.calibration)                     # lean.t_s, lean.lean_deg, ...
+    after = api.smooth("RIDE.csv.gz", two.calibration)                    # after.lean_deg, after.lean_sigma_deg, ...
     stops = api.find_stops(api.vehicle_channels("RIDE.csv.gz", two.calibration))
 
 A log is a path, an open file of text or bytes, a Log made of arrays, or a Stretch of one of these. Tables have
@@ -27,6 +28,7 @@ from .calibration.six import SixPositions, fit_six_positions
 from .calibration.two import TwoPositions, fit_two_positions
 from .errors import InputError
 from .imports.importing import Imported, import_recording, write_imported
+from .logs.csv_lines import write_log
 from .logs.cut import cut_log
 from .logs.log import Log
 from .logs.reader import read_log
@@ -35,6 +37,7 @@ from .refusals import RefusedInput, sentence
 from .replay.replay import LeanTable, replay
 from .simulation.ride import Ride as SimulatedRide
 from .simulation.ride import ride as simulate_ride
+from .smoothing.smooth import SmoothedRide, smooth
 
 __all__ = [
     "CalibrationFile",
@@ -51,6 +54,7 @@ __all__ = [
     "RideFit",
     "SimulatedRide",
     "SixPositions",
+    "SmoothedRide",
     "Stop",
     "Stretch",
     "Summary",
@@ -70,8 +74,10 @@ __all__ = [
     "replay",
     "sentence",
     "simulate_ride",
+    "smooth",
     "summary",
     "vehicle_channels",
     "write_calibration",
     "write_imported",
+    "write_log",
 ]

@@ -68,7 +68,8 @@ _SENTENCES = {
     "speed=km/h, mph or m/s",
     "import-sign": "which sign accelerations have in {0} is not certain, and no track with turns tells it: at rest the "
     "axis that points up has to read +1 g, else the ride is mirrored and --units a=-g or a=-m/s2 puts it right",
-    "import-damaged": "{0} damaged rows are left out: a time out of order, or readings past any sensor's",
+    "import-damaged": "damaged rows that are left out: {0}; a cell is no number, a time out of order, or a reading "
+    "past any sensor's",
     "import-mirrored": "the sensor turns against the track, so left and right are exchanged: were all its "
     "accelerations turned? {0} has +1 g where up is",
     "left-handed": "the rates turn the force the wrong way, so the lean is wrong: are the axes left-handed (reverse "
@@ -100,6 +101,11 @@ class RefusedInput(InputError):
         super().__init__(f"{where}: {sentence(refusal)}{advice}" if where else f"{sentence(refusal)}{advice}")
         self.code = refusal.code
         self.values = refusal.values
+        self._given = Refusal(refusal.code, *refusal.values), where, advice
+
+    def __reduce__(self) -> tuple[type["RefusedInput"], tuple[Refusal, str, str]]:
+        """Pickled as it was made: another process may raise it."""
+        return RefusedInput, self._given
 
 
 def sentence(refusal: Refusal | Notice) -> str:

@@ -33,7 +33,7 @@ class Road:
             "t_s": self.t_s.copy(),
             "up_g": np.ones(n),
             "forward_g": self.mps2 / STANDARD_GRAVITY,
-            "speed_mps": np.full(n, np.nan),
+            **dict.fromkeys(("speed_mps", "lat_deg", "lon_deg", "utc_s"), np.full(n, np.nan)),
             "resting": self.rests.astype(float),
             "sure": np.ones(n),
         }

@@ -35,6 +35,7 @@ class Channels(Table):
     pitch_rate_dps: > 0 nose up; yaw_rate_dps: > 0 in a left turn; roll_rate_dps: > 0 to the right. shown_g: the forward
     force, smoothed as on the display. sigma_deg: standard deviation of the lean. As 1 or 0: resting: the meter knows
     that the bike stands still; rolling: it knows from leaning and turning that it does not; sure: it trusts its lean.
+    lat_deg, lon_deg: degrees north and east, and utc_s: s since 1970, both only where there is a new value.
     """
 
     t_s: Array
@@ -54,6 +55,9 @@ class Channels(Table):
     resting: Array
     rolling: Array
     sure: Array
+    lat_deg: Array
+    lon_deg: Array
+    utc_s: Array
 
     @property
     def trusted(self) -> NDArray[np.bool_]:
@@ -189,6 +193,9 @@ def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool 
         lean[:, 3],
         lean[:, 4],
         lean[:, 5],
+        block.lat_deg,
+        block.lon_deg,
+        block.utc_s,
     )
 
 

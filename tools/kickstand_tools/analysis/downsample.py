@@ -8,6 +8,8 @@ import numpy as np
 from ..logs.table import Array
 from .channels import Channels
 
+_LAST = ("lat_deg", "lon_deg", "utc_s")
+
 
 def joined(parts: list[Channels]) -> Channels:
     """The parts of a ride, one after the other, as one."""
@@ -20,7 +22,8 @@ def spacing_s(course: Channels) -> float:
 
 
 def downsampled(blocks: Iterable[Channels], step_s: float) -> Iterator[Channels]:
-    """Means over each stretch of step_s in which there are samples; a channel's NaNs do not count.
+    """Means over each stretch of step_s in which there are samples; a channel's NaNs do not count. Of positions, and of
+    their time, the last one: there is no mean of longitudes on both sides of 180 degrees.
 
     A ride with a sample or less in each stretch comes through unchanged. A stretch may go on from block to block.
     """
@@ -44,6 +47,10 @@ def _means(block: Channels, step: Array) -> Channels:
     for field in fields(block):
         values = getattr(block, field.name)
         there = ~np.isnan(values)
+        if field.name in _LAST:
+            last = np.maximum.reduceat(np.where(there, np.arange(len(step)), -1), starts)
+            columns.append(np.where(last >= 0, values[last], np.nan))
+            continue
         count = np.add.reduceat(there, starts, dtype=float)
         total = np.add.reduceat(np.where(there, values, 0.0), starts)
         columns.append(np.divide(total, count, out=np.full(len(starts), np.nan), where=count > 0))

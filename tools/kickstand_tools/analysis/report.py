@@ -39,14 +39,18 @@ def as_data(seen: Overview) -> dict[str, Any]:
     for name, peak in peaks.items():
         there = peak.time_s is not None
         data[name] = {"value": round(peak.value, 4), "time_s": round(peak.time_s or 0.0, 3)} if there else None
+    judged = _judged(seen)
     data["alignment"] = {
-        name: None if value is None else round(value, 4)
+        name: round(value, 4) if judged and value is not None else None
         for name, value in vars(quality).items()
         if not name.endswith(("lateral_g", "forward_g"))
     }
     if not seen.ride.car:
         costs = vars(lean_cost(quality))
-        data["lean_cost"] = {name: None if value is None else round(value, 2) for name, value in costs.items()}
+        known = judged and not seen.exchanged
+        data["lean_cost"] = {
+            name: round(value, 2) if known and value is not None else None for name, value in costs.items()
+        }
     data["remark"] = sentence(seen.exchanged) if seen.exchanged else ""
     data["stops"] = [
         {name: value if isinstance(value, str) else round(value, 3) for name, value in vars(stop).items()}
@@ -64,11 +68,13 @@ def page(seen: Overview) -> Group:
         if any(stop.speed_from == "integrated" for stop in seen.stops):
             parts.append(Text("* no speed in the log: integrated from the acceleration", style="dim"))
     else:
-        parts += [Text(), Text(sentence(seen.exchanged) if seen.exchanged else _no_stops(seen))]
+        parts += [Text(), Text(_no_stops(seen))]
     return Group(*parts)
 
 
 def _no_stops(seen: Overview) -> str:
+    if seen.exchanged:
+        return "Stops: not told, see the warning."
     if not seen.has_speed and seen.summary.riding_s > RIDDEN_S:
         return "no speed in the log: stops cannot be told"  # there may have been some: none was sure enough
     if stops_by_speed(seen.course):
@@ -101,7 +107,7 @@ def _ride(seen: Overview) -> Table:
 
 def _alignment(seen: Overview) -> Text:
     quality = seen.quality
-    if any(notice.code in CONTRADICTED for notice in seen.notices):
+    if not _judged(seen):
         return Text("Alignment: not judged, see the warning.")
     said = "Alignment: not enough straight riding to tell how far it is off."
     known = angles(quality)
@@ -118,16 +124,21 @@ def _alignment(seen: Overview) -> Text:
     return Text(said)
 
 
+def _judged(seen: Overview) -> bool:
+    """Whether the ride says how well the sensor is aligned: not where it contradicts the calibration altogether."""
+    return not any(notice.code in CONTRADICTED for notice in seen.notices)
+
+
 def _cost(cost: LeanCost, speed: bool) -> str:
     """What the angles cost, and what to do against it. speed: the log has one."""
     drive = "calibrate ride or drive takes it out" if speed else "calibrate ride takes it out"
     remedies = {
-        "Roll": (cost.roll_deg, "calibrate two again, held upright"),
-        "Pitch": (cost.pitch_deg, "calibrate two again, on level ground"),
+        "Roll": (cost.roll_deg, "calibrate ride takes it out, or calibrate two, held upright"),
+        "Pitch": (cost.pitch_deg, "calibrate ride takes it out, or calibrate two, on level ground"),
         "Yaw": (cost.yaw_deg, drive),
     }
     said = [
-        f" {name} costs up to about {value:.1f}° of lean; {remedy}."
+        f" {name} usually costs about {value:.1f}° of lean; {remedy}."
         for name, (value, remedy) in remedies.items()
         if value is not None and value >= COSTS_DEG
     ]

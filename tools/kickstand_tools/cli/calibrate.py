@@ -14,8 +14,8 @@ if TYPE_CHECKING:
     from ..calibration.six import SixPositions
     from ..calibration.two import TwoPositions
 
-_PATH = click.Path(path_type=Path)
-_OUT = click.option("--out", required=True, type=_PATH, help="The file to write.")
+PATH = click.Path(path_type=Path)
+OUT = click.option("--out", required=True, type=PATH, help="The file to write.")
 
 
 @click.group(no_args_is_help=False)
@@ -24,8 +24,8 @@ def calibrate() -> None:
 
 
 @calibrate.command()
-@click.argument("poses", nargs=-1, required=True, type=_PATH, metavar="POSE.csv...")
-@_OUT
+@click.argument("poses", nargs=-1, required=True, type=PATH, metavar="POSE.csv...")
+@OUT
 def six(poses: tuple[Path, ...], out: Path) -> None:
     """Accelerometer offset and slope from six still poses, each side up once, in any order.
 
@@ -37,19 +37,19 @@ def six(poses: tuple[Path, ...], out: Path) -> None:
 
     check_output(out, list(poses))
     found = fit_six_positions(poses)
-    _print(_six_lines(found))
+    print_lines(_six_lines(found))
     write_calibration(out, found.calibration)
     click.echo(f"written: {out}")
 
 
 @calibrate.command()
-@click.argument("kickstand", type=_PATH, metavar="KICKSTAND.csv")
-@click.argument("upright", type=_PATH, metavar="UPRIGHT.csv")
-@click.option("--calibration", type=_PATH, help="The result of `kickstand calibrate six`, to build on.")
+@click.argument("kickstand", type=PATH, metavar="KICKSTAND.csv")
+@click.argument("upright", type=PATH, metavar="UPRIGHT.csv")
+@click.option("--calibration", type=PATH, help="The result of `kickstand calibrate six`, to build on.")
 @click.option(
     "--side", type=click.Choice(["left", "right"]), default="left", help="Where the kickstand leans to."
 )
-@_OUT
+@OUT
 def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out: Path) -> None:
     """How the sensor sits on the bike, from a pose on the kickstand and one upright.
 
@@ -63,16 +63,16 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
     check_output(out, [kickstand, upright])
     before = read_calibration(calibration) if calibration else None
     found = fit_two_positions(kickstand, upright, before, side)
-    _print(_two_lines(found))
+    print_lines(_two_lines(found))
     warn(upright, remarks(found.calibration, before))
     write_calibration(out, found.calibration)
     click.echo(f"written: {out}")
 
 
 @calibrate.command()
-@click.argument("logs", nargs=-1, required=True, type=_PATH, metavar="LOG.csv...")
+@click.argument("logs", nargs=-1, required=True, type=PATH, metavar="LOG.csv...")
 @click.option(
-    "--calibration", type=_PATH, help="What is known already: six positions, and a motorcycle's two poses."
+    "--calibration", type=PATH, help="What is known already: six positions, and a motorcycle's two poses."
 )
 @click.option(
     "--vehicle",
@@ -80,7 +80,7 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
     help="motorcycle if the calibration has two poses, else car, if not given.",
 )
 @click.option("--method", type=click.Choice(["improved", "published"]), default="improved")
-@_OUT
+@OUT
 def drive(
     logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None, method: str, out: Path
 ) -> None:
@@ -103,7 +103,7 @@ def drive(
     several = len(logs) > 1
     with Bar("driving") as bar:
         found = fit_drive(
-            logs, before, vehicle, method, bar.reach, lambda event: _print(_event_lines(event, several))
+            logs, before, vehicle, method, bar.reach, lambda event: print_lines(_event_lines(event, several))
         )
     for name, notice in found.notices:
         warn(name, [notice])
@@ -112,7 +112,7 @@ def drive(
         for log in logs:
             wrong = contradiction(read_log(log), before)
             warn(log, [wrong] if wrong else [])
-    _print(_drive_lines(found, several))
+    print_lines(_drive_lines(found, several))
     write_calibration(out, found.calibration)
     click.echo(f"written: {out}")
 
@@ -130,9 +130,9 @@ def _six_lines(found: "SixPositions") -> Iterable[str]:
             f"free pose: {found.free_pose.name}, {found.free_pose.samples} samples, "
             f"{found.free_pose_error_g * 1000:+.1f} mg from 1 g: {good}"
         )
-    yield "offset     " + _axes(found.calibration.accel_offset_g, "%+.4f g")
-    yield "slope      " + _axes(found.calibration.accel_slope, "%.4f")
-    yield "gyro bias  " + _axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
+    yield "offset     " + along_axes(found.calibration.accel_offset_g, "%+.4f g")
+    yield "slope      " + along_axes(found.calibration.accel_slope, "%.4f")
+    yield "gyro bias  " + along_axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
     if found.beyond_sheet:
         axes = ", ".join(found.beyond_sheet)
         yield f"warning: {axes} is beyond the data sheet (50 mg, z 80 mg, slope 3 %): used anyway"
@@ -153,13 +153,13 @@ def _two_lines(found: "TwoPositions") -> Iterable[str]:
         f"upright:   {second.name}, {second.samples} samples, "
         f"{found.tilt_deg:.1f} degrees from the kickstand on the {side}"
     )
-    yield "gyro bias  " + _axes(calibration.gyro_bias_dps, "%+.2f deg/s")
-    yield from _matrix_lines(calibration.vehicle_from_sensor)
+    yield "gyro bias  " + along_axes(calibration.gyro_bias_dps, "%+.2f deg/s")
+    yield from matrix_lines(calibration.vehicle_from_sensor)
     if found.tilt_deg < WARN_TILT_DEG:
         cost_deg = alignment_quality.yaw_cost_deg(7.0)
         yield (
-            f"warning: under {WARN_TILT_DEG:.0f} degrees, 1 degree of pitch turns forward by over 7, which costs up to "
-            f"about {cost_deg:.1f} degrees of lean: lean further, or calibrate drive after it"
+            f"warning: under {WARN_TILT_DEG:.0f} degrees, 1 degree of pitch turns forward by over 7, which usually "
+            f"costs about {cost_deg:.1f} degrees of lean: lean further, or calibrate drive after it"
         )
     if not calibration.six_done:
         yield "warning: no six-position calibration: an offset of 50 mg is 3 degrees of lean: calibrate six first"
@@ -188,9 +188,9 @@ def _drive_lines(found: "DriveResult", several: bool) -> Iterable[str]:
             yield f"warning: the mount is {yaw_deg:.0f} degrees from where the two poses saw it: was it moved since?"
         else:
             cost_deg = alignment_quality.yaw_cost_deg(yaw_deg)
-            costs = f", which costs up to about {cost_deg:.1f} degrees of lean" if cost_deg >= 0.05 else ""
+            costs = f", which usually costs about {cost_deg:.1f} degrees of lean" if cost_deg >= 0.05 else ""
             yield f"the two poses had forward {yaw_deg:.1f} degrees off{costs}: now it is put right"
-    yield from _matrix_lines(found.calibration.vehicle_from_sensor)
+    yield from matrix_lines(found.calibration.vehicle_from_sensor)
     if not found.calibration.six_done:
         what = "warning: no six-position calibration: an offset of 50 mg tilts the vertical by 3 degrees"
         yield f"{what}: calibrate six first"
@@ -216,17 +216,17 @@ def _event_lines(event: "DriveEvent", several: bool) -> Iterable[str]:
     yield f"{event.t_s:7.1f} s  {words[event.what]}"
 
 
-def _matrix_lines(vehicle_from_sensor) -> Iterable[str]:
+def matrix_lines(vehicle_from_sensor) -> Iterable[str]:
     for name, row in zip(("left", "up", "forward"), vehicle_from_sensor, strict=True):
-        yield f"{name:<10} " + _axes(row, "%+.4f")
+        yield f"{name:<10} " + along_axes(row, "%+.4f")
 
 
-def _axes(values, form: str) -> str:
+def along_axes(values, form: str) -> str:
     from kickstand.units import AXES
 
     return "  ".join(f"{axis} " + form % value for axis, value in zip(AXES, values, strict=True))
 
 
-def _print(lines: Iterable[str]) -> None:
+def print_lines(lines: Iterable[str]) -> None:
     for line in lines:
         click.echo(line)

@@ -6,20 +6,21 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .calibrate import _OUT, _PATH, _axes, _matrix_lines, _print
+from .calibrate import OUT, PATH, along_axes, matrix_lines, print_lines
+from .warnings import warn
 
 if TYPE_CHECKING:
     from ..calibration.ride.fit import RideFit
 
 
 @click.command()
-@click.argument("log", type=_PATH, metavar="LOG.csv")
+@click.argument("log", type=PATH, metavar="LOG.csv")
 @click.option(
     "--phone",
     type=click.Choice(["portrait", "landscape", "flat"]),
     help="How a phone was mounted, to check the result: upright or on its side with the screen to the rider, or flat.",
 )
-@_OUT
+@OUT
 def ride(log: Path, phone: str | None, out: Path) -> None:
     """How the sensor sits on a motorcycle, from any ride with bends: no poses, and no speed, are needed.
 
@@ -33,7 +34,8 @@ def ride(log: Path, phone: str | None, out: Path) -> None:
     check_output(out, [log])
     with Bar("aligning") as bar:
         found = fit_ride(log, phone, bar.reach)
-    _print(_ride_lines(found))
+    warn(log, found.notices)
+    print_lines(_ride_lines(found))
     write_calibration(out, found.calibration)
     click.echo(f"written: {out}")
 
@@ -51,7 +53,7 @@ def _ride_lines(found: "RideFit") -> Iterable[str]:
         yield f"speed: {max(0.0, found.lag_s):.1f} s late"
     if found.phone_deg is not None:
         yield f"phone: mounted as said, turned by {found.phone_deg:.0f} degrees"
-    yield "gyro bias  " + _axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
-    yield "offset     " + _axes(found.calibration.accel_offset_g, "%+.4f g")
-    yield from _matrix_lines(found.calibration.vehicle_from_sensor)
+    yield "gyro bias  " + along_axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
+    yield "offset     " + along_axes(found.calibration.accel_offset_g, "%+.4f g")
+    yield from matrix_lines(found.calibration.vehicle_from_sensor)
     yield "upright is where the bike is balanced on straights; a ride does not tell the accelerometer's slopes"

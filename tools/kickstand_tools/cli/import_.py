@@ -85,6 +85,6 @@ def _table(found: "Imported"):
     for column in ("quantity", "from", "unit", "rate", "axes and sign"):
         table.add_column(column, overflow="fold")
     for taken in found.taken:
-        rate = f"{taken.rate_hz:.4g} Hz" if taken.rate_hz else ""
+        rate = f"{taken.rate_hz:{'.0f' if taken.rate_hz >= 10.0 else '.2g'}} Hz" if taken.rate_hz else ""
         table.add_row(taken.quantity, taken.source, taken.unit, rate, taken.sign)
     return table

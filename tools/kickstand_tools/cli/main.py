@@ -22,7 +22,7 @@ def kickstand(context: click.Context) -> None:
 
 for _command in (
     *(board.flash, board.status, board.pull, board.record),
-    *(import_.import_, calibrate.calibrate, ride.replay, ride.report, ride.plot, ride.export, ride.cut),
+    *(import_.import_, calibrate.calibrate, ride.replay, ride.smooth, ride.report, ride.plot, ride.export, ride.cut),
     *(simulated.simulate, simulated.evaluate),
     *(without_a_board.demo, without_a_board.emulate, without_a_board.bench),
 ):

@@ -1,4 +1,4 @@
-"""The commands of `kickstand` that read a recorded ride: replay, report, plot, export, cut."""
+"""The commands of `kickstand` that read a recorded ride: replay, smooth, report, plot, export, cut."""
 
 import json
 from collections.abc import Callable
@@ -64,11 +64,35 @@ def replay(
 
 @click.command()
 @click.argument("ride", type=_PATH, metavar="RIDE.csv")
-@click.option("--to", "form", required=True, type=click.Choice(["csv", "vbo", "racechrono", "parquet"]))
+@_CALIBRATION
+@_stretch
+@_OUT
+def smooth(ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, out: Path) -> None:
+    """The lean looked back over: from the whole ride, each sample with its standard deviation.
+
+    The log's axes are right-handed, and so are its rates; at rest the axis that points up reads +1 g.
+    """
+    from ..calibration.file import calibration_beside, read_calibration
+    from ..output import check_output
+    from ..progress import Bar
+    from ..smoothing.smooth import smooth_to_csv
+
+    calibration = calibration or calibration_beside(ride)
+    check_output(out, [ride, calibration])
+    parameters = read_calibration(calibration)
+    with Bar("smoothing") as bar:
+        count, notices = smooth_to_csv(_part(ride, from_s, to_s), parameters, out, bar.reach)
+    warn(ride, notices)
+    click.echo(f"written: {out}, {count} samples")
+
+
+@click.command()
+@click.argument("ride", type=_PATH, metavar="RIDE.csv")
+@click.option("--to", "form", required=True, type=click.Choice(["csv", "gpx", "vbo", "racechrono", "parquet"]))
 @_CALIBRATION
 @_OUT
 def export(ride: Path, form: str, calibration: Path | None, out: Path) -> None:
-    """Write a ride as Circuit Tools (vbo), RaceChrono or data frames (parquet, csv) open it.
+    """Write a ride as maps (gpx), Circuit Tools (vbo), RaceChrono or data frames (parquet, csv) open it.
 
     The log's axes are right-handed, and so are its rates; at rest the axis that points up reads +1 g.
     """
@@ -108,7 +132,7 @@ def report(
 
     with Bar("reading") as bar:
         seen = overview(open_ride(_part(ride, from_s, to_s), calibration), bar.reach)
-    warn(ride, seen.notices)
+    warn(ride, [*seen.notices, *([seen.exchanged] if seen.exchanged else [])])
     if as_json:
         click.echo(json.dumps(as_data(seen)))
     else:

@@ -9,6 +9,7 @@ from pathlib import Path, PurePosixPath
 
 from ..errors import InputError, cause
 
+_EXCEL = b"\xd0\xcf\x11\xe0"  # its older files begin so; the newer are zips
 SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # what is looked at in a folder or a zip
 _BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 
@@ -84,6 +85,8 @@ def _contents(path: Path) -> Iterator[tuple[str, bytes]]:
 
 def _unzipped(path: Path) -> Iterator[tuple[str, bytes]]:
     with zipfile.ZipFile(path) as archive:
+        if "[Content_Types].xml" in archive.namelist():
+            raise InputError(f"{path}: a table of Excel: export it as CSV")
         for entry in archive.infolist():
             if not entry.is_dir() and _wanted(entry.filename):
                 yield entry.filename.replace("\\", "/"), _unpacked(archive, entry)
@@ -107,7 +110,8 @@ def _wanted(name: str) -> bool:
 
 def _no_text(path: Path) -> list[Piece]:
     if path.is_file():
-        raise InputError(f"{path}: not text: give what an app has exported as CSV or VBO")
+        excel = "a table of Excel: export it as CSV" if path.read_bytes()[:4] == _EXCEL else ""
+        raise InputError(f"{path}: {excel or 'not text: give what an app has exported as CSV or VBO'}")
     return []
 
 

@@ -1,6 +1,5 @@
 """A recording of another app or logger as a log: what it is, joined on one clock, checked, written."""
 
-import gzip
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,14 +8,12 @@ import numpy as np
 from kickstand.errors import Notice
 
 from ..errors import InputError
-from ..logs.cells import COLUMNS
-from ..logs.csv_lines import csv_lines
+from ..logs.axes.course import course_agrees
+from ..logs.csv_lines import write_log
 from ..logs.log import Log
-from ..logs.reader import BLOCK_SAMPLES, read_log
-from ..output import write_whole
+from ..logs.reader import LEAST_G, read_log
 from . import mapped
 from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo
-from .course import course_agrees
 from .files import Piece, read_pieces
 from .join import GAP_NS, Joined, join
 from .recording import Array, Recording, Taken
@@ -24,26 +21,19 @@ from .sheets import check_pandas
 from .units import ACCELERATIONS, SPEEDS, factor, unit
 
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
-WITHOUT_GRAVITY_G = 0.4  # median force: a ride's is over 0.9
 WRONG_UNIT_G = 3.0  # median force: m/s2 taken for g give 9.8
-TRACK = ("speed_mps", "lat_deg", "lon_deg", "utc_s")
-_DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
 
 
 @dataclass(eq=False)
 class Imported:
-    """app: whose recording it was. log: n samples, from the recording's own start. lat_deg, lon_deg, utc_s (n): NaN
-    where there is no new value; UTC in s since 1970. taken: what was taken for what. notices: what is remarkable
-    (kickstand_tools.refusals.sentence puts a notice into words). gaps_s: how long each gap lasts.
+    """app: whose recording it was. log: from the recording's own start. taken: what was taken for what. notices: what
+    is remarkable (kickstand_tools.refusals.sentence puts a notice into words). gaps_s: how long each gap lasts.
 
     vehicle_axes: x points left, y up, z forward on the vehicle already, as far as its logger was mounted so.
     """
 
     app: str
     log: Log
-    lat_deg: Array
-    lon_deg: Array
-    utc_s: Array
     taken: list[Taken]
     notices: list[Notice] = field(default_factory=list)
     vehicle_axes: bool = False
@@ -102,14 +92,16 @@ def import_recording(
             joined.speed_mps[rows],
             joined.temp_c[rows],
             name=name,
+            lat_deg=joined.lat_deg[rows],
+            lon_deg=joined.lon_deg[rows],
+            utc_s=joined.utc_s[rows],
         )
     )
+    if any(notice.code in ("left-handed", "rates-misfit") for notice in log.notices):
+        recording.notices = [notice for notice in recording.notices if notice.code != "import-mirrored"]  # so it seems
     return Imported(
         recording.app,
         log,
-        joined.lat_deg[rows],
-        joined.lon_deg[rows],
-        joined.utc_s[rows],
         recording.taken,
         [*recording.notices, *log.notices],
         recording.vehicle_axes,
@@ -119,31 +111,16 @@ def import_recording(
 def write_imported(path: Path | str, imported: Imported) -> None:
     """Write the log, gzipped if its name ends in .gz, whole or not at all. Raises InputError.
 
-    Columns: a log's, and those of TRACK and temp_c as far as there are values; t_s from the recording's own start.
+    Columns: a log's, those that may be empty as far as there are values; t_s from the recording's own start.
 
     >>> import tempfile
     >>> log = Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2)
-    >>> none = np.full(2, np.nan)
     >>> with tempfile.TemporaryDirectory() as directory:
-    ...     write_imported(f"{directory}/ride.csv", Imported("none", log, none, none, none, []))
+    ...     write_imported(f"{directory}/ride.csv", Imported("none", log, []))
     ...     print(Path(f"{directory}/ride.csv").read_text().splitlines()[1])
     0.000000,0.000000,1.000000,0.000000,0.000000,0.000000,0.000000
     """
-    values = imported.log.columns()
-    values["t_s"] = values["t_s"] + imported.log.start_s
-    values |= {"lat_deg": imported.lat_deg, "lon_deg": imported.lon_deg, "utc_s": imported.utc_s}
-    names = [*COLUMNS, *[name for name in (*TRACK, "temp_c") if np.any(np.isfinite(values[name]))]]
-    digits = [_DIGITS.get(name, 6) for name in names]
-    table = np.column_stack([values[name] for name in names])
-
-    def write(temporary: Path) -> None:
-        opened = gzip.open if Path(path).suffix == ".gz" else open
-        with opened(temporary, "wt", encoding="ascii", newline="") as file:
-            file.write(",".join(names) + "\n")
-            for begin in range(0, len(table), BLOCK_SAMPLES):
-                file.write(csv_lines(table[begin : begin + BLOCK_SAMPLES], digits))
-
-    write_whole(Path(path), write)
+    write_log(path, imported.log)
 
 
 def _recording(pieces: list[Piece], name: str, columns: Mapping[str, str] | None, units: dict[str, str]) -> Recording:
@@ -182,7 +159,7 @@ def _recording(pieces: list[Piece], name: str, columns: Mapping[str, str] | None
 def _check_force(joined: Joined, name: str) -> None:
     """Raise InputError where the acceleration has no gravity in it, or is in another unit than it says."""
     usual = float(np.median(np.linalg.norm(joined.accel_g, axis=1)))
-    if usual < WITHOUT_GRAVITY_G:
+    if usual < LEAST_G:
         raise InputError(
             f"{name}: its acceleration is {usual:.2f} g as a rule, where gravity makes it 1: gravity has been taken "
             "off, and without it there is no lean; record the acceleration with gravity"

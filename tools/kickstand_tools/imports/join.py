@@ -46,6 +46,7 @@ def join(recording: Recording, name: str) -> Joined:
         raise InputError(f"{name}: its readings are past any sensor's, {_most(accel.values, rates)}: check their units")
     there &= ~past
     lost = int(np.count_nonzero(past)) + len(recording.accel.time_ns) - len(accel.time_ns)
+    lost += max(recording.accel.damaged, recording.gyro.damaged)  # both may stand in the same rows
     if np.count_nonzero(there) < 2:
         raise InputError(f"{name}: accelerometer and gyro have no time in common: were they recorded together?")
     temp_c = np.full(len(there), np.nan) if recording.temp_c is None else recording.temp_c
@@ -69,7 +70,7 @@ def in_order(sensor: Sensor, name: str) -> Sensor:
         time_ns, values = time_ns[order], values[order]
     since_s = (time_ns - time_ns[0]) * 1e-9
     even_ns = np.rint(even_times(since_s, f"{name}, {sensor.name}") * 1e9).astype(np.int64) + time_ns[0]
-    return Sensor(sensor.name, even_ns, values)
+    return Sensor(sensor.name, even_ns, values, sensor.damaged)
 
 
 def _damaged(time_ns: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -111,7 +112,7 @@ def added(first: Sensor, second: Sensor, name: str) -> Sensor:
     """The sum of two sensors on the first one's clock, where there are both: what moves the phone, and gravity."""
     first, second = in_order(first, name), in_order(second, name)
     values = first.values + on_clock(second, first.time_ns, _period_ns(first))
-    return Sensor("accelerometer", first.time_ns, values)
+    return Sensor("accelerometer", first.time_ns, values, max(first.damaged, second.damaged))
 
 
 def _most(accel_g: Array, rates_dps: Array) -> str:

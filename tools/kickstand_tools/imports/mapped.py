@@ -10,7 +10,7 @@ from ..errors import InputError
 from .files import Piece
 from .recording import Recording, Sensor, Taken, rate_hz, track_of
 from .sheets import Sheet, cells_of, plain, read_sheet, unit_in
-from .times import EPOCH_NS, Nanoseconds, times_ns
+from .times import EPOCH_NS, Nanoseconds, time_unit, times_ns
 from .units import ACCELERATIONS, ANGLES, RATES, SPEEDS, TIMES, factor, unit
 
 NAME = "a table"
@@ -35,8 +35,10 @@ def read_mapped(piece: Piece, columns: Mapping[str, str], units: Mapping[str, st
     _check_keys(columns, units)
     sheet = read_sheet(piece, header_line(piece, columns))
     places = {key: _place(sheet, key, wanted) for key, wanted in columns.items()}
+    _check_units(sheet, places, units)
     t_unit = units.get("t") or unit_in(sheet.columns[places["t"]])
-    time_ns = times_ns(sheet.series(places["t"]), t_unit if unit(t_unit) in TIMES else "", sheet.name)
+    t_unit = time_unit(sheet.series(places["t"]), t_unit if unit(t_unit) in TIMES else "")
+    time_ns = times_ns(sheet.series(places["t"]), t_unit, sheet.name)
     accel, first = _sensor(sheet, time_ns, places, units, "accelerometer")
     gyro, second = _sensor(sheet, time_ns, places, units, "gyro")
     for key in ("lat", "lon"):
@@ -45,11 +47,11 @@ def read_mapped(piece: Piece, columns: Mapping[str, str], units: Mapping[str, st
             sheet.frame[places[key]] = scale * sheet.numbers(places[key])
     speed_unit = "m/s"
     if "speed" in places:
-        speed_unit = unit(_unit(units, ("speed",), sheet.columns[places["speed"]], SPEEDS))
+        speed_unit = unit(_unit(units, ("speed",), sheet.columns[places["speed"]]))
     track, more = track_of(sheet, time_ns, places.get("speed"), places.get("lat"), places.get("lon"), speed_unit)
     temp_c = sheet.numbers(places["temp"]) if "temp" in places else None
     utc_ns = 0 if len(time_ns) and int(np.median(time_ns)) > EPOCH_NS else None
-    taken = [first, second, *more]
+    taken = [Taken("time", sheet.named([places["t"]]), t_unit), first, second, *more]
     return Recording(NAME, accel, gyro, track, temp_c, taken, utc_ns=utc_ns, sign_known=_turned(units))
 
 
@@ -58,6 +60,12 @@ def unknown(pieces: list[Piece], source: str) -> str:
     piece = max(pieces, key=lambda piece: len(piece.text))
     columns = cells_of(piece.text.split("\n", _HEADER_LINES)[header_line(piece, {})])
     found, missing = guessed(columns)
+    if set(missing) == set(REQUIRED):
+        shown = ", ".join(columns)[:60]
+        return (
+            f"{source}: not a file of an app that is known, and no table of sensors ({shown!a}): give the file, the "
+            "folder or the zip that an app has exported as CSV"
+        )
     several = f" (of {len(pieces)} files, the largest is {piece.name})" if len(pieces) > 1 else ""
     shown = ", ".join(columns[:40]) + (", ..." if len(columns) > 40 else "")
     line = f"{source}: not a file of an app that is known{several}. Its columns: {shown}"
@@ -125,6 +133,8 @@ def _check_keys(columns: Mapping[str, str], units: Mapping[str, str]) -> None:
     strange = [key for key in units if key not in UNIT_KEYS]
     if strange:
         raise InputError(f"--units: {strange[0]!a} is not one of {', '.join(UNIT_KEYS)}")
+    for key, text in units.items():
+        factor(text, UNIT_KEYS[key], key)  # raises for another unit
 
 
 def _place(sheet: Sheet, key: str, wanted: str) -> int:
@@ -144,21 +154,33 @@ def _sensor(
     sheet: Sheet, time_ns: Nanoseconds, places: dict[str, int], units: Mapping[str, str], quantity: str
 ) -> tuple[Sensor, Taken]:
     axes, all_of, kinds = (ACCEL, "a", ACCELERATIONS) if quantity == "accelerometer" else (GYRO, "g", RATES)
-    names = [_unit(units, (axis, all_of), sheet.columns[places[axis]], kinds) for axis in axes]
+    names = [_unit(units, (axis, all_of), sheet.columns[places[axis]]) for axis in axes]
     scale = np.array([factor(text, kinds, axis) for text, axis in zip(names, axes)])
     values = sheet.table([places[axis] for axis in axes]) * scale
-    source = f"{sheet.name}: {', '.join(sheet.columns[places[axis]] for axis in axes)}"
+    source = sheet.named([places[axis] for axis in axes])
     sign = "as it is" if np.all(scale > 0.0) else "turned" if np.all(scale < 0.0) else "turned in part"
     shown = ", ".join(dict.fromkeys(text.lstrip("-") for text in names))
     return Sensor(quantity, time_ns, values), Taken(quantity, source, shown, rate_hz(time_ns), sign)
 
 
-def _unit(units: Mapping[str, str], keys: tuple[str, ...], column: str, kinds: Mapping[str, float]) -> str:
-    said = next((units[key] for key in keys if key in units), unit_in(column))
-    if not said or (said == unit_in(column) and unit(said) not in kinds):
-        first = next(iter(kinds))
-        raise InputError(f"{column}: its unit is not known: add --units {keys[-1]}={first} (one of {', '.join(kinds)})")
-    return said
+def _check_units(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, str]) -> None:
+    """Raise InputError naming every column whose unit is neither given nor in brackets in its name."""
+    unknown: dict[str, list[str]] = {}
+    for key in (*ACCEL, *GYRO, "speed"):
+        if key in places:
+            column, all_of = sheet.columns[places[key]], key if key == "speed" else key[0]
+            if key not in units and all_of not in units and unit(unit_in(column)) not in UNIT_KEYS[key]:
+                unknown.setdefault(all_of, []).append(column)
+    if unknown:
+        ask = ",".join(f"{key}={next(iter(UNIT_KEYS[key]))}" for key in unknown)
+        choice = "; ".join(f"{key} is one of {', '.join(UNIT_KEYS[key])}" for key in unknown)
+        columns = ", ".join(column for of_one in unknown.values() for column in of_one)
+        raise InputError(f"{sheet.name}: the unit is not known of {columns}: add --units {ask} ({choice})")
+
+
+def _unit(units: Mapping[str, str], keys: tuple[str, ...], column: str) -> str:
+    """What is given for one of the keys, else what stands in brackets in the column's name."""
+    return next((units[key] for key in keys if key in units), unit_in(column))
 
 
 def _turned(units: Mapping[str, str]) -> bool:

@@ -41,14 +41,18 @@ def rate_hz(time_ns: Nanoseconds) -> float:
 @dataclass
 class Sensor:
     """n samples: time_ns (n) of the recorder's clock, values (n, 3): g, +1 where the axis points up at rest, or deg/s,
-    right-handed. name: for messages."""
+    right-handed. name: for messages. damaged: rows of its file that are left out, because a value cannot be
+    read; a row without a time of its own or without any value is another sensor's."""
 
     name: str
     time_ns: Nanoseconds
     values: Array
+    damaged: int = 0
 
     def __post_init__(self) -> None:
-        good = (self.time_ns != NO_TIME) & np.all(np.abs(self.values) < _ABSURD, axis=1)  # no NaN either
+        timed, empty = self.time_ns != NO_TIME, np.all(np.isnan(self.values), axis=1)
+        good = timed & np.all(np.abs(self.values) < _ABSURD, axis=1)  # no NaN either
+        self.damaged += int(np.count_nonzero(timed & ~good & ~empty))
         self.time_ns, self.values = self.time_ns[good], self.values[good]
 
 
@@ -57,7 +61,7 @@ def sensor_of(
 ) -> tuple[Sensor, Taken]:
     """Three columns of a sheet, times scale, one number or one an axis. what: quantity, unit, what its sign was."""
     quantity, unit, sign = what
-    source = f"{sheet.name}: {', '.join(sheet.columns[place] for place in places)}"
+    source = sheet.named(places)
     values = sheet.table(places) * scale
     return Sensor(quantity, time_ns, values), Taken(quantity, source, unit, rate_hz(time_ns), sign)
 
@@ -100,9 +104,9 @@ def track_of(
     track = Track(time_ns, sheet.numbers(speed) * scale, sheet.numbers(lat), sheet.numbers(lon))
     taken, hz = [], rate_hz(track.time_ns)
     if speed is not None:
-        taken.append(Taken("speed", f"{sheet.name}: {sheet.columns[speed]}", speed_unit, hz))
+        taken.append(Taken("speed", sheet.named([speed]), speed_unit, hz))
     if lat is not None and lon is not None:
-        taken.append(Taken("position", f"{sheet.name}: {sheet.columns[lat]}, {sheet.columns[lon]}", "degrees", hz))
+        taken.append(Taken("position", sheet.named([lat, lon]), "degrees", hz))
     return track, taken
 
 

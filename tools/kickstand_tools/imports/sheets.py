@@ -2,6 +2,7 @@
 
 import csv
 import io
+import os
 import re
 import warnings
 from dataclasses import dataclass
@@ -17,6 +18,7 @@ from .files import Piece
 if TYPE_CHECKING:
     from pandas import DataFrame, Series
 
+LONG = 6  # letters that several names begin with are too many to repeat
 _DECIMAL_COMMA = re.compile(r"(?:^|[;\t\"])\s*[+-]?\d+,\d")
 
 
@@ -34,6 +36,14 @@ class Sheet:
         wanted = [plain(name) for name in names]
         found = [plain(column) for column in self.columns]
         return next((found.index(name) for name in wanted if name in found), None)
+
+    def named(self, places: list[int]) -> str:
+        """The file and some columns of it, for people: without units, and what several begin with said once."""
+        names = [re.sub(r"[(\[].*?[)\]]", "", self.columns[place]).strip(" ,;") for place in places]
+        same = len(os.path.commonprefix(names)) if len(names) > 2 else 0  # noqa: RUF071 - letters, no path
+        if same > LONG:
+            names[1:] = ["…" + name[same:] for name in names[1:]]
+        return f"{self.name}: {', '.join(names)}"
 
     def series(self, place: int) -> "Series":
         """A column as it was read."""

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 Nanoseconds = NDArray[np.int64]
 
 NO_TIME = np.iinfo(np.int64).min  # of a cell that holds none
+DATES = "date or clock"
 EPOCH_NS = 10**17  # 1973: a later time counts from 1970
 DAY_NS = 86400 * 10**9
 _LATEST_NS = 4.0e18  # the year 2096; twice as much still fits into 64 bits
@@ -46,6 +47,14 @@ def times_ns(cells: "Series", unit_name: str = "", where: str = "the recording")
         shown = ascii(str(cells.iloc[0])[:30]) if len(cells) else "empty"
         raise InputError(f"{where}: {shown} is no time: numbers, or dates such as 2024-05-17T09:30:00.25Z, are needed")
     return np.where(known, np.asarray(dates.dt.tz_localize(None), dtype="datetime64[ns]").astype(np.int64), NO_TIME)
+
+
+def time_unit(cells: "Series", given: str = "") -> str:
+    """The unit of times, told from their size and steps where it is not given; "date or clock" where they are these."""
+    numbers = numbers_of(cells)
+    if np.count_nonzero(np.isfinite(numbers)) <= np.count_nonzero(cells.notna()) // 2:
+        return DATES
+    return unit(given) if given else _guessed(numbers.astype(float))
 
 
 def of_seconds(seconds: NDArray[np.float64]) -> Nanoseconds:

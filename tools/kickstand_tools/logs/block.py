@@ -7,8 +7,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .cells import TRACK
 from .log import FirmwareRow, firmware_rows
 from .table import Array
+
+_ROWS = ("time_us", "readings", *TRACK, "frozen")  # the arrays of n
 
 
 @dataclass
@@ -16,8 +19,9 @@ class Block:
     """Some rows of a log, one after the other, as the firmware's modules take them.
 
     time_us (n): since the log's first sample. readings (n, 7): acceleration (3, g), temperature (C), rate (3, deg/s),
-    the chip's order. speed_mps (n). A speed or temperature that the log does not have is NaN. start_s: the recorder's
-    own time at the log's first sample. frozen (n): True where the readings are not believed, see mended.frozen.
+    the chip's order. speed_mps, lat_deg, lon_deg, utc_s (n): as in a Log. What the log does not have is NaN. start_s:
+    the recorder's own time at the log's first sample. frozen (n): True where the readings are not believed, see
+    mended.frozen.
     """
 
     time_us: NDArray[np.int64]
@@ -31,8 +35,14 @@ class Block:
     names: tuple[str, ...] = ()  # of the columns in lines
     own_times: bool = True  # the times are those that stand in lines
     frozen: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    lat_deg: Array = field(default_factory=lambda: np.zeros(0))
+    lon_deg: Array = field(default_factory=lambda: np.zeros(0))
+    utc_s: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
+        for name in TRACK:
+            if len(getattr(self, name)) != len(self.time_us):
+                setattr(self, name, np.full(len(self.time_us), np.nan))
         if len(self.frozen) != len(self.time_us):
             self.frozen = np.zeros(len(self.time_us), dtype=bool)
 
@@ -60,14 +70,7 @@ class Block:
             lines = self.lines[which]
         else:
             lines = [line for line, wanted in zip(self.lines, which.tolist()) if wanted]
-        return replace(
-            self,
-            time_us=self.time_us[which],
-            readings=self.readings[which],
-            speed_mps=self.speed_mps[which],
-            lines=lines,
-            frozen=self.frozen[which],
-        )
+        return replace(self, lines=lines, **{name: getattr(self, name)[which] for name in _ROWS})
 
     @property
     def believed(self) -> "Block":
@@ -79,10 +82,7 @@ def joined(first: Block, second: Block) -> Block:
     """Two blocks that follow on as one."""
     return replace(
         second,
-        time_us=np.concatenate((first.time_us, second.time_us)),
-        readings=np.concatenate((first.readings, second.readings)),
-        speed_mps=np.concatenate((first.speed_mps, second.speed_mps)),
         lines=first.lines + second.lines,
         own_times=first.own_times and second.own_times,
-        frozen=np.concatenate((first.frozen, second.frozen)),
+        **{name: np.concatenate((getattr(first, name), getattr(second, name))) for name in _ROWS},
     )

@@ -11,14 +11,17 @@ from numpy.typing import NDArray
 from ..errors import InputError
 
 COLUMNS = ("t_s", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")
-OPTIONAL = ("speed_mps", "temp_c")  # may be empty in a row
+TRACK = ("speed_mps", "lat_deg", "lon_deg", "utc_s")  # what a satellite receiver tells, now and then
+OPTIONAL = (*TRACK, "temp_c")  # may be empty in a row
 
 # A larger value is in another unit (m/s2, counts): the sensor's widest ranges are 16 g and 2000 deg/s.
 MOST_G, MOST_DPS = 20.0, 2500.0
 _LIMITS = {"t_s": 1e10, "ax_g": MOST_G, "ay_g": MOST_G, "az_g": MOST_G, "temp_c": 200.0, "speed_mps": 200.0}
 _LIMITS |= {"gx_dps": MOST_DPS, "gy_dps": MOST_DPS, "gz_dps": MOST_DPS}
+_LIMITS |= {"lat_deg": 90.0, "lon_deg": 180.0, "utc_s": 1e10}
 _UNITS = {"t_s": "seconds", "temp_c": "degrees Celsius", "speed_mps": "m/s"}
 _UNITS |= {"ax_g": "g", "ay_g": "g", "az_g": "g", "gx_dps": "deg/s", "gy_dps": "deg/s", "gz_dps": "deg/s"}
+_UNITS |= {"lat_deg": "degrees", "lon_deg": "degrees", "utc_s": "seconds since 1970"}
 
 
 def check_text(log: str, content: bytes, lines_before: int) -> None:
@@ -27,6 +30,8 @@ def check_text(log: str, content: bytes, lines_before: int) -> None:
         content.decode()
     except UnicodeDecodeError as error:
         line = lines_before + content.count(b"\n", 0, error.start) + 1
+        if content.startswith(b"PK\x03\x04"):
+            raise InputError(f"{log} is a zip: if an app has exported it, kickstand import makes a log of it") from None
         raise InputError(f"{log}, line {line}: not text: give a log as CSV or as .csv.gz") from error
 
 

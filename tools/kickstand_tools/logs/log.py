@@ -1,7 +1,7 @@
 """A recorded log in memory."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from kickstand.errors import Notice
@@ -9,6 +9,7 @@ from kickstand.units import AXES
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import InputError
+from .cells import TRACK
 from .table import Array, Table
 
 ROOM_TEMP_C = 25.0  # what the firmware's modules are told where a log has no temperature
@@ -27,11 +28,12 @@ class Log(Table):
     """One recording in the sensor's own axes: n samples.
 
     t_s (n): seconds since the first sample, increasing. accel_g (n, 3): specific force, g. gyro_dps (n, 3): angular
-    rate, deg/s. speed_mps (n): m/s, NaN where there is no new value. temperature_c (n): NaN where there is none.
-    start_s: the recorder's own time at the first sample, s. name: what messages call the log. notices: what is
-    remarkable in it (kickstand_tools.refusals.sentence puts a notice into words).
+    rate, deg/s. speed_mps (n): m/s. temperature_c (n). lat_deg, lon_deg (n): the position, degrees north and east.
+    utc_s (n): Universal Time, s since 1970. These are NaN where there is no new value. start_s: the recorder's own time
+    at the first sample, s. name: what messages call the log. notices: what is remarkable in it
+    (kickstand_tools.refusals.sentence puts a notice into words).
 
-    Made of arrays, speed and temperature may be left out, and t_s may start anywhere. Raises InputError for shapes that
+    Made of arrays, those that may be NaN may be left out, and t_s may start anywhere. Raises InputError for shapes that
     do not fit and for a time that does not increase.
 
     >>> import numpy as np
@@ -49,13 +51,18 @@ class Log(Table):
     start_s: float = 0.0
     name: str = "the log"
     notices: list[Notice] = field(default_factory=list)
+    lat_deg: Array = field(default_factory=lambda: np.zeros(0))
+    lon_deg: Array = field(default_factory=lambda: np.zeros(0))
+    utc_s: Array = field(default_factory=lambda: np.zeros(0))
 
     def __post_init__(self) -> None:
         self.t_s = np.asarray(self.t_s, dtype=float)
         self.accel_g, self.gyro_dps = np.asarray(self.accel_g, float), np.asarray(self.gyro_dps, float)
-        self.speed_mps, self.temperature_c = self._optional(self.speed_mps), self._optional(self.temperature_c)
+        for name in (*TRACK, "temperature_c"):
+            setattr(self, name, self._optional(getattr(self, name)))
         n = len(self.t_s)
-        for name, shape in (("t_s", (n,)), ("accel_g", (n, 3)), ("gyro_dps", (n, 3)), ("speed_mps", (n,))):
+        shapes = {"t_s": (n,), "accel_g": (n, 3), "gyro_dps": (n, 3)} | dict.fromkeys((*TRACK, "temperature_c"), (n,))
+        for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
                 raise InputError(f"{self.name}: {name} has the shape {getattr(self, name).shape}, it has to be {shape}")
         if n and not np.all(np.diff(np.rint(self.t_s * 1e6)) > 0):
@@ -94,7 +101,12 @@ class Log(Table):
         named: dict[str, Array] = {"t_s": self.t_s}
         named |= {f"a{axis}_g": values for axis, values in zip(AXES, self.accel_g.T)}
         named |= {f"g{axis}_dps": values for axis, values in zip(AXES, self.gyro_dps.T)}
-        return named | {"speed_mps": self.speed_mps, "temp_c": self.temperature_c}
+        return named | {name: getattr(self, name) for name in TRACK} | {"temp_c": self.temperature_c}
+
+    def part(self, which: NDArray[np.bool_]) -> "Log":
+        """The samples where an array of n is True."""
+        values = {field.name: getattr(self, field.name) for field in fields(self)}
+        return Log(**{name: v[which] if isinstance(v, np.ndarray) else v for name, v in values.items()})
 
     def _optional(self, values: ArrayLike) -> Array:
         array = np.asarray(values, dtype=float)

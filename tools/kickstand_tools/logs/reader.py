@@ -14,21 +14,21 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..output import write_whole
 from . import cells
+from .axes.bends import Bends
 from .axes.handedness import Handedness
 from .block import Block
-from .cells import COLUMNS, OPTIONAL
+from .cells import COLUMNS, OPTIONAL, TRACK
 from .log import Log
 from .mended.even_blocks import even_blocks
 from .mended.frozen import FrozenReadings
-from .mended.last_line import without_cut_line
-from .rate_unit import RateUnit
+from .mended.last_line import last_marked, without_cut_line
 from .source import File, Progress, chunks, name_of, total_bytes
 from .speed_unit import SpeedUnit
 from .stretch import Stretch
 from .table import Array
 
 BLOCK_BYTES = 1 << 22  # of text, some 60000 samples
-LEAST_G = 0.3  # less than this is usual where gravity was taken off
+LEAST_G = 0.4  # median force; less is usual where gravity was taken off, a ride's is over 0.9
 BLOCK_SAMPLES = 60_000  # of a log in memory
 _NUMERIC = b"0123456789+-.eE, \n"  # where nothing else stands, numpy may read it
 
@@ -36,7 +36,8 @@ Source = File | Log | Stretch  # what can be read as a log
 
 
 def read_log(source: Source, minimum: int = 2, progress: Progress | None = None) -> Log:
-    """Read a whole log: CSV with the columns t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps and optionally speed_mps,temp_c.
+    """Read a whole log: CSV with the columns t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps and optionally
+    speed_mps,lat_deg,lon_deg,utc_s,temp_c.
 
     source: a path (gzipped if it ends in .gz), an open file of text or bytes, a Log, which is checked, or a Stretch of
     one of these. minimum: the least number of samples. progress: called with the bytes read and those of the file.
@@ -48,7 +49,7 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None)
     >>> log.accel_g.tolist()
     [[0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]
     >>> log.to_pandas().columns.tolist()
-    ['t_s', 'ax_g', 'ay_g', 'az_g', 'gx_dps', 'gy_dps', 'gz_dps', 'speed_mps', 'temp_c']
+    ['t_s', 'ax_g', 'ay_g', 'az_g', 'gx_dps', 'gy_dps', 'gz_dps', 'speed_mps', 'lat_deg', 'lon_deg', 'utc_s', 'temp_c']
     """
     notices: list[Notice] = []
     blocks = list(read_blocks(source, minimum, progress, notices))
@@ -57,11 +58,11 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None)
         np.concatenate([block.t_s for block in blocks]),
         readings[:, :3],
         readings[:, 4:],
-        np.concatenate([block.speed_mps for block in blocks]),
-        readings[:, 3],
-        blocks[0].start_s,
-        name_of(source),
-        notices,
+        temperature_c=readings[:, 3],
+        start_s=blocks[0].start_s,
+        name=name_of(source),
+        notices=notices,
+        **{column: np.concatenate([getattr(block, column) for block in blocks]) for column in TRACK},
     )
 
 
@@ -74,7 +75,8 @@ def read_blocks(
     """
     name, count = name_of(source), 0
     remarks: list[Notice] = []
-    speed_unit, rate_unit, handedness, frozen = SpeedUnit(name), RateUnit(), Handedness(), FrozenReadings()
+    speed_unit, frozen = SpeedUnit(name), FrozenReadings()
+    axes = Handedness(), Bends()
     whole = source.source if isinstance(source, Stretch) else source
     total = len(whole.t_s) if isinstance(whole, Log) else total_bytes(whole)
     for block in _unchecked(source, remarks):
@@ -85,16 +87,16 @@ def read_blocks(
         if block.has_speed:
             speed_unit.add(block.t_s, block.readings[:, :3], block.speed_mps)
         if notices is not None:
-            rate_unit.add(block.t_s, block.readings[:, :3], block.readings[:, 4:])
-            handedness.add(block.t_s, block.readings[:, :3], block.readings[:, 4:], block.speed_mps)
+            for judge in axes:
+                judge.add(block.t_s, block.readings[:, :3], block.readings[:, 4:], block.speed_mps)
         yield block
         if progress:
             progress(block.done, total)
     if count < minimum:
         raise InputError(f"{name} is too short: {count} samples, at least {minimum} are needed")
     if notices is not None:
-        judged = [notice for notice in (rate_unit.notice, handedness.notice()) if notice]
-        notices += remarks + frozen.notices() + judged
+        judged = [notice for notice in (judge.notice() for judge in axes) if notice]
+        notices += remarks + frozen.notices() + judged[:1]  # one cause is told once
 
 
 def read_twice(source: Source) -> Source:
@@ -126,9 +128,14 @@ def _blocks_of(log: Log) -> Iterator[Block]:
     has_temp, has_speed = (not np.all(np.isnan(values)) for values in (log.temperature_c, log.speed_mps))
     for start in range(0, len(time_us), BLOCK_SAMPLES):
         part = slice(start, start + BLOCK_SAMPLES)
-        done = min(start + BLOCK_SAMPLES, len(time_us))
         yield Block(
-            time_us[part], readings[part], log.speed_mps[part], has_temp, has_speed, log.start_s, done
+            time_us[part],
+            readings[part],
+            has_temp=has_temp,
+            has_speed=has_speed,
+            start_s=log.start_s,
+            done=min(start + BLOCK_SAMPLES, len(time_us)),
+            **{name: getattr(log, name)[part] for name in TRACK},
         )
 
 
@@ -152,7 +159,7 @@ def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], rema
     """The blocks with their times as they stand in the file, which may repeat."""
     places = {column: names.index(column) for column in COLUMNS + OPTIONAL if column in names}
     line, start_us, last_us = 1, None, None
-    for text, done, is_last in _last_marked(pieces):
+    for text, done, is_last in last_marked(pieces):
         cut = b""
         if is_last:
             text, cut = without_cut_line(text, names, places)
@@ -165,17 +172,6 @@ def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], rema
         start_us = int(time_us[0]) if start_us is None else start_us
         last_us = int(time_us[-1])
         yield _block(table, time_us - start_us, places, start_us / 1e6, rows, names, done)
-
-
-def _last_marked(pieces: Iterator[tuple[bytes, int]]) -> Iterator[tuple[bytes, int, bool]]:
-    """Each piece, and whether it is the last one."""
-    before = next(pieces, None)
-    for piece in pieces:
-        if before:
-            yield *before, False
-        before = piece
-    if before:
-        yield *before, True
 
 
 def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
@@ -226,9 +222,17 @@ def _block(
     column |= {name: table[:, k] for k, name in enumerate(places)}
     order = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")
     readings = np.column_stack([column[name] for name in order])
-    has_temp, has_speed = "temp_c" in places, "speed_mps" in places
-    lines = [line for line in text.split("\n") if line]
-    return Block(time_us, readings, column["speed_mps"], has_temp, has_speed, start_s, done, lines, tuple(names))
+    return Block(
+        time_us,
+        readings,
+        has_temp="temp_c" in places,
+        has_speed="speed_mps" in places,
+        start_s=start_s,
+        done=done,
+        lines=[line for line in text.split("\n") if line],
+        names=tuple(names),
+        **{name: column[name] for name in TRACK},
+    )
 
 
 def _check_units(name: str, block: Block) -> None:

@@ -4,12 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..logs.axes.leaning import WINDOW_S
 from ..logs.table import Array
 from . import model as m
 from .first_guess import first_guess, in_hand, standing
 from .model import Model
 from .solver import Chain, Eliminated, back, eliminate, solve_chain, variances
-from .windows import WINDOW_S, Windows, padded
+from .windows import Windows, padded
 
 BLOCK = 200  # windows of a block, at least; see solver.py
 ROUNDS, PLAIN_ROUNDS = 8, 2  # at most; the first ones without regard to outliers

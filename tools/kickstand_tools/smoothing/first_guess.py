@@ -4,7 +4,8 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from ..calibration.ride.windows import averaged, known_speed, unrest
+from ..calibration.ride.windows import known_speed
+from ..logs.axes.leaning import averaged, unrest
 from ..logs.table import Array
 from .windows import Windows
 

@@ -19,7 +19,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from ..calibration.ride.windows import averaged
+from ..logs.axes.leaning import averaged
 from ..logs.table import Array
 from .windows import Windows
 

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..logs.axes.leaning import WINDOW_S
+from ..logs.axes.leaning import WINDOW_S
 from ..logs.table import Array
 
-WINDOW_S = 0.2
 GAP_S = 0.17  # a longer step between two samples: readings are missing
 
 

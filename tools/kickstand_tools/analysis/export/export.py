@@ -2,11 +2,13 @@
 
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from kickstand.errors import Notice
 
+from ...errors import InputError
 from ...logs.reader import Source, read_blocks, read_twice
 from ...logs.source import Progress
 from ...logs.stretch import Stretch
@@ -15,16 +17,19 @@ from ...output import write_whole
 from ...replay.mount_check import MountCheck
 from ..channels import Channels, Ride
 from ..downsample import downsampled
-from . import export_csv, export_parquet, export_racechrono, export_vbo
+from ..track import Track, joined, track
+from . import export_csv, export_gpx, export_parquet, export_racechrono, export_vbo
 
-STEP_S = {"csv": 0.0, "parquet": 0.0, "racechrono": 0.01, "vbo": 0.01}  # the last two hold up to 100 a second
+STEP_S = {"csv": 0.0, "gpx": 0.0, "parquet": 0.0, "racechrono": 0.01, "vbo": 0.01}  # two hold up to 100 a second
 _WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
     "csv": export_csv.write,
+    "gpx": export_gpx.write,
     "parquet": export_parquet.write,
     "racechrono": export_racechrono.write,
     "vbo": export_vbo.write,
 }
-_DATED = ("racechrono", "vbo")
+_CHECK = {"gpx": export_gpx.check, "parquet": export_parquet.check}  # is the library that writes it there?
+_DATED = ("gpx", "racechrono", "vbo")
 _CLOCK_S = 1e8  # March 1973: a log that starts later has Unix time in it
 
 
@@ -37,11 +42,12 @@ def export(
 ) -> int:
     """Write a ride of open_ride() to a file, whole or not at all. Returns the number of rows. Raises InputError.
 
-    form: "csv" (gzipped if out ends in .gz), "parquet", "racechrono" or "vbo". progress: called with how much of the
-    log is done of how much. notices: what is remarkable in the log is appended to it.
+    form: "csv" (gzipped if out ends in .gz), "gpx", "parquet", "racechrono" or "vbo". progress: called with how much of
+    the log is done of how much. notices: what is remarkable in the log is appended to it.
 
-    racechrono and vbo want date and time. A board has no clock, so such a ride is taken to end when its file was
-    written last: when it was recorded live, or pulled.
+    gpx needs positions. gpx, racechrono and vbo want date and time, which come with positions. A board without a
+    satellite receiver has no clock, so its ride is taken to end when its file was written last: when it was recorded
+    live, or pulled.
 
     >>> import tempfile
     >>> import numpy as np
@@ -51,18 +57,23 @@ def export(
     ...     export(open_ride(log, CalibrationFile(aligned=True)), "csv", f"{directory}/ride.csv")
     300
     """
-    if form == "parquet":
-        export_parquet.check()
+    if form in _CHECK:
+        _CHECK[form]()
     ride = Ride(read_twice(ride.log), ride.calibration)
-    start_s, seconds, speeds = _first_pass(ride.log)
-    if form in _DATED and start_s < _CLOCK_S:
+    whole = _first_pass(ride.log)
+    start_s = whole.start_s
+    if form == "gpx" and not len(whole.places.t_s):
+        raise InputError(f"{ride.name} has no positions (lat_deg, lon_deg), so there is no track to write")
+    if form in _DATED and whole.utc_s is not None:
+        start_s = whole.utc_s
+    elif form in _DATED and start_s < _CLOCK_S:
         file = ride.log.source if isinstance(ride.log, Stretch) else ride.log
         written_s = Path(file).stat().st_mtime if isinstance(file, (Path, str)) else time.time()
         after_s = 0.0
         if isinstance(ride.log, Stretch):  # the file ends later than the stretch
-            whole_start_s, whole_s, _ = _first_pass(ride.log.source)
-            after_s = whole_start_s + whole_s - start_s - seconds
-        start_s = float(max(0, int(written_s - after_s - seconds)))
+            log = _first_pass(ride.log.source)
+            after_s = log.start_s + log.seconds - start_s - whole.seconds
+        start_s = float(max(0, int(written_s - after_s - whole.seconds)))
     count, mount = 0, MountCheck(ride.calibration)
 
     def checked(blocks: Iterator[Channels]) -> Iterator[Channels]:
@@ -74,9 +85,13 @@ def export(
         nonlocal count
         blocks = checked(ride.blocks(progress, notices))
         for block in downsampled(blocks, STEP_S[form]) if STEP_S[form] else blocks:
-            if form == "vbo" and len(speeds):
+            if form == "gpx":
+                block = block.part(np.isfinite(block.lat_deg) & np.isfinite(block.lon_deg))
+            if form in ("gpx", "vbo") and len(whole.speeds):
                 # every row of a VBO file has a speed: without this, rows between two values would say 0
-                block.speed_mps = np.interp(block.t_s, *speeds.T)
+                block.speed_mps = np.interp(block.t_s, *whole.speeds.T)
+            if form == "vbo":
+                block.lat_deg, block.lon_deg = whole.places.at(block.t_s)
             count += len(block.t_s)
             yield block
 
@@ -87,11 +102,27 @@ def export(
     return count
 
 
-def _first_pass(log: Source) -> tuple[float, float, Array]:
-    """The log's own time of its first sample, its length in s, and its speeds: (n, 2), s from there and m/s."""
-    start_s, seconds, speeds = 0.0, 0.0, []
+@dataclass
+class _Whole:
+    """A whole log. start_s: its own time at the first sample. seconds: its length. speeds (n, 2): s from there and m/s.
+    places: its positions. utc_s: Universal Time at the first sample, the median of what its rows tell, because some
+    come later than others; None where none tells it."""
+
+    start_s: float
+    seconds: float
+    speeds: Array
+    places: Track
+    utc_s: float | None
+
+
+def _first_pass(log: Source) -> _Whole:
+    start_s, seconds, speeds, places, starts_utc_s = 0.0, 0.0, [], [], []
     for block in read_blocks(log):
         start_s, seconds = block.start_s, float(block.t_s[-1])
         there = ~np.isnan(block.speed_mps)
         speeds.append(np.column_stack((block.t_s[there], block.speed_mps[there])))
-    return start_s, seconds, np.concatenate(speeds)
+        places.append(track(block))
+        starts_utc_s.append((block.utc_s - block.t_s)[np.isfinite(block.utc_s)])
+    told = np.concatenate(starts_utc_s)
+    utc_s = float(np.median(told)) if len(told) else None
+    return _Whole(start_s, seconds, np.concatenate(speeds), joined(places), utc_s)

@@ -11,6 +11,8 @@ from ...errors import InputError, extra
 from ..channels import Channels
 from .export_csv import COLUMNS
 
+_FINE = ("t_s", "lat_deg", "lon_deg", "utc_s")  # a float of 32 bits tells positions that are 1 m apart
+
 
 def check() -> None:
     """Raise InputError where Parquet cannot be written."""
@@ -19,13 +21,14 @@ def check() -> None:
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """One row group a block; time in 64-bit floats, the rest in 32-bit floats. NaN where there is no value."""
+    """One row group a block; times and positions in 64-bit floats, the rest in 32-bit floats. NaN where there is no
+    value."""
     import pyarrow
     from pyarrow.parquet import ParquetWriter
 
     schema = pyarrow.schema(
         [
-            pyarrow.field(name, pyarrow.float64() if name == "t_s" else pyarrow.float32(), metadata={"unit": unit})
+            pyarrow.field(name, pyarrow.float64() if name in _FINE else pyarrow.float32(), metadata={"unit": unit})
             for name, (_, unit) in COLUMNS.items()
         ],
         metadata={"made_by": "kickstand", "axes": "left, up, forward; lean > 0 to the right"},

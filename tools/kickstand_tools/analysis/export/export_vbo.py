@@ -3,10 +3,11 @@
 Sections, standard channels, and units for the others alone, as in
 https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.html; columns and their signs as in
 https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and the VBOX HD Lite's user guide:
-time HHMMSS.SS, velocity in km/h, latitude and longitude in minutes, long accel > 0 forward, lat accel > 0 to the
-left, others with mantissa and exponent. Kickstand has no satellites: their number and the position are 0. Any other
-column that the log has no values for is left out, except velocity, which VBO requires: it is then 0, and a comment in
-the file says so.
+time HHMMSS.SS, velocity in km/h, latitude and longitude in minutes, north and west positive, heading in degrees
+clockwise from north, long accel > 0 forward, lat accel > 0 to the left, others with mantissa and exponent. A log does
+not tell the number of satellites: it is 4, the fewest that a position takes, where there is a position, else 0, as the
+position then is. Any other column that the log has no values for is left out, except velocity, which VBO requires: it
+is then 0, and a comment in the file says so.
 """
 
 import time
@@ -16,6 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
+from ...logs.axes.course import distance_m
+from ...logs.table import Array
 from ..channels import Channels
 
 # (title in [header], name in [column names]); of the others (both, unit, channel)
@@ -36,15 +39,18 @@ OTHER = (
     ("roll-rate", "deg/s", "roll_rate_dps"),
     ("temperature", "C", "temp_c"),
 )
-_STANDARD_ROW = "000 %09.2f +00000.000000 +00000.000000 %07.3f 000.00 +00000.00 %+07.3f %+07.3f"
+_STANDARD_ROW = "%03d %09.2f %+013.6f %+013.6f %07.3f %06.2f +00000.00 %+07.3f %+07.3f"
+_SATELLITES = 4
+_SAME_M = 1e-3  # between rows, a hundredth of a second apart
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """Lines end in CR and LF; the date and each row's time are UTC."""
+    """Lines end in CR and LF; the date and each row's time are UTC. blocks: positions in as many rows as can be."""
     first = next(blocks)  # a channel that the log does not have is NaN in its first block already
     other = [column for column in OTHER if not np.all(np.isnan(getattr(first, column[2])))]
     lean = "lean-angle in degrees, > 0 to the right; " if OTHER[0] in other else ""
-    comments = [f"Kickstand: {lean}no satellites", "Log Rate (Hz) : at most 100.00"]
+    satellites = f"satellites {_SATELLITES} stands for a position, 0 for none"
+    comments = [f"Kickstand: {lean}{satellites}", "Log Rate (Hz) : at most 100.00"]
     if np.all(np.isnan(first.speed_mps)):
         comments.append("no speed in the log: velocity 0 stands for none")
     row_form = _STANDARD_ROW + " %+.6E" * len(other) + "\r\n"
@@ -68,17 +74,43 @@ def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
     ]
     with open(path, "w", encoding="utf-8", newline="") as file:
         file.write("\r\n".join(head) + "\r\n")
+        course_deg = _Heading()
         for block in chain([first], blocks):
+            placed = np.isfinite(block.lat_deg)
             table = np.column_stack(
                 (
+                    placed * _SATELLITES,
                     _clock(block.t_s + start_s),
+                    60.0 * block.lat_deg,
+                    -60.0 * block.lon_deg,
                     block.speed_mps * 3.6,
+                    course_deg.of(block.lat_deg, block.lon_deg),
                     block.forward_g,
                     block.lateral_g,
                     *[getattr(block, channel) for _, _, channel in other],
                 )
             )
             file.write("".join([row_form % tuple(row) for row in np.nan_to_num(table).tolist()]))
+
+
+class _Heading:
+    """Where the positions go, block by block."""
+
+    def __init__(self) -> None:
+        self._last = np.full((3, 1), np.nan)  # latitude, longitude and heading of the last row of the block before
+
+    def of(self, lat_deg: Array, lon_deg: Array) -> Array:
+        """(n) degrees clockwise from north, from the row before to each. Where both are one place it is that of the row
+        before. The first row with a position has that of the second."""
+        lat, lon = (np.concatenate((last, now)) for last, now in zip(self._last, (lat_deg, lon_deg)))
+        east, north = distance_m(lat[:-1], lon[:-1], lat[1:], lon[1:])
+        found = np.concatenate((self._last[2], np.degrees(np.arctan2(east, north)) % 360.0))
+        moved = np.concatenate(([True], ~(np.hypot(east, north) <= _SAME_M)))  # NaN too: a gap ends what was before
+        found = found[np.maximum.accumulate(np.where(moved, np.arange(len(found)), 0))]
+        first = np.flatnonzero(np.isnan(found[:-1]) & np.isfinite(lat[:-1]))
+        found[first] = found[first + 1]
+        self._last = np.array([[lat[-1]], [lon[-1]], [found[-1]]])
+        return found[1:]
 
 
 def _clock(seconds: np.ndarray) -> np.ndarray:

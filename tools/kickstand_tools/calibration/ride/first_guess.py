@@ -12,18 +12,16 @@ from kickstand.errors import Refusal
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
+from ...logs.axes.bends import speed_in_radians
+from ...logs.axes.leaning import WINDOW_S, Leaning, averaged, leaned, leaning_of, without_drift
 from ...logs.table import Array
-from .windows import WINDOW_S, Windows, averaged, known_speed
+from .windows import Windows, known_speed
 
-_SMOOTH_S = 0.6  # of the rates whose changes are compared
-_SLOW_S = 12.0  # leans that last longer are not told from the drift of the gyro
 _MIN_RIDING_S = 30.0
 _MIN_LEAN = np.radians(3.0)  # rms: riding straight on tells nothing
 _MIN_LIKENESS = 0.5  # correlation between leaning and turning; bikes have over 0.75
 _MAX_PUSHED = 0.5  # force to the side over the lean in bends; bikes have 0.1 to 0.2 by their tyres' width
 _CAR_G, _CAR_LEAN = 0.045, np.radians(5.0)  # a car's rms of the force to the side is above, of its lean below
-# So little, and still it goes with turning as at the speed of a ride: a car's lean is that of 1 m/s.
-_RADIANS_LEAN, _RADIANS_LIKENESS, _RADIANS_MPS = np.radians(1.0), 0.75, 3.0
 _STUCK_MPS = 0.5
 _MAX_SPEED_FACTOR = 1.8  # of the log's speed and that of the bends, either way
 
@@ -47,23 +45,14 @@ def first_guess(windows: Windows) -> FirstGuess:
         raise Refusal("ride-short", seconds, _MIN_RIDING_S)
     bias = _bias(windows)
     rate = windows.rate - bias
-    up = _unit(windows.force[riding].mean(axis=0))
-    yaw = averaged(rate @ up, _SMOOTH_S)
-    level = averaged(rate - np.outer(rate @ up, up), _SMOOTH_S)
-    forward = -np.gradient(yaw)[riding] @ (level - level.mean(axis=0))[riding]
-    forward = _unit(forward - up * (forward @ up))
-    left = np.cross(up, forward)
-    rolled = _without_drift(np.cumsum(rate @ forward) * WINDOW_S)
-    turned = _without_drift(rate @ up)
-    _refuse_no_motorcycle(rolled, turned, _without_drift(windows.force @ left), riding)
+    found = leaning_of(rate, windows.force, riding)
+    left = found.matrix[0]
+    _refuse_no_motorcycle(found, without_drift(windows.force @ left), riding)
     known = known_speed(windows.time_s, windows.speed)
-    usual = -float(rolled[riding] @ turned[riding] / (turned[riding] @ turned[riding])) * STANDARD_GRAVITY
-    _refuse_wrong_speed(known[riding], rolled[riding], turned[riding])
-    speed = np.where(np.isnan(known), np.where(riding, usual, 0.0), known)
-    slow = np.arctan(-speed * (rate @ up) / STANDARD_GRAVITY)
-    lean = rolled + slow - _without_drift(slow)
-    _refuse_left_handed(rate @ left, rate @ up, lean, riding)
-    return FirstGuess(np.array([left, up, forward]), bias, _borders(lean), _borders(speed))
+    _refuse_wrong_speed(known[riding], found.rolled[riding], found.turned[riding])
+    speed = np.where(np.isnan(known), np.where(riding, found.speed, 0.0), known)
+    lean = leaned(found.rolled, found.yaw, speed)
+    return FirstGuess(found.matrix, bias, _borders(lean), _borders(speed))
 
 
 def _bias(windows: Windows) -> Array:
@@ -74,22 +63,23 @@ def _bias(windows: Windows) -> Array:
     return np.median(averaged(windows.rate, 1.0), axis=0)
 
 
-def _refuse_no_motorcycle(rolled: Array, turned: Array, sideways: Array, riding: NDArray[np.bool_]) -> None:
-    """rolled (rad), turned (rad/s), sideways (g): (n), changes within some seconds only."""
-    rolled, turned, sideways = rolled[riding], turned[riding], sideways[riding]
+def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: NDArray[np.bool_]) -> None:
+    """sideways (n): force to the left, g, changes within some seconds only."""
+    in_radians_mps = speed_in_radians(found)
+    if in_radians_mps is not None:
+        raise Refusal("rates-in-radians", in_radians_mps)
+    rolled, turned, sideways = found.rolled[riding], found.turned[riding], sideways[riding]
     lean, side = float(np.sqrt(np.mean(rolled**2))), float(np.sqrt(np.mean(sideways**2)))
-    both = -float(rolled @ turned)
-    likeness = both / np.sqrt(max(float(rolled @ rolled) * float(turned @ turned), 1e-30))
-    pushed = abs(float(sideways @ turned)) / max(abs(both), 1e-30)
-    usual_mps = both / max(float(turned @ turned), 1e-30) * STANDARD_GRAVITY
-    if lean < _RADIANS_LEAN and likeness > _RADIANS_LIKENESS and usual_mps > _RADIANS_MPS:
-        raise Refusal("rates-in-radians", float(np.degrees(usual_mps)))
+    pushed = abs(float(sideways @ turned)) / max(abs(float(rolled @ turned)), 1e-30)
     if pushed > _MAX_PUSHED and side > _CAR_G and lean < _CAR_LEAN:
         raise Refusal("not-leaning")
     if lean < _MIN_LEAN:
         raise Refusal("no-bends", float(np.degrees(lean)))
-    if pushed > _MAX_PUSHED or likeness < _MIN_LIKENESS:
+    if pushed > _MAX_PUSHED or found.likeness < _MIN_LIKENESS:
         raise Refusal("ride-contradicts")
+    # a leaned bike that turns also turns about its own left
+    if found.share < 0.0:
+        raise Refusal("left-handed")
 
 
 def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array) -> None:
@@ -105,23 +95,6 @@ def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array) -> None:
         raise Refusal("speed-unit", factor)
 
 
-def _refuse_left_handed(pitch_rate: Array, yaw: Array, lean: Array, riding: NDArray[np.bool_]) -> None:
-    """A leaned bike that turns also turns about its own left, by yaw rate x sin(lean), where the axes are right."""
-    expected = (yaw * np.sin(lean))[riding]
-    share = float((expected - expected.mean()) @ pitch_rate[riding] / (expected @ expected))
-    if share < 0.0:
-        raise Refusal("left-handed")
-
-
-def _without_drift(values: Array) -> Array:
-    slow = averaged(averaged(values, _SLOW_S), _SLOW_S)
-    return values - slow
-
-
 def _borders(values: Array) -> Array:
     inner = 0.5 * (values[1:] + values[:-1])
     return np.concatenate((values[:1], inner, values[-1:]))
-
-
-def _unit(vector: Array) -> Array:
-    return vector / max(float(np.linalg.norm(vector)), 1e-12)

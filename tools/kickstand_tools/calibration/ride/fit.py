@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from kickstand.errors import Refusal
+from kickstand.errors import Notice, Refusal
 
 from ...errors import InputError
 from ...logs.mended.frozen import believed
@@ -35,7 +35,7 @@ class RideFit:
     forward, which the calibration takes off; offset_sigma_g (3): standard errors. used_s: from and to which second of
     the log the sensor was mounted. riding_s, standing_s: seconds of it. lean_deg: rms of the ride's lean. lag_s: by how
     much the log's speed is late, None without a speed. phone_deg: by how much the phone is turned against the way that
-    was said, None if nothing was.
+    was said, None if nothing was. notices: what is remarkable in the log.
     """
 
     calibration: CalibrationFile
@@ -51,6 +51,7 @@ class RideFit:
     lean_deg: float
     lag_s: float | None
     phone_deg: float | None
+    notices: list[Notice]
 
 
 def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = None) -> RideFit:
@@ -75,19 +76,16 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
     if step_s * _SLOWEST_HZ > 1.0:
         raise InputError(f"{log.name}: a sample every {step_s:.2f} s: at least {_SLOWEST_HZ:.0f} a second are needed")
     try:
-        for notice in log.notices:
-            if notice.code == "rates-in-radians":
-                raise Refusal(notice.code, *notice.values)
         windows = windows_of(log)
         guess = first_guess(windows)
         expected = mounting(phone, guess.matrix) if phone else None
         found = adjust(windows, guess, expected, progress)
-        return _checked(windows, found, expected)
+        return _checked(windows, found, expected, log.notices)
     except Refusal as refusal:
         raise RefusedInput(refusal, log.name) from refusal
 
 
-def _checked(windows: Windows, found: Adjustment, expected: Array | None) -> RideFit:
+def _checked(windows: Windows, found: Adjustment, expected: Array | None, notices: list[Notice]) -> RideFit:
     """The result with its quality. Raises Refusal where that is too low."""
     halves = np.degrees(found.halves)
     if np.max(np.abs(halves)) > _MOVED_DEG:
@@ -128,4 +126,5 @@ def _checked(windows: Windows, found: Adjustment, expected: Array | None) -> Rid
         float(np.degrees(np.sqrt(np.mean(lean**2)))),
         float(found.parameters[m.DELAY]) if given else None,
         None if off is None else float(off),
+        notices,
     )

@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ...logs.axes.leaning import WINDOW_S, averaged, unrest
 from ...logs.cells import MOST_DPS, MOST_G
 from ...logs.log import Log
 from ...logs.table import Array
 
-WINDOW_S = 0.2
 _MOUNTED_S, _MOUNTED_DEG = 10.0, 35.0  # over so long the mean force of a ride keeps within this of the usual one
 _LONGEST_S = 1800.0  # more than half an hour of a ride tells no more
 _STILL_S, _CALM_S = 1.6, 1.0  # shorter standstills are not told from smooth riding
@@ -84,16 +84,6 @@ def known_speed(time_s: Array, speed: Array) -> Array:
     return np.interp(time_s, time_s[there], speed[there])
 
 
-def averaged(values: Array, seconds: float) -> Array:
-    """Mean over so many seconds around each window; (n) or (n, k)."""
-    half = max(1, round(seconds / WINDOW_S / 2.0))
-    if not len(values):
-        return values
-    padded = np.concatenate((np.repeat(values[:1], half + 1, 0), values, np.repeat(values[-1:], half, 0)))
-    total = np.cumsum(padded, axis=0)
-    return (total[2 * half + 1 :] - total[: -2 * half - 1]) / (2 * half + 1)
-
-
 def _plausible(log: Log, starts: NDArray[np.intp]) -> NDArray[np.bool_]:
     """(windows) False where a reading is one that no ride gives."""
     absurd = np.any(np.abs(log.accel_g) > MOST_G, axis=1) | np.any(np.abs(log.gyro_dps) > MOST_DPS, axis=1)
@@ -114,15 +104,6 @@ def _mounted(force: Array) -> slice:
     margin = round(_MOUNTED_S / WINDOW_S)  # until the mean is of the ride alone
     begin, end = begin + margin * (begin > 0), end - margin * (end < len(force))
     return slice(begin, min(end, begin + round(_LONGEST_S / WINDOW_S)))
-
-
-def unrest(values: Array, over_s: float) -> Array:
-    """(n): standard deviation within over_s, of the component that has the largest; values (n, 3)."""
-    if not len(values):
-        return np.zeros(0)
-    centred = values - values.mean(axis=0)
-    variance = averaged(centred**2, over_s) - averaged(centred, over_s) ** 2
-    return np.sqrt(np.maximum(variance, 0.0)).max(axis=1)
 
 
 def _still(rate: Array, force: Array, speed: Array, over_s: float) -> NDArray[np.bool_]:

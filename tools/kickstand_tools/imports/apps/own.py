@@ -13,7 +13,7 @@ from ...logs.cells import COLUMNS
 from ..files import Piece
 from ..recording import Recording, sensor_of, track_of
 from ..sheets import Sheet, cells_of, read_sheet
-from ..times import times_ns
+from ..times import Nanoseconds, times_ns
 
 NAME = "Kickstand"
 _FORCES = ("left_g", "up_g", "forward_g")
@@ -52,9 +52,16 @@ def read(pieces: list[Piece], name: str) -> Recording:
         track,
         temp_c,
         [first, second, *places],
-        utc_ns=0 if from_1970 else None,
+        utc_ns=0 if from_1970 else _utc_ns(sheet, time_ns),
         vehicle_axes=len(log) < 6,
     )
+
+
+def _utc_ns(sheet: Sheet, time_ns: Nanoseconds) -> int | None:
+    """What makes UTC of the log's own time, in ns since 1970; None where the log does not tell."""
+    utc_s = sheet.numbers(sheet.place("utc_s"))
+    there = np.isfinite(utc_s)
+    return int(np.median(utc_s[there] * 1e9 - time_ns[there])) if np.any(there) else None
 
 
 def _is_ours(piece: Piece) -> bool:

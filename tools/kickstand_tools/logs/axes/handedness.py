@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 
 from ..table import Array
 from ..time_cells import no_cells, with_block
+from .calm import calm_rates
 from .turning import CELL_S, Turning
 
 WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # the second one where the log has none of the first
 MOST_WINDOWS = 16  # judged: those in which the sensor turns most
 KEPT = 36_000  # cells: an hour
 GAP_CELLS = 3  # without a sample, or with the same reading in each: nothing is known there
-CALMEST = 0.2  # of the seconds: the gyro's bias is about their median
-CALM_G, CALM_DPS = 0.02, 2.0  # force and rate change alike little
+CALM_DPS = 2.0  # rates change so little in calm seconds
 KNOWN_DPS = 3.0  # a bias that is wrong by less is found while fitting
 TRIED = 6  # of the 48 ways are looked at closely
 
@@ -133,13 +133,11 @@ def _bias(force: Array, rate: Array, known: NDArray[np.bool_]) -> Array | None:
     if not np.any(whole):
         return None
     forces, rates = (values[: count * n].reshape(count, n, 3)[whole] for values in (force, rate))
-    unrest = np.sum(np.std(forces, axis=1), axis=1) / CALM_G + np.sum(np.std(rates, axis=1), axis=1) / CALM_DPS
-    means = np.mean(rates, axis=1)
-    calmest = means[np.argsort(unrest)[: max(3, round(CALMEST * len(unrest)))]]
+    calmest = calm_rates(forces, rates, CALM_DPS)
     bias = np.median(calmest, axis=0)
     if np.median(np.linalg.norm(calmest - bias, axis=1)) < KNOWN_DPS:
         return bias
-    return np.zeros(3) if np.max(np.abs(np.mean(means, axis=0))) < KNOWN_DPS else None
+    return np.zeros(3) if np.max(np.abs(np.mean(rates, axis=(0, 1)))) < KNOWN_DPS else None
 
 
 def _unlikely(way: Array) -> float:

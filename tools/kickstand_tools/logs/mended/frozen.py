@@ -93,15 +93,4 @@ def believed(log: Log) -> Log:
     """The log without frozen readings: where they were is a gap. The log itself where there are none."""
     block = Block(log.time_us, log.readings, log.speed_mps, True, True, log.start_s, 0)
     kept = ~FrozenReadings().mark(block)
-    if np.all(kept):
-        return log
-    return Log(
-        log.t_s[kept],
-        log.accel_g[kept],
-        log.gyro_dps[kept],
-        log.speed_mps[kept],
-        log.temperature_c[kept],
-        log.start_s,
-        log.name,
-        log.notices,
-    )
+    return log if np.all(kept) else log.part(kept)

@@ -1,7 +1,20 @@
 """The last line of a log, which a recorder that lost its power did not finish."""
 
+from collections.abc import Iterator
+
 from ...errors import InputError
 from .. import cells
+
+
+def last_marked(pieces: Iterator[tuple[bytes, int]]) -> Iterator[tuple[bytes, int, bool]]:
+    """Each piece, and whether it is the last one."""
+    before = next(pieces, None)
+    for piece in pieces:
+        if before:
+            yield *before, False
+        before = piece
+    if before:
+        yield *before, True
 
 
 def without_cut_line(text: bytes, names: list[str], places: dict[str, int]) -> tuple[bytes, bytes]:

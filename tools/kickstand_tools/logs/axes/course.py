@@ -6,7 +6,7 @@ motion of the sensor cannot tell it. Positions can.
 
 import numpy as np
 
-from .recording import Array
+from ..table import Array
 
 EARTH_M = 6_371_000.0
 SLOWEST_MPS = 3.0  # of a course that positions tell
@@ -18,7 +18,8 @@ LAGS_S = np.arange(0.0, 2.1, 0.25)  # by which positions may be late
 
 def distance_m(lat: Array, lon: Array, next_lat: Array, next_lon: Array) -> tuple[Array, Array]:
     """How far east and north one position (degrees) is of another, in metres: (n) each, for distances of kilometres."""
-    east = np.radians(next_lon - lon) * np.cos(np.radians(lat)) * EARTH_M
+    apart_deg = (next_lon - lon + 180.0) % 360.0 - 180.0  # also across the meridian of 180 degrees
+    east = np.radians(apart_deg) * np.cos(np.radians(lat)) * EARTH_M
     return east, np.radians(next_lat - lat) * EARTH_M
 
 

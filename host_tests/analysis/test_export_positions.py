@@ -1,0 +1,183 @@
+"""A ride's positions in the files of other programs, read back by the programs' own rules."""
+
+import csv
+import functools
+from datetime import UTC, datetime
+from pathlib import Path
+
+import app_exports
+import command
+import numpy as np
+import pytest
+from kickstand_tools import api
+from kickstand_tools.analysis.export import export_gpx
+from kickstand_tools.analysis.track import Track
+from kickstand_tools.logs.csv_lines import write_log
+
+gpxpy = pytest.importorskip("gpxpy")
+pandas = pytest.importorskip("pandas")
+START_S = app_exports.START_UTC_S
+HZ = 5  # positions
+ALIGNED = api.CalibrationFile(aligned=True)
+DEGREE_M = np.radians(app_exports._EARTH_M)
+
+
+@functools.cache
+def log(start_s: float = 0.0) -> api.Log:
+    """Half a minute with a position every 0.2 s, each in the row in which it has come: none before 1 s, and none from
+    10 to 20 s; a speed each second. start_s: by the log's own clock."""
+    ride = app_exports.riding().every(2)  # 100 a second
+    row = np.arange(len(ride.t_s))
+    told = (row % (100 // HZ) == 7) & (ride.t_s > 1.0) & ~((ride.t_s > 10.0) & (ride.t_s < 20.0))
+    track = [np.where(told, v, np.nan) for v in (ride.lat_deg, ride.lon_deg, START_S + ride.t_s)]
+    speed = np.where(row % 100 == 7, ride.speed_mps, np.nan)
+    names = ("lat_deg", "lon_deg", "utc_s")
+    return api.Log(start_s + ride.t_s, ride.force_g, ride.rates_dps, speed, **dict(zip(names, track)))
+
+
+def exported(form: str, tmp_path: Path, ride: api.Log | api.Stretch | None = None) -> Path:
+    out = tmp_path / f"out.{form}"
+    api.export(api.open_ride(log() if ride is None else ride, ALIGNED), form, out)
+    return out
+
+
+def away_m(lat, lon, t_s) -> np.ndarray:
+    """How far these places are from where the ride was at these times."""
+    ride = app_exports.riding()
+    north = (np.asarray(lat) - np.interp(t_s, ride.t_s, ride.lat_deg)) * DEGREE_M
+    east = (np.asarray(lon) - np.interp(t_s, ride.t_s, ride.lon_deg)) * DEGREE_M * np.cos(np.radians(52.5))
+    return np.hypot(north, east)
+
+
+def values(points, name: str) -> np.ndarray:
+    """The numbers in the extensions of track points by the name of the element, NaN where there is none."""
+    found = []
+    for point in points:
+        elements = [one for part in point.extensions for one in part.iter() if one.tag.endswith("}" + name)]
+        found.append(float(elements[0].text) if elements else np.nan)
+    return np.array(found)
+
+
+def test_gpx_has_each_position_with_time_speed_and_lean(tmp_path):
+    gpx = gpxpy.parse(exported("gpx", tmp_path).read_text())
+    (track,) = gpx.tracks
+    assert [len(segment.points) > 20 for segment in track.segments] == [True, True]  # no line across the gap
+    points = [point for segment in track.segments for point in segment.points]
+    given = log()
+    there = np.isfinite(given.lat_deg)
+    assert len(points) == np.count_nonzero(there)
+    t_s = np.array([point.time.timestamp() for point in points]) - START_S
+    assert t_s == pytest.approx(given.t_s[there], abs=1e-3)
+    assert np.max(away_m([p.latitude for p in points], [p.longitude for p in points], t_s)) < 0.02
+    ride = app_exports.riding()
+    assert values(points, "speed") == pytest.approx(np.interp(t_s, ride.t_s, ride.speed_mps), abs=1.0)
+    lean = api.replay(given, ALIGNED)
+    assert values(points, "lean_deg") == pytest.approx(np.interp(t_s, lean.t_s, lean.lean_deg), abs=0.06)
+    assert gpx.nsmap["gpxtpx"] == export_gpx.GARMIN
+    assert gpx.version == "1.1"
+
+
+def test_a_lean_that_is_not_sure_is_not_in_a_track(tmp_path):
+    """A log that begins in a turn: the lean is unknown for some seconds. The positions are there."""
+    later = log().part(log().t_s > 7.0)
+    gpx = gpxpy.parse(exported("gpx", tmp_path, later).read_text())
+    points = [point for segment in gpx.tracks[0].segments for point in segment.points]
+    channels = api.vehicle_channels(later, ALIGNED)
+    sure = channels.trusted[np.isfinite(channels.lat_deg)]
+    assert 0 < np.count_nonzero(~sure) < len(sure)
+    assert np.array_equal(np.isfinite(values(points, "lean_deg")), sure)
+
+
+def vbo_rows(path: Path) -> dict[str, np.ndarray]:
+    lines = path.read_text().split("\n")
+    names = lines[lines.index("[column names]") + 1].split()
+    table = np.array([[float(cell) for cell in line.split()] for line in lines[lines.index("[data]") + 1 : -1]])
+    return dict(zip(names, table.T))
+
+
+def test_every_row_of_a_vbo_has_the_place_on_the_line_between_positions(tmp_path):
+    rows = vbo_rows(exported("vbo", tmp_path))
+    clock = rows["time"]
+    midnight = datetime.fromtimestamp(START_S, UTC).replace(hour=0, minute=0, second=0, microsecond=0).timestamp()
+    t_s = clock // 10000 * 3600 + clock // 100 % 100 * 60 + clock % 100 + midnight - START_S
+    placed = rows["sats"] == 4
+    assert set(rows["sats"]) == {0.0, 4.0}
+    assert t_s[0] == pytest.approx(0.0, abs=0.006)
+    told_s = log().t_s[np.isfinite(log().lat_deg)]
+    ends_s = [told_s[0], np.max(told_s[told_s < 15.0]), np.min(told_s[told_s > 15.0]), told_s[-1]]
+    within = [(t_s > begin - 0.005) & (t_s < end + 0.005) for begin, end in zip(ends_s[::2], ends_s[1::2])]
+    assert np.array_equal(placed, within[0] | within[1])
+    assert np.max(away_m(rows["lat"] / 60, -rows["long"] / 60, t_s)[placed]) < 0.2  # rows have hundredths of a second
+    assert np.all(rows["lat"][~placed] == 0.0)
+    ride = app_exports.riding()
+    east, north = np.gradient(ride.lon_deg) * np.cos(np.radians(52.5)), np.gradient(ride.lat_deg)
+    course = np.interp(t_s, ride.t_s, np.unwrap(np.arctan2(east, north)))
+    moving = placed & (np.interp(t_s, ride.t_s, ride.speed_mps) > 3.0)
+    wrong = (rows["heading"] - np.degrees(course) + 180.0) % 360.0 - 180.0
+    assert np.max(np.abs(wrong[moving])) < 5.0
+
+
+@pytest.mark.parametrize("form", ["csv", "parquet"])
+def test_data_frames_have_the_positions_to_the_centimetre(tmp_path, form):
+    frame = (pandas.read_csv if form == "csv" else pandas.read_parquet)(exported(form, tmp_path))
+    given = log()
+    for name in ("lat_deg", "lon_deg", "utc_s"):
+        assert np.allclose(frame[name], getattr(given, name), rtol=0.0, atol=1e-3 if name == "utc_s" else 1e-7,
+                           equal_nan=True)  # fmt: skip
+
+
+def test_racechrono_has_places_and_the_time_of_the_satellites(tmp_path):
+    lines = exported("racechrono", tmp_path).read_text().split("\n")
+    rows = list(csv.DictReader(lines[lines.index("") + 1 :]))[2:]
+    told = [row for row in rows if row["latitude"]]
+    assert len(told) == np.count_nonzero(np.isfinite(log().lat_deg))
+    t_s = np.array([float(row["elapsed_time"]) for row in told])
+    assert [float(row["timestamp"]) for row in told] == pytest.approx(t_s + START_S, abs=2e-3)
+    assert np.max(away_m(*([float(row[name]) for row in told] for name in ("latitude", "longitude")), t_s)) < 0.05
+
+
+@pytest.mark.parametrize("form", ["gpx", "racechrono", "vbo"])
+def test_the_time_of_the_satellites_goes_before_any_other(tmp_path, form):
+    """A log whose own clock was set wrong, and a stretch of a log that begins within a second without a position."""
+    for ride in (log(1.2e9), api.Stretch(log(), 12.5, 25.0)):
+        out = exported(form, tmp_path, ride)
+        if form == "gpx":
+            point = gpxpy.parse(out.read_text()).tracks[0].segments[-1].points[-1]
+            told = np.isfinite(log().utc_s) & (log().t_s <= (40.0 if isinstance(ride, api.Log) else 25.0))
+            assert point.time.timestamp() == pytest.approx(np.max(log().utc_s[told]), abs=1e-3)
+            continue
+        clock = datetime.fromtimestamp(START_S + (0.0 if isinstance(ride, api.Log) else 12.5), UTC)
+        assert f"{clock:%d/%m/%Y}" in out.read_text()
+        if form == "vbo":
+            assert vbo_rows(out)["time"][0] == pytest.approx(float(f"{clock:%H%M%S.%f}"), abs=0.02)
+
+
+def test_a_track_across_180_degrees_goes_the_short_way():
+    track = Track(np.arange(3.0), np.full(3, -10.0), np.array([179.9999, -179.9999, -179.9997]))
+    lat, lon = track.at(np.array([0.25, 0.75, 1.5, 2.1, -0.1]))
+    assert lon == pytest.approx([179.99995, -179.99995, -179.9998, np.nan, np.nan], abs=1e-7, nan_ok=True)
+    assert lat[:3] == pytest.approx(-10.0)
+
+
+def test_a_position_alone_is_a_place_and_none_is_nowhere():
+    lat, lon = Track(np.array([5.0]), np.array([1.0]), np.array([2.0])).at(np.array([4.9, 5.0, 5.1]))
+    assert lat == pytest.approx([np.nan, 1.0, np.nan], nan_ok=True)
+    assert lon == pytest.approx([np.nan, 2.0, np.nan], nan_ok=True)
+    assert np.all(np.isnan(Track(np.zeros(0), np.zeros(0), np.zeros(0)).at(np.array([1.0]))))
+
+
+def test_the_command_writes_a_track_or_says_why_not(tmp_path, monkeypatch):
+    ride, calibration = tmp_path / "ride.csv", tmp_path / "ride.cal.json"
+    write_log(ride, log())
+    api.write_calibration(calibration, ALIGNED)
+    out = tmp_path / "ride.gpx"
+    result = command.works("export", ride, "--to", "gpx", "--out", out)
+    assert f"written: {out}, " in result.out
+    assert len(gpxpy.parse(out.read_text()).tracks[0].segments) == 2
+    out.unlink()
+    bare = tmp_path / "bare.csv"
+    write_log(bare, api.Log(log().t_s, log().accel_g, log().gyro_dps))
+    arguments = ("export", bare, "--calibration", calibration, "--to", "gpx", "--out", out)
+    command.refused(tmp_path, *arguments, words="has no positions (lat_deg, lon_deg), so there is no track to write")
+    monkeypatch.setattr(export_gpx, "find_spec", lambda name: None)
+    command.refused(tmp_path, *arguments, words="GPX needs gpxpy")

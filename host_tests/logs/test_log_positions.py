@@ -1,0 +1,107 @@
+"""Positions and Universal Time in a log: read, cut, mended and written like the other columns."""
+
+import io
+
+import numpy as np
+import pytest
+from kickstand_tools.errors import InputError
+from kickstand_tools.logs import reader
+from kickstand_tools.logs.csv_lines import write_log
+from kickstand_tools.logs.cut import cut_log
+from kickstand_tools.logs.log import Log
+from kickstand_tools.logs.mended.frozen import believed
+from kickstand_tools.logs.reader import read_blocks, read_log
+from kickstand_tools.logs.stretch import Stretch
+
+TRACK = ("lat_deg", "lon_deg", "utc_s")
+HEADER = "t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps,lat_deg,lon_deg,utc_s\n"
+TOLD = range(3, 400, 20)  # rows that have a position
+
+
+def place(k: int) -> tuple[float, float, float]:
+    return -33.8688197 + 1e-7 * k, 151.2092955 - 1e-7 * k, 1_700_000_000.25 + k / 100
+
+
+def text(n: int = 400, t: str = "{:.2f}") -> str:
+    rows = []
+    for k in range(n):
+        cells = "{:.7f},{:.7f},{:.3f}".format(*place(k)) if k in TOLD else ",,"
+        rows.append(f"{t.format(k / 100)},0.0{k % 7},1.0,0.0{k % 3},0.{k % 9},0.5,0.1,{cells}\n")
+    return HEADER + "".join(rows)
+
+
+def told(log: Log) -> list[tuple[int, tuple[float, ...]]]:
+    """(hundredths of a second by the recorder's clock, position and time) of each row that has one."""
+    assert np.array_equal(np.isfinite(log.lat_deg), np.isfinite(log.utc_s))
+    rows = np.flatnonzero(np.isfinite(log.lat_deg) & np.isfinite(log.lon_deg))
+    return [
+        (round(100 * (log.start_s + log.t_s[row])), tuple(float(getattr(log, name)[row]) for name in TRACK))
+        for row in rows
+    ]
+
+
+def expected(rows=TOLD) -> list[tuple[int, tuple[float, ...]]]:
+    return [(k, pytest.approx(place(k), rel=0, abs=1e-8)) for k in rows]
+
+
+@pytest.mark.parametrize("block_bytes", [700, 1 << 22])
+def test_they_are_read_in_any_block_and_cut_like_all_else(monkeypatch, block_bytes):
+    monkeypatch.setattr(reader, "BLOCK_BYTES", block_bytes)
+    monkeypatch.setattr(reader, "BLOCK_SAMPLES", 55)
+    log = read_log(io.StringIO(text()))
+    assert told(log) == expected()
+    assert told(read_log(log)) == expected()
+    assert told(read_log(Stretch(log, 1.0, 2.0))) == expected(range(103, 200, 20))
+    assert told(read_log(Stretch(io.StringIO(text()), 1.0, 2.0))) == expected(range(103, 200, 20))
+
+
+def test_times_that_are_spread_keep_them_in_their_rows():
+    """Times in tenths of a second: ten rows share one."""
+    log = read_log(io.StringIO(text(t="{:.1f}")))
+    assert np.flatnonzero(np.isfinite(log.lat_deg)).tolist() == list(TOLD)
+    assert log.lon_deg[23] == pytest.approx(place(23)[1], abs=1e-8)
+
+
+def test_those_of_frozen_readings_go_with_them():
+    whole = read_log(io.StringIO(text()))
+    whole.accel_g += np.random.default_rng(1).normal(0.0, 1e-3, whole.accel_g.shape)
+    whole.accel_g[100:200] = whole.accel_g[100]
+    whole.gyro_dps[100:200] = whole.gyro_dps[100]
+    kept = believed(whole)
+    assert len(kept.t_s) < 310
+    assert told(kept) == expected([k for k in TOLD if not 100 < k < 200])
+    (block,) = read_blocks(whole)
+    assert np.count_nonzero(np.isfinite(block.believed.lat_deg)) == len(told(kept))
+
+
+def test_a_cut_and_a_written_log_have_them_and_one_without_has_no_columns(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(text())
+    cut_log(path, tmp_path / "cut.csv.gz", 1.0, 2.0)
+    assert told(read_log(tmp_path / "cut.csv.gz")) == expected(range(103, 200, 20))
+    write_log(tmp_path / "again.csv", read_log(path))
+    assert (tmp_path / "again.csv").read_text().splitlines()[0] == HEADER.strip()
+    assert told(read_log(tmp_path / "again.csv")) == expected()
+    bare = Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2)
+    write_log(tmp_path / "bare.csv", bare)
+    assert (tmp_path / "bare.csv").read_text().splitlines()[0] == "t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps"
+    assert np.all(np.isnan(read_log(tmp_path / "bare.csv").utc_s))
+
+
+@pytest.mark.parametrize(
+    ("cells", "words"),
+    [
+        ("90.1,0,0", "line 5: lat_deg is 90.1, past any reading: its unit is degrees"),
+        ("0,-180.5,0", "line 5: lon_deg is -180.5, past any reading: its unit is degrees"),
+        ("0,0,1.7e12", "line 5: utc_s is 1.7e12, past any reading: its unit is seconds since 1970"),
+        ("5230.1234N,0,0", "line 5: lat_deg is '5230.1234N', not a number"),
+        ("nan,0,0", "line 5: lat_deg is 'nan': a number is needed"),
+    ],
+)
+def test_mistakes_in_them_are_told_by_their_line(cells, words):
+    lines = text(8).splitlines()
+    assert lines[4].count(",") == 9
+    lines[4] = ",".join([*lines[4].split(",")[:7], cells])
+    with pytest.raises(InputError) as refusal:
+        read_log(io.StringIO("\n".join(lines)))
+    assert words.replace("'", "") in str(refusal.value).replace("'", "")

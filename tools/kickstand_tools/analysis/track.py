@@ -1,0 +1,46 @@
+"""Where a ride was: the positions of a log, one after the other, and what lies between them."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from ..logs.block import Block
+from ..logs.table import Array
+from .channels import Channels
+
+GAP_S = 5.0  # without a position: where the ride was meanwhile is not known
+
+
+@dataclass
+class Track:
+    """m positions. t_s: seconds since the log's first sample; lat_deg, lon_deg: degrees north and east."""
+
+    t_s: Array
+    lat_deg: Array
+    lon_deg: Array
+
+    def at(self, t_s: Array) -> tuple[Array, Array]:
+        """Latitude and longitude (n) at these times (n), along straight lines; NaN before the first position, after the
+        last, and in gaps."""
+        none = np.full(len(t_s), np.nan)
+        if not len(self.t_s):
+            return none, none
+        after = np.clip(np.searchsorted(self.t_s, t_s), 1, max(1, len(self.t_s) - 1))
+        before_s, after_s = self.t_s[after - 1], self.t_s[np.minimum(after, len(self.t_s) - 1)]
+        known = (t_s >= self.t_s[0]) & (t_s <= self.t_s[-1])
+        known &= (after_s - before_s <= GAP_S) | (t_s == before_s) | (t_s == after_s)
+        lat = np.interp(t_s, self.t_s, self.lat_deg)
+        lon = np.interp(t_s, self.t_s, np.unwrap(self.lon_deg, period=360.0))  # also across 180 degrees
+        return np.where(known, lat, np.nan), np.where(known, (lon + 180.0) % 360.0 - 180.0, np.nan)
+
+
+def track(part: Channels | Block) -> Track:
+    """Of a block of a ride or of a log, or of a whole course."""
+    there = np.isfinite(part.lat_deg) & np.isfinite(part.lon_deg)
+    return Track(part.t_s[there], part.lat_deg[there], part.lon_deg[there])
+
+
+def joined(tracks: list[Track]) -> Track:
+    """Those of blocks that follow on as one."""
+    columns = ([getattr(one, field.name) for one in tracks] for field in fields(Track))
+    return Track(*(np.concatenate(column) for column in columns))
