@@ -14,6 +14,7 @@ from kickstand_tools.logs.log import Log
 G = 9.80665
 FINE_HZ, RATE_HZ = 800, 200
 UP_ERROR_DEG, PITCH_ERROR_DEG, STAND_DEG = 1.5, 1.0, 11.0  # of the two poses, and the tilt between them
+VIBRATION_G, VIBRATION_DPS = 0.12, 1.5  # rms of white noise in each sample
 
 
 @dataclass
@@ -58,7 +59,8 @@ def town(chance):
     legs = [(6.0, 0.0, 0.0)]
     for _ in range(22):
         legs += [(6.0, 0.0, chance.uniform(7.0, 13.0))]
-        legs += [(chance.uniform(2.5, 5.0), chance.choice((-1.0, 1.0)) * chance.uniform(8.0, 25.0), chance.uniform(4.5, 8.0))]
+        lean = chance.choice((-1.0, 1.0)) * chance.uniform(8.0, 25.0)
+        legs += [(chance.uniform(2.5, 5.0), lean, chance.uniform(4.5, 8.0))]
         if chance.random() < 0.3:
             legs += [(5.0, 0.0, 0.0), (chance.uniform(4.0, 12.0), 0.0, 0.0)]
     return [*legs, (6.0, 0.0, 8.0)]
@@ -67,11 +69,13 @@ def town(chance):
 KINDS = {"sweepers": sweepers, "held": held, "track": track, "town": town}
 
 
-def other_ride(kind, seed, height_m=0.0, rider_deg=2.0, vibration_g=0.12, vibration_dps=1.5, speed=False):
-    """height_m: of the sensor above the roll axis. rider_deg: rms by which the rider, moving about, makes the bike's
-    lean differ from the one of balance. speed: give it once a second, 0.4 s late."""
+def other_ride(kind, seed, height_m=0.0, seconds=1000.0, rider_deg=2.0, speed=False):
+    """height_m: of the sensor above the roll axis. seconds: no longer than this, to whole legs. rider_deg: rms by which
+    the rider, moving about, makes the bike's lean differ from the one of balance. speed: give it once a second, 0.4 s
+    late."""
     chance = np.random.default_rng([seed, *kind.encode()])
     legs = KINDS[kind](chance)
+    legs = [leg for leg, end in zip(legs, np.cumsum([leg[0] for leg in legs])) if end <= seconds]
     time, lean, v = _course(legs)
     n = len(time)
     riding = np.clip((v - 1.0) / 3.0, 0.0, 1.0)
@@ -84,8 +88,8 @@ def other_ride(kind, seed, height_m=0.0, rider_deg=2.0, vibration_g=0.12, vibrat
     force, rates = (values[: n // step * step].reshape(-1, step, 3).mean(axis=1) for values in (force, rates))
     count = len(force)
     shaken = np.clip(v[: n // step * step : step] / 5.0, 0.1, 1.0)[:, None]
-    force = force + vibration_g * shaken * chance.standard_normal((count, 3))
-    rates = np.degrees(rates) + vibration_dps * shaken * chance.standard_normal((count, 3))
+    force = force + VIBRATION_G * shaken * chance.standard_normal((count, 3))
+    rates = np.degrees(rates) + VIBRATION_DPS * shaken * chance.standard_normal((count, 3))
     gyro, accel = (
         np.eye(3) + chance.uniform(-1.0, 1.0, (3, 3)) * np.where(np.eye(3) > 0, scale, cross)
         for scale, cross in ((0.03, 0.02), (0.004, 0.01))

@@ -1,5 +1,7 @@
 """Where a bike stands, and its lean and speed, roughly: where the adjustment begins."""
 
+import itertools
+
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
@@ -41,7 +43,7 @@ def in_hand(w: Windows) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     places = np.flatnonzero(off)
     if len(places):  # between two of them, and between one and an end of the log, it need not be mounted
         ends = np.concatenate(([0], places, [len(w) - 1]))
-        for begin, end in zip(ends[:-1], ends[1:]):
+        for begin, end in itertools.pairwise(ends):
             if w.edges[end + 1] - w.edges[begin] < BETWEEN_S:
                 off[begin : end + 1] = True
     return off, averaged(off.astype(float), MOUNTED_S) > 0.01

@@ -3,7 +3,7 @@
 States at both ends of each window: lean t, pitch q, velocity of the sensor to the left, up and forward in level axes
 that turn with the bike (l, u, v), and the gyro's bias (3). With the yaw rate p about the vertical:
 
-    t' = w_z - tan q (w_x sin t + w_y cos t)        q' = w_y sin t - w_x cos t        p = (w_x sin t + w_y cos t) / cos q
+    p = (w_x sin t + w_y cos t) / cos q        t' = w_z - p sin q        q' = w_y sin t - w_x cos t
     l' = a_l - p v        v' = a_f + p l        u' = a_u        a: the force in level axes, less 1 g upwards
 
 These are the firmware's kickstand.lean.bike_model without its assumption that there is no motion sideways or up. That
@@ -29,7 +29,8 @@ STATE_STEPS = np.array([1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6])
 
 # Parameters: rotation of the alignment (rad, about left, up, forward); errors of the gyro (3 x 3); offset of the
 # accelerometer (g) and its scale along up; place of the sensor above the roll axis and in front of the rear wheel (m);
-# tyres: force to the side over sin(lean); beside: the same upright (g); delay of the speed (s); dive in braking (s2 rad/m).
+# tyres: force to the side over sin(lean); beside: the same upright (g); delay of the speed (s); dive in braking
+# (rad per m/s2).
 ROTATION, GYRO, OFFSET, SCALE = slice(0, 3), slice(3, 12), slice(12, 15), 15
 HEIGHT, AHEAD, TYRES, BESIDE, DELAY, DIVE = 16, 17, 18, 19, 20, 21
 PARAMETERS = 22

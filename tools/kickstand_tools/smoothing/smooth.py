@@ -111,7 +111,8 @@ def _check(log: Source, calibration: CalibrationFile) -> None:
     if calibration.vehicle == "car":
         raise InputError(f"{name_of(log)}: a car does not lean: its calibration was made with --vehicle car")
     if not calibration.aligned:
-        raise InputError("the calibration is not aligned, so the lean is unknown: kickstand calibrate two, or ride, first")
+        todo = "kickstand calibrate two, or calibrate ride, first"
+        raise InputError(f"the calibration is not aligned, so the lean is unknown: {todo}")
 
 
 def _pieces(blocks: Iterator[Block]) -> Iterator[Block]:

@@ -6,7 +6,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..logs.axes.leaning import WINDOW_S
-from ..logs.axes.leaning import WINDOW_S
 from ..logs.table import Array
 
 GAP_S = 0.17  # a longer step between two samples: readings are missing
@@ -16,9 +15,10 @@ GAP_S = 0.17  # a longer step between two samples: readings are missing
 class Windows:
     """n windows, one following on the other; where readings are missing a window without readings lies between two.
 
-    edges (n + 1, s): their times. rate (n, 3, rad/s), force (n, 3, g): means, along the vehicle's axes. jolt (n): by how
-    much the rate differs from its mean at most, rad/s. speed (n): m/s, NaN where there is none. gap (n): True where there are no readings. Of each sample: number, in which window it lies;
-    before and after (s): the time that it stands for.
+    edges (n + 1, s): their times. rate (n, 3, rad/s), force (n, 3, g): means, along the vehicle's axes. jolt (n): by
+    how much the rate differs from its mean at most, rad/s. speed (n): m/s, NaN where there is none. gap (n): True where
+    there are no readings. Of each sample: number, in which window it lies; before and after (s): the time that it
+    stands for.
     """
 
     edges: Array
