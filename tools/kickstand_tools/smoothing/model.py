@@ -47,7 +47,7 @@ DRIFT = np.full(PARAMETERS, 1e-4)  # share of sigma by which each may change fro
 DRIFT[ROTATION], DRIFT[OFFSET] = 0.04, (0.3, 0.1, 0.1)
 
 # Noise per square root of a second
-ANGLE_ROOT = np.radians(0.08)
+ANGLE_ROOT = np.radians(0.12)
 VELOCITY_ROOT = np.array([0.05, 0.05, 0.10])
 BIAS_ROOT = np.radians(0.01)
 GAP_ROOT = np.array([np.radians(30.0), np.radians(5.0), 3.0, 1.0, 4.0])
@@ -55,9 +55,9 @@ GAP_MOST = np.array([np.radians(60.0), np.radians(8.0), 20.0, 2.0, 20.0])  # of 
 
 # Measurements: sigma, and how long an error lasts
 SLIDE, SLIDE_SHARE, SLIDE_S = 0.1, 0.01, 0.5  # m/s, and share of v tan(lean)
-DIVE_MPS, DIVE_ANGLE, DIVE_S = 0.1, np.radians(1.0), 0.5
+DIVE_MPS, DIVE_ANGLE, DIVE_S = 0.1, np.radians(1.5), 0.5
 SLOPE_MPS, SLOPE_ANGLE, SLOPE_S = 0.1, np.radians(2.0), 4.0
-BALANCE, BALANCE_S = 0.010, 3.0
+BALANCE, BALANCE_S = 0.014, 3.0
 BALANCE_LEANED, BALANCE_ROLLING = 0.06, 0.05
 BALANCED_MPS = 4.0
 USUAL_MPS, ANY_MPS, ANY_S = 15.0, 20.0, 60.0

@@ -7,6 +7,7 @@ from .adjust import Adjusted
 from .model import FORWARD, LEAN, PITCH, corrected_rates, jolted
 from .windows import Windows
 
+LEANED_SHARE = 0.005  # of the lean: what the model leaves out, such as a gyro that feels forces, grows with it
 TIMING_S = 0.004  # s: of what the delay of the gyro's low-pass, and the times of samples, are off
 
 
@@ -33,6 +34,7 @@ def at_samples(windows: Windows, rate: Array, found: Adjusted, delay_s: float) -
     whole = (turned[last] - (turned - roll_rate * duration)[np.flatnonzero(first)])[np.cumsum(first) - 1]
     lean = before[:, LEAN] + until + share * ((after - before)[:, LEAN] - whole)
     sigma = found.sigma[number, LEAN] + share * (found.sigma[number + 1] - found.sigma[number])[:, LEAN]
-    sigma = np.hypot(sigma, TIMING_S * roll_rate)
-    sigma = np.hypot(sigma, 2.0 * np.sqrt(np.clip(share * (1.0 - share), 0.0, 1.0)) * jolted(windows)[number])
+    jolt = 2.0 * np.sqrt(np.clip(share * (1.0 - share), 0.0, 1.0)) * jolted(windows)[number]
+    for more in (TIMING_S * roll_rate, LEANED_SHARE * lean, jolt):
+        sigma = np.hypot(sigma, more)
     return np.column_stack((lean + delay_s * roll_rate, sigma, pitch, speed))

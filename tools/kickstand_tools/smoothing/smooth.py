@@ -101,7 +101,7 @@ def smooth_blocks(
             past.extend(waiting[:CHAPTER])
             del waiting[:CHAPTER]
     # the end of a ride may be short: as much of what was before it is adjusted with it
-    yield from _chapter([*past][len(waiting) :] if past else [], waiting, [], calibration)
+    yield from _chapter([*past][-max(1, CHAPTER - len(waiting)) :], waiting, [], calibration)
     contradiction = mount.notice()
     if notices is not None and contradiction:
         notices.append(contradiction)
