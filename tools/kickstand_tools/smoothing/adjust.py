@@ -6,9 +6,11 @@ import numpy as np
 
 from ..logs.axes.leaning import WINDOW_S
 from ..logs.table import Array
-from . import model as m
+from . import parameters as of
 from .first_guess import first_guess, in_hand, standing
-from .model import Model
+from .model import linearised
+from .noise import Circumstances
+from .parameters import BIAS, FORWARD, LEAN, LEFT, PITCH, STATES, UP
 from .solver import Chain, Eliminated, back, eliminate, solve_chain, variances
 from .windows import Windows, padded
 
@@ -17,15 +19,15 @@ ROUNDS, PLAIN_ROUNDS = 8, 2  # at most; the first ones without regard to outlier
 CONVERGED = np.radians(0.03)
 MAX_LEAN = 0.5  # rad: of one step. The equations are linear no further.
 MAX_PITCH = 1.2  # rad: as in the firmware
-# Standard deviations of the first state of all
-START = np.array([1.0, 0.3, 1.0, 1.0, 20.0, 0.03, 0.03, 0.03])
+START = np.array([1.0, 0.3, 1.0, 1.0, 20.0, 0.03, 0.03, 0.03])  # 1 sigma of the first state of all
+DRAWN = [PITCH, LEFT, UP, *range(STATES)[BIAS]]  # of it, what is drawn towards 0
 
 
 @dataclass
 class Adjusted:
     """The motion at the edges of n windows, and the sensor's errors in each of them.
 
-    states, sigma (n + 1, STATES): see model.py, and standard deviations. parameters (n, PARAMETERS).
+    states, sigma (n + 1, STATES): see parameters.py, and their standard deviations. parameters (n, PARAMETERS).
     """
 
     states: Array
@@ -41,67 +43,68 @@ def adjust(windows: Windows, six_done: bool) -> Adjusted:
         if fit.step(robust=k >= PLAIN_ROUNDS) < CONVERGED and k > PLAIN_ROUNDS:
             break
     n = len(windows)
-    return Adjusted(fit.states[: n + 1], fit.sigma()[: n + 1], np.repeat(fit.parameters, fit.length, axis=0)[:n])
+    return Adjusted(fit.states[: n + 1], fit.sigma()[: n + 1], fit.each_window()[:n])
 
 
 class _Fit:
     def __init__(self, windows: Windows, blocks: int, six_done: bool) -> None:
-        self._windows, self._blocks, self.length = windows, blocks, len(windows) // blocks
+        self._windows, self._blocks, self._length = windows, blocks, len(windows) // blocks
         self._still = standing(windows)
-        self._in_hand, self._not_riding = in_hand(windows)
+        self._held = in_hand(windows)
         lean, speed = first_guess(windows, self._still)
-        self.states = np.zeros((len(windows) + 1, m.STATES))
-        self.states[:, m.LEAN], self.states[:, m.FORWARD] = _at_edges(lean), _at_edges(speed)
-        self.parameters = np.tile(m.USUAL, (blocks, 1))
-        self._unrest = np.ones(len(windows))
-        self._known = m.SIGMA.copy() if six_done else m.sigma_without_six()
+        self.states = np.zeros((len(windows) + 1, STATES))
+        self.states[:, LEAN], self.states[:, FORWARD] = _at_edges(lean), _at_edges(speed)
+        self._parameters = np.tile(of.USUAL, (blocks, 1))
+        self._roughness = np.ones(len(windows))
+        self._known = of.sigma(six_done)
         self._rolling = np.gradient(windows.rate[:, 2]) / WINDOW_S if len(windows) > 1 else np.zeros(1)
 
+    def each_window(self) -> Array:
+        """(n, PARAMETERS)"""
+        return np.repeat(self._parameters, self._length, axis=0)
+
     def step(self, robust: bool) -> float:
-        """Returns the largest change of lean, rad."""
-        reduced, chain = self._solve(robust)
+        """Returns the largest change of lean, rad. Raises LinAlgError."""
+        reduced, chain = self._solved(self._linearised(robust))
         change = _in_a_row(back(reduced, chain))
-        most = float(np.max(np.abs(change[:, m.LEAN])))
+        most = float(np.max(np.abs(change[:, LEAN])))
         if not np.isfinite(most):
             raise np.linalg.LinAlgError
         share = min(1.0, MAX_LEAN / max(most, 1e-9))
         self.states += share * change
-        self.states[:, m.PITCH] = np.clip(self.states[:, m.PITCH], -MAX_PITCH, MAX_PITCH)
-        self.parameters = self.parameters + share * chain.parameters
+        self.states[:, PITCH] = np.clip(self.states[:, PITCH], -MAX_PITCH, MAX_PITCH)
+        self._parameters = self._parameters + share * chain.parameters
         return most
 
     def sigma(self) -> Array:
-        """(n + 1, STATES) standard deviations."""
-        model, slopes = self._linearised(robust=True)
-        self._unrest = model.unrest_of(slopes[:, :, -1])
-        return np.sqrt(np.maximum(_in_a_row(variances(*self._solve(robust=True))), 0.0))
+        """(n + 1, STATES) standard deviations, of errors that are as large as this ride's residuals.
 
-    def _linearised(self, robust: bool) -> tuple[Model, Array]:
+        The states are those by the sigmas of a rough ride, because errors that no model has last for long, and weigh
+        less then.
+        """
+        self._roughness = self._circumstances().roughness_of(self._linearised(robust=True)[:, :, -1])
+        return np.sqrt(np.maximum(_in_a_row(variances(*self._solved(self._linearised(robust=True)))), 0.0))
+
+    def _circumstances(self) -> Circumstances:
         middle = 0.5 * (self.states[1:] + self.states[:-1])
-        leaned, speed = middle[:, m.LEAN], middle[:, m.FORWARD]
-        held = self._in_hand, self._not_riding
-        model = Model(self._windows, self._still, *held, self._rolling, leaned, speed, self._unrest)
-        return model, model.linearised(self.states, np.repeat(self.parameters, self.length, axis=0), robust)
-
-    def _solve(self, robust: bool) -> tuple[Eliminated, Chain]:
-        _, slopes = self._linearised(robust)
-        p = self.parameters
-        reduced = eliminate(
-            slopes.reshape(self._blocks, self.length, *slopes.shape[1:]).transpose(1, 0, 2, 3), m.STATES
-        )
-        _hold_start(reduced.left, self.states[0])
-        prior = np.column_stack((np.diag(1.0 / self._known**2), (p[0] - m.USUAL) / self._known**2))
-        return reduced, solve_chain(
-            reduced.left, m.STATES, prior, (m.DRIFT * self._known) ** 2, np.diff(p, axis=0)
+        lean, speed = middle[:, LEAN], middle[:, FORWARD]
+        return Circumstances(
+            self._windows, self._still, *self._held, self._rolling, lean, speed, self._roughness
         )
 
+    def _linearised(self, robust: bool) -> Array:
+        return linearised(self._circumstances(), self.states, self.each_window(), robust)
 
-def _hold_start(left: Array, state: Array) -> None:
-    """What is known of the first state of all: little. The lean and the speed are not drawn towards anything."""
-    rows = np.arange(m.STATES, 2 * m.STATES)
-    left[0, rows, rows] += 1.0 / START**2
-    drawn = [m.PITCH, m.LEFT, m.UP, 5, 6, 7]
-    left[0, rows[drawn], -1] += state[drawn] / START[drawn] ** 2
+    def _solved(self, slopes: Array) -> tuple[Eliminated, Chain]:
+        side_by_side = slopes.reshape(self._blocks, self._length, *slopes.shape[1:]).transpose(1, 0, 2, 3)
+        reduced = eliminate(side_by_side, STATES)
+        first = np.arange(STATES, 2 * STATES)
+        reduced.left[0, first, first] += 1.0 / START**2
+        reduced.left[0, first[DRAWN], -1] += self.states[0, DRAWN] / START[DRAWN] ** 2
+        p, weight = self._parameters, 1.0 / self._known**2
+        prior = np.column_stack((np.diag(weight), (p[0] - of.USUAL) * weight))
+        drift = (of.DRIFT * self._known) ** 2
+        return reduced, solve_chain(reduced.left, STATES, prior, drift, np.diff(p, axis=0))
 
 
 def _in_a_row(blocks: Array) -> Array:

@@ -4,10 +4,11 @@ import numpy as np
 
 from ..logs.table import Array
 from .adjust import Adjusted
-from .model import FORWARD, LEAN, PITCH, corrected_rates, jolted
+from .noise import jolted
+from .parameters import FORWARD, LEAN, PITCH, corrected_rates
 from .windows import Windows
 
-LEANED_SHARE = 0.005  # of the lean: what the model leaves out, such as a gyro that feels forces, grows with it
+LEANED_SHARE = 0.004  # of the lean: what the model leaves out, such as a gyro that feels forces, grows with it
 TIMING_S = 0.004  # s: of what the delay of the gyro's low-pass, and the times of samples, are off
 
 
