@@ -75,7 +75,11 @@ def test_a_calibration_that_does_not_serve_is_refused(ride, tmp_path, change, wo
 
 @pytest.mark.parametrize(
     ("rows", "words"),
-    [([], "is empty"), (["0,0,1,0,0,0,0"], "too short"), (["0,0,1,0,0,0,0", "1,0,1.1,0,0,0,0", "2,0,1,0,0,0,0"], "20")],
+    [
+        ([], "is empty"),
+        (["0,0,1,0,0,0,0"], "too short"),
+        (["0,0,1,0,0,0,0", "1,0,1.1,0,0,0,0", "2,0,1,0,0,0,0"], "at least 10"),
+    ],
 )
 def test_a_log_that_is_none_is_refused(ride, tmp_path, rows, words):
     directory, _, _ = ride

@@ -26,6 +26,9 @@ _TO = click.option(
 )
 
 
+_LIVE = click.option("--live", is_flag=True, help="The lean that the display showed, not the smoothed one.")
+
+
 def _stretch(command: Callable[..., Any]) -> Callable[..., Any]:
     return _FROM(_TO(command))
 
@@ -115,11 +118,14 @@ def export(ride: Path, form: str, calibration: Path | None, out: Path) -> None:
 @click.argument("ride", type=_PATH, metavar="RIDE.csv")
 @_CALIBRATION
 @_stretch
+@_LIVE
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def report(
-    ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, as_json: bool
+    ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, live: bool, as_json: bool
 ) -> None:
     """A ride in a page: maxima, time at large leans, and each stop as a brake test has it.
+
+    The lean is the smoothed one: from the whole ride, and nearer to the truth than what the display showed.
 
     The log's axes are right-handed, and so are its rates; at rest the axis that points up reads +1 g.
     """
@@ -131,7 +137,7 @@ def report(
     from ..progress import Bar
 
     with Bar("reading") as bar:
-        seen = overview(open_ride(_part(ride, from_s, to_s), calibration), bar.reach)
+        seen = overview(open_ride(_part(ride, from_s, to_s), calibration, smoothed=not live), bar.reach)
     warn(ride, [*seen.notices, *([seen.exchanged] if seen.exchanged else [])])
     if as_json:
         click.echo(json.dumps(as_data(seen)))
@@ -143,11 +149,14 @@ def report(
 @click.argument("ride", type=_PATH, metavar="RIDE.csv")
 @_CALIBRATION
 @_stretch
+@_LIVE
 @click.option("--out", required=True, type=_PATH, help="The directory to write to.")
 def plot(
-    ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, out: Path
+    ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, live: bool, out: Path
 ) -> None:
     """Draw a ride: a picture (PNG) and a page to zoom into (HTML).
+
+    The lean is the smoothed one: from the whole ride, and nearer to the truth than what the display showed.
 
     The log's axes are right-handed, and so are its rates; at rest the axis that points up reads +1 g.
     """
@@ -158,7 +167,7 @@ def plot(
 
     plot.check(out)
     with Bar("reading") as bar:
-        seen = overview(open_ride(_part(ride, from_s, to_s), calibration), bar.reach)
+        seen = overview(open_ride(_part(ride, from_s, to_s), calibration, smoothed=not live), bar.reach)
     warn(ride, seen.notices)
     for path in plot.draw(seen, out):
         click.echo(f"written: {path}")

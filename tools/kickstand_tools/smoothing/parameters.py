@@ -25,7 +25,7 @@ PARAMETERS = 22
 # What is known of them before the ride, and 1 sigma of that. Scale errors of 3 % and cross-axis sensitivity of 2 % are
 # the limits of the data sheet PS-MPU-6000A, 6.1 and 6.2.
 USUAL, SIGMA = np.zeros(PARAMETERS), np.empty(PARAMETERS)
-SIGMA[ROTATION], SIGMA[GYRO] = np.radians([1.5, 5.0, 2.5]), 0.012
+SIGMA[ROTATION], SIGMA[GYRO] = np.radians([1.5, 5.0, 2.0]), 0.012
 SIGMA[OFFSET], SIGMA[SCALE] = (0.001, 0.003, 0.003), 0.004
 WITHOUT_SIX_G, WITHOUT_SIX_SCALE = 0.04, 0.015  # the same where the six positions were not done
 for _place, _usual, _sigma in (

@@ -19,7 +19,7 @@ from .adjust import adjust
 from .samples import at_samples
 from .windows import windows_of
 
-SLOWEST_HZ = 20.0
+SLOWEST_HZ = 10.0
 PIECE_S = 120.0  # a log is cut into pieces
 CHAPTER = 12  # of which so many are adjusted together, with one before and one after them
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps")
@@ -56,7 +56,7 @@ def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None 
     True
     """
     notices: list[Notice] = []
-    blocks = list(smooth_blocks(log, calibration, progress, notices))
+    blocks = list(_checked_blocks(log, calibration, progress, notices))
     time_s = np.concatenate([block.t_s for block, _ in blocks])
     return SmoothedRide(time_s, *np.concatenate([found for _, found in blocks]).T, notices=notices)
 
@@ -72,7 +72,7 @@ def smooth_to_csv(
 
     def rows() -> Iterator[list[str]]:
         nonlocal count
-        for block, found in smooth_blocks(log, calibration, progress, notices):
+        for block, found in _checked_blocks(log, calibration, progress, notices):
             count += len(found)
             for time, (lean, sigma, pitch, speed) in zip(block.time_text, found.tolist(), strict=True):
                 yield [time, f"{lean:.3f}", f"{sigma:.3f}", f"{pitch:.3f}", f"{speed:.3f}"]
@@ -81,20 +81,31 @@ def smooth_to_csv(
     return count, notices
 
 
+def _checked_blocks(
+    log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
+) -> Iterator[tuple[Block, Array]]:
+    """smooth_blocks(), and what contradicts the calibration."""
+    mount = MountCheck(calibration)
+    for block, found in smooth_blocks(log, calibration, progress, notices):
+        believed = block.believed
+        mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
+        yield block, found
+    contradiction = mount.notice()
+    notices += [contradiction] if contradiction else []
+
+
 def smooth_blocks(
     log: Source,
     calibration: CalibrationFile,
     progress: Progress | None = None,
     notices: list[Notice] | None = None,
 ) -> Iterator[tuple[Block, Array]]:
-    """Each piece of the log with its values (n, COLUMNS). notices is appended to at the end. Raises InputError."""
+    """Each piece of the log with its values (n, COLUMNS). notices: what is remarkable in the log is appended to it at
+    the end. Raises InputError."""
     _check(log, calibration)
-    mount = MountCheck(calibration)
     past: deque[Block] = deque(maxlen=CHAPTER)
     waiting: list[Block] = []
     for piece in _pieces(read_blocks(log, 2, progress, notices)):
-        believed = piece.believed
-        mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
         waiting.append(piece)
         if len(waiting) > CHAPTER:
             yield from _chapter([*past][-1:], waiting[:CHAPTER], waiting[CHAPTER:], calibration)
@@ -102,9 +113,6 @@ def smooth_blocks(
             del waiting[:CHAPTER]
     # the end of a ride may be short: as much of what was before it is adjusted with it
     yield from _chapter([*past][-max(1, CHAPTER - len(waiting)) :], waiting, [], calibration)
-    contradiction = mount.notice()
-    if notices is not None and contradiction:
-        notices.append(contradiction)
 
 
 def _check(log: Source, calibration: CalibrationFile) -> None:
