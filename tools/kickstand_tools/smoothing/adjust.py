@@ -56,7 +56,7 @@ class _Fit:
         self.states[:, LEAN], self.states[:, FORWARD] = _at_edges(lean), _at_edges(speed)
         self._parameters = np.tile(of.USUAL, (blocks, 1))
         self._roughness = np.ones(len(windows))
-        self._known = of.sigma(six_done)
+        self._before = of.sigma(six_done)  # 1 sigma of the parameters, before the ride
         self._rolling = np.gradient(windows.rate[:, 2]) / WINDOW_S if len(windows) > 1 else np.zeros(1)
 
     def each_window(self) -> Array:
@@ -101,9 +101,9 @@ class _Fit:
         first = np.arange(STATES, 2 * STATES)
         reduced.left[0, first, first] += 1.0 / START**2
         reduced.left[0, first[DRAWN], -1] += self.states[0, DRAWN] / START[DRAWN] ** 2
-        p, weight = self._parameters, 1.0 / self._known**2
-        prior = np.column_stack((np.diag(weight), (p[0] - of.USUAL) * weight))
-        drift = (of.DRIFT * self._known) ** 2
+        p, known = self._parameters, of.known(self._before)
+        prior = np.column_stack((known, known @ (p[0] - of.USUAL)))
+        drift = (of.DRIFT * self._before) ** 2
         return reduced, solve_chain(reduced.left, STATES, prior, drift, np.diff(p, axis=0))
 
 

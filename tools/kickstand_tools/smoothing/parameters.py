@@ -50,6 +50,19 @@ def sigma(six_done: bool) -> Array:
     return found
 
 
+def known(sigma: Array) -> Array:
+    """(m, m): the information about the parameters before the ride, for their standard deviations (m).
+
+    The pose that the alignment took for upright was measured with the accelerometer's offset: not the rotation is known
+    from it, but the lean and pitch that the sensor has in this pose, which are the sum of both.
+    """
+    found = np.diag(1.0 / sigma**2)
+    for angle, offset, sign in ((ROTATION.start, OFFSET.stop - 1, 1.0), (ROTATION.stop - 1, OFFSET.start, -1.0)):
+        found[offset, offset] += found[angle, angle]
+        found[angle, offset] = found[offset, angle] = sign * found[angle, angle]
+    return found
+
+
 def corrected_rates(rate: Array, states: Array, p: Array) -> tuple[Array, Array, Array]:
     """Rates about left, up, forward (rad/s) without the gyro's errors. rate (n, 3), states (n, STATES), p (n,
     PARAMETERS)."""
