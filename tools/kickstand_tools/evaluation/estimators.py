@@ -1,5 +1,5 @@
-"""The estimators that are compared: the firmware's own lean, the one looked back over after the ride, and the filters of
-hobby projects and of the literature.
+"""The estimators that are compared: the firmware's own lean, the one looked back over after the ride, and the filters
+of hobby projects and of the literature.
 
 Each takes Samples and returns the lean in degrees of every sample, > 0 to the right. The filters of the packages
 `ahrs` and `vqf` run with their authors' default gains, started from the first reading.
