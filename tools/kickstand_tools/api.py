@@ -5,6 +5,7 @@
     six = api.fit_six_positions(["1.csv", "2.csv", "3.csv", "4.csv", "5.csv", "6.csv", "7.csv"])
     two = api.fit_two_positions("KICKSTAND.csv", "UPRIGHT.csv", six.calibration)
     lean = api.replay("RIDE.csv.gz", two.calibration)                     # lean.t_s, lean.lean_deg, ...
+    after = api.smooth("RIDE.csv.gz", two.calibration)                    # after.lean_deg, after.lean_sigma_deg, ...
     stops = api.find_stops(api.vehicle_channels("RIDE.csv.gz", two.calibration))
 
 A log is a path, an open file of text or bytes, a Log made of arrays, or a Stretch of one of these. Tables have
@@ -40,6 +41,7 @@ from .refusals import RefusedInput, sentence
 from .replay.replay import LeanTable, replay
 from .simulation.ride import Ride as SimulatedRide
 from .simulation.ride import ride as simulate_ride
+from .smoothing.smooth import SmoothedRide, smooth
 from .web.site import site_files, write_site
 
 __all__ = [
@@ -59,6 +61,7 @@ __all__ = [
     "RideFit",
     "SimulatedRide",
     "SixPositions",
+    "SmoothedRide",
     "Stop",
     "Stretch",
     "Summary",
@@ -83,6 +86,7 @@ __all__ = [
     "sentence",
     "simulate_ride",
     "site_files",
+    "smooth",
     "summary",
     "vehicle_channels",
     "write_calibration",

@@ -22,8 +22,8 @@ def kickstand(context: click.Context) -> None:
 
 for _command in (
     *(board.flash, board.status, board.pull, board.record),
-    *(import_.import_, join.join, calibrate.calibrate, ride.replay, ride.report, ride.plot, ride.export, ride.cut),
-    overlay.overlay,
+    *(import_.import_, join.join, calibrate.calibrate, ride.replay, ride.smooth, ride.report, ride.plot, ride.export),
+    *(ride.cut, overlay.overlay),
     *(simulated.simulate, simulated.evaluate),
     *(without_a_board.demo, without_a_board.web, without_a_board.emulate, without_a_board.bench),
 ):
