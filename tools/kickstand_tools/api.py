@@ -20,13 +20,17 @@ from .analysis.export.export import export
 from .analysis.overview import Overview, overview
 from .analysis.stops.brake_test import Stop, find_stops
 from .analysis.summary import Summary, summary
-from .calibration.drive import DriveResult, fit_drive
+from .calibration.drive import DriveFit, fit_drive
 from .calibration.drive_events import DriveEvent
 from .calibration.file import CalibrationFile, read_calibration, write_calibration
 from .calibration.ride.fit import RideFit, fit_ride
 from .calibration.six import SixPositions, fit_six_positions
 from .calibration.two import TwoPositions, fit_two_positions
 from .errors import InputError
+from .fleet.brake_tests import brake_tests
+from .fleet.manifest import Period, by_pattern, read_manifest
+from .fleet.period import PeriodResult, work_on_period
+from .fleet.run import FleetRun, run_fleet
 from .imports.importing import Imported, import_recording, write_imported
 from .joining.joined import Joined, join_track, write_joined
 from .joining.track import Track
@@ -48,7 +52,8 @@ __all__ = [
     "CalibrationFile",
     "Channels",
     "DriveEvent",
-    "DriveResult",
+    "DriveFit",
+    "FleetRun",
     "Imported",
     "InputError",
     "Joined",
@@ -56,6 +61,8 @@ __all__ = [
     "Log",
     "Overlaid",
     "Overview",
+    "Period",
+    "PeriodResult",
     "RefusedInput",
     "Ride",
     "RideFit",
@@ -67,6 +74,8 @@ __all__ = [
     "Summary",
     "Track",
     "TwoPositions",
+    "brake_tests",
+    "by_pattern",
     "cut_log",
     "export",
     "find_stops",
@@ -81,14 +90,17 @@ __all__ = [
     "overview",
     "read_calibration",
     "read_log",
+    "read_manifest",
     "read_track",
     "replay",
+    "run_fleet",
     "sentence",
     "simulate_ride",
     "site_files",
     "smooth",
     "summary",
     "vehicle_channels",
+    "work_on_period",
     "write_calibration",
     "write_imported",
     "write_joined",
