@@ -29,7 +29,7 @@ def ride(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def lean(ride):
-    return shown(api.open_ride(ride))
+    return shown(api.open_ride(ride, smoothed=True))
 
 
 @pytest.fixture(scope="module")
@@ -208,3 +208,11 @@ def test_a_gopros_readings_are_read_in_deg_s_on_the_videos_time(tmp_path):
     assert np.allclose(read.rate_dps, rate, atol=0.02)
     assert np.allclose(read.t_s, (np.arange(450) + 0.5) / 150.0, atol=0.002)
     assert telemetry(open_video(gopro.film(tmp_path / "plain.mp4", 1.0))) is None
+
+
+def test_live_shows_what_the_display_showed(tmp_path, ride):
+    """At the first lean the two differ: the display did not know what came after."""
+    for more in ((), ("--live",)):
+        command.works("overlay", ride, "--from", 5, "--to", 15, *more, "--out", tmp_path / f"clip{len(more)}.webm")
+    smoothed, live = (gopro.frames(tmp_path / f"clip{k}.webm").astype(int) for k in (0, 1))
+    assert np.abs(smoothed - live).max() > 100

@@ -27,6 +27,7 @@ _PATH = click.Path(path_type=Path)
     "--height", type=click.IntRange(240, 4320), default=1080, help="Of the video that a clip is for, pixels."
 )
 @click.option("--mph", is_flag=True, help="Miles an hour instead of kilometres.")
+@click.option("--live", is_flag=True, help="The lean that the display showed, not the smoothed one.")
 @click.option("--out", required=True, type=_PATH, help="FILE.mp4 with --video, else FILE.mov or FILE.webm.")
 def overlay(
     ride: Path,
@@ -38,11 +39,13 @@ def overlay(
     to_s: float | None,
     height: int,
     mph: bool,
+    live: bool,
     out: Path,
 ) -> None:
     """Draw lean, forces, speed and maxima over a video, or as a transparent clip to lay over one.
 
-    .mov is ProRes 4444, .webm is VP9, both with alpha. Where the lean is not known the gauge shows --.
+    .mov is ProRes 4444, .webm is VP9, both with alpha. The lean is the smoothed one: from the whole ride, and nearer to
+    the truth than what the display showed. Where it is not known the gauge shows --.
     """
     from ..calibration.file import calibration_beside
     from ..output import check_output
@@ -53,7 +56,7 @@ def overlay(
     check_output(out, [ride, calibration, *([video] if video else [])])
     rate = float(fps) if fps else None
     with Bar("reading and drawing") as bar:
-        made = overlay(ride, out, calibration, video, offset, rate, from_s, to_s, height, mph, bar.reach)
+        made = overlay(ride, out, calibration, video, offset, rate, from_s, to_s, height, mph, live, bar.reach)
     warn(ride, made.notices)
     if made.correlation is not None:
         click.echo(

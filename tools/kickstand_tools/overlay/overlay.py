@@ -59,6 +59,7 @@ def overlay(
     to_s: float | None = None,
     height: int = _CLIP_HEIGHT,
     mph: bool = False,
+    live: bool = False,
     progress: Progress | None = None,
 ) -> Overlaid:
     """Write a gauge of lean, forces, speed and maxima: over a video (.mp4), or as a transparent clip (.mov, .webm).
@@ -67,16 +68,16 @@ def overlay(
     picture, s since the ride's first sample: 12.5 if the video begins 12.5 s after the ride, -3 if it begins 3 s before
     it. None: found by the sensors of the GoPro that made it. fps: pictures a second; None: the video's, or 30. from_s,
     to_s: the part of the ride; negative: before its end. height: of the video that a clip is for, pixels. mph: miles an
-    hour.
+    hour. live: the lean that the display showed, not the smoothed one.
     progress: called with how much of the ride has been read, then with how many pictures are drawn. Raises InputError.
 
-    >>> overlay("ride.csv", "clip.avi")
+    >>> overlay("ride.csv", "clip.avi")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
-    kickstand_tools.errors.InputError: clip.avi: the name of a transparent clip ends in .mov or .webm
+    kickstand_tools.errors.InputError: clip.avi: the name of a transparent clip ends in .mov or .webm...
     """
     out = Path(out)
     filmed = _check(out, video, offset_s)
-    opened = open_ride(read_twice(ride) if filmed and offset_s is None else ride, calibration)
+    opened = open_ride(read_twice(ride), calibration, smoothed=not live)
     correlation = None
     if filmed and offset_s is None:
         offset_s, correlation = _found_offset(opened.log, filmed, progress)

@@ -61,7 +61,7 @@ class Shown:
 
 
 def shown(ride: Ride, progress: Progress | None = None, notices: list[Notice] | None = None) -> Shown:
-    """Of a whole ride (see open_ride): the lean that the display showed. progress, notices: of Ride.blocks().
+    """Of a whole ride (see open_ride), with the lean that it was opened with. progress, notices: of Ride.blocks().
 
     Raises InputError.
     """
