@@ -42,7 +42,7 @@ def test_channels_are_those_of_the_meter(ride, course):
         rolling.append(engine.meter.filter.rolling)
         trusted.append(engine.meter.trusted)
     for name, column in zip(replay_engine.COLUMNS, np.transpose(rows)):
-        if name not in ("static_lean_deg", "lean_formula_deg"):  # the formula: above
+        if name not in ("static_lean_deg", "lean_formula_deg", "lean_sigma_deg"):  # the formula: above
             assert np.max(np.abs(getattr(course, name) - column)) < 1e-5, name
     assert np.array_equal(course.shown_g, shown)
     assert np.array_equal(course.rolling, rolling)
