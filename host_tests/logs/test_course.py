@@ -50,15 +50,18 @@ def test_a_bias_of_the_gyro_is_no_turning(bias_dps):
     assert codes(mirrored(biased)) == ["mirrored"]
 
 
-def circling(both_sides: bool, bias_dps: float) -> Course:
-    """At 10 m/s round and round, to the left or to either side."""
+def circling(both_sides: bool, bias_dps: float, wavering_dps: float = 0.0) -> Course:
+    """At 10 m/s round and round, to the left or to either side. wavering_dps: of the track, which the gyro has against
+    it: noise of positions."""
     t_s = np.arange(0.0, 120.0, 0.02)
-    yaw_dps = np.where(both_sides & (t_s > 60.0), -10.0, 10.0)
+    turning_dps = np.where(both_sides & (t_s > 60.0), -10.0, 10.0)
+    wave_dps = wavering_dps * np.sin(t_s)
+    yaw_dps = turning_dps + wave_dps
     way = np.cumsum(np.radians(yaw_dps)) * 0.02
     lat, lon = (np.cumsum(10.0 * wave(way)) * 0.02 * 9e-6 for wave in (np.sin, np.cos))
     told = np.arange(len(t_s)) % 50 == 0
     course = Course()
-    rates = np.column_stack((0 * t_s, yaw_dps + bias_dps, 0 * t_s))
+    rates = np.column_stack((0 * t_s, turning_dps - wave_dps + bias_dps, 0 * t_s))
     places = [np.where(told, place, np.nan) for place in (lat, lon)]
     for block in np.array_split(np.arange(len(t_s)), 7):
         course.add(t_s[block], np.tile([0.0, 1.0, 0.0], (len(block), 1)), rates[block], *(v[block] for v in places))
@@ -68,6 +71,7 @@ def circling(both_sides: bool, bias_dps: float) -> Course:
 def test_turns_to_one_side_might_be_a_bias_and_tell_nothing():
     assert circling(False, -20.0).agrees() is None
     assert circling(False, 0.0).agrees() is None
+    assert circling(False, 0.0, wavering_dps=3.0).agrees() is None
     for bias_dps in (-20.0, 0.0, 20.0):
         assert circling(True, bias_dps).agrees() is True
 

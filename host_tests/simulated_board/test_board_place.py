@@ -85,8 +85,14 @@ def test_an_old_position_is_not_taken_for_new():
         gps._uart = Listing(sentence("GPVTG,84.4,T,,M,19.438,N,36.0,K,A").encode())
         assert gps.poll(5000) is not None  # no RMC for 4 s
         assert gps.place(5000) is None
-        gps._uart = Listing(rmc(time="120006.00").encode())
+        gps._uart = Listing(rmc(time="120005.00").encode())
         assert [gps.poll(ms) is None for ms in (5990, 6000)] == [True, False]
+        for ms in (7000, 8000, 9000, 10000):  # then VTG alone, which counts once RMC is 3 s old
+            gps._uart = Listing(sentence("GPVTG,84.4,T,,M,19.438,N,36.0,K,A").encode())
+            assert (gps.poll(ms) is None) == (ms < 9000), ms
+            assert gps.place(ms) is None, ms
+        gps._uart = Listing(rmc(time="120011.00").encode())
+        assert [gps.poll(ms) is None for ms in (11990, 12000)] == [True, False]
         gps._uart = Listing(b"$GP")
         assert gps.poll(20000) is None
         assert gps.place(20000) is None

@@ -278,6 +278,27 @@ def test_a_speed_goes_with_the_next_turn_alone(recorder, keeper):
     assert [turn.speed_mps for turn in blocks(keeper)[0].turns] == [None, 0.0, None, 12.34]
 
 
+def test_a_position_goes_with_the_next_turn_alone(recorder, keeper):
+    """With a speed or without one."""
+    start(recorder)
+    recorder.add_fix(None, ride_writer.place(0))
+    recorder.add_fix(None, ride_writer.place(1))  # the newest one counts
+    add(recorder, 2)
+    recorder.add_fix(5.0, None)
+    add(recorder, 1)
+    recorder.add_fix(6.0, ride_writer.place(2))
+    add(recorder, 1)
+    recorder.add_fix(None, ride_writer.place(3))
+    start(recorder)
+    add(recorder, 1)
+    recorder.stop()
+    first, second = blocks(keeper)
+    hundredths = [turn.place and round(100 * turn.place.utc_s % 100) for turn in first.turns]
+    assert hundredths == [20, None, None, 30]
+    assert [turn.speed_mps for turn in first.turns] == [None, None, 5.0, 6.0]
+    assert [turn.place for turn in second.turns] == [None]
+
+
 def test_time_and_room(recorder, keeper):
     """A kilobyte a second, until it is known how many they are."""
     start(recorder)
