@@ -33,7 +33,7 @@ def standing(w: Windows) -> NDArray[np.bool_]:
 
 
 def in_hand(w: Windows) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """(n) True where the sensor is surely moved about in a hand, or lies with the bike: up is far from the calibration's.
+    """(n) True where the sensor is surely moved about in a hand, or lies with the bike: up is far from where it was.
     And the same with the seconds before and after, which may not be riding either.
 
     A bike in balance feels the force along its own up, however far it leans.
