@@ -133,7 +133,8 @@ def test_racechrono_has_places_and_the_time_of_the_satellites(tmp_path):
     assert len(told) == np.count_nonzero(np.isfinite(log().lat_deg))
     t_s = np.array([float(row["elapsed_time"]) for row in told])
     assert [float(row["timestamp"]) for row in told] == pytest.approx(t_s + START_S, abs=2e-3)
-    assert np.max(away_m(*([float(row[name]) for row in told] for name in ("latitude", "longitude")), t_s)) < 0.05
+    lat, lon = ([float(row[name]) for row in told] for name in ("latitude", "longitude"))
+    assert np.max(away_m(lat, lon, t_s)) < 0.05
 
 
 @pytest.mark.parametrize("form", ["gpx", "racechrono", "vbo"])

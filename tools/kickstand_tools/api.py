@@ -20,35 +20,49 @@ from .analysis.export.export import export
 from .analysis.overview import Overview, overview
 from .analysis.stops.brake_test import Stop, find_stops
 from .analysis.summary import Summary, summary
-from .calibration.drive import DriveResult, fit_drive
+from .calibration.drive import DriveFit, fit_drive
 from .calibration.drive_events import DriveEvent
 from .calibration.file import CalibrationFile, read_calibration, write_calibration
 from .calibration.ride.fit import RideFit, fit_ride
 from .calibration.six import SixPositions, fit_six_positions
 from .calibration.two import TwoPositions, fit_two_positions
 from .errors import InputError
+from .fleet.brake_tests import brake_tests
+from .fleet.manifest import Period, by_pattern, read_manifest
+from .fleet.period import PeriodResult, work_on_period
+from .fleet.run import FleetRun, run_fleet
 from .imports.importing import Imported, import_recording, write_imported
+from .joining.joined import Joined, join_track, write_joined
+from .joining.track import Track
+from .joining.track_files import read_track
 from .logs.csv_lines import write_log
 from .logs.cut import cut_log
 from .logs.log import Log
 from .logs.reader import read_log
 from .logs.stretch import Stretch
+from .overlay.overlay import Overlaid, overlay
 from .refusals import RefusedInput, sentence
 from .replay.replay import LeanTable, replay
 from .simulation.ride import Ride as SimulatedRide
 from .simulation.ride import ride as simulate_ride
 from .smoothing.smooth import SmoothedRide, smooth
+from .web.site import site_files, write_site
 
 __all__ = [
     "CalibrationFile",
     "Channels",
     "DriveEvent",
-    "DriveResult",
+    "DriveFit",
+    "FleetRun",
     "Imported",
     "InputError",
+    "Joined",
     "LeanTable",
     "Log",
+    "Overlaid",
     "Overview",
+    "Period",
+    "PeriodResult",
     "RefusedInput",
     "Ride",
     "RideFit",
@@ -58,7 +72,10 @@ __all__ = [
     "Stop",
     "Stretch",
     "Summary",
+    "Track",
     "TwoPositions",
+    "brake_tests",
+    "by_pattern",
     "cut_log",
     "export",
     "find_stops",
@@ -67,17 +84,26 @@ __all__ = [
     "fit_six_positions",
     "fit_two_positions",
     "import_recording",
+    "join_track",
     "open_ride",
+    "overlay",
     "overview",
     "read_calibration",
     "read_log",
+    "read_manifest",
+    "read_track",
     "replay",
+    "run_fleet",
     "sentence",
     "simulate_ride",
+    "site_files",
     "smooth",
     "summary",
     "vehicle_channels",
+    "work_on_period",
     "write_calibration",
     "write_imported",
+    "write_joined",
     "write_log",
+    "write_site",
 ]

@@ -197,7 +197,7 @@ class DriveAlignment:
         if self._means is not None:
             force, rate, seconds = self._means
             self._means = None
-            if self._speed_mps >= 0.0:
+            if self._speed_mps >= 0.0 and self._silent_us <= STALE_US:  # a last speed of 0 is no standstill for ever
                 self.standing.update(force, rate, self._speed_mps, seconds)
         elif self._work is not None:
             if next(self._work, True):

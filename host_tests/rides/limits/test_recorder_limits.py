@@ -257,7 +257,7 @@ def test_a_gap_belongs_to_its_own_ride(recorder, keeper, clock):
     add(recorder, 2, clock)
     recorder.mark_gap()
     start(recorder)
-    recorder.add_speed(500)
+    recorder.add_fix(5.0, None)
     start(recorder)
     add(recorder, 3, clock)
     recorder.stop()
@@ -269,10 +269,10 @@ def test_a_gap_belongs_to_its_own_ride(recorder, keeper, clock):
 def test_a_speed_goes_with_the_next_turn_alone(recorder, keeper):
     start(recorder)
     add(recorder, 1)
-    recorder.add_speed(1200)
-    recorder.add_speed(0)  # the newest one counts, a zero is one
+    recorder.add_fix(12.0, None)
+    recorder.add_fix(0.0, None)  # the newest one counts, a zero is one
     add(recorder, 2)
-    recorder.add_speed(1234)
+    recorder.add_fix(12.34, None)
     add(recorder, 1)
     recorder.stop()
     assert [turn.speed_mps for turn in blocks(keeper)[0].turns] == [None, 0.0, None, 12.34]

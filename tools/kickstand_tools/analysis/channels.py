@@ -174,7 +174,7 @@ def vehicle_channels(
     """
     from .downsample import joined
 
-    return joined(list(open_ride(log, calibration).blocks(progress)))
+    return joined(open_ride(log, calibration).blocks(progress))
 
 
 def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool = False) -> Channels:

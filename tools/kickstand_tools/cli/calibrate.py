@@ -9,7 +9,7 @@ import click
 from .warnings import warn
 
 if TYPE_CHECKING:
-    from ..calibration.drive import DriveResult
+    from ..calibration.drive import DriveFit
     from ..calibration.drive_events import DriveEvent
     from ..calibration.six import SixPositions
     from ..calibration.two import TwoPositions
@@ -165,7 +165,7 @@ def _two_lines(found: "TwoPositions") -> Iterable[str]:
         yield "warning: no six-position calibration: an offset of 50 mg is 3 degrees of lean: calibrate six first"
 
 
-def _drive_lines(found: "DriveResult", several: bool) -> Iterable[str]:
+def _drive_lines(found: "DriveFit", several: bool) -> Iterable[str]:
     from kickstand.drive_alignment import verdict
 
     from ..analysis import alignment_quality

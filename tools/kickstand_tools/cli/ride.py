@@ -149,10 +149,17 @@ def report(
 @click.argument("ride", type=_PATH, metavar="RIDE.csv")
 @_CALIBRATION
 @_stretch
+@click.option("--tiles", is_flag=True, help="Streets below the track: the page asks a server for them when it is open.")
 @_LIVE
 @click.option("--out", required=True, type=_PATH, help="The directory to write to.")
 def plot(
-    ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, live: bool, out: Path
+    ride: Path,
+    calibration: Path | None,
+    from_s: float | None,
+    to_s: float | None,
+    tiles: bool,
+    live: bool,
+    out: Path,
 ) -> None:
     """Draw a ride: a picture (PNG) and a page to zoom into (HTML).
 
@@ -169,7 +176,7 @@ def plot(
     with Bar("reading") as bar:
         seen = overview(open_ride(_part(ride, from_s, to_s), calibration, smoothed=not live), bar.reach)
     warn(ride, seen.notices)
-    for path in plot.draw(seen, out):
+    for path in plot.draw(seen, out, tiles):
         click.echo(f"written: {path}")
     warn(ride, [seen.exchanged] if seen.exchanged else [])
 

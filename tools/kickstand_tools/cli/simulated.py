@@ -23,7 +23,7 @@ _PROFILES = (
 
 
 @click.command()
-@click.option("--profile", required=True, help=f"{_PROFILES}.")
+@click.option("--profile", help=f"{_PROFILES}.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Another seed, another ride.")
 @click.option(
     "--seconds",
@@ -37,24 +37,47 @@ _PROFILES = (
     type=click.FloatRange(-10.0, 10.0),
     help="Between the poses, degrees; at random if not given.",
 )
-@click.option("--speed", is_flag=True, help="Write a speed into the log, once a second.")
+@click.option("--speed", is_flag=True, help="Write speed and position into the log, once a second.")
+@click.option(
+    "--fleet",
+    "vehicles",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Instead: N cars, buses and motorcycles with a few drives each, a manifest, and what is wrong with some.",
+)
 @click.option("--out", required=True, type=_PATH, help="The directory to write to.")
 def simulate(
-    profile: str,
+    profile: str | None,
     seed: int,
     seconds: float,
     upright_error: float,
     pitch_change: float | None,
     speed: bool,
+    vehicles: int | None,
     out: Path,
 ) -> None:
-    """Make up a ride: six poses and a free one, kickstand, upright, the ride, its truth."""
+    """Make up a ride: six poses and a free one, kickstand, upright, the ride, its truth. Or a fleet (see fleet)."""
+    if vehicles is not None:
+        _simulate_fleet(vehicles, seed, out)
+        return
+    if profile is None:
+        raise click.UsageError("Missing option '--profile', or '--fleet' for a fleet.")
     from ..progress import spinner
     from ..simulation.files import simulate
 
     with spinner("making up a ride"):
         made = simulate(profile, seed, out, seconds, upright_error, pitch_change, speed=speed)
     click.echo(f"written: {out}, {len(made.time)} samples")
+
+
+def _simulate_fleet(vehicles: int, seed: int, out: Path) -> None:
+    from ..progress import Bar
+    from ..simulation.fleet.fleet import make_fleet
+
+    with Bar("making up vehicles", lines_s=_LINES_S) as bar:
+        made = make_fleet(out, vehicles, seed, progress=bar.reach)
+    logs = sum(len(vehicle.paths) for vehicle in made)
+    click.echo(f"written: {out}/MANIFEST.csv and TRUTH.csv, {vehicles} vehicles, {logs} logs")
 
 
 @click.command()

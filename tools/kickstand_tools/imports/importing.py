@@ -97,8 +97,6 @@ def import_recording(
             utc_s=joined.utc_s[rows],
         )
     )
-    if any(notice.code in ("left-handed", "rates-misfit") for notice in log.notices):
-        recording.notices = [notice for notice in recording.notices if notice.code != "import-mirrored"]  # so it seems
     return Imported(
         recording.app,
         log,
@@ -171,12 +169,14 @@ def _check_force(joined: Joined, name: str) -> None:
 
 
 def _check_sign(recording: Recording, joined: Joined) -> None:
-    """Where the track shows a mirrored accelerometer: turn it if its sign was only likely, else remark on it."""
-    agrees = course_agrees(_seconds(joined), joined.accel_g, joined.gyro_dps, joined.lat_deg, joined.lon_deg)
+    """Turn an accelerometer whose sign was only likely where the track shows that it is mirrored.
+
+    One whose sign is known is left as it is: reading the log remarks on it.
+    """
     if recording.sign_known:
-        if agrees is False:
-            recording.notices.append(Notice("import-mirrored", recording.app))
-    elif agrees is None:
+        return
+    agrees = course_agrees(_seconds(joined), joined.accel_g, joined.gyro_dps, joined.lat_deg, joined.lon_deg)
+    if agrees is None:
         recording.notices.append(Notice("import-sign", recording.app))
     elif agrees:
         _say_sign(recording, "+1 g up, by the turns of the track")

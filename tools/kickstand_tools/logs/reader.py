@@ -6,6 +6,7 @@ import io
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from kickstand.errors import Notice
@@ -15,6 +16,7 @@ from ..errors import InputError
 from ..output import write_whole
 from . import cells
 from .axes.bends import Bends
+from .axes.course import Course
 from .axes.handedness import Handedness
 from .block import Block
 from .cells import COLUMNS, OPTIONAL, TRACK
@@ -27,7 +29,7 @@ from .speed_unit import SpeedUnit
 from .stretch import Stretch
 from .table import Array
 
-BLOCK_BYTES = 1 << 22  # of text, some 60000 samples
+BLOCK_BYTES = 1 << 20  # of text, some 15000 samples
 LEAST_G = 0.4  # median force; less is usual where gravity was taken off, a ride's is over 0.9
 BLOCK_SAMPLES = 60_000  # of a log in memory
 _NUMERIC = b"0123456789+-.eE, \n"  # where nothing else stands, numpy may read it
@@ -35,12 +37,13 @@ _NUMERIC = b"0123456789+-.eE, \n"  # where nothing else stands, numpy may read i
 Source = File | Log | Stretch  # what can be read as a log
 
 
-def read_log(source: Source, minimum: int = 2, progress: Progress | None = None) -> Log:
+def read_log(source: Source, minimum: int = 2, progress: Progress | None = None, axes: bool = True) -> Log:
     """Read a whole log: CSV with the columns t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps and optionally
     speed_mps,lat_deg,lon_deg,utc_s,temp_c.
 
     source: a path (gzipped if it ends in .gz), an open file of text or bytes, a Log, which is checked, or a Stretch of
     one of these. minimum: the least number of samples. progress: called with the bytes read and those of the file.
+    axes: judge whether rates and accelerations belong together, which takes most of the time.
     Times that repeat are spread, a cut end is left out. Raises InputError naming the file, and the line for a mistake
     in it, also for units that are easily mistaken (m/s2, milliseconds, km/h).
 
@@ -52,7 +55,7 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None)
     ['t_s', 'ax_g', 'ay_g', 'az_g', 'gx_dps', 'gy_dps', 'gz_dps', 'speed_mps', 'lat_deg', 'lon_deg', 'utc_s', 'temp_c']
     """
     notices: list[Notice] = []
-    blocks = list(read_blocks(source, minimum, progress, notices))
+    blocks = list(read_blocks(source, minimum, progress, notices, axes))
     readings = np.concatenate([block.readings for block in blocks])
     return Log(
         np.concatenate([block.t_s for block in blocks]),
@@ -67,7 +70,8 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None)
 
 
 def read_blocks(
-    source: Source, minimum: int = 2, progress: Progress | None = None, notices: list[Notice] | None = None
+    source: Source, minimum: int = 2, progress: Progress | None = None, notices: list[Notice] | None = None,
+    axes: bool = True
 ) -> Iterator[Block]:
     """The same block by block, however long the log is. Readings that froze are marked in each block.
 
@@ -76,7 +80,8 @@ def read_blocks(
     name, count = name_of(source), 0
     remarks: list[Notice] = []
     speed_unit, frozen = SpeedUnit(name), FrozenReadings()
-    axes = Handedness(), Bends()
+    judging = notices is not None and axes
+    judges, course = (Handedness(), Bends()) if judging else (), Course()
     whole = source.source if isinstance(source, Stretch) else source
     total = len(whole.t_s) if isinstance(whole, Log) else total_bytes(whole)
     for block in _unchecked(source, remarks):
@@ -86,27 +91,24 @@ def read_blocks(
         block.frozen = frozen.mark(block)
         if block.has_speed:
             speed_unit.add(block.t_s, block.readings[:, :3], block.speed_mps)
-        if notices is not None:
-            for judge in axes:
-                judge.add(block.t_s, block.readings[:, :3], block.readings[:, 4:], block.speed_mps)
+        for judge in judges:
+            judge.add(block.t_s, block.readings[:, :3], block.readings[:, 4:], block.speed_mps)
+        if judging:
+            course.add(block.t_s, block.readings[:, :3], block.readings[:, 4:], block.lat_deg, block.lon_deg)
         yield block
         if progress:
             progress(block.done, total)
     if count < minimum:
         raise InputError(f"{name} is too short: {count} samples, at least {minimum} are needed")
     if notices is not None:
-        judged = [notice for notice in (judge.notice() for judge in axes) if notice]
+        judged = [notice for notice in (judge.notice() for judge in (*judges, course)) if notice]
         notices += remarks + frozen.notices() + judged[:1]  # one cause is told once
 
 
 def read_twice(source: Source) -> Source:
     """The same where it can be read again, else a Log: an open file can be read once."""
     if isinstance(source, Stretch):
-        return Stretch(_again(source.source), source.from_s, source.to_s)
-    return _again(source)
-
-
-def _again(source: File | Log) -> File | Log:
+        return Stretch(read_twice(source.source), source.from_s, source.to_s)
     return source if isinstance(source, (Path, str, Log)) else read_log(source)
 
 
@@ -117,7 +119,7 @@ def _unchecked(source: Source, remarks: list[Notice]) -> Iterator[Block]:
     if not isinstance(source, Stretch):
         return _parsed(source, name_of(source), remarks)
     if source.from_its_end:
-        whole = _again(source.source)
+        whole = read_twice(source.source)
         last_s = [float(block.t_s[-1]) for block in _unchecked(whole, [])]
         source = Stretch(whole, source.from_s, source.to_s).of_length(max(last_s, default=0.0))
     return source.cut(_unchecked(source.source, remarks))
@@ -218,13 +220,12 @@ def _block(
     names: list[str],
     done: int,
 ) -> Block:
-    column = dict.fromkeys(OPTIONAL, np.full(len(table), np.nan))
+    column: dict[str, Any] = dict.fromkeys(OPTIONAL, np.full(len(table), np.nan))
     column |= {name: table[:, k] for k, name in enumerate(places)}
     order = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")
-    readings = np.column_stack([column[name] for name in order])
     return Block(
         time_us,
-        readings,
+        np.column_stack([column[name] for name in order]),
         has_temp="temp_c" in places,
         has_speed="speed_mps" in places,
         start_s=start_s,

@@ -38,6 +38,8 @@ def chunks(source: File, size: int, remarks: list[Notice] | None = None) -> Iter
     if not isinstance(source, (Path, str)):
         try:
             yield from _pieces(source, source, size, remarks)
+        except (EOFError, zlib.error) as error:
+            raise InputError(f"{name_of(source)} is damaged or cut short: copy it again") from error
         except (OSError, ValueError) as error:
             raise InputError(f"{name_of(source)} cannot be read: {cause(error)}") from error
         return

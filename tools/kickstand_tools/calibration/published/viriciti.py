@@ -101,10 +101,10 @@ class PublishedAlignment:
 
     def update(self, force, rate, dt_us):
         """As DriveAlignment.update()."""
-        self._improved.update(force, rate, dt_us)
         if dt_us > GAP_US:
-            self._forget()
+            self.interrupt()
             return
+        self._improved.update(force, rate, dt_us)
         for i in range(3):
             self._sums[i] += force[i] * dt_us
         self._sums_us += dt_us
@@ -116,6 +116,11 @@ class PublishedAlignment:
             self._sums_us = 0
             if self._improved.vertical.known(self._up):
                 self._sample(list(self._levelled))
+
+    def interrupt(self):
+        """As DriveAlignment.interrupt()."""
+        self._improved.interrupt()
+        self._forget()
 
     def finish(self):
         """As DriveAlignment.finish()."""

@@ -1,0 +1,93 @@
+"""A log that is summed by numpy gives the same alignment as its samples one by one, as on the board."""
+
+from array import array
+
+import driving_runs
+import numpy as np
+import pytest
+from kickstand.drive_alignment.alignment import DriveAlignment
+from kickstand.drive_alignment.history import BIN_US
+from kickstand_tools.calibration.drive import fit_logs
+from kickstand_tools.calibration.drive_bins import drive_bins
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.logs.log import Log
+from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
+
+CALIBRATION = CalibrationFile(accel_offset_g=np.array([0.02, -0.01, 0.03]), accel_slope=np.array([1.01, 0.99, 1.0]))
+
+
+def drive(rate_hz=100, every_s=0.5, events=7, seed=5):
+    """A made-up drive as a Log whose times are uneven; a speed each every_s, anywhere within a bin."""
+    mount = np.reshape(random_mounting(seed), (3, 3))
+    made = list(driving_runs.samples(driving_runs.around(events), tilt_deg=1.0))[:: 100 // rate_hz]
+    n = len(made)
+    t_s = np.arange(n) / rate_hz + np.random.default_rng(seed).uniform(0.0, 0.3 / rate_hz, n)
+    speed = np.full(n, np.nan)
+    shown = np.arange(3, n, round(every_s * rate_hz) + 1)
+    speed[shown] = [made[k][2] for k in shown]
+    force, rate = (np.array([row[k] for row in made]) @ mount for k in (0, 1))
+    return Log(t_s, force, rate + [0.5, -1.0, 0.3], speed)
+
+
+def as_on_the_board(log, bias):
+    """The matrix of a DriveAlignment that is given each sample by itself."""
+    alignment, firmware = DriveAlignment("car", None, bias), CALIBRATION.to_firmware()
+    force, rate, previous = [0.0] * 3, [0.0] * 3, 0
+    for now, reading, speed in log.rows():
+        firmware.apply(reading, force, rate)
+        alignment.update(force, rate, now - previous)
+        previous = now
+        if speed == speed:
+            alignment.measure_speed(speed)
+    alignment.finish()
+    matrix = array("f", [0.0] * 9)
+    alignment.matrix(matrix)
+    return np.reshape(matrix, (3, 3)), alignment
+
+
+def apart_deg(one, other):
+    return np.degrees(np.linalg.norm(one - other) / np.sqrt(2.0))
+
+
+@pytest.mark.parametrize(("rate_hz", "every_s", "gap"), [(100, 0.5, False), (50, 0.2, False), (100, 1.0, True)])
+def test_bins_give_the_board_s_matrix(rate_hz, every_s, gap):
+    log = drive(rate_hz, every_s, events=7 + 2 * gap)
+    if gap:
+        kept = (log.t_s < 70.0) | (log.t_s > 71.3)
+        log = log.part(kept)
+    found = fit_logs([log], CALIBRATION, "car")
+    bias = (found.calibration.gyro_bias_dps - CALIBRATION.gyro_bias_dps).tolist()
+    matrix, board = as_on_the_board(log, bias)
+    assert apart_deg(found.calibration.vehicle_from_sensor, matrix) < 0.05
+    assert (found.used, found.turned, found.stops) == (board.counted, board.turned, board.standing.stops)
+    assert found.quality_deg == pytest.approx(board.quality_deg, abs=0.02)
+    assert found.used >= 5
+
+
+def test_bins_hold_every_sample_and_every_speed_once():
+    log = drive(events=2)
+    log = log.part((log.t_s < 9.02) | (log.t_s > 10.0))
+    parts = list(drive_bins(log, CalibrationFile(), BIN_US))
+    assert sum(part.samples for part in parts) == len(log.t_s)
+    speeds = [
+        mps
+        for part in parts
+        for mps in [part.start_mps, *(mps for _, mps in part.speeds), part.end_mps]
+        if mps is not None
+    ]
+    assert speeds == log.speed_mps[~np.isnan(log.speed_mps)].tolist()
+    assert [part.begins for part in parts].count(True) == 2
+    whole = [part for part in parts if part.last_us]
+    assert all(BIN_US <= part.first_us + part.last_us < BIN_US + 20_000 for part in whole)
+    force = sum(np.array(part.force) * (part.first_us + part.last_us) for part in parts)
+    step_us = np.diff(log.time_us, prepend=0)
+    expected = np.sum((log.accel_g * np.where(step_us > 500_000, 0, step_us)[:, None]), axis=0)
+    assert force == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_refusal_is_part_of_the_result_with_what_was_counted():
+    log = drive(events=3)
+    found = fit_logs([log], CALIBRATION, "car")
+    assert (found.status, found.reason) == ("refused", "few-events")
+    assert found.stops == 1 and 0 < found.used < 5
+    assert found.calibration is CALIBRATION

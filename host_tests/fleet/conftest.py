@@ -1,0 +1,10 @@
+"""One small fleet and one run over it for all tests of a module, because both take seconds."""
+
+import made_fleet
+import pytest
+
+
+@pytest.fixture(scope="session")
+def fleet(tmp_path_factory):
+    """A MadeFleet of nine vehicles, of which several have something wrong."""
+    return made_fleet.make(tmp_path_factory.mktemp("fleet"))

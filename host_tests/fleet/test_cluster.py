@@ -1,0 +1,201 @@
+"""Dask's workers: what one task does to its worker costs no other task, and a run goes on where it was stopped."""
+
+import os
+import signal
+import threading
+import time
+from collections import Counter
+from pathlib import Path
+
+import pyarrow.parquet as parquet
+import pytest
+from fleet_tasks import task
+from kickstand_tools.errors import InputError
+from kickstand_tools.fleet import files, run
+from kickstand_tools.fleet.cluster import CRASHED, TIMED_OUT, Cluster
+from kickstand_tools.fleet.journal import Journal
+from kickstand_tools.fleet.manifest import Period, read_manifest
+from kickstand_tools.fleet.period import failed
+from kickstand_tools.fleet.run import run_fleet
+from kickstand_tools.fleet.schema import TABLES, schema
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    with Cluster(None, 2, timeout_s=6.0) as running:
+        yield running
+
+
+def test_a_task_that_kills_its_worker_or_hangs_costs_itself_alone(cluster, tmp_path):
+    note = tmp_path / "began"
+    behaviours = {2: "die", 4: "raise", 5: "hang"}
+    items = [(k, behaviours.get(k, ""), str(note)) for k in range(14)]
+    found = {index: (result, reason) for index, result, reason, _ in cluster.run(task, items)}
+    assert found == {k: (None if k in behaviours else k, "") for k in range(14)} | {
+        2: (None, CRASHED),
+        4: (None, CRASHED),
+        5: (None, TIMED_OUT),
+    }
+    began = Counter(int(line.split()[0]) for line in note.read_text().splitlines())
+    assert began[2] == 2 and sum(began.values()) <= 14 + 6  # what was done is not computed again
+
+
+def test_a_worker_that_is_killed_costs_no_result(cluster, tmp_path):
+    note = tmp_path / "began"
+    items = [(k, "slow", str(note)) for k in range(8)]
+
+    def kill():
+        while not note.exists() or len(note.read_text().splitlines()) < 3:
+            time.sleep(0.05)
+        os.kill(int(note.read_text().splitlines()[-1].split()[1]), signal.SIGKILL)  # a worker of ours
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    found = sorted((index, result) for index, result, _, _ in cluster.run(task, items))
+    killer.join()
+    assert found == [(k, k) for k in range(8)]
+
+
+def test_a_fleet_on_a_cluster_gives_tables_and_goes_on(cluster, fleet, tmp_path, monkeypatch):
+    periods = read_manifest(str(fleet.manifest))
+    worked = []
+
+    def only(function, items, *_):
+        worked.append(len(items))
+        yield from cluster.run(function, items)
+
+    monkeypatch.setattr(run, "run_tasks", only)
+    first = run_fleet(periods[:4], tmp_path)
+    assert (first.vehicles, first.new) == (4, 4)
+    seen = []
+    whole = run_fleet(periods, tmp_path, with_signals=False, progress=lambda done, total: seen.append((done, total)))
+    assert (whole.new, worked) == (len(periods) - 4, [4, len(periods) - 4])
+    assert seen[0] == (4, len(periods)) and seen[-1] == (len(periods), len(periods))
+    tables = {name: parquet.read_table(tmp_path / f"{name}.parquet") for name in TABLES}
+    for name, table in tables.items():
+        assert table.schema.names == list(TABLES[name])
+        for found, written in zip(table.schema, schema(name), strict=True):
+            assert found.type == written.type or str(found.type).startswith("list<")
+            assert found.metadata[b"unit"] == written.metadata[b"unit"]
+    rows = tables["alignments"].to_pylist()
+    assert [row["vehicle"] for row in rows] == [period.vehicle for period in periods]
+    assert {row["status"] for row in rows} == {"aligned", "refused"}
+    assert all(len(row["vehicle_from_sensor"]) == 9 for row in rows if row["status"] == "aligned")
+    assert all((tmp_path / row["plot"]).is_file() for row in rows if row["plot"])
+    assert tables["moved"].num_rows == 2 and tables["brake_tests"].num_rows > 10 and tables["errors"].num_rows >= 1
+    page = (tmp_path / "index.html").read_text()
+    assert "http" not in page.replace("http://www.w3.org/2000/svg", "")
+    assert all(row["vehicle"] in page for row in rows)
+
+    # a log that changed is worked on again, nothing else
+    path = Path(periods[0].paths[0])
+    stat = path.stat()
+    os.utime(path, ns=(stat.st_atime_ns, stat.st_mtime_ns + 1_000_000))
+    assert run_fleet(periods, tmp_path).new == 1
+    assert run_fleet(periods, tmp_path).new == 0
+    # so are other options
+    assert run_fleet(periods[:1], tmp_path, with_signals=True).new == 1
+    written = sorted((tmp_path / "signals").rglob("*.parquet"))
+    assert len(written) >= len(periods[0].paths)
+    values = parquet.read_table(written[0], partitioning=None)
+    assert abs(values["up_g"].to_numpy().mean() - 1.0) < 0.05
+    folders = written[0].relative_to(tmp_path / "signals").parts[:-1]
+    assert {folder.split("=")[0] for folder in folders} == {"vehicle", "day"}
+
+
+def test_a_run_that_is_stopped_keeps_what_it_has(tmp_path, monkeypatch):
+    periods = [Period(f"v{k}", "", "car", ("none.csv",)) for k in range(5)]
+
+    def stopped(_, items, *__):
+        for index in range(3):
+            yield index, failed(items[index][0], "unreadable", "no file"), "", ""
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(run, "run_tasks", stopped)
+    with pytest.raises(KeyboardInterrupt):
+        run_fleet(periods, tmp_path)
+    assert parquet.read_table(tmp_path / "alignments.parquet")["vehicle"].to_pylist() == ["v0", "v1", "v2"]
+    assert "3 of 5 so far" in (tmp_path / "index.html").read_text()
+    with Journal(tmp_path / "journal.jsonl") as journal:
+        keys = run._keys(periods, False)
+        assert [key in journal for key in keys] == [True, True, True, False, False]
+
+
+def test_a_vehicle_that_crashed_is_tried_again_by_the_next_run(tmp_path, monkeypatch):
+    periods = [Period("v", "", "car", ("none.csv",))]
+    monkeypatch.setattr(run, "run_tasks", lambda *_: iter([(0, None, CRASHED, "its worker died")]))
+    first = run_fleet(periods, tmp_path)
+    assert first.seen.reasons[("error", CRASHED)] == 1
+    assert run_fleet(periods, tmp_path).new == 1
+
+
+def test_a_journal_whose_end_was_cut_or_whose_disk_is_full_loses_no_line(tmp_path):
+    path = tmp_path / "journal.jsonl"
+    result = failed(Period("v", "", "car", ()), "unreadable", "x")
+    with Journal(path) as journal:
+        journal.add("a", result)
+        journal.add("b", result)
+    path.write_bytes(path.read_bytes()[:-10])
+    with Journal(path) as journal:
+        assert ("a" in journal, "b" in journal) == (True, False)
+        journal.add("c", result)
+        assert [found.alignment["vehicle"] for found in journal.results(["a", "b", "c"])] == ["v", "v"]
+    if os.path.exists("/dev/full"):
+        full = Journal(tmp_path / "full.jsonl")
+        with full:
+            full.add("a", result)
+            kept, full._file = full._file, open("/dev/full", "wb")
+            with pytest.raises(InputError, match="the same command goes on"):
+                full.add("b", result)
+            full._file = kept
+        with Journal(tmp_path / "full.jsonl") as again:
+            assert "a" in again and "b" not in again
+
+
+def test_no_scheduler_is_told(monkeypatch):
+    monkeypatch.setattr("kickstand_tools.fleet.cluster._REMOTE_PATIENCE_S", 0.5)
+    with pytest.raises(InputError, match=r"no workers at tcp://127\.0\.0\.1:9"):
+        list(run.run_tasks(task, [(1,)], "tcp://127.0.0.1:9"))
+
+
+def test_s3_gives_the_same_as_files(fleet, tmp_path, monkeypatch):
+    moto = pytest.importorskip("moto.server")
+    s3fs = pytest.importorskip("s3fs")
+    server = moto.ThreadedMotoServer(port=0, verbose=False)
+    server.start()
+    try:
+        host, port = server.get_host_and_port()
+        for name, value in {
+            "AWS_ENDPOINT_URL": f"http://{host}:{port}",
+            "AWS_ACCESS_KEY_ID": "test",
+            "AWS_SECRET_ACCESS_KEY": "test",
+            "AWS_DEFAULT_REGION": "us-east-1",
+        }.items():
+            monkeypatch.setenv(name, value)
+        s3fs.S3FileSystem.clear_instance_cache()
+        s3 = s3fs.S3FileSystem()
+        s3.mkdir("fleet")
+        wanted = read_manifest(str(fleet.manifest))[:2]
+        names = [Path(path) for period in wanted for path in period.paths]
+        for path in names:
+            s3.put_file(str(path), f"fleet/drives/{path.name}")
+        lines = [
+            f"{period.vehicle},drives/{Path(path).name},{period.kind}" for period in wanted for path in period.paths
+        ]
+        s3.pipe_file("fleet/MANIFEST.csv", "\n".join(["vehicle,path,kind", *lines]).encode())
+        periods = read_manifest("s3://fleet/MANIFEST.csv")
+        marks = files.identities(path for period in periods for path in period.paths)
+        assert all(marks.values())
+        assert files.matches("s3://fleet/drives/*") == sorted(f"s3://fleet/drives/{path.name}" for path in names)
+        from kickstand_tools.fleet.period import work_on_period
+
+        for one, other in zip(periods, wanted, strict=True):
+            remote = work_on_period(one, "s3://fleet/signals")
+            local = work_on_period(other, str(tmp_path / "signals"))
+            assert remote.alignment == local.alignment
+            assert [row | {"log": ""} for row in remote.brake_tests] == [row | {"log": ""} for row in local.brake_tests]
+        assert len(s3.glob("fleet/signals/**/*.parquet")) == len(list(tmp_path.rglob("*.parquet"))) > 0
+    finally:
+        server.stop()
+
+

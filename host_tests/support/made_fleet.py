@@ -1,0 +1,57 @@
+"""A small fleet that is made up, and drives of it in memory."""
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from kickstand_tools.simulation.fleet import fleet as made_up
+from kickstand_tools.simulation.fleet.route import random_route
+from kickstand_tools.simulation.fleet.vehicle import HANDLING, Receiver, drive_log, random_sensor
+
+# what is wrong with each vehicle: a car, a bus and a motorcycle in turn
+TROUBLES = ["", "", "", "moved-between", "garbage", "moved-within", "km/h", "dead", "late"]
+
+
+@dataclass
+class MadeFleet:
+    directory: Path
+    vehicles: list[made_up.MadeVehicle]
+    truth: dict[str, dict[str, str]]
+
+    @property
+    def manifest(self):
+        return self.directory / "MANIFEST.csv"
+
+    def mount(self, vehicle):
+        """Vehicle from sensor (3, 3)."""
+        return np.reshape([float(self.truth[vehicle][name]) for name in made_up.MATRIX], (3, 3))
+
+
+def make(directory, troubles=TROUBLES, seed=3, seconds=170.0):
+    vehicles = made_up.make_fleet(directory, len(troubles), seed, seconds, 50.0, troubles)
+    with (directory / "TRUTH.csv").open(newline="") as file:
+        truth = {row["vehicle"]: row for row in csv.DictReader(file)}
+    return MadeFleet(directory, vehicles, truth)
+
+
+def drive(seed, kind="car", seconds=200.0, sensor=None, moved=None, straight=True, rate_hz=50.0, **receiver):
+    """(Log, Sensor) of one drive. moved: (seconds, mount from then on)."""
+    chance = np.random.default_rng([seed, 5])
+    sensor = sensor or random_sensor(chance)
+    route = random_route(chance, HANDLING[kind], seconds, rate_hz, straight)
+    log = drive_log(chance, kind, route, sensor, Receiver(**receiver), 1.79e9, moved, f"drive {seed}")
+    return log, sensor
+
+
+def turn_of(degrees, axis):
+    """(3, 3): a turn about an axis (3)."""
+    x, y, z = np.asarray(axis, float) / np.linalg.norm(axis)
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    angle = np.radians(degrees)
+    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+
+
+def yaw_deg(found, true):
+    between = np.asarray(found).reshape(3, 3) @ np.asarray(true).reshape(3, 3).T
+    return float(np.degrees(np.arctan2(between[2, 0] - between[0, 2], between[0, 0] + between[2, 2])))

@@ -1,0 +1,52 @@
+"""The command `kickstand fleet`: many vehicles at once."""
+
+from pathlib import Path
+
+import click
+
+
+@click.command()
+@click.argument("manifest", metavar="MANIFEST.csv|GLOB")
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="The directory to write to.")
+@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, tcp://...; this computer if not given.")
+@click.option("--workers", type=click.IntRange(min=1), help="On this computer; one a processor if not given.")
+@click.option("--signals", is_flag=True, help="Also write each log's accelerations along the vehicle's axes.")
+@click.option(
+    "--timeout",
+    type=click.FloatRange(min=1.0),
+    default=600.0,
+    help="Seconds after which work on a vehicle is given up.",
+)
+@click.option(
+    "--vehicle",
+    type=click.Choice(["motorcycle", "car"]),
+    default="car",
+    help="What the logs of a GLOB are of; a manifest says it itself.",
+)
+def fleet(
+    manifest: str, out: Path, scheduler: str | None, workers: int | None, signals: bool, timeout: float, vehicle: str
+) -> None:
+    """Align a whole fleet, find mounts that moved, and measure its brake tests.
+
+    The manifest is CSV with the columns vehicle,path,kind and optionally mount: a line a log, in the order of time. A
+    GLOB takes each file that it matches for a vehicle of its own. Paths may be s3://. Run again, and only what is new
+    is done.
+    """
+    from ..fleet.manifest import by_pattern, is_pattern, read_manifest
+    from ..fleet.run import run_fleet
+    from ..progress import Bar
+
+    periods = by_pattern(manifest, vehicle) if is_pattern(manifest) else read_manifest(manifest)
+    with Bar("vehicles", lines_s=10.0, patience_s=0.0) as bar:
+        found = run_fleet(periods, out, scheduler, workers, signals, timeout, bar.reach)
+    before = found.vehicles - found.new
+    done = f", {before} of them finished before" if before else ""
+    click.echo(f"{found.vehicles} vehicles and mounts{done}")
+    seen = found.seen
+    counts = seen.statuses
+    click.echo(f"aligned: {counts['aligned']}, refused: {counts['refused']}, errors: {counts['error']}")
+    for (status, reason), count in seen.reasons.most_common():
+        click.echo(f"{count:7}  {status}: {reason}")
+    tests = len(seen.decelerations[1])
+    click.echo(f"mounts that moved: {seen.moved_count}; brake tests: {tests}; rows of errors: {seen.errors}")
+    click.echo(f"written: {out}/index.html, alignments.parquet, moved.parquet, brake_tests.parquet, errors.parquet")

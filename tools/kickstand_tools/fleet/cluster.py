@@ -1,0 +1,178 @@
+"""All that is Dask's: runs a function on many items, on this computer or on a cluster.
+
+A task that kills its worker must cost itself alone. Dask would give it to other workers, which it kills too, and
+compute again what these had finished. So no retries are allowed, only a few tasks are under way at a time, and their
+results are let go at once. What was on a worker that died is tried a second time, when everything else is done and one
+at a time: what kills its worker then has done so itself.
+"""
+
+import contextlib
+import logging
+import queue
+import signal
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+from ..errors import InputError, cause, extra
+
+CRASHED, TIMED_OUT = "crashed", "timed-out"
+_PER_WORKER = 2  # tasks under way: one runs, one waits
+_LOOK_S = 0.5  # between two looks for tasks that take too long
+_TOPIC = "kickstand-fleet"  # of the messages in which a worker says that it begins a task
+Outcome = tuple[int, Any | None, str, str]
+_LOCAL_PATIENCE_S, _REMOTE_PATIENCE_S = 60.0, 20.0  # for workers
+
+
+def run_tasks(
+    function: Callable[..., Any],
+    items: Sequence[tuple[Any, ...]],
+    scheduler: str | None = None,
+    workers: int | None = None,
+    timeout_s: float = 600.0,
+) -> Iterator[Outcome]:
+    """(index, result, "", "") of function(*item) for each item, in any order; (index, None, CRASHED or TIMED_OUT, what
+    happened) where there is none. Starts no workers where there are no items. See Cluster."""
+    if items:
+        with Cluster(scheduler, workers, timeout_s) as cluster:
+            yield from cluster.run(function, items)
+
+
+class Cluster:
+    """with Cluster(scheduler, workers, timeout_s) as cluster: for index, outcome in cluster.run(function, items).
+
+    scheduler: the address of one, None for workers on this computer: so many, or one a processor. timeout_s: a task
+    that takes longer is ended. workers: how many there are. Raises InputError where there is no cluster.
+    """
+
+    def __init__(self, scheduler: str | None, workers: int | None, timeout_s: float) -> None:
+        self._address, self._wanted, self._timeout_s = scheduler, workers, timeout_s
+        self.workers = 0
+
+    def __enter__(self) -> "Cluster":
+        try:
+            import dask
+            from distributed import Client, LocalCluster, WorkerPlugin
+        except ImportError as error:
+            raise InputError("a fleet needs Dask: " + extra("fleet")) from error
+
+        class Undisturbed(WorkerPlugin):
+            """A terminal's Ctrl-C goes to the workers, too, which are ended by this process."""
+
+            def setup(self, worker: Any) -> None:
+                signal.signal(signal.SIGINT, signal.SIG_IGN)
+                logging.getLogger("distributed").setLevel(logging.CRITICAL)
+
+        # what happens to workers is told by the results
+        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        self._stack = contextlib.ExitStack()
+        self._stack.enter_context(
+            dask.config.set(
+                {
+                    "distributed.scheduler.allowed-failures": 0,
+                    "distributed.scheduler.worker-saturation": 1.0,
+                    "distributed.comm.timeouts.connect": "10s",
+                }
+            )
+        )
+        try:
+            if self._address is None:
+                cluster = LocalCluster(n_workers=self._wanted, threads_per_worker=1, dashboard_address=":0")
+                self._stack.callback(lambda: cluster.close(timeout=5))
+                self._client = Client(cluster)
+                self._client.register_plugin(Undisturbed())
+            else:
+                self._client = Client(self._address, timeout=_REMOTE_PATIENCE_S)
+            self._stack.callback(lambda: self._client.close(timeout=2))
+            patience_s = _LOCAL_PATIENCE_S if self._address is None else _REMOTE_PATIENCE_S
+            self._client.wait_for_workers(1, timeout=patience_s)
+        except (OSError, TimeoutError, ValueError) as error:
+            self._stack.close()
+            where = self._address or "this computer"
+            raise InputError(f"no workers at {where}: {cause(error)}") from error
+        self._started: dict[str, tuple[float, str]] = {}  # by key: when it began, and on which worker
+        self._client.subscribe_topic(_TOPIC, self._hear)
+        self.workers = len(self._client.scheduler_info(n_workers=-1)["workers"])
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        with contextlib.suppress(Exception):
+            self._stack.close()
+
+    def run(
+        self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]]
+    ) -> Iterator[Outcome]:
+        """As run_tasks(). function and items have to be picklable. Raises InputError if the scheduler is lost."""
+        self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
+        self._under_way: dict[str, tuple[int, Any]] = {}
+        suspects: list[int] = []
+        waiting = deque(range(len(items)))
+        while waiting or self._under_way:
+            while waiting and len(self._under_way) < _PER_WORKER * max(1, self.workers):
+                self._submit(function, items, waiting.popleft())
+            yield from self._collect(suspects)
+        for index in suspects:
+            self._submit(function, items, index)
+            again: list[int] = []
+            while self._under_way:
+                yield from self._collect(again)
+            if again:
+                yield index, None, CRASHED, "its worker died twice: out of memory, or a crash of a library"
+
+    def _submit(self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]], index: int) -> None:
+        key = f"fleet-{index}-{time.monotonic_ns()}"
+        future = self._client.submit(_announced, key, function, *items[index], key=key, pure=False)
+        self._under_way[key] = index, future
+        future.add_done_callback(self._ended.put)
+
+    def _collect(self, suspects: list[int]) -> Iterator[Outcome]:
+        """Wait for a result, or a while. suspects: those whose worker died are appended to it."""
+        with contextlib.suppress(queue.Empty):
+            future = self._ended.get(timeout=_LOOK_S)
+            place = self._under_way.pop(future.key, None)
+            self._started.pop(future.key, None)
+            if place is None:
+                return
+            index, status = place[0], future.status
+            if status == "finished":
+                yield index, future.result(), "", ""
+            elif status == "error":
+                error = future.exception()
+                if type(error).__name__ == "KilledWorker":
+                    suspects.append(index)
+                else:
+                    yield index, None, CRASHED, f"{type(error).__name__}: {error}"
+            else:
+                raise InputError(
+                    f"the cluster{f' at {self._address}' if self._address else ''} was lost; what is finished is kept, "
+                    "the same command goes on"
+                )
+            future.release()
+        yield from self._end_late_ones()
+
+    def _end_late_ones(self) -> Iterator[Outcome]:
+        now = time.monotonic()
+        for key, (began_s, worker) in list(self._started.items()):
+            if key not in self._under_way:
+                self._started.pop(key, None)
+            elif now - began_s > self._timeout_s:
+                index, future = self._under_way.pop(key)
+                self._started.pop(key, None)
+                future.cancel(force=True)
+                with contextlib.suppress(Exception):  # it may have died meanwhile
+                    self._client.restart_workers([worker], timeout=30, raise_for_error=False)
+                yield index, None, TIMED_OUT, f"took longer than {self._timeout_s:.0f} s, so it was ended"
+
+    def _hear(self, event: tuple[float, Any]) -> None:
+        _, (key, worker) = event
+        self._started[key] = time.monotonic(), worker
+
+
+def _announced(key: str, function: Callable[..., Any], *arguments: Any) -> Any:
+    """In a worker: say that the task begins, then do it."""
+    from distributed import get_worker
+
+    worker = get_worker()
+    worker.log_event(_TOPIC, (key, worker.address))
+    return function(*arguments)

@@ -1,0 +1,158 @@
+"""What a drive shows of how the sensor sits, in pieces of some seconds whose sums can be compared.
+
+As in the firmware's ForwardRegression, the force of each interval between two speeds is explained by
+
+    f = level + forward a + left c        a = dv/dt / g, c = v (yaw rate) / g
+
+in the sensor's own axes. Unlike there, turns are used too: in a car they show left as well as braking shows forward. A
+motorcycle leans into turns, so that its force stays along its own up and grows to sqrt(1 + c^2): there
+
+    f = level sqrt(1 + c^2) + forward a
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from kickstand.drive_alignment.alignment import MOTORCYCLE
+from kickstand.drive_alignment.events import MAX_INTERVAL_US
+from kickstand.units import GAP_US, STANDARD_GRAVITY
+
+from ..logs.log import Log
+from ..logs.table import Array
+
+INTERVAL_S = 0.9  # between two speeds that are used, at least
+STANDING_MPS, MOVING_MPS = 0.3, 2.0
+STANDING_WEIGHT = 0.3  # of a second at a stop: a long stop shows one slope of the road, however long it was
+LEVEL_S = 20.0  # the mean force over so long is about vertical, which tells the yaw rate from the other rates
+BLOCK_S = 8.0
+TURN_WEIGHT = 0.3  # of turns against braking: tyres slip sideways in slow ones, and drivers brake and speed up in them
+
+
+@dataclass
+class Intervals:
+    """n intervals between two speeds of a log. t_s: their middles. force (n, 3, g): means, in the sensor's axes.
+    terms (n, 3): what is multiplied by level, forward and left. weight (n): s. speed (n): m/s."""
+
+    t_s: Array
+    force: Array
+    terms: Array
+    weight: Array
+    speed: Array
+
+
+@dataclass
+class Blocks:
+    """m blocks of intervals that follow one another in one or several logs.
+
+    square (m, 3, 3), product (m, 3, 3): sums of terms x terms and of terms x force, with the weights. log (m): index of
+    the log; t_s (m): begin in it; end_s (m).
+    """
+
+    square: Array
+    product: Array
+    log: Array
+    t_s: Array
+    end_s: Array
+
+    def part(self, which: slice) -> "Blocks":
+        """Some of them."""
+        return Blocks(*(getattr(self, name)[which] for name in ("square", "product", "log", "t_s", "end_s")))
+
+
+def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
+    """The intervals of a log whose speed is late by lag_s. bias_dps (3): of the gyro."""
+    step = np.diff(log.t_s, prepend=log.t_s[0])
+    step = np.where(step * 1e6 > GAP_US, 0.0, step)
+    rate = np.radians(log.gyro_dps - bias_dps)
+    there = np.flatnonzero(~np.isnan(log.speed_mps))
+    time, speed = log.t_s[there] - lag_s, log.speed_mps[there]
+    kept = time >= 0.0
+    time, speed = _spread(time[kept], speed[kept])
+    curve = rate * (np.interp(log.t_s, time, speed) / STANDARD_GRAVITY)[:, None]
+    felt = np.cumsum(np.column_stack((log.accel_g, curve)) * step[:, None], axis=0)
+    covered = np.cumsum(step)
+    ends = np.array([np.interp(time, log.t_s, column) for column in felt.T]).T
+    seconds, whole = np.diff(time), np.diff(np.interp(time, log.t_s, covered))
+    good = (seconds <= MAX_INTERVAL_US * 1e-6) & (whole > 0.9 * seconds)
+    means = (np.diff(ends, axis=0) / np.maximum(whole, 1e-9)[:, None])[good]
+    middle, length = (time[1:] - seconds / 2.0)[good], seconds[good]
+    mean_mps = (0.5 * (speed[1:] + speed[:-1]))[good]
+    a = (np.diff(speed) / seconds / STANDARD_GRAVITY)[good]
+    up = _local_up(middle, means[:, :3], length)
+    c = np.sum(means[:, 3:] * up, axis=1)
+    standing = (mean_mps < STANDING_MPS) & (np.abs(a) < 0.01)
+    if kind == MOTORCYCLE:
+        terms = np.column_stack((np.sqrt(1.0 + c * c), a, np.zeros_like(a)))
+        weight = length * (mean_mps > MOVING_MPS)  # a foot is down below
+    else:
+        terms = np.column_stack((np.ones_like(a), a, c))
+        weight = length * np.where(standing, STANDING_WEIGHT, mean_mps > STANDING_MPS)
+    return Intervals(middle, means[:, :3], terms, weight, mean_mps)
+
+
+def blocks(logs: list[Intervals]) -> Blocks:
+    """All intervals of the logs in blocks of about BLOCK_S."""
+    square, product, which, begin, end = [], [], [], [], []
+    for index, log in enumerate(logs):
+        if not len(log.t_s):
+            continue
+        place = np.floor((log.t_s - log.t_s[0]) / BLOCK_S).astype(int)
+        starts = np.flatnonzero(np.diff(place, prepend=-1))
+        weighted = log.terms * log.weight[:, None]
+        square.append(np.add.reduceat(weighted[:, :, None] * log.terms[:, None, :], starts))
+        product.append(np.add.reduceat(weighted[:, :, None] * log.force[:, None, :], starts))
+        which.append(np.full(len(starts), index))
+        begin.append(log.t_s[starts])
+        end.append(log.t_s[np.append(starts[1:], len(log.t_s)) - 1])
+    if not square:
+        return Blocks(np.zeros((0, 3, 3)), np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros(0), np.zeros(0))
+    return Blocks(*(np.concatenate(parts) for parts in (square, product, which, begin, end)))
+
+
+def fits(square: Array, product: Array) -> tuple[Array, Array]:
+    """(k, 3, 3) level, forward and left of k sums (k, 3, 3), and (k, 2): how much a and c varied, in g^2 s."""
+    ridge = np.diag([1e-9, 1e-6, 1e-6]) * np.maximum(square[..., :1, :1], 1e-3)
+    found = np.linalg.solve(square + ridge, product)
+    seconds = np.maximum(square[..., 0, 0], 1e-9)[..., None]
+    means = square[..., 0, 1:] / seconds
+    varied = np.diagonal(square, axis1=-2, axis2=-1)[..., 1:] - seconds * means * means
+    return found, varied
+
+
+def frames(found: Array, varied: Array) -> Array:
+    """(k, 3, 3) vehicle from sensor, rows left, up, forward, of what fits() returned."""
+    level, forward, left = found[..., 0, :], found[..., 1, :], found[..., 2, :]
+    up = level / np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), 1e-9)
+    ahead = varied[..., :1] * forward + TURN_WEIGHT * varied[..., 1:] * np.cross(left, up)
+    side = np.cross(up, ahead)
+    side /= np.maximum(np.linalg.norm(side, axis=-1, keepdims=True), 1e-9)
+    return np.stack((side, up, np.cross(side, up)), axis=-2)
+
+
+def handedness(found: Array, varied: Array) -> float:
+    """The part of a turn's force that is on the side to which the vehicle turns: about 1, about -1 where the gyro's
+    signs or the axes are mirrored, 0 if there were no turns (or on a motorcycle, which leans into them)."""
+    if varied[1] < 0.05:
+        return 0.0
+    level, forward, left = found
+    side = np.cross(level, forward)
+    return float(side @ left / max(float(np.linalg.norm(side)), 1e-9))
+
+
+def _spread(time: Array, speed: Array) -> tuple[Array, Array]:
+    """Of speeds that come faster, those that are INTERVAL_S apart."""
+    kept, last = [], -np.inf
+    for k, now in enumerate(time.tolist()):
+        if now - last >= INTERVAL_S:
+            kept.append(k)
+            last = now
+    return time[kept], speed[kept]
+
+
+def _local_up(middle: Array, force: Array, length: Array) -> Array:
+    """(n, 3) unit vectors: the mean force of the LEVEL_S around each interval."""
+    sums = np.vstack((np.zeros(3), np.cumsum(force * length[:, None], axis=0)))
+    first = np.searchsorted(middle, middle - LEVEL_S / 2.0)
+    last = np.searchsorted(middle, middle + LEVEL_S / 2.0, side="right")
+    up = sums[last] - sums[first]
+    return up / np.maximum(np.linalg.norm(up, axis=1, keepdims=True), 1e-9)

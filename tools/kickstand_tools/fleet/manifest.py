@@ -1,0 +1,101 @@
+"""Which logs are of which vehicle: MANIFEST.csv, or a pattern of paths."""
+
+import csv
+import io
+from dataclasses import dataclass
+
+from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE
+
+from ..errors import InputError
+from . import files
+
+COLUMNS = ("vehicle", "path", "kind")
+_KINDS = (MOTORCYCLE, CAR)
+
+
+@dataclass(frozen=True)
+class Period:
+    """Logs in which the sensor should have sat on a vehicle in one and the same way, in the order of time.
+
+    kind: "motorcycle" or "car" (anything that does not lean). mount: which of the vehicle's mountings it is, "" where
+    there is only one. paths: of the logs, as fsspec takes them.
+    """
+
+    vehicle: str
+    mount: str
+    kind: str
+    paths: tuple[str, ...]
+
+
+def read_manifest(path: str) -> list[Period]:
+    """The periods of a manifest: CSV with the columns vehicle,path,kind and optionally mount.
+
+    Rows of the same vehicle and mount are one period. Paths are seen from the manifest's directory and may be patterns
+    (logs/*.csv.gz). Raises InputError naming the line.
+
+    >>> import tempfile
+    >>> with tempfile.NamedTemporaryFile("w", suffix=".csv") as file:
+    ...     _ = file.write("vehicle,path,kind\\nbus 12,/logs/1.csv,car\\nbus 12,/logs/2.csv,car\\n")
+    ...     file.flush()
+    ...     read_manifest(file.name)
+    [Period(vehicle='bus 12', mount='', kind='car', paths=('/logs/1.csv', '/logs/2.csv'))]
+    """
+    try:
+        text = files.read_bytes(path).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path} is no text: a manifest starts with the line {','.join(COLUMNS)}") from error
+    rows = csv.reader(io.StringIO(text))
+    header = [name.strip() for name in next(rows, [])]
+    missing = [name for name in COLUMNS if name not in header]
+    if missing:
+        raise InputError(f"{path}: no column {missing[0]}: a manifest starts with the line {','.join(COLUMNS)}")
+    base = path.rpartition("/")[0] if "/" in path else ""
+    base = "/" if path.startswith("/") and not base else base
+    kinds: dict[tuple[str, str], str] = {}
+    logs: dict[tuple[str, str], list[str]] = {}
+    for line, row in enumerate(rows, 2):
+        if not any(cell.strip() for cell in row):
+            continue
+        if len(row) != len(header):
+            raise InputError(f"{path}, line {line}: {len(row)} cells, the first line has {len(header)}")
+        cells = dict(zip(header, (cell.strip() for cell in row)))
+        period = cells["vehicle"], cells.get("mount", "")
+        if not cells["vehicle"] or not cells["path"]:
+            raise InputError(f"{path}, line {line}: vehicle and path must not be empty")
+        if cells["kind"] not in _KINDS:
+            raise InputError(f"{path}, line {line}: kind is {cells['kind']!r}, it is motorcycle or car")
+        if kinds.setdefault(period, cells["kind"]) != cells["kind"]:
+            raise InputError(f"{path}, line {line}: {cells['vehicle']} is a {kinds[period]} in an earlier line")
+        found = _found(files.join(base, cells["path"]))
+        known = logs.setdefault(period, [])
+        for log in found:
+            if log in known:
+                raise InputError(f"{path}, line {line}: {log} is given twice for {cells['vehicle']}")
+            known.append(log)
+    if not logs:
+        raise InputError(f"{path} has no vehicles: each line after the first is vehicle,path,kind")
+    return [Period(*period, kinds[period], tuple(paths)) for period, paths in logs.items()]
+
+
+def by_pattern(pattern: str, kind: str = CAR) -> list[Period]:
+    """Each file that the pattern matches is a vehicle of its own, named by its path. Raises InputError.
+
+    >>> import tempfile
+    >>> with tempfile.NamedTemporaryFile(suffix=".csv") as file:
+    ...     [period.vehicle == file.name for period in by_pattern(file.name[:-6] + "*.csv")]
+    [True]
+    """
+    found = files.matches(pattern)
+    if not found:
+        raise InputError(f"{pattern} matches no file")
+    return [Period(path, "", kind, (path,)) for path in found]
+
+
+def is_pattern(path: str) -> bool:
+    """True if it has * ? or [ in it."""
+    return any(mark in path for mark in "*?[")
+
+
+def _found(path: str) -> list[str]:
+    """A pattern's files; the path itself where nothing matches: the run tells that it is missing."""
+    return (files.matches(path) or [path]) if is_pattern(path) else [path]

@@ -1,0 +1,210 @@
+"""One mount of one vehicle: its alignment, where it moved, its brake tests. A plain function on files."""
+
+import math
+import traceback
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from kickstand.errors import AlignmentError
+
+from ..analysis.stops.brake_test import Stop
+from ..calibration.drive import DriveFit, fit_logs, usable
+from ..errors import InputError, cause
+from ..logs.log import Log
+from ..refusals import RefusedInput
+from . import evidence, signals
+from .brake_tests import brake_tests
+from .files import open_log
+from .manifest import Period
+from .moved import Move, find_moves
+
+UNREADABLE, FAULT, NO_SPEED, MOVED, LEFT_HANDED = "unreadable", "fault", "no-speed", "mount-moved", "left-handed"
+AFTERWARDS = "not-finished"  # the vehicle is aligned, but brake tests or signals of this log are missing
+_DOUBTS = (MOVED, "parts-differ", "uncertain")  # of the firmware: then it is worth while to look for a move
+_PLOTTED = 160  # intervals in a picture
+_AGAINST = -0.5  # of a turn's force on the side of the turn: a gyro or axes that are mirrored
+
+Row = dict[str, Any]
+
+
+@dataclass
+class PeriodResult:
+    """What schema.TABLES has of one mount of one vehicle, and its picture: for each of some intervals the changes of
+    speed, what was felt forward, the centripetal acceleration, what was felt to the left (4, g)."""
+
+    alignment: Row
+    moved: list[Row] = field(default_factory=list)
+    brake_tests: list[Row] = field(default_factory=list)
+    errors: list[Row] = field(default_factory=list)
+    picture: list[list[float]] = field(default_factory=list)
+
+
+def work_on_period(period: Period, signals_to: str | None = None) -> PeriodResult:
+    """Align a period of a manifest, look where its mount moved, and measure its brake tests.
+
+    signals_to: a directory for each log's accelerations along the vehicle's axes, None for none. What is wrong with
+    the data is part of the result: a log that cannot be used costs a row of errors, and where none is left the status
+    is "error" or "refused". Never raises, so that one vehicle cannot stop a fleet.
+
+    >>> found = work_on_period(Period("bus 12", "", "car", ("no-such-file.csv",)))
+    >>> found.alignment["status"], found.errors[0]["message"]
+    ('error', 'no-such-file.csv: there is no such file')
+    """
+    try:
+        return _result(period, signals_to)
+    except Exception as error:  # a fault of ours, or no memory: it must not cost other vehicles
+        where = traceback.extract_tb(error.__traceback__)[-1]
+        message = f"{type(error).__name__}: {error} ({Path(where.filename).name}, line {where.lineno})"
+        return failed(period, FAULT, message)
+
+
+def failed(period: Period, reason: str, message: str) -> PeriodResult:
+    """The result of a period that gave none."""
+    whose = {"vehicle": period.vehicle, "mount": period.mount}
+    row = _alignment(period, "error", reason, message, [], len(period.paths))
+    return PeriodResult(row, errors=[whose | {"log": "", "reason": reason, "message": message}])
+
+
+def _result(period: Period, signals_to: str | None) -> PeriodResult:
+    whose = {"vehicle": period.vehicle, "mount": period.mount}
+    logs, errors = _logs(period, whose)
+    if not logs:
+        refused = [row for row in errors if row["reason"] != UNREADABLE]
+        because = (refused or errors)[0]
+        status = "refused" if refused else "error"
+        row = _alignment(period, status, because["reason"], because["message"], [], len(errors))
+        return PeriodResult(row, errors=errors)
+    fit = fit_logs(logs, None, period.kind)
+    status, reason, message = fit.status, fit.reason, str(fit.refusal or "")
+    driven, moves = [], []
+    if fit.status == "aligned" or fit.reason in _DOUBTS:
+        driven = [evidence.intervals(log, period.kind, fit.lag_s or 0.0, fit.bias_dps) for log in logs]
+        moves = find_moves(driven, fit.reason in (MOVED, "parts-differ"))
+        wrong = None if moves else _mirrored(driven)
+        if moves:
+            status, reason, message = "refused", MOVED, _moved_words(moves, logs)
+        elif wrong:
+            status, reason, message = "refused", LEFT_HANDED, wrong
+    result = PeriodResult(_alignment(period, status, reason, message, logs, len(errors), fit), errors=errors)
+    result.moved = [whose | _moved_row(move, logs) for move in moves]
+    if driven:
+        result.picture = _picture(driven, fit)
+    if status == "aligned":
+        for log in logs:
+            try:
+                tests = brake_tests(log, fit.calibration)
+                result.brake_tests += [whose | {"log": log.name} | _stop_row(stop, log) for stop in tests]
+                if signals_to is not None:
+                    signals.write(signals_to, period.vehicle, log, fit.calibration)
+            except (InputError, OSError) as error:
+                errors.append(whose | {"log": log.name, "reason": AFTERWARDS, "message": cause(error)})
+    return result
+
+
+def _logs(period: Period, whose: Row) -> tuple[list[Log], list[Row]]:
+    """Those that can be used, and a row of errors for each other."""
+    logs, errors = [], []
+    for path in period.paths:
+        reason = UNREADABLE
+        try:
+            log = open_log(path)
+            if np.all(np.isnan(log.speed_mps)):
+                reason = NO_SPEED
+            logs.append(usable(log, False))
+        except RefusedInput as error:
+            errors.append(whose | {"log": path, "reason": error.code, "message": str(error)})
+        except (InputError, OSError) as error:
+            errors.append(whose | {"log": path, "reason": reason, "message": cause(error)})
+    return logs, errors
+
+
+def _alignment(
+    period: Period, status: str, reason: str, message: str, logs: list[Log], left_out: int, fit: DriveFit | None = None
+) -> Row:
+    known = fit if fit and status == "aligned" else None
+    judged = fit.quality_deg if fit and fit.quality_deg < 180.0 else None
+    return {
+        "vehicle": period.vehicle,
+        "mount": period.mount,
+        "kind": period.kind,
+        "status": status,
+        "reason": reason,
+        "message": message,
+        "quality_deg": judged,
+        "halves_deg": fit.halves_deg if fit and judged is not None else None,
+        "vehicle_from_sensor": known.calibration.vehicle_from_sensor.ravel().tolist() if known else None,
+        "gyro_bias_dps": known.calibration.gyro_bias_dps.tolist() if known else None,
+        "speed_lag_s": fit.lag_s if fit else None,
+        "stops": fit.stops if fit else 0,
+        "events_used": fit.used if fit else 0,
+        "events_in_turns": fit.turned if fit else 0,
+        "logs": len(logs),
+        "logs_left_out": left_out,
+        "driven_s": float(sum(log.t_s[-1] for log in logs)),
+        "start_utc_s": _utc_s(logs[0], 0.0) if logs else None,
+        "plot": "",
+    }
+
+
+def _mirrored(driven: list[evidence.Intervals]) -> str | None:
+    """What is wrong with the axes, by the turns: the force of a turn is on the side to which the gyro says it goes."""
+    whole = evidence.blocks(driven)
+    if not len(whole.log):
+        return None
+    found, varied = evidence.fits(np.sum(whole.square, axis=0), np.sum(whole.product, axis=0))
+    if evidence.handedness(found, varied) > _AGAINST:
+        return None
+    return str(RefusedInput(AlignmentError(LEFT_HANDED)))
+
+
+def _moved_words(moves: list[Move], logs: list[Log]) -> str:
+    first = moves[0]
+    name = logs[first.log].name
+    when = f"before {name}" if first.at_s is None else f"in {name} at {first.at_s:.0f} s"
+    more = f", and {len(moves) - 1} times more" if len(moves) > 1 else ""
+    return (
+        f"the mount was turned by {first.angle_deg:.0f} degrees {when}{more}: give the logs after it another mount in "
+        "the manifest"
+    )
+
+
+def _moved_row(move: Move, logs: list[Log]) -> Row:
+    log = logs[move.log]
+    return {
+        "log": log.name,
+        "within_log": move.at_s is not None,
+        "at_s": move.at_s,
+        "utc_s": _utc_s(log, move.at_s or 0.0),
+        "turned_deg": move.angle_deg,
+        "turned_sigma_deg": move.angle_sigma_deg,
+        "sigmas": move.sigmas,
+        **dict(zip(("about_left_deg", "about_up_deg", "about_forward_deg"), move.turn_deg.tolist())),
+    }
+
+
+def _stop_row(stop: Stop, log: Log) -> Row:
+    names = ("start_s", "initial_speed_mps", "duration_s", "distance_m", "mfdd_mps2", "peak_mps2", "jerk_mps3")
+    row: Row = {name: float(getattr(stop, name)) for name in (*names, "side_m", "heading_deg")}
+    return row | {"utc_s": _utc_s(log, stop.start_s), "speed_from": stop.speed_from}
+
+
+def _utc_s(log: Log, at_s: float) -> float | None:
+    """Universal Time at at_s in the log: the median of what its rows tell, because some come late."""
+    starts = (log.utc_s - log.t_s)[np.isfinite(log.utc_s)]
+    return float(np.median(starts)) + at_s if len(starts) else None
+
+
+def _picture(driven: list[evidence.Intervals], fit: DriveFit) -> list[list[float]]:
+    frame = fit.calibration.vehicle_from_sensor
+    if fit.status != "aligned":  # the mean of what it was: the points show that it is none
+        whole = evidence.blocks(driven)
+        frame = evidence.frames(*evidence.fits(np.sum(whole.square, axis=0), np.sum(whole.product, axis=0)))
+    used = [log.weight > 0.0 for log in driven]
+    terms = np.concatenate([log.terms[which] for log, which in zip(driven, used)])
+    force = np.concatenate([log.force[which] for log, which in zip(driven, used)])
+    felt = force @ frame.T
+    table = np.column_stack((terms[:, 1], felt[:, 2], terms[:, 2], felt[:, 0]))
+    step = max(1, math.ceil(len(table) / _PLOTTED))
+    return table[::step].round(3).tolist()

@@ -1,0 +1,134 @@
+"""A whole fleet: what is new is worked on, everything is written to a directory, at any time and again at the end."""
+
+import hashlib
+import json
+import time
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from kickstand import __version__
+
+from ..errors import InputError, cause
+from ..output import check_directory
+from . import files, tables
+from .cluster import run_tasks
+from .journal import Journal
+from .manifest import Period
+from .period import PeriodResult, failed, work_on_period
+from .show import plot
+from .show.page import Glance, write_page
+
+RESULTS_VERSION = 1  # another one makes all results of before obsolete
+SIGNALS = "signals"
+TIMEOUT_S = 600.0  # for one mount of one vehicle
+_WRITE_S, _SHARE = 15.0, 20.0  # tables are written so often, and at most every so many times what writing takes
+
+
+@dataclass
+class FleetRun:
+    """vehicles: how many mounts of vehicles there are; new: how many of them were worked on now, the others were
+    finished before. seen: what all results show at one glance."""
+
+    vehicles: int
+    new: int
+    seen: Glance
+
+
+def run_fleet(
+    periods: list[Period],
+    out: Path | str,
+    scheduler: str | None = None,
+    workers: int | None = None,
+    with_signals: bool = False,
+    timeout_s: float = TIMEOUT_S,
+    progress: Callable[[int, int], None] | None = None,
+) -> FleetRun:
+    """Work on all periods (see read_manifest), and write tables (see schema.TABLES), pictures and index.html to out.
+
+    scheduler: the address of a Dask cluster, None for workers on this computer: so many, or one a processor.
+    with_signals: also write each log's accelerations along the vehicle's axes, to out/signals. timeout_s: for one
+    period. progress: called with (done, all). What an earlier run into the same directory has finished is not done
+    again, as long as its logs have not changed. Raises InputError; what is finished is kept and shown then, too.
+
+    A script has to call it below `if __name__ == "__main__":`, because workers on this computer import the script.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     run = run_fleet([], directory)
+    ...     run.new, run.seen.count, sorted(path.name for path in Path(directory).glob("*.parquet"))
+    (0, 0, ['alignments.parquet', 'brake_tests.parquet', 'errors.parquet', 'moved.parquet'])
+    """
+    directory = Path(out)
+    tables.check()
+    check_directory(directory)
+    try:
+        (directory / "plots").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"{directory} cannot be made: {cause(error)}") from error
+    keys = _keys(periods, with_signals)
+    signals_to = str(directory.resolve() / SIGNALS) if with_signals else None
+    with Journal(directory / "journal.jsonl") as journal:
+        todo = [k for k, key in enumerate(keys) if key not in journal]
+        done = len(keys) - len(todo)
+        if progress:
+            progress(done, len(keys))
+        last_s, pause_s = time.monotonic(), _WRITE_S
+        try:
+            items = [(periods[k], signals_to) for k in todo]
+            for index, result, reason, message in run_tasks(work_on_period, items, scheduler, workers, timeout_s):
+                k = todo[index]
+                _keep(directory, journal, keys[k], periods[k], result, reason, message)
+                done += 1
+                if progress:
+                    progress(done, len(keys))
+                if time.monotonic() - last_s > pause_s:
+                    journal.sync()
+                    before_s = time.monotonic()
+                    write_results(directory, journal.results(keys), len(keys))
+                    last_s = time.monotonic()
+                    pause_s = max(_WRITE_S, _SHARE * (last_s - before_s))
+        finally:  # also when it was stopped
+            seen = write_results(directory, journal.results(keys), len(keys))
+        return FleetRun(len(keys), len(todo), seen)
+
+
+def write_results(directory: Path, results: Iterable[PeriodResult], expected: int) -> Glance:
+    """Write the tables and the page of the results so far. expected: how many there will be. Raises InputError."""
+    glance = Glance()
+
+    def seen() -> Iterator[PeriodResult]:
+        for result in results:
+            glance.add(result)
+            yield result
+
+    tables.write_tables(directory, seen())
+    write_page(directory / "index.html", glance, expected)
+    return glance
+
+
+def _keep(
+    directory: Path,
+    journal: Journal,
+    key: str,
+    period: Period,
+    result: PeriodResult | None,
+    reason: str,
+    message: str,
+) -> None:
+    kept = result or failed(period, reason, message)
+    if kept.picture:
+        kept.alignment["plot"] = f"plots/{plot.file_name(period.vehicle, period.mount)}"
+        plot.write_plot(directory / kept.alignment["plot"], kept)
+    journal.add(key, kept, again=result is None)
+
+
+def _keys(periods: list[Period], with_signals: bool) -> list[str]:
+    """What tells the result of each period from that of other logs, other options and other versions."""
+    marks = files.identities(dict.fromkeys(path for period in periods for path in period.paths))
+    keys = []
+    for period in periods:
+        logs = [(path, marks[path]) for path in period.paths]
+        told = [RESULTS_VERSION, __version__, period.vehicle, period.mount, period.kind, logs, with_signals]
+        keys.append(hashlib.sha256(json.dumps(told).encode()).hexdigest()[:32])
+    return keys
