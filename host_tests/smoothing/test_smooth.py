@@ -8,7 +8,7 @@ from smoothed_rides import other, rms, simulated
 
 RIDES = {
     "street": lambda: simulated("street", 1, 150.0),
-    "city": lambda: simulated("city", 5, 150.0),
+    "city": lambda: simulated("city", 7, 150.0),
     "wheelie": lambda: simulated("wheelie", 1, 120.0),
     "crosswind": lambda: simulated("crosswind", 2, 150.0),
     "long turns": lambda: other("sweepers", 2, seconds=170.0),

@@ -17,6 +17,7 @@ STILL_MPS, STANDS = 0.3, 4.0  # a speed of less allows so much more
 BIAS_RADPS = np.radians(4.0)  # of the gyro, since its calibration: a rate above is a turn
 MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # the mean force of a ride over so long keeps within this of up
 BETWEEN_S = 20.0
+SURELY_S = 4.0  # at both ends of this it may still ride, or fall
 SLOW_S = 4.0  # changes of lean that take longer follow from turning, quicker ones from the roll rate
 TURNS_S = 40.0  # over which turns tell a speed
 USUAL_MPS, USUAL_RADPS = 10.0, 0.14  # where there are no turns; yaw rate of turns that count as much
@@ -32,8 +33,8 @@ def standing(w: Windows) -> NDArray[np.bool_]:
 
 
 def in_hand(w: Windows) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """(n) True where the sensor is moved about in a hand, or the bike lies: up is far from the calibration's. And the
-    same with the seconds before and after, which may not be riding either.
+    """(n) True where the sensor is surely moved about in a hand, or lies with the bike: up is far from where it was.
+    And the same with the seconds before and after, which may not be riding either.
 
     A bike in balance feels the force along its own up, however far it leans.
     """
@@ -46,7 +47,8 @@ def in_hand(w: Windows) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         for begin, end in itertools.pairwise(ends):
             if w.edges[end + 1] - w.edges[begin] < BETWEEN_S:
                 off[begin : end + 1] = True
-    return off, averaged(off.astype(float), MOUNTED_S) > 0.01
+    share = off.astype(float)
+    return averaged(share, SURELY_S) > 0.99, averaged(share, MOUNTED_S) > 0.01
 
 
 def first_guess(w: Windows, still: NDArray[np.bool_]) -> tuple[Array, Array]:

@@ -21,7 +21,7 @@ RESTING, RESTING_RATE, BACKWARD = slice(6, 9), slice(9, 12), 12
 MEASURED = 13
 
 # Noise of the motion, per square root of a second
-ANGLE_ROOT = np.radians(0.10)  # rad: of lean and pitch, by vibration of the gyro
+ANGLE_ROOT = np.radians(0.2)  # rad: of lean and pitch, by vibration of the gyro
 VELOCITY_ROOT = (0.05, 0.05, 0.10)  # m/s: left, up, forward, by vibration of the accelerometer
 BIAS_ROOT = np.radians(0.01)  # rad/s: 0.6 deg/s in five minutes of warming up
 # Where readings are missing, and in the hand: lean, pitch, velocity; per root of a second, and at most
@@ -31,8 +31,8 @@ JOLTED_RADPS, JOLTED_S = np.radians(150.0), 0.06  # a rate that is so far from i
 JOLT = 4.0  # sigmas of the motion within a window: what is more is a jolt to the sensor, and counts less and less
 
 # Errors of the measurements, and how long they last
-SLIDE_MPS, SLIDE_SHARE, SLIDE_S = 0.1, 0.01, 0.5  # m/s sideways, and as a share of speed x tan(lean)
-DIVE_MPS, DIVE_RAD, DIVE_S = 0.1, np.radians(1.5), 0.5  # m/s up, and as an angle: of the chassis against the road
+SLIDE_MPS, SLIDE_SHARE, SLIDE_S = 0.15, 0.01, 0.5  # m/s sideways, and as a share of speed x tan(lean)
+DIVE_MPS, DIVE_RAD, DIVE_S = 0.1, np.radians(2.5), 0.5  # m/s up, and as an angle: of the chassis against the road
 SLOPE_MPS, SLOPE_RAD, SLOPE_S = 0.1, np.radians(2.0), 4.0  # the same, of the road against the horizontal
 BALANCE_G, BALANCE_S = 0.011, 3.0  # force to the side, by wind, camber and the rider
 BALANCE_LEANED_G, BALANCE_ROLLING = 0.045, 0.05  # the same over sin(lean), and over the roll acceleration (g s2/rad)
