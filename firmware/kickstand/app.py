@@ -194,8 +194,8 @@ class App:
             self.recorder.stalled = False
             self.drive.speed.after_stall(now_ms)
         speed = self.drive.poll(now_ms)
-        if speed is not None and self.recording:
-            self.recorder.add_speed(int(100 * speed + 0.5))
+        if self.recorder and self.recorder.active:
+            self.recorder.add_fix(speed, self.drive.speed.place(now_ms))
 
     def _show(self, now_ms):
         """Put the page as it is now onto the display. As often, and at standstill only, save the trim that riding has

@@ -219,7 +219,8 @@ def test_a_speed_is_drawn_where_there_is_one(tmp_path, car, speed_hz):
     ("content", "words"),
     [
         (b"", "is empty"),
-        (b"PK\x03\x04\x00\xff\xfe", "not text"),
+        (b"\x7fELF\x00\xff\xfe", "not text"),
+        (b"PK\x03\x04\x00\xff\xfe", "is a zip: if an app has exported it, kickstand import makes a log of it"),
         (b"lat,lon\n1,2\n", "no column t_s"),
         ((command.HEADER + "\n0,0,0,1,0,0\n1,0,0,1,0,0,0\n").encode(), "is the line cut?"),
         ((command.HEADER + "\n0,0,0,1,0,0\n").encode(), "too short: 0 samples"),

@@ -10,6 +10,7 @@ import command
 import numpy as np
 import pytest
 from kickstand_tools import api
+from kickstand_tools.analysis.downsample import downsampled
 from kickstand_tools.analysis.export import export_gpx
 from kickstand_tools.analysis.track import Track
 from kickstand_tools.logs.csv_lines import write_log
@@ -133,7 +134,8 @@ def test_racechrono_has_places_and_the_time_of_the_satellites(tmp_path):
     assert len(told) == np.count_nonzero(np.isfinite(log().lat_deg))
     t_s = np.array([float(row["elapsed_time"]) for row in told])
     assert [float(row["timestamp"]) for row in told] == pytest.approx(t_s + START_S, abs=2e-3)
-    assert np.max(away_m(*([float(row[name]) for row in told] for name in ("latitude", "longitude")), t_s)) < 0.05
+    lat, lon = ([float(row[name]) for row in told] for name in ("latitude", "longitude"))
+    assert np.max(away_m(lat, lon, t_s)) < 0.05
 
 
 @pytest.mark.parametrize("form", ["gpx", "racechrono", "vbo"])
@@ -157,6 +159,15 @@ def test_a_track_across_180_degrees_goes_the_short_way():
     lat, lon = track.at(np.array([0.25, 0.75, 1.5, 2.1, -0.1]))
     assert lon == pytest.approx([179.99995, -179.99995, -179.9998, np.nan, np.nan], abs=1e-7, nan_ok=True)
     assert lat[:3] == pytest.approx(-10.0)
+
+
+def test_of_positions_in_a_short_time_the_last_one_stays():
+    """Their mean across 180 degrees would be on the other side of the earth."""
+    few = log().part(log().t_s < 0.1)
+    few.lon_deg[:] = np.nan
+    few.lat_deg[:], few.lon_deg[3:6], few.utc_s[2] = -10.0, (179.9999, -179.9999, -179.9998), START_S
+    (one,) = downsampled(api.open_ride(few, ALIGNED).blocks(), 1.0)
+    assert (one.lat_deg[0], one.lon_deg[0], one.utc_s[0]) == (-10.0, -179.9998, START_S)
 
 
 def test_a_position_alone_is_a_place_and_none_is_nowhere():

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kickstand_tools.pictures import drawn, lcd, ride
+from kickstand_tools.pictures import drawn, lcd, page, ride
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -37,6 +37,11 @@ def test_the_plot_of_the_ride_is_not_stale():
     assert fresh.shape == kept.shape, STALE
     difference = float(np.mean(np.abs(fresh - kept)))
     assert difference < 1.0, STALE  # of 255
+
+
+def test_the_picture_of_the_page_is_not_stale():
+    """By the files that decide how the page looks: riding there again would take half a minute."""
+    assert Image.open(PICTURES / "page.png").info["looks"] == page.looks(), STALE
 
 
 def test_they_are_small_and_fetch_nothing(pictures):

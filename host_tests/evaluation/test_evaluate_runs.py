@@ -52,7 +52,7 @@ def swept():
 def test_every_estimator_is_scored(swept):
     assert swept.refusal is None
     there = {name for name in estimators.OTHERS if _PACKAGE.get(name) not in estimators.missing()}
-    assert set(swept.scores) == {"kickstand", "formula", "formula 0.3 s"} | there
+    assert set(swept.scores) == {"kickstand", "smoothed", "formula", "formula 0.3 s"} | there
     for lean in swept.traces.values():
         assert lean.shape == swept.traces["time"].shape
         assert np.all(np.isfinite(lean))
@@ -64,6 +64,7 @@ def test_filters_that_trust_the_force_decay_in_a_held_turn(swept):
     assert 0.85 < swept.scores["formula"].slope < 1.1
     assert swept.scores["formula 0.3 s"].rms_deg < 0.5 * swept.scores["formula"].rms_deg
     assert swept.scores["kickstand"].rms_deg < swept.scores["formula 0.3 s"].rms_deg
+    assert swept.scores["smoothed"].rms_deg < 0.6 * swept.scores["kickstand"].rms_deg
     assert 0.9 < swept.scores["kickstand"].slope < 1.1
 
 

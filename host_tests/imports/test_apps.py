@@ -170,9 +170,8 @@ def test_kickstands_own_exports_come_back(tmp_path, form):
     ride = app_exports.riding().every(2)
     speed = np.where(np.arange(len(ride.t_s)) % 100 == 0, ride.speed_mps, np.nan)
     each_s = np.where(np.isfinite(speed), 1.0, np.nan)
-    track = {"lat_deg": each_s * ride.lat_deg, "lon_deg": each_s * ride.lon_deg}
-    track["utc_s"] = each_s * ride.t_s + START_UTC_S
-    log = api.Log(ride.t_s, ride.phone_g, ride.rates_dps @ PHONE.T, speed, **track)
+    lat, lon, utc_s = each_s * ride.lat_deg, each_s * ride.lon_deg, each_s * ride.t_s + START_UTC_S
+    log = api.Log(ride.t_s, ride.phone_g, ride.rates_dps @ PHONE.T, speed, lat_deg=lat, lon_deg=lon, utc_s=utc_s)
     out = tmp_path / f"out.{'parquet' if form == 'parquet' else 'csv'}"
     api.export(api.open_ride(log, ON_PHONE), form, out)
     found = api.import_recording(out)

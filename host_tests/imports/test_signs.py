@@ -102,7 +102,7 @@ def test_a_mirrored_export_of_a_known_app_is_remarked_on(tmp_path):
     ride = riding().every(2)
     ride.force_g = -ride.force_g
     found = api.import_recording(app_exports.into(tmp_path / "p.zip", app_exports.phyphox(ride)))
-    assert [notice.code for notice in found.notices] == ["import-mirrored"]
+    assert [notice.code for notice in found.notices] == ["mirrored"]
     assert "left and right are exchanged" in api.sentence(found.notices[0])
     assert up_at_rest(found) == pytest.approx(-UP, abs=0.02)
 

@@ -104,7 +104,7 @@ def test_a_bike_over_65_degrees_for_a_second_has_fallen():
 
 
 def test_the_lean_of_a_fall_is_no_maximum():
-    shown = roll(ride(meter(), 3.0), 0.0, 63.0)
+    shown = ride(roll(ride(meter(), 3.0), 0.0, 63.0), 0.2, lean_deg=63.0)
     near(shown.max_right_deg, 63.0, 0.5)  # the low-pass is made up for
     roll(shown, 63.0, 85.0)
     assert shown.lean_deg > 80.0
@@ -114,7 +114,7 @@ def test_the_lean_of_a_fall_is_no_maximum():
 def test_maxima_are_the_largest_of_each_side_until_they_are_reset():
     shown = ride(meter(), 3.0)
     for lean_from, lean_to in ((0.0, 20.0), (20.0, -10.0), (-10.0, 8.0), (8.0, -30.0), (-30.0, 0.0)):
-        roll(shown, lean_from, lean_to)
+        ride(roll(shown, lean_from, lean_to), 0.3, lean_deg=lean_to)
     near(shown.max_right_deg, 20.0, 0.5)
     near(shown.max_left_deg, 30.0, 0.5)
     shown.reset_maxima()
@@ -138,8 +138,24 @@ def test_a_lean_that_cannot_be_trusted_is_no_maximum():
     near(shown.lean_deg, 30.0, 0.5)
     assert shown.max_right_deg < 0.1
     shown.trust()
-    ride(shown, 0.1, lean_deg=30.0)
+    ride(shown, 0.2, lean_deg=30.0)
     near(shown.max_right_deg, 30.0, 0.2)
+
+
+def test_what_lasts_less_than_150_ms_is_no_maximum():
+    """A pothole that jerks the sensor by 18 degrees, to either side."""
+    shown = ride(roll(ride(meter(), 3.0), 0.0, 20.0), 0.3, lean_deg=20.0)
+    for sign in 1.0, -1.0:
+        for _ in range(3):
+            roll(shown, 20.0, 20.0 + sign * 18.0, dps=300.0)
+            roll(shown, 20.0 + sign * 18.0, 20.0, dps=300.0)
+            ride(shown, 0.1, lean_deg=20.0)
+        near(shown.max_right_deg, 20.0, 0.5)
+    roll(shown, 20.0, 30.0, dps=300.0)
+    ride(shown, 0.13, lean_deg=30.0)
+    assert shown.max_right_deg < 30.0
+    ride(shown, 0.1, lean_deg=30.0)
+    near(shown.max_right_deg, 30.0, 0.5)
 
 
 def test_a_gap_of_more_than_half_a_second_begins_anew():
@@ -235,7 +251,7 @@ def test_a_speed_below_zero_is_no_news():
 
 
 def test_another_calibration_or_a_restart_forgets_the_ride_and_keeps_the_maxima():
-    shown = roll(ride(meter(), 3.0), 0.0, 20.0)
+    shown = ride(roll(ride(meter(), 3.0), 0.0, 20.0), 0.2, lean_deg=20.0)
     assert shown.trusted
     shown.restart()
     assert not shown.trusted

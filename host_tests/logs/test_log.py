@@ -2,6 +2,7 @@
 
 import gzip
 import io
+from typing import Any
 
 import command
 import numpy as np
@@ -15,7 +16,7 @@ from kickstand_tools.logs.source import log_stem, name_of, total_bytes
 FORCE, RATE = [0.1, 0.2, 0.9], [1.0, 2.0, 3.0]
 
 
-def log_of(n: int, start_s: float = 0.0, **more) -> Log:
+def log_of(n: int, start_s: float = 0.0, **more: Any) -> Log:
     return Log(start_s + np.arange(n) / 100.0, np.tile(FORCE, (n, 1)), np.tile(RATE, (n, 1)), **more)
 
 
@@ -31,7 +32,7 @@ def test_times_count_from_the_first_sample():
 
 
 def test_the_chips_order_and_the_names_of_the_columns():
-    track = {"lat_deg": [52.1, np.nan], "lon_deg": [-0.5, np.nan], "utc_s": [1.7e9, np.nan]}
+    track: Any = {"lat_deg": [52.1, np.nan], "lon_deg": [-0.5, np.nan], "utc_s": [1.7e9, np.nan]}
     log = log_of(2, temperature_c=[20.0, 21.0], speed_mps=[5.0, np.nan], **track)
     assert log.readings[1].tolist() == [0.1, 0.2, 0.9, 21.0, 1.0, 2.0, 3.0]
     first = {name: values[0] for name, values in log.columns().items()}

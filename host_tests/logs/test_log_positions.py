@@ -1,6 +1,7 @@
 """Positions and Universal Time in a log: read, cut, mended and written like the other columns."""
 
 import io
+from collections.abc import Iterable
 
 import numpy as np
 import pytest
@@ -40,7 +41,7 @@ def told(log: Log) -> list[tuple[int, tuple[float, ...]]]:
     ]
 
 
-def expected(rows=TOLD) -> list[tuple[int, tuple[float, ...]]]:
+def expected(rows: Iterable[int] = TOLD) -> list:
     return [(k, pytest.approx(place(k), rel=0, abs=1e-8)) for k in rows]
 
 
@@ -82,7 +83,7 @@ def test_a_cut_and_a_written_log_have_them_and_one_without_has_no_columns(tmp_pa
     write_log(tmp_path / "again.csv", read_log(path))
     assert (tmp_path / "again.csv").read_text().splitlines()[0] == HEADER.strip()
     assert told(read_log(tmp_path / "again.csv")) == expected()
-    bare = Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2)
+    bare = Log(np.array([0.0, 0.01]), np.tile([0.0, 1.0, 0.0], (2, 1)), np.zeros((2, 3)))
     write_log(tmp_path / "bare.csv", bare)
     assert (tmp_path / "bare.csv").read_text().splitlines()[0] == "t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps"
     assert np.all(np.isnan(read_log(tmp_path / "bare.csv").utc_s))

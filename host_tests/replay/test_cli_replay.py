@@ -97,7 +97,31 @@ def test_the_engines_agree(tmp_path):
         )
         results.append(read(tmp_path / f"{engine}.csv"))
     for name in replay_engine.COLUMNS:
-        assert np.max(np.abs(results[0][name] - results[1][name])) < 0.002, name
+        assert np.array_equal(np.isnan(results[0][name]), np.isnan(results[1][name])), name
+        assert np.nanmax(np.abs(results[0][name] - results[1][name])) < 0.002, name
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_how_sure_the_firmware_was_of_its_lean(tmp_path, engine):
+    """Its standard deviation where the display shows a lean, nothing where it shows `--`."""
+    t = np.arange(600) / 50.0
+    turning = (t > 6.0)[:, None]
+    force = np.where(turning, [0.0, 1.2, 0.0], [0.0, 1.0, 0.0]) + 1e-3 * np.sin(31.0 * t)[:, None]
+    rate = np.where(turning, [8.0, 12.0, 0.0], 0.0) + 1e-2 * np.sin(29.0 * t)[:, None]
+    kept = (t < 6.0) | (t > 8.0)  # a gap, after which the bike is in a bend
+    rows = np.column_stack((t, force, rate))[kept]
+    log, cal = command.write(tmp_path / "log.csv", rows), tmp_path / "CAL.json"
+    cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": np.eye(3).tolist()}))
+    command.works("replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv", "--engine", engine)
+    got, meter = read(tmp_path / "LEAN.csv"), replay_engine.Replay(read_calibration(cal).to_firmware())
+    shown, sigma = [], []
+    for row in read_log(log).rows():
+        meter.take(*row)
+        shown.append(meter.meter.trusted)
+        sigma.append(np.degrees(np.sqrt(meter.meter.filter.variance)))
+    assert 0.2 < np.mean(shown) < 0.99
+    assert np.array_equal(~np.isnan(got["lean_sigma_deg"]), shown)
+    assert np.allclose(got["lean_sigma_deg"][shown], np.array(sigma)[shown], atol=0.01)
 
 
 def with_speed(log, speed):

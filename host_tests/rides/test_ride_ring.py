@@ -304,8 +304,8 @@ def test_a_speed_source_without_a_sensor_fills_no_block(recorder, flash):
     for sums, n, dt_us in turns[:10]:
         recorder.add(sums, n, dt_us)
     for speed in range(20_000):
-        recorder.add_speed(speed % 7)
-    recorder.add_speed(1234)
+        recorder.add_fix(speed % 7 / 100, None)
+    recorder.add_fix(12.34, None)
     for sums, n, dt_us in turns[10:]:
         recorder.add(sums, n, dt_us)
     recorder.stop()

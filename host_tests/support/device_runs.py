@@ -70,7 +70,8 @@ def run_device(plan):
     plan: "until" (s); "lean" as for standing(), or "ride" [[name of a function in rides, arguments...], ...],
     or "poses" as for poses_of; "seed" of the part (None: perfect); its "temp_c"; "presses" [[at_s, for_s], ...];
     "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...];
-    "gps" or "wheel" arguments of the models, which are told the speed of the ride; config "VEHICLE" "car": the ride
+    "gps" or "wheel" arguments of the models, which are told the speed of the ride, the first also its "place":
+    [latitude, longitude, degrees north a second, degrees east a second]; config "VEHICLE" "car": the ride
     is a car's; "remount" [at_s, seed of the mounting from then on]; "stream" True: as `kickstand record` starts it;
     "card" arguments of the model of an SD card, which is formatted, and whose content is returned as "rides"; "card
     faults" [[at_s, attribute, value], ...].
@@ -94,7 +95,10 @@ def run_device(plan):
     board = Board(world, **plan.get("board", {}))
     for source in ("gps", "wheel"):
         if ride and source in plan:
-            getattr(board, "fit_" + source)(lambda t_s, ride=ride: ride.truth(t_s)[1], **plan[source])
+            more = dict(plan[source])
+            if "place" in more:
+                more["place"] = lambda t_s, p=more["place"]: (p[0] + p[2] * t_s, p[1] + p[3] * t_s)
+            getattr(board, "fit_" + source)(lambda t_s, ride=ride: ride.truth(t_s)[1], **more)
     if "card" in plan:
         board.fit_card(**plan["card"])
         cards.format_card(board, plan)

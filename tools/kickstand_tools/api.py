@@ -5,6 +5,7 @@
     six = api.fit_six_positions(["1.csv", "2.csv", "3.csv", "4.csv", "5.csv", "6.csv", "7.csv"])
     two = api.fit_two_positions("KICKSTAND.csv", "UPRIGHT.csv", six.calibration)
     lean = api.replay("RIDE.csv.gz", two.calibration)                     # lean.t_s, lean.lean_deg, ...
+    after = api.smooth("RIDE.csv.gz", two.calibration)                    # after.lean_deg, after.lean_sigma_deg, ...
     stops = api.find_stops(api.vehicle_channels("RIDE.csv.gz", two.calibration))
 
 A log is a path, an open file of text or bytes, a Log made of arrays, or a Stretch of one of these. Tables have
@@ -31,15 +32,21 @@ from .fleet.manifest import Period, by_pattern, read_manifest
 from .fleet.period import PeriodResult, work_on_period
 from .fleet.run import FleetRun, run_fleet
 from .imports.importing import Imported, import_recording, write_imported
+from .joining.joined import Joined, join_track, write_joined
+from .joining.track import Track
+from .joining.track_files import read_track
 from .logs.csv_lines import write_log
 from .logs.cut import cut_log
 from .logs.log import Log
 from .logs.reader import read_log
 from .logs.stretch import Stretch
+from .overlay.overlay import Overlaid, overlay
 from .refusals import RefusedInput, sentence
 from .replay.replay import LeanTable, replay
 from .simulation.ride import Ride as SimulatedRide
 from .simulation.ride import ride as simulate_ride
+from .smoothing.smooth import SmoothedRide, smooth
+from .web.site import site_files, write_site
 
 __all__ = [
     "CalibrationFile",
@@ -49,8 +56,10 @@ __all__ = [
     "FleetRun",
     "Imported",
     "InputError",
+    "Joined",
     "LeanTable",
     "Log",
+    "Overlaid",
     "Overview",
     "Period",
     "PeriodResult",
@@ -59,9 +68,11 @@ __all__ = [
     "RideFit",
     "SimulatedRide",
     "SixPositions",
+    "SmoothedRide",
     "Stop",
     "Stretch",
     "Summary",
+    "Track",
     "TwoPositions",
     "brake_tests",
     "by_pattern",
@@ -73,19 +84,26 @@ __all__ = [
     "fit_six_positions",
     "fit_two_positions",
     "import_recording",
+    "join_track",
     "open_ride",
+    "overlay",
     "overview",
     "read_calibration",
     "read_log",
     "read_manifest",
+    "read_track",
     "replay",
     "run_fleet",
     "sentence",
     "simulate_ride",
+    "site_files",
+    "smooth",
     "summary",
     "vehicle_channels",
     "work_on_period",
     "write_calibration",
     "write_imported",
+    "write_joined",
     "write_log",
+    "write_site",
 ]

@@ -70,8 +70,8 @@ _SENTENCES = {
     "axis that points up has to read +1 g, else the ride is mirrored and --units a=-g or a=-m/s2 puts it right",
     "import-damaged": "damaged rows that are left out: {0}; a cell is no number, a time out of order, or a reading "
     "past any sensor's",
-    "import-mirrored": "the sensor turns against the track, so left and right are exchanged: were all its "
-    "accelerations turned? {0} has +1 g where up is",
+    "mirrored": "the sensor turns against the track, so left and right are exchanged: were all accelerations "
+    "turned? At rest the axis that points up has to read +1 g",
     "left-handed": "the rates turn the force the wrong way, so the lean is wrong: are the axes left-handed (reverse "
     "one in both sensors) or the gyro of the opposite sign (reverse all its rates)? At rest up reads +1 g",
     "rates-misfit": "the rates do not belong to the accelerations, so the lean is wrong: the rates {0}; instead of "

@@ -12,6 +12,7 @@ TRIM_MAX_VARIANCE = radians(0.5) ** 2  # a trim less certain than this is not ke
 TRIM_STEP_DEG = 0.3  # a smaller change of the trim is not worth wearing the flash
 FALLEN_DEG = 65.0
 FALLEN_US = 1_000_000
+HELD_US = 75_000  # a maximum lasts twice as long: a pothole jerks the sensor for less
 WHEELIE_DEG = 20.0  # of pitch: no road is as steep, and with a wheel in the air the filter's equations do not hold
 
 
@@ -61,6 +62,7 @@ class LeanMeter:
         self.max_right_deg = 0.0
         self.max_accel_g = 0.0
         self.max_brake_g = 0.0
+        self._hold_again()
 
     def distrust(self, reason):
         """The lean is not to be shown, for a reason that stands in its place: until trust(), or another calibration."""
@@ -162,7 +164,9 @@ class LeanMeter:
             -self.max_left_deg <= lean <= self.max_right_deg
             and -self.max_brake_g <= self.smooth_force[2] <= self.max_accel_g
         ):
-            self._hold_maxima(lean, self.smooth_force[2])
+            self._hold_maxima(lean, self.smooth_force[2], dt_us)
+        elif self._over_us:
+            self._hold_again()
 
     def _smooth(self, gain):
         force, smooth = self.force, self.smooth_force
@@ -171,10 +175,24 @@ class LeanMeter:
             smooth[0] += gain * (force[0] - smooth[0])
             smooth[1] += gain * (force[1] - smooth[1])
 
-    def _hold_maxima(self, lean, forward):
+    def _hold_again(self):
+        """The lean was within its maxima."""
+        self._over_us = 0  # since the lean exceeds one, or since HELD_US of that
+        self._least = 180.0  # lean in that time, and in the HELD_US before; 0 if it did not exceed it then
+        self._least_before = 0.0
+
+    def _hold_maxima(self, lean, forward, dt_us):
         if not self.trusted:
+            self._hold_again()
             return
-        self.max_left_deg = max(self.max_left_deg, -lean)
-        self.max_right_deg = max(self.max_right_deg, lean)
         self.max_accel_g = max(self.max_accel_g, forward)
         self.max_brake_g = max(self.max_brake_g, -forward)
+        self._over_us += dt_us
+        self._least = min(self._least, abs(lean))
+        if self._over_us >= HELD_US:
+            held = min(self._least_before, self._least)
+            if lean > 0.0:
+                self.max_right_deg = max(self.max_right_deg, held)
+            else:
+                self.max_left_deg = max(self.max_left_deg, held)
+            self._least_before, self._least, self._over_us = self._least, 180.0, 0

@@ -1,13 +1,17 @@
 """The format of a recorded ride: blocks of a few thousand bytes, each of which can be read without the others.
 
 A block is: a head (magic, format version, length, ride, sequence, time in us since power-on, temperature at its end in
-hundredths of a degree Celsius, counts per g, ten times the counts per deg/s, samples per second, firmware version, how
-late the gyro's low-pass is in tenths of a millisecond, 0 in rides of version 0.3.0 and before); the
-calibration as store.pack() writes it; the entries; zeros; a tail (number of entries, CRC32 of everything before it).
+hundredths of a degree Celsius, counts per g, ten times the counts per deg/s, samples per second, firmware version,
+number of positions, how late the gyro's low-pass is in tenths of a millisecond, 0 in rides of version 0.3.0 and
+before); the calibration as store.pack() writes it; the entries; zeros; the positions, the last one first; a tail
+(number of entries, CRC32 of everything before it).
 
 An entry is one turn of the loop: how many samples came in (n), the microseconds since the turn before, and the sums of
 the samples' six counts (ax ay az gx gy gz). So the mean that the lean was computed from is kept exactly. Or an entry is
 a speed: n = 0, then centimetres per second.
+
+A position is the number of the entry, a turn, that it belongs to, and the four numbers of Gps.place(). A reader of
+version 0.4.0 and before, which knows no positions, takes their bytes for the zeros and reads all else.
 
 Each number is kept as its difference from a prediction: n sample periods for the time, the values of the turn before
 for the others. An adaptive Rice code holds the difference (R. F. Rice, JPL publication 79-22), most significant bit
@@ -26,8 +30,10 @@ from ..errors import NO_MACHINE_CODE, checked
 
 MAGIC = b"KRID"
 VERSION = 1
-HEAD = "<4sHHIIqhHHH11sB"
+HEAD = "<4sHHIIqhHHH10sBB"
 _TEMPERATURE_AT = struct.calcsize("<4sHHIIq")
+_PLACES_AT = struct.calcsize("<4sHHIIqhHHH10s")
+PLACE = "<HHIii"
 TAIL = "<HI"
 BLOCK = 4096  # bytes in a block of the flash
 FIELDS = 9  # of an entry: n, dt_us, sums of ax ay az gx gy gz, speed
@@ -40,6 +46,7 @@ MAX_SIZE = 1 << 20  # a larger size counts as this in the mean, so that it fits 
 MAX_DT_US = 1 << 29  # the longest time between two turns that an entry can hold
 _HEAD_LENGTH = struct.calcsize(HEAD) + BODY_LENGTH
 _TAIL_LENGTH = struct.calcsize(TAIL)
+_PLACE_LENGTH = struct.calcsize(PLACE)
 _WORST = (FIELDS + 1) * (LIMIT + RAW_BITS) // 8 + 2  # the most bytes that a turn and a speed can take
 # Where the coder's state, array('i', 22), keeps what. From 0 on, FIELDS values: the entry before. From _MEANS on,
 # FIELDS values: the mean size of each field. Then: bits that do not yet make a byte, how many those are, the place of
@@ -126,6 +133,9 @@ class RideBlock:
         self._state[_PERIOD] = period_us
         self._entry = array("i", [0] * FIELDS)
         self._temperature = 0  # of the last turn, in counts
+        self._places = 0
+        self._end = 0  # where the positions begin
+        self._reserved = 0  # bytes that are kept free for a position; none before the first one
         self.length = 0
         self.count = 0
 
@@ -140,7 +150,7 @@ class RideBlock:
         state[0] = 1  # the prediction divides by the n of the turn before
         state[_PENDING] = state[_BITS] = 0
         state[_AT] = _HEAD_LENGTH
-        version = __version__.encode()[:11]
+        version = __version__.encode()[:10]
         struct.pack_into(
             HEAD,
             self.buffer,
@@ -156,12 +166,14 @@ class RideBlock:
             int(10 * chip.gyro_lsb_per_dps + 0.5),
             sample_hz,
             version,
+            0,  # the number of positions is written by close()
             int(10_000 * chip.gyro_delay_s + 0.5),
         )
         self.buffer[_HEAD_LENGTH - BODY_LENGTH : _HEAD_LENGTH] = body
         self._chip = chip
         self.length = length
-        self.count = 0
+        self.count = self._places = 0
+        self._end = length - _TAIL_LENGTH
 
     def add(self, sums, n, dt_us):
         """Append a turn: the sums of n samples' seven counts, and the microseconds since the turn before."""
@@ -185,9 +197,20 @@ class RideBlock:
         encode(self._entry, self._state, self.buffer)
         self.count += 1
 
+    def add_place(self, place):
+        """Append a position, as Gps.place() has it, which belongs to the turn that is appended next."""
+        end = self._end - _PLACE_LENGTH
+        if not self._reserved:
+            self._reserved = _PLACE_LENGTH
+            if self._state[_AT] + _WORST > end:
+                return  # no room was kept for the first one of all
+        struct.pack_into(PLACE, self.buffer, end, self.count, place[0], place[1], place[2], place[3])
+        self._end = end
+        self._places += 1
+
     def full(self):
-        """True when the longest possible turn and speed might not fit any more."""
-        return self._state[_AT] + _WORST + _TAIL_LENGTH > self.length
+        """True when the longest possible turn and speed, and a position, might not fit any more."""
+        return self._state[_AT] + _WORST + self._reserved > self._end
 
     def close(self):
         """Write the temperature, the last bits and the tail. Then the block is complete."""
@@ -197,9 +220,10 @@ class RideBlock:
         if state[_BITS]:
             buffer[at] = (state[_PENDING] << (8 - state[_BITS])) & 0xFF
             at += 1
-        tail = self.length - _TAIL_LENGTH
-        while at < tail:
+        while at < self._end:
             buffer[at] = 0
             at += 1
+        buffer[_PLACES_AT] = self._places
+        tail = self.length - _TAIL_LENGTH
         struct.pack_into("<H", buffer, tail, self.count)
         struct.pack_into("<I", buffer, tail + 2, crc32(memoryview(buffer)[: tail + 2]))

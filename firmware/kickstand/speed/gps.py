@@ -1,13 +1,15 @@
-"""Speed from a GPS receiver: its sentences RMC and VTG (NMEA 0183) on a UART.
+"""Speed and position from a GPS receiver: its sentences RMC and VTG (NMEA 0183) on a UART.
 
 >>> gps = Gps(machine.UART(1, 9600, tx=machine.Pin(8), rx=machine.Pin(9), timeout=0))
->>> speed_mps = gps.poll(time.ticks_ms())       # None: no new speed
+>>> speed_mps = gps.poll(now_ms)        # None: no new speed. now_ms: time.ticks_ms()
+>>> place = gps.place(now_ms)           # None: poll(now_ms) has found no new position
 
 A sentence is a line: $, two letters for the satellite system (GP, GL, GN, BD, ...: all are accepted), three letters for
 its kind, fields separated by commas, *, and a checksum of two hexadecimal digits: the exclusive or of all between $
 and *.
 """
 
+from array import array
 from time import ticks_diff
 
 from ..errors import Notice
@@ -22,6 +24,7 @@ TIME_JUMP_MS = 5000  # a fix that seems later than this is not: the receiver has
 MIN_FIXES_FOR_NEW_REFERENCE = 4
 KNOT_MPS = 1852.0 / 3600.0  # one knot in m/s
 KMH_MPS = 1.0 / 3.6  # one km/h in m/s
+_DIGITS = 5  # of a minute of arc, after its point: 2 cm
 
 
 class Gps:
@@ -45,6 +48,9 @@ class Gps:
         self._fixes = 0  # fixes with a delay since the reference was set, and when that was
         self._since_ms = 0
         self.age_ms = 0
+        self._fix = None  # the fields of the RMC that the last speed came from, None if it came from a VTG
+        self._day_ms = 0  # its time of day
+        self._place = array("i", (0, 0, 0, 0))
 
     def poll(self, now_ms):
         """Return a new speed in m/s, or None. Never waits. now_ms: ticks_ms()."""
@@ -76,6 +82,26 @@ class Gps:
     def _begin(self, now_ms):
         """From now on there is time for a whole sentence and for a fix, before their absence is a fault."""
         self._heard_ms = self._sentence_ms = self._fix_ms = now_ms
+        self._fix = None
+
+    def place(self, now_ms):
+        """The position of the fix whose speed poll(now_ms) has returned; None if there is none.
+
+        An array that the next position overwrites: date, (year since 2000) << 9 | month << 5 | day, or 0 if the
+        receiver does not know it yet; time of day in ms; latitude (north > 0) and longitude (east > 0) in 0.00001
+        minutes. All are integers: floats of 32 bits cannot tell places that are a metre apart."""
+        fields = self._fix
+        if fields is None or now_ms != self._fix_ms:
+            return None
+        lat, lon = _minutes(fields[3], fields[4] == b"S"), _minutes(fields[5], fields[6] == b"W")
+        if lat is None or lon is None:
+            return None
+        place = self._place
+        place[0] = _date(fields[9]) if len(fields) > 9 else 0
+        place[1] = self._day_ms
+        place[2] = lat
+        place[3] = lon
+        return place
 
     def after_stall(self, now_ms):
         """Interrupts were off until now. Nothing to do: if bytes were lost, the checksum of their sentence is wrong."""
@@ -120,6 +146,7 @@ class Gps:
         valid = fields[2] == b"A" and not (len(fields) > 12 and fields[12] in (b"E", b"N"))
         if not valid or repeated or self._late(fields[1], now_ms):
             return None
+        self._fix = fields
         return float(fields[7]) * KNOT_MPS
 
     def _vtg(self, fields, now_ms):
@@ -129,16 +156,17 @@ class Gps:
         if len(fields) > 9 and fields[9] in (b"E", b"N"):
             return None
         self.age_ms = 0
+        self._fix = None
         if fields[6] == b"N" and fields[5]:
             return float(fields[5]) * KNOT_MPS
         return float(fields[7]) * KMH_MPS if fields[8] == b"K" and fields[7] else None
 
     def _late(self, time, now_ms):
         """True if a fix with this time of day, hhmmss.ss, comes more than LATE_MS later than the reference did. Sets
-        age_ms.
+        age_ms and _day_ms.
 
         Clocks do go back: a NEO-6M's by 3 s when it learns of the leap seconds."""
-        day_ms = (int(time[0:2]) * 60 + int(time[2:4])) * 60_000 + int(float(time[4:]) * 1000.0 + 0.5)
+        self._day_ms = day_ms = (int(time[0:2]) * 60 + int(time[2:4])) * 60_000 + int(float(time[4:]) * 1000.0 + 0.5)
         self.age_ms = 0
         if self._reference is not None:
             reference_ms, reference_day_ms = self._reference
@@ -153,6 +181,38 @@ class Gps:
                 return delay_ms > LATE_MS
         self._reference, self._fixes, self._since_ms = (now_ms, day_ms), 0, now_ms
         return False
+
+
+def _minutes(field, negative):
+    """An angle as NMEA writes it, (d)ddmm.mmmm, in 0.00001 minutes; None if it is none. Further digits are left out."""
+    whole = part = 0
+    digits = -1  # read after the point
+    for byte in field:
+        if byte == 46 and digits < 0:  # the point
+            digits = 0
+        elif not 48 <= byte <= 57:
+            return None
+        elif digits < 0:
+            whole = 10 * whole + byte - 48
+        elif digits < _DIGITS:
+            part = 10 * part + byte - 48
+            digits += 1
+    if digits < 0 or whole >= 18000:
+        return None
+    while digits < _DIGITS:
+        part *= 10
+        digits += 1
+    angle = (whole // 100 * 60 + whole % 100) * 100_000 + part
+    return -angle if negative else angle
+
+
+def _date(field):
+    """The date ddmmyy as place() has it, 0 if it is none."""
+    try:
+        date = int(field)
+    except ValueError:
+        return 0
+    return (date % 100 << 9 | date // 100 % 100 << 5 | date // 10_000) & 0xFFFF
 
 
 def _checksum(line, start, end):

@@ -1,6 +1,7 @@
 """Opens the speed source that config.py names, and refuses speeds that no vehicle can have.
 
-A source is a Gps or a Wheel. Both have poll(now_ms), after_stall(now_ms), fault(now_ms), problem and age_ms.
+A source is a Gps or a Wheel. Both have poll(now_ms), place(now_ms), after_stall(now_ms), fault(now_ms), problem and
+age_ms.
 """
 
 from time import ticks_diff
@@ -41,6 +42,11 @@ class Speed:
         self._last_ms = now_ms
         self.age_us = 1000 * self._source.age_ms
         return speed
+
+    def place(self, now_ms):
+        """Where the vehicle was when the speed was measured that poll(now_ms) has found, also one that it has refused:
+        as Gps.place() returns it, or None."""
+        return self._source.place(now_ms)
 
     def after_stall(self, now_ms):
         """Say that interrupts were off until now, while flash was erased. now_ms: ticks_ms()."""

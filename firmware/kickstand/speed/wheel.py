@@ -161,6 +161,9 @@ class Wheel:
         self.age_ms = (ticks_diff(ticks_us(), pulse_us) + period_us // 2) // 1000
         return pulses * self._metre_us / period_us
 
+    def place(self, now_ms):
+        """None: a wheel does not know where it is."""
+
     def after_stall(self, now_ms):
         """Interrupts were off until now, and pulses may be lost or late: the next period begins with the next pulse."""
         if self._seen_us is not None or self._seen != self.count:

@@ -257,7 +257,7 @@ def test_a_gap_belongs_to_its_own_ride(recorder, keeper, clock):
     add(recorder, 2, clock)
     recorder.mark_gap()
     start(recorder)
-    recorder.add_speed(500)
+    recorder.add_fix(5.0, None)
     start(recorder)
     add(recorder, 3, clock)
     recorder.stop()
@@ -269,13 +269,34 @@ def test_a_gap_belongs_to_its_own_ride(recorder, keeper, clock):
 def test_a_speed_goes_with_the_next_turn_alone(recorder, keeper):
     start(recorder)
     add(recorder, 1)
-    recorder.add_speed(1200)
-    recorder.add_speed(0)  # the newest one counts, a zero is one
+    recorder.add_fix(12.0, None)
+    recorder.add_fix(0.0, None)  # the newest one counts, a zero is one
     add(recorder, 2)
-    recorder.add_speed(1234)
+    recorder.add_fix(12.34, None)
     add(recorder, 1)
     recorder.stop()
     assert [turn.speed_mps for turn in blocks(keeper)[0].turns] == [None, 0.0, None, 12.34]
+
+
+def test_a_position_goes_with_the_next_turn_alone(recorder, keeper):
+    """With a speed or without one."""
+    start(recorder)
+    recorder.add_fix(None, ride_writer.place(0))
+    recorder.add_fix(None, ride_writer.place(1))  # the newest one counts
+    add(recorder, 2)
+    recorder.add_fix(5.0, None)
+    add(recorder, 1)
+    recorder.add_fix(6.0, ride_writer.place(2))
+    add(recorder, 1)
+    recorder.add_fix(None, ride_writer.place(3))
+    start(recorder)
+    add(recorder, 1)
+    recorder.stop()
+    first, second = blocks(keeper)
+    hundredths = [turn.place and round(100 * turn.place.utc_s % 100) for turn in first.turns]
+    assert hundredths == [20, None, None, 30]
+    assert [turn.speed_mps for turn in first.turns] == [None, None, 5.0, 6.0]
+    assert [turn.place for turn in second.turns] == [None]
 
 
 def test_time_and_room(recorder, keeper):

@@ -3,6 +3,7 @@
 import math
 import random
 import types
+from array import array
 
 from kickstand.calibration.parameters import Calibration
 from kickstand.calibration.store import pack
@@ -42,8 +43,20 @@ def turns(count, seed=0):
         yield sums, n, n * 5000 + random.randint(-200, 200)
 
 
-def blocks(count, ride=1, length=block_length, sequence=0, time_us=2_000_000, trim_deg=0.0, speed=False):
-    """`count` full blocks, and the turns of the loop that they hold: (sums of six, n, dt_us)."""
+def place(k):
+    """The k-th position, as Gps.place() has it: from 17.9 s before the new year's midnight on, one in 0.1 s."""
+    day_ms, date = 86_382_100 + 100 * k, 26 << 9 | 12 << 5 | 31
+    if day_ms >= 86_400_000:
+        day_ms, date = day_ms - 86_400_000, 27 << 9 | 1 << 5 | 1
+    return array("i", (date, day_ms, -203_212_345 + 7 * k, -1_079_999_999 + 11 * k))
+
+
+def blocks(
+    count, ride=1, length=block_length, sequence=0, time_us=2_000_000, trim_deg=0.0, speed=False, places_every=0
+):
+    """`count` full blocks, and the turns of the loop that they hold: (sums of six, n, dt_us).
+
+    speed: each hundredth turn has one. places_every: turns from one position to the next, 0 for none."""
     block = RideBlock(5000)
     body = pack(CHIP.who_am_i, CHIP.accel_range_g, calibration(trim_deg))
     written, held = [], []
@@ -54,6 +67,8 @@ def blocks(count, ride=1, length=block_length, sequence=0, time_us=2_000_000, tr
             sums, n, dt_us = next(source)
             if speed and len(held) % 100 == 0:
                 block.add_speed(len(held))
+            if places_every and len(held) % places_every == 0:
+                block.add_place(place(len(held) // places_every))
             block.add(sums, n, dt_us)
             time_us += dt_us
             held.append((tuple(sums[:3] + sums[4:]), n, dt_us))

@@ -1,7 +1,7 @@
 """A recorded ride in the vehicle's axes, block by block: what plot, report and export work on.
 
-The lean is the firmware's own, sample by sample. Everything that does not depend on the past is computed by numpy; a
-test holds it equal to the firmware.
+The lean is the firmware's own, sample by sample, or the smoothed one. Everything that does not depend on the past is
+computed by numpy; a test holds it equal to the firmware.
 """
 
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 from kickstand.errors import Notice
-from kickstand.lean.meter import FALLEN_DEG
+from kickstand.lean.meter import FALLEN_DEG, MAX_VARIANCE
 from numpy.typing import NDArray
 
 from ..calibration.file import CalibrationFile, calibration_beside, read_calibration
@@ -22,6 +22,7 @@ from ..logs.source import File, Progress, log_stem, name_of
 from ..logs.stretch import Stretch
 from ..logs.table import Array, Table
 from ..replay import replay_engine
+from ..smoothing.smooth import smooth_blocks
 
 _TOO_SMALL = 0.01  # g2, as in kickstand.lean: in free fall no force tells a direction
 
@@ -61,7 +62,7 @@ class Channels(Table):
 
     @property
     def trusted(self) -> NDArray[np.bool_]:
-        """(n) True where the display shows the lean and holds its maxima."""
+        """(n) True where the display shows the lean and holds its maxima; a smoothed one by the same limits."""
         return (self.sure > 0.0) & ~(np.abs(self.lean_deg) >= FALLEN_DEG)
 
     @property
@@ -81,10 +82,12 @@ class Channels(Table):
 
 @dataclass
 class Ride:
-    """A log and the calibration it is read with."""
+    """A log and the calibration it is read with. smoothed: its lean is the one looked back over, and not the one that
+    the display showed."""
 
     log: Source
     calibration: CalibrationFile
+    smoothed: bool = False
 
     @property
     def name(self) -> str:
@@ -106,7 +109,7 @@ class Ride:
         read_blocks(). Raises InputError."""
         lean = _Lean(self.calibration)
         told = False
-        for whole in read_blocks(self.log, progress=progress, notices=notices):
+        for whole, found in self._read(progress, notices):
             block = whole.believed
             if not len(block.time_us):
                 continue
@@ -114,13 +117,26 @@ class Ride:
             if notices is not None and not told and np.any(rows[:, 2] < 0.0):
                 told = True
                 notices.append(_absurd(block, int(np.argmax(rows[:, 2] < 0.0))))
+            if found is not None:
+                shown = found[~whole.frozen]
+                rows[:, 0], rows[:, 2] = shown[:, 0], np.radians(shown[:, 1]) ** 2
+                rows[:, 5] = rows[:, 2] <= MAX_VARIANCE  # NaN is not
             yield channels(block, self.calibration, rows, self.car)
 
+    def _read(
+        self, progress: Progress | None, notices: list[Notice] | None
+    ) -> Iterator[tuple[Block, Array | None]]:
+        """The blocks of the log, and what smooth_blocks() gives for each, None where it is not wanted."""
+        if self.smoothed:
+            return smooth_blocks(self.log, self.calibration, progress, notices)
+        return ((block, None) for block in read_blocks(self.log, progress=progress, notices=notices))
 
-def open_ride(log: Source, calibration: CalibrationFile | File | None = None) -> Ride:
+
+def open_ride(log: Source, calibration: CalibrationFile | File | None = None, smoothed: bool = False) -> Ride:
     """A ride to look at: a log (see read_log) with a calibration, or the file of one; None: NAME.cal.json beside it.
 
-    Raises InputError, also for a calibration that is not aligned: lean and braking are then unknown.
+    smoothed: with the lean of smooth() in the place of the firmware's; a car has none. Raises InputError, also for a
+    calibration that is not aligned: lean and braking are then unknown.
 
     >>> import numpy as np
     >>> from kickstand_tools.api import CalibrationFile, Log
@@ -139,7 +155,7 @@ def open_ride(log: Source, calibration: CalibrationFile | File | None = None) ->
         name = "the calibration" if isinstance(source, CalibrationFile) else name_of(source)
         todo = "kickstand calibrate two, or calibrate ride, first"
         raise InputError(f"{name} is not aligned, so lean and braking are unknown: {todo}")
-    return Ride(log, parameters)
+    return Ride(log, parameters, smoothed and parameters.vehicle != "car")
 
 
 def vehicle_channels(
@@ -158,7 +174,7 @@ def vehicle_channels(
     """
     from .downsample import joined
 
-    return joined(list(open_ride(log, calibration).blocks(progress)))
+    return joined(open_ride(log, calibration).blocks(progress))
 
 
 def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool = False) -> Channels:

@@ -11,9 +11,28 @@ from .channels import Channels
 _LAST = ("lat_deg", "lon_deg", "utc_s")
 
 
-def joined(parts: list[Channels]) -> Channels:
-    """The parts of a ride, one after the other, as one."""
-    return Channels(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(Channels)))
+def joined(parts: Iterable[Channels]) -> Channels:
+    """The parts of a ride, one after the other, as one. Of parts that are made one by one the memory holds but one."""
+    columns: list[Array] = []
+    length = 0
+    for part in parts:
+        columns = columns or [np.zeros(0) for _ in fields(Channels)]
+        end = length + len(part.t_s)
+        for column, field in zip(columns, fields(Channels)):
+            if end > len(column):
+                column.resize(end + end // 2, refcheck=False)  # in place, where the system can
+            column[length:end] = getattr(part, field.name)
+        length = end
+    for column in columns:
+        column.resize(length, refcheck=False)
+    return Channels(*columns)
+
+
+def thinned(course: Channels, step_s: float) -> Channels:
+    """A whole ride in means over step_s; itself if it has no more samples than that."""
+    if np.all(np.diff(_stretches(course.t_s, step_s)) > 0.0):
+        return course
+    return joined(downsampled([course], step_s))
 
 
 def spacing_s(course: Channels) -> float:
@@ -30,13 +49,18 @@ def downsampled(blocks: Iterable[Channels], step_s: float) -> Iterator[Channels]
     rest: Channels | None = None
     for block in blocks:
         block = block if rest is None else joined([rest, block])
-        step = np.floor(block.t_s / step_s + 1e-6)
+        step = _stretches(block.t_s, step_s)
         last = int(np.searchsorted(step, step[-1]))  # the last stretch may go on in the next block
         rest = block.part(slice(last, None))
         if last:
             yield _means(block.part(slice(0, last)), step[:last])
     if rest is not None:
         yield _means(rest, np.zeros(len(rest.t_s)))
+
+
+def _stretches(t_s: Array, step_s: float) -> Array:
+    """The number of the stretch that each sample lies in."""
+    return np.floor(t_s / step_s + 1e-6)
 
 
 def _means(block: Channels, step: Array) -> Channels:

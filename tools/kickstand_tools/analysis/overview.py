@@ -60,7 +60,7 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
             mount.add(block.t_s, block.force_g, block.rate_dps, block.speed_mps)
             yield block
 
-    course = joined(list(downsampled(blocks(), RATE_S)))
+    course = joined(downsampled(blocks(), RATE_S))
     total.frozen_s = sum(float(notice.values[1]) for notice in notices if notice.code == "frozen-readings")
     found = quality(course, standing(course))
     contradiction = mount.notice(found.roll_deg)

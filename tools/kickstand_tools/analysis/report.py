@@ -34,6 +34,7 @@ def as_data(seen: Overview) -> dict[str, Any]:
     }
     peaks = {"max_brake_g": total.brake_g, "max_accel_g": total.accel_g, "max_speed_mps": total.speed_mps}
     if not seen.ride.car:
+        data["lean"] = "smoothed" if seen.ride.smoothed else "live"
         peaks = {"max_left_deg": total.left_deg, "max_right_deg": total.right_deg} | peaks
         data |= {f"beyond_{limit:.0f}_deg_s": round(s, 2) for limit, s in total.beyond_s.items()}
     for name, peak in peaks.items():
@@ -87,6 +88,8 @@ def _ride(seen: Overview) -> Table:
     table = Table.grid(padding=(0, 3))
     table.add_row("Duration", clock(total.duration_s), f"riding {clock(total.riding_s)}")
     if not seen.ride.car:
+        how = "smoothed" if seen.ride.smoothed else "as the display showed it"
+        table.add_row("Lean", how)
         table.add_row("Max left", *_peak(total.left_deg, "{:.0f}°"))
         table.add_row("Max right", *_peak(total.right_deg, "{:.0f}°"))
         for limit, seconds in total.beyond_s.items():

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
+from kickstand.lean.meter import HELD_US
 from kickstand.units import GAP_US, LOST_US
 
 from ..logs.table import Array
@@ -10,6 +11,7 @@ from .channels import Channels
 
 LEANS_DEG = (30.0, 40.0)
 BIN_DEG = 1.0
+HELD_S = 2e-6 * HELD_US  # a maximum of the lean lasts so long, as on the display
 BINS_DEG = np.arange(-70.0, 70.0 + BIN_DEG, BIN_DEG)
 
 
@@ -31,11 +33,11 @@ class Peak:
 class Summary:
     """A ride in figures; add() takes it block by block.
 
-    left_deg, right_deg: the largest lean to each side. brake_g, accel_g: the largest forces, smoothed as on the
-    display. These four count where the display would show the lean. riding_s: time not at rest. beyond_s: time at a
-    lean of at least so many degrees, by degrees. histogram_s: time on the move in each bin of BINS_DEG. not_sure_s:
-    time in which the meter does not trust its lean.  missing_s: time without readings, longer than LOST_US each.
-    frozen_s: of that, the time in which there were readings, but frozen ones.
+    left_deg, right_deg: the largest lean to each side that lasted HELD_S. brake_g, accel_g: the largest forces,
+    smoothed as on the display. These four count where the display would show the lean. riding_s: time not at rest.
+    beyond_s: time at a lean of at least so many degrees, by degrees. histogram_s: time on the move in each bin of
+    BINS_DEG. not_sure_s: time in which the meter does not trust its lean.  missing_s: time without readings, longer
+    than LOST_US each. frozen_s: of that, the time in which there were readings, but frozen ones.
     """
 
     samples: int = 0
@@ -51,6 +53,8 @@ class Summary:
     not_sure_s: float = 0.0
     missing_s: float = 0.0
     frozen_s: float = 0.0
+    _last_t_s: Array = field(default_factory=lambda: np.zeros(0))  # of the block before, as far as it is needed
+    _last_deg: Array = field(default_factory=lambda: np.zeros(0))
 
     def add(self, block: Channels) -> None:
         """The next part of the ride."""
@@ -64,8 +68,7 @@ class Summary:
         sure = block.trusted
         lean = np.where(sure, block.lean_deg, np.nan)
         forward = np.where(sure, block.shown_g, np.nan)
-        self.right_deg.add(t, lean)
-        self.left_deg.add(t, -lean)
+        self._hold(t, lean)
         self.accel_g.add(t, forward)
         self.brake_g.add(t, -forward)
         self.speed_mps.add(t, block.speed_mps)
@@ -76,6 +79,23 @@ class Summary:
         self.not_sure_s += float(np.sum(step[~sure]))
         held = riding & sure
         self.histogram_s += np.histogram(block.lean_deg[held], BINS_DEG, weights=step[held])[0]
+
+
+    def _hold(self, t_s: Array, lean: Array) -> None:
+        """lean: NaN where it is not trusted."""
+        if not len(t_s):
+            return
+        step_s = float(np.median(np.diff(t_s))) if len(t_s) > 1 else HELD_S
+        n = max(1, round(HELD_S / max(step_s, 1e-6)))
+        t_s, lean = np.append(self._last_t_s, t_s), np.append(self._last_deg, lean)
+        self._last_t_s, self._last_deg = t_s[-n:], lean[-n:]
+        if len(lean) > n:
+            for peak, values in ((self.right_deg, lean), (self.left_deg, -lean)):
+                windows = np.lib.stride_tricks.sliding_window_view(values, n + 1)  # n steps each
+                least = np.min(windows, axis=1)
+                best = int(np.argmax(np.where(np.isnan(least), -np.inf, least)))
+                at = best + int(np.argmin(windows[best]))
+                peak.add(t_s[at : at + 1], least[best : best + 1])
 
 
 def summary(channels: Channels) -> Summary:

@@ -62,7 +62,7 @@ def import_(
         click.echo(f"      kickstand report {out}")
 
 
-_WRONG = ("import-mirrored", "left-handed", "rates-misfit", "rates-in-radians")  # the axes are to be put right first
+_WRONG = ("mirrored", "left-handed", "rates-misfit", "rates-in-radians")  # the axes are to be put right first
 
 
 def _pairs(text: str, option: str) -> dict[str, str]:

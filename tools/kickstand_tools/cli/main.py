@@ -5,7 +5,7 @@ import sys
 import click
 
 from ..errors import InputError
-from . import board, calibrate, calibrate_ride, fleet, import_, ride, simulated, without_a_board
+from . import board, calibrate, calibrate_ride, fleet, import_, join, overlay, ride, simulated, without_a_board
 
 
 @click.group(
@@ -22,9 +22,10 @@ def kickstand(context: click.Context) -> None:
 
 for _command in (
     *(board.flash, board.status, board.pull, board.record),
-    *(import_.import_, calibrate.calibrate, ride.replay, ride.report, ride.plot, ride.export, ride.cut),
+    *(import_.import_, join.join, calibrate.calibrate, ride.replay, ride.smooth, ride.report, ride.plot, ride.export),
+    *(ride.cut, overlay.overlay),
     *(fleet.fleet, simulated.simulate, simulated.evaluate),
-    *(without_a_board.demo, without_a_board.emulate, without_a_board.bench),
+    *(without_a_board.demo, without_a_board.web, without_a_board.emulate, without_a_board.bench),
 ):
     kickstand.add_command(_command)
 calibrate.calibrate.add_command(calibrate_ride.ride)

@@ -1,4 +1,4 @@
-"""The commands of `kickstand` that read a recorded ride: replay, report, plot, export, cut."""
+"""The commands of `kickstand` that read a recorded ride: replay, smooth, report, plot, export, cut."""
 
 import json
 from collections.abc import Callable
@@ -24,6 +24,9 @@ _FROM = click.option(
 _TO = click.option(
     "--to", "to_s", type=float, metavar="S", help="Leave out what is after; a negative S counts from the end."
 )
+
+
+_LIVE = click.option("--live", is_flag=True, help="The lean that the display showed, not the smoothed one.")
 
 
 def _stretch(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -64,6 +67,30 @@ def replay(
 
 @click.command()
 @click.argument("ride", type=_PATH, metavar="RIDE.csv")
+@_CALIBRATION
+@_stretch
+@_OUT
+def smooth(ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, out: Path) -> None:
+    """The lean looked back over: from the whole ride, each sample with its standard deviation.
+
+    The log's axes are right-handed, and so are its rates; at rest the axis that points up reads +1 g.
+    """
+    from ..calibration.file import calibration_beside, read_calibration
+    from ..output import check_output
+    from ..progress import Bar
+    from ..smoothing.smooth import smooth_to_csv
+
+    calibration = calibration or calibration_beside(ride)
+    check_output(out, [ride, calibration])
+    parameters = read_calibration(calibration)
+    with Bar("smoothing") as bar:
+        count, notices = smooth_to_csv(_part(ride, from_s, to_s), parameters, out, bar.reach)
+    warn(ride, notices)
+    click.echo(f"written: {out}, {count} samples")
+
+
+@click.command()
+@click.argument("ride", type=_PATH, metavar="RIDE.csv")
 @click.option("--to", "form", required=True, type=click.Choice(["csv", "gpx", "vbo", "racechrono", "parquet"]))
 @_CALIBRATION
 @_OUT
@@ -91,11 +118,14 @@ def export(ride: Path, form: str, calibration: Path | None, out: Path) -> None:
 @click.argument("ride", type=_PATH, metavar="RIDE.csv")
 @_CALIBRATION
 @_stretch
+@_LIVE
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def report(
-    ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, as_json: bool
+    ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, live: bool, as_json: bool
 ) -> None:
     """A ride in a page: maxima, time at large leans, and each stop as a brake test has it.
+
+    The lean is the smoothed one: from the whole ride, and nearer to the truth than what the display showed.
 
     The log's axes are right-handed, and so are its rates; at rest the axis that points up reads +1 g.
     """
@@ -107,7 +137,7 @@ def report(
     from ..progress import Bar
 
     with Bar("reading") as bar:
-        seen = overview(open_ride(_part(ride, from_s, to_s), calibration), bar.reach)
+        seen = overview(open_ride(_part(ride, from_s, to_s), calibration, smoothed=not live), bar.reach)
     warn(ride, [*seen.notices, *([seen.exchanged] if seen.exchanged else [])])
     if as_json:
         click.echo(json.dumps(as_data(seen)))
@@ -119,11 +149,21 @@ def report(
 @click.argument("ride", type=_PATH, metavar="RIDE.csv")
 @_CALIBRATION
 @_stretch
+@click.option("--tiles", is_flag=True, help="Streets below the track: the page asks a server for them when it is open.")
+@_LIVE
 @click.option("--out", required=True, type=_PATH, help="The directory to write to.")
 def plot(
-    ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, out: Path
+    ride: Path,
+    calibration: Path | None,
+    from_s: float | None,
+    to_s: float | None,
+    tiles: bool,
+    live: bool,
+    out: Path,
 ) -> None:
     """Draw a ride: a picture (PNG) and a page to zoom into (HTML).
+
+    The lean is the smoothed one: from the whole ride, and nearer to the truth than what the display showed.
 
     The log's axes are right-handed, and so are its rates; at rest the axis that points up reads +1 g.
     """
@@ -134,9 +174,9 @@ def plot(
 
     plot.check(out)
     with Bar("reading") as bar:
-        seen = overview(open_ride(_part(ride, from_s, to_s), calibration), bar.reach)
+        seen = overview(open_ride(_part(ride, from_s, to_s), calibration, smoothed=not live), bar.reach)
     warn(ride, seen.notices)
-    for path in plot.draw(seen, out):
+    for path in plot.draw(seen, out, tiles):
         click.echo(f"written: {path}")
     warn(ride, [seen.exchanged] if seen.exchanged else [])
 

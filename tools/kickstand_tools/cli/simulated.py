@@ -37,7 +37,7 @@ _PROFILES = (
     type=click.FloatRange(-10.0, 10.0),
     help="Between the poses, degrees; at random if not given.",
 )
-@click.option("--speed", is_flag=True, help="Write a speed into the log, once a second.")
+@click.option("--speed", is_flag=True, help="Write speed and position into the log, once a second.")
 @click.option(
     "--fleet",
     "vehicles",

@@ -1,7 +1,10 @@
-"""The commands that run the firmware without a board: demo, emulate, bench."""
+"""The commands that run the firmware without a board: demo, web, emulate, bench."""
 
+import contextlib
 import json
 import sys
+import webbrowser
+from pathlib import Path
 
 import click
 
@@ -18,6 +21,30 @@ def demo(hand: bool, cpython: bool) -> None:
     except DeviceStopped as error:
         click.echo(str(error), err=True)
         sys.exit(1)
+
+
+@click.command()
+@click.option("--out", type=click.Path(path_type=Path), help="Write the site to this directory instead of opening it.")
+def web(out: Path | None) -> None:
+    """Ride the simulated board in the browser; with --out write the site for any web server."""
+    from ..output import check_directory
+    from ..progress import spinner
+    from ..web import serve, site
+
+    if out is not None:
+        check_directory(out)
+    with spinner("putting the site together"):
+        files = site.site_files()
+    if out is not None:
+        site.write_site(files, out)
+        click.echo(f"written: {out}, {len(files)} files for a web server: a browser runs no modules of a folder")
+        return
+    with serve.server(files) as server:
+        address = f"http://{serve.HOST}:{server.server_address[1]}/"
+        click.echo(f"Kickstand in the browser: {address} (Ctrl-C ends it)")
+        webbrowser.open(address)
+        with contextlib.suppress(KeyboardInterrupt):
+            server.serve_forever()
 
 
 @click.command()

@@ -1,4 +1,4 @@
-"""A simulated bike that is steered by hand, with commands. Plain Python for CPython and MicroPython.
+"""A simulated bike that is steered by hand, with keys or in the browser. Plain Python for CPython and MicroPython.
 
 Its motion follows the same equations as simulation/scripted/script.py.
 """
@@ -29,14 +29,15 @@ _SWAY_RADPS = 2.0 * pi * 0.4
 
 
 class HandBike:
-    """Starts on the kickstand; command() steers it. motion() and truth() are those of script.Ride, but t_s must not
-    go back."""
+    """Starts on the kickstand; command(), or stand(), ride() and lean_to(), steer it. motion() and truth() are those of
+    script.Ride, but t_s must not go back."""
 
     def __init__(self, vibration_g=0.05):
         self._vibration_g = vibration_g
         self._t_s = 0.0
         self._pose = "kickstand"  # or "upright", "riding"
         self._lean_wish = 0.0
+        self._cruise = CRUISE_MPS
         self._lean, self._lean_rate = radians(KICKSTAND_DEG), 0.0
         self._speed, self._acceleration, self._distance = 0.0, 0.0, 0.0
         self._sway = 0.0  # amplitude, rad
@@ -44,19 +45,32 @@ class HandBike:
     def command(self, name):
         """left, right: set off, then lean 5 degrees further; upright, kickstand: stop and stand so."""
         if name in ("kickstand", "upright"):
-            self._pose = name
-            self._lean_wish = 0.0
+            self.stand(name)
         elif name in ("left", "right") and self._pose != "kickstand":
             step = LEAN_STEP_DEG if name == "right" else -LEAN_STEP_DEG
             if self._pose == "riding":
-                self._lean_wish = max(-MAX_LEAN_DEG, min(MAX_LEAN_DEG, self._lean_wish + step))
+                self.lean_to(self._lean_wish + step)
             self._pose = "riding"
+
+    def stand(self, pose):
+        """Stop, and stand on the "kickstand" or "upright"."""
+        self._pose = pose
+        self._lean_wish = 0.0
+
+    def ride(self, speed_mps):
+        """Set off, or ride on, at this speed in m/s: more than script.RIDING_MPS, or the bike would not lean."""
+        self._pose = "riding"
+        self._cruise = speed_mps
+
+    def lean_to(self, lean_deg):
+        """Lean so far, > 0 to the right, in degrees; 50 at most. While the bike stands or sets off it stays upright."""
+        self._lean_wish = max(-MAX_LEAN_DEG, min(MAX_LEAN_DEG, lean_deg))
 
     def _advance(self, t_s):
         while self._t_s < t_s:
             step = min(_STEP_S, t_s - self._t_s)
             self._t_s += step
-            cruise = CRUISE_MPS if self._pose == "riding" else 0.0
+            cruise = self._cruise if self._pose == "riding" else 0.0
             wish = _SPEED_RATE * (cruise - self._speed)
             self._acceleration = max(-_MAX_BRAKING, min(_MAX_ACCELERATION, wish))
             if cruise == 0.0 and self._speed < 0.02:
@@ -100,7 +114,7 @@ class HandBike:
             return self._pose if settled and abs(self._lean - pose) < 0.01 else "moving"
         if self._pose != "riding":
             return "brake"
-        if self._speed < CRUISE_MPS - 1.0:
+        if self._speed < self._cruise - 1.0:
             return "accelerate"
         if settled and self._lean_wish and abs(self._lean - radians(self._lean_wish)) < 0.02:
             return "held turn"

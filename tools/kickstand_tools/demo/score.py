@@ -1,13 +1,13 @@
 """The lean on the LCD compared with the true one."""
 
-import re
 from dataclasses import dataclass
 from math import sqrt
 from typing import TypedDict
 
 from rich.table import Table
 
-_LEAN_PAGE = re.compile(r"Lean +(\d+)° (left|right)?[ *]*$")
+from .shown_lean import shown_lean
+
 _ROLLING = ("roll in", "roll out", "roll")
 _STANDING = ("kickstand", "upright", "moving", "wait")
 
@@ -34,14 +34,6 @@ class Figures:
     shown_mean_deg: float
     rms_error_deg: float
     worst_error_deg: float
-
-
-def shown_lean(lcd: list[str]) -> float | None:
-    """The lean that an LCD shows in degrees, > 0 to the right; None if it shows another page."""
-    found = _LEAN_PAGE.match(lcd[0])
-    if not found:
-        return None
-    return -float(found[1]) if found[2] == "left" else float(found[1])
 
 
 class Score:

@@ -40,11 +40,16 @@ def judge(path: Path, port: str, machine: str) -> Judged:
         text=True,
         check=True,
     )
-    fault, unused = json.loads(done.stdout.splitlines()[-1])  # config.py may print too
+    return in_words(path, *json.loads(done.stdout.splitlines()[-1]))  # config.py may print too
+
+
+def in_words(path: Path, fault: tuple[int | None, str] | None, unused: list[tuple[int, str]]) -> Judged:
+    """What posing() has found."""
+    said = None
     if fault:
         line, reason = fault
-        fault = f"{path}{f', line {line}' if line else ''}: {reason}: correct it and run this command again"
-    return Judged(fault, [f"{path}, line {line}: {text}" for line, text in unused])
+        said = f"{path}{f', line {line}' if line else ''}: {reason}: correct it and run this command again"
+    return Judged(said, [f"{path}, line {line}: {text}" for line, text in unused])
 
 
 def _fault(path: Path, port: str) -> tuple[int | None, str] | None:
@@ -98,14 +103,17 @@ def _line_of(name: str, source: bytes) -> int | None:
     return max((node.lineno for node in named if node.id == name), default=None)
 
 
-def _main(port: str, machine: str, path: Path) -> None:
-    """This process cannot be used for anything else afterwards."""
+def posing(
+    path: Path, port: str, machine: str
+) -> tuple[tuple[int | None, str] | None, list[tuple[int, str]]]:
+    """(fault: None or (line, reason), unused: (line, text) each). This process poses as the board from then on, and
+    cannot judge for another."""
     Board(lambda t_s: (0, 0, 1, 0, 0, 0), port="esp32" if port == "esp32" else "rp2").install()  # for machine
     sys.platform = port
     vars(sys.implementation)["_machine"] = machine
     unused = _unused(path, port)
-    print("\n" + json.dumps([_fault(path, port), unused]))
+    return _fault(path, port), unused
 
 
 if __name__ == "__main__":
-    _main(sys.argv[1], sys.argv[2], Path(sys.argv[3]))
+    print("\n" + json.dumps(posing(Path(sys.argv[3]), sys.argv[1], sys.argv[2])))

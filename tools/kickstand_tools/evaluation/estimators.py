@@ -1,10 +1,12 @@
-"""The estimators that are compared: the firmware's own lean, and the filters of hobby projects and of the literature.
+"""The estimators that are compared: the firmware's own lean, the one looked back over after the ride, and the filters
+of hobby projects and of the literature.
 
 Each takes Samples and returns the lean in degrees of every sample, > 0 to the right. The filters of the packages
 `ahrs` and `vqf` run with their authors' default gains, started from the first reading.
 """
 
 from collections.abc import Callable
+from dataclasses import replace
 from importlib.util import find_spec
 
 import numpy as np
@@ -14,6 +16,7 @@ from numpy.typing import NDArray
 from ..calibration.file import CalibrationFile
 from ..logs.reader import Log
 from ..replay import replay_engine
+from ..smoothing.smooth import smooth
 from .samples import Samples, calibrated
 
 AVERAGE_S = 0.3  # of the formula's lean
@@ -94,6 +97,7 @@ def estimate(
     samples = calibrated(log, calibration)
     result = {
         "kickstand": shown,
+        "smoothed": smooth(replace(log, speed_mps=np.zeros(0)), calibration).lean_deg,
         "formula": formula,
         "formula 0.3 s": trailing_mean(formula, AVERAGE_S, samples.rate_hz),
     }

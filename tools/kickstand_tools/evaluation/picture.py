@@ -20,6 +20,7 @@ _STYLES = {
     "true": ("black", 1.8),
     "reference": ("black", 1.8),
     "kickstand": ("tab:red", 1.4),
+    "smoothed": ("tab:cyan", 1.2),
 }
 
 

@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..logs.axes.course import course_agrees
 from ..logs.csv_lines import write_log
 from ..logs.log import Log
-from ..logs.reader import read_log
+from ..logs.reader import LEAST_G, read_log
 from . import mapped
 from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo
 from .files import Piece, read_pieces
@@ -21,7 +21,6 @@ from .sheets import check_pandas
 from .units import ACCELERATIONS, SPEEDS, factor, unit
 
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
-WITHOUT_GRAVITY_G = 0.4  # median force: a ride's is over 0.9
 WRONG_UNIT_G = 3.0  # median force: m/s2 taken for g give 9.8
 
 
@@ -98,8 +97,6 @@ def import_recording(
             utc_s=joined.utc_s[rows],
         )
     )
-    if any(notice.code in ("left-handed", "rates-misfit") for notice in log.notices):
-        recording.notices = [notice for notice in recording.notices if notice.code != "import-mirrored"]  # so it seems
     return Imported(
         recording.app,
         log,
@@ -160,7 +157,7 @@ def _recording(pieces: list[Piece], name: str, columns: Mapping[str, str] | None
 def _check_force(joined: Joined, name: str) -> None:
     """Raise InputError where the acceleration has no gravity in it, or is in another unit than it says."""
     usual = float(np.median(np.linalg.norm(joined.accel_g, axis=1)))
-    if usual < WITHOUT_GRAVITY_G:
+    if usual < LEAST_G:
         raise InputError(
             f"{name}: its acceleration is {usual:.2f} g as a rule, where gravity makes it 1: gravity has been taken "
             "off, and without it there is no lean; record the acceleration with gravity"
@@ -172,12 +169,14 @@ def _check_force(joined: Joined, name: str) -> None:
 
 
 def _check_sign(recording: Recording, joined: Joined) -> None:
-    """Where the track shows a mirrored accelerometer: turn it if its sign was only likely, else remark on it."""
-    agrees = course_agrees(_seconds(joined), joined.accel_g, joined.gyro_dps, joined.lat_deg, joined.lon_deg)
+    """Turn an accelerometer whose sign was only likely where the track shows that it is mirrored.
+
+    One whose sign is known is left as it is: reading the log remarks on it.
+    """
     if recording.sign_known:
-        if agrees is False:
-            recording.notices.append(Notice("import-mirrored", recording.app))
-    elif agrees is None:
+        return
+    agrees = course_agrees(_seconds(joined), joined.accel_g, joined.gyro_dps, joined.lat_deg, joined.lon_deg)
+    if agrees is None:
         recording.notices.append(Notice("import-sign", recording.app))
     elif agrees:
         _say_sign(recording, "+1 g up, by the turns of the track")

@@ -1,7 +1,7 @@
 """A recorded log in memory."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 from kickstand.errors import Notice
@@ -105,8 +105,8 @@ class Log(Table):
 
     def part(self, which: NDArray[np.bool_]) -> "Log":
         """The samples where an array of n is True."""
-        values = {field.name: getattr(self, field.name) for field in fields(self)}
-        return Log(**{name: v[which] if isinstance(v, np.ndarray) else v for name, v in values.items()})
+        arrays = [field.name for field in fields(self) if isinstance(getattr(self, field.name), np.ndarray)]
+        return replace(self, **{name: getattr(self, name)[which] for name in arrays})
 
     def _optional(self, values: ArrayLike) -> Array:
         array = np.asarray(values, dtype=float)

@@ -6,6 +6,7 @@ import io
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from kickstand.errors import Notice
@@ -15,6 +16,7 @@ from ..errors import InputError
 from ..output import write_whole
 from . import cells
 from .axes.bends import Bends
+from .axes.course import Course
 from .axes.handedness import Handedness
 from .block import Block
 from .cells import COLUMNS, OPTIONAL, TRACK
@@ -27,8 +29,8 @@ from .speed_unit import SpeedUnit
 from .stretch import Stretch
 from .table import Array
 
-BLOCK_BYTES = 1 << 22  # of text, some 60000 samples
-LEAST_G = 0.3  # less than this is usual where gravity was taken off
+BLOCK_BYTES = 1 << 20  # of text, some 15000 samples
+LEAST_G = 0.4  # median force; less is usual where gravity was taken off, a ride's is over 0.9
 BLOCK_SAMPLES = 60_000  # of a log in memory
 _NUMERIC = b"0123456789+-.eE, \n"  # where nothing else stands, numpy may read it
 
@@ -68,11 +70,8 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None,
 
 
 def read_blocks(
-    source: Source,
-    minimum: int = 2,
-    progress: Progress | None = None,
-    notices: list[Notice] | None = None,
-    axes: bool = True,
+    source: Source, minimum: int = 2, progress: Progress | None = None, notices: list[Notice] | None = None,
+    axes: bool = True
 ) -> Iterator[Block]:
     """The same block by block, however long the log is. Readings that froze are marked in each block.
 
@@ -81,7 +80,8 @@ def read_blocks(
     name, count = name_of(source), 0
     remarks: list[Notice] = []
     speed_unit, frozen = SpeedUnit(name), FrozenReadings()
-    judges = (Handedness(), Bends()) if notices is not None and axes else ()
+    judging = notices is not None and axes
+    judges, course = (Handedness(), Bends()) if judging else (), Course()
     whole = source.source if isinstance(source, Stretch) else source
     total = len(whole.t_s) if isinstance(whole, Log) else total_bytes(whole)
     for block in _unchecked(source, remarks):
@@ -93,20 +93,26 @@ def read_blocks(
             speed_unit.add(block.t_s, block.readings[:, :3], block.speed_mps)
         for judge in judges:
             judge.add(block.t_s, block.readings[:, :3], block.readings[:, 4:], block.speed_mps)
+        if judging:
+            course.add(block.t_s, block.readings[:, :3], block.readings[:, 4:], block.lat_deg, block.lon_deg)
         yield block
         if progress:
             progress(block.done, total)
     if count < minimum:
         raise InputError(f"{name} is too short: {count} samples, at least {minimum} are needed")
     if notices is not None:
-        judged = [notice for notice in (judge.notice() for judge in judges) if notice]
+        judged = [notice for notice in (judge.notice() for judge in (*judges, course)) if notice]
         notices += remarks + frozen.notices() + judged[:1]  # one cause is told once
 
 
 def read_twice(source: Source) -> Source:
     """The same where it can be read again, else a Log: an open file can be read once."""
     if isinstance(source, Stretch):
-        return Stretch(read_twice(source.source), source.from_s, source.to_s)
+        return Stretch(_again(source.source), source.from_s, source.to_s)
+    return _again(source)
+
+
+def _again(source: File | Log) -> File | Log:
     return source if isinstance(source, (Path, str, Log)) else read_log(source)
 
 
@@ -117,7 +123,7 @@ def _unchecked(source: Source, remarks: list[Notice]) -> Iterator[Block]:
     if not isinstance(source, Stretch):
         return _parsed(source, name_of(source), remarks)
     if source.from_its_end:
-        whole = read_twice(source.source)
+        whole = _again(source.source)
         last_s = [float(block.t_s[-1]) for block in _unchecked(whole, [])]
         source = Stretch(whole, source.from_s, source.to_s).of_length(max(last_s, default=0.0))
     return source.cut(_unchecked(source.source, remarks))
@@ -218,13 +224,12 @@ def _block(
     names: list[str],
     done: int,
 ) -> Block:
-    column = dict.fromkeys(OPTIONAL, np.full(len(table), np.nan))
+    column: dict[str, Any] = dict.fromkeys(OPTIONAL, np.full(len(table), np.nan))
     column |= {name: table[:, k] for k, name in enumerate(places)}
     order = ("ax_g", "ay_g", "az_g", "temp_c", "gx_dps", "gy_dps", "gz_dps")
-    readings = np.column_stack([column[name] for name in order])
     return Block(
         time_us,
-        readings,
+        np.column_stack([column[name] for name in order]),
         has_temp="temp_c" in places,
         has_speed="speed_mps" in places,
         start_s=start_s,

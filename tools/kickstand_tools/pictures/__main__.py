@@ -1,7 +1,7 @@
 """Writes every picture to tools/pictures: .venv/bin/python -m kickstand_tools.pictures"""
 
 from .. import firmware_path
-from . import ride
+from . import page, ride
 from .drawn import drawn
 
 
@@ -10,6 +10,10 @@ def main() -> None:
     for name, svg in drawn().items():
         (directory / name).write_text(svg, encoding="utf-8")
     (directory / "ride.png").write_bytes(ride.draw())
+    if page.available():
+        (directory / "page.png").write_bytes(page.draw())
+    else:
+        print("no Chromium: page.png stays as it is")
     print(f"written: {directory}")
 
 

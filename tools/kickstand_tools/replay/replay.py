@@ -23,7 +23,7 @@ from .mount_check import MountCheck
 
 _CHUNK = 500  # samples between two calls of progress while an emulated Pico works
 
-_UNKNOWN = (float("nan"),) * len(replay_engine.COLUMNS)
+_SIGMA = replay_engine.COLUMNS.index("lean_sigma_deg")
 
 Row = tuple[float, ...]  # of replay_engine.COLUMNS
 Replayed = tuple[Block, list[Row]]
@@ -35,8 +35,9 @@ class LeanTable(Table):
 
     t_s: seconds since the first sample; where the readings froze all else is NaN. lean_deg: the shown lean.
     lean_formula_deg: Nicolae's (25)-(26) as it stands.
-    left_g, up_g, forward_g: specific force. static_lean_deg: the lean of a vehicle at rest with this force. notices:
-    what is remarkable in the ride (kickstand_tools.refusals.sentence puts a notice into words).
+    left_g, up_g, forward_g: specific force. static_lean_deg: the lean of a vehicle at rest with this force.
+    lean_sigma_deg: the standard deviation of the lean that the firmware believed in, NaN where the display shows no
+    lean. notices: what is remarkable in the ride (kickstand_tools.refusals.sentence puts a notice into words).
     """
 
     t_s: Array
@@ -48,6 +49,7 @@ class LeanTable(Table):
     static_lean_deg: Array
     yaw_rate_dps: Array
     roll_rate_dps: Array
+    lean_sigma_deg: Array
     notices: list[Notice]
 
 
@@ -70,7 +72,7 @@ def replay(
     notices: list[Notice] = []
     blocks = list(replay_blocks(log, calibration, engine, progress, notices))
     time_s = np.concatenate([block.t_s for block, _ in blocks])
-    columns = np.concatenate([np.array(results) for _, results in blocks]).T
+    columns = np.concatenate([results for _, results in blocks]).T
     return LeanTable(time_s, *columns, notices=notices)
 
 
@@ -87,7 +89,7 @@ def replay_to_csv(
         nonlocal count
         for block, results in replay_blocks(log, calibration, engine, progress, notices):
             count += len(results)
-            for time, row in zip(block.time_text, results, strict=True):
+            for time, row in zip(block.time_text, results.tolist(), strict=True):
                 yield [time, *(f"{value:.5f}" for value in row)]
 
     write_table(out, ("t_s", *replay_engine.COLUMNS), rows())
@@ -96,9 +98,9 @@ def replay_to_csv(
 
 def replay_blocks(
     log: Source, calibration: CalibrationFile, engine: str, progress: Progress | None, notices: list[Notice]
-) -> Iterator[Replayed]:
-    """Each block of the log with the engine's results for it, NaN where the readings froze: there the engine is told of
-    a gap. notices is appended to at the end."""
+) -> Iterator[tuple[Block, Array]]:
+    """Each block of the log with the engine's results for it (n, COLUMNS), NaN where the readings froze: there the
+    engine is told of a gap. notices is appended to at the end."""
     mount = MountCheck(calibration)
     for block, results in _RUN[engine](log, calibration, progress, notices):
         believed = block.believed
@@ -108,11 +110,13 @@ def replay_blocks(
     notices += [contradiction] if contradiction else []
 
 
-def _with_frozen(block: Block, results: list[Row]) -> list[Row]:
-    if len(results) == len(block.time_us):
-        return results
-    given = iter(results)
-    return [_UNKNOWN if frozen else next(given) for frozen in block.frozen.tolist()]
+def _with_frozen(block: Block, results: list[Row]) -> Array:
+    """(n, COLUMNS), NaN where there is no value."""
+    found = np.full((len(block.time_us), len(replay_engine.COLUMNS)), np.nan)
+    found[~block.frozen] = np.reshape(results, (-1, len(replay_engine.COLUMNS)))
+    sigma = found[:, _SIGMA]
+    sigma[sigma == replay_engine.NOT_SHOWN] = np.nan
+    return found
 
 
 def _cpython(

@@ -11,7 +11,7 @@ is printed and read again may be another number.
 
 import struct
 import sys
-from math import degrees, radians
+from math import degrees, radians, sqrt
 
 from kickstand.calibration.parameters import Calibration
 from kickstand.lean.formula import static_lean_deg
@@ -28,10 +28,12 @@ COLUMNS = (
     "static_lean_deg",
     "yaw_rate_dps",
     "roll_rate_dps",
+    "lean_sigma_deg",
 )
 CALIBRATION = "<20d"
 RECORD = "<q8d"
-RESULT = "<8d"
+RESULT = "<9d"
+NOT_SHOWN = -1.0  # lean_sigma_deg where the display shows no lean
 NO_SPEED = -1.0  # not NaN, which a board's struct does not read as NaN
 
 
@@ -95,6 +97,7 @@ class Replay:
             static_lean_deg(force),
             degrees(rate[1]),
             degrees(rate[2]),
+            degrees(sqrt(meter.filter.variance)) if meter.trusted else NOT_SHOWN,
         )
 
 

@@ -4,6 +4,7 @@ import struct
 from binascii import crc32
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from datetime import UTC, datetime
 from typing import Any
 
 from kickstand.calibration import store
@@ -12,13 +13,25 @@ from kickstand.rides import block as block_format
 
 _HEAD_LENGTH = struct.calcsize(block_format.HEAD)
 _TAIL_LENGTH = struct.calcsize(block_format.TAIL)
+_PLACE_LENGTH = struct.calcsize(block_format.PLACE)
 _START = _HEAD_LENGTH + store.BODY_LENGTH
 _LATE_PERIODS = 2  # sample periods, as in kickstand.imu.sample_clock: samples were lost
+_DEGREE = 60 * 100_000  # in the unit of positions, 0.00001 minutes
 CUT_SHORT = "cut short"  # the last block of a ride often is: the power went off while it was written
 
 
 class BadBlock(Exception):
     """These bytes are not a whole block; the text says why in a few words."""
+
+
+@dataclass
+class Place:
+    """A position that came with a turn, and when it was there. lat_deg, lon_deg: north and east; utc_s: Universal Time,
+    s since 1970, None where the receiver did not know the date."""
+
+    lat_deg: float
+    lon_deg: float
+    utc_s: float | None
 
 
 @dataclass
@@ -29,6 +42,7 @@ class Turn:
     n: int
     sums: tuple[int, ...]
     speed_mps: float | None
+    place: Place | None = None
 
 
 @dataclass
@@ -96,7 +110,7 @@ def parse(data: bytes) -> Block:
         raise BadBlock("not of a ride")
     if len(data) < _START + _TAIL_LENGTH:
         raise BadBlock(CUT_SHORT)
-    _, version, length, *rest, firmware, delay = struct.unpack_from(block_format.HEAD, data)
+    _, version, length, *rest, firmware, places, delay = struct.unpack_from(block_format.HEAD, data)
     if version != block_format.VERSION:
         raise BadBlock(f"format {version}, this program reads {block_format.VERSION}")
     if len(data) < length:
@@ -108,14 +122,28 @@ def parse(data: bytes) -> Block:
     fields: list[Any] = [*rest, firmware, delay, data[_HEAD_LENGTH:_START], crc]
     block = Block(*fields)
     try:
-        block.turns = list(_turns(block, data[_START : len(data) - _TAIL_LENGTH], count))
+        end = len(data) - _TAIL_LENGTH - places * _PLACE_LENGTH
+        found = dict(_places(data[end : len(data) - _TAIL_LENGTH]))
+        block.turns = list(_turns(block, data[_START:end], count, found))
     except (ValueError, ZeroDivisionError) as error:  # the check sum is right: it was written like this
         raise BadBlock("not decodable") from error
     return block
 
 
-def _turns(block: Block, data: bytes, count: int) -> Iterator[Turn]:
-    """Undo block_format.encode_python."""
+def _places(data: bytes) -> Iterator[tuple[int, Place]]:
+    """The number of the entry that each position belongs to, and the position."""
+    for entry, date, day_ms, lat, lon in struct.iter_unpack(block_format.PLACE, data):
+        if abs(lat) > 90 * _DEGREE or abs(lon) > 180 * _DEGREE:
+            continue  # a receiver has said so, and a log with such a position would be refused
+        try:
+            midnight_s = datetime(2000 + (date >> 9), date >> 5 & 15, date & 31, tzinfo=UTC).timestamp()
+        except ValueError:
+            midnight_s = None
+        yield entry, Place(lat / _DEGREE, lon / _DEGREE, None if midnight_s is None else midnight_s + day_ms / 1000.0)
+
+
+def _turns(block: Block, data: bytes, count: int, places: dict[int, Place]) -> Iterator[Turn]:
+    """Undo block_format.encode_python. places: by the number of their entry."""
     bits = bin(int.from_bytes(b"\x01" + data, "big"))[3:]
     before = [1] + [0] * (block_format.FIELDS - 1)
     means = [block_format.START_MEAN] * block_format.FIELDS
@@ -138,7 +166,7 @@ def _turns(block: Block, data: bytes, count: int) -> Iterator[Turn]:
         means[i] = mean + min(size, block_format.MAX_SIZE) - (mean >> block_format.MEAN_SHIFT)
         return size >> 1 ^ -(size & 1)
 
-    for _ in range(count):
+    for entry in range(count):
         n_before = before[0]
         n = n_before + difference(0)
         if n == 0:
@@ -149,7 +177,7 @@ def _turns(block: Block, data: bytes, count: int) -> Iterator[Turn]:
         for i in range(2, 8):
             before[i] = (before[i] if n == n_before else before[i] * n // n_before) + difference(i)
         before[0] = n
-        yield Turn(now, n, tuple(before[2:8]), speed)
+        yield Turn(now, n, tuple(before[2:8]), speed, places.get(entry))
         speed = None
 
 

@@ -15,6 +15,7 @@ from ..calibration.file import CalibrationFile, write_calibration
 from ..deploy.board_console import BrokenOff, lines
 from ..deploy.connection import connected, refuse_unfit_firmware, restart
 from ..errors import InputError, cause
+from ..logs.cells import TRACK
 from ..output import check_output, write_whole
 from ..replay.replay_engine import ReplayMeter
 from . import ride_log
@@ -109,7 +110,7 @@ class _Recording:
         opened = gzip.open if path.suffix == ".gz" else open
         aligned = False
         with opened(path, "wt", encoding="ascii", newline="") as file:
-            file.write(",".join(ride_log.header(speed=True)) + "\n")
+            file.write(",".join(ride_log.header(TRACK)) + "\n")
             for block in blocks:
                 if self.first is None or block.body != self.first.body:
                     if self.first:
@@ -123,7 +124,7 @@ class _Recording:
                 expected = block.sequence + 1
                 missing_s += block.missing_s()
                 for row, turn in zip(
-                    ride_log.rows([block], True, self.first.time_us), block.turns, strict=True
+                    ride_log.rows([block], TRACK, self.first.time_us), block.turns, strict=True
                 ):
                     file.write(",".join(row) + "\n")
                     reading = [float(cell) for cell in row[1:7]]

@@ -1,25 +1,26 @@
 """A recorded ride as the project's log CSV and CAL.json."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ..calibration.file import CalibrationFile, calibration_path, write_calibration
-from ..logs.reader import COLUMNS, write_table
-from .block_reader import Block
+from ..logs.cells import COLUMNS, TRACK
+from ..logs.reader import write_table
+from .block_reader import Block, Turn
 
 
-def header(speed: bool) -> tuple[str, ...]:
-    """The log's column names."""
-    return (*COLUMNS, "speed_mps", "temp_c") if speed else (*COLUMNS, "temp_c")
+def header(track: Sequence[str]) -> tuple[str, ...]:
+    """The log's column names. track: those of TRACK that it has."""
+    return (*COLUMNS, *track, "temp_c")
 
 
-def rows(blocks: Iterable[Block], speed: bool, from_us: int = 0) -> Iterator[list[str]]:
+def rows(blocks: Iterable[Block], track: Sequence[str], from_us: int = 0) -> Iterator[list[str]]:
     """One row a turn of the board's loop: the mean of its samples at the time of the last, in s since from_us.
 
     Values have enough digits to tell one count of the chip from the next. The temperature stands in the first row of
-    each block.
+    each block. track: as header() takes it.
     """
     for block in blocks:
         lsb, gyro_lsb = block.accel_lsb_per_g, block.gyro_lsb_tenths / 10
@@ -28,11 +29,23 @@ def rows(blocks: Iterable[Block], speed: bool, from_us: int = 0) -> Iterator[lis
             row = [f"{(turn.time_us - from_us) / 1e6:.6f}"]
             row += [f"{total / turn.n / lsb:.7f}" for total in turn.sums[:3]]
             row += [f"{total / turn.n / gyro_lsb:.6f}" for total in turn.sums[3:]]
-            if speed:
-                row.append("" if turn.speed_mps is None else f"{turn.speed_mps:.2f}")
+            if track:
+                told = _told(turn)
+                row += [told[name] for name in track]
             row.append(temperature)
             yield row
             temperature = ""
+
+
+def _told(turn: Turn) -> dict[str, str]:
+    """What came from the speed source with a turn: the cells of TRACK."""
+    cells: dict[str, str] = dict.fromkeys(TRACK, "")
+    if turn.speed_mps is not None:
+        cells["speed_mps"] = f"{turn.speed_mps:.2f}"
+    if turn.place:
+        cells |= {"lat_deg": f"{turn.place.lat_deg:.7f}", "lon_deg": f"{turn.place.lon_deg:.7f}"}
+        cells["utc_s"] = "" if turn.place.utc_s is None else f"{turn.place.utc_s:.3f}"
+    return cells
 
 
 def calibration(block: Block) -> CalibrationFile:
@@ -58,8 +71,14 @@ def calibration(block: Block) -> CalibrationFile:
 
 def write(path: Path, blocks: list[Block]) -> Path:
     """Write NAME.csv.gz (or .csv) and NAME.cal.json beside it, whose path is returned."""
-    speed = any(turn.speed_mps is not None for block in blocks for turn in block.turns)
-    write_table(path, header(speed), rows(blocks, speed, blocks[0].time_us))
+    turns = [turn for block in blocks for turn in block.turns]
+    there = {
+        "speed_mps": any(turn.speed_mps is not None for turn in turns),
+        "lat_deg": any(turn.place for turn in turns),
+        "utc_s": any(turn.place and turn.place.utc_s is not None for turn in turns),
+    }
+    track = [name for name in TRACK if there[name.replace("lon", "lat")]]
+    write_table(path, header(track), rows(blocks, track, blocks[0].time_us))
     beside = calibration_path(path)
     write_calibration(beside, calibration(blocks[0]))
     return beside

@@ -2,7 +2,16 @@
 
 _KNOTS = 3600.0 / 1852.0
 _PIECE = 8  # bytes that are handed over at once
-_START_S = 12 * 3600 - 20  # UTC time of day when the clock is 0
+_START_S = 12 * 3600 - 20  # UTC time of day when the clock is 0, on 21 November 2026
+_HOME = 48.1173, 11.5166667  # degrees north and east
+
+
+def _angle(degrees, digits, sides):
+    """As NMEA writes it: degrees with so many digits, minutes, and the letter of its side."""
+    parts = int(abs(degrees) * 6e6 + 0.5)  # 0.00001 minutes
+    whole, rest = parts // 6_000_000, parts % 6_000_000
+    side = sides[1] if degrees < 0.0 else sides[0]
+    return "%0*d%02d.%05d,%s" % (digits, whole, rest // 100_000, rest % 100_000, side)
 
 
 def sentence(body):
@@ -14,14 +23,17 @@ def sentence(body):
 
 
 class Gps:
-    """speed(t_s): of the vehicle, m/s.  hz: fixes a second.  latency_s: from a fix to its first byte.
+    """speed(t_s): of the vehicle, m/s.  hz: fixes a second.  latency_s: from a fix to its first byte.  place(t_s):
+    latitude and longitude, degrees north and east; None: it stays where it is.
 
     kinds: which sentences with a speed it sends.  talker: their first letters, the satellite system.
     faults: [[kind, from_s, until_s], ...] where kind is "unplugged", "garbled" (a wrong bit now and then), "void" (no
     fix) or "stuck" (the last sentence again and again).
     """
 
-    def __init__(self, clock, speed, hz=1, latency_s=0.2, baud=9600, talker="GP", kinds=("RMC", "VTG"), faults=()):
+    def __init__(
+        self, clock, speed, hz=1, latency_s=0.2, baud=9600, talker="GP", kinds=("RMC", "VTG"), faults=(), place=None
+    ):
         self._clock = clock
         self._speed = speed
         self._latency_us = int(latency_s * 1e6)
@@ -29,6 +41,7 @@ class Gps:
         self._talker = talker
         self._kinds = kinds
         self._faults = faults
+        self._place = place
         self._last = b""
         self._sent = 0
         self._receive = None
@@ -52,7 +65,7 @@ class Gps:
         data = bytearray(self._last)
         if self._has("garbled"):
             for i in range(self._sent % 13, len(data), 13):
-                data[i] ^= 1 << self._sent % 7
+                data[i] ^= 1 << (self._sent + i // 13) % 7  # two of the same bit would leave the checksum right
         self._sent += 1
         start_us = self._clock.now_us + self._latency_us
         for i in range(0, len(data), _PIECE):
@@ -69,13 +82,15 @@ class Gps:
     def _sentences(self):
         now_us = self._clock.now_us
         knots = self._speed(now_us / 1e6) * _KNOTS
-        seconds = (now_us // 1_000_000 + _START_S) % 86400
+        seconds = now_us // 1_000_000 + _START_S
+        day, seconds = 21 + seconds // 86400, seconds % 86400
         time = "%02d%02d%02d.%02d" % (seconds // 3600, seconds // 60 % 60, seconds % 60, now_us // 10_000 % 100)
         valid = not self._has("void")
         text = ""
         if "RMC" in self._kinds:
-            fix = "A,4807.0380,N,01131.0000,E,%.3f,84.4" % knots if valid else "V,,,,,,"
-            text += sentence("%sRMC,%s,%s,211126,,,%s" % (self._talker, time, fix, "A" if valid else "N"))
+            lat, lon = self._place(now_us / 1e6) if self._place else _HOME
+            fix = "A,%s,%s,%.3f,84.4" % (_angle(lat, 2, "NS"), _angle(lon, 3, "EW"), knots) if valid else "V,,,,,,"
+            text += sentence("%sRMC,%s,%s,%02d1126,,,%s" % (self._talker, time, fix, day, "A" if valid else "N"))
         text += sentence("%sGSA,A,3,04,05,,09,12,,,24,,,,,2.5,1.3,2.1" % self._talker)
         if "VTG" in self._kinds:
             course = "84.4,T,,M,%.3f,N,%.3f,K,A" % (knots, knots * 1.852) if valid else ",,,,,,,,N"

@@ -6,14 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..logs.reader import COLUMNS
+from ..logs.cells import COLUMNS, TRACK
 from ..output import check_directory
+from .positions import positions
 from .profiles import check_profile
 from .ride import Ride, ride
 
 _LOG = ",".join((*COLUMNS, "temp_c"))
 _FORMATS = ["%.3f", *["%.6f"] * 6, "%.2f"]
-_SPEED_EVERY = 200  # samples: once a second, as a GPS receiver does
+_TRACK_EVERY = 200  # samples: once a second, as a GPS receiver does
 
 
 def simulate(
@@ -29,7 +30,8 @@ def simulate(
     """Simulate a ride (see ride.ride) and write it to out_dir. Raises InputError.
 
     Logs: POSE_1.csv to POSE_7.csv (the last one slanted), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv. TRUTH.csv has one row
-    for each row of RIDE.csv. A RIDE.cal.json that is there is removed. speed: RIDE.csv gets a speed once a second.
+    for each row of RIDE.csv. A RIDE.cal.json that is there is removed. speed: RIDE.csv gets a speed and a
+    position once a second.
     """
     check_profile(profile)
     directory = Path(out_dir)
@@ -69,10 +71,11 @@ def _write_ride(path: Path, made: Ride, speed: bool) -> None:
         _save(path, _log(made.time, made.readings), _LOG, _FORMATS)
         return
     form = ",".join(_FORMATS)
-    lines = [_LOG + ",speed_mps"]
+    lines = [",".join((_LOG, *TRACK))]
+    track = np.column_stack((made.truth["speed_mps"], *positions(made)))
     for k, row in enumerate(_log(made.time, made.readings).tolist()):
-        value = f"{made.truth['speed_mps'][k]:.2f}" if k % _SPEED_EVERY == 0 else ""
-        lines.append(f"{form % tuple(row)},{value}")
+        cells = "{:.2f},{:.7f},{:.7f},{:.3f}".format(*track[k]) if k % _TRACK_EVERY == 0 else ",,,"
+        lines.append(f"{form % tuple(row)},{cells}")
     path.write_text("\n".join(lines) + "\n", encoding="ascii")
 
 

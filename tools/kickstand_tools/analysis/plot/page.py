@@ -8,6 +8,7 @@ import numpy as np
 from ..overview import Overview
 from ..report import clock
 from ..stops.brake_test import Stop
+from . import page_with_map, track_map
 from .envelope import GAP_S, SPEED_GAP_S, envelope
 from .traces import (
     BRAKE_COLOUR,
@@ -27,9 +28,16 @@ from .traces import (
 POINTS = 40_000  # of a line: with more, a browser no longer zooms smoothly
 
 
-def draw(path: Path, seen: Overview) -> None:
-    """Write it."""
-    figure(seen).write_html(path, include_plotlyjs=True, full_html=True)
+def draw(path: Path, seen: Overview, tiles: bool = False) -> None:
+    """Write it, with a map beside the charts where the log has positions. tiles: with streets in the map, which the
+    page then takes from a server."""
+    charts, points = figure(seen), track_map.map_points(seen)
+    if points is None:
+        charts.write_html(path, include_plotlyjs=True, full_html=True)
+        return
+    charts.update_layout(hovermode="x")  # anywhere over a chart, not on a line alone
+    charts.update_xaxes(hoverformat=".1f")
+    path.write_text(page_with_map.html(charts, points, seen, tiles), encoding="utf-8")
 
 
 def figure(seen: Overview) -> Any:

@@ -17,10 +17,10 @@ def check(directory: Path) -> None:
     check_directory(directory)
 
 
-def draw(seen: Overview, directory: Path) -> list[Path]:
-    """Write both; their paths. Raises InputError."""
+def draw(seen: Overview, directory: Path, tiles: bool = False) -> list[Path]:
+    """Write both; their paths. tiles: as page.draw() takes it. Raises InputError."""
     paths = [directory / f"{seen.ride.stem}.png", directory / f"{seen.ride.stem}.html"]
     with new_directory(directory):
         write_whole(paths[0], lambda path: picture.draw(path, seen))
-        write_whole(paths[1], lambda path: page.draw(path, seen))
+        write_whole(paths[1], lambda path: page.draw(path, seen, tiles))
     return paths

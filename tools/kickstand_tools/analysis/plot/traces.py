@@ -52,7 +52,8 @@ def title(seen: Overview) -> str:
     total = seen.summary
     said = [seen.ride.stem, clock(total.duration_s)]
     if not seen.ride.car:
-        said.append(f"lean {total.left_deg.value:.0f}° left, {total.right_deg.value:.0f}° right")
+        how = "smoothed lean" if seen.ride.smoothed else "lean as displayed"
+        said.append(f"{how} {total.left_deg.value:.0f}° left, {total.right_deg.value:.0f}° right")
     said.append(f"braking {total.brake_g.value:.2f} g, acceleration {total.accel_g.value:.2f} g")
     return "  ·  ".join(said)
 

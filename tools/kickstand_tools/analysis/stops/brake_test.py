@@ -24,7 +24,7 @@ from kickstand.units import STANDARD_GRAVITY
 
 from ...logs.table import Array
 from ..channels import Channels
-from ..downsample import downsampled, joined
+from ..downsample import thinned
 from ..signals import integral, smoothed
 from .plausible import closes, plausible
 from .speed_fit import fitted_speed, speed_delay_s
@@ -79,7 +79,7 @@ def find_stops(channels: Channels) -> list[Stop]:
     >>> stops[-1].speed_from, stops[-1].initial_speed_mps > 3.0, stops[-1].mfdd_mps2 > 1.0
     ('log', True, True)
     """
-    ride = joined(list(downsampled([channels], RATE_S)))
+    ride = thinned(channels, RATE_S)
     still = standing(ride)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], still, [False]))))
     delay_s = speed_delay_s(ride)

@@ -97,6 +97,15 @@ def _window(values: Array, n: int) -> tuple[Array, Array]:
     """Mean and standard deviation of each n values in a row."""
     middle = float(np.mean(values))  # subtracted, or rounding of large squares would hide the spread
     values = values - middle
-    first, second = (np.cumsum(np.concatenate(([0.0], x))) for x in (values, values * values))
-    mean = (first[n:] - first[:-n]) / n
-    return mean + middle, np.sqrt(np.maximum(0.0, (second[n:] - second[:-n]) / n - mean * mean))
+    mean = _mean(values, n)
+    values *= values
+    spread = _mean(values, n)
+    spread -= mean * mean
+    return mean + middle, np.sqrt(np.maximum(0.0, spread, out=spread), out=spread)
+
+
+def _mean(values: Array, n: int) -> Array:
+    """Of each n values in a row."""
+    sums = np.concatenate(([0.0], values))
+    np.cumsum(sums, out=sums)
+    return (sums[n:] - sums[:-n]) / n

@@ -1,0 +1,185 @@
+"""The map in the page of a ride: in metres, north up, the sides in their colours, and linked with the charts."""
+
+import functools
+import json
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import app_exports
+import numpy as np
+import pytest
+from kickstand_tools import api
+from kickstand_tools.analysis.overview import Overview, overview
+from kickstand_tools.analysis.plot import page, page_with_map, track_map
+
+pytest.importorskip("plotly")
+EARTH_M = 6_371_000.0
+MOTORCYCLE = api.CalibrationFile(aligned=True)
+
+
+@functools.cache
+def seen(lat_deg: float = 52.5, lon_deg: float = 13.4, gap: bool = False, car: bool = False) -> Overview:
+    """Half a minute from this place on, with a position each half second; gap: none from 10 to 16 s."""
+    ride = app_exports.riding().every(2)
+    told = np.arange(len(ride.t_s)) % 50 == 3
+    if gap:
+        told &= (ride.t_s < 10.0) | (ride.t_s > 16.0)
+    narrow = np.cos(np.radians(52.5)) / np.cos(np.radians(lat_deg))
+    lat = np.where(told, ride.lat_deg - 52.5 + lat_deg, np.nan)
+    lon = np.where(told, ((ride.lon_deg - 13.4) * narrow + lon_deg + 180.0) % 360.0 - 180.0, np.nan)
+    speed = np.where(told, ride.speed_mps, np.nan)
+    log = api.Log(ride.t_s, ride.force_g, ride.rates_dps, speed, lat_deg=lat, lon_deg=lon, name="RIDE.csv")
+    return overview(api.open_ride(log, replace(MOTORCYCLE, vehicle="car") if car else MOTORCYCLE))
+
+
+def points_of(*place, **kind) -> track_map.MapPoints:
+    found = track_map.map_points(seen(*place, **kind))
+    assert found is not None
+    return found
+
+
+@pytest.mark.parametrize(
+    "place", [(52.5, 13.4), (-33.9, 151.2), (0.0, -78.5), (69.6, 18.9), (47.6, 179.999), (-0.001, 0.001)]
+)
+def test_a_metre_is_a_metre_to_the_north_and_to_the_east(place):
+    """On every latitude, on both sides of the equator and across the meridian of 180 degrees."""
+    found = points_of(*place)
+    ride = app_exports.riding()
+    north = (ride.lat_deg - ride.lat_deg[0]) * np.radians(EARTH_M)
+    east = (ride.lon_deg - ride.lon_deg[0]) * np.radians(EARTH_M) * np.cos(np.radians(52.5))
+    for got, true in ((found.north_m, north), (found.east_m, east)):
+        want = np.interp(found.t_s, ride.t_s, true)
+        assert np.max(np.abs(got - got[0] - (want - want[0]))) < 0.5
+    moved = np.hypot(np.diff(found.east_m), np.diff(found.north_m))
+    assert np.sum(moved) == pytest.approx(np.sum(np.hypot(np.diff(east), np.diff(north))), rel=0.01)
+    assert np.min(moved) > 0.3  # where the bike stands there is one point
+
+
+def test_lean_and_speed_are_those_of_the_moment():
+    found, channels = points_of(), seen().course
+    lean = np.interp(found.t_s, channels.t_s, channels.lean_deg)
+    known = np.isfinite(found.lean_deg)
+    assert np.count_nonzero(known) > 0.9 * len(known)
+    assert found.lean_deg[known] == pytest.approx(lean[known], abs=0.7)
+    ride = app_exports.riding()
+    assert found.speed_kmh == pytest.approx(3.6 * np.interp(found.t_s, ride.t_s, ride.speed_mps), abs=4.0)
+
+
+def test_the_line_is_broken_where_the_place_is_not_known():
+    found = points_of(gap=True)
+    (gap,) = np.flatnonzero(np.isnan(found.east_m))
+    assert found.t_s[gap - 1] < 10.0 < 16.0 < found.t_s[gap + 1]
+    line, dots = track_map.figure(found, seen(gap=True)).data
+    assert [k for k, x in enumerate(line.x) if x is None] == [gap]
+    assert np.all(np.isfinite(dots.x))
+
+
+def test_left_is_blue_and_right_is_orange_on_an_equal_scale_with_north_up():
+    made = track_map.figure(points_of(), seen())
+    _, dots = made.data
+    scale = dict(dots.marker.colorscale)
+    assert dots.marker.cmin == -dots.marker.cmax < 0.0
+    for place, colour in scale.items():
+        red, blue = int(colour[1:3], 16), int(colour[5:7], 16)
+        assert np.sign(blue - red) == np.sign(0.5 - place)
+    lean = np.asarray(dots.marker.color)
+    assert lean.min() < -20.0 and lean.max() > 30.0
+    assert made.layout.yaxis.scaleanchor == "x"
+    assert made.layout.yaxis.autorange is None  # the values of y grow upwards
+    assert "N" in made.layout.annotations[1].text
+
+
+def test_a_car_has_a_track_without_a_lean():
+    _, dots = track_map.figure(points_of(car=True), seen(car=True)).data
+    assert isinstance(dots.marker.color, str)
+    assert len(dots.x) > 50
+
+
+def page_of(tmp_path: Path, which: Overview, tiles: bool = False) -> str:
+    page.draw(tmp_path / "ride.html", which, tiles)
+    return (tmp_path / "ride.html").read_text()
+
+
+@pytest.mark.parametrize("positions", [0, 1])
+def test_without_positions_the_page_is_as_it_was(tmp_path, positions):
+    """One alone is no track."""
+    course = seen().course
+    places = {name: np.where(np.arange(len(course.t_s)) < positions, 5.0, np.nan) for name in ("lat_deg", "lon_deg")}
+    bare = replace(seen(), course=replace(course, **places))
+    html = page_of(tmp_path, bare)
+    page.figure(bare).write_html(tmp_path / "was.html", include_plotlyjs=True, full_html=True, div_id="chart")
+    name = re.search(r'<div id="([0-9a-f-]{36})"', html)
+    assert name and html.replace(name[1], "chart") == (tmp_path / "was.html").read_text()
+
+
+def test_a_page_asks_for_nothing_unless_tiles_are_wanted(tmp_path):
+    html = page_of(tmp_path, seen())
+    assert not re.search(r"<(script|link|img)[^>]*(src|href)=", html)
+    assert page_with_map.TILES_URL not in html
+    assert "TILES = null" in html
+    assert "OpenStreetMap contributors" not in html.rpartition("<p id=")[2]
+    html = page_of(tmp_path, seen(), tiles=True)
+    assert page_with_map.TILES_URL in html
+    assert "openstreetmap.org/copyright" in html.rpartition('<p id="tiles">')[2]
+
+
+@pytest.mark.parametrize("place", [(52.5, 13.4), (-33.9, 151.2), (47.6, -0.01)])
+def test_tiles_lie_where_the_track_is(place):
+    """The number of the start's tile by the map's metres, and by the formula of slippy maps."""
+    found = points_of(*place)
+    tiles = page_with_map._tiles(found)
+    size = tiles["world_m"] / 2**15
+    lat, lon = np.radians(found.lat_deg), found.lon_deg
+    column = (lon + 180.0) / 360.0 * 2**15
+    row = (1.0 - np.log(np.tan(lat) + 1.0 / np.cos(lat)) / np.pi) / 2.0 * 2**15
+    assert tiles["west_m"] / size == pytest.approx(column, abs=1e-6)
+    assert tiles["north_m"] / size == pytest.approx(row, abs=1e-6)
+
+
+_POINT = """() => {
+  const k = Math.floor(map.data[0].x.length * 0.6), x = map._fullLayout.xaxis, y = map._fullLayout.yaxis;
+  return [x._offset + x.d2p(map.data[0].x[k]), y._offset + y.d2p(map.data[0].y[k]), map.data[0].customdata[k][0]];
+}"""
+
+
+def test_in_a_browser_chart_and_map_show_the_same_moment(tmp_path):
+    playwright = pytest.importorskip("playwright.sync_api")
+    browser_path = shutil.which("chromium")
+    if not browser_path:
+        pytest.skip("no chromium")
+    page_of(tmp_path, seen())
+    with playwright.sync_playwright() as run:
+        options = ["--no-sandbox", "--enable-unsafe-swiftshader"]
+        browser = run.chromium.launch(executable_path=browser_path, args=options)
+        try:
+            view = browser.new_page(viewport={"width": 1300, "height": 800})
+            asked, errors = [], []
+            view.on("request", lambda request: asked.append(request.url))
+            view.on("pageerror", lambda error: errors.append(str(error)))
+            view.goto((tmp_path / "ride.html").as_uri())
+            view.wait_for_function("map.layout.annotations[0].text != ''")
+            bar = view.evaluate("[map.layout.annotations[0].text, map.layout.shapes[1].x1, map.layout.xaxis.range]")
+            area, chart = view.locator("#map").bounding_box(), view.locator("#chart").bounding_box()
+            at = view.evaluate(_POINT)
+            view.mouse.move(area["x"] + at[0], area["y"] + at[1])
+            view.wait_for_function("document.querySelector('#chart .hoverlayer text') !== null")
+            said = view.locator("#here").text_content()
+            view.mouse.move(chart["x"] + 0.6 * chart["width"], chart["y"] + 180)
+            view.wait_for_timeout(300)
+            there = view.evaluate("[map.layout.shapes[0].xanchor, map.layout.shapes[0].yanchor]")
+            later = view.locator("#here").text_content()
+        finally:
+            browser.close()
+    assert errors == []
+    assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
+    metres, (west, east) = float(bar[0].split()[0]), bar[2]
+    assert bar[0].endswith(" m")
+    assert (bar[1] - 0.02) * (east - west) == pytest.approx(metres, rel=1e-6)
+    assert said.split()[0] == f"0:{int(at[2]):02}"
+    points = points_of()
+    minutes, seconds = later.split()[0].split(":")
+    k = np.argmin(np.hypot(points.east_m - there[0], points.north_m - there[1]))
+    assert points.t_s[k] == pytest.approx(60 * int(minutes) + int(seconds), abs=1.1)
+    assert json.dumps(there) != json.dumps([0, 0])

@@ -1,0 +1,218 @@
+"""kickstand overlay: frames read back, transparency, times, sides; what is no video of the ride is refused."""
+
+import os
+import subprocess
+from typing import Any
+
+import analysis_rides
+import command
+import numpy as np
+import pytest
+from kickstand_tools import api
+
+pytest.importorskip("imageio_ffmpeg")
+pytest.importorskip("PIL")
+
+import gopro
+import imageio_ffmpeg
+from kickstand_tools.overlay.gauge import Gauge
+from kickstand_tools.overlay.gpmf import telemetry
+from kickstand_tools.overlay.overlay import MARGIN
+from kickstand_tools.overlay.shown import shown
+from kickstand_tools.overlay.video import open_video
+
+
+@pytest.fixture(scope="module")
+def ride(tmp_path_factory):
+    return analysis_rides.short(tmp_path_factory.mktemp("ride"), rate_hz=100, speed_hz=1)
+
+
+@pytest.fixture(scope="module")
+def lean(ride):
+    return shown(api.open_ride(ride, smoothed=True))
+
+
+@pytest.fixture(scope="module")
+def left_s(lean) -> float:
+    """When the bike leans furthest to the left; six seconds later it leans to the right."""
+    return float(lean.t_s[np.nanargmin(lean.lean_deg)])
+
+
+def filled(pictures: np.ndarray, gauge: Gauge) -> np.ndarray:
+    """(n) share of the dial that is filled, < 0 on the left, of pictures of the gauge alone."""
+    colour = pictures[..., :3].astype(int)
+    amber = (colour[..., 0] > 180) & (np.abs(colour[..., 1] - 160) < 60) & (colour[..., 2] < 110)
+    dial = amber[:, : round(0.55 * gauge.height), : round(1.15 * gauge.height)]
+    middle = round(0.6 * gauge.height)
+    sides = dial[:, :, middle:].sum(axis=(1, 2)) - dial[:, :, :middle].sum(axis=(1, 2)).astype(float)
+    return sides / max(np.abs(sides).max(), 1.0)
+
+
+@pytest.mark.parametrize(("form", "fps"), [(".mov", 30), (".webm", 60)])
+def test_a_transparent_clip(tmp_path, ride, lean, left_s, form, fps):
+    out = tmp_path / f"clip{form}"
+    begin = round(left_s, 2)
+    arguments = "--from", begin, "--to", begin + 8.0, "--fps", fps, "--height", 480
+    said = command.works("overlay", ride, *arguments, "--out", out).out
+    assert said == f"written: {out}, {8 * fps} pictures, 8.0 s, {fps} a second\n"
+    pictures = gopro.frames(out, "rgba")
+    gauge = Gauge(480)
+    assert pictures.shape == (8 * fps, gauge.height, gauge.width, 4)
+    assert pictures[:, 0, 0, 3].max() < 10
+    assert pictures[..., 3].max() > 245
+    shares = filled(pictures, gauge)
+    wanted = lean.at(begin + np.arange(8 * fps) / fps).lean_deg
+    assert wanted.min() < -20.0 < 20.0 < wanted.max()
+    # 3 degrees are 0.05 s where the bike rolls fastest
+    assert np.abs(shares * np.abs(wanted).max() - wanted).max() < 3.0
+
+
+@pytest.mark.parametrize("fps", [None, 30])
+def test_over_a_video(tmp_path, ride, left_s, fps):
+    """The film stays as it is around the gauge, which shows the time of the ride that the offset says."""
+    film, out = gopro.film(tmp_path / "film.mp4", 4.0), tmp_path / "out.mp4"
+    offset = round(left_s - 2.0, 2)
+    more = ("--fps", fps) if fps else ()
+    said = command.works("overlay", ride, "--video", film, "--offset", offset, *more, "--out", out).out
+    rate = fps or 10
+    assert f"{4 * rate} pictures, 4.0 s, {rate} a second" in said
+    pictures, before = gopro.frames(out), gopro.frames(film)
+    assert len(pictures) == pytest.approx(4 * rate, abs=1)
+    gauge, margin = Gauge(240), round(MARGIN * 240)
+    rows, columns = slice(240 - margin - gauge.height, 240 - margin), slice(margin, margin + gauge.width)
+    around = np.ones((240, 320), dtype=bool)
+    around[rows.start - 8 : rows.stop + 8, : columns.stop + 8] = False
+    assert np.abs(pictures[0].astype(int) - before[0])[around].max() < 12
+    at_left = filled(pictures[:, rows, columns], gauge)[2 * rate]
+    assert at_left < -0.5
+    assert "Audio" in ffmpeg("-i", out)
+
+
+def ffmpeg(*arguments: object) -> str:
+    """What the program says."""
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), *(str(argument) for argument in arguments)]
+    return subprocess.run(command, capture_output=True, text=True).stderr
+
+
+def test_a_part_of_a_video_that_began_before_the_ride(tmp_path, ride):
+    film = gopro.film(tmp_path / "film.mp4", 6.0)
+    given = "overlay", ride, "--video", film, "--offset", -3
+    out = "--out", tmp_path / "out.mp4"
+    said = command.refused(tmp_path, *given, *out, words="lasts from -3.0 to 3.0 s of the ride")
+    assert "--from 0.0 --to 3.0" in said
+    command.works(*given, "--from", 0, "--to", 3, *out)
+    assert len(gopro.frames(tmp_path / "out.mp4")) == pytest.approx(30, abs=1)
+
+
+def test_a_gopros_gyro_finds_the_offset(tmp_path):
+    made = api.simulate_ride("street", seed=4, seconds=120.0)
+    log = tmp_path / "RIDE.csv"
+    api.write_log(log, api.Log.from_readings(made.readings, made.rate_hz))
+    kickstand, upright = (api.Log.from_readings(pose, made.rate_hz) for pose in (made.kickstand, made.upright))
+    api.write_calibration(tmp_path / "RIDE.cal.json", api.fit_two_positions(kickstand, upright).calibration)
+    begin = 9005  # between two of the cells of 0.05 s that are compared
+    turned = made.readings[begin : begin + 30 * 200, 4:] @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    noise = np.random.default_rng(2).normal(0.0, 0.5, turned.shape)
+    film = gopro.with_telemetry(gopro.film(tmp_path / "GX01.mp4", 30.0), turned + noise + [1.0, -2.0, 0.5], 200.0)
+    more = "--from", 50, "--to", 52, "--out", tmp_path / "out.mp4"
+    said = command.works("overlay", log, "--video", film, *more).out
+    found = float(said.partition("--offset ")[2].split()[0])
+    assert found == pytest.approx(begin / 200.0, abs=0.015)
+    other = gopro.with_telemetry(gopro.film(tmp_path / "GX02.mp4", 30.0), walk(30 * 200), 200.0)
+    given = "overlay", log, "--video", other, "--out", tmp_path / "2.mp4"
+    said = command.refused(tmp_path, *given, words="give --offset")
+    assert "turn as the camera does" in said or "two times" in said
+
+
+def walk(count: int) -> np.ndarray:
+    """Rates of something else that moves."""
+    steps = np.random.default_rng(5).normal(size=(count, 3))
+    return 40.0 * np.apply_along_axis(lambda v: np.convolve(v, np.ones(80) / 80.0, "same"), 0, steps)
+
+
+def test_what_is_no_video_of_the_ride_is_refused(tmp_path, ride):
+    film = gopro.film(tmp_path / "film.mp4", 3.0)
+    (tmp_path / "text.mp4").write_text("no film\n" * 100)
+    (tmp_path / "half.mp4").write_bytes(film.read_bytes()[: film.stat().st_size // 2])
+    sound = tmp_path / "sound.mp4"
+    gopro.film(tmp_path / "loud.mp4", 1.0)
+    ffmpeg("-i", tmp_path / "loud.mp4", "-vn", "-c", "copy", sound)
+    out = "--out", tmp_path / "out.mp4"
+    for video, more, words in (
+        ("text.mp4", ("--offset", 1), "is no video that ffmpeg can read"),
+        ("half.mp4", ("--offset", 1), "is no video that ffmpeg can read"),
+        ("sound.mp4", ("--offset", 1), "has no pictures"),
+        ("no.mp4", ("--offset", 1), "there is no such file"),
+        ("film.mp4", (), "no readings of a GoPro's gyro"),
+        ("film.mp4", ("--offset", 500), "they have nothing in common"),
+        ("film.mp4", ("--offset", -50), "they have nothing in common"),
+        ("film.mp4", ("--offset", 5, "--from", 20), "there is nothing from 20.0 to 8.0 s"),
+    ):
+        command.refused(tmp_path, "overlay", ride, "--video", tmp_path / video, *more, *out, words=words)
+    clip = "--out", tmp_path / "clip.mov"
+    command.refused(tmp_path, "overlay", ride, "--video", film, "--offset", 1, *clip, words="has to end in .mp4")
+    command.refused(tmp_path, "overlay", ride, *out, words="ends in .mov or .webm")
+    command.refused(tmp_path, "overlay", ride, "--offset", 3, *clip, words="is that of a video")
+    command.refused(tmp_path, "overlay", ride, "--video", film, "--offset", 1, "--out", film, words="is also an input")
+
+
+def test_half_a_ride_is_refused_and_says_what_both_have(tmp_path, ride):
+    film = gopro.film(tmp_path / "film.mp4", 8.0)
+    half = tmp_path / "HALF.csv"
+    lines = ride.read_text().splitlines(keepends=True)
+    half.write_text("".join(lines[: len(lines) // 2]))
+    calibration = "--calibration", ride.with_name("RIDE.cal.json")
+    ends_s = (len(lines) // 2 - 2) / 100.0
+    given = "overlay", half, *calibration, "--video", film, "--offset", f"{ends_s - 4.0:.2f}"
+    command.refused(tmp_path, *given, "--out", tmp_path / "out.mp4", words=f"which ends at {ends_s:.1f} s")
+
+
+def test_when_it_is_stopped_nothing_is_left(tmp_path, ride):
+    """Neither a file nor ffmpeg, which would go on writing it."""
+    film = gopro.film(tmp_path / "film.mp4", 5.0)
+    (tmp_path / "clip.mov").write_text("an older clip")
+    before = command.snapshot(tmp_path)
+    seen = []
+
+    def stop(done: int, total: int) -> None:
+        seen.append((done, total))
+        if total == 50 and done == 20:
+            raise KeyboardInterrupt
+
+    over: dict[str, Any] = {"video": film, "offset_s": 1.0}
+    clip: dict[str, Any] = {"from_s": 0.0, "to_s": 5.0, "fps": 10.0}
+    for name, more in (("out.mp4", over), ("clip.mov", clip)):
+        with pytest.raises(KeyboardInterrupt):
+            api.overlay(ride, tmp_path / name, progress=stop, **more)
+        assert (20, 50) in seen
+        seen.clear()
+    assert command.snapshot(tmp_path) == before
+    assert not [line for line in os.popen("ps -o ppid=,comm=").read().splitlines() if f"{os.getpid()} ffmpeg" in line]
+
+
+def test_a_disk_that_is_full_is_told(tmp_path, ride, monkeypatch):
+    """What ffmpeg says when it stops stands in the line."""
+    from kickstand_tools.overlay import overlay
+
+    monkeypatch.setitem(overlay._TRANSPARENT, ".mov", ("-c:v", "no-such-codec"))
+    given = "overlay", ride, "--from", 1, "--to", 2, "--out", tmp_path / "clip.mov"
+    command.refused(tmp_path, *given, words="ffmpeg has stopped: ")
+
+
+def test_a_gopros_readings_are_read_in_deg_s_on_the_videos_time(tmp_path):
+    rate = walk(3 * 150)
+    film = open_video(gopro.with_telemetry(gopro.film(tmp_path / "GX.mp4", 3.0), rate, 150.0))
+    assert (film.width, film.height, film.fps, film.seconds) == (320, 240, 10.0, pytest.approx(3.0))
+    read = telemetry(film)
+    assert read is not None
+    assert np.allclose(read.rate_dps, rate, atol=0.02)
+    assert np.allclose(read.t_s, (np.arange(450) + 0.5) / 150.0, atol=0.002)
+    assert telemetry(open_video(gopro.film(tmp_path / "plain.mp4", 1.0))) is None
+
+
+def test_live_shows_what_the_display_showed(tmp_path, ride):
+    """At the first lean the two differ: the display did not know what came after."""
+    for more in ((), ("--live",)):
+        command.works("overlay", ride, "--from", 5, "--to", 15, *more, "--out", tmp_path / f"clip{len(more)}.webm")
+    smoothed, live = (gopro.frames(tmp_path / f"clip{k}.webm").astype(int) for k in (0, 1))
+    assert np.abs(smoothed - live).max() > 100

@@ -1,0 +1,47 @@
+"""What the gauge is told of a ride."""
+
+import analysis_rides
+import numpy as np
+import pytest
+from kickstand_tools import api
+from kickstand_tools.overlay.shown import shown
+
+
+@pytest.fixture(scope="module")
+def ride(tmp_path_factory):
+    return analysis_rides.short(tmp_path_factory.mktemp("ride"), rate_hz=100, speed_hz=1)
+
+
+def test_it_is_what_the_display_showed(ride):
+    seen, lean = shown(api.open_ride(ride)), api.vehicle_channels(ride)
+    sure = lean.trusted
+    assert np.array_equal(seen.t_s, lean.t_s)
+    assert np.array_equal(seen.lean_deg[sure], lean.lean_deg[sure])
+    assert np.all(np.isnan(seen.lean_deg[~sure]))
+    assert seen.right_deg[-1] == pytest.approx(np.nanmax(seen.lean_deg), abs=0.5)
+    assert seen.left_deg[-1] == pytest.approx(-np.nanmin(seen.lean_deg), abs=0.5)
+    assert seen.has_speed
+    braking = seen.at(np.array([seen.t_s[-1] - 6.0]))
+    assert braking.forward_g[0] < -0.2
+    turning = np.abs(seen.lean_deg) > 25.0
+    assert np.all(np.sign(seen.left_g[turning]) == -np.sign(seen.lean_deg[turning]))  # leaning right it is pushed right
+
+
+def test_a_potholes_lean_is_no_maximum_and_a_lean_that_is_not_trusted_neither(ride, monkeypatch):
+    opened = api.open_ride(ride)
+    blocks = list(opened.blocks())
+
+    def changed():
+        for block in blocks:
+            at = np.searchsorted(block.t_s, 2.0)
+            block.lean_deg[at : at + 10] = 64.0  # 0.1 s
+            block.lean_deg[at + 100 : at + 150] = -64.0
+            block.sure[at + 100 : at + 150] = 0.0
+            yield block
+
+    monkeypatch.setattr(type(opened), "blocks", lambda self, progress=None, notices=None: changed())
+    seen = shown(opened)
+    early = seen.t_s < 4.0
+    assert seen.right_deg[early].max() < 5.0
+    assert seen.left_deg[early].max() < 5.0
+    assert np.isnan(seen.at(np.array([3.2])).lean_deg[0])

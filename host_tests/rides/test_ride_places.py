@@ -1,0 +1,196 @@
+"""Positions in recorded rides: exact in each block, with the turn they came with, and nothing lost by them."""
+
+import struct
+
+import devices
+import engines
+import numpy as np
+import pytest
+import ride_writer
+from kickstand.rides import block as block_format
+from kickstand.rides.block import RideBlock
+from kickstand_tools.logs.reader import read_log
+from kickstand_tools.rides import block_reader, ride_log
+from mpy import run_mpy
+from test_recorder import rides
+
+MIDNIGHT_S = 1_798_761_600.0  # 1 January 2027
+DEGREE = 6_000_000  # in 0.00001 minutes
+
+
+def expected(k: int) -> tuple[float, float, float]:
+    """Latitude, longitude and UTC of ride_writer.place(k)."""
+    return (-203_212_345 + 7 * k) / DEGREE, (-1_079_999_999 + 11 * k) / DEGREE, MIDNIGHT_S - 17.9 + k / 10
+
+
+def found(blocks) -> list[tuple[int, tuple[float, float, float | None]]]:
+    """(number of the turn, position) of each."""
+    turns = [turn for block in blocks for turn in block.turns]
+    return [(i, (t.place.lat_deg, t.place.lon_deg, t.place.utc_s)) for i, t in enumerate(turns) if t.place]
+
+
+@pytest.mark.parametrize("length", [block_format.block_length, lambda _: 512], ids=["flash", "USB"])
+@pytest.mark.parametrize("every", [10, 1])
+def test_every_position_is_with_its_own_turn_and_every_turn_is_there(every, length):
+    data, turns = ride_writer.blocks(12, length=length, speed=True, places_every=every)
+    blocks, problems = block_reader.read(b"".join(data))
+    assert problems == []
+    times = [blocks[0].time_us, *(turn.time_us for block in blocks for turn in block.turns)]
+    held = [(turn.sums, turn.n, turn.time_us - before)
+            for turn, before in zip((turn for block in blocks for turn in block.turns), times)]  # fmt: skip
+    assert held == turns
+    assert [k for k, _ in found(blocks)] == list(range(0, len(turns), every))
+    for k, (lat_deg, lon_deg, utc_s) in found(blocks):
+        assert (lat_deg, lon_deg) == pytest.approx(expected(k // every)[:2], rel=0.0, abs=1e-9)
+        assert utc_s == pytest.approx(expected(k // every)[2], rel=0.0, abs=1e-6)
+    assert [turn.speed_mps for block in blocks for turn in block.turns][:101:100] == [0.0, 1.0]
+    for block, content in zip(blocks, data):
+        free = content[: -6 - 16 * sum(bool(turn.place) for turn in block.turns)]
+        assert len(free) - len(free.rstrip(b"\0")) < 16 + 60  # no more room is left than for the worst turn
+
+
+def test_an_older_reader_finds_all_but_the_positions():
+    """It takes the number of positions for a byte of the version's name, and their bytes for zeros."""
+    data, _ = ride_writer.blocks(3, places_every=10)
+    for content in data:
+        fields = struct.unpack_from("<4sHHIIqhHHH11sB", content)
+        assert fields[:3] == (b"KRID", 1, len(content))
+        assert fields[10].startswith(block_format.__version__.encode() + b"\0")
+        count, _ = struct.unpack_from("<HI", content, len(content) - 6)
+        block = block_reader.parse(content)
+        start = len(content) - 6
+        old = list(block_reader._turns(block, content[block_reader._START : start], count, {}))
+        assert [(t.time_us, t.sums, t.n) for t in old] == [(t.time_us, t.sums, t.n) for t in block.turns]
+
+
+def test_a_ride_of_an_older_firmware_has_no_positions():
+    """There the byte was the last one of the version's name, and always 0."""
+    content = ride_writer.blocks(1)[0][0]
+    assert content[42] == 0
+    assert found([block_reader.parse(content)]) == []
+
+
+def changed(k: int, *values: int) -> list:
+    """What a block says whose only position is number k of `values`: date, ms, latitude, longitude."""
+    block = RideBlock(5000)
+    block.begin(1024, 7, 3, 5, ride_writer.CHIP, 200, bytes(80))
+    block.add_place(values)
+    block.add([0, 0, 8192, 0, 0, 0, 0], 2, 10_000)
+    block.close()
+    return found([block_reader.parse(bytes(block.buffer[:1024]))])
+
+
+def test_a_date_that_is_none_leaves_the_position_and_no_place_on_earth_is_left_out():
+    for date in (0, 5, 26 << 9 | 13 << 5 | 1, 26 << 9 | 2 << 5 | 30, 0xFFFF):
+        ((_, (lat, lon, utc_s)),) = changed(0, date, 1000, 6_000_000, -6_000_000)
+        assert (lat, lon, utc_s) == (1.0, -1.0, None), date
+    assert changed(0, 0, 0, 90 * DEGREE + 1, 0) == []
+    assert changed(0, 0, 0, 0, -180 * DEGREE - 1) == []
+    assert len(changed(0, 0, 0, 90 * DEGREE, -180 * DEGREE)) == 1
+
+
+@pytest.mark.parametrize("length", range(700, 720))
+def test_however_full_a_block_is_the_worst_turn_and_a_position_fit(length):
+    """After quiet turns, each of few bits, every number of a violent one takes the longest code."""
+    quiet = [800] * 7, 8, 40_000
+    count = 0
+    for violent in (False, True):  # first to see how many quiet ones there are, then with the last one violent
+        block = RideBlock(5000)
+        for sequence in range(2):  # in the first block room was not kept from the beginning
+            block.begin(length, 1, sequence, 0, ride_writer.CHIP, 200, bytes(80))
+            block.add_place(ride_writer.place(0))
+            while not block.full() and (not violent or not sequence or block.count < count - 1):
+                block.add(*quiet)
+        if violent:
+            block.add_speed(1 << 24)
+            block.add_place(ride_writer.place(1))
+            block.add([-32768] * 7, 1, 1 << 29)
+        count = block.count
+        block.close()
+        read = block_reader.parse(bytes(block.buffer[:length]))
+        assert len(found([read])) == 1 + violent
+    assert read.turns[-1].sums == (-32768,) * 6
+    assert {turn.sums for turn in read.turns[:-1]} == {(800,) * 6}
+    assert len(read.turns) == count - 1 > 90
+
+
+def test_the_first_position_of_all_is_left_out_where_no_room_was_kept_for_it():
+    """From then on there is room in each block, however full it is."""
+    block = RideBlock(5000)
+    for sequence in range(3):
+        block.begin(512, 1, sequence, 0, ride_writer.CHIP, 200, bytes(80))
+        sign = 1
+        while not block.full():
+            sign = -sign
+            block.add_speed((1 << 24) * (sign > 0))
+            if sequence:
+                block.add_place(ride_writer.place(sequence))
+            block.add([sign * 8 * 32767] * 7, 8, (1 << 29) if sign > 0 else 0)
+            if block.full() and not sequence:
+                block.add_place(ride_writer.place(0))
+        block.close()
+        read = block_reader.parse(bytes(block.buffer[:512]))
+        assert len(found([read])) == (len(read.turns) if sequence else 0)
+        assert read.turns[-1].sums == (sign * 8 * 32767,) * 6
+
+
+# A block with positions by MicroPython, in hexadecimal. Lengths of arrays and packing differ between the two.
+_WRITE = """
+from array import array
+from kickstand.rides.block import RideBlock
+class Chip:
+    accel_lsb_per_g, gyro_lsb_per_dps, gyro_delay_s = 4096, 65.5, 0.0134
+    def temperature_c(self, counts):
+        return 31.25
+block = RideBlock(5000)
+block.begin(1024, 7, 3, 5, Chip(), 200, bytes(80))
+for k in range(12):
+    block.add_place(array("i", (10000 + k, 86399999, -539999999 + k, 1079999999 - k)))
+    block.add([100 * k] * 7, 2, 10000)
+block.close()
+print("".join("%02x" % byte for byte in block.buffer[:block.length]))
+"""
+
+
+def test_both_engines_write_the_same_bytes(capsys):
+    exec(_WRITE, {})
+    assert run_mpy(_WRITE) == capsys.readouterr().out
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_a_recorded_ride_tells_where_it_was(engine, tmp_path):
+    """From the receiver's wire to the log, ten times a second; the speed of a motorcycle is not even confirmed yet."""
+    place = [-33.5, -70.5, -1e-4, 2e-4]
+    plan = {
+        "ride": [["upright", 4.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 5.0]],
+        "gps": {"hz": 10, "baud": 38400, "latency_s": 0.1, "place": place},
+        "config": {"RECORD": True, "SPEED": "gps", "GPS_BAUD": 38400},
+        "until": 14,
+    }
+    devices.run(engine, tmp_path, plan)
+    (blocks,) = rides(tmp_path)[0].values()
+    ride_log.write(tmp_path / "ride.csv", blocks)
+    log = read_log(tmp_path / "ride.csv")
+    told = np.isfinite(log.lat_deg)
+    seconds = log.t_s[-1] - log.t_s[0]
+    assert np.count_nonzero(told) > 9.5 * seconds - 10
+    noon_s = 1_795_262_400.0  # 21 November 2026; the clock of the model is 0 at 20 s before
+    fix_s = log.utc_s[told] - (noon_s - 20.0)
+    at_s = log.t_s[told] + blocks[0].time_us * 1e-6
+    assert np.all((at_s - fix_s > 0.09) & (at_s - fix_s < 0.2))
+    assert np.max(np.abs(log.lat_deg[told] - (place[0] + place[2] * fix_s))) < 2e-6
+    assert np.max(np.abs(log.lon_deg[told] - (place[1] + place[3] * fix_s))) < 3e-6
+
+
+def test_a_log_has_the_columns_that_there_is_something_in(tmp_path):
+    for name, speed, every, columns in (
+        ("none", False, 0, []),
+        ("places", False, 10, ["lat_deg", "lon_deg", "utc_s"]),
+        ("all", True, 10, ["speed_mps", "lat_deg", "lon_deg", "utc_s"]),
+    ):
+        blocks, _ = block_reader.read(b"".join(ride_writer.blocks(2, speed=speed, places_every=every)[0]))
+        ride_log.write(tmp_path / f"{name}.csv", blocks)
+        header, first = (tmp_path / f"{name}.csv").read_text().splitlines()[:2]
+        assert header.split(",")[7:] == [*columns, "temp_c"]
+        if "lat_deg" in columns:
+            assert first.split(",")[-4:] == ["-33.8687242", "-179.9999998", f"{MIDNIGHT_S - 17.9:.3f}", "31.25"]

@@ -1,0 +1,94 @@
+"""kickstand smooth: what it writes, and what it refuses."""
+
+import json
+
+import command
+import numpy as np
+import pytest
+from command import refused, works
+from kickstand_tools.calibration.file import write_calibration
+from kickstand_tools.logs.reader import write_table
+from smoothed_rides import simulated
+
+
+@pytest.fixture(scope="module")
+def ride(tmp_path_factory):
+    """RIDE.csv with its calibration beside it, at 50 samples a second."""
+    directory = tmp_path_factory.mktemp("ride")
+    known = simulated("street", 2, 40.0)
+    rows = np.column_stack((known.log.t_s + 7.25, known.log.accel_g, known.log.gyro_dps))[::4]
+    write_table(directory / "RIDE.csv", command.HEADER.split(","), rows.round(5).tolist())
+    write_calibration(directory / "RIDE.cal.json", known.calibration)
+    return directory, known.lean_deg[::4], known.riding[::4]
+
+
+def read(path):
+    return np.genfromtxt(path, delimiter=",", names=True)
+
+
+def test_a_row_for_each_sample_with_the_logs_own_time(ride, tmp_path):
+    directory, lean, riding = ride
+    out = tmp_path / "LEAN.csv"
+    result = works("smooth", directory / "RIDE.csv", "--out", out)
+    assert result.err == ""
+    assert result.out == f"written: {out}, {len(lean)} samples\n"
+    assert out.read_text().startswith("t_s,lean_deg,lean_sigma_deg,pitch_deg,speed_mps\n7.25,")
+    got = read(out)
+    assert np.array_equal(got["t_s"], read(directory / "RIDE.csv")["t_s"])
+    assert np.max(np.abs(got["lean_deg"] - lean)[riding]) < 3.0
+    assert np.all(got["lean_sigma_deg"] > 0.0)
+
+
+def test_a_stretch_of_a_ride(ride, tmp_path):
+    directory, _, _ = ride
+    works("smooth", directory / "RIDE.csv", "--from", 20, "--to", 30, "--out", tmp_path / "LEAN.csv")
+    assert len(read(tmp_path / "LEAN.csv")) == 501
+
+
+def test_another_mounts_calibration_is_told(tmp_path):
+    known = simulated("street", 2, 90.0)
+    rows = np.column_stack((known.log.t_s, known.log.accel_g, known.log.gyro_dps))[::4]
+    write_table(tmp_path / "RIDE.csv", command.HEADER.split(","), rows.round(5).tolist())
+    known.calibration.vehicle_from_sensor = np.roll(known.calibration.vehicle_from_sensor, 1, axis=0)
+    write_calibration(tmp_path / "CAL.json", known.calibration)
+    result = works(
+        "smooth", tmp_path / "RIDE.csv", "--calibration", tmp_path / "CAL.json", "--out", tmp_path / "L.csv"
+    )
+    assert "the calibration's up is 92 degrees off" in result.err
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"vehicle": "car"}, "a car does not lean"),
+        ({"aligned": False}, "not aligned"),
+        ({"version": 7}, "version 7"),
+    ],
+)
+def test_a_calibration_that_does_not_serve_is_refused(ride, tmp_path, change, words):
+    directory, _, _ = ride
+    data = json.loads((directory / "RIDE.cal.json").read_text()) | change
+    (tmp_path / "CAL.json").write_text(json.dumps(data))
+    given = "--calibration", tmp_path / "CAL.json", "--out", tmp_path / "LEAN.csv"
+    refused(tmp_path, "smooth", directory / "RIDE.csv", *given, words=words)
+
+
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ([], "is empty"),
+        (["0,0,1,0,0,0,0"], "too short"),
+        (["0,0,1,0,0,0,0", "1,0,1.1,0,0,0,0", "2,0,1,0,0,0,0"], "at least 10"),
+    ],
+)
+def test_a_log_that_is_none_is_refused(ride, tmp_path, rows, words):
+    directory, _, _ = ride
+    log = tmp_path / "LOG.csv"
+    log.write_text("\n".join([command.HEADER, *rows, ""]) if rows else "")
+    given = "--calibration", directory / "RIDE.cal.json", "--out", tmp_path / "LEAN.csv"
+    assert words in refused(tmp_path, "smooth", log, *given)
+
+
+def test_the_ride_itself_is_not_overwritten(ride):
+    directory, _, _ = ride
+    refused(directory, "smooth", directory / "RIDE.csv", "--out", directory / "RIDE.csv", words="also an input")

@@ -1,0 +1,180 @@
+"""A second simulator of rides, which shares nothing with kickstand_tools.simulation: a check on what is fitted to that.
+
+A path and an attitude are drawn as curves, the place of the sensor follows from them, and its readings are numerical
+derivatives: of the place for the force, of the attitude's matrix for the rates. The bike is in exact balance, but for a
+rider who moves; the vibration is white. World axes: x, y level, z up. Vehicle axes: left, up, forward.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.logs.log import Log
+
+G = 9.80665
+FINE_HZ, RATE_HZ = 800, 200
+UP_ERROR_DEG, PITCH_ERROR_DEG, STAND_DEG = 1.5, 1.0, 11.0  # of the two poses, and the tilt between them
+VIBRATION_G, VIBRATION_DPS = 0.12, 1.5  # rms of white noise in each sample
+
+
+@dataclass
+class OtherRide:
+    """log (n samples), calibration by two sloppy poses, and the truth (n): lean in degrees, speed in m/s."""
+
+    log: Log
+    calibration: CalibrationFile
+    lean_deg: np.ndarray
+    speed_mps: np.ndarray
+
+
+def sweepers(chance):
+    """(seconds, lean in degrees, speed in m/s) of legs: turns of 60 s at 38 degrees, to either side."""
+    legs = [(6.0, 0.0, 0.0), (8.0, 0.0, 22.0)]
+    for side in (1.0, -1.0, -1.0, 1.0):
+        legs += [(5.0, 0.0, 22.0), (60.0, 38.0 * side, 22.0)]
+    return [*legs, (6.0, 0.0, 22.0)]
+
+
+def held(chance):
+    """Long turns to both sides, one directly after the other."""
+    legs = [(6.0, 0.0, 0.0), (8.0, 0.0, 20.0)]
+    for k in range(5):
+        legs += [(chance.uniform(25.0, 60.0), chance.uniform(28.0, 42.0) * (-1.0) ** k, chance.uniform(18.0, 25.0))]
+    return [*legs, (6.0, 0.0, 20.0)]
+
+
+def track(chance):
+    """35 corners of 30 to 55 degrees, one after the other, with a short straight now and then."""
+    legs = [(6.0, 0.0, 0.0), (8.0, 0.0, 28.0)]
+    for _ in range(35):
+        lean, speed = chance.choice((-1.0, 1.0)) * chance.uniform(30.0, 55.0), chance.uniform(18.0, 33.0)
+        legs += [(chance.uniform(3.0, 7.0), lean, speed)]
+        if chance.random() < 0.4:
+            legs += [(chance.uniform(2.0, 5.0), 0.0, speed + chance.uniform(0.0, 15.0))]
+    return [*legs, (6.0, 0.0, 20.0)]
+
+
+def town(chance):
+    """Slow turns, and stops."""
+    legs = [(6.0, 0.0, 0.0)]
+    for _ in range(22):
+        legs += [(6.0, 0.0, chance.uniform(7.0, 13.0))]
+        lean = chance.choice((-1.0, 1.0)) * chance.uniform(8.0, 25.0)
+        legs += [(chance.uniform(2.5, 5.0), lean, chance.uniform(4.5, 8.0))]
+        if chance.random() < 0.3:
+            legs += [(5.0, 0.0, 0.0), (chance.uniform(4.0, 12.0), 0.0, 0.0)]
+    return [*legs, (6.0, 0.0, 8.0)]
+
+
+KINDS = {"sweepers": sweepers, "held": held, "track": track, "town": town}
+
+
+def other_ride(kind, seed, height_m=0.0, seconds=1000.0, rider_deg=2.0, speed=False):
+    """height_m: of the sensor above the roll axis. seconds: no longer than this, to whole legs. rider_deg: rms by which
+    the rider, moving about, makes the bike's lean differ from the one of balance. speed: give it once a second, 0.4 s
+    late."""
+    chance = np.random.default_rng([seed, *kind.encode()])
+    legs = KINDS[kind](chance)
+    legs = [leg for leg, end in zip(legs, np.cumsum([leg[0] for leg in legs])) if end <= seconds]
+    time, lean, v = _course(legs)
+    n = len(time)
+    riding = np.clip((v - 1.0) / 3.0, 0.0, 1.0)
+    chassis = np.radians(lean + rider_deg * riding * _noise(chance, n, 0.7))
+    yaw_rate = np.where(v > 0.5, -G * np.tan(np.radians(lean)) / np.maximum(v, 3.0), 0.0)
+    slope = np.radians(0.8) * _noise(chance, n, 4.0) * riding
+    dive = np.radians(0.25) * _smooth(np.gradient(v) * FINE_HZ, 0.2)
+    force, rates = _readings(v, yaw_rate, slope, chassis, slope + dive, height_m)
+    step = FINE_HZ // RATE_HZ
+    force, rates = (values[: n // step * step].reshape(-1, step, 3).mean(axis=1) for values in (force, rates))
+    count = len(force)
+    shaken = np.clip(v[: n // step * step : step] / 5.0, 0.1, 1.0)[:, None]
+    force = force + VIBRATION_G * shaken * chance.standard_normal((count, 3))
+    rates = np.degrees(rates) + VIBRATION_DPS * shaken * chance.standard_normal((count, 3))
+    gyro, accel = (
+        np.eye(3) + chance.uniform(-1.0, 1.0, (3, 3)) * np.where(np.eye(3) > 0, scale, cross)
+        for scale, cross in ((0.03, 0.02), (0.004, 0.01))
+    )
+    drift = np.cumsum(chance.standard_normal((count, 3)), axis=0) * 0.004 / np.sqrt(RATE_HZ)
+    rates = rates @ gyro.T + chance.uniform(-0.3, 0.3, 3) + drift
+    force = force @ accel.T + chance.uniform(-0.005, 0.005, 3)
+    # The upright pose was off by roll, and in yaw by what a change of pitch between the poses makes of it
+    roll, yaw = np.radians(UP_ERROR_DEG), np.radians(PITCH_ERROR_DEG) / np.tan(np.radians(STAND_DEG))
+    roll, yaw = roll * chance.choice((-1.0, 1.0)), yaw * chance.choice((-1.0, 1.0))
+    wrong = _about(2, roll) @ _about(1, yaw)
+    mounting, _ = np.linalg.qr(chance.standard_normal((3, 3)))
+    mounting *= np.linalg.det(mounting)
+    middle = (np.arange(count) + 0.5) / RATE_HZ
+    told = np.full(count, np.nan)
+    if speed:
+        told[::RATE_HZ] = np.interp(middle[::RATE_HZ] - 0.4, time, v)
+    log = Log(middle, force @ mounting, rates @ mounting, told)
+    calibration = CalibrationFile(vehicle_from_sensor=wrong @ mounting, aligned=True, six_done=True, gyro_delay_s=0.0)
+    return OtherRide(log, calibration, np.degrees(np.interp(middle, time, chassis)), np.interp(middle, time, v))
+
+
+def _course(legs):
+    """Time (s), lean (degrees) and speed (m/s), smooth, at FINE_HZ."""
+    ends = np.cumsum([leg[0] for leg in legs])
+    time = np.arange(int(ends[-1] * FINE_HZ)) / FINE_HZ
+    which = np.searchsorted(ends, time, side="right").clip(0, len(legs) - 1)
+    lean = _smooth(np.array([leg[1] for leg in legs])[which], 0.5)
+    v = np.interp(time, np.concatenate(([0.0], ends)), [legs[0][2], *[leg[2] for leg in legs]])
+    return time, lean, _smooth(v, 0.4)
+
+
+def _readings(v, yaw_rate, slope, lean, pitch, height_m):
+    """Specific force (g) and rates (rad/s) along left, up, forward, by differences of place and attitude."""
+    heading = np.cumsum(yaw_rate) / FINE_HZ
+    along = v / FINE_HZ
+    place = np.column_stack(
+        (
+            np.cumsum(along * np.cos(slope) * np.cos(heading)),
+            np.cumsum(along * np.cos(slope) * np.sin(heading)),
+            np.cumsum(along * np.sin(slope)),
+        )
+    )
+    c, s = np.cos(heading), np.sin(heading)
+    nothing = np.zeros_like(c)
+    ahead = np.stack((c * np.cos(pitch), s * np.cos(pitch), np.sin(pitch)), axis=1)
+    level_left = np.stack((-s, c, nothing), axis=1)
+    above = np.cross(ahead, level_left)
+    ct, st = np.cos(lean)[:, None], np.sin(lean)[:, None]
+    left, up = ct * level_left + st * above, ct * above - st * level_left
+    place = place + height_m * up
+    acceleration = np.gradient(np.gradient(place, axis=0), axis=0) * FINE_HZ**2 + [0.0, 0.0, G]
+    body = np.stack((left, up, ahead), axis=1)  # rows are the vehicle's axes in the world
+    change = np.gradient(body, axis=0) * FINE_HZ
+    force = np.einsum("nij,nj->ni", body, acceleration) / G
+    rates = np.column_stack(
+        (
+            np.einsum("ni,ni->n", change[:, 1], ahead),
+            np.einsum("ni,ni->n", change[:, 2], left),
+            np.einsum("ni,ni->n", change[:, 0], up),
+        )
+    )
+    return force, rates
+
+
+def _about(axis, angle):
+    i, j = (axis + 1) % 3, (axis + 2) % 3
+    turned = np.eye(3)
+    turned[i, i] = turned[j, j] = np.cos(angle)
+    turned[i, j], turned[j, i] = np.sin(angle), -np.sin(angle)
+    return turned
+
+
+def _smooth(values, seconds):
+    """Twice a moving mean: as smooth as a hand."""
+    width = max(1, round(seconds * FINE_HZ))
+    window = np.full(width, 1.0 / width)
+    for _ in range(3):
+        longer = np.pad(values, (width // 2, width - 1 - width // 2), mode="edge")
+        values = np.convolve(longer, window, mode="valid")
+    return values
+
+
+def _noise(chance, n, seconds):
+    """Smooth noise of rms 1 that changes within so many seconds."""
+    knots = chance.standard_normal(int(n / FINE_HZ / seconds) + 3)
+    values = _smooth(np.interp(np.arange(n) / FINE_HZ / seconds, np.arange(len(knots)), knots), 0.5 * seconds)
+    return values / np.std(values)

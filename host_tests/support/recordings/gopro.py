@@ -1,0 +1,97 @@
+"""Small videos, and the telemetry of a GoPro in them."""
+
+import struct
+import subprocess
+from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+
+SCALE = 3755  # of the gyro's integers, as HERO cameras have it
+
+
+def film(path: Path, seconds: float, fps: int = 10, size: str = "320x240", colour: str = "green") -> Path:
+    """A video of one colour, with sound."""
+    sources = ["-f", "lavfi", "-i", f"color={colour}:size={size}:rate={fps}:duration={seconds}"]
+    sources += ["-f", "lavfi", "-i", f"sine=duration={seconds}"]
+    command = [imageio_ffmpeg.get_ffmpeg_exe(), "-y", "-loglevel", "error", *sources, "-pix_fmt", "yuv420p", str(path)]
+    subprocess.run(command, check=True)
+    return path
+
+
+def frames(path: Path, form: str = "rgb24") -> np.ndarray:
+    """(n, height, width, 3 or 4) all pictures of a video; "rgba": with its transparency."""
+    channels = 4 if form == "rgba" else 3
+    decoder = ["-c:v", "libvpx-vp9"] if path.suffix == ".webm" else []  # ffmpeg's own leaves the transparency out
+    reader = imageio_ffmpeg.read_frames(str(path), pix_fmt=form, bits_per_pixel=8 * channels, input_params=decoder)
+    width, height = next(reader)["size"]
+    return np.array([np.frombuffer(frame, np.uint8).reshape(height, width, channels) for frame in reader])
+
+
+def with_telemetry(video: Path, rate_dps: np.ndarray, rate_hz: float) -> Path:
+    """The same video, with a track of GPMF added: the gyro's readings (n, 3) from its first picture on."""
+    count = round(rate_hz)
+    packets = [_packet(rate_dps[begin : begin + count]) for begin in range(0, len(rate_dps) - count + 1, count)]
+    content = video.read_bytes()
+    moov = _find(content, b"moov")
+    head, inner, rest = content[: moov.start], content[moov.start + 8 : moov.stop], content[moov.stop :]
+    assert not rest  # what stands before stays where it is
+    length = 8 + len(inner) + len(_track(packets, 0))
+    grown = inner + _track(packets, len(head) + length + 8)
+    video.write_bytes(head + _box(b"moov", grown) + _box(b"mdat", b"".join(packets)))
+    return video
+
+
+def _packet(rate_dps: np.ndarray) -> bytes:
+    numbers = np.rint(np.radians(rate_dps) * SCALE).astype(">i2")
+    streams = []
+    for key, values in ((b"ACCL", np.ones((len(numbers), 3), ">i2")), (b"GYRO", numbers)):
+        scale = _item(b"SCAL", b"s", 2, struct.pack(">h", SCALE))
+        name = _item(b"STNM", b"c", 1, b"of three axes")
+        streams.append(_item(b"STRM", b"\0", 1, name + scale + _item(key, b"s", 6, values.tobytes())))
+    return _item(b"DEVC", b"\0", 1, _item(b"DVNM", b"c", 1, b"camera") + b"".join(streams))
+
+
+def _item(key: bytes, kind: bytes, size: int, values: bytes) -> bytes:
+    padded = values + bytes(-len(values) % 4)
+    return key + kind + struct.pack(">BH", size, len(values) // size) + padded
+
+
+def _box(name: bytes, content: bytes) -> bytes:
+    return struct.pack(">I4s", 8 + len(content), name) + content
+
+
+def _find(content: bytes, name: bytes) -> slice:
+    place = 0
+    while place < len(content):
+        size, found = struct.unpack_from(">I4s", content, place)
+        if found == name:
+            return slice(place, place + size)
+        place += size
+    raise AssertionError(name)
+
+
+def _track(packets: list[bytes], begin: int) -> bytes:
+    """A track of MP4 with a packet a second. begin: place of the first one in the file."""
+    count, seconds = len(packets), 1000 * len(packets)
+    matrix = struct.pack(">9i", 65536, 0, 0, 0, 65536, 0, 0, 0, 1 << 30)
+    tkhd = struct.pack(">IIIIII8xHHHH", 7, 0, 0, 3, 0, seconds, 0, 0, 0, 0) + matrix + struct.pack(">II", 0, 0)
+    mdhd = struct.pack(">IIIIIHH", 0, 0, 0, 1000, seconds, 0x15C7, 0)
+    hdlr = struct.pack(">II4s12x", 0, 0, b"meta") + b"GoPro MET\0"
+    gmin = struct.pack(">IHHHHHH", 0, 64, 0x8000, 0x8000, 0x8000, 0, 0)
+    dref = struct.pack(">II", 0, 1) + _box(b"url ", struct.pack(">I", 1))
+    stsd = struct.pack(">II", 0, 1) + _box(b"gpmd", struct.pack(">6xHI", 1, 0))
+    places, place = [], begin
+    for packet in packets:
+        places.append(place)
+        place += len(packet)
+    stbl = (
+        _box(b"stsd", stsd)
+        + _box(b"stts", struct.pack(">IIII", 0, 1, count, 1000))
+        + _box(b"stsc", struct.pack(">IIIII", 0, 1, 1, 1, 1))
+        + _box(b"stsz", struct.pack(f">III{count}I", 0, 0, count, *map(len, packets)))
+        + _box(b"stco", struct.pack(f">II{count}I", 0, count, *places))
+    )
+    minf = _box(b"gmhd", _box(b"gmin", gmin)) + _box(b"dinf", _box(b"dref", dref)) + _box(b"stbl", stbl)
+    mdia = _box(b"mdhd", mdhd) + _box(b"hdlr", hdlr) + _box(b"minf", minf)
+    return _box(b"trak", _box(b"tkhd", tkhd) + _box(b"mdia", mdia))

@@ -1,0 +1,49 @@
+"""Rides of both simulators with sloppy calibrations, with what the display shows of them."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.evaluation.runs import as_log, calibrated_by_poses
+from kickstand_tools.logs.log import Log
+from kickstand_tools.replay import replay_engine
+from kickstand_tools.simulation.ride import ride
+from other_bike import other_ride
+
+
+@dataclass
+class Known:
+    """A ride whose lean (n, degrees) is known. riding (n): True from setting off on."""
+
+    log: Log
+    calibration: CalibrationFile
+    lean_deg: np.ndarray
+    riding: np.ndarray
+
+    def live(self):
+        """(n) the firmware's lean."""
+        engine = replay_engine.Replay(self.calibration.to_firmware(), self.calibration.delay_s())
+        return np.array([engine.step(*row)[0] for row in self.log.rows()])
+
+    def part(self, kept):
+        """The samples where kept (n) is True."""
+        log = self.log
+        rows = log.t_s[kept], log.accel_g[kept], log.gyro_dps[kept], log.speed_mps[kept]
+        return Known(Log(*rows), self.calibration, self.lean_deg[kept], self.riding[kept])
+
+
+def simulated(profile, seed, seconds):
+    """By kickstand_tools.simulation; the upright pose was off by 1.5 degrees, the pitch between both by 1."""
+    made = ride(profile, seed, seconds, 1.5 * (1, -1)[seed % 2], 1.0 * (1, -1)[seed // 2 % 2])
+    riding = np.cumsum(made.truth["speed_mps"] > 0.5) > 0
+    return Known(as_log(made), calibrated_by_poses(made), made.truth["lean_deg"], riding)
+
+
+def other(kind, seed, **more):
+    """By other_bike."""
+    made = other_ride(kind, seed, **more)
+    return Known(made.log, made.calibration, made.lean_deg, np.cumsum(made.speed_mps > 0.5) > 0)
+
+
+def rms(values):
+    return float(np.sqrt(np.mean(np.square(values))))

@@ -1,0 +1,52 @@
+"""The board of the page, and the same board with the firmware's own loop, told the same. CPython and MicroPython.
+
+As a script, with "page" or "loop" as its argument: reads {"until_s": s, "orders": [[s, name, value], ...]} as JSON from
+standard input, runs that in the current directory (the board's flash) and prints as JSON on the last line:
+{"orders": as they were carried out, "displays": [[s, what the display showed from then on], ...]}.
+"""
+
+import json
+import sys
+
+from kickstand_tools.web.device import Device, PageDevice
+
+
+def page(orders, until_s):
+    """As worker.mjs turns it, but in slices of other lengths."""
+    device = PageDevice()
+    done, slice_s, now_s = [], 0.007, 0.0
+    for at_s, name, value in orders:
+        while now_s < at_s:
+            slice_s = 0.007 if slice_s > 0.09 else slice_s + 0.011
+            now_s = min(at_s, now_s + slice_s)
+            device.run_to(now_s)
+        done.append([device.order(name, value), name, value])
+    device.run_to(until_s)
+    return done, json.loads(device.take())
+
+
+def loop(orders, until_s):
+    """With kickstand.start.main() and its loop."""
+    device = Device()
+    from kickstand.start import main
+
+    board = device.board
+    for at_s, name, value in orders:
+        board.at(at_s, lambda name=name, value=value: device.act(name, value))
+    stopped = False
+    while board.clock.now_us < until_s * 1e6:
+        if not device.powered:
+            device.rest()
+        elif stopped:
+            device.powered = stopped = device.resume(device.rest) != "off"
+        else:
+            ended = board.run(main, until_s)
+            device.powered, stopped = ended != "off", ended == "returned"
+    return orders, json.loads(device.take())
+
+
+if __name__ == "__main__":
+    told = json.load(sys.stdin)
+    orders, ticks = (page if sys.argv[1] == "page" else loop)(told["orders"], told["until_s"])
+    displays = [[tick["t_s"], tick["display"]] for tick in ticks if "display" in tick]
+    print("\n" + json.dumps({"orders": orders, "displays": displays}))

@@ -1,0 +1,116 @@
+"""A rider at the page: real clicks and keys, and what there is to be seen then."""
+
+import os
+from pathlib import Path
+
+READ_S = 30  # at most, until the display says something: a busy machine starts the page late
+
+# Keeps what the board's worker sends, for tests to look at and to repeat
+KEEP = """
+const Real = Worker;
+window.seen = { displays: [], orders: [], rates: [], shift: 0, last: null };
+window.Worker = class extends Real {
+  constructor(...given) {
+    super(...given);
+    this.addEventListener("message", ({ data }) => {
+      for (const tick of data.ticks ?? []) {
+        seen.last = tick;
+        if (tick.display) seen.displays.push([tick.t_s, tick.display]);
+      }
+      seen.orders.push(...(data.orders ?? []));
+      if (data.rate !== undefined) seen.rates.push(data.rate);
+    });
+  }
+};
+new PerformanceObserver((list) => {
+  for (const entry of list.getEntries()) if (!entry.hadRecentInput) seen.shift += entry.value;
+}).observe({ type: "layout-shift", buffered: true });
+"""
+
+
+class Rider:
+    """browser: of playwright. asked: the addresses that the page has fetched; errors: what went wrong in it."""
+
+    def __init__(self, browser, address, **kind):
+        self._browser = browser
+        self.context = browser.new_context(**kind)
+        self.context.add_init_script(KEEP)
+        self.asked, self.errors = [], []
+        self.context.on("request", lambda request: self.asked.append(request.url))
+        self.page = self.context.new_page()
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.goto(address)
+
+    def reads(self, text, within_s=READ_S):
+        """Wait until the display says this in its first line."""
+        self.page.wait_for_function(
+            "text => seen.last && document.querySelector('#display').ariaLabel.startsWith(`Display: ${text}`)",
+            arg=text,
+            timeout=1000 * within_s,
+        )
+
+    def told(self, text, within_s=READ_S):
+        """Wait until the guide says this."""
+        self.page.wait_for_function(
+            "text => document.querySelector('#todo').textContent.includes(text)", arg=text, timeout=1000 * within_s
+        )
+
+    def wait(self, seconds):
+        """Until so much of the board's time has passed."""
+        self.page.wait_for_function(
+            "until => seen.last.t_s >= until", arg=self.seen("last")["t_s"] + seconds, timeout=1000 * (seconds + READ_S)
+        )
+
+    def keys(self, key, times):
+        for _ in range(times):
+            self.page.keyboard.press(key)
+
+    def hold(self, seconds):
+        """Keep the space bar pressed for so long."""
+        self.page.keyboard.down("Space")
+        self.wait(seconds)
+        self.page.keyboard.up("Space")
+        self.wait(0.3)  # as a finger does, which does not press again at once
+
+    def click(self, selector):
+        self.page.click(selector)
+
+    def seen(self, what):
+        """What the board has sent, by a name in KEEP."""
+        return self.page.evaluate(f"seen.{what}")
+
+    def text(self, selector):
+        return self.page.inner_text(selector)
+
+    def leans(self):
+        """(true, shown) as the page says them, degrees, > 0 to the right."""
+        return tuple(_lean_deg(self.text(selector)) for selector in ("#true-lean", "#shown-lean"))
+
+    def align(self):
+        """The two presses, as the guide asks for them."""
+        self.told("Press the button")
+        self.click("#press")
+        self.reads("Now upright")
+        self.click("#do")  # hold it upright
+        self.told("Press the button once more")
+        self.click("#press")
+
+    def slow(self, times):
+        """Let the page's own thread have this part of the processor only."""
+        self.context.new_cdp_session(self.page).send("Emulation.setCPUThrottlingRate", {"rate": times})
+
+    def worker_s(self):
+        """Processor time that the page's workers have used, in s."""
+        processes = self._browser.new_browser_cdp_session().send("SystemInfo.getProcessInfo")["processInfo"]
+        ticks = 0
+        for process in processes:
+            for thread in Path(f"/proc/{process['id']}/task").glob("*"):
+                if (thread / "comm").read_text().strip() == "DedicatedWorker":
+                    fields = (thread / "stat").read_text().rsplit(")", 1)[1].split()
+                    ticks += int(fields[11]) + int(fields[12])  # in user mode, and in the kernel
+        return ticks / os.sysconf("SC_CLK_TCK")
+
+
+def _lean_deg(text):
+    size, _, side = text.partition("°")
+    return -float(size) if side.strip() == "left" else float(size)

@@ -1,0 +1,80 @@
+"""A serial port of the browser that leads to an emulated Pico in the test's own process.
+
+Emulated time passes only while the page listens.
+"""
+
+import base64
+
+# Takes the place of navigator.serial. boardSays() and boardHears() are Python's.
+FAKE = """
+const line = {
+  getInfo: () => ({}),
+  setSignals: async () => {},
+  async open() {
+    let going = true;
+    this.readable = new ReadableStream({
+      async pull(sink) {
+        while (going) {
+          const said = await boardSays();
+          if (said === null) return sink.error(new Error("The device has been lost."));
+          if (said) return sink.enqueue(Uint8Array.from(atob(said), (c) => c.charCodeAt(0)));
+          await new Promise((done) => setTimeout(done, 1));
+        }
+      },
+      cancel() { going = false; },
+    });
+    this.writable = new WritableStream({
+      async write(bytes) {
+        if (!(await boardHears(btoa(String.fromCharCode(...bytes))))) throw new Error("The device has been lost.");
+      },
+    });
+  },
+  async close() {},
+};
+Object.defineProperty(navigator, "serial", { value: { requestPort: async () => line }, configurable: true });
+"""
+
+
+class SerialLine:
+    """device: an emulator.pico.Pico.  cut_after: so many bytes to the board the cable is pulled; None for never."""
+
+    STEP_S = 0.04  # of emulated time at most, until the page may speak again
+
+    def __init__(self, rider, device):
+        self._rider, self._device = rider, device
+        self._said = bytearray()
+        self.connected = True
+        self.sent = 0
+        self.cut_after = None
+        device.heard = self._hear
+        rider.page.expose_function("boardSays", self._says)
+        rider.page.expose_function("boardHears", self._hears)
+
+    def _hear(self, data):
+        self._said += data
+        self._device.chip.stop()
+
+    def _says(self):
+        if not self.connected:
+            return None
+        self._device.run(self.STEP_S)
+        said = base64.b64encode(bytes(self._said)).decode()
+        self._said.clear()
+        return said
+
+    def _hears(self, text):
+        data = base64.b64decode(text)
+        self.sent += len(data)
+        if self.cut_after is not None and self.sent > self.cut_after:
+            self.connected = False
+        if self.connected:
+            self._device.console.send(data)
+        return self.connected
+
+    def install(self):
+        """Click, and what the page says in the end."""
+        page = self._rider.page
+        self.connected, self.sent = True, 0
+        page.click("#install")
+        page.wait_for_function("!document.querySelector('#install').disabled", timeout=600_000)
+        return self._rider.text("#install-said")

@@ -1,0 +1,39 @@
+"""The loop that the page turns is the firmware's own: what the display shows is the same, at the same instants."""
+
+import json
+import subprocess
+import sys
+
+import repeat
+from kickstand_tools import firmware_path
+
+# Safe mode too: the button is held while the power comes on
+ORDERS = [
+    *([1.0, "button", True], [1.2, "button", False], [5.0, "pose", "upright"]),
+    *([6.0, "sensor", False], [7.3, "sensor", True]),
+    *([9.0, "power", False], [9.5, "button", True], [9.7, "power", True], [11.2, "button", False]),
+    *([12.0, "power", False], [12.3, "power", True]),
+]
+UNTIL_S = 14.0
+
+
+def run(kind, orders, flash):
+    flash.mkdir()
+    done = subprocess.run(
+        [sys.executable, repeat.__file__, kind],
+        input=json.dumps({"orders": orders, "until_s": UNTIL_S}),
+        capture_output=True,
+        text=True,
+        env={"PYTHONPATH": firmware_path.search_path()},
+        cwd=flash,
+        check=True,
+    )
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_the_page_turns_the_loop_as_the_firmware_does(tmp_path):
+    page = run("page", ORDERS, tmp_path / "page")
+    loop = run("loop", page["orders"], tmp_path / "loop")
+    shown = {display["text"][0].rstrip() for _, display in page["displays"]}
+    assert {"", "Kickstand", "Stand: hold", "Now upright:", "Calibration", "Safe mode"} <= shown
+    assert page["displays"] == loop["displays"]

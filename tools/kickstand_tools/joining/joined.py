@@ -1,0 +1,149 @@
+"""A ride with the positions of a track: matched, and written as a log."""
+
+import csv
+import gzip
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from kickstand.errors import Notice
+from kickstand.units import LOST_US
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..logs.block import Block
+from ..logs.csv_lines import write_log
+from ..logs.log import Log
+from ..logs.reader import Source, read_blocks, read_twice
+from ..logs.source import Progress, name_of
+from ..logs.table import Array
+from ..output import write_whole
+from .match import Match, match
+from .motion import motion
+from .track import Track
+from .track_files import read_track
+
+SPEED = "speed_mps"
+Integers = NDArray[np.int64]
+_FORMAT = {SPEED: "%.3f", "lat_deg": "%.7f", "lon_deg": "%.7f", "utc_s": "%.3f"}
+
+
+@dataclass
+class Joined:
+    """A ride, the track that belongs to it, and where. own_speed: the log has a speed, which stays."""
+
+    ride: Source
+    track: Track
+    match: Match
+    own_speed: bool
+    notices: list[Notice]
+
+    @property
+    def columns(self) -> dict[str, Array]:
+        """(m, the points of the track) by the names of the log's columns."""
+        track = self.track
+        values = {SPEED: track.speeds_mps(), "lat_deg": track.lat_deg, "lon_deg": track.lon_deg, "utc_s": track.utc_s}
+        return {name: value for name, value in values.items() if name != SPEED or not self.own_speed}
+
+
+def join_track(ride: Source, track: Path | str | Track, progress: Progress | None = None) -> Joined:
+    """Find where a phone's or watch's track belongs in a ride, by how both turn and speed up.
+
+    ride: see read_log; it needs neither a calibration nor a speed. track: a .gpx or .fit file. Their clocks may differ
+    by any time and drift. progress: called with how much of the ride has been read. Raises InputError where the track
+    is another ride's, and where that cannot be told.
+
+    >>> from kickstand_tools.api import simulate_ride
+    >>> ride = simulate_ride("hills", seed=1, seconds=120.0)
+    >>> course = np.cumsum(np.radians(ride.truth["yaw_rate_dps"])) / ride.rate_hz  # to the left of east
+    >>> north, east = (np.cumsum(ride.truth["speed_mps"] * way(course)) / ride.rate_hz for way in (np.sin, np.cos))
+    >>> lat, lon = np.degrees(north / 6_371_000.0)[::200], np.degrees(east / 6_371_000.0)[::200]
+    >>> track = Track(1.7e9 + np.arange(len(lat)), lat, lon, np.full(len(lat), np.nan), "track")
+    >>> joined = join_track(Log.from_readings(ride.readings, ride.rate_hz), track)
+    >>> round(joined.match.start_utc_s - 1.7e9)
+    0
+    """
+    given = track if isinstance(track, Track) else read_track(track)
+    ride = read_twice(ride)
+    notices: list[Notice] = []
+    moved = motion(ride, progress, notices)
+    if moved.positions:
+        raise InputError(f"{name_of(ride)} has positions already: join puts them to a ride that has none")
+    try:
+        found = match(moved, given)
+    except InputError as error:
+        raise InputError(f"{name_of(ride)}, {given.name}: {error}") from error
+    return Joined(ride, given, found, moved.speed, notices)
+
+
+def write_joined(out: Path | str, joined: Joined, progress: Progress | None = None) -> int:
+    """Write the ride, line for line, with the track's values in the rows nearest to them, whole or not at all.
+
+    Gzipped if the name ends in .gz. Returns how many positions there are in it. progress: called with how much of the
+    ride is done. Raises InputError.
+
+    >>> import tempfile
+    >>> log = Log([0.0, 0.01], [[0.0, 1.0, 0.0]] * 2, [[0.0, 0.0, 0.0]] * 2)
+    >>> track = Track(*(np.array([value]) for value in (1.7e9, 48.0, 11.0, 9.0)), name="track")
+    >>> joined = Joined(log, track, Match(1.7e9, 0.0, 0.1, 0.9, 0.0), own_speed=False, notices=[])
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     count = write_joined(f"{directory}/ride.csv", joined)
+    ...     print(Path(f"{directory}/ride.csv").read_text().splitlines()[1].partition(",0.000000,9")[2])
+    .000,48.0000000,11.0000000,1700000000.000
+    """
+    out, columns = Path(out), joined.columns
+    at_us = np.rint(joined.match.ride_s(joined.track.utc_s) * 1e6).astype(np.int64)
+    if isinstance(joined.ride, Log):
+        log = joined.ride
+        rows, points = _nearest(log.time_us, at_us)
+        values = {name: _placed(column[points], rows, len(log.t_s)) for name, column in columns.items()}
+        write_log(out, replace(log, **values))
+        return len(points)
+    count = 0
+
+    def write(temporary: Path) -> None:
+        nonlocal count
+        opened = gzip.open if out.suffix == ".gz" else open
+        with opened(temporary, "wt", encoding="utf-8", newline="") as file:
+            first = True
+            for block in read_blocks(joined.ride, 2, progress):
+                kept = [name for name in block.names if name not in columns]
+                if first:
+                    file.write(",".join([*kept, *columns]) + "\n")
+                    first = False
+                rows, points = _nearest(block.time_us, at_us)
+                ends = ["," * len(columns)] * len(block.lines)
+                for row, values in zip(rows.tolist(), zip(*(column[points].tolist() for column in columns.values()))):
+                    cells = [_FORMAT[name] % value for name, value in zip(columns, values)]
+                    ends[row] = "," + ",".join(cells).replace("nan", "")
+                count += len(points)
+                lines = block.lines if len(kept) == len(block.names) else _only(block, kept)
+                file.write("".join([f"{line}{end}\n" for line, end in zip(lines, ends)]))
+
+    write_whole(out, write)
+    return count
+
+
+def _nearest(time_us: Integers, at_us: Integers) -> tuple[Integers, Integers]:
+    """Rows, and which points belong into them: those within the rows' time and not in a gap of the log."""
+    points = np.flatnonzero((at_us >= time_us[0]) & (at_us <= time_us[-1]))
+    after = np.clip(np.searchsorted(time_us, at_us[points]), 1, max(len(time_us) - 1, 1))
+    if len(time_us) < 2:
+        return np.zeros(len(points), dtype=int), points
+    rows = after - (at_us[points] - time_us[after - 1] < time_us[after] - at_us[points])
+    near = np.abs(time_us[rows] - at_us[points]) <= LOST_US
+    rows, last = np.unique(rows[near][::-1], return_index=True)  # of two points in a row the later one
+    return rows, points[near][::-1][last]
+
+
+def _placed(values: Array, rows: Integers, count: int) -> Array:
+    placed = np.full(count, np.nan)
+    placed[rows] = values
+    return placed
+
+
+def _only(block: Block, kept: list[str]) -> list[str]:
+    """The lines with these columns."""
+    places = [block.names.index(name) for name in kept]
+    rows = (next(csv.reader([line])) if '"' in line else line.split(",") for line in block.lines)
+    return [",".join([cells[place] for place in places]) for cells in rows]

@@ -1,0 +1,153 @@
+"""Where a track belongs in a ride, if it does: the best of all shifts, or why none will do."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from kickstand.units import STANDARD_GRAVITY
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from ..logs.table import Array
+from ..refusals import OPPOSITE_SIGN
+from .course import Course, course
+from .fit import AROUND_S, Fit, apart, fitted
+from .motion import STEP_S, Motion
+from .pieces import STEPS, pieces
+from .search import correlations, evidence, peaks
+from .track import LONGEST_S, SLOWEST_MPS, Track
+
+_GRID_S = 0.5
+_SPAN_S = 4.0  # over which a change of course is compared first
+_APART_S = 10.0  # between two rough shifts
+_CANDIDATES = 5
+_WORTH = 0.1  # of the likeliest one's evidence, for a rough shift to be tried
+_LEAST_S = 60.0  # of riding that both have
+_LEAST_TURN_DEG = 360.0  # in all
+_LEAST_EVIDENCE = 15.0  # other rides' tracks reach 9
+_LEAST_LEAD = 6.0  # of the best shift's evidence before another one's
+_MOST_APART = 3.0
+_MOST_DRIFT = 400e-6  # of a crystal in the heat of an engine it is 100e-6
+_ALIKE = 0.9  # a higher correlation is no chance, but may be one bend like another
+_LEAST_CORRELATION = 0.6
+_MOST_SIGMA_S = 0.3
+
+
+@dataclass
+class Match:
+    """start_utc_s: the track's time at the ride's first sample, s since 1970, from which positions are where the bike
+    was: what the receiver is late by is in it. drift: by how many seconds a second the ride's clock loses. sigma_s:
+    standard deviation of the match. correlation: of the changes of course, 0 to 1. common_s: how long the track and the
+    ride last together."""
+
+    start_utc_s: float
+    drift: float
+    sigma_s: float
+    correlation: float
+    common_s: float
+
+    def ride_s(self, utc_s: Array) -> Array:
+        """Seconds since the ride's first sample at these times."""
+        return (utc_s - self.start_utc_s) * (1.0 - self.drift)
+
+
+def match(motion: Motion, track: Track) -> Match:
+    """Raises InputError where the track does not belong to the ride, or where that cannot be told. The names of both
+    stand before what it says."""
+    track = track.once_a_second()
+    steps = course(track)
+    parts = pieces(steps)
+    _check_turns(motion, steps)
+    found: list[Fit] = []
+    mirrored, rough = _rough_shifts(motion, steps)
+    for shift_s in rough:
+        fit = fitted(motion, steps, parts, shift_s)
+        if fit is not None:
+            found.append(fit)
+    if not found:
+        raise InputError(f"they have less than {_LEAST_S:.0f} s of riding in common: {_OTHER}")
+    found.sort(key=lambda fit: -fit.evidence)
+    best = found[0]
+    if best.evidence < _LEAST_EVIDENCE or best.correlation < _LEAST_CORRELATION:
+        if mirrored:
+            raise InputError(
+                "the ride turns left where the track turns right: " + OPPOSITE_SIGN
+            )
+        if best.correlation > _ALIKE:
+            common_s = best.pieces * STEPS
+            raise InputError(f"they have {common_s} s with too few bends in common to be sure: {_LONGER}")
+        raise InputError(f"nowhere does the ride turn as the track does: {_OTHER}")
+    others = [fit for fit in found if abs(fit.shift_s - best.shift_s) > AROUND_S]
+    if others and others[0].evidence > best.evidence - _LEAST_LEAD:
+        far_s = abs(others[0].shift_s - best.shift_s)
+        raise InputError(f"the track fits at two times, {far_s:.0f} s apart, as its bends are alike: {_LONGER}")
+    if abs(best.drift) > _MOST_DRIFT or apart(motion, steps, parts, best) > _MOST_APART:
+        raise InputError(
+            "the ride turns as the track does, but at other times: it is the same road on another day, or other bends "
+            "that are alike"
+        )
+    if best.sigma_s > _MOST_SIGMA_S:
+        raise InputError(f"the track fits to {best.sigma_s:.1f} s only, not to {_MOST_SIGMA_S} s: {_LONGER}")
+    start_utc_s = float(track.utc_s[0]) + best.shift_s
+    made = Match(start_utc_s, best.drift, best.sigma_s, best.correlation, 0.0)
+    begin_s, end_s = made.ride_s(track.utc_s[[0, -1]])
+    made.common_s = float(min(end_s, motion.seconds) - max(begin_s, 0.0))
+    return made
+
+
+_LONGER = "a longer ride with more bends is needed, or a track with a point every second"
+_OTHER = "is it the track of another ride or another day?"
+
+
+def _check_turns(motion: Motion, steps: Course) -> None:
+    if motion.seconds < _LEAST_S:
+        raise InputError(f"the ride lasts {motion.seconds:.0f} s: at least {_LEAST_S:.0f} s with bends are needed")
+    moving_s = float((steps.end_s - steps.begin_s)[steps.good].sum())
+    if moving_s < _LEAST_S:
+        raise InputError(
+            f"the track moves for {moving_s:.0f} s only, faster than {SLOWEST_MPS} m/s and with a point at least every "
+            f"{LONGEST_S:.0f} s: {_LEAST_S:.0f} s are needed"
+        )
+    second = round(1.0 / STEP_S)
+    yaw_dps = motion.rate_dps @ motion.up
+    yaw_dps = np.convolve(yaw_dps, np.full(second, 1.0 / second), "same")
+    turned_deg = float(np.abs(yaw_dps[np.abs(yaw_dps) > 3.0]).sum()) * STEP_S
+    if turned_deg < _LEAST_TURN_DEG:
+        raise InputError(f"the ride turns by {turned_deg:.0f} degrees in all: too few bends to tell where it was when")
+
+
+def _rough_shifts(motion: Motion, steps: Course) -> tuple[bool, list[float]]:
+    """Would the ride fit better if it turned the other way? The shifts that fit best."""
+    of_track, track_good = _changes_of_track(steps)
+    of_ride, ride_good = _changes_of_ride(motion)
+    found, count = correlations(of_track, track_good, of_ride, ride_good)
+    found = np.where(count * _GRID_S >= _LEAST_S / 2.0, found, 0.0)
+    likely = evidence(found, count, _GRID_S / _SPAN_S)
+    other = evidence(-found, count, _GRID_S / _SPAN_S)
+    found_at = [p for p in peaks(likely, round(_APART_S / _GRID_S), _CANDIDATES) if likely[p] > _WORTH * likely.max()]
+    shifts = [(place - (len(of_ride) - 1)) * _GRID_S for place in found_at]
+    return bool(other.max() > _LEAST_EVIDENCE and other.max() > 2.0 * likely.max()), shifts
+
+
+def _changes_of_track(steps: Course) -> tuple[Array, NDArray[np.bool_]]:
+    """Every _GRID_S by how much the course changes within _SPAN_S, in degrees as a leaning bike's gyro sees it; and
+    whether that is known."""
+    middle_s, at_s = (steps.begin_s + steps.end_s) / 2.0, np.arange(0.0, steps.end_s[-1], _GRID_S)
+    half = _SPAN_S / 2.0
+    heading = np.cumsum(steps.turn_deg)
+    change = np.interp(at_s + half, middle_s, heading) - np.interp(at_s - half, middle_s, heading)
+    speed = np.interp(at_s, middle_s, np.where(steps.good, steps.speed_mps, 0.0))
+    bad = np.append(0, np.cumsum(~steps.good))
+    first, last = np.searchsorted(steps.end_s, at_s - half), np.searchsorted(steps.begin_s, at_s + half)
+    known = (bad[last] == bad[first]) & (at_s >= half) & (at_s <= steps.end_s[-1] - half)
+    return change * np.cos(np.arctan(speed * np.radians(change / _SPAN_S) / STANDARD_GRAVITY)), known
+
+
+def _changes_of_ride(motion: Motion) -> tuple[Array, NDArray[np.bool_]]:
+    """The same of the ride's sensor."""
+    at_s, half = np.arange(0.0, motion.seconds, _GRID_S), _SPAN_S / 2.0
+    edges_s = np.arange(len(motion.there) + 1) * STEP_S
+    turned = np.append(0.0, np.cumsum(motion.rate_dps @ motion.up)) * STEP_S
+    change = np.interp(at_s + half, edges_s, turned) - np.interp(at_s - half, edges_s, turned)
+    missing = np.append(0, np.cumsum(~motion.there)) * STEP_S
+    gap_s = np.interp(at_s + half, edges_s, missing) - np.interp(at_s - half, edges_s, missing)
+    return change, (gap_s < 0.1 * _SPAN_S) & (at_s >= half) & (at_s <= motion.seconds - half)

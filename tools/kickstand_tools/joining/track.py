@@ -1,0 +1,55 @@
+"""The track of a phone or a watch: where it was, and when."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..logs.axes.course import distance_m
+from ..logs.table import Array, Table
+
+LONGEST_S = 6.0  # between two points of one course: watches write one so rarely on straights
+SLOWEST_MPS = 2.5  # of a step that is more than the positions' errors
+FASTEST_MPS = 100.0  # a quicker step is a jump of the receiver
+_OFTEN_S = 0.7
+_AROUND = 2  # points before and after, from which a speed is taken
+
+
+@dataclass(eq=False)
+class Track(Table):
+    """n points in the order of time.
+
+    utc_s: s since 1970, increasing. lat_deg, lon_deg: north and east. speed_mps: as the file has it, NaN where it has
+    none. name: the file's.
+    """
+
+    utc_s: Array
+    lat_deg: Array
+    lon_deg: Array
+    speed_mps: Array
+    name: str
+
+    def speeds_mps(self) -> Array:
+        """(n) those of the file. Where it has none: by how far the points around are apart, as far as that is more than
+        their errors."""
+        if np.any(np.isfinite(self.speed_mps)):
+            return self.speed_mps
+        speed = np.full(len(self.utc_s), np.nan)
+        if len(speed) <= 2 * _AROUND:
+            return speed
+        way_m = np.append(0.0, np.cumsum(np.hypot(*self.steps_m())))
+        span_s = self.utc_s[2 * _AROUND :] - self.utc_s[: -2 * _AROUND]
+        mean = (way_m[2 * _AROUND :] - way_m[: -2 * _AROUND]) / span_s
+        told = (span_s <= LONGEST_S) & (mean > SLOWEST_MPS) & (mean < FASTEST_MPS)
+        speed[_AROUND:-_AROUND] = np.where(told, mean, np.nan)
+        return speed
+
+    def once_a_second(self) -> "Track":
+        """A point a second of a track that has more: closer ones tell less of the course than they err."""
+        if len(self.utc_s) < 2 or np.median(np.diff(self.utc_s)) > _OFTEN_S:
+            return self
+        first = np.unique(np.floor(self.utc_s - self.utc_s[0]), return_index=True)[1]
+        return Track(*(values[first] for values in self.columns().values()), name=self.name)
+
+    def steps_m(self) -> tuple[Array, Array]:
+        """(n - 1) each: how far east and north every point is of the one before."""
+        return distance_m(self.lat_deg[:-1], self.lon_deg[:-1], self.lat_deg[1:], self.lon_deg[1:])

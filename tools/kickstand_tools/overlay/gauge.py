@@ -1,0 +1,179 @@
+"""The gauge: a picture of one moment of a ride, transparent where there is nothing.
+
+A dial from 60 degrees to the left over upright to 60 to the right, with a motorcycle seen from behind that leans as the
+rider's does; beside it the speed and the forces. Text has an outline, so that it can be read on snow and in a tunnel.
+"""
+
+import math
+
+from PIL import Image, ImageChops, ImageDraw
+
+from . import parts
+from .parts import ACCENT, DIM, PANEL, WHITE
+
+MOST_DEG = 60.0  # end of the dial
+MOST_G = 1.2  # edge of the circle of forces
+SHARE = 0.3  # of the video's height
+UPRIGHT_DEG = 0.5  # a smaller lean is to neither side
+_WIDTH = 1.72  # by the height
+_SPREAD = 1.5  # degrees of the picture for a degree of lean
+_MIDDLE, _SIDE = 60.0, 146.0  # of the dial, and of speed and forces, from the left
+_KMH, _MPH = 3.6, 3.6 / 1.609344
+
+
+class Gauge:
+    """Draws at one size. video_height: of the video that the gauge is for, pixels. mph: miles, not kilometres, an hour.
+    has_speed: there is room for a speed.
+
+    width, height: of the pictures, even, as videos need it.
+    """
+
+    def __init__(self, video_height: int, has_speed: bool = True, mph: bool = False) -> None:
+        self.height = max(96, 2 * round(video_height * SHARE / 2.0))
+        self.width = 2 * round(self.height * _WIDTH / 2.0)
+        self._unit = self.height / 100.0  # lengths below are in hundredths of the height
+        self._has_speed, self._mph = has_speed, mph
+        self._dial, self._radius = self._px(_MIDDLE, 62.0), round(50.0 * self._unit)
+        forces_y, forces_radius = (63.0, 21.0) if has_speed else (46.0, 30.0)
+        self._forces, self._forces_radius = self._px(_SIDE, forces_y), forces_radius * self._unit
+        self._band = parts.smooth_mask((2 * self._radius, 2 * self._radius), self._draw_band)
+        self._still = self._still_picture()
+
+    def picture(
+        self, lean_deg: float, forward_g: float, left_g: float, speed_mps: float, left_deg: float, right_deg: float
+    ) -> Image.Image:
+        """(height, width) RGBA. NaN: not known or not trusted. left_deg, right_deg: largest leans until now."""
+        picture = self._still.copy()
+        known = math.isfinite(lean_deg)
+        if known:
+            self._fill(picture, lean_deg)
+            bike = parts.bike(34.0 * self._unit)
+            turned = bike.rotate(-max(-75.0, min(75.0, lean_deg)), Image.Resampling.BICUBIC)
+            parts.put(picture, turned, self._px(_MIDDLE, 61.0))
+        self._marks(picture, left_deg, right_deg)
+        self._number(picture, lean_deg, known)
+        self._show_forces(picture, forward_g, left_g)
+        if self._has_speed:
+            scale = _MPH if self._mph else _KMH
+            words = f"{scale * speed_mps:.0f}" if math.isfinite(speed_mps) else "--"
+            self._text(picture, words, 24.0, WHITE, (_SIDE, 17.0))
+        return picture
+
+    def _px(self, x: float, y: float) -> tuple[float, float]:
+        return x * self._unit, y * self._unit
+
+    def _text(
+        self, picture: Image.Image, words: str, size: float, colour: parts.Colour, centre: tuple[float, float]
+    ) -> None:
+        parts.put(picture, parts.text(words, round(size * self._unit, 1), colour), self._px(*centre))
+
+    def _draw_band(self, pen: ImageDraw.ImageDraw, finer: int) -> None:
+        """The dial's half ring, as a mask."""
+        size, inner = 2 * self._radius * finer, 8.0 * self._unit * finer
+        pen.pieslice([0, 0, size - 1, size - 1], 180, 360, fill=255)
+        pen.ellipse([inner, inner, size - 1 - inner, size - 1 - inner], fill=0)
+
+    def _still_picture(self) -> Image.Image:
+        """What is the same at all times."""
+        picture = Image.new("RGBA", (self.width, self.height), parts.CLEAR)
+        panel = parts.smooth_mask(
+            picture.size,
+            lambda pen, finer: pen.rounded_rectangle(
+                [0, 0, self.width * finer - 1, self.height * finer - 1], radius=9.0 * self._unit * finer, fill=PANEL[3]
+            ),
+        )
+        picture.paste(PANEL[:3] + (255,), mask=panel)
+        picture.putalpha(panel)
+        edge = max(1, round(self._unit * 0.8))
+        ring = parts.outlined(self._band, (70, 76, 86, 255), edge)
+        parts.put(picture, ring, self._dial)
+        for lean in range(-60, 61, 10):
+            long = lean % 30 == 0
+            self._tick(picture, lean, 42.0 if long else 46.0, 50.0, WHITE if long else DIM)
+        for lean in (-60, -30, 30, 60):
+            x, y = self._on_dial(lean, 36.0 if abs(lean) == 60 else 37.0)
+            self._text(picture, f"{abs(lean)}", 6.5, WHITE, (x, y - 3.0 if abs(lean) == 60 else y))
+        self._circle(picture)
+        if self._has_speed:
+            self._text(picture, "mph" if self._mph else "km/h", 8.0, WHITE, (_SIDE, 33.0))
+        return picture
+
+    def _on_dial(self, lean_deg: float, radius: float) -> tuple[float, float]:
+        angle = math.radians(_SPREAD * max(-MOST_DEG, min(MOST_DEG, lean_deg)))
+        return _MIDDLE + radius * math.sin(angle), 62.0 - radius * math.cos(angle)
+
+    def _tick(self, picture: Image.Image, lean_deg: float, near: float, far: float, colour: parts.Colour) -> None:
+        begin, end = (self._px(*self._on_dial(lean_deg, radius)) for radius in (near, far))
+
+        def draw(pen: ImageDraw.ImageDraw, finer: int) -> None:
+            line = [(x * finer, y * finer) for x, y in (begin, end)]
+            pen.line(line, fill=255, width=max(finer, round(0.9 * self._unit * finer)))
+
+        picture.paste(colour, mask=parts.smooth_mask(picture.size, draw))
+
+    def _circle(self, picture: Image.Image) -> None:
+        """Of the forces, with rings at 0.5 and 1 g, and what its ends mean."""
+        (x, y), radius = self._forces, self._forces_radius
+
+        def draw(pen: ImageDraw.ImageDraw, finer: int) -> None:
+            for ring_g, width in ((0.5, 0.5), (1.0, 0.5), (MOST_G, 1.0)):
+                r = radius * ring_g / MOST_G * finer
+                box = [x * finer - r, y * finer - r, x * finer + r, y * finer + r]
+                pen.ellipse(box, outline=255, width=max(finer, round(width * self._unit * finer)))
+            pen.line([(x * finer, (y - radius) * finer), (x * finer, (y + radius) * finer)], fill=120, width=finer)
+            pen.line([((x - radius) * finer, y * finer), ((x + radius) * finer, y * finer)], fill=120, width=finer)
+
+        picture.alpha_composite(
+            parts.outlined(parts.smooth_mask(picture.size, draw), DIM, max(1, round(self._unit * 0.4)))
+        )
+
+    def _fill(self, picture: Image.Image, lean_deg: float) -> None:
+        """The band from upright to the lean, on its side."""
+        size = 2 * self._radius
+        angle = _SPREAD * max(-MOST_DEG, min(MOST_DEG, lean_deg))
+        begin, end = sorted((270.0, 270.0 + angle))
+
+        def draw(pen: ImageDraw.ImageDraw, finer: int) -> None:
+            pen.pieslice([0, 0, size * finer - 1, size * finer - 1], begin, end, fill=255)
+
+        mask = ImageChops.multiply(parts.smooth_mask((size, size), draw, finer=2), self._band)
+        at = round(self._dial[0] - self._radius), round(self._dial[1] - self._radius)
+        picture.paste(ACCENT, at, mask)
+
+    def _marks(self, picture: Image.Image, left_deg: float, right_deg: float) -> None:
+        """The largest leans: a line across the dial, and in figures below its ends."""
+        pen = ImageDraw.Draw(picture)
+        for sign, value in ((-1.0, left_deg), (1.0, right_deg)):
+            if value > UPRIGHT_DEG:
+                ends = [self._px(*self._on_dial(sign * value, radius)) for radius in (40.0, 52.0)]
+                pen.line(ends, fill=parts.DARK, width=max(3, round(2.6 * self._unit)))
+                pen.line(ends, fill=WHITE, width=max(1, round(1.4 * self._unit)))
+            words = f"max {value:.0f}°" if value > UPRIGHT_DEG else "max --"
+            self._text(picture, words, 7.0, WHITE, (_MIDDLE + sign * 44.0, 70.0))
+
+    def _number(self, picture: Image.Image, lean_deg: float, known: bool) -> None:
+        self._text(picture, f"{abs(lean_deg):.0f}" if known else "--", 27.0, WHITE, (_MIDDLE, 84.0))
+        if known:
+            digits = len(f"{abs(lean_deg):.0f}")
+            self._text(picture, "°", 27.0, WHITE, (_MIDDLE + 2.5 + 7.8 * digits, 84.0))
+        for sign, word in ((-1.0, "LEFT"), (1.0, "RIGHT")):
+            on = known and sign * lean_deg > UPRIGHT_DEG
+            self._text(picture, word, 7.5, ACCENT if on else DIM, (_MIDDLE + sign * 37.5, 84.5))
+            if on:
+                mark = parts.arrow(8.0 * self._unit, sign > 0.0, ACCENT)
+                parts.put(picture, mark, self._px(_MIDDLE + sign * 54.0, 84.0))
+
+    def _show_forces(self, picture: Image.Image, forward_g: float, left_g: float) -> None:
+        known = math.isfinite(forward_g) and math.isfinite(left_g)
+        braking = known and forward_g < 0.0
+        ends = (
+            ("BRAKE" if braking else "ACCEL", abs(forward_g), 92.0 - 3.5),
+            ("SIDE" if abs(left_g) < 0.005 else "LEFT" if left_g > 0.0 else "RIGHT", abs(left_g), 95.5),
+        )
+        for word, value, y in ends:
+            self._text(picture, f"{word} {value:.2f} g" if known else "-- g", 6.5, WHITE, (_SIDE, y))
+        if known:
+            (x, y), scale = self._forces, self._forces_radius / MOST_G
+            size = min(1.0, MOST_G / max(math.hypot(forward_g, left_g), 1e-9)) * scale
+            spot = parts.spot(round(7.0 * self._unit), ACCENT)
+            parts.put(picture, spot, (x - left_g * size, y - forward_g * size))

@@ -1,0 +1,74 @@
+"""What a GoPro measures while it films: the accelerometer's and the gyro's readings in its video file.
+
+The format is GPMF, described at github.com/gopro/gpmf-parser: keys of four letters, a type, a size and a number of
+values, big-endian, one within another. A packet of it comes about every second.
+"""
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..logs.table import Array
+from .video import Video, packets
+
+_NUMBERS = {b"b": "i1", b"B": "u1", b"s": "i2", b"S": "u2", b"l": "i4", b"L": "u4", b"j": "i8", b"J": "u8"}
+_NUMBERS |= {b"f": "f4", b"d": "f8"}  # numpy's names
+_NESTED = b"\0"
+
+
+@dataclass
+class Telemetry:
+    """The camera's gyro: t_s (n): since the video's first picture. rate_dps (n, 3): in the camera's axes."""
+
+    t_s: Array
+    rate_dps: Array
+
+
+def telemetry(video: Video) -> Telemetry | None:
+    """None where the video has none that can be read."""
+    if video.telemetry is None:
+        return None
+    times, rates = [], []
+    for at_s, lasts_s, packet in packets(video, video.telemetry):
+        samples = [values for values in streams(packet, b"GYRO") if len(values)]
+        if samples and lasts_s > 0.0:
+            rate = samples[0]
+            times.append(at_s + lasts_s * (np.arange(len(rate)) + 0.5) / len(rate))
+            rates.append(np.degrees(rate))
+    if not times:
+        return None
+    return Telemetry(np.concatenate(times), np.vstack(rates))
+
+
+def streams(packet: bytes, key: bytes) -> Iterator[Array]:
+    """The values (n, axes) of each stream with this key, in the unit that the format has for it."""
+    for name, kind, _, body in _items(packet):
+        if kind == _NESTED and name in (b"DEVC", b"STRM"):
+            yield from _of_stream(body, key) if name == b"STRM" else streams(body, key)
+
+
+def _of_stream(body: bytes, key: bytes) -> Iterator[Array]:
+    """SCAL stands before the values that it is to divide."""
+    scale = np.ones(1)
+    for name, kind, size, values in _items(body):
+        if kind not in _NUMBERS or name not in (b"SCAL", key):
+            continue
+        form = np.dtype(">" + _NUMBERS[kind])
+        numbers = np.frombuffer(values[: len(values) // form.itemsize * form.itemsize], form).astype(float)
+        axes = size // form.itemsize
+        if name == b"SCAL":
+            scale = numbers if len(numbers) == 3 else numbers[:1]
+        elif axes >= 3:
+            yield numbers[: len(numbers) // axes * axes].reshape(-1, axes)[:, :3] / scale
+
+
+def _items(data: bytes) -> Iterator[tuple[bytes, bytes, int, bytes]]:
+    """Key, type, size of a sample and the bytes of all its samples, which are padded to four."""
+    place = 0
+    while place + 8 <= len(data):
+        name, kind, size, count = struct.unpack_from(">4scBH", data, place)
+        place += 8
+        yield name, kind, size, data[place : place + size * count]
+        place += (size * count + 3) // 4 * 4

@@ -1,0 +1,174 @@
+"""A ride's gauge over a video, or as a transparent clip."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from kickstand.errors import Notice
+
+from ..analysis.channels import open_ride
+from ..calibration.file import CalibrationFile
+from ..errors import InputError
+from ..joining.motion import motion
+from ..logs.reader import Source, read_twice
+from ..logs.source import File, Progress, name_of
+from ..output import write_whole
+from .camera_match import camera_offset_s
+from .gpmf import telemetry
+from .shown import Shown, shown
+from .video import Video, ffmpeg, open_video, write_video
+
+MARGIN = 0.03  # of the video's height: from its edges to the gauge
+_BEYOND_S = 1.0  # by which a video may begin before the ride or end after it
+_FPS = 30.0
+_CLIP_HEIGHT = 1080
+_TRANSPARENT = {
+    ".mov": ("-c:v", "prores_ks", "-profile:v", "4444", "-pix_fmt", "yuva444p10le", "-vendor", "apl0"),
+    ".webm": (
+        *("-c:v", "libvpx-vp9", "-pix_fmt", "yuva420p", "-crf", "20", "-b:v", "0", "-auto-alt-ref", "0"),
+        *("-deadline", "realtime", "-cpu-used", "6", "-row-mt", "1"),
+    ),
+}
+_SOLID = ("-c:v", "libx264", "-preset", "fast", "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart")
+
+
+@dataclass
+class Overlaid:
+    """pictures, fps: how many there are, and a second. begin_s, end_s: of the ride. offset_s: the ride's time at the
+    video's first picture, None without a video. correlation: of camera and ride where that found the offset. notices:
+    what is remarkable in the ride."""
+
+    pictures: int
+    fps: float
+    begin_s: float
+    end_s: float
+    offset_s: float | None
+    correlation: float | None
+    notices: list[Notice]
+
+
+def overlay(
+    ride: Source,
+    out: Path | str,
+    calibration: CalibrationFile | File | None = None,
+    video: Path | str | None = None,
+    offset_s: float | None = None,
+    fps: float | None = None,
+    from_s: float | None = None,
+    to_s: float | None = None,
+    height: int = _CLIP_HEIGHT,
+    mph: bool = False,
+    live: bool = False,
+    progress: Progress | None = None,
+) -> Overlaid:
+    """Write a gauge of lean, forces, speed and maxima: over a video (.mp4), or as a transparent clip (.mov, .webm).
+
+    ride, calibration: as for open_ride(). video: one of the ride. offset_s: the ride's time at the video's first
+    picture, s since the ride's first sample: 12.5 if the video begins 12.5 s after the ride, -3 if it begins 3 s before
+    it. None: found by the sensors of the GoPro that made it. fps: pictures a second; None: the video's, or 30. from_s,
+    to_s: the part of the ride; negative: before its end. height: of the video that a clip is for, pixels. mph: miles an
+    hour. live: the lean that the display showed, not the smoothed one.
+    progress: called with how much of the ride has been read, then with how many pictures are drawn. Raises InputError.
+
+    >>> overlay("ride.csv", "clip.avi")  # doctest: +ELLIPSIS
+    Traceback (most recent call last):
+    kickstand_tools.errors.InputError: clip.avi: the name of a transparent clip ends in .mov or .webm...
+    """
+    out = Path(out)
+    filmed = _check(out, video, offset_s)
+    opened = open_ride(read_twice(ride), calibration, smoothed=not live)
+    correlation = None
+    if filmed and offset_s is None:
+        offset_s, correlation = _found_offset(opened.log, filmed, progress)
+    notices: list[Notice] = []
+    seen = shown(opened, progress, notices)
+    begin_s, end_s = _part(seen, filmed, offset_s, from_s, to_s, opened.name)
+    rate = fps or (filmed.fps if filmed else _FPS)
+    count = max(1, round((end_s - begin_s) * rate))
+    moments = seen.at(begin_s + np.arange(count) / rate)
+    from .gauge import Gauge
+
+    size = min(filmed.width, filmed.height) if filmed else height
+    gauge = Gauge(size, seen.has_speed, mph)
+    done = 0
+
+    def drawn() -> None:
+        nonlocal done
+        done += 1
+        if progress:
+            progress(done, count)
+
+    def pictures() -> Iterator[bytes]:
+        for k in range(count):
+            yield gauge.picture(*(float(value[k]) for value in moments.values)).tobytes()
+
+    given = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", f"{gauge.width}x{gauge.height}", "-r", f"{rate:g}", "-i", "-"]
+    if filmed is None:
+        arguments = [*given, *_TRANSPARENT[out.suffix.lower()]]
+    else:
+        assert offset_s is not None
+        arguments = _over(filmed, begin_s - offset_s, end_s - begin_s, fps, given, round(MARGIN * size))
+    write_whole(out, lambda temporary: write_video(temporary, arguments, pictures(), drawn))
+    return Overlaid(count, rate, begin_s, end_s, offset_s, correlation, notices)
+
+
+def _check(out: Path, video: Path | str | None, offset_s: float | None) -> Video | None:
+    """Raise InputError, before any work is done, for what cannot be written or read."""
+    if video is None:
+        if out.suffix.lower() not in _TRANSPARENT:
+            raise InputError(f"{out}: the name of a transparent clip ends in .mov or .webm; an .mp4 needs --video")
+        if offset_s is not None:
+            raise InputError("an offset is that of a video: give --video, or --from and --to")
+        ffmpeg()
+        return None
+    if out.suffix.lower() != ".mp4":
+        raise InputError(f"{out}: over a video the name has to end in .mp4")
+    return open_video(Path(video))
+
+
+def _found_offset(log: Source, video: Video, progress: Progress | None) -> tuple[float, float]:
+    todo = "give --offset, the ride's time in seconds at the video's first picture"
+    measured = telemetry(video)
+    if measured is None:
+        raise InputError(f"{video.path}: no readings of a GoPro's gyro in it tell when it was filmed: {todo}")
+    try:
+        return camera_offset_s(motion(log, progress), measured)
+    except InputError as error:
+        raise InputError(f"{video.path}, {name_of(log)}: {error}: {todo}") from error
+
+
+def _part(
+    seen: Shown, video: Video | None, offset_s: float | None, from_s: float | None, to_s: float | None, name: str
+) -> tuple[float, float]:
+    """From when to when of the ride. Raises InputError where the ride does not have it."""
+    last_s = float(seen.t_s[-1])
+    begin_s, end_s = (s if s is None or s >= 0.0 else max(0.0, last_s + s) for s in (from_s, to_s))
+    if video is not None and offset_s is not None:
+        first, last = offset_s, offset_s + video.seconds
+        where = f"the video lasts from {first:.1f} to {last:.1f} s of the ride {name}, which ends at {last_s:.1f} s"
+        if first >= last_s or last <= 0.0:
+            raise InputError(f"{where}: they have nothing in common, check --offset")
+        if begin_s is None and end_s is None and (first < -_BEYOND_S or last > last_s + _BEYOND_S):
+            within = f"--from {max(first, 0.0):.1f} --to {min(last, last_s):.1f}"
+            raise InputError(f"{where}: check --offset, or take what they have in common with {within}")
+        begin_s = max(first, begin_s if begin_s is not None else first)
+        end_s = min(last, end_s if end_s is not None else last)
+    begin_s, end_s = begin_s or 0.0, last_s if end_s is None else end_s
+    if end_s <= begin_s or begin_s >= last_s:
+        raise InputError(f"{name} lasts {last_s:.1f} s: there is nothing from {begin_s:.1f} to {end_s:.1f} s")
+    return begin_s, end_s if video else min(end_s, last_s)
+
+
+def _over(
+    video: Video, begin_s: float, seconds: float, fps: float | None, gauge: list[str], margin: int
+) -> list[str]:
+    """The arguments that lay the gauge over the video's left lower corner. Sound is copied."""
+    even = "crop=iw-mod(iw\\,2):ih-mod(ih\\,2)"
+    rate = f",fps={fps:g}" if fps else ""
+    laid = f"overlay=x={margin}:y=main_h-overlay_h-{margin}:eof_action=repeat"
+    return [
+        *("-ss", f"{max(begin_s, 0.0):.4f}", "-t", f"{seconds:.4f}", "-i", str(video.path), *gauge),
+        *("-filter_complex", f"[0:v:0]{even}{rate}[film];[film][1:v]{laid}[all]"),
+        *("-map", "[all]", "-map", "0:a?", "-c:a", "copy", *_SOLID),
+    ]

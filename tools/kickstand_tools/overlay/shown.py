@@ -1,0 +1,93 @@
+"""What the gauge shows at each moment of a ride."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from kickstand.errors import Notice
+from numpy.typing import NDArray
+
+from ..analysis.channels import Ride
+from ..analysis.signals import smoothed
+from ..analysis.summary import HELD_S
+from ..logs.source import Progress
+from ..logs.table import Array
+
+_FORCE_S = 0.3  # over which forces are averaged: engine and road shake them
+_GAP_S = 0.2  # a reading that is older is not shown
+_SPEED_S = 3.0  # the same of a speed, which comes once a second as a rule
+
+
+@dataclass
+class Shown:
+    """n moments of a ride. t_s: since its first sample. NaN where a value is not known or not trusted.
+
+    lean_deg: > 0 to the right. forward_g: > 0 when speeding up. left_g: acceleration to the left along the road.
+    speed_mps. left_deg, right_deg: the largest lean to each side until then, 0 for none.
+    """
+
+    t_s: Array
+    lean_deg: Array
+    forward_g: Array
+    left_g: Array
+    speed_mps: Array
+    left_deg: Array
+    right_deg: Array
+
+    @property
+    def has_speed(self) -> bool:
+        """There is a speed somewhere."""
+        return bool(np.any(np.isfinite(self.speed_mps)))
+
+    @property
+    def values(self) -> tuple[Array, ...]:
+        """All but the times, (n) each."""
+        return self.lean_deg, self.forward_g, self.left_g, self.speed_mps, self.left_deg, self.right_deg
+
+    def at(self, t_s: Array) -> "Shown":
+        """The same at other times (m); NaN before the ride, after it and in gaps."""
+        before = np.clip(np.searchsorted(self.t_s, t_s, side="right") - 1, 0, len(self.t_s) - 2)
+        lean, forward, left = (
+            _between(self.t_s, value, before, t_s, _GAP_S) for value in (self.lean_deg, self.forward_g, self.left_g)
+        )
+        known = np.flatnonzero(np.isfinite(self.speed_mps))
+        speed = np.full(len(t_s), np.nan)
+        if len(known) > 1:
+            at_s = self.t_s[known]
+            place = np.clip(np.searchsorted(at_s, t_s, side="right") - 1, 0, len(known) - 2)
+            speed = _between(at_s, self.speed_mps[known], place, t_s, _SPEED_S)
+        last = np.searchsorted(self.t_s, t_s, side="right") - 1
+        most_left, most_right = (np.where(last >= 0, value[last], 0.0) for value in (self.left_deg, self.right_deg))
+        return Shown(t_s, lean, forward, left, speed, most_left, most_right)
+
+
+def shown(ride: Ride, progress: Progress | None = None, notices: list[Notice] | None = None) -> Shown:
+    """Of a whole ride (see open_ride), with the lean that it was opened with. progress, notices: of Ride.blocks().
+
+    Raises InputError.
+    """
+    columns: list[NDArray[np.float64]] = []
+    for block in ride.blocks(progress, notices):
+        lean = np.where(block.trusted, block.lean_deg, np.nan)
+        columns.append(np.array([block.t_s, lean, block.forward_g, block.lateral_g, block.speed_mps]))
+    t_s, lean, forward, left, speed = np.hstack(columns)
+    forward, left = (smoothed(values, t_s, _FORCE_S) for values in (forward, left))
+    return Shown(t_s, lean, forward, left, speed, _maximum(t_s, -lean), _maximum(t_s, lean))
+
+
+def _maximum(t_s: Array, lean: Array) -> Array:
+    """(n) the largest lean so far that lasted for HELD_S."""
+    count = round(HELD_S / float(np.median(np.diff(t_s)))) + 1
+    value = np.where(np.isfinite(lean), lean, 0.0)
+    padded = np.append(np.zeros(count - 1), value)
+    lasted = np.min(np.lib.stride_tricks.sliding_window_view(padded, count), axis=1)
+    return np.maximum(np.maximum.accumulate(lasted), 0.0)
+
+
+def _between(at_s: Array, values: Array, before: NDArray[np.int64], t_s: Array, gap_s: float) -> Array:
+    """Values at t_s along straight lines; NaN outside, and between two that are further apart than gap_s."""
+    step_s = at_s[before + 1] - at_s[before]
+    share = (t_s - at_s[before]) / step_s
+    result = values[before] * (1.0 - share) + values[before + 1] * share
+    margin = gap_s / step_s
+    inside = (share >= -np.minimum(margin, 0.5)) & (share <= 1.0 + np.minimum(margin, 0.5)) & (step_s <= gap_s)
+    return np.where(inside, result, np.nan)

@@ -1,0 +1,122 @@
+"""Videos by ffmpeg, which the package imageio-ffmpeg carries: what is in one, and one written picture by picture."""
+
+import re
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import InputError, extra
+
+_QUIET = ("-hide_banner", "-loglevel", "error", "-nostdin", "-y")
+
+
+@dataclass
+class Video:
+    """width, height: as it is shown, pixels. fps: pictures a second. seconds: how long it lasts. telemetry: the number
+    of the stream of a GoPro's sensors, None if there is none."""
+
+    path: Path
+    width: int
+    height: int
+    fps: float
+    seconds: float
+    telemetry: int | None
+
+
+def ffmpeg() -> str:
+    """The program. Raises InputError where it is not installed."""
+    try:
+        import imageio_ffmpeg
+        import PIL  # noqa: F401  the gauge needs it, too
+    except ImportError as error:
+        raise InputError("overlay needs imageio-ffmpeg and Pillow: " + extra("video")) from error
+    try:
+        return imageio_ffmpeg.get_ffmpeg_exe()
+    except RuntimeError as error:
+        raise InputError("imageio-ffmpeg has no ffmpeg for this system: install ffmpeg") from error
+
+
+def open_video(path: Path) -> Video:
+    """What a video is. Raises InputError for a file that is none."""
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file" if not path.is_dir() else f"{path} is a directory, no video")
+    said = _run(["-hide_banner", "-nostdin", "-i", str(path)]).stderr.decode(errors="replace")
+    stream = re.search(r"Stream #0:\d+.*: Video: (.*)", said)
+    if "Input #0" not in said:
+        raise InputError(f"{path} is no video that ffmpeg can read")
+    if not stream or "attached pic" in stream[0]:
+        raise InputError(f"{path} has no pictures: give a video")
+    size = re.search(r"\b(\d{2,5})x(\d{2,5})\b", stream[1])
+    rate = re.search(r"([\d.]+)(k?) fps", stream[1]) or re.search(r"([\d.]+)(k?) tbr", stream[1])
+    counted = _run(["-hide_banner", "-nostdin", "-i", str(path), "-map", "0:v:0", "-c", "copy", "-f", "null", "-"])
+    pictures = re.findall(r"frame= *(\d+)", counted.stderr.decode(errors="replace"))
+    if not size or not rate or not pictures or not int(pictures[-1]) or counted.returncode:
+        raise InputError(f"{path} is a damaged video: copy it again")
+    fps = float(rate[1]) * (1000.0 if rate[2] else 1.0)
+    width, height = int(size[1]), int(size[2])
+    turned = re.search(r"rotation of (-?[\d.]+) degrees", said)
+    if turned and round(float(turned[1])) % 180 == 90:
+        width, height = height, width
+    telemetry = re.search(r"Stream #0:(\d+)[^\n]*\(gpmd", said)
+    return Video(
+        path,
+        width,
+        height,
+        fps,
+        int(pictures[-1]) / fps,
+        int(telemetry[1]) if telemetry else None,
+    )
+
+
+def packets(video: Video, stream: int) -> list[tuple[float, float, bytes]]:
+    """When each packet of a stream begins, how long it is for (s since the first picture), and what is in it."""
+    chosen = ["-i", str(video.path), "-map", f"0:{stream}", "-c", "copy"]
+    listed = _run([*_QUIET, *chosen, "-f", "framecrc", "-"]).stdout.decode(errors="replace")
+    data = _run([*_QUIET, *chosen, "-f", "data", "-"]).stdout
+    tick = re.search(r"#tb 0: (\d+)/(\d+)", listed)
+    if not tick:
+        return []
+    unit_s, found, begin = int(tick[1]) / int(tick[2]), [], 0
+    for line in listed.splitlines():
+        if not line.startswith("#"):
+            _, _, at, lasts, size, *_ = (cell.strip() for cell in line.split(","))
+            found.append((int(at) * unit_s, int(lasts) * unit_s, data[begin : begin + int(size)]))
+            begin += int(size)
+    return found
+
+
+def write_video(
+    out: Path, arguments: Iterable[str], pictures: Iterable[bytes], each: Callable[[], None] | None = None
+) -> None:
+    """Run ffmpeg with these arguments and out, and give it the pictures on its standard input.
+
+    each: called after every picture. Raises InputError with ffmpeg's own words where it fails.
+    """
+    with tempfile.TemporaryFile() as words:
+        command = [ffmpeg(), "-hide_banner", "-loglevel", "error", "-y", *arguments, str(out)]
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=words)
+        assert process.stdin is not None
+        try:
+            try:
+                for picture in pictures:
+                    process.stdin.write(picture)
+                    if each:
+                        each()
+                process.stdin.close()
+            except BrokenPipeError:
+                pass  # it has stopped, and says why
+            process.wait()
+        except BaseException:  # Ctrl-C, too: no program goes on writing
+            process.kill()
+            process.wait()
+            raise
+        if process.returncode:
+            words.seek(0)
+            said = words.read().decode(errors="replace").strip().rpartition("\n")[2]
+            raise InputError(f"ffmpeg has stopped: {said or 'it does not say why'}")
+
+
+def _run(arguments: list[str]) -> "subprocess.CompletedProcess[bytes]":
+    return subprocess.run([ffmpeg(), *arguments], capture_output=True, check=False)

@@ -1,0 +1,88 @@
+"""The states, and what the errors of the sensor and the bike have in common for a ride; readings without these errors.
+
+The states are those of both ends of each window. Parameters hold for a block of windows and drift from one to the next.
+"""
+
+import numpy as np
+
+from ..logs.table import Array
+
+# lean and pitch (rad), velocity of the sensor to the left, up and forward (m/s), bias of the gyro (rad/s)
+LEAN, PITCH, LEFT, UP, FORWARD, BIAS = 0, 1, 2, 3, 4, slice(5, 8)
+STATES = 8
+
+ROTATION = slice(0, 3)  # rad: error of the alignment about left, up, forward
+GYRO = slice(3, 12)  # of 1: scale and cross-axis errors of the gyro, 3 x 3
+OFFSET = slice(12, 15)  # g: of the accelerometer
+SCALE = 15  # of 1: of the accelerometer along up
+HEIGHT, AHEAD = 16, 17  # m: of the sensor above the roll axis, and in front of the rear wheel
+TYRES = 18  # g: force to the side over sin(lean), because tyres touch the road beside their middle
+BESIDE = 19  # g: force to the side of a bike that is upright
+DELAY = 20  # s: of the log's speed
+DIVE = 21  # rad per m/s^2: of the nose in braking
+PARAMETERS = 22
+
+# What is known of them before the ride, and 1 sigma of that. Scale errors of 3 % and cross-axis sensitivity of 2 % are
+# the limits of the data sheet PS-MPU-6000A, 6.1 and 6.2.
+USUAL, SIGMA = np.zeros(PARAMETERS), np.empty(PARAMETERS)
+SIGMA[ROTATION], SIGMA[GYRO] = np.radians([1.5, 5.0, 2.0]), 0.012
+SIGMA[OFFSET], SIGMA[SCALE] = (0.001, 0.003, 0.003), 0.004
+WITHOUT_SIX_G, WITHOUT_SIX_SCALE = 0.04, 0.015  # the same where the six positions were not done
+for _place, _usual, _sigma in (
+    (HEIGHT, 0.5, 0.3),
+    (AHEAD, 0.6, 0.5),
+    (TYRES, 0.07, 0.06),
+    (BESIDE, 0.0, 0.001),
+    (DELAY, 0.4, 0.4),
+    (DIVE, np.radians(0.2), np.radians(0.2)),
+):
+    USUAL[_place], SIGMA[_place] = _usual, _sigma
+# Share of sigma by which they change from block to block: a mount yields, and a sensor warms up
+DRIFT = np.full(PARAMETERS, 1e-4)
+DRIFT[ROTATION], DRIFT[OFFSET] = 0.04, (0.3, 0.1, 0.1)
+
+
+def sigma(six_done: bool) -> Array:
+    """SIGMA for an accelerometer that was calibrated by six positions, or was not."""
+    found = SIGMA.copy()
+    if not six_done:
+        found[OFFSET], found[SCALE] = WITHOUT_SIX_G, WITHOUT_SIX_SCALE
+    return found
+
+
+def known(sigma: Array) -> Array:
+    """(m, m): the information about the parameters before the ride, for their standard deviations (m).
+
+    The pose that the alignment took for upright was measured with the accelerometer's offset: not the rotation is known
+    from it, but the lean and pitch that the sensor has in this pose, which are the sum of both.
+    """
+    found = np.diag(1.0 / sigma**2)
+    for angle, offset, sign in ((ROTATION.start, OFFSET.stop - 1, 1.0), (ROTATION.stop - 1, OFFSET.start, -1.0)):
+        found[offset, offset] += found[angle, angle]
+        found[angle, offset] = found[offset, angle] = sign * found[angle, angle]
+    return found
+
+
+def corrected_rates(rate: Array, states: Array, p: Array) -> tuple[Array, Array, Array]:
+    """Rates about left, up, forward (rad/s) without the gyro's errors. rate (n, 3), states (n, STATES), p (n,
+    PARAMETERS)."""
+    x, y, z = rate.T
+    a, b, c = p[:, ROTATION].T
+    g, bias = p[:, GYRO].T, states[:, BIAS].T
+    return (
+        x + b * z - c * y + g[0] * x + g[1] * y + g[2] * z - bias[0],
+        y + c * x - a * z + g[3] * x + g[4] * y + g[5] * z - bias[1],
+        z + a * y - b * x + g[6] * x + g[7] * y + g[8] * z - bias[2],
+    )
+
+
+def corrected_force(force: Array, p: Array) -> tuple[Array, Array, Array]:
+    """Forces to the left, up and forward (g) without the accelerometer's errors. force (n, 3), p (n, PARAMETERS)."""
+    x, y, z = force.T
+    a, b, c = p[:, ROTATION].T
+    off = p[:, OFFSET].T
+    return (
+        x + b * z - c * y + off[0],
+        (1.0 + p[:, SCALE]) * y + c * x - a * z + off[1],
+        z + a * y - b * x + off[2],
+    )

@@ -1,0 +1,170 @@
+"""The lean of a recorded ride looked back over: from all of its readings, those before and those after."""
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from kickstand.errors import Notice
+
+from ..calibration.file import CalibrationFile
+from ..errors import InputError
+from ..logs.block import Block
+from ..logs.reader import Source, read_blocks, write_table
+from ..logs.source import Progress, name_of
+from ..logs.table import Array, Table
+from ..replay.mount_check import MountCheck
+from .adjust import adjust
+from .samples import at_samples
+from .windows import windows_of
+
+SLOWEST_HZ = 10.0
+PIECE_S = 120.0  # a log is cut into pieces
+CHAPTER = 12  # of which so many are adjusted together, with one before and one after them
+COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps")
+
+
+@dataclass(eq=False)
+class SmoothedRide(Table):
+    """The motion of a motorcycle on a ride: n samples, NaN where the readings froze.
+
+    t_s: seconds since the log's first sample. lean_deg: > 0 to the right. lean_sigma_deg: its standard deviation.
+    pitch_deg: of road and suspension, > 0 nose up. speed_mps: of the sensor, forward. notices: what is remarkable in
+    the ride (kickstand_tools.refusals.sentence puts a notice into words).
+    """
+
+    t_s: Array
+    lean_deg: Array
+    lean_sigma_deg: Array
+    pitch_deg: Array
+    speed_mps: Array
+    notices: list[Notice] = field(default_factory=list)
+
+
+def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None = None) -> SmoothedRide:
+    """The lean of a motorcycle from all readings of its ride, with a standard deviation for each sample.
+
+    log: see read_log; a speed helps and is not needed. calibration: aligned, of a motorcycle. progress: called with how
+    much of the log is done of how much. Least squares over the whole ride: see model.py. Raises InputError.
+
+    >>> from kickstand_tools.api import CalibrationFile, Log, simulate_ride
+    >>> ride = simulate_ride("street", seed=1, seconds=60.0)
+    >>> calibration = CalibrationFile(vehicle_from_sensor=ride.vehicle_from_sensor, aligned=True)
+    >>> found = smooth(Log.from_readings(ride.readings, ride.rate_hz), calibration)
+    >>> float(abs(found.lean_deg - ride.truth["lean_deg"]).max()) < 10.0
+    True
+    """
+    notices: list[Notice] = []
+    blocks = list(_checked_blocks(log, calibration, progress, notices))
+    time_s = np.concatenate([block.t_s for block, _ in blocks])
+    return SmoothedRide(time_s, *np.concatenate([found for _, found in blocks]).T, notices=notices)
+
+
+def smooth_to_csv(
+    log: Source, calibration: CalibrationFile, out: Path, progress: Progress | None = None
+) -> tuple[int, list[Notice]]:
+    """Write LEAN.csv: the log's own times, then COLUMNS. Returns the number of samples and the notices.
+
+    Memory does not grow with the log. Raises InputError.
+    """
+    count, notices = 0, []
+
+    def rows() -> Iterator[list[str]]:
+        nonlocal count
+        for block, found in _checked_blocks(log, calibration, progress, notices):
+            count += len(found)
+            for time, (lean, sigma, pitch, speed) in zip(block.time_text, found.tolist(), strict=True):
+                yield [time, f"{lean:.3f}", f"{sigma:.3f}", f"{pitch:.3f}", f"{speed:.3f}"]
+
+    write_table(out, ("t_s", *COLUMNS), rows())
+    return count, notices
+
+
+def _checked_blocks(
+    log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
+) -> Iterator[tuple[Block, Array]]:
+    """smooth_blocks(), and what contradicts the calibration."""
+    mount = MountCheck(calibration)
+    for block, found in smooth_blocks(log, calibration, progress, notices):
+        believed = block.believed
+        mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
+        yield block, found
+    contradiction = mount.notice()
+    notices += [contradiction] if contradiction else []
+
+
+def smooth_blocks(
+    log: Source,
+    calibration: CalibrationFile,
+    progress: Progress | None = None,
+    notices: list[Notice] | None = None,
+) -> Iterator[tuple[Block, Array]]:
+    """Each piece of the log with its values (n, COLUMNS). notices: what is remarkable in the log is appended to it at
+    the end. Raises InputError."""
+    _check(log, calibration)
+    past: deque[Block] = deque(maxlen=CHAPTER)
+    waiting: list[Block] = []
+    for piece in _pieces(read_blocks(log, 2, progress, notices)):
+        waiting.append(piece)
+        if len(waiting) > CHAPTER:
+            yield from _chapter([*past][-1:], waiting[:CHAPTER], waiting[CHAPTER:], calibration)
+            past.extend(waiting[:CHAPTER])
+            del waiting[:CHAPTER]
+    # the end of a ride may be short: as much of what was before it is adjusted with it
+    yield from _chapter([*past][-max(1, CHAPTER - len(waiting)) :], waiting, [], calibration)
+
+
+def _check(log: Source, calibration: CalibrationFile) -> None:
+    if calibration.vehicle == "car":
+        raise InputError(f"{name_of(log)}: a car does not lean: its calibration was made with --vehicle car")
+    if not calibration.aligned:
+        todo = "kickstand calibrate two, or calibrate ride, first"
+        raise InputError(f"the calibration is not aligned, so the lean is unknown: {todo}")
+
+
+def _pieces(blocks: Iterator[Block]) -> Iterator[Block]:
+    """The blocks cut into pieces of PIECE_S, none over that."""
+    for block in blocks:
+        number = np.floor(block.t_s / PIECE_S)
+        cuts = np.flatnonzero(np.diff(number)) + 1
+        for begin, end in zip([0, *cuts.tolist()], [*cuts.tolist(), len(number)]):
+            yield block.part(slice(begin, end))
+
+
+def _chapter(
+    before: list[Block], own: list[Block], after: list[Block], calibration: CalibrationFile
+) -> Iterator[tuple[Block, Array]]:
+    """The values of the pieces `own`, adjusted together with those before and after them."""
+    believed = [piece.believed for piece in (*before, *own, *after)]
+    values = _adjusted(believed, calibration)
+    first = sum(len(piece.time_us) for piece in believed[: len(before)])
+    for piece in own:
+        found = np.full((len(piece.time_us), len(COLUMNS)), np.nan)
+        there = ~piece.frozen
+        count = int(np.count_nonzero(there))
+        found[there] = values[first : first + count]
+        first += count
+        yield piece, found
+
+
+def _adjusted(pieces: list[Block], calibration: CalibrationFile) -> Array:
+    """(samples, COLUMNS)"""
+    t_s = np.concatenate([piece.t_s for piece in pieces])
+    readings = np.concatenate([piece.readings for piece in pieces])
+    speed = np.concatenate([piece.speed_mps for piece in pieces])
+    nothing = np.full((len(t_s), len(COLUMNS)), np.nan)
+    if len(t_s) < 2:
+        return nothing
+    step_s = float(np.median(np.diff(t_s)))
+    if step_s * SLOWEST_HZ > 1.0:
+        raise InputError(f"a sample every {step_s:.2f} s: at least {SLOWEST_HZ:.0f} a second are needed")
+    force, rate = calibration.in_vehicle(readings)
+    rate = np.radians(rate)
+    windows = windows_of(t_s, force, rate, speed)
+    try:
+        found = at_samples(windows, rate, adjust(windows, calibration.six_done), calibration.delay_s())
+    except np.linalg.LinAlgError:
+        return nothing  # readings that are no ride's: the lean is not known
+    found[:, :3] = np.degrees(found[:, :3])
+    return found

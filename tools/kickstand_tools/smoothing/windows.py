@@ -1,0 +1,102 @@
+"""A stretch of a ride as means over a fifth of a second, in which the vibration of the engine averages out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..logs.axes.leaning import WINDOW_S
+from ..logs.table import Array
+
+GAP_S = 0.17  # a longer step between two samples: readings are missing
+
+
+@dataclass
+class Windows:
+    """n windows, one following on the other; where readings are missing a window without readings lies between two.
+
+    edges (n + 1, s): their times. rate (n, 3, rad/s), force (n, 3, g): means, along the vehicle's axes. jolt (n): by
+    how much the rate differs from its mean at most, rad/s. speed (n): m/s, NaN where there is none. gap (n): True where
+    there are no readings. Of each sample: number, in which window it lies; before and after (s): the time that it
+    stands for.
+    """
+
+    edges: Array
+    rate: Array
+    force: Array
+    jolt: Array
+    speed: Array
+    gap: NDArray[np.bool_]
+    number: NDArray[np.intp]
+    before: Array
+    after: Array
+
+    def __len__(self) -> int:
+        return len(self.gap)
+
+    @property
+    def seconds(self) -> Array:
+        """(n) how long each is."""
+        return np.diff(self.edges)
+
+
+def windows_of(t_s: Array, force: Array, rate: Array, speed: Array) -> Windows:
+    """Of samples: t_s (s), force (samples, 3, g), rate (samples, 3, rad/s), speed (m/s, NaN where there is no new one).
+
+    Each sample stands for the time until half way to its neighbours, so that the sum over a window is the integral.
+    """
+    step = np.diff(t_s)
+    usual = float(np.median(step)) if len(step) else WINDOW_S
+    lost = step > max(GAP_S, 1.5 * usual)
+    half = np.where(lost, 0.5 * usual, 0.5 * step)
+    before, after = np.append(0.5 * usual, half), np.append(half, 0.5 * usual)
+    begins = np.append(True, lost)  # of a stretch without missing readings
+    since = t_s - t_s[begins][np.cumsum(begins) - 1]
+    cell = np.floor(since / WINDOW_S + 1e-6).astype(np.int64)
+    starts = np.flatnonzero(np.append(True, (np.diff(cell) != 0) | lost))
+    weight = before + after
+    length = np.add.reduceat(weight, starts)
+
+    def mean(values: Array) -> Array:
+        return np.add.reduceat(values * weight[:, None], starts, axis=0) / length[:, None]
+
+    there = np.flatnonzero(~np.isnan(speed))
+    given = np.full(len(starts), np.nan)
+    given[np.searchsorted(starts, there, side="right") - 1] = speed[there]
+    place = np.searchsorted(starts, np.arange(len(t_s)), side="right") - 1
+    mean_rate = mean(rate)
+    jolt = np.maximum.reduceat(np.linalg.norm(rate - mean_rate[place], axis=1), starts)
+    at = np.flatnonzero(begins[starts])[1:]  # before these windows readings are missing
+    ends = np.append(starts[1:], len(t_s)) - 1
+    edges = np.insert((t_s - before)[starts], at, (t_s + after)[ends[at - 1]])
+    return Windows(
+        np.append(edges, t_s[-1] + after[-1]),
+        np.insert(mean_rate, at, 0.0, axis=0),
+        np.insert(mean(force), at, 0.0, axis=0),
+        np.insert(jolt, at, 0.0),
+        np.insert(given, at, np.nan),
+        np.insert(np.zeros(len(starts), dtype=bool), at, True),
+        place + np.searchsorted(at, place, side="right"),
+        before,
+        after,
+    )
+
+
+def padded(windows: Windows, length: int) -> Windows:
+    """With windows without readings and without duration at the end, to a multiple of `length` windows."""
+    more = -len(windows) % length
+
+    def longer(values: Array, fill: float) -> Array:
+        return np.concatenate((values, np.full((more, *values.shape[1:]), fill)))
+
+    return Windows(
+        np.append(windows.edges, np.full(more, windows.edges[-1])),
+        longer(windows.rate, 0.0),
+        longer(windows.force, 0.0),
+        longer(windows.jolt, 0.0),
+        longer(windows.speed, np.nan),
+        np.append(windows.gap, np.ones(more, dtype=bool)),
+        windows.number,
+        windows.before,
+        windows.after,
+    )

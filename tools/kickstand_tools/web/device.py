@@ -1,0 +1,195 @@
+"""The device of the page: the firmware on the simulated board, on a bike that is steered by hand. Plain Python for
+MicroPython, in the browser and elsewhere, and for CPython.
+
+    device = PageDevice()
+    device.order("button", True)    # what the page's controls do, see Device.act()
+    device.run_to(0.5)              # s of the board's time
+    device.take()                   # JSON: what was to be seen meanwhile
+"""
+
+import json
+
+from ..demo.hand_bike import HandBike
+from ..demo.shown_lean import shown_lean
+from ..simulated_board.clock import PowerOff, Reset, to_us
+from ..simulated_board.fakes.fake_time import sleep_us, ticks_add, ticks_diff, ticks_us
+from ..simulated_board.simulator import Board
+from ..simulation.scripted.sensor_errors import Sensor
+
+PART_SEED = 1
+PART_SHARE = 0.5  # errors of up to half of the data sheet's limits: an ordinary sensor
+TICK_S = 0.02
+REST_US = 10_000  # steps of the time in which no firmware runs
+CUT_AFTER_BYTES = 40  # of a calibration's record
+FOREVER_S = 1e9
+
+
+class Device:
+    """Board, bike, and what was to be seen of them.
+
+    powered: False while the supply is off.
+    """
+
+    def __init__(self):
+        self.bike = HandBike()
+        self.board = Board(Sensor(seed=PART_SEED, share=PART_SHARE).world(self.bike.motion))
+        self.powered = True
+        self._ticks = []
+        self._seen = -1  # the display's count of changes at the last tick
+        self._plugged = True
+        self.board.every(TICK_S, self._tick)
+        self.board.install()
+
+    def act(self, name, value):
+        """Do one of these, at this instant of the board's time:
+
+        button True (down) or False; pose "kickstand", "upright" or a speed in m/s to ride at; lean degrees, > 0 to the
+        right; sensor False (its wire is pulled) or True; cut_save True: the supply is cut in the middle of the next
+        save of a calibration; power False or True.
+        """
+        board = self.board
+        if name == "button":
+            board.button.turn(value, board.clock.now_us)
+        elif name == "pose":
+            if value in ("kickstand", "upright"):
+                self.bike.stand(value)
+            else:
+                self.bike.ride(value)
+        elif name == "lean":
+            self.bike.lean_to(value)
+        elif name == "sensor":
+            if value and not self._plugged:
+                board.fit_sensor()
+            elif self._plugged and not value:
+                board.remove_sensor()
+            self._plugged = value
+        elif name == "cut_save":
+            board.faults.cut_file(".cal", CUT_AFTER_BYTES)
+        elif value:
+            board.faults.restore_files()  # a save is cut once
+            self.powered = True
+        elif self.powered:
+            raise PowerOff
+
+    def rest(self):
+        """Let a step of time pass in which no firmware runs."""
+        self.board.clock.advance(REST_US)
+
+    def resume(self, function):
+        """Board.run() without a start: for a function that goes on with what is under way."""
+        try:
+            function()
+            return "returned"
+        except (PowerOff, Reset) as error:
+            ended = error  # MicroPython deletes `error` at the end of this block
+            return self.board.run(lambda: _raise(ended), FOREVER_S)
+
+    def _tick(self):
+        board = self.board
+        t_s = board.clock.now_us / 1e6
+        lean_deg, speed_mps, yaw_rate_dps, phase = self.bike.truth(t_s)
+        tick = {
+            "t_s": round(t_s, 3),
+            "lean_deg": round(lean_deg, 2),
+            "speed_mps": round(speed_mps, 2),
+            "yaw_rate_dps": round(yaw_rate_dps, 1),
+            "phase": phase,
+            "powered": self.powered,
+        }
+        if board.lcd.changes != self._seen:
+            self._seen = board.lcd.changes
+            tick["display"] = display(board.lcd)
+        self._ticks.append(tick)
+
+    def take(self):
+        """What was to be seen every TICK_S since the last call, as JSON: a list of objects with the time t_s, the
+        bike's true lean_deg, speed_mps, yaw_rate_dps and phase, powered, and the display, where it has changed."""
+        ticks, self._ticks = self._ticks, []
+        return json.dumps(ticks)
+
+
+def display(lcd):
+    """What a display shows: the codes of both lines, character memory (8 rows for each of 8 characters), whether it is
+    on and lit, its text, and the lean (deg) if that is what it shows."""
+    text = lcd.text()
+    on = lcd.on and lcd.two_lines
+    return {
+        "codes": lcd.codes() if on else [[0x20] * 16, [0x20] * 16],
+        "cgram": list(lcd.cgram),
+        "lit": lcd.backlight,
+        "text": text,
+        "shown_deg": shown_lean(text),
+    }
+
+
+class PageDevice(Device):
+    """A Device whose firmware is turned a while at a time, because a page must get its control back: as kickstand.app
+    has a method for one turn of its loop, the loop itself is here once more. A test compares both."""
+
+    def __init__(self):
+        super().__init__()
+        from kickstand.app import App  # after Board.install()
+
+        setattr(App, "run", lambda app: self._hand_over(app))  # noqa: B010 type checkers know that run() never returns
+        self._app = None  # while its loop is turned
+        self._stopped = False  # main() has ended by itself: safe mode
+
+    def order(self, name, value):
+        """Do act(name, value). Returns the board's time in s."""
+        self._ended(self.resume(lambda: self.act(name, value)))
+        return self.board.clock.now_us / 1e6
+
+    def run_to(self, until_s):
+        """Let the board's time pass up to until_s; a start goes past that."""
+        until_us = to_us(until_s)
+        clock = self.board.clock
+        while clock.now_us < until_us:
+            if not self.powered:
+                self.rest()
+            elif self._app:
+                self._ended(self.resume(lambda: self._turn(self._app, until_us)))
+            elif self._stopped:
+                self._ended(self.resume(self.rest))
+            else:
+                self._start()
+
+    def _hand_over(self, app):
+        """In place of App.run()."""
+        self._app = app
+
+    def _start(self):
+        from kickstand.board import port
+        from kickstand.start import main
+
+        ended = self.board.run(main, FOREVER_S)
+        self._stopped = ended == "returned" and self._app is None
+        self._ended(ended)
+        if self._app:
+            self._watchdog = port.start_watchdog() if self._app.settings.WATCHDOG else None
+            self._due_us = ticks_us()
+
+    def _turn(self, app, until_us):
+        """App._loop(), but that garbage is collected by the page."""
+        from kickstand.app import LOOP_US
+
+        watchdog, clock = self._watchdog, self.board.clock
+        while clock.now_us < until_us:
+            app.turn()
+            if watchdog:
+                watchdog.feed()
+            self._due_us = ticks_add(self._due_us, LOOP_US)
+            wait_us = ticks_diff(self._due_us, ticks_us())
+            if wait_us > 0:
+                sleep_us(wait_us)
+            else:
+                self._due_us = ticks_us()
+
+    def _ended(self, ended):
+        if ended != "returned":
+            self._app = None
+            self._stopped = False
+            self.powered = ended == "reset"
+
+
+def _raise(error):
+    raise error

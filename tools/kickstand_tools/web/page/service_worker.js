@@ -1,0 +1,40 @@
+// Keeps the whole site in the browser, so that it opens without a network. The two texts below are filled in when the
+// site is put together (web/site.py). A new version is fetched in the background and shown at the next visit.
+
+const FILES = "__FILES__";
+const VERSION = "__VERSION__";
+const CACHE = `kickstand-${VERSION}`;
+
+addEventListener("install", (event) => {
+  event.waitUntil(keep());
+});
+
+addEventListener("activate", (event) => {
+  event.waitUntil(forget());
+});
+
+addEventListener("fetch", (event) => {
+  if (event.request.method === "GET") event.respondWith(answer(event.request));
+});
+
+async function keep() {
+  const cache = await caches.open(CACHE);
+  await cache.addAll(FILES.map((name) => new Request(name, { cache: "reload" })));
+  await skipWaiting();
+}
+
+async function forget() {
+  for (const name of await caches.keys()) {
+    if (name.startsWith("kickstand-") && name !== CACHE) await caches.delete(name);
+  }
+  await clients.claim();
+}
+
+async function answer(request) {
+  const cache = await caches.open(CACHE);
+  const kept = await cache.match(request, { ignoreSearch: true });
+  if (kept) return kept;
+  const fetched = await fetch(request); // what installs the firmware is kept once it was asked for
+  if (fetched.ok) await cache.put(request, fetched.clone());
+  return fetched;
+}

@@ -1,0 +1,71 @@
+"""Serves the site to the browser of this computer."""
+
+import errno
+import os
+import sys
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import PurePosixPath
+from typing import Any
+from urllib.parse import unquote, urlsplit
+
+HOST = "127.0.0.1"
+PORT = 8377  # the same each time, so that the browser finds what it has kept
+# Named here, because the registry of Windows may hold others, with which a browser runs no module
+TYPES = {
+    ".css": "text/css; charset=utf-8",
+    ".html": "text/html; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+    ".json": "application/json",
+    ".mjs": "text/javascript; charset=utf-8",
+    ".png": "image/png",
+    ".svg": "image/svg+xml",
+    ".txt": "text/plain; charset=utf-8",
+    ".wasm": "application/wasm",
+    ".webmanifest": "application/manifest+json",
+    ".zip": "application/zip",
+}
+
+
+class Server(ThreadingHTTPServer):
+    """Says nothing of a browser that hangs up."""
+
+    allow_reuse_address = os.name != "nt"  # there it would share the port with whoever has it
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        if not isinstance(sys.exc_info()[1], ConnectionError):
+            super().handle_error(request, client_address)
+
+
+def server(files: dict[str, bytes], port: int = PORT) -> Server:
+    """A server of {path: content}, on `port` or, if that is taken, on a free one. Its port is server_address[1]."""
+
+    class Handler(BaseHTTPRequestHandler):
+        protocol_version = "HTTP/1.1"
+
+        def do_GET(self) -> None:
+            self._answer(True)
+
+        def do_HEAD(self) -> None:
+            self._answer(False)
+
+        def _answer(self, whole: bool) -> None:
+            name = unquote(urlsplit(self.path).path).lstrip("/") or "index.html"
+            data = files.get(name)
+            self.send_response(200 if data is not None else 404)
+            self.send_header("Content-Type", TYPES.get(PurePosixPath(name).suffix, "application/octet-stream"))
+            self.send_header("Content-Length", str(len(data or b"")))
+            self.send_header("Cache-Control", "no-cache")
+            self.send_header("X-Content-Type-Options", "nosniff")
+            self.end_headers()
+            if whole and data:
+                self.wfile.write(data)
+
+        def log_message(self, format: str, *args: object) -> None:
+            """Say nothing of each request."""
+
+    try:
+        return Server((HOST, port), Handler)
+    except OSError as error:
+        if error.errno not in (errno.EADDRINUSE, errno.EACCES) or not port:
+            raise
+        return Server((HOST, 0), Handler)

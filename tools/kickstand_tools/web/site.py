@@ -1,0 +1,82 @@
+"""The files of the site: ours, the Python that the page runs, the display's characters, and what comes from npm."""
+
+import hashlib
+import json
+from pathlib import Path
+
+from .. import firmware_path
+from ..output import check_directory, new_directory, write_whole
+from ..pictures.lcd_font import ROM
+from . import install_archive, npm_packages
+
+PAGE = Path(__file__).resolve().parent / "page"
+# The tools' modules and folders that device.py imports
+MODULES = (
+    "__init__.py",
+    "demo/__init__.py",
+    "demo/hand_bike.py",
+    "demo/shown_lean.py",
+    "simulated_board",
+    "simulation/__init__.py",
+    "simulation/data_sheet.py",
+    "simulation/scripted",
+    "web/__init__.py",
+    "web/device.py",
+)
+INSTALLING = ("pyodide/", "install.zip")  # large, and only for those who have a board: fetched when they ask for it
+_NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first by itself, the second as "./"
+_LISTED = "__FILES__", "__VERSION__"  # in service_worker.js
+
+
+def python_files() -> dict[str, str]:
+    """{path as imported: source} of the firmware's package, and of the tools' modules that the page runs."""
+    tools = firmware_path.TOOLS / "kickstand_tools"
+    found = [(path, firmware_path.PACKAGE.parent) for path in _modules(firmware_path.PACKAGE)]
+    found += [(path, firmware_path.TOOLS) for name in MODULES for path in _modules(tools / name)]
+    return {path.relative_to(top).as_posix(): path.read_text(encoding="utf-8") for path, top in found}
+
+
+def site_files() -> dict[str, bytes]:
+    """{path in the site: content} of the whole site. Raises InputError if MicroPython cannot be fetched.
+
+    >>> sorted(site_files())[:2]  # doctest: +SKIP
+    ['bike.mjs', 'board.mjs']
+    """
+    files = npm_packages.find()
+    files |= {path.name: path.read_bytes() for path in sorted(PAGE.iterdir()) if path.is_file()}
+    files["python.json"] = json.dumps(python_files()).encode()
+    files["install.zip"] = install_archive.archive()
+    files["font.json"] = json.dumps({code: list(rows) for code, rows in ROM.items()}).encode()
+    version = hashlib.sha256(b"".join(name.encode() + data for name, data in sorted(files.items()))).hexdigest()[:12]
+    worker = files["service_worker.js"].decode()
+    kept = sorted(["./", *(name for name in files if name not in _NOT_KEPT and not name.startswith(INSTALLING))])
+    for mark, text in zip(_LISTED, (json.dumps(kept), version)):
+        worker = worker.replace(f'"{mark}"', text if text.startswith("[") else f'"{text}"')
+    files["service_worker.js"] = worker.encode()
+    return files
+
+
+def write_site(files: dict[str, bytes], out: Path) -> None:
+    """Write site_files() to a directory. Raises InputError if that is not possible.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as made:
+    ...     write_site({"index.html": b"a page"}, Path(made) / "site")
+    ...     print((Path(made) / "site" / "index.html").read_text())
+    a page
+    """
+    check_directory(out)
+    with new_directory(out):
+        for name, data in files.items():
+            path = out / name
+            with new_directory(path.parent):
+                write_whole(path, lambda temporary, data=data: _write(temporary, data))
+
+
+def _write(path: Path, data: bytes) -> None:
+    path.write_bytes(data)
+
+
+def _modules(place: Path) -> list[Path]:
+    """The modules in a folder and below it, or the one module that `place` is."""
+    return sorted(place.rglob("*.py")) if place.is_dir() else [place]
