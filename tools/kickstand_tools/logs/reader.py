@@ -28,6 +28,7 @@ from .source import File, Progress, chunks, name_of, total_bytes
 from .speed_unit import SpeedUnit
 from .stretch import Stretch
 from .table import Array
+from .usual_units import check_units
 
 BLOCK_BYTES = 1 << 20  # of text, some 15000 samples
 LEAST_G = 0.4  # median force; less is usual where gravity was taken off, a ride's is over 0.9
@@ -44,7 +45,8 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None,
     source: a path (gzipped if it ends in .gz), an open file of text or bytes, a Log, which is checked, or a Stretch of
     one of these. minimum: the least number of samples. progress: called with the bytes read and those of the file.
     axes: judge whether rates and accelerations belong together, which takes most of the time. Times that repeat are
-    spread, a cut end is left out. Raises InputError naming the file, and the line for a mistake in it, also for units that are easily mistaken (m/s2, milliseconds, km/h).
+    spread, a cut end is left out. Raises InputError naming the file, and the line for a mistake in it, also for units
+    that are easily mistaken (m/s2, milliseconds, km/h).
 
     >>> import io
     >>> log = read_log(io.StringIO("t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\\n0.00,0,1,0,0,0,0\\n0.01,0,1,0,0,0,0\\n"))
@@ -85,7 +87,7 @@ def read_blocks(
     total = len(whole.t_s) if isinstance(whole, Log) else total_bytes(whole)
     for block in _unchecked(source, remarks):
         if not count:
-            _check_units(name, block)
+            check_units(name, block)
         count += len(block.time_us)
         block.frozen = frozen.mark(block)
         if block.has_speed:
@@ -237,17 +239,3 @@ def _block(
         names=tuple(names),
         **{name: column[name] for name in TRACK},
     )
-
-
-def _check_units(name: str, block: Block) -> None:
-    """Raise InputError for a log in units that are easily taken for the right ones, by its beginning."""
-    usual_g = np.median(np.linalg.norm(block.readings[:, :3], axis=1))
-    if usual_g < LEAST_G:
-        raise InputError(
-            f"{name}: accelerations are usually {usual_g:.2f} g, not 1 g: was gravity taken off? It has to be in them"
-        )
-    if 5.0 < usual_g < 20.0:
-        raise InputError(f"{name}: accelerations look like m/s2: divide them by 9.80665, their unit is g")
-    time_us = block.time_us
-    if len(time_us) > 1 and (time_us[-1] - time_us[0]) / (len(time_us) - 1) >= 4e6:
-        raise InputError(f"{name}: seconds between samples: is t_s in milliseconds?")
