@@ -209,7 +209,7 @@ def _vehicle(result: PeriodResult) -> str:
     """A row of the table of vehicles."""
     row = result.alignment
     values = [test["mfdd_mps2"] for test in result.brake_tests]
-    why: str = _WORDS.get(row["reason"], row["reason"])
+    why = str(_WORDS.get(row["reason"], row["reason"]))
     quality = f"{row['quality_deg']:.2f}°" if row["quality_deg"] is not None else ""
     median = f"{statistics.median(values):.2f}" if values else ""
     left_out = f"+{row['logs_left_out']}" if row["logs_left_out"] else ""
