@@ -214,6 +214,18 @@ def test_however_late_the_first_speed_comes_the_first_braking_event_counts(silen
     assert result["ready"]
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_last_speed_of_zero_is_no_standstill_once_the_source_is_silent(engine):
+    """It drives off after the receiver has died, in long curves whose force is as steady as at a stop."""
+    before = [*around(7), [8.0, -1.0, 0.0], STAND]
+    legs = [*before, [4.0, 4.0, 0.0], [30.0, 0.0, 9.0]]
+    seconds = sum(leg[0] for leg in before)
+    options = {"source": {"silent": (seconds - 3.0, 1e9)}}
+    [result] = run(engine, [("drive", (legs, MOUNT, options))])
+    assert result["ready"], result
+    assert max(map(abs, errors(result, MOUNT))) < 0.5
+
+
 def test_a_silent_source_is_not_a_stuck_one():
     """In a straight tunnel with stop and go there is no speed; before and after it there is."""
     tunnel = [[seconds, acceleration, 0.0] for seconds, acceleration, _ in around(6, pause_s=3.0, stands=False)]

@@ -16,10 +16,10 @@ from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 CALIBRATION = CalibrationFile(accel_offset_g=np.array([0.02, -0.01, 0.03]), accel_slope=np.array([1.01, 0.99, 1.0]))
 
 
-def drive(rate_hz=100, every_s=0.5, events=7, seed=5):
-    """A made-up drive as a Log whose times are uneven; a speed each every_s, anywhere within a bin."""
+def drive(rate_hz=100, every_s=0.5, events=7, seed=5, before=()):
+    """A made-up drive as a Log whose times are uneven; a speed each every_s, anywhere within a bin. before: legs."""
     mount = np.reshape(random_mounting(seed), (3, 3))
-    made = list(driving_runs.samples(driving_runs.around(events), tilt_deg=1.0))[:: 100 // rate_hz]
+    made = list(driving_runs.samples([*before, *driving_runs.around(events)], tilt_deg=1.0))[:: 100 // rate_hz]
     n = len(made)
     t_s = np.arange(n) / rate_hz + np.random.default_rng(seed).uniform(0.0, 0.3 / rate_hz, n)
     speed = np.full(n, np.nan)
@@ -91,3 +91,20 @@ def test_a_refusal_is_part_of_the_result_with_what_was_counted():
     assert (found.status, found.reason) == ("refused", "few-events")
     assert found.stops == 1 and 0 < found.used < 5
     assert found.calibration is CALIBRATION
+
+
+def test_a_vehicle_that_stands_at_another_slope_in_the_next_log_has_not_moved_its_mount():
+    """Parked nose down at the end of the first log, nose up at the beginning of the second one."""
+    mount = np.reshape(random_mounting(5), (3, 3))
+    logs = []
+    for slope_deg, first in ((-4.5, False), (4.5, True)):
+        log = drive(events=6, before=[driving_runs.STAND])
+        at = log.t_s < 12.0 if first else log.t_s > log.t_s[-1] - 12.0
+        standing_g = np.array([0.0, np.cos(np.radians(slope_deg)), np.sin(np.radians(slope_deg))]) @ mount
+        noise_g = np.random.default_rng(1).normal(0.0, 0.002, log.accel_g.shape)
+        log.accel_g = np.where(at[:, None], standing_g + noise_g, log.accel_g)
+        if not first:  # the drive of the helper ends before the vehicle stands
+            log.gyro_dps = np.where(at[:, None], [0.5, -1.0, 0.3], log.gyro_dps)
+            log.speed_mps = np.where(at & ~np.isnan(log.speed_mps), 0.0, log.speed_mps)
+        logs.append(log)
+    assert fit_logs(logs, None, "car").reason != "mount-moved"

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from kickstand.drive_alignment.alignment import STALE_US, DriveAlignment
 from kickstand.drive_alignment.history import BIN_US
-from kickstand.drive_alignment.vertical import StandingVertical
+from kickstand.drive_alignment.vertical import MOVED_MPS, StandingVertical
 
 from ..errors import InputError
 from ..logs.log import Log
@@ -22,6 +22,7 @@ def standing(logs: Sequence[Log], calibration: CalibrationFile, steps: "Steps") 
     standing = StandingVertical()
     speed_mps, silent_us = -1.0, 0  # none yet
     for log in logs:
+        _end_stop(standing)
         for part in drive_bins(log, calibration, BIN_US):
             length_us = part.first_us + part.last_us
             new = [part.start_mps, *(mps for _, mps in part.speeds), part.end_mps]
@@ -48,6 +49,8 @@ def feed(
         for part in drive_bins(log, calibration, length_us):
             if part.begins and (end_us or log is not logs[0]):
                 alignment.interrupt()
+                if end_us == 0:
+                    _end_stop(alignment.standing)
             try:
                 end_us = part.end_us
                 if part.start_mps is not None:
@@ -67,6 +70,11 @@ def feed(
         if log is logs[-1]:
             alignment.finish()
         watch.end(end_us / 1e6)
+
+
+def _end_stop(standing: StandingVertical) -> None:
+    """Another log begins: where the vehicle stands now is another place, perhaps on another slope."""
+    standing.update((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 2.0 * MOVED_MPS, 0.0)  # as if it had driven
 
 
 def _measure(

@@ -62,10 +62,9 @@ class Cluster:
 
             def setup(self, worker: Any) -> None:
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
-                logging.getLogger("distributed").setLevel(logging.CRITICAL)
+                _silence()
 
-        # what happens to workers is told by the results
-        logging.getLogger("distributed").setLevel(logging.CRITICAL)
+        _silence()
         self._stack = contextlib.ExitStack()
         self._stack.enter_context(
             dask.config.set(
@@ -167,6 +166,13 @@ class Cluster:
     def _hear(self, event: tuple[float, Any]) -> None:
         _, (key, worker) = event
         self._started[key] = time.monotonic(), worker
+
+
+def _silence() -> None:
+    """What happens to workers and to the scheduler is told by the results, and by InputErrors."""
+    for name in ("distributed", *logging.root.manager.loggerDict):
+        if name.split(".")[0] == "distributed":
+            logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 def _announced(key: str, function: Callable[..., Any], *arguments: Any) -> Any:

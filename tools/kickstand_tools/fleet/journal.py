@@ -44,6 +44,8 @@ class Journal:
     def __exit__(self, *exception: object) -> None:
         with contextlib.suppress(OSError):
             self._file.close()
+            if not self._end:
+                self._path.unlink()
 
     def __contains__(self, key: str) -> bool:
         """True if the result is there for good."""

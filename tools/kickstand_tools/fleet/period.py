@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from kickstand.drive_alignment.quality import AGREE_DEG
 from kickstand.errors import AlignmentError
 
 from ..analysis.stops.brake_test import Stop
@@ -81,7 +82,8 @@ def _result(period: Period, signals_to: str | None) -> PeriodResult:
     driven, moves = [], []
     if fit.status == "aligned" or fit.reason in _DOUBTS:
         driven = [evidence.intervals(log, period.kind, fit.lag_s or 0.0, fit.bias_dps) for log in logs]
-        moves = find_moves(driven, fit.reason in (MOVED, "parts-differ"))
+        doubted = fit.reason in (MOVED, "parts-differ") or (fit.halves_deg or 0.0) > AGREE_DEG
+        moves = find_moves(driven, doubted)
         wrong = None if moves else _mirrored(driven)
         if moves:
             status, reason, message = "refused", MOVED, _moved_words(moves, logs)

@@ -9,8 +9,7 @@ from pathlib import Path
 
 from kickstand import __version__
 
-from ..errors import InputError, cause
-from ..output import check_directory
+from ..output import check_directory, new_directory
 from . import files, tables
 from .cluster import run_tasks
 from .journal import Journal
@@ -20,7 +19,7 @@ from .show import plot
 from .show.page import Glance, write_page
 
 RESULTS_VERSION = 1  # another one makes all results of before obsolete
-SIGNALS = "signals"
+PLOTS, SIGNALS = "plots", "signals"
 TIMEOUT_S = 600.0  # for one mount of one vehicle
 _WRITE_S, _SHARE = 15.0, 20.0  # tables are written so often, and at most every so many times what writing takes
 
@@ -62,13 +61,9 @@ def run_fleet(
     directory = Path(out)
     tables.check()
     check_directory(directory)
-    try:
-        (directory / "plots").mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{directory} cannot be made: {cause(error)}") from error
     keys = _keys(periods, with_signals)
     signals_to = str(directory.resolve() / SIGNALS) if with_signals else None
-    with Journal(directory / "journal.jsonl") as journal:
+    with new_directory(directory / PLOTS), Journal(directory / "journal.jsonl") as journal:
         todo = [k for k, key in enumerate(keys) if key not in journal]
         done = len(keys) - len(todo)
         if progress:
@@ -88,9 +83,11 @@ def run_fleet(
                     write_results(directory, journal.results(keys), len(keys))
                     last_s = time.monotonic()
                     pause_s = max(_WRITE_S, _SHARE * (last_s - before_s))
-        finally:  # also when it was stopped
-            seen = write_results(directory, journal.results(keys), len(keys))
-        return FleetRun(len(keys), len(todo), seen)
+        except BaseException:  # also when it is stopped
+            if done:
+                write_results(directory, journal.results(keys), len(keys))
+            raise
+        return FleetRun(len(keys), len(todo), write_results(directory, journal.results(keys), len(keys)))
 
 
 def write_results(directory: Path, results: Iterable[PeriodResult], expected: int) -> Glance:
@@ -118,7 +115,7 @@ def _keep(
 ) -> None:
     kept = result or failed(period, reason, message)
     if kept.picture:
-        kept.alignment["plot"] = f"plots/{plot.file_name(period.vehicle, period.mount)}"
+        kept.alignment["plot"] = f"{PLOTS}/{plot.file_name(period.vehicle, period.mount)}"
         plot.write_plot(directory / kept.alignment["plot"], kept)
     journal.add(key, kept, again=result is None)
 
