@@ -92,3 +92,17 @@ def test_a_log_that_is_none_is_refused(ride, tmp_path, rows, words):
 def test_the_ride_itself_is_not_overwritten(ride):
     directory, _, _ = ride
     refused(directory, "smooth", directory / "RIDE.csv", "--out", directory / "RIDE.csv", words="also an input")
+
+
+def test_a_report_has_the_smoothed_lean_and_the_live_one_if_wanted(ride):
+    directory, lean, _ = ride
+    log = directory / "RIDE.csv"
+    largest = {}
+    for option, word, said in ((), "smoothed", "smoothed"), (("--live",), "live", "as the display showed it"):
+        data = json.loads(works("report", log, "--json", *option).out)
+        assert data["lean"] == word
+        assert said in works("report", log, *option).out
+        largest[word] = [data[f"max_{side}_deg"]["value"] for side in ("left", "right")]
+    true = [-np.min(lean), np.max(lean)]  # the one to the left is on the kickstand
+    assert np.max(np.abs(np.subtract(largest["smoothed"], true))) < 1.0
+    assert largest["smoothed"] != largest["live"]
