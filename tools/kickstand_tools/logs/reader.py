@@ -28,9 +28,9 @@ from .source import File, Progress, chunks, name_of, total_bytes
 from .speed_unit import SpeedUnit
 from .stretch import Stretch
 from .table import Array
+from .units_check import check_units
 
 BLOCK_BYTES = 1 << 20  # of text, some 15000 samples
-LEAST_G = 0.4  # median force; less is usual where gravity was taken off, a ride's is over 0.9
 BLOCK_SAMPLES = 60_000  # of a log in memory
 _NUMERIC = b"0123456789+-.eE, \n"  # where nothing else stands, numpy may read it
 
@@ -86,7 +86,7 @@ def read_blocks(
     total = len(whole.t_s) if isinstance(whole, Log) else total_bytes(whole)
     for block in _unchecked(source, remarks):
         if not count:
-            _check_units(name, block)
+            check_units(name, block)
         count += len(block.time_us)
         block.frozen = frozen.mark(block)
         if block.has_speed:
@@ -107,8 +107,11 @@ def read_blocks(
 
 def read_twice(source: Source) -> Source:
     """The same where it can be read again, else a Log: an open file can be read once."""
-    if isinstance(source, Stretch):
-        return Stretch(read_twice(source.source), source.from_s, source.to_s)
+    stretch = isinstance(source, Stretch)
+    return Stretch(_again(source.source), source.from_s, source.to_s) if stretch else _again(source)
+
+
+def _again(source: File | Log) -> File | Log:
     return source if isinstance(source, (Path, str, Log)) else read_log(source)
 
 
@@ -119,7 +122,7 @@ def _unchecked(source: Source, remarks: list[Notice]) -> Iterator[Block]:
     if not isinstance(source, Stretch):
         return _parsed(source, name_of(source), remarks)
     if source.from_its_end:
-        whole = read_twice(source.source)
+        whole = _again(source.source)
         last_s = [float(block.t_s[-1]) for block in _unchecked(whole, [])]
         source = Stretch(whole, source.from_s, source.to_s).of_length(max(last_s, default=0.0))
     return source.cut(_unchecked(source.source, remarks))
@@ -234,17 +237,3 @@ def _block(
         names=tuple(names),
         **{name: column[name] for name in TRACK},
     )
-
-
-def _check_units(name: str, block: Block) -> None:
-    """Raise InputError for a log in units that are easily taken for the right ones, by its beginning."""
-    usual_g = np.median(np.linalg.norm(block.readings[:, :3], axis=1))
-    if usual_g < LEAST_G:
-        raise InputError(
-            f"{name}: accelerations are usually {usual_g:.2f} g, not 1 g: was gravity taken off? It has to be in them"
-        )
-    if 5.0 < usual_g < 20.0:
-        raise InputError(f"{name}: accelerations look like m/s2: divide them by 9.80665, their unit is g")
-    time_us = block.time_us
-    if len(time_us) > 1 and (time_us[-1] - time_us[0]) / (len(time_us) - 1) >= 4e6:
-        raise InputError(f"{name}: seconds between samples: is t_s in milliseconds?")
