@@ -174,7 +174,7 @@ def test_a_freeze_is_no_stop_for_calibrate_drive():
     readings[2000:4000] = readings[2000]
     log = log_of(readings)
     log.speed_mps[::100] = 12.0
-    assert len(drive.usable(read_log(log), False).t_s) == 4001
+    assert len(drive.usable(log, False).t_s) == 4001
 
 
 def test_blocks_are_marked_once():

@@ -52,7 +52,7 @@ class Cluster:
 
     def __enter__(self) -> "Cluster":
         try:
-            import dask
+            from dask import config
             from distributed import Client, LocalCluster, WorkerPlugin
         except ImportError as error:
             raise InputError("a fleet needs Dask: " + extra("fleet")) from error
@@ -67,7 +67,7 @@ class Cluster:
         _silence()
         self._stack = contextlib.ExitStack()
         self._stack.enter_context(
-            dask.config.set(
+            config.set(
                 {
                     "distributed.scheduler.allowed-failures": 0,
                     "distributed.scheduler.worker-saturation": 1.0,

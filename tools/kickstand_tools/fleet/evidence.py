@@ -112,7 +112,7 @@ def blocks(logs: list[Intervals]) -> Blocks:
 def fits(square: Array, product: Array) -> tuple[Array, Array]:
     """(k, 3, 3) level, forward and left of k sums (k, 3, 3), and (k, 2): how much a and c varied, in g^2 s."""
     ridge = np.diag([1e-9, 1e-6, 1e-6]) * np.maximum(square[..., :1, :1], 1e-3)
-    found = np.linalg.solve(square + ridge, product)
+    found = np.asarray(np.linalg.solve(square + ridge, product), dtype=float)
     seconds = np.maximum(square[..., 0, 0], 1e-9)[..., None]
     means = square[..., 0, 1:] / seconds
     varied = np.diagonal(square, axis1=-2, axis2=-1)[..., 1:] - seconds * means * means

@@ -4,6 +4,7 @@ import gzip
 import io
 from collections.abc import Iterable
 from pathlib import Path
+from typing import IO, cast
 
 from ..errors import InputError, cause, extra
 from ..logs.log import Log
@@ -72,7 +73,7 @@ def open_log(path: str) -> Log:
     file: io.BytesIO = _Named(path, read_bytes(path))
     if path.endswith(".gz"):
         with gzip.GzipFile(filename=path, fileobj=file) as unpacked:
-            return read_log(unpacked, axes=False)
+            return read_log(cast(IO[bytes], unpacked), axes=False)
     return read_log(file, axes=False)
 
 
@@ -118,4 +119,8 @@ def write_bytes(path: str, content: bytes) -> None:
         target.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{target.parent} cannot be made: {cause(error)}") from error
-    write_whole(target, lambda temporary: temporary.write_bytes(content) and None)
+
+    def write(temporary: Path) -> None:
+        temporary.write_bytes(content)
+
+    write_whole(target, write)

@@ -107,8 +107,9 @@ def read_blocks(
 
 def read_twice(source: Source) -> Source:
     """The same where it can be read again, else a Log: an open file can be read once."""
-    stretch = isinstance(source, Stretch)
-    return Stretch(_again(source.source), source.from_s, source.to_s) if stretch else _again(source)
+    if isinstance(source, Stretch):
+        return Stretch(_again(source.source), source.from_s, source.to_s)
+    return _again(source)
 
 
 def _again(source: File | Log) -> File | Log:

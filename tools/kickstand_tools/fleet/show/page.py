@@ -13,7 +13,7 @@ from urllib.parse import quote
 
 import numpy as np
 
-from ...output import write_whole
+from ..files import write_bytes
 from ..period import PeriodResult, Row
 from .svg import Panel, date_text
 
@@ -111,7 +111,7 @@ class Glance:
 
 def write_page(path: Path, glance: Glance, expected: int) -> None:
     """Write the page, whole or not at all. Raises InputError."""
-    write_whole(path, lambda temporary: temporary.write_text(glance.page(expected), encoding="utf-8") and None)
+    write_bytes(str(path), glance.page(expected).encode())
 
 
 def _first(rows: list[Any], key: Callable[[Any], float], count: int) -> list[Any]:
@@ -209,7 +209,7 @@ def _vehicle(result: PeriodResult) -> str:
     """A row of the table of vehicles."""
     row = result.alignment
     values = [test["mfdd_mps2"] for test in result.brake_tests]
-    why = _WORDS.get(row["reason"], row["reason"])
+    why: str = _WORDS.get(row["reason"], row["reason"])
     quality = f"{row['quality_deg']:.2f}°" if row["quality_deg"] is not None else ""
     median = f"{statistics.median(values):.2f}" if values else ""
     left_out = f"+{row['logs_left_out']}" if row["logs_left_out"] else ""

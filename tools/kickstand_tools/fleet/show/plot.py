@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
-from ...output import write_whole
+from ..files import write_bytes
 from ..period import PeriodResult
 from ..signals import safe_name
 from .svg import Panel, date_text
@@ -22,7 +22,7 @@ def file_name(vehicle: str, mount: str) -> str:
 
 def write_plot(path: Path, result: PeriodResult) -> None:
     """Write the picture of a result that has one. Raises InputError."""
-    write_whole(path, lambda temporary: temporary.write_text(draw(result), encoding="utf-8") and None)
+    write_bytes(str(path), draw(result).encode())
 
 
 def draw(result: PeriodResult) -> str:

@@ -97,7 +97,7 @@ def make_fleet(
                 progress(k + 1, len(troubles))
         rows = [(v.name, path.relative_to(directory), _leans(v.kind)) for v in made for path in v.paths]
         write_table(directory / "MANIFEST.csv", ("vehicle", "path", "kind"), rows)
-        write_table(directory / "TRUTH.csv", (*_COLUMNS, *MATRIX), (_truth(v) for v in made))
+        write_table(directory / "TRUTH.csv", (*_COLUMNS, *MATRIX), (list(_truth(v)) for v in made))
     except OSError as error:
         raise InputError(f"{directory} cannot be written: {cause(error)}") from error
     return made

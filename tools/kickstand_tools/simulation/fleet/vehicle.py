@@ -96,8 +96,8 @@ def _felt(chance: np.random.Generator, kind: str, route: Route) -> tuple[Array, 
     w_left, w_up = -np.gradient(pitch, step_s), route.yaw_rate
     rate = np.column_stack((w_left * c + w_up * s, w_up * c - w_left * s, np.gradient(lean, step_s)))
     moving = np.minimum(1.0, route.speed / 10.0)[:, None]
-    force += chance.normal(0.0, 1.0, force.shape) * (0.06 + [0.25, 0.5, 0.25] * moving)
-    rate += np.radians(chance.normal(0.0, 1.0, rate.shape) * (0.1 + [1.2, 0.5, 0.8] * moving))
+    force += chance.normal(0.0, 1.0, force.shape) * (0.06 + np.array([0.25, 0.5, 0.25]) * moving)
+    rate += np.radians(chance.normal(0.0, 1.0, rate.shape) * (0.1 + np.array([1.2, 0.5, 0.8]) * moving))
     return force, rate
 
 
