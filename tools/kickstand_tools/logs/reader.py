@@ -44,7 +44,8 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None,
     source: a path (gzipped if it ends in .gz), an open file of text or bytes, a Log, which is checked, or a Stretch of
     one of these. minimum: the least number of samples. progress: called with the bytes read and those of the file.
     axes: judge whether rates and accelerations belong together, which takes most of the time. Times that repeat are
-    spread, a cut end is left out. Raises InputError naming the file, and the line for a mistake in it, also for units that are easily mistaken (m/s2, milliseconds, km/h).
+    spread, a cut end is left out. Raises InputError naming the file, and the line for a mistake in it, also for units
+    that are easily mistaken (m/s2, milliseconds, km/h).
 
     >>> import io
     >>> log = read_log(io.StringIO("t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\\n0.00,0,1,0,0,0,0\\n0.01,0,1,0,0,0,0\\n"))
