@@ -66,7 +66,7 @@ def winding(seconds: float, slow_ppm: float = 0.0) -> tuple[api.Log, api.Track]:
     force = np.outer(1.0 / np.cos(lean), [0.0, 1.0, 0.0])
     heading = np.cumsum(yaw) * 0.02
     lat, lon = (np.degrees(np.cumsum(speed * turn(heading)) * 0.02 / EARTH_M)[::5] for turn in (np.sin, np.cos))
-    track = api.Track(1.7e9 + 0.1 * np.arange(len(lat)), lat, lon, np.full(len(lat), speed), "exact")
+    track = api.Track(1.7e9 + np.arange(len(lat)) / 10.0, lat, lon, np.full(len(lat), speed), "exact")
     return api.Log(t_s * (1.0 - slow_ppm * 1e-6), force, rates), track
 
 

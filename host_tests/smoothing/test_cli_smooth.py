@@ -6,7 +6,7 @@ import command
 import numpy as np
 import pytest
 from command import refused, works
-from kickstand_tools.calibration.file import write_calibration
+from kickstand_tools.calibration.file import CalibrationFile, write_calibration
 from kickstand_tools.logs.reader import write_table
 from smoothed_rides import simulated
 
@@ -78,7 +78,7 @@ def test_a_calibration_that_does_not_serve_is_refused(ride, tmp_path, change, wo
     [
         ([], "is empty"),
         (["0,0,1,0,0,0,0"], "too short"),
-        (["0,0,1,0,0,0,0", "1,0,1.1,0,0,0,0", "2,0,1,0,0,0,0"], "at least 10"),
+        (["0,0,1,0,0,0,0", "1,0,1.1,0,0,0,0", "2,0,1,0,0,0,0"], "under 10"),
     ],
 )
 def test_a_log_that_is_none_is_refused(ride, tmp_path, rows, words):
@@ -92,3 +92,29 @@ def test_a_log_that_is_none_is_refused(ride, tmp_path, rows, words):
 def test_the_ride_itself_is_not_overwritten(ride):
     directory, _, _ = ride
     refused(directory, "smooth", directory / "RIDE.csv", "--out", directory / "RIDE.csv", words="also an input")
+
+
+def test_a_report_has_the_smoothed_lean_and_the_live_one_if_wanted(ride):
+    directory, lean, _ = ride
+    log = directory / "RIDE.csv"
+    largest = {}
+    for option, word, said in ((), "smoothed", "smoothed"), (("--live",), "live", "as the display showed it"):
+        data = json.loads(works("report", log, "--json", *option).out)
+        assert data["lean"] == word
+        assert said in works("report", log, *option).out
+        largest[word] = [data[f"max_{side}_deg"]["value"] for side in ("left", "right")]
+    true = [-np.min(lean), np.max(lean)]  # the one to the left is on the kickstand
+    assert np.max(np.abs(np.subtract(largest["smoothed"], true))) < 1.0
+    assert largest["smoothed"] != largest["live"]
+
+
+def test_a_log_of_few_samples_a_second_is_reported_as_the_display_had_it(tmp_path):
+    """There is nothing to look back over; smooth itself refuses it."""
+    t_s = np.arange(0.0, 60.0, 0.2)
+    noise = np.random.default_rng(1).normal(0.0, 0.01, (len(t_s), 6))
+    table = np.column_stack((t_s, noise + [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]))
+    ride, cal = tmp_path / "RIDE.csv", tmp_path / "RIDE.cal.json"
+    command.write(ride, table)
+    write_calibration(cal, CalibrationFile(aligned=True))
+    assert "too few samples a second to look back over" in command.works("report", ride).err
+    command.refused(tmp_path, "smooth", ride, "--out", tmp_path / "LEAN.csv", words="under 10 samples a second")

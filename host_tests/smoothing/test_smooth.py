@@ -167,5 +167,5 @@ def test_a_long_ride_is_adjusted_in_chapters(street, monkeypatch):
 def test_a_slow_log_is_refused():
     t = np.arange(0.0, 20.0, 0.2)
     log = Log(t, np.tile([0.0, 1.0, 0.0], (100, 1)) + 0.01 * np.sin(t)[:, None], np.ones((100, 3)) * t[:, None])
-    with pytest.raises(InputError, match="at least 10 a second"):
+    with pytest.raises(InputError, match="under 10 samples a second"):
         smooth(log, CalibrationFile(aligned=True))

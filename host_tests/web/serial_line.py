@@ -45,7 +45,7 @@ class SerialLine:
         self._said = bytearray()
         self.connected = True
         self.sent = 0
-        self.cut_after = None
+        self.cut_after: int | None = None
         device.heard = self._hear
         rider.page.expose_function("boardSays", self._says)
         rider.page.expose_function("boardHears", self._hears)

@@ -293,7 +293,7 @@ def test_a_position_goes_with_the_next_turn_alone(recorder, keeper):
     add(recorder, 1)
     recorder.stop()
     first, second = blocks(keeper)
-    hundredths = [turn.place and round(100 * turn.place.utc_s % 100) for turn in first.turns]
+    hundredths = [turn.place and turn.place.utc_s and round(100 * turn.place.utc_s % 100) for turn in first.turns]
     assert hundredths == [20, None, None, 30]
     assert [turn.speed_mps for turn in first.turns] == [None, None, 5.0, 6.0]
     assert [turn.place for turn in second.turns] == [None]

@@ -108,7 +108,7 @@ class Ride:
         """The ride from its beginning, without the readings that froze: they are a gap. progress, notices: of
         read_blocks(). Raises InputError."""
         lean = _Lean(self.calibration)
-        told = False
+        told = slow = False
         for whole, found in self._read(progress, notices):
             block = whole.believed
             if not len(block.time_us):
@@ -117,6 +117,10 @@ class Ride:
             if notices is not None and not told and np.any(rows[:, 2] < 0.0):
                 told = True
                 notices.append(_absurd(block, int(np.argmax(rows[:, 2] < 0.0))))
+            if self.smoothed and found is None and not slow:
+                slow = True
+                if notices is not None:
+                    notices.append(Notice("smooth-slow"))
             if found is not None:
                 shown = found[~whole.frozen]
                 rows[:, 0], rows[:, 2] = shown[:, 0], np.radians(shown[:, 1]) ** 2
@@ -126,7 +130,7 @@ class Ride:
     def _read(
         self, progress: Progress | None, notices: list[Notice] | None
     ) -> Iterator[tuple[Block, Array | None]]:
-        """The blocks of the log, and what smooth_blocks() gives for each, None where it is not wanted."""
+        """The blocks of the log, and what smooth_blocks() gives for each, None where it is not wanted or gives none."""
         if self.smoothed:
             return smooth_blocks(self.log, self.calibration, progress, notices)
         return ((block, None) for block in read_blocks(self.log, progress=progress, notices=notices))

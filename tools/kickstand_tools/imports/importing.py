@@ -12,7 +12,7 @@ from ..logs.axes.course import course_agrees
 from ..logs.csv_lines import write_log
 from ..logs.log import Log
 from ..logs.reader import read_log
-from ..logs.usual_units import LEAST_G
+from ..logs.units_check import LEAST_G
 from . import mapped
 from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo
 from .files import Piece, read_pieces

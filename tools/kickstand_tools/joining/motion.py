@@ -38,7 +38,7 @@ class Motion:
     @property
     def t_s(self) -> Array:
         """(n) the middle of each cell, s since the first sample."""
-        return (np.arange(len(self.there)) + 0.5) * STEP_S
+        return np.arange(0.5, len(self.there)) * STEP_S
 
     @property
     def seconds(self) -> float:

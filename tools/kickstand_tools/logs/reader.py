@@ -28,10 +28,9 @@ from .source import File, Progress, chunks, name_of, total_bytes
 from .speed_unit import SpeedUnit
 from .stretch import Stretch
 from .table import Array
-from .usual_units import check_units
+from .units_check import check_units
 
 BLOCK_BYTES = 1 << 20  # of text, some 15000 samples
-LEAST_G = 0.4  # median force; less is usual where gravity was taken off, a ride's is over 0.9
 BLOCK_SAMPLES = 60_000  # of a log in memory
 _NUMERIC = b"0123456789+-.eE, \n"  # where nothing else stands, numpy may read it
 

@@ -21,7 +21,7 @@ from .windows import windows_of
 
 SLOWEST_HZ = 10.0
 PIECE_S = 120.0  # a log is cut into pieces
-CHAPTER = 12  # of which so many are adjusted together, with one before and one after them
+CHAPTER = 6  # of which so many are adjusted together, with one before and one after them
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps")
 
 
@@ -87,6 +87,8 @@ def _checked_blocks(
     """smooth_blocks(), and what contradicts the calibration."""
     mount = MountCheck(calibration)
     for block, found in smooth_blocks(log, calibration, progress, notices):
+        if found is None:
+            raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples a second: too few to look back over")
         believed = block.believed
         mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
         yield block, found
@@ -99,9 +101,9 @@ def smooth_blocks(
     calibration: CalibrationFile,
     progress: Progress | None = None,
     notices: list[Notice] | None = None,
-) -> Iterator[tuple[Block, Array]]:
-    """Each piece of the log with its values (n, COLUMNS). notices: what is remarkable in the log is appended to it at
-    the end. Raises InputError."""
+) -> Iterator[tuple[Block, Array | None]]:
+    """Each piece of the log with its values (n, COLUMNS), None where there are too few samples a second. notices: what
+    is remarkable in the log is appended to it at the end. Raises InputError."""
     _check(log, calibration)
     past: deque[Block] = deque(maxlen=CHAPTER)
     waiting: list[Block] = []
@@ -134,12 +136,15 @@ def _pieces(blocks: Iterator[Block]) -> Iterator[Block]:
 
 def _chapter(
     before: list[Block], own: list[Block], after: list[Block], calibration: CalibrationFile
-) -> Iterator[tuple[Block, Array]]:
+) -> Iterator[tuple[Block, Array | None]]:
     """The values of the pieces `own`, adjusted together with those before and after them."""
     believed = [piece.believed for piece in (*before, *own, *after)]
     values = _adjusted(believed, calibration)
     first = sum(len(piece.time_us) for piece in believed[: len(before)])
     for piece in own:
+        if values is None:
+            yield piece, None
+            continue
         found = np.full((len(piece.time_us), len(COLUMNS)), np.nan)
         there = ~piece.frozen
         count = int(np.count_nonzero(there))
@@ -148,8 +153,8 @@ def _chapter(
         yield piece, found
 
 
-def _adjusted(pieces: list[Block], calibration: CalibrationFile) -> Array:
-    """(samples, COLUMNS)"""
+def _adjusted(pieces: list[Block], calibration: CalibrationFile) -> Array | None:
+    """(samples, COLUMNS); None where there are too few samples a second."""
     t_s = np.concatenate([piece.t_s for piece in pieces])
     readings = np.concatenate([piece.readings for piece in pieces])
     speed = np.concatenate([piece.speed_mps for piece in pieces])
@@ -158,7 +163,7 @@ def _adjusted(pieces: list[Block], calibration: CalibrationFile) -> Array:
         return nothing
     step_s = float(np.median(np.diff(t_s)))
     if step_s * SLOWEST_HZ > 1.0:
-        raise InputError(f"a sample every {step_s:.2f} s: at least {SLOWEST_HZ:.0f} a second are needed")
+        return None
     force, rate = calibration.in_vehicle(readings)
     rate = np.radians(rate)
     windows = windows_of(t_s, force, rate, speed)

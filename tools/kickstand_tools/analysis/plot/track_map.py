@@ -88,7 +88,7 @@ def figure(points: MapPoints, seen: Overview) -> Any:
         known &= np.isfinite(points.lean_deg)
         dots |= {"color": points.lean_deg[known].round(1), "colorscale": _COLOURS, "cmin": -limit, "cmax": limit}
         bar = {"title": {"text": "left  ·  lean, °  ·  right", "side": "top"}, "orientation": "h", "thickness": 10}
-        bar |= {"x": 1.0, "y": 1.0, "xanchor": "right", "yanchor": "top", "len": 0.5}
+        bar |= {"x": 1.0, "y": 0.965, "xanchor": "right", "yanchor": "top", "len": 0.5}
         ticks = [f"{limit:.0f}", "0", f"{limit:.0f}"]
         dots["colorbar"] = bar | {"tickvals": [-limit, 0.0, limit], "ticktext": ticks}
     at = {"x": x[known], "y": y[known], "customdata": points.t_s[known].round(1)}

@@ -44,8 +44,9 @@ class Bends:
         moves = MOVES * np.percentile(changes, 95)  # whatever the unit is
         if np.count_nonzero(changes > moves) * WINDOW_S < RIDING_S:
             return None
-        seconds = [values[: len(values) // 5 * 5].reshape(-1, 5, 3) for values in (force, rate)]
-        rate -= np.median(calm_rates(*seconds, moves), axis=0)
+        whole = len(rate) // 5 * 5  # seconds
+        calm = calm_rates(force[:whole].reshape(-1, 5, 3), rate[:whole].reshape(-1, 5, 3), moves)
+        rate -= np.median(calm, axis=0)
         found = leaning_of(rate, force, changes > moves)
         speed = speed_in_radians(found)
         if speed is not None:

@@ -1,15 +1,15 @@
-"""Units of a log that are easily taken for the right ones."""
+"""Units that are easily taken for a log's own, told by its beginning."""
 
 import numpy as np
 
 from ..errors import InputError
 from .block import Block
 
-LEAST_G = 0.3  # less than this is usual where gravity was taken off
+LEAST_G = 0.4  # median force; less is usual where gravity was taken off, a ride's is over 0.9
 
 
 def check_units(name: str, block: Block) -> None:
-    """Raise InputError for a log in units that are easily taken for the right ones, by its beginning."""
+    """Raise InputError for accelerations without gravity or in m/s2, and for times in ms. block: the log's first."""
     usual_g = np.median(np.linalg.norm(block.readings[:, :3], axis=1))
     if usual_g < LEAST_G:
         raise InputError(
