@@ -107,8 +107,7 @@ class Ride:
     def blocks(self, progress: Progress | None = None, notices: list[Notice] | None = None) -> Iterator[Channels]:
         """The ride from its beginning, without the readings that froze: they are a gap. progress, notices: of
         read_blocks(). Raises InputError."""
-        lean = _Lean(self.calibration)
-        told = slow = False
+        lean, told, slow = _Lean(self.calibration), False, False
         for whole, found in self._read(progress, notices):
             block = whole.believed
             if not len(block.time_us):
@@ -117,15 +116,14 @@ class Ride:
             if notices is not None and not told and np.any(rows[:, 2] < 0.0):
                 told = True
                 notices.append(_absurd(block, int(np.argmax(rows[:, 2] < 0.0))))
-            if self.smoothed and found is None and not slow:
-                slow = True
-                if notices is not None:
-                    notices.append(Notice("smooth-slow"))
+            slow |= self.smoothed and found is None
             if found is not None:
                 shown = found[~whole.frozen]
                 rows[:, 0], rows[:, 2] = shown[:, 0], np.radians(shown[:, 1]) ** 2
                 rows[:, 5] = rows[:, 2] <= MAX_VARIANCE  # NaN is not
             yield channels(block, self.calibration, rows, self.car)
+        if slow and notices is not None:
+            notices.append(Notice("smooth-slow"))
 
     def _read(
         self, progress: Progress | None, notices: list[Notice] | None
