@@ -1,6 +1,7 @@
 """The firmware's drivers can be imported in every test; recorded data is found or its tests are skipped."""
 
 import gc
+import importlib.util
 from pathlib import Path
 
 import hypothesis
@@ -15,6 +16,7 @@ hypothesis.settings.register_profile(
 )
 hypothesis.settings.load_profile("unhurried")
 
+CHROMIUM = Path("/usr/bin/chromium")
 ROOT = Path(__file__).resolve().parent.parent
 
 
@@ -41,3 +43,20 @@ def shared_data() -> Path:
     if not path.is_dir():
         pytest.skip("no recordings: ../shared/data is not beside the checkout")
     return path
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    """Debian's Chromium as playwright's browser, one for all tests of a process: playwright cannot be begun twice."""
+    if not CHROMIUM.exists():
+        pytest.skip(f"no {CHROMIUM}: on Debian the package chromium")
+    if importlib.util.find_spec("playwright") is None:
+        pytest.skip("no playwright")
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        browser = playwright.chromium.launch(
+            executable_path=CHROMIUM, args=["--no-sandbox", "--enable-unsafe-swiftshader"]
+        )
+        yield browser
+        browser.close()

@@ -3,7 +3,6 @@
 import functools
 import json
 import re
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -144,34 +143,25 @@ _POINT = """() => {
 }"""
 
 
-def test_in_a_browser_chart_and_map_show_the_same_moment(tmp_path):
-    playwright = pytest.importorskip("playwright.sync_api")
-    browser_path = shutil.which("chromium")
-    if not browser_path:
-        pytest.skip("no chromium")
+def test_in_a_browser_chart_and_map_show_the_same_moment(tmp_path, chromium):
     page_of(tmp_path, seen())
-    with playwright.sync_playwright() as run:
-        options = ["--no-sandbox", "--enable-unsafe-swiftshader"]
-        browser = run.chromium.launch(executable_path=browser_path, args=options)
-        try:
-            view = browser.new_page(viewport={"width": 1300, "height": 800})
-            asked, errors = [], []
-            view.on("request", lambda request: asked.append(request.url))
-            view.on("pageerror", lambda error: errors.append(str(error)))
-            view.goto((tmp_path / "ride.html").as_uri())
-            view.wait_for_function("map.layout.annotations[0].text != ''")
-            bar = view.evaluate("[map.layout.annotations[0].text, map.layout.shapes[1].x1, map.layout.xaxis.range]")
-            area, chart = view.locator("#map").bounding_box(), view.locator("#chart").bounding_box()
-            at = view.evaluate(_POINT)
-            view.mouse.move(area["x"] + at[0], area["y"] + at[1])
-            view.wait_for_function("document.querySelector('#chart .hoverlayer text') !== null")
-            said = view.locator("#here").text_content()
-            view.mouse.move(chart["x"] + 0.6 * chart["width"], chart["y"] + 180)
-            view.wait_for_timeout(300)
-            there = view.evaluate("[map.layout.shapes[0].xanchor, map.layout.shapes[0].yanchor]")
-            later = view.locator("#here").text_content()
-        finally:
-            browser.close()
+    view = chromium.new_page(viewport={"width": 1300, "height": 800})
+    asked, errors = [], []
+    view.on("request", lambda request: asked.append(request.url))
+    view.on("pageerror", lambda error: errors.append(str(error)))
+    view.goto((tmp_path / "ride.html").as_uri())
+    view.wait_for_function("map.layout.annotations[0].text != ''")
+    bar = view.evaluate("[map.layout.annotations[0].text, map.layout.shapes[1].x1, map.layout.xaxis.range]")
+    area, chart = view.locator("#map").bounding_box(), view.locator("#chart").bounding_box()
+    at = view.evaluate(_POINT)
+    view.mouse.move(area["x"] + at[0], area["y"] + at[1])
+    view.wait_for_function("document.querySelector('#chart .hoverlayer text') !== null")
+    said = view.locator("#here").text_content()
+    view.mouse.move(chart["x"] + 0.6 * chart["width"], chart["y"] + 180)
+    view.wait_for_timeout(300)
+    there = view.evaluate("[map.layout.shapes[0].xanchor, map.layout.shapes[0].yanchor]")
+    later = view.locator("#here").text_content()
+    view.close()
     assert errors == []
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
     metres, (west, east) = float(bar[0].split()[0]), bar[2]
