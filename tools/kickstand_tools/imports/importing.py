@@ -12,7 +12,6 @@ from ..logs.axes.course import course_agrees
 from ..logs.csv_lines import write_log
 from ..logs.log import Log
 from ..logs.reader import read_log
-from ..logs.units_check import LEAST_G
 from . import mapped
 from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo
 from .files import Piece, read_pieces
@@ -22,6 +21,7 @@ from .sheets import check_pandas
 from .units import ACCELERATIONS, SPEEDS, factor, unit
 
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
+WITHOUT_GRAVITY_G = 0.4  # median force: of an app's whole ride, which a pose with an offset of 0.6 g is not
 WRONG_UNIT_G = 3.0  # median force: m/s2 taken for g give 9.8
 
 
@@ -158,7 +158,7 @@ def _recording(pieces: list[Piece], name: str, columns: Mapping[str, str] | None
 def _check_force(joined: Joined, name: str) -> None:
     """Raise InputError where the acceleration has no gravity in it, or is in another unit than it says."""
     usual = float(np.median(np.linalg.norm(joined.accel_g, axis=1)))
-    if usual < LEAST_G:
+    if usual < WITHOUT_GRAVITY_G:
         raise InputError(
             f"{name}: its acceleration is {usual:.2f} g as a rule, where gravity makes it 1: gravity has been taken "
             "off, and without it there is no lean; record the acceleration with gravity"

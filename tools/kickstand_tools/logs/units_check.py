@@ -5,7 +5,7 @@ import numpy as np
 from ..errors import InputError
 from .block import Block
 
-LEAST_G = 0.35  # median force; less is usual where gravity was taken off, a ride's is over 0.9
+LEAST_G = 0.3  # median force; less is usual where gravity was taken off, a ride's is over 0.9
 
 
 def check_units(name: str, block: Block) -> None:
