@@ -142,6 +142,8 @@ class Cluster:
                     suspects.append(index)
                 else:
                     yield index, None, CRASHED, f"{type(error).__name__}: {error}"
+            elif self._client.status == "running":
+                suspects.append(index)  # its result went with a worker that was ended for another's sake
             else:
                 raise InputError(
                     f"the cluster{f' at {self._address}' if self._address else ''} was lost; what is finished is kept, "
