@@ -83,7 +83,7 @@ ROOMS = {
     ),
     "units": Room(
         (TOOLS + "logs/*_unit.py",),
-        (TESTS + "logs/test_unit_limits.py", TESTS + "logs/test_bends.py", TESTS + "logs/test_speed_unit.py"),
+        (TESTS + "logs/test_unit_limits.py", TESTS + "logs/axes/test_bends.py", TESTS + "logs/test_speed_unit.py"),
     ),
     "replay": Room(
         (TOOLS + "replay/*.py",),
