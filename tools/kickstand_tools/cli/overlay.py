@@ -24,7 +24,7 @@ _PATH = click.Path(path_type=Path)
 @click.option("--from", "from_s", type=float, metavar="S", help="Only from this time of the ride on.")
 @click.option("--to", "to_s", type=float, metavar="S", help="Only up to there; a negative S counts from the end.")
 @click.option(
-    "--height", type=click.IntRange(240, 4320), default=1080, help="Of the video that a clip is for, pixels."
+    "--height", type=click.IntRange(240, 4320), help="Of the video that a clip is for, pixels; if not given, 1080."
 )
 @click.option("--mph", is_flag=True, help="Miles an hour instead of kilometres.")
 @click.option("--live", is_flag=True, help="The lean that the display showed, not the smoothed one.")
@@ -37,7 +37,7 @@ def overlay(
     fps: str | None,
     from_s: float | None,
     to_s: float | None,
-    height: int,
+    height: int | None,
     mph: bool,
     live: bool,
     out: Path,
