@@ -3,6 +3,7 @@
 from math import atan2, cos, degrees, pi, radians, sin, sqrt
 
 from bike_motion import DT_S, DT_US, GRAVITY_MPS2, felt, near
+from kickstand.lean.bike_model import LEAN, SPEED
 from kickstand.lean.lean_filter import LeanFilter
 
 LEVEL, NO_RATE = [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]
@@ -197,8 +198,9 @@ def test_values_that_are_no_numbers_are_forgotten():
     assert sigma_deg(estimator) < 1.0
 
 
-def test_a_speed_of_500_kmh_is_one_and_of_600_is_none():
-    for speed_mps, fits in ((140.0, True), (160.0, False)):
+def test_a_speed_of_850_kmh_is_one_and_of_950_is_none():
+    """A board on its nose seems to speed up by 1 g until its rest is seen, after ten seconds and more."""
+    for speed_mps, fits in ((240.0, True), (260.0, False)):
         estimator = LeanFilter()
         feel(estimator, 0.05, [0.0, 1.2, 0.0])
         restarts = 0
@@ -260,7 +262,7 @@ def test_a_bias_that_is_far_off_is_put_right_at_once_where_rest_is_seen():
             estimator.update(force, rate, DT_US)
         for _ in range(60):
             near(estimator.update(force, rate, DT_US), 20.0, 0.25)
-            near(estimator.pitch_deg, 0.0, 0.15)
+            near(estimator.pitch_deg, 0.0, 0.2)
 
 
 def test_a_sensor_whose_forward_axis_points_up_or_down_comes_to_rest():
@@ -275,19 +277,19 @@ def test_a_sensor_whose_forward_axis_points_up_or_down_comes_to_rest():
             assert rested, (left, up)
 
 
-def trim_after(forward_g):
-    """Whether the trim is measured on a straight; the speed was told while it sped up so."""
+def trim_after(speed_mps, lean_deg):
+    """Whether the trim is measured on a straight where speed and lean are so uncertain."""
     estimator = LeanFilter()
     feel(estimator, 0.1, [0.0, 1.1, 0.0])
-    for _ in range(50):
-        estimator.measure_speed(15.0)
-        estimator.update([0.0, 1.0, forward_g], NO_RATE, DT_US)
     before = estimator.trim.variance
-    feel(estimator, 1.0)
+    estimator._p.set_variance(LEAN, radians(lean_deg) ** 2)
+    estimator._p.set_variance(SPEED, (speed_mps / GRAVITY_MPS2) ** 2)
+    feel(estimator, 0.42)  # a window, and the work on it
     return estimator.trim.variance < before
 
 
-def test_the_trim_is_measured_while_the_speed_is_certain_to_8_mps():
-    """A speed that is told a second late, while the speed changes by so much."""
-    assert trim_after(1.3)
-    assert not trim_after(2.5)
+def test_the_trim_is_measured_while_the_speed_is_certain_to_8_mps_and_the_lean_to_1_4_degrees():
+    assert trim_after(7.5, 1.0)
+    assert not trim_after(8.5, 1.0)
+    assert trim_after(7.5, 1.3)
+    assert not trim_after(7.5, 3.0)
