@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from ..calibration.ride.fit import RideFit
 
 
-@click.command()
+@click.command(short_help="The alignment of a motorcycle, from riding with bends.")
 @click.argument("log", type=PATH, metavar="LOG.csv")
 @click.option(
     "--phone",
