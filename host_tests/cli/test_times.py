@@ -3,7 +3,7 @@
 import click
 import command
 import pytest
-from kickstand_tools.cli.times import TIME
+from kickstand_tools.cli.common import TIME
 
 
 @pytest.mark.parametrize(

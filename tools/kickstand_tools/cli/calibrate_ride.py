@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .calibrate import OUT, PATH, along_axes, matrix_lines, print_lines
-from .warnings import warn
+from .common import warn
 
 if TYPE_CHECKING:
     from ..calibration.ride.fit import RideFit

@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..errors import InputError
-from .times import TIME
-from .warnings import warn
+from .common import TIME, warn
 
 if TYPE_CHECKING:
     from ..imports.importing import Imported

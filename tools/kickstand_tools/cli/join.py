@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .warnings import warn
+from .common import warn
 
 if TYPE_CHECKING:
     from ..joining.joined import Joined

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import click
 
-from .times import TIME
-from .warnings import warn
+from .common import TIME, warn
 
 _PATH = click.Path(path_type=Path)
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from kickstand.errors import Notice
 
-from .times import TIME
-from .warnings import warn
+from .common import TIME, warn
 
 if TYPE_CHECKING:
     from ..logs.reader import Source

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from ..errors import InputError
-from .warnings import warn
+from .common import warn
 
 _PATH = click.Path(path_type=Path)
 _LINES_S = 10.0  # between two lines of progress where there is no terminal for a bar

@@ -37,7 +37,7 @@ def web(out: Path | None) -> None:
         files = site.site_files()
     if out is not None:
         site.write_site(files, out)
-        click.echo(f"written: {out}, {len(files)} files: a web server has to serve them, a browser does not run them as files")
+        click.echo(f"written: {out}, {len(files)} files for a web server: opened as files they do not run")
         return
     with serve.server(files) as server:
         address = f"http://{serve.HOST}:{server.server_address[1]}/"

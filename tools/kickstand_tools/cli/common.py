@@ -1,6 +1,13 @@
-"""Times on the command line: seconds, or as the report prints them."""
+"""What several commands share: times as they are given, and notices in words on standard error."""
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
+
+if TYPE_CHECKING:
+    from kickstand.errors import Notice
 
 
 class Time(click.ParamType):
@@ -25,3 +32,11 @@ class Time(click.ParamType):
 
 
 TIME = Time()
+
+
+def warn(log: Path | str, notices: "Iterable[Notice]") -> None:
+    """A line for each notice. log: what they are about."""
+    from ..refusals import sentence
+
+    for notice in notices:
+        click.echo(f"warning: {log}: {sentence(notice)}", err=True)
