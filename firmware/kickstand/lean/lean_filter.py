@@ -51,7 +51,8 @@ class LeanFilter:
         self._x = x
         self._p = None
         self._rest = RestDetector(not self._kept)
-        self._given_speed = None
+        self._given_speed = self._told_speed = None  # the latest, until a window takes it; the one before
+        self._told_s = 0.0  # since the one before
         self._work = None
         self._pieces = 1  # of the work, in each sample
         self._sums = [0.0] * 9  # see predict()
@@ -212,9 +213,12 @@ class LeanFilter:
             yield from p.update(*measurement)
         yield from p.update(*measurements.level_road(model, x, seconds))
         lean, speed, given = x[LEAN] - self.trim.angle, x[SPEED], self._given_speed
+        self._told_s += seconds
         if given is not None:
-            self._given_speed = None
-            yield from p.update(*measurements.given_speed(given, speed, model.acceleration))
+            # By the given speeds alone: an acceleration that a wrong pitch feigns must not make them count for less.
+            acceleration = 0.0 if self._told_speed is None else (given - self._told_speed) / self._told_s
+            self._given_speed, self._told_speed, self._told_s = None, given, 0.0
+            yield from p.update(*measurements.given_speed(given, speed, acceleration))
         else:
             yield from p.update(*measurements.straight_or_usual_speed(lean, speed, model.yaw_rate, seconds))
         certain = (

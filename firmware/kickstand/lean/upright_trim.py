@@ -16,7 +16,7 @@ SIGMA_STRAIGHT = radians(1.5)  # rad: of the balance, by rider, camber and wind.
 SIGMA_LEAN_SHARE = 0.15  # of sin(lean): of a bike's force to the side in turns. Larger: turns to one side count less.
 SIGMA_TURN = 0.1  # of sin(lean): by which turns differ in it, as a rider hangs off or not. Larger: turns count less.
 SIGMA_YAW_S = 0.1  # rad per rad/s of yaw rate. Larger: turns count less.
-MAX_SIDEWAYS = 0.1  # of the force up. Larger: a bike that is pushed, or a sensor in a hand, counts as balanced.
+MAX_SIDEWAYS = 0.1  # of the force up, from what is expected. Larger: a sensor in a hand counts as balanced.
 DISTURBANCE_S = 2.0  # s: how long such a disturbance lasts. Larger: found later, steadier.
 NOISE = radians(0.01)  # rad per square root of a second. Larger: a change during the ride is followed sooner.
 
@@ -39,9 +39,10 @@ class UprightTrim:
     def update(self, sideways, lean, yaw_rate, seconds):
         """sideways: force to the left over force up while riding. lean (rad) and yaw_rate (rad/s) tell turns from
         straights. seconds: since the update before."""
-        if not -MAX_SIDEWAYS < sideways < MAX_SIDEWAYS:
-            return
         sine = sin(lean - self.angle)
+        innovation = sideways - self.angle - sine * self._lean_share
+        if not -MAX_SIDEWAYS < innovation < MAX_SIDEWAYS:
+            return
         turn = SIGMA_TURN * sine
         yaw = SIGMA_YAW_S * yaw_rate
         noise = (SIGMA_STRAIGHT**2 + turn * turn + yaw * yaw) * 2.0 * DISTURBANCE_S / seconds
@@ -50,7 +51,7 @@ class UprightTrim:
         angle_gain = self.variance + sine * self._covariance
         share_gain = self._covariance + sine * self._share_variance
         expected = angle_gain + sine * share_gain + noise
-        innovation = (sideways - self.angle - sine * self._lean_share) / expected
+        innovation /= expected
         self.angle = max(-MAX_TRIM, min(MAX_TRIM, self.angle + angle_gain * innovation))
         self._lean_share += share_gain * innovation
         self.variance -= angle_gain * angle_gain / expected
