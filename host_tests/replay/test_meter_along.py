@@ -1,17 +1,19 @@
 """The fast loop of replay, report and plot gives what the firmware's meter gives sample by sample, and LEAN.csv tells
 it to the letter."""
 
+import multiprocessing
 from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 import smoothed_rides
+from kickstand_tools.errors import InputError
+from kickstand_tools.logs import reader
 from kickstand_tools.logs.csv_lines import write_log
 from kickstand_tools.logs.reader import read_blocks, read_log
-from kickstand_tools.replay import replay_engine
+from kickstand_tools.replay import replay, replay_engine
 from kickstand_tools.replay.meter_along import MeterAlong
-from kickstand_tools.replay.replay import replay_to_csv
 
 BY_NUMPY = ("lean_formula_deg", "static_lean_deg")  # its arc functions may differ in the last digit of a double
 
@@ -61,7 +63,7 @@ def test_it_is_the_meter_sample_by_sample(known):
 def test_the_file_has_the_values_as_python_writes_them(known, tmp_path):
     log, calibration = known
     write_log(tmp_path / "log.csv", log)
-    count, _ = replay_to_csv(tmp_path / "log.csv", calibration, "cpython", tmp_path / "LEAN.csv")
+    count, _ = replay.replay_to_csv(tmp_path / "log.csv", calibration, "cpython", tmp_path / "LEAN.csv")
     want = by_steps(read_log(tmp_path / "log.csv"), calibration)
     want[want[:, -1] == replay_engine.NOT_SHOWN, -1] = np.nan
     header, *lines = (tmp_path / "LEAN.csv").read_text().splitlines()
@@ -70,3 +72,24 @@ def test_the_file_has_the_values_as_python_writes_them(known, tmp_path):
     rows = zip(times, want.tolist(), strict=True)
     assert lines == [",".join((time, *(f"{value:.5f}" for value in row))) for time, row in rows]
     assert count == len(lines)
+
+
+def test_two_processes_write_the_same(known, tmp_path, monkeypatch):
+    """As for a long log, with more blocks than are read ahead; and a second process that ends is told of."""
+    log, calibration = known
+    write_log(tmp_path / "log.csv", log)
+    monkeypatch.setattr(reader, "BLOCK_BYTES", 50_000)
+    for name, long_bytes in (("one.csv", 1 << 30), ("two.csv", 1)):
+        monkeypatch.setattr(replay, "_LONG_BYTES", long_bytes)
+        replay.replay_to_csv(tmp_path / "log.csv", calibration, "cpython", tmp_path / name)
+    assert (tmp_path / "two.csv").read_bytes() == (tmp_path / "one.csv").read_bytes()
+
+    def end(columns, pool=None):
+        for process in multiprocessing.active_children():
+            process.terminate()
+            process.join()
+
+    with pytest.raises(InputError, match="second process of replay has ended"):
+        replay.replay_to_csv(tmp_path / "log.csv", calibration, "cpython", tmp_path / "two.csv", progress=end)
+    assert (tmp_path / "two.csv").read_bytes() == (tmp_path / "one.csv").read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["log.csv", "one.csv", "two.csv"]

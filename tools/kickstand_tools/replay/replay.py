@@ -17,13 +17,15 @@ from ..errors import InputError
 from ..logs.block import Block
 from ..logs.csv_lines import joined_cells, number_cells, text_cells, write_lines
 from ..logs.reader import Source, read_blocks, read_twice
-from ..logs.source import Progress
+from ..logs.source import Progress, total_bytes
 from ..logs.table import Array, Table
-from . import replay_engine
+from . import replay_engine, second_process
 from .meter_along import MeterAlong
 from .mount_check import MountCheck
 
 _CHUNK = 500  # samples between two calls of progress while an emulated Pico works
+
+_LONG_BYTES = 20 << 20  # of the file: a log of some seconds' work, for which a second process is worth its start
 
 _SIGMA = replay_engine.COLUMNS.index("lean_sigma_deg")
 
@@ -82,13 +84,16 @@ def replay_to_csv(
 ) -> tuple[int, list[Notice]]:
     """Write LEAN.csv: the log's own times, then replay_engine.COLUMNS. Returns the number of samples and the notices.
 
-    Memory does not grow with the log, except on the emulated Pico, which is too slow for a long one. Raises InputError.
+    A long log takes two processes. Memory does not grow with it, except on the emulated Pico, which is too slow for a
+    long one. Raises InputError.
     """
     count, notices = 0, []
+    # for the command alone: a program that calls replay() may not be one that can be started once more
+    run = "two processes" if engine == "cpython" and total_bytes(log) > _LONG_BYTES else engine
 
     def lines() -> Iterator[bytes]:
         nonlocal count
-        for block, results in replay_blocks(log, calibration, engine, progress, notices):
+        for block, results in replay_blocks(log, calibration, run, progress, notices):
             count += len(results)
             yield joined_cells([text_cells(block.time_text), *(number_cells(column, 5) for column in results.T)])
 
@@ -130,6 +135,12 @@ def _cpython(
     meter = MeterAlong(calibration)
     for block in read_blocks(log, 2, progress, notices):
         yield block, meter.columns(block.believed)
+
+
+def _two_processes(
+    log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
+) -> Iterator[Replayed]:
+    return second_process.columns_of(read_blocks(log, 2, progress, notices), calibration)
 
 
 def _micropython(
@@ -182,7 +193,7 @@ def _rp2040(
         yield block, _table(results.read(wanted))
 
 
-_RUN = {"cpython": _cpython, "micropython": _micropython, "rp2040": _rp2040}
+_RUN = {"cpython": _cpython, "two processes": _two_processes, "micropython": _micropython, "rp2040": _rp2040}
 
 
 def _records(blocks: Iterable[Block], calibration: CalibrationFile) -> Iterator[bytes]:
