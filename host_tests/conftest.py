@@ -3,6 +3,7 @@
 import functools
 import gc
 import importlib.util
+import itertools
 import sys
 from pathlib import Path
 
@@ -50,9 +51,22 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: (item.get_closest_marker("long") is None, item.get_closest_marker("chip") is None))
 
 
+TESTS_PER_COLLECTION = 200
+_tests = itertools.count(1)
+
+
 def pytest_collection_finish() -> None:
-    """What is there by now stays. The app collects often, which takes CPython 0.2 s for all that the tests import."""
+    """What the tests have imported stays."""
     gc.collect()
+    gc.freeze()
+
+
+def pytest_runtest_setup() -> None:
+    """The app collects garbage often. Of all that earlier tests have left that takes CPython half a second, so what is
+    there before a test is not looked through; now and then it is, and what is garbage of it goes."""
+    if next(_tests) % TESTS_PER_COLLECTION == 0:
+        gc.unfreeze()
+        gc.collect()
     gc.freeze()
 
 
