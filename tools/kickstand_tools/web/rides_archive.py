@@ -16,7 +16,7 @@ MODULES = (
 )
 _NUMPY = "lib/python3.12/site-packages/"  # in the package of conda
 # A third of numpy, which is for its developers, for other compilers, and for random numbers
-_LEFT_OUT = ("/tests/", "/f2py/", "/random/", "/distutils/", "/testing/", "/include/", "/_pyinstaller/", "_tests.c")
+_LEFT_OUT = ("/tests/", "/f2py/", "/random/", "/distutils/", "/testing/", "/include/", "/_pyinstaller/")
 _LICENCES = "info/licenses/"
 
 
