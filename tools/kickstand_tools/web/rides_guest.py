@@ -4,6 +4,7 @@ page/rides/worker.mjs runs it, in the folder where the files are that were given
 Each function returns JSON: what its docstring says, or {"refused": why}, the line that the command would say.
 """
 
+import contextlib
 import functools
 import json
 from dataclasses import asdict
@@ -18,11 +19,14 @@ from ..analysis.plot.page import page
 from ..calibration.file import calibration_beside, calibration_path, write_calibration
 from ..calibration.ride.fit import fit_ride
 from ..errors import InputError
+from ..imports.importing import app_of
+from ..logs.reader import check_first_line
 from ..refusals import sentence
 from ..smoothing.smooth import smooth_to_csv
 
 MADE = Path("/made")  # what is offered for download; the folder of the files that were given cannot be written to
 PLOTLY = '<script src="./plotly/plotly.min.js"></script>'  # the page of a ride loads it from the site
+TOO_LONG = "this ride is too long for the memory of a browser: kickstand cut takes a part of it"
 
 
 def told(function):
@@ -35,14 +39,14 @@ def told(function):
         except InputError as error:
             return json.dumps({"refused": str(error)})
         except MemoryError:
-            return json.dumps({"refused": "this ride is too long for the memory of a browser: kickstand cut shortens it"})
+            return json.dumps({"refused": TOO_LONG})
 
     return as_json
 
 
 @told
 def rides():
-    """[{"log": name, "calibration": name or ""}, ...]: the logs, each with what lies beside it or the only one there."""
+    """[{"log": name, "calibration": name or ""}, ...]: the logs, each with the one beside it or the only one there."""
     names = sorted(path.name for path in Path().iterdir())
     calibrations = [name for name in names if name.lower().endswith(".json")]
     logs = [name for name in names if name not in calibrations]
@@ -54,10 +58,18 @@ def rides():
 
 
 @told
+def check(log):
+    """{}: it is a log, as far as its first line tells."""
+    _check(log)
+    return {}
+
+
+@told
 def look(log, calibration, tell):
-    """What `report` says and `plot` draws of a log: {"words": report.Words, "json": report.as_data(), "warnings": [...],
-    "page": HTML, "stem": the name without suffixes}. calibration: its file, "" for the one beside the log. tell(done,
-    total): the progress."""
+    """What `report` says and `plot` draws of a log: {"words": report.Words, "json": report.as_data(), "warnings":
+    [...], "page": HTML, "stem": the name without suffixes}. calibration: its file, "" for the one beside the log.
+    tell(done, total): the progress."""
+    _check(log)
     ride = open_ride(Path(log), _calibration(log, calibration), smoothed=True)
     seen = overview(ride, tell)
     notices = [*seen.notices, *([seen.exchanged] if seen.exchanged else [])]
@@ -92,6 +104,19 @@ def align(log, tell):
         "warnings": [sentence(notice) for notice in found.notices],
         **{name: round(getattr(found, name), 1) for name in ("roll_deg", "pitch_deg", "yaw_deg")},
     }
+
+
+def _check(log):
+    """check_first_line(), which says whose the recording is if it is that of an app."""
+    try:
+        check_first_line(Path(log))
+    except InputError:
+        app = ""
+        with contextlib.suppress(InputError):  # the reason above says more
+            app = app_of(log)
+        if app:
+            raise InputError(f"{log} is a recording of {app}: kickstand import makes a log of it") from None
+        raise
 
 
 def _calibration(log, calibration):

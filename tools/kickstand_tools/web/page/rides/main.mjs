@@ -31,8 +31,7 @@ const isCalibration = (file) => file.name.toLowerCase().endsWith(".json");
 
 async function look(ride) {
   if (!ride.calibration) {
-    say(`${ride.log} has no calibration with it. Add its .cal.json, or let the ride tell how the sensor sits: that takes some minutes of riding with bends to both sides.`, true);
-    byId("align").hidden = false;
+    await work(`Looking at ${ride.log} …`, () => tools.call("check", ride.log), () => ask(ride));
     return;
   }
   await work(`Looking at ${ride.log} …`, () => tools.call("look", ride.log, ride.calibration), (found) => {
@@ -42,6 +41,11 @@ async function look(ride) {
     byId("save-calibration").hidden = !ride.found;
     say(ride.found ?? "");
   });
+}
+
+function ask(ride) {
+  say(`${ride.log} has no calibration with it. Add its .cal.json, or let the ride tell how the sensor sits: that takes some minutes of riding with bends to both sides.`, true);
+  byId("align").hidden = false;
 }
 
 async function align() {

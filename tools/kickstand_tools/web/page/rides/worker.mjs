@@ -6,6 +6,7 @@
 import { loadPython } from "../python.mjs";
 
 const GIVEN = "/given";
+const QUICK = ["rides", "check"]; // tell no progress
 const OFTEN_MS = 100; // between two messages of progress
 
 let guest;
@@ -37,7 +38,7 @@ function give(files) {
 }
 
 function call([name, ...given]) {
-  const said = JSON.parse(guest[name](...given, ...(name === "rides" ? [] : [tell])));
+  const said = JSON.parse(guest[name](...given, ...(QUICK.includes(name) ? [] : [tell])));
   const made = said.path && python.FS.readFile(said.path);
   postMessage({ said, made }, made ? [made.buffer] : []);
 }
