@@ -18,7 +18,6 @@ from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, senso
 from .files import Piece, read_pieces
 from .join import GAP_NS, Joined, join
 from .recording import Array, Recording, Taken
-from .sheets import check_pandas
 from .units import ACCELERATIONS, SPEEDS, factor, unit
 
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
@@ -77,7 +76,6 @@ def import_recording(
     >>> round(found.rate_hz), found.log.accel_g[0].round(3).tolist(), found.log.gyro_dps[0].round(2).tolist()
     (100, [0.0, 1.0, 0.0], [0.0, 0.0, 5.73])
     """
-    check_pandas()
     name = str(source)
     recording = _recording(read_pieces(source), name, columns, dict(units or {}))
     joined = join(recording, name)
