@@ -17,6 +17,7 @@ from kickstand_tools.web import rides_guest
 from rider import Rider
 from test_page_looks import LAPTOP, PHONE
 
+PHONE_MOUNTED = analysis_rides.CALIBRATION | {"vehicle_from_sensor": app_exports.PHONE.tolist()}
 WAIT_MS = 120_000  # a busy machine starts Python late
 DROP = """([selector, files]) => {
   const data = new DataTransfer();
@@ -155,6 +156,22 @@ def test_a_log_alone_asks_for_its_calibration(page, ride, calibration):
     assert page.page.is_visible("#report")
 
 
+def test_the_export_of_a_phone_becomes_a_log(page, tmp_path):
+    """As `import` makes it; with a calibration it is a ride."""
+    path = app_exports.into(tmp_path / "phone.zip", app_exports.phyphox(app_exports.riding().every(4)))
+    assert "phone.zip has no calibration with it" in page.give(path)
+    (tmp_path / "phone.cal.json").write_text(json.dumps(PHONE_MOUNTED))
+    assert page.give(tmp_path / "phone.cal.json") == ""
+    works("import", path, "--out", tmp_path / "log.csv")
+    was, now = tmp_path / "log.csv", tmp_path / "now.csv"
+    now.write_bytes(page.saved("#save-log"))
+    for name in analysis_rides.table(was).dtype.names:
+        assert near(analysis_rides.table(now)[name], analysis_rides.table(was)[name], 2e-6), name
+    told = json.loads(works("report", was, "--calibration", tmp_path / "phone.cal.json", "--json").out)
+    shown = json.loads(page.saved("#save-json"))
+    assert_near({**shown, "ride": ""}, {**told, "ride": ""})
+
+
 def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):
     files = []
     for name in ("A", "B"):
@@ -175,15 +192,12 @@ def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):
     [
         ("picture.png", b"\x89PNG\r\n\x1a\n\x00\xff\xfe", "picture.png, line 1: not text: give a log as CSV"),
         ("table.csv", b"lat,lon\n1,2\n", "table.csv, line 1: no column t_s, ax_g"),
-        ("phone.zip", None, "phone.zip is a recording of phyphox: kickstand import makes a log of it."),
+        ("damaged.zip", b"PK\x03\x04\xff" + bytes(40), "damaged.zip is a zip: if an app has exported it"),
     ],
 )
 def test_what_is_no_ride_is_told_in_one_line(page, tmp_path, name, content, words):
     path = tmp_path / name
-    if content is None:
-        app_exports.into(path, app_exports.phyphox(app_exports.riding().every(4)))
-    else:
-        path.write_bytes(content)
+    path.write_bytes(content)
     said = page.give(path)
     assert words in said and "\n" not in said
     assert page.page.is_hidden("#report") and page.page.is_hidden("#charts")

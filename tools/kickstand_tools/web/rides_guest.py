@@ -1,10 +1,9 @@
-"""`kickstand report`, `plot`, `smooth` and `calibrate ride` in the browser: their own code on CPython for WebAssembly.
-page/rides/worker.mjs runs it, in the folder where the files are that were given to the page.
+"""`kickstand report`, `plot`, `smooth`, `import` and `calibrate ride` in the browser: their own code on CPython for
+WebAssembly. page/rides/worker.mjs runs it, in a folder of its own.
 
 Each function returns JSON: what its docstring says, or {"refused": why}, the line that the command would say.
 """
 
-import contextlib
 import functools
 import json
 from dataclasses import asdict
@@ -19,12 +18,11 @@ from ..analysis.plot.page import page
 from ..calibration.file import calibration_beside, calibration_path, write_calibration
 from ..calibration.ride.fit import fit_ride
 from ..errors import InputError
-from ..imports.importing import app_of
+from ..imports.importing import app_of, import_recording, write_imported
 from ..logs.reader import check_first_line
 from ..refusals import sentence
 from ..smoothing.smooth import smooth_to_csv
 
-MADE = Path("/made")  # what is offered for download; the folder of the files that were given cannot be written to
 PLOTLY = '<script src="./plotly/plotly.min.js"></script>'  # the page of a ride loads it from the site
 TOO_LONG = "this ride is too long for the memory of a browser: kickstand cut takes a part of it"
 
@@ -45,9 +43,14 @@ def told(function):
 
 
 @told
-def rides():
-    """[{"log": name, "calibration": name or ""}, ...]: the logs, each with the one beside it or the only one there."""
-    names = sorted(path.name for path in Path().iterdir())
+def rides(given):
+    """[{"log": name, "calibration": name or ""}, ...]: the logs in the folder `given`, each with the calibration beside
+    it or the only one there. The files are linked to from here, where others can be made beside them."""
+    for old in Path().iterdir():
+        old.unlink()
+    names = sorted(path.name for path in Path(given).iterdir())
+    for name in names:
+        Path(name).symlink_to(Path(given, name))
     calibrations = [name for name in names if name.lower().endswith(".json")]
     logs = [name for name in names if name not in calibrations]
     if not logs:
@@ -58,10 +61,20 @@ def rides():
 
 
 @told
-def check(log):
-    """{}: it is a log, as far as its first line tells."""
-    _check(log)
-    return {}
+def take(log, _tell):
+    """{"log": log}; for a recording of an app {"log": the one that `import` makes of it, "path": likewise, "app": whose
+    it is, "warnings": [...]}."""
+    try:
+        check_first_line(Path(log))
+        return {"log": log}
+    except InputError:
+        if not _app(log):
+            raise
+    found = import_recording(log)
+    out = f"{log.partition('.')[0]}.log.csv"
+    write_imported(out, found)
+    warnings = [sentence(notice) for notice in found.notices]
+    return {"log": out, "path": out, "app": found.app, "warnings": warnings}
 
 
 @told
@@ -69,7 +82,6 @@ def look(log, calibration, tell):
     """What `report` says and `plot` draws of a log: {"words": report.Words, "json": report.as_data(), "warnings":
     [...], "page": HTML, "stem": the name without suffixes}. calibration: its file, "" for the one beside the log.
     tell(done, total): the progress."""
-    _check(log)
     ride = open_ride(Path(log), _calibration(log, calibration), smoothed=True)
     seen = overview(ride, tell)
     notices = [*seen.notices, *([seen.exchanged] if seen.exchanged else [])]
@@ -85,8 +97,7 @@ def look(log, calibration, tell):
 @told
 def smooth(log, calibration, tell):
     """{"path": of LEAN.csv as `smooth` writes it}."""
-    MADE.mkdir(exist_ok=True)
-    out = MADE / "lean.csv"
+    out = Path(f"{log}.lean.csv")
     ride = open_ride(Path(log), _calibration(log, calibration))
     smooth_to_csv(Path(log), ride.calibration, out, tell)
     return {"path": str(out)}
@@ -95,9 +106,8 @@ def smooth(log, calibration, tell):
 @told
 def align(log, tell):
     """{"path": of the calibration that `calibrate ride` finds, "roll_deg", "pitch_deg", "yaw_deg": how well}."""
-    MADE.mkdir(exist_ok=True)
     found = fit_ride(Path(log), progress=tell)
-    out = MADE / calibration_path(Path(log)).name
+    out = calibration_path(Path(log))
     write_calibration(out, found.calibration)
     return {
         "path": str(out),
@@ -106,17 +116,12 @@ def align(log, tell):
     }
 
 
-def _check(log):
-    """check_first_line(), which says whose the recording is if it is that of an app."""
+def _app(log):
+    """app_of(), "" too for what cannot be read."""
     try:
-        check_first_line(Path(log))
+        return app_of(log)
     except InputError:
-        app = ""
-        with contextlib.suppress(InputError):  # the reason above says more
-            app = app_of(log)
-        if app:
-            raise InputError(f"{log} is a recording of {app}: kickstand import makes a log of it") from None
-        raise
+        return ""
 
 
 def _calibration(log, calibration):
