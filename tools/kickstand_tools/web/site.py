@@ -43,7 +43,7 @@ def site_files() -> dict[str, bytes]:
     ['bike.mjs', 'board.mjs']
     """
     files = npm_packages.find()
-    files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in sorted(PAGE.rglob("*")) if path.is_file()}
+    files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in PAGE.rglob("*") if path.is_file()}
     files["python.json"] = json.dumps(python_files()).encode()
     files["install.zip"] = install_archive.archive()
     files["font.json"] = json.dumps({code: list(rows) for code, rows in ROM.items()}).encode()
