@@ -43,6 +43,7 @@ class SerialLine:
     def __init__(self, rider, device):
         self._rider, self._device = rider, device
         self._said = bytearray()
+        self.said = bytearray()  # all that the board has said
         self.connected = True
         self.sent = 0
         self.cut_after: int | None = None
@@ -52,6 +53,7 @@ class SerialLine:
 
     def _hear(self, data):
         self._said += data
+        self.said += data
         self._device.chip.stop()
 
     def _says(self):

@@ -38,10 +38,13 @@ CHANGED = "the board's calibration has changed: the log ends here"
 class LiveReading:
     """A block of half a second. aligned: the board's sensor is.  moments: (s since the recording began, lean in
     degrees > 0 to the right, specific force forward in g) at each turn of the board's loop; the lean is None where it
-    is not known well enough to be shown.  rate_hz: turns a second.  seconds: since the recording began."""
+    is not known well enough to be shown.  max_left_deg, max_right_deg: as on the display, since the recording began, 0
+    before there is one.  rate_hz: turns a second.  seconds: since the recording began."""
 
     aligned: bool
     moments: list[tuple[float, float | None, float]]
+    max_left_deg: float
+    max_right_deg: float
     rate_hz: float
     seconds: float
 
@@ -100,7 +103,8 @@ class Recording:
             self.seconds = (before - self.first.time_us) / 1e6
             if self._live:
                 rate_hz = len(block.turns) * 1e6 / max(1, before - block.time_us)
-                self._live(LiveReading(aligned, moments, rate_hz, self.seconds))
+                most = (meter.max_left_deg, meter.max_right_deg) if aligned else (0.0, 0.0)
+                self._live(LiveReading(aligned, moments, *most, rate_hz, self.seconds))
         if self.first is None:
             raise InputError("; ".join(["nothing was recorded: does the display show readings?", *notes]))
         if missing:
