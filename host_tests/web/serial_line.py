@@ -36,20 +36,24 @@ Object.defineProperty(navigator, "serial", { value: { requestPort: async () => l
 
 
 class SerialLine:
-    """device: an emulator.pico.Pico.  cut_after: so many bytes to the board the cable is pulled; None for never."""
+    """rider: at a page that was given FAKE.  said: all that the board has said.  cut_after: so many bytes to the board
+    the cable is pulled; None for never."""
 
     STEP_S = 0.04  # of emulated time at most, until the page may speak again
 
-    def __init__(self, rider, device):
-        self._rider, self._device = rider, device
-        self._said = bytearray()
-        self.said = bytearray()  # all that the board has said
+    def __init__(self, rider):
+        self.rider = rider
+        rider.page.expose_function("boardSays", self._says)
+        rider.page.expose_function("boardHears", self._hears)
+
+    def plug_in(self, device):
+        """device: an emulator.pico.Pico, or a RawPrompt."""
+        self._device = device
+        self._said, self.said = bytearray(), bytearray()
         self.connected = True
         self.sent = 0
         self.cut_after: int | None = None
         device.heard = self._hear
-        rider.page.expose_function("boardSays", self._says)
-        rider.page.expose_function("boardHears", self._hears)
 
     def _hear(self, data):
         self._said += data
@@ -75,8 +79,8 @@ class SerialLine:
 
     def install(self):
         """Click, and what the page says in the end."""
-        page = self._rider.page
+        page = self.rider.page
         self.connected, self.sent = True, 0
         page.click("#install")
         page.wait_for_function("!document.querySelector('#install').disabled", timeout=600_000)
-        return self._rider.text("#install-said")
+        return self.rider.text("#install-said")

@@ -21,8 +21,9 @@ def rider(chromium, address):
 
 
 def plugged_in(rider, device):
-    line = SerialLine(rider, device)
+    line = SerialLine(rider)
     rider.page.reload()
+    line.plug_in(device)
     device.run(0.5)
     return line
 

@@ -5,7 +5,7 @@ from rider import Rider
 
 PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
 LAPTOP = {"viewport": {"width": 1440, "height": 900}}
-PAGES = {"": "Try", "install.html": "Install"}
+PAGES = {"": "Try", "install.html": "Install", "live.html": "Live"}
 
 
 @pytest.mark.parametrize("name", PAGES)

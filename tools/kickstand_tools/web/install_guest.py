@@ -1,5 +1,5 @@
-"""`kickstand flash` in the browser: its own code on CPython for WebAssembly. page/install/install.mjs runs it, in a fresh
-Python for each board.
+"""`kickstand flash` in the browser: its own code on CPython for WebAssembly. page/install/install.mjs runs it, in a
+fresh Python for each board.
 """
 
 import json

@@ -1,5 +1,5 @@
-"""The browser's serial port for mpremote, on CPython for WebAssembly: in place of pyserial's, and of time.sleep(), which
-would stop the whole page. While this waits the page has the control.
+"""The browser's serial port for mpremote, on CPython for WebAssembly: in place of pyserial's, and of time.sleep(),
+which would stop the whole page. While this waits the page has the control.
 """
 
 import sys
@@ -8,7 +8,7 @@ import types
 
 from pyodide.ffi import run_sync  # waits for what JavaScript promises
 
-ROOT = "/kickstand"  # where page/cable/cable.mjs unpacks install_archive.archive()
+ROOT = "/packages"  # where page/python.mjs unpacks install_archive.archive()
 _POLL_S = 0.002
 _GONE = "nothing comes any more"
 

@@ -2,7 +2,6 @@
 // WebAssembly, which is fetched for this only.
 
 const BAUD = 115200;
-const ROOT = "/kickstand"; // as in web/serial_port.py
 const BACK_MS = 10_000; // until a board that has restarted is there again, at most
 const AGAIN_MS = 300;
 
@@ -91,15 +90,9 @@ export class SerialLine {
 
 /** A new Python with the tools in it. withNumpy: those that write rides need it. */
 export async function python(withNumpy = false) {
-  const { loadPyodide } = await import("../pyodide/pyodide.mjs");
-  const archives = ["./install.zip", ...(withNumpy ? ["./numpy/numpy.zip"] : [])].map((name) =>
-    fetch(name).then((answer) => answer.arrayBuffer()),
-  );
-  const made = await loadPyodide();
-  const [tools, numpy] = await Promise.all(archives);
-  made.unpackArchive(tools, "zip", { extractDir: ROOT });
-  if (numpy) made.unpackArchive(numpy, "zip", { extractDir: `${ROOT}/tools` });
-  made.runPython(`import sys; sys.path.insert(0, "${ROOT}/tools")`);
+  const { PACKAGES, loadPython } = await import("../python.mjs");
+  const made = await loadPython(["install.zip", ...(withNumpy ? ["numpy/numpy.zip"] : [])]);
+  made.runPython(`import sys; sys.path.insert(0, "${PACKAGES}/tools")`);
   return made;
 }
 
