@@ -4,11 +4,18 @@ Emulated time passes only while the page listens.
 """
 
 import base64
+import json
+
+from raw_prompt import RawPrompt
 
 # Takes the place of navigator.serial. boardSays() and boardHears() are Python's.
 FAKE = """
+window.boardAnswersAtOnce = false;
+// An imagined board has started again at once
+const later = setTimeout;
+window.setTimeout = (done, ms, ...rest) => later(done, boardAnswersAtOnce && ms === 2000 ? 0 : ms, ...rest);
 const line = {
-  getInfo: () => ({}),
+  getInfo: () => ({ usbVendorId: boardAnswersAtOnce ? 1 : undefined }),
   setSignals: async () => {},
   async open() {
     let going = true;
@@ -47,7 +54,8 @@ class SerialLine:
         rider.page.expose_function("boardHears", self._hears)
 
     def plug_in(self, device):
-        """device: an emulator.pico.Pico, or a RawPrompt."""
+        """device: an emulator.pico.Pico, which is given time, or a RawPrompt."""
+        self.rider.page.evaluate(f"boardAnswersAtOnce = {json.dumps(isinstance(device, RawPrompt))}")
         self._device = device
         self._said, self.said = bytearray(), bytearray()
         self.connected = True
@@ -77,10 +85,16 @@ class SerialLine:
             self._device.console.send(data)
         return self.connected
 
+    def look(self):
+        """Click, and what the page says of the board."""
+        self.rider.page.click("#look")
+        return self._said_by("#look")
+
     def install(self):
         """Click, and what the page says in the end."""
-        page = self.rider.page
-        self.connected, self.sent = True, 0
-        page.click("#install")
-        page.wait_for_function("!document.querySelector('#install').disabled", timeout=600_000)
+        self.rider.page.click("#install")
+        return self._said_by("#look")
+
+    def _said_by(self, button):
+        self.rider.page.wait_for_selector(f"{button}:enabled", timeout=600_000)
         return self.rider.text("#install-said")

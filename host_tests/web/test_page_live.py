@@ -1,21 +1,16 @@
 """The page listens to boards and fetches their rides, with the code of `kickstand record` and `pull`."""
 
-import base64
 import gzip
-import io
 import types
 
 import pytest
 import ride_writer
 import serial_line
-from emulated import calibrated, firmware, leaning, pico
 from fake_board import FakeBoard
+from kept import recorded, saved
 from kickstand.rides import ride_paths
-from kickstand_tools.calibration.file import write_calibration
 from kickstand_tools.deploy import connection
-from kickstand_tools.rides import block_reader, ride_log
 from kickstand_tools.rides.pull import pull
-from kickstand_tools.rides.stream import Recording
 from raw_prompt import RawPrompt
 from rider import Rider
 from serial_line import SerialLine
@@ -44,49 +39,6 @@ def rider(line):
 def board(tmp_path):
     (tmp_path / "flash" / "rides").mkdir(parents=True)
     return FakeBoard(tmp_path / "flash")
-
-
-def saved(rider, tmp_path):
-    """{name: content} of all that is offered, saved by clicks."""
-    found = {}
-    for link in rider.page.locator("#files a").all():
-        with rider.page.expect_download() as download:
-            link.click()
-        path = tmp_path / download.value.suggested_filename
-        download.value.save_as(path)
-        found[path.name] = path.read_bytes()
-    return found
-
-
-def recorded(blocks):
-    """[log, calibration] that `kickstand record` makes of these blocks."""
-    log, calibration = io.StringIO(), io.StringIO()
-    recording = Recording()
-    recording.write(log, iter(map(block_reader.parse, blocks)), [])
-    assert recording.first
-    write_calibration(calibration, ride_log.calibration(recording.first))
-    return [log.getvalue().encode(), calibration.getvalue().encode()]
-
-
-@pytest.mark.long
-@pytest.mark.chip
-def test_the_lean_of_a_board_live(line, rider, tmp_path):
-    """Within a degree of what its own display shows, and kept as the same log that `kickstand record` writes."""
-    with pico(leaning(20.0), {**firmware(), **calibrated()}) as device:
-        line.plug_in(device)
-        device.run(0.5)
-        rider.page.click("#start")
-        rider.page.wait_for_function("document.querySelector('#lean').textContent === '20°'", timeout=300_000)
-        assert rider.text("#side") == "right"
-        assert "20° right" in device.lcd()[0]
-        rider.page.click("#stop")
-        rider.page.wait_for_selector("#files li", timeout=120_000)
-    assert rider.text("#live-said") == "Stopped."
-    last = line.said.rindex(b".\r\n") + 3
-    begun = line.said.rindex(b"\x04", 0, line.said.index(b"\n.\r\n")) + 1
-    blocks = [base64.b64decode(block.replace(b"\r\n", b"")) for block in line.said[begun:last].split(b".\r\n")[:-1]]
-    assert len(blocks) > 1
-    assert list(saved(rider, tmp_path).values()) == recorded(blocks)
 
 
 def test_a_cable_that_is_pulled_leaves_the_log(line, rider, board, tmp_path):

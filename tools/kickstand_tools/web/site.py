@@ -24,7 +24,7 @@ MODULES = (
     "web/device.py",
 )
 # Large, and only for those who have a board or a ride: fetched when they ask for it
-LATER = ("install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip")
+LATER = ("esptool/", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip")
 _NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first by itself, the second as "./"
 _LISTED = "__FILES__", "__VERSION__"  # in service_worker.js
 
