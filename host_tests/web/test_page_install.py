@@ -85,6 +85,17 @@ def test_what_a_rider_has_set_is_shown_and_stays(line, board):
     assert board.path("config.py").read_text() == "SIDE = 'right'  # mine\nDLPF = 0x4\nRECORD = True\n"
 
 
+def test_each_board_has_usual_pins_of_its_own(line, board):
+    """After a Pico, by which the fields above were filled."""
+    other(board, _machine="Generic ESP32 module with ESP32")
+    board.modules["sys"].platform = "esp32"
+    line.plug_in(RawPrompt(board))
+    line.look()
+    assert line.rider.page.get_attribute("[name=BUTTON_PIN]", "placeholder") == "4"
+    choose(line, "BUTTON_PIN", "7")
+    assert "no pin of the chip" in line.rider.text("#fault-BUTTON_PIN")
+
+
 def test_a_config_that_is_more_than_settings_is_left_to_the_rider(line, board):
     own = "import sys\nRECORD = sys.platform == 'rp2'\n"
     board.path("config.py").write_text(own)

@@ -1,9 +1,10 @@
-"""`kickstand flash` in the browser: its own code on CPython for WebAssembly. page/install/install.mjs runs it, in a
-fresh Python for each board. What goes to it is JSON.
+"""`kickstand flash` in the browser: its own code on CPython for WebAssembly. page/install/install.mjs runs it. What
+goes to it is JSON.
 """
 
 import json
 import re
+import sys
 from pathlib import Path
 
 from .serial_port import ROOT, take_place_of_pyserial
@@ -43,6 +44,8 @@ class Installation:
             return json.dumps({"refused": str(error)})
         self._path = _config()
         self._template = self._path.read_text(encoding="utf-8")
+        for module in [module for module in sys.modules if module.startswith("kickstand.")]:
+            del sys.modules[module]  # of a board before: the firmware asks what it runs on as it is imported
         settings, self._by_hand = {}, None
         try:
             settings = config_text.values(self._own or "")

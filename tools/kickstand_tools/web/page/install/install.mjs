@@ -8,6 +8,7 @@ import { Fields } from "./fields.mjs";
 
 const byId = (id) => document.getElementById(id);
 const fields = new Fields(byId("fields"), check);
+let loaded; // the tools, once for all
 let board = null; // {port, guest}: an Installation of install_guest.py
 let byHand = null;
 
@@ -24,7 +25,7 @@ async function look() {
   atWork(true);
   byId("config").hidden = true;
   tell("Loading the tools …", 0);
-  const tools = await python(); // a new one: one that has posed as a board cannot pose as another
+  const tools = await (loaded ??= python());
   const guest = tools.pyimport("kickstand_tools.web.install_guest").Installation();
   const said = await overCable(port, tell, (line, name) => {
     tell("Asking the board …", 0);
