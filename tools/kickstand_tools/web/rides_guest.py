@@ -1,5 +1,5 @@
-"""`kickstand report`, `plot`, `smooth` and `calibrate ride` in the browser: their own code on CPython for WebAssembly.
-page/rides/worker.mjs runs it, in the folder where the files are that were given to the page.
+"""`kickstand report`, `plot`, `smooth`, `import` and `calibrate ride` in the browser: their own code on CPython for
+WebAssembly. page/rides/worker.mjs runs it, in a folder of its own.
 
 Each function returns JSON: what its docstring says, or {"refused": why}, the line that the command would say.
 """
@@ -18,11 +18,13 @@ from ..analysis.plot.page import page
 from ..calibration.file import calibration_beside, calibration_path, write_calibration
 from ..calibration.ride.fit import fit_ride
 from ..errors import InputError
+from ..imports.importing import app_of, import_recording, write_imported
+from ..logs.reader import check_first_line
 from ..refusals import sentence
 from ..smoothing.smooth import smooth_to_csv
 
-MADE = Path("/made")  # what is offered for download; the folder of the files that were given cannot be written to
 PLOTLY = '<script src="./plotly/plotly.min.js"></script>'  # the page of a ride loads it from the site
+TOO_LONG = "this ride is too long for the memory of a browser: kickstand cut takes a part of it"
 
 
 def told(function):
@@ -35,15 +37,20 @@ def told(function):
         except InputError as error:
             return json.dumps({"refused": str(error)})
         except MemoryError:
-            return json.dumps({"refused": "this ride is too long for the memory of a browser: kickstand cut shortens it"})
+            return json.dumps({"refused": TOO_LONG})
 
     return as_json
 
 
 @told
-def rides():
-    """[{"log": name, "calibration": name or ""}, ...]: the logs, each with what lies beside it or the only one there."""
-    names = sorted(path.name for path in Path().iterdir())
+def rides(given):
+    """[{"log": name, "calibration": name or ""}, ...]: the logs in the folder `given`, each with the calibration beside
+    it or the only one there. The files are linked to from here, where others can be made beside them."""
+    for old in Path().iterdir():
+        old.unlink()
+    names = sorted(path.name for path in Path(given).iterdir())
+    for name in names:
+        Path(name).symlink_to(Path(given, name))
     calibrations = [name for name in names if name.lower().endswith(".json")]
     logs = [name for name in names if name not in calibrations]
     if not logs:
@@ -54,10 +61,27 @@ def rides():
 
 
 @told
+def take(log, _tell):
+    """{"log": log}; for a recording of an app {"log": the one that `import` makes of it, "path": likewise, "app": whose
+    it is, "warnings": [...]}."""
+    try:
+        check_first_line(Path(log))
+        return {"log": log}
+    except InputError:
+        if not _app(log):
+            raise
+    found = import_recording(log)
+    out = f"{log.partition('.')[0]}.log.csv"
+    write_imported(out, found)
+    warnings = [sentence(notice) for notice in found.notices]
+    return {"log": out, "path": out, "app": found.app, "warnings": warnings}
+
+
+@told
 def look(log, calibration, tell):
-    """What `report` says and `plot` draws of a log: {"words": report.Words, "json": report.as_data(), "warnings": [...],
-    "page": HTML, "stem": the name without suffixes}. calibration: its file, "" for the one beside the log. tell(done,
-    total): the progress."""
+    """What `report` says and `plot` draws of a log: {"words": report.Words, "json": report.as_data(), "warnings":
+    [...], "page": HTML, "stem": the name without suffixes}. calibration: its file, "" for the one beside the log.
+    tell(done, total): the progress."""
     ride = open_ride(Path(log), _calibration(log, calibration), smoothed=True)
     seen = overview(ride, tell)
     notices = [*seen.notices, *([seen.exchanged] if seen.exchanged else [])]
@@ -73,8 +97,7 @@ def look(log, calibration, tell):
 @told
 def smooth(log, calibration, tell):
     """{"path": of LEAN.csv as `smooth` writes it}."""
-    MADE.mkdir(exist_ok=True)
-    out = MADE / "lean.csv"
+    out = Path(f"{log}.lean.csv")
     ride = open_ride(Path(log), _calibration(log, calibration))
     smooth_to_csv(Path(log), ride.calibration, out, tell)
     return {"path": str(out)}
@@ -83,15 +106,22 @@ def smooth(log, calibration, tell):
 @told
 def align(log, tell):
     """{"path": of the calibration that `calibrate ride` finds, "roll_deg", "pitch_deg", "yaw_deg": how well}."""
-    MADE.mkdir(exist_ok=True)
     found = fit_ride(Path(log), progress=tell)
-    out = MADE / calibration_path(Path(log)).name
+    out = calibration_path(Path(log))
     write_calibration(out, found.calibration)
     return {
         "path": str(out),
         "warnings": [sentence(notice) for notice in found.notices],
         **{name: round(getattr(found, name), 1) for name in ("roll_deg", "pitch_deg", "yaw_deg")},
     }
+
+
+def _app(log):
+    """app_of(), "" too for what cannot be read."""
+    try:
+        return app_of(log)
+    except InputError:
+        return ""
 
 
 def _calibration(log, calibration):

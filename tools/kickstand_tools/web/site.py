@@ -44,7 +44,7 @@ def site_files() -> dict[str, bytes]:
     ['bike.mjs', 'board.mjs']
     """
     files = npm_packages.find()
-    files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in PAGE.rglob("*") if path.is_file()}
+    files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in sorted(PAGE.rglob("*.*"))}
     files["python.json"] = json.dumps(python_files()).encode()
     files["install.zip"] = install_archive.archive()
     files["rides.zip"] = rides_archive.archive()

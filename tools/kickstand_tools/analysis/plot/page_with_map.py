@@ -35,6 +35,7 @@ _BESIDE = """<aside>
 </aside>
 <script>
 const MAP = {map}, CHART_AXES = {axes}, TILES = {tiles};
+if (finger) MAP.layout.dragmode = false;
 Plotly.newPlot("map", MAP.data, MAP.layout, {{ responsive: true, scrollZoom: true }});
 {script}
 </script>"""

@@ -30,33 +30,42 @@ export async function openRide(files) {
 const isCalibration = (file) => file.name.toLowerCase().endsWith(".json");
 
 async function look(ride) {
+  if (!ride.taken) {
+    await work(`Reading ${ride.log} …`, () => tools.call("take", ride.log), async (found) => {
+      Object.assign(ride, { taken: found, given: ride.log, log: found.log });
+      await look(ride);
+    });
+    return;
+  }
   if (!ride.calibration) {
-    say(`${ride.log} has no calibration with it. Add its .cal.json, or let the ride tell how the sensor sits: that takes some minutes of riding with bends to both sides.`, true);
+    say(`${ride.given} has no calibration with it. Add its .cal.json, or let the ride tell how the sensor sits: that takes some minutes of riding with bends to both sides.`, true);
     byId("align").hidden = false;
     return;
   }
-  await work(`Looking at ${ride.log} …`, () => tools.call("look", ride.log, ride.calibration), (found) => {
+  await work(`Looking at ${ride.given} …`, () => tools.call("look", ride.log, ride.calibration), (found) => {
+    const warnings = [...new Set([...(ride.taken.warnings ?? []), ...found.warnings])];
     looked = { ...found, ride };
-    showReport(found);
+    showReport({ ...found, warnings });
     showCharts(found.page);
-    byId("save-calibration").hidden = !ride.found;
-    say(ride.found ?? "");
+    byId("save-calibration").hidden = !ride.aligned;
+    byId("save-log").hidden = !ride.taken.made;
+    say(ride.aligned ?? "");
   });
 }
 
 async function align() {
   const ride = chosen();
-  await work(`Looking how the sensor sits in ${ride.log} …`, () => tools.call("align", ride.log), async (found) => {
+  await work(`Looking how the sensor sits in ${ride.given} …`, () => tools.call("align", ride.log), async (found) => {
     const [roll, pitch, yaw] = [found.roll_deg, found.pitch_deg, found.yaw_deg];
-    const said = `The ride tells how the sensor sits: roll to ${roll}°, pitch to ${pitch}°, yaw to ${yaw}°.`;
-    Object.assign(ride, { calibration: found.path, found: said, bytes: found.made });
+    const aligned = `The ride tells how the sensor sits: roll to ${roll}°, pitch to ${pitch}°, yaw to ${yaw}°.`;
+    Object.assign(ride, { calibration: found.path, aligned, bytes: found.made });
     await look(ride);
   });
 }
 
 async function saveLean() {
   const { ride, stem } = looked;
-  await work(`Finding the lean of each sample of ${ride.log} …`, () => tools.call("smooth", ride.log, ride.calibration), (found) => {
+  await work(`Finding the lean of each sample of ${ride.given} …`, () => tools.call("smooth", ride.log, ride.calibration), (found) => {
     save(`${stem}.lean.csv`, "text/csv", found.made);
     say("");
   }, true);
@@ -68,7 +77,7 @@ async function savePage() {
   save(`${stem}.html`, "text/html", page.replace(`<script src="${PLOTLY}"></script>`, () => `<script>${library}</script>`));
 }
 
-const chosen = () => rides.find(({ log }) => log === byId("ride").value) ?? rides[0];
+const chosen = () => rides[Math.max(0, byId("ride").selectedIndex)];
 
 /** Do it, saying so, then show what came of it; or say why nothing did. stays: what is shown stays meanwhile. */
 async function work(text, begin, show, stays = false) {
@@ -124,6 +133,7 @@ byId("stop").addEventListener("click", stop);
 byId("save-lean").addEventListener("click", saveLean);
 byId("save-page").addEventListener("click", savePage);
 byId("save-json").addEventListener("click", () => save(`${looked.stem}.json`, "application/json", JSON.stringify(looked.json, null, 1)));
+byId("save-log").addEventListener("click", () => save(looked.ride.log, "text/csv", looked.ride.taken.made));
 byId("save-calibration").addEventListener("click", () => save(`${looked.stem}.cal.json`, "application/json", looked.ride.bytes));
 
 keepOffline();

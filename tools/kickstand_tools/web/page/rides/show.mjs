@@ -49,7 +49,7 @@ export function showCharts(page) {
 }
 
 export function hideRide() {
-  for (const id of ["report", "charts", "save-calibration"]) byId(id).hidden = true;
+  for (const id of ["report", "charts"]) byId(id).hidden = true;
   byId("plot").removeAttribute("srcdoc");
 }
 

@@ -6,6 +6,7 @@
 import { loadPython } from "../python.mjs";
 
 const GIVEN = "/given";
+const HERE = "/ride"; // where Python works
 const OFTEN_MS = 100; // between two messages of progress
 
 let guest;
@@ -22,22 +23,21 @@ function tell(done, total) {
 
 async function load() {
   python = await loadPython(["./numpy/numpy.zip", "./rides.zip"]);
-  python.FS.mkdir(GIVEN);
+  for (const folder of [GIVEN, HERE]) python.FS.mkdir(folder);
+  python.FS.chdir(HERE);
   guest = python.pyimport("kickstand_tools.web.rides_guest");
   guest.prepare();
 }
 
 /** The files are read where they lie, piece by piece: none is copied into Python's memory as a whole. */
 function give(files) {
-  python.FS.chdir("/");
   if (mounted) python.FS.unmount(GIVEN);
   mounted = true;
   python.FS.mount(python.FS.filesystems.WORKERFS, { files }, GIVEN);
-  python.FS.chdir(GIVEN);
 }
 
 function call([name, ...given]) {
-  const said = JSON.parse(guest[name](...given, ...(name === "rides" ? [] : [tell])));
+  const said = JSON.parse(name === "rides" ? guest.rides(GIVEN) : guest[name](...given, tell));
   const made = said.path && python.FS.readFile(said.path);
   postMessage({ said, made }, made ? [made.buffer] : []);
 }
