@@ -45,6 +45,7 @@ def site_files() -> dict[str, bytes]:
     """
     files = npm_packages.find()
     files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in sorted(PAGE.rglob("*.*"))}
+    files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # as a text a browser shows
     files["python.json"] = json.dumps(python_files()).encode()
     files["install.zip"] = install_archive.archive()
     files["rides.zip"] = rides_archive.archive()
