@@ -23,7 +23,7 @@ def line(chromium, address):
     rider.page.add_init_script(serial_line.FAKE)
     rider.page.reload()
     yield SerialLine(rider)
-    assert rider.errors == []
+    assert rider.errors == [] and rider.strangers() == []
     rider.context.close()
 
 
@@ -56,6 +56,7 @@ def test_a_new_board_gets_the_firmware_and_its_settings(line, board):
     choose(line, "SIDE", '"right"')
     choose(line, "BUTTON_PIN", "99")
     assert "but it must be a number from 0 to 48" in line.rider.text("#fault-BUTTON_PIN")
+    assert line.rider.axe() == []
     assert page.is_disabled("#install")
     choose(line, "BUTTON_PIN", "5")
     assert "a pin is used twice" in line.rider.text("#config")

@@ -25,7 +25,7 @@ def line(chromium, address):
     rider.page.add_init_script(serial_line.FAKE)
     rider.page.reload()
     yield SerialLine(rider)
-    assert rider.errors == []
+    assert rider.errors == [] and rider.strangers() == []
     rider.context.close()
 
 
@@ -68,6 +68,7 @@ def test_the_rides_of_a_board_are_what_the_command_pulls(line, rider, board, tmp
     rider.page.wait_for_selector("#files li")
     told = rider.text("#pull-said")
     assert told.startswith("2 rides are here")
+    assert rider.axe() == []
     assert "ride 4, part 0: damaged at byte 4096: left out" in told
     files = saved(rider, tmp_path)
     assert board.resets == 1
