@@ -254,6 +254,16 @@ def test_a_computer_that_slept_is_told(streaming, tmp_path, monkeypatch):
     assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
 
 
+def test_after_a_new_alignment_the_log_ends_and_the_board_is_told(streaming, tmp_path):
+    data, turns = half_seconds(3)
+    board = streaming([*data, *ride_writer.blocks(2, trim_deg=1.0, length=lambda _: 512)[0]], "silence", b"")
+    result = command.works("record", "--out", tmp_path / "ride.csv")
+    assert result.err == "warning: the board's calibration has changed: the log ends here\n"
+    assert board.serial.written == b"\x03\x01"
+    assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
+    assert json.loads((tmp_path / "ride.cal.json").read_text())["trim_deg"] == 0.0
+
+
 def test_a_block_that_came_over_damaged_leaves_a_gap(streaming, tmp_path):
     data, _ = half_seconds(6)
     data[3] = data[3][:200] + b"!" + data[3][201:]

@@ -9,12 +9,12 @@ _RAW_PASTE = b"\x05A\x01"
 
 class RawPrompt:
     """Has as much of an emulator.pico.Pico as SerialLine asks for. board: a FakeBoard, on which the code is run.
-    stream: blocks that the app sends, in place of being run; it goes on, and sends no more, until Ctrl-C.  deaf: says
-    nothing at all."""
+    streams: blocks that the app sends each time that it is started, in place of being run; it goes on, and sends no
+    more, until Ctrl-C.  deaf: says nothing at all."""
 
-    def __init__(self, board=None, stream=(), deaf=False):
+    def __init__(self, board=None, *streams, deaf=False):
         self.board, self._deaf = board, deaf
-        self._stream = said(stream)
+        self._streams = [said(blocks) for blocks in streams]
         self._streaming = False
         self._typed = b""
         self.heard = lambda data: None
@@ -52,9 +52,9 @@ class RawPrompt:
         elif "machine.reset()" in code:
             self.board.resets += 1
             self.heard(b"OK")
-        elif "RideStream" in code and self._stream:
+        elif "RideStream" in code and self._streams:
             self._streaming = True
-            self.heard(b"OK" + self._stream)
+            self.heard(b"OK" + self._streams.pop(0))
         else:
             out, error = self.board.exec_raw(code)
             self.heard(b"OK" + out + b"\x04" + error + b"\x04>")

@@ -55,6 +55,19 @@ def test_a_cable_that_is_pulled_leaves_the_log(line, rider, board, tmp_path):
     assert list(saved(rider, tmp_path).values()) == recorded(blocks)
 
 
+def test_after_a_new_alignment_another_log_begins(line, rider, board, tmp_path):
+    blocks = ride_writer.blocks(3, **SHORT)[0], ride_writer.blocks(2, trim_deg=1.0, **SHORT)[0]
+    line.plug_in(RawPrompt(board, [*blocks[0], *blocks[1]], blocks[1]))
+    rider.page.click("#start")
+    rider.page.wait_for_selector("#files li")
+    rider.page.wait_for_function("document.querySelector('#live-said').textContent.startsWith('Recording: ')")
+    rider.page.click("#stop")
+    rider.page.wait_for_selector("#files li + li")
+    assert rider.text("#live-said") == "Stopped."
+    assert list(saved(rider, tmp_path).values()) == [*recorded(blocks[1]), *recorded(blocks[0])]
+    assert board.resets == 2
+
+
 def test_the_rides_of_a_board_are_what_the_command_pulls(line, rider, board, tmp_path, monkeypatch):
     damaged = ride_writer.blocks(2, ride=4)[0]
     damaged[1] = damaged[1][:500] + b"?" + damaged[1][501:]

@@ -51,12 +51,13 @@ def record(
         try:
             if begin:
                 begin(name)
-            recorded = Recording(live)
+            stopped = threading.Event()
+            recorded = Recording(stopped, live)
             notes: list[str] = []
 
             def write(temporary: Path) -> None:
                 opened = gzip.open if out.suffix == ".gz" else open
-                with opened(temporary, "wt", encoding="ascii", newline="") as file, _signals() as stopped:
+                with opened(temporary, "wt", encoding="ascii", newline="") as file, _signals(stopped):
                     recorded.write(file, blocks(transport, name, notes, stopped), notes)
 
             write_whole(out, write)
@@ -69,12 +70,11 @@ def record(
 
 
 @contextlib.contextmanager
-def _signals() -> Iterator[threading.Event]:
-    """What is set by a signal to end the recording, so that the board is told with a Ctrl-C there."""
-    stopped = threading.Event()
+def _signals(stopped: threading.Event) -> Iterator[None]:
+    """What would end this program ends the recording instead."""
     before = {number: signal.signal(number, lambda *_: stopped.set()) for number in _ends()}
     try:
-        yield stopped
+        yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -60,9 +60,12 @@ class LiveReading:
 
 
 class Recording:
-    """Blocks into a file. first: the first block; seconds, count: how much there is."""
+    """Blocks into a file. stopped: set where the log has to end, so that the blocks end too.  live: called for each.
 
-    def __init__(self, live: Callable[[LiveReading], None] | None = None) -> None:
+    first: the first block; seconds, count: how much there is."""
+
+    def __init__(self, stopped: threading.Event, live: Callable[[LiveReading], None] | None = None) -> None:
+        self._stopped = stopped
         self.first: Block | None = None
         self.seconds = 0.0
         self.count = 0
@@ -74,13 +77,17 @@ class Recording:
         missing, expected, before = 0, 0, 0
         missing_s: list[float] = []
         meter = ReplayMeter(CalibrationFile().to_firmware())
-        aligned = False
+        aligned = changed = False
         file.write(",".join(ride_log.header(TRACK)) + "\n")
         for block in blocks:
+            if changed:  # until the board has stopped
+                continue
             if self.first is None or block.body != self.first.body:
                 if self.first:
                     notes.append(CHANGED)
-                    break
+                    self._stopped.set()
+                    changed = True
+                    continue
                 self.first = block
                 calibration = ride_log.calibration(block)
                 meter = ReplayMeter(calibration.to_firmware(), delay_s=calibration.delay_s())

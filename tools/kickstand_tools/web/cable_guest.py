@@ -34,7 +34,7 @@ class Live:
         from ..errors import InputError
         from ..rides import stream
 
-        self._recording = stream.Recording(lambda reading: told(json.dumps(vars(reading))))
+        self._recording = stream.Recording(self._stopped, lambda reading: told(json.dumps(vars(reading))))
         notes = []
         try:
             with connected(name) as (transport, _):

@@ -52,7 +52,7 @@ class Installation:
         except InputError as error:
             self._by_hand = str(error)
         with config_check.posed(*self._pose):
-            usual = {name: repr(value) for name, value in vars(config_check.usual()).items() if name.isupper()}
+            usual = {name: _written(value) for name, value in vars(config_check.usual()).items() if name.isupper()}
         told = {"board": board, "settings": settings, "usual": usual, "by_hand": self._by_hand}
         return json.dumps(told)
 
@@ -120,6 +120,11 @@ def _describe(transport, name):
     if platform not in PLATFORMS:
         raise InputError(f"{text}: Kickstand runs on a Raspberry Pi Pico and on an ESP32")
     return text
+
+
+def _written(value):
+    """As it would stand in config.py: addresses in hexadecimal."""
+    return f"({', '.join(map(hex, value))})" if isinstance(value, tuple) else repr(value)
 
 
 def _compiled(source, architecture):

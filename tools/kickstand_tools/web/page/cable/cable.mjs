@@ -121,11 +121,16 @@ export async function overCable(port, tell, speak, restarted = false) {
   const line = new SerialLine(port);
   try {
     await line.open(restarted);
+  } catch (error) {
+    tell(`The port cannot be opened: ${error.message}. Does another program have it?`);
+    return null;
+  }
+  try {
     // A line that is not USB, as a bridge to an emulated board is, is given time as `kickstand flash` gives it
     return await speak(line, port.getInfo?.().usbVendorId ? "this port" : "socket:this port");
   } catch (error) {
     console.error(error);
-    tell(`The port cannot be used: ${error.message.trim().split("\n").at(-1)}. Does another program have it?`);
+    tell(`This went wrong: ${error.message.trim().split("\n").at(-1)}. Load the page again.`);
     return null;
   } finally {
     await line.close();

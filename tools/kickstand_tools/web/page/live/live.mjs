@@ -16,6 +16,7 @@ const guests = () => (loaded ??= python(true).then((made) => made.pyimport("kick
 let loaded; // once for all: no board is posed here
 let live; // the Live of cable_guest.py that runs, or null
 let stopped = false;
+let awake = null; // a WakeLockSentinel
 let aligned = false;
 let furthest = [0, 0];
 
@@ -29,7 +30,7 @@ async function start() {
   atWork(true);
   tell("Loading the tools …");
   const guest = await guests();
-  const awake = await navigator.wakeLock?.request("screen").catch(() => null);
+  await stayAwake();
   let said = null;
   for (let again = false; !stopped; again = true) {
     player.restart();
@@ -43,7 +44,13 @@ async function start() {
   }
   awake?.release();
   atWork(false);
+  if (!said && stopped) tell("Stopped.");
   if (said) tell(said.refused ? `${inPages(said.refused)}.` : inPages(["Stopped", ...said.notes].join(". ")) + ".");
+}
+
+/** Keep the screen on, where the browser can. It ends that itself when the page is covered. */
+async function stayAwake() {
+  awake = await navigator.wakeLock?.request("screen").catch(() => null);
 }
 
 function heard(text) {
@@ -139,5 +146,6 @@ byId("pull").disabled = byId("live-form").hidden;
 byId("start").addEventListener("click", start);
 byId("stop").addEventListener("click", stop);
 byId("pull").addEventListener("click", pull);
+document.addEventListener("visibilitychange", () => live && !document.hidden && stayAwake());
 requestAnimationFrame(draw);
 keepOffline();
