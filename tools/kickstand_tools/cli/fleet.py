@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 
-@click.command()
+@click.command(short_help="Align many vehicles, find moved mounts, test their brakes.")
 @click.argument("manifest", metavar="MANIFEST.csv|GLOB")
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="The directory to write to.")
 @click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, tcp://...; this computer if not given.")

@@ -1,6 +1,6 @@
 // Wires the page: files come in, what the tools say of them is shown.
 
-import { keepOffline } from "../offline.mjs";
+import { keepOffline, keptOffline } from "../offline.mjs";
 import { takePulled } from "./pulled.mjs";
 import { hideRide, save, showCharts, showReport } from "./show.mjs";
 import { Tools } from "./tools.mjs";
@@ -19,7 +19,8 @@ export async function openRide(files) {
   const names = files.map((file) => file.name);
   given = [...(adds ? given.filter((file) => !names.includes(file.name)) : []), ...files];
   await work("Loading Python, 8 MB the first time …", async () => {
-    tools.open(given);
+    await keptOffline();
+    tools.give(given);
     rides = await tools.call("rides");
     byId("ride").replaceChildren(...rides.map(({ log }) => new Option(log, log)));
     byId("which").hidden = rides.length < 2;
@@ -95,6 +96,7 @@ async function work(text, begin, show, stays = false) {
   }
   if (mine !== turn) return;
   byId("work").hidden = true;
+  if (!tools.open) forget();
   if (wrong) say(`${wrong}.`, true);
   else await show(found);
 }
@@ -107,9 +109,15 @@ function say(text, wrong = false) {
 function stop() {
   turn++;
   tools.stop();
+  forget();
   byId("work").hidden = true;
   say("Stopped.");
-  tools.open(given);
+}
+
+/** The files that were given went with the worker. */
+function forget() {
+  given = rides = [];
+  byId("which").hidden = true;
 }
 
 byId("files").addEventListener("change", () => {

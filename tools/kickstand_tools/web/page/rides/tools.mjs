@@ -1,8 +1,9 @@
 // The page's side of worker.mjs.
 
 export class Tools {
-  #worker;
-  #answer;
+  #worker = null;
+  #answer = null;
+  #before = Promise.resolve(); // the calls are made one after the other
   #tell;
 
   /** tell(done, of): the progress of what is worked on. */
@@ -10,8 +11,13 @@ export class Tools {
     this.#tell = tell;
   }
 
+  /** False: there are no files, because nothing was opened, or the work was stopped or has failed. */
+  get open() {
+    return this.#worker !== null;
+  }
+
   /** Take these File objects in place of all before; what was being worked on is given up. */
-  open(files) {
+  give(files) {
     if (this.#answer) this.stop();
     this.#worker ??= this.#start();
     this.#worker.postMessage({ files });
@@ -19,19 +25,25 @@ export class Tools {
 
   /** The result of a function of web/rides_guest.py: what it returns, with `made`, the bytes of the file it made.
    *
-   * Throws an Error with the line of a refusal. One call at a time. */
+   * Throws an Error with the line of a refusal. */
   call(...call) {
-    return new Promise((resolve, reject) => {
-      this.#answer = { resolve, reject };
-      this.#worker.postMessage({ call });
-    });
+    const said = this.#before.then(
+      () =>
+        new Promise((resolve, reject) => {
+          this.#answer = { resolve, reject };
+          this.#worker.postMessage({ call });
+        }),
+    );
+    this.#before = said.catch(() => {});
+    return said;
   }
 
-  /** Give up what is being worked on. */
+  /** Give up what is being worked on, and the files: whoever waits for it waits for ever. */
   stop() {
     this.#worker?.terminate();
     this.#worker = null;
     this.#answer = null;
+    this.#before = Promise.resolve();
   }
 
   #start() {
