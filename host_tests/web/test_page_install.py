@@ -57,6 +57,9 @@ def test_a_new_board_gets_the_firmware_and_its_settings(line, board):
     choose(line, "BUTTON_PIN", "99")
     assert "but it must be a number from 0 to 48" in line.rider.text("#fault-BUTTON_PIN")
     assert line.rider.axe() == []
+    page.set_viewport_size({"width": 390, "height": 844})
+    assert line.rider.fits()
+    page.set_viewport_size({"width": 1280, "height": 720})
     assert page.is_disabled("#install")
     choose(line, "BUTTON_PIN", "5")
     assert "a pin is used twice" in line.rider.text("#config")
