@@ -12,7 +12,7 @@ class RawPrompt:
     streams: blocks that the app sends each time that it is started, in place of being run; it goes on, and sends no
     more, until Ctrl-C.  deaf: says nothing at all."""
 
-    def __init__(self, board=None, *streams, deaf=False):
+    def __init__(self, board, *streams, deaf=False):
         self.board, self._deaf = board, deaf
         self._streams = [said(blocks) for blocks in streams]
         self._streaming = False

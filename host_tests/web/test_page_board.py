@@ -37,6 +37,7 @@ def test_a_board_is_brought_up_to_date_and_watched(chromium, address, tmp_path):
         rider.page.click("#stop")
         rider.page.wait_for_selector("#files li", timeout=120_000)
     assert rider.text("#live-said") == "Stopped."
+    rider.page.wait_for_function("document.querySelector('#lean').textContent === '--'")  # it is old news soon
     blocks = streamed(bytes(line.said))
     assert len(blocks) > 1
     assert list(saved(rider, tmp_path).values()) == recorded(blocks)

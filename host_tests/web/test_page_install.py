@@ -146,7 +146,7 @@ def test_a_board_that_does_not_fit_is_left_alone(line, board, differs, platform,
     assert board.written == [] and board.resets == 1
 
 
-def test_what_is_no_image_for_an_esp32_is_not_written(line, tmp_path):
+def test_what_is_no_image_for_an_esp32_is_not_written(line, board, tmp_path):
     """Nor one for another chip: no chip answers here at all."""
     page = line.rider.page
     page.click("text=ESP32: a .bin file")
@@ -156,7 +156,7 @@ def test_what_is_no_image_for_an_esp32_is_not_written(line, tmp_path):
         ("esp32.bin", b"\xe9" + bytes(2000), "no ESP32 answers: hold its button BOOT"),
     ):
         (tmp_path / name).write_bytes(content)
-        line.plug_in(RawPrompt(deaf=True))
+        line.plug_in(RawPrompt(board, deaf=True))
         page.set_input_files("#image-file", tmp_path / name)
         page.click("#image")
         page.wait_for_function(

@@ -1,5 +1,6 @@
 """The page listens to boards and fetches their rides, with the code of `kickstand record` and `pull`."""
 
+import functools
 import gzip
 import types
 
@@ -15,7 +16,7 @@ from raw_prompt import RawPrompt
 from rider import Rider
 from serial_line import SerialLine
 
-SHORT = {"length": lambda _: 512}  # blocks of half a second
+half_seconds = functools.partial(ride_writer.blocks, length=lambda _: 512)  # blocks as short as those of a stream
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +44,7 @@ def board(tmp_path):
 
 def test_a_cable_that_is_pulled_leaves_the_log(line, rider, board, tmp_path):
     """And no lean on the gauge. What swayed too much to tell its lean was "--" all along."""
-    blocks, _ = ride_writer.blocks(3, **SHORT)
+    blocks, _ = half_seconds(3)
     line.plug_in(RawPrompt(board, blocks))
     rider.page.click("#start")
     rider.page.wait_for_function("document.querySelector('#live-said').textContent.startsWith('Recording: ')")
@@ -56,7 +57,7 @@ def test_a_cable_that_is_pulled_leaves_the_log(line, rider, board, tmp_path):
 
 
 def test_after_a_new_alignment_another_log_begins(line, rider, board, tmp_path):
-    blocks = ride_writer.blocks(3, **SHORT)[0], ride_writer.blocks(2, trim_deg=1.0, **SHORT)[0]
+    blocks = half_seconds(3)[0], half_seconds(2, trim_deg=1.0)[0]
     line.plug_in(RawPrompt(board, [*blocks[0], *blocks[1]], blocks[1]))
     rider.page.click("#start")
     rider.page.wait_for_selector("#files li")
@@ -94,7 +95,9 @@ def test_the_rides_of_a_board_are_what_the_command_pulls(line, rider, board, tmp
     }
     with rider.context.expect_page() as opened:
         rider.page.click("#files li:first-child button")
-    assert opened.value.url.endswith("/rides.html#pulled")
+    rides = opened.value
+    assert rides.url.endswith("/rides.html#pulled")
+    rides.wait_for_selector("#report-title:has-text('ride-00004-')", timeout=60_000)
     opened.value.close()
 
 

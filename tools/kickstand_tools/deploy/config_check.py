@@ -17,7 +17,7 @@ import types
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .. import firmware_path
 from ..simulated_board.simulator import Board
@@ -88,7 +88,8 @@ def usual() -> "Settings":
     try:
         return Settings(None)
     except SettingsError as error:
-        return error.settings
+        settings: Any = error.settings
+        return settings
 
 
 def unused(path: Path, port: str) -> list[tuple[int, str]]:

@@ -10,7 +10,7 @@ import threading
 from datetime import datetime
 from pathlib import Path
 
-from .serial_port import take_place_of_pyserial
+from .serial_guest import take_place_of_pyserial
 
 
 class Live:

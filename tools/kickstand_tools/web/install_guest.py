@@ -7,7 +7,7 @@ import re
 import sys
 from pathlib import Path
 
-from .serial_port import ROOT, take_place_of_pyserial
+from .serial_guest import ROOT, take_place_of_pyserial
 
 OLDEST = (1, 23)  # MicroPython
 PLATFORMS = ("rp2", "esp32")

@@ -5,7 +5,7 @@ const BAUD = 115200;
 const BACK_MS = 10_000; // until a board that has restarted is there again, at most
 const AGAIN_MS = 300;
 
-/** The bytes of a serial port, for web/serial_port.py. lost: nothing more can come. */
+/** The bytes of a serial port, for web/serial_guest.py. lost: nothing more can come. */
 export class SerialLine {
   lost = false;
   #port;
