@@ -20,7 +20,7 @@ class Live:
         self._stopped = threading.Event()
         self._log = io.StringIO()
         self._recording = None
-        self._name = f"live-{datetime.now():%Y%m%d-%H%M%S}"
+        self._began = datetime.now()
 
     def run(self, line, name, told):
         """Listen to the board at a SerialLine until stop(), or until nothing more comes. name: of its port.
@@ -56,14 +56,16 @@ class Live:
     def files(self):
         """[(name, content)] of the log, and of its calibration, both as `kickstand record` writes them; nothing
         before the first readings."""
-        if self._recording is None or self._recording.first is None:
+        first = self._recording and self._recording.first
+        if not first:
             return []
         from ..calibration.file import write_calibration
         from ..rides import ride_log
 
         calibration = io.StringIO()
-        write_calibration(calibration, ride_log.calibration(self._recording.first))
-        made = {f"{self._name}.csv": self._log, f"{self._name}.cal.json": calibration}
+        write_calibration(calibration, ride_log.calibration(first))
+        stem = f"live-{self._began:%Y%m%d-%H%M%S}-{first.crc & 0xFFFF:04x}"
+        made = {f"{stem}.csv": self._log, f"{stem}.cal.json": calibration}
         return [(name, file.getvalue().encode("ascii")) for name, file in made.items()]
 
 
