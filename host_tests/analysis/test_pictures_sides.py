@@ -1,6 +1,7 @@
 """Left is drawn on the left, braking below: in the picture and in the page, whose axes nobody else checks."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import analysis_rides
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from kickstand_tools.analysis.alignment_quality import Quality
 from kickstand_tools.analysis.channels import open_ride
 from kickstand_tools.analysis.overview import Overview, overview
-from kickstand_tools.analysis.plot import charts, picture
+from kickstand_tools.analysis.plot import charts, page, picture
 from kickstand_tools.simulation.scripted import script
 
 pytest.importorskip("matplotlib")
@@ -95,3 +96,23 @@ def test_lean_to_the_left_is_below_and_on_the_left(seen, panels):
     assert by_name["share"]["x"][int(np.argmax(shares))] < -25.0
     (said,) = [note for note in figure["layout"]["annotations"] if note["text"].endswith("° left")]
     assert said["y"] == pytest.approx(-seen.summary.left_deg.value)
+
+
+def test_in_a_narrow_window_the_charts_stand_below_each_other(seen):
+    """In a wide one the last three beside each other; neither covers another."""
+    for kind, last_row in (("layout", 3), ("narrow", 1)):
+        drawn = charts.figure(seen)[kind]
+        axes = [name.removeprefix("xaxis") for name in drawn if name.startswith("xaxis")]
+        places = [(drawn[f"xaxis{k}"]["domain"], drawn[f"yaxis{k}"]["domain"]) for k in axes]
+        lowest = min(y[0] for _, y in places)
+        assert sum(y[0] == lowest for _, y in places) == last_row
+        for k, (x, y) in enumerate(places):
+            for other_x, other_y in places[:k]:
+                assert x[0] >= other_x[1] or x[1] <= other_x[0] or y[1] <= other_y[0]
+
+
+def test_the_name_of_a_ride_is_text_in_its_page(seen):
+    named = replace(seen, ride=replace(seen.ride, log=Path("<b>&.csv")))
+    html = page.page(named, "")
+    assert "<title>&lt;b&gt;&amp;</title>" in html
+    assert "<b>" not in html

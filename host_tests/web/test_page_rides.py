@@ -217,8 +217,10 @@ def test_rides_that_were_pulled_are_opened_once(page, address, ride, calibration
     page.page.goto(address + "rides.html#pulled")
     assert page.said() == ""
     assert page.page.inner_text("#report-title") == "RIDE.csv"
-    page.page.reload()
-    page.page.wait_for_timeout(300)
+    page.page.goto(address + "licences.txt")
+    page.page.goto(address + "rides.html#pulled")
+    page.page.wait_for_function("location.hash === ''")
+    page.page.wait_for_timeout(500)
     assert page.page.is_hidden("#report") and page.page.is_hidden("#work")
 
 
@@ -241,8 +243,11 @@ def test_what_takes_too_long_can_be_stopped(page, ride, calibration):
     page.page.click("#stop")
     assert page.said() == "Stopped."
     page.page.set_input_files("#files", [ride])
+    page.page.wait_for_function("!document.querySelector('#work').hidden")
+    (worker,) = page.page.workers
     assert page.give(ride, calibration) == ""
     assert page.page.inner_text("#report-title") == "RIDE.csv"
+    assert worker not in page.page.workers
 
 
 def test_axe_finds_nothing(page, ride, calibration):
