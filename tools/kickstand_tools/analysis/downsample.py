@@ -25,8 +25,7 @@ def joined(parts: Iterable[Channels]) -> Channels:
                     continue
                 column = columns[k] = np.full(end, np.nan)
             if end > len(column):
-                column.resize(end + end // 8, refcheck=False)  # in place, where the system can; what is new is filled
-                column[length:] = np.nan
+                column.resize(end + end // 8, refcheck=False)  # in place, where the system can; it fills what is new
             column[length:end] = values
         length = end
     for column in columns:
