@@ -105,6 +105,13 @@ def read_blocks(
         notices += remarks + frozen.notices() + judged[:1]  # one cause is told once
 
 
+def check_first_line(log: Path) -> None:
+    """Raise InputError where a file does not begin as a log does."""
+    first = next(chunks(log, 1), (b"", 0))[0]
+    cells.check_text(str(log), first, 0)
+    cells.header(str(log), first.decode().removeprefix("\ufeff").partition("\n")[0])
+
+
 def read_twice(source: Source) -> Source:
     """The same where it can be read again, else a Log: an open file can be read once."""
     if isinstance(source, Stretch):
