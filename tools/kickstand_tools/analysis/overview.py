@@ -1,8 +1,9 @@
 """One pass over a ride: all that its report and its pictures show."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import numpy as np
 from kickstand.errors import Notice
 
 from ..logs.source import Progress
@@ -15,10 +16,13 @@ from .stops.brake_test import RATE_S, Stop, find_stops
 from .stops.standstill import standing
 from .summary import Summary
 
+_NOT_KEPT = ("lean_formula_deg", "temp_c", "shown_g", "lean_sigma_deg", "utc_s")  # a quarter of a long ride's memory
+
 
 @dataclass
 class Overview:
-    """A ride: the summary of every sample, and its course in means over RATE_S.
+    """A ride: the summary of every sample, and its course in means over RATE_S, in which the columns that neither
+    report nor pictures need are NaN (vehicle_channels() has them).
 
     speed_correlation: between the forward force and the changes of the speed, 1 if forward is right, -1 if it is
     backward, None if the ride does not tell. exchanged: said where forward is backward; stops is then empty. notices:
@@ -58,7 +62,7 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     def blocks() -> Iterator[Channels]:
         for block in ride.blocks(progress, notices, mount):
             total.add(block)
-            yield block
+            yield replace(block, **dict.fromkeys(_NOT_KEPT, np.full(len(block.t_s), np.nan)))
 
     course = joined(downsampled(blocks(), RATE_S))
     frozen_s = sum(float(notice.values[1]) for notice in notices if notice.code == "frozen-readings")
