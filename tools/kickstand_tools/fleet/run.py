@@ -18,7 +18,7 @@ from .period import PeriodResult, failed, work_on_period
 from .show import plot
 from .show.page import Glance, write_page
 
-RESULTS_VERSION = 1  # another one makes all results of before obsolete
+RESULTS_VERSION = 2  # another one makes all results of before obsolete
 PLOTS, SIGNALS = "plots", "signals"
 TIMEOUT_S = 600.0  # for one mount of one vehicle
 _WRITE_S, _SHARE = 15.0, 20.0  # tables are written so often, and at most every so many times what writing takes
