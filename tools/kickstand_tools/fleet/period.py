@@ -1,5 +1,6 @@
 """One mount of one vehicle: its alignment, where it moved, its brake tests. A plain function on files."""
 
+import errno
 import math
 import traceback
 from dataclasses import dataclass, field
@@ -24,7 +25,8 @@ from .manifest import Period
 from .moved import Move, find_moves
 
 UNREADABLE, FAULT, NO_SPEED, MOVED, LEFT_HANDED = "unreadable", "fault", "no-speed", "mount-moved", "left-handed"
-AFTERWARDS = "not-finished"  # the vehicle is aligned, but brake tests or signals of this log are missing
+# The vehicle is aligned, but brake tests or signals of this log are missing; because the disk for signals is full
+AFTERWARDS, DISK_FULL = "not-finished", "disk-full"
 _DOUBTS = (MOVED, "parts-differ", "uncertain")  # of the firmware: then it is worth while to look for a move
 _PLOTTED = 160  # intervals in a picture
 _AGAINST = -0.5  # of a turn's force on the side of the turn: a gyro or axes that are mirrored
@@ -113,7 +115,9 @@ def _result(period: Period, signals_to: str | None) -> PeriodResult:
                 if signals_to is not None:
                     signals.write(signals_to, period.vehicle, log, known)
             except (InputError, OSError) as error:
-                errors.append(whose | {"log": log.name, "reason": AFTERWARDS, "message": cause(error)})
+                full = getattr(error.__cause__ or error, "errno", None) in (errno.ENOSPC, errno.EDQUOT)
+                why = DISK_FULL if full else AFTERWARDS
+                errors.append(whose | {"log": log.name, "reason": why, "message": cause(error)})
     return result
 
 

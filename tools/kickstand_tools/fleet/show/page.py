@@ -109,9 +109,9 @@ class Glance:
         )
 
 
-def write_page(path: Path, glance: Glance, expected: int) -> None:
+def write_page(path: str, glance: Glance, expected: int) -> None:
     """Write the page, whole or not at all. Raises InputError."""
-    write_bytes(str(path), glance.page(expected).encode())
+    write_bytes(path, glance.page(expected).encode())
 
 
 def _first(rows: list[Any], key: Callable[[Any], float], count: int) -> list[Any]:
