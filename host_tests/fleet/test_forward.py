@@ -1,12 +1,17 @@
 """Forward from whole logs: nearer than the device's, and as sure as it says."""
 
+import dataclasses
+
 import numpy as np
 import pytest
-from kickstand_tools.calibration.drive import fit_logs
+from kickstand.errors import AlignmentError
+from kickstand_tools.calibration.drive import fit_logs, usable
 from kickstand_tools.fleet import evidence, forward, period
 from kickstand_tools.fleet.forward import find_forward
 from kickstand_tools.fleet.manifest import Period
 from kickstand_tools.logs.csv_lines import write_log
+from kickstand_tools.logs.reader import read_log
+from kickstand_tools.refusals import RefusedInput
 from made_fleet import drive, yaw_deg
 
 SEEDS = (101, 102, 106, 109)  # on which the device is off by about a degree
@@ -66,6 +71,32 @@ def test_forward_that_is_not_sure_is_told_and_not_given(tmp_path, monkeypatch, l
     assert (found.alignment["status"], found.alignment["reason"]) == ("refused", "uncertain")
     assert "drive on" in found.alignment["message"] and found.alignment["quality_deg"] > 0.1
     assert found.alignment["vehicle_from_sensor"] is None and not found.brake_tests
+
+
+def test_a_late_speed_that_looks_like_a_moved_mount_is_told_as_late(tmp_path, monkeypatch):
+    log, _ = drive(4)
+    moved = RefusedInput(AlignmentError("mount-moved", "between-stops", 8.0))
+    fit = dataclasses.replace(fit_logs([log], None, "car"), refusal=moved)
+    for lag_s, reason in ((0.5, "mount-moved"), (2.5, "speed-late")):
+        monkeypatch.setattr(period, "fit_logs", lambda *_, lag_s=lag_s: dataclasses.replace(fit, lag_s=lag_s))
+        row = worked_on(tmp_path, log).alignment
+        assert (row["status"], row["reason"]) == ("refused", reason)
+    assert "2.5 s late" in row["message"]
+
+
+# of the recordings, from their own receivers: rows left, up, forward
+REFERENCES = {
+    "short-turn-loop-nominal-001": [[0.0124, 0.9995, 0.0302], [-0.0021, -0.0302, 0.9995], [0.9999, -0.0124, 0.0017]],
+    "medium-turn-loop-nominal-002": [[0.0098, 0.9999, -0.0040], [0.0, 0.0040, 1.0], [1.0, -0.0098, 0.0]],
+}
+
+
+@pytest.mark.parametrize("name", REFERENCES)
+def test_forward_of_recorded_drives(shared_data, name):
+    log = usable(read_log(shared_data / f"car-urban-{name}.csv.gz", axes=False), False)
+    fit = fit_logs([log], None, "car")
+    known = find_forward([evidence.intervals(log, "car", fit.lag_s or 0.0, fit.bias_dps)])
+    assert abs(yaw_deg(known.frame, REFERENCES[name])) < 1.0 and known.sure
 
 
 def test_logs_that_tell_nothing_have_no_forward():

@@ -95,6 +95,27 @@ def test_a_road_counts_once_however_many_intervals_are_on_it():
     assert told == pytest.approx(count / (evidence.ROAD_SHARE + 1.0), rel=0.01)
 
 
+def pitched(log, sensor, degrees):
+    """The log with the sensor turned about left by degrees (n)."""
+    vehicle = log.accel_g @ sensor.mount.T
+    angle = np.radians(degrees)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    found = copy.copy(log)
+    up, forward = vehicle[:, 1], vehicle[:, 2]
+    turned = np.column_stack((vehicle[:, 0], cosine * up + sine * forward, cosine * forward - sine * up))
+    found.accel_g = turned @ sensor.mount
+    return found
+
+
+def test_a_turn_is_sudden_and_a_hill_is_not():
+    log, sensor = drive(33, "car", 240.0)
+    middle = log.t_s[-1] / 2.0
+    (move,) = find_moves([driven(pitched(log, sensor, np.where(log.t_s > middle, 6.5, 0.0)))])
+    assert move.at_s == pytest.approx(middle, abs=8.0) and abs(move.turn_deg[0]) == pytest.approx(6.5, abs=1.5)
+    hill = np.clip((log.t_s - middle) / 50.0 + 0.5, 0.0, 1.0) * 6.5
+    assert find_moves([driven(pitched(log, sensor, hill))]) == []
+
+
 @pytest.mark.parametrize("name", ["medium-turn-loop-nominal-001", "medium-turn-loop-nominal-002"])
 def test_turns_of_five_degrees_in_recorded_drives(shared_data, name):
     log = usable(read_log(shared_data / f"car-urban-{name}.csv.gz", axes=False), False)

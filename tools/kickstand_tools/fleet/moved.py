@@ -34,7 +34,7 @@ SWAY_DEG, SWAY_WORST_DEG, SWAY_SIGMAS = 0.7, 5.0, 3.0
 SURELY_DEG = 8.0  # no two slopes of a road differ by more; less has to happen at once if it is during a log
 TILT_DEG = 2.2  # a turn about the vertical has no more tilt than this
 STEP_S, STEP_GAP_S = 8.0, 1.0  # on each side of the moment, for the change at once
-STEP_SHARE = 0.5  # of the tilt that has to be in it
+STEP_SHARE = 0.7  # of the tilt that has to be in it
 
 
 @dataclass
@@ -86,7 +86,7 @@ def _search(logs: list[Intervals], whole: Blocks, share: float) -> list[Move]:
         score = move.sigmas / share / (BETWEEN_SIGMAS if between else SUDDEN_SIGMAS if tilted else WITHIN_SIGMAS)
         if move.angle_deg < LEAST_DEG or score < 1.0 or (best and score <= best[0]):
             continue
-        if not between and tilted:
+        if not between and tilted and abs(turn[1]) < WITHIN_SIGMAS * sigma[1]:  # a slope of the road has no yaw
             moment = _moment(logs[move.log], move)
             if moment is None:
                 continue
@@ -165,15 +165,17 @@ def _moment(log: Intervals, move: Move) -> float | None:
     near = np.abs(time - move.at_s) < 60.0
     if np.count_nonzero(near) < 10:
         return None
-    found, _ = fits(terms[near].T @ terms[near], terms[near].T @ force[near])
+    found, varied = fits(terms[near].T @ terms[near], terms[near].T @ force[near])
     level = (force - terms[:, 1:] @ found[1:]) / terms[:, :1]  # what is left is the vertical
+    left, _, forward = frames(found, varied)
+    tips = (left * move.turn_deg[2] - forward * move.turn_deg[0]) / tilt  # where up goes as the sensor turns so
     best, moment = 0.0, move.at_s
     for now in time[np.abs(time - move.at_s) < 2.5 * STEP_S]:
         early = (time > now - STEP_GAP_S - STEP_S) & (time < now - STEP_GAP_S)
         late = (time > now + STEP_GAP_S) & (time < now + STEP_GAP_S + STEP_S)
         if np.count_nonzero(early) < 3 or np.count_nonzero(late) < 3:
             continue
-        step = np.degrees(np.linalg.norm(np.median(level[late], axis=0) - np.median(level[early], axis=0)))
+        step = np.degrees((np.median(level[late], axis=0) - np.median(level[early], axis=0)) @ tips)
         if step > best:
             best, moment = float(step), float(now)
     return moment if best > STEP_SHARE * tilt or tilt > SURELY_DEG else None

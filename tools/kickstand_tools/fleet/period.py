@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from kickstand.drive_alignment.quality import AGREE_DEG
+from kickstand.drive_alignment.speed_check import fit_problem
 from kickstand.errors import AlignmentError
 
 from ..analysis.stops.brake_test import Stop
@@ -94,7 +95,10 @@ def _result(period: Period, signals_to: str | None) -> PeriodResult:
             reason, message = MOVED, _moved_words(moves, logs)
         elif wrong:
             reason, message = LEFT_HANDED, wrong
-        elif found and found.sure and fit.reason != MOVED:
+        elif fit.reason == MOVED:
+            late = fit_problem(fit.lag_s or 0.0, 1.0)  # which takes braking for standing on another slope
+            reason, message = (late.code, str(RefusedInput(late))) if late else (reason, message)
+        elif found and found.sure:
             reason, message = "", ""
         elif found and not fit.reason:
             refusal = RefusedInput(AlignmentError("uncertain", found.sigma_deg, fit.used))
