@@ -83,7 +83,7 @@ def test_what_cut_refuses(log, tmp_path):
     command.refused(tmp_path, "cut", log, "--out", out, words="Give --from, --to or both")
     command.refused(tmp_path, "cut", log, "--from", "60", "--out", out, words="the log is 10.0 s long")
     command.refused(tmp_path, "cut", log, "--from", "1", "--out", log, words="is also an input")
-    command.refused(tmp_path, "cut", log, "--from", "early", "--out", out, words="not a valid float")
+    command.refused(tmp_path, "cut", log, "--from", "early", "--out", out, words="'early' is no time: give seconds")
 
 
 def test_poses_cut_out_of_one_log_align_the_sensor(tmp_path):

@@ -34,9 +34,9 @@ class Channels(Table):
     t_s: seconds since the log's first sample. lean_deg: > 0 to the right; lean_formula_deg: by Nicolae's (25)-(26)
     alone. left_g, up_g, forward_g: specific force; lateral_g: acceleration to the left in the road's plane, (23).
     pitch_rate_dps: > 0 nose up; yaw_rate_dps: > 0 in a left turn; roll_rate_dps: > 0 to the right. shown_g: the forward
-    force, smoothed as on the display. sigma_deg: standard deviation of the lean. As 1 or 0: resting: the meter knows
-    that the bike stands still; rolling: it knows from leaning and turning that it does not; sure: it trusts its lean.
-    lat_deg, lon_deg: degrees north and east, and utc_s: s since 1970, both only where there is a new value.
+    force, smoothed as on the display. lean_sigma_deg: standard deviation of the lean. As 1 or 0: resting: the meter
+    knows that the bike stands still; rolling: it knows from leaning and turning that it does not; sure: it trusts its
+    lean. lat_deg, lon_deg: degrees north and east, and utc_s: s since 1970, both only where there is a new value.
     """
 
     t_s: Array
@@ -52,7 +52,7 @@ class Channels(Table):
     speed_mps: Array
     temp_c: Array
     shown_g: Array
-    sigma_deg: Array
+    lean_sigma_deg: Array
     resting: Array
     rolling: Array
     sure: Array

@@ -179,10 +179,10 @@ def calibration_path(log: Path) -> Path:
 
 def calibration_beside(log: Path) -> Path:
     """The same where it is there. Raises InputError without it, without the log, and for a file that is no log."""
-    beside = calibration_path(log)
     if not log.is_file():
         what = "is a directory: give the name of a ride in it" if log.is_dir() else "there is no such file"
         raise InputError(f"{log}: {what}")
+    beside = calibration_path(log)
     if not beside.exists():
         first = next(chunks(log, 1), (b"", 0))[0]
         cells.check_text(str(log), first, 0)

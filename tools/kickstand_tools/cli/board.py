@@ -21,7 +21,7 @@ _PORT = click.option(
 _NAMED_ONE_BY_ONE = 5
 
 
-@click.command()
+@click.command(short_help="Copy the firmware to a board, and start it.")
 @_PORT
 @click.option("--config", is_flag=True, help="Replace the board's config.py too, which is otherwise kept.")
 def flash(port: str | None, config: bool) -> None:
@@ -54,7 +54,7 @@ def flash(port: str | None, config: bool) -> None:
     click.echo("restarted: the display shows the rest")
 
 
-@click.command()
+@click.command(short_help="Ask a board for versions, settings, sensor and calibration.")
 @_PORT
 def status(port: str | None) -> None:
     """Ask a board how it is: versions, settings, sensor, display, calibration."""
@@ -63,7 +63,7 @@ def status(port: str | None) -> None:
     click.echo(status(port))
 
 
-@click.command()
+@click.command(short_help="Fetch the rides that a board has recorded.")
 @_PORT
 @click.option("--out", type=_PATH, default=Path(), help="The directory to write to; this one if not given.")
 @click.option("--delete", is_flag=True, help="Remove from the board what came over whole.")
@@ -87,7 +87,7 @@ def pull(port: str | None, out: Path, delete: bool) -> None:
         click.echo(f"no rides on the board at {result.port}: its menu's Record ride makes one")
 
 
-@click.command()
+@click.command(short_help="Write a log live over USB.")
 @_PORT
 @click.option("--out", required=True, type=_PATH, help="The file to write.")
 def record(port: str | None, out: Path) -> None:

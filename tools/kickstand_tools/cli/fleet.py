@@ -3,7 +3,7 @@
 import click
 
 
-@click.command()
+@click.command(short_help="Align many vehicles, find moved mounts, test their brakes.")
 @click.argument("manifest", metavar="MANIFEST.csv|GLOB")
 @click.option("--out", required=True, metavar="DIR", help="The directory to write to, or a place like s3://...")
 @click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, tcp://...; this computer if not given.")

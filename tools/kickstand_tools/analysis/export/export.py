@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -59,7 +59,7 @@ def export(
     """
     if form in _CHECK:
         _CHECK[form]()
-    ride = Ride(read_twice(ride.log), ride.calibration)
+    ride = replace(ride, log=read_twice(ride.log))
     whole = _first_pass(ride.log)
     start_s = whole.start_s
     if form == "gpx" and not len(whole.places.t_s):

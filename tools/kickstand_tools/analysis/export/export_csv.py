@@ -23,7 +23,7 @@ COLUMNS = {
     "roll_rate_dps": (4, "deg/s"),
     "speed_mps": (3, "m/s"),
     "temp_c": (2, "Cel"),
-    "sigma_deg": (3, "deg"),
+    "lean_sigma_deg": (3, "deg"),
     "lat_deg": (7, "deg"),
     "lon_deg": (7, "deg"),
     "utc_s": (3, "s"),

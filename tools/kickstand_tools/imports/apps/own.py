@@ -40,7 +40,7 @@ def read(pieces: list[Piece], name: str) -> Recording:
         accel, first = sensor_of(sheet, time_ns, exported[:3], 1.0, ("accelerometer", "g", said))
         gyro, second = sensor_of(sheet, time_ns, exported[3:], _RATE_SIGNS, ("gyro", "deg/s", said))
     else:
-        raise InputError(f"{name} holds the lean that kickstand has computed: give the log that it was made from")
+        raise InputError(f"{name} holds a lean, no readings: give the log that it was made from")
     speed, lat, lon = (sheet.place(column) for column in ("speed_mps", "lat_deg", "lon_deg"))
     track, places = track_of(sheet, time_ns, speed, lat, lon)
     temp_c = sheet.numbers(sheet.place("temp_c"))
