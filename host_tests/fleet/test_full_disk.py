@@ -20,24 +20,22 @@ FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 @pytest.fixture
-def small_disk(tmp_path):
-    """A function that makes a disk of some kB, or resizes it. Its directory is small_disk.path."""
-    path = tmp_path / "disk"
-    path.mkdir()
-
-    def resize(kb):
-        option = "remount," if os.path.ismount(path) else ""
-        mount = ["mount", "-t", "tmpfs", "-o", f"{option}size={kb}k", "tmpfs", str(path)]
-        if subprocess.run(mount, capture_output=True, check=False).returncode:
-            pytest.skip("no disk may be mounted here")
-
-    resize.path = path
+def disk(tmp_path):
+    """The directory of a disk that resize() has made."""
     if not sys.platform.startswith("linux"):
         pytest.skip("tmpfs is of Linux")
-    try:
-        yield resize
-    finally:
-        subprocess.run(["umount", str(path)], capture_output=True, check=False)
+    path = tmp_path / "disk"
+    path.mkdir()
+    yield path
+    subprocess.run(["umount", str(path)], capture_output=True, check=False)
+
+
+def resize(path, kb):
+    """Make a disk of some kB there, or make it larger."""
+    option = "remount," if os.path.ismount(path) else ""
+    mount = ["mount", "-t", "tmpfs", "-o", f"{option}size={kb}k", "tmpfs", str(path)]
+    if subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("no disk may be mounted here")
 
 
 @pytest.fixture(scope="module")
@@ -56,17 +54,17 @@ def finished(directory, keys):
 
 # From a disk that has no room for a picture to one that has none for the last table beside all rows
 @pytest.mark.parametrize("kb", [8, 16, 32, 48, 64, 72, 80])
-def test_a_disk_of_any_size_loses_no_finished_row(small_disk, results, monkeypatch, kb):
+def test_a_disk_of_any_size_loses_no_finished_row(disk, results, monkeypatch, kb):
     known, periods = results
     monkeypatch.setattr(run, "run_tasks", in_this_process)
     monkeypatch.setattr(run, "work_on_period", lambda period, _: copy.deepcopy(known[period.vehicle]))
-    small_disk(kb)
-    out = small_disk.path / "results"
+    resize(disk, kb)
+    out = disk / "results"
     with pytest.raises(InputError, match=r"^[^\n]*No space left on device[^\n]*$"):
         run_fleet(periods, out)
     keys = run._keys(periods, False)
     kept = finished(out, keys)
-    small_disk(4096)
+    resize(disk, 4096)
     whole = run_fleet(periods, out)
     assert whole.new == len(periods) - kept
     rows = parquet.read_table(out / "alignments.parquet").to_pylist()

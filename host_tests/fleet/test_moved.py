@@ -33,7 +33,9 @@ def halves(log):
     """How the mount is taken to have turned in the middle of a log, and its sigma."""
     whole = evidence.blocks([driven(log)])
     middle = len(whole.log) // 2
-    return compare(whole.part(slice(0, middle)), whole.part(slice(middle, None)))
+    found = compare(whole.part(slice(0, middle)), whole.part(slice(middle, None)))
+    assert found
+    return found
 
 
 @pytest.fixture(scope="module")

@@ -149,14 +149,14 @@ def frames(found: Array, varied: Array) -> Array:
     level, forward, left = found[..., 0, :], found[..., 1, :], found[..., 2, :]
     up = level / np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), 1e-9)
     ahead = varied[..., :1] * forward + TURN_WEIGHT * varied[..., 1:] * np.cross(left, up)
-    return frame_of(up, ahead)
+    return frame_of(up, np.asarray(ahead, dtype=float))
 
 
 def frame_of(up: Array, ahead: Array) -> Array:
     """(..., 3, 3) rows left, up, forward, of up (..., 3, unit vectors) and of what points about forward (..., 3)."""
     side = np.cross(up, ahead)
     side /= np.maximum(np.linalg.norm(side, axis=-1, keepdims=True), 1e-9)
-    return np.stack((side, up, np.cross(side, up)), axis=-2)
+    return np.asarray(np.stack((side, up, np.cross(side, up)), axis=-2), dtype=float)
 
 
 def handedness(found: Array, varied: Array) -> float:
@@ -202,12 +202,13 @@ def _sway(log: Log) -> Array:
     """(samples, 3) the force's changes that take some tenths of a second, in g."""
     step_s = float(np.median(np.diff(log.t_s)))
     sums = np.vstack((np.zeros(3), np.cumsum(log.accel_g, axis=0)))
-    place = np.arange(len(log.t_s))
-    quick, slow = (_mean(sums, place, max(1, round(width_s / step_s))) for width_s in SWAY_S)
+    quick, slow = (_mean(sums, max(1, round(width_s / step_s))) for width_s in SWAY_S)
     return quick - slow
 
 
-def _mean(sums: Array, place: Array, width: int) -> Array:
+def _mean(sums: Array, width: int) -> Array:
+    """Over so many samples around each, of their running sums."""
+    place = np.arange(len(sums) - 1)
     first = np.maximum(place - width // 2, 0)
     last = np.minimum(place + (width + 1) // 2, len(place))
     return (sums[last] - sums[first]) / (last - first)[:, None]
