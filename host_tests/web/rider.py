@@ -99,12 +99,16 @@ class Rider:
         """Let the page's own thread have this part of the processor only."""
         self.context.new_cdp_session(self.page).send("Emulation.setCPUThrottlingRate", {"rate": times})
 
+    def processes(self):
+        """The numbers of the browser's processes."""
+        told = self._browser.new_browser_cdp_session().send("SystemInfo.getProcessInfo")
+        return [process["id"] for process in told["processInfo"]]
+
     def worker_s(self):
         """Processor time that the page's workers have used, in s."""
-        processes = self._browser.new_browser_cdp_session().send("SystemInfo.getProcessInfo")["processInfo"]
         ticks = 0
-        for process in processes:
-            for thread in Path(f"/proc/{process['id']}/task").glob("*"):
+        for process in self.processes():
+            for thread in Path(f"/proc/{process}/task").glob("*"):
                 if (thread / "comm").read_text().strip() == "DedicatedWorker":
                     fields = (thread / "stat").read_text().rsplit(")", 1)[1].split()
                     ticks += int(fields[11]) + int(fields[12])  # in user mode, and in the kernel

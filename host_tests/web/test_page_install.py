@@ -14,7 +14,7 @@ STRANGE = OTHER + "other.implementation, other.platform = sys.implementation, 's
 
 @pytest.fixture
 def rider(chromium, address):
-    rider = Rider(chromium, address)
+    rider = Rider(chromium, address + "install.html")
     rider.page.add_init_script(serial_line.FAKE)
     yield rider
     rider.context.close()
@@ -23,7 +23,6 @@ def rider(chromium, address):
 def plugged_in(rider, device):
     line = SerialLine(rider, device)
     rider.page.reload()
-    rider.reads("Raw")
     device.run(0.5)
     return line
 
@@ -59,7 +58,7 @@ def test_a_board_that_does_not_fit_is_left_alone(rider, boot, words):
 
 
 def test_a_browser_without_serial_ports_says_so(chromium, address):
-    rider = Rider(chromium, address)
+    rider = Rider(chromium, address + "install.html")
     rider.page.add_init_script("delete Navigator.prototype.serial")
     rider.page.reload()
     rider.page.wait_for_selector("#install-unable:not([hidden])")

@@ -21,10 +21,9 @@ from ..logs.reader import Source, read_blocks
 from ..logs.source import File, Progress, log_stem, name_of
 from ..logs.stretch import Stretch
 from ..logs.table import Array, Table
-from ..replay import replay_engine
+from ..replay.formula import formula_lean_deg
+from ..replay.meter_along import MeterAlong
 from ..smoothing.smooth import smooth_blocks
-
-_TOO_SMALL = 0.01  # g2, as in kickstand.lean: in free fall no force tells a direction
 
 
 @dataclass(eq=False)
@@ -224,27 +223,22 @@ def _absurd(block: Block, at: int) -> Notice:
     return Notice("absurd-readings", block.time_us[at] / 1e6, float(np.max(most[4:])), float(np.max(most[:3])))
 
 
-def formula_lean_deg(left: Array, up: Array, yaw_rate: Array) -> Array:
-    """kickstand.lean.formula.formula_lean_deg on arrays: Nicolae's (25)-(26), degrees, > 0 to the right."""
-    square = left * left + up * up
-    size = np.sqrt(np.maximum(0.0, square - 1.0))
-    sine = (left - np.sign(yaw_rate) * size * up) / np.maximum(square, _TOO_SMALL)
-    return np.where(square < _TOO_SMALL, 0.0, np.degrees(np.arcsin(np.clip(sine, -1.0, 1.0))))
-
-
 class _Lean:
     """The firmware's meter, run along the ride."""
 
     def __init__(self, calibration: CalibrationFile) -> None:
-        self._engine = replay_engine.Replay(calibration.to_firmware(), calibration.delay_s())
+        self._along = MeterAlong(calibration)
 
     def follow(self, block: Block) -> Array:
         """(n, 6): lean (degrees), displayed forward force (g), variance of the lean (rad2), resting, rolling, sure."""
-        take, meter = self._engine.take, self._engine.meter
-        smooth = meter.smooth_force
-        rows = []
-        for row in block.rows():
-            take(*row)
+        columns: list[list[float]] = [[] for _ in range(6)]
+        leans, shown, variances, resting, rolling, sure = columns
+        for meter in self._along.after_each(block, *self._along.in_vehicle(block)):
             lean = meter.filter
-            rows.append((meter.lean_deg, smooth[2], lean.variance, lean.at_rest, lean.rolling, meter.trusted))
-        return np.array(rows, dtype=float)
+            leans.append(meter.lean_deg)
+            shown.append(meter.smooth_force[2])
+            variances.append(lean.variance)
+            resting.append(lean.at_rest)
+            rolling.append(lean.rolling)
+            sure.append(meter.trusted)
+        return np.column_stack(columns).astype(float)

@@ -20,7 +20,7 @@ def joined(parts: Iterable[Channels]) -> Channels:
         end = length + len(part.t_s)
         for column, field in zip(columns, fields(Channels)):
             if end > len(column):
-                column.resize(end + end // 2, refcheck=False)  # in place, where the system can
+                column.resize(end + end // 8, refcheck=False)  # in place, where the system can; what is new is filled
             column[length:end] = getattr(part, field.name)
         length = end
     for column in columns:

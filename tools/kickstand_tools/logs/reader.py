@@ -105,6 +105,13 @@ def read_blocks(
         notices += remarks + frozen.notices() + judged[:1]  # one cause is told once
 
 
+def check_first_line(log: Path) -> None:
+    """Raise InputError where a file does not begin as a log does."""
+    first = next(chunks(log, 1), (b"", 0))[0]
+    cells.check_text(str(log), first, 0)
+    cells.header(str(log), first.decode().removeprefix("\ufeff").partition("\n")[0])
+
+
 def read_twice(source: Source) -> Source:
     """The same where it can be read again, else a Log: an open file can be read once."""
     if isinstance(source, Stretch):
@@ -202,7 +209,10 @@ def _numbers(
     of a mistake and is twenty times slower.
     """
     if text.strip() and not text.translate(None, _NUMERIC):
-        plain = text.replace(b",,", b",nan,").replace(b",,", b",nan,").replace(b",\n", b",nan\n")
+        plain = text.replace(b",,", b",nan,")
+        if len(plain) > len(text):  # of three commas the second is still beside the third
+            plain = plain.replace(b",,", b",nan,")
+        plain = plain.replace(b",\n", b",nan\n")
         try:
             table = np.loadtxt(io.BytesIO(plain), delimiter=",", comments=None, ndmin=2)
         except ValueError:
