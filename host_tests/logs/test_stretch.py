@@ -148,8 +148,8 @@ def test_a_stretch_exported_keeps_its_time_of_day(tmp_path):
     """A log without a clock ends when it was written; a stretch of it ends earlier by what is left out."""
     import os
 
-    from kickstand_tools.analysis.channels import open_ride
     from kickstand_tools.analysis.export.export import export
+    from kickstand_tools.analysis.ride import open_ride
 
     ride = analysis_rides.short(tmp_path)  # 34 s
     os.utime(ride, (1_700_000_100, 1_700_000_100))

@@ -11,9 +11,9 @@ import app_exports
 import numpy as np
 import pytest
 from command import works
-from kickstand_tools.analysis.channels import open_ride
 from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.plot import charts
+from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.web import rides_guest
 from rider import Rider
 from test_page_looks import LAPTOP, PHONE

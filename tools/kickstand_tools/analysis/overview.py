@@ -10,8 +10,9 @@ from ..logs.source import Progress
 from ..logs.stretch import Stretch
 from ..replay.mount_check import MountCheck
 from .alignment_quality import Quality, quality
-from .channels import Channels, Ride
+from .channels import Channels
 from .downsample import downsampled, joined
+from .ride import Ride
 from .stops.brake_test import RATE_S, Stop, find_stops
 from .stops.standstill import standing
 from .summary import Summary

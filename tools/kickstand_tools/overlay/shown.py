@@ -6,7 +6,7 @@ import numpy as np
 from kickstand.errors import Notice
 from numpy.typing import NDArray
 
-from ..analysis.channels import Ride
+from ..analysis.ride import Ride
 from ..analysis.signals import smoothed
 from ..analysis.summary import HELD_S
 from ..logs.source import Progress

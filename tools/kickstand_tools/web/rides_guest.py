@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from ..analysis import report
-from ..analysis.channels import open_ride
 from ..analysis.overview import overview
 from ..analysis.plot.page import page
+from ..analysis.ride import open_ride
 from ..calibration.file import calibration_beside, calibration_path, write_calibration
 from ..calibration.ride.fit import fit_ride
 from ..errors import InputError

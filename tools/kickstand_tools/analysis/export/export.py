@@ -15,8 +15,9 @@ from ...logs.stretch import Stretch
 from ...logs.table import Array
 from ...output import write_whole
 from ...replay.mount_check import MountCheck
-from ..channels import Channels, Ride
+from ..channels import Channels
 from ..downsample import downsampled
+from ..ride import Ride
 from ..track import Track, joined, track
 from . import export_csv, export_gpx, export_parquet, export_racechrono, export_vbo
 
