@@ -1,6 +1,5 @@
 """What cannot be imported is refused in one line that says what to do, and nothing is written."""
 
-import sys
 import zipfile
 
 import app_exports
@@ -9,8 +8,6 @@ import numpy as np
 import pytest
 from app_exports import riding
 from kickstand_tools import api
-
-pytest.importorskip("pandas")
 
 
 @pytest.fixture
@@ -219,12 +216,6 @@ def test_a_zip_with_a_password(tmp_path):
         content[content.index(mark) + place] |= 1  # the flag of an encrypted entry
     (tmp_path / "a.zip").write_bytes(content)
     refused(tmp_path, tmp_path / "a.zip", "is packed with a password, or in another way: unpack it first")
-
-
-def test_without_pandas_the_extra_is_named(tmp_path, ride, monkeypatch):
-    (tmp_path / "r.csv").write_text(app_exports.racebox(ride))
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    refused(tmp_path, tmp_path / "r.csv", "import needs pandas: ")
 
 
 @pytest.mark.parametrize(

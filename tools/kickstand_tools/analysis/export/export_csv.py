@@ -34,8 +34,8 @@ def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
     """Gzipped if the name ends in .gz."""
     opened = gzip.open if path.suffix == ".gz" else open
     digits = [digit for digit, _ in COLUMNS.values()]
-    with opened(path, "wt", encoding="ascii", newline="") as file:
-        file.write(",".join(COLUMNS) + "\n")
+    with opened(path, "wb") as file:
+        file.write((",".join(COLUMNS) + "\n").encode("ascii"))
         for block in blocks:
             block.t_s = block.t_s + start_s
-            file.write(csv_lines(np.column_stack([getattr(block, name) for name in COLUMNS]), digits))
+            file.writelines(csv_lines(np.column_stack([getattr(block, name) for name in COLUMNS]), digits))
