@@ -221,10 +221,8 @@ class LeanFilter:
             yield from p.update(*measurements.given_speed(given, speed, acceleration))
         else:
             yield from p.update(*measurements.straight_or_usual_speed(lean, speed, model.yaw_rate, seconds))
-        certain = (
-            p.rows[SPEED][SPEED] < measurements.SIGMA_TRIM_SPEED**2
-            and p.rows[LEAN][LEAN] < measurements.SIGMA_TRIM_LEAN**2
-        )
+        certain = p.rows[SPEED][SPEED] < measurements.SIGMA_TRIM_SPEED**2
+        certain = certain and p.rows[LEAN][LEAN] < measurements.SIGMA_TRIM_LEAN**2
         if certain and model.speed > measurements.STRAIGHT_MIN_SPEED:
             sideways = (means[5] - model.acceleration * x[YAW_ERROR]) / max(means[6], 0.5)
             self.trim.update(sideways, x[LEAN], model.yaw_rate, seconds)
