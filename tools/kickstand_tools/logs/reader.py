@@ -1,10 +1,8 @@
 """Recorded logs: CSV with the columns of COLUMNS, plain or gzipped, read block by block."""
 
-import csv
-import gzip
 import io
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +11,6 @@ from kickstand.errors import Notice
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..output import write_whole
 from . import cells
 from .axes.bends import Bends
 from .axes.course import Course
@@ -202,19 +199,6 @@ def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], rema
         start_us = int(time_us[0]) if start_us is None else start_us
         last_us = int(time_us[-1])
         yield _block(table, time_us - start_us, places, start_us / 1e6, rows, names, done)
-
-
-def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Write a CSV file, gzipped if its name ends in .gz, whole or not at all."""
-
-    def write(temporary: Path) -> None:
-        opened = gzip.open if path.suffix == ".gz" else open
-        with opened(temporary, "wt", encoding="ascii", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(columns)
-            writer.writerows(rows)
-
-    write_whole(path, write)
 
 
 def _numbers(
