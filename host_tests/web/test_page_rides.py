@@ -3,6 +3,7 @@
 import base64
 import gzip
 import json
+import zipfile
 from pathlib import Path
 
 import analysis_rides
@@ -178,6 +179,10 @@ def test_the_export_of_a_phone_becomes_a_log(page, tmp_path):
     told = json.loads(works("report", was, "--calibration", tmp_path / "phone.cal.json", "--json").out)
     shown = json.loads(page.saved("#save-json"))
     assert_near({**shown, "ride": ""}, {**told, "ride": ""})
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(tmp_path / "unpacked")
+    assert page.give(*(tmp_path / "unpacked").glob("*.csv"), tmp_path / "phone.cal.json") == ""
+    assert json.loads(page.saved("#save-json"))["samples"] == shown["samples"]
 
 
 def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):

@@ -17,12 +17,13 @@ from ..calibration.file import CalibrationFile, calibration_beside, read_calibra
 from ..errors import InputError
 from ..logs.block import Block
 from ..logs.log import ROOM_TEMP_C
-from ..logs.reader import Source, read_blocks
+from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import File, Progress, log_stem, name_of
 from ..logs.stretch import Stretch
 from ..logs.table import Array, Table
 from ..replay.formula import formula_lean_deg
 from ..replay.meter_along import MeterAlong
+from ..replay.mount_check import MountCheck
 from ..smoothing.smooth import smooth_blocks
 
 
@@ -103,11 +104,14 @@ class Ride:
         """A car, which has no lean; else a motorcycle."""
         return self.calibration.vehicle == "car"
 
-    def blocks(self, progress: Progress | None = None, notices: list[Notice] | None = None) -> Iterator[Channels]:
-        """The ride from its beginning, without the readings that froze: they are a gap. progress, notices: of
-        read_blocks(). Raises InputError."""
+    def blocks(
+        self, progress: Progress | None = None, notices: list[Notice] | None = None, mount: MountCheck | None = None
+    ) -> Iterator[Channels]:
+        """The ride without the readings that froze: they are a gap. progress, notices: of read_blocks(). mount: is
+        given all of the log, also where the ride is a stretch of it. Raises InputError."""
         lean, told, slow = _Lean(self.calibration), False, False
-        for whole, found in self._read(progress, notices):
+        log, stretch = apart(self.log)
+        for whole, found in self._read(log, progress, notices):
             block = whole.believed
             if not len(block.time_us):
                 continue
@@ -120,17 +124,23 @@ class Ride:
                 shown = found[~whole.frozen]
                 rows[:, 0], rows[:, 2] = shown[:, 0], np.radians(shown[:, 1]) ** 2
                 rows[:, 5] = rows[:, 2] <= MAX_VARIANCE  # NaN is not
-            yield channels(block, self.calibration, rows, self.car)
+            seen = channels(block, self.calibration, rows, self.car)
+            if mount is not None:
+                mount.add(seen.t_s, seen.force_g, seen.rate_dps, seen.speed_mps)
+            if stretch is None:
+                yield seen
+            elif (which := stretch.holds(block)).any():
+                yield seen.part(which)
         if slow and notices is not None:
             notices.append(Notice("smooth-slow"))
 
     def _read(
-        self, progress: Progress | None, notices: list[Notice] | None
+        self, log: Source, progress: Progress | None, notices: list[Notice] | None
     ) -> Iterator[tuple[Block, Array | None]]:
         """The blocks of the log, and what smooth_blocks() gives for each, None where it is not wanted or gives none."""
         if self.smoothed:
-            return smooth_blocks(self.log, self.calibration, progress, notices)
-        return ((block, None) for block in read_blocks(self.log, progress=progress, notices=notices))
+            return smooth_blocks(log, self.calibration, progress, notices)
+        return ((block, None) for block in read_blocks(log, progress=progress, notices=notices))
 
 
 def open_ride(log: Source, calibration: CalibrationFile | File | None = None, smoothed: bool = False) -> Ride:
