@@ -6,9 +6,10 @@ import analysis_rides
 import numpy as np
 import pytest
 from kickstand.lean import formula
-from kickstand_tools.analysis.channels import Channels, open_ride
+from kickstand_tools.analysis.channels import Channels
 from kickstand_tools.analysis.downsample import downsampled, joined
 from kickstand_tools.analysis.plot.envelope import envelope
+from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.summary import Summary
 from kickstand_tools.logs import reader
 from kickstand_tools.replay import replay_engine

@@ -7,10 +7,12 @@ import numpy as np
 from kickstand.errors import Notice
 
 from ..logs.source import Progress
+from ..logs.stretch import Stretch
 from ..replay.mount_check import MountCheck
 from .alignment_quality import Quality, quality
-from .channels import Channels, Ride
+from .channels import Channels
 from .downsample import downsampled, joined
+from .ride import Ride
 from .stops.brake_test import RATE_S, Stop, find_stops
 from .stops.standstill import standing
 from .summary import Summary
@@ -59,13 +61,14 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     notices: list[Notice] = []
 
     def blocks() -> Iterator[Channels]:
-        for block in ride.blocks(progress, notices):
+        for block in ride.blocks(progress, notices, mount):
             total.add(block)
-            mount.add(block.t_s, block.force_g, block.rate_dps, block.speed_mps)
             yield replace(block, **dict.fromkeys(_NOT_KEPT, np.full(len(block.t_s), np.nan)))
 
     course = joined(downsampled(blocks(), RATE_S))
-    total.frozen_s = sum(float(notice.values[1]) for notice in notices if notice.code == "frozen-readings")
+    frozen_s = sum(float(notice.values[1]) for notice in notices if notice.code == "frozen-readings")
+    # Of a stretch the notice tells more than its own.
+    total.frozen_s = min(frozen_s, total.missing_s) if isinstance(ride.log, Stretch) else frozen_s
     found = quality(course, standing(course))
     contradiction = mount.notice(found.roll_deg)
     exchanged = contradiction if contradiction and contradiction.code == "forward-exchanged" else None

@@ -119,6 +119,26 @@ def read_twice(source: Source) -> Source:
     return _again(source)
 
 
+def apart(source: Source) -> tuple[File | Log, Stretch | None]:
+    """The whole log, and the stretch of it that is wanted, with times from the log's beginning; None: all of it.
+
+    Raises InputError where the stretch holds no sample.
+    """
+    if not isinstance(source, Stretch):
+        return source, None
+    stretch = _from_beginning(Stretch(_again(source.source), source.from_s, source.to_s))
+    next(stretch.cut(_unchecked(stretch.source, [])))
+    return stretch.source, stretch
+
+
+def _from_beginning(stretch: Stretch) -> Stretch:
+    if not stretch.from_its_end:
+        return stretch
+    whole = _again(stretch.source)
+    last_s = [float(block.t_s[-1]) for block in _unchecked(whole, [])]
+    return Stretch(whole, stretch.from_s, stretch.to_s).of_length(max(last_s, default=0.0))
+
+
 def _again(source: File | Log) -> File | Log:
     return source if isinstance(source, (Path, str, Log)) else read_log(source)
 
@@ -129,10 +149,7 @@ def _unchecked(source: Source, remarks: list[Notice]) -> Iterator[Block]:
         return _blocks_of(source)
     if not isinstance(source, Stretch):
         return _parsed(source, name_of(source), remarks)
-    if source.from_its_end:
-        whole = _again(source.source)
-        last_s = [float(block.t_s[-1]) for block in _unchecked(whole, [])]
-        source = Stretch(whole, source.from_s, source.to_s).of_length(max(last_s, default=0.0))
+    source = _from_beginning(source)
     return source.cut(_unchecked(source.source, remarks))
 
 
