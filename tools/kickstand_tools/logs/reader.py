@@ -3,6 +3,7 @@
 import io
 import itertools
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -112,7 +113,7 @@ def check_first_line(log: Path) -> None:
 def read_twice(source: Source) -> Source:
     """The same where it can be read again, else a Log: an open file can be read once."""
     if isinstance(source, Stretch):
-        return Stretch(_again(source.source), source.from_s, source.to_s)
+        return replace(source, source=_again(source.source))
     return _again(source)
 
 
@@ -123,7 +124,7 @@ def apart(source: Source) -> tuple[File | Log, Stretch | None]:
     """
     if not isinstance(source, Stretch):
         return source, None
-    stretch = _from_beginning(Stretch(_again(source.source), source.from_s, source.to_s))
+    stretch = _from_beginning(replace(source, source=_again(source.source)))
     next(stretch.cut(_unchecked(stretch.source, [])))
     return stretch.source, stretch
 
@@ -146,8 +147,8 @@ def _unchecked(source: Source, remarks: list[Notice]) -> Iterator[Block]:
         return _blocks_of(source)
     if not isinstance(source, Stretch):
         return _parsed(source, name_of(source), remarks)
-    source = _from_beginning(source)
-    return source.cut(_unchecked(source.source, remarks))
+    stretch = _from_beginning(source)
+    return stretch.cut(_unchecked(stretch.source, remarks))
 
 
 def _blocks_of(log: Log) -> Iterator[Block]:
