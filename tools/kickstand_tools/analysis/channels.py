@@ -1,4 +1,4 @@
-"""A recorded ride in the vehicle's axes, block by block: what plot, report and export work on.
+"""A ride in the vehicle's axes: what plot, report and export work on.
 
 The lean is the firmware's own, sample by sample, or the smoothed one. Everything that does not depend on the past is
 computed by numpy; a test holds it equal to the firmware.

@@ -16,7 +16,9 @@ the vehicle's own affair, but the same before and after a moment, as long as the
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from kickstand.drive_alignment.alignment import MOTORCYCLE
@@ -84,11 +86,9 @@ def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
     time, speed = _spread(time[kept], speed[kept])
     curve = rate * (np.interp(log.t_s, time, speed) / STANDARD_GRAVITY)[:, None]
     sway = _sway(log)
-    outer = (sway[:, :, None] * sway[:, None, :]).reshape(-1, 9)
-    felt = np.cumsum(np.column_stack((log.accel_g, curve, outer)) * step[:, None], axis=0)
-    covered = np.cumsum(step)
-    ends = _at(time, log.t_s, felt)
-    seconds, whole = np.diff(time), np.diff(np.interp(time, log.t_s, covered))
+    squares = (one * other for one in sway.T for other in sway.T)
+    ends = _integrals(chain(log.accel_g.T, curve.T, squares), log.t_s, step, time)
+    seconds, whole = np.diff(time), np.diff(np.interp(time, log.t_s, np.cumsum(step)))
     good = (seconds <= MAX_INTERVAL_US * 1e-6) & (whole > 0.9 * seconds)
     means = (np.diff(ends, axis=0) / np.maximum(whole, 1e-9)[:, None])[good]
     middle, length = (time[1:] - seconds / 2.0)[good], seconds[good]
@@ -102,8 +102,8 @@ def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
         weight = length * (mean_mps > MOVING_MPS)  # a foot is down below
         shown = np.zeros_like(a)  # what it sways about is its wheels' contacts, and its rider
     else:
-        angle = np.cumsum(rate * step[:, None], axis=0)
-        swing = (_at(time + SWING_S / 2.0, log.t_s, angle) - _at(time - SWING_S / 2.0, log.t_s, angle)) / SWING_S
+        later, sooner = (_integrals(rate.T, log.t_s, step, time + ahead) for ahead in (SWING_S / 2.0, -SWING_S / 2.0))
+        swing = (later - sooner) / SWING_S
         w = np.sum(np.diff(swing, axis=0)[good] * up, axis=1) / length
         terms = np.column_stack((np.ones_like(a), a, c, w))
         weight = length * np.where(standing, STANDING_WEIGHT, mean_mps > STANDING_MPS)
@@ -214,9 +214,9 @@ def _mean(sums: Array, width: int) -> Array:
     return (sums[last] - sums[first]) / (last - first)[:, None]
 
 
-def _at(time: Array, t_s: Array, columns: Array) -> Array:
-    """(len(time), k): each of the columns (n, k) at these times."""
-    return np.array([np.interp(time, t_s, column) for column in columns.T]).T
+def _integrals(columns: Iterable[Array], t_s: Array, step: Array, time: Array) -> Array:
+    """(len(time), k): of each of k columns (n), until these times. One after the other: logs of hours are large."""
+    return np.array([np.interp(time, t_s, np.cumsum(column * step)) for column in columns]).T
 
 
 def _spread(time: Array, speed: Array) -> tuple[Array, Array]:

@@ -11,7 +11,8 @@ from kickstand.errors import Notice
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
 from ..logs.block import Block
-from ..logs.reader import Source, apart, read_blocks, write_table
+from ..logs.csv_lines import write_table
+from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import Progress, name_of
 from ..logs.table import Array, Table
 from ..replay.mount_check import MountCheck
