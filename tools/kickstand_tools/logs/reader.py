@@ -118,10 +118,8 @@ def read_twice(source: Source) -> Source:
 
 
 def apart(source: Source) -> tuple[File | Log, Stretch | None]:
-    """The whole log, and the stretch of it that is wanted, with times from the log's beginning; None: all of it.
-
-    Raises InputError where the stretch holds no sample.
-    """
+    """The whole log, and the stretch of it that is wanted, with times from the log's beginning; None: all of it. Raises
+    InputError where the stretch holds no sample."""
     if not isinstance(source, Stretch):
         return source, None
     stretch = _from_beginning(replace(source, source=_again(source.source)))
