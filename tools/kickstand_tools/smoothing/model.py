@@ -56,8 +56,8 @@ def motion_and_measurements(windows: Windows, middle: Array, p: Array) -> tuple[
     middle (n, STATES): states in the middle of each window. p (n, PARAMETERS).
     """
     t, q, left, up, forward = middle[:, : BIAS.start].T
-    wx, wy, wz = corrected_rates(windows.rate, middle, p)
-    fx, fy, fz = corrected_force(windows.force, p)
+    wx, wy, wz = corrected_rates(windows.rate, middle, p, windows.warm)
+    fx, fy, fz = corrected_force(windows.force, p, windows.warm)
     st, ct, sq, cq = np.sin(t), np.cos(t), np.sin(q), np.cos(q)
     yaw = (wx * st + wy * ct) / cq
     upright = fx * st + fy * ct  # force up after the lean is taken off
@@ -77,7 +77,7 @@ def motion_and_measurements(windows: Windows, middle: Array, p: Array) -> tuple[
     measured[:, noise.SLIDING] = wheel_left
     measured[:, noise.CLIMBING] = wheel_up - wheel * (q - p[:, DIVE] * ahead)
     measured[:, noise.SLOPING] = wheel_up
-    measured[:, noise.BALANCED] = fx - p[:, TYRES] * st - p[:, BESIDE]
+    measured[:, noise.BALANCED] = fx - p[:, TYRES] * st - p[:, BESIDE] * ct
     measured[:, noise.ANY_SPEED] = wheel - USUAL_MPS
     measured[:, noise.GIVEN_SPEED] = wheel - p[:, DELAY] * ahead - np.nan_to_num(windows.speed)
     measured[:, noise.RESTING] = middle[:, LEFT : BIAS.start]

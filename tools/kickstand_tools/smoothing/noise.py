@@ -42,6 +42,8 @@ GIVEN_MPS = 0.5  # of the log's speed
 REST_MPS, REST_RADPS = 0.05, np.radians(0.15)  # of a bike that stands
 HAND_MPS = 0.5  # of a sensor that is moved about, over a window
 BACKWARD_MPS = 0.3  # of a bike that rides backwards
+SLOWLY_S = 40.0
+UNBALANCED_LEFT, LEAST_UNBALANCE, MOST_UNBALANCE = 0.74, 0.25, 6.0
 OUTLIER = 2.0  # sigmas: what is further off counts less and less
 LASTING_S = ((SLIDING, SLIDE_S), (CLIMBING, DIVE_S), (SLOPING, SLOPE_S), (BALANCED, BALANCE_S), (ANY_SPEED, ANY_S))
 
@@ -67,6 +69,7 @@ class Circumstances:
     lean: Array
     speed: Array
     roughness: Array
+    unbalance: float
 
     @property
     def riding(self) -> NDArray[np.bool_]:
@@ -98,7 +101,7 @@ class Circumstances:
         found[riding, CLIMBING] = (self.roughness * np.hypot(DIVE_MPS, DIVE_RAD * speed))[riding]
         found[riding, SLOPING] = np.hypot(SLOPE_MPS, SLOPE_RAD * speed)[riding]
         balanced = riding & (self.speed > BALANCE_MIN_MPS)
-        found[balanced, BALANCED] = np.hypot(BALANCE_G, BALANCE_LEANED_G * np.sin(self.lean))[balanced]
+        found[balanced, BALANCED] = self.unbalance * np.hypot(BALANCE_G, BALANCE_LEANED_G * np.sin(self.lean))[balanced]
         found[riding, ANY_SPEED] = ANY_MPS
         found *= self.lasting()
         found[balanced, BALANCED] = np.hypot(found[:, BALANCED], BALANCE_ROLLING * self.rolling)[balanced]
@@ -123,6 +126,20 @@ class Circumstances:
         share = averaged(self.riding.astype(float), ROUGHNESS_S)
         found = averaged(np.where(self.riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
         return np.where(share > 0.02, np.clip(np.sqrt(found), LEAST_ROUGHNESS, MOST_ROUGHNESS), 1.0)
+
+    def unbalance_of(self, force: Array) -> float:
+        """force (n): the BALANCED measurement."""
+        counted = self.riding & (self.speed > BALANCE_MIN_MPS)
+        expected = np.hypot(BALANCE_G, BALANCE_LEANED_G * np.sin(self.lean))
+        slow = averaged(counted.astype(float), SLOWLY_S)
+        slowly = averaged(np.where(counted, force, 0.0), SLOWLY_S) / np.maximum(slow, 1e-9)
+        force = force - slowly
+        share = averaged(counted.astype(float), BALANCE_S)
+        z = averaged(np.where(counted, force / expected, 0.0), BALANCE_S)
+        whole = share > 0.99
+        if np.count_nonzero(whole) < 50:
+            return 1.0
+        return float(np.clip(np.sqrt(np.mean(z[whole] ** 2) / UNBALANCED_LEFT), LEAST_UNBALANCE, MOST_UNBALANCE))
 
 
 def jolted(windows: Windows) -> Array:

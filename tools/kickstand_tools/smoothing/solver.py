@@ -65,49 +65,98 @@ class Chain:
     joint: Array
 
 
-def solve_chain(left: Array, s: int, prior: Array, drift: Array, between: Array) -> Chain:
-    """left: of eliminate(). prior (m, m + 1): normal equations of what is known of the first block's parameters.
-    drift (m): variances of their change from block to block; between (B - 1, m): how far the parameters about which
-    the equations were linearised differ from block to block."""
+@dataclass
+class Beliefs:
+    """What is believed of the parameters besides the windows, in G ways.
+
+    prior (G, m, m + 1): normal equations of the first block's parameters. drift (G, B - 1, m): variances of their change from
+    block to block. between (B - 1, m): how far the parameters about which the equations were linearised differ from
+    block to block.
+    """
+
+    prior: Array
+    drift: Array
+    between: Array
+
+    def one(self, g: int) -> "Beliefs":
+        """The one of number g."""
+        return Beliefs(self.prior[g : g + 1], self.drift[g : g + 1], self.between)
+
+
+def _forward(left: Array, s: int, beliefs: Beliefs) -> tuple[list[Array], list[Array], Array, Array]:
+    """From block to block: gains and inverses (G, s + m, ...) of each, the normal equations (G, s, s + 1) of the last
+    state, and (G): twice the negative logarithm of how likely the ride is, but for a constant."""
     blocks, m = len(left), left.shape[1] - 2 * s
-    n = s + m
+    ways, n = len(beliefs.drift), s + m
     keep = np.r_[s : 2 * s + m]  # x_0, p
-    known = np.zeros((n, n + 1))
-    known[s:, s:n], known[s:, n] = prior[:, :m], prior[:, m]
-    weight = np.diag(1.0 / drift)
+    known = np.zeros((ways, n, n + 1))
+    known[:, s:, s:] = beliefs.prior
+    inside = np.arange(s, n)
     gains, inverses = [], []
+    before, pull = beliefs.prior[:, :, :m], beliefs.prior[:, :, m:]
+    unlikely = np.sum(pull * np.linalg.solve(before, pull), axis=(1, 2)) - np.linalg.slogdet(before)[1]
     for b in range(blocks):
         whole = left[b]
-        inner = whole[np.ix_(keep, keep)] + known[:, :n]
-        gradient = whole[keep, -1] + known[:, n]
-        across = np.zeros((n, n + 1))  # by the next block's x_0, p, and 1
-        across[:, :s], across[:, n] = whole[keep, :s], gradient
+        inner = whole[np.ix_(keep, keep)] + known[:, :, :n]
+        gradient = whole[keep, -1] + known[:, :, n]
+        across = np.zeros((ways, n, n + 1))  # by the next block's x_0, p, and 1
+        across[:, :, :s], across[:, :, n] = whole[keep, :s], gradient
+        known = np.zeros((ways, n, n + 1))
+        known[:, :s, :s], known[:, :s, n] = whole[:s, :s], whole[:s, -1]
         if b < blocks - 1:
-            inner[s:, s:] += weight
-            across[s:, s:n] = -weight
-            across[s:, n] -= weight @ between[b]
+            weight, gap = 1.0 / beliefs.drift[:, b], beliefs.between[b]
+            inner[:, inside, inside] += weight
+            across[:, inside, inside] = -weight
+            across[:, inside, n] -= weight * gap
+            known[:, inside, inside] = weight
+            known[:, inside, n] = weight * gap
+            unlikely += np.sum(weight * gap**2 - np.log(weight), axis=1)
         inverse = np.linalg.inv(inner)
         gain = inverse @ across
         gains.append(gain)
         inverses.append(inverse)
-        known = np.zeros((n, n + 1))
-        known[:s, :s], known[:s, n] = whole[:s, :s], whole[:s, -1]
-        if b < blocks - 1:
-            known[s:, s:n] = weight
-            known[s:, n] = weight @ between[b]
-        known -= across[:, :n].T @ gain
-    end = np.linalg.inv(known[:s, :s])
+        known -= across[:, :, :n].transpose(0, 2, 1) @ gain
+        unlikely += np.linalg.slogdet(inner)[1] - np.sum(across[:, :, n] * gain[:, :, n], axis=1)
+    end = known[:, :s, :s]
+    solved = np.linalg.solve(end, known[:, :s, n:])[:, :, 0]
+    return gains, inverses, known[:, :s], unlikely + np.linalg.slogdet(end)[1] - np.sum(solved * known[:, :s, n], axis=1)
+
+
+def unlikelihood(left: Array, s: int, beliefs: Beliefs) -> Array:
+    """(G): twice the negative logarithm of how likely the ride is by each of the beliefs, but for what they share."""
+    return _forward(left, s, beliefs)[3]
+
+
+def mixed(left: Array, s: int, beliefs: Beliefs, share: Array) -> Chain:
+    """What is found by each of the beliefs, put together by their shares (G), whose sum is 1."""
+    chains = [solve_chain(left, s, beliefs.one(g)) for g in range(len(share))]
+    first = np.einsum("g,gbi->bi", share, [one.first for one in chains])
+    parameters = np.einsum("g,gbi->bi", share, [one.parameters for one in chains])
+    joint = np.zeros_like(chains[0].joint)
+    for weight, one in zip(share, chains):
+        off_first, off_parameters = one.first - first, one.parameters - parameters
+        off = np.concatenate((off_first[1:], off_first[:-1], off_parameters), axis=1)
+        joint += weight * (one.joint + off[:, :, None] * off[:, None, :])
+    return Chain(first, parameters, joint)
+
+
+def solve_chain(left: Array, s: int, beliefs: Beliefs) -> Chain:
+    """left: of eliminate(). beliefs: in one way."""
+    gains, inverses, last, _ = _forward(left, s, beliefs)
+    blocks, m = len(left), left.shape[1] - 2 * s
+    n = s + m
+    end = np.linalg.inv(last[0, :, :s])
     first, parameters = np.empty((blocks + 1, s)), np.empty((blocks, m))
     joint = np.empty((blocks, 2 * s + m, 2 * s + m))
-    first[blocks] = -end @ known[:s, n]
+    first[blocks] = -end @ last[0, :, -1]
     following = np.concatenate((first[blocks], np.zeros(m)))
     spread = np.zeros((n, n))
     spread[:s, :s] = end
     for b in range(blocks - 1, -1, -1):
-        gain = gains[b][:, :n]
-        here = -gain @ following - gains[b][:, n]
+        gain = gains[b][0, :, :n]
+        here = -gain @ following - gains[b][0, :, n]
         cross = -gain @ spread
-        covariance = inverses[b] - cross @ gain.T
+        covariance = inverses[b][0] - cross @ gain.T
         joint[b, :s, :s], joint[b, s:, :s], joint[b, :s, s:] = spread[:s, :s], cross[:, :s], cross[:, :s].T
         joint[b, s:, s:] = covariance
         first[b], parameters[b] = here[:s], here[s:]
