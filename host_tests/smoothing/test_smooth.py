@@ -63,7 +63,8 @@ def test_it_does_not_depend_on_how_the_sensor_sits(street):
     other_calibration = type(calibration)(
         vehicle_from_sensor=calibration.vehicle_from_sensor @ turn.T, aligned=True, six_done=True
     )
-    other_log = Log(log.t_s, force @ turn.T, (log.gyro_dps - calibration.gyro_bias_dps) @ turn.T)
+    rate = log.gyro_dps - calibration.gyro_bias_dps
+    other_log = Log(log.t_s, force @ turn.T, rate @ turn.T, temperature_c=log.temperature_c)
     one, two = smooth(log, calibration), smooth(other_log, other_calibration)
     assert np.allclose(one.lean_deg, two.lean_deg, atol=0.01)
 
@@ -149,9 +150,9 @@ def test_a_long_ride_is_adjusted_in_chapters(street, monkeypatch):
     sizes = []
     adjusted = room._adjusted
 
-    def counted(pieces, calibration):
+    def counted(pieces, *more):
         sizes.append(sum(len(piece.time_us) for piece in pieces))
-        return adjusted(pieces, calibration)
+        return adjusted(pieces, *more)
 
     monkeypatch.setattr(room, "_adjusted", counted)
     monkeypatch.setattr(room, "PIECE_S", 10.0)

@@ -13,7 +13,7 @@ wheels' velocity is the sensor's less what turning adds at its place. Measured a
     SLIDING      the wheels' velocity sideways: they do not slide
     CLIMBING     their velocity up less that along the chassis: it points along the road, but for its dive in braking
     SLOPING      their velocity up: roads are level on average
-    BALANCED     the force to the side, less that by the tyres' width: a bike that rides is balanced
+    BALANCED     the force to the side, less those by the tyres' width and by what lasts: a bike that rides is balanced
     ANY_SPEED    the speed less a usual one        GIVEN_SPEED    the same less the log's, which is late
     RESTING      the velocity, and RESTING_RATE the rates, of a bike that stands
     BACKWARD     the speed where it is under 0
@@ -29,6 +29,7 @@ from .parameters import (
     AHEAD,
     BESIDE,
     BIAS,
+    CAMBER,
     DELAY,
     DIVE,
     FORWARD,
@@ -46,6 +47,7 @@ from .parameters import (
 from .windows import Windows
 
 ROWS = STATES + MEASURED
+STRAIGHT = 0.1  # rad: of lean. Up to about this a road is cambered, above it is banked, like the turn itself.
 STATE_STEPS = np.array([1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6])  # of the differences for derivatives
 PARAMETER_STEP = 1e-5
 
@@ -77,7 +79,7 @@ def motion_and_measurements(windows: Windows, middle: Array, p: Array) -> tuple[
     measured[:, noise.SLIDING] = wheel_left
     measured[:, noise.CLIMBING] = wheel_up - wheel * (q - p[:, DIVE] * ahead)
     measured[:, noise.SLOPING] = wheel_up
-    measured[:, noise.BALANCED] = fx - p[:, TYRES] * st - p[:, BESIDE] * ct
+    measured[:, noise.BALANCED] = fx - p[:, TYRES] * st - p[:, BESIDE] * ct - p[:, CAMBER] / (1.0 + (t / STRAIGHT) ** 4)
     measured[:, noise.ANY_SPEED] = wheel - USUAL_MPS
     measured[:, noise.GIVEN_SPEED] = wheel - p[:, DELAY] * ahead - np.nan_to_num(windows.speed)
     measured[:, noise.RESTING] = middle[:, LEFT : BIAS.start]

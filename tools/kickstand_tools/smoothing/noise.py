@@ -23,7 +23,8 @@ MEASURED = 13
 # Noise of the motion, per square root of a second
 ANGLE_ROOT = np.radians(0.2)  # rad: of lean and pitch, by vibration of the gyro
 VELOCITY_ROOT = (0.05, 0.05, 0.10)  # m/s: left, up, forward, by vibration of the accelerometer
-BIAS_ROOT = np.radians(0.01)  # rad/s: 0.6 deg/s in five minutes of warming up
+BIAS_ROOT = np.radians(0.005)  # rad/s
+WARMING_ROOT = np.radians(0.01)  # the same where no temperature tells: 0.6 deg/s in five minutes of warming up
 # Where readings are missing, and in the hand: lean, pitch, velocity; per root of a second, and at most
 LOST_ROOT = np.array([np.radians(30.0), np.radians(5.0), 3.0, 1.0, 4.0])
 LOST_MOST = np.array([np.radians(60.0), np.radians(8.0), 20.0, 2.0, 20.0])
@@ -42,8 +43,6 @@ GIVEN_MPS = 0.5  # of the log's speed
 REST_MPS, REST_RADPS = 0.05, np.radians(0.15)  # of a bike that stands
 HAND_MPS = 0.5  # of a sensor that is moved about, over a window
 BACKWARD_MPS = 0.3  # of a bike that rides backwards
-SLOWLY_S = 40.0
-UNBALANCED_LEFT, LEAST_UNBALANCE, MOST_UNBALANCE = 0.74, 0.25, 6.0
 OUTLIER = 2.0  # sigmas: what is further off counts less and less
 LASTING_S = ((SLIDING, SLIDE_S), (CLIMBING, DIVE_S), (SLOPING, SLOPE_S), (BALANCED, BALANCE_S), (ANY_SPEED, ANY_S))
 
@@ -51,6 +50,10 @@ LASTING_S = ((SLIDING, SLIDE_S), (CLIMBING, DIVE_S), (SLOPING, SLOPE_S), (BALANC
 TELLING = [LEAN, PITCH, LEFT, UP, FORWARD, STATES + SLIDING, STATES + CLIMBING]
 EXPECTED = np.array([0.38, 0.38, 0.38, 0.38, 0.38, 0.5, 0.5])
 ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
+# How far from balance a ride is, likewise: by the rms of BALANCED in means over BALANCE_S, less what lasts
+# (parameters.BESIDE), over its standard deviation; the share of an error lasting BALANCE_S that is left in such a mean
+UNBALANCED_LEFT, LASTS_S, LEAST_UNBALANCE, MOST_UNBALANCE = 0.86, 40.0, 0.25, 6.0
+TOLD_BY = 50  # windows, at least
 
 
 @dataclass
@@ -58,7 +61,8 @@ class Circumstances:
     """What is known of each of n windows.
 
     still (n): the bike stands. in_hand, not_riding (n): of first_guess.in_hand(). rolling (n): roll acceleration,
-    rad/s^2. lean (n, rad), speed (n, m/s): roughly. roughness (n): of roughness_of(), 1 for a rough ride.
+    rad/s^2. lean (n, rad), speed (n, m/s): roughly. roughness (n): of roughness_of(), 1 for a rough ride. unbalance:
+    of unbalance_of().
     """
 
     windows: Windows
@@ -76,6 +80,14 @@ class Circumstances:
         """(n) True where the bike rides, or may."""
         return ~self.windows.gap & ~self.still & ~self.not_riding
 
+    @property
+    def _balanced(self) -> NDArray[np.bool_]:
+        return self.riding & (self.speed > BALANCE_MIN_MPS)
+
+    def _of_balance(self) -> Array:
+        """(n) g: of a ride that is as far from balance as usual."""
+        return np.hypot(BALANCE_G, BALANCE_LEANED_G * np.sin(self.lean))
+
     def of_motion(self) -> Array:
         """(n, STATES): standard deviations of what the states change by within a window."""
         w = self.windows
@@ -85,7 +97,7 @@ class Circumstances:
         found[:, LEFT : BIAS.start] = VELOCITY_ROOT
         found[:, : BIAS.start] *= root * self.roughness[:, None]
         found[:, :LEFT] = np.hypot(found[:, :LEFT], jolted(w)[:, None])
-        found[:, BIAS] = BIAS_ROOT * root
+        found[:, BIAS] = (BIAS_ROOT if np.any(w.warm) else WARMING_ROOT) * root
         lost = np.minimum(LOST_ROOT * root, LOST_MOST)
         everything, velocity = w.gap | (self.in_hand & ~self.still), self.not_riding & ~self.still
         found[everything, : BIAS.start] = lost[everything]
@@ -100,8 +112,8 @@ class Circumstances:
         found[riding, SLIDING] = (self.roughness * np.hypot(SLIDE_MPS, sideways))[riding]
         found[riding, CLIMBING] = (self.roughness * np.hypot(DIVE_MPS, DIVE_RAD * speed))[riding]
         found[riding, SLOPING] = np.hypot(SLOPE_MPS, SLOPE_RAD * speed)[riding]
-        balanced = riding & (self.speed > BALANCE_MIN_MPS)
-        found[balanced, BALANCED] = self.unbalance * np.hypot(BALANCE_G, BALANCE_LEANED_G * np.sin(self.lean))[balanced]
+        balanced = self._balanced
+        found[balanced, BALANCED] = (self.unbalance * self._of_balance())[balanced]
         found[riding, ANY_SPEED] = ANY_MPS
         found *= self.lasting()
         found[balanced, BALANCED] = np.hypot(found[:, BALANCED], BALANCE_ROLLING * self.rolling)[balanced]
@@ -128,18 +140,14 @@ class Circumstances:
         return np.where(share > 0.02, np.clip(np.sqrt(found), LEAST_ROUGHNESS, MOST_ROUGHNESS), 1.0)
 
     def unbalance_of(self, force: Array) -> float:
-        """force (n): the BALANCED measurement."""
-        counted = self.riding & (self.speed > BALANCE_MIN_MPS)
-        expected = np.hypot(BALANCE_G, BALANCE_LEANED_G * np.sin(self.lean))
-        slow = averaged(counted.astype(float), SLOWLY_S)
-        slowly = averaged(np.where(counted, force, 0.0), SLOWLY_S) / np.maximum(slow, 1e-9)
-        force = force - slowly
-        share = averaged(counted.astype(float), BALANCE_S)
-        z = averaged(np.where(counted, force / expected, 0.0), BALANCE_S)
-        whole = share > 0.99
-        if np.count_nonzero(whole) < 50:
+        """How large errors of the balance are. force (n): the measurement BALANCED, g."""
+        counted = self._balanced
+        share, whole = averaged(counted.astype(float), LASTS_S), averaged(counted.astype(float), BALANCE_S) > 0.99
+        if np.count_nonzero(whole) < TOLD_BY:
             return 1.0
-        return float(np.clip(np.sqrt(np.mean(z[whole] ** 2) / UNBALANCED_LEFT), LEAST_UNBALANCE, MOST_UNBALANCE))
+        brief = force - averaged(np.where(counted, force, 0.0), LASTS_S) / np.maximum(share, 1e-9)
+        mean = averaged(np.where(counted, brief / self._of_balance(), 0.0), BALANCE_S)[whole]
+        return float(np.clip(np.sqrt(np.mean(mean**2)) / UNBALANCED_LEFT, LEAST_UNBALANCE, MOST_UNBALANCE))
 
 
 def jolted(windows: Windows) -> Array:

@@ -6,7 +6,8 @@ parameters to the first state of the next one: a short chain, which is solved fr
 the whole chain at once, no block knows less than another, and the loops are short.
 
 Unknowns of a block: its states x_0 ... x_K (s each) and its parameters p (m). x_K is the next block's x_0. Parameters
-may drift from block to block.
+may drift from block to block. By how much is believed in several ways at once, of which the chain tells how likely
+each makes the readings.
 """
 
 from dataclasses import dataclass
@@ -69,9 +70,9 @@ class Chain:
 class Beliefs:
     """What is believed of the parameters besides the windows, in G ways.
 
-    prior (G, m, m + 1): normal equations of the first block's parameters. drift (G, B - 1, m): variances of their change from
-    block to block. between (B - 1, m): how far the parameters about which the equations were linearised differ from
-    block to block.
+    prior (G, m, m + 1): normal equations of the first block's parameters. drift (G, B - 1, m): variances of their
+    change from block to block. between (B - 1, m): how far the parameters about which the equations were linearised
+    differ from block to block.
     """
 
     prior: Array
@@ -119,25 +120,13 @@ def _forward(left: Array, s: int, beliefs: Beliefs) -> tuple[list[Array], list[A
         unlikely += np.linalg.slogdet(inner)[1] - np.sum(across[:, :, n] * gain[:, :, n], axis=1)
     end = known[:, :s, :s]
     solved = np.linalg.solve(end, known[:, :s, n:])[:, :, 0]
-    return gains, inverses, known[:, :s], unlikely + np.linalg.slogdet(end)[1] - np.sum(solved * known[:, :s, n], axis=1)
+    unlikely += np.linalg.slogdet(end)[1] - np.sum(solved * known[:, :s, n], axis=1)
+    return gains, inverses, known[:, :s], unlikely
 
 
 def unlikelihood(left: Array, s: int, beliefs: Beliefs) -> Array:
     """(G): twice the negative logarithm of how likely the ride is by each of the beliefs, but for what they share."""
     return _forward(left, s, beliefs)[3]
-
-
-def mixed(left: Array, s: int, beliefs: Beliefs, share: Array) -> Chain:
-    """What is found by each of the beliefs, put together by their shares (G), whose sum is 1."""
-    chains = [solve_chain(left, s, beliefs.one(g)) for g in range(len(share))]
-    first = np.einsum("g,gbi->bi", share, [one.first for one in chains])
-    parameters = np.einsum("g,gbi->bi", share, [one.parameters for one in chains])
-    joint = np.zeros_like(chains[0].joint)
-    for weight, one in zip(share, chains):
-        off_first, off_parameters = one.first - first, one.parameters - parameters
-        off = np.concatenate((off_first[1:], off_first[:-1], off_parameters), axis=1)
-        joint += weight * (one.joint + off[:, :, None] * off[:, None, :])
-    return Chain(first, parameters, joint)
 
 
 def solve_chain(left: Array, s: int, beliefs: Beliefs) -> Chain:
@@ -161,6 +150,19 @@ def solve_chain(left: Array, s: int, beliefs: Beliefs) -> Chain:
         joint[b, s:, s:] = covariance
         first[b], parameters[b] = here[:s], here[s:]
         following, spread = here, covariance
+    return Chain(first, parameters, joint)
+
+
+def mixed(left: Array, s: int, beliefs: Beliefs, share: Array) -> Chain:
+    """What is found by each of the beliefs, put together by their shares (G), whose sum is 1."""
+    chains = [solve_chain(left, s, beliefs.one(g)) for g in range(len(share))]
+    first = np.einsum("g,gbi->bi", share, [one.first for one in chains])
+    parameters = np.einsum("g,gbi->bi", share, [one.parameters for one in chains])
+    joint = np.zeros_like(chains[0].joint)
+    for weight, one in zip(share, chains):
+        off_first, off_parameters = one.first - first, one.parameters - parameters
+        off = np.concatenate((off_first[1:], off_first[:-1], off_parameters), axis=1)
+        joint += weight * (one.joint + off[:, :, None] * off[:, None, :])
     return Chain(first, parameters, joint)
 
 
