@@ -9,16 +9,17 @@ from ..logs.table import Array
 from . import parameters as of
 from .beliefs import UNJUDGED, beliefs, judged
 from .first_guess import first_guess, in_hand, standing
-from .model import linearised, motion_and_measurements
+from .model import linearised, residuals
 from .noise import BALANCED, Circumstances
 from .parameters import BIAS, FORWARD, LEAN, LEFT, PITCH, STATES, UP
 from .solver import Chain, Eliminated, back, eliminate, mixed, variances
 from .windows import Windows, padded
 
-BLOCK = 50  # windows of a block, at least; see solver.py
-ROUNDS, PLAIN_ROUNDS, JUDGING_ROUNDS = 8, 2, 3  # at most; the first without regard to outliers, those after them judge
+BLOCK = 50  # windows of a block; see solver.py
+ROUNDS, PLAIN_ROUNDS = 10, 2  # at most; the first ones without regard to outliers
+NEAR, CONVERGED = np.radians([3.0, 0.03])  # changes of lean: from NEAR on residuals tell of the ride's errors
+JUDGING_ROUNDS = 2
 BELIEVED_ROUGHNESS = 0.5  # the motion is not believed to be smoother: errors that no model has weigh less then
-CONVERGED = np.radians(0.03)
 MAX_LEAN = 0.5  # rad: of one step. The equations are linear no further.
 MAX_PITCH = 1.2  # rad: as in the firmware
 START = np.array([1.0, 0.3, 1.0, 1.0, 20.0, 0.03, 0.03, 0.03])  # 1 sigma of the first state of all
@@ -39,25 +40,22 @@ class Adjusted:
 
 def adjust(windows: Windows, six_done: bool) -> Adjusted:
     """six_done: the accelerometer was calibrated by six positions. Raises LinAlgError where nothing can be found."""
-    count = max(1, len(windows) // BLOCK)
-    fit = _Fit(padded(windows, -(-len(windows) // count)), count, six_done)
-    for k in range(ROUNDS):
-        change = fit.plain_step() if k < PLAIN_ROUNDS else fit.step(judge=k < PLAIN_ROUNDS + JUDGING_ROUNDS)
-        if change < CONVERGED and k > PLAIN_ROUNDS:
-            break
+    length = min(BLOCK, len(windows))
+    fit = _Fit(padded(windows, length), length, six_done)
+    fit.converge()
     n = len(windows)
     return Adjusted(fit.states[: n + 1], fit.sigma()[: n + 1], fit.each_window()[:n])
 
 
 class _Fit:
-    def __init__(self, windows: Windows, blocks: int, six_done: bool) -> None:
-        self._windows, self._blocks, self._length = windows, blocks, len(windows) // blocks
+    def __init__(self, windows: Windows, length: int, six_done: bool) -> None:
+        self._windows, self._blocks, self._length = windows, len(windows) // length, length
         self._still = standing(windows)
         self._held = in_hand(windows)
         lean, speed = first_guess(windows, self._still)
         self.states = np.zeros((len(windows) + 1, STATES))
         self.states[:, LEAN], self.states[:, FORWARD] = _at_edges(lean), _at_edges(speed)
-        self._parameters = np.tile(of.USUAL, (blocks, 1))
+        self._parameters = np.tile(of.USUAL, (self._blocks, 1))
         self._roughness, self._unbalance, self._judged = np.ones(len(windows)), 1.0, UNJUDGED
         self._before = of.sigma(six_done)  # 1 sigma of the parameters, before the ride
         self._rolling = np.gradient(windows.rate[:, 2]) / WINDOW_S if len(windows) > 1 else np.zeros(1)
@@ -66,21 +64,21 @@ class _Fit:
         """(n, PARAMETERS)"""
         return np.repeat(self._parameters, self._length, axis=0)
 
-    def plain_step(self) -> float:
-        """Returns the largest change of lean, rad. Raises LinAlgError."""
-        return self._step(self._linearised(robust=False), judge=False)
+    def converge(self) -> None:
+        """Raises LinAlgError."""
+        change, judged_rounds = np.inf, 0
+        for k in range(ROUNDS):
+            near = k > PLAIN_ROUNDS and change < NEAR
+            if near:
+                self._learn()
+            change = self._step(k >= PLAIN_ROUNDS, judge=near and judged_rounds < JUDGING_ROUNDS)
+            judged_rounds += near
+            if change < CONVERGED and judged_rounds >= JUDGING_ROUNDS:
+                break
 
-    def step(self, judge: bool) -> float:
-        """The same with what is known of this ride's errors so far. judge: what of beliefs.py counts."""
-        slopes = self._linearised(robust=True)
-        self._roughness = np.maximum(self._circumstances().roughness_of(slopes[:, :, -1]), BELIEVED_ROUGHNESS)
-        middle = 0.5 * (self.states[1:] + self.states[:-1])
-        _, measured = motion_and_measurements(self._windows, middle, self.each_window())
-        self._unbalance = self._circumstances().unbalance_of(measured[:, BALANCED])
-        return self._step(self._linearised(robust=True), judge)
-
-    def _step(self, slopes: Array, judge: bool) -> float:
-        reduced = self._reduced(slopes)
+    def _step(self, robust: bool, judge: bool) -> float:
+        """judge: what of beliefs.py counts. Returns the largest change of lean, rad. Raises LinAlgError."""
+        reduced = self._reduced(self._linearised(robust))
         if judge:
             self._judged = judged(reduced.left, STATES, self._parameters, self._before)
         chain = self._solved(reduced)
@@ -94,9 +92,18 @@ class _Fit:
         self._parameters = self._parameters + share * chain.parameters
         return most
 
+    def _learn(self) -> None:
+        """What this ride's residuals tell of its errors."""
+        known = self._circumstances()
+        found = residuals(known, self.states, self.each_window(), robust=True)
+        rough = known.roughness_of(found.values)
+        self._roughness = np.clip(rough, BELIEVED_ROUGHNESS, 1.0)
+        self._unbalance = known.unbalance_of(found.measured[:, BALANCED])
+
     def sigma(self) -> Array:
         """(n + 1, STATES) standard deviations, of errors that are as large as this ride's residuals."""
-        self._roughness = self._circumstances().roughness_of(self._linearised(robust=True)[:, :, -1])
+        known = self._circumstances()
+        self._roughness = known.roughness_of(residuals(known, self.states, self.each_window(), robust=True).values)
         reduced = self._reduced(self._linearised(robust=True))
         return np.sqrt(np.maximum(_in_a_row(variances(reduced, self._solved(reduced))), 0.0))
 

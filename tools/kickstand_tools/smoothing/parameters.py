@@ -20,8 +20,8 @@ TYRES = 18  # g: force to the side over sin(lean), because tyres touch the road 
 BESIDE = 19  # g: level force to the side that lasts, by wind; see beliefs.py
 DELAY = 20  # s: of the log's speed
 DIVE = 21  # rad per m/s^2: of the nose in braking
-OFFSET_PER_C, BIAS_PER_C = slice(22, 25), slice(25, 28)  # g and rad/s per C, see Windows.warm
-CAMBER = 28  # g: force to the side on straights, where a cambered road meets the tyres beside their middle
+CAMBER = 22  # g: force to the side on straights, where a cambered road meets the tyres beside their middle
+OFFSET_PER_C, BIAS_PER_C = slice(23, 26), slice(26, 29)  # g and rad/s per C, see Windows.warm
 PARAMETERS = 29
 
 # What is known of them before the ride, and 1 sigma of that. Scale errors of 3 % and cross-axis sensitivity of 2 % are
