@@ -19,7 +19,6 @@ BLOCK = 50  # windows of a block; see solver.py
 ROUNDS, PLAIN_ROUNDS = 10, 2  # at most; the first ones without regard to outliers
 NEAR, CONVERGED = np.radians([3.0, 0.03])  # changes of lean: from NEAR on residuals tell of the ride's errors
 JUDGING_ROUNDS = 2
-BELIEVED_ROUGHNESS = 0.5  # the motion is not believed to be smoother: errors that no model has weigh less then
 MAX_LEAN = 0.5  # rad: of one step. The equations are linear no further.
 MAX_PITCH = 1.2  # rad: as in the firmware
 START = np.array([1.0, 0.3, 1.0, 1.0, 20.0, 0.03, 0.03, 0.03])  # 1 sigma of the first state of all
@@ -80,7 +79,7 @@ class _Fit:
         """judge: what of beliefs.py counts. Returns the largest change of lean, rad. Raises LinAlgError."""
         reduced = self._reduced(self._linearised(robust))
         if judge:
-            self._judged = judged(reduced.left, STATES, self._parameters, self._before)
+            self._judged = judged(reduced.left, STATES, self._parameters, self._before, self._unbalance)
         chain = self._solved(reduced)
         change = _in_a_row(back(reduced, chain))
         most = float(np.max(np.abs(change[:, LEAN])))
@@ -97,7 +96,6 @@ class _Fit:
         known = self._circumstances()
         found = residuals(known, self.states, self.each_window(), robust=True)
         rough = known.roughness_of(found.values)
-        self._roughness = np.clip(rough, BELIEVED_ROUGHNESS, 1.0)
         self._unbalance = known.unbalance_of(found.measured[:, BALANCED])
 
     def sigma(self) -> Array:

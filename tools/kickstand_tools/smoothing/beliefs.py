@@ -16,16 +16,17 @@ from . import parameters as of
 from .parameters import BESIDE, ROTATION
 from .solver import Beliefs, solve_chain, unlikelihood
 
+ROLL = ROTATION.stop - 1
 # Standard deviations. The mount's are those of its turning within a block of 10 s.
 FIRM, YIELDING, LOOSE = np.radians([0.028, 0.105, 0.35])  # rad
-SLIP = np.radians(1.5)  # rad: of its turning at one moment
+SLIP = np.radians(1.0)  # rad: of its turning about forward at one moment
 CALM_G, WIND_G, STORM_G = np.radians([0.04, 0.6, 1.8])  # g: force to the side that lasts for minutes
 PUSHED_S = 120.0  # for how long
 BLOCK_S = 10.0
 # How unusual something is: twice the logarithm of how often a ride is without it
-YIELDS, SLIPS, PUSHED = 1.0, 4.0, 7.0
+YIELDS, SLIPS, PUSHED = 1.0, 6.0, 5.0
 PLACES = 6  # so many blocks are tried, in which the mount may have slipped
-WEIGHT = 0.5  # of the likelihood: errors that no model has last, so that the readings tell less than they seem to
+WEIGHT = 0.25  # of the likelihood: errors that no model has last, so that the readings tell less than they seem to
 LEAST_SHARE = 0.02  # a way that is less likely does not count
 
 
@@ -79,12 +80,14 @@ class Judged:
 UNJUDGED = Judged(USUAL, np.ones(1), 0)
 
 
-def judged(left: Array, s: int, parameters: Array, before: Array) -> Judged:
+def judged(left: Array, s: int, parameters: Array, before: Array, unbalance: float) -> Judged:
     """left, s: of solver.eliminate(). parameters (B, m): about which the equations are linear. before (m): standard
-    deviations of the parameters before the ride."""
+    deviations of the parameters before the ride. unbalance: of Circumstances; errors that are so much larger than usual
+    let the readings tell less."""
     place = _slipped(left, s, parameters, before)
-    unlikely = unlikelihood(left, s, beliefs(ALL, place, parameters, before)) + ALL.unusual
-    share = np.exp(-0.5 * WEIGHT * (unlikely - np.min(unlikely)))
+    unlikely = unlikelihood(left, s, beliefs(ALL, place, parameters, before)) * WEIGHT / max(1.0, unbalance) ** 2
+    unlikely += ALL.unusual
+    share = np.exp(-0.5 * (unlikely - np.min(unlikely)))
     counted = np.flatnonzero(share > LEAST_SHARE * np.sum(share))
     return Judged(ALL.part(counted), share[counted] / np.sum(share[counted]), place)
 
@@ -95,8 +98,8 @@ def _slipped(left: Array, s: int, parameters: Array, before: Array) -> int:
     if len(parameters) < 2:
         return 0
     loose = solve_chain(left, s, beliefs(LOOSE_MOUNT, 0, parameters, before))
-    turned = np.diff(parameters + loose.parameters, axis=0)[:, ROTATION]
-    places = np.argsort(np.sum(turned**2, axis=1))[-PLACES:]
+    turned = np.diff(parameters + loose.parameters, axis=0)[:, ROLL]
+    places = np.argsort(np.abs(turned))[-PLACES:]
     tried = SLIPPING.part(np.zeros(len(places), dtype=int))
     return int(places[np.argmin(unlikelihood(left, s, beliefs(tried, places, parameters, before)))])
 
@@ -109,10 +112,10 @@ def beliefs(ways: Ways, place: int | NDArray[np.intp], parameters: Array, before
     known = np.stack([of.known(one) for one in sigma])
     drift = (of.DRIFT * sigma) ** 2
     drift[:, ROTATION] = ways.turning[:, None] ** 2
-    drift[:, ROTATION.stop - 1] = ways.rolling**2
+    drift[:, ROLL] = ways.rolling**2
     drift[:, BESIDE] = ways.pushed**2 * 2.0 * BLOCK_S / PUSHED_S
     drift = np.repeat(drift[:, None], max(0, blocks - 1), axis=1)
     if blocks > 1:
-        drift[np.arange(count), place, ROTATION] += (ways.slips[:, None] * SLIP) ** 2
+        drift[np.arange(count), place, ROLL] += (ways.slips * SLIP) ** 2
     pull = known @ (parameters[0] - of.USUAL)
     return Beliefs(np.concatenate((known, pull[:, :, None]), axis=2), drift, np.diff(parameters, axis=0))

@@ -43,7 +43,7 @@ for _place, _usual, _sigma in (
     USUAL[_place], SIGMA[_place] = _usual, _sigma
 # Share of sigma by which they change from block to block: a sensor warms up. A mount that yields: see beliefs.py.
 DRIFT = np.full(PARAMETERS, 1e-4)
-DRIFT[OFFSET] = 0.3, 0.1, 0.1
+DRIFT[OFFSET] = 0.15, 0.05, 0.05
 
 
 def sigma(six_done: bool) -> Array:
