@@ -9,8 +9,8 @@ from ..logs.table import Array
 from . import parameters as of
 from .beliefs import UNJUDGED, beliefs, judged
 from .first_guess import first_guess, in_hand, standing
-from .model import linearised, residuals
-from .noise import BALANCED, Circumstances
+from .model import Residuals, linearised, residuals
+from .noise import BALANCED, BRIEF_S, LONG_S, Circumstances
 from .parameters import BIAS, FORWARD, LEAN, LEFT, PITCH, STATES, UP
 from .solver import Chain, Eliminated, back, eliminate, mixed, variances
 from .windows import Windows, padded
@@ -69,7 +69,8 @@ class _Fit:
         for k in range(ROUNDS):
             near = k > PLAIN_ROUNDS and change < NEAR
             if near:
-                self._learn()
+                balance = self._residuals().measured[:, BALANCED]
+                self._unbalance = self._circumstances().unbalance_of(balance, BRIEF_S)
             change = self._step(k >= PLAIN_ROUNDS, judge=near and judged_rounds < JUDGING_ROUNDS)
             judged_rounds += near
             if change < CONVERGED and judged_rounds >= JUDGING_ROUNDS:
@@ -91,17 +92,15 @@ class _Fit:
         self._parameters = self._parameters + share * chain.parameters
         return most
 
-    def _learn(self) -> None:
-        """What this ride's residuals tell of its errors."""
-        known = self._circumstances()
-        found = residuals(known, self.states, self.each_window(), robust=True)
-        rough = known.roughness_of(found.values)
-        self._unbalance = known.unbalance_of(found.measured[:, BALANCED])
-
     def sigma(self) -> Array:
-        """(n + 1, STATES) standard deviations, of errors that are as large as this ride's residuals."""
-        known = self._circumstances()
-        self._roughness = known.roughness_of(residuals(known, self.states, self.each_window(), robust=True).values)
+        """(n + 1, STATES) standard deviations, of errors that are as large as this ride's residuals.
+
+        The states are those by the sigmas of a rough ride, because errors that no model has last for long, and weigh
+        less then.
+        """
+        known, found = self._circumstances(), self._residuals()
+        self._roughness = known.roughness_of(found.values)
+        self._unbalance = known.unbalance_of(found.measured[:, BALANCED], LONG_S)
         reduced = self._reduced(self._linearised(robust=True))
         return np.sqrt(np.maximum(_in_a_row(variances(reduced, self._solved(reduced))), 0.0))
 
@@ -111,6 +110,9 @@ class _Fit:
         return Circumstances(
             self._windows, self._still, *self._held, self._rolling, lean, speed, self._roughness, self._unbalance
         )
+
+    def _residuals(self) -> Residuals:
+        return residuals(self._circumstances(), self.states, self.each_window(), robust=True)
 
     def _linearised(self, robust: bool) -> Array:
         return linearised(self._circumstances(), self.states, self.each_window(), robust)

@@ -18,13 +18,14 @@ from .solver import Beliefs, solve_chain, unlikelihood
 
 ROLL = ROTATION.stop - 1
 # Standard deviations. The mount's are those of its turning within a block of 10 s.
-FIRM, YIELDING, LOOSE = np.radians([0.028, 0.105, 0.35])  # rad
+FIRM, YIELDING, LOOSE = np.radians([0.05, 0.11, 0.35])  # rad
 SLIP = np.radians(1.0)  # rad: of its turning about forward at one moment
 CALM_G, WIND_G, STORM_G = np.radians([0.04, 0.6, 1.8])  # g: force to the side that lasts for minutes
 PUSHED_S = 120.0  # for how long
 BLOCK_S = 10.0
-# How unusual something is: twice the logarithm of how often a ride is without it
-YIELDS, SLIPS, PUSHED = 1.0, 6.0, 5.0
+# How unusual something is: twice the logarithm of how often a ride is without it. A light wind that lasts is usual, but
+# a mount that yields looks the same, and is further from the truth if it is taken for wind.
+YIELDS, SLIPS, WINDY, STORMY = 1.0, 6.0, 8.0, 5.0
 PLACES = 6  # so many blocks are tried, in which the mount may have slipped
 WEIGHT = 0.25  # of the likelihood: errors that no model has last, so that the readings tell less than they seem to
 LEAST_SHARE = 0.02  # a way that is less likely does not count
@@ -51,7 +52,7 @@ class Ways:
 
 def _all_ways() -> Ways:
     mounts = ((FIRM, FIRM, 0.0), (FIRM, YIELDING, YIELDS), (YIELDING, YIELDING, YIELDS))
-    pushes = ((CALM_G, 0.0), (WIND_G, PUSHED), (STORM_G, PUSHED))
+    pushes = ((CALM_G, 0.0), (WIND_G, WINDY), (STORM_G, STORMY))
     slips = ((0.0, 0.0), (1.0, SLIPS))
     rows = [
         (turning, rolling, pushed, slip, yields + windy + slipped)

@@ -50,9 +50,11 @@ LASTING_S = ((SLIDING, SLIDE_S), (CLIMBING, DIVE_S), (SLOPING, SLOPE_S), (BALANC
 TELLING = [LEAN, PITCH, LEFT, UP, FORWARD, STATES + SLIDING, STATES + CLIMBING]
 EXPECTED = np.array([0.38, 0.38, 0.38, 0.38, 0.38, 0.5, 0.5])
 ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
-# How far from balance a ride is, likewise: by the rms of BALANCED in means over BALANCE_S, less what lasts
-# (parameters.BESIDE), over its standard deviation; the share of an error lasting BALANCE_S that is left in such a mean
-UNBALANCED_LEFT, LASTS_S, LEAST_UNBALANCE, MOST_UNBALANCE = 0.86, 40.0, 0.25, 6.0
+# How far from balance a ride is, likewise: by the rms of BALANCED in means over some seconds, less what lasts longer
+# (parameters.BESIDE), over its standard deviation. The longer these means, the more an error has gone that changes
+# sides, as a rider's corrections do: over BRIEF_S the balance is judged with care, over LONG_S as it is.
+BRIEF_S, LONG_S, LASTS_S = 3.0, 10.0, 40.0
+LEAST_UNBALANCE, MOST_UNBALANCE = 0.25, 6.0
 TOLD_BY = 50  # windows, at least
 
 
@@ -139,15 +141,17 @@ class Circumstances:
         found = averaged(np.where(self.riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
         return np.where(share > 0.02, np.clip(np.sqrt(found), LEAST_ROUGHNESS, MOST_ROUGHNESS), 1.0)
 
-    def unbalance_of(self, force: Array) -> float:
-        """How large errors of the balance are. force (n): the measurement BALANCED, g."""
+    def unbalance_of(self, force: Array, over_s: float) -> float:
+        """How large errors of the balance are. force (n): the measurement BALANCED, g. over_s: BRIEF_S or LONG_S."""
         counted = self._balanced
-        share, whole = averaged(counted.astype(float), LASTS_S), averaged(counted.astype(float), BALANCE_S) > 0.99
+        share, whole = averaged(counted.astype(float), LASTS_S), averaged(counted.astype(float), over_s) > 0.97
         if np.count_nonzero(whole) < TOLD_BY:
             return 1.0
-        brief = force - averaged(np.where(counted, force, 0.0), LASTS_S) / np.maximum(share, 1e-9)
-        mean = averaged(np.where(counted, brief / self._of_balance(), 0.0), BALANCE_S)[whole]
-        return float(np.clip(np.sqrt(np.mean(mean**2)) / UNBALANCED_LEFT, LEAST_UNBALANCE, MOST_UNBALANCE))
+        off = force - averaged(np.where(counted, force, 0.0), LASTS_S) / np.maximum(share, 1e-9)
+        mean = averaged(np.where(counted, off / self._of_balance(), 0.0), over_s)[whole]
+        ratio = over_s / BALANCE_S  # left in a mean is this share of the variance of an error that lasts BALANCE_S
+        left = 2.0 * (ratio - 1.0 + np.exp(-ratio)) / ratio**2
+        return float(np.clip(np.sqrt(np.mean(mean**2) / left), LEAST_UNBALANCE, MOST_UNBALANCE))
 
 
 def jolted(windows: Windows) -> Array:
