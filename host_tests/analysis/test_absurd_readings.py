@@ -5,8 +5,8 @@ import warnings
 
 import numpy as np
 import pytest
-from kickstand_tools.analysis.channels import open_ride
 from kickstand_tools.analysis.downsample import joined
+from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
 from kickstand_tools.refusals import sentence
@@ -24,7 +24,7 @@ def test_a_lean_filter_that_has_lost_itself(seed):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         ride = joined(list(open_ride(spinning(seed), CalibrationFile(aligned=True)).blocks(notices=notices)))
-    lost = np.isnan(ride.sigma_deg)
+    lost = np.isnan(ride.lean_sigma_deg)
     assert not np.any(ride.trusted[lost])
     assert not np.any(ride.sure[lost])
     said = [sentence(notice) for notice in notices if notice.code == "absurd-readings"]
@@ -37,6 +37,6 @@ def test_a_lean_filter_that_has_lost_itself(seed):
 
 def test_some_of_them_do():
     assert any(
-        np.isnan(joined(list(open_ride(spinning(seed), CalibrationFile(aligned=True)).blocks())).sigma_deg).any()
+        np.isnan(joined(list(open_ride(spinning(seed), CalibrationFile(aligned=True)).blocks())).lean_sigma_deg).any()
         for seed in range(6)
     )

@@ -10,9 +10,9 @@ import command
 import numpy as np
 import pytest
 from kickstand_tools.analysis import report
-from kickstand_tools.analysis.channels import open_ride
 from kickstand_tools.analysis.overview import overview
-from kickstand_tools.analysis.plot import page, picture, plot
+from kickstand_tools.analysis.plot import charts, picture, plot
+from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.stops.brake_test import Stop
 from kickstand_tools.simulation.scripted import script
 
@@ -198,17 +198,17 @@ def test_a_speed_is_drawn_where_there_is_one(tmp_path, car, speed_hz):
     cal = tmp_path / "RIDE.cal.json"
     cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle": "car" if car else "motorcycle"}))
     seen = overview(open_ride(ride, cal))
-    figure = page.figure(seen)
-    row = {trace.name: trace.yaxis for trace in figure.data}
+    figure = charts.figure(seen)
+    row = {trace.get("name"): trace["yaxis"] for trace in figure["data"]}
     assert ("lean" in row) is not car
     assert ("speed" in row) is bool(speed_hz)
     above = {"lean", "speed"} & set(row)
     assert len({row[name] for name in (*above, "forward")}) == len(above) + 1
     assert row["forward"] == row["to the left"] == ("y", "y2", "y3")[len(above)]
-    assert {shape.xref for shape in figure.layout.shapes} == {row["forward"].replace("y", "x")}
+    assert {shape["xref"] for shape in figure["layout"]["shapes"]} == {row["forward"].replace("y", "x")}
     if speed_hz:
-        (drawn,) = (trace for trace in figure.data if trace.name == "speed")
-        assert max(drawn.y) == pytest.approx(54.0, abs=0.5)  # km/h
+        (drawn,) = (trace for trace in figure["data"] if trace.get("name") == "speed")
+        assert max(drawn["y"]) == pytest.approx(54.0, abs=0.5)  # km/h
     picture.draw(tmp_path / "ride.png", seen)
     height = struct.unpack(">2I", (tmp_path / "ride.png").read_bytes()[16:24])[1]
     assert height == 550 + 250 * (not car) + 150 * bool(speed_hz)

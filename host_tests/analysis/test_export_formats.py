@@ -9,11 +9,14 @@ import time
 from dataclasses import fields
 from pathlib import Path
 
+import analysis_rides
+import command
 import numpy as np
 import pytest
-from kickstand_tools.analysis.channels import Channels, open_ride
+from kickstand_tools.analysis.channels import Channels
 from kickstand_tools.analysis.export import export_csv, export_racechrono, export_vbo
 from kickstand_tools.analysis.export.export import export
+from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.log import Log
@@ -32,7 +35,7 @@ VALUES = {
     "speed_mps": 10.5,
     "temp_c": 21.456,
     "shown_g": 7.0,
-    "sigma_deg": 0.98765,
+    "lean_sigma_deg": 0.98765,
     "resting": 5.0,
     "rolling": 6.0,
     "sure": 8.0,
@@ -60,7 +63,7 @@ def test_csv_to_the_letter(tmp_path):
     lines = written(export_csv.write, tmp_path / "x.csv", block(0.25), none, start_s=100.0).split("\n")
     assert lines == [
         "t_s,lean_deg,lean_formula_deg,left_g,up_g,forward_g,lateral_g,pitch_rate_dps,yaw_rate_dps,roll_rate_dps,"
-        "speed_mps,temp_c,sigma_deg,lat_deg,lon_deg,utc_s",
+        "speed_mps,temp_c,lean_sigma_deg,lat_deg,lon_deg,utc_s",
         "100.250000,-12.346,23.457,0.12346,0.98765,-0.23457,0.34568,1.2346,-2.3457,3.4568,10.500,21.46,0.988,"
         "52.1234568,-0.5000000,1700000123.457",
         "100.500000,-12.346,,0.12346,0.98765,-0.23457,0.34568,1.2346,-2.3457,3.4568,,,0.988,,,",
@@ -220,9 +223,18 @@ def test_sigma_is_what_the_filter_believes_in_degrees(tmp_path):
         engine.take(*row)
         variance.append(engine.meter.filter.variance)
     export(open_ride(log, motorcycle), "csv", tmp_path / "out")
-    sigma = np.genfromtxt(tmp_path / "out", delimiter=",", names=True)["sigma_deg"]
+    sigma = np.genfromtxt(tmp_path / "out", delimiter=",", names=True)["lean_sigma_deg"]
     assert sigma == pytest.approx(np.sqrt(variance) * 180.0 / np.pi, abs=1e-3)
     assert sigma.max() > 0.5
+
+
+def test_the_lean_is_the_smoothed_one_or_with_live_the_displays(tmp_path):
+    ride = analysis_rides.short(tmp_path, rate_hz=50)
+    for more, other in (((), "smooth"), (("--live",), "replay")):
+        command.works("export", ride, "--to", "csv", *more, "--out", tmp_path / "export.csv")
+        command.works(other, ride, "--out", tmp_path / "lean.csv")
+        exported, expected = (analysis_rides.table(tmp_path / name) for name in ("export.csv", "lean.csv"))
+        assert exported["lean_deg"] == pytest.approx(expected["lean_deg"], abs=1e-3), other
 
 
 def first_time(path: Path, form: str) -> float:

@@ -1,14 +1,15 @@
 """Left is drawn on the left, braking below: in the picture and in the page, whose axes nobody else checks."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import analysis_rides
 import numpy as np
 import pytest
 from kickstand_tools.analysis.alignment_quality import Quality
-from kickstand_tools.analysis.channels import open_ride
 from kickstand_tools.analysis.overview import Overview, overview
-from kickstand_tools.analysis.plot import page, picture
+from kickstand_tools.analysis.plot import charts, page, picture
+from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.simulation.scripted import script
 
 pytest.importorskip("matplotlib")
@@ -60,9 +61,9 @@ def test_g_against_g_in_the_picture(panels):
 
 
 def test_g_against_g_in_the_page(seen):
-    (drawn,) = [trace for trace in page.figure(seen).data if trace.type == "heatmap"]
-    x, y = np.meshgrid(drawn.x, drawn.y)
-    check(seconds_at(x, y, 10.0**drawn.z))
+    (drawn,) = [trace for trace in charts.figure(seen)["data"] if trace["type"] == "heatmap"]
+    x, y = np.meshgrid(drawn["x"], drawn["y"])
+    check(seconds_at(x, y, 10.0 ** np.array(drawn["z"], dtype=float)))
 
 
 def test_the_straights_and_their_line(seen, panels):
@@ -73,11 +74,11 @@ def test_the_straights_and_their_line(seen, panels):
     slope = -np.tan(np.radians(10.0))
     assert line.get_xdata() == pytest.approx(slope * line.get_ydata())
     assert list(line.get_ydata()) == [-0.5, 0.5]
-    below = [trace for trace in page.figure(seen).data if trace.type.startswith("scatter")][-2:]
-    assert below[0].x == pytest.approx(-seen.quality.lateral_g)
-    assert below[0].y == pytest.approx(seen.quality.forward_g)
-    assert below[1].x == pytest.approx(slope * np.array(below[1].y))
-    assert list(below[1].y) == [-0.5, 0.5]
+    below = [trace for trace in charts.figure(seen)["data"] if trace["type"].startswith("scatter")][-2:]
+    assert below[0]["x"] == pytest.approx(-seen.quality.lateral_g, abs=1e-5)
+    assert below[0]["y"] == pytest.approx(seen.quality.forward_g, abs=1e-5)
+    assert below[1]["x"] == pytest.approx(slope * np.array(below[1]["y"]), abs=1e-5)
+    assert list(below[1]["y"]) == [-0.5, 0.5]
 
 
 def test_lean_to_the_left_is_below_and_on_the_left(seen, panels):
@@ -88,10 +89,30 @@ def test_lean_to_the_left_is_below_and_on_the_left(seen, panels):
     bars = panels["How long at which lean"].patches
     (turn,) = [bar for bar in bars if bar.get_height() == max(b.get_height() for b in bars if abs(b.get_x()) > 8.0)]
     assert turn.get_x() < -25.0
-    figure = page.figure(seen)
-    by_name = {trace.name: trace for trace in figure.data}
-    assert min(by_name["lean"].y) == pytest.approx(-seen.summary.left_deg.value, abs=0.2)
-    shares = np.where(np.abs(by_name["share"].x) > 8.0, by_name["share"].y, 0.0)
-    assert by_name["share"].x[int(np.argmax(shares))] < -25.0
-    (said,) = [note for note in figure.layout.annotations if note.text.endswith("° left")]
-    assert said.y == pytest.approx(-seen.summary.left_deg.value)
+    figure = charts.figure(seen)
+    by_name = {trace.get("name"): trace for trace in figure["data"]}
+    assert min(by_name["lean"]["y"]) == pytest.approx(-seen.summary.left_deg.value, abs=0.2)
+    shares = np.where(np.abs(by_name["share"]["x"]) > 8.0, by_name["share"]["y"], 0.0)
+    assert by_name["share"]["x"][int(np.argmax(shares))] < -25.0
+    (said,) = [note for note in figure["layout"]["annotations"] if note["text"].endswith("° left")]
+    assert said["y"] == pytest.approx(-seen.summary.left_deg.value)
+
+
+def test_in_a_narrow_window_the_charts_stand_below_each_other(seen):
+    """In a wide one the last three beside each other; neither covers another."""
+    for kind, last_row in (("layout", 3), ("narrow", 1)):
+        drawn = charts.figure(seen)[kind]
+        axes = [name.removeprefix("xaxis") for name in drawn if name.startswith("xaxis")]
+        places = [(drawn[f"xaxis{k}"]["domain"], drawn[f"yaxis{k}"]["domain"]) for k in axes]
+        lowest = min(y[0] for _, y in places)
+        assert sum(y[0] == lowest for _, y in places) == last_row
+        for k, (x, y) in enumerate(places):
+            for other_x, other_y in places[:k]:
+                assert x[0] >= other_x[1] or x[1] <= other_x[0] or y[1] <= other_y[0]
+
+
+def test_the_name_of_a_ride_is_text_in_its_page(seen):
+    named = replace(seen, ride=replace(seen.ride, log=Path("<b>&.csv")))
+    html = page.page(named, "")
+    assert "<title>&lt;b&gt;&amp;</title>" in html
+    assert "<b>" not in html

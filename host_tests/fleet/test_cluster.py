@@ -11,7 +11,7 @@ import pyarrow.parquet as parquet
 import pytest
 from fleet_tasks import task
 from kickstand_tools.errors import InputError
-from kickstand_tools.fleet import files, run
+from kickstand_tools.fleet import run
 from kickstand_tools.fleet.cluster import CRASHED, TIMED_OUT, Cluster
 from kickstand_tools.fleet.journal import Journal
 from kickstand_tools.fleet.manifest import Period, read_manifest
@@ -155,44 +155,3 @@ def test_no_scheduler_is_told(monkeypatch):
     monkeypatch.setattr("kickstand_tools.fleet.cluster._REMOTE_PATIENCE_S", 0.5)
     with pytest.raises(InputError, match=r"no workers at tcp://127\.0\.0\.1:9"):
         list(run.run_tasks(task, [(1,)], "tcp://127.0.0.1:9"))
-
-
-def test_s3_gives_the_same_as_files(fleet, tmp_path, monkeypatch):
-    moto = pytest.importorskip("moto.server")
-    s3fs = pytest.importorskip("s3fs")
-    server = moto.ThreadedMotoServer(port=0, verbose=False)
-    server.start()
-    try:
-        host, port = server.get_host_and_port()
-        for name, value in {
-            "AWS_ENDPOINT_URL": f"http://{host}:{port}",
-            "AWS_ACCESS_KEY_ID": "test",
-            "AWS_SECRET_ACCESS_KEY": "test",
-            "AWS_DEFAULT_REGION": "us-east-1",
-        }.items():
-            monkeypatch.setenv(name, value)
-        s3fs.S3FileSystem.clear_instance_cache()
-        s3 = s3fs.S3FileSystem()
-        s3.mkdir("fleet")
-        wanted = read_manifest(str(fleet.manifest))[:2]
-        names = [Path(path) for period in wanted for path in period.paths]
-        for path in names:
-            s3.put_file(str(path), f"fleet/drives/{path.name}")
-        lines = [f"{one.vehicle},drives/{Path(path).name},{one.kind}" for one in wanted for path in one.paths]
-        s3.pipe_file("fleet/MANIFEST.csv", "\n".join(["vehicle,path,kind", *lines]).encode())
-        periods = read_manifest("s3://fleet/MANIFEST.csv")
-        marks = files.identities(path for period in periods for path in period.paths)
-        assert all(marks.values())
-        assert files.matches("s3://fleet/drives/*") == sorted(f"s3://fleet/drives/{path.name}" for path in names)
-        from kickstand_tools.fleet.period import work_on_period
-
-        for one, other in zip(periods, wanted, strict=True):
-            remote = work_on_period(one, "s3://fleet/signals")
-            local = work_on_period(other, str(tmp_path / "signals"))
-            assert remote.alignment == local.alignment
-            assert [row | {"log": ""} for row in remote.brake_tests] == [row | {"log": ""} for row in local.brake_tests]
-        assert len(s3.glob("fleet/signals/**/*.parquet")) == len(list(tmp_path.rglob("*.parquet"))) > 0
-    finally:
-        server.stop()
-
-

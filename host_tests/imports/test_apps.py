@@ -21,8 +21,6 @@ import pytest
 from app_exports import PHONE, START_UTC_S, Riding
 from kickstand_tools import api
 
-pytest.importorskip("pandas")
-
 ON_PHONE = api.CalibrationFile(vehicle_from_sensor=PHONE.T, aligned=True)
 ON_BIKE = api.CalibrationFile(aligned=True)
 WITHIN_DEG = (

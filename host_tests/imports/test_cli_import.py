@@ -9,8 +9,6 @@ import pytest
 from app_exports import PHONE, riding
 from kickstand_tools import api
 
-pytest.importorskip("pandas")
-
 
 def test_it_says_what_it_took_for_what(tmp_path):
     source = app_exports.into(tmp_path / "p.zip", app_exports.phyphox(riding().every(2)))

@@ -9,8 +9,6 @@ from kickstand_tools import api
 from kickstand_tools.imports.join import join, on_clock
 from kickstand_tools.imports.recording import Recording, Sensor, Track
 
-pytest.importorskip("pandas")
-
 MS = 10**6
 
 

@@ -1,6 +1,5 @@
 """What cannot be imported is refused in one line that says what to do, and nothing is written."""
 
-import sys
 import zipfile
 
 import app_exports
@@ -9,8 +8,6 @@ import numpy as np
 import pytest
 from app_exports import riding
 from kickstand_tools import api
-
-pytest.importorskip("pandas")
 
 
 @pytest.fixture
@@ -181,7 +178,7 @@ def test_a_replays_output_and_kickstands_own_vbo(tmp_path, ride):
     command.still(tmp_path / "log.csv", (0, 1, 0))
     cal = command.write_cal(tmp_path / "CAL.json")
     command.works("replay", tmp_path / "log.csv", "--calibration", cal, "--out", tmp_path / "LEAN.csv")
-    refused(tmp_path, tmp_path / "LEAN.csv", "holds the lean that kickstand has computed: give the log")
+    refused(tmp_path, tmp_path / "LEAN.csv", "holds a lean, no readings: give the log")
 
 
 def test_units_that_are_known_are_not_asked_for(tmp_path, ride):
@@ -219,12 +216,6 @@ def test_a_zip_with_a_password(tmp_path):
         content[content.index(mark) + place] |= 1  # the flag of an encrypted entry
     (tmp_path / "a.zip").write_bytes(content)
     refused(tmp_path, tmp_path / "a.zip", "is packed with a password, or in another way: unpack it first")
-
-
-def test_without_pandas_the_extra_is_named(tmp_path, ride, monkeypatch):
-    (tmp_path / "r.csv").write_text(app_exports.racebox(ride))
-    monkeypatch.setitem(sys.modules, "pandas", None)
-    refused(tmp_path, tmp_path / "r.csv", "import needs pandas: ")
 
 
 @pytest.mark.parametrize(

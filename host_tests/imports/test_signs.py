@@ -8,8 +8,6 @@ from app_exports import PHONE, riding
 from kickstand_tools import api
 from kickstand_tools.logs.axes.course import course_agrees
 
-pytest.importorskip("pandas")
-
 
 def up_at_rest(found: api.Imported) -> np.ndarray:
     """The mean force of the first second, in which the motorcycle stands upright."""

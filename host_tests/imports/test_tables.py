@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from app_exports import riding
 from kickstand_tools import api
-from kickstand_tools.imports import times, units
-
-pandas = pytest.importorskip("pandas")
+from kickstand_tools.imports import cells, times, units
 
 NAMES = {
     "t": "Millis",
@@ -122,9 +120,14 @@ TIMES = {
 }
 
 
+def column(texts):
+    """These cells, as they are read."""
+    return cells.columns_of([[text] for text in texts], 1)[0]
+
+
 @pytest.mark.parametrize("name", TIMES)
 def test_times_of_any_kind_without_a_unit(name):
-    found = times.times_ns(pandas.Series(TIMES[name]))
+    found = times.times_ns(column(TIMES[name]))
     assert np.allclose(np.diff(found), 10_000_000, atol=600)  # of a double in ns since 1970
     if "1970" in name or "zone" in name or name == "UTC":
         assert found[0] == pytest.approx(START_NS, abs=600)
@@ -133,12 +136,12 @@ def test_times_of_any_kind_without_a_unit(name):
 def test_slow_recorders_in_ms_are_not_taken_for_seconds():
     """Ten and twenty-five samples a second, and as fast as 400."""
     for step, unit in ((100, 1e6), (40, 1e6), (2.5, 1e6), (0.1, 1e9), (0.0025, 1e9), (100_000, 1e3), (2500, 1e3)):
-        found = times.times_ns(pandas.Series([step * k for k in range(20)]))
+        found = times.times_ns(np.array([step * k for k in range(20)]))
         assert np.allclose(np.diff(found), step * unit), (step, unit)
 
 
 def test_a_cell_without_a_time():
-    found = times.times_ns(pandas.Series(["0.0", "0.01", "", "x", "1e300", "inf", "0.06"]))
+    found = times.times_ns(column(["0.0", "0.01", "", "x", "1e300", "inf", "0.06"]))
     assert (found == times.NO_TIME).tolist() == [False, False, True, True, True, True, False]
 
 
@@ -202,3 +205,24 @@ def test_a_mistake_in_the_options(tmp_path, name):
     out = tmp_path / "R.csv"
     arguments = ["--out", out, "--columns", columns, "--units", given]
     command.refused(tmp_path, "import", tmp_path / "log.csv", *arguments, words=words)
+
+
+def test_columns_are_whole_numbers_floats_or_text():
+    text = '1,0.5,start,7\n2, 1.5 ,,\n\n3,NA,"a, ""b""",9\n4,x,1_0,1\n'
+    whole, floats, words, few = cells.columns_of_text(text, ",", 4)
+    assert whole.dtype.kind == "i" and whole.tolist() == [1, 2, 3, 4]
+    assert floats.tolist() == ["0.5", " 1.5 ".lstrip(), "", "x"]
+    assert np.allclose(cells.numbers_of(floats), [0.5, 1.5, np.nan, np.nan], equal_nan=True)
+    assert words.tolist() == ["start", "", 'a, "b"', "1_0"]
+    assert np.all(np.isnan(cells.numbers_of(words)))  # 1_0 is no number
+    assert few.dtype.kind == "f" and np.isnan(few[1]) and cells.filled(few).tolist() == [True, False, True, True]
+
+
+def test_a_damaged_row_costs_itself(monkeypatch):
+    """A quotation mark that is not closed, cells too many or too few; a block that is text after one of numbers."""
+    monkeypatch.setattr(cells, "ROWS", 2)
+    rows = ['"1","2","3"', '"4","5,"6"', "7,8,9,10", "11", f"12,13,{14:0200000d}", "15,stop,16"]
+    first, second, third = cells.columns_of_text("\n".join(rows), ",", 3)
+    assert first.tolist() == [1, 4, 11, 12, 15]
+    assert second.tolist() == ["2", "5", "", "13.0", "stop"]
+    assert np.allclose(cells.numbers_of(third), [3, 6, np.nan, 14, 16], equal_nan=True)

@@ -100,8 +100,9 @@ def test_a_part_of_a_video_that_began_before_the_ride(tmp_path, ride):
     out = "--out", tmp_path / "out.mp4"
     said = command.refused(tmp_path, *given, *out, words="lasts from -3.0 to 3.0 s of the ride")
     assert "--from 0.0 --to 3.0" in said
-    command.works(*given, "--from", 0, "--to", 3, *out)
-    assert len(gopro.frames(tmp_path / "out.mp4")) == pytest.approx(30, abs=1)
+    for part in (("--from", 0, "--to", 3), ("--to", 3), ("--from", 0)):
+        command.works(*given, *part, *out)
+        assert len(gopro.frames(tmp_path / "out.mp4")) == pytest.approx(30, abs=1), part
 
 
 def test_a_gopros_gyro_finds_the_offset(tmp_path):
@@ -151,6 +152,8 @@ def test_what_is_no_video_of_the_ride_is_refused(tmp_path, ride):
         command.refused(tmp_path, "overlay", ride, "--video", tmp_path / video, *more, *out, words=words)
     clip = "--out", tmp_path / "clip.mov"
     command.refused(tmp_path, "overlay", ride, "--video", film, "--offset", 1, *clip, words="has to end in .mp4")
+    given = "overlay", ride, "--video", film, "--offset", 1
+    command.refused(tmp_path, *given, "--height", 480, *out, words="over a video the gauge goes by the video's own")
     command.refused(tmp_path, "overlay", ride, *out, words="ends in .mov or .webm")
     command.refused(tmp_path, "overlay", ride, "--offset", 3, *clip, words="is that of a video")
     command.refused(tmp_path, "overlay", ride, "--video", film, "--offset", 1, "--out", film, words="is also an input")

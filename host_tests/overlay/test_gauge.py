@@ -96,12 +96,12 @@ def test_maxima_have_their_marks(gauge):
     assert np.all(changed[:, 1] > 0.6 * gauge.height)
 
 
-@pytest.mark.parametrize("height", [240, 480, 1080, 2160])
-def test_its_size_goes_by_the_videos_and_its_corners_are_clear(height):
+@pytest.mark.parametrize("height, pixels", [(240, 108), (480, 216), (720, 216), (1080, 324), (2160, 648)])
+def test_its_size_goes_by_the_videos_and_its_corners_are_clear(height, pixels):
     gauge = Gauge(height, has_speed=height != 480, mph=True)
     picture = np.asarray(gauge.picture(30.0, -0.2, 0.5, 20.0, 12.0, 31.0))
     assert picture.shape == (gauge.height, gauge.width, 4)
-    assert gauge.height == max(96, round(0.3 * height))
+    assert gauge.height == pixels
     assert gauge.width % 2 == gauge.height % 2 == 0
     assert picture[0, 0, 3] == picture[-1, -1, 3] == 0
     assert 50 < picture[gauge.height // 2, 2, 3] < 200  # the panel lets the film through

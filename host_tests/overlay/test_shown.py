@@ -1,8 +1,11 @@
 """What the gauge is told of a ride."""
 
+from dataclasses import replace
+
 import analysis_rides
 import numpy as np
 import pytest
+from kickstand.errors import Notice
 from kickstand_tools import api
 from kickstand_tools.overlay.shown import shown
 
@@ -39,9 +42,19 @@ def test_a_potholes_lean_is_no_maximum_and_a_lean_that_is_not_trusted_neither(ri
             block.sure[at + 100 : at + 150] = 0.0
             yield block
 
-    monkeypatch.setattr(type(opened), "blocks", lambda self, progress=None, notices=None: changed())
+    monkeypatch.setattr(type(opened), "blocks", lambda self, progress=None, notices=None, mount=None: changed())
     seen = shown(opened)
     early = seen.t_s < 4.0
     assert seen.right_deg[early].max() < 5.0
     assert seen.left_deg[early].max() < 5.0
     assert np.isnan(seen.at(np.array([3.2])).lean_deg[0])
+
+
+def test_a_calibration_that_the_ride_contradicts_is_told(ride):
+    """As by every command that takes one."""
+    calibration = api.read_calibration(ride.with_name("RIDE.cal.json"))
+    backward = replace(calibration, vehicle_from_sensor=np.diag([-1.0, 1.0, -1.0]))
+    for given, codes in ((calibration, []), (backward, ["forward-exchanged"])):
+        notices: list[Notice] = []
+        shown(api.open_ride(ride, given), notices=notices)
+        assert [notice.code for notice in notices] == codes

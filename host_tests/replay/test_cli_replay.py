@@ -286,7 +286,7 @@ def test_the_calibration_beside_the_log_is_taken(tmp_path):
     command.refused(tmp_path, "replay", log, "--out", lean, words=f"no calibration {beside.name} beside it")
     beside.write_text(json.dumps(analysis_rides.CALIBRATION))
     command.works("replay", log, "--out", lean)
-    words = f"LEAN.csv holds the lean that kickstand has computed: give the log that it was made from, {log}\n"
+    words = f"LEAN.csv holds a lean, no readings: give the log that it was made from, {log}\n"
     exported = tmp_path / "EXPORTED.csv"
     command.works("export", log, "--to", "csv", "--out", exported)
     out = tmp_path / "x.csv"

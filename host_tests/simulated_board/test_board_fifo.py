@@ -148,3 +148,23 @@ def test_the_ring_of_bytes():
     assert [ring.pop() for _ in range(5)] == [2, 3, 4, 5, 5]
     assert [ring.push(i, keep_old=True) for i in range(6)] == [False] * 4 + [True] * 2
     assert [ring.pop() for _ in range(4)] == [0, 1, 2, 3]
+
+
+def test_many_bytes_at_once_are_the_same_as_one_by_one():
+    values, places = bytes(range(100, 228)), (3, 4, 5, 60, 61, 7, 127)
+    for keep_old in (False, True):
+        quick, slow = Fifo(40), Fifo(40)
+        for step in range(200):
+            if step * 7 % 11 < 6:
+                full = False
+                for place in places[: step % 8]:
+                    full = slow.push(values[place], keep_old) or full
+                assert quick.push_all(values, places[: step % 8], keep_old) == full
+            else:
+                got = bytearray(step % 9)
+                quick.pop_into(got)
+                assert got == bytes([slow.pop() for _ in range(step % 9)])
+            assert quick.count == slow.count
+        got = bytearray(45)
+        quick.pop_into(got)  # more than there is: the last one is repeated
+        assert got == bytes([slow.pop() for _ in range(45)])

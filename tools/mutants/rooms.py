@@ -107,6 +107,16 @@ ROOMS = {
             TESTS + "analysis/stops/test_analysis_brake_test.py",
         ),
     ),
+    "fleet": Room(
+        tuple(
+            TOOLS + f"fleet/{name}.py"
+            for name in ("evidence", "files", "forward", "journal", "manifest", "moved", "period", "run", "tables")
+        ),
+        tuple(  # not test_cluster.py, which takes longer than all of them
+            TESTS + f"fleet/test_{name}.py"
+            for name in ("evidence", "moved", "forward", "period", "full_disk", "store", "manifest")
+        ),
+    ),
     "simulation": Room(
         (TOOLS + "simulation/*.py", TOOLS + "simulation/physics/*.py", TOOLS + "simulation/scripted/*.py"),
         (TESTS + "simulation/*.py",),

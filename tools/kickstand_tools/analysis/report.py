@@ -1,11 +1,8 @@
-"""A ride in a page of the terminal, or as JSON."""
+"""A ride in words, for a terminal or a page, or as JSON."""
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
-
-from rich.console import Group
-from rich.table import Table
-from rich.text import Text
+from typing import TYPE_CHECKING, Any
 
 from ..refusals import SWAPPED_DEG, sentence
 from .alignment_quality import LeanCost, Quality, lean_cost
@@ -14,9 +11,27 @@ from .stops.brake_test import Stop
 from .stops.speed_stops import stops_by_speed
 from .summary import Peak
 
+if TYPE_CHECKING:
+    from rich.console import Group
+
 CONTRADICTED = ("up-off", "forward-off", "left-handed", "rates-misfit", "rates-in-radians")  # by the ride
 COSTS_DEG = 0.1  # of lean: less is not worth a word
 RIDDEN_S = 10.0  # a shorter ride is pushing the bike about
+STOPS_TITLE = "Stops (MFDD: UN R13)"
+STOPS_UNITS = {"at": "", "from": "km/h", "time": "s", "distance": "m", "MFDD": "m/s²", "peak": "m/s²", "jerk": "m/s³"}
+STOPS_UNITS |= {"pulls": "m"}  # one line a stop in 80 columns: no units in it
+
+
+@dataclass
+class Words:
+    """What a report says. name: of the log. ride: rows of what, how much, and when it was or "". alignment: a
+    paragraph. stops: a row for each, the columns of STOPS_UNITS. remark: on the stops or why there are none, or ""."""
+
+    name: str
+    ride: list[tuple[str, str, str]]
+    alignment: str
+    stops: list[tuple[str, ...]]
+    remark: str
 
 
 def as_data(seen: Overview) -> dict[str, Any]:
@@ -61,16 +76,38 @@ def as_data(seen: Overview) -> dict[str, Any]:
     return data
 
 
-def page(seen: Overview) -> Group:
+def page(seen: Overview) -> "Group":
     """The ride for a terminal."""
-    parts: list[Any] = [Text(Path(seen.ride.name).name, style="bold"), _ride(seen), Text(), _alignment(seen)]
-    if seen.stops:
-        parts += [Text(), _stops(seen.stops)]
-        if any(stop.speed_from == "integrated" for stop in seen.stops):
-            parts.append(Text("* no speed in the log: integrated from the acceleration", style="dim"))
-    else:
-        parts += [Text(), Text(_no_stops(seen))]
+    from rich.console import Group
+    from rich.table import Table
+    from rich.text import Text
+
+    said = words(seen)
+    ride = Table.grid(padding=(0, 3))
+    for row in said.ride:
+        ride.add_row(*row)
+    parts: list[Any] = [Text(said.name, style="bold"), ride, Text(), Text(said.alignment), Text()]
+    if said.stops:
+        stops = Table(title=STOPS_TITLE, title_justify="left", box=None, pad_edge=False, header_style="dim")
+        for name, unit in STOPS_UNITS.items():
+            stops.add_column(f"{name}\n{unit}", justify="right", no_wrap=True)
+        for row in said.stops:
+            stops.add_row(*row)
+        parts.append(stops)
+    if said.remark:
+        parts += [Text(said.remark, style="dim" if said.stops else "")]
     return Group(*parts)
+
+
+def words(seen: Overview) -> Words:
+    """The ride in words."""
+    return Words(Path(seen.ride.name).name, _ride(seen), _alignment(seen), _stops(seen.stops), _remark(seen))
+
+
+def _remark(seen: Overview) -> str:
+    if any(stop.speed_from == "integrated" for stop in seen.stops):
+        return "* no speed in the log: integrated from the acceleration"
+    return "" if seen.stops else _no_stops(seen)
 
 
 def _no_stops(seen: Overview) -> str:
@@ -83,35 +120,32 @@ def _no_stops(seen: Overview) -> str:
     return "No stop from over 10 km/h found."
 
 
-def _ride(seen: Overview) -> Table:
+def _ride(seen: Overview) -> list[tuple[str, str, str]]:
     total = seen.summary
-    table = Table.grid(padding=(0, 3))
-    table.add_row("Duration", clock(total.duration_s), f"riding {clock(total.riding_s)}")
+    rows = [("Duration", clock(total.duration_s), f"riding {clock(total.riding_s)}")]
     if not seen.ride.car:
-        how = "smoothed" if seen.ride.smoothed else "as the display showed it"
-        table.add_row("Lean", how)
-        table.add_row("Max left", *_peak(total.left_deg, "{:.0f}°"))
-        table.add_row("Max right", *_peak(total.right_deg, "{:.0f}°"))
-        for limit, seconds in total.beyond_s.items():
-            table.add_row(f"Over {limit:.0f}°", f"{seconds:.1f} s")
-    table.add_row("Max braking", *_peak(total.brake_g, "{:.2f} g"))
-    table.add_row("Max acceleration", *_peak(total.accel_g, "{:.2f} g"))
+        rows.append(("Lean", "smoothed" if seen.ride.smoothed else "as the display showed it", ""))
+        rows.append(("Max left", *_peak(total.left_deg, "{:.0f}°")))
+        rows.append(("Max right", *_peak(total.right_deg, "{:.0f}°")))
+        rows += [(f"Over {limit:.0f}°", f"{seconds:.1f} s", "") for limit, seconds in total.beyond_s.items()]
+    rows.append(("Max braking", *_peak(total.brake_g, "{:.2f} g")))
+    rows.append(("Max acceleration", *_peak(total.accel_g, "{:.2f} g")))
     if seen.has_speed:
         peak = Peak(total.speed_mps.value * 3.6, total.speed_mps.time_s)
-        table.add_row("Max speed", *_peak(peak, "{:.0f} km/h"))
+        rows.append(("Max speed", *_peak(peak, "{:.0f} km/h")))
     if total.not_sure_s >= 1.0:
-        table.add_row("Lean not sure", clock(total.not_sure_s))
+        rows.append(("Lean not sure", clock(total.not_sure_s), ""))
     if total.missing_s - total.frozen_s >= 0.1:
-        table.add_row("No readings", f"{total.missing_s - total.frozen_s:.1f} s")
+        rows.append(("No readings", f"{total.missing_s - total.frozen_s:.1f} s", ""))
     if total.frozen_s >= 0.1:
-        table.add_row("Readings frozen", f"{total.frozen_s:.1f} s")
-    return table
+        rows.append(("Readings frozen", f"{total.frozen_s:.1f} s", ""))
+    return rows
 
 
-def _alignment(seen: Overview) -> Text:
+def _alignment(seen: Overview) -> str:
     quality = seen.quality
     if not _judged(seen):
-        return Text("Alignment: not judged, see the warning.")
+        return "Alignment: not judged, see the warning."
     said = "Alignment: not enough straight riding to tell how far it is off."
     known = angles(quality)
     if known:
@@ -124,7 +158,7 @@ def _alignment(seen: Overview) -> Text:
             said += _cost(lean_cost(quality), seen.has_speed)
     if quality.gravity_g is not None:
         said += f" At rest the force is {quality.gravity_g:.3f} g."
-    return Text(said)
+    return said
 
 
 def _judged(seen: Overview) -> bool:
@@ -148,16 +182,11 @@ def _cost(cost: LeanCost, speed: bool) -> str:
     return "".join(said) or f" That costs less than {COSTS_DEG}° of lean: nothing to do."
 
 
-def _stops(stops: list[Stop]) -> Table:
-    table = Table(title="Stops (MFDD: UN R13)", title_justify="left", box=None, pad_edge=False, header_style="dim")
-    units = {"at": "", "from": "km/h", "time": "s", "distance": "m", "MFDD": "m/s²", "peak": "m/s²", "jerk": "m/s³"}
-    for name, unit in (units | {"pulls": "m"}).items():  # one line a stop in 80 columns: no units in it
-        table.add_column(f"{name}\n{unit}", justify="right", no_wrap=True)
-    for stop in stops:
-        mark = "*" if stop.speed_from == "integrated" else ""
-        table.add_row(
+def _stops(stops: list[Stop]) -> list[tuple[str, ...]]:
+    return [
+        (
             clock(stop.start_s),
-            f"{stop.initial_speed_mps * 3.6:.1f}{mark}",
+            f"{stop.initial_speed_mps * 3.6:.1f}{'*' if stop.speed_from == 'integrated' else ''}",
             f"{stop.duration_s:.2f}",
             f"{stop.distance_m:.1f}",
             f"{stop.mfdd_mps2:.2f}",
@@ -165,7 +194,8 @@ def _stops(stops: list[Stop]) -> Table:
             f"{stop.jerk_mps3:.0f}",
             f"{abs(stop.side_m):.1f} {'left' if stop.side_m > 0 else 'right'}",
         )
-    return table
+        for stop in stops
+    ]
 
 
 def _peak(peak: Peak, form: str) -> tuple[str, str]:

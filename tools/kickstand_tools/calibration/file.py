@@ -15,8 +15,8 @@ from kickstand.units import AXES
 from numpy.typing import NDArray
 
 from ..errors import InputError, cause
-from ..logs import cells
-from ..logs.source import File, chunks, log_stem, name_of
+from ..logs.reader import check_first_line
+from ..logs.source import File, log_stem, name_of
 from ..output import write_whole
 
 VERSION = 1
@@ -179,14 +179,12 @@ def calibration_path(log: Path) -> Path:
 
 def calibration_beside(log: Path) -> Path:
     """The same where it is there. Raises InputError without it, without the log, and for a file that is no log."""
-    beside = calibration_path(log)
     if not log.is_file():
         what = "is a directory: give the name of a ride in it" if log.is_dir() else "there is no such file"
         raise InputError(f"{log}: {what}")
+    beside = calibration_path(log)
     if not beside.exists():
-        first = next(chunks(log, 1), (b"", 0))[0]
-        cells.check_text(str(log), first, 0)
-        cells.header(str(log), first.decode().removeprefix("\ufeff").partition("\n")[0])
+        check_first_line(log)
         raise InputError(f"{log}: no calibration {beside.name} beside it: give one with --calibration")
     return beside
 

@@ -12,7 +12,7 @@ from .. import firmware_path
 if TYPE_CHECKING:
     from ..deploy.connection import Progress
     from ..rides.pull import PulledRide
-    from ..rides.record import LiveReading
+    from ..rides.stream import LiveReading
 
 _PATH = click.Path(path_type=Path)
 _PORT = click.option(
@@ -21,7 +21,7 @@ _PORT = click.option(
 _NAMED_ONE_BY_ONE = 5
 
 
-@click.command()
+@click.command(short_help="Copy the firmware to a board, and start it.")
 @_PORT
 @click.option("--config", is_flag=True, help="Replace the board's config.py too, which is otherwise kept.")
 def flash(port: str | None, config: bool) -> None:
@@ -54,7 +54,7 @@ def flash(port: str | None, config: bool) -> None:
     click.echo("restarted: the display shows the rest")
 
 
-@click.command()
+@click.command(short_help="Ask a board for versions, settings, sensor and calibration.")
 @_PORT
 def status(port: str | None) -> None:
     """Ask a board how it is: versions, settings, sensor, display, calibration."""
@@ -63,7 +63,7 @@ def status(port: str | None) -> None:
     click.echo(status(port))
 
 
-@click.command()
+@click.command(short_help="Fetch the rides that a board has recorded.")
 @_PORT
 @click.option("--out", type=_PATH, default=Path(), help="The directory to write to; this one if not given.")
 @click.option("--delete", is_flag=True, help="Remove from the board what came over whole.")
@@ -87,7 +87,7 @@ def pull(port: str | None, out: Path, delete: bool) -> None:
         click.echo(f"no rides on the board at {result.port}: its menu's Record ride makes one")
 
 
-@click.command()
+@click.command(short_help="Write a log live over USB.")
 @_PORT
 @click.option("--out", required=True, type=_PATH, help="The file to write.")
 def record(port: str | None, out: Path) -> None:
@@ -117,8 +117,8 @@ def _live_text(reading: "LiveReading") -> str:
     """The lean as a bar to the left or right, and how long the recording is."""
     how_long = f"{reading.rate_hz:3.0f} readings/s  {reading.seconds // 60:.0f}:{reading.seconds % 60:04.1f}"
     lean = reading.lean_deg
-    if lean is None:
-        return f"not aligned  {how_long}"
+    if lean is None:  # as on the display, a lean that is not certain enough is not shown
+        return f"{'lean --' if reading.aligned else 'not aligned'}  {how_long}"
     bar = "#" * min(20, round(abs(lean) / 3))
     picture = f"{bar if lean < 0 else '':>20}|{bar if lean > 0 else '':<20}"
     return f"{picture} lean {lean:+5.1f} deg  forward {reading.forward_g:+.2f} g  {how_long}"

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .warnings import warn
+from .common import warn
 
 if TYPE_CHECKING:
     from ..calibration.drive import DriveFit
@@ -23,7 +23,7 @@ def calibrate() -> None:
     """Compute a calibration from recorded poses or drives."""
 
 
-@calibrate.command()
+@calibrate.command(short_help="Offset and slope of the accelerometer, from six poses.")
 @click.argument("poses", nargs=-1, required=True, type=PATH, metavar="POSE.csv...")
 @OUT
 def six(poses: tuple[Path, ...], out: Path) -> None:
@@ -42,7 +42,7 @@ def six(poses: tuple[Path, ...], out: Path) -> None:
     click.echo(f"written: {out}")
 
 
-@calibrate.command()
+@calibrate.command(short_help="The alignment, from a pose on the kickstand and upright.")
 @click.argument("kickstand", type=PATH, metavar="KICKSTAND.csv")
 @click.argument("upright", type=PATH, metavar="UPRIGHT.csv")
 @click.option("--calibration", type=PATH, help="The result of `kickstand calibrate six`, to build on.")
@@ -53,7 +53,7 @@ def six(poses: tuple[Path, ...], out: Path) -> None:
 def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out: Path) -> None:
     """How the sensor sits on the bike, from a pose on the kickstand and one upright.
 
-    Axes are right-handed, and at rest the one that points up reads +1 g.
+    Axes have to be right-handed, and the one that points up has to read +1 g at rest.
     """
     from ..calibration.file import read_calibration, write_calibration
     from ..calibration.remarks import remarks
@@ -69,7 +69,7 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
     click.echo(f"written: {out}")
 
 
-@calibrate.command()
+@calibrate.command(short_help="The alignment of any vehicle, from driving with braking.")
 @click.argument("logs", nargs=-1, required=True, type=PATH, metavar="LOG.csv...")
 @click.option(
     "--calibration", type=PATH, help="What is known already: six positions, and a motorcycle's two poses."
@@ -86,7 +86,7 @@ def drive(
 ) -> None:
     """How the sensor sits on the vehicle, from logs of driving with speed: stops and braking in a straight line.
 
-    Axes are right-handed, and at rest the one that points up reads +1 g.
+    Axes have to be right-handed, and the one that points up has to read +1 g at rest.
     """
     from ..calibration.drive import fit_drive
     from ..calibration.file import read_calibration, write_calibration

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 import click
 
 from .calibrate import OUT, PATH, along_axes, matrix_lines, print_lines
-from .warnings import warn
+from .common import warn
 
 if TYPE_CHECKING:
     from ..calibration.ride.fit import RideFit
 
 
-@click.command()
+@click.command(short_help="The alignment of a motorcycle, from riding with bends.")
 @click.argument("log", type=PATH, metavar="LOG.csv")
 @click.option(
     "--phone",
@@ -52,7 +52,7 @@ def _ride_lines(found: "RideFit") -> Iterable[str]:
     if found.lag_s is not None:
         yield f"speed: {max(0.0, found.lag_s):.1f} s late"
     if found.phone_deg is not None:
-        yield f"phone: mounted as said, turned by {found.phone_deg:.0f} degrees"
+        yield f"phone: mounted as --phone says, within {found.phone_deg:.0f} degrees"
     yield "gyro bias  " + along_axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
     yield "offset     " + along_axes(found.calibration.accel_offset_g, "%+.4f g")
     yield from matrix_lines(found.calibration.vehicle_from_sensor)

@@ -1,13 +1,11 @@
 """The command `kickstand fleet`: many vehicles at once."""
 
-from pathlib import Path
-
 import click
 
 
-@click.command()
+@click.command(short_help="Align many vehicles, find moved mounts, test their brakes.")
 @click.argument("manifest", metavar="MANIFEST.csv|GLOB")
-@click.option("--out", required=True, type=click.Path(path_type=Path), help="The directory to write to.")
+@click.option("--out", required=True, metavar="DIR", help="The directory to write to, or a place like s3://...")
 @click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, tcp://...; this computer if not given.")
 @click.option("--workers", type=click.IntRange(min=1), help="On this computer; one a processor if not given.")
 @click.option("--signals", is_flag=True, help="Also write each log's accelerations along the vehicle's axes.")
@@ -24,7 +22,7 @@ import click
     help="What the logs of a GLOB are of; a manifest says it itself.",
 )
 def fleet(
-    manifest: str, out: Path, scheduler: str | None, workers: int | None, signals: bool, timeout: float, vehicle: str
+    manifest: str, out: str, scheduler: str | None, workers: int | None, signals: bool, timeout: float, vehicle: str
 ) -> None:
     """Align a whole fleet, find mounts that moved, and measure its brake tests.
 

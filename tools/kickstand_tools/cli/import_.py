@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..errors import InputError
-from .warnings import warn
+from .common import TIME, warn
 
 if TYPE_CHECKING:
     from ..imports.importing import Imported
@@ -21,8 +21,8 @@ _UNITS = "Of t, a (or ax, ay, az), g (or gx, gy, gz), speed; -UNIT turns the sig
 @click.option("--out", required=True, type=_PATH, help="The log to write, packed if it ends in .gz.")
 @click.option("--columns", metavar="t=NAME,ax=NAME,...", help=_COLUMNS)
 @click.option("--units", metavar="a=UNIT,g=UNIT,...", help=_UNITS)
-@click.option("--from", "start_s", type=float, metavar="S", help="Seconds from the start, or if negative from the end.")
-@click.option("--to", "end_s", type=float, metavar="S", help="The same, for the end.")
+@click.option("--from", "start_s", type=TIME, metavar="TIME", help="Seconds from the start; negative: from the end.")
+@click.option("--to", "end_s", type=TIME, metavar="TIME", help="The same, for the end.")
 def import_(
     source: Path, out: Path, columns: str | None, units: str | None, start_s: float | None, end_s: float | None
 ) -> None:
@@ -31,8 +31,8 @@ def import_(
     Known: phyphox, Sensor Logger, SensorLog, Sensor Kinetics, RaceChrono (CSV), RaceBox, VBO, AiM, and Kickstand's own
     exports. Any other table of accelerations (with gravity) and rates of rotation needs --columns and --units.
 
-    A log's axes are right-handed. At rest the axis that points up reads +1 g, and a rate is positive right-handed about
-    its axis.
+    The axes of the log have to be right-handed. At rest the axis that points up reads +1 g, and a rate is positive
+    right-handed about its axis.
     """
     from rich.console import Console
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .warnings import warn
+from .common import warn
 
 if TYPE_CHECKING:
     from ..joining.joined import Joined
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 _PATH = click.Path(path_type=Path)
 
 
-@click.command()
+@click.command(short_help="Put a phone's or a watch's track to a ride without GPS.")
 @click.argument("ride", type=_PATH, metavar="RIDE.csv")
 @click.argument("track", type=_PATH, metavar="TRACK.gpx|.fit")
 @click.option("--out", required=True, type=_PATH, help="The log to write, packed if it ends in .gz.")
@@ -53,7 +53,8 @@ def _lines(joined: "Joined") -> list[str]:
     lines = [
         f"the ride began at {when} UTC by the track's clock, +- {found.sigma_s:.2f} s: {abs(late_s):.2f} s {side} the "
         "track's first point",
-        f"match: correlation {found.correlation:.2f} over {found.common_s / 60.0:.1f} minutes; the ride's clock is "
-        f"{abs(found.drift) * 1e6:.0f} ppm {'slow' if found.drift >= 0.0 else 'fast'}",
+        f"match: correlation {found.correlation:.2f} over {found.common_s / 60.0:.1f} minutes",
     ]
+    if abs(found.drift) * found.common_s > 3.0 * found.sigma_s:  # less is not known from a ride of this length
+        lines.append(f"the ride's clock is {abs(found.drift) * 1e6:.0f} ppm {'slow' if found.drift > 0.0 else 'fast'}")
     return [*lines, "the log's own speed stays"] if joined.own_speed else lines

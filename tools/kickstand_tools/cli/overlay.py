@@ -4,27 +4,27 @@ from pathlib import Path
 
 import click
 
-from .warnings import warn
+from .common import TIME, warn
 
 _PATH = click.Path(path_type=Path)
 
 
-@click.command()
+@click.command(short_help="Draw the lean over a video of the ride.")
 @click.argument("ride", type=_PATH, metavar="RIDE.csv")
 @click.option("--calibration", type=_PATH, help="A CAL.json; if not given, the one beside the ride.")
 @click.option("--video", type=_PATH, help="A video of the ride; without it a transparent clip is written.")
 @click.option(
     "--offset",
-    type=float,
-    metavar="S",
+    type=TIME,
+    metavar="TIME",
     help="The ride's time at the video's first picture: 12.5 if the video begins 12.5 s after the ride, -3 if 3 s "
     "before it. Not needed for a GoPro on the bike.",
 )
 @click.option("--fps", type=click.Choice(["30", "60"]), help="Pictures a second; if not given, the video's, or 30.")
-@click.option("--from", "from_s", type=float, metavar="S", help="Only from this time of the ride on.")
-@click.option("--to", "to_s", type=float, metavar="S", help="Only up to there; a negative S counts from the end.")
+@click.option("--from", "from_s", type=TIME, metavar="TIME", help="Only from this time of the ride on: 90 or 1:30.")
+@click.option("--to", "to_s", type=TIME, metavar="TIME", help="Only up to there; negative: from the end.")
 @click.option(
-    "--height", type=click.IntRange(240, 4320), default=1080, help="Of the video that a clip is for, pixels."
+    "--height", type=click.IntRange(240, 4320), help="Of the video that a clip is for, pixels; if not given, 1080."
 )
 @click.option("--mph", is_flag=True, help="Miles an hour instead of kilometres.")
 @click.option("--live", is_flag=True, help="The lean that the display showed, not the smoothed one.")
@@ -37,7 +37,7 @@ def overlay(
     fps: str | None,
     from_s: float | None,
     to_s: float | None,
-    height: int,
+    height: int | None,
     mph: bool,
     live: bool,
     out: Path,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from kickstand.errors import Notice
 
-from .warnings import warn
+from .common import TIME, warn
 
 if TYPE_CHECKING:
     from ..logs.reader import Source
@@ -19,10 +19,10 @@ _CALIBRATION = click.option(
     "--calibration", type=_PATH, help="A CAL.json; if not given, the one beside the ride."
 )
 _FROM = click.option(
-    "--from", "from_s", type=float, metavar="S", help="Leave out what is before: seconds from the beginning."
+    "--from", "from_s", type=TIME, metavar="TIME", help="Leave out what is before: seconds from the beginning, or 1:30."
 )
 _TO = click.option(
-    "--to", "to_s", type=float, metavar="S", help="Leave out what is after; a negative S counts from the end."
+    "--to", "to_s", type=TIME, metavar="TIME", help="Leave out what is after; a negative time counts from the end."
 )
 
 
@@ -33,7 +33,7 @@ def _stretch(command: Callable[..., Any]) -> Callable[..., Any]:
     return _FROM(_TO(command))
 
 
-@click.command()
+@click.command(short_help="Find the lean as the firmware shows it during the ride.")
 @click.argument("log", type=_PATH, metavar="LOG.csv")
 @_CALIBRATION
 @_stretch
@@ -44,7 +44,7 @@ def replay(
 ) -> None:
     """Run the firmware's own lean meter over a recorded log.
 
-    The log's axes are right-handed, and so are its rates; at rest the axis that points up reads +1 g.
+    The log's axes and rates have to be right-handed, and the axis that points up has to read +1 g at rest.
     """
     from ..calibration.file import calibration_beside, read_calibration
     from ..output import check_output
@@ -65,15 +65,15 @@ def replay(
     click.echo(f"written: {out}, {count} samples")
 
 
-@click.command()
+@click.command(short_help="Find the lean afterwards, from the whole ride.")
 @click.argument("ride", type=_PATH, metavar="RIDE.csv")
 @_CALIBRATION
 @_stretch
 @_OUT
 def smooth(ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, out: Path) -> None:
-    """The lean looked back over: from the whole ride, each sample with its standard deviation.
+    """Find the lean afterwards, from the whole ride, each sample with its standard deviation.
 
-    The log's axes are right-handed, and so are its rates; at rest the axis that points up reads +1 g.
+    The log's axes and rates have to be right-handed, and the axis that points up has to read +1 g at rest.
     """
     from ..calibration.file import calibration_beside, read_calibration
     from ..output import check_output
@@ -89,18 +89,21 @@ def smooth(ride: Path, calibration: Path | None, from_s: float | None, to_s: flo
     click.echo(f"written: {out}, {count} samples")
 
 
-@click.command()
+@click.command(short_help="Write a ride for another program.")
 @click.argument("ride", type=_PATH, metavar="RIDE.csv")
 @click.option("--to", "form", required=True, type=click.Choice(["csv", "gpx", "vbo", "racechrono", "parquet"]))
 @_CALIBRATION
+@_LIVE
 @_OUT
-def export(ride: Path, form: str, calibration: Path | None, out: Path) -> None:
+def export(ride: Path, form: str, calibration: Path | None, live: bool, out: Path) -> None:
     """Write a ride as maps (gpx), Circuit Tools (vbo), RaceChrono or data frames (parquet, csv) open it.
 
-    The log's axes are right-handed, and so are its rates; at rest the axis that points up reads +1 g.
+    The lean is the smoothed one: from the whole ride, and nearer to the truth than what the display showed.
+
+    The log's axes and rates have to be right-handed, and the axis that points up has to read +1 g at rest.
     """
-    from ..analysis.channels import open_ride
     from ..analysis.export.export import export
+    from ..analysis.ride import open_ride
     from ..calibration.file import calibration_beside
     from ..output import check_output
     from ..progress import Bar
@@ -109,12 +112,12 @@ def export(ride: Path, form: str, calibration: Path | None, out: Path) -> None:
     check_output(out, [ride, calibration])
     notices: list[Notice] = []
     with Bar("exporting") as bar:
-        count = export(open_ride(ride, calibration), form, out, bar.reach, notices)
+        count = export(open_ride(ride, calibration, smoothed=not live), form, out, bar.reach, notices)
     warn(ride, notices)
     click.echo(f"written: {out}, {count} rows")
 
 
-@click.command()
+@click.command(short_help="Print maxima, time at large leans, and brake tests.")
 @click.argument("ride", type=_PATH, metavar="RIDE.csv")
 @_CALIBRATION
 @_stretch
@@ -127,13 +130,13 @@ def report(
 
     The lean is the smoothed one: from the whole ride, and nearer to the truth than what the display showed.
 
-    The log's axes are right-handed, and so are its rates; at rest the axis that points up reads +1 g.
+    The log's axes and rates have to be right-handed, and the axis that points up has to read +1 g at rest.
     """
     from rich.console import Console
 
-    from ..analysis.channels import open_ride
     from ..analysis.overview import overview
     from ..analysis.report import as_data, page
+    from ..analysis.ride import open_ride
     from ..progress import Bar
 
     with Bar("reading") as bar:
@@ -145,7 +148,7 @@ def report(
         Console().print(page(seen))
 
 
-@click.command()
+@click.command(short_help="Draw a ride, as a picture and as a page to zoom into.")
 @click.argument("ride", type=_PATH, metavar="RIDE.csv")
 @_CALIBRATION
 @_stretch
@@ -165,11 +168,11 @@ def plot(
 
     The lean is the smoothed one: from the whole ride, and nearer to the truth than what the display showed.
 
-    The log's axes are right-handed, and so are its rates; at rest the axis that points up reads +1 g.
+    The log's axes and rates have to be right-handed, and the axis that points up has to read +1 g at rest.
     """
-    from ..analysis.channels import open_ride
     from ..analysis.overview import overview
     from ..analysis.plot import plot
+    from ..analysis.ride import open_ride
     from ..progress import Bar
 
     plot.check(out)
@@ -181,7 +184,7 @@ def plot(
     warn(ride, [seen.exchanged] if seen.exchanged else [])
 
 
-@click.command()
+@click.command(short_help="Cut a stretch out of a log.")
 @click.argument("log", type=_PATH, metavar="LOG.csv")
 @_stretch
 @_OUT

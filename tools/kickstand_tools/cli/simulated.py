@@ -6,7 +6,8 @@ from pathlib import Path
 
 import click
 
-from .warnings import warn
+from ..errors import InputError
+from .common import warn
 
 _PATH = click.Path(path_type=Path)
 _LINES_S = 10.0  # between two lines of progress where there is no terminal for a bar
@@ -22,7 +23,7 @@ _PROFILES = (
 )
 
 
-@click.command()
+@click.command(short_help="Make up a ride with its true lean, or drives of a fleet.")
 @click.option("--profile", help=f"{_PROFILES}.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Another seed, another ride.")
 @click.option(
@@ -37,7 +38,7 @@ _PROFILES = (
     type=click.FloatRange(-10.0, 10.0),
     help="Between the poses, degrees; at random if not given.",
 )
-@click.option("--speed", is_flag=True, help="Write speed and position into the log, once a second.")
+@click.option("--speed", is_flag=True, help="Write what a GPS receiver gives into the log: speed, position, time.")
 @click.option(
     "--fleet",
     "vehicles",
@@ -58,16 +59,29 @@ def simulate(
 ) -> None:
     """Make up a ride: six poses and a free one, kickstand, upright, the ride, its truth. Or a fleet (see fleet)."""
     if vehicles is not None:
+        _check_fleet(out)
         _simulate_fleet(vehicles, seed, out)
         return
     if profile is None:
         raise click.UsageError("Missing option '--profile', or '--fleet' for a fleet.")
+    if (out / "MANIFEST.csv").exists():
+        raise InputError(f"{out} holds a fleet, whose truth would be lost: give --out another directory")
     from ..progress import spinner
     from ..simulation.files import simulate
 
     with spinner("making up a ride"):
         made = simulate(profile, seed, out, seconds, upright_error, pitch_change, speed=speed)
-    click.echo(f"written: {out}, {len(made.time)} samples")
+    click.echo(f"written: {out / 'RIDE.csv'}, {len(made.time)} samples, with its poses and TRUTH.csv")
+
+
+def _check_fleet(out: Path) -> None:
+    """Refuse what a fleet has no use for, and the directory of a ride."""
+    context = click.get_current_context()
+    for name in ("profile", "seconds", "upright_error", "pitch_change", "speed"):
+        if context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT:
+            raise click.UsageError(f"--{name.replace('_', '-')} is of a single ride: leave it or --fleet out.")
+    if (out / "RIDE.csv").exists():
+        raise InputError(f"{out} holds a ride, whose truth would be lost: give --out another directory")
 
 
 def _simulate_fleet(vehicles: int, seed: int, out: Path) -> None:
@@ -80,7 +94,7 @@ def _simulate_fleet(vehicles: int, seed: int, out: Path) -> None:
     click.echo(f"written: {out}/MANIFEST.csv and TRUTH.csv, {vehicles} vehicles, {logs} logs")
 
 
-@click.command()
+@click.command(short_help="Compare the shown lean with the truth of simulated rides.")
 @click.option("--profiles", default="street,track,sweeper,city,hills", help=f"With commas between: {_PROFILES}.")
 @click.option("--seeds", type=click.IntRange(min=1), default=3, help="Rides of each profile.")
 @click.option(

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 
 
-@click.command()
+@click.command(short_help="The firmware on a simulated board, in the terminal.")
 @click.option("--hand", is_flag=True, help="Lean the bike and press the button yourself, with keys.")
 @click.option("--cpython", is_flag=True, help="Run the firmware on CPython, not on MicroPython.")
 def demo(hand: bool, cpython: bool) -> None:
@@ -23,7 +23,7 @@ def demo(hand: bool, cpython: bool) -> None:
         sys.exit(1)
 
 
-@click.command()
+@click.command(short_help="Open the lean meter's pages in the browser.")
 @click.option("--out", type=click.Path(path_type=Path), help="Write the site to this directory instead of opening it.")
 def web(out: Path | None) -> None:
     """Ride the simulated board in the browser; with --out write the site for any web server."""
@@ -37,7 +37,7 @@ def web(out: Path | None) -> None:
         files = site.site_files()
     if out is not None:
         site.write_site(files, out)
-        click.echo(f"written: {out}, {len(files)} files for a web server: a browser runs no modules of a folder")
+        click.echo(f"written: {out}, {len(files)} files for a web server: opened as files they do not run")
         return
     with serve.server(files) as server:
         address = f"http://{serve.HOST}:{server.server_address[1]}/"
@@ -47,7 +47,7 @@ def web(out: Path | None) -> None:
             server.serve_forever()
 
 
-@click.command()
+@click.command(short_help="An emulated Pico that flash can deploy to.")
 @click.option("--port", type=click.IntRange(1024, 65535), default=2040, help="On which mpremote finds it.")
 def emulate(port: int) -> None:
     """An emulated Pico on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
@@ -59,7 +59,7 @@ def emulate(port: int) -> None:
     emulate(port, click.echo)
 
 
-@click.command()
+@click.command(short_help="Time, memory and flash of the firmware on an emulated Pico.")
 @click.option("--seconds", type=click.IntRange(1, 600), default=10, help="Emulated, of each of four runs.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def bench(seconds: int, as_json: bool) -> None:

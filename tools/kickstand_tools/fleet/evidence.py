@@ -2,15 +2,23 @@
 
 As in the firmware's ForwardRegression, the force of each interval between two speeds is explained by
 
-    f = level + forward a + left c        a = dv/dt / g, c = v (yaw rate) / g
+    f = level + forward a + left c + arm w        a = dv/dt / g, c = v (yaw rate) / g, w = d(yaw rate)/dt
 
 in the sensor's own axes. Unlike there, turns are used too: in a car they show left as well as braking shows forward. A
-motorcycle leans into turns, so that its force stays along its own up and grows to sqrt(1 + c^2): there
+sensor ahead of the rear axle is swung sideways as a turn begins and ends, which is when drivers brake and speed up:
+arm, its distance from that axle, takes this up. A motorcycle leans into turns, so that its force stays along its own up
+and grows to sqrt(1 + c^2): there
 
     f = level sqrt(1 + c^2) + forward a
+
+Beside this, a car's body sways on its springs in directions of its own, mostly sideways. In which direction it does is
+the vehicle's own affair, but the same before and after a moment, as long as the mount is.
 """
 
+import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 from kickstand.drive_alignment.alignment import MOTORCYCLE
@@ -25,38 +33,46 @@ STANDING_MPS, MOVING_MPS = 0.3, 2.0
 STANDING_WEIGHT = 0.3  # of a second at a stop: a long stop shows one slope of the road, however long it was
 LEVEL_S = 20.0  # the mean force over so long is about vertical, which tells the yaw rate from the other rates
 BLOCK_S = 8.0
+# The road: variance of its slope in parts of that of all other errors in a mean over 1 s, and how soon it changes
+ROAD_SHARE, ROAD_M = 1.0, 150.0
+SWING_S = 0.2  # over which the yaw rate at both ends of an interval is averaged
+SWAY_S = 0.05, 0.3  # means over the one and over the other: what is between is sway, not driving and not noise
 TURN_WEIGHT = 0.3  # of turns against braking: tyres slip sideways in slow ones, and drivers brake and speed up in them
 
 
 @dataclass
 class Intervals:
     """n intervals between two speeds of a log. t_s: their middles. force (n, 3, g): means, in the sensor's axes.
-    terms (n, 3): what is multiplied by level, forward and left. weight (n): s. speed (n): m/s."""
+    terms (n, 4): what is multiplied by level, forward, left and arm. weight (n): s. speed (n): m/s. sway (n, 3, 3,
+    g^2): the covariance of the force's quick changes; zeros where it tells nothing."""
 
     t_s: Array
     force: Array
     terms: Array
     weight: Array
     speed: Array
+    sway: Array
 
 
 @dataclass
 class Blocks:
     """m blocks of intervals that follow one another in one or several logs.
 
-    square (m, 3, 3), product (m, 3, 3): sums of terms x terms and of terms x force, with the weights. log (m): index of
+    square (m, 4, 4), product (m, 4, 3): sums of terms x terms and of terms x force, the road taken off. sway (m, 3, 3):
+    mean of the intervals' in parts of its trace, so that a rough road counts no more than another. log (m): index of
     the log; t_s (m): begin in it; end_s (m).
     """
 
     square: Array
     product: Array
+    sway: Array
     log: Array
     t_s: Array
     end_s: Array
 
     def part(self, which: slice) -> "Blocks":
         """Some of them."""
-        return Blocks(*(getattr(self, name)[which] for name in ("square", "product", "log", "t_s", "end_s")))
+        return Blocks(*(getattr(self, name)[which] for name in ("square", "product", "sway", "log", "t_s", "end_s")))
 
 
 def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
@@ -69,53 +85,62 @@ def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
     kept = time >= 0.0
     time, speed = _spread(time[kept], speed[kept])
     curve = rate * (np.interp(log.t_s, time, speed) / STANDARD_GRAVITY)[:, None]
-    felt = np.cumsum(np.column_stack((log.accel_g, curve)) * step[:, None], axis=0)
-    covered = np.cumsum(step)
-    ends = np.array([np.interp(time, log.t_s, column) for column in felt.T]).T
-    seconds, whole = np.diff(time), np.diff(np.interp(time, log.t_s, covered))
+    sway = _sway(log)
+    squares = (one * other for one in sway.T for other in sway.T)
+    ends = _integrals(chain(log.accel_g.T, curve.T, squares), log.t_s, step, time)
+    seconds, whole = np.diff(time), np.diff(np.interp(time, log.t_s, np.cumsum(step)))
     good = (seconds <= MAX_INTERVAL_US * 1e-6) & (whole > 0.9 * seconds)
     means = (np.diff(ends, axis=0) / np.maximum(whole, 1e-9)[:, None])[good]
     middle, length = (time[1:] - seconds / 2.0)[good], seconds[good]
     mean_mps = (0.5 * (speed[1:] + speed[:-1]))[good]
     a = (np.diff(speed) / seconds / STANDARD_GRAVITY)[good]
     up = _local_up(middle, means[:, :3], length)
-    c = np.sum(means[:, 3:] * up, axis=1)
+    c = np.sum(means[:, 3:6] * up, axis=1)
     standing = (mean_mps < STANDING_MPS) & (np.abs(a) < 0.01)
     if kind == MOTORCYCLE:
-        terms = np.column_stack((np.sqrt(1.0 + c * c), a, np.zeros_like(a)))
+        terms = np.column_stack((np.sqrt(1.0 + c * c), a, np.zeros_like(a), np.zeros_like(a)))
         weight = length * (mean_mps > MOVING_MPS)  # a foot is down below
+        shown = np.zeros_like(a)  # what it sways about is its wheels' contacts, and its rider
     else:
-        terms = np.column_stack((np.ones_like(a), a, c))
+        later, sooner = (_integrals(rate.T, log.t_s, step, time + ahead) for ahead in (SWING_S / 2.0, -SWING_S / 2.0))
+        swing = (later - sooner) / SWING_S
+        w = np.sum(np.diff(swing, axis=0)[good] * up, axis=1) / length
+        terms = np.column_stack((np.ones_like(a), a, c, w))
         weight = length * np.where(standing, STANDING_WEIGHT, mean_mps > STANDING_MPS)
-    return Intervals(middle, means[:, :3], terms, weight, mean_mps)
+        shown = (mean_mps > MOVING_MPS).astype(float)
+    sway = (means[:, 6:] * shown[:, None]).reshape(-1, 3, 3)
+    return Intervals(middle, means[:, :3], terms, weight, mean_mps, sway)
 
 
 def blocks(logs: list[Intervals]) -> Blocks:
     """All intervals of the logs in blocks of about BLOCK_S."""
-    square, product, which, begin, end = [], [], [], [], []
+    square, product, sway, which, begin, end = [], [], [], [], [], []
     for index, log in enumerate(logs):
         if not len(log.t_s):
             continue
         place = np.floor((log.t_s - log.t_s[0]) / BLOCK_S).astype(int)
         starts = np.flatnonzero(np.diff(place, prepend=-1))
-        weighted = log.terms * log.weight[:, None]
-        square.append(np.add.reduceat(weighted[:, :, None] * log.terms[:, None, :], starts))
-        product.append(np.add.reduceat(weighted[:, :, None] * log.force[:, None, :], starts))
+        terms, force = _without_road(log)
+        square.append(np.add.reduceat(terms[:, :, None] * terms[:, None, :], starts))
+        product.append(np.add.reduceat(terms[:, :, None] * force[:, None, :], starts))
+        swayed = np.add.reduceat(log.sway, starts)
+        sway.append(swayed / np.maximum(np.trace(swayed, axis1=1, axis2=2), 1e-12)[:, None, None])
         which.append(np.full(len(starts), index))
         begin.append(log.t_s[starts])
         end.append(log.t_s[np.append(starts[1:], len(log.t_s)) - 1])
     if not square:
-        return Blocks(np.zeros((0, 3, 3)), np.zeros((0, 3, 3)), np.zeros(0, int), np.zeros(0), np.zeros(0))
-    return Blocks(*(np.concatenate(parts) for parts in (square, product, which, begin, end)))
+        none = np.zeros(0)
+        return Blocks(np.zeros((0, 4, 4)), np.zeros((0, 4, 3)), np.zeros((0, 3, 3)), np.zeros(0, int), none, none)
+    return Blocks(*(np.concatenate(parts) for parts in (square, product, sway, which, begin, end)))
 
 
 def fits(square: Array, product: Array) -> tuple[Array, Array]:
-    """(k, 3, 3) level, forward and left of k sums (k, 3, 3), and (k, 2): how much a and c varied, in g^2 s."""
-    ridge = np.diag([1e-9, 1e-6, 1e-6]) * np.maximum(square[..., :1, :1], 1e-3)
+    """(k, t, 3) level, forward, left and so on of k sums of t terms, and (k, 2): how much a and c varied, in g^2 s."""
+    ridge = np.diag([1e-9] + [1e-6] * (square.shape[-1] - 1)) * np.maximum(square[..., :1, :1], 1e-3)
     found = np.asarray(np.linalg.solve(square + ridge, product), dtype=float)
     seconds = np.maximum(square[..., 0, 0], 1e-9)[..., None]
-    means = square[..., 0, 1:] / seconds
-    varied = np.diagonal(square, axis1=-2, axis2=-1)[..., 1:] - seconds * means * means
+    means = square[..., 0, 1:3] / seconds
+    varied = np.diagonal(square, axis1=-2, axis2=-1)[..., 1:3] - seconds * means * means
     return found, varied
 
 
@@ -124,9 +149,14 @@ def frames(found: Array, varied: Array) -> Array:
     level, forward, left = found[..., 0, :], found[..., 1, :], found[..., 2, :]
     up = level / np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), 1e-9)
     ahead = varied[..., :1] * forward + TURN_WEIGHT * varied[..., 1:] * np.cross(left, up)
+    return frame_of(up, np.asarray(ahead, dtype=float))
+
+
+def frame_of(up: Array, ahead: Array) -> Array:
+    """(..., 3, 3) rows left, up, forward, of up (..., 3, unit vectors) and of what points about forward (..., 3)."""
     side = np.cross(up, ahead)
     side /= np.maximum(np.linalg.norm(side, axis=-1, keepdims=True), 1e-9)
-    return np.stack((side, up, np.cross(side, up)), axis=-2)
+    return np.asarray(np.stack((side, up, np.cross(side, up)), axis=-2), dtype=float)
 
 
 def handedness(found: Array, varied: Array) -> float:
@@ -134,9 +164,59 @@ def handedness(found: Array, varied: Array) -> float:
     signs or the axes are mirrored, 0 if there were no turns (or on a motorcycle, which leans into them)."""
     if varied[1] < 0.05:
         return 0.0
-    level, forward, left = found
+    level, forward, left = found[:3]
     side = np.cross(level, forward)
     return float(side @ left / max(float(np.linalg.norm(side)), 1e-9))
+
+
+def _without_road(log: Intervals) -> tuple[Array, Array]:
+    """Terms and force, each less what the intervals before foretell of it, in parts of its standard deviation.
+
+    Slope and camber of the road look like another level for some hundred metres: neighbouring intervals share their
+    errors, and a plain regression takes what a road does during one braking for forward. The innovations of a filter
+    that follows the road (a first-order Gauss-Markov process in distance) share none: the sums of these are those of
+    generalized least squares.
+    """
+    rows = np.hstack((log.terms, log.force))
+    driven = log.speed * np.diff(log.t_s, prepend=log.t_s[0])
+    kept = np.exp(-driven / ROAD_M)
+    foretold, unsure = np.zeros(rows.shape[1]), ROAD_SHARE
+    for k, weight in enumerate(log.weight.tolist()):
+        foretold = foretold * kept[k]
+        unsure = ROAD_SHARE + (unsure - ROAD_SHARE) * kept[k] ** 2
+        gain = unsure * weight / (unsure * weight + 1.0)
+        rows[k] -= foretold
+        foretold = foretold + gain * rows[k]
+        rows[k] *= math.sqrt(weight * (1.0 - gain))
+        unsure *= 1.0 - gain
+    return rows[:, :-3], rows[:, -3:]
+
+
+def sway_deg(sway: Array, frame: Array) -> Array:
+    """(k) where the vehicle sways most, degrees from forward towards left, -90 to 90. sway (k, 3, 3), frame (3, 3)."""
+    level = frame[[0, 2]] @ sway @ frame[[0, 2]].T
+    return np.degrees(0.5 * np.arctan2(2.0 * level[..., 0, 1], level[..., 1, 1] - level[..., 0, 0]))
+
+
+def _sway(log: Log) -> Array:
+    """(samples, 3) the force's changes that take some tenths of a second, in g."""
+    step_s = float(np.median(np.diff(log.t_s)))
+    sums = np.vstack((np.zeros(3), np.cumsum(log.accel_g, axis=0)))
+    quick, slow = (_mean(sums, max(1, round(width_s / step_s))) for width_s in SWAY_S)
+    return quick - slow
+
+
+def _mean(sums: Array, width: int) -> Array:
+    """Over so many samples around each, of their running sums."""
+    place = np.arange(len(sums) - 1)
+    first = np.maximum(place - width // 2, 0)
+    last = np.minimum(place + (width + 1) // 2, len(place))
+    return (sums[last] - sums[first]) / (last - first)[:, None]
+
+
+def _integrals(columns: Iterable[Array], t_s: Array, step: Array, time: Array) -> Array:
+    """(len(time), k): of each of k columns (n), until these times. One after the other: logs of hours are large."""
+    return np.array([np.interp(time, t_s, np.cumsum(column * step)) for column in columns]).T
 
 
 def _spread(time: Array, speed: Array) -> tuple[Array, Array]:

@@ -1,10 +1,12 @@
 """Logs wherever fsspec reaches them: local files, s3:// and others."""
 
+import contextlib
 import gzip
 import io
-from collections.abc import Iterable
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import IO, cast
+from typing import IO, Any, cast
 
 from ..errors import InputError, cause, extra
 from ..logs.log import Log
@@ -26,10 +28,10 @@ def join(base: str, path: str) -> str:
 
 def read_bytes(path: str) -> bytes:
     """A whole file. Raises InputError."""
-    try:
-        if is_remote(path):
-            fs, place = _system(path)
+    if is_remote(path):
+        with _in_store(path, "read") as (fs, place):
             return fs.cat_file(place)
+    try:
         return Path(path).read_bytes()
     except FileNotFoundError as error:
         raise InputError(f"{path}: there is no such file") from error
@@ -37,11 +39,19 @@ def read_bytes(path: str) -> bytes:
         raise InputError(f"{path} cannot be read: {cause(error)}") from error
 
 
+def read_all(paths: list[str]) -> list[bytes]:
+    """Whole files of one store, fetched together. Raises InputError."""
+    with _in_store(paths[0], "read") as (fs, _):
+        places = [_system(path)[1] for path in paths]
+        found = fs.cat(places)
+        return [found[place] for place in places]
+
+
 def matches(pattern: str) -> list[str]:
     """The files that a pattern with * ? [ ] stands for, sorted; ** reaches through directories."""
-    fs, place = _system(pattern)
-    found = sorted(str(path) for path in fs.glob(place))
-    return [fs.unstrip_protocol(path) for path in found] if is_remote(pattern) else found
+    with _in_store(pattern, "read") as (fs, place):
+        found = sorted(str(path) for path in fs.glob(place))
+        return [fs.unstrip_protocol(path) for path in found] if is_remote(pattern) else found
 
 
 def identities(paths: Iterable[str]) -> dict[str, str]:
@@ -50,7 +60,7 @@ def identities(paths: Iterable[str]) -> dict[str, str]:
     Remote directories are listed once each.
     """
     known: dict[str, str] = {}
-    listed: dict[str, dict[str, str]] = {}
+    directories: dict[str, dict[str, str]] = {}
     for path in paths:
         if not is_remote(path):
             try:
@@ -60,9 +70,9 @@ def identities(paths: Iterable[str]) -> dict[str, str]:
                 known[path] = ""
             continue
         parent = path.rpartition("/")[0]
-        if parent not in listed:
-            listed[parent] = _listed(parent)
-        known[path] = listed[parent].get(path, "")
+        if parent not in directories:
+            directories[parent] = listed(parent)
+        known[path] = directories[parent].get(path, "")
     return known
 
 
@@ -83,17 +93,32 @@ class _Named(io.BytesIO):
         self.name = name
 
 
-def _listed(parent: str) -> dict[str, str]:
-    fs, place = _system(parent)
-    try:
-        found = fs.ls(place, detail=True)
-    except FileNotFoundError:
-        return {}
-    marks = {}
-    for info in found:
-        time = info.get("ETag") or info.get("mtime") or info.get("LastModified") or ""
-        marks[fs.unstrip_protocol(info["name"])] = f"{info.get('size')}-{time}"
+def listed(parent: str) -> dict[str, str]:
+    """What tells that a file has changed, by path, of each in a directory of a store; none where there is no directory.
+    Raises InputError."""
+    marks: dict[str, str] = {}
+    with _in_store(parent, "read") as (fs, place), contextlib.suppress(FileNotFoundError):
+        fs.invalidate_cache(place)
+        for info in fs.ls(place, detail=True):
+            time = info.get("ETag") or info.get("mtime") or info.get("LastModified") or ""
+            marks[fs.unstrip_protocol(info["name"])] = f"{info.get('size')}-{time}"
     return marks
+
+
+@contextlib.contextmanager
+def _in_store(path: str, what: str) -> Iterator[tuple[Any, str]]:
+    """(file system, place in it) of a remote path. Whatever goes wrong there, in libraries that raise errors of their
+    own, is an InputError: the path cannot be read, or written."""
+    try:
+        yield _system(path)
+    except InputError:
+        raise
+    except FileNotFoundError as error:
+        instead = "there is no such file" if what == "read" else f"cannot be {what}: there is no such place"
+        raise InputError(f"{path}: {instead}") from error
+    except Exception as error:
+        said = " ".join((cause(error)).split())
+        raise InputError(f"{path} cannot be {what}: {said}") from error
 
 
 def _system(path: str):
@@ -110,17 +135,29 @@ def _system(path: str):
 
 def write_bytes(path: str, content: bytes) -> None:
     """Write a file, whole or not at all, and the directories for it. Raises InputError."""
+
+    def write(temporary: Path) -> None:
+        temporary.write_bytes(content)
+
     if is_remote(path):
-        fs, place = _system(path)
-        fs.pipe_file(place, content)
+        with _in_store(path, "written") as (fs, place):
+            fs.pipe_file(place, content)
         return
     target = Path(path)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"{target.parent} cannot be made: {cause(error)}") from error
-
-    def write(temporary: Path) -> None:
-        temporary.write_bytes(content)
-
     write_whole(target, write)
+
+
+def write_by(path: str, write: Callable[[Path], None]) -> None:
+    """Have write(temporary path) write a file, then put it where it belongs, whole or not at all. Raises InputError."""
+    if not is_remote(path):
+        write_whole(Path(path), write)
+        return
+    with tempfile.TemporaryDirectory() as here:
+        temporary = Path(here) / path.rpartition("/")[2]
+        write_whole(temporary, write)
+        with _in_store(path, "written") as (fs, place):
+            fs.put_file(str(temporary), place)

@@ -1,6 +1,7 @@
-"""Each result as it comes, one line of JSON each: what a run that was stopped, or whose disk filled up, had finished.
+"""Each result as it comes: what a run that was stopped, or whose disk filled up, had finished.
 
-A line that was cut, by a loss of power or a full disk, is dropped when the file is opened again.
+In a directory of this computer a line of JSON each, in one file; a line that was cut, by a loss of power or a full
+disk, is dropped when the file is opened again. In a store such as S3, whose files cannot grow, a file each.
 """
 
 import contextlib
@@ -9,9 +10,13 @@ import os
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 from ..errors import InputError, cause
+from . import files
 from .period import PeriodResult
+
+_AT_ONCE = 200  # results that are fetched from a store together
 
 
 class Journal:
@@ -53,22 +58,23 @@ class Journal:
 
     def add(self, key: str, result: PeriodResult, again: bool = False) -> None:
         """Keep a result. again: another run is to try for a better one. Raises InputError, and what was kept stays."""
-        line = json.dumps({"key": key, "again": again, "result": asdict(result) | {"picture": []}}).encode() + b"\n"
+        line = _line(key, result, again) + b"\n"
         try:
             self._file.write(line)
             self._file.flush()
         except OSError as error:
             with contextlib.suppress(OSError):
                 self._file.truncate(self._end)
-            raise InputError(
-                f"{self._path} cannot be written: {cause(error)}; what is finished is kept, the same command goes on"
-            ) from error
+            raise self._cannot(error) from error
         self._note(line)
         self._end += len(line)
 
     def sync(self) -> None:
-        """What was added outlasts a loss of power from now on."""
-        os.fsync(self._file.fileno())
+        """What was added outlasts a loss of power from now on. Raises InputError."""
+        try:
+            os.fsync(self._file.fileno())
+        except OSError as error:
+            raise self._cannot(error) from error
 
     def results(self, keys: Iterable[str]) -> Iterator[PeriodResult]:
         """Those of the keys that are there, the latest of each."""
@@ -76,7 +82,12 @@ class Journal:
             for key in keys:
                 if key in self._places:
                     file.seek(self._places[key])
-                    yield PeriodResult(**json.loads(file.readline())["result"])
+                    yield _result(file.readline())
+
+    def _cannot(self, error: OSError) -> InputError:
+        return InputError(
+            f"{self._path} cannot be written: {cause(error)}; what is finished is kept, the same command goes on"
+        )
 
     def _note(self, line: bytes) -> None:
         entry = json.loads(line)
@@ -85,3 +96,50 @@ class Journal:
             self._again.add(entry["key"])
         else:
             self._again.discard(entry["key"])
+
+
+class StoreJournal:
+    """The same, with a directory in a store: KEY.json is there for good, KEY.again.json may be bettered."""
+
+    def __init__(self, directory: str) -> None:
+        self._directory = directory
+        self._kept: set[str] = set()
+        self._again: set[str] = set()
+
+    def __enter__(self) -> "StoreJournal":
+        for path in files.listed(self._directory):
+            name = path.rpartition("/")[2]
+            (self._again if name.endswith(".again.json") else self._kept).add(name.partition(".")[0])
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        pass
+
+    def __contains__(self, key: str) -> bool:
+        return key in self._kept
+
+    def add(self, key: str, result: PeriodResult, again: bool = False) -> None:
+        files.write_bytes(self._path(key, again), _line(key, result, again))
+        (self._again if again else self._kept).add(key)
+
+    def sync(self) -> None:
+        pass
+
+    def results(self, keys: Iterable[str]) -> Iterator[PeriodResult]:
+        there = [
+            self._path(key, key not in self._kept) for key in keys if key in self._kept or key in self._again
+        ]
+        for first in range(0, len(there), _AT_ONCE):
+            yield from map(_result, files.read_all(there[first : first + _AT_ONCE]))
+
+    def _path(self, key: str, again: bool) -> str:
+        return f"{self._directory}/{key}{'.again' if again else ''}.json"
+
+
+def _line(key: str, result: PeriodResult, again: bool) -> bytes:
+    return json.dumps({"key": key, "again": again, "result": asdict(result) | {"picture": []}}).encode()
+
+
+def _result(line: bytes) -> PeriodResult:
+    entry: dict[str, Any] = json.loads(line)
+    return PeriodResult(**entry["result"])

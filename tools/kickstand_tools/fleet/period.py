@@ -1,5 +1,6 @@
 """One mount of one vehicle: its alignment, where it moved, its brake tests. A plain function on files."""
 
+import errno
 import math
 import traceback
 from dataclasses import dataclass, field
@@ -8,21 +9,25 @@ from typing import Any
 
 import numpy as np
 from kickstand.drive_alignment.quality import AGREE_DEG
+from kickstand.drive_alignment.speed_check import fit_problem
 from kickstand.errors import AlignmentError
 
 from ..analysis.stops.brake_test import Stop
 from ..calibration.drive import DriveFit, fit_logs, usable
+from ..calibration.file import CalibrationFile
 from ..errors import InputError, cause
 from ..logs.log import Log
 from ..refusals import RefusedInput
 from . import evidence, signals
 from .brake_tests import brake_tests
 from .files import open_log
+from .forward import Forward, find_forward
 from .manifest import Period
 from .moved import Move, find_moves
 
 UNREADABLE, FAULT, NO_SPEED, MOVED, LEFT_HANDED = "unreadable", "fault", "no-speed", "mount-moved", "left-handed"
-AFTERWARDS = "not-finished"  # the vehicle is aligned, but brake tests or signals of this log are missing
+# The vehicle is aligned, but brake tests or signals of this log are missing; because the disk for signals is full
+AFTERWARDS, DISK_FULL = "not-finished", "disk-full"
 _DOUBTS = (MOVED, "parts-differ", "uncertain")  # of the firmware: then it is worth while to look for a move
 _PLOTTED = 160  # intervals in a picture
 _AGAINST = -0.5  # of a turn's force on the side of the turn: a gyro or axes that are mirrored
@@ -78,30 +83,45 @@ def _result(period: Period, signals_to: str | None) -> PeriodResult:
         row = _alignment(period, status, because["reason"], because["message"], [], len(errors))
         return PeriodResult(row, errors=errors)
     fit = fit_logs(logs, None, period.kind)
-    status, reason, message = fit.status, fit.reason, str(fit.refusal or "")
-    driven, moves = [], []
+    reason, message = fit.reason, str(fit.refusal or "")
+    driven, moves, found = [], [], None
     if fit.status == "aligned" or fit.reason in _DOUBTS:
         driven = [evidence.intervals(log, period.kind, fit.lag_s or 0.0, fit.bias_dps) for log in logs]
         doubted = fit.reason in (MOVED, "parts-differ") or (fit.halves_deg or 0.0) > AGREE_DEG
         moves = find_moves(driven, doubted)
+        found = find_forward(driven, fit.calibration.vehicle_from_sensor[1] if fit.status == "aligned" else None)
         wrong = None if moves else _mirrored(driven)
         if moves:
-            status, reason, message = "refused", MOVED, _moved_words(moves, logs)
+            reason, message = MOVED, _moved_words(moves, logs)
         elif wrong:
-            status, reason, message = "refused", LEFT_HANDED, wrong
-    result = PeriodResult(_alignment(period, status, reason, message, logs, len(errors), fit), errors=errors)
+            reason, message = LEFT_HANDED, wrong
+        elif fit.reason == MOVED:
+            late = fit_problem(fit.lag_s or 0.0, 1.0)  # which takes braking for standing on another slope
+            reason, message = (late.code, str(RefusedInput(late))) if late else (reason, message)
+        elif found and found.sure:
+            reason, message = "", ""
+        elif found and not fit.reason:
+            refusal = RefusedInput(AlignmentError("uncertain", found.sigma_deg, fit.used))
+            reason, message = refusal.code, str(refusal)
+    status = "refused" if reason else "aligned"
+    result = PeriodResult(_alignment(period, status, reason, message, logs, len(errors), fit, found), errors=errors)
     result.moved = [whose | _moved_row(move, logs) for move in moves]
     if driven:
-        result.picture = _picture(driven, fit)
-    if status == "aligned":
+        result.picture = _picture(driven, found)
+    if found and status == "aligned":
+        known = CalibrationFile(
+            gyro_bias_dps=fit.bias_dps, vehicle_from_sensor=found.frame, aligned=True, vehicle=period.kind
+        )
         for log in logs:
             try:
-                tests = brake_tests(log, fit.calibration)
+                tests = brake_tests(log, known)
                 result.brake_tests += [whose | {"log": log.name} | _stop_row(stop, log) for stop in tests]
                 if signals_to is not None:
-                    signals.write(signals_to, period.vehicle, log, fit.calibration)
+                    signals.write(signals_to, period.vehicle, log, known)
             except (InputError, OSError) as error:
-                errors.append(whose | {"log": log.name, "reason": AFTERWARDS, "message": cause(error)})
+                full = getattr(error.__cause__ or error, "errno", None) in (errno.ENOSPC, errno.EDQUOT)
+                why = DISK_FULL if full else AFTERWARDS
+                errors.append(whose | {"log": log.name, "reason": why, "message": cause(error)})
     return result
 
 
@@ -123,10 +143,16 @@ def _logs(period: Period, whose: Row) -> tuple[list[Log], list[Row]]:
 
 
 def _alignment(
-    period: Period, status: str, reason: str, message: str, logs: list[Log], left_out: int, fit: DriveFit | None = None
+    period: Period,
+    status: str,
+    reason: str,
+    message: str,
+    logs: list[Log],
+    left_out: int,
+    fit: DriveFit | None = None,
+    found: Forward | None = None,
 ) -> Row:
-    known = fit if fit and status == "aligned" else None
-    judged = fit.quality_deg if fit and fit.quality_deg < 180.0 else None
+    known = found if status == "aligned" else None
     return {
         "vehicle": period.vehicle,
         "mount": period.mount,
@@ -134,10 +160,10 @@ def _alignment(
         "status": status,
         "reason": reason,
         "message": message,
-        "quality_deg": judged,
-        "halves_deg": fit.halves_deg if fit and judged is not None else None,
-        "vehicle_from_sensor": known.calibration.vehicle_from_sensor.ravel().tolist() if known else None,
-        "gyro_bias_dps": known.calibration.gyro_bias_dps.tolist() if known else None,
+        "quality_deg": found.sigma_deg if found else None,
+        "halves_deg": found.halves_deg if found else None,
+        "vehicle_from_sensor": known.frame.ravel().tolist() if known else None,
+        "gyro_bias_dps": fit.bias_dps.tolist() if fit and known else None,
         "speed_lag_s": fit.lag_s if fit else None,
         "stops": fit.stops if fit else 0,
         "events_used": fit.used if fit else 0,
@@ -198,15 +224,14 @@ def _utc_s(log: Log, at_s: float) -> float | None:
     return float(np.median(starts)) + at_s if len(starts) else None
 
 
-def _picture(driven: list[evidence.Intervals], fit: DriveFit) -> list[list[float]]:
-    frame = fit.calibration.vehicle_from_sensor
-    if fit.status != "aligned":  # the mean of what it was: the points show that it is none
-        whole = evidence.blocks(driven)
-        frame = evidence.frames(*evidence.fits(np.sum(whole.square, axis=0), np.sum(whole.product, axis=0)))
+def _picture(driven: list[evidence.Intervals], found: Forward | None) -> list[list[float]]:
+    """Where the mount moved the frame is a mean of what it was: the points show that it is none."""
+    if not found:
+        return []
     used = [log.weight > 0.0 for log in driven]
     terms = np.concatenate([log.terms[which] for log, which in zip(driven, used)])
     force = np.concatenate([log.force[which] for log, which in zip(driven, used)])
-    felt = force @ frame.T
+    felt = force @ found.frame.T
     table = np.column_stack((terms[:, 1], felt[:, 2], terms[:, 2], felt[:, 0]))
     step = max(1, math.ceil(len(table) / _PLOTTED))
     return table[::step].round(3).tolist()

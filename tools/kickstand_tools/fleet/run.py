@@ -1,5 +1,6 @@
 """A whole fleet: what is new is worked on, everything is written to a directory, at any time and again at the end."""
 
+import contextlib
 import hashlib
 import json
 import time
@@ -9,16 +10,17 @@ from pathlib import Path
 
 from kickstand import __version__
 
+from ..errors import InputError
 from ..output import check_directory, new_directory
 from . import files, tables
 from .cluster import run_tasks
-from .journal import Journal
+from .journal import Journal, StoreJournal
 from .manifest import Period
-from .period import PeriodResult, failed, work_on_period
+from .period import AFTERWARDS, DISK_FULL, PeriodResult, failed, work_on_period
 from .show import plot
 from .show.page import Glance, write_page
 
-RESULTS_VERSION = 1  # another one makes all results of before obsolete
+RESULTS_VERSION = 2  # another one makes all results of before obsolete
 PLOTS, SIGNALS = "plots", "signals"
 TIMEOUT_S = 600.0  # for one mount of one vehicle
 _WRITE_S, _SHARE = 15.0, 20.0  # tables are written so often, and at most every so many times what writing takes
@@ -43,7 +45,8 @@ def run_fleet(
     timeout_s: float = TIMEOUT_S,
     progress: Callable[[int, int], None] | None = None,
 ) -> FleetRun:
-    """Work on all periods (see read_manifest), and write tables (see schema.TABLES), pictures and index.html to out.
+    """Work on all periods (see read_manifest), and write tables (see schema.TABLES), pictures and index.html to out, a
+    directory or a place in a store (s3://...).
 
     scheduler: the address of a Dask cluster, None for workers on this computer: so many, or one a processor.
     with_signals: also write each log's accelerations along the vehicle's axes, to out/signals. timeout_s: for one
@@ -58,12 +61,18 @@ def run_fleet(
     ...     run.new, run.seen.count, sorted(path.name for path in Path(directory).glob("*.parquet"))
     (0, 0, ['alignments.parquet', 'brake_tests.parquet', 'errors.parquet', 'moved.parquet'])
     """
-    directory = Path(out)
     tables.check()
-    check_directory(directory)
-    keys = _keys(periods, with_signals)
-    signals_to = str(directory.resolve() / SIGNALS) if with_signals else None
-    with new_directory(directory / PLOTS), Journal(directory / "journal.jsonl") as journal:
+    with contextlib.ExitStack() as opened:
+        if files.is_remote(str(out)):
+            directory = str(out).rstrip("/")
+            journal = opened.enter_context(StoreJournal(files.join(directory, "journal")))
+        else:
+            check_directory(Path(out))
+            directory = str(Path(out).resolve())  # workers may run elsewhere
+            opened.enter_context(new_directory(Path(directory) / PLOTS))
+            journal = opened.enter_context(Journal(Path(directory) / "journal.jsonl"))
+        keys = _keys(periods, with_signals)
+        signals_to = files.join(directory, SIGNALS) if with_signals else None
         todo = [k for k, key in enumerate(keys) if key not in journal]
         done = len(keys) - len(todo)
         if progress:
@@ -84,13 +93,14 @@ def run_fleet(
                     last_s = time.monotonic()
                     pause_s = max(_WRITE_S, _SHARE * (last_s - before_s))
         except BaseException:  # also when it is stopped
-            if done:
-                write_results(directory, journal.results(keys), len(keys))
+            with contextlib.suppress(InputError):  # a full disk is told already
+                if next(journal.results(keys), None):
+                    write_results(directory, journal.results(keys), len(keys))
             raise
         return FleetRun(len(keys), len(todo), write_results(directory, journal.results(keys), len(keys)))
 
 
-def write_results(directory: Path, results: Iterable[PeriodResult], expected: int) -> Glance:
+def write_results(directory: str, results: Iterable[PeriodResult], expected: int) -> Glance:
     """Write the tables and the page of the results so far. expected: how many there will be. Raises InputError."""
     glance = Glance()
 
@@ -100,24 +110,36 @@ def write_results(directory: Path, results: Iterable[PeriodResult], expected: in
             yield result
 
     tables.write_tables(directory, seen())
-    write_page(directory / "index.html", glance, expected)
+    write_page(files.join(directory, "index.html"), glance, expected)
     return glance
 
 
 def _keep(
-    directory: Path,
-    journal: Journal,
+    directory: str,
+    journal: Journal | StoreJournal,
     key: str,
     period: Period,
     result: PeriodResult | None,
     reason: str,
     message: str,
 ) -> None:
+    """Keep a result before anything else can fail. Raises InputError."""
     kept = result or failed(period, reason, message)
+    missing = [row for row in kept.errors if row["reason"] in (AFTERWARDS, DISK_FULL)]
+    unshown = None
     if kept.picture:
-        kept.alignment["plot"] = f"{PLOTS}/{plot.file_name(period.vehicle, period.mount)}"
-        plot.write_plot(directory / kept.alignment["plot"], kept)
-    journal.add(key, kept, again=result is None)
+        path = f"{PLOTS}/{plot.file_name(period.vehicle, period.mount)}"
+        try:
+            plot.write_plot(files.join(directory, path), kept)
+            kept.alignment["plot"] = path
+        except InputError as error:
+            unshown = error
+    journal.add(key, kept, again=result is None or bool(missing) or unshown is not None)
+    if unshown:
+        raise unshown
+    full = next((row for row in missing if row["reason"] == DISK_FULL), None)
+    if full:
+        raise InputError(f"{full['message']}; what is finished is kept, the same command goes on")
 
 
 def _keys(periods: list[Period], with_signals: bool) -> list[str]:

@@ -5,8 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, extra
-from ..output import write_whole
-from . import schema
+from . import files, schema
 from .period import PeriodResult, Row
 
 _GROUP = 20_000  # rows that are written at a time
@@ -20,13 +19,13 @@ def check() -> None:
         raise InputError("a fleet needs pyarrow: " + extra("fleet")) from error
 
 
-def write_tables(directory: Path, results: Iterable[PeriodResult]) -> None:
+def write_tables(directory: str, results: Iterable[PeriodResult]) -> None:
     """Write a file NAME.parquet for each of schema.TABLES, whole or not at all. Memory does not grow with the number of
     results, which are gone through once. Raises InputError."""
     _open_next(directory, list(schema.TABLES), {}, results)
 
 
-def _open_next(directory: Path, names: list[str], tables: dict[str, "_Table"], results: Iterable[PeriodResult]) -> None:
+def _open_next(directory: str, names: list[str], tables: dict[str, "_Table"], results: Iterable[PeriodResult]) -> None:
     """Open the table of the first name, then the others, then write all."""
     if not names:
         for result in results:
@@ -44,7 +43,7 @@ def _open_next(directory: Path, names: list[str], tables: dict[str, "_Table"], r
             _open_next(directory, others, tables, results)
             tables[name].flush()
 
-    write_whole(directory / f"{name}.parquet", write)
+    files.write_by(files.join(directory, f"{name}.parquet"), write)
 
 
 class _Table:

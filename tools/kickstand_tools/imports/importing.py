@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from kickstand.errors import Notice
@@ -17,7 +18,6 @@ from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, senso
 from .files import Piece, read_pieces
 from .join import GAP_NS, Joined, join
 from .recording import Array, Recording, Taken
-from .sheets import check_pandas
 from .units import ACCELERATIONS, SPEEDS, factor, unit
 
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
@@ -76,7 +76,6 @@ def import_recording(
     >>> round(found.rate_hz), found.log.accel_g[0].round(3).tolist(), found.log.gyro_dps[0].round(2).tolist()
     (100, [0.0, 1.0, 0.0], [0.0, 0.0, 5.73])
     """
-    check_pandas()
     name = str(source)
     recording = _recording(read_pieces(source), name, columns, dict(units or {}))
     joined = join(recording, name)
@@ -107,6 +106,20 @@ def import_recording(
     )
 
 
+def app_of(source: Path | str) -> str:
+    """Whose recording a file, a folder or a zip is, "" where that is not known. Raises InputError if it cannot be read.
+
+    >>> import pathlib, tempfile
+    >>> with tempfile.TemporaryDirectory() as directory:
+    ...     path = pathlib.Path(directory, "table.csv")
+    ...     _ = path.write_text("a,b\\n1,2\\n")
+    ...     app_of(path)
+    ''
+    """
+    found = _recordings(read_pieces(source))
+    return found[0][0].NAME if found else ""
+
+
 def write_imported(path: Path | str, imported: Imported) -> None:
     """Write the log, gzipped if its name ends in .gz, whole or not at all. Raises InputError.
 
@@ -127,12 +140,7 @@ def _recording(pieces: list[Piece], name: str, columns: Mapping[str, str] | None
         if len(pieces) > 1:
             raise InputError(f"{name} holds {len(pieces)} files: give --columns with one, such as {pieces[0].name}")
         return mapped.read_mapped(pieces[0], columns, units, name)
-    found, left = [], pieces
-    for app in _APPS:
-        for files in app.finds(left):
-            found.append((app, files))
-        claimed = {id(piece) for _, files in found for piece in files}
-        left = [piece for piece in left if id(piece) not in claimed]
+    found = _recordings(pieces)
     if not found:
         raise InputError(mapped.unknown(pieces, name))
     if len(found) > 1:
@@ -153,6 +161,17 @@ def _recording(pieces: list[Piece], name: str, columns: Mapping[str, str] | None
             recording.accel.values = -recording.accel.values
             _say_sign(recording, "turned")
     return recording
+
+
+def _recordings(pieces: list[Piece]) -> list[tuple[Any, list[Piece]]]:
+    """The recordings among some files: each with its module in apps/."""
+    found, left = [], pieces
+    for app in _APPS:
+        for files in app.finds(left):
+            found.append((app, files))
+        claimed = {id(piece) for _, files in found for piece in files}
+        left = [piece for piece in left if id(piece) not in claimed]
+    return found
 
 
 def _check_force(joined: Joined, name: str) -> None:

@@ -91,14 +91,10 @@ def on_clock(sensor: Sensor, clock_ns: NDArray[np.int64], period_ns: float) -> A
 
     Interpolated along straight lines; a sensor that is faster than the clock, whose period is given, is averaged.
     """
-    import pandas
-
-    frame = pandas.DataFrame(sensor.values, index=pandas.to_timedelta(sensor.time_ns, unit="ns"))
-    clock = pandas.to_timedelta(clock_ns, unit="ns")
-    if _period_ns(sensor) * FASTER < period_ns:
-        frame = pandas.DataFrame(frame.rolling(f"{round(period_ns)}ns", center=True).mean())
-    both = frame.reindex(frame.index.union(clock)).interpolate(method="index", limit_area="inside")
-    values = np.array(both.loc[clock], dtype=float)
+    slow = _period_ns(sensor) * FASTER < period_ns
+    known = _averaged(sensor, period_ns) if slow else sensor.values
+    since, at = (np.asarray(ns - sensor.time_ns[0], dtype=float) for ns in (sensor.time_ns, clock_ns))
+    values = np.column_stack([_between(at, since, column) for column in known.T])
     own = sensor.time_ns
     after = np.searchsorted(own, clock_ns, side="left")
     next_ns = own[np.minimum(after, len(own) - 1)]
@@ -106,6 +102,24 @@ def on_clock(sensor: Sensor, clock_ns: NDArray[np.int64], period_ns: float) -> A
     apart = next_ns - own[np.maximum(after - 1, 0)]
     values[~exact & (apart > GAP_NS)] = np.nan
     return values
+
+
+def _between(at: Array, since: Array, values: Array) -> Array:
+    """Values (n) at other times, along straight lines over those that are NaN; NaN outside."""
+    there = ~np.isnan(values)
+    if not np.any(there):
+        return np.full(len(at), np.nan)
+    return np.interp(at, since[there], values[there], left=np.nan, right=np.nan)
+
+
+def _averaged(sensor: Sensor, over_ns: float) -> Array:
+    """A sensor's values (n, 3), each the mean over so long around it."""
+    half = round(over_ns / 2.0)
+    begin, end = (np.searchsorted(sensor.time_ns, sensor.time_ns + side, side="right") for side in (-half, half))
+    sums = np.cumsum(np.vstack((np.zeros(3), np.nan_to_num(sensor.values))), axis=0)
+    counts = np.cumsum(np.vstack((np.zeros(3), ~np.isnan(sensor.values))), axis=0)
+    found, count = sums[end] - sums[begin], counts[end] - counts[begin]
+    return np.where(count > 0.0, found / np.maximum(count, 1.0), np.nan)
 
 
 def added(first: Sensor, second: Sensor, name: str) -> Sensor:

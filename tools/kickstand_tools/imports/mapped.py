@@ -37,14 +37,14 @@ def read_mapped(piece: Piece, columns: Mapping[str, str], units: Mapping[str, st
     places = {key: _place(sheet, key, wanted) for key, wanted in columns.items()}
     _check_units(sheet, places, units)
     t_unit = units.get("t") or unit_in(sheet.columns[places["t"]])
-    t_unit = time_unit(sheet.series(places["t"]), t_unit if unit(t_unit) in TIMES else "")
-    time_ns = times_ns(sheet.series(places["t"]), t_unit, sheet.name)
+    t_unit = time_unit(sheet.cells[places["t"]], t_unit if unit(t_unit) in TIMES else "")
+    time_ns = times_ns(sheet.cells[places["t"]], t_unit, sheet.name)
     accel, first = _sensor(sheet, time_ns, places, units, "accelerometer")
     gyro, second = _sensor(sheet, time_ns, places, units, "gyro")
     for key in ("lat", "lon"):
         if key in places:
             scale = factor(units.get(key, "deg"), ANGLES, key)
-            sheet.frame[places[key]] = scale * sheet.numbers(places[key])
+            sheet.cells[places[key]] = scale * sheet.numbers(places[key])
     speed_unit = "m/s"
     if "speed" in places:
         speed_unit = unit(_unit(units, ("speed",), sheet.columns[places["speed"]]))

@@ -1,22 +1,16 @@
 """A table of text as columns of numbers: which separator, which decimal mark, under which names."""
 
 import csv
-import io
 import os
 import re
-import warnings
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..errors import InputError, extra
+from ..errors import InputError
 from ..logs.table import Array
+from .cells import Cells, columns_of_text, numbers_of
 from .files import Piece
-
-if TYPE_CHECKING:
-    from pandas import DataFrame, Series
 
 LONG = 6  # letters that several names begin with are too many to repeat
 _DECIMAL_COMMA = re.compile(r"(?:^|[;\t\"])\s*[+-]?\d+,\d")
@@ -24,12 +18,11 @@ _DECIMAL_COMMA = re.compile(r"(?:^|[;\t\"])\s*[+-]?\d+,\d")
 
 @dataclass
 class Sheet:
-    """name: of the file, for messages. columns: as they are called in it, some perhaps twice. frame: the cells, its
-    columns numbered from 0."""
+    """name: of the file, for messages. columns: as they are called in it, some perhaps twice. cells: of each column."""
 
     name: str
     columns: list[str]
-    frame: "DataFrame"
+    cells: list[Cells]
 
     def place(self, *names: str) -> int | None:
         """Number of the first column of one of these names, compared by plain()."""
@@ -45,27 +38,15 @@ class Sheet:
             names[1:] = ["…" + name[same:] for name in names[1:]]
         return f"{self.name}: {', '.join(names)}"
 
-    def series(self, place: int) -> "Series":
-        """A column as it was read."""
-        return self.frame.iloc[:, place]
-
     def numbers(self, place: int | None) -> Array:
         """A column as numbers (n), NaN where a cell has none; all NaN for None."""
         if place is None:
-            return np.full(len(self.frame), np.nan)
-        return numbers_of(self.series(place)).astype(float)
+            return np.full(len(self.cells[0]), np.nan)
+        return numbers_of(self.cells[place]).astype(float)
 
     def table(self, places: list[int]) -> Array:
         """Several columns as numbers (n, columns)."""
         return np.column_stack([self.numbers(place) for place in places])
-
-
-def numbers_of(cells: "Series") -> NDArray[Any]:
-    """Cells (n) as whole numbers where all of them are, else as floats, NaN for what is no number."""
-    import pandas
-
-    values = np.asarray(pandas.to_numeric(cells, errors="coerce"))
-    return values if values.dtype.kind in "iuf" else values.astype(float)
 
 
 def plain(name: str) -> str:
@@ -77,14 +58,6 @@ def unit_in(name: str) -> str:
     """The unit that stands in brackets in a column's name, "" for none."""
     found = re.search(r"[(\[]([^)\]]*)[)\]]\s*$", name)
     return found[1].strip() if found else ""
-
-
-def check_pandas() -> None:
-    """Raise InputError where pandas is not installed: it reads the tables and joins the sensors."""
-    try:
-        import pandas as pandas
-    except ImportError as error:
-        raise InputError("import needs pandas: " + extra("rides")) from error
 
 
 def separator_of(line: str) -> str:
@@ -112,28 +85,7 @@ def read_sheet(piece: Piece, header: int = 0, skipped: int = 0) -> Sheet:
     columns = cells_of(lines[header])
     while columns and not columns[-1]:
         columns.pop()  # lines that end in a separator
-    return Sheet(piece.name, columns, _frame(piece.name, lines[-1], separator_of(lines[header]), len(columns)))
-
-
-def _frame(name: str, text: str, separator: str, width: int) -> "DataFrame":
-    import pandas
-
+    text, separator = lines[-1], separator_of(lines[header])
     if separator != "," and _DECIMAL_COMMA.search(text[:20000]):
         text = text.replace(",", ".")
-    for tried in (text, text.replace('"', "")):  # a quotation mark that is not closed swallows what follows
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore")  # lines that end in a separator, and columns of several kinds
-                return pandas.read_csv(
-                    io.StringIO(tried),
-                    sep=separator,
-                    header=None,
-                    names=list(range(max(width, 1))),
-                    index_col=False,
-                    skipinitialspace=True,
-                    low_memory=False,
-                    on_bad_lines="skip",
-                )
-        except (ValueError, OverflowError):  # ParserError is a ValueError
-            continue
-    raise InputError(f"{name}: no table of numbers: export it again as CSV")
+    return Sheet(piece.name, columns, columns_of_text(text, separator, max(len(columns), 1)))

@@ -1,17 +1,15 @@
 """Times as apps write them, as nanoseconds: numbers in s, ms, us or ns, from any start or from 1970, dates, clocks."""
 
 import re
-from typing import TYPE_CHECKING, Any
+from datetime import UTC, datetime, timedelta
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .sheets import numbers_of
+from .cells import Cells, as_text, filled, numbers_of
 from .units import TIMES, unit
-
-if TYPE_CHECKING:
-    from pandas import Series
 
 Nanoseconds = NDArray[np.int64]
 
@@ -20,39 +18,47 @@ DATES = "date or clock"
 EPOCH_NS = 10**17  # 1973: a later time counts from 1970
 DAY_NS = 86400 * 10**9
 _LATEST_NS = 4.0e18  # the year 2096; twice as much still fits into 64 bits
+_BLANK = re.compile(r"\s+(?=[+-]\d\d:?\d\d$)")
 _CLOCK = re.compile(r"^\s*(?:(\d+):)?(\d{1,2}):(\d{1,2}(?:\.\d+)?)\s*$")
 
 
-def times_ns(cells: "Series", unit_name: str = "", where: str = "the recording") -> Nanoseconds:
+def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") -> Nanoseconds:
     """Times (n) in ns, NO_TIME for a cell that holds none.
 
     unit_name: of numbers, "" if it is to be told from their size and steps. Raises InputError where few cells are
     times. where: what messages call them.
     """
-    import pandas
-
     numbers = numbers_of(cells)
-    filled = int(np.count_nonzero(cells.notna()))
-    if np.count_nonzero(np.isfinite(numbers)) > filled // 2:
+    count = int(np.count_nonzero(filled(cells)))
+    if np.count_nonzero(np.isfinite(numbers)) > count // 2:
         return _of_numbers(numbers, unit_name, where)
-    texts = cells.astype(str)
-    clocks = [_CLOCK.match(str(text)) for text in texts.tolist()]
-    if sum(map(bool, clocks)) > filled // 2:
+    texts = as_text(cells)
+    clocks = [_CLOCK.match(text) for text in texts]
+    if sum(map(bool, clocks)) > count // 2:
         parts = [[float(part or 0.0) for part in match.groups()] if match else [np.nan] * 3 for match in clocks]
         return _after_midnight(np.array(parts) @ np.array([3600.0, 60.0, 1.0]))
-    zoned = texts.str.replace(r"\s+(?=[+-]\d\d:?\d\d$)", "", regex=True).str.replace(" UTC", "+00:00", regex=False)
-    dates = pandas.to_datetime(zoned, errors="coerce", utc=True, format="ISO8601")
-    known = np.asarray(dates.notna(), dtype=bool)
-    if np.count_nonzero(known) <= filled // 2:
-        shown = ascii(str(cells.iloc[0])[:30]) if len(cells) else "empty"
+    dates = np.array([_date_ns(text) for text in texts], dtype=np.int64)
+    if np.count_nonzero(dates != NO_TIME) <= count // 2:
+        shown = ascii(texts[0][:30]) if texts else "empty"
         raise InputError(f"{where}: {shown} is no time: numbers, or dates such as 2024-05-17T09:30:00.25Z, are needed")
-    return np.where(known, np.asarray(dates.dt.tz_localize(None), dtype="datetime64[ns]").astype(np.int64), NO_TIME)
+    return dates
 
 
-def time_unit(cells: "Series", given: str = "") -> str:
+def _date_ns(text: str) -> int:
+    """A date as ISO 8601 has it, in UTC where it names no zone; a blank before the zone is usual."""
+    try:
+        date = datetime.fromisoformat(_BLANK.sub("", text.strip()).replace(" UTC", "+00:00"))
+    except ValueError:
+        return NO_TIME
+    since = (date if date.tzinfo else date.replace(tzinfo=UTC)) - datetime(1970, 1, 1, tzinfo=UTC)
+    ns = since // timedelta(microseconds=1) * 1000
+    return ns if abs(ns) < 2.0 * _LATEST_NS else NO_TIME
+
+
+def time_unit(cells: Cells, given: str = "") -> str:
     """The unit of times, told from their size and steps where it is not given; "date or clock" where they are these."""
     numbers = numbers_of(cells)
-    if np.count_nonzero(np.isfinite(numbers)) <= np.count_nonzero(cells.notna()) // 2:
+    if np.count_nonzero(np.isfinite(numbers)) <= np.count_nonzero(filled(cells)) // 2:
         return DATES
     return unit(given) if given else _guessed(numbers.astype(float))
 

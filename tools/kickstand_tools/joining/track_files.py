@@ -64,7 +64,7 @@ def _gpx(path: Path, progress: Progress | None) -> Iterator[Point]:
     try:
         document = gpxpy.parse(content)
     except (gpxpy.gpx.GPXException, ValueError, LookupError) as error:
-        raise InputError(f"{path} is no GPX file: {error}") from error
+        raise InputError(f"{path} is no GPX file, or its copy is not whole: {error}") from error
     for track in document.tracks:
         for segment in track.segments:
             for point in segment.points:

@@ -43,7 +43,7 @@ def header(log: str, line: str) -> list[str]:
         raise InputError(f"{log}, line 1: not CSV ({error}): is it a log?") from error
     missing = [name for name in COLUMNS if name not in names]
     if missing and "lean_deg" in names:
-        what = f"{log} holds the lean that kickstand has computed"
+        what = f"{log} holds a lean, no readings"
         raise InputError(f"{what}: give the log that it was made from{_made_from(log)}")
     if missing and any(mark in "".join(names) for mark in ";\t"):
         raise InputError(f"{log}, line 1: values stand apart by ; or tab: save it with commas between them")

@@ -1,9 +1,16 @@
-"""Tables of numbers as lines of CSV, quickly; a log in memory as a file."""
+"""Tables of numbers as lines of CSV, quickly; a log in memory as a file.
 
+The texts are those of Python's own formatting, made of a column at once instead of number by number, in a seventh of
+its time: formatting was a third of the work on a long ride.
+"""
+
+import csv
 import gzip
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..output import write_whole
 from .cells import COLUMNS, OPTIONAL
@@ -11,13 +18,82 @@ from .log import Log
 from .table import Array
 
 _DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
-_ROWS = 60_000  # written at a time
+_ROWS = 15_000  # written at a time: their letters fit a processor's cache
+_MOST = 2.0**53  # in units of the last digit: up to here doubles are no more than one unit apart
+_POINT, _MINUS, _ZERO, _COMMA, _END = b".-0,\n"
+
+Letters = NDArray[np.uint8]  # (m, n): the ASCII letters of n texts, one in each column; 0 is none
 
 
-def csv_lines(table: Array, digits: list[int]) -> str:
-    """(n, m) with digits[k] after the point in column k; NaN is an empty cell."""
-    form = ",".join(f"%.{digit}f" for digit in digits) + "\n"
-    return "".join([form % tuple(row) for row in table.tolist()]).replace("nan", "")
+def csv_lines(table: Array, digits: Sequence[int]) -> Iterator[bytes]:
+    """The lines of (n, m) with digits[k] after the point in column k, some at a time; NaN is an empty cell."""
+    for begin in range(0, len(table), _ROWS):
+        columns = table[begin : begin + _ROWS].T
+        yield joined_cells([number_cells(column, digit, nan="") for column, digit in zip(columns, digits, strict=True)])
+
+
+def joined_cells(columns: Sequence[Letters]) -> bytes:
+    """Lines of CSV from the cells of each column."""
+    n = columns[0].shape[1]
+    comma, end = np.full((1, n), _COMMA, dtype=np.uint8), np.full((1, n), _END, dtype=np.uint8)
+    parts = [part for letters in columns for part in (letters, comma)]
+    return np.concatenate((*parts[:-1], end)).T.tobytes().translate(None, b"\0")
+
+
+def text_cells(texts: Sequence[str]) -> Letters:
+    """Of ASCII texts. Raises UnicodeEncodeError for others."""
+    packed = np.array(texts, dtype=np.bytes_)
+    return np.ascontiguousarray(packed.view(np.uint8).reshape(len(texts), packed.itemsize).T)
+
+
+def number_cells(values: Array, digits: int, nan: str = "nan") -> Letters:
+    """f"{value:.{digits}f}" of each of values (n). nan: what stands for a value that is not a number."""
+    scaled = np.abs(values) * 10.0**digits
+    missing = np.isnan(scaled)
+    scaled = np.where(missing, 0.0, scaled)
+    if not np.all(scaled < _MOST):  # infinity, too
+        return text_cells([nan if value != value else f"{value:.{digits}f}" for value in values.tolist()])
+    whole = np.rint(scaled)
+    # The product was rounded: close to the middle between two numbers the text may be the other one's.
+    for k in np.flatnonzero(np.abs(np.abs(scaled - whole) - 0.5) <= scaled * 2.0**-52).tolist():
+        whole[k] = int(f"{abs(values[k]):.{digits}f}".replace(".", ""))
+    most = int(np.max(whole, initial=0.0))
+    letters = _letters(whole.astype(np.uint32 if most < 2**32 else np.uint64), digits, len(str(most)), len(nan))
+    letters[0] = np.where(np.signbit(values), _MINUS, 0)
+    if np.any(missing):
+        letters[:, missing] = np.array([*nan.encode(), *bytes(len(letters) - len(nan))], dtype=np.uint8)[:, None]
+    return letters
+
+
+def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, room: int) -> Letters:
+    """Of integers (n) of up to `most` digits with a point before the last `digits` ones, and a free row in front. room:
+    rows at least."""
+    places = max(most, digits + 1)
+    letters = np.zeros((max(places + 2, room), len(number)), dtype=np.uint8)
+    row = len(letters) - 1
+    for place in range(places):
+        if place == digits > 0:
+            letters[row] = _POINT
+            row -= 1
+        rest = number // 10
+        letter = (number - 10 * rest).astype(np.uint8) + np.uint8(_ZERO)
+        letters[row] = letter if place <= digits else np.where(number > 0, letter, 0)  # no zeros in front
+        number, row = rest, row - 1
+    return letters
+
+
+def write_lines(path: Path, names: Sequence[str], pieces: Iterable[bytes]) -> None:
+    """Write a CSV file from its columns' names and its lines, gzipped if its name ends in .gz, whole or not at all.
+
+    Raises InputError."""
+
+    def write(temporary: Path) -> None:
+        opened = gzip.open if path.suffix == ".gz" else open
+        with opened(temporary, "wb") as file:
+            file.write((",".join(names) + "\n").encode("ascii"))
+            file.writelines(pieces)
+
+    write_whole(path, write)
 
 
 def write_log(path: Path | str, log: Log) -> None:
@@ -31,18 +107,22 @@ def write_log(path: Path | str, log: Log) -> None:
     ...     print(Path(directory, "log.csv").read_text().splitlines()[1])
     0.000000,0.000000,1.000000,0.000000,0.000000,0.000000,0.000000
     """
-    path = Path(path)
     values = log.columns()
     values["t_s"] = values["t_s"] + log.start_s
     names = [*COLUMNS, *[name for name in OPTIONAL if np.any(np.isfinite(values[name]))]]
     digits = [_DIGITS.get(name, 6) for name in names]
     table = np.column_stack([values[name] for name in names])
+    write_lines(Path(path), names, csv_lines(table, digits))
+
+
+def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a CSV file, gzipped if its name ends in .gz, whole or not at all."""
 
     def write(temporary: Path) -> None:
         opened = gzip.open if path.suffix == ".gz" else open
         with opened(temporary, "wt", encoding="ascii", newline="") as file:
-            file.write(",".join(names) + "\n")
-            for begin in range(0, len(table), _ROWS):
-                file.write(csv_lines(table[begin : begin + _ROWS], digits))
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(columns)
+            writer.writerows(rows)
 
     write_whole(path, write)

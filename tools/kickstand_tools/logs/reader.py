@@ -1,10 +1,8 @@
 """Recorded logs: CSV with the columns of COLUMNS, plain or gzipped, read block by block."""
 
-import csv
-import gzip
 import io
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +11,6 @@ from kickstand.errors import Notice
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..output import write_whole
 from . import cells
 from .axes.bends import Bends
 from .axes.course import Course
@@ -105,11 +102,38 @@ def read_blocks(
         notices += remarks + frozen.notices() + judged[:1]  # one cause is told once
 
 
+def check_first_line(log: Path) -> None:
+    """Raise InputError where a file does not begin as a log does."""
+    first = next(chunks(log, 1), (b"", 0))[0]
+    cells.check_text(str(log), first, 0)
+    cells.header(str(log), first.decode().removeprefix("\ufeff").partition("\n")[0])
+
+
 def read_twice(source: Source) -> Source:
     """The same where it can be read again, else a Log: an open file can be read once."""
     if isinstance(source, Stretch):
         return Stretch(_again(source.source), source.from_s, source.to_s)
     return _again(source)
+
+
+def apart(source: Source) -> tuple[File | Log, Stretch | None]:
+    """The whole log, and the stretch of it that is wanted, with times from the log's beginning; None: all of it.
+
+    Raises InputError where the stretch holds no sample.
+    """
+    if not isinstance(source, Stretch):
+        return source, None
+    stretch = _from_beginning(Stretch(_again(source.source), source.from_s, source.to_s))
+    next(stretch.cut(_unchecked(stretch.source, [])))
+    return stretch.source, stretch
+
+
+def _from_beginning(stretch: Stretch) -> Stretch:
+    if not stretch.from_its_end:
+        return stretch
+    whole = _again(stretch.source)
+    last_s = [float(block.t_s[-1]) for block in _unchecked(whole, [])]
+    return Stretch(whole, stretch.from_s, stretch.to_s).of_length(max(last_s, default=0.0))
 
 
 def _again(source: File | Log) -> File | Log:
@@ -122,10 +146,7 @@ def _unchecked(source: Source, remarks: list[Notice]) -> Iterator[Block]:
         return _blocks_of(source)
     if not isinstance(source, Stretch):
         return _parsed(source, name_of(source), remarks)
-    if source.from_its_end:
-        whole = _again(source.source)
-        last_s = [float(block.t_s[-1]) for block in _unchecked(whole, [])]
-        source = Stretch(whole, source.from_s, source.to_s).of_length(max(last_s, default=0.0))
+    source = _from_beginning(source)
     return source.cut(_unchecked(source.source, remarks))
 
 
@@ -180,19 +201,6 @@ def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], rema
         yield _block(table, time_us - start_us, places, start_us / 1e6, rows, names, done)
 
 
-def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Write a CSV file, gzipped if its name ends in .gz, whole or not at all."""
-
-    def write(temporary: Path) -> None:
-        opened = gzip.open if path.suffix == ".gz" else open
-        with opened(temporary, "wt", encoding="ascii", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(columns)
-            writer.writerows(rows)
-
-    write_whole(path, write)
-
-
 def _numbers(
     name: str, text: bytes, names: list[str], places: dict[str, int], line: int, before_us: int | None
 ) -> tuple[Array, str]:
@@ -202,7 +210,10 @@ def _numbers(
     of a mistake and is twenty times slower.
     """
     if text.strip() and not text.translate(None, _NUMERIC):
-        plain = text.replace(b",,", b",nan,").replace(b",,", b",nan,").replace(b",\n", b",nan\n")
+        plain = text.replace(b",,", b",nan,")
+        if len(plain) > len(text):  # of three commas the second is still beside the third
+            plain = plain.replace(b",,", b",nan,")
+        plain = plain.replace(b",\n", b",nan\n")
         try:
             table = np.loadtxt(io.BytesIO(plain), delimiter=",", comments=None, ndmin=2)
         except ValueError:

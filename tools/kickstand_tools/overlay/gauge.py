@@ -14,6 +14,7 @@ from .parts import ACCENT, DIM, PANEL, WHITE
 MOST_DEG = 60.0  # end of the dial
 MOST_G = 1.2  # edge of the circle of forces
 SHARE = 0.3  # of the video's height
+LEGIBLE_PX, MOST_SHARE = 216.0, 0.45  # the least height at which its small words can be read; of small videos
 UPRIGHT_DEG = 0.5  # a smaller lean is to neither side
 _WIDTH = 1.72  # by the height
 _SPREAD = 1.5  # degrees of the picture for a degree of lean
@@ -29,7 +30,8 @@ class Gauge:
     """
 
     def __init__(self, video_height: int, has_speed: bool = True, mph: bool = False) -> None:
-        self.height = max(96, 2 * round(video_height * SHARE / 2.0))
+        height = max(SHARE * video_height, min(LEGIBLE_PX, MOST_SHARE * video_height))
+        self.height = 2 * round(height / 2.0)
         self.width = 2 * round(self.height * _WIDTH / 2.0)
         self._unit = self.height / 100.0  # lengths below are in hundredths of the height
         self._has_speed, self._mph = has_speed, mph

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from kickstand.errors import Notice
 
-from ..analysis.channels import open_ride
+from ..analysis.ride import open_ride
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
 from ..joining.motion import motion
@@ -57,7 +57,7 @@ def overlay(
     fps: float | None = None,
     from_s: float | None = None,
     to_s: float | None = None,
-    height: int = _CLIP_HEIGHT,
+    height: int | None = None,
     mph: bool = False,
     live: bool = False,
     progress: Progress | None = None,
@@ -67,16 +67,16 @@ def overlay(
     ride, calibration: as for open_ride(). video: one of the ride. offset_s: the ride's time at the video's first
     picture, s since the ride's first sample: 12.5 if the video begins 12.5 s after the ride, -3 if it begins 3 s before
     it. None: found by the sensors of the GoPro that made it. fps: pictures a second; None: the video's, or 30. from_s,
-    to_s: the part of the ride; negative: before its end. height: of the video that a clip is for, pixels. mph: miles an
-    hour. live: the lean that the display showed, not the smoothed one.
-    progress: called with how much of the ride has been read, then with how many pictures are drawn. Raises InputError.
+    to_s: the part of the ride; negative: before its end. height: of the video that a clip is for, pixels; None: 1080.
+    mph: miles an hour. live: the lean that the display showed, not the smoothed one. progress: called with how much
+    of the ride has been read, then with how many pictures are drawn. Raises InputError.
 
     >>> overlay("ride.csv", "clip.avi")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     kickstand_tools.errors.InputError: clip.avi: the name of a transparent clip ends in .mov or .webm...
     """
     out = Path(out)
-    filmed = _check(out, video, offset_s)
+    filmed = _check(out, video, offset_s, height)
     opened = open_ride(read_twice(ride), calibration, smoothed=not live)
     correlation = None
     if filmed and offset_s is None:
@@ -89,7 +89,7 @@ def overlay(
     moments = seen.at(begin_s + np.arange(count) / rate)
     from .gauge import Gauge
 
-    size = min(filmed.width, filmed.height) if filmed else height
+    size = min(filmed.width, filmed.height) if filmed else height or _CLIP_HEIGHT
     gauge = Gauge(size, seen.has_speed, mph)
     done = 0
 
@@ -109,11 +109,16 @@ def overlay(
     else:
         assert offset_s is not None
         arguments = _over(filmed, begin_s - offset_s, end_s - begin_s, fps, given, round(MARGIN * size))
-    write_whole(out, lambda temporary: write_video(temporary, arguments, pictures(), drawn))
+
+    def written(temporary: Path) -> None:
+        temporary.touch()  # where that fails the system's reason is told, which ffmpeg's words hide
+        write_video(temporary, arguments, pictures(), drawn)
+
+    write_whole(out, written)
     return Overlaid(count, rate, begin_s, end_s, offset_s, correlation, notices)
 
 
-def _check(out: Path, video: Path | str | None, offset_s: float | None) -> Video | None:
+def _check(out: Path, video: Path | str | None, offset_s: float | None, height: int | None) -> Video | None:
     """Raise InputError, before any work is done, for what cannot be written or read."""
     if video is None:
         if out.suffix.lower() not in _TRANSPARENT:
@@ -124,6 +129,8 @@ def _check(out: Path, video: Path | str | None, offset_s: float | None) -> Video
         return None
     if out.suffix.lower() != ".mp4":
         raise InputError(f"{out}: over a video the name has to end in .mp4")
+    if height is not None:
+        raise InputError("a height is that of a clip: over a video the gauge goes by the video's own")
     return open_video(Path(video))
 
 
@@ -152,8 +159,10 @@ def _part(
         if begin_s is None and end_s is None and (first < -_BEYOND_S or last > last_s + _BEYOND_S):
             within = f"--from {max(first, 0.0):.1f} --to {min(last, last_s):.1f}"
             raise InputError(f"{where}: check --offset, or take what they have in common with {within}")
-        begin_s = max(first, begin_s if begin_s is not None else first)
-        end_s = min(last, end_s if end_s is not None else last)
+        if begin_s is not None or end_s is not None:  # what is not given is where both are
+            begin_s, end_s = begin_s or 0.0, last_s if end_s is None else min(end_s, last_s)
+        begin_s = first if begin_s is None else max(first, begin_s)
+        end_s = last if end_s is None else min(last, end_s)
     begin_s, end_s = begin_s or 0.0, last_s if end_s is None else end_s
     if end_s <= begin_s or begin_s >= last_s:
         raise InputError(f"{name} lasts {last_s:.1f} s: there is nothing from {begin_s:.1f} to {end_s:.1f} s")

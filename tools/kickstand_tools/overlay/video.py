@@ -45,7 +45,7 @@ def open_video(path: Path) -> Video:
     said = _run(["-hide_banner", "-nostdin", "-i", str(path)]).stderr.decode(errors="replace")
     stream = re.search(r"Stream #0:\d+.*: Video: (.*)", said)
     if "Input #0" not in said:
-        raise InputError(f"{path} is no video that ffmpeg can read")
+        raise InputError(f"{path} is no video that ffmpeg can read, or its copy is not whole")
     if not stream or "attached pic" in stream[0]:
         raise InputError(f"{path} has no pictures: give a video")
     size = re.search(r"\b(\d{2,5})x(\d{2,5})\b", stream[1])

@@ -15,18 +15,21 @@ from .. import unix_port
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
 from ..logs.block import Block
-from ..logs.reader import Source, read_blocks, read_twice, write_table
-from ..logs.source import Progress
+from ..logs.csv_lines import joined_cells, number_cells, text_cells, write_lines
+from ..logs.reader import Source, apart, read_blocks, read_twice
+from ..logs.source import Progress, total_bytes
 from ..logs.table import Array, Table
-from . import replay_engine
+from . import replay_engine, second_process
+from .meter_along import MeterAlong
 from .mount_check import MountCheck
 
 _CHUNK = 500  # samples between two calls of progress while an emulated Pico works
 
+_LONG_BYTES = 20 << 20  # of the file: a log of some seconds' work, for which a second process is worth its start
+
 _SIGMA = replay_engine.COLUMNS.index("lean_sigma_deg")
 
-Row = tuple[float, ...]  # of replay_engine.COLUMNS
-Replayed = tuple[Block, list[Row]]
+Replayed = tuple[Block, Array]  # (n, replay_engine.COLUMNS) of the rows that are believed
 
 
 @dataclass(eq=False)
@@ -81,18 +84,20 @@ def replay_to_csv(
 ) -> tuple[int, list[Notice]]:
     """Write LEAN.csv: the log's own times, then replay_engine.COLUMNS. Returns the number of samples and the notices.
 
-    Memory does not grow with the log, except on the emulated Pico, which is too slow for a long one. Raises InputError.
+    A long log takes two processes. Memory does not grow with it, except on the emulated Pico, which is too slow for a
+    long one. Raises InputError.
     """
     count, notices = 0, []
+    # for the command alone: a program that calls replay() may not be one that can be started once more
+    run = "two processes" if engine == "cpython" and total_bytes(log) > _LONG_BYTES else engine
 
-    def rows() -> Iterator[list[str]]:
+    def lines() -> Iterator[bytes]:
         nonlocal count
-        for block, results in replay_blocks(log, calibration, engine, progress, notices):
+        for block, results in replay_blocks(log, calibration, run, progress, notices):
             count += len(results)
-            for time, row in zip(block.time_text, results.tolist(), strict=True):
-                yield [time, *(f"{value:.5f}" for value in row)]
+            yield joined_cells([text_cells(block.time_text), *(number_cells(column, 5) for column in results.T)])
 
-    write_table(out, ("t_s", *replay_engine.COLUMNS), rows())
+    write_lines(out, ("t_s", *replay_engine.COLUMNS), lines())
     return count, notices
 
 
@@ -102,18 +107,28 @@ def replay_blocks(
     """Each block of the log with the engine's results for it (n, COLUMNS), NaN where the readings froze: there the
     engine is told of a gap. notices is appended to at the end."""
     mount = MountCheck(calibration)
-    for block, results in _RUN[engine](log, calibration, progress, notices):
+    whole, stretch = apart(log)
+    for block, results in _RUN[engine](whole, calibration, progress, notices):
         believed = block.believed
         mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
-        yield block, _with_frozen(block, results)
+        found = _with_frozen(block, results)
+        if stretch is None:
+            yield block, found
+        elif (which := stretch.holds(block)).any():
+            yield block.part(which), found[which]
     contradiction = mount.notice()
     notices += [contradiction] if contradiction else []
 
 
-def _with_frozen(block: Block, results: list[Row]) -> Array:
+def _table(results: bytes) -> Array:
+    """(n, COLUMNS) from the bytes that replay_engine.run writes."""
+    return np.frombuffer(results, dtype="<f8").reshape(-1, len(replay_engine.COLUMNS))
+
+
+def _with_frozen(block: Block, results: Array) -> Array:
     """(n, COLUMNS), NaN where there is no value."""
     found = np.full((len(block.time_us), len(replay_engine.COLUMNS)), np.nan)
-    found[~block.frozen] = np.reshape(results, (-1, len(replay_engine.COLUMNS)))
+    found[~block.frozen] = results
     sigma = found[:, _SIGMA]
     sigma[sigma == replay_engine.NOT_SHOWN] = np.nan
     return found
@@ -122,9 +137,15 @@ def _with_frozen(block: Block, results: list[Row]) -> Array:
 def _cpython(
     log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
 ) -> Iterator[Replayed]:
-    engine = replay_engine.Replay(calibration.to_firmware(), calibration.delay_s())
+    meter = MeterAlong(calibration)
     for block in read_blocks(log, 2, progress, notices):
-        yield block, [engine.step(*row) for row in block.believed.rows()]
+        yield block, meter.columns(block.believed)
+
+
+def _two_processes(
+    log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
+) -> Iterator[Replayed]:
+    return second_process.columns_of(read_blocks(log, 2, progress, notices), calibration)
 
 
 def _micropython(
@@ -146,7 +167,7 @@ def _micropython(
                 results = process.stdout.read(wanted)
                 if len(results) < wanted:
                     break
-                yield block, list(struct.iter_unpack(replay_engine.RESULT, results))
+                yield block, _table(results)
             results += process.stdout.read()
         if process.returncode != 0:  # its traceback came over standard output
             reason = results.decode(errors="replace").strip().rpartition("\n")[2]
@@ -174,10 +195,10 @@ def _rp2040(
     results.seek(0)
     for block in read_blocks(log, notices=notices):
         wanted = size * int(np.count_nonzero(~block.frozen))
-        yield block, list(struct.iter_unpack(replay_engine.RESULT, results.read(wanted)))
+        yield block, _table(results.read(wanted))
 
 
-_RUN = {"cpython": _cpython, "micropython": _micropython, "rp2040": _rp2040}
+_RUN = {"cpython": _cpython, "two processes": _two_processes, "micropython": _micropython, "rp2040": _rp2040}
 
 
 def _records(blocks: Iterable[Block], calibration: CalibrationFile) -> Iterator[bytes]:

@@ -55,16 +55,26 @@ class ReplayMeter(LeanMeter):
         """reading: 7 numbers in the chip's order (g, C, deg/s); dt_us: microseconds since the one before, 0 for the
         first."""
         self._reading, self._n = reading, 1
-        m, c, out = self._force_matrix, self._force_offset, self.force
+        self.in_vehicle(reading, self.force, self.rate)
+        self._follow(dt_us)
+
+    def in_vehicle(self, reading, force, rate):
+        """Put the force (g) and the rate (rad/s) of a reading into force (3) and rate (3). A reading may also be seven
+        arrays of n numbers: the results are then arrays."""
+        m, c = self._force_matrix, self._force_offset
         x, y, z = reading[0], reading[1], reading[2]
-        out[0] = m[0] * x + m[1] * y + m[2] * z + c[0]
-        out[1] = m[3] * x + m[4] * y + m[5] * z + c[1]
-        out[2] = m[6] * x + m[7] * y + m[8] * z + c[2]
-        m, c, out = self._rate_matrix, self._rate_offset, self.rate
+        force[0] = m[0] * x + m[1] * y + m[2] * z + c[0]
+        force[1] = m[3] * x + m[4] * y + m[5] * z + c[1]
+        force[2] = m[6] * x + m[7] * y + m[8] * z + c[2]
+        m, c = self._rate_matrix, self._rate_offset
         x, y, z = reading[4], reading[5], reading[6]
-        out[0] = m[0] * x + m[1] * y + m[2] * z + c[0]
-        out[1] = m[3] * x + m[4] * y + m[5] * z + c[1]
-        out[2] = m[6] * x + m[7] * y + m[8] * z + c[2]
+        rate[0] = m[0] * x + m[1] * y + m[2] * z + c[0]
+        rate[1] = m[3] * x + m[4] * y + m[5] * z + c[1]
+        rate[2] = m[6] * x + m[7] * y + m[8] * z + c[2]
+
+    def follow(self, force, rate, dt_us):
+        """update() with what in_vehicle() made of the reading: three numbers each."""
+        self.force, self.rate = force, rate
         self._follow(dt_us)
 
 

@@ -137,6 +137,14 @@ class Bus:
         value = self._device.read_byte()
         return value if self._fault is None else self._fault.on_read(value)
 
+    def read_into(self, buf):
+        """Fill buf with what read_byte() returns."""
+        if self._device is not None and self._fault is None:
+            self._device.read_into(buf)
+            return
+        for i in range(len(buf)):
+            buf[i] = self.read_byte()
+
     def stop(self):
         """STOP: the transfer is over."""
         if self._device is not None:

@@ -108,6 +108,14 @@ class Mpu6050:
             value |= reg.RESET
         return value
 
+    def read_into(self, buf):
+        """Fill buf with what read_byte() returns."""
+        if self._pointer == reg.FIFO_R_W:
+            self.fifo.pop_into(buf)
+            return
+        for i in range(len(buf)):
+            buf[i] = self.read_byte()
+
     def stop(self):
         """STOP."""
 
@@ -232,6 +240,5 @@ class Mpu6050:
             return
         # FIFO_MODE, which the MPU6500 family has
         keep_old = self._variant.has_accel_config2 and bool(self._regs[reg.CONFIG] & 0x40)
-        for register in self._fifo_registers:
-            if self.fifo.push(self._regs[register], keep_old):
-                self._regs[reg.INT_STATUS] |= reg.FIFO_OFLOW & self._regs[reg.INT_ENABLE]
+        if self.fifo.push_all(self._regs, self._fifo_registers, keep_old):
+            self._regs[reg.INT_STATUS] |= reg.FIFO_OFLOW & self._regs[reg.INT_ENABLE]

@@ -1,8 +1,7 @@
-"""What install_guest.py needs to put the firmware onto a board: the tools that `kickstand flash` consists of, mpremote,
-and the firmware, as sources and compiled for every machine code of a board."""
+"""What install_guest.py and cable_guest.py need to speak to a board: the tools that `kickstand flash`, `record` and
+`pull` consist of, mpremote, and the firmware, as sources and compiled for every machine code of a board.
+"""
 
-import io
-import zipfile
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -11,13 +10,16 @@ import mpremote
 from .. import firmware_path
 from ..deploy import bytecode
 from ..deploy.firmware_files import firmware_files
+from .zipped import zipped
 
 # Of Pico; of Pico 2; of ESP32-C3, C6 and H2 and of a Pico 2's other processor; of all other ESP32
 ARCHITECTURES = ("armv6m", "armv7emsp", "rv32imc", "xtensawin")
-_FLASH = ("__init__.py", "deploy", "errors.py", "firmware_path.py", "simulated_board")
-_TOOLS = (*_FLASH, "web/__init__.py", "web/install_guest.py")
+_TOOLS = (
+    *("__init__.py", "deploy", "errors.py", "firmware_path.py", "simulated_board"),
+    *("calibration/__init__.py", "calibration/file.py", "logs", "output.py", "refusals.py", "replay", "rides"),
+    *("web/__init__.py", "web/cable_guest.py", "web/install_guest.py", "web/serial_guest.py"),
+)
 _MPREMOTE = ("__init__.py", "mp_errno.py", "transport.py", "transport_serial.py")
-_DATE = (1980, 1, 1, 0, 0, 0)  # the same files make the same archive
 
 
 def archive() -> bytes:
@@ -28,14 +30,7 @@ def archive() -> bytes:
         for path in sorted((tools / name).rglob("*.py")) if (tools / name).is_dir() else [tools / name]:
             files[f"tools/{path.relative_to(firmware_path.TOOLS).as_posix()}"] = path
     files |= {f"firmware{path}": source for path, source in firmware_files().items()}
-    contents = {name: path.read_bytes() for name, path in files.items()} | _compiled()
-    made = io.BytesIO()
-    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as zipped:
-        for name, data in sorted(contents.items()):
-            entry = zipfile.ZipInfo(name, _DATE)
-            entry.compress_type = zipfile.ZIP_DEFLATED
-            zipped.writestr(entry, data)
-    return made.getvalue()
+    return zipped({name: path.read_bytes() for name, path in files.items()} | _compiled())
 
 
 def _compiled() -> dict[str, bytes]:

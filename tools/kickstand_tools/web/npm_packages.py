@@ -1,4 +1,4 @@
-"""MicroPython and CPython for browsers: packages from npm, of the versions and with the hashes in
+"""MicroPython, CPython and what runs on it for browsers: packages from npm, of the versions and with the hashes in
 npm/package-lock.json."""
 
 import hashlib
@@ -19,9 +19,12 @@ PACKAGES = {
         "@micropython/micropython-webassembly-pyscript",
         ("micropython.mjs", "micropython.wasm"),
     ),
+    "esptool": ("esptool-js", ("bundle.js", "LICENSE")),
+    "numpy": ("@emscripten-forge/numpy", ("pkg/numpy-2.0.1-py312h4e66579_0.tar.gz",)),
+    "plotly": ("plotly.js-dist-min", ("plotly.min.js",)),
     "pyodide": (
         "pyodide",
-        ("pyodide.mjs", "pyodide.asm.mjs", "pyodide.asm.wasm", "python_stdlib.zip", "pyodide-lock.json"),
+        ("pyodide.mjs", "pyodide.asm.js", "pyodide.asm.wasm", "python_stdlib.zip", "pyodide-lock.json"),
     ),
 }
 _TIMEOUT_S = 300

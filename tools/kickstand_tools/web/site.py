@@ -7,7 +7,7 @@ from pathlib import Path
 from .. import firmware_path
 from ..output import check_directory, new_directory, write_whole
 from ..pictures.lcd_font import ROM
-from . import install_archive, npm_packages
+from . import install_archive, npm_packages, rides_archive
 
 PAGE = Path(__file__).resolve().parent / "page"
 # The tools' modules and folders that device.py imports
@@ -23,7 +23,8 @@ MODULES = (
     "web/__init__.py",
     "web/device.py",
 )
-INSTALLING = ("pyodide/", "install.zip")  # large, and only for those who have a board: fetched when they ask for it
+# Large, and only for those who have a board or a ride: fetched when they ask for it
+LATER = ("esptool/", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip")
 _NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first by itself, the second as "./"
 _LISTED = "__FILES__", "__VERSION__"  # in service_worker.js
 
@@ -43,13 +44,17 @@ def site_files() -> dict[str, bytes]:
     ['bike.mjs', 'board.mjs']
     """
     files = npm_packages.find()
-    files |= {path.name: path.read_bytes() for path in sorted(PAGE.iterdir()) if path.is_file()}
+    files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in sorted(PAGE.rglob("*.*"))}
+    files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # as a text a browser shows
     files["python.json"] = json.dumps(python_files()).encode()
     files["install.zip"] = install_archive.archive()
+    files["rides.zip"] = rides_archive.archive()
+    (package,) = (name for name in files if name.startswith("numpy/"))
+    files["numpy/numpy.zip"], files["numpy/licence.txt"] = rides_archive.numpy_archive(files.pop(package))
     files["font.json"] = json.dumps({code: list(rows) for code, rows in ROM.items()}).encode()
     version = hashlib.sha256(b"".join(name.encode() + data for name, data in sorted(files.items()))).hexdigest()[:12]
     worker = files["service_worker.js"].decode()
-    kept = sorted(["./", *(name for name in files if name not in _NOT_KEPT and not name.startswith(INSTALLING))])
+    kept = sorted(["./", *(name for name in files if name not in _NOT_KEPT and not name.startswith(LATER))])
     for mark, text in zip(_LISTED, (json.dumps(kept), version)):
         worker = worker.replace(f'"{mark}"', text if text.startswith("[") else f'"{text}"')
     files["service_worker.js"] = worker.encode()

@@ -23,7 +23,7 @@ COLUMNS = {
     "roll_rate_dps": (4, "deg/s"),
     "speed_mps": (3, "m/s"),
     "temp_c": (2, "Cel"),
-    "sigma_deg": (3, "deg"),
+    "lean_sigma_deg": (3, "deg"),
     "lat_deg": (7, "deg"),
     "lon_deg": (7, "deg"),
     "utc_s": (3, "s"),
@@ -34,8 +34,8 @@ def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
     """Gzipped if the name ends in .gz."""
     opened = gzip.open if path.suffix == ".gz" else open
     digits = [digit for digit, _ in COLUMNS.values()]
-    with opened(path, "wt", encoding="ascii", newline="") as file:
-        file.write(",".join(COLUMNS) + "\n")
+    with opened(path, "wb") as file:
+        file.write((",".join(COLUMNS) + "\n").encode("ascii"))
         for block in blocks:
             block.t_s = block.t_s + start_s
-            file.write(csv_lines(np.column_stack([getattr(block, name) for name in COLUMNS]), digits))
+            file.writelines(csv_lines(np.column_stack([getattr(block, name) for name in COLUMNS]), digits))

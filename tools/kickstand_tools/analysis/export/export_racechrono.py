@@ -52,8 +52,8 @@ def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
         "",
     ]
     head += [",".join(str(column[k]) for column in COLUMNS) for k in range(3)]
-    with open(path, "w", encoding="utf-8", newline="") as file:
-        file.write("\n".join(head) + "\n")
+    with open(path, "wb") as file:
+        file.write(("\n".join(head) + "\n").encode())
         for block in blocks:
             none = np.full(len(block.t_s), np.nan)
             table = np.column_stack(
@@ -76,4 +76,4 @@ def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
                     block.roll_rate_dps,
                 )
             )
-            file.write(csv_lines(table, [column[3] for column in COLUMNS]))
+            file.writelines(csv_lines(table, [column[3] for column in COLUMNS]))

@@ -1,6 +1,5 @@
 """The page of a ride with its map beside the charts: pointing at one shows the same moment in the other."""
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -8,6 +7,7 @@ import numpy as np
 
 from ...logs.axes.course import EARTH_M
 from ..overview import Overview
+from .in_script import as_script
 from .track_map import MapPoints, figure
 
 # OpenStreetMap's own server refuses a page that was opened as a file: it wants to know the page's address.
@@ -18,52 +18,41 @@ ATTRIBUTION = (
 )
 MOST_ZOOM = 19
 
-_PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<title>{title}</title>
-<style>
-body {{ margin: 0; display: grid; grid-template-columns: minmax(0, 62fr) minmax(0, 38fr); font-family: sans-serif; }}
-aside {{ position: sticky; top: 0; height: 100vh; display: flex; flex-direction: column; }}
-#map-frame {{ flex: 1; min-height: 0; }}
-#here {{ margin: 1em 1em 0; font-variant-numeric: tabular-nums; }}
-#tiles {{ margin: 0 1em 0.5em; font-size: 12px; color: #555; }}
-@media (max-width: 1000px) {{
-  body {{ display: flex; flex-direction: column; }}
-  aside {{ order: -1; height: 60vh; z-index: 2; background: white; border-bottom: 1px solid #ccc; }}
-}}
-</style>
-</head>
-<body>
-<main>{charts}</main>
-<aside>
+STYLE = """body { display: grid; grid-template-columns: minmax(0, 62fr) minmax(0, 38fr); }
+aside { position: sticky; top: 0; height: min(100vh, 60rem); display: flex; flex-direction: column; }
+#map-frame { flex: 1; min-height: 0; }
+#map { height: 100%; }
+#here { margin: 1em 1em 0; font-variant-numeric: tabular-nums; }
+#tiles { margin: 0 1em 0.5em; font-size: 12px; color: #555; }
+@media (max-width: 1000px) {
+  body { display: flex; flex-direction: column; }
+  aside { order: -1; height: min(60vh, 30rem); z-index: 2; background: white; border-bottom: 1px solid #ccc; }
+}"""
+_BESIDE = """<aside>
 <p id="here"></p>
-<div id="map-frame">{map}</div>
+<div id="map-frame"><div id="map"></div></div>
 <p id="tiles">{attribution}</p>
 </aside>
 <script>
-const CHART_AXES = {axes}, TILES = {tiles};
+const MAP = {map}, CHART_AXES = {axes}, TILES = {tiles};
+if (finger) MAP.layout.dragmode = false;
+Plotly.newPlot("map", MAP.data, MAP.layout, {{ responsive: true, scrollZoom: true }});
 {script}
-</script>
-</body>
-</html>
-"""
+</script>"""
 
 
-def html(charts: Any, points: MapPoints, seen: Overview, tiles: bool) -> str:
-    """The whole page. charts: the figure of page.figure(). tiles: with streets, which the page takes from a server."""
-    over_time = [name for name in charts.select_xaxes() if name.ticktext is not None]
-    axes = [axis.plotly_name.replace("axis", "") for axis in over_time]
-    options = {"full_html": False, "config": {"responsive": True, "scrollZoom": False}}
-    at_map = options | {"default_height": "100%", "config": {"responsive": True, "scrollZoom": True}}
-    return _PAGE.format(
-        title=seen.ride.stem,
-        charts=charts.to_html(include_plotlyjs=True, div_id="chart", **options),
-        map=figure(points, seen).to_html(include_plotlyjs=False, div_id="map", **at_map),
+def time_axes(charts: dict[str, Any]) -> list[str]:
+    """The axes of time in charts.figure(), by their names in its layout."""
+    return [name for name, axis in charts["layout"].items() if name.startswith("xaxis") and "ticktext" in axis]
+
+
+def beside(charts: dict[str, Any], points: MapPoints, seen: Overview, tiles: bool) -> str:
+    """What of the page is beside the charts. tiles: with streets, which the page takes from a server."""
+    return _BESIDE.format(
+        map=as_script(figure(points, seen)),
         attribution=ATTRIBUTION if tiles else "",
-        axes=json.dumps(axes),
-        tiles=json.dumps(_tiles(points)) if tiles else "null",
+        axes=as_script([name.replace("axis", "") for name in time_axes(charts)]),
+        tiles=as_script(_tiles(points)) if tiles else "null",
         script=Path(__file__).with_name("map.js").read_text(encoding="utf-8"),
     )
 

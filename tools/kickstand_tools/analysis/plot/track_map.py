@@ -1,4 +1,4 @@
-"""The map of a ride: its track, coloured by lean, north up, in metres, as a figure of plotly.
+"""The map of a ride: its track, coloured by lean, north up, in metres.
 
 The projection is Mercator's, which keeps angles, with the scale of the ride's own latitude: 50 km to the north the
 scale is off by one per cent. The tiles of maps have it too.
@@ -14,6 +14,8 @@ from ...logs.axes.course import EARTH_M
 from ...logs.table import Array
 from ..overview import Overview
 from ..track import Track, track
+from .in_script import plain
+from .layout import PAPER
 from .traces import LEFT_COLOUR, RIGHT_COLOUR, SPEED_COLOUR, lean_limit, traces
 
 POINTS = 20_000
@@ -65,64 +67,55 @@ def map_points(seen: Overview) -> MapPoints | None:
     return MapPoints(t_s, east, north, drawn.lean_deg[row], speed, lat_deg, lon_deg)
 
 
-def figure(points: MapPoints, seen: Overview) -> Any:
-    """The plotly figure.
+def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
+    """As plotly.js takes it: {"data": traces, "layout": ...}, in plain numbers, lists and None for NaN.
 
     Its first trace is the track as a line: customdata are time (s), lean (degrees) and speed (km/h), None where there
     is none. The second has the points in colour: customdata are their times. The first shape marks a place, the second
     is the bar of the scale, and the first annotation that bar's length: map.js moves them.
     """
-    from plotly.graph_objects import Figure, Scattergl
-
-    x, y = points.east_m.round(1), points.north_m.round(1)
-    values = np.column_stack((points.t_s, points.lean_deg, points.speed_kmh)).round(1)
-    told = [_none_for_nan(row) for row in values.tolist()]
-    none_for_nan = {name: _none_for_nan(row) for name, row in (("x", x.tolist()), ("y", y.tolist()))}
-    made: Any = Figure()
-    line = {"width": 1.5, "color": "#8a8a8a"}
-    made.add_trace(Scattergl(mode="lines", line=line, customdata=told, hoverinfo="skip", **none_for_nan))
+    x, y = plain(points.east_m, 1), plain(points.north_m, 1)
+    told = [plain(row, 1) for row in np.column_stack((points.t_s, points.lean_deg, points.speed_kmh))]
+    line = {"type": "scattergl", "mode": "lines", "line": {"width": 1.5, "color": "#8a8a8a"}, "hoverinfo": "skip"}
     dots: dict[str, Any] = {"size": 6, "color": SPEED_COLOUR}
-    known = np.isfinite(x)
+    known = np.isfinite(points.east_m)
     if not seen.ride.car:
         limit = max(LEAST_LEAN_DEG, float(np.floor(lean_limit(seen) / 1.2)))
         known &= np.isfinite(points.lean_deg)
-        dots |= {"color": points.lean_deg[known].round(1), "colorscale": _COLOURS, "cmin": -limit, "cmax": limit}
+        lean = plain(points.lean_deg[known], 1)
+        dots |= {"color": lean, "colorscale": _COLOURS, "cmin": -limit, "cmax": limit}
         bar = {"title": {"text": "left  ·  lean, °  ·  right", "side": "top"}, "orientation": "h", "thickness": 10}
-        bar |= {"x": 1.0, "y": 0.965, "xanchor": "right", "yanchor": "top", "len": 0.5}
+        bar |= {"x": 1.0, "y": 0.965, "xanchor": "right", "yanchor": "top", "len": 0.5, "ticks": "outside"}
         ticks = [f"{limit:.0f}", "0", f"{limit:.0f}"]
-        dots["colorbar"] = bar | {"tickvals": [-limit, 0.0, limit], "ticktext": ticks}
-    at = {"x": x[known], "y": y[known], "customdata": points.t_s[known].round(1)}
-    made.add_trace(Scattergl(mode="markers", marker=dots, hoverinfo="none", **at))
+        dots["colorbar"] = bar | {"tickvals": [-limit, 0.0, limit], "ticktext": ticks, "outlinewidth": 0}
+    at = {"x": plain(points.east_m[known], 1), "y": plain(points.north_m[known], 1)}
+    at |= {"customdata": plain(points.t_s[known], 1), "marker": dots}
     paper = {"xref": "paper", "yref": "paper", "showarrow": False}
-    font = {"font": {"size": 18}}
-    made.update_layout(
-        template="simple_white",
-        showlegend=False,
-        margin={"l": 5, "r": 5, "t": 10, "b": 5},
-        hovermode="closest",
-        dragmode="pan",
-        shapes=[
+    thin = {"arrowhead": 0, "arrowwidth": 1}
+    layout = PAPER | {
+        "margin": {"l": 5, "r": 5, "t": 10, "b": 5},
+        "hovermode": "closest",
+        "dragmode": "pan",
+        "xaxis": {"visible": False},
+        "yaxis": {"visible": False, "scaleanchor": "x"},
+        "shapes": [
             {"type": "circle", "xsizemode": "pixel", "ysizemode": "pixel", "xanchor": x[0], "yanchor": y[0], "x0": -8}
             | {"x1": 8, "y0": -8, "y1": 8, "line": {"width": 3, "color": "#111111"}}
             | {"fillcolor": "#ffe14a", "opacity": 1.0},
             {"type": "line", "xref": "paper", "yref": "paper", "x0": 0.02, "x1": 0.02, "y0": 0.02, "y1": 0.02}
             | {"line": {"width": 4, "color": "#111111"}, "opacity": 1.0},
         ],
-        annotations=[
+        "annotations": [
             paper | {"x": 0.02, "y": 0.025, "xanchor": "left", "yanchor": "bottom", "text": ""},
-            paper | {"x": 0.02, "y": 0.99, "xanchor": "left", "yanchor": "top", "text": "<b>N</b><br>↑"} | font,
-            {"x": x[0], "y": y[0], "text": "start", "ax": -25, "ay": -25},
-            {"x": x[-1], "y": y[-1], "text": "end", "ax": 25, "ay": 25},
+            paper
+            | {"x": 0.02, "y": 0.99, "xanchor": "left", "yanchor": "top", "text": "<b>N</b><br>↑"}
+            | {"font": {"size": 18}},
+            thin | {"x": x[0], "y": y[0], "text": "start", "ax": -25, "ay": -25},
+            thin | {"x": x[-1], "y": y[-1], "text": "end", "ax": 25, "ay": 25},
         ],
-    )
-    made.update_xaxes(visible=False)
-    made.update_yaxes(visible=False, scaleanchor="x")
-    return made
-
-
-def _none_for_nan(values: list[float]) -> list[float | None]:
-    """As JSON can hold them."""
-    return [None if value != value else value for value in values]
+    }
+    track_line = line | {"x": x, "y": y, "customdata": told}
+    return {"data": [track_line, {"type": "scattergl", "mode": "markers", "hoverinfo": "none"} | at], "layout": layout}
 
 
 def _times(places: Track, seconds: float) -> Array:

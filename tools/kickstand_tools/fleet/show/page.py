@@ -109,9 +109,9 @@ class Glance:
         )
 
 
-def write_page(path: Path, glance: Glance, expected: int) -> None:
+def write_page(path: str, glance: Glance, expected: int) -> None:
     """Write the page, whole or not at all. Raises InputError."""
-    write_bytes(str(path), glance.page(expected).encode())
+    write_bytes(path, glance.page(expected).encode())
 
 
 def _first(rows: list[Any], key: Callable[[Any], float], count: int) -> list[Any]:
@@ -137,7 +137,7 @@ def _reasons(reasons: Counter[tuple[str, str]]) -> str:
 def _quality(values: Sequence[float]) -> str:
     if not values:
         return ""
-    top = 2.6  # what is ready is within 2.5 degrees
+    top = 1.6  # what is aligned is within 1.5 degrees
     edges, heights = _histogram(values, top, 26)
     title = f"Standard error of forward, median {statistics.median(values):.2f}°"
     panel = Panel(0, 0, 460, 230, (0.0, top), (0.0, max(heights) * 1.08), title, "degrees", "vehicles")

@@ -5,7 +5,6 @@ SVG by hand: a fleet has thousands of them, and each takes a millisecond.
 
 from collections.abc import Sequence
 from html import escape
-from pathlib import Path
 
 from ..files import write_bytes
 from ..period import PeriodResult
@@ -20,9 +19,9 @@ def file_name(vehicle: str, mount: str) -> str:
     return safe_name(f"{vehicle} {mount}" if mount else vehicle) + ".svg"
 
 
-def write_plot(path: Path, result: PeriodResult) -> None:
+def write_plot(path: str, result: PeriodResult) -> None:
     """Write the picture of a result that has one. Raises InputError."""
-    write_bytes(str(path), draw(result).encode())
+    write_bytes(path, draw(result).encode())
 
 
 def draw(result: PeriodResult) -> str:

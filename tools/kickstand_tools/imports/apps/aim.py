@@ -42,7 +42,7 @@ def read(pieces: list[Piece], name: str) -> Recording:
         missing = ", ".join(channel for channel, place in wanted if place is None)
         raise InputError(f"{name}: no channel {missing}: export the accelerometer's and the gyro's three channels each")
     accel_places, rate_places = ([place for place in places if place is not None] for places in (accel, rates))
-    time_ns = times_ns(sheet.series(0), "s", sheet.name)
+    time_ns = times_ns(sheet.cells[0], "s", sheet.name)
     vertical = sheet.numbers(accel_places[1])
     down = bool(np.nanmedian(vertical) < 0.0) if np.any(np.isfinite(vertical)) else True
     accel_unit, rate_unit = units.get(accel_places[0]) or "g", units.get(rate_places[0]) or "deg/s"

@@ -31,7 +31,7 @@ def read(pieces: list[Piece], name: str) -> Recording:
     sheet = _sheet(pieces[0])
     log = [sheet.columns.index(column) for column in COLUMNS[1:] if column in sheet.columns]
     exported = [sheet.columns.index(column) for column in (*_FORCES, *_RATES) if column in sheet.columns]
-    time_ns = times_ns(sheet.series(sheet.columns.index("t_s")), "s", sheet.name)
+    time_ns = times_ns(sheet.cells[sheet.columns.index("t_s")], "s", sheet.name)
     if len(log) == 6:
         accel, first = sensor_of(sheet, time_ns, log[:3], 1.0, ("accelerometer", "g", "+1 g up"))
         gyro, second = sensor_of(sheet, time_ns, log[3:], 1.0, ("gyro", "deg/s", "right-handed"))
@@ -40,7 +40,7 @@ def read(pieces: list[Piece], name: str) -> Recording:
         accel, first = sensor_of(sheet, time_ns, exported[:3], 1.0, ("accelerometer", "g", said))
         gyro, second = sensor_of(sheet, time_ns, exported[3:], _RATE_SIGNS, ("gyro", "deg/s", said))
     else:
-        raise InputError(f"{name} holds the lean that kickstand has computed: give the log that it was made from")
+        raise InputError(f"{name} holds a lean, no readings: give the log that it was made from")
     speed, lat, lon = (sheet.place(column) for column in ("speed_mps", "lat_deg", "lon_deg"))
     track, places = track_of(sheet, time_ns, speed, lat, lon)
     temp_c = sheet.numbers(sheet.place("temp_c"))
@@ -74,15 +74,15 @@ def _is_ours(piece: Piece) -> bool:
 def _sheet(piece: Piece) -> Sheet:
     if not piece.content.startswith(b"PAR1"):
         return read_sheet(piece)
-    import pandas
-
     try:
-        frame = pandas.read_parquet(io.BytesIO(piece.content))
+        from pyarrow import parquet
+
+        table = parquet.read_table(io.BytesIO(piece.content))
     except ImportError as error:
         raise InputError("Parquet needs pyarrow: " + extra("rides")) from error
     except (ValueError, OSError) as error:
         raise InputError(f"{piece.name} is damaged or cut short: copy it again") from error
-    columns = [str(column) for column in frame.columns]
+    columns = [str(column) for column in table.column_names]
     if "t_s" not in columns:
         raise InputError(f"{piece.name}: not a ride that kickstand has exported: its columns are {', '.join(columns)}")
-    return Sheet(piece.name, columns, frame.set_axis(range(len(columns)), axis=1))
+    return Sheet(piece.name, columns, [column.to_numpy() for column in table.columns])

@@ -10,6 +10,7 @@ import re
 import numpy as np
 
 from ...errors import InputError
+from ..cells import as_text
 from ..files import Piece
 from ..join import added
 from ..recording import Recording, Sensor, Taken, Track, sensor_of, track_of
@@ -83,7 +84,7 @@ def _sensors(sheet: Sheet, stem: str, pauses: "_Pauses") -> list[tuple[str, Sens
             continue
         places = [axes[axis] for axis in "xyz"]
         kind = "gyro" if unit(unit_name) in RATES else _kind(what)
-        time_ns = pauses.after(times_ns(sheet.series(time), "s", sheet.name))
+        time_ns = pauses.after(times_ns(sheet.cells[time], "s", sheet.name))
         kinds = RATES if kind == "gyro" else ACCELERATIONS
         scale = factor(unit_name, kinds, sheet.name)
         quantity = "gyro" if kind == "gyro" else "accelerometer"
@@ -119,7 +120,7 @@ def _location(sheet: Sheet, pauses: "_Pauses") -> tuple[Track | None, list[Taken
     time = next((place for place, column in enumerate(sheet.columns) if plain(column).endswith("time")), 0)
     if lat is None and speed is None:
         return None, []
-    time_ns = pauses.after(times_ns(sheet.series(time), "s", sheet.name))
+    time_ns = pauses.after(times_ns(sheet.cells[time], "s", sheet.name))
     unit_name = unit(unit_in(sheet.columns[speed])) if speed is not None else "m/s"
     return track_of(sheet, time_ns, speed, lat, lon, unit_name or "m/s")
 
@@ -137,7 +138,7 @@ class _Pauses:
         own, utc = sheet.place("experiment time"), sheet.place("system time")
         if own is None or utc is None or sheet.columns[0].lower() != "event":
             return
-        events = sheet.series(0).astype(str).str.upper().tolist()
+        events = [event.upper() for event in as_text(sheet.cells[0])]
         at = of_seconds(sheet.numbers(own)).tolist()
         clock = of_seconds(sheet.numbers(utc)).tolist()
         starts = [k for k, event in enumerate(events) if event == "START" and k < len(clock)]

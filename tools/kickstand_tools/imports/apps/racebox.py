@@ -35,7 +35,7 @@ def read(pieces: list[Piece], name: str, speed_unit: str = "") -> Recording:
         raise InputError(f"{name}: no GForceY or GForceZ, as in its motorcycle mode: export it with that mode off")
     if None in gyro:
         raise InputError(f"{name}: no GyroX to GyroZ: export it from RaceBox's app on the phone, which writes them")
-    time_ns = times_ns(sheet.series(sheet.place("Time") or 0), "", sheet.name)
+    time_ns = times_ns(sheet.cells[sheet.place("Time") or 0], "", sheet.name)
     order = [[places[k] for k in _WHERE] for places in (accel, gyro)]
     there = [[place for place in places if place is not None] for places in order]
     box = "box's x forward, y left, z up; +1 g up"

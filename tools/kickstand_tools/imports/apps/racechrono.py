@@ -42,7 +42,7 @@ def read(pieces: list[Piece], name: str) -> Recording:
     by_kickstand = "by Kickstand" in lines[0]
     axes = "left, up, forward" if by_kickstand else "+1 g up"
     time_place = next(place for place, column in enumerate(sheet.columns) if plain(column) in _TIMES)
-    time_ns = times_ns(sheet.series(time_place), "s", sheet.name)
+    time_ns = times_ns(sheet.cells[time_place], "s", sheet.name)
     found = []
     for places, kinds, what in ((accel, ACCELERATIONS, "accelerometer"), (gyro, RATES, "gyro")):
         there = [place for place in places if place is not None]

@@ -65,4 +65,4 @@ def _parts(piece: Piece) -> tuple[str, str]:
 
 def _sensor(piece: Piece, quantity: str, scale: float, unit: str, sign: str) -> tuple[Sensor, Taken]:
     sheet = read_sheet(piece)
-    return sensor_of(sheet, times_ns(sheet.series(0), "s", sheet.name), [1, 2, 3], scale, (quantity, unit, sign))
+    return sensor_of(sheet, times_ns(sheet.cells[0], "s", sheet.name), [1, 2, 3], scale, (quantity, unit, sign))

@@ -44,7 +44,7 @@ def read(pieces: list[Piece], name: str) -> Recording:
     track, places = None, []
     if "location" in files and len(files["location"].first_lines(2)) > 1:
         sheet = read_sheet(files["location"])
-        time_ns = times_ns(sheet.series(sheet.place("time") or 0), "ns", sheet.name)
+        time_ns = times_ns(sheet.cells[sheet.place("time") or 0], "ns", sheet.name)
         track, places = track_of(
             sheet, time_ns, sheet.place("speed"), sheet.place("latitude"), sheet.place("longitude")
         )
@@ -94,5 +94,5 @@ def _sensor(piece: Piece, quantity: str, scale: float, unit: str, sign: str) -> 
     places = [sheet.place(axis) for axis in "xyz"]
     if None in places or sheet.place("time") is None:
         raise InputError(f"{sheet.name}: no columns time, x, y and z: export it again")
-    time_ns = times_ns(sheet.series(sheet.place("time") or 0), "ns", sheet.name)
+    time_ns = times_ns(sheet.cells[sheet.place("time") or 0], "ns", sheet.name)
     return sensor_of(sheet, time_ns, [place for place in places if place is not None], scale, (quantity, unit, sign))

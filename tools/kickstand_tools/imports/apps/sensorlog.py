@@ -60,7 +60,7 @@ def _times(sheet: Sheet, sensor: str) -> Nanoseconds:
     place = sheet.place(f"{sensor}Timestamp_sinceReboot", "accelerometerTimestamp_sinceReboot", "loggingTime")
     if place is None:
         raise InputError(f"{sheet.name}: no column {sensor}Timestamp_sinceReboot(s): export it with the timestamps")
-    return times_ns(sheet.series(place), "s", sheet.name)
+    return times_ns(sheet.cells[place], "s", sheet.name)
 
 
 def _accelerometer(sheet: Sheet, name: str) -> tuple[Sensor, list[Taken]]:
@@ -95,7 +95,7 @@ def _utc_ns(sheet: Sheet) -> int | None:
     if logged is None:
         return None
     try:
-        written = times_ns(sheet.series(logged), "", sheet.name)
+        written = times_ns(sheet.cells[logged], "", sheet.name)
     except InputError:
         return None
     own = _times(sheet, "accelerometer" if _places(sheet, _ACCEL) else "motion")

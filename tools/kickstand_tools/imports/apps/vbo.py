@@ -12,6 +12,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from ...errors import InputError
+from ..cells import columns_of
 from ..files import Piece
 from ..recording import Recording, Taken, sensor_of, track_of
 from ..sheets import Sheet, plain
@@ -63,7 +64,7 @@ def read(pieces: list[Piece], name: str) -> Recording:
     lat, lon = sheet.place("lat", "latitude"), sheet.place("long", "longitude", "lon")
     for place, sign in ((lat, 1.0), (lon, -1.0)):
         if place is not None:
-            sheet.frame[place] = sign * sheet.numbers(place) / 60.0
+            sheet.cells[place] = sign * sheet.numbers(place) / 60.0
     track, places = track_of(sheet, time_ns, sheet.place("velocity"), lat, lon, _speed_unit(sections))
     taken = [first, second, *places]
     for one in taken:
@@ -87,14 +88,12 @@ def _sections(piece: Piece) -> dict[str, list[str]]:
 
 
 def _sheet(name: str, sections: dict[str, list[str]]) -> Sheet:
-    import pandas
-
     columns = " ".join(sections.get("column names", [])).split()
     rows = [line.split() for line in sections.get("data", []) if line]
     if not columns or not rows:
         raise InputError(f"{name}: no rows under [data]: was anything recorded?")
     whole = [row for row in rows if len(row) == len(columns)]
-    return Sheet(name, columns, pandas.DataFrame(whole, columns=range(len(columns))))
+    return Sheet(name, columns, columns_of(whole, len(columns)))
 
 
 def _units(sections: dict[str, list[str]], sheet: Sheet) -> dict[int, str]:

@@ -44,9 +44,8 @@ class FrozenReadings:
         frozen = np.zeros(len(same), dtype=bool)
         begins = np.flatnonzero(~same)  # each run of equal readings
         ends = np.append(begins[1:], len(same))
-        for begin, end in zip(begins.tolist(), ends.tolist()):
-            if end - begin < 2:
-                continue
+        long = ends > begins + 1
+        for begin, end in zip(begins[long].tolist(), ends[long].tolist()):
             goes_on = begin == 0 and len(self._last) > 0
             since_s = self._since_s if goes_on else float(time_s[begin])
             samples = end - begin + (self._since_samples - 1 if goes_on else 0)

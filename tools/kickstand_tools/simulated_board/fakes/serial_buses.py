@@ -101,15 +101,12 @@ class _Controller:
             raise OSError(errno.EIO)
 
     def _receive(self, buf):
-        length = len(buf)
         try:
-            self._spend(9 * length + 1)  # the STOP included
+            self._spend(9 * len(buf) + 1)  # the STOP included
         except Reset:
             self._bus.hang()  # the device does not notice the reset and goes on sending
             raise
-        bus = self._bus  # a local for bus.read_byte would be a bound method, which MicroPython allocates
-        for i in range(length):
-            buf[i] = bus.read_byte()
+        self._bus.read_into(buf)
 
 
 def _in_one_go(method):

@@ -5,7 +5,7 @@ import { Board } from "./board.mjs";
 import { Steering, connectButton, leanText } from "./controls.mjs";
 import { Display } from "./display.mjs";
 import { Guide } from "./guide.mjs";
-import { connectInstall } from "./install.mjs";
+import { keepOffline } from "./offline.mjs";
 import { Road } from "./road.mjs";
 
 const byId = (id) => document.getElementById(id);
@@ -27,7 +27,7 @@ const board = new Board({
   ready() {
     byId("pose").disabled = false;
     for (const id of ["wire", "cut", "power"]) byId(id).disabled = false;
-    if (navigator.serviceWorker && isSecureContext) navigator.serviceWorker.register("./service_worker.js");
+    keepOffline();
   },
   tick(next) {
     tick = next;
@@ -57,7 +57,6 @@ const board = new Board({
 
 const steering = new Steering((name, value) => board.order(name, value));
 connectButton((down) => board.button(down));
-connectInstall();
 
 const actions = {
   kickstand: () => steering.stand("kickstand"),

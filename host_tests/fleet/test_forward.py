@@ -1,0 +1,106 @@
+"""Forward from whole logs: nearer than the device's, and as sure as it says."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from kickstand.errors import AlignmentError
+from kickstand_tools.calibration.drive import fit_logs, usable
+from kickstand_tools.fleet import evidence, forward, period
+from kickstand_tools.fleet.forward import find_forward
+from kickstand_tools.fleet.manifest import Period
+from kickstand_tools.logs.csv_lines import write_log
+from kickstand_tools.logs.reader import read_log
+from kickstand_tools.refusals import RefusedInput
+from made_fleet import drive, yaw_deg
+
+SEEDS = (101, 102, 106, 109)  # on which the device is off by about a degree
+
+
+@pytest.fixture(scope="module")
+def buses():
+    """(the device's fit, what the whole log tells, the mount) of buses that brake some ten times, gently."""
+    found = []
+    for seed in SEEDS:
+        log, sensor = drive(seed, "bus", 150.0)
+        fit = fit_logs([log], None, "car")
+        driven = [evidence.intervals(log, "car", fit.lag_s or 0.0, fit.bias_dps)]
+        found.append((fit, find_forward(driven, fit.calibration.vehicle_from_sensor[1]), sensor.mount))
+    return found
+
+
+def test_forward_without_the_road_is_nearer_than_the_device_s(buses):
+    device = [yaw_deg(fit.calibration.vehicle_from_sensor, mount) for fit, _, mount in buses]
+    whole = [yaw_deg(known.frame, mount) for _, known, mount in buses]
+    assert np.sqrt(np.mean(np.square(device))) > 0.95
+    assert np.sqrt(np.mean(np.square(whole))) < 0.6
+
+
+def test_its_error_is_what_it_says(buses):
+    sigmas = np.array([known.sigma_deg for _, known, _ in buses])
+    errors = np.array([yaw_deg(known.frame, mount) for _, known, mount in buses])
+    assert np.all(sigmas < 0.7) and np.all(np.abs(errors) < 2.0 * sigmas)
+
+
+def test_up_stays_the_device_s(buses):
+    for fit, known, _ in buses:
+        assert known.frame[1] == pytest.approx(fit.calibration.vehicle_from_sensor[1], abs=1e-6)
+        assert known.frame @ known.frame.T == pytest.approx(np.eye(3), abs=1e-6)
+
+
+def worked_on(tmp_path, log):
+    path = tmp_path / "1.csv"
+    write_log(path, log)
+    return period.work_on_period(Period("v", "", "car", (str(path),)))
+
+
+@pytest.mark.parametrize(("seed", "doubt"), [(138, "uncertain"), (114, "parts-differ")])
+def test_what_the_device_doubts_is_aligned_where_the_whole_log_is_sure(tmp_path, seed, doubt):
+    log, sensor = drive(seed, "bus", 150.0)
+    assert fit_logs([log], None, "car").reason == doubt
+    found = worked_on(tmp_path, log)
+    assert (found.alignment["status"], found.alignment["reason"], found.alignment["message"]) == ("aligned", "", "")
+    assert abs(yaw_deg(found.alignment["vehicle_from_sensor"], sensor.mount)) < 0.8
+    assert found.brake_tests
+
+
+@pytest.mark.parametrize("limit", ["READY_DEG", "AGREE_DEG"])
+def test_forward_that_is_not_sure_is_told_and_not_given(tmp_path, monkeypatch, limit):
+    monkeypatch.setattr(forward, limit, 0.1)
+    found = worked_on(tmp_path, drive(4)[0])
+    assert (found.alignment["status"], found.alignment["reason"]) == ("refused", "uncertain")
+    assert "drive on" in found.alignment["message"] and found.alignment["quality_deg"] > 0.1
+    assert found.alignment["vehicle_from_sensor"] is None and not found.brake_tests
+
+
+def test_a_late_speed_that_looks_like_a_moved_mount_is_told_as_late(tmp_path, monkeypatch):
+    log, _ = drive(4)
+    moved = RefusedInput(AlignmentError("mount-moved", "between-stops", 8.0))
+    fit = dataclasses.replace(fit_logs([log], None, "car"), refusal=moved)
+    for lag_s, reason in ((0.5, "mount-moved"), (2.5, "speed-late")):
+        monkeypatch.setattr(period, "fit_logs", lambda *_, lag_s=lag_s: dataclasses.replace(fit, lag_s=lag_s))
+        row = worked_on(tmp_path, log).alignment
+        assert (row["status"], row["reason"]) == ("refused", reason)
+    assert "2.5 s late" in row["message"]
+
+
+# of the recordings, from their own receivers: rows left, up, forward
+REFERENCES = {
+    "short-turn-loop-nominal-001": [[0.0124, 0.9995, 0.0302], [-0.0021, -0.0302, 0.9995], [0.9999, -0.0124, 0.0017]],
+    "medium-turn-loop-nominal-002": [[0.0098, 0.9999, -0.0040], [0.0, 0.0040, 1.0], [1.0, -0.0098, 0.0]],
+}
+
+
+@pytest.mark.parametrize("name", REFERENCES)
+def test_forward_of_recorded_drives(shared_data, name):
+    log = usable(read_log(shared_data / f"car-urban-{name}.csv.gz", axes=False), False)
+    fit = fit_logs([log], None, "car")
+    known = find_forward([evidence.intervals(log, "car", fit.lag_s or 0.0, fit.bias_dps)])
+    assert known and known.sure and abs(yaw_deg(known.frame, REFERENCES[name])) < 1.0
+
+
+def test_logs_that_tell_nothing_have_no_forward():
+    log, _ = drive(4, seconds=60.0)
+    driven = evidence.intervals(log, "car", 0.0, np.zeros(3))
+    short = evidence.Intervals(*(getattr(driven, name)[:20] for name in evidence.Intervals.__dataclass_fields__))
+    assert find_forward([short]) is None and find_forward([]) is None

@@ -1,0 +1,121 @@
+"""A disk that fills up, in whatever is being written: no finished row is lost, and one line says so."""
+
+import copy
+import errno
+import os
+import subprocess
+import sys
+
+import pyarrow.parquet as parquet
+import pytest
+from kickstand_tools.errors import InputError
+from kickstand_tools.fleet import run
+from kickstand_tools.fleet.journal import Journal
+from kickstand_tools.fleet.manifest import read_manifest
+from kickstand_tools.fleet.period import DISK_FULL, work_on_period
+from kickstand_tools.fleet.run import run_fleet
+from made_fleet import in_this_process
+
+FULL = OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+@pytest.fixture
+def disk(tmp_path):
+    """The directory of a disk that resize() has made."""
+    if not sys.platform.startswith("linux"):
+        pytest.skip("tmpfs is of Linux")
+    path = tmp_path / "disk"
+    path.mkdir()
+    yield path
+    subprocess.run(["umount", str(path)], capture_output=True, check=False)
+
+
+def resize(path, kb):
+    """Make a disk of some kB there, or make it larger."""
+    option = "remount," if os.path.ismount(path) else ""
+    mount = ["mount", "-t", "tmpfs", "-o", f"{option}size={kb}k", "tmpfs", str(path)]
+    if subprocess.run(mount, capture_output=True, check=False).returncode:
+        pytest.skip("no disk may be mounted here")
+
+
+@pytest.fixture(scope="module")
+def results(fleet):
+    """Of three vehicles, by name, and their periods."""
+    periods = read_manifest(str(fleet.manifest))[:3]
+    return {period.vehicle: work_on_period(period) for period in periods}, periods
+
+
+def finished(directory, keys):
+    if not (directory / "journal.jsonl").exists():
+        return 0
+    with Journal(directory / "journal.jsonl") as journal:
+        return sum(key in journal for key in keys)
+
+
+# From a disk that has no room for a picture to one that has none for the last table beside all rows
+@pytest.mark.parametrize("kb", [8, 16, 32, 48, 64, 72, 80])
+def test_a_disk_of_any_size_loses_no_finished_row(disk, results, monkeypatch, kb):
+    known, periods = results
+    monkeypatch.setattr(run, "run_tasks", in_this_process)
+    monkeypatch.setattr(run, "work_on_period", lambda period, _: copy.deepcopy(known[period.vehicle]))
+    resize(disk, kb)
+    out = disk / "results"
+    with pytest.raises(InputError, match=r"^[^\n]*No space left on device[^\n]*$"):
+        run_fleet(periods, out)
+    keys = run._keys(periods, False)
+    kept = finished(out, keys)
+    resize(disk, 4096)
+    whole = run_fleet(periods, out)
+    assert whole.new == len(periods) - kept
+    rows = parquet.read_table(out / "alignments.parquet").to_pylist()
+    assert [row["status"] for row in rows] == [known[period.vehicle].alignment["status"] for period in periods]
+    assert all((out / row["plot"]).is_file() for row in rows)
+    assert not list(out.rglob(".*"))  # nothing half written
+    assert run_fleet(periods, out).new == 0
+
+
+def test_a_picture_that_cannot_be_written_costs_no_row(results, tmp_path, monkeypatch):
+    known, periods = results
+    monkeypatch.setattr(run, "run_tasks", in_this_process)
+    monkeypatch.setattr(run, "work_on_period", lambda period, _: copy.deepcopy(known[period.vehicle]))
+
+    def full(*_):
+        raise InputError("plots cannot be written: No space left on device")
+
+    with monkeypatch.context() as patched, pytest.raises(InputError, match="plots cannot be written"):
+        patched.setattr("kickstand_tools.fleet.show.plot.write_plot", full)
+        run_fleet(periods, tmp_path)
+    rows = parquet.read_table(tmp_path / "alignments.parquet").to_pylist()
+    assert [(row["status"], row["plot"]) for row in rows] == [("aligned", "")]
+    assert run_fleet(periods, tmp_path).new == len(periods)  # the first one for its picture
+
+
+def test_signals_that_do_not_fit_stop_the_run_and_are_written_by_the_next(results, tmp_path, monkeypatch):
+    _, periods = results
+    monkeypatch.setattr(run, "run_tasks", in_this_process)
+
+    def full(path, _):
+        raise InputError(f"{path} cannot be written: {FULL.strerror}") from FULL
+
+    with monkeypatch.context() as patched:
+        patched.setattr("kickstand_tools.fleet.signals.write_bytes", full)
+        with pytest.raises(InputError, match="No space left on device; what is finished is kept, the same command"):
+            run_fleet(periods[:2], tmp_path, with_signals=True)
+    rows = parquet.read_table(tmp_path / "alignments.parquet").to_pylist()
+    assert [row["status"] for row in rows] == ["aligned"]
+    errors = parquet.read_table(tmp_path / "errors.parquet")["reason"].to_pylist()
+    assert set(errors) == {DISK_FULL}
+    whole = run_fleet(periods[:2], tmp_path, with_signals=True)
+    assert (whole.new, whole.seen.errors) == (2, 0) and list(tmp_path.glob("signals/**/*.parquet"))
+
+
+def test_a_journal_that_cannot_reach_the_disk_is_told(tmp_path, monkeypatch):
+    def full(_):
+        raise FULL
+
+    monkeypatch.setattr(os, "fsync", full)
+    with (
+        Journal(tmp_path / "journal.jsonl") as journal,
+        pytest.raises(InputError, match="No space left on device; what is finished is kept, the same command goes on"),
+    ):
+        journal.sync()

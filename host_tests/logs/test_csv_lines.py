@@ -1,0 +1,45 @@
+"""Columns of numbers as text: to the letter what Python's own formatting gives."""
+
+import numpy as np
+import pytest
+from kickstand_tools.logs.csv_lines import csv_lines, joined_cells, number_cells, text_cells
+
+AWKWARD = [0.0, -0.0, -1e-9, 5e-324, 0.5, 1.5, 2.5, -0.5, 9.9999999, 99999.5, 2.0**53, -(2.0**60), 1e300]
+
+
+def numbers(digits):
+    chance = np.random.default_rng(digits)
+    many = [chance.normal(scale=scale, size=300) for scale in (1e-6, 1e-2, 1.0, 30.0, 1e6, 1.7e9)]
+    middles = (np.arange(-40, 40) + 0.5) * 10.0**-digits  # between two texts, or as close to it as a double can be
+    decimals = np.round(chance.normal(size=300), digits + 1)  # every tenth has such a 5 at its end
+    return np.concatenate((*many, middles, np.nextafter(middles, 9.0), decimals))
+
+
+@pytest.mark.parametrize("digits", range(8))
+def test_numbers_are_written_as_python_writes_them(digits):
+    for values in (numbers(digits), np.array(AWKWARD), np.array([*AWKWARD, np.inf, -np.inf]), np.array([-0.25])):
+        cells = number_cells(values, digits)
+        assert joined_cells([cells]).decode().split("\n")[:-1] == [f"{value:.{digits}f}" for value in values.tolist()]
+
+
+@pytest.mark.parametrize("values", [[np.nan, 1.25, -np.nan], [np.nan], [np.nan, np.inf]])
+@pytest.mark.parametrize("nan", ["nan", "", "unknown"])
+def test_what_is_no_number_has_a_text_of_its_own(values, nan):
+    lines = joined_cells([number_cells(np.array(values), 1, nan)]).decode().split("\n")[:-1]
+    assert lines == [nan if np.isnan(value) else f"{value:.1f}" for value in values]
+
+
+def test_lines_are_of_texts_and_numbers():
+    texts, values = ["0.00", "1700000000.125", "2"], np.array([-1.0, 22.125, 3.375])
+    assert joined_cells([text_cells(texts), number_cells(values, 2)]) == b"0.00,-1.00\n1700000000.125,22.12\n2,3.38\n"
+    assert joined_cells([text_cells([]), number_cells(values[:0], 2)]) == b""
+    with pytest.raises(UnicodeEncodeError):
+        text_cells(["\u0661"])
+
+
+def test_a_table_is_written_in_pieces():
+    table = np.random.default_rng(1).normal(size=(31_000, 2))
+    table[30_500, 1] = np.nan
+    pieces = list(csv_lines(table, [3, 0]))
+    assert len(pieces) == 3
+    assert b"".join(pieces).decode() == "".join(f"{a:.3f},{b:.0f}\n".replace("nan", "") for a, b in table.tolist())

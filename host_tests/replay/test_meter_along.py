@@ -1,0 +1,95 @@
+"""The fast loop of replay, report and plot gives what the firmware's meter gives sample by sample, and LEAN.csv tells
+it to the letter."""
+
+import multiprocessing
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import smoothed_rides
+from kickstand_tools.errors import InputError
+from kickstand_tools.logs import reader
+from kickstand_tools.logs.csv_lines import write_log
+from kickstand_tools.logs.reader import read_blocks, read_log
+from kickstand_tools.replay import replay, replay_engine
+from kickstand_tools.replay.meter_along import MeterAlong
+
+BY_NUMPY = ("lean_formula_deg", "static_lean_deg")  # its arc functions may differ in the last digit of a double
+
+
+@pytest.fixture(scope="module")
+def known():
+    """A ride with a speed now and then, a short and a long gap, and readings that freeze."""
+    made = smoothed_rides.simulated("street", 3, 40.0)
+    log, n = made.log, len(made.log.t_s)
+    t_s, accel_g, gyro_dps = log.t_s.copy(), log.accel_g.copy(), log.gyro_dps.copy()
+    t_s[n // 3 :] += 0.3
+    t_s[n // 2 :] += 2.0
+    accel_g[2 * n // 3 :][:600], gyro_dps[2 * n // 3 :][:600] = accel_g[2 * n // 3], gyro_dps[2 * n // 3]
+    speed = np.where(np.arange(n) % 200 == 7, 14.0, np.nan)
+    speed[7::800] = 0.0
+    calibration = replace(made.calibration, trim_deg=0.5, gyro_delay_s=0.002)
+    return replace(log, t_s=t_s, accel_g=accel_g, gyro_dps=gyro_dps, speed_mps=speed), calibration
+
+
+def by_steps(log, calibration):
+    """(n, COLUMNS) by the loop that MicroPython runs, NaN where the readings froze."""
+    engine = replay_engine.Replay(calibration.to_firmware(), calibration.delay_s())
+    rows = []
+    for block in read_blocks(log):
+        rows.append(np.full((len(block.time_us), len(replay_engine.COLUMNS)), np.nan))
+        rows[-1][~block.frozen] = [engine.step(*row) for row in block.believed.rows()]
+    return np.concatenate(rows)
+
+
+def test_it_is_the_meter_sample_by_sample(known):
+    log, calibration = known
+    (block,) = read_blocks(log)
+    believed, along = block.believed, MeterAlong(calibration)
+    assert 0 < len(believed.time_us) < len(block.time_us)
+    cuts = [0, 1, 1, 700, 5000, len(believed.time_us)]  # in blocks, an empty one too
+    parts = [along.columns(believed.part(slice(a, b))) for a, b in pairwise(cuts)]
+    got, want = np.concatenate(parts), by_steps(log, calibration)[~block.frozen]
+    shown = got[:, -1] != replay_engine.NOT_SHOWN
+    assert 0.2 < np.mean(shown) < 0.999
+    for name, mine, meters in zip(replay_engine.COLUMNS, got.T, want.T, strict=True):
+        if name in BY_NUMPY:
+            assert np.max(np.abs(mine - meters)) < 1e-9, name
+        else:
+            assert np.array_equal(mine, meters), name
+
+
+def test_the_file_has_the_values_as_python_writes_them(known, tmp_path):
+    log, calibration = known
+    write_log(tmp_path / "log.csv", log)
+    count, _ = replay.replay_to_csv(tmp_path / "log.csv", calibration, "cpython", tmp_path / "LEAN.csv")
+    want = by_steps(read_log(tmp_path / "log.csv"), calibration)
+    want[want[:, -1] == replay_engine.NOT_SHOWN, -1] = np.nan
+    header, *lines = (tmp_path / "LEAN.csv").read_text().splitlines()
+    assert header == ",".join(("t_s", *replay_engine.COLUMNS))
+    times = [line.partition(",")[0] for line in (tmp_path / "log.csv").read_text().splitlines()[1:]]
+    rows = zip(times, want.tolist(), strict=True)
+    assert lines == [",".join((time, *(f"{value:.5f}" for value in row))) for time, row in rows]
+    assert count == len(lines)
+
+
+def test_two_processes_write_the_same(known, tmp_path, monkeypatch):
+    """As for a long log, with more blocks than are read ahead; and a second process that ends is told of."""
+    log, calibration = known
+    write_log(tmp_path / "log.csv", log)
+    monkeypatch.setattr(reader, "BLOCK_BYTES", 50_000)
+    for name, long_bytes in (("one.csv", 1 << 30), ("two.csv", 1)):
+        monkeypatch.setattr(replay, "_LONG_BYTES", long_bytes)
+        replay.replay_to_csv(tmp_path / "log.csv", calibration, "cpython", tmp_path / name)
+    assert (tmp_path / "two.csv").read_bytes() == (tmp_path / "one.csv").read_bytes()
+
+    def end(columns, pool=None):
+        for process in multiprocessing.active_children():
+            process.terminate()
+            process.join()
+
+    with pytest.raises(InputError, match="second process of replay has ended"):
+        replay.replay_to_csv(tmp_path / "log.csv", calibration, "cpython", tmp_path / "two.csv", progress=end)
+    assert (tmp_path / "two.csv").read_bytes() == (tmp_path / "one.csv").read_bytes()
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["log.csv", "one.csv", "two.csv"]

@@ -1,0 +1,50 @@
+"""MeterAlong in a process of its own. The meter is two thirds of replay's work: it runs beside reading and writing."""
+
+import multiprocessing
+import signal
+from collections import deque
+from collections.abc import Iterator
+from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+
+from ..calibration.file import CalibrationFile
+from ..errors import InputError
+from ..logs.block import Block
+from ..logs.table import Array
+from .meter_along import MeterAlong
+
+_AHEAD = 3  # blocks that are read and not yet yielded: the second process always has one to work on
+
+_along: MeterAlong  # of the second process
+
+
+def columns_of(blocks: Iterator[Block], calibration: CalibrationFile) -> Iterator[tuple[Block, Array]]:
+    """Each block with MeterAlong.columns() of its rows that are believed. Raises InputError, also where the second
+    process comes to an end."""
+    spawn = multiprocessing.get_context("spawn")  # a process with threads, as of a progress bar, must not be forked
+    waiting: deque[tuple[Block, Future[Array]]] = deque()
+    try:
+        with ProcessPoolExecutor(1, spawn, _begin, (calibration,)) as pool:
+            for block in blocks:
+                waiting.append((block, pool.submit(_columns, replace(block.believed, lines=[]))))
+                if len(waiting) > _AHEAD:
+                    yield _result(*waiting.popleft())
+            while waiting:
+                yield _result(*waiting.popleft())
+    except BrokenProcessPool as error:
+        raise InputError("the second process of replay has ended: is there enough memory?") from error
+
+
+def _result(block: Block, columns: Future[Array]) -> tuple[Block, Array]:
+    return block, columns.result()
+
+
+def _begin(calibration: CalibrationFile) -> None:
+    global _along
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the first process's: it ends this one
+    _along = MeterAlong(calibration)
+
+
+def _columns(block: Block) -> Array:
+    return _along.columns(block)

@@ -1,0 +1,63 @@
+// Puts the report of a ride into the page.
+
+const byId = (id) => document.getElementById(id);
+
+function element(name, ...inside) {
+  const made = document.createElement(name);
+  made.append(...inside);
+  return made;
+}
+
+/** looked: what look() of web/rides_guest.py says. */
+export function showReport({ words, warnings }) {
+  byId("report-title").textContent = words.name;
+  byId("warnings").replaceChildren(...warnings.map((warning) => element("li", `Warning: ${warning}.`)));
+  byId("figures").replaceChildren(
+    ...words.ride.map(([name, ...cells]) => {
+      const head = element("th", name);
+      head.scope = "row";
+      return element("tr", head, ...cells.map((cell) => element("td", cell)));
+    }),
+  );
+  byId("alignment").textContent = words.alignment;
+  byId("stops-frame").hidden = !words.stops.length;
+  byId("stops-title").textContent = words.title;
+  const heads = Object.entries(words.units).map(([name, unit]) => {
+    const head = element("th", name, element("small", unit || "\u00a0"));
+    head.scope = "col";
+    return head;
+  });
+  byId("stops-head").replaceChildren(element("tr", ...heads));
+  byId("stops").replaceChildren(
+    ...words.stops.map((cells) => element("tr", ...cells.map((cell) => element("td", cell)))),
+  );
+  byId("remark").textContent = words.remark;
+  byId("report").hidden = false;
+}
+
+/** page: the HTML of the charts, which is as high as it is wide enough for. */
+export function showCharts(page) {
+  const frame = byId("plot");
+  byId("charts").hidden = false;
+  const fit = () => {
+    const inside = frame.contentDocument?.documentElement;
+    if (inside) frame.style.height = `${inside.querySelector("body").scrollHeight}px`;
+  };
+  frame.onload = fit;
+  addEventListener("resize", fit);
+  frame.srcdoc = page;
+}
+
+export function hideRide() {
+  for (const id of ["report", "charts"]) byId(id).hidden = true;
+  byId("plot").removeAttribute("srcdoc");
+}
+
+/** Offer it to the browser as a file. */
+export function save(name, type, content) {
+  const link = element("a");
+  link.href = URL.createObjectURL(new Blob([content], { type }));
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 60_000);
+}

@@ -1,0 +1,65 @@
+// The page's side of worker.mjs.
+
+export class Tools {
+  #worker = null;
+  #answer = null;
+  #before = Promise.resolve(); // the calls are made one after the other
+  #tell;
+
+  /** tell(done, of): the progress of what is worked on. */
+  constructor(tell) {
+    this.#tell = tell;
+  }
+
+  /** False: there are no files, because nothing was opened, or the work was stopped or has failed. */
+  get open() {
+    return this.#worker !== null;
+  }
+
+  /** Take these File objects in place of all before; what was being worked on is given up. */
+  give(files) {
+    if (this.#answer) this.stop();
+    this.#worker ??= this.#start();
+    this.#worker.postMessage({ files });
+  }
+
+  /** The result of a function of web/rides_guest.py: what it returns, with `made`, the bytes of the file it made.
+   *
+   * Throws an Error with the line of a refusal. */
+  call(...call) {
+    const said = this.#before.then(
+      () =>
+        new Promise((resolve, reject) => {
+          this.#answer = { resolve, reject };
+          this.#worker.postMessage({ call });
+        }),
+    );
+    this.#before = said.catch(() => {});
+    return said;
+  }
+
+  /** Give up what is being worked on, and the files: whoever waits for it waits for ever. */
+  stop() {
+    this.#worker?.terminate();
+    this.#worker = null;
+    this.#answer = null;
+    this.#before = Promise.resolve();
+  }
+
+  #start() {
+    const worker = new Worker(new URL("./worker.mjs", import.meta.url), { type: "module" });
+    worker.onmessage = ({ data }) => {
+      if (data.of !== undefined) return this.#tell(data.done, data.of);
+      const { resolve, reject } = this.#answer;
+      this.#answer = null;
+      if (data.failed || data.said.refused) reject(new Error(data.failed ?? data.said.refused));
+      else resolve(Array.isArray(data.said) ? data.said : { ...data.said, made: data.made });
+      if (data.failed) this.stop(); // Python does not go on after an error of its own
+    };
+    worker.onerror = (event) => {
+      this.#answer?.reject(new Error(event.message || "the page cannot start its worker"));
+      this.stop();
+    };
+    return worker;
+  }
+}

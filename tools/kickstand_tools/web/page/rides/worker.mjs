@@ -1,0 +1,55 @@
+// The tools of the command line, away from the page's own thread.
+//
+// Takes {files}: what was given to the page, and {call: [name, ...arguments]}: a function of web/rides_guest.py.
+// Sends {done, of}: the progress of a call, {said}: its result, {failed: text}, and {made}: with the file that it made.
+
+import { loadPython } from "../python.mjs";
+
+const GIVEN = "/given";
+const HERE = "/ride"; // where Python works
+const OFTEN_MS = 100; // between two messages of progress
+
+let guest;
+let python;
+let mounted = false;
+let saidMs = 0;
+
+function tell(done, total) {
+  const nowMs = performance.now();
+  if (nowMs - saidMs < OFTEN_MS) return;
+  saidMs = nowMs;
+  postMessage({ done, of: total });
+}
+
+async function load() {
+  python = await loadPython(["./numpy/numpy.zip", "./rides.zip"]);
+  for (const folder of [GIVEN, HERE]) python.FS.mkdir(folder);
+  python.FS.chdir(HERE);
+  guest = python.pyimport("kickstand_tools.web.rides_guest");
+  guest.prepare();
+}
+
+/** The files are read where they lie, piece by piece: none is copied into Python's memory as a whole. */
+function give(files) {
+  if (mounted) python.FS.unmount(GIVEN);
+  mounted = true;
+  python.FS.mount(python.FS.filesystems.WORKERFS, { files }, GIVEN);
+}
+
+function call([name, ...given]) {
+  const said = JSON.parse(name === "rides" ? guest.rides(GIVEN) : guest[name](...given, tell));
+  const made = said.path && python.FS.readFile(said.path);
+  postMessage({ said, made }, made ? [made.buffer] : []);
+}
+
+const loaded = load();
+
+onmessage = async ({ data }) => {
+  try {
+    await loaded;
+    if (data.files) give(data.files);
+    else call(data.call);
+  } catch (error) {
+    postMessage({ failed: String(error.message ?? error).trim().split("\n").at(-1) });
+  }
+};
