@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kickstand_tools.smoothing.solver import Beliefs, back, eliminate, mixed, solve_chain, unlikelihood, variances
+from kickstand_tools.smoothing.solver import Beliefs, back, eliminate, mixed, solve_chains, unlikelihood, variances
 
 S, M, ROWS = 3, 2, 6
 
@@ -58,7 +58,7 @@ def test_blocks_give_the_solution_of_the_whole_chain(blocks, length):
     slopes, prior, drift, between = problem(blocks, length)
     want, want_variances, states = at_once(slopes, prior, drift, between)
     reduced = eliminate(slopes, S)
-    chain = solve_chain(reduced.left, S, in_ways(prior, drift, between))
+    (chain,) = solve_chains(reduced.left, S, in_ways(prior, drift, between))
     found, spread = back(reduced, chain), variances(reduced, chain)
     for b in range(blocks):
         for k in range(length + 1):
@@ -112,8 +112,8 @@ def test_what_several_beliefs_find_lies_between_and_is_as_unsure_as_they_differ(
     slopes, prior, drift, between = problem(3, 4)
     reduced = eliminate(slopes, S)
     ways = in_ways(prior, drift, between, drift * 100.0)
-    chains = [solve_chain(reduced.left, S, ways.one(g)) for g in range(2)]
-    found = mixed(reduced.left, S, ways, np.array([0.75, 0.25]))
+    chains = solve_chains(reduced.left, S, ways)
+    found = mixed(chains, np.array([0.75, 0.25]))
     states = [back(reduced, chain) for chain in (*chains, found)]
     assert np.allclose(states[2], 0.75 * states[0] + 0.25 * states[1])
     spread = [variances(reduced, chain) for chain in (*chains, found)]

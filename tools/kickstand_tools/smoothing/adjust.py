@@ -12,12 +12,12 @@ from .first_guess import first_guess, in_hand, standing
 from .model import Residuals, linearised, residuals
 from .noise import BALANCED, BRIEF_S, LONG_S, Circumstances
 from .parameters import BIAS, FORWARD, LEAN, LEFT, PITCH, STATES, UP
-from .solver import Chain, Eliminated, back, eliminate, mixed, variances
+from .solver import Chain, Eliminated, back, eliminate, mixed, solve_chains, variances
 from .windows import Windows, padded
 
 BLOCK = 50  # windows of a block; see solver.py
 ROUNDS, PLAIN_ROUNDS = 10, 2  # at most; the first ones without regard to outliers
-NEAR, CONVERGED = np.radians([3.0, 0.03])  # changes of lean: from NEAR on residuals tell of the ride's errors
+NEAR, CONVERGED = np.radians([3.0, 0.02])  # changes of lean: from NEAR on residuals tell of the ride's errors
 JUDGING_ROUNDS = 2
 MAX_LEAN = 0.5  # rad: of one step. The equations are linear no further.
 MAX_PITCH = 1.2  # rad: as in the firmware
@@ -128,7 +128,7 @@ class _Fit:
     def _solved(self, reduced: Eliminated) -> Chain:
         known = self._judged
         ways = beliefs(known.ways, known.place, self._parameters, self._before)
-        return mixed(reduced.left, STATES, ways, known.share)
+        return mixed(solve_chains(reduced.left, STATES, ways), known.share)
 
 
 def _in_a_row(blocks: Array) -> Array:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..logs.table import Array
 from . import parameters as of
 from .parameters import BESIDE, ROTATION
-from .solver import Beliefs, solve_chain, unlikelihood
+from .solver import Beliefs, solve_chains, unlikelihood
 
 ROLL = ROTATION.stop - 1
 # Standard deviations. The mount's are those of its turning within a block of 10 s.
@@ -98,7 +98,7 @@ def _slipped(left: Array, s: int, parameters: Array, before: Array) -> int:
     the one that the readings speak for."""
     if len(parameters) < 2:
         return 0
-    loose = solve_chain(left, s, beliefs(LOOSE_MOUNT, 0, parameters, before))
+    (loose,) = solve_chains(left, s, beliefs(LOOSE_MOUNT, 0, parameters, before))
     turned = np.diff(parameters + loose.parameters, axis=0)[:, ROLL]
     places = np.argsort(np.abs(turned))[-PLACES:]
     tried = SLIPPING.part(np.zeros(len(places), dtype=int))

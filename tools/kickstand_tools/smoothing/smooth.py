@@ -22,7 +22,7 @@ from .windows import windows_of
 
 SLOWEST_HZ = 10.0
 PIECE_S = 120.0  # a log is cut into pieces
-CHAPTER = 6  # of which so many are adjusted together, with one before and one after them
+CHAPTER = 8  # of which so many are adjusted together, with one before and one after them
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps")
 
 

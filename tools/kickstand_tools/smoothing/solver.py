@@ -79,10 +79,6 @@ class Beliefs:
     drift: Array
     between: Array
 
-    def one(self, g: int) -> "Beliefs":
-        """The one of number g."""
-        return Beliefs(self.prior[g : g + 1], self.drift[g : g + 1], self.between)
-
 
 def _forward(left: Array, s: int, beliefs: Beliefs) -> tuple[list[Array], list[Array], Array, Array]:
     """From block to block: gains and inverses (G, s + m, ...) of each, the normal equations (G, s, s + 1) of the last
@@ -129,23 +125,28 @@ def unlikelihood(left: Array, s: int, beliefs: Beliefs) -> Array:
     return _forward(left, s, beliefs)[3]
 
 
-def solve_chain(left: Array, s: int, beliefs: Beliefs) -> Chain:
-    """left: of eliminate(). beliefs: in one way."""
+def solve_chains(left: Array, s: int, beliefs: Beliefs) -> list[Chain]:
+    """What is found by each of the beliefs. left: of eliminate()."""
     gains, inverses, last, _ = _forward(left, s, beliefs)
-    blocks, m = len(left), left.shape[1] - 2 * s
-    n = s + m
-    end = np.linalg.inv(last[0, :, :s])
-    first, parameters = np.empty((blocks + 1, s)), np.empty((blocks, m))
-    joint = np.empty((blocks, 2 * s + m, 2 * s + m))
-    first[blocks] = -end @ last[0, :, -1]
-    following = np.concatenate((first[blocks], np.zeros(m)))
+    return [
+        _backward([one[g] for one in gains], [one[g] for one in inverses], last[g], s) for g in range(len(last))
+    ]
+
+
+def _backward(gains: list[Array], inverses: list[Array], last: Array, s: int) -> Chain:
+    blocks, n = len(gains), len(gains[0])
+    end = np.linalg.inv(last[:, :s])
+    first, parameters = np.empty((blocks + 1, s)), np.empty((blocks, n - s))
+    joint = np.empty((blocks, s + n, s + n))
+    first[blocks] = -end @ last[:, -1]
+    following = np.concatenate((first[blocks], np.zeros(n - s)))
     spread = np.zeros((n, n))
     spread[:s, :s] = end
     for b in range(blocks - 1, -1, -1):
-        gain = gains[b][0, :, :n]
-        here = -gain @ following - gains[b][0, :, n]
+        gain = gains[b][:, :n]
+        here = -gain @ following - gains[b][:, n]
         cross = -gain @ spread
-        covariance = inverses[b][0] - cross @ gain.T
+        covariance = inverses[b] - cross @ gain.T
         joint[b, :s, :s], joint[b, s:, :s], joint[b, :s, s:] = spread[:s, :s], cross[:, :s], cross[:, :s].T
         joint[b, s:, s:] = covariance
         first[b], parameters[b] = here[:s], here[s:]
@@ -153,9 +154,8 @@ def solve_chain(left: Array, s: int, beliefs: Beliefs) -> Chain:
     return Chain(first, parameters, joint)
 
 
-def mixed(left: Array, s: int, beliefs: Beliefs, share: Array) -> Chain:
-    """What is found by each of the beliefs, put together by their shares (G), whose sum is 1."""
-    chains = [solve_chain(left, s, beliefs.one(g)) for g in range(len(share))]
+def mixed(chains: list[Chain], share: Array) -> Chain:
+    """The chains put together by their shares, whose sum is 1: their mean, as unsure as they are and differ."""
     first = np.einsum("g,gbi->bi", share, [one.first for one in chains])
     parameters = np.einsum("g,gbi->bi", share, [one.parameters for one in chains])
     joint = np.zeros_like(chains[0].joint)
