@@ -3,6 +3,7 @@
 import io
 import itertools
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -112,18 +113,16 @@ def check_first_line(log: Path) -> None:
 def read_twice(source: Source) -> Source:
     """The same where it can be read again, else a Log: an open file can be read once."""
     if isinstance(source, Stretch):
-        return Stretch(_again(source.source), source.from_s, source.to_s)
+        return replace(source, source=_again(source.source))
     return _again(source)
 
 
 def apart(source: Source) -> tuple[File | Log, Stretch | None]:
-    """The whole log, and the stretch of it that is wanted, with times from the log's beginning; None: all of it.
-
-    Raises InputError where the stretch holds no sample.
-    """
+    """The whole log, and the stretch of it that is wanted, with times from the log's beginning; None: all of it. Raises
+    InputError where the stretch holds no sample."""
     if not isinstance(source, Stretch):
         return source, None
-    stretch = _from_beginning(Stretch(_again(source.source), source.from_s, source.to_s))
+    stretch = _from_beginning(replace(source, source=_again(source.source)))
     next(stretch.cut(_unchecked(stretch.source, [])))
     return stretch.source, stretch
 
@@ -146,8 +145,8 @@ def _unchecked(source: Source, remarks: list[Notice]) -> Iterator[Block]:
         return _blocks_of(source)
     if not isinstance(source, Stretch):
         return _parsed(source, name_of(source), remarks)
-    source = _from_beginning(source)
-    return source.cut(_unchecked(source.source, remarks))
+    stretch = _from_beginning(source)
+    return stretch.cut(_unchecked(stretch.source, remarks))
 
 
 def _blocks_of(log: Log) -> Iterator[Block]:
@@ -210,10 +209,7 @@ def _numbers(
     of a mistake and is twenty times slower.
     """
     if text.strip() and not text.translate(None, _NUMERIC):
-        plain = text.replace(b",,", b",nan,")
-        if len(plain) > len(text):  # of three commas the second is still beside the third
-            plain = plain.replace(b",,", b",nan,")
-        plain = plain.replace(b",\n", b",nan\n")
+        plain = text.replace(b",,", b",nan,").replace(b",,", b",nan,").replace(b",\n", b",nan\n")
         try:
             table = np.loadtxt(io.BytesIO(plain), delimiter=",", comments=None, ndmin=2)
         except ValueError:
