@@ -6,11 +6,15 @@ from kickstand_tools.smoothing import noise
 from kickstand_tools.smoothing.model import motion_and_measurements
 from kickstand_tools.smoothing.parameters import (
     AHEAD,
+    BESIDE,
+    BIAS_PER_C,
+    CAMBER,
     FORWARD,
     HEIGHT,
     LEAN,
     LEFT,
     OFFSET,
+    OFFSET_PER_C,
     PARAMETERS,
     PITCH,
     ROTATION,
@@ -26,7 +30,7 @@ from kickstand_tools.smoothing.windows import Windows, windows_of
 G = 9.80665
 
 
-def one(rate, force, speed=np.nan):
+def one(rate, force, speed=np.nan, warm=0.0):
     """A window with these readings."""
     return Windows(
         np.array([0.0, 0.2]),
@@ -34,6 +38,7 @@ def one(rate, force, speed=np.nan):
         np.array([force]),
         np.zeros(1),
         np.array([speed]),
+        np.array([warm]),
         np.zeros(1, dtype=bool),
         np.zeros(1, dtype=int),
         np.array([0.1]),
@@ -97,6 +102,30 @@ def test_wide_tyres_make_a_balanced_bike_feel_a_force_to_the_side():
     assert abs(measured[0, noise.BALANCED]) < 1e-12
 
 
+def test_a_side_wind_is_level_and_a_cambered_road_counts_on_straights():
+    p = np.zeros((1, PARAMETERS))
+    p[0, BESIDE] = 0.03
+    _, measured = motion_and_measurements(one([0.0] * 3, [0.03 * np.cos(0.5), 1.0, 0.0]), state(lean=0.5), p)
+    assert abs(measured[0, noise.BALANCED]) < 1e-12
+    p = np.zeros((1, PARAMETERS))
+    p[0, CAMBER] = 0.01
+    off = [
+        motion_and_measurements(one([0.0] * 3, [0.01, 1.0, 0.0]), state(lean=lean), p)[1][0, noise.BALANCED]
+        for lean in (0.0, 0.02, 0.5)
+    ]
+    assert np.allclose(off, [0.0, 0.0, 0.01], atol=5e-5)
+
+
+def test_a_warmer_sensor_has_other_offsets():
+    p = np.zeros((1, PARAMETERS))
+    p[0, OFFSET_PER_C], p[0, BIAS_PER_C] = (0.001, 0.0, 0.002), (0.0, 0.0, 0.01)
+    readings = [0.0, 0.0, 0.1], [-0.01, 1.0, -0.02]
+    motion, _ = motion_and_measurements(one(*readings, warm=10.0), state(), p)
+    assert np.allclose(motion, 0.0, atol=1e-12)
+    motion, _ = motion_and_measurements(one(*readings), state(), p)
+    assert motion[0, LEAN] == pytest.approx(0.1)
+
+
 def test_the_upright_pose_tells_rotation_and_offset_together():
     """A sensor whose offset the pose has taken for a tilt is right at rest, whatever the offset."""
     before = sigma(six_done=False)
@@ -120,7 +149,7 @@ def test_windows_hold_the_integrals_and_gaps_are_windows_of_their_own():
     rate = rng.normal(size=(300, 3))
     speed = np.full(300, np.nan)
     speed[[10, 200]] = 7.0, 9.0
-    windows = windows_of(t, np.tile([0.0, 1.0, 0.0], (300, 1)), rate, speed)
+    windows = windows_of(t, np.tile([0.0, 1.0, 0.0], (300, 1)), rate, speed, np.zeros(300))
     assert np.array_equal(np.flatnonzero(windows.gap), [windows.number[149] + 1])
     assert windows.seconds[windows.gap][0] == pytest.approx(5.0, abs=0.03)
     share = (windows.before + windows.after)[:, None]

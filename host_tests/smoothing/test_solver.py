@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kickstand_tools.smoothing.solver import back, eliminate, solve_chain, variances
+from kickstand_tools.smoothing.solver import Beliefs, back, eliminate, mixed, solve_chains, unlikelihood, variances
 
 S, M, ROWS = 3, 2, 6
 
@@ -45,12 +45,20 @@ def at_once(slopes, prior, drift, between):
     return -covariance @ gradient, np.diag(covariance), states
 
 
+def in_ways(prior, drift, between, *more):
+    """Beliefs with this drift (m), and with others."""
+    drifts = np.stack([drift, *more])
+    return Beliefs(
+        np.stack([prior] * len(drifts)), np.repeat(drifts[:, None], len(between), axis=1), between
+    )
+
+
 @pytest.mark.parametrize(("blocks", "length"), [(1, 1), (1, 5), (2, 1), (4, 3), (3, 7)])
 def test_blocks_give_the_solution_of_the_whole_chain(blocks, length):
     slopes, prior, drift, between = problem(blocks, length)
     want, want_variances, states = at_once(slopes, prior, drift, between)
     reduced = eliminate(slopes, S)
-    chain = solve_chain(reduced.left, S, prior, drift, between)
+    (chain,) = solve_chains(reduced.left, S, in_ways(prior, drift, between))
     found, spread = back(reduced, chain), variances(reduced, chain)
     for b in range(blocks):
         for k in range(length + 1):
@@ -58,3 +66,56 @@ def test_blocks_give_the_solution_of_the_whole_chain(blocks, length):
             assert np.allclose(found[k, b], want[place], atol=1e-9)
             assert np.allclose(spread[k, b], want_variances[place], rtol=1e-6)
     assert np.allclose(chain.parameters.ravel(), want[states * S :], atol=1e-9)
+
+
+def test_the_likelihood_is_that_of_the_parameters_as_a_whole():
+    """Against the density of what is measured, whose covariance is that of its noise and of all unknowns."""
+    slopes, prior, drift, between = problem(3, 2)
+    other = drift * [9.0, 0.25]
+    left = eliminate(slopes, S).left
+    found = unlikelihood(left, S, in_ways(prior, drift, between, other))
+    want = [by_density(slopes, prior, one, between) for one in (drift, other)]
+    assert found[1] - found[0] == pytest.approx(want[1] - want[0], rel=1e-4)
+
+
+def by_density(slopes, prior, drift, between):
+    """Twice the negative logarithm of the density; flat states have a very wide density before."""
+    length, blocks = slopes.shape[:2]
+    states = blocks * length + 1
+    n = states * S + blocks * M
+    rows, wide = [], 1e6
+    for b in range(blocks):
+        for k in range(length):
+            row = np.zeros((ROWS, n + 1))
+            first = (b * length + k) * S
+            row[:, first : first + 2 * S] = slopes[k, b, :, : 2 * S]
+            row[:, states * S + b * M : states * S + (b + 1) * M] = slopes[k, b, :, 2 * S : -1]
+            row[:, n] = slopes[k, b, :, -1]
+            rows.append(row)
+    rows = np.concatenate(rows)
+    covariance, mean = np.eye(n) * wide, np.zeros(n)
+    at_first = np.linalg.inv(prior[:, :M])
+    pulled = -at_first @ prior[:, M]
+    for a in range(blocks):
+        mean[states * S + a * M : states * S + (a + 1) * M] = pulled - np.sum(between[:a], axis=0)
+        for b in range(blocks):
+            shared = at_first + min(a, b) * np.diag(drift)
+            covariance[states * S + a * M : states * S + (a + 1) * M, states * S + b * M : states * S + (b + 1) * M] = (
+                shared
+            )
+    spread = rows[:, :n] @ covariance @ rows[:, :n].T + np.eye(len(rows))
+    off = rows[:, n] + rows[:, :n] @ mean
+    return np.linalg.slogdet(spread)[1] + off @ np.linalg.solve(spread, off)
+
+
+def test_what_several_beliefs_find_lies_between_and_is_as_unsure_as_they_differ():
+    slopes, prior, drift, between = problem(3, 4)
+    reduced = eliminate(slopes, S)
+    ways = in_ways(prior, drift, between, drift * 100.0)
+    chains = solve_chains(reduced.left, S, ways)
+    found = mixed(chains, np.array([0.75, 0.25]))
+    states = [back(reduced, chain) for chain in (*chains, found)]
+    assert np.allclose(states[2], 0.75 * states[0] + 0.25 * states[1])
+    spread = [variances(reduced, chain) for chain in (*chains, found)]
+    apart = 0.75 * 0.25 * (states[1] - states[0]) ** 2
+    assert np.allclose(spread[2], 0.75 * spread[0] + 0.25 * spread[1] + apart)

@@ -28,7 +28,7 @@ class Known:
     def part(self, kept):
         """The samples where kept (n) is True."""
         log = self.log
-        rows = log.t_s[kept], log.accel_g[kept], log.gyro_dps[kept], log.speed_mps[kept]
+        rows = log.t_s[kept], log.accel_g[kept], log.gyro_dps[kept], log.speed_mps[kept], log.temperature_c[kept]
         return Known(Log(*rows), self.calibration, self.lean_deg[kept], self.riding[kept])
 
 

@@ -7,16 +7,18 @@ import numpy as np
 from ..logs.axes.leaning import WINDOW_S
 from ..logs.table import Array
 from . import parameters as of
+from .beliefs import UNJUDGED, beliefs, judged
 from .first_guess import first_guess, in_hand, standing
-from .model import linearised
-from .noise import Circumstances
+from .model import Residuals, linearised, residuals
+from .noise import BALANCED, BRIEF_S, LONG_S, Circumstances
 from .parameters import BIAS, FORWARD, LEAN, LEFT, PITCH, STATES, UP
-from .solver import Chain, Eliminated, back, eliminate, solve_chain, variances
+from .solver import Chain, Eliminated, back, eliminate, mixed, solve_chains, variances
 from .windows import Windows, padded
 
-BLOCK = 200  # windows of a block, at least; see solver.py
-ROUNDS, PLAIN_ROUNDS = 8, 2  # at most; the first ones without regard to outliers
-CONVERGED = np.radians(0.03)
+BLOCK = 50  # windows of a block; see solver.py
+ROUNDS, PLAIN_ROUNDS = 10, 2  # at most; the first ones without regard to outliers
+NEAR, CONVERGED = np.radians([3.0, 0.02])  # changes of lean: from NEAR on residuals tell of the ride's errors
+JUDGING_ROUNDS = 2
 MAX_LEAN = 0.5  # rad: of one step. The equations are linear no further.
 MAX_PITCH = 1.2  # rad: as in the firmware
 START = np.array([1.0, 0.3, 1.0, 1.0, 20.0, 0.03, 0.03, 0.03])  # 1 sigma of the first state of all
@@ -37,25 +39,23 @@ class Adjusted:
 
 def adjust(windows: Windows, six_done: bool) -> Adjusted:
     """six_done: the accelerometer was calibrated by six positions. Raises LinAlgError where nothing can be found."""
-    count = max(1, len(windows) // BLOCK)
-    fit = _Fit(padded(windows, -(-len(windows) // count)), count, six_done)
-    for k in range(ROUNDS):
-        if fit.step(robust=k >= PLAIN_ROUNDS) < CONVERGED and k > PLAIN_ROUNDS:
-            break
+    length = min(BLOCK, len(windows))
+    fit = _Fit(padded(windows, length), length, six_done)
+    fit.converge()
     n = len(windows)
     return Adjusted(fit.states[: n + 1], fit.sigma()[: n + 1], fit.each_window()[:n])
 
 
 class _Fit:
-    def __init__(self, windows: Windows, blocks: int, six_done: bool) -> None:
-        self._windows, self._blocks, self._length = windows, blocks, len(windows) // blocks
+    def __init__(self, windows: Windows, length: int, six_done: bool) -> None:
+        self._windows, self._blocks, self._length = windows, len(windows) // length, length
         self._still = standing(windows)
         self._held = in_hand(windows)
         lean, speed = first_guess(windows, self._still)
         self.states = np.zeros((len(windows) + 1, STATES))
         self.states[:, LEAN], self.states[:, FORWARD] = _at_edges(lean), _at_edges(speed)
-        self._parameters = np.tile(of.USUAL, (blocks, 1))
-        self._roughness = np.ones(len(windows))
+        self._parameters = np.tile(of.USUAL, (self._blocks, 1))
+        self._roughness, self._unbalance, self._judged = np.ones(len(windows)), 1.0, UNJUDGED
         self._before = of.sigma(six_done)  # 1 sigma of the parameters, before the ride
         self._rolling = np.gradient(windows.rate[:, 2]) / WINDOW_S if len(windows) > 1 else np.zeros(1)
 
@@ -63,9 +63,25 @@ class _Fit:
         """(n, PARAMETERS)"""
         return np.repeat(self._parameters, self._length, axis=0)
 
-    def step(self, robust: bool) -> float:
-        """Returns the largest change of lean, rad. Raises LinAlgError."""
-        reduced, chain = self._solved(self._linearised(robust))
+    def converge(self) -> None:
+        """Raises LinAlgError."""
+        change, judged_rounds = np.inf, 0
+        for k in range(ROUNDS):
+            near = k > PLAIN_ROUNDS and change < NEAR
+            if near:
+                balance = self._residuals().measured[:, BALANCED]
+                self._unbalance = self._circumstances().unbalance_of(balance, BRIEF_S)
+            change = self._step(k >= PLAIN_ROUNDS, judge=near and judged_rounds < JUDGING_ROUNDS)
+            judged_rounds += near
+            if change < CONVERGED and judged_rounds >= JUDGING_ROUNDS:
+                break
+
+    def _step(self, robust: bool, judge: bool) -> float:
+        """judge: what of beliefs.py counts. Returns the largest change of lean, rad. Raises LinAlgError."""
+        reduced = self._reduced(self._linearised(robust))
+        if judge:
+            self._judged = judged(reduced.left, STATES, self._parameters, self._before, self._unbalance)
+        chain = self._solved(reduced)
         change = _in_a_row(back(reduced, chain))
         most = float(np.max(np.abs(change[:, LEAN])))
         if not np.isfinite(most):
@@ -82,29 +98,37 @@ class _Fit:
         The states are those by the sigmas of a rough ride, because errors that no model has last for long, and weigh
         less then.
         """
-        self._roughness = self._circumstances().roughness_of(self._linearised(robust=True)[:, :, -1])
-        return np.sqrt(np.maximum(_in_a_row(variances(*self._solved(self._linearised(robust=True)))), 0.0))
+        known, found = self._circumstances(), self._residuals()
+        self._roughness = known.roughness_of(found.values)
+        self._unbalance = known.unbalance_of(found.measured[:, BALANCED], LONG_S)
+        reduced = self._reduced(self._linearised(robust=True))
+        return np.sqrt(np.maximum(_in_a_row(variances(reduced, self._solved(reduced))), 0.0))
 
     def _circumstances(self) -> Circumstances:
         middle = 0.5 * (self.states[1:] + self.states[:-1])
         lean, speed = middle[:, LEAN], middle[:, FORWARD]
         return Circumstances(
-            self._windows, self._still, *self._held, self._rolling, lean, speed, self._roughness
+            self._windows, self._still, *self._held, self._rolling, lean, speed, self._roughness, self._unbalance
         )
+
+    def _residuals(self) -> Residuals:
+        return residuals(self._circumstances(), self.states, self.each_window(), robust=True)
 
     def _linearised(self, robust: bool) -> Array:
         return linearised(self._circumstances(), self.states, self.each_window(), robust)
 
-    def _solved(self, slopes: Array) -> tuple[Eliminated, Chain]:
+    def _reduced(self, slopes: Array) -> Eliminated:
         side_by_side = slopes.reshape(self._blocks, self._length, *slopes.shape[1:]).transpose(1, 0, 2, 3)
         reduced = eliminate(side_by_side, STATES)
         first = np.arange(STATES, 2 * STATES)
         reduced.left[0, first, first] += 1.0 / START**2
         reduced.left[0, first[DRAWN], -1] += self.states[0, DRAWN] / START[DRAWN] ** 2
-        p, known = self._parameters, of.known(self._before)
-        prior = np.column_stack((known, known @ (p[0] - of.USUAL)))
-        drift = (of.DRIFT * self._before) ** 2
-        return reduced, solve_chain(reduced.left, STATES, prior, drift, np.diff(p, axis=0))
+        return reduced
+
+    def _solved(self, reduced: Eliminated) -> Chain:
+        known = self._judged
+        ways = beliefs(known.ways, known.place, self._parameters, self._before)
+        return mixed(solve_chains(reduced.left, STATES, ways), known.share)
 
 
 def _in_a_row(blocks: Array) -> Array:

@@ -13,11 +13,13 @@ wheels' velocity is the sensor's less what turning adds at its place. Measured a
     SLIDING      the wheels' velocity sideways: they do not slide
     CLIMBING     their velocity up less that along the chassis: it points along the road, but for its dive in braking
     SLOPING      their velocity up: roads are level on average
-    BALANCED     the force to the side, less that by the tyres' width: a bike that rides is balanced
+    BALANCED     the force to the side, less those by the tyres' width and by what lasts: a bike that rides is balanced
     ANY_SPEED    the speed less a usual one        GIVEN_SPEED    the same less the log's, which is late
     RESTING      the velocity, and RESTING_RATE the rates, of a bike that stands
     BACKWARD     the speed where it is under 0
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
@@ -29,12 +31,16 @@ from .parameters import (
     AHEAD,
     BESIDE,
     BIAS,
+    BIAS_PER_C,
+    CAMBER,
     DELAY,
     DIVE,
     FORWARD,
     HEIGHT,
     LEAN,
     LEFT,
+    OFFSET,
+    OFFSET_PER_C,
     PARAMETERS,
     PITCH,
     STATES,
@@ -46,6 +52,7 @@ from .parameters import (
 from .windows import Windows
 
 ROWS = STATES + MEASURED
+STRAIGHT = 0.1  # rad: of lean. Up to about this a road is cambered, above it is banked, like the turn itself.
 STATE_STEPS = np.array([1e-5, 1e-5, 1e-4, 1e-4, 1e-4, 1e-6, 1e-6, 1e-6])  # of the differences for derivatives
 PARAMETER_STEP = 1e-5
 
@@ -56,8 +63,8 @@ def motion_and_measurements(windows: Windows, middle: Array, p: Array) -> tuple[
     middle (n, STATES): states in the middle of each window. p (n, PARAMETERS).
     """
     t, q, left, up, forward = middle[:, : BIAS.start].T
-    wx, wy, wz = corrected_rates(windows.rate, middle, p)
-    fx, fy, fz = corrected_force(windows.force, p)
+    wx, wy, wz = corrected_rates(windows.rate, middle, p, windows.warm)
+    fx, fy, fz = corrected_force(windows.force, p, windows.warm)
     st, ct, sq, cq = np.sin(t), np.cos(t), np.sin(q), np.cos(q)
     yaw = (wx * st + wy * ct) / cq
     upright = fx * st + fy * ct  # force up after the lean is taken off
@@ -77,7 +84,7 @@ def motion_and_measurements(windows: Windows, middle: Array, p: Array) -> tuple[
     measured[:, noise.SLIDING] = wheel_left
     measured[:, noise.CLIMBING] = wheel_up - wheel * (q - p[:, DIVE] * ahead)
     measured[:, noise.SLOPING] = wheel_up
-    measured[:, noise.BALANCED] = fx - p[:, TYRES] * st - p[:, BESIDE]
+    measured[:, noise.BALANCED] = fx - p[:, TYRES] * st - p[:, BESIDE] * ct - p[:, CAMBER] / (1.0 + (t / STRAIGHT) ** 4)
     measured[:, noise.ANY_SPEED] = wheel - USUAL_MPS
     measured[:, noise.GIVEN_SPEED] = wheel - p[:, DELAY] * ahead - np.nan_to_num(windows.speed)
     measured[:, noise.RESTING] = middle[:, LEFT : BIAS.start]
@@ -86,12 +93,22 @@ def motion_and_measurements(windows: Windows, middle: Array, p: Array) -> tuple[
     return motion, measured
 
 
-def linearised(known: Circumstances, states: Array, p: Array, robust: bool) -> Array:
-    """(n, ROWS, 2 STATES + PARAMETERS + 1): derivatives of the residuals by the states at both ends of each window and
-    by the parameters, and the residuals, all over their standard deviations.
+@dataclass
+class Residuals:
+    """Of n windows. motion (n, STATES), measured (n, MEASURED): of motion_and_measurements(). scale (n, STATES), weight
+    (n, MEASURED): by what they are multiplied. values (n, ROWS): over their standard deviations. sigma (n, STATES): of
+    what the states change by."""
 
-    states (n + 1, STATES): at the windows' edges. p (n, PARAMETERS). robust: outliers count less (Cauchy).
-    """
+    motion: Array
+    measured: Array
+    sigma: Array
+    scale: Array
+    weight: Array
+    values: Array
+
+
+def residuals(known: Circumstances, states: Array, p: Array, robust: bool) -> Residuals:
+    """states (n + 1, STATES): at the windows' edges. p (n, PARAMETERS). robust: outliers count less (Cauchy)."""
     windows = known.windows
     middle, step = 0.5 * (states[1:] + states[:-1]), states[1:] - states[:-1]
     seconds = np.where(windows.gap, 0.0, windows.seconds)[:, None]
@@ -102,23 +119,36 @@ def linearised(known: Circumstances, states: Array, p: Array, robust: bool) -> A
         sigma[:, : BIAS.start] *= np.hypot(1.0, off / noise.JOLT)
         # what holds for long is judged by its own sigma, not by its share of a window
         weight = weight / np.hypot(1.0, measured * weight * known.lasting() / OUTLIER)
-    found = np.zeros((len(middle), ROWS, 2 * STATES + PARAMETERS + 1))
     scale = seconds / sigma
+    values = np.concatenate((step / sigma - scale * motion, weight * measured), axis=1)
+    return Residuals(motion, measured, sigma, scale, weight, values)
+
+
+def linearised(known: Circumstances, states: Array, p: Array, robust: bool) -> Array:
+    """(n, ROWS, 2 STATES + PARAMETERS + 1): derivatives of the residuals by the states at both ends of each window and
+    by the parameters, and the residuals. See residuals()."""
+    windows, at = known.windows, residuals(known, states, p, robust)
+    middle = 0.5 * (states[1:] + states[:-1])
+    found = np.empty((len(middle), ROWS, 2 * STATES + PARAMETERS + 1))
+    found[:, :, -1] = at.values
+
+    def changed(middle: Array, p: Array, step: float) -> Array:
+        motion, measured = motion_and_measurements(windows, middle, p)
+        return np.concatenate((at.scale * (at.motion - motion), at.weight * (measured - at.measured)), axis=1) / step
+
     for i in range(STATES):
         moved = middle.copy()
         moved[:, i] += STATE_STEPS[i]
-        by_motion, by_measured = motion_and_measurements(windows, moved, p)
-        half = 0.5 / STATE_STEPS[i]  # the middle changes by half of what an end does
-        found[:, :STATES, i] = found[:, :STATES, STATES + i] = -half * scale * (by_motion - motion)
-        found[:, STATES:, i] = found[:, STATES:, STATES + i] = half * weight * (by_measured - measured)
-        found[:, i, i] -= 1.0 / sigma[:, i]
-        found[:, i, STATES + i] += 1.0 / sigma[:, i]
-    for j in range(PARAMETERS):
+        found[:, :, i] = found[:, :, STATES + i] = 0.5 * changed(moved, p, STATE_STEPS[i])  # the middle moves by half
+    for j in range(OFFSET_PER_C.start):
         moved = p.copy()
         moved[:, j] += PARAMETER_STEP
-        by_motion, by_measured = motion_and_measurements(windows, middle, moved)
-        found[:, :STATES, 2 * STATES + j] = scale * (motion - by_motion) / PARAMETER_STEP
-        found[:, STATES:, 2 * STATES + j] = weight * (by_measured - measured) / PARAMETER_STEP
-    found[:, :STATES, -1] = step / sigma - scale * motion
-    found[:, STATES:, -1] = weight * measured
+        found[:, :, 2 * STATES + j] = changed(middle, moved, PARAMETER_STEP)
+    warm = windows.warm[:, None, None]
+    by_parameters = found[:, :, 2 * STATES : -1]
+    by_parameters[:, :, OFFSET_PER_C] = warm * by_parameters[:, :, OFFSET]
+    by_parameters[:, :, BIAS_PER_C] = warm * 2.0 * found[:, :, BIAS]
+    for i in range(STATES):
+        found[:, i, i] -= 1.0 / at.sigma[:, i]
+        found[:, i, STATES + i] += 1.0 / at.sigma[:, i]
     return found

@@ -26,7 +26,7 @@ def at_samples(windows: Windows, rate: Array, found: Adjusted, delay_s: float) -
     lean = before[:, LEAN] + share * (after - before)[:, LEAN]
     pitch = before[:, PITCH] + share * (after - before)[:, PITCH]
     speed = before[:, FORWARD] + share * (after - before)[:, FORWARD]
-    wx, wy, wz = corrected_rates(rate, 0.5 * (before + after), found.parameters[number])
+    wx, wy, wz = corrected_rates(rate, 0.5 * (before + after), found.parameters[number], windows.warm[number])
     roll_rate = wz - np.tan(pitch) * (wx * np.sin(lean) + wy * np.cos(lean))
     turned = np.cumsum(roll_rate * duration)
     until = turned - roll_rate * duration

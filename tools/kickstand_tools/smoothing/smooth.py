@@ -22,7 +22,7 @@ from .windows import windows_of
 
 SLOWEST_HZ = 10.0
 PIECE_S = 120.0  # a log is cut into pieces
-CHAPTER = 6  # of which so many are adjusted together, with one before and one after them
+CHAPTER = 8  # of which so many are adjusted together, with one before and one after them
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps")
 
 
@@ -112,14 +112,17 @@ def smooth_blocks(
     _check(log, calibration)
     past: deque[Block] = deque(maxlen=CHAPTER)
     waiting: list[Block] = []
+    start_c = np.nan
     for piece in _pieces(read_blocks(log, 2, progress, notices)):
         waiting.append(piece)
+        known = piece.readings[~np.isnan(piece.readings[:, 3]), 3]
+        start_c = float(known[0]) if np.isnan(start_c) and len(known) else start_c
         if len(waiting) > CHAPTER:
-            yield from _chapter([*past][-1:], waiting[:CHAPTER], waiting[CHAPTER:], calibration)
+            yield from _chapter([*past][-1:], waiting[:CHAPTER], waiting[CHAPTER:], calibration, start_c)
             past.extend(waiting[:CHAPTER])
             del waiting[:CHAPTER]
     # the end of a ride may be short: as much of what was before it is adjusted with it
-    yield from _chapter([*past][-max(1, CHAPTER - len(waiting)) :], waiting, [], calibration)
+    yield from _chapter([*past][-max(1, CHAPTER - len(waiting)) :], waiting, [], calibration, start_c)
 
 
 def _check(log: Source, calibration: CalibrationFile) -> None:
@@ -140,11 +143,11 @@ def _pieces(blocks: Iterator[Block]) -> Iterator[Block]:
 
 
 def _chapter(
-    before: list[Block], own: list[Block], after: list[Block], calibration: CalibrationFile
+    before: list[Block], own: list[Block], after: list[Block], calibration: CalibrationFile, start_c: float
 ) -> Iterator[tuple[Block, Array | None]]:
     """The values of the pieces `own`, adjusted together with those before and after them."""
     believed = [piece.believed for piece in (*before, *own, *after)]
-    values = _adjusted(believed, calibration)
+    values = _adjusted(believed, calibration, start_c)
     first = sum(len(piece.time_us) for piece in believed[: len(before)])
     for piece in own:
         if values is None:
@@ -158,7 +161,15 @@ def _chapter(
         yield piece, found
 
 
-def _adjusted(pieces: list[Block], calibration: CalibrationFile) -> Array | None:
+def _warm(t_s: Array, temperature_c: Array, start_c: float) -> Array:
+    """(n): how much warmer it is than start_c; 0 where the log does not tell."""
+    there = np.flatnonzero(~np.isnan(temperature_c))
+    if not len(there) or np.isnan(start_c):
+        return np.zeros(len(t_s))
+    return np.interp(t_s, t_s[there], temperature_c[there]) - start_c
+
+
+def _adjusted(pieces: list[Block], calibration: CalibrationFile, start_c: float) -> Array | None:
     """(samples, COLUMNS); None where there are too few samples a second."""
     t_s = np.concatenate([piece.t_s for piece in pieces])
     readings = np.concatenate([piece.readings for piece in pieces])
@@ -166,12 +177,13 @@ def _adjusted(pieces: list[Block], calibration: CalibrationFile) -> Array | None
     nothing = np.full((len(t_s), len(COLUMNS)), np.nan)
     if len(t_s) < 2:
         return nothing
+    warm = _warm(t_s, readings[:, 3], start_c)
     step_s = float(np.median(np.diff(t_s)))
     if step_s * SLOWEST_HZ > 1.0:
         return None
     force, rate = calibration.in_vehicle(readings)
     rate = np.radians(rate)
-    windows = windows_of(t_s, force, rate, speed)
+    windows = windows_of(t_s, force, rate, speed, warm)
     try:
         found = at_samples(windows, rate, adjust(windows, calibration.six_done), calibration.delay_s())
     except np.linalg.LinAlgError:

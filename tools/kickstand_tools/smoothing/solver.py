@@ -6,7 +6,8 @@ parameters to the first state of the next one: a short chain, which is solved fr
 the whole chain at once, no block knows less than another, and the loops are short.
 
 Unknowns of a block: its states x_0 ... x_K (s each) and its parameters p (m). x_K is the next block's x_0. Parameters
-may drift from block to block.
+may drift from block to block. By how much is believed in several ways at once, of which the chain tells how likely
+each makes the readings.
 """
 
 from dataclasses import dataclass
@@ -65,42 +66,80 @@ class Chain:
     joint: Array
 
 
-def solve_chain(left: Array, s: int, prior: Array, drift: Array, between: Array) -> Chain:
-    """left: of eliminate(). prior (m, m + 1): normal equations of what is known of the first block's parameters.
-    drift (m): variances of their change from block to block; between (B - 1, m): how far the parameters about which
-    the equations were linearised differ from block to block."""
+@dataclass
+class Beliefs:
+    """What is believed of the parameters besides the windows, in G ways.
+
+    prior (G, m, m + 1): normal equations of the first block's parameters. drift (G, B - 1, m): variances of their
+    change from block to block. between (B - 1, m): how far the parameters about which the equations were linearised
+    differ from block to block.
+    """
+
+    prior: Array
+    drift: Array
+    between: Array
+
+
+def _forward(left: Array, s: int, beliefs: Beliefs) -> tuple[list[Array], list[Array], Array, Array]:
+    """From block to block: gains and inverses (G, s + m, ...) of each, the normal equations (G, s, s + 1) of the last
+    state, and (G): twice the negative logarithm of how likely the ride is, but for a constant."""
     blocks, m = len(left), left.shape[1] - 2 * s
-    n = s + m
+    ways, n = len(beliefs.drift), s + m
     keep = np.r_[s : 2 * s + m]  # x_0, p
-    known = np.zeros((n, n + 1))
-    known[s:, s:n], known[s:, n] = prior[:, :m], prior[:, m]
-    weight = np.diag(1.0 / drift)
+    known = np.zeros((ways, n, n + 1))
+    known[:, s:, s:] = beliefs.prior
+    inside = np.arange(s, n)
     gains, inverses = [], []
+    before, pull = beliefs.prior[:, :, :m], beliefs.prior[:, :, m:]
+    unlikely = np.sum(pull * np.linalg.solve(before, pull), axis=(1, 2)) - np.linalg.slogdet(before)[1]
     for b in range(blocks):
         whole = left[b]
-        inner = whole[np.ix_(keep, keep)] + known[:, :n]
-        gradient = whole[keep, -1] + known[:, n]
-        across = np.zeros((n, n + 1))  # by the next block's x_0, p, and 1
-        across[:, :s], across[:, n] = whole[keep, :s], gradient
+        inner = whole[np.ix_(keep, keep)] + known[:, :, :n]
+        gradient = whole[keep, -1] + known[:, :, n]
+        across = np.zeros((ways, n, n + 1))  # by the next block's x_0, p, and 1
+        across[:, :, :s], across[:, :, n] = whole[keep, :s], gradient
+        known = np.zeros((ways, n, n + 1))
+        known[:, :s, :s], known[:, :s, n] = whole[:s, :s], whole[:s, -1]
         if b < blocks - 1:
-            inner[s:, s:] += weight
-            across[s:, s:n] = -weight
-            across[s:, n] -= weight @ between[b]
+            weight, gap = 1.0 / beliefs.drift[:, b], beliefs.between[b]
+            inner[:, inside, inside] += weight
+            across[:, inside, inside] = -weight
+            across[:, inside, n] -= weight * gap
+            known[:, inside, inside] = weight
+            known[:, inside, n] = weight * gap
+            unlikely += np.sum(weight * gap**2 - np.log(weight), axis=1)
         inverse = np.linalg.inv(inner)
         gain = inverse @ across
         gains.append(gain)
         inverses.append(inverse)
-        known = np.zeros((n, n + 1))
-        known[:s, :s], known[:s, n] = whole[:s, :s], whole[:s, -1]
-        if b < blocks - 1:
-            known[s:, s:n] = weight
-            known[s:, n] = weight @ between[b]
-        known -= across[:, :n].T @ gain
-    end = np.linalg.inv(known[:s, :s])
-    first, parameters = np.empty((blocks + 1, s)), np.empty((blocks, m))
-    joint = np.empty((blocks, 2 * s + m, 2 * s + m))
-    first[blocks] = -end @ known[:s, n]
-    following = np.concatenate((first[blocks], np.zeros(m)))
+        known -= across[:, :, :n].transpose(0, 2, 1) @ gain
+        unlikely += np.linalg.slogdet(inner)[1] - np.sum(across[:, :, n] * gain[:, :, n], axis=1)
+    end = known[:, :s, :s]
+    solved = np.linalg.solve(end, known[:, :s, n:])[:, :, 0]
+    unlikely += np.linalg.slogdet(end)[1] - np.sum(solved * known[:, :s, n], axis=1)
+    return gains, inverses, known[:, :s], unlikely
+
+
+def unlikelihood(left: Array, s: int, beliefs: Beliefs) -> Array:
+    """(G): twice the negative logarithm of how likely the ride is by each of the beliefs, but for what they share."""
+    return _forward(left, s, beliefs)[3]
+
+
+def solve_chains(left: Array, s: int, beliefs: Beliefs) -> list[Chain]:
+    """What is found by each of the beliefs. left: of eliminate()."""
+    gains, inverses, last, _ = _forward(left, s, beliefs)
+    return [
+        _backward([one[g] for one in gains], [one[g] for one in inverses], last[g], s) for g in range(len(last))
+    ]
+
+
+def _backward(gains: list[Array], inverses: list[Array], last: Array, s: int) -> Chain:
+    blocks, n = len(gains), len(gains[0])
+    end = np.linalg.inv(last[:, :s])
+    first, parameters = np.empty((blocks + 1, s)), np.empty((blocks, n - s))
+    joint = np.empty((blocks, s + n, s + n))
+    first[blocks] = -end @ last[:, -1]
+    following = np.concatenate((first[blocks], np.zeros(n - s)))
     spread = np.zeros((n, n))
     spread[:s, :s] = end
     for b in range(blocks - 1, -1, -1):
@@ -112,6 +151,18 @@ def solve_chain(left: Array, s: int, prior: Array, drift: Array, between: Array)
         joint[b, s:, s:] = covariance
         first[b], parameters[b] = here[:s], here[s:]
         following, spread = here, covariance
+    return Chain(first, parameters, joint)
+
+
+def mixed(chains: list[Chain], share: Array) -> Chain:
+    """The chains put together by their shares, whose sum is 1: their mean, as unsure as they are and differ."""
+    first = np.einsum("g,gbi->bi", share, [one.first for one in chains])
+    parameters = np.einsum("g,gbi->bi", share, [one.parameters for one in chains])
+    joint = np.zeros_like(chains[0].joint)
+    for weight, one in zip(share, chains):
+        off_first, off_parameters = one.first - first, one.parameters - parameters
+        off = np.concatenate((off_first[1:], off_first[:-1], off_parameters), axis=1)
+        joint += weight * (one.joint + off[:, :, None] * off[:, None, :])
     return Chain(first, parameters, joint)
 
 

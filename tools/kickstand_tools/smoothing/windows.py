@@ -16,7 +16,8 @@ class Windows:
     """n windows, one following on the other; where readings are missing a window without readings lies between two.
 
     edges (n + 1, s): their times. rate (n, 3, rad/s), force (n, 3, g): means, along the vehicle's axes. jolt (n): by
-    how much the rate differs from its mean at most, rad/s. speed (n): m/s, NaN where there is none. gap (n): True where
+    how much the rate differs from its mean at most, rad/s. speed (n): m/s, NaN where there is none. warm (n): how much
+    warmer than at the begin of the log, C, 0 where that is not known. gap (n): True where
     there are no readings. Of each sample: number, in which window it lies; before and after (s): the time that it
     stands for.
     """
@@ -26,6 +27,7 @@ class Windows:
     force: Array
     jolt: Array
     speed: Array
+    warm: Array
     gap: NDArray[np.bool_]
     number: NDArray[np.intp]
     before: Array
@@ -40,8 +42,9 @@ class Windows:
         return np.diff(self.edges)
 
 
-def windows_of(t_s: Array, force: Array, rate: Array, speed: Array) -> Windows:
-    """Of samples: t_s (s), force (samples, 3, g), rate (samples, 3, rad/s), speed (m/s, NaN where there is no new one).
+def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array) -> Windows:
+    """Of samples: t_s (s), force (samples, 3, g), rate (samples, 3, rad/s), speed (m/s, NaN where there is no new one),
+    warm (C, see Windows).
 
     Each sample stands for the time until half way to its neighbours, so that the sum over a window is the integral.
     """
@@ -75,6 +78,7 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array) -> Windows:
         np.insert(mean(force), at, 0.0, axis=0),
         np.insert(jolt, at, 0.0),
         np.insert(given, at, np.nan),
+        np.insert(warm[starts], at, 0.0),
         np.insert(np.zeros(len(starts), dtype=bool), at, True),
         place + np.searchsorted(at, place, side="right"),
         before,
@@ -95,6 +99,7 @@ def padded(windows: Windows, length: int) -> Windows:
         longer(windows.force, 0.0),
         longer(windows.jolt, 0.0),
         longer(windows.speed, np.nan),
+        longer(windows.warm, 0.0),
         np.append(windows.gap, np.ones(more, dtype=bool)),
         windows.number,
         windows.before,
