@@ -9,9 +9,9 @@ import command
 import numpy as np
 import pytest
 from kickstand_tools.analysis.alignment_quality import Quality
-from kickstand_tools.analysis.channels import open_ride
 from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.report import angles
+from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.simulation.scripted import script
 
 

@@ -6,9 +6,10 @@ import analysis_rides
 import numpy as np
 import pytest
 from kickstand.lean import formula
-from kickstand_tools.analysis.channels import Channels, open_ride
+from kickstand_tools.analysis.channels import Channels
 from kickstand_tools.analysis.downsample import downsampled, joined
 from kickstand_tools.analysis.plot.envelope import envelope
+from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.summary import Summary
 from kickstand_tools.logs import reader
 from kickstand_tools.replay import replay_engine
@@ -166,3 +167,14 @@ def test_time_at_rest_is_none_of_the_ride():
     assert total.riding_s == pytest.approx(0.59)
     assert np.sum(total.histogram_s) == pytest.approx(0.59)
     assert total.duration_s == pytest.approx(0.99)
+
+
+def test_parts_are_joined_and_a_column_without_values_takes_no_memory(course):
+    first, second, third = (course.part(slice(a, a + 1000)) for a in (0, 1000, 2000))
+    first.temp_c = second.temp_c = third.temp_c = first.speed_mps = np.full(1000, np.nan)
+    whole = joined(iter([first, second, third]))
+    assert whole.temp_c.strides == (0,) and len(whole.temp_c) == 3000
+    assert np.all(np.isnan(whole.speed_mps[:1000])) and not np.all(np.isnan(whole.speed_mps[1000:]))
+    for field in fields(Channels):
+        parts = np.concatenate([getattr(part, field.name) for part in (first, second, third)])
+        assert np.array_equal(getattr(whole, field.name), parts, equal_nan=True), field.name

@@ -35,7 +35,7 @@ def shown(ride) -> np.ndarray:
 
 def export(ride, form, tmp_path, suffix="") -> Path:
     out = tmp_path / f"out.{form}{suffix}"
-    result = command.works("export", ride, "--to", form, "--out", out)
+    result = command.works("export", ride, "--live", "--to", form, "--out", out)
     assert result.out.startswith(f"written: {out}, ")
     return out
 

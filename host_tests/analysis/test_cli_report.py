@@ -10,9 +10,9 @@ import command
 import numpy as np
 import pytest
 from kickstand_tools.analysis import report
-from kickstand_tools.analysis.channels import open_ride
 from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.plot import charts, picture, plot
+from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.stops.brake_test import Stop
 from kickstand_tools.simulation.scripted import script
 

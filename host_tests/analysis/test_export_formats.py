@@ -13,9 +13,10 @@ import analysis_rides
 import command
 import numpy as np
 import pytest
-from kickstand_tools.analysis.channels import Channels, open_ride
+from kickstand_tools.analysis.channels import Channels
 from kickstand_tools.analysis.export import export_csv, export_racechrono, export_vbo
 from kickstand_tools.analysis.export.export import export
+from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.log import Log

@@ -7,9 +7,9 @@ import analysis_rides
 import numpy as np
 import pytest
 from kickstand_tools.analysis.alignment_quality import Quality
-from kickstand_tools.analysis.channels import open_ride
 from kickstand_tools.analysis.overview import Overview, overview
 from kickstand_tools.analysis.plot import charts, page, picture
+from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.simulation.scripted import script
 
 pytest.importorskip("matplotlib")

@@ -88,7 +88,7 @@ def test_results_can_be_sent(results):
 
 def test_brake_tests_of_a_car_without_the_lean_filter(fleet, results):
     made = fleet.vehicles[0]
-    from kickstand_tools.analysis.channels import vehicle_channels
+    from kickstand_tools.analysis.ride import vehicle_channels
     from kickstand_tools.analysis.stops.brake_test import find_stops
     from kickstand_tools.calibration.file import CalibrationFile
 

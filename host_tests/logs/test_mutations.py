@@ -11,10 +11,10 @@ import mutations
 import numpy as np
 import pytest
 from kickstand_tools.analysis import report
-from kickstand_tools.analysis.channels import open_ride
 from kickstand_tools.analysis.export.export import export
 from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.plot import traces
+from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.drive import fit_drive
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.calibration.poses import read_pose

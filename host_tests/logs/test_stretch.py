@@ -8,6 +8,7 @@ import analysis_rides
 import command
 import numpy as np
 import pytest
+from kickstand_tools import api
 from kickstand_tools.errors import InputError
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.reader import read_blocks, read_log, read_twice
@@ -109,18 +110,46 @@ def test_replay_report_and_plot_take_a_stretch(tmp_path):
     data = json.loads(command.works("report", ride, "--from", "18", "--to", "26", "--json").out)
     assert data["duration_s"] == 8.0
     assert data["stops"] == []
+    assert 18.0 <= data["max_right_deg"]["time_s"] <= 26.0  # the ride's own time
     pytest.importorskip("matplotlib")
     pytest.importorskip("plotly")
     command.works("plot", ride, "--to", "26", "--out", tmp_path / "pictures")
     assert (tmp_path / "pictures" / "RIDE.png").exists()
 
 
+@pytest.mark.parametrize("name", ["replay", "smooth", "export"])
+def test_the_lean_of_a_stretch_is_that_of_the_whole_ride_there(tmp_path, name):
+    """What was before tells where upright is, and what comes after too; begun anew it would be off, or not known."""
+    ride = analysis_rides.short(tmp_path, rate_hz=50)
+    whole, part = tmp_path / "whole.csv", tmp_path / "part.csv"
+    form = ("--to", "csv") if name == "export" else ()
+    command.works(name, ride, *form, "--out", whole)
+    if name == "export":
+        api.export(api.open_ride(Stretch(ride, 16.0, -4.0), smoothed=True), "csv", part)
+    else:
+        command.works(name, ride, "--from", "16", "--to", "-4", "--out", part)
+    lines = whole.read_text().splitlines()
+    times = [float(line.partition(",")[0]) for line in lines[1:]]
+    expected = [line for line, t_s in zip(lines[1:], times) if 16.0 <= t_s <= times[-1] - 4.0 + 1e-9]
+    assert part.read_text().splitlines()[1:] == expected
+
+
+def test_a_stretch_is_warned_of_another_mounts_calibration_as_the_ride_is(tmp_path):
+    ride = analysis_rides.short(tmp_path, speed_hz=1)
+    backward = tmp_path / "backward.json"
+    turned = [[-1, 0, 0], [0, 1, 0], [0, 0, -1]]
+    backward.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": turned}))
+    for given in (("replay", "--out", tmp_path / "lean.csv"), ("report",)):
+        said = command.works(given[0], ride, "--calibration", backward, "--from", "30", *given[1:])
+        assert "forward" in said.err, given
+
+
 def test_a_stretch_exported_keeps_its_time_of_day(tmp_path):
     """A log without a clock ends when it was written; a stretch of it ends earlier by what is left out."""
     import os
 
-    from kickstand_tools.analysis.channels import open_ride
     from kickstand_tools.analysis.export.export import export
+    from kickstand_tools.analysis.ride import open_ride
 
     ride = analysis_rides.short(tmp_path)  # 34 s
     os.utime(ride, (1_700_000_100, 1_700_000_100))

@@ -42,7 +42,7 @@ def test_a_potholes_lean_is_no_maximum_and_a_lean_that_is_not_trusted_neither(ri
             block.sure[at + 100 : at + 150] = 0.0
             yield block
 
-    monkeypatch.setattr(type(opened), "blocks", lambda self, progress=None, notices=None: changed())
+    monkeypatch.setattr(type(opened), "blocks", lambda self, progress=None, notices=None, mount=None: changed())
     seen = shown(opened)
     early = seen.t_s < 4.0
     assert seen.right_deg[early].max() < 5.0

@@ -16,7 +16,7 @@ import pytest
 import ride_writer
 from kickstand_tools.deploy import board_console, connection
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.rides import record
+from kickstand_tools.rides import stream
 from serial.tools import list_ports
 from watched import Watched, watched
 
@@ -157,14 +157,24 @@ def test_under_nohup_a_closed_terminal_is_not_heard(streaming, tmp_path):
     assert "the board says nothing any more" in result.err
 
 
-@pytest.mark.parametrize(("aligned", "words"), [(True, "lean "), (False, "not aligned")])
-def test_the_lean_is_shown_live_once_there_is_one(aligned, words, streaming, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("aligned", "still", "words"), [(True, True, "deg"), (True, False, "lean --"), (False, True, "not aligned")]
+)
+def test_the_lean_is_shown_live_once_it_is_known(aligned, still, words, streaming, tmp_path, monkeypatch):
     monkeypatch.setattr(ride_writer, "calibration", functools.partial(calibration, ride_writer.calibration(), aligned))
+    if still:
+        monkeypatch.setattr(ride_writer, "turns", at_rest)
     streaming(half_seconds(3)[0], "ctrl-c")
     shown = watched(monkeypatch, Watched(), "record", "--out", tmp_path / "ride.csv")
     assert words in shown
-    assert ("deg" in shown) is aligned
+    assert ("deg" in shown) is (aligned and still)
     assert "readings/s" in shown
+
+
+def at_rest(count, seed=0):
+    """As ride_writer.turns(), upright on a quiet stand."""
+    for i in range(count):
+        yield [2 * mean for mean in (-40, 83, 4096, 0, i % 2, 98, 0)], 2, 10_000
 
 
 def calibration(made, aligned, _trim_deg):
@@ -237,11 +247,21 @@ def test_a_computer_that_slept_is_told(streaming, tmp_path, monkeypatch):
     monkeypatch.setattr(board_console, "_AWAY_SILENT_S", 0.1)
     data, turns = half_seconds(3)
     streaming(data, "asleep")
-    monkeypatch.setattr(record, "_SILENT_S", 60.0)
+    monkeypatch.setattr(stream, "_SILENT_S", 60.0)
     result = command.works("record", "--out", tmp_path / "ride.csv")
     assert "this computer took nothing for 300 s: keep it awake: what came until then is kept" in result.err
     assert result.err.count("\n") == 1
     assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
+
+
+def test_after_a_new_alignment_the_log_ends_and_the_board_is_told(streaming, tmp_path):
+    data, turns = half_seconds(3)
+    board = streaming([*data, *ride_writer.blocks(2, trim_deg=1.0, length=lambda _: 512)[0]], "silence", b"")
+    result = command.works("record", "--out", tmp_path / "ride.csv")
+    assert result.err == "warning: the board's calibration has changed: the log ends here\n"
+    assert board.serial.written == b"\x03\x01"
+    assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
+    assert json.loads((tmp_path / "ride.cal.json").read_text())["trim_deg"] == 0.0
 
 
 def test_a_block_that_came_over_damaged_leaves_a_gap(streaming, tmp_path):

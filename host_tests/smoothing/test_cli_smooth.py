@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from command import refused, works
 from kickstand_tools.calibration.file import CalibrationFile, write_calibration
-from kickstand_tools.logs.reader import write_table
+from kickstand_tools.logs.csv_lines import write_table
 from smoothed_rides import simulated
 
 

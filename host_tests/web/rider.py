@@ -3,6 +3,8 @@
 import os
 from pathlib import Path
 
+import pytest
+
 READ_S = 30  # at most, until the display says something: a busy machine starts the page late
 
 # Keeps what the board's worker sends, for tests to look at and to repeat
@@ -94,6 +96,25 @@ class Rider:
         self.click("#do")  # hold it upright
         self.told("Press the button once more")
         self.click("#press")
+
+    def axe(self):
+        """What axe-core finds, in the light and in the dark: a line for each."""
+        axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+        told = []
+        for scheme in ("light", "dark"):
+            self.page.emulate_media(color_scheme=scheme)
+            for one in axe.run(self.page).response["violations"]:
+                told += [f"{one['id']}: {node['html']}: {node['failureSummary']}" for node in one["nodes"]]
+        return told
+
+    def fits(self):
+        """Is the page as wide as its window?"""
+        return self.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+
+    def strangers(self):
+        """The addresses beyond the site that it has asked for."""
+        home = "/".join(self.asked[0].split("/")[:3]) + "/"
+        return [url for url in self.asked if not url.startswith((home, f"blob:{home}", "data:"))]
 
     def slow(self, times):
         """Let the page's own thread have this part of the processor only."""

@@ -4,11 +4,18 @@ Emulated time passes only while the page listens.
 """
 
 import base64
+import json
+
+from raw_prompt import RawPrompt
 
 # Takes the place of navigator.serial. boardSays() and boardHears() are Python's.
 FAKE = """
+window.boardAnswersAtOnce = false;
+// An imagined board has started again at once
+const later = setTimeout;
+window.setTimeout = (done, ms, ...rest) => later(done, boardAnswersAtOnce && ms === 2000 ? 0 : ms, ...rest);
 const line = {
-  getInfo: () => ({}),
+  getInfo: () => ({ usbVendorId: boardAnswersAtOnce ? 1 : undefined }),
   setSignals: async () => {},
   async open() {
     let going = true;
@@ -36,22 +43,29 @@ Object.defineProperty(navigator, "serial", { value: { requestPort: async () => l
 
 
 class SerialLine:
-    """device: an emulator.pico.Pico.  cut_after: so many bytes to the board the cable is pulled; None for never."""
+    """rider: at a page that was given FAKE.  said: all that the board has said.  cut_after: so many bytes to the board
+    the cable is pulled; None for never."""
 
     STEP_S = 0.04  # of emulated time at most, until the page may speak again
 
-    def __init__(self, rider, device):
-        self._rider, self._device = rider, device
-        self._said = bytearray()
+    def __init__(self, rider):
+        self.rider = rider
+        rider.page.expose_function("boardSays", self._says)
+        rider.page.expose_function("boardHears", self._hears)
+
+    def plug_in(self, device):
+        """device: an emulator.pico.Pico, which is given time, or a RawPrompt."""
+        self.rider.page.evaluate(f"boardAnswersAtOnce = {json.dumps(isinstance(device, RawPrompt))}")
+        self._device = device
+        self._said, self.said = bytearray(), bytearray()
         self.connected = True
         self.sent = 0
         self.cut_after: int | None = None
         device.heard = self._hear
-        rider.page.expose_function("boardSays", self._says)
-        rider.page.expose_function("boardHears", self._hears)
 
     def _hear(self, data):
         self._said += data
+        self.said += data
         self._device.chip.stop()
 
     def _says(self):
@@ -71,10 +85,16 @@ class SerialLine:
             self._device.console.send(data)
         return self.connected
 
+    def look(self):
+        """Click, and what the page says of the board."""
+        self.rider.page.click("#look")
+        return self._said_by("#look")
+
     def install(self):
         """Click, and what the page says in the end."""
-        page = self._rider.page
-        self.connected, self.sent = True, 0
-        page.click("#install")
-        page.wait_for_function("!document.querySelector('#install').disabled", timeout=600_000)
-        return self._rider.text("#install-said")
+        self.rider.page.click("#install")
+        return self._said_by("#look")
+
+    def _said_by(self, button):
+        self.rider.page.wait_for_selector(f"{button}:enabled", timeout=600_000)
+        return self.rider.text("#install-said")

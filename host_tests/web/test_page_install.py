@@ -1,60 +1,176 @@
-"""The page puts the firmware onto an emulated Pico, with the code of `kickstand flash`."""
+"""The page puts the firmware and its config.py onto a board, with the code of `kickstand flash`."""
 
+import re
+import types
+
+import fake_board
 import pytest
 import serial_line
-from emulated import calibrated, firmware, leaning, pico, shown_lean
+from fake_board import FakeBoard
+from kickstand_tools.deploy import firmware_files
+from kickstand_tools.deploy.bytecode import PICO
+from raw_prompt import RawPrompt
 from rider import Rider
 from serial_line import SerialLine
 
-OTHER = "import sys\nclass Other: pass\nother = Other()\nsys.modules['sys'] = other\nother.platform = 'rp2'\n"
-OLD = "name, version, _machine, _mpy = 'micropython', (1, 22, 2), 'Raspberry Pi Pico with RP2040', 0\n"
-OLD = OTHER + "class Old:\n    " + OLD + "other.implementation = Old\n"
-STRANGE = OTHER + "other.implementation, other.platform = sys.implementation, 'stm32'\n"
+FIRMWARE = firmware_files.contents(PICO)
 
 
-@pytest.fixture
-def rider(chromium, address):
+@pytest.fixture(scope="module")
+def line(chromium, address):
+    """One page for all tests."""
     rider = Rider(chromium, address + "install.html")
     rider.page.add_init_script(serial_line.FAKE)
-    yield rider
+    rider.page.reload()
+    yield SerialLine(rider)
+    assert rider.errors == [] and rider.strangers() == []
     rider.context.close()
 
 
-def plugged_in(rider, device):
-    line = SerialLine(rider, device)
-    rider.page.reload()
-    device.run(0.5)
-    return line
+@pytest.fixture
+def board(tmp_path):
+    """A board that has all of the firmware but for what computes the lean, and what starts it: copying takes time."""
+    for path, data in FIRMWARE.items():
+        if not path.startswith("/kickstand/lean/") and path.count("/") > 1:
+            (tmp_path / path[1:]).parent.mkdir(parents=True, exist_ok=True)
+            (tmp_path / path[1:]).write_bytes(data)
+    return FakeBoard(tmp_path)
 
 
-@pytest.mark.long
-@pytest.mark.chip
-def test_an_update_over_a_cable_that_is_pulled_and_plugged_in_again(rider):
-    """The calibration stays, nothing starts in between, and in the end the board shows its lean."""
-    old = {path: b"old" if path == "/kickstand/lean/meter.mpy" else data for path, data in firmware().items()}
-    with pico(leaning(20.0), {**old, **calibrated(), "/kickstand/gone.mpy": b""}) as device:
-        line = plugged_in(rider, device)
-        line.cut_after = 5000
-        assert "connection lost" in line.install()
-        line.cut_after = None
-        device.power_cycle()
-        device.run(3.0)
-        assert not device.board.lcd.on  # without its main.py
-        said = line.install()
-        assert said.startswith("Done: Raspberry Pi Pico with RP2040, MicroPython 1.26.1.")
-        assert "as they were" in said and "config.py stays" in said
-        device.power_cycle()
-        assert device.run_until(lambda: shown_lean(device.lcd()) == 20.0, 30.0) is not None
-    assert rider.errors == []
+def choose(line, name, value):
+    line.rider.page.evaluate("document.querySelectorAll('#fields details').forEach((one) => (one.open = true))")
+    field = line.rider.page.locator(f"[name={name}]")
+    if field.evaluate("field => field.tagName") == "SELECT":
+        field.select_option(value)
+    else:
+        field.fill(value)
+        field.blur()
 
 
-@pytest.mark.chip
+def test_a_new_board_gets_the_firmware_and_its_settings(line, board):
+    """What is wrong is told beside the field, by the firmware's own rules, and nothing is copied until it is right."""
+    line.plug_in(RawPrompt(board))
+    assert line.look() == "Imagined Pico with RP2040, MicroPython 1.26.1 is there."
+    page = line.rider.page
+    assert page.get_attribute("[name=BUTTON_PIN]", "placeholder") == "15"
+    choose(line, "SIDE", '"right"')
+    choose(line, "BUTTON_PIN", "99")
+    assert "but it must be a number from 0 to 48" in line.rider.text("#fault-BUTTON_PIN")
+    assert line.rider.axe() == []
+    page.set_viewport_size({"width": 390, "height": 844})
+    assert line.rider.fits()
+    page.set_viewport_size({"width": 1280, "height": 720})
+    assert page.is_disabled("#install")
+    choose(line, "BUTTON_PIN", "5")
+    assert "a pin is used twice" in line.rider.text("#config")
+    choose(line, "BUTTON_PIN", "fifteen")
+    assert "fifteen is no value" in line.rider.text("#fault-BUTTON_PIN")
+    choose(line, "BUTTON_PIN", "14")
+    said = line.install()
+    assert said.startswith("Done: Imagined Pico with RP2040, MicroPython 1.26.1.")
+    on_it = fake_board.files(board.root)
+    config = on_it.pop("/config.py").decode()
+    assert [one.split("#")[0].strip() for one in config.splitlines() if one[:1].isupper()] == [
+        'SIDE = "right"',
+        "BUTTON_PIN = 14",
+    ]
+    assert on_it == {path: data for path, data in FIRMWARE.items() if path != "/config.py"}
+
+
+def test_what_a_rider_has_set_is_shown_and_stays(line, board):
+    board.path("config.py").write_text("SIDE = 'right'  # mine\nDLPF = 0x4\n")
+    line.plug_in(RawPrompt(board))
+    line.look()
+    page = line.rider.page
+    assert page.locator("[name=SIDE] option:checked").inner_text() == "right"
+    assert page.locator("[name=DLPF] option:checked").inner_text() == "4: 21 Hz"
+    choose(line, "RECORD", "True")
+    line.install()
+    assert board.path("config.py").read_text() == "SIDE = 'right'  # mine\nDLPF = 0x4\nRECORD = True\n"
+
+
+def test_each_board_has_usual_pins_of_its_own(line, board):
+    """After a Pico, by which the fields above were filled."""
+    other(board, _machine="Generic ESP32 module with ESP32")
+    board.modules["sys"].platform = "esp32"
+    line.plug_in(RawPrompt(board))
+    line.look()
+    assert line.rider.page.get_attribute("[name=BUTTON_PIN]", "placeholder") == "4"
+    choose(line, "BUTTON_PIN", "7")
+    assert "no pin of the chip" in line.rider.text("#fault-BUTTON_PIN")
+
+
+def test_a_config_that_is_more_than_settings_is_left_to_the_rider(line, board):
+    own = "import sys\nRECORD = sys.platform == 'rp2'\n"
+    board.path("config.py").write_text(own)
+    line.plug_in(RawPrompt(board))
+    line.look()
+    assert "own config.py, line 1 is no setting" in line.rider.text("#by-hand")
+    assert line.rider.page.is_hidden("#settings")
+    assert "Its own config.py stays" in line.install()
+    assert board.path("config.py").read_text() == own
+
+
+def test_a_cable_that_is_pulled_leaves_a_board_that_starts_nothing(line, board):
+    """And that can be installed anew."""
+    line.plug_in(RawPrompt(board))
+    line.look()
+    line.cut_after = 12_000
+    assert "connection lost" in line.install()
+    assert not board.path("main.py").exists()
+    line.plug_in(RawPrompt(board))
+    line.look()
+    assert "copied and verified" in line.install()
+    assert board.path("main.py").exists()
+
+
+def other(board, **differs):
+    implementation = vars(board.modules["sys"].implementation) | differs
+    board.modules["sys"].implementation = types.SimpleNamespace(**implementation)
+
+
 @pytest.mark.parametrize(
-    ("boot", "words"), [(OLD, "1.22.2: put MicroPython 1.23 or newer"), (STRANGE, "runs on a Raspberry Pi Pico")]
+    ("differs", "platform", "words"),
+    [
+        ({"version": (1, 22, 2)}, "rp2", "1.22.2: put MicroPython 1.23 or newer"),
+        ({"name": "circuitpython"}, "rp2", "this port runs circuitpython: put MicroPython on the board first"),
+        ({}, "stm32", "runs on a Raspberry Pi Pico"),
+    ],
 )
-def test_a_board_that_does_not_fit_is_left_alone(rider, boot, words):
-    with pico(files={"/boot.py": boot.encode()}) as device:
-        assert words in plugged_in(rider, device).install()
+def test_a_board_that_does_not_fit_is_left_alone(line, board, differs, platform, words):
+    other(board, **differs)
+    board.modules["sys"].platform = platform
+    line.plug_in(RawPrompt(board))
+    assert words in line.look()
+    assert line.rider.page.is_hidden("#config")
+    assert board.written == [] and board.resets == 1
+
+
+def test_what_is_no_image_for_an_esp32_is_not_written(line, board, tmp_path):
+    """Nor one for another chip: no chip answers here at all."""
+    page = line.rider.page
+    page.click("text=ESP32: a .bin file")
+    for name, content, words in (
+        ("notes.bin", b"hello", "no image for an ESP32"),
+        ("pico.uf2", b"UF2\n" * 200, "no image for an ESP32"),
+        ("esp32.bin", b"\xe9" + bytes(2000), "no ESP32 answers: hold its button BOOT"),
+    ):
+        (tmp_path / name).write_bytes(content)
+        line.plug_in(RawPrompt(board, deaf=True))
+        page.set_input_files("#image-file", tmp_path / name)
+        page.click("#image")
+        page.wait_for_function(
+            "words => document.querySelector('#image-said').textContent.includes(words)", arg=words, timeout=120_000
+        )
+    page.wait_for_selector("#image:enabled")
+
+
+def test_the_form_has_every_setting(line):
+    names = line.rider.page.evaluate(
+        "async () => (await import('./install/fields.mjs')).GROUPS.flatMap(([, , of]) => of.map(([name]) => name))"
+    )
+    text = firmware_files.firmware_files()["/config.py"].read_text()
+    assert sorted(names) == sorted(re.findall(r"(?m)^# ([A-Z_0-9]+) = ", text))
 
 
 def test_a_browser_without_serial_ports_says_so(chromium, address):

@@ -3,6 +3,7 @@
 import base64
 import gzip
 import json
+import zipfile
 from pathlib import Path
 
 import analysis_rides
@@ -10,9 +11,9 @@ import app_exports
 import numpy as np
 import pytest
 from command import works
-from kickstand_tools.analysis.channels import open_ride
 from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.plot import charts
+from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.web import rides_guest
 from rider import Rider
 from test_page_looks import LAPTOP, PHONE
@@ -178,6 +179,10 @@ def test_the_export_of_a_phone_becomes_a_log(page, tmp_path):
     told = json.loads(works("report", was, "--calibration", tmp_path / "phone.cal.json", "--json").out)
     shown = json.loads(page.saved("#save-json"))
     assert_near({**shown, "ride": ""}, {**told, "ride": ""})
+    with zipfile.ZipFile(path) as archive:
+        archive.extractall(tmp_path / "unpacked")
+    assert page.give(*(tmp_path / "unpacked").glob("*.csv"), tmp_path / "phone.cal.json") == ""
+    assert json.loads(page.saved("#save-json"))["samples"] == shown["samples"]
 
 
 def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):

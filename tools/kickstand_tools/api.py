@@ -15,9 +15,10 @@ InputError says in one line what is wrong with what was given. Its subclass Refu
 a refusal of the firmware's (kickstand.errors). sentence() puts a notice or a refusal into words.
 """
 
-from .analysis.channels import Channels, Ride, open_ride, vehicle_channels
+from .analysis.channels import Channels
 from .analysis.export.export import export
 from .analysis.overview import Overview, overview
+from .analysis.ride import Ride, open_ride, vehicle_channels
 from .analysis.stops.brake_test import Stop, find_stops
 from .analysis.summary import Summary, summary
 from .calibration.drive import DriveFit, fit_drive

@@ -8,8 +8,9 @@ import command
 import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY
-from kickstand_tools.analysis.channels import Channels, open_ride
+from kickstand_tools.analysis.channels import Channels
 from kickstand_tools.analysis.downsample import downsampled, joined
+from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.stops.brake_test import RATE_S, Stop, find_stops, mfdd_mps2
 from kickstand_tools.analysis.stops.speed_fit import speed_delay_s
 from kickstand_tools.analysis.stops.standstill import standing

@@ -12,20 +12,26 @@ _LAST = ("lat_deg", "lon_deg", "utc_s")
 
 
 def joined(parts: Iterable[Channels]) -> Channels:
-    """The parts of a ride, one after the other, as one. Of parts that are made one by one the memory holds but one."""
-    columns: list[Array] = []
+    """The parts of a ride, one after the other, as one. Of parts that are made one by one the memory holds but one, and
+    a column without any value takes none: it is read only."""
+    columns: list[Array | None] = [None for _ in fields(Channels)]
     length = 0
     for part in parts:
-        columns = columns or [np.zeros(0) for _ in fields(Channels)]
         end = length + len(part.t_s)
-        for column, field in zip(columns, fields(Channels)):
+        for k, field in enumerate(fields(Channels)):
+            values, column = getattr(part, field.name), columns[k]
+            if column is None:
+                if np.all(np.isnan(values)):
+                    continue
+                column = columns[k] = np.full(end, np.nan)
             if end > len(column):
-                column.resize(end + end // 8, refcheck=False)  # in place, where the system can; what is new is filled
-            column[length:end] = getattr(part, field.name)
+                column.resize(end + end // 8, refcheck=False)  # in place, where the system can; it fills what is new
+            column[length:end] = values
         length = end
     for column in columns:
-        column.resize(length, refcheck=False)
-    return Channels(*columns)
+        if column is not None:
+            column.resize(length, refcheck=False)
+    return Channels(*(np.broadcast_to(np.nan, length) if column is None else column for column in columns))
 
 
 def thinned(course: Channels, step_s: float) -> Channels:

@@ -1,23 +1,29 @@
 """One pass over a ride: all that its report and its pictures show."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+import numpy as np
 from kickstand.errors import Notice
 
 from ..logs.source import Progress
+from ..logs.stretch import Stretch
 from ..replay.mount_check import MountCheck
 from .alignment_quality import Quality, quality
-from .channels import Channels, Ride
+from .channels import Channels
 from .downsample import downsampled, joined
+from .ride import Ride
 from .stops.brake_test import RATE_S, Stop, find_stops
 from .stops.standstill import standing
 from .summary import Summary
 
+_NOT_KEPT = ("lean_formula_deg", "temp_c", "shown_g", "lean_sigma_deg", "utc_s")  # a quarter of a long ride's memory
+
 
 @dataclass
 class Overview:
-    """A ride: the summary of every sample, and its course in means over RATE_S.
+    """A ride: the summary of every sample, and its course in means over RATE_S, in which the columns that neither
+    report nor pictures need are NaN (vehicle_channels() has them).
 
     speed_correlation: between the forward force and the changes of the speed, 1 if forward is right, -1 if it is
     backward, None if the ride does not tell. exchanged: said where forward is backward; stops is then empty. notices:
@@ -55,13 +61,14 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     notices: list[Notice] = []
 
     def blocks() -> Iterator[Channels]:
-        for block in ride.blocks(progress, notices):
+        for block in ride.blocks(progress, notices, mount):
             total.add(block)
-            mount.add(block.t_s, block.force_g, block.rate_dps, block.speed_mps)
-            yield block
+            yield replace(block, **dict.fromkeys(_NOT_KEPT, np.full(len(block.t_s), np.nan)))
 
     course = joined(downsampled(blocks(), RATE_S))
-    total.frozen_s = sum(float(notice.values[1]) for notice in notices if notice.code == "frozen-readings")
+    frozen_s = sum(float(notice.values[1]) for notice in notices if notice.code == "frozen-readings")
+    # Of a stretch the notice tells more than its own.
+    total.frozen_s = min(frozen_s, total.missing_s) if isinstance(ride.log, Stretch) else frozen_s
     found = quality(course, standing(course))
     contradiction = mount.notice(found.roll_deg)
     exchanged = contradiction if contradiction and contradiction.code == "forward-exchanged" else None

@@ -53,18 +53,20 @@ class Summary:
     not_sure_s: float = 0.0
     missing_s: float = 0.0
     frozen_s: float = 0.0
+    _begin_s: float = 0.0
     _last_t_s: Array = field(default_factory=lambda: np.zeros(0))  # of the block before, as far as it is needed
     _last_deg: Array = field(default_factory=lambda: np.zeros(0))
 
     def add(self, block: Channels) -> None:
         """The next part of the ride."""
         t = block.t_s
-        step = np.diff(t, prepend=self.duration_s if self.samples else t[0])
+        self._begin_s = t[0] if not self.samples else self._begin_s
+        step = np.diff(t, prepend=self._begin_s + self.duration_s)
         longest_s = max(LOST_US / 1e6, 4.0 * float(np.median(step)))  # of a slow log that is whole
         self.missing_s += float(np.sum(step[step > longest_s]))
         step = np.where(step * 1e6 > GAP_US, 0.0, step)  # readings were missing
         self.samples += len(t)
-        self.duration_s = float(t[-1])
+        self.duration_s = float(t[-1] - self._begin_s)
         sure = block.trusted
         lean = np.where(sure, block.lean_deg, np.nan)
         forward = np.where(sure, block.shown_g, np.nan)

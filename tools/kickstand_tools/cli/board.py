@@ -12,7 +12,7 @@ from .. import firmware_path
 if TYPE_CHECKING:
     from ..deploy.connection import Progress
     from ..rides.pull import PulledRide
-    from ..rides.record import LiveReading
+    from ..rides.stream import LiveReading
 
 _PATH = click.Path(path_type=Path)
 _PORT = click.option(
@@ -117,8 +117,8 @@ def _live_text(reading: "LiveReading") -> str:
     """The lean as a bar to the left or right, and how long the recording is."""
     how_long = f"{reading.rate_hz:3.0f} readings/s  {reading.seconds // 60:.0f}:{reading.seconds % 60:04.1f}"
     lean = reading.lean_deg
-    if lean is None:
-        return f"not aligned  {how_long}"
+    if lean is None:  # as on the display, a lean that is not certain enough is not shown
+        return f"{'lean --' if reading.aligned else 'not aligned'}  {how_long}"
     bar = "#" * min(20, round(abs(lean) / 3))
     picture = f"{bar if lean < 0 else '':>20}|{bar if lean > 0 else '':<20}"
     return f"{picture} lean {lean:+5.1f} deg  forward {reading.forward_g:+.2f} g  {how_long}"

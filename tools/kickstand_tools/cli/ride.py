@@ -102,8 +102,8 @@ def export(ride: Path, form: str, calibration: Path | None, live: bool, out: Pat
 
     The log's axes and rates have to be right-handed, and the axis that points up has to read +1 g at rest.
     """
-    from ..analysis.channels import open_ride
     from ..analysis.export.export import export
+    from ..analysis.ride import open_ride
     from ..calibration.file import calibration_beside
     from ..output import check_output
     from ..progress import Bar
@@ -134,9 +134,9 @@ def report(
     """
     from rich.console import Console
 
-    from ..analysis.channels import open_ride
     from ..analysis.overview import overview
     from ..analysis.report import as_data, page
+    from ..analysis.ride import open_ride
     from ..progress import Bar
 
     with Bar("reading") as bar:
@@ -170,9 +170,9 @@ def plot(
 
     The log's axes and rates have to be right-handed, and the axis that points up has to read +1 g at rest.
     """
-    from ..analysis.channels import open_ride
     from ..analysis.overview import overview
     from ..analysis.plot import plot
+    from ..analysis.ride import open_ride
     from ..progress import Bar
 
     plot.check(out)

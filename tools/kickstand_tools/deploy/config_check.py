@@ -14,11 +14,16 @@ import subprocess
 import sys
 import traceback
 import types
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from .. import firmware_path
 from ..simulated_board.simulator import Board
+
+if TYPE_CHECKING:
+    from kickstand.settings import Settings
 
 
 @dataclass(frozen=True)
@@ -44,7 +49,7 @@ def judge(path: Path, port: str, machine: str) -> Judged:
 
 
 def in_words(path: Path, fault: tuple[int | None, str] | None, unused: list[tuple[int, str]]) -> Judged:
-    """What posing() has found."""
+    """What fault() and unused() have found."""
     said = None
     if fault:
         line, reason = fault
@@ -52,8 +57,8 @@ def in_words(path: Path, fault: tuple[int | None, str] | None, unused: list[tupl
     return Judged(said, [f"{path}, line {line}: {text}" for line, text in unused])
 
 
-def _fault(path: Path, port: str) -> tuple[int | None, str] | None:
-    """Line and reason of the first fault, or None."""
+def fault(path: Path) -> tuple[int | None, str] | None:
+    """Line and reason of the first fault, or None; while posed()."""
     from kickstand.console import sentence
     from kickstand.errors import SettingsError
     from kickstand.settings import Settings
@@ -75,18 +80,24 @@ def _fault(path: Path, port: str) -> tuple[int | None, str] | None:
     return None
 
 
-def _unused(path: Path, port: str) -> list[tuple[int, str]]:
-    """Lines "# NAME = value" whose value is not the default: the '#' was forgotten there."""
+def usual() -> "Settings":
+    """The defaults, while posed(). Pins are None on a board without usual ones."""
     from kickstand.errors import SettingsError
     from kickstand.settings import Settings
 
     try:
-        defaults = Settings(None)
-    except SettingsError as error:  # a board without usual pins
-        defaults = error.settings
+        return Settings(None)
+    except SettingsError as error:
+        settings: Any = error.settings
+        return settings
+
+
+def unused(path: Path, port: str) -> list[tuple[int, str]]:
+    """Lines "# NAME = value" whose value is not the default: the '#' was forgotten there; while posed()."""
+    defaults = usual()
     found = []
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
-        match = re.match(r"#\s*([A-Z_]+) = (.*)", line)
+        match = re.match(r"#\s*([A-Z_0-9]+) = (.*)", line)
         if not match or (port != "rp2" and re.search(r"# \(\d+\)", line)):  # its default depends on the board
             continue
         name, value = match[1], match[2].split("#")[0].strip()
@@ -103,17 +114,20 @@ def _line_of(name: str, source: bytes) -> int | None:
     return max((node.lineno for node in named if node.id == name), default=None)
 
 
-def posing(
-    path: Path, port: str, machine: str
-) -> tuple[tuple[int | None, str] | None, list[tuple[int, str]]]:
-    """(fault: None or (line, reason), unused: (line, text) each). This process poses as the board from then on, and
-    cannot judge for another."""
-    Board(lambda t_s: (0, 0, 1, 0, 0, 0), port="esp32" if port == "esp32" else "rp2").install()  # for machine
-    sys.platform = port
+@contextlib.contextmanager
+def posed(port: str, machine: str) -> Iterator[None]:
+    """This process poses as the board meanwhile. It cannot pose as another later: settings.py is imported once."""
+    before = sys.platform
     vars(sys.implementation)["_machine"] = machine
-    unused = _unused(path, port)
-    return _fault(path, port), unused
+    with Board(lambda t_s: (0, 0, 1, 0, 0, 0), port="esp32" if port == "esp32" else "rp2"):  # for machine
+        sys.platform = port
+        try:
+            yield
+        finally:
+            sys.platform = before
 
 
 if __name__ == "__main__":
-    print("\n" + json.dumps(posing(Path(sys.argv[3]), sys.argv[1], sys.argv[2])))
+    with posed(sys.argv[1], sys.argv[2]):
+        judged = fault(Path(sys.argv[3])), unused(Path(sys.argv[3]), sys.argv[1])
+    print("\n" + json.dumps(judged))

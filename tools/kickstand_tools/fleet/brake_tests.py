@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from ..analysis.channels import Channels, Ride, channels
+from ..analysis.channels import Channels, channels
 from ..analysis.downsample import downsampled, joined
+from ..analysis.ride import Ride
 from ..analysis.stops.brake_test import RATE_S, Stop, find_stops
 from ..calibration.file import CalibrationFile
 from ..logs.reader import Source, read_blocks

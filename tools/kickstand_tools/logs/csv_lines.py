@@ -4,6 +4,7 @@ The texts are those of Python's own formatting, made of a column at once instead
 its time: formatting was a third of the work on a long ride.
 """
 
+import csv
 import gzip
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -112,3 +113,16 @@ def write_log(path: Path | str, log: Log) -> None:
     digits = [_DIGITS.get(name, 6) for name in names]
     table = np.column_stack([values[name] for name in names])
     write_lines(Path(path), names, csv_lines(table, digits))
+
+
+def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
+    """Write a CSV file, gzipped if its name ends in .gz, whole or not at all."""
+
+    def write(temporary: Path) -> None:
+        opened = gzip.open if path.suffix == ".gz" else open
+        with opened(temporary, "wt", encoding="ascii", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(columns)
+            writer.writerows(rows)
+
+    write_whole(path, write)

@@ -1,10 +1,9 @@
 """Recorded logs: CSV with the columns of COLUMNS, plain or gzipped, read block by block."""
 
-import csv
-import gzip
 import io
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,6 @@ from kickstand.errors import Notice
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..output import write_whole
 from . import cells
 from .axes.bends import Bends
 from .axes.course import Course
@@ -115,8 +113,28 @@ def check_first_line(log: Path) -> None:
 def read_twice(source: Source) -> Source:
     """The same where it can be read again, else a Log: an open file can be read once."""
     if isinstance(source, Stretch):
-        return Stretch(_again(source.source), source.from_s, source.to_s)
+        return replace(source, source=_again(source.source))
     return _again(source)
+
+
+def apart(source: Source) -> tuple[File | Log, Stretch | None]:
+    """The whole log, and the stretch of it that is wanted, with times from the log's beginning; None: all of it.
+
+    Raises InputError where the stretch holds no sample.
+    """
+    if not isinstance(source, Stretch):
+        return source, None
+    stretch = _from_beginning(replace(source, source=_again(source.source)))
+    next(stretch.cut(_unchecked(stretch.source, [])))
+    return stretch.source, stretch
+
+
+def _from_beginning(stretch: Stretch) -> Stretch:
+    if not stretch.from_its_end:
+        return stretch
+    whole = _again(stretch.source)
+    last_s = [float(block.t_s[-1]) for block in _unchecked(whole, [])]
+    return Stretch(whole, stretch.from_s, stretch.to_s).of_length(max(last_s, default=0.0))
 
 
 def _again(source: File | Log) -> File | Log:
@@ -129,11 +147,8 @@ def _unchecked(source: Source, remarks: list[Notice]) -> Iterator[Block]:
         return _blocks_of(source)
     if not isinstance(source, Stretch):
         return _parsed(source, name_of(source), remarks)
-    if source.from_its_end:
-        whole = _again(source.source)
-        last_s = [float(block.t_s[-1]) for block in _unchecked(whole, [])]
-        source = Stretch(whole, source.from_s, source.to_s).of_length(max(last_s, default=0.0))
-    return source.cut(_unchecked(source.source, remarks))
+    stretch = _from_beginning(source)
+    return stretch.cut(_unchecked(stretch.source, remarks))
 
 
 def _blocks_of(log: Log) -> Iterator[Block]:
@@ -185,19 +200,6 @@ def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], rema
         start_us = int(time_us[0]) if start_us is None else start_us
         last_us = int(time_us[-1])
         yield _block(table, time_us - start_us, places, start_us / 1e6, rows, names, done)
-
-
-def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Write a CSV file, gzipped if its name ends in .gz, whole or not at all."""
-
-    def write(temporary: Path) -> None:
-        opened = gzip.open if path.suffix == ".gz" else open
-        with opened(temporary, "wt", encoding="ascii", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(columns)
-            writer.writerows(rows)
-
-    write_whole(path, write)
 
 
 def _numbers(

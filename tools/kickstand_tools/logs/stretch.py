@@ -3,6 +3,9 @@
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ..errors import InputError
 from .block import Block
 from .log import Log
@@ -13,7 +16,8 @@ from .source import File, name_of
 class Stretch:
     """From from_s to to_s of a log, seconds since its first sample; negative: before its last one. None: its end there.
 
-    It can be given wherever a log can. Its times count from its own first sample.
+    It can be given wherever a log can. Read as a log its times count from its own first sample. What finds the lean
+    works on the whole log, because the lean depends on what was before, and gives the stretch in the log's own times.
 
     >>> import numpy as np
     >>> from kickstand_tools.api import Log, read_log
@@ -41,6 +45,12 @@ class Stretch:
         times = [None if t is None else t if t >= 0.0 else length_s + t for t in (self.from_s, self.to_s)]
         return Stretch(self.source, *times)
 
+    def holds(self, block: Block) -> NDArray[np.bool_]:
+        """(n) which samples of a block of the whole log lie in it. Its times are from the beginning."""
+        begin_us = round(1e6 * (self.from_s or 0.0))
+        end_us = float("inf") if self.to_s is None else round(1e6 * self.to_s)
+        return (block.time_us >= begin_us) & (block.time_us <= end_us)
+
     def cut(self, blocks: Iterator[Block]) -> Iterator[Block]:
         """The blocks of the whole log, cut. Raises InputError where nothing is left."""
         begin_us = round(1e6 * (self.from_s or 0.0))
@@ -52,7 +62,7 @@ class Stretch:
             length_s = float(block.t_s[-1])
             if block.time_us[0] > end_us:
                 break
-            within = (block.time_us >= begin_us) & (block.time_us <= end_us)
+            within = self.holds(block)
             if not within.any():
                 continue
             part = block if within.all() else block.part(within)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from kickstand.errors import Notice
 
-from ..analysis.channels import open_ride
+from ..analysis.ride import open_ride
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
 from ..joining.motion import motion

@@ -6,7 +6,7 @@ import numpy as np
 from kickstand.errors import Notice
 from numpy.typing import NDArray
 
-from ..analysis.channels import Ride
+from ..analysis.ride import Ride
 from ..analysis.signals import smoothed
 from ..analysis.summary import HELD_S
 from ..logs.source import Progress
@@ -67,8 +67,7 @@ def shown(ride: Ride, progress: Progress | None = None, notices: list[Notice] | 
     """
     columns: list[NDArray[np.float64]] = []
     mount = MountCheck(ride.calibration)
-    for block in ride.blocks(progress, notices):
-        mount.add(block.t_s, block.force_g, block.rate_dps, block.speed_mps)
+    for block in ride.blocks(progress, notices, mount):
         lean = np.where(block.trusted, block.lean_deg, np.nan)
         columns.append(np.array([block.t_s, lean, block.forward_g, block.lateral_g, block.speed_mps]))
     contradiction = mount.notice()

@@ -38,10 +38,10 @@ class MeterAlong:
         steps_us, self._last_us = np.diff(block.time_us, prepend=first_us), int(block.time_us[-1])
         # Tuples that live for a sample: of lists of lists Python's garbage collector would keep account.
         forces, rates = (zip(*(axis.tolist() for axis in vector)) for vector in (force, rate))
-        for meter.force, meter.rate, step_us, speed in zip(forces, rates, steps_us.tolist(), block.speed_mps.tolist()):
+        for forces_g, rates_radps, step_us, speed in zip(forces, rates, steps_us.tolist(), block.speed_mps.tolist()):
             if speed >= 0.0:  # NaN is not
                 meter.measure_speed(speed)
-            meter.follow(step_us)
+            meter.follow(forces_g, rates_radps, step_us)
             yield meter
 
     def columns(self, block: Block) -> Array:

@@ -16,7 +16,7 @@ from ..calibration.file import CalibrationFile
 from ..errors import InputError
 from ..logs.block import Block
 from ..logs.csv_lines import joined_cells, number_cells, text_cells, write_lines
-from ..logs.reader import Source, read_blocks, read_twice
+from ..logs.reader import Source, apart, read_blocks, read_twice
 from ..logs.source import Progress, total_bytes
 from ..logs.table import Array, Table
 from . import replay_engine, second_process
@@ -107,10 +107,15 @@ def replay_blocks(
     """Each block of the log with the engine's results for it (n, COLUMNS), NaN where the readings froze: there the
     engine is told of a gap. notices is appended to at the end."""
     mount = MountCheck(calibration)
-    for block, results in _RUN[engine](log, calibration, progress, notices):
+    whole, stretch = apart(log)
+    for block, results in _RUN[engine](whole, calibration, progress, notices):
         believed = block.believed
         mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
-        yield block, _with_frozen(block, results)
+        found = _with_frozen(block, results)
+        if stretch is None:
+            yield block, found
+        elif (which := stretch.holds(block)).any():
+            yield block.part(which), found[which]
     contradiction = mount.notice()
     notices += [contradiction] if contradiction else []
 

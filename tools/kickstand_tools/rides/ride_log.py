@@ -7,7 +7,7 @@ import numpy as np
 
 from ..calibration.file import CalibrationFile, calibration_path, write_calibration
 from ..logs.cells import COLUMNS, TRACK
-from ..logs.reader import write_table
+from ..logs.csv_lines import write_table
 from .block_reader import Block, Turn
 
 

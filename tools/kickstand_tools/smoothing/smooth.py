@@ -11,7 +11,8 @@ from kickstand.errors import Notice
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
 from ..logs.block import Block
-from ..logs.reader import Source, read_blocks, write_table
+from ..logs.csv_lines import write_table
+from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import Progress, name_of
 from ..logs.table import Array, Table
 from ..replay.mount_check import MountCheck
@@ -86,12 +87,16 @@ def _checked_blocks(
 ) -> Iterator[tuple[Block, Array]]:
     """smooth_blocks(), and what contradicts the calibration."""
     mount = MountCheck(calibration)
-    for block, found in smooth_blocks(log, calibration, progress, notices):
+    whole, stretch = apart(log)
+    for block, found in smooth_blocks(whole, calibration, progress, notices):
         if found is None:
             raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples a second: too few to look back over")
         believed = block.believed
         mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
-        yield block, found
+        if stretch is None:
+            yield block, found
+        elif (which := stretch.holds(block)).any():
+            yield block.part(which), found[which]
     contradiction = mount.notice()
     notices += [contradiction] if contradiction else []
 

@@ -1,5 +1,6 @@
-"""`kickstand web`: a page in which the firmware runs on the simulated board, and from which it is put onto a real one.
+"""`kickstand web`: pages in which the firmware runs on the simulated board, from which it is put onto a real one, which
+watch and fetch what a board records, and which look at a ride.
 
-page/ is what the browser gets of ours. device.py runs in it on MicroPython, install_guest.py on CPython; npm/ names
-both packages. The other modules put the site together and serve it.
+page/ is what the browser gets of ours. device.py runs in it on MicroPython, the modules *_guest.py on CPython; npm/
+names both packages and what else is fetched. The other modules put the site together and serve it.
 """

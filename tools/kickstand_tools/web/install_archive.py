@@ -1,5 +1,6 @@
-"""What install_guest.py needs to put the firmware onto a board: the tools that `kickstand flash` consists of, mpremote,
-and the firmware, as sources and compiled for every machine code of a board."""
+"""What install_guest.py and cable_guest.py need to speak to a board: the tools that `kickstand flash`, `record` and
+`pull` consist of, mpremote, and the firmware, as sources and compiled for every machine code of a board.
+"""
 
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -13,8 +14,11 @@ from .zipped import zipped
 
 # Of Pico; of Pico 2; of ESP32-C3, C6 and H2 and of a Pico 2's other processor; of all other ESP32
 ARCHITECTURES = ("armv6m", "armv7emsp", "rv32imc", "xtensawin")
-_FLASH = ("__init__.py", "deploy", "errors.py", "firmware_path.py", "simulated_board")
-_TOOLS = (*_FLASH, "web/__init__.py", "web/install_guest.py")
+_TOOLS = (
+    *("__init__.py", "deploy", "errors.py", "firmware_path.py", "simulated_board"),
+    *("calibration/__init__.py", "calibration/file.py", "logs", "output.py", "refusals.py", "replay", "rides"),
+    *("web/__init__.py", "web/cable_guest.py", "web/install_guest.py", "web/serial_guest.py"),
+)
 _MPREMOTE = ("__init__.py", "mp_errno.py", "transport.py", "transport_serial.py")
 
 

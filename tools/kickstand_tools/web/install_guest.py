@@ -1,145 +1,145 @@
-"""`kickstand flash` in the browser: its own code on CPython for WebAssembly, with the browser's serial port in place of
-pyserial's. page/install.mjs runs it, in a fresh Python for each board. While it waits the page has the control.
+"""`kickstand flash` in the browser: its own code on CPython for WebAssembly. page/install/install.mjs runs it. What
+goes to it is JSON.
 """
 
 import json
+import re
 import sys
-import time
-import types
 from pathlib import Path
 
-from pyodide.ffi import run_sync  # waits for what JavaScript promises
+from .serial_guest import ROOT, take_place_of_pyserial
 
-ROOT = Path("/kickstand")  # where install_archive.archive() is unpacked
 OLDEST = (1, 23)  # MicroPython
 PLATFORMS = ("rp2", "esp32")
 COMMON = "armv6m"  # the first of install_archive.ARCHITECTURES
-_POLL_S = 0.002
-_GONE = "nothing comes any more"
-_POSE = "(lambda s: (tuple(s.implementation.version[:2]), s.platform))(__import__('sys'))"
+_VERSION = "(lambda s: (tuple(s.implementation.version[:2]), s.platform))(__import__('sys'))"
+_POSE = "(lambda s: (s.platform, getattr(s.implementation, '_machine', '')))(__import__('sys'))"
 
 
-class Port:
-    """pyserial's Serial, as much of it as mpremote uses. port: the SerialLine of install.mjs."""
+class Installation:
+    """One board: first look(), then install(). check() at any time in between."""
 
-    dtr = rts = True
+    def look(self, line, name):
+        """What the board at a SerialLine is, and what its config.py sets. name: of its port, for messages. The board is
+        restarted.
 
-    def __init__(self, port, timeout):
-        self._port = port
-        self._timeout = timeout
-        self._heard = bytearray()
+        Returns {"refused": why} or {"board", "settings": {name: its value in config.py}, "usual": {name: the value that
+        is taken without one}, "by_hand": why a form cannot change this config.py, or null}.
+        """
+        take_place_of_pyserial(line)
+        from ..deploy import config_check, config_text, connection
+        from ..deploy.firmware_files import CONFIG
+        from ..errors import InputError
 
-    def isOpen(self):
-        return True
+        try:
+            with connection.connected(name) as (transport, name):
+                try:
+                    board = _describe(transport, name)
+                    self._pose = transport.eval(_POSE)
+                    there = transport.fs_exists(CONFIG)
+                    self._own = bytes(transport.fs_readfile(CONFIG)).decode(errors="replace") if there else None
+                finally:
+                    connection.restart(transport)
+        except InputError as error:
+            return json.dumps({"refused": str(error)})
+        self._path = _config()
+        self._template = self._path.read_text(encoding="utf-8")
+        for module in [module for module in sys.modules if module.startswith("kickstand.")]:
+            del sys.modules[module]  # of a board before: the firmware asks what it runs on as it is imported
+        settings, self._by_hand = {}, None
+        try:
+            settings = config_text.values(self._own or "")
+        except InputError as error:
+            self._by_hand = str(error)
+        with config_check.posed(*self._pose):
+            usual = {name: _written(value) for name, value in vars(config_check.usual()).items() if name.isupper()}
+        told = {"board": board, "settings": settings, "usual": usual, "by_hand": self._by_hand}
+        return json.dumps(told)
 
-    def inWaiting(self):
-        if not self._heard:
-            self._listen()
-        return len(self._heard)
+    def check(self, wanted):
+        """The config.py with these settings, {name: value or null for the usual one}, by the firmware's own rules.
 
-    def read(self, size=1):
-        """`size` bytes, or fewer at the time-out."""
-        until_s = time.monotonic() + self._timeout
-        while len(self._heard) < size and time.monotonic() < until_s:
-            self._listen()
-            if len(self._heard) < size:
-                _sleep(self._port, _POLL_S)
-        data = bytes(self._heard[:size])
-        del self._heard[:size]
-        return data
+        Returns {"text", "fault": [name of the setting or null, what is wrong] or null}.
+        """
+        from ..deploy import config_check, config_text
+        from ..errors import InputError
 
-    def _listen(self):
-        self._heard += self._port.take().to_py()
-        if self._port.lost and not self._heard:
-            raise OSError(5, _GONE)
+        text = self._template if self._own is None else self._own
+        values = json.loads(wanted)
+        for name, value in values.items():  # one by one, so that a fault can be put beside its field
+            try:
+                text = config_text.with_values(text, {name: value})
+            except InputError as error:
+                return json.dumps({"text": text, "fault": [name, str(error)]})
+        self._path.write_text(text, encoding="utf-8")
+        with config_check.posed(*self._pose):
+            found = config_check.fault(self._path)
+        if found:
+            line, reason = found
+            setting = line and re.match(r"\w+", text.splitlines()[line - 1])
+            mentioned = next((name for name in values if re.search(rf"\b{name}\b", reason)), None)
+            found = [setting[0] if setting else mentioned, reason.partition(": correct it")[0]]
+        return json.dumps({"text": text, "fault": found})
 
-    def write(self, data):
-        if not run_sync(self._port.send(bytes(data))):
-            raise OSError(5, _GONE)
-        return len(data)
+    def install(self, line, name, wanted, tell):
+        """Put the firmware onto the board at a SerialLine, with the settings that check() has found right; a config.py
+        that a form cannot change stays. tell(what, done, total): the progress, bytes.
 
-    def close(self):
-        run_sync(self._port.close())
+        Returns {"board", "copied": how many files, "kept": likewise, "config_kept"} or {"refused": why}.
+        """
+        take_place_of_pyserial(line)
+        from ..deploy import bytecode, config_check, flash
+        from ..deploy.firmware_files import CONFIG
+        from ..errors import InputError
 
+        def judged(path, platform, machine):
+            with config_check.posed(platform, machine):
+                return config_check.in_words(path, config_check.fault(path), config_check.unused(path, platform))
 
-def install(port, name, side, tell):
-    """Put the firmware onto the board at a SerialLine. name: of its port, for messages. side: which way its kickstand
-    leans the bike, for a board that has no config.py. tell(what, done, total): the progress, bytes.
-
-    Returns JSON: {"board", "copied": how many files, "kept": likewise, "config_kept"} or {"refused": why}.
-    """
-    _take_place_of_pyserial(port)
-    from mpremote import transport_serial
-
-    from kickstand_tools import firmware_path
-    from kickstand_tools.deploy import bytecode, config_check, connection, flash
-    from kickstand_tools.deploy.firmware_files import CONFIG
-    from kickstand_tools.errors import InputError
-
-    def described(transport, name):
-        """connection.describe(), and a look at whether the board is one that Kickstand runs on."""
-        text = connection.describe(transport, name)
-        version, platform = transport.eval(_POSE)
-        if version < OLDEST:
-            raise InputError(f"{text}: put MicroPython {OLDEST[0]}.{OLDEST[1]} or newer on the board first")
-        if platform not in PLATFORMS:
-            raise InputError(f"{text}: Kickstand runs on a Raspberry Pi Pico and on an ESP32")
-        return text
-
-    def compiled(source, architecture):
-        """bytecode.cross_compiled() from the archive. All but machine code is the same for every board."""
-        folders = ROOT / "compiled" / architecture, ROOT / "compiled" / COMMON
-        path = source.relative_to(firmware_path.PACKAGE).with_suffix(".mpy")
-        if not folders[0].is_dir():
-            raise bytecode.CannotCompile("this page has nothing compiled for this board")
-        return next(folder / path for folder in folders if (folder / path).is_file()).read_bytes()
-
-    def judged(path, platform, machine):
-        before = sys.platform
-        found = config_check.in_words(path, *config_check.posing(path, platform, machine))
-        sys.platform = before
-        return found
-
-    for module in (transport_serial, connection):  # CPython's own sleep() would stop the whole page
-        module.time = types.SimpleNamespace(monotonic=time.monotonic, time=time.time, sleep=lambda s: _sleep(port, s))
-    flash.describe, bytecode.cross_compiled, config_check.judge = described, compiled, judged
-    if side == "right":
-        _choose_right(firmware_path.config())
-    try:
-        done = flash.flash(name, progress=tell)
-    except InputError as error:
-        return json.dumps({"refused": str(error)})
-    installed = done.installed
-    return json.dumps(
-        {
-            "board": done.board,
-            "copied": len(installed.copied),
-            "kept": len(installed.kept),
-            "config_kept": CONFIG not in installed.copied,
-        }
-    )
+        flash.describe, bytecode.cross_compiled, config_check.judge = _describe, _compiled, judged
+        self._path.write_text(self._template, encoding="utf-8")
+        text = None if self._by_hand else json.loads(self.check(wanted))["text"]
+        try:
+            done = flash.flash(name, replace_config=text is not None and text != self._own, progress=tell)
+        except InputError as error:
+            return json.dumps({"refused": str(error)})
+        installed = done.installed
+        told = {"board": done.board, "copied": len(installed.copied), "kept": len(installed.kept)}
+        return json.dumps(told | {"config_kept": CONFIG not in installed.copied})
 
 
-def _take_place_of_pyserial(port):
-    """Modules for mpremote to import: it opens serial ports, and asks for a console's properties."""
-    names = "serial", "serial.tools", "serial.tools.list_ports"
-    serial, tools, list_ports = (types.ModuleType(name) for name in names)
-    serial.__version__ = "3.5"
-    serial.SerialException = OSError
-    serial.serial_for_url = lambda _name, timeout, **_options: Port(port, timeout)
-    serial.tools, tools.list_ports = tools, list_ports
-    console = types.ModuleType("mpremote.console")
-    console.VT_ENABLED = False
-    for module in (serial, tools, list_ports, console):
-        sys.modules[module.__name__] = module
-    sys.path[:0] = [str(ROOT / "tools"), str(ROOT / "firmware"), str(ROOT)]
+def _describe(transport, name):
+    """connection.describe(), and a look at whether the board is one that Kickstand runs on."""
+    from ..deploy import connection
+    from ..errors import InputError
+
+    text = connection.describe(transport, name)
+    version, platform = transport.eval(_VERSION)
+    if version < OLDEST:
+        raise InputError(f"{text}: put MicroPython {OLDEST[0]}.{OLDEST[1]} or newer on the board first")
+    if platform not in PLATFORMS:
+        raise InputError(f"{text}: Kickstand runs on a Raspberry Pi Pico and on an ESP32")
+    return text
 
 
-def _choose_right(config):
-    """SIDE = "right" in a config.py that leaves it to the default."""
-    text = config.read_text(encoding="utf-8")
-    config.write_text(text.replace('# SIDE = "left"', 'SIDE = "right"', 1), encoding="utf-8")
+def _written(value):
+    """As it would stand in config.py: addresses in hexadecimal."""
+    return f"({', '.join(map(hex, value))})" if isinstance(value, tuple) else repr(value)
 
 
-def _sleep(port, seconds):
-    run_sync(port.sleep(1000 * seconds))
+def _compiled(source, architecture):
+    """bytecode.cross_compiled() from the archive. All but machine code is the same for every board."""
+    from .. import firmware_path
+    from ..deploy import bytecode
+
+    folders = [Path(ROOT) / "compiled" / one for one in (architecture, COMMON)]
+    path = source.relative_to(firmware_path.PACKAGE).with_suffix(".mpy")
+    if not folders[0].is_dir():
+        raise bytecode.CannotCompile("this page has nothing compiled for this board")
+    return next(folder / path for folder in folders if (folder / path).is_file()).read_bytes()
+
+
+def _config():
+    from .. import firmware_path
+
+    return firmware_path.config()

@@ -19,6 +19,7 @@ PACKAGES = {
         "@micropython/micropython-webassembly-pyscript",
         ("micropython.mjs", "micropython.wasm"),
     ),
+    "esptool": ("esptool-js", ("bundle.js", "LICENSE")),
     "numpy": ("@emscripten-forge/numpy", ("pkg/numpy-2.0.1-py312h4e66579_0.tar.gz",)),
     "plotly": ("plotly.js-dist-min", ("plotly.min.js",)),
     "pyodide": (

@@ -6,15 +6,16 @@ Each function returns JSON: what its docstring says, or {"refused": why}, the li
 
 import functools
 import json
+import shutil
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
 from ..analysis import report
-from ..analysis.channels import open_ride
 from ..analysis.overview import overview
 from ..analysis.plot.page import page
+from ..analysis.ride import open_ride
 from ..calibration.file import calibration_beside, calibration_path, write_calibration
 from ..calibration.ride.fit import fit_ride
 from ..errors import InputError
@@ -24,6 +25,7 @@ from ..refusals import sentence
 from ..smoothing.smooth import smooth_to_csv
 
 PLOTLY = '<script src="./plotly/plotly.min.js"></script>'  # the page of a ride loads it from the site
+TOGETHER = "recording"  # the folder of files that are one recording
 TOO_LONG = "this ride is too long for the memory of a browser: kickstand cut takes a part of it"
 
 
@@ -45,16 +47,22 @@ def told(function):
 @told
 def rides(given):
     """[{"log": name, "calibration": name or ""}, ...]: the logs in the folder `given`, each with the calibration beside
-    it or the only one there. The files are linked to from here, where others can be made beside them."""
+    it or the only one there. Files of an app that are one recording together count as one log.
+
+    The files are linked to from here, where others can be made beside them.
+    """
     for old in Path().iterdir():
-        old.unlink()
+        shutil.rmtree(old) if old.is_dir() else old.unlink()
     names = sorted(path.name for path in Path(given).iterdir())
-    for name in names:
-        Path(name).symlink_to(Path(given, name))
+    _link(given, names, Path())
     calibrations = [name for name in names if name.lower().endswith(".json")]
     logs = [name for name in names if name not in calibrations]
     if not logs:
         raise InputError("no log among these files: a ride is RIDE.csv or RIDE.csv.gz, with its RIDE.cal.json")
+    if len(logs) > 1 and not any(map(_is_log, logs)):
+        Path(TOGETHER).mkdir()
+        _link(given, logs, Path(TOGETHER))
+        logs = [TOGETHER] if _app(TOGETHER) else logs
     only = calibrations[0] if len(calibrations) == 1 else ""
     beside = {log: calibration_path(Path(log)).name for log in logs}
     return [{"log": log, "calibration": beside[log] if beside[log] in names else only} for log in logs]
@@ -64,12 +72,10 @@ def rides(given):
 def take(log, _tell):
     """{"log": log}; for a recording of an app {"log": the one that `import` makes of it, "path": likewise, "app": whose
     it is, "warnings": [...]}."""
-    try:
-        check_first_line(Path(log))
+    if _is_log(log):
         return {"log": log}
-    except InputError:
-        if not _app(log):
-            raise
+    if not _app(log):
+        check_first_line(Path(log))  # says what is wrong
     found = import_recording(log)
     out = f"{log.partition('.')[0]}.log.csv"
     write_imported(out, found)
@@ -109,11 +115,22 @@ def align(log, tell):
     found = fit_ride(Path(log), progress=tell)
     out = calibration_path(Path(log))
     write_calibration(out, found.calibration)
-    return {
-        "path": str(out),
-        "warnings": [sentence(notice) for notice in found.notices],
-        **{name: round(getattr(found, name), 1) for name in ("roll_deg", "pitch_deg", "yaw_deg")},
-    }
+    known = {name: round(getattr(found, name), 1) for name in ("roll_deg", "pitch_deg", "yaw_deg")}
+    return {"path": str(out), **known}
+
+
+def _link(given, names, place):
+    for name in names:
+        (place / name).symlink_to(Path(given, name))
+
+
+def _is_log(name):
+    """As far as its first line tells."""
+    try:
+        check_first_line(Path(name))
+        return True
+    except InputError:
+        return False
 
 
 def _app(log):

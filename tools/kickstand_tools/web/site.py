@@ -24,7 +24,7 @@ MODULES = (
     "web/device.py",
 )
 # Large, and only for those who have a board or a ride: fetched when they ask for it
-LATER = ("install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip")
+LATER = ("esptool/", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip")
 _NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first by itself, the second as "./"
 _LISTED = "__FILES__", "__VERSION__"  # in service_worker.js
 
@@ -45,6 +45,7 @@ def site_files() -> dict[str, bytes]:
     """
     files = npm_packages.find()
     files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in sorted(PAGE.rglob("*.*"))}
+    files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # as a text a browser shows
     files["python.json"] = json.dumps(python_files()).encode()
     files["install.zip"] = install_archive.archive()
     files["rides.zip"] = rides_archive.archive()

@@ -15,8 +15,9 @@ from ...logs.stretch import Stretch
 from ...logs.table import Array
 from ...output import write_whole
 from ...replay.mount_check import MountCheck
-from ..channels import Channels, Ride
+from ..channels import Channels
 from ..downsample import downsampled
+from ..ride import Ride
 from ..track import Track, joined, track
 from . import export_csv, export_gpx, export_parquet, export_racechrono, export_vbo
 
@@ -60,30 +61,21 @@ def export(
     if form in _CHECK:
         _CHECK[form]()
     ride = replace(ride, log=read_twice(ride.log))
-    whole = _first_pass(ride.log)
+    log = ride.log.source if isinstance(ride.log, Stretch) else ride.log
+    whole = _first_pass(log)
     start_s = whole.start_s
     if form == "gpx" and not len(whole.places.t_s):
         raise InputError(f"{ride.name} has no positions (lat_deg, lon_deg), so there is no track to write")
     if form in _DATED and whole.utc_s is not None:
         start_s = whole.utc_s
     elif form in _DATED and start_s < _CLOCK_S:
-        file = ride.log.source if isinstance(ride.log, Stretch) else ride.log
-        written_s = Path(file).stat().st_mtime if isinstance(file, (Path, str)) else time.time()
-        after_s = 0.0
-        if isinstance(ride.log, Stretch):  # the file ends later than the stretch
-            log = _first_pass(ride.log.source)
-            after_s = log.start_s + log.seconds - start_s - whole.seconds
-        start_s = float(max(0, int(written_s - after_s - whole.seconds)))
+        written_s = Path(log).stat().st_mtime if isinstance(log, (Path, str)) else time.time()
+        start_s = float(max(0, int(written_s - whole.seconds)))
     count, mount = 0, MountCheck(ride.calibration)
-
-    def checked(blocks: Iterator[Channels]) -> Iterator[Channels]:
-        for block in blocks:
-            mount.add(block.t_s, block.force_g, block.rate_dps, block.speed_mps)
-            yield block
 
     def rows() -> Iterator[Channels]:
         nonlocal count
-        blocks = checked(ride.blocks(progress, notices))
+        blocks = ride.blocks(progress, notices, mount)
         for block in downsampled(blocks, STEP_S[form]) if STEP_S[form] else blocks:
             if form == "gpx":
                 block = block.part(np.isfinite(block.lat_deg) & np.isfinite(block.lon_deg))

@@ -105,7 +105,10 @@ class Model:
         rate = self.rate + self.rate @ (turn + parameters[GYRO].reshape(3, 3)).T - middle[:, BIAS]
         force = self.force + self.force @ (turn + parameters[ACCEL].reshape(3, 3)).T + parameters[OFFSET]
         place = parameters[PLACE] / STANDARD_GRAVITY
-        force = force - np.cross(self.turning, place) - np.cross(rate, np.cross(rate, place))
+        around = np.cross(np.eye(3), place)  # a @ around = a x place
+        # less turning x place and rate x (rate x place), without np.cross, which takes ten times as long
+        force = force - self.turning @ around - (rate @ place)[:, None] * rate
+        force += np.sum(rate * rate, axis=1)[:, None] * place
         wx, wy, wz = rate.T
         fx, fy, fz = force.T
         st, ct, sq, cq = np.sin(t), np.cos(t), np.sin(q), np.cos(q)

@@ -1,4 +1,4 @@
-"""MicroPython's `os` with an ilistdir() that gives sizes, as on a board.
+"""MicroPython's `os` with an ilistdir() that gives sizes, as on a board, and the room of a Pico's flash.
 
 Under MicroPython this module takes the place of `os`; under CPython the names in ADDED are added to the real one.
 """
@@ -8,6 +8,10 @@ import sys
 
 if sys.implementation.name == "micropython":
     from os import *  # noqa: F403 # pyright: ignore[reportWildcardImportFromLibrary]
+
+BLOCK = 4096
+FLASH_BLOCKS = 352
+FIRMWARE_BLOCKS = 80  # compiled
 
 # What CPython's os does not have
 ADDED = ("ilistdir",)
@@ -25,3 +29,23 @@ def ilistdir(path="."):
             continue
         status = os.stat(path + "/" + name)
         yield name, status[0] & 0xF000, 0, status[6]
+
+
+def statvfs(path):
+    """As os.statvfs(). For a folder in the current one: of a Pico's flash that holds the firmware and this folder. What
+    it really is on may have no end."""
+    if path.startswith("/"):
+        return os.statvfs(path)
+    free = FLASH_BLOCKS - FIRMWARE_BLOCKS - _taken(path)
+    return BLOCK, BLOCK, FLASH_BLOCKS, free, free, 0, 0, 0, 0, 255
+
+
+def _taken(folder):
+    """Blocks of all files in a folder and below it."""
+    blocks = 0
+    for name, kind, *rest in ilistdir(folder):
+        if kind & 0x4000:
+            blocks += _taken(folder + "/" + name)
+        elif len(rest) > 1:
+            blocks += (rest[1] + BLOCK - 1) // BLOCK
+    return blocks

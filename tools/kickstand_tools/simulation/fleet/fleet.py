@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError, cause, extra
+from ...logs.csv_lines import write_table
 from ...logs.log import Log
-from ...logs.reader import write_table
 from ...logs.table import Array
 from ...output import check_directory
 from .route import random_route

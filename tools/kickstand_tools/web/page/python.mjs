@@ -3,7 +3,7 @@
 import { loadPyodide } from "./pyodide/pyodide.mjs";
 
 const HERE = new URL("./", import.meta.url);
-const PACKAGES = "/packages";
+export const PACKAGES = "/packages"; // where they are
 
 /** A new Python. archives: ZIP files of the site; what is in them can be imported. */
 export async function loadPython(archives) {

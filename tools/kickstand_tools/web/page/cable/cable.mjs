@@ -2,9 +2,10 @@
 // WebAssembly, which is fetched for this only.
 
 const BAUD = 115200;
-const ROOT = "/kickstand";
+const BACK_MS = 10_000; // until a board that has restarted is there again, at most
+const AGAIN_MS = 300;
 
-/** The bytes of a serial port, for web/serial_port.py. lost: nothing more can come. */
+/** The bytes of a serial port, for web/serial_guest.py. lost: nothing more can come. */
 export class SerialLine {
   lost = false;
   #port;
@@ -15,8 +16,18 @@ export class SerialLine {
     this.#port = port;
   }
 
-  async open() {
-    await this.#port.open({ baudRate: BAUD });
+  /** restarted: the board may just be starting, and its port is away until then. */
+  async open(restarted = false) {
+    const until = performance.now() + (restarted ? BACK_MS : 0);
+    for (;;) {
+      try {
+        await this.#port.open({ baudRate: BAUD });
+        break;
+      } catch (error) {
+        if (performance.now() > until) throw error;
+        await this.sleep(AGAIN_MS);
+      }
+    }
     // As a terminal program does: a Pico says nothing to a host without it
     await this.#port.setSignals?.({ dataTerminalReady: true, requestToSend: true });
     this.#read();
@@ -77,17 +88,56 @@ export class SerialLine {
   }
 }
 
-/** A new Python with the tools in it: one that has posed as a board cannot pose as another. */
-export async function python() {
-  const { loadPyodide } = await import("../pyodide/pyodide.mjs");
-  const archive = fetch("./install.zip").then((answer) => answer.arrayBuffer());
-  const made = await loadPyodide();
-  made.unpackArchive(await archive, "zip", { extractDir: ROOT });
-  made.runPython(`import sys; sys.path.insert(0, "${ROOT}/tools")`);
+/** A new Python with the tools in it. withNumpy: those that write rides need it. */
+export async function python(withNumpy = false) {
+  const { PACKAGES, loadPython } = await import("../python.mjs");
+  const made = await loadPython(["install.zip", ...(withNumpy ? ["numpy/numpy.zip"] : [])]);
+  made.runPython(`import sys; sys.path.insert(0, "${PACKAGES}/tools")`);
   return made;
 }
 
-/** True if this browser has a serial port, and lets Python wait for it. */
-export function able() {
-  return "serial" in navigator && "Suspending" in WebAssembly;
+/** Show what applies in this browser: it needs a serial port, and has to let Python wait for it. */
+export function showIfAble(form, unable) {
+  const able = "serial" in navigator && "Suspending" in WebAssembly;
+  form.hidden = !able;
+  unable.hidden = able;
+}
+
+/** The port that the rider chooses, or null; tell(text) says why there is none. */
+export async function choosePort(tell) {
+  try {
+    return await navigator.serial.requestPort();
+  } catch {
+    tell("No port was chosen. Is the board on a cable that carries data?");
+    return null;
+  }
+}
+
+/**
+ * What speak(line, name) returns, with a SerialLine open meanwhile, and the port's name for messages. tell(text) is given
+ * what goes wrong, and null is returned then.
+ */
+export async function overCable(port, tell, speak, restarted = false) {
+  const line = new SerialLine(port);
+  try {
+    await line.open(restarted);
+  } catch (error) {
+    tell(`The port cannot be opened: ${error.message}. Does another program have it?`);
+    return null;
+  }
+  try {
+    // A line that is not USB, as a bridge to an emulated board is, is given time as `kickstand flash` gives it
+    return await speak(line, port.getInfo?.().usbVendorId ? "this port" : "socket:this port");
+  } catch (error) {
+    console.error(error);
+    tell(`This went wrong: ${error.message.trim().split("\n").at(-1)}. Load the page again.`);
+    return null;
+  } finally {
+    await line.close();
+  }
+}
+
+/** A line of the command's, in these pages' words. */
+export function inPages(text) {
+  return text.replaceAll("socket:", "").replace(/kickstand flash (puts|brings)/, "the page Install $1");
 }

@@ -1,10 +1,16 @@
-// Puts the firmware onto a board at the browser's serial port: `kickstand flash` itself, on CPython for WebAssembly, which
-// is fetched for this only.
+// Puts the firmware and its config.py onto a board at the browser's serial port: `kickstand flash` itself, on CPython for
+// WebAssembly (web/install_guest.py).
 
-import { SerialLine, able, python } from "../cable/cable.mjs";
+import { choosePort, inPages, overCable, python, showIfAble } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
+import { connectImage } from "./image.mjs";
+import { Fields } from "./fields.mjs";
 
 const byId = (id) => document.getElementById(id);
+const fields = new Fields(byId("fields"), check);
+let loaded; // the tools, once for all
+let board = null; // {port, guest}: an Installation of install_guest.py
+let byHand = null;
 
 function tell(text, share = null) {
   byId("install-said").textContent = text;
@@ -12,47 +18,78 @@ function tell(text, share = null) {
   byId("install-bar").value = share ?? 0;
 }
 
-async function install() {
-  let port;
-  try {
-    port = await navigator.serial.requestPort();
-  } catch {
-    tell("No port was chosen. Is the board on a cable that carries data?");
-    return;
-  }
-  byId("install").disabled = true;
-  const line = new SerialLine(port);
-  try {
-    tell("Loading the tools …", 0);
-    const tools = await python();
-    await line.open();
+/** What board is there, and what does its config.py say? */
+async function look() {
+  const port = await choosePort(tell);
+  if (!port) return;
+  atWork(true);
+  byId("config").hidden = true;
+  tell("Loading the tools …", 0);
+  const tools = await (loaded ??= python());
+  const guest = tools.pyimport("kickstand_tools.web.install_guest").Installation();
+  const said = await overCable(port, tell, (line, name) => {
     tell("Asking the board …", 0);
-    // A line that is not USB, as a bridge to an emulated board is, is given time as `kickstand flash` gives it
-    const name = port.getInfo?.().usbVendorId ? "the board" : "socket:the board";
-    const said = tools
-      .pyimport("kickstand_tools.web.install_guest")
-      .install.callPromising(line, name, byId("side").value, (what, done, total) => tell(what, done / total));
-    told(JSON.parse(await said));
-  } catch (error) {
-    console.error(error);
-    tell(`The port cannot be used: ${error.message.trim().split("\n").at(-1)}. Does another program have it?`);
-  } finally {
-    await line.close();
-    byId("install").disabled = false;
-  }
+    return guest.look.callPromising(line, name);
+  });
+  atWork(false);
+  if (!said) return;
+  const { refused, board: name, settings, usual, by_hand } = JSON.parse(said);
+  if (refused) return tell(`Not installed: ${inPages(refused)}.`);
+  board = { port, guest };
+  byHand = by_hand;
+  byId("by-hand").textContent = byHand ? `The board’s own ${byHand}. It stays as it is.` : "";
+  byId("settings").hidden = Boolean(byHand);
+  if (!byHand) fields.fill(settings, usual);
+  byId("config").hidden = false;
+  tell(`${name} is there.`);
+  check();
 }
 
-function told({ refused, board, copied, kept, config_kept }) {
+/** Do the firmware's own rules take what is in the form? */
+function check() {
+  if (byHand) return true;
+  const { text, fault } = JSON.parse(board.guest.check(JSON.stringify(fields.values())));
+  byId("text").textContent = text;
+  fields.mark(...(fault ?? [null, ""]));
+  byId("fault").textContent = fault && !fault[0] ? fault[1] : "";
+  byId("install").disabled = Boolean(fault);
+  return !fault;
+}
+
+async function install() {
+  if (!check()) return;
+  const { port, guest } = board;
+  const wanted = JSON.stringify(byHand ? {} : fields.values());
+  atWork(true);
+  tell("Asking the board …", 0);
+  const said = await overCable(
+    port,
+    tell,
+    (line, name) => guest.install.callPromising(line, name, wanted, (what, done, total) => tell(what, done / total)),
+    true, // after the look
+  );
+  atWork(false);
+  if (said) told(JSON.parse(said));
+}
+
+function told({ refused, board: name, copied, kept, config_kept }) {
   if (refused) {
-    tell(`Not installed: ${refused.replaceAll("socket:", "")}.`);
+    tell(`Not installed: ${inPages(refused)}.`);
     return;
   }
+  byId("config").hidden = true;
   const files = copied ? `${copied} files copied and verified, ${kept} as they were` : "it was up to date";
   const config = config_kept ? " Its own config.py stays." : "";
-  tell(`Done: ${board}. ${files}.${config} The board starts now: press its button on the stand, then upright.`);
+  tell(`Done: ${name}. ${files}.${config} The board starts now: press its button on the stand, then upright.`);
 }
 
-byId("install-form").hidden = !able();
-byId("install-unable").hidden = able();
+function atWork(on) {
+  for (const id of ["look", "install", "fields", "image", "image-file"]) byId(id).disabled = on;
+}
+
+showIfAble(byId("install-form"), byId("install-unable"));
+byId("image-form").hidden = byId("install-form").hidden;
+byId("look").addEventListener("click", look);
 byId("install").addEventListener("click", install);
+connectImage(atWork);
 keepOffline();

@@ -1,0 +1,38 @@
+"""What the page Live offers to save, and what the command would have written."""
+
+import base64
+import io
+import threading
+
+from kickstand_tools.calibration.file import write_calibration
+from kickstand_tools.rides import block_reader, ride_log
+from kickstand_tools.rides.stream import Recording
+
+
+def saved(rider, tmp_path):
+    """{name: content} of all that is offered, saved by clicks."""
+    found = {}
+    for link in rider.page.locator("#files a").all():
+        with rider.page.expect_download() as download:
+            link.click()
+        path = tmp_path / download.value.suggested_filename
+        download.value.save_as(path)
+        found[path.name] = path.read_bytes()
+    return found
+
+
+def recorded(blocks):
+    """[log, calibration] that `kickstand record` makes of these blocks."""
+    log, calibration = io.StringIO(), io.StringIO()
+    recording = Recording(threading.Event())
+    recording.write(log, iter(map(block_reader.parse, blocks)), [])
+    assert recording.first
+    write_calibration(calibration, ride_log.calibration(recording.first))
+    return [log.getvalue().encode(), calibration.getvalue().encode()]
+
+
+def streamed(said):
+    """The blocks in all that a board has said."""
+    begun = said.rindex(b"\x04", 0, said.index(b"\n.\r\n")) + 1
+    *whole, _ = said[begun:].split(b".\r\n")
+    return [b"".join(map(base64.b64decode, block.split())) for block in whole]

@@ -1,0 +1,68 @@
+"""An imagined board at the other end of a SerialLine: MicroPython's raw prompt, byte by byte, before a FakeBoard."""
+
+import base64
+
+_PROMPT = b"raw REPL; CTRL-B to exit\r\n>"
+_CTRL_A, _CTRL_C, _CTRL_D = b"\x01\x03\x04"
+_RAW_PASTE = b"\x05A\x01"
+
+
+class RawPrompt:
+    """Has as much of an emulator.pico.Pico as SerialLine asks for. board: a FakeBoard, on which the code is run.
+    streams: blocks that the app sends each time that it is started, in place of being run; it goes on, and sends no
+    more, until Ctrl-C.  deaf: says nothing at all."""
+
+    def __init__(self, board, *streams, deaf=False):
+        self.board, self._deaf = board, deaf
+        self._streams = [said(blocks) for blocks in streams]
+        self._streaming = False
+        self._typed = b""
+        self.heard = lambda data: None
+        self.console = self.chip = self
+
+    def run(self, seconds):
+        """It takes no time."""
+
+    def stop(self):
+        """It is never under way."""
+
+    def send(self, data):
+        """What is typed."""
+        for byte in b"" if self._deaf else data:
+            if byte == _CTRL_C:
+                self._typed = b""
+                if self._streaming:
+                    self._streaming = False
+                    self.heard(b"\x04\x04>")
+            elif byte == _CTRL_A and self._typed + b"\x01" == _RAW_PASTE:
+                self._typed = b""
+                self.heard(b"R\x00")  # it understands, but cannot
+            elif byte == _CTRL_A:
+                self._typed = b""
+                self.heard(_PROMPT)
+            elif byte == _CTRL_D:
+                code, self._typed = self._typed, b""
+                self._do(code.decode())
+            else:
+                self._typed = (self._typed + bytes([byte])).lstrip(b"\r")
+
+    def _do(self, code):
+        if not code:
+            self.heard(b"OK\r\nMPY: soft reboot\r\n" + _PROMPT)
+        elif "machine.reset()" in code:
+            self.board.resets += 1
+            self.heard(b"OK")
+        elif "RideStream" in code and self._streams:
+            self._streaming = True
+            self.heard(b"OK" + self._streams.pop(0))
+        else:
+            out, error = self.board.exec_raw(code)
+            self.heard(b"OK" + out + b"\x04" + error + b"\x04>")
+
+
+def said(blocks):
+    """Blocks as usb_stream prints them."""
+    return b"".join(
+        b"".join(base64.b64encode(block[at : at + 256]) + b"\r\n" for at in range(0, len(block), 256)) + b".\r\n"
+        for block in blocks
+    )

@@ -1,0 +1,45 @@
+"""An emulated Pico at the pages Install and Live, one after the other."""
+
+import pytest
+import serial_line
+from emulated import calibrated, firmware, leaning, pico, shown_lean
+from kept import recorded, saved, streamed
+from rider import Rider
+from serial_line import SerialLine
+
+LEAN_DEG = 20.0
+
+
+@pytest.mark.long
+@pytest.mark.chip
+def test_a_board_is_brought_up_to_date_and_watched(chromium, address, tmp_path):
+    """Its calibration stays. Its lean on the page is the one on its own display, and the log is the one that `kickstand
+    record` writes."""
+    rider = Rider(chromium, address + "install.html", accept_downloads=True)
+    rider.page.add_init_script(serial_line.FAKE)
+    rider.page.reload()
+    line = SerialLine(rider)
+    old = {path: b"old" if path == "/kickstand/lean/meter.mpy" else data for path, data in firmware().items()}
+    with pico(leaning(LEAN_DEG), {**old, **calibrated(), "/kickstand/gone.mpy": b""}) as device:
+        device.run(0.5)
+        line.plug_in(device)
+        assert line.look() == "Raspberry Pi Pico with RP2040, MicroPython 1.26.1 is there."
+        said = line.install()
+        assert said.startswith("Done: Raspberry Pi Pico with RP2040, MicroPython 1.26.1. 2 files copied and verified")
+        assert "config.py stays" in said
+        assert "/kickstand/gone.mpy" not in device.files()
+        rider.page.goto(address + "live.html")
+        line.plug_in(device)
+        rider.page.click("#start")
+        rider.page.wait_for_function("document.querySelector('#lean').textContent === '20°'", timeout=300_000)
+        assert rider.text("#side") == "right"
+        assert shown_lean(device.lcd()) == LEAN_DEG
+        rider.page.click("#stop")
+        rider.page.wait_for_selector("#files li", timeout=120_000)
+    assert rider.text("#live-said") == "Stopped."
+    rider.page.wait_for_function("document.querySelector('#lean').textContent === '--'")  # it is old news soon
+    blocks = streamed(bytes(line.said))
+    assert len(blocks) > 1
+    assert list(saved(rider, tmp_path).values()) == recorded(blocks)
+    assert rider.errors == []
+    rider.context.close()

@@ -1,0 +1,122 @@
+"""The page listens to boards and fetches their rides, with the code of `kickstand record` and `pull`."""
+
+import functools
+import gzip
+import types
+
+import pytest
+import ride_writer
+import serial_line
+from fake_board import FakeBoard
+from kept import recorded, saved
+from kickstand.rides import ride_paths
+from kickstand_tools.deploy import connection
+from kickstand_tools.rides.pull import pull
+from raw_prompt import RawPrompt
+from rider import Rider
+from serial_line import SerialLine
+
+half_seconds = functools.partial(ride_writer.blocks, length=lambda _: 512)  # blocks as short as those of a stream
+
+
+@pytest.fixture(scope="module")
+def line(chromium, address):
+    """One page for all tests, whose Python is loaded once."""
+    rider = Rider(chromium, address + "live.html", accept_downloads=True)
+    rider.page.add_init_script(serial_line.FAKE)
+    rider.page.reload()
+    yield SerialLine(rider)
+    assert rider.errors == [] and rider.strangers() == []
+    rider.context.close()
+
+
+@pytest.fixture
+def rider(line):
+    line.rider.page.evaluate("document.querySelector('#files').replaceChildren()")
+    return line.rider
+
+
+@pytest.fixture
+def board(tmp_path):
+    (tmp_path / "flash" / "rides").mkdir(parents=True)
+    return FakeBoard(tmp_path / "flash")
+
+
+def test_a_cable_that_is_pulled_leaves_the_log(line, rider, board, tmp_path):
+    """And no lean on the gauge. What swayed too much to tell its lean was "--" all along."""
+    blocks, _ = half_seconds(3)
+    line.plug_in(RawPrompt(board, blocks))
+    rider.page.click("#start")
+    rider.page.wait_for_function("document.querySelector('#live-said').textContent.startsWith('Recording: ')")
+    assert (rider.text("#lean"), rider.text("#max-left")) == ("--", "--")
+    line.connected = False
+    rider.page.wait_for_selector("#files li")
+    assert "connection lost" in rider.text("#live-said")
+    assert "what came until then is kept" in rider.text("#live-said")
+    assert list(saved(rider, tmp_path).values()) == recorded(blocks)
+
+
+def test_after_a_new_alignment_another_log_begins(line, rider, board, tmp_path):
+    blocks = half_seconds(3)[0], half_seconds(2, trim_deg=1.0)[0]
+    line.plug_in(RawPrompt(board, [*blocks[0], *blocks[1]], blocks[1]))
+    rider.page.click("#start")
+    rider.page.wait_for_selector("#files li")
+    rider.page.wait_for_function("document.querySelector('#live-said').textContent.startsWith('Recording: ')")
+    rider.page.click("#stop")
+    rider.page.wait_for_selector("#files li + li")
+    assert rider.text("#live-said") == "Stopped."
+    assert list(saved(rider, tmp_path).values()) == [*recorded(blocks[1]), *recorded(blocks[0])]
+    assert board.resets == 2
+
+
+def test_the_rides_of_a_board_are_what_the_command_pulls(line, rider, board, tmp_path, monkeypatch):
+    damaged = ride_writer.blocks(2, ride=4)[0]
+    damaged[1] = damaged[1][:500] + b"?" + damaged[1][501:]
+    for number, blocks in {3: ride_writer.blocks(2, ride=3, speed=True)[0], 4: damaged}.items():
+        path = board.root / f"rides/000/{number:02}/00000.rid"
+        path.parent.mkdir(parents=True)
+        path.write_bytes(b"".join(blocks))
+    has_firmware(board, monkeypatch)
+    line.plug_in(RawPrompt(board))
+    rider.page.click("#pull")
+    rider.page.wait_for_selector("#files li")
+    told = rider.text("#pull-said")
+    assert told.startswith("2 rides are here")
+    assert rider.axe() == []
+    assert "ride 4, part 0: damaged at byte 4096: left out" in told
+    files = saved(rider, tmp_path)
+    assert board.resets == 1
+    monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: board)
+    monkeypatch.setattr(connection, "_RESTART_S", 0)
+    pull("the same board", tmp_path / "out")
+    pulled = {path.name: path.read_bytes() for path in (tmp_path / "out").iterdir()}
+    assert {name: unpacked(data) for name, data in files.items()} == {
+        name: unpacked(data) for name, data in pulled.items()
+    }
+    with rider.context.expect_page() as opened:
+        rider.page.click("#files li:first-child button")
+    rides = opened.value
+    assert rides.url.endswith("/rides.html#pulled")
+    rides.wait_for_selector("#report-title:has-text('ride-00004-')", timeout=60_000)
+    opened.value.close()
+
+
+def unpacked(data):
+    return gzip.decompress(data) if data.startswith(b"\x1f\x8b") else data
+
+
+def has_firmware(board, monkeypatch):
+    """The modules that tell the rides, on this board's flash."""
+    monkeypatch.setattr(ride_paths, "directory", lambda _settings: "rides")
+    monkeypatch.setattr(ride_paths, "os", board.modules["os"])
+    board.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: None))
+    board.modules["kickstand.rides"] = types.SimpleNamespace(ride_paths=ride_paths)
+
+
+@pytest.mark.parametrize(("press", "says"), [("#start", "#live-said"), ("#pull", "#pull-said")])
+def test_a_board_without_the_firmware_is_told_of_the_page_install(line, rider, board, press, says):
+    line.plug_in(RawPrompt(board))
+    rider.page.click(press)
+    rider.page.wait_for_selector(f"{press}:enabled:visible")
+    assert rider.text(says) == "Kickstand is not on the board at this port: the page Install puts it there."
+    assert board.resets == 1

@@ -1,0 +1,157 @@
+"""A recorded ride, to be gone through block by block: a log, its calibration, and whose lean is wanted."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from kickstand.errors import Notice
+from kickstand.lean.meter import MAX_VARIANCE
+
+from ..calibration.file import CalibrationFile, calibration_beside, read_calibration
+from ..errors import InputError
+from ..logs.block import Block
+from ..logs.reader import Source, apart, read_blocks
+from ..logs.source import File, Progress, log_stem, name_of
+from ..logs.stretch import Stretch
+from ..logs.table import Array
+from ..replay.meter_along import MeterAlong
+from ..replay.mount_check import MountCheck
+from ..smoothing.smooth import smooth_blocks
+from .channels import Channels, channels
+
+
+@dataclass
+class Ride:
+    """A log and the calibration it is read with. smoothed: its lean is the one looked back over, and not the one that
+    the display showed."""
+
+    log: Source
+    calibration: CalibrationFile
+    smoothed: bool = False
+
+    @property
+    def name(self) -> str:
+        """The log's, with its path if it has one."""
+        return name_of(self.log)
+
+    @property
+    def stem(self) -> str:
+        """The name without path and suffixes."""
+        return log_stem(self.name)
+
+    @property
+    def car(self) -> bool:
+        """A car, which has no lean; else a motorcycle."""
+        return self.calibration.vehicle == "car"
+
+    def blocks(
+        self, progress: Progress | None = None, notices: list[Notice] | None = None, mount: MountCheck | None = None
+    ) -> Iterator[Channels]:
+        """The ride without the readings that froze: they are a gap. progress, notices: of read_blocks(). mount: is
+        given all of the log, also where the ride is a stretch of it. Raises InputError."""
+        lean, told, slow = _Lean(self.calibration), False, False
+        log, stretch = apart(self.log)
+        for whole, found in self._read(log, progress, notices):
+            block = whole.believed
+            if not len(block.time_us):
+                continue
+            rows = lean.follow(block)
+            if notices is not None and not told and np.any(rows[:, 2] < 0.0):
+                told = True
+                notices.append(_absurd(block, int(np.argmax(rows[:, 2] < 0.0))))
+            slow |= self.smoothed and found is None
+            if found is not None:
+                shown = found[~whole.frozen]
+                rows[:, 0], rows[:, 2] = shown[:, 0], np.radians(shown[:, 1]) ** 2
+                rows[:, 5] = rows[:, 2] <= MAX_VARIANCE  # NaN is not
+            seen = channels(block, self.calibration, rows, self.car)
+            if mount is not None:
+                mount.add(seen.t_s, seen.force_g, seen.rate_dps, seen.speed_mps)
+            if stretch is None:
+                yield seen
+            elif (which := stretch.holds(block)).any():
+                yield seen.part(which)
+        if slow and notices is not None:
+            notices.append(Notice("smooth-slow"))
+
+    def _read(
+        self, log: Source, progress: Progress | None, notices: list[Notice] | None
+    ) -> Iterator[tuple[Block, Array | None]]:
+        """The blocks of the log, and what smooth_blocks() gives for each, None where it is not wanted or gives none."""
+        if self.smoothed:
+            return smooth_blocks(log, self.calibration, progress, notices)
+        return ((block, None) for block in read_blocks(log, progress=progress, notices=notices))
+
+
+def open_ride(log: Source, calibration: CalibrationFile | File | None = None, smoothed: bool = False) -> Ride:
+    """A ride to look at: a log (see read_log) with a calibration, or the file of one; None: NAME.cal.json beside it.
+
+    smoothed: with the lean of smooth() in the place of the firmware's; a car has none. Raises InputError, also for a
+    calibration that is not aligned: lean and braking are then unknown.
+
+    >>> import numpy as np
+    >>> from kickstand_tools.api import CalibrationFile, Log
+    >>> log = Log(np.arange(300) / 100.0, np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3)))
+    >>> open_ride(log, CalibrationFile(aligned=True)).car
+    False
+    """
+    source = calibration
+    file = log.source if isinstance(log, Stretch) else log
+    if source is None and isinstance(file, (Path, str)):
+        source = calibration_beside(Path(file))
+    if source is None:
+        raise InputError(f"{name_of(log)}: an open file has no calibration beside it: give one")
+    parameters = source if isinstance(source, CalibrationFile) else read_calibration(source)
+    if not parameters.aligned:
+        name = "the calibration" if isinstance(source, CalibrationFile) else name_of(source)
+        todo = "kickstand calibrate two, or calibrate ride, first"
+        raise InputError(f"{name} is not aligned, so lean and braking are unknown: {todo}")
+    return Ride(log, parameters, smoothed and parameters.vehicle != "car")
+
+
+def vehicle_channels(
+    log: Source, calibration: CalibrationFile | File | None = None, progress: Progress | None = None
+) -> Channels:
+    """The whole ride in the vehicle's axes, with the firmware's lean. log, calibration and errors: as open_ride().
+
+    progress: called with how much of the log is done of how much. Forces are Nicolae's (18)-(20) and the matrix.
+
+    >>> import numpy as np
+    >>> from kickstand_tools.api import CalibrationFile, Log
+    >>> log = Log(np.arange(300) / 100.0, np.tile([0.0, 1.0, 0.0], (300, 1)), np.zeros((300, 3)))
+    >>> channels = vehicle_channels(log, CalibrationFile(aligned=True))
+    >>> bool(abs(channels.lean_deg).max() < 0.1), float(channels.up_g[-1])
+    (True, 1.0)
+    """
+    from .downsample import joined
+
+    return joined(open_ride(log, calibration).blocks(progress))
+
+
+def _absurd(block: Block, at: int) -> Notice:
+    """The lean filter has lost itself at this row: what the readings of the second before it were."""
+    before = slice(int(np.searchsorted(block.time_us, block.time_us[at] - 1_000_000)), at + 1)
+    most = np.max(np.abs(block.readings[before]), axis=0)
+    return Notice("absurd-readings", block.time_us[at] / 1e6, float(np.max(most[4:])), float(np.max(most[:3])))
+
+
+class _Lean:
+    """The firmware's meter, run along the ride."""
+
+    def __init__(self, calibration: CalibrationFile) -> None:
+        self._along = MeterAlong(calibration)
+
+    def follow(self, block: Block) -> Array:
+        """(n, 6): lean (degrees), displayed forward force (g), variance of the lean (rad2), resting, rolling, sure."""
+        columns: list[list[float]] = [[] for _ in range(6)]
+        leans, shown, variances, resting, rolling, sure = columns
+        for meter in self._along.after_each(block, *self._along.in_vehicle(block)):
+            lean = meter.filter
+            leans.append(meter.lean_deg)
+            shown.append(meter.smooth_force[2])
+            variances.append(lean.variance)
+            resting.append(lean.at_rest)
+            rolling.append(lean.rolling)
+            sure.append(meter.trusted)
+        return np.column_stack(columns).astype(float)

@@ -1,0 +1,148 @@
+"""A ride as a board streams it: its blocks as they come, into a log, and the lean of each moment."""
+
+import binascii
+import contextlib
+import threading
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import IO
+
+from mpremote.transport_serial import SerialTransport
+
+from ..calibration.file import CalibrationFile
+from ..deploy.board_console import BrokenOff, lines
+from ..deploy.connection import refuse_unfit_firmware
+from ..errors import InputError, cause
+from ..logs.cells import TRACK
+from ..replay.replay_engine import NO_SPEED, ReplayMeter
+from . import ride_log
+from .block_reader import BadBlock, Block, missing_note, parse
+
+# The app with its turns sent over USB, its display and button alive; Ctrl-C ends it.
+_START = """
+from kickstand import devices, settings
+from kickstand.app import App
+from kickstand.board import port
+from kickstand.rides.usb_stream import RideStream
+chosen = settings.load()
+try:
+    App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen), RideStream()).run()
+except KeyboardInterrupt:
+    port.rest_watchdog()
+"""
+_SILENT_S = 60.0  # an emulated board takes a while to start; one without a sensor says nothing either
+CHANGED = "the board's calibration has changed: the log ends here"
+
+
+@dataclass(frozen=True)
+class LiveReading:
+    """A block of half a second. aligned: the board's sensor is.  moments: (s since the recording began, lean in
+    degrees > 0 to the right, specific force forward in g) at each turn of the board's loop; the lean is None where it
+    is not known well enough to be shown.  max_left_deg, max_right_deg: as on the display, since the recording began, 0
+    before there is one.  rate_hz: turns a second.  seconds: since the recording began."""
+
+    aligned: bool
+    moments: list[tuple[float, float | None, float]]
+    max_left_deg: float
+    max_right_deg: float
+    rate_hz: float
+    seconds: float
+
+    @property
+    def lean_deg(self) -> float | None:
+        """At the end."""
+        return self.moments[-1][1] if self.moments else None
+
+    @property
+    def forward_g(self) -> float:
+        """At the end."""
+        return self.moments[-1][2] if self.moments else 0.0
+
+
+class Recording:
+    """Blocks into a file. stopped: set where the log has to end, so that the blocks end too.  live: called for each.
+
+    first: the first block; seconds, count: how much there is."""
+
+    def __init__(self, stopped: threading.Event, live: Callable[[LiveReading], None] | None = None) -> None:
+        self._stopped = stopped
+        self.first: Block | None = None
+        self.seconds = 0.0
+        self.count = 0
+        self._live = live
+
+    def write(self, file: IO[str], blocks: Iterator[Block], notes: list[str]) -> None:
+        """All of them as they come. notes: gets a line for each thing that is missing. Raises InputError if there is
+        none."""
+        missing, expected, before = 0, 0, 0
+        missing_s: list[float] = []
+        meter = ReplayMeter(CalibrationFile().to_firmware())
+        aligned = changed = False
+        file.write(",".join(ride_log.header(TRACK)) + "\n")
+        for block in blocks:
+            if changed:  # until the board has stopped
+                continue
+            if self.first is None or block.body != self.first.body:
+                if self.first:
+                    notes.append(CHANGED)
+                    self._stopped.set()
+                    changed = True
+                    continue
+                self.first = block
+                calibration = ride_log.calibration(block)
+                meter = ReplayMeter(calibration.to_firmware(), delay_s=calibration.delay_s())
+                aligned = calibration.aligned
+                before = block.time_us
+            missing += block.sequence - expected
+            expected = block.sequence + 1
+            missing_s += block.missing_s()
+            moments = []
+            for row, turn in zip(ride_log.rows([block], TRACK, self.first.time_us), block.turns, strict=True):
+                file.write(",".join(row) + "\n")
+                reading = [float(cell) for cell in row[1:7]]
+                meter.measure_speed(NO_SPEED if turn.speed_mps is None else turn.speed_mps)
+                meter.update((*reading[:3], 0.0, *reading[3:]), turn.time_us - before)
+                before = turn.time_us
+                shown = aligned and meter.trusted
+                at_s = (before - self.first.time_us) / 1e6
+                moments.append((at_s, meter.lean_deg if shown else None, meter.smooth_force[2]))
+            self.count += len(block.turns)
+            self.seconds = (before - self.first.time_us) / 1e6
+            if self._live:
+                rate_hz = len(block.turns) * 1e6 / max(1, before - block.time_us)
+                most = (meter.max_left_deg, meter.max_right_deg) if aligned else (0.0, 0.0)
+                self._live(LiveReading(aligned, moments, *most, rate_hz, self.seconds))
+        if self.first is None:
+            raise InputError("; ".join(["nothing was recorded: does the display show readings?", *notes]))
+        if missing:
+            notes.append(f"{missing} blocks of half a second did not arrive: the log has gaps")
+        if missing_s:
+            notes.append(missing_note(missing_s))
+
+
+def blocks(transport: SerialTransport, name: str, notes: list[str], stopped: threading.Event) -> Iterator[Block]:
+    """Whole blocks as the board says them, until `stopped` is set or the connection is lost. name: the port's, for
+    notes, which get a line for what has ended it. Raises NoFirmware, OutdatedFirmware."""
+    parts: list[bytes] = []
+    for line in _lines(transport, name, notes, stopped):
+        if line != b".":
+            parts.append(line)
+            continue
+        with contextlib.suppress(BadBlock, binascii.Error):  # its number will be missing
+            yield parse(b"".join(binascii.a2b_base64(part) for part in parts))
+        parts = []
+
+
+def _lines(
+    transport: SerialTransport, name: str, notes: list[str], stopped: threading.Event
+) -> Iterator[bytes]:
+    """What the app on the board prints, line by line."""
+    try:
+        yield from lines(transport, _START, _SILENT_S, stopped)
+        if not stopped.is_set():
+            notes.append(f"{name}: the board stopped by itself: what came until then is kept")
+    except OSError as error:
+        notes.append(f"{name}: connection lost ({cause(error)}): what came until then is kept")
+    except BrokenOff as error:
+        refuse_unfit_firmware(str(error), name)
+        notes.append(f"{name}: {error}: what came until then is kept")

@@ -1,0 +1,102 @@
+"""`kickstand record` and `kickstand pull` in the browser: their own code on CPython for WebAssembly. page/live/live.mjs
+runs it. What goes to it is JSON, but for the files.
+"""
+
+import contextlib
+import io
+import json
+import tempfile
+import threading
+from datetime import datetime
+from pathlib import Path
+
+from .serial_guest import take_place_of_pyserial
+
+
+class Live:
+    """A board's stream, watched and kept."""
+
+    def __init__(self):
+        self._stopped = threading.Event()
+        self._log = io.StringIO()
+        self._recording = None
+        self._began = datetime.now()
+
+    def run(self, line, name, told):
+        """Listen to the board at a SerialLine until stop(), or until nothing more comes. name: of its port.
+        told(reading): called every half second with a LiveReading's fields as JSON.
+
+        Returns JSON: {"notes": lines on what is missing, "changed": the log ended because of another calibration} or
+        {"refused": why}. What came until then is in files().
+        """
+        take_place_of_pyserial(line)
+        from ..deploy.connection import connected, describe, restart
+        from ..errors import InputError
+        from ..rides import stream
+
+        self._recording = stream.Recording(self._stopped, lambda reading: told(json.dumps(vars(reading))))
+        notes = []
+        try:
+            with connected(name) as (transport, _):
+                try:
+                    describe(transport, name)
+                    blocks = stream.blocks(transport, name, notes, self._stopped)
+                    self._recording.write(self._log, blocks, notes)
+                finally:
+                    with contextlib.suppress(Exception):  # the cable may be out
+                        restart(transport)
+        except InputError as error:
+            return json.dumps({"refused": str(error)})
+        return json.dumps({"notes": notes, "changed": stream.CHANGED in notes})
+
+    def stop(self):
+        """End run()."""
+        self._stopped.set()
+
+    def files(self):
+        """[(name, content)] of the log, and of its calibration, both as `kickstand record` writes them; nothing
+        before the first readings."""
+        first = self._recording and self._recording.first
+        if not first:
+            return []
+        from ..calibration.file import write_calibration
+        from ..rides import ride_log
+
+        calibration = io.StringIO()
+        write_calibration(calibration, ride_log.calibration(first))
+        stem = f"live-{self._began:%Y%m%d-%H%M%S}-{first.crc & 0xFFFF:04x}"
+        made = {f"{stem}.csv": self._log, f"{stem}.cal.json": calibration}
+        return [(name, file.getvalue().encode("ascii")) for name, file in made.items()]
+
+
+def pull(line, name, tell):
+    """Fetch the rides from the board at a SerialLine. name: of its port.  tell(what, done, total): the progress, bytes.
+
+    Returns (JSON, files): {"refused": why it ended early, or null, "rides": [{"number", "log": its name or null,
+    "seconds", "readings", "problems"}]} and [(name, content)], the logs with their calibrations as `kickstand pull`
+    writes them.
+    """
+    take_place_of_pyserial(line)
+    from ..calibration.file import calibration_path
+    from ..errors import InputError
+    from ..rides import pull
+
+    refused, rides = None, []
+    with tempfile.TemporaryDirectory() as directory:
+        try:
+            pull.pull(name, Path(directory), progress=tell, pulled=rides.append)
+        except InputError as error:
+            refused = str(error)
+        written = [path for ride in rides if ride.log for path in (ride.log, calibration_path(ride.log))]
+        files = [(path.name, path.read_bytes()) for path in written]
+    told = [
+        {
+            "number": ride.number,
+            "log": ride.log and ride.log.name,
+            "seconds": ride.seconds,
+            "readings": ride.readings,
+            "problems": ride.problems,
+        }
+        for ride in rides
+    ]
+    return json.dumps({"refused": refused, "rides": told}), files

@@ -1,0 +1,53 @@
+// Logs that came over the cable: to be saved, and to be looked at in the page Rides.
+
+const RUNNING = Symbol("running");
+const unsaved = new Set();
+
+addEventListener("beforeunload", (event) => {
+  if (unsaved.size) event.preventDefault(); // the browser asks: what is not saved is lost
+});
+
+/** on: something is under way that leaving the page would end. */
+export function busy(on) {
+  if (on) unsaved.add(RUNNING);
+  else unsaved.delete(RUNNING);
+}
+
+/** Add a ride to the list. title: text; files: [{name, data: Uint8Array}], the log and its calibration. */
+export function offer(list, title, files) {
+  const item = document.createElement("li");
+  item.append(Object.assign(document.createElement("strong"), { textContent: title }));
+  for (const { name, data } of files) {
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(new Blob([data]));
+    link.download = link.textContent = name;
+    unsaved.add(name);
+    link.addEventListener("click", () => unsaved.delete(name));
+    item.append(link);
+  }
+  const look = Object.assign(document.createElement("button"), { type: "button", textContent: "Look at it" });
+  look.addEventListener("click", async () => {
+    await handOver(files);
+    open("./rides.html#pulled"); // in a tab of its own: this page keeps what is not saved yet
+  });
+  item.append(look);
+  list.prepend(item);
+  list.closest("section").hidden = false;
+}
+
+/** For the page Rides: database "kickstand", store "files", key "pulled": [{name, data: ArrayBuffer}]. */
+async function handOver(files) {
+  const opening = indexedDB.open("kickstand", 1);
+  opening.onupgradeneeded = () => opening.result.createObjectStore("files");
+  const database = await done(opening);
+  const given = files.map(({ name, data }) => ({ name, data: data.slice().buffer }));
+  await done(database.transaction("files", "readwrite").objectStore("files").put(given, "pulled"));
+  database.close();
+}
+
+function done(request) {
+  return new Promise((resolve, reject) => {
+    request.onsuccess = () => resolve(request.result);
+    request.onerror = () => reject(request.error);
+  });
+}

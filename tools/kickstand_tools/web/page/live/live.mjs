@@ -1,0 +1,151 @@
+// Shows what a board streams, keeps it as a log, and fetches the rides that the board has recorded: `kickstand record` and
+// `kickstand pull` on CPython for WebAssembly (web/cable_guest.py).
+
+import { choosePort, inPages, overCable, python, showIfAble } from "../cable/cable.mjs";
+import { keepOffline } from "../offline.mjs";
+import { Chart } from "./chart.mjs";
+import { busy, offer } from "./files.mjs";
+import { Gauge } from "./gauge.mjs";
+import { Player } from "./player.mjs";
+
+const byId = (id) => document.getElementById(id);
+const gauge = new Gauge(byId("gauge"));
+const chart = new Chart(byId("chart"));
+const player = new Player();
+const guests = () => (loaded ??= python(true).then((made) => made.pyimport("kickstand_tools.web.cable_guest")));
+let loaded; // once for all: no board is posed here
+let live; // the Live of cable_guest.py that runs, or null
+let stopped = false;
+let awake = null; // a WakeLockSentinel
+let aligned = false;
+let furthest = [0, 0];
+
+const tell = (text) => (byId("live-said").textContent = text);
+
+/** Listen until the rider stops it or the board is gone. After a new alignment another log begins. */
+async function start() {
+  const port = await choosePort(tell);
+  if (!port) return;
+  stopped = false;
+  atWork(true);
+  tell("Loading the tools …");
+  const guest = await guests();
+  await stayAwake();
+  let said = null;
+  for (let again = false; !stopped; again = true) {
+    player.restart();
+    furthest = [0, 0];
+    tell("The board starts …");
+    live = guest.Live();
+    said = JSON.parse(await overCable(port, tell, (line, name) => live.run.callPromising(line, name, heard), again));
+    keep(live);
+    live = null;
+    if (!said?.changed) break;
+  }
+  awake?.release();
+  atWork(false);
+  if (!said && stopped) tell("Stopped.");
+  if (said) tell(said.refused ? `${inPages(said.refused)}.` : inPages(["Stopped", ...said.notes].join(". ")) + ".");
+}
+
+/** Keep the screen on, where the browser can. It ends that itself when the page is covered. */
+async function stayAwake() {
+  awake = await navigator.wakeLock?.request("screen").catch(() => null);
+}
+
+function heard(text) {
+  const reading = JSON.parse(text);
+  aligned = reading.aligned;
+  furthest = [reading.max_left_deg, reading.max_right_deg];
+  player.take(reading.moments, performance.now());
+  tell(`${aligned ? "Recording" : "Recording; the board is not aligned yet, so there is no lean"}: ${clock(reading.seconds)}`);
+}
+
+function stop() {
+  stopped = true;
+  live?.stop();
+  tell("Stopping …");
+}
+
+function keep(live) {
+  const files = byName(live.files());
+  if (files.length) offer(byId("files"), `Live, until ${new Date().toLocaleTimeString()}`, files);
+}
+
+async function pull() {
+  const say = (text, share = null) => {
+    byId("pull-said").textContent = text;
+    byId("pull-bar").hidden = share === null;
+    byId("pull-bar").value = share ?? 0;
+  };
+  const port = await choosePort(say);
+  if (!port) return;
+  atWork(true, false);
+  say("Loading the tools …", 0);
+  const guest = await guests();
+  const result = await overCable(port, say, (line, name) => {
+    say("Asking the board …", 0);
+    return guest.pull.callPromising(line, name, (what, done, total) => say(what, total ? done / total : 0));
+  });
+  atWork(false);
+  if (!result) return;
+  const { refused, rides } = JSON.parse(result.get(0));
+  const files = byName(result.get(1));
+  for (const { number, log, seconds, readings } of rides) {
+    const stem = log?.replace(".csv.gz", "");
+    const title = `Ride ${number}: ${clock(seconds)}, ${readings} readings`;
+    if (log) offer(byId("files"), title, files.filter(({ name }) => name.startsWith(`${stem}.`)));
+  }
+  const problems = [...rides.flatMap((ride) => ride.problems), ...(refused ? [inPages(refused)] : [])];
+  const none = refused ? "" : "There are no rides on the board: its menu’s “Record ride” makes one";
+  const sum = rides.length ? `${rides.length} rides are here: save them. They stay on the board too` : none;
+  say([sum, ...problems].filter(Boolean).join(". ") + ".");
+}
+
+/** Of Python's [(name, bytes)]. */
+function byName(list) {
+  return list.toJs().map(([name, data]) => ({ name, data }));
+}
+
+function atWork(on, listening = on) {
+  for (const id of ["start", "pull"]) byId(id).disabled = on;
+  byId("start").hidden = listening;
+  byId("stop").hidden = !listening;
+  busy(on);
+}
+
+function clock(seconds) {
+  return `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
+}
+
+let drawn = null;
+
+function draw(nowMs) {
+  const { moment, until } = player.now(nowMs);
+  const key = `${moment} ${until} ${innerWidth} ${matchMedia("(prefers-color-scheme: dark)").matches}`;
+  if (key !== drawn) {
+    drawn = key;
+    const lean = moment?.[1] ?? null;
+    gauge.show(lean, ...furthest);
+    chart.draw(player.moments, until);
+    put("lean", lean === null ? "--" : `${Math.abs(Math.round(lean))}°`);
+    put("side", lean === null || Math.round(lean) === 0 ? "\u00a0" : lean < 0 ? "left" : "right");
+    put("forward", moment ? `${moment[2] < 0 ? "−" : "+"}${Math.abs(moment[2]).toFixed(2)} g` : "--");
+    put("max-left", furthest[0] ? `${Math.round(furthest[0])}°` : "--");
+    put("max-right", furthest[1] ? `${Math.round(furthest[1])}°` : "--");
+  }
+  requestAnimationFrame(draw);
+}
+
+function put(id, text) {
+  if (byId(id).textContent !== text) byId(id).textContent = text;
+}
+
+showIfAble(byId("live-form"), byId("live-unable"));
+byId("pull").disabled = byId("live-form").hidden;
+byId("start").addEventListener("click", start);
+byId("stop").addEventListener("click", stop);
+byId("pull").addEventListener("click", pull);
+document.addEventListener("visibilitychange", () => live && !document.hidden && stayAwake());
+requestAnimationFrame(draw);
+keepOffline();
