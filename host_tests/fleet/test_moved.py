@@ -69,6 +69,10 @@ def test_blocks_that_agree_by_chance_are_not_believed_to_the_end(bus):
     found = compare(alike, alike)
     varied = evidence.fits(np.sum(alike.square, axis=0), np.sum(alike.product, axis=0))[1]
     assert found and found[0] == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
+    least = int(np.argmin(whole.square[:, 1, 1]))
+    assert compare(alike, whole.part(slice(least, least + 1))) is None  # too few, and too little braking
+    cruised = evidence.Blocks(*(np.repeat(getattr(whole, name)[least : least + 1], 30, axis=0) for name in names))
+    assert compare(alike, cruised) is None
     assert found[1] ** 2 == pytest.approx(2.0 * moved.ROAD_DEG**2 + [0.0, 2.0 * 0.4**2 / np.sum(varied), 0.0], rel=0.01)
 
 
