@@ -3,6 +3,7 @@
 from math import atan2, cos, degrees, pi, radians, sin, sqrt
 
 from bike_motion import DT_S, DT_US, GRAVITY_MPS2, felt, near
+from kickstand.lean.bike_model import LEAN, SPEED
 from kickstand.lean.lean_filter import LeanFilter
 
 LEVEL, NO_RATE = [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]
@@ -99,7 +100,7 @@ def test_over_3_mps_it_rolls():
 
 
 def told(speed_mps, mps2):
-    """Power-on while it speeds up so; after a second the speed is told once, a second late if it is late."""
+    """Power-on while it speeds up so; after half a second the speed is told once."""
     estimator = LeanFilter()
     force = [0.0, 1.0, mps2 / GRAVITY_MPS2]
     feel(estimator, 0.05, [0.0, 1.1, 0.0])
@@ -110,12 +111,32 @@ def told(speed_mps, mps2):
 
 
 def test_a_speed_of_less_than_three_sigma_may_be_none():
-    """Told 4 m/s: while it speeds up by 0.5 m/s^2 that is right to 1.1 m/s, by 2 m/s^2 to 2.2 m/s."""
+    """Told 4 m/s, that is right to 1 m/s; after 0.4 s of lost readings to 1.5 m/s."""
     assert told(4.0, 0.5).rolling
-    assert told(4.0, 2.0).speed_mps > 3.5
-    assert not told(4.0, 2.0).rolling
-    assert told(9.0, 2.0).rolling
-    assert told(12.0, 4.0).speed_mps < 17.0
+    for speed_mps, rolls in ((4.0, False), (9.0, True)):
+        estimator = told(speed_mps, 0.5)
+        estimator.doubt(0.4)
+        assert estimator.speed_mps > 3.5
+        assert estimator.rolling is rolls
+
+
+def speed_sigma_mps(forward_g, before_mps, now_mps):
+    """1 sigma after two speeds, told a second apart, of a bike that feels such a force."""
+    estimator = LeanFilter()
+    force = [0.0, 1.0, forward_g]
+    feel(estimator, 0.05, [0.0, 1.1, 0.0])
+    for speed_mps in (before_mps, now_mps):
+        feel(estimator, 1.0, force)
+        estimator.measure_speed(speed_mps)
+    feel(estimator, 0.5, force)
+    return sqrt(estimator._p.rows[SPEED][SPEED]) * GRAVITY_MPS2
+
+
+def test_a_speed_may_be_late_while_the_told_ones_change_whatever_force_is_felt():
+    """A wrong pitch feigns a force forward, and the speed that would contradict it must not be heard less for that."""
+    steady, changing = speed_sigma_mps(0.0, 12.0, 12.0), speed_sigma_mps(0.0, 6.0, 12.0)
+    assert changing > steady + 0.2
+    near(speed_sigma_mps(0.3, 12.0, 12.0), steady, 0.05)
 
 
 def test_a_told_speed_is_news_once():
@@ -197,8 +218,9 @@ def test_values_that_are_no_numbers_are_forgotten():
     assert sigma_deg(estimator) < 1.0
 
 
-def test_a_speed_of_500_kmh_is_one_and_of_600_is_none():
-    for speed_mps, fits in ((140.0, True), (160.0, False)):
+def test_a_speed_of_850_kmh_is_one_and_of_950_is_none():
+    """A board on its nose seems to speed up by 1 g until its rest is seen, after ten seconds and more."""
+    for speed_mps, fits in ((240.0, True), (260.0, False)):
         estimator = LeanFilter()
         feel(estimator, 0.05, [0.0, 1.2, 0.0])
         restarts = 0
@@ -260,7 +282,7 @@ def test_a_bias_that_is_far_off_is_put_right_at_once_where_rest_is_seen():
             estimator.update(force, rate, DT_US)
         for _ in range(60):
             near(estimator.update(force, rate, DT_US), 20.0, 0.25)
-            near(estimator.pitch_deg, 0.0, 0.15)
+            near(estimator.pitch_deg, 0.0, 0.2)
 
 
 def test_a_sensor_whose_forward_axis_points_up_or_down_comes_to_rest():
@@ -275,19 +297,19 @@ def test_a_sensor_whose_forward_axis_points_up_or_down_comes_to_rest():
             assert rested, (left, up)
 
 
-def trim_after(forward_g):
-    """Whether the trim is measured on a straight; the speed was told while it sped up so."""
+def trim_after(speed_mps, lean_deg):
+    """Whether the trim is measured on a straight where speed and lean are so uncertain."""
     estimator = LeanFilter()
     feel(estimator, 0.1, [0.0, 1.1, 0.0])
-    for _ in range(50):
-        estimator.measure_speed(15.0)
-        estimator.update([0.0, 1.0, forward_g], NO_RATE, DT_US)
     before = estimator.trim.variance
-    feel(estimator, 1.0)
+    estimator._p.set_variance(LEAN, radians(lean_deg) ** 2)
+    estimator._p.set_variance(SPEED, (speed_mps / GRAVITY_MPS2) ** 2)
+    feel(estimator, 0.42)  # a window, and the work on it
     return estimator.trim.variance < before
 
 
-def test_the_trim_is_measured_while_the_speed_is_certain_to_8_mps():
-    """A speed that is told a second late, while the speed changes by so much."""
-    assert trim_after(1.3)
-    assert not trim_after(2.5)
+def test_the_trim_is_measured_while_the_speed_is_certain_to_8_mps_and_the_lean_to_1_4_degrees():
+    assert trim_after(7.5, 1.0)
+    assert not trim_after(8.5, 1.0)
+    assert trim_after(7.5, 1.3)
+    assert not trim_after(7.5, 3.0)

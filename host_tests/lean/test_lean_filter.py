@@ -81,6 +81,38 @@ def test_the_gyros_scale_and_cross_axis_errors_are_found(seed):
     assert np.abs(shown - np.degrees(lean))[late].max() < 2.5
 
 
+def held_from_side_to_side(seconds):
+    """Lean and speed: ten seconds of standing, then turns of 40 s at 38 degrees, directly one after the other."""
+    t = np.arange(int(seconds * HZ)) / HZ
+    lean = np.radians(38.0) * (t > 23.0) * np.where((t - 23.0) % 80.0 < 40.0, 1.0, -1.0)
+    lean = np.convolve(lean, np.full(HZ, 1.0 / HZ), mode="same")
+    return lean, 22.0 * np.clip((t - 10.0) / 8.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize("gain", [0.99, 1.01])
+def test_in_held_turns_the_gyros_scale_is_found_from_the_force_up(gain):
+    """3 % between the rates about left and up are 0.8 degrees of lean at 38; the accelerometer's own error, which would
+    be as much, is seen at rest."""
+    lean, speed = held_from_side_to_side(190.0)
+    still = 10 * HZ
+    force, rate = balanced(190.0, lean, speed)
+    force[still:], rate[still:] = shaken(force[still:], rate[still:])
+    rate[:, 0] *= 1.03
+    error = leans((gain * force).tolist(), rate.tolist()) - np.degrees(lean)
+    for side in (1.0, -1.0):
+        turn = (side * lean > 0.6) & (np.arange(len(lean)) > 63 * HZ)
+        assert np.abs(np.mean(error[turn])) < 0.35
+
+
+def test_a_pose_that_was_not_upright_is_found_in_turns_without_a_straight():
+    lean, speed = held_from_side_to_side(190.0)
+    force, rate = shaken(*balanced(190.0, lean, speed))
+    off = np.radians(1.5)
+    turned = np.array([[np.cos(off), np.sin(off), 0.0], [-np.sin(off), np.cos(off), 0.0], [0.0, 0.0, 1.0]])
+    error = leans((force @ turned.T).tolist(), (rate @ turned.T).tolist()) - np.degrees(lean)
+    assert np.abs(np.mean(error[110 * HZ :])) < 0.3
+
+
 def test_a_given_speed_helps_where_the_ride_began_unseen():
     """Power-on on a straight, a second before a turn: with a speed the lean is right at once."""
     lean, speed = held_turns(120.0)

@@ -32,12 +32,35 @@ def test_on_a_straight_the_balance_is_known_to_one_and_a_half_degrees():
 
 
 def test_in_turns_it_is_known_less():
-    """Tyre width and hanging off: 0.4 of the sine of the lean; and 0.2 s of the yaw rate."""
+    """Turns differ by 0.1 of the sine of the lean, bikes by 0.15, which lasts; and there is 0.1 s of the yaw rate."""
     for lean_deg in (30.0, -30.0):
-        near(disturbance_deg(lean_deg, 0.0), sqrt(1.5**2 + (0.4 * 0.5 * 180.0 / pi) ** 2), 0.1)
+        differ, bike = 0.1 * 0.5, 0.15 * 0.5 * sqrt(WINDOW_S / (2.0 * 2.0))
+        near(disturbance_deg(lean_deg, 0.0), sqrt(1.5**2 + (differ**2 + bike**2) * (180.0 / pi) ** 2), 0.1)
     for yaw_dps in (10.0, -10.0):
-        near(disturbance_deg(0.0, yaw_dps), sqrt(1.5**2 + 2.0**2), 0.02)
+        near(disturbance_deg(0.0, yaw_dps), sqrt(1.5**2 + 1.0**2), 0.02)
     near(disturbance_deg(3.0, 0.0, angle_deg=3.0), 1.5, 0.02)  # the lean that counts is that beyond the trim
+
+
+def after_turns(sides, lean_share):
+    """The trim after turns of a minute at 35 degrees of a bike that feels lean_share sin(lean), its pose off by 2."""
+    trim = UprightTrim(0.0)
+    for side in sides:
+        lean = radians(35.0 * side)
+        for _ in range(300):
+            trim.update(radians(2.0) + lean_share * sin(lean), lean + radians(2.0), -0.35 * side, WINDOW_S)
+    return trim
+
+
+def test_turns_to_both_sides_find_a_pose_that_was_off_by_two_degrees():
+    """Without a straight between them: what tyres and rider add is alike to both sides, and cancels."""
+    for lean_share in (0.0, 0.1, -0.1):
+        near(degrees(after_turns((1, -1, 1, -1), lean_share).angle), 2.0, 0.4)
+
+
+def test_turns_to_one_side_do_not_tell_the_pose_from_the_tyres():
+    one, both = after_turns((1, 1), 0.1), after_turns((1, -1), 0.1)
+    assert sigma_deg(one) > 2.0 * sigma_deg(both)
+    assert sigma_deg(one) > 1.5
 
 
 def test_half_a_minute_of_straights_finds_a_pose_that_was_off_by_two_degrees():

@@ -58,6 +58,8 @@ def test_nothing_is_past_a_motorcycle(rides, name):
         ("sweeper", (15, 53), (17, 33), (6, 35)),
         ("city", (12, 45), (9, 16), (20, 90)),
         ("hills", (28, 50), (11, 21), (25, 110)),
+        ("held", (36, 50), (18, 26), (14, 40)),
+        ("corners", (38, 60), (20, 45), (15, 60)),
     ],
 )
 def test_profiles_reach_their_stated_ranges(rides, name, lean, speed, yaw):
@@ -77,6 +79,8 @@ def test_each_profile_has_what_it_is_named_for(rides):
     turn = rides["sweeper"].phase == "turn"
     assert turn.sum() > 60 * 200
     assert np.abs(rides["sweeper"].truth["lean_deg"][turn]).min() < 60.0
+    lean = rides["held"].truth["lean_deg"][rides["held"].phase == "turn"]
+    assert (lean > 25.0).sum() > 40 * 200 and (lean < -25.0).sum() > 40 * 200
     city = rides["city"]
     assert (
         (city.truth["speed_mps"] == 0.0) & (city.phase == "stopped")

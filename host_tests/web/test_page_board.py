@@ -2,8 +2,10 @@
 
 import pytest
 import serial_line
-from emulated import calibrated, firmware, leaning, pico, shown_lean
+from emulated import calibrated, firmware, leaning, pico, shown_lean, shows
 from kept import recorded, saved, streamed
+from kickstand_tools.simulation.scripted.script import Ride, kickstand, upright
+from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from rider import Rider
 from serial_line import SerialLine
 
@@ -41,5 +43,39 @@ def test_a_board_is_brought_up_to_date_and_watched(chromium, address, tmp_path):
     blocks = streamed(bytes(line.said))
     assert len(blocks) > 1
     assert list(saved(rider, tmp_path).values()) == recorded(blocks)
+    assert rider.errors == []
+    rider.context.close()
+
+
+@pytest.mark.long
+@pytest.mark.chip
+def test_from_an_empty_board_to_its_lean(chromium, address):
+    """All that a rider does: install, unplug, press on the stand and upright. The display shows the lean."""
+    rider = Rider(chromium, address + "install.html")
+    rider.page.add_init_script(serial_line.FAKE)
+    rider.page.reload()
+    line = SerialLine(rider)
+    poses = Ride([kickstand(5.5), upright(5.5), upright(1e6, lean_deg=LEAN_DEG)])
+    part = Sensor(seed=1, share=0.1)  # its accelerometer is not calibrated here: that shall cost no degrees
+    feels, started_s = part.world(poses.motion), 0.0
+    with pico(lambda t_s: feels(max(0.0, t_s - started_s))) as device:
+        device.run(0.5)
+        line.plug_in(device)
+        assert line.look() == "Raspberry Pi Pico with RP2040, MicroPython 1.26.1 is there."
+        assert "files copied and verified" in line.install()
+        assert {path: device.files()[path.strip("/")] for path in firmware()} == firmware()
+        device.power_cycle()
+        shows(device, "On stand: press", 4.0)
+        started_s = device.time_s
+        device.run(2.0)
+        device.press()
+        shows(device, "Now upright: ", 4.5)
+        device.run_until(lambda: poses.truth(device.time_s - started_s)[3] == "upright", 8.0)
+        device.press()
+        shows(device, "Aligned!", 4.5)
+        device.run_until(lambda: poses.truth(device.time_s - started_s)[0] > LEAN_DEG - 0.1, 8.0)
+        device.power_cycle()
+        device.run_until(lambda: shown_lean(device.lcd()) is not None, 4.0)
+        assert abs(shown_lean(device.lcd()) - LEAN_DEG) <= 2.0
     assert rider.errors == []
     rider.context.close()

@@ -21,7 +21,7 @@ Equations, with ' for the derivative by time
                              q' = w_y sin t - w_x cos t                          (2)
     wheels do not slide      v' = f_z - sin q + v w_y psi                        (3)
                              f_x = cos q sin t + v w_y + psi v' - h cos t w_z'   (4)
-                             f_y = cos q cos t - v w_x                           (5)
+                             f_y = cos q cos t - v w_x - h w_z^2                 (5)
     roads are level          0 = q + psi sin t  on average                       (6)
 
 h is the height of the sensor above the roll axis. (4) and (5) are A. Nicolae's (22) and (23) with s = v w. In a
@@ -67,7 +67,7 @@ def predict(x, force, rate, seconds, sums):
     sums (9 values) grows by the sample's values. Divided by the number of samples at the end of a window (the samples
     of a fifth of a second, which make one update of the filter) they are the window's means:
         0       innovation of (4) without its term in h, at the state before the step, in g
-        1       innovation of (5), at the same state, in g
+        1       innovation of (5) without its term in h, at the same state, in g
         2 to 4  corrected rates about left, up, forward, in rad/s
         5 to 7  force left, up, forward, in g
         8       square of innovation 0, in g^2
@@ -179,3 +179,4 @@ class Linearisation:
         )
         self.sin_lean, self.cos_lean, self.sin_pitch, self.cos_pitch = st, ct, sq, cq
         self.speed, self.yaw_rate, self.sideways, self.acceleration = speed, yaw_rate, sideways, acceleration
+        self.pitch_rate = wy * st - wx * ct

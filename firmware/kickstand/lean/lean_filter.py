@@ -24,7 +24,7 @@ FIRST_WINDOW_US = 50_000
 PIECES = 21  # of the work on a window; a test counts them
 SLOW_STEP_US = 12_000  # samples that are further apart leave time for all pieces at once
 DELAY_S = 0.0048  # of the MPU6050's gyro at DLPF 3
-MAX_SPEED = 150.0 / STANDARD_GRAVITY
+MAX_SPEED = 250.0 / STANDARD_GRAVITY  # g s: of a board that lies on its nose, before its rest is seen, under it
 
 
 class LeanFilter:
@@ -37,6 +37,7 @@ class LeanFilter:
         self.trim = UprightTrim(trim)
         self._delay_s = delay_s
         self._p = None
+        self._force_error = 0.0  # of the accelerometer at rest, where the force is 1 g; as a share of it
         self.restart()
 
     def restart(self):
@@ -50,7 +51,8 @@ class LeanFilter:
         self._x = x
         self._p = None
         self._rest = RestDetector(not self._kept)
-        self._given_speed = None
+        self._given_speed = self._told_speed = None  # the latest, until a window takes it; the one before
+        self._told_s = 0.0  # since the one before
         self._work = None
         self._pieces = 1  # of the work, in each sample
         self._sums = [0.0] * 9  # see predict()
@@ -195,6 +197,8 @@ class LeanFilter:
         for i in range(BIAS_LEFT, BIAS_LEFT + 3):
             p.add_noise(i, measurements.NOISE_BIAS**2 * seconds)
         if self._rest.resting:
+            size = sqrt(means[5] * means[5] + means[6] * means[6] + means[7] * means[7])
+            self._force_error += measurements.REST_FORCE_SHARE * (size - 1.0 - self._force_error)
             self._axis = (self._axis + 1) % 3
             for measurement in measurements.at_rest(model, means, self._x[SPEED], self._axis):
                 yield from p.update(*measurement)
@@ -205,16 +209,20 @@ class LeanFilter:
     def _update_ride(self, model, means, seconds, roll_acceleration):
         """By the forces, the road, the speed or a straight; and the trim of upright."""
         p, x = self._p, self._x
-        for measurement in measurements.forces(model, means, roll_acceleration):
+        for measurement in measurements.forces(model, means, roll_acceleration, self._force_error):
             yield from p.update(*measurement)
         yield from p.update(*measurements.level_road(model, x, seconds))
         lean, speed, given = x[LEAN] - self.trim.angle, x[SPEED], self._given_speed
+        self._told_s += seconds
         if given is not None:
-            self._given_speed = None
-            yield from p.update(*measurements.given_speed(given, speed, model.acceleration))
+            # By the given speeds alone: an acceleration that a wrong pitch feigns must not make them count for less.
+            acceleration = 0.0 if self._told_speed is None else (given - self._told_speed) / self._told_s
+            self._given_speed, self._told_speed, self._told_s = None, given, 0.0
+            yield from p.update(*measurements.given_speed(given, speed, acceleration))
         else:
             yield from p.update(*measurements.straight_or_usual_speed(lean, speed, model.yaw_rate, seconds))
         certain = p.rows[SPEED][SPEED] < measurements.SIGMA_TRIM_SPEED**2
+        certain = certain and p.rows[LEAN][LEAN] < measurements.SIGMA_TRIM_LEAN**2
         if certain and model.speed > measurements.STRAIGHT_MIN_SPEED:
             sideways = (means[5] - model.acceleration * x[YAW_ERROR]) / max(means[6], 0.5)
             self.trim.update(sideways, x[LEAN], model.yaw_rate, seconds)

@@ -27,11 +27,11 @@ SIGMA_START = (  # Larger, each: found sooner, but the other states' errors are 
     radians(1.0),  # rad/s: up
     radians(1.0),  # rad/s: forward
     radians(5.0),  # rad: yaw error of the kickstand pose
-    0.010,  # of 1: scale of the gyro's left axis; most chips, of 0.03 allowed
-    0.010,  # of 1: cross-axis, left of up; most chips, of 0.02 allowed
-    0.010,  # of 1: cross-axis, forward of left
-    0.010,  # of 1: cross-axis, forward of up
-    0.010,  # of 1: scale of the forward axis
+    0.020,  # of 1: scale of the gyro's left axis against that of its up axis; 0.03 is allowed to each
+    0.014,  # of 1: cross-axis, left of up; 0.02 is allowed
+    0.014,  # of 1: cross-axis, forward of left
+    0.014,  # of 1: cross-axis, forward of up
+    0.014,  # of 1: scale of the forward axis
 )
 SIGMA_START_LEAN_MOVING = radians(30.0)  # rad: lean under way. Larger: lean is shown later, and follows forces more.
 USUAL_SPEED = 15.0 / STANDARD_GRAVITY  # g s: where nothing tells it. Larger: leans begun before the start are larger.
@@ -46,9 +46,10 @@ SIGMA_LOST_FORCE = 0.3  # g: forward. Larger, both: after a gap the lean is hidd
 
 # Measurement noise while riding
 SIGMA_LEFT = 0.04  # g: of the force to the left. Larger: lean follows it less, and the gyro and level roads more.
-SIGMA_UP = 0.4  # g: of the force up, which bumps disturb. Larger: speed is found later.
+SIGMA_UP = 0.07  # g: of the force up, which bumps disturb. Larger: in held turns scale errors are found later.
+PITCHING_SHARE = 2.0  # of 1: of the pitch rate that springs may be to blame for. Larger: braking disturbs less.
 SHAKEN_SHARE = 0.1  # of 1: of vibration's variance that a mean keeps. Larger: forces count less on rough roads.
-ROLL_HEIGHT_M = 0.4  # m: h, of the sensor above the roll axis. Larger: roll acceleration explains more of the force.
+ROLL_HEIGHT_M = 0.4  # m: h, of the sensor above the roll axis. Larger: rolling explains more of the force.
 SIGMA_ROLL_HEIGHT_M = 0.4  # m. Larger: forces count less while the bike rolls quickly.
 SIGMA_GIVEN_SPEED = 1.0 / STANDARD_GRAVITY  # g s: of a receiver or a wheel sensor. Larger: it counts for less.
 GIVEN_SPEED_LATE_S = 1.0  # s: how late it may be. Larger: it counts for less while speeding up and braking.
@@ -69,23 +70,37 @@ USUAL_SPEED_S = 60.0  # s: how long a speed lasts. Larger: less pull towards USU
 SIGMA_STAND = radians(0.5)  # rad: of lean and pitch by the force on coming to rest. Larger: later forces count more.
 SIGMA_REST_RATE = radians(0.05)  # rad/s: of the gyro. Larger: bias is found later.
 SIGMA_REST_FORCE = 0.02  # g: of the force, with the engine idling. Larger: lean settles later.
+REST_FORCE_SHARE = 0.1  # of 1: weight of a window in the mean force at rest. Larger: found sooner, less steady.
 SIGMA_REST_SPEED = 0.02 / STANDARD_GRAVITY  # g s: of a speed of zero. Larger: it is less surely zero.
 MAX_REST_PUSH = 0.08  # g: forward force not from pitch; more is braking. Larger: steady braking is taken for standing.
 ROLLING_SPEED = 3.0 / STANDARD_GRAVITY  # g s: an estimate above it is no standstill, if the next line holds too.
 ROLLING_SIGMAS = 3.0  # speed over its standard deviation. Larger, both: a smooth road is mistaken for rest.
-# g s: the trim is measured while the speed is more certain than this. Larger: found sooner, less surely.
-SIGMA_TRIM_SPEED = 8.0 / STANDARD_GRAVITY
+# The trim is measured while speed and lean are more certain than this. Larger, both: found sooner, less surely.
+SIGMA_TRIM_SPEED = 8.0 / STANDARD_GRAVITY  # g s
+SIGMA_TRIM_LEAN = radians(1.4)  # rad
 
 
-def forces(model, means, roll_acceleration):
-    """Two: the force to the left, (4), and up, (5). roll_acceleration: rad/s^2 divided by standard gravity."""
+def forces(model, means, roll_acceleration, force_error):
+    """Two: the force to the left, (4), and up, (5). roll_acceleration: rad/s^2 divided by standard gravity.
+    force_error: of the accelerometer, as a share of the force."""
     uncertain = SIGMA_ROLL_HEIGHT_M * roll_acceleration
     left = means[0]
     shaken = max(0.0, means[8] - left * left)
     left_variance = SIGMA_LEFT**2 + SHAKEN_SHARE * shaken + uncertain**2
     left += ROLL_HEIGHT_M * roll_acceleration * model.cos_lean
-    up_variance = SIGMA_UP**2 + (uncertain * model.sin_lean) ** 2
-    return (model.left_row, left, left_variance), (model.up_row, means[1], up_variance)
+    # In a held turn a force up of 1 / cos(lean) tells the lean, whatever the gyro's scale: a window says little, a
+    # minute much, if nothing in it is always wrong to the same side.
+    square = means[4] * means[4] / STANDARD_GRAVITY
+    up = means[1] + ROLL_HEIGHT_M * square - force_error * means[6]
+    # Where the springs pitch the bike its wheels do not rise, though v w_x says so.
+    pitching = PITCHING_SHARE * model.speed * model.pitch_rate
+    up_variance = (
+        SIGMA_UP**2
+        + pitching * pitching
+        + SIGMA_ROLL_HEIGHT_M**2 * square * square
+        + (uncertain * model.sin_lean) ** 2
+    )
+    return (model.left_row, left, left_variance), (model.up_row, up, up_variance)
 
 
 def level_road(model, x, seconds):

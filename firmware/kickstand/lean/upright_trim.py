@@ -1,7 +1,9 @@
 """The lean at which the bike is balanced, where the upright pose of the alignment was not quite upright.
 
 A bike in balance feels no force to the side. What it feels on straights, on average, is the angle between the
-alignment's upright and the balance, plus the accelerometer's drift. Both are to be taken off the lean.
+alignment's upright and the balance, plus the accelerometer's drift. Both are to be taken off the lean. In turns it
+also feels that its tyres are wide and its rider hangs off; what turns to the left and to the right have in common is
+again the trim.
 """
 
 from math import radians, sin
@@ -11,15 +13,16 @@ MAX_TRIM = radians(3.5)  # rad: a pose off by 2 degrees, and the rest of the acc
 SIGMA_START = radians(2.5)  # rad: of a new pose. Larger: trim is found sooner, and less steady.
 SIGMA_KEPT = radians(0.7)  # rad: of a trim kept from an earlier, colder or hotter ride. Larger: as above.
 SIGMA_STRAIGHT = radians(1.5)  # rad: of the balance, by rider, camber and wind. Larger: found later, steadier.
-SIGMA_TURN = 0.4  # of sin(lean): in turns tyre width and hanging off add to the force. Larger: turns count less.
-SIGMA_YAW_S = 0.2  # rad per rad/s of yaw rate. Larger: turns count less.
-MAX_SIDEWAYS = 0.1  # of the force up. Larger: a bike that is pushed, or a sensor in a hand, counts as balanced.
+SIGMA_LEAN_SHARE = 0.15  # of sin(lean): of a bike's force to the side in turns. Larger: turns to one side count less.
+SIGMA_TURN = 0.1  # of sin(lean): by which turns differ in it, as a rider hangs off or not. Larger: turns count less.
+SIGMA_YAW_S = 0.1  # rad per rad/s of yaw rate. Larger: turns count less.
+MAX_SIDEWAYS = 0.1  # of the force up, from what is expected. Larger: a sensor in a hand counts as balanced.
 DISTURBANCE_S = 2.0  # s: how long such a disturbance lasts. Larger: found later, steadier.
 NOISE = radians(0.01)  # rad per square root of a second. Larger: a change during the ride is followed sooner.
 
 
 class UprightTrim:
-    """A Kalman filter of one state. angle: the trim in rad, to take off the lean, within MAX_TRIM. variance: its
+    """A Kalman filter of two states. angle: the trim in rad, to take off the lean, within MAX_TRIM. variance: its
     uncertainty, rad^2. Both are read only.
 
     angle at the start: what was found on earlier rides, 0 if nothing was.
@@ -28,16 +31,29 @@ class UprightTrim:
     def __init__(self, angle):
         self.angle = angle
         self.variance = (SIGMA_START if angle == 0.0 else SIGMA_KEPT) ** 2
+        # The second state: wide tyres and riders lean a bike more or less than balance would, alike to both sides
+        self._lean_share = 0.0  # of sin(lean)
+        self._share_variance = SIGMA_LEAN_SHARE**2
+        self._covariance = 0.0
 
     def update(self, sideways, lean, yaw_rate, seconds):
         """sideways: force to the left over force up while riding. lean (rad) and yaw_rate (rad/s) tell turns from
         straights. seconds: since the update before."""
-        if not -MAX_SIDEWAYS < sideways < MAX_SIDEWAYS:
+        sine = sin(lean - self.angle)
+        innovation = sideways - self.angle - sine * self._lean_share
+        if not -MAX_SIDEWAYS < innovation < MAX_SIDEWAYS:
             return
-        turn = SIGMA_TURN * sin(lean - self.angle)
+        turn = SIGMA_TURN * sine
         yaw = SIGMA_YAW_S * yaw_rate
         noise = (SIGMA_STRAIGHT**2 + turn * turn + yaw * yaw) * 2.0 * DISTURBANCE_S / seconds
         self.variance += NOISE**2 * seconds
-        gain = self.variance / (self.variance + noise)
-        self.angle = max(-MAX_TRIM, min(MAX_TRIM, self.angle + gain * (sideways - self.angle)))
-        self.variance *= 1.0 - gain
+        # P H^T of the measurement sideways = angle + lean_share sin(lean), H = (1, sin(lean))
+        angle_gain = self.variance + sine * self._covariance
+        share_gain = self._covariance + sine * self._share_variance
+        expected = angle_gain + sine * share_gain + noise
+        innovation /= expected
+        self.angle = max(-MAX_TRIM, min(MAX_TRIM, self.angle + angle_gain * innovation))
+        self._lean_share += share_gain * innovation
+        self.variance -= angle_gain * angle_gain / expected
+        self._covariance -= angle_gain * share_gain / expected
+        self._share_variance -= share_gain * share_gain / expected

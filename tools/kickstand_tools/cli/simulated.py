@@ -18,8 +18,8 @@ _UPRIGHT_ERROR = click.option(
 
 # The names in simulation.profiles. Importing that needs numpy, which would slow every command down.
 _PROFILES = (
-    "street, track, sweeper, city, hills; hard ones: banked, wheelie, bumps, crosswind, weight, vibration, creep, "
-    "temperature, fall, parked"
+    "street, track, sweeper, city, hills; hard ones: held, corners, banked, wheelie, bumps, crosswind, weight, "
+    "vibration, creep, temperature, fall, parked"
 )
 
 

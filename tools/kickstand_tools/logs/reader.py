@@ -118,10 +118,8 @@ def read_twice(source: Source) -> Source:
 
 
 def apart(source: Source) -> tuple[File | Log, Stretch | None]:
-    """The whole log, and the stretch of it that is wanted, with times from the log's beginning; None: all of it.
-
-    Raises InputError where the stretch holds no sample.
-    """
+    """The whole log, and the stretch of it that is wanted, with times from the log's beginning; None: all of it. Raises
+    InputError where the stretch holds no sample."""
     if not isinstance(source, Stretch):
         return source, None
     stretch = _from_beginning(replace(source, source=_again(source.source)))
@@ -211,10 +209,7 @@ def _numbers(
     of a mistake and is twenty times slower.
     """
     if text.strip() and not text.translate(None, _NUMERIC):
-        plain = text.replace(b",,", b",nan,")
-        if len(plain) > len(text):  # of three commas the second is still beside the third
-            plain = plain.replace(b",,", b",nan,")
-        plain = plain.replace(b",\n", b",nan\n")
+        plain = text.replace(b",,", b",nan,").replace(b",,", b",nan,").replace(b",\n", b",nan\n")
         try:
             table = np.loadtxt(io.BytesIO(plain), delimiter=",", comments=None, ndmin=2)
         except ValueError:

@@ -19,7 +19,7 @@ from ..logs.csv_lines import joined_cells, number_cells, text_cells, write_lines
 from ..logs.reader import Source, apart, read_blocks, read_twice
 from ..logs.source import Progress, total_bytes
 from ..logs.table import Array, Table
-from . import replay_engine, second_process
+from . import replay_engine
 from .meter_along import MeterAlong
 from .mount_check import MountCheck
 
@@ -145,6 +145,8 @@ def _cpython(
 def _two_processes(
     log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
 ) -> Iterator[Replayed]:
+    from . import second_process  # a browser's Python cannot import it
+
     return second_process.columns_of(read_blocks(log, 2, progress, notices), calibration)
 
 

@@ -166,6 +166,8 @@ MAIN: dict[str, Callable[[Plan], Conditions]] = {
     "hills": hills,
 }
 PROFILES: dict[str, Callable[[Plan], Conditions]] = MAIN | {
+    "held": stress.held,
+    "corners": stress.corners,
     "banked": lambda plan: stress.banked(plan, street),
     "wheelie": lambda plan: stress.wheelie(plan),
     "bumps": lambda plan: stress.bumps(plan),

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from .physics.road import CLASS_B, CLASS_C
+from .physics.road import CLASS_A, CLASS_B, CLASS_C
 from .plan import Conditions, Plan
 
 Profile = Callable[[Plan], Conditions]
@@ -78,6 +78,38 @@ def weight(plan: Plan, road: Profile) -> Conditions:
         )
     conditions.sway_m = 0.004
     return conditions
+
+
+def held(plan: Plan) -> Conditions:
+    """Turns of 60 s at 38 degrees to either side, directly one after the other, by a rider who moves about.
+
+    No straight tells what is upright, and for a minute nothing but the sensor's errors can change the lean.
+    """
+    plan.begin()
+    plan.slope_percent = 1.5
+    speed = plan.uniform(18.0, 25.0)
+    plan.to_speed(speed, 2.5)
+    plan.straight(5.0)
+    lean = plan.side() * 35.0  # of the centre of mass: the tyres' width adds 3 degrees to the bike's
+    while plan.going_on:
+        plan.turn(lean, speed, seconds=60.0, roll_s=2.0)
+        lean = -lean
+    plan.finish(speed, 3.0)
+    return Conditions(CLASS_B * plan.uniform(0.4, 1.2), plan.uniform(0.05, 0.2), unrest_deg=1.5, sway_m=0.01)
+
+
+def corners(plan: Plan) -> Conditions:
+    """Corners of 30 to 55 degrees and 3 to 7 s, with few and short straights, by a rider who moves about."""
+    plan.begin()
+    plan.slope_percent, plan.roll_dps = 3.0, 80.0
+    plan.to_speed(28.0, 4.0)
+    while plan.going_on:
+        lean = plan.side() * plan.uniform(27.0, 50.0)
+        plan.turn(lean, plan.uniform(18.0, 33.0), seconds=plan.uniform(3.0, 7.0), roll_s=1.0)
+        if plan.likely(0.4):
+            plan.straight(plan.uniform(2.0, 5.0), plan.speed + plan.uniform(0.0, 8.0))
+    plan.finish(28.0, 4.0)
+    return Conditions(CLASS_A * plan.uniform(0.7, 1.5), plan.uniform(0.08, 0.2), unrest_deg=1.5, sway_m=0.01)
 
 
 def vibration(plan: Plan, road: Profile) -> Conditions:
