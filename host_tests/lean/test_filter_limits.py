@@ -129,6 +129,7 @@ def speed_sigma_mps(forward_g, before_mps, now_mps):
         feel(estimator, 1.0, force)
         estimator.measure_speed(speed_mps)
     feel(estimator, 0.5, force)
+    assert estimator._p is not None
     return sqrt(estimator._p.rows[SPEED][SPEED]) * GRAVITY_MPS2
 
 
@@ -302,6 +303,7 @@ def trim_after(speed_mps, lean_deg):
     estimator = LeanFilter()
     feel(estimator, 0.1, [0.0, 1.1, 0.0])
     before = estimator.trim.variance
+    assert estimator._p is not None
     estimator._p.set_variance(LEAN, radians(lean_deg) ** 2)
     estimator._p.set_variance(SPEED, (speed_mps / GRAVITY_MPS2) ** 2)
     feel(estimator, 0.42)  # a window, and the work on it

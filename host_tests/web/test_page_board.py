@@ -76,6 +76,6 @@ def test_from_an_empty_board_to_its_lean(chromium, address):
         device.run_until(lambda: poses.truth(device.time_s - started_s)[0] > LEAN_DEG - 0.1, 8.0)
         device.power_cycle()
         device.run_until(lambda: shown_lean(device.lcd()) is not None, 4.0)
-        assert abs(shown_lean(device.lcd()) - LEAN_DEG) <= 2.0
+        assert shown_lean(device.lcd()) == pytest.approx(LEAN_DEG, abs=2.0)
     assert rider.errors == []
     rider.context.close()

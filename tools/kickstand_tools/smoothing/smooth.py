@@ -11,7 +11,7 @@ from kickstand.errors import Notice
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
 from ..logs.block import Block
-from ..logs.csv_lines import write_table
+from ..logs.csv_lines import joined_cells, number_cells, text_cells, write_lines
 from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import Progress, name_of
 from ..logs.table import Array, Table
@@ -71,14 +71,13 @@ def smooth_to_csv(
     """
     count, notices = 0, []
 
-    def rows() -> Iterator[list[str]]:
+    def lines() -> Iterator[bytes]:
         nonlocal count
         for block, found in _checked_blocks(log, calibration, progress, notices):
             count += len(found)
-            for time, (lean, sigma, pitch, speed) in zip(block.time_text, found.tolist(), strict=True):
-                yield [time, f"{lean:.3f}", f"{sigma:.3f}", f"{pitch:.3f}", f"{speed:.3f}"]
+            yield joined_cells([text_cells(block.time_text), *(number_cells(column, 3) for column in found.T)])
 
-    write_table(out, ("t_s", *COLUMNS), rows())
+    write_lines(out, ("t_s", *COLUMNS), lines())
     return count, notices
 
 
