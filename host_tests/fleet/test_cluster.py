@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections import Counter
@@ -149,6 +151,41 @@ def test_a_journal_whose_end_was_cut_or_whose_disk_is_full_loses_no_line(tmp_pat
                 full.add("b", result)
         with Journal(tmp_path / "full.jsonl") as again:
             assert "a" in again and "b" not in again
+
+
+def test_a_journal_that_is_none_is_told(tmp_path):
+    for text in ("nonsense\n", "[]\n", '{"key": 1}\n'):
+        (tmp_path / "journal.jsonl").write_text(text)
+        with pytest.raises(InputError, match="is damaged: remove it, and all is worked out again"):
+            Journal(tmp_path / "journal.jsonl").__enter__()
+        assert (tmp_path / "journal.jsonl").read_text() == text
+
+
+PROGRAM = """
+from kickstand_tools.fleet.cluster import Cluster
+if __name__ == "__main__":
+    print("starting", flush=True)
+    with Cluster(None, 2, 60.0):
+        print("started", flush=True)
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="Ctrl-C comes at once on this system")
+@pytest.mark.parametrize("after_s", [0.6, 1.6])
+def test_ctrl_c_while_workers_start_is_heard_when_they_have(tmp_path, after_s):
+    """Stopped at once they would print pages of what failed."""
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM)
+    command, pipe = [sys.executable, str(program)], subprocess.PIPE
+    with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, start_new_session=True) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == "starting\n"
+        time.sleep(after_s)
+        os.killpg(process.pid, signal.SIGINT)  # as a terminal does: to the workers, too
+        said, trouble = process.communicate(timeout=120)
+    assert said == ""
+    assert trouble.count("Traceback") == 1
+    assert trouble.endswith("KeyboardInterrupt\n")
 
 
 def test_no_scheduler_is_told(monkeypatch):

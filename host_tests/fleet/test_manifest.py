@@ -67,6 +67,8 @@ def test_the_command_refuses_in_one_line_and_writes_nothing(tmp_path, monkeypatc
         ((good, "--out", out, "--scheduler", "tcp://127.0.0.1:9"), "no workers at tcp://127.0.0.1:9"),
         ((good, "--out", out, "--scheduler", "nonsense://x"), "no workers at nonsense://x"),
         (("gone://store/MANIFEST.csv", "--out", out), "gone://store/MANIFEST.csv"),
+        ((tmp_path, "--out", out), f"is a directory: give {tmp_path}/MANIFEST.csv, or a pattern"),
+        (("1.csv", "2.csv", "--out", out), "One manifest, or one pattern in quotation marks"),
     ):
         command.refused(tmp_path, "fleet", *arguments, words=words)
 

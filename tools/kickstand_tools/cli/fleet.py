@@ -4,7 +4,7 @@ import click
 
 
 @click.command(short_help="Align many vehicles, find moved mounts, test their brakes.")
-@click.argument("manifest", metavar="MANIFEST.csv|GLOB")
+@click.argument("manifests", nargs=-1, required=True, metavar="MANIFEST.csv|GLOB")
 @click.option("--out", required=True, metavar="DIR", help="The directory to write to, or a place like s3://...")
 @click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, tcp://...; this computer if not given.")
 @click.option("--workers", type=click.IntRange(min=1), help="On this computer; one a processor if not given.")
@@ -22,7 +22,13 @@ import click
     help="What the logs of a GLOB are of; a manifest says it itself.",
 )
 def fleet(
-    manifest: str, out: str, scheduler: str | None, workers: int | None, signals: bool, timeout: float, vehicle: str
+    manifests: tuple[str, ...],
+    out: str,
+    scheduler: str | None,
+    workers: int | None,
+    signals: bool,
+    timeout: float,
+    vehicle: str,
 ) -> None:
     """Align a whole fleet, find mounts that moved, and measure its brake tests.
 
@@ -34,9 +40,16 @@ def fleet(
     from ..fleet.run import run_fleet
     from ..progress import Bar
 
+    manifest = manifests[0]
+    if len(manifests) > 1:  # the shell has put names into the place of a pattern
+        raise click.UsageError("One manifest, or one pattern in quotation marks.")
     periods = by_pattern(manifest, vehicle) if is_pattern(manifest) else read_manifest(manifest)
-    with Bar("vehicles", lines_s=10.0, patience_s=0.0) as bar:
-        found = run_fleet(periods, out, scheduler, workers, signals, timeout, bar.reach)
+    try:
+        with Bar("vehicles", lines_s=10.0, patience_s=0.0) as bar:
+            found = run_fleet(periods, out, scheduler, workers, signals, timeout, bar.reach)
+    except KeyboardInterrupt:
+        click.echo("what is finished is kept, the same command goes on", err=True)
+        raise
     before = found.vehicles - found.new
     done = f", {before} of them finished before" if before else ""
     click.echo(f"{found.vehicles} vehicles and mounts{done}")
@@ -47,4 +60,8 @@ def fleet(
         click.echo(f"{count:7}  {status}: {reason}")
     tests = len(seen.decelerations[1])
     click.echo(f"mounts that moved: {seen.moved_count}; brake tests: {tests}; rows of errors: {seen.errors}")
+    for path, message in seen.first_errors:
+        click.echo(f"error: {path}: {message}")
+    if seen.errors > len(seen.first_errors):
+        click.echo("more errors are in errors.parquet")
     click.echo(f"written: {out}/index.html, alignments.parquet, moved.parquet, brake_tests.parquet, errors.parquet")

@@ -13,6 +13,7 @@ import signal
 import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from multiprocessing import resource_tracker
 from typing import Any
 
 from ..errors import InputError, cause, extra
@@ -77,8 +78,9 @@ class Cluster:
         )
         try:
             if self._address is None:
-                cluster = LocalCluster(n_workers=self._wanted, threads_per_worker=1, dashboard_address=":0")
-                self._stack.callback(lambda: cluster.close(timeout=5))
+                with _undisturbed():
+                    cluster = LocalCluster(n_workers=self._wanted, threads_per_worker=1, dashboard_address=":0")
+                    self._stack.callback(lambda: cluster.close(timeout=5))
                 self._client = Client(cluster)
                 self._client.register_plugin(Undisturbed())
             else:
@@ -86,8 +88,10 @@ class Cluster:
             self._stack.callback(lambda: self._client.close(timeout=2))
             patience_s = _LOCAL_PATIENCE_S if self._address is None else _REMOTE_PATIENCE_S
             self._client.wait_for_workers(1, timeout=patience_s)
-        except (OSError, TimeoutError, ValueError) as error:
-            self._stack.close()
+        except BaseException as error:  # Ctrl-C, too
+            self.__exit__()
+            if not isinstance(error, (OSError, TimeoutError, ValueError)):
+                raise
             where = self._address or "this computer"
             raise InputError(f"no workers at {where}: {cause(error)}") from error
         self._started: dict[str, tuple[float, str]] = {}  # by key: when it began, and on which worker
@@ -168,6 +172,21 @@ class Cluster:
     def _hear(self, event: tuple[float, Any]) -> None:
         _, (key, worker) = event
         self._started[key] = time.monotonic(), worker
+
+
+@contextlib.contextmanager
+def _undisturbed() -> Iterator[None]:
+    """Ctrl-C waits until the end of the `with`: processes that are stopped while they start print pages of what failed.
+    Those that are started within never hear of it."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    resource_tracker.ensure_running()  # Python starts it with the first process, and lets Ctrl-C through again then
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _silence() -> None:

@@ -42,7 +42,10 @@ class Journal:
                 self._note(line)
                 self._end += len(line)
             self._file.truncate(self._end)
-        except (OSError, ValueError) as error:
+        except (ValueError, LookupError, TypeError) as error:
+            what = "is damaged: remove it, and all is worked out again, or give --out another directory"
+            raise InputError(f"{self._path} {what}") from error
+        except OSError as error:
             raise InputError(f"{self._path} cannot be used: {cause(error)}: give --out another directory") from error
         return self
 

@@ -3,6 +3,7 @@
 import csv
 import io
 from dataclasses import dataclass
+from pathlib import Path
 
 from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE
 
@@ -40,6 +41,8 @@ def read_manifest(path: str) -> list[Period]:
     ...     read_manifest(file.name)
     [Period(vehicle='bus 12', mount='', kind='car', paths=('/logs/1.csv', '/logs/2.csv'))]
     """
+    if not files.is_remote(path) and Path(path).is_dir():
+        raise InputError(f"{path} is a directory: give {path}/MANIFEST.csv, or a pattern such as '{path}/*.csv'")
     try:
         text = files.read_bytes(path).decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -17,7 +17,7 @@ from ..files import write_bytes
 from ..period import PeriodResult, Row
 from .svg import Panel, date_text
 
-_WORST, _MOST_MOVED, _MOST_ROWS, _MOST_DOTS = 25, 200, 2000, 3000
+_WORST, _MOST_MOVED, _MOST_ROWS, _MOST_DOTS, _SAID = 25, 200, 2000, 3000, 3
 _WORDS = {
     "mount-moved": "the mount was turned",
     "speed-unit": "the speed is not in m/s",
@@ -42,13 +42,14 @@ _DAY_S = 86_400.0
 class Glance:
     """What the page shows of many results; add() takes them one by one. Memory hardly grows with their number.
 
-    statuses, reasons: how many have each; moved_count, errors: rows of these tables; decelerations: (s since 1970 or
-    NaN, m/s2) of each brake test.
+    statuses, reasons: how many have each; moved_count, errors: rows of these tables; first_errors: log or vehicle, and
+    message, of some of these. decelerations: (s since 1970 or NaN, m/s2) of each brake test.
     """
 
     def __init__(self) -> None:
         self.count = self.moved_count = self.moved_vehicles = self.errors = 0
         self.driven_s = 0.0
+        self.first_errors: list[tuple[str, str]] = []
         self.statuses: Counter[str] = Counter()
         self.reasons: Counter[tuple[str, str]] = Counter()
         self.decelerations: tuple[array[float], array[float]] = array("d"), array("d")
@@ -69,6 +70,8 @@ class Glance:
         self.moved_count += len(result.moved)
         self.moved_vehicles += bool(result.moved)
         self.errors += len(result.errors)
+        said = [(row["log"] or row["vehicle"], row["message"]) for row in result.errors]
+        self.first_errors = (self.first_errors + said)[:_SAID]
         for test in result.brake_tests:
             self.decelerations[0].append(math.nan if test["utc_s"] is None else test["utc_s"])
             self.decelerations[1].append(test["mfdd_mps2"])
@@ -82,14 +85,14 @@ class Glance:
 
     def page(self, expected: int) -> str:
         """The page as HTML. expected: how many results there will be in the end."""
-        tests = len(self.decelerations[1])
+        tests, hours = len(self.decelerations[1]), self.driven_s / 3600.0
         tiles = [
             (self.statuses["aligned"], f"aligned ({_share(self.statuses['aligned'], self.count)})", "good"),
             (self.statuses["refused"], "refused: the drives do not tell", "warn"),
             (self.statuses["error"], "errors: no log could be used", "bad"),
             (self.moved_vehicles, "with a mount that moved", "warn"),
             (tests, "brake tests", ""),
-            (round(self.driven_s / 3600.0), "hours of driving", ""),
+            (round(hours, 1) if hours < 10.0 else round(hours), "hours of driving", ""),
         ]
         rows = (self._rows[False] + self._rows[True])[:_MOST_ROWS]
         partly = f"The first {_MOST_ROWS:,} of {self.count:,}; all are in alignments.parquet."
