@@ -173,13 +173,15 @@ def plot(
     from ..analysis.overview import overview
     from ..analysis.plot import plot
     from ..analysis.ride import open_ride
-    from ..progress import Bar
+    from ..progress import Bar, spinner
 
     plot.check(out)
     with Bar("reading") as bar:
         seen = overview(open_ride(_part(ride, from_s, to_s), calibration, smoothed=not live), bar.reach)
     warn(ride, seen.notices)
-    for path in plot.draw(seen, out, tiles):
+    with spinner("drawing"):
+        written = list(plot.draw(seen, out, tiles))
+    for path in written:
         click.echo(f"written: {path}")
     warn(ride, [seen.exchanged] if seen.exchanged else [])
 

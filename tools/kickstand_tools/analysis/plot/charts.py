@@ -87,7 +87,7 @@ def _layout(seen: Overview, drawn: Traces, over_time: list[str], forces: int, na
         made[f"xaxis{_number(k)}"] |= at_times | ({"matches": "x"} if k > 1 else {})
     limit = lean_limit(seen)
     if not seen.ride.car:
-        made["yaxis"]["range"] = [-limit, limit]
+        made["yaxis"]["range"] = [-1.2 * limit, 1.2 * limit]  # with room for what stands at the maxima
     middle, share = histogram(seen)
     leaning = float(np.max(share[np.abs(middle) > 5.0], initial=0.0))
     gg, lean, straights = forces + 1, forces + 2, forces + 3
