@@ -51,7 +51,8 @@ def test_the_wheel_carries_the_firmware(tmp_path):
             assert archive.read(inside) == source.read_bytes()
     assert {"kickstand_tools/cli/main.py", "kickstand_tools/py.typed"} <= names
     web = firmware_path.TOOLS / "kickstand_tools" / "web"
-    assert {f"kickstand_tools/web/{path.relative_to(web).as_posix()}" for path in web.glob("[np]*/*")} <= names
+    pages = [path for name in ("npm", "page") for path in (web / name).rglob("*") if path.is_file()]
+    assert {f"kickstand_tools/web/{path.relative_to(web).as_posix()}" for path in pages} <= names
     assert {name.split("/")[0] for name in names} == {"kickstand", "kickstand_tools", "kickstand-0.4.0.dist-info"}
     assert not [name for name in names if "__pycache__" in name or name.endswith(".cal")]
 

@@ -110,7 +110,7 @@ def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
     steps = [b.time_us - a.time_us for a, b in pairwise(t for block in found[1] for t in block.turns)]
     assert [step > 500_000 for step in steps].count(True) == 1
     leans = replayed(found[1], tmp_path)
-    assert max(abs(a - b) for a, b in zip(exact[: len(leans)], leans, strict=True)) < 0.03
+    assert max(abs(a - b) for a, b in zip(exact[: len(leans)], leans, strict=True)) < 0.05
 
 
 @pytest.mark.parametrize("temp_c", [-5.0, 48.0])
