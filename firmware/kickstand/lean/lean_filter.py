@@ -137,7 +137,7 @@ class LeanFilter:
             self._start(means)
             return
         if not (abs(x[LEAN]) < 2 * pi and x[SPEED] < MAX_SPEED):  # also not-a-number
-            self._p = None  # so that nothing is kept: the sensor's errors may be no numbers either
+            self._p, self._force_error = None, 0.0  # nothing is kept: the sensor's errors may be no numbers either
             self.restart()
             return
         # see forces(): divided by standard gravity, so that metres times this are g

@@ -52,7 +52,8 @@ class Channels(Table):
 
     @property
     def trusted(self) -> NDArray[np.bool_]:
-        """(n) True where the display shows the lean and holds its maxima; a smoothed one by the same limits."""
+        """(n) True where the display shows the lean and holds its maxima; a smoothed one by its standard
+        deviation, and FALLEN_DEG."""
         return (self.sure > 0.0) & ~(np.abs(self.lean_deg) >= FALLEN_DEG)
 
     @property

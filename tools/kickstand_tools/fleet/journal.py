@@ -34,6 +34,7 @@ class Journal:
     def __enter__(self) -> "Journal":
         try:
             self._file = open(self._path, "a+b")
+            self._lock()
             self._file.seek(0)
             self._end = 0
             for line in self._file:
@@ -48,6 +49,17 @@ class Journal:
         except OSError as error:
             raise InputError(f"{self._path} cannot be used: {cause(error)}: give --out another directory") from error
         return self
+
+    def _lock(self) -> None:
+        """Two runs that write into one file would take each other's results for their own."""
+        with contextlib.suppress(ImportError):  # Windows
+            import fcntl
+
+            try:
+                fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError as error:
+                self._file.close()
+                raise InputError(f"another run works in {self._path.parent}: wait for it, or end it") from error
 
     def __exit__(self, *exception: object) -> None:
         with contextlib.suppress(OSError):

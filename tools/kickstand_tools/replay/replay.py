@@ -18,6 +18,7 @@ from ..logs.block import Block
 from ..logs.csv_lines import joined_cells, number_cells, text_cells, write_lines
 from ..logs.reader import Source, apart, read_blocks, read_twice
 from ..logs.source import Progress, total_bytes
+from ..logs.stretch import Stretch
 from ..logs.table import Array, Table
 from . import replay_engine
 from .meter_along import MeterAlong
@@ -36,7 +37,8 @@ Replayed = tuple[Block, Array]  # (n, replay_engine.COLUMNS) of the rows that ar
 class LeanTable(Table):
     """What the board would have shown: n samples, axes left, up, forward; lean > 0 to the right.
 
-    t_s: seconds since the first sample; where the readings froze all else is NaN. lean_deg: the shown lean.
+    t_s: seconds since the first sample; where the readings froze all else is NaN. lean_deg: the meter's lean,
+    which is shown where lean_sigma_deg is not NaN.
     lean_formula_deg: Nicolae's (25)-(26) as it stands.
     left_g, up_g, forward_g: specific force. static_lean_deg: the lean of a vehicle at rest with this force.
     lean_sigma_deg: the standard deviation of the lean that the firmware believed in, NaN where the display shows no
@@ -88,8 +90,9 @@ def replay_to_csv(
     long one. Raises InputError.
     """
     count, notices = 0, []
+    whole = log.source if isinstance(log, Stretch) else log
     # for the command alone: a program that calls replay() may not be one that can be started once more
-    run = "two processes" if engine == "cpython" and total_bytes(log) > _LONG_BYTES else engine
+    run = "two processes" if engine == "cpython" and total_bytes(whole) > _LONG_BYTES else engine
 
     def lines() -> Iterator[bytes]:
         nonlocal count

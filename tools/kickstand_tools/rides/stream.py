@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import IO
 
+from kickstand.lean.meter import FALLEN_DEG
 from mpremote.transport_serial import SerialTransport
 
 from ..calibration.file import CalibrationFile
@@ -103,7 +104,7 @@ class Recording:
                 meter.measure_speed(NO_SPEED if turn.speed_mps is None else turn.speed_mps)
                 meter.update((*reading[:3], 0.0, *reading[3:]), turn.time_us - before)
                 before = turn.time_us
-                shown = aligned and meter.trusted
+                shown = aligned and meter.trusted and not meter.fallen and abs(meter.lean_deg) <= FALLEN_DEG
                 at_s = (before - self.first.time_us) / 1e6
                 moments.append((at_s, meter.lean_deg if shown else None, meter.smooth_force[2]))
             self.count += len(block.turns)

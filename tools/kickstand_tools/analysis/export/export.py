@@ -84,6 +84,7 @@ def export(
                 block.speed_mps = np.interp(block.t_s, *whole.speeds.T)
             if form == "vbo":
                 block.lat_deg, block.lon_deg = whole.places.at(block.t_s)
+            block.lean_sigma_deg = np.where(block.trusted, block.lean_sigma_deg, np.nan)  # as in a replay
             count += len(block.t_s)
             yield block
 

@@ -1,5 +1,6 @@
 """The charts of a ride as plotly.js takes them: {"data": traces, "layout": of a wide window, "narrow": of a phone}."""
 
+import html
 from typing import Any
 
 import numpy as np
@@ -79,9 +80,10 @@ def _layout(seen: Overview, drawn: Traces, over_time: list[str], forces: int, na
     names = [*(titles[name] for name in over_time), said, "g against g"]
     names += ["" if seen.ride.car else "How long at which lean, %", "Alignment: g on the straights"]
     rows = [*(_HIGH if name == "lean" else _LOW for name in over_time), _HIGH, _SQUARE]
-    made = arranged(rows, names, title(seen), narrow)
-    seconds = float(drawn.time_s[-1])
-    ticks = np.arange(0.0, seconds, tick_s(seconds) * (2 if narrow else 1))
+    made = arranged(rows, names, html.escape(title(seen)), narrow)  # plotly takes < for the beginning of a tag
+    begin, end = float(drawn.time_s[0]), float(drawn.time_s[-1])
+    step = tick_s(end - begin) * (2 if narrow else 1)
+    ticks = np.arange(step * np.ceil(begin / step), end, step)
     at_times = {"tickvals": ticks.tolist(), "ticktext": [clock(tick) for tick in ticks]}
     for k in range(1, forces + 1):
         made[f"xaxis{_number(k)}"] |= at_times | ({"matches": "x"} if k > 1 else {})

@@ -53,7 +53,7 @@ def draw(path: Path, seen: Overview) -> None:
     with rc_context(_STYLE):
         figure = Figure(figsize=(11, sum(heights)), layout="constrained")
         FigureCanvasAgg(figure)
-        figure.suptitle(title(seen), fontsize=12, x=0.01, ha="left")
+        figure.suptitle(title(seen), fontsize=12, x=0.01, ha="left", parse_math=False)  # a name may have $ in it
         rows = figure.add_gridspec(len(heights), 3, height_ratios=heights)
         drawn = traces(seen)
         first = None
