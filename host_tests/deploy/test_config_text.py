@@ -62,11 +62,28 @@ def test_what_a_rider_has_set_stays():
         ("SIDE = 'left'\nif True:\n    SIDE = 'right'\n", "line 2 is no setting"),
         ("SIDE = \n", "cannot be read"),
         ("A = B = 3\n", "line 1 is no setting"),
+        ("# mine\nSIDE = __import__('os').name\n", "line 2 computes SIDE"),
+        ("SIDE = right\n", "line 1 computes SIDE"),
+        ("print('x')\nSIDE = 'left'\n", "line 1 is no setting"),
+        ("SIDE = 'left'\nDLPF = 4\nSIDE = 'right'\n", "line 3 sets SIDE again"),
     ],
 )
 def test_more_than_settings_is_left_to_the_rider(text, words):
     with pytest.raises(InputError, match=words):
         config_text.with_values(text, {"RECORD": "True"})
+
+
+def test_what_is_no_text_is_left_to_the_rider():
+    assert config_text.decoded("# é\n".encode()) == "# é\n"
+    with pytest.raises(InputError, match="not text in UTF-8"):
+        config_text.decoded("# é\n".encode("latin-1"))
+
+
+@pytest.mark.parametrize("mark", ["\f", "\v", "\x85", "\u2028"])
+def test_lines_are_counted_as_python_counts_them(mark):
+    text = f"# one{mark}two\nSIDE = 'left'\nDLPF = 4\n"
+    assert config_text.with_values(text, {"SIDE": "'right'"}) == text.replace("left", "right")
+    assert config_text.with_values(text.replace("\n", "\r\n"), {"DLPF": None}) == text.replace("DLPF", "# DLPF")
 
 
 @pytest.mark.parametrize("value", ["left", "1 + x", "__import__('os')", "3\nx = 4", "", "'left"])

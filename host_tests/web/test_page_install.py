@@ -100,15 +100,21 @@ def test_each_board_has_usual_pins_of_its_own(line, board):
     assert "no pin of the chip" in line.rider.text("#fault-BUTTON_PIN")
 
 
-def test_a_config_that_is_more_than_settings_is_left_to_the_rider(line, board):
-    own = "import sys\nRECORD = sys.platform == 'rp2'\n"
-    board.path("config.py").write_text(own)
+@pytest.mark.parametrize(
+    ("own", "words"),
+    [
+        (b"import sys\nRECORD = sys.platform == 'rp2'\n", "own config.py, line 1 is no setting"),
+        ("# Größe\nRECORD = True\n".encode("latin-1"), "own config.py is not text in UTF-8"),
+    ],
+)
+def test_a_config_that_is_more_than_settings_is_left_to_the_rider(line, board, own, words):
+    board.path("config.py").write_bytes(own)
     line.plug_in(RawPrompt(board))
     line.look()
-    assert "own config.py, line 1 is no setting" in line.rider.text("#by-hand")
+    assert words in line.rider.text("#by-hand")
     assert line.rider.page.is_hidden("#settings")
     assert "Its own config.py stays" in line.install()
-    assert board.path("config.py").read_text() == own
+    assert board.path("config.py").read_bytes() == own
 
 
 def test_a_cable_that_is_pulled_leaves_a_board_that_starts_nothing(line, board):
@@ -171,6 +177,16 @@ def test_the_form_has_every_setting(line):
     )
     text = firmware_files.firmware_files()["/config.py"].read_text()
     assert sorted(names) == sorted(re.findall(r"(?m)^# ([A-Z_0-9]+) = ", text))
+
+
+def test_a_setting_of_0_is_not_shown_as_the_usual_one(line):
+    shown = """async () => {
+      const place = document.createElement("div");
+      const fields = new (await import("./install/fields.mjs")).Fields(place, () => {});
+      fields.fill({ LCD_I2C: "0" }, { LCD_I2C: "1" });
+      return [place.querySelector("[name=LCD_I2C]").selectedOptions[0].text, fields.values().LCD_I2C];
+    }"""
+    assert line.rider.page.evaluate(shown) == ["0", "0"]
 
 
 def test_a_browser_without_serial_ports_says_so(chromium, address):

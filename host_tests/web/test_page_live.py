@@ -113,6 +113,43 @@ def has_firmware(board, monkeypatch):
     board.modules["kickstand.rides"] = types.SimpleNamespace(ride_paths=ride_paths)
 
 
+def test_a_port_that_takes_no_signals_is_closed_again(line):
+    told = """async () => {
+      const said = [];
+      const port = {
+        open: async () => said.push("open"),
+        setSignals: async () => { throw new Error("no signals"); },
+        close: async () => said.push("closed"),
+      };
+      await (await import("./cable/cable.mjs")).overCable(port, (text) => said.push(text), () => said.push("spoken"));
+      return said;
+    }"""
+    said = "The port cannot be opened: no signals. Does another program have it?"
+    assert line.rider.page.evaluate(told) == ["open", "closed", said]
+
+
+def test_after_a_disturbed_byte_the_line_goes_on(line):
+    """As Web Serial does it: the stream fails, and the port has another until the cable is pulled."""
+    told = """async () => {
+      const { SerialLine } = await import("./cable/cable.mjs");
+      const streams = [1, 2].map((byte) => {
+        const given = [Uint8Array.of(byte)];
+        return new ReadableStream({
+          pull(sink) {
+            if (given.length) return sink.enqueue(given.pop());
+            streams.shift();
+            sink.error(new Error("framing"));
+          },
+        }, { highWaterMark: 0 });
+      });
+      const line = new SerialLine({ open: async () => {}, get readable() { return streams[0] ?? null; } });
+      await line.open();
+      for (let i = 0; i < 100 && !line.lost; i += 1) await line.sleep(10);
+      return [[...line.take()], line.lost];
+    }"""
+    assert line.rider.page.evaluate(told) == [[1, 2], True]
+
+
 @pytest.mark.parametrize(("press", "says"), [("#start", "#live-said"), ("#pull", "#pull-said")])
 def test_a_board_without_the_firmware_is_told_of_the_page_install(line, rider, board, press, says):
     line.plug_in(RawPrompt(board))

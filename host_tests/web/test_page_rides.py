@@ -298,6 +298,24 @@ def test_a_singular_matrix_is_told_though_webassembly_has_no_flags():
     assert rides_guest.raising(np.linalg.inv)(2.0 * np.eye(2)).tolist() == [[0.5, 0.0], [0.0, 0.5]]
 
 
+@pytest.mark.parametrize(
+    ("given", "found"),
+    [
+        (("A.csv", "B.csv", "A.cal.json"), ["A.cal.json", ""]),  # a lean by another bike's calibration would be wrong
+        (("A.csv", "B.csv.gz", "mine.json"), ["mine.json", "mine.json"]),
+        (("A.csv", "B.cal.json"), ["B.cal.json"]),
+    ],
+)
+def test_a_calibration_of_one_ride_is_not_taken_for_another(given, found, tmp_path, monkeypatch):
+    for place in ("given", "work"):
+        (tmp_path / place).mkdir()
+    for name in given:
+        (tmp_path / "given" / name).write_text("")
+    monkeypatch.chdir(tmp_path / "work")
+    told = json.loads(rides_guest.rides(str(tmp_path / "given")))
+    assert [ride["calibration"] for ride in told] == found
+
+
 def test_a_ride_past_the_memory_is_told():
     @rides_guest.told
     def too_much():

@@ -153,7 +153,7 @@ def test_without_a_network_it_says_so(no_cache, monkeypatch):
     monkeypatch.setenv("npm_config_registry", "http://127.0.0.1:9/")
     monkeypatch.setenv("npm_config_fetch_retries", "0")
     monkeypatch.setenv("npm_config_cache", str(no_cache / "npm"))
-    refused(no_cache / "home", "web", "--out", no_cache / "site", words="cannot be fetched: npm says: ")
+    refused(no_cache / "home", "web", "--out", no_cache / "site", words="the pages carry cannot be fetched: npm says: ")
     assert not (no_cache / "site").exists()
     assert list((no_cache / "home" / ".cache" / "kickstand").iterdir()) == []
 

@@ -6,9 +6,23 @@ import re
 from ..errors import InputError
 
 
+def decoded(data: bytes) -> str:
+    """The text of a config.py. Raises InputError if it is not UTF-8."""
+    try:
+        return data.decode()
+    except UnicodeDecodeError as error:
+        raise InputError("config.py is not text in UTF-8: change this file by hand") from error
+
+
+def lines(text: str) -> list[str]:
+    """As Python counts them: str.splitlines() would begin another line at a form feed or U+2028 too."""
+    found = re.split(r"\r\n|\r|\n", text)
+    return found if found[-1] else found[:-1]
+
+
 def values(text: str) -> dict[str, str]:
     """{name: its value as it is written there} of the settings that a config.py sets. Raises InputError if the file is
-    more than lines NAME = VALUE, which a form cannot show.
+    more than lines NAME = VALUE, each with a plain value and a name of its own, which a form cannot show.
 
     >>> values('SIDE = "right"  # mine\\n# RECORD = False\\n')
     {'SIDE': '"right"'}
@@ -25,7 +39,7 @@ def with_values(text: str, wanted: dict[str, str | None]) -> str:
     SIDE = "right"   # or "right"
     # RECORD = True
     """
-    lines = text.splitlines()
+    written = lines(text)
     assigned = _assigned(text)
     added = []
     for name, value in wanted.items():
@@ -37,34 +51,42 @@ def with_values(text: str, wanted: dict[str, str | None]) -> str:
         if node:
             begin, end = node.lineno - 1, node.end_lineno or node.lineno
             if value is None:
-                lines[begin:end] = [f"# {line}" for line in lines[begin:end]]
+                written[begin:end] = [f"# {line}" for line in written[begin:end]]
             else:
-                rest = lines[end - 1].encode()[node.end_col_offset or 0 :].decode()
+                rest = written[end - 1].encode()[node.end_col_offset or 0 :].decode()
                 # one line more or less would move the settings below
-                lines[begin:end] = [f"{name} = {value}{rest}", *[""] * (end - begin - 1)]
+                written[begin:end] = [f"{name} = {value}{rest}", *[""] * (end - begin - 1)]
         elif value is not None:
             usual = re.compile(rf"# {name} = .*?(?=\s*#|$)")
-            at = next((i for i, line in enumerate(lines) if usual.match(line)), None)
+            at = next((i for i, line in enumerate(written) if usual.match(line)), None)
             if at is None:
                 added.append(f"{name} = {value}")
             else:
-                lines[at] = f"{name} = {value}" + usual.sub("", lines[at], count=1)
-    return "\n".join([*lines, *added]) + "\n"
+                written[at] = f"{name} = {value}" + usual.sub("", written[at], count=1)
+    return "\n".join([*written, *added]) + "\n"
 
 
 def _assigned(text: str) -> dict[str, ast.Assign]:
-    """The last assignment to each name."""
+    """The assignment to each name. Nothing in the file is run: a page does this with the file of any board."""
     try:
         body = ast.parse(text).body
     except (SyntaxError, ValueError) as error:
         raise InputError(f"config.py cannot be read ({error}): correct it by hand") from error
     found = {}
     for i, node in enumerate(body):
-        if i == 0 and isinstance(node, ast.Expr):
+        if i == 0 and isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             continue  # what the file is for, in words
         target = node.targets[0] if isinstance(node, ast.Assign) and len(node.targets) == 1 else None
         if not (isinstance(node, ast.Assign) and isinstance(target, ast.Name)) or node.col_offset:
             raise InputError(f"config.py, line {node.lineno} is no setting NAME = VALUE: change this file by hand")
+        if target.id in found:
+            raise InputError(f"config.py, line {node.lineno} sets {target.id} again: change this file by hand")
+        try:
+            ast.literal_eval(node.value)
+        except (ValueError, TypeError, RecursionError) as error:
+            raise InputError(
+                f"config.py, line {node.lineno} computes {target.id}, it is no plain value: change this file by hand"
+            ) from error
         found[target.id] = node
     return found
 

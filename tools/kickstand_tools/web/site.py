@@ -38,7 +38,7 @@ def python_files() -> dict[str, str]:
 
 
 def site_files() -> dict[str, bytes]:
-    """{path in the site: content} of the whole site. Raises InputError if MicroPython cannot be fetched.
+    """{path in the site: content} of the whole site. Raises InputError if what they carry cannot be fetched.
 
     >>> sorted(site_files())[:2]  # doctest: +SKIP
     ['bike.mjs', 'board.mjs']

@@ -2,6 +2,7 @@
 // WebAssembly, which is fetched for this only.
 
 const BAUD = 115200;
+const BUFFER = 65_536; // bytes that may come while the page is busy
 const BACK_MS = 10_000; // until a board that has restarted is there again, at most
 const AGAIN_MS = 300;
 
@@ -21,7 +22,7 @@ export class SerialLine {
     const until = performance.now() + (restarted ? BACK_MS : 0);
     for (;;) {
       try {
-        await this.#port.open({ baudRate: BAUD });
+        await this.#port.open({ baudRate: BAUD, bufferSize: BUFFER });
         break;
       } catch (error) {
         if (performance.now() > until) throw error;
@@ -29,20 +30,33 @@ export class SerialLine {
       }
     }
     // As a terminal program does: a Pico says nothing to a host without it
-    await this.#port.setSignals?.({ dataTerminalReady: true, requestToSend: true });
+    try {
+      await this.#port.setSignals?.({ dataTerminalReady: true, requestToSend: true });
+    } catch (error) {
+      await this.close(); // it could not be opened again
+      throw error;
+    }
     this.#read();
   }
 
   async #read() {
-    try {
-      this.#reader = this.#port.readable.getReader();
-      for (;;) {
-        const { value, done } = await this.#reader.read();
-        if (done) break;
-        this.#heard.push(value);
+    let ended;
+    // After a disturbed byte or a break the port has another stream, which goes on
+    while (!this.lost && this.#port.readable && this.#port.readable !== ended) {
+      ended = this.#port.readable;
+      try {
+        this.#reader = ended.getReader();
+        for (;;) {
+          const { value, done } = await this.#reader.read();
+          if (done) {
+            this.lost = true; // closed from here
+            break;
+          }
+          this.#heard.push(value);
+        }
+      } catch {
+        // a disturbance, or the cable was pulled, or the board has restarted
       }
-    } catch {
-      // the cable was pulled, or the board has restarted
     }
     this.lost = true;
   }

@@ -118,8 +118,8 @@ function field(name, label, choices, value, usual) {
   return made;
 }
 
-/** Are these two the same to Python? As far as choices go: 'left' is "left", and 0x68 is 104. */
+/** Are these two, neither left empty, the same to Python? As far as choices go: 'left' is "left", and 0x68 is 104. */
 function same(one, other) {
   const plain = (text) => (Number.isNaN(Number(text)) ? text.replaceAll("'", '"') : Number(text));
-  return other !== "" && plain(one) === plain(other);
+  return one !== "" && other !== "" && plain(one) === plain(other);
 }
