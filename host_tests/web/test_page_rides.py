@@ -142,6 +142,17 @@ def test_the_lean_of_each_sample_is_that_of_the_command(page, ride, calibration,
     assert page.page.is_visible("#report")
 
 
+def test_what_the_site_does_not_give_is_not_saved(page, ride, calibration):
+    page.give(ride, calibration)
+    page.page.context.route("**/plotly.min.js", lambda route: route.fulfill(status=404, body="not here"))
+    try:
+        page.page.click("#save-page")
+        assert "plotly.min.js cannot be loaded (HTTP 404)" in page.said()
+    finally:
+        page.page.context.unroute("**/plotly.min.js")
+    assert b"Plotly.newPlot" in page.saved("#save-page")
+
+
 def test_dropped_on_the_page_packed_and_cut_off(page, ride, calibration, tmp_path):
     """A recorder without power leaves half a file: what there is is shown, with a warning."""
     packed = gzip.compress(ride.read_bytes())
@@ -243,7 +254,11 @@ def test_once_used_it_works_without_a_network(chromium, address, ride, calibrati
 
 
 def test_what_takes_too_long_can_be_stopped(page, ride, calibration):
-    """And other files taken in its place."""
+    """And other files taken in its place. What was shown goes too: it could not be saved any more."""
+    page.give(ride, calibration)
+    page.page.click("#save-lean")
+    page.page.click("#stop")
+    assert page.said() == "Stopped." and page.page.is_hidden("#report")
     page.page.set_input_files("#files", [ride, calibration])
     page.page.click("#stop")
     assert page.said() == "Stopped."
@@ -296,6 +311,34 @@ def test_a_singular_matrix_is_told_though_webassembly_has_no_flags():
         silent(np.zeros((3, 3)))
     assert np.all(np.isnan(silent(np.full((3, 3), np.nan))))  # as numpy does elsewhere
     assert rides_guest.raising(np.linalg.inv)(2.0 * np.eye(2)).tolist() == [[0.5, 0.0], [0.0, 0.5]]
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        ("A.csv B.csv A.cal.json", {"A.csv": "A.cal.json", "B.csv": ""}),
+        ("A.csv B.csv bike.json", {"A.csv": "bike.json", "B.csv": "bike.json"}),
+        ("A.csv bike.json", {"A.csv": "bike.json"}),
+    ],
+)
+def test_the_calibration_of_another_ride_is_not_taken(ride, tmp_path, monkeypatch, names, expected):
+    assert rides_of(tmp_path, monkeypatch, {name: ride.read_text()[:500] for name in names.split()}) == expected
+
+
+def test_a_file_may_have_the_name_of_the_folder_of_recordings(tmp_path, monkeypatch):
+    files = {"recording": "no log", "recording_": "neither"}
+    assert rides_of(tmp_path, monkeypatch, files) == {"recording": "", "recording_": ""}
+
+
+def rides_of(tmp_path, monkeypatch, files):
+    """{log: calibration} of these files, {name: text}."""
+    for folder in ("given", "here"):
+        (tmp_path / folder).mkdir()
+    for name, text in files.items():
+        (tmp_path / "given" / name).write_text(text)
+    monkeypatch.chdir(tmp_path / "here")  # where all else is deleted
+    found = json.loads(rides_guest.rides(str(tmp_path / "given")))
+    return {one["log"]: one["calibration"] for one in found}
 
 
 def test_a_ride_past_the_memory_is_told():
