@@ -13,7 +13,7 @@ from kickstand.rides import ride_paths
 from kickstand_tools.deploy import connection
 from kickstand_tools.rides.pull import pull
 from raw_prompt import RawPrompt
-from rider import Rider
+from rider import MISSING, Rider
 from serial_line import SerialLine
 
 PLAYED = """async () => {
@@ -74,14 +74,14 @@ def test_tools_that_cannot_be_loaded_can_be_asked_for_again(chromium, address, b
     rider.page.reload()
     line = SerialLine(rider)
     line.plug_in(RawPrompt(board, half_seconds(3)[0]))
-    rider.context.route("**/install.zip", lambda route: route.fulfill(status=404, body="not here"))
+    rider.page.evaluate(MISSING, "install.zip")
     for press, says in (("#start", "#live-said"), ("#pull", "#pull-said")):
         rider.page.click(press)
         rider.page.wait_for_selector(f"{says}:has-text('install.zip cannot be loaded (HTTP 404)')", timeout=60_000)
         assert rider.page.is_enabled(press)
-    rider.context.unroute("**/install.zip")
+    rider.page.evaluate("given()")
     rider.page.click("#start")
-    rider.page.wait_for_function("document.querySelector('#live-said').textContent.startsWith('Recording')", timeout=60_000)
+    rider.page.wait_for_selector("#live-said:has-text('Recording')", timeout=60_000)
     line.connected = False
     rider.page.wait_for_selector("#files li")
     rider.page.evaluate(REFUSED)

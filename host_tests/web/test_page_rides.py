@@ -15,7 +15,7 @@ from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.plot import charts
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.web import rides_guest
-from rider import Rider
+from rider import MISSING, Rider
 from test_page_looks import LAPTOP, PHONE
 
 PHONE_MOUNTED = analysis_rides.CALIBRATION | {"vehicle_from_sensor": app_exports.PHONE.tolist()}
@@ -144,12 +144,10 @@ def test_the_lean_of_each_sample_is_that_of_the_command(page, ride, calibration,
 
 def test_what_the_site_does_not_give_is_not_saved(page, ride, calibration):
     page.give(ride, calibration)
-    page.page.context.route("**/plotly.min.js", lambda route: route.fulfill(status=404, body="not here"))
-    try:
-        page.page.click("#save-page")
-        assert "plotly.min.js cannot be loaded (HTTP 404)" in page.said()
-    finally:
-        page.page.context.unroute("**/plotly.min.js")
+    page.page.evaluate(MISSING, "plotly.min.js")
+    page.page.click("#save-page")
+    assert "plotly.min.js cannot be loaded (HTTP 404)" in page.said()
+    page.page.evaluate("given()")
     assert b"Plotly.newPlot" in page.saved("#save-page")
 
 

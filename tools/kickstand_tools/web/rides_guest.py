@@ -47,7 +47,8 @@ def told(function):
 @told
 def rides(given):
     """[{"log": name, "calibration": name or ""}, ...]: the logs in the folder `given`, each with the calibration beside
-    it, or the only one there if that is beside no other log. Files of an app that are one recording together count as one log.
+    it, or the only one there if that is beside no other log. Files of an app that are one recording together count as
+    one log.
 
     The files are linked to from here, where others can be made beside them.
     """
