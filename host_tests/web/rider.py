@@ -28,6 +28,7 @@ new PerformanceObserver((list) => {
   for (const entry of list.getEntries()) if (!entry.hadRecentInput) seen.shift += entry.value;
 }).observe({ type: "layout-shift", buffered: true });
 """
+
 # The site has no file whose address ends so; window.given() again fetches all. The service worker is passed by.
 MISSING = """(end) => {
   const fetched = window.fetch;
