@@ -13,8 +13,15 @@ from kickstand.rides import ride_paths
 from kickstand_tools.deploy import connection
 from kickstand_tools.rides.pull import pull
 from raw_prompt import RawPrompt
-from rider import Rider
+from rider import MISSING, Rider
 from serial_line import SerialLine
+
+PLAYED = """async () => {
+  const player = new (await import("./live/player.mjs")).Player();
+  player.take([[0, 10, 0], [0.49, 20, 0]], 1000);
+  return [1600, 2100, 2300].map((nowMs) => player.now(nowMs).moment?.[1] ?? null);
+}"""
+REFUSED = "() => Object.defineProperty(window, 'indexedDB', { value: { open() { throw new Error('refused'); } } })"
 
 half_seconds = functools.partial(ride_writer.blocks, length=lambda _: 512)  # blocks as short as those of a stream
 
@@ -54,6 +61,33 @@ def test_a_cable_that_is_pulled_leaves_the_log(line, rider, board, tmp_path):
     assert "connection lost" in rider.text("#live-said")
     assert "what came until then is kept" in rider.text("#live-said")
     assert list(saved(rider, tmp_path).values()) == recorded(blocks)
+
+
+def test_a_lean_ends_soon_after_the_last_block(rider):
+    assert rider.page.evaluate(PLAYED) == [20, 20, None]
+
+
+def test_tools_that_cannot_be_loaded_can_be_asked_for_again(chromium, address, board):
+    """And a browser without a store for other pages says how its files get there."""
+    rider = Rider(chromium, address + "live.html")
+    rider.page.add_init_script(serial_line.FAKE)
+    rider.page.reload()
+    line = SerialLine(rider)
+    line.plug_in(RawPrompt(board, half_seconds(3)[0]))
+    rider.page.evaluate(MISSING, "install.zip")
+    for press, says in (("#start", "#live-said"), ("#pull", "#pull-said")):
+        rider.page.click(press)
+        rider.page.wait_for_selector(f"{says}:has-text('install.zip cannot be loaded (HTTP 404)')", timeout=60_000)
+        assert rider.page.is_enabled(press)
+    rider.page.evaluate("given()")
+    rider.page.click("#start")
+    rider.page.wait_for_selector("#live-said:has-text('Recording')", timeout=60_000)
+    line.connected = False
+    rider.page.wait_for_selector("#files li")
+    rider.page.evaluate(REFUSED)
+    rider.page.click("#files li button")
+    rider.page.wait_for_selector("#files li:has-text('save them, and choose them there')")
+    rider.context.close()
 
 
 def test_after_a_new_alignment_another_log_begins(line, rider, board, tmp_path):

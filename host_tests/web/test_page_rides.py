@@ -15,7 +15,7 @@ from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.plot import charts
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.web import rides_guest
-from rider import Rider
+from rider import MISSING, Rider
 from test_page_looks import LAPTOP, PHONE
 
 PHONE_MOUNTED = analysis_rides.CALIBRATION | {"vehicle_from_sensor": app_exports.PHONE.tolist()}
@@ -142,6 +142,15 @@ def test_the_lean_of_each_sample_is_that_of_the_command(page, ride, calibration,
     assert page.page.is_visible("#report")
 
 
+def test_what_the_site_does_not_give_is_not_saved(page, ride, calibration):
+    page.give(ride, calibration)
+    page.page.evaluate(MISSING, "plotly.min.js")
+    page.page.click("#save-page")
+    assert "plotly.min.js cannot be loaded (HTTP 404)" in page.said()
+    page.page.evaluate("given()")
+    assert b"Plotly.newPlot" in page.saved("#save-page")
+
+
 def test_dropped_on_the_page_packed_and_cut_off(page, ride, calibration, tmp_path):
     """A recorder without power leaves half a file: what there is is shown, with a warning."""
     packed = gzip.compress(ride.read_bytes())
@@ -194,7 +203,10 @@ def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):
         files[-1].write_bytes(calibration.read_bytes())
     page.give(*files)
     first = page.report()[0]
-    page.page.select_option("#ride", "B.csv")
+    with page.page.expect_download(timeout=WAIT_MS) as lean:  # which comes though another ride is chosen meanwhile
+        page.page.evaluate("document.querySelector('#save-lean').click()")
+        page.page.select_option("#ride", "B.csv")
+    assert lean.value.suggested_filename == "A.lean.csv"
     page.said()
     assert page.page.inner_text("#report-title") == "B.csv"
     assert page.report()[0] != first
@@ -255,6 +267,13 @@ def test_what_takes_too_long_can_be_stopped(page, ride, calibration):
     assert worker not in page.page.workers
 
 
+def test_what_was_stopped_leaves_no_report_whose_buttons_do_nothing(page, ride, calibration):
+    page.give(ride, calibration)
+    page.page.evaluate("['#save-lean', '#stop'].forEach((button) => document.querySelector(button).click())")
+    assert page.said() == "Stopped."
+    assert page.page.is_hidden("#report") and page.page.is_hidden("#charts")
+
+
 def test_axe_finds_nothing(page, ride, calibration):
     axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
     for kind in (LAPTOP, PHONE):
@@ -299,21 +318,31 @@ def test_a_singular_matrix_is_told_though_webassembly_has_no_flags():
 
 
 @pytest.mark.parametrize(
-    ("given", "found"),
+    ("names", "expected"),
     [
-        (("A.csv", "B.csv", "A.cal.json"), ["A.cal.json", ""]),  # a lean by another bike's calibration would be wrong
-        (("A.csv", "B.csv.gz", "mine.json"), ["mine.json", "mine.json"]),
-        (("A.csv", "B.cal.json"), ["B.cal.json"]),
+        ("A.csv B.csv A.cal.json", {"A.csv": "A.cal.json", "B.csv": ""}),
+        ("A.csv B.csv bike.json", {"A.csv": "bike.json", "B.csv": "bike.json"}),
+        ("A.csv bike.json", {"A.csv": "bike.json"}),
     ],
 )
-def test_a_calibration_of_one_ride_is_not_taken_for_another(given, found, tmp_path, monkeypatch):
-    for place in ("given", "work"):
-        (tmp_path / place).mkdir()
-    for name in given:
-        (tmp_path / "given" / name).write_text("")
-    monkeypatch.chdir(tmp_path / "work")
-    told = json.loads(rides_guest.rides(str(tmp_path / "given")))
-    assert [ride["calibration"] for ride in told] == found
+def test_the_calibration_of_another_ride_is_not_taken(ride, tmp_path, monkeypatch, names, expected):
+    assert rides_of(tmp_path, monkeypatch, {name: ride.read_text()[:500] for name in names.split()}) == expected
+
+
+def test_a_file_may_have_the_name_of_the_folder_of_recordings(tmp_path, monkeypatch):
+    files = {"recording": "no log", "recording_": "neither"}
+    assert rides_of(tmp_path, monkeypatch, files) == {"recording": "", "recording_": ""}
+
+
+def rides_of(tmp_path, monkeypatch, files):
+    """{log: calibration} of these files, {name: text}."""
+    for folder in ("given", "here"):
+        (tmp_path / folder).mkdir()
+    for name, text in files.items():
+        (tmp_path / "given" / name).write_text(text)
+    monkeypatch.chdir(tmp_path / "here")  # where all else is deleted
+    found = json.loads(rides_guest.rides(str(tmp_path / "given")))
+    return {one["log"]: one["calibration"] for one in found}
 
 
 def test_a_ride_past_the_memory_is_told():

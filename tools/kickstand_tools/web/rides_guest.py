@@ -24,7 +24,7 @@ from ..logs.reader import check_first_line
 from ..refusals import sentence
 from ..smoothing.smooth import smooth_to_csv
 
-PLOTLY = '<script src="./plotly/plotly.min.js"></script>'  # the page of a ride loads it from the site
+PLOTLY = "./plotly/plotly.min.js"  # the page of a ride loads it from the site
 TOGETHER = "recording"  # the folder of files that are one recording
 TOO_LONG = "this ride is too long for the memory of a browser: kickstand cut takes a part of it"
 
@@ -47,8 +47,8 @@ def told(function):
 @told
 def rides(given):
     """[{"log": name, "calibration": name or ""}, ...]: the logs in the folder `given`, each with the calibration beside
-    it, or with the only one there if that bears no other log's name. Files of an app that are one
-    recording together count as one log.
+    it, or the only one there if that is beside no other log. Files of an app that are one recording together count as
+    one log.
 
     The files are linked to from here, where others can be made beside them.
     """
@@ -61,9 +61,12 @@ def rides(given):
     if not logs:
         raise InputError("no log among these files: a ride is RIDE.csv or RIDE.csv.gz, with its RIDE.cal.json")
     if len(logs) > 1 and not any(map(_is_log, logs)):
-        Path(TOGETHER).mkdir()
-        _link(given, logs, Path(TOGETHER))
-        logs = [TOGETHER] if _app(TOGETHER) else logs
+        together = TOGETHER
+        while together in names:
+            together += "_"
+        Path(together).mkdir()
+        _link(given, logs, Path(together))
+        logs = [together] if _app(together) else logs
     beside = {log: calibration_path(Path(log)).name for log in logs}
     only = calibrations[0] if len(calibrations) == 1 and calibrations[0] not in beside.values() else ""
     return [{"log": log, "calibration": beside[log] if beside[log] in names else only} for log in logs]
@@ -87,8 +90,8 @@ def take(log, _tell):
 @told
 def look(log, calibration, tell):
     """What `report` says and `plot` draws of a log: {"words": report.Words, "json": report.as_data(), "warnings":
-    [...], "page": HTML, "stem": the name without suffixes}. calibration: its file, "" for the one beside the log.
-    tell(done, total): the progress."""
+    [...], "page": HTML, "plotly": the script that the page loads, "stem": the name without suffixes}. calibration: its
+    file, "" for the one beside the log. tell(done, total): the progress."""
     ride = open_ride(Path(log), _calibration(log, calibration), smoothed=True)
     seen = overview(ride, tell)
     notices = [*seen.notices, *([seen.exchanged] if seen.exchanged else [])]
@@ -96,7 +99,8 @@ def look(log, calibration, tell):
         "words": asdict(report.words(seen)) | {"units": report.STOPS_UNITS, "title": report.STOPS_TITLE},
         "json": report.as_data(seen),
         "warnings": [sentence(notice) for notice in notices],
-        "page": page(seen, PLOTLY),
+        "page": page(seen, f'<script src="{PLOTLY}"></script>'),
+        "plotly": PLOTLY,
         "stem": ride.stem,
     }
 

@@ -110,6 +110,21 @@ export async function python(withNumpy = false) {
   return made;
 }
 
+/** A function that does load() once and returns what came of it. Where that fails it returns null, tell(text) is given
+ * why, and the next call tries again. */
+export function loadOnce(load) {
+  let loaded;
+  return async (tell) => {
+    try {
+      return await (loaded ??= load());
+    } catch (error) {
+      loaded = undefined;
+      tell(`The tools cannot be loaded: ${error.message}. Is there a network? Try again.`);
+      return null;
+    }
+  };
+}
+
 /** Show what applies in this browser: it needs a serial port, and has to let Python wait for it. */
 export function showIfAble(form, unable) {
   const able = "serial" in navigator && "Suspending" in WebAssembly;

@@ -1,14 +1,14 @@
 // Puts the firmware and its config.py onto a board at the browser's serial port: `kickstand flash` itself, on CPython for
 // WebAssembly (web/install_guest.py).
 
-import { choosePort, inPages, overCable, python, showIfAble } from "../cable/cable.mjs";
+import { choosePort, inPages, loadOnce, overCable, python, showIfAble } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
 import { connectImage } from "./image.mjs";
 import { Fields } from "./fields.mjs";
 
 const byId = (id) => document.getElementById(id);
 const fields = new Fields(byId("fields"), check);
-let loaded; // the tools, once for all
+const load = loadOnce(python);
 let board = null; // {port, guest}: an Installation of install_guest.py
 let byHand = null;
 
@@ -25,7 +25,8 @@ async function look() {
   atWork(true);
   byId("config").hidden = true;
   tell("Loading the tools …", 0);
-  const tools = await (loaded ??= python());
+  const tools = await load(tell);
+  if (!tools) return atWork(false);
   const guest = tools.pyimport("kickstand_tools.web.install_guest").Installation();
   const said = await overCable(port, tell, (line, name) => {
     tell("Asking the board …", 0);

@@ -1,5 +1,7 @@
 // Logs that came over the cable: to be saved, and to be looked at in the page Rides.
 
+import { leavePulled } from "../rides/pulled.mjs";
+
 const RUNNING = Symbol("running");
 const unsaved = new Set();
 
@@ -27,27 +29,15 @@ export function offer(list, title, files) {
   }
   const look = Object.assign(document.createElement("button"), { type: "button", textContent: "Look at it" });
   look.addEventListener("click", async () => {
-    await handOver(files);
+    try {
+      await leavePulled(files);
+    } catch {
+      look.replaceWith("This browser does not hand files to the page Rides: save them, and choose them there.");
+      return;
+    }
     open("./rides.html#pulled"); // in a tab of its own: this page keeps what is not saved yet
   });
   item.append(look);
   list.prepend(item);
   list.closest("section").hidden = false;
-}
-
-/** For the page Rides: database "kickstand", store "files", key "pulled": [{name, data: ArrayBuffer}]. */
-async function handOver(files) {
-  const opening = indexedDB.open("kickstand", 1);
-  opening.onupgradeneeded = () => opening.result.createObjectStore("files");
-  const database = await done(opening);
-  const given = files.map(({ name, data }) => ({ name, data: data.slice().buffer }));
-  await done(database.transaction("files", "readwrite").objectStore("files").put(given, "pulled"));
-  database.close();
-}
-
-function done(request) {
-  return new Promise((resolve, reject) => {
-    request.onsuccess = () => resolve(request.result);
-    request.onerror = () => reject(request.error);
-  });
 }

@@ -1,7 +1,7 @@
 // Shows what a board streams, keeps it as a log, and fetches the rides that the board has recorded: `kickstand record` and
 // `kickstand pull` on CPython for WebAssembly (web/cable_guest.py).
 
-import { choosePort, inPages, overCable, python, showIfAble } from "../cable/cable.mjs";
+import { choosePort, inPages, loadOnce, overCable, python, showIfAble } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
 import { Chart } from "./chart.mjs";
 import { busy, offer } from "./files.mjs";
@@ -12,8 +12,7 @@ const byId = (id) => document.getElementById(id);
 const gauge = new Gauge(byId("gauge"));
 const chart = new Chart(byId("chart"));
 const player = new Player();
-const guests = () => (loaded ??= python(true).then((made) => made.pyimport("kickstand_tools.web.cable_guest")));
-let loaded; // once for all: no board is posed here
+const guests = loadOnce(async () => (await python(true)).pyimport("kickstand_tools.web.cable_guest")); // no board is posed here
 let live; // the Live of cable_guest.py that runs, or null
 let stopped = false;
 let awake = null; // a WakeLockSentinel
@@ -29,7 +28,8 @@ async function start() {
   stopped = false;
   atWork(true);
   tell("Loading the tools …");
-  const guest = await guests();
+  const guest = await guests(tell);
+  if (!guest) return atWork(false);
   await stayAwake();
   let said = null;
   for (let again = false; !stopped; again = true) {
@@ -58,7 +58,7 @@ function heard(text) {
   aligned = reading.aligned;
   furthest = [reading.max_left_deg, reading.max_right_deg];
   player.take(reading.moments, performance.now());
-  tell(`${aligned ? "Recording" : "Recording; the board is not aligned yet, so there is no lean"}: ${clock(reading.seconds)}`);
+  if (!stopped) tell(`${aligned ? "Recording" : "Recording; the board is not aligned yet, so there is no lean"}: ${clock(reading.seconds)}`);
 }
 
 function stop() {
@@ -82,7 +82,8 @@ async function pull() {
   if (!port) return;
   atWork(true, false);
   say("Loading the tools …", 0);
-  const guest = await guests();
+  const guest = await guests(say);
+  if (!guest) return atWork(false);
   const result = await overCable(port, say, (line, name) => {
     say("Asking the board …", 0);
     return guest.pull.callPromising(line, name, (what, done, total) => say(what, total ? done / total : 0));

@@ -1,7 +1,7 @@
 // Readings come in blocks of half a second: they are played at the pace at which they were taken, half a second late.
 
 const KEPT_S = 62;
-const STALE_MS = 2500; // without a block: what was shown is no longer so
+const STALE_MS = 1200; // without a block, two of which should have come: what was shown is no longer so
 const JUMP_S = 0.7;
 const EASE = 0.1; // of what a block comes early or late
 

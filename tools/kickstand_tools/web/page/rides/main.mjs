@@ -1,11 +1,11 @@
 // Wires the page: files come in, what the tools say of them is shown.
 
+import { fetched } from "../fetched.mjs";
 import { keepOffline, keptOffline } from "../offline.mjs";
 import { takePulled } from "./pulled.mjs";
 import { hideRide, save, showCharts, showReport } from "./show.mjs";
 import { Tools } from "./tools.mjs";
 
-const PLOTLY = "./plotly/plotly.min.js";
 const byId = (id) => document.getElementById(id);
 const tools = new Tools((done, of) => of && (byId("work-bar").value = done / of));
 let given = []; // File objects
@@ -66,16 +66,18 @@ async function align() {
 
 async function saveLean() {
   const { ride, stem } = looked;
-  await work(`Finding the lean of each sample of ${ride.given} …`, () => tools.call("smooth", ride.log, ride.calibration), (found) => {
-    save(`${stem}.lean.csv`, "text/csv", found.made);
-    say("");
-  }, true);
+  await work(`Finding the lean of each sample of ${ride.given} …`, async () => {
+    const { made } = await tools.call("smooth", ride.log, ride.calibration);
+    save(`${stem}.lean.csv`, "text/csv", made); // also where another ride was chosen meanwhile
+  }, () => say(""), true);
 }
 
 async function savePage() {
-  const { page, stem } = looked;
-  const library = await fetch(PLOTLY).then((answer) => answer.text());
-  save(`${stem}.html`, "text/html", page.replace(`<script src="${PLOTLY}"></script>`, () => `<script>${library}</script>`));
+  const { page, plotly, stem } = looked;
+  await work("Loading what draws the charts …", () => fetched(plotly).then((answer) => answer.text()), (library) => {
+    save(`${stem}.html`, "text/html", page.replace(`<script src="${plotly}"></script>`, () => `<script>${library}</script>`));
+    say("");
+  }, true);
 }
 
 const chosen = () => rides[Math.max(0, byId("ride").selectedIndex)];
@@ -114,10 +116,11 @@ function stop() {
   say("Stopped.");
 }
 
-/** The files that were given went with the worker. */
+/** The files that were given went with the worker, and what is shown could not be saved any more. */
 function forget() {
   given = rides = [];
   byId("which").hidden = true;
+  hideRide();
 }
 
 byId("files").addEventListener("change", () => {

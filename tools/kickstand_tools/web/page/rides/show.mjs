@@ -37,16 +37,17 @@ export function showReport({ words, warnings }) {
 
 /** page: the HTML of the charts, which is as high as it is wide enough for. */
 export function showCharts(page) {
-  const frame = byId("plot");
   byId("charts").hidden = false;
-  const fit = () => {
-    const inside = frame.contentDocument?.documentElement;
-    if (inside) frame.style.height = `${inside.querySelector("body").scrollHeight}px`;
-  };
-  frame.onload = fit;
-  addEventListener("resize", fit);
-  frame.srcdoc = page;
+  byId("plot").srcdoc = page;
 }
+
+function fit() {
+  const inside = byId("plot").contentDocument?.documentElement;
+  if (inside) byId("plot").style.height = `${inside.querySelector("body").scrollHeight}px`;
+}
+
+byId("plot").addEventListener("load", fit);
+addEventListener("resize", fit);
 
 export function hideRide() {
   for (const id of ["report", "charts"]) byId(id).hidden = true;

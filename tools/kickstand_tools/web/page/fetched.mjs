@@ -1,0 +1,8 @@
+// What the pages fetch of the site.
+
+/** The Response. Throws an Error where the site does not give the file. */
+export async function fetched(url) {
+  const answer = await fetch(url);
+  if (!answer.ok) throw new Error(`${url} cannot be loaded (HTTP ${answer.status})`);
+  return answer;
+}
