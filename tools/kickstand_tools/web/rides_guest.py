@@ -7,8 +7,10 @@ Each function returns JSON: what its docstring says, or {"refused": why}, the li
 import functools
 import json
 import shutil
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -29,7 +31,7 @@ TOGETHER = "recording"  # the folder of files that are one recording
 TOO_LONG = "this ride is too long for the memory of a browser: kickstand cut takes a part of it"
 
 
-def told(function):
+def told(function: Callable[..., Any]) -> Callable[..., str]:
     """With the result as JSON, or why there is none."""
 
     @functools.wraps(function)
