@@ -114,7 +114,7 @@ ROOMS = {
         ),
         tuple(  # not test_cluster.py, which takes longer than all of them
             TESTS + f"fleet/test_{name}.py"
-            for name in ("evidence", "moved", "forward", "period", "full_disk", "store", "manifest")
+            for name in ("evidence", "moved", "forward", "period", "full_disk", "s3_store", "manifest")
         ),
     ),
     "simulation": Room(
