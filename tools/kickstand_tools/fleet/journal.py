@@ -44,6 +44,7 @@ class Journal:
                 self._end += len(line)
             self._file.truncate(self._end)
         except (ValueError, LookupError, TypeError) as error:
+            self._file.close()
             what = "is damaged: remove it, and all is worked out again, or give --out another directory"
             raise InputError(f"{self._path} {what}") from error
         except OSError as error:

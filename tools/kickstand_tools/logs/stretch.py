@@ -10,6 +10,7 @@ from ..errors import InputError
 from .block import Block
 from .log import Log
 from .source import File, name_of
+from .table import Array
 
 
 @dataclass
@@ -47,14 +48,15 @@ class Stretch:
 
     def holds(self, block: Block) -> NDArray[np.bool_]:
         """(n) which samples of a block of the whole log lie in it. Its times are from the beginning."""
-        begin_us = round(1e6 * (self.from_s or 0.0))
-        end_us = float("inf") if self.to_s is None else round(1e6 * self.to_s)
+        begin_us, end_us = self._ends_us()
         return (block.time_us >= begin_us) & (block.time_us <= end_us)
+
+    def _ends_us(self) -> tuple[float, float]:
+        return round(1e6 * (self.from_s or 0.0)), float("inf") if self.to_s is None else round(1e6 * self.to_s)
 
     def cut(self, blocks: Iterator[Block]) -> Iterator[Block]:
         """The blocks of the whole log, cut. Raises InputError where nothing is left."""
-        begin_us = round(1e6 * (self.from_s or 0.0))
-        end_us = float("inf") if self.to_s is None else round(1e6 * self.to_s)
+        begin_us, end_us = self._ends_us()
         if end_us <= begin_us:
             raise InputError(f"{self.name}: the stretch ends before it begins: give --from the smaller time")
         from_us, length_s = None, 0.0
@@ -70,3 +72,11 @@ class Stretch:
             yield replace(part, time_us=part.time_us - from_us, start_s=part.start_s + from_us / 1e6)
         if from_us is None:
             raise InputError(f"{self.name}: no samples in this stretch: the log is {length_s:.1f} s long")
+
+
+def within(stretch: Stretch | None, block: Block, values: Array) -> Iterator[tuple[Block, Array]]:
+    """A block of the whole log and the values of its rows (n, ...), as far as they lie in the stretch; None: all."""
+    if stretch is None:
+        yield block, values
+    elif (which := stretch.holds(block)).any():
+        yield block.part(which), values[which]

@@ -17,7 +17,7 @@ from .replay_engine import NOT_SHOWN, ReplayMeter
 
 
 class MeterAlong:
-    """follow() takes a ride's blocks one after the other."""
+    """columns() or after_each() takes a ride's blocks one after the other."""
 
     def __init__(self, calibration: CalibrationFile) -> None:
         self._meter = ReplayMeter(calibration.to_firmware(), delay_s=calibration.delay_s())

@@ -18,7 +18,7 @@ from ..logs.block import Block
 from ..logs.csv_lines import joined_cells, number_cells, text_cells, write_lines
 from ..logs.reader import Source, apart, read_blocks, read_twice
 from ..logs.source import Progress, total_bytes
-from ..logs.stretch import Stretch
+from ..logs.stretch import Stretch, within
 from ..logs.table import Array, Table
 from . import replay_engine
 from .meter_along import MeterAlong
@@ -114,11 +114,7 @@ def replay_blocks(
     for block, results in _RUN[engine](whole, calibration, progress, notices):
         believed = block.believed
         mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
-        found = _with_frozen(block, results)
-        if stretch is None:
-            yield block, found
-        elif (which := stretch.holds(block)).any():
-            yield block.part(which), found[which]
+        yield from within(stretch, block, _with_frozen(block, results))
     contradiction = mount.notice()
     notices += [contradiction] if contradiction else []
 

@@ -14,6 +14,7 @@ from ..logs.block import Block
 from ..logs.csv_lines import joined_cells, number_cells, text_cells, write_lines
 from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import Progress, name_of
+from ..logs.stretch import within
 from ..logs.table import Array, Table
 from ..replay.mount_check import MountCheck
 from .adjust import adjust
@@ -92,10 +93,7 @@ def _checked_blocks(
             raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples a second: too few to look back over")
         believed = block.believed
         mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
-        if stretch is None:
-            yield block, found
-        elif (which := stretch.holds(block)).any():
-            yield block.part(which), found[which]
+        yield from within(stretch, block, found)
     contradiction = mount.notice()
     notices += [contradiction] if contradiction else []
 
