@@ -175,7 +175,7 @@ def _check_units(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, st
         ask = ",".join(f"{key}={next(iter(UNIT_KEYS[key]))}" for key in unknown)
         choice = "; ".join(f"{key} is one of {', '.join(UNIT_KEYS[key])}" for key in unknown)
         columns = ", ".join(column for of_one in unknown.values() for column in of_one)
-        raise InputError(f"{sheet.name}: the unit is not known of {columns}: add --units {ask} ({choice})")
+        raise InputError(f"{sheet.name}: the unit is not known of {columns}", "name_units", ask, choice)
 
 
 def _unit(units: Mapping[str, str], keys: tuple[str, ...], column: str) -> str:
