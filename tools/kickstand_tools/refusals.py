@@ -115,7 +115,7 @@ class RefusedInput(InputError):
 
 
 def sentence(refusal: Refusal | Notice, remedies: Remedies = COMMANDS) -> str:
-    """One line, without the full stop at its end: what is wrong, and where it helps what to do, in the words of remedies.
+    """One line, without the full stop at its end: what is wrong, and where it helps what to do, in these words.
 
     >>> sentence(Notice("same-pose", 0.4))
     'both poses are the same (0.4 degrees apart): one on the kickstand, one upright'

@@ -19,7 +19,6 @@ COMMANDS = {
     "give_calibration": "give a file made by kickstand calibrate",
     "import_log": "an app's export has to go through kickstand import first",
     "import_zip": "if an app has exported it, kickstand import makes a log of it",
-    "install_pyarrow": "{0}",
     "name_columns": "{0}",
     "name_units": "add --units {0} ({1})",
     "other_side": "calibrate two {0}?",

@@ -28,9 +28,9 @@ STOPS_TERMS = (
 
 @dataclass
 class Words:
-    """What a report says. name: of the log. too_little: to tell much, or "". ride: rows of what, how much, and when it
-    was or "". alignment: a paragraph. stops: a row for each, the columns of STOPS_UNITS, whose words are in STOPS_TERMS.
-    remark: on the stops or why there are none, or ""."""
+    """What a report says. name: of the log. too_little: that the log holds too little of a ride, or "". ride: rows of
+    what, how much, and when it was or "". alignment: a paragraph. stops: a row for each, the columns of STOPS_UNITS, of
+    which STOPS_TERMS explains some. remark: on the stops or why there are none, or ""."""
 
     name: str
     too_little: str
@@ -143,7 +143,7 @@ def _ride(seen: Overview) -> list[tuple[str, str, str]]:
     rows = [("Duration", clock(total.duration_s), f"riding {clock(seen.riding_s)}")]
     if not seen.ride.car:
         live = "as the display showed it"
-        rows.append(("Lean", *(("smoothed", "found from the whole ride") if seen.ride.smoothed else (live, ""))))
+        rows.append(("Lean", *(("smoothed", "from the whole ride") if seen.ride.smoothed else (live, ""))))
         rows.append(("Max left", *_peak(total.left_deg, "{:.0f}°")))
         rows.append(("Max right", *_peak(total.right_deg, "{:.0f}°")))
         rows += [(f"Over {limit:.0f}°", f"{seconds:.1f} s", "") for limit, seconds in total.beyond_s.items()]

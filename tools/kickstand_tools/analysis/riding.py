@@ -15,7 +15,7 @@ MOVES_MPS = 1.0
 
 
 def riding_s(ride: Channels, standing: NDArray[np.bool_]) -> float:
-    """Seconds. ride: a whole ride with evenly spaced samples (see downsampled()); standing (n): True where it stands."""
+    """Seconds. ride: with evenly spaced samples (see downsampled()); standing (n): True where it stands still."""
     if not _has_moved(ride):
         return 0.0
     return float(np.count_nonzero(~standing)) * spacing_s(ride)

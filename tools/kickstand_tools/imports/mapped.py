@@ -24,8 +24,9 @@ WORDS |= {"speed": "speed", "lat": "latitude", "lon": "longitude", "temp": "temp
 UNIT_KEYS = {"t": TIMES, "a": ACCELERATIONS, "g": RATES, "speed": SPEEDS, "lat": ANGLES, "lon": ANGLES}
 UNIT_KEYS |= dict.fromkeys(ACCEL, ACCELERATIONS) | dict.fromkeys(GYRO, RATES)
 _AXIS = r"(?:^|[^a-z]){0}(?:$|[^a-z])|{0}$"
-_ACCEL_NAME = re.compile(r"acc|gforce|^a_?[xyz]\b|^a[xyz]$")
-_GYRO_NAME = re.compile(r"gyr|rotation|omega|angular|^[gw]_?[xyz]\b|^[gw][xyz]$")
+_ACCEL_NAME = re.compile(r"acc|gforce|^a_?[xyz]\b")
+_GYRO_NAME = re.compile(r"gyr|rotation|omega|angular|^[gw]_?[xyz]\b")
+_UNIT_END = re.compile(r"_(g|mps2|ms2|dps|rads?|rps)$")
 _NUMBER = re.compile(r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?")
 _HEADER_LINES = 60  # among which the line of names is looked for
 FEWEST_NUMBERS = 4  # in a row, a time and three axes: text with commas in it has none
@@ -149,7 +150,7 @@ def guessed(columns: list[str]) -> dict[str, str]:
     """Columns that seem to be the ones asked for."""
     found: dict[str, str] = {}
     for column in columns:
-        low, bare = column.lower(), plain(column)
+        low, bare = _UNIT_END.sub("", column.lower()), plain(column)
         if any(mark in column for mark in ",="):
             continue
         sensor = "g" if _GYRO_NAME.search(low) else "a" if _ACCEL_NAME.search(low) else ""

@@ -52,6 +52,8 @@ def sorted_out(names: list[str]) -> Given:
                 found.kinds[name] = "log"
             else:
                 pieces = read_pieces(Path(name))
+                if any(piece.name.endswith(".parquet") for piece in pieces):
+                    raise InputError(f"{name} is Parquet, which this page cannot read: give the ride as CSV")
                 if zipfile.is_zipfile(name):
                     _add(found, name, [name], pieces)
                 else:
@@ -89,7 +91,7 @@ def _add(found: Given, log: str, files: list[str], pieces: list[Piece]) -> None:
     """A ride, or why these pieces are none."""
     known = recordings(pieces)
     table = None if known else mapped.table_in(pieces)
-    if not known and (table is None or len(pieces) > 1):
+    if not known and (table is None or len(table.columns) < len(mapped.REQUIRED) or len(pieces) > 1):
         found.refused |= dict.fromkeys(files, mapped.unknown(pieces, log))
         return
     found.rides.append(GivenRide(log, files, table=table))

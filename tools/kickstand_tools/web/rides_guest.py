@@ -54,9 +54,9 @@ def told(function: Callable[..., Any]) -> Callable[..., str]:
 def rides(given, names):
     """What the files of these names (JSON) in the folder `given` are, in the order in which they were given.
 
-    {"rides": [{"log", "isLog": and no app's recording, "calibration": name or "", "files": [names], "table": asked_for()
-    of one that nobody knows}, ...], in the order of their names; "kinds": {name: what it is}; "why": {name: why it
-    cannot be used}}.
+    {"rides": [{"log", "isLog": no app's recording, "calibration": name or "", "files": [names], "table": asked_for() of
+    one that nobody knows}, ...], in the order of their names; "kinds": {name: what it is}; "why": {name: why it cannot
+    be used}}.
     """
     for old in Path().iterdir():
         if old != MADE:
@@ -83,8 +83,8 @@ def asked_for(table: mapped.Table) -> dict[str, Any]:
         [key, words, key in mapped.REQUIRED, table.found.get(key, "")] for key, words in mapped.WORDS.items()
     ]
     units = [
-        [key, words, [[unit, unit] for unit in mapped.UNIT_KEYS[key]], table.units.get(key, "")]
-        for key, words in (("a", "unit of the acceleration"), ("g", "unit of the rates"), ("speed", "unit of the speed"))
+        [key, f"unit of the {words}", [[unit, unit] for unit in mapped.UNIT_KEYS[key]], table.units.get(key, "")]
+        for key, words in (("a", "acceleration"), ("g", "rates"), ("speed", "speed"))
     ]
     units[0][2] += [[f"-{unit}", f"{unit}, all of the opposite sign"] for unit in mapped.UNIT_KEYS["a"]]
     return {"columns": table.columns, "keys": keys, "units": units, "lacking": table.lacking}
@@ -97,7 +97,7 @@ def take(log, is_log, columns, units, _tell):
     if is_log:
         return {"log": log}
     found = import_recording(log, json.loads(columns) or None, json.loads(units))
-    out = str(MADE / f"{log.partition('.')[0]}.log.csv")
+    out = str(_made(log, f"{log.partition('.')[0]}.csv"))
     write_imported(out, found)
     warnings = [sentence(notice, REMEDIES) for notice in found.notices]
     return {"log": out, "path": out, "app": found.app, "warnings": warnings}
@@ -125,8 +125,8 @@ def look(log, calibration, tell):
 @told
 def smooth(log, calibration, tell):
     """{"path": of LEAN.csv as `smooth` writes it}."""
-    out = MADE / f"{Path(log).name}.lean.csv"
     ride = open_ride(Path(log), Path(calibration))
+    out = _made(log, f"{ride.stem}.lean.csv")
     smooth_to_csv(Path(log), ride.calibration, out, tell)
     return {"path": str(out)}
 
@@ -135,14 +135,22 @@ def smooth(log, calibration, tell):
 def align(log, tell):
     """{"path": of the calibration that `calibrate ride` finds, "roll_deg", "pitch_deg", "yaw_deg": how well}."""
     found = fit_ride(Path(log), progress=tell)
-    out = MADE / calibration_path(Path(log)).name
+    out = _made(log, calibration_path(Path(log)).name)
     write_calibration(out, found.calibration)
     known = {name: round(getattr(found, name), 1) for name in ("roll_deg", "pitch_deg", "yaw_deg")}
     return {"path": str(out), **known}
 
 
+def _made(log, name):
+    """A path for what is made of a log: those of another one may have the same name."""
+    folder = Path(log).parent if MADE in Path(log).parents else MADE / log
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder / name
+
+
 def _one_line(text):
-    return re.sub(rf"\b{MADE}/", "", " ".join(text.split()))
+    """Without the folder of what was made: nobody knows of it."""
+    return re.sub(rf"\b{MADE}/[^/]*/", "", " ".join(text.split()))
 
 
 def raising(function):

@@ -79,7 +79,7 @@ def _sheet(piece: Piece) -> Sheet:
 
         table = parquet.read_table(io.BytesIO(piece.content))
     except ImportError as error:
-        raise InputError(f"{piece.name}: Parquet needs pyarrow", "install_pyarrow", extra("rides")) from error
+        raise InputError("Parquet needs pyarrow: " + extra("rides")) from error
     except (ValueError, OSError) as error:
         raise InputError(f"{piece.name} is damaged or cut short: copy it again") from error
     columns = [str(column) for column in table.column_names]

@@ -35,7 +35,7 @@ export class Held {
   /** kinds: {name: what it is}; why: {name: why it cannot be used}. */
   show({ kinds, why }) {
     const rows = this.files.map((file) => this.#row(file, kinds[file.name], why[file.name]));
-    this.#place.querySelector("ul").replaceChildren(...rows);
+    this.#place.querySelector("ul").replaceChildren(...rows.toReversed()); // the last given first
     const wrong = Object.keys(why).length;
     const count = rows.length === 1 ? "1 file" : `${rows.length} files`;
     this.#place.querySelector("summary").textContent = wrong ? `${count}, ${wrong} of no use` : count;

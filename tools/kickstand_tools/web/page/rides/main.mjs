@@ -13,6 +13,7 @@ const tools = new Tools((done, of) => of && (byId("work-bar").value = done / of)
 const held = new Held(byId("held"), () => sortOut([]));
 let rides = []; // as rides() of web/rides_guest.py says, with what became of each: see kept()
 let looked = null;
+let current = ""; // the ride that was chosen last
 let turn = 0; // of the work that is wanted: what was begun for an earlier one is not shown
 
 /** Look at a ride. files: File objects, which join those of before. */
@@ -25,28 +26,23 @@ export async function openRide(files) {
 async function sortOut(added) {
   await work("Loading Python, 8 MB the first time …", async () => {
     await keptOffline();
-    if (tools.give(held.files)) rides = []; // what was made of them is gone
+    if (tools.give(held.files)) [rides, looked] = [[], null]; // what was made of them is gone
     return tools.call("rides", JSON.stringify(held.names));
   }, async (found) => {
     rides = found.rides.map(kept);
     held.show(found);
-    byId("ride").replaceChildren(...rides.map((ride) => new Option(`${ride.given}, ${size(ride.bytes)}`)));
+    byId("ride").replaceChildren(...rides.map((ride) => new Option(`${ride.given}, ${size(ride.bytes)}`, ride.given)));
     byId("which").hidden = rides.length < 2;
-    const ride =
-      rides.find((one) => one.files.some((name) => added.includes(name))) ??
-      rides.find((one) => one.given === looked?.ride.given) ??
-      rides[0];
     const wrong = added.map((name) => found.why[name]).find(Boolean);
-    if (ride) {
-      byId("ride").selectedIndex = rides.indexOf(ride);
-      if (!isShown(ride)) await look(ride);
-      else say(wrong ? ended(wrong) : "", Boolean(wrong));
-      return;
-    }
-    hideRide();
-    const [name] = held.names;
+    const now = rides.find((one) => one.given === current);
+    const told = [now, ...rides].find((one) => one && added.includes(one.calibration));
+    const ride = rides.find((one) => one.files.some((name) => added.includes(name))) ?? told ?? (wrong ? undefined : (now ?? rides[0]));
+    byId("ride").selectedIndex = rides.indexOf(ride ?? now);
+    if (ride && !isShown(ride)) return look(ride);
+    if (!now) hideRide();
     if (wrong) say(ended(wrong), true);
-    else say(Object.values(found.kinds).includes("calibration") ? `${name} is a calibration. Now add the ride that it belongs to.` : "");
+    else if (!rides.length && Object.values(found.kinds).includes("calibration")) say("This is a calibration. Now add the ride that it belongs to.");
+    else say("");
   }, true);
 }
 
@@ -71,11 +67,12 @@ function isShown(ride) {
 }
 
 async function look(ride) {
+  current = ride.given;
   if (!ride.taken) {
     if (ride.table && !ride.asked) {
       hideRide();
       ask(ride);
-      say(`${ride.given} is not of an app that is known${ride.table.lacking}.`);
+      say(`${ride.given} is not of an app that is known${ride.table.lacking}: say what its columns are.`);
       return;
     }
     const { columns = {}, units = {} } = ride.asked ?? {};
@@ -116,7 +113,7 @@ async function align() {
   const ride = chosen();
   await work(`Looking how the sensor sits in ${ride.given} …`, () => tools.call("align", ride.log), async (found) => {
     const [roll, pitch, yaw] = [found.roll_deg, found.pitch_deg, found.yaw_deg];
-    const words = `The ride tells how the sensor sits: roll to ${roll}°, pitch to ${pitch}°, yaw to ${yaw}°.`;
+    const words = `The ride tells how the sensor sits: roll within ${roll}°, pitch within ${pitch}°, yaw within ${yaw}°.`;
     ride.fitted = { path: found.path, words, bytes: found.made };
     await look(ride);
   });
