@@ -26,9 +26,9 @@ class Overview:
     """A ride: the summary of every sample, and its course in means over RATE_S, in which the columns that neither
     report nor pictures need are NaN (vehicle_channels() has them).
 
-    riding_s: seconds on the move. speed_correlation: between the forward force and the changes of the speed, 1 if forward
-    is right, -1 if it is backward, None if the ride does not tell. exchanged: said where forward is backward; stops is
-    then empty. notices: what else is remarkable in the log.
+    riding_s: time on the move, s. speed_correlation: between the forward force and the changes of the speed, 1 if
+    forward is right, -1 if it is backward, None if the ride does not tell. exchanged: said where forward is backward;
+    stops is then empty. notices: what else is remarkable in the log.
     """
 
     ride: Ride
