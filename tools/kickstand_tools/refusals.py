@@ -128,11 +128,11 @@ def sentence(refusal: Refusal | Notice, remedies: Remedies = COMMANDS) -> str:
     if refusal.code == "speed-unit":
         return _speed_unit(*refusal.values)
     if refusal.code == "forward-exchanged":
-        return _forward_exchanged(*refusal.values, remedies)
+        return _forward_exchanged(remedies, *refusal.values)
     if refusal.code == "up-off":
-        return _up_off(*refusal.values, remedies)
+        return _up_off(remedies, *refusal.values)
     if refusal.code == "forward-off":
-        return _forward_off(*refusal.values, remedies)
+        return _forward_off(remedies, *refusal.values)
     words = _SENTENCES.get(refusal.code)
     return words.format(*refusal.values, **remedies) if words else console.sentence(refusal)
 
@@ -155,7 +155,7 @@ def _speed_unit(factor: float) -> str:
     return f"the speed changes {factor:.1f} times as much as the force says: {guess}"
 
 
-def _forward_exchanged(car: bool, side: str, roll_deg: float | None, remedies: Remedies) -> str:
+def _forward_exchanged(remedies: Remedies, car: bool, side: str, roll_deg: float | None) -> str:
     """side: the one that two poses were calibrated for, "" if not known. roll_deg: by how much up is off, None if it is
     not known."""
     line = "forward and backward are exchanged: "
@@ -169,22 +169,22 @@ def _forward_exchanged(car: bool, side: str, roll_deg: float | None, remedies: R
     return line + " Or, if no board wrote this log, " + OPPOSITE_SIGN
 
 
-def _up_off(angle_deg: float, car: bool, remedies: Remedies) -> str:
+def _up_off(remedies: Remedies, angle_deg: float, car: bool) -> str:
     line = f"the calibration's up is {angle_deg:.0f} degrees off, so nothing computed with it is right: "
     if angle_deg > UPSIDE_DOWN_DEG:
-        return line + f"is it another mount's? {_again(car, remedies)}. Or {OPPOSITE_SIGN}"
-    return line + f"is it another mount's? {_again(car, remedies)}"
+        return line + f"is it another mount's? {_again(remedies, car)}. Or {OPPOSITE_SIGN}"
+    return line + f"is it another mount's? {_again(remedies, car)}"
 
 
-def _forward_off(angle_deg: float, by: str, car: bool, remedies: Remedies) -> str:
+def _forward_off(remedies: Remedies, angle_deg: float, by: str, car: bool) -> str:
     """angle_deg: from the calibration's forward to the ride's, > 0 to the left."""
     side = "left" if angle_deg > 0.0 else "right"
     wrong = "braking and cornering are" if car else "lean, braking and cornering are"
     return (
         f"by the {by} of this ride forward is {abs(angle_deg):.0f} degrees to the {side} of the calibration's, so "
-        f"{wrong} wrong: is it another mount's? {_again(car, remedies)}"
+        f"{wrong} wrong: is it another mount's? {_again(remedies, car)}"
     )
 
 
-def _again(car: bool, remedies: Remedies) -> str:
+def _again(remedies: Remedies, car: bool) -> str:
     return remedies["align_again_car" if car else "align_again"]

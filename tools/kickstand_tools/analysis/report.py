@@ -142,8 +142,8 @@ def _ride(seen: Overview) -> list[tuple[str, str, str]]:
     total = seen.summary
     rows = [("Duration", clock(total.duration_s), f"riding {clock(seen.riding_s)}")]
     if not seen.ride.car:
-        live = "as the display showed it"
-        rows.append(("Lean", *(("smoothed", "from the whole ride") if seen.ride.smoothed else (live, ""))))
+        smoothed = ("Lean", "smoothed", "from the whole ride")
+        rows.append(smoothed if seen.ride.smoothed else ("Lean", "as the display showed it", ""))
         rows.append(("Max left", *_peak(total.left_deg, "{:.0f}°")))
         rows.append(("Max right", *_peak(total.right_deg, "{:.0f}°")))
         rows += [(f"Over {limit:.0f}°", f"{seconds:.1f} s", "") for limit, seconds in total.beyond_s.items()]
