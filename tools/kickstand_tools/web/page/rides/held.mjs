@@ -4,6 +4,7 @@ const MANY = 8; // and the list begins closed
 
 export class Held {
   #files = new Map(); // by name, in the order in which they were given
+  #found = { kinds: {}, why: {} };
   #place;
   #removed;
 
@@ -32,11 +33,13 @@ export class Held {
     return this.#files.get(name);
   }
 
-  /** kinds: {name: what it is}; why: {name: why it cannot be used}. */
-  show({ kinds, why }) {
+  /** found: {kinds: {name: what it is}, why: {name: why it cannot be used}}, as far as that is known. */
+  show(found = this.#found) {
+    this.#found = found;
+    const { kinds, why } = found;
     const rows = this.files.map((file) => this.#row(file, kinds[file.name], why[file.name]));
     this.#place.querySelector("ul").replaceChildren(...rows.toReversed()); // the last given first
-    const wrong = Object.keys(why).length;
+    const wrong = this.names.filter((name) => why[name]).length;
     const count = rows.length === 1 ? "1 file" : `${rows.length} files`;
     this.#place.querySelector("summary").textContent = wrong ? `${count}, ${wrong} of no use` : count;
     if (wrong || rows.length <= MANY) this.#place.open = true;
@@ -56,7 +59,7 @@ export class Held {
     const name = document.createElement("strong");
     name.textContent = file.name;
     const words = document.createElement("span");
-    words.textContent = why ?? `${kind}, ${size(file.size)}`;
+    words.textContent = why ?? [kind, size(file.size)].filter(Boolean).join(", ");
     row.classList.toggle("wrong", Boolean(why));
     row.append(name, words, remove);
     return row;

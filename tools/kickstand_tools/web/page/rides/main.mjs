@@ -24,6 +24,7 @@ export async function openRide(files) {
 
 /** Find out what the files are that are held, and look at the ride that the new ones make. added: their names. */
 async function sortOut(added) {
+  held.show();
   await work("Loading Python, 8 MB the first time …", async () => {
     await keptOffline();
     if (tools.give(held.files)) [rides, looked] = [[], null]; // what was made of them is gone
@@ -36,13 +37,14 @@ async function sortOut(added) {
     const wrong = added.map((name) => found.why[name]).find(Boolean);
     const now = rides.find((one) => one.given === current);
     const told = [now, ...rides].find((one) => one && added.includes(one.calibration));
-    const ride = rides.find((one) => one.files.some((name) => added.includes(name))) ?? told ?? (wrong ? undefined : (now ?? rides[0]));
-    byId("ride").selectedIndex = rides.indexOf(ride ?? now);
-    if (ride && !isShown(ride)) return look(ride);
-    if (!now) hideRide();
-    if (wrong) say(ended(wrong), true);
-    else if (!rides.length && Object.values(found.kinds).includes("calibration")) say("This is a calibration. Now add the ride that it belongs to.");
-    else say("");
+    const meant = rides.find((one) => one.files.some((name) => added.includes(name))) ?? told;
+    const ride = meant ?? now ?? (wrong ? undefined : rides[0]);
+    byId("ride").selectedIndex = rides.indexOf(ride);
+    const only = !rides.length && Object.values(found.kinds).includes("calibration");
+    say(only ? "This is a calibration. Now add the ride that it belongs to." : "");
+    if (!ride) hideRide();
+    else if (!isShown(ride)) await look(ride);
+    if (wrong && !meant && byId("work").hidden) say(ended(wrong), true);
   }, true);
 }
 
