@@ -11,12 +11,12 @@ from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
 
 
-def standing(seconds, shake_g, shake_dps, speed_mps=np.nan):
+def standing(seconds, shake_g, shake_dps, speed_mps=np.nan, bias_dps=0.0):
     """A bike on its wheels, with an engine that shakes it by so much, rms."""
     count = round(100 * seconds)
     random = np.random.default_rng(2)
     force = [0.0, 1.0, 0.0] + random.normal(0.0, shake_g, (count, 3))
-    rates = random.normal(0.0, shake_dps, (count, 3))
+    rates = random.normal(bias_dps, shake_dps, (count, 3))
     return Log(np.arange(count) / 100.0, force, rates, np.full(count, speed_mps))
 
 
@@ -26,8 +26,11 @@ def words_of(log):
 
 @pytest.mark.parametrize(
     "log",
-    [standing(12, 0.003, 0.1), standing(40, 0.05, 1.5), standing(40, 0.1, 3.0, speed_mps=0.0)],
-    ids=["engine off", "engine on", "engine on, with a speed"],
+    [
+        *(standing(12, 0.003, 0.1), standing(40, 0.05, 1.5)),
+        *(standing(40, 0.1, 3.0, speed_mps=0.0), standing(40, 0.05, 1.5, bias_dps=5.0)),
+    ],
+    ids=["engine off", "engine on", "engine on, with a speed", "engine on, the gyro's bias not known"],
 )
 def test_a_bike_that_stands_does_not_ride(log):
     said = words_of(log)
