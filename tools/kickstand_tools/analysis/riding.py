@@ -31,6 +31,6 @@ def _has_moved(ride: Channels) -> bool:
 
 
 def _changes(values: Array, t_s: Array) -> float:
-    """By how much the mean over OVER_S differs from the usual, which may be a gyro's bias or the slope of the ground."""
+    """By how much the mean over OVER_S differs from the usual one: a gyro's bias, or the slope of the ground."""
     slow = smoothed(values, t_s, OVER_S)
     return float(np.max(np.abs(slow - np.median(slow))))
