@@ -162,6 +162,23 @@ def test_a_port_that_takes_no_signals_is_closed_again(line):
     assert line.rider.page.evaluate(told) == ["open", "closed", said]
 
 
+def test_a_port_whose_stream_refuses_to_end_is_closed_all_the_same(line):
+    """Else it could not be opened again."""
+    told = """async () => {
+      const { SerialLine } = await import("./cable/cable.mjs");
+      const said = [];
+      const line = new SerialLine({
+        open: async () => {},
+        readable: new ReadableStream({ cancel() { throw new Error("it is gone"); } }),
+        close: async () => said.push("closed"),
+      });
+      await line.open();
+      await line.close();
+      return said;
+    }"""
+    assert line.rider.page.evaluate(told) == ["closed"]
+
+
 def test_after_a_disturbed_byte_the_line_goes_on(line):
     """As Web Serial does it: the stream fails, and the port has another until the cable is pulled."""
     told = """async () => {

@@ -92,13 +92,11 @@ export class SerialLine {
   }
 
   async close() {
-    try {
-      await this.#reader?.cancel();
-      this.#reader?.releaseLock();
-      await this.#port.close();
-    } catch {
-      // it is gone already
-    }
+    this.lost = true; // or what reads would go on with the port's next stream
+    // Each of these fails where the cable is out. A port that is not closed could not be opened again.
+    await this.#reader?.cancel().catch(() => {});
+    this.#reader?.releaseLock();
+    await this.#port.close().catch(() => {});
   }
 }
 
