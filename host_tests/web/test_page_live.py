@@ -143,7 +143,8 @@ def has_firmware(board, monkeypatch):
     """The modules that tell the rides, on this board's flash."""
     monkeypatch.setattr(ride_paths, "directory", lambda _settings: "rides")
     monkeypatch.setattr(ride_paths, "os", board.modules["os"])
-    board.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: None))
+    settings = types.SimpleNamespace(VEHICLE="motorcycle")
+    board.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: settings))
     board.modules["kickstand.rides"] = types.SimpleNamespace(ride_paths=ride_paths)
 
 

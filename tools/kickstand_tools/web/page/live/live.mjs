@@ -6,6 +6,7 @@ import { keepOffline } from "../offline.mjs";
 import { Chart } from "./chart.mjs";
 import { busy, offer } from "./files.mjs";
 import { Gauge } from "./gauge.mjs";
+import { LEAN, SIDEWAYS, sideOf, written } from "./measures.mjs";
 import { Player } from "./player.mjs";
 
 const byId = (id) => document.getElementById(id);
@@ -17,6 +18,7 @@ let live; // the Live of cable_guest.py that runs, or null
 let stopped = false;
 let awake = null; // a WakeLockSentinel
 let aligned = false;
+let measure = null; // LEAN or SIDEWAYS
 let furthest = [0, 0];
 
 const tell = (text) => (byId("live-said").textContent = text);
@@ -56,9 +58,10 @@ async function stayAwake() {
 function heard(text) {
   const reading = JSON.parse(text);
   aligned = reading.aligned;
-  furthest = [reading.max_left_deg, reading.max_right_deg];
+  show(reading.car ? SIDEWAYS : LEAN);
+  furthest = measure.most(reading);
   player.take(reading.moments, performance.now());
-  if (!stopped) tell(`${aligned ? "Recording" : "Recording; the board is not aligned yet, so there is no lean"}: ${clock(reading.seconds)}`);
+  if (!stopped) tell(`${aligned ? "Recording" : `Recording; the board is not aligned yet, so there is ${measure.none}`}: ${clock(reading.seconds)}`);
 }
 
 function stop() {
@@ -119,6 +122,18 @@ function clock(seconds) {
   return `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
 }
 
+/** Show this one of measures.mjs from now on. */
+function show(wanted) {
+  if (wanted === measure) return;
+  measure = wanted;
+  gauge.scale(measure);
+  put("now-title", measure.title);
+  put("max-left-name", measure.furthest[0]);
+  put("max-right-name", measure.furthest[1]);
+  byId("chart").setAttribute("aria-label", `${measure.title.split(" ")[0]} and acceleration over the last minute`);
+  drawn = null;
+}
+
 let drawn = null;
 
 function draw(nowMs) {
@@ -126,14 +141,15 @@ function draw(nowMs) {
   const key = `${moment} ${until} ${innerWidth} ${matchMedia("(prefers-color-scheme: dark)").matches}`;
   if (key !== drawn) {
     drawn = key;
-    const lean = moment?.[1] ?? null;
-    gauge.show(lean, ...furthest);
-    chart.draw(player.moments, until);
-    put("lean", lean === null ? "--" : `${Math.abs(Math.round(lean))}°`);
-    put("side", lean === null || Math.round(lean) === 0 ? "\u00a0" : lean < 0 ? "left" : "right");
-    put("forward", moment ? `${moment[2] < 0 ? "−" : "+"}${Math.abs(moment[2]).toFixed(2)} g` : "--");
-    put("max-left", furthest[0] ? `${Math.round(furthest[0])}°` : "--");
-    put("max-right", furthest[1] ? `${Math.round(furthest[1])}°` : "--");
+    const value = moment && measure.value(moment);
+    const forward = moment ? moment[2] : null;
+    gauge.show(value, ...(measure === LEAN ? furthest : [0, 0]));
+    chart.draw(player.moments, until, measure);
+    put("lean", value === null ? "--" : written(measure, value));
+    put("side", (value !== null && sideOf(measure, value)) || "\u00a0");
+    put("forward", forward === null ? "--" : `${forward < 0 ? "−" : "+"}${Math.abs(forward).toFixed(2)} g`);
+    put("max-left", furthest[0] ? written(measure, furthest[0]) : "--");
+    put("max-right", furthest[1] ? written(measure, furthest[1]) : "--");
   }
   requestAnimationFrame(draw);
 }
@@ -142,6 +158,7 @@ function put(id, text) {
   if (byId(id).textContent !== text) byId(id).textContent = text;
 }
 
+show(LEAN);
 showIfAble(byId("live-form"), byId("live-unable"));
 byId("pull").disabled = byId("live-form").hidden;
 byId("start").addEventListener("click", start);
