@@ -69,11 +69,17 @@ def test_a_lean_ends_soon_after_the_last_block(rider):
 
 def test_tools_that_cannot_be_loaded_can_be_asked_for_again(chromium, address, board):
     """And a browser without a store for other pages says how its files get there."""
-    rider = Rider(chromium, address + "live.html")
+    rider = Rider(chromium, address + "live.html", service_workers="block")
     rider.page.add_init_script(serial_line.FAKE)
     rider.page.reload()
     line = SerialLine(rider)
     line.plug_in(RawPrompt(board, half_seconds(3)[0]))
+    for name in ("pyodide.asm.wasm", "python_stdlib.zip", "python.mjs"):  # of the first Pyodide itself never tells
+        rider.page.route(f"**/{name}", lambda route: route.abort())
+        rider.page.click("#start")
+        rider.page.wait_for_selector("#live-said:has-text('Is there a network? Press the button again')")
+        rider.page.unroute(f"**/{name}")
+        rider.page.evaluate("document.querySelector('#live-said').textContent = ''")
     rider.page.evaluate(MISSING, "install.zip")
     for press, says in (("#start", "#live-said"), ("#pull", "#pull-said")):
         rider.page.click(press)
@@ -84,6 +90,7 @@ def test_tools_that_cannot_be_loaded_can_be_asked_for_again(chromium, address, b
     rider.page.wait_for_selector("#live-said:has-text('Recording')", timeout=60_000)
     line.connected = False
     rider.page.wait_for_selector("#files li")
+    assert rider.errors == []
     rider.page.evaluate(REFUSED)
     rider.page.click("#files li button")
     rider.page.wait_for_selector("#files li:has-text('save them, and choose them there')")

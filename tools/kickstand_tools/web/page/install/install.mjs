@@ -1,7 +1,7 @@
 // Puts the firmware and its config.py onto a board at the browser's serial port: `kickstand flash` itself, on CPython for
 // WebAssembly (web/install_guest.py).
 
-import { choosePort, inPages, loadOnce, overCable, python, showIfAble } from "../cable/cable.mjs";
+import { choosePort, inPages, loadOnce, overCable, python } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
 import { connectImage } from "./image.mjs";
 import { Fields } from "./fields.mjs";
@@ -24,7 +24,7 @@ async function look() {
   if (!port) return;
   atWork(true);
   byId("config").hidden = true;
-  tell("Loading the tools …", 0);
+  tell("Loading the tools, once 6 MB …", 0);
   const tools = await load(tell);
   if (!tools) return atWork(false);
   const guest = tools.pyimport("kickstand_tools.web.install_guest").Installation();
@@ -88,8 +88,6 @@ function atWork(on) {
   for (const id of ["look", "install", "fields", "image", "image-file"]) byId(id).disabled = on;
 }
 
-showIfAble(byId("install-form"), byId("install-unable"));
-byId("image-form").hidden = byId("install-form").hidden;
 byId("look").addEventListener("click", look);
 byId("install").addEventListener("click", install);
 connectImage(atWork);

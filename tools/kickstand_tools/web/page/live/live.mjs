@@ -1,7 +1,7 @@
 // Shows what a board streams, keeps it as a log, and fetches the rides that the board has recorded: `kickstand record` and
 // `kickstand pull` on CPython for WebAssembly (web/cable_guest.py).
 
-import { choosePort, inPages, loadOnce, overCable, python, showIfAble } from "../cable/cable.mjs";
+import { choosePort, inPages, loadOnce, overCable, python } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
 import { Chart } from "./chart.mjs";
 import { busy, offer } from "./files.mjs";
@@ -29,7 +29,7 @@ async function start() {
   if (!port) return;
   stopped = false;
   atWork(true);
-  tell("Loading the tools …");
+  tell("Loading the tools, once 8 MB …");
   const guest = await guests(tell);
   if (!guest) return atWork(false);
   await stayAwake();
@@ -84,7 +84,7 @@ async function pull() {
   const port = await choosePort(say);
   if (!port) return;
   atWork(true, false);
-  say("Loading the tools …", 0);
+  say("Loading the tools, once 8 MB …", 0);
   const guest = await guests(say);
   if (!guest) return atWork(false);
   const result = await overCable(port, say, (line, name) => {
@@ -159,8 +159,6 @@ function put(id, text) {
 }
 
 show(LEAN);
-showIfAble(byId("live-form"), byId("live-unable"));
-byId("pull").disabled = byId("live-form").hidden;
 byId("start").addEventListener("click", start);
 byId("stop").addEventListener("click", stop);
 byId("pull").addEventListener("click", pull);
