@@ -10,11 +10,11 @@ _RAW_PASTE = b"\x05A\x01"
 class RawPrompt:
     """Has as much of an emulator.pico.Pico as SerialLine asks for. board: a FakeBoard, on which the code is run.
     streams: blocks that the app sends each time that it is started, in place of being run; it goes on, and sends no
-    more, until Ctrl-C.  deaf: says nothing at all."""
+    more, until Ctrl-C.  vehicle: in its config.py.  deaf: says nothing at all."""
 
-    def __init__(self, board, *streams, deaf=False):
+    def __init__(self, board, *streams, vehicle="motorcycle", deaf=False):
         self.board, self._deaf = board, deaf
-        self._streams = [said(blocks) for blocks in streams]
+        self._streams = [b"vehicle %s\r\n" % vehicle.encode() + said(blocks) for blocks in streams]
         self._streaming = False
         self._typed = b""
         self.heard = lambda data: None

@@ -200,7 +200,7 @@ def test_a_browser_without_serial_ports_says_so(chromium, address):
         assert "Firefox, Safari" in first.inner_text()
         for button in rider.page.locator("main button").all():
             assert button.is_hidden()
-        assert rider.axe() == []
+    assert rider.axe() == []
     rider.context.close()
 
 
@@ -224,14 +224,17 @@ def test_tools_that_do_not_come_are_told_and_can_be_asked_for_again(chromium, ad
 def test_the_wiring_is_that_of_the_boards_own_pins(line):
     """In the tables, as the firmware has them, and drawn."""
     page = line.rider.page
-    for board, pins in (("pico", ["GP4, pin 6", "GP5, pin 7", "GP6, pin 9", "GP7, pin 10", "GP15, pin 20"]),
-                        ("esp32", ["21", "22", "18", "19", "4"])):
+    for board, pins in (
+        ("pico", ["GP4, pin 6", "GP5, pin 7", "GP6, pin 9", "GP7, pin 10", "GP15, pin 20"]),
+        ("esp32", ["21", "22", "18", "19", "4"]),
+    ):
         wired = page.locator(f".wired:has(img[src='./wiring_{board}.svg'])")
         cells = wired.locator("td:last-child").all_text_contents()
         assert [cell for cell in cells if "GND" not in cell and "3V3" not in cell] == pins
         wired.evaluate("wired => (wired.closest('details').open = true)")
-        wired.locator("img").scroll_into_view_if_needed()
-        page.wait_for_function("(img) => img.complete && img.naturalWidth > 0", arg=wired.locator("img").element_handle())
+        picture = wired.locator("img")
+        picture.scroll_into_view_if_needed()
+        page.wait_for_function("img => img.complete && img.naturalWidth > 0", arg=picture.element_handle())
 
 
 def test_each_board_has_its_own_page_for_micropython(line):

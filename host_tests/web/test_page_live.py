@@ -2,6 +2,7 @@
 
 import functools
 import gzip
+import json
 import types
 
 import pytest
@@ -63,6 +64,34 @@ def test_a_cable_that_is_pulled_leaves_the_log(line, rider, board, tmp_path):
     assert list(saved(rider, tmp_path).values()) == recorded(blocks)
 
 
+def test_a_car_shows_g_in_place_of_a_lean(line, rider, board, tmp_path, monkeypatch):
+    """And so does its log, by the calibration. A motorcycle after it has its gauge again."""
+    monkeypatch.setattr(ride_writer, "turns", braking_in_a_left_bend)
+    line.plug_in(RawPrompt(board, half_seconds(3)[0], vehicle="car"))
+    rider.page.click("#start")
+    rider.page.wait_for_function("document.querySelector('#lean').textContent === '0.30 g'")
+    assert (rider.text("#side"), rider.text("#forward")[1:]) == ("left", "0.20 g")
+    assert rider.page.get_attribute("#gauge", "aria-label") == "Sideways now: 0.30 g left"
+    assert (rider.text("#max-left-name"), rider.text("#max-left")) == ("Hardest braking", "0.20 g")
+    line.connected = False
+    rider.page.wait_for_selector("#files li")
+    log, calibration = saved(rider, tmp_path).values()
+    assert json.loads(calibration)["vehicle"] == "car"
+    assert log.count(b"\n") > 100
+    rider.page.wait_for_selector("#start:enabled:visible")
+    line.plug_in(RawPrompt(board, half_seconds(3)[0]))
+    rider.page.click("#start")
+    rider.page.wait_for_selector("#max-left-name:has-text('Most left')")
+    line.connected = False
+    rider.page.wait_for_selector("#start:enabled:visible")
+
+
+def braking_in_a_left_bend(count, seed=0):
+    """As ride_writer.turns(), of a car: 0.2 and 0.3 g."""
+    for _ in range(count):
+        yield [2 * mean for mean in (-851, 1324, 4096, 0, 0, 98, 0)], 2, 10_000
+
+
 def test_a_lean_ends_soon_after_the_last_block(rider):
     assert rider.page.evaluate(PLAYED) == [20, 20, None]
 
@@ -74,7 +103,7 @@ def test_tools_that_cannot_be_loaded_can_be_asked_for_again(chromium, address, b
     rider.page.reload()
     line = SerialLine(rider)
     line.plug_in(RawPrompt(board, half_seconds(3)[0]))
-    for name in ("pyodide.asm.wasm", "python_stdlib.zip", "python.mjs"):  # of the first Pyodide itself never tells
+    for name in ("python.mjs", "pyodide.asm.wasm"):  # that the second is missing Pyodide itself does not tell
         rider.page.route(f"**/{name}", lambda route: route.abort())
         rider.page.click("#start")
         rider.page.wait_for_selector("#live-said:has-text('Is there a network? Press the button again')")
