@@ -50,7 +50,7 @@ def choose(line, name, value):
 def test_a_new_board_gets_the_firmware_and_its_settings(line, board):
     """What is wrong is told beside the field, by the firmware's own rules, and nothing is copied until it is right."""
     line.plug_in(RawPrompt(board))
-    assert line.look() == "Imagined Pico with RP2040, MicroPython 1.26.1 is there."
+    assert line.look().startswith("Imagined Pico with RP2040, MicroPython 1.26.1 is there.")
     page = line.rider.page
     assert page.get_attribute("[name=BUTTON_PIN]", "placeholder") == "15"
     choose(line, "SIDE", '"right"')
@@ -122,7 +122,7 @@ def test_a_cable_that_is_pulled_leaves_a_board_that_starts_nothing(line, board):
     line.plug_in(RawPrompt(board))
     line.look()
     line.cut_after = 12_000
-    assert "connection lost" in line.install()
+    assert line.install() == "Not installed: connection lost: plug the board in again, then repeat."
     assert not board.path("main.py").exists()
     line.plug_in(RawPrompt(board))
     line.look()
@@ -226,7 +226,7 @@ def test_the_wiring_is_that_of_the_boards_own_pins(line):
     page = line.rider.page
     for board, pins in (
         ("pico", ["GP4, pin 6", "GP5, pin 7", "GP6, pin 9", "GP7, pin 10", "GP15, pin 20"]),
-        ("esp32", ["21", "22", "18", "19", "4"]),
+        ("esp32", [f"GPIO {number}" for number in (21, 22, 18, 19, 4)]),
     ):
         wired = page.locator(f".wired:has(img[src='./wiring_{board}.svg'])")
         cells = wired.locator("td:last-child").all_text_contents()

@@ -59,8 +59,7 @@ def test_a_cable_that_is_pulled_leaves_the_log(line, rider, board, tmp_path):
     assert (rider.text("#lean"), rider.text("#max-left")) == ("--", "--")
     line.connected = False
     rider.page.wait_for_selector("#files li")
-    assert "connection lost" in rider.text("#live-said")
-    assert "what came until then is kept" in rider.text("#live-said")
+    assert rider.text("#live-said") == "Stopped. Connection lost: what came until then is kept."
     assert list(saved(rider, tmp_path).values()) == recorded(blocks)
 
 
@@ -72,7 +71,7 @@ def test_a_car_shows_g_in_place_of_a_lean(line, rider, board, tmp_path, monkeypa
     rider.page.wait_for_function("document.querySelector('#lean').textContent === '0.30 g'")
     assert (rider.text("#side"), rider.text("#forward")[1:]) == ("left", "0.20 g")
     assert rider.page.get_attribute("#gauge", "aria-label") == "Sideways now: 0.30 g left"
-    assert (rider.text("#max-left-name"), rider.text("#max-left")) == ("Hardest braking", "0.20 g")
+    assert (rider.text("#max-left-name"), rider.text("#max-left")) == ("Peak braking", "0.20 g")
     line.connected = False
     rider.page.wait_for_selector("#files li")
     log, calibration = saved(rider, tmp_path).values()
@@ -153,7 +152,7 @@ def test_the_rides_of_a_board_are_what_the_command_pulls(line, rider, board, tmp
     told = rider.text("#pull-said")
     assert told.startswith("2 rides are here")
     assert rider.axe() == []
-    assert "ride 4, part 0: damaged at byte 4096: left out" in told
+    assert "Ride 4, part 0: damaged at byte 4096: left out" in told
     files = saved(rider, tmp_path)
     assert board.resets == 1
     monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: board)

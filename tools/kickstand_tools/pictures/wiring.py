@@ -66,7 +66,7 @@ def connections(board: Board) -> list[tuple[str, dict[str, str]]]:
 
     def pin(name: str) -> str:
         if not board.numbered:
-            return name
+            return f"GPIO {name}" if name.isdigit() else name
         return f"{name}, pin {near[name] if name in near else 2 * len(board.far) + 1 - far[name]}"
 
     pins = {module: {one: pin(name) for one, name in taken.items()} for module, taken in _default_pins(board).items()}

@@ -162,5 +162,8 @@ export async function overCable(port, tell, speak, restarted = false) {
 
 /** A line of the command's, in these pages' words. */
 export function inPages(text) {
-  return text.replaceAll("socket:", "").replace(/kickstand flash (puts|brings)/, "the page Install $1");
+  return text
+    .replaceAll("socket:", "")
+    .replace(/this port: connection lost \(.*?\)/, "connection lost")
+    .replace(/kickstand flash (puts|brings)/, "the page Install $1");
 }

@@ -42,7 +42,7 @@ async function look() {
   byId("settings").hidden = Boolean(byHand);
   if (!byHand) fields.fill(settings, usual);
   byId("config").hidden = false;
-  tell(`${name} is there.`);
+  tell(`${name} is there. ${byHand ? "Press" : "Look through its settings, then press"} Install.`);
   check();
 }
 
@@ -79,9 +79,9 @@ function told({ refused, board: name, copied, kept, config_kept }) {
     return;
   }
   byId("config").hidden = true;
-  const files = copied ? `${copied} files copied and verified, ${kept} as they were` : "it was up to date";
+  const files = copied ? `${copied} files copied and verified${kept ? `, ${kept} were there already` : ""}` : "it was up to date";
   const config = config_kept ? " Its own config.py stays." : "";
-  tell(`Done: ${name}. ${files}.${config} The board starts now: press its button on the stand, then upright.`);
+  tell(`Done: ${name}. ${files}.${config} The board starts now. Press its button once with the bike on its kickstand, and once with the bike upright.`);
 }
 
 function atWork(on) {

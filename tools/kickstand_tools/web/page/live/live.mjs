@@ -47,7 +47,7 @@ async function start() {
   awake?.release();
   atWork(false);
   if (!said && stopped) tell("Stopped.");
-  if (said) tell(said.refused ? `${inPages(said.refused)}.` : inPages(["Stopped", ...said.notes].join(". ")) + ".");
+  if (said) tell(sentences(said.refused ? [said.refused] : ["Stopped", ...said.notes]));
 }
 
 /** Keep the screen on, where the browser can. It ends that itself when the page is covered. */
@@ -100,10 +100,15 @@ async function pull() {
     const title = `Ride ${number}: ${clock(seconds)}, ${readings} readings`;
     if (log) offer(byId("files"), title, files.filter(({ name }) => name.startsWith(`${stem}.`)));
   }
-  const problems = [...rides.flatMap((ride) => ride.problems), ...(refused ? [inPages(refused)] : [])];
+  const problems = [...rides.flatMap((ride) => ride.problems), ...(refused ? [refused] : [])];
   const none = refused ? "" : "There are no rides on the board: its menu’s “Record ride” makes one";
   const sum = rides.length ? `${rides.length} rides are here: save them. They stay on the board too` : none;
-  say([sum, ...problems].filter(Boolean).join(". ") + ".");
+  say(sentences([sum, ...problems].filter(Boolean)));
+}
+
+/** Lines of the commands, one after the other. */
+function sentences(lines) {
+  return lines.map((line) => inPages(line).replace(/^./, (first) => first.toUpperCase())).join(". ") + ".";
 }
 
 /** Of Python's [(name, bytes)]. */
@@ -128,6 +133,7 @@ function show(wanted) {
   measure = wanted;
   gauge.scale(measure);
   put("now-title", measure.title);
+  byId("lean").classList.toggle("long", measure === SIDEWAYS);
   put("max-left-name", measure.furthest[0]);
   put("max-right-name", measure.furthest[1]);
   byId("chart").setAttribute("aria-label", `${measure.title.split(" ")[0]} and acceleration over the last minute`);

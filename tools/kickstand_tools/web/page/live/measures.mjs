@@ -23,12 +23,12 @@ export const SIDEWAYS = {
   none: "nothing to show",
   value: ([, , , left]) => (left === null ? null : -left),
   limit: 1,
-  mark: 0.1,
+  mark: 0.25,
   chart: { title: "sideways, right above", step: 0.5, unit: " g" },
   digits: 2,
   unit: " g",
   spoken: "g",
-  furthest: ["Hardest braking", "Hardest acceleration"],
+  furthest: ["Peak braking", "Peak acceleration"],
   most: ({ max_brake_g, max_accel_g }) => [max_brake_g, max_accel_g],
 };
 
