@@ -121,7 +121,7 @@ def test_tools_that_cannot_be_loaded_can_be_asked_for_again(chromium, address, b
     assert rider.errors == []
     rider.page.evaluate(REFUSED)
     rider.page.click("#files li button")
-    rider.page.wait_for_selector("#files li:has-text('save them, and choose them there')")
+    rider.page.wait_for_selector("#files li:has-text('save both, and choose them on the page Rides')")
     rider.context.close()
 
 
