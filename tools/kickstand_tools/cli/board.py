@@ -117,7 +117,7 @@ def _live_text(reading: "LiveReading") -> str:
     """The lean as a bar to the left or right, and how long the recording is."""
     how_long = f"{reading.rate_hz:3.0f} readings/s  {reading.seconds // 60:.0f}:{reading.seconds % 60:04.1f}"
     lean, forward_g, left_g = reading.lean_deg, reading.forward_g, reading.left_g
-    if reading.car and reading.aligned:
+    if left_g is not None:  # a car, and aligned
         side = "left " if left_g > 0.0 else "right"
         return f"forward {forward_g:+.2f} g  {side} {abs(left_g):.2f} g  {how_long}"
     if lean is None:  # as on the display, a lean that is not certain enough is not shown

@@ -131,7 +131,7 @@ class Recording:
             if self._live:
                 rate_hz = len(block.turns) * 1e6 / max(1, before - block.time_us)
                 most = meter.max_left_deg, meter.max_right_deg, meter.max_accel_g, meter.max_brake_g
-                most = most if aligned else (0.0,) * 4
+                most = most if aligned else (0.0, 0.0, 0.0, 0.0)
                 self._live(LiveReading(aligned, car, moments, *most, rate_hz, self.seconds))
         if self.first is None:
             raise InputError("; ".join(["nothing was recorded: does the display show readings?", *notes]))
