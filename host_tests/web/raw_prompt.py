@@ -14,7 +14,8 @@ class RawPrompt:
 
     def __init__(self, board, *streams, vehicle="motorcycle", deaf=False):
         self.board, self._deaf = board, deaf
-        self._streams = [b"vehicle %s\r\n" % vehicle.encode() + said(blocks) for blocks in streams]
+        self._streams = [said(blocks) for blocks in streams]
+        self._vehicle = b"vehicle %s\r\n" % vehicle.encode()
         self._streaming = False
         self._typed = b""
         self.heard = lambda data: None
@@ -54,7 +55,8 @@ class RawPrompt:
             self.heard(b"OK")
         elif "RideStream" in code and self._streams:
             self._streaming = True
-            self.heard(b"OK" + self._streams.pop(0))
+            told = self._vehicle if "chosen.VEHICLE" in code else b""
+            self.heard(b"OK" + told + self._streams.pop(0))
         else:
             out, error = self.board.exec_raw(code)
             self.heard(b"OK" + out + b"\x04" + error + b"\x04>")

@@ -171,6 +171,18 @@ def test_what_is_no_image_for_an_esp32_is_not_written(line, board, tmp_path):
     page.wait_for_selector("#image:enabled")
 
 
+def test_after_its_first_use_the_page_works_without_a_network(line, board):
+    line.plug_in(RawPrompt(board))
+    line.look()
+    page = line.rider.page
+    line.rider.context.set_offline(True)
+    page.reload()
+    line.plug_in(RawPrompt(board))
+    assert "is there" in line.look()
+    assert page.evaluate("document.querySelector('.wired img').naturalWidth") > 0
+    line.rider.context.set_offline(False)
+
+
 def test_the_form_has_every_setting(line):
     names = line.rider.page.evaluate(
         "async () => (await import('./install/fields.mjs')).GROUPS.flatMap(([, , of]) => of.map(([name]) => name))"

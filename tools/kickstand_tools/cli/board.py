@@ -114,7 +114,7 @@ def record(port: str | None, out: Path) -> None:
 
 
 def _live_text(reading: "LiveReading") -> str:
-    """The lean as a bar to the left or right, and how long the recording is."""
+    """The lean as a bar to the left or right, in a car the forces, and how long the recording is."""
     how_long = f"{reading.rate_hz:3.0f} readings/s  {reading.seconds // 60:.0f}:{reading.seconds % 60:04.1f}"
     lean, forward_g, left_g = reading.lean_deg, reading.forward_g, reading.left_g
     if left_g is not None:  # a car, and aligned
