@@ -24,7 +24,7 @@ async function look() {
   if (!port) return;
   atWork(true);
   byId("config").hidden = true;
-  tell("Loading the tools, once 6 MB …", 0);
+  tell("Loading the tools, 6 MB the first time …", 0);
   const tools = await load(tell);
   if (!tools) return atWork(false);
   const guest = tools.pyimport("kickstand_tools.web.install_guest").Installation();
@@ -79,9 +79,11 @@ function told({ refused, board: name, copied, kept, config_kept }) {
     return;
   }
   byId("config").hidden = true;
-  const files = copied ? `${copied} files copied and verified${kept ? `, ${kept} were there already` : ""}` : "it was up to date";
+  const there = kept ? `, ${kept} were there already` : "";
+  const files = copied ? `${copied} files copied and verified${there}` : "it was up to date";
   const config = config_kept ? " Its own config.py stays." : "";
-  tell(`Done: ${name}. ${files}.${config} The board starts now. Press its button once with the bike on its kickstand, and once with the bike upright.`);
+  const next = "Press its button once with the bike on its kickstand, and once with the bike upright.";
+  tell(`Done: ${name}. ${files}.${config} The board starts now. ${next}`);
 }
 
 function atWork(on) {

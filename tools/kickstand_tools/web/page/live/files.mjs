@@ -33,7 +33,8 @@ export function offer(list, title, files) {
       await leavePulled(files);
     } catch {
       item.setAttribute("role", "status"); // a screen reader says what takes the button's place
-      look.replaceWith("This browser hands nothing from page to page, as in a private window: save both, and choose them on the page Rides.");
+      const why = "This browser hands nothing from page to page, as in a private window";
+      look.replaceWith(`${why}: save both, and choose them on the page Rides.`);
       return;
     }
     open("./rides.html#pulled"); // in a tab of its own: this page keeps what is not saved yet

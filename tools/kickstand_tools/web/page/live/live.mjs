@@ -29,7 +29,7 @@ async function start() {
   if (!port) return;
   stopped = false;
   atWork(true);
-  tell("Loading the tools, once 8 MB …");
+  tell("Loading the tools, 8 MB the first time …");
   const guest = await guests(tell);
   if (!guest) return atWork(false);
   await stayAwake();
@@ -61,7 +61,8 @@ function heard(text) {
   show(reading.car ? SIDEWAYS : LEAN);
   furthest = measure.most(reading);
   player.take(reading.moments, performance.now());
-  if (!stopped) tell(`${aligned ? "Recording" : `Recording; the board is not aligned yet, so there is ${measure.none}`}: ${clock(reading.seconds)}`);
+  const lacking = aligned ? "" : `; the board is not aligned yet, so there is ${measure.none}`;
+  if (!stopped) tell(`Recording${lacking}: ${clock(reading.seconds)}`);
 }
 
 function stop() {
@@ -84,7 +85,7 @@ async function pull() {
   const port = await choosePort(say);
   if (!port) return;
   atWork(true, false);
-  say("Loading the tools, once 8 MB …", 0);
+  say("Loading the tools, 8 MB the first time …", 0);
   const guest = await guests(say);
   if (!guest) return atWork(false);
   const result = await overCable(port, say, (line, name) => {
@@ -102,7 +103,11 @@ async function pull() {
   }
   const problems = [...rides.flatMap((ride) => ride.problems), ...(refused ? [refused] : [])];
   const none = refused ? "" : "There are no rides on the board: its menu’s “Record ride” makes one";
-  const sum = rides.length ? `${rides.length} rides are here: save them. They stay on the board too` : none;
+  const some =
+    rides.length === 1
+      ? "1 ride is here: save it. It stays on the board too"
+      : `${rides.length} rides are here: save them. They stay on the board too`;
+  const sum = rides.length ? some : none;
   say(sentences([sum, ...problems].filter(Boolean)));
 }
 
