@@ -17,7 +17,7 @@ from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.plot import charts
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.cli.main import kickstand
-from kickstand_tools.web import rides_guest, rides_remedies
+from kickstand_tools.web import rides_guest
 from rider import MISSING, Rider
 from test_page_looks import LAPTOP, PHONE
 
@@ -339,8 +339,8 @@ def test_the_charts_follow_the_dark(page, ride, calibration):
 
 
 def test_every_remedy_has_words_for_the_page():
-    assert rides_remedies.REMEDIES.keys() == remedies.COMMANDS.keys()
-    for name, words in rides_remedies.REMEDIES.items():
+    assert remedies.PAGE.keys() == remedies.COMMANDS.keys()
+    for name, words in remedies.PAGE.items():
         assert "--" not in words, name
         assert not any(f"kickstand {command}" in words for command in kickstand.commands), name
 

@@ -12,7 +12,7 @@ from .zipped import zipped
 MODULES = (
     *("__init__.py", "errors.py", "firmware_path.py", "output.py", "refusals.py", "remedies.py"),
     *("analysis", "calibration", "imports", "logs", "replay", "smoothing"),
-    *("web/__init__.py", "web/rides_given.py", "web/rides_guest.py", "web/rides_remedies.py"),
+    *("web/__init__.py", "web/rides_given.py", "web/rides_guest.py"),
 )
 _NUMPY = "lib/python3.12/site-packages/"  # in the package of conda
 # A third of numpy, which is for its developers, for other compilers, and for random numbers

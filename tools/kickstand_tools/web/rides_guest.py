@@ -2,7 +2,7 @@
 WebAssembly. page/rides/worker.mjs runs it, in a folder of its own.
 
 Each function returns JSON: what its docstring says, or {"refused": why}, what the command would say in the words of
-rides_remedies.py.
+a page.
 """
 
 import functools
@@ -26,9 +26,9 @@ from ..errors import InputError
 from ..imports import mapped
 from ..imports.importing import import_recording, write_imported
 from ..refusals import sentence
+from ..remedies import PAGE
 from ..smoothing.smooth import smooth_to_csv
 from .rides_given import sorted_out
-from .rides_remedies import REMEDIES
 
 PLOTLY = "./plotly/plotly.min.js"  # the page of a ride loads it from the site
 MADE = Path("made")  # beside what was given
@@ -43,7 +43,7 @@ def told(function: Callable[..., Any]) -> Callable[..., str]:
         try:
             return json.dumps(function(*given))
         except InputError as error:
-            return json.dumps({"refused": _one_line(error.said(REMEDIES))})
+            return json.dumps({"refused": _one_line(error.said(PAGE))})
         except MemoryError:
             return json.dumps({"refused": TOO_LONG})
 
@@ -71,7 +71,7 @@ def rides(given, names):
         | {"calibration": one.calibration, "files": one.files, "table": one.table and asked_for(one.table)}
         for one in found.rides
     ]
-    refused = {name: _one_line(error.said(REMEDIES)) for name, error in found.refused.items()}
+    refused = {name: _one_line(error.said(PAGE)) for name, error in found.refused.items()}
     return {"rides": rides, "kinds": found.kinds, "why": refused}
 
 
@@ -99,7 +99,7 @@ def take(log, is_log, columns, units, _tell):
     found = import_recording(log, json.loads(columns) or None, json.loads(units))
     out = str(_made(log, f"{log.partition('.')[0]}.csv"))
     write_imported(out, found)
-    warnings = [sentence(notice, REMEDIES) for notice in found.notices]
+    warnings = [sentence(notice, PAGE) for notice in found.notices]
     return {"log": out, "path": out, "app": found.app, "warnings": warnings}
 
 
@@ -113,9 +113,9 @@ def look(log, calibration, tell):
     notices = [*seen.notices, *([seen.exchanged] if seen.exchanged else [])]
     table = {"units": report.STOPS_UNITS, "title": report.STOPS_TITLE, "terms": report.STOPS_TERMS}
     return {
-        "words": asdict(report.words(seen, REMEDIES)) | table,
+        "words": asdict(report.words(seen, PAGE)) | table,
         "json": report.as_data(seen) | {"ride": Path(log).name},
-        "warnings": [sentence(notice, REMEDIES) for notice in notices],
+        "warnings": [sentence(notice, PAGE) for notice in notices],
         "page": page(seen, f'<script src="{PLOTLY}"></script>'),
         "plotly": PLOTLY,
         "stem": ride.stem,
