@@ -18,6 +18,7 @@ from .axes.course import Course
 from .axes.handedness import Handedness
 from .block import Block
 from .cells import COLUMNS, OPTIONAL, TRACK
+from .csv_lines import numbers_in
 from .log import Log
 from .mended.even_blocks import even_blocks
 from .mended.frozen import FrozenReadings
@@ -205,15 +206,17 @@ def _numbers(
 ) -> tuple[Array, str]:
     """(n, columns in the order of places) and the rows as CSV. line: how many lines came before this text.
 
-    numpy reads plain numbers. Any other text, and values that look wrong, are read cell by cell, which tells the line
-    of a mistake and is twenty times slower.
+    numbers_in() reads what Kickstand writes, numpy other plain numbers, three times slower. Any other text, and values
+    that look wrong, are read cell by cell, which tells the line of a mistake and is sixty times slower.
     """
     if text.strip() and not text.translate(None, _NUMERIC):
-        plain = text.replace(b",,", b",nan,").replace(b",,", b",nan,").replace(b",\n", b",nan\n")
-        try:
-            table = np.loadtxt(io.BytesIO(plain), delimiter=",", comments=None, ndmin=2)
-        except ValueError:
-            table = np.empty((0, 0))
+        table = numbers_in(text, len(names))
+        if table is None:
+            plain = text.replace(b",,", b",nan,").replace(b",,", b",nan,").replace(b",\n", b",nan\n")
+            try:
+                table = np.loadtxt(io.BytesIO(plain), delimiter=",", comments=None, ndmin=2)
+            except ValueError:
+                table = np.empty((0, 0))
         if table.shape[1] == len(names):
             table = table[:, list(places.values())]
             if cells.plausible(table, list(places), before_us):
