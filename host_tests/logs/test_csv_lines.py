@@ -59,14 +59,14 @@ def test_numbers_are_read_as_python_reads_them(digits):
 
 
 def test_the_last_line_needs_no_end():
-    assert np.array_equal(numbers_in(b"1.25,,-3\n,2,40", 3), [[1.25, np.nan, -3.0], [np.nan, 2.0, 40.0]], equal_nan=True)
+    assert np.array_equal(numbers_in(b"1.25,,-3\n,2,4", 3), [[1.25, np.nan, -3.0], [np.nan, 2.0, 4.0]], equal_nan=True)
 
 
 @pytest.mark.parametrize(
     "text",
     ["1,2\n3", "1,2,3\n4\n", "1,2\n\n3,4\n", "1,2\n3,4,\n", "1.5,2\n2,2\n", "2,2\n1.5,2\n", "1.5,2\n1.25,2\n"]
-    + ["-,1\n", ".,1\n", "1-2,1\n", "--2,1\n", "1.2.3,1\n", "1e3,1\n", "1+2\n", " 1,1\n", "nan,1\n", "1\r,2\n", '"1",2\n']
-    + ["1234567890123456,1\n", "0.1234567890123456,1\n", "1.5,2\n\u0661.5,2\n"],
+    + ["-,1\n", ".,1\n", "1-2,1\n", "--2,1\n", "1.2.3,1\n", "1e3,1\n", "1+2\n", " 1,1\n", "nan,1\n"]
+    + ["1\r,2\n", '"1",2\n', "1234567890123456,1\n", "0.1234567890123456,1\n", "1.5,2\n\u0661.5,2\n"],
 )
 def test_what_is_no_table_of_plain_numbers_is_left_to_another_reader(text):
     assert numbers_in(text.encode(), 2) is None

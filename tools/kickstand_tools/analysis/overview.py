@@ -13,7 +13,7 @@ from .alignment_quality import Quality, quality
 from .channels import Channels
 from .downsample import downsampled, joined
 from .ride import Ride
-from .stops.brake_test import RATE_S, Stop, find_stops
+from .stops.brake_test import RATE_S, Stop, stops_of
 from .stops.standstill import standing
 from .summary import Summary
 
@@ -69,9 +69,10 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     frozen_s = sum(float(notice.values[1]) for notice in notices if notice.code == "frozen-readings")
     # Of a stretch the notice tells more than its own.
     total.frozen_s = min(frozen_s, total.missing_s) if isinstance(ride.log, Stretch) else frozen_s
-    found = quality(course, standing(course))
+    still = standing(course)
+    found = quality(course, still)
     contradiction = mount.notice(found.roll_deg)
     exchanged = contradiction if contradiction and contradiction.code == "forward-exchanged" else None
     notices += [contradiction] if contradiction and not exchanged else []
-    stops = [] if exchanged else find_stops(course)
+    stops = [] if exchanged else stops_of(course, still)
     return Overview(ride, total, course, stops, found, mount.sign.correlation, exchanged, notices)

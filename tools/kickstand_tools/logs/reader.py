@@ -70,12 +70,10 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None,
 
 def read_blocks(
     source: Source, minimum: int = 2, progress: Progress | None = None, notices: list[Notice] | None = None,
-    axes: bool = True
+    axes: bool = True, lines: bool = True
 ) -> Iterator[Block]:
-    """The same block by block, however long the log is. Readings that froze are marked in each block.
-
-    notices: what is remarkable in the log is appended to it at the end.
-    """
+    """The same block by block, however long the log is. Readings that froze are marked in each block. notices: what is
+    remarkable in the log is appended to it at the end. lines: keep the rows as CSV too, which take the most memory."""
     name, count = name_of(source), 0
     remarks: list[Notice] = []
     speed_unit, frozen = SpeedUnit(name), FrozenReadings()
@@ -87,6 +85,7 @@ def read_blocks(
         if not count:
             check_units(name, block)
         count += len(block.time_us)
+        block.lines = block.lines if lines else []
         block.frozen = frozen.mark(block)
         if block.has_speed:
             speed_unit.add(block.t_s, block.readings[:, :3], block.speed_mps)
