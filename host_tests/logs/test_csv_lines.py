@@ -59,7 +59,9 @@ def test_numbers_are_read_as_python_reads_them(digits):
 
 
 def test_the_last_line_needs_no_end():
-    assert np.array_equal(numbers_in(b"1.25,,-3\n,2,4", 3), [[1.25, np.nan, -3.0], [np.nan, 2.0, 4.0]], equal_nan=True)
+    found = numbers_in(b"1.25,,-3\n,2,4", 3)
+    assert found is not None
+    assert np.array_equal(found, [[1.25, np.nan, -3.0], [np.nan, 2.0, 4.0]], equal_nan=True)
 
 
 @pytest.mark.parametrize(

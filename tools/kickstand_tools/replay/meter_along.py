@@ -41,8 +41,7 @@ class MeterAlong:
         for forces_g, rates_radps, step_us, speed in zip(forces, rates, steps_us.tolist(), block.speed_mps.tolist()):
             if speed >= 0.0:  # NaN is not
                 meter.measure_speed(speed)
-            meter.force, meter.rate = forces_g, rates_radps
-            meter.follow(step_us)
+            meter.follow(forces_g, rates_radps, step_us)
             yield meter
 
     def columns(self, block: Block) -> Array:

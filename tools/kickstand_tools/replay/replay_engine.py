@@ -72,7 +72,10 @@ class ReplayMeter(LeanMeter):
         rate[1] = m[3] * x + m[4] * y + m[5] * z + c[1]
         rate[2] = m[6] * x + m[7] * y + m[8] * z + c[2]
 
-    follow = LeanMeter._follow  # with force and rate as they are set
+    def follow(self, force, rate, dt_us):
+        """update() with what in_vehicle() made of the reading: three numbers each."""
+        self.force, self.rate = force, rate
+        self._follow(dt_us)
 
 
 class Replay:
