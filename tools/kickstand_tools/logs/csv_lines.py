@@ -119,7 +119,7 @@ def _numbers(letters: NDArray[np.uint8], end: NDArray[np.intp], length: NDArray[
     minus = letters[end - length] == _MINUS
     length = length - minus  # a copy: the minus sign is left out
     most = int(np.max(length))
-    if most - has_point > _MOST_DIGITS or np.min(length) <= has_point:
+    if most - has_point > _MOST_DIGITS or np.min(length) <= max(digits, has_point):
         return None
     back = np.arange(most)[:, None]  # of each digit from the end
     figures = letters.take(end - 1 - back, mode="clip") - np.uint8(_ZERO)
