@@ -42,7 +42,7 @@ def test_a_phone_leans_the_motorcycle(chromium, address):
     tilt(3)
     rider.page.tap("#tilt")
     rider.page.wait_for_function("document.querySelector('#tilt').ariaPressed === 'true'")
-    assert rider.page.is_checked("input[value=ride]")
+    assert rider.page.get_attribute("#pose [value=ride]", "aria-pressed") == "true"
     rider.page.wait_for_timeout(200)
     tilt(23)
     rider.page.wait_for_function("document.querySelector('#lean-out').value === '20° right'")

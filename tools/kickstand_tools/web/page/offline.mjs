@@ -1,6 +1,17 @@
-/** Have the browser keep the site, so that each of its pages opens without a network. */
-export function keepOffline() {
-  if (navigator.serviceWorker && isSecureContext) navigator.serviceWorker.register("./service_worker.js");
+/**
+ * Have the browser keep the site, so that each of its pages opens without a network. What a page loads only when it is
+ * used (see LATER in web/site.py) is kept from its first use on. Resolves to true once it is so, to false where it cannot
+ * be: without https, except on this computer's own address.
+ */
+export async function keepOffline() {
+  if (!navigator.serviceWorker || !isSecureContext) return false;
+  try {
+    await navigator.serviceWorker.register("./service_worker.js");
+    await navigator.serviceWorker.ready;
+    return true;
+  } catch {
+    return false;
+  }
 }
 
 const LONGEST_MS = 5000;
