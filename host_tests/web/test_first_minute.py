@@ -66,7 +66,9 @@ def pull_the_wire(rider):
 
 def cut_the_power_in_a_save(rider):
     """Of the alignment: the one before is still there."""
-    rider.click("#cut")
+    for armed in "true", "false", "true":
+        rider.click("#cut")
+        rider.page.wait_for_selector(f"#cut[aria-pressed={armed}]")
     rider.told("next save")
     rider.click("#do")  # put it on its stand
     rider.told("Hold the button for a second")
@@ -80,7 +82,7 @@ def cut_the_power_in_a_save(rider):
     rider.reads("blank")
     rider.click("#do")  # switch it on
     rider.reads("Lean")
-    rider.told("The meter is aligned")
+    rider.told("The old alignment is still there")
     rider.click("#press")
     rider.reads("Max left")
 
@@ -106,6 +108,7 @@ def is_what_the_firmware_shows(rider, flash):
 
 def works_without_a_network(rider, address):
     rider.page.wait_for_function("navigator.serviceWorker.controller")
+    assert "works without a network" in rider.text("#offline")
     rider.context.set_offline(True)
     for name in "", "index.html":
         rider.page.goto(address + name)

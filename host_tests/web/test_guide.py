@@ -62,7 +62,8 @@ LOOK = """async (ticks) => {
     words = shows(display.text)?.words ?? words;
     if (!tick.powered && !dark) guide.dark(tick.cut);
     dark = !tick.powered;
-    step = guide.next(display.text, display.shown_deg, tick.pose, tick.phase === tick.pose, { ...tick, time: tick.t_s }) ?? step;
+    const standing = tick.phase === tick.pose;
+    step = guide.next(display.text, display.shown_deg, tick.pose, standing, { ...tick, time: tick.t_s }) ?? step;
     return [tick.stage, words, step.number, step.text, step.action?.[1] ?? ""];
   });
 }"""
@@ -70,8 +71,8 @@ LOOK = """async (ticks) => {
 SHORT, LONG = ("press", 0.15), ("press", 1.2)
 STAND, UPRIGHT, RIDE = ("pose", "kickstand"), ("pose", "upright"), ("pose", 15.0)
 PULL, PLUG = ("sensor", False), ("sensor", True)
-ALIGN = [STAND, ("wait", 8), SHORT, ("wait", 4.5), UPRIGHT, ("wait", 4), SHORT, ("wait", 4.5)]
-RIDING = [*ALIGN, RIDE, ("wait", 9), ("lean", 30), ("wait", 8)]
+ALIGN = [("wait", 1.5), SHORT, ("wait", 4), UPRIGHT, ("wait", 3), SHORT, ("wait", 4)]
+RIDING = [*ALIGN, RIDE, ("wait", 8), ("lean", 30), ("wait", 6)]
 
 
 @pytest.fixture(scope="module")
@@ -144,7 +145,6 @@ def test_the_same_pose_twice(stages):
         [SHORT],
         [UPRIGHT, ("wait", 4)],
         [SHORT, ("wait", 0.5)],
-        ALIGN,
     )
     expect(
         told,

@@ -1,6 +1,8 @@
 // The rider's hands: button, pose, lean, speed, the phone's tilt. Calls act(name, value) with what is wanted.
 
 const STEP_DEG = 5;
+const SLOWEST_KMH = 20; // to ride at
+const CRUISE_KMH = 54; // at first
 const DRAG_DEG = 75; // of lean for half the scene's width
 const TAP_MS = 150;
 
@@ -50,8 +52,7 @@ export class Steering {
   #poses = document.querySelectorAll("#pose button");
   #lean = byId("lean");
   #speed = byId("speed");
-  #slowest = this.#speed.min;
-  #wanted = this.#speed.value; // km/h, while riding
+  #wanted = CRUISE_KMH; // while riding
   pose = "kickstand";
 
   constructor(act) {
@@ -72,7 +73,7 @@ export class Steering {
     for (const button of this.#poses) button.setAttribute("aria-pressed", String(button.value === pose));
     const riding = pose === "ride";
     this.#lean.disabled = this.#speed.disabled = !riding;
-    this.#speed.min = riding ? this.#slowest : 0;
+    this.#speed.min = riding ? SLOWEST_KMH : 0;
     if (riding) {
       this.#show(0);
       this.#ride(this.#wanted);
@@ -112,7 +113,7 @@ export class Steering {
   /** kmh: as the slider has it, or beyond its ends. */
   #ride(kmh) {
     this.#speed.value = kmh;
-    this.#wanted = this.#speed.value;
+    this.#wanted = this.#speed.valueAsNumber;
     this.#showSpeed(this.#wanted / 3.6);
     this.#act("pose", this.#wanted / 3.6);
   }
@@ -123,7 +124,7 @@ export class Steering {
     if (!steps || this.pose !== "ride") return;
     event.preventDefault();
     if (steps[0]) this.lean(Number(this.#lean.value) + steps[0]);
-    else this.#ride(Number(this.#wanted) + steps[1]);
+    else this.#ride(this.#wanted + steps[1]);
   }
 
   #drag(scene) {
