@@ -76,11 +76,12 @@ def test_every_step_has_its_room(chromium, address, files):
               const [todo, button, guide] = ["#todo", "#do", ".guide"].map((one) => document.querySelector(one));
               button.hidden = false;
               button.textContent = "Put it on its stand";
+              todo.textContent = "";
+              const bottom = guide.getBoundingClientRect().bottom;
               return steps.filter((text) => {
                 todo.textContent = text;
-                const end = guide.getBoundingClientRect().bottom;
-                return todo.getBoundingClientRect().bottom > button.offsetTop + guide.offsetParent.offsetTop
-                  || button.getBoundingClientRect().bottom > end - 8;
+                const moved = guide.getBoundingClientRect().bottom !== bottom;
+                return moved || button.getBoundingClientRect().bottom > bottom - 8;
               });
             }""",
             steps,
