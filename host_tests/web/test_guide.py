@@ -129,7 +129,7 @@ def test_a_press_while_riding_is_taken_for_the_stand(stages):
     expect(
         told,
         ("not aligned", 1, "Put the motorcycle on its stand first", "kickstand"),
-        ("aligning", 1, "that it is on its stand", "kickstand"),
+        ("aligning", 1, "that the motorcycle is on its stand", "kickstand"),
         ("refused", 1, "why it has not taken this pose", "kickstand"),
         ("refused", 1, "Press the button: once more", ""),
         ("aligning", 2, "Now hold the motorcycle upright", "upright"),
@@ -149,11 +149,11 @@ def test_the_same_pose_twice(stages):
     expect(
         told,
         ("aligning", 2, "Now hold the motorcycle upright", "upright"),
-        ("aligning", 2, "that it is upright", "upright"),
+        ("aligning", 2, "that the motorcycle is upright", "upright"),
         ("refused", 1, "Both poses were the same", ""),
         ("aligning", 1, "Press the button", ""),
         ("aligning", 1, "on its stand first", "kickstand"),
-        ("aligning", 1, "that it is on its stand", "kickstand"),
+        ("aligning", 1, "that the motorcycle is on its stand", "kickstand"),
     )
 
 

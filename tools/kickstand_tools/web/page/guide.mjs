@@ -89,7 +89,7 @@ export class Guide {
     const there = stand ? ON_STAND : UPRIGHT;
     const right = pose === this.#wanted;
     if (kind === "six" || (kind === "spoilt" && this.#wanted === "six")) {
-      return step(0, "For these the sensor is turned by hand, which this page cannot do. Hold the button to leave.");
+      return step(0, "For these the sensor is turned by hand: not on this page. Hold the button to leave.");
     }
     switch (kind) {
       case "unaligned":
@@ -104,8 +104,10 @@ export class Guide {
       case "take-stand":
       case "take-upright":
         if (!right) {
-          const pressed = stand ? "that it is on its stand. Put it there." : "that it is upright. Hold it so.";
-          return step(number, `The press told the meter ${pressed}`, there);
+          const told = stand
+            ? "You have told the meter that the motorcycle is on its stand. Put it there."
+            : "You have told the meter that the motorcycle is upright. Hold it so.";
+          return step(number, told, there);
         }
         if (!standing) return step(number, "The meter waits until the motorcycle is still.");
         if (!stand) return step(number, "Keep it still, until the bar is full.");
