@@ -28,6 +28,13 @@ def test_on_a_phone_everything_for_the_first_minute_is_on_its_first_screen(chrom
         assert box["y"] + box["height"] <= PHONE["viewport"]["height"], selector
     rider.page.tap("#press")
     rider.reads("Stand: hold")
+    rider.page.tap("#wire")
+    rider.told("wire is out")
+    rider.reads("No sensor")
+    assert rider.page.locator("#display").bounding_box()["y"] >= 0, "what the fault does is not in sight"
+    rider.page.tap("#power")
+    rider.told("display is dark")
+    assert rider.seen("shifts") == []
     rider.context.close()
 
 
