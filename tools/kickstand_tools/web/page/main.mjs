@@ -36,7 +36,7 @@ const board = new Board({
   ready() {
     byId("pose").disabled = false;
     for (const id in FAULTS) byId(id).disabled = false;
-    keepOffline().then((kept) => put("offline", kept ? "It works without a network from now on." : ""));
+    keepOffline().then((kept) => byId("offline").classList.toggle("away", !kept));
   },
   tick(next) {
     tick = next;
