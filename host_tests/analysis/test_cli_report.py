@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from kickstand_tools.analysis import report
 from kickstand_tools.analysis.overview import overview
-from kickstand_tools.analysis.plot import charts, picture, plot
+from kickstand_tools.analysis.plot import charts, picture, plot, traces
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.stops.brake_test import Stop
 from kickstand_tools.simulation.scripted import script
@@ -43,6 +43,24 @@ def test_a_report_has_the_ride_in_figures(ride):
     assert abs(stop["side_m"]) < 0.2
     assert data["alignment"]["gravity_g"] == pytest.approx(1.0, abs=0.002)
     assert abs(data["alignment"]["roll_deg"]) < 0.5
+
+
+def test_with_another_mounts_calibration_there_are_no_figures(ride, tmp_path):
+    """In the words, and in what is drawn."""
+    (tmp_path / "cal.json").write_text(
+        json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": [[1, 0, 0], [0, 0, 1], [0, -1, 0]]})
+    )
+    seen = overview(open_ride(ride, tmp_path / "cal.json"))
+    assert [notice.code for notice in seen.notices] == ["up-off"]
+    rows = {name: value for name, value, _ in report.words(seen).ride}
+    names = "Max left", "Max right", "Over 30°", "Over 40°", "Max braking", "Max acceleration"
+    assert [rows[name] for name in names] == ["--"] * 6
+    assert traces.title(seen).endswith("lean as displayed -- left, -- right  ·  braking --, acceleration --")
+    assert traces.quality_lines(seen) == ["not judged"]
+    seen.quality.yaw_deg = 58.7  # as a longer ride would have it
+    lines = len(charts.figure(seen)["data"])
+    seen.notices.clear()
+    assert len(charts.figure(seen)["data"]) == lines + 1  # the yaw that was found
 
 
 def test_time_without_readings_is_said(ride, tmp_path):
@@ -102,7 +120,7 @@ def test_without_a_speed_stops_are_marked(tmp_path):
 
 def test_without_a_speed_it_may_be_that_nothing_can_be_told(tmp_path):
     moving = analysis_rides.write(tmp_path, [script.upright(4), script.accelerate(15, 5), script.straight(20)])
-    assert "no speed in the log: stops cannot be told" in command.works("report", moving).out
+    assert "Stops: not told, the log has no speed." in command.works("report", moving).out
     ride = [script.upright(4), script.accelerate(15, 5), script.straight(20)]
     moving = analysis_rides.write(tmp_path, ride, speed_hz=1)
     assert "No stop from over 10 km/h found." in command.works("report", moving).out

@@ -61,15 +61,15 @@ def as_data(seen: Overview) -> dict[str, Any]:
     for name, peak in peaks.items():
         there = peak.time_s is not None
         data[name] = {"value": round(peak.value, 4), "time_s": round(peak.time_s or 0.0, 3)} if there else None
-    judged = _judged(seen)
+    fits = judged(seen)
     data["alignment"] = {
-        name: round(value, 4) if judged and value is not None else None
+        name: round(value, 4) if fits and value is not None else None
         for name, value in vars(quality).items()
         if not name.endswith(("lateral_g", "forward_g"))
     }
     if not seen.ride.car:
         costs = vars(lean_cost(quality))
-        known = judged and not seen.exchanged
+        known = fits and not seen.exchanged
         data["lean_cost"] = {
             name: round(value, 2) if known and value is not None else None for name, value in costs.items()
         }
@@ -132,7 +132,7 @@ def _no_stops(seen: Overview) -> str:
     if seen.exchanged:
         return "Stops: not told, see the warning."
     if not seen.has_speed and seen.riding_s > RIDDEN_S:
-        return "no speed in the log: stops cannot be told"  # there may have been some: none was sure enough
+        return "Stops: not told, the log has no speed."  # there may have been some: none was sure enough
     if stops_by_speed(seen.course):
         return "The speed falls to a stop, the force says otherwise: is the calibration this ride's?"
     return "No stop from over 10 km/h found."
@@ -144,14 +144,16 @@ def _ride(seen: Overview) -> list[tuple[str, str, str]]:
     if not seen.ride.car:
         smoothed = ("Lean", "smoothed", "from the whole ride")
         rows.append(smoothed if seen.ride.smoothed else ("Lean", "as the display showed it", ""))
-        rows.append(("Max left", *_peak(total.left_deg, "{:.0f}°")))
-        rows.append(("Max right", *_peak(total.right_deg, "{:.0f}°")))
-        rows += [(f"Over {limit:.0f}°", f"{seconds:.1f} s", "") for limit, seconds in total.beyond_s.items()]
-    rows.append(("Max braking", *_peak(total.brake_g, "{:.2f} g")))
-    rows.append(("Max acceleration", *_peak(total.accel_g, "{:.2f} g")))
+        rows.append(("Max left", *peak_words(total.left_deg, "{:.0f}°")))
+        rows.append(("Max right", *peak_words(total.right_deg, "{:.0f}°")))
+        known = (total.left_deg.time_s, total.right_deg.time_s) != (None, None)
+        for limit, seconds in total.beyond_s.items():
+            rows.append((f"Over {limit:.0f}°", f"{seconds:.1f} s" if known else "--", ""))
+    rows.append(("Max braking", *peak_words(total.brake_g, "{:.2f} g")))
+    rows.append(("Max acceleration", *peak_words(total.accel_g, "{:.2f} g")))
     if seen.has_speed:
         peak = Peak(total.speed_mps.value * 3.6, total.speed_mps.time_s)
-        rows.append(("Max speed", *_peak(peak, "{:.0f} km/h")))
+        rows.append(("Max speed", *peak_words(peak, "{:.0f} km/h")))
     if total.not_sure_s >= 1.0:
         rows.append(("Lean not sure", clock(total.not_sure_s), ""))
     if total.missing_s - total.frozen_s >= 0.1:
@@ -163,7 +165,7 @@ def _ride(seen: Overview) -> list[tuple[str, str, str]]:
 
 def _alignment(seen: Overview, remedies: Remedies) -> str:
     quality = seen.quality
-    if not _judged(seen):
+    if not judged(seen):
         return "Alignment: not judged, see the warning."
     said = "Alignment: not enough straight riding to tell how far it is off."
     known = angles(quality)
@@ -180,7 +182,7 @@ def _alignment(seen: Overview, remedies: Remedies) -> str:
     return said
 
 
-def _judged(seen: Overview) -> bool:
+def judged(seen: Overview) -> bool:
     """Whether the ride says how well the sensor is aligned: not where it contradicts the calibration altogether."""
     return not any(notice.code in CONTRADICTED for notice in seen.notices)
 
@@ -216,7 +218,8 @@ def _stops(stops: list[Stop]) -> list[tuple[str, ...]]:
     ]
 
 
-def _peak(peak: Peak, form: str) -> tuple[str, str]:
+def peak_words(peak: Peak, form: str) -> tuple[str, str]:
+    """Its value, and when it was; "--" where nothing was sure enough to be one."""
     if peak.time_s is None:
         return "--", ""
     return form.format(peak.value), f"at {clock(peak.time_s)}"

@@ -7,7 +7,7 @@ import numpy as np
 
 from ...logs.table import Array
 from ..overview import Overview
-from ..report import clock
+from ..report import clock, judged
 from ..stops.brake_test import Stop
 from .envelope import GAP_S, SPEED_GAP_S, envelope
 from .in_script import plain
@@ -63,7 +63,7 @@ def _data(seen: Overview, drawn: Traces, over_time: list[str], forces: int) -> A
     straights = {"type": "scattergl", "name": "straights", "mode": "markers", "marker": {"size": 3, "color": "grey"}}
     straights |= {"x": plain(-seen.quality.lateral_g, 5), "y": plain(seen.quality.forward_g, 5)}
     made += [one | _axes(forces + k) for k, one in enumerate((seconds, bars, straights), 1)]
-    if seen.quality.yaw_deg is not None:
+    if seen.quality.yaw_deg is not None and judged(seen):
         reach = np.array([-1.0, 1.0]) * float(np.max(np.abs(seen.quality.forward_g)))
         across = -np.tan(np.radians(seen.quality.yaw_deg)) * reach
         line = {"type": "scatter", "mode": "lines", "line": {"width": 1.5, "color": BRAKE_COLOUR}}

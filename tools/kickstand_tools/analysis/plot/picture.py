@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ..overview import Overview
-from ..report import clock
+from ..report import clock, judged
 from .envelope import GAP_S, SPEED_GAP_S, envelope
 from .traces import (
     BRAKE_COLOUR,
@@ -154,7 +154,7 @@ def _histogram(axes: Any, seen: Overview) -> None:
 def _alignment(axes: Any, seen: Overview) -> None:
     quality = seen.quality
     axes.plot(-quality.lateral_g, quality.forward_g, ".", color=LATERAL_COLOUR, markersize=3, alpha=0.5)
-    if quality.yaw_deg is not None:
+    if quality.yaw_deg is not None and judged(seen):
         reach = np.array([-1.0, 1.0]) * float(np.max(np.abs(quality.forward_g)))
         axes.plot(-np.tan(np.radians(quality.yaw_deg)) * reach, reach, color=BRAKE_COLOUR, linewidth=1.2)
     axes.axvline(0.0, color="0.6", linewidth=0.6)

@@ -7,7 +7,7 @@ import numpy as np
 from ...logs.table import Array
 from ..downsample import spacing_s
 from ..overview import Overview
-from ..report import angles, clock
+from ..report import angles, clock, judged, peak_words
 from ..summary import BINS_DEG, Peak
 
 LEFT_COLOUR, RIGHT_COLOUR = "#2563a8", "#c2571a"
@@ -53,8 +53,10 @@ def title(seen: Overview) -> str:
     said = [seen.ride.stem, clock(total.duration_s)]
     if not seen.ride.car:
         how = "smoothed lean" if seen.ride.smoothed else "lean as displayed"
-        said.append(f"{how} {total.left_deg.value:.0f}° left, {total.right_deg.value:.0f}° right")
-    said.append(f"braking {total.brake_g.value:.2f} g, acceleration {total.accel_g.value:.2f} g")
+        left, right = peak_words(total.left_deg, "{:.0f}°")[0], peak_words(total.right_deg, "{:.0f}°")[0]
+        said.append(f"{how} {left} left, {right} right")
+    brake, accel = peak_words(total.brake_g, "{:.2f} g")[0], peak_words(total.accel_g, "{:.2f} g")[0]
+    said.append(f"braking {brake}, acceleration {accel}")
     return "  ·  ".join(said)
 
 
@@ -78,6 +80,8 @@ def histogram(seen: Overview) -> tuple[Array, Array]:
 def quality_lines(seen: Overview) -> list[str]:
     """One line for each thing that the ride says about the alignment."""
     quality = seen.quality
+    if not judged(seen):
+        return ["not judged"]
     lines = angles(quality) or ["not enough straight riding"]
     return lines if quality.gravity_g is None else [*lines, f"at rest {quality.gravity_g:.3f} g"]
 
