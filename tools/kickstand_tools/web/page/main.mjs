@@ -90,7 +90,13 @@ byId("do").addEventListener("click", () => {
   actions[byId("do").dataset.action]();
   focusPress();
 });
-for (const id in FAULTS) byId(id).addEventListener("click", actions[id]);
+for (const id in FAULTS) {
+  byId(id).addEventListener("click", (event) => {
+    // The guide tells what this has done, and undoes it: on a phone it may be out of sight
+    if (event.currentTarget.ariaPressed === "false") byId("todo").parentElement.scrollIntoView({ block: "nearest" });
+    actions[id]();
+  });
+}
 // After a click with the mouse the space bar is the board's button again
 addEventListener("click", (event) => {
   if (event.detail && event.target.closest("button:not(#press, #do)")) document.activeElement.blur();
