@@ -82,7 +82,8 @@ function told({ refused, board: name, copied, kept, config_kept }) {
   const there = kept ? `, ${kept} were there already` : "";
   const files = copied ? `${copied} files copied and verified${there}` : "it was up to date";
   const config = config_kept ? " Its own config.py stays." : "";
-  const next = "Press its button once with the bike on its kickstand, and once with the bike upright.";
+  const next =
+    "With the sensor fixed to the bike’s frame, press the board’s button once on the kickstand, and once upright.";
   tell(`Done: ${name}. ${files}.${config} The board starts now. ${next}`);
 }
 
