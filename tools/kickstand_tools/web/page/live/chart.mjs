@@ -6,7 +6,7 @@ const GAP = 26;
 const EVERY_S = 10; // a line of the grid
 // value: of a moment; limit: at the upper end, and below 0 as far; step: between two lines
 const ACCELERATION = {
-  ...{ title: "acceleration, braking below", value: ([, , forward]) => forward, limit: 1, step: 0.5, unit: " g" },
+  ...{ title: "acceleration: braking is down", value: ([, , forward]) => forward, limit: 1, step: 0.5, unit: " g" },
   ...{ share: 0.38, color: "--truth" },
 };
 
