@@ -238,7 +238,7 @@ def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):
         ("slow.csv", b"t_s,ax_g,ay_g,az_g\n0,0,1,0\n", "and no gyro found in it: needed are a time, the acceleration"),
         ("damaged.zip", b"PK\x03\x04\xff" + bytes(40), "damaged.zip is damaged or cut short: copy it again"),
         ("ride.parquet", b"PAR1" + bytes(40), "ride.parquet is Parquet, which this page cannot read: give the ride as"),
-        ("report.json", b'{"ride": "A"}', "report.json: version is missing: give the .cal.json of the ride"),
+        ("report.json", b'{"ride": "A"}', "report.json is no calibration: version is missing: give the"),
     ],
 )
 def test_what_is_no_ride_is_told_in_one_line_and_does_not_spoil_the_next(

@@ -127,7 +127,7 @@ def read_calibration(source: File) -> CalibrationFile:
     if not isinstance(data, dict):
         raise InputError(f"{name} is no calibration", "give_calibration")
     if "version" not in data:
-        raise InputError(f"{name}: version is missing", "give_calibration")
+        raise InputError(f"{name} is no calibration: version is missing", "give_calibration")
     if data["version"] != VERSION or isinstance(data["version"], bool):
         raise InputError(
             f"{name}: version {_shown(data['version'])}, this program reads {VERSION}: calibrate again"
