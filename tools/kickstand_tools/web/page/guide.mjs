@@ -158,7 +158,7 @@ export class Guide {
     if (Math.abs(shown) < WELL_DEG) this.#heldSince = null;
     else this.#heldSince ??= state.time;
     if (this.#heldSince !== null && state.time - this.#heldSince > RIDE_S) this.#ridden = true;
-    if (this.#ridden) return step(5, "That is all. A press turns the pages, a long one opens the menu. Break something, or build one: see Install.");
+    if (this.#ridden) return step(5, "That is all. A press turns the pages. Now break something, or build one: see Install.");
     return step(4, "Lean it: drag the motorcycle, use the slider or the arrow keys. Compare both figures.");
   }
 }
