@@ -125,7 +125,7 @@ class _Fit:
 
     def _solved(self, reduced: Eliminated) -> Chain:
         known = self._judged
-        ways = beliefs(known.ways, known.place, self._parameters, self._before)
+        ways = beliefs(known.ways, self._parameters, self._before)
         return mixed(solve_chains(reduced.left, STATES, ways), known.share)
 
 
