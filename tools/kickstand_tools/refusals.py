@@ -79,6 +79,8 @@ _SENTENCES = {
     "gx, gy, gz right would be {1}",
     "upside-down": "the sensor's {0} points down: if it is not mounted upside down, all accelerations are of the "
     "opposite sign, and left and right get exchanged: reverse them (at rest up reads +1 g)",
+    "car-replayed": "the calibration is a car's, whose display shows no lean: lean_deg is that of a motorcycle which "
+    "would feel the same, and lean_sigma_deg is nan",
     "another-mount": "the calibration given is of a mount {0:.0f} degrees from this one: its offset and slope are used",
 }
 _MOVED = {

@@ -32,7 +32,8 @@ class CalibrationFile:
 
     accel_offset_g (3), accel_slope (3), gyro_bias_dps (3); vehicle_from_sensor (3, 3): rows left, up, forward.
     aligned: the matrix was measured; six_done: offset and slope were. trim_deg: by how much the upright pose of the
-    alignment was found to be off. vehicle: "car" or "motorcycle" if the matrix was measured by driving, else "".
+    alignment was found to be off. vehicle: "car" or "motorcycle" if the matrix was measured by driving, "car" also if
+    the board was set to one, else "".
     kickstand_side: "left" or "right", where the kickstand leaned the bike to in the two poses, else "". notes: further
     entries to write to the file. gyro_delay_s: how late the low-pass DLPF of a recorded ride made the gyro, None if
     that is not known.
