@@ -18,8 +18,8 @@ from .solver import Beliefs, unlikelihood
 
 ROLL = ROTATION.stop - 1
 # Standard deviations. The mount's are those of its turning within a block of 10 s.
-FIRM, YIELDING = np.radians([0.03, 0.13])  # rad
-CALM_G, WIND_G, STORM_G = np.radians([0.02, 0.6, 1.8])  # g: force to the side that lasts for minutes
+FIRM, YIELDING = np.radians([0.05, 0.11])  # rad
+CALM_G, WIND_G, STORM_G = np.radians([0.03, 0.6, 1.8])  # g: force to the side that lasts for minutes
 PUSHED_S = 120.0  # for how long
 BLOCK_S = 10.0
 # How unusual something is: twice the logarithm of how often a ride is without it. A light wind that lasts is usual, but

@@ -54,7 +54,7 @@ ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
 # (parameters.BESIDE), over its standard deviation. The longer these means, the more an error has gone that changes
 # sides, as a rider's corrections do: over BRIEF_S the balance is judged with care, over LONG_S as it is.
 BRIEF_S, LONG_S, LASTS_S = 3.0, 10.0, 40.0
-LEAST_UNBALANCE, MOST_UNBALANCE = 0.15, 6.0
+LEAST_UNBALANCE, MOST_UNBALANCE = 0.25, 6.0
 TOLD_BY = 50  # windows, at least
 
 

@@ -8,8 +8,8 @@ from .noise import jolted
 from .parameters import FORWARD, LEAN, PITCH, corrected_rates
 from .windows import Windows
 
-LEANED_SHARE = 0.003  # of the lean: what the model leaves out, such as a gyro that feels forces, grows with it
-TIMING_S = 0.003  # s: of what the delay of the gyro's low-pass, and the times of samples, are off
+LEANED_SHARE = 0.004  # of the lean: what the model leaves out, such as a gyro that feels forces, grows with it
+TIMING_S = 0.004  # s: of what the delay of the gyro's low-pass, and the times of samples, are off
 
 
 def at_samples(windows: Windows, rate: Array, found: Adjusted, delay_s: float) -> Array:
