@@ -1,4 +1,4 @@
-"""Derivatives of the equations of model.py, by the chain rule; a test holds them against differences.
+"""Derivatives of equations.py, by the chain rule; a test holds them against differences.
 
 By differences they would cost as much as all the rest of the adjustment. A derivative that is 0 everywhere is left out.
 """
