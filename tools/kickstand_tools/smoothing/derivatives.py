@@ -34,7 +34,7 @@ By = dict[int, Array]  # derivatives of a quantity by the inputs
 
 def _sum(one: By, factor: Array | float, other: By) -> By:
     """Derivatives of one + factor x other."""
-    return {i: one.get(i, 0.0) + factor * other.get(i, 0.0) for i in {**one, **other}}
+    return {i: np.add(one.get(i, 0.0), factor * other.get(i, 0.0)) for i in {**one, **other}}
 
 
 def by_inputs(inputs: Array) -> dict[int, By]:

@@ -135,7 +135,7 @@ class Circumstances:
         return found
 
     def roughness_of(self, residual: Array) -> Array:
-        """(n): how large errors are around each window. residual (n, STATES + MEASURED): Residuals.values of model.py."""
+        """(n): how large errors are around each window. residual (n, STATES + MEASURED): values of Residuals."""
         squares = np.mean((residual[:, TELLING] / EXPECTED) ** 2, axis=1) * self.roughness**2
         share = averaged(self.riding.astype(float), ROUGHNESS_S)
         found = averaged(np.where(self.riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
