@@ -34,7 +34,7 @@ By = dict[int, Array]  # derivatives of a quantity by the inputs
 
 def _sum(one: By, factor: Array | float, other: By) -> By:
     """Derivatives of one + factor x other."""
-    return {i: np.add(one.get(i, 0.0), factor * other.get(i, 0.0)) for i in {**one, **other}}
+    return one | {i: one[i] + factor * value if i in one else factor * value for i, value in other.items()}
 
 
 def by_inputs(inputs: Array) -> dict[int, By]:
