@@ -131,7 +131,7 @@ def test_the_derivatives_are_those_of_the_equations():
     """By the states and by every parameter, against differences; the speed backwards and forwards."""
     rng, n = np.random.default_rng(3), 30
     force, rate = rng.normal(size=(2, n, 3))
-    windows = windows_of(0.2 * np.arange(n), force, rate, rng.normal(size=n), rng.normal(size=n))
+    windows = windows_of(np.linspace(0.0, 6.0, n), force, rate, rng.normal(size=n), rng.normal(size=n))
     middle, p = 0.3 * rng.normal(size=(n, STATES)), 0.3 * rng.normal(size=(n, PARAMETERS))
     factor = rng.uniform(0.5, 2.0, size=(ROWS, n))
     found = by_unknowns(windows, middle, p, factor)

@@ -62,7 +62,7 @@ def mean_error(known):
     return np.mean((found.lean_deg - known.lean_deg)[last]), np.mean(found.lean_sigma_deg[last])
 
 
-def test_a_mount_that_slips_in_mid_ride_is_followed(street):
+def test_a_mount_that_slips_in_mid_ride_spoils_little_of_what_follows(street):
     """By 1.5 degrees about forward, within 0.3 s: the gyro feels it, and from then on straights seem to lean."""
     log, calibration = street.log, street.calibration
     angle = np.radians(1.5) * np.clip((log.t_s - 65.0) / 0.3, 0.0, 1.0)
