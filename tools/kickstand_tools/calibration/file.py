@@ -123,11 +123,11 @@ def read_calibration(source: File) -> CalibrationFile:
     except OSError as error:
         raise InputError(f"{name} cannot be read: {cause(error)}") from error
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{name} is not JSON: give a file made by kickstand calibrate") from error
+        raise InputError(f"{name} is not JSON", "give_calibration") from error
     if not isinstance(data, dict):
-        raise InputError(f"{name} is no calibration: give a file made by kickstand calibrate")
+        raise InputError(f"{name} is no calibration", "give_calibration")
     if "version" not in data:
-        raise InputError(f"{name}: version is missing: give a file made by kickstand calibrate")
+        raise InputError(f"{name}: version is missing", "give_calibration")
     if data["version"] != VERSION or isinstance(data["version"], bool):
         raise InputError(
             f"{name}: version {_shown(data['version'])}, this program reads {VERSION}: calibrate again"
@@ -192,7 +192,7 @@ def calibration_beside(log: Path) -> Path:
 
 def _list(name: str, data: dict[str, Any], entry: str) -> list[Any]:
     if entry not in data:
-        raise InputError(f"{name}: {entry} is missing: give a file made by kickstand calibrate")
+        raise InputError(f"{name}: {entry} is missing", "give_calibration")
     if not isinstance(data[entry], list) or len(data[entry]) != 3:
         what = "3 rows of 3 numbers" if entry == "vehicle_from_sensor" else "3 numbers"
         raise InputError(f"{name}: {entry} has to be {what}: calibrate again")

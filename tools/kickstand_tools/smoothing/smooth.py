@@ -103,14 +103,15 @@ def smooth_blocks(
     calibration: CalibrationFile,
     progress: Progress | None = None,
     notices: list[Notice] | None = None,
+    lines: bool = True,
 ) -> Iterator[tuple[Block, Array | None]]:
-    """Each piece of the log with its values (n, COLUMNS), None where there are too few samples a second. notices: what
-    is remarkable in the log is appended to it at the end. Raises InputError."""
+    """Each piece of the log with its values (n, COLUMNS), None where there are too few samples a second. notices,
+    lines: of read_blocks(). Raises InputError."""
     _check(log, calibration)
     past: deque[Block] = deque(maxlen=CHAPTER)
     waiting: list[Block] = []
     start_c = np.nan
-    for piece in _pieces(read_blocks(log, 2, progress, notices)):
+    for piece in _pieces(read_blocks(log, 2, progress, notices, lines=lines)):
         waiting.append(piece)
         known = piece.readings[~np.isnan(piece.readings[:, 3]), 3]
         start_c = float(known[0]) if np.isnan(start_c) and len(known) else start_c
@@ -126,8 +127,7 @@ def _check(log: Source, calibration: CalibrationFile) -> None:
     if calibration.vehicle == "car":
         raise InputError(f"{name_of(log)}: a car does not lean, and its calibration is a car's")
     if not calibration.aligned:
-        todo = "kickstand calibrate two, or calibrate ride, first"
-        raise InputError(f"the calibration is not aligned, so the lean is unknown: {todo}")
+        raise InputError("the calibration is not aligned, so the lean is unknown", "align")
 
 
 def _pieces(blocks: Iterator[Block]) -> Iterator[Block]:
