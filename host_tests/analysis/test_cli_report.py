@@ -251,6 +251,7 @@ def test_without_the_libraries_there_is_no_picture(ride, tmp_path, monkeypatch):
 def test_pictures_go_into_a_directory(ride, tmp_path):
     (tmp_path / "file").write_text("")
     command.refused(tmp_path, "plot", ride, "--out", tmp_path / "file", words="is a file")
+    command.refused(tmp_path, "plot", ride, "--out", tmp_path / "ride.html", words="give the directory")
 
 
 def test_broken_off_a_picture_leaves_no_empty_directory(ride, tmp_path, monkeypatch):

@@ -160,7 +160,7 @@ def test_a_table_that_nobody_knows_is_met_with_the_line_to_type(tmp_path, monkey
     line = command.refused(
         tmp_path, "import", "my log.csv", "--out", "R.csv", words="not a file of an app that is known"
     )
-    assert "Its columns: Millis, Acc_X, Acc_Y, Acc_Z, Gyro_X, Gyro_Y, Gyro_Z, Speed_kmh, Note" in line
+    assert "its columns are Millis, Acc_X, Acc_Y, Acc_Z, Gyro_X, Gyro_Y, Gyro_Z, Speed_kmh, Note" in line
     typed = line.partition("type: kickstand ")[2]
     assert typed.startswith("import 'my log.csv' --out RIDE.csv --columns t=Millis,ax=Acc_X,")
     result = command.works(*shlex.split(typed))
@@ -171,7 +171,7 @@ def test_a_table_that_nobody_knows_is_met_with_the_line_to_type(tmp_path, monkey
 def test_what_a_table_lacks_is_said(tmp_path):
     (tmp_path / "log.csv").write_text("time,ax,ay,az,speed\n0,0,1,0,3\n1,0,1,0,3\n")
     line = command.refused(
-        tmp_path, "import", tmp_path / "log.csv", "--out", tmp_path / "R.csv", words="not found: gyro."
+        tmp_path, "import", tmp_path / "log.csv", "--out", tmp_path / "R.csv", words="and no gyro found in it: "
     )
     assert "t=time,ax=ax,ay=ay,az=az,gx=?,gy=?,gz=?,speed=speed" in line
 

@@ -212,6 +212,15 @@ def test_an_unaligned_calibration_works_with_a_warning(tmp_path):
     assert len(read(tmp_path / "LEAN.csv")) == 100
 
 
+def test_no_lean_of_a_car_is_one_that_the_display_showed(tmp_path):
+    log, cal = ride(tmp_path / "log.csv", 5.0), command.write_cal(tmp_path / "CAL.json", vehicle="car")
+    out = tmp_path / "LEAN.csv"
+    told = command.works("replay", log, "--calibration", cal, "--out", out).err
+    assert told.count("\n") == 1 and "a car's, whose display shows no lean" in told
+    assert np.all(np.isnan(read(out)["lean_sigma_deg"]))
+    assert not np.any(np.isnan(read(out)["forward_g"]))
+
+
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_the_trim_that_riding_found_is_used(tmp_path, engine):
     """Standing still, the lean is what the accelerometer says less what upright was off; without one it is 0."""

@@ -27,7 +27,8 @@ def board(tmp_path, monkeypatch):
     monkeypatch.setattr(connection, "_RESTART_S", 0)
     monkeypatch.setattr(ride_paths, "directory", lambda _settings: "rides")
     monkeypatch.setattr(ride_paths, "os", board.modules["os"])
-    board.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: None))
+    settings = types.SimpleNamespace(VEHICLE="motorcycle")
+    board.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: settings))
     board.modules["kickstand.rides"] = types.SimpleNamespace(ride_paths=ride_paths)
     return board
 
@@ -71,6 +72,21 @@ def test_rides_become_logs_with_their_calibration(board, tmp_path):
     assert cal["accel_offset_g"] == pytest.approx([0.01, -0.02, 0.03])
     assert (cal["trim_deg"], cal["firmware"], cal["who_am_i"], cal["sample_hz"]) == (1.25, __version__, "0x68", 200)
     assert len(list(board.root.glob("rides/*/*/*"))) == 3  # nothing was to be deleted
+
+
+@pytest.mark.parametrize(
+    ("vehicle", "by_drive", "told"), [("car", True, "car"), ("car", False, None), ("motorcycle", True, None)]
+)
+def test_the_drive_of_a_car_is_known_as_one(vehicle, by_drive, told, board, tmp_path, monkeypatch):
+    """Its log then shows no lean. What two poses have aligned was ridden before the board came into the car."""
+    made = ride_writer.calibration()
+    made.by_drive = by_drive
+    monkeypatch.setattr(ride_writer, "calibration", lambda _trim_deg: made)
+    board.modules["kickstand"].settings.load().VEHICLE = vehicle
+    put(board, "000/03/00000.rid", ride_writer.blocks(1, ride=3)[0])
+    command.works("pull", "--out", tmp_path / "out")
+    (path,) = tmp_path.glob("out/*.cal.json")
+    assert json.loads(path.read_text()).get("vehicle") == told
 
 
 def test_another_ride_of_the_same_number_gets_a_file_of_its_own(board, tmp_path):

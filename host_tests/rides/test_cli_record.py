@@ -6,6 +6,7 @@ import functools
 import gzip
 import json
 import os
+import re
 import signal
 import types
 from itertools import pairwise
@@ -171,10 +172,31 @@ def test_the_lean_is_shown_live_once_it_is_known(aligned, still, words, streamin
     assert "readings/s" in shown
 
 
+@pytest.mark.parametrize("aligned", [True, False])
+def test_a_car_shows_g_and_no_lean(aligned, streaming, tmp_path, monkeypatch):
+    """Nor does its log, whose calibration says that it is a car's."""
+    monkeypatch.setattr(ride_writer, "calibration", functools.partial(calibration, ride_writer.calibration(), aligned))
+    monkeypatch.setattr(ride_writer, "turns", braking_in_a_left_bend)
+    board = streaming(half_seconds(3)[0], "ctrl-c")
+    board.serial.data = b"vehicle car\r\n" + board.serial.data
+    shown = watched(monkeypatch, Watched(), "record", "--out", tmp_path / "ride.csv")
+    assert " deg" not in shown
+    assert ("forward -0.20 g  left  0.30 g" in re.sub("\x1b\\[[0-9;]*m", "", shown)) is aligned
+    assert ("not aligned" in shown) is not aligned
+    assert json.loads((tmp_path / "ride.cal.json").read_text())["vehicle"] == "car"
+    assert len(read_log(tmp_path / "ride.csv").time_us) > 100
+
+
 def at_rest(count, seed=0):
     """As ride_writer.turns(), upright on a quiet stand."""
     for i in range(count):
         yield [2 * mean for mean in (-40, 83, 4096, 0, i % 2, 98, 0)], 2, 10_000
+
+
+def braking_in_a_left_bend(count, seed=0):
+    """Of a car: 0.2 and 0.3 g."""
+    for _ in range(count):
+        yield [2 * mean for mean in (-851, 1324, 4096, 0, 0, 98, 0)], 2, 10_000
 
 
 def calibration(made, aligned, _trim_deg):

@@ -34,5 +34,5 @@ def recorded(blocks):
 def streamed(said):
     """The blocks in all that a board has said."""
     begun = said.rindex(b"\x04", 0, said.index(b"\n.\r\n")) + 1
-    *whole, _ = said[begun:].split(b".\r\n")
+    *whole, _ = said[begun:].partition(b"\r\n")[2].split(b".\r\n")  # the first line names the vehicle
     return [b"".join(map(base64.b64decode, block.split())) for block in whole]

@@ -10,11 +10,12 @@ _RAW_PASTE = b"\x05A\x01"
 class RawPrompt:
     """Has as much of an emulator.pico.Pico as SerialLine asks for. board: a FakeBoard, on which the code is run.
     streams: blocks that the app sends each time that it is started, in place of being run; it goes on, and sends no
-    more, until Ctrl-C.  deaf: says nothing at all."""
+    more, until Ctrl-C.  vehicle: in its config.py.  deaf: says nothing at all."""
 
-    def __init__(self, board, *streams, deaf=False):
+    def __init__(self, board, *streams, vehicle="motorcycle", deaf=False):
         self.board, self._deaf = board, deaf
         self._streams = [said(blocks) for blocks in streams]
+        self._vehicle = b"vehicle %s\r\n" % vehicle.encode()
         self._streaming = False
         self._typed = b""
         self.heard = lambda data: None
@@ -54,7 +55,8 @@ class RawPrompt:
             self.heard(b"OK")
         elif "RideStream" in code and self._streams:
             self._streaming = True
-            self.heard(b"OK" + self._streams.pop(0))
+            told = self._vehicle if "chosen.VEHICLE" in code else b""
+            self.heard(b"OK" + told + self._streams.pop(0))
         else:
             out, error = self.board.exec_raw(code)
             self.heard(b"OK" + out + b"\x04" + error + b"\x04>")

@@ -50,7 +50,7 @@ def choose(line, name, value):
 def test_a_new_board_gets_the_firmware_and_its_settings(line, board):
     """What is wrong is told beside the field, by the firmware's own rules, and nothing is copied until it is right."""
     line.plug_in(RawPrompt(board))
-    assert line.look() == "Imagined Pico with RP2040, MicroPython 1.26.1 is there."
+    assert line.look().startswith("Imagined Pico with RP2040, MicroPython 1.26.1 is there.")
     page = line.rider.page
     assert page.get_attribute("[name=BUTTON_PIN]", "placeholder") == "15"
     choose(line, "SIDE", '"right"')
@@ -122,7 +122,7 @@ def test_a_cable_that_is_pulled_leaves_a_board_that_starts_nothing(line, board):
     line.plug_in(RawPrompt(board))
     line.look()
     line.cut_after = 12_000
-    assert "connection lost" in line.install()
+    assert line.install() == "Not installed: connection lost: plug the board in again, then repeat."
     assert not board.path("main.py").exists()
     line.plug_in(RawPrompt(board))
     line.look()
@@ -155,7 +155,7 @@ def test_a_board_that_does_not_fit_is_left_alone(line, board, differs, platform,
 def test_what_is_no_image_for_an_esp32_is_not_written(line, board, tmp_path):
     """Nor one for another chip: no chip answers here at all."""
     page = line.rider.page
-    page.click("text=ESP32: a .bin file")
+    page.click("text=ESP32: a file that ends in .bin")
     for name, content, words in (
         ("notes.bin", b"hello", "no image for an ESP32"),
         ("pico.uf2", b"UF2\n" * 200, "no image for an ESP32"),
@@ -169,6 +169,18 @@ def test_what_is_no_image_for_an_esp32_is_not_written(line, board, tmp_path):
             "words => document.querySelector('#image-said').textContent.includes(words)", arg=words, timeout=120_000
         )
     page.wait_for_selector("#image:enabled")
+
+
+def test_after_its_first_use_the_page_works_without_a_network(line, board):
+    line.plug_in(RawPrompt(board))
+    line.look()
+    page = line.rider.page
+    line.rider.context.set_offline(True)
+    page.reload()
+    line.plug_in(RawPrompt(board))
+    assert "is there" in line.look()
+    assert page.evaluate("document.querySelector('.wired img').naturalWidth") > 0
+    line.rider.context.set_offline(False)
 
 
 def test_the_form_has_every_setting(line):
@@ -190,9 +202,57 @@ def test_a_setting_of_0_is_not_shown_as_the_usual_one(line):
 
 
 def test_a_browser_without_serial_ports_says_so(chromium, address):
-    rider = Rider(chromium, address + "install.html")
+    """First of all, and offers nothing that needs one."""
+    rider = Rider(chromium, address)
     rider.page.add_init_script("delete Navigator.prototype.serial")
-    rider.page.reload()
-    rider.page.wait_for_selector("#install-unable:not([hidden])")
-    assert rider.page.is_hidden("#install-form")
+    for name in ("install.html", "live.html"):
+        rider.page.goto(address + name)
+        first = rider.page.locator("main section:visible").first
+        assert first.get_attribute("id") == "unable"
+        assert "Firefox, Safari" in first.inner_text()
+        for button in rider.page.locator("main button").all():
+            assert button.is_hidden()
+    assert rider.axe() == []
     rider.context.close()
+
+
+def test_a_browser_with_serial_ports_hears_nothing_of_others(line):
+    assert line.rider.page.is_hidden("#unable")
+    assert line.rider.page.is_visible("#look")
+
+
+def test_tools_that_do_not_come_are_told_and_can_be_asked_for_again(chromium, address):
+    rider = Rider(chromium, address, service_workers="block")
+    rider.page.add_init_script(serial_line.FAKE)
+    rider.page.goto(address + "install.html")
+    rider.page.route("**/install.zip", lambda route: route.abort())
+    rider.page.click("#look")
+    rider.page.wait_for_selector("#install-said:has-text('Is there a network? Press the button again')")
+    assert rider.page.is_enabled("#look")
+    assert rider.errors == []
+    rider.context.close()
+
+
+def test_the_wiring_is_that_of_the_boards_own_pins(line):
+    """In the tables, as the firmware has them, and drawn."""
+    page = line.rider.page
+    for board, pins in (
+        ("pico", ["GP4, pin 6", "GP5, pin 7", "GP6, pin 9", "GP7, pin 10", "GP15, pin 20"]),
+        ("esp32", [f"GPIO {number}" for number in (21, 22, 18, 19, 4)]),
+    ):
+        wired = page.locator(f".wired:has(img[src='./wiring_{board}.svg'])")
+        cells = wired.locator("td:last-child").all_text_contents()
+        assert [cell for cell in cells if "GND" not in cell and "3V3" not in cell] == pins
+        wired.evaluate("wired => (wired.closest('details').open = true)")
+        picture = wired.locator("img")
+        picture.scroll_into_view_if_needed()
+        page.wait_for_function("img => img.complete && img.naturalWidth > 0", arg=picture.element_handle())
+
+
+def test_each_board_has_its_own_page_for_micropython(line):
+    """A link that leaves the page only when it is clicked, into a tab of its own."""
+    links = line.rider.page.locator("a[href^='https:']")
+    assert links.evaluate_all("links => links.map((one) => [one.target, one.rel])") == 9 * [["_blank", "noopener"]]
+    names = links.evaluate_all("links => links.map((one) => one.href)")
+    assert names[:2] == [f"https://micropython.org/download/{board}/" for board in ("RPI_PICO", "RPI_PICO_W")]
+    assert len(set(names)) == 9

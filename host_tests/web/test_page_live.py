@@ -2,6 +2,7 @@
 
 import functools
 import gzip
+import json
 import types
 
 import pytest
@@ -58,9 +59,36 @@ def test_a_cable_that_is_pulled_leaves_the_log(line, rider, board, tmp_path):
     assert (rider.text("#lean"), rider.text("#max-left")) == ("--", "--")
     line.connected = False
     rider.page.wait_for_selector("#files li")
-    assert "connection lost" in rider.text("#live-said")
-    assert "what came until then is kept" in rider.text("#live-said")
+    assert rider.text("#live-said") == "Stopped. Connection lost: what came until then is kept."
     assert list(saved(rider, tmp_path).values()) == recorded(blocks)
+
+
+def test_a_car_shows_g_in_place_of_a_lean(line, rider, board, tmp_path, monkeypatch):
+    """And so does its log, by the calibration. A motorcycle after it has its gauge again."""
+    monkeypatch.setattr(ride_writer, "turns", braking_in_a_left_bend)
+    line.plug_in(RawPrompt(board, half_seconds(3)[0], vehicle="car"))
+    rider.page.click("#start")
+    rider.page.wait_for_function("document.querySelector('#lean').textContent === '0.30 g'")
+    assert (rider.text("#side"), rider.text("#forward")[1:]) == ("left", "0.20 g")
+    assert rider.page.get_attribute("#gauge", "aria-label") == "Sideways now: 0.30 g left"
+    assert (rider.text("#max-left-name"), rider.text("#max-left")) == ("Peak braking", "0.20 g")
+    line.connected = False
+    rider.page.wait_for_selector("#files li")
+    log, calibration = saved(rider, tmp_path).values()
+    assert json.loads(calibration)["vehicle"] == "car"
+    assert log.count(b"\n") > 100
+    rider.page.wait_for_selector("#start:enabled:visible")
+    line.plug_in(RawPrompt(board, half_seconds(3)[0]))
+    rider.page.click("#start")
+    rider.page.wait_for_selector("#max-left-name:has-text('Most left')")
+    line.connected = False
+    rider.page.wait_for_selector("#start:enabled:visible")
+
+
+def braking_in_a_left_bend(count, seed=0):
+    """As ride_writer.turns(), of a car: 0.2 and 0.3 g."""
+    for _ in range(count):
+        yield [2 * mean for mean in (-851, 1324, 4096, 0, 0, 98, 0)], 2, 10_000
 
 
 def test_a_lean_ends_soon_after_the_last_block(rider):
@@ -69,11 +97,17 @@ def test_a_lean_ends_soon_after_the_last_block(rider):
 
 def test_tools_that_cannot_be_loaded_can_be_asked_for_again(chromium, address, board):
     """And a browser without a store for other pages says how its files get there."""
-    rider = Rider(chromium, address + "live.html")
+    rider = Rider(chromium, address + "live.html", service_workers="block")
     rider.page.add_init_script(serial_line.FAKE)
     rider.page.reload()
     line = SerialLine(rider)
     line.plug_in(RawPrompt(board, half_seconds(3)[0]))
+    for name in ("python.mjs", "pyodide.asm.wasm"):  # that the second is missing Pyodide itself does not tell
+        rider.page.route(f"**/{name}", lambda route: route.abort())
+        rider.page.click("#start")
+        rider.page.wait_for_selector("#live-said:has-text('Is there a network? Press the button again')")
+        rider.page.unroute(f"**/{name}")
+        rider.page.evaluate("document.querySelector('#live-said').textContent = ''")
     rider.page.evaluate(MISSING, "install.zip")
     for press, says in (("#start", "#live-said"), ("#pull", "#pull-said")):
         rider.page.click(press)
@@ -84,9 +118,10 @@ def test_tools_that_cannot_be_loaded_can_be_asked_for_again(chromium, address, b
     rider.page.wait_for_selector("#live-said:has-text('Recording')", timeout=60_000)
     line.connected = False
     rider.page.wait_for_selector("#files li")
+    assert rider.errors == []
     rider.page.evaluate(REFUSED)
     rider.page.click("#files li button")
-    rider.page.wait_for_selector("#files li:has-text('save them, and choose them there')")
+    rider.page.wait_for_selector("#files li:has-text('save both, and choose them on the page Rides')")
     rider.context.close()
 
 
@@ -117,7 +152,7 @@ def test_the_rides_of_a_board_are_what_the_command_pulls(line, rider, board, tmp
     told = rider.text("#pull-said")
     assert told.startswith("2 rides are here")
     assert rider.axe() == []
-    assert "ride 4, part 0: damaged at byte 4096: left out" in told
+    assert "Ride 4, part 0: damaged at byte 4096: left out" in told
     files = saved(rider, tmp_path)
     assert board.resets == 1
     monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: board)
@@ -143,7 +178,8 @@ def has_firmware(board, monkeypatch):
     """The modules that tell the rides, on this board's flash."""
     monkeypatch.setattr(ride_paths, "directory", lambda _settings: "rides")
     monkeypatch.setattr(ride_paths, "os", board.modules["os"])
-    board.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: None))
+    settings = types.SimpleNamespace(VEHICLE="motorcycle")
+    board.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: settings))
     board.modules["kickstand.rides"] = types.SimpleNamespace(ride_paths=ride_paths)
 
 
@@ -160,6 +196,23 @@ def test_a_port_that_takes_no_signals_is_closed_again(line):
     }"""
     said = "The port cannot be opened: no signals. Does another program have it?"
     assert line.rider.page.evaluate(told) == ["open", "closed", said]
+
+
+def test_a_port_whose_stream_refuses_to_end_is_closed_all_the_same(line):
+    """Else it could not be opened again."""
+    told = """async () => {
+      const { SerialLine } = await import("./cable/cable.mjs");
+      const said = [];
+      const line = new SerialLine({
+        open: async () => {},
+        readable: new ReadableStream({ cancel() { throw new Error("it is gone"); } }),
+        close: async () => said.push("closed"),
+      });
+      await line.open();
+      await line.close();
+      return said;
+    }"""
+    assert line.rider.page.evaluate(told) == ["closed"]
 
 
 def test_after_a_disturbed_byte_the_line_goes_on(line):

@@ -8,12 +8,15 @@ from pathlib import Path
 
 import analysis_rides
 import app_exports
+import command
 import numpy as np
 import pytest
 from command import works
+from kickstand_tools import remedies
 from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.plot import charts
 from kickstand_tools.analysis.ride import open_ride
+from kickstand_tools.cli.main import kickstand
 from kickstand_tools.web import rides_guest
 from rider import MISSING, Rider
 from test_page_looks import LAPTOP, PHONE
@@ -56,9 +59,21 @@ class Rides:
         self.rider, self.page = rider, rider.page
 
     def give(self, *files):
+        """Choose files in place of all before; what the page says in the end."""
+        while self.held():
+            self.page.click("#held li:first-child button")
+            self.said()
+        return self.add(*files)
+
+    def add(self, *files):
         """Choose files; what the page says in the end."""
         self.page.set_input_files("#files", files)
         return self.said()
+
+    def held(self):
+        """{name: what the page says of it} of the files that it has."""
+        cells = "rows => rows.map((row) => [row.children[0].textContent, row.children[1].textContent])"
+        return dict(self.page.eval_on_selector_all("#held li", cells))
 
     def said(self):
         self.page.wait_for_function("document.querySelector('#work').hidden", timeout=WAIT_MS)
@@ -153,6 +168,7 @@ def test_what_the_site_does_not_give_is_not_saved(page, ride, calibration):
 
 def test_dropped_on_the_page_packed_and_cut_off(page, ride, calibration, tmp_path):
     """A recorder without power leaves half a file: what there is is shown, with a warning."""
+    page.give()
     packed = gzip.compress(ride.read_bytes())
     files = [("RIDE.csv.gz", packed[: len(packed) // 2]), ("RIDE.cal.json", calibration.read_bytes())]
     page.page.evaluate(DROP, ["#drop", [[name, base64.b64encode(data).decode()] for name, data in files]])
@@ -170,7 +186,7 @@ def test_a_log_alone_asks_for_its_calibration(page, ride, calibration):
     assert page.page.is_hidden("#report")
     page.page.click("#align")
     assert "of riding: at least" in page.said()
-    assert page.give(calibration) == ""
+    assert page.add(calibration) == ""
     assert page.page.is_visible("#report")
 
 
@@ -179,7 +195,7 @@ def test_the_export_of_a_phone_becomes_a_log(page, tmp_path):
     path = app_exports.into(tmp_path / "phone.zip", app_exports.phyphox(app_exports.riding().every(4)))
     assert "phone.zip has no calibration with it" in page.give(path)
     (tmp_path / "phone.cal.json").write_text(json.dumps(PHONE_MOUNTED))
-    assert page.give(tmp_path / "phone.cal.json") == ""
+    assert page.add(tmp_path / "phone.cal.json") == ""
     works("import", path, "--out", tmp_path / "log.csv")
     was, now = tmp_path / "log.csv", tmp_path / "now.csv"
     now.write_bytes(page.saved("#save-log"))
@@ -215,17 +231,118 @@ def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
-        ("picture.png", b"\x89PNG\r\n\x1a\n\x00\xff\xfe", "picture.png, line 1: not text: give a log as CSV"),
-        ("table.csv", b"lat,lon\n1,2\n", "table.csv, line 1: no column t_s, ax_g"),
-        ("damaged.zip", b"PK\x03\x04\xff" + bytes(40), "damaged.zip is a zip: if an app has exported it"),
+        ("picture.png", b"\x89PNG\r\n\x1a\n" + bytes(8), "picture.png: not text: give what an app has exported"),
+        ("table.csv", b"lat,lon\n1,2\n", "table.csv: not a file of an app that is known, and no table of sensors"),
+        ("note.txt", b"Time flies, so speed,\nand more of it\n", "note.txt: not a file of an app that is known"),
+        ("empty.csv", b"", "empty.csv holds no recording: give the file, the folder or the zip"),
+        ("slow.csv", b"t_s,ax_g,ay_g,az_g\n0,0,1,0\n", "and no gyro found in it: needed are a time, the acceleration"),
+        ("damaged.zip", b"PK\x03\x04\xff" + bytes(40), "damaged.zip is damaged or cut short: copy it again"),
+        ("ride.parquet", b"PAR1" + bytes(40), "ride.parquet is Parquet, which this page cannot read: give the ride as"),
+        ("report.json", b'{"ride": "A"}', "report.json: version is missing: give the .cal.json of the ride"),
     ],
 )
-def test_what_is_no_ride_is_told_in_one_line(page, tmp_path, name, content, words):
+def test_what_is_no_ride_is_told_in_one_line_and_does_not_spoil_the_next(
+    page, ride, calibration, tmp_path, name, content, words
+):
     path = tmp_path / name
     path.write_bytes(content)
     said = page.give(path)
-    assert words in said and "\n" not in said
+    assert words in said and "\n" not in said and "kickstand" not in said and "--" not in said
     assert page.page.is_hidden("#report") and page.page.is_hidden("#charts")
+    assert words in page.held()[name]
+    if name == "ride.parquet":
+        assert page.add(ride, calibration) == ""
+        assert page.page.inner_text("#report-title") == "RIDE.csv"
+        assert words in page.add(path)
+        assert page.page.is_visible("#report")
+        page.give(ride)
+        assert words in page.add(path)
+        assert page.page.is_visible("#align")  # the ride still waits for its calibration
+
+
+def test_files_come_in_any_order_one_by_one_and_go(page, ride, calibration, tmp_path):
+    assert "This is a calibration. Now add the ride" in page.give(calibration)
+    assert page.add(ride) == ""
+    assert page.page.inner_text("#calibration") == "RIDE.cal.json"
+    other = tmp_path / "other.csv"
+    other.write_bytes(ride.read_bytes())
+    assert "other.csv has no calibration" in page.add(other)  # it is beside another ride
+    bike = tmp_path / "bike.json"
+    bike.write_bytes(calibration.read_bytes())
+    assert page.add(bike) == ""
+    assert (page.page.inner_text("#report-title"), page.page.inner_text("#calibration")) == ("other.csv", "bike.json")
+    assert list(page.held()) == ["bike.json", "other.csv", "RIDE.csv", "RIDE.cal.json"]
+    page.page.click("[aria-label='Remove bike.json']")
+    assert "other.csv has no calibration" in page.said()
+    assert page.page.is_hidden("#report")
+    page.page.click("[aria-label='Remove other.csv']")
+    page.said()
+    assert page.page.inner_text("#report-title") == "RIDE.csv"
+
+
+def test_the_columns_of_a_table_can_be_named(page, tmp_path):
+    """As --columns and --units name them for `import`."""
+    log, riding = tmp_path / "log.csv", app_exports.riding().every(4)
+    log.write_text(app_exports.any_table(riding).replace("Acc_X", "Quantity 1", 1))
+    assert page.give(log).endswith("and no acceleration found in it: say what its columns are.")
+    assert page.page.eval_on_selector("[name=ay]", "select => select.value") == "Acc_Y"
+    page.page.click("#table button")
+    assert page.page.is_visible("#table")  # one is missing
+    page.page.select_option("[name=ax]", "Quantity 1")
+    page.page.select_option("[name=a]", "m/s2")
+    page.page.select_option("[name=g]", "deg/s")
+    page.page.click("#table button")
+    assert "log.csv has no calibration with it" in page.said()
+    (tmp_path / "phone.json").write_text(json.dumps(PHONE_MOUNTED))
+    page.add(tmp_path / "phone.json")
+    columns = "t=Millis,ax=Quantity 1,ay=Acc_Y,az=Acc_Z,gx=Gyro_X,gy=Gyro_Y,gz=Gyro_Z,speed=Speed_kmh"
+    named = ["--columns", columns, "--units", "a=m/s2,g=deg/s,speed=km/h"]
+    works("import", log, "--out", tmp_path / "R.csv", *named)
+    told = json.loads(works("report", tmp_path / "R.csv", "--calibration", tmp_path / "phone.json", "--json").out)
+    assert_near({**json.loads(page.saved("#save-json")), "ride": ""}, {**told, "ride": ""})
+
+
+def test_a_browser_that_keeps_nothing_says_so(chromium, address):
+    """A private window of some browsers refuses its store."""
+    rider = Rider(chromium, address + "licences.txt", **LAPTOP)
+    rider.context.add_init_script("IDBFactory.prototype.open = () => { throw new DOMException('', 'SecurityError'); }")
+    rider.page.goto(address + "rides.html#pulled")
+    rider.page.wait_for_function("document.querySelector('#said').textContent.startsWith('This browser keeps nothing')")
+    assert rider.errors == []
+    rider.context.close()
+
+
+def test_too_little_of_a_ride_is_said_at_its_top(page, calibration, tmp_path):
+    """In the words of the command; a bike that stands with its engine running does not ride."""
+    random = np.random.default_rng(1)
+    readings = random.normal(0.0, [0.03] * 3 + [1.0] * 3, (1200, 6)) + [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]
+    rows = [",".join(f"{value:.4f}" for value in (k / 100.0, *row)) for k, row in enumerate(readings.tolist())]
+    (tmp_path / "RIDE.csv").write_text("\n".join([command.HEADER, *rows]) + "\n")
+    (tmp_path / "RIDE.cal.json").write_bytes(calibration.read_bytes())
+    assert page.give(tmp_path / "RIDE.csv", tmp_path / "RIDE.cal.json") == ""
+    said = page.page.inner_text("#too-little")
+    assert said == "0:12 of log, all of it standing: too little for a report."
+    assert said in works("report", tmp_path / "RIDE.csv").out
+    assert page.report()[0][2] == "riding 0:00"
+    assert page.page.is_hidden("#terms")
+
+
+def test_the_charts_follow_the_dark(page, ride, calibration):
+    page.give(ride, calibration)
+    chart = page.page.frame_locator("#plot").locator("#chart")
+    for scheme, filtered, paper in (("dark", True, "rgb(26, 26, 26)"), ("light", False, "rgb(255, 255, 255)")):
+        page.page.emulate_media(color_scheme=scheme)
+        shown = chart.evaluate(
+            "(chart) => [getComputedStyle(chart).filter, getComputedStyle(chart.ownerDocument.body).backgroundColor]"
+        )
+        assert (shown[0] != "none", shown[1]) == (filtered, paper)
+
+
+def test_every_remedy_has_words_for_the_page():
+    assert remedies.PAGE.keys() == remedies.COMMANDS.keys()
+    for name, words in remedies.PAGE.items():
+        assert "--" not in words, name
+        assert not any(f"kickstand {command}" in words for command in kickstand.commands), name
 
 
 def test_rides_that_were_pulled_are_opened_once(page, address, ride, calibration):
@@ -248,7 +365,7 @@ def test_once_used_it_works_without_a_network(chromium, address, ride, calibrati
     page.page.frame_locator("#plot").locator("#chart .main-svg").first.wait_for()
     rider.context.set_offline(True)
     page.page.reload()
-    assert "no log among these files" in page.give(calibration)
+    assert "Now add the ride" in page.give(calibration)
     assert page.give(ride, calibration) == ""
     page.page.frame_locator("#plot").locator("#chart .main-svg").first.wait_for()
     rider.context.close()
@@ -256,15 +373,17 @@ def test_once_used_it_works_without_a_network(chromium, address, ride, calibrati
 
 def test_what_takes_too_long_can_be_stopped(page, ride, calibration):
     """And other files taken in its place."""
+    page.give()
     page.page.set_input_files("#files", [ride, calibration])
     page.page.click("#stop")
     assert page.said() == "Stopped."
-    page.page.set_input_files("#files", [ride])
+    assert len(page.held()) == 2
+    page.page.click("#again")
     page.page.wait_for_function("!document.querySelector('#work').hidden")
-    (worker,) = page.page.workers
-    assert page.give(ride, calibration) == ""
+    before = page.page.workers
+    assert page.add(ride, calibration) == ""
     assert page.page.inner_text("#report-title") == "RIDE.csv"
-    assert worker not in page.page.workers
+    assert not set(before) & set(page.page.workers)
 
 
 def test_what_was_stopped_leaves_no_report_whose_buttons_do_nothing(page, ride, calibration):
@@ -323,15 +442,28 @@ def test_a_singular_matrix_is_told_though_webassembly_has_no_flags():
         ("A.csv B.csv A.cal.json", {"A.csv": "A.cal.json", "B.csv": ""}),
         ("A.csv B.csv bike.json", {"A.csv": "bike.json", "B.csv": "bike.json"}),
         ("A.csv bike.json", {"A.csv": "bike.json"}),
+        ("A.csv old.json new.json", {"A.csv": "new.json"}),
+        ("ride-10.csv ride-9.csv bike.json", {"ride-9.csv": "bike.json", "ride-10.csv": "bike.json"}),
     ],
 )
 def test_the_calibration_of_another_ride_is_not_taken(ride, tmp_path, monkeypatch, names, expected):
-    assert rides_of(tmp_path, monkeypatch, {name: ride.read_text()[:500] for name in names.split()}) == expected
+    found = rides_of(tmp_path, monkeypatch, {name: ride.read_text()[:500] for name in names.split()})
+    assert list(found.items()) == list(expected.items())
+
+
+def test_two_recordings_of_single_files_are_two_rides(tmp_path, monkeypatch):
+    """Files of an app that are one recording together are one."""
+    riding = app_exports.riding().every(4)
+    parts = {name: text for name, text in app_exports.phyphox(riding).items() if "/" not in name}
+    files = {"b.csv": app_exports.racechrono(riding), "a.csv": app_exports.racechrono(riding), **parts}
+    names = ["a.csv", "b.csv", "phyphox recording"]
+    assert list(rides_of(tmp_path, monkeypatch, files)) == names
 
 
 def test_a_file_may_have_the_name_of_the_folder_of_recordings(tmp_path, monkeypatch):
-    files = {"recording": "no log", "recording_": "neither"}
-    assert rides_of(tmp_path, monkeypatch, files) == {"recording": "", "recording_": ""}
+    parts = {name: text for name, text in app_exports.phyphox(app_exports.riding().every(4)).items() if "/" not in name}
+    found = rides_of(tmp_path, monkeypatch, {"phyphox recording": "no log", **parts})
+    assert list(found) == ["phyphox recording_"]
 
 
 def rides_of(tmp_path, monkeypatch, files):
@@ -339,10 +471,11 @@ def rides_of(tmp_path, monkeypatch, files):
     for folder in ("given", "here"):
         (tmp_path / folder).mkdir()
     for name, text in files.items():
+        text = json.dumps(analysis_rides.CALIBRATION) if name.endswith(".json") else text
         (tmp_path / "given" / name).write_text(text)
     monkeypatch.chdir(tmp_path / "here")  # where all else is deleted
-    found = json.loads(rides_guest.rides(str(tmp_path / "given")))
-    return {one["log"]: one["calibration"] for one in found}
+    found = json.loads(rides_guest.rides(str(tmp_path / "given"), json.dumps(list(files))))
+    return {one["log"]: one["calibration"] for one in found["rides"]}
 
 
 def test_a_ride_past_the_memory_is_told():

@@ -3,10 +3,26 @@
 import sys
 
 from . import firmware_path
+from .remedies import COMMANDS, Remedies
 
 
 class InputError(Exception):
-    """Something that the user has given cannot be used. Its text is one line: what is wrong, and what to do."""
+    """Something that the user has given cannot be used. Its text is one line: what is wrong, and what to do.
+
+    what: what is wrong, and what to do where that is the same for everybody; remedy: a name in remedies.COMMANDS of
+    what to do, and the values in its words.
+    """
+
+    def __init__(self, what: str, remedy: str = "", *values: str) -> None:
+        super().__init__(what, remedy, *values)
+
+    def __str__(self) -> str:
+        return self.said(COMMANDS)
+
+    def said(self, remedies: Remedies) -> str:
+        """The line with these words for what to do."""
+        what, remedy, *values = self.args
+        return f"{what}: {remedies[remedy].format(*values)}" if remedy else what
 
 
 def cause(error: BaseException) -> str:

@@ -5,13 +5,14 @@ from kickstand import console
 from kickstand.errors import Notice, Refusal
 
 from .errors import InputError
+from .remedies import COMMANDS, Remedies
 
 SWAPPED_DEG = 4.0  # an upright pose is hardly ever so far off; a pose on the kickstand taken for it is
 
 UPSIDE_DOWN_DEG = 150.0
 OPPOSITE_SIGN = "do all accelerations have the opposite sign? At rest up reads +1 g"
 
-# {0}, {1} ... are the refusal's values
+# {0}, {1} ... are the refusal's values; what stands there by name is what to do (remedies.py)
 _SENTENCES = {
     "absurd-readings": "readings that no vehicle gives, at {0:.1f} s up to {1:.0f} deg/s and {2:.1f} g, where the lean "
     "is not known: check the sensor, and the units in the log",
@@ -52,23 +53,21 @@ _SENTENCES = {
     "smooth-slow": "too few samples a second to look back over: where the log has under 10, the lean is the display's",
     "ride-short": "only {0:.0f} s of riding: at least {1:.0f} s with bends are needed",
     "no-bends": "it hardly leans ({0:.1f} degrees rms): a motorcycle's ride with bends to both sides is needed",
-    "not-leaning": "in bends it is pushed aside and does not lean, as a car: with a speed in the log take kickstand "
-    "calibrate drive --vehicle car",
+    "not-leaning": "in bends it is pushed aside and does not lean, as a car: {align_car}",
     "ride-contradicts": "no one mounting explains these readings: was the sensor moved, or are axes exchanged between "
     "accelerometer and gyro?",
     "ride-halves": "two halves of the ride disagree by {0:.0f} degrees: did the mount move? Give a part in which "
     "it did not",
     "ride-uncertain": "the alignment is known to {0:.1f} degrees in roll, {1:.1f} in pitch and {2:.1f} in yaw "
     "only: a longer ride is needed, with bends to both sides",
-    "phone-otherwise": "by the ride the phone is turned by {1:.0f} degrees against {0}: mounted another way? Then "
-    "leave out --phone",
+    "phone-otherwise": "by the ride the phone is turned by {1:.0f} degrees against {0}: mounted another way? "
+    "{phone_otherwise}",
     "phone-upside-down": "for a phone mounted {0} all accelerations have the opposite sign: at rest the axis that "
     "points up has to read +1 g",
     "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
-    "import-speed-unit": "{0} has no unit, and the positions do not tell it, so the speed is left out: add --units "
-    "speed=km/h, mph or m/s",
+    "import-speed-unit": "{0} has no unit, and the positions do not tell it, so the speed is left out: {speed_unit}",
     "import-sign": "which sign accelerations have in {0} is not certain, and no track with turns tells it: at rest the "
-    "axis that points up has to read +1 g, else the ride is mirrored and --units a=-g or a=-m/s2 puts it right",
+    "axis that points up has to read +1 g, else the ride is mirrored and {sign}",
     "import-damaged": "damaged rows that are left out: {0}; a cell is no number, a time out of order, or a reading "
     "past any sensor's",
     "mirrored": "the sensor turns against the track, so left and right are exchanged: were all accelerations "
@@ -79,6 +78,8 @@ _SENTENCES = {
     "gx, gy, gz right would be {1}",
     "upside-down": "the sensor's {0} points down: if it is not mounted upside down, all accelerations are of the "
     "opposite sign, and left and right get exchanged: reverse them (at rest up reads +1 g)",
+    "car-replayed": "the calibration is a car's, whose display shows no lean: lean_deg is that of a motorcycle which "
+    "would feel the same, and lean_sigma_deg is nan",
     "another-mount": "the calibration given is of a mount {0:.0f} degrees from this one: its offset and slope are used",
 }
 _MOVED = {
@@ -99,18 +100,24 @@ class RefusedInput(InputError):
     """
 
     def __init__(self, refusal: Refusal, where: str = "", advice: str = "") -> None:
-        super().__init__(f"{where}: {sentence(refusal)}{advice}" if where else f"{sentence(refusal)}{advice}")
+        self._given = Refusal(refusal.code, *refusal.values), where, advice
+        super().__init__(self.said(COMMANDS))
         self.code = refusal.code
         self.values = refusal.values
-        self._given = Refusal(refusal.code, *refusal.values), where, advice
+
+    def said(self, remedies: Remedies) -> str:
+        """See InputError."""
+        refusal, where, advice = self._given
+        line = f"{sentence(refusal, remedies)}{advice}"
+        return f"{where}: {line}" if where else line
 
     def __reduce__(self) -> tuple[type["RefusedInput"], tuple[Refusal, str, str]]:
         """Pickled as it was made: another process may raise it."""
         return RefusedInput, self._given
 
 
-def sentence(refusal: Refusal | Notice) -> str:
-    """One line, without the full stop at its end: what is wrong, and where it helps what to do.
+def sentence(refusal: Refusal | Notice, remedies: Remedies = COMMANDS) -> str:
+    """One line, without the full stop at its end: what is wrong, and where it helps what to do, in these words.
 
     >>> sentence(Notice("same-pose", 0.4))
     'both poses are the same (0.4 degrees apart): one on the kickstand, one upright'
@@ -123,13 +130,13 @@ def sentence(refusal: Refusal | Notice) -> str:
     if refusal.code == "speed-unit":
         return _speed_unit(*refusal.values)
     if refusal.code == "forward-exchanged":
-        return _forward_exchanged(*refusal.values)
+        return _forward_exchanged(remedies, *refusal.values)
     if refusal.code == "up-off":
-        return _up_off(*refusal.values)
+        return _up_off(remedies, *refusal.values)
     if refusal.code == "forward-off":
-        return _forward_off(*refusal.values)
+        return _forward_off(remedies, *refusal.values)
     words = _SENTENCES.get(refusal.code)
-    return words.format(*refusal.values) if words else console.sentence(refusal)
+    return words.format(*refusal.values, **remedies) if words else console.sentence(refusal)
 
 
 def _frozen(stretches: int, seconds: float, begin_s: float, end_s: float) -> str:
@@ -150,36 +157,36 @@ def _speed_unit(factor: float) -> str:
     return f"the speed changes {factor:.1f} times as much as the force says: {guess}"
 
 
-def _forward_exchanged(car: bool, side: str, roll_deg: float | None) -> str:
+def _forward_exchanged(remedies: Remedies, car: bool, side: str, roll_deg: float | None) -> str:
     """side: the one that two poses were calibrated for, "" if not known. roll_deg: by how much up is off, None if it is
     not known."""
     line = "forward and backward are exchanged: "
     if car:
-        line += "calibrate drive again?"
+        line += remedies["align_driving"]
     elif roll_deg is not None and abs(roll_deg) > SWAPPED_DEG:
         line += "were the poses swapped?"
     else:
         other = {"left": "--side right", "right": "--side left"}.get(side, "with the other --side")
-        line += f"calibrate two {other}?" + ("" if roll_deg is not None else " Or were the poses swapped?")
+        line += remedies["other_side"].format(other) + ("" if roll_deg is not None else " Or were the poses swapped?")
     return line + " Or, if no board wrote this log, " + OPPOSITE_SIGN
 
 
-def _up_off(angle_deg: float, car: bool) -> str:
+def _up_off(remedies: Remedies, angle_deg: float, car: bool) -> str:
     line = f"the calibration's up is {angle_deg:.0f} degrees off, so nothing computed with it is right: "
     if angle_deg > UPSIDE_DOWN_DEG:
-        return line + f"is it another mount's? {_again(car)}. Or {OPPOSITE_SIGN}"
-    return line + f"is it another mount's? {_again(car)}"
+        return line + f"is it another mount's? {_again(remedies, car)}. Or {OPPOSITE_SIGN}"
+    return line + f"is it another mount's? {_again(remedies, car)}"
 
 
-def _forward_off(angle_deg: float, by: str, car: bool) -> str:
+def _forward_off(remedies: Remedies, angle_deg: float, by: str, car: bool) -> str:
     """angle_deg: from the calibration's forward to the ride's, > 0 to the left."""
     side = "left" if angle_deg > 0.0 else "right"
     wrong = "braking and cornering are" if car else "lean, braking and cornering are"
     return (
         f"by the {by} of this ride forward is {abs(angle_deg):.0f} degrees to the {side} of the calibration's, so "
-        f"{wrong} wrong: is it another mount's? {_again(car)}"
+        f"{wrong} wrong: is it another mount's? {_again(remedies, car)}"
     )
 
 
-def _again(car: bool) -> str:
-    return "Calibrate again: calibrate drive" if car else "Calibrate again: calibrate two, or calibrate ride"
+def _again(remedies: Remedies, car: bool) -> str:
+    return remedies["align_again_car" if car else "align_again"]

@@ -13,6 +13,7 @@ from .alignment_quality import Quality, quality
 from .channels import Channels
 from .downsample import downsampled, joined
 from .ride import Ride
+from .riding import riding_s
 from .stops.brake_test import RATE_S, Stop, find_stops
 from .stops.standstill import standing
 from .summary import Summary
@@ -25,9 +26,9 @@ class Overview:
     """A ride: the summary of every sample, and its course in means over RATE_S, in which the columns that neither
     report nor pictures need are NaN (vehicle_channels() has them).
 
-    speed_correlation: between the forward force and the changes of the speed, 1 if forward is right, -1 if it is
-    backward, None if the ride does not tell. exchanged: said where forward is backward; stops is then empty. notices:
-    what else is remarkable in the log.
+    riding_s: time on the move, s. speed_correlation: between the forward force and the changes of the speed, 1 if
+    forward is right, -1 if it is backward, None if the ride does not tell. exchanged: said where forward is backward;
+    stops is then empty. notices: what else is remarkable in the log.
     """
 
     ride: Ride
@@ -35,6 +36,7 @@ class Overview:
     course: Channels
     stops: list[Stop]
     quality: Quality
+    riding_s: float
     speed_correlation: float | None
     exchanged: Notice | None
     notices: list[Notice]
@@ -69,9 +71,11 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     frozen_s = sum(float(notice.values[1]) for notice in notices if notice.code == "frozen-readings")
     # Of a stretch the notice tells more than its own.
     total.frozen_s = min(frozen_s, total.missing_s) if isinstance(ride.log, Stretch) else frozen_s
-    found = quality(course, standing(course))
+    still = standing(course)
+    found = quality(course, still)
     contradiction = mount.notice(found.roll_deg)
     exchanged = contradiction if contradiction and contradiction.code == "forward-exchanged" else None
     notices += [contradiction] if contradiction and not exchanged else []
     stops = [] if exchanged else find_stops(course)
-    return Overview(ride, total, course, stops, found, mount.sign.correlation, exchanged, notices)
+    moved_s = min(total.riding_s, riding_s(course, still))
+    return Overview(ride, total, course, stops, found, moved_s, mount.sign.correlation, exchanged, notices)

@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..refusals import SWAPPED_DEG, sentence
+from ..remedies import COMMANDS, Remedies
 from .alignment_quality import LeanCost, Quality, lean_cost
 from .overview import Overview
 from .stops.brake_test import Stop
@@ -17,17 +18,22 @@ if TYPE_CHECKING:
 CONTRADICTED = ("up-off", "forward-off", "left-handed", "rates-misfit", "rates-in-radians")  # by the ride
 COSTS_DEG = 0.1  # of lean: less is not worth a word
 RIDDEN_S = 10.0  # a shorter ride is pushing the bike about
-STOPS_TITLE = "Stops (MFDD: UN R13)"
+STOPS_TITLE = "Stops"
 STOPS_UNITS = {"at": "", "from": "km/h", "time": "s", "distance": "m", "MFDD": "m/s²", "peak": "m/s²", "jerk": "m/s³"}
 STOPS_UNITS |= {"pulls": "m"}  # one line a stop in 80 columns: no units in it
-
+STOPS_TERMS = (
+    "MFDD: mean deceleration while the speed falls from 80 to 10 % of what it was (UN R13). peak: the largest. "
+    "jerk: how fast the deceleration changes, at most. pulls: how far the bike ends beside its straight line."
+)
 
 @dataclass
 class Words:
-    """What a report says. name: of the log. ride: rows of what, how much, and when it was or "". alignment: a
-    paragraph. stops: a row for each, the columns of STOPS_UNITS. remark: on the stops or why there are none, or ""."""
+    """What a report says. name: of the log. too_little: that the log holds too little of a ride, or "". ride: rows of
+    what, how much, and when it was or "". alignment: a paragraph. stops: a row for each, the columns of STOPS_UNITS, of
+    which STOPS_TERMS explains some. remark: on the stops or why there are none, or ""."""
 
     name: str
+    too_little: str
     ride: list[tuple[str, str, str]]
     alignment: str
     stops: list[tuple[str, ...]]
@@ -42,7 +48,7 @@ def as_data(seen: Overview) -> dict[str, Any]:
         "vehicle": "car" if seen.ride.car else "motorcycle",
         "duration_s": round(total.duration_s, 3),
         "samples": total.samples,
-        "riding_s": round(total.riding_s, 1),
+        "riding_s": round(seen.riding_s, 1),
         "lean_unsure_s": round(total.not_sure_s, 1),
         "missing_s": round(max(0.0, total.missing_s - total.frozen_s), 1),
         "frozen_s": round(total.frozen_s, 1),
@@ -86,22 +92,34 @@ def page(seen: Overview) -> "Group":
     ride = Table.grid(padding=(0, 3))
     for row in said.ride:
         ride.add_row(*row)
-    parts: list[Any] = [Text(said.name, style="bold"), ride, Text(), Text(said.alignment), Text()]
+    parts: list[Any] = [Text(said.name, style="bold")]
+    parts += [Text(said.too_little, style="bold")] if said.too_little else []
+    parts += [ride, Text(), Text(said.alignment), Text()]
     if said.stops:
         stops = Table(title=STOPS_TITLE, title_justify="left", box=None, pad_edge=False, header_style="dim")
         for name, unit in STOPS_UNITS.items():
             stops.add_column(f"{name}\n{unit}", justify="right", no_wrap=True)
         for row in said.stops:
             stops.add_row(*row)
-        parts.append(stops)
+        parts += [stops, Text(STOPS_TERMS, style="dim")]
     if said.remark:
         parts += [Text(said.remark, style="dim" if said.stops else "")]
     return Group(*parts)
 
 
-def words(seen: Overview) -> Words:
-    """The ride in words."""
-    return Words(Path(seen.ride.name).name, _ride(seen), _alignment(seen), _stops(seen.stops), _remark(seen))
+def words(seen: Overview, remedies: Remedies = COMMANDS) -> Words:
+    """The ride in words. remedies: those for what to do."""
+    alignment = _alignment(seen, remedies)
+    return Words(
+        Path(seen.ride.name).name, _too_little(seen), _ride(seen), alignment, _stops(seen.stops), _remark(seen)
+    )
+
+
+def _too_little(seen: Overview) -> str:
+    if seen.riding_s >= RIDDEN_S:
+        return ""
+    riding = f"{seen.riding_s:.0f} s of it riding" if seen.riding_s >= 1.0 else "all of it standing"
+    return f"{clock(seen.summary.duration_s)} of log, {riding}: too little for a report."
 
 
 def _remark(seen: Overview) -> str:
@@ -113,7 +131,7 @@ def _remark(seen: Overview) -> str:
 def _no_stops(seen: Overview) -> str:
     if seen.exchanged:
         return "Stops: not told, see the warning."
-    if not seen.has_speed and seen.summary.riding_s > RIDDEN_S:
+    if not seen.has_speed and seen.riding_s > RIDDEN_S:
         return "no speed in the log: stops cannot be told"  # there may have been some: none was sure enough
     if stops_by_speed(seen.course):
         return "The speed falls to a stop, the force says otherwise: is the calibration this ride's?"
@@ -122,9 +140,10 @@ def _no_stops(seen: Overview) -> str:
 
 def _ride(seen: Overview) -> list[tuple[str, str, str]]:
     total = seen.summary
-    rows = [("Duration", clock(total.duration_s), f"riding {clock(total.riding_s)}")]
+    rows = [("Duration", clock(total.duration_s), f"riding {clock(seen.riding_s)}")]
     if not seen.ride.car:
-        rows.append(("Lean", "smoothed" if seen.ride.smoothed else "as the display showed it", ""))
+        smoothed = ("Lean", "smoothed", "from the whole ride")
+        rows.append(smoothed if seen.ride.smoothed else ("Lean", "as the display showed it", ""))
         rows.append(("Max left", *_peak(total.left_deg, "{:.0f}°")))
         rows.append(("Max right", *_peak(total.right_deg, "{:.0f}°")))
         rows += [(f"Over {limit:.0f}°", f"{seconds:.1f} s", "") for limit, seconds in total.beyond_s.items()]
@@ -142,7 +161,7 @@ def _ride(seen: Overview) -> list[tuple[str, str, str]]:
     return rows
 
 
-def _alignment(seen: Overview) -> str:
+def _alignment(seen: Overview, remedies: Remedies) -> str:
     quality = seen.quality
     if not _judged(seen):
         return "Alignment: not judged, see the warning."
@@ -155,7 +174,7 @@ def _alignment(seen: Overview) -> str:
         swapped = far and (seen.speed_correlation is None or seen.speed_correlation < 0.0)
         said += ": were the poses swapped?" if swapped else ": was it held upright?" if far else "."
         if not seen.ride.car and not seen.exchanged:
-            said += _cost(lean_cost(quality), seen.has_speed)
+            said += _cost(lean_cost(quality), seen.has_speed, remedies)
     if quality.gravity_g is not None:
         said += f" At rest the force is {quality.gravity_g:.3f} g."
     return said
@@ -166,17 +185,16 @@ def _judged(seen: Overview) -> bool:
     return not any(notice.code in CONTRADICTED for notice in seen.notices)
 
 
-def _cost(cost: LeanCost, speed: bool) -> str:
+def _cost(cost: LeanCost, speed: bool, remedies: Remedies) -> str:
     """What the angles cost, and what to do against it. speed: the log has one."""
-    drive = "calibrate ride or drive takes it out" if speed else "calibrate ride takes it out"
-    remedies = {
-        "Roll": (cost.roll_deg, "calibrate ride takes it out, or calibrate two, held upright"),
-        "Pitch": (cost.pitch_deg, "calibrate ride takes it out, or calibrate two, on level ground"),
-        "Yaw": (cost.yaw_deg, drive),
+    costs = {
+        "Roll": (cost.roll_deg, remedies["less_roll"]),
+        "Pitch": (cost.pitch_deg, remedies["less_pitch"]),
+        "Yaw": (cost.yaw_deg, remedies["less_yaw_by_speed" if speed else "less_yaw"]),
     }
     said = [
         f" {name} usually costs about {value:.1f}° of lean; {remedy}."
-        for name, (value, remedy) in remedies.items()
+        for name, (value, remedy) in costs.items()
         if value is not None and value >= COSTS_DEG
     ]
     return "".join(said) or f" That costs less than {COSTS_DEG}° of lean: nothing to do."

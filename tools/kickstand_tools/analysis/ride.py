@@ -105,8 +105,7 @@ def open_ride(log: Source, calibration: CalibrationFile | File | None = None, sm
     parameters = source if isinstance(source, CalibrationFile) else read_calibration(source)
     if not parameters.aligned:
         name = "the calibration" if isinstance(source, CalibrationFile) else name_of(source)
-        todo = "kickstand calibrate two, or calibrate ride, first"
-        raise InputError(f"{name} is not aligned, so lean and braking are unknown: {todo}")
+        raise InputError(f"{name} is not aligned, so lean and braking are unknown", "align")
     return Ride(log, parameters, smoothed and parameters.vehicle != "car")
 
 

@@ -32,7 +32,8 @@ class CalibrationFile:
 
     accel_offset_g (3), accel_slope (3), gyro_bias_dps (3); vehicle_from_sensor (3, 3): rows left, up, forward.
     aligned: the matrix was measured; six_done: offset and slope were. trim_deg: by how much the upright pose of the
-    alignment was found to be off. vehicle: "car" or "motorcycle" if the matrix was measured by driving, else "".
+    alignment was found to be off. vehicle: "car" or "motorcycle" if the matrix was measured by driving, "car" also if
+    the board was set to one, else "".
     kickstand_side: "left" or "right", where the kickstand leaned the bike to in the two poses, else "". notes: further
     entries to write to the file. gyro_delay_s: how late the low-pass DLPF of a recorded ride made the gyro, None if
     that is not known.
@@ -122,11 +123,11 @@ def read_calibration(source: File) -> CalibrationFile:
     except OSError as error:
         raise InputError(f"{name} cannot be read: {cause(error)}") from error
     except (ValueError, RecursionError) as error:
-        raise InputError(f"{name} is not JSON: give a file made by kickstand calibrate") from error
+        raise InputError(f"{name} is not JSON", "give_calibration") from error
     if not isinstance(data, dict):
-        raise InputError(f"{name} is no calibration: give a file made by kickstand calibrate")
+        raise InputError(f"{name} is no calibration", "give_calibration")
     if "version" not in data:
-        raise InputError(f"{name}: version is missing: give a file made by kickstand calibrate")
+        raise InputError(f"{name}: version is missing", "give_calibration")
     if data["version"] != VERSION or isinstance(data["version"], bool):
         raise InputError(
             f"{name}: version {_shown(data['version'])}, this program reads {VERSION}: calibrate again"
@@ -191,7 +192,7 @@ def calibration_beside(log: Path) -> Path:
 
 def _list(name: str, data: dict[str, Any], entry: str) -> list[Any]:
     if entry not in data:
-        raise InputError(f"{name}: {entry} is missing: give a file made by kickstand calibrate")
+        raise InputError(f"{name}: {entry} is missing", "give_calibration")
     if not isinstance(data[entry], list) or len(data[entry]) != 3:
         what = "3 rows of 3 numbers" if entry == "vehicle_from_sensor" else "3 numbers"
         raise InputError(f"{name}: {entry} has to be {what}: calibrate again")

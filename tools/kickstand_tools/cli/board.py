@@ -114,14 +114,17 @@ def record(port: str | None, out: Path) -> None:
 
 
 def _live_text(reading: "LiveReading") -> str:
-    """The lean as a bar to the left or right, and how long the recording is."""
+    """The lean as a bar to the left or right, in a car the forces, and how long the recording is."""
     how_long = f"{reading.rate_hz:3.0f} readings/s  {reading.seconds // 60:.0f}:{reading.seconds % 60:04.1f}"
-    lean = reading.lean_deg
+    lean, forward_g, left_g = reading.lean_deg, reading.forward_g, reading.left_g
+    if left_g is not None:  # a car, and aligned
+        side = "left " if left_g > 0.0 else "right"
+        return f"forward {forward_g:+.2f} g  {side} {abs(left_g):.2f} g  {how_long}"
     if lean is None:  # as on the display, a lean that is not certain enough is not shown
         return f"{'lean --' if reading.aligned else 'not aligned'}  {how_long}"
     bar = "#" * min(20, round(abs(lean) / 3))
     picture = f"{bar if lean < 0 else '':>20}|{bar if lean > 0 else '':<20}"
-    return f"{picture} lean {lean:+5.1f} deg  forward {reading.forward_g:+.2f} g  {how_long}"
+    return f"{picture} lean {lean:+5.1f} deg  forward {forward_g:+.2f} g  {how_long}"
 
 
 @contextlib.contextmanager

@@ -106,20 +106,6 @@ def import_recording(
     )
 
 
-def app_of(source: Path | str) -> str:
-    """Whose recording a file, a folder or a zip is, "" where that is not known. Raises InputError if it cannot be read.
-
-    >>> import pathlib, tempfile
-    >>> with tempfile.TemporaryDirectory() as directory:
-    ...     path = pathlib.Path(directory, "table.csv")
-    ...     _ = path.write_text("a,b\\n1,2\\n")
-    ...     app_of(path)
-    ''
-    """
-    found = _recordings(read_pieces(source))
-    return found[0][0].NAME if found else ""
-
-
 def write_imported(path: Path | str, imported: Imported) -> None:
     """Write the log, gzipped if its name ends in .gz, whole or not at all. Raises InputError.
 
@@ -140,9 +126,9 @@ def _recording(pieces: list[Piece], name: str, columns: Mapping[str, str] | None
         if len(pieces) > 1:
             raise InputError(f"{name} holds {len(pieces)} files: give --columns with one, such as {pieces[0].name}")
         return mapped.read_mapped(pieces[0], columns, units, name)
-    found = _recordings(pieces)
+    found = recordings(pieces)
     if not found:
-        raise InputError(mapped.unknown(pieces, name))
+        raise mapped.unknown(pieces, name)
     if len(found) > 1:
         which = ", ".join(files[0].folder or files[0].name for _, files in found[:4])
         more = ", ..." if len(found) > 4 else ""
@@ -163,8 +149,8 @@ def _recording(pieces: list[Piece], name: str, columns: Mapping[str, str] | None
     return recording
 
 
-def _recordings(pieces: list[Piece]) -> list[tuple[Any, list[Piece]]]:
-    """The recordings among some files: each with its module in apps/."""
+def recordings(pieces: list[Piece]) -> list[tuple[Any, list[Piece]]]:
+    """The recordings among some files: each with its module in apps/, whose NAME is the app's."""
     found, left = [], pieces
     for app in _APPS:
         for files in app.finds(left):

@@ -3,6 +3,7 @@
 import re
 import shlex
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,12 +18,18 @@ NAME = "a table"
 ACCEL, GYRO = ("ax", "ay", "az"), ("gx", "gy", "gz")
 REQUIRED = ("t", *ACCEL, *GYRO)
 OPTIONAL = ("speed", "lat", "lon", "temp")
+WORDS = {"t": "time"} | {f"a{axis}": f"acceleration along {axis}" for axis in "xyz"}
+WORDS |= {f"g{axis}": f"rate about {axis}" for axis in "xyz"}
+WORDS |= {"speed": "speed", "lat": "latitude", "lon": "longitude", "temp": "temperature"}
 UNIT_KEYS = {"t": TIMES, "a": ACCELERATIONS, "g": RATES, "speed": SPEEDS, "lat": ANGLES, "lon": ANGLES}
 UNIT_KEYS |= dict.fromkeys(ACCEL, ACCELERATIONS) | dict.fromkeys(GYRO, RATES)
 _AXIS = r"(?:^|[^a-z]){0}(?:$|[^a-z])|{0}$"
-_ACCEL_NAME = re.compile(r"acc|gforce|^a_?[xyz]\b|^a[xyz]$")
-_GYRO_NAME = re.compile(r"gyr|rotation|omega|angular|^[gw]_?[xyz]\b|^[gw][xyz]$")
+_ACCEL_NAME = re.compile(r"acc|gforce|^a_?[xyz]\b")
+_GYRO_NAME = re.compile(r"gyr|rotation|omega|angular|^[gw]_?[xyz]\b")
+_UNIT_END = re.compile(r"_(g|mps2|ms2|dps|rads?|rps)$")
+_NUMBER = re.compile(r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?")
 _HEADER_LINES = 60  # among which the line of names is looked for
+FEWEST_NUMBERS = 4  # in a row, a time and three axes: text with commas in it has none
 
 
 def read_mapped(piece: Piece, columns: Mapping[str, str], units: Mapping[str, str], name: str) -> Recording:
@@ -55,35 +62,69 @@ def read_mapped(piece: Piece, columns: Mapping[str, str], units: Mapping[str, st
     return Recording(NAME, accel, gyro, track, temp_c, taken, utc_ns=utc_ns, sign_known=_turned(units))
 
 
-def unknown(pieces: list[Piece], source: str) -> str:
-    """What to say of a file that no app is known for: its columns, what is missing among them, the line to type."""
+@dataclass
+class Table:
+    """A table of sensors that no app is known for. columns: as they are called in it; found: those of them that seem to
+    be the ones of REQUIRED and OPTIONAL; units: what seems to be theirs, by UNIT_KEYS."""
+
+    name: str
+    columns: list[str]
+    found: dict[str, str]
+    units: dict[str, str]
+
+    @property
+    def missing(self) -> list[str]:
+        """The ones of REQUIRED that are not found."""
+        return [key for key in REQUIRED if key not in self.found]
+
+    @property
+    def lacking(self) -> str:
+        """The same in words, "" for none."""
+        missing = self.missing
+        lacking = ["time"] if "t" in missing else []
+        lacking += [word for word, axes in (("acceleration", ACCEL), ("gyro", GYRO)) if set(axes) & set(missing)]
+        return f", and no {', '.join(lacking)} found in it" if lacking else ""
+
+
+def table_in(pieces: list[Piece]) -> Table | None:
+    """The largest of these files, None where that is no table of sensors."""
     piece = max(pieces, key=lambda piece: len(piece.text))
-    columns = cells_of(piece.text.split("\n", _HEADER_LINES)[header_line(piece, {})])
-    found, missing = guessed(columns)
-    if set(missing) == set(REQUIRED):
-        shown = ", ".join(columns)[:60]
-        return (
+    number = header_line(piece, {})
+    lines = [line for line in piece.text.split("\n", _HEADER_LINES + 3)[number:] if line.strip()]
+    columns = cells_of(lines[0])
+    found = guessed(columns)
+    numbers = max((_numbers(cells_of(line)) for line in lines[1:3]), default=0)
+    if numbers < (FEWEST_NUMBERS if found else len(REQUIRED)):
+        return None
+    stated = {key: unit_in(found.get(key, "")) for key in ("ax", "gx")}
+    units = {"a": stated["ax"] if unit(stated["ax"]) in ACCELERATIONS else "m/s2"}
+    units["g"] = stated["gx"] if unit(stated["gx"]) in RATES else "rad/s"
+    if "speed" in found and unit(unit_in(found["speed"])) not in SPEEDS:
+        units["speed"] = "km/h"
+    return Table(piece.name, columns, found, units)
+
+
+def unknown(pieces: list[Piece], source: str) -> InputError:
+    """For a file that no app is known for: what is missing in it, its columns, and the line to type."""
+    table = table_in(pieces)
+    if table is None:
+        shown = next((line for piece in pieces for line in piece.first_lines(1)), "")[:60]
+        return InputError(
             f"{source}: not a file of an app that is known, and no table of sensors ({shown!a}): give the file, the "
             "folder or the zip that an app has exported as CSV"
         )
-    several = f" (of {len(pieces)} files, the largest is {piece.name})" if len(pieces) > 1 else ""
-    shown = ", ".join(columns[:40]) + (", ..." if len(columns) > 40 else "")
-    line = f"{source}: not a file of an app that is known{several}. Its columns: {shown}"
-    lacking = ["time"] if "t" in missing else []
-    lacking += [word for word, axes in (("acceleration", ACCEL), ("gyro", GYRO)) if set(axes) & set(missing)]
-    line += f"; not found: {', '.join(lacking)}" if lacking else ""
-    given = [f"{key}={found.get(key, '?')}" for key in REQUIRED] + [
-        f"{key}={found[key]}" for key in OPTIONAL if key in found
-    ]
-    stated = {key: unit_in(found.get(key, "")) for key in ("ax", "gx")}
-    units = [f"a={stated['ax'] if unit(stated['ax']) in ACCELERATIONS else 'm/s2'}"]
-    units += [f"g={stated['gx'] if unit(stated['gx']) in RATES else 'rad/s'}"]
-    units += ["speed=km/h"] if "speed" in found and unit(unit_in(found["speed"])) not in SPEEDS else []
-    where = source if len(pieces) == 1 else f"{source}/{piece.name}"
-    ask = "Put in what is not right" if not missing else "Put in what the ? stand for"
-    return (
-        f"{line}. {ask}, and type: kickstand import {shlex.quote(where)} --out RIDE.csv "
-        f"--columns {shlex.quote(','.join(given))} --units {','.join(units)}"
+    several = f" (of {len(pieces)} files, the largest is {table.name})" if len(pieces) > 1 else ""
+    shown = ", ".join(table.columns[:40]) + (", ..." if len(table.columns) > 40 else "")
+    given = [f"{key}={table.found.get(key, '?')}" for key in REQUIRED]
+    given += [f"{key}={table.found[key]}" for key in OPTIONAL if key in table.found]
+    units = ",".join(f"{key}={name}" for key, name in table.units.items())
+    where = source if len(pieces) == 1 else f"{source}/{table.name}"
+    ask = "Put in what the ? stand for" if table.missing else "Put in what is not right"
+    return InputError(
+        f"{source}: not a file of an app that is known{several}{table.lacking}",
+        "name_columns",
+        f"its columns are {shown}. {ask}, and type: kickstand import {shlex.quote(where)} --out RIDE.csv "
+        f"--columns {shlex.quote(','.join(given))} --units {units}",
     )
 
 
@@ -95,17 +136,21 @@ def header_line(piece: Piece, columns: Mapping[str, str]) -> int:
         cells = cells_of(line)
         if wanted and wanted <= set(cells):
             return number
-        numbers = sum(bool(re.fullmatch(r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?", cell)) for cell in cells)
+        numbers = _numbers(cells)
         if len(cells) > width and numbers < len(cells) / 2:
             widest, width = number, len(cells)
     return widest
 
 
-def guessed(columns: list[str]) -> tuple[dict[str, str], list[str]]:
-    """Columns that seem to be the ones asked for, and which of the required are not found."""
+def _numbers(cells: list[str]) -> int:
+    return sum(bool(_NUMBER.fullmatch(cell)) for cell in cells)
+
+
+def guessed(columns: list[str]) -> dict[str, str]:
+    """Columns that seem to be the ones asked for."""
     found: dict[str, str] = {}
     for column in columns:
-        low, bare = column.lower(), plain(column)
+        low, bare = _UNIT_END.sub("", column.lower()), plain(column)
         if any(mark in column for mark in ",="):
             continue
         sensor = "g" if _GYRO_NAME.search(low) else "a" if _ACCEL_NAME.search(low) else ""
@@ -120,7 +165,7 @@ def guessed(columns: list[str]) -> tuple[dict[str, str], list[str]]:
             found.setdefault("lat", column)
         elif bare.startswith("lon") and "acc" not in bare:
             found.setdefault("lon", column)
-    return found, [key for key in REQUIRED if key not in found]
+    return found
 
 
 def _check_keys(columns: Mapping[str, str], units: Mapping[str, str]) -> None:
@@ -175,7 +220,7 @@ def _check_units(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, st
         ask = ",".join(f"{key}={next(iter(UNIT_KEYS[key]))}" for key in unknown)
         choice = "; ".join(f"{key} is one of {', '.join(UNIT_KEYS[key])}" for key in unknown)
         columns = ", ".join(column for of_one in unknown.values() for column in of_one)
-        raise InputError(f"{sheet.name}: the unit is not known of {columns}: add --units {ask} ({choice})")
+        raise InputError(f"{sheet.name}: the unit is not known of {columns}", "name_units", ask, choice)
 
 
 def _unit(units: Mapping[str, str], keys: tuple[str, ...], column: str) -> str:

@@ -31,7 +31,7 @@ def check_text(log: str, content: bytes, lines_before: int) -> None:
     except UnicodeDecodeError as error:
         line = lines_before + content.count(b"\n", 0, error.start) + 1
         if content.startswith(b"PK\x03\x04"):
-            raise InputError(f"{log} is a zip: if an app has exported it, kickstand import makes a log of it") from None
+            raise InputError(f"{log} is a zip", "import_zip") from None
         raise InputError(f"{log}, line {line}: not text: give a log as CSV or as .csv.gz") from error
 
 
@@ -49,8 +49,7 @@ def header(log: str, line: str) -> list[str]:
         raise InputError(f"{log}, line 1: values stand apart by ; or tab: save it with commas between them")
     if missing:
         raise InputError(
-            f"{log}, line 1: no column {', '.join(missing)}: a log starts with {','.join(COLUMNS)}; "
-            "an app's export has to go through kickstand import first"
+            f"{log}, line 1: no column {', '.join(missing)}, and a log starts with {','.join(COLUMNS)}", "import_log"
         )
     for name in COLUMNS + OPTIONAL:
         if names.count(name) > 1:

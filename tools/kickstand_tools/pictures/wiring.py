@@ -60,6 +60,24 @@ _CHANNELS = (320, 350)  # x of the two vertical wires to a module
 _GROUND_X, _SUPPLY_X, _OUTSIDE_X, _TOP_Y = 380, 866, 36, 36
 
 
+def connections(board: Board) -> list[tuple[str, dict[str, str]]]:
+    """[(module, {its pin: the board's pin})], as draw() draws them."""
+    near, far = ({name: row + 1 for row, name in enumerate(side)} for side in (board.near, board.far))
+
+    def pin(name: str) -> str:
+        if not board.numbered:
+            return f"GPIO {name}" if name.isdigit() else name
+        return f"{name}, pin {near[name] if name in near else 2 * len(board.far) + 1 - far[name]}"
+
+    pins = {module: {one: pin(name) for one, name in taken.items()} for module, taken in _default_pins(board).items()}
+    supply = {"VCC": pin("3V3"), "GND": "any GND"}
+    return [
+        ("Sensor", supply | pins["sensor"]),
+        ("Display", supply | pins["display"]),
+        ("Button", {"one side": pins["button"]["signal"], "other side": "any GND"}),
+    ]
+
+
 def draw(board: Board, display: str) -> str:
     """The drawing of a board with its modules. display: an SVG of a display, for decoration."""
     page = Drawing(_WIDTH, _HEIGHT, mirrored=board.near_is_left)

@@ -108,15 +108,20 @@ def replay_blocks(
     log: Source, calibration: CalibrationFile, engine: str, progress: Progress | None, notices: list[Notice]
 ) -> Iterator[tuple[Block, Array]]:
     """Each block of the log with the engine's results for it (n, COLUMNS), NaN where the readings froze: there the
-    engine is told of a gap. notices is appended to at the end."""
-    mount = MountCheck(calibration)
+    engine is told of a gap. A car's display shows no lean, so lean_sigma_deg is NaN throughout. notices is appended to
+    at the end."""
+    mount, car = MountCheck(calibration), calibration.vehicle == "car"
     whole, stretch = apart(log)
     for block, results in _RUN[engine](whole, calibration, progress, notices):
         believed = block.believed
         mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
-        yield from within(stretch, block, _with_frozen(block, results))
+        found = _with_frozen(block, results)
+        if car:
+            found[:, _SIGMA] = np.nan
+        yield from within(stretch, block, found)
     contradiction = mount.notice()
     notices += [contradiction] if contradiction else []
+    notices += [Notice("car-replayed")] if car else []
 
 
 def _table(results: bytes) -> Array:

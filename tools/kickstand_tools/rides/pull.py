@@ -21,13 +21,14 @@ from .block_reader import CUT_SHORT, Block, missing_note, read
 
 _SILENT_S = 60  # an emulated board takes a while
 
-# Prints the directory, and (ride, part, bytes, path) of each part in it
+# Prints the directory and the vehicle, and (ride, part, bytes, path) of each part in it
 _LIST = """
 import os
 from kickstand import settings
 from kickstand.rides import ride_paths
-directory = ride_paths.directory(settings.load())
-print(repr(directory))
+chosen = settings.load()
+directory = ride_paths.directory(chosen)
+print((directory, chosen.VEHICLE))
 try:
     os.stat(directory)
 except OSError:
@@ -96,13 +97,13 @@ def pull(
         raise InputError(f"{out}: there is no directory {out.parent}: make it first")
     with connected(port) as (transport, name):
         try:
-            directory, rides = _list(transport, name)
+            directory, vehicle, rides = _list(transport, name)
             if rides:
                 out.mkdir(exist_ok=True)
             result = PullResult(name, [])
             sofar = _SoFar(sum(part.size for parts in rides.values() for part in parts), progress)
             for number, parts in rides.items():
-                ride = _pull_ride(transport, number, parts, out, sofar)
+                ride = _pull_ride(transport, number, parts, vehicle, out, sofar)
                 if delete and ride.whole:
                     _delete(transport, directory, parts)
                     ride.deleted = True
@@ -126,8 +127,8 @@ class _SoFar:
             self._progress(what, self._done, self._total)
 
 
-def _list(transport: SerialTransport, name: str) -> tuple[str, dict[int, list[_Part]]]:
-    """Where the rides are, and the parts of each."""
+def _list(transport: SerialTransport, name: str) -> tuple[str, str, dict[int, list[_Part]]]:
+    """Where the rides are, the vehicle in the board's config.py, and the parts of each."""
     listed, error = transport.exec_raw(_LIST, timeout=_SILENT_S)
     if error:
         reason = last_line(error.decode(errors="replace"))
@@ -135,15 +136,16 @@ def _list(transport: SerialTransport, name: str) -> tuple[str, dict[int, list[_P
             raise InputError(f"{name}: {reason.partition(': ')[2]}")
         refuse_unfit_firmware(reason, name)
         raise InputError(f"the board at {name} cannot tell its rides ({reason}): kickstand flash brings it up to date")
-    directory, *parts = map(ast.literal_eval, listed.decode().splitlines())
+    (directory, vehicle), *parts = map(ast.literal_eval, listed.decode().splitlines())
     in_order = sorted(_Part(*part) for part in parts)
-    return directory, {ride: list(group) for ride, group in itertools.groupby(in_order, lambda part: part.ride)}
+    by_ride = itertools.groupby(in_order, lambda part: part.ride)
+    return directory, vehicle, {ride: list(group) for ride, group in by_ride}
 
 
 def _pull_ride(
-    transport: SerialTransport, number: int, parts: list[_Part], out: Path, sofar: _SoFar
+    transport: SerialTransport, number: int, parts: list[_Part], vehicle: str, out: Path, sofar: _SoFar
 ) -> PulledRide:
-    """Write its log."""
+    """Write its log. vehicle: in the board's config.py; a ride that two poses have aligned was a motorcycle's."""
     ride = PulledRide(number)
     blocks: list[Block] = []
     for part in parts:
@@ -168,6 +170,8 @@ def _pull_ride(
         ride.problems.append(f"{title}: {missing_note(missing_s)}")
     if blocks[0].sequence:
         ride.problems.append(f"{title}: its beginning had to make room for later blocks")
+    if blocks[0].calibration().by_drive:
+        blocks[0].vehicle = vehicle
     ride.log = out / f"ride-{number:05}-{blocks[0].crc & 0xFFFF:04x}.csv.gz"
     ride_log.write(ride.log, blocks)
     ride.seconds = (blocks[-1].turns[-1].time_us - blocks[0].time_us) / 1e6

@@ -65,6 +65,7 @@ def calibration(block: Block) -> CalibrationFile:
         c.six_done,
         notes,
         c.trim_deg,
+        "car" if block.vehicle == "car" else "",
         gyro_delay_s=block.delay_tenths_ms / 10_000 if block.delay_tenths_ms else None,
     )
 

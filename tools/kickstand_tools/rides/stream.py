@@ -26,26 +26,33 @@ from kickstand.app import App
 from kickstand.board import port
 from kickstand.rides.usb_stream import RideStream
 chosen = settings.load()
+print("vehicle", chosen.VEHICLE)
 try:
     App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen), RideStream()).run()
 except KeyboardInterrupt:
     port.rest_watchdog()
 """
+_VEHICLE = b"vehicle "  # begins the line that _START prints; base64 has no space
 _SILENT_S = 60.0  # an emulated board takes a while to start; one without a sensor says nothing either
 CHANGED = "the board's calibration has changed: the log ends here"
 
 
 @dataclass(frozen=True)
 class LiveReading:
-    """A block of half a second. aligned: the board's sensor is.  moments: (s since the recording began, lean in
-    degrees > 0 to the right, specific force forward in g) at each turn of the board's loop; the lean is None where it
-    is not known well enough to be shown.  max_left_deg, max_right_deg: as on the display, since the recording began, 0
-    before there is one.  rate_hz: turns a second.  seconds: since the recording began."""
+    """A block of half a second. aligned: the board's sensor is.  car: the board is set to a vehicle that does not lean.
+    moments: at each turn of the board's loop (s since the recording began, lean in degrees > 0 to the right, specific
+    force forward and to the left in g); the lean is None where it is not known well enough to be shown, and of a car;
+    the force where the sensor is not aligned, the one to the left also of a motorcycle.  max_left_deg, max_right_deg,
+    max_accel_g, max_brake_g: as on the display, since the recording began, 0 before there is one.  rate_hz: turns a
+    second.  seconds: since the recording began."""
 
     aligned: bool
-    moments: list[tuple[float, float | None, float]]
+    car: bool
+    moments: list[tuple[float, float | None, float | None, float | None]]
     max_left_deg: float
     max_right_deg: float
+    max_accel_g: float
+    max_brake_g: float
     rate_hz: float
     seconds: float
 
@@ -55,9 +62,14 @@ class LiveReading:
         return self.moments[-1][1] if self.moments else None
 
     @property
-    def forward_g(self) -> float:
+    def forward_g(self) -> float | None:
         """At the end."""
-        return self.moments[-1][2] if self.moments else 0.0
+        return self.moments[-1][2] if self.moments else None
+
+    @property
+    def left_g(self) -> float | None:
+        """At the end."""
+        return self.moments[-1][3] if self.moments else None
 
 
 class Recording:
@@ -78,7 +90,7 @@ class Recording:
         missing, expected, before = 0, 0, 0
         missing_s: list[float] = []
         meter = ReplayMeter(CalibrationFile().to_firmware())
-        aligned = changed = False
+        aligned = car = changed = False
         file.write(",".join(ride_log.header(TRACK)) + "\n")
         for block in blocks:
             if changed:  # until the board has stopped
@@ -91,7 +103,8 @@ class Recording:
                     continue
                 self.first = block
                 calibration = ride_log.calibration(block)
-                meter = ReplayMeter(calibration.to_firmware(), delay_s=calibration.delay_s())
+                car = calibration.vehicle == "car"
+                meter = ReplayMeter(calibration.to_firmware(), not car, calibration.delay_s())
                 aligned = calibration.aligned
                 before = block.time_us
             missing += block.sequence - expected
@@ -104,15 +117,22 @@ class Recording:
                 meter.measure_speed(NO_SPEED if turn.speed_mps is None else turn.speed_mps)
                 meter.update((*reading[:3], 0.0, *reading[3:]), turn.time_us - before)
                 before = turn.time_us
-                shown = aligned and meter.trusted and not meter.fallen and abs(meter.lean_deg) <= FALLEN_DEG
-                at_s = (before - self.first.time_us) / 1e6
-                moments.append((at_s, meter.lean_deg if shown else None, meter.smooth_force[2]))
+                trusted = meter.trusted and not meter.fallen and abs(meter.lean_deg) <= FALLEN_DEG
+                moments.append(
+                    (
+                        (before - self.first.time_us) / 1e6,
+                        meter.lean_deg if aligned and trusted and not car else None,
+                        meter.smooth_force[2] if aligned else None,
+                        meter.smooth_force[0] if aligned and car else None,
+                    )
+                )
             self.count += len(block.turns)
             self.seconds = (before - self.first.time_us) / 1e6
             if self._live:
                 rate_hz = len(block.turns) * 1e6 / max(1, before - block.time_us)
-                most = (meter.max_left_deg, meter.max_right_deg) if aligned else (0.0, 0.0)
-                self._live(LiveReading(aligned, moments, *most, rate_hz, self.seconds))
+                most = meter.max_left_deg, meter.max_right_deg, meter.max_accel_g, meter.max_brake_g
+                most = most if aligned else (0.0, 0.0, 0.0, 0.0)
+                self._live(LiveReading(aligned, car, moments, *most, rate_hz, self.seconds))
         if self.first is None:
             raise InputError("; ".join(["nothing was recorded: does the display show readings?", *notes]))
         if missing:
@@ -125,12 +145,18 @@ def blocks(transport: SerialTransport, name: str, notes: list[str], stopped: thr
     """Whole blocks as the board says them, until `stopped` is set or the connection is lost. name: the port's, for
     notes, which get a line for what has ended it. Raises NoFirmware, OutdatedFirmware."""
     parts: list[bytes] = []
+    vehicle = ""
     for line in _lines(transport, name, notes, stopped):
+        if line.startswith(_VEHICLE):
+            vehicle = line.removeprefix(_VEHICLE).decode()
+            continue
         if line != b".":
             parts.append(line)
             continue
         with contextlib.suppress(BadBlock, binascii.Error):  # its number will be missing
-            yield parse(b"".join(binascii.a2b_base64(part) for part in parts))
+            block = parse(b"".join(binascii.a2b_base64(part) for part in parts))
+            block.vehicle = vehicle
+            yield block
         parts = []
 
 

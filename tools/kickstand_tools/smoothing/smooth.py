@@ -124,10 +124,9 @@ def smooth_blocks(
 
 def _check(log: Source, calibration: CalibrationFile) -> None:
     if calibration.vehicle == "car":
-        raise InputError(f"{name_of(log)}: a car does not lean: its calibration was made with --vehicle car")
+        raise InputError(f"{name_of(log)}: a car does not lean, and its calibration is a car's")
     if not calibration.aligned:
-        todo = "kickstand calibrate two, or calibrate ride, first"
-        raise InputError(f"the calibration is not aligned, so the lean is unknown: {todo}")
+        raise InputError("the calibration is not aligned, so the lean is unknown", "align")
 
 
 def _pieces(blocks: Iterator[Block]) -> Iterator[Block]:

@@ -15,7 +15,7 @@ from .zipped import zipped
 # Of Pico; of Pico 2; of ESP32-C3, C6 and H2 and of a Pico 2's other processor; of all other ESP32
 ARCHITECTURES = ("armv6m", "armv7emsp", "rv32imc", "xtensawin")
 _TOOLS = (
-    *("__init__.py", "deploy", "errors.py", "firmware_path.py", "simulated_board"),
+    *("__init__.py", "deploy", "errors.py", "firmware_path.py", "remedies.py", "simulated_board"),
     *("calibration/__init__.py", "calibration/file.py", "logs", "output.py", "refusals.py", "replay", "rides"),
     *("web/__init__.py", "web/cable_guest.py", "web/install_guest.py", "web/serial_guest.py"),
 )

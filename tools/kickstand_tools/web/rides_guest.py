@@ -1,11 +1,13 @@
 """`kickstand report`, `plot`, `smooth`, `import` and `calibrate ride` in the browser: their own code on CPython for
 WebAssembly. page/rides/worker.mjs runs it, in a folder of its own.
 
-Each function returns JSON: what its docstring says, or {"refused": why}, the line that the command would say.
+Each function returns JSON: what its docstring says, or {"refused": why}, what the command would say in the words of
+a page.
 """
 
 import functools
 import json
+import re
 import shutil
 from collections.abc import Callable
 from dataclasses import asdict
@@ -18,17 +20,19 @@ from ..analysis import report
 from ..analysis.overview import overview
 from ..analysis.plot.page import page
 from ..analysis.ride import open_ride
-from ..calibration.file import calibration_beside, calibration_path, write_calibration
+from ..calibration.file import calibration_path, write_calibration
 from ..calibration.ride.fit import fit_ride
 from ..errors import InputError
-from ..imports.importing import app_of, import_recording, write_imported
-from ..logs.reader import check_first_line
+from ..imports import mapped
+from ..imports.importing import import_recording, write_imported
 from ..refusals import sentence
+from ..remedies import PAGE
 from ..smoothing.smooth import smooth_to_csv
+from .rides_given import sorted_out
 
 PLOTLY = "./plotly/plotly.min.js"  # the page of a ride loads it from the site
-TOGETHER = "recording"  # the folder of files that are one recording
-TOO_LONG = "this ride is too long for the memory of a browser: kickstand cut takes a part of it"
+MADE = Path("made")  # beside what was given
+TOO_LONG = "this ride is too long for the memory of a browser: give a part of it"
 
 
 def told(function: Callable[..., Any]) -> Callable[..., str]:
@@ -39,7 +43,7 @@ def told(function: Callable[..., Any]) -> Callable[..., str]:
         try:
             return json.dumps(function(*given))
         except InputError as error:
-            return json.dumps({"refused": str(error)})
+            return json.dumps({"refused": _one_line(error.said(PAGE))})
         except MemoryError:
             return json.dumps({"refused": TOO_LONG})
 
@@ -47,60 +51,71 @@ def told(function: Callable[..., Any]) -> Callable[..., str]:
 
 
 @told
-def rides(given):
-    """[{"log": name, "calibration": name or ""}, ...]: the logs in the folder `given`, each with the calibration beside
-    it, or the only one there if that is beside no other log. Files of an app that are one recording together count as
-    one log.
+def rides(given, names):
+    """What the files of these names (JSON) in the folder `given` are, in the order in which they were given.
 
-    The files are linked to from here, where others can be made beside them.
+    {"rides": [{"log", "isLog": no app's recording, "calibration": name or "", "files": [names], "table": asked_for() of
+    one that nobody knows}, ...], in the order of their names; "kinds": {name: what it is}; "why": {name: why it cannot
+    be used}}.
     """
     for old in Path().iterdir():
-        shutil.rmtree(old) if old.is_dir() else old.unlink()
-    names = sorted(path.name for path in Path(given).iterdir())
-    _link(given, names, Path())
-    calibrations = [name for name in names if name.lower().endswith(".json")]
-    logs = [name for name in names if name not in calibrations]
-    if not logs:
-        raise InputError("no log among these files: a ride is RIDE.csv or RIDE.csv.gz, with its RIDE.cal.json")
-    if len(logs) > 1 and not any(map(_is_log, logs)):
-        together = TOGETHER
-        while together in names:
-            together += "_"
-        Path(together).mkdir()
-        _link(given, logs, Path(together))
-        logs = [together] if _app(together) else logs
-    beside = {log: calibration_path(Path(log)).name for log in logs}
-    only = calibrations[0] if len(calibrations) == 1 and calibrations[0] not in beside.values() else ""
-    return [{"log": log, "calibration": beside[log] if beside[log] in names else only} for log in logs]
+        if old != MADE:
+            shutil.rmtree(old) if old.is_dir() else old.unlink()
+    MADE.mkdir(exist_ok=True)
+    names = json.loads(names)
+    for name in names:
+        Path(name).symlink_to(Path(given, name))
+    found = sorted_out(names)
+    rides = [
+        {"log": one.log, "isLog": found.kinds.get(one.log) == "log"}
+        | {"calibration": one.calibration, "files": one.files, "table": one.table and asked_for(one.table)}
+        for one in found.rides
+    ]
+    refused = {name: _one_line(error.said(PAGE)) for name, error in found.refused.items()}
+    return {"rides": rides, "kinds": found.kinds, "why": refused}
+
+
+def asked_for(table: mapped.Table) -> dict[str, Any]:
+    """What the page asks about a table: {"columns": all, "keys": [[key, words, is it needed, column that seems to be
+    it or ""], ...], "units": [[key, words, [[unit, words], ...], the one that seems right], ...],
+    "lacking": what is not found, in words}."""
+    keys = [
+        [key, words, key in mapped.REQUIRED, table.found.get(key, "")] for key, words in mapped.WORDS.items()
+    ]
+    units = [
+        [key, f"unit of the {words}", [[unit, unit] for unit in mapped.UNIT_KEYS[key]], table.units.get(key, "")]
+        for key, words in (("a", "acceleration"), ("g", "rates"), ("speed", "speed"))
+    ]
+    units[0][2] += [[f"-{unit}", f"{unit}, all of the opposite sign"] for unit in mapped.UNIT_KEYS["a"]]
+    return {"columns": table.columns, "keys": keys, "units": units, "lacking": table.lacking}
 
 
 @told
-def take(log, _tell):
+def take(log, is_log, columns, units, _tell):
     """{"log": log}; for a recording of an app {"log": the one that `import` makes of it, "path": likewise, "app": whose
-    it is, "warnings": [...]}."""
-    if _is_log(log):
+    it is, "warnings": [...]}. columns, units: of a table, as JSON of what --columns and --units take, else "{}"."""
+    if is_log:
         return {"log": log}
-    if not _app(log):
-        check_first_line(Path(log))  # says what is wrong
-    found = import_recording(log)
-    out = f"{log.partition('.')[0]}.log.csv"
+    found = import_recording(log, json.loads(columns) or None, json.loads(units))
+    out = str(_made(log, f"{log.partition('.')[0]}.csv"))
     write_imported(out, found)
-    warnings = [sentence(notice) for notice in found.notices]
+    warnings = [sentence(notice, PAGE) for notice in found.notices]
     return {"log": out, "path": out, "app": found.app, "warnings": warnings}
 
 
 @told
 def look(log, calibration, tell):
-    """What `report` says and `plot` draws of a log: {"words": report.Words, "json": report.as_data(), "warnings":
-    [...], "page": HTML, "plotly": the script that the page loads, "stem": the name without suffixes}. calibration: its
-    file, "" for the one beside the log. tell(done, total): the progress."""
-    ride = open_ride(Path(log), _calibration(log, calibration), smoothed=True)
+    """What `report` says and `plot` draws of a log with the calibration of a file: {"words": report.Words, "json":
+    report.as_data(), "warnings": [...], "page": HTML, "plotly": the script that the page loads, "stem": the name
+    without suffixes}. tell(done, total): the progress."""
+    ride = open_ride(Path(log), Path(calibration), smoothed=True)
     seen = overview(ride, tell)
     notices = [*seen.notices, *([seen.exchanged] if seen.exchanged else [])]
+    table = {"units": report.STOPS_UNITS, "title": report.STOPS_TITLE, "terms": report.STOPS_TERMS}
     return {
-        "words": asdict(report.words(seen)) | {"units": report.STOPS_UNITS, "title": report.STOPS_TITLE},
-        "json": report.as_data(seen),
-        "warnings": [sentence(notice) for notice in notices],
+        "words": asdict(report.words(seen, PAGE)) | table,
+        "json": report.as_data(seen) | {"ride": Path(log).name},
+        "warnings": [sentence(notice, PAGE) for notice in notices],
         "page": page(seen, f'<script src="{PLOTLY}"></script>'),
         "plotly": PLOTLY,
         "stem": ride.stem,
@@ -110,8 +125,8 @@ def look(log, calibration, tell):
 @told
 def smooth(log, calibration, tell):
     """{"path": of LEAN.csv as `smooth` writes it}."""
-    out = Path(f"{log}.lean.csv")
-    ride = open_ride(Path(log), _calibration(log, calibration))
+    ride = open_ride(Path(log), Path(calibration))
+    out = _made(log, f"{ride.stem}.lean.csv")
     smooth_to_csv(Path(log), ride.calibration, out, tell)
     return {"path": str(out)}
 
@@ -120,36 +135,22 @@ def smooth(log, calibration, tell):
 def align(log, tell):
     """{"path": of the calibration that `calibrate ride` finds, "roll_deg", "pitch_deg", "yaw_deg": how well}."""
     found = fit_ride(Path(log), progress=tell)
-    out = calibration_path(Path(log))
+    out = _made(log, calibration_path(Path(log)).name)
     write_calibration(out, found.calibration)
     known = {name: round(getattr(found, name), 1) for name in ("roll_deg", "pitch_deg", "yaw_deg")}
     return {"path": str(out), **known}
 
 
-def _link(given, names, place):
-    for name in names:
-        (place / name).symlink_to(Path(given, name))
+def _made(log, name):
+    """A path for what is made of a log: those of another one may have the same name."""
+    folder = Path(log).parent if MADE in Path(log).parents else MADE / log
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder / name
 
 
-def _is_log(name):
-    """As far as its first line tells."""
-    try:
-        check_first_line(Path(name))
-        return True
-    except InputError:
-        return False
-
-
-def _app(log):
-    """app_of(), "" too for what cannot be read."""
-    try:
-        return app_of(log)
-    except InputError:
-        return ""
-
-
-def _calibration(log, calibration):
-    return Path(calibration) if calibration else calibration_beside(Path(log))
+def _one_line(text):
+    """Without the folder of what was made: nobody knows of it."""
+    return re.sub(rf"\b{MADE}/[^/]*/", "", " ".join(text.split()))
 
 
 def raising(function):

@@ -7,7 +7,7 @@ from pathlib import Path
 from .. import firmware_path
 from ..output import check_directory, new_directory, write_whole
 from ..pictures.lcd_font import ROM
-from . import install_archive, npm_packages, rides_archive
+from . import install_archive, npm_packages, rides_archive, wiring_files
 
 PAGE = Path(__file__).resolve().parent / "page"
 # The tools' modules and folders that device.py imports
@@ -46,6 +46,8 @@ def site_files() -> dict[str, bytes]:
     files = npm_packages.find()
     files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in sorted(PAGE.rglob("*.*"))}
     files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # as a text a browser shows
+    files |= wiring_files.wiring_files()
+    files["install.html"] = wiring_files.with_tables(files["install.html"].decode()).encode()
     files["python.json"] = json.dumps(python_files()).encode()
     files["install.zip"] = install_archive.archive()
     files["rides.zip"] = rides_archive.archive()

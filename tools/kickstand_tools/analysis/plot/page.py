@@ -17,12 +17,17 @@ _PAGE = """<!DOCTYPE html>
 <title>{title}</title>
 {library}
 <style>
-body {{ margin: 0; font-family: sans-serif; }}
+:root {{ color-scheme: light dark; --paper: #fff; --ink: #222; --quiet: #555; }}
+body {{ margin: 0; font-family: sans-serif; color: var(--ink); background: var(--paper); }}
+@media (prefers-color-scheme: dark) {{
+  :root {{ --paper: #1a1a1a; --ink: #eee; --quiet: #bbb; }}
+  .drawn {{ filter: invert(0.9) hue-rotate(180deg); }} /* white paper gets dark, and each colour keeps its hue */
+}}
 {style}
 </style>
 </head>
 <body>
-<main><div id="chart"></div></main>
+<main><div id="chart" class="drawn"></div></main>
 <script>
 const CHART = {charts};
 const finger = matchMedia("(pointer: coarse)").matches, narrow = matchMedia("(max-width: 600px)").matches;

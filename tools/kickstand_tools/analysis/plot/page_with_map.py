@@ -23,14 +23,14 @@ aside { position: sticky; top: 0; height: min(100vh, 60rem); display: flex; flex
 #map-frame { flex: 1; min-height: 0; }
 #map { height: 100%; }
 #here { margin: 1em 1em 0; font-variant-numeric: tabular-nums; }
-#tiles { margin: 0 1em 0.5em; font-size: 12px; color: #555; }
+#tiles { margin: 0 1em 0.5em; font-size: 12px; color: var(--quiet); }
 @media (max-width: 1000px) {
   body { display: flex; flex-direction: column; }
-  aside { order: -1; height: min(60vh, 30rem); z-index: 2; background: white; border-bottom: 1px solid #ccc; }
+  aside { order: -1; height: min(60vh, 30rem); z-index: 2; background: var(--paper); border-bottom: 1px solid #888; }
 }"""
 _BESIDE = """<aside>
 <p id="here"></p>
-<div id="map-frame"><div id="map"></div></div>
+<div id="map-frame"><div id="map" class="drawn"></div></div>
 <p id="tiles">{attribution}</p>
 </aside>
 <script>

@@ -14,6 +14,8 @@ def check(directory: Path) -> None:
     missing = [name for name in ("matplotlib", "plotly") if not find_spec(name)]
     if missing:
         raise InputError(f"pictures need {' and '.join(missing)}: {extra('rides')}")
+    if directory.suffix in (".png", ".html"):
+        raise InputError(f"{directory}: a picture and a page are written: give the directory for them")
     check_directory(directory)
 
 

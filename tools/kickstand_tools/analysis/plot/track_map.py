@@ -85,7 +85,7 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
         lean = plain(points.lean_deg[known], 1)
         dots |= {"color": lean, "colorscale": _COLOURS, "cmin": -limit, "cmax": limit}
         bar = {"title": {"text": "left  ·  lean, °  ·  right", "side": "top"}, "orientation": "h", "thickness": 10}
-        bar |= {"x": 1.0, "y": 0.965, "xanchor": "right", "yanchor": "top", "len": 0.5, "ticks": "outside"}
+        bar |= {"x": 1.0, "y": 1.0, "xanchor": "right", "yanchor": "bottom", "ypad": 5, "len": 0.6, "ticks": "outside"}
         ticks = [f"{limit:.0f}", "0", f"{limit:.0f}"]
         dots["colorbar"] = bar | {"tickvals": [-limit, 0.0, limit], "ticktext": ticks, "outlinewidth": 0}
     at = {"x": plain(points.east_m[known], 1), "y": plain(points.north_m[known], 1)}
@@ -93,7 +93,7 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
     paper = {"xref": "paper", "yref": "paper", "showarrow": False}
     thin = {"arrowhead": 0, "arrowwidth": 1}
     layout = PAPER | {
-        "margin": {"l": 5, "r": 5, "t": 10, "b": 5},
+        "margin": {"l": 5, "r": 5, "t": 85, "b": 5},  # above the track: plotly's buttons, and below them the legend
         "hovermode": "closest",
         "dragmode": "pan",
         "xaxis": {"visible": False},
@@ -108,7 +108,7 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
         "annotations": [
             paper | {"x": 0.02, "y": 0.025, "xanchor": "left", "yanchor": "bottom", "text": ""},
             paper
-            | {"x": 0.02, "y": 0.99, "xanchor": "left", "yanchor": "top", "text": "<b>N</b><br>↑"}
+            | {"x": 0.02, "y": 1.0, "xanchor": "left", "yanchor": "bottom", "text": "<b>N</b><br>↑"}
             | {"font": {"size": 18}},
             thin | {"x": x[0], "y": y[0], "text": "start", "ax": -25, "ay": -25},
             thin | {"x": x[-1], "y": y[-1], "text": "end", "ax": 25, "ay": 25},

@@ -169,7 +169,7 @@ def _moved(moved: Sequence[tuple[Row, str]], count: int) -> str:
         turned = f"{row['turned_deg']:.1f}° ± {row['turned_sigma_deg']:.1f}°"
         lines.append(
             f"<tr><td>{_name(row, plot)}</td><td class=n>{turned}</td><td class=n>{row['sigmas']:.0f} sigma</td>"
-            f"<td>{escape(when)} {escape(Path(row['log']).name)}{day}</td></tr>"
+            f"<td class=when>{escape(when)} {escape(Path(row['log']).name)}{day}</td></tr>"
         )
     more = f"<p>The {_MOST_MOVED} largest of {count}.</p>" if count > _MOST_MOVED else ""
     head = "<tr><th>vehicle<th class=n>turned by<th class=n>how sure<th>when</tr>"

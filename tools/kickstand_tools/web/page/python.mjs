@@ -3,15 +3,17 @@
 import { fetched } from "./fetched.mjs";
 import { loadPyodide } from "./pyodide/pyodide.mjs";
 
+// What Pyodide fetches. Where one of these does not come it waits for ever, so they are fetched before it asks for them.
+const PARTS = ["pyodide.asm.js", "pyodide.asm.wasm", "python_stdlib.zip", "pyodide-lock.json"];
 const HERE = new URL("./", import.meta.url);
 export const PACKAGES = "/packages"; // where they are
 
 /** A new Python. archives: ZIP files of the site; what is in them can be imported. */
 export async function loadPython(archives) {
-  const [python, ...packed] = await Promise.all([
-    loadPyodide({ indexURL: new URL("./pyodide/", HERE).href }),
-    ...archives.map((name) => fetched(new URL(name, HERE)).then((answer) => answer.arrayBuffer())),
-  ]);
+  const wanted = [...archives, ...PARTS.map((name) => `pyodide/${name}`)];
+  const come = await Promise.all(wanted.map((name) => fetched(new URL(name, HERE)).then((answer) => answer.arrayBuffer())));
+  const packed = come.slice(0, archives.length);
+  const python = await loadPyodide({ indexURL: new URL("./pyodide/", HERE).href });
   // numpy looks at its callers before it saves a copy. Pyodide has no backtrace(); 0 callers found means: do not save it.
   python._module.LDSO.loadedLibsByName["__main__"].exports.backtrace = () => 0;
   for (const archive of packed) python.unpackArchive(archive, "zip", { extractDir: PACKAGES });

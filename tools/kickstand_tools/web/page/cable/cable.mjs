@@ -1,6 +1,8 @@
 // What the pages that speak to a board share: the browser's serial port, and the tools of the command line on CPython for
 // WebAssembly, which is fetched for this only.
 
+import { keptOffline } from "../offline.mjs";
+
 const BAUD = 115200;
 const BUFFER = 65_536; // bytes that may come while the page is busy
 const BACK_MS = 10_000; // until a board that has restarted is there again, at most
@@ -92,18 +94,17 @@ export class SerialLine {
   }
 
   async close() {
-    try {
-      await this.#reader?.cancel();
-      this.#reader?.releaseLock();
-      await this.#port.close();
-    } catch {
-      // it is gone already
-    }
+    this.lost = true; // or what reads would go on with the port's next stream
+    // Each of these fails where the cable is out. A port that is not closed could not be opened again.
+    await this.#reader?.cancel().catch(() => {});
+    this.#reader?.releaseLock();
+    await this.#port.close().catch(() => {});
   }
 }
 
 /** A new Python with the tools in it. withNumpy: those that write rides need it. */
 export async function python(withNumpy = false) {
+  await keptOffline(); // so that what is fetched now is kept too
   const { PACKAGES, loadPython } = await import("../python.mjs");
   const made = await loadPython(["install.zip", ...(withNumpy ? ["numpy/numpy.zip"] : [])]);
   made.runPython(`import sys; sys.path.insert(0, "${PACKAGES}/tools")`);
@@ -119,17 +120,10 @@ export function loadOnce(load) {
       return await (loaded ??= load());
     } catch (error) {
       loaded = undefined;
-      tell(`The tools cannot be loaded: ${error.message}. Is there a network? Try again.`);
+      tell(`The tools cannot be loaded. Is there a network? Press the button again to retry. (${error.message})`);
       return null;
     }
   };
-}
-
-/** Show what applies in this browser: it needs a serial port, and has to let Python wait for it. */
-export function showIfAble(form, unable) {
-  const able = "serial" in navigator && "Suspending" in WebAssembly;
-  form.hidden = !able;
-  unable.hidden = able;
 }
 
 /** The port that the rider chooses, or null; tell(text) says why there is none. */
@@ -168,5 +162,8 @@ export async function overCable(port, tell, speak, restarted = false) {
 
 /** A line of the command's, in these pages' words. */
 export function inPages(text) {
-  return text.replaceAll("socket:", "").replace(/kickstand flash (puts|brings)/, "the page Install $1");
+  return text
+    .replaceAll("socket:", "")
+    .replace(/this port: connection lost \(.*?\)/, "connection lost")
+    .replace(/kickstand flash (puts|brings)/, "the page Install $1");
 }

@@ -13,7 +13,7 @@ export const GROUPS = [
     ["SPEED", "Speed comes from", [["None", "nothing"], ['"gps"', "a GPS receiver that sends NMEA"], ['"wheel"', "a contact at a wheel"]]],
     ["RECORD", "Record every ride from power-on", SWITCH],
   ]],
-  ["Wiring", false, [
+  ["Wiring, where it is not that of step 1", false, [
     ["SENSOR_SDA", "Sensor, SDA: GPIO"],
     ["SENSOR_SCL", "Sensor, SCL: GPIO"],
     ["SENSOR_I2C", "Sensor, number of the I2C bus (Pico)", numbers(0, 1)],

@@ -46,7 +46,9 @@ export function connectImage(atWork) {
 
 async function write(port, data, wanted) {
   tell("Loading esptool …", 0);
-  const { ESPLoader, Transport } = await import("../esptool/bundle.js");
+  const { ESPLoader, Transport } = await import("../esptool/bundle.js").catch((error) => {
+    throw new Error("esptool cannot be loaded. Is there a network? Press the button again to retry", { cause: error });
+  });
   const transport = new Transport(port);
   const quiet = { clean() {}, write() {}, writeLine() {} };
   const loader = new ESPLoader({ transport, baudrate: BAUD, terminal: quiet });

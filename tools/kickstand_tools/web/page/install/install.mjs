@@ -1,7 +1,7 @@
 // Puts the firmware and its config.py onto a board at the browser's serial port: `kickstand flash` itself, on CPython for
 // WebAssembly (web/install_guest.py).
 
-import { choosePort, inPages, loadOnce, overCable, python, showIfAble } from "../cable/cable.mjs";
+import { choosePort, inPages, loadOnce, overCable, python } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
 import { connectImage } from "./image.mjs";
 import { Fields } from "./fields.mjs";
@@ -24,7 +24,7 @@ async function look() {
   if (!port) return;
   atWork(true);
   byId("config").hidden = true;
-  tell("Loading the tools …", 0);
+  tell("Loading the tools, 6 MB the first time …", 0);
   const tools = await load(tell);
   if (!tools) return atWork(false);
   const guest = tools.pyimport("kickstand_tools.web.install_guest").Installation();
@@ -42,7 +42,7 @@ async function look() {
   byId("settings").hidden = Boolean(byHand);
   if (!byHand) fields.fill(settings, usual);
   byId("config").hidden = false;
-  tell(`${name} is there.`);
+  tell(`${name} is there. ${byHand ? "Press" : "Look through its settings, then press"} Install.`);
   check();
 }
 
@@ -79,17 +79,17 @@ function told({ refused, board: name, copied, kept, config_kept }) {
     return;
   }
   byId("config").hidden = true;
-  const files = copied ? `${copied} files copied and verified, ${kept} as they were` : "it was up to date";
+  const there = kept ? `, ${kept} were there already` : "";
+  const files = copied ? `${copied} files copied and verified${there}` : "it was up to date";
   const config = config_kept ? " Its own config.py stays." : "";
-  tell(`Done: ${name}. ${files}.${config} The board starts now: press its button on the stand, then upright.`);
+  const next = "Press its button once with the bike on its kickstand, and once with the bike upright.";
+  tell(`Done: ${name}. ${files}.${config} The board starts now. ${next}`);
 }
 
 function atWork(on) {
   for (const id of ["look", "install", "fields", "image", "image-file"]) byId(id).disabled = on;
 }
 
-showIfAble(byId("install-form"), byId("install-unable"));
-byId("image-form").hidden = byId("install-form").hidden;
 byId("look").addEventListener("click", look);
 byId("install").addEventListener("click", install);
 connectImage(atWork);

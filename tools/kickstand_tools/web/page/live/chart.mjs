@@ -1,14 +1,14 @@
-// Lean and g over the last minute, on one canvas.
+// Lean, or what a car has in its place, and acceleration over the last minute, on one canvas.
 
 const SPAN_S = 60;
 const LEFT = 46; // px for the numbers beside the plots
 const GAP = 26;
 const EVERY_S = 10; // a line of the grid
-// key: of a moment; limit: at the upper end, and below 0 as far; step: between two lines
-const PLOTS = [
-  { title: "lean, right above", key: 1, limit: 60, step: 30, unit: "°", share: 0.62, color: "--accent" },
-  { title: "acceleration, braking below", key: 2, limit: 1, step: 0.5, unit: " g", share: 0.38, color: "--truth" },
-];
+// value: of a moment; limit: at the upper end, and below 0 as far; step: between two lines
+const ACCELERATION = {
+  ...{ title: "acceleration, braking below", value: ([, , forward]) => forward, limit: 1, step: 0.5, unit: " g" },
+  ...{ share: 0.38, color: "--truth" },
+};
 
 export class Chart {
   #canvas;
@@ -17,8 +17,8 @@ export class Chart {
     this.#canvas = canvas;
   }
 
-  /** moments: [s, lean in degrees or null, g]; until: s, at the right edge. */
-  draw(moments, until) {
+  /** moments: those of LiveReading (rides/stream.py); until: s, at the right edge; measure: one of measures.mjs. */
+  draw(moments, until, { value, limit, chart }) {
     const { clientWidth: width, clientHeight: height } = this.#canvas;
     const scale = devicePixelRatio;
     if (this.#canvas.width !== Math.round(width * scale) || this.#canvas.height !== Math.round(height * scale)) {
@@ -31,25 +31,25 @@ export class Chart {
     pen.clearRect(0, 0, width, height);
     pen.font = "600 13px system-ui, sans-serif";
     let top = GAP;
-    for (const plot of PLOTS) {
+    for (const plot of [{ ...chart, value, limit, share: 0.62, color: "--accent" }, ACCELERATION]) {
       const tall = (height - 2 * GAP - 8) * plot.share;
       this.#plot(pen, style, plot, moments, until, { top, tall, width });
       top += tall + GAP;
     }
   }
 
-  #plot(pen, style, { title, key, limit, step, unit, color }, moments, until, { top, tall, width }) {
+  #plot(pen, style, { title, value, limit, step, unit, color }, moments, until, { top, tall, width }) {
     const x = (s) => width - ((until - s) / SPAN_S) * (width - LEFT);
-    const y = (value) => top + (tall * (limit - Math.max(-limit, Math.min(limit, value)))) / (2 * limit);
+    const y = (size) => top + (tall * (limit - Math.max(-limit, Math.min(limit, size)))) / (2 * limit);
     pen.fillStyle = style.getPropertyValue("--quiet");
     pen.textAlign = "left";
     pen.fillText(title, LEFT, top - 7);
     pen.textAlign = "right";
     pen.strokeStyle = style.getPropertyValue("--edge");
     pen.lineWidth = 1;
-    for (let value = -limit; value <= limit; value += step) {
-      line(pen, [[LEFT, y(value)], [width, y(value)]]);
-      pen.fillText(`${Math.abs(value)}${unit}`, LEFT - 6, y(value) + 4);
+    for (let size = -limit; size <= limit; size += step) {
+      line(pen, [[LEFT, y(size)], [width, y(size)]]);
+      pen.fillText(`${Math.abs(size)}${unit}`, LEFT - 6, y(size) + 4);
     }
     for (let s = Math.ceil((until - SPAN_S) / EVERY_S) * EVERY_S; s < until; s += EVERY_S) {
       line(pen, [[x(s), top], [x(s), top + tall]]);
@@ -62,11 +62,12 @@ export class Chart {
       const [s] = moment;
       if (s < until - SPAN_S || s > until) continue;
       const broken = piece.length && s - piece.at(-1)[2] > 0.3;
-      if (moment[key] === null || broken) {
+      const size = value(moment);
+      if (size === null || broken) {
         line(pen, piece);
         piece = [];
       }
-      if (moment[key] !== null) piece.push([x(s), y(moment[key]), s]);
+      if (size !== null) piece.push([x(s), y(size), s]);
     }
     line(pen, piece);
   }

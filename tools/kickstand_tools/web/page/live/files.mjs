@@ -32,7 +32,9 @@ export function offer(list, title, files) {
     try {
       await leavePulled(files);
     } catch {
-      look.replaceWith("This browser does not hand files to the page Rides: save them, and choose them there.");
+      item.setAttribute("role", "status"); // a screen reader says what takes the button's place
+      const why = "This browser hands nothing from page to page, as in a private window";
+      look.replaceWith(`${why}: save both, and choose them on the page Rides.`);
       return;
     }
     open("./rides.html#pulled"); // in a tab of its own: this page keeps what is not saved yet

@@ -1,11 +1,12 @@
 // Shows what a board streams, keeps it as a log, and fetches the rides that the board has recorded: `kickstand record` and
 // `kickstand pull` on CPython for WebAssembly (web/cable_guest.py).
 
-import { choosePort, inPages, loadOnce, overCable, python, showIfAble } from "../cable/cable.mjs";
+import { choosePort, inPages, loadOnce, overCable, python } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
 import { Chart } from "./chart.mjs";
 import { busy, offer } from "./files.mjs";
 import { Gauge } from "./gauge.mjs";
+import { LEAN, SIDEWAYS, sideOf, written } from "./measures.mjs";
 import { Player } from "./player.mjs";
 
 const byId = (id) => document.getElementById(id);
@@ -17,6 +18,7 @@ let live; // the Live of cable_guest.py that runs, or null
 let stopped = false;
 let awake = null; // a WakeLockSentinel
 let aligned = false;
+let measure = null; // LEAN or SIDEWAYS
 let furthest = [0, 0];
 
 const tell = (text) => (byId("live-said").textContent = text);
@@ -27,7 +29,7 @@ async function start() {
   if (!port) return;
   stopped = false;
   atWork(true);
-  tell("Loading the tools …");
+  tell("Loading the tools, 8 MB the first time …");
   const guest = await guests(tell);
   if (!guest) return atWork(false);
   await stayAwake();
@@ -45,7 +47,7 @@ async function start() {
   awake?.release();
   atWork(false);
   if (!said && stopped) tell("Stopped.");
-  if (said) tell(said.refused ? `${inPages(said.refused)}.` : inPages(["Stopped", ...said.notes].join(". ")) + ".");
+  if (said) tell(sentences(said.refused ? [said.refused] : ["Stopped", ...said.notes]));
 }
 
 /** Keep the screen on, where the browser can. It ends that itself when the page is covered. */
@@ -56,9 +58,11 @@ async function stayAwake() {
 function heard(text) {
   const reading = JSON.parse(text);
   aligned = reading.aligned;
-  furthest = [reading.max_left_deg, reading.max_right_deg];
+  show(reading.car ? SIDEWAYS : LEAN);
+  furthest = measure.most(reading);
   player.take(reading.moments, performance.now());
-  if (!stopped) tell(`${aligned ? "Recording" : "Recording; the board is not aligned yet, so there is no lean"}: ${clock(reading.seconds)}`);
+  const lacking = aligned ? "" : `; the board is not aligned yet, so there is ${measure.none}`;
+  if (!stopped) tell(`Recording${lacking}: ${clock(reading.seconds)}`);
 }
 
 function stop() {
@@ -81,7 +85,7 @@ async function pull() {
   const port = await choosePort(say);
   if (!port) return;
   atWork(true, false);
-  say("Loading the tools …", 0);
+  say("Loading the tools, 8 MB the first time …", 0);
   const guest = await guests(say);
   if (!guest) return atWork(false);
   const result = await overCable(port, say, (line, name) => {
@@ -97,10 +101,19 @@ async function pull() {
     const title = `Ride ${number}: ${clock(seconds)}, ${readings} readings`;
     if (log) offer(byId("files"), title, files.filter(({ name }) => name.startsWith(`${stem}.`)));
   }
-  const problems = [...rides.flatMap((ride) => ride.problems), ...(refused ? [inPages(refused)] : [])];
+  const problems = [...rides.flatMap((ride) => ride.problems), ...(refused ? [refused] : [])];
   const none = refused ? "" : "There are no rides on the board: its menu’s “Record ride” makes one";
-  const sum = rides.length ? `${rides.length} rides are here: save them. They stay on the board too` : none;
-  say([sum, ...problems].filter(Boolean).join(". ") + ".");
+  const some =
+    rides.length === 1
+      ? "1 ride is here: save it. It stays on the board too"
+      : `${rides.length} rides are here: save them. They stay on the board too`;
+  const sum = rides.length ? some : none;
+  say(sentences([sum, ...problems].filter(Boolean)));
+}
+
+/** Lines of the commands, one after the other. */
+function sentences(lines) {
+  return lines.map((line) => inPages(line).replace(/^./, (first) => first.toUpperCase())).join(". ") + ".";
 }
 
 /** Of Python's [(name, bytes)]. */
@@ -119,6 +132,19 @@ function clock(seconds) {
   return `${Math.floor(seconds / 60)}:${String(Math.floor(seconds % 60)).padStart(2, "0")}`;
 }
 
+/** Show this one of measures.mjs from now on. */
+function show(wanted) {
+  if (wanted === measure) return;
+  measure = wanted;
+  gauge.scale(measure);
+  put("now-title", measure.title);
+  byId("lean").classList.toggle("long", measure === SIDEWAYS);
+  put("max-left-name", measure.furthest[0]);
+  put("max-right-name", measure.furthest[1]);
+  byId("chart").setAttribute("aria-label", `${measure.title.split(" ")[0]} and acceleration over the last minute`);
+  drawn = null;
+}
+
 let drawn = null;
 
 function draw(nowMs) {
@@ -126,14 +152,15 @@ function draw(nowMs) {
   const key = `${moment} ${until} ${innerWidth} ${matchMedia("(prefers-color-scheme: dark)").matches}`;
   if (key !== drawn) {
     drawn = key;
-    const lean = moment?.[1] ?? null;
-    gauge.show(lean, ...furthest);
-    chart.draw(player.moments, until);
-    put("lean", lean === null ? "--" : `${Math.abs(Math.round(lean))}°`);
-    put("side", lean === null || Math.round(lean) === 0 ? "\u00a0" : lean < 0 ? "left" : "right");
-    put("forward", moment ? `${moment[2] < 0 ? "−" : "+"}${Math.abs(moment[2]).toFixed(2)} g` : "--");
-    put("max-left", furthest[0] ? `${Math.round(furthest[0])}°` : "--");
-    put("max-right", furthest[1] ? `${Math.round(furthest[1])}°` : "--");
+    const value = moment && measure.value(moment);
+    const forward = moment ? moment[2] : null;
+    gauge.show(value, ...(measure === LEAN ? furthest : [0, 0]));
+    chart.draw(player.moments, until, measure);
+    put("lean", value === null ? "--" : written(measure, value));
+    put("side", (value !== null && sideOf(measure, value)) || "\u00a0");
+    put("forward", forward === null ? "--" : `${forward < 0 ? "−" : "+"}${Math.abs(forward).toFixed(2)} g`);
+    put("max-left", furthest[0] ? written(measure, furthest[0]) : "--");
+    put("max-right", furthest[1] ? written(measure, furthest[1]) : "--");
   }
   requestAnimationFrame(draw);
 }
@@ -142,8 +169,7 @@ function put(id, text) {
   if (byId(id).textContent !== text) byId(id).textContent = text;
 }
 
-showIfAble(byId("live-form"), byId("live-unable"));
-byId("pull").disabled = byId("live-form").hidden;
+show(LEAN);
 byId("start").addEventListener("click", start);
 byId("stop").addEventListener("click", stop);
 byId("pull").addEventListener("click", pull);

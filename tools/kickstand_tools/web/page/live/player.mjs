@@ -6,7 +6,7 @@ const JUMP_S = 0.7;
 const EASE = 0.1; // of what a block comes early or late
 
 export class Player {
-  /** All of the last minute: [s, lean in degrees or null, g]. */
+  /** All of the last minute, as LiveReading (rides/stream.py) has them. */
   moments = [];
   #late = null; // s of our time minus s of the recording
   #heardMs = -Infinity;

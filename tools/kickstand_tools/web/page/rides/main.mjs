@@ -2,55 +2,112 @@
 
 import { fetched } from "../fetched.mjs";
 import { keepOffline, keptOffline } from "../offline.mjs";
+import { Held, size } from "./held.mjs";
 import { takePulled } from "./pulled.mjs";
 import { hideRide, save, showCharts, showReport } from "./show.mjs";
+import { askColumns, askNothing } from "./table.mjs";
 import { Tools } from "./tools.mjs";
 
 const byId = (id) => document.getElementById(id);
 const tools = new Tools((done, of) => of && (byId("work-bar").value = done / of));
-let given = []; // File objects
-let rides = []; // {log, calibration}, as rides() of web/rides_guest.py says
+const held = new Held(byId("held"), () => sortOut([]));
+let rides = []; // as rides() of web/rides_guest.py says, with what became of each: see kept()
 let looked = null;
+let current = ""; // the ride that was chosen last
 let turn = 0; // of the work that is wanted: what was begun for an earlier one is not shown
 
-/** Look at a ride. files: File objects; a calibration alone goes with the files of before. */
+/** Look at a ride. files: File objects, which join those of before. */
 export async function openRide(files) {
-  const adds = files.length > 0 && files.every(isCalibration);
-  const names = files.map((file) => file.name);
-  given = [...(adds ? given.filter((file) => !names.includes(file.name)) : []), ...files];
-  await work("Loading Python, 8 MB the first time …", async () => {
-    await keptOffline();
-    tools.give(given);
-    rides = await tools.call("rides");
-    byId("ride").replaceChildren(...rides.map(({ log }) => new Option(log, log)));
-    byId("which").hidden = rides.length < 2;
-    return rides[0];
-  }, look);
+  held.add(files);
+  await sortOut(files.map((file) => file.name));
 }
 
-const isCalibration = (file) => file.name.toLowerCase().endsWith(".json");
+/** Find out what the files are that are held, and look at the ride that the new ones make. added: their names. */
+async function sortOut(added) {
+  held.show();
+  await work("Loading Python, 8 MB the first time …", async () => {
+    await keptOffline();
+    if (tools.give(held.files)) [rides, looked] = [[], null]; // what was made of them is gone
+    return tools.call("rides", JSON.stringify(held.names));
+  }, async (found) => {
+    rides = found.rides.map(kept);
+    held.show(found);
+    byId("ride").replaceChildren(...rides.map((ride) => new Option(`${ride.given}, ${size(ride.bytes)}`, ride.given)));
+    byId("which").hidden = rides.length < 2;
+    const wrong = added.map((name) => found.why[name]).find(Boolean);
+    const now = rides.find((one) => one.given === current);
+    const told = [now, ...rides].find((one) => one && added.includes(one.calibration));
+    const meant = rides.find((one) => one.files.some((name) => added.includes(name))) ?? told;
+    const ride = meant ?? now ?? (wrong ? undefined : rides[0]);
+    byId("ride").selectedIndex = rides.indexOf(ride);
+    const only = !rides.length && Object.values(found.kinds).includes("calibration");
+    say(only ? "This is a calibration. Now add the ride that it belongs to." : "");
+    if (!ride) hideRide();
+    else if (!isShown(ride)) await look(ride);
+    if (wrong && !meant && byId("work").hidden) say(ended(wrong), true);
+  }, true);
+}
+
+/** A ride with what was made of it, if it has the same files as before. given: its name in what was given. */
+function kept(ride) {
+  const sources = ride.files.map((name) => held.file(name));
+  const bytes = sources.reduce((sum, file) => sum + file.size, 0);
+  const same = (old) => old.given === ride.log && old.sources.length === sources.length && old.sources.every((file, k) => file === sources[k]);
+  const { log = ride.log, taken, fitted } = rides.find(same) ?? {};
+  return { ...ride, given: ride.log, sources, bytes, log, taken, fitted };
+}
+
+const calibrationOf = (ride) => ride.calibration || ride.fitted?.path;
+
+/** Is this what the page shows already? */
+function isShown(ride) {
+  const { given, sources } = looked?.ride ?? {};
+  const same = given === ride.given && sources.every((file, k) => file === ride.sources[k]);
+  if (!same || byId("report").hidden || looked.calibration !== calibrationOf(ride)) return false;
+  looked.ride = ride;
+  return looked.calibrationFile === held.file(ride.calibration);
+}
 
 async function look(ride) {
+  current = ride.given;
   if (!ride.taken) {
-    await work(`Reading ${ride.log} …`, () => tools.call("take", ride.log), async (found) => {
-      Object.assign(ride, { taken: found, given: ride.log, log: found.log });
+    if (ride.table && !ride.asked) {
+      hideRide();
+      ask(ride);
+      say(`${ride.given} is not of an app that is known${ride.table.lacking}: say what its columns are.`);
+      return;
+    }
+    const { columns = {}, units = {} } = ride.asked ?? {};
+    const given = [ride.log, ride.isLog, JSON.stringify(columns), JSON.stringify(units)];
+    const done = await work(`Reading ${ride.given} …`, () => tools.call("take", ...given), async (found) => {
+      Object.assign(ride, { taken: found, log: found.log });
       await look(ride);
     });
+    if (!done && ride.table) ask(ride);
     return;
   }
-  if (!ride.calibration) {
+  if (!calibrationOf(ride)) {
     say(`${ride.given} has no calibration with it. Add its .cal.json, or let the ride tell how the sensor sits: that takes some minutes of riding with bends to both sides.`, true);
+    hideRide();
     byId("align").hidden = false;
     return;
   }
-  await work(`Looking at ${ride.given} …`, () => tools.call("look", ride.log, ride.calibration), (found) => {
+  const calibration = calibrationOf(ride);
+  await work(`Looking at ${ride.given} …`, () => tools.call("look", ride.log, calibration), (found) => {
     const warnings = [...new Set([...(ride.taken.warnings ?? []), ...found.warnings])];
-    looked = { ...found, ride };
-    showReport({ ...found, warnings });
+    looked = { ...found, ride, calibration, calibrationFile: held.file(ride.calibration) };
+    showReport({ ...found, warnings, name: ride.given, calibration: ride.calibration || "found from the ride" });
     showCharts(found.page);
-    byId("save-calibration").hidden = !ride.aligned;
+    byId("save-calibration").hidden = Boolean(ride.calibration);
     byId("save-log").hidden = !ride.taken.made;
-    say(ride.aligned ?? "");
+    say(ride.calibration ? "" : ride.fitted.words);
+  });
+}
+
+function ask(ride) {
+  askColumns(ride.given, ride.table, (columns, units) => {
+    ride.asked = { columns, units };
+    look(ride);
   });
 }
 
@@ -58,16 +115,16 @@ async function align() {
   const ride = chosen();
   await work(`Looking how the sensor sits in ${ride.given} …`, () => tools.call("align", ride.log), async (found) => {
     const [roll, pitch, yaw] = [found.roll_deg, found.pitch_deg, found.yaw_deg];
-    const aligned = `The ride tells how the sensor sits: roll to ${roll}°, pitch to ${pitch}°, yaw to ${yaw}°.`;
-    Object.assign(ride, { calibration: found.path, aligned, bytes: found.made });
+    const words = `The ride tells how the sensor sits: roll within ${roll}°, pitch within ${pitch}°, yaw within ${yaw}°.`;
+    ride.fitted = { path: found.path, words, bytes: found.made };
     await look(ride);
   });
 }
 
 async function saveLean() {
-  const { ride, stem } = looked;
+  const { ride, stem, calibration } = looked;
   await work(`Finding the lean of each sample of ${ride.given} …`, async () => {
-    const { made } = await tools.call("smooth", ride.log, ride.calibration);
+    const { made } = await tools.call("smooth", ride.log, calibration);
     save(`${stem}.lean.csv`, "text/csv", made); // also where another ride was chosen meanwhile
   }, () => say(""), true);
 }
@@ -82,11 +139,13 @@ async function savePage() {
 
 const chosen = () => rides[Math.max(0, byId("ride").selectedIndex)];
 
-/** Do it, saying so, then show what came of it; or say why nothing did. stays: what is shown stays meanwhile. */
+/** Do it, saying so, then show what came of it; or say why nothing did, and return false. stays: what is shown stays
+ * meanwhile. */
 async function work(text, begin, show, stays = false) {
   const mine = ++turn;
   say(text);
-  byId("align").hidden = true;
+  for (const id of ["align", "again"]) byId(id).hidden = true;
+  askNothing();
   byId("work").hidden = false;
   byId("work-bar").removeAttribute("value");
   if (!stays) hideRide();
@@ -96,12 +155,15 @@ async function work(text, begin, show, stays = false) {
   } catch (error) {
     wrong = error.message;
   }
-  if (mine !== turn) return;
+  if (mine !== turn) return true;
   byId("work").hidden = true;
   if (!tools.open) forget();
-  if (wrong) say(`${wrong}.`, true);
+  if (wrong) say(ended(wrong), true);
   else await show(found);
+  return !wrong;
 }
+
+const ended = (line) => (/[.?!]$/.test(line) ? line : `${line}.`);
 
 function say(text, wrong = false) {
   byId("said").textContent = text;
@@ -116,10 +178,12 @@ function stop() {
   say("Stopped.");
 }
 
-/** The files that were given went with the worker, and what is shown could not be saved any more. */
+/** What was made of the files went with the worker, and what is shown could not be saved any more. */
 function forget() {
-  given = rides = [];
+  rides = [];
+  looked = null;
   byId("which").hidden = true;
+  byId("again").hidden = !held.files.length;
   hideRide();
 }
 
@@ -140,16 +204,21 @@ addEventListener("drop", (event) => {
 });
 byId("ride").addEventListener("change", () => look(chosen()));
 byId("align").addEventListener("click", align);
+byId("again").addEventListener("click", () => sortOut([]));
 byId("stop").addEventListener("click", stop);
 byId("save-lean").addEventListener("click", saveLean);
 byId("save-page").addEventListener("click", savePage);
 byId("save-json").addEventListener("click", () => save(`${looked.stem}.json`, "application/json", JSON.stringify(looked.json, null, 1)));
-byId("save-log").addEventListener("click", () => save(looked.ride.log, "text/csv", looked.ride.taken.made));
-byId("save-calibration").addEventListener("click", () => save(`${looked.stem}.cal.json`, "application/json", looked.ride.bytes));
+byId("save-log").addEventListener("click", () => save(`${looked.stem}.csv`, "text/csv", looked.ride.taken.made));
+byId("save-calibration").addEventListener("click", () => save(`${looked.stem}.cal.json`, "application/json", looked.ride.fitted.bytes));
 
 keepOffline();
 if (location.hash === "#pulled") {
   history.replaceState(null, "", "./rides.html");
-  const files = await takePulled();
-  if (files.length) await openRide(files);
+  try {
+    const files = await takePulled();
+    if (files.length) await openRide(files);
+  } catch {
+    say("This browser keeps nothing for the page, as in a private window: save the rides on the page Live, and give them here.", true);
+  }
 }

@@ -8,9 +8,11 @@ function element(name, ...inside) {
   return made;
 }
 
-/** looked: what look() of web/rides_guest.py says. */
-export function showReport({ words, warnings }) {
-  byId("report-title").textContent = words.name;
+/** words, warnings: of look() in web/rides_guest.py; name: of the ride as it was given. */
+export function showReport({ words, warnings, name, calibration }) {
+  byId("report-title").textContent = name;
+  byId("calibration").textContent = calibration;
+  byId("too-little").textContent = words.too_little;
   byId("warnings").replaceChildren(...warnings.map((warning) => element("li", `Warning: ${warning}.`)));
   byId("figures").replaceChildren(
     ...words.ride.map(([name, ...cells]) => {
@@ -31,6 +33,7 @@ export function showReport({ words, warnings }) {
   byId("stops").replaceChildren(
     ...words.stops.map((cells) => element("tr", ...cells.map((cell) => element("td", cell)))),
   );
+  byId("terms").textContent = words.stops.length ? words.terms : "";
   byId("remark").textContent = words.remark;
   byId("report").hidden = false;
 }

@@ -16,11 +16,14 @@ export class Tools {
     return this.#worker !== null;
   }
 
-  /** Take these File objects in place of all before; what was being worked on is given up. */
+  /** Take these File objects in place of all before; what was being worked on is given up. True if all that was made of
+   * files before is gone. */
   give(files) {
     if (this.#answer) this.stop();
+    const begins = !this.open;
     this.#worker ??= this.#start();
     this.#worker.postMessage({ files });
+    return begins;
   }
 
   /** The result of a function of web/rides_guest.py: what it returns, with `made`, the bytes of the file it made.

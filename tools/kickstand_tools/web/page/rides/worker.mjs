@@ -37,7 +37,7 @@ function give(files) {
 }
 
 function call([name, ...given]) {
-  const said = JSON.parse(name === "rides" ? guest.rides(GIVEN) : guest[name](...given, tell));
+  const said = JSON.parse(name === "rides" ? guest.rides(GIVEN, ...given) : guest[name](...given, tell));
   const made = said.path && python.FS.readFile(said.path);
   postMessage({ said, made }, made ? [made.buffer] : []);
 }

@@ -1,0 +1,57 @@
+"""How long a ride was ridden, and a log that holds too little of one."""
+
+import analysis_rides
+import command
+import numpy as np
+import pytest
+from kickstand_tools.analysis import report
+from kickstand_tools.analysis.overview import overview
+from kickstand_tools.analysis.ride import open_ride
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.logs.log import Log
+
+
+def standing(seconds, shake_g, shake_dps, speed_mps=np.nan, bias_dps=0.0):
+    """A bike on its wheels, with an engine that shakes it by so much, rms."""
+    count = round(100 * seconds)
+    random = np.random.default_rng(2)
+    force = [0.0, 1.0, 0.0] + random.normal(0.0, shake_g, (count, 3))
+    rates = random.normal(bias_dps, shake_dps, (count, 3))
+    return Log(np.arange(count) / 100.0, force, rates, np.full(count, speed_mps))
+
+
+def words_of(log):
+    return report.words(overview(open_ride(log, CalibrationFile(aligned=True))))
+
+
+@pytest.mark.parametrize(
+    "log",
+    [
+        *(standing(12, 0.003, 0.1), standing(40, 0.05, 1.5)),
+        *(standing(40, 0.1, 3.0, speed_mps=0.0), standing(40, 0.05, 1.5, bias_dps=5.0)),
+    ],
+    ids=["engine off", "engine on", "engine on, with a speed", "engine on, the gyro's bias not known"],
+)
+def test_a_bike_that_stands_does_not_ride(log):
+    said = words_of(log)
+    assert said.ride[0][2] == "riding 0:00"
+    assert said.too_little == f"{said.ride[0][1]} of log, all of it standing: too little for a report."
+
+
+def test_a_ride_is_ridden_but_for_its_standing(tmp_path):
+    """Four seconds before it and four after, of 37; with a speed and without."""
+    for speed_hz in (0, 5):
+        said = words_of(analysis_rides.short(tmp_path, speed_hz=speed_hz))
+        minutes, seconds = said.ride[0][2].removeprefix("riding ").split(":")
+        ridden_s = 60 * int(minutes) + int(seconds)
+        whole, rest = said.ride[0][1].split(":")
+        assert 60 * int(whole) + int(rest) - ridden_s == pytest.approx(8, abs=2)
+        assert said.too_little == ""
+
+
+def test_a_log_that_was_cut_says_so_first(tmp_path):
+    path = analysis_rides.short(tmp_path)
+    path.write_text("\n".join(path.read_text().splitlines()[:900]) + "\n")
+    out = command.works("report", path).out
+    assert out.splitlines()[1].startswith("0:09 of log, ")
+    assert "s of it riding: too little for a report." in out.splitlines()[1]

@@ -1,0 +1,44 @@
+// What the page shows of a vehicle: the lean of a motorcycle; of a car, which does not lean, the specific force sideways.
+//
+// value: of a moment of LiveReading (rides/stream.py), > 0 to the right, null where it is not known.  limit: at the ends of
+// gauge and chart; mark: between two marks of the gauge, every second one with its number.
+
+export const LEAN = {
+  title: "Lean now",
+  none: "no lean",
+  value: ([, lean]) => lean,
+  limit: 60,
+  mark: 10,
+  chart: { title: "lean, right above", step: 30, unit: "°" },
+  digits: 0,
+  unit: "°",
+  spoken: "degrees",
+  // Beside the acceleration now
+  furthest: ["Most left", "Most right"],
+  most: ({ max_left_deg, max_right_deg }) => [max_left_deg, max_right_deg],
+};
+
+export const SIDEWAYS = {
+  title: "Sideways now",
+  none: "nothing to show",
+  value: ([, , , left]) => (left === null ? null : -left),
+  limit: 1,
+  mark: 0.25,
+  chart: { title: "sideways, right above", step: 0.5, unit: " g" },
+  digits: 2,
+  unit: " g",
+  spoken: "g",
+  furthest: ["Peak braking", "Peak acceleration"],
+  most: ({ max_brake_g, max_accel_g }) => [max_brake_g, max_accel_g],
+};
+
+/** A size with its unit. */
+export function written({ digits, unit }, value) {
+  return `${Math.abs(value).toFixed(digits)}${unit}`;
+}
+
+/** "left" or "right", "" where the size would be written as 0. */
+export function sideOf({ digits }, value) {
+  if (Number(value.toFixed(digits)) === 0) return "";
+  return value < 0 ? "left" : "right";
+}

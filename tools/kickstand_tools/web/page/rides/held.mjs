@@ -1,0 +1,71 @@
+// The files that were given to the page, what each of them is, and a button to remove each.
+
+const MANY = 8; // and the list begins closed
+
+export class Held {
+  #files = new Map(); // by name, in the order in which they were given
+  #found = { kinds: {}, why: {} };
+  #place;
+  #removed;
+
+  /** place: the <details> to show them in. removed(): is called when one was removed. */
+  constructor(place, removed) {
+    this.#place = place;
+    this.#removed = removed;
+  }
+
+  add(files) {
+    for (const file of files) {
+      this.#files.delete(file.name); // the last given of a name counts
+      this.#files.set(file.name, file);
+    }
+  }
+
+  get files() {
+    return [...this.#files.values()];
+  }
+
+  get names() {
+    return [...this.#files.keys()];
+  }
+
+  file(name) {
+    return this.#files.get(name);
+  }
+
+  /** found: {kinds: {name: what it is}, why: {name: why it cannot be used}}, as far as that is known. */
+  show(found = this.#found) {
+    this.#found = found;
+    const { kinds, why } = found;
+    const rows = this.files.map((file) => this.#row(file, kinds[file.name], why[file.name]));
+    this.#place.querySelector("ul").replaceChildren(...rows.toReversed()); // the last given first
+    const wrong = this.names.filter((name) => why[name]).length;
+    const count = rows.length === 1 ? "1 file" : `${rows.length} files`;
+    this.#place.querySelector("summary").textContent = wrong ? `${count}, ${wrong} of no use` : count;
+    if (wrong || rows.length <= MANY) this.#place.open = true;
+    this.#place.hidden = !rows.length;
+  }
+
+  #row(file, kind, why) {
+    const row = document.createElement("li");
+    const remove = document.createElement("button");
+    remove.type = "button";
+    remove.textContent = "Remove";
+    remove.ariaLabel = `Remove ${file.name}`;
+    remove.addEventListener("click", () => {
+      this.#files.delete(file.name);
+      this.#removed();
+    });
+    const name = document.createElement("strong");
+    name.textContent = file.name;
+    const words = document.createElement("span");
+    words.textContent = why ?? [kind, size(file.size)].filter(Boolean).join(", ");
+    row.classList.toggle("wrong", Boolean(why));
+    row.append(name, words, remove);
+    return row;
+  }
+}
+
+export function size(bytes) {
+  return bytes < 1e5 ? `${Math.ceil(bytes / 1e3)} kB` : `${(bytes / 1e6).toFixed(1)} MB`;
+}

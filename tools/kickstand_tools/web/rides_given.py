@@ -1,0 +1,112 @@
+"""What the files that were given to the page Rides are: logs, recordings of an app, tables, calibrations."""
+
+import re
+import zipfile
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from ..calibration.file import calibration_path, read_calibration
+from ..errors import InputError
+from ..imports import mapped
+from ..imports.files import Piece, read_pieces
+from ..imports.importing import recordings
+from ..logs.reader import check_first_line
+
+
+@dataclass
+class GivenRide:
+    """log: a file, or a folder of files that are one recording. files: all that belong to it. table: what is to be
+    asked about it, None if it is known."""
+
+    log: str
+    files: list[str]
+    calibration: str = ""
+    table: mapped.Table | None = None
+
+
+@dataclass
+class Given:
+    """rides: in the order of their names. kinds: what each file is, refused: why it is nothing that can be used."""
+
+    rides: list[GivenRide] = field(default_factory=list)
+    kinds: dict[str, str] = field(default_factory=dict)
+    refused: dict[str, InputError] = field(default_factory=dict)
+
+
+def sorted_out(names: list[str]) -> Given:
+    """What these files of the working directory are; they are named in the order in which they were given.
+
+    A ride has the calibration beside it, or else the last one given that is beside no other ride.
+    """
+    found, loose = Given(), []
+    calibrations = []
+    for name in names:
+        try:
+            if name.lower().endswith(".json"):
+                read_calibration(Path(name))
+                calibrations.append(name)
+                found.kinds[name] = "calibration"
+            elif _is_log(name):
+                found.rides.append(GivenRide(name, [name]))
+                found.kinds[name] = "log"
+            else:
+                pieces = read_pieces(Path(name))
+                if any(piece.name.endswith(".parquet") for piece in pieces):
+                    raise InputError(f"{name} is Parquet, which this page cannot read: give the ride as CSV")
+                if zipfile.is_zipfile(name):
+                    _add(found, name, [name], pieces)
+                else:
+                    loose += pieces
+        except InputError as error:
+            found.refused[name] = error
+    for name, pieces in _together(loose):
+        _add(found, name, [piece.name for piece in pieces], pieces)
+    found.rides.sort(key=lambda ride: _by_number(ride.log))
+    beside = {ride.log: calibration_path(Path(ride.log)).name for ride in found.rides}
+    free = [name for name in calibrations if name not in beside.values()]
+    for ride in found.rides:
+        ride.calibration = beside[ride.log] if beside[ride.log] in calibrations else next(reversed(free), "")
+    return found
+
+
+def _together(pieces: list[Piece]) -> Iterator[tuple[str, list[Piece]]]:
+    """(name, its pieces) of each recording among single files: the name is that of a folder where they are several."""
+    found = recordings(pieces)
+    used = {id(piece) for _, group in found for piece in group}
+    for app, group in found:
+        name = group[0].name
+        if len(group) > 1:
+            name = f"{app.NAME} recording"
+            while Path(name).exists():
+                name += "_"
+            Path(name).mkdir()
+            for piece in group:
+                Path(name, piece.name).symlink_to(Path(piece.name).readlink())
+        yield name, group
+    yield from ((piece.name, [piece]) for piece in pieces if id(piece) not in used)
+
+
+def _add(found: Given, log: str, files: list[str], pieces: list[Piece]) -> None:
+    """A ride, or why these pieces are none."""
+    known = recordings(pieces)
+    table = None if known else mapped.table_in(pieces)
+    if not known and (table is None or len(table.columns) < len(mapped.REQUIRED) or len(pieces) > 1):
+        found.refused |= dict.fromkeys(files, mapped.unknown(pieces, log))
+        return
+    found.rides.append(GivenRide(log, files, table=table))
+    found.kinds |= dict.fromkeys(files, f"of {known[0][0].NAME}" if known else "table")
+
+
+def _is_log(name: str) -> bool:
+    """As far as its first line tells."""
+    try:
+        check_first_line(Path(name))
+        return True
+    except InputError:
+        return False
+
+
+def _by_number(name: str) -> list[tuple[int, str]]:
+    """ride-2 comes before ride-10."""
+    return [(int(part or 0), "") if k % 2 else (0, part) for k, part in enumerate(re.split(r"(\d+)", name.lower()))]
