@@ -52,6 +52,15 @@ def test_channels_are_those_of_the_meter(ride, course):
     assert np.array_equal(course.trusted, trusted)
 
 
+def test_a_smoothed_ride_differs_in_its_lean_alone(ride, course):
+    smoothed = joined(open_ride(ride.log, ride.calibration, smoothed=True).blocks())
+    other = {"lean_deg", "lean_sigma_deg", "lateral_g", "sure"}
+    for name in (field.name for field in fields(Channels)):
+        same = np.array_equal(getattr(smoothed, name), getattr(course, name), equal_nan=True)
+        assert same == (name not in other), name
+    assert np.any(smoothed.trusted)
+
+
 def test_the_maxima_are_those_the_display_held(ride):
     """Block by block, in whatever blocks."""
     log = reader.read_log(ride.log)

@@ -1,5 +1,6 @@
 """kickstand demo as a user meets it: printed, in a terminal, by hand."""
 
+import functools
 import itertools
 import os
 import re
@@ -34,12 +35,12 @@ def spent_s():
     return times.children_user + times.children_system
 
 
-@pytest.fixture(scope="module", params=ENGINES)
-def printed(request):
+@functools.cache
+def printed_by(engine):
     """The demo's output where standard output is no terminal, and the seconds of processor time that it took."""
     began = spent_s()
     done = subprocess.run(
-        demo_command(request.param),
+        demo_command(engine),
         stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
@@ -50,6 +51,11 @@ def printed(request):
     assert done.returncode == 0, done.stdout + done.stderr
     assert done.stderr == ""
     return done.stdout, spent_s() - began
+
+
+@pytest.fixture(params=ENGINES)
+def printed(request):
+    return printed_by(request.param)
 
 
 def frames(text):
@@ -111,13 +117,8 @@ def test_printed_it_ends_with_shown_against_true(printed):
 
 @pytest.mark.skipif(not unix_port.available(), reason="no MicroPython for this system")
 def test_both_engines_show_the_same():
-    here, there = (
-        subprocess.run(
-            demo_command(engine), stdin=subprocess.DEVNULL, capture_output=True, encoding="utf-8", timeout=HUNG_S
-        )
-        for engine in ("cpython", "micropython")
-    )
-    assert frames(here.stdout) and here.stdout == there.stdout
+    here, there = (printed_by(engine)[0] for engine in ("cpython", "micropython"))
+    assert frames(here) and here == there
 
 
 def test_by_hand_needs_a_terminal():

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from kickstand_tools.logs.csv_lines import csv_lines, joined_cells, number_cells, text_cells
+from kickstand_tools.logs.csv_lines import csv_lines, joined_cells, number_cells, numbers_in, text_cells
 
 AWKWARD = [0.0, -0.0, -1e-9, 5e-324, 0.5, 1.5, 2.5, -0.5, 9.9999999, 99999.5, 2.0**53, -(2.0**60), 1e300]
 
@@ -43,3 +43,33 @@ def test_a_table_is_written_in_pieces():
     pieces = list(csv_lines(table, [3, 0]))
     assert len(pieces) == 3
     assert b"".join(pieces).decode() == "".join(f"{a:.3f},{b:.0f}\n".replace("nan", "") for a, b in table.tolist())
+
+
+@pytest.mark.parametrize("digits", range(8))
+def test_numbers_are_read_as_python_reads_them(digits):
+    values = numbers(digits)
+    texts = [text for text in (f"{value:.{digits}f}" for value in values.tolist()) if len(text.strip("-")) <= 15]
+    texts += ["-0.0", "7", "-12"] if digits == 0 else [f"-.{'5' * digits}", f"00.{'1' * digits}"]
+    texts = [text for text in texts if len(text.partition(".")[2]) == digits]
+    found = numbers_in("".join(f"{text},,\n" for text in texts).encode(), 3)
+    assert found is not None and len(found) == len(texts) > 1000
+    wanted = np.array([float(text) for text in texts])
+    assert np.array_equal(found[:, 0], wanted) and np.array_equal(np.signbit(found[:, 0]), np.signbit(wanted))
+    assert np.all(np.isnan(found[:, 1:]))
+
+
+def test_the_last_line_needs_no_end():
+    found = numbers_in(b"1.25,,-3\n,2,4", 3)
+    assert found is not None
+    assert np.array_equal(found, [[1.25, np.nan, -3.0], [np.nan, 2.0, 4.0]], equal_nan=True)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["1,2\n3", "1,2,3\n4\n", "1,2\n\n3,4\n", "1,2\n3,4,\n", "1.5,2\n2,2\n", "2,2\n1.5,2\n", "1.5,2\n1.25,2\n"]
+    + ["-,1\n", ".,1\n", "1-2,1\n", "--2,1\n", "1.2.3,1\n", "1e3,1\n", "1+2\n", " 1,1\n", "nan,1\n"]
+    + ["1\r,2\n", '"1",2\n', "1234567890123456,1\n", "0.1234567890123456,1\n", "1.5,2\n\u0661.5,2\n"]
+    + ["1.,0.123\n2.,55\n"],
+)
+def test_what_is_no_table_of_plain_numbers_is_left_to_another_reader(text):
+    assert numbers_in(text.encode(), 2) is None

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from kickstand_tools.errors import InputError
 from kickstand_tools.logs import reader
+from kickstand_tools.logs.csv_lines import numbers_in
 
 HEADER = command.HEADER + ",temp_c,speed_mps"
 
@@ -40,13 +41,26 @@ def test_blocks_add_up_to_the_log(tmp_path, monkeypatch, name, block_bytes):
     assert blocks[-1].done == path.stat().st_size
 
 
-def test_numpy_and_the_reader_of_cells_agree(tmp_path):
-    """A text column sends every row to the cell reader; the numbers are the same to the last bit."""
+def test_the_three_readers_of_numbers_agree(tmp_path):
+    """A number with an exponent leaves its block to numpy, a text column to the cell reader; the numbers are the same
+    to the last bit."""
+    quick = write(tmp_path / "quick.csv", [HEADER, *[row.replace("1e0", "1") for row in rows(800)]])
     plain = write(tmp_path / "plain.csv", [HEADER, *rows(800)])
     noted = write(tmp_path / "noted.csv", [HEADER + ",note", *[row + ",hello" for row in rows(800)]])
-    one, other = reader.read_log(plain), reader.read_log(noted)
-    assert np.array_equal(one.readings, other.readings)
-    assert np.array_equal(one.speed_mps, other.speed_mps, equal_nan=True)
+    assert numbers_in(quick.read_bytes().partition(b"\n")[2], 9) is not None
+    assert numbers_in(plain.read_bytes().partition(b"\n")[2], 9) is None
+    one = reader.read_log(quick)
+    for other in (reader.read_log(plain), reader.read_log(noted)):
+        assert np.array_equal(one.readings, other.readings)
+        assert np.array_equal(one.speed_mps, other.speed_mps, equal_nan=True)
+
+
+def test_rows_that_are_not_kept_leave_the_blocks_as_they_are(tmp_path):
+    path = write(tmp_path / "ride.csv", [HEADER, *rows(800)])
+    for kept, bare in zip(reader.read_blocks(path), reader.read_blocks(path, lines=False), strict=True):
+        assert len(kept.lines) == len(kept.time_us) and not bare.lines
+        assert np.array_equal(kept.readings, bare.readings) and np.array_equal(kept.time_us, bare.time_us)
+        assert len(bare.part(slice(10, 20)).time_us) == len(bare.part(bare.time_us < 50_000).time_us) == 10
 
 
 MISTAKES = {

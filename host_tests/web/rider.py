@@ -10,7 +10,7 @@ READ_S = 30  # at most, until the display says something: a busy machine starts 
 # Keeps what the board's worker sends, for tests to look at and to repeat
 KEEP = """
 const Real = Worker;
-window.seen = { displays: [], orders: [], rates: [], shift: 0, last: null };
+window.seen = { displays: [], orders: [], rates: [], shifts: [], last: null };
 window.Worker = class extends Real {
   constructor(...given) {
     super(...given);
@@ -25,7 +25,10 @@ window.Worker = class extends Real {
   }
 };
 new PerformanceObserver((list) => {
-  for (const entry of list.getEntries()) if (!entry.hadRecentInput) seen.shift += entry.value;
+  for (const entry of list.getEntries()) {
+    const moved = entry.sources.map((one) => one.node?.id || one.node?.className || one.node?.nodeName);
+    seen.shifts.push([entry.value, ...moved]);
+  }
 }).observe({ type: "layout-shift", buffered: true });
 """
 

@@ -28,6 +28,13 @@ def test_on_a_phone_everything_for_the_first_minute_is_on_its_first_screen(chrom
         assert box["y"] + box["height"] <= PHONE["viewport"]["height"], selector
     rider.page.tap("#press")
     rider.reads("Stand: hold")
+    rider.page.tap("#wire")
+    rider.told("wire is out")
+    rider.reads("No sensor")
+    assert rider.page.locator("#display").bounding_box()["y"] >= 0, "what the fault does is not in sight"
+    rider.page.tap("#power")
+    rider.told("display is dark")
+    assert rider.seen("shifts") == []
     rider.context.close()
 
 
@@ -42,7 +49,7 @@ def test_a_phone_leans_the_motorcycle(chromium, address):
     tilt(3)
     rider.page.tap("#tilt")
     rider.page.wait_for_function("document.querySelector('#tilt').ariaPressed === 'true'")
-    assert rider.page.is_checked("input[value=ride]")
+    assert rider.page.get_attribute("#pose [value=ride]", "aria-pressed") == "true"
     rider.page.wait_for_timeout(200)
     tilt(23)
     rider.page.wait_for_function("document.querySelector('#lean-out').value === '20° right'")

@@ -512,4 +512,3 @@ def assert_near(found, wanted):
         assert found == pytest.approx(wanted, abs=0.0021)
     else:
         assert found == wanted
-

@@ -92,8 +92,10 @@ def predict(x, force, rate, seconds, sums):
     acceleration = fz - sq + sideways * yaw_error
     x[LEAN] = t + (wz - sq / cq * (wx * st + wy * ct)) * seconds
     q += (wy * st - wx * ct) * seconds
-    if abs(q) > MAX_PITCH:
-        q = -MAX_PITCH if q < 0.0 else MAX_PITCH
+    if q > MAX_PITCH:
+        q = MAX_PITCH
+    elif q < -MAX_PITCH:
+        q = -MAX_PITCH
     x[PITCH] = q
     speed = v + acceleration * seconds
     x[SPEED] = speed if speed > 0.0 else 0.0

@@ -90,7 +90,7 @@ class LeanFilter:
     @property
     def variance(self):
         """Of the lean, rad^2."""
-        return self._p.rows[LEAN][LEAN] + self.trim.variance if self._p else pi * pi
+        return self._p.rows[LEAN][LEAN] + self.trim.variance if self._p is not None else pi * pi
 
     @property
     def at_rest(self):

@@ -99,7 +99,8 @@ class LeanMeter:
             return True
         if self._doubt:
             return False
-        return 0.0 <= self.filter.variance <= MAX_VARIANCE and abs(self.filter.pitch_deg) < WHEELIE_DEG
+        lean = self.filter
+        return 0.0 <= lean.variance <= MAX_VARIANCE and abs(lean.pitch_deg) < WHEELIE_DEG
 
     def keep_trim(self):
         """Take the trim found so far into the calibration, if the bike stands, the trim is certain enough and it
@@ -148,11 +149,15 @@ class LeanMeter:
                 self.filter.doubt(dt_us * 1e-6)
         if self._fresh:
             self._fresh = False
-            dt_us = 0  # nothing was before: the same on the board and in a replay
-            self._smooth(1.0)
+            dt_us, gain = 0, 1.0  # nothing was before: the same on the board and in a replay
         else:
-            self._smooth(dt_us / (SMOOTH_US + dt_us))
-        self.lean_deg = lean = self.filter.update(self.force, self.rate, dt_us) if self._leans else 0.0
+            gain = dt_us / (SMOOTH_US + dt_us)
+        force, smooth = self.force, self.smooth_force
+        smooth[2] += gain * (force[2] - smooth[2])
+        if self._smooth_all:
+            smooth[0] += gain * (force[0] - smooth[0])
+            smooth[1] += gain * (force[1] - smooth[1])
+        self.lean_deg = lean = self.filter.update(force, self.rate, dt_us) if self._leans else 0.0
         if abs(lean) >= FALLEN_DEG:
             self._flat_us += dt_us
             self.fallen = self._flat_us >= FALLEN_US
@@ -162,18 +167,11 @@ class LeanMeter:
             self.fallen = False
         if not (
             -self.max_left_deg <= lean <= self.max_right_deg
-            and -self.max_brake_g <= self.smooth_force[2] <= self.max_accel_g
+            and -self.max_brake_g <= smooth[2] <= self.max_accel_g
         ):
-            self._hold_maxima(lean, self.smooth_force[2], dt_us)
+            self._hold_maxima(lean, smooth[2], dt_us)
         elif self._over_us:
             self._hold_again()
-
-    def _smooth(self, gain):
-        force, smooth = self.force, self.smooth_force
-        smooth[2] += gain * (force[2] - smooth[2])
-        if self._smooth_all:
-            smooth[0] += gain * (force[0] - smooth[0])
-            smooth[1] += gain * (force[1] - smooth[1])
 
     def _hold_again(self):
         """The lean was within its maxima."""

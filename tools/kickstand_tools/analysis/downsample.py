@@ -25,7 +25,9 @@ def joined(parts: Iterable[Channels]) -> Channels:
                     continue
                 column = columns[k] = np.full(end, np.nan)
             if end > len(column):
-                column.resize(end + end // 8, refcheck=False)  # in place, where the system can; it fills what is new
+                longer = np.empty(2 * end)  # what is not written yet takes no memory
+                longer[:length] = column[:length]
+                column = columns[k] = longer
             column[length:end] = values
         length = end
     for column in columns:

@@ -14,7 +14,7 @@ from .channels import Channels
 from .downsample import downsampled, joined
 from .ride import Ride
 from .riding import riding_s
-from .stops.brake_test import RATE_S, Stop, find_stops
+from .stops.brake_test import RATE_S, Stop, stops_of
 from .stops.standstill import standing
 from .summary import Summary
 
@@ -76,6 +76,6 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     contradiction = mount.notice(found.roll_deg)
     exchanged = contradiction if contradiction and contradiction.code == "forward-exchanged" else None
     notices += [contradiction] if contradiction and not exchanged else []
-    stops = [] if exchanged else find_stops(course)
+    stops = [] if exchanged else stops_of(course, still)
     moved_s = min(total.riding_s, riding_s(course, still))
     return Overview(ride, total, course, stops, found, moved_s, mount.sign.correlation, exchanged, notices)

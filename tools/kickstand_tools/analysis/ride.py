@@ -56,7 +56,7 @@ class Ride:
             block = whole.believed
             if not len(block.time_us):
                 continue
-            rows = lean.follow(block)
+            rows = lean.follow(block, shown=found is None)
             if notices is not None and not told and np.any(rows[:, 2] < 0.0):
                 told = True
                 notices.append(_absurd(block, int(np.argmax(rows[:, 2] < 0.0))))
@@ -80,8 +80,8 @@ class Ride:
     ) -> Iterator[tuple[Block, Array | None]]:
         """The blocks of the log, and what smooth_blocks() gives for each, None where it is not wanted or gives none."""
         if self.smoothed:
-            return smooth_blocks(log, self.calibration, progress, notices)
-        return ((block, None) for block in read_blocks(log, progress=progress, notices=notices))
+            return smooth_blocks(log, self.calibration, progress, notices, lines=False)
+        return ((block, None) for block in read_blocks(log, progress=progress, notices=notices, lines=False))
 
 
 def open_ride(log: Source, calibration: CalibrationFile | File | None = None, smoothed: bool = False) -> Ride:
@@ -141,16 +141,21 @@ class _Lean:
     def __init__(self, calibration: CalibrationFile) -> None:
         self._along = MeterAlong(calibration)
 
-    def follow(self, block: Block) -> Array:
-        """(n, 6): lean (degrees), displayed forward force (g), variance of the lean (rad2), resting, rolling, sure."""
+    def follow(self, block: Block, shown: bool) -> Array:
+        """(n, 6): lean (degrees), displayed forward force (g), variance of the lean (rad2), resting, rolling, sure.
+
+        shown: the lean is wanted as it was shown; else it and sure are 0, which saves a tenth of the time.
+        """
+        n = len(block.time_us)
         columns: list[list[float]] = [[] for _ in range(6)]
-        leans, shown, variances, resting, rolling, sure = columns
+        lean_deg, forward, variance, resting, rolling, sure = (column.append for column in columns)
         for meter in self._along.after_each(block, *self._along.in_vehicle(block)):
             lean = meter.filter
-            leans.append(meter.lean_deg)
-            shown.append(meter.smooth_force[2])
-            variances.append(lean.variance)
-            resting.append(lean.at_rest)
-            rolling.append(lean.rolling)
-            sure.append(meter.trusted)
-        return np.column_stack(columns).astype(float)
+            forward(meter.smooth_force[2])
+            variance(lean.variance)
+            resting(lean.at_rest)
+            rolling(lean.rolling)
+            if shown:
+                lean_deg(meter.lean_deg)
+                sure(meter.trusted)
+        return np.column_stack([column or np.zeros(n) for column in columns]).astype(float)

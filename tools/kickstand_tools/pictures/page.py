@@ -51,6 +51,7 @@ def draw(size: tuple[int, int] = _LAPTOP, dark: bool = False) -> bytes:
         for _ in range(7):
             page.keyboard.press("ArrowRight")
         page.wait_for_function(_TOLD, arg="That is all")
+        page.evaluate("document.activeElement.blur()")  # without the ring around the button that has the focus
         shot = page.screenshot()
         browser.close()
         server.shutdown()

@@ -48,7 +48,7 @@ def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None 
     """The lean of a motorcycle from all readings of its ride, with a standard deviation for each sample.
 
     log: see read_log; a speed helps and is not needed. calibration: aligned, of a motorcycle. progress: called with how
-    much of the log is done of how much. Least squares over the whole ride: see model.py. Raises InputError.
+    much of the log is done of how much. Least squares over the whole ride: see equations.py. Raises InputError.
 
     >>> from kickstand_tools.api import CalibrationFile, Log, simulate_ride
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)
@@ -103,14 +103,15 @@ def smooth_blocks(
     calibration: CalibrationFile,
     progress: Progress | None = None,
     notices: list[Notice] | None = None,
+    lines: bool = True,
 ) -> Iterator[tuple[Block, Array | None]]:
-    """Each piece of the log with its values (n, COLUMNS), None where there are too few samples a second. notices: what
-    is remarkable in the log is appended to it at the end. Raises InputError."""
+    """Each piece of the log with its values (n, COLUMNS), None where there are too few samples a second. notices,
+    lines: of read_blocks(). Raises InputError."""
     _check(log, calibration)
     past: deque[Block] = deque(maxlen=CHAPTER)
     waiting: list[Block] = []
     start_c = np.nan
-    for piece in _pieces(read_blocks(log, 2, progress, notices)):
+    for piece in _pieces(read_blocks(log, 2, progress, notices, lines=lines)):
         waiting.append(piece)
         known = piece.readings[~np.isnan(piece.readings[:, 3]), 3]
         start_c = float(known[0]) if np.isnan(start_c) and len(known) else start_c

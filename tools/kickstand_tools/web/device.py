@@ -45,7 +45,7 @@ class Device:
 
         button True (down) or False; pose "kickstand", "upright" or a speed in m/s to ride at; lean degrees, > 0 to the
         right; sensor False (its wire is pulled) or True; cut_save True: the supply is cut in the middle of the next
-        save of a calibration; power False or True.
+        save of a calibration, False: it is not; power False or True.
         """
         board = self.board
         if name == "button":
@@ -64,7 +64,10 @@ class Device:
                 board.remove_sensor()
             self._plugged = value
         elif name == "cut_save":
-            board.faults.cut_file(".cal", CUT_AFTER_BYTES)
+            if value:
+                board.faults.cut_file(".cal", CUT_AFTER_BYTES)
+            else:
+                board.faults.restore_files()
         elif value:
             board.faults.restore_files()  # a save is cut once
             self.powered = True

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
+from numpy.typing import NDArray
 
 from ...logs.table import Array
 from ..channels import Channels
@@ -80,7 +81,11 @@ def find_stops(channels: Channels) -> list[Stop]:
     ('log', True, True)
     """
     ride = thinned(channels, RATE_S)
-    still = standing(ride)
+    return stops_of(ride, standing(ride))
+
+
+def stops_of(ride: Channels, still: NDArray[np.bool_]) -> list[Stop]:
+    """The same of a whole ride in means over RATE_S. still (n): True where it stands still."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], still, [False]))))
     delay_s = speed_delay_s(ride)
     found, after = [], 0

@@ -15,7 +15,7 @@ export class Board {
       data.ticks?.forEach(heard.tick);
       if (data.rate !== undefined) heard.rate(data.rate);
     };
-    this.#worker.onerror = (event) => heard.failed(event.message || "the page cannot start its worker");
+    this.#worker.onerror = (event) => heard.failed(event.message || "a file of this page cannot be loaded");
     this.#worker.addEventListener("message", ({ data }) => {
       for (const [, name, value] of data.orders ?? []) if (name === "button") heard.pressed(value);
     });

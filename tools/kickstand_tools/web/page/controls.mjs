@@ -1,11 +1,14 @@
 // The rider's hands: button, pose, lean, speed, the phone's tilt. Calls act(name, value) with what is wanted.
 
 const STEP_DEG = 5;
+const SLOWEST_KMH = 20; // to ride at
+const CRUISE_KMH = 54; // at first
 const DRAG_DEG = 75; // of lean for half the scene's width
 const TAP_MS = 150;
 
 const byId = (id) => document.getElementById(id);
-const inControl = (target) => target.closest?.("button, a, summary");
+// A pose that is chosen already has no use for the space bar
+const inControl = (target) => target.closest?.("button:not(#pose [aria-pressed=true]), a, summary");
 
 /** The push button: mouse, touch, space bar, and the click of a screen reader. press(down) is called. */
 export function connectButton(press) {
@@ -19,6 +22,9 @@ export function connectButton(press) {
     button.addEventListener(name, () => press(false));
   }
   button.addEventListener("contextmenu", (event) => event.preventDefault());
+  button.addEventListener("keydown", (event) => {
+    if (event.repeat && event.key === "Enter") event.preventDefault(); // it would press again and again
+  });
   button.addEventListener("click", (event) => {
     if (event.detail) return; // a pointer's, which has been seen to
     press(true);
@@ -37,20 +43,25 @@ export function connectButton(press) {
   addEventListener("blur", () => press(false));
 }
 
-/** Pose, lean and speed. act(name, value) as for Board.order(). */
+/**
+ * Pose, lean and speed. act(name, value) as for Board.order(). The poses are buttons and no radio buttons, whose arrow keys
+ * would change the pose: here they always lean.
+ */
 export class Steering {
   #act;
+  #poses = document.querySelectorAll("#pose button");
   #lean = byId("lean");
   #speed = byId("speed");
+  #wanted = CRUISE_KMH; // while riding
   pose = "kickstand";
 
   constructor(act) {
     this.#act = act;
-    for (const radio of document.querySelectorAll("input[name=pose]")) {
-      radio.addEventListener("change", () => this.stand(radio.value));
+    for (const button of this.#poses) {
+      button.addEventListener("click", () => button.value === this.pose || this.stand(button.value));
     }
     this.#lean.addEventListener("input", () => this.lean(Number(this.#lean.value)));
-    this.#speed.addEventListener("input", () => this.#ride());
+    this.#speed.addEventListener("input", () => this.#ride(this.#speed.value));
     addEventListener("keydown", (event) => this.#key(event));
     this.#drag(byId("scene"));
     this.#tilt(byId("tilt"));
@@ -59,13 +70,22 @@ export class Steering {
   /** pose: "kickstand", "upright" or "ride". */
   stand(pose) {
     this.pose = pose;
-    document.querySelector(`input[name=pose][value=${pose}]`).checked = true;
+    for (const button of this.#poses) button.setAttribute("aria-pressed", String(button.value === pose));
     const riding = pose === "ride";
     this.#lean.disabled = this.#speed.disabled = !riding;
-    this.#show(0);
-    if (riding) this.#ride();
-    else this.#act("pose", pose);
+    this.#speed.min = riding ? SLOWEST_KMH : 0;
+    if (riding) {
+      this.#show(0);
+      this.#ride(this.#wanted);
+    } else this.#act("pose", pose);
     this.#act("lean", 0);
+  }
+
+  /** While it stands, or comes to a stop, the sliders show what the motorcycle does. lean: degrees; speed: m/s. */
+  follow(lean, speed) {
+    if (this.pose === "ride") return;
+    this.#show(Math.round(lean));
+    this.#showSpeed(speed);
   }
 
   lean(degrees) {
@@ -75,16 +95,27 @@ export class Steering {
   }
 
   #show(degrees) {
-    this.#lean.value = degrees;
     const text = leanText(degrees, 0);
+    if (byId("lean-out").value === text) return;
+    this.#lean.value = degrees;
     byId("lean-out").value = text;
     this.#lean.setAttribute("aria-valuetext", text);
   }
 
-  #ride() {
-    byId("speed-out").value = `${this.#speed.value} km/h`;
-    this.#speed.setAttribute("aria-valuetext", `${this.#speed.value} km/h`);
-    if (this.pose === "ride") this.#act("pose", Number(this.#speed.value) / 3.6);
+  #showSpeed(speed) {
+    const text = speedText(speed);
+    if (byId("speed-out").value === text) return;
+    this.#speed.value = speed * 3.6;
+    byId("speed-out").value = text;
+    this.#speed.setAttribute("aria-valuetext", text);
+  }
+
+  /** kmh: as the slider has it, or beyond its ends. */
+  #ride(kmh) {
+    this.#speed.value = kmh;
+    this.#wanted = this.#speed.valueAsNumber;
+    this.#showSpeed(this.#wanted / 3.6);
+    this.#act("pose", this.#wanted / 3.6);
   }
 
   #key(event) {
@@ -93,10 +124,7 @@ export class Steering {
     if (!steps || this.pose !== "ride") return;
     event.preventDefault();
     if (steps[0]) this.lean(Number(this.#lean.value) + steps[0]);
-    else {
-      this.#speed.value = Number(this.#speed.value) + steps[1];
-      this.#ride();
-    }
+    else this.#ride(this.#wanted + steps[1]);
   }
 
   #drag(scene) {
@@ -137,6 +165,11 @@ export class Steering {
       } else removeEventListener("deviceorientation", follow);
     });
   }
+}
+
+/** m/s in words: "54 km/h". */
+export function speedText(speed) {
+  return `${Math.round(speed * 3.6)} km/h`;
 }
 
 /** A lean in words: "12.3° left". */

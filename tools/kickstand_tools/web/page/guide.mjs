@@ -1,73 +1,164 @@
-// What to do next, told from what the display says: the first minute, and what to look at after a fault.
+// What to do next, told from what the display shows: the first minute, and what to look at after a fault.
+
+import { shows } from "./shows.mjs";
 
 const RIDE_S = 3; // that the lean is held before the last step counts as done
 const WELL_DEG = 15;
 
-const REFUSED = /^(Moved!|Same pose|Tilt |Gyro offset|Not saved)/; // lines of firmware/kickstand/ui/messages.py
-const MENU = "→"; // begins a line of the menu
+// The pose that the firmware wants; after a refusal it is still the one before
+const WANTED = {
+  unaligned: "kickstand",
+  "ask-stand": "kickstand",
+  "take-stand": "kickstand",
+  "ask-upright": "upright",
+  "take-upright": "upright",
+  six: "six",
+};
+const PAGES = {
+  maxima: "the largest lean to each side",
+  force: "acceleration and braking, and their peaks",
+  formula: "a published formula’s lean beside ours",
+  readings: "what the sensor itself measures",
+  recording: "the time that the ride has been recorded",
+  info: "the sensor, and what is calibrated",
+};
 
-/** A step: number (1 to 4, 0 for none), text, and the action that its button does: [label, what], or none. */
+const ON_STAND = ["Put it on its stand", "kickstand"];
+const UPRIGHT = ["Hold it upright", "upright"];
+const RIDE = ["Ride", "ride"];
+
+/** A step: number (1 to 4, 5 when all are done, 0 for none), text, and its button's [label, action], or none. */
 const step = (number, text, action) => ({ number, text, action });
 
 export class Guide {
+  #wanted = "kickstand";
   #heldSince = null;
   #ridden = false;
-  #wasArmed = false;
+  #cut = false; // the power has gone in a save, and since then nothing has been ridden or aligned
+
+  /** The power has gone. inSave: in the middle of one. */
+  dark(inSave) {
+    this.#cut = inSave;
+  }
 
   /**
-   * The step that fits. lines: the display's two; shown: the lean that it shows, or null. pose: "kickstand", "upright",
-   * "ride"; standing: it has come to rest in it. state: {powered, plugged, armed (a save will be cut), time (s)}.
+   * The step that fits, or null for the one before. lines: the display's two; shown: the lean that it shows, or null.
+   * pose: "kickstand", "upright", "ride"; standing: it has come to rest in it. state: {powered, plugged, armed (a save
+   * will be cut), time (s)}.
    */
   next(lines, shown, pose, standing, state) {
-    const [first, second] = lines;
-    if (state.armed) this.#wasArmed = true;
+    const { kind } = shows(lines) ?? {};
+    this.#wanted = WANTED[kind] ?? this.#wanted;
+    if (kind === "aligned" || pose === "ride") this.#cut = false;
+    return (
+      this.#fault(kind, state) ??
+      this.#alignment(kind, lines, pose, standing) ??
+      this.#use(kind, lines, shown, pose, state)
+    );
+  }
+
+  #fault(kind, state) {
     if (!state.powered) {
-      const text = this.#wasArmed
+      const how = this.#cut
         ? "The power went when 40 bytes of the calibration were written. Is the old one still there?"
         : "The board has no power: the display is dark.";
-      return step(0, text, ["Switch it on", "power"]);
+      return step(0, how, ["Switch it on", "power"]);
     }
+    if (kind === "safe") {
+      const how = "Safe mode: the button was held while the power came on. Switch it off, and on again.";
+      return step(0, how, ["Switch it off", "power"]);
+    }
+    if (kind === "dark" || kind === "starting") return step(0, "The board starts.");
     if (!state.plugged) {
-      return step(0, "The sensor’s wire is out. The meter says so, and shows no lean that it does not know.", ["Plug it in", "wire"]);
+      const how =
+        kind === "menu"
+          ? "The sensor’s wire is out. The menu lies over the message: it closes after 20 seconds."
+          : kind === "stopped"
+            ? "The sensor’s wire is out: the meter stops the alignment."
+            : "The sensor’s wire is out. The meter says so, and shows no lean that it does not know.";
+      return step(0, how, ["Plug it in", "wire"]);
     }
-    if (first.startsWith("Sensor")) return step(0, "The sensor is there again: the firmware sets it up anew.");
-    if (first.startsWith("Raw ") || first.startsWith("On the stand")) {
-      if (pose !== "kickstand") return step(1, "Put the motorcycle on its stand first.", ["Put it on its stand", "kickstand"]);
-      if (!standing) return step(1, "The motorcycle goes onto its stand.");
-      const text = "The motorcycle leans on its stand, the sensor sits on it at any angle. Press the button.";
-      return step(1, this.#wasArmed && !state.armed ? "Nothing that was half written is believed: begin again. Press the button." : text);
-    }
-    if (first.startsWith("Stand: hold")) return step(1, "Hands off for three seconds, until the bar is full.");
-    if (first.startsWith("Now upright")) {
-      if (pose !== "upright") return step(2, "The meter knows the stand. Now hold the motorcycle upright.", ["Hold it upright", "upright"]);
-      return step(2, standing ? "Press the button once more." : "The motorcycle comes upright.");
-    }
-    if (first.startsWith("Upright: hold")) return step(2, "Keep it still, until the bar is full.");
-    if (first.startsWith("Aligned")) return step(3, "Done: the meter knows how the sensor sits. Ride!", pose === "ride" ? null : ["Ride", "ride"]);
-    if (REFUSED.test(first)) return step(0, "The meter says why it does not take this. Stand still, and press the button again.");
-    if (state.armed) return this.#save(first, second, pose);
-    if (first.startsWith("Lean")) return this.#ride(shown, pose, state);
+    if (kind === "stopped") return step(0, "The wire was out: the meter has stopped the alignment.");
+    if (kind === "fault") return step(0, "The sensor is there again: the firmware sets it up anew.");
     return null;
   }
 
-  /** How to have the firmware save a calibration, which is to be cut. */
-  #save(first, second, pose) {
-    if (pose !== "kickstand") return step(0, "The power goes in the middle of the next save. Stop for a new alignment.", ["Put it on its stand", "kickstand"]);
-    if (first.startsWith(`${MENU}Align the bike`)) return step(0, "Hold the button once more: “Align the bike” is chosen.");
-    return step(0, "Hold the button for a second: the menu comes.");
+  #alignment(kind, lines, pose, standing) {
+    const stand = this.#wanted === "kickstand";
+    const number = stand ? 1 : 2;
+    const there = stand ? ON_STAND : UPRIGHT;
+    const right = pose === this.#wanted;
+    if (kind === "six" || (kind === "spoilt" && this.#wanted === "six")) {
+      return step(0, "For these the sensor is turned by hand: not on this page. Hold the button to leave.");
+    }
+    switch (kind) {
+      case "unaligned":
+      case "ask-stand":
+        if (!right) return step(1, "Put the motorcycle on its stand first.", ON_STAND);
+        if (!standing) return step(1, "The motorcycle goes onto its stand.");
+        if (this.#cut) return step(1, "Nothing that was half written is believed: begin again. Press the button.");
+        return step(1, "The motorcycle leans on its stand, the sensor sits on it at any angle. Press the button.");
+      case "ask-upright":
+        if (!right) return step(2, "The meter knows the stand. Now hold the motorcycle upright.", UPRIGHT);
+        return step(2, standing ? "Press the button once more." : "The motorcycle comes upright.");
+      case "take-stand":
+      case "take-upright":
+        if (!right) {
+          const told = stand
+            ? "You have told the meter that the motorcycle is on its stand. Put it there."
+            : "You have told the meter that the motorcycle is upright. Hold it so.";
+          return step(number, told, there);
+        }
+        if (!standing) return step(number, "The meter waits until the motorcycle is still.");
+        if (!stand) return step(number, "Keep it still, until the bar is full.");
+        return step(number, "Hands off for three seconds, until the bar is full.");
+      case "spoilt":
+        if (!right) return step(number, "The meter says why it has not taken this pose.", there);
+        if (!standing) return step(number, "The meter says why it has not taken this pose. Wait until it is still.");
+        return step(number, "The meter says why it has not taken this pose. Press the button: once more.");
+      case "unlike":
+        if (lines[0].startsWith("Same pose")) {
+          return step(1, "Both poses were the same. Press the button, and begin again with the stand.");
+        }
+        return step(1, "The meter says why it takes neither pose. Press the button, and begin with the stand.");
+      case "aligned":
+        return step(3, "Done: the meter knows how the sensor sits. Ride!", pose === "ride" ? null : RIDE);
+      default:
+        return null;
+    }
   }
 
-  #ride(shown, pose, state) {
-    if (this.#wasArmed) {
-      this.#wasArmed = false;
-      this.#ridden = false;
+  #use(kind, lines, shown, pose, state) {
+    if (kind !== "lean" && kind !== "menu" && !PAGES[kind]) return null;
+    if (state.armed) return this.#save(kind, lines, pose);
+    if (kind === "menu") {
+      return step(0, "The menu: a press goes to the next entry, a long one takes it. It closes after 20 seconds.");
     }
-    if (pose !== "ride") return step(3, "The meter is aligned. Ride!", ["Ride", "ride"]);
+    if (kind === "info") return step(0, `This page shows ${PAGES.info}. A press leaves it.`);
+    const riding = pose === "ride";
+    const number = this.#ridden ? 5 : riding ? 4 : 3;
+    if (kind !== "lean") return step(number, `This page shows ${PAGES[kind]}. Press for the next.`, riding ? null : RIDE);
+    if (riding) return this.#ride(shown, state);
+    if (!this.#cut) return step(number, "The meter is aligned. Ride!", RIDE);
+    return step(number, "The old alignment is still there: nothing half written is believed. Ride!", RIDE);
+  }
+
+  /** How to have the firmware save a calibration, which is to be cut. */
+  #save(kind, lines, pose) {
+    if (pose !== "kickstand") {
+      return step(0, "The power goes in the middle of the next save. Stop for a new alignment.", ON_STAND);
+    }
+    if (kind !== "menu") return step(0, "Hold the button for a second: the menu comes.");
+    if (lines[0].startsWith("→Align the bike")) return step(0, "Hold the button once more: “Align the bike” is chosen.");
+    return step(0, "Press until the menu says “Align the bike”, then hold the button for a second.");
+  }
+
+  #ride(shown, state) {
     if (shown === null) return step(4, "The meter is not sure yet. It says so, rather than show a wrong lean: ride on.");
     if (Math.abs(shown) < WELL_DEG) this.#heldSince = null;
     else this.#heldSince ??= state.time;
     if (this.#heldSince !== null && state.time - this.#heldSince > RIDE_S) this.#ridden = true;
-    if (this.#ridden) return step(5, "That is all there is to it. A press turns the pages, a long one opens the menu. Or break something.");
-    return step(4, "Lean it: arrow keys, the slider, or drag the motorcycle. Compare both figures.");
+    if (this.#ridden) return step(5, "That is all. A press turns the pages, a long one opens the menu. Or break something.");
+    return step(4, "Lean it: drag the motorcycle, use the slider or the arrow keys. Compare both figures.");
   }
 }

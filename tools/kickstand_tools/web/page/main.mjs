@@ -2,42 +2,53 @@
 
 import { Bike } from "./bike.mjs";
 import { Board } from "./board.mjs";
-import { Steering, connectButton, leanText } from "./controls.mjs";
+import { Steering, connectButton, leanText, speedText } from "./controls.mjs";
 import { Display } from "./display.mjs";
+import { fetched } from "./fetched.mjs";
 import { Guide } from "./guide.mjs";
 import { keepOffline } from "./offline.mjs";
 import { Road } from "./road.mjs";
+import { shows } from "./shows.mjs";
 
 const byId = (id) => document.getElementById(id);
 const SLOW = 0.9; // of real time
 const MOST_S = 0.1; // that the road moves on from one picture to the next
 const settled = { kickstand: "kickstand", upright: "upright" };
+const FAULTS = {
+  // what its button says below its name: as it was, and while it is pressed in
+  wire: ["plugged in", "out"],
+  cut: ["not armed", "armed"],
+  power: ["on", "off"],
+};
 
 const bike = new Bike(byId("bike"));
 const road = new Road(byId("road"));
 const guide = new Guide();
-const state = { powered: true, plugged: true, armed: false, time: 0 };
+const state = { powered: true, plugged: true, armed: false, stopped: false, time: 0 };
 let display;
 let tick = { t_s: 0, lean_deg: -12, speed_mps: 0, yaw_rate_dps: 0, phase: "kickstand" };
 let screen = { text: ["", ""], shown_deg: null };
+let words = "–"; // in place of a lean that the display does not show
 let drawn = { t_s: -1 };
 let told = null;
 
 const board = new Board({
   ready() {
     byId("pose").disabled = false;
-    for (const id of ["wire", "cut", "power"]) byId(id).disabled = false;
-    keepOffline();
+    for (const id in FAULTS) byId(id).disabled = false;
+    keepOffline().then((kept) => byId("offline").classList.toggle("away", !kept));
   },
   tick(next) {
     tick = next;
     state.time = next.t_s;
     if (next.powered !== state.powered) {
       state.powered = next.powered;
+      if (!state.powered) guide.dark(state.armed);
       state.armed = false;
     }
     if (next.display) {
       screen = next.display;
+      words = shows(screen.text)?.words ?? words;
       display?.show(screen);
     }
     tell();
@@ -46,12 +57,11 @@ const board = new Board({
     byId("press").classList.toggle("down", down);
   },
   rate(rate) {
-    byId("slow").hidden = rate > SLOW;
-    byId("press-help").hidden = rate <= SLOW;
+    byId("slow").classList.toggle("away", rate > SLOW);
+    byId("press-help").classList.toggle("away", rate <= SLOW);
   },
   failed(text) {
-    byId("todo").textContent = `The simulated board has stopped: ${text}. Load the page again.`;
-    byId("do").hidden = true;
+    stop(`The simulated board has stopped: ${text}. Load the page again.`);
   },
 });
 
@@ -66,30 +76,42 @@ const actions = {
     state.plugged = !state.plugged;
     board.order("sensor", state.plugged);
   },
-  power: () => board.order("power", !state.powered),
+  power() {
+    state.armed = false; // this is not the power going in a save
+    board.order("power", !state.powered);
+  },
   cut() {
-    state.armed = true;
-    board.order("cut_save", true);
+    state.armed = !state.armed;
+    board.order("cut_save", state.armed);
   },
 };
 
-byId("do").addEventListener("click", () => actions[byId("do").dataset.action]());
-for (const id of ["wire", "cut", "power"]) byId(id).addEventListener("click", actions[id]);
+byId("do").addEventListener("click", () => {
+  actions[byId("do").dataset.action]();
+  focusPress();
+});
+for (const id in FAULTS) byId(id).addEventListener("click", actions[id]);
 // After a click with the mouse the space bar is the board's button again
 addEventListener("click", (event) => {
-  if (event.detail && event.target.matches("button:not(#press)")) event.target.blur();
+  if (event.detail && event.target.closest("button:not(#press, #do)")) document.activeElement.blur();
 });
+
+/** To where the next step is done, or the arrow keys lean: the guide's own button goes with its step. */
+function focusPress() {
+  byId("press").focus({ preventScroll: true });
+}
 
 /** The guide's step and the faults, where they have changed. */
 function tell() {
   const standing = tick.phase === settled[steering.pose];
   const step = guide.next(screen.text, screen.shown_deg, steering.pose, standing, state);
-  toggle("wire", !state.plugged, state.plugged ? "Pull the sensor’s wire" : "Plug the sensor’s wire in");
-  toggle("power", !state.powered, state.powered ? "Switch the power off" : "Switch the power on");
-  toggle("cut", state.armed, state.armed ? "The next save will be cut" : "Cut the power in a save");
-  if (!step || JSON.stringify(step) === told) return;
+  toggle("wire", !state.plugged);
+  toggle("cut", state.armed);
+  toggle("power", !state.powered);
+  if (!step || state.stopped || JSON.stringify(step) === told) return;
   told = JSON.stringify(step);
   byId("todo").textContent = step.text;
+  if (!step.action && document.activeElement === byId("do")) focusPress();
   byId("do").hidden = !step.action;
   byId("do").textContent = step.action?.[0] ?? "";
   byId("do").dataset.action = step.action?.[1] ?? "";
@@ -98,9 +120,16 @@ function tell() {
   }
 }
 
-function toggle(id, on, text) {
-  put(id, text);
-  byId(id).classList.toggle("on", on);
+function toggle(id, on) {
+  byId(id).setAttribute("aria-pressed", String(on));
+  put(`${id}-now`, FAULTS[id][Number(on)]);
+}
+
+/** What the page needs is missing, or has stopped. */
+function stop(text) {
+  state.stopped = true;
+  byId("todo").textContent = text;
+  byId("do").hidden = true;
 }
 
 function draw() {
@@ -109,8 +138,9 @@ function draw() {
     bike.draw(lean_deg, screen.shown_deg, steering.pose, speed_mps, phase === "brake");
     road.draw(speed_mps, yaw_rate_dps, Math.min(MOST_S, t_s - drawn.t_s));
     put("true-lean", leanText(lean_deg));
-    put("shown-lean", screen.shown_deg === null ? "no lean" : leanText(screen.shown_deg, 0));
-    put("speed-now", `${Math.round(speed_mps * 3.6)} km/h`);
+    put("shown-lean", screen.shown_deg === null ? words : leanText(screen.shown_deg, 0));
+    put("speed-now", speedText(speed_mps));
+    steering.follow(lean_deg, speed_mps);
     drawn = tick;
   }
   requestAnimationFrame(draw);
@@ -120,7 +150,10 @@ function put(id, text) {
   if (byId(id).textContent !== text) byId(id).textContent = text;
 }
 
-const font = await fetch("./font.json").then((answer) => answer.json());
-display = new Display(byId("display"), byId("display-said"), font);
-if (screen.codes) display.show(screen);
-draw();
+try {
+  display = new Display(byId("display"), byId("display-said"), await (await fetched("./font.json")).json());
+  if (screen.codes) display.show(screen);
+  draw();
+} catch (error) {
+  stop(`The display cannot be drawn: ${error.message}. Load the page again.`);
+}

@@ -32,9 +32,18 @@ async function forget() {
 
 async function answer(request) {
   const cache = await caches.open(CACHE);
-  const kept = await cache.match(request, { ignoreSearch: true });
+  const kept = await cache.match(named(request), { ignoreSearch: true });
   if (kept) return kept;
-  const fetched = await fetch(request); // what installs the firmware is kept once it was asked for
-  if (fetched.ok) await cache.put(request, fetched.clone());
+  const fetched = await fetch(request);
+  if (fetched.ok) {
+    // What a page loads when it is used is kept from then on, where there is room: else it is fetched again each time
+    await cache.put(request, fetched.clone()).catch(() => {});
+  }
   return fetched;
+}
+
+/** What a page is kept as: the first one without its name, because some servers forward from that name. */
+function named(request) {
+  const { pathname } = new URL(request.url);
+  return pathname === new URL("./index.html", location).pathname ? "./" : request;
 }

@@ -4,6 +4,7 @@
 // Sends {ready}, {ticks} as Device.take() gives them, {rate}: the board's seconds a second, if not all in time less than
 // 1, {orders} with the board's time of each, for whoever wants to repeat them, and {failed: text}.
 
+import { fetched } from "./fetched.mjs";
 import { loadMicroPython } from "./micropython/micropython.mjs";
 
 const PAUSE_MS = 8; // between two looks at the time
@@ -21,8 +22,8 @@ let ratedMs;
 
 async function load() {
   const [micropython, python] = await Promise.all([
-    loadMicroPython({ stdout: (line) => console.log(line), linebuffer: true }),
-    fetch("./python.json").then((answer) => answer.json()),
+    loadMicroPython({ stdout: (line) => console.log(line), linebuffer: true }).catch(missing),
+    fetched("./python.json").then((answer) => answer.json()),
   ]);
   const folders = new Set();
   for (const [name, source] of Object.entries(python)) {
@@ -39,6 +40,12 @@ async function load() {
   micropython.runPython("import sys; sys.path.insert(0, '/lib')");
   const made = micropython.pyimport("kickstand_tools.web.device").PageDevice();
   device = { order: made.order, run_to: made.run_to, take: made.take };
+}
+
+/** MicroPython says in a puzzle that the site does not give its .wasm file. */
+async function missing(error) {
+  await fetched("./micropython/micropython.wasm");
+  throw error;
 }
 
 /** Let the board's time follow ours, and send what is to be seen. */

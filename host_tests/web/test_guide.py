@@ -1,0 +1,259 @@
+"""The guide's next step, told from what the firmware really shows: the page's device runs here as fast as it can, is
+steered as a person would, and what was to be seen is shown to the page's own guide, step by step."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+from kickstand.errors import Refusal
+from kickstand.ui import messages, pages
+from kickstand_tools import firmware_path
+
+# Waits and presses of a rider, each a generator of (s, name, value); the names are those of Device.act()
+DRIVE = """
+import json, sys
+from kickstand_tools.simulated_board.fakes import cpython
+cpython.supplement()
+from kickstand_tools.web.device import PageDevice
+
+device, now, told = PageDevice(), 0.0, []
+state = {"powered": True, "plugged": True, "armed": False, "pose": "kickstand", "stage": -1}
+
+def run(seconds):
+    global now
+    now += seconds
+    device.run_to(now)
+    for tick in json.loads(device.take()):
+        cut = state["armed"] and not tick["powered"]
+        state["armed"] = state["armed"] and tick["powered"]
+        told.append({**state, **tick, "cut": cut})
+
+def press(seconds):
+    device.order("button", True)
+    run(seconds)
+    device.order("button", False)
+    run(0.4)
+
+def do(name, value):
+    if name in ("press", "wait"):
+        return press(value) if name == "press" else run(value)
+    device.order(name, value)
+    if name == "pose":
+        state["pose"] = value if isinstance(value, str) else "ride"
+    elif name not in ("lean", "button"):
+        state[{"sensor": "plugged", "power": "powered", "cut_save": "armed"}[name]] = value
+
+for stage, orders in enumerate(json.load(sys.stdin)):
+    state["stage"] = stage
+    for order in orders:
+        do(*order)
+print("\\n" + json.dumps(told))
+"""
+
+# As tell() in main.mjs
+LOOK = """async (ticks) => {
+  const { Guide } = await import("./guide.mjs");
+  const { shows } = await import("./shows.mjs");
+  const guide = new Guide();
+  let display = { text: ["", ""], shown_deg: null }, words = null, step = null, dark = false;
+  return ticks.map((tick) => {
+    display = tick.display ?? display;
+    words = shows(display.text)?.words ?? words;
+    if (!tick.powered && !dark) guide.dark(tick.cut);
+    dark = !tick.powered;
+    const standing = tick.phase === tick.pose;
+    step = guide.next(display.text, display.shown_deg, tick.pose, standing, { ...tick, time: tick.t_s }) ?? step;
+    return [tick.stage, words, step.number, step.text, step.action?.[1] ?? ""];
+  });
+}"""
+
+SHORT, LONG = ("press", 0.15), ("press", 1.2)
+STAND, UPRIGHT, RIDE = ("pose", "kickstand"), ("pose", "upright"), ("pose", 15.0)
+PULL, PLUG = ("sensor", False), ("sensor", True)
+ALIGN = [("wait", 1.5), SHORT, ("wait", 4), UPRIGHT, ("wait", 3), SHORT, ("wait", 4)]
+RIDING = [*ALIGN, RIDE, ("wait", 8), ("lean", 30), ("wait", 6)]
+
+
+@pytest.fixture(scope="module")
+def guide(chromium, address):
+    """The page's modules, without its board: what LOOK gives for a list of ticks."""
+    page = chromium.new_page()
+    page.goto(address + "licences.txt")
+    yield lambda ticks: page.evaluate(LOOK, ticks)
+    page.close()
+
+
+@pytest.fixture
+def stages(guide, tmp_path):
+    """By stage of a drive: what was last told in it (words beside the true lean, number, text, action), and all the
+    texts that were."""
+
+    def drive(*orders):
+        done = subprocess.run(
+            [sys.executable, "-c", DRIVE],
+            input=json.dumps(orders),
+            capture_output=True,
+            text=True,
+            env={"PYTHONPATH": firmware_path.search_path()},
+            cwd=tmp_path,
+            check=True,
+        )
+        last, texts = {}, {}
+        for stage, *told in guide(json.loads(done.stdout.splitlines()[-1])):
+            last[stage] = told
+            texts.setdefault(stage, set()).add(told[2])
+        return last, texts
+
+    return drive
+
+
+def expect(told, *table):
+    """table: for each stage its (words, number, part of the text, action)."""
+    last, _ = told
+    for stage, (words, number, text, action) in enumerate(table):
+        told_words, told_number, told_text, told_action = last[stage]
+        assert text in told_text, (stage, told_text)
+        assert (told_words, told_number, told_action) == (words, number, action), (stage, told_text)
+
+
+def test_a_press_while_riding_is_taken_for_the_stand(stages):
+    told = stages(
+        [RIDE, ("wait", 8)],
+        [SHORT, ("wait", 3)],
+        [("wait", 9)],
+        [STAND, ("wait", 9)],
+        [SHORT, ("wait", 4.5)],
+        [UPRIGHT, ("wait", 4)],
+    )
+    expect(
+        told,
+        ("not aligned", 1, "Put the motorcycle on its stand first", "kickstand"),
+        ("aligning", 1, "that the motorcycle is on its stand", "kickstand"),
+        ("refused", 1, "why it has not taken this pose", "kickstand"),
+        ("refused", 1, "Press the button: once more", ""),
+        ("aligning", 2, "Now hold the motorcycle upright", "upright"),
+        ("aligning", 2, "Press the button once more", ""),
+    )
+
+
+def test_the_same_pose_twice(stages):
+    told = stages(
+        [("wait", 2), SHORT, ("wait", 4.5)],
+        [SHORT, ("wait", 1)],
+        [("wait", 3.5)],
+        [SHORT],
+        [UPRIGHT, ("wait", 4)],
+        [SHORT, ("wait", 0.5)],
+    )
+    expect(
+        told,
+        ("aligning", 2, "Now hold the motorcycle upright", "upright"),
+        ("aligning", 2, "that the motorcycle is upright", "upright"),
+        ("refused", 1, "Both poses were the same", ""),
+        ("aligning", 1, "Press the button", ""),
+        ("aligning", 1, "on its stand first", "kickstand"),
+        ("aligning", 1, "that the motorcycle is on its stand", "kickstand"),
+    )
+
+
+def test_the_wire_is_pulled_while_the_menu_is_open(stages):
+    told = stages(
+        RIDING,
+        [LONG],
+        [PULL, ("wait", 2)],
+        [SHORT, ("wait", 21)],
+        [PLUG, ("wait", 0.1)],
+        [("wait", 6)],
+        [STAND, ("wait", 9), LONG, LONG, SHORT, PULL, ("wait", 1)],
+        [("wait", 3)],
+    )
+    expect(
+        told,
+        ("not sure", 5, "That is all", ""),
+        ("the menu", 0, "The menu", ""),
+        ("the menu", 0, "The menu lies over the message", "wire"),
+        ("a fault", 0, "shows no lean", "wire"),
+        ("a fault", 0, "sets it up anew", ""),
+        ("not sure", 5, "That is all", ""),
+        ("a fault", 0, "stops the alignment", "wire"),
+        ("a fault", 0, "shows no lean", "wire"),
+    )
+
+
+def test_each_page_is_named(stages):
+    told = stages(RIDING, *[[SHORT] for _ in range(5)], [LONG, *[SHORT] * 3], [LONG], [SHORT], [LONG, SHORT, LONG])
+    expect(
+        told,
+        ("not sure", 5, "That is all", ""),
+        ("maxima", 5, "the largest lean", ""),
+        ("g", 5, "acceleration and braking", ""),
+        ("formula", 5, "formula", ""),
+        ("readings", 5, "the sensor itself", ""),
+        ("not sure", 5, "That is all", ""),
+        ("the menu", 0, "The menu", ""),
+        ("sensor info", 0, "the sensor, and what is calibrated", ""),
+        ("not sure", 5, "That is all", ""),
+        ("positions", 0, "turned by hand", ""),
+    )
+
+
+def test_the_power_goes_in_a_save_or_by_its_switch(stages):
+    arm, on = ("cut_save", True), ("power", True)
+    told = stages(
+        [*RIDING, arm, ("wait", 0.1)],
+        [("cut_save", False), ("wait", 0.1)],
+        [arm, STAND, ("wait", 9)],
+        [LONG, SHORT],
+        [*[SHORT] * 5],
+        [LONG, *ALIGN],
+        [on, ("wait", 0.1)],
+        [("wait", 4)],
+        [RIDE, ("wait", 6)],
+        [("power", False), ("wait", 0.2)],
+        [("button", True), on, ("wait", 2), ("button", False), ("wait", 0.2)],
+    )
+    expect(
+        told,
+        ("not sure", 0, "Stop for a new alignment", "kickstand"),
+        ("not sure", 5, "That is all", ""),
+        ("not sure", 0, "Hold the button for a second", ""),
+        ("the menu", 0, "Press until the menu says", ""),
+        ("the menu", 0, "Hold the button once more", ""),
+        ("nothing", 0, "when 40 bytes", "power"),
+        ("nothing", 0, "The board starts", ""),
+        ("not sure", 5, "The old alignment is still there", "ride"),
+        ("not sure", 5, "", ""),
+        ("nothing", 0, "The board has no power", "power"),
+        ("safe mode", 0, "Safe mode", "power"),
+    )
+
+
+def test_a_disarmed_save_is_whole(stages):
+    last, _ = stages([("cut_save", True), ("wait", 1), ("cut_save", False), *ALIGN])
+    assert last[0][2].startswith("Done")
+
+
+FIRST_MINUTE = (
+    *("too-few", "moved", "vibration", "tilting", "saturated", "frozen-pose", "gyro-offset"),
+    *("not-one-g", "same-pose", "tilt-small", "tilt-large", "not-written", "read-back"),
+    *("no-sensor", "unknown-chip", "sensor-lost", "sensor-frozen", "sensor-silent", "sensor-reset", "readings-lost"),
+    "starting",
+)
+
+
+@pytest.mark.parametrize("code", FIRST_MINUTE)
+def test_each_refusal_and_fault_of_the_first_minute_has_its_step(guide, code):
+    """Also those that the simulated board does not come to by itself."""
+    text = [line.replace("\xdf", "°") for line in messages.lines(Refusal(code, 1, 2))]
+    tick = {"powered": True, "plugged": True, "pose": "kickstand", "phase": "kickstand", "t_s": 1.0, "stage": 0}
+    ((_, words, _, told, _),) = guide([{**tick, "display": {"text": text, "shown_deg": None}}])
+    kind = {"starting": "board starts", "a fault": "there again", "refused": "Press the button"}[words]
+    assert kind in told
+
+
+def test_a_lean_that_is_not_sure_is_no_other_page(guide):
+    tick = {"powered": True, "plugged": True, "pose": "ride", "phase": "straight", "t_s": 1.0, "stage": 0}
+    for text in pages.unsure(None), pages.unsure("mount-moved"):
+        ((_, words, number, told, _),) = guide([{**tick, "display": {"text": text, "shown_deg": None}}])
+        assert (words, number) == ("not sure", 4) and "not sure yet" in told
