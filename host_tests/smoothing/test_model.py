@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from kickstand_tools.smoothing import noise
-from kickstand_tools.smoothing.model import motion_and_measurements
+from kickstand_tools.smoothing.derivatives import by_unknowns
+from kickstand_tools.smoothing.equations import ROWS, motion_and_measurements
 from kickstand_tools.smoothing.parameters import (
     AHEAD,
     BESIDE,
@@ -124,6 +125,23 @@ def test_a_warmer_sensor_has_other_offsets():
     assert np.allclose(motion, 0.0, atol=1e-12)
     motion, _ = motion_and_measurements(one(*readings), state(), p)
     assert motion[0, LEAN] == pytest.approx(0.1)
+
+
+def test_the_derivatives_are_those_of_the_equations():
+    """By the states and by every parameter, against differences; the speed backwards and forwards."""
+    rng, n = np.random.default_rng(3), 30
+    force, rate = rng.normal(size=(2, n, 3))
+    windows = windows_of(np.linspace(0.0, 6.0, n), force, rate, rng.normal(size=n), rng.normal(size=n))
+    middle, p = 0.3 * rng.normal(size=(n, STATES)), 0.3 * rng.normal(size=(n, PARAMETERS))
+    factor = rng.uniform(0.5, 2.0, size=(ROWS, n))
+    found = by_unknowns(windows, middle, p, factor)
+    for k in range(STATES + PARAMETERS):
+        step = 1e-5 * (np.arange(STATES + PARAMETERS) == k)
+        after, before = (
+            np.concatenate(motion_and_measurements(windows, middle + sign * step[:STATES], p + sign * step[STATES:]), 1)
+            for sign in (1.0, -1.0)
+        )
+        assert np.allclose(found[:, :, k], factor.T * (after - before) / 2e-5, rtol=1e-6, atol=1e-6), k
 
 
 def test_the_upright_pose_tells_rotation_and_offset_together():

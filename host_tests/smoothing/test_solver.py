@@ -8,16 +8,27 @@ S, M, ROWS = 3, 2, 6
 
 
 def problem(blocks, length, seed=0):
-    """Random residuals: slopes (length, blocks, ROWS, S + S + M + 1), prior and drift of the parameters."""
+    """Random residuals: slopes and ends as eliminate() takes them, prior and drift of the parameters."""
     rng = np.random.default_rng(seed)
-    slopes = rng.normal(size=(length, blocks, ROWS, 2 * S + M + 1))
+    slopes = rng.normal(size=(blocks, length, ROWS, S + M + 1))
+    ends = rng.uniform(0.5, 1.5, size=(blocks, length, S))
     prior = np.column_stack((np.diag([2.0, 3.0]), [0.5, -0.3]))
-    return slopes, prior, np.array([0.01, 0.1]), rng.normal(size=(blocks - 1, M))
+    return (slopes, ends), prior, np.array([0.01, 0.1]), rng.normal(size=(blocks - 1, M))
+
+
+def by_both_ends(slopes, ends):
+    """(blocks, length, ROWS, S + S + M + 1): derivatives by the first state, the last one, the parameters, and 1."""
+    first, last = slopes[..., :S].copy(), slopes[..., :S].copy()
+    for i in range(S):
+        first[:, :, i, i] -= ends[:, :, i]
+        last[:, :, i, i] += ends[:, :, i]
+    return np.concatenate((first, last, slopes[..., S:]), axis=3)
 
 
 def at_once(slopes, prior, drift, between):
     """All states in a row, then the parameters of each block: solution and covariance of the normal equations."""
-    length, blocks = slopes.shape[:2]
+    slopes = by_both_ends(*slopes)
+    blocks, length = slopes.shape[:2]
     states = blocks * length + 1
     n = states * S + blocks * M
     normal, gradient = np.zeros((n, n)), np.zeros(n)
@@ -26,7 +37,7 @@ def at_once(slopes, prior, drift, between):
         for k in range(length):
             first = (b * length + k) * S
             places = np.concatenate((np.arange(first, first + 2 * S), own))
-            slope, residual = slopes[k, b, :, :-1], slopes[k, b, :, -1]
+            slope, residual = slopes[b, k, :, :-1], slopes[b, k, :, -1]
             normal[np.ix_(places, places)] += slope.T @ slope
             gradient[places] += slope.T @ residual
         if b == 0:
@@ -57,14 +68,14 @@ def in_ways(prior, drift, between, *more):
 def test_blocks_give_the_solution_of_the_whole_chain(blocks, length):
     slopes, prior, drift, between = problem(blocks, length)
     want, want_variances, states = at_once(slopes, prior, drift, between)
-    reduced = eliminate(slopes, S)
+    reduced = eliminate(*slopes)
     (chain,) = solve_chains(reduced.left, S, in_ways(prior, drift, between))
     found, spread = back(reduced, chain), variances(reduced, chain)
     for b in range(blocks):
         for k in range(length + 1):
             place = slice((b * length + k) * S, (b * length + k + 1) * S)
-            assert np.allclose(found[k, b], want[place], atol=1e-9)
-            assert np.allclose(spread[k, b], want_variances[place], rtol=1e-6)
+            assert np.allclose(found[b, k], want[place], atol=1e-9)
+            assert np.allclose(spread[b, k], want_variances[place], rtol=1e-6)
     assert np.allclose(chain.parameters.ravel(), want[states * S :], atol=1e-9)
 
 
@@ -72,7 +83,7 @@ def test_the_likelihood_is_that_of_the_parameters_as_a_whole():
     """Against the density of what is measured, whose covariance is that of its noise and of all unknowns."""
     slopes, prior, drift, between = problem(3, 2)
     other = drift * [9.0, 0.25]
-    left = eliminate(slopes, S).left
+    left = eliminate(*slopes).left
     found = unlikelihood(left, S, in_ways(prior, drift, between, other))
     want = [by_density(slopes, prior, one, between) for one in (drift, other)]
     assert found[1] - found[0] == pytest.approx(want[1] - want[0], rel=1e-4)
@@ -80,7 +91,8 @@ def test_the_likelihood_is_that_of_the_parameters_as_a_whole():
 
 def by_density(slopes, prior, drift, between):
     """Twice the negative logarithm of the density; flat states have a very wide density before."""
-    length, blocks = slopes.shape[:2]
+    slopes = by_both_ends(*slopes)
+    blocks, length = slopes.shape[:2]
     states = blocks * length + 1
     n = states * S + blocks * M
     rows, wide = [], 1e6
@@ -88,9 +100,9 @@ def by_density(slopes, prior, drift, between):
         for k in range(length):
             row = np.zeros((ROWS, n + 1))
             first = (b * length + k) * S
-            row[:, first : first + 2 * S] = slopes[k, b, :, : 2 * S]
-            row[:, states * S + b * M : states * S + (b + 1) * M] = slopes[k, b, :, 2 * S : -1]
-            row[:, n] = slopes[k, b, :, -1]
+            row[:, first : first + 2 * S] = slopes[b, k, :, : 2 * S]
+            row[:, states * S + b * M : states * S + (b + 1) * M] = slopes[b, k, :, 2 * S : -1]
+            row[:, n] = slopes[b, k, :, -1]
             rows.append(row)
     rows = np.concatenate(rows)
     covariance, mean = np.eye(n) * wide, np.zeros(n)
@@ -110,7 +122,7 @@ def by_density(slopes, prior, drift, between):
 
 def test_what_several_beliefs_find_lies_between_and_is_as_unsure_as_they_differ():
     slopes, prior, drift, between = problem(3, 4)
-    reduced = eliminate(slopes, S)
+    reduced = eliminate(*slopes)
     ways = in_ways(prior, drift, between, drift * 100.0)
     chains = solve_chains(reduced.left, S, ways)
     found = mixed(chains, np.array([0.75, 0.25]))

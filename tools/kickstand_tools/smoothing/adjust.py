@@ -78,7 +78,7 @@ class _Fit:
 
     def _step(self, robust: bool, judge: bool) -> float:
         """judge: what of beliefs.py counts. Returns the largest change of lean, rad. Raises LinAlgError."""
-        reduced = self._reduced(self._linearised(robust))
+        reduced = self._reduced(robust)
         if judge:
             self._judged = judged(reduced.left, STATES, self._parameters, self._before, self._unbalance)
         chain = self._solved(reduced)
@@ -101,7 +101,7 @@ class _Fit:
         known, found = self._circumstances(), self._residuals()
         self._roughness = known.roughness_of(found.values)
         self._unbalance = known.unbalance_of(found.measured[:, BALANCED], LONG_S)
-        reduced = self._reduced(self._linearised(robust=True))
+        reduced = self._reduced(robust=True)
         return np.sqrt(np.maximum(_in_a_row(variances(reduced, self._solved(reduced))), 0.0))
 
     def _circumstances(self) -> Circumstances:
@@ -114,12 +114,10 @@ class _Fit:
     def _residuals(self) -> Residuals:
         return residuals(self._circumstances(), self.states, self.each_window(), robust=True)
 
-    def _linearised(self, robust: bool) -> Array:
-        return linearised(self._circumstances(), self.states, self.each_window(), robust)
-
-    def _reduced(self, slopes: Array) -> Eliminated:
-        side_by_side = slopes.reshape(self._blocks, self._length, *slopes.shape[1:]).transpose(1, 0, 2, 3)
-        reduced = eliminate(side_by_side, STATES)
+    def _reduced(self, robust: bool) -> Eliminated:
+        slopes, ends = linearised(self._circumstances(), self.states, self.each_window(), robust)
+        side_by_side = self._blocks, self._length
+        reduced = eliminate(slopes.reshape(*side_by_side, *slopes.shape[1:]), ends.reshape(*side_by_side, STATES))
         first = np.arange(STATES, 2 * STATES)
         reduced.left[0, first, first] += 1.0 / START**2
         reduced.left[0, first[DRAWN], -1] += self.states[0, DRAWN] / START[DRAWN] ** 2
@@ -127,14 +125,13 @@ class _Fit:
 
     def _solved(self, reduced: Eliminated) -> Chain:
         known = self._judged
-        ways = beliefs(known.ways, known.place, self._parameters, self._before)
+        ways = beliefs(known.ways, self._parameters, self._before)
         return mixed(solve_chains(reduced.left, STATES, ways), known.share)
 
 
 def _in_a_row(blocks: Array) -> Array:
-    """(K + 1, B, s) with shared ends -> (B K + 1, s)."""
-    s = blocks.shape[2]
-    return np.concatenate((blocks[:-1].transpose(1, 0, 2).reshape(-1, s), blocks[-1:, -1]))
+    """(B, K + 1, s) with shared ends -> (B K + 1, s)."""
+    return np.concatenate((blocks[:, :-1].reshape(-1, blocks.shape[2]), blocks[-1, -1:]))
 
 
 def _at_edges(values: Array) -> Array:

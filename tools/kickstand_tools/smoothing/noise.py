@@ -1,4 +1,4 @@
-"""How large the errors of the motion and of the measurements of model.py are, and every parameter of that.
+"""How large the errors of the motion and of the measurements of equations.py are, and every parameter of that.
 
 Symbol = default  # unit: what it is. Standard deviations are 1 sigma. A disturbance that lasts tau seconds, measured in
 each window of T seconds, gets the variance sigma^2 2 tau / T, because measurements that share an error must not count
@@ -135,7 +135,7 @@ class Circumstances:
         return found
 
     def roughness_of(self, residual: Array) -> Array:
-        """(n): how large errors are around each window. residual (n, STATES + MEASURED): what model.py gives."""
+        """(n): how large errors are around each window. residual (n, STATES + MEASURED): values of Residuals."""
         squares = np.mean((residual[:, TELLING] / EXPECTED) ** 2, axis=1) * self.roughness**2
         share = averaged(self.riding.astype(float), ROUGHNESS_S)
         found = averaged(np.where(self.riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)

@@ -21,6 +21,7 @@ BESIDE = 19  # g: level force to the side that lasts, by wind; see beliefs.py
 DELAY = 20  # s: of the log's speed
 DIVE = 21  # rad per m/s^2: of the nose in braking
 CAMBER = 22  # g: force to the side on straights, where a cambered road meets the tyres beside their middle
+OF_BIKE = slice(16, 23)  # those from HEIGHT on: not the sensor's
 OFFSET_PER_C, BIAS_PER_C = slice(23, 26), slice(26, 29)  # g and rad/s per C, see Windows.warm
 PARAMETERS = 29
 
@@ -36,7 +37,7 @@ for _place, _usual, _sigma in (
     (AHEAD, 0.6, 0.5),
     (TYRES, 0.07, 0.06),
     (BESIDE, 0.0, 0.001),
-    (CAMBER, 0.0, 0.0035),
+    (CAMBER, 0.0, 0.0055),  # of usual tyres, 0.12, on a road that falls to the side by 2.6 degrees
     (DELAY, 0.4, 0.4),
     (DIVE, np.radians(0.2), np.radians(0.2)),
 ):

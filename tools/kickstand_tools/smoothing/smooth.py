@@ -48,7 +48,7 @@ def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None 
     """The lean of a motorcycle from all readings of its ride, with a standard deviation for each sample.
 
     log: see read_log; a speed helps and is not needed. calibration: aligned, of a motorcycle. progress: called with how
-    much of the log is done of how much. Least squares over the whole ride: see model.py. Raises InputError.
+    much of the log is done of how much. Least squares over the whole ride: see equations.py. Raises InputError.
 
     >>> from kickstand_tools.api import CalibrationFile, Log, simulate_ride
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)

@@ -19,8 +19,8 @@ from ..logs.table import Array
 
 @dataclass
 class Eliminated:
-    """Blocks without their inner states. gains (K - 1, B, s, s + s + m + 1): each inner state is minus this times the
-    next state, the block's first one, its parameters and 1. covariances (K - 1, B, s, s): of what that leaves open.
+    """Blocks without their inner states. gains (B, K - 1, s, s + s + m + 1): each inner state is minus this times the
+    next state, the block's first one, its parameters and 1. covariances (B, K - 1, s, s): of what that leaves open.
     left (B, s + s + m, s + s + m + 1): the normal equations of x_K, x_0, p; the last column is the gradient."""
 
     gains: Array
@@ -28,32 +28,52 @@ class Eliminated:
     left: Array
 
 
-def eliminate(slopes: Array, s: int) -> Eliminated:
-    """slopes (K, B, r, s + s + m + 1): derivatives of a window's residuals by its first state, its last one and the
-    parameters, and the residuals themselves."""
-    count, blocks, _, width = slopes.shape
-    known = np.zeros((blocks, width, width))  # of x_k, x_0, p, 1: what the windows before k say
-    first = np.matmul(slopes[0].transpose(0, 2, 1), slopes[0])
-    order = np.r_[s : 2 * s, 0:s, 2 * s : width]  # x_1, x_0, p, 1
-    known[:] = first[:, order][:, :, order]
-    gains = np.empty((count - 1, blocks, s, width))
-    covariances = np.empty((count - 1, blocks, s, s))
-    rest = np.r_[0:s, 2 * s : width]  # x_k+1, p, 1 in the order of what is left
+def eliminate(slopes: Array, ends: Array) -> Eliminated:
+    """slopes (B, K, r, s + m + 1): derivatives of the residuals of a window by its states, the same for its first and
+    its last one, and by the parameters, and the residuals. ends (B, K, s): what the derivative of the first s residuals
+    by the last state, each by its own, has in addition, and that by the first state has less."""
+    (blocks, count, _, width), s = slopes.shape, ends.shape[2]
+    ties = np.empty((blocks, count - 1, s, s + width))  # of a state x_k, which is eliminated, to x_k+1, x_0, p, 1
+    gains, covariances = np.empty_like(ties), np.empty((blocks, count - 1, s, s))
+    begin, across, last = _window(slopes[:, 0], ends[:, 0])
+    own, tied = last[:, :, :s], np.concatenate((across.transpose(0, 2, 1), last[:, :, s:]), axis=2)
     for k in range(1, count):
-        normal = np.matmul(slopes[k].transpose(0, 2, 1), slopes[k])
-        inner = normal[:, :s, :s] + known[:, :s, :s]
-        across = np.empty((blocks, s, width))
-        across[:, :, :s] = normal[:, :s, s : 2 * s]
-        across[:, :, s:] = known[:, :s, s:]
-        across[:, :, 2 * s :] += normal[:, :s, 2 * s :]
-        covariance = np.linalg.inv(inner)
-        gain = np.matmul(covariance, across)
-        after = -np.matmul(across.transpose(0, 2, 1), gain)
-        after[:, s:, s:] += known[:, s:, s:]
-        after[:, rest[:, None], rest] += normal[:, s:, s:]
-        known = after
-        gains[k - 1], covariances[k - 1] = gain, covariance
-    return Eliminated(gains, covariances, known[:, :-1])
+        first, across, last = _window(slopes[:, k], ends[:, k])
+        tie = ties[:, k - 1]
+        tie[:, :, :s], tie[:, :, s:] = across, tied
+        tie[:, :, 2 * s :] += first[:, :, s:]
+        covariances[:, k - 1] = np.linalg.inv(own + first[:, :, :s])
+        gain = np.matmul(covariances[:, k - 1], tie, out=gains[:, k - 1])
+        passed = np.matmul(tie[:, :, :s].transpose(0, 2, 1), gain)
+        own, tied = last[:, :, :s] - passed[:, :, :s], -passed[:, :, s:]
+        tied[:, :, s:] += last[:, :, s:]
+    # what ties x_0, p and 1 to each other is a sum over the windows: two large products instead of two a window
+    left = np.zeros((blocks, s + width, s + width))
+    left[:, :s, :s], left[:, :s, s:], left[:, s:, :s] = own, tied, tied.transpose(0, 2, 1)
+    left[:, s : 2 * s, s:], left[:, 2 * s :, s : 2 * s] = begin, begin[:, :, s:].transpose(0, 2, 1)
+    common, tie, gain = (_in_rows(one)[:, :, s:] for one in (slopes, ties, gains))
+    left[:, 2 * s :, 2 * s :] = np.matmul(common.transpose(0, 2, 1), common)
+    left[:, s:, s:] -= np.matmul(tie.transpose(0, 2, 1), gain)
+    return Eliminated(gains, covariances, left[:, :-1])
+
+
+def _in_rows(values: Array) -> Array:
+    """(B, K, r, w) -> (B, K r, w)"""
+    return values.reshape(len(values), -1, values.shape[-1])
+
+
+def _window(slopes: Array, ends: Array) -> tuple[Array, Array, Array]:
+    """Normal equations of one window of each block: of its first state by itself, p, 1 (B, s, s + m + 1), by the last
+    state (B, s, s), and of its last state by itself, p, 1."""
+    s = ends.shape[1]
+    middle = np.matmul(slopes[:, :, :s].transpose(0, 2, 1), slopes)
+    change = ends[:, :, None] * slopes[:, :s]
+    turned, square = change[:, :, :s].transpose(0, 2, 1), ends[:, :, None] ** 2 * np.eye(s)
+    first, last = middle - change, middle + change
+    across = first[:, :, :s] + turned - square
+    first[:, :, :s] += square - turned
+    last[:, :, :s] += square + turned
+    return first, across, last
 
 
 @dataclass
@@ -81,43 +101,46 @@ class Beliefs:
 
 
 def _forward(left: Array, s: int, beliefs: Beliefs) -> tuple[list[Array], list[Array], Array, Array]:
-    """From block to block: gains and inverses (G, s + m, ...) of each, the normal equations (G, s, s + 1) of the last
-    state, and (G): twice the negative logarithm of how likely the ride is, but for a constant."""
+    """From block to block: gains (G, s + m, s + m + 1) and inverses (G, s + m, s + m) of each, the normal equations
+    (G, s, s + 1) of the last state, and (G): twice the negative logarithm of how likely the ride is, but for a
+    constant."""
     blocks, m = len(left), left.shape[1] - 2 * s
     ways, n = len(beliefs.drift), s + m
-    keep = np.r_[s : 2 * s + m]  # x_0, p
-    known = np.zeros((ways, n, n + 1))
+    known = np.zeros((ways, n, n + 1))  # of x_0, p, 1
     known[:, s:, s:] = beliefs.prior
     inside = np.arange(s, n)
     gains, inverses = [], []
     before, pull = beliefs.prior[:, :, :m], beliefs.prior[:, :, m:]
     unlikely = np.sum(pull * np.linalg.solve(before, pull), axis=(1, 2)) - np.linalg.slogdet(before)[1]
     for b in range(blocks):
-        whole = left[b]
-        inner = whole[np.ix_(keep, keep)] + known[:, :, :n]
-        gradient = whole[keep, -1] + known[:, :, n]
-        across = np.zeros((ways, n, n + 1))  # by the next block's x_0, p, and 1
-        across[:, :, :s], across[:, :, n] = whole[keep, :s], gradient
-        known = np.zeros((ways, n, n + 1))
-        known[:, :s, :s], known[:, :s, n] = whole[:s, :s], whole[:s, -1]
+        weight, gap = np.zeros((ways, m)), np.zeros(m)  # what ties p to the next block's
         if b < blocks - 1:
             weight, gap = 1.0 / beliefs.drift[:, b], beliefs.between[b]
-            inner[:, inside, inside] += weight
-            across[:, inside, inside] = -weight
-            across[:, inside, n] -= weight * gap
-            known[:, inside, inside] = weight
-            known[:, inside, n] = weight * gap
             unlikely += np.sum(weight * gap**2 - np.log(weight), axis=1)
+        whole = known + left[b, s:, s:]
+        gradient = whole[:, :, n]
+        gradient[:, s:] -= weight * gap
+        inner = whole[:, :, :n]
+        inner[:, inside, inside] += weight
         inverse = np.linalg.inv(inner)
-        gain = inverse @ across
+        by_last = left[b, :s, s:-1]  # of x_K, which is tied to x_0 and p; the next p to p alone, by -weight
+        gain = np.empty((ways, n, n + 1))  # by x_K, the next p, 1
+        gain[:, :, :s] = inverse @ by_last.T
+        gain[:, :, s:n] = -weight[:, None] * inverse[:, :, s:]
+        gain[:, :, n] = (inverse @ gradient[:, :, None])[:, :, 0]
+        unlikely += np.linalg.slogdet(inner)[1] - np.sum(gradient * gain[:, :, n], axis=1)
+        known[:, :s] = -by_last @ gain
+        known[:, :s, :s] += left[b, :s, :s]
+        known[:, :s, n] += left[b, :s, -1]
+        known[:, s:] = weight[:, :, None] * gain[:, s:]
+        known[:, inside, inside] += weight
+        known[:, s:, n] += weight * gap
         gains.append(gain)
         inverses.append(inverse)
-        known -= across[:, :, :n].transpose(0, 2, 1) @ gain
-        unlikely += np.linalg.slogdet(inner)[1] - np.sum(across[:, :, n] * gain[:, :, n], axis=1)
     end = known[:, :s, :s]
     solved = np.linalg.solve(end, known[:, :s, n:])[:, :, 0]
     unlikely += np.linalg.slogdet(end)[1] - np.sum(solved * known[:, :s, n], axis=1)
-    return gains, inverses, known[:, :s], unlikely
+    return gains, inverses, known[:, :s, [*range(s), n]], unlikely
 
 
 def unlikelihood(left: Array, s: int, beliefs: Beliefs) -> Array:
@@ -128,30 +151,22 @@ def unlikelihood(left: Array, s: int, beliefs: Beliefs) -> Array:
 def solve_chains(left: Array, s: int, beliefs: Beliefs) -> list[Chain]:
     """What is found by each of the beliefs. left: of eliminate()."""
     gains, inverses, last, _ = _forward(left, s, beliefs)
-    return [
-        _backward([one[g] for one in gains], [one[g] for one in inverses], last[g], s) for g in range(len(last))
-    ]
-
-
-def _backward(gains: list[Array], inverses: list[Array], last: Array, s: int) -> Chain:
-    blocks, n = len(gains), len(gains[0])
-    end = np.linalg.inv(last[:, :s])
-    first, parameters = np.empty((blocks + 1, s)), np.empty((blocks, n - s))
-    joint = np.empty((blocks, s + n, s + n))
-    first[blocks] = -end @ last[:, -1]
-    following = np.concatenate((first[blocks], np.zeros(n - s)))
-    spread = np.zeros((n, n))
-    spread[:s, :s] = end
+    blocks, (ways, n, _) = len(gains), gains[0].shape
+    first, parameters = np.empty((ways, blocks + 1, s)), np.empty((ways, blocks, n - s))
+    joint = np.empty((ways, blocks, s + n, s + n))
+    following, spread = np.zeros((ways, n, 1)), np.zeros((ways, n, n))  # of the next x_0, p
+    spread[:, :s, :s] = np.linalg.inv(last[:, :, :s])
+    following[:, :s] = -spread[:, :s, :s] @ last[:, :, s:]
+    first[:, blocks] = following[:, :s, 0]
     for b in range(blocks - 1, -1, -1):
-        gain = gains[b][:, :n]
-        here = -gain @ following - gains[b][:, n]
+        gain = gains[b][:, :, :n]
         cross = -gain @ spread
-        covariance = inverses[b] - cross @ gain.T
-        joint[b, :s, :s], joint[b, s:, :s], joint[b, :s, s:] = spread[:s, :s], cross[:, :s], cross[:, :s].T
-        joint[b, s:, s:] = covariance
-        first[b], parameters[b] = here[:s], here[s:]
-        following, spread = here, covariance
-    return Chain(first, parameters, joint)
+        joint[:, b, :s, :s], joint[:, b, s:, :s] = spread[:, :s, :s], cross[:, :, :s]
+        joint[:, b, :s, s:] = cross[:, :, :s].transpose(0, 2, 1)
+        following = -gain @ following - gains[b][:, :, n:]
+        spread = joint[:, b, s:, s:] = inverses[b] - cross @ gain.transpose(0, 2, 1)
+        first[:, b], parameters[:, b] = following[:, :s, 0], following[:, s:, 0]
+    return [Chain(*one) for one in zip(first, parameters, joint)]
 
 
 def mixed(chains: list[Chain], share: Array) -> Chain:
@@ -167,30 +182,31 @@ def mixed(chains: list[Chain], share: Array) -> Chain:
 
 
 def back(eliminated: Eliminated, chain: Chain) -> Array:
-    """(K + 1, B, s): the changes of all states of each block."""
+    """(B, K + 1, s): the changes of all states of each block."""
     gains, s = eliminated.gains, chain.first.shape[1]
-    states = np.empty((len(gains) + 2, len(chain.parameters), s))
-    states[0], states[-1] = chain.first[:-1], chain.first[1:]
-    common = np.concatenate((chain.first[:-1], chain.parameters, np.ones((len(chain.parameters), 1))), axis=1)
-    fixed = np.einsum("kbij,bj->kbi", gains[:, :, :, s:], common)
-    for k in range(len(gains), 0, -1):
-        states[k] = -np.matmul(gains[k - 1, :, :, :s], states[k + 1][:, :, None])[:, :, 0] - fixed[k - 1]
+    states = np.empty((len(gains), gains.shape[1] + 2, s))
+    states[:, 0], states[:, -1] = chain.first[:-1], chain.first[1:]
+    common = np.concatenate((chain.first[:-1], chain.parameters, np.ones((len(gains), 1))), axis=1)
+    fixed = np.matmul(_in_rows(gains)[:, :, s:], common[:, :, None]).reshape(gains.shape[:3])
+    for k in range(gains.shape[1], 0, -1):
+        following = states[:, k + 1, :, None]
+        states[:, k] = -np.matmul(gains[:, k - 1, :, :s], following)[:, :, 0] - fixed[:, k - 1]
     return states
 
 
 def variances(eliminated: Eliminated, chain: Chain) -> Array:
-    """(K + 1, B, s): of all states of each block."""
+    """(B, K + 1, s): of all states of each block."""
     gains, joint, s = eliminated.gains, chain.joint, chain.first.shape[1]
-    found = np.empty((len(gains) + 2, len(joint), s))
-    found[0] = np.einsum("bii->bi", joint[:, s : 2 * s, s : 2 * s])
-    found[-1] = np.einsum("bii->bi", joint[:, :s, :s])
+    found = np.empty((len(gains), gains.shape[1] + 2, s))
+    found[:, 0] = np.einsum("bii->bi", joint[:, s : 2 * s, s : 2 * s])
+    found[:, -1] = np.einsum("bii->bi", joint[:, :s, :s])
     common = joint[:, s:, s:]
     spread = joint.copy()  # of x_k+1, x_0, p
-    for k in range(len(gains), 0, -1):
-        gain = gains[k - 1, :, :, :-1]
+    for k in range(gains.shape[1], 0, -1):
+        gain = gains[:, k - 1, :, :-1]
         row = -np.matmul(gain, spread)  # x_k with x_k+1, x_0, p
-        own = eliminated.covariances[k - 1] - np.matmul(row, gain.transpose(0, 2, 1))
-        found[k] = np.einsum("bii->bi", own)
+        own = eliminated.covariances[:, k - 1] - np.matmul(row, gain.transpose(0, 2, 1))
+        found[:, k] = np.einsum("bii->bi", own)
         spread = np.empty_like(joint)
         spread[:, :s, :s], spread[:, :s, s:] = own, row[:, :, s:]
         spread[:, s:, :s], spread[:, s:, s:] = row[:, :, s:].transpose(0, 2, 1), common
