@@ -29,10 +29,10 @@ def words_of(log):
 @pytest.mark.parametrize(
     "log",
     [
-        *(standing(12, 0.003, 0.1), standing(40, 0.05, 1.5)),
+        *(standing(0.02, 0.003, 0.1), standing(12, 0.003, 0.1), standing(40, 0.05, 1.5)),
         *(standing(40, 0.1, 3.0, speed_mps=0.0), standing(40, 0.05, 1.5, bias_dps=5.0)),
     ],
-    ids=["engine off", "engine on", "engine on, with a speed", "engine on, the gyro's bias not known"],
+    ids=["two samples", "engine off", "engine on", "engine on, with a speed", "engine on, the gyro's bias not known"],
 )
 def test_a_bike_that_stands_does_not_ride(log):
     said = words_of(log)
