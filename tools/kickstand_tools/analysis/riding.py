@@ -27,7 +27,7 @@ def _has_moved(ride: Channels) -> bool:
     if np.any(~np.isnan(ride.speed_mps)):
         return bool(np.nanmax(ride.speed_mps) > MOVES_MPS)
     half = round(0.5 * OVER_S / spacing_s(ride))
-    if len(ride.t_s) <= max(1, 2 * half):
+    if len(ride.t_s) <= 2 * half:
         return False
     inner = slice(half, len(ride.t_s) - half)  # at its ends a mean is mostly that of the first or the last sample
     turns, pushes = (smoothed(values, ride.t_s, OVER_S)[inner] for values in (ride.yaw_rate_dps, ride.forward_g))
