@@ -201,3 +201,18 @@ def test_the_terms_that_measurements_take_from_the_model():
     assert model.yaw_rate == pytest.approx(rate[0] * math.sin(t) + rate[1] * math.cos(t))
     assert model.sideways == pytest.approx(v * rate[1])
     assert model.acceleration == pytest.approx(force[2] - math.sin(q) + v * rate[1] * x[YAW_ERROR])
+
+
+@pytest.mark.parametrize("lean", [-0.6, 0.0, 0.6])
+@pytest.mark.parametrize("pitch", [-0.2, 0.2])
+def test_what_the_yaw_error_shows_of_the_pitch_is_no_lean_of_the_bike(lean, pitch):
+    """(7): the vertical along the bike's axes, then along those of a sensor that is turned about up."""
+    yaw_error = 0.1
+    left, up, forward = math.cos(pitch) * math.sin(lean), math.cos(pitch) * math.cos(lean), math.sin(pitch)
+    s, c = math.sin(yaw_error), math.cos(yaw_error)
+    left, forward = c * left + s * forward, c * forward - s * left
+    x = np.zeros(STATES)
+    x[[LEAN, PITCH, YAW_ERROR]] = math.atan2(left, up), math.asin(forward), yaw_error
+    share = Linearisation(x, np.zeros(3), 0.0).lean_by_pitch(x)
+    assert x[LEAN] - share == pytest.approx(lean, abs=math.radians(0.25))
+    assert abs(x[LEAN] - lean) > math.radians(0.75)

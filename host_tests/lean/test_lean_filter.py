@@ -113,6 +113,20 @@ def test_a_pose_that_was_not_upright_is_found_in_turns_without_a_straight():
     assert np.abs(np.mean(error[110 * HZ :])) < 0.3
 
 
+def test_in_a_wheelie_a_sensor_that_is_turned_about_up_shows_no_lean():
+    """30 degrees of pitch would be 2.5 of lean with the forward axis 5 degrees to the side."""
+    t = np.arange(35 * HZ) / HZ
+    speed = 3.0 * np.clip(t - 10.0, 0.0, 8.0)
+    pitch = np.radians(30.0) * np.clip(3.0 - np.abs(t - 28.0), 0.0, 1.0)
+    force, rate = balanced(35.0, np.zeros(len(t)), speed)
+    push = force[:, 2] + np.sin(pitch)
+    turned = np.radians(5.0)
+    force = np.column_stack((turned * push, np.cos(pitch) + speed * np.gradient(pitch, t) / GRAVITY_MPS2, push))
+    rate[:, 0] = -np.gradient(pitch, t)
+    rate[:, 2] = -turned * rate[:, 0]
+    assert np.abs(leans(force, rate)[20 * HZ :]).max() < 1.0
+
+
 def test_a_given_speed_helps_where_the_ride_began_unseen():
     """Power-on on a straight, a second before a turn: with a speed the lean is right at once."""
     lean, speed = held_turns(120.0)

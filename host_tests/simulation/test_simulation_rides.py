@@ -100,6 +100,14 @@ def test_each_profile_has_what_it_is_named_for(rides):
     assert np.abs(np.mean(windy.truth["lean_deg"][straight])) > 1.8
 
 
+@pytest.mark.parametrize("name", ["held", "corners", "weight"])
+def test_a_rider_who_moves_about_does_not_tilt_a_bike_on_its_stand(rides, name):
+    made = rides[name]
+    lean = made.truth["lean_deg"]
+    assert np.ptp(lean[made.phase == "kickstand"]) < 0.02
+    assert np.ptp(lean[(made.phase == "standing") & (made.truth["speed_mps"] == 0.0)]) < 1.5
+
+
 def test_the_sensor_feels_one_g_at_rest_and_the_rates_of_the_truth(rides):
     made = rides["street"]
     force, rates = felt(made)

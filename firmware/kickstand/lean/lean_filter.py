@@ -50,17 +50,16 @@ class LeanFilter:
                 self._kept.append((i, self._p.rows[i][i]))
         self._x = x
         self._p = None
+        self._upright = self.trim.angle  # LEAN of a bike that is upright
         self._rest = RestDetector(not self._kept)
         self._given_speed = self._told_speed = None  # the latest, until a window takes it; the one before
         self._told_s = 0.0  # since the one before
         self._work = None
         self._pieces = 1  # of the work, in each sample
         self._sums = [0.0] * 9  # see predict()
-        self._count = 0
-        self._window_us = 0
+        self._count = self._window_us = 0
         self._axis = 0  # of the gyro, whose bias is measured next at rest
-        self._roll_rate = 0.0
-        self._last_roll_rate = 0.0
+        self._roll_rate = self._last_roll_rate = 0.0
 
     def doubt(self, seconds):
         """The readings of so many seconds are lost: what the bike did meanwhile is not known."""
@@ -120,7 +119,7 @@ class LeanFilter:
             self._end_window()
         if self._p is None:
             return degrees(atan2(sums[5], sums[6]))
-        return degrees(x[LEAN] + self._delay_s * self._roll_rate - self.trim.angle)
+        return degrees(x[LEAN] + self._delay_s * self._roll_rate - self._upright)
 
     def _end_window(self):
         """The work on the window before is done: begin with the means of this one."""
@@ -130,8 +129,7 @@ class LeanFilter:
         for i in range(9):
             self._sums[i] = 0.0
         self._pieces = PIECES if self._window_us > n * SLOW_STEP_US else 1
-        self._count = 0
-        self._window_us = 0
+        self._count = self._window_us = 0
         x = self._x
         if self._p is None:
             self._start(means)
@@ -177,6 +175,7 @@ class LeanFilter:
         x[LEAN] = atan2(fx, fy)
         x[PITCH] = _possible_pitch(atan2(fz, sqrt(fx * fx + fy * fy)))
         x[SPEED] = 0.0
+        self._upright = self.trim.angle
         p.set_variance(LEAN, measurements.SIGMA_STAND**2)
         p.set_variance(PITCH, measurements.SIGMA_STAND**2)
         p.set_variance(SPEED, measurements.SIGMA_REST_SPEED**2)
@@ -212,7 +211,7 @@ class LeanFilter:
         for measurement in measurements.forces(model, means, roll_acceleration, self._force_error):
             yield from p.update(*measurement)
         yield from p.update(*measurements.level_road(model, x, seconds))
-        lean, speed, given = x[LEAN] - self.trim.angle, x[SPEED], self._given_speed
+        lean, speed, given = x[LEAN] - self._upright, x[SPEED], self._given_speed
         self._told_s += seconds
         if given is not None:
             # By the given speeds alone: an acceleration that a wrong pitch feigns must not make them count for less.
@@ -224,12 +223,11 @@ class LeanFilter:
         certain = p.rows[SPEED][SPEED] < measurements.SIGMA_TRIM_SPEED**2
         certain = certain and p.rows[LEAN][LEAN] < measurements.SIGMA_TRIM_LEAN**2
         if certain and model.speed > measurements.STRAIGHT_MIN_SPEED:
-            sideways = (means[5] - model.acceleration * x[YAW_ERROR]) / max(means[6], 0.5)
+            sideways = (means[5] - means[7] * x[YAW_ERROR]) / max(means[6], 0.5)
             self.trim.update(sideways, x[LEAN], model.yaw_rate, seconds)
 
     def _inject(self, model):
-        """Put the corrections into the state. Adjust the innovations that were summed up during the calculation too:
-        they were measured against the old state."""
+        """Put the corrections into the state, and into the innovations summed up meanwhile against the old state."""
         p, x, sums = self._p, self._x, self._sums
         for j, h in model.left_row:
             sums[0] -= self._count * h * p.correction[j]
@@ -239,6 +237,8 @@ class LeanFilter:
             x[i] += p.take_correction(i)
         x[SPEED] = max(0.0, x[SPEED])
         x[PITCH] = _possible_pitch(x[PITCH])
+        if not self._rest.resting:  # there the force tells: of a sensor in the hand any yaw error may be believed
+            self._upright = self.trim.angle + model.lean_by_pitch(x)
         if x[LEAN] > pi:
             x[LEAN] -= 2 * pi
         elif x[LEAN] < -pi:

@@ -57,6 +57,7 @@ GIVEN_SPEED_LATE_S = 1.0  # s: how late it may be. Larger: it counts for less wh
 # Assumptions that take the place of measurements
 SIGMA_SLOPE = radians(1.6)  # rad: of roads' slopes. Larger: slopes are followed better, turns told from them worse.
 SLOPE_S = 3.0  # s: how long a slope lasts; fitted, real ones last longer. Larger: as for SIGMA_SLOPE.
+STEEP = radians(6.0)  # rad: such a slope counts half as much, twice it a fifth. Larger: wheelies pass for slopes.
 # Riding straight is all three: less lean than this, less yaw rate than this, more speed than this.
 STRAIGHT_MAX_LEAN = radians(8.0)  # rad. Larger: the lean of wide turns is drawn towards upright.
 STRAIGHT_MAX_RATE = radians(2.5)  # rad/s, about the vertical. Larger: the lean of slow turns is drawn towards upright.
@@ -68,7 +69,7 @@ USUAL_SPEED_S = 60.0  # s: how long a speed lasts. Larger: less pull towards USU
 
 # Standing still
 SIGMA_STAND = radians(0.5)  # rad: of lean and pitch by the force on coming to rest. Larger: later forces count more.
-SIGMA_REST_RATE = radians(0.05)  # rad/s: of the gyro. Larger: bias is found later.
+SIGMA_REST_RATE = radians(0.1)  # rad/s: of a bike that feet hold. Larger: bias is found later.
 SIGMA_REST_FORCE = 0.02  # g: of the force, with the engine idling. Larger: lean settles later.
 REST_FORCE_SHARE = 0.1  # of 1: weight of a window in the mean force at rest. Larger: found sooner, less steady.
 SIGMA_REST_SPEED = 0.02 / STANDARD_GRAVITY  # g s: of a speed of zero. Larger: it is less surely zero.
@@ -104,9 +105,10 @@ def forces(model, means, roll_acceleration, force_error):
 
 
 def level_road(model, x, seconds):
-    """Roads are level on average, (6)."""
+    """Roads are level on average, (6), but a steep pitch may be a wheelie."""
     innovation = -x[PITCH] - x[YAW_ERROR] * model.sin_lean
-    return model.level_row, innovation, SIGMA_SLOPE**2 * 2 * SLOPE_S / seconds
+    steep = innovation / STEEP
+    return model.level_row, innovation, SIGMA_SLOPE**2 * (1.0 + steep * steep) * 2 * SLOPE_S / seconds
 
 
 def straight_or_usual_speed(lean, speed, yaw_rate, seconds):

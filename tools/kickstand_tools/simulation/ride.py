@@ -14,7 +14,7 @@ from .physics.chip import DIVIDER, RATE_HZ, Chip
 from .physics.engine import Engine
 from .physics.kinematics import Motion, body_rates, specific_force
 from .physics.road import Shaking, add_bumps, profile_slope, shaking
-from .physics.signals import band_noise, second_order, smoothed
+from .physics.signals import band_noise, second_order, smoothed, smoothstep
 from .plan import Conditions, Plan
 from .profiles import PROFILES
 
@@ -129,7 +129,8 @@ def _motion(
 ) -> tuple[Motion, Shaking]:
     n, rate = len(command.time), command.rate_hz
     command.crosswind += conditions.gust_mps2 * band_noise(chance, n, 0.05, 0.5, rate)
-    command.hang += conditions.sway_m * band_noise(chance, n, 0.02, 0.3, rate)
+    # A rider who moves about leans a bike that rides, not one on its stand or on the rider's feet.
+    command.hang += conditions.sway_m * band_noise(chance, n, 0.02, 0.3, rate) * smoothstep(command.speed / 5.0)
     rolled = balance.roll(command, bike, balance.weave(chance, command, conditions.unrest_deg))
     surface = profile_slope(chance, float(command.distance[-1]) + 10.0, conditions.roughness)
     for phase, spacing, height, length in conditions.bumps:
