@@ -68,7 +68,7 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
             yield replace(block, **dict.fromkeys(_NOT_KEPT, np.full(len(block.t_s), np.nan)))
 
     course = joined(downsampled(blocks(), RATE_S))
-    if total.speed_mps.time_s is None:  # always 0, as with a wheel's contact torn off: it must not say that the bike stood
+    if total.speed_mps.time_s is None:  # always 0, as of a torn wheel contact: it must not say that the bike stood
         course = replace(course, speed_mps=np.broadcast_to(np.nan, len(course.t_s)))
     frozen_s = sum(float(notice.values[1]) for notice in notices if notice.code == "frozen-readings")
     # Of a stretch the notice tells more than its own.
