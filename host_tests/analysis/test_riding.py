@@ -9,6 +9,8 @@ from kickstand_tools.analysis.overview import overview
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
+from kickstand_tools.logs.reader import read_log
+from kickstand_tools.logs.stretch import Stretch
 
 
 def standing(seconds, shake_g, shake_dps, speed_mps=np.nan, bias_dps=0.0):
@@ -27,15 +29,22 @@ def words_of(log):
 @pytest.mark.parametrize(
     "log",
     [
-        *(standing(12, 0.003, 0.1), standing(40, 0.05, 1.5)),
+        *(standing(0.02, 0.003, 0.1), standing(12, 0.003, 0.1), standing(40, 0.05, 1.5)),
         *(standing(40, 0.1, 3.0, speed_mps=0.0), standing(40, 0.05, 1.5, bias_dps=5.0)),
     ],
-    ids=["engine off", "engine on", "engine on, with a speed", "engine on, the gyro's bias not known"],
+    ids=["two samples", "engine off", "engine on", "engine on, with a speed", "engine on, the gyro's bias not known"],
 )
 def test_a_bike_that_stands_does_not_ride(log):
     said = words_of(log)
     assert said.ride[0][2] == "riding 0:00"
     assert said.too_little == f"{said.ride[0][1]} of log, all of it standing: too little for a report."
+
+
+def test_a_knock_as_the_log_begins_is_no_ride():
+    """As of the hand that switches it on: 0.4 g for 0.02 s, which are 0.008 g over a second."""
+    log = standing(40, 0.05, 1.5)
+    log.accel_g[:2, 2] = 0.4
+    assert words_of(log).ride[0][2] == "riding 0:00"
 
 
 def test_a_ride_is_ridden_but_for_its_standing(tmp_path):
@@ -47,6 +56,26 @@ def test_a_ride_is_ridden_but_for_its_standing(tmp_path):
         whole, rest = said.ride[0][1].split(":")
         assert 60 * int(whole) + int(rest) - ridden_s == pytest.approx(8, abs=2)
         assert said.too_little == ""
+
+
+def test_a_speed_that_is_always_0_hides_no_ride(tmp_path):
+    """As that of a wheel whose contact is off: the time on the move is that of a ride without a speed."""
+    log = read_log(analysis_rides.short(tmp_path))
+    without = words_of(log)
+    log.speed_mps[::20] = 0.0
+    said = words_of(log)
+    assert (said.ride[0], said.too_little) == (without.ride[0], "")
+    assert said.stops or said.remark == "no speed in the log: stops cannot be told"
+
+
+def test_a_stretch_without_speed_that_goes_straight_on_is_ridden():
+    """On a road that shakes, at a speed that does not change: not enough to say that a whole log stood still."""
+    assert words_of(Stretch(standing(40, 0.05, 1.5), 5.0, 30.0)).too_little == ""
+
+
+def test_a_stretch_of_one_sample_that_rests_has_a_report():
+    said = words_of(Stretch(standing(12, 0.003, 0.1), 11.985))
+    assert said.too_little == "0:00 of log, all of it standing: too little for a report."
 
 
 def test_a_log_that_was_cut_says_so_first(tmp_path):

@@ -168,6 +168,23 @@ def test_a_table_that_nobody_knows_is_met_with_the_line_to_type(tmp_path, monkey
     assert api.read_log("RIDE.csv").accel_g[0] == pytest.approx(riding().phone_g[0], abs=1e-4)
 
 
+@pytest.mark.parametrize(
+    ("names", "units"),
+    [
+        ("time,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps,speed_mps", "a=g,g=deg/s,speed=m/s"),
+        ("time,ax,ay,az,gx_rads,gy_rads,gz_rads,speed_kmh", "a=m/s2,g=rad/s,speed=km/h"),
+        ("t,a_x (m/s^2),a_y,a_z,g_x (deg/s),g_y,g_z,Speed (mph)", "a=m/s2,g=deg/s,speed=mph"),
+        ("t,ax,ay,az,gx,gy,gz,speed", "a=m/s2,g=rad/s,speed=km/h"),
+    ],
+)
+def test_the_line_to_type_has_the_units_that_stand_in_the_names(tmp_path, names, units):
+    """And the form of the page Rides, which has no other default for a speed than what is proposed here."""
+    path = tmp_path / "log.csv"
+    path.write_text(names + "\n" + "0,0,1,0,0,0,0,3\n" * 3)
+    line = command.refused(tmp_path, "import", path, "--out", tmp_path / "R.csv", words="not a file of an app")
+    assert line.rstrip().endswith(f"--units {units}")
+
+
 def test_what_a_table_lacks_is_said(tmp_path):
     (tmp_path / "log.csv").write_text("time,ax,ay,az,speed\n0,0,1,0,3\n1,0,1,0,3\n")
     line = command.refused(

@@ -153,6 +153,9 @@ def test_the_commands_say_it(tmp_path):
     assert len(analysis_rides.table(exported)) == len(rows) - 199
     seen = overview(open_ride(ride))
     assert not np.any((seen.course.t_s > 13.1) & (seen.course.t_s < 14.9))
+    stretch = ("--from", "13.5", "--to", "14.5")
+    for arguments in ("report",), ("plot", "--out", tmp_path / "pictures"):
+        command.refused(tmp_path, arguments[0], ride, *arguments[1:], *stretch, words="all readings are frozen")
 
 
 @pytest.mark.parametrize("engine", ["cpython", "micropython"])

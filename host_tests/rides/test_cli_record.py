@@ -187,6 +187,13 @@ def test_a_car_shows_g_and_no_lean(aligned, streaming, tmp_path, monkeypatch):
     assert len(read_log(tmp_path / "ride.csv").time_us) > 100
 
 
+def test_a_disturbed_byte_in_the_name_of_the_vehicle_ends_no_recording(streaming, tmp_path):
+    board = streaming(half_seconds(3)[0], "ctrl-c")
+    board.serial.data = b"vehicle \xff\r\n" + board.serial.data
+    command.works("record", "--out", tmp_path / "ride.csv")
+    assert len(read_log(tmp_path / "ride.csv").time_us) > 100
+
+
 def at_rest(count, seed=0):
     """As ride_writer.turns(), upright on a quiet stand."""
     for i in range(count):

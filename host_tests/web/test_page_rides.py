@@ -233,6 +233,7 @@ def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):
     [
         ("picture.png", b"\x89PNG\r\n\x1a\n" + bytes(8), "picture.png: not text: give what an app has exported"),
         ("table.csv", b"lat,lon\n1,2\n", "table.csv: not a file of an app that is known, and no table of sensors"),
+        ("made", b"as what was made is called", "made: not a file of an app that is known"),
         ("note.txt", b"Time flies, so speed,\nand more of it\n", "note.txt: not a file of an app that is known"),
         ("empty.csv", b"", "empty.csv holds no recording: give the file, the folder or the zip"),
         ("slow.csv", b"t_s,ax_g,ay_g,az_g\n0,0,1,0\n", "and no gyro found in it: needed are a time, the acceleration"),
@@ -258,6 +259,18 @@ def test_what_is_no_ride_is_told_in_one_line_and_does_not_spoil_the_next(
         page.give(ride)
         assert words in page.add(path)
         assert page.page.is_visible("#align")  # the ride still waits for its calibration
+
+
+def test_a_file_that_cannot_be_read_does_not_spoil_the_others(page, ride, calibration, tmp_path):
+    """A folder, and one that is written anew after it was given; both fail in the same way."""
+    path = tmp_path / "written.csv"
+    path.write_bytes(ride.read_bytes())
+    page.give(path)
+    path.write_text("anew, and of another length")
+    assert page.add(ride, calibration) == ""
+    assert page.page.inner_text("#report-title") == "RIDE.csv"
+    assert "written.csv cannot be read: it is a folder, or was changed" in page.held()["written.csv"]
+    assert "not a file of an app" in page.add(path)
 
 
 def test_files_come_in_any_order_one_by_one_and_go(page, ride, calibration, tmp_path):

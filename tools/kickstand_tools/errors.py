@@ -9,8 +9,8 @@ from .remedies import COMMANDS, Remedies
 class InputError(Exception):
     """Something that the user has given cannot be used. Its text is one line: what is wrong, and what to do.
 
-    what: what is wrong, and what to do where that is the same for everybody; remedy: a name in remedies.COMMANDS of
-    what to do, and the values in its words.
+    what: what is wrong, and what to do about it if the command line and the pages say that in the same words. If not,
+    remedy: the name in remedies.py of what to do, and values: what is put into its words for {0}, {1} ...
     """
 
     def __init__(self, what: str, remedy: str = "", *values: str) -> None:

@@ -25,7 +25,7 @@ def joined(parts: Iterable[Channels]) -> Channels:
                     continue
                 column = columns[k] = np.full(end, np.nan)
             if end > len(column):
-                longer = np.empty(2 * end)  # what is not written yet takes no memory
+                longer = np.empty(2 * end)  # what is not written yet takes no memory, but in a browser
                 longer[:length] = column[:length]
                 column = columns[k] = longer
             column[length:end] = values

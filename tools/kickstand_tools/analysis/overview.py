@@ -68,6 +68,8 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
             yield replace(block, **dict.fromkeys(_NOT_KEPT, np.full(len(block.t_s), np.nan)))
 
     course = joined(downsampled(blocks(), RATE_S))
+    if total.speed_mps.time_s is None:  # always 0, as of a torn wheel contact: it must not say that the bike stood
+        course = replace(course, speed_mps=np.broadcast_to(np.nan, len(course.t_s)))
     frozen_s = sum(float(notice.values[1]) for notice in notices if notice.code == "frozen-readings")
     # Of a stretch the notice tells more than its own.
     total.frozen_s = min(frozen_s, total.missing_s) if isinstance(ride.log, Stretch) else frozen_s
@@ -77,5 +79,5 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     exchanged = contradiction if contradiction and contradiction.code == "forward-exchanged" else None
     notices += [contradiction] if contradiction and not exchanged else []
     stops = [] if exchanged else stops_of(course, still)
-    moved_s = min(total.riding_s, riding_s(course, still))
+    moved_s = min(total.riding_s, riding_s(course, still, whole=not isinstance(ride.log, Stretch)))
     return Overview(ride, total, course, stops, found, moved_s, mount.sign.correlation, exchanged, notices)

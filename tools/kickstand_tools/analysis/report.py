@@ -26,6 +26,7 @@ STOPS_TERMS = (
     "jerk: how fast the deceleration changes, at most. pulls: how far the bike ends beside its straight line."
 )
 
+
 @dataclass
 class Words:
     """What a report says. name: of the log. too_little: that the log holds too little of a ride, or "". ride: rows of

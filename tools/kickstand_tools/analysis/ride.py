@@ -50,7 +50,7 @@ class Ride:
     ) -> Iterator[Channels]:
         """The ride without the readings that froze: they are a gap. progress, notices: of read_blocks(). mount: is
         given all of the log, also where the ride is a stretch of it. Raises InputError."""
-        lean, told, slow = _Lean(self.calibration), False, False
+        lean, told, slow, some = _Lean(self.calibration), False, False, False
         log, stretch = apart(self.log)
         for whole, found in self._read(log, progress, notices):
             block = whole.believed
@@ -68,10 +68,15 @@ class Ride:
             seen = channels(block, self.calibration, rows, self.car)
             if mount is not None:
                 mount.add(seen.t_s, seen.force_g, seen.rate_dps, seen.speed_mps)
-            if stretch is None:
-                yield seen
-            elif (which := stretch.holds(block)).any():
-                yield seen.part(which)
+            if stretch is not None:
+                which = stretch.holds(block)
+                if not which.any():
+                    continue
+                seen = seen.part(which)
+            some = True
+            yield seen
+        if not some:
+            raise InputError(f"{self.name}: all readings are frozen, so that nothing is known: check the sensor")
         if slow and notices is not None:
             notices.append(Notice("smooth-slow"))
 

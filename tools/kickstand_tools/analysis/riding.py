@@ -15,9 +15,10 @@ TURNS_DPS, PUSHES_G = 3.0, 0.05
 MOVES_MPS = 1.0
 
 
-def riding_s(ride: Channels, standing: NDArray[np.bool_]) -> float:
-    """Seconds. ride: with evenly spaced samples (see downsampled()); standing (n): True where it stands still."""
-    if not _has_moved(ride):
+def riding_s(ride: Channels, standing: NDArray[np.bool_], whole: bool = True) -> float:
+    """Seconds. ride: with evenly spaced samples (see downsampled()); standing (n): True where it stands still. whole:
+    not a stretch of a ride, in which a vehicle may go straight on, or keep to one turn, from beginning to end."""
+    if whole and not _has_moved(ride):
         return 0.0
     return float(np.count_nonzero(~standing)) * spacing_s(ride)
 
@@ -25,12 +26,14 @@ def riding_s(ride: Channels, standing: NDArray[np.bool_]) -> float:
 def _has_moved(ride: Channels) -> bool:
     if np.any(~np.isnan(ride.speed_mps)):
         return bool(np.nanmax(ride.speed_mps) > MOVES_MPS)
-    if ride.t_s[-1] - ride.t_s[0] < OVER_S:
+    half = round(0.5 * OVER_S / spacing_s(ride))
+    if len(ride.t_s) <= 2 * half:
         return False
-    return _changes(ride.yaw_rate_dps, ride.t_s) > TURNS_DPS or _changes(ride.forward_g, ride.t_s) > PUSHES_G
+    inner = slice(half, len(ride.t_s) - half)  # at its ends a mean is mostly that of the first or the last sample
+    turns, pushes = (smoothed(values, ride.t_s, OVER_S)[inner] for values in (ride.yaw_rate_dps, ride.forward_g))
+    return _changes(turns) > TURNS_DPS or _changes(pushes) > PUSHES_G
 
 
-def _changes(values: Array, t_s: Array) -> float:
-    """By how much the mean over OVER_S differs from the usual one: a gyro's bias, or the slope of the ground."""
-    slow = smoothed(values, t_s, OVER_S)
-    return float(np.max(np.abs(slow - np.median(slow))))
+def _changes(means: Array) -> float:
+    """By how much they differ from the usual one, at most: that is a gyro's bias, or the slope of the ground."""
+    return float(np.max(np.abs(means - np.median(means))))

@@ -96,12 +96,17 @@ def table_in(pieces: list[Piece]) -> Table | None:
     numbers = max((_numbers(cells_of(line)) for line in lines[1:3]), default=0)
     if numbers < (FEWEST_NUMBERS if found else len(REQUIRED)):
         return None
-    stated = {key: unit_in(found.get(key, "")) for key in ("ax", "gx")}
-    units = {"a": stated["ax"] if unit(stated["ax"]) in ACCELERATIONS else "m/s2"}
-    units["g"] = stated["gx"] if unit(stated["gx"]) in RATES else "rad/s"
-    if "speed" in found and unit(unit_in(found["speed"])) not in SPEEDS:
-        units["speed"] = "km/h"
+    units = {"a": _seems_in(found.get("ax", ""), ACCELERATIONS, "m/s2")}
+    units["g"] = _seems_in(found.get("gx", ""), RATES, "rad/s")
+    if "speed" in found:
+        units["speed"] = _seems_in(found["speed"], SPEEDS, "km/h")
     return Table(piece.name, columns, found, units)
+
+
+def _seems_in(column: str, kinds: Mapping[str, float], usual: str) -> str:
+    """The one of kinds that stands in brackets or behind the last _ of a column's name, else the usual one."""
+    stated = (unit(unit_in(column)), unit(column.rpartition("_")[2]))
+    return next((name for name in stated if name in kinds), usual)
 
 
 def unknown(pieces: list[Piece], source: str) -> InputError:

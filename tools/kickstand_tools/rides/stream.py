@@ -40,11 +40,14 @@ CHANGED = "the board's calibration has changed: the log ends here"
 @dataclass(frozen=True)
 class LiveReading:
     """A block of half a second. aligned: the board's sensor is.  car: the board is set to a vehicle that does not lean.
+
     moments: at each turn of the board's loop (s since the recording began, lean in degrees > 0 to the right, specific
-    force forward and to the left in g); the lean is None where it is not known well enough to be shown, and of a car;
-    the force where the sensor is not aligned, the one to the left also of a motorcycle.  max_left_deg, max_right_deg,
-    max_accel_g, max_brake_g: as on the display, since the recording began, 0 before there is one.  rate_hz: turns a
-    second.  seconds: since the recording began."""
+    force forward in g, and to the left in g). What is not known is None: all three before the sensor is aligned, and
+    the lean where it is too uncertain to be shown. A car has no lean, and of a motorcycle the force to the left is left
+    out, because it is near 0 in a bend.
+
+    max_left_deg, max_right_deg, max_accel_g, max_brake_g: as on the display, since the recording began, 0 before there
+    is one.  rate_hz: turns a second.  seconds: since the recording began."""
 
     aligned: bool
     car: bool
@@ -148,7 +151,7 @@ def blocks(transport: SerialTransport, name: str, notes: list[str], stopped: thr
     vehicle = ""
     for line in _lines(transport, name, notes, stopped):
         if line.startswith(_VEHICLE):
-            vehicle = line.removeprefix(_VEHICLE).decode()
+            vehicle = line.removeprefix(_VEHICLE).decode(errors="replace")  # a byte may be disturbed
             continue
         if line != b".":
             parts.append(line)

@@ -31,7 +31,7 @@ from ..smoothing.smooth import smooth_to_csv
 from .rides_given import sorted_out
 
 PLOTLY = "./plotly/plotly.min.js"  # the page of a ride loads it from the site
-MADE = Path("made")  # beside what was given
+MADE = Path("../made")  # not where what was given is: that may have any name
 TOO_LONG = "this ride is too long for the memory of a browser: give a part of it"
 
 
@@ -59,9 +59,7 @@ def rides(given, names):
     be used}}.
     """
     for old in Path().iterdir():
-        if old != MADE:
-            shutil.rmtree(old) if old.is_dir() else old.unlink()
-    MADE.mkdir(exist_ok=True)
+        shutil.rmtree(old) if old.is_dir() else old.unlink()
     names = json.loads(names)
     for name in names:
         Path(name).symlink_to(Path(given, name))
@@ -150,7 +148,7 @@ def _made(log, name):
 
 def _one_line(text):
     """Without the folder of what was made: nobody knows of it."""
-    return re.sub(rf"\b{MADE}/[^/]*/", "", " ".join(text.split()))
+    return re.sub(rf"{re.escape(str(MADE))}/[^/]*/", "", " ".join(text.split()))
 
 
 def raising(function):

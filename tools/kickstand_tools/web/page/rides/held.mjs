@@ -1,6 +1,7 @@
 // The files that were given to the page, what each of them is, and a button to remove each.
 
 const MANY = 8; // and the list begins closed
+const UNREADABLE = "it is a folder, or was changed or moved after it was given. Give it again, or what is in the folder";
 
 export class Held {
   #files = new Map(); // by name, in the order in which they were given
@@ -25,8 +26,13 @@ export class Held {
     return [...this.#files.values()];
   }
 
-  get names() {
-    return [...this.#files.keys()];
+  /** Those of the files that the browser can read. The others are left in {name: why not} of `why`. */
+  async readable(why) {
+    const tried = await Promise.allSettled(this.files.map((file) => file.slice(0, 1).arrayBuffer()));
+    return this.files.filter(({ name }, k) => {
+      if (tried[k].status === "rejected") why[name] = `${name} cannot be read: ${UNREADABLE}`;
+      return tried[k].status === "fulfilled";
+    });
   }
 
   file(name) {
@@ -39,7 +45,7 @@ export class Held {
     const { kinds, why } = found;
     const rows = this.files.map((file) => this.#row(file, kinds[file.name], why[file.name]));
     this.#place.querySelector("ul").replaceChildren(...rows.toReversed()); // the last given first
-    const wrong = this.names.filter((name) => why[name]).length;
+    const wrong = this.files.filter(({ name }) => why[name]).length;
     const count = rows.length === 1 ? "1 file" : `${rows.length} files`;
     this.#place.querySelector("summary").textContent = wrong ? `${count}, ${wrong} of no use` : count;
     if (wrong || rows.length <= MANY) this.#place.open = true;

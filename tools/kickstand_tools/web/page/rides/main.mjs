@@ -26,9 +26,14 @@ export async function openRide(files) {
 async function sortOut(added) {
   held.show();
   await work("Loading Python, 8 MB the first time …", async () => {
+    const mine = turn;
     await keptOffline();
-    if (tools.give(held.files)) [rides, looked] = [[], null]; // what was made of them is gone
-    return tools.call("rides", JSON.stringify(held.names));
+    const unreadable = {};
+    const files = await held.readable(unreadable);
+    if (mine !== turn) return; // a later one has given the worker its files
+    if (tools.give(files)) [rides, looked] = [[], null]; // what was made of them is gone
+    const found = await tools.call("rides", JSON.stringify(files.map(({ name }) => name)));
+    return { ...found, why: { ...found.why, ...unreadable } };
   }, async (found) => {
     rides = found.rides.map(kept);
     held.show(found);

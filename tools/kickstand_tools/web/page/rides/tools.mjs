@@ -56,7 +56,7 @@ export class Tools {
       const { resolve, reject } = this.#answer;
       this.#answer = null;
       if (data.failed || data.said.refused) reject(new Error(data.failed ?? data.said.refused));
-      else resolve(Array.isArray(data.said) ? data.said : { ...data.said, made: data.made });
+      else resolve({ ...data.said, made: data.made });
       if (data.failed) this.stop(); // Python does not go on after an error of its own
     };
     worker.onerror = (event) => {
