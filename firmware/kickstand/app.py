@@ -128,7 +128,9 @@ class App:
             self._take(n, dt_us, now_ms)
         if self.drive:
             self._poll_speed(now_ms)
-        self.sensor.check(now_ms)
+        page_due = ticks_diff(now_ms, self._page_ms) >= 0
+        if page_due:
+            self.sensor.check(now_ms)
         if self.sensor.fault is not None:
             self.clock.restart()
             self.screen.interrupt(now_ms)
@@ -137,7 +139,7 @@ class App:
         event = self.button.poll(now_ms)
         if event:
             self.screen.press(event, now_ms)
-        if ticks_diff(now_ms, self._page_ms) >= 0:
+        if page_due:
             self._show(now_ms)
         self.lcd.tick(now_ms)
         if self.recorder and self.recorder.active:  # recording() would cost 20 us

@@ -76,6 +76,13 @@ def test_a_fault_of_a_moment(engine, fault, aligned):
     assert record.ends == ["off"]
 
 
+def test_a_sample_that_a_supply_dip_has_torn_is_not_shown(aligned):
+    dips = [["supply_dip", [FAULT_S + 1.013 * k, "torn"]] for k in range(20)]
+    record = devices.run("cpython", aligned, standing(dips, until=30))
+    assert set(record.leans(0, 30)) == {STATIC}
+    assert record.first("Sensor reset", FAULT_S) < FAULT_S + 0.3
+
+
 def test_a_who_am_i_misread_is_read_again(aligned):
     """Or it would look for the calibration of a chip that is not there."""
     record = devices.run("cpython", aligned, standing([["corrupt", [0x68, 1, 0, 0x10]]], until=3))

@@ -68,7 +68,8 @@ class Faults:
     def supply_dip(self, at_s, leaves="asleep"):
         """The sensor's supply drops for a moment, and its configuration is lost.
 
-        leaves: "asleep" (data 0), "frozen" (asleep, the last data) or "default_ranges" (awake, other scales).
+        leaves: "asleep" (data 0), "frozen" (asleep, the last data), "default_ranges" (awake, other scales) or "torn"
+        (asleep, and the frame that was being read ends in garbage).
         """
         self._board.at(at_s, lambda: self._board.sensor.supply_dip(leaves))
 

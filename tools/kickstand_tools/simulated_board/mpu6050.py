@@ -51,13 +51,15 @@ class Mpu6050:
             self._start_sampling(self._busy_us + reg.WAKE_US)
 
     def supply_dip(self, leaves="asleep"):
-        """A short loss of supply. It leaves the chip "asleep" (data 0), "frozen" (asleep, the last data) or awake with
-        "default_ranges"."""
+        """A short loss of supply. It leaves the chip "asleep" (data 0), "frozen" (asleep, the last data), awake with
+        "default_ranges", or asleep and the frame "torn" that was being read: its rates are garbage."""
         self._update()
         data = bytes(self._regs[reg.ACCEL_XOUT_H : reg.GYRO_ZOUT_L + 1])
         self.power_on()
         if leaves == "frozen":
             self._regs[reg.ACCEL_XOUT_H : reg.GYRO_ZOUT_L + 1] = data
+        elif leaves == "torn":
+            self.fifo.push_all(data[:8] + b"\x18" * 6, range(14))
         elif leaves == "default_ranges":
             self._busy_us = self.clock.now_us
             self._regs[reg.PWR_MGMT_1] = 0x01
