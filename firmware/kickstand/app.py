@@ -128,8 +128,7 @@ class App:
             self._take(n, dt_us, now_ms)
         if self.drive:
             self._poll_speed(now_ms)
-        page_due = ticks_diff(now_ms, self._page_ms) >= 0
-        if page_due:
+        if ticks_diff(now_ms, self._page_ms) >= 0:  # twice: one more local puts this frame on the heap
             self.sensor.check(now_ms)
         if self.sensor.fault is not None:
             self.clock.restart()
@@ -139,7 +138,7 @@ class App:
         event = self.button.poll(now_ms)
         if event:
             self.screen.press(event, now_ms)
-        if page_due:
+        if ticks_diff(now_ms, self._page_ms) >= 0:
             self._show(now_ms)
         self.lcd.tick(now_ms)
         if self.recorder and self.recorder.active:  # recording() would cost 20 us
