@@ -128,7 +128,7 @@ class App:
             self._take(n, dt_us, now_ms)
         if self.drive:
             self._poll_speed(now_ms)
-        if ticks_diff(now_ms, self._page_ms) >= 0:  # twice: one more local puts this frame on the heap
+        if ticks_diff(now_ms, self._page_ms) >= 0:  # asked twice: a local would put this frame on the heap
             self.sensor.check(now_ms)
         if self.sensor.fault is not None:
             self.clock.restart()

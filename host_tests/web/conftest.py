@@ -1,10 +1,13 @@
-"""The site on a server of its own. Where it cannot be put together, its tests are skipped."""
+"""The site on a server of its own, and the page Rides. Where the site cannot be put together, its tests are skipped."""
 
 import threading
 
+import analysis_rides
 import pytest
 from kickstand_tools.errors import InputError
 from kickstand_tools.web import serve, site
+from rider import LAPTOP, Rider
+from rides_page import Rides
 
 
 @pytest.fixture(scope="session")
@@ -23,3 +26,24 @@ def address(files):
         threading.Thread(target=server.serve_forever, daemon=True).start()
         yield f"http://{serve.HOST}:{server.server_address[1]}/"
         server.shutdown()
+
+
+@pytest.fixture(scope="module")
+def ride(tmp_path_factory):
+    """Half a minute, with a speed."""
+    return analysis_rides.short(tmp_path_factory.mktemp("ride"), speed_hz=5)
+
+
+@pytest.fixture(scope="module")
+def calibration(ride):
+    return ride.with_name("RIDE.cal.json")
+
+
+@pytest.fixture(scope="module")
+def page(chromium, address):
+    """One for all tests: Python is loaded once."""
+    rider = Rider(chromium, address + "rides.html", **LAPTOP)
+    yield Rides(rider)
+    away = [url for url in rider.asked if not url.startswith((address, "blob:" + address, "data:"))]
+    rider.context.close()
+    assert (away, rider.errors) == ([], [])

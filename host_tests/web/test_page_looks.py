@@ -1,10 +1,8 @@
 """The page for everyone: axe-core finds nothing, in the light and in the dark, on a phone and on a laptop."""
 
 import pytest
-from rider import Rider
+from rider import LAPTOP, PHONE, Rider
 
-PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
-LAPTOP = {"viewport": {"width": 1440, "height": 900}}
 PAGES = {"": "Try", "install.html": "Install", "live.html": "Live"}
 
 

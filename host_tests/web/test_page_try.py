@@ -3,8 +3,7 @@
 import re
 
 import pytest
-from rider import Rider
-from test_page_looks import LAPTOP
+from rider import LAPTOP, Rider
 
 ACTIVE = "document.activeElement.id || document.activeElement.value"
 

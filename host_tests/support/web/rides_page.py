@@ -1,0 +1,76 @@
+"""The page Rides, with somebody who gives it files; and numbers compared."""
+
+from pathlib import Path
+
+import analysis_rides
+import app_exports
+import numpy as np
+import pytest
+
+WAIT_MS = 120_000  # a busy machine starts Python late
+PHONE_MOUNTED = analysis_rides.CALIBRATION | {"vehicle_from_sensor": app_exports.PHONE.tolist()}
+
+
+class Rides:
+    """The page, with somebody who gives it files."""
+
+    def __init__(self, rider):
+        self.rider, self.page = rider, rider.page
+
+    def give(self, *files):
+        """Choose files in place of all before; what the page says in the end."""
+        while self.held():
+            self.page.click("#held li:first-child button")
+            self.said()
+        return self.add(*files)
+
+    def add(self, *files):
+        """Choose files; what the page says in the end."""
+        self.page.set_input_files("#files", files)
+        return self.said()
+
+    def held(self):
+        """{name: what the page says of it} of the files that it has."""
+        cells = "rows => rows.map((row) => [row.children[0].textContent, row.children[1].textContent])"
+        return dict(self.page.eval_on_selector_all("#held li", cells))
+
+    def said(self):
+        self.page.wait_for_function("document.querySelector('#work').hidden", timeout=WAIT_MS)
+        return self.page.inner_text("#said")
+
+    def saved(self, selector) -> bytes:
+        """What a button offers for download."""
+        with self.page.expect_download(timeout=WAIT_MS) as download:
+            self.page.click(selector)
+        return Path(download.value.path()).read_bytes()
+
+    def report(self):
+        """The rows of the report as the page shows them."""
+        return self.page.eval_on_selector_all(
+            "#report tbody tr", "rows => rows.map((row) => [...row.cells].map((cell) => cell.textContent.trim()))"
+        )
+
+    def warnings(self):
+        return self.page.inner_text("#warnings")
+
+
+def near(found, wanted, by):
+    found, wanted = (np.array(values, dtype=float) for values in (found, wanted))
+    return found.shape == wanted.shape and np.allclose(found, wanted, rtol=1e-6, atol=by, equal_nan=True)
+
+
+def assert_near(found, wanted):
+    """The same JSON, but for the last digit of its numbers."""
+    assert type(found) is type(wanted) or {type(found), type(wanted)} == {int, float}
+    if isinstance(wanted, dict):
+        assert found.keys() == wanted.keys()
+        for key in wanted:
+            assert_near(found[key], wanted[key])
+    elif isinstance(wanted, list):
+        assert len(found) == len(wanted)
+        for one, other in zip(found, wanted):
+            assert_near(one, other)
+    elif isinstance(wanted, (int, float)):
+        assert found == pytest.approx(wanted, abs=0.0021)
+    else:
+        assert found == wanted

@@ -1,0 +1,76 @@
+"""What runs in the page Rides, on CPython."""
+
+import json
+
+import analysis_rides
+import app_exports
+import numpy as np
+import pytest
+from kickstand_tools import remedies
+from kickstand_tools.cli.main import kickstand
+from kickstand_tools.web import rides_guest
+
+
+def test_every_remedy_has_words_for_the_page():
+    assert remedies.PAGE.keys() == remedies.COMMANDS.keys()
+    for name, words in remedies.PAGE.items():
+        assert "--" not in words, name
+        assert not any(f"kickstand {command}" in words for command in kickstand.commands), name
+
+
+def test_a_singular_matrix_is_told_though_webassembly_has_no_flags():
+    silent = rides_guest.raising(lambda matrix: np.full_like(matrix, np.nan))
+    with pytest.raises(np.linalg.LinAlgError):
+        silent(np.zeros((3, 3)))
+    assert np.all(np.isnan(silent(np.full((3, 3), np.nan))))  # as numpy does elsewhere
+    assert rides_guest.raising(np.linalg.inv)(2.0 * np.eye(2)).tolist() == [[0.5, 0.0], [0.0, 0.5]]
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        ("A.csv B.csv A.cal.json", {"A.csv": "A.cal.json", "B.csv": ""}),
+        ("A.csv B.csv bike.json", {"A.csv": "bike.json", "B.csv": "bike.json"}),
+        ("A.csv bike.json", {"A.csv": "bike.json"}),
+        ("A.csv old.json new.json", {"A.csv": "new.json"}),
+        ("ride-10.csv ride-9.csv bike.json", {"ride-9.csv": "bike.json", "ride-10.csv": "bike.json"}),
+    ],
+)
+def test_the_calibration_of_another_ride_is_not_taken(ride, tmp_path, monkeypatch, names, expected):
+    found = rides_of(tmp_path, monkeypatch, {name: ride.read_text()[:500] for name in names.split()})
+    assert list(found.items()) == list(expected.items())
+
+
+def test_two_recordings_of_single_files_are_two_rides(tmp_path, monkeypatch):
+    """Files of an app that are one recording together are one."""
+    riding = app_exports.riding().every(4)
+    parts = {name: text for name, text in app_exports.phyphox(riding).items() if "/" not in name}
+    files = {"b.csv": app_exports.racechrono(riding), "a.csv": app_exports.racechrono(riding), **parts}
+    names = ["a.csv", "b.csv", "phyphox recording"]
+    assert list(rides_of(tmp_path, monkeypatch, files)) == names
+
+
+def test_a_file_may_have_the_name_of_the_folder_of_recordings(tmp_path, monkeypatch):
+    parts = {name: text for name, text in app_exports.phyphox(app_exports.riding().every(4)).items() if "/" not in name}
+    found = rides_of(tmp_path, monkeypatch, {"phyphox recording": "no log", **parts})
+    assert list(found) == ["phyphox recording_"]
+
+
+def test_a_ride_past_the_memory_is_told():
+    @rides_guest.told
+    def too_much():
+        raise MemoryError
+
+    assert json.loads(too_much()) == {"refused": rides_guest.TOO_LONG}
+
+
+def rides_of(tmp_path, monkeypatch, files):
+    """{log: calibration} of these files, {name: text}."""
+    for folder in ("given", "here"):
+        (tmp_path / folder).mkdir()
+    for name, text in files.items():
+        text = json.dumps(analysis_rides.CALIBRATION) if name.endswith(".json") else text
+        (tmp_path / "given" / name).write_text(text)
+    monkeypatch.chdir(tmp_path / "here")  # where all else is deleted
+    found = json.loads(rides_guest.rides(str(tmp_path / "given"), json.dumps(list(files))))
+    return {one["log"]: one["calibration"] for one in found["rides"]}
