@@ -16,9 +16,7 @@ import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
 VENV = os.path.join(ROOT, ".venv")
-PYTHON = (
-    os.path.join(VENV, "Scripts", "python.exe") if os.name == "nt" else os.path.join(VENV, "bin", "python")
-)
+PYTHON = os.path.join(VENV, "Scripts", "python.exe") if os.name == "nt" else os.path.join(VENV, "bin", "python")
 STAMP = os.path.join(VENV, "installed.txt")
 LOG = os.path.join(VENV, "install.log")
 OLDEST = (3, 11)
@@ -33,8 +31,7 @@ class Stop(Exception):
 def main(arguments):
     if sys.version_info < OLDEST:
         raise Stop(
-            "Python 3.11 or newer is needed, this is %d.%d: start it with a newer python3"
-            % sys.version_info[:2]
+            "Python 3.11 or newer is needed, this is %d.%d: start it with a newer python3" % sys.version_info[:2]
         )
     if not arguments or arguments[0] not in ("demo", "test", "mutants"):
         raise Stop("say what to do: %s demo, test or mutants" % sys.argv[0])
@@ -48,10 +45,11 @@ def main(arguments):
 
 
 def test(arguments):
-    """Run ruff, pyright and pytest, each even if one before it has failed; 0 if all succeed, else 1."""
+    """Run ruff (rules and layout), pyright and pytest, each even if one before it has failed; 0 if all succeed, else 1."""
     failed = []
     for tool, command in (
         ("ruff", ("-m", "ruff", "check", ".")),
+        ("ruff format", ("-m", "ruff", "format", "--check", ".")),
         ("pyright", ("-m", "pyright", "--pythonpath", PYTHON)),
         ("pytest", ("-m", "pytest", "-n", "auto", "--dist", "worksteal", *arguments)),
     ):
@@ -95,15 +93,11 @@ def make_venv():
         errors="replace",
     )
     if "ensurepip" in made.stdout or "No module named venv" in made.stdout:
-        raise Stop(
-            "this Python has no venv and pip: on Debian or Ubuntu install python3-venv, then repeat this"
-        )
+        raise Stop("this Python has no venv and pip: on Debian or Ubuntu install python3-venv, then repeat this")
     if made.returncode != 0:
         raise Stop(".venv cannot be made: %s" % last_line(made.stdout))
     if not has_pip():
-        raise Stop(
-            "there is no pip in the new .venv: on Debian or Ubuntu install python3-venv, then repeat this"
-        )
+        raise Stop("there is no pip in the new .venv: on Debian or Ubuntu install python3-venv, then repeat this")
 
 
 def has_pip():

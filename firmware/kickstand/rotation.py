@@ -70,8 +70,6 @@ def is_rotation(m, tolerance=1e-4):
             if not abs(product - (1.0 if i == j else 0.0)) <= tolerance:  # "not <=" also refuses not-a-number
                 return False
     determinant = (
-        m[0] * (m[4] * m[8] - m[5] * m[7])
-        - m[1] * (m[3] * m[8] - m[5] * m[6])
-        + m[2] * (m[3] * m[7] - m[4] * m[6])
+        m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6])
     )
     return determinant > 0

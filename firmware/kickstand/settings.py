@@ -28,9 +28,7 @@ def _sample_rate(value):
 
 
 def _addresses(value):
-    return (
-        isinstance(value, tuple) and bool(value) and all(isinstance(a, int) and 8 <= a <= 0x77 for a in value)
-    )
+    return isinstance(value, tuple) and bool(value) and all(isinstance(a, int) and 8 <= a <= 0x77 for a in value)
 
 
 def _or_none(check):

@@ -69,10 +69,7 @@ def _sensor(sensor, settings):
         sensor.set_up()
         chip.read()
     except UnknownChip as error:
-        print(
-            "Sensor       unknown chip, WHO_AM_I %s: set ACCEPT_WHO_AM_I in config.py to try it"
-            % hex(error.args[0])
-        )
+        print("Sensor       unknown chip, WHO_AM_I %s: set ACCEPT_WHO_AM_I in config.py to try it" % hex(error.args[0]))
         return 0
     except OSError as error:
         print(

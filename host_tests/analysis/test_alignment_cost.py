@@ -71,9 +71,7 @@ def test_riding_takes_roll_out_up_to_a_limit(ride):
 def test_calibrate_drive_takes_yaw_out(ride):
     log, calibration, *_ = ride
     found = fit_drive([log], turned(calibration, "yaw", 9.0), "motorcycle").calibration
-    before, after = (
-        overview(open_ride(log, one)).quality.yaw_deg for one in (turned(calibration, "yaw", 9.0), found)
-    )
+    before, after = (overview(open_ride(log, one)).quality.yaw_deg for one in (turned(calibration, "yaw", 9.0), found))
     assert before is not None
     assert after is not None
     assert abs(abs(before) - 9.0) < 2.5

@@ -20,11 +20,7 @@ FUNCTIONS = [name for name in api.__all__ if inspect.isfunction(getattr(api, nam
 def test_the_example_of_a_function_runs(name):
     public = getattr(api, name)
     module = sys.modules[public.__module__]
-    found = [
-        test
-        for test in doctest.DocTestFinder(recurse=False).find(public, name, module=module)
-        if test.examples
-    ]
+    found = [test for test in doctest.DocTestFinder(recurse=False).find(public, name, module=module) if test.examples]
     assert found, f"{name} has no example"
     for test in found:
         assert doctest.DocTestRunner().run(test).failed == 0

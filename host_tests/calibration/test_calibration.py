@@ -74,9 +74,7 @@ def test_impossible_captures_are_refused(engine):
     off = AXES.copy()
     off[2] = tipped(AXES[2], 25, np.random.default_rng(1))
     answers = engines.run(engine, [("fit", (p.tolist(),)) for p in (dead, far, off)])
-    for answer, reason in zip(
-        answers, ("axis x barely changes", "axis x: offset", "side +y was 25 degrees off")
-    ):
+    for answer, reason in zip(answers, ("axis x barely changes", "axis x: offset", "side +y was 25 degrees off")):
         assert reason in engines.words(answer)
         assert all(len(line) <= 16 for line in answer["lcd"])
 

@@ -39,9 +39,7 @@ def six_poses(tmp_path):
     """Each side up once, up to 10 degrees askew."""
     rng = np.random.default_rng(1)
     return [
-        command.still(
-            tmp_path / f"side{side}.csv", reads(tipped(axis, rng.uniform(0, 10), rng)), BIAS, seed=k
-        )
+        command.still(tmp_path / f"side{side}.csv", reads(tipped(axis, rng.uniform(0, 10), rng)), BIAS, seed=k)
         for k, (side, axis) in enumerate(command.AXES.items())
     ]
 
@@ -117,9 +115,7 @@ def test_two_alone_assumes_a_perfect_accelerometer(tmp_path):
 
 
 def test_two_may_write_over_the_calibration_it_builds_on(tmp_path):
-    cal = command.write_cal(
-        tmp_path / "CAL.json", accel_offset_g=[0.01, 0.0, 0.0], accel_slope=[1.0, 1.0, 1.0]
-    )
+    cal = command.write_cal(tmp_path / "CAL.json", accel_offset_g=[0.01, 0.0, 0.0], accel_slope=[1.0, 1.0, 1.0])
     command.still(tmp_path / "stand.csv", leaned(-10))
     command.still(tmp_path / "upright.csv", leaned(0), seed=1)
     command.works(
@@ -286,9 +282,7 @@ def two_refused(tmp_path, words, *more):
     """calibrate two over stand.csv and upright.csv, with an older CAL.json that has to stay."""
     (tmp_path / "CAL.json").write_text("the one from yesterday\n")
     poses = tmp_path / "stand.csv", tmp_path / "upright.csv"
-    return command.refused(
-        tmp_path, "calibrate", "two", *poses, *more, "--out", tmp_path / "CAL.json", words=words
-    )
+    return command.refused(tmp_path, "calibrate", "two", *poses, *more, "--out", tmp_path / "CAL.json", words=words)
 
 
 @pytest.mark.parametrize(

@@ -66,9 +66,7 @@ def test_a_bad_calibration_is_refused(tmp_path, log, name):
 def test_what_is_no_calibration_is_refused(tmp_path, log, name):
     (tmp_path / "CAL.json").write_bytes(BROKEN[name])
     out = tmp_path / "LEAN.csv"
-    command.refused(
-        tmp_path, "replay", log, "--calibration", tmp_path / "CAL.json", "--out", out, words="CAL.json"
-    )
+    command.refused(tmp_path, "replay", log, "--calibration", tmp_path / "CAL.json", "--out", out, words="CAL.json")
 
 
 def test_a_directory_or_nothing_is_refused(tmp_path, log):
@@ -110,9 +108,7 @@ def test_a_byte_order_mark_is_no_hindrance(tmp_path):
 def test_without_word_of_it_an_identity_is_not_aligned(tmp_path):
     """A file of another program need not say; only a matrix that was measured is an alignment."""
     assert not read_calibration(command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=I)).aligned
-    assert read_calibration(
-        command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=I, aligned=True)
-    ).aligned
+    assert read_calibration(command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=I, aligned=True)).aligned
 
 
 def test_a_write_that_fails_leaves_the_old_file_and_no_other(tmp_path, monkeypatch, log):

@@ -104,9 +104,7 @@ def test_printed_every_frame_is_a_change(printed):
 
 def test_printed_it_ends_with_shown_against_true(printed):
     table = printed[0].split("shown on the LCD against true")[1]
-    rows = re.findall(
-        r"│ held turn \d +│ +(\d+) │ +(-?[\d.]+) │ +(-?[\d.]+) │ +([\d.]+) │ +([-+][\d.]+) │", table
-    )
+    rows = re.findall(r"│ held turn \d +│ +(\d+) │ +(-?[\d.]+) │ +(-?[\d.]+) │ +([\d.]+) │ +([-+][\d.]+) │", table)
     assert [round(float(row[1])) for row in rows] == [-30, 38, -45]
     for count, true, shown, rms, worst in rows:
         assert int(count) > 50
@@ -152,9 +150,7 @@ def test_where_there_is_no_micropython_it_says_so_and_runs(monkeypatch, capfd):
 
 def test_a_device_that_stops_early_is_an_error(monkeypatch):
     monkeypatch.setattr(unix_port, "available", lambda: True)
-    monkeypatch.setattr(
-        unix_port, "command", lambda *_: [sys.executable, "-c", "print('no sensor in the shop')"]
-    )
+    monkeypatch.setattr(unix_port, "command", lambda *_: [sys.executable, "-c", "print('no sensor in the shop')"])
     with pytest.raises(DeviceStopped, match="no sensor in the shop"):
         demo()
     failed = run("demo")

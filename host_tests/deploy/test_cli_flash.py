@@ -321,9 +321,7 @@ def test_why_a_port_does_not_open(tmp_path, monkeypatch, error, words):
 
 def test_status_prints_what_the_board_says_and_restarts_it(board):
     board.path("kickstand").mkdir()
-    board.path("kickstand/__init__.py").write_text(
-        "def status():\n    print('Lean 3 \u00b0')\n    print('done')\n"
-    )
+    board.path("kickstand/__init__.py").write_text("def status():\n    print('Lean 3 \u00b0')\n    print('done')\n")
     result = command.works("status")
     assert result.out == "Lean 3 \u00b0\ndone\n"
     assert (board.resets, board.closed) == (1, True)

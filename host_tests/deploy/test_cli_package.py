@@ -173,9 +173,7 @@ def test_an_old_python_is_turned_away_in_one_line(dev, monkeypatch):
 
 @pytest.mark.parametrize("arguments", [[], ["fly"]])
 def test_it_says_what_it_can_do(arguments):
-    done = subprocess.run(
-        [sys.executable, str(ROOT / "tools" / "dev.py"), *arguments], capture_output=True, text=True
-    )
+    done = subprocess.run([sys.executable, str(ROOT / "tools" / "dev.py"), *arguments], capture_output=True, text=True)
     assert done.returncode != 0
     assert done.stderr.startswith("dev.py: say what to do")
     assert done.stderr.count("\n") == 1

@@ -177,6 +177,4 @@ def test_json_on_standard_output_is_the_same_for_the_same_seed():
 
 
 def test_an_unknown_profile_is_refused(tmp_path):
-    refused(
-        tmp_path, "evaluate", "--profiles", "street,moon", "--out", tmp_path / "x", words="no profile moon"
-    )
+    refused(tmp_path, "evaluate", "--profiles", "street,moon", "--out", tmp_path / "x", words="no profile moon")

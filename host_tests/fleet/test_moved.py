@@ -112,8 +112,12 @@ def test_a_road_counts_once_however_many_intervals_are_on_it():
     """Innovations: of a force that is the same error all along, only the first interval of a standstill counts."""
     count = 50
     standing = evidence.Intervals(
-        np.arange(count, dtype=float), np.tile([0.0, 1.0, 0.1], (count, 1)), np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
-        np.ones(count), np.zeros(count), np.zeros((count, 3, 3)),
+        np.arange(count, dtype=float),
+        np.tile([0.0, 1.0, 0.1], (count, 1)),
+        np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)),
+        np.ones(count),
+        np.zeros(count),
+        np.zeros((count, 3, 3)),
     )
     told = float(np.sum(evidence.blocks([standing]).square[:, 0, 0]))
     assert told == pytest.approx(1.0 / (evidence.ROAD_SHARE + 1.0 / count), rel=1e-6)

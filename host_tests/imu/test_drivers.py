@@ -10,9 +10,7 @@ import pytest
 from kickstand_tools import unix_port
 from kickstand_tools.simulated_board.simulator import Board
 
-needs_micropython = pytest.mark.skipif(
-    not unix_port.available(), reason="no MicroPython unix port for this system"
-)
+needs_micropython = pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
 
 HEAP_SCRIPT = """
 import json, sys

@@ -59,9 +59,7 @@ def test_static_lean(engine):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_free_fall_and_huge_forces_give_a_number(engine):
-    calls = [
-        ("formula_lean", (f, r)) for f in ([0, 0, 0], [0.01, -0.01, 0], [16, 16, 16]) for r in (0, 5, -5)
-    ]
+    calls = [("formula_lean", (f, r)) for f in ([0, 0, 0], [0.01, -0.01, 0], [16, 16, 16]) for r in (0, 5, -5)]
     assert all(-90 <= angle <= 90 for angle in engines.run(engine, calls))
 
 
@@ -86,9 +84,7 @@ def test_shown_lean_does_not_decay_in_a_held_turn(engine, lean):
 def test_shown_lean_of_a_standing_bike(engine, lean):
     force = [np.sin(np.radians(lean)), np.cos(np.radians(lean)), 0.0]
     rng = np.random.default_rng(7)
-    readings = [
-        [*(force + rng.normal(scale=0.004, size=3)), 0, *rng.normal(scale=0.05, size=3)] for _ in range(500)
-    ]
+    readings = [[*(force + rng.normal(scale=0.004, size=3)), 0, *rng.normal(scale=0.05, size=3)] for _ in range(500)]
     shown = engines.run(engine, [("meter", ([1, 0, 0, 0, 1, 0, 0, 0, 1], readings, 10_000))])[0]
     assert_allclose(np.array(shown)[200:, 0], lean, atol=0.5)
     assert np.mean(np.array(shown)[200:, 0]) == pytest.approx(lean, abs=0.1)

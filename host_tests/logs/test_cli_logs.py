@@ -61,9 +61,7 @@ def test_a_bad_log_is_refused(tmp_path, name):
     log.write_bytes(content)
     cal = command.write_cal(tmp_path / "CAL.json")
     (tmp_path / "LEAN.csv").write_text("the one from yesterday\n")
-    line = command.refused(
-        tmp_path, "replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv", words=words
-    )
+    line = command.refused(tmp_path, "replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv", words=words)
     assert name.replace("\n", " ") in line
 
 
@@ -86,9 +84,7 @@ def test_a_directory_is_no_log(tmp_path):
 def test_a_log_that_is_not_there(tmp_path):
     cal, log = command.write_cal(tmp_path / "CAL.json"), tmp_path / "none.csv"
     out = tmp_path / "LEAN.csv"
-    command.refused(
-        tmp_path, "replay", log, "--calibration", cal, "--out", out, words="there is no such file"
-    )
+    command.refused(tmp_path, "replay", log, "--calibration", cal, "--out", out, words="there is no such file")
 
 
 PLAIN = text(*GOOD)

@@ -37,8 +37,18 @@ def test_the_chips_order_and_the_names_of_the_columns():
     assert log.readings[1].tolist() == [0.1, 0.2, 0.9, 21.0, 1.0, 2.0, 3.0]
     first = {name: values[0] for name, values in log.columns().items()}
     assert first == {
-        "t_s": 0.0, "ax_g": 0.1, "ay_g": 0.2, "az_g": 0.9, "gx_dps": 1.0, "gy_dps": 2.0, "gz_dps": 3.0,
-        "speed_mps": 5.0, "lat_deg": 52.1, "lon_deg": -0.5, "utc_s": 1.7e9, "temp_c": 20.0,
+        "t_s": 0.0,
+        "ax_g": 0.1,
+        "ay_g": 0.2,
+        "az_g": 0.9,
+        "gx_dps": 1.0,
+        "gy_dps": 2.0,
+        "gz_dps": 3.0,
+        "speed_mps": 5.0,
+        "lat_deg": 52.1,
+        "lon_deg": -0.5,
+        "utc_s": 1.7e9,
+        "temp_c": 20.0,
     }
     again = Log.from_readings(log.readings, 50.0, "mine")
     assert again.t_s.tolist() == [0.0, 0.02]

@@ -115,6 +115,7 @@ CASES = {
     ("rides/block_viper.py", "encode"): (block.encode_python, entries),
 }
 
+
 def copied(arguments):
     """The arguments again, with the arrays' contents in arrays of their own."""
     return [argument if isinstance(argument, int | bytes) else argument[:] for argument in arguments]

@@ -79,7 +79,10 @@ def test_forces_move_the_spot_the_way_the_bike_is_pushed(gauge):
         return np.argwhere(amber(gauge, lean_deg=0.0, **forces)[:, side:]).mean(axis=0)
 
     (down, along), (braked, _), (_, left), (far, _) = (
-        spot(), spot(forward_g=-0.8), spot(left_g=0.8), spot(forward_g=-7.0)
+        spot(),
+        spot(forward_g=-0.8),
+        spot(left_g=0.8),
+        spot(forward_g=-7.0),
     )
     assert braked > down + 20
     assert left < along - 20

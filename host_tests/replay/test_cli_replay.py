@@ -28,9 +28,7 @@ def ride(path, seconds=20.0, rate_hz=100, seed=0):
     lean, s = 0.6 * np.sin(t), 0.7 * np.sin(t)
     left, up = np.sin(lean) + s * np.cos(lean), np.cos(lean) - s * np.sin(lean)
     force = np.column_stack((0.4 * np.sin(2 * t), left, up)) + rng.normal(scale=0.05, size=(len(t), 3))
-    rate = np.column_stack((np.degrees(0.6) * np.cos(t), 20 * np.sin(t), 20 * s)) + rng.normal(
-        size=(len(t), 3)
-    )
+    rate = np.column_stack((np.degrees(0.6) * np.cos(t), 20 * np.sin(t), 20 * s)) + rng.normal(size=(len(t), 3))
     return command.write(path, np.column_stack((t, force, rate)))
 
 
@@ -47,10 +45,7 @@ def test_forces_and_rates_are_the_calibrated_and_turned_readings(tmp_path, engin
     matrix = np.array(parameters["vehicle_from_sensor"])
     sensor = np.column_stack([given[name] for name in ("ax_g", "ay_g", "az_g")])
     force = (sensor * parameters["accel_slope"] + parameters["accel_offset_g"]) @ matrix.T
-    rate = (
-        np.column_stack([given[name] for name in ("gx_dps", "gy_dps", "gz_dps")])
-        - parameters["gyro_bias_dps"]
-    )
+    rate = np.column_stack([given[name] for name in ("gx_dps", "gy_dps", "gz_dps")]) - parameters["gyro_bias_dps"]
     rate = rate @ matrix.T
     assert np.array_equal(got["t_s"], given["t_s"])
     for column, name in enumerate(("left_g", "up_g", "forward_g")):
@@ -67,9 +62,7 @@ def test_the_formula_is_the_corrected_25_and_26(tmp_path, engine):
     command.works("replay", log, "--calibration", cal, "--out", out, "--engine", engine)
     calibration = replay_input(cal)
     readings = np.column_stack([read(log)[n] for n in ("ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")])
-    force = (readings[:, :3] * calibration["accel_slope"] + calibration["accel_offset_g"]) @ calibration[
-        "matrix"
-    ].T
+    force = (readings[:, :3] * calibration["accel_slope"] + calibration["accel_offset_g"]) @ calibration["matrix"].T
     yaw = ((readings[:, 3:] - calibration["gyro_bias_dps"]) @ calibration["matrix"].T)[:, 1]
     x, y = force[:, 0], force[:, 1]
     s = np.sign(yaw) * np.sqrt(np.maximum(0.0, x * x + y * y - 1.0))
@@ -82,9 +75,7 @@ def test_the_formula_is_the_corrected_25_and_26(tmp_path, engine):
 
 def replay_input(cal):
     data = json.loads(cal.read_text())
-    return {key: np.array(value) for key, value in data.items()} | {
-        "matrix": np.array(data["vehicle_from_sensor"])
-    }
+    return {key: np.array(value) for key, value in data.items()} | {"matrix": np.array(data["vehicle_from_sensor"])}
 
 
 @pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
@@ -92,9 +83,7 @@ def test_the_engines_agree(tmp_path):
     log, cal = ride(tmp_path / "log.csv", seconds=60), command.write_cal(tmp_path / "CAL.json")
     results = []
     for engine in "cpython", "micropython":
-        command.works(
-            "replay", log, "--calibration", cal, "--out", tmp_path / f"{engine}.csv", "--engine", engine
-        )
+        command.works("replay", log, "--calibration", cal, "--out", tmp_path / f"{engine}.csv", "--engine", engine)
         results.append(read(tmp_path / f"{engine}.csv"))
     for name in replay_engine.COLUMNS:
         assert np.array_equal(np.isnan(results[0][name]), np.isnan(results[1][name])), name

@@ -77,9 +77,7 @@ def test_parts_stay_within_the_sheet_and_differ():
     assert np.abs(off[:, ~np.eye(3, dtype=bool)]).max() <= 0.02 + 1e-12
     biases = np.array([p.gyro_bias for p in parts])
     assert 18.0 < np.abs(biases).max() <= 20.0
-    assert np.abs(np.array([p.accel_offset for p in parts])).max(axis=0) == pytest.approx(
-        [0.05, 0.05, 0.08], rel=0.1
-    )
+    assert np.abs(np.array([p.accel_offset for p in parts])).max(axis=0) == pytest.approx([0.05, 0.05, 0.08], rel=0.1)
     perfect_part = Chip.random(np.random.default_rng(1), share=0.0)
     assert np.array_equal(perfect_part.gyro_matrix, np.eye(3))
 

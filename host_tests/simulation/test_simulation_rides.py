@@ -82,9 +82,7 @@ def test_each_profile_has_what_it_is_named_for(rides):
     lean = rides["held"].truth["lean_deg"][rides["held"].phase == "turn"]
     assert (lean > 25.0).sum() > 40 * 200 and (lean < -25.0).sum() > 40 * 200
     city = rides["city"]
-    assert (
-        (city.truth["speed_mps"] == 0.0) & (city.phase == "stopped")
-    ).any() or "walking pace" in city.phase
+    assert ((city.truth["speed_mps"] == 0.0) & (city.phase == "stopped")).any() or "walking pace" in city.phase
     assert np.abs(rides["hills"].truth["slope_deg"]).max() > 4.0
     assert rides["wheelie"].truth["pitch_deg"].max() > 9.0
     hard = np.gradient(rides["bumps"].truth["speed_mps"], 0.005)
@@ -116,10 +114,7 @@ def test_the_sensor_feels_one_g_at_rest_and_the_rates_of_the_truth(rides):
     lean = np.degrees(np.arctan2(force[rest, 0], force[rest, 1])).mean()
     assert lean == pytest.approx(made.truth["lean_deg"][rest].mean(), abs=0.4)
     # integrated over the ride, roll, less the heading's share, comes back to the lean; drift is the chip's
-    turned = (
-        np.cumsum(rates[:, 2] - made.truth["yaw_rate_dps"] * np.sin(np.radians(made.truth["pitch_deg"])))
-        / 200.0
-    )
+    turned = np.cumsum(rates[:, 2] - made.truth["yaw_rate_dps"] * np.sin(np.radians(made.truth["pitch_deg"]))) / 200.0
     error = turned - made.truth["lean_deg"]
     drift = np.polyval(np.polyfit(made.time, error, 3), made.time)
     assert np.std(error - drift) < 1.5

@@ -76,9 +76,7 @@ def test_the_engine_turns_with_the_road_and_never_below_idle():
 def test_vibration_has_its_size_and_stops_with_the_engine():
     speed = np.full(20000, 6000.0 / 135.0)
     running = np.repeat([1.0, 0.0], 10000)
-    force, rates = Engine(rms_g=0.2, shift_rpm=6500.0).vibration(
-        np.random.default_rng(2), speed, running, RATE
-    )
+    force, rates = Engine(rms_g=0.2, shift_rpm=6500.0).vibration(np.random.default_rng(2), speed, running, RATE)
     assert force[:10000].std(axis=0) / STANDARD_GRAVITY == pytest.approx([0.2] * 3, rel=0.15)
     assert not force[10000:].any()
     assert not rates[10000:].any()

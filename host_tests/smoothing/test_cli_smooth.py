@@ -51,9 +51,7 @@ def test_another_mounts_calibration_is_told(tmp_path):
     write_table(tmp_path / "RIDE.csv", command.HEADER.split(","), rows.round(5).tolist())
     known.calibration.vehicle_from_sensor = np.roll(known.calibration.vehicle_from_sensor, 1, axis=0)
     write_calibration(tmp_path / "CAL.json", known.calibration)
-    result = works(
-        "smooth", tmp_path / "RIDE.csv", "--calibration", tmp_path / "CAL.json", "--out", tmp_path / "L.csv"
-    )
+    result = works("smooth", tmp_path / "RIDE.csv", "--calibration", tmp_path / "CAL.json", "--out", tmp_path / "L.csv")
     assert "the calibration's up is 92 degrees off" in result.err
 
 

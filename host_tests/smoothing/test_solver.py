@@ -59,9 +59,7 @@ def at_once(slopes, prior, drift, between):
 def in_ways(prior, drift, between, *more):
     """Beliefs with this drift (m), and with others."""
     drifts = np.stack([drift, *more])
-    return Beliefs(
-        np.stack([prior] * len(drifts)), np.repeat(drifts[:, None], len(between), axis=1), between
-    )
+    return Beliefs(np.stack([prior] * len(drifts)), np.repeat(drifts[:, None], len(between), axis=1), between)
 
 
 @pytest.mark.parametrize(("blocks", "length"), [(1, 1), (1, 5), (2, 1), (4, 3), (3, 7)])

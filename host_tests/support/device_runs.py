@@ -128,6 +128,7 @@ def run_device(plan):
 
         for name, value in plan.get("config", {}).items():
             setattr(Config, name, tuple(value) if isinstance(value, list) else value)
+
         def stream():
             chosen = settings.load()
             App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen), RideStream()).run()

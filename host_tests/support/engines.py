@@ -16,9 +16,7 @@ ENGINES = [
     "cpython",
     pytest.param(
         "micropython",
-        marks=pytest.mark.skipif(
-            not unix_port.available(), reason="no MicroPython unix port for this system"
-        ),
+        marks=pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system"),
     ),
 ]
 

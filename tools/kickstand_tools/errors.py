@@ -38,4 +38,4 @@ def extra(name: str) -> str:
     """
     if firmware_path.installed():
         return f'{sys.executable} -m pip install "kickstand[{name}]"'
-    return f"in the project's directory, {sys.executable} -m pip install -e \".[{name}]\""
+    return f'in the project\'s directory, {sys.executable} -m pip install -e ".[{name}]"'

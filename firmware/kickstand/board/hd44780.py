@@ -92,9 +92,7 @@ class Lcd:
         """Do the next piece of work: at most one line. Call it about every 10 ms. now_ms: ticks_ms().
 
         Raises SettingsError for pins that cannot be used, and nothing else."""
-        if self._acted_ms is not None and ticks_diff(now_ms, self._acted_ms) < (
-            STEP_MS if self.address else PROBE_MS
-        ):
+        if self._acted_ms is not None and ticks_diff(now_ms, self._acted_ms) < (STEP_MS if self.address else PROBE_MS):
             return
         try:
             if self.address is None:

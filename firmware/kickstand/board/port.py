@@ -67,6 +67,8 @@ def open_i2c(controller, sda, scl, frequency, timeout_us):
     if IS_ESP32:
         return machine.SoftI2C(scl, sda, freq=min(frequency, _SOFT_I2C_HZ), timeout=timeout_us)
     return machine.I2C(controller, sda=sda, scl=scl, freq=frequency, timeout=timeout_us)
+
+
 def turns_to_collect(most):
     """After how many turns of the app's loop the garbage is to be collected: most, or fewer where the heap is small.
 

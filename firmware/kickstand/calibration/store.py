@@ -47,9 +47,7 @@ class Store:
         if calibration is None:
             self.message = "not calibrated" + (": " + ", ".join(problems) if problems else "")
             return Calibration()
-        self.message = "record %d" % sequence + (
-            " (other record: %s)" % ", ".join(problems) if problems else ""
-        )
+        self.message = "record %d" % sequence + (" (other record: %s)" % ", ".join(problems) if problems else "")
         return calibration
 
     def unchanged(self):

@@ -96,10 +96,7 @@ def forces(model, means, roll_acceleration, force_error):
     # Where the springs pitch the bike its wheels do not rise, though v w_x says so.
     pitching = PITCHING_SHARE * model.speed * model.pitch_rate
     up_variance = (
-        SIGMA_UP**2
-        + pitching * pitching
-        + SIGMA_ROLL_HEIGHT_M**2 * square * square
-        + (uncertain * model.sin_lean) ** 2
+        SIGMA_UP**2 + pitching * pitching + SIGMA_ROLL_HEIGHT_M**2 * square * square + (uncertain * model.sin_lean) ** 2
     )
     return (model.left_row, left, left_variance), (model.up_row, up, up_variance)
 

@@ -166,8 +166,7 @@ class LeanMeter:
             self._flat_us = 0
             self.fallen = False
         if not (
-            -self.max_left_deg <= lean <= self.max_right_deg
-            and -self.max_brake_g <= smooth[2] <= self.max_accel_g
+            -self.max_left_deg <= lean <= self.max_right_deg and -self.max_brake_g <= smooth[2] <= self.max_accel_g
         ):
             self._hold_maxima(lean, smooth[2], dt_us)
         elif self._over_us:

@@ -173,9 +173,7 @@ class TestStandstill:
 
     def test_what_the_gyro_reads_at_rest_is_its_bias(self):
         road = braking(20.0, 5.0)
-        ride = road.channels(
-            pitch_rate_dps=np.full(len(road.t_s), 1.5), yaw_rate_dps=np.full(len(road.t_s), -2.5)
-        )
+        ride = road.channels(pitch_rate_dps=np.full(len(road.t_s), 1.5), yaw_rate_dps=np.full(len(road.t_s), -2.5))
         (stop,) = find_stops(ride)
         assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.002)
         assert stop.heading_deg == pytest.approx(0.0, abs=1e-6)

@@ -82,7 +82,6 @@ class Summary:
         held = riding & sure
         self.histogram_s += np.histogram(block.lean_deg[held], BINS_DEG, weights=step[held])[0]
 
-
     def _hold(self, t_s: Array, lean: Array) -> None:
         """lean: NaN where it is not trusted."""
         if not len(t_s):

@@ -61,6 +61,7 @@ def time_stages(spent):
 
 def stopwatch_us(spent):
     """How many us longer a call takes because it is timed."""
+
     def function(self, n):
         pass
 

@@ -72,8 +72,16 @@ def drive_bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterat
                     inside.append((times[start] + first_us - times[k], speeds[k]))
             means = ((integral[end] - integral[start]) / max(1, whole_us)).tolist()
             yield Bin(
-                start == first, start_mps, means[:3], means[3:], first_us, whole_us - first_us, inside, end_mps,
-                times[end], end - start + (start == first),
+                start == first,
+                start_mps,
+                means[:3],
+                means[3:],
+                first_us,
+                whole_us - first_us,
+                inside,
+                end_mps,
+                times[end],
+                end - start + (start == first),
             )
             start = end
             if not full:

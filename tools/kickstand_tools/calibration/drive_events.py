@@ -81,9 +81,7 @@ class DriveWatch:
 
     def _add(self, t_s: float, what: str, refusal: Refusal | None = None) -> None:
         alignment = self._alignment
-        event = DriveEvent(
-            self._log, t_s, what, alignment.counted, alignment.needed, alignment.quality_deg, refusal
-        )
+        event = DriveEvent(self._log, t_s, what, alignment.counted, alignment.needed, alignment.quality_deg, refusal)
         self.events.append(event)
         if self._on_event:
             self._on_event(event)

@@ -129,9 +129,7 @@ def read_calibration(source: File) -> CalibrationFile:
     if "version" not in data:
         raise InputError(f"{name} is no calibration: version is missing", "give_calibration")
     if data["version"] != VERSION or isinstance(data["version"], bool):
-        raise InputError(
-            f"{name}: version {_shown(data['version'])}, this program reads {VERSION}: calibrate again"
-        )
+        raise InputError(f"{name}: version {_shown(data['version'])}, this program reads {VERSION}: calibrate again")
     rows = _list(name, data, "vehicle_from_sensor")
     offset, slope, bias = (
         np.array(_numbers(name, entry, _list(name, data, entry)))

@@ -46,9 +46,7 @@ def six(poses: tuple[Path, ...], out: Path) -> None:
 @click.argument("kickstand", type=PATH, metavar="KICKSTAND.csv")
 @click.argument("upright", type=PATH, metavar="UPRIGHT.csv")
 @click.option("--calibration", type=PATH, help="The result of `kickstand calibrate six`, to build on.")
-@click.option(
-    "--side", type=click.Choice(["left", "right"]), default="left", help="Where the kickstand leans to."
-)
+@click.option("--side", type=click.Choice(["left", "right"]), default="left", help="Where the kickstand leans to.")
 @OUT
 def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out: Path) -> None:
     """How the sensor sits on the bike, from a pose on the kickstand and one upright.
@@ -71,9 +69,7 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
 
 @calibrate.command(short_help="The alignment of any vehicle, from driving with braking.")
 @click.argument("logs", nargs=-1, required=True, type=PATH, metavar="LOG.csv...")
-@click.option(
-    "--calibration", type=PATH, help="What is known already: six positions, and a motorcycle's two poses."
-)
+@click.option("--calibration", type=PATH, help="What is known already: six positions, and a motorcycle's two poses.")
 @click.option(
     "--vehicle",
     type=click.Choice(["motorcycle", "car"]),
@@ -81,9 +77,7 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
 )
 @click.option("--method", type=click.Choice(["improved", "published"]), default="improved")
 @OUT
-def drive(
-    logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None, method: str, out: Path
-) -> None:
+def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None, method: str, out: Path) -> None:
     """How the sensor sits on the vehicle, from logs of driving with speed: stops and braking in a straight line.
 
     Axes have to be right-handed, and the one that points up has to read +1 g at rest.

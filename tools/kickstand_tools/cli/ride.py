@@ -15,9 +15,7 @@ if TYPE_CHECKING:
 
 _PATH = click.Path(path_type=Path)
 _OUT = click.option("--out", required=True, type=_PATH, help="The file to write.")
-_CALIBRATION = click.option(
-    "--calibration", type=_PATH, help="A CAL.json; if not given, the one beside the ride."
-)
+_CALIBRATION = click.option("--calibration", type=_PATH, help="A CAL.json; if not given, the one beside the ride.")
 _FROM = click.option(
     "--from", "from_s", type=TIME, metavar="TIME", help="Leave out what is before: seconds from the beginning, or 1:30."
 )

@@ -104,9 +104,7 @@ def _simulate_fleet(vehicles: int, seed: int, out: Path) -> None:
     help="Of riding, each; start and stop come on top.",
 )
 @_UPRIGHT_ERROR
-@click.option(
-    "--pitch-change", type=click.FloatRange(-10.0, 10.0), default=1.0, help="Between the two poses, degrees."
-)
+@click.option("--pitch-change", type=click.FloatRange(-10.0, 10.0), default=1.0, help="Between the two poses, degrees.")
 @click.option("--recording", type=_PATH, help="A recorded ride with speed to compare on too.")
 @click.option("--out", type=_PATH, help="Write evaluation.json and lean.png to this directory.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")

@@ -64,9 +64,7 @@ def connected(port: str | None) -> Iterator[tuple[SerialTransport, str]]:
     except OSError as error:
         if error.errno == errno.ENOSPC:
             raise InputError(f"the board at {name} is full: remove files of your own from it") from error
-        raise InputError(
-            f"{name}: connection lost ({cause(error)}): plug the board in again, then repeat"
-        ) from error
+        raise InputError(f"{name}: connection lost ({cause(error)}): plug the board in again, then repeat") from error
     finally:
         with contextlib.suppress(OSError):
             transport.close()  # its port may be gone, or just restarting

@@ -122,6 +122,4 @@ def _verify(transport: SerialTransport, copied: dict[str, bytes]) -> None:
     found = survey(transport).files if copied else {}
     for path, data in copied.items():
         if found.get(unfinished(path)) != fingerprint(data):
-            raise InputError(
-                f"{path[1:]} reads back differently: try again; if it stays so, the flash is worn out"
-            )
+            raise InputError(f"{path[1:]} reads back differently: try again; if it stays so, the flash is worn out")

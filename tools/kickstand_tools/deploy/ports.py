@@ -46,9 +46,7 @@ def why_closed(port: str) -> InputError:
         if error.errno in (errno.EACCES, errno.EPERM):
             return InputError(f"no permission for {port}: on Linux join the group dialout and log in again")
         if error.errno == errno.ENOENT or "FileNotFoundError" in text:
-            return InputError(
-                f"there is no port {port}: plug the board in, or leave --port out to have it found"
-            )
+            return InputError(f"there is no port {port}: plug the board in, or leave --port out to have it found")
         if port.startswith("socket:") and "refused" in text:
             return InputError(f"nothing listens at {port}: is kickstand emulate running?")
         return InputError(f"{port} cannot be opened: {text}: check the name and the cable")

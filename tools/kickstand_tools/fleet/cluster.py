@@ -103,9 +103,7 @@ class Cluster:
         with contextlib.suppress(Exception):
             self._stack.close()
 
-    def run(
-        self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]]
-    ) -> Iterator[Outcome]:
+    def run(self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]]) -> Iterator[Outcome]:
         """As run_tasks(). function and items have to be picklable. Raises InputError if the scheduler is lost."""
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._under_way: dict[str, tuple[int, Any]] = {}

@@ -142,9 +142,7 @@ class StoreJournal:
         pass
 
     def results(self, keys: Iterable[str]) -> Iterator[PeriodResult]:
-        there = [
-            self._path(key, key not in self._kept) for key in keys if key in self._kept or key in self._again
-        ]
+        there = [self._path(key, key not in self._kept) for key in keys if key in self._kept or key in self._again]
         for first in range(0, len(there), _AT_ONCE):
             yield from map(_result, files.read_all(there[first : first + _AT_ONCE]))
 

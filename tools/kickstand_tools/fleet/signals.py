@@ -67,5 +67,3 @@ def safe_name(name: str) -> str:
 
 def _date(day: float) -> str:
     return (datetime.date(1970, 1, 1) + datetime.timedelta(days=int(day))).isoformat()
-
-

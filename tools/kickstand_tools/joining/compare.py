@@ -21,9 +21,7 @@ class Comparison:
         begin_s, end_s = pieces.begin_s[:, 0] - shift_s, pieces.end_s[:, -1] - shift_s
         within = (begin_s > margin_s) & (end_s < motion.seconds - margin_s)
         missing = np.append(0, np.cumsum(~motion.there))
-        first, last = (
-            np.clip(np.rint(at / STEP_S).astype(int), 0, len(motion.there)) for at in (begin_s, end_s)
-        )
+        first, last = (np.clip(np.rint(at / STEP_S).astype(int), 0, len(motion.there)) for at in (begin_s, end_s))
         within &= missing[last] - missing[first] <= 0.05 * (last - first)
         self.given = pieces.part(within)
         self.middle_s = float(self.given.middle_s.mean()) if np.any(within) else 0.0

@@ -69,9 +69,7 @@ def match(motion: Motion, track: Track) -> Match:
     best = found[0]
     if best.evidence < _LEAST_EVIDENCE or best.correlation < _LEAST_CORRELATION:
         if mirrored:
-            raise InputError(
-                "the ride turns left where the track turns right: " + OPPOSITE_SIGN
-            )
+            raise InputError("the ride turns left where the track turns right: " + OPPOSITE_SIGN)
         if best.correlation > _ALIKE:
             common_s = best.pieces * STEPS
             raise InputError(f"they have {common_s} s with too few bends in common to be sure: {_LONGER}")

@@ -58,7 +58,7 @@ def header(log: str, line: str) -> list[str]:
 
 
 def _made_from(log: str) -> str:
-    """", RIDE.csv", if that is the only ride beside it that has a calibration."""
+    """ ", RIDE.csv", if that is the only ride beside it that has a calibration."""
     rides = [
         path.with_name(path.name.removesuffix(".cal.json") + ending)
         for path in Path(log).parent.glob("*.cal.json")
@@ -98,9 +98,7 @@ def read(
             now = round(value[0] * 1e6)
             if before_us is not None and now < before_us:
                 at = cells[places["t_s"]].strip()
-                raise InputError(
-                    f"{where}: time goes back from {before_us / 1e6:.6f} at {at} s: it has to increase"
-                )
+                raise InputError(f"{where}: time goes back from {before_us / 1e6:.6f} at {at} s: it has to increase")
             before_us = now
             values.append(value)
             writer.writerow([cell.replace("\n", " ") for cell in cells])

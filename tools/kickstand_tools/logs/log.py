@@ -78,9 +78,7 @@ class Log(Table):
         rate_hz: samples per second.
         """
         table = np.asarray(readings, dtype=float)
-        return cls(
-            np.arange(len(table)) / rate_hz, table[:, :3], table[:, 4:], temperature_c=table[:, 3], name=name
-        )
+        return cls(np.arange(len(table)) / rate_hz, table[:, :3], table[:, 4:], temperature_c=table[:, 3], name=name)
 
     @property
     def time_us(self) -> NDArray[np.int64]:

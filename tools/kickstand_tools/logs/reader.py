@@ -69,8 +69,12 @@ def read_log(source: Source, minimum: int = 2, progress: Progress | None = None,
 
 
 def read_blocks(
-    source: Source, minimum: int = 2, progress: Progress | None = None, notices: list[Notice] | None = None,
-    axes: bool = True, lines: bool = True
+    source: Source,
+    minimum: int = 2,
+    progress: Progress | None = None,
+    notices: list[Notice] | None = None,
+    axes: bool = True,
+    lines: bool = True,
 ) -> Iterator[Block]:
     """The same block by block, however long the log is. Readings that froze are marked in each block. notices: what is
     remarkable in the log is appended to it at the end. lines: keep the rows as CSV too, which take the most memory."""

@@ -169,9 +169,7 @@ def _part(
     return begin_s, end_s if video else min(end_s, last_s)
 
 
-def _over(
-    video: Video, begin_s: float, seconds: float, fps: float | None, gauge: list[str], margin: int
-) -> list[str]:
+def _over(video: Video, begin_s: float, seconds: float, fps: float | None, gauge: list[str], margin: int) -> list[str]:
     """The arguments that lay the gauge over the video's left lower corner. Sound is copied."""
     even = "crop=iw-mod(iw\\,2):ih-mod(ih\\,2)"
     rate = f",fps={fps:g}" if fps else ""

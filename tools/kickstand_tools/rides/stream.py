@@ -163,9 +163,7 @@ def blocks(transport: SerialTransport, name: str, notes: list[str], stopped: thr
         parts = []
 
 
-def _lines(
-    transport: SerialTransport, name: str, notes: list[str], stopped: threading.Event
-) -> Iterator[bytes]:
+def _lines(transport: SerialTransport, name: str, notes: list[str], stopped: threading.Event) -> Iterator[bytes]:
     """What the app on the board prints, line by line."""
     try:
         yield from lines(transport, _START, _SILENT_S, stopped)

@@ -201,9 +201,7 @@ class Faults:
     def _transfers(self, kind, address, nth, count, byte=0, mask=0, read=True):
         for bus in self._board.buses:
             first = bus.transfers.get(address, 0) + nth
-            bus.faults.append(
-                TransferFault(kind, address, first, first + count - 1, byte=byte, mask=mask, read=read)
-            )
+            bus.faults.append(TransferFault(kind, address, first, first + count - 1, byte=byte, mask=mask, read=read))
 
     def _during(self, kind, address, at_s, for_s):
         for bus in self._board.buses:

@@ -101,9 +101,7 @@ def _stepped(time: Signal, starts: Signal, values: list[float], settle_s: list[f
     for start, before, after, settle in zip(starts[1:], values, values[1:], settle_s[1:]):
         if after != before:
             first = np.searchsorted(time, start)
-            result[first:] = before + (after - before) * smoothstep(
-                (time[first:] - start) / max(settle, 1e-3)
-            )
+            result[first:] = before + (after - before) * smoothstep((time[first:] - start) / max(settle, 1e-3))
     return result
 
 

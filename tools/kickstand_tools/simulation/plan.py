@@ -79,9 +79,7 @@ class Plan:
 
     def begin(self) -> None:
         """Stand on the kickstand, upright, then start the engine."""
-        self.legs.append(
-            Leg("kickstand", self.uniform(4.0, 12.0), 0.0, self.uniform(-13.0, -8.0), engine=0.0)
-        )
+        self.legs.append(Leg("kickstand", self.uniform(4.0, 12.0), 0.0, self.uniform(-13.0, -8.0), engine=0.0))
         self.legs.append(Leg("lifting", 2.0, 0.0, 0.0, roll_s=2.0))
         self.legs.append(Leg("standing", self.uniform(3.0, 8.0), 0.0))
         self.legs.append(Leg("standing", self.uniform(3.0, 8.0), 0.0, engine=1.0))

@@ -28,9 +28,7 @@ def seven(chance: np.random.Generator, chip: Chip, temp_c: float) -> list[NDArra
         axis[side // 2] = 1.0 if side % 2 == 0 else -1.0
         off = up - axis * (up @ axis)
         askew = np.radians(chance.uniform(0.0, _ASKEW_DEG))
-        found.append(
-            still(chance, chip, axis * np.cos(askew) + off / np.linalg.norm(off) * np.sin(askew), temp_c)
-        )
+        found.append(still(chance, chip, axis * np.cos(askew) + off / np.linalg.norm(off) * np.sin(askew), temp_c))
     signs = chance.choice((-1.0, 1.0), 3)
     free = signs * chance.uniform(0.45, 0.75, 3)
     found.append(still(chance, chip, free / np.linalg.norm(free), temp_c))

@@ -51,9 +51,7 @@ def track(plan: Plan) -> Conditions:
         if plan.likely(0.5):
             plan.straight(plan.uniform(1.0, 6.0), min(plan.speed + 5.0, 65.0))
     plan.finish(30.0, 5.0)
-    return Conditions(
-        CLASS_A * plan.uniform(0.7, 1.5), plan.uniform(0.08, 0.25), shift_rpm=10000.0, unrest_deg=0.5
-    )
+    return Conditions(CLASS_A * plan.uniform(0.7, 1.5), plan.uniform(0.08, 0.25), shift_rpm=10000.0, unrest_deg=0.5)
 
 
 def sweeper(plan: Plan) -> Conditions:
@@ -140,9 +138,7 @@ def hills(plan: Plan) -> Conditions:
     return Conditions(CLASS_B * plan.uniform(0.6, 2.0), plan.uniform(0.05, 0.2))
 
 
-def _bends(
-    plan: Plan, lean_deg: float, speeds: tuple[float, float], linked: float, rolls: tuple[float, float]
-) -> None:
+def _bends(plan: Plan, lean_deg: float, speeds: tuple[float, float], linked: float, rolls: tuple[float, float]) -> None:
     """A bend, perhaps followed by more to alternating sides. linked: chance of another one."""
     lean, speed = plan.side() * lean_deg, plan.uniform(*speeds)
     if plan.speed > speed + 2.0:
@@ -152,9 +148,7 @@ def _bends(
         lean = -lean * plan.uniform(0.7, 1.1)
         lean = max(-42.0, min(42.0, lean))
         roll_s = plan.uniform(*rolls)
-        plan.turn(
-            lean, plan.speed * plan.uniform(0.9, 1.1), heading_deg=plan.uniform(20.0, 80.0), roll_s=roll_s
-        )
+        plan.turn(lean, plan.speed * plan.uniform(0.9, 1.1), heading_deg=plan.uniform(20.0, 80.0), roll_s=roll_s)
     plan.out_of_turn(plan.uniform(*speeds) + 2.0, plan.uniform(1.5, 3.5), roll_s=plan.uniform(*rolls))
 
 

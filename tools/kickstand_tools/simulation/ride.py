@@ -137,9 +137,7 @@ def _motion(
         add_bumps(surface, _places(command, phase, spacing), height, length)
     shaken = shaking(chance, command.distance, command.speed, surface, bike, rate)
     acceleration = np.gradient(command.speed, 1.0 / rate)
-    dive = np.radians(bike.dive_deg_per_mps2) * second_order(
-        acceleration, bike.dive_hz, bike.dive_damping, rate
-    )
+    dive = np.radians(bike.dive_deg_per_mps2) * second_order(acceleration, bike.dive_hz, bike.dive_damping, rate)
     motion = Motion(
         rate,
         command.speed,

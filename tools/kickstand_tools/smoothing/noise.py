@@ -95,7 +95,7 @@ class Circumstances:
         w = self.windows
         root = np.sqrt(np.maximum(w.seconds, 1e-4))[:, None]
         found = np.empty((len(w), STATES))
-        found[:, : LEFT] = ANGLE_ROOT
+        found[:, :LEFT] = ANGLE_ROOT
         found[:, LEFT : BIAS.start] = VELOCITY_ROOT
         found[:, : BIAS.start] *= root * self.roughness[:, None]
         found[:, :LEFT] = np.hypot(found[:, :LEFT], jolted(w)[:, None])

@@ -77,9 +77,7 @@ def asked_for(table: mapped.Table) -> dict[str, Any]:
     """What the page asks about a table: {"columns": all, "keys": [[key, words, is it needed, column that seems to be
     it or ""], ...], "units": [[key, words, [[unit, words], ...], the one that seems right], ...],
     "lacking": what is not found, in words}."""
-    keys = [
-        [key, words, key in mapped.REQUIRED, table.found.get(key, "")] for key, words in mapped.WORDS.items()
-    ]
+    keys = [[key, words, key in mapped.REQUIRED, table.found.get(key, "")] for key, words in mapped.WORDS.items()]
     units = [
         [key, f"unit of the {words}", [[unit, unit] for unit in mapped.UNIT_KEYS[key]], table.units.get(key, "")]
         for key, words in (("a", "acceleration"), ("g", "rates"), ("speed", "speed"))

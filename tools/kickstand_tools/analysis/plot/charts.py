@@ -141,4 +141,3 @@ def _label(stop: Stop, axes: int) -> dict[str, Any]:
     place = {"x": (stop.start_s + stop.stop_s) / 2.0, "y": 1, "yanchor": "top", "font": {"size": 12}}
     place |= {"xref": f"x{_number(axes)}", "yref": f"y{_number(axes)} domain"}
     return place | {"text": f"{stop.mfdd_mps2:.1f}", "showarrow": False}
-

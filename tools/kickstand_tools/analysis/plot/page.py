@@ -63,4 +63,3 @@ def page(seen: Overview, library: str, tiles: bool = False) -> str:
         charts=as_script(charts),
         beside="" if points is None else page_with_map.beside(charts, points, seen, tiles),
     )
-

@@ -47,9 +47,7 @@ def speed_delay_s(ride: Channels) -> float:
     return float(DELAYS_S[best] + 0.5 * (before - after) / (before - 2.0 * least + after) * (DELAYS_S[1] - DELAYS_S[0]))
 
 
-def fitted_speed(
-    part: Channels, begin: int, speed: Array, acceleration: Array, delay_s: float
-) -> Array | None:
+def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, delay_s: float) -> Array | None:
     """The speed (n, m/s), corrected by the log's; None if the log has no speed there.
 
     part: the ride up to a standstill; speed, acceleration (n): integrated and measured, m/s and m/s2. begin: index at

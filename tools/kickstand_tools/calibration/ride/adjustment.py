@@ -36,9 +36,7 @@ class Adjustment:
     states: Array
 
 
-def adjust(
-    windows: Windows, guess: FirstGuess, expected: Array | None, progress: Progress | None = None
-) -> Adjustment:
+def adjust(windows: Windows, guess: FirstGuess, expected: Array | None, progress: Progress | None = None) -> Adjustment:
     """expected: the matrix as the user says it, None if unknown. Raises Refusal if no alignment fits."""
     fit = _Fit(windows, guess, expected)
     size = np.inf
@@ -94,9 +92,7 @@ class _Fit:
                 eliminate(slopes[part], residual[part], m.STATE_COUNT)[0]
                 for part in (slice(None, half), slice(half, None))
             )
-            turns = [
-                -np.linalg.solve(each[:, :-1] + prior, each[:, -1] + pull)[m.ROTATION] for each in (first, second)
-            ]
+            turns = [-np.linalg.solve(each[:, :-1] + prior, each[:, -1] + pull)[m.ROTATION] for each in (first, second)]
             covariance = np.linalg.inv(first[:, :-1] + second[:, :-1] + prior)
         except np.linalg.LinAlgError as error:
             raise Refusal("ride-contradicts") from error

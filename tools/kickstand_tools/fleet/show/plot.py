@@ -69,7 +69,15 @@ def _braking(result: PeriodResult, x: float) -> str:
     margin = 0.05 * max(last - first, 3600.0 if dated else 1.0)
     span = (first - margin, last + margin)
     panel = Panel(
-        x, 60, 290, 300, span, (0.0, hardest), f"{len(tests)} brake tests", "day" if dated else "test", "MFDD, m/s²",
+        x,
+        60,
+        290,
+        300,
+        span,
+        (0.0, hardest),
+        f"{len(tests)} brake tests",
+        "day" if dated else "test",
+        "MFDD, m/s²",
         date_text if dated else None,
     )
     panel.dots(list(zip(times, (test["mfdd_mps2"] for test in tests))), "#c2410c", 3.0)

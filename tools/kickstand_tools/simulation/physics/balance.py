@@ -27,9 +27,7 @@ class Roll:
     yaw_rate: Signal
 
 
-def chassis_lean(
-    balance: Signal, bike: Bike, bank: Signal | float = 0.0, hang: Signal | float = 0.0
-) -> Signal:
+def chassis_lean(balance: Signal, bike: Bike, bank: Signal | float = 0.0, hang: Signal | float = 0.0) -> Signal:
     """Lean of the chassis for a lean of the centre of mass (Cossalter (4.4), with road and rider added), rad.
 
     bank: the road's tilt to the right. hang: the centre of mass to the right of the bike's plane, m.

@@ -34,9 +34,7 @@ _ENGINE_SHARE = 0.5  # of vibration_g
 class Segment:
     """A part of the ride in which lean, speed, slope, sway and engine change smoothly to new values (None: stay)."""
 
-    def __init__(
-        self, phase, seconds, lean_deg=None, speed_mps=None, slope_deg=None, sway_deg=None, engine=None
-    ):
+    def __init__(self, phase, seconds, lean_deg=None, speed_mps=None, slope_deg=None, sway_deg=None, engine=None):
         self.phase = phase
         self.seconds = seconds
         self.targets = (lean_deg, speed_mps, slope_deg, sway_deg, engine)
@@ -166,8 +164,7 @@ class Ride:
         return self._segments[i]
 
     def state(self, t_s):
-        """(phase, lean, its rate, speed, acceleration, yaw rate, slope, its rate, distance, engine 0..1) in rad, m, s.
-        """
+        """(phase, lean, its rate, speed, acceleration, yaw rate, slope, its rate, distance, engine 0..1) in rad, m, s."""
         start, segment, before, after, distance = self._find(t_s)
         seconds = segment.seconds
         u = min(1.0, max(0.0, (t_s - start) / seconds)) if seconds else 1.0
