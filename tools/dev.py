@@ -45,7 +45,7 @@ def main(arguments):
 
 
 def test(arguments):
-    """Run ruff (rules and layout), pyright and pytest, each even if one before it has failed; 0 if all succeed, else 1."""
+    """Run ruff, ruff format, pyright and pytest, each even if one before it has failed; 0 if all succeed, else 1."""
     failed = []
     for tool, command in (
         ("ruff", ("-m", "ruff", "check", ".")),

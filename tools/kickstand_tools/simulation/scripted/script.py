@@ -164,7 +164,7 @@ class Ride:
         return self._segments[i]
 
     def state(self, t_s):
-        """(phase, lean, its rate, speed, acceleration, yaw rate, slope, its rate, distance, engine 0..1) in rad, m, s."""
+        """(phase, lean, its rate, speed, acceleration, yaw rate, slope, its rate, distance, engine 0..1), rad and m."""
         start, segment, before, after, distance = self._find(t_s)
         seconds = segment.seconds
         u = min(1.0, max(0.0, (t_s - start) / seconds)) if seconds else 1.0
