@@ -1,5 +1,6 @@
 """Dask's workers: what one task does to its worker costs no other task, and a run goes on where it was stopped."""
 
+import json
 import os
 import signal
 import subprocess
@@ -9,6 +10,7 @@ import time
 from collections import Counter
 from pathlib import Path
 
+import mutations
 import pyarrow.parquet as parquet
 import pytest
 from fleet_tasks import task
@@ -86,7 +88,7 @@ def test_a_fleet_on_a_cluster_gives_tables_and_goes_on(cluster, fleet, tmp_path,
     assert all((tmp_path / row["plot"]).is_file() for row in rows if row["plot"])
     assert tables["moved"].num_rows == 2 and tables["brake_tests"].num_rows > 10 and tables["errors"].num_rows >= 1
     page = (tmp_path / "index.html").read_text()
-    assert "http" not in page.replace("http://www.w3.org/2000/svg", "")
+    assert "://" not in page.replace("http://www.w3.org/2000/svg", "")
     assert all(row["vehicle"] in page for row in rows)
 
     # a log that changed is worked on again, nothing else
@@ -119,7 +121,7 @@ def test_a_run_that_is_stopped_keeps_what_it_has(tmp_path, monkeypatch):
     assert parquet.read_table(tmp_path / "alignments.parquet")["vehicle"].to_pylist() == ["v0", "v1", "v2"]
     assert "3 of 5 so far" in (tmp_path / "index.html").read_text()
     with Journal(tmp_path / "journal.jsonl") as journal:
-        keys = run._keys(periods, False)
+        keys = run._keys(periods, run._marks(periods), False)
         assert [key in journal for key in keys] == [True, True, True, False, False]
 
 
@@ -163,12 +165,29 @@ def test_two_runs_do_not_share_a_journal(tmp_path):
         assert "a" in second
 
 
-def test_a_journal_that_is_none_is_told(tmp_path):
-    for text in ("nonsense\n", "[]\n", '{"key": 1}\n'):
-        (tmp_path / "journal.jsonl").write_text(text)
-        with pytest.raises(InputError, match="is damaged: remove it, and all is worked out again"):
-            Journal(tmp_path / "journal.jsonl").__enter__()
-        assert (tmp_path / "journal.jsonl").read_text() == text
+def test_a_damaged_line_of_a_journal_costs_that_line_and_is_counted_once(tmp_path):
+    path = tmp_path / "journal.jsonl"
+    names = ["a", "b", "c"]
+    with Journal(path) as journal:
+        for name in names:
+            journal.add(name, failed(Period(name, "", "car", ()), "unreadable", "x"))
+    whole = path.read_bytes().splitlines(keepends=True)
+    entry = json.loads(whole[1])
+    wrong = [
+        entry | {"result": value} for value in (None, [], "x", {}, {"alignment": 1}, entry["result"] | {"more": 1})
+    ]
+    lines = [mutations.broken([whole[1]], number)[1] for number in range(300)]
+    lines += [json.dumps(one).encode() + b"\n" for one in wrong]
+    for line in (*lines, b"nonsense\n", b"[]\n", b'{"key": 1}\n', b"\0" * 400 + b"\n", 5000 * b"[" + b"\n"):
+        path.write_bytes(whole[0] + line + whole[2])
+        with Journal(path) as journal:
+            found = [result.alignment["vehicle"] for result in journal.results(names)]
+            assert found == [name for name in names if name in journal]
+            assert journal.damaged or found == names or not line.strip(), line
+            assert "a" in found and ("c" in found or not line.endswith(b"\n")), line
+            journal.add("d", failed(Period("d", "", "car", ()), "unreadable", "x"))
+        with Journal(path) as journal:
+            assert "d" in journal and journal.damaged == 0
 
 
 PROGRAM = """

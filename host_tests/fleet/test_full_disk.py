@@ -62,7 +62,7 @@ def test_a_disk_of_any_size_loses_no_finished_row(disk, results, monkeypatch, kb
     out = disk / "results"
     with pytest.raises(InputError, match=r"^[^\n]*No space left on device[^\n]*$"):
         run_fleet(periods, out)
-    keys = run._keys(periods, False)
+    keys = run._keys(periods, run._marks(periods), False)
     kept = finished(out, keys)
     resize(disk, 4096)
     whole = run_fleet(periods, out)

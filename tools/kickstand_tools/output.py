@@ -56,4 +56,5 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
     except OSError as error:
         raise InputError(f"{path} cannot be written: {cause(error)}; choose another place") from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):  # on a read-only file system it would hide the reason
+            temporary.unlink(missing_ok=True)

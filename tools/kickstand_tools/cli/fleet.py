@@ -53,6 +53,8 @@ def fleet(
     before = found.vehicles - found.new
     done = f", {before} of them finished before" if before else ""
     click.echo(f"{found.vehicles} vehicles and mounts{done}")
+    if found.damaged:
+        click.echo(f"{found.damaged} results of before were damaged, and are worked out again", err=True)
     seen = found.seen
     counts = seen.statuses
     click.echo(f"aligned: {counts['aligned']}, refused: {counts['refused']}, errors: {counts['error']}")
@@ -61,7 +63,7 @@ def fleet(
     tests = len(seen.decelerations[1])
     click.echo(f"mounts that moved: {seen.moved_count}; brake tests: {tests}; rows of errors: {seen.errors}")
     for path, message in seen.first_errors:
-        click.echo(f"error: {path}: {message}")
+        click.echo(f"error: {message if path in message else f'{path}: {message}'}")
     if seen.errors > len(seen.first_errors):
         click.echo("more errors are in errors.parquet")
     click.echo(f"written: {out}/index.html, alignments.parquet, moved.parquet, brake_tests.parquet, errors.parquet")

@@ -1,5 +1,10 @@
 """All that is Dask's: runs a function on many items, on this computer or on a cluster.
 
+Workers on this computer and their scheduler talk over 127.0.0.1 by TLS, with keys that are made for the run and known
+to its processes alone: another user of the computer can connect, but neither read nor run anything. Dask has no Unix
+sockets, and a process pool of our own would need the same care for crashes a second time. Dask's web pages are left
+out.
+
 A task that kills its worker must cost itself alone. Dask would give it to other workers, which it kills too, and
 compute again what these had finished. So no retries are allowed, only a few tasks are under way at a time, and their
 results are let go at once. What was on a worker that died is tried a second time, when everything else is done and one
@@ -55,6 +60,9 @@ class Cluster:
         try:
             from dask import config
             from distributed import Client, LocalCluster, WorkerPlugin
+            from distributed.security import Security
+
+            keys = Security.temporary() if self._address is None else None
         except ImportError as error:
             raise InputError("a fleet needs Dask: " + extra("fleet")) from error
 
@@ -73,13 +81,21 @@ class Cluster:
                     "distributed.scheduler.allowed-failures": 0,
                     "distributed.scheduler.worker-saturation": 1.0,
                     "distributed.comm.timeouts.connect": "10s",
+                    "distributed.scheduler.http.routes": [],
+                    "distributed.worker.http.routes": [],
                 }
             )
         )
         try:
             if self._address is None:
                 with _undisturbed():
-                    cluster = LocalCluster(n_workers=self._wanted, threads_per_worker=1, dashboard_address=":0")
+                    cluster = LocalCluster(
+                        n_workers=self._wanted,
+                        threads_per_worker=1,
+                        host="127.0.0.1",
+                        security=keys,
+                        dashboard_address="127.0.0.1:0",
+                    )
                     self._stack.callback(lambda: cluster.close(timeout=5))
                 self._client = Client(cluster)
                 self._client.register_plugin(Undisturbed())

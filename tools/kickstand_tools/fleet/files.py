@@ -2,16 +2,59 @@
 
 import contextlib
 import gzip
+import hashlib
 import io
+import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import IO, Any, cast
+from urllib.parse import quote
 
 from ..errors import InputError, cause, extra
 from ..logs.log import Log
 from ..logs.reader import read_log
+from ..logs.source import open_input
 from ..output import write_whole
+
+MOST_BYTES = 300_000_000  # of a log in a store as it is packed there: ten hours at 200 Hz have 150 million
+_LONGEST = 100  # bytes of a name; a file system takes 255, with ending and temporary name
+
+
+def file_stem(readable: str, *exact: str) -> str:
+    """A file's name without ending: readable, as far as any file system takes it, and a hash of exact, which makes the
+    name unique. It is the same in every run.
+
+    >>> file_stem(".bus 12", "bus 12", "front")
+    'bus%2012-e9a9b5c8f0'
+    """
+    return f"{_quoted(readable).lstrip('.')}-{_hash(*exact)}"
+
+
+def folder_value(value: str) -> str:
+    """value as data frames read it from the name of a folder KEY=VALUE; a very long one is cut and made unique.
+
+    >>> folder_value("bus 12"), len(folder_value(300 * "x"))
+    ('bus%2012', 111)
+    """
+    return _quoted(value) if len(quote(_bytes(value), safe="")) <= _LONGEST else f"{_quoted(value)}-{_hash(value)}"
+
+
+def printable(text: str) -> str:
+    """The same where it is text; what is no UTF-8 in a file's name as its code."""
+    return text.encode("utf-8", "backslashreplace").decode()
+
+
+def _quoted(text: str) -> str:
+    return re.sub("%.?$", "", quote(_bytes(text), safe="")[:_LONGEST])
+
+
+def _hash(*exact: str) -> str:
+    return hashlib.sha256(b"\0".join(_bytes(part) for part in exact)).hexdigest()[:10]
+
+
+def _bytes(text: str) -> bytes:
+    return text.encode("utf-8", "surrogatepass")
 
 
 def is_remote(path: str) -> bool:
@@ -26,17 +69,20 @@ def join(base: str, path: str) -> str:
     return f"{base.rstrip('/')}/{path}" if base else path
 
 
-def read_bytes(path: str) -> bytes:
-    """A whole file. Raises InputError."""
+def read_bytes(path: str, most: int = MOST_BYTES) -> bytes:
+    """A whole file of at most so many bytes. Raises InputError."""
     if is_remote(path):
         with _in_store(path, "read") as (fs, place):
-            return fs.cat_file(place)
-    try:
-        return Path(path).read_bytes()
-    except FileNotFoundError as error:
-        raise InputError(f"{path}: there is no such file") from error
-    except OSError as error:
-        raise InputError(f"{path} cannot be read: {cause(error)}") from error
+            content = fs.cat_file(place, end=most + 1)
+    else:
+        try:
+            with open_input(path) as file:
+                content = file.read(most + 1)
+        except OSError as error:
+            raise InputError(f"{path} cannot be read: {cause(error)}") from error
+    if len(content) > most:
+        raise InputError(f"{path} is too large: over {most / 1e6:.0f} MB")
+    return content
 
 
 def read_all(paths: list[str]) -> list[bytes]:
@@ -66,7 +112,7 @@ def identities(paths: Iterable[str]) -> dict[str, str]:
             try:
                 stat = Path(path).stat()
                 known[path] = f"{stat.st_size}-{stat.st_mtime_ns}"
-            except OSError:
+            except (OSError, ValueError):  # a name with a NUL in it
                 known[path] = ""
             continue
         parent = path.rpartition("/")[0]

@@ -1,12 +1,14 @@
 """Each result as it comes: what a run that was stopped, or whose disk filled up, had finished.
 
-In a directory of this computer a line of JSON each, in one file; a line that was cut, by a loss of power or a full
-disk, is dropped when the file is opened again. In a store such as S3, whose files cannot grow, a file each.
+In a directory of this computer a line of JSON each, in one file. In a store such as S3, whose files cannot grow, a file
+each. A check sum in each notices every change: a line that was cut, by a loss of power or a full disk, or that was
+damaged, is dropped when the journal is opened again, and its result is worked out again.
 """
 
 import contextlib
 import json
 import os
+import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import asdict
 from pathlib import Path
@@ -17,36 +19,34 @@ from . import files
 from .period import PeriodResult
 
 _AT_ONCE = 200  # results that are fetched from a store together
+_LONGEST = 1 << 26  # bytes of a line; one of a thousand logs has a hundredth of that
 
 
 class Journal:
     """with Journal(path) as journal: journal.add(key, result); key in journal; journal.results(keys).
 
     key: tells the result of these logs, with these options, from any other. Results are read from the file again when
-    they are wanted: memory holds where each of them is.
+    they are wanted: memory holds where each of them is. damaged: lines that could not be used.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._places: dict[str, int] = {}
         self._again: set[str] = set()  # of results that another run may better
+        self.damaged = 0
 
     def __enter__(self) -> "Journal":
         try:
-            self._file = open(self._path, "a+b")
+            self._file = open(os.open(self._path, os.O_RDWR | os.O_CREAT | getattr(os, "O_BINARY", 0), 0o666), "r+b")
             self._lock()
-            self._file.seek(0)
             self._end = 0
-            for line in self._file:
-                if not line.endswith(b"\n"):
-                    break
-                self._note(line)
+            while line := self._file.readline(_LONGEST):
+                if not self._note(line) and line.strip():
+                    self.damaged += 1
+                    self._file.seek(self._end)
+                    self._file.write(b" " * (len(line) - 1) + b"\n")  # so that it is counted once
                 self._end += len(line)
-            self._file.truncate(self._end)
-        except (ValueError, LookupError, TypeError) as error:
-            self._file.close()
-            what = "is damaged: remove it, and all is worked out again, or give --out another directory"
-            raise InputError(f"{self._path} {what}") from error
+            self._file.flush()
         except OSError as error:
             raise InputError(f"{self._path} cannot be used: {cause(error)}: give --out another directory") from error
         return self
@@ -76,6 +76,7 @@ class Journal:
         """Keep a result. again: another run is to try for a better one. Raises InputError, and what was kept stays."""
         line = _line(key, result, again) + b"\n"
         try:
+            self._file.seek(self._end)
             self._file.write(line)
             self._file.flush()
         except OSError as error:
@@ -98,34 +99,40 @@ class Journal:
             for key in keys:
                 if key in self._places:
                     file.seek(self._places[key])
-                    yield _result(file.readline())
+                    if entry := _entry(file.readline()):
+                        yield entry[2]
 
     def _cannot(self, error: OSError) -> InputError:
         return InputError(
             f"{self._path} cannot be written: {cause(error)}; what is finished is kept, the same command goes on"
         )
 
-    def _note(self, line: bytes) -> None:
-        entry = json.loads(line)
-        self._places[entry["key"]] = self._end
-        if entry["again"]:
-            self._again.add(entry["key"])
-        else:
-            self._again.discard(entry["key"])
+    def _note(self, line: bytes) -> bool:
+        """False for a line that is damaged."""
+        if not (line.endswith(b"\n") and (entry := _entry(line))):
+            return False
+        key, again, _ = entry
+        self._places[key] = self._end
+        (self._again.add if again else self._again.discard)(key)
+        return True
 
 
 class StoreJournal:
-    """The same, with a directory in a store: KEY.json is there for good, KEY.again.json may be bettered."""
+    """The same, with a directory in a store: KEY.json is there for good, KEY.again.json may be bettered. All are
+    read when the journal is opened, and those that are damaged are worked out again."""
 
     def __init__(self, directory: str) -> None:
         self._directory = directory
         self._kept: set[str] = set()
         self._again: set[str] = set()
+        self.damaged = 0
 
     def __enter__(self) -> "StoreJournal":
         for path in files.listed(self._directory):
             name = path.rpartition("/")[2]
             (self._again if name.endswith(".again.json") else self._kept).add(name.partition(".")[0])
+        for _ in self.results(self._kept | self._again):
+            pass
         return self
 
     def __exit__(self, *exception: object) -> None:
@@ -144,16 +151,34 @@ class StoreJournal:
     def results(self, keys: Iterable[str]) -> Iterator[PeriodResult]:
         there = [self._path(key, key not in self._kept) for key in keys if key in self._kept or key in self._again]
         for first in range(0, len(there), _AT_ONCE):
-            yield from map(_result, files.read_all(there[first : first + _AT_ONCE]))
+            paths = there[first : first + _AT_ONCE]
+            for path, content in zip(paths, files.read_all(paths)):
+                if entry := _entry(content):
+                    yield entry[2]
+                else:
+                    self.damaged += 1
+                    (self._again if path.endswith(".again.json") else self._kept).discard(
+                        path.rpartition("/")[2].partition(".")[0]
+                    )
 
     def _path(self, key: str, again: bool) -> str:
         return f"{self._directory}/{key}{'.again' if again else ''}.json"
 
 
 def _line(key: str, result: PeriodResult, again: bool) -> bytes:
-    return json.dumps({"key": key, "again": again, "result": asdict(result) | {"picture": []}}).encode()
+    entry: dict[str, Any] = {"key": key, "again": again, "result": asdict(result) | {"picture": []}}
+    return json.dumps(entry | {"crc32": _sum(entry)}).encode()
 
 
-def _result(line: bytes) -> PeriodResult:
-    entry: dict[str, Any] = json.loads(line)
-    return PeriodResult(**entry["result"])
+def _entry(line: bytes) -> tuple[str, bool, PeriodResult] | None:
+    """(key, again, result) of a line; None where it is not as it was written."""
+    try:
+        entry = json.loads(line)
+        sum_then = entry.pop("crc32")
+        return (entry["key"], entry["again"], PeriodResult(**entry["result"])) if sum_then == _sum(entry) else None
+    except (ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        return None
+
+
+def _sum(entry: dict[str, Any]) -> int:
+    return zlib.crc32(json.dumps(entry).encode())

@@ -12,6 +12,7 @@ from . import files
 
 COLUMNS = ("vehicle", "path", "kind")
 _KINDS = (MOTORCYCLE, CAR)
+_MOST_BYTES = 100_000_000  # of a manifest: a million logs
 
 
 @dataclass(frozen=True)
@@ -44,24 +45,23 @@ def read_manifest(path: str) -> list[Period]:
     if not files.is_remote(path) and Path(path).is_dir():
         raise InputError(f"{path} is a directory: give {path}/MANIFEST.csv, or a pattern such as '{path}/*.csv'")
     try:
-        text = files.read_bytes(path).decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InputError(f"{path} is no text: a manifest starts with the line {','.join(COLUMNS)}") from error
-    rows = csv.reader(io.StringIO(text))
-    header = [name.strip() for name in next(rows, [])]
+        text = files.read_bytes(path, _MOST_BYTES).decode("utf-8-sig")
+        header, *rows = [[cell.strip() for cell in row] for row in csv.reader(io.StringIO(text))] or [[]]
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path} is no table: a manifest starts with the line {','.join(COLUMNS)}") from error
     missing = [name for name in COLUMNS if name not in header]
     if missing:
         raise InputError(f"{path}: no column {missing[0]}: a manifest starts with the line {','.join(COLUMNS)}")
     base = path.rpartition("/")[0] if "/" in path else ""
     base = "/" if path.startswith("/") and not base else base
     kinds: dict[tuple[str, str], str] = {}
-    logs: dict[tuple[str, str], list[str]] = {}
+    logs: dict[tuple[str, str], dict[str, None]] = {}  # in order
     for line, row in enumerate(rows, 2):
-        if not any(cell.strip() for cell in row):
+        if not any(row):
             continue
         if len(row) != len(header):
             raise InputError(f"{path}, line {line}: {len(row)} cells, the first line has {len(header)}")
-        cells = dict(zip(header, (cell.strip() for cell in row)))
+        cells = dict(zip(header, row))
         period = cells["vehicle"], cells.get("mount", "")
         if not cells["vehicle"] or not cells["path"]:
             raise InputError(f"{path}, line {line}: vehicle and path must not be empty")
@@ -70,11 +70,11 @@ def read_manifest(path: str) -> list[Period]:
         if kinds.setdefault(period, cells["kind"]) != cells["kind"]:
             raise InputError(f"{path}, line {line}: {cells['vehicle']} is a {kinds[period]} in an earlier line")
         found = _found(files.join(base, cells["path"]))
-        known = logs.setdefault(period, [])
+        known = logs.setdefault(period, {})
         for log in found:
             if log in known:
                 raise InputError(f"{path}, line {line}: {log} is given twice for {cells['vehicle']}")
-            known.append(log)
+            known[log] = None
     if not logs:
         raise InputError(f"{path} has no vehicles: each line after the first is vehicle,path,kind")
     return [Period(*period, kinds[period], tuple(paths)) for period, paths in logs.items()]
@@ -91,7 +91,7 @@ def by_pattern(pattern: str, kind: str = CAR) -> list[Period]:
     found = files.matches(pattern)
     if not found:
         raise InputError(f"{pattern} matches no file")
-    return [Period(path, "", kind, (path,)) for path in found]
+    return [Period(files.printable(path), "", kind, (path,)) for path in found]
 
 
 def is_pattern(path: str) -> bool:

@@ -4,6 +4,7 @@ import errno
 import math
 import traceback
 from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +19,14 @@ from ..calibration.file import CalibrationFile
 from ..errors import InputError, cause
 from ..logs.log import Log
 from ..refusals import RefusedInput
-from . import evidence, signals
+from . import evidence, files, signals
 from .brake_tests import brake_tests
-from .files import open_log
 from .forward import Forward, find_forward
 from .manifest import Period
 from .moved import Move, find_moves
 
-UNREADABLE, FAULT, NO_SPEED, MOVED, LEFT_HANDED = "unreadable", "fault", "no-speed", "mount-moved", "left-handed"
+UNREADABLE, CHANGED, NO_MEMORY, FAULT = "unreadable", "changed", "no-memory", "fault"
+NO_SPEED, MOVED, LEFT_HANDED = "no-speed", "mount-moved", "left-handed"
 # The vehicle is aligned, but brake tests or signals of this log are missing; because the disk for signals is full
 AFTERWARDS, DISK_FULL = "not-finished", "disk-full"
 _DOUBTS = (MOVED, "parts-differ", "uncertain")  # of the firmware: then it is worth while to look for a move
@@ -59,15 +60,27 @@ def work_on_period(period: Period, signals_to: str | None = None) -> PeriodResul
     ('error', 'no-such-file.csv: there is no such file')
     """
     try:
-        return _result(period, signals_to)
-    except Exception as error:  # a fault of ours, or no memory: it must not cost other vehicles
+        return _printable(_result(period, signals_to))
+    except MemoryError:
+        return failed(period, NO_MEMORY, "its logs take more memory than there is")
+    except OSError as error:
+        return failed(period, UNREADABLE, cause(error))
+    except Exception as error:  # a fault of ours: it must not cost other vehicles
         where = traceback.extract_tb(error.__traceback__)[-1]
         message = f"{type(error).__name__}: {error} ({Path(where.filename).name}, line {where.lineno})"
         return failed(period, FAULT, message)
 
 
+def _printable(result: PeriodResult) -> PeriodResult:
+    """The same, for files with names that are no UTF-8, which tables and pages cannot hold."""
+    for row in chain([result.alignment], result.moved, result.brake_tests, result.errors):
+        row |= {key: files.printable(value) for key, value in row.items() if isinstance(value, str)}
+    return result
+
+
 def failed(period: Period, reason: str, message: str) -> PeriodResult:
     """The result of a period that gave none."""
+    message = files.printable(message)
     whose = {"vehicle": period.vehicle, "mount": period.mount}
     row = _alignment(period, "error", reason, message, [], len(period.paths))
     return PeriodResult(row, errors=[whose | {"log": "", "reason": reason, "message": message}])
@@ -117,7 +130,7 @@ def _result(period: Period, signals_to: str | None) -> PeriodResult:
                 tests = brake_tests(log, known)
                 result.brake_tests += [whose | {"log": log.name} | _stop_row(stop, log) for stop in tests]
                 if signals_to is not None:
-                    signals.write(signals_to, period.vehicle, log, known)
+                    signals.write(signals_to, period, log, known)
             except (InputError, OSError) as error:
                 full = getattr(error.__cause__ or error, "errno", None) in (errno.ENOSPC, errno.EDQUOT)
                 why = DISK_FULL if full else AFTERWARDS
@@ -131,7 +144,7 @@ def _logs(period: Period, whose: Row) -> tuple[list[Log], list[Row]]:
     for path in period.paths:
         reason = UNREADABLE
         try:
-            log = open_log(path)
+            log = files.open_log(path)
             if np.all(np.isnan(log.speed_mps)):
                 reason = NO_SPEED
             logs.append(usable(log, False))

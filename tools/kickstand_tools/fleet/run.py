@@ -16,11 +16,11 @@ from . import files, tables
 from .cluster import run_tasks
 from .journal import Journal, StoreJournal
 from .manifest import Period
-from .period import AFTERWARDS, DISK_FULL, PeriodResult, failed, work_on_period
+from .period import AFTERWARDS, CHANGED, DISK_FULL, PeriodResult, failed, work_on_period
 from .show import plot
 from .show.page import Glance, write_page
 
-RESULTS_VERSION = 2  # another one makes all results of before obsolete
+RESULTS_VERSION = 3  # another one makes all results of before obsolete
 PLOTS, SIGNALS = "plots", "signals"
 TIMEOUT_S = 600.0  # for one mount of one vehicle
 _WRITE_S, _SHARE = 15.0, 20.0  # tables are written so often, and at most every so many times what writing takes
@@ -29,10 +29,12 @@ _WRITE_S, _SHARE = 15.0, 20.0  # tables are written so often, and at most every 
 @dataclass
 class FleetRun:
     """vehicles: how many mounts of vehicles there are; new: how many of them were worked on now, the others were
-    finished before. seen: what all results show at one glance."""
+    finished before. damaged: how many results of before could not be read, and are worked out again. seen: what all
+    results show at one glance."""
 
     vehicles: int
     new: int
+    damaged: int
     seen: Glance
 
 
@@ -71,7 +73,8 @@ def run_fleet(
             directory = str(Path(out).resolve())  # workers may run elsewhere
             opened.enter_context(new_directory(Path(directory) / PLOTS))
             journal = opened.enter_context(Journal(Path(directory) / "journal.jsonl"))
-        keys = _keys(periods, with_signals)
+        marks = _marks(periods)
+        keys = _keys(periods, marks, with_signals)
         signals_to = files.join(directory, SIGNALS) if with_signals else None
         todo = [k for k, key in enumerate(keys) if key not in journal]
         done = len(keys) - len(todo)
@@ -82,7 +85,9 @@ def run_fleet(
             items = [(periods[k], signals_to) for k in todo]
             for index, result, reason, message in run_tasks(work_on_period, items, scheduler, workers, timeout_s):
                 k = todo[index]
-                _keep(directory, journal, keys[k], periods[k], result, reason, message)
+                kept = result or failed(periods[k], reason, message)
+                changed = _note_changed(periods[k], marks, kept)
+                _keep(directory, journal, keys[k], kept, again=result is None or changed)
                 done += 1
                 if progress:
                     progress(done, len(keys))
@@ -97,7 +102,8 @@ def run_fleet(
                 if next(journal.results(keys), None):
                     write_results(directory, journal.results(keys), len(keys))
             raise
-        return FleetRun(len(keys), len(todo), write_results(directory, journal.results(keys), len(keys)))
+        seen = write_results(directory, journal.results(keys), len(keys))
+        return FleetRun(len(keys), len(todo), journal.damaged, seen)
 
 
 def write_results(directory: str, results: Iterable[PeriodResult], expected: int) -> Glance:
@@ -114,27 +120,29 @@ def write_results(directory: str, results: Iterable[PeriodResult], expected: int
     return glance
 
 
-def _keep(
-    directory: str,
-    journal: Journal | StoreJournal,
-    key: str,
-    period: Period,
-    result: PeriodResult | None,
-    reason: str,
-    message: str,
-) -> None:
-    """Keep a result before anything else can fail. Raises InputError."""
-    kept = result or failed(period, reason, message)
+def _note_changed(period: Period, marks: dict[str, str], result: PeriodResult) -> bool:
+    """Whether a log of this computer was replaced since the run began, so that the result may be of either. Then result
+    gets a row of errors. In a store a file that is read is one whole version of it."""
+    now = files.identities(path for path in period.paths if not files.is_remote(path))
+    changed = [path for path, mark in now.items() if mark != marks[path]]
+    for path in map(files.printable, changed):
+        whose = {"vehicle": period.vehicle, "mount": period.mount, "log": path, "reason": CHANGED}
+        result.errors.append(whose | {"message": f"{path} has changed during the run: run the command again"})
+    return bool(changed)
+
+
+def _keep(directory: str, journal: Journal | StoreJournal, key: str, kept: PeriodResult, again: bool) -> None:
+    """Keep a result before anything else can fail. again: another run is to try for a better one. Raises InputError."""
     missing = [row for row in kept.errors if row["reason"] in (AFTERWARDS, DISK_FULL)]
     unshown = None
     if kept.picture:
-        path = f"{PLOTS}/{plot.file_name(period.vehicle, period.mount)}"
+        path = f"{PLOTS}/{plot.file_name(kept.alignment['vehicle'], kept.alignment['mount'])}"
         try:
             plot.write_plot(files.join(directory, path), kept)
             kept.alignment["plot"] = path
         except InputError as error:
             unshown = error
-    journal.add(key, kept, again=result is None or bool(missing) or unshown is not None)
+    journal.add(key, kept, again or bool(missing) or unshown is not None)
     if unshown:
         raise unshown
     full = next((row for row in missing if row["reason"] == DISK_FULL), None)
@@ -142,12 +150,17 @@ def _keep(
         raise InputError(f"{full['message']}; what is finished is kept, the same command goes on")
 
 
-def _keys(periods: list[Period], with_signals: bool) -> list[str]:
-    """What tells the result of each period from that of other logs, other options and other versions."""
-    marks = files.identities(dict.fromkeys(path for period in periods for path in period.paths))
+def _marks(periods: list[Period]) -> dict[str, str]:
+    """See files.identities()."""
+    return files.identities(dict.fromkeys(path for period in periods for path in period.paths))
+
+
+def _keys(periods: list[Period], marks: dict[str, str], with_signals: bool) -> list[str]:
+    """What distinguishes the result of each period from that of other logs, other options and other versions."""
     keys = []
     for period in periods:
         logs = [(path, marks[path]) for path in period.paths]
-        told = [RESULTS_VERSION, __version__, period.vehicle, period.mount, period.kind, logs, with_signals]
-        keys.append(hashlib.sha256(json.dumps(told).encode()).hexdigest()[:32])
+        version = [RESULTS_VERSION, __version__, with_signals]
+        exact = json.dumps([*version, period.vehicle, period.mount, period.kind, logs])
+        keys.append(hashlib.sha256(exact.encode()).hexdigest()[:32])
     return keys

@@ -2,14 +2,14 @@
 
 import datetime
 import io
-import re
 
 import numpy as np
 
 from ..calibration.file import CalibrationFile
 from ..logs.log import Log
 from ..logs.source import log_stem
-from .files import write_bytes
+from .files import file_stem, folder_value, printable, write_bytes
+from .manifest import Period
 
 UNKNOWN_DAY = "unknown"
 _FINE = ("t_s", "utc_s")  # 32-bit floats are too coarse for these
@@ -27,15 +27,17 @@ COLUMNS = {
 }
 
 
-def write(directory: str, vehicle: str, log: Log, calibration: CalibrationFile) -> list[str]:
+def write(directory: str, period: Period, log: Log, calibration: CalibrationFile) -> list[str]:
     """Write a log to DIRECTORY/vehicle=.../day=.../NAME.parquet, one file for each day of Universal Time in it (day
-    "unknown" where the log has none). Returns the paths. calibration: an aligned one. Raises InputError."""
+    "unknown" where the log has none). NAME is made of the mount and the log's name, with a hash of its path: no two
+    logs share a file, and another run writes the same ones. Returns the paths. calibration: an aligned one. Raises
+    InputError."""
     import pyarrow
     from pyarrow import parquet
 
     force, rate = calibration.in_vehicle(log.readings)
-    told = np.isfinite(log.utc_s)
-    start_s = float(np.median((log.utc_s - log.t_s)[told])) if np.any(told) else float("nan")
+    timed = np.isfinite(log.utc_s)
+    start_s = float(np.median((log.utc_s - log.t_s)[timed])) if np.any(timed) else float("nan")
     values = dict(
         zip(COLUMNS, (log.t_s, log.t_s + start_s, *force.T, *rate.T, log.speed_mps), strict=True),
     )
@@ -44,25 +46,28 @@ def write(directory: str, vehicle: str, log: Log, calibration: CalibrationFile) 
             pyarrow.field(name, pyarrow.float64() if name in _FINE else pyarrow.float32(), metadata={"unit": unit})
             for name, unit in COLUMNS.items()
         ],
-        metadata={"made_by": "kickstand fleet", "log": log.name, "axes": "left, up, forward of the vehicle"},
+        metadata={
+            "made_by": "kickstand fleet",
+            "vehicle": period.vehicle,
+            "mount": period.mount,
+            "log": printable(log.name),
+            "axes": "left, up, forward of the vehicle",
+        },
     )
-    days = np.floor(values["utc_s"] / 86_400.0) if np.any(told) else np.zeros(len(log.t_s))
+    readable = f"{period.mount} {log_stem(log.name)}".strip()
+    name = file_stem(readable, period.vehicle, period.mount, log.name) + ".parquet"
+    days = np.floor(values["utc_s"] / 86_400.0) if np.any(timed) else np.zeros(len(log.t_s))
     paths = []
     for day in np.unique(days):
-        name = _date(day) if np.any(told) else UNKNOWN_DAY
+        date = _date(day) if np.any(timed) else UNKNOWN_DAY
         rows = days == day
         arrays = [pyarrow.array(values[f.name][rows], type=f.type, from_pandas=True) for f in schema]
         file = io.BytesIO()
         parquet.write_table(pyarrow.table(arrays, schema=schema), file, compression="zstd")
-        path = f"{directory}/vehicle={safe_name(vehicle)}/day={name}/{safe_name(log_stem(log.name))}.parquet"
+        path = f"{directory}/vehicle={folder_value(period.vehicle)}/day={date}/{name}"
         write_bytes(path, file.getvalue())
         paths.append(path)
     return paths
-
-
-def safe_name(name: str) -> str:
-    """A name that a file or a directory can have: what else is in it becomes its code."""
-    return re.sub(r"[^A-Za-z0-9._-]", lambda found: f"%{ord(found[0]):02X}", name).lstrip(".") or "%00"
 
 
 def _date(day: float) -> str:

@@ -2,10 +2,11 @@
 
 import gzip
 import os
+import stat
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, cast
 
 from kickstand.errors import Notice
 
@@ -13,6 +14,21 @@ from ..errors import InputError, cause
 
 File = Path | str | IO[bytes] | IO[str]
 Progress = Callable[[int, int], None]  # called with (done, total) in one unit; total is 0 where it is not known
+
+
+def open_input(path: Path | str) -> IO[bytes]:
+    """An ordinary file, open for reading. Raises InputError where there is none: a device or a pipe may never end."""
+    try:
+        # without waiting for somebody who writes into a pipe
+        file = open(os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)), "rb")
+        if stat.S_ISREG(os.fstat(file.fileno()).st_mode):
+            return file
+        file.close()
+        raise InputError(f"{path} is not an ordinary file: copy what it gives into one first")
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: there is no such file") from error
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path} cannot be read: {cause(error)}") from error
 
 
 def name_of(source: object) -> str:
@@ -40,8 +56,10 @@ def chunks(source: File, size: int, remarks: list[Notice] | None = None) -> Iter
         raise InputError(f"{name} is a directory: give the name of a log in it")
     try:
         if isinstance(source, (Path, str)):
-            path = Path(source)
-            with open(path, "rb") as packed, gzip.open(packed) if path.suffix == ".gz" else packed as file:
+            with (
+                open_input(source) as packed,
+                cast(IO[bytes], gzip.open(packed)) if str(source).endswith(".gz") else packed as file,
+            ):
                 yield from _pieces(file, packed, size, remarks)
         else:
             yield from _pieces(source, source, size, remarks)

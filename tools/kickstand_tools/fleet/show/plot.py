@@ -6,9 +6,8 @@ SVG by hand: a fleet has thousands of them, and each takes a millisecond.
 from collections.abc import Sequence
 from html import escape
 
-from ..files import write_bytes
+from ..files import file_stem, write_bytes
 from ..period import PeriodResult
-from ..signals import safe_name
 from .svg import Panel, date_text
 
 _WIDTH, _HEIGHT = 960, 380
@@ -16,7 +15,7 @@ _WIDTH, _HEIGHT = 960, 380
 
 def file_name(vehicle: str, mount: str) -> str:
     """The name of the picture of a mount."""
-    return safe_name(f"{vehicle} {mount}" if mount else vehicle) + ".svg"
+    return file_stem(f"{vehicle} {mount}".strip(), vehicle, mount) + ".svg"
 
 
 def write_plot(path: str, result: PeriodResult) -> None:

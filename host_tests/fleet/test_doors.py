@@ -1,0 +1,209 @@
+"""What names, other users of the computer and changing files may do to a fleet: cost their own row at most."""
+
+import http.client
+import os
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import command
+import psutil
+import pyarrow.parquet as parquet
+import pytest
+from kickstand_tools.errors import InputError
+from kickstand_tools.fleet import files, run
+from kickstand_tools.fleet.manifest import Period, by_pattern, read_manifest
+from kickstand_tools.fleet.period import work_on_period
+from kickstand_tools.fleet.run import run_fleet
+from kickstand_tools.fleet.show import plot
+from kickstand_tools.output import write_whole
+from made_fleet import in_this_process
+
+
+@pytest.fixture
+def drive(fleet):
+    """A log of a car that can be aligned."""
+    return Path(read_manifest(str(fleet.manifest))[0].paths[0])
+
+
+@pytest.fixture
+def alone(monkeypatch):
+    """Vehicles are worked on in this process."""
+    monkeypatch.setattr(run, "run_tasks", in_this_process)
+
+
+def copied(source, *targets):
+    for target in targets:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_bytes(source.read_bytes())
+    return tuple(str(target) for target in targets)
+
+
+def test_signals_of_logs_of_one_name_and_of_two_mounts_do_not_overwrite_each_other(drive, tmp_path, alone):
+    name = drive.name
+    paths = copied(drive, tmp_path / "d1" / name, tmp_path / "d2" / name)
+    periods = [Period("v", "", "car", paths), Period("v", "second", "car", paths), Period("v second", "", "car", paths)]
+    whole = run_fleet(periods, tmp_path / "out", with_signals=True)
+    assert (whole.seen.statuses["aligned"], whole.seen.errors) == (3, 0)
+    written = sorted(path.relative_to(tmp_path) for path in (tmp_path / "out" / "signals").rglob("*.parquet"))
+    assert len(written) == 6
+    assert sum(parquet.ParquetFile(tmp_path / path).metadata.num_rows for path in written) == 6 * len(
+        files.open_log(str(drive)).t_s
+    )
+    assert sum("second" in path.name for path in written) == 2  # the mount's name is in them
+    run_fleet(periods, tmp_path / "again", with_signals=True)
+    again = (tmp_path / "again" / "signals").rglob("*.parquet")
+    assert {path.name for path in again} == {path.name for path in written}
+    pictures = [row["plot"] for row in parquet.read_table(tmp_path / "out" / "alignments.parquet").to_pylist()]
+    assert len(set(pictures)) == 3
+
+
+NAMES = ["x" * 256, "x" * 257, 100 * "\u4e2d", "hid", ".hid", "..", "a/b", "con", "a%2Fb", "\x00", " ", "\u202e", "HID"]
+
+
+def test_every_name_has_files_of_its_own_that_any_file_system_takes():
+    for made in (
+        [plot.file_name(name, "") for name in NAMES] + [plot.file_name(name, "m") for name in NAMES],
+        [files.folder_value(name) for name in NAMES],
+    ):
+        assert len(set(made)) == len(made)
+        assert all(len(name.encode()) < 150 and name.isascii() and "/" not in name for name in made)
+    assert len({plot.file_name(name, "").lower() for name in NAMES}) == len(NAMES)
+    assert plot.file_name(".hid", "")[0] != "."
+
+
+def test_a_long_name_among_good_ones_costs_nothing(fleet, tmp_path, alone):
+    paths = read_manifest(str(fleet.manifest))[0].paths
+    names = ["first", "v" * 300, 120 * "\u4e2d", "last"]
+    out = tmp_path / "out"
+    whole = run_fleet([Period(name, "", "car", paths) for name in names], out, with_signals=True)
+    assert whole.seen.statuses["aligned"] == len(names)
+    rows = parquet.read_table(out / "alignments.parquet").to_pylist()
+    assert [row["vehicle"] for row in rows] == names
+    assert all((out / row["plot"]).is_file() for row in rows)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux has names that are no UTF-8")
+def test_a_file_name_that_is_no_utf8_costs_nothing(drive, tmp_path, alone):
+    copied(drive, tmp_path / "good.csv")
+    with open(os.fsencode(tmp_path) + b"/bad\xff.csv", "wb") as file:
+        file.write(drive.read_bytes())
+    with open(os.fsencode(tmp_path) + b"/none\xfe.csv", "wb") as file:
+        file.write(b"no log")
+    whole = run_fleet(by_pattern(f"{tmp_path}/*.csv"), tmp_path / "out", with_signals=True)
+    assert (whole.seen.statuses["aligned"], whole.seen.statuses["error"]) == (2, 1)
+    errors = parquet.read_table(tmp_path / "out" / "errors.parquet").to_pylist()
+    assert "none\\udcfe.csv" in errors[0]["log"]
+    assert "bad\\udcff" in (tmp_path / "out" / "index.html").read_text()
+
+
+def test_a_log_that_is_replaced_during_the_run_is_noticed_and_worked_on_again(drive, tmp_path, alone, monkeypatch):
+    (log,) = copied(drive, tmp_path / "drive.csv")
+
+    def replaced(period, signals_to):
+        result = work_on_period(period, signals_to)
+        os.utime(log, ns=(1, 1))
+        return result
+
+    with monkeypatch.context() as patched:
+        patched.setattr(run, "work_on_period", replaced)
+        first = run_fleet([Period("v", "", "car", (log,))], tmp_path / "out")
+    assert first.seen.errors == 1
+    row = parquet.read_table(tmp_path / "out" / "errors.parquet").to_pylist()[0]
+    assert row["reason"] == "changed" and "has changed during the run" in row["message"]
+    second = run_fleet([Period("v", "", "car", (log,))], tmp_path / "out")
+    assert (second.new, second.seen.errors) == (1, 0)
+
+
+def test_no_memory_and_no_disk_are_no_fault_of_kickstands(monkeypatch):
+    for error, reason in ((MemoryError(), "no-memory"), (OSError(5, "Input/output error"), "unreadable")):
+
+        def broken(path, error=error):
+            raise error
+
+        monkeypatch.setattr(files, "open_log", broken)
+        found = work_on_period(Period("v", "", "car", ("x.csv",)))
+        assert found.errors[0]["reason"] == reason
+        assert "Error" not in found.errors[0]["message"]
+
+
+def test_a_file_that_cannot_be_written_says_why(tmp_path, monkeypatch):
+    """On a read-only file system the temporary file cannot be removed either."""
+
+    def read_only(*_, **__):
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr(Path, "unlink", read_only)
+    with pytest.raises(InputError, match="Read-only file system"):
+        write_whole(tmp_path / "x", read_only)
+
+
+PROGRAM = """
+import sys
+from kickstand_tools.fleet.cluster import Cluster
+if __name__ == "__main__":
+    with Cluster(None, 2, 60.0) as cluster:
+        print(cluster._client.scheduler.address, flush=True)
+        sys.stdin.read()
+"""
+
+
+def test_only_this_computer_can_connect_and_nobody_but_the_run_can_run_code(tmp_path):
+    from distributed import Client
+    from distributed.security import Security
+
+    program = tmp_path / "program.py"
+    program.write_text(PROGRAM)
+    with subprocess.Popen([sys.executable, str(program)], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None and process.stdin is not None
+        address = process.stdout.readline().decode().strip()
+        assert address.startswith("tls://127.0.0.1:")
+        family = [psutil.Process(process.pid), *psutil.Process(process.pid).children(recursive=True)]
+        sockets = [one for member in family for one in member.net_connections("inet") if one.status == "LISTEN"]
+        assert len(sockets) >= 3
+        assert {one.laddr.ip for one in sockets} == {"127.0.0.1"}
+        for url, keys in ((address.replace("tls", "tcp"), None), (address, Security.temporary())):
+            with pytest.raises(OSError):
+                Client(url, security=keys, timeout=5)
+        for one in sockets:
+            try:
+                with urllib.request.urlopen(f"http://127.0.0.1:{one.laddr.port}/json/identity.json", timeout=5):
+                    pytest.fail("somebody else may look at the scheduler")
+            except OSError as refused:
+                assert "404" in str(refused) or not isinstance(refused, urllib.error.HTTPError)
+            except http.client.HTTPException:
+                pass  # no web server
+        process.stdin.close()
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"vehicle,path,kind\n" + b"x" * 200_000 + b",a,car\n", "is no table"),
+        (b"vehicle,path,kind\nv,a\x00b.csv,car\n", ""),
+        (b"\xff\xfe", "is no table"),
+    ],
+)
+def test_a_hostile_manifest_is_one_line_or_a_row(tmp_path, alone, content, words):
+    path = tmp_path / "MANIFEST.csv"
+    path.write_bytes(content)
+    if words:
+        command.refused(tmp_path, "fleet", path, "--out", tmp_path / "out", words=words)
+    else:
+        assert run_fleet(read_manifest(str(path)), tmp_path / "out").seen.statuses["error"] == 1
+
+
+def test_an_error_names_the_log_once(tmp_path, alone):
+    (tmp_path / "MANIFEST.csv").write_text("vehicle,path,kind\nv,none.csv,car\n")
+    result = command.works("fleet", tmp_path / "MANIFEST.csv", "--out", tmp_path / "out")
+    line = next(line for line in result.out.splitlines() if line.startswith("error:"))
+    assert line.count("none.csv") == 1
+
+
+def test_a_pipe_is_no_manifest_and_no_log(tmp_path, alone):
+    os.mkfifo(tmp_path / "pipe.csv")
+    command.refused(tmp_path, "fleet", tmp_path / "pipe.csv", "--out", tmp_path / "out", words="not an ordinary file")
+    found = work_on_period(Period("v", "", "car", (str(tmp_path / "pipe.csv"),)))
+    assert "not an ordinary file" in found.errors[0]["message"]
