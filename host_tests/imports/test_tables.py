@@ -226,7 +226,7 @@ def test_a_mistake_in_the_options(tmp_path, name):
 
 def test_columns_are_whole_numbers_floats_or_text():
     text = '1,0.5,start,7\n2, 1.5 ,,\n\n3,NA,"a, ""b""",9\n4,x,1_0,1\n'
-    whole, floats, words, few = cells.columns_of_text(text, ",", 4)
+    (whole, floats, words, few), _ = cells.columns_of_text(text, ",", 4)
     assert whole.dtype.kind == "i" and whole.tolist() == [1, 2, 3, 4]
     assert floats.tolist() == ["0.5", " 1.5 ".lstrip(), "", "x"]
     assert np.allclose(cells.numbers_of(floats), [0.5, 1.5, np.nan, np.nan], equal_nan=True)
@@ -239,7 +239,7 @@ def test_a_damaged_row_costs_itself(monkeypatch):
     """A quotation mark that is not closed, cells too many or too few; a block that is text after one of numbers."""
     monkeypatch.setattr(cells, "ROWS", 2)
     rows = ['"1","2","3"', '"4","5,"6"', "7,8,9,10", "11", f"12,13,{14:0200000d}", "15,stop,16"]
-    first, second, third = cells.columns_of_text("\n".join(rows), ",", 3)
+    (first, second, third), _ = cells.columns_of_text("\n".join(rows), ",", 3)
     assert first.tolist() == [1, 4, 11, 12, 15]
     assert second.tolist() == ["2", "5", "", "13.0", "stop"]
     assert np.allclose(cells.numbers_of(third), [3, 6, np.nan, 14, 16], equal_nan=True)

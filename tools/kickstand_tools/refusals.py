@@ -68,8 +68,8 @@ _SENTENCES = {
     "import-speed-unit": "{0} has no unit, and the positions do not tell it, so the speed is left out: {speed_unit}",
     "import-sign": "which sign accelerations have in {0} is not certain, and no track with turns tells it: at rest the "
     "axis that points up has to read +1 g, else the ride is mirrored and {sign}",
-    "import-damaged": "damaged rows that are left out: {0}; a cell is no number, a time out of order, or a reading "
-    "past any sensor's",
+    "import-damaged": "damaged rows that are left out: {0}; a cell or a time is no number, a time is out of order, "
+    "a row has too many cells, or a reading is past any sensor's",
     "mirrored": "the sensor turns against the track, so left and right are exchanged: were all accelerations "
     "turned? At rest the axis that points up has to read +1 g",
     "left-handed": "the rates turn the force the wrong way, so the lean is wrong: are the axes left-handed (reverse "

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from ..errors import InputError, cause
 from ..logs.reader import check_first_line
-from ..logs.source import File, log_stem, name_of
+from ..logs.source import File, log_stem, name_of, open_input
 from ..output import write_whole
 
 VERSION = 1
+MOST_BYTES = 1_000_000  # of a file; what kickstand writes has a thousandth of that
 MAX_DELAY_S = 0.05  # of a chip's low-pass: the slowest has 33 ms
 ROTATION_TOLERANCE = 2e-3  # a matrix copied with three or four decimals is still good to 0.1 degrees
 
@@ -116,10 +117,16 @@ def read_calibration(source: File) -> CalibrationFile:
     """
     name = name_of(source)
     try:
-        content = Path(source).read_bytes() if isinstance(source, (Path, str)) else source.read()
+        if isinstance(source, (Path, str)):
+            if not Path(source).exists():
+                raise InputError(f"{name}: there is no such file: make it with kickstand calibrate")
+            with open_input(source) as file:
+                content = file.read(MOST_BYTES + 1)
+        else:
+            content = source.read(MOST_BYTES + 1)
+        if len(content) > MOST_BYTES:
+            raise InputError(f"{name} is too large for a calibration, which has under 1 MB", "give_calibration")
         data = json.loads(content if isinstance(content, str) else content.decode("utf-8-sig"))
-    except FileNotFoundError as error:
-        raise InputError(f"{name}: there is no such file: make it with kickstand calibrate") from error
     except OSError as error:
         raise InputError(f"{name} cannot be read: {cause(error)}") from error
     except (ValueError, RecursionError) as error:

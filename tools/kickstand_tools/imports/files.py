@@ -1,16 +1,24 @@
 """The text files of a recording: one file, a folder of them, or a zip, in whatever encoding the app has written."""
 
 import gzip
+import itertools
+import struct
 import zipfile
 import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
+from typing import IO
 
 from ..errors import InputError, cause
+from ..logs.source import open_input
 
 _EXCEL = b"\xd0\xcf\x11\xe0"  # its older files begin so; the newer are zips
 SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # what is looked at in a folder or a zip
+# A recording as text: some hours at 100 Hz. Reading it takes at most ten times its memory.
+MOST_BYTES = 250_000_000
+MOST_FILES = 10_000  # in a folder or a zip
+LONGEST_LINE = 1_000_000  # characters; a table of a thousand columns has a tenth of that
 _BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 
 
@@ -43,14 +51,12 @@ class Piece:
 def read_pieces(source: Path | str) -> list[Piece]:
     """What a file, a folder or a zip holds; in the last two only files of SUFFIXES, and one zip that is all they hold.
 
-    Raises InputError for what is not there, is damaged, empty, or no text.
+    Raises InputError for what is not there, is damaged, empty, no text, or over MOST_BYTES when unpacked.
     """
     path = Path(source)
     try:
-        pieces = [_piece(name, content) for name, content in _contents(path)]
+        pieces = [_piece(name, content) for name, content in _bounded(path)]
         pieces = [piece for piece in pieces if piece is not None] or _no_text(path)
-    except FileNotFoundError as error:
-        raise InputError(f"{path}: there is no such file") from error
     except gzip.BadGzipFile as error:
         raise InputError(f"{path} is not a gzip file: unpacked recordings have names without .gz") from error
     except (zipfile.BadZipFile, NotImplementedError, zlib.error, EOFError) as error:
@@ -63,15 +69,33 @@ def read_pieces(source: Path | str) -> list[Piece]:
     return pieces
 
 
+def _bounded(path: Path) -> Iterator[tuple[str, bytes]]:
+    """_contents(), as long as they are not too large."""
+    size = 0
+    for name, content in _contents(path):
+        size += len(content)
+        if size > MOST_BYTES:
+            raise InputError(f"{path} is too large: over {MOST_BYTES / 1e6:.0f} MB when unpacked: give a part of it")
+        yield name, content
+
+
+def _read(file: IO[bytes]) -> bytes:
+    """No more than tells that it is too much."""
+    return file.read(MOST_BYTES + 1)
+
+
 def _contents(path: Path) -> Iterator[tuple[str, bytes]]:
     if not path.is_dir():
-        content = path.read_bytes()
-        if content.startswith(b"PK\x03\x04") or path.suffix.lower() == ".zip":
-            yield from _unzipped(path)
-        else:
-            yield path.name, gzip.decompress(content) if path.suffix == ".gz" else content
+        with open_input(path) as file:
+            zipped = file.read(4) == b"PK\x03\x04" or path.suffix.lower() == ".zip"
+        yield from _unzipped(path) if zipped else [(path.name, _unpacked_file(path))]
         return
-    names = sorted(file for file in path.rglob("*") if file.is_file())
+    whole = path.resolve()
+    # without those that a link in the folder has elsewhere
+    names = (file for file in path.rglob("*") if file.is_file() and file.resolve().is_relative_to(whole))
+    names = sorted(itertools.islice(names, MOST_FILES + 1))
+    if len(names) > MOST_FILES:
+        raise InputError(f"{path} holds over {MOST_FILES} files: give the folder of one recording")
     inside = [file for file in names if _wanted(file.relative_to(path).as_posix())]
     packed = [file for file in names if file.suffix.lower() == ".zip"]
     if not inside and len(packed) > 1:
@@ -79,24 +103,51 @@ def _contents(path: Path) -> Iterator[tuple[str, bytes]]:
     if not inside and packed:
         yield from _unzipped(packed[0])
     for file in inside:
-        content = file.read_bytes()
-        yield file.relative_to(path).as_posix(), gzip.decompress(content) if file.suffix == ".gz" else content
+        yield file.relative_to(path).as_posix(), _unpacked_file(file)
+
+
+def _unpacked_file(path: Path) -> bytes:
+    with open_input(path) as file:
+        if path.suffix != ".gz":
+            return _read(file)
+        with gzip.GzipFile(fileobj=file) as unpacked:
+            return _read(unpacked)  # type: ignore[arg-type] - it has read()
+
+
+def _check_directory(file: IO[bytes], path: Path) -> None:
+    """Refuse a zip whose directory, which zipfile reads whole, is larger than that of MOST_FILES files."""
+    size = file.seek(0, 2)
+    file.seek(max(0, size - 65_557))
+    _, mark, last = file.read().rpartition(b"PK\5\6")
+    if mark and len(last) >= 12 and struct.unpack_from("<I", last, 8)[0] > 400 * MOST_FILES:
+        raise InputError(f"{path} holds over {MOST_FILES} files: give the zip of one recording")
+    file.seek(0)
 
 
 def _unzipped(path: Path) -> Iterator[tuple[str, bytes]]:
-    with zipfile.ZipFile(path) as archive:
+    with open_input(path) as file:
+        _check_directory(file, path)
+        yield from _entries(file, path)
+
+
+def _entries(file: IO[bytes], path: Path) -> Iterator[tuple[str, bytes]]:
+    with zipfile.ZipFile(file) as archive:
         if "[Content_Types].xml" in archive.namelist():
             raise InputError(f"{path}: a table of Excel: export it as CSV")
         for entry in archive.infolist():
             if not entry.is_dir() and _wanted(entry.filename):
-                yield entry.filename.replace("\\", "/"), _unpacked(archive, entry)
+                yield entry.filename.replace("\\", "/"), _unpacked(archive, entry, path)
 
 
-def _unpacked(archive: zipfile.ZipFile, entry: zipfile.ZipInfo) -> bytes:
+def _unpacked(archive: zipfile.ZipFile, entry: zipfile.ZipInfo, path: Path) -> bytes:
     try:
-        return archive.read(entry)
+        # bzip2 and LZMA are unpacked whole, however little of it is read
+        if entry.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise NotImplementedError
+        with archive.open(entry) as file:
+            return _read(file)
     except RuntimeError as error:  # NotImplementedError is one, too
-        raise InputError(f"{archive.filename} is packed with a password, or in another way: unpack it first") from error
+        raise InputError(f"{path} is packed with a password, or in another way: unpack it first") from error
     except (OSError, ValueError) as error:  # an entry that points outside the file
         raise zipfile.BadZipFile(str(error)) from error
 
@@ -110,7 +161,8 @@ def _wanted(name: str) -> bool:
 
 def _no_text(path: Path) -> list[Piece]:
     if path.is_file():
-        excel = "a table of Excel: export it as CSV" if path.read_bytes()[:4] == _EXCEL else ""
+        with open_input(path) as file:
+            excel = "a table of Excel: export it as CSV" if file.read(4) == _EXCEL else ""
         raise InputError(f"{path}: {excel or 'not text: give what an app has exported as CSV or VBO'}")
     return []
 
@@ -120,6 +172,8 @@ def _piece(name: str, content: bytes) -> Piece | None:
     if content.startswith(b"PAR1"):
         return Piece(name, content, "")
     text = _decoded(content)
+    if max(map(len, text[: 64 * LONGEST_LINE].split("\n", 64)[:64])) > LONGEST_LINE:
+        raise InputError(f"{name}: a line of over {LONGEST_LINE:,} characters: it is no table of a recording")
     if sum(character < " " and character not in "\t\r\n" for character in text[:4000]) > 3:
         return None
     return Piece(name, content, text.replace("\r\n", "\n").replace("\r", "\n"))

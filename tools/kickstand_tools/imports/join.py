@@ -16,6 +16,8 @@ GAP_NS = LOST_US * 1000  # between samples that are further apart nothing is int
 FASTER = 1.5  # times the accelerometer's rate: a gyro so fast is averaged over each of its samples
 MANY = 0.02  # share of readings past MOST_G and MOST_DPS from which they are no damaged cells, but in another unit
 SHUFFLED_NS = 500_000_000  # samples that come later than younger ones by less are put in order
+LATE_STEPS, MOST_LATE = 4.0, 0.02  # of which no larger share is later by more than so many usual steps
+MOST_HZ = 10_000.0  # of an inertial sensor; the fastest have 8,000
 
 
 @dataclass
@@ -65,11 +67,26 @@ def in_order(sensor: Sensor, name: str) -> Sensor:
     kept = ~_damaged(time_ns)
     time_ns, values = time_ns[kept], values[kept]
     late = np.maximum.accumulate(time_ns) - time_ns
+    steps = np.diff(time_ns)
+    usual_ns = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+    if np.count_nonzero(late > LATE_STEPS * usual_ns) > MOST_LATE * len(late):
+        times = int(np.count_nonzero(steps < 0))
+        row = int(np.argmax(steps < 0)) + 2
+        raise InputError(
+            f"{name}: the time of {sensor.name} goes back {times} times, first in its row {row}: is it the time "
+            "since the recording's beginning?"
+        )
     if np.any(late) and np.max(late) < SHUFFLED_NS:
         order = np.argsort(time_ns, kind="stable")
         time_ns, values = time_ns[order], values[order]
     since_s = (time_ns - time_ns[0]) * 1e-9
     even_ns = np.rint(even_times(since_s, f"{name}, {sensor.name}") * 1e9).astype(np.int64) + time_ns[0]
+    hz = 1e9 / float(np.median(np.diff(even_ns)))
+    if hz > MOST_HZ:
+        raise InputError(
+            f"{name}: {sensor.name} has {hz:.0f} samples a second, and no sensor has over {MOST_HZ:.0f}: are the times "
+            "times, and is their unit right?"
+        )
     return Sensor(sensor.name, even_ns, values, sensor.damaged)
 
 

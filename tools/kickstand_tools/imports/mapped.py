@@ -210,7 +210,7 @@ def _sensor(
     source = sheet.named([places[axis] for axis in axes])
     sign = "as it is" if np.all(scale > 0.0) else "turned" if np.all(scale < 0.0) else "turned in part"
     shown = ", ".join(dict.fromkeys(text.lstrip("-") for text in names))
-    return Sensor(quantity, time_ns, values), Taken(quantity, source, shown, rate_hz(time_ns), sign)
+    return Sensor(quantity, time_ns, values, sheet.left_out), Taken(quantity, source, shown, rate_hz(time_ns), sign)
 
 
 def _check_units(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, str]) -> None:

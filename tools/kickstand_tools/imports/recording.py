@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from ..logs.table import Array
 from .sheets import Sheet
-from .times import NO_TIME, Nanoseconds
+from .times import NO_TIME, REPEATED, Nanoseconds
 from .units import SPEEDS, factor
 
 SECOND_NS = 10**9
@@ -31,7 +31,7 @@ class Taken:
 
 def rate_hz(time_ns: Nanoseconds) -> float:
     """Samples in a second, without gaps; 0 where there are too few to tell."""
-    steps = np.diff(time_ns[time_ns != NO_TIME])
+    steps = np.diff(time_ns[time_ns > REPEATED])
     if not np.any(steps > 0):
         return 0.0
     whole = (steps >= 0) & (steps < 5.0 * np.median(steps[steps > 0]))
@@ -41,8 +41,8 @@ def rate_hz(time_ns: Nanoseconds) -> float:
 @dataclass
 class Sensor:
     """n samples: time_ns (n) of the recorder's clock, values (n, 3): g, +1 where the axis points up at rest, or deg/s,
-    right-handed. name: for messages. damaged: rows of its file that are left out, because a value cannot be
-    read; a row without a time of its own or without any value is another sensor's."""
+    right-handed. name: for messages. damaged: rows of its file that are left out, because they have too many
+    cells or their time or a value cannot be read; a row without any value is another sensor's."""
 
     name: str
     time_ns: Nanoseconds
@@ -50,9 +50,9 @@ class Sensor:
     damaged: int = 0
 
     def __post_init__(self) -> None:
-        timed, empty = self.time_ns != NO_TIME, np.all(np.isnan(self.values), axis=1)
-        good = timed & np.all(np.abs(self.values) < _ABSURD, axis=1)  # no NaN either
-        self.damaged += int(np.count_nonzero(timed & ~good & ~empty))
+        without = (self.time_ns == REPEATED) | np.all(np.isnan(self.values), axis=1)
+        good = (self.time_ns > REPEATED) & np.all(np.abs(self.values) < _ABSURD, axis=1)  # no NaN either
+        self.damaged += int(np.count_nonzero(~good & ~without))
         self.time_ns, self.values = self.time_ns[good], self.values[good]
 
 
@@ -63,7 +63,7 @@ def sensor_of(
     quantity, unit, sign = what
     source = sheet.named(places)
     values = sheet.table(places) * scale
-    return Sensor(quantity, time_ns, values), Taken(quantity, source, unit, rate_hz(time_ns), sign)
+    return Sensor(quantity, time_ns, values, sheet.left_out), Taken(quantity, source, unit, rate_hz(time_ns), sign)
 
 
 @dataclass

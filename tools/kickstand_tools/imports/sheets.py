@@ -18,11 +18,13 @@ _DECIMAL_COMMA = re.compile(r"(?:^|[;\t\"])\s*[+-]?\d+,\d")
 
 @dataclass
 class Sheet:
-    """name: of the file, for messages. columns: as they are called in it, some perhaps twice. cells: of each column."""
+    """name: of the file, for messages. columns: as they are called in it, some perhaps twice. cells: of each column.
+    left_out: rows that were damaged."""
 
     name: str
     columns: list[str]
     cells: list[Cells]
+    left_out: int = 0
 
     def place(self, *names: str) -> int | None:
         """Number of the first column of one of these names, compared by plain()."""
@@ -88,4 +90,4 @@ def read_sheet(piece: Piece, header: int = 0, skipped: int = 0) -> Sheet:
     text, separator = lines[-1], separator_of(lines[header])
     if separator != "," and _DECIMAL_COMMA.search(text[:20000]):
         text = text.replace(",", ".")
-    return Sheet(piece.name, columns, columns_of_text(text, separator, max(len(columns), 1)))
+    return Sheet(piece.name, columns, *columns_of_text(text, separator, max(len(columns), 1)))

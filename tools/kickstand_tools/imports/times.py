@@ -14,6 +14,7 @@ from .units import TIMES, unit
 Nanoseconds = NDArray[np.int64]
 
 NO_TIME = np.iinfo(np.int64).min  # of a cell that holds none
+REPEATED = NO_TIME + 1  # of a row that repeats a sample of an earlier one
 DATES = "date or clock"
 EPOCH_NS = 10**17  # 1973: a later time counts from 1970
 DAY_NS = 86400 * 10**9

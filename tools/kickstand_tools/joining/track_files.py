@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, cause, extra
-from ..logs.source import Progress
+from ..logs.source import Progress, open_input
 from .track import FASTEST_MPS, Track
 
 _DEGREES = 180.0 / 2**31  # of a FIT file's semicircle
 _FEWEST = 30  # points of a track
+_MOST_BYTES = 50_000_000  # a day at a fix a second has 20 million; as a document it takes ten times the memory
 
 Point = tuple[float, float, float, float]  # s since 1970, latitude and longitude in degrees, m/s or NaN
 
@@ -35,12 +36,18 @@ def read_track(path: Path | str, progress: Progress | None = None) -> Track:
     reader = _READERS.get(path.suffix.lower())
     if reader is None:
         raise InputError(f"{path}: the name of a track ends in .gpx or .fit: export the track as one of these")
-    if not path.is_file():
-        raise InputError(f"{path}: there is no such file")
     try:
+        with open_input(path) as file:
+            size = file.seek(0, 2)
+        if size > _MOST_BYTES:
+            raise InputError(f"{path} is too large for a track: over {_MOST_BYTES / 1e6:.0f} MB: export a part of it")
         points = list(reader(path, progress))
+    except InputError:
+        raise
     except OSError as error:
         raise InputError(f"{path} cannot be read: {cause(error)}") from error
+    except Exception as error:  # of the formats' libraries, which raise many kinds for damaged files
+        raise InputError(f"{path} is damaged, or not of the format that its name says: {_words(error)}") from error
     table = np.array(points, dtype=float).reshape(-1, 4)
     on_earth = (np.abs(table[:, 1]) <= 90.0) & (np.abs(table[:, 2]) <= 180.0)
     table = table[np.all(np.isfinite(table[:, :3]), axis=1) & on_earth]
@@ -64,7 +71,7 @@ def _gpx(path: Path, progress: Progress | None) -> Iterator[Point]:
     try:
         document = gpxpy.parse(content)
     except (gpxpy.gpx.GPXException, ValueError, LookupError) as error:
-        raise InputError(f"{path} is no GPX file, or its copy is not whole: {error}") from error
+        raise InputError(f"{path} is no GPX file, or its copy is not whole: {_words(error)}") from error
     for track in document.tracks:
         for segment in track.segments:
             for point in segment.points:
@@ -107,7 +114,12 @@ def _fit(path: Path, progress: Progress | None) -> Iterator[Point]:
                 if progress:
                     progress(min(file.tell(), total), total)
     except (fitdecode.FitError, TypeError, ValueError) as error:
-        raise InputError(f"{path} is no FIT file, or a damaged one: {error}") from error
+        raise InputError(f"{path} is no FIT file, or a damaged one: {_words(error)}") from error
+
+
+def _words(error: Exception) -> str:
+    """The beginning of what a library says, which may quote all of a file."""
+    return ascii(" ".join(str(error).split())[:60])[1:-1] or type(error).__name__
 
 
 _FIT_FIELDS = ("timestamp", "position_lat", "position_long", "speed", "enhanced_speed")

@@ -31,6 +31,7 @@ from .units_check import check_units
 
 BLOCK_BYTES = 1 << 20  # of text, some 15000 samples
 BLOCK_SAMPLES = 60_000  # of a log in memory
+MOST_SAMPLES = 10_000_000  # fourteen hours at 200 Hz, which as a whole take some 1 GB of memory
 _NUMERIC = b"0123456789+-.eE, \n"  # where nothing else stands, numpy may read it
 
 Source = File | Log | Stretch  # what can be read as a log
@@ -89,6 +90,10 @@ def read_blocks(
         if not count:
             check_units(name, block)
         count += len(block.time_us)
+        if count > MOST_SAMPLES:
+            raise InputError(
+                f"{name} has over {MOST_SAMPLES / 1e6:.0f} million samples: kickstand cut makes a part of it"
+            )
         block.lines = block.lines if lines else []
         block.frozen = frozen.mark(block)
         if block.has_speed:

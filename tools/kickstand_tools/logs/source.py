@@ -12,6 +12,8 @@ from kickstand.errors import Notice
 
 from ..errors import InputError, cause
 
+# Bytes of a line, or of NUL bytes at the end, which is what a file system leaves of a file that was not closed
+LONGEST_LINE = 16_000_000
 File = Path | str | IO[bytes] | IO[str]
 Progress = Callable[[int, int], None]  # called with (done, total) in one unit; total is 0 where it is not known
 
@@ -60,9 +62,9 @@ def chunks(source: File, size: int, remarks: list[Notice] | None = None) -> Iter
                 open_input(source) as packed,
                 cast(IO[bytes], gzip.open(packed)) if str(source).endswith(".gz") else packed as file,
             ):
-                yield from _pieces(file, packed, size, remarks)
+                yield from _pieces(name, file, packed, size, remarks)
         else:
-            yield from _pieces(source, source, size, remarks)
+            yield from _pieces(name, source, source, size, remarks)
     except gzip.BadGzipFile as error:
         if "Not a gzipped" in str(error):
             raise InputError(f"{name} is not a gzip file: unpacked logs have names without .gz") from error
@@ -82,12 +84,14 @@ def total_bytes(source: object) -> int:
     return 0
 
 
-def _pieces(file: Any, packed: Any, size: int, remarks: list[Notice] | None) -> Iterator[tuple[bytes, int]]:
-    """packed: the file below `file`, whose position tells the bytes read; the same one where nothing is packed."""
+def _pieces(name: str, file: Any, packed: Any, size: int, remarks: list[Notice] | None) -> Iterator[tuple[bytes, int]]:
+    """packed: the file below `file`, whose position is the bytes read; the same one where nothing is packed."""
     pending, read = b"", 0
     for data in _data(file, size, remarks):
         read += len(data)
         pending += data
+        if len(pending) > LONGEST_LINE + size:
+            raise InputError(f"{name}: {LONGEST_LINE / 1e6:.0f} MB without the end of a line: it is no log")
         if len(pending) >= size:
             cut = pending.rfind(b"\n") + 1 or pending.rfind(b"\r") + 1
             if cut:

@@ -31,9 +31,13 @@ def telemetry(video: Video) -> Telemetry | None:
     if video.telemetry is None:
         return None
     times, rates = [], []
-    for at_s, lasts_s, packet in packets(video, video.telemetry):
+    try:
+        found = packets(video, video.telemetry)
+    except ValueError:  # not the numbers that ffmpeg prints of a packet
+        return None
+    for at_s, lasts_s, packet in found:
         samples = [values for values in streams(packet, b"GYRO") if len(values)]
-        if samples and lasts_s > 0.0:
+        if samples and lasts_s > 0.0 and np.all(np.abs(samples[0]) < 1e3):
             rate = samples[0]
             times.append(at_s + lasts_s * (np.arange(len(rate)) + 0.5) / len(rate))
             rates.append(np.degrees(rate))
@@ -61,7 +65,8 @@ def _of_stream(body: bytes, key: bytes) -> Iterator[Array]:
         if name == b"SCAL":
             scale = numbers if len(numbers) == 3 else numbers[:1]
         elif axes >= 3:
-            yield numbers[: len(numbers) // axes * axes].reshape(-1, axes)[:, :3] / scale
+            with np.errstate(all="ignore"):  # a damaged scale may be 0
+                yield numbers[: len(numbers) // axes * axes].reshape(-1, axes)[:, :3] / scale
 
 
 def _items(data: bytes) -> Iterator[tuple[bytes, bytes, int, bytes]]:

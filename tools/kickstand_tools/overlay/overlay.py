@@ -17,7 +17,7 @@ from ..output import write_whole
 from .camera_match import camera_offset_s
 from .gpmf import telemetry
 from .shown import Shown, shown
-from .video import Video, ffmpeg, open_video, write_video
+from .video import Video, ffmpeg, input_of, open_video, write_video
 
 MARGIN = 0.03  # of the video's height: from its edges to the gauge
 _BEYOND_S = 1.0  # by which a video may begin before the ride or end after it
@@ -175,7 +175,7 @@ def _over(video: Video, begin_s: float, seconds: float, fps: float | None, gauge
     rate = f",fps={fps:g}" if fps else ""
     laid = f"overlay=x={margin}:y=main_h-overlay_h-{margin}:eof_action=repeat"
     return [
-        *("-ss", f"{max(begin_s, 0.0):.4f}", "-t", f"{seconds:.4f}", "-i", str(video.path), *gauge),
+        *("-ss", f"{max(begin_s, 0.0):.4f}", "-t", f"{seconds:.4f}", *input_of(video.path), *gauge),
         *("-filter_complex", f"[0:v:0]{even}{rate}[film];[film][1:v]{laid}[all]"),
         *("-map", "[all]", "-map", "0:a?", "-c:a", "copy", *_SOLID),
     ]

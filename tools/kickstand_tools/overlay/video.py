@@ -10,6 +10,7 @@ from pathlib import Path
 from ..errors import InputError, extra
 
 _QUIET = ("-hide_banner", "-loglevel", "error", "-nostdin", "-y")
+_LARGEST, _FASTEST = 16_384, 1000.0  # pixels of a side, pictures a second: more than any camera's
 
 
 @dataclass
@@ -38,11 +39,17 @@ def ffmpeg() -> str:
         raise InputError("imageio-ffmpeg has no ffmpeg for this system: install ffmpeg") from error
 
 
+def input_of(path: Path) -> list[str]:
+    """ffmpeg's arguments to read a file. By its name alone it would take 12:30.mp4 for a protocol, and what poses as a
+    video could have it read from the network."""
+    return ["-protocol_whitelist", "file,pipe", "-i", f"file:{path}"]
+
+
 def open_video(path: Path) -> Video:
     """What a video is. Raises InputError for a file that is none."""
     if not path.is_file():
         raise InputError(f"{path}: there is no such file" if not path.is_dir() else f"{path} is a directory, no video")
-    said = _run(["-hide_banner", "-nostdin", "-i", str(path)]).stderr.decode(errors="replace")
+    said = _run(["-hide_banner", "-nostdin", *input_of(path)]).stderr.decode(errors="replace")
     stream = re.search(r"Stream #0:\d+.*: Video: (.*)", said)
     if "Input #0" not in said:
         raise InputError(f"{path} is no video that ffmpeg can read, or its copy is not whole")
@@ -50,12 +57,14 @@ def open_video(path: Path) -> Video:
         raise InputError(f"{path} has no pictures: give a video")
     size = re.search(r"\b(\d{2,5})x(\d{2,5})\b", stream[1])
     rate = re.search(r"([\d.]+)(k?) fps", stream[1]) or re.search(r"([\d.]+)(k?) tbr", stream[1])
-    counted = _run(["-hide_banner", "-nostdin", "-i", str(path), "-map", "0:v:0", "-c", "copy", "-f", "null", "-"])
+    counted = _run(["-hide_banner", "-nostdin", *input_of(path), "-map", "0:v:0", "-c", "copy", "-f", "null", "-"])
     pictures = re.findall(r"frame= *(\d+)", counted.stderr.decode(errors="replace"))
     if not size or not rate or not pictures or not int(pictures[-1]) or counted.returncode:
         raise InputError(f"{path} is a damaged video: copy it again")
     fps = float(rate[1]) * (1000.0 if rate[2] else 1.0)
     width, height = int(size[1]), int(size[2])
+    if max(width, height) > _LARGEST or not 0.0 < fps <= _FASTEST:
+        raise InputError(f"{path} is no camera's video: {width}x{height} pixels, {fps:g} pictures a second")
     turned = re.search(r"rotation of (-?[\d.]+) degrees", said)
     if turned and round(float(turned[1])) % 180 == 90:
         width, height = height, width
@@ -72,7 +81,7 @@ def open_video(path: Path) -> Video:
 
 def packets(video: Video, stream: int) -> list[tuple[float, float, bytes]]:
     """When each packet of a stream begins, how long it is for (s since the first picture), and what is in it."""
-    chosen = ["-i", str(video.path), "-map", f"0:{stream}", "-c", "copy"]
+    chosen = [*input_of(video.path), "-map", f"0:{stream}", "-c", "copy"]
     listed = _run([*_QUIET, *chosen, "-f", "framecrc", "-"]).stdout.decode(errors="replace")
     data = _run([*_QUIET, *chosen, "-f", "data", "-"]).stdout
     tick = re.search(r"#tb 0: (\d+)/(\d+)", listed)
@@ -95,7 +104,7 @@ def write_video(
     each: called after every picture. Raises InputError with ffmpeg's own words where it fails.
     """
     with tempfile.TemporaryFile() as words:
-        command = [ffmpeg(), "-hide_banner", "-loglevel", "error", "-y", *arguments, str(out)]
+        command = [ffmpeg(), "-hide_banner", "-loglevel", "error", "-y", *arguments, f"file:{out}"]
         process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=words)
         assert process.stdin is not None
         try:

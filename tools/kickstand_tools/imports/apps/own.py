@@ -10,6 +10,7 @@ import numpy as np
 
 from ...errors import InputError, extra
 from ...logs.cells import COLUMNS
+from ..cells import MOST_CELLS
 from ..files import Piece
 from ..recording import Recording, sensor_of, track_of
 from ..sheets import Sheet, cells_of, read_sheet
@@ -77,10 +78,13 @@ def _sheet(piece: Piece) -> Sheet:
     try:
         from pyarrow import parquet
 
+        size = parquet.ParquetFile(io.BytesIO(piece.content)).metadata
+        if size.num_rows * size.num_columns > MOST_CELLS:
+            raise InputError(f"{piece.name} is too large: over {MOST_CELLS / 1e6:.0f} million cells")
         table = parquet.read_table(io.BytesIO(piece.content))
     except ImportError as error:
         raise InputError("Parquet needs pyarrow: " + extra("rides")) from error
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, NotImplementedError, KeyError, TypeError) as error:
         raise InputError(f"{piece.name} is damaged or cut short: copy it again") from error
     columns = [str(column) for column in table.column_names]
     if "t_s" not in columns:

@@ -11,7 +11,7 @@ from ...errors import InputError
 from ..files import Piece
 from ..recording import Recording, Sensor, Taken, Track, sensor_of, track_of
 from ..sheets import Sheet, cells_of, plain, read_sheet
-from ..times import NO_TIME, Nanoseconds, times_ns
+from ..times import NO_TIME, REPEATED, Nanoseconds, times_ns
 from ..units import RATES
 
 NAME = "SensorLog"
@@ -53,7 +53,7 @@ def _places(sheet: Sheet, names: list[str]) -> list[int]:
 def _clock(sheet: Sheet, sensor: str) -> Nanoseconds:
     """A sensor's own times; only the first row of each of its samples has one, for a row repeats what is not new."""
     time_ns = _times(sheet, sensor)
-    return np.where(np.diff(time_ns, prepend=NO_TIME) == 0, NO_TIME, time_ns)
+    return np.where(np.diff(time_ns, prepend=NO_TIME) == 0, REPEATED, time_ns)
 
 
 def _times(sheet: Sheet, sensor: str) -> Nanoseconds:
@@ -77,7 +77,7 @@ def _accelerometer(sheet: Sheet, name: str) -> tuple[Sensor, list[Taken]]:
     time_ns = _clock(sheet, "motion")
     _, first = sensor_of(sheet, time_ns, user, -1.0, ("accelerometer", "g", "without gravity: gravity added"))
     _, second = sensor_of(sheet, time_ns, gravity, -1.0, ("accelerometer", "g", _UP))
-    total = Sensor("accelerometer", time_ns, -sheet.table(user) - sheet.table(gravity))
+    total = Sensor("accelerometer", time_ns, -sheet.table(user) - sheet.table(gravity), sheet.left_out)
     return total, [first, second]
 
 
