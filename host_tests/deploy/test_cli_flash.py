@@ -29,7 +29,7 @@ def board(tmp_path, monkeypatch):
     board = fake_board.FakeBoard(tmp_path / "flash")
     board.path("boot.py").write_text("# boot\n")
     monkeypatch.setattr(list_ports, "comports", lambda: [MODEM, PICO, BUILT_IN, PROBE])
-    monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: board)
+    monkeypatch.setattr(connection, "Board", lambda name, timeout: board)
     monkeypatch.setattr(connection, "_RESTART_S", 0)
     return board
 
@@ -154,7 +154,7 @@ def sources():
 def test_a_board_that_takes_other_bytecode_gets_the_sources(board, monkeypatch, mpy, words):
     command.works("flash")
     other = fake_board.FakeBoard(board.root, mpy=mpy)
-    monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: other)
+    monkeypatch.setattr(connection, "Board", lambda name, timeout: other)
     result = command.works("flash")
     assert fake_board.files(board.root) == sources() | {"/boot.py": b"# boot\n"}
     assert re.search(f"note: .*{words}.*: it gets the sources", result.out)
@@ -170,7 +170,7 @@ def test_without_mpy_cross_it_gets_the_sources(board, monkeypatch):
 def test_machine_code_is_for_the_board(board, monkeypatch):
     """Of an ESP32 here: what has machine code in it differs from a Pico's, bytecode does not."""
     other = fake_board.FakeBoard(board.root, mpy=0x2B06)
-    monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: other)
+    monkeypatch.setattr(connection, "Board", lambda name, timeout: other)
     command.works("flash")
     found = fake_board.files(board.root)
     assert {path for path, data in wanted().items() if found[path] != data} == {
@@ -222,7 +222,7 @@ def test_a_cable_pulled_while_copying(board):
 @pytest.mark.parametrize("verb", ["flash", "status"])
 def test_another_python_is_refused(board, monkeypatch, verb):
     other = fake_board.FakeBoard(board.root, python="circuitpython")
-    monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: other)
+    monkeypatch.setattr(connection, "Board", lambda name, timeout: other)
     refused(other, verb, words="runs circuitpython: put MicroPython on the board")
 
 
@@ -248,7 +248,7 @@ def test_several_boards(tmp_path, monkeypatch):
 def test_a_named_port_is_taken_as_it_is(board, monkeypatch):
     opened = []
     monkeypatch.setattr(list_ports, "comports", list)
-    monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: opened.append(name) or board)
+    monkeypatch.setattr(connection, "Board", lambda name, timeout: opened.append(name) or board)
     command.works("flash", "--port", "rfc2217://10.0.0.9:2217")
     assert opened == ["rfc2217://10.0.0.9:2217"]
 

@@ -231,5 +231,5 @@ def test_each_check_is_run_and_any_failure_counts(dev, monkeypatch, failing):
 
     monkeypatch.setattr(dev, "run", run)
     assert dev.test(["-k", "lean"]) == 1
-    assert [command[1] for command in ran] == ["ruff", "pyright", "pytest"]
-    assert ran[2][-2:] == ("-k", "lean")
+    assert [command[1] for command in ran] == ["ruff", "ruff", "pyright", "pytest"]
+    assert ran[3][-2:] == ("-k", "lean")

@@ -23,7 +23,7 @@ def board(tmp_path, monkeypatch):
     board.path("config.py").write_text("# on the board\n")
     pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
     monkeypatch.setattr(list_ports, "comports", lambda: [pico])
-    monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: board)
+    monkeypatch.setattr(connection, "Board", lambda name, timeout: board)
     monkeypatch.setattr(connection, "_RESTART_S", 0)
     return board
 

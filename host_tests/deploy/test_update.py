@@ -57,7 +57,7 @@ def plugged(monkeypatch):
     def plug(board):
         pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
         monkeypatch.setattr(list_ports, "comports", lambda: [pico])
-        monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: board)
+        monkeypatch.setattr(connection, "Board", lambda name, timeout: board)
         monkeypatch.setattr(connection, "_RESTART_S", 0)
         monkeypatch.setattr(flash, "contents", lambda mpy: dict(contents(mpy or None)))
         return board

@@ -95,7 +95,7 @@ def streaming(tmp_path, monkeypatch):
         board.serial = Stream(blocks, end, last)
         pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
         monkeypatch.setattr(list_ports, "comports", lambda: [pico])
-        monkeypatch.setattr(connection, "SerialTransport", lambda name, timeout: board)
+        monkeypatch.setattr(connection, "Board", lambda name, timeout: board)
         monkeypatch.setattr(connection, "_RESTART_S", 0)
         monkeypatch.setattr(board_console, "time", Clocks)
         return board

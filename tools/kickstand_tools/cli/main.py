@@ -4,7 +4,7 @@ import sys
 
 import click
 
-from ..errors import InputError
+from ..errors import InputError, cause
 from . import board, calibrate, calibrate_ride, fleet, import_, join, overlay, ride, simulated, without_a_board
 
 
@@ -45,6 +45,13 @@ def main(arguments: list[str] | None = None) -> None:
         _refuse(f"{message}{'' if message.endswith(('.', '?')) else '.'} See {command} --help.")
     except click.ClickException as error:
         _refuse(error.format_message())
+    except OSError as error:
+        about = f"{error.filename}: " if error.filename else ""
+        _refuse(f"{about}{cause(error)}: check the disk, the file or the connection, then repeat this")
+    except MemoryError:
+        _refuse("this takes more memory than there is: give a part of it, or close other programs")
+    except UnicodeError as error:
+        _refuse(f"a name or a text is not in the letters that it should be in ({error}): rename the file")
     except Exception as error:
         if sys.flags.dev_mode:  # python -X dev: for whoever looks for the fault
             raise

@@ -1,5 +1,6 @@
 """What a program on the board prints, line by line while it runs: mpremote reads byte by byte, or after its end."""
 
+import math
 import threading
 import time
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ _END = b"\x04"  # of the program's output, and of its error
 _PROMPT = b">"  # after both
 _LAST_S = 10.0  # for what the program still prints after Ctrl-C
 _POLL_S = 0.01
+_LONGEST_LINE = 100_000  # bytes; those of rides have 2,000
 _AWAY_S = 1.0  # this computer slept, or was too busy to read: a board that streams stops itself then
 _AWAY_SILENT_S = 5.0  # after that, how long the board may print nothing
 
@@ -21,15 +23,20 @@ class BrokenOff(Exception):
 
 
 def lines(
-    transport: SerialTransport, code: str, silent_s: float, stopped: threading.Event | None = None
+    transport: SerialTransport,
+    code: str,
+    silent_s: float,
+    stopped: threading.Event | None = None,
+    most_bytes: float = math.inf,
 ) -> Iterator[bytes]:
     """Run code on the board; each line that it prints, without the line's end. Raises BrokenOff, OSError.
 
-    silent_s: how long it may print nothing, seconds.  stopped: once set, the program gets a Ctrl-C.
+    silent_s: how long it may print nothing, seconds.  stopped: once set, the program gets a Ctrl-C.  most_bytes: how
+    much it may print.
     """
     transport.exec_raw_no_follow(code)
     serial: Any = transport.serial
-    said = b""
+    said, count = b"", 0
     asked_s = None
     heard_s = time.monotonic()
     away_s, polled_s = 0.0, time.time()  # unlike the monotonic clock it goes on while the computer sleeps
@@ -40,7 +47,10 @@ def lines(
         away_s, polled_s = max(away_s, time.time() - polled_s), time.time()
         if waiting := serial.inWaiting():
             heard_s = time.monotonic()
-            said += serial.read(waiting)
+            got = serial.read(waiting)
+            said, count = said + got, count + len(got)
+            if count > most_bytes or len(said) > _LONGEST_LINE + len(got):
+                raise BrokenOff("the board does not come to an end")
         elif time.monotonic() - heard_s > silent_s:
             raise BrokenOff("the board says nothing any more")
         elif away_s > _AWAY_S and time.monotonic() - heard_s > min(silent_s, _AWAY_SILENT_S):

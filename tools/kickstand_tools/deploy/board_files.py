@@ -1,15 +1,16 @@
 """What is on a board's flash: its files with their hashes, its folders, its free blocks."""
 
-import ast
 import hashlib
 from dataclasses import dataclass
 
 from mpremote.transport_serial import SerialTransport
 
+from .connection import literal
 from .firmware_files import PACKAGE
 
 # Prints (path, size, SHA-256) of each file in the root and below the package's folder, (path, None, None) of each
-# folder below the package's folder, that folder itself included.
+# folder below the package's folder, that folder itself included; the folder of rides if it holds any; and (bytes of a
+# block, free blocks) of the flash.
 _SURVEY = """
 import hashlib, os
 def survey(directory):
@@ -30,8 +31,11 @@ def survey(directory):
                 digest.update(block)
         print((path, size, digest.digest()))
 survey("")
-""".replace("{PACKAGE}", PACKAGE)
-
+if any("/" + entry[0] == "{RIDES}" for entry in os.ilistdir("/")) and list(os.ilistdir("{RIDES}")):
+    print("{RIDES}")
+s = os.statvfs("/")
+print((s[0], s[3]))
+"""
 _RIDES = "/rides"  # in flash, see kickstand.rides.flash_ring.directory()
 
 Fingerprint = tuple[int, bytes]
@@ -52,14 +56,17 @@ class BoardFiles:
 
 def survey(transport: SerialTransport) -> BoardFiles:
     """Look at the board's flash."""
-    entries = [ast.literal_eval(line) for line in transport.exec(_SURVEY).decode().splitlines()]
-    block, free_blocks = transport.eval("(lambda s: (s[0], s[3]))(__import__('os').statvfs('/'))")
+    code = _SURVEY.replace("{PACKAGE}", PACKAGE).replace("{RIDES}", _RIDES)
+    *lines, last = transport.exec(code).splitlines() or [b""]
+    has_rides = _RIDES.encode() in lines[-1:]
+    entries = [literal(line, (str, int, bytes), (str, None, None)) for line in lines[: len(lines) - has_rides]]
+    block, free_blocks = literal(last, (int, int))
     return BoardFiles(
         {path: (size, digest) for path, size, digest in entries if size is not None},
         frozenset(path for path, size, _ in entries if size is None),
         block,
         free_blocks,
-        transport.fs_isdir(_RIDES) and bool(transport.fs_listdir(_RIDES)),
+        has_rides,
     )
 
 

@@ -69,7 +69,7 @@ def fault(path: Path) -> tuple[int | None, str] | None:
         exec(compile(source, path, "exec"), vars(module))
     except SyntaxError as error:
         return error.lineno, f"SyntaxError: {error.msg}"
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         frames = traceback.extract_tb(error.__traceback__)
         lines = [frame.lineno for frame in frames if frame.filename == str(path)]
         return lines[-1] if lines else None, f"{type(error).__name__}: {error}"

@@ -1,5 +1,6 @@
 """A connection to a board at its raw prompt, by mpremote, and what its errors mean."""
 
+import ast
 import contextlib
 import errno
 import io
@@ -16,6 +17,7 @@ from .ports import find_port, why_closed
 # Called with what is being done, the bytes that are done and the bytes in all.
 Progress = Callable[[str, int, int], None]
 
+MOST_BYTES = 1_000_000  # of an answer; the longest, the list of a board's files, has a hundredth of that
 _ANSWER_S = 10
 _EMULATED = "socket:"  # begins the name of an emulated board's port
 _SLOWER = 12  # how much longer than a board an emulated one may take: its seconds last longer where the host is busy
@@ -30,13 +32,33 @@ class OutdatedFirmware(InputError):
     """The firmware on the board lacks a module that these tools ask for."""
 
 
-class _SlowBoard(SerialTransport):
-    """A board whose seconds last longer than ours: mpremote's limits on silence are stretched alike."""
+class Board(SerialTransport):
+    """A board whose answers end: mpremote waits for as long as something comes. slower: how much longer than a real
+    board's its seconds last, by which mpremote's limits on silence are stretched."""
+
+    slower = 1
 
     def read_until(self, min_num_bytes, ending, timeout=10, data_consumer=None, timeout_overall=None):
-        """See SerialTransport."""
-        limits: list[Any] = [limit and limit * _SLOWER for limit in (timeout, timeout_overall)]
-        return super().read_until(min_num_bytes, ending, limits[0], data_consumer, limits[1])
+        """See SerialTransport. Raises TransportError for an answer of over MOST_BYTES."""
+        limits: list[Any] = [limit and limit * self.slower for limit in (timeout, timeout_overall)]
+        said = bytearray()
+
+        def take(piece: bytes) -> None:
+            said.extend(piece)
+            if len(said) > MOST_BYTES:
+                raise TransportError("the answer does not end")
+            if data_consumer:
+                data_consumer(piece)
+
+        while True:  # until the last byte of ending comes, again and again
+            before = len(said)
+            super().read_until(min_num_bytes, ending[-1:], limits[0], take, limits[1])
+            if len(said) == before or said.endswith(ending) or not said.endswith(ending[-1:]):
+                return bytes(said)
+
+
+class _EmulatedBoard(Board):
+    slower = _SLOWER
 
 
 @contextlib.contextmanager
@@ -48,10 +70,8 @@ def connected(port: str | None) -> Iterator[tuple[SerialTransport, str]]:
     """
     name = port or find_port()
     try:
-        if name.startswith(_EMULATED):
-            transport = _SlowBoard(name, timeout=_ANSWER_S * _SLOWER)
-        else:
-            transport = SerialTransport(name, timeout=_ANSWER_S)
+        kind = _EmulatedBoard if name.startswith(_EMULATED) else Board
+        transport = kind(name, timeout=_ANSWER_S * (_SLOWER if kind is _EmulatedBoard else 1))
     except (TransportError, ValueError):
         raise why_closed(name) from None
     try:
@@ -76,11 +96,43 @@ def restart(transport: SerialTransport) -> None:
     time.sleep(_RESTART_S)
 
 
+def ask(transport: SerialTransport, expression: str, *shapes: Any) -> Any:
+    """What an expression of Python is on the board. shapes: see literal(). Raises InputError."""
+    return literal(transport.exec(f"print(repr({expression}))"), *shapes)
+
+
+def literal(text: bytes, *shapes: Any) -> Any:
+    """What a line of a board's output stands for.
+
+    shapes: what it may be: a type, or a tuple of the types of a tuple's values; numbers are whole and not negative, and
+    None stands for None. Raises InputError for everything else: the board may be another device.
+
+    >>> literal(b"('/rides', 3)", (str, int))
+    ('/rides', 3)
+    """
+    try:
+        value = ast.literal_eval(text.decode().strip())
+    except (SyntaxError, ValueError, TypeError, MemoryError, RecursionError):
+        value = literal  # of no shape
+    if any(_fits(value, shape) for shape in shapes):
+        return value
+    shown = ascii(text[:40].decode(errors="replace").strip())
+    raise InputError(f"the board's answer {shown} makes no sense: plug it in again, then repeat this")
+
+
+def _fits(value: Any, shape: Any) -> bool:
+    if isinstance(shape, tuple):
+        return type(value) is tuple and len(value) == len(shape) and all(map(_fits, value, shape))
+    return value is None if shape is None else type(value) is shape and (shape is not int or 0 <= value < 1 << 40)
+
+
 def describe(transport: SerialTransport, name: str) -> str:
     """The board and its version of MicroPython. Raises InputError for another Python."""
-    implementation, version, machine = transport.eval(
+    implementation, version, machine = ask(
+        transport,
         "(lambda i: (i.name, '.'.join(str(n) for n in i.version[:3]), getattr(i, '_machine', 'board')))"
-        "(__import__('sys').implementation)"
+        "(__import__('sys').implementation)",
+        (str, str, str),
     )
     if implementation != "micropython":
         raise InputError(f"{name} runs {implementation}: put MicroPython on the board first")

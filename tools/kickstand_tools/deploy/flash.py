@@ -9,7 +9,7 @@ from .. import firmware_path
 from ..errors import InputError
 from . import bytecode, config_check
 from .board_files import fingerprint, survey
-from .connection import Progress, connected, describe, restart
+from .connection import Progress, ask, connected, describe, restart
 from .firmware_files import CONFIG, contents, unfinished
 from .update import Update, plan, refuse_without_room
 
@@ -54,11 +54,11 @@ def flash(port: str | None, replace_config: bool = False, progress: Progress | N
     with connected(port) as (transport, name):
         board = describe(transport, name)
         source = firmware_path.config()
-        config = source if replace_config or not transport.fs_exists(CONFIG) else None
+        there = ask(transport, "[entry[0] for entry in __import__('os').ilistdir('/')]", list)
+        config = source if replace_config or CONFIG[1:] not in there else None
         try:
             names = "(lambda s: (s.platform, getattr(s.implementation, '_machine', '')))(__import__('sys'))"
-            platform, machine = transport.eval(names)
-            judged = config_check.judge(source, str(platform), str(machine))
+            judged = config_check.judge(source, *ask(transport, names, (str, str)))
             if config and judged.fault:
                 raise InputError(judged.fault)
             wanted, why_sources = _contents(transport)
@@ -110,7 +110,7 @@ def install(transport: SerialTransport, update: Update, progress: Progress | Non
 
 def _contents(transport: SerialTransport) -> tuple[dict[str, bytes], str | None]:
     """The firmware for this board, and why it is not compiled."""
-    mpy = int(transport.eval("getattr(__import__('sys').implementation, '_mpy', 0)"))  # 0: takes no compiled files
+    mpy = ask(transport, "getattr(__import__('sys').implementation, '_mpy', 0)", int)  # 0: takes no compiled files
     try:
         return contents(mpy), None
     except bytecode.CannotCompile as reason:

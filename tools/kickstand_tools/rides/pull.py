@@ -1,6 +1,5 @@
 """Rides from the board's flash or SD card to logs on the host, by mpremote."""
 
-import ast
 import binascii
 import contextlib
 import itertools
@@ -13,7 +12,7 @@ from mpremote.transport import TransportExecError
 from mpremote.transport_serial import SerialTransport
 
 from ..deploy.board_console import BrokenOff, lines
-from ..deploy.connection import Progress, connected, last_line, refuse_unfit_firmware, restart
+from ..deploy.connection import Progress, connected, last_line, literal, refuse_unfit_firmware, restart
 from ..errors import InputError
 from ..output import check_directory
 from . import ride_log
@@ -136,8 +135,11 @@ def _list(transport: SerialTransport, name: str) -> tuple[str, str, dict[int, li
             raise InputError(f"{name}: {reason.partition(': ')[2]}")
         refuse_unfit_firmware(reason, name)
         raise InputError(f"the board at {name} cannot tell its rides ({reason}): kickstand flash brings it up to date")
-    (directory, vehicle), *parts = map(ast.literal_eval, listed.decode().splitlines())
-    in_order = sorted(_Part(*part) for part in parts)
+    first, *lines = listed.splitlines() or [b""]
+    directory, vehicle = literal(first, (str, str))
+    in_order = sorted(_Part(*literal(line, (int, int, int, str))) for line in lines)
+    if not all(part.path.startswith(f"{directory}/") and part.ride < 100_000 for part in in_order):
+        raise InputError(f"the board at {name} names rides that are none: kickstand flash brings it up to date")
     by_ride = itertools.groupby(in_order, lambda part: part.ride)
     return directory, vehicle, {ride: list(group) for ride, group in by_ride}
 
@@ -150,7 +152,7 @@ def _pull_ride(
     blocks: list[Block] = []
     for part in parts:
         title = f"ride {number}, part {part.part}"
-        found, problems = read(_read(transport, part.path, title, sofar))
+        found, problems = read(_read(transport, part, title, sofar))
         blocks += found
         for problem in problems:
             if problem == CUT_SHORT:
@@ -173,6 +175,8 @@ def _pull_ride(
     if blocks[0].calibration().by_drive:
         blocks[0].vehicle = vehicle
     ride.log = out / f"ride-{number:05}-{blocks[0].crc & 0xFFFF:04x}.csv.gz"
+    if not ride.log.resolve().is_relative_to(out.resolve()):
+        raise InputError(f"{ride.log} is a link to {ride.log.resolve()}: remove it, or give --out another directory")
     ride_log.write(ride.log, blocks)
     ride.seconds = (blocks[-1].turns[-1].time_us - blocks[0].time_us) / 1e6
     ride.readings = sum(len(block.turns) for block in blocks)
@@ -190,15 +194,18 @@ def _delete(transport: SerialTransport, directory: str, parts: list[_Part]) -> N
             emptied = emptied.parent
 
 
-def _read(transport: SerialTransport, path: str, title: str, sofar: _SoFar) -> bytes:
+def _read(transport: SerialTransport, part: _Part, title: str, sofar: _SoFar) -> bytes:
     """A file of the board."""
-    content = b""
+    content = bytearray()
     sofar.add(f"pulling {title}", 0)
     try:
-        for line in lines(transport, _READ.replace("PATH", repr(path)), _SILENT_S):
+        # four characters are three bytes, and a line ends in two more; the ride that is recorded now may have grown
+        for line in lines(
+            transport, _READ.replace("PATH", repr(part.path)), _SILENT_S, most_bytes=2 * part.size + 9999
+        ):
             piece = binascii.a2b_base64(line)
             content += piece
             sofar.add(f"pulling {title}", len(piece))
     except (BrokenOff, binascii.Error) as error:
-        raise InputError(f"{path} did not come over whole ({error}): try again, with another cable") from error
-    return content
+        raise InputError(f"{part.path} did not come over whole ({error}): try again, with another cable") from error
+    return bytes(content)

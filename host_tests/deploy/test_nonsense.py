@@ -1,0 +1,201 @@
+"""Boards that talk nonsense: each command that asks one says a line, whatever comes, and writes nothing outside."""
+
+import types
+
+import command
+import fake_board
+import mutations
+import pytest
+import ride_writer
+from kickstand_tools.deploy import connection
+from kickstand_tools.errors import InputError
+from kickstand_tools.rides.block_reader import BadBlock, parse, read
+from mpremote.transport import TransportError
+from serial.tools import list_ports
+
+NONSENSE = {
+    "nothing": b"",
+    "bytes": bytes(range(256)),
+    "no UTF-8": b"\xff\xfe\xfd\n",
+    "half a line": b"('rp2', ",
+    "another language": b"$GPRMC,120000.00,A,4807.038,N*00\r\n" * 3,
+    "numbers": b"1\n2\n3\n",
+    "deep": b"(" * 5000,
+    "long number": b"9" * 5000,
+    "a call": b"__import__('os')\n",
+    "negative": b"('/rides', 'car')\n(-1, -1, -1, '/rides/x')\n",
+    "a path for a number": b"('/rides', 'car')\n('../../../OWNED', 0, 5, '/rides/x')\n",
+    "half a ride": b"('/rides', 'car')\n(1.5, 0, 5, '/rides/x')\n",
+    "a file elsewhere": b"('/rides', 'car')\n(1, 0, 5, '/config.py')\n",
+    "wrong types": b"(1, 2)\n({}, [], None, 0)\n",
+    "lists": b"[]\n[]\n",
+    "nul": b"\0" * 100,
+}
+COMMANDS = {
+    "flash": ("flash",),
+    "status": ("status",),
+    "pull": ("pull", "--out", "out"),
+    "record": ("record", "--out", "RIDE.csv"),
+}
+
+
+class Nonsense(fake_board.FakeBoard):
+    """Answers everything with the same bytes. first: answers before that, which are right."""
+
+    def __init__(self, root, content, first=0):
+        super().__init__(root)
+        self._content, self._first = content, first
+
+    def exec(self, command, data_consumer=None):
+        if self._first > 0:
+            self._first -= 1
+            return super().exec(command, data_consumer)
+        return self._content
+
+    def exec_raw_no_follow(self, command):
+        self.serial.data += self._content + b"\x04\x04>"
+
+
+@pytest.fixture
+def plug_in(tmp_path, monkeypatch):
+    """A function that makes a board the only one that is plugged in."""
+    monkeypatch.chdir(tmp_path)
+    pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
+    monkeypatch.setattr(list_ports, "comports", lambda: [pico])
+    monkeypatch.setattr(connection, "_RESTART_S", 0)
+    return lambda board: monkeypatch.setattr(connection, "Board", lambda name, timeout: board)
+
+
+def one_line(result):
+    assert "Traceback" not in result.err
+    assert "fault in kickstand" not in result.err
+    assert "unexpected" not in result.err
+    if result.status:
+        assert result.status == 2
+        assert result.err.count("\n") == 1
+
+
+@pytest.mark.parametrize("content", NONSENSE.values(), ids=NONSENSE)
+@pytest.mark.parametrize("name", COMMANDS)
+def test_nonsense_is_one_line_and_writes_nothing(tmp_path, plug_in, name, content):
+    (tmp_path / "flash").mkdir()
+    (tmp_path / "out").mkdir()
+    for first in (0, 1, 2, 3):
+        plug_in(Nonsense(tmp_path / "flash", content, first))
+        one_line(command.run(*COMMANDS[name]))
+        assert sorted(path.name for path in tmp_path.iterdir()) == ["flash", "out"]
+        assert not list((tmp_path / "out").iterdir())
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_a_mutated_answer_is_one_line(tmp_path, plug_in, name):
+    good = b"('/rides', 'motorcycle')\n(1, 0, 700, '/rides/000/01/00000.rid')\n('micropython', '1.26.1', 'Pico')\n"
+    (tmp_path / "flash").mkdir()
+    (tmp_path / "out").mkdir()
+    for number in range(60):
+        plug_in(Nonsense(tmp_path / "flash", mutations.broken([good], number)[1], number % 3))
+        one_line(command.run(*COMMANDS[name]))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["flash", "out"]
+
+
+class Endless:
+    """A serial port that says the same for ever."""
+
+    def __init__(self, said):
+        self._said, self.count = said, 0
+
+    def inWaiting(self):
+        return 1
+
+    def read(self, count=1):
+        self.count += count
+        return self._said
+
+
+@pytest.mark.parametrize("ending", [b"\x04", b"raw REPL; CTRL-B to exit\r\n>"])
+@pytest.mark.parametrize("said", [b"x", b"\n", b">"])
+def test_an_answer_without_end_is_given_up(monkeypatch, ending, said):
+    monkeypatch.setattr(connection, "MOST_BYTES", 5000)
+    board = connection.Board.__new__(connection.Board)
+    board.serial = Endless(said)
+    board.is_pty = False
+    with pytest.raises(TransportError, match="does not end"):
+        board.read_until(1, ending)
+    assert board.serial.count < 6000
+
+
+def test_a_ride_that_is_longer_than_announced_is_given_up(tmp_path, plug_in, monkeypatch):
+    listed = b"('/rides', 'car')\n(1, 0, 100, '/rides/000/01/00000.rid')\n"
+
+    class Long(fake_board.FakeBoard):
+        def exec_raw(self, command, timeout=10):
+            return listed, b""
+
+        def exec_raw_no_follow(self, command):
+            self.serial.data += b"AAAA\n" * 100_000
+
+    (tmp_path / "flash").mkdir()
+    plug_in(Long(tmp_path / "flash"))
+    (tmp_path / "out").mkdir()
+    line = command.refused(tmp_path / "out", "pull", "--out", tmp_path / "out", words="did not come over whole")
+    assert "does not come to an end" in line
+
+
+def test_a_link_in_the_directory_is_not_followed(tmp_path, plug_in):
+    blocks = ride_writer.blocks(3, ride=1)[0]
+    content = b"".join(blocks)
+
+    class Board(fake_board.FakeBoard):
+        def exec_raw(self, command, timeout=10):
+            return f"('/rides', 'car')\n(1, 0, {len(content)}, '/rides/1.rid')\n".encode(), b""
+
+        def exec_raw_no_follow(self, command):
+            if "PATH" not in command and "open(" in command:
+                import binascii
+
+                self.serial.data += binascii.b2a_base64(content) + b"\x04\x04>"
+
+    (tmp_path / "flash").mkdir()
+    (tmp_path / "out").mkdir()
+    plug_in(Board(tmp_path / "flash"))
+    command.works("pull", "--out", tmp_path / "out")
+    (log,) = (tmp_path / "out").glob("*.csv.gz")
+    log.unlink()
+    log.symlink_to(tmp_path / "elsewhere.csv.gz")
+    plug_in(Board(tmp_path / "flash"))
+    result = command.run("pull", "--out", tmp_path / "out")
+    assert result.status == 2 and "is a link to" in result.err
+    assert not (tmp_path / "elsewhere.csv.gz").exists()
+
+
+def test_a_mutated_ride_gives_blocks_or_problems():
+    blocks = ride_writer.blocks(6, ride=1)[0]
+    content = b"".join(blocks)
+    for number in range(400):
+        mutated = mutations.broken([content], number)[1]
+        found, problems = read(mutated)
+        assert found or problems or not mutated
+        try:
+            parse(mutations.broken([blocks[0]], number)[1])
+        except BadBlock:
+            pass
+
+
+@pytest.mark.parametrize(
+    ("text", "shape", "fits"),
+    [
+        (b"(1, 'a')\r\n", (int, str), True),
+        (b"(1, 'a')", (int, int), False),
+        (b"(True, 'a')", (int, str), False),
+        (b"(-1, 'a')", (int, str), False),
+        (b"1.0", int, False),
+        (b"('x', None)", (str, None), True),
+        (b"print()", str, False),
+    ],
+)
+def test_what_an_answer_may_be(text, shape, fits):
+    if fits:
+        connection.literal(text, shape)
+    else:
+        with pytest.raises(InputError, match="makes no sense"):
+            connection.literal(text, shape)
