@@ -113,6 +113,6 @@ def test_in_a_narrow_window_the_charts_stand_below_each_other(seen):
 
 def test_the_name_of_a_ride_is_text_in_its_page(seen):
     named = replace(seen, ride=replace(seen.ride, log=Path("<b>&.csv")))
-    html = page.page(named, "")
+    html = page.page(named, "", "")
     assert "<title>&lt;b&gt;&amp;</title>" in html
     assert "<b>" not in html

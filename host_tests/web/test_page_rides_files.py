@@ -196,6 +196,7 @@ def test_rides_that_were_pulled_are_opened_once(page, address, ride, calibration
     page.page.evaluate(PULLED, [[path.name, path.read_text()] for path in (ride, calibration)])
     page.page.goto(address + "licences.txt")
     page.page.goto(address + "rides.html#pulled")
+    page.page.wait_for_selector("#report", timeout=WAIT_MS)  # which takes a while after the page has loaded
     assert page.said() == ""
     assert page.page.inner_text("#report-title") == "RIDE.csv"
     page.page.goto(address + "licences.txt")

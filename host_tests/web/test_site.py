@@ -5,6 +5,7 @@ import http.client
 import io
 import json
 import re
+import socket
 import threading
 import urllib.request
 import zipfile
@@ -162,3 +163,43 @@ def test_without_a_network_it_says_so(no_cache, monkeypatch):
 def test_a_file_is_not_written_over(files, tmp_path):
     (tmp_path / "site").write_text("mine")
     refused(tmp_path, "web", "--out", tmp_path / "site", words="give --out the name of a directory")
+
+
+def test_every_page_has_a_policy_and_the_charts_have_a_frame_without_rights(files):
+    """No script but the site's own runs; what a page frames reaches neither it nor what the browser keeps for it."""
+    pages = {name: data.decode() for name, data in files.items() if name.endswith(".html")}
+    assert len(pages) == 4
+    for name, text in pages.items():
+        policy = re.findall('<meta http-equiv="Content-Security-Policy" content="([^"]+)">', text)[0]
+        assert policy.startswith("default-src 'none'; base-uri 'none'; form-action 'none'; script-src 'self'"), name
+        assert "__" not in policy and "'unsafe-inline'" not in policy.partition("style-src")[0], name
+        assert "'unsafe-eval'" not in policy or name == "rides.html", name
+        assert not re.findall('<script>| on[a-z]+="', text), name
+        assert "http:" not in policy and "https:" not in policy, name
+    assert "<iframe" not in "".join(text for name, text in pages.items() if name != "rides.html")
+    assert 'sandbox="allow-scripts allow-downloads"' in pages["rides.html"]
+
+
+def ask(port, said):
+    """What a server answers to these bytes."""
+    with socket.create_connection((serve.HOST, port), timeout=20) as connection:
+        connection.sendall(said)
+        return connection.recv(4096)
+
+
+def test_strange_requests_and_slow_connections_stop_nobody(monkeypatch, capsys):
+    monkeypatch.setattr(serve, "PATIENCE_S", 0.5)
+    monkeypatch.setattr(serve, "MOST", 8)
+    with serve.server({"index.html": b"the page"}, 0) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        port = server.server_address[1]
+        for path in (b"http://[::1/", b"//[", b"/../../etc/passwd", b"/%00", b"/" + b"a" * 60_000):
+            assert ask(port, b"GET " + path + b" HTTP/1.1\r\n\r\n").startswith(b"HTTP/1.1 4"), path
+        held = [socket.create_connection((serve.HOST, port)) for _ in range(40)]
+        for connection in held:
+            connection.sendall(b"GET / HT")
+        assert b"the page" in ask(port, b"GET / HTTP/1.0\r\n\r\n")
+        for connection in held:
+            connection.close()
+        server.shutdown()
+    assert "Traceback" not in capsys.readouterr().err

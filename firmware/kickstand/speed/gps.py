@@ -24,6 +24,7 @@ TIME_JUMP_MS = 5000  # a fix that seems later than this is not: the receiver has
 MIN_FIXES_FOR_NEW_REFERENCE = 4
 KNOT_MPS = 1852.0 / 3600.0  # one knot in m/s
 KMH_MPS = 1.0 / 3.6  # one km/h in m/s
+_DAY_MS = 86_401_000  # of a day with a leap second
 _DIGITS = 5  # of a minute of arc, after its point: 2 cm
 
 
@@ -93,7 +94,7 @@ class Gps:
         fields = self._fix
         if fields is None or now_ms != self._fix_ms:
             return None
-        lat, lon = _minutes(fields[3], fields[4] == b"S"), _minutes(fields[5], fields[6] == b"W")
+        lat, lon = _minutes(fields[3], 90, fields[4] == b"S"), _minutes(fields[5], 180, fields[6] == b"W")
         if lat is None or lon is None:
             return None
         place = self._place
@@ -146,8 +147,9 @@ class Gps:
         valid = fields[2] == b"A" and not (len(fields) > 12 and fields[12] in (b"E", b"N"))
         if not valid or repeated or self._late(fields[1], now_ms):
             return None
+        speed = float(fields[7]) * KNOT_MPS
         self._fix = fields
-        return float(fields[7]) * KNOT_MPS
+        return speed
 
     def _vtg(self, fields, now_ms):
         """The speed in the fields of $--VTG,course,T,course,M,knots,N,km/h,K[,mode], unless the receiver sends RMC."""
@@ -165,8 +167,11 @@ class Gps:
         """True if a fix with this time of day, hhmmss.ss, comes more than LATE_MS later than the reference did. Sets
         age_ms and _day_ms.
 
-        Clocks do go back: a NEO-6M's by 3 s when it learns of the leap seconds."""
-        self._day_ms = day_ms = (int(time[0:2]) * 60 + int(time[2:4])) * 60_000 + int(float(time[4:]) * 1000.0 + 0.5)
+        Clocks do go back: a NEO-6M's by 3 s when it learns of the leap seconds. Raises ValueError for no time."""
+        day_ms = (int(time[0:2]) * 60 + int(time[2:4])) * 60_000 + int(float(time[4:]) * 1000.0 + 0.5)
+        if not 0 <= day_ms <= _DAY_MS:
+            raise ValueError
+        self._day_ms = day_ms
         self.age_ms = 0
         if self._reference is not None:
             reference_ms, reference_day_ms = self._reference
@@ -183,8 +188,9 @@ class Gps:
         return False
 
 
-def _minutes(field, negative):
-    """An angle as NMEA writes it, (d)ddmm.mmmm, in 0.00001 minutes; None if it is none. Further digits are left out."""
+def _minutes(field, degrees, negative):
+    """An angle as NMEA writes it, (d)ddmm.mmmm, in 0.00001 minutes; None if it is none, or more than so many degrees.
+    Further digits are left out."""
     whole = part = 0
     digits = -1  # read after the point
     for byte in field:
@@ -197,7 +203,7 @@ def _minutes(field, negative):
         elif digits < _DIGITS:
             part = 10 * part + byte - 48
             digits += 1
-    if digits < 0 or whole >= 18000:
+    if digits < 0 or whole >= 100 * degrees or whole % 100 >= 60:
         return None
     while digits < _DIGITS:
         part *= 10

@@ -28,8 +28,10 @@ window.Worker = class extends Real {
 };
 new PerformanceObserver((list) => {
   for (const entry of list.getEntries()) {
-    const moved = entry.sources.map((one) => one.node?.id || one.node?.className || one.node?.nodeName);
-    seen.shifts.push([entry.value, ...moved]);
+    const moved = entry.sources.map((one) => [
+      one.node?.id || one.node?.className || one.node?.nodeName, one.previousRect.toJSON(), one.currentRect.toJSON(),
+    ]);
+    seen.shifts.push([entry.value, entry.startTime, ...moved]);
   }
 }).observe({ type: "layout-shift", buffered: true });
 """
@@ -44,16 +46,18 @@ MISSING = """(end) => {
 
 
 class Rider:
-    """browser: of playwright. asked: the addresses that the page has fetched; errors: what went wrong in it."""
+    """browser: of playwright. asked: the addresses that the page has fetched; errors: what went wrong in it. policy:
+    whether the page's content security policy holds, which playwright's wait_for_function() breaks."""
 
-    def __init__(self, browser, address, **kind):
+    def __init__(self, browser, address, policy=False, **kind):
         self._browser = browser
-        self.context = browser.new_context(**kind)
+        self.context = browser.new_context(bypass_csp=not policy, **kind)
         self.context.add_init_script(KEEP)
         self.asked, self.errors = [], []
         self.context.on("request", lambda request: self.asked.append(request.url))
         self.page = self.context.new_page()
         self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("console", lambda said: "Security Policy" in said.text and self.errors.append(said.text))
         self.page.goto(address)
 
     def reads(self, text, within_s=READ_S):

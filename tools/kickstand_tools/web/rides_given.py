@@ -82,7 +82,9 @@ def _together(pieces: list[Piece]) -> Iterator[tuple[str, list[Piece]]]:
                 name += "_"
             Path(name).mkdir()
             for piece in group:
-                Path(name, piece.name).symlink_to(Path(piece.name).readlink())
+                Path(name, piece.name).write_bytes(
+                    piece.content
+                )  # not a link: an import leaves out those that lead out
         yield name, group
     yield from ((piece.name, [piece]) for piece in pieces if id(piece) not in used)
 

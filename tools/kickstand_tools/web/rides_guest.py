@@ -112,7 +112,7 @@ def look(log, calibration, tell):
         "words": asdict(report.words(seen, PAGE)) | table,
         "json": report.as_data(seen) | {"ride": Path(log).name},
         "warnings": [sentence(notice, PAGE) for notice in notices],
-        "page": page(seen, f'<script src="{PLOTLY}"></script>'),
+        "page": page(seen, f'<script src="{PLOTLY}"></script>', "'self'"),
         "plotly": PLOTLY,
         "stem": ride.stem,
     }

@@ -5,10 +5,12 @@ import os
 import sys
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import PurePosixPath
+from threading import BoundedSemaphore
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
 HOST = "127.0.0.1"
+MOST, PATIENCE_S = 64, 10.0  # connections at a time; for what a browser has to send
 PORT = 8377  # the same each time, so that the browser finds what it has kept
 # Named here, because the registry of Windows may hold others, with which a browser runs no module
 TYPES = {
@@ -27,12 +29,28 @@ TYPES = {
 
 
 class Server(ThreadingHTTPServer):
-    """Says nothing of a browser that hangs up."""
+    """Says nothing of a browser that hangs up. Connections beyond MOST wait in the queue of the system."""
 
+    request_queue_size = 128
+    daemon_threads = True
     allow_reuse_address = os.name != "nt"  # there it would share the port with whoever has it
 
+    def __init__(self, *arguments: Any) -> None:
+        self._free = BoundedSemaphore(MOST)
+        super().__init__(*arguments)
+
+    def process_request(self, request: Any, client_address: Any) -> None:
+        self._free.acquire()
+        super().process_request(request, client_address)
+
+    def process_request_thread(self, request: Any, client_address: Any) -> None:
+        try:
+            super().process_request_thread(request, client_address)
+        finally:
+            self._free.release()
+
     def handle_error(self, request: Any, client_address: Any) -> None:
-        if not isinstance(sys.exc_info()[1], ConnectionError):
+        if not isinstance(sys.exc_info()[1], (ConnectionError, TimeoutError)):
             super().handle_error(request, client_address)
 
 
@@ -41,6 +59,7 @@ def server(files: dict[str, bytes], port: int = PORT) -> Server:
 
     class Handler(BaseHTTPRequestHandler):
         protocol_version = "HTTP/1.1"
+        timeout = PATIENCE_S
 
         def do_GET(self) -> None:
             self._answer(True)
@@ -49,7 +68,11 @@ def server(files: dict[str, bytes], port: int = PORT) -> Server:
             self._answer(False)
 
         def _answer(self, whole: bool) -> None:
-            name = unquote(urlsplit(self.path).path).lstrip("/") or "index.html"
+            try:
+                name = unquote(urlsplit(self.path).path).lstrip("/") or "index.html"
+            except ValueError:  # as of http://[::1/
+                self.send_error(400)
+                return
             data = files.get(name)
             self.send_response(200 if data is not None else 404)
             self.send_header("Content-Type", TYPES.get(PurePosixPath(name).suffix, "application/octet-stream"))

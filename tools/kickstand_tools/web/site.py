@@ -5,6 +5,8 @@ import json
 from pathlib import Path
 
 from .. import firmware_path
+from ..analysis.plot import page, page_with_map
+from ..analysis.plot.in_script import source_hash
 from ..output import check_directory, new_directory, write_whole
 from ..pictures.lcd_font import ROM
 from . import install_archive, npm_packages, rides_archive, wiring_files
@@ -37,6 +39,11 @@ def python_files() -> dict[str, str]:
     return {path.relative_to(top).as_posix(): path.read_text(encoding="utf-8") for path, top in found}
 
 
+def _chart_scripts(library: bytes) -> bytes:
+    """The scripts of the charts of a ride as the policy of the page that frames them names them, the library first."""
+    return " ".join(map(source_hash, (library.decode(), page.SCRIPT, page_with_map.SCRIPT))).encode()
+
+
 def site_files() -> dict[str, bytes]:
     """{path in the site: content} of the whole site. Raises InputError if what they carry cannot be fetched.
 
@@ -48,6 +55,7 @@ def site_files() -> dict[str, bytes]:
     files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # as a text a browser shows
     files |= wiring_files.wiring_files()
     files["install.html"] = wiring_files.with_tables(files["install.html"].decode()).encode()
+    files["rides.html"] = files["rides.html"].replace(b"__CHARTS__", _chart_scripts(files["plotly/plotly.min.js"]))
     files["python.json"] = json.dumps(python_files()).encode()
     files["install.zip"] = install_archive.archive()
     files["rides.zip"] = rides_archive.archive()

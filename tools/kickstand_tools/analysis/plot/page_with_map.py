@@ -11,7 +11,8 @@ from .in_script import as_script
 from .track_map import MapPoints, figure
 
 # OpenStreetMap's own server refuses a page that was opened as a file: it wants to know the page's address.
-TILES_URL = "https://basemaps.cartocdn.com/rastertiles/voyager/{z}/{x}/{y}.png"
+TILES_HOST = "https://basemaps.cartocdn.com"
+TILES_URL = TILES_HOST + "/rastertiles/voyager/{z}/{x}/{y}.png"
 ATTRIBUTION = (
     '© <a href="https://www.openstreetmap.org/copyright">OpenStreetMap</a> contributors, '
     '© <a href="https://carto.com/attributions">CARTO</a>'
@@ -33,12 +34,13 @@ _BESIDE = """<aside>
 <div id="map-frame"><div id="map" class="drawn"></div></div>
 <p id="tiles">{attribution}</p>
 </aside>
-<script>
-const MAP = {map}, CHART_AXES = {axes}, TILES = {tiles};
+<script type="application/json" id="map-data">{map}</script>
+<script>{script}</script>"""
+SCRIPT = """
+const { map: MAP, axes: CHART_AXES, tiles: TILES } = JSON.parse(document.getElementById("map-data").textContent);
 if (finger) MAP.layout.dragmode = false;
-Plotly.newPlot("map", MAP.data, MAP.layout, {{ responsive: true, scrollZoom: true }});
-{script}
-</script>"""
+Plotly.newPlot("map", MAP.data, MAP.layout, { responsive: true, scrollZoom: true });
+""" + Path(__file__).with_name("map.js").read_text(encoding="utf-8")
 
 
 def time_axes(charts: dict[str, Any]) -> list[str]:
@@ -48,13 +50,12 @@ def time_axes(charts: dict[str, Any]) -> list[str]:
 
 def beside(charts: dict[str, Any], points: MapPoints, seen: Overview, tiles: bool) -> str:
     """What of the page is beside the charts. tiles: with streets, which the page takes from a server."""
-    return _BESIDE.format(
-        map=as_script(figure(points, seen)),
-        attribution=ATTRIBUTION if tiles else "",
-        axes=as_script([name.replace("axis", "") for name in time_axes(charts)]),
-        tiles=as_script(_tiles(points)) if tiles else "null",
-        script=Path(__file__).with_name("map.js").read_text(encoding="utf-8"),
-    )
+    data = {
+        "map": figure(points, seen),
+        "axes": [name.replace("axis", "") for name in time_axes(charts)],
+        "tiles": _tiles(points) if tiles else None,
+    }
+    return _BESIDE.format(map=as_script(data), attribution=ATTRIBUTION if tiles else "", script=SCRIPT)
 
 
 def _tiles(points: MapPoints) -> dict[str, Any]:

@@ -98,11 +98,14 @@ async function look(ride) {
     return;
   }
   const calibration = calibrationOf(ride);
-  await work(`Looking at ${ride.given} …`, () => tools.call("look", ride.log, calibration), (found) => {
+  await work(`Looking at ${ride.given} …`, async () => {
+    const found = await tools.call("look", ride.log, calibration);
+    return { ...found, charts: whole(found.page, found.plotly, await (await fetched(found.plotly)).text()) };
+  }, (found) => {
     const warnings = [...new Set([...(ride.taken.warnings ?? []), ...found.warnings])];
     looked = { ...found, ride, calibration, calibrationFile: held.file(ride.calibration) };
     showReport({ ...found, warnings, name: ride.given, calibration: ride.calibration || "found from the ride" });
-    showCharts(found.page);
+    showCharts(found.charts);
     byId("save-calibration").hidden = Boolean(ride.calibration);
     byId("save-log").hidden = !ride.taken.made;
     say(ride.calibration ? "" : ride.fitted.words);
@@ -134,10 +137,18 @@ async function saveLean() {
   }, () => say(""), true);
 }
 
+/** The page of the charts with the library in it. A frame without this page's rights has not what is kept offline. */
+function whole(page, plotly, library) {
+  const [allowed] = document.querySelector("meta[http-equiv]").content.match(/'sha256-[^']+'/); // see web/site.py
+  return page
+    .replace("script-src 'self'", () => `script-src ${allowed}`)
+    .replace(`<script src="${plotly}"></script>`, () => `<script>${library}</script>`);
+}
+
 async function savePage() {
   const { page, plotly, stem } = looked;
   await work("Loading what draws the charts …", () => fetched(plotly).then((answer) => answer.text()), (library) => {
-    save(`${stem}.html`, "text/html", page.replace(`<script src="${plotly}"></script>`, () => `<script>${library}</script>`));
+    save(`${stem}.html`, "text/html", whole(page, plotly, library));
     say("");
   }, true);
 }

@@ -44,13 +44,10 @@ export function showCharts(page) {
   byId("plot").srcdoc = page;
 }
 
-function fit() {
-  const inside = byId("plot").contentDocument?.documentElement;
-  if (inside) byId("plot").style.height = `${inside.querySelector("body").scrollHeight}px`;
-}
-
-byId("plot").addEventListener("load", fit);
-addEventListener("resize", fit);
+// The frame may run scripts, but not reach this page: it says how high it is
+addEventListener("message", ({ source, data }) => {
+  if (source === byId("plot").contentWindow && Number.isFinite(data?.height)) byId("plot").style.height = `${data.height}px`;
+});
 
 export function hideRide() {
   for (const id of ["report", "charts"]) byId(id).hidden = true;

@@ -1,0 +1,46 @@
+"""The pages under their own content security policy, which the other tests switch off: nothing they need is stopped."""
+
+import pytest
+from rider import LAPTOP, Rider
+
+PYTHON = "() => import('./python.mjs').then((m) => m.loadPython([])).then((python) => python.runPython('6 * 7'))"
+
+FOREIGN = """() => {
+  const script = document.createElement("script");
+  script.textContent = "window.ours = 1";
+  document.body.append(script);
+}"""
+
+
+def within(chromium, address, name):
+    rider = Rider(chromium, address + name, policy=True, **LAPTOP)
+    rider.page.wait_for_load_state("networkidle")
+    return rider
+
+
+def test_try_runs_and_a_foreign_script_does_not(chromium, address):
+    rider = within(chromium, address, "")
+    rider.page.locator('#display[aria-label^="Display: "]').wait_for()
+    assert rider.errors == []
+    rider.page.evaluate(FOREIGN)
+    assert rider.page.evaluate("() => window.ours") is None
+    assert "Content Security Policy" in rider.errors[0]
+    rider.context.close()
+
+
+@pytest.mark.parametrize("name", ["install.html", "live.html"])
+def test_python_runs_in_the_pages_that_speak_to_a_board(chromium, address, name):
+    rider = within(chromium, address, name)
+    assert rider.page.evaluate(PYTHON) == 42
+    assert rider.errors == []
+    rider.context.close()
+
+
+def test_the_charts_of_a_ride_are_drawn_in_a_frame_without_rights(chromium, address, ride, calibration):
+    rider = within(chromium, address, "rides.html")
+    rider.page.set_input_files("#files", [ride, calibration])
+    frame = rider.page.frame_locator("#plot")
+    frame.locator("#chart .main-svg").first.wait_for(timeout=120_000)
+    assert frame.locator("#chart").evaluate("() => window.origin") == "null"
+    assert rider.errors == []
+    rider.context.close()

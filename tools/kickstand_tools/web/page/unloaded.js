@@ -1,0 +1,8 @@
+// A module that cannot be loaded says nothing by itself
+addEventListener("error", (event) => {
+  if (event.target.tagName !== "SCRIPT") return;
+  document.getElementById("todo").textContent =
+    location.protocol === "file:"
+      ? "This page has to come from a web server: “kickstand web” is one."
+      : "A file of this page cannot be loaded. Load the page again.";
+}, true);
