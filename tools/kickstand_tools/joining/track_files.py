@@ -1,5 +1,6 @@
 """Tracks as phones and watches write them: GPX and FIT."""
 
+import warnings
 from collections.abc import Callable, Iterator
 from datetime import UTC, datetime
 from pathlib import Path
@@ -41,7 +42,9 @@ def read_track(path: Path | str, progress: Progress | None = None) -> Track:
             size = file.seek(0, 2)
         if size > _MOST_BYTES:
             raise InputError(f"{path} is too large for a track: over {_MOST_BYTES / 1e6:.0f} MB: export a part of it")
-        points = list(reader(path, progress))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # fitdecode's, line by line, of a damaged file
+            points = list(reader(path, progress))
     except InputError:
         raise
     except OSError as error:
