@@ -9,6 +9,7 @@ import urllib.request
 from pathlib import Path
 
 import command
+import mutations
 import psutil
 import pyarrow.parquet as parquet
 import pytest
@@ -200,6 +201,30 @@ def test_an_error_names_the_log_once(tmp_path, alone):
     result = command.works("fleet", tmp_path / "MANIFEST.csv", "--out", tmp_path / "out")
     line = next(line for line in result.out.splitlines() if line.startswith("error:"))
     assert line.count("none.csv") == 1
+
+
+def test_what_is_left_out_of_a_log_is_reported_and_the_log_still_counts(fleet, tmp_path):
+    paths = list(read_manifest(str(fleet.manifest))[0].paths)
+    cut = tmp_path / "cut.csv"
+    cut.write_bytes(Path(paths[0]).read_bytes()[:-9] + bytes(50))
+    found = work_on_period(Period("v", "", "car", (str(cut), *paths[1:])))
+    assert (found.alignment["status"], found.alignment["logs_left_out"]) == ("aligned", 0)
+    assert {row["reason"] for row in found.errors} == {"nul-end", "cut-line"}
+    assert all(row["log"] == str(cut) for row in found.errors)
+
+
+def test_a_mutated_manifest_is_read_or_refused_in_one_line(tmp_path):
+    path = tmp_path / "MANIFEST.csv"
+    content = b"vehicle,path,kind,mount\n" + b"".join(b"v%d,logs/%d.csv,car,m\n" % (k, k) for k in range(20))
+    seen = set()
+    for number in range(200):
+        path.write_bytes(mutations.broken([content], number)[1])
+        try:
+            seen.add(bool(read_manifest(str(path))))
+        except InputError as error:
+            assert "\n" not in str(error)
+            seen.add(False)
+    assert seen == {True, False}
 
 
 def test_a_pipe_is_no_manifest_and_no_log(tmp_path, alone):

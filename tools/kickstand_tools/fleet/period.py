@@ -18,7 +18,7 @@ from ..calibration.drive import DriveFit, fit_logs, usable
 from ..calibration.file import CalibrationFile
 from ..errors import InputError, cause
 from ..logs.log import Log
-from ..refusals import RefusedInput
+from ..refusals import RefusedInput, sentence
 from . import evidence, files, signals
 from .brake_tests import brake_tests
 from .forward import Forward, find_forward
@@ -29,6 +29,7 @@ UNREADABLE, CHANGED, NO_MEMORY, FAULT = "unreadable", "changed", "no-memory", "f
 NO_SPEED, MOVED, LEFT_HANDED = "no-speed", "mount-moved", "left-handed"
 # The vehicle is aligned, but brake tests or signals of this log are missing; because the disk for signals is full
 AFTERWARDS, DISK_FULL = "not-finished", "disk-full"
+_LEFT_OUT = ("cut-line", "cut-gzip", "nul-end", "frozen-readings")  # notices of a log that say what of it is not used
 _DOUBTS = (MOVED, "parts-differ", "uncertain")  # of the firmware: then it is worth while to look for a move
 _PLOTTED = 160  # intervals in a picture
 _AGAINST = -0.5  # of a turn's force on the side of the turn: a gyro or axes that are mirrored
@@ -118,6 +119,12 @@ def _result(period: Period, signals_to: str | None) -> PeriodResult:
             reason, message = refusal.code, str(refusal)
     status = "refused" if reason else "aligned"
     result = PeriodResult(_alignment(period, status, reason, message, logs, len(errors), fit, found), errors=errors)
+    errors += [
+        whose | {"log": log.name, "reason": notice.code, "message": sentence(notice)}
+        for log in logs
+        for notice in log.notices
+        if notice.code in _LEFT_OUT
+    ]
     result.moved = [whose | _moved_row(move, logs) for move in moves]
     if driven:
         result.picture = _picture(driven, found)
