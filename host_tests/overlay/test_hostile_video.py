@@ -1,0 +1,32 @@
+"""What poses as a video or as a camera's readings: no error of ours, and no file but the one that was named."""
+
+import random
+import struct
+from pathlib import Path
+
+import mutations
+import numpy as np
+from kickstand_tools.overlay import gpmf, video
+
+
+def item(name, kind, size, count, body):
+    return struct.pack(">4scBH", name, kind, size, count) + body + bytes(-len(body) % 4)
+
+
+def test_mutated_readings_of_a_camera_are_numbers_or_nothing():
+    rates = np.arange(30).astype(">i2").tobytes()
+    stream = item(b"SCAL", b"s", 2, 1, b"\0\5") + item(b"GYRO", b"s", 6, 10, rates)
+    inner = item(b"STRM", b"\0", 1, len(stream), stream)
+    packet = item(b"DEVC", b"\0", 1, len(inner), inner)
+    assert len(next(iter(gpmf.streams(packet, b"GYRO")))) == 10
+    for number in range(500):
+        chance = random.Random(number)
+        change = chance.choice(
+            (mutations.flip_bytes, mutations.cut_end, mutations.cut_a_piece, mutations.put_nul_bytes)
+        )
+        for values in gpmf.streams(change(packet, chance), b"GYRO"):
+            assert values.ndim == 2 and values.shape[1] == 3
+
+
+def test_a_name_is_no_protocol_and_the_network_is_closed():
+    assert video.input_of(Path("12:30.mp4")) == ["-protocol_whitelist", "file,pipe", "-i", "file:12:30.mp4"]
