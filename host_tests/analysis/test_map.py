@@ -116,7 +116,7 @@ def test_a_page_asks_for_nothing_unless_tiles_are_wanted(tmp_path):
     html = page_of(tmp_path, seen())
     assert not re.search(r"<(script|link|img)[^>]*(src|href)=", html)
     assert page_with_map.TILES_URL not in html
-    assert "TILES = null" in html
+    assert '"tiles": null' in html
     assert "OpenStreetMap contributors" not in html.rpartition("<p id=")[2]
     html = page_of(tmp_path, seen(), tiles=True)
     assert page_with_map.TILES_URL in html
