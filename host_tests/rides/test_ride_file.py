@@ -1,9 +1,13 @@
 """The format of recorded rides: exact on both engines; a damaged block is left out, and nothing else."""
 
 import ast
+import io
 import json
+import math
+import random
 import struct
 import subprocess
+import threading
 from binascii import crc32
 from dataclasses import replace
 from pathlib import Path
@@ -13,11 +17,12 @@ import numpy as np
 import pytest
 import ride_writer
 from kickstand import __version__
+from kickstand.calibration import store
 from kickstand.rides import block as block_format
 from kickstand_tools import unix_port
 from kickstand_tools.calibration.file import read_calibration
 from kickstand_tools.replay.replay import replay
-from kickstand_tools.rides import block_reader, ride_log
+from kickstand_tools.rides import block_reader, ride_log, stream
 from mpy import run_mpy
 from ride_writer import CHIP
 
@@ -198,3 +203,38 @@ def test_any_damaged_byte_costs_its_own_block_and_is_said():
         assert [block.sequence for block in found] == [2]
         assert len(problems) == 1
     assert block_reader.read(b"") == ([], [])
+
+
+def sealed(data):
+    """With the check sum of these bytes, as somebody would write it who has bad intentions."""
+    return data[:-4] + struct.pack("<I", crc32(data[:-4]))
+
+
+def test_a_block_of_impossible_values_is_bad_however_right_its_check_sum(tmp_path):
+    """Whatever the reader takes can be written as a log, and shown live."""
+    good = ride_writer.blocks(1, speed=True, places_every=50)[0][0]
+    head = struct.calcsize(block_format.HEAD)
+    start = head + store.BODY_LENGTH
+    forged = []
+    fields = struct.unpack_from(block_format.HEAD, good)
+    for i in (7, 8, 9):  # the units of force and rate, samples a second
+        forged.append(struct.pack(block_format.HEAD, *fields[:i], 0, *fields[i + 1 :]) + good[head:])
+    for value in (math.nan, math.inf, 1e38):
+        at = start - 4 * len(ride_writer.calibration().parameters())
+        forged += [good[:k] + struct.pack("<f", value) + good[k + 4 :] for k in range(at, start, 4)]
+    for data in forged:
+        with pytest.raises(block_reader.BadBlock, match="not decodable"):
+            block_reader.parse(sealed(data))
+    chance, taken = random.Random(1), 0
+    for _ in range(400):
+        data = bytearray(good)
+        for _ in range(chance.choice((1, 4, 40))):
+            data[chance.randrange(head, len(data) - 4)] = chance.choice((0, 255, chance.randrange(256)))
+        try:
+            block = block_reader.parse(sealed(bytes(data)))
+        except block_reader.BadBlock:
+            continue
+        taken += 1
+        ride_log.write(tmp_path / "ride.csv", [block])
+        stream.Recording(threading.Event(), lambda reading: None).write(io.StringIO(), iter([block]), [])
+    assert taken > 20

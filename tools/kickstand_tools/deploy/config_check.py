@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from kickstand.settings import Settings
 
 
+LONGEST_S = 60.0  # for a config.py to run, on a busy computer
+
+
 @dataclass(frozen=True)
 class Judged:
     """fault: what a board would not take, with line and remedy, or None.  unused: settings that differ from their
@@ -37,15 +40,22 @@ class Judged:
 
 def judge(path: Path, port: str, machine: str) -> Judged:
     """Judge a config.py for a board. port: its sys.platform.  machine: its sys.implementation._machine."""
-    done = subprocess.run(
-        [sys.executable, "-P", "-m", __name__, port, machine, str(path)],
-        env=os.environ | {"PYTHONPATH": firmware_path.search_path()},
-        stdout=subprocess.PIPE,
-        stderr=subprocess.DEVNULL,
-        text=True,
-        check=True,
-    )
-    return in_words(path, *json.loads(done.stdout.splitlines()[-1]))  # config.py may print too
+    try:
+        done = subprocess.run(
+            [sys.executable, "-P", "-m", __name__, port, machine, str(path)],
+            env=os.environ | {"PYTHONPATH": firmware_path.search_path()},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            check=True,
+            timeout=LONGEST_S,
+        )
+        found, unused = json.loads(done.stdout.splitlines()[-1])  # config.py may print too
+        return in_words(path, found, unused)
+    except (subprocess.SubprocessError, ValueError, TypeError, IndexError):
+        reason = "it ends its own check, or does not come to an end: only settings belong in it"
+        return in_words(path, (None, reason), [])
 
 
 def in_words(path: Path, fault: tuple[int | None, str] | None, unused: list[tuple[int, str]]) -> Judged:

@@ -17,6 +17,7 @@ _PLACE_LENGTH = struct.calcsize(block_format.PLACE)
 _START = _HEAD_LENGTH + store.BODY_LENGTH
 _LATE_PERIODS = 2  # sample periods, as in kickstand.imu.sample_clock: samples were lost
 _DEGREE = 60 * 100_000  # in the unit of positions, 0.00001 minutes
+_MOST = 1e4  # of a parameter of a calibration, far beyond those that a board stores
 CUT_SHORT = "cut short"  # the last block of a ride often is: the power went off while it was written
 
 
@@ -123,6 +124,9 @@ def parse(data: bytes) -> Block:
     fields: list[Any] = [*rest, firmware, delay, data[_HEAD_LENGTH:_START], crc]
     block = Block(*fields)
     try:
+        units = block.accel_lsb_per_g, block.gyro_lsb_tenths, block.sample_hz
+        if not all(units) or not all(abs(value) <= _MOST for value in block.calibration().parameters()):
+            raise ValueError  # "not <=" also refuses not-a-number
         end = len(data) - _TAIL_LENGTH - places * _PLACE_LENGTH
         found = dict(_places(data[end : len(data) - _TAIL_LENGTH]))
         block.turns = list(_turns(block, data[_START:end], count, found))
@@ -174,9 +178,12 @@ def _turns(block: Block, data: bytes, count: int, places: dict[int, Place]) -> I
             before[8] += difference(8)
             speed = before[8] / 100
             continue
-        now += n * period_us + difference(1)
+        dt_us = n * period_us + difference(1)
         for i in range(2, 8):
             before[i] = (before[i] if n == n_before else before[i] * n // n_before) + difference(i)
+        if n < 0 or dt_us < 0 or max(map(abs, before[2:8])) > n << 15:
+            raise ValueError  # time goes on, and counts have 16 bits
+        now += dt_us
         before[0] = n
         yield Turn(now, n, tuple(before[2:8]), speed, places.get(entry))
         speed = None
