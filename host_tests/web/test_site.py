@@ -1,5 +1,6 @@
 """kickstand web: what the site consists of, where it may lie, how it is served, and what is refused."""
 
+import contextlib
 import gzip
 import http.client
 import io
@@ -203,3 +204,32 @@ def test_strange_requests_and_slow_connections_stop_nobody(monkeypatch, capsys):
             connection.close()
         server.shutdown()
     assert "Traceback" not in capsys.readouterr().err
+
+
+def test_connections_that_send_now_and_then_are_ended_for_others(monkeypatch):
+    """Each byte in time, and never a whole request."""
+    monkeypatch.setattr(serve, "MOST", 4)
+    monkeypatch.setattr(serve, "FULL_S", 0.2)
+    with serve.server({"index.html": b"the page"}, 0) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        port = server.server_address[1]
+        held = [socket.create_connection((serve.HOST, port)) for _ in range(4)]
+        over = threading.Event()
+
+        def drip():
+            while not over.wait(0.1):
+                for connection in held:
+                    with contextlib.suppress(OSError):
+                        connection.sendall(b"x")
+
+        dripping = threading.Thread(target=drip)
+        dripping.start()
+        try:
+            for _ in range(6):
+                assert ask(port, b"GET / HTTP/1.0\r\n\r\n").endswith(b"the page")
+        finally:
+            over.set()
+            dripping.join()
+            for connection in held:
+                connection.close()
+            server.shutdown()

@@ -1,7 +1,9 @@
 """Serves the site to the browser of this computer."""
 
+import contextlib
 import errno
 import os
+import socket
 import sys
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import PurePosixPath
@@ -11,6 +13,7 @@ from urllib.parse import unquote, urlsplit
 
 HOST = "127.0.0.1"
 MOST, PATIENCE_S = 64, 10.0  # connections at a time; for what a browser has to send
+FULL_S = 1.0  # a new connection waits for so long for another to end, then the oldest is ended
 PORT = 8377  # the same each time, so that the browser finds what it has kept
 # Named here, because the registry of Windows may hold others, with which a browser runs no module
 TYPES = {
@@ -29,7 +32,7 @@ TYPES = {
 
 
 class Server(ThreadingHTTPServer):
-    """Says nothing of a browser that hangs up. Connections beyond MOST wait in the queue of the system."""
+    """Says nothing of a browser that hangs up. Of more than MOST connections the oldest is ended: it may be held."""
 
     request_queue_size = 128
     daemon_threads = True
@@ -37,16 +40,22 @@ class Server(ThreadingHTTPServer):
 
     def __init__(self, *arguments: Any) -> None:
         self._free = BoundedSemaphore(MOST)
+        self._open: dict[Any, None] = {}  # the oldest first
         super().__init__(*arguments)
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        self._free.acquire()
+        if not self._free.acquire(timeout=FULL_S):
+            with contextlib.suppress(OSError, StopIteration, RuntimeError):  # another may end meanwhile
+                next(iter(self._open)).shutdown(socket.SHUT_RDWR)
+            self._free.acquire()
+        self._open[request] = None
         super().process_request(request, client_address)
 
     def process_request_thread(self, request: Any, client_address: Any) -> None:
         try:
             super().process_request_thread(request, client_address)
         finally:
+            self._open.pop(request, None)
             self._free.release()
 
     def handle_error(self, request: Any, client_address: Any) -> None:
