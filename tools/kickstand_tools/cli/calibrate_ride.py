@@ -10,7 +10,7 @@ from .calibrate import OUT, PATH, along_axes, matrix_lines, print_lines
 from .common import warn
 
 if TYPE_CHECKING:
-    from ..calibration.ride.fit import RideFit
+    from ..estimation.alignment import RideFit
 
 
 @click.command(short_help="The alignment of a motorcycle, from riding with bends.")
@@ -27,7 +27,7 @@ def ride(log: Path, phone: str | None, out: Path) -> None:
     All axes have to be right-handed, with +1 g at rest along the one that points up.
     """
     from ..calibration.file import write_calibration
-    from ..calibration.ride.fit import fit_ride
+    from ..estimation.alignment import fit_ride
     from ..output import check_output
     from ..progress import Bar
 

@@ -74,9 +74,9 @@ def smooth(ride: Path, calibration: Path | None, from_s: float | None, to_s: flo
     The log's axes and rates have to be right-handed, and the axis that points up has to read +1 g at rest.
     """
     from ..calibration.file import calibration_beside, read_calibration
+    from ..estimation.smooth import smooth_to_csv
     from ..output import check_output
     from ..progress import Bar
-    from ..smoothing.smooth import smooth_to_csv
 
     calibration = calibration or calibration_beside(ride)
     check_output(out, [ride, calibration])

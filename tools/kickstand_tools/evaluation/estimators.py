@@ -14,9 +14,9 @@ from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from ..calibration.file import CalibrationFile
+from ..estimation.smooth import smooth
 from ..logs.reader import Log
 from ..replay import replay_engine
-from ..smoothing.smooth import smooth
 from .samples import Samples, calibrated
 
 AVERAGE_S = 0.3  # of the formula's lean

@@ -15,8 +15,8 @@ from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from ..calibration.file import CalibrationFile
-from ..calibration.ride.fit import fit_ride
 from ..errors import InputError
+from ..estimation.alignment import fit_ride
 from ..logs.reader import Log, read_log
 from ..replay.mount_check import contradiction
 from .estimators import estimate

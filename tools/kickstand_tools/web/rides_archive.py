@@ -11,7 +11,7 @@ from .zipped import zipped
 # The tools' modules and folders that rides_guest.py imports
 MODULES = (
     *("__init__.py", "errors.py", "firmware_path.py", "output.py", "refusals.py", "remedies.py"),
-    *("analysis", "calibration", "imports", "logs", "replay", "smoothing"),
+    *("analysis", "calibration", "imports", "logs", "estimation", "replay"),
     *("web/__init__.py", "web/rides_given.py", "web/rides_guest.py"),
 )
 _NUMPY = "lib/python3.12/site-packages/"  # in the package of conda

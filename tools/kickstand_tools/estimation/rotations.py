@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from ...logs.table import Array
+from ..logs.table import Array
 
 
 def turned(matrix: Array, rotation: Array) -> Array:

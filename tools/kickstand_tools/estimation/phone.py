@@ -7,7 +7,7 @@ Orientation; Android and iOS have the same).
 import numpy as np
 from kickstand.errors import Refusal
 
-from ...logs.table import Array
+from ..logs.table import Array
 from .rotations import rotation_between
 
 _X, _Y, _Z = np.eye(3)
