@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from kickstand_tools import api
 from kickstand_tools.estimation import first_guess
-from kickstand_tools.estimation.alignment import mounted_windows
-from kickstand_tools.estimation.phone import PHONES
+from kickstand_tools.estimation.alignment import PHONES, mounted_windows
 from kickstand_tools.estimation.rotations import rotation_between, turned
 from kickstand_tools.logs.log import Log
 

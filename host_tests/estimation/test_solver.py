@@ -53,7 +53,8 @@ class Problem:
         normal = a[:, :n].T @ a[:, :n]
         found = -np.linalg.solve(normal, a[:, :n].T @ a[:, n])
         misfit = np.sum((a[:, :n] @ found + a[:, n]) ** 2)
-        likelihood = misfit + np.linalg.slogdet(normal)[1] - np.linalg.slogdet(prior[:, :M])[1] + np.sum(np.log(variance))
+        prior_and_walks = np.linalg.slogdet(prior[:, :M])[1] - np.sum(np.log(variance))
+        likelihood = misfit + np.linalg.slogdet(normal)[1] - prior_and_walks
         return found, np.linalg.inv(normal), likelihood
 
 

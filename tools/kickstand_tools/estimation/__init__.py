@@ -9,6 +9,6 @@
     solver.py         the linear least squares of one step: states by Schur complement, then the chain of blocks
     least_squares.py  the steps: states and parameters with their covariance
 
-Two results: the alignment with its covariance (alignment.py, `kickstand calibrate ride`), and the smoothed lean with its
-standard deviation (smooth.py, `kickstand smooth`).
+Two results: the alignment with its covariance (alignment.py, `kickstand calibrate ride`), and the smoothed lean with
+its standard deviation (smooth.py, `kickstand smooth`).
 """

@@ -24,10 +24,9 @@ from ..logs.reader import Source, read_log
 from ..logs.source import Progress
 from ..logs.table import Array
 from ..refusals import RefusedInput
-from .first_guess import MOUNTED_DEG, MOUNTED_S, Axes, axes, standing
+from .first_guess import MIN_RIDING_S, MOUNTED_DEG, MOUNTED_S, Axes, axes, standing
 from .hypotheses import Hypotheses
 from .least_squares import Estimate
-from .phone import PHONES, SIGMA_DEG, mounting
 from .rotations import rotation_between
 from .unknowns import ACCEL, BESIDE, BIAS, BIAS_PER_C, DELAY, LEAN, MEAN, OFFSET, OFFSET_PER_C, ROTATION, SENSOR, Prior
 from .windows import WINDOW_S, Windows, windows_of
@@ -35,13 +34,27 @@ from .windows import WINDOW_S, Windows, windows_of
 SLOWEST_HZ = 20.0
 LONGEST_S = 1800.0  # more than half an hour of a ride adds nothing
 ROTATION_SIGMA = 10.0  # rad: nothing is known of the misalignment
-OFFSET_SIGMA_G, AXES_SIGMA = 0.04, 0.012  # of the accelerometer: its bias; its scale and cross-axis errors
+AXES_SIGMA = 0.012  # of 1: scale and cross-axis errors of the accelerometer
 BESIDE_SIGMA_G = 0.005  # force to the side on straights, of luggage or camber
 UNSETTLED = np.radians(0.5)  # a last step of more has not converged
 ODD_SIGMAS, ABSURD_SIGMAS = 4.0, 20.0  # of the sensor's errors that are found: beyond, its quality is worse
 MAX_DEG = np.array([5.0, 5.0, 3.5])  # pitch, yaw, roll: known less exactly, an alignment is not given
 MOVED_DEG = 8.0
 CONSTANT = Hypotheses(*np.array([[1e-5], [1e-5], [1e-4], [0.0], [1.0]]))  # nothing changes in the ride
+
+# How a phone may be mounted, as its user says it: a check of what the ride says, and a hint where that says little. A
+# phone's axes, seen by who looks at its screen: x to the right, y to the top, z out of the screen (W3C Device
+# Orientation; Android and iOS have the same).
+X, Y, Z = np.eye(3)
+
+# Rows left, up, forward. A screen that faces the rider looks backward; landscape: turned to either side.
+PHONES = {
+    "portrait": [np.array([-X, Y, -Z])],
+    "landscape": [np.array([Y, X, -Z]), np.array([-Y, -X, -Z])],
+    "flat": [np.array([-X, Z, Y])],
+}
+PHONE_SIGMA_DEG = 20.0  # of a holder that is tilted towards the rider's eyes
+PHONE_MAX_DEG = 45.0  # the mountings are at least 90 degrees apart
 
 
 @dataclass
@@ -99,7 +112,7 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
         guess = axes(windows)
         if progress:
             progress(1, 2)
-        expected = mounting(phone, guess.matrix) if phone else None
+        expected = _mounting(phone, guess.matrix) if phone else None
         found = _checked(windows, guess, estimate_alignment(windows, guess, expected), expected, log.notices)
     except Refusal as refusal:
         raise RefusedInput(refusal, log.name) from refusal
@@ -115,15 +128,10 @@ def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) ->
     Raises Refusal if no alignment fits.
     """
     sigma, mean = Prior.of_pose(six_done=False).sigma, MEAN.copy()
-    sigma[ROTATION], sigma[ACCEL], sigma[OFFSET], sigma[BESIDE] = (
-        ROTATION_SIGMA,
-        AXES_SIGMA,
-        OFFSET_SIGMA_G,
-        BESIDE_SIGMA_G,
-    )
+    sigma[ROTATION], sigma[ACCEL], sigma[BESIDE] = ROTATION_SIGMA, AXES_SIGMA, BESIDE_SIGMA_G
     sigma[OFFSET_PER_C] = sigma[BIAS_PER_C] = 0.0
     if expected is not None:
-        mean[ROTATION], sigma[ROTATION] = rotation_between(expected, guess.matrix), np.radians(SIGMA_DEG)
+        mean[ROTATION], sigma[ROTATION] = rotation_between(expected, guess.matrix), np.radians(PHONE_SIGMA_DEG)
     try:
         found = Estimate(windows.turned(guess.matrix, guess.bias), Prior(mean, sigma, posed=False), CONSTANT)
     except np.linalg.LinAlgError as error:
@@ -144,7 +152,7 @@ def mounted_windows(log: Log) -> Windows:
     near = mean @ usual > np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(usual)
     edges = np.flatnonzero(np.diff(np.concatenate(([False], near, [False]))))
     if not len(edges):
-        raise Refusal("ride-contradicts")
+        raise Refusal("ride-short", 0.0, MIN_RIDING_S)
     longest = int(np.argmax(edges[1::2] - edges[::2]))
     begin, end = int(edges[2 * longest]), int(edges[2 * longest + 1])
     margin = round(MOUNTED_S / WINDOW_S)  # until the mean is of the ride alone
@@ -156,6 +164,8 @@ def mounted_windows(log: Log) -> Windows:
 def _windows(log: Log, part: NDArray[np.bool_] | slice = slice(None)) -> Windows:
     """Along the sensor's axes."""
     t_s, rate = log.t_s[part], np.radians(log.gyro_dps[part])
+    if len(t_s) < 2:
+        raise Refusal("ride-short", 0.0, MIN_RIDING_S)
     return windows_of(t_s, log.accel_g[part], rate, log.speed_mps[part], np.zeros(len(t_s)))
 
 
@@ -180,7 +190,7 @@ def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | N
     still = standing(windows.turned(matrix, guess.bias))
     lean = (0.5 * (states[1:, LEAN] + states[:-1, LEAN]))[~still]
     has_speed = not np.all(np.isnan(windows.speed))
-    off = None if expected is None else float(np.degrees(np.linalg.norm(rotation_between(matrix, expected))))
+    off = None if expected is None else _off_deg(matrix, expected)
     notes = {"ride_quality_deg": {"roll": round(roll, 2), "pitch": round(pitch, 2), "yaw": round(yaw, 2)}}
     calibration = CalibrationFile(
         accel_offset_g=offset @ matrix,
@@ -206,3 +216,19 @@ def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | N
         off,
         notices,
     )
+
+
+def _mounting(phone: str, found: Array) -> Array:
+    """The matrix (3, 3) that the user means, of those that phone allows the one next to found. Raises Refusal where
+    found is another one."""
+    off, nearest = min(((_off_deg(found, matrix), i) for i, matrix in enumerate(PHONES[phone])))
+    if off > PHONE_MAX_DEG:
+        mirrored = found * [[1.0], [-1.0], [-1.0]]  # what accelerations of the opposite sign make of it
+        if min(_off_deg(mirrored, matrix) for matrix in PHONES[phone]) < PHONE_MAX_DEG:
+            raise Refusal("phone-upside-down", phone)
+        raise Refusal("phone-otherwise", phone, off)
+    return PHONES[phone][nearest]
+
+
+def _off_deg(found: Array, matrix: Array) -> float:
+    return float(np.degrees(np.linalg.norm(rotation_between(found, matrix))))

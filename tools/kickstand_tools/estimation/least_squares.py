@@ -51,8 +51,7 @@ class Estimate:
         self._use_own_noise()
 
     def unknowns(self, number: NDArray[np.intp], states: Array) -> Array:
-        """(STATES + PARAMETERS, len(number)): as equations.py takes them, of these states (.., STATES) in the windows of
-        these numbers."""
+        """(STATES + PARAMETERS, k): as equations.py takes them. states (k, STATES): in windows of these numbers (k)."""
         return np.concatenate((states.T, self.parameters[number // self._length].T))
 
     def sigma(self) -> Array:

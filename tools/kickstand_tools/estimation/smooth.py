@@ -187,11 +187,10 @@ def _adjusted(pieces: list[Block], calibration: CalibrationFile, start_c: float)
     rate = np.radians(rate)
     windows = windows_of(t_s, force, rate, speed, warm)
     try:
-        found = at_samples(
-            windows, rate, Estimate(windows, Prior.of_pose(calibration.six_done), ALL), calibration.delay_s()
-        )
+        estimate = Estimate(windows, Prior.of_pose(calibration.six_done), ALL)
     except np.linalg.LinAlgError:
         return nothing  # readings that are no ride's: the lean is not known
+    found = at_samples(windows, rate, estimate, calibration.delay_s())
     found[:, :3] = np.degrees(found[:, :3])
     return found
 
@@ -204,21 +203,23 @@ def at_samples(windows: Windows, rate: Array, found: Estimate, delay_s: float) -
     """
     number, sigma = windows.number, found.sigma()[:, LEAN]
     duration = windows.before + windows.after
-    first = np.append(True, np.diff(number) > 0)  # sample of its window
-    begin = np.flatnonzero(first)[np.cumsum(first) - 1]
-    since = np.cumsum(duration)
-    since = since - duration - (since - duration)[begin]  # of the window's begin, until the sample's own time begins
-    share = (since + windows.before) / windows.seconds[number]
+    last = np.append(np.diff(number) > 0, True)  # sample of its window
+    window = np.cumsum(last) - last
+
+    def integral(rate: Array) -> tuple[Array, Array]:
+        """From the begin of its window to each sample, and over the whole window."""
+        until = np.cumsum(rate * duration)
+        edges = np.concatenate(([0.0], until[last]))
+        return until - rate * windows.after - edges[window], np.diff(edges)[window]
+
+    since, seconds = integral(np.ones(len(number)))
+    share = since / seconds
     before, after = found.states[number], found.states[number + 1]
-    lean, pitch, speed = ((before + share[:, None] * (after - before))[:, [LEAN, PITCH, FORWARD]]).T
+    lean, pitch, speed = (before + share[:, None] * (after - before))[:, [LEAN, PITCH, FORWARD]].T
     wx, wy, wz = corrected_rates(rate.T, found.unknowns(number, 0.5 * (before + after)), windows.warm[number])
     roll_rate = wz - np.tan(pitch) * (wx * np.sin(lean) + wy * np.cos(lean))
-    turned = np.cumsum(roll_rate * duration)
-    until = turned - roll_rate * duration
-    until = until - until[begin] + roll_rate * windows.before
-    last = np.append(np.flatnonzero(first)[1:], len(number)) - 1  # sample of its window
-    whole = (turned[last] - (turned - roll_rate * duration)[np.flatnonzero(first)])[np.cumsum(first) - 1]
-    lean = before[:, LEAN] + until + share * ((after - before)[:, LEAN] - whole)
+    rolled, whole = integral(roll_rate)
+    lean = before[:, LEAN] + rolled + share * ((after - before)[:, LEAN] - whole)
     spread = sigma[number] + share * (sigma[number + 1] - sigma[number])
     jolt = 2.0 * np.sqrt(np.clip(share * (1.0 - share), 0.0, 1.0)) * jolted(windows)[number]
     for more in (TIMING_S * roll_rate, LEANED_SHARE * lean, jolt):

@@ -1,9 +1,9 @@
 """Linear least squares over a chain of states, with parameters that follow a random walk from block to block.
 
 The windows of a ride are laid side by side as B blocks of K windows. A link holds the normal equations of two states
-that follow one another, and their columns for the parameters of the block and for the right-hand side. Each second
-state is eliminated by its Schur complement, in all blocks at the same time, until one link of each block is left (cyclic
-reduction). The blocks then are a chain themselves: of states that are a block's first state together with its
+that follow one another, and their columns for the parameters of the block and for the right-hand side. Every second
+state is eliminated by its Schur complement, in all blocks at the same time, until one link of each block is left
+(cyclic reduction). The blocks then are a chain themselves, of states that are a block's first state together with its
 parameters. The same elimination solves it, for G hypotheses about the random walk at the same time, and gives the
 likelihood of each. The result is that of one least squares over the whole chain.
 """
@@ -19,11 +19,11 @@ from ..logs.table import Array
 class Reduced:
     """B chains of which the inner states are eliminated. s: values of a state; m: of the parameters of a chain.
 
-    Of each level of the elimination, the first one first: gains (B, states, s, s + s + m + 1): a state's change is minus
-    this times (the state before, the state after, the parameters, 1); covariances (B, states, s, s): of what that leaves
-    open. left (B, s + s + m, s + s + m + 1): the normal equations of the first state, the last one and the parameters;
-    the last column is the gradient. log_determinant (B): of the information about all states that were eliminated.
-    residual (B): the sum of squares at their optimum.
+    Of each level of the elimination, the first one first: gains (B, states, s, s + s + m + 1): a state's change is
+    minus this times (the state before, the state after, the parameters, 1); covariances (B, states, s, s): of a state,
+    given these. left (B, s + s + m, s + s + m + 1): the normal equations of the first state, the last one and the
+    parameters; the last column is the gradient. log_determinant (B): of the information about all states that were
+    eliminated. residual (B): the sum of squares at their optimum.
     """
 
     s: int
@@ -35,8 +35,8 @@ class Reduced:
 
 
 def reduce_windows(jacobian: Array, states: int) -> Reduced:
-    """jacobian (B, K, r, s + s + m + 1): derivatives of the residuals of a window by the state at its begin, that at its
-    end and the parameters, and the residuals. Raises LinAlgError."""
+    """jacobian (B, K, r, s + s + m + 1): derivatives of the residuals of a window by the state at its begin, that at
+    its end and the parameters, and the residuals. states: s. Raises LinAlgError."""
     links = np.matmul(jacobian[..., : 2 * states].transpose(0, 1, 3, 2), jacobian)
     common = _in_rows(jacobian[..., 2 * states :])
     return _reduced(links, np.matmul(common.transpose(0, 2, 1), common))
@@ -116,8 +116,8 @@ def covariances(reduced: Reduced, joint: Array) -> Array:
 class RandomWalks:
     """The parameters by G hypotheses.
 
-    prior (G, m, m + 1): normal equations of those of the first block. variance (G, B - 1, m): of their change from block
-    to block. between (B - 1, m): by how much those about which the equations were linearised change.
+    prior (G, m, m + 1): normal equations of those of the first block. variance (G, B - 1, m): of their change from
+    block to block. between (B - 1, m): by how much those about which the equations were linearised change.
     """
 
     prior: Array
@@ -180,7 +180,7 @@ def posterior_covariance(blocks: Reduced, walks: RandomWalks, weight: Array) -> 
     states = _first_states(reduced, ends)
     off = np.concatenate((states[:, :-1], states[:, 1:]), axis=2)
     off -= np.einsum("g,gbi->bi", weight, off)
-    within = covariances(reduced, np.linalg.inv(ends[..., :-1]))
+    within = covariances(reduced, np.linalg.inv(ends[..., :-1]).astype(float))
     whole = np.einsum("g,gbij->bij", weight, within + off[..., :, None] * off[..., None, :])
     kept = np.r_[:s, n : n + s, s:n]
     return whole[:, kept[:, None], kept]
@@ -188,5 +188,5 @@ def posterior_covariance(blocks: Reduced, walks: RandomWalks, weight: Array) -> 
 
 def _first_states(reduced: Reduced, ends: Array) -> Array:
     """(G, B + 1, n): changes of the chains' states."""
-    change = -np.linalg.solve(ends[..., :-1], ends[..., -1:]).reshape(len(ends), 2, reduced.s)
-    return back(reduced, change, np.zeros((len(ends), 0)))
+    change = np.linalg.solve(ends[..., :-1], -ends[..., -1:]).astype(float)
+    return back(reduced, change.reshape(len(ends), 2, reduced.s), np.zeros((len(ends), 0)))
