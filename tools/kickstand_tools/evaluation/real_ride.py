@@ -19,6 +19,7 @@ from ..calibration.ride.fit import fit_ride
 from ..errors import InputError
 from ..logs.reader import Log, read_log
 from ..replay.mount_check import contradiction
+from ..signals.averages import moving_mean
 from .estimators import estimate
 from .metrics import rms, slope
 from .samples import calibrated
@@ -84,6 +85,4 @@ def _speed(log: Log) -> NDArray[np.float64]:
 
 def _averaged(x: NDArray, rate_hz: float) -> NDArray[np.float64]:
     """The mean over 1 s around each sample."""
-    n = max(round(AVERAGE_S * rate_hz), 1)
-    padded = np.pad(x, (n // 2, n - 1 - n // 2), mode="edge")
-    return np.convolve(padded, np.full(n, 1.0 / n), mode="valid")
+    return moving_mean(x, round(AVERAGE_S * rate_hz))
