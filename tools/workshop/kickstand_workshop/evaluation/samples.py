@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.logs.reader import Log
 from numpy.typing import NDArray
-
-from ..calibration.file import CalibrationFile
-from ..logs.reader import Log
 
 
 @dataclass

@@ -6,12 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from kickstand_tools import firmware_path
+from kickstand_tools.emulator import flash_image
+from kickstand_tools.emulator.host_link import GUEST, HostLink
+from kickstand_tools.emulator.pico import Pico
 from rich.table import Table
-
-from .. import firmware_path
-from ..emulator import flash_image
-from ..emulator.host_link import GUEST, HostLink
-from ..emulator.pico import Pico
 
 _LIMIT_S = 10.0
 _ROWS = 10  # modules that the table names

@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from ..simulated_board.mpu6050 import Mpu6050
-from ..simulated_board.mpu6050_registers import ACCEL_XOUT_H
+from kickstand_tools.simulated_board.mpu6050 import Mpu6050
+from kickstand_tools.simulated_board.mpu6050_registers import ACCEL_XOUT_H
 
 
 class SampleCount:

@@ -4,9 +4,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
+from kickstand_tools.errors import InputError, extra
 from numpy.typing import NDArray
-
-from ..errors import InputError, extra
 
 ZOOM_S = 60.0
 # Colour and line width, in the order of drawing: the noisy ones lie behind

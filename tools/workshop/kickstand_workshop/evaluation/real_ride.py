@@ -12,13 +12,13 @@ from pathlib import Path
 import numpy as np
 from kickstand.errors import Notice
 from kickstand.units import STANDARD_GRAVITY
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.calibration.ride.fit import fit_ride
+from kickstand_tools.errors import InputError
+from kickstand_tools.logs.reader import Log, read_log
+from kickstand_tools.replay.mount_check import contradiction
 from numpy.typing import NDArray
 
-from ..calibration.file import CalibrationFile
-from ..calibration.ride.fit import fit_ride
-from ..errors import InputError
-from ..logs.reader import Log, read_log
-from ..replay.mount_check import contradiction
 from .estimators import estimate
 from .metrics import rms, slope
 from .samples import calibrated

@@ -9,15 +9,15 @@ from dataclasses import dataclass, field
 from multiprocessing.queues import SimpleQueue
 
 import numpy as np
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.calibration.six import fit_six_positions
+from kickstand_tools.calibration.two import fit_two_positions
+from kickstand_tools.errors import InputError
+from kickstand_tools.logs.log import Log
+from kickstand_tools.simulation.profiles import check_profile
+from kickstand_tools.simulation.ride import Ride, ride
 from numpy.typing import NDArray
 
-from ..calibration.file import CalibrationFile
-from ..calibration.six import fit_six_positions
-from ..calibration.two import fit_two_positions
-from ..errors import InputError
-from ..logs.log import Log
-from ..simulation.profiles import check_profile
-from ..simulation.ride import Ride, ride
 from . import estimators
 from .metrics import Score, score
 

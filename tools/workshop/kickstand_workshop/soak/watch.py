@@ -3,7 +3,8 @@
 import re
 from collections.abc import Callable
 
-from ..simulated_board.simulator import Board
+from kickstand_tools.simulated_board.simulator import Board
+
 from .trip import QUIET_S, SENSOR, Trip
 
 LOOK_S = 0.1

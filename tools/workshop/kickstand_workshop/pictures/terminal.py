@@ -4,14 +4,13 @@ import io
 from html import escape
 from itertools import groupby
 
+from kickstand_tools.demo.demo import Device
+from kickstand_tools.demo.score import State
+from kickstand_tools.demo.screen import WIDTH, screen
 from rich.console import Console
 from rich.segment import Segment
 from rich.style import Style
 from rich.terminal_theme import TerminalTheme
-
-from ..demo.demo import Device
-from ..demo.score import State
-from ..demo.screen import WIDTH, screen
 
 MOMENT_S = 36.0  # in the right turn of the demo's script
 _KEYS = "b button  B long press  p pause  q quit"

@@ -1,6 +1,8 @@
 """All drawn pictures by file name."""
 
-from . import lcd, terminal, wiring
+from kickstand_tools.pictures import lcd, wiring
+
+from . import terminal
 from .device_pages import device_pages
 
 

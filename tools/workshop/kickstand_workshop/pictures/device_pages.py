@@ -10,11 +10,11 @@ import subprocess
 import sys
 import tempfile
 
-from .. import firmware_path
-from ..demo.device import KICKSTAND_PRESS_S, LONG_PRESS_S, PART_SEED, PART_SHARE, SCRIPT, UPRIGHT_PRESS_S
-from ..simulated_board.simulator import Board
-from ..simulation.scripted.script import Ride
-from ..simulation.scripted.sensor_errors import Sensor
+from kickstand_tools import firmware_path
+from kickstand_tools.demo.device import KICKSTAND_PRESS_S, LONG_PRESS_S, PART_SEED, PART_SHARE, SCRIPT, UPRIGHT_PRESS_S
+from kickstand_tools.simulated_board.simulator import Board
+from kickstand_tools.simulation.scripted.script import Ride
+from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 
 # From the demo's script: a turn to the right from 32 to 39 s, brakes from 50 to 56 s, then stands.
 PRESSES_S = (KICKSTAND_PRESS_S, UPRIGHT_PRESS_S, 48.0, 51.0)  # stand, upright, page of maxima, page of braking

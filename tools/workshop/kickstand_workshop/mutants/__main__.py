@@ -19,11 +19,11 @@ import tempfile
 import time
 from pathlib import Path
 
-from changes import Change, changes
-from fork import KILLED, SURVIVED, TIMED_OUT, Tests
-from rooms import ROOMS, sources, tests
+from .changes import Change, changes
+from .fork import KILLED, SURVIVED, TIMED_OUT, Tests
+from .rooms import ROOMS, sources, tests
 
-ROOT = Path(__file__).resolve().parent.parent.parent
+ROOT = Path(__file__).resolve().parents[4]
 
 
 def main() -> int:

@@ -11,12 +11,12 @@ from importlib.util import find_spec
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.logs.reader import Log
+from kickstand_tools.replay import replay_engine
+from kickstand_tools.smoothing.smooth import smooth
 from numpy.typing import NDArray
 
-from ..calibration.file import CalibrationFile
-from ..logs.reader import Log
-from ..replay import replay_engine
-from ..smoothing.smooth import smooth
 from .samples import Samples, calibrated
 
 AVERAGE_S = 0.3  # of the formula's lean

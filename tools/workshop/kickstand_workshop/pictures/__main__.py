@@ -1,6 +1,7 @@
-"""Writes every picture to tools/pictures: .venv/bin/python -m kickstand_tools.pictures"""
+"""Writes every picture to tools/pictures: .venv/bin/python -m kickstand_workshop.pictures"""
 
-from .. import firmware_path
+from kickstand_tools import firmware_path
+
 from . import page, ride
 from .drawn import drawn
 

@@ -7,9 +7,8 @@ import sys
 import tempfile
 from pathlib import Path
 
+from kickstand_tools import firmware_path
 from PIL import Image
-
-from .. import firmware_path
 
 COLOURS = 64  # enough for a plot, and a third of the file
 _COMMANDS = (

@@ -1,4 +1,4 @@
-"""python -m kickstand_tools.soak --hours 24 --seed 1: prints the table, and what was found; exit status 1 then."""
+"""python -m kickstand_workshop.soak --hours 24 --seed 1: prints the table, and what was found; exit status 1 then."""
 
 import sys
 

@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 from kickstand.calibration.parameters import Calibration
+from kickstand_tools.deploy.bytecode import cross_compiled
+from kickstand_tools.emulator import flash_image
+from kickstand_tools.emulator.host_link import GUEST, HostLink
+from kickstand_tools.emulator.pico import Pico
+from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, upright
+from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from rich.console import Group
 from rich.table import Table
 
-from ..deploy.bytecode import cross_compiled
-from ..emulator import flash_image
-from ..emulator.host_link import GUEST, HostLink
-from ..emulator.pico import Pico
-from ..simulation.scripted.script import Ride, accelerate, turn, upright
-from ..simulation.scripted.sensor_errors import Sensor
 from . import boot
 from .sample_count import SampleCount
 

@@ -5,7 +5,7 @@ import io
 import threading
 from pathlib import Path
 
-from ..web import serve, site
+from kickstand_tools.web import serve, site
 
 _CHROMIUM = Path("/usr/bin/chromium")
 _LAPTOP, _PHONE = (1440, 900), (390, 844)

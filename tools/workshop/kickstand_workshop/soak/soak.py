@@ -14,8 +14,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ..simulated_board.simulator import Board
-from ..simulation.scripted.sensor_errors import Sensor
+from kickstand_tools.simulated_board.simulator import Board
+from kickstand_tools.simulation.scripted.sensor_errors import Sensor
+
 from .trip import Trip, make_trip
 from .watch import Watch
 
