@@ -45,7 +45,7 @@ ROOMS = {
         (FIRMWARE + "lean/*.py",),
         (
             TESTS + "lean/test_known_ride.py",
-            TESTS + "lean/test_*_limits.py",
+            TESTS + "lean/test_filter_states.py",
             TESTS + "lean/test_[bkmru]*.py",
         ),  # not test_lean_filter.py and test_formula.py, which take longer than all of them
     ),
