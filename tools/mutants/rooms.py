@@ -51,7 +51,7 @@ ROOMS = {
     ),
     "drive_alignment": Room(
         (FIRMWARE + "drive_alignment/*.py",),
-        (TESTS + "drive_alignment/test_drive_limits.py", TESTS + "drive_alignment/*.py"),
+        (TESTS + "drive_alignment/test_parts.py", TESTS + "drive_alignment/*.py"),
     ),
     "speed": Room(
         (FIRMWARE + "speed/*.py",),
