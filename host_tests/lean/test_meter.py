@@ -8,6 +8,21 @@ from kickstand.calibration.parameters import Calibration
 STILL = reading(*force_and_rate())
 
 
+def test_the_g_shown_follows_smoothly_whether_aligned_or_not():
+    for aligned in (True, False):
+        calibration = Calibration()
+        calibration.aligned = aligned
+        shown, seen = meter(calibration, leans=False), []
+        shown.update(STILL, 0)
+        for _ in range(150):
+            shown.update((0.2, 1.2, 0.4, 25.0, 0.0, 0.0, 0.0), DT_US)
+            seen.append(shown.smooth_force[2])
+        assert seen == sorted(seen)
+        assert seen[10] < 0.2
+        for value, force in zip(shown.smooth_force, (0.2, 1.2, 0.4)):
+            near(value, force, 0.01)
+
+
 def test_the_first_g_is_shown_at_once_also_after_a_gap():
     shown = meter(leans=False)
     shown.update((0.1, 0.9, 0.3, 25.0, 0.0, 0.0, 0.0), 10_000)

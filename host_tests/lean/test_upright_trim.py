@@ -13,7 +13,7 @@ def sigma_deg(trim):
 
 
 def after_turns(sides, lean_share):
-    """The trim after turns of a minute at 35 degrees whose force to the side is lean_share sin(lean), its pose off by 2."""
+    """The trim after turns of a minute at 35 degrees, of a force to the side of lean_share sin(lean); pose off by 2."""
     trim = UprightTrim(0.0)
     for side in sides:
         lean = radians(35.0 * side)

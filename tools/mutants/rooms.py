@@ -47,7 +47,9 @@ ROOMS = {
             TESTS + "lean/test_known_ride.py",
             TESTS + "lean/test_filter_states.py",
             TESTS + "lean/test_[bkmru]*.py",
-        ),  # not test_lean_filter.py and test_formula.py, which take longer than all of them
+            TESTS + "lean/test_formula.py",
+            TESTS + "lean/test_lean_filter.py",
+        ),
     ),
     "drive_alignment": Room(
         (FIRMWARE + "drive_alignment/*.py",),
