@@ -1,8 +1,8 @@
 """The lean filter's figures over one ride: whatever changes them changes every rider's lean, so it has to be meant.
 
 The ride has all that the filter knows: rest, bias, a yaw error, scale errors, slopes, vibration, turns, slow samples,
-measured speeds, lost samples, a restart under way. Other tests say what each parameter does; this one notices that any has
-changed. After a change that is meant, in host_tests/lean, with firmware and tools on PYTHONPATH:
+measured speeds, lost samples, a restart under way. Other tests say what each parameter does; this one notices that
+any has changed. After a change that is meant, in host_tests/lean, with firmware and tools on PYTHONPATH:
 python test_known_ride.py > known_ride.csv
 Runs on MicroPython too.
 """

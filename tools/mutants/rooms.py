@@ -65,7 +65,7 @@ ROOMS = {
     ),
     "rides": Room(
         (FIRMWARE + "rides/*.py",),
-        (TESTS + "rides/limits/*.py",),  # the others take longer
+        tuple(TESTS + f"rides/test_{name}.py" for name in ("block", "recording", "ring", "stream", "card_trial")),
     ),
     "pull": Room(
         (TOOLS + "rides/*.py",),
