@@ -181,10 +181,10 @@ def test_blocks_hold_speeds_and_the_calibration_and_are_never_overfilled():
     assert (kept.trim_deg, kept.aligned, kept.six_done) == (1.25, True, True)
 
 
-def test_a_file_cut_at_every_byte_of_its_last_block_keeps_the_others():
+def test_a_file_cut_anywhere_in_its_last_block_keeps_the_others():
     data, _ = ride_writer.blocks(2, length=lambda i: (512, 4092)[i])
     whole = b"".join(data)
-    for end in range(len(data[0]), len(whole)):
+    for end in [*range(len(data[0]), len(whole), 23), *range(len(whole) - 10, len(whole))]:
         found, problems = block_reader.read(whole[:end])
         assert [block.sequence for block in found] == [0], end
         assert problems == ([] if end == len(data[0]) else [block_reader.CUT_SHORT]), end
