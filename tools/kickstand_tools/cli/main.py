@@ -1,6 +1,10 @@
 """The `kickstand` command. What it refuses: one line on standard error, status 2, nothing written."""
 
+import importlib
+import importlib.util
+import pkgutil
 import sys
+from collections.abc import Iterator
 
 import click
 
@@ -20,12 +24,21 @@ def kickstand(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
+def _added() -> Iterator[click.Command]:
+    """What other packages add: the COMMANDS of the module `commands` of each that is named kickstand_..."""
+    for package in pkgutil.iter_modules():
+        if package.name.startswith("kickstand_") and package.name != __name__.partition(".")[0]:
+            if importlib.util.find_spec(package.name + ".commands"):
+                yield from importlib.import_module(package.name + ".commands").COMMANDS
+
+
 for _command in (
     *(board.flash, board.status, board.pull, board.record),
     *(import_.import_, join.join, calibrate.calibrate, ride.replay, ride.smooth, ride.report, ride.plot, ride.export),
     *(ride.cut, overlay.overlay),
-    *(fleet.fleet, simulated.simulate, simulated.evaluate),
-    *(without_a_board.demo, without_a_board.web, without_a_board.emulate, without_a_board.bench),
+    *(fleet.fleet, simulated.simulate),
+    *(without_a_board.demo, without_a_board.web, without_a_board.emulate),
+    *_added(),
 ):
     kickstand.add_command(_command)
 calibrate.calibrate.add_command(calibrate_ride.ride)

@@ -1,7 +1,6 @@
-"""The commands that run the firmware without a board: demo, web, emulate, bench."""
+"""The commands that run the firmware without a board: demo, web, emulate."""
 
 import contextlib
-import json
 import sys
 import webbrowser
 from pathlib import Path
@@ -57,22 +56,3 @@ def emulate(port: int) -> None:
     from ..emulator.emulate import emulate
 
     emulate(port, click.echo)
-
-
-@click.command(short_help="Time, memory and flash of the firmware on an emulated Pico.")
-@click.option("--seconds", type=click.IntRange(1, 600), default=10, help="Emulated, of each of four runs.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def bench(seconds: int, as_json: bool) -> None:
-    """What the firmware costs on an emulated Pico: time, memory, flash."""
-    from ..emulator import image
-
-    image.find()  # before anything else of the emulator is imported
-    from rich.console import Console
-
-    from ..bench.bench import bench, tables
-
-    result = bench(seconds)
-    if as_json:
-        click.echo(json.dumps(result))
-    else:
-        Console().print(tables(result))
