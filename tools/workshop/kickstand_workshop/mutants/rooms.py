@@ -57,7 +57,7 @@ ROOMS = {
     ),
     "speed": Room(
         (FIRMWARE + "speed/*.py",),
-        (TESTS + "simulated_board/test_board_speed_limits.py", TESTS + "simulated_board/test_board_speed.py"),
+        (TESTS + "simulated_board/test_board_speed.py", TESTS + "simulated_board/test_board_place.py"),
     ),
     "ui": Room(
         (FIRMWARE + "ui/*.py",),
