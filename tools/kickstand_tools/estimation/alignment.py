@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
-from ..logs.axes.leaning import averaged
 from ..logs.cells import MOST_DPS, MOST_G
 from ..logs.log import Log
 from ..logs.mended.frozen import believed
@@ -24,10 +23,12 @@ from ..logs.reader import Source, read_log
 from ..logs.source import Progress
 from ..logs.table import Array
 from ..refusals import RefusedInput
+from ..signals.cells import stretches
+from ..signals.leaning import averaged
+from ..signals.rotations import rotation_vector
 from .first_guess import MIN_RIDING_S, MOUNTED_DEG, MOUNTED_S, Axes, axes, standing
 from .hypotheses import Hypotheses
 from .least_squares import Estimate
-from .rotations import rotation_between
 from .unknowns import ACCEL, BESIDE, BIAS, BIAS_PER_C, DELAY, LEAN, MEAN, OFFSET, OFFSET_PER_C, ROTATION, SENSOR, Prior
 from .windows import WINDOW_S, Windows, windows_of
 
@@ -131,7 +132,7 @@ def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) ->
     sigma[ROTATION], sigma[ACCEL], sigma[BESIDE] = ROTATION_SIGMA, AXES_SIGMA, BESIDE_SIGMA_G
     sigma[OFFSET_PER_C] = sigma[BIAS_PER_C] = 0.0
     if expected is not None:
-        mean[ROTATION], sigma[ROTATION] = rotation_between(expected, guess.matrix), np.radians(PHONE_SIGMA_DEG)
+        mean[ROTATION], sigma[ROTATION] = rotation_vector(expected @ guess.matrix.T), np.radians(PHONE_SIGMA_DEG)
     try:
         found = Estimate(windows.turned(guess.matrix, guess.bias), Prior(mean, sigma, posed=False), CONSTANT)
     except np.linalg.LinAlgError as error:
@@ -150,11 +151,10 @@ def mounted_windows(log: Log) -> Windows:
     mean /= np.maximum(np.linalg.norm(mean, axis=1), 1e-9)[:, None]
     usual = np.median(mean, axis=0)
     near = mean @ usual > np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(usual)
-    edges = np.flatnonzero(np.diff(np.concatenate(([False], near, [False]))))
-    if not len(edges):
+    mounted = stretches(near)
+    if not len(mounted):
         raise Refusal("ride-short", 0.0, MIN_RIDING_S)
-    longest = int(np.argmax(edges[1::2] - edges[::2]))
-    begin, end = int(edges[2 * longest]), int(edges[2 * longest + 1])
+    begin, end = mounted[np.argmax(np.diff(mounted, axis=1))]
     margin = round(MOUNTED_S / WINDOW_S)  # until the mean is of the ride alone
     first = windows.edges[begin + margin * (begin > 0)]
     last = windows.edges[end - margin * (end < len(windows))]
@@ -231,4 +231,4 @@ def _mounting(phone: str, found: Array) -> Array:
 
 
 def _off_deg(found: Array, matrix: Array) -> float:
-    return float(np.degrees(np.linalg.norm(rotation_between(found, matrix))))
+    return float(np.degrees(np.linalg.norm(rotation_vector(found @ matrix.T))))

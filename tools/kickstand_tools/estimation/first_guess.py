@@ -1,7 +1,7 @@
 """Where a bike stands, and its lean and speed, roughly: where the adjustment begins."""
 
 import itertools
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from kickstand.errors import Refusal
@@ -9,13 +9,13 @@ from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from ..logs.axes.bends import speed_in_radians
-from ..logs.axes.leaning import Leaning, averaged, leaning_of, unrest, without_drift
 from ..logs.table import Array
+from ..signals.leaning import WINDOW_S, Leaning, averaged, leaning_of, without_drift
+from ..signals.standstill import motionless
 from .windows import Windows
 
 STILL_S = 1.6  # shorter standstills are not told from smooth riding
 STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # rms of the means of windows, over STILL_S
-STILL_MPS, STANDS = 0.3, 4.0  # a speed of less allows so much more
 BIAS_RADPS = np.radians(4.0)  # of the gyro, since its calibration: a rate above is a turn
 MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # the mean force of a ride over so long keeps within this of up
 BETWEEN_S = 20.0
@@ -40,10 +40,9 @@ def standing(w: Windows) -> NDArray[np.bool_]:
 
 
 def _calm(w: Windows, over_s: float) -> NDArray[np.bool_]:
-    known = w.known_speed
-    allowed = np.where(known < STILL_MPS, STANDS, 1.0)
-    calm = (unrest(w.rate, over_s) < allowed * STILL_RADPS) & (unrest(w.force, over_s) < allowed * STILL_G)
-    return calm & ~w.gap & ~(known >= STILL_MPS)
+    return ~w.gap & motionless(
+        w.rate, w.force, 2 * round(0.5 * over_s / WINDOW_S) + 1, STILL_RADPS, STILL_G, w.known_speed
+    )
 
 
 def in_hand(w: Windows) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -96,11 +95,11 @@ def axes(w: Windows) -> Axes:
     """Where up and forward are, within some degrees, and the gyro's bias, of windows along the sensor's axes.
 
     In balance the specific force keeps the direction of the bike's own up, so that its mean over the riding is up. For
-    forward, and for the hand of the axes, see logs/axes/leaning.py. Raises Refusal where the ride is none of a
+    forward, and for the hand of the axes, see signals/leaning.py. Raises Refusal where the ride is none of a
     motorcycle, or has too little leaning.
     """
     bias = _bias(w)
-    w = w.turned(np.eye(3), bias)
+    w = replace(w, rate=w.rate - bias)
     riding = ~w.gap & ~standing(w)
     seconds = float(np.sum(w.seconds[riding]))
     if seconds < MIN_RIDING_S:

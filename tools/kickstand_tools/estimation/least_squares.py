@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..logs.table import Array
+from ..signals.rotations import rotation_matrix
 from .equations import BALANCED, ROWS, jacobian, process_and_measurements
 from .first_guess import lean_and_speed, standing
 from .hypotheses import Hypotheses
 from .noise import BRIEF_S, LONG_S, Noise
-from .rotations import turned
 from .solver import RandomWalks, Reduced, covariances, posterior_covariance, reduce_windows, solve
 from .unknowns import BIAS, FORWARD, LEAN, LEFT, PARAMETERS, PITCH, ROTATION, STATES, UP, Prior
 from .windows import Windows
@@ -124,9 +124,8 @@ class Estimate:
         rotation = self.parameters[0, ROTATION].copy()
         self.parameters[:, ROTATION] -= rotation
         self.prior.mean[ROTATION] -= rotation
-        turn = turned(np.eye(3), rotation)
-        self.matrix = turn @ self.matrix
-        self._windows.rate, self._windows.force = self._windows.rate @ turn.T, self._windows.force @ turn.T
+        turn = rotation_matrix(rotation)
+        self.matrix, self._windows = turn @ self.matrix, self._windows.turned(turn)
 
     def _middle(self) -> Array:
         """Unknowns in the middle of each window."""

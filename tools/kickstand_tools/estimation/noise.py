@@ -8,8 +8,8 @@ as independent.
 import numpy as np
 from numpy.typing import NDArray
 
-from ..logs.axes.leaning import WINDOW_S, averaged
 from ..logs.table import Array
+from ..signals.leaning import WINDOW_S, averaged
 from . import equations as eq
 from .first_guess import in_hand
 from .unknowns import BIAS, FORWARD, LEAN, LEFT, PITCH, UP

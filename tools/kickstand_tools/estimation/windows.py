@@ -5,8 +5,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from ..logs.axes.leaning import WINDOW_S
 from ..logs.table import Array
+from ..signals.calibrated import rotated
+from ..signals.cells import cell_numbers
+from ..signals.leaning import WINDOW_S
 
 GAP_S = 0.17  # a longer step between two samples: readings are missing
 
@@ -53,9 +55,10 @@ class Windows:
             return np.full(len(self), np.nan)
         return np.interp(middle, middle[there], self.speed[there])
 
-    def turned(self, matrix: Array, bias: Array) -> "Windows":
+    def turned(self, matrix: Array, bias: Array | float = 0.0) -> "Windows":
         """Along the axes of the rows of matrix (3, 3); with rates less bias (3, rad/s)."""
-        return replace(self, rate=(self.rate - bias) @ matrix.T, force=self.force @ matrix.T)
+        rate, force = rotated(matrix, self.rate - bias, self.force)
+        return replace(self, rate=rate, force=force)
 
     def padded(self, length: int) -> "Windows":
         """With windows without readings and without duration at the end, to a multiple of `length` windows."""
@@ -89,8 +92,7 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array)
     before, after = np.append(0.5 * usual, half), np.append(half, 0.5 * usual)
     begins = np.append(True, lost)  # of a stretch without missing readings
     since = t_s - t_s[begins][np.cumsum(begins) - 1]
-    cell = np.floor(since / WINDOW_S + 1e-6).astype(np.int64)
-    starts = np.flatnonzero(np.append(True, (np.diff(cell) != 0) | lost))
+    starts = np.flatnonzero(np.append(True, (np.diff(cell_numbers(since, WINDOW_S)) != 0) | lost))
     weight = before + after
     length = np.add.reduceat(weight, starts)
 
