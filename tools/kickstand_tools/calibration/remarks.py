@@ -14,7 +14,7 @@ ANOTHER_MOUNT_DEG = 10.0
 def remarks(found: CalibrationFile, before: CalibrationFile | None = None) -> list[Notice]:
     """Of an alignment that has been found, and of the one that was given to build on.
 
-    upside-down: accelerations of the opposite sign look like a sensor upside down, and no log tells one from the other.
+    upside-down: accelerations of the opposite sign look like a sensor upside down, and no log separates the two.
     A phone's x may point down: it lies on its side. another-mount: only offset and slope are taken from the one given.
     """
     notices = []
