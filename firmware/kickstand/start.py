@@ -9,10 +9,11 @@ from time import sleep_ms, ticks_ms
 
 import machine
 
-from . import __version__, settings
+from . import settings
 from .board import port
 from .devices import open_button, open_lcd, open_sensor
 from .errors import SettingsError
+from .units import __version__
 
 CHARGE_MS = 100
 
@@ -31,9 +32,9 @@ STEPS = (
     "lean.meter",
     "ui.messages",
     "ui.pages",
-    "ui.views",
     "ui.page_ring",
     "ui.screen",
+    "rides.recording",
     "app",
 )
 
@@ -76,7 +77,7 @@ def main():
             pass
     except KeyboardInterrupt:
         port.rest_watchdog()
-        print("Kickstand stopped. Ctrl-D starts it again; import kickstand; kickstand.status() tells how it is.")
+        print("Kickstand stopped. Ctrl-D starts it again; import kickstand; kickstand.status() reports how it is.")
 
 
 def run(chosen, lcd):

@@ -5,7 +5,6 @@ import os
 import sys
 from time import sleep_ms, ticks_diff, ticks_ms
 
-from . import __version__
 from .calibration.store import Store
 from .console import sentence
 from .devices import open_button, open_lcd, open_sensor
@@ -13,6 +12,7 @@ from .errors import SettingsError
 from .imu.mpu6050 import UnknownChip
 from .settings import load
 from .ui import messages
+from .units import __version__
 
 LISTEN_MS = 3500
 _TRIAL = "trial.tmp"  # written and removed

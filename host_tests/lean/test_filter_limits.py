@@ -115,7 +115,7 @@ def test_a_speed_of_less_than_three_sigma_may_be_none():
     assert told(4.0, 0.5).rolling
     for speed_mps, rolls in ((4.0, False), (9.0, True)):
         estimator = told(speed_mps, 0.5)
-        estimator.doubt(0.4)
+        estimator.inflate_covariance(0.4)
         assert estimator.speed_mps > 3.5
         assert estimator.rolling is rolls
 

@@ -48,10 +48,10 @@ def test_a_standing_bike_is_at_rest_and_upright():
 def test_the_lean_is_distrusted_for_a_reason_until_it_is_trusted_again():
     shown = stand(meter())
     shown.distrust("mount has moved")
-    assert shown.doubt == "mount has moved"
+    assert shown.suppressed_reason == "mount has moved"
     assert not shown.trusted
     shown.trust()
-    assert shown.doubt is None
+    assert shown.suppressed_reason is None
     assert shown.trusted
     with pytest.raises(AttributeError):
         setattr(shown, "doubt", "written")  # noqa: B010 type checkers know that it is read only
@@ -61,9 +61,9 @@ def test_a_doubt_is_about_one_calibration():
     shown = stand(meter())
     shown.distrust("side was wrong?")
     shown.use(shown.calibration)
-    assert shown.doubt == "side was wrong?"
+    assert shown.suppressed_reason == "side was wrong?"
     shown.use(Calibration())
-    assert shown.doubt is None
+    assert shown.suppressed_reason is None
 
 
 def test_a_car_has_no_lean_to_doubt():

@@ -50,10 +50,10 @@ class DriveAlignment:
     """
 
     def __init__(self, vehicle, up=None, bias=None):
-        self.vehicle = vehicle
+        self._leans = vehicle == MOTORCYCLE
         self.needed = MIN_EVENTS
         self.standing = StandingVertical(bias or (0.0, 0.0, 0.0))
-        self.vertical = Vertical(vehicle == CAR, up, self.standing)
+        self.vertical = Vertical(not self._leans, up, self.standing)
         self._history = ForceHistory()
         self.events = DrivingEvents(self._history)
         self.quality = DrivingQuality(self.events, self.vertical)
@@ -92,7 +92,7 @@ class DriveAlignment:
             return READY
         if self._speed_mps < 0.0 or self._silent_us > STALE_US:
             return WAITING_FOR_SPEED
-        if self.vehicle == CAR and not self.standing.stops:
+        if not (self._leans or self.standing.stops):
             return WAITING_FOR_STOP
         if not self.events.braking:
             return WAITING_FOR_BRAKING
@@ -106,7 +106,7 @@ class DriveAlignment:
     @property
     def problem(self):
         """What is wrong with the speed or with the mount, and driving on does not mend: an AlignmentError, or None."""
-        if self._speed_check.problem is None and self.standing.moved and self.vehicle == CAR:
+        if self._speed_check.problem is None and self.standing.moved and not self._leans:
             return AlignmentError("mount-moved", "between-stops", MAX_CHANGE_DEG)
         if self.counted < self.needed:
             return self._speed_check.problem
@@ -124,7 +124,7 @@ class DriveAlignment:
             return AlignmentError("no-speed")
         if self._top_mps < MOVED_MPS:
             return AlignmentError("not-driven", needed)
-        if self.vehicle == CAR and not self.standing.stops:
+        if not (self._leans or self.standing.stops):
             return AlignmentError("not-stopped", SETTLE_S + COUNTS_S)
         if counted < needed:
             return AlignmentError("few-events", counted, needed, turned)

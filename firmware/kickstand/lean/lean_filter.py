@@ -61,7 +61,7 @@ class LeanFilter:
         self._axis = 0  # of the gyro, whose bias is measured next at rest
         self._roll_rate = self._last_roll_rate = 0.0
 
-    def doubt(self, seconds):
+    def inflate_covariance(self, seconds):
         """The readings of so many seconds are lost: what the bike did meanwhile is not known."""
         p = self._p
         if p is None:

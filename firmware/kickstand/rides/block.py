@@ -24,9 +24,9 @@ import struct
 from array import array
 from binascii import crc32
 
-from .. import __version__
 from ..calibration.store import BODY_LENGTH
 from ..errors import NO_MACHINE_CODE, checked
+from ..units import __version__
 
 MAGIC = b"KRID"
 VERSION = 1
