@@ -39,7 +39,7 @@ STEPS = (
 )
 
 
-def tell(lcd, line1, line2=""):
+def _show(lcd, line1, line2=""):
     """Show two lines on the display, at once."""
     lcd.show(line1, line2)
     lcd.flush()
@@ -61,7 +61,7 @@ def main():
         lcd = open_lcd(chosen)
         if machine.reset_cause() == machine.PWRON_RESET and _held(open_button(chosen)):
             print("Kickstand %s: safe mode, the button was held at power-up." % __version__)
-            tell(lcd, "Safe mode", "Ready for USB")
+            _show(lcd, "Safe mode", "Ready for USB")
             return
         lcd.show("Kickstand", "starting")  # a lean from before a reset must not pass for a reading
         run(chosen, lcd)
@@ -72,7 +72,7 @@ def main():
 
         print("Kickstand stopped. " + sentence(error))
         try:
-            tell(lcd or open_lcd(error.settings), *lines(error))
+            _show(lcd or open_lcd(error.settings), *lines(error))
         except SettingsError:  # the display's own pins are wrong, or not set, which Pin() refuses
             pass
     except KeyboardInterrupt:
@@ -98,9 +98,9 @@ def run(chosen, lcd):
     except ImportError as error:  # after an update that was broken off: to restart would not help
         port.rest_watchdog()
         print("Kickstand stopped: incomplete firmware (%s). Run kickstand flash." % error)
-        tell(lcd, "Incomplete:", "flash it again")
+        _show(lcd, "Incomplete:", "flash it again")
     except Exception as error:
         sys.print_exception(error)
-        tell(lcd, "Error, restarts", type(error).__name__)
+        _show(lcd, "Error, restarts", type(error).__name__)
         sleep_ms(3000)
         machine.reset()

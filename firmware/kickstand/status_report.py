@@ -101,7 +101,7 @@ def _display(lcd):
 
 
 def _speed(settings):
-    """Print what the speed source says within LISTEN_MS: long enough to tell what is wrong with it."""
+    """Print what the speed source says within LISTEN_MS: long enough to find out what is wrong with it."""
     if settings.SPEED is None:
         print("Speed        no source: SPEED is not set, alignment by driving is off")
         return

@@ -143,12 +143,12 @@ def test_elsewhere_its_speed_is_15_mps_to_20_for_a_minute():
 
 
 def test_a_speed_that_is_told_is_right_to_1_mps_and_a_second_late():
-    row, innovation, variance = measurements.given_speed(12.0 / GRAVITY_MPS2, 10.0 / GRAVITY_MPS2, 0.0)
+    row, innovation, variance = measurements.measured_speed(12.0 / GRAVITY_MPS2, 10.0 / GRAVITY_MPS2, 0.0)
     assert row == ((SPEED, 1.0),)
     near(innovation * GRAVITY_MPS2, 2.0, 1e-6)
     near(sqrt(variance) * GRAVITY_MPS2, 1.0, 1e-6)
     for braking_mps2 in (6.0, -6.0):  # a second later it may be 6 m/s off
-        _, _, variance = measurements.given_speed(1.0, 1.0, braking_mps2 / GRAVITY_MPS2)
+        _, _, variance = measurements.measured_speed(1.0, 1.0, braking_mps2 / GRAVITY_MPS2)
         near(sqrt(variance) * GRAVITY_MPS2, sqrt(1.0 + 36.0), 1e-6)
 
 

@@ -15,8 +15,8 @@ class Calibration:
 
     accel_offset (3, g) and accel_slope (3): calibrated = slope * reading + offset, Nicolae's equations 18-20.
     gyro_bias (3, deg/s): what the gyro reads at rest. vehicle_from_sensor (9, row-major, rows left, up, forward): the
-    alignment, a rotation matrix. trim_deg: the trim, a correction of the upright pose that riding has found: degrees by
-    which the lean would read too far to the right. six_done: offset and slope were measured. aligned:
+    alignment, a rotation matrix. trim_deg: the roll-misalignment correction, which riding has found: degrees by which
+    the lean would read too far to the right. six_done: offset and slope were measured. aligned:
     vehicle_from_sensor was measured. by_drive: it was measured or refined by driving.
     """
 
@@ -80,7 +80,7 @@ class Calibration:
         return array("f", [self.accel_slope[i] * accel[i] + self.accel_offset[i] for i in range(3)])
 
     def scales(self):
-        """What a count is worth: g for each accelerometer axis (3), and deg/s for the gyro."""
+        """The scale factors of the counts: g a count for each accelerometer axis (3), and deg/s for the gyro."""
         return self._scale, self._gyro_scale
 
     def apply(self, reading, force, rate):

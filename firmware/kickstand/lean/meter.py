@@ -9,7 +9,7 @@ from .lean_filter import DELAY_S, LeanFilter
 SMOOTH_US = 300_000  # time constant of the g shown
 MAX_VARIANCE = radians(3.0) ** 2  # a lean less certain than this is not shown
 TRIM_MAX_VARIANCE = radians(0.5) ** 2  # a trim less certain than this is not kept
-TRIM_STEP_DEG = 0.3  # a smaller change of the trim is not worth wearing the flash
+TRIM_STEP_DEG = 0.3  # a smaller change of the trim is not saved: flash wears
 FALLEN_DEG = 65.0
 FALLEN_US = 1_000_000
 HELD_US = 75_000  # a maximum lasts twice as long: a pothole jerks the sensor for less

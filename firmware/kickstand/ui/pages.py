@@ -66,7 +66,7 @@ def recorded(line):
 
 
 def recording(recorder):
-    """For how long the ride has been recorded, and for how much longer there is room before its beginning is erased."""
+    """For how long the ride has been recorded, and how much longer it may last before its beginning is erased."""
     seconds, room_s = recorder.seconds(), recorder.room_s()
     if room_s is None:
         room = "to USB"
