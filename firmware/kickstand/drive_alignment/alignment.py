@@ -105,7 +105,7 @@ class DriveAlignment:
 
     @property
     def problem(self):
-        """What is wrong with the speed or with the mount, and more driving cannot resolve: an AlignmentError, or None."""
+        """What is wrong with speed or mount, and more driving cannot resolve: an AlignmentError or None."""
         if self._speed_check.problem is None and self.standing.moved and not self._leans:
             return AlignmentError("mount-moved", "between-stops", MAX_CHANGE_DEG)
         if self.counted < self.needed:

@@ -182,9 +182,7 @@ class BackgroundAlignment:
             self._meter.trust()
         if agreed and code == STAND_SIDE:
             old = self._meter.calibration
-            turned = matrix()
-            for i in range(9):
-                turned[i] = old.vehicle_from_sensor[i]
+            turned = matrix(old.vehicle_from_sensor)
             turn_round(turned)
             if self._save(turned, -self._meter.trim_deg):
                 self.message = Notice("side-fixed")

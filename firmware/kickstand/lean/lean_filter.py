@@ -214,7 +214,7 @@ class LeanFilter:
         lean, speed, measured = x[LEAN] - self._upright, x[SPEED], self._speed
         self._speed_s += seconds
         if measured is not None:
-            # From the measured speeds alone: a pitch error would bias the estimated acceleration, and so their variance.
+            # From the measured speeds alone: a pitch error would bias the estimated acceleration.
             acceleration = 0.0 if self._last_speed is None else (measured - self._last_speed) / self._speed_s
             self._speed, self._last_speed, self._speed_s = None, measured, 0.0
             yield from p.update(*measurements.measured_speed(measured, speed, acceleration))

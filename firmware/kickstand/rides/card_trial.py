@@ -15,7 +15,7 @@ _CONTENT = b"Kickstand"
 
 
 def prepare(recorder, settings):
-    """Raises nothing: what is wrong with the card is reported, as the recorder's problem and whenever a ride is begun."""
+    """Raises nothing: what is wrong with the card is reported, as the recorder's problem and when a ride is begun."""
     try:
         _try_out(ride_paths.directory(settings))
         return

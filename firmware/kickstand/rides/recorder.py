@@ -175,15 +175,8 @@ class Recorder:
 
     def _begin_block(self):
         """Let the turns to come fill an empty block."""
-        self._block.begin(
-            self.keeper.next_length(),
-            self._ride,
-            self._sequence,
-            self._time_us,
-            self._chip,
-            self._sample_hz,
-            self._body,
-        )
+        length, number = self.keeper.next_length(), (self._ride, self._sequence)
+        self._block.begin(length, *number, self._time_us, self._chip, self._sample_hz, self._body)
         self._sequence += 1
 
     def _end_block(self):
