@@ -50,9 +50,12 @@ def web(out: Path | None) -> None:
 @click.option("--port", type=click.IntRange(1024, 65535), default=2040, help="On which mpremote finds it.")
 def emulate(port: int) -> None:
     """An emulated Pico on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
-    from ..emulator import image
+    from ..emulator import image, native
+    from ..progress import spinner
 
     image.find()  # before anything else of the emulator is imported
+    with spinner("compiling the emulator, once"):
+        native.build()
     from ..emulator.emulate import emulate
 
     emulate(port, click.echo)

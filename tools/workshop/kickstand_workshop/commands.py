@@ -80,9 +80,12 @@ def evaluate(
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 def bench(seconds: int, as_json: bool) -> None:
     """What the firmware costs on an emulated Pico: time, memory, flash."""
-    from kickstand_tools.emulator import image
+    from kickstand_tools.emulator import image, native
+    from kickstand_tools.progress import spinner
 
     image.find()  # before anything else of the emulator is imported
+    with spinner("compiling the emulator, once"):
+        native.build()
     from rich.console import Console
 
     from .bench.bench import bench, tables
