@@ -45,17 +45,19 @@ ROOMS = {
         (FIRMWARE + "lean/*.py",),
         (
             TESTS + "lean/test_known_ride.py",
-            TESTS + "lean/test_*_limits.py",
+            TESTS + "lean/test_filter_states.py",
             TESTS + "lean/test_[bkmru]*.py",
-        ),  # not test_lean_filter.py and test_formula.py, which take longer than all of them
+            TESTS + "lean/test_formula.py",
+            TESTS + "lean/test_lean_filter.py",
+        ),
     ),
     "drive_alignment": Room(
         (FIRMWARE + "drive_alignment/*.py",),
-        (TESTS + "drive_alignment/test_drive_limits.py", TESTS + "drive_alignment/*.py"),
+        (TESTS + "drive_alignment/test_parts.py", TESTS + "drive_alignment/*.py"),
     ),
     "speed": Room(
         (FIRMWARE + "speed/*.py",),
-        (TESTS + "simulated_board/test_board_speed_limits.py", TESTS + "simulated_board/test_board_speed.py"),
+        (TESTS + "simulated_board/test_board_speed.py", TESTS + "simulated_board/test_board_place.py"),
     ),
     "ui": Room(
         (FIRMWARE + "ui/*.py",),
@@ -63,7 +65,7 @@ ROOMS = {
     ),
     "rides": Room(
         (FIRMWARE + "rides/*.py",),
-        (TESTS + "rides/limits/*.py",),  # the others take longer
+        tuple(TESTS + f"rides/test_{name}.py" for name in ("block", "recording", "ring", "stream", "card_trial")),
     ),
     "pull": Room(
         (TOOLS + "rides/*.py",),

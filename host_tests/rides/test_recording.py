@@ -212,15 +212,6 @@ def test_the_beginning_of_a_ride_may_erase_flash_also_one_that_fails(step, fails
         take_stall(recorder)
 
 
-def test_a_write_that_fails_may_have_erased_flash(recorder, keeper):
-    start(recorder)
-    keeper.fails, keeper.takes_ms = "write", {"abandon": 45}
-    while recorder.active:
-        assert not take_stall(recorder)
-        add(recorder, 1)
-    assert take_stall(recorder)
-
-
 def test_the_end_of_a_ride_closes_a_file_and_may_erase_flash(recorder, keeper):
     for stops_interrupts in (True, False):
         keeper.stops_interrupts = stops_interrupts

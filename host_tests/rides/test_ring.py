@@ -28,22 +28,6 @@ def test_a_part_has_16_blocks_in_flash_and_256_on_a_card(settings, blocks, root)
     assert sizes == {0: 100 * blocks, 1: 100 * blocks, 2: 100}
 
 
-def test_the_room_is_what_is_free_and_what_older_rides_have(root):
-    """Of the flash, 80 blocks are taken for firmware; 40, a part and two more always stay free."""
-    ring = RideRing(FLASH)
-    ring.begin()
-    assert ring.room() == (400 + (500 - 400 - 80) - 58) * KB_4
-    write_block(ring)
-    assert ring.room() == (400 + 20 - 58 - 1) * KB_4
-    root.free = 430 * KB_4  # less is taken than by firmware alone
-    ring.begin()
-    assert ring.room() == (430 - 58) * KB_4
-    root.free = 50 * KB_4
-    root.all = 130 * KB_4
-    ring.begin()
-    assert ring.room() == 0
-
-
 def test_room_is_made_exactly_when_a_part_does_not_fit(root):
     for free, steps in ((58 * KB_4, 1), (58 * KB_4 - 1, 3)):
         old = old_ride(root, 1)
@@ -53,18 +37,6 @@ def test_room_is_made_exactly_when_a_part_does_not_fit(root):
         assert write_block(ring) == steps  # the oldest is found, its part is removed, the new one is opened
         assert (old / "00000.rid").exists() is (steps == 1)
         ring.end()
-
-
-def test_removed_parts_count_as_free_and_no_longer_as_room(root):
-    old_ride(root, 1, parts=2, size=3 * KB_4)
-    root.free, root.all = 54 * KB_4, 200 * KB_4
-    ring = RideRing(FLASH)
-    ring.begin()
-    room = ring.room()
-    assert room == (54 + (200 - 54 - 80) - 58) * KB_4
-    assert write_block(ring) == 4
-    assert ring.room() == room - KB_4
-    assert list(ride_paths.parts("rides")) == [(2, 0, 100)]
 
 
 def test_its_own_first_parts_go_last_and_then_there_is_no_room(root):
@@ -133,17 +105,6 @@ def test_where_somebody_has_removed_the_ride_there_is_no_room(root):
     with pytest.raises(OSError) as error:
         ring.ready()
     assert ring.fault_code(error.value) == "out-of-room"
-
-
-def test_a_flash_without_rides_to_remove_is_full(root):
-    root.free = 57 * KB_4
-    ring = RideRing(FLASH)
-    ring.begin()
-    with pytest.raises(OSError) as error:
-        for _ in range(10):
-            assert not ring.ready()
-    assert error.value.args[0] == 28
-    assert not list((root.path / "rides").rglob("*.rid"))
 
 
 class File:
@@ -215,13 +176,6 @@ def test_free_and_all_bytes_are_blocks_of_the_size_that_counts(monkeypatch):
     monkeypatch.setattr("os.statvfs", lambda path: (512, 4096, 300, 200, 190, 0, 0, 0, 0, 255), raising=False)
     assert flash_ring.free_bytes("") == 200 * 4096
     assert flash_ring.all_bytes("") == 300 * 4096
-
-
-def test_a_part_has_its_place():
-    assert ride_paths.RIDES_IN_GROUP == 100
-    assert ride_paths.group_path("rides", 3) == "rides/003"
-    assert ride_paths.ride_path("rides", 345) == "rides/003/45"
-    assert ride_paths.part_path("rides", 345, 2) == "rides/003/45/00002.rid"
 
 
 def test_only_what_is_named_as_a_part_is_one(root):

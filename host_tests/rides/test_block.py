@@ -64,32 +64,6 @@ def test_a_block_takes_what_fits_and_the_worst_turn_always_does():
         assert len(data) - len(data.rstrip(b"\0")) < 60
 
 
-def quiet(length, count=0):
-    """A block of turns that do not differ, so that each takes few bits: so many, or until it is full."""
-    block = RideBlock(5000)
-    block.begin(length, 1, 0, 0, ride_writer.CHIP, 200, bytes(80))
-    while block.count < count or (not count and not block.full()):
-        block.add([800] * 7, 8, 40_000)
-    return block
-
-
-@pytest.mark.parametrize("length", range(700, 704))
-def test_however_full_a_block_is_the_worst_turn_fits(length):
-    """After quiet turns every number of a violent one takes the longest code."""
-    count = quiet(length).count
-    block = quiet(length, count - 1)
-    assert not block.full()
-    block.add_speed(1 << 24)
-    block.add([-32768] * 7, 1, 1 << 29)
-    assert block.full()
-    block.close()
-    found = block_reader.parse(bytes(block.buffer[:length])).turns
-    assert len(found) == count > 100  # so that the codes became short
-    assert (found[-1].sums, found[-1].n, found[-1].speed_mps) == ((-32768,) * 6, 1, (1 << 24) / 100)
-    assert found[-1].time_us == (count - 1) * 40_000 + (1 << 29)
-    assert {turn.sums for turn in found[:-1]} == {(800,) * 6}
-
-
 @pytest.mark.parametrize("count", range(1, 17))
 def test_a_block_may_end_within_any_byte(count):
     block = RideBlock(5000)
