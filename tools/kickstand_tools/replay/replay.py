@@ -183,9 +183,10 @@ def _micropython(
 def _rp2040(
     log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
 ) -> Iterator[Replayed]:
-    from ..emulator import image
+    from ..emulator import image, native
 
     image.find()  # says what is not installed, before the import below fails for want of it
+    native.build()
     from . import emulated as emulated
 
     log, size = read_twice(log), struct.calcsize(replay_engine.RESULT)
