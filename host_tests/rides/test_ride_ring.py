@@ -14,7 +14,7 @@ from kickstand.rides.flash_ring import RideRing
 from kickstand.rides.ride_paths import part_path
 from kickstand.ui import messages
 from kickstand_tools.rides import block_reader
-from kickstand_tools.simulated_board.fakes import current, fake_machine, fake_os, fake_time
+from kickstand_tools.simulated_board.fakes import fake_machine, fake_os, fake_time
 from kickstand_tools.simulated_board.simulator import Board
 
 SETTINGS = types.SimpleNamespace(SD_SPI=None)
@@ -330,7 +330,7 @@ def test_a_speed_source_without_a_sensor_fills_no_block(recorder, flash):
 )
 def test_a_card_that_cannot_be_used_is_said_in_one_line(driver, words, lcd, recorder, monkeypatch):
     monkeypatch.setitem(sys.modules, "machine", fake_machine)
-    monkeypatch.setattr(current, "board", Board(lambda t_s: (0, 0, 1, 0, 0, 0)), raising=False)  # it has the pins
+    monkeypatch.setattr(fake_machine, "board", Board(lambda t_s: (0, 0, 1, 0, 0, 0)), raising=False)  # it has the pins
     from kickstand.board import port
 
     pins = types.SimpleNamespace(SD_SPI=0, SD_SCK=18, SD_MOSI=19, SD_MISO=16, SD_CS=17)

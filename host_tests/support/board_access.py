@@ -25,7 +25,6 @@ def read(chip, register, count=1):
     chip.write_byte(register)
     chip.start(chip.address, True)
     values = [chip.read_byte() for _ in range(count)]
-    chip.stop()
     return values
 
 
@@ -35,7 +34,6 @@ def write(chip, register, *values):
     chip.write_byte(register)
     for value in values:
         chip.write_byte(value)
-    chip.stop()
 
 
 def counts(chip):

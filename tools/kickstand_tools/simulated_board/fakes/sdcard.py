@@ -1,7 +1,5 @@
-"""Stands in for micropython-lib's driver `sdcard`: the same interface, and the same faults.
-
-Its write() returns without a word when the card rejects the data, its wait for a busy card has no limit, and its clock
-is 1.32 MHz unless told otherwise.
+"""Stands in for micropython-lib's driver `sdcard`, with the same interface. write() and write_token(), in which that
+driver has faults, are left out: the firmware brings its own (kickstand/board/spi_card.py).
 """
 
 import time
@@ -42,12 +40,10 @@ class SDCard:
         self.cmd(16, 512)
         self.spi.init(baudrate=baudrate, phase=0, polarity=0)
 
-    def cmd(self, cmd, arg, final=0, release=True, skip1=False):
+    def cmd(self, cmd, arg, final=0, release=True):
         """Send a command; return the first byte of its answer, -1 for none."""
         self.cs(0)
         self.spi.write(bytes([0x40 | cmd]) + arg.to_bytes(4, "big") + b"\x95")
-        if skip1:
-            self.spi.read(1, 0xFF)
         for _ in range(_TRIES):
             response = self.spi.read(1, 0xFF)[0]
             if not response & 0x80:
@@ -70,26 +66,6 @@ class SDCard:
             raise OSError("timeout waiting for response")
         self.spi.write_readinto(b"\xff" * len(buf), buf)
         self.spi.write(b"\xff\xff")
-        self._release()
-
-    def write(self, token, buf):
-        """Write a sector, or what a card that rejects it makes of that."""
-        self.cs(0)
-        self.spi.read(1, token)
-        self.spi.write(buf)
-        self.spi.write(b"\xff\xff")
-        if self.spi.read(1, 0xFF)[0] & 0x1F == 0x05:
-            while self.spi.read(1, 0xFF)[0] == 0:
-                pass
-        self._release()
-
-    def write_token(self, token):
-        """End the writing of several sectors."""
-        self.cs(0)
-        self.spi.read(1, token)
-        self.spi.write(b"\xff")
-        while self.spi.read(1, 0xFF)[0] == 0:
-            pass
         self._release()
 
     def readblocks(self, block_num, buf):
