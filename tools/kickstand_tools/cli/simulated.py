@@ -1,34 +1,26 @@
-"""The commands that simulate rides: simulate, which writes one, and evaluate, which judges the lean on many."""
+"""The command that simulates rides."""
 
-import contextlib
-import json
 from pathlib import Path
 from typing import Any
 
 import click
-from rich.console import Console
 
-from ..errors import InputError, extra
-from ..evaluation import picture, report, runs
-from ..evaluation.estimators import missing
-from ..evaluation.evaluate import evaluate
-from ..output import check_directory, new_directory
+from ..errors import InputError
 from ..progress import Bar, spinner
 from ..simulation.files import simulate
 from ..simulation.fleet.fleet import make_fleet
 from ..simulation.profiles import MAIN, PROFILES
-from .common import JSON, OUT_DIRECTORY, PATH, Command, warn
+from .common import OUT_DIRECTORY, Command
 
-_LINES_S = 10.0  # between two lines of progress where there is no terminal for a bar
-_WIDTH = 110  # columns of a table that is not printed to a terminal
-_PROFILES = f"{', '.join(MAIN)}; hard ones: {', '.join(name for name in PROFILES if name not in MAIN)}."
+LINES_S = 10.0  # between two lines of progress where there is no terminal for a bar
+PROFILE_NAMES = f"{', '.join(MAIN)}; hard ones: {', '.join(name for name in PROFILES if name not in MAIN)}."
 
 
-def _seconds(least: float, words: str) -> Command:
+def seconds_option(least: float, words: str) -> Command:
     return click.option("--seconds", type=click.FloatRange(least, 7200.0), default=640.0, help=words)
 
 
-def _poses(pitch_change_deg: float | None, words: str) -> Command:
+def pose_options(pitch_change_deg: float | None, words: str) -> Command:
     """What is not as it should be in the two poses."""
 
     def add(command: Command) -> Command:
@@ -41,10 +33,10 @@ def _poses(pitch_change_deg: float | None, words: str) -> Command:
 
 
 @click.command()
-@click.option("--profile", help=_PROFILES)
+@click.option("--profile", help=PROFILE_NAMES)
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Another seed, another ride.")
-@_seconds(20.0, "Of riding; start and stop come on top.")
-@_poses(None, "Between the poses, degrees; at random if not given.")
+@seconds_option(20.0, "Of riding; start and stop come on top.")
+@pose_options(None, "Between the poses, degrees; at random if not given.")
 @click.option("--speed", is_flag=True, help="Write what a GPS receiver gives into the log: speed, position, time.")
 @click.option(
     "--fleet",
@@ -58,7 +50,7 @@ def simulate_command(profile: str | None, seed: int, vehicles: int | None, out: 
     """Make up a ride: six poses and a free one, kickstand, upright, the ride, its truth. Or a fleet (see fleet)."""
     if vehicles is not None:
         _check_fleet(out)
-        with Bar("making up vehicles", lines_s=_LINES_S) as bar:
+        with Bar("making up vehicles", lines_s=LINES_S) as bar:
             fleet = make_fleet(out, vehicles, seed, progress=bar.reach)
         logs = sum(len(vehicle.paths) for vehicle in fleet)
         click.echo(f"written: {out}/MANIFEST.csv and TRUTH.csv, {vehicles} vehicles, {logs} logs")
@@ -81,44 +73,3 @@ def _check_fleet(out: Path) -> None:
             raise click.UsageError(f"{option.opts[0]} is of a single ride: leave it or --fleet out.")
     if (out / "RIDE.csv").exists():
         raise InputError(f"{out} holds a ride, whose truth would be lost: give --out another directory")
-
-
-@click.command()
-@click.option("--profiles", default=",".join(MAIN), help=f"With commas between: {_PROFILES}")
-@click.option("--seeds", type=click.IntRange(min=1), default=3, help="Rides of each profile.")
-@_seconds(60.0, "Of riding, each; start and stop come on top.")
-@_poses(1.0, "Between the two poses, degrees.")
-@click.option("--recording", type=PATH, help="A recorded ride with speed to compare on too.")
-@click.option("--out", type=PATH, help="Write evaluation.json and lean.png to this directory.")
-@JSON
-def evaluate_command(
-    profiles: str, recording: Path | None, out: Path | None, as_json: bool, **of_the_rides: Any
-) -> None:
-    """Compare the shown lean and other filters with the truth of simulated rides."""
-    names = [name.strip() for name in profiles.split(",")]
-    jobs = runs.jobs(names, traces=out is not None, **of_the_rides)
-    if out is not None:
-        picture.check()
-        check_directory(out)
-    absent = missing()
-    if absent:
-        click.echo(f"left out, not installed: {', '.join(absent)}: {extra('evaluate')}", err=True)
-    with new_directory(out) if out is not None else contextlib.nullcontext():
-        with Bar("riding", len(jobs) * runs.steps(), patience_s=0.0, lines_s=_LINES_S) as bar:
-            found = evaluate(jobs, recording, lambda: bar.advance(1))
-        for result in found.results:
-            if result.refusal is not None:
-                where = f"{result.job.profile}, seed {result.job.seed}"
-                click.echo(f"{where}, not calibrated: {result.refusal}", err=True)
-        warn(str(recording), found.recorded.notices if found.recorded else ())
-        if as_json:
-            click.echo(json.dumps(report.document(found), indent=2))
-        else:
-            console = Console()
-            console = console if console.is_terminal else Console(width=_WIDTH)
-            console.print(report.table(found.results))
-            if found.recorded:
-                console.print(report.real_table(found.recorded.scores, found.recorded.name))
-        if out is not None:
-            figures, drawing = report.write(found, out)
-            click.echo(f"written: {figures} and {drawing}", err=True)

@@ -1,20 +1,18 @@
-"""The commands that run the firmware without a board: demo, web, emulate, bench."""
+"""The commands that run the firmware without a board: demo, web, emulate."""
 
 import contextlib
-import json
 import sys
 import webbrowser
 from pathlib import Path
 
 import click
-from rich.console import Console
 
 from ..demo.demo import DeviceStopped, demo
 from ..emulator import image
 from ..output import check_directory
 from ..progress import spinner
 from ..web import serve, site
-from .common import JSON, PATH
+from .common import PATH
 
 
 @click.command()
@@ -57,18 +55,3 @@ def emulate_command(port: int) -> None:
     from ..emulator.emulate import emulate
 
     emulate(port, click.echo)
-
-
-@click.command()
-@click.option("--seconds", type=click.IntRange(1, 600), default=10, help="Emulated, of each of four runs.")
-@JSON
-def bench_command(seconds: int, as_json: bool) -> None:
-    """What the firmware costs on an emulated Pico: time, memory, flash."""
-    image.find()  # before anything else of the emulator is imported
-    from ..bench.bench import bench, tables
-
-    result = bench(seconds)
-    if as_json:
-        click.echo(json.dumps(result))
-    else:
-        Console().print(tables(result))

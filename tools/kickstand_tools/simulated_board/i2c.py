@@ -139,7 +139,7 @@ class Bus:
 
     def read_into(self, buf):
         """Fill buf with what read_byte() returns."""
-        if self._fault is None and hasattr(self._device, "read_into"):
+        if self._device is not None and self._fault is None and hasattr(self._device, "read_into"):
             self._device.read_into(buf)
             return
         for i in range(len(buf)):

@@ -2,6 +2,9 @@
 driver has faults, are left out: the firmware brings its own (kickstand/board/spi_card.py).
 """
 
+# pyright: reportAttributeAccessIssue=false
+# the time is MicroPython's, and the methods that are left out are a subclass's
+
 import time
 
 _TRIES = 100
@@ -25,7 +28,7 @@ class SDCard:
         if self.cmd(8, 0x1AA, 4) != 1:
             raise OSError("couldn't determine SD card version")
         for _ in range(_TRIES):
-            time.sleep_ms(50)  # pyright: ignore[reportAttributeAccessIssue]
+            time.sleep_ms(50)
             self.cmd(58, 0, 4)
             self.cmd(55, 0)
             if self.cmd(41, 0x40000000) == 0:
@@ -60,7 +63,7 @@ class SDCard:
         for _ in range(_TRIES):
             if self.spi.read(1, 0xFF)[0] == 0xFE:
                 break
-            time.sleep_ms(1)  # pyright: ignore[reportAttributeAccessIssue]
+            time.sleep_ms(1)
         else:
             self._release()
             raise OSError("timeout waiting for response")
