@@ -1,6 +1,7 @@
 """The sensors of a recording, each on its own clock and at its own rate, joined on the accelerometer's."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Container
+from dataclasses import dataclass, replace
 
 import numpy as np
 from kickstand.units import LOST_US
@@ -87,7 +88,7 @@ def in_order(sensor: Sensor, name: str) -> Sensor:
             f"{name}: {sensor.name} has {hz:.0f} samples a second, and no sensor has over {MOST_HZ:.0f}: are the times "
             "times, and is their unit right?"
         )
-    return Sensor(sensor.name, even_ns, values, sensor.damaged)
+    return replace(sensor, time_ns=even_ns, values=values)
 
 
 def _damaged(time_ns: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -139,11 +140,25 @@ def _averaged(sensor: Sensor, over_ns: float) -> Array:
     return np.where(count > 0.0, found / np.maximum(count, 1.0), np.nan)
 
 
-def added(first: Sensor, second: Sensor, name: str) -> Sensor:
-    """The sum of two sensors on the first one's clock, where there are both: what moves the phone, and gravity."""
-    first, second = in_order(first, name), in_order(second, name)
-    values = first.values + on_clock(second, first.time_ns, _period_ns(first))
-    return Sensor("accelerometer", first.time_ns, values, max(first.damaged, second.damaged))
+def with_gravity(
+    there: Container[str], sensor: Callable[[str], Sensor], name: str, whose: str, remedy: str, none: str
+) -> Sensor:
+    """The accelerometer. there: which there are of "total", with gravity in it, "user", without, and "gravity".
+
+    sensor: called with one of these. Raises InputError where gravity was taken off (whose: acceleration; remedy: what
+    to do) and where there is no acceleration (none: says so).
+    """
+    if "total" in there:
+        return sensor("total")
+    if "user" not in there:
+        raise InputError(f"{name}: {none}")
+    if "gravity" not in there:
+        raise InputError(f"{name}: gravity has been taken off its {whose}, and without it there is no lean: {remedy}")
+    user, gravity = (in_order(sensor(which), name) for which in ("user", "gravity"))
+    user.taken[0].sign = "without gravity: gravity added"
+    values = user.values + on_clock(gravity, user.time_ns, _period_ns(user))
+    taken = [*user.taken, *gravity.taken]
+    return Sensor(user.name, user.time_ns, values, max(user.damaged, gravity.damaged), taken)
 
 
 def _most(accel_g: Array, rates_dps: Array) -> str:

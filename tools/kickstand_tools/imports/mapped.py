@@ -11,7 +11,7 @@ from ..errors import InputError
 from .files import Piece
 from .recording import Recording, Sensor, Taken, rate_hz, track_of
 from .sheets import Sheet, cells_of, plain, read_sheet, unit_in
-from .times import EPOCH_NS, Nanoseconds, time_unit, times_ns
+from .times import EPOCH_NS, Nanoseconds, time_unit
 from .units import ACCELERATIONS, ANGLES, RATES, SPEEDS, TIMES, factor, unit
 
 NAME = "a table"
@@ -45,21 +45,18 @@ def read_mapped(piece: Piece, columns: Mapping[str, str], units: Mapping[str, st
     _check_units(sheet, places, units)
     t_unit = units.get("t") or unit_in(sheet.columns[places["t"]])
     t_unit = time_unit(sheet.cells[places["t"]], t_unit if unit(t_unit) in TIMES else "")
-    time_ns = times_ns(sheet.cells[places["t"]], t_unit, sheet.name)
-    accel, first = _sensor(sheet, time_ns, places, units, "accelerometer")
-    gyro, second = _sensor(sheet, time_ns, places, units, "gyro")
-    for key in ("lat", "lon"):
-        if key in places:
-            scale = factor(units.get(key, "deg"), ANGLES, key)
-            sheet.cells[places[key]] = scale * sheet.numbers(places[key])
+    time_ns = sheet.times(places["t"], t_unit)
+    accel = _sensor(sheet, time_ns, places, units, "accelerometer")
+    accel.taken.insert(0, Taken("time", sheet.named([places["t"]]), t_unit))
+    gyro = _sensor(sheet, time_ns, places, units, "gyro")
+    lat, lon = (factor(units.get(key, "deg"), ANGLES, key) for key in ("lat", "lon"))
     speed_unit = "m/s"
     if "speed" in places:
         speed_unit = unit(_unit(units, ("speed",), sheet.columns[places["speed"]]))
-    track, more = track_of(sheet, time_ns, places.get("speed"), places.get("lat"), places.get("lon"), speed_unit)
+    track = track_of(sheet, time_ns, places.get("speed"), places.get("lat"), places.get("lon"), speed_unit, (lat, lon))
     temp_c = sheet.numbers(places["temp"]) if "temp" in places else None
     utc_ns = 0 if len(time_ns) and int(np.median(time_ns)) > EPOCH_NS else None
-    taken = [Taken("time", sheet.named([places["t"]]), t_unit), first, second, *more]
-    return Recording(NAME, accel, gyro, track, temp_c, taken, utc_ns=utc_ns, sign_known=_turned(units))
+    return Recording(NAME, accel, gyro, track, temp_c, utc_ns=utc_ns, sign_known=_turned(units))
 
 
 @dataclass
@@ -202,7 +199,7 @@ def _place(sheet: Sheet, key: str, wanted: str) -> int:
 
 def _sensor(
     sheet: Sheet, time_ns: Nanoseconds, places: dict[str, int], units: Mapping[str, str], quantity: str
-) -> tuple[Sensor, Taken]:
+) -> Sensor:
     axes, all_of, kinds = (ACCEL, "a", ACCELERATIONS) if quantity == "accelerometer" else (GYRO, "g", RATES)
     names = [_unit(units, (axis, all_of), sheet.columns[places[axis]]) for axis in axes]
     scale = np.array([factor(text, kinds, axis) for text, axis in zip(names, axes)])
@@ -210,7 +207,7 @@ def _sensor(
     source = sheet.named([places[axis] for axis in axes])
     sign = "as it is" if np.all(scale > 0.0) else "turned" if np.all(scale < 0.0) else "turned in part"
     shown = ", ".join(dict.fromkeys(text.lstrip("-") for text in names))
-    return Sensor(quantity, time_ns, values, sheet.left_out), Taken(quantity, source, shown, rate_hz(time_ns), sign)
+    return Sensor(quantity, time_ns, values, sheet.left_out, [Taken(quantity, source, shown, rate_hz(time_ns), sign)])
 
 
 def _check_units(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, str]) -> None:

@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..logs.table import Array
 from .cells import Cells, columns_of_text, numbers_of
 from .files import Piece
+from .times import Nanoseconds, times_ns
 
 LONG = 6  # letters that several names begin with are too many to repeat
 _DECIMAL_COMMA = re.compile(r"(?:^|[;\t\"])\s*[+-]?\d+,\d")
@@ -31,6 +32,17 @@ class Sheet:
         wanted = [plain(name) for name in names]
         found = [plain(column) for column in self.columns]
         return next((found.index(name) for name in wanted if name in found), None)
+
+    def axes(self, *names: str | tuple[str, ...]) -> tuple[list[int], list[str]]:
+        """place() of each name, or of one of several names, and the first names of those that are not there."""
+        each = [name if isinstance(name, tuple) else (name,) for name in names]
+        found = {one[0]: self.place(*one) for one in each}
+        places = [place for place in found.values() if place is not None]
+        return places, [name for name, place in found.items() if place is None]
+
+    def times(self, place: int, unit: str = "s") -> Nanoseconds:
+        """A column as times (n). unit: of numbers, "" if it is to be found from them. Raises InputError."""
+        return times_ns(self.cells[place], unit, self.name)
 
     def named(self, places: list[int]) -> str:
         """The file and some columns of it, for people: without units, and what several begin with said once."""
