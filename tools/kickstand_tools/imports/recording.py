@@ -117,8 +117,8 @@ def track_of(
     """
     if speed is None and (lat is None or lon is None):
         return None
-    places = (sheet.numbers(place) * scale for place, scale in zip((lat, lon), per_degree))
-    track = Track(time_ns, sheet.numbers(speed) * factor(speed_unit, SPEEDS, "speed"), *places)
+    speed_mps = sheet.numbers(speed) * factor(speed_unit, SPEEDS, "speed")
+    track = Track(time_ns, speed_mps, sheet.numbers(lat) * per_degree[0], sheet.numbers(lon) * per_degree[1])
     hz = rate_hz(track.time_ns)
     if speed is not None:
         track.taken.append(Taken("speed", sheet.named([speed]), speed_unit, hz))

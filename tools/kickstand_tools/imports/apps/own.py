@@ -41,7 +41,8 @@ def read(pieces: list[Piece], name: str) -> Recording:
         gyro = sensor_of(sheet, time_ns, exported[3:], "gyro", "deg/s", "left, up, forward", _RATE_SIGNS)
     else:
         raise InputError(f"{name} holds a lean, no readings: give the log that it was made from")
-    track = track_of(sheet, time_ns, *(sheet.place(column) for column in ("speed_mps", "lat_deg", "lon_deg")))
+    speed, lat, lon = (sheet.place(column) for column in ("speed_mps", "lat_deg", "lon_deg"))
+    track = track_of(sheet, time_ns, speed, lat, lon)
     temp_c = sheet.numbers(sheet.place("temp_c"))
     from_1970 = bool(len(time_ns)) and float(np.median(time_ns)) > EPOCH_NS
     utc_ns = 0 if from_1970 else _utc_ns(sheet, time_ns)

@@ -51,7 +51,8 @@ def read(pieces: list[Piece], name: str) -> Recording:
     if "location" in files and len(files["location"].first_lines(2)) > 1:
         sheet = read_sheet(files["location"])
         time_ns = sheet.times(sheet.place("time") or 0, "ns")
-        track = track_of(sheet, time_ns, *(sheet.place(column) for column in ("speed", "latitude", "longitude")))
+        speed, lat, lon = (sheet.place(column) for column in ("speed", "latitude", "longitude"))
+        track = track_of(sheet, time_ns, speed, lat, lon)
     return Recording(NAME, accel, _sensor(gyro_file, "gyro", "rad/s", "right-handed"), track, utc_ns=0)
 
 
