@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from .files import Piece
 from .recording import Recording, Sensor, Taken, rate_hz, track_of
-from .sheets import Sheet, cells_of, plain, read_sheet, unit_in
+from .sheets import Sheet, names_in, plain, read_sheet, unit_in
 from .times import EPOCH_NS, Nanoseconds, time_unit
 from .units import ACCELERATIONS, ANGLES, RATES, SPEEDS, TIMES, factor, unit
 
@@ -88,9 +88,9 @@ def table_in(pieces: list[Piece]) -> Table | None:
     piece = max(pieces, key=lambda piece: len(piece.text))
     number = header_line(piece, {})
     lines = [line for line in piece.text.split("\n", _HEADER_LINES + 3)[number:] if line.strip()]
-    columns = cells_of(lines[0])
+    columns = names_in(lines[0])
     found = guessed(columns)
-    numbers = max((_numbers(cells_of(line)) for line in lines[1:3]), default=0)
+    numbers = max((_numbers(names_in(line)) for line in lines[1:3]), default=0)
     if numbers < (FEWEST_NUMBERS if found else len(REQUIRED)):
         return None
     units = {"a": _seems_in(found.get("ax", ""), ACCELERATIONS, "m/s2")}
@@ -135,7 +135,7 @@ def header_line(piece: Piece, columns: Mapping[str, str]) -> int:
     wanted = {name.strip() for name in columns.values() if not name.strip().startswith("#")}
     widest, width = 0, 0
     for number, line in enumerate(piece.text.split("\n", _HEADER_LINES)[:_HEADER_LINES]):
-        cells = cells_of(line)
+        cells = names_in(line)
         if wanted and wanted <= set(cells):
             return number
         numbers = _numbers(cells)

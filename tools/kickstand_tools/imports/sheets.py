@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..logs.csv_reader import Cells, cells_of, columns_of_text, numbers_of, separator_of
 from ..logs.table import Array
-from .cells import Cells, columns_of_text, numbers_of
 from .files import Piece
 from .times import Nanoseconds, times_ns
 
@@ -74,18 +74,12 @@ def unit_in(name: str) -> str:
     return found[1].strip() if found else ""
 
 
-def separator_of(line: str) -> str:
-    """The one of , ; and tab that parts the cells of a line, by what stands outside quotation marks."""
-    bare = re.sub(r'"[^"]*"', "", line)
-    return max(",;\t", key=bare.count)
-
-
-def cells_of(line: str) -> list[str]:
-    """The cells of one line."""
+def names_in(line: str) -> list[str]:
+    """The cells of a line of names, none of one that is no CSV."""
     try:
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator_of(line)), [])]
+        return [cell.strip() for cell in cells_of(line, separator_of(line))]
     except csv.Error:
-        return [cell.strip() for cell in line.split(separator_of(line))]
+        return []
 
 
 def read_sheet(piece: Piece, header: int = 0, skipped: int = 0) -> Sheet:
@@ -96,7 +90,7 @@ def read_sheet(piece: Piece, header: int = 0, skipped: int = 0) -> Sheet:
     lines = piece.text.split("\n", header + skipped + 1)
     if len(lines) < header + skipped + 2 or not lines[-1].strip():
         raise InputError(f"{piece.name}: no rows under the names of the columns: was anything recorded?")
-    columns = cells_of(lines[header])
+    columns = names_in(lines[header])
     while columns and not columns[-1]:
         columns.pop()  # lines that end in a separator
     text, separator = lines[-1], separator_of(lines[header])

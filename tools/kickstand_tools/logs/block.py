@@ -1,6 +1,5 @@
 """Some rows of a log, one after the other."""
 
-import csv
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
@@ -8,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cells import TRACK
+from .csv_reader import cells_of
 from .log import FirmwareRow, firmware_rows
 from .table import Array
 
@@ -61,8 +61,7 @@ class Block:
         if not self.lines or not self.own_times:
             return [f"{self.start_s + t:.6f}" for t in self.t_s.tolist()]
         place = self.names.index("t_s")
-        rows = (next(csv.reader([line])) if '"' in line else line.split(",", place + 1) for line in self.lines)
-        return [cells[place].strip() for cells in rows]
+        return [cells_of(line)[place].strip() for line in self.lines]
 
     def part(self, which: slice | NDArray[np.bool_]) -> "Block":
         """The rows of a slice, or those where an array of n is True."""

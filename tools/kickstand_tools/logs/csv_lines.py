@@ -1,7 +1,7 @@
-"""Tables of numbers as lines of CSV and back, quickly; a log in memory as a file.
+"""Tables of numbers as lines of CSV, quickly; a log in memory as a file.
 
-The texts are those of Python's own formatting, and the numbers those that Python reads, made of a column at once
-instead of number by number: that takes a seventh of the time for writing, and a third of numpy.loadtxt's for reading.
+The texts are those of Python's own formatting, made of a column at once instead of number by number: that takes a
+seventh of the time.
 """
 
 import csv
@@ -21,8 +21,6 @@ _DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
 _ROWS = 15_000  # written at a time: their letters fit a processor's cache
 _MOST = 2.0**53  # in units of the last digit: up to here doubles are no more than one unit apart
 _POINT, _MINUS, _ZERO, _COMMA, _END = b".-0,\n"
-_PLAIN = b"0123456789.-,\n"
-_MOST_DIGITS = 15  # of a number that a double holds as an integer
 
 Letters = NDArray[np.uint8]  # (m, n): the ASCII letters of n texts, one in each column; 0 is none
 
@@ -82,58 +80,6 @@ def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, room: 
         letters[row] = letter if place <= digits else np.where(number > 0, letter, 0)  # no zeros in front
         number, row = rest, row - 1
     return letters
-
-
-def numbers_in(text: bytes, count: int) -> Array | None:
-    """(n, count) the numbers in n lines of `count` cells, NaN for an empty one; float() would read the same.
-
-    None, for another reader, where the text is anything else than n lines of `count` plain numbers, and where a column
-    has different numbers of digits after the point, as in "1.5" and "2".
-    """
-    if text.translate(None, _PLAIN):
-        return None
-    letters = np.frombuffer(text if text.endswith(b"\n") else text + b"\n", dtype=np.uint8)
-    ends = np.flatnonzero(letters <= _COMMA)  # a comma or a line feed: all others have larger codes
-    if len(ends) % count or np.count_nonzero(letters == _END) * count != len(ends):
-        return None
-    ends = ends.reshape(-1, count)
-    if not np.all(letters[ends[:, -1]] == _END):
-        return None
-    lengths = np.diff(ends.ravel(), prepend=-1).reshape(ends.shape) - 1
-    found = np.full(ends.shape, np.nan)
-    for k in range(count):
-        there = np.flatnonzero(lengths[:, k])
-        if len(there):
-            values = _numbers(letters, ends[there, k], lengths[there, k])
-            if values is None:
-                return None
-            found[there, k] = values
-    return found
-
-
-def _numbers(letters: NDArray[np.uint8], end: NDArray[np.intp], length: NDArray[np.intp]) -> Array | None:
-    """The numbers (n) that stand before places (n) in letters, each of so many letters; None as in numbers_in()."""
-    first = letters[end[0] - length[0] : end[0]].tobytes()
-    digits = len(first.partition(b".")[2])
-    has_point = b"." in first
-    minus = letters[end - length] == _MINUS
-    length = length - minus  # a copy: the minus sign is left out
-    most = int(np.max(length))
-    if most - has_point > _MOST_DIGITS or np.min(length) <= max(digits, has_point):
-        return None
-    back = np.arange(most)[:, None]  # of each digit from the end
-    figures = letters.take(end - 1 - back, mode="clip") - np.uint8(_ZERO)
-    if has_point:
-        if not np.all(figures[digits] == np.uint8(_POINT - _ZERO + 256)):
-            return None
-        figures[digits] = 0
-    figures[back >= length] = 0
-    if np.max(figures) > 9:
-        return None
-    tens = 10.0 ** np.maximum(0, np.arange(most) - (has_point & (np.arange(most) > digits)))
-    # Both are integers that a double holds, so that the quotient is the double next to the decimal number.
-    values = (tens @ figures) / 10.0**digits
-    return np.where(minus, -values, values)
 
 
 def write_lines(path: Path, names: Sequence[str], pieces: Iterable[bytes]) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from ...errors import InputError
 from ..files import Piece
 from ..recording import Recording, sensor_of, track_of
-from ..sheets import cells_of, plain, read_sheet, unit_in
+from ..sheets import names_in, plain, read_sheet, unit_in
 from ..units import SPEEDS, unit
 
 NAME = "AiM"
@@ -25,7 +25,7 @@ def finds(pieces: list[Piece]) -> list[list[Piece]]:
 
 def read(pieces: list[Piece], name: str) -> Recording:
     """Raises InputError for what is missing."""
-    lines = [cells_of(line) for line in pieces[0].text.split("\n", 60)[:60]]
+    lines = [names_in(line) for line in pieces[0].text.split("\n", 60)[:60]]
     header = next(
         (k for k, cells in enumerate(lines) if cells and cells[0] == "Time" and sum(map(bool, cells)) > 3), None
     )

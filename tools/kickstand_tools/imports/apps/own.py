@@ -10,10 +10,10 @@ import numpy as np
 
 from ...errors import InputError, extra
 from ...logs.cells import COLUMNS
-from ..cells import MOST_CELLS
+from ...logs.csv_reader import MOST_CELLS
 from ..files import Piece
 from ..recording import Recording, sensor_of, track_of
-from ..sheets import Sheet, cells_of, read_sheet
+from ..sheets import Sheet, names_in, read_sheet
 from ..times import EPOCH_NS, Nanoseconds
 
 NAME = "Kickstand"
@@ -59,7 +59,7 @@ def _utc_ns(sheet: Sheet, time_ns: Nanoseconds) -> int | None:
 def _is_ours(piece: Piece) -> bool:
     if piece.content.startswith(b"PAR1"):
         return True
-    head = cells_of(next(iter(piece.first_lines(1)), ""))
+    head = names_in(next(iter(piece.first_lines(1)), ""))
     return "t_s" in head and (set(COLUMNS) <= set(head) or set(_FORCES) <= set(head))
 
 

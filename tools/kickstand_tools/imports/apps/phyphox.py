@@ -11,11 +11,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...errors import InputError
-from ..cells import as_text
+from ...logs.csv_reader import as_text
 from ..files import Piece
 from ..join import with_gravity
 from ..recording import Recording, Sensor, Track, sensor_of, track_of
-from ..sheets import Sheet, cells_of, plain, read_sheet, unit_in
+from ..sheets import Sheet, names_in, plain, read_sheet, unit_in
 from ..times import EPOCH_NS, Nanoseconds, of_seconds
 from ..units import ACCELERATIONS, RATES, unit
 
@@ -60,7 +60,7 @@ def _is_meta(piece: Piece) -> bool:
 
 def _is_ours(piece: Piece) -> bool:
     """Does its first line name a time in s and then quantities with their units in brackets?"""
-    first = cells_of(next(iter(piece.first_lines(1)), ""))
+    first = names_in(next(iter(piece.first_lines(1)), ""))
     if _is_meta(piece) or len(first) < 2 or not re.fullmatch(r"(.*\s)?time \(s\)", first[0], re.IGNORECASE):
         return False
     known = [_AXIS.match(column) for column in first]

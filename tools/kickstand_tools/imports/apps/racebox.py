@@ -12,7 +12,7 @@ from ...errors import InputError
 from ...logs.axes.course import distance_m
 from ..files import Piece
 from ..recording import SECOND_NS, Array, Recording, sensor_of, track_of
-from ..sheets import Sheet, cells_of, plain, read_sheet, unit_in
+from ..sheets import Sheet, names_in, plain, read_sheet, unit_in
 from ..times import Nanoseconds
 from ..units import SPEEDS, factor, unit
 
@@ -52,7 +52,7 @@ def read(pieces: list[Piece], name: str, speed_unit: str = "") -> Recording:
 def _header(piece: Piece) -> int | None:
     """The number of the line of names: there may be lines about the laps before it."""
     for number, line in enumerate(piece.text.split("\n", 200)[:200]):
-        names = {plain(cell) for cell in cells_of(line)}
+        names = {plain(cell) for cell in names_in(line)}
         if {"gforcex", "gforcez", "time"} <= names:
             return number
     return None

@@ -10,7 +10,7 @@ that measured. Kickstand's own export has this form, too.
 from ...errors import InputError
 from ..files import Piece
 from ..recording import Recording, sensor_of, track_of
-from ..sheets import cells_of, plain, read_sheet
+from ..sheets import names_in, plain, read_sheet
 
 NAME = "RaceChrono"
 _FIRST = "This file is created using RaceChrono"
@@ -56,16 +56,16 @@ def read(pieces: list[Piece], name: str) -> Recording:
 
 
 def _is_header(line: str) -> bool:
-    first = [plain(cell) for cell in cells_of(line)]
+    first = [plain(cell) for cell in names_in(line)]
     return len(first) > 4 and any(name in first[:5] for name in _TIMES)
 
 
 def _units(lines: list[str], header: int) -> tuple[dict[int, str], int]:
     """The units by the numbers of their columns, and how many lines of heads follow the first."""
-    following = [cells_of(line) for line in lines[header + 1 : header + 3]]
+    following = [names_in(line) for line in lines[header + 1 : header + 3]]
     if len(following) == 2 and following[0] and following[0][0] == "unix time":
         return {place: cell for place, cell in enumerate(following[0]) if cell}, 2
-    names = cells_of(lines[header])
+    names = names_in(lines[header])
     return {place: name.rpartition("(")[2].rstrip(")") for place, name in enumerate(names) if name.endswith(")")}, 0
 
 

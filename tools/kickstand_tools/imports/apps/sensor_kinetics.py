@@ -11,7 +11,7 @@ from ...errors import InputError
 from ..files import Piece
 from ..join import with_gravity
 from ..recording import Recording, Sensor, sensor_of
-from ..sheets import cells_of, read_sheet
+from ..sheets import names_in, read_sheet
 
 NAME = "Sensor Kinetics"
 _HEAD = ["time", "x_value", "y_value", "z_value"]
@@ -24,7 +24,7 @@ def finds(pieces: list[Piece]) -> list[list[Piece]]:
     """The recordings among these files: those whose names are alike but for the sensor's."""
     alike: dict[str, list[Piece]] = {}
     for piece in pieces:
-        head = [cell.lower() for cell in cells_of(next(iter(piece.first_lines(1)), ""))]
+        head = [cell.lower() for cell in names_in(next(iter(piece.first_lines(1)), ""))]
         if head == _HEAD:
             alike.setdefault(f"{piece.folder}/{_parts(piece)[0]}", []).append(piece)
     return list(alike.values())

@@ -9,7 +9,7 @@ from ...errors import InputError
 from ..files import Piece
 from ..join import with_gravity
 from ..recording import Recording, Sensor, sensor_of, track_of
-from ..sheets import cells_of, read_sheet
+from ..sheets import names_in, read_sheet
 
 NAME = "Sensor Logger"
 _TOTAL, _RAW, _USER, _GRAVITY = "totalacceleration", "accelerometeruncalibrated", "accelerometer", "gravity"
@@ -57,14 +57,14 @@ def read(pieces: list[Piece], name: str) -> Recording:
 
 
 def _is_ours(piece: Piece) -> bool:
-    first = cells_of(next(iter(piece.first_lines(1)), ""))
+    first = names_in(next(iter(piece.first_lines(1)), ""))
     return first[:2] == ["time", "seconds_elapsed"] and piece.stem in (_TOTAL, _RAW, _USER, _GRAVITY, *_GYROS)
 
 
 def _platform(files: dict[str, Piece]) -> tuple[bool | None, bool]:
     """Was it an iPhone (None: not known), and were its units and signs standardised?"""
     if "metadata" in files and len(files["metadata"].first_lines(2)) > 1:
-        names, values = (cells_of(line) for line in files["metadata"].first_lines(2))
+        names, values = (names_in(line) for line in files["metadata"].first_lines(2))
         said = {name.lower(): value.lower() for name, value in zip(names, values)}
         if said.get("platform"):
             return said["platform"] == "ios", said.get("standardisation") == "true"

@@ -11,7 +11,7 @@ from ...errors import InputError
 from ..files import Piece
 from ..join import with_gravity
 from ..recording import Recording, Sensor, Track, sensor_of, track_of
-from ..sheets import Sheet, cells_of, plain, read_sheet
+from ..sheets import Sheet, names_in, plain, read_sheet
 from ..times import NO_TIME, REPEATED, Nanoseconds
 
 NAME = "SensorLog"
@@ -44,7 +44,7 @@ def read(pieces: list[Piece], name: str) -> Recording:
 
 
 def _is_ours(piece: Piece) -> bool:
-    head = {plain(cell) for cell in cells_of(next(iter(piece.first_lines(1)), ""))}
+    head = {plain(cell) for cell in names_in(next(iter(piece.first_lines(1)), ""))}
     return bool(head & {plain(_ACCEL[0]), plain(_USER[0])})
 
 

@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from ...errors import InputError
-from ..cells import columns_of
+from ...logs.csv_reader import columns_of
 from ..files import Piece
 from ..recording import Recording, sensor_of, track_of
 from ..sheets import Sheet, plain

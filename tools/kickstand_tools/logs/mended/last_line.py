@@ -38,7 +38,7 @@ def without_cut_line(text: bytes, names: list[str], places: dict[str, int]) -> t
 
 def _readable(line: bytes, names: list[str], places: dict[str, int]) -> bool:
     try:
-        return len(cells.read("", line.decode(), len(names), places, 0, None)[0]) == 1
+        return len(cells.read("", line.decode(), len(names), places, 0, None)) == 1
     except (InputError, UnicodeDecodeError):
         return False
 
