@@ -1,4 +1,4 @@
-"""Positions and Universal Time in a log: read, cut, mended and written like the other columns."""
+"""Positions and Universal Time in a log: read, cut, repaired and written like the other columns."""
 
 import io
 from collections.abc import Iterable
@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 from kickstand_tools.errors import InputError
 from kickstand_tools.logs import reader
-from kickstand_tools.logs.csv_lines import write_log
-from kickstand_tools.logs.cut import cut_log
+from kickstand_tools.logs.csv_lines import cut_log, write_log
+from kickstand_tools.logs.frozen import without_frozen
 from kickstand_tools.logs.log import Log
-from kickstand_tools.logs.mended.frozen import believed
 from kickstand_tools.logs.reader import read_blocks, read_log
 from kickstand_tools.logs.stretch import Stretch
 
@@ -68,11 +67,11 @@ def test_those_of_frozen_readings_go_with_them():
     whole.accel_g += np.random.default_rng(1).normal(0.0, 1e-3, whole.accel_g.shape)
     whole.accel_g[100:200] = whole.accel_g[100]
     whole.gyro_dps[100:200] = whole.gyro_dps[100]
-    kept = believed(whole)
+    kept = without_frozen(whole)
     assert len(kept.t_s) < 310
     assert told(kept) == expected([k for k in TOLD if not 100 < k < 200])
     (block,) = read_blocks(whole)
-    assert np.count_nonzero(np.isfinite(block.believed.lat_deg)) == len(told(kept))
+    assert np.count_nonzero(np.isfinite(block.measured.lat_deg)) == len(told(kept))
 
 
 def test_a_cut_and_a_written_log_have_them_and_one_without_has_no_columns(tmp_path):

@@ -190,7 +190,7 @@ def plot(
 @_OUT
 def cut(log: Path, from_s: float | None, to_s: float | None, out: Path) -> None:
     """Cut a stretch out of a log: a still pose for calibrate two or six, or one ride of several."""
-    from ..logs.cut import cut_log
+    from ..logs.csv_lines import cut_log
     from ..output import check_output
     from ..progress import Bar
 

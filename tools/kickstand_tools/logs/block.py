@@ -20,8 +20,8 @@ class Block:
 
     time_us (n): since the log's first sample. readings (n, 7): acceleration (3, g), temperature (C), rate (3, deg/s),
     the chip's order. speed_mps, lat_deg, lon_deg, utc_s (n): as in a Log. What the log does not have is NaN. start_s:
-    the recorder's own time at the log's first sample. frozen (n): True where the readings are not believed, see
-    mended.frozen.
+    the recorder's own time at the log's first sample. frozen (n): True where the readings are repeated ones, see
+    frozen.py.
     """
 
     time_us: NDArray[np.int64]
@@ -72,7 +72,7 @@ class Block:
         return replace(self, lines=lines, **{name: getattr(self, name)[which] for name in _ROWS})
 
     @property
-    def believed(self) -> "Block":
+    def measured(self) -> "Block":
         """The rows that are not frozen."""
         return self.part(~self.frozen) if np.any(self.frozen) else self
 

@@ -18,10 +18,9 @@ from .axes.handedness import Handedness
 from .block import Block
 from .cells import COLUMNS, OPTIONAL, TRACK
 from .csv_reader import numbers_in
+from .even_times import even_blocks
+from .frozen import FrozenReadings
 from .log import Log
-from .mended.even_blocks import even_blocks
-from .mended.frozen import FrozenReadings
-from .mended.last_line import last_marked, without_cut_line
 from .source import File, Progress, chunks, name_of, total_bytes
 from .speed_unit import SpeedUnit
 from .stretch import Stretch
@@ -192,10 +191,10 @@ def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], rema
     """The blocks with their times as they stand in the file, which may repeat."""
     places = {column: names.index(column) for column in COLUMNS + OPTIONAL if column in names}
     line, start_us, last_us = 1, None, None
-    for text, done, is_last in last_marked(pieces):
+    for text, done, is_last in _last_marked(pieces):
         cut = b""
         if is_last:
-            text, cut = without_cut_line(text, names, places)
+            text, cut = _without_cut_line(text, names, places)
             remarks += [Notice("cut-line", line + text.count(b"\n") + 1)] if cut else []
         table = _numbers(name, text, names, places, line, last_us)
         line += text.count(b"\n")
@@ -241,3 +240,45 @@ def _block(
         names=tuple(names),
         **{name: column[name] for name in TRACK},
     )
+
+
+def _last_marked(parts: Iterator[tuple[bytes, int]]) -> Iterator[tuple[bytes, int, bool]]:
+    """Each part, and whether it is the last one."""
+    before = next(parts, None)
+    for part in parts:
+        if before:
+            yield *before, False
+        before = part
+    if before:
+        yield *before, True
+
+
+def _without_cut_line(text: bytes, names: list[str], places: dict[str, int]) -> tuple[bytes, bytes]:
+    """The end of a log without its last line if that was cut, and the cut line: empty if it was not.
+
+    text: whole lines, of which the last one may have no end. It was cut if it has fewer cells than there are columns;
+    without an end also if it cannot be read, or if its last number has fewer digits after the point than the line
+    before it: half a number is a number too.
+    """
+    kept = text.rstrip()
+    before, _, last = kept.rpartition(b"\n")
+    if not last or last.count(b'"'):
+        return text, b""
+    cut = last.count(b",") + 1 < len(names)
+    if not cut and not text.endswith(b"\n"):
+        above = before.rpartition(b"\n")[2]
+        half = not last.endswith(b",") and _digits(last) < _digits(above)
+        cut = half or not _readable(last, names, places)
+    return (before + b"\n" if before else b"", last) if cut else (text, b"")
+
+
+def _readable(line: bytes, names: list[str], places: dict[str, int]) -> bool:
+    try:
+        return len(cells.read("", line.decode(), len(names), places, 0, None)) == 1
+    except (InputError, UnicodeDecodeError):
+        return False
+
+
+def _digits(line: bytes) -> int:
+    """After the point of the last cell; 0 for an empty one."""
+    return len(line.rpartition(b",")[2].strip().partition(b".")[2])

@@ -36,7 +36,7 @@ _EMULATED_S = 1e6  # a log is as long as it is
 
 _SIGMA = replay_engine.COLUMNS.index("lean_sigma_deg")
 
-Replayed = tuple[Block, Array]  # (n, replay_engine.COLUMNS) of the rows that are believed
+Replayed = tuple[Block, Array]  # (n, replay_engine.COLUMNS) of the rows that are not frozen
 Engine = Callable[[Iterator[bytes], Progress | None], contextlib.AbstractContextManager[IO[bytes]]]
 
 
@@ -48,7 +48,7 @@ class LeanTable(Table):
     which is shown where lean_sigma_deg is not NaN.
     lean_formula_deg: Nicolae's (25)-(26) as it stands.
     left_g, up_g, forward_g: specific force. static_lean_deg: the lean of a vehicle at rest with this force.
-    lean_sigma_deg: the standard deviation of the lean that the firmware believed in, NaN where the display shows no
+    lean_sigma_deg: the standard deviation of the lean that the firmware estimates, NaN where the display shows no
     lean. notices: what is remarkable in the ride (kickstand_tools.refusals.sentence puts a notice into words).
     """
 
@@ -120,8 +120,8 @@ def replay_blocks(
     mount, car = MountCheck(calibration), calibration.vehicle == "car"
     whole, stretch = apart(log)
     for block, results in _RUN[engine](whole, calibration, progress, notices):
-        believed = block.believed
-        mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
+        measured = block.measured
+        mount.add(measured.t_s, *calibration.in_vehicle(measured.readings), measured.speed_mps)
         found = _with_frozen(block, results)
         if car:
             found[:, _SIGMA] = np.nan
@@ -150,7 +150,7 @@ def _cpython(
 ) -> Iterator[Replayed]:
     meter = MeterAlong(calibration)
     for block in read_blocks(log, 2, progress, notices):
-        yield block, meter.columns(block.believed)
+        yield block, meter.columns(block.measured)
 
 
 def _two_processes(
@@ -237,6 +237,6 @@ def _records(blocks: Iterable[Block], calibration: CalibrationFile) -> Iterator[
     """The bytes that replay_engine.run reads."""
     yield struct.pack(replay_engine.CALIBRATION, *calibration.parameters(), calibration.delay_s())
     for block in blocks:
-        for time_us, reading, speed in block.believed.rows():
+        for time_us, reading, speed in block.measured.rows():
             given = speed if speed >= 0.0 else replay_engine.NO_SPEED  # NaN is not >= 0
             yield struct.pack(replay_engine.RECORD, time_us, *reading, given)

@@ -28,7 +28,7 @@ def columns_of(blocks: Iterator[Block], calibration: CalibrationFile) -> Iterato
     try:
         with ProcessPoolExecutor(1, spawn, _begin, (calibration,)) as pool:
             for block in blocks:
-                waiting.append((block, pool.submit(_columns, replace(block.believed, lines=[]))))
+                waiting.append((block, pool.submit(_columns, replace(block.measured, lines=[]))))
                 if len(waiting) > _AHEAD:
                     yield _result(*waiting.popleft())
             while waiting:
