@@ -75,7 +75,7 @@ def test_at_each_end_and_twice():
 
 @pytest.mark.parametrize("digits", [5, 4, 3, 2, 1])
 @pytest.mark.parametrize("noise", [1.0, 0.3])
-def test_a_vehicle_at_rest_is_believed(digits, noise):
+def test_a_vehicle_at_rest_is_not_frozen(digits, noise):
     """A quiet sensor, the engine off, in logs with fewer and fewer digits: with one, most readings are the same."""
     idling = resting(1, 5, 30.0, digits)  # its engine shakes it
     readings = np.vstack((riding(5, 1, digits), idling, resting(20, 2, noise, digits), idling, riding(5, 3, digits)))
@@ -109,7 +109,7 @@ def test_a_log_without_what_froze():
 
 @pytest.mark.parametrize("profile", ["street", "track"])
 def test_a_freeze_is_no_standstill(profile):
-    """20 s in the middle of a ride: believed, it leaves the lean wrong by up to 50 degrees, and long after it."""
+    """20 s in the middle of a ride: taken for a standstill, it leaves the lean wrong by up to 50 degrees, and long after it."""
     ride = simulate_ride(profile, seed=1, seconds=100.0)
     hz = round(ride.rate_hz)
     kickstand, upright = (Log.from_readings(pose, hz) for pose in (ride.kickstand, ride.upright))
@@ -189,7 +189,7 @@ def test_blocks_are_marked_once():
     assert marks.notices()[0].values[0] == 1
 
 
-def test_real_logs_are_believed_and_a_freeze_in_one_is_not(shared_data):
+def test_no_real_log_is_frozen_and_a_freeze_in_one_is_found(shared_data):
     for path in sorted(shared_data.glob("*.csv.gz")):
         log = reader.read_log(path)
         assert log.notices == []

@@ -49,7 +49,7 @@ def test_forces_and_rates_are_the_calibrated_and_turned_readings(tmp_path, engin
     log, cal = ride(tmp_path / "log.csv"), command.write_cal(tmp_path / "CAL.json")
     got, said = replayed(log, cal, engine)
     assert said == ""
-    assert got.dtype.names[:6] == ("t_s", "lean_deg", "lean_formula_deg", "left_g", "up_g", "forward_g")
+    assert (got.dtype.names or ())[:6] == ("t_s", "lean_deg", "lean_formula_deg", "left_g", "up_g", "forward_g")
 
     given, parameters = read(log), json.loads(cal.read_text())
     matrix = np.array(parameters["vehicle_from_sensor"])

@@ -21,7 +21,7 @@ _along: MeterAlong  # of the second process
 
 
 def columns_of(blocks: Iterator[Block], calibration: CalibrationFile) -> Iterator[tuple[Block, Array]]:
-    """Each block with MeterAlong.columns() of its rows that are believed. Raises InputError, also where the second
+    """Each block with MeterAlong.columns() of its rows that are measured. Raises InputError, also where the second
     process comes to an end."""
     spawn = multiprocessing.get_context("spawn")  # a process with threads, as of a progress bar, must not be forked
     waiting: deque[tuple[Block, Future[Array]]] = deque()
