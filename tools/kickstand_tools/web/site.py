@@ -5,10 +5,10 @@ import json
 from pathlib import Path
 
 from .. import firmware_path
-from ..analysis.plot import page, page_with_map
-from ..analysis.plot.in_script import source_hash
+from ..analysis.plot import page
 from ..output import check_directory, new_directory, write_whole
 from ..pictures.lcd_font import ROM
+from ..templates import source_hash
 from . import install_archive, npm_packages, rides_archive, wiring_files
 
 PAGE = Path(__file__).resolve().parent / "page"
@@ -41,7 +41,7 @@ def python_files() -> dict[str, str]:
 
 def _chart_scripts(library: bytes) -> bytes:
     """The scripts of the charts of a ride as the policy of the page that frames them names them, the library first."""
-    return " ".join(map(source_hash, (library.decode(), page.SCRIPT, page_with_map.SCRIPT))).encode()
+    return " ".join(map(source_hash, (library.decode(), *page.SCRIPTS))).encode()
 
 
 def site_files() -> dict[str, bytes]:
