@@ -3,12 +3,13 @@
 import hashlib
 import json
 from pathlib import Path
+from typing import Any
 
 from .. import firmware_path
 from ..analysis.plot import page
 from ..output import check_directory, new_directory, write_whole
 from ..pictures.lcd_font import ROM
-from ..templates import source_hash
+from ..templates import filled, source_hash
 from . import install_archive, npm_packages, rides_archive, wiring_files
 
 PAGE = Path(__file__).resolve().parent / "page"
@@ -28,7 +29,6 @@ MODULES = (
 # Large, and only for those who have a board or a ride: fetched when they ask for it
 LATER = ("esptool/", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip")
 _NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first by itself, the second as "./"
-_LISTED = "__FILES__", "__VERSION__"  # in service_worker.js
 
 
 def python_files() -> dict[str, str]:
@@ -39,9 +39,9 @@ def python_files() -> dict[str, str]:
     return {path.relative_to(top).as_posix(): path.read_text(encoding="utf-8") for path, top in found}
 
 
-def _chart_scripts(library: bytes) -> bytes:
+def _chart_scripts(library: bytes) -> str:
     """The scripts of the charts of a ride as the policy of the page that frames them names them, the library first."""
-    return " ".join(map(source_hash, (library.decode(), *page.SCRIPTS))).encode()
+    return " ".join(map(source_hash, (library.decode(), *page.SCRIPTS)))
 
 
 def site_files() -> dict[str, bytes]:
@@ -54,8 +54,8 @@ def site_files() -> dict[str, bytes]:
     files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in sorted(PAGE.rglob("*.*"))}
     files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # as a text a browser shows
     files |= wiring_files.wiring_files()
-    files["install.html"] = wiring_files.with_tables(files["install.html"].decode()).encode()
-    files["rides.html"] = files["rides.html"].replace(b"__CHARTS__", _chart_scripts(files["plotly/plotly.min.js"]))
+    files["install.html"] = _filled("install.html", boards=wiring_files.tables())
+    files["rides.html"] = _filled("rides.html", charts=_chart_scripts(files["plotly/plotly.min.js"]))
     files["python.json"] = json.dumps(python_files()).encode()
     files["install.zip"] = install_archive.archive()
     files["rides.zip"] = rides_archive.archive()
@@ -63,12 +63,13 @@ def site_files() -> dict[str, bytes]:
     files["numpy/numpy.zip"], files["numpy/licence.txt"] = rides_archive.numpy_archive(files.pop(package))
     files["font.json"] = json.dumps({code: list(rows) for code, rows in ROM.items()}).encode()
     version = hashlib.sha256(b"".join(name.encode() + data for name, data in sorted(files.items()))).hexdigest()[:12]
-    worker = files["service_worker.js"].decode()
     kept = sorted(["./", *(name for name in files if name not in _NOT_KEPT and not name.startswith(LATER))])
-    for mark, text in zip(_LISTED, (json.dumps(kept), version)):
-        worker = worker.replace(f'"{mark}"', text if text.startswith("[") else f'"{text}"')
-    files["service_worker.js"] = worker.encode()
+    files["service_worker.js"] = _filled("service_worker.js", files=kept, version=version)
     return files
+
+
+def _filled(name: str, **values: Any) -> bytes:
+    return filled(PAGE / name, **values).encode()
 
 
 def write_site(files: dict[str, bytes], out: Path) -> None:
