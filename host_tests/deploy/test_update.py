@@ -59,7 +59,7 @@ def plugged(monkeypatch):
         monkeypatch.setattr(list_ports, "comports", lambda: [pico])
         monkeypatch.setattr(connection, "Board", lambda name, timeout: board)
         monkeypatch.setattr(connection, "_RESTART_S", 0)
-        monkeypatch.setattr(flash, "contents", lambda mpy: dict(contents(mpy or None)))
+        monkeypatch.setattr(flash, "contents", lambda mpy, _compiler: dict(contents(mpy or None)))
         return board
 
     return plug
