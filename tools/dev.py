@@ -3,7 +3,7 @@
 
     python3 tools/dev.py demo         the firmware on a simulated board, live in the terminal
     python3 tools/dev.py test         ruff, pyright and every test; further arguments go to pytest
-    python3 tools/dev.py mutants imu  which single changes of a room's code its tests do not notice (tools/mutants)
+    python3 tools/dev.py mutants imu  which single changes of a room's code its tests do not notice
 
 They make .venv beside pyproject.toml and install into it, again only when pyproject.toml has changed.
 """
@@ -40,7 +40,7 @@ def main(arguments):
     if name == "test":
         return test(rest)
     if name == "mutants":
-        return run(os.path.join("tools", "mutants"), *rest)
+        return run("-m", "kickstand_workshop.mutants", *rest)
     return run("-m", "kickstand_tools.cli", "demo", *rest)
 
 

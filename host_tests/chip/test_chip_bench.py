@@ -12,7 +12,7 @@ pytestmark = pytest.mark.chip
 def test_bench():
     """A short run: stages add up, nothing is lost, the heap does not shrink."""
     pico()  # or skip
-    from kickstand_tools.bench import bench
+    from kickstand_workshop.bench import bench
 
     result = json.loads(json.dumps(bench.bench(1)))
     stages = {name: spread["median"] for name, spread in result["stage_us"].items()}

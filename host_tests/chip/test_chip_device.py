@@ -4,9 +4,9 @@ import time
 
 import pytest
 from emulated import calibrated, firmware, leaning, pico, shown_lean, shows
-from kickstand_tools.bench.sample_count import SampleCount
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, kickstand, turn, upright, wait
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
+from kickstand_workshop.bench.sample_count import SampleCount
 
 pytestmark = pytest.mark.chip
 

@@ -5,7 +5,7 @@ import re
 
 import pytest
 from emulated import calibrated, firmware, leaning, pico, reset_in_a_read, shown_lean, shows
-from kickstand_tools.bench.sample_count import SampleCount
+from kickstand_workshop.bench.sample_count import SampleCount
 
 pytestmark = pytest.mark.chip
 

@@ -92,7 +92,7 @@ def rides(files):
 @pytest.mark.long
 def test_a_recorded_ride_replays_as_it_was_shown(tmp_path):
     """While it is recorded no sample is lost, and the display goes on."""
-    from kickstand_tools.bench.sample_count import SampleCount
+    from kickstand_workshop.bench.sample_count import SampleCount
 
     with pico(PART.world(RIDE.motion), modules() | calibrated()) as device:
         samples = SampleCount(device.board.sensor)

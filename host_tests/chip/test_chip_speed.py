@@ -4,7 +4,7 @@ import json
 
 import pytest
 from emulated import calibrated, firmware, leaning, modules, pico, shown_lean, shows
-from kickstand_tools.bench.sample_count import SampleCount
+from kickstand_workshop.bench.sample_count import SampleCount
 
 pytestmark = pytest.mark.chip
 

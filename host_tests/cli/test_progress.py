@@ -5,8 +5,8 @@ import contextlib
 import command
 import pytest
 from kickstand_tools import output, progress
-from kickstand_tools.cli import simulated
-from kickstand_tools.evaluation import evaluate, runs
+from kickstand_workshop import commands
+from kickstand_workshop.evaluation import evaluate, runs
 from watched import Watched, watched
 
 
@@ -41,7 +41,7 @@ def test_judging_is_seen_from_the_start(monkeypatch):
 def test_judging_says_its_progress_where_there_is_no_terminal(monkeypatch):
     """A line now and then."""
     arguments = ["evaluate", "--profiles", "parked", "--seeds", 1, "--seconds", 60, "--json"]
-    monkeypatch.setattr(simulated, "_LINES_S", 0.0)
+    monkeypatch.setattr(commands, "LINES_S", 0.0)
     lines = command.works(*arguments).err.splitlines()
     assert len(lines) == runs.steps()
     assert (lines[0], lines[-1]) == (f"riding: {100 / runs.steps():.0f} %", "riding: 100 %")

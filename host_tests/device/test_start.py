@@ -10,8 +10,8 @@ import mpy
 import pytest
 from kickstand import errors
 from kickstand_tools import firmware_path
-from kickstand_tools.bench.boot import in_order
 from kickstand_tools.simulated_board.simulator import Board
+from kickstand_workshop.bench.boot import in_order
 
 
 @pytest.fixture

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from kickstand_tools.pictures import drawn, lcd, page, ride
+from kickstand_tools.pictures import lcd
+from kickstand_workshop.pictures import drawn, page, ride
 from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "tools" / "pictures"
-STALE = "stale: run .venv/bin/python -m kickstand_tools.pictures, look at the pictures, check them in"
+STALE = "stale: run .venv/bin/python -m kickstand_workshop.pictures, look at the pictures, check them in"
 
 
 @pytest.fixture(scope="module")

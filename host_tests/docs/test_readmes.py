@@ -48,13 +48,14 @@ def test_the_first_page_is_short_and_has_both_commands():
     assert "    python3 tools/dev.py test\n" in text
 
 
-@pytest.mark.parametrize("package", ["firmware/kickstand", "tools/kickstand_tools"])
+PACKAGES = "firmware/kickstand", "tools/kickstand_tools", "tools/workshop/kickstand_workshop"
+
+
+@pytest.mark.parametrize("package", PACKAGES)
 def test_the_map_has_every_folder_and_no_other(package):
-    text = text_of(READMES[0])
-    begin = text.index(f"{package.split('/')[1]}/")
-    drawn = text[begin : text.index("    host_tests/")]
-    if package.startswith("firmware"):
-        drawn = drawn[: drawn.index("    tools/")]
+    name = package.rpartition("/")[2]
+    drawn = re.split(rf"^ .*\b{name}/(?=\s)", text_of(READMES[0]), maxsplit=1, flags=re.MULTILINE)[1]
+    drawn = re.split(r"\n {4}\w", drawn)[0]  # until the next top folder
     mapped = set(re.findall(r"\b(\w+)/(?=,| )", drawn.split("\n", 1)[1]))
     folders = {path.parent for path in (ROOT / package).rglob("*.py")} - {ROOT / package}
     assert mapped == {folder.relative_to(ROOT / package).parts[0] for folder in folders}
@@ -67,7 +68,8 @@ def test_every_file_that_is_pointed_to_is_there():
 
 def test_every_command_is_described():
     text = text_of(READMES[2])
-    for name, command in kickstand.commands.items():
+    for name in kickstand.list_commands(None):
+        command = kickstand.get_command(None, name)
         for words in [f"{name} {sub}" for sub in getattr(command, "commands", {})] or [name]:
             assert f"`{words}`" in text, words
 

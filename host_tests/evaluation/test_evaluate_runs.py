@@ -10,10 +10,10 @@ from command import refused, works
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.errors import InputError
-from kickstand_tools.evaluation import estimators, real_ride, runs
-from kickstand_tools.evaluation.samples import Samples
 from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation.ride import ride
+from kickstand_workshop.evaluation import estimators, real_ride, runs
+from kickstand_workshop.evaluation.samples import Samples
 
 FILTERS = ["complementary", "mahony", "madgwick", "vqf"]
 _PACKAGE = {"mahony": "ahrs", "madgwick": "ahrs", "vqf": "vqf"}

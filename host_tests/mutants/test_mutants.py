@@ -1,4 +1,4 @@
-"""tools/mutants: the table of rooms, the changes it makes, and what it takes for noticed."""
+"""kickstand_workshop.mutants: the table of rooms, the changes it makes, and what it takes for noticed."""
 
 import os
 import subprocess
@@ -6,11 +6,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from kickstand_workshop.mutants import rooms
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-sys.path.append(str(ROOT / "tools" / "mutants"))
-
-import rooms  # noqa: E402
 
 
 @pytest.mark.parametrize("name", rooms.ROOMS)
@@ -26,7 +24,7 @@ def test_every_pattern_of_the_table_has_files(name):
 def changed(tmp_path):
     """Every changed text of a file, by the lines that differ."""
     pytest.importorskip("cosmic_ray", reason="needs the extra mutants")
-    from changes import changes
+    from kickstand_workshop.mutants.changes import changes
 
     def all_of(text):
         (tmp_path / "code.py").write_text(text)
@@ -88,10 +86,8 @@ def test_noticed_unnoticed_and_for_ever(tmp_path):
         "import code_under\n\ndef test_twice():\n    assert code_under.twice(2) == 4\n"
     )
     script = f"""
-import sys
 from pathlib import Path
-sys.path.insert(0, {str(ROOT / "tools" / "mutants")!r})
-import fork
+from kickstand_workshop.mutants import fork
 fork.WARM, fork.EXTRA_S = (), 1
 tests = fork.Tests(Path({str(tmp_path)!r}), ["test_code.py"])
 assert tests.pass_unchanged(), tests.output()

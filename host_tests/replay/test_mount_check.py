@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.calibration.ride.fit import fit_ride
-from kickstand_tools.evaluation.runs import calibrated_by_poses
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.refusals import RefusedInput, sentence
@@ -18,6 +17,7 @@ from kickstand_tools.replay.mount_check import MountCheck, contradiction
 from kickstand_tools.simulation.profiles import PROFILES
 from kickstand_tools.simulation.ride import ride
 from kickstand_tools.simulation.scripted import script
+from kickstand_workshop.evaluation.runs import calibrated_by_poses
 
 
 def turned(matrix, left=0.0, up=0.0, forward=0.0):

@@ -2,10 +2,10 @@
 
 import pytest
 from kickstand_tools.simulation.scripted import script
-from kickstand_tools.soak import soak as soaking
-from kickstand_tools.soak.__main__ import table
-from kickstand_tools.soak.soak import soak
-from kickstand_tools.soak.trip import SENSOR, SHORT_S, Trip
+from kickstand_workshop.soak import soak as soaking
+from kickstand_workshop.soak.__main__ import table
+from kickstand_workshop.soak.soak import soak
+from kickstand_workshop.soak.trip import SENSOR, SHORT_S, Trip
 
 
 def test_some_minutes_of_random_rides_and_faults():

@@ -45,13 +45,26 @@ def counts(chip):
     return [value - 65536 if value > 32767 else value for value in values]
 
 
-def on_board(firmware, until_s=1.0, **fitted):
-    """Run firmware(board) on a new Board(**fitted), at rest unless `world` is given. Returns (outcome, board)."""
+def on_board(program, until_s=1.0, **fitted):
+    """Run program(board) on a new Board(**fitted), at rest unless `world` is given. Returns (outcome, board)."""
     world = fitted.pop("world", level)
     board = Board(world, **fitted)
     board.install()
     try:
-        outcome = board.run(lambda: firmware(board), until_s)
+        outcome = board.run(lambda: program(board), until_s)
     finally:
         board.uninstall()
     return outcome, board
+
+
+def firmware(until_s=30.0, **fitted):
+    """Decorates test(board): it runs as the firmware of a new Board(**fitted), and must get to its end."""
+
+    def decorated(function):
+        def test():
+            outcome, _ = on_board(function, until_s, **fitted)
+            assert outcome == "returned"
+
+        return test
+
+    return decorated

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.evaluation.runs import as_log, calibrated_by_poses
 from kickstand_tools.logs.log import Log
 from kickstand_tools.replay import replay_engine
 from kickstand_tools.simulation.ride import ride
+from kickstand_workshop.evaluation.runs import as_log, calibrated_by_poses
 from other_bike import other_ride
 
 

@@ -1,1 +1,1 @@
-"""The pictures of the READMEs, made from the real firmware, settings and commands."""
+"""Display and wiring as SVG, drawn from the settings and the character ROM: for the web page and the READMEs."""

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...logs.table import Array
+from ...signals.averages import smoothed
 from ..downsample import spacing_s
 from ..overview import Overview
 from ..report import angles, clock, judged, peak_words
-from ..signals import smoothed
 from ..summary import BIN_DEG, BINS_DEG, Peak
 
 LEFT_COLOUR, RIGHT_COLOUR = "#2563a8", "#c2571a"

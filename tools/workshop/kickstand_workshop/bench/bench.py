@@ -1,0 +1,211 @@
+"""What the firmware costs on the emulated Pico in time, memory and flash: bench() measures, tables() lays it out."""
+
+import ast
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from kickstand.calibration.parameters import Calibration
+from kickstand_tools.deploy.bytecode import cross_compiled
+from kickstand_tools.emulator import flash_image
+from kickstand_tools.emulator.host_link import GUEST, HostLink
+from kickstand_tools.emulator.pico import Pico
+from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, upright
+from kickstand_tools.simulation.scripted.sensor_errors import Sensor
+from rich.console import Group
+from rich.table import Table
+
+from . import boot
+from .sample_count import SampleCount
+
+SAMPLE_HZ = 200  # as bench_guest sets it
+_GUEST = ("bench_guest", "stages_guest")  # modules of this folder that run on the Pico
+_SENSOR = Sensor(seed=1, share=0.0)  # without errors, mounted at some angle
+_RIDE = [accelerate(15.0, 1.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 20
+_MODES: dict[str, dict[str, Any]] = {"aligning by driving": {"SPEED": "wheel"}, "recording": {"RECORD": True}}
+_WHEEL_PIN, _PULSE_S, _CLOSED_S = 14, 0.133, 0.02  # one magnet on a wheel of 2 m circumference, at 15 m/s
+
+
+def bench(seconds: int = 10) -> dict[str, Any]:
+    """Measure everything, which takes minutes. The figures' names end with their units.
+
+    seconds: emulated time of each of four runs. Raises GuestError if the program on the Pico fails.
+    """
+    plain = _run(seconds, detail=False)
+    detail = _run(seconds, detail=True)
+    modes = {name: _run(seconds, detail=False, chosen=chosen) for name, chosen in _MODES.items()}
+    figures = plain["figures"]
+    return {
+        "sample_hz": SAMPLE_HZ,
+        "seconds": figures["elapsed_us"] / 1e6,
+        "turn_us": _spread(plain["took"]),
+        "stage_us": {name: _spread(us) for name, us in _stages(detail).items()},
+        "cpu_share": _cpu_share(plain),
+        "turns": figures["turns"],
+        "samples_taken": plain["taken"],
+        "samples_lost": plain["lost"],
+        "heap_bytes_per_sample": round(figures["heap_bytes"] / max(1, plain["heap_samples"])),
+        "collections_by_app": figures["collections_by_app"],
+        "collections_automatic": figures["collections_automatic"],
+        "collection_pause_us": _spread(plain["pauses"]),
+        "free_heap_bytes": figures["free_before"],
+        "free_heap_at_end_bytes": figures["free_after"],
+        "modes": {name: _compared(mode, plain) for name, mode in modes.items()},
+        "boot": {
+            kind: asdict(boot.boot(_SENSOR.world(Ride([upright(100.0)]).motion), _calibration(), kind == "mpy"))
+            for kind in ("py", "mpy")
+        },
+        "flash_bytes": {kind: _size(kind == "mpy") for kind in ("py", "mpy")},
+    }
+
+
+def tables(result: dict[str, Any]) -> Group:
+    """The result of bench() for a terminal."""
+    times = Table(title=f"A turn of the loop at {result['sample_hz']} samples a second: emulated us")
+    times.add_column("stage")
+    for name in ("median", "p99", "max"):
+        times.add_column(name, justify="right")
+    for name, spread in (*result["stage_us"].items(), ("whole turn", result["turn_us"])):
+        times.add_row(name, *(f"{spread[key]:.0f}" for key in ("median", "p99", "max")))
+    figures = Table(show_header=False)
+    pause = result["collection_pause_us"]
+    starts, size = result["boot"], result["flash_bytes"]
+    for name, text in (
+        ("CPU share", f"{100 * result['cpu_share']:.0f} %"),
+        ("samples taken / lost", f"{result['samples_taken']} / {result['samples_lost']} in {result['seconds']:.1f} s"),
+        ("heap taken by a sample", f"{result['heap_bytes_per_sample']} bytes"),
+        ("collections", f"{result['collections_by_app']} by the app, {result['collections_automatic']} by themselves"),
+        ("a collection takes", f"{pause['median'] / 1000:.1f} ms, at most {pause['max'] / 1000:.1f} ms"),
+        (
+            "free heap, start / end",
+            f"{result['free_heap_bytes'] / 1024:.0f} / {result['free_heap_at_end_bytes'] / 1024:.0f} KB",
+        ),
+        *((f"while {name}", _mode_text(mode)) for name, mode in result["modes"].items()),
+        ("reset to first lean", f"{starts['py']['lean_s']:.2f} s from .py, {starts['mpy']['lean_s']:.2f} s from .mpy"),
+        ("size on flash", f"{size['py'] / 1000:.1f} kB as .py, {size['mpy'] / 1000:.1f} kB as .mpy"),
+    ):
+        figures.add_row(name, text)
+    return Group(times, boot.table(starts["mpy"]), figures)
+
+
+def _mode_text(mode: dict[str, Any]) -> str:
+    return (
+        f"CPU {100 * mode['cpu_share']:.0f} %, {mode['us_per_sample']:+.0f} us a sample, {mode['samples_lost']} lost, "
+        f"{mode['free_heap_bytes'] / 1024:.0f} / {mode['free_heap_at_end_bytes'] / 1024:.0f} KB free"
+    )
+
+
+def _cpu_share(run: dict[str, Any]) -> float:
+    return 1.0 - run["figures"]["slept_us"] / run["figures"]["elapsed_us"]
+
+
+def _compared(mode: dict[str, Any], plain: dict[str, Any]) -> dict[str, Any]:
+    """The figures of a run in a mode, and what it costs more than the plain run."""
+    figures = mode["figures"]
+    return {
+        "cpu_share": _cpu_share(mode),
+        "us_per_sample": (_cpu_share(mode) - _cpu_share(plain)) * 1e6 / SAMPLE_HZ,
+        "turn_us": _spread(mode["took"]),
+        "samples_taken": mode["taken"],
+        "samples_lost": mode["lost"],
+        "collections_automatic": figures["collections_automatic"],
+        "free_heap_bytes": figures["free_before"],
+        "free_heap_at_end_bytes": figures["free_after"],
+    }
+
+
+def _turn_wheel(pico: Pico) -> None:
+    """Let the wheel contact close and open from now on."""
+    pin = pico.chip.rp2040.gpio[_WHEEL_PIN]
+
+    def close() -> None:
+        pin.set_input_value(False)
+        pico.board.at(pico.time_s + _CLOSED_S, pin.release_input)
+        pico.board.at(pico.time_s + _PULSE_S, close)
+
+    close()
+
+
+def _run(seconds: int, detail: bool, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
+    """Run the app's loop for so many emulated seconds. chosen: settings by name.
+
+    Returns the figures and arrays of bench_guest, and how many samples were taken and lost.
+    """
+    chosen = chosen or {}
+    files = flash_image.firmware(compiled=True) | _calibration()
+    del files["/main.py"]
+    files |= {f"{name}.mpy": cross_compiled(Path(__file__).with_name(f"{name}.py")) for name in _GUEST}
+    arrays: list[np.ndarray] = []
+    stages: list[np.ndarray] = []
+    result: dict[str, Any] = {}
+    with Pico(_SENSOR.world(Ride(_RIDE).motion), files) as pico:
+        samples = SampleCount(pico.board.sensor)
+
+        def take(data: bytes) -> None:
+            if data == b"begin":
+                samples.begin()
+            elif data == b"heap":
+                result["heap_samples"] = samples.delivered()
+            elif data == b"end":
+                result.update(taken=samples.taken(), lost=samples.lost())
+            elif "taken" not in result:
+                stages.append(np.frombuffer(data, np.uint32))
+            else:
+                arrays.append(np.frombuffer(data, np.uint16))
+
+        HostLink(pico.chip, b"", take)
+        if chosen.get("SPEED") == "wheel":
+            _turn_wheel(pico)
+        code = f"{GUEST}import bench_guest\nbench_guest.run({detail}, {seconds}, Sink(), {chosen})\n"
+        result["figures"] = ast.literal_eval(pico.exec(code, limit_s=2.0 * seconds + 30.0))
+    turns = result["figures"]["turns"]
+    result["took"] = arrays[0][:turns]
+    figures = result["figures"]
+    result["pauses"] = (
+        arrays[1][: figures["collections_by_app"]]
+        if figures["collections_by_app"]
+        else np.array([figures["collect_us"]])
+    )
+    if detail:
+        result["stages"] = np.array(stages).astype(int)
+    return result
+
+
+def _stages(run: dict[str, Any]) -> dict[str, np.ndarray]:
+    """The us that each stage took, in each turn in which it ran."""
+    columns = dict(zip(run["figures"]["stages"], run["stages"].T, strict=True))
+    sampled = columns["decode and sum"] > 0
+    watch = run["figures"]["stopwatch_us"]
+    fetch = columns["fetch"] - 3 * watch  # it contains two transfers and add_up()
+    meter = columns["meter"] - 2 * watch
+    stages = {
+        "read": columns["read"],
+        "decode and sum": columns["decode and sum"],
+        "check": fetch - columns["read"] - columns["decode and sum"],
+        "calibrate and rotate": columns["calibrate and rotate"],
+        "filter": columns["filter"],
+        "rest of the meter": meter - columns["calibrate and rotate"] - columns["filter"],
+        "sample path": fetch + meter,
+    }
+    stages = {name: us[sampled] for name, us in stages.items()}
+    stages["page"] = columns["page"][columns["page"] > 0]
+    stages["display"] = columns["display"]
+    return stages
+
+
+def _spread(us: np.ndarray) -> dict[str, float]:
+    return {"median": float(np.median(us)), "p99": float(np.percentile(us, 99)), "max": float(us.max())}
+
+
+def _calibration() -> dict[str, bytes]:
+    """The files with the calibration of _SENSOR, of which only the mounting is unknown."""
+    calibration = Calibration()
+    calibration.aligned = True
+    for i, value in enumerate(_SENSOR.vehicle_from_sensor):
+        calibration.vehicle_from_sensor[i] = value
+    return flash_image.stored(calibration)
+
+
+def _size(compiled: bool) -> int:
+    return sum(len(content) for content in flash_image.firmware(compiled).values())

@@ -1,0 +1,118 @@
+"""Where the time from reset to the first lean goes, on the emulated Pico: boot() measures, table() lays it out."""
+
+import ast
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from kickstand_tools import firmware_path
+from kickstand_tools.emulator import flash_image
+from kickstand_tools.emulator.host_link import GUEST, HostLink
+from kickstand_tools.emulator.pico import Pico
+from rich.table import Table
+
+_LIMIT_S = 10.0
+_ROWS = 10  # modules that the table names
+
+# Imports each module after those that it imports itself, so that each time is the module's own.
+_GUEST = """
+from time import ticks_diff, ticks_us
+took = []
+for name in {names}:
+    start = ticks_us()
+    __import__(name)
+    took.append(ticks_diff(ticks_us(), start))
+print("took", took)
+"""
+
+
+@dataclass(frozen=True)
+class Boot:
+    """Seconds since the board got power. micropython_s: main.py begins.  starting_s: the display says that Kickstand
+    starts.  sampling_s: the sensor is set up and samples.  lean_s: the display shows the first lean.  import_s: seconds
+    that each module takes."""
+
+    micropython_s: float
+    starting_s: float
+    sampling_s: float
+    lean_s: float
+    import_s: dict[str, float]
+
+
+def boot(world: Callable[[float], tuple], files: dict[str, bytes], compiled: bool = True) -> Boot:
+    """world: as for a Pico, upright and at rest.  files: the board's, besides the firmware: its calibration.  compiled:
+    the firmware as .mpy. Raises NotReached if there is no lean in 10 s."""
+    board_files = flash_image.firmware(compiled) | files
+    with Pico(world, board_files) as pico:
+        pico.run_until(lambda: pico.lcd()[1].startswith("starting"), _LIMIT_S, 0.001)
+        starting_s = pico.time_s
+        pico.run_until(lambda: pico.board.sensor.fifo.count, _LIMIT_S, 0.001)
+        sampling_s = pico.time_s
+        pico.run_until(lambda: pico.lcd()[0].startswith("Lean") and "°" in pico.lcd()[0], _LIMIT_S, 0.001)
+        lean_s = pico.time_s
+    return Boot(_micropython_s(board_files), starting_s, sampling_s, lean_s, _imports(world, board_files))
+
+
+def table(result: dict[str, Any]) -> Table:
+    """A Boot's values by name, for a terminal."""
+    rows = Table(title="From reset to the first lean, compiled: emulated ms")
+    rows.add_column("what")
+    rows.add_column("at", justify="right")
+    rows.add_column("takes", justify="right")
+    rows.add_row("main.py begins", f"{1000 * result['micropython_s']:.0f}", "")
+    by_cost = sorted(result["import_s"].items(), key=lambda item: -item[1])
+    rows.add_row(f"{len(by_cost)} imports, all", "", f"{1000 * sum(result['import_s'].values()):.0f}")
+    for name, seconds in by_cost[:_ROWS]:
+        rows.add_row("  " + name.removeprefix("kickstand."), "", f"{1000 * seconds:.0f}")
+    rows.add_row("display says starting", f"{1000 * result['starting_s']:.0f}", "")
+    rows.add_row("sensor samples", f"{1000 * result['sampling_s']:.0f}", "")
+    took_s = result["lean_s"] - result["sampling_s"]
+    rows.add_row("first lean on the display", f"{1000 * result['lean_s']:.0f}", f"{1000 * took_s:.0f}")
+    return rows
+
+
+def _micropython_s(files: dict[str, bytes]) -> float:
+    """Until MicroPython runs main.py."""
+    begun: list[bytes] = []
+    with Pico(files={**files, "/main.py": f"{GUEST}Sink().write(b'main')\n".encode()}) as pico:
+        HostLink(pico.chip, b"", begun.append)
+        pico.run_until(lambda: begun, _LIMIT_S, 0.001)
+        return pico.time_s
+
+
+def _imports(world: Callable[[float], tuple], files: dict[str, bytes]) -> dict[str, float]:
+    names = ["kickstand.board.port", *in_order("kickstand.start", []), *in_order("kickstand.app", [])]
+    names = list(dict.fromkeys(names))
+    files = {path: content for path, content in files.items() if path.lstrip("/") != "main.py"}
+    with Pico(world, files) as pico:
+        said = pico.exec(_GUEST.format(names=names), _LIMIT_S)
+    took_us = ast.literal_eval(said.split("took ")[1])
+    return {name: us / 1e6 for name, us in zip(names, took_us, strict=True)}
+
+
+def in_order(name: str, found: list[str]) -> list[str]:
+    """The module and all that it imports on being imported, each after its own imports; added to found."""
+    for other in _imported(name):
+        if other not in found:
+            in_order(other, found)
+    if name not in found:
+        found.append(name)
+    return found
+
+
+def _imported(name: str) -> Iterator[str]:
+    """The firmware's modules that this one imports at once."""
+    path = _path(name)
+    package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        for inner in node.body if isinstance(node, ast.Try) else [node]:
+            if isinstance(inner, ast.ImportFrom) and inner.level:
+                base = package[: len(package) - inner.level + 1] + (inner.module or "").split(".") * bool(inner.module)
+                modules = [".".join(base), *(".".join([*base, alias.name]) for alias in inner.names)]
+                yield from (module for module in modules if _path(module).is_file() and "." in module)
+
+
+def _path(name: str) -> Path:
+    path = firmware_path.PACKAGE.parent.joinpath(*name.split("."))
+    return path.with_suffix(".py") if path.with_suffix(".py").is_file() else path / "__init__.py"

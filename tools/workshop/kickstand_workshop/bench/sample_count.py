@@ -1,0 +1,53 @@
+"""Counts the samples that the simulated sensor takes, and those of them that are lost unread."""
+
+from typing import Any
+
+from kickstand_tools.simulated_board.mpu6050 import Mpu6050
+from kickstand_tools.simulated_board.mpu6050_registers import ACCEL_XOUT_H
+
+
+class SampleCount:
+    """Counts for one sensor, which may be read through its data registers or through its FIFO."""
+
+    def __init__(self, sensor: Mpu6050) -> None:
+        self._sensor: Any = sensor
+        self._start, self._pop = sensor.start, sensor.fifo.pop
+        sensor.start = self._on_start  # type: ignore[method-assign]
+        sensor.fifo.pop = self._on_pop  # type: ignore[method-assign]
+        self._first = self._waiting = self._popped = 0
+        self._read: set[int] = set()
+
+    def begin(self) -> None:
+        """Count from here."""
+        self._sensor._update()
+        self._first, self._waiting = self._sensor._next, self._sensor.fifo.count
+        self._popped = 0
+        self._read = set()
+
+    def taken(self) -> int:
+        """Samples the sensor took."""
+        self._sensor._update()
+        return self._sensor._next - self._first
+
+    def delivered(self) -> int:
+        """Samples that were read."""
+        return self._popped // (len(self._sensor._fifo_registers) or 1) or len(self._read)
+
+    def lost(self) -> int:
+        """Samples that can no longer be read: overwritten, pushed out of the FIFO or cleared with it."""
+        taken = self.taken()  # first, because it brings the FIFO up to date
+        frame = len(self._sensor._fifo_registers)
+        if frame:
+            kept = self._popped + self._sensor.fifo.count - self._waiting
+            return taken - kept // frame
+        return max(0, taken - 1 - len(self._read))  # the latest can still be read
+
+    def _on_start(self, address: int, read: bool) -> bool:
+        acknowledged = self._start(address, read)
+        if read and self._sensor._pointer == ACCEL_XOUT_H:
+            self._read.add(self._sensor._next)
+        return acknowledged
+
+    def _on_pop(self) -> int:
+        self._popped += self._sensor.fifo.count > 0
+        return self._pop()

@@ -1,0 +1,78 @@
+"""The commands that the workshop adds to `kickstand`: evaluate, which judges the lean on many rides, and bench."""
+
+import contextlib
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+from kickstand_tools.cli.common import JSON, PATH, warn
+from kickstand_tools.cli.simulated import LINES_S, PROFILE_NAMES, poses, riding_seconds
+from kickstand_tools.emulator import image
+from kickstand_tools.errors import extra
+from kickstand_tools.output import check_directory, new_directory
+from kickstand_tools.progress import Bar
+from kickstand_tools.simulation.profiles import MAIN
+from rich.console import Console
+
+from .evaluation import picture, report, runs
+from .evaluation.estimators import missing
+from .evaluation.evaluate import evaluate
+
+_WIDTH = 110  # columns of a table that is not printed to a terminal
+
+
+@click.command()
+@click.option("--profiles", default=",".join(MAIN), help=f"With commas between: {PROFILE_NAMES}")
+@click.option("--seeds", type=click.IntRange(min=1), default=3, help="Rides of each profile.")
+@riding_seconds(60.0, "Of riding, each; start and stop come on top.")
+@poses(1.0, "Between the two poses, degrees.")
+@click.option("--recording", type=PATH, help="A recorded ride with speed to compare on too.")
+@click.option("--out", type=PATH, help="Write evaluation.json and lean.png to this directory.")
+@JSON
+def evaluate_command(
+    profiles: str, recording: Path | None, out: Path | None, as_json: bool, **of_the_rides: Any
+) -> None:
+    """Compare the shown lean and other filters with the truth of simulated rides."""
+    names = [name.strip() for name in profiles.split(",")]
+    jobs = runs.jobs(names, traces=out is not None, **of_the_rides)
+    if out is not None:
+        picture.check()
+        check_directory(out)
+    absent = missing()
+    if absent:
+        click.echo(f"left out, not installed: {', '.join(absent)}: {extra('evaluate')}", err=True)
+    with new_directory(out) if out is not None else contextlib.nullcontext():
+        with Bar("riding", len(jobs) * runs.steps(), patience_s=0.0, lines_s=LINES_S) as bar:
+            found = evaluate(jobs, recording, lambda: bar.advance(1))
+        for result in found.results:
+            if result.refusal is not None:
+                where = f"{result.job.profile}, seed {result.job.seed}"
+                click.echo(f"{where}, not calibrated: {result.refusal}", err=True)
+        warn(str(recording), found.recorded.notices if found.recorded else ())
+        if as_json:
+            click.echo(json.dumps(report.document(found), indent=2))
+        else:
+            console = Console()
+            console = console if console.is_terminal else Console(width=_WIDTH)
+            console.print(report.table(found.results))
+            if found.recorded:
+                console.print(report.real_table(found.recorded.scores, found.recorded.name))
+        if out is not None:
+            figures, drawing = report.write(found, out)
+            click.echo(f"written: {figures} and {drawing}", err=True)
+
+
+@click.command()
+@click.option("--seconds", type=click.IntRange(1, 600), default=10, help="Emulated, of each of four runs.")
+@JSON
+def bench_command(seconds: int, as_json: bool) -> None:
+    """What the firmware costs on an emulated Pico: time, memory, flash."""
+    image.find()  # before anything else of the emulator is imported
+    from .bench.bench import bench, tables
+
+    result = bench(seconds)
+    if as_json:
+        click.echo(json.dumps(result))
+    else:
+        Console().print(tables(result))

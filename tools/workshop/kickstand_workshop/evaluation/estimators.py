@@ -1,0 +1,130 @@
+"""The estimators that are compared: the firmware's own lean, the one looked back over after the ride, and the filters
+of hobby projects and of the literature.
+
+Each takes Samples and returns the lean in degrees of every sample, > 0 to the right. The filters of the packages
+`ahrs` and `vqf` run with their authors' default gains, started from the first reading.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from importlib.util import find_spec
+
+import numpy as np
+from kickstand.units import STANDARD_GRAVITY
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.logs.reader import Log
+from kickstand_tools.replay import replay_engine
+from kickstand_tools.smoothing.smooth import smooth
+from numpy.typing import NDArray
+
+from .samples import Samples, calibrated
+
+AVERAGE_S = 0.3  # of the formula's lean
+COMPLEMENTARY = 0.98  # weight of the integrated lean at each sample; the direction of the force has the rest
+
+_SHOWN, _FORMULA = (replay_engine.COLUMNS.index(name) for name in ("lean_deg", "lean_formula_deg"))
+_TO_XYZ = [2, 0, 1]  # left, up, forward to forward, left, up: the body frame of ahrs and vqf
+_PACKAGES = {"mahony": "ahrs", "madgwick": "ahrs", "vqf": "vqf"}
+
+
+def trailing_mean(x: NDArray, seconds: float, rate_hz: float) -> NDArray[np.float64]:
+    """Mean of the last `seconds`, shorter at the start."""
+    n = max(round(seconds * rate_hz), 1)
+    total = np.cumsum(np.concatenate((np.zeros((1, *x.shape[1:])), x)), axis=0)
+    first = np.maximum(np.arange(1, len(x) + 1) - n, 0)
+    count = np.arange(1, len(x) + 1) - first
+    return (total[1:] - total[first]) / count.reshape(-1, *[1] * (x.ndim - 1))
+
+
+def complementary(samples: Samples) -> NDArray[np.float64]:
+    """The filter of most hobby projects: the integrated roll rate, pulled towards the direction of the force."""
+    leaned = np.degrees(np.arctan2(samples.force[:, 0], samples.force[:, 1]))
+    step = samples.rate[:, 2] / samples.rate_hz
+    result = np.empty_like(leaned)
+    now = leaned[0]
+    for k in range(len(leaned)):
+        now = COMPLEMENTARY * (now + step[k]) + (1.0 - COMPLEMENTARY) * leaned[k]
+        result[k] = now
+    return result
+
+
+def mahony(samples: Samples) -> NDArray[np.float64]:
+    from ahrs.filters import Mahony
+
+    gyro, accel = _xyz(samples)
+    return _roll(Mahony(gyr=gyro, acc=accel, frequency=samples.rate_hz).Q)
+
+
+def madgwick(samples: Samples) -> NDArray[np.float64]:
+    from ahrs.filters import Madgwick
+
+    gyro, accel = _xyz(samples)
+    return _roll(Madgwick(gyr=gyro, acc=accel, frequency=samples.rate_hz).Q)
+
+
+def vqf(samples: Samples) -> NDArray[np.float64]:
+    from vqf import VQF
+
+    gyro, accel = _xyz(samples)
+    return _roll(VQF(1.0 / samples.rate_hz).updateBatch(gyro, accel)["quat6D"])
+
+
+OTHERS: dict[str, Callable[[Samples], NDArray[np.float64]]] = {
+    "complementary": complementary,
+    "mahony": mahony,
+    "madgwick": madgwick,
+    "vqf": vqf,
+}
+
+
+def missing() -> list[str]:
+    """The packages that are not installed. estimate() leaves their filters out."""
+    return sorted({package for package in _PACKAGES.values() if find_spec(package) is None})
+
+
+def estimate(
+    log: Log, calibration: CalibrationFile, done: Callable[[], None] = lambda: None
+) -> dict[str, NDArray[np.float64]]:
+    """Lean in degrees, > 0 to the right, by the name of each estimator that is installed. The log's speed is not used.
+
+    done(): called after each of steps().
+    """
+    engine = replay_engine.Replay(calibration.to_firmware())
+    shown, formula = np.empty(len(log.t_s)), np.empty(len(log.t_s))
+    for i, (time_us, reading, _) in enumerate(log.rows()):
+        values = engine.step(time_us, reading)
+        shown[i], formula[i] = values[_SHOWN], values[_FORMULA]
+    samples = calibrated(log, calibration)
+    result = {
+        "kickstand": shown,
+        "smoothed": smooth(replace(log, speed_mps=np.zeros(0)), calibration).lean_deg,
+        "formula": formula,
+        "formula 0.3 s": trailing_mean(formula, AVERAGE_S, samples.rate_hz),
+    }
+    done()
+    for name in _others():
+        result[name] = OTHERS[name](samples)
+        done()
+    return result
+
+
+def steps() -> int:
+    """How often estimate() calls done(): once for the firmware's lean and once for each other filter."""
+    return 1 + len(_others())
+
+
+def _others() -> list[str]:
+    absent = missing()
+    return [name for name in OTHERS if _PACKAGES.get(name) not in absent]
+
+
+def _xyz(samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Rates in rad/s and force in m/s^2, both (N, 3) along forward, left, up."""
+    gyro = np.ascontiguousarray(np.radians(samples.rate[:, _TO_XYZ]))
+    return gyro, np.ascontiguousarray(samples.force[:, _TO_XYZ] * STANDARD_GRAVITY)
+
+
+def _roll(q: NDArray) -> NDArray[np.float64]:
+    """Lean in degrees from body-to-earth quaternions (N, 4: w, x, y, z); body axes forward, left, up."""
+    w, x, y, z = q.T
+    return np.degrees(np.arctan2(2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)))

@@ -1,0 +1,88 @@
+"""Estimators compared on a recorded ride, which has neither a calibration nor a true lean: both come from the ride.
+
+The calibration is what `kickstand calibrate ride` finds. The reference lean is atan(v * yaw rate / g), averaged over
+1 s, with the yaw rate about the bike's own up axis. It reads low (1 Hz speed, wide tyres, an axis that leans with the
+bike) and ignores slope and bank of the road: it can compare methods and show a lean that decays in a turn, but its
+degrees are not to be trusted.
+"""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from kickstand.errors import Notice
+from kickstand.units import STANDARD_GRAVITY
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.calibration.ride.fit import fit_ride
+from kickstand_tools.errors import InputError
+from kickstand_tools.logs.reader import Log, read_log
+from kickstand_tools.replay.mount_check import contradiction
+from kickstand_tools.signals.averages import moving_mean
+from numpy.typing import NDArray
+
+from .estimators import estimate
+from .metrics import rms, slope
+from .samples import calibrated
+
+AVERAGE_S = 1.0
+_RIDING_MPS = 2.0  # scored where the speed is higher
+_LEANED_DEG = 5.0  # the slope is fitted beyond: the reference is rarely over 10 degrees
+
+
+@dataclass
+class RealScore:
+    """Against the rough reference. slope: shown over reference lean where that is over 5 degrees."""
+
+    rms_deg: float
+    slope: float
+
+
+@dataclass
+class Comparison:
+    """name: of the recording's file. scores: by estimator.
+
+    traces: (N,) each: "time" in s; "reference" and each estimator's lean in degrees, > 0 to the right. notices: what is
+    remarkable in the recording, or contradicts the calibration that was found in it.
+    """
+
+    name: str
+    scores: dict[str, RealScore]
+    traces: dict[str, NDArray[np.float64]]
+    notices: list[Notice] = field(default_factory=list)
+
+
+def compare(path: Path) -> Comparison:
+    """Run every estimator over a recorded ride with speed. Raises InputError if it cannot be used."""
+    log = read_log(path)
+    speed, calibration = _speed(log), fit_ride(log).calibration
+    reference = reference_lean(log, calibration)
+    time = log.t_s
+    riding = speed > _RIDING_MPS
+    shown = estimate(log, calibration)
+    scores = {
+        name: RealScore(rms((lean - reference)[riding]), slope(lean[riding], reference[riding], _LEANED_DEG))
+        for name, lean in shown.items()
+    }
+    wrong = contradiction(log, calibration)
+    notices = [*log.notices, *([wrong] if wrong else [])]
+    return Comparison(path.name, scores, {"time": time, "reference": reference, **shown}, notices)
+
+
+def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64]:
+    """atan(v * yaw rate / g) in degrees, > 0 to the right, averaged over 1 s."""
+    samples = calibrated(log, calibration)
+    centripetal = _speed(log) * np.radians(samples.rate[:, 1])
+    return _averaged(-np.degrees(np.arctan(centripetal / STANDARD_GRAVITY)), samples.rate_hz)
+
+
+def _speed(log: Log) -> NDArray[np.float64]:
+    """Speed in m/s at each sample, interpolated between the logged values."""
+    there = ~np.isnan(log.speed_mps)
+    if np.count_nonzero(there) < 2:
+        raise InputError(f"{log.name} has no speed: without it there is no reference")
+    return np.interp(log.t_s, log.t_s[there], log.speed_mps[there])
+
+
+def _averaged(x: NDArray, rate_hz: float) -> NDArray[np.float64]:
+    """The mean over 1 s around each sample."""
+    return moving_mean(x, round(AVERAGE_S * rate_hz))

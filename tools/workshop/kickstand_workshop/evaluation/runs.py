@@ -1,0 +1,137 @@
+"""Simulates rides, calibrates them with the firmware's own code and scores every estimator, on all processors."""
+
+import contextlib
+import multiprocessing
+import os
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from multiprocessing.queues import SimpleQueue
+
+import numpy as np
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.calibration.six import fit_six_positions
+from kickstand_tools.calibration.two import fit_two_positions
+from kickstand_tools.errors import InputError
+from kickstand_tools.logs.log import Log
+from kickstand_tools.simulation.profiles import check_profile
+from kickstand_tools.simulation.ride import Ride, ride
+from numpy.typing import NDArray
+
+from . import estimators
+from .metrics import Score, score
+
+_POLL_S = 0.2  # the workers' progress is read this often
+_steps_done: SimpleQueue  # in a worker process: what it tells its progress by
+
+
+@dataclass(frozen=True)
+class Job:
+    """One ride to simulate. The signs of the two set-up errors depend on the seed. traces: keep the leans."""
+
+    profile: str
+    seed: int
+    seconds: float = 640.0
+    upright_error_deg: float = 0.0
+    pitch_change_deg: float = 1.0
+    traces: bool = False
+
+
+@dataclass
+class Result:
+    """scores: by estimator. refusal: why the firmware refused to calibrate from the poses; None if it did not.
+
+    traces: (N,) each: "time" in s; "true" and each estimator's lean in degrees. Empty unless the job asks for them.
+    """
+
+    job: Job
+    scores: dict[str, Score] = field(default_factory=dict)
+    traces: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    refusal: str | None = None
+
+
+def jobs(
+    profiles: list[str],
+    seeds: int,
+    seconds: float = 640.0,
+    upright_error_deg: float = 0.0,
+    pitch_change_deg: float = 1.0,
+    traces: bool = False,
+) -> list[Job]:
+    """One Job for each profile and seed. traces: for the first seed. Raises InputError for an unknown profile."""
+    for name in profiles:
+        check_profile(name)
+    return [
+        Job(name, seed, seconds, upright_error_deg, pitch_change_deg, traces and seed == 0)
+        for seed in range(seeds)
+        for name in profiles
+    ]
+
+
+def steps() -> int:
+    """How often a job calls done(): once for the ride, then for each estimator."""
+    return 1 + estimators.steps()
+
+
+def run(job: Job, done: Callable[[], None] = lambda: None) -> Result:
+    """Simulate, calibrate from the poses alone, estimate and score. done(): called after each of steps()."""
+    upright_sign, pitch_sign = (1, -1)[job.seed % 2], (1, -1)[job.seed // 2 % 2]
+    made = ride(
+        job.profile,
+        job.seed,
+        job.seconds,
+        upright_sign * job.upright_error_deg,
+        pitch_sign * job.pitch_change_deg,
+    )
+    done()
+    try:
+        calibration = calibrated_by_poses(made)
+    except InputError as error:
+        for _ in range(estimators.steps()):
+            done()
+        return Result(job, refusal=str(error))
+    shown = estimators.estimate(as_log(made), calibration, done)
+    scores = {name: score(lean, made.truth, made.rate_hz) for name, lean in shown.items()}
+    traces = {"time": made.time, "true": made.truth["lean_deg"], **shown} if job.traces else {}
+    return Result(job, scores, traces)
+
+
+def run_all(jobs: list[Job], done: Callable[[], None] = lambda: None) -> Iterator[Result]:
+    """Yield the result of run() for each job as it is ready. done(): called soon after each of a job's steps()."""
+    steps_done = multiprocessing.SimpleQueue()
+    with multiprocessing.Pool(min(len(jobs), os.cpu_count() or 1), _begin_worker, (steps_done,)) as pool:
+        results = pool.imap_unordered(_work, jobs)
+        for _ in jobs:
+            result = None
+            while result is None:
+                with contextlib.suppress(multiprocessing.TimeoutError):
+                    result = results.next(_POLL_S)
+                while not steps_done.empty():
+                    steps_done.get()
+                    done()
+            yield result
+
+
+def calibrated_by_poses(made: Ride) -> CalibrationFile:
+    """`kickstand calibrate six` and `two` over the ride's poses. Raises InputError."""
+    seven = [Log.from_readings(pose, made.rate_hz, f"POSE_{k}.csv") for k, pose in enumerate(made.poses, 1)]
+    kickstand = Log.from_readings(made.kickstand, made.rate_hz, "KICKSTAND.csv")
+    upright = Log.from_readings(made.upright, made.rate_hz, "UPRIGHT.csv")
+    return fit_two_positions(kickstand, upright, fit_six_positions(seven).calibration).calibration
+
+
+def as_log(made: Ride) -> Log:
+    """The ride as if read from its file."""
+    readings = made.readings
+    return Log(made.time, readings[:, :3], readings[:, 4:], temperature_c=readings[:, 3], name="RIDE.csv")
+
+
+def _begin_worker(steps_done: SimpleQueue) -> None:
+    """Without standard error: after Ctrl-C every worker would print a traceback."""
+    global _steps_done
+    _steps_done = steps_done
+    sys.stderr = open(os.devnull, "w", encoding="utf-8")
+
+
+def _work(job: Job) -> Result:
+    return run(job, lambda: _steps_done.put(None))

@@ -1,0 +1,22 @@
+"""Writes every picture to tools/pictures: .venv/bin/python -m kickstand_workshop.pictures"""
+
+from kickstand_tools import firmware_path
+
+from . import page, ride
+from .drawn import drawn
+
+
+def main() -> None:
+    directory = firmware_path.TOOLS / "pictures"
+    for name, svg in drawn().items():
+        (directory / name).write_text(svg, encoding="utf-8")
+    (directory / "ride.png").write_bytes(ride.draw())
+    if page.available():
+        (directory / "page.png").write_bytes(page.draw())
+    else:
+        print("no Chromium: page.png stays as it is")
+    print(f"written: {directory}")
+
+
+if __name__ == "__main__":
+    main()

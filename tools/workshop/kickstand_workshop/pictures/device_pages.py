@@ -1,0 +1,68 @@
+"""What the display of a simulated device says at chosen moments of the demo's ride.
+
+In a process of its own, because the firmware sees the simulated board's clock and files: prints JSON,
+{name: [codes of both lines, character memory]}.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+
+from kickstand_tools import firmware_path
+from kickstand_tools.demo.device import KICKSTAND_PRESS_S, LONG_PRESS_S, PART_SEED, PART_SHARE, SCRIPT, UPRIGHT_PRESS_S
+from kickstand_tools.simulated_board.simulator import Board
+from kickstand_tools.simulation.scripted.script import Ride
+from kickstand_tools.simulation.scripted.sensor_errors import Sensor
+
+# From the demo's script: a turn to the right from 32 to 39 s, brakes from 50 to 56 s, then stands.
+PRESSES_S = (KICKSTAND_PRESS_S, UPRIGHT_PRESS_S, 48.0, 51.0)  # stand, upright, page of maxima, page of braking
+LONG_PRESS_AT_S = 58.0
+MOMENTS_S = {
+    "starting": 0.22,
+    "on_stand": 3.0,
+    "hold_still": 5.5,
+    "upright": 9.0,
+    "aligned": 16.0,
+    "lean": 36.0,
+    "maxima": 50.0,
+    "brake": 53.0,
+    "menu": 60.0,
+}
+
+
+def device_pages() -> dict[str, tuple[list[list[int]], bytes]]:
+    """{name of a moment: (codes of both lines, the 64 bytes of character memory)}."""
+    with tempfile.TemporaryDirectory() as flash:
+        done = subprocess.run(
+            [sys.executable, "-m", __name__],
+            env=os.environ | {"PYTHONPATH": firmware_path.search_path()},
+            cwd=flash,
+            stdout=subprocess.PIPE,
+            text=True,
+            check=True,
+        )
+    seen = json.loads(done.stdout.splitlines()[-1])
+    return {name: (codes, bytes(cgram)) for name, (codes, cgram) in seen.items()}
+
+
+def _run() -> dict[str, tuple[list[list[int]], list[int]]]:
+    """Turns this process into a board's."""
+    ride = Ride(SCRIPT)
+    board = Board(Sensor(seed=PART_SEED, share=PART_SHARE).world(ride.motion))
+    for at_s in PRESSES_S:
+        board.press(at_s)
+    board.press(LONG_PRESS_AT_S, LONG_PRESS_S)
+    seen = {}
+    for name, at_s in MOMENTS_S.items():
+        board.at(at_s, lambda name=name: seen.update({name: (board.lcd.codes(), list(board.lcd.cgram))}))
+    board.install()
+    from kickstand.start import main  # after install(), which decides what `machine` and `time` are
+
+    board.run(main, ride.seconds)
+    return seen
+
+
+if __name__ == "__main__":
+    print("\n" + json.dumps(_run()))
