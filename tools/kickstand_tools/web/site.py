@@ -11,20 +11,9 @@ from ..output import check_directory, new_directory, write_whole
 from ..pictures.lcd_font import ROM
 from ..templates import filled, source_hash
 from . import install_archive, npm_packages, rides_archive, wiring_files
+from .zipped import tools
 
 PAGE = Path(__file__).resolve().parent / "page"
-# The tools' modules and folders that device.py imports
-MODULES = (
-    "__init__.py",
-    "demo/__init__.py",
-    "demo/hand_bike.py",
-    "demo/shown_lean.py",
-    "simulated_board",
-    "simulation/__init__.py",
-    "simulation/scripted",
-    "web/__init__.py",
-    "web/device.py",
-)
 # Large, and only for those who have a board or a ride: fetched when they ask for it
 LATER = ("esptool/", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip")
 _NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first by itself, the second as "./"
@@ -32,10 +21,9 @@ _NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first b
 
 def python_files() -> dict[str, str]:
     """{path as imported: source} of the firmware's package, and of the tools' modules that the page runs."""
-    tools = firmware_path.TOOLS / "kickstand_tools"
-    found = [(path, firmware_path.PACKAGE.parent) for path in _modules(firmware_path.PACKAGE)]
-    found += [(path, firmware_path.TOOLS) for name in MODULES for path in _modules(tools / name)]
-    return {path.relative_to(top).as_posix(): path.read_text(encoding="utf-8") for path, top in found}
+    package = firmware_path.PACKAGE
+    found = {path.relative_to(package.parent).as_posix(): path for path in sorted(package.rglob("*.py"))}
+    return {name: path.read_text(encoding="utf-8") for name, path in (found | tools("web/device.py")).items()}
 
 
 def _chart_scripts(library: bytes) -> str:
@@ -90,8 +78,3 @@ def write_site(files: dict[str, bytes], out: Path) -> None:
 
 def _write(path: Path, data: bytes) -> None:
     path.write_bytes(data)
-
-
-def _modules(place: Path) -> list[Path]:
-    """The modules in a folder and below it, or the one module that `place` is."""
-    return sorted(place.rglob("*.py")) if place.is_dir() else [place]
