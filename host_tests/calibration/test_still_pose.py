@@ -1,4 +1,4 @@
-"""A still pose, each axis by itself: 8192 counts per g, 65.5 per deg/s. test_calibration.py has what else spoils one."""
+"""A still pose, each axis by itself: 8192 counts per g, 65.5 per deg/s. What else spoils one: test_calibration.py."""
 
 import pytest
 from kickstand.calibration.still_pose import StillPose
