@@ -179,15 +179,6 @@ def readings(offset=(0.0,) * 3, slope=(1.0,) * 3, forces: ArrayLike = AXES):
     return ((np.asarray(forces) - offset) / slope).tolist()
 
 
-def test_the_tilt_of_a_side_is_that_of_its_calibrated_reading():
-    """20.4 degrees by the raw reading of an axis with 0.1 g of offset."""
-    offset, slope = [0.1, 0.0, 0.0], [1.0, 1.0, 1.0]
-    forces = AXES.copy()
-    forces[0] = [np.cos(np.radians(19.0)), np.sin(np.radians(19.0)), 0.0]
-    assert six_position.tilt_deg(readings(offset, slope, forces)[0]) > 20.4
-    six_position.check_plausible(offset, slope, readings(offset, slope, forces))
-
-
 def test_the_fit_has_converged():
     """The true parameters are found to five digits from poses 15 degrees off, where one step is not enough."""
     rng = np.random.default_rng(5)

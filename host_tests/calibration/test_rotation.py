@@ -81,9 +81,3 @@ def test_a_direction_has_length_1_and_a_null_vector_has_none():
     for vector in ([0.0, 0.0, 0.0], [5e-10, 0.0, 0.0], [float("nan"), 0.0, 1.0]):
         with pytest.raises(ValueError, match="no direction"):
             rotation.normalize(rotation.vector(*vector))
-
-
-def test_dot_and_the_identity():
-    assert rotation.dot([1.0, 2.0, 3.0], [4.0, -5.0, 6.0]) == 12.0
-    assert list(rotation.matrix()) == np.eye(3).ravel().tolist()
-    assert list(rotation.vector()) == [0.0, 0.0, 0.0]

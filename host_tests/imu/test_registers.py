@@ -85,18 +85,6 @@ def test_setup_writes_what_the_register_map_says(time):
     assert wires.times_us[-1] - reset < 200_000
 
 
-def test_the_low_pass_of_the_accelerometer_of_an_mpu6500_is_set_too():
-    wires = Wires(MPU6500)
-    started(wires, dlpf=4)
-    assert wires.log[2:7] == [
-        (SMPLRT_DIV, 4),
-        (CONFIG, 4),
-        (GYRO_CONFIG, 0x08),
-        (ACCEL_CONFIG, 0x10),
-        (ACCEL_CONFIG2, 4),
-    ]
-
-
 @pytest.mark.parametrize(
     ("accel_g", "accel_bits", "lsb_per_g"), [(2, 0x00, 16384), (4, 0x08, 8192), (8, 0x10, 4096), (16, 0x18, 2048)]
 )

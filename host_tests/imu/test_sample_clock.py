@@ -41,16 +41,6 @@ def test_samples_are_a_period_apart():
     assert own.step(1, 105_000) == PERIOD_US
 
 
-def test_before_the_first_sample_there_is_nothing_to_correct():
-    own = clock()
-    own.emptied(1000)
-    assert own.step(1, 2000) == 0
-    own.emptied(50_000)  # a long gap
-    own.restart()  # and it is forgotten
-    assert own.step(1, 60_000) == 0
-    assert own.step(1, 65_000) == PERIOD_US
-
-
 @pytest.mark.parametrize("error", [0.01, 0.0, -0.01])
 def test_a_chip_that_is_1_percent_off_keeps_the_boards_time(error):
     """Over 20 s, looked at at random moments, up to 10 ms apart."""

@@ -152,18 +152,6 @@ def test_own_characters():
     assert lcd.glyphs[2] == "\u258d"
 
 
-def test_changes_count_what_can_be_seen():
-    lcd = ready()
-    write(lcd, 0, "abc")
-    before = lcd.changes
-    write(lcd, 0, "abc")
-    assert lcd.changes == before
-    write(lcd, 0, "abd")
-    assert lcd.changes == before + 1
-    lcd.write_byte(0)
-    assert lcd.changes == before + 2 and not lcd.backlight
-
-
 def test_patterns_as_text():
     def column(bits):
         return [bits] * 8
