@@ -64,6 +64,55 @@ def test_a_block_takes_what_fits_and_the_worst_turn_always_does():
         assert len(data) - len(data.rstrip(b"\0")) < 60
 
 
+def places(block):
+    return sum(turn.place is not None for turn in block.turns)
+
+
+@pytest.mark.parametrize("length", range(700, 720))
+def test_however_full_a_block_is_the_worst_turn_and_a_position_fit(length):
+    """After quiet turns, each of few bits, every number of a violent one takes the longest code."""
+    quiet = [800] * 7, 8, 40_000
+    count = 0
+    for violent in (False, True):  # first to see how many quiet ones there are, then with the last one violent
+        block = RideBlock(5000)
+        for sequence in range(2):  # in the first block room was not kept from the beginning
+            block.begin(length, 1, sequence, 0, ride_writer.CHIP, 200, bytes(80))
+            block.add_place(ride_writer.place(0))
+            while not block.full() and (not violent or not sequence or block.count < count - 1):
+                block.add(*quiet)
+        if violent:
+            block.add_speed(1 << 24)
+            block.add_place(ride_writer.place(1))
+            block.add([-32768] * 7, 1, 1 << 29)
+        count = block.count
+        block.close()
+        read = block_reader.parse(bytes(block.buffer[:length]))
+        assert places(read) == 1 + violent
+    assert read.turns[-1].sums == (-32768,) * 6
+    assert {turn.sums for turn in read.turns[:-1]} == {(800,) * 6}
+    assert len(read.turns) == count - 1 > 90
+
+
+def test_the_first_position_of_all_is_left_out_where_no_room_was_kept_for_it():
+    """From then on there is room in each block, however full it is."""
+    block = RideBlock(5000)
+    for sequence in range(3):
+        block.begin(512, 1, sequence, 0, ride_writer.CHIP, 200, bytes(80))
+        sign = 1
+        while not block.full():
+            sign = -sign
+            block.add_speed((1 << 24) * (sign > 0))
+            if sequence:
+                block.add_place(ride_writer.place(sequence))
+            block.add([sign * 8 * 32767] * 7, 8, (1 << 29) if sign > 0 else 0)
+            if block.full() and not sequence:
+                block.add_place(ride_writer.place(0))
+        block.close()
+        read = block_reader.parse(bytes(block.buffer[:512]))
+        assert places(read) == (len(read.turns) if sequence else 0)
+        assert read.turns[-1].sums == (sign * 8 * 32767,) * 6
+
+
 @pytest.mark.parametrize("count", range(1, 17))
 def test_a_block_may_end_within_any_byte(count):
     block = RideBlock(5000)
