@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import ride_writer
 from kickstand.rides import block as block_format
-from kickstand.rides.block import RideBlock
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.rides import block_reader, ride_log
 from mpy import run_mpy
@@ -70,23 +69,21 @@ def test_a_ride_of_an_older_firmware_has_no_positions():
     assert found([block_reader.parse(content)]) == []
 
 
-def changed(k: int, *values: int) -> list:
-    """What a block says whose only position is number k of `values`: date, ms, latitude, longitude."""
-    block = RideBlock(5000)
-    block.begin(1024, 7, 3, 5, ride_writer.CHIP, 200, bytes(80))
+def said(*values: int) -> list:
+    """What a block says whose only position is these: date, ms, latitude, longitude."""
+    block = ride_writer.begun(1024)
     block.add_place(values)
     block.add([0, 0, 8192, 0, 0, 0, 0], 2, 10_000)
-    block.close()
-    return found([block_reader.parse(bytes(block.buffer[:1024]))])
+    return found([ride_writer.ended(block)])
 
 
 def test_a_date_that_is_none_leaves_the_position_and_no_place_on_earth_is_left_out():
     for date in (0, 5, 26 << 9 | 13 << 5 | 1, 26 << 9 | 2 << 5 | 30, 0xFFFF):
-        ((_, (lat, lon, utc_s)),) = changed(0, date, 1000, 6_000_000, -6_000_000)
+        ((_, (lat, lon, utc_s)),) = said(date, 1000, 6_000_000, -6_000_000)
         assert (lat, lon, utc_s) == (1.0, -1.0, None), date
-    assert changed(0, 0, 0, 90 * DEGREE + 1, 0) == []
-    assert changed(0, 0, 0, 0, -180 * DEGREE - 1) == []
-    assert len(changed(0, 0, 0, 90 * DEGREE, -180 * DEGREE)) == 1
+    assert said(0, 0, 90 * DEGREE + 1, 0) == []
+    assert said(0, 0, 0, -180 * DEGREE - 1) == []
+    assert len(said(0, 0, 90 * DEGREE, -180 * DEGREE)) == 1
 
 
 # A block with positions by MicroPython, in hexadecimal. Lengths of arrays and packing differ between the two.
@@ -113,7 +110,7 @@ def test_both_engines_write_the_same_bytes(capsys):
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
-def test_a_recorded_ride_tells_where_it_was(engine, tmp_path):
+def test_a_recorded_ride_says_where_it_was(engine, tmp_path):
     """From the receiver's wire to the log, ten times a second; the speed of a motorcycle is not even confirmed yet."""
     place = [-33.5, -70.5, -1e-4, 2e-4]
     plan = {
