@@ -2,7 +2,6 @@
 
 import types
 
-import driving_runs
 import numpy as np
 import pytest
 from engines import ENGINES, run
@@ -148,18 +147,6 @@ def test_parts_of_a_drive(engine):
         assert sigmas == pytest.approx(forward_deg / np.sqrt(variance), rel=0.01)
         assert roll_deg == 0.0
         assert pitch_deg == pytest.approx(5.0, rel=1e-3)
-
-
-@pytest.mark.parametrize(("change", "differ"), [(0, True), (4, False), (5, False)])
-def test_parts_too_short_are_not_compared(change, differ):
-    """Forward needs enough change of speed, the vertical enough seconds."""
-    block = [0.0, 1.0, 0.0, 0.0, 0.2, 40.0]
-    last = [0.2, 1.0, 0.2, 0.2, 0.11, 22.0]
-    if change:
-        last[change] *= 0.8
-    forward_deg, _, roll_deg, pitch_deg = driving_runs.parts([block] * 5 + [last])
-    found = (roll_deg + pitch_deg if change == 5 else forward_deg) > 11.0
-    assert found is differ
 
 
 @pytest.mark.parametrize(("turning_s", "straight"), [(2.0, True), (2.5, False)])

@@ -252,17 +252,3 @@ def test_a_check_that_is_lost_counts_as_a_lost_transfer(board):
         assert code(sensor) is None
         sensor.check(now_ms + 100 * k)
     assert code(sensor) == "sensor-lost"
-
-
-def test_failures_before_a_set_up_do_not_count_after_it(board):
-    sensor, chip, now_ms = running(board)
-    chip.waiting = [OSError(5)] * 3
-    for k in range(3):
-        sensor.fetch(now_ms + k)
-    now_ms = set_up(sensor, now_ms + 100)
-    chip.waiting = [1, OSError(5), 1]
-    del chip.calls[:]
-    for k in range(3):
-        sensor.fetch(now_ms + k)
-        assert code(sensor) is None
-    assert chip.calls == ["fetch", "fetch", "restart_fifo", "fetch"]

@@ -62,13 +62,6 @@ def test_an_older_reader_finds_all_but_the_positions():
         assert [(t.time_us, t.sums, t.n) for t in old] == [(t.time_us, t.sums, t.n) for t in block.turns]
 
 
-def test_a_ride_of_an_older_firmware_has_no_positions():
-    """There the byte was the last one of the version's name, and always 0."""
-    content = ride_writer.blocks(1)[0][0]
-    assert content[42] == 0
-    assert found([block_reader.parse(content)]) == []
-
-
 def said(*values: int) -> list:
     """What a block says whose only position is these: date, ms, latitude, longitude."""
     block = ride_writer.begun(1024)

@@ -108,6 +108,7 @@ def test_a_card_that_cannot_be_used_is_said_and_nothing_restarts(card, tmp_path)
     assert record.first("No SD card|SD card:") < 12
     assert leans_on(record, 20)
     assert record.console.count("SD card: ") in (1, 2)
+    assert ("its driver is not on the board: mpremote mip install sdcard" in record.console) is ("driver" in card)
     assert not blocks(record)
 
 

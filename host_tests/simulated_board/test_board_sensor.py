@@ -84,17 +84,6 @@ def test_ranges_and_saturation():
     assert counts(chip)[6] == -32768
 
 
-def test_temperature_formula_of_each_family():
-    for who_am_i, slope, zero in (
-        (0x68, 340.0, 36.53),
-        (0x70, 333.87, 21.0),
-        (0x98, 326.8, 25.0),
-        (0x19, 326.8, 25.0),
-    ):
-        _, chip = awake(lambda t_s: (0, 0, 1, 0, 0, 0, 40.0), who_am_i)
-        assert abs(counts(chip)[3] / slope + zero - 40.0) < 0.002
-
-
 def test_sample_rate():
     for div, dlpf, period_us in (
         (0, 3, 1000),
@@ -150,12 +139,3 @@ def test_the_low_pass_delays():
         clock.advance(1_000_000)
         sampled_us = clock.now_us - clock.now_us % 1000  # START_UP_US and WAKE_US are whole milliseconds
         assert abs(counts(chip)[0] - (sampled_us - delay_us) * 16384 / 1e6) <= 0.5
-
-
-def test_frozen_data_are_the_last_before_the_dip():
-    clock, chip = awake(ramp, div=0)
-    clock.advance(1_000_000)
-    dip_s = clock.now_us / 1e6
-    chip.supply_dip("frozen")
-    clock.advance(500_000)
-    assert abs(counts(chip)[0] / 16384 - dip_s) < 0.01

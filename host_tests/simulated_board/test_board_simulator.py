@@ -130,15 +130,6 @@ def test_a_button_held_at_power_up():
 
 
 @firmware()
-def test_at_and_every(board):
-    seen = []
-    board.at(0.25, lambda: seen.append("at"))
-    board.every(0.1, lambda: seen.append(board.clock.now_us))
-    fake_time.sleep_ms(350)
-    assert seen == [100_000, 200_000, "at", 300_000]
-
-
-@firmware()
 def test_timers(board):
     seen = []
     Timer(-1, mode=Timer.ONE_SHOT, period=20, callback=lambda timer: seen.append(board.clock.now_us))
