@@ -8,8 +8,8 @@ from kickstand_tools.joining.compare import Comparison
 from kickstand_tools.joining.course import course
 from kickstand_tools.joining.motion import motion
 from kickstand_tools.joining.pieces import pieces
-from kickstand_tools.joining.search import correlations
 from kickstand_tools.logs.axes.course import EARTH_M
+from kickstand_tools.signals.lag import correlations
 
 PROFILES = ("street", "track", "sweeper", "city", "hills")
 SECONDS = {"sweeper": 450.0, "city": 300.0, "street": 300.0}  # of a ride that has few bends for its length

@@ -11,7 +11,7 @@ from kickstand_tools.logs import reader
 from kickstand_tools.logs.axes.course import Course
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.simulation.positions import positions
+from kickstand_tools.simulation.files import positions
 from kickstand_tools.simulation.ride import ride
 
 

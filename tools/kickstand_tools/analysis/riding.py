@@ -4,9 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..logs.table import Array
+from ..signals.averages import smoothed
 from .channels import Channels
 from .downsample import spacing_s
-from .signals import smoothed
 
 # A vehicle that has gone anywhere has turned, sped up or braked by this much for a second. An engine that idles at
 # standstill shakes as much as a road, but its mean over a second hardly changes.

@@ -44,9 +44,7 @@ def drive_bins(log: Log, calibration: CalibrationFile, length_us: int) -> Iterat
     time_us = log.time_us
     step_us = np.diff(time_us, prepend=time_us[0])
     is_gap = step_us > GAP_US
-    values = np.column_stack(
-        (log.accel_g * calibration.accel_slope + calibration.accel_offset_g, log.gyro_dps - calibration.gyro_bias_dps)
-    )
+    values = np.column_stack(calibration.in_sensor(log.accel_g, log.gyro_dps))
     integral = np.cumsum(values * np.where(is_gap, 0, step_us)[:, None], axis=0)
     times, speeds = time_us.tolist(), log.speed_mps.tolist()
     there = np.flatnonzero(~np.isnan(log.speed_mps)).tolist()

@@ -18,6 +18,7 @@ from ..errors import InputError, cause
 from ..logs.reader import check_first_line
 from ..logs.source import File, log_stem, name_of, open_input
 from ..output import write_whole
+from ..signals.calibrated import calibrated, rotated
 
 VERSION = 1
 MOST_BYTES = 1_000_000  # of a file; what kickstand writes has a thousandth of that
@@ -80,8 +81,12 @@ class CalibrationFile:
 
     def in_vehicle(self, readings: Array) -> tuple[Array, Array]:
         """Force (n, 3, g) and rate (n, 3, deg/s) along left, up, forward of readings (n, 7) in the chip's order."""
-        force = (readings[:, :3] * self.accel_slope + self.accel_offset_g) @ self.vehicle_from_sensor.T
-        return force, (readings[:, 4:] - self.gyro_bias_dps) @ self.vehicle_from_sensor.T
+        force, rate = rotated(self.vehicle_from_sensor, *self.in_sensor(readings[:, :3], readings[:, 4:]))
+        return force, rate
+
+    def in_sensor(self, accel_g: Array, gyro_dps: Array) -> tuple[Array, Array]:
+        """Force (n, 3, g) and rate (n, 3, deg/s) along the sensor's own axes."""
+        return calibrated(accel_g, gyro_dps, self.accel_offset_g, self.accel_slope, self.gyro_bias_dps)
 
     def delay_s(self) -> float:
         """gyro_delay_s, or that of the default DLPF."""

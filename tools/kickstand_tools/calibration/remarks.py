@@ -4,6 +4,7 @@ import numpy as np
 from kickstand.errors import Notice
 from kickstand.units import AXES
 
+from ..signals.rotations import rotation_vector
 from .file import CalibrationFile
 
 UPSIDE_DOWN = 0.87  # cosine: within 30 degrees
@@ -22,8 +23,8 @@ def remarks(found: CalibrationFile, before: CalibrationFile | None = None) -> li
     if up[axis] < -UPSIDE_DOWN and AXES[axis] != "x":
         notices.append(Notice("upside-down", AXES[axis]))
     if before is not None and before.aligned:
-        cosine = (np.sum(found.vehicle_from_sensor * before.vehicle_from_sensor) - 1.0) / 2.0
-        turned_deg = float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
+        turn = rotation_vector(found.vehicle_from_sensor @ before.vehicle_from_sensor.T)
+        turned_deg = float(np.degrees(np.linalg.norm(turn)))
         if turned_deg > ANOTHER_MOUNT_DEG:
             notices.append(Notice("another-mount", turned_deg))
     return notices

@@ -27,9 +27,12 @@ from kickstand.units import GAP_US, STANDARD_GRAVITY
 
 from ..logs.log import Log
 from ..logs.table import Array
+from ..signals.averages import moving_mean
+from ..signals.cells import cell_numbers, runs
+from ..signals.standstill import STANDING_MPS
 
 INTERVAL_S = 0.9  # between two speeds that are used, at least
-STANDING_MPS, MOVING_MPS = 0.3, 2.0
+MOVING_MPS = 2.0
 STANDING_WEIGHT = 0.3  # of a second at a stop: a long stop shows one slope of the road, however long it was
 LEVEL_S = 20.0  # the mean force over so long is about vertical, which tells the yaw rate from the other rates
 BLOCK_S = 8.0
@@ -118,8 +121,7 @@ def blocks(logs: list[Intervals]) -> Blocks:
     for index, log in enumerate(logs):
         if not len(log.t_s):
             continue
-        place = np.floor((log.t_s - log.t_s[0]) / BLOCK_S).astype(int)
-        starts = np.flatnonzero(np.diff(place, prepend=-1))
+        starts = runs(cell_numbers(log.t_s - log.t_s[0], BLOCK_S))
         terms, force = _without_road(log)
         square.append(np.add.reduceat(terms[:, :, None] * terms[:, None, :], starts))
         product.append(np.add.reduceat(terms[:, :, None] * force[:, None, :], starts))
@@ -201,17 +203,8 @@ def sway_deg(sway: Array, frame: Array) -> Array:
 def _sway(log: Log) -> Array:
     """(samples, 3) the force's changes that take some tenths of a second, in g."""
     step_s = float(np.median(np.diff(log.t_s)))
-    sums = np.vstack((np.zeros(3), np.cumsum(log.accel_g, axis=0)))
-    quick, slow = (_mean(sums, max(1, round(width_s / step_s))) for width_s in SWAY_S)
+    quick, slow = (moving_mean(log.accel_g, round(width_s / step_s)) for width_s in SWAY_S)
     return quick - slow
-
-
-def _mean(sums: Array, width: int) -> Array:
-    """Over so many samples around each, of their running sums."""
-    place = np.arange(len(sums) - 1)
-    first = np.maximum(place - width // 2, 0)
-    last = np.minimum(place + (width + 1) // 2, len(place))
-    return (sums[last] - sums[first]) / (last - first)[:, None]
 
 
 def _integrals(columns: Iterable[Array], t_s: Array, step: Array, time: Array) -> Array:

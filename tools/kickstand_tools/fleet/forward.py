@@ -11,9 +11,9 @@ import numpy as np
 from kickstand.drive_alignment.quality import AGREE_DEG, READY_DEG
 
 from ..logs.table import Array
+from ..signals.rotations import rotation_vector
 from . import evidence
 from .evidence import Intervals
-from .moved import rotation_vector
 
 SENSOR_DEG = 0.3  # standard deviation of what slope errors of 1 % between the sensor's axes do to forward
 # The arm is for comparing parts of a drive. Over a whole one it may stand for other things than being swung: of three

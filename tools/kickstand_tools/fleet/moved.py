@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..logs.table import Array
+from ..signals.rotations import rotation_vector
 from . import evidence
 from .evidence import Blocks, Intervals, blocks, fits, frames
 
@@ -179,13 +180,3 @@ def _moment(log: Intervals, move: Move) -> float | None:
         if step > best:
             best, moment = float(step), float(now)
     return moment if best > STEP_SHARE * tilt or tilt > SURELY_DEG else None
-
-
-def rotation_vector(turn: Array) -> Array:
-    """(..., 3) rad of rotations (..., 3, 3), each under 180 degrees."""
-    axis = np.stack(
-        (turn[..., 2, 1] - turn[..., 1, 2], turn[..., 0, 2] - turn[..., 2, 0], turn[..., 1, 0] - turn[..., 0, 1]), -1
-    )
-    sine = np.linalg.norm(axis, axis=-1, keepdims=True)
-    angle = np.arctan2(sine, np.trace(turn, axis1=-2, axis2=-1)[..., None] - 1.0)
-    return axis / np.maximum(sine, 1e-12) * angle

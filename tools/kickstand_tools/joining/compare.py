@@ -4,6 +4,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
 from ..logs.table import Array
+from ..signals.averages import moving_mean
 from .course import Course
 from .motion import STEP_S, Motion
 from .pieces import Pieces, without_slope
@@ -60,8 +61,7 @@ def _double_sums(motion: Motion, course: Course, shift_s: float) -> Array:
     across = np.asarray(np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))]), dtype=float)
     across /= np.linalg.norm(across)
     rates = motion.rate_dps @ np.vstack((up, across, np.cross(up, across))).T
-    second = round(1.0 / STEP_S)
-    yaw_dps = np.convolve(rates[:, 0], np.full(second, 1.0 / second), "same")[: len(rates)]
+    yaw_dps = moving_mean(rates[:, 0], round(1.0 / STEP_S))
     middle_s = (course.begin_s + course.end_s) / 2.0
     speed = np.interp(motion.t_s + shift_s, middle_s, np.where(course.good, course.speed_mps, 0.0))
     sine = np.minimum(np.abs(speed * np.radians(yaw_dps)) / STANDARD_GRAVITY, _MOST_SINE)

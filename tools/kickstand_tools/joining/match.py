@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..logs.table import Array
 from ..refusals import OPPOSITE_SIGN
+from ..signals.averages import moving_mean
+from ..signals.lag import correlations, log_likelihood_ratio, peaks
 from .course import Course, course
 from .fit import AROUND_S, Fit, apart, fitted
 from .motion import STEP_S, Motion
 from .pieces import STEPS, pieces
-from .search import correlations, evidence, peaks
 from .track import LONGEST_S, SLOWEST_MPS, Track
 
 _GRID_S = 0.5
@@ -105,9 +106,7 @@ def _check_turns(motion: Motion, steps: Course) -> None:
             f"the track moves for {moving_s:.0f} s only, faster than {SLOWEST_MPS} m/s and with a point at least every "
             f"{LONGEST_S:.0f} s: {_LEAST_S:.0f} s are needed"
         )
-    second = round(1.0 / STEP_S)
-    yaw_dps = motion.rate_dps @ motion.up
-    yaw_dps = np.convolve(yaw_dps, np.full(second, 1.0 / second), "same")
+    yaw_dps = moving_mean(motion.rate_dps @ motion.up, round(1.0 / STEP_S))
     turned_deg = float(np.abs(yaw_dps[np.abs(yaw_dps) > 3.0]).sum()) * STEP_S
     if turned_deg < _LEAST_TURN_DEG:
         raise InputError(f"the ride turns by {turned_deg:.0f} degrees in all: too few bends to tell where it was when")
@@ -119,8 +118,8 @@ def _rough_shifts(motion: Motion, steps: Course) -> tuple[bool, list[float]]:
     of_ride, ride_good = _changes_of_ride(motion)
     found, count = correlations(of_track, track_good, of_ride, ride_good)
     found = np.where(count * _GRID_S >= _LEAST_S / 2.0, found, 0.0)
-    likely = evidence(found, count, _GRID_S / _SPAN_S)
-    other = evidence(-found, count, _GRID_S / _SPAN_S)
+    likely = log_likelihood_ratio(found, count, _GRID_S / _SPAN_S)
+    other = log_likelihood_ratio(-found, count, _GRID_S / _SPAN_S)
     found_at = [p for p in peaks(likely, round(_APART_S / _GRID_S), _CANDIDATES) if likely[p] > _WORTH * likely.max()]
     shifts = [(place - (len(of_ride) - 1)) * _GRID_S for place in found_at]
     return bool(other.max() > _LEAST_EVIDENCE and other.max() > 2.0 * likely.max()), shifts

@@ -4,8 +4,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..joining.motion import STEP_S, Motion
-from ..joining.search import correlations, evidence, peaks
 from ..logs.table import Array
+from ..signals.averages import moving_mean
+from ..signals.lag import correlations, log_likelihood_ratio, peak_offset, peaks
 from .gpmf import Telemetry
 
 _SLOW_S = 5.0  # what changes more slowly is left to the gyros' bias
@@ -28,33 +29,19 @@ def camera_offset_s(ride: Motion, camera: Telemetry) -> tuple[float, float]:
     filmed, ridden = _turning(rate - np.median(rate[count > 0], axis=0)), _turning(ride.rate_dps)
     found, common = correlations(ridden, ride.there, filmed, count > 0)
     found = np.where(common * STEP_S >= _LEAST_S, found, 0.0)
-    likely = evidence(found, common, STEP_S / _ALIKE_S)
+    likely = log_likelihood_ratio(found, common, STEP_S / _ALIKE_S)
     best = peaks(likely, round(_APART_S / STEP_S), 2)
     if not best or likely[best[0]] < _LEAST_EVIDENCE or found[best[0]] < _LEAST_CORRELATION:
         raise InputError("nowhere does the ride turn as the camera does")
     if len(best) > 1 and likely[best[1]] > likely[best[0]] - _LEAST_LEAD:
         raise InputError("the camera turns as the ride does at two times or more")
     at = best[0]
-    shift = at - (len(filmed) - 1) + _top(found[max(at - 1, 0) : at + 2])
+    between = peak_offset(found[at - 1 : at + 2]) if 0 < at < len(found) - 1 else 0.0
+    shift = at - (len(filmed) - 1) + between
     return shift * STEP_S - float(camera.t_s[0]), float(found[at])
 
 
 def _turning(rate_dps: Array) -> Array:
     """(n) how fast it turns about any axis, less what changes slowly and quickly."""
-    size = _mean(np.linalg.norm(rate_dps, axis=1), _QUICK_S)
-    return size - _mean(size, _SLOW_S)
-
-
-def _mean(values: Array, over_s: float) -> Array:
-    count = max(1, round(over_s / STEP_S))
-    share = np.convolve(np.ones(len(values)), np.ones(count), "same")[: len(values)]
-    return np.convolve(values, np.ones(count), "same")[: len(values)] / share
-
-
-def _top(three: Array) -> float:
-    """Where a parabola through three neighbours is highest, from the one in the middle."""
-    if len(three) < 3:
-        return 0.0
-    before, here, after = three
-    bend = before - 2.0 * here + after
-    return float(np.clip(0.5 * (before - after) / bend, -0.5, 0.5)) if bend < 0.0 else 0.0
+    size = moving_mean(np.linalg.norm(rate_dps, axis=1), round(_QUICK_S / STEP_S))
+    return size - moving_mean(size, round(_SLOW_S / STEP_S))

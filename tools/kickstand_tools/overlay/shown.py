@@ -7,11 +7,11 @@ from kickstand.errors import Notice
 from numpy.typing import NDArray
 
 from ..analysis.ride import Ride
-from ..analysis.signals import smoothed
 from ..analysis.summary import HELD_S
 from ..logs.source import Progress
 from ..logs.table import Array
 from ..replay.mount_check import MountCheck
+from ..signals.averages import smoothed
 
 _FORCE_S = 0.3  # over which forces are averaged: engine and road shake them
 _GAP_S = 0.2  # a reading that is older is not shown

@@ -20,7 +20,6 @@ MODULES = (
     "demo/shown_lean.py",
     "simulated_board",
     "simulation/__init__.py",
-    "simulation/data_sheet.py",
     "simulation/scripted",
     "web/__init__.py",
     "web/device.py",

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...logs.table import Array
+from ...signals.averages import moving_mean
 from ..downsample import spacing_s
 from ..overview import Overview
 from ..report import angles, clock, judged, peak_words
@@ -37,8 +38,8 @@ def traces(seen: Overview) -> Traces:
     """The traces of a ride."""
     course = seen.course
     step_s = spacing_s(course)
-    n = max(1, round(SMOOTH_S / step_s))
-    lateral, forward = _mean(course.lateral_g, n), _mean(course.forward_g, n)
+    n = round(SMOOTH_S / step_s)
+    lateral, forward = moving_mean(course.lateral_g, n), moving_mean(course.forward_g, n)
     moving = course.resting < 0.5
     reach = max(0.5, float(np.percentile(np.abs(np.concatenate((lateral, forward))), 99.99)))
     edges = np.arange(-np.ceil(reach / GG_BIN_G) - 2, np.ceil(reach / GG_BIN_G) + 3) * GG_BIN_G
@@ -89,13 +90,3 @@ def quality_lines(seen: Overview) -> list[str]:
 def tick_s(seconds: float) -> float:
     """A round time between ticks, so that there are 6 to 12 of them."""
     return next((tick for tick in (1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800) if seconds < 12 * tick), 3600)
-
-
-def _mean(values: Array, n: int) -> Array:
-    """Over n samples around each."""
-    if len(values) < 2 * n:
-        return values
-    sums = np.cumsum(np.concatenate(([0.0], values)))
-    mean = (sums[n:] - sums[:-n]) / n
-    before = (n - 1) // 2
-    return np.concatenate((np.full(before, mean[0]), mean, np.full(n - 1 - before, mean[-1])))

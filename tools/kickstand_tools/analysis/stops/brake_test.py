@@ -24,9 +24,9 @@ from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
 from ...logs.table import Array
+from ...signals.averages import integral, smoothed
 from ..channels import Channels
 from ..downsample import thinned
-from ..signals import integral, smoothed
 from .plausible import closes, plausible
 from .speed_fit import fitted_speed, speed_delay_s
 from .standstill import standing
@@ -44,6 +44,8 @@ ONSET_S = 0.6  # at most, from the faint share to the other
 # Height of the sensor above the point about which a bike pitches, which is as high as the wheels' hubs. When the nose
 # goes down, a sensor under the seat moves forward.
 SENSOR_HEIGHT_M = 0.65
+
+SMOOTH_S = 0.2  # accelerations and jerks are means over it
 
 
 @dataclass
@@ -124,7 +126,7 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
     acceleration, pitch_rate, yaw_rate = _acceleration(part, rest)
     felt = integral(time, acceleration)
     speed = felt - felt[-1] + SENSOR_HEIGHT_M * np.radians(pitch_rate)  # integrated backwards from the standstill
-    smooth = smoothed(acceleration, time)
+    smooth = smoothed(acceleration, time, SMOOTH_S)
     begin = _onset(smooth, time, rest)
     if begin is None:
         return None
@@ -134,7 +136,7 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
         speed, known = fitted, "log"
     elif from_rest and not closes(float(speed[0]), float(time[rest] - time[0])):
         return None
-    smooth = smoothed(np.gradient(speed, time), time)
+    smooth = smoothed(np.gradient(speed, time), time, SMOOTH_S)
     v = speed[begin:]
     below = np.flatnonzero(v <= 0.02 * v[0])
     if v[0] < MIN_SPEED_MPS or not len(below):
@@ -156,7 +158,7 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
         float(distance[-1] + 0.5 * v[-1] * tail),
         mfdd,
         float(-np.min(smooth[begin : end + 1])),
-        float(np.max(np.abs(smoothed(np.gradient(smooth, time), time)[begin : end + 1]))),
+        float(np.max(np.abs(smoothed(np.gradient(smooth, time), time, SMOOTH_S)[begin : end + 1]))),
         float(integral(t, v * np.sin(side))[-1]),
         float(heading[-1]),
         known,

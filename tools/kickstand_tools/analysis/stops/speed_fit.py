@@ -8,9 +8,11 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
 from ...logs.table import Array
+from ...signals.averages import integral, smoothed
+from ...signals.lag import best_lag
 from ..channels import Channels
-from ..signals import integral, smoothed
 
+SMOOTH_S = 0.2  # of the acceleration by which a late speed differs
 LEAD_S = 4.0  # how long before the braking the speed is used for the fit
 DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # delays of the speed that are tried
 ENOUGH_SPEEDS, ENOUGH_CHANGE_MPS = 30, 0.5
@@ -31,20 +33,16 @@ def speed_delay_s(ride: Channels) -> float:
     second = np.floor(ride.t_s[there])
     there = there[np.flatnonzero(np.diff(second, prepend=-1.0))]  # one a second
     time, changes = ride.t_s[there], np.diff(ride.speed_mps[there])
-    felt = integral(ride.t_s, STANDARD_GRAVITY * ride.forward_g)
+    pushed = integral(ride.t_s, STANDARD_GRAVITY * ride.forward_g)
     if len(there) < ENOUGH_SPEEDS or np.std(changes) < ENOUGH_CHANGE_MPS:
         return 0.0
-    left = []
-    for delay in DELAYS_S:
-        pushes = np.diff(np.interp(time - delay, ride.t_s, felt))
-        if np.std(pushes) < ENOUGH_CHANGE_MPS:
-            return 0.0
-        left.append(1.0 - np.corrcoef(pushes, changes)[0, 1] ** 2)
-    best = int(np.argmin(left))
-    if best in (0, len(left) - 1):
-        return 0.0
-    before, least, after = left[best - 1 : best + 2]  # its minimum is that of a parabola through these
-    return float(DELAYS_S[best] + 0.5 * (before - after) / (before - 2.0 * least + after) * (DELAYS_S[1] - DELAYS_S[0]))
+
+    def earlier(by_s: float) -> tuple[Array, Array] | None:
+        pushes = np.diff(np.interp(time - by_s, ride.t_s, pushed))
+        return (changes, pushes[:, None]) if np.std(pushes) >= ENOUGH_CHANGE_MPS else None
+
+    found = best_lag(DELAYS_S, earlier)
+    return found.lag_s if found and found.inside else 0.0
 
 
 def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, delay_s: float) -> Array | None:
@@ -67,7 +65,7 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
     hats = np.column_stack([np.interp(time, knots[::-1], row[::-1]) for row in np.eye(len(knots))])
     pushed = np.column_stack([integral(time, hat) for hat in hats.T])
     pushed = pushed[-1] - pushed  # from each sample to the end
-    terms = np.column_stack((speed, pushed, -smoothed(acceleration, time)))[wanted]
+    terms = np.column_stack((speed, pushed, -smoothed(acceleration, time, SMOOTH_S)))[wanted]
     error = part.speed_mps[values] - speed[wanted]
     prior = np.zeros((len(knots) + 2, len(knots) + 2))
     prior[0, 0], prior[-1, -1] = 1.0 / SIGMA_SCALE, 1.0 / SIGMA_DELAY_S

@@ -4,11 +4,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...logs.table import Array
+from ...signals.averages import smoothed, window_means, window_spreads
+from ...signals.standstill import STANDING_MPS
 from ..channels import Channels
 from ..downsample import spacing_s
-from ..signals import smoothed
 
-STOPPED_MPS = 0.3  # a speed that counts as standing; satellites never quite say 0
 STALE_S = 3.0  # an older speed tells nothing
 
 # Without a speed: a vehicle stands still while it shakes, over QUIET_S, by less than a share of its shaking when moving
@@ -32,7 +32,7 @@ def standing(ride: Channels) -> NDArray[np.bool_]:
         place = np.searchsorted(there, np.arange(len(still)), side="right") - 1
         latest = there[np.maximum(place, 0)]
         known = (place >= 0) & (ride.t_s - ride.t_s[latest] < STALE_S)
-        still = np.where(known, ride.speed_mps[latest] < STOPPED_MPS, still)
+        still = np.where(known, ride.speed_mps[latest] < STANDING_MPS, still)
     return still
 
 
@@ -44,15 +44,13 @@ def _quiet(ride: Channels) -> NDArray[np.bool_]:
     quiet = np.ones(len(still) - second + 1, dtype=bool)
     for rate in ride.pitch_rate_dps, ride.yaw_rate_dps:
         slow = smoothed(rate, ride.t_s, ENGINE_S)
-        mean, _ = _window(slow, second)
-        quiet &= (np.abs(mean) < STILL_DPS) & _calm(slow, second, QUIET_SHARE)
+        quiet &= (np.abs(window_means(slow, second)) < STILL_DPS) & _calm(slow, second, QUIET_SHARE)
         quiet &= _calm(_road(rate, ride.t_s), second, QUIET_SHARE)
     quiet &= _calm(_road(ride.up_g, ride.t_s), second, QUIET_UP_SHARE)
     half = second // 2
-    forward, _ = _window(ride.forward_g, half)
+    forward = window_means(ride.forward_g, half)
     quiet &= np.abs(forward[second - half :] - forward[: len(quiet)]) < STILL_G
-    rolling, _ = _window(ride.rolling, second)
-    quiet &= _weight(ride, second) & (rolling < 0.5)
+    quiet &= _weight(ride, second) & (window_means(ride.rolling, second) < 0.5)
     for shift in range(second):  # every sample of a quiet window
         still[shift : shift + len(quiet)] |= quiet
     return still
@@ -80,32 +78,13 @@ def _road(values: Array, time: Array) -> Array:
 
 def _calm(values: Array, n: int, share: float) -> NDArray[np.bool_]:
     """Where n samples in a row spread by less than this share of what they do on the move."""
-    _, spread = _window(values, n)
+    spread = window_spreads(values, n)
     return spread < share * np.percentile(spread, RIDING_PERCENTILE)
 
 
 def _weight(ride: Channels, n: int) -> NDArray[np.bool_]:
     """Where the force over n samples in a row is the weight alone, as far as the sensor is calibrated."""
-    size = np.sqrt(sum(_window(axis, n)[0] ** 2 for axis in (ride.left_g, ride.up_g, ride.forward_g)))
-    resting, _ = _window(ride.resting, n)
-    rests = size[resting > 0.99]
+    size = np.sqrt(sum(window_means(axis, n) ** 2 for axis in (ride.left_g, ride.up_g, ride.forward_g)))
+    rests = size[window_means(ride.resting, n) > 0.99]
     weight = float(np.median(rests)) if len(rests) else 1.0
     return np.abs(size - weight) < (MAX_OFF_G if len(rests) else UNCALIBRATED_G)
-
-
-def _window(values: Array, n: int) -> tuple[Array, Array]:
-    """Mean and standard deviation of each n values in a row."""
-    middle = float(np.mean(values))  # subtracted, or rounding of large squares would hide the spread
-    values = values - middle
-    mean = _mean(values, n)
-    values *= values
-    spread = _mean(values, n)
-    spread -= mean * mean
-    return mean + middle, np.sqrt(np.maximum(0.0, spread, out=spread), out=spread)
-
-
-def _mean(values: Array, n: int) -> Array:
-    """Of each n values in a row."""
-    sums = np.concatenate(([0.0], values))
-    np.cumsum(sums, out=sums)
-    return (sums[n:] - sums[:-n]) / n

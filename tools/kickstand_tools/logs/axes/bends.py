@@ -10,10 +10,10 @@ judged.
 import numpy as np
 from kickstand.errors import Notice
 
+from ...signals.leaning import WINDOW_S, Leaning, leaning_of, unrest
 from ..table import Array
 from ..time_cells import no_cells, with_block
 from .calm import calm_rates
-from .leaning import WINDOW_S, Leaning, leaning_of, unrest
 
 KEPT_S, RIDING_S = 1800.0, 15.0  # half an hour is judged; less riding tells nothing
 MOVES_S, MOVES = 1.6, 0.1  # within so long a ride changes the rates by over so much of their liveliest changes

@@ -13,6 +13,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
+from ...signals.rotations import cross_matrix, rotation_matrix
 from ..table import Array
 
 CELL_S = 0.1  # means over it are used: what shakes faster is vibration
@@ -77,7 +78,7 @@ class Turning:
 
     def _fit(self, rate: Array, turn: Array, turned: Array, velocity: tuple[Array, Array]) -> "_Fit":
         values, changes = (part[..., None, None] for part in velocity)
-        parts = turn @ (_cross(rate) * values + np.eye(3) * changes)  # (kinds, w, n, 3, 3)
+        parts = turn @ (cross_matrix(rate) * values + np.eye(3) * changes)  # (kinds, w, n, 3, 3)
         along = _evened(np.concatenate(list(parts), axis=-1) / STANDARD_GRAVITY)
         moved = _evened(turned)
         square = np.einsum("wnij,wnik->wjk", along, along)
@@ -91,7 +92,7 @@ class Turning:
         """(3) deg/s. A change of the bias turns all that was integrated: linear about the middle of the window."""
         angle = np.cumsum(turn, axis=1) * CELL_S
         angle -= angle[:, rate.shape[1] // 2, None]
-        by_bias = _evened(-sign * np.radians(1.0) * _cross(turned) @ angle)
+        by_bias = _evened(-sign * np.radians(1.0) * cross_matrix(turned) @ angle)
         mixed = np.einsum("wnij,wnik->wjk", fit.along, by_bias)
         # the velocities of the windows are eliminated from the normal equations
         square = np.einsum("wnij,wnik->jk", by_bias, by_bias) - np.einsum("wji,wjk,wkl->il", mixed, fit.inverse, mixed)
@@ -114,30 +115,13 @@ class _Fit:
 
 def _turn(rate: Array) -> Array:
     """(w, n, 3, 3): from the axes in the middle of each cell to those at the window's beginning. rate: rad/s."""
-    half = _rotation(rate * (CELL_S / 2.0))
+    half = rotation_matrix(rate * (CELL_S / 2.0))
     after = half @ half  # then the product of twice as many cells each time
     reach = 1
     while reach < rate.shape[1]:
         after[:, reach:] = after[:, :-reach] @ after[:, reach:]
         reach *= 2
     return np.concatenate((half[:, :1], after[:, :-1] @ half[:, 1:]), axis=1)
-
-
-def _rotation(angle: Array) -> Array:
-    """(..., 3, 3) of rotation vectors (..., 3, rad): Rodrigues' formula."""
-    size = np.linalg.norm(angle, axis=-1)[..., None, None]
-    cross = _cross(angle)
-    # sinc is sin(pi x) / (pi x)
-    return np.eye(3) + np.sinc(size / np.pi) * cross + 0.5 * np.sinc(size / (2.0 * np.pi)) ** 2 * (cross @ cross)
-
-
-def _cross(vector: Array) -> Array:
-    """(..., 3, 3): times another vector, this one's cross product with it."""
-    matrix = np.zeros((*vector.shape, 3))
-    x, y, z = np.moveaxis(vector, -1, 0)
-    matrix[..., 0, 1], matrix[..., 0, 2], matrix[..., 1, 2] = -z, y, -x
-    matrix[..., 1, 0], matrix[..., 2, 0], matrix[..., 2, 1] = z, -y, x
-    return matrix
 
 
 def _evened(values: Array) -> Array:

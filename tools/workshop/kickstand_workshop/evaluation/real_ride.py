@@ -17,6 +17,7 @@ from kickstand_tools.calibration.ride.fit import fit_ride
 from kickstand_tools.errors import InputError
 from kickstand_tools.logs.reader import Log, read_log
 from kickstand_tools.replay.mount_check import contradiction
+from kickstand_tools.signals.averages import moving_mean
 from numpy.typing import NDArray
 
 from .estimators import estimate
@@ -84,6 +85,4 @@ def _speed(log: Log) -> NDArray[np.float64]:
 
 def _averaged(x: NDArray, rate_hz: float) -> NDArray[np.float64]:
     """The mean over 1 s around each sample."""
-    n = max(round(AVERAGE_S * rate_hz), 1)
-    padded = np.pad(x, (n // 2, n - 1 - n // 2), mode="edge")
-    return np.convolve(padded, np.full(n, 1.0 / n), mode="valid")
+    return moving_mean(x, round(AVERAGE_S * rate_hz))

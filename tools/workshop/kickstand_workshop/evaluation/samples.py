@@ -23,7 +23,4 @@ class Samples:
 
 def calibrated(log: Log, calibration: CalibrationFile) -> Samples:
     """Apply a calibration with numpy: Nicolae's (18)-(20), then the mounting matrix. All estimators use the same."""
-    matrix = calibration.vehicle_from_sensor
-    force = log.accel_g * calibration.accel_slope + calibration.accel_offset_g
-    rate = log.gyro_dps - calibration.gyro_bias_dps
-    return Samples(log.t_s, force @ matrix.T, rate @ matrix.T)
+    return Samples(log.t_s, *calibration.in_vehicle(log.readings))

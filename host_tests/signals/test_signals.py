@@ -1,0 +1,192 @@
+"""What is done to arrays of samples everywhere."""
+
+import numpy as np
+import pytest
+from kickstand.units import STANDARD_GRAVITY
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.signals.averages import (
+    integral,
+    moving_mean,
+    moving_spread,
+    smoothed,
+    window_means,
+    window_spreads,
+)
+from kickstand_tools.signals.calibrated import calibrated, rotated
+from kickstand_tools.signals.cells import Cells, cell_numbers, runs, stretches
+from kickstand_tools.signals.lag import best_lag, correlation, correlations, log_likelihood_ratio, peak_offset, peaks
+from kickstand_tools.signals.leaning import leaning_of
+from kickstand_tools.signals.rotations import cross_matrix, rotation_matrix, rotation_vector
+from kickstand_tools.signals.standstill import motionless
+
+CHANCE = np.random.default_rng(1)
+
+
+def test_readings_are_calibrated_and_turned_as_the_firmware_does_it():
+    matrix = rotation_matrix(np.array([0.3, -1.2, 2.0]))
+    calibration = CalibrationFile([0.01, -0.02, 0.03], [1.02, 0.99, 1.01], [1.0, -2.0, 3.0], matrix)
+    readings = CHANCE.normal(size=(5, 7))
+    known = calibration.accel_offset_g, calibration.accel_slope, calibration.gyro_bias_dps
+    found = rotated(matrix, *calibrated(readings[:, :3], readings[:, 4:], *known))
+    firmware = calibration.to_firmware()
+    for k, reading in enumerate(readings):
+        force, rate = np.zeros(3), np.zeros(3)
+        firmware.apply(reading, force, rate)
+        assert np.allclose(found[0][k], matrix @ force, atol=1e-6)
+        assert np.allclose(found[1][k], matrix @ rate, atol=1e-6)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 8])
+@pytest.mark.parametrize("shape", [(20,), (20, 3)])
+def test_means_and_spreads_of_windows(n, shape):
+    values = 1e6 + CHANCE.normal(size=shape)
+    windows = np.lib.stride_tricks.sliding_window_view(values, n, axis=0)
+    assert np.allclose(window_means(values, n), windows.mean(axis=-1), rtol=1e-12)
+    assert np.allclose(window_spreads(values, n), windows.std(axis=-1), atol=1e-7)
+    for moving, window in ((moving_mean, window_means), (moving_spread, window_spreads)):
+        around = moving(values, n)
+        assert around.shape == shape
+        assert np.allclose(around[n // 2 : 20 - (n - 1 - n // 2)], window(values, n), atol=1e-6)
+
+
+def test_beyond_the_ends_the_last_value_goes_on():
+    assert moving_mean(np.array([3.0, 0.0, 0.0, 6.0]), 3).tolist() == [2.0, 1.0, 2.0, 4.0]
+    assert len(moving_mean(np.zeros(0), 5)) == len(moving_spread(np.zeros(0), 5)) == 0
+
+
+def test_smoothing_and_integrals_along_time():
+    time = np.arange(0.0, 10.0, 0.01)
+    wave = np.sin(time)
+    assert np.allclose(integral(time, wave), 1.0 - np.cos(time), atol=1e-4)
+    assert np.allclose(smoothed(wave, time, 0.2)[20:-20], wave[20:-20], atol=0.003)
+    assert smoothed(np.ones(1), time[:1], 0.2).tolist() == [1.0]
+
+
+def in_cells(block: int) -> Cells:
+    time = np.concatenate((np.arange(0.3, 2.0, 0.06), np.arange(3.0, 4.0, 0.06)))
+    speed = np.where(np.arange(len(time)) % 7 == 0, time, np.nan)
+    cells = Cells(0.1)
+    for k in range(0, len(time), block):
+        part = slice(k, k + block)
+        cells.add(time[part], np.column_stack((time, time**2))[part], speed[part, None])
+    return cells
+
+
+@pytest.mark.parametrize("block", [1, 3, 1000])
+def test_cells_hold_the_means_of_their_samples(block):
+    even = in_cells(block).evenly(100)
+    assert even and even.first == 3
+    assert even.count[:4].tolist() == [2, 2, 1, 2]
+    assert even.means[0] == pytest.approx([0.33, (0.09 + 0.36**2) / 2.0])
+    assert even.latest[0, 0] == pytest.approx(0.3)
+    assert np.all(np.isnan(even.means[18:26])), "nothing is known where there are no samples"
+    seconds = even.merged(10)
+    assert seconds.first == 0
+    assert seconds.count.sum() == even.count.sum()
+    assert seconds.means[1, 0] == pytest.approx(np.mean(np.arange(1.02, 1.99, 0.06)))
+    assert np.isnan(seconds.means[2]).all()
+    assert seconds.latest[1, 0] == pytest.approx(1.14), "the first of a second's"
+
+
+def test_only_so_many_cells_are_kept_and_too_long_a_time_is_no_log():
+    cells = Cells(1.0, most=3)
+    assert cells.evenly(100) is None
+    for at in (0.0, 1.0, 2.0, 5.0):
+        cells.add(np.array([at]), np.ones((1, 1)), np.ones((1, 1)))
+    even = cells.evenly(100)
+    assert even and even.first == 1
+    assert even.count.tolist() == [1, 1, 0, 0, 1]
+    assert cells.evenly(4) is None
+
+
+def test_runs_and_stretches():
+    assert cell_numbers(np.array([0.0, 0.1, 0.3, 0.31]), 0.1).tolist() == [0, 1, 3, 3]
+    assert runs(np.array([4, 4, 5, 4])).tolist() == [0, 2, 3]
+    assert stretches(np.array([True, True, False, True])).tolist() == [[0, 2], [3, 4]]
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.33, 0.8])
+def test_the_lag_of_one_signal_against_another(late_s):
+    time = np.arange(0.0, 60.0, 0.1)
+    direction = np.array([0.6, 0.0, -0.8])
+    lags = np.arange(-0.5, 1.6, 0.1)
+
+    def signal(at):
+        return np.sin(at) + np.sin(2.7 * at)
+
+    found = best_lag(lags, lambda by: (signal(time - late_s), np.outer(signal(time - by), direction)))
+    assert found and found.inside
+    assert found.lag_s == pytest.approx(late_s, abs=0.01)
+    assert found.value > 0.99
+    assert np.allclose(found.direction, direction)
+    assert best_lag(lags, lambda by: None) is None
+
+
+def test_a_correlation_with_all_of_the_cause_is_less_than_along_one_direction():
+    effect = CHANCE.normal(size=1000)
+    cause = np.column_stack((effect, CHANCE.normal(size=1000)))
+    assert correlation(effect, cause).value > 0.99
+    assert correlation(effect, cause, whole=True).value == pytest.approx(0.5**0.5, abs=0.05)
+    assert correlation(effect, -effect[:, None]).direction.tolist() == [-1.0]
+    assert correlation(np.ones(5), np.ones((5, 1))).value == 0.0
+
+
+def test_all_shifts_at_once():
+    first, second = CHANCE.normal(size=300), np.zeros(100)
+    second[:] = first[120:220]
+    good = CHANCE.random(300) > 0.1
+    found, count = correlations(first, good, second, np.ones(100, bool))
+    assert int(np.argmax(found)) == 120 + 99
+    assert found[219] == pytest.approx(1.0)
+    assert count[219] == np.count_nonzero(good[120:220])
+    ratio = log_likelihood_ratio(found, count, 1.0)
+    assert ratio[219] > 100.0
+    assert np.all(ratio[found < 0.0] == 0.0)
+    assert peaks(np.array([1.0, 5.0, 4.0, 0.0, 3.0, -1.0]), 1, 9) == [1, 4]
+
+
+def test_a_peak_lies_between_its_neighbours():
+    assert peak_offset(np.array([-0.49, -0.09, -1.69])) == pytest.approx(-0.3)
+    assert peak_offset(np.array([1.0, 0.0, 1.0])) == 0.0
+
+
+def test_rotation_vectors_and_matrices_are_each_others_inverse():
+    vectors = CHANCE.uniform(-1.8, 1.8, size=(50, 3))
+    vectors[0] = 0.0
+    vectors[1] *= 1e-9
+    matrices = rotation_matrix(vectors)
+    assert np.allclose(matrices @ np.swapaxes(matrices, -1, -2), np.eye(3))
+    assert np.allclose(np.linalg.det(matrices), 1.0)
+    assert np.allclose(rotation_vector(matrices), vectors, atol=1e-12)
+    assert np.allclose(rotation_matrix(np.array([0.0, 0.0, np.pi / 2.0])) @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0])
+    assert np.allclose(cross_matrix(vectors[2]) @ vectors[3], np.cross(vectors[2], vectors[3]))
+
+
+@pytest.mark.parametrize(
+    ("shaking", "speed", "expected"),
+    [(0.5, None, True), (3.0, None, False), (3.0, 0.1, True), (12.0, 0.1, False), (0.5, 5.0, False)],
+)
+def test_a_standstill_is_where_nothing_changes(shaking, speed, expected):
+    rate = CHANCE.normal(size=(100, 3)) * shaking
+    force = np.tile([0.0, 1.0, 0.0], (100, 1))
+    known = None if speed is None else np.full(100, speed)
+    still = motionless(rate, force, 9, 1.8, 0.01, known)
+    assert np.mean(still) == pytest.approx(float(expected), abs=0.1)
+    assert not motionless(0.0 * rate, force + CHANCE.normal(size=(100, 3)), 9, 1.8, 0.01).any()
+
+
+def test_a_bike_leans_as_it_turns():
+    """Forward, speed, handedness and unit of the rates, from bends at 15 m/s; turned into other axes."""
+    time = np.arange(0.0, 120.0, 0.2)
+    lean, roll_rate = 0.4 * np.sin(1.1 * time), 0.44 * np.cos(1.1 * time)
+    yaw = -STANDARD_GRAVITY * np.tan(lean) / 15.0
+    rate = np.column_stack((yaw * np.sin(lean), yaw * np.cos(lean), roll_rate))
+    force = np.column_stack((0.0 * lean, 1.0 / np.cos(lean), 0.0 * lean))
+    turn = rotation_matrix(np.array([0.5, 1.0, -2.0]))
+    riding = np.ones(len(time), dtype=bool)
+    found = leaning_of(rate @ turn, force @ turn, riding)
+    assert np.allclose(found.matrix, turn, atol=0.05)
+    assert found.speed == pytest.approx(15.0, rel=0.1)
+    assert found.share == pytest.approx(1.0, rel=0.1)
+    assert found.likeness > 0.9
+    assert leaning_of(-rate @ turn, force @ turn, riding).share == pytest.approx(-1.0, rel=0.1)
