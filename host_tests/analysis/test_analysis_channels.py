@@ -12,7 +12,7 @@ from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.summary import Summary
 from kickstand_tools.logs import reader
 from kickstand_tools.replay import replay_engine
-from kickstand_tools.replay.formula import formula_lean_deg
+from kickstand_tools.replay.meter_along import formula_lean_deg
 
 
 @pytest.fixture(scope="module")

@@ -21,7 +21,7 @@ from kickstand_tools.calibration.poses import read_pose
 from kickstand_tools.calibration.ride.fit import fit_ride
 from kickstand_tools.errors import InputError
 from kickstand_tools.imports.importing import import_recording, write_imported
-from kickstand_tools.logs.cut import cut_log
+from kickstand_tools.logs.csv_lines import cut_log
 from kickstand_tools.replay.replay import replay_to_csv
 from kickstand_tools.simulation.scripted import script
 from rich.console import Console

@@ -13,7 +13,7 @@ from kickstand.rides import flash_ring
 from kickstand.rides.flash_ring import RideRing
 from kickstand.ui import messages
 from kickstand_tools.rides import block_reader
-from kickstand_tools.simulated_board.fakes import current, fake_machine, fake_os
+from kickstand_tools.simulated_board.fakes import fake_machine, fake_os
 from kickstand_tools.simulated_board.simulator import Board
 
 SETTINGS = types.SimpleNamespace(SD_SPI=None)
@@ -203,7 +203,7 @@ def test_a_file_system_that_fails_ends_the_ride_and_keeps_what_was_written(recor
 
 def test_a_card_without_its_driver_is_said_in_one_line(recorder, monkeypatch):
     monkeypatch.setitem(sys.modules, "machine", fake_machine)
-    monkeypatch.setattr(current, "board", Board(lambda t_s: (0, 0, 1, 0, 0, 0)), raising=False)  # it has the pins
+    monkeypatch.setattr(fake_machine, "board", Board(lambda t_s: (0, 0, 1, 0, 0, 0)), raising=False)  # it has the pins
     recorder.keeper = RideRing(types.SimpleNamespace(SD_SPI=0, SD_SCK=18, SD_MOSI=19, SD_MISO=16, SD_CS=17))
     with contextlib.redirect_stdout(io.StringIO()) as said:
         recorder.start(ride_writer.CHIP, ride_writer.calibration())

@@ -21,7 +21,7 @@ from ..errors import InputError
 from ..imports.importing import Imported, import_recording, write_imported
 from ..joining.joined import Joined, join_track, write_joined
 from ..joining.track_files import read_track
-from ..logs.cut import cut_log
+from ..logs.csv_lines import cut_log
 from ..logs.reader import Source
 from ..logs.stretch import Stretch
 from ..output import check_output

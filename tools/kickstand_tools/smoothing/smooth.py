@@ -91,7 +91,7 @@ def _checked_blocks(
     for block, found in smooth_blocks(whole, calibration, progress, notices):
         if found is None:
             raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples a second: too few to look back over")
-        believed = block.believed
+        believed = block.measured
         mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
         yield from within(stretch, block, found)
     contradiction = mount.notice()
@@ -143,7 +143,7 @@ def _chapter(
     before: list[Block], own: list[Block], after: list[Block], calibration: CalibrationFile, start_c: float
 ) -> Iterator[tuple[Block, Array | None]]:
     """The values of the pieces `own`, adjusted together with those before and after them."""
-    believed = [piece.believed for piece in (*before, *own, *after)]
+    believed = [piece.measured for piece in (*before, *own, *after)]
     values = _adjusted(believed, calibration, start_c)
     first = sum(len(piece.time_us) for piece in believed[: len(before)])
     for piece in own:

@@ -76,11 +76,11 @@ ROOMS = {
         (TESTS + "calibration/test_cli*.py", TESTS + "drive_alignment/test_cli_drive.py"),
     ),
     "broken logs": Room(
-        (TOOLS + "logs/mended/*.py", *(TOOLS + f"logs/{name}.py" for name in ("even_times", "stretch", "cut"))),
+        tuple(TOOLS + f"logs/{name}.py" for name in ("even_times", "frozen", "stretch")),
         tuple(TESTS + f"logs/{name}.py" for name in ("test_ends", "test_even_times", "test_frozen", "test_stretch")),
     ),
     "logs": Room(
-        tuple(TOOLS + f"logs/{name}.py" for name in ("block", "cells", "log", "reader", "source", "table")),
+        tuple(TOOLS + f"logs/{name}.py" for name in ("block", "cells", "csv_reader", "log", "reader", "source")),
         tuple(TESTS + f"logs/{name}.py" for name in ("test_log", "test_cells", "test_cli_logs", "test_log_blocks")),
     ),
     "units": Room(

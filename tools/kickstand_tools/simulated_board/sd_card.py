@@ -1,9 +1,6 @@
-"""An SD card on SPI (SD Physical Layer Simplified Specification, chapter 7), and the machine.SPI that it is on."""
-
-from . import current
+"""An SD card on SPI (SD Physical Layer Simplified Specification, chapter 7)."""
 
 SECTOR = 512
-_CALL_US = 20  # what a call into machine.SPI takes, with the driver's Python around it
 _EMPTY = bytes(SECTOR)
 _IDLE = 0x01
 _ACCEPTED, _WRITE_ERROR = 0x05, 0x0D  # data responses
@@ -155,33 +152,3 @@ class SdCard:
     def ioctl(self, op, argument):
         """How many sectors there are, and their size."""
         return {4: self._sectors, 5: SECTOR}.get(op, 0)
-
-
-class SPI:
-    """machine.SPI with the simulated board's card on it."""
-
-    def __init__(self, id, baudrate=1_000_000, sck=None, mosi=None, miso=None, **mode):
-        self.init(baudrate)
-
-    def init(self, baudrate=1_000_000, **mode):
-        self._hz = baudrate
-        card = current.board.card
-        if card:
-            card.most_hz = max(card.most_hz, baudrate)
-
-    def write(self, buf):
-        self._exchange(buf)
-
-    def read(self, count, write=0x00):
-        return self._exchange(bytes([write]) * count)
-
-    def readinto(self, buf, write=0x00):
-        buf[:] = self._exchange(bytes([write]) * len(buf))
-
-    def write_readinto(self, out, buf):
-        buf[:] = self._exchange(bytes(out))
-
-    def _exchange(self, data):
-        current.board.clock.advance(_CALL_US + 8 * len(data) * 1_000_000 // self._hz)
-        card = current.board.card
-        return card.exchange(data) if card else b"\xff" * len(data)

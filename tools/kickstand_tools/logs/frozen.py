@@ -2,16 +2,16 @@
 
 Noise changes the readings of a working sensor from sample to sample, at rest too. Six that stay the same to the last
 digit for half a second were not measured. Only in a log with few digits rounding may hide the noise of a vehicle at
-rest: there the readings are believed where those before or after go on at the same values, and doubted where they jump.
+rest: there the readings count where those before or after go on at the same values, and are left out where they jump.
 """
 
 import numpy as np
 from kickstand.errors import Notice
 from numpy.typing import NDArray
 
-from ..block import Block
-from ..log import Log
-from ..table import Array
+from .block import Block
+from .log import Log
+from .table import Array
 
 FROZEN_S, FROZEN_SAMPLES = 0.5, 10  # the same for at least so long, in so many samples
 COARSE_G, COARSE_DPS = 0.002, 0.05  # steps in which rounding may hide the noise of a phone's sensor
@@ -53,7 +53,7 @@ class FrozenReadings:
                 continue
             if (goes_on and self._was_frozen) or self._doubtful(values, time_s, begin, end):
                 frozen[begin + 1 : end] = True
-                self._tell(float(time_s[begin]), float(time_s[end - 1]))
+                self._add(float(time_s[begin]), float(time_s[end - 1]))
         last = int(begins[-1])
         if not (last == 0 and len(self._last)):
             self._since_s, self._since_samples = float(time_s[last]), 1
@@ -82,13 +82,13 @@ class FrozenReadings:
         means = [np.mean(values[rows], axis=0) for rows in (before, after) if len(rows)]
         return not any(np.all(np.abs(mean - values[begin]) <= near) for mean in means)
 
-    def _tell(self, begin_s: float, end_s: float) -> None:
+    def _add(self, begin_s: float, end_s: float) -> None:
         if self._stretches and self._stretches[-1][1] == begin_s:  # it went on from the block before
             begin_s = self._stretches.pop()[0]
         self._stretches.append((begin_s, end_s))
 
 
-def believed(log: Log) -> Log:
+def without_frozen(log: Log) -> Log:
     """The log without frozen readings: where they were is a gap. The log itself where there are none."""
     block = Block(log.time_us, log.readings, log.speed_mps, True, True, log.start_s, 0)
     kept = ~FrozenReadings().mark(block)
