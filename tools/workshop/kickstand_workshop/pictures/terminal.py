@@ -6,7 +6,8 @@ import re
 from kickstand_tools.demo.demo import Device
 from kickstand_tools.demo.score import State
 from kickstand_tools.demo.screen import WIDTH, screen
-from rich.console import CONSOLE_SVG_FORMAT, Console
+from rich._export_format import CONSOLE_SVG_FORMAT
+from rich.console import Console
 from rich.terminal_theme import TerminalTheme
 
 MOMENT_S = 36.0  # in the right turn of the demo's script
