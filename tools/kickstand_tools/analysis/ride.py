@@ -10,6 +10,7 @@ from kickstand.lean.meter import MAX_VARIANCE
 
 from ..calibration.file import CalibrationFile, calibration_beside, read_calibration
 from ..errors import InputError
+from ..estimation.smooth import smooth_blocks
 from ..logs.block import Block
 from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import File, Progress, log_stem, name_of
@@ -17,7 +18,6 @@ from ..logs.stretch import Stretch
 from ..logs.table import Array
 from ..replay.meter_along import MeterAlong
 from ..replay.mount_check import MountCheck
-from ..smoothing.smooth import smooth_blocks
 from .channels import Channels, channels
 
 
