@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .common import warn
+from .common import on_right_handed_axes, warn
 
 if TYPE_CHECKING:
     from ..calibration.drive import DriveFit
@@ -48,21 +48,19 @@ def six(poses: tuple[Path, ...], out: Path) -> None:
 @click.option("--calibration", type=PATH, help="The result of `kickstand calibrate six`, to build on.")
 @click.option("--side", type=click.Choice(["left", "right"]), default="left", help="Where the kickstand leans to.")
 @OUT
+@on_right_handed_axes
 def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out: Path) -> None:
-    """How the sensor sits on the bike, from a pose on the kickstand and one upright.
-
-    Axes have to be right-handed, and the one that points up has to read +1 g at rest.
-    """
+    """How the sensor sits on the bike, from a pose on the kickstand and one upright."""
     from ..calibration.file import read_calibration, write_calibration
-    from ..calibration.remarks import remarks
     from ..calibration.two import fit_two_positions
+    from ..checks.mount import of_calibration
     from ..output import check_output
 
     check_output(out, [kickstand, upright])
     before = read_calibration(calibration) if calibration else None
     found = fit_two_positions(kickstand, upright, before, side)
     print_lines(_two_lines(found))
-    warn(upright, remarks(found.calibration, before))
+    warn(upright, of_calibration(found.calibration, before))
     write_calibration(out, found.calibration)
     click.echo(f"written: {out}")
 
@@ -77,19 +75,17 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
 )
 @click.option("--method", type=click.Choice(["improved", "published"]), default="improved")
 @OUT
+@on_right_handed_axes
 def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None, method: str, out: Path) -> None:
-    """How the sensor sits on the vehicle, from logs of driving with speed: stops and braking in a straight line.
-
-    Axes have to be right-handed, and the one that points up has to read +1 g at rest.
-    """
+    """How the sensor sits on the vehicle, from logs of driving with speed: stops and braking in a straight line."""
     from ..calibration.drive import fit_drive
     from ..calibration.file import read_calibration, write_calibration
     from ..calibration.poses import refuse_same_file
-    from ..calibration.remarks import remarks
+    from ..checks.log import remarks
+    from ..checks.mount import of_calibration
     from ..logs.reader import read_log
     from ..output import check_output
     from ..progress import Bar
-    from ..replay.mount_check import contradiction
 
     check_output(out, list(logs))
     refuse_same_file(logs)
@@ -101,11 +97,10 @@ def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None,
         )
     for name, notice in found.notices:
         warn(name, [notice])
-    warn(logs[0], remarks(found.calibration))
+    warn(logs[0], of_calibration(found.calibration))
     if before and not found.poses:
         for log in logs:
-            wrong = contradiction(read_log(log), before)
-            warn(log, [wrong] if wrong else [])
+            warn(log, remarks(read_log(log), before, axes=False))
     print_lines(_drive_lines(found, several))
     write_calibration(out, found.calibration)
     click.echo(f"written: {out}")

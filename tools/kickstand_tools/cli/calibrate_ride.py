@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .calibrate import OUT, PATH, along_axes, matrix_lines, print_lines
-from .common import warn
+from .common import on_right_handed_axes, warn
 
 if TYPE_CHECKING:
     from ..calibration.ride.fit import RideFit
@@ -21,11 +21,9 @@ if TYPE_CHECKING:
     help="How a phone was mounted, to check the result: upright or on its side with the screen to the rider, or flat.",
 )
 @OUT
+@on_right_handed_axes
 def ride(log: Path, phone: str | None, out: Path) -> None:
-    """How the sensor sits on a motorcycle, from any ride with bends: no poses, and no speed, are needed.
-
-    All axes have to be right-handed, with +1 g at rest along the one that points up.
-    """
+    """How the sensor sits on a motorcycle, from any ride with bends: no poses, and no speed, are needed."""
     from ..calibration.file import write_calibration
     from ..calibration.ride.fit import fit_ride
     from ..output import check_output

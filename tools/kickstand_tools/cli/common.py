@@ -1,8 +1,9 @@
 """What several commands share: times as they are given, and notices in words on standard error."""
 
-from collections.abc import Iterable
+import inspect
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -32,6 +33,13 @@ class Time(click.ParamType):
 
 
 TIME = Time()
+
+
+def on_right_handed_axes(command: Callable[..., Any]) -> Callable[..., Any]:
+    """A command whose help says what the axes of its logs have to be."""
+    line = "The log's axes and rates have to be right-handed, and the axis that points up has to read +1 g at rest."
+    command.__doc__ = f"{inspect.cleandoc(command.__doc__ or '')}\n\n{line}"
+    return command
 
 
 def warn(log: Path | str, notices: "Iterable[Notice]") -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from kickstand.errors import Notice
 
-from .common import TIME, warn
+from .common import TIME, on_right_handed_axes, warn
 
 if TYPE_CHECKING:
     from ..logs.reader import Source
@@ -37,13 +37,11 @@ def _stretch(command: Callable[..., Any]) -> Callable[..., Any]:
 @_stretch
 @click.option("--engine", type=click.Choice(["cpython", "micropython", "rp2040"]), default="cpython")
 @_OUT
+@on_right_handed_axes
 def replay(
     log: Path, calibration: Path | None, from_s: float | None, to_s: float | None, engine: str, out: Path
 ) -> None:
-    """Run the firmware's own lean meter over a recorded log.
-
-    The log's axes and rates have to be right-handed, and the axis that points up has to read +1 g at rest.
-    """
+    """Run the firmware's own lean meter over a recorded log."""
     from ..calibration.file import calibration_beside, read_calibration
     from ..output import check_output
     from ..progress import Bar
@@ -68,11 +66,9 @@ def replay(
 @_CALIBRATION
 @_stretch
 @_OUT
+@on_right_handed_axes
 def smooth(ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, out: Path) -> None:
-    """Find the lean afterwards, from the whole ride, each sample with its standard deviation.
-
-    The log's axes and rates have to be right-handed, and the axis that points up has to read +1 g at rest.
-    """
+    """Find the lean afterwards, from the whole ride, each sample with its standard deviation."""
     from ..calibration.file import calibration_beside, read_calibration
     from ..output import check_output
     from ..progress import Bar
@@ -93,12 +89,11 @@ def smooth(ride: Path, calibration: Path | None, from_s: float | None, to_s: flo
 @_CALIBRATION
 @_LIVE
 @_OUT
+@on_right_handed_axes
 def export(ride: Path, form: str, calibration: Path | None, live: bool, out: Path) -> None:
     """Write a ride as maps (gpx), Circuit Tools (vbo), RaceChrono or data frames (parquet, csv) open it.
 
     The lean is the smoothed one: from the whole ride, and nearer to the truth than what the display showed.
-
-    The log's axes and rates have to be right-handed, and the axis that points up has to read +1 g at rest.
     """
     from ..analysis.export.export import export
     from ..analysis.ride import open_ride
@@ -121,14 +116,13 @@ def export(ride: Path, form: str, calibration: Path | None, live: bool, out: Pat
 @_stretch
 @_LIVE
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+@on_right_handed_axes
 def report(
     ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, live: bool, as_json: bool
 ) -> None:
     """A ride in a page: maxima, time at large leans, and each stop as a brake test has it.
 
     The lean is the smoothed one: from the whole ride, and nearer to the truth than what the display showed.
-
-    The log's axes and rates have to be right-handed, and the axis that points up has to read +1 g at rest.
     """
     from rich.console import Console
 
@@ -139,7 +133,7 @@ def report(
 
     with Bar("reading") as bar:
         seen = overview(open_ride(_part(ride, from_s, to_s), calibration, smoothed=not live), bar.reach)
-    warn(ride, [*seen.notices, *([seen.exchanged] if seen.exchanged else [])])
+    warn(ride, seen.notices)
     if as_json:
         click.echo(json.dumps(as_data(seen)))
     else:
@@ -153,6 +147,7 @@ def report(
 @click.option("--tiles", is_flag=True, help="Streets below the track: the page asks a server for them when it is open.")
 @_LIVE
 @click.option("--out", required=True, type=_PATH, help="The directory to write to.")
+@on_right_handed_axes
 def plot(
     ride: Path,
     calibration: Path | None,
@@ -165,8 +160,6 @@ def plot(
     """Draw a ride: a picture (PNG) and a page to zoom into (HTML).
 
     The lean is the smoothed one: from the whole ride, and nearer to the truth than what the display showed.
-
-    The log's axes and rates have to be right-handed, and the axis that points up has to read +1 g at rest.
     """
     from ..analysis.overview import overview
     from ..analysis.plot import plot
@@ -181,7 +174,6 @@ def plot(
         written = list(plot.draw(seen, out, tiles))
     for path in written:
         click.echo(f"written: {path}")
-    warn(ride, [seen.exchanged] if seen.exchanged else [])
 
 
 @click.command(short_help="Cut a stretch out of a log.")

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from kickstand.errors import Notice
 
+from ..checks.course import log_agrees
 from ..errors import InputError
-from ..logs.axes.course import course_agrees
 from ..logs.csv_lines import write_log
 from ..logs.log import Log
 from ..logs.reader import read_log
@@ -181,7 +181,7 @@ def _check_sign(recording: Recording, joined: Joined) -> None:
     """
     if recording.sign_known:
         return
-    agrees = course_agrees(_seconds(joined), joined.accel_g, joined.gyro_dps, joined.lat_deg, joined.lon_deg)
+    agrees = log_agrees(_seconds(joined), joined.accel_g, joined.gyro_dps, joined.lat_deg, joined.lon_deg)
     if agrees is None:
         recording.notices.append(Notice("import-sign", recording.app))
     elif agrees:

@@ -22,7 +22,6 @@ from ..logs.stretch import Stretch, within
 from ..logs.table import Array, Table
 from . import replay_engine
 from .meter_along import MeterAlong
-from .mount_check import MountCheck
 
 _CHUNK = 500  # samples between two calls of progress while an emulated Pico works
 
@@ -110,17 +109,13 @@ def replay_blocks(
     """Each block of the log with the engine's results for it (n, COLUMNS), NaN where the readings froze: there the
     engine is told of a gap. A car's display shows no lean, so lean_sigma_deg is NaN throughout. notices is appended to
     at the end."""
-    mount, car = MountCheck(calibration), calibration.vehicle == "car"
+    car = calibration.vehicle == "car"
     whole, stretch = apart(log)
     for block, results in _RUN[engine](whole, calibration, progress, notices):
-        believed = block.believed
-        mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
         found = _with_frozen(block, results)
         if car:
             found[:, _SIGMA] = np.nan
         yield from within(stretch, block, found)
-    contradiction = mount.notice()
-    notices += [contradiction] if contradiction else []
     notices += [Notice("car-replayed")] if car else []
 
 
@@ -142,7 +137,7 @@ def _cpython(
     log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
 ) -> Iterator[Replayed]:
     meter = MeterAlong(calibration)
-    for block in read_blocks(log, 2, progress, notices):
+    for block in read_blocks(log, 2, progress, notices, calibration=calibration):
         yield block, meter.columns(block.believed)
 
 
@@ -151,7 +146,7 @@ def _two_processes(
 ) -> Iterator[Replayed]:
     from . import second_process  # a browser's Python cannot import it
 
-    return second_process.columns_of(read_blocks(log, 2, progress, notices), calibration)
+    return second_process.columns_of(read_blocks(log, 2, progress, notices, calibration=calibration), calibration)
 
 
 def _micropython(
@@ -168,7 +163,7 @@ def _micropython(
         with subprocess.Popen(command, env=unix_port.environment(), stdout=subprocess.PIPE) as process:
             assert process.stdout is not None
             results = b""
-            for block in read_blocks(log, 2, progress, notices):
+            for block in read_blocks(log, 2, progress, notices, calibration=calibration):
                 wanted = size * int(np.count_nonzero(~block.frozen))
                 results = process.stdout.read(wanted)
                 if len(results) < wanted:
@@ -199,7 +194,7 @@ def _rp2040(
 
     emulated.run(records, sink)
     results.seek(0)
-    for block in read_blocks(log, notices=notices):
+    for block in read_blocks(log, notices=notices, calibration=calibration):
         wanted = size * int(np.count_nonzero(~block.frozen))
         yield block, _table(results.read(wanted))
 

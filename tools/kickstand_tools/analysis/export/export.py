@@ -14,7 +14,6 @@ from ...logs.source import Progress
 from ...logs.stretch import Stretch
 from ...logs.table import Array
 from ...output import write_whole
-from ...replay.mount_check import MountCheck
 from ..channels import Channels
 from ..downsample import downsampled
 from ..ride import Ride
@@ -71,11 +70,11 @@ def export(
     elif form in _DATED and start_s < _CLOCK_S:
         written_s = Path(log).stat().st_mtime if isinstance(log, (Path, str)) else time.time()
         start_s = float(max(0, int(written_s - whole.seconds)))
-    count, mount = 0, MountCheck(ride.calibration)
+    count = 0
 
     def rows() -> Iterator[Channels]:
         nonlocal count
-        blocks = ride.blocks(progress, notices, mount)
+        blocks = ride.blocks(progress, notices)
         for block in downsampled(blocks, STEP_S[form]) if STEP_S[form] else blocks:
             if form == "gpx":
                 block = block.part(np.isfinite(block.lat_deg) & np.isfinite(block.lon_deg))
@@ -89,9 +88,6 @@ def export(
             yield block
 
     write_whole(Path(out), lambda temporary: _WRITE[form](temporary, rows(), start_s))
-    contradiction = mount.notice()
-    if notices is not None and contradiction:
-        notices.append(contradiction)
     return count
 
 

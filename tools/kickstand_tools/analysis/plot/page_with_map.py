@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ...logs.axes.course import EARTH_M
+from ...signals.geography import EARTH_M
 from ..overview import Overview
 from .in_script import as_script
 from .track_map import MapPoints, figure

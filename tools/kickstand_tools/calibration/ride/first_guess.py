@@ -12,7 +12,7 @@ from kickstand.errors import Refusal
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from ...logs.axes.bends import speed_in_radians
+from ...checks.bends import speed_in_radians
 from ...logs.axes.leaning import WINDOW_S, Leaning, averaged, leaned, leaning_of, without_drift
 from ...logs.table import Array
 from .windows import Windows, known_speed

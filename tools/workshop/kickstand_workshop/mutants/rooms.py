@@ -81,14 +81,9 @@ ROOMS = {
         tuple(TOOLS + f"logs/{name}.py" for name in ("block", "cells", "log", "reader", "source", "table")),
         tuple(TESTS + f"logs/{name}.py" for name in ("test_log", "test_cells", "test_cli_logs", "test_log_blocks")),
     ),
-    "units": Room(
-        (TOOLS + "logs/*_unit.py",),
-        (TESTS + "logs/test_unit_limits.py", TESTS + "logs/axes/test_bends.py", TESTS + "logs/test_speed_unit.py"),
-    ),
-    "replay": Room(
-        (TOOLS + "replay/*.py",),
-        (TESTS + "replay/test_forward_sign.py", TESTS + "replay/test_cli_replay.py"),
-    ),
+    "signals": Room((TOOLS + "signals/*.py",), (TESTS + "signals/*.py",)),
+    "checks": Room((TOOLS + "checks/*.py",), (TESTS + "checks/test_[bcms]*.py", TESTS + "checks/test_handedness.py")),
+    "replay": Room((TOOLS + "replay/*.py",), (TESTS + "replay/test_cli_replay.py",)),
     "analysis": Room(
         (TOOLS + "analysis/*.py", TOOLS + "analysis/plot/*.py"),
         (TESTS + "analysis/*.py", TESTS + "analysis/stops/*.py"),
