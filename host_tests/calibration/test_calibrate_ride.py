@@ -16,8 +16,8 @@ from kickstand_tools.calibration.ride.first_guess import first_guess
 from kickstand_tools.calibration.ride.phone import PHONES
 from kickstand_tools.calibration.ride.rotations import rotation_between, turned
 from kickstand_tools.calibration.ride.windows import windows_of
+from kickstand_tools.logs.frozen import without_frozen
 from kickstand_tools.logs.log import Log
-from kickstand_tools.logs.mended.frozen import believed
 
 RIDES = [(profile, seed) for seed in (21, 22) for profile in ("street", "track", "city", "hills", "sweeper")]
 RATE_HZ = 200
@@ -193,7 +193,7 @@ def test_windows_with_frozen_or_absurd_readings_are_no_windows():
     log = log_of(simulated(), speed=False)
     log.accel_g[10000:14000], log.gyro_dps[10000:14000] = log.accel_g[10000], log.gyro_dps[10000]
     log.gyro_dps[20000, 1] = 1e5
-    windows = windows_of(believed(log))
+    windows = windows_of(without_frozen(log))
     gone = np.setdiff1d(np.round(np.arange(0.1, log.t_s[-1], 0.2), 1), np.round(windows.time_s, 1))
     assert gone == pytest.approx([*np.arange(50.3, 70.0, 0.2), 100.1])
     assert np.flatnonzero(~windows.linked[:-1]).tolist() == [250, 400]

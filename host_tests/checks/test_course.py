@@ -12,7 +12,7 @@ from kickstand_tools.checks.course import course_agrees
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.simulation.positions import positions
+from kickstand_tools.simulation.files import positions
 from kickstand_tools.simulation.ride import ride
 
 

@@ -1,18 +1,17 @@
 """Updates of a board with an older version: what goes, broken off at any step, and the room that is needed."""
 
 import functools
-import types
 from pathlib import PurePosixPath
 from typing import Any
 
 import command
+import fake_board
 import pytest
 from kickstand.rides import flash_ring
-from kickstand_tools.deploy import bytecode, connection, firmware_files, flash, room
+from kickstand_tools.deploy import bytecode, firmware_files, flash, room
 from kickstand_tools.deploy.board_files import BoardFiles, fingerprint, survey
 from kickstand_tools.deploy.update import needed_blocks, plan, refuse_without_room
 from littlefs_board import BLOCK, PORTS, LittlefsBoard
-from serial.tools import list_ports
 
 # The modules of version 0.2.0, all in one folder.
 FLAT = """
@@ -55,12 +54,8 @@ def plugged(monkeypatch):
     """plugged(board): the only board that there is."""
 
     def plug(board):
-        pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
-        monkeypatch.setattr(list_ports, "comports", lambda: [pico])
-        monkeypatch.setattr(connection, "Board", lambda name, timeout: board)
-        monkeypatch.setattr(connection, "_RESTART_S", 0)
-        monkeypatch.setattr(flash, "contents", lambda mpy: dict(contents(mpy or None)))
-        return board
+        monkeypatch.setattr(flash, "contents", lambda mpy, _compiler: dict(contents(mpy or None)))
+        return fake_board.plug_in(monkeypatch, board)
 
     return plug
 

@@ -1,15 +1,18 @@
-"""The pieces of alignment by driving, one by one, against numpy where there is something to compute."""
+"""The steps of alignment by driving, one by one, against numpy where there is something to compute."""
+
+import types
 
 import driving_runs
 import numpy as np
 import pytest
 from engines import ENGINES, run
 from kickstand.drive_alignment import parts, vertical
-from kickstand.drive_alignment.events import EventFinder
+from kickstand.drive_alignment.alignment import DriveAlignment
+from kickstand.drive_alignment.events import DrivingEvents, EventFinder, LastEvent
 from kickstand.drive_alignment.history import BIN_US, MASK, SIZE, ForceHistory
 from kickstand.drive_alignment.regression import Fit, ForwardRegression
-from kickstand.drive_alignment.speed_check import LIVELY_G, STUCK_S, TURNING_DPS, SpeedCheck
-from kickstand.drive_alignment.vertical import StandingVertical
+from kickstand.drive_alignment.speed_check import LIVELY_G, STUCK_S, TURNING_DPS, SpeedCheck, fit_problem
+from kickstand.drive_alignment.vertical import StandingVertical, Vertical
 from kickstand_tools.calibration.published.dispersion import NONE
 from kickstand_tools.calibration.published.rodrigues import rotation_between
 
@@ -22,7 +25,7 @@ def unit(rng):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("off_deg", [0.0, 1e-3, 0.01, 0.1, 1.0, 45.0, 89.9, 90.1, 179.0, 179.9, 179.99, 180.0])
+@pytest.mark.parametrize("off_deg", [0.0, 0.01, 45.0, 89.9, 90.1, 179.99, 180.0])
 def test_rotation_between_is_safe_at_every_angle(engine, off_deg):
     """It is a rotation and takes a to b, within 2e-6, even where a and b are exactly antiparallel."""
     rng = np.random.default_rng(3)
@@ -54,7 +57,7 @@ def test_rotation_between_in_32_bits():
 
 
 @pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("sigma_deg", [1.0, 4.0, 8.0, 20.0])
+@pytest.mark.parametrize("sigma_deg", [1.0, 20.0])
 def test_dispersion_is_fishers(engine, sigma_deg):
     rng = np.random.default_rng(7)
     angles = 2.5 + np.radians(sigma_deg) * rng.normal(size=400)
@@ -278,7 +281,7 @@ def test_a_bend_at_a_stuck_zero_is_no_stop(share, moved):
 
 @pytest.mark.parametrize(("share", "stuck"), [(0.9, False), (1.1, True)])
 def test_a_speed_that_stays_the_same_while_driving_is_stuck(share, stuck):
-    """Two ways not to be stuck: too few lively seconds, or a change of force too small for a lively second."""
+    """It is not with too few lively seconds, or a change of force too small for a lively second."""
     check = SpeedCheck()
     for k in range(round(share * (STUCK_S + 1))):
         check.measure(7.0)
@@ -305,3 +308,80 @@ def test_a_speed_below_zero(speed, bad):
     check = SpeedCheck()
     check.measure(speed)
     assert (check.problem is not None) is bad
+
+
+def test_a_change_of_speed_begins_the_count_again():
+    check = SpeedCheck()
+    for k in range(15):
+        check.measure(7.0 if k < 8 else 7.1)
+        check.update_second([0.0, 1.0, 0.1 * (k % 2)])
+    assert check.problem is None
+
+
+@pytest.mark.parametrize(("ratio", "factor"), [(0.25, 4.0), (-1.0, 99.9)])
+def test_a_wrong_unit_is_said_as_what_the_speed_is_multiplied_by(ratio, factor):
+    problem = fit_problem(0.0, ratio)
+    assert (problem.code, problem.values) == ("speed-unit", (factor,))
+
+
+def test_only_two_acceleration_events_count():
+    found = DrivingEvents(ForceHistory())
+    for braking, acceleration, counted in ((0, 1, 1), (0, 5, 2), (3, 5, 5)):
+        found.braking_count, found.acceleration_count = braking, acceleration
+        assert (found.counted, found.straight_count) == (counted, braking + acceleration)
+
+
+def test_the_last_event_shows_forward():
+    """Braking by 0.3 and 0.5 g for half a second each: force is the vertical and so much to the back."""
+    last = LastEvent()
+    last.add(0.5, 99.0, [1.0, 1.0, 1.0])
+    last.clear()
+    for a in (-0.3, -0.5):
+        last.add(0.5, 0.5 * a, [0.5 * 0.8 * a, 0.5, 0.5 * 0.6 * a])
+    out = [0.0] * 3
+    assert last.forward(out, UP) == pytest.approx(0.5 * (0.3**2 + 0.5**2))
+    assert out == pytest.approx([0.8, 0.0, 0.6])
+
+
+def test_where_the_vertical_comes_from():
+    """A car's: its stops, and with a fit the mean of both. A motorcycle's: the upright pose; else straight riding."""
+    standing = types.SimpleNamespace(stops=0, up=level(10.0))
+    fit = types.SimpleNamespace(level=[2.0 * part for part in level(4.0)])
+
+    def pitch(vertical, fit=None):
+        out = [0.0] * 3
+        return np.degrees(np.arctan2(out[2], out[1])) if vertical.known(out, fit) else None
+
+    car, bike, posed = Vertical(True, None, standing), Vertical(False, None, standing), Vertical(False, UP, standing)
+    assert (pitch(car), pitch(bike), pitch(posed), pitch(car, fit)) == (None, None, 0.0, None)
+    assert (pitch(bike, fit), pitch(posed, fit)) == (pytest.approx(4.0), 0.0)
+    standing.stops = 1
+    assert (pitch(car), pitch(car, fit)) == (pytest.approx(10.0), pytest.approx(7.0))
+    for pitch_deg, times, mean in ((0.0, 1, 0.0), (8.0, 1, 4.0), (8.0, 60, 8.0)):  # of the last minute
+        for _ in range(times):
+            bike.update(level(pitch_deg), 10.0)
+        assert pitch(bike) == pytest.approx(mean, abs=0.1)
+    assert bike.turn_axis == pytest.approx(level(8.0), abs=0.01)
+    assert posed.turn_axis == pytest.approx(UP)
+    assert car.turn_axis is standing.up
+
+
+def test_what_is_missing_is_said_in_the_order_in_which_it_can_be_done():
+    drive, codes = DriveAlignment("car"), []
+
+    def missing(*counts):
+        codes.append(drive.missing(*counts).code)
+
+    missing(0, 5, 0)
+    drive.measure_speed(1.0)
+    missing(0, 5, 0)
+    drive.measure_speed(3.0)
+    missing(0, 5, 0)
+    drive.standing.stops = 1
+    missing(4, 5, 1)
+    missing(5, 5, 1)
+    drive.quality.quality_deg = 3.0
+    missing(5, 5, 1)
+    drive.quality.agree = True
+    missing(5, 5, 1)
+    assert codes == ["no-speed", "not-driven", "not-stopped", "few-events", "uncertain", "parts-differ", "uncertain"]

@@ -1,4 +1,4 @@
-"""What a sensor on a bike feels, by the equations of motion alone: for tests that MicroPython runs too."""
+"""What a sensor on a bike measures, by the equations of motion alone: for tests that MicroPython runs too."""
 
 from math import cos, degrees, pi, radians, sin, tan
 
@@ -10,7 +10,7 @@ DT_US = 10_000
 DT_S = DT_US * 1e-6
 
 
-def felt(lean_deg=0.0, speed_mps=0.0, roll_dps=0.0, forward_mps2=0.0):
+def force_and_rate(lean_deg=0.0, speed_mps=0.0, roll_dps=0.0, forward_mps2=0.0):
     """Force (left, up, forward in g) and rate (rad/s) of a bike on a level road, in balance from 1 m/s on."""
     t = radians(lean_deg)
     yaw = -GRAVITY_MPS2 * tan(t) / speed_mps if speed_mps > 1.0 else 0.0
@@ -33,10 +33,10 @@ def meter(calibration=None, **options):
 
 
 def ride(shown, seconds, speed_mps=None, **motion):
-    """Let the meter feel a steady motion; speed_mps is felt, not told."""
-    felt_now = reading(*felt(speed_mps=speed_mps or 0.0, **motion))
+    """A steady motion; speed_mps shows in the readings only, it is not measured by another sensor."""
+    readings = reading(*force_and_rate(speed_mps=speed_mps or 0.0, **motion))
     for _ in range(int(seconds / DT_S + 0.5)):
-        shown.update(felt_now, DT_US)
+        shown.update(readings, DT_US)
     return shown
 
 
@@ -46,7 +46,7 @@ def roll(shown, from_deg, to_deg, speed_mps=0.0, dps=60.0):
     rate = (to_deg - from_deg) / (steps * DT_S)
     for k in range(steps):
         lean = from_deg + (to_deg - from_deg) * (k + 1) / steps
-        shown.update(reading(*felt(lean, speed_mps, rate)), DT_US)
+        shown.update(reading(*force_and_rate(lean, speed_mps, rate)), DT_US)
     return shown
 
 
@@ -55,7 +55,7 @@ def speed_up(shown, from_mps, to_mps, seconds):
     rate = (to_mps - from_mps) / seconds
     steps = int(seconds / DT_S + 0.5)
     for k in range(steps):
-        shown.update(reading(*felt(0.0, from_mps + rate * DT_S * (k + 1), 0.0, rate)), DT_US)
+        shown.update(reading(*force_and_rate(0.0, from_mps + rate * DT_S * (k + 1), 0.0, rate)), DT_US)
     return shown
 
 

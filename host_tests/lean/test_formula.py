@@ -64,7 +64,7 @@ def test_free_fall_and_huge_forces_give_a_number(engine):
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
-@pytest.mark.parametrize("lean", [-45, -20, 20, 45])
+@pytest.mark.parametrize("lean", [-45, 20])
 def test_shown_lean_does_not_decay_in_a_held_turn(engine, lean):
     """Sixty seconds in a turn, with 5 % of vibration: where gravity-seeking filters decay to zero."""
     ride = Ride([upright(5), accelerate(20, 8), turn(lean, 60)])
@@ -80,7 +80,7 @@ def test_shown_lean_does_not_decay_in_a_held_turn(engine, lean):
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
-@pytest.mark.parametrize("lean", [-60, -12, 0, 0.5, 30, 60])
+@pytest.mark.parametrize("lean", [-60, 0.5, 30])
 def test_shown_lean_of_a_standing_bike(engine, lean):
     force = [np.sin(np.radians(lean)), np.cos(np.radians(lean)), 0.0]
     rng = np.random.default_rng(7)

@@ -1,18 +1,18 @@
 """The lean filter's figures over one ride: whatever changes them changes every rider's lean, so it has to be meant.
 
-The ride has all that the filter knows: rest, bias, a yaw error, scale errors, slopes, vibration, turns, told speeds,
-slow samples, lost ones, a restart under way. Other tests say what each parameter does; this one notices that any has
-changed. After a change that is meant, in host_tests/lean, with firmware and tools on PYTHONPATH:
+The ride has all that the filter knows: rest, bias, a yaw error, scale errors, slopes, vibration, turns, slow samples,
+measured speeds, lost samples, a restart under way. Other tests say what each parameter does; this one notices that
+any has changed. After a change that is meant, in host_tests/lean, with firmware and tools on PYTHONPATH:
 python test_known_ride.py > known_ride.csv
 Runs on MicroPython too.
 """
 
 from math import cos, degrees, radians, sin, sqrt
 
-from bike_motion import felt
+from bike_motion import force_and_rate
 from kickstand.lean.lean_filter import LeanFilter
 
-# seconds, then at their end: lean in degrees, speed in m/s, slope in degrees; whether the speed is told each second
+# seconds, then at their end: lean in degrees, speed in m/s, slope in degrees; whether the speed is measured each second
 LEGS = (
     (6, 3, 0, 2, False),
     (6, 0, 16, 0, False),
@@ -50,19 +50,19 @@ TOLERANCES = 0.02, 0.02, 0.02, 0.02, 0.005  # of a row's values
 
 
 def states():
-    """(seconds, lean in degrees, speed in m/s, slope in degrees; their rates of change; told) at every 10 ms."""
+    """(seconds, lean in degrees, speed in m/s, slope in degrees; their rates of change; measured) at every 10 ms."""
     t_s, before = 0.0, (3, 0, 2)
-    for seconds, *after, told in LEGS:
+    for seconds, *after, measured in LEGS:
         rates = [(b - a) / seconds for a, b in zip(before, after)]
         for k in range(100 * seconds):
-            yield t_s + k / 100.0, [a + r * k / 100.0 for a, r in zip(before, rates)], rates, told
+            yield t_s + k / 100.0, [a + r * k / 100.0 for a, r in zip(before, rates)], rates, measured
         t_s, before = t_s + seconds, after
 
 
 def sensed(t_s, values, rates):
-    """Force and rate as a part with errors feels them."""
+    """Force and rate as a part with errors measures them."""
     lean, speed, slope = values
-    (left, up, forward), (x, y, z) = felt(lean, speed, rates[0], rates[1])
+    (left, up, forward), (x, y, z) = force_and_rate(lean, speed, rates[0], rates[1])
     forward += sin(radians(slope))
     x -= radians(rates[2]) * cos(radians(lean))
     y += radians(rates[2]) * sin(radians(lean))
@@ -76,16 +76,16 @@ def sensed(t_s, values, rates):
 def figures():
     """Each second: lean and 1 sigma in degrees, speed in m/s, pitch and trim in degrees, 1 at rest."""
     estimator, before_s, rows = LeanFilter(), 0.0, []
-    for k, (t_s, values, rates, told) in enumerate(states()):
+    for k, (t_s, values, rates, measured) in enumerate(states()):
         if SLOW_S[0] <= t_s < SLOW_S[1] and k % 2:
             continue
-        if told and k % 100 == 50:
+        if measured and k % 100 == 50:
             estimator.measure_speed(values[1] + 0.4)
         if abs(t_s - RESTART_S) < 1e-6:
             estimator.restart()
         for lost_s, seconds in LOST:
             if abs(t_s - lost_s) < 1e-6:
-                estimator.doubt(seconds)
+                estimator.inflate_covariance(seconds)
         lean = estimator.update(*sensed(t_s, values, rates), int((t_s - before_s) * 1e6 + 0.5))
         before_s = t_s
         if k % 100 == 0 and k:

@@ -1,73 +1,140 @@
-"""The meter: what it shows as certain, and how late the sensor's low-pass may be."""
+"""The meter: what it shows as certain, which maxima it keeps, what a gap does to it. Runs on MicroPython too."""
 
-import math
+from math import degrees, pi, radians
 
-import pytest
+from bike_motion import DT_US, force_and_rate, meter, near, nose_up, reading, ride, roll, speed_up
 from kickstand.calibration.parameters import Calibration
-from kickstand.lean import lean_filter
-from kickstand_tools.replay.replay_engine import ReplayMeter
-from kickstand_tools.simulated_board.simulator import Board
 
-DT_US = 10_000
-STILL = (0.0, 1.0, 0.0, 25.0, 0.0, 0.0, 0.0)
+STILL = reading(*force_and_rate())
 
 
-@pytest.fixture
-def gyro_delay_s():
-    """The driver's table: seconds by DLPF, 1 to 6."""
-    board = Board(lambda t: STILL)
-    board.install()  # the driver needs MicroPython's time
-    try:
-        from kickstand.imu.mpu6050 import GYRO_DELAY_S
-    finally:
-        board.uninstall()
-    return GYRO_DELAY_S
+def test_the_g_shown_follows_smoothly_whether_aligned_or_not():
+    for aligned in (True, False):
+        calibration = Calibration()
+        calibration.aligned = aligned
+        shown, seen = meter(calibration, leans=False), []
+        shown.update(STILL, 0)
+        for _ in range(150):
+            shown.update((0.2, 1.2, 0.4, 25.0, 0.0, 0.0, 0.0), DT_US)
+            seen.append(shown.smooth_force[2])
+        assert seen == sorted(seen)
+        assert seen[10] < 0.2
+        for value, force in zip(shown.smooth_force, (0.2, 1.2, 0.4)):
+            near(value, force, 0.01)
 
 
-def meter(**options):
-    calibration = Calibration()
-    for i in range(9):
-        calibration.vehicle_from_sensor[i] = 1.0 if i % 4 == 0 else 0.0
-    return ReplayMeter(calibration, **options)
-
-
-def stand(shown, seconds=5.0):
-    for _ in range(round(seconds * 1e6 / DT_US)):
-        shown.update(STILL, DT_US)
-    return shown
+def test_the_first_g_is_shown_at_once_also_after_a_gap():
+    shown = meter(leans=False)
+    shown.update((0.1, 0.9, 0.3, 25.0, 0.0, 0.0, 0.0), 10_000)
+    near(shown.smooth_force[2], 0.3, 1e-12)
+    near(shown.smooth_force[0], 0.1, 1e-12)
+    shown.update((-0.1, 1.1, -0.3, 25.0, 0.0, 0.0, 0.0), 600_000)
+    near(shown.smooth_force[2], -0.3, 1e-12)
 
 
 def test_a_standing_bike_is_at_rest_and_upright():
-    shown = stand(meter())
+    shown = ride(meter(), 3.0)
     assert shown.at_rest
     assert shown.trusted
-    assert shown.speed_mps == pytest.approx(0.0, abs=0.01)
-    assert shown.lean_deg == pytest.approx(0.0, abs=0.01)
+    near(shown.speed_mps, 0.0, 0.01)
+    near(shown.lean_deg, 0.0, 0.01)
 
 
-def test_the_lean_is_distrusted_for_a_reason_until_it_is_trusted_again():
-    shown = stand(meter())
-    shown.distrust("mount has moved")
-    assert shown.doubt == "mount has moved"
-    assert not shown.trusted
-    shown.trust()
-    assert shown.doubt is None
+def test_a_lean_is_shown_once_it_is_certain_and_no_longer_when_it_is_not():
+    """Power-on on a straight at 20 m/s after a bump: uncertain at first, more certain with each second."""
+    shown, trusted, sigmas = meter(), [], []
+    shown.update(reading([0.0, 1.0, 0.5], [0.0, 0.0, 0.0]), 0)
+    for _ in range(2000):
+        shown.update(STILL, DT_US)
+        trusted.append(shown.trusted)
+        sigmas.append(shown.filter.variance)
+    assert not trusted[0]
+    assert trusted[-1]
+    assert min([s for s, t in zip(sigmas, trusted) if not t]) > max([s for s, t in zip(sigmas, trusted) if t])
+
+
+def test_with_the_nose_far_up_or_down_there_is_no_lean():
+    for sign in (1.0, -1.0):
+        shown = nose_up(ride(meter(), 4.0), 0.0, sign * 15.0)
+        assert shown.trusted
+        assert not nose_up(shown, sign * 15.0, sign * 25.0).trusted
+        assert nose_up(shown, sign * 25.0, 0.0).trusted
+
+
+def test_a_car_shows_its_g_however_it_stands():
+    shown = nose_up(ride(meter(leans=False), 1.0), 0.0, 25.0)
     assert shown.trusted
-    with pytest.raises(AttributeError):
-        setattr(shown, "doubt", "written")  # noqa: B010 type checkers know that it is read only
+    assert shown.lean_deg == 0.0
 
 
-def test_a_doubt_is_about_one_calibration():
-    shown = stand(meter())
+def test_a_bike_that_lies_on_its_side_for_a_second_has_fallen():
+    for sign in (1.0, -1.0):
+        lying = sign * 80.0
+        shown = ride(roll(ride(meter(), 3.0), 0.0, lying, dps=120.0), 0.5, lean_deg=lying)
+        assert not shown.fallen
+        assert ride(shown, 0.7, lean_deg=lying).fallen
+        assert not roll(shown, lying, sign * 60.0).fallen
+        roll(shown, sign * 60.0, lying)
+        assert not ride(shown, 0.5, lean_deg=lying).fallen  # the second counts from its latest fall
+        assert ride(shown, 0.7, lean_deg=lying).fallen
+        shown.restart()
+        assert not shown.fallen
+        assert shown.lean_deg == 0.0
+
+
+def test_the_lean_of_a_fall_is_no_maximum():
+    shown = ride(roll(ride(meter(), 3.0), 0.0, 63.0), 0.2, lean_deg=63.0)
+    near(shown.max_right_deg, 63.0, 0.5)  # the low-pass is made up for
+    roll(shown, 63.0, 85.0)
+    assert shown.lean_deg > 80.0
+    assert shown.max_right_deg < 65.0
+
+
+def test_maxima_are_the_largest_of_each_side_until_they_are_reset():
+    shown = ride(meter(), 3.0)
+    for lean_from, lean_to in ((0.0, 20.0), (20.0, -10.0), (-10.0, 8.0), (8.0, -30.0), (-30.0, 0.0)):
+        ride(roll(shown, lean_from, lean_to), 0.3, lean_deg=lean_to)
+    near(shown.max_right_deg, 20.0, 0.5)
+    near(shown.max_left_deg, 30.0, 0.5)
+    shown.reset_maxima()
+    assert shown.max_right_deg < 0.1
+    assert shown.max_left_deg == shown.max_accel_g == shown.max_brake_g == 0.0
+    speed_up(shown, 0.0, 12.0, 4.0)
+    near(shown.max_accel_g, 3.0 / 9.80665, 0.01)
+    assert shown.max_brake_g < 0.01
+    speed_up(shown, 12.0, 2.0, 2.0)
+    near(shown.max_brake_g, 5.0 / 9.80665, 0.01)
+    near(shown.max_accel_g, 3.0 / 9.80665, 0.01)
+    ride(shown, 0.5)
+    shown.reset_maxima()
+    assert shown.max_right_deg == shown.max_left_deg == shown.max_accel_g == shown.max_brake_g == 0.0
+
+
+def test_the_lean_is_distrusted_for_a_reason_and_is_no_maximum_until_it_is_trusted_again():
+    shown = ride(meter(), 3.0)
+    shown.distrust("mount has moved")
+    assert shown.suppressed_reason == "mount has moved"
+    roll(shown, 0.0, 30.0)
+    assert not shown.trusted
+    near(shown.lean_deg, 30.0, 0.5)
+    assert shown.max_right_deg < 0.1
+    shown.trust()
+    assert shown.suppressed_reason is None
+    assert ride(shown, 0.2, lean_deg=30.0).trusted
+    near(shown.max_right_deg, 30.0, 0.2)
+
+
+def test_a_reason_for_distrust_belongs_to_one_calibration():
+    shown = ride(meter(), 3.0)
     shown.distrust("side was wrong?")
     shown.use(shown.calibration)
-    assert shown.doubt == "side was wrong?"
+    assert shown.suppressed_reason == "side was wrong?"
     shown.use(Calibration())
-    assert shown.doubt is None
+    assert shown.suppressed_reason is None
 
 
-def test_a_car_has_no_lean_to_doubt():
-    shown = stand(meter(leans=False))
+def test_a_car_has_no_lean_to_distrust():
+    shown = ride(meter(leans=False), 3.0)
     shown.distrust("mount has moved")
     assert shown.trusted
 
@@ -75,28 +142,134 @@ def test_a_car_has_no_lean_to_doubt():
 def test_the_trim_of_the_calibration_is_taken_off():
     calibration = Calibration()
     calibration.trim_deg = 1.5
-    shown = ReplayMeter(calibration)
-    assert shown.trim_deg == pytest.approx(1.5)
-    for i in range(9):
-        calibration.vehicle_from_sensor[i] = 1.0 if i % 4 == 0 else 0.0
-    shown.use(calibration)
-    assert stand(shown).lean_deg == pytest.approx(-1.5, abs=0.01)
+    shown = meter(calibration)
+    near(shown.trim_deg, 1.5, 1e-5)
+    near(ride(shown, 3.0).lean_deg, -1.5, 0.01)
 
 
-def test_a_slower_low_pass_takes_off_more(gyro_delay_s):
-    """Rolling at 60 deg/s: lean is shown as it is now, by the delay of the low-pass times the rate ahead."""
-    rate_dps = 60.0
-    ahead = []
-    for delay_s in gyro_delay_s.values():
-        shown = stand(meter(delay_s=delay_s))
-        before = math.degrees(shown.filter._x[0])  # the state itself
-        shown.update((*STILL[:6], rate_dps), DT_US)
-        ahead.append(shown.lean_deg - before - rate_dps * DT_US * 1e-6)
-    assert ahead == pytest.approx([rate_dps * delay for delay in gyro_delay_s.values()], abs=0.01)
-    assert ahead == sorted(ahead)
-    assert ahead[5] > ahead[2] + 0.8
+def test_what_lasts_less_than_150_ms_is_no_maximum():
+    """A pothole that jerks the sensor by 18 degrees, to either side."""
+    shown = ride(roll(ride(meter(), 3.0), 0.0, 20.0), 0.3, lean_deg=20.0)
+    for sign in 1.0, -1.0:
+        for _ in range(3):
+            roll(shown, 20.0, 20.0 + sign * 18.0, dps=300.0)
+            roll(shown, 20.0 + sign * 18.0, 20.0, dps=300.0)
+            ride(shown, 0.1, lean_deg=20.0)
+        near(shown.max_right_deg, 20.0, 0.5)
+    roll(shown, 20.0, 30.0, dps=300.0)
+    ride(shown, 0.13, lean_deg=30.0)
+    assert shown.max_right_deg < 30.0
+    ride(shown, 0.1, lean_deg=30.0)
+    near(shown.max_right_deg, 30.0, 0.5)
 
 
-def test_without_a_setting_the_delay_is_that_of_the_default_low_pass(gyro_delay_s):
-    assert lean_filter.DELAY_S == gyro_delay_s[3]
-    assert tuple(gyro_delay_s.values()) == (0.0019, 0.0028, 0.0048, 0.0083, 0.0134, 0.0186)
+def test_a_short_gap_is_bridged_and_after_a_long_one_the_filter_begins_anew():
+    """The movement during a bridged gap is taken from the rate at its end."""
+    shown = ride(meter(), 3.0)
+    shown.update(reading(*force_and_rate(4.0, roll_dps=10.0)), 400_000)
+    near(shown.lean_deg, 4.0, 0.3)
+    shown.update(reading(*force_and_rate(-20.0, roll_dps=50.0)), 600_000)
+    near(shown.lean_deg, -20.0, 0.01)  # by the force alone: no rate is multiplied by the gap
+    assert shown.filter.variance == pi * pi  # one reading says nothing yet
+    assert not shown.trusted
+    assert not shown.at_rest
+
+
+def test_lost_readings_make_the_lean_uncertain():
+    for lost_us, trusted in ((150_000, True), (300_000, False)):
+        shown = ride(meter(), 3.0)
+        shown.update(STILL, lost_us)
+        assert shown.trusted is trusted
+
+
+def trimmed(angle_deg, sigma_deg, kept_deg=0.0):
+    """A bike that stands, whose ride has found this trim so surely."""
+    calibration = Calibration()
+    calibration.trim_deg = kept_deg
+    shown = ride(meter(calibration), 3.0)
+    shown.filter.trim.angle, shown.filter.trim.variance = radians(angle_deg), radians(sigma_deg) ** 2
+    return shown
+
+
+def test_a_trim_is_kept_if_it_is_certain_and_has_changed():
+    for angle_deg, sigma_deg, kept_deg, keeps in (
+        (1.0, 0.3, 0.0, True),
+        (-1.0, 0.3, 0.0, True),
+        (1.0, 0.8, 0.0, False),
+        (1.0, 0.3, 0.9, False),
+    ):
+        shown = trimmed(angle_deg, sigma_deg, kept_deg)
+        assert shown.keep_trim() is keeps, (angle_deg, sigma_deg, kept_deg)
+        near(shown.calibration.trim_deg, angle_deg if keeps else kept_deg, 1e-5)
+        assert not shown.keep_trim()  # once is enough
+
+
+def test_no_trim_is_kept_while_it_rides():
+    shown = trimmed(1.0, 0.3)
+    speed_up(shown, 0.0, 15.0, 5.0)
+    assert not shown.at_rest
+    assert not shown.keep_trim()
+    assert shown.calibration.trim_deg == 0.0
+
+
+def test_the_delay_of_the_low_pass_is_made_up_for():
+    """Rolling to the right at 60 deg/s, what is measured is some milliseconds old: the lean is larger by now."""
+    now, late = ride(meter(delay_s=0.0), 3.0), ride(meter(delay_s=0.02), 3.0)
+    for k in range(10):
+        for shown in (now, late):
+            shown.update(reading(*force_and_rate(0.6 * (k + 1), roll_dps=60.0)), DT_US)
+    near(late.lean_deg - now.lean_deg, 60.0 * 0.02, 0.01)
+    near(now.lean_deg, 6.0, 0.2)
+
+
+def test_a_speed_below_zero_is_no_news():
+    given, alone = meter(), meter()
+    for shown in (given, alone):
+        ride(speed_up(ride(shown, 3.0), 0.0, 20.0, 6.0), 1.0, speed_mps=20.0)
+    given.measure_speed(-1.0)
+    for shown in (given, alone):
+        ride(shown, 1.0, speed_mps=20.0)
+    assert given.speed_mps == alone.speed_mps
+    given.measure_speed(0.0)  # a zero is one
+    ride(given, 1.0, speed_mps=20.0)
+    assert given.speed_mps < alone.speed_mps - 0.5
+
+
+def test_another_calibration_or_a_restart_forgets_the_ride_and_keeps_the_maxima():
+    shown = ride(roll(ride(meter(), 3.0), 0.0, 20.0), 0.2, lean_deg=20.0)
+    assert shown.trusted
+    shown.restart()
+    assert not shown.trusted
+    near(shown.max_right_deg, 20.0, 0.5)
+    ride(shown, 3.0)
+    assert shown.trusted
+    shown.use(shown.calibration)
+    assert not shown.trusted
+    near(shown.max_right_deg, 20.0, 0.5)
+
+
+def test_a_meter_takes_sums_of_counts():
+    from array import array
+
+    calibration = Calibration()
+    calibration.set_scale(4096, 65.5)
+    shown = meter(calibration)
+    assert shown.reading == [0] * 7
+    shown.update_sum(array("i", [8, 3 * 4096, 4, 100, -2, 6, 131]), 3, 0)
+    assert [round(3 * value, 6) for value in shown.reading] == [8, 12288, 4, 100, -2, 6, 131]
+    near(shown.force[1], 1.0, 0.001)
+    near(degrees(shown.rate[2]), 131 / 3 / 65.5, 0.01)
+    shown.restart()
+    counts = array("i", [2 * 1401, 2 * 3849, 0, 0, 0, 0, 0])  # 20 degrees
+    for _ in range(200):
+        shown.update_sum(counts, 2, DT_US)
+    near(shown.lean_deg, 20.0, 0.1)
+    assert shown.at_rest
+
+
+def test_the_formulas_lean_takes_the_yaw_rate():
+    """A turn of 30 degrees that a bike leans into: the rate about left has its other sign at the nose down."""
+    force, rate = force_and_rate(30.0, 15.0)
+    shown = meter()
+    shown.update(reading(force, [-rate[0], rate[1], rate[2]]), 0)
+    near(shown.lean_formula_deg, 30.0, 0.01)

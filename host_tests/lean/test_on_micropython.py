@@ -19,9 +19,8 @@ for name in sorted(dir(module)):
 
 
 MODULES = (
-    "test_meter_limits",
-    "test_filter_limits",
-    "test_formula_limits",
+    "test_meter",
+    "test_filter_states",
     "test_rest",
     "test_upright_trim",
     "test_measurements",

@@ -113,13 +113,12 @@ def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
     assert max(abs(a - b) for a, b in zip(exact[: len(leans)], leans, strict=True)) < 0.05
 
 
-@pytest.mark.parametrize("temp_c", [-5.0, 48.0])
-def test_a_ride_tells_how_warm_the_sensor_was(temp_c, tmp_path):
-    plan = {"seed": 3, "temp_c": temp_c, "config": {"RECORD": True}, "until": 12}
+def test_a_ride_says_how_warm_the_sensor_was(tmp_path):
+    plan = {"seed": 3, "temp_c": -5.0, "config": {"RECORD": True}, "until": 12}
     devices.run("cpython", tmp_path, plan)
-    told = [block.centidegrees / 100 for block in rides(tmp_path)[0][1]]
-    assert told
-    assert told == pytest.approx([temp_c] * len(told), abs=0.2)
+    said = [block.centidegrees / 100 for block in rides(tmp_path)[0][1]]
+    assert said
+    assert said == pytest.approx([-5.0] * len(said), abs=0.2)
 
 
 def test_a_wheel_is_not_misread_while_flash_is_erased(tmp_path, monkeypatch):
@@ -156,57 +155,6 @@ def test_a_wheel_is_not_misread_while_flash_is_erased(tmp_path, monkeypatch):
     speeds = [turn.speed_mps for turn in turns if turn.speed_mps is not None and turn.time_us > 8e6]
     assert len(speeds) > 200
     assert speeds == pytest.approx([6.0] * len(speeds), abs=0.1)
-
-
-@pytest.mark.parametrize("failing", [False, True])
-def test_a_wheel_is_told_of_a_ride_that_begins_or_ends(failing, tmp_path, monkeypatch):
-    """Both erase flash, in which time no edge is noticed; no speed is made of the pulses before and after. Also where
-    recording ends by itself, because the flash has failed."""
-    with Board(lambda t_s: (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 25.0)):
-        from kickstand.speed.wheel import Wheel
-
-    calls, boards = [], []
-    polled, told, fit = Wheel.poll, Wheel.after_stall, Board.fit_wheel
-    ends = "write" if failing else "end"
-
-    def fitted(self, *arguments, **kind):
-        fit(self, *arguments, **kind)
-        boards.append(self)
-
-    def erasing(name, function):
-        def erase(self, *more):
-            boards[0].clock.advance(45_000)
-            calls.append(name)
-            if name == "write" and failing:
-                raise OSError(5)
-            return function(self, *more)
-
-        return erase
-
-    def poll(self, now_ms):
-        if calls[-1:] != ["poll"]:
-            calls.append("poll")
-        return polled(self, now_ms)
-
-    def after_stall(self, now_ms):
-        calls.append("told")
-        told(self, now_ms)
-
-    monkeypatch.setattr(Board, "fit_wheel", fitted)
-    for name in ("begin", ends):
-        monkeypatch.setattr(RideRing, name, erasing(name, getattr(RideRing, name)))
-    monkeypatch.setattr(Wheel, "poll", poll)
-    monkeypatch.setattr(Wheel, "after_stall", after_stall)
-    # The menu has one entry more: alignment by driving
-    presses = [[8, LONG], *([10 + i, SHORT] for i in range(5)), [16, LONG]]
-    presses += [[20, LONG], *([22 + i, SHORT] for i in range(5)), [28, LONG]]
-    plan = {"ride": [["wait", 40.0]], "wheel": {}, "config": {"SPEED": "wheel"}, "presses": presses, "until": 32}
-    devices.run("cpython", tmp_path, ALIGNED)
-    devices.run("cpython", tmp_path, plan)
-    assert ends in calls and "begin" in calls
-    for erased, after, then in zip(calls, calls[1:], calls[2:], strict=False):
-        if erased in ("begin", ends):
-            assert (after, then) == ("told", "poll"), calls
 
 
 def test_the_menu_starts_and_ends_a_ride(tmp_path):

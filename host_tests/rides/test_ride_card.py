@@ -79,7 +79,7 @@ print(json.dumps(took))
 """
 
 
-@pytest.mark.parametrize(("rides", "parts"), [(10, 25), (40, 25), (80, 25), (2000, 1), (20, 85)])
+@pytest.mark.parametrize(("rides", "parts"), [(40, 25), (2000, 1), (20, 85)])
 def test_no_turn_waits_long_for_a_card(rides, parts):
     script = _CARD + _MANY.replace("RIDES", str(rides)).replace("PARTS", str(parts))
     took = json.loads(run_mpy(script))

@@ -59,7 +59,7 @@ from kickstand.rides import block as block_format
 from kickstand.rides.block import encode, encode_python
 assert encode is not encode_python
 random.seed(1)
-for block in range(300):
+for block in range(100):
     states, outs = [], []
     for _ in range(2):
         state = array("i", [0] * (block_format._PERIOD + 1))
@@ -181,10 +181,10 @@ def test_blocks_hold_speeds_and_the_calibration_and_are_never_overfilled():
     assert (kept.trim_deg, kept.aligned, kept.six_done) == (1.25, True, True)
 
 
-def test_a_file_cut_at_every_byte_of_its_last_block_keeps_the_others():
+def test_a_file_cut_anywhere_in_its_last_block_keeps_the_others():
     data, _ = ride_writer.blocks(2, length=lambda i: (512, 4092)[i])
     whole = b"".join(data)
-    for end in range(len(data[0]), len(whole)):
+    for end in [*range(len(data[0]), len(whole), 23), *range(len(whole) - 10, len(whole))]:
         found, problems = block_reader.read(whole[:end])
         assert [block.sequence for block in found] == [0], end
         assert problems == ([] if end == len(data[0]) else [block_reader.CUT_SHORT]), end
@@ -192,7 +192,7 @@ def test_a_file_cut_at_every_byte_of_its_last_block_keeps_the_others():
 
 def test_any_damaged_byte_costs_its_own_block_and_is_said():
     data, _ = ride_writer.blocks(3)
-    for at in [*range(160), *range(160, len(data[1]), 97), *range(len(data[1]) - 10, len(data[1]))]:
+    for at in [*range(0, 160, 3), *range(160, len(data[1]), 197), *range(len(data[1]) - 10, len(data[1]))]:
         spoilt = bytearray(data[1])
         spoilt[at] ^= 0x41
         found, problems = block_reader.read(data[0] + bytes(spoilt) + data[2])
@@ -226,7 +226,7 @@ def test_a_block_of_impossible_values_is_bad_however_right_its_check_sum(tmp_pat
         with pytest.raises(block_reader.BadBlock, match="not decodable"):
             block_reader.parse(sealed(data))
     chance, taken = random.Random(1), 0
-    for _ in range(400):
+    for _ in range(200):
         data = bytearray(good)
         for _ in range(chance.choice((1, 4, 40))):
             data[chance.randrange(head, len(data) - 4)] = chance.choice((0, 255, chance.randrange(256)))
@@ -237,4 +237,4 @@ def test_a_block_of_impossible_values_is_bad_however_right_its_check_sum(tmp_pat
         taken += 1
         ride_log.write(tmp_path / "ride.csv", [block])
         stream.Recording(threading.Event(), lambda reading: None).write(io.StringIO(), iter([block]), [])
-    assert taken > 20
+    assert taken > 10

@@ -9,16 +9,24 @@ import types
 
 import pytest
 import ride_writer
-from kickstand.rides import flash_ring, ride_paths
+from kickstand.rides import flash_ring
 from kickstand.rides.flash_ring import RideRing
-from kickstand.rides.ride_paths import part_path
 from kickstand.ui import messages
 from kickstand_tools.rides import block_reader
-from kickstand_tools.simulated_board.fakes import current, fake_machine, fake_os, fake_time
+from kickstand_tools.simulated_board.fakes import fake_machine, fake_os
 from kickstand_tools.simulated_board.simulator import Board
 
 SETTINGS = types.SimpleNamespace(SD_SPI=None)
-NEEDED = RideRing(SETTINGS).needed
+PART = 4  # blocks, so that little has to be recorded
+
+
+def small_parts():
+    ring = RideRing(SETTINGS)
+    ring._part_blocks, ring.needed = PART, ring.needed - 12 * 4096
+    return ring
+
+
+NEEDED = small_parts().needed
 
 
 def _taken(directory):
@@ -46,7 +54,7 @@ class Flash:
 def flash(tmp_path, monkeypatch):
     """Room for four parts beside what is kept free."""
     monkeypatch.chdir(tmp_path)
-    flash = Flash(tmp_path, NEEDED + 3 * 65536 + 8192)
+    flash = Flash(tmp_path, NEEDED + 3 * PART * 4096 + 8192)
     monkeypatch.setattr(flash_ring, "free_bytes", flash.free)
     monkeypatch.setattr(flash_ring, "all_bytes", lambda _path: flash.size + flash_ring.FIRMWARE)
     monkeypatch.setattr("os.ilistdir", fake_os.ilistdir, raising=False)
@@ -54,27 +62,22 @@ def flash(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def recorder(flash, monkeypatch):
-    """A Recorder on that flash, its clock that of a board."""
-    from kickstand_tools.simulated_board.clock import Clock
-
-    clock = Clock()
-    fake_time.use(clock, 0)
-    for name in fake_time.ADDED:
-        monkeypatch.setattr("time." + name, getattr(fake_time, name), raising=False)
+def recorder(flash, clock):
+    """A Recorder on that flash."""
     from kickstand.rides.recorder import Recorder
 
-    return Recorder(RideRing(SETTINGS), 200)
+    return Recorder(small_parts(), 200)
 
 
 def ride(recorder, flash, turns, seed=0):
     """One ride of so many turns of the loop."""
     recorder.start(ride_writer.CHIP, ride_writer.calibration())
-    for sums, n, dt_us in ride_writer.turns(turns, seed):
+    for i, (sums, n, dt_us) in enumerate(ride_writer.turns(turns, seed)):
         if recorder.active:
             recorder.add(sums, n, dt_us)
             recorder.tick()
-            flash.free()
+            if i % 8 == 0:
+                flash.free()
     recorder.stop()
 
 
@@ -90,11 +93,11 @@ def found(flash):
 
 
 def test_the_oldest_ride_goes_first_and_the_flash_never_fills(recorder, flash):
-    for seed in range(6):
-        ride(recorder, flash, 12_000, seed)  # one and a half parts
+    for seed in range(4):
+        ride(recorder, flash, 3000, seed)  # one and a half parts
     rides = found(flash)
-    assert sorted(rides) == [4, 5, 6] or sorted(rides) == [5, 6]
-    assert rides[6] == list(range(len(rides[6])))
+    assert sorted(rides) in ([2, 3, 4], [3, 4])
+    assert rides[4] == list(range(len(rides[4])))
     assert flash.least >= flash_ring.RESERVE
     assert recorder.problem is None
 
@@ -102,64 +105,20 @@ def test_the_oldest_ride_goes_first_and_the_flash_never_fills(recorder, flash):
 def test_a_ride_longer_than_the_flash_keeps_its_end(recorder, flash):
     recorder.start(ride_writer.CHIP, ride_writer.calibration())
     rooms = []
-    for i, (sums, n, dt_us) in enumerate(ride_writer.turns(60_000)):
+    for i, (sums, n, dt_us) in enumerate(ride_writer.turns(9000)):
         recorder.add(sums, n, dt_us)
         recorder.tick()
-        if i % 2000 == 1999:
+        if i % 500 == 499:
             rooms.append(recorder.room_s())
     recorder.stop()
     sequences = found(flash)[1]
     assert sequences == list(range(sequences[0], sequences[0] + len(sequences)))
-    assert sequences[0] > 0 and sequences[0] % 16 == 0
+    assert sequences[0] > 0 and sequences[0] % PART == 0
     assert rooms[2:] == sorted(rooms[2:], reverse=True)
     assert rooms[-1] == 0
     # the room that it showed when the ride had just begun was right
     bytes_s = sum(map(len, ride_writer.blocks(20)[0])) / (sum(dt for _, _, dt in ride_writer.blocks(20)[1]) / 1e6)
-    assert rooms[2] + 80 == pytest.approx((flash.size - NEEDED) / bytes_s, rel=0.2)
-
-
-def test_the_oldest_go_part_by_part_with_their_directories_and_one_step_a_turn(recorder, flash, monkeypatch):
-    """Rides 98 to 112, which are in two groups. The owner's own files stay, and their directories."""
-    names = [part_path("rides", ride, part) for ride in range(98, 113) for part in range(4)]
-    for name in reversed(names):
-        (flash.root / name).parent.mkdir(parents=True, exist_ok=True)
-        (flash.root / name).write_bytes(bytes(4096))
-    strays = ["00001-0000.ride", "notes.txt", "000/99/._00000.rid", "000/3.rid", "001/notes/1", "001/02/0000.rid"]
-    for name in strays:
-        (flash.root / "rides" / name).parent.mkdir(exist_ok=True)
-        (flash.root / "rides" / name).write_bytes(b"the rider's own")
-    (flash.root / "rides/000/12").mkdir()  # the power went
-    flash.size = NEEDED + (len(names) + len(strays)) * 4096
-    steps = []
-
-    def noted(function):
-        def call(path):
-            steps.append((function.__name__, path))
-            function(path)
-
-        return call
-
-    patched = types.SimpleNamespace(mkdir=os.mkdir, remove=noted(os.remove), rmdir=noted(os.rmdir))
-    monkeypatch.setattr(flash_ring, "os", patched)
-    recorder.start(ride_writer.CHIP, ride_writer.calibration())
-    assert recorder.room_s() == (len(names) + len(strays)) * 4096 // 1024
-    for sums, n, dt_us in ride_writer.turns(20_000):  # two and a half parts
-        recorder.add(sums, n, dt_us)
-        before = len(steps)
-        recorder.tick()
-        assert len(steps) <= before + 1
-    recorder.stop()
-    assert recorder.problem is None
-    removed = [path for name, path in steps if name == "remove"]
-    assert len(removed) >= 32
-    assert removed == names[: len(removed)]
-    assert not (flash.root / "rides/000/12").exists()
-    assert not (flash.root / "rides/000/98").exists()
-    assert not (flash.root / "rides/001/00").exists()
-    assert all((flash.root / "rides" / name).exists() for name in strays)
-    assert (flash.root / part_path("rides", 113, 2)).exists()
-    sizes = {ride: sizes for ride, _, sizes in ride_paths.parts("rides")}
-    assert sorted(sizes) == list(range(98 + len(removed) // 4, 114))
+    assert rooms[2] + 20 == pytest.approx((flash.size - NEEDED) / bytes_s, rel=0.2)
 
 
 def test_a_ride_without_a_block_leaves_no_directory_of_its_own(recorder, flash):
@@ -175,29 +134,6 @@ def test_a_ride_without_a_block_leaves_no_directory_of_its_own(recorder, flash):
     ride(recorder, flash, 1000)
     ride(recorder, flash, 1000)
     assert sorted(found(flash)) == [1, 2]
-
-
-def test_the_numbers_go_on_after_the_newest(recorder, flash):
-    (flash.root / "rides/000/07").mkdir(parents=True)
-    (flash.root / "rides/002").mkdir()
-    ride(recorder, flash, 1000)
-    assert sorted(found(flash)) == [200]
-    (flash.root / "rides/002/99").mkdir()
-    (flash.root / "rides/002/99/00003.rid").write_bytes(b"")
-    ride(recorder, flash, 1000)
-    assert sorted(found(flash)) == [200, 300]
-
-
-def test_no_memory_for_a_ride_is_said_and_the_display_goes_on(recorder, monkeypatch):
-    def listed(_path):
-        raise MemoryError("memory allocation failed")
-
-    monkeypatch.setattr("os.ilistdir", listed)
-    with contextlib.redirect_stdout(io.StringIO()) as said:
-        recorder.start(ride_writer.CHIP, ride_writer.calibration())
-    assert messages.lines(recorder.problem) == ("Rec. stopped", "no memory")
-    assert said.getvalue().count("\n") == 1
-    assert not recorder.active
 
 
 def test_a_flash_that_is_full_of_other_things_refuses_in_one_line(recorder, flash):
@@ -244,9 +180,10 @@ class WornFile:
         self._worn.use()
 
 
-@pytest.mark.parametrize("uses", [0, 1, 2, 17, 18, 19, 35, 36, 50, 52])
+@pytest.mark.parametrize("uses", [0, 1, 2, 18, 35, 52])
 def test_a_file_system_that_fails_ends_the_ride_and_keeps_what_was_written(recorder, flash, uses, monkeypatch):
     """Whenever it fails there is one notice and no exception, and the next ride is recorded when it works again."""
+    recorder.keeper, flash.size = RideRing(SETTINGS), 1 << 20
     worn = Worn(uses)
     with monkeypatch.context() as patch, contextlib.redirect_stdout(io.StringIO()) as said:
         patch.setattr(flash_ring, "open", worn.open, raising=False)
@@ -264,86 +201,13 @@ def test_a_file_system_that_fails_ends_the_ride_and_keeps_what_was_written(recor
     assert [len(blocks) for blocks in parts.values()] == [5]
 
 
-def test_a_card_that_is_pulled_is_said(recorder, flash, monkeypatch):
-    monkeypatch.setattr(ride_paths, "directory", lambda _settings: "rides")
-    flash.size += 1 << 20
-    recorder.keeper = RideRing(types.SimpleNamespace(SD_SPI=0))
-    with contextlib.redirect_stdout(io.StringIO()):
-        monkeypatch.setattr(flash_ring, "open", Worn(5).open, raising=False)
-        ride(recorder, flash, 1000)
-    assert messages.lines(recorder.problem) == ("Rec. stopped", "card fault")
-
-
-def take_stall(recorder):
-    """As the app does it."""
-    stalled, recorder.stalled = recorder.stalled, False
-    return stalled
-
-
-@pytest.mark.parametrize("stops_interrupts", [True, False])
-def test_a_stall_is_told_once(stops_interrupts, recorder, flash):
-    """The end of a ride closes a file, which may erase flash."""
-    recorder.keeper.stops_interrupts = stops_interrupts
-    assert not take_stall(recorder)
-    ride(recorder, flash, 10)
-    assert take_stall(recorder) is stops_interrupts
-    assert not take_stall(recorder)
-
-
-def test_a_gap_in_the_readings_is_one_in_the_log(recorder, flash):
-    """After a fault of the sensor the board's filter starts again. A gap of half a second restarts the replay's."""
-    recorder.start(ride_writer.CHIP, ride_writer.calibration())
-    for i, (sums, n, dt_us) in enumerate(ride_writer.turns(100)):
-        if i == 50:
-            recorder.mark_gap()
-            dt_us = 0
-        recorder.add(sums, n, dt_us)
-    recorder.stop()
-    block = block_reader.read((flash.root / "rides/000/01/00000.rid").read_bytes())[0][0]
-    steps = [after.time_us - before.time_us for before, after in zip(block.turns, block.turns[1:], strict=False)]
-    assert [step > 500_000 for step in steps].count(True) == 1
-    assert steps[49] > 500_000
-
-
-def test_a_speed_source_without_a_sensor_fills_no_block(recorder, flash):
-    """Speeds are written only with turns. A turn gets the newest speed."""
-    recorder.start(ride_writer.CHIP, ride_writer.calibration())
-    turns = list(ride_writer.turns(20))
-    for sums, n, dt_us in turns[:10]:
-        recorder.add(sums, n, dt_us)
-    for speed in range(20_000):
-        recorder.add_fix(speed % 7 / 100, None)
-    recorder.add_fix(12.34, None)
-    for sums, n, dt_us in turns[10:]:
-        recorder.add(sums, n, dt_us)
-    recorder.stop()
-    block = block_reader.read((flash.root / "rides/000/01/00000.rid").read_bytes())[0][0]
-    assert [turn.speed_mps for turn in block.turns] == [None] * 10 + [12.34] + [None] * 9
-
-
-@pytest.mark.parametrize(
-    ("driver", "words", "lcd"),
-    [
-        (None, "its driver is not on the board: mpremote mip install sdcard", ("SD card:", "no driver")),
-        (OSError("no SD card"), "none that can be used", ("No SD card", "check, restart")),
-    ],
-)
-def test_a_card_that_cannot_be_used_is_said_in_one_line(driver, words, lcd, recorder, monkeypatch):
+def test_a_card_without_its_driver_is_said_in_one_line(recorder, monkeypatch):
     monkeypatch.setitem(sys.modules, "machine", fake_machine)
-    monkeypatch.setattr(current, "board", Board(lambda t_s: (0, 0, 1, 0, 0, 0)), raising=False)  # it has the pins
-    from kickstand.board import port
-
-    pins = types.SimpleNamespace(SD_SPI=0, SD_SCK=18, SD_MOSI=19, SD_MISO=16, SD_CS=17)
-
-    def opened(*_):
-        raise driver or ImportError("no module named 'sdcard'")
-
-    monkeypatch.setattr(port, "open_sd_card", opened)
-    recorder.keeper = RideRing(pins)
+    monkeypatch.setattr(fake_machine, "board", Board(lambda t_s: (0, 0, 1, 0, 0, 0)), raising=False)  # it has the pins
+    recorder.keeper = RideRing(types.SimpleNamespace(SD_SPI=0, SD_SCK=18, SD_MOSI=19, SD_MISO=16, SD_CS=17))
     with contextlib.redirect_stdout(io.StringIO()) as said:
         recorder.start(ride_writer.CHIP, ride_writer.calibration())
-    assert words in said.getvalue()
+    assert said.getvalue().endswith("its driver is not on the board: mpremote mip install sdcard\n")
     assert said.getvalue().count("\n") == 1
-    assert messages.lines(recorder.problem) == lcd
-    assert all(len(line) <= 16 for line in lcd)
+    assert messages.lines(recorder.problem) == ("SD card:", "no driver")
     assert not recorder.active

@@ -39,7 +39,9 @@ def leans_on(record, since_s):
 
 
 def test_a_card_records_and_costs_no_reading_and_little_time(tmp_path):
+    """With the driver's default clock a block would take 25 ms, and the FAT of a card of 32 GB 25 s."""
     record = run(tmp_path)
+    assert record.card_hz >= 8_000_000
     assert len(blocks(record)) >= 3
     assert missing_s(record) == []
     assert record.first("Raw") < 1.5
@@ -97,12 +99,10 @@ def test_a_card_whose_room_must_be_counted_is_counted_before_the_watchdog_runs(t
     [
         ({"init_s": None}, {}),  # the driver waits 5 s for it
         ({"init_s": 4.5}, {"formatted": False}),
-        ({}, {"card faults": [[0.0, "removed", True]]}),
         ({"driver": False}, {}),
         ({}, {"card faults": [[0.0, "rejects", 1000]]}),
-        ({}, {"card faults": [[0.0, "stuck", True]]}),
     ],
-    ids=["never ready", "no file system", "removed", "no driver", "rejects all", "stuck"],
+    ids=["never ready", "no file system", "no driver", "rejects all"],
 )
 def test_a_card_that_cannot_be_used_is_told_and_nothing_restarts(card, plan, tmp_path):
     record = run(tmp_path, card, **plan)
@@ -121,9 +121,3 @@ def test_a_card_that_failed_at_the_start_is_not_waited_for_again(tmp_path):
     assert 21 < record.first("No SD card", 20.0) < 23
     assert 23 < record.first("Raw   20°") < 25
     assert record.ends == ["off"]
-
-
-def test_the_card_is_clocked_quickly(tmp_path):
-    """The driver's default takes 25 ms for a block, and 25 s for the FAT of a card of 32 GB."""
-    record = run(tmp_path, until=6)
-    assert record.card_hz >= 8_000_000

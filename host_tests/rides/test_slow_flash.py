@@ -40,22 +40,21 @@ def blocks(flash):
     return [b for path in sorted(flash.glob("rides/*/*/*.rid")) for b in block_reader.read(path.read_bytes())[0]]
 
 
-@pytest.fixture(params=PARTS)
-def run(request, tmp_path, monkeypatch):
+@pytest.fixture(scope="module", params=PARTS)
+def run(request, tmp_path_factory):
     """(the display, the turns, the ride's blocks, erase_s, fifo_s) of a recorded ride."""
     who_am_i, erase_s, fifo_s = PARTS[request.param]
+    flash = tmp_path_factory.mktemp("flash")
     plan = {"seed": 2, "board": {"who_am_i": who_am_i}}
-    devices.run("cpython", tmp_path, {**devices.ALIGNED, **plan, "until": 20})
-    seen = Seen(monkeypatch)
+    devices.run("cpython", flash, {**devices.ALIGNED, **plan, "until": 20})
     info = [[56.5, LONG], *([58.5 + i, SHORT] for i in range(3)), [62.5, LONG]]
     faults = [["slow_flash", [0.0, 1000.0, erase_s]]]
     config = {"RECORD": True}
-    record = devices.run(
-        "cpython",
-        tmp_path,
-        {**plan, "ride": BENDS, "config": config, "faults": faults, "presses": info, "until": UNTIL_S},
-    )
-    return record, seen.turns, blocks(tmp_path), erase_s, fifo_s
+    plan |= {"ride": BENDS, "config": config, "faults": faults, "presses": info, "until": UNTIL_S}
+    with pytest.MonkeyPatch.context() as monkeypatch:
+        seen = Seen(monkeypatch)
+        record = devices.run("cpython", flash, plan)
+    return record, seen.turns, blocks(flash), erase_s, fifo_s
 
 
 def test_each_is_a_gap_of_its_length_in_the_ride_and_is_counted(run):

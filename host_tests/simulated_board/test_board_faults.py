@@ -3,7 +3,7 @@
 import errno
 import os
 
-from board_access import level, on_board, raised
+from board_access import firmware, level, on_board, raised
 from kickstand_tools.simulated_board.fakes.fake_machine import I2C, Pin
 
 
@@ -44,86 +44,58 @@ def lcd_answers(board):
 STILL = [0, 0, 0, 0, 0x10, 0x00]
 
 
-def test_nack_of_the_nth_transfer():
-    def firmware(board):
-        chip = Chip(board)
-        board.faults.nack(0x68, nth=3, count=2)
-        assert [chip.error() for _ in range(6)] == [None, None, errno.EIO, errno.EIO, None, None]
-        board.faults.nack(0x68)
-        assert [chip.error() for _ in range(2)] == [errno.EIO, None]
-
-    check(firmware)
+@firmware()
+def test_nack_of_the_nth_transfer(board):
+    chip = Chip(board)
+    board.faults.nack(0x68, nth=3, count=2)
+    assert [chip.error() for _ in range(6)] == [None, None, errno.EIO, errno.EIO, None, None]
+    board.faults.nack(0x68)
+    assert [chip.error() for _ in range(2)] == [errno.EIO, None]
 
 
-def test_nack_for_a_time_and_only_at_that_address():
-    def firmware(board):
-        chip = Chip(board)
-        now_s = board.clock.now_us / 1e6
-        board.faults.nack_for(0x68, now_s + 0.1, 0.2)
-        seen = []
-        for _ in range(4):
-            seen.append(chip.error())
-            assert lcd_answers(board)
-            board.clock.advance(110_000)
-        assert seen == [None, errno.EIO, errno.EIO, None], seen
-
-    check(firmware)
+@firmware()
+def test_nack_for_a_time_and_only_at_that_address(board):
+    chip = Chip(board)
+    now_s = board.clock.now_us / 1e6
+    board.faults.nack_for(0x68, now_s + 0.1, 0.2)
+    seen = []
+    for _ in range(4):
+        seen.append(chip.error())
+        assert lcd_answers(board)
+        board.clock.advance(110_000)
+    assert seen == [None, errno.EIO, errno.EIO, None], seen
 
 
-def test_time_out():
-    def firmware(board):
-        chip = Chip(board)
-        board.faults.timeout(0x68, nth=2)
-        assert chip.error() is None
-        start = board.clock.now_us
-        assert chip.error() == errno.ETIMEDOUT
-        assert 5000 <= board.clock.now_us - start < 5100
-        assert chip.error() is None
-        board.faults.timeout_for(0x68, board.clock.now_us / 1e6, 0.012)
-        assert [chip.error() for _ in range(4)] == [errno.ETIMEDOUT] * 3 + [None]
-
-    check(firmware)
+@firmware()
+def test_time_out(board):
+    chip = Chip(board)
+    board.faults.timeout(0x68, nth=2)
+    assert chip.error() is None
+    start = board.clock.now_us
+    assert chip.error() == errno.ETIMEDOUT
+    assert 5000 <= board.clock.now_us - start < 5100
+    assert chip.error() is None
+    board.faults.timeout_for(0x68, board.clock.now_us / 1e6, 0.012)
+    assert [chip.error() for _ in range(4)] == [errno.ETIMEDOUT] * 3 + [None]
 
 
-def test_stuck_sda():
-    def firmware(board):
-        chip = Chip(board)
-        now_s = board.clock.now_us / 1e6
-        board.faults.stuck_sda(now_s + 0.01, bits=5)
-        board.faults.stuck_sda(now_s + 0.01, lcd=True)
-        assert chip.error() is None and lcd_answers(board)
-        board.clock.advance(10_000)
-        assert chip.error() == errno.ETIMEDOUT and not lcd_answers(board)
-        scl = Pin(5, Pin.OPEN_DRAIN, value=1)
-        for _ in range(9):
-            scl(0)
-            scl(1)
-        assert chip.error() is None and not lcd_answers(board)
-
-    check(firmware)
+@firmware()
+def test_a_corrupted_byte(board):
+    chip = Chip(board)
+    good = chip.read()
+    assert good[:6] == STILL
+    board.faults.corrupt(0x68, nth=2, byte=4, mask=0x81)
+    assert chip.read() == good
+    assert chip.read() == good[:4] + [good[4] ^ 0x81] + good[5:]
+    assert chip.read() == good
 
 
-def test_a_corrupted_byte():
-    def firmware(board):
-        chip = Chip(board)
-        good = chip.read()
-        assert good[:6] == STILL
-        board.faults.corrupt(0x68, nth=2, byte=4, mask=0x81)
-        assert chip.read() == good
-        assert chip.read() == good[:4] + [good[4] ^ 0x81] + good[5:]
-        assert chip.read() == good
-
-    check(firmware)
-
-
-def test_a_corrupted_write():
-    def firmware(board):
-        chip = Chip(board)
-        board.faults.corrupt(0x68, byte=1, mask=0x10, read=False)
-        chip.i2c.writeto_mem(0x68, 0x1B, b"\x08")
-        assert chip.read(0x1B, 1) == [0x18]
-
-    check(firmware)
+@firmware()
+def test_a_corrupted_write(board):
+    chip = Chip(board)
+    board.faults.corrupt(0x68, byte=1, mask=0x10, read=False)
+    chip.i2c.writeto_mem(0x68, 0x1B, b"\x08")
+    assert chip.read(0x1B, 1) == [0x18]
 
 
 def test_a_bit_slip():
@@ -165,90 +137,63 @@ def moving(t_s):
     return (t_s / 100, 0.0, 1.0, t_s, 0.0, 0.0)
 
 
-def test_frozen_data():
-    def firmware(board):
-        chip = Chip(board)
-        now_s = board.clock.now_us / 1e6
-        board.faults.freeze(now_s + 0.1, 1.0)
-        before = chip.read()
-        board.clock.advance(200_000)
-        held = chip.read()
-        assert held != before
-        board.clock.advance(800_000)
-        assert chip.read() == held
-        assert chip.read(0x6B, 1) == [1] and chip.read(0x1B, 1) == [0x08]
-        board.clock.advance(200_000)
-        assert chip.read() != held
-
-    check(firmware, world=moving)
+@firmware(world=moving)
+def test_frozen_data(board):
+    chip = Chip(board)
+    now_s = board.clock.now_us / 1e6
+    board.faults.freeze(now_s + 0.1, 1.0)
+    before = chip.read()
+    board.clock.advance(200_000)
+    held = chip.read()
+    assert held != before
+    board.clock.advance(800_000)
+    assert chip.read() == held
+    assert chip.read(0x6B, 1) == [1] and chip.read(0x1B, 1) == [0x08]
+    board.clock.advance(200_000)
+    assert chip.read() != held
 
 
-def test_all_zero_and_all_ones():
-    def firmware(board):
-        chip = Chip(board)
-        now_s = board.clock.now_us / 1e6
-        board.faults.all_zero(now_s + 0.1, 0.1)
-        board.faults.all_ones(now_s + 0.3, 0.1)
-        seen = []
-        for _ in range(5):
-            board.clock.advance(50_000)
-            seen.append(chip.read()[4:6])
-            board.clock.advance(49_000)
-        assert seen == [[0x10, 0], [0, 0], [0x10, 0], [0xFF, 0xFF], [0x10, 0]], seen
-
-    check(firmware)
+@firmware()
+def test_all_zero_and_all_ones(board):
+    chip = Chip(board)
+    now_s = board.clock.now_us / 1e6
+    board.faults.all_zero(now_s + 0.1, 0.1)
+    board.faults.all_ones(now_s + 0.3, 0.1)
+    seen = []
+    for _ in range(5):
+        board.clock.advance(50_000)
+        seen.append(chip.read()[4:6])
+        board.clock.advance(49_000)
+    assert seen == [[0x10, 0], [0, 0], [0x10, 0], [0xFF, 0xFF], [0x10, 0]], seen
 
 
-def test_sensor_unplugged_and_back():
-    def firmware(board):
-        chip = Chip(board)
-        now_s = board.clock.now_us / 1e6
-        board.faults.unplug_sensor(now_s + 0.1, 0.5)
-        assert chip.error() is None
-        board.clock.advance(200_000)
-        assert chip.error() == errno.EIO
-        board.clock.advance(500_000)
-        assert chip.read(0x6B, 1) == [0x40] and chip.read()[:6] == [0] * 6
-        chip.set_up()
-        assert chip.read()[:6] == STILL
-        board.faults.unplug_sensor(board.clock.now_us / 1e6)
-        board.clock.advance(10_000_000)
-        assert chip.error() == errno.EIO
-
-    check(firmware)
+@firmware()
+def test_sensor_unplugged_and_back(board):
+    chip = Chip(board)
+    now_s = board.clock.now_us / 1e6
+    board.faults.unplug_sensor(now_s + 0.1, 0.5)
+    assert chip.error() is None
+    board.clock.advance(200_000)
+    assert chip.error() == errno.EIO
+    board.clock.advance(500_000)
+    assert chip.read(0x6B, 1) == [0x40] and chip.read()[:6] == [0] * 6
+    chip.set_up()
+    assert chip.read()[:6] == STILL
+    board.faults.unplug_sensor(board.clock.now_us / 1e6)
+    board.clock.advance(10_000_000)
+    assert chip.error() == errno.EIO
 
 
-def test_lcd_unplugged_and_back():
-    def firmware(board):
-        board.lcd.on = True
-        board.lcd.ddram[0] = ord("x")
-        assert board.lcd.text()[0][0] == "x"
-        board.faults.unplug_lcd(0.1, 0.5)
-        board.clock.advance(200_000)
-        assert not lcd_answers(board) and board.lcd.text()[0] == " " * 16
-        board.clock.advance(500_000)
-        assert lcd_answers(board) and board.lcd.text()[0] == " " * 16
-
-    check(firmware)
-
-
-def test_lcd_nibbles_out_of_step():
-    def firmware(board):
-        i2c = I2C(1, sda=Pin(6), scl=Pin(7), freq=100_000)
-        for nibble in (0x30, 0x30, 0x30, 0x20):
-            board.clock.advance(50_000)
-            i2c.writeto(0x27, bytes((nibble | 4, nibble)))
-        board.faults.lcd_slip(board.clock.now_us / 1e6)
-        board.clock.advance(1000)
-        display_on = bytes((0x04, 0x00, 0xC4, 0xC0))
-        i2c.writeto(0x27, display_on)
-        assert not board.lcd.on
-        board.faults.lcd_slip(board.clock.now_us / 1e6)
-        board.clock.advance(1000)
-        i2c.writeto(0x27, display_on)
-        assert board.lcd.on
-
-    check(firmware)
+@firmware()
+def test_lcd_unplugged_and_back(board):
+    board.lcd.on = True
+    board.lcd.ddram[0] = ord("x")
+    assert board.lcd.text()[0][0] == "x"
+    board.faults.unplug_lcd(0.1, 0.5)
+    board.clock.advance(200_000)
+    assert not lcd_answers(board) and board.lcd.text()[0] == " " * 16
+    board.clock.advance(500_000)
+    assert lcd_answers(board) and board.lcd.text()[0] == " " * 16
 
 
 def test_files():

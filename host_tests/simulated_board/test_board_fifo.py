@@ -79,14 +79,6 @@ def test_the_count_is_latched_by_its_high_byte():
     assert waiting(chip) == 720
 
 
-def test_reading_past_the_end_repeats_the_last_byte():
-    clock, chip = filling()
-    clock.advance(1000)
-    frame = read(chip, 0x74, FRAME)
-    assert read(chip, 0x74, 5) == [frame[-1]] * 5
-    assert waiting(chip) == 0
-
-
 def test_overflow_loses_the_oldest_and_the_alignment():
     for who_am_i, size in ((0x68, 1024), (0x70, 512), (0x19, 1024)):
         frame = 14 if who_am_i == 0x19 else FRAME
@@ -107,28 +99,6 @@ def test_overflow_loses_the_oldest_and_the_alignment():
         assert x == gyro
 
 
-def test_a_long_neglect_ends_as_if_every_byte_had_been_pushed():
-    clock, chip = filling()
-    slow_clock, slow = filling()
-    for _ in range(500):
-        slow_clock.advance(1000)
-        slow.peek(0)
-    clock.advance(500_000)
-    assert read(chip, 0x74, 1024) == read(slow, 0x74, 1024)
-
-
-def test_an_mpu6500_can_keep_the_old_data():
-    clock, chip = filling(0x70)
-    write(chip, 0x1A, 0x41)
-    write(chip, 0x6A, 0x04)
-    write(chip, 0x6A, 0x40)
-    clock.advance(1000)
-    first = read(chip, 0x3B, 2)
-    clock.advance(200_000)
-    assert waiting(chip) == 512
-    assert read(chip, 0x74, 2) == first
-
-
 def test_fifo_reset_acts_only_while_disabled():
     clock, chip = filling()
     clock.advance(5000)
@@ -140,14 +110,6 @@ def test_fifo_reset_acts_only_while_disabled():
     assert read(chip, 0x6A) == [0]
     clock.advance(5000)
     assert waiting(chip) == 0
-
-
-def test_the_ring_of_bytes():
-    ring = Fifo(4)
-    assert [ring.push(i) for i in range(6)] == [False] * 4 + [True] * 2
-    assert [ring.pop() for _ in range(5)] == [2, 3, 4, 5, 5]
-    assert [ring.push(i, keep_old=True) for i in range(6)] == [False] * 4 + [True] * 2
-    assert [ring.pop() for _ in range(4)] == [0, 1, 2, 3]
 
 
 def test_many_bytes_at_once_are_the_same_as_one_by_one():

@@ -73,28 +73,6 @@ def test_before_4_bit_mode_the_open_pins_read_as_ones():
     assert lcd.codes()[0][0] == 0x4F
 
 
-def test_commands_before_power_up_is_over_are_lost():
-    clock = Clock()
-    lcd = Lcd(clock)
-    clock.advance(POWER_UP_US - 200)
-    nibble(lcd, 0x30)
-    assert lcd.lost == 1
-
-
-def test_the_waits_of_the_initialisation_are_needed():
-    clock = Clock()
-    lcd = Lcd(clock)
-    clock.advance(POWER_UP_US)
-    nibble(lcd, 0x30)
-    clock.advance(4100 - 3 * PORT_US)
-    nibble(lcd, 0x30)
-    assert lcd.lost == 1
-    nibble(lcd, 0x30)
-    assert lcd.lost == 1
-    nibble(lcd, 0x30)
-    assert lcd.lost == 1, "100 us are over after two bytes"
-
-
 def test_home_takes_long_and_what_comes_meanwhile_is_lost():
     lcd = ready()
     write(lcd, 0, "abc")
@@ -143,19 +121,6 @@ def busy(lcd):
     return bool(flag)
 
 
-def test_the_address_counter_reads_back():
-    lcd = ready()
-    send(lcd, 0x80 | 0x45)
-    lcd.clock.advance(100)
-    pins(lcd, 0xF0 | RW | E)
-    high = lcd.read_byte() & 0xF0
-    pins(lcd, 0xF0 | RW)
-    pins(lcd, 0xF0 | RW | E)
-    low = lcd.read_byte() & 0xF0
-    pins(lcd, 0xF0 | RW)
-    assert high | low >> 4 == 0x45
-
-
 def test_nibbles_out_of_step_garble_and_the_initialisation_heals():
     lcd = ready()
     write(lcd, 0, "hello")
@@ -172,57 +137,6 @@ def test_nibbles_out_of_step_garble_and_the_initialisation_heals():
         lcd.clock.advance(2000)
     write(lcd, 0, "hello           ")
     assert lcd.text()[0] == "hello           "
-
-
-def test_e_must_fall_to_take_anything():
-    lcd = ready()
-    write(lcd, 0, "")
-    before = lcd.text()
-    for value in (ord("x"), ord("x") << 4 & 0xF0):
-        pins(lcd, value & 0xF0 | RS | LIGHT)
-        pins(lcd, value & 0xF0 | RS | LIGHT)
-    assert lcd.text() == before
-    # What counts are the levels before the edge: these two nibbles are "A"
-    pins(lcd, 0x40 | RS | E)
-    pins(lcd, 0xF0)
-    pins(lcd, 0x10 | RS | E)
-    pins(lcd, 0xF0)
-    assert lcd.text()[0][0] == "A"
-
-
-def test_lines_run_into_each_other_at_40_characters():
-    lcd = ready()
-    write(lcd, 0, "a" * 40 + "b" * 40 + "c")
-    assert lcd.text() == ["c" + "a" * 15, "b" * 16]
-    send(lcd, 0x04)
-    send(lcd, 0x80)
-    send(lcd, ord("d"), RS)
-    send(lcd, ord("e"), RS)
-    assert lcd.text()[0][0] == "d" and lcd.ddram[0x67] == ord("e")
-
-
-def test_display_shift():
-    lcd = ready()
-    write(lcd, 0, "0123456789abcdefghij")
-    for _ in range(3):
-        send(lcd, 0x18)
-    assert lcd.text()[0] == "3456789abcdefghi"
-    send(lcd, 0x1C)
-    assert lcd.text()[0] == "23456789abcdefgh"
-    send(lcd, 0x02)
-    lcd.clock.advance(CLEAR_US)
-    assert lcd.text()[0] == "0123456789abcdef"
-
-
-def test_off_and_one_line():
-    lcd = ready()
-    write(lcd, 0, "abc")
-    write(lcd, 1, "def")
-    send(lcd, 0x08)
-    assert lcd.text() == [" " * 16] * 2
-    send(lcd, 0x0C)
-    send(lcd, 0x20)
-    assert lcd.text() == ["abc" + " " * 13, " " * 16]
 
 
 def test_own_characters():

@@ -43,23 +43,11 @@ def test_who_am_i_variants():
     assert set(VARIANTS) == {0x68, 0x70, 0x71, 0x72, 0x73, 0x74, 0x78, 0x98, 0x19}
 
 
-def test_an_unknown_chip_only_has_another_name():
-    _, chip = awake(who_am_i=0x55)
-    assert read(chip, 0x75) == [0x55] and counts(chip)[2] == 16384
-
-
 def test_asleep_after_power_on():
     clock = Clock()
     chip = Mpu6050(clock, level)
     clock.advance(1_000_000)
     assert counts(chip) == [0] * 7
-
-
-def test_an_mpu6500_runs_after_power_on():
-    clock = Clock()
-    chip = Mpu6050(clock, level, 0x70)
-    clock.advance(1_000_000)
-    assert counts(chip)[2] == 16384
 
 
 def test_writes_during_start_up_are_lost():
@@ -194,34 +182,6 @@ def test_the_low_pass_delays():
         assert abs(counts(chip)[0] - (sampled_us - delay_us) * 16384 / 1e6) <= 0.5
 
 
-def test_without_low_pass_the_accelerometer_stays_at_1_khz():
-    clock, chip = awake(ramp, div=0, dlpf=0)
-    accel, gyro = [], []
-    for _ in range(16):
-        clock.advance(125)
-        now = counts(chip)
-        accel.append(now[0])
-        gyro.append(now[4])
-    assert len(set(accel)) <= 3
-    clock, chip = awake(lambda t_s: (t_s, 0, 0, t_s * 1000.0, 0, 0), div=0, dlpf=0)
-    for _ in range(16):
-        clock.advance(125)
-        gyro.append(counts(chip)[4])
-    assert len(set(gyro)) >= 16
-
-
-def test_sleep_holds_the_registers():
-    clock, chip = awake(ramp)
-    clock.advance(20_000)
-    before = counts(chip)
-    write(chip, 0x6B, 0x41)
-    clock.advance(1_000_000)
-    assert counts(chip) == before
-    write(chip, 0x6B, 0x01)
-    clock.advance(WAKE_US)
-    assert counts(chip) != before
-
-
 def test_auto_increment_writes_and_read_only_registers():
     _, chip = awake()
     write(chip, 0x19, 1, 2, 0x08, 0x10)
@@ -239,33 +199,6 @@ def test_register_1d_only_where_the_family_has_it():
         _, chip = awake(who_am_i=who_am_i)
         write(chip, 0x1D, 0x03)
         assert read(chip, 0x1D) == [0 if who_am_i == 0x68 else 3]
-
-
-def test_data_ready_clears_on_read_and_needs_its_enable():
-    clock, chip = awake()
-    clock.advance(20_000)
-    assert read(chip, 0x3A) == [0]
-    write(chip, 0x38, 0x01)
-    clock.advance(10_000)
-    assert read(chip, 0x3A) == [1]
-    assert read(chip, 0x3A) == [0]
-
-
-def test_supply_dips():
-    for leaves, power, expected_z in (
-        ("asleep", 0x40, 0),
-        ("frozen", 0x40, 4096),
-        ("default_ranges", 0x01, 16384),
-    ):
-        clock, chip = awake()
-        write(chip, 0x1B, 0x08, 0x10)
-        clock.advance(20_000)
-        assert counts(chip)[2] == 4096
-        chip.supply_dip(leaves)
-        clock.advance(200_000)
-        assert counts(chip)[2] == expected_z
-        assert read(chip, 0x1B, 2) == [0, 0]
-        assert read(chip, 0x6B) == [power]
 
 
 def test_frozen_data_are_the_last_before_the_dip():

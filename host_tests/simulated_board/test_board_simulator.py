@@ -2,7 +2,7 @@
 
 import sys
 
-from board_access import level, on_board, raised
+from board_access import firmware, level, on_board, raised
 from kickstand_tools.simulated_board.fakes import fake_machine, fake_time
 from kickstand_tools.simulated_board.fakes.fake_machine import WDT, Pin, Timer
 from kickstand_tools.simulated_board.simulator import Board
@@ -19,13 +19,6 @@ def test_the_three_ends_of_a_run():
     assert on_board(lambda board: fake_machine.reset())[0] == "reset"
 
 
-def test_other_exceptions_come_through():
-    def firmware(board):
-        raise KeyError("mistake")
-
-    assert isinstance(raised(on_board, firmware), KeyError)
-
-
 def test_firmware_that_catches_every_exception_is_still_switched_off():
     def firmware(board):
         while True:
@@ -35,15 +28,6 @@ def test_firmware_that_catches_every_exception_is_still_switched_off():
                 pass
 
     assert on_board(firmware, 1.0)[0] == "off"
-
-
-def test_a_bus_that_hangs_is_free_after_a_power_cycle():
-    def firmware(board):
-        board.faults.stuck_sda(0.5)
-        fake_time.sleep_ms(5000)
-
-    outcome, board = on_board(firmware, 1.0)
-    assert outcome == "off" and board.sensor_bus.sda_level() == 1
 
 
 def test_power_is_lost_by_off_and_kept_by_reset():
@@ -129,35 +113,18 @@ def levels(board, until_us):
     return changes
 
 
-def test_a_press_bounces_and_then_holds():
-    def firmware(board):
-        board.press(0.1, 0.2)
-        changes = levels(board, 500_000)
-        down = [t for t, _ in changes if t < 200_000]
-        up = [t for t, _ in changes if t >= 200_000]
-        assert len(down) > 2 and len(up) > 2, "no bounce"
-        assert len(down) % 2 == 1 and len(up) % 2 == 1, "the last level is not the right one"
-        assert 100_000 <= down[0] < 100_100 and down[-1] < 105_000
-        assert 300_000 <= up[0] < 300_100 and up[-1] < 305_000
-        board.press()
-        assert levels(board, 510_000)[0][1] == 0
-
-    assert on_board(firmware, 2.0)[0] == "returned"
-
-
-def test_the_same_seed_bounces_the_same():
-    def seen(seed):
-        found = []
-
-        def firmware(board):
-            board.press(0.1)
-            found.extend(levels(board, 200_000))
-
-        on_board(firmware, seed=seed)
-        return found
-
-    assert seen(1) == seen(1)
-    assert seen(1) != seen(2)
+@firmware(2.0)
+def test_a_press_bounces_and_then_holds(board):
+    board.press(0.1, 0.2)
+    changes = levels(board, 500_000)
+    down = [t for t, _ in changes if t < 200_000]
+    up = [t for t, _ in changes if t >= 200_000]
+    assert len(down) > 2 and len(up) > 2, "no bounce"
+    assert len(down) % 2 == 1 and len(up) % 2 == 1, "the last level is not the right one"
+    assert 100_000 <= down[0] < 100_100 and down[-1] < 105_000
+    assert 300_000 <= up[0] < 300_100 and up[-1] < 305_000
+    board.press()
+    assert levels(board, 510_000)[0][1] == 0
 
 
 def test_a_capacitor_at_the_button_is_charged_by_the_pull_up():
@@ -188,44 +155,25 @@ def test_a_button_held_at_power_up():
         assert board.run(lambda: firmware(board), 1.0) == "returned"
 
 
-def test_at_and_every():
-    def firmware(board):
-        seen = []
-        board.at(0.25, lambda: seen.append("at"))
-        board.every(0.1, lambda: seen.append(board.clock.now_us))
-        fake_time.sleep_ms(350)
-        assert seen == [100_000, 200_000, "at", 300_000]
-
-    assert on_board(firmware)[0] == "returned"
-
-
-def test_timers():
-    def firmware(board):
-        seen = []
-        Timer(-1, mode=Timer.ONE_SHOT, period=20, callback=lambda timer: seen.append(board.clock.now_us))
-        ticker = Timer()
-        ticker.init(period=50, callback=lambda timer: seen.append(board.clock.now_us))
-        fake_time.sleep_ms(160)
-        ticker.deinit()
-        fake_time.sleep_ms(200)
-        assert seen == [20_000, 50_000, 100_000, 150_000]
-
-    assert on_board(firmware)[0] == "returned"
-
-
-def test_timers_end_with_a_reset():
+@firmware()
+def test_at_and_every(board):
     seen = []
+    board.at(0.25, lambda: seen.append("at"))
+    board.every(0.1, lambda: seen.append(board.clock.now_us))
+    fake_time.sleep_ms(350)
+    assert seen == [100_000, 200_000, "at", 300_000]
 
-    def firmware():
-        if board.boots == 1:
-            Timer(-1, period=100, callback=lambda timer: seen.append(1))
-            fake_machine.reset()
-        fake_time.sleep_ms(500)
 
-    with Board(level) as board:
-        assert board.run(firmware, 5.0) == "reset"
-        assert board.run(firmware, 5.0) == "returned"
-    assert seen == []
+@firmware()
+def test_timers(board):
+    seen = []
+    Timer(-1, mode=Timer.ONE_SHOT, period=20, callback=lambda timer: seen.append(board.clock.now_us))
+    ticker = Timer()
+    ticker.init(period=50, callback=lambda timer: seen.append(board.clock.now_us))
+    fake_time.sleep_ms(160)
+    ticker.deinit()
+    fake_time.sleep_ms(200)
+    assert seen == [20_000, 50_000, 100_000, 150_000]
 
 
 def test_installed_and_gone_again():
@@ -244,25 +192,6 @@ def test_installed_and_gone_again():
     after = __import__("time")
     assert after.time() > 1_000_000_000, "the host's own time is back"
     assert sys.implementation.name == "micropython" or not hasattr(after, "ticks_us")
-
-
-def test_code_imported_under_one_board_runs_on_the_next():
-    def firmware(board):
-        assert __import__("machine").Pin is Pin  # the same class, whichever board is installed
-        fake_time.sleep_ms(7)
-        assert board.clock.now_us == 7000
-
-    assert on_board(firmware)[0] == "returned"
-    assert on_board(firmware)[0] == "returned"
-
-
-def test_a_board_without_sensor_and_display():
-    def firmware(board):
-        assert fake_machine.I2C(0, sda=4, scl=5).scan() == []
-        assert fake_machine.I2C(1, sda=6, scl=7).scan() == []
-        assert board.lcd.text() == [" " * 16] * 2
-
-    assert on_board(firmware, 10.0, sensor_address=None, lcd_address=None)[0] == "returned"
 
 
 def test_the_world_is_asked_once_a_sample():

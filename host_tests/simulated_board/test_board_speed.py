@@ -109,6 +109,27 @@ def test_speed_of_a_sentence_in_any_system_and_any_version():
     assert speeds_of(sentence("GPVTG,84.4,T,,M,,N,36.0,K")) == [10000]
 
 
+def test_vtg_has_knots_or_kilometres_an_hour():
+    for fields, expected in (
+        ("19.438,N,,K", [10000]),
+        ("19.438,N,99.9,K", [10000]),
+        (",N,36.0,K", [10000]),
+        ("99.9,X,36.0,K", [10000]),
+        ("99.9,X,36.0,X", []),
+        (",N,,K", []),
+    ):
+        assert speeds_of(sentence("GPVTG,84.4,T,,M," + fields + ",A")) == expected, fields
+
+
+def test_a_turn_of_the_loop_reads_64_bytes_at_most():
+    with Board(level):
+        from kickstand.speed.gps import Gps
+
+        wire = Listing(200 * b"x")
+        Gps(wire).poll(1000)
+        assert wire.any() == 136
+
+
 def test_what_is_no_fix_is_no_speed():
     assert speeds_of(sentence(RMC % ("GP", 1, "V", "19.438", ",N"))) == []
     assert speeds_of(sentence(RMC % ("GP", 1, "A", "19.438", ",E"))) == []  # the last fix carried on
@@ -144,7 +165,7 @@ def test_the_same_fix_again_is_not_new():
     assert speeds_of(sentence(RMC % ("GP", 1, "A", "19.438", ",A")) * 5) == [10000]
 
 
-def test_a_fix_that_waited_in_the_receiver_is_refused_and_its_age_told():
+def test_a_fix_that_waited_in_the_receiver_is_refused_or_has_its_age():
     with Board(level):
         from kickstand.speed.gps import Gps
 
@@ -244,13 +265,13 @@ def test_a_contact_that_bounces_is_counted_once():
 
 def test_a_storm_of_pulses_is_named_and_the_speed_returns():
     """Twice as long as the pause, so that the interrupt is tried in the middle of it."""
-    for pulses_per_s in (5_000, 20_000, 50_000):
+    for port, pulses_per_s in (("rp2", 5_000), ("rp2", 50_000), ("esp32", 6_000), ("esp32", 50_000)):
 
         def fit(board, pulses_per_s=pulses_per_s):
             board.fit_wheel(constant)
             board.faults.wheel_storm(10.0, 8.0, pulses_per_s)
 
-        got, faults = drive({"SPEED": "wheel"}, fit, 25.0)
+        got, faults = drive({"SPEED": "wheel"}, fit, 25.0, port)
         assert faults[9] is None and faults[23] is None
         for second in range(11, 20):
             assert faults[second] == ("Wheel: noise", "check wiring"), second
@@ -281,7 +302,7 @@ def wheel_on_an_esp32(pulses_per_metre, speed_mps, seconds=21.0, **kind):
 
 def test_an_esp32_counts_pulses_that_fall_into_a_transfer():
     """Its interrupts wait meanwhile: of a contact that closed and opened again only the opening is seen, twice."""
-    for pulses, hz in ((0.5, 13.3), (1.0, 23.7), (2.0, 71.9), (3.0, 149.3), (5.0, 121.7), (10.0, 203.1), (50.0, 290.0)):
+    for pulses, hz in ((0.5, 13.3), (3.0, 149.3), (50.0, 290.0)):
         mean, deviation, faults = wheel_on_an_esp32(pulses, hz / pulses)
         assert abs(mean * pulses - hz) < 0.025 * hz, (pulses, hz, mean)
         assert deviation < 0.1 * mean
@@ -290,7 +311,7 @@ def test_an_esp32_counts_pulses_that_fall_into_a_transfer():
 
 def test_a_contact_that_bounces_is_counted_once_on_an_esp32_too():
     """Also where it bounces during a transfer: at any speed, and at any time of the loop's turn."""
-    for speed in (1.3, 2.0, 4.1, 7.77, 15.0, 33.3):
+    for speed in (1.3, 7.77, 33.3):
         mean, _, _ = wheel_on_an_esp32(0.5, speed, bounce_us=2000)
         assert abs(mean - speed) < 0.01 * speed, (speed, mean)
 
@@ -301,7 +322,7 @@ def test_a_wheel_that_is_too_quick_for_an_esp32_is_named_and_gives_no_speed():
     def speed_of(t_s):
         return 20.0 if 8.0 < t_s < 14.0 else 5.0
 
-    for pulses in (20, 50, 100):
+    for pulses in (20, 100):
         config = {"SPEED": "wheel", "PULSES_PER_METRE": pulses}
         got, faults = drive(config, lambda b, p=pulses: b.fit_wheel(speed_of, pulses_per_metre=p), 20.0, "esp32")
         assert faults[12] == ("Wheel: too quick", "fewer pulses/m"), pulses
@@ -309,35 +330,6 @@ def test_a_wheel_that_is_too_quick_for_an_esp32_is_named_and_gives_no_speed():
         slow = [speed for t_s, speed, _ in got if 1.0 < t_s < 8.0 or t_s > 15.0]
         assert (len(slow) > 50 and faults[6] is faults[18] is None) == (pulses < 60)
         assert all(abs(speed - 5.0) < 0.7 for speed in slow)
-
-
-def test_a_storm_of_pulses_is_cut_off_on_an_esp32_too():
-    for pulses_per_s in (6_000, 20_000, 50_000):
-
-        def fit(board, pulses_per_s=pulses_per_s):
-            board.fit_wheel(constant)
-            board.faults.wheel_storm(10.0, 8.0, pulses_per_s)
-
-        got, faults = drive({"SPEED": "wheel"}, fit, 25.0, "esp32")
-        assert faults[9] is None and faults[23] is None
-        for second in range(11, 20):
-            assert faults[second] == ("Wheel: noise", "check wiring"), second
-        assert not [t for t, _, _ in got if 10.2 < t < 20.0]
-        assert all(abs(speed - 15.0) < 0.5 for _, speed, _ in got)
-
-
-def test_wheel_on_an_esp32():
-    with Board(level, port="esp32"):
-        from kickstand.speed.wheel import Wheel
-        from machine import Pin  # type: ignore[import-not-found]
-
-        pin = Pin(27, Pin.IN, Pin.PULL_UP)
-        Wheel(pin, 0.5, {})
-        try:
-            Wheel(pin, 0.5, {"hard": True})
-            raise AssertionError("its interrupts are always soft")
-        except TypeError:
-            pass
 
 
 def test_jumps_that_no_vehicle_makes_are_refused_until_they_last():

@@ -1,9 +1,11 @@
-"""Scripted rides: what the sensor measures agrees with the trajectory, differentiated numerically."""
+"""Scripted rides and the one by hand: balance, poses, vibration, and the kinematics of long simulated rides."""
 
 import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.demo.hand_bike import CRUISE_MPS, HandBike
+from kickstand_tools.simulation.physics.bike import Bike
+from kickstand_tools.simulation.physics.kinematics import Motion, body_rates, specific_force
 from kickstand_tools.simulation.scripted.script import (
     KICKSTAND_DEG,
     Ride,
@@ -31,52 +33,18 @@ HILLY = [
 ]
 
 
-def about(axis, angle):
-    """Rotation matrix about a coordinate axis, right-handed."""
-    c, s = np.cos(angle), np.sin(angle)
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    matrix = np.eye(3)
-    matrix[i, i] = matrix[j, j] = c
-    matrix[j, i], matrix[i, j] = s, -s
-    return matrix
-
-
-@pytest.fixture(scope="module")
-def ridden():
-    """The hilly ride, no vibration: step, attitude (world from body), acceleration in the world, motion."""
+def test_forces_and_rates_are_those_of_the_kinematics_that_judge_long_rides():
+    """test_simulation_kinematics.py shows that those are the derivatives of attitude and place."""
     ride = Ride(HILLY, vibration_g=0.0)
-    dt = 0.0005
-    t = np.arange(0.0, ride.seconds, dt)
-    states = [ride.state(x) for x in t]
-    lean, speed, yaw_rate, slope = (np.array([s[i] for s in states]) for i in (1, 3, 5, 6))
-    heading = np.concatenate([[0.0], np.cumsum((yaw_rate[1:] + yaw_rate[:-1]) / 2 * dt)])
-    # World: left, up, forward at heading 0. A left turn is positive about up, nose up negative about left.
-    attitude = np.array([about(1, h) @ about(0, -e) @ about(2, b) for h, e, b in zip(heading, slope, lean)])
-    road = np.array([(about(1, h) @ about(0, -e))[:, 2] for h, e in zip(heading, slope)])
-    acceleration = np.gradient(road * speed[:, None], dt, axis=0)
+    rate_hz = 1000.0
+    t = np.arange(0.0, ride.seconds, 1.0 / rate_hz)
+    lean, speed, yaw_rate, slope = np.array([[ride.state(x)[i] for i in (1, 3, 5, 6)] for x in t]).T
+    on_the_roll_axis = Bike(sensor_height=0.06, sensor_forward=0.0)
+    same = Motion(rate_hz, speed, slope, yaw_rate, lean, slope, np.zeros_like(t))
     motion = np.array([ride.motion(x) for x in t])
-    return dt, attitude, acceleration, motion
-
-
-def test_positive_lean_is_to_the_right_and_a_positive_rotation_about_forward():
-    leaned = about(2, np.radians(30.0))
-    assert leaned[1, 0] > 0  # the left side is up
-    assert leaned[0, 1] < 0  # and the top of the bike is to the right of its wheels (left is positive)
-
-
-def test_rates_are_the_derivative_of_the_attitude(ridden):
-    dt, attitude, _, motion = ridden
-    change = np.einsum("nji,njk->nik", attitude[1:-1], (attitude[2:] - attitude[:-2]) / (2 * dt))
-    rates = np.degrees(np.stack([change[:, 2, 1], change[:, 0, 2], change[:, 1, 0]], axis=1))
-    assert np.abs(rates).max() > 40.0  # something happened
-    assert np.abs(rates - motion[1:-1, 3:]).max() < 0.01
-
-
-def test_forces_are_the_derivative_of_the_velocity(ridden):
-    _, attitude, acceleration, motion = ridden
-    felt = np.einsum("nji,nj->ni", attitude, acceleration / STANDARD_GRAVITY + [0.0, 1.0, 0.0])
-    assert np.ptp(felt[:, 1]) > 0.3 and np.ptp(felt[:, 2]) > 0.5
-    assert np.abs(felt - motion[:, :3])[1:-1].max() < 1e-3
+    assert np.all(np.ptp(motion, axis=0) > (0.001, 0.3, 0.5, 10.0, 40.0, 40.0))  # something happened
+    assert np.abs(specific_force(same, on_the_roll_axis) / STANDARD_GRAVITY - motion[:, :3])[1:-1].max() < 1e-3
+    assert np.abs(np.degrees(body_rates(same)) - motion[:, 3:])[1:-1].max() < 0.01
 
 
 def test_distance_is_the_integral_of_speed():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.simulation.commands import Leg, commands
-from kickstand_tools.simulation.physics import balance
+from kickstand_tools.simulation.physics import bike as physics
 from kickstand_tools.simulation.physics.bike import Bike
 from kickstand_tools.simulation.physics.kinematics import Motion, body_rates, specific_force
 from kickstand_tools.simulation.physics.signals import integral
@@ -81,10 +81,10 @@ def test_at_rest_the_force_is_one_g_along_the_vertical(lean_deg):
     assert np.allclose(force[:, 2], np.sin(0.1))
 
 
-def held_turn(lean_deg: float, bike: Bike, speed: float = 18.0, **more: float) -> tuple[balance.Roll, int]:
+def held_turn(lean_deg: float, bike: Bike, speed: float = 18.0, **more: float) -> tuple[physics.Roll, int]:
     """A turn's roll and a sample in its steady middle."""
     command = commands([Leg("straight", 3.0, speed, 0.0), Leg("turn", 8.0, speed, lean_deg, **more)], RATE)
-    return balance.roll(command, bike, np.zeros_like(command.time)), 9000
+    return physics.roll(command, bike, np.zeros_like(command.time)), 9000
 
 
 @pytest.mark.parametrize("lean_deg", [-45.0, -20.0, 10.0, 38.0])
@@ -109,7 +109,7 @@ def test_wide_tyres_and_spinning_wheels_lean_further_than_the_formula():
 def test_the_moments_about_the_contact_point_balance():
     """Bank, hanging off and tyres: the line from contact point to centre of mass has the balance lean."""
     bike, bank, hang, b = Bike(), np.radians(7.0), 0.03, np.radians(31.0)
-    lean = balance.chassis_lean(b, bike, bank, hang)
+    lean = physics.chassis_lean(b, bike, bank, hang)
     arm = bike.mass_height - bike.tyre_radius
     right = bike.tyre_radius * np.sin(bank) + arm * np.sin(lean) + hang * np.cos(lean)
     up = bike.tyre_radius * np.cos(bank) + arm * np.cos(lean) - hang * np.sin(lean)
@@ -132,6 +132,6 @@ def test_a_turn_begins_with_countersteering():
 
 def test_wind_from_the_left_leans_a_straight_ride_to_the_left():
     command = commands([Leg("straight", 6.0, 20.0, 0.0, crosswind_mps2=0.5)], RATE)
-    rolled = balance.roll(command, Bike(), np.zeros_like(command.time))
+    rolled = physics.roll(command, Bike(), np.zeros_like(command.time))
     assert np.degrees(rolled.balance[3000]) == pytest.approx(-np.degrees(np.arctan(0.5 / STANDARD_GRAVITY)))
     assert abs(rolled.yaw_rate[3000]) < 1e-6

@@ -24,9 +24,7 @@ def read(chip, register, count=1):
     chip.start(chip.address, False)
     chip.write_byte(register)
     chip.start(chip.address, True)
-    values = [chip.read_byte() for _ in range(count)]
-    chip.stop()
-    return values
+    return [chip.read_byte() for _ in range(count)]
 
 
 def write(chip, register, *values):
@@ -35,7 +33,6 @@ def write(chip, register, *values):
     chip.write_byte(register)
     for value in values:
         chip.write_byte(value)
-    chip.stop()
 
 
 def counts(chip):
@@ -45,13 +42,26 @@ def counts(chip):
     return [value - 65536 if value > 32767 else value for value in values]
 
 
-def on_board(firmware, until_s=1.0, **fitted):
-    """Run firmware(board) on a new Board(**fitted), at rest unless `world` is given. Returns (outcome, board)."""
+def on_board(program, until_s=1.0, **fitted):
+    """Run program(board) on a new Board(**fitted), at rest unless `world` is given. Returns (outcome, board)."""
     world = fitted.pop("world", level)
     board = Board(world, **fitted)
     board.install()
     try:
-        outcome = board.run(lambda: firmware(board), until_s)
+        outcome = board.run(lambda: program(board), until_s)
     finally:
         board.uninstall()
     return outcome, board
+
+
+def firmware(until_s=30.0, **fitted):
+    """Decorates test(board): it runs as the firmware of a new Board(**fitted), and must get to its end."""
+
+    def decorated(function):
+        def test():
+            outcome, _ = on_board(function, until_s, **fitted)
+            assert outcome == "returned"
+
+        return test
+
+    return decorated

@@ -50,7 +50,7 @@ class Ride:
         lean, told, slow, some = _Lean(self.calibration), False, False, False
         log, stretch = apart(self.log)
         for whole, found in self._read(log, progress, notices):
-            block = whole.believed
+            block = whole.measured
             if not len(block.time_us):
                 continue
             rows = lean.follow(block, shown=found is None)

@@ -34,7 +34,7 @@ class LogCells:
     def integrals(self, at_s: Array) -> Array:
         """(k, 7) until the times at_s (k): of force (g s), of rate (degrees) and of the time that is known (s)."""
         edges_s = self.first_s + np.arange(len(self.known) + 1) * CELL_S
-        return np.array([np.interp(at_s, edges_s, sums) for sums in self._sums]).T
+        return np.asarray([np.interp(at_s, edges_s, sums) for sums in self._sums], dtype=float).T
 
     @cached_property
     def _sums(self) -> Array:

@@ -3,31 +3,28 @@
 import contextlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from .. import firmware_path
+from ..deploy.connection import Progress
+from ..deploy.flash import flash
+from ..deploy.status import status
+from ..progress import Bar
+from ..rides.live_line import LiveLine
+from ..rides.pull import PulledRide, pull
+from ..rides.record import record
+from ..rides.stream import LiveReading
+from .common import OUT, PATH, PORT, warning
 
-if TYPE_CHECKING:
-    from ..deploy.connection import Progress
-    from ..rides.pull import PulledRide
-    from ..rides.stream import LiveReading
-
-_PATH = click.Path(path_type=Path)
-_PORT = click.option(
-    "--port", help="Serial port of the board, as COM3 or /dev/ttyACM0; found by itself if only one is there."
-)
 _NAMED_ONE_BY_ONE = 5
 
 
-@click.command(short_help="Copy the firmware to a board, and start it.")
-@_PORT
+@click.command()
+@PORT
 @click.option("--config", is_flag=True, help="Replace the board's config.py too, which is otherwise kept.")
-def flash(port: str | None, config: bool) -> None:
+def flash_command(port: str | None, config: bool) -> None:
     """Copy the firmware to a board that runs MicroPython, check it, and start it."""
-    from ..deploy.flash import flash
-
     with _bar() as progress:
         result = flash(port, config, progress)
     click.echo(f"{result.board} on {result.port}")
@@ -54,32 +51,29 @@ def flash(port: str | None, config: bool) -> None:
     click.echo("restarted: the display shows the rest")
 
 
-@click.command(short_help="Ask a board for versions, settings, sensor and calibration.")
-@_PORT
-def status(port: str | None) -> None:
+@click.command()
+@PORT
+def status_command(port: str | None) -> None:
     """Ask a board how it is: versions, settings, sensor, display, calibration."""
-    from ..deploy.status import status
-
     click.echo(status(port))
 
 
-@click.command(short_help="Fetch the rides that a board has recorded.")
-@_PORT
-@click.option("--out", type=_PATH, default=Path(), help="The directory to write to; this one if not given.")
+@click.command()
+@PORT
+@click.option("--out", type=PATH, default=Path(), help="The directory to write to; this one if not given.")
 @click.option("--delete", is_flag=True, help="Remove from the board what came over whole.")
-def pull(port: str | None, out: Path, delete: bool) -> None:
+def pull_command(port: str | None, out: Path, delete: bool) -> None:
     """Fetch the rides that a board has recorded, as logs with their calibration."""
-    from ..rides.pull import pull
 
-    def say(ride: "PulledRide") -> None:
+    def say(ride: PulledRide) -> None:
         for problem in ride.problems:
-            _warn(problem)
+            warning(problem)
         if ride.log:
             click.echo(f"written: {ride.log}, {ride.seconds / 60:.1f} min, {ride.readings} readings")
         if ride.deleted:
             click.echo(f"deleted from the board: ride {ride.number}")
         elif delete:
-            _warn(f"ride {ride.number}: not deleted from the board, because not all of it came over")
+            warning(f"ride {ride.number}: not deleted from the board, because not all of it came over")
 
     with _bar() as progress:
         result = pull(port, out, delete, progress, say)
@@ -87,14 +81,11 @@ def pull(port: str | None, out: Path, delete: bool) -> None:
         click.echo(f"no rides on the board at {result.port}: its menu's Record ride makes one")
 
 
-@click.command(short_help="Write a log live over USB.")
-@_PORT
-@click.option("--out", required=True, type=_PATH, help="The file to write.")
-def record(port: str | None, out: Path) -> None:
+@click.command()
+@PORT
+@OUT
+def record_command(port: str | None, out: Path) -> None:
     """Write a log live over USB until Ctrl-C; the board's display goes on."""
-    from ..rides.live_line import LiveLine
-    from ..rides.record import record
-
     with contextlib.ExitStack() as stack:
         line: list[LiveLine] = []
 
@@ -102,18 +93,15 @@ def record(port: str | None, out: Path) -> None:
             click.echo(f"recording from {name}: Ctrl-C ends it")
             line.append(stack.enter_context(LiveLine()))
 
-        def show(reading: "LiveReading") -> None:
-            line[0].show(_live_text(reading))
-
-        result = record(port, out, begin, show)
+        result = record(port, out, begin, lambda reading: line[0].show(_live_text(reading)))
     for note in result.notes:
-        _warn(note)
+        warning(note)
     click.echo(
         f"written: {result.log}, {result.seconds:.1f} s, {result.readings} readings, and {result.calibration.name}"
     )
 
 
-def _live_text(reading: "LiveReading") -> str:
+def _live_text(reading: LiveReading) -> str:
     """The lean as a bar to the left or right, in a car the forces, and how long the recording is."""
     how_long = f"{reading.rate_hz:3.0f} readings/s  {reading.seconds // 60:.0f}:{reading.seconds % 60:04.1f}"
     lean, forward_g, left_g = reading.lean_deg, reading.forward_g, reading.left_g
@@ -128,24 +116,12 @@ def _live_text(reading: "LiveReading") -> str:
 
 
 @contextlib.contextmanager
-def _bar() -> "Iterator[Progress]":
-    """A progress bar, from the first time that it is called on."""
-    from ..progress import Bar
-
-    with contextlib.ExitStack() as stack:
-        bars: list[Bar] = []
-        before = 0
+def _bar() -> Iterator[Progress]:
+    """A progress bar whose text changes."""
+    with Bar("") as bar:
 
         def show(what: str, done: int, total: int) -> None:
-            nonlocal before
-            if not bars:
-                bars.append(stack.enter_context(Bar(what, total)))
-            bars[0].describe(what)
-            bars[0].advance(done - before)
-            before = done
+            bar.describe(what)
+            bar.reach(done, total)
 
         yield show
-
-
-def _warn(text: str) -> None:
-    click.echo(f"warning: {text}", err=True)

@@ -1,92 +1,76 @@
-"""The commands of `kickstand calibrate`: six, two, drive; ride is in calibrate_ride.py."""
+"""The commands of `kickstand calibrate`: six, two, drive, ride."""
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
+from kickstand.calibration.six_position import SIDES
+from kickstand.calibration.two_position import WARN_TILT_DEG
+from kickstand.drive_alignment import verdict
+from kickstand.units import AXES
 
-from .common import on_right_handed_axes, warn
-
-if TYPE_CHECKING:
-    from ..calibration.drive import DriveFit
-    from ..calibration.drive_events import DriveEvent
-    from ..calibration.six import SixPositions
-    from ..calibration.two import TwoPositions
-
-PATH = click.Path(path_type=Path)
-OUT = click.option("--out", required=True, type=PATH, help="The file to write.")
+from ..analysis import alignment_quality
+from ..calibration import drive_events as events
+from ..calibration.drive import DriveFit, fit_drive
+from ..calibration.file import CalibrationFile, read_calibration, write_calibration
+from ..calibration.poses import refuse_same_file
+from ..calibration.ride.fit import RideFit, fit_ride
+from ..calibration.six import GOOD_FREE_POSE_G, SixPositions, fit_six_positions
+from ..calibration.two import TwoPositions, fit_two_positions
+from ..checks.log import remarks
+from ..checks.mount import of_calibration
+from ..logs.reader import read_log
+from ..output import check_output
+from ..progress import Bar
+from ..refusals import OPPOSITE_SIGN, sentence
+from .common import OUT, PATH, RIGHT_HANDED, VEHICLES, file_argument, print_lines, warn
 
 
 @click.group(no_args_is_help=False)
-def calibrate() -> None:
+def calibrate_command() -> None:
     """Compute a calibration from recorded poses or drives."""
 
 
-@calibrate.command(short_help="Offset and slope of the accelerometer, from six poses.")
-@click.argument("poses", nargs=-1, required=True, type=PATH, metavar="POSE.csv...")
+@calibrate_command.command(short_help="Offset and slope of the accelerometer, from six poses.")
+@file_argument("poses", "POSE.csv...", nargs=-1, required=True)
 @OUT
 def six(poses: tuple[Path, ...], out: Path) -> None:
     """Accelerometer offset and slope from six still poses, each side up once, in any order.
 
     A seventh, slanted pose checks the result.
     """
-    from ..calibration.file import write_calibration
-    from ..calibration.six import fit_six_positions
-    from ..output import check_output
-
     check_output(out, list(poses))
     found = fit_six_positions(poses)
     print_lines(_six_lines(found))
-    write_calibration(out, found.calibration)
-    click.echo(f"written: {out}")
+    _write(out, found.calibration)
 
 
-@calibrate.command(short_help="The alignment, from a pose on the kickstand and upright.")
-@click.argument("kickstand", type=PATH, metavar="KICKSTAND.csv")
-@click.argument("upright", type=PATH, metavar="UPRIGHT.csv")
+@calibrate_command.command(short_help="The alignment, from a pose on the kickstand and upright.")
+@file_argument("kickstand", "KICKSTAND.csv")
+@file_argument("upright", "UPRIGHT.csv")
 @click.option("--calibration", type=PATH, help="The result of `kickstand calibrate six`, to build on.")
 @click.option("--side", type=click.Choice(["left", "right"]), default="left", help="Where the kickstand leans to.")
 @OUT
-@on_right_handed_axes
+@RIGHT_HANDED
 def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out: Path) -> None:
     """How the sensor sits on the bike, from a pose on the kickstand and one upright."""
-    from ..calibration.file import read_calibration, write_calibration
-    from ..calibration.two import fit_two_positions
-    from ..checks.mount import of_calibration
-    from ..output import check_output
-
     check_output(out, [kickstand, upright])
     before = read_calibration(calibration) if calibration else None
     found = fit_two_positions(kickstand, upright, before, side)
     print_lines(_two_lines(found))
     warn(upright, of_calibration(found.calibration, before))
-    write_calibration(out, found.calibration)
-    click.echo(f"written: {out}")
+    _write(out, found.calibration)
 
 
-@calibrate.command(short_help="The alignment of any vehicle, from driving with braking.")
-@click.argument("logs", nargs=-1, required=True, type=PATH, metavar="LOG.csv...")
+@calibrate_command.command(short_help="The alignment of any vehicle, from driving with braking.")
+@file_argument("logs", "LOG.csv...", nargs=-1, required=True)
 @click.option("--calibration", type=PATH, help="What is known already: six positions, and a motorcycle's two poses.")
-@click.option(
-    "--vehicle",
-    type=click.Choice(["motorcycle", "car"]),
-    help="motorcycle if the calibration has two poses, else car, if not given.",
-)
+@click.option("--vehicle", type=VEHICLES, help="motorcycle if the calibration has two poses, else car, if not given.")
 @click.option("--method", type=click.Choice(["improved", "published"]), default="improved")
 @OUT
-@on_right_handed_axes
+@RIGHT_HANDED
 def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None, method: str, out: Path) -> None:
     """How the sensor sits on the vehicle, from logs of driving with speed: stops and braking in a straight line."""
-    from ..calibration.drive import fit_drive
-    from ..calibration.file import read_calibration, write_calibration
-    from ..calibration.poses import refuse_same_file
-    from ..checks.log import remarks
-    from ..checks.mount import of_calibration
-    from ..logs.reader import read_log
-    from ..output import check_output
-    from ..progress import Bar
-
     check_output(out, list(logs))
     refuse_same_file(logs)
     before = read_calibration(calibration) if calibration else None
@@ -102,15 +86,34 @@ def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None,
         for log in logs:
             warn(log, remarks(read_log(log), before, axes=False))
     print_lines(_drive_lines(found, several))
-    write_calibration(out, found.calibration)
+    _write(out, found.calibration)
+
+
+@calibrate_command.command(short_help="The alignment of a motorcycle, from riding with bends.")
+@file_argument("log", "LOG.csv")
+@click.option(
+    "--phone",
+    type=click.Choice(["portrait", "landscape", "flat"]),
+    help="How a phone was mounted, to check the result: upright or on its side with the screen to the rider, or flat.",
+)
+@OUT
+@RIGHT_HANDED
+def ride(log: Path, phone: str | None, out: Path) -> None:
+    """How the sensor sits on a motorcycle, from any ride with bends: no poses, and no speed, are needed."""
+    check_output(out, [log])
+    with Bar("aligning") as bar:
+        found = fit_ride(log, phone, bar.reach)
+    warn(log, found.notices)
+    print_lines(_ride_lines(found))
+    _write(out, found.calibration)
+
+
+def _write(out: Path, calibration: CalibrationFile) -> None:
+    write_calibration(out, calibration)
     click.echo(f"written: {out}")
 
 
-def _six_lines(found: "SixPositions") -> Iterable[str]:
-    from kickstand.calibration.six_position import SIDES
-
-    from ..calibration.six import GOOD_FREE_POSE_G
-
+def _six_lines(found: SixPositions) -> Iterable[str]:
     for side, pose, tilt in zip(SIDES, found.sides, found.tilt_deg, strict=True):
         yield f"{side} up: {pose.name}, {pose.samples} samples, {tilt:.1f} degrees off its axis"
     if found.free_pose and found.free_pose_error_g is not None:
@@ -119,9 +122,9 @@ def _six_lines(found: "SixPositions") -> Iterable[str]:
             f"free pose: {found.free_pose.name}, {found.free_pose.samples} samples, "
             f"{found.free_pose_error_g * 1000:+.1f} mg from 1 g: {good}"
         )
-    yield "offset     " + along_axes(found.calibration.accel_offset_g, "%+.4f g")
-    yield "slope      " + along_axes(found.calibration.accel_slope, "%.4f")
-    yield "gyro bias  " + along_axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
+    yield "offset     " + _along_axes(found.calibration.accel_offset_g, "%+.4f g")
+    yield "slope      " + _along_axes(found.calibration.accel_slope, "%.4f")
+    yield "gyro bias  " + _along_axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
     if found.beyond_sheet:
         axes = ", ".join(found.beyond_sheet)
         yield f"warning: {axes} is beyond the data sheet (50 mg, z 80 mg, slope 3 %): used anyway"
@@ -130,11 +133,7 @@ def _six_lines(found: "SixPositions") -> Iterable[str]:
     yield "not aligned yet: next is kickstand calibrate two"
 
 
-def _two_lines(found: "TwoPositions") -> Iterable[str]:
-    from kickstand.calibration.two_position import WARN_TILT_DEG
-
-    from ..analysis import alignment_quality
-
+def _two_lines(found: TwoPositions) -> Iterable[str]:
     calibration, first, second = found.calibration, found.kickstand, found.upright
     side = calibration.kickstand_side
     yield f"kickstand: {first.name}, {first.samples} samples"
@@ -142,8 +141,8 @@ def _two_lines(found: "TwoPositions") -> Iterable[str]:
         f"upright:   {second.name}, {second.samples} samples, "
         f"{found.tilt_deg:.1f} degrees from the kickstand on the {side}"
     )
-    yield "gyro bias  " + along_axes(calibration.gyro_bias_dps, "%+.2f deg/s")
-    yield from matrix_lines(calibration.vehicle_from_sensor)
+    yield "gyro bias  " + _along_axes(calibration.gyro_bias_dps, "%+.2f deg/s")
+    yield from _matrix_lines(calibration.vehicle_from_sensor)
     if found.tilt_deg < WARN_TILT_DEG:
         cost_deg = alignment_quality.yaw_cost_deg(7.0)
         yield (
@@ -154,12 +153,7 @@ def _two_lines(found: "TwoPositions") -> Iterable[str]:
         yield "warning: no six-position calibration: an offset of 50 mg is 3 degrees of lean: calibrate six first"
 
 
-def _drive_lines(found: "DriveFit", several: bool) -> Iterable[str]:
-    from kickstand.drive_alignment import verdict
-
-    from ..analysis import alignment_quality
-    from ..refusals import OPPOSITE_SIGN
-
+def _drive_lines(found: DriveFit, several: bool) -> Iterable[str]:
     yield f"{found.vehicle}, method {found.method}: {found.used} used, {found.turned} in turns not used"
     yield f"stops: {found.stops}"
     ready = f"ready after {found.ready_s:.0f} s" + (" of all logs" if several else "")
@@ -179,17 +173,14 @@ def _drive_lines(found: "DriveFit", several: bool) -> Iterable[str]:
             cost_deg = alignment_quality.yaw_cost_deg(yaw_deg)
             costs = f", which usually costs about {cost_deg:.1f} degrees of lean" if cost_deg >= 0.05 else ""
             yield f"the two poses had forward {yaw_deg:.1f} degrees off{costs}: now it is put right"
-    yield from matrix_lines(found.calibration.vehicle_from_sensor)
+    yield from _matrix_lines(found.calibration.vehicle_from_sensor)
     if not found.calibration.six_done:
         what = "warning: no six-position calibration: an offset of 50 mg tilts the vertical by 3 degrees"
         yield f"{what}: calibrate six first"
 
 
-def _event_lines(event: "DriveEvent", several: bool) -> Iterable[str]:
+def _event_lines(event: events.DriveEvent, several: bool) -> Iterable[str]:
     """Of several logs, the name of each is said before its events."""
-    from ..calibration import drive_events as events
-    from ..refusals import sentence
-
     if event.what in (events.LOG_BEGINS, events.LOG_WITHOUT_EVENTS):
         if several:
             yield f"{event.log}:" if event.what == events.LOG_BEGINS else "           no braking in it"
@@ -205,17 +196,29 @@ def _event_lines(event: "DriveEvent", several: bool) -> Iterable[str]:
     yield f"{event.t_s:7.1f} s  {words[event.what]}"
 
 
-def matrix_lines(vehicle_from_sensor) -> Iterable[str]:
+def _ride_lines(found: RideFit) -> Iterable[str]:
+    begin, end = found.used_s
+    yield (
+        f"used: {begin:.0f} to {end:.0f} s of the log, {found.riding_s:.0f} s of it riding, "
+        f"leaning {found.lean_deg:.0f} degrees rms"
+    )
+    yield f"known to: roll {found.roll_deg:.1f}, pitch {found.pitch_deg:.1f}, yaw {found.yaw_deg:.1f} degrees"
+    roll, pitch, yaw = (abs(angle) for angle in found.halves_deg)
+    yield f"two halves of the ride differ by: roll {roll:.1f}, pitch {pitch:.1f}, yaw {yaw:.1f} degrees"
+    if found.lag_s is not None:
+        yield f"speed: {max(0.0, found.lag_s):.1f} s late"
+    if found.phone_deg is not None:
+        yield f"phone: mounted as --phone says, within {found.phone_deg:.0f} degrees"
+    yield "gyro bias  " + _along_axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
+    yield "offset     " + _along_axes(found.calibration.accel_offset_g, "%+.4f g")
+    yield from _matrix_lines(found.calibration.vehicle_from_sensor)
+    yield "upright is where the bike is balanced on straights; a ride does not tell the accelerometer's slopes"
+
+
+def _matrix_lines(vehicle_from_sensor) -> Iterable[str]:
     for name, row in zip(("left", "up", "forward"), vehicle_from_sensor, strict=True):
-        yield f"{name:<10} " + along_axes(row, "%+.4f")
+        yield f"{name:<10} " + _along_axes(row, "%+.4f")
 
 
-def along_axes(values, form: str) -> str:
-    from kickstand.units import AXES
-
+def _along_axes(values, form: str) -> str:
     return "  ".join(f"{axis} " + form % value for axis, value in zip(AXES, values, strict=True))
-
-
-def print_lines(lines: Iterable[str]) -> None:
-    for line in lines:
-        click.echo(line)

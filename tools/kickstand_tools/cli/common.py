@@ -1,14 +1,16 @@
-"""What several commands share: times as they are given, and notices in words on standard error."""
+"""What commands share: arguments and options, the times given to them, notices in words on standard error."""
 
-import inspect
 from collections.abc import Callable, Iterable
+from inspect import cleandoc
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
+from kickstand.errors import Notice
 
-if TYPE_CHECKING:
-    from kickstand.errors import Notice
+from ..refusals import sentence
+
+Command = Callable[..., Any]
 
 
 class Time(click.ParamType):
@@ -33,18 +35,83 @@ class Time(click.ParamType):
 
 
 TIME = Time()
+PATH = click.Path(path_type=Path)
+PORT = click.option(
+    "--port", help="Serial port of the board, as COM3 or /dev/ttyACM0; found by itself if only one is there."
+)
+JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+VEHICLES = click.Choice(["motorcycle", "car"])
 
 
-def on_right_handed_axes(command: Callable[..., Any]) -> Callable[..., Any]:
-    """A command whose help says what the axes of its logs have to be."""
-    line = "The log's axes and rates have to be right-handed, and the axis that points up has to read +1 g at rest."
-    command.__doc__ = f"{inspect.cleandoc(command.__doc__ or '')}\n\n{line}"
-    return command
+def file_argument(name: str, metavar: str, **more: Any) -> Command:
+    """An argument that names a file."""
+    return click.argument(name, type=PATH, metavar=metavar, **more)
 
 
-def warn(log: Path | str, notices: "Iterable[Notice]") -> None:
-    """A line for each notice. log: what they are about."""
-    from ..refusals import sentence
+def out_option(words: str) -> Command:
+    """The option --out, which has to be given."""
+    return click.option("--out", required=True, type=PATH, help=words)
 
+
+OUT = out_option("The file to write.")
+OUT_LOG = out_option("The log to write, packed if it ends in .gz.")
+OUT_DIRECTORY = out_option("The directory to write to.")
+RIDE = file_argument("ride", "RIDE.csv")
+CALIBRATION = click.option("--calibration", type=PATH, help="A CAL.json; if not given, the one beside the ride.")
+
+
+def from_to(start: str, end: str, **names: str) -> Command:
+    """The options --from and --to with these words, as from_s and to_s."""
+
+    def add(command: Command) -> Command:
+        first = click.option("--from", "from_s", type=TIME, metavar="TIME", help=start)
+        return first(click.option("--to", "to_s", type=TIME, metavar="TIME", help=end)(command))
+
+    return add
+
+
+STRETCH = from_to(
+    "Leave out what is before: seconds from the beginning, or 1:30.",
+    "Leave out what is after; a negative time counts from the end.",
+)
+
+
+def help_adds(text: str) -> Command:
+    """A further paragraph of a command's help."""
+
+    def add(command: Command) -> Command:
+        command.__doc__ = f"{cleandoc(command.__doc__ or '')}\n\n{text}"
+        return command
+
+    return add
+
+
+RIGHT_HANDED = help_adds(
+    "The axes of the log have to be right-handed. At rest the axis that points up reads +1 g, and a rate is positive "
+    "right-handed about its axis."
+)
+
+
+def live(command: Command) -> Command:
+    """The smoothed lean, or with --live the one that was shown."""
+    smoothed = (
+        "The lean is the smoothed one: from the whole ride, and nearer to the truth than what the display showed."
+    )
+    option = click.option("--live", is_flag=True, help="The lean that the display showed, not the smoothed one.")
+    return option(help_adds(smoothed)(command))
+
+
+def warn(log: Path | str, notices: Iterable[Notice]) -> None:
+    """A warning for each notice. log: what they are about."""
     for notice in notices:
-        click.echo(f"warning: {log}: {sentence(notice)}", err=True)
+        warning(f"{log}: {sentence(notice)}")
+
+
+def warning(text: str) -> None:
+    """A line on standard error."""
+    click.echo(f"warning: {text}", err=True)
+
+
+def print_lines(lines: Iterable[str]) -> None:
+    for line in lines:
+        click.echo(line)

@@ -1,52 +1,47 @@
 """The command `kickstand fleet`: many vehicles at once."""
 
+from typing import Any
+
 import click
 
+from ..fleet.manifest import by_pattern, is_pattern, read_manifest
+from ..fleet.run import run_fleet
+from ..progress import Bar
+from .common import VEHICLES
 
-@click.command(short_help="Align many vehicles, find moved mounts, test their brakes.")
+
+@click.command()
 @click.argument("manifests", nargs=-1, required=True, metavar="MANIFEST.csv|GLOB")
 @click.option("--out", required=True, metavar="DIR", help="The directory to write to, or a place like s3://...")
 @click.option("--scheduler", metavar="ADDRESS", help="Of a Dask cluster, tcp://...; this computer if not given.")
 @click.option("--workers", type=click.IntRange(min=1), help="On this computer; one a processor if not given.")
-@click.option("--signals", is_flag=True, help="Also write each log's accelerations along the vehicle's axes.")
+@click.option(
+    "--signals", "with_signals", is_flag=True, help="Also write each log's accelerations along the vehicle's axes."
+)
 @click.option(
     "--timeout",
+    "timeout_s",
     type=click.FloatRange(min=1.0),
     default=600.0,
     help="Seconds after which work on a vehicle is given up.",
 )
 @click.option(
-    "--vehicle",
-    type=click.Choice(["motorcycle", "car"]),
-    default="car",
-    help="What the logs of a GLOB are of; a manifest says it itself.",
+    "--vehicle", type=VEHICLES, default="car", help="What the logs of a GLOB are of; a manifest says it itself."
 )
-def fleet(
-    manifests: tuple[str, ...],
-    out: str,
-    scheduler: str | None,
-    workers: int | None,
-    signals: bool,
-    timeout: float,
-    vehicle: str,
-) -> None:
+def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **how: Any) -> None:
     """Align a whole fleet, find mounts that moved, and measure its brake tests.
 
     The manifest is CSV with the columns vehicle,path,kind and optionally mount: a line a log, in the order of time. A
     GLOB takes each file that it matches for a vehicle of its own. Paths may be s3://. Run again, and only what is new
     is done.
     """
-    from ..fleet.manifest import by_pattern, is_pattern, read_manifest
-    from ..fleet.run import run_fleet
-    from ..progress import Bar
-
     manifest = manifests[0]
     if len(manifests) > 1:  # the shell has put names into the place of a pattern
         raise click.UsageError("One manifest, or one pattern in quotation marks.")
     periods = by_pattern(manifest, vehicle) if is_pattern(manifest) else read_manifest(manifest)
     try:
         with Bar("vehicles", lines_s=10.0, patience_s=0.0) as bar:
-            found = run_fleet(periods, out, scheduler, workers, signals, timeout, bar.reach)
+            found = run_fleet(periods, out, progress=bar.reach, **how)
     except KeyboardInterrupt:
         click.echo("what is finished is kept, the same command goes on", err=True)
         raise

@@ -1,18 +1,64 @@
 """The `kickstand` command. What it refuses: one line on standard error, status 2, nothing written."""
 
 import importlib
-import importlib.util
 import pkgutil
 import sys
-from collections.abc import Iterator
 
 import click
 
 from ..errors import InputError, cause
-from . import board, calibrate, calibrate_ride, fleet, import_, join, overlay, ride, simulated, without_a_board
+
+# name: (the module of its function name_command, a line of help). Modules are imported when a command runs: most take
+# numpy, which takes its time
+COMMANDS = {
+    "calibrate": (".calibrate", "Compute a calibration from recorded poses or drives."),
+    "cut": (".ride", "Cut a stretch out of a log."),
+    "demo": (".without_a_board", "The firmware on a simulated board, in the terminal."),
+    "emulate": (".without_a_board", "An emulated Pico that flash can deploy to."),
+    "export": (".ride", "Write a ride for another program."),
+    "flash": (".board", "Copy the firmware to a board, and start it."),
+    "fleet": (".fleet", "Align many vehicles, find moved mounts, test their brakes."),
+    "import": (".ride", "Make a log of a recording of another app or logger."),
+    "join": (".ride", "Put a phone's or a watch's track to a ride without GPS."),
+    "overlay": (".ride", "Draw the lean over a video of the ride."),
+    "plot": (".ride", "Draw a ride, as a picture and as a page to zoom into."),
+    "pull": (".board", "Fetch the rides that a board has recorded."),
+    "record": (".board", "Write a log live over USB."),
+    "replay": (".ride", "Find the lean as the firmware shows it during the ride."),
+    "report": (".ride", "Print maxima, time at large leans, and brake tests."),
+    "simulate": (".simulated", "Make up a ride with its true lean, or drives of a fleet."),
+    "smooth": (".ride", "Find the lean afterwards, from the whole ride."),
+    "status": (".board", "Ask a board for versions, settings, sensor and calibration."),
+    "web": (".without_a_board", "Open the lean meter's pages in the browser."),
+}
+
+
+def _commands() -> dict[str, tuple[str, str]]:
+    """COMMANDS, and those that other packages named kickstand_... add: their COMMANDS, in the same form."""
+    found = dict(COMMANDS)
+    for package in pkgutil.iter_modules():
+        if package.name.startswith("kickstand_") and package.name != __name__.partition(".")[0]:
+            found |= getattr(importlib.import_module(package.name), "COMMANDS", {})
+    return dict(sorted(found.items()))
+
+
+class Commands(click.Group):
+    """The commands of COMMANDS and of other packages."""
+
+    def list_commands(self, ctx: click.Context | None) -> list[str]:
+        return list(_commands())
+
+    def get_command(self, ctx: click.Context | None, cmd_name: str) -> click.Command | None:
+        module, _ = _commands().get(cmd_name, (None, None))
+        return getattr(importlib.import_module(module, __package__), f"{cmd_name}_command") if module else None
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, words) for name, (_, words) in _commands().items()])
 
 
 @click.group(
+    cls=Commands,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "show_default": True},
 )
@@ -22,26 +68,6 @@ def kickstand(context: click.Context) -> None:
     """Lean meter for any motorcycle: put it on a board, calibrate it, replay rides."""
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
-
-
-def _added() -> Iterator[click.Command]:
-    """What other packages add: the COMMANDS of the module `commands` of each that is named kickstand_..."""
-    for package in pkgutil.iter_modules():
-        if package.name.startswith("kickstand_") and package.name != __name__.partition(".")[0]:
-            if importlib.util.find_spec(package.name + ".commands"):
-                yield from importlib.import_module(package.name + ".commands").COMMANDS
-
-
-for _command in (
-    *(board.flash, board.status, board.pull, board.record),
-    *(import_.import_, join.join, calibrate.calibrate, ride.replay, ride.smooth, ride.report, ride.plot, ride.export),
-    *(ride.cut, overlay.overlay),
-    *(fleet.fleet, simulated.simulate),
-    *(without_a_board.demo, without_a_board.web, without_a_board.emulate),
-    *_added(),
-):
-    kickstand.add_command(_command)
-calibrate.calibrate.add_command(calibrate_ride.ride)
 
 
 def main(arguments: list[str] | None = None) -> None:

@@ -1,108 +1,171 @@
-"""The commands of `kickstand` that read a recorded ride: replay, smooth, report, plot, export, cut."""
+"""The commands that read a recorded ride: import, join, replay, smooth, report, plot, export, cut, overlay."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 from kickstand.errors import Notice
+from rich.console import Console
+from rich.table import Table
 
-from .common import TIME, on_right_handed_axes, warn
-
-if TYPE_CHECKING:
-    from ..logs.reader import Source
-
-_PATH = click.Path(path_type=Path)
-_OUT = click.option("--out", required=True, type=_PATH, help="The file to write.")
-_CALIBRATION = click.option("--calibration", type=_PATH, help="A CAL.json; if not given, the one beside the ride.")
-_FROM = click.option(
-    "--from", "from_s", type=TIME, metavar="TIME", help="Leave out what is before: seconds from the beginning, or 1:30."
+from ..analysis.export.export import export
+from ..analysis.overview import overview
+from ..analysis.plot import plot
+from ..analysis.report import as_data, page
+from ..analysis.ride import open_ride
+from ..calibration.file import calibration_beside, calibration_path, read_calibration
+from ..errors import InputError
+from ..imports.importing import Imported, import_recording, write_imported
+from ..joining.joined import Joined, join_track, write_joined
+from ..joining.track_files import read_track
+from ..logs.csv_lines import cut_log
+from ..logs.reader import Source
+from ..logs.stretch import Stretch
+from ..output import check_output
+from ..overlay.overlay import overlay
+from ..progress import Bar, spinner
+from ..replay.replay import replay_to_csv
+from ..smoothing.smooth import smooth_to_csv
+from .common import (
+    CALIBRATION,
+    JSON,
+    OUT,
+    OUT_DIRECTORY,
+    OUT_LOG,
+    PATH,
+    RIDE,
+    RIGHT_HANDED,
+    STRETCH,
+    TIME,
+    file_argument,
+    from_to,
+    live,
+    out_option,
+    print_lines,
+    warn,
+    warning,
 )
-_TO = click.option(
-    "--to", "to_s", type=TIME, metavar="TIME", help="Leave out what is after; a negative time counts from the end."
+
+_WRONG_AXES = ("mirrored", "left-handed", "rates-misfit", "rates-in-radians")  # these are to be put right first
+
+
+@click.command()
+@file_argument("source", "FILE|DIR|ZIP")
+@OUT_LOG
+@click.option(
+    "--columns",
+    metavar="t=NAME,ax=NAME,...",
+    help="Of another table: t, ax, ay, az, gx, gy, gz; also speed, lat, lon, temp. #3 is the third column.",
 )
+@click.option(
+    "--units",
+    metavar="a=UNIT,g=UNIT,...",
+    help="Of t, a (or ax, ay, az), g (or gx, gy, gz), speed; -UNIT turns the sign.",
+)
+@from_to("Seconds from the start; negative: from the end.", "The same, for the end.")
+@RIGHT_HANDED
+def import_command(
+    source: Path, out: Path, columns: str | None, units: str | None, from_s: float | None, to_s: float | None
+) -> None:
+    """Make a log of a recording of another app or logger.
+
+    Known: phyphox, Sensor Logger, SensorLog, Sensor Kinetics, RaceChrono (CSV), RaceBox, VBO, AiM, and Kickstand's own
+    exports. Any other table of accelerations (with gravity) and rates of rotation needs --columns and --units.
+    """
+    check_output(out, [source] if source.is_file() else sorted(source.rglob("*")) if source.is_dir() else [])
+    named = _pairs(columns, "--columns") if columns is not None else None
+    with spinner("importing"):
+        found = import_recording(source, named, _pairs(units or "", "--units"), from_s, to_s)
+        write_imported(out, found)
+    Console().print(_import_table(found))
+    warn(source, found.notices)
+    t_s, gaps_s = found.log.t_s, found.gaps_s
+    count = "1 gap" if len(gaps_s) == 1 else f"{len(gaps_s)} gaps"
+    gaps = f", {count} of {gaps_s.sum():.1f} s in all" if len(gaps_s) else ""
+    click.echo(f"written: {out}, {len(t_s)} samples in {t_s[-1]:.1f} s, {found.rate_hz:.0f} a second{gaps}")
+    if found.vehicle_axes:
+        click.echo("x is left, y up, z forward, as far as the logger was mounted so")
+    beside = calibration_path(out)
+    if beside.exists():
+        click.echo(f"{beside} is of an earlier ride: after the mount has moved, kickstand calibrate ride makes it anew")
+    elif not any(notice.code in _WRONG_AXES for notice in found.notices):
+        click.echo(f"next: kickstand calibrate ride {out} --out {beside}")
+        click.echo(f"      kickstand report {out}")
 
 
-_LIVE = click.option("--live", is_flag=True, help="The lean that the display showed, not the smoothed one.")
+@click.command()
+@RIDE
+@file_argument("track", "TRACK.gpx|.fit")
+@OUT_LOG
+def join_command(ride: Path, track: Path, out: Path) -> None:
+    """Put the track of a phone or a watch to a ride of a board without GPS.
+
+    When the ride was is found out by how ride and track turn and speed up. The written log has the track's positions,
+    times and speeds. A track of another ride is refused.
+    """
+    check_output(out, [ride, track])
+    with spinner("reading the track"):
+        given = read_track(track)
+    with Bar("reading") as bar:
+        joined = join_track(ride, given, bar.reach)
+    warn(ride, joined.notices)
+    with Bar("writing") as bar:
+        count = write_joined(out, joined, bar.reach)
+    print_lines(_joined_lines(joined))
+    click.echo(f"written: {out}, {count} positions")
+    if calibration_path(ride).is_file() and not calibration_path(out).exists():
+        click.echo(f"next: kickstand report {out} --calibration {calibration_path(ride)}")
 
 
-def _stretch(command: Callable[..., Any]) -> Callable[..., Any]:
-    return _FROM(_TO(command))
-
-
-@click.command(short_help="Find the lean as the firmware shows it during the ride.")
-@click.argument("log", type=_PATH, metavar="LOG.csv")
-@_CALIBRATION
-@_stretch
+@click.command()
+@file_argument("ride", "LOG.csv")
+@CALIBRATION
+@STRETCH
 @click.option("--engine", type=click.Choice(["cpython", "micropython", "rp2040"]), default="cpython")
-@_OUT
-@on_right_handed_axes
-def replay(
-    log: Path, calibration: Path | None, from_s: float | None, to_s: float | None, engine: str, out: Path
+@OUT
+@RIGHT_HANDED
+def replay_command(
+    ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, engine: str, out: Path
 ) -> None:
     """Run the firmware's own lean meter over a recorded log."""
-    from ..calibration.file import calibration_beside, read_calibration
-    from ..output import check_output
-    from ..progress import Bar
-    from ..replay.replay import replay_to_csv
-
-    calibration = calibration or calibration_beside(log)
-    check_output(out, [log, calibration])
+    calibration = _given_or_beside(ride, calibration, out)
     parameters = read_calibration(calibration)
     with Bar("replaying") as bar:
-        count, notices = replay_to_csv(_part(log, from_s, to_s), parameters, engine, out, bar.reach)
-    warn(log, notices)
+        count, notices = replay_to_csv(_part(ride, from_s, to_s), parameters, engine, out, bar.reach)
+    warn(ride, notices)
     if not parameters.aligned:
-        click.echo(
-            f"warning: {calibration} is not aligned: this is the lean of the sensor, not of the bike",
-            err=True,
-        )
+        warning(f"{calibration} is not aligned: this is the lean of the sensor, not of the bike")
     click.echo(f"written: {out}, {count} samples")
 
 
-@click.command(short_help="Find the lean afterwards, from the whole ride.")
-@click.argument("ride", type=_PATH, metavar="RIDE.csv")
-@_CALIBRATION
-@_stretch
-@_OUT
-@on_right_handed_axes
-def smooth(ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, out: Path) -> None:
+@click.command()
+@RIDE
+@CALIBRATION
+@STRETCH
+@OUT
+@RIGHT_HANDED
+def smooth_command(ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, out: Path) -> None:
     """Find the lean afterwards, from the whole ride, each sample with its standard deviation."""
-    from ..calibration.file import calibration_beside, read_calibration
-    from ..output import check_output
-    from ..progress import Bar
-    from ..smoothing.smooth import smooth_to_csv
-
-    calibration = calibration or calibration_beside(ride)
-    check_output(out, [ride, calibration])
-    parameters = read_calibration(calibration)
+    parameters = read_calibration(_given_or_beside(ride, calibration, out))
     with Bar("smoothing") as bar:
         count, notices = smooth_to_csv(_part(ride, from_s, to_s), parameters, out, bar.reach)
     warn(ride, notices)
     click.echo(f"written: {out}, {count} samples")
 
 
-@click.command(short_help="Write a ride for another program.")
-@click.argument("ride", type=_PATH, metavar="RIDE.csv")
+@click.command()
+@RIDE
+@CALIBRATION
 @click.option("--to", "form", required=True, type=click.Choice(["csv", "gpx", "vbo", "racechrono", "parquet"]))
-@_CALIBRATION
-@_LIVE
-@_OUT
-@on_right_handed_axes
-def export(ride: Path, form: str, calibration: Path | None, live: bool, out: Path) -> None:
-    """Write a ride as maps (gpx), Circuit Tools (vbo), RaceChrono or data frames (parquet, csv) open it.
-
-    The lean is the smoothed one: from the whole ride, and nearer to the truth than what the display showed.
-    """
-    from ..analysis.export.export import export
-    from ..analysis.ride import open_ride
-    from ..calibration.file import calibration_beside
-    from ..output import check_output
-    from ..progress import Bar
-
-    calibration = calibration or calibration_beside(ride)
-    check_output(out, [ride, calibration])
+@live
+@OUT
+@RIGHT_HANDED
+def export_command(ride: Path, form: str, calibration: Path | None, live: bool, out: Path) -> None:
+    """Write a ride as maps (gpx), Circuit Tools (vbo), RaceChrono or data frames (parquet, csv) open it."""
+    calibration = _given_or_beside(ride, calibration, out)
     notices: list[Notice] = []
     with Bar("exporting") as bar:
         count = export(open_ride(ride, calibration, smoothed=not live), form, out, bar.reach, notices)
@@ -110,27 +173,17 @@ def export(ride: Path, form: str, calibration: Path | None, live: bool, out: Pat
     click.echo(f"written: {out}, {count} rows")
 
 
-@click.command(short_help="Print maxima, time at large leans, and brake tests.")
-@click.argument("ride", type=_PATH, metavar="RIDE.csv")
-@_CALIBRATION
-@_stretch
-@_LIVE
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-@on_right_handed_axes
-def report(
+@click.command()
+@RIDE
+@CALIBRATION
+@STRETCH
+@live
+@JSON
+@RIGHT_HANDED
+def report_command(
     ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, live: bool, as_json: bool
 ) -> None:
-    """A ride in a page: maxima, time at large leans, and each stop as a brake test has it.
-
-    The lean is the smoothed one: from the whole ride, and nearer to the truth than what the display showed.
-    """
-    from rich.console import Console
-
-    from ..analysis.overview import overview
-    from ..analysis.report import as_data, page
-    from ..analysis.ride import open_ride
-    from ..progress import Bar
-
+    """A ride in a page: maxima, time at large leans, and each stop as a brake test has it."""
     with Bar("reading") as bar:
         seen = overview(open_ride(_part(ride, from_s, to_s), calibration, smoothed=not live), bar.reach)
     warn(ride, seen.notices)
@@ -140,15 +193,15 @@ def report(
         Console().print(page(seen))
 
 
-@click.command(short_help="Draw a ride, as a picture and as a page to zoom into.")
-@click.argument("ride", type=_PATH, metavar="RIDE.csv")
-@_CALIBRATION
-@_stretch
+@click.command()
+@RIDE
+@CALIBRATION
+@STRETCH
 @click.option("--tiles", is_flag=True, help="Streets below the track: the page asks a server for them when it is open.")
-@_LIVE
-@click.option("--out", required=True, type=_PATH, help="The directory to write to.")
-@on_right_handed_axes
-def plot(
+@live
+@OUT_DIRECTORY
+@RIGHT_HANDED
+def plot_command(
     ride: Path,
     calibration: Path | None,
     from_s: float | None,
@@ -157,35 +210,22 @@ def plot(
     live: bool,
     out: Path,
 ) -> None:
-    """Draw a ride: a picture (PNG) and a page to zoom into (HTML).
-
-    The lean is the smoothed one: from the whole ride, and nearer to the truth than what the display showed.
-    """
-    from ..analysis.overview import overview
-    from ..analysis.plot import plot
-    from ..analysis.ride import open_ride
-    from ..progress import Bar, spinner
-
+    """Draw a ride: a picture (PNG) and a page to zoom into (HTML)."""
     plot.check(out)
     with Bar("reading") as bar:
         seen = overview(open_ride(_part(ride, from_s, to_s), calibration, smoothed=not live), bar.reach)
     warn(ride, seen.notices)
     with spinner("drawing"):
         written = list(plot.draw(seen, out, tiles))
-    for path in written:
-        click.echo(f"written: {path}")
+    print_lines(f"written: {path}" for path in written)
 
 
-@click.command(short_help="Cut a stretch out of a log.")
-@click.argument("log", type=_PATH, metavar="LOG.csv")
-@_stretch
-@_OUT
-def cut(log: Path, from_s: float | None, to_s: float | None, out: Path) -> None:
+@click.command()
+@file_argument("log", "LOG.csv")
+@STRETCH
+@OUT
+def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) -> None:
     """Cut a stretch out of a log: a still pose for calibrate two or six, or one ride of several."""
-    from ..logs.cut import cut_log
-    from ..output import check_output
-    from ..progress import Bar
-
     if from_s is None and to_s is None:
         raise click.UsageError("Give --from, --to or both: seconds from the beginning of the log.")
     check_output(out, [log])
@@ -196,7 +236,91 @@ def cut(log: Path, from_s: float | None, to_s: float | None, out: Path) -> None:
     click.echo(f"written: {out}, {count} samples, {seconds:.1f} s")
 
 
-def _part(log: Path, from_s: float | None, to_s: float | None) -> "Source":
-    from ..logs.stretch import Stretch
+@click.command()
+@RIDE
+@CALIBRATION
+@click.option("--video", type=PATH, help="A video of the ride; without it a transparent clip is written.")
+@click.option(
+    "--offset",
+    "offset_s",
+    type=TIME,
+    metavar="TIME",
+    help="The ride's time at the video's first picture: 12.5 if the video begins 12.5 s after the ride, -3 if 3 s "
+    "before it. Not needed for a GoPro on the bike.",
+)
+@click.option("--fps", type=click.Choice(["30", "60"]), help="Pictures a second; if not given, the video's, or 30.")
+@from_to("Only from this time of the ride on: 90 or 1:30.", "Only up to there; negative: from the end.")
+@click.option(
+    "--height", type=click.IntRange(240, 4320), help="Of the video that a clip is for, pixels; if not given, 1080."
+)
+@click.option("--mph", is_flag=True, help="Miles an hour instead of kilometres.")
+@live
+@out_option("FILE.mp4 with --video, else FILE.mov or FILE.webm.")
+def overlay_command(
+    ride: Path, calibration: Path | None, video: Path | None, fps: str | None, out: Path, **options: Any
+) -> None:
+    """Draw lean, forces, speed and maxima over a video, or as a transparent clip to lay over one.
 
+    .mov is ProRes 4444, .webm is VP9, both with alpha. Where the lean is not known the gauge shows --.
+    """
+    calibration = _given_or_beside(ride, calibration, out, *([video] if video else []))
+    rate = float(fps) if fps else None
+    with Bar("reading and drawing") as bar:
+        made = overlay(ride, out, calibration, video, fps=rate, progress=bar.reach, **options)
+    warn(ride, made.notices)
+    if made.correlation is not None:
+        click.echo(
+            f"the video begins at {made.offset_s:.2f} s of the ride, as the camera's gyro has it (correlation "
+            f"{made.correlation:.2f}): --offset {made.offset_s:.2f}"
+        )
+    click.echo(f"written: {out}, {made.pictures} pictures, {made.end_s - made.begin_s:.1f} s, {made.fps:g} a second")
+
+
+def _part(log: Path, from_s: float | None, to_s: float | None) -> Source:
     return log if from_s is None and to_s is None else Stretch(log, from_s, to_s)
+
+
+def _given_or_beside(ride: Path, calibration: Path | None, out: Path, *inputs: Path) -> Path:
+    """The calibration. Raises InputError without one, and where writing out would fail or destroy an input."""
+    calibration = calibration or calibration_beside(ride)
+    check_output(out, [ride, calibration, *inputs])
+    return calibration
+
+
+def _pairs(text: str, option: str) -> dict[str, str]:
+    """KEY=VALUE,KEY=VALUE,..."""
+    pairs = {}
+    for part in text.split(",") if text.strip() else []:
+        key, equals, value = (word.strip() for word in part.partition("="))
+        if not key or not equals or not value:
+            raise InputError(f"{option}: {part!a} is not NAME=VALUE; commas part the pairs")
+        if key in pairs:
+            raise InputError(f"{option}: {key!a} is there twice")
+        pairs[key] = value
+    return pairs
+
+
+def _import_table(found: Imported) -> Table:
+    table = Table(title=found.app, title_justify="left", box=None, pad_edge=False)
+    for column in ("quantity", "from", "unit", "rate", "axes and sign"):
+        table.add_column(column, overflow="fold")
+    for taken in found.taken:
+        rate = f"{taken.rate_hz:{'.0f' if taken.rate_hz >= 10.0 else '.2g'}} Hz" if taken.rate_hz else ""
+        table.add_row(taken.quantity, taken.source, taken.unit, rate, taken.sign)
+    return table
+
+
+def _joined_lines(joined: Joined) -> Iterator[str]:
+    found, began = joined.match, joined.match.start_utc_s
+    late_s = began - joined.track.utc_s[0]
+    when = (datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=began)).strftime("%Y-%m-%d %H:%M:%S.%f")[:-4]
+    side = "after" if late_s >= 0.0 else "before"
+    yield (
+        f"the ride began at {when} UTC by the track's clock, +- {found.sigma_s:.2f} s: {abs(late_s):.2f} s {side} the "
+        "track's first point"
+    )
+    yield f"match: correlation {found.correlation:.2f} over {found.common_s / 60.0:.1f} minutes"
+    if abs(found.drift) * found.common_s > 3.0 * found.sigma_s:  # less is not known from a ride of this length
+        yield f"the ride's clock is {abs(found.drift) * 1e6:.0f} ppm {'slow' if found.drift > 0.0 else 'fast'}"
+    if joined.own_speed:
+        yield "the log's own speed stays"

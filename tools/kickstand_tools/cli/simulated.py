@@ -1,39 +1,42 @@
 """The command that simulates rides."""
 
 from pathlib import Path
+from typing import Any
 
 import click
 
 from ..errors import InputError
+from ..progress import Bar, spinner
+from ..simulation.files import simulate
+from ..simulation.fleet.fleet import make_fleet
+from ..simulation.profiles import MAIN, PROFILES
+from .common import OUT_DIRECTORY, Command
 
-_PATH = click.Path(path_type=Path)
 LINES_S = 10.0  # between two lines of progress where there is no terminal for a bar
-UPRIGHT_ERROR = click.option(
-    "--upright-error", type=click.FloatRange(-30.0, 30.0), default=0.0, help="Of the upright pose, degrees."
-)
-
-# The names in simulation.profiles. Importing that needs numpy, which would slow every command down.
-PROFILES = (
-    "street, track, sweeper, city, hills; hard ones: held, corners, banked, wheelie, bumps, crosswind, weight, "
-    "vibration, creep, temperature, fall, parked"
-)
+PROFILE_NAMES = f"{', '.join(MAIN)}; hard ones: {', '.join(name for name in PROFILES if name not in MAIN)}."
 
 
-@click.command(short_help="Make up a ride with its true lean, or drives of a fleet.")
-@click.option("--profile", help=f"{PROFILES}.")
+def seconds_option(least: float, words: str) -> Command:
+    return click.option("--seconds", type=click.FloatRange(least, 7200.0), default=640.0, help=words)
+
+
+def pose_options(pitch_change_deg: float | None, words: str) -> Command:
+    """What is not as it should be in the two poses."""
+
+    def add(command: Command) -> Command:
+        upright, pitch = click.FloatRange(-30.0, 30.0), click.FloatRange(-10.0, 10.0)
+        return click.option(
+            "--upright-error", "upright_error_deg", type=upright, default=0.0, help="Of the upright pose, degrees."
+        )(click.option("--pitch-change", "pitch_change_deg", type=pitch, default=pitch_change_deg, help=words)(command))
+
+    return add
+
+
+@click.command()
+@click.option("--profile", help=PROFILE_NAMES)
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Another seed, another ride.")
-@click.option(
-    "--seconds",
-    type=click.FloatRange(min=20.0, max=7200.0),
-    default=640.0,
-    help="Of riding; start and stop come on top.",
-)
-@UPRIGHT_ERROR
-@click.option(
-    "--pitch-change",
-    type=click.FloatRange(-10.0, 10.0),
-    help="Between the poses, degrees; at random if not given.",
-)
+@seconds_option(20.0, "Of riding; start and stop come on top.")
+@pose_options(None, "Between the poses, degrees; at random if not given.")
 @click.option("--speed", is_flag=True, help="Write what a GPS receiver gives into the log: speed, position, time.")
 @click.option(
     "--fleet",
@@ -42,49 +45,31 @@ PROFILES = (
     metavar="N",
     help="Instead: N cars, buses and motorcycles with a few drives each, a manifest, and what is wrong with some.",
 )
-@click.option("--out", required=True, type=_PATH, help="The directory to write to.")
-def simulate(
-    profile: str | None,
-    seed: int,
-    seconds: float,
-    upright_error: float,
-    pitch_change: float | None,
-    speed: bool,
-    vehicles: int | None,
-    out: Path,
-) -> None:
+@OUT_DIRECTORY
+def simulate_command(profile: str | None, seed: int, vehicles: int | None, out: Path, **of_a_ride: Any) -> None:
     """Make up a ride: six poses and a free one, kickstand, upright, the ride, its truth. Or a fleet (see fleet)."""
     if vehicles is not None:
         _check_fleet(out)
-        _simulate_fleet(vehicles, seed, out)
+        with Bar("making up vehicles", lines_s=LINES_S) as bar:
+            fleet = make_fleet(out, vehicles, seed, progress=bar.reach)
+        logs = sum(len(vehicle.paths) for vehicle in fleet)
+        click.echo(f"written: {out}/MANIFEST.csv and TRUTH.csv, {vehicles} vehicles, {logs} logs")
         return
     if profile is None:
         raise click.UsageError("Missing option '--profile', or '--fleet' for a fleet.")
     if (out / "MANIFEST.csv").exists():
         raise InputError(f"{out} holds a fleet, whose truth would be lost: give --out another directory")
-    from ..progress import spinner
-    from ..simulation.files import simulate
-
     with spinner("making up a ride"):
-        made = simulate(profile, seed, out, seconds, upright_error, pitch_change, speed=speed)
+        made = simulate(profile, seed, out, **of_a_ride)
     click.echo(f"written: {out / 'RIDE.csv'}, {len(made.time)} samples, with its poses and TRUTH.csv")
 
 
 def _check_fleet(out: Path) -> None:
     """Refuse what a fleet has no use for, and the directory of a ride."""
     context = click.get_current_context()
-    for name in ("profile", "seconds", "upright_error", "pitch_change", "speed"):
-        if context.get_parameter_source(name) is not click.core.ParameterSource.DEFAULT:
-            raise click.UsageError(f"--{name.replace('_', '-')} is of a single ride: leave it or --fleet out.")
+    given = click.core.ParameterSource.COMMANDLINE
+    for option in context.command.params:
+        if option.name not in ("seed", "vehicles", "out") and context.get_parameter_source(option.name or "") is given:
+            raise click.UsageError(f"{option.opts[0]} is of a single ride: leave it or --fleet out.")
     if (out / "RIDE.csv").exists():
         raise InputError(f"{out} holds a ride, whose truth would be lost: give --out another directory")
-
-
-def _simulate_fleet(vehicles: int, seed: int, out: Path) -> None:
-    from ..progress import Bar
-    from ..simulation.fleet.fleet import make_fleet
-
-    with Bar("making up vehicles", lines_s=LINES_S) as bar:
-        made = make_fleet(out, vehicles, seed, progress=bar.reach)
-    logs = sum(len(vehicle.paths) for vehicle in made)
-    click.echo(f"written: {out}/MANIFEST.csv and TRUTH.csv, {vehicles} vehicles, {logs} logs")

@@ -7,14 +7,19 @@ from pathlib import Path
 
 import click
 
+from ..demo.demo import DeviceStopped, demo
+from ..emulator import image, native
+from ..output import check_directory
+from ..progress import spinner
+from ..web import serve, site
+from .common import PATH
 
-@click.command(short_help="The firmware on a simulated board, in the terminal.")
+
+@click.command()
 @click.option("--hand", is_flag=True, help="Lean the bike and press the button yourself, with keys.")
 @click.option("--cpython", is_flag=True, help="Run the firmware on CPython, not on MicroPython.")
-def demo(hand: bool, cpython: bool) -> None:
+def demo_command(hand: bool, cpython: bool) -> None:
     """Watch the firmware on a simulated board: kickstand press, upright press, a ride."""
-    from ..demo.demo import DeviceStopped, demo
-
     try:
         demo(hand, cpython)
     except DeviceStopped as error:
@@ -22,14 +27,10 @@ def demo(hand: bool, cpython: bool) -> None:
         sys.exit(1)
 
 
-@click.command(short_help="Open the lean meter's pages in the browser.")
-@click.option("--out", type=click.Path(path_type=Path), help="Write the site to this directory instead of opening it.")
-def web(out: Path | None) -> None:
+@click.command()
+@click.option("--out", type=PATH, help="Write the site to this directory instead of opening it.")
+def web_command(out: Path | None) -> None:
     """Ride the simulated board in the browser; with --out write the site for any web server."""
-    from ..output import check_directory
-    from ..progress import spinner
-    from ..web import serve, site
-
     if out is not None:
         check_directory(out)
     with spinner("putting the site together"):
@@ -46,13 +47,13 @@ def web(out: Path | None) -> None:
             server.serve_forever()
 
 
-@click.command(short_help="An emulated Pico that flash can deploy to.")
+@click.command()
 @click.option("--port", type=click.IntRange(1024, 65535), default=2040, help="On which mpremote finds it.")
-def emulate(port: int) -> None:
+def emulate_command(port: int) -> None:
     """An emulated Pico on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
-    from ..emulator import image
-
     image.find()  # before anything else of the emulator is imported
+    with spinner("compiling the emulator, once"):
+        native.build()
     from ..emulator.emulate import emulate
 
     emulate(port, click.echo)

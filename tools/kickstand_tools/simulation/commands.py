@@ -56,17 +56,23 @@ def commands(legs: list[Leg], rate_hz: float) -> Commands:
     ends = np.cumsum([leg.seconds for leg in legs])
     starts = ends - [leg.seconds for leg in legs]
     time = np.arange(int(ends[-1] * rate_hz)) / rate_hz
-    speeds = _kept([leg.speed_mps for leg in legs])
+    speeds = _kept(legs, "speed_mps")
     speed = np.interp(time, np.concatenate(([0.0], ends)), [speeds[0], *speeds])
     speed = np.maximum(smoothed(speed, _SPEED_SMOOTHING_S, rate_hz), 0.0)
     speed[speed < 1e-4] = 0.0
     distance = integral(speed, rate_hz)
-    rolls = [min(leg.roll_s, leg.seconds) for leg in legs]
 
-    def stepped(values: list[float | None], settle_s: list[float]) -> Signal:
-        return _stepped(time, starts, _kept(values), settle_s)
+    def stepped(name: str, settle_s: float | None = 1.0) -> Signal:
+        """A leg's value is reached within settle_s of its start (None: its roll_s), then held."""
+        values = _kept(legs, name)
+        result = np.full_like(time, values[0])
+        for leg, start, before, after in zip(legs[1:], starts[1:], values, values[1:]):
+            if after != before:
+                settle = min(leg.roll_s if settle_s is None else settle_s, leg.seconds)
+                first = np.searchsorted(time, start)
+                result[first:] = before + (after - before) * smoothstep((time[first:] - start) / max(settle, 1e-3))
+        return result
 
-    quick = [min(1.0, leg.seconds) for leg in legs]
     phases = list(dict.fromkeys(leg.phase for leg in legs))
     which = np.searchsorted(ends, time, side="right").clip(0, len(legs) - 1)
     return Commands(
@@ -74,35 +80,26 @@ def commands(legs: list[Leg], rate_hz: float) -> Commands:
         time,
         speed,
         distance,
-        np.radians(stepped([leg.lean_deg for leg in legs], rolls)),
-        _slope(distance, np.interp(ends, time, distance), _kept([leg.slope_percent for leg in legs])),
-        stepped([leg.hang_m for leg in legs], quick),
-        np.radians(stepped([leg.lift_deg for leg in legs], quick)),
-        stepped([leg.engine for leg in legs], quick),
-        stepped([leg.crosswind_mps2 for leg in legs], quick),
-        np.radians(stepped([leg.bank_deg for leg in legs], [min(3.0, leg.seconds) for leg in legs])),
+        np.radians(stepped("lean_deg", None)),
+        _slope(distance, np.interp(ends, time, distance), _kept(legs, "slope_percent")),
+        stepped("hang_m"),
+        np.radians(stepped("lift_deg")),
+        stepped("engine"),
+        stepped("crosswind_mps2"),
+        np.radians(stepped("bank_deg", 3.0)),
         np.array([phases.index(leg.phase) for leg in legs])[which],
         phases,
     )
 
 
-def _kept(values: list[float | None]) -> list[float]:
-    """Each None replaced by the value before it, or by 0 at the start."""
+def _kept(legs: list[Leg], name: str) -> list[float]:
+    """A value of each leg: None is replaced by the value before it, or by 0 at the start."""
     kept, now = [], 0.0
-    for value in values:
+    for leg in legs:
+        value = getattr(leg, name)
         now = now if value is None else value
         kept.append(now)
     return kept
-
-
-def _stepped(time: Signal, starts: Signal, values: list[float], settle_s: list[float]) -> Signal:
-    """Each value is reached within settle_s of its start, then held."""
-    result = np.full_like(time, values[0])
-    for start, before, after, settle in zip(starts[1:], values, values[1:], settle_s[1:]):
-        if after != before:
-            first = np.searchsorted(time, start)
-            result[first:] = before + (after - before) * smoothstep((time[first:] - start) / max(settle, 1e-3))
-    return result
 
 
 def _slope(distance: Signal, ends: Signal, percent: list[float]) -> Signal:
@@ -112,9 +109,9 @@ def _slope(distance: Signal, ends: Signal, percent: list[float]) -> Signal:
         if end > knots[-1] + 1.0:
             knots.append(float(end))
             values.append(value)
-    place = np.searchsorted(knots, distance, side="right").clip(1, len(knots) - 1) if len(knots) > 1 else None
-    if place is None:
+    if len(knots) == 1:
         return np.full_like(distance, np.arctan(percent[0] / 100.0))
     at, value = np.array(knots), np.array(values)
+    place = np.searchsorted(at, distance, side="right").clip(1, len(knots) - 1)
     u = (distance - at[place - 1]) / (at[place] - at[place - 1])
     return np.arctan((value[place - 1] + (value[place] - value[place - 1]) * smoothstep(u)) / 100.0)

@@ -8,12 +8,14 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..logs.cells import COLUMNS, TRACK
 from ..output import check_directory
-from .positions import positions
 from .profiles import check_profile
 from .ride import Ride, ride
 
 _LOG = ",".join((*COLUMNS, "temp_c"))
 _FORMATS = ["%.3f", *["%.6f"] * 6, "%.2f"]
+START = 47.6, 8.0  # degrees north and east, heading east
+START_UTC_S = 1_779_008_400.0  # 09:00 on 17 May 2026
+_DEGREE_M = np.radians(6_371_000.0)
 _TRACK_EVERY = 200  # samples: once a second, as a GPS receiver does
 
 
@@ -56,6 +58,18 @@ def write_poses(directory: Path, made: Ride) -> tuple[list[Path], Path, Path]:
     for path, readings in zip([*seven, *pair], [*made.poses, made.kickstand, made.upright]):
         _save(path, _log(np.arange(len(readings)) / made.rate_hz, readings), _LOG, _FORMATS)
     return seven, *pair
+
+
+def positions(made: Ride) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Where and when it goes: its true speed and yaw rate, integrated.
+
+    Latitude, longitude (degrees north and east) and Universal Time (s since 1970) of each reading.
+    """
+    course = np.cumsum(np.radians(made.truth["yaw_rate_dps"])) / made.rate_hz  # to the left of east
+    speed = made.truth["speed_mps"] / made.rate_hz
+    lat = START[0] + np.cumsum(speed * np.sin(course)) / _DEGREE_M
+    lon = START[1] + np.cumsum(speed * np.cos(course)) / (_DEGREE_M * np.cos(np.radians(START[0])))
+    return lat, lon, START_UTC_S + made.time
 
 
 def _log(time: NDArray, readings: NDArray) -> NDArray:

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from . import poses
 from .commands import Commands, commands
-from .physics import balance
-from .physics.bike import Bike
+from .physics.bike import Bike, roll, weave
 from .physics.chip import DIVIDER, RATE_HZ, Chip
 from .physics.engine import Engine
 from .physics.kinematics import Motion, body_rates, specific_force
@@ -131,7 +130,7 @@ def _motion(
     command.crosswind += conditions.gust_mps2 * band_noise(chance, n, 0.05, 0.5, rate)
     # A rider who moves about leans a bike that rides, not one on its stand or on the rider's feet.
     command.hang += conditions.sway_m * band_noise(chance, n, 0.02, 0.3, rate) * smoothstep(command.speed / 5.0)
-    rolled = balance.roll(command, bike, balance.weave(chance, command, conditions.unrest_deg))
+    rolled = roll(command, bike, weave(chance, command, conditions.unrest_deg))
     surface = profile_slope(chance, float(command.distance[-1]) + 10.0, conditions.roughness)
     for phase, spacing, height, length in conditions.bumps:
         add_bumps(surface, _places(command, phase, spacing), height, length)

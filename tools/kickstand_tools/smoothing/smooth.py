@@ -137,7 +137,7 @@ def _chapter(
     before: list[Block], own: list[Block], after: list[Block], calibration: CalibrationFile, start_c: float
 ) -> Iterator[tuple[Block, Array | None]]:
     """The values of the pieces `own`, adjusted together with those before and after them."""
-    believed = [piece.believed for piece in (*before, *own, *after)]
+    believed = [piece.measured for piece in (*before, *own, *after)]
     values = _adjusted(believed, calibration, start_c)
     first = sum(len(piece.time_us) for piece in believed[: len(before)])
     for piece in own:

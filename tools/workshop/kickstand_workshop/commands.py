@@ -3,51 +3,39 @@
 import contextlib
 import json
 from pathlib import Path
+from typing import Any
 
 import click
-from kickstand_tools.cli.common import warn
-from kickstand_tools.cli.simulated import LINES_S, PROFILES, UPRIGHT_ERROR
+from kickstand_tools.cli.common import JSON, PATH, warn
+from kickstand_tools.cli.simulated import LINES_S, PROFILE_NAMES, pose_options, seconds_option
+from kickstand_tools.emulator import image, native
+from kickstand_tools.errors import extra
+from kickstand_tools.output import check_directory, new_directory
+from kickstand_tools.progress import Bar, spinner
+from kickstand_tools.simulation.profiles import MAIN
+from rich.console import Console
 
-_PATH = click.Path(path_type=Path)
+from .evaluation import picture, report, runs
+from .evaluation.estimators import missing
+from .evaluation.evaluate import evaluate
+
 _WIDTH = 110  # columns of a table that is not printed to a terminal
 
 
-@click.command(short_help="Compare the shown lean with the truth of simulated rides.")
-@click.option("--profiles", default="street,track,sweeper,city,hills", help=f"With commas between: {PROFILES}.")
+@click.command()
+@click.option("--profiles", default=",".join(MAIN), help=f"With commas between: {PROFILE_NAMES}")
 @click.option("--seeds", type=click.IntRange(min=1), default=3, help="Rides of each profile.")
-@click.option(
-    "--seconds",
-    type=click.FloatRange(min=60.0, max=7200.0),
-    default=640.0,
-    help="Of riding, each; start and stop come on top.",
-)
-@UPRIGHT_ERROR
-@click.option("--pitch-change", type=click.FloatRange(-10.0, 10.0), default=1.0, help="Between the two poses, degrees.")
-@click.option("--recording", type=_PATH, help="A recorded ride with speed to compare on too.")
-@click.option("--out", type=_PATH, help="Write evaluation.json and lean.png to this directory.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def evaluate(
-    profiles: str,
-    seeds: int,
-    seconds: float,
-    upright_error: float,
-    pitch_change: float,
-    recording: Path | None,
-    out: Path | None,
-    as_json: bool,
+@seconds_option(60.0, "Of riding, each; start and stop come on top.")
+@pose_options(1.0, "Between the two poses, degrees.")
+@click.option("--recording", type=PATH, help="A recorded ride with speed to compare on too.")
+@click.option("--out", type=PATH, help="Write evaluation.json and lean.png to this directory.")
+@JSON
+def evaluate_command(
+    profiles: str, recording: Path | None, out: Path | None, as_json: bool, **of_the_rides: Any
 ) -> None:
     """Compare the shown lean and other filters with the truth of simulated rides."""
-    from kickstand_tools.errors import extra
-    from kickstand_tools.output import check_directory, new_directory
-    from kickstand_tools.progress import Bar
-    from rich.console import Console
-
-    from .evaluation import picture, report, runs
-    from .evaluation.estimators import missing
-    from .evaluation.evaluate import evaluate
-
     names = [name.strip() for name in profiles.split(",")]
-    jobs = runs.jobs(names, seeds, seconds, upright_error, pitch_change, traces=out is not None)
+    jobs = runs.jobs(names, traces=out is not None, **of_the_rides)
     if out is not None:
         picture.check()
         check_directory(out)
@@ -75,16 +63,14 @@ def evaluate(
             click.echo(f"written: {figures} and {drawing}", err=True)
 
 
-@click.command(short_help="Time, memory and flash of the firmware on an emulated Pico.")
+@click.command()
 @click.option("--seconds", type=click.IntRange(1, 600), default=10, help="Emulated, of each of four runs.")
-@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
-def bench(seconds: int, as_json: bool) -> None:
+@JSON
+def bench_command(seconds: int, as_json: bool) -> None:
     """What the firmware costs on an emulated Pico: time, memory, flash."""
-    from kickstand_tools.emulator import image
-
     image.find()  # before anything else of the emulator is imported
-    from rich.console import Console
-
+    with spinner("compiling the emulator, once"):
+        native.build()
     from .bench.bench import bench, tables
 
     result = bench(seconds)
@@ -92,6 +78,3 @@ def bench(seconds: int, as_json: bool) -> None:
         click.echo(json.dumps(result))
     else:
         Console().print(tables(result))
-
-
-COMMANDS = (evaluate, bench)

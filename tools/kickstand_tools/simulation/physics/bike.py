@@ -1,8 +1,21 @@
-"""A motorcycle and where the sensor sits on it."""
+"""A two-wheeler: its measures, where the sensor sits on it, and how it leans and turns.
+
+The roll balance is that of a bike whose rider wants a certain lean. Lean > 0 to the right, yaw rate > 0 in a left turn.
+The line from the contact point to the centre of mass leans by the balance lean b. The chassis leans more, because wide
+tyres touch the road beside their middle.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
+
+from ..commands import Commands
+from .signals import Signal, band_noise, derivative, smoothed, smoothstep
+
+_STEERING_S = 0.04  # smoothing of the steering, which cannot turn at any speed
+_WANDER = 0.06  # rms of the lean's wandering in a turn, as a share of the lean
+_STANDS_MPS, _RIDES_MPS = 0.4, 1.5  # the feet hold the bike below, steering balances it above
 
 
 @dataclass(frozen=True)
@@ -45,3 +58,60 @@ class Bike:
     def pendulum(self) -> float:
         """Length of the equivalent pendulum in roll, m: the longer, the slower the bike falls into a lean."""
         return (self.mass_height**2 + self.roll_gyration**2) / self.mass_height
+
+
+@dataclass
+class Roll:
+    """lean: of the chassis, rad; balance: lean of the centre of mass, rad; yaw_rate: about the vertical, rad/s."""
+
+    lean: Signal
+    balance: Signal
+    yaw_rate: Signal
+
+
+def chassis_lean(balance: Signal, bike: Bike, bank: Signal | float = 0.0, hang: Signal | float = 0.0) -> Signal:
+    """Lean of the chassis for a lean of the centre of mass (Cossalter (4.4), with road and rider added), rad.
+
+    bank: the road's tilt to the right. hang: the centre of mass to the right of the bike's plane, m.
+    """
+    arm = bike.mass_height - bike.tyre_radius
+    flank = np.arcsin(bike.tyre_radius * np.sin(balance - bank) / np.hypot(arm, hang))
+    return balance + flank - np.arctan2(hang, arm)
+
+
+def weave(chance: np.random.Generator, command: Commands, riding_deg: float) -> Signal:
+    """How the lean wavers in a rider's hands, rad.
+
+    riding_deg: rms at speed. At walking pace it is more, with the feet down a little; in a turn the lean also follows
+    the rider's corrections of the line.
+    """
+    n, rate = len(command.time), command.rate_hz
+    v = command.speed
+    slow = smoothstep(v / _RIDES_MPS) * (1.0 + 2.0 * (1.0 - smoothstep((v - 1.0) / 5.0)))
+    moving = band_noise(chance, n, 0.15, 0.6, rate) * riding_deg * slow
+    wander = _WANDER * command.lean * slow * band_noise(chance, n, 0.05, 0.3, rate)
+    feet = band_noise(chance, n, 0.2, 0.6, rate) * 0.12 * (1.0 - smoothstep(v / _RIDES_MPS)) * command.engine
+    return np.radians(moving + feet) + wander
+
+
+def roll(command: Commands, bike: Bike, unrest: Signal) -> Roll:
+    """Lean and yaw rate. The yaw rate p is the one that fulfils the roll equation of the pendulum:
+
+    pendulum * b'' = g_n sin b + ((1 + wheels) v p + wind) cos b
+
+    So a quick roll to the right begins with a yaw to the left: countersteering. unrest: see weave().
+    """
+    rate, v = command.rate_hz, command.speed
+    normal_g = STANDARD_GRAVITY * np.cos(command.slope) + v * derivative(command.slope, rate)
+    wind = command.crosswind * smoothstep(v / 5.0)
+    balance = np.arctan(np.tan(command.lean) - wind / normal_g) + unrest
+    acceleration = derivative(derivative(balance, rate), rate)
+    needed = bike.pendulum * acceleration / np.cos(balance) - normal_g * np.tan(balance) - wind
+    needed /= 1.0 + bike.wheel_inertia
+    steered = smoothstep((v - _STANDS_MPS) / (_RIDES_MPS - _STANDS_MPS))
+    lock = bike.max_curvature
+    wanted = needed / (lock * np.maximum(v, 0.1) ** 2)
+    curvature = steered * lock * wanted / (1.0 + wanted**6) ** (1.0 / 6.0)  # limited smoothly near the steering lock
+    yaw_rate = smoothed(curvature * v, _STEERING_S, rate) / np.cos(command.slope)
+    hang = command.hang
+    return Roll(chassis_lean(balance, bike, command.bank * smoothstep(v / 5.0), hang), balance, yaw_rate)

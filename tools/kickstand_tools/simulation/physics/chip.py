@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..data_sheet import MAX_GYRO_BIAS_DPS, MAX_OFFSET_G, MAX_SCALE_ERROR
+from ..scripted.sensor_errors import MAX_GYRO_BIAS_DPS, MAX_OFFSET_G, MAX_SCALE_ERROR
 
 RATE_HZ = 1000
 DIVIDER = 5  # 200 Hz

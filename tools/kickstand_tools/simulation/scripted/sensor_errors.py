@@ -9,10 +9,10 @@ seed gives the same reading at the same instant on both, whatever was asked befo
 
 from math import cos, pi, sin, sqrt
 
-from kickstand.units import AXES
-
-from ..data_sheet import MAX_GYRO_BIAS_DPS, MAX_OFFSET_G, MAX_SCALE_ERROR
-
+# Tolerances, data sheet PS-MPU-6000A rev 3.4, sections 6.1 and 6.2
+MAX_OFFSET_G = (0.05, 0.05, 0.08)  # of the accelerometer, along x, y, z
+MAX_SCALE_ERROR = 0.03  # of accelerometer and gyro
+MAX_GYRO_BIAS_DPS = 20.0
 ACCEL_NOISE_G = 0.0033  # rms: 400 ug/sqrt(Hz) behind the 44 Hz low-pass
 GYRO_NOISE_DPS = 0.041  # rms: 0.005 deg/s/sqrt(Hz) behind the 42 Hz one
 
@@ -59,22 +59,6 @@ def random_mounting(seed):
         2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w),
         2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y),
     )  # fmt: skip
-
-
-def axis_aligned_mountings():
-    """The 24 mountings along the vehicle's axes: vehicle from sensor, 9 each, rows left, up, forward."""
-    axes = [(s * (i == 0), s * (i == 1), s * (i == 2)) for i in range(3) for s in (1.0, -1.0)]
-    found = []
-    for left in axes:
-        for up in axes:
-            if left[0] * up[0] + left[1] * up[1] + left[2] * up[2] == 0.0:
-                forward = (
-                    left[1] * up[2] - left[2] * up[1],
-                    left[2] * up[0] - left[0] * up[2],
-                    left[0] * up[1] - left[1] * up[0],
-                )
-                found.append(left + up + forward)
-    return found
 
 
 class Sensor:
@@ -132,20 +116,3 @@ def resting(sensor, up):
     force = [(m[3 * i] * up[0] + m[3 * i + 1] * up[1] + m[3 * i + 2] * up[2]) / size for i in range(3)]
     still = (force[0], force[1], force[2], 0.0, 0.0, 0.0)
     return sensor.world(lambda t_s: still)
-
-
-def six_poses(sensor, off_deg=0.0, seed=1):
-    """Seven (name, world): "+x", "-x", ... with that side up, but up to off_deg askew; then "free", a slanted one."""
-    chance = Chance(seed + 2000)
-    poses = []
-    for axis in range(3):
-        for sign in (1.0, -1.0):
-            askew = chance.uniform(0.0, off_deg) * pi / 180.0
-            around = chance.uniform(0.0, 2.0 * pi)
-            up = [0.0, 0.0, 0.0]
-            up[axis] = sign * cos(askew)
-            up[(axis + 1) % 3] = sin(askew) * cos(around)
-            up[(axis + 2) % 3] = sin(askew) * sin(around)
-            poses.append((("+" if sign > 0 else "-") + AXES[axis], resting(sensor, up)))
-    poses.append(("free", resting(sensor, (0.5, 0.6, -0.7))))
-    return poses

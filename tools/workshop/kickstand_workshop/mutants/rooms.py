@@ -45,17 +45,19 @@ ROOMS = {
         (FIRMWARE + "lean/*.py",),
         (
             TESTS + "lean/test_known_ride.py",
-            TESTS + "lean/test_*_limits.py",
+            TESTS + "lean/test_filter_states.py",
             TESTS + "lean/test_[bkmru]*.py",
-        ),  # not test_lean_filter.py and test_formula.py, which take longer than all of them
+            TESTS + "lean/test_formula.py",
+            TESTS + "lean/test_lean_filter.py",
+        ),
     ),
     "drive_alignment": Room(
         (FIRMWARE + "drive_alignment/*.py",),
-        (TESTS + "drive_alignment/test_drive_limits.py", TESTS + "drive_alignment/*.py"),
+        (TESTS + "drive_alignment/test_parts.py", TESTS + "drive_alignment/*.py"),
     ),
     "speed": Room(
         (FIRMWARE + "speed/*.py",),
-        (TESTS + "simulated_board/test_board_speed_limits.py", TESTS + "simulated_board/test_board_speed.py"),
+        (TESTS + "simulated_board/test_board_speed.py", TESTS + "simulated_board/test_board_place.py"),
     ),
     "ui": Room(
         (FIRMWARE + "ui/*.py",),
@@ -63,7 +65,7 @@ ROOMS = {
     ),
     "rides": Room(
         (FIRMWARE + "rides/*.py",),
-        (TESTS + "rides/limits/*.py",),  # the others take longer
+        tuple(TESTS + f"rides/test_{name}.py" for name in ("block", "recording", "ring", "stream", "card_trial")),
     ),
     "pull": Room(
         (TOOLS + "rides/*.py",),
@@ -74,11 +76,11 @@ ROOMS = {
         (TESTS + "calibration/test_cli*.py", TESTS + "drive_alignment/test_cli_drive.py"),
     ),
     "broken logs": Room(
-        (TOOLS + "logs/mended/*.py", *(TOOLS + f"logs/{name}.py" for name in ("even_times", "stretch", "cut"))),
+        tuple(TOOLS + f"logs/{name}.py" for name in ("even_times", "frozen", "stretch")),
         tuple(TESTS + f"logs/{name}.py" for name in ("test_ends", "test_even_times", "test_frozen", "test_stretch")),
     ),
     "logs": Room(
-        tuple(TOOLS + f"logs/{name}.py" for name in ("block", "cells", "log", "reader", "source", "table")),
+        tuple(TOOLS + f"logs/{name}.py" for name in ("block", "cells", "csv_reader", "log", "reader", "source")),
         tuple(TESTS + f"logs/{name}.py" for name in ("test_log", "test_cells", "test_cli_logs", "test_log_blocks")),
     ),
     "signals": Room((TOOLS + "signals/*.py",), (TESTS + "signals/*.py",)),

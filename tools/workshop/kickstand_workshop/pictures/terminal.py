@@ -1,12 +1,13 @@
 """The demo as a terminal shows it, as SVG. Lines, blocks and Braille dots are drawn: not every font has them."""
 
 import io
-from html import escape
 from itertools import groupby
 
 from kickstand_tools.demo.demo import Device
 from kickstand_tools.demo.score import State
 from kickstand_tools.demo.screen import WIDTH, screen
+from kickstand_tools.svg import drawing, element
+from markupsafe import Markup
 from rich.console import Console
 from rich.segment import Segment
 from rich.style import Style
@@ -39,21 +40,21 @@ def draw() -> str:
     lines = console.render_lines(picture, console.options, pad=False)
     width = WIDTH * _CELL[0] + 2 * _MARGIN
     height = len(lines) * _CELL[1] + _TITLE_HEIGHT + _MARGIN
-    cells = "\n".join(element for row, line in enumerate(lines) for element in _line(line, row))
-    lights = "".join(
-        f'<circle cx="{22 + 20 * i}" cy="17" r="6" fill="{c}"/>'
-        for i, c in enumerate(("#e0524e", "#f2c94c", "#5ab46e"))
+    cells = [element for row, line in enumerate(lines) for element in _line(line, row)]
+    lights = [
+        element("circle", cx=22 + 20 * i, cy=17, r=6, fill=colour)
+        for i, colour in enumerate(("#e0524e", "#f2c94c", "#5ab46e"))
+    ]
+    command = "python3 tools/dev.py demo"
+    return drawing(
+        (width, height),
+        element("rect", width=width, height=height, rx=10, fill="#181a1f"),
+        *lights,
+        element("text", command, x=width / 2, y=22, text_anchor="middle", fill="#dcdfe4"),
+        element("g", *cells, transform=f"translate({_MARGIN} {_TITLE_HEIGHT})"),
+        font_family=_FONT,
+        font_size=16,
     )
-    title = f'<text x="{width / 2}" y="22" text-anchor="middle" fill="#dcdfe4">python3 tools/dev.py demo</text>'
-    font = f'font-family="{_FONT}" font-size="16"'
-    return f"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" {font}>
-<rect width="{width}" height="{height}" rx="10" fill="#181a1f"/>
-{lights}{title}
-<g transform="translate({_MARGIN} {_TITLE_HEIGHT})">
-{cells}
-</g>
-</svg>
-"""
 
 
 def _state() -> State:
@@ -66,7 +67,7 @@ def _state() -> State:
     raise RuntimeError("the demo ended early: " + "\n".join(device.console))
 
 
-def _line(segments: list[Segment], row: int) -> list[str]:
+def _line(segments: list[Segment], row: int) -> list[Markup]:
     """The elements of one line, background first."""
     elements = []
     y = row * _CELL[1]
@@ -74,14 +75,15 @@ def _line(segments: list[Segment], row: int) -> list[str]:
     for segment in segments:
         style = segment.style or Style()
         if style.bgcolor:
-            place = f'x="{column * _CELL[0]}" y="{y}" width="{_CELL[0] * len(segment.text)}" height="{_CELL[1]}"'
+            size = {"width": _CELL[0] * len(segment.text), "height": _CELL[1]}
             colour = style.bgcolor.get_truecolor(_THEME, foreground=False).hex
-            elements.append(f'<rect {place} fill="{colour}" shape-rendering="crispEdges"/>')
+            place = {"x": column * _CELL[0], "y": y}
+            elements.append(element("rect", **place, **size, fill=colour, shape_rendering="crispEdges"))
         colour = style.color.get_truecolor(_THEME).hex if style.color else "#dcdfe4"
         for drawn, group in groupby(segment.text, key=_is_drawn):
             text = "".join(group)
             if drawn:
-                elements.append(_shapes(text, column * _CELL[0], y, colour))
+                elements.extend(_shapes(text, column * _CELL[0], y, colour))
             elif text.strip():
                 elements.append(_words(text, column * _CELL[0], y, colour, bool(style.bold)))
             column += len(text)
@@ -92,14 +94,14 @@ def _is_drawn(character: str) -> bool:
     return character in _LINES or character in _BLOCKS or 0x2800 <= ord(character) < 0x2900
 
 
-def _words(text: str, x: int, y: int, colour: str, bold: bool) -> str:
+def _words(text: str, x: int, y: int, colour: str, bold: bool) -> Markup:
     """Text with a place for every character, whatever the width of the font."""
     places = " ".join(str(x + i * _CELL[0]) for i in range(len(text)))
-    weight = ' font-weight="bold"' if bold else ""
-    return f'<text x="{places}" y="{y + 16}"{weight} fill="{colour}" xml:space="preserve">{escape(text)}</text>'
+    weight = "bold" if bold else None
+    return element("text", text, x=places, y=y + 16, font_weight=weight, fill=colour, **{"xml:space": "preserve"})
 
 
-def _shapes(text: str, x: int, y: int, colour: str) -> str:
+def _shapes(text: str, x: int, y: int, colour: str) -> list[Markup]:
     """A run of lines, blocks or Braille as one path each."""
     strokes: dict[int, str] = {}
     filled = ""
@@ -117,8 +119,8 @@ def _shapes(text: str, x: int, y: int, colour: str) -> str:
                 if (ord(character) - 0x2800) >> bit & 1:
                     filled += f"M{x + 1 + 5 * dx} {y + 1.2 + 5.25 * dy:g}h3v3h-3z"
         x += _CELL[0]
-    lines = "".join(
-        f'<path d="{path}" stroke="{colour}" stroke-width="{strength}" stroke-linecap="square"/>'
+    lines = [
+        element("path", d=path, stroke=colour, stroke_width=strength, stroke_linecap="square")
         for strength, path in strokes.items()
-    )
-    return lines + (f'<path d="{filled}" fill="{colour}"/>' if filled else "")
+    ]
+    return lines + ([element("path", d=filled, fill=colour)] if filled else [])

@@ -1,0 +1,241 @@
+"""The lean filter's states: start, rest, rolling, and what a restart keeps. Runs on MicroPython too."""
+
+from math import atan2, cos, degrees, pi, radians, sin, sqrt
+
+from bike_motion import DT_S, DT_US, GRAVITY_MPS2, force_and_rate, near
+from kickstand.lean.bike_model import SPEED
+from kickstand.lean.lean_filter import LeanFilter
+
+LEVEL, NO_RATE = [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]
+
+
+def hold(estimator, seconds, force=LEVEL, rate=NO_RATE, dt_us=DT_US):
+    """The same force and rate for so long; returns the last lean."""
+    lean = 0.0
+    for _ in range(int(seconds * 1e6 / dt_us + 0.5)):
+        lean = estimator.update(force, rate, dt_us)
+    return lean
+
+
+def sigma_deg(estimator):
+    """Of the lean without the trim."""
+    return degrees(sqrt(estimator.variance - estimator.trim.variance))
+
+
+def test_before_the_first_window_nothing_is_known():
+    estimator = LeanFilter()
+    assert estimator.variance == pi * pi
+    assert not estimator.rolling
+    assert not estimator.at_rest
+    near(estimator.update([0.5, sqrt(0.75), 0.0], NO_RATE, 0), 30.0, 1e-9)
+    assert estimator.variance == pi * pi
+
+
+def test_the_first_lean_is_that_of_the_force_of_the_first_twentieth_of_a_second():
+    estimator = LeanFilter()
+    shown = [estimator.update([sin(radians(a)), cos(radians(a)), 0.0], NO_RATE, DT_US) for a in (10, 12, 14, 16)]
+    near(shown[3], 13.0, 0.01)
+    assert estimator.variance == pi * pi
+    near(estimator.update([sin(radians(18)), cos(radians(18)), 0.0], NO_RATE, DT_US), 14.0, 0.01)
+    near(sigma_deg(estimator), 1.5, 1e-6)
+
+
+def test_power_on_under_way_leaves_lean_and_speed_uncertain():
+    """At rest the force is the vertical; a rate, or a force that is not 1 g, means that it moves."""
+    for force, rate, moves in (
+        (LEVEL, [0.0, 0.0, 0.015], False),  # the gyro's bias
+        ([0.0, 0.96, 0.0], NO_RATE, False),  # the accelerometer's error
+        (LEVEL, [0.0, 0.03, 0.0], True),
+        ([0.0, 1.08, 0.0], NO_RATE, True),
+    ):
+        estimator = LeanFilter()
+        hold(estimator, 0.06, force, rate)
+        assert (estimator.speed_mps > 5.0) is moves
+        assert (sigma_deg(estimator) > 20.0) is moves
+
+
+def test_it_rolls_once_it_has_sped_up():
+    estimator = LeanFilter()
+    hold(estimator, 3.0)
+    rolling = []
+    for _ in range(300):
+        estimator.update([0.0, 1.0, 2.0 / GRAVITY_MPS2], NO_RATE, DT_US)
+        rolling.append(estimator.rolling)
+    near(estimator.speed_mps, 6.0, 1.0)
+    assert not rolling[50]
+    assert rolling[-1]
+    assert rolling == sorted(rolling)
+
+
+def measured(speed_mps, mps2):
+    """Power-on while it speeds up so; after half a second the speed is measured once."""
+    estimator = LeanFilter()
+    force = [0.0, 1.0, mps2 / GRAVITY_MPS2]
+    hold(estimator, 0.05, [0.0, 1.1, 0.0])
+    hold(estimator, 0.5, force)
+    estimator.measure_speed(speed_mps)
+    hold(estimator, 0.7, force)
+    return estimator
+
+
+def speed_sigma_mps(forward_g, before_mps, now_mps):
+    """1 sigma after two speeds, measured a second apart, with such a force forward."""
+    estimator = LeanFilter()
+    force = [0.0, 1.0, forward_g]
+    hold(estimator, 0.05, [0.0, 1.1, 0.0])
+    for speed_mps in (before_mps, now_mps):
+        hold(estimator, 1.0, force)
+        estimator.measure_speed(speed_mps)
+    hold(estimator, 0.5, force)
+    return sqrt(estimator._p.rows[SPEED][SPEED]) * GRAVITY_MPS2
+
+
+def test_a_measured_speed_may_be_late_while_the_measured_ones_change_whatever_the_force_is():
+    """A pitch error looks like a force forward, and the speed that would contradict it must not have less weight."""
+    steady, changing = speed_sigma_mps(0.0, 12.0, 12.0), speed_sigma_mps(0.0, 6.0, 12.0)
+    assert changing > steady + 0.2
+    near(speed_sigma_mps(0.3, 12.0, 12.0), steady, 0.05)
+
+
+def test_a_measured_speed_counts_once():
+    estimator = measured(5.0, 0.0)
+    near(estimator.speed_mps, 5.0, 0.2)
+    once, again = measured(5.0, 3.0), measured(5.0, 3.0)
+    again.measure_speed(5.0)
+    for each in (once, again):
+        hold(each, 0.7, [0.0, 1.0, 3.0 / GRAVITY_MPS2])
+    assert again.speed_mps < once.speed_mps - 0.1
+
+
+def test_coming_to_rest_the_force_is_the_vertical():
+    """Whatever was estimated before: here a lean of 10 degrees that the gyro did not see."""
+    estimator = LeanFilter()
+    hold(estimator, 3.0)
+    hold(estimator, 4.0, [0.0, 1.0, 2.0 / GRAVITY_MPS2])
+    force = [sin(radians(10.0)), cos(radians(10.0)) * cos(radians(12.0)), sin(radians(12.0)) * cos(radians(10.0))]
+    t_s = 0.0
+    while not estimator.at_rest:
+        hold(estimator, DT_S, force)
+        t_s += DT_S
+    assert t_s < 12.0
+    hold(estimator, 0.2, force)
+    near(estimator.speed_mps, 0.0, 0.01)
+    upright_deg = degrees(estimator.trim.angle)
+    near(hold(estimator, DT_S, force) + upright_deg, degrees(atan2(force[0], force[1])), 0.15)
+    near(estimator.pitch_deg, 11.8, 0.15)
+    assert sigma_deg(estimator) < 0.7
+
+
+def biased(bias_dps, seconds=30.0):
+    """A filter that has seen a bias at rest."""
+    estimator = LeanFilter()
+    rate = [radians(value) for value in bias_dps]
+    hold(estimator, seconds, LEVEL, rate)
+    assert estimator.at_rest
+    return estimator, rate
+
+
+def test_at_rest_the_bias_of_every_axis_is_found_and_a_restart_keeps_it():
+    """Then the bike is rocked: a bias that was not found would be seen as a lean."""
+    bias_dps = (1.2, -0.9, 1.5)
+    for restarted in (False, True):
+        estimator, bias = biased(bias_dps)
+        if restarted:
+            estimator.restart()
+            assert estimator.variance == pi * pi
+            assert not estimator.at_rest
+            near(estimator.speed_mps, 0.0, 1e-9)
+        worst = 0.0
+        for k in range(1000):
+            lean_deg = 10.0 - 10.0 * cos(k * DT_S)
+            roll_dps = 10.0 * sin(k * DT_S)
+            force, rate = force_and_rate(lean_deg, 0.0, roll_dps)
+            lean = estimator.update(force, [a + b for a, b in zip(rate, bias)], DT_US)
+            worst = max(worst, abs(lean - lean_deg - 0.0048 * roll_dps))
+        assert worst < 0.7, worst
+
+
+def test_after_a_restart_a_smooth_turn_is_no_rest():
+    """The bias is known by then: a rate of 2 deg/s that does not change is the bike's."""
+    estimator, _ = biased((0.0, 0.0, 0.0), 5.0)
+    estimator.restart()
+    for _ in range(1500):
+        estimator.update([0.0, 1.02, 0.0], [0.0, radians(2.0), 0.0], DT_US)
+        assert not estimator.at_rest
+
+
+def test_values_that_are_no_numbers_are_forgotten():
+    estimator = LeanFilter()
+    hold(estimator, 3.0)
+    forgotten = False
+    for k in range(300):
+        estimator.update([float("nan") if k < 20 else 0.0, 1.0, 0.0], NO_RATE, DT_US)
+        forgotten = forgotten or estimator.variance == pi * pi
+    assert forgotten
+    near(hold(estimator, 5.0), 0.0, 0.01)
+    assert sigma_deg(estimator) < 1.0
+
+
+def test_a_lean_beyond_half_a_turn_comes_from_the_other_side():
+    """A sensor in the hand, turned over to the right or left, and on."""
+    for sign in (1.0, -1.0):
+        estimator = LeanFilter()
+        hold(estimator, 3.0)
+        for k in range(1500):
+            a = sign * min(2.0 * pi, 0.006 * k)
+            turning = sign * 0.6 if 0.006 * k < 2.0 * pi else 0.0
+            lean = estimator.update([sin(a), cos(a), 0.0], [0.0, 0.0, turning], DT_US)
+            if abs(a) > radians(210.0):
+                near(lean, degrees(a) - sign * 360.0, 3.0)
+        near(hold(estimator, 4.0), 0.0, 0.5)
+
+
+def test_a_large_correction_is_made_once():
+    """Power-on in a turn of 30 degrees; then the speed is measured, and the lean found at once. While that is computed
+    more innovations are summed up, which still show the old error."""
+    estimator, leans = LeanFilter(), []
+    force, rate = force_and_rate(30.0, 20.0)
+    for k in range(400):
+        if k == 10:
+            estimator.measure_speed(20.0)
+        leans.append(estimator.update(force, rate, DT_US))
+    assert abs(leans[30]) < 1.0
+    assert leans[60] > 28.0
+    assert max(leans) < 30.5
+
+
+def test_where_samples_come_slowly_rest_and_ride_are_seen_as_well():
+    """At 50 Hz all work on a window is done in the sample after it."""
+    estimator = LeanFilter()
+    force, rate = force_and_rate(-20.0)
+    lean = 0.0
+    for k in range(400):
+        lean = estimator.update(force, rate, 20_000 if k else 0)
+    assert estimator.at_rest
+    near(lean, -20.0, 0.05)
+    near(hold(estimator, 6.0, [sin(radians(-20.0)), cos(radians(-20.0)), 0.2], NO_RATE, 20_000), -20.0, 2.0)
+    assert estimator.rolling
+
+
+def test_a_bias_that_is_far_off_is_put_right_at_once_where_rest_is_seen():
+    """Of 5 deg/s, on a bike that stands at 20 degrees: neither lean nor pitch drifts from then on."""
+    force, _ = force_and_rate(20.0)
+    for axis in range(3):
+        estimator, rate = LeanFilter(), [0.08 * (axis == i) for i in range(3)]
+        while not estimator.at_rest:
+            estimator.update(force, rate, DT_US)
+        for _ in range(60):
+            near(estimator.update(force, rate, DT_US), 20.0, 0.25)
+            near(estimator.pitch_deg, 0.0, 0.2)
+
+
+def test_a_sensor_whose_forward_axis_points_up_or_down_comes_to_rest():
+    """A board on the table, not aligned: where pitch is a right angle, lean has no meaning, but nothing may fail."""
+    for forward in (1.0, -1.0):
+        for left, up in ((0.0, 0.0), (1e-5, 0.0), (1e-4, -1e-4), (0.01, 0.02), (0.0, -0.3)):
+            estimator, rested = LeanFilter(), False
+            for _ in range(1500):
+                estimator.update([left, up, forward * sqrt(1.0 - left * left - up * up)], NO_RATE, DT_US)
+                rested = rested or estimator.at_rest
+                assert abs(estimator.pitch_deg) < 68.8
+            assert rested, (left, up)

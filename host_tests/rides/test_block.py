@@ -1,0 +1,113 @@
+"""The blocks of a ride at their limits: how they are filled, and the format."""
+
+import types
+from binascii import crc32
+
+import pytest
+import ride_writer
+from kickstand.rides import block as block_format
+from kickstand.rides.block import RideBlock, block_length
+from kickstand_tools.rides import block_reader
+
+
+def some_turns(count):
+    """Turns that are the same in any version of Python."""
+    for i in range(count):
+        n = (2, 2, 3, 1, 8, 2)[i % 6]
+        yield [n * (i * k * 7919 % 4001 - 2000) for k in range(1, 8)], n, n * 5000 + i * 37 % 400 - 200
+
+
+FORMAT_1 = 1672459265  # the check sum of what the test below writes
+
+
+def test_the_bytes_of_a_block_are_those_of_format_1(monkeypatch):
+    """Rides that were recorded by an older firmware have to be readable: whoever changes these bytes has to change the
+    format's number, and to keep a reader for the old ones."""
+    monkeypatch.setattr(block_format, "__version__", "0.0.0")
+    block = RideBlock(5000)
+    block.begin(4092, 7, 3, 123456789012, ride_writer.CHIP, 200, bytes(range(80)))
+    assert block_format.BODY_LENGTH == 80
+    for i, turn in enumerate(some_turns(120)):
+        if i % 10 == 0:
+            block.add_speed(i * 13)
+        block.add(*turn)
+    block.add([32767] * 7, 1, 1)
+    block.add([-32768] * 7, 1, 1 << 29)
+    for turn in some_turns(6):
+        block.add(*turn)
+    block.close()
+    data = bytes(block.buffer[:4092])
+    assert (data[:4], data[4:6], data[6:8]) == (b"KRID", b"\1\0", (4092).to_bytes(2, "little"))
+    assert block.count == 120 + 12 + 8
+    assert crc32(data[:-4]) == int.from_bytes(data[-4:], "little") == FORMAT_1
+
+
+def test_a_block_takes_what_fits_and_the_worst_turn_always_does():
+    """A turn and a speed of the longest codes: 12 ones and 31 bits for each of the ten numbers, 54 bytes."""
+    body = bytes(80)
+    for length in (512, 700):
+        block = RideBlock(5000)
+        block.begin(length, 1, 0, 0, ride_writer.CHIP, 200, body)
+        assert not block.full()
+        sign = 1
+        written = 0
+        while not block.full():
+            sign = -sign
+            block.add_speed((1 << 24) * (sign > 0))
+            block.add([sign * 8 * 32767] * 7, 8, (1 << 29) if sign > 0 else 0)
+            written += 1
+        block.close()
+        found = block_reader.parse(bytes(block.buffer[:length]))
+        assert len(found.turns) == written > 3
+        assert found.turns[-1].sums == (sign * 8 * 32767,) * 6
+        data = bytes(block.buffer[: length - 6])
+        assert len(data) - len(data.rstrip(b"\0")) < 60
+
+
+@pytest.mark.parametrize("count", range(1, 17))
+def test_a_block_may_end_within_any_byte(count):
+    block = RideBlock(5000)
+    block.begin(1024, 1, 0, 0, ride_writer.CHIP, 200, bytes(80))
+    for turn in some_turns(count):
+        block.add(*turn)
+    block.close()
+    found = block_reader.parse(bytes(block.buffer[:1024])).turns
+    assert [(turn.sums, turn.n) for turn in found] == [((*s[:3], *s[4:]), n) for s, n, _ in some_turns(count)]
+
+
+def test_a_block_begins_without_anything_of_the_one_before():
+    """Each can be read without the others. What is left of a longer one is overwritten with zeros."""
+    first, again = RideBlock(5000), RideBlock(5000)
+    first.begin(4096, 1, 0, 0, ride_writer.CHIP, 200, bytes(80))
+    for turn in some_turns(150):
+        first.add_speed(900)
+        first.add(*turn)
+    first.close()
+    for block in (first, again):
+        block.begin(1024, 1, 1, 55, ride_writer.CHIP, 200, bytes(80))
+        for turn in some_turns(5):
+            block.add(*turn)
+        block.close()
+    assert first.buffer[:1024] == again.buffer[:1024]
+    assert first.count == again.count == 5
+
+
+def test_the_temperature_is_that_of_the_last_turns_mean():
+    chip = types.SimpleNamespace(accel_lsb_per_g=4096, gyro_lsb_per_dps=16.4, gyro_delay_s=0.0186)
+    chip.temperature_c = lambda counts: counts / 4
+    block = RideBlock(5000)
+    block.begin(1024, 1, 0, 0, chip, 200, bytes(80))
+    block.add([0, 0, 0, 900, 0, 0, 0], 3, 15_000)
+    block.add([0, 0, 0, -303, 0, 0, 0], 3, 15_000)
+    block.close()
+    found = block_reader.parse(bytes(block.buffer[:1024]))
+    assert found.centidegrees == -2525
+    assert found.gyro_lsb_tenths == 164
+    assert found.delay_tenths_ms == 186
+
+
+@pytest.mark.parametrize("index", [1, 2, 3, 4, 6, 8, 96, 1 << 12])
+def test_a_block_of_littlefs_begins_with_a_pointer_for_each_halving(index):
+    pointers = 1 + max(k for k in range(20) if index % (1 << k) == 0)
+    assert block_length(index) == 4096 - 4 * pointers
+    assert block_length(0) == 4096

@@ -1,0 +1,337 @@
+"""The recorder at its limits, with nothing real behind it."""
+
+import contextlib
+import io
+from itertools import pairwise
+
+import pytest
+import ride_writer
+from kickstand.errors import CardError, Notice
+from kickstand_tools.rides import block_reader
+
+TURN_US = 10_000
+
+
+class Keeper:
+    """Takes the place of a RideRing. steps: what was asked of it; taken: whole blocks. fails: the name of a step that
+    raises."""
+
+    stops_interrupts = True
+    fails = ""
+    error: Exception = OSError(5)
+
+    def __init__(self, clock, length=1024):
+        self.clock, self.length = clock, length
+        self.steps, self.taken, self.begun = [], [], b""
+        self.takes_ms = {}  # by the name of a step
+        self.is_ready, self.slow_us, self.free = True, 0, 1_000_000
+
+    def _step(self, name):
+        self.steps.append(name)
+        self.clock.advance(1000 * self.takes_ms.get(name, 0))
+        if name == self.fails:
+            raise self.error
+
+    def begin(self):
+        self._step("begin")
+        return 7
+
+    def next_length(self):
+        return self.length
+
+    def room(self):
+        return self.free
+
+    def ready(self):
+        self._step("ready")
+        return self.is_ready
+
+    def write(self, piece):
+        self._step("write")
+        self.clock.advance(self.slow_us)
+        self.begun += bytes(piece)
+
+    def end_block(self):
+        self._step("end_block")
+        self.taken.append(self.begun)
+        self.begun = b""
+
+    def end(self):
+        self._step("end")
+
+    def abandon(self):
+        self._step("abandon")
+
+    def fault_code(self, error):
+        return "flash-fault"
+
+
+@pytest.fixture
+def keeper(clock):
+    return Keeper(clock)
+
+
+@pytest.fixture
+def recorder(clock, keeper):
+    from kickstand.rides.recorder import Recorder
+
+    return Recorder(keeper, 200)
+
+
+def take_stall(recorder):
+    """As the app does it."""
+    stalled, recorder.stalled = recorder.stalled, False
+    return stalled
+
+
+def start(recorder):
+    recorder.start(ride_writer.CHIP, ride_writer.calibration())
+
+
+def add(recorder, turns, clock=None, tick=True):
+    """So many turns of 10 ms with the same two samples."""
+    for _ in range(turns):
+        if clock:
+            clock.advance(TURN_US)
+        recorder.add([200, -100, 8192, 60, 4, -4, 8], 2, TURN_US)
+        if tick:
+            recorder.tick()
+
+
+def blocks(keeper):
+    found, problems = block_reader.read(b"".join(keeper.taken))
+    assert problems == []
+    return found
+
+
+def times(keeper):
+    return [turn.time_us for block in blocks(keeper) for turn in block.turns]
+
+
+def test_a_block_is_written_by_pieces_of_256_bytes_one_a_turn(recorder, keeper):
+    keeper.length = 700
+    start(recorder)
+    while "write" not in keeper.steps:
+        add(recorder, 1)
+    keeper.steps.clear()
+    written = [len(keeper.begun)]
+    while not keeper.taken:
+        before = len(keeper.steps)
+        add(recorder, 1)
+        assert len(keeper.steps) == before + 2  # ready, and one more
+        written.append(len(keeper.begun))
+    assert written == [256, 512, 700, 0]
+    assert [len(data) for data in keeper.taken] == [700]
+    before = len(keeper.steps)
+    recorder.tick()
+    assert len(keeper.steps) == before  # nothing is waiting
+
+
+def test_what_is_not_ready_is_asked_again_in_the_next_turn(recorder, keeper):
+    start(recorder)
+    keeper.is_ready = False
+    while "ready" not in keeper.steps:
+        add(recorder, 1)
+    add(recorder, 5)
+    assert keeper.steps.count("ready") == 6
+    assert "write" not in keeper.steps
+    keeper.is_ready = True
+    add(recorder, 5)
+    assert len(keeper.taken) == 1
+
+
+def test_all_blocks_follow_one_another_and_tell_what_they_belong_to(recorder, keeper, clock):
+    start(recorder)
+    add(recorder, 1500, clock)
+    recorder.stop()
+    found = blocks(keeper)
+    assert len(found) >= 3
+    assert [block.sequence for block in found] == list(range(len(found)))
+    assert {(block.ride, block.sample_hz, block.accel_lsb_per_g) for block in found} == {(7, 200, 4096)}
+    assert found[0].time_us == pytest.approx(3_000_000, abs=1000)
+    assert found[0].time_us % 1000 == 0
+    assert times(keeper) == [found[0].time_us + TURN_US * (i + 1) for i in range(1500)]
+    assert [block.time_us for block in found[1:]] == [block.turns[-1].time_us for block in found[:-1]]
+    assert found[0].calibration().aligned
+
+
+def test_a_ride_without_a_turn_has_no_block(recorder, keeper):
+    start(recorder)
+    assert recorder.active
+    recorder.stop()
+    assert not recorder.active
+    assert keeper.steps == ["begin", "end"]
+    recorder.stop()
+    assert keeper.steps == ["begin", "end"]
+
+
+def test_a_new_ride_ends_the_one_before(recorder, keeper):
+    start(recorder)
+    add(recorder, 3)
+    start(recorder)
+    assert keeper.steps[-2:] == ["end", "begin"]
+    assert len(keeper.taken) == 1
+    assert recorder.seconds() == 0
+
+
+def test_a_turn_that_fills_a_block_waits_for_the_one_before(recorder, keeper):
+    """Where flash was slower than the ride no block may be lost."""
+    start(recorder)
+    add(recorder, 1500, tick=False)
+    recorder.stop()
+    assert [block.sequence for block in blocks(keeper)] == list(range(len(keeper.taken)))
+    assert len(times(keeper)) == 1500
+
+
+@pytest.mark.parametrize(
+    ("ms", "stops_interrupts", "stalled"), [(10, True, False), (12, True, True), (12, False, False)]
+)
+def test_a_write_of_over_10_ms_was_an_erase_of_the_flash(ms, stops_interrupts, stalled, recorder, keeper):
+    keeper.slow_us = ms * 1000
+    keeper.stops_interrupts = stops_interrupts
+    start(recorder)
+    assert not take_stall(recorder)
+    while "write" not in keeper.steps:
+        assert not take_stall(recorder)
+        add(recorder, 1)
+    assert take_stall(recorder) is stalled
+    assert not take_stall(recorder)
+
+
+@pytest.mark.parametrize("stops_interrupts", [True, False])
+@pytest.mark.parametrize(("step", "fails"), [("begin", ""), ("begin", "begin"), ("abandon", "begin")])
+def test_the_beginning_of_a_ride_may_erase_flash_also_one_that_fails(step, fails, stops_interrupts, recorder, keeper):
+    keeper.stops_interrupts, keeper.fails = stops_interrupts, fails
+    for ms, stalled in ((9, False), (12, True)):
+        keeper.takes_ms = {step: ms}
+        start(recorder)
+        assert recorder.active is (not fails)
+        assert take_stall(recorder) is (stalled and stops_interrupts)
+        keeper.takes_ms = {}
+        recorder.stop()
+        take_stall(recorder)
+
+
+def test_the_end_of_a_ride_closes_a_file_and_may_erase_flash(recorder, keeper):
+    for stops_interrupts in (True, False):
+        keeper.stops_interrupts = stops_interrupts
+        start(recorder)
+        recorder.stop()
+        assert take_stall(recorder) is stops_interrupts
+
+
+@pytest.mark.parametrize(("waited_us", "step_us"), [(100_000, 500_001), (3_000_000, 3_000_000), (600_000_000, 1 << 29)])
+def test_after_a_gap_the_time_is_the_clocks_and_more_than_half_a_second(waited_us, step_us, recorder, keeper, clock):
+    start(recorder)
+    add(recorder, 4, clock)
+    recorder.mark_gap()
+    clock.advance(waited_us)
+    recorder.add([0, 0, 8192, 0, 0, 0, 0], 2, 1)
+    add(recorder, 3, clock)
+    recorder.stop()
+    found = times(keeper)
+    steps = [b - a for a, b in pairwise(found)]
+    assert steps == [TURN_US] * 3 + [pytest.approx(step_us, abs=1000)] + [TURN_US] * 3
+    assert steps[3] > 500_000
+
+
+def test_a_gap_before_the_first_turn_is_none(recorder, keeper, clock):
+    start(recorder)
+    recorder.mark_gap()
+    add(recorder, 2, clock)
+    recorder.stop()
+    assert times(keeper)[0] - blocks(keeper)[0].time_us == TURN_US
+
+
+def test_a_gap_belongs_to_its_own_ride(recorder, keeper, clock):
+    start(recorder)
+    add(recorder, 2, clock)
+    recorder.mark_gap()
+    start(recorder)
+    recorder.add_fix(5.0, None)
+    start(recorder)
+    add(recorder, 3, clock)
+    recorder.stop()
+    found = blocks(keeper)[-1].turns
+    assert [b.time_us - a.time_us for a, b in pairwise(found)] == [TURN_US] * 2
+    assert [turn.speed_mps for turn in found] == [None] * 3
+
+
+def test_a_speed_goes_with_the_next_turn_alone(recorder, keeper):
+    start(recorder)
+    add(recorder, 1)
+    recorder.add_fix(12.0, None)
+    recorder.add_fix(0.0, None)  # the newest one counts, a zero is one
+    add(recorder, 2)
+    recorder.add_fix(12.34, None)
+    add(recorder, 1)
+    recorder.stop()
+    assert [turn.speed_mps for turn in blocks(keeper)[0].turns] == [None, 0.0, None, 12.34]
+
+
+def test_a_position_goes_with_the_next_turn_alone(recorder, keeper):
+    """With a speed or without one."""
+    start(recorder)
+    recorder.add_fix(None, ride_writer.place(0))
+    recorder.add_fix(None, ride_writer.place(1))  # the newest one counts
+    add(recorder, 2)
+    recorder.add_fix(5.0, None)
+    add(recorder, 1)
+    recorder.add_fix(6.0, ride_writer.place(2))
+    add(recorder, 1)
+    recorder.add_fix(None, ride_writer.place(3))
+    start(recorder)
+    add(recorder, 1)
+    recorder.stop()
+    first, second = blocks(keeper)
+    hundredths = [turn.place and turn.place.utc_s and round(100 * turn.place.utc_s % 100) for turn in first.turns]
+    assert hundredths == [20, None, None, 30]
+    assert [turn.speed_mps for turn in first.turns] == [None, None, 5.0, 6.0]
+    assert [turn.place for turn in second.turns] == [None]
+
+
+def test_time_and_room(recorder, keeper):
+    """A kilobyte a second, until it is known how many they are."""
+    start(recorder)
+    assert recorder.seconds() == 0
+    assert recorder.room_s() == 1_000_000 // 1024
+    add(recorder, 99)
+    assert recorder.seconds() == 0
+    add(recorder, 1)
+    assert recorder.seconds() == 1
+    while len(keeper.taken) < 3:
+        add(recorder, 1)
+    seconds = recorder.seconds()
+    assert seconds > 2
+    assert recorder.room_s() == 1_000_000 * seconds // (3 * 1024)
+    keeper.free = 0
+    assert recorder.room_s() == 0
+    keeper.free = None
+    assert recorder.room_s() is None
+
+
+@pytest.mark.parametrize("step", ["begin", "ready", "write", "end_block", "end"])
+@pytest.mark.parametrize("error", [OSError(5), MemoryError("no memory")])
+def test_whatever_fails_ends_the_ride_once_with_one_notice(step, error, recorder, keeper):
+    keeper.fails, keeper.error = step, error
+    with contextlib.redirect_stdout(io.StringIO()) as said:
+        start(recorder)
+        for _ in range(1500):
+            if recorder.active:
+                add(recorder, 1)
+        recorder.stop()
+    assert not recorder.active
+    assert keeper.steps.count("abandon") == 1
+    assert said.getvalue().count("\n") == 1
+    assert isinstance(recorder.problem, Notice)
+    assert recorder.take_problem().values == (str(error),)
+    assert recorder.take_problem() is None
+
+
+def test_a_card_that_is_refused_says_so_itself(recorder, keeper):
+    keeper.fails, keeper.error = "begin", CardError("no-card", "no SD card")
+    with contextlib.redirect_stdout(io.StringIO()):
+        start(recorder)
+    assert not recorder.active
+    assert recorder.problem is keeper.error
+    assert keeper.steps == ["begin"]

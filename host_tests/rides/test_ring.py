@@ -1,0 +1,208 @@
+"""The ring of rides at its limits: room, the oldest ride, places of files."""
+
+import os
+import shutil
+from pathlib import Path
+
+import pytest
+from kickstand.rides import flash_ring, ride_paths
+from kickstand.rides.block import block_length
+from kickstand.rides.flash_ring import RideRing
+from rings import CARD, FLASH, KB_4, old_ride, write_block
+
+
+@pytest.mark.parametrize(("settings", "blocks"), [(FLASH, 16), (CARD, 256)])
+def test_a_part_has_16_blocks_in_flash_and_256_on_a_card(settings, blocks, root):
+    root.free = root.all = 2000 * KB_4
+    ring = RideRing(settings)
+    assert ring.stops_interrupts is (settings is FLASH)
+    assert ring.needed == (40 + blocks + 2) * KB_4
+    ring.begin()
+    lengths = []
+    for _ in range(2 * blocks + 1):
+        lengths.append(ring.next_length())
+        write_block(ring)
+    ring.end()
+    assert lengths == [block_length(i) for i in range(blocks)] * 2 + [KB_4]
+    sizes = {part: size for _, part, size in ride_paths.parts("rides" if settings is FLASH else "card")}
+    assert sizes == {0: 100 * blocks, 1: 100 * blocks, 2: 100}
+
+
+def test_room_is_made_exactly_when_a_part_does_not_fit(root):
+    for free, steps in ((58 * KB_4, 1), (58 * KB_4 - 1, 3)):
+        old = old_ride(root, 1)
+        root.free = free
+        ring = RideRing(FLASH)
+        assert ring.begin() > 1
+        assert write_block(ring) == steps  # the oldest is found, its part is removed, the new one is opened
+        assert (old / "00000.rid").exists() is (steps == 1)
+        ring.end()
+
+
+def test_its_own_first_parts_go_last_and_then_there_is_no_room(root):
+    root.free = 58 * KB_4
+    old_ride(root, 1)
+    ring = RideRing(FLASH)
+    assert ring.begin() == 2
+    for _ in range(16):
+        write_block(ring, KB_4)
+    assert sorted(ride_paths.parts("rides")) == [(1, 0, KB_4), (2, 0, 16 * KB_4)]
+    rooms = [ring.room()]
+    while not ring.ready():
+        root.free = 43 * KB_4
+        rooms.append(ring.room())
+    # ride 1 is found, its part is removed, its directory too, ride 2 is found, its part is removed, the next is opened
+    assert [room > 0 for room in rooms] == [True] * 5 + [False] * 2
+    assert [part for part in ride_paths.parts("rides") if part[1] == 0] == []
+    assert not (root.path / "rides/000/01").exists()
+
+
+def test_the_oldest_go_ride_by_ride_and_group_by_group(root):
+    """One step removes one thing. What has no parts left is passed over, and what the owner put there stays."""
+    for ride in (98, 99, 100, 300):
+        old_ride(root, ride)
+    (root.path / "rides/000/98/notes.txt").write_bytes(b"the rider's own")
+    (root.path / "rides/001/notes.txt").write_bytes(b"the rider's own")
+    (root.path / "rides/002").mkdir()
+    (root.path / "rides/000/00").mkdir()
+    root.free = 10 * KB_4
+    ring = RideRing(FLASH)
+    assert ring.begin() == 301
+
+    def left():
+        return sorted(path.relative_to("rides").as_posix() for path in Path("rides").rglob("*"))
+
+    gone, before = [], left()
+    with pytest.raises(OSError):
+        for _ in range(50):
+            assert not ring.ready()
+            now = left()
+            gone.append([path for path in before if path not in now])
+            before = now
+    assert all(len(paths) <= 1 for paths in gone)
+    assert [path for paths in gone for path in paths] == [
+        "000/00",
+        "000/98/00000.rid",
+        "000/99/00000.rid",
+        "000/99",
+        "001/00/00000.rid",
+        "001/00",
+        "002",
+        "003/00/00000.rid",
+        "003/00",
+    ]
+    assert before == ["000", "000/98", "000/98/notes.txt", "001", "001/notes.txt", "003", "003/01"]
+    # ride 0 found and removed; of each other found, its part and its directory removed; groups 1 and 2 found empty; the
+    # ride itself found
+    assert len(gone) == 2 + 4 * 3 + 2 + 1
+
+
+def test_where_somebody_has_removed_the_ride_there_is_no_room(root):
+    root.free = 0
+    ring = RideRing(FLASH)
+    ring.begin()
+    shutil.rmtree("rides/000")
+    with pytest.raises(OSError) as error:
+        ring.ready()
+    assert ring.fault_code(error.value) == "out-of-room"
+
+
+class File:
+    """An open file. short: by how much each write falls short. closed: how often it was."""
+
+    def __init__(self, short=0, error=None):
+        self.short, self.error, self.closed = short, error, 0
+
+    def write(self, piece):
+        return len(piece) - self.short
+
+    def close(self):
+        self.closed += 1
+        if self.error:
+            raise self.error
+
+
+def begun(file, monkeypatch):
+    """A ring whose first part is this file."""
+    monkeypatch.setattr(flash_ring, "open", lambda path, mode: file, raising=False)
+    ring = RideRing(FLASH)
+    ring.begin()
+    while not ring.ready():
+        pass
+    return ring
+
+
+def test_a_write_that_is_cut_short_says_that_there_is_no_room(root, monkeypatch):
+    begun(File(), monkeypatch).write(b"abc")
+    ring = begun(File(short=1), monkeypatch)
+    with pytest.raises(OSError) as error:
+        ring.write(b"abc")
+    assert ring.fault_code(error.value) == "out-of-room"
+
+
+def test_faults_have_their_codes():
+    for settings, code in ((FLASH, "flash-fault"), (CARD, "card-fault")):
+        ring = RideRing(settings)
+        assert ring.fault_code(OSError(5)) == code
+        assert ring.fault_code(OSError()) == code
+        assert ring.fault_code(OSError(28)) == "out-of-room"
+        assert ring.fault_code(MemoryError()) == "out-of-memory"
+
+
+def test_ending_closes_once_and_abandoning_raises_nothing(root, monkeypatch):
+    RideRing(FLASH).end()  # there is nothing to close
+    file = File(error=OSError(5))
+    ring = begun(file, monkeypatch)
+    ring.abandon()
+    ring.abandon()
+    assert file.closed == 1
+    with pytest.raises(OSError):
+        begun(file, monkeypatch).end()
+
+
+def test_a_directory_that_cannot_be_made_ends_in_its_error(root, monkeypatch):
+    def refuse(path):
+        raise OSError(30)
+
+    RideRing(FLASH).begin()  # it is there now
+    assert RideRing(FLASH).begin() == 1  # and empty: the same ride again
+    monkeypatch.setattr("os.mkdir", refuse)
+    with pytest.raises(OSError, match="30"):
+        RideRing(FLASH).begin()
+
+
+def test_free_and_all_bytes_are_blocks_of_the_size_that_counts(monkeypatch):
+    """Of statvfs: block size, fragment size (in which blocks are counted), all, free."""
+    monkeypatch.setattr("os.statvfs", lambda path: (512, 4096, 300, 200, 190, 0, 0, 0, 0, 255), raising=False)
+    assert flash_ring.free_bytes("") == 200 * 4096
+    assert flash_ring.all_bytes("") == 300 * 4096
+
+
+def test_only_what_is_named_as_a_part_is_one(root):
+    old_ride(root, 345, parts=3)
+    old_ride(root, 307)
+    (root.path / "rides/003/45/00003.rid").mkdir()
+    for name in ("00004.txt", "0005.rid", "000006.rid", "0000x.rid"):
+        (root.path / "rides/003/45" / name).write_bytes(b"x")
+    (root.path / "rides/003/46").write_bytes(b"x")
+    (root.path / "rides/003/1").mkdir()
+    (root.path / "rides/03").mkdir()
+    assert sorted(ride_paths.parts("rides")) == [(307, 0, KB_4)] + [(345, i, KB_4) for i in range(3)]
+    assert sorted(ride_paths.rides("rides", 3)) == [307, 345]
+    assert list(ride_paths.groups("rides")) == [3]
+    assert ride_paths.first_part("rides/003/45") == (0, KB_4)
+    os.remove("rides/003/45/00000.rid")
+    assert ride_paths.first_part("rides/003/45") == (1, KB_4)
+    assert ride_paths.newest_ride("rides") == 345
+
+
+def test_numbers_of_rides_go_on(root):
+    Path("rides").mkdir()
+    assert ride_paths.newest_ride("rides") == 0
+    (root.path / "rides/002").mkdir()
+    assert ride_paths.newest_ride("rides") == 200
+    old_ride(root, 99)
+    ring = RideRing(FLASH)
+    assert ring.begin() == 200
+    write_block(ring)
+    assert ring.begin() == 201
