@@ -34,12 +34,14 @@ class LogCells:
     def integrals(self, at_s: Array) -> Array:
         """(k, 7) until the times at_s (k): of force (g s), of rate (degrees) and of the time that is known (s)."""
         edges_s = self.first_s + np.arange(len(self.known) + 1) * CELL_S
-        return np.asarray([np.interp(at_s, edges_s, sums) for sums in self._sums], dtype=float).T
+        return np.column_stack([np.interp(at_s, edges_s, sums) for sums in self._sums])
 
     @cached_property
     def _sums(self) -> Array:
         values = np.column_stack((self.force, self.rate, self.known)) * CELL_S
-        return np.hstack((np.zeros((7, 1)), np.cumsum(values.T, axis=1)))
+        sums = np.zeros((7, len(values) + 1))
+        np.cumsum(values.T, axis=1, out=sums[:, 1:])
+        return sums
 
     def means(self, over: int) -> tuple[Array, Array, Array]:
         """Force (k, 3), rate (k, 3) and the first speed (k, m/s) over so many cells each; NaN where there is none."""
