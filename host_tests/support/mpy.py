@@ -8,6 +8,20 @@ import pytest
 from kickstand_tools import unix_port
 
 HERE = Path(__file__).resolve().parent
+_TESTS = """
+import sys
+sys.path.insert(0, sys.argv[1])
+module = __import__(sys.argv[2])
+for name in sorted(dir(module)):
+    if name.startswith("test_"):
+        print(name)
+        getattr(module, name)()
+"""
+
+
+def run_tests(module: Path) -> None:
+    """Every test of a module that needs no more than MicroPython has, in one process."""
+    assert "test_" in run_mpy(_TESTS, str(module.parent), module.stem)
 
 
 def run_mpy(
