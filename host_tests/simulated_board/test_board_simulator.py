@@ -19,17 +19,6 @@ def test_the_three_ends_of_a_run():
     assert on_board(lambda board: fake_machine.reset())[0] == "reset"
 
 
-def test_firmware_that_catches_every_exception_is_still_switched_off():
-    def firmware(board):
-        while True:
-            try:
-                fake_time.sleep_ms(10)
-            except Exception:
-                pass
-
-    assert on_board(firmware, 1.0)[0] == "off"
-
-
 def test_power_is_lost_by_off_and_kept_by_reset():
     seen = []
 
