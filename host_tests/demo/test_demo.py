@@ -14,7 +14,7 @@ from engines import ENGINES
 from kickstand_tools import unix_port
 from kickstand_tools.demo.demo import DeviceStopped, demo
 from kickstand_tools.demo.device_process import Device
-from kickstand_tools.demo.shown_lean import shown_lean
+from kickstand_tools.simulated_board.lcd import shown_lean
 from terminal import Terminal
 
 HUNG_S = 300  # only a process that hangs takes as long, whatever else the machine does

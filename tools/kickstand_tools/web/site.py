@@ -17,7 +17,6 @@ MODULES = (
     "__init__.py",
     "demo/__init__.py",
     "demo/hand_bike.py",
-    "demo/shown_lean.py",
     "simulated_board",
     "simulation/__init__.py",
     "simulation/scripted",
