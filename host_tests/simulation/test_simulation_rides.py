@@ -16,7 +16,7 @@ def rides():
     return {name: ride(name, 5, SHORT_S) for name in PROFILES}
 
 
-def felt(made):
+def vehicle_readings(made):
     """Force (N, 3, g) and rates (N, 3, deg/s) in vehicle axes, the part's matrix and biases taken off."""
     chip, mounting = made.chip, made.vehicle_from_sensor
     force = (made.readings[:, :3] - chip.accel_offset) @ np.linalg.inv(chip.accel_matrix).T @ mounting.T
@@ -108,7 +108,7 @@ def test_a_rider_who_moves_about_does_not_tilt_a_bike_on_its_stand(rides, name):
 
 def test_the_sensor_feels_one_g_at_rest_and_the_rates_of_the_truth(rides):
     made = rides["street"]
-    force, rates = felt(made)
+    force, rates = vehicle_readings(made)
     rest = made.phase == "kickstand"
     assert np.linalg.norm(force[rest], axis=1).mean() == pytest.approx(1.0, abs=0.005)
     lean = np.degrees(np.arctan2(force[rest, 0], force[rest, 1])).mean()
@@ -134,9 +134,9 @@ def test_the_two_poses_are_what_was_asked_for():
 
 
 def test_a_creeping_mount_turns_by_some_degrees():
-    """The gravity felt at the end has moved against the truth's lean and pitch."""
+    """The gravity measured at the end has moved against the truth's lean and pitch."""
     made = ride("creep", 4, 60.0, share=0.0)
-    force, _ = felt(made)
+    force, _ = vehicle_readings(made)
     early, late = force[200:600].mean(axis=0), force[-600:-200].mean(axis=0)
     lean = np.radians(made.truth["lean_deg"])
     first = np.degrees(np.arctan2(early[0], early[1]) - lean[200:600].mean())

@@ -1,4 +1,4 @@
-"""Writes a fleet that is made up: logs, MANIFEST.csv, and TRUTH.csv, which tells what a run over it has to find."""
+"""Writes a fleet that is made up: logs, MANIFEST.csv, and TRUTH.csv, which says what a run over it has to find."""
 
 import gzip
 from collections.abc import Callable, Iterator

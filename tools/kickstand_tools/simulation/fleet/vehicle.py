@@ -58,7 +58,7 @@ def drive_log(
     name: str = "the log",
 ) -> Log:
     """The log of a drive. moved: at so many seconds the mount turns to another one (3, 3) within 0.3 s."""
-    force, rate = _felt(chance, kind, route)
+    force, rate = _readings(chance, kind, route)
     mount = np.broadcast_to(sensor.mount, (len(force), 3, 3))
     if moved is not None:
         at_s, other = moved
@@ -79,7 +79,7 @@ def drive_log(
     return Log(route.time, force, rate, speed, utc_s=utc_s, name=name)
 
 
-def _felt(chance: np.random.Generator, kind: str, route: Route) -> tuple[Array, Array]:
+def _readings(chance: np.random.Generator, kind: str, route: Route) -> tuple[Array, Array]:
     """(n, 3) specific force (m/s2) and (n, 3) rate (rad/s) along the vehicle's left, up, forward."""
     step_s = route.time[1]
     lateral = route.speed * route.yaw_rate
