@@ -1,10 +1,13 @@
 """Whole simulated rides: the same again from the same seed, within their stated ranges, written as logs."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from command import refused, works
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.simulation.files import simulate
+from kickstand_tools.simulation.physics.chip import RATE_HZ
 from kickstand_tools.simulation.profiles import MAIN, PROFILES
 from kickstand_tools.simulation.ride import random_rotation, ride
 
@@ -185,3 +188,19 @@ def test_the_calibration_of_the_ride_before_goes_with_it(tmp_path):
 
 def test_an_unknown_profile_is_refused(tmp_path):
     refused(tmp_path, "simulate", "--profile", "moon", "--out", tmp_path / "x", words="street")
+
+
+@pytest.mark.parametrize("profile", ["street", "creep"])
+def test_a_ride_takes_at_most_so_many_columns(profile):
+    """An hour has 3.6 million rows at the chip's 1 kHz. What it gives back keeps none of them alive."""
+    seconds = 400.0
+    column = seconds * RATE_HZ * 8  # bytes of one number a row
+    tracemalloc.start()
+    try:
+        made = ride(profile, seed=0, seconds=seconds)
+        left, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert made.rate_hz == 200.0
+    assert peak < 44 * column
+    assert left < 6 * column
