@@ -37,8 +37,7 @@ from .imports.importing import Imported, import_recording, write_imported
 from .joining.joined import Joined, join_track, write_joined
 from .joining.track import Track
 from .joining.track_files import read_track
-from .logs.csv_lines import write_log
-from .logs.cut import cut_log
+from .logs.csv_lines import cut_log, write_log
 from .logs.log import Log
 from .logs.reader import read_log
 from .logs.stretch import Stretch

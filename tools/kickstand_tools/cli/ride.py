@@ -22,7 +22,7 @@ from ..estimation.smooth import smooth_to_csv
 from ..imports.importing import Imported, import_recording, write_imported
 from ..joining.joined import Joined, join_track, write_joined
 from ..joining.track_files import read_track
-from ..logs.cut import cut_log
+from ..logs.csv_lines import cut_log
 from ..logs.reader import Source
 from ..logs.stretch import Stretch
 from ..output import check_output
@@ -186,7 +186,7 @@ def report_command(
     """A ride in a page: maxima, time at large leans, and each stop as a brake test has it."""
     with Bar("reading") as bar:
         seen = overview(open_ride(_part(ride, from_s, to_s), calibration, smoothed=not live), bar.reach)
-    warn(ride, [*seen.notices, *([seen.exchanged] if seen.exchanged else [])])
+    warn(ride, seen.notices)
     if as_json:
         click.echo(json.dumps(as_data(seen)))
     else:
@@ -218,7 +218,6 @@ def plot_command(
     with spinner("drawing"):
         written = list(plot.draw(seen, out, tiles))
     print_lines(f"written: {path}" for path in written)
-    warn(ride, [seen.exchanged] if seen.exchanged else [])
 
 
 @click.command()

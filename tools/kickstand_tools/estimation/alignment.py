@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from ..calibration.file import CalibrationFile
 from ..errors import InputError
 from ..logs.cells import MOST_DPS, MOST_G
+from ..logs.frozen import without_frozen
 from ..logs.log import Log
-from ..logs.mended.frozen import believed
 from ..logs.reader import Source, read_log
 from ..logs.source import Progress
 from ..logs.table import Array
@@ -104,7 +104,7 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
     """
     if phone is not None and phone not in PHONES:
         raise InputError(f"no phone is mounted {phone}: there are {', '.join(PHONES)}")
-    log = believed(read_log(log))
+    log = without_frozen(read_log(log))
     step_s = float(log.t_s[-1]) / (len(log.t_s) - 1)
     if step_s * SLOWEST_HZ > 1.0:
         raise InputError(f"{log.name}: a sample every {step_s:.2f} s: at least {SLOWEST_HZ:.0f} a second are needed")

@@ -15,7 +15,6 @@ from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import Progress, name_of
 from ..logs.stretch import within
 from ..logs.table import Array, Table
-from ..replay.mount_check import MountCheck
 from .equations import corrected_rates
 from .hypotheses import ALL
 from .least_squares import Estimate
@@ -89,17 +88,12 @@ def smooth_to_csv(
 def _checked_blocks(
     log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
 ) -> Iterator[tuple[Block, Array]]:
-    """smooth_blocks(), and what contradicts the calibration."""
-    mount = MountCheck(calibration)
+    """smooth_blocks() of the stretch that is wanted."""
     whole, stretch = apart(log)
     for block, found in smooth_blocks(whole, calibration, progress, notices):
         if found is None:
             raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples a second: too few to look back over")
-        believed = block.believed
-        mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
         yield from within(stretch, block, found)
-    contradiction = mount.notice()
-    notices += [contradiction] if contradiction else []
 
 
 def smooth_blocks(
@@ -118,7 +112,7 @@ def smooth_blocks(
     past: list[Block] = []
     waiting: list[Block] = []
     start_c = np.nan
-    for segment in _segments(read_blocks(log, 2, progress, notices, lines=lines)):
+    for segment in _segments(read_blocks(log, 2, progress, notices, lines=lines, calibration=calibration)):
         waiting.append(segment)
         known = segment.readings[~np.isnan(segment.readings[:, 3]), 3]
         start_c = float(known[0]) if np.isnan(start_c) and len(known) else start_c
@@ -142,9 +136,9 @@ def _together(
     before: list[Block], own: list[Block], after: list[Block], calibration: CalibrationFile, start_c: float
 ) -> Iterator[tuple[Block, Array | None]]:
     """The values of the segments `own`, estimated together with those before and after them."""
-    believed = [segment.believed for segment in (*before, *own, *after)]
-    values = _estimated(believed, calibration, start_c)
-    first = sum(len(segment.time_us) for segment in believed[: len(before)])
+    measured = [segment.measured for segment in (*before, *own, *after)]
+    values = _estimated(measured, calibration, start_c)
+    first = sum(len(segment.time_us) for segment in measured[: len(before)])
     for segment in own:
         if values is None:
             yield segment, None

@@ -9,7 +9,7 @@ from ..analysis.stops.brake_test import RATE_S, Stop, find_stops
 from ..calibration.file import CalibrationFile
 from ..logs.reader import Source, read_blocks
 
-_LEAN_COLUMNS = 6  # of what the firmware's meter tells of a motorcycle
+_LEAN_COLUMNS = 6  # of what the firmware's meter says of a motorcycle
 
 
 def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
@@ -36,7 +36,7 @@ def car_channels(log: Source, calibration: CalibrationFile) -> list[Channels]:
     """A log in the vehicle's axes without a lean, block by block."""
     found = []
     for whole in read_blocks(log):
-        block = whole.believed
+        block = whole.measured
         if len(block.time_us):
             found.append(channels(block, calibration, np.zeros((len(block.time_us), _LEAN_COLUMNS)), car=True))
     return found
