@@ -67,9 +67,9 @@ def test_an_installation_stays_that_of_the_checkout():
     """Without -e `flash --config` would copy a config.py that the rider has never edited."""
     readmes = [ROOT / "README.md", ROOT / "firmware" / "README.md", ROOT / "tools" / "README.md"]
     text = "\n".join(path.read_text(encoding="utf-8") for path in readmes)
-    told = re.findall(r"pip install\b(?! esptool).*", text) + [extra("rides")]
-    assert len(told) >= 4
-    assert all("pip install -e " in line for line in told)
+    lines = re.findall(r"pip install\b(?! esptool).*", text) + [extra("rides")]
+    assert len(lines) >= 4
+    assert all("pip install -e " in line for line in lines)
 
 
 def test_an_installed_wheel_finds_its_firmware(tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""A config.py of the rider's own: which one is flashed, and how a slip in it is told on the host and by the board."""
+"""A config.py of the rider's own: which one is flashed, and how the host and the board name a slip in it."""
 
 import os
 import subprocess

@@ -96,9 +96,9 @@ def test_an_export_replays_as_the_ride_it_was_made_from(tmp_path, name):
 def test_utc_is_that_of_the_recording(tmp_path, name):
     write, every = EXPORTS[name]
     found = api.import_recording(write(tmp_path, app_exports.riding().every(every)))
-    told = np.isfinite(found.log.utc_s)
+    known = np.isfinite(found.log.utc_s)
     t_s = found.log.t_s + found.log.start_s
-    assert np.max(np.abs(found.log.utc_s[told] - START_UTC_S - t_s[told])) < 0.02
+    assert np.max(np.abs(found.log.utc_s[known] - START_UTC_S - t_s[known])) < 0.02
 
 
 def test_one_file_with_all_sensors_of_phyphox(tmp_path):
@@ -152,9 +152,9 @@ def test_kickstands_own_exports_come_back(tmp_path, form):
     for name in ("lat_deg", "lon_deg"):
         given = getattr(ride, name)[: len(there)]
         assert np.allclose(getattr(found.log, name)[there], given[there], rtol=0.0, atol=1e-7)
-    told = np.isfinite(found.log.utc_s)
-    assert np.count_nonzero(told) >= np.count_nonzero(there)
-    assert np.allclose(found.log.utc_s[told] - START_UTC_S, t_s[told], rtol=0.0, atol=2e-3)
+    known = np.isfinite(found.log.utc_s)
+    assert np.count_nonzero(known) >= np.count_nonzero(there)
+    assert np.allclose(found.log.utc_s[known] - START_UTC_S, t_s[known], rtol=0.0, atol=2e-3)
 
 
 def test_a_log_comes_back_as_it_was_also_from_a_spreadsheet(tmp_path):

@@ -106,7 +106,7 @@ def read_blocks(
         raise InputError(f"{name} is too short: {count} samples, at least {minimum} are needed")
     if notices is not None:
         judged = [notice for notice in (judge.notice() for judge in (*judges, course)) if notice]
-        notices += remarks + frozen.notices() + judged[:1]  # one cause is told once
+        notices += remarks + frozen.notices() + judged[:1]  # one cause is named once
 
 
 def check_first_line(log: Path) -> None:
