@@ -267,7 +267,7 @@ def test_an_emulated_board_is_given_longer_to_answer(port, limit_s, tmp_path, mo
 
     monkeypatch.setattr(transport_serial.serial, "serial_for_url", open_port)
     clock = types.SimpleNamespace(monotonic=lambda: waited_s[0], sleep=sleep)
-    monkeypatch.setattr(transport_serial, "time", clock)
+    monkeypatch.setattr(connection, "time", clock)
     command.refused(tmp_path, "status", "--port", port, words=f"no MicroPython answers on {port}")
     assert waited_s[0] == pytest.approx(2 * limit_s, abs=0.1)
 

@@ -54,7 +54,7 @@ def plugged(monkeypatch):
     """plugged(board): the only board that there is."""
 
     def plug(board):
-        monkeypatch.setattr(flash, "contents", lambda mpy: dict(contents(mpy or None)))
+        monkeypatch.setattr(flash, "contents", lambda mpy, _compiler: dict(contents(mpy or None)))
         return fake_board.plug_in(monkeypatch, board)
 
     return plug

@@ -4,9 +4,10 @@ import ast
 import contextlib
 import errno
 import io
+import math
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, cast
 
 import serial
 from mpremote.transport import TransportError, TransportExecError
@@ -19,7 +20,8 @@ from ..errors import InputError, cause
 Progress = Callable[[str, int, int], None]
 
 MOST_BYTES = 1_000_000  # of an answer; the longest, the list of a board's files, has a hundredth of that
-_ANSWER_S = 10
+ANSWER_S = 10
+_POLL_S = 0.01
 _PROGRAM_S = 60  # an emulated board takes a while to compile the modules
 _EMULATED = "socket:"  # begins the name of an emulated board's port
 _SLOWER = 12  # how much longer than a board an emulated one may take: its seconds last longer where the host is busy
@@ -51,42 +53,51 @@ class Board(SerialTransport):
 
     slower = 1
 
+    def wait(self, seconds: float) -> None:
+        """Do nothing for so long. Where a program must not sleep, a board of its own does something else."""
+        time.sleep(seconds)
+
     def read_until(self, min_num_bytes, ending, timeout=10, data_consumer=None, timeout_overall=None):
         """See SerialTransport. Raises TransportError for an answer of over MOST_BYTES."""
-        limits: list[Any] = [limit and limit * self.slower for limit in (timeout, timeout_overall)]
-        said = bytearray()
-
-        def take(piece: bytes) -> None:
-            said.extend(piece)
-            if len(said) > MOST_BYTES:
-                raise TransportError("the answer does not end")
-            if data_consumer:
-                data_consumer(piece)
-
-        while True:  # until the last byte of ending comes, again and again
-            before = len(said)
-            super().read_until(min_num_bytes, ending[-1:], limits[0], take, limits[1])
-            if len(said) == before or said.endswith(ending) or not said.endswith(ending[-1:]):
-                return bytes(said)
+        said, serial = bytearray(), cast(Any, self.serial)
+        began_s = heard_s = time.monotonic()
+        limits: list[Any] = [math.inf if limit is None else limit * self.slower for limit in (timeout, timeout_overall)]
+        while not said.endswith(ending):
+            now_s = time.monotonic()
+            # An emulator's pseudo-terminal may not say what waits. Of mpremote the older ones know nothing of those.
+            if piece := serial.read(1) if getattr(self, "is_pty", False) or serial.inWaiting() > 0 else b"":
+                said += piece
+                heard_s = now_s
+                if len(said) > MOST_BYTES:
+                    raise TransportError("the answer does not end")
+                if data_consumer:
+                    data_consumer(piece)
+            elif now_s >= heard_s + limits[0] or now_s >= began_s + limits[1]:
+                break
+            else:
+                self.wait(_POLL_S)
+        return bytes(said)
 
 
 class _EmulatedBoard(Board):
     slower = _SLOWER
 
 
+# The name of a board's port, a board at a port that is open, or None for the only board that is plugged in
+Port = str | Board | None
+
+
 @contextlib.contextmanager
-def connected(port: str | None) -> Iterator[tuple[SerialTransport, str]]:
+def connected(port: Port) -> Iterator[tuple[Board, str]]:
     """A board at its raw prompt, its program interrupted, and the name of its port.
 
-    port: None takes the only board that is plugged in.  Raises InputError, also for errors of the connection inside
-    the with block.
+    Raises InputError, also for errors of the connection inside the with block.
     """
-    name = port or find_port()
-    try:
-        kind = _EmulatedBoard if name.startswith(_EMULATED) else Board
-        transport = kind(name, timeout=_ANSWER_S * (_SLOWER if kind is _EmulatedBoard else 1))
-    except (TransportError, ValueError):
-        raise why_closed(name) from None
+    if port is None or isinstance(port, str):
+        name = port or find_port()
+        transport = _opened(name)
+    else:
+        transport, name = port, port.device_name
     try:
         _enter(transport, name)
         yield transport, name
@@ -101,6 +112,14 @@ def connected(port: str | None) -> Iterator[tuple[SerialTransport, str]]:
     finally:
         with contextlib.suppress(OSError):
             transport.close()  # its port may be gone, or just restarting
+
+
+def _opened(name: str) -> Board:
+    kind = _EmulatedBoard if name.startswith(_EMULATED) else Board
+    try:
+        return kind(name, timeout=ANSWER_S * (_SLOWER if kind is _EmulatedBoard else 1))
+    except (TransportError, ValueError):
+        raise why_closed(name) from None
 
 
 def find_port() -> str:
@@ -137,10 +156,10 @@ def why_closed(port: str) -> InputError:
     return InputError(f"{port} could not be opened at first, and now can: try again")
 
 
-def restart(transport: SerialTransport) -> None:
+def restart(transport: Board) -> None:
     """Reset the board, so that it starts as after power-on. Its USB port goes away for a moment."""
     transport.exec_raw_no_follow("import time, machine\ntime.sleep_ms(100)\nmachine.reset()")
-    time.sleep(_RESTART_S)
+    transport.wait(_RESTART_S)
 
 
 def ask(transport: SerialTransport, expression: str, *shapes: Any) -> Any:

@@ -193,9 +193,10 @@ def micropython(records: Iterator[bytes], _progress: Progress | None) -> Iterato
 @contextlib.contextmanager
 def rp2040(records: Iterator[bytes], progress: Progress | None) -> Iterator[IO[bytes]]:
     """The results of an emulated Pico: 32-bit floats and the board's own interpreter. Raises InputError, GuestError."""
-    from ..emulator import image
+    from ..emulator import image, native
 
     image.find()  # says what is not installed, before an import below fails for want of it
+    native.build()
     from ..deploy.bytecode import cross_compiled
     from ..emulator import flash_image
     from ..emulator.host_link import GUEST, HostLink

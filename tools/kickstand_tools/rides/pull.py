@@ -9,10 +9,9 @@ from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
 from mpremote.transport import TransportExecError
-from mpremote.transport_serial import SerialTransport
 
 from ..deploy.board_console import BrokenOff, lines
-from ..deploy.connection import Progress, connected, literal, printed, restart
+from ..deploy.connection import Board, Port, Progress, connected, literal, printed, restart
 from ..errors import InputError
 from ..output import check_directory
 from . import ride_log
@@ -83,7 +82,7 @@ class PullResult:
 
 
 def pull(
-    port: str | None,
+    port: Port,
     out: Path,
     delete: bool = False,
     progress: Progress | None = None,
@@ -91,7 +90,7 @@ def pull(
 ) -> PullResult:
     """Write every ride on the board to a log in the directory out, then restart the board.
 
-    port: None takes the only board that is plugged in.  delete: remove from the board each ride that came over whole.
+    delete: remove from the board each ride that came over whole.
     pulled: called with each ride once it is done.  Raises InputError, NoFirmware, OutdatedFirmware.
     """
     check_directory(out)
@@ -124,7 +123,7 @@ def pull(
     return result
 
 
-def _list(transport: SerialTransport, name: str) -> tuple[str, str, dict[int, list[_Part]]]:
+def _list(transport: Board, name: str) -> tuple[str, str, dict[int, list[_Part]]]:
     """Where the rides are, the vehicle in the board's config.py, and the parts of each."""
     first, *lines = printed(transport, name, _LIST, "its rides").splitlines() or [b""]
     directory, vehicle = literal(first, (str, str))
@@ -135,9 +134,7 @@ def _list(transport: SerialTransport, name: str) -> tuple[str, str, dict[int, li
     return directory, vehicle, {ride: list(group) for ride, group in by_ride}
 
 
-def _pull_ride(
-    transport: SerialTransport, number: int, parts: list[_Part], vehicle: str, out: Path, came: _Came
-) -> PulledRide:
+def _pull_ride(transport: Board, number: int, parts: list[_Part], vehicle: str, out: Path, came: _Came) -> PulledRide:
     """Write its log. vehicle: in the board's config.py; a ride that two poses have aligned was a motorcycle's."""
     ride = PulledRide(number)
     blocks: list[Block] = []
@@ -174,7 +171,7 @@ def _pull_ride(
     return ride
 
 
-def _delete(transport: SerialTransport, directory: str, parts: list[_Part]) -> None:
+def _delete(transport: Board, directory: str, parts: list[_Part]) -> None:
     """Parts of one ride, and the directories that are empty then."""
     for part in parts:
         transport.fs_rmfile(part.path)
@@ -185,7 +182,7 @@ def _delete(transport: SerialTransport, directory: str, parts: list[_Part]) -> N
             emptied = emptied.parent
 
 
-def _read(transport: SerialTransport, part: _Part, title: str, came: _Came) -> bytes:
+def _read(transport: Board, part: _Part, title: str, came: _Came) -> bytes:
     """A file of the board."""
     content = bytearray()
     came(f"pulling {title}", 0)
