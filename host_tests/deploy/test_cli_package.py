@@ -236,6 +236,8 @@ def test_each_check_is_run_and_any_failure_counts(dev, monkeypatch, failing):
         return int(failing in command)
 
     monkeypatch.setattr(dev, "run", run)
+    monkeypatch.setattr(dev, "PYTHON", sys.executable)
+    monkeypatch.setattr(dev, "COMPILE", "")
     assert dev.test(["-k", "lean"]) == 1
     assert [command[1] for command in ran] == ["ruff", "ruff", "pyright", "pytest"]
     assert ran[3][-2:] == ("-k", "lean")
