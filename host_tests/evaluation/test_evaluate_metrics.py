@@ -6,12 +6,11 @@ import math
 import numpy as np
 import pytest
 from kickstand_workshop.evaluation.estimators import trailing_mean
-from kickstand_workshop.evaluation.evaluate import Evaluation
 from kickstand_workshop.evaluation.metrics import Score, lag_ms, score, slope, straights
 from kickstand_workshop.evaluation.picture import ZOOM_S, zoom_start
 from kickstand_workshop.evaluation.real_ride import RealScore
 from kickstand_workshop.evaluation.report import document, pooled, real_table, table
-from kickstand_workshop.evaluation.runs import Job, Result
+from kickstand_workshop.evaluation.runs import Evaluation, Job, Result
 from rich.console import Console
 
 RATE = 200.0

@@ -11,10 +11,9 @@ from rich import box
 from rich.table import Table
 
 from . import picture
-from .evaluate import Evaluation
 from .metrics import Score
 from .real_ride import RealScore
-from .runs import Result
+from .runs import Evaluation, Result
 
 CAPTION = (
     "rms: over all rides; worst ride: rms of the worst; 95 %: mean over rides; worst: of all; "
