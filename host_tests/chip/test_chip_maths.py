@@ -7,7 +7,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from emulated import PART, modules, pico
+from emulated import PART, pico
 from kickstand_tools import unix_port
 from kickstand_tools.replay import replay_engine
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn
@@ -30,12 +30,11 @@ print(json.dumps([turned[0:3], turned[3]]))
 """
 
 
-def test_composed_rotations_agree_with_numpy():
+def test_composed_rotations_agree_with_numpy(at_prompt):
     """Six rotations one after the other, of the three axes and of a vector: to 1e-6, a few units of the last place."""
     matrices = [random_mounting(seed) for seed in range(6)]
     v = (0.3, -0.5, 0.81)
-    with pico(files=modules()) as board:
-        axes, out = json.loads(board.exec(f"matrices = {matrices!r}\nv = {v!r}\n{_COMPOSED}"))
+    axes, out = json.loads(at_prompt.exec(f"matrices = {matrices!r}\nv = {v!r}\n{_COMPOSED}"))
     expected = np.eye(3)
     for m in matrices:
         expected = np.reshape(m, (3, 3)) @ expected

@@ -1,7 +1,6 @@
 """A position on the emulated Pico, with its floats of 32 bits and small integers of 31: from the wire to the block."""
 
 import pytest
-from emulated import modules, pico
 from kickstand_tools.rides import block_reader
 from kickstand_tools.simulated_board.gps import sentence
 
@@ -42,9 +41,8 @@ print("".join("%%02x" %% byte for byte in block.buffer[:512]))
 """
 
 
-def test_a_position_is_exact_on_the_chip_quick_and_takes_little_heap():
-    with pico(files=modules()) as device:
-        costs, block = device.exec(_RUN % TEXT.encode(), 20.0).split("\n")[:2]
+def test_a_position_is_exact_on_the_chip_quick_and_takes_little_heap(at_prompt):
+    costs, block = at_prompt.exec(_RUN % TEXT.encode(), 20.0).split("\n")[:2]
     turn = block_reader.parse(bytes.fromhex(block.strip())).turns[0]
     assert turn.place == block_reader.Place(-89.0 - 59.99999 / 60, -179.0 - 59.99998 / 60, 1_798_761_599.97)
     took_us, heap = map(int, costs.split())

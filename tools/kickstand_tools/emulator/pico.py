@@ -4,12 +4,11 @@ from collections.abc import Callable
 from typing import Any
 
 from . import flash_image, image
-from .board import EmulatedBoard
+from .board import EmulatedBoard, EmulatedClock
 from .chip import Chip
-from .clock import EmulatedClock
+from .console import QuietConsole
 from .flash_memory import PowerCut
 from .i2c_wires import Wires
-from .quiet_usb import QuietConsole
 
 _LEVEL = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _CTRL_A, _CTRL_C, _CTRL_D = b"\x01", b"\x03", b"\x04"
