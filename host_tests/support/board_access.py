@@ -24,9 +24,7 @@ def read(chip, register, count=1):
     chip.start(chip.address, False)
     chip.write_byte(register)
     chip.start(chip.address, True)
-    values = [chip.read_byte() for _ in range(count)]
-    chip.stop()
-    return values
+    return [chip.read_byte() for _ in range(count)]
 
 
 def write(chip, register, *values):
@@ -35,7 +33,6 @@ def write(chip, register, *values):
     chip.write_byte(register)
     for value in values:
         chip.write_byte(value)
-    chip.stop()
 
 
 def counts(chip):

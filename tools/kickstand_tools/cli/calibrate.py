@@ -15,9 +15,9 @@ from ..calibration.drive import DriveFit, fit_drive
 from ..calibration.file import CalibrationFile, read_calibration, write_calibration
 from ..calibration.poses import refuse_same_file
 from ..calibration.remarks import remarks
-from ..calibration.ride.fit import RideFit, fit_ride
 from ..calibration.six import GOOD_FREE_POSE_G, SixPositions, fit_six_positions
 from ..calibration.two import TwoPositions, fit_two_positions
+from ..estimation.alignment import RideFit, fit_ride
 from ..logs.reader import read_log
 from ..output import check_output
 from ..progress import Bar

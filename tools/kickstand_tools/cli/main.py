@@ -3,60 +3,58 @@
 import importlib
 import pkgutil
 import sys
-from typing import Any
 
 import click
 
 from ..errors import InputError, cause
 
-_CLI = __name__.rpartition(".")[0] + "."
 # name: (the module of its function name_command, a line of help). Modules are imported when a command runs: most take
 # numpy, which takes its time
 COMMANDS = {
-    "calibrate": (_CLI + "calibrate", "Compute a calibration from recorded poses or drives."),
-    "cut": (_CLI + "ride", "Cut a stretch out of a log."),
-    "demo": (_CLI + "without_a_board", "The firmware on a simulated board, in the terminal."),
-    "emulate": (_CLI + "without_a_board", "An emulated Pico that flash can deploy to."),
-    "export": (_CLI + "ride", "Write a ride for another program."),
-    "flash": (_CLI + "board", "Copy the firmware to a board, and start it."),
-    "fleet": (_CLI + "fleet", "Align many vehicles, find moved mounts, test their brakes."),
-    "import": (_CLI + "ride", "Make a log of a recording of another app or logger."),
-    "join": (_CLI + "ride", "Put a phone's or a watch's track to a ride without GPS."),
-    "overlay": (_CLI + "ride", "Draw the lean over a video of the ride."),
-    "plot": (_CLI + "ride", "Draw a ride, as a picture and as a page to zoom into."),
-    "pull": (_CLI + "board", "Fetch the rides that a board has recorded."),
-    "record": (_CLI + "board", "Write a log live over USB."),
-    "replay": (_CLI + "ride", "Find the lean as the firmware shows it during the ride."),
-    "report": (_CLI + "ride", "Print maxima, time at large leans, and brake tests."),
-    "simulate": (_CLI + "simulated", "Make up a ride with its true lean, or drives of a fleet."),
-    "smooth": (_CLI + "ride", "Find the lean afterwards, from the whole ride."),
-    "status": (_CLI + "board", "Ask a board for versions, settings, sensor and calibration."),
-    "web": (_CLI + "without_a_board", "Open the lean meter's pages in the browser."),
+    "calibrate": (".calibrate", "Compute a calibration from recorded poses or drives."),
+    "cut": (".ride", "Cut a stretch out of a log."),
+    "demo": (".without_a_board", "The firmware on a simulated board, in the terminal."),
+    "emulate": (".without_a_board", "An emulated Pico that flash can deploy to."),
+    "export": (".ride", "Write a ride for another program."),
+    "flash": (".board", "Copy the firmware to a board, and start it."),
+    "fleet": (".fleet", "Align many vehicles, find moved mounts, test their brakes."),
+    "import": (".ride", "Make a log of a recording of another app or logger."),
+    "join": (".ride", "Put a phone's or a watch's track to a ride without GPS."),
+    "overlay": (".ride", "Draw the lean over a video of the ride."),
+    "plot": (".ride", "Draw a ride, as a picture and as a page to zoom into."),
+    "pull": (".board", "Fetch the rides that a board has recorded."),
+    "record": (".board", "Write a log live over USB."),
+    "replay": (".ride", "Find the lean as the firmware shows it during the ride."),
+    "report": (".ride", "Print maxima, time at large leans, and brake tests."),
+    "simulate": (".simulated", "Make up a ride with its true lean, or drives of a fleet."),
+    "smooth": (".ride", "Find the lean afterwards, from the whole ride."),
+    "status": (".board", "Ask a board for versions, settings, sensor and calibration."),
+    "web": (".without_a_board", "Open the lean meter's pages in the browser."),
 }
 
 
-class Commands(click.Group):
-    """COMMANDS, and the `COMMANDS` of each installed package that is named kickstand_..."""
+def _commands() -> dict[str, tuple[str, str]]:
+    """COMMANDS, and those that other packages named kickstand_... add: their COMMANDS, in the same form."""
+    found = dict(COMMANDS)
+    for package in pkgutil.iter_modules():
+        if package.name.startswith("kickstand_") and package.name != __name__.partition(".")[0]:
+            found |= getattr(importlib.import_module(package.name), "COMMANDS", {})
+    return dict(sorted(found.items()))
 
-    def __init__(self, **more: Any) -> None:
-        super().__init__(**more)
-        here = __name__.partition(".")[0]
-        names = {package.name for package in pkgutil.iter_modules() if package.name.startswith("kickstand_")} - {here}
-        self._all = dict(COMMANDS)
-        for name in names:
-            self._all.update(importlib.import_module(name).COMMANDS)
+
+class Commands(click.Group):
+    """The commands of COMMANDS and of other packages."""
 
     def list_commands(self, ctx: click.Context | None) -> list[str]:
-        return sorted(self._all)
+        return list(_commands())
 
     def get_command(self, ctx: click.Context | None, cmd_name: str) -> click.Command | None:
-        if cmd_name not in self._all:
-            return None
-        return getattr(importlib.import_module(self._all[cmd_name][0]), f"{cmd_name}_command")
+        module, _ = _commands().get(cmd_name, (None, None))
+        return getattr(importlib.import_module(module, __package__), f"{cmd_name}_command") if module else None
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
-            formatter.write_dl([(name, self._all[name][1]) for name in sorted(self._all)])
+            formatter.write_dl([(name, words) for name, (_, words) in _commands().items()])
 
 
 @click.group(

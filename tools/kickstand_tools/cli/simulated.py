@@ -16,12 +16,11 @@ LINES_S = 10.0  # between two lines of progress where there is no terminal for a
 PROFILE_NAMES = f"{', '.join(MAIN)}; hard ones: {', '.join(name for name in PROFILES if name not in MAIN)}."
 
 
-def riding_seconds(least: float, words: str) -> Command:
-    """The option --seconds."""
+def seconds_option(least: float, words: str) -> Command:
     return click.option("--seconds", type=click.FloatRange(least, 7200.0), default=640.0, help=words)
 
 
-def poses(pitch_change_deg: float | None, words: str) -> Command:
+def pose_options(pitch_change_deg: float | None, words: str) -> Command:
     """What is not as it should be in the two poses."""
 
     def add(command: Command) -> Command:
@@ -36,8 +35,8 @@ def poses(pitch_change_deg: float | None, words: str) -> Command:
 @click.command()
 @click.option("--profile", help=PROFILE_NAMES)
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Another seed, another ride.")
-@riding_seconds(20.0, "Of riding; start and stop come on top.")
-@poses(None, "Between the poses, degrees; at random if not given.")
+@seconds_option(20.0, "Of riding; start and stop come on top.")
+@pose_options(None, "Between the poses, degrees; at random if not given.")
 @click.option("--speed", is_flag=True, help="Write what a GPS receiver gives into the log: speed, position, time.")
 @click.option(
     "--fleet",

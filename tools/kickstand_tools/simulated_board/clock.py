@@ -112,3 +112,37 @@ class Clock:
             self._host_lead_us += late
         self._pace_us = self.now_us + _PACE_STEP_US
         self._plan()
+
+
+class Watchdog:
+    """Raises Reset if it is not fed in time, from within the call that lets the time pass. clock: a Clock."""
+
+    def __init__(self, clock):
+        self._clock = clock
+        self._timeout_us = 0
+        self._due_us = 0
+        self._round = 0  # counts start() and stop(): checks that an earlier start() has scheduled do nothing
+
+    def start(self, timeout_us):
+        """From now on feed() must be called within timeout_us."""
+        self._timeout_us = timeout_us
+        self._round += 1
+        self.feed()
+        self._check_later(self._round)
+
+    def stop(self):
+        """Feeding is no longer needed."""
+        self._round += 1
+
+    def feed(self):
+        """Start the time-out again."""
+        self._due_us = self._clock.now_us + self._timeout_us
+
+    def _check_later(self, number):
+        def check():
+            if number == self._round:
+                if self._clock.now_us >= self._due_us:
+                    raise Reset
+                self._check_later(number)
+
+        self._clock.at(self._due_us, check)

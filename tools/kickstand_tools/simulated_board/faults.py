@@ -8,10 +8,10 @@ import errno
 import io
 
 from .clock import PowerOff, to_us
-from .fakes.files import ErasedFile, FailingFile
 from .i2c import TransferFault
 
 _FOREVER = 1 << 60  # a number of transfers
+_BLOCK = 4096  # bytes of flash that are erased at once
 _STALL_S = 0.5  # that a print waits for a host which takes nothing (shared/tinyusb/mp_usbd_cdc.h of MicroPython)
 
 
@@ -53,10 +53,7 @@ class Faults:
     def cut(self, address, at_s, byte):
         """The first transfer to address after at_s that has so many bytes breaks off at byte `byte`."""
 
-        def begin():
-            self._transfers("cut", address, 1, _FOREVER, byte, read=False)
-
-        self._board.at(at_s, begin)
+        self._board.at(at_s, lambda: self._transfers("cut", address, 1, _FOREVER, byte, read=False))
 
     def stuck_sda(self, at_s, bits=8, lcd=False):
         """A device on the sensor's bus (lcd: on the display's) holds SDA low until SCL was clocked `bits` times."""
@@ -87,15 +84,11 @@ class Faults:
 
     def unplug_sensor(self, at_s, for_s=None):
         """The sensor is disconnected, for good or for for_s; then it starts as after power-on."""
-        self._board.at(at_s, self._board.remove_sensor)
-        if for_s is not None:
-            self._board.at(at_s + for_s, self._board.fit_sensor)
+        self._between(at_s, for_s, self._board.remove_sensor, self._board.fit_sensor)
 
     def unplug_lcd(self, at_s, for_s=None):
         """The display is disconnected, for good or for for_s; then it starts as after power-on."""
-        self._board.at(at_s, self._board.remove_lcd)
-        if for_s is not None:
-            self._board.at(at_s + for_s, self._board.fit_lcd)
+        self._between(at_s, for_s, self._board.remove_lcd, self._board.fit_lcd)
 
     def lcd_slip(self, at_s):
         """A spike on E shifts the display's pairing of nibbles by one."""
@@ -103,13 +96,11 @@ class Faults:
 
     def wheel_storm(self, at_s, for_s, pulses_per_s):
         """An ignition cable induces pulses in the cable of the wheel contact."""
-        wheel = self._board.wheel
 
         def set_to(pulses_per_s):
-            wheel.noise_hz = pulses_per_s
+            self._board.wheel.noise_hz = pulses_per_s
 
-        self._board.at(at_s, lambda: set_to(pulses_per_s))
-        self._board.at(at_s + for_s, lambda: set_to(0))
+        self._between(at_s, for_s, lambda: set_to(pulses_per_s), lambda: set_to(0))
 
     def busy(self, at_s, for_s, times=1):
         """Something else takes all of the processor's time for for_s, `times` times with 30 ms between them."""
@@ -126,11 +117,8 @@ class Faults:
     def disk_full(self, at_s, for_s):
         """Nothing can be written to a file."""
 
-        def begin():
-            self._replace_open(lambda file, path: FailingFile(file, 0, OSError(errno.ENOSPC)))
-
-        self._board.at(at_s, begin)
-        self._board.at(at_s + for_s, self.restore_files)
+        full = self._writing(lambda file, path: _FailingFile(file, 0, OSError(errno.ENOSPC)))
+        self._between(at_s, for_s, lambda: self._replace_open(full), self.restore_files)
 
     def cut_file(self, ending, length):
         """The supply is cut when `length` bytes of the next file with this ending are written. Then files_cut is 1."""
@@ -139,9 +127,9 @@ class Faults:
             if not path.endswith(ending):
                 return file
             self.files_cut += 1
-            return FailingFile(file, length, PowerOff())
+            return _FailingFile(file, length, PowerOff())
 
-        self._replace_open(wrap)
+        self._replace_open(self._writing(wrap))
 
     def file_error(self, ending, at_s, for_s):
         """Files whose name has this ending cannot be opened for reading."""
@@ -157,11 +145,8 @@ class Faults:
         def erase():
             self._board.clock.advance(to_us(erase_s))
 
-        def opened(real, path, mode="r", *more, **named):
-            file = real(path, mode, *more, **named)
-            return ErasedFile(file, erase) if "w" in mode else file
-
-        self._opened_by(at_s, for_s, opened)
+        slow = self._writing(lambda file, path: _ErasedFile(file, erase))
+        self._between(at_s, for_s, lambda: self._replace_open(slow), self.restore_files)
 
     def restore_files(self):
         """End the faults of the file system."""
@@ -169,16 +154,20 @@ class Faults:
             builtins.open = self._real_open
             self._real_open = None
 
-    def _replace_open(self, wrap):
-        """Files opened for writing become wrap(file, path)."""
+    def _replace_open(self, opened):
+        """From now on files are opened by opened(the real open(), its arguments)."""
         self.restore_files()
         self._real_open = real = builtins.open
+        builtins.open = lambda *arguments, **named: opened(real, *arguments, **named)
 
-        def opening(path, mode="r", *more, **named):
+    def _writing(self, wrap):
+        """For _replace_open(): files opened for writing become wrap(file, path)."""
+
+        def opened(real, path, mode="r", *more, **named):
             file = real(path, mode, *more, **named)
             return wrap(file, str(path)) if "w" in mode else file
 
-        builtins.open = opening
+        return opened
 
     # On USB
 
@@ -189,8 +178,7 @@ class Faults:
             self._real_print = builtins.print
             builtins.print = lambda *_, **__: self._board.clock.advance(to_us(_STALL_S))
 
-        self._board.at(at_s, begin)
-        self._board.at(at_s + for_s, self.restore_print)
+        self._between(at_s, for_s, begin, self.restore_print)
 
     def restore_print(self):
         """End usb_asleep()."""
@@ -208,8 +196,15 @@ class Faults:
             bus.faults.append(TransferFault(kind, address, 0, _FOREVER, to_us(at_s), to_us(at_s + for_s)))
 
     def _override(self, at_s, for_s, value):
-        self._board.at(at_s, lambda: self._board.sensor.override(value))
-        self._board.at(at_s + for_s, lambda: self._board.sensor.override(None))
+        self._between(
+            at_s, for_s, lambda: self._board.sensor.override(value), lambda: self._board.sensor.override(None)
+        )
+
+    def _between(self, at_s, for_s, begin, end):
+        """begin() at at_s, and end() for_s later (None: never)."""
+        self._board.at(at_s, begin)
+        if for_s is not None:
+            self._board.at(at_s + for_s, end)
 
     def _files(self, ending, at_s, for_s, empty):
         def failing(real, path, mode="r", *more, **named):
@@ -219,15 +214,52 @@ class Faults:
                 raise OSError(errno.EIO)
             return io.BytesIO() if "b" in mode else io.StringIO()
 
-        self._opened_by(at_s, for_s, failing)
+        self._between(at_s, for_s, lambda: self._replace_open(failing), self.restore_files)
 
-    def _opened_by(self, at_s, for_s, opened):
-        """For for_s files are opened by opened(the real open(), its arguments)."""
 
-        def begin():
-            self.restore_files()
-            self._real_open = real = builtins.open
-            builtins.open = lambda *arguments, **named: opened(real, *arguments, **named)
+class _Wrapped:
+    """What the two below leave to the file itself."""
 
-        self._board.at(at_s, begin)
-        self._board.at(at_s + for_s, self.restore_files)
+    def __init__(self, file):
+        self._file = file
+
+    def __getattr__(self, name):
+        return getattr(self._file, name)
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self._file.close()
+
+
+class _ErasedFile(_Wrapped):
+    """A file that is written to flash: erase() is called for each block that it begins."""
+
+    def __init__(self, file, erase):
+        super().__init__(file)
+        self._erase = erase
+        self._room = 0  # bytes that are left in the block
+
+    def write(self, data):
+        self._room -= len(data)
+        while self._room < 0:
+            self._erase()
+            self._room += _BLOCK
+        return self._file.write(data)
+
+
+class _FailingFile(_Wrapped):
+    """A file of which `length` bytes can be written, then `error` is raised."""
+
+    def __init__(self, file, length, error):
+        super().__init__(file)
+        self._left, self._error = length, error
+
+    def write(self, data):
+        count = self._file.write(data[: self._left])
+        self._left -= count
+        if count < len(data):
+            self._file.flush()
+            raise self._error
+        return count

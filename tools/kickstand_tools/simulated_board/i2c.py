@@ -139,7 +139,7 @@ class Bus:
 
     def read_into(self, buf):
         """Fill buf with what read_byte() returns."""
-        if self._device is not None and self._fault is None:
+        if self._device is not None and self._fault is None and hasattr(self._device, "read_into"):
             self._device.read_into(buf)
             return
         for i in range(len(buf)):
@@ -147,8 +147,6 @@ class Bus:
 
     def stop(self):
         """STOP: the transfer is over."""
-        if self._device is not None:
-            self._device.stop()
         self._device = self._fault = None
         self.open = False
 

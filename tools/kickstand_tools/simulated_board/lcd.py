@@ -115,14 +115,6 @@ class Lcd:
             status <<= 4
         return (port & 0x0F) | (status & 0xF0)
 
-    def read_into(self, buf):
-        """Fill buf with what read_byte() returns."""
-        for i in range(len(buf)):
-            buf[i] = self.read_byte()
-
-    def stop(self):
-        """STOP."""
-
     # The controller
 
     def _latch(self, port):

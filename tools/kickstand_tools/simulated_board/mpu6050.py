@@ -111,15 +111,12 @@ class Mpu6050:
         return value
 
     def read_into(self, buf):
-        """Fill buf with what read_byte() returns."""
+        """Fill buf with what read_byte() returns, quickly."""
         if self._pointer == reg.FIFO_R_W:
             self.fifo.pop_into(buf)
             return
         for i in range(len(buf)):
             buf[i] = self.read_byte()
-
-    def stop(self):
-        """STOP."""
 
     # Registers
 

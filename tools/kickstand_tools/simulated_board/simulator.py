@@ -9,16 +9,15 @@ Within the `with` statement `machine` is the board's, and `time` and `os` too. I
 """
 
 from .button import Button
-from .clock import Clock, PowerOff, Reset, to_us
+from .clock import Clock, PowerOff, Reset, Watchdog, to_us
 from .fakes import chips, fake_machine, fake_time
 from .fakes.installer import Installer
-from .fakes.sd_card import SdCard
 from .faults import Faults
 from .gps import Gps
 from .i2c import Bus
 from .lcd import Lcd
 from .mpu6050 import Mpu6050
-from .watchdog import Watchdog
+from .sd_card import SdCard
 from .wheel import Wheel
 
 __all__ = ["Board", "PowerOff", "Reset"]

@@ -1,4 +1,4 @@
-"""The commands that the workshop adds to `kickstand`: evaluate, which judges the lean on many rides, and bench."""
+"""The commands that the workshop adds to `kickstand`: evaluate and bench."""
 
 import contextlib
 import json
@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 from kickstand_tools.cli.common import JSON, PATH, warn
-from kickstand_tools.cli.simulated import LINES_S, PROFILE_NAMES, poses, riding_seconds
+from kickstand_tools.cli.simulated import LINES_S, PROFILE_NAMES, pose_options, seconds_option
 from kickstand_tools.emulator import image, native
 from kickstand_tools.errors import extra
 from kickstand_tools.output import check_directory, new_directory
@@ -24,8 +24,8 @@ _WIDTH = 110  # columns of a table that is not printed to a terminal
 @click.command()
 @click.option("--profiles", default=",".join(MAIN), help=f"With commas between: {PROFILE_NAMES}")
 @click.option("--seeds", type=click.IntRange(min=1), default=3, help="Rides of each profile.")
-@riding_seconds(60.0, "Of riding, each; start and stop come on top.")
-@poses(1.0, "Between the two poses, degrees.")
+@seconds_option(60.0, "Of riding, each; start and stop come on top.")
+@pose_options(1.0, "Between the two poses, degrees.")
 @click.option("--recording", type=PATH, help="A recorded ride with speed to compare on too.")
 @click.option("--out", type=PATH, help="Write evaluation.json and lean.png to this directory.")
 @JSON

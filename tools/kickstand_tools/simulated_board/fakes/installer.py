@@ -1,10 +1,11 @@
-"""Puts the fakes in the place of `machine`, `time` and `os`, and puts the real modules back."""
+"""Puts the fakes in the place of `machine`, `time` and `os`, and of `sys` where the board is another than the one that
+the firmware was imported for; and puts the real modules back."""
 
 import os
 import sys
 import time
 
-from . import current, fake_machine, fake_os, fake_sys, fake_time
+from . import fake_machine, fake_os, fake_time
 
 _ADDED_TO = ((time, fake_time), (os, fake_os))  # under CPython
 
@@ -17,13 +18,13 @@ class Installer:
 
     def install(self, board):
         """From now on `machine`, `time` and `os` are those of this simulator.Board."""
-        current.use(board)
+        fake_machine.use(board)
         fake_time.use(board.clock, board.clock.now_us)
         self._replace("machine", fake_machine)
         if board.port == "esp32":
-            self._replace("esp32", fake_sys.Esp32)
+            self._replace("esp32", _Esp32)
         if board.poses:
-            self._replace("sys", fake_sys.posing(board.port, board.machine))
+            self._replace("sys", _posing(board.port, board.machine))
         if board.card and board.card.driver:
             from . import sdcard
 
@@ -57,3 +58,33 @@ class Installer:
         if name not in self._real:
             self._real[name] = sys.modules.get(name)
         sys.modules[name] = module
+
+
+class _Namespace:
+    """What MicroPython takes for a module."""
+
+
+class _Esp32:
+    """The module esp32 of a board whose heap has room."""
+
+    HEAP_DATA = 4
+
+    @staticmethod
+    def idf_heap_info(capabilities):
+        """One region of ESP-IDF's heap: its size, and how much of it is free, in one piece, and at the least."""
+        return [(160_000, 0, 0, 0)]
+
+
+def _posing(port, machine):
+    """A module sys. port: its platform.  machine: its implementation._machine, as in chips.MACHINES."""
+    real = {name: getattr(sys, name) for name in dir(sys) if not name.startswith("__")}
+    of = sys.implementation
+    implementation = _filled(_Namespace(), {"name": of.name, "version": of.version, "_machine": machine})
+    module = _Namespace() if of.name == "micropython" else type(sys)("sys")
+    return _filled(_filled(module, real), {"platform": port, "implementation": implementation})
+
+
+def _filled(made, attributes):
+    for name, value in attributes.items():
+        setattr(made, name, value)
+    return made

@@ -1,8 +1,9 @@
-"""Stands in for micropython-lib's driver `sdcard`: the same interface, and the same faults.
-
-Its write() returns without a word when the card rejects the data, its wait for a busy card has no limit, and its clock
-is 1.32 MHz unless told otherwise.
+"""Stands in for micropython-lib's driver `sdcard`, with the same interface. write() and write_token(), in which that
+driver has faults, are left out: the firmware brings its own (kickstand/board/spi_card.py).
 """
+
+# pyright: reportAttributeAccessIssue=false
+# the time is MicroPython's, and the methods that are left out are a subclass's
 
 import time
 
@@ -27,7 +28,7 @@ class SDCard:
         if self.cmd(8, 0x1AA, 4) != 1:
             raise OSError("couldn't determine SD card version")
         for _ in range(_TRIES):
-            time.sleep_ms(50)  # pyright: ignore[reportAttributeAccessIssue]
+            time.sleep_ms(50)
             self.cmd(58, 0, 4)
             self.cmd(55, 0)
             if self.cmd(41, 0x40000000) == 0:
@@ -42,12 +43,10 @@ class SDCard:
         self.cmd(16, 512)
         self.spi.init(baudrate=baudrate, phase=0, polarity=0)
 
-    def cmd(self, cmd, arg, final=0, release=True, skip1=False):
+    def cmd(self, cmd, arg, final=0, release=True):
         """Send a command; return the first byte of its answer, -1 for none."""
         self.cs(0)
         self.spi.write(bytes([0x40 | cmd]) + arg.to_bytes(4, "big") + b"\x95")
-        if skip1:
-            self.spi.read(1, 0xFF)
         for _ in range(_TRIES):
             response = self.spi.read(1, 0xFF)[0]
             if not response & 0x80:
@@ -64,32 +63,12 @@ class SDCard:
         for _ in range(_TRIES):
             if self.spi.read(1, 0xFF)[0] == 0xFE:
                 break
-            time.sleep_ms(1)  # pyright: ignore[reportAttributeAccessIssue]
+            time.sleep_ms(1)
         else:
             self._release()
             raise OSError("timeout waiting for response")
         self.spi.write_readinto(b"\xff" * len(buf), buf)
         self.spi.write(b"\xff\xff")
-        self._release()
-
-    def write(self, token, buf):
-        """Write a sector, or what a card that rejects it makes of that."""
-        self.cs(0)
-        self.spi.read(1, token)
-        self.spi.write(buf)
-        self.spi.write(b"\xff\xff")
-        if self.spi.read(1, 0xFF)[0] & 0x1F == 0x05:
-            while self.spi.read(1, 0xFF)[0] == 0:
-                pass
-        self._release()
-
-    def write_token(self, token):
-        """End the writing of several sectors."""
-        self.cs(0)
-        self.spi.read(1, token)
-        self.spi.write(b"\xff")
-        while self.spi.read(1, 0xFF)[0] == 0:
-            pass
         self._release()
 
     def readblocks(self, block_num, buf):
