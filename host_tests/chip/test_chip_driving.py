@@ -11,7 +11,7 @@ from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
 pytestmark = pytest.mark.chip
 
-# mount, clock, elapsed and allocated are given; each update does one piece of the work, so that all are timed alike
+# mount, clock, elapsed and allocated are given; each update does one step of the work, so that all are timed alike
 _DRIVE = """
 from kickstand.drive_alignment import alignment
 from kickstand.rotation import matrix

@@ -9,7 +9,7 @@ pytestmark = pytest.mark.chip
 
 SAVES = 16  # littlefs writes a page at a time, and goes on to a block that it erases at every fifteenth save
 
-# The gyro bias about x tells the calibrations apart
+# The calibrations differ in the gyro bias about x
 _TOOLS = """
 from kickstand.calibration.store import Store
 def bias():

@@ -149,7 +149,7 @@ def test_wherever_the_power_goes_all_but_the_last_block_is_kept(at_prompt):
     assert len(rides(flash_image.read(states[-1][0]))[1]) >= 4
 
 
-@pytest.mark.parametrize("operation", [2, 20, 37])
+@pytest.mark.parametrize("operation", [2, 37])
 def test_a_board_records_again_after_a_cut(at_prompt, operation):
     at_prompt.exec(_FEED)
     at_prompt.chip.flash.cut_power(operation, 0.5)

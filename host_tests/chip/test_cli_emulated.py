@@ -12,7 +12,7 @@ import types
 import command
 import pytest
 from emulated import calibrated, firmware, pico
-from kickstand_tools.deploy import bytecode
+from kickstand_tools.deploy import bytecode, connection
 from kickstand_tools.emulator import image
 from kickstand_tools.errors import InputError
 from mpremote import transport_serial
@@ -89,7 +89,8 @@ def test_flash_and_status_on_the_emulated_pico(monkeypatch):
         address = re.search(r"socket://\S+?:\d+", emulating.said.get())
         assert address
         clock = types.SimpleNamespace(monotonic=emulating.time_s, sleep=lambda seconds: time.sleep(seconds / 10))
-        monkeypatch.setattr(transport_serial, "time", clock)
+        for module in (transport_serial, connection):
+            monkeypatch.setattr(module, "time", clock)
         flashed = command.works("flash", "--port", address[0]).out
         assert f"Raspberry Pi Pico with RP2040, MicroPython 1.26.1 on {address[0]}" in flashed
         assert "kept: config.py" in flashed

@@ -18,7 +18,7 @@ THERE = [name for name in estimators.OTHERS if estimators.PACKAGES.get(name) not
 
 
 def leaned(lean_deg: float, roll_s: float = 1.5) -> Samples:
-    """A bike at rest leaned slowly from upright to lean_deg, then held as long: no turn, no doubt."""
+    """A bike at rest leaned slowly from upright to lean_deg, then held as long: no turn."""
     n = int(roll_s * 200)
     lean = np.radians(np.concatenate((np.linspace(0.0, lean_deg, n), np.full(n, lean_deg))))
     rate = np.zeros((2 * n, 3))

@@ -71,7 +71,7 @@ def begun(pause_s: float) -> tuple[int, str]:
 
 
 def leaning(lean_deg: float) -> Callable[[float], tuple]:
-    """What PART feels on a bike that is held at this lean."""
+    """What PART reads on a bike that is held at this lean."""
     return PART.world(Ride([upright(1e6, lean_deg=lean_deg)]).motion)
 
 

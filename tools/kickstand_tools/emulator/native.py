@@ -58,7 +58,7 @@ def build() -> bool:
         return True
     if sys.platform != "linux" or not compiler or not Path(sysconfig.get_path("include"), "Python.h").is_file():
         return False
-    with contextlib.suppress(OSError):  # no room, no such folder, or another process was first
+    with contextlib.suppress(OSError):  # a full disk, a read-only home, or another process was first
         wanted.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=wanted.parent) as made:
             if _compile(compiler, Path(made)):

@@ -43,7 +43,7 @@ class Pico:
         self.board.button.changed = self._button_changed
         self.console = QuietConsole(self.chip.rp2040.usb_ctrl, self._received)
         self.said = bytearray()  # what the board printed
-        self.heard: Callable[[bytes], None] | None = None  # called with each piece of it
+        self.heard: Callable[[bytes], None] | None = None  # called with each part of it
         self.powered = False
         self._awaited = b""
         self._raw = False  # True while its console is in the raw REPL

@@ -16,7 +16,7 @@ _STRAIGHT_DPS, _STRAIGHT_DEG, _STRAIGHT_MPS, _STRAIGHT_S = 2.0, 6.0, 5.0, 1.0
 
 @dataclass
 class Score:
-    """Errors in degrees. slope: shown over true lean. lag: > 0 if shown late. NaN where the ride does not tell."""
+    """Errors in degrees. slope: shown over true lean. lag: > 0 if shown late. NaN where not observable."""
 
     rms_deg: float
     p95_deg: float  # 95 % of the absolute errors are smaller
