@@ -186,7 +186,7 @@ def report_command(
     """A ride in a page: maxima, time at large leans, and each stop as a brake test has it."""
     with Bar("reading") as bar:
         seen = overview(open_ride(_part(ride, from_s, to_s), calibration, smoothed=not live), bar.reach)
-    warn(ride, [*seen.notices, *([seen.exchanged] if seen.exchanged else [])])
+    warn(ride, seen.notices)
     if as_json:
         click.echo(json.dumps(as_data(seen)))
     else:
@@ -218,7 +218,6 @@ def plot_command(
     with spinner("drawing"):
         written = list(plot.draw(seen, out, tiles))
     print_lines(f"written: {path}" for path in written)
-    warn(ride, [seen.exchanged] if seen.exchanged else [])
 
 
 @click.command()

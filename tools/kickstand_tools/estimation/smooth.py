@@ -16,7 +16,6 @@ from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import Progress, name_of
 from ..logs.stretch import within
 from ..logs.table import Array, Table
-from ..replay.mount_check import MountCheck
 from .equations import corrected_rates
 from .hypotheses import ALL
 from .least_squares import Estimate
@@ -90,17 +89,12 @@ def smooth_to_csv(
 def _checked_blocks(
     log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
 ) -> Iterator[tuple[Block, Array]]:
-    """smooth_blocks(), and what contradicts the calibration."""
-    mount = MountCheck(calibration)
+    """smooth_blocks() of the stretch that is wanted."""
     whole, stretch = apart(log)
     for block, found in smooth_blocks(whole, calibration, progress, notices):
         if found is None:
             raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples a second: too few to look back over")
-        believed = block.measured
-        mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
         yield from within(stretch, block, found)
-    contradiction = mount.notice()
-    notices += [contradiction] if contradiction else []
 
 
 def smooth_blocks(
@@ -116,7 +110,7 @@ def smooth_blocks(
     past: deque[Block] = deque(maxlen=CHAPTER)
     waiting: list[Block] = []
     start_c = np.nan
-    for piece in _pieces(read_blocks(log, 2, progress, notices, lines=lines)):
+    for piece in _pieces(read_blocks(log, 2, progress, notices, lines=lines, calibration=calibration)):
         waiting.append(piece)
         known = piece.readings[~np.isnan(piece.readings[:, 3]), 3]
         start_c = float(known[0]) if np.isnan(start_c) and len(known) else start_c

@@ -106,12 +106,11 @@ def look(log, calibration, tell):
     without suffixes}. tell(done, total): the progress."""
     ride = open_ride(Path(log), Path(calibration), smoothed=True)
     seen = overview(ride, tell)
-    notices = [*seen.notices, *([seen.exchanged] if seen.exchanged else [])]
     table = {"units": report.STOPS_UNITS, "title": report.STOPS_TITLE, "terms": report.STOPS_TERMS}
     return {
         "words": asdict(report.words(seen, PAGE)) | table,
         "json": report.as_data(seen) | {"ride": Path(log).name},
-        "warnings": [sentence(notice, PAGE) for notice in notices],
+        "warnings": [sentence(notice, PAGE) for notice in seen.notices],
         "page": page(seen, f'<script src="{PLOTLY}"></script>', "'self'"),
         "plotly": PLOTLY,
         "stem": ride.stem,

@@ -1,7 +1,7 @@
-"""A track's course and speed in pieces of half a minute, which are compared with a ride's one by one.
+"""A track's course and speed in segments of half a minute, which are compared with a ride's one by one.
 
-Within a piece only changes count: its mean and its slope are taken off. What is left of a gyro's bias, the direction in
-which the ride began and the hills do not matter then.
+Within a segment only changes count: its mean and its trend are taken off. What is left of a gyro's bias, the direction
+in which the ride began and the hills do not matter then.
 """
 
 from dataclasses import dataclass
@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 from ..logs.table import Array
 from .course import Course
 
-STEPS = 30  # of a piece at most
-_FEWEST = 8  # a piece of fewer steps tells little
+STEPS = 30  # of a segment at most
+_FEWEST = 8  # a segment of fewer steps shows little
 
 
 @dataclass
-class Pieces:
-    """p pieces of up to STEPS good steps in a row, all (p, STEPS); weights are 0 where a piece is shorter.
+class Segments:
+    """p segments of up to STEPS good steps in a row, all (p, STEPS); weights are 0 where a segment is shorter.
 
     begin_s, end_s: of each step, s since the track's first point. turned_deg: by how much the course of each step is to
-    the left of the piece's first one. course_weight: 1/deg2. speed_mps; speed_weight: 1 or 0. The first and the last
-    of these have no mean and no slope.
+    the left of the segment's first one. course_weight: 1/deg2. speed_mps; speed_weight: 1 or 0. The first and the last
+    of these have no mean and no trend.
     """
 
     begin_s: Array
@@ -37,13 +37,13 @@ class Pieces:
         """(p, STEPS) of each step."""
         return (self.begin_s + self.end_s) / 2.0
 
-    def part(self, which: NDArray[np.bool_]) -> "Pieces":
-        """The pieces for which an array of p is True."""
+    def part(self, which: NDArray[np.bool_]) -> "Segments":
+        """The segments for which an array of p is True."""
         arrays = self.begin_s, self.end_s, self.turned_deg, self.course_weight, self.speed_mps, self.speed_weight
-        return Pieces(*(array[which] for array in arrays))
+        return Segments(*(array[which] for array in arrays))
 
 
-def pieces(course: Course) -> Pieces:
+def segments(course: Course) -> Segments:
     """All of a course."""
     edges = np.diff(course.good.astype(int), prepend=0, append=0)
     rows = [
@@ -59,13 +59,13 @@ def pieces(course: Course) -> Pieces:
     turn[:, :1] = 0.0
     weight = there / course.sigma_deg[place] ** 2
     begin_s, end_s = course.begin_s[place], course.end_s[place]
-    made = Pieces(begin_s, end_s, np.cumsum(turn, axis=1), weight, course.speed_mps[place], there)
-    made.turned_deg = without_slope(made.turned_deg, weight, made.middle_s)
-    made.speed_mps = without_slope(made.speed_mps, there, made.middle_s)
+    made = Segments(begin_s, end_s, np.cumsum(turn, axis=1), weight, course.speed_mps[place], there)
+    made.turned_deg = without_trend(made.turned_deg, weight, made.middle_s)
+    made.speed_mps = without_trend(made.speed_mps, there, made.middle_s)
     return made
 
 
-def without_slope(values: Array, weight: Array, at_s: Array) -> Array:
+def without_trend(values: Array, weight: Array, at_s: Array) -> Array:
     """(p, STEPS) values less the straight line that fits each row best."""
     total = np.maximum(weight.sum(axis=1, keepdims=True), 1e-12)
     since = at_s - (weight * at_s).sum(axis=1, keepdims=True) / total

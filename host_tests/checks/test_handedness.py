@@ -5,10 +5,10 @@ import itertools
 import command
 import numpy as np
 import pytest
-from kickstand_tools.logs.axes.handedness import WAYS, Handedness
+from checked import cells_of, words
+from kickstand_tools.checks.handedness import EXCHANGES, better_exchange, handedness, liveliest
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.refusals import sentence
 from kickstand_tools.simulation.profiles import MAIN, PROFILES
 from kickstand_tools.simulation.ride import random_rotation, ride
 
@@ -35,25 +35,17 @@ def rides():
     return {name: simulated(name) for name in MAIN}
 
 
-def judged(log, accel=None, gyro=None, speed=True, block=1_000_000):
+def judged(log, accel=None, gyro=None, speed=True):
     """What is said of a log whose sensors' axes are exchanged and reversed by these matrices; "" for nothing."""
-    force = log.accel_g if accel is None else log.accel_g @ np.transpose(accel)
-    rate = log.gyro_dps if gyro is None else log.gyro_dps @ np.transpose(gyro)
-    mps = log.speed_mps if speed else np.full(len(log.t_s), np.nan)
-    found = Handedness()
-    for k in range(0, len(log.t_s), block):
-        part = slice(k, k + block)
-        found.add(log.t_s[part], force[part], rate[part], mps[part])
-    notice = found.notice()
-    return sentence(notice) if notice else ""
+    return words(handedness(cells_of(log, accel, gyro, speed)))
 
 
 @pytest.mark.parametrize(("profile", "speed"), [("street", False), ("city", True)])
 def test_all_48_ways_to_exchange_and_reverse_axes(rides, profile, speed):
     """Put on both sensors alike: the left-handed ones are remarked on, the right-handed ones are not."""
-    told = [judged(rides[profile], way, way, speed) for way in SIGNED]
-    for way, said in zip(SIGNED, told, strict=True):
-        assert (WRONG_WAY in said) == bool(said) == (np.linalg.det(way) < 0.0), (way, said)
+    told = [judged(rides[profile], exchange, exchange, speed) for exchange in SIGNED]
+    for exchange, said in zip(SIGNED, told, strict=True):
+        assert (WRONG_WAY in said) == bool(said) == (np.linalg.det(exchange) < 0.0), (exchange, said)
     assert sum(map(bool, told)) == 24
 
 
@@ -80,14 +72,10 @@ def test_other_rates_biases_and_lengths_do_not_accuse(rides, profile):
         assert judged(cut) == "", (every, begin, seconds)
 
 
-def told_of(log, gyro=None, accel=None):
-    return judged(log, accel=accel, gyro=gyro)
-
-
 def test_the_remark_names_what_fits(rides):
     log = rides["sweeper"]
     swap = np.eye(3)[[1, 0, 2]]
-    for gyro, accel, words in (
+    for gyro, accel, line in (
         (np.diag([1, 1, -1]), None, "the rates are reversed about z; instead of gx, gy, gz right would be gx, gy, -gz"),
         (swap, None, "the rates about x and y are exchanged; instead of gx, gy, gz right would be gy, gx, gz"),
         (None, np.diag([1, -1, 1]), "reversed about x and z, or accelerations along y; "),
@@ -100,19 +88,19 @@ def test_the_remark_names_what_fits(rides):
         (MINUS, None, WRONG_WAY),
         (None, MINUS, None),  # the mirror image: motion cannot tell it
     ):
-        said = told_of(log, gyro, accel)
-        assert (words in said) if words else said == "", said
+        said = judged(log, accel, gyro)
+        assert (line in said) if line else said == "", said
 
 
 def test_axes_exchanged_in_one_sensor(rides):
-    """With a speed nearly all ways are seen (24 of the 47 are tried), and those that are have the right name."""
+    """With a speed nearly all exchanges are seen (24 of the 47 are tried), and those that are have the right name."""
     seen = 0
     log = rides["street"]
-    for way in WAYS[1::2]:
-        found = Handedness()
-        found.add(log.t_s, log.accel_g, log.gyro_dps @ way, log.speed_mps)  # way undoes it
-        place = found._best()
-        assert place is None or np.array_equal(WAYS[place], way)
+    for exchange in EXCHANGES[1::2]:
+        turning = liveliest(cells_of(log, gyro=exchange.T))  # exchange undoes it
+        assert turning is not None
+        place = better_exchange(turning)
+        assert place is None or np.array_equal(EXCHANGES[place], exchange)
         seen += place is not None
     assert seen >= 23
 
@@ -144,10 +132,8 @@ def test_a_phone_in_the_hand(seed):
     assert WRONG_WAY in judged(log, gyro=MINUS)
 
 
-def test_blocks_gaps_and_frozen_readings(rides):
+def test_gaps_and_frozen_readings(rides):
     log = rides["street"]
-    assert judged(log, gyro=MINUS, block=777) == judged(log, gyro=MINUS)
-    assert judged(log, block=777) == ""
     kept = (log.t_s % 30.0) < 25.0  # every half minute five seconds are missing
     gaps = Log(log.t_s[kept], log.accel_g[kept], log.gyro_dps[kept], log.speed_mps[kept])
     assert judged(gaps) == ""
@@ -155,14 +141,12 @@ def test_blocks_gaps_and_frozen_readings(rides):
     force, rate = log.accel_g.copy(), log.gyro_dps.copy()
     for k in range(1000, len(force) - 1500, 1500):  # and here they are what they were
         force[k : k + 400], rate[k : k + 400] = force[k], rate[k]
-    frozen = Log(log.t_s, force, rate, log.speed_mps)
-    assert judged(frozen) == ""
-    assert WRONG_WAY in judged(frozen, gyro=MINUS)
+    for sign, codes in (1.0, ["frozen-readings"]), (-1.0, ["frozen-readings", "left-handed"]):
+        read = read_log(Log(log.t_s, force, sign * rate, log.speed_mps))
+        assert [notice.code for notice in read.notices] == codes
 
 
 def test_too_little_to_tell():
-    empty = Handedness()
-    assert empty.notice() is None
     still = Log(np.arange(0.0, 60.0, 0.02), np.tile([0.0, 1.0, 0.0], (3000, 1)), np.zeros((3000, 3)))
     assert judged(still) == ""
     assert judged(hand(seconds=8.0), gyro=MINUS) == ""
@@ -187,48 +171,11 @@ def test_the_commands_say_so_in_one_line(tmp_path, rides):
     assert sum(each.startswith(line) for each in said) == 1
 
 
-class Found:
-    """What Turning says: so much is left of each window as it is, and with everything reversed."""
-
-    def __init__(self, as_it_is, reversed_all, unbiased=True):
-        self.left, self.unbiased = (np.array(as_it_is), np.array(reversed_all)), unbiased
-
-    def rough(self, ways):
-        return np.arange(48.0)
-
-    def unexplained(self, way):
-        return (
-            self.left[0] if way[0, 0] == 1.0 and np.trace(way) == 3.0 else self.left[1] * (1.0 + (np.trace(way) > -3.0))
-        )
-
-
-@pytest.mark.parametrize(
-    ("as_it_is", "reversed_all", "unbiased", "told"),
-    [
-        ([0.10, 0.01, 0.01, 0.09], [0.025] * 4, False, True),  # 2.1 times
-        ([0.10, 0.01, 0.01, 0.07], [0.025] * 4, False, False),  # 1.9 times, and the windows do not agree
-        ([0.032, 0.033, 0.034, 0.033], [0.025] * 4, False, True),  # 1.3 times, and they do
-        ([0.030, 0.030, 0.031, 0.030], [0.025] * 4, False, False),  # 1.2 times
-        ([0.0016] * 5, [0.0005] * 5, False, True),  # 0.0011 g2 more
-        ([0.0014] * 5, [0.0005] * 5, False, False),  # 0.0009: this may be drift
-        ([0.051] * 3, [0.01] * 3, True, True),  # few windows: 5.1 times
-        ([0.049] * 3, [0.01] * 3, True, False),
-        ([0.200] * 3, [0.01] * 3, False, False),  # with a bias that is not sure
-    ],
-)
-def test_how_clear_it_has_to_be(monkeypatch, as_it_is, reversed_all, unbiased, told):
-    monkeypatch.setattr(Handedness, "_turning", lambda self: Found(as_it_is, reversed_all, unbiased))
-    notice = Handedness().notice()
-    assert (notice is not None and notice.code == "left-handed") is told
-
-
 def test_a_bias_is_found_while_fitting():
     """The hand is never calm, so nothing else tells it."""
     log = hand(seed=0)
     turning = {}
     for bias in 0.0, 2.5:
-        found = Handedness()
-        found.add(log.t_s, log.accel_g, log.gyro_dps + bias, log.speed_mps)
-        turning[bias] = found._turning()
-    known, unknown = (float(np.mean(turning[bias].unexplained(WAYS[0]))) for bias in (0.0, 2.5))
+        turning[bias] = liveliest(cells_of(Log(log.t_s, log.accel_g, log.gyro_dps + bias)))
+    known, unknown = (float(np.mean(turning[bias].unexplained(EXCHANGES[0]))) for bias in (0.0, 2.5))
     assert unknown < 2.0 * known

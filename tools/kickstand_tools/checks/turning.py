@@ -4,7 +4,7 @@ The rates of a window are integrated to the turn C from the sensor's axes at eac
 There the force (specific, in g) is up, a constant vector, and the change of a velocity V, which the sensor's axes turn
 round: C f = up + C (dV/dt + rate x V) / g. V is small except along the vehicle: it is what the log's speed says, times
 a direction, or where there is none a velocity that changes slowly. up, V and a bias of the gyro are fitted by least
-squares, with what is usual for V and the bias as a prior; what is left tells how well the rates belong to the forces.
+squares, with what is usual for V and the bias as a prior; what is left shows how well the rates belong to the forces.
 """
 
 from dataclasses import dataclass
@@ -13,16 +13,16 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from ...signals.rotations import cross_matrix, rotation_matrix
-from ..table import Array
+from ..signals import Array
+from ..signals.rotations import cross_matrix, rotation_matrix
+from .cells import CELL_S
 
-CELL_S = 0.1  # means over it are used: what shakes faster is vibration
 KNOT_S = 5.0  # between two knots an unknown velocity changes evenly
 EVENED = 10  # cells: in means over so many, once they are turned into the same axes, vibration evens out
 FORCE_G = 0.1  # rms of what is left of them
 VELOCITY_MPS, DIRECTION, BIAS_DPS = 20.0, 1.0, 3.0  # usual: an unknown velocity, a direction's part, a change of bias
 BIAS_STEPS, MOST_DPS = 2, 5.0  # so often the bias is corrected, by at most so much at once
-LATE_S = (0.0, 0.5, 1.0, 1.5)  # delays of the speed that are tried: a satellite receiver tells it late
+LATE_S = (0.0, 0.5, 1.0, 1.5)  # delays of the speed that are tried: a satellite receiver's is late
 
 
 class Turning:
@@ -44,23 +44,24 @@ class Turning:
         """The gyro's bias is about 0."""
         return bool(np.max(np.abs(self._bias)) < BIAS_DPS)
 
-    def rough(self, ways: Array) -> Array:
-        """ways (k, 3, 3): rate = way @ reading. (k): mean square, g2, of what the turn alone leaves of the force."""
+    def rough(self, exchanges: Array) -> Array:
+        """exchanges (k, 3, 3): rate = exchange @ reading. (k): mean square, g2, of what the turn alone leaves of the
+        force."""
         sizes = np.mean(np.sum(self._force**2, axis=2))
-        left = np.empty(len(ways))
+        left = np.empty(len(exchanges))
         for sign in 1.0, -1.0:
             turn = _turn(sign * np.radians(self._rate - self._bias))
             both = np.einsum("wnij,wnk->wijk", turn, self._force) / turn.shape[1]
-            right = np.linalg.det(ways) * sign > 0.0
+            right = np.linalg.det(exchanges) * sign > 0.0
             # turning the gyro's axes by a rotation is turning the force's by its inverse
-            up = np.einsum("wijk,qkj->qwi", both, sign * ways[right])
+            up = np.einsum("wijk,qkj->qwi", both, sign * exchanges[right])
             left[right] = sizes - np.mean(np.sum(up**2, axis=2), axis=1)
         return left
 
-    def unexplained(self, way: Array) -> Array:
-        """(w): mean square in each window, g2, of the force that the rates way @ reading do not explain."""
-        sign = np.linalg.det(way)
-        force = self._force @ (sign * way)  # in axes in which the gyro needs no more than this sign
+    def unexplained(self, exchange: Array) -> Array:
+        """(w): mean square in each window, g2, of the force that the rates exchange @ reading do not explain."""
+        sign = np.linalg.det(exchange)
+        force = self._force @ (sign * exchange)  # in axes in which the gyro needs no more than this sign
         bias, velocity = self._bias, self._velocities[0]
         if len(self._velocities) > 1:
             turned = self._turned(force, sign, bias)

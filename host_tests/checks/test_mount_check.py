@@ -8,16 +8,21 @@ import analysis_rides
 import command
 import numpy as np
 import pytest
+from checked import cells_of, words
+from kickstand.errors import Notice
 from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.checks.cells import CellTable
+from kickstand_tools.checks.mount import contradiction
 from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.refusals import RefusedInput, sentence
-from kickstand_tools.replay.mount_check import MountCheck, contradiction
 from kickstand_tools.simulation.profiles import PROFILES
 from kickstand_tools.simulation.ride import ride
 from kickstand_tools.simulation.scripted import script
 from kickstand_workshop.evaluation.runs import calibrated_by_poses
+
+G = 9.80665
 
 
 def turned(matrix, left=0.0, up=0.0, forward=0.0):
@@ -54,8 +59,7 @@ def other(calibration, vehicle="", **turns):
 
 
 def said(log, calibration):
-    notice = contradiction(log, calibration)
-    return sentence(notice) if notice else ""
+    return words(contradiction(cells_of(log), calibration))
 
 
 @pytest.mark.parametrize("profile", PROFILES)
@@ -72,16 +76,16 @@ def test_right_calibrations_are_never_accused(profile):
 def test_wrong_ones_are(profile, speed):
     log, calibration = made(profile, speed=speed)
     by = "speed" if speed else "bends"
-    for turns, words in (
+    for turns, line in (
         ({"up": 180.0}, "forward and backward are exchanged: calibrate two with the other --side?"),
         ({"up": 90.0}, f"by the {by} of this ride forward is "),
         ({"up": -30.0}, " so lean, braking and cornering are wrong: is it another mount's? Calibrate again: "),
         ({"left": 40.0}, "the calibration's up is "),
         ({"forward": 90.0, "up": 70.0}, "so nothing computed with it is right: is it another mount's? "),
     ):
-        assert words in said(log, other(calibration, "", **turns)), turns
+        assert line in said(log, other(calibration, "", **turns)), turns
     for angle, side in (90.0, "left"), (-90.0, "right"):
-        notice = contradiction(log, other(calibration, up=angle))
+        notice = contradiction(cells_of(log), other(calibration, up=angle))
         assert notice is not None
         found, how, car = notice.values
         assert (found, how, car) == (pytest.approx(angle, abs=8.0), by, False)
@@ -97,20 +101,9 @@ def test_another_seeds_calibration(rides=("street", "sweeper", "city")):
         assert "is it another mount's?" in said(log, calibration)
 
 
-def test_blocks_and_gaps():
+def test_gaps():
     log, calibration = made("street")
     wrong = other(calibration, up=90.0)
-    force, rate = wrong.in_vehicle(log.readings)
-    checks = []
-    for block in 777, 1_000_000:
-        check = MountCheck(wrong)
-        for k in range(0, len(log.t_s), block):
-            part = slice(k, k + block)
-            check.add(log.t_s[part], force[part], rate[part], log.speed_mps[part])
-        checks.append(check)
-    assert checks[0].forward_by_speed() == pytest.approx(checks[1].forward_by_speed())
-    assert checks[0].forward_by_bends() == pytest.approx(checks[1].forward_by_bends())
-    assert checks[0].up_deg() == pytest.approx(checks[1].up_deg())
     kept = (log.t_s % 30.0) < 24.0
     gaps = Log(log.t_s[kept], log.accel_g[kept], log.gyro_dps[kept], log.speed_mps[kept])
     assert said(gaps, calibration) == ""
@@ -118,7 +111,6 @@ def test_blocks_and_gaps():
 
 
 def test_what_does_not_tell():
-    assert MountCheck(CalibrationFile(aligned=True)).notice() is None
     log, calibration = made("street")
     assert said(log, CalibrationFile()) == ""  # not aligned: that is said elsewhere
     short = slice(0, 500)
@@ -162,3 +154,90 @@ def test_recordings(shared_data):
     assert said(log, car) == ""
     assert "so braking and cornering are wrong" in said(log, other(car, "car", up=90.0))
     assert "calibrate drive again?" in said(log, other(car, "car", up=180.0))
+
+
+SIGN = " Or, if no board wrote this log, do all accelerations have the opposite sign? At rest up reads +1 g"
+
+
+def exchanged_line(car, side, roll_deg=None):
+    return sentence(Notice("forward-exchanged", car, side, roll_deg))
+
+
+def test_what_is_said():
+    """The sign of the log is always named as the other cause: the other side of the kickstand would make a clean report
+    of it, mirrored."""
+    assert exchanged_line(False, "left", 0.0).endswith("exchanged: calibrate two --side right?" + SIGN)
+    assert exchanged_line(False, "right", -3.9).endswith("exchanged: calibrate two --side left?" + SIGN)
+    assert exchanged_line(False, "", 0.0).endswith("calibrate two with the other --side?" + SIGN)
+    assert exchanged_line(False, "left", -4.1).endswith("exchanged: were the poses swapped?" + SIGN)
+    assert exchanged_line(False, "left").endswith("calibrate two --side right? Or were the poses swapped?" + SIGN)
+    assert exchanged_line(True, "").endswith("exchanged: calibrate drive again?" + SIGN)
+
+
+def jerky(late_s: int = 0, sign: float = 1.0, noise_g: float = 0.0, seconds: int = 240, mps2: float = 2.0) -> Log:
+    """Another acceleration each second, by chance, along z; a speed at its beginning, so many seconds late. 10 Hz."""
+    chance = np.random.default_rng(5)
+    pushes = chance.normal(scale=mps2, size=seconds)
+    speed_at = 30.0 + np.concatenate(([0.0], np.cumsum(pushes)))
+    time = np.arange(0.0, seconds, 0.1)
+    second = np.floor(time + 1e-9).astype(int)
+    force = sign * (pushes / G + chance.normal(scale=noise_g, size=seconds))[second]
+    speed = np.full(len(time), np.nan)
+    speed[::10] = speed_at[np.maximum(0, np.arange(seconds) - late_s)]
+    readings = np.column_stack((0 * force, 0 * force + 1.0, force))
+    return Log(time, readings, np.zeros(readings.shape), speed)
+
+
+ALONG_Z = CalibrationFile(aligned=True, vehicle="car")
+
+
+def exchanged(log: Log) -> bool:
+    notice = contradiction(cells_of(log), ALONG_Z)
+    assert notice is None or notice.code == "forward-exchanged"
+    return notice is not None
+
+
+@pytest.mark.parametrize(("late_s", "shown"), [(-1, False), (0, True), (1, True), (2, True), (3, False), (4, False)])
+def test_a_speed_up_to_two_seconds_late_shows_which_way_is_forward(late_s, shown):
+    """Each second pushes otherwise than the one before, so that one second off says nothing."""
+    assert exchanged(jerky(late_s, sign=-1.0)) is shown
+    assert not exchanged(jerky(late_s))
+
+
+def test_a_speed_that_is_unclear_accuses_only_of_what_is_sure():
+    """Hills add to the force: a correlation of -0.64 is sure enough, -0.55 is not."""
+    assert exchanged(jerky(sign=-1.0, noise_g=0.24))
+    assert not exchanged(jerky(sign=-1.0, noise_g=0.28))
+
+
+def test_few_and_small_changes_of_speed_show_nothing():
+    assert not exchanged(jerky(sign=-1.0, seconds=19))
+    assert not exchanged(jerky(sign=-1.0, mps2=0.4))
+    assert exchanged(jerky(sign=-1.0, seconds=24, mps2=0.7))
+
+
+def test_only_the_last_hour_counts():
+    """What was the other way round before it, as with a sensor that was turned over."""
+    before, after = jerky(sign=-1.0, seconds=3600), jerky(seconds=3600)
+    force, speed = (np.concatenate((getattr(before, name), getattr(after, name))) for name in ("accel_g", "speed_mps"))
+    time = np.arange(0.0, 7200.0, 0.1)
+    assert not exchanged(Log(time, force, np.zeros(force.shape), speed))
+    assert exchanged(before)
+
+
+def test_of_several_speeds_in_a_second_the_first_counts():
+    log = jerky(sign=-1.0)
+    log.speed_mps[3::10] = 77.0
+    assert exchanged(log)
+
+
+def test_seconds_without_a_speed_or_without_samples():
+    """A gap in the log and lost satellites: what is left is enough. But two days are not one ride."""
+    log = jerky(sign=-1.0)
+    log.speed_mps[500:900] = np.nan
+    assert exchanged(log.part((log.t_s < 100.0) | (log.t_s > 130.0)))
+    far = CellTable()
+    for at_s in 0.0, 4e5:
+        far.add(log.t_s + at_s, log.accel_g, log.gyro_dps, log.speed_mps)
+    assert far.cells() is None
+    assert CellTable().cells() is None

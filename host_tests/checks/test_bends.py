@@ -4,27 +4,20 @@ import analysis_rides
 import command
 import numpy as np
 import pytest
-from kickstand_tools.logs.axes.bends import Bends
+from checked import cells_of, words
+from kickstand.units import STANDARD_GRAVITY
+from kickstand_tools.checks.bends import bends
+from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.refusals import sentence
 from kickstand_tools.simulation.files import simulate
 from kickstand_tools.simulation.profiles import PROFILES
 from kickstand_tools.simulation.scripted import script
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
 
-def said(unit):
-    notice = unit.notice()
-    return sentence(notice) if notice else ""
-
-
-def judged(log, scale=1.0, block=5000):
+def judged(log, scale=1.0):
     """What is said of a whole log, its rates made smaller."""
-    time, force, rate = log.t_s, log.accel_g, scale * log.gyro_dps
-    unit = Bends()
-    for k in range(0, len(time), block):
-        unit.add(time[k : k + block], force[k : k + block], rate[k : k + block], log.speed_mps[k : k + block])
-    return said(unit)
+    return words(bends(cells_of(log, gyro=scale * np.eye(3))))
 
 
 @pytest.mark.parametrize("profile", PROFILES)
@@ -48,10 +41,8 @@ TURN = np.reshape(random_mounting(3), (3, 3))
 def straight_on(time, forward, up):
     """What is said of a vehicle that hardly turns at all."""
     force = np.column_stack((0.05 * np.sin(0.3 * time), up * np.ones(len(time)), forward)) @ TURN
-    unit = Bends()
     rate = 0.01 * np.column_stack((np.cos(time), np.sin(time), time % 1.0)) @ TURN
-    unit.add(time, force, rate, np.full(len(time), np.nan))
-    return said(unit)
+    return judged(Log(time, force, rate))
 
 
 @pytest.mark.parametrize("slope", [0.2, 0.0, -0.2])
@@ -77,6 +68,41 @@ def test_the_commands_say_so_in_one_line(tmp_path, name):
     assert said.startswith(f"warning: {ride}: in bends the rates are those of ")
     assert said.count("\n") == 1
     assert said.endswith(" m/s: are they in rad/s? deg/s are needed\n")
+
+
+def weaving(scale=57.0, noise_dps=0.0, unlike=0.0, seconds=40.0, rest_s=8.0):
+    """A ride of bends to both sides at 15 m/s, its rates so many times too small; noise in that about left.
+
+    unlike: part of the rolling that has nothing to do with turning. rest_s: at rest, after the ride.
+    """
+    chance = np.random.default_rng(7)
+    time = np.arange(0.0, seconds + rest_s, 0.02)
+    moving = np.where(time < seconds, 1.0, 0.0)
+    lean = 0.4 * np.sin(1.1 * time) * moving
+    yaw = -STANDARD_GRAVITY * np.tan(lean) / 15.0
+    rolling = (0.44 * np.cos(1.1 * time) + unlike * np.cos(2.3 * time)) * moving
+    about_left = yaw * np.sin(lean) + np.radians(noise_dps) * chance.normal(size=len(time)) * moving
+    rate = np.degrees(np.column_stack((about_left, yaw * np.cos(lean), rolling))) / scale
+    force = np.column_stack((0.0 * time, 1.0 / np.cos(lean), 0.3 * np.sin(2.0 * time) * moving))
+    return bends(cells_of(Log(time, force @ TURN, rate @ TURN)))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [
+        ({"scale": 16.0}, {"scale": 13.0}),  # a share of 15
+        ({"noise_dps": 15.0}, {"noise_dps": 60.0}),  # by under 4.5 sigmas it is chance
+        ({"unlike": 0.3}, {"unlike": 1.0}),  # a bike's rolling goes with its turning
+        ({"seconds": 16.0}, {"seconds": 12.0}),  # a quarter of a minute of riding
+        ({"rest_s": 1770.0}, {"rest_s": 1800.0}),  # half an hour is kept
+    ],
+)
+def test_what_it_takes_to_be_sure_of_rates_in_radians(wrong, right):
+    notice = weaving(**wrong)
+    assert notice
+    assert notice.code == "rates-in-radians"
+    assert notice.values[0] == pytest.approx(15.0 * 57.3, rel=0.2)
+    assert weaving(**right) is None
 
 
 def test_recordings(shared_data):

@@ -6,9 +6,10 @@ from dataclasses import replace
 import command
 import numpy as np
 import pytest
+from checked import cells_of
 from kickstand_tools import api
+from kickstand_tools.checks.course import course_agrees
 from kickstand_tools.logs import reader
-from kickstand_tools.logs.axes.course import Course
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.simulation.files import positions
@@ -50,7 +51,7 @@ def test_a_bias_of_the_gyro_is_no_turning(bias_dps):
     assert codes(mirrored(biased)) == ["mirrored"]
 
 
-def circling(both_sides: bool, bias_dps: float, wavering_dps: float = 0.0) -> Course:
+def circling(both_sides: bool, bias_dps: float, wavering_dps: float = 0.0) -> bool | None:
     """At 10 m/s round and round, to the left or to either side. wavering_dps: of the track, which the gyro has against
     it: noise of positions."""
     t_s = np.arange(0.0, 120.0, 0.02)
@@ -60,20 +61,18 @@ def circling(both_sides: bool, bias_dps: float, wavering_dps: float = 0.0) -> Co
     way = np.cumsum(np.radians(yaw_dps)) * 0.02
     lat, lon = (np.cumsum(10.0 * wave(way)) * 0.02 * 9e-6 for wave in (np.sin, np.cos))
     told = np.arange(len(t_s)) % 50 == 0
-    course = Course()
     rates = np.column_stack((0 * t_s, turning_dps - wave_dps + bias_dps, 0 * t_s))
     places = [np.where(told, place, np.nan) for place in (lat, lon)]
-    for block in np.array_split(np.arange(len(t_s)), 7):
-        course.add(t_s[block], np.tile([0.0, 1.0, 0.0], (len(block), 1)), rates[block], *(v[block] for v in places))
-    return course
+    up = np.tile([0.0, 1.0, 0.0], (len(t_s), 1))
+    return course_agrees(cells_of(Log(t_s, up, rates, lat_deg=places[0], lon_deg=places[1])))
 
 
 def test_turns_to_one_side_might_be_a_bias_and_tell_nothing():
-    assert circling(False, -20.0).agrees() is None
-    assert circling(False, 0.0).agrees() is None
-    assert circling(False, 0.0, wavering_dps=3.0).agrees() is None
+    assert circling(False, -20.0) is None
+    assert circling(False, 0.0) is None
+    assert circling(False, 0.0, wavering_dps=3.0) is None
     for bias_dps in (-20.0, 0.0, 20.0):
-        assert circling(True, bias_dps).agrees() is True
+        assert circling(True, bias_dps) is True
 
 
 def test_a_gyro_of_the_opposite_sign_is_told_as_that_alone():
