@@ -145,6 +145,7 @@ _POINT = """() => {
 def test_in_a_browser_chart_and_map_show_the_same_moment(tmp_path, chromium):
     page_of(tmp_path, seen())
     view = chromium.new_page(viewport={"width": 1300, "height": 800})
+    view.set_default_timeout(120_000)  # a busy machine draws late
     asked, errors = [], []
     view.on("request", lambda request: asked.append(request.url))
     view.on("pageerror", lambda error: errors.append(str(error)))
