@@ -116,7 +116,7 @@ def test_without_a_speed_stops_are_marked(tmp_path):
 
 def test_without_a_speed_it_may_be_that_nothing_can_be_told(tmp_path):
     moving = analysis_rides.write(tmp_path, [script.upright(4), script.accelerate(15, 5), script.straight(20)])
-    assert "Stops: not told, the log has no speed." in command.works("report", moving).out
+    assert "Stops: not known, the log has no speed." in command.works("report", moving).out
     ride = [script.upright(4), script.accelerate(15, 5), script.straight(20)]
     moving = analysis_rides.write(tmp_path, ride, speed_hz=1)
     assert "No stop from over 10 km/h found." in command.works("report", moving).out
@@ -138,7 +138,7 @@ def test_a_kickstand_on_the_other_side_is_told(ride, tmp_path):
     said = command.works("report", ride, "--calibration", cal)
     assert line in said.err
     assert "do all accelerations have the opposite sign?" in said.err
-    assert "Stops: not told" in said.out
+    assert "Stops: not known" in said.out
     assert "MFDD" not in said.out  # of the wrong way round, no figure is right
     data = json.loads(command.works("report", ride, "--calibration", cal, "--json").out)
     assert data["remark"].startswith(line)

@@ -1,4 +1,4 @@
-"""The guide's next step, told from what the firmware really shows: the page's device runs here as fast as it can, is
+"""The guide's next step, from what the firmware really shows: the page's device runs here as fast as it can, is
 steered as a person would, and what was to be seen is shown to the page's own guide, step by step."""
 
 import json
@@ -18,7 +18,7 @@ from kickstand_tools.simulated_board.fakes import cpython
 cpython.supplement()
 from kickstand_tools.web.device import PageDevice
 
-device, now, told = PageDevice(), 0.0, []
+device, now, said = PageDevice(), 0.0, []
 state = {"powered": True, "plugged": True, "armed": False, "pose": "kickstand", "stage": -1}
 
 def run(seconds):
@@ -28,7 +28,7 @@ def run(seconds):
     for tick in json.loads(device.take()):
         cut = state["armed"] and not tick["powered"]
         state["armed"] = state["armed"] and tick["powered"]
-        told.append({**state, **tick, "cut": cut})
+        said.append({**state, **tick, "cut": cut})
 
 def press(seconds):
     device.order("button", True)
@@ -49,7 +49,7 @@ for stage, orders in enumerate(json.load(sys.stdin)):
     state["stage"] = stage
     for order in orders:
         do(*order)
-print("\\n" + json.dumps(told))
+print("\\n" + json.dumps(said))
 """
 
 # As tell() in main.mjs
@@ -73,7 +73,7 @@ def guide(chromium, address):
 
 @pytest.fixture
 def stages(guide, tmp_path):
-    """By stage of a drive: what was last told in it (words beside the true lean, number, text, action), and all the
+    """By stage of a drive: what was last said in it (words beside the true lean, number, text, action), and all the
     texts that were."""
 
     def drive(*orders):
@@ -87,17 +87,17 @@ def stages(guide, tmp_path):
             check=True,
         )
         last, texts = {}, {}
-        for stage, *told in guide(json.loads(done.stdout.splitlines()[-1])):
-            last[stage] = told
-            texts.setdefault(stage, set()).add(told[2])
+        for stage, *said in guide(json.loads(done.stdout.splitlines()[-1])):
+            last[stage] = said
+            texts.setdefault(stage, set()).add(said[2])
         return last, texts
 
     return drive
 
 
-def expect(told, *table):
+def expect(said, *table):
     """table: for each stage its (words, number, part of the text, action)."""
-    last, _ = told
+    last, _ = said
     for stage, (words, number, text, action) in enumerate(table):
         told_words, told_number, told_text, told_action = last[stage]
         assert text in told_text, (stage, told_text)
@@ -105,7 +105,7 @@ def expect(told, *table):
 
 
 def test_a_press_while_riding_is_taken_for_the_stand(stages):
-    told = stages(
+    said = stages(
         [RIDE, ("wait", 8)],
         [SHORT, ("wait", 3)],
         [("wait", 9)],
@@ -114,7 +114,7 @@ def test_a_press_while_riding_is_taken_for_the_stand(stages):
         [UPRIGHT, ("wait", 4)],
     )
     expect(
-        told,
+        said,
         ("not aligned", 1, "Put the motorcycle on its stand first", "kickstand"),
         ("aligning", 1, "that the motorcycle is on its stand", "kickstand"),
         ("refused", 1, "why it has not taken this pose", "kickstand"),
@@ -125,7 +125,7 @@ def test_a_press_while_riding_is_taken_for_the_stand(stages):
 
 
 def test_the_same_pose_twice(stages):
-    told = stages(
+    said = stages(
         [("wait", 2), SHORT, ("wait", 4.5)],
         [SHORT, ("wait", 1)],
         [("wait", 3.5)],
@@ -134,7 +134,7 @@ def test_the_same_pose_twice(stages):
         [SHORT, ("wait", 0.5)],
     )
     expect(
-        told,
+        said,
         ("aligning", 2, "Now hold the motorcycle upright", "upright"),
         ("aligning", 2, "that the motorcycle is upright", "upright"),
         ("refused", 1, "Both poses were the same", ""),
@@ -145,7 +145,7 @@ def test_the_same_pose_twice(stages):
 
 
 def test_the_wire_is_pulled_while_the_menu_is_open(stages):
-    told = stages(
+    said = stages(
         RIDING,
         [LONG],
         [PULL, ("wait", 2)],
@@ -156,7 +156,7 @@ def test_the_wire_is_pulled_while_the_menu_is_open(stages):
         [("wait", 3)],
     )
     expect(
-        told,
+        said,
         ("not sure", 5, "That is all", ""),
         ("the menu", 0, "The menu", ""),
         ("the menu", 0, "The menu lies over the message", "wire"),
@@ -169,9 +169,9 @@ def test_the_wire_is_pulled_while_the_menu_is_open(stages):
 
 
 def test_each_page_is_named(stages):
-    told = stages(RIDING, *[[SHORT] for _ in range(5)], [LONG, *[SHORT] * 3], [LONG], [SHORT], [LONG, SHORT, LONG])
+    said = stages(RIDING, *[[SHORT] for _ in range(5)], [LONG, *[SHORT] * 3], [LONG], [SHORT], [LONG, SHORT, LONG])
     expect(
-        told,
+        said,
         ("not sure", 5, "That is all", ""),
         ("maxima", 5, "the largest lean", ""),
         ("g", 5, "acceleration and braking", ""),
@@ -187,7 +187,7 @@ def test_each_page_is_named(stages):
 
 def test_the_power_goes_in_a_save_or_by_its_switch(stages):
     arm, on = ("cut_save", True), ("power", True)
-    told = stages(
+    said = stages(
         [*RIDING, arm, ("wait", 0.1)],
         [("cut_save", False), ("wait", 0.1)],
         [arm, STAND, ("wait", 9)],
@@ -201,7 +201,7 @@ def test_the_power_goes_in_a_save_or_by_its_switch(stages):
         [("button", True), on, ("wait", 2), ("button", False), ("wait", 0.2)],
     )
     expect(
-        told,
+        said,
         ("not sure", 0, "Stop for a new alignment", "kickstand"),
         ("not sure", 5, "That is all", ""),
         ("not sure", 0, "Hold the button for a second", ""),
@@ -234,13 +234,13 @@ def test_each_refusal_and_fault_of_the_first_minute_has_its_step(guide, code):
     """Also those that the simulated board does not come to by itself."""
     text = [line.replace("\xdf", "°") for line in messages.lines(Refusal(code, 1, 2))]
     tick = {"powered": True, "plugged": True, "pose": "kickstand", "phase": "kickstand", "t_s": 1.0, "stage": 0}
-    ((_, words, _, told, _),) = guide([{**tick, "display": {"text": text, "shown_deg": None}}])
+    ((_, words, _, said, _),) = guide([{**tick, "display": {"text": text, "shown_deg": None}}])
     kind = {"starting": "board starts", "a fault": "there again", "refused": "Press the button"}[words]
-    assert kind in told
+    assert kind in said
 
 
 def test_a_lean_that_is_not_sure_is_no_other_page(guide):
     tick = {"powered": True, "plugged": True, "pose": "ride", "phase": "straight", "t_s": 1.0, "stage": 0}
     for text in pages.unsure(None), pages.unsure("mount-moved"):
-        ((_, words, number, told, _),) = guide([{**tick, "display": {"text": text, "shown_deg": None}}])
-        assert (words, number) == ("not sure", 4) and "not sure yet" in told
+        ((_, words, number, said, _),) = guide([{**tick, "display": {"text": text, "shown_deg": None}}])
+        assert (words, number) == ("not sure", 4) and "not sure yet" in said

@@ -27,10 +27,10 @@ AWAKE = """() => {
 
 def test_the_report_is_that_of_the_command(page, ride, calibration):
     assert page.give(ride, calibration) == ""
-    told = json.loads(works("report", ride, "--json").out)
+    reported = json.loads(works("report", ride, "--json").out)
     shown = json.loads(page.saved("#save-json"))
-    assert shown.pop("ride") == Path(told.pop("ride")).name
-    assert_near(shown, told)
+    assert shown.pop("ride") == Path(reported.pop("ride")).name
+    assert_near(shown, reported)
     wide = works("report", ride).out.split()
     for row in page.report():
         assert [word for cell in row for word in cell.split() if word not in wide] == []

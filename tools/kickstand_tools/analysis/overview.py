@@ -27,8 +27,8 @@ class Overview:
     report nor pictures need are NaN (vehicle_channels() has them).
 
     riding_s: time on the move, s. speed_correlation: between the forward force and the changes of the speed, 1 if
-    forward is right, -1 if it is backward, None if the ride does not tell. exchanged: said where forward is backward;
-    stops is then empty. notices: what else is remarkable in the log.
+    forward is right, -1 if it is backward, None if the ride does not show it. exchanged: said where forward is
+    backward; stops is then empty. notices: what else is remarkable in the log.
     """
 
     ride: Ride
@@ -71,7 +71,7 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     if total.speed_mps.time_s is None:  # always 0, as of a torn wheel contact: it must not say that the bike stood
         course = replace(course, speed_mps=np.broadcast_to(np.nan, len(course.t_s)))
     frozen_s = sum(float(notice.values[1]) for notice in notices if notice.code == "frozen-readings")
-    # Of a stretch the notice tells more than its own.
+    # The notice is of the whole log, also of a stretch of it.
     total.frozen_s = min(frozen_s, total.missing_s) if isinstance(ride.log, Stretch) else frozen_s
     still = standing(course)
     found = quality(course, still)
