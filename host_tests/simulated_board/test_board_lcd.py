@@ -2,9 +2,9 @@
 
 from kickstand_tools.simulated_board import glyphs
 from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.lcd import CLEAR_US, COMMAND_US, DATA_US, POWER_UP_US, Lcd
+from kickstand_tools.simulated_board.lcd import CLEAR_US, POWER_UP_US, Lcd
 
-RS, RW, E, LIGHT = 0x01, 0x02, 0x04, 0x08
+RS, E, LIGHT = 0x01, 0x04, 0x08
 PORT_US = 90  # a byte at 100 kHz
 
 
@@ -62,17 +62,6 @@ def test_two_lines_of_text():
     assert lcd.lost == 0 and lcd.backlight
 
 
-def test_before_4_bit_mode_the_open_pins_read_as_ones():
-    clock = Clock()
-    lcd = Lcd(clock)
-    clock.advance(POWER_UP_US)
-    nibble(lcd, 0x30)
-    assert lcd.two_lines
-    clock.advance(5000)
-    nibble(lcd, 0x40, RS)
-    assert lcd.codes()[0][0] == 0x4F
-
-
 def test_home_takes_long_and_what_comes_meanwhile_is_lost():
     lcd = ready()
     write(lcd, 0, "abc")
@@ -83,60 +72,6 @@ def test_home_takes_long_and_what_comes_meanwhile_is_lost():
     lcd.clock.advance(done_us - lcd.clock.now_us)
     send(lcd, ord("x"), RS)
     assert lcd.text()[0].startswith("xbc")
-
-
-def test_clear():
-    lcd = ready()
-    write(lcd, 1, "abc")
-    send(lcd, 0x04)  # right to left
-    send(lcd, 0x01)
-    lcd.clock.advance(CLEAR_US)
-    assert lcd.text() == [" " * 16] * 2
-    send(lcd, ord("x"), RS)
-    send(lcd, ord("y"), RS)
-    assert lcd.text()[0].startswith("xy"), "clear also sets left to right"
-
-
-def test_data_and_commands_keep_it_busy():
-    lcd = ready()
-    for value, rs, busy_us in ((0x80, 0, COMMAND_US), (ord("a"), RS, DATA_US)):
-        lcd.clock.advance(1000)
-        nibble(lcd, value, rs)
-        lcd.write_byte(value << 4 & 0xF0 | rs | E)
-        lcd.write_byte(value << 4 & 0xF0 | rs)
-        lcd.clock.advance(busy_us - 1)
-        assert busy(lcd)
-        lcd.clock.advance(1)
-        assert not busy(lcd)
-
-
-def busy(lcd):
-    """The busy flag as a driver reads it, without time passing."""
-    lcd.write_byte(0xF0 | RW)
-    lcd.write_byte(0xF0 | RW | E)
-    flag = lcd.read_byte() & 0x80
-    lcd.write_byte(0xF0 | RW)
-    lcd.write_byte(0xF0 | RW | E)
-    lcd.write_byte(0xF0 | RW)
-    return bool(flag)
-
-
-def test_nibbles_out_of_step_garble_and_the_initialisation_heals():
-    lcd = ready()
-    write(lcd, 0, "hello")
-    lcd.slip()
-    write(lcd, 0, "hello")
-    assert lcd.text()[0] != "hello           "
-    lcd.clock.advance(2000)
-    for wait_us in (5000, 5000, 5000):
-        nibble(lcd, 0x30)
-        lcd.clock.advance(wait_us)
-    nibble(lcd, 0x20)
-    for command in (0x28, 0x0C, 0x06, 0x02):
-        send(lcd, command)
-        lcd.clock.advance(2000)
-    write(lcd, 0, "hello           ")
-    assert lcd.text()[0] == "hello           "
 
 
 def test_own_characters():
@@ -152,18 +87,6 @@ def test_own_characters():
     assert lcd.glyphs[2] == "\u258d"
 
 
-def test_changes_count_what_can_be_seen():
-    lcd = ready()
-    write(lcd, 0, "abc")
-    before = lcd.changes
-    write(lcd, 0, "abc")
-    assert lcd.changes == before
-    write(lcd, 0, "abd")
-    assert lcd.changes == before + 1
-    lcd.write_byte(0)
-    assert lcd.changes == before + 2 and not lcd.backlight
-
-
 def test_patterns_as_text():
     def column(bits):
         return [bits] * 8
@@ -177,9 +100,3 @@ def test_patterns_as_text():
     assert glyphs.drawn([0] + [0x1C] * 6 + [0]) == "\u258b"
     assert glyphs.drawn(column(0x04)) == "|"
     assert glyphs.drawn([0x04, 0x0E, 0x15, 0x04, 0x04, 0x04, 0x04, 0x00]) == "?"
-
-
-def test_rom_a00():
-    assert [glyphs.rom(c) for c in (0xDF, 0x7E, 0x7F, 0xFF, 0x41, 0x20, 0x5C)] == [
-        "\u00b0", "\u2192", "\u2190", "\u2588", "A", " ", "\u00a5",
-    ]  # fmt: skip

@@ -10,14 +10,13 @@ from kickstand.lean.meter import MAX_VARIANCE
 
 from ..calibration.file import CalibrationFile, calibration_beside, read_calibration
 from ..errors import InputError
+from ..estimation.smooth import smooth_blocks
 from ..logs.block import Block
 from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import File, Progress, log_stem, name_of
 from ..logs.stretch import Stretch
 from ..logs.table import Array
 from ..replay.meter_along import MeterAlong
-from ..replay.mount_check import MountCheck
-from ..smoothing.smooth import smooth_blocks
 from .channels import Channels, channels
 
 
@@ -45,14 +44,10 @@ class Ride:
         """A car, which has no lean; else a motorcycle."""
         return self.calibration.vehicle == "car"
 
-    def blocks(
-        self, progress: Progress | None = None, notices: list[Notice] | None = None, mount: MountCheck | None = None
-    ) -> Iterator[Channels]:
-        """The ride without the readings that froze: they are a gap. progress, notices: of read_blocks(); of what
-        contradicts the calibration, too, unless there is a mount, which is given all of the log, also where the ride is
-        a stretch of it. Raises InputError."""
+    def blocks(self, progress: Progress | None = None, notices: list[Notice] | None = None) -> Iterator[Channels]:
+        """The ride without the readings that froze: they are a gap. progress, notices: of read_blocks(), of all of the
+        log, also where the ride is a stretch of it. Raises InputError."""
         lean, absurd, slow, some = _Lean(self.calibration), False, False, False
-        check = mount or MountCheck(self.calibration)
         log, stretch = apart(self.log)
         for whole, found in self._read(log, progress, notices):
             block = whole.measured
@@ -68,8 +63,6 @@ class Ride:
                 rows[:, 0], rows[:, 2] = shown[:, 0], np.radians(shown[:, 1]) ** 2
                 rows[:, 5] = rows[:, 2] <= MAX_VARIANCE  # NaN is not
             seen = channels(block, self.calibration, rows, self.car)
-            if mount is not None or notices is not None:
-                check.add(seen.t_s, seen.force_g, seen.rate_dps, seen.speed_mps)
             if stretch is not None:
                 which = stretch.holds(block)
                 if not which.any():
@@ -79,10 +72,8 @@ class Ride:
             yield seen
         if not some:
             raise InputError(f"{self.name}: all readings are frozen, so that nothing is known: check the sensor")
-        if notices is not None:
-            notices += [Notice("smooth-slow")] if slow else []
-            contradiction = None if mount else check.notice()
-            notices += [contradiction] if contradiction else []
+        if notices is not None and slow:
+            notices.append(Notice("smooth-slow"))
 
     def _read(
         self, log: Source, progress: Progress | None, notices: list[Notice] | None
@@ -90,7 +81,8 @@ class Ride:
         """The blocks of the log, and what smooth_blocks() gives for each, None where it is not wanted or gives none."""
         if self.smoothed:
             return smooth_blocks(log, self.calibration, progress, notices, lines=False)
-        return ((block, None) for block in read_blocks(log, progress=progress, notices=notices, lines=False))
+        blocks = read_blocks(log, 2, progress, notices, lines=False, calibration=self.calibration)
+        return ((block, None) for block in blocks)
 
 
 def open_ride(log: Source, calibration: CalibrationFile | File | None = None, smoothed: bool = False) -> Ride:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...logs.axes.course import EARTH_M
 from ...logs.table import Array
+from ...signals.geography import EARTH_M
 from ..overview import Overview
 from ..track import Track, track
 from .charts import LEFT_COLOUR, RIGHT_COLOUR, SPEED_COLOUR, lean_limit, shown_lean_deg
