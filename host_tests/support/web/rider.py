@@ -41,7 +41,7 @@ class Rider:
             timeout=1000 * within_s,
         )
 
-    def told(self, text, within_s=READ_S):
+    def guide_says(self, text, within_s=READ_S):
         """Wait until the guide says this."""
         self.page.wait_for_function(
             "text => document.querySelector('#todo').textContent.includes(text)", arg=text, timeout=1000 * within_s
@@ -80,22 +80,22 @@ class Rider:
 
     def align(self):
         """The two presses, as the guide asks for them."""
-        self.told("Press the button")
+        self.guide_says("Press the button")
         self.click("#press")
         self.reads("Now upright")
         self.click("#do")  # hold it upright
-        self.told("Press the button once more")
+        self.guide_says("Press the button once more")
         self.click("#press")
 
     def axe(self):
         """What axe-core finds, in the light and in the dark: a line for each."""
         axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
-        told = []
+        found = []
         for scheme in ("light", "dark"):
             self.page.emulate_media(color_scheme=scheme)
             for one in axe.run(self.page).response["violations"]:
-                told += [f"{one['id']}: {node['html']}: {node['failureSummary']}" for node in one["nodes"]]
-        return told
+                found += [f"{one['id']}: {node['html']}: {node['failureSummary']}" for node in one["nodes"]]
+        return found
 
     def fits(self):
         """Is the page as wide as its window?"""
@@ -112,8 +112,8 @@ class Rider:
 
     def processes(self):
         """The numbers of the browser's processes."""
-        told = self._browser.new_browser_cdp_session().send("SystemInfo.getProcessInfo")
-        return [process["id"] for process in told["processInfo"]]
+        info = self._browser.new_browser_cdp_session().send("SystemInfo.getProcessInfo")
+        return [process["id"] for process in info["processInfo"]]
 
     def worker_s(self):
         """Processor time that the page's workers have used, in s."""
