@@ -11,7 +11,7 @@ import command
 import fake_board
 import pytest
 import serial
-from kickstand_tools.deploy import bytecode, connection, firmware_files, ports
+from kickstand_tools.deploy import bytecode, connection, firmware_files
 from mpremote import transport_serial
 from serial.tools import list_ports
 
@@ -267,7 +267,7 @@ def test_an_emulated_board_is_given_longer_to_answer(port, limit_s, tmp_path, mo
 
     monkeypatch.setattr(transport_serial.serial, "serial_for_url", open_port)
     clock = types.SimpleNamespace(monotonic=lambda: waited_s[0], sleep=sleep)
-    monkeypatch.setattr(transport_serial, "time", clock)
+    monkeypatch.setattr(connection, "time", clock)
     command.refused(tmp_path, "status", "--port", port, words=f"no MicroPython answers on {port}")
     assert waited_s[0] == pytest.approx(2 * limit_s, abs=0.1)
 
@@ -302,7 +302,7 @@ def test_why_a_port_does_not_open(tmp_path, monkeypatch, error, words):
     monkeypatch.setattr(serial, "serial_for_url", fail)
     monkeypatch.setattr(list_ports, "comports", lambda: [PICO])
     command.refused(tmp_path, "flash", words=words)
-    assert words in str(ports.why_closed("/dev/ttyACM0"))
+    assert words in str(connection.why_closed("/dev/ttyACM0"))
 
 
 def test_status_prints_what_the_board_says_and_restarts_it(board):

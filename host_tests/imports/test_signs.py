@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from app_exports import PHONE, riding
 from kickstand_tools import api
-from kickstand_tools.logs.axes.course import course_agrees
+from kickstand_tools.checks.course import log_agrees
 
 
 def up_at_rest(found: api.Imported) -> np.ndarray:
@@ -145,4 +145,4 @@ def test_swerves_that_come_late_are_not_taken_for_the_opposite_ones(sign, late_s
     places = 1e-5 * north, 1e-5 * east
     lat, lon = (np.where(np.arange(3000) % 50 == 0, np.interp(t_s - late_s, t_s, place), np.nan) for place in places)
     rates = np.column_stack((0 * t_s, yaw_dps, 0 * t_s))
-    assert course_agrees(t_s, np.tile([0.0, sign, 0.0], (3000, 1)), rates, lat, lon) is (sign > 0)
+    assert log_agrees(t_s, np.tile([0.0, sign, 0.0], (3000, 1)), rates, lat, lon) is (sign > 0)

@@ -7,8 +7,8 @@ from kickstand_tools import api
 from kickstand_tools.joining.compare import Comparison
 from kickstand_tools.joining.course import course
 from kickstand_tools.joining.motion import motion
-from kickstand_tools.joining.pieces import pieces
-from kickstand_tools.logs.axes.course import EARTH_M
+from kickstand_tools.joining.segments import segments
+from kickstand_tools.signals.geography import EARTH_M
 from kickstand_tools.signals.lag import correlations
 
 PROFILES = ("street", "track", "sweeper", "city", "hills")
@@ -155,7 +155,7 @@ def test_a_leaning_bikes_gyro_tells_how_the_course_turns():
     """At 45 degrees of lean the rate about the bike's up is 0.7 of the yaw rate."""
     log, track = winding(300.0)
     steps = course(track.once_a_second())
-    compared = Comparison(motion(log), steps, pieces(steps), 0.0, 3.0)
+    compared = Comparison(motion(log), steps, segments(steps), 0.0, 3.0)
     error = compared.turned(0.0)[0] - compared.given.turned_deg
     assert np.abs(compared.given.turned_deg).max() > 40.0
     assert np.abs(error[compared.given.course_weight > 0.0]).max() < 3.0

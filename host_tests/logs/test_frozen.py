@@ -109,7 +109,7 @@ def test_a_log_without_what_froze():
 
 @pytest.mark.parametrize("profile", ["street", "track"])
 def test_a_freeze_is_no_standstill(profile):
-    """20 s in the middle of a ride: taken for a standstill, it leaves the lean wrong by up to 50 degrees, and long after it."""
+    """Of 20 s in the middle of a ride. Taken for a standstill, it leaves the lean wrong by up to 50 degrees."""
     ride = simulate_ride(profile, seed=1, seconds=100.0)
     hz = round(ride.rate_hz)
     kickstand, upright = (Log.from_readings(pose, hz) for pose in (ride.kickstand, ride.upright))

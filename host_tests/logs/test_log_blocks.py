@@ -6,6 +6,7 @@ import tracemalloc
 import command
 import numpy as np
 import pytest
+from kickstand_tools.checks import cells
 from kickstand_tools.errors import InputError
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.csv_reader import numbers_in
@@ -96,7 +97,9 @@ def test_a_damaged_gzip_file_is_refused_after_its_good_part(tmp_path, monkeypatc
 
 
 def test_memory_does_not_grow_with_the_log(tmp_path, monkeypatch):
+    """But for the cells of its last hour, by which it is judged: here of its last half minute."""
     monkeypatch.setattr(reader, "BLOCK_BYTES", 1 << 16)
+    monkeypatch.setattr(cells, "KEPT", 300)
     peaks = []
     for count in 10_000, 60_000:
         path = write(tmp_path / "ride.csv", [HEADER, *rows(count)])

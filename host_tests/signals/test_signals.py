@@ -24,10 +24,10 @@ CHANCE = np.random.default_rng(1)
 
 def test_readings_are_calibrated_and_turned_as_the_firmware_does_it():
     matrix = rotation_matrix(np.array([0.3, -1.2, 2.0]))
-    calibration = CalibrationFile([0.01, -0.02, 0.03], [1.02, 0.99, 1.01], [1.0, -2.0, 3.0], matrix)
+    offset, slope, bias = np.array([[0.01, -0.02, 0.03], [1.02, 0.99, 1.01], [1.0, -2.0, 3.0]])
+    calibration = CalibrationFile(offset, slope, bias, matrix)
     readings = CHANCE.normal(size=(5, 7))
-    known = calibration.accel_offset_g, calibration.accel_slope, calibration.gyro_bias_dps
-    found = rotated(matrix, *calibrated(readings[:, :3], readings[:, 4:], *known))
+    found = rotated(matrix, *calibrated(readings[:, :3], readings[:, 4:], offset, slope, bias))
     firmware = calibration.to_firmware()
     for k, reading in enumerate(readings):
         force, rate = np.zeros(3), np.zeros(3)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from kickstand_tools.deploy import connection
+from kickstand_tools.deploy import board_console, connection
 from kickstand_tools.deploy.bytecode import PICO
 from mpremote.transport import Transport, TransportError, TransportExecError
 from serial.tools import list_ports
@@ -59,6 +59,10 @@ class FakeBoard(Transport):
             return __import__(name, *rest)
 
         self._globals = {"__builtins__": vars(builtins) | {"__import__": imports, "open": self._open}}
+
+    def wait(self, seconds: float) -> None:
+        """By the clock that a test may have given the tools."""
+        board_console.time.sleep(seconds)
 
     def enter_raw_repl(self, soft_reset: bool = True, timeout_overall: int = 10) -> None:
         if not self.answers:

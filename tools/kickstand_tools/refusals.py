@@ -10,7 +10,8 @@ from .remedies import COMMANDS, Remedies
 SWAPPED_DEG = 4.0  # an upright pose is hardly ever so far off; a pose on the kickstand taken for it is
 
 UPSIDE_DOWN_DEG = 150.0
-OPPOSITE_SIGN = "do all accelerations have the opposite sign? At rest up reads +1 g"
+_AT_REST = "at rest up reads +1 g"
+OPPOSITE_SIGN = f"do all accelerations have the opposite sign? {_AT_REST.capitalize()}"
 
 # {0}, {1} ... are the refusal's values; what stands there by name is what to do (remedies.py)
 _SENTENCES = {
@@ -62,22 +63,22 @@ _SENTENCES = {
     "only: a longer ride is needed, with bends to both sides",
     "phone-otherwise": "by the ride the phone is turned by {1:.0f} degrees against {0}: mounted another way? "
     "{phone_otherwise}",
-    "phone-upside-down": "for a phone mounted {0} all accelerations have the opposite sign: at rest the axis that "
-    "points up has to read +1 g",
+    "phone-upside-down": "for a phone mounted {0} all accelerations have the opposite sign: " + _AT_REST,
     "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
     "import-speed-unit": "{0} has no unit, and the positions do not tell it, so the speed is left out: {speed_unit}",
-    "import-sign": "which sign accelerations have in {0} is not certain, and no track with turns tells it: at rest the "
-    "axis that points up has to read +1 g, else the ride is mirrored and {sign}",
+    "import-sign": "which sign accelerations have in {0} is not certain, and no track with turns shows it: "
+    + _AT_REST
+    + ", else the ride is mirrored and {sign}",
     "import-damaged": "damaged rows that are left out: {0}; a cell or a time is no number, a time is out of order, "
     "a row has too many cells, or a reading is past any sensor's",
     "mirrored": "the sensor turns against the track, so left and right are exchanged: were all accelerations "
-    "turned? At rest the axis that points up has to read +1 g",
+    "turned? " + _AT_REST.capitalize(),
     "left-handed": "the rates turn the force the wrong way, so the lean is wrong: are the axes left-handed (reverse "
-    "one in both sensors) or the gyro of the opposite sign (reverse all its rates)? At rest up reads +1 g",
+    "one in both sensors) or the gyro of the opposite sign (reverse all its rates)? " + _AT_REST.capitalize(),
     "rates-misfit": "the rates do not belong to the accelerations, so the lean is wrong: the rates {0}; instead of "
     "gx, gy, gz right would be {1}",
     "upside-down": "the sensor's {0} points down: if it is not mounted upside down, all accelerations are of the "
-    "opposite sign, and left and right get exchanged: reverse them (at rest up reads +1 g)",
+    "opposite sign, and left and right get exchanged: reverse them (" + _AT_REST + ")",
     "car-replayed": "the calibration is a car's, whose display shows no lean: lean_deg is that of a motorcycle which "
     "would feel the same, and lean_sigma_deg is nan",
     "another-mount": "the calibration given is of a mount {0:.0f} degrees from this one: its offset and slope are used",

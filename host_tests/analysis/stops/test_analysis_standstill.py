@@ -7,7 +7,6 @@ from kickstand_tools.analysis.downsample import downsampled, joined
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.stops import brake_test
 from kickstand_tools.analysis.stops.brake_test import RATE_S, find_stops
-from kickstand_tools.analysis.stops.plausible import closes, plausible
 from kickstand_tools.analysis.stops.standstill import standing
 from kickstand_tools.calibration.file import write_calibration
 from kickstand_tools.calibration.two import fit_two_positions
@@ -56,16 +55,3 @@ def test_what_was_integrated_to_a_standstill_that_was_none_is_not_shown(track, m
     monkeypatch.setattr(brake_test, "plausible", lambda *_: True)
     monkeypatch.setattr(brake_test, "closes", lambda *_: True)
     assert shown < 0.5 * len(find_stops(without_speed(track)))
-
-
-def test_what_is_plausible():
-    """Up to 250 km/h, 15 m to a side, 30 degrees; 3 m/s left over, and 0.7 m/s more each second of half a minute."""
-    for sign in 1.0, -1.0:
-        assert plausible(69.4, 14.9 * sign, 29.9 * sign)
-        assert not plausible(69.5, 0.0, 0.0)
-        assert not plausible(20.0, 15.1 * sign, 0.0)
-        assert not plausible(20.0, 0.0, 30.1 * sign)
-        assert closes(11.3 * sign, 12.0)
-        assert not closes(11.5 * sign, 12.0)
-        assert not closes(24.1 * sign, 30.0)
-        assert closes(58.0 * sign, 30.1)  # too long to tell

@@ -90,15 +90,6 @@ def test_a_second_of_quiet_is_needed(seconds, stands):
     assert standing(ridden).any() == stands
 
 
-@pytest.mark.parametrize(("samples", "told"), [(99, False), (100, True)])
-def test_a_ride_of_less_than_two_seconds_tells_nothing(samples, told):
-    """There has to be riding to compare with."""
-    ride = maybe()
-    part = ride.part(slice(round(BEGIN_S * RATE_HZ), round(BEGIN_S * RATE_HZ) + samples))
-    part.pitch_rate_dps[:10] += 50.0 * np.sin(np.arange(10.0))
-    assert standing(part).any() in ((True, False) if told else (False,))
-
-
 def test_a_rest_of_the_filter_goes_back_to_where_the_force_became_that_of_the_rest():
     """On a road without any shaking: braked to 12 s, a fork that comes up for 0.3 s, and a rest seen from 13.5 s on."""
     road = Road((8.0, 0.0), (4.0, -4.0), (4.0, 0.0))

@@ -8,7 +8,6 @@ from kickstand.errors import Notice
 
 from ..logs.source import Progress
 from ..logs.stretch import Stretch
-from ..replay.mount_check import MountCheck
 from .alignment_quality import Quality, quality
 from .channels import Channels
 from .downsample import downsampled, joined
@@ -26,9 +25,8 @@ class Overview:
     """A ride: the summary of every sample, and its course in means over RATE_S, in which the columns that neither
     report nor pictures need are NaN (vehicle_channels() has them).
 
-    riding_s: time on the move, s. speed_correlation: between the forward force and the changes of the speed, 1 if
-    forward is right, -1 if it is backward, None if the ride does not tell. exchanged: said where forward is backward;
-    stops is then empty. notices: what else is remarkable in the log.
+    riding_s: time on the move, s. notices: what is remarkable in the log, and contradicts the calibration. stops: none
+    where forward is backward.
     """
 
     ride: Ride
@@ -37,9 +35,12 @@ class Overview:
     stops: list[Stop]
     quality: Quality
     riding_s: float
-    speed_correlation: float | None
-    exchanged: Notice | None
     notices: list[Notice]
+
+    @property
+    def exchanged(self) -> Notice | None:
+        """Of notices the one that forward is backward."""
+        return next((notice for notice in self.notices if notice.code == "forward-exchanged"), None)
 
     @property
     def has_speed(self) -> bool:
@@ -59,11 +60,11 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     >>> seen.summary.duration_s, seen.stops
     (2.5, [])
     """
-    total, mount = Summary(), MountCheck(ride.calibration)
+    total = Summary()
     notices: list[Notice] = []
 
     def blocks() -> Iterator[Channels]:
-        for block in ride.blocks(progress, notices, mount):
+        for block in ride.blocks(progress, notices):
             total.add(block)
             yield replace(block, **dict.fromkeys(_NOT_KEPT, np.full(len(block.t_s), np.nan)))
 
@@ -75,9 +76,10 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     total.frozen_s = min(frozen_s, total.missing_s) if isinstance(ride.log, Stretch) else frozen_s
     still = standing(course)
     found = quality(course, still)
-    contradiction = mount.notice(found.roll_deg)
-    exchanged = contradiction if contradiction and contradiction.code == "forward-exchanged" else None
-    notices += [contradiction] if contradiction and not exchanged else []
-    stops = [] if exchanged else stops_of(course, still)
     moved_s = min(total.riding_s, riding_s(course, still, whole=not isinstance(ride.log, Stretch)))
-    return Overview(ride, total, course, stops, found, moved_s, mount.sign.correlation, exchanged, notices)
+    seen = Overview(ride, total, course, [], found, moved_s, notices)
+    if seen.exchanged:
+        seen.exchanged.values = (*seen.exchanged.values[:2], found.roll_deg)
+    else:
+        seen.stops = stops_of(course, still)
+    return seen

@@ -8,8 +8,7 @@ from ..refusals import SWAPPED_DEG, sentence
 from ..remedies import COMMANDS, Remedies
 from .alignment_quality import LeanCost, Quality, lean_cost
 from .overview import Overview
-from .stops.brake_test import Stop
-from .stops.speed_stops import stops_by_speed
+from .stops.brake_test import Stop, stops_by_speed
 from .summary import Peak
 
 if TYPE_CHECKING:
@@ -174,7 +173,7 @@ def _alignment(seen: Overview, remedies: Remedies) -> str:
         said = f"Alignment: it seems off by {', '.join(known)}"
         far = abs(quality.roll_deg or 0.0) > SWAPPED_DEG and not seen.ride.car
         # swapped poses exchange forward and backward too
-        swapped = far and (seen.speed_correlation is None or seen.speed_correlation < 0.0)
+        swapped = far and (seen.exchanged or not seen.has_speed)
         said += ": were the poses swapped?" if swapped else ": was it held upright?" if far else "."
         if not seen.ride.car and not seen.exchanged:
             said += _cost(lean_cost(quality), seen.has_speed, remedies)

@@ -10,14 +10,13 @@ from kickstand.lean.meter import MAX_VARIANCE
 
 from ..calibration.file import CalibrationFile, calibration_beside, read_calibration
 from ..errors import InputError
+from ..estimation.smooth import smooth_blocks
 from ..logs.block import Block
 from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import File, Progress, log_stem, name_of
 from ..logs.stretch import Stretch
 from ..logs.table import Array
 from ..replay.meter_along import MeterAlong
-from ..replay.mount_check import MountCheck
-from ..smoothing.smooth import smooth_blocks
 from .channels import Channels, channels
 
 
@@ -45,20 +44,18 @@ class Ride:
         """A car, which has no lean; else a motorcycle."""
         return self.calibration.vehicle == "car"
 
-    def blocks(
-        self, progress: Progress | None = None, notices: list[Notice] | None = None, mount: MountCheck | None = None
-    ) -> Iterator[Channels]:
-        """The ride without the readings that froze: they are a gap. progress, notices: of read_blocks(). mount: is
-        given all of the log, also where the ride is a stretch of it. Raises InputError."""
-        lean, told, slow, some = _Lean(self.calibration), False, False, False
+    def blocks(self, progress: Progress | None = None, notices: list[Notice] | None = None) -> Iterator[Channels]:
+        """The ride without the readings that froze: they are a gap. progress, notices: of read_blocks(), of all of the
+        log, also where the ride is a stretch of it. Raises InputError."""
+        lean, absurd, slow, some = _Lean(self.calibration), False, False, False
         log, stretch = apart(self.log)
         for whole, found in self._read(log, progress, notices):
             block = whole.measured
             if not len(block.time_us):
                 continue
             rows = lean.follow(block, shown=found is None)
-            if notices is not None and not told and np.any(rows[:, 2] < 0.0):
-                told = True
+            if notices is not None and not absurd and np.any(rows[:, 2] < 0.0):
+                absurd = True
                 notices.append(_absurd(block, int(np.argmax(rows[:, 2] < 0.0))))
             slow |= self.smoothed and found is None
             if found is not None:
@@ -66,8 +63,6 @@ class Ride:
                 rows[:, 0], rows[:, 2] = shown[:, 0], np.radians(shown[:, 1]) ** 2
                 rows[:, 5] = rows[:, 2] <= MAX_VARIANCE  # NaN is not
             seen = channels(block, self.calibration, rows, self.car)
-            if mount is not None:
-                mount.add(seen.t_s, seen.force_g, seen.rate_dps, seen.speed_mps)
             if stretch is not None:
                 which = stretch.holds(block)
                 if not which.any():
@@ -77,7 +72,7 @@ class Ride:
             yield seen
         if not some:
             raise InputError(f"{self.name}: all readings are frozen, so that nothing is known: check the sensor")
-        if slow and notices is not None:
+        if notices is not None and slow:
             notices.append(Notice("smooth-slow"))
 
     def _read(
@@ -86,7 +81,8 @@ class Ride:
         """The blocks of the log, and what smooth_blocks() gives for each, None where it is not wanted or gives none."""
         if self.smoothed:
             return smooth_blocks(log, self.calibration, progress, notices, lines=False)
-        return ((block, None) for block in read_blocks(log, progress=progress, notices=notices, lines=False))
+        blocks = read_blocks(log, 2, progress, notices, lines=False, calibration=self.calibration)
+        return ((block, None) for block in blocks)
 
 
 def open_ride(log: Source, calibration: CalibrationFile | File | None = None, smoothed: bool = False) -> Ride:

@@ -14,15 +14,15 @@ from ..calibration import drive_events as events
 from ..calibration.drive import DriveFit, fit_drive
 from ..calibration.file import CalibrationFile, read_calibration, write_calibration
 from ..calibration.poses import refuse_same_file
-from ..calibration.remarks import remarks
-from ..calibration.ride.fit import RideFit, fit_ride
 from ..calibration.six import GOOD_FREE_POSE_G, SixPositions, fit_six_positions
 from ..calibration.two import TwoPositions, fit_two_positions
+from ..checks.log import remarks
+from ..checks.mount import of_calibration
+from ..estimation.alignment import RideFit, fit_ride
 from ..logs.reader import read_log
 from ..output import check_output
 from ..progress import Bar
 from ..refusals import OPPOSITE_SIGN, sentence
-from ..replay.mount_check import contradiction
 from .common import OUT, PATH, RIGHT_HANDED, VEHICLES, file_argument, print_lines, warn
 
 
@@ -58,7 +58,7 @@ def two(kickstand: Path, upright: Path, calibration: Path | None, side: str, out
     before = read_calibration(calibration) if calibration else None
     found = fit_two_positions(kickstand, upright, before, side)
     print_lines(_two_lines(found))
-    warn(upright, remarks(found.calibration, before))
+    warn(upright, of_calibration(found.calibration, before))
     _write(out, found.calibration)
 
 
@@ -81,11 +81,10 @@ def drive(logs: tuple[Path, ...], calibration: Path | None, vehicle: str | None,
         )
     for name, notice in found.notices:
         warn(name, [notice])
-    warn(logs[0], remarks(found.calibration))
+    warn(logs[0], of_calibration(found.calibration))
     if before and not found.poses:
         for log in logs:
-            wrong = contradiction(read_log(log), before)
-            warn(log, [wrong] if wrong else [])
+            warn(log, remarks(read_log(log), before, axes=False))
     print_lines(_drive_lines(found, several))
     _write(out, found.calibration)
 
@@ -130,7 +129,7 @@ def _six_lines(found: SixPositions) -> Iterable[str]:
         axes = ", ".join(found.beyond_sheet)
         yield f"warning: {axes} is beyond the data sheet (50 mg, z 80 mg, slope 3 %): used anyway"
     if found.free_pose is None:
-        yield "warning: no free pose: six poses fit exactly whatever they were, only a seventh can tell"
+        yield "warning: no free pose: six poses fit exactly whatever they were, only a seventh can show an error"
     yield "not aligned yet: next is kickstand calibrate two"
 
 
@@ -213,7 +212,7 @@ def _ride_lines(found: RideFit) -> Iterable[str]:
     yield "gyro bias  " + _along_axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
     yield "offset     " + _along_axes(found.calibration.accel_offset_g, "%+.4f g")
     yield from _matrix_lines(found.calibration.vehicle_from_sensor)
-    yield "upright is where the bike is balanced on straights; a ride does not tell the accelerometer's slopes"
+    yield "upright is where the bike is balanced on straights; the accelerometer's slopes are not observable from a ride"
 
 
 def _matrix_lines(vehicle_from_sensor) -> Iterable[str]:

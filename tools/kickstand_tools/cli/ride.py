@@ -18,6 +18,7 @@ from ..analysis.report import as_data, page
 from ..analysis.ride import open_ride
 from ..calibration.file import calibration_beside, calibration_path, read_calibration
 from ..errors import InputError
+from ..estimation.smooth import smooth_to_csv
 from ..imports.importing import Imported, import_recording, write_imported
 from ..joining.joined import Joined, join_track, write_joined
 from ..joining.track_files import read_track
@@ -28,7 +29,6 @@ from ..output import check_output
 from ..overlay.overlay import overlay
 from ..progress import Bar, spinner
 from ..replay.replay import replay_to_csv
-from ..smoothing.smooth import smooth_to_csv
 from .common import (
     CALIBRATION,
     JSON,
@@ -186,7 +186,7 @@ def report_command(
     """A ride in a page: maxima, time at large leans, and each stop as a brake test has it."""
     with Bar("reading") as bar:
         seen = overview(open_ride(_part(ride, from_s, to_s), calibration, smoothed=not live), bar.reach)
-    warn(ride, [*seen.notices, *([seen.exchanged] if seen.exchanged else [])])
+    warn(ride, seen.notices)
     if as_json:
         click.echo(json.dumps(as_data(seen)))
     else:
@@ -218,7 +218,6 @@ def plot_command(
     with spinner("drawing"):
         written = list(plot.draw(seen, out, tiles))
     print_lines(f"written: {path}" for path in written)
-    warn(ride, [seen.exchanged] if seen.exchanged else [])
 
 
 @click.command()

@@ -9,7 +9,7 @@ from ..analysis.stops.brake_test import RATE_S, Stop, find_stops
 from ..calibration.file import CalibrationFile
 from ..logs.reader import Source, read_blocks
 
-_LEAN_COLUMNS = 6  # of what the firmware's meter tells of a motorcycle
+_LEAN_COLUMNS = 6  # of what the firmware's meter says of a motorcycle
 
 
 def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:

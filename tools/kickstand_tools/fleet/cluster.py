@@ -204,7 +204,7 @@ def _undisturbed() -> Iterator[None]:
 
 
 def _silence() -> None:
-    """What happens to workers and to the scheduler is told by the results, and by InputErrors."""
+    """What happens to workers and to the scheduler is said by the results, and by InputErrors."""
     for name in ("distributed", *logging.root.manager.loggerDict):
         if name.split(".")[0] == "distributed":
             logging.getLogger(name).setLevel(logging.CRITICAL)

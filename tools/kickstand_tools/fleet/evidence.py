@@ -1,4 +1,4 @@
-"""What a drive shows of how the sensor sits, in pieces of some seconds whose sums can be compared.
+"""What a drive shows of how the sensor sits, in blocks of some seconds whose sums can be compared.
 
 As in the firmware's ForwardRegression, the force of each interval between two speeds is explained by
 
@@ -28,13 +28,13 @@ from kickstand.units import GAP_US, STANDARD_GRAVITY
 from ..logs.log import Log
 from ..logs.table import Array
 from ..signals.averages import moving_mean
-from ..signals.cells import cell_numbers, runs
+from ..signals.cells import runs
 from ..signals.standstill import STANDING_MPS
 
 INTERVAL_S = 0.9  # between two speeds that are used, at least
 MOVING_MPS = 2.0
 STANDING_WEIGHT = 0.3  # of a second at a stop: a long stop shows one slope of the road, however long it was
-LEVEL_S = 20.0  # the mean force over so long is about vertical, which tells the yaw rate from the other rates
+LEVEL_S = 20.0  # the mean force over so long is about vertical, which parts the yaw rate from the other rates
 BLOCK_S = 8.0
 # The road: variance of its slope in parts of that of all other errors in a mean over 1 s, and how soon it changes
 ROAD_SHARE, ROAD_M = 1.0, 150.0
@@ -47,7 +47,7 @@ TURN_WEIGHT = 0.3  # of turns against braking: tyres slip sideways in slow ones,
 class Intervals:
     """n intervals between two speeds of a log. t_s: their middles. force (n, 3, g): means, in the sensor's axes.
     terms (n, 4): what is multiplied by level, forward, left and arm. weight (n): s. speed (n): m/s. sway (n, 3, 3,
-    g^2): the covariance of the force's quick changes; zeros where it tells nothing."""
+    g^2): the covariance of the force's quick changes; zeros where it shows nothing."""
 
     t_s: Array
     force: Array
@@ -121,7 +121,7 @@ def blocks(logs: list[Intervals]) -> Blocks:
     for index, log in enumerate(logs):
         if not len(log.t_s):
             continue
-        starts = runs(cell_numbers(log.t_s - log.t_s[0], BLOCK_S))
+        starts = runs(np.floor((log.t_s - log.t_s[0]) / BLOCK_S))
         terms, force = _without_road(log)
         square.append(np.add.reduceat(terms[:, :, None] * terms[:, None, :], starts))
         product.append(np.add.reduceat(terms[:, :, None] * force[:, None, :], starts))
@@ -172,7 +172,7 @@ def handedness(found: Array, varied: Array) -> float:
 
 
 def _without_road(log: Intervals) -> tuple[Array, Array]:
-    """Terms and force, each less what the intervals before foretell of it, in parts of its standard deviation.
+    """Terms and force, each less what the intervals before predict of it, in parts of its standard deviation.
 
     Slope and camber of the road look like another level for some hundred metres: neighbouring intervals share their
     errors, and a plain regression takes what a road does during one braking for forward. The innovations of a filter
@@ -182,15 +182,15 @@ def _without_road(log: Intervals) -> tuple[Array, Array]:
     rows = np.hstack((log.terms, log.force))
     driven = log.speed * np.diff(log.t_s, prepend=log.t_s[0])
     kept = np.exp(-driven / ROAD_M)
-    foretold, unsure = np.zeros(rows.shape[1]), ROAD_SHARE
+    predicted, variance = np.zeros(rows.shape[1]), ROAD_SHARE
     for k, weight in enumerate(log.weight.tolist()):
-        foretold = foretold * kept[k]
-        unsure = ROAD_SHARE + (unsure - ROAD_SHARE) * kept[k] ** 2
-        gain = unsure * weight / (unsure * weight + 1.0)
-        rows[k] -= foretold
-        foretold = foretold + gain * rows[k]
+        predicted = predicted * kept[k]
+        variance = ROAD_SHARE + (variance - ROAD_SHARE) * kept[k] ** 2
+        gain = variance * weight / (variance * weight + 1.0)
+        rows[k] -= predicted
+        predicted = predicted + gain * rows[k]
         rows[k] *= math.sqrt(weight * (1.0 - gain))
-        unsure *= 1.0 - gain
+        variance *= 1.0 - gain
     return rows[:, :-3], rows[:, -3:]
 
 

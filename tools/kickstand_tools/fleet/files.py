@@ -101,7 +101,7 @@ def matches(pattern: str) -> list[str]:
 
 
 def identities(paths: Iterable[str]) -> dict[str, str]:
-    """What tells that a file has changed, by path: its ETag, or its size and time; "" where there is no file.
+    """What shows that a file has changed, by path: its ETag, or its size and time; "" where there is no file.
 
     Remote directories are listed once each.
     """
@@ -140,7 +140,7 @@ class _Named(io.BytesIO):
 
 
 def listed(parent: str) -> dict[str, str]:
-    """What tells that a file has changed, by path, of each in a directory of a store; none where there is no directory.
+    """What shows that a file has changed, by path, of each in a directory of a store; none where there is no directory.
     Raises InputError."""
     marks: dict[str, str] = {}
     with _in_store(parent, "read") as (fs, place), contextlib.suppress(FileNotFoundError):

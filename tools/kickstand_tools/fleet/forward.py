@@ -15,7 +15,7 @@ from ..signals.rotations import rotation_vector
 from . import evidence
 from .evidence import Intervals
 
-SENSOR_DEG = 0.3  # standard deviation of what slope errors of 1 % between the sensor's axes do to forward
+SENSOR_DEG = 0.3  # standard deviation of what scale errors of 1 % between the sensor's axes do to forward
 # The arm is for comparing parts of a drive. Over a whole one it may stand for other things than being swung: of three
 # recorded drives one was 2 degrees off with it, and none over 0.6 without.
 _TERMS = 3
@@ -39,7 +39,7 @@ class Forward:
 
 def find_forward(logs: list[Intervals], up: Array | None = None) -> Forward | None:
     """How the sensor sits. logs: the intervals of each. up (3): in the sensor's axes; None: as they show it. None if
-    they tell nothing."""
+    they show nothing."""
     whole = evidence.blocks(logs)
     count = len(whole.log)
     if count < _LEAST_BLOCKS:

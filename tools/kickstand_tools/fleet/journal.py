@@ -25,7 +25,7 @@ _LONGEST = 1 << 26  # bytes of a line; one of a thousand logs has a hundredth of
 class Journal:
     """with Journal(path) as journal: journal.add(key, result); key in journal; journal.results(keys).
 
-    key: tells the result of these logs, with these options, from any other. Results are read from the file again when
+    key: parts the result of these logs, with these options, from any other. Results are read from the file again when
     they are wanted: memory holds where each of them is. damaged: lines that could not be used.
     """
 

@@ -100,5 +100,5 @@ def is_pattern(path: str) -> bool:
 
 
 def _found(path: str) -> list[str]:
-    """A pattern's files; the path itself where nothing matches: the run tells that it is missing."""
+    """A pattern's files; the path itself where nothing matches: the run says that it is missing."""
     return (files.matches(path) or [path]) if is_pattern(path) else [path]

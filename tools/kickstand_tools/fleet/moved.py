@@ -19,7 +19,7 @@ from .evidence import Blocks, Intervals, blocks, fits, frames
 LEAST_DEG = 3.2  # smaller turns are within what roads, load and temperature do
 BETWEEN_SIGMAS, WITHIN_SIGMAS = 3.3, 4.3  # within a log there are many moments to choose from
 SUDDEN_SIGMAS = 3.8  # within a log, where the vertical jumps at that moment
-DOUBTED_SHARE = 0.7  # of these sigmas is enough where the firmware has its doubts about the mount, too
+SUSPECTED_SHARE = 0.7  # of these sigmas is enough where the firmware suspects the mount, too
 # What lasts on each side of the comparison, 1 sigma in degrees: pitch, yaw and roll (about left, up, forward), during a
 # log and from one log to another
 ROAD_DEG = np.array([0.5, 0.25, 0.35])
@@ -67,10 +67,10 @@ class Move:
         return float(np.linalg.norm(self.turn_deg / self.sigma_deg))
 
 
-def find_moves(logs: list[Intervals], doubted: bool = False) -> list[Move]:
-    """Where the mount turned, in the order of time. logs: the intervals of each. doubted: the firmware found parts of
+def find_moves(logs: list[Intervals], suspected: bool = False) -> list[Move]:
+    """Where the mount turned, in the order of time. logs: the intervals of each. suspected: the firmware found parts of
     the drive that differ."""
-    return _search(logs, blocks(logs), DOUBTED_SHARE if doubted else 1.0)
+    return _search(logs, blocks(logs), SUSPECTED_SHARE if suspected else 1.0)
 
 
 def _search(logs: list[Intervals], whole: Blocks, share: float) -> list[Move]:
@@ -110,7 +110,7 @@ def _sides(whole: Blocks, at: int, between: bool) -> tuple[Blocks, Blocks]:
 
 def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
     """How the mount turned from the one to the other, and its sigma (3 each, degrees along left, up, forward). None if
-    one of them tells too little."""
+    one of them shows too little."""
     if min(len(before.log), len(after.log)) < LEAST_BLOCKS:
         return None
     one, other = _known(before), _known(after)

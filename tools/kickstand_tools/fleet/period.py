@@ -30,7 +30,7 @@ NO_SPEED, MOVED, LEFT_HANDED = "no-speed", "mount-moved", "left-handed"
 # The vehicle is aligned, but brake tests or signals of this log are missing; because the disk for signals is full
 AFTERWARDS, DISK_FULL = "not-finished", "disk-full"
 _LEFT_OUT = ("cut-line", "cut-gzip", "nul-end", "frozen-readings")  # notices of a log that say what of it is not used
-_DOUBTS = (MOVED, "parts-differ", "uncertain")  # of the firmware: then it is worth while to look for a move
+_SUSPECTS = (MOVED, "parts-differ", "uncertain")  # of the firmware: then it is worth while to look for a move
 _PLOTTED = 160  # intervals in a picture
 _AGAINST = -0.5  # of a turn's force on the side of the turn: a gyro or axes that are mirrored
 
@@ -40,7 +40,7 @@ Row = dict[str, Any]
 @dataclass
 class PeriodResult:
     """What schema.TABLES has of one mount of one vehicle, and its picture: for each of some intervals the changes of
-    speed, what was felt forward, the centripetal acceleration, what was felt to the left (4, g)."""
+    speed, the force forward, the centripetal acceleration, the force to the left (4, g)."""
 
     alignment: Row
     moved: list[Row] = field(default_factory=list)
@@ -82,70 +82,99 @@ def _printable(result: PeriodResult) -> PeriodResult:
 def failed(period: Period, reason: str, message: str) -> PeriodResult:
     """The result of a period that gave none."""
     message = files.printable(message)
-    whose = {"vehicle": period.vehicle, "mount": period.mount}
     row = _alignment(period, "error", reason, message, [], len(period.paths))
-    return PeriodResult(row, errors=[whose | {"log": "", "reason": reason, "message": message}])
+    return PeriodResult(row, errors=[_error(period, "", reason, message)])
 
 
 def _result(period: Period, signals_to: str | None) -> PeriodResult:
-    whose = {"vehicle": period.vehicle, "mount": period.mount}
-    logs, errors = _logs(period, whose)
+    logs, errors = _logs(period)
     if not logs:
         refused = [row for row in errors if row["reason"] != UNREADABLE]
         because = (refused or errors)[0]
         status = "refused" if refused else "error"
         row = _alignment(period, status, because["reason"], because["message"], [], len(errors))
         return PeriodResult(row, errors=errors)
-    fit = fit_logs(logs, None, period.kind)
-    reason, message = fit.reason, str(fit.refusal or "")
-    driven, moves, found = [], [], None
-    if fit.status == "aligned" or fit.reason in _DOUBTS:
-        driven = [evidence.intervals(log, period.kind, fit.lag_s or 0.0, fit.bias_dps) for log in logs]
-        doubted = fit.reason in (MOVED, "parts-differ") or (fit.halves_deg or 0.0) > AGREE_DEG
-        moves = find_moves(driven, doubted)
-        found = find_forward(driven, fit.calibration.vehicle_from_sensor[1] if fit.status == "aligned" else None)
-        wrong = None if moves else _mirrored(driven)
-        if moves:
-            reason, message = MOVED, _moved_words(moves, logs)
-        elif wrong:
-            reason, message = LEFT_HANDED, wrong
-        elif fit.reason == MOVED:
-            late = fit_problem(fit.lag_s or 0.0, 1.0)  # which takes braking for standing on another slope
-            reason, message = (late.code, str(RefusedInput(late))) if late else (reason, message)
-        elif found and found.sure:
-            reason, message = "", ""
-        elif found and not fit.reason:
-            refusal = RefusedInput(AlignmentError("uncertain", found.sigma_deg, fit.used))
-            reason, message = refusal.code, str(refusal)
-    status = "refused" if reason else "aligned"
-    result = PeriodResult(_alignment(period, status, reason, message, logs, len(errors), fit, found), errors=errors)
+    drive = _drive(period, logs)
+    reason, message = _refusal(drive, logs)
+    aligned = not reason
+    row = _alignment(period, "aligned" if aligned else "refused", reason, message, logs, len(errors), drive)
     errors += [
-        whose | {"log": log.name, "reason": notice.code, "message": sentence(notice)}
+        _error(period, log.name, notice.code, sentence(notice))
         for log in logs
         for notice in log.notices
         if notice.code in _LEFT_OUT
     ]
-    result.moved = [whose | _moved_row(move, logs) for move in moves]
-    if driven:
-        result.picture = _picture(driven, found)
-    if found and status == "aligned":
+    moved = [_whose(period) | _moved_row(move, logs) for move in drive.moves]
+    result = PeriodResult(row, moved, [], errors, _picture(drive))
+    if aligned and drive.found:
         known = CalibrationFile(
-            gyro_bias_dps=fit.bias_dps, vehicle_from_sensor=found.frame, aligned=True, vehicle=period.kind
+            gyro_bias_dps=drive.fit.bias_dps, vehicle_from_sensor=drive.found.frame, aligned=True, vehicle=period.kind
         )
         for log in logs:
-            try:
-                tests = brake_tests(log, known)
-                result.brake_tests += [whose | {"log": log.name} | _stop_row(stop, log) for stop in tests]
-                if signals_to is not None:
-                    signals.write(signals_to, period, log, known)
-            except (InputError, OSError) as error:
-                full = getattr(error.__cause__ or error, "errno", None) in (errno.ENOSPC, errno.EDQUOT)
-                why = DISK_FULL if full else AFTERWARDS
-                errors.append(whose | {"log": log.name, "reason": why, "message": cause(error)})
+            _use(result, period, log, known, signals_to)
     return result
 
 
-def _logs(period: Period, whose: Row) -> tuple[list[Log], list[Row]]:
+@dataclass
+class _Drive:
+    """What the logs of a period show: by the firmware's own alignment and, where that is worth while, its intervals,
+    how the mount moved and where forward is."""
+
+    fit: DriveFit
+    intervals: list[evidence.Intervals] = field(default_factory=list)
+    moves: list[Move] = field(default_factory=list)
+    found: Forward | None = None
+
+
+def _drive(period: Period, logs: list[Log]) -> _Drive:
+    fit = fit_logs(logs, None, period.kind)
+    if fit.refusal and fit.reason not in _SUSPECTS:
+        return _Drive(fit)
+    driven = [evidence.intervals(log, period.kind, fit.lag_s or 0.0, fit.bias_dps) for log in logs]
+    suspected = fit.reason in (MOVED, "parts-differ") or (fit.halves_deg or 0.0) > AGREE_DEG
+    up = None if fit.refusal else fit.calibration.vehicle_from_sensor[1]
+    return _Drive(fit, driven, find_moves(driven, suspected), find_forward(driven, up))
+
+
+def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
+    """Why there is no alignment, its code and its words; empty where there is one."""
+    fit, found = drive.fit, drive.found
+    if drive.moves:
+        return MOVED, _moved_words(drive.moves, logs)
+    problem = None
+    if _mirrored(drive.intervals):
+        problem = AlignmentError(LEFT_HANDED)
+    elif fit.reason == MOVED:
+        problem = fit_problem(fit.lag_s or 0.0, 1.0)  # a late speed takes braking for standing on another slope
+    elif found and found.sure:
+        return "", ""
+    elif found and not fit.reason:
+        problem = AlignmentError("uncertain", found.sigma_deg, fit.used)
+    refusal = RefusedInput(problem) if problem else fit.refusal
+    return (refusal.code, str(refusal)) if refusal else ("", "")
+
+
+def _use(result: PeriodResult, period: Period, log: Log, known: CalibrationFile, signals_to: str | None) -> None:
+    """Add the brake tests of a log to the result, and write its signals."""
+    try:
+        tests = brake_tests(log, known)
+        result.brake_tests += [_whose(period) | {"log": log.name} | _stop_row(stop, log) for stop in tests]
+        if signals_to is not None:
+            signals.write(signals_to, period, log, known)
+    except (InputError, OSError) as error:
+        full = getattr(error.__cause__ or error, "errno", None) in (errno.ENOSPC, errno.EDQUOT)
+        result.errors.append(_error(period, log.name, DISK_FULL if full else AFTERWARDS, cause(error)))
+
+
+def _whose(period: Period) -> Row:
+    return {"vehicle": period.vehicle, "mount": period.mount}
+
+
+def _error(period: Period, log: str, reason: str, message: str) -> Row:
+    return _whose(period) | {"log": log, "reason": reason, "message": message}
+
+
+def _logs(period: Period) -> tuple[list[Log], list[Row]]:
     """Those that can be used, and a row of errors for each other."""
     logs, errors = [], []
     for path in period.paths:
@@ -156,26 +185,18 @@ def _logs(period: Period, whose: Row) -> tuple[list[Log], list[Row]]:
                 reason = NO_SPEED
             logs.append(usable(log, False))
         except RefusedInput as error:
-            errors.append(whose | {"log": path, "reason": error.code, "message": str(error)})
+            errors.append(_error(period, path, error.code, str(error)))
         except (InputError, OSError) as error:
-            errors.append(whose | {"log": path, "reason": reason, "message": cause(error)})
+            errors.append(_error(period, path, reason, cause(error)))
     return logs, errors
 
 
 def _alignment(
-    period: Period,
-    status: str,
-    reason: str,
-    message: str,
-    logs: list[Log],
-    left_out: int,
-    fit: DriveFit | None = None,
-    found: Forward | None = None,
+    period: Period, status: str, reason: str, message: str, logs: list[Log], left_out: int, drive: _Drive | None = None
 ) -> Row:
+    fit, found = (drive.fit, drive.found) if drive else (None, None)
     known = found if status == "aligned" else None
-    return {
-        "vehicle": period.vehicle,
-        "mount": period.mount,
+    return _whose(period) | {
         "kind": period.kind,
         "status": status,
         "reason": reason,
@@ -196,15 +217,13 @@ def _alignment(
     }
 
 
-def _mirrored(driven: list[evidence.Intervals]) -> str | None:
-    """What is wrong with the axes, by the turns: the force of a turn is on the side to which the gyro says it goes."""
+def _mirrored(driven: list[evidence.Intervals]) -> bool:
+    """Is the force of a turn on the other side than that to which the gyro says it goes?"""
     whole = evidence.blocks(driven)
     if not len(whole.log):
-        return None
+        return False
     found, varied = evidence.fits(np.sum(whole.square, axis=0), np.sum(whole.product, axis=0))
-    if evidence.handedness(found, varied) > _AGAINST:
-        return None
-    return str(RefusedInput(AlignmentError(LEFT_HANDED)))
+    return evidence.handedness(found, varied) <= _AGAINST
 
 
 def _moved_words(moves: list[Move], logs: list[Log]) -> str:
@@ -241,19 +260,18 @@ def _stop_row(stop: Stop, log: Log) -> Row:
 
 
 def _utc_s(log: Log, at_s: float) -> float | None:
-    """Universal Time at at_s in the log: the median of what its rows tell, because some come late."""
+    """Universal Time at at_s in the log: the median of what its rows say, because some come late."""
     starts = (log.utc_s - log.t_s)[np.isfinite(log.utc_s)]
     return float(np.median(starts)) + at_s if len(starts) else None
 
 
-def _picture(driven: list[evidence.Intervals], found: Forward | None) -> list[list[float]]:
+def _picture(drive: _Drive) -> list[list[float]]:
     """Where the mount moved the frame is a mean of what it was: the points show that it is none."""
-    if not found:
+    if not drive.found:
         return []
-    used = [log.weight > 0.0 for log in driven]
-    terms = np.concatenate([log.terms[which] for log, which in zip(driven, used)])
-    force = np.concatenate([log.force[which] for log, which in zip(driven, used)])
-    felt = force @ found.frame.T
-    table = np.column_stack((terms[:, 1], felt[:, 2], terms[:, 2], felt[:, 0]))
+    used = [log.weight > 0.0 for log in drive.intervals]
+    terms = np.concatenate([log.terms[which] for log, which in zip(drive.intervals, used)])
+    force = np.concatenate([log.force[which] for log, which in zip(drive.intervals, used)]) @ drive.found.frame.T
+    table = np.column_stack((terms[:, 1], force[:, 2], terms[:, 2], force[:, 0]))
     step = max(1, math.ceil(len(table) / _PLOTTED))
     return table[::step].round(3).tolist()

@@ -98,7 +98,7 @@ def run_fleet(
                     last_s = time.monotonic()
                     pause_s = max(_WRITE_S, _SHARE * (last_s - before_s))
         except BaseException:  # also when it is stopped
-            with contextlib.suppress(InputError):  # a full disk is told already
+            with contextlib.suppress(InputError):  # a full disk is said already
                 if next(journal.results(keys), None):
                     write_results(directory, journal.results(keys), len(keys))
             raise

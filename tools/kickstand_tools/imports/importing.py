@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from kickstand.errors import Notice
 
+from ..checks.course import log_agrees
 from ..errors import InputError
-from ..logs.axes.course import course_agrees
 from ..logs.csv_lines import write_log
 from ..logs.log import Log
 from ..logs.reader import read_log
@@ -161,7 +161,7 @@ def _check_sign(recording: Recording, log: Log) -> None:
     """
     if recording.sign_known:
         return
-    agrees = course_agrees(log.t_s, log.accel_g, log.gyro_dps, log.lat_deg, log.lon_deg)
+    agrees = log_agrees(log.t_s, log.accel_g, log.gyro_dps, log.lat_deg, log.lon_deg)
     if agrees is None:
         recording.notices.append(Notice("import-sign", recording.app))
     elif agrees:

@@ -7,7 +7,7 @@ from ..logs.table import Array
 from ..signals.averages import moving_mean
 from .course import Course
 from .motion import STEP_S, Motion
-from .pieces import Pieces, without_slope
+from .segments import Segments, without_trend
 
 _MOST_SINE = 0.87  # of a lean; over 60 degrees the speed or the rate is wrong
 
@@ -15,27 +15,27 @@ _MOST_SINE = 0.87  # of a lean; over 60 degrees the speed or the rate is wrong
 class Comparison:
     """A ride beside a track. A shift is the track's time at the ride's first sample, s since the track's first point.
 
-    given: the pieces of the track that lie within the ride, whatever shift within margin_s is the right one.
+    given: the segments of the track that lie within the ride, whatever shift within margin_s is the right one.
     """
 
-    def __init__(self, motion: Motion, course: Course, pieces: Pieces, shift_s: float, margin_s: float) -> None:
-        begin_s, end_s = pieces.begin_s[:, 0] - shift_s, pieces.end_s[:, -1] - shift_s
+    def __init__(self, motion: Motion, course: Course, segments: Segments, shift_s: float, margin_s: float) -> None:
+        begin_s, end_s = segments.begin_s[:, 0] - shift_s, segments.end_s[:, -1] - shift_s
         within = (begin_s > margin_s) & (end_s < motion.seconds - margin_s)
         missing = np.append(0, np.cumsum(~motion.there))
         first, last = (np.clip(np.rint(at / STEP_S).astype(int), 0, len(motion.there)) for at in (begin_s, end_s))
         within &= missing[last] - missing[first] <= 0.05 * (last - first)
-        self.given = pieces.part(within)
+        self.given = segments.part(within)
         self.middle_s = float(self.given.middle_s.mean()) if np.any(within) else 0.0
         self._sums = _double_sums(motion, course, shift_s)
         self._edges_s = np.arange(len(motion.there) + 1) * STEP_S
 
     def turned(self, shift_s: float, drift: float = 0.0, axes: int = 3) -> Array:
         """(axes, p, STEPS): by how much the ride has turned about its up and two axes across it, in degrees, as
-        Pieces.turned_deg. drift: by how many seconds a second the ride's clock loses against the track's."""
+        Segments.turned_deg. drift: by how many seconds a second the ride's clock loses against the track's."""
         return self._means(range(axes), shift_s, drift, self.given.course_weight)
 
     def sped_up(self, shift_s: float, drift: float = 0.0) -> Array:
-        """(3, p, STEPS): the integral of the force along the sensor's axes in m/s, as Pieces.speed_mps."""
+        """(3, p, STEPS): the integral of the force along the sensor's axes in m/s, as Segments.speed_mps."""
         return self._means(range(3, 6), shift_s, drift, self.given.speed_weight)
 
     def _means(self, columns: range, shift_s: float, drift: float, weight: Array) -> Array:
@@ -46,7 +46,7 @@ class Comparison:
         for column in columns:
             sums = self._sums[:, column]
             mean = np.interp(end_s, self._edges_s, sums) - np.interp(begin_s, self._edges_s, sums)
-            means.append(without_slope(mean / (end_s - begin_s), weight, given.middle_s))
+            means.append(without_trend(mean / (end_s - begin_s), weight, given.middle_s))
         return np.array(means)
 
 
@@ -54,7 +54,7 @@ def _double_sums(motion: Motion, course: Course, shift_s: float) -> Array:
     """(n + 1, 6): integrals over time of what the ride has turned (degrees; up and two axes across it) and of the
     integrated force (m/s; the sensor's axes): their differences are means between two times.
 
-    The rate about up is the yaw rate times the cosine of the lean. The track's speed tells the lean, because a bike
+    The rate about up is the yaw rate times the cosine of the lean. The track's speed shows the lean, because a bike
     leans as its turn demands.
     """
     up = motion.up

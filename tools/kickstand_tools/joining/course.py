@@ -1,4 +1,4 @@
-"""A track's course: the direction of each step from one point to the next, as far as it can be told."""
+"""A track's course: the direction of each step from one point to the next, as far as it is known."""
 
 from dataclasses import dataclass
 
@@ -9,7 +9,7 @@ from ..logs.table import Array
 from .track import FASTEST_MPS, LONGEST_S, SLOWEST_MPS, Track
 
 STEP_ERROR_M = 1.0  # of a step's length across it (1 sigma), as phones' receivers err from one second to the next
-COURSE_ERROR_DEG = 4.0  # of the rest: yaw by a gyro whose slope is off, and how positions are smoothed
+COURSE_ERROR_DEG = 4.0  # of the rest: yaw by a gyro whose scale factor is off, and how positions are smoothed
 
 
 @dataclass

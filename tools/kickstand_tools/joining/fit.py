@@ -12,7 +12,7 @@ from ..logs.table import Array
 from .compare import Comparison
 from .course import Course
 from .motion import Motion
-from .pieces import Pieces
+from .segments import Segments
 
 AROUND_S = 6.0  # how far from the rough shift the right one may be, with the drift at the ends of the ride
 _TRIED_S = 0.1  # apart
@@ -20,13 +20,13 @@ _SHIFTS = np.arange(-AROUND_S, AROUND_S + _TRIED_S / 2.0, _TRIED_S)
 _DRIFTS = np.arange(-300e-6, 301e-6, 20e-6)
 _USUAL_DRIFT = 100e-6  # 1 sigma: two crystals, one of them hot
 _USUAL_TILT = 0.05  # 1 sigma, rad: of up by an accelerometer's offset
-_BELIEVED = 1.0 / np.array([np.inf, _USUAL_DRIFT, _USUAL_TILT, _USUAL_TILT, np.inf, np.inf, np.inf]) ** 2
+_PRIOR = 1.0 / np.array([np.inf, _USUAL_DRIFT, _USUAL_TILT, _USUAL_TILT, np.inf, np.inf, np.inf]) ** 2
 _SAME_TRACK_S = 0.05  # 1 sigma, of what a receiver smooths more in bends than on straights
-_DOUBTS = 4.0  # degrees of freedom of Student's distribution, by which errors over two sigma count less
-_LEAST_ERROR = 0.5  # of its weight's: a better receiver does not make the gyro's slope and the lean exact
-_LEAST_COST = 0.5 * (_DOUBTS + 1.0) * np.log1p(_LEAST_ERROR**2 / _DOUBTS)  # of a step
+_FREEDOM = 4.0  # degrees of freedom of Student's distribution, by which errors over two sigma count less
+_LEAST_ERROR = 0.5  # of its weight's: a better receiver does not make the gyro's scale factor and the lean exact
+_LEAST_COST = 0.5 * (_FREEDOM + 1.0) * np.log1p(_LEAST_ERROR**2 / _FREEDOM)  # of a step
 _ROUNDS = 8
-_FEWEST = 2  # pieces to compare
+_FEWEST = 2  # segments to compare
 _STEPS_ALIKE = 4.0  # neighbouring steps whose errors are alike, because courses are smooth
 
 
@@ -35,8 +35,8 @@ class Fit:
     """shift_s: the track's time at the ride's first sample, s since the track's first point. drift: by how many seconds
     a second the ride's clock loses. sigma_s: standard deviation of where a point of the track lies in the ride, at the
     end of the ride where it is larger. correlation: of the courses' changes. evidence: natural logarithm of how much
-    likelier the courses are with the ride's turns than without. tilt (2): of the ride's up, rad. pieces: how many were
-    compared."""
+    likelier the courses are with the ride's turns than without. tilt (2): of the ride's up, rad. segments: how many
+    were compared."""
 
     shift_s: float
     drift: float
@@ -44,25 +44,26 @@ class Fit:
     correlation: float
     evidence: float
     tilt: Array
-    pieces: int
+    segments: int
 
 
-def fitted(motion: Motion, course: Course, pieces: Pieces, rough_s: float) -> Fit | None:
+def fitted(motion: Motion, course: Course, segments: Segments, rough_s: float) -> Fit | None:
     """The best fit within AROUND_S of a rough shift. None where the two have hardly anything in common there."""
-    compared = Comparison(motion, course, pieces, rough_s, AROUND_S + 1.0)
+    compared = Comparison(motion, course, segments, rough_s, AROUND_S + 1.0)
     if len(compared.given.begin_s) < _FEWEST:
         return None
     tried = _tried(compared, rough_s)
-    compared = Comparison(motion, course, pieces, tried.shift_s, 2.0)
+    compared = Comparison(motion, course, segments, tried.shift_s, 2.0)
     return _polished(compared, tried)
 
 
-def apart(motion: Motion, course: Course, pieces: Pieces, fit: Fit) -> float:
-    """By how much better the pieces fit if each has a shift of its own, in units of an error's cost and for each piece.
+def apart(motion: Motion, course: Course, segments: Segments, fit: Fit) -> float:
+    """By how much better the segments fit if each has a shift of its own, in units of an error's cost and for each
+    segment.
 
     Under 2 where the track belongs to the ride. The same road at other times of the day is over 4.
     """
-    compared = Comparison(motion, course, pieces, fit.shift_s, AROUND_S + 1.0)
+    compared = Comparison(motion, course, segments, fit.shift_s, AROUND_S + 1.0)
     given = compared.given
     shift_s = fit.shift_s * (1.0 - fit.drift) + fit.drift * compared.middle_s
     costs = _costs(compared, shift_s, fit.drift, np.append(1.0, fit.tilt))
@@ -86,7 +87,7 @@ def _tried(compared: Comparison, rough_s: float) -> _Tried:
     since_s = given.middle_s.mean(axis=1) - middle_s
     best = (np.inf, 0.0, 0.0)
     for drift in _DRIFTS:
-        # the cost of each piece at its own shift, for every shift in the middle of the ride
+        # the cost of each segment at its own shift, for every shift in the middle of the ride
         at = np.clip((_SHIFTS[:, None] + drift * since_s + AROUND_S) / _TRIED_S, 0.0, len(_SHIFTS) - 1.001)
         low = at.astype(int)
         column = np.arange(len(since_s))
@@ -101,7 +102,8 @@ def _tried(compared: Comparison, rough_s: float) -> _Tried:
 
 
 def _costs(compared: Comparison, shift_s: float, drift: float, along: Array) -> Array:
-    """(shifts, p) the cost of each piece at each of _SHIFTS around a shift. along: what of the ride's turns counts."""
+    """(shifts, p) the cost of each segment at each of _SHIFTS around a shift. along: what of the ride's turns
+    counts."""
     given = compared.given
     return np.array(
         [
@@ -111,17 +113,17 @@ def _costs(compared: Comparison, shift_s: float, drift: float, along: Array) -> 
     )
 
 
-def _cost(given: Pieces, error_deg: Array) -> Array:
-    """(p) how unlikely the errors (p, STEPS) of each piece are: the logarithm of Student's distribution."""
+def _cost(given: Segments, error_deg: Array) -> Array:
+    """(p) minus the log-likelihood of the errors (p, STEPS) of each segment are, by Student's distribution."""
     square = error_deg * error_deg * given.course_weight
-    return 0.5 * (_DOUBTS + 1.0) * np.log1p(square / _DOUBTS).sum(axis=1)
+    return 0.5 * (_FREEDOM + 1.0) * np.log1p(square / _FREEDOM).sum(axis=1)
 
 
 @dataclass
 class _Step:
     """What is known at one state of the seven unknowns: shift, drift, tilt (2), the sensor's forward axis (3).
 
-    model_deg (p, STEPS): the turned courses. pulls (p, 7): to where each piece pulls the unknowns. inverse (7, 7): of
+    model_deg (p, STEPS): the turned courses. pulls (p, 7): to where each segment pulls the unknowns. inverse (7, 7): of
     the curvature.
     """
 
@@ -137,7 +139,7 @@ def _polished(compared: Comparison, tried: _Tried) -> Fit:
     now = np.array([tried.shift_s, tried.drift, 0.0, 0.0, *forward])
     step = _step(compared, now)
     for _ in range(_ROUNDS):
-        by = step.inverse @ (step.pulls.sum(axis=0) - _BELIEVED * now)
+        by = step.inverse @ (step.pulls.sum(axis=0) - _PRIOR * now)
         by[0] = np.clip(by[0], -1.0, 1.0)
         now = now + by
         step = _step(compared, now)
@@ -161,17 +163,17 @@ def _step(compared: Comparison, now: Array) -> _Step:
     course_counts = _counts(course_error, given.course_weight)
     speed_counts = _counts(speed_error, given.speed_weight)
     curvature = np.einsum("ips,jps,ps->ij", by_course, by_course, course_counts)
-    curvature += np.einsum("ips,jps,ps->ij", by_speed, by_speed, speed_counts) + np.diag(_BELIEVED + 1e-9)
+    curvature += np.einsum("ips,jps,ps->ij", by_speed, by_speed, speed_counts) + np.diag(_PRIOR + 1e-9)
     pulls = np.einsum("ips,ps->pi", by_course, course_counts * course_error)
     pulls += np.einsum("ips,ps->pi", by_speed, speed_counts * speed_error)
     return _Step(model_deg, pulls, np.asarray(np.linalg.inv(curvature), dtype=float))
 
 
 def _judged(compared: Comparison, evidence: float, now: Array, step: _Step) -> Fit:
-    """The errors within a piece may belong together: the variance comes from how much the pieces pull at the solution,
-    each on its own."""
+    """The errors within a segment may belong together: the variance comes from how much the segments pull at the
+    solution, each on its own."""
     given, count, drift = compared.given, len(step.pulls), float(now[1])
-    spread = step.pulls.T @ step.pulls * count / max(count - 2, 1) + np.diag(_BELIEVED)
+    spread = step.pulls.T @ step.pulls * count / max(count - 2, 1) + np.diag(_PRIOR)
     covariance = (step.inverse @ spread @ step.inverse)[:2, :2]
     ends_s = np.array([given.begin_s.min(), given.end_s.max()]) - compared.middle_s
     variance = max(float(np.array([1.0, end]) @ covariance @ np.array([1.0, end])) for end in ends_s)
@@ -199,4 +201,4 @@ def _counts(error: Array, weight: Array) -> Array:
     """(p, STEPS) the weight of each error: by its own variance, and less the more unusual it is."""
     scaled = error * np.sqrt(weight)
     usual = max(float(np.median(np.abs(scaled[weight > 0.0]))) / 0.6745, _LEAST_ERROR)
-    return weight / usual**2 * (1.0 + 1.0 / _DOUBTS) / (1.0 + (scaled / usual) ** 2 / _DOUBTS)
+    return weight / usual**2 * (1.0 + 1.0 / _FREEDOM) / (1.0 + (scaled / usual) ** 2 / _FREEDOM)

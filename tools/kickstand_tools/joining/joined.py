@@ -51,7 +51,7 @@ def join_track(ride: Source, track: Path | str | Track, progress: Progress | Non
 
     ride: see read_log; it needs neither a calibration nor a speed. track: a .gpx or .fit file. Their clocks may differ
     by any time and drift. progress: called with how much of the ride has been read. Raises InputError where the track
-    is another ride's, and where that cannot be told.
+    is another ride's, and where that cannot be shown.
 
     >>> from kickstand_tools.api import simulate_ride
     >>> ride = simulate_ride("hills", seed=1, seconds=120.0)

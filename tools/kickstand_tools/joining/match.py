@@ -14,7 +14,7 @@ from ..signals.lag import correlations, log_likelihood_ratio, peaks
 from .course import Course, course
 from .fit import AROUND_S, Fit, apart, fitted
 from .motion import STEP_S, Motion
-from .pieces import STEPS, pieces
+from .segments import STEPS, segments
 from .track import LONGEST_S, SLOWEST_MPS, Track
 
 _GRID_S = 0.5
@@ -52,11 +52,11 @@ class Match:
 
 
 def match(motion: Motion, track: Track) -> Match:
-    """Raises InputError where the track does not belong to the ride, or where that cannot be told. The names of both
+    """Raises InputError where the track does not belong to the ride, or where that cannot be shown. The names of both
     stand before what it says."""
     track = track.once_a_second()
     steps = course(track)
-    parts = pieces(steps)
+    parts = segments(steps)
     _check_turns(motion, steps)
     found: list[Fit] = []
     mirrored, rough = _rough_shifts(motion, steps)
@@ -72,7 +72,7 @@ def match(motion: Motion, track: Track) -> Match:
         if mirrored:
             raise InputError("the ride turns left where the track turns right: " + OPPOSITE_SIGN)
         if best.correlation > _ALIKE:
-            common_s = best.pieces * STEPS
+            common_s = best.segments * STEPS
             raise InputError(f"they have {common_s} s with too few bends in common to be sure: {_LONGER}")
         raise InputError(f"nowhere does the ride turn as the track does: {_OTHER}")
     others = [fit for fit in found if abs(fit.shift_s - best.shift_s) > AROUND_S]

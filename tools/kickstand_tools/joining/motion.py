@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..logs.reader import Source, read_blocks
 from ..logs.source import Progress, name_of
 from ..logs.table import Array
-from ..logs.time_cells import no_cells, with_block
+from ..signals.cells import Cells
 
 STEP_S = 0.05
 _MOST_DPS = 20.0  # a cell that turns faster weighs no more for the direction of up
@@ -55,7 +55,7 @@ class Motion:
 
 def motion(ride: Source, progress: Progress | None = None, notices: list[Notice] | None = None) -> Motion:
     """Of a log (see read_log). progress, notices: of read_blocks(). Raises InputError."""
-    done, last, speed, positions = [], no_cells(), False, False
+    table, speed, positions = Cells(STEP_S), False, False
     for block in read_blocks(ride, 2, progress, notices):
         speed |= bool(np.any(np.isfinite(block.speed_mps)))
         positions |= bool(np.any(np.isfinite(block.lat_deg)))
@@ -63,18 +63,12 @@ def motion(ride: Source, progress: Progress | None = None, notices: list[Notice]
         if len(good.time_us):
             if good.t_s[-1] > _LONGEST_S:
                 raise InputError(f"{name_of(ride)} is longer than {_LONGEST_S / 3600:.0f} hours: cut it first")
-            readings = good.readings
-            cells = with_block(last, STEP_S, good.t_s, readings[:, :3], readings[:, 4:], good.speed_mps)
-            done.append(cells[:-1])
-            last = cells[-1:]
-    table = np.vstack([*done, last])
-    if not len(table):
+            table.add(good.t_s, good.readings[:, [0, 1, 2, 4, 5, 6]], np.zeros((len(good.t_s), 0)))
+    cells = table.evenly(round(_LONGEST_S / STEP_S) + 1)
+    if cells is None:
         raise InputError(f"{name_of(ride)}: all readings are frozen: check the sensor")
-    place = table[:, 0].astype(int)
-    n = int(place[-1]) + 1
-    force, rate, there = np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n, dtype=bool)
-    force[place] = table[:, 1:4] / table[:, 7:8]
-    measured = table[:, 4:7] / table[:, 7:8]
-    rate[place] = measured - np.median(measured, axis=0)
-    there[place] = True
-    return Motion(force, rate, there, speed, positions)
+    missing = np.zeros((cells.first, 6))  # frozen from the beginning on
+    means = np.vstack((missing, cells.means - np.append(np.zeros(3), np.nanmedian(cells.means[:, 3:], axis=0))))
+    there = np.append(missing[:, 0], cells.count) > 0
+    means[~there] = 0.0
+    return Motion(means[:, :3], means[:, 3:], there, speed, positions)

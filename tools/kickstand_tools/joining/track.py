@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..logs.axes.course import distance_m
 from ..logs.table import Array, Table
+from ..signals.geography import distance_m
 
 LONGEST_S = 6.0  # between two points of one course: watches write one so rarely on straights
 SLOWEST_MPS = 2.5  # of a step that is more than the positions' errors
@@ -39,12 +39,12 @@ class Track(Table):
         way_m = np.append(0.0, np.cumsum(np.hypot(*self.steps_m())))
         span_s = self.utc_s[2 * _AROUND :] - self.utc_s[: -2 * _AROUND]
         mean = (way_m[2 * _AROUND :] - way_m[: -2 * _AROUND]) / span_s
-        told = (span_s <= LONGEST_S) & (mean > SLOWEST_MPS) & (mean < FASTEST_MPS)
-        speed[_AROUND:-_AROUND] = np.where(told, mean, np.nan)
+        known = (span_s <= LONGEST_S) & (mean > SLOWEST_MPS) & (mean < FASTEST_MPS)
+        speed[_AROUND:-_AROUND] = np.where(known, mean, np.nan)
         return speed
 
     def once_a_second(self) -> "Track":
-        """A point a second of a track that has more: closer ones tell less of the course than they err."""
+        """A point a second of a track that has more: closer ones show less of the course than they err."""
         if len(self.utc_s) < 2 or np.median(np.diff(self.utc_s)) > _OFTEN_S:
             return self
         first = np.unique(np.floor(self.utc_s - self.utc_s[0]), return_index=True)[1]

@@ -4,17 +4,16 @@ import itertools
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from kickstand.errors import Notice
 from numpy.typing import NDArray
 
+from ..checks.log import Checks
+from ..checks.units import check_units
 from ..errors import InputError
 from . import cells
-from .axes.bends import Bends
-from .axes.course import Course
-from .axes.handedness import Handedness
 from .block import Block
 from .cells import COLUMNS, OPTIONAL, TRACK
 from .csv_reader import numbers_in
@@ -22,10 +21,11 @@ from .even_times import even_blocks
 from .frozen import FrozenReadings
 from .log import Log
 from .source import File, Progress, chunks, name_of, total_bytes
-from .speed_unit import SpeedUnit
 from .stretch import Stretch
 from .table import Array
-from .units_check import check_units
+
+if TYPE_CHECKING:
+    from ..calibration.file import CalibrationFile
 
 BLOCK_BYTES = 1 << 20  # of text, some 15000 samples
 BLOCK_SAMPLES = 60_000  # of a log in memory
@@ -73,19 +73,19 @@ def read_blocks(
     notices: list[Notice] | None = None,
     axes: bool = True,
     lines: bool = True,
+    calibration: "CalibrationFile | None" = None,
 ) -> Iterator[Block]:
     """The same block by block, however long the log is. Readings that froze are marked in each block. notices: what is
-    remarkable in the log is appended to it at the end. lines: keep the rows as CSV too, which take the most memory."""
+    remarkable in the log is appended to it at the end, and what contradicts this calibration of it. lines: keep the
+    rows as CSV too, which take the most memory."""
     name, count = name_of(source), 0
     remarks: list[Notice] = []
-    speed_unit, frozen = SpeedUnit(name), FrozenReadings()
-    judging = notices is not None and axes
-    judges, course = (Handedness(), Bends()) if judging else (), Course()
+    checks, frozen = Checks(name), FrozenReadings()
     whole = source.source if isinstance(source, Stretch) else source
     total = len(whole.t_s) if isinstance(whole, Log) else total_bytes(whole)
     for block in _unchecked(source, remarks):
         if not count:
-            check_units(name, block)
+            check_units(name, block.time_us, block.readings[:, :3])
         count += len(block.time_us)
         if count > MOST_SAMPLES:
             raise InputError(
@@ -93,20 +93,15 @@ def read_blocks(
             )
         block.lines = block.lines if lines else []
         block.frozen = frozen.mark(block)
-        if block.has_speed:
-            speed_unit.add(block.t_s, block.readings[:, :3], block.speed_mps)
-        for judge in judges:
-            judge.add(block.t_s, block.readings[:, :3], block.readings[:, 4:], block.speed_mps)
-        if judging:
-            course.add(block.t_s, block.readings[:, :3], block.readings[:, 4:], block.lat_deg, block.lon_deg)
+        checks.add(block.measured)
         yield block
         if progress:
             progress(block.done, total)
     if count < minimum:
         raise InputError(f"{name} is too short: {count} samples, at least {minimum} are needed")
+    found = checks.remarks(axes and notices is not None, calibration)
     if notices is not None:
-        judged = [notice for notice in (judge.notice() for judge in (*judges, course)) if notice]
-        notices += remarks + frozen.notices() + judged[:1]  # one cause is told once
+        notices += remarks + frozen.notices() + found
 
 
 def check_first_line(log: Path) -> None:

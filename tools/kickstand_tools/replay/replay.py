@@ -25,7 +25,6 @@ from ..logs.stretch import Stretch, within
 from ..logs.table import Array, Table
 from . import replay_engine
 from .meter_along import MeterAlong
-from .mount_check import MountCheck
 
 _CHUNK = 500  # samples between two calls of progress while an emulated Pico works
 
@@ -117,17 +116,13 @@ def replay_blocks(
     """Each block of the log with the engine's results for it (n, COLUMNS), NaN where the readings froze: there the
     engine is told of a gap. A car's display shows no lean, so lean_sigma_deg is NaN throughout. notices is appended to
     at the end."""
-    mount, car = MountCheck(calibration), calibration.vehicle == "car"
+    car = calibration.vehicle == "car"
     whole, stretch = apart(log)
     for block, results in _RUN[engine](whole, calibration, progress, notices):
-        measured = block.measured
-        mount.add(measured.t_s, *calibration.in_vehicle(measured.readings), measured.speed_mps)
         found = _with_frozen(block, results)
         if car:
             found[:, _SIGMA] = np.nan
         yield from within(stretch, block, found)
-    contradiction = mount.notice()
-    notices += [contradiction] if contradiction else []
     notices += [Notice("car-replayed")] if car else []
 
 
@@ -149,7 +144,7 @@ def _cpython(
     log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
 ) -> Iterator[Replayed]:
     meter = MeterAlong(calibration)
-    for block in read_blocks(log, 2, progress, notices):
+    for block in read_blocks(log, 2, progress, notices, calibration=calibration):
         yield block, meter.columns(block.measured)
 
 
@@ -158,7 +153,7 @@ def _two_processes(
 ) -> Iterator[Replayed]:
     from . import second_process  # a browser's Python cannot import it
 
-    return second_process.columns_of(read_blocks(log, 2, progress, notices), calibration)
+    return second_process.columns_of(read_blocks(log, 2, progress, notices, calibration=calibration), calibration)
 
 
 def _by_records(
@@ -167,7 +162,8 @@ def _by_records(
     """By replay_engine.run() on another Python, which reads records and writes results."""
     log = read_twice(log)
     with engine(_records(read_blocks(log), calibration), progress) as results:
-        for block in read_blocks(log, 2, None if engine is rp2040 else progress, notices):
+        shown = None if engine is rp2040 else progress
+        for block in read_blocks(log, 2, shown, notices, calibration=calibration):
             wanted = _RESULT_BYTES * int(np.count_nonzero(~block.frozen))
             found = results.read(wanted)
             if len(found) < wanted:

@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from typing import IO
 
 from kickstand.lean.meter import FALLEN_DEG
-from mpremote.transport_serial import SerialTransport
 
 from ..calibration.file import CalibrationFile
 from ..deploy.board_console import BrokenOff, lines
-from ..deploy.connection import refuse_unfit_firmware
+from ..deploy.connection import Board, refuse_unfit_firmware
 from ..errors import InputError, cause
 from ..logs.cells import TRACK
 from ..replay.replay_engine import NO_SPEED, Replay
@@ -58,21 +57,6 @@ class LiveReading:
     max_brake_g: float
     rate_hz: float
     seconds: float
-
-    @property
-    def lean_deg(self) -> float | None:
-        """At the end."""
-        return self.moments[-1][1] if self.moments else None
-
-    @property
-    def forward_g(self) -> float | None:
-        """At the end."""
-        return self.moments[-1][2] if self.moments else None
-
-    @property
-    def left_g(self) -> float | None:
-        """At the end."""
-        return self.moments[-1][3] if self.moments else None
 
 
 class Recording:
@@ -144,7 +128,7 @@ class Recording:
             notes.append(missing_note(missing_s))
 
 
-def blocks(transport: SerialTransport, name: str, notes: list[str], stopped: threading.Event) -> Iterator[Block]:
+def blocks(transport: Board, name: str, notes: list[str], stopped: threading.Event) -> Iterator[Block]:
     """Whole blocks as the board says them, until `stopped` is set or the connection is lost. name: the port's, for
     notes, which get a line for what has ended it. Raises NoFirmware, OutdatedFirmware."""
     parts: list[bytes] = []
@@ -163,7 +147,7 @@ def blocks(transport: SerialTransport, name: str, notes: list[str], stopped: thr
         parts = []
 
 
-def _lines(transport: SerialTransport, name: str, notes: list[str], stopped: threading.Event) -> Iterator[bytes]:
+def _lines(transport: Board, name: str, notes: list[str], stopped: threading.Event) -> Iterator[bytes]:
     """What the app on the board prints, line by line."""
     try:
         yield from lines(transport, _START, _SILENT_S, stopped)

@@ -1,8 +1,8 @@
 """A motorcycle's leaning against its turning, from its rates alone.
 
 A bike that begins to turn leans: tan(lean) = -speed x yaw rate / g. So the rate about forward, which changes the lean,
-goes with minus the change of the yaw rate, which also tells forward from backward. Leaned, it turns about its own left
-too, by yaw rate x sin(lean): as a product of two quantities, that tells handedness and the unit of the rates.
+goes with minus the change of the yaw rate, which also parts forward from backward. Leaned, it turns about its own left
+too, by yaw rate x sin(lean): as a product of two quantities, that shows handedness and the unit of the rates.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from .averages import moving_mean, moving_spread
 
 WINDOW_S = 0.2  # rates and forces are means over it
 SMOOTH_S = 0.6  # of the rates whose changes are compared
-SLOW_S = 12.0  # leans that last longer are not told from the drift of the gyro
+SLOW_S = 12.0  # leans that last longer cannot be parted from the drift of the gyro
 
 
 @dataclass

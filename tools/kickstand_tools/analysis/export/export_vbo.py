@@ -17,8 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...logs.axes.course import distance_m
 from ...logs.table import Array
+from ...signals.geography import distance_m
 from ..channels import Channels
 
 # (title in [header], name in [column names]); of the others (both, unit, channel)

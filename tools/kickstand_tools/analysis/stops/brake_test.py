@@ -5,7 +5,7 @@ ve = 0.1 v0 in km/h, and sb and se the distances in metres from there to vb and 
 
     dm = (vb^2 - ve^2) / (25.92 (se - sb))   in m/s2.
 
-At the standstill the force tells the slope of the road, and the gyro's readings are its bias. From there speed and
+At the standstill the force shows the slope of the road, and the gyro's readings are its bias. From there speed and
 pitch are integrated backwards, so that the dive of the fork is not taken for braking:
 
     dq/dt = w_y sin t - w_x cos t,   dv/dt = f_z - g sin q       (as in kickstand.lean.bike_model)
@@ -13,8 +13,8 @@ pitch are integrated backwards, so that the dive of the fork is not taken for br
 with lean t (> 0 to the right), pitch q (nose up), speed v, rates w and specific force f along left (x), up (y) and
 forward (z).
 
-Where the log has a speed, the integrated one is fitted to it (speed_fit.py). Elsewhere it has to be plausible
-(plausible.py).
+Where the log has a speed, the integrated one is fitted to it (speed_fit.py). Integrated from a
+standstill that was not one, speed and distance can come out as anything: elsewhere it has to be plausible.
 """
 
 from dataclasses import dataclass
@@ -25,9 +25,9 @@ from numpy.typing import NDArray
 
 from ...logs.table import Array
 from ...signals.averages import integral, smoothed
+from ...signals.standstill import STANDING_MPS
 from ..channels import Channels
 from ..downsample import thinned
-from .plausible import closes, plausible
 from .speed_fit import fitted_speed, speed_delay_s
 from .standstill import standing
 
@@ -44,6 +44,13 @@ ONSET_S = 0.6  # at most, from the faint share to the other
 # Height of the sensor above the point about which a bike pitches, which is as high as the wheels' hubs. When the nose
 # goes down, a sensor under the seat moves forward.
 SENSOR_HEIGHT_M = 0.65
+
+MAX_SPEED_MPS = 250.0 / 3.6
+MAX_SIDE_M, MAX_HEADING_DEG = 15.0, 30.0  # off a straight line: more is a bend, not a stop
+# How far the integrated speed may be from 0 at the standstill before: OPEN_MPS, and OPEN_MPS2 for each second between.
+# A degree of pitch makes 0.17 m/s2, and a gyro's drift adds to it: over more than SHOWING_S the speed shows nothing.
+OPEN_MPS, OPEN_MPS2, SHOWING_S = 3.0, 0.7, 30.0
+SPEED_S, SURELY = 15.0, 1.5  # a stop that the speed alone shows: at most so long, so many times MIN_MFDD_MPS2
 
 SMOOTH_S = 0.2  # accelerations and jerks are means over it
 
@@ -117,6 +124,29 @@ def mfdd_mps2(speed_mps: Array, distance_m: Array) -> float:
     return float((3.6**2 * (vb * vb - ve * ve)) / (25.92 * (se - sb)))
 
 
+def closes(speed_mps: float, seconds: float) -> bool:
+    """True if speed_mps, integrated back from a standstill to the one before, is as near to 0 as that time allows."""
+    return seconds > SHOWING_S or abs(speed_mps) < OPEN_MPS + OPEN_MPS2 * seconds
+
+
+def plausible(initial_speed_mps: float, side_m: float, heading_deg: float) -> bool:
+    """True for a stop that can be: from this speed, so far to the side, turned by so much."""
+    return initial_speed_mps < MAX_SPEED_MPS and abs(side_m) < MAX_SIDE_M and abs(heading_deg) < MAX_HEADING_DEG
+
+
+def stops_by_speed(ride: Channels) -> bool:
+    """True if the speed in the log alone falls to a stop from over 10 km/h, surely hard enough to be a brake test, even
+    if the force does not show it."""
+    there = ~np.isnan(ride.speed_mps)
+    time, speed = ride.t_s[there], ride.speed_mps[there]
+    for end in np.flatnonzero((speed[1:] < STANDING_MPS) & (speed[:-1] >= STANDING_MPS)) + 1:
+        before = slice(int(np.searchsorted(time, time[end] - SPEED_S)), end)
+        fall = speed[before] / (time[end] - time[before])
+        if np.any((speed[before] > MIN_SPEED_MPS) & (fall > SURELY * MIN_MFDD_MPS2)):
+            return True
+    return False
+
+
 def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | None:
     """The stop that ends in the standstill that begins at index rest, None if it is none.
 
@@ -124,8 +154,10 @@ def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | 
     """
     time = part.t_s
     acceleration, pitch_rate, yaw_rate = _acceleration(part, rest)
-    felt = integral(time, acceleration)
-    speed = felt - felt[-1] + SENSOR_HEIGHT_M * np.radians(pitch_rate)  # integrated backwards from the standstill
+    integrated = integral(time, acceleration)
+    speed = (
+        integrated - integrated[-1] + SENSOR_HEIGHT_M * np.radians(pitch_rate)
+    )  # integrated backwards from the standstill
     smooth = smoothed(acceleration, time, SMOOTH_S)
     begin = _onset(smooth, time, rest)
     if begin is None:

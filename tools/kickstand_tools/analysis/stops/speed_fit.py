@@ -1,7 +1,7 @@
 """A speed integrated from the acceleration, corrected by the speed in the log.
 
-A log with a speed once a second has two or three values in a hard stop, which do not tell its shape. The acceleration
-tells the shape, but its integral drifts.
+A log with a speed once a second has two or three values in a hard stop, which do not show its shape. The acceleration
+shows the shape, but its integral drifts.
 """
 
 import numpy as np
@@ -25,7 +25,7 @@ SIGMA_WALK_MPS2, KNOT_S = 0.1, 0.5  # per square root of a second
 def speed_delay_s(ride: Channels) -> float:
     """How late the log's speed is, as a satellite receiver's is: the delay with which its changes fit the force best.
 
-    0 if the ride does not tell.
+    0 if the ride does not show it.
     """
     there = np.flatnonzero(~np.isnan(ride.speed_mps))
     if len(there) < ENOUGH_SPEEDS:
@@ -52,8 +52,8 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
     which braking begins. delay_s: of the log's speed.
 
     Least squares with prior knowledge: log = (1 + scale) v + integral of slope to the end - delay dv/dt. The slope is
-    the part of the force that comes from hill and dive and that the gyro has not told: a random walk back in time, from
-    nearly 0 at standstill.
+    the part of the force that comes from hill and dive and that the gyro has not measured: a random walk back in time,
+    from nearly 0 at standstill.
     """
     time = part.t_s
     values = np.flatnonzero(~np.isnan(part.speed_mps))

@@ -9,7 +9,7 @@ from ...signals.standstill import STANDING_MPS
 from ..channels import Channels
 from ..downsample import spacing_s
 
-STALE_S = 3.0  # an older speed tells nothing
+STALE_S = 3.0  # an older speed shows nothing
 
 # Without a speed: a vehicle stands still while it shakes, over QUIET_S, by less than a share of its shaking when moving
 QUIET_S = 1.0
@@ -57,7 +57,7 @@ def _quiet(ride: Channels) -> NDArray[np.bool_]:
 
 
 def _rested(ride: Channels) -> NDArray[np.bool_]:
-    """The rests that the lean filter found, for a road so smooth that shaking tells nothing. Each is extended back to
+    """The rests that the lean filter found, for a road so smooth that shaking shows nothing. Each is extended back to
     where the forward force became that of the rest."""
     still = ride.resting > 0.5
     if not np.any(still):

@@ -9,7 +9,7 @@ import numpy as np
 from kickstand.errors import Notice
 
 from ...errors import InputError
-from ...logs.axes.course import distance_m
+from ...signals.geography import distance_m
 from ..files import Piece
 from ..recording import SECOND_NS, Array, Recording, sensor_of, track_of
 from ..sheets import Sheet, names_in, plain, read_sheet, unit_in

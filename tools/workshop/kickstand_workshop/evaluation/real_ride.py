@@ -13,10 +13,10 @@ import numpy as np
 from kickstand.errors import Notice
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.calibration.ride.fit import fit_ride
+from kickstand_tools.checks.log import remarks
 from kickstand_tools.errors import InputError
+from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.reader import Log, read_log
-from kickstand_tools.replay.mount_check import contradiction
 from kickstand_tools.signals.averages import moving_mean
 from numpy.typing import NDArray
 
@@ -63,8 +63,7 @@ def compare(path: Path) -> Comparison:
         name: RealScore(rms((lean - reference)[riding]), slope(lean[riding], reference[riding], _LEANED_DEG))
         for name, lean in shown.items()
     }
-    wrong = contradiction(log, calibration)
-    notices = [*log.notices, *([wrong] if wrong else [])]
+    notices = [*log.notices, *remarks(log, calibration, axes=False)]
     return Comparison(path.name, scores, {"time": time, "reference": reference, **shown}, notices)
 
 

@@ -1,0 +1,243 @@
+"""A calibration of another mount is noticed by every command that takes one; a right one never is."""
+
+import json
+import re
+from dataclasses import replace
+
+import analysis_rides
+import command
+import numpy as np
+import pytest
+from checked import cells_of, words
+from kickstand.errors import Notice
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.checks.cells import CellTable
+from kickstand_tools.checks.mount import contradiction
+from kickstand_tools.estimation.alignment import fit_ride
+from kickstand_tools.logs.log import Log
+from kickstand_tools.logs.reader import read_log
+from kickstand_tools.refusals import RefusedInput, sentence
+from kickstand_tools.simulation.profiles import PROFILES
+from kickstand_tools.simulation.ride import ride
+from kickstand_tools.simulation.scripted import script
+from kickstand_workshop.evaluation.runs import calibrated_by_poses
+
+G = 9.80665
+
+
+def turned(matrix, left=0.0, up=0.0, forward=0.0):
+    """A mount's matrix, wrongly turned about the vehicle's axes by so many degrees."""
+    found = np.eye(3)
+    for axis, angle in enumerate((left, up, forward)):
+        s, c = np.sin(np.radians(angle)), np.cos(np.radians(angle))
+        turn = np.eye(3)
+        i, j = (axis + 1) % 3, (axis + 2) % 3
+        turn[i, i], turn[j, j], turn[i, j], turn[j, i] = c, c, -s, s
+        found = turn @ found
+    return found @ matrix
+
+
+def made(profile, upright_error_deg=0.0, speed=True, seed=4):
+    """A ride at 50 Hz and its calibration by six, then two poses, which are far enough apart."""
+    simulated = ride(profile, seed, 150.0, upright_error_deg)
+    try:
+        calibration = calibrated_by_poses(simulated)
+    except RefusedInput:
+        return made(profile, upright_error_deg, speed, seed + 1)
+    mps = np.full(len(simulated.time), np.nan)
+    if speed:
+        mps[::200] = simulated.truth["speed_mps"][::200]
+    every = slice(None, None, 4)
+    readings = simulated.readings[every]
+    log = Log(simulated.time[every], readings[:, :3], readings[:, 4:], mps[every])
+    return log, calibration
+
+
+def other(calibration, vehicle="", **turns):
+    matrix = turned(calibration.vehicle_from_sensor, **turns)
+    return replace(calibration, vehicle_from_sensor=matrix, vehicle=vehicle, kickstand_side="")
+
+
+def said(log, calibration):
+    return words(contradiction(cells_of(log), calibration))
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_right_calibrations_are_never_accused(profile):
+    for error in -3.5, 3.5:
+        log, calibration = made(profile, error)
+        silent = Log(log.t_s, log.accel_g, log.gyro_dps)
+        for each in log, silent:
+            assert said(each, calibration) == "", error
+            assert said(each, other(calibration, up=8.0)) == ""  # what two poses may be off
+
+
+@pytest.mark.parametrize(("profile", "speed"), [("street", True), ("city", False), ("track", False), ("hills", True)])
+def test_wrong_ones_are(profile, speed):
+    log, calibration = made(profile, speed=speed)
+    by = "speed" if speed else "bends"
+    for turns, line in (
+        ({"up": 180.0}, "forward and backward are exchanged: calibrate two with the other --side?"),
+        ({"up": 90.0}, f"by the {by} of this ride forward is "),
+        ({"up": -30.0}, " so lean, braking and cornering are wrong: is it another mount's? Calibrate again: "),
+        ({"left": 40.0}, "the calibration's up is "),
+        ({"forward": 90.0, "up": 70.0}, "so nothing computed with it is right: is it another mount's? "),
+    ):
+        assert line in said(log, other(calibration, "", **turns)), turns
+    for angle, side in (90.0, "left"), (-90.0, "right"):
+        notice = contradiction(cells_of(log), other(calibration, up=angle))
+        assert notice is not None
+        found, how, car = notice.values
+        assert (found, how, car) == (pytest.approx(angle, abs=8.0), by, False)
+        assert f" degrees to the {side} of the calibration's" in sentence(notice)
+    upside_down = Log(log.t_s, -log.accel_g, log.gyro_dps, log.speed_mps)
+    assert "do all accelerations have the opposite sign? At rest up reads +1 g" in said(upside_down, calibration)
+
+
+def test_another_seeds_calibration(rides=("street", "sweeper", "city")):
+    """Of another bike, whose sensor is mounted in another way."""
+    pairs = [made(profile) for profile in rides]
+    for (log, _), (_, calibration) in zip(pairs, pairs[1:] + pairs[:1]):
+        assert "is it another mount's?" in said(log, calibration)
+
+
+def test_gaps():
+    log, calibration = made("street")
+    wrong = other(calibration, up=90.0)
+    kept = (log.t_s % 30.0) < 24.0
+    gaps = Log(log.t_s[kept], log.accel_g[kept], log.gyro_dps[kept], log.speed_mps[kept])
+    assert said(gaps, calibration) == ""
+    assert "by the speed of this ride forward is " in said(gaps, wrong)
+
+
+def test_what_does_not_tell():
+    log, calibration = made("street")
+    assert said(log, CalibrationFile()) == ""  # not aligned: that is said elsewhere
+    short = slice(0, 500)
+    few = Log(log.t_s[short], log.accel_g[short], log.gyro_dps[short], log.speed_mps[short])
+    assert said(few, other(calibration, up=90.0)) == ""
+    silent = Log(log.t_s, log.accel_g, log.gyro_dps)
+    assert said(silent, other(calibration, "car", up=90.0)) == ""  # a car does not lean
+
+
+@pytest.mark.parametrize("name", ["replay", "report", "plot", "export"])
+def test_the_commands_say_so_in_one_line(tmp_path, name):
+    legs = [script.upright(4)]
+    for side in (-1, 1, -1, 1):
+        legs += [script.accelerate(15, 5), script.turn(30 * side, 5), script.straight(2), script.brake(5, 3)]
+    path = analysis_rides.write(tmp_path, legs, speed_hz=1)
+    cal = tmp_path / "wrong.json"
+    cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]}))
+    more = {"replay": ("--out", tmp_path / "LEAN.csv"), "plot": ("--out", tmp_path)}
+    more |= {"export": ("--to", "csv", "--out", tmp_path / "ride.csv")}
+    assert command.works(name, path, *more.get(name, ())).err == ""
+    line = command.works(name, path, "--calibration", cal, *more.get(name, ())).err
+    assert line.startswith(f"warning: {path}: by the speed of this ride forward is 9")
+    assert line.count("\n") == 1
+
+
+def test_recordings(shared_data):
+    path = shared_data / "motorcycle-ride.csv.gz"
+    log = read_log(path)
+    calibration = fit_ride(log).calibration
+    assert said(log, calibration) == ""
+    told = said(log, other(calibration, up=90.0))
+    found = re.search(r"by the bends of this ride forward is (\d+) degrees to the left", told)
+    assert found and abs(int(found[1]) - 90) < 6
+    assert "forward and backward are exchanged" in said(log, other(calibration, up=180.0))
+    name = "car-urban-medium-turn-loop-nominal-001.csv.gz"
+    rows = [[0.0473, 0.9987, 0.0204], [-0.0003, -0.0204, 0.9998], [0.9989, -0.0473, -0.0006]]
+    car, log = (
+        CalibrationFile(vehicle_from_sensor=np.array(rows), aligned=True, vehicle="car"),
+        read_log(shared_data / name),
+    )
+    assert said(log, car) == ""
+    assert "so braking and cornering are wrong" in said(log, other(car, "car", up=90.0))
+    assert "calibrate drive again?" in said(log, other(car, "car", up=180.0))
+
+
+SIGN = " Or, if no board wrote this log, do all accelerations have the opposite sign? At rest up reads +1 g"
+
+
+def exchanged_line(car, side, roll_deg=None):
+    return sentence(Notice("forward-exchanged", car, side, roll_deg))
+
+
+def test_what_is_said():
+    """The sign of the log is always named as the other cause: the other side of the kickstand would make a clean report
+    of it, mirrored."""
+    assert exchanged_line(False, "left", 0.0).endswith("exchanged: calibrate two --side right?" + SIGN)
+    assert exchanged_line(False, "right", -3.9).endswith("exchanged: calibrate two --side left?" + SIGN)
+    assert exchanged_line(False, "", 0.0).endswith("calibrate two with the other --side?" + SIGN)
+    assert exchanged_line(False, "left", -4.1).endswith("exchanged: were the poses swapped?" + SIGN)
+    assert exchanged_line(False, "left").endswith("calibrate two --side right? Or were the poses swapped?" + SIGN)
+    assert exchanged_line(True, "").endswith("exchanged: calibrate drive again?" + SIGN)
+
+
+def jerky(late_s: int = 0, sign: float = 1.0, noise_g: float = 0.0, seconds: int = 240, mps2: float = 2.0) -> Log:
+    """Another acceleration each second, by chance, along z; a speed at its beginning, so many seconds late. 10 Hz."""
+    chance = np.random.default_rng(5)
+    pushes = chance.normal(scale=mps2, size=seconds)
+    speed_at = 30.0 + np.concatenate(([0.0], np.cumsum(pushes)))
+    time = np.arange(0.0, seconds, 0.1)
+    second = np.floor(time + 1e-9).astype(int)
+    force = sign * (pushes / G + chance.normal(scale=noise_g, size=seconds))[second]
+    speed = np.full(len(time), np.nan)
+    speed[::10] = speed_at[np.maximum(0, np.arange(seconds) - late_s)]
+    readings = np.column_stack((0 * force, 0 * force + 1.0, force))
+    return Log(time, readings, np.zeros(readings.shape), speed)
+
+
+ALONG_Z = CalibrationFile(aligned=True, vehicle="car")
+
+
+def exchanged(log: Log) -> bool:
+    notice = contradiction(cells_of(log), ALONG_Z)
+    assert notice is None or notice.code == "forward-exchanged"
+    return notice is not None
+
+
+@pytest.mark.parametrize(("late_s", "shown"), [(-1, False), (0, True), (1, True), (2, True), (3, False), (4, False)])
+def test_a_speed_up_to_two_seconds_late_shows_which_way_is_forward(late_s, shown):
+    """Each second pushes otherwise than the one before, so that one second off says nothing."""
+    assert exchanged(jerky(late_s, sign=-1.0)) is shown
+    assert not exchanged(jerky(late_s))
+
+
+def test_a_speed_that_is_unclear_accuses_only_of_what_is_sure():
+    """Hills add to the force: a correlation of -0.64 is sure enough, -0.55 is not."""
+    assert exchanged(jerky(sign=-1.0, noise_g=0.24))
+    assert not exchanged(jerky(sign=-1.0, noise_g=0.28))
+
+
+def test_few_and_small_changes_of_speed_show_nothing():
+    assert not exchanged(jerky(sign=-1.0, seconds=19))
+    assert not exchanged(jerky(sign=-1.0, mps2=0.4))
+    assert exchanged(jerky(sign=-1.0, seconds=24, mps2=0.7))
+
+
+def test_only_the_last_hour_counts():
+    """What was the other way round before it, as with a sensor that was turned over."""
+    before, after = jerky(sign=-1.0, seconds=3600), jerky(seconds=3600)
+    force, speed = (np.concatenate((getattr(before, name), getattr(after, name))) for name in ("accel_g", "speed_mps"))
+    time = np.arange(0.0, 7200.0, 0.1)
+    assert not exchanged(Log(time, force, np.zeros(force.shape), speed))
+    assert exchanged(before)
+
+
+def test_of_several_speeds_in_a_second_the_first_counts():
+    log = jerky(sign=-1.0)
+    log.speed_mps[3::10] = 77.0
+    assert exchanged(log)
+
+
+def test_seconds_without_a_speed_or_without_samples():
+    """A gap in the log and lost satellites: what is left is enough. But two days are not one ride."""
+    log = jerky(sign=-1.0)
+    log.speed_mps[500:900] = np.nan
+    assert exchanged(log.part((log.t_s < 100.0) | (log.t_s > 130.0)))
+    far = CellTable()
+    for at_s in 0.0, 4e5:
+        far.add(log.t_s + at_s, log.accel_g, log.gyro_dps, log.speed_mps)
+    assert far.cells() is None
+    assert CellTable().cells() is None

@@ -1,0 +1,176 @@
+"""A speed that is not in m/s is refused by whatever reads a log, and one that is never is."""
+
+import csv
+
+import command
+import driving_runs
+import numpy as np
+import pytest
+from checked import cells_of, words
+from kickstand.units import STANDARD_GRAVITY
+from kickstand_tools.checks.speed import speed_unit
+from kickstand_tools.errors import InputError
+from kickstand_tools.logs import reader
+from kickstand_tools.logs.log import Log
+from kickstand_tools.logs.reader import read_log
+from kickstand_tools.simulation.files import simulate
+from kickstand_tools.simulation.profiles import PROFILES
+from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
+
+MOUNT = random_mounting(3)
+
+
+def said(time, force, speed) -> str:
+    """What is said of the unit of a speed."""
+    return words(speed_unit(cells_of(Log(time, force, np.zeros(force.shape), speed))))
+
+
+KMH, MPH, KNOTS = 3.6, 2.2369, 1.9438
+
+
+def record(path, brakings=7, vehicle="motorcycle", **source):
+    """A made-up drive; source: of driving_runs.SpeedSource."""
+    legs = driving_runs.around(brakings)
+    gps = driving_runs.SpeedSource(**{"every_s": 1.0} | source)
+    with path.open("w", newline="") as file:
+        rows = csv.writer(file)
+        rows.writerow([*command.HEADER.split(","), "speed_mps"])
+        for k, (force, rate, mps) in enumerate(driving_runs.samples(legs, vehicle)):
+            value = gps.step_to(mps)
+            row = (k / driving_runs.RATE_HZ, *driving_runs.mounted(MOUNT, force), *driving_runs.mounted(MOUNT, rate))
+            rows.writerow([*(f"{v:.5f}" for v in row), "" if value is None else f"{value:.3f}"])
+    return path
+
+
+@pytest.mark.parametrize("late_s", [0.0, 1.0])
+@pytest.mark.parametrize("every_s", [0.1, 0.5, 1.0])
+@pytest.mark.parametrize(
+    ("scale", "words"),
+    [
+        (KMH, r"drive.csv: the speed changes 3\.[4-7] times as much as the force says: it is in km/h, m/s are needed"),
+        (MPH, r"changes 2\.[12] times .*: it is in mph or knots, m/s are needed"),
+        (KNOTS, r"changes (1\.9|2\.0) times .*: it is in mph or knots, m/s are needed"),
+    ],
+)
+def test_other_units_are_refused(tmp_path, scale, words, every_s, late_s):
+    log = record(tmp_path / "drive.csv", scale=scale, every_s=every_s, late_s=late_s)
+    with pytest.raises(InputError, match=words):
+        read_log(log)
+
+
+@pytest.mark.parametrize("late_s", [0.0, 1.0, 3.0])
+@pytest.mark.parametrize("every_s", [0.1, 0.5, 1.0, 2.0])
+def test_what_is_right_is_read(tmp_path, every_s, late_s):
+    read_log(record(tmp_path / "drive.csv", every_s=every_s, late_s=late_s, step=1 / 3.6))
+
+
+@pytest.mark.parametrize("block_bytes", [2000, 100_000])
+def test_it_takes_no_whole_log(tmp_path, monkeypatch, block_bytes):
+    """What a block knows goes on in the next, and the refusal comes as soon as it is sure."""
+    log = record(tmp_path / "drive.csv", 20, scale=KMH)
+    monkeypatch.setattr(reader, "BLOCK_BYTES", block_bytes)
+    before = 0
+    with pytest.raises(InputError, match="km/h"):
+        for block in reader.read_blocks(log):
+            before = block.time_us[-1]
+    assert 20e6 < before < 90e6
+
+
+@pytest.mark.parametrize("aligned", [True, False])
+@pytest.mark.parametrize("name", ["replay", "report", "plot", "export"])
+def test_every_command_refuses_them(tmp_path, name, aligned):
+    """However the calibration says that the sensor sits."""
+    log = record(tmp_path / "drive.csv", scale=KMH)
+    turned = {} if aligned else {"vehicle_from_sensor": [[0, 0, 1], [1, 0, 0], [0, 1, 0]]}
+    cal = command.write_cal(tmp_path / "CAL.json", **turned)
+    more = {
+        "replay": ("--out", tmp_path / "LEAN.csv"),
+        "plot": ("--out", tmp_path),
+        "export": ("--to", "csv", "--out", tmp_path / "ride.csv"),
+    }
+    command.refused(tmp_path, name, log, "--calibration", cal, *more.get(name, ()), words="it is in km/h, m/s are")
+
+
+def jerky(scale=KMH, late_s=0.0, every_s=1.0, step_s=0.1, seconds=60, size_g=0.3, pushed=None, noise_g=0.0) -> str:
+    """What is said of a log with another push each second, +size_g or -size_g by chance, along (0.6, 0, 0.8).
+
+    pushed: only so many of the seconds are. noise_g: of the force in each second.
+    """
+    chance = np.random.default_rng(7)
+    push = size_g * np.sign(chance.normal(size=seconds))
+    if pushed is not None:
+        push[np.argsort(chance.random(seconds))[pushed:]] = 0.0
+        push[np.flatnonzero(push)] *= np.resize([1.0, -1.0], np.count_nonzero(push)) * np.sign(push[push != 0.0])
+    time = np.arange(0.0, seconds, step_s)
+    second = np.clip(np.ceil(time - 1e-9).astype(int) - 1, 0, seconds - 1)  # a force lasts from the sample before
+    force = np.outer((push + noise_g * chance.normal(size=seconds))[second], [0.6, 0.0, 0.8]) + [0.0, 1.0, 0.0]
+    mps = 50.0 + STANDARD_GRAVITY * np.concatenate(([0.0], np.cumsum(push)))
+    speed = np.full(len(time), np.nan)
+    given = np.arange(0.0, seconds - every_s / 2.0, every_s)
+    speed[np.searchsorted(time, given - 1e-9)] = scale * np.interp(given - late_s, np.arange(seconds + 1.0), mps)
+    return said(time, force, speed)
+
+
+@pytest.mark.parametrize(
+    ("refused", "not_refused"),
+    [
+        ({"scale": 1.52}, {"scale": 1.48}),  # 1.5 times as much as the force explains; knots are 1.94
+        ({"size_g": 0.175}, {"size_g": 0.125}),  # 0.15 g is no slope of an ordinary road
+        ({"seconds": 300, "pushed": 11}, {"seconds": 300, "pushed": 8}),  # ten seconds of it
+        ({"seconds": 31}, {"seconds": 24}),  # 25 seconds: five sigmas of the correlation cannot be reached before
+        ({"late_s": 2.0}, {"late_s": 3.0}),  # a satellite receiver's delay
+        ({"every_s": 2.1, "seconds": 120, "late_s": 0.1}, {"every_s": 2.3, "seconds": 120, "late_s": 0.1}),
+        ({"step_s": 0.19}, {"step_s": 0.45, "seconds": 120}),  # a gap: the force in it is unknown
+    ],
+)
+def test_what_it_takes_to_be_sure_of_another_unit_of_speed(refused, not_refused):
+    assert "the speed changes" in jerky(**refused)
+    assert jerky(**not_refused) == ""
+
+
+def test_what_could_be_chance():
+    """Over 100 s five sigmas are a correlation of 0.5."""
+    assert jerky(scale=20.0, noise_g=0.7, seconds=101, size_g=0.5)
+    assert not jerky(scale=20.0, noise_g=1.6, seconds=101, size_g=0.5)
+
+
+@pytest.mark.parametrize("profile", PROFILES)
+def test_no_simulated_ride_is_refused(tmp_path, profile):
+    simulate(profile, 7, tmp_path, 150.0, speed=True)
+    log = read_log(tmp_path / "RIDE.csv")
+    time, force, speed = log.t_s, log.accel_g, log.speed_mps
+    rng = np.random.default_rng(1)
+    noisy = np.abs(speed + rng.normal(scale=0.5, size=len(speed)))
+    lost = np.where(rng.random(len(speed)) < 0.2, 0.0, speed)  # 0 where the satellites are
+    for wrong in noisy, np.round(speed), lost, rng.uniform(0.0, 50.0) * rng.random(len(speed)):
+        assert said(time, force, np.where(np.isnan(speed), np.nan, wrong)) == ""
+
+
+def test_what_was_felt_while_samples_are_missing_is_not_known():
+    """A logger that sleeps for half of each second: what it has of the force is half of what there was."""
+    time = np.arange(0.0, 300.0, 0.01)
+    push = 0.4 * np.sign(np.sin(2.0 * np.pi * time / 20.0)) * (time % 10.0 < 4.0)
+    speed = np.where(np.arange(len(time)) % 100 == 99, 20.0 + np.cumsum(push) * 0.01 * 9.80665, np.nan)
+    force = np.column_stack((push, np.ones(len(time)), np.zeros(len(time))))
+    awake = time % 1.0 > 0.5
+    assert said(time[awake], force[awake], speed[awake]) == ""
+    assert "km/h" in said(time, force, speed * KMH)
+
+
+def test_a_speed_that_has_nothing_to_do_with_the_ride():
+    """Whatever it is, of its unit it says nothing: not one of a hundred may look like one by chance."""
+    rng = np.random.default_rng(0)
+    time = np.arange(0.0, 60.0, 0.1)
+    for _ in range(100):
+        force = np.repeat(rng.normal(scale=0.2, size=(60, 3)), 10, axis=0) + [0.0, 0.0, 1.0]
+        speed = np.where(np.arange(len(time)) % 10 == 0, rng.uniform(0.0, 50.0, len(time)), np.nan)
+        assert said(time, force, speed) == ""
+
+
+def test_recordings(shared_data, tmp_path):
+    for log in sorted(shared_data.glob("*.csv.gz")):
+        whole = read_log(log)
+        time, force, speed = whole.t_s, whole.accel_g, whole.speed_mps
+        if log.name.startswith("car-urban"):
+            assert "it is in km/h" in said(time, force, speed * KMH)
+            assert "it is in mph or knots" in said(time, force, speed * MPH)

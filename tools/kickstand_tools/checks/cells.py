@@ -1,0 +1,90 @@
+"""The table that all checks judge: the last hour of a log in cells of a tenth of a second."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..signals import Array
+from ..signals.cells import Cells, EvenCells, cell_numbers, runs, stretches
+
+CELL_S = 0.1  # what shakes faster is vibration
+KEPT = 36_000  # cells with samples: an hour
+GAP_CELLS = 3  # so many without samples: what happened meanwhile is unknown. Fewer are filled along straight lines
+
+
+@dataclass
+class LogCells:
+    """n cells of CELL_S in a row. first_s: the time at which the first begins. force (n, 3, g), rate (n, 3, deg/s):
+    means, in the sensor's axes; 0 where known (n) is False. speeds (m, 2: s, m/s), places (m, 3: s, degrees): the first
+    ones of each second."""
+
+    even: EvenCells
+    force: Array
+    rate: Array
+    known: NDArray[np.bool_]
+    speeds: Array
+    places: Array
+
+    @property
+    def first_s(self) -> float:
+        return self.even.first * CELL_S
+
+    def integrals(self, at_s: Array) -> Array:
+        """(k, 7) until the times at_s (k): of force (g s), of rate (degrees) and of the time that is known (s)."""
+        edges_s = self.first_s + np.arange(len(self.known) + 1) * CELL_S
+        return np.column_stack([np.interp(at_s, edges_s, sums) for sums in self._sums])
+
+    @cached_property
+    def _sums(self) -> Array:
+        values = np.column_stack((self.force, self.rate, self.known)) * CELL_S
+        sums = np.zeros((7, len(values) + 1))
+        np.cumsum(values.T, axis=1, out=sums[:, 1:])
+        return sums
+
+    def means(self, over: int) -> tuple[Array, Array, Array]:
+        """Force (k, 3), rate (k, 3) and the first speed (k, m/s) over so many cells each; NaN where there is none."""
+        merged = self.even.merged(over)
+        return merged.means[:, :3], merged.means[:, 3:], merged.latest[:, 1]
+
+
+class CellTable:
+    """add() takes a log's samples block by block."""
+
+    def __init__(self) -> None:
+        self._cells = Cells(CELL_S, KEPT)
+
+    def add(self, time_s: Array, force: Array, rate: Array, speed_mps: Array, *place: Array) -> None:
+        """force (n, 3, g), rate (n, 3, deg/s), in the sensor's axes; speed_mps (n) and, if there are any, latitude and
+        longitude (n, degrees): NaN for no new value."""
+        lat, lon = place or np.full((2, len(time_s)), np.nan)
+        speed_s, place_s = (np.where(np.isnan(values), np.nan, time_s) for values in (speed_mps, lat))
+        latest = np.column_stack((speed_s, speed_mps, place_s, lat, lon))
+        self._cells.add(time_s, np.column_stack((force, rate)), latest)
+
+    def cells(self) -> LogCells | None:
+        """What there is so far; None if that is nothing, or spread over so long a time that it is no ride."""
+        even = self._cells.evenly(10 * KEPT)
+        if even is None:
+            return None
+        there = even.count > 0
+        known = there.copy()
+        for begin, end in stretches(~there):
+            known[begin:end] = end - begin < GAP_CELLS
+        at, places = np.arange(len(there)), np.flatnonzero(there)
+        filled = np.column_stack([np.interp(at, places, column[places]) for column in even.means.T]) * known[:, None]
+        return LogCells(
+            even,
+            filled[:, :3],
+            filled[:, 3:],
+            known,
+            _once_a_second(even.latest[:, :2]),
+            _once_a_second(even.latest[:, 2:]),
+        )
+
+
+def _once_a_second(values: Array) -> Array:
+    """The first row of each second that is known; the first column is the time."""
+    values = values[np.all(np.isfinite(values), axis=1)]
+    return values[runs(cell_numbers(values[:, 0], 1.0))] if len(values) else values

@@ -1,0 +1,52 @@
+"""Which side up an accelerometer reads, by a track: the gyro's rate about up has to turn as the course does.
+
+An accelerometer alone of the opposite sign gives an exact mirror image of the ride, left and right exchanged, and the
+motion of the sensor cannot show it. Positions can.
+"""
+
+import numpy as np
+
+from ..signals import Array
+from ..signals.geography import distance_m
+from ..signals.lag import best_lag
+from .cells import CellTable, LogCells
+
+SLOWEST_MPS = 3.0  # of a course that positions show
+TURNING_DPS = 4.0  # a second that turns faster counts
+FASTEST_DPS = 90.0  # positions that jump
+ENOUGH = 8  # such seconds
+CLEAR = 0.6  # correlation of course and gyro, of either sign
+LAGS_S = np.arange(0.0, 2.1, 0.25)  # by which positions may be late
+LONGEST_S = 2.5  # between two positions
+
+
+def course_agrees(cells: LogCells) -> bool | None:
+    """Does the sensor turn about its up as the positions do? None where too few turns to both sides show it."""
+    if len(cells.places) < ENOUGH:
+        return None
+    at_s, lat, lon = cells.places.T
+    east, north = distance_m(lat[:-1], lon[:-1], lat[1:], lon[1:])
+    step_s = np.diff(at_s)
+    moving = (np.hypot(east, north) > SLOWEST_MPS * step_s) & (step_s < LONGEST_S)
+    middle_s, span_s = at_s[1:-1], (step_s[1:] + step_s[:-1]) / 2.0
+    course_dps = np.degrees(np.diff(np.unwrap(np.arctan2(north, east)))) / span_s
+    counted = moving[1:] & moving[:-1] & (np.abs(course_dps) > TURNING_DPS) & (np.abs(course_dps) < FASTEST_DPS)
+    course_dps, middle_s, span_s = course_dps[counted], middle_s[counted], span_s[counted]
+    if len(course_dps) < ENOUGH or np.std(course_dps) < TURNING_DPS:  # what the gyro reads always is no turning
+        return None
+    up = np.sum(cells.force * cells.even.count[:, None], axis=0)
+
+    def earlier(by_s: float) -> tuple[Array, Array]:
+        before, after = (cells.integrals(middle_s - by_s + side * span_s)[:, 3:6] for side in (-0.5, 0.5))
+        return course_dps, ((after - before) @ up / span_s)[:, None]
+
+    best = best_lag(LAGS_S, earlier)
+    return None if best is None or best.value < CLEAR else bool(best.direction[0] > 0.0)
+
+
+def log_agrees(time_s: Array, accel_g: Array, gyro_dps: Array, lat_deg: Array, lon_deg: Array) -> bool | None:
+    """course_agrees() of samples: (n), (n, 3), (n, 3), and positions (n) that are NaN where there is no new one."""
+    table = CellTable()
+    table.add(time_s, accel_g, gyro_dps, np.full(len(time_s), np.nan), lat_deg, lon_deg)
+    cells = table.cells()
+    return None if cells is None else course_agrees(cells)

@@ -1,0 +1,74 @@
+"""All that is remarked on in a log, for whoever reads it: from one table of cells."""
+
+from typing import TYPE_CHECKING
+
+from kickstand.errors import Notice
+
+from ..refusals import RefusedInput
+from . import mount
+from .bends import bends
+from .cells import CellTable, LogCells
+from .course import course_agrees
+from .handedness import handedness
+from .speed import speed_unit
+
+if TYPE_CHECKING:
+    from ..calibration.file import CalibrationFile
+    from ..logs.block import Block
+    from ..logs.log import Log
+
+_AGAIN_S = 20.0  # of a log, after which the unit of its speed is judged again
+
+
+class Checks:
+    """add() takes a log part by part; remarks() judges all of it. name: the log's, for messages."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+        self._table = CellTable()
+        self._judged_s = 0.0
+
+    def add(self, part: "Block | Log") -> None:
+        """Without frozen readings. Raises RefusedInput once it is sure that the speed is not in m/s."""
+        readings = part.readings
+        self._table.add(part.t_s, readings[:, :3], readings[:, 4:], part.speed_mps, part.lat_deg, part.lon_deg)
+        if len(part.t_s) and part.t_s[-1] > self._judged_s + _AGAIN_S:
+            self._judged_s = float(part.t_s[-1])
+            self._judge_speed(self._table.cells())
+
+    def remarks(self, axes: bool = True, calibration: "CalibrationFile | None" = None) -> list[Notice]:
+        """What is wrong with the axes of the log, one cause once, and what contradicts a calibration of it. axes: are
+        they to be judged? Raises RefusedInput."""
+        cells = self._table.cells()
+        if cells is None:
+            return []
+        self._judge_speed(cells)
+        found: list[Notice | None] = []
+        if axes:
+            mirrored = Notice("mirrored") if course_agrees(cells) is False else None
+            found.append(handedness(cells) or bends(cells) or mirrored)
+        if calibration is not None:
+            found.append(mount.contradiction(cells, calibration))
+        return [notice for notice in found if notice]
+
+    def _judge_speed(self, cells: LogCells | None) -> None:
+        wrong = cells and speed_unit(cells)
+        if wrong:
+            raise RefusedInput(wrong, self._name)
+
+
+def remarks(log: "Log", calibration: "CalibrationFile | None" = None, axes: bool = True) -> list[Notice]:
+    """The same of a log in memory. Raises RefusedInput.
+
+    >>> import numpy as np
+    >>> from kickstand_tools.api import simulate_ride
+    >>> from kickstand_tools.logs.log import Log
+    >>> ride = simulate_ride("street", seed=1, seconds=60.0)
+    >>> log = Log.from_readings(ride.readings, ride.rate_hz)
+    >>> log.gyro_dps = -log.gyro_dps
+    >>> [notice.code for notice in remarks(log)]
+    ['left-handed']
+    """
+    checks = Checks(log.name)
+    checks.add(log)
+    return checks.remarks(axes, calibration)

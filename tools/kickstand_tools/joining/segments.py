@@ -1,0 +1,74 @@
+"""A track's course and speed in segments of half a minute, which are compared with a ride's one by one.
+
+Within a segment only changes count: its mean and its trend are taken off. What is left of a gyro's bias, the direction
+in which the ride began and the hills do not matter then.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..logs.table import Array
+from .course import Course
+
+STEPS = 30  # of a segment at most
+_FEWEST = 8  # a segment of fewer steps shows little
+
+
+@dataclass
+class Segments:
+    """p segments of up to STEPS good steps in a row, all (p, STEPS); weights are 0 where a segment is shorter.
+
+    begin_s, end_s: of each step, s since the track's first point. turned_deg: by how much the course of each step is to
+    the left of the segment's first one. course_weight: 1/deg2. speed_mps; speed_weight: 1 or 0. The first and the last
+    of these have no mean and no trend.
+    """
+
+    begin_s: Array
+    end_s: Array
+    turned_deg: Array
+    course_weight: Array
+    speed_mps: Array
+    speed_weight: Array
+
+    @property
+    def middle_s(self) -> Array:
+        """(p, STEPS) of each step."""
+        return (self.begin_s + self.end_s) / 2.0
+
+    def part(self, which: NDArray[np.bool_]) -> "Segments":
+        """The segments for which an array of p is True."""
+        arrays = self.begin_s, self.end_s, self.turned_deg, self.course_weight, self.speed_mps, self.speed_weight
+        return Segments(*(array[which] for array in arrays))
+
+
+def segments(course: Course) -> Segments:
+    """All of a course."""
+    edges = np.diff(course.good.astype(int), prepend=0, append=0)
+    rows = [
+        np.arange(start, min(start + STEPS, end))
+        for begin, end in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1))
+        for start in range(begin, end, STEPS)
+    ]
+    rows = [row for row in rows if len(row) >= _FEWEST]
+    place, there = np.zeros((len(rows), STEPS), dtype=int), np.zeros((len(rows), STEPS))
+    for k, row in enumerate(rows):
+        place[k, : len(row)], place[k, len(row) :], there[k, : len(row)] = row, row[-1], 1.0
+    turn = course.turn_deg[place] * there
+    turn[:, :1] = 0.0
+    weight = there / course.sigma_deg[place] ** 2
+    begin_s, end_s = course.begin_s[place], course.end_s[place]
+    made = Segments(begin_s, end_s, np.cumsum(turn, axis=1), weight, course.speed_mps[place], there)
+    made.turned_deg = without_trend(made.turned_deg, weight, made.middle_s)
+    made.speed_mps = without_trend(made.speed_mps, there, made.middle_s)
+    return made
+
+
+def without_trend(values: Array, weight: Array, at_s: Array) -> Array:
+    """(p, STEPS) values less the straight line that fits each row best."""
+    total = np.maximum(weight.sum(axis=1, keepdims=True), 1e-12)
+    since = at_s - (weight * at_s).sum(axis=1, keepdims=True) / total
+    mean = (weight * values).sum(axis=1, keepdims=True) / total
+    spread = np.maximum((weight * since * since).sum(axis=1, keepdims=True), 1e-12)
+    return values - mean - (weight * since * values).sum(axis=1, keepdims=True) / spread * since
