@@ -11,9 +11,9 @@ import pytest
 from checked import cells_of, words
 from kickstand.errors import Notice
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.calibration.ride.fit import fit_ride
 from kickstand_tools.checks.cells import CellTable
 from kickstand_tools.checks.mount import contradiction
+from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.refusals import RefusedInput, sentence

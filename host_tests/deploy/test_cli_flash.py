@@ -11,7 +11,7 @@ import command
 import fake_board
 import pytest
 import serial
-from kickstand_tools.deploy import bytecode, connection, firmware_files, ports
+from kickstand_tools.deploy import bytecode, connection, firmware_files
 from mpremote import transport_serial
 from serial.tools import list_ports
 
@@ -302,7 +302,7 @@ def test_why_a_port_does_not_open(tmp_path, monkeypatch, error, words):
     monkeypatch.setattr(serial, "serial_for_url", fail)
     monkeypatch.setattr(list_ports, "comports", lambda: [PICO])
     command.refused(tmp_path, "flash", words=words)
-    assert words in str(ports.why_closed("/dev/ttyACM0"))
+    assert words in str(connection.why_closed("/dev/ttyACM0"))
 
 
 def test_status_prints_what_the_board_says_and_restarts_it(board):

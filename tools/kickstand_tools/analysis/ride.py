@@ -10,13 +10,13 @@ from kickstand.lean.meter import MAX_VARIANCE
 
 from ..calibration.file import CalibrationFile, calibration_beside, read_calibration
 from ..errors import InputError
+from ..estimation.smooth import smooth_blocks
 from ..logs.block import Block
 from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import File, Progress, log_stem, name_of
 from ..logs.stretch import Stretch
 from ..logs.table import Array
 from ..replay.meter_along import MeterAlong
-from ..smoothing.smooth import smooth_blocks
 from .channels import Channels, channels
 
 
@@ -47,15 +47,15 @@ class Ride:
     def blocks(self, progress: Progress | None = None, notices: list[Notice] | None = None) -> Iterator[Channels]:
         """The ride without the readings that froze: they are a gap. progress, notices: of read_blocks(), of all of the
         log, also where the ride is a stretch of it. Raises InputError."""
-        lean, told, slow, some = _Lean(self.calibration), False, False, False
+        lean, absurd, slow, some = _Lean(self.calibration), False, False, False
         log, stretch = apart(self.log)
         for whole, found in self._read(log, progress, notices):
             block = whole.measured
             if not len(block.time_us):
                 continue
             rows = lean.follow(block, shown=found is None)
-            if notices is not None and not told and np.any(rows[:, 2] < 0.0):
-                told = True
+            if notices is not None and not absurd and np.any(rows[:, 2] < 0.0):
+                absurd = True
                 notices.append(_absurd(block, int(np.argmax(rows[:, 2] < 0.0))))
             slow |= self.smoothed and found is None
             if found is not None:
@@ -72,8 +72,8 @@ class Ride:
             yield seen
         if not some:
             raise InputError(f"{self.name}: all readings are frozen, so that nothing is known: check the sensor")
-        if slow and notices is not None:
-            notices.append(Notice("smooth-slow"))
+        if notices is not None:
+            notices += [Notice("smooth-slow")] if slow else []
 
     def _read(
         self, log: Source, progress: Progress | None, notices: list[Notice] | None

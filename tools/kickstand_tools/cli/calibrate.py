@@ -14,11 +14,11 @@ from ..calibration import drive_events as events
 from ..calibration.drive import DriveFit, fit_drive
 from ..calibration.file import CalibrationFile, read_calibration, write_calibration
 from ..calibration.poses import refuse_same_file
-from ..calibration.ride.fit import RideFit, fit_ride
 from ..calibration.six import GOOD_FREE_POSE_G, SixPositions, fit_six_positions
 from ..calibration.two import TwoPositions, fit_two_positions
 from ..checks.log import remarks
 from ..checks.mount import of_calibration
+from ..estimation.alignment import RideFit, fit_ride
 from ..logs.reader import read_log
 from ..output import check_output
 from ..progress import Bar

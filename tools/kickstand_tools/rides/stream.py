@@ -58,21 +58,6 @@ class LiveReading:
     rate_hz: float
     seconds: float
 
-    @property
-    def lean_deg(self) -> float | None:
-        """At the end."""
-        return self.moments[-1][1] if self.moments else None
-
-    @property
-    def forward_g(self) -> float | None:
-        """At the end."""
-        return self.moments[-1][2] if self.moments else None
-
-    @property
-    def left_g(self) -> float | None:
-        """At the end."""
-        return self.moments[-1][3] if self.moments else None
-
 
 class Recording:
     """Blocks into a file. stopped: set where the log has to end, so that the blocks end too.  live: called for each.

@@ -16,13 +16,18 @@ from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import Progress, name_of
 from ..logs.stretch import within
 from ..logs.table import Array, Table
-from .adjust import adjust
-from .samples import at_samples
-from .windows import windows_of
+from .equations import corrected_rates
+from .hypotheses import ALL
+from .least_squares import Estimate
+from .noise import jolted
+from .unknowns import FORWARD, LEAN, PITCH, Prior
+from .windows import Windows, windows_of
 
 SLOWEST_HZ = 10.0
 PIECE_S = 120.0  # a log is cut into pieces
 CHAPTER = 8  # of which so many are adjusted together, with one before and one after them
+LEANED_SHARE = 0.004  # of the lean: what the model leaves out, such as a gyro that measures forces, grows with it
+TIMING_S = 0.004  # s: of what the delay of the gyro's low-pass, and the times of samples, are off
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps")
 
 
@@ -176,8 +181,41 @@ def _adjusted(pieces: list[Block], calibration: CalibrationFile, start_c: float)
     rate = np.radians(rate)
     windows = windows_of(t_s, force, rate, speed, warm)
     try:
-        found = at_samples(windows, rate, adjust(windows, calibration.six_done), calibration.delay_s())
+        estimate = Estimate(windows, Prior.of_pose(calibration.six_done), ALL)
     except np.linalg.LinAlgError:
         return nothing  # readings that are no ride's: the lean is not known
+    found = at_samples(windows, rate, estimate, calibration.delay_s())
     found[:, :3] = np.degrees(found[:, :3])
     return found
+
+
+def at_samples(windows: Windows, rate: Array, found: Estimate, delay_s: float) -> Array:
+    """(samples, 4): lean, its standard deviation, pitch (rad) and speed (m/s). Between the edges of the windows the
+    corrected gyro gives the lean.
+
+    rate (samples, 3): rad/s, as windows_of() took it. delay_s: by how much the gyro's low-pass is late.
+    """
+    number, sigma = windows.number, found.sigma()[:, LEAN]
+    duration = windows.before + windows.after
+    last = np.append(np.diff(number) > 0, True)  # sample of its window
+    window = np.cumsum(last) - last
+
+    def integral(rate: Array) -> tuple[Array, Array]:
+        """From the begin of its window to each sample, and over the whole window."""
+        until = np.cumsum(rate * duration)
+        edges = np.concatenate(([0.0], until[last]))
+        return until - rate * windows.after - edges[window], np.diff(edges)[window]
+
+    since, seconds = integral(np.ones(len(number)))
+    share = since / seconds
+    before, after = found.states[number], found.states[number + 1]
+    lean, pitch, speed = (before + share[:, None] * (after - before))[:, [LEAN, PITCH, FORWARD]].T
+    wx, wy, wz = corrected_rates(rate.T, found.unknowns(number, 0.5 * (before + after)), windows.warm[number])
+    roll_rate = wz - np.tan(pitch) * (wx * np.sin(lean) + wy * np.cos(lean))
+    rolled, whole = integral(roll_rate)
+    lean = before[:, LEAN] + rolled + share * ((after - before)[:, LEAN] - whole)
+    spread = sigma[number] + share * (sigma[number + 1] - sigma[number])
+    jolt = 2.0 * np.sqrt(np.clip(share * (1.0 - share), 0.0, 1.0)) * jolted(windows)[number]
+    for more in (TIMING_S * roll_rate, LEANED_SHARE * lean, jolt):
+        spread = np.hypot(spread, more)
+    return np.column_stack((lean + delay_s * roll_rate, spread, pitch, speed))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from kickstand_tools.api import CalibrationFile, InputError, Log, smooth
-from kickstand_tools.smoothing import smooth as room
+from kickstand_tools.estimation import smooth as room
 from smoothed_rides import Known, other, rms, simulated
 
 RIDES = {

@@ -1,4 +1,5 @@
-"""What a report says that an alignment costs is what it costs, and what it says to do takes it out."""
+"""How far off the ride shows the alignment to be, what a report says that this costs, and what to do about it: where
+it is known how far off it is."""
 
 import dataclasses
 import json
@@ -9,20 +10,29 @@ import command
 import numpy as np
 import pytest
 from kickstand_tools.analysis.alignment_quality import Quality, lean_cost, yaw_cost_deg
+from kickstand_tools.analysis.report import angles
 from kickstand_tools.api import Log, fit_drive, fit_two_positions, open_ride, overview, simulate_ride, vehicle_channels
+from kickstand_tools.simulation.scripted import script
 
 NONE = np.zeros(1)
-AXES = {"roll": (0, 1), "pitch": (1, 2), "yaw": (0, 2)}
+# "up" leans to the right of the bike's own; "forward" points up; "forward" points to the right
+AXES = {"roll": (1, 0), "pitch": (1, 2), "yaw": (2, 0)}
+
+
+def turn(name, degrees):
+    """(3, 3): two axes turned into one another, so that this angle of the alignment is off by so much."""
+    a, b = AXES[name]
+    made = np.eye(3)
+    made[a, a] = made[b, b] = np.cos(np.radians(degrees))
+    made[b, a] = np.sin(np.radians(degrees))
+    made[a, b] = -made[b, a]
+    return made
 
 
 def turned(calibration, name, degrees):
-    """The calibration with two of its axes turned into one another."""
-    a, b = AXES[name]
-    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    turn = np.eye(3)
-    turn[a, a] = turn[b, b] = c
-    turn[a, b], turn[b, a] = -s, s
-    return dataclasses.replace(calibration, vehicle_from_sensor=turn @ calibration.vehicle_from_sensor)
+    """The calibration with that angle off."""
+    matrix = turn(name, degrees) @ calibration.vehicle_from_sensor
+    return dataclasses.replace(calibration, vehicle_from_sensor=matrix)
 
 
 @pytest.fixture(scope="module", params=["street", "track", "city"])
@@ -79,26 +89,45 @@ def test_calibrate_drive_takes_yaw_out(ride):
     assert found.vehicle_from_sensor == pytest.approx(calibration.vehicle_from_sensor, abs=0.02)
 
 
-def with_calibration(ride, name, degrees):
+def with_calibration(ride, name, degrees, **changed):
     """The path of a CAL.json in which that is wrong."""
-    sine, cosine = np.sin(np.radians(degrees)), np.cos(np.radians(degrees))
-    a, b = AXES[name]
-    matrix = np.eye(3)
-    matrix[a, a] = matrix[b, b] = cosine
-    matrix[a, b], matrix[b, a] = -sine, sine
     path = ride.with_name(f"{name}.json")
-    path.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": matrix.tolist()}))
+    matrix = turn(name, degrees).tolist()
+    path.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": matrix} | changed))
     return path
 
 
 @pytest.fixture(scope="module")
 def scripted(tmp_path_factory):
-    from kickstand_tools.simulation.scripted import script
-
+    """Straights and turns between standstills, with a speed each second."""
     segments = [script.upright(4)]
-    for _ in range(4):
-        segments += [script.accelerate(16, 5), script.straight(8), script.brake(0, 4), script.wait(4)]
+    for lean in 25, -30, 20:
+        segments += [script.accelerate(16, 5), script.straight(6), script.turn(lean, 4), script.straight(5)]
+        segments += [script.brake(0, 4), script.wait(4)]
     return analysis_rides.write(tmp_path_factory.mktemp("ride"), segments, speed_hz=1)
+
+
+@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize("angle_deg", [-3.0, 0.0, 2.0])
+def test_an_error_of_the_alignment_is_seen(scripted, axis, angle_deg):
+    quality = overview(open_ride(scripted, with_calibration(scripted, axis, angle_deg))).quality
+    assert quality.straight_s > 30.0
+    for name in AXES:
+        value = getattr(quality, f"{name}_deg")
+        assert value == pytest.approx(angle_deg if name == axis else 0.0, abs=0.4), name
+    assert quality.gravity_g == pytest.approx(1.0, abs=0.002)
+
+
+def test_a_ride_without_straights_does_not_show_it(tmp_path):
+    path = analysis_rides.write(tmp_path, [script.upright(8)])
+    quality = overview(open_ride(path, None)).quality
+    assert (quality.roll_deg, quality.pitch_deg, quality.yaw_deg) == (None, None, None)
+    said = command.works("report", path).out
+    assert "Alignment: not enough straight riding to tell how far it is off." in said
+
+
+def test_nothing_is_a_negative_nothing():
+    assert angles(Quality(-0.04, None, 2.04, None, 60.0, NONE, NONE)) == ["roll +0.0°", "yaw +2.0°"]
 
 
 @pytest.mark.parametrize(
@@ -129,8 +158,7 @@ def test_without_a_speed_calibrate_drive_is_no_help(scripted, tmp_path):
     assert "calibrate drive" not in said
 
 
-def test_a_car_has_no_lean_to_lose(scripted, tmp_path):
-    cal = tmp_path / "car.json"
-    cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle": "car"}))
+def test_a_car_has_no_lean_to_lose(scripted):
+    cal = with_calibration(scripted, "yaw", 0.0, vehicle="car")
     assert "of lean" not in command.works("report", scripted, "--calibration", cal).out
     assert "lean_cost" not in json.loads(command.works("report", scripted, "--calibration", cal, "--json").out)
