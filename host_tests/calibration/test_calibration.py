@@ -212,16 +212,6 @@ def test_the_equations_are_solved_whatever_their_order():
         assert_allclose([row[6] for row in rows], solution, atol=1e-6)
 
 
-def test_the_tilt_of_a_pose():
-    rng = np.random.default_rng(4)
-    for axis in AXES:
-        for angle in (0.0, 3.0, 25.0):
-            assert six_position.tilt_deg(1.3 * tipped(axis, angle, rng)) == pytest.approx(angle, abs=1e-5)
-    assert six_position.tilt_deg([1.0, 1.0, 1.0]) == pytest.approx(54.7356, abs=1e-3)
-    assert six_position.tilt_deg([0.0, 0.0, 0.0]) == 90.0
-    assert six_position.tilt_deg([0.0, 0.0, 1e-5]) == 0.0
-
-
 def test_the_result_of_the_six_positions():
     new = six_position_calibration([0.1, 0.2, 0.3], [1.1, 0.9, 1.0], [3.0, -2.0, 1.0])
     identity = [1, 0, 0, 0, 1, 0, 0, 0, 1]

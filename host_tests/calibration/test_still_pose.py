@@ -65,17 +65,6 @@ def test_readings_that_never_change_are_frozen_and_one_that_does_is_enough():
     assert problem_of(rows) is None
 
 
-def test_the_mean_is_that_of_all_samples():
-    rows = samples()
-    for k, row in enumerate(rows):
-        row[0] += k % 3
-        row[6] += k % 4
-    pose = finished(rows)
-    assert pose.count == 100
-    assert pose.accel == pytest.approx([sum(row[i] for row in rows) / 100 / 8192 for i in range(3)], abs=1e-9)
-    assert pose.gyro == pytest.approx([sum(row[i] for row in rows) / 100 / 65.5 for i in (4, 5, 6)], abs=1e-9)
-
-
 def test_a_spoilt_pose_stays_spoilt():
     pose = StillPose(8192, 65.5, 32700, 100)
     rows = samples()

@@ -127,15 +127,6 @@ def test_every_damaged_byte_is_noticed(store, tmp_path):
         assert "damaged" in store.message
 
 
-@pytest.mark.parametrize("content", [b"", b"\xff" * 92, b"\0" * 92, b"x" * 5000])
-def test_rubbish_in_both_files_is_not_calibrated(store, tmp_path, content):
-    for name in FILES:
-        (tmp_path / name).write_bytes(content)
-    assert not store.load().aligned
-    assert store.message.startswith("not calibrated: ")
-    assert all((tmp_path / name).read_bytes() == content for name in FILES)  # nothing is rewritten
-
-
 def test_a_file_that_is_a_directory(store, tmp_path):
     (tmp_path / FILES[0]).mkdir()
     (tmp_path / FILES[1]).mkdir()

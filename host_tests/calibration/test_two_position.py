@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from kickstand.calibration.parameters import Calibration
-from kickstand.calibration.two_position import MIN_TILT_DEG, WARN_TILT_DEG, align, two_position
+from kickstand.calibration.two_position import align
 from kickstand.errors import AlignmentError
 from numpy.testing import assert_allclose
 from test_rotation import random_rotation
@@ -106,18 +106,6 @@ def test_not_a_number_is_refused():
 def at(angle_deg):
     """Specific force of a bike leaned to the left by an angle, g."""
     return [-np.sin(np.radians(angle_deg)), np.cos(np.radians(angle_deg)), 0.0]
-
-
-@pytest.mark.parametrize(("tilt_deg", "turned_deg"), [(MIN_TILT_DEG, 11), (WARN_TILT_DEG, 7)])
-def test_what_a_degree_of_pitch_between_the_poses_costs(tilt_deg, turned_deg):
-    """The two limits stand for this: forward is turned by 1 / tan(tilt)."""
-    pitch = np.radians(1.0)
-    tilted = np.array(at(tilt_deg))
-    pitched = [tilted[0], tilted[1] * np.cos(pitch), tilted[1] * np.sin(pitch)]
-    truth, found = [0.0] * 9, [0.0] * 9
-    two_position(truth, at(tilt_deg + 0.01), at(0))
-    two_position(found, pitched, at(0))
-    assert rotation_angle_deg(found, truth) == pytest.approx(turned_deg, abs=0.6)
 
 
 class Pose:

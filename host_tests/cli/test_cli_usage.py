@@ -1,41 +1,39 @@
-"""How the command is called: help, and one line for every mistake."""
+"""How the command is called: help, times, and one line for every mistake."""
 
 import re
 import subprocess
 import sys
 
+import click
 import command
 import pytest
+from kickstand_tools.cli.common import TIME
 from kickstand_tools.logs import reader
 from kickstand_tools.simulation.profiles import PROFILES
 
 MISTAKES = {
-    "no such command": (["fly"], "No such command 'fly'"),
-    "no such option": (["--fast"], "No such option"),
-    "calibrate what": (["calibrate"], "Missing command"),
-    "six without poses": (["calibrate", "six", "--out", "CAL.json"], "Missing argument"),
-    "six without out": (["calibrate", "six", "a.csv"], "Missing option '--out'"),
-    "two with one pose": (["calibrate", "two", "a.csv", "--out", "CAL.json"], "UPRIGHT.csv"),
-    "two with three": (["calibrate", "two", "a", "b", "c", "--out", "d"], "unexpected extra argument (c)"),
-    "side": (
-        ["calibrate", "two", "a.csv", "b.csv", "--side", "up", "--out", "CAL.json"],
-        "'up' is not one of",
-    ),
-    "replay nothing": (["replay"], "Missing argument 'LOG.csv'"),
-    "engine": (["replay", "a", "--calibration", "b", "--out", "c", "--engine", "x"], "'x' is not one of"),
-    "flash what": (["flash", "now"], "unexpected extra argument (now)"),
-    "port without a name": (["status", "--port"], "requires an argument"),
+    "fly": "No such command 'fly'",
+    "--fast": "No such option",
+    "calibrate": "Missing command",
+    "calibrate six --out CAL.json": "Missing argument",
+    "calibrate six a.csv": "Missing option '--out'",
+    "calibrate two a.csv --out CAL.json": "UPRIGHT.csv",
+    "calibrate two a b c --out d": "unexpected extra argument (c)",
+    "calibrate two a.csv b.csv --side up --out CAL.json": "'up' is not one of",
+    "replay": "Missing argument 'LOG.csv'",
+    "replay a --calibration b --out c --engine x": "'x' is not one of",
+    "flash now": "unexpected extra argument (now)",
+    "status --port": "requires an argument",
 }
 
 
-@pytest.mark.parametrize("name", MISTAKES)
-def test_a_mistake_is_told_in_one_line(tmp_path, monkeypatch, name):
+@pytest.mark.parametrize("line", MISTAKES)
+def test_a_mistake_is_said_in_one_line(tmp_path, monkeypatch, line):
     monkeypatch.chdir(tmp_path)
-    arguments, words = MISTAKES[name]
-    result = command.run(*arguments)
+    result = command.run(*line.split())
     assert (result.status, result.out) == (2, "")
     assert result.err.count("\n") == 1
-    assert words in result.err
+    assert MISTAKES[line] in result.err
     assert re.search(r"[^.][.?] See kickstand.* --help\.\n$", result.err)
     assert not list(tmp_path.iterdir())
 
@@ -67,22 +65,38 @@ def test_a_fault_of_its_own_is_one_line_too(tmp_path, monkeypatch):
 
 def test_from_a_shell(tmp_path):
     """Standard output empty, one line on standard error, status 2: as a script sees it."""
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "kickstand_tools.cli",
-            "replay",
-            "none.csv",
-            "--calibration",
-            "x",
-            "--out",
-            "y",
-        ],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-    )
+    arguments = "-m kickstand_tools.cli replay none.csv --calibration x --out y".split()
+    done = subprocess.run([sys.executable, *arguments], cwd=tmp_path, capture_output=True, text=True)
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == "kickstand: x: there is no such file: make it with kickstand calibrate\n"
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "text, seconds",
+    [("60", 60.0), ("12.5", 12.5), ("-30", -30.0), ("1:00", 60.0), ("-1:30.5", -90.5), ("1:02:03", 3723.0)],
+)
+def test_seconds_minutes_and_hours(text, seconds):
+    assert TIME.convert(text, None, None) == seconds
+
+
+@pytest.mark.parametrize("text", ["", "early", "1:", ":30", "1:2:3:4", "1:-5", "1.5:00", "nan", "inf", "--5"])
+def test_what_is_no_time_is_refused_and_says_how(text):
+    with pytest.raises(click.UsageError, match="is no time: give seconds such as 60"):
+        TIME.convert(text, None, None)
+
+
+def test_a_ride_without_a_name_is_no_fault(tmp_path):
+    command.refused(tmp_path, "smooth", "", "--out", tmp_path / "LEAN.csv", words="is a directory")
+
+
+def test_a_fleet_is_not_made_up_over_a_ride_and_has_no_profile(tmp_path):
+    (tmp_path / "RIDE.csv").write_text("a ride")
+    (tmp_path / "fleet").mkdir()
+    (tmp_path / "fleet" / "MANIFEST.csv").write_text("a fleet")
+    command.refused(tmp_path, "simulate", "--fleet", 2, "--out", tmp_path, words="holds a ride")
+    given = "simulate", "--profile", "street"
+    command.refused(tmp_path, *given, "--out", tmp_path / "fleet", words="holds a fleet")
+    out = "--fleet", 2, "--out", tmp_path / "new"
+    command.refused(tmp_path, *given, *out, words="--profile is of a single ride")
+    command.refused(tmp_path, "simulate", "--speed", *out, words="--speed is of a single ride")

@@ -6,7 +6,7 @@ import pytest
 from kickstand_tools.demo.keyboard import split
 from kickstand_tools.demo.score import Score, State, table
 from kickstand_tools.demo.screen import bike, lcd_lines, lean_text, screen
-from kickstand_tools.demo.shown_lean import shown_lean
+from kickstand_tools.simulated_board.lcd import shown_lean
 from rich.console import Console
 
 STATE: State = {

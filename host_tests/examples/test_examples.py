@@ -9,26 +9,26 @@ from pathlib import Path
 
 import engines
 import pytest
-from kickstand_tools import firmware_path, unix_port
+from kickstand_tools import firmware_path
+from mpy import run_mpy
 
-HERE = Path(__file__).resolve().parent
-EXAMPLES = HERE.parents[1] / "firmware" / "examples"
+SCRIPT = Path(__file__).resolve().with_name("example_run.py")
+EXAMPLES = SCRIPT.parents[2] / "firmware" / "examples"
 TURN_DEG = 35.0  # of example_run.py's ride
 
 
 def run(engine, flash, name, until, presses=()):
     """What the program printed, and the display's two lines each second."""
-    script = str(HERE / "example_run.py")
+    plan = json.dumps({"program": str(EXAMPLES / name), "until": until, "presses": presses})
     if engine == "cpython":
-        command, environment = [sys.executable, script], os.environ | {"PYTHONPATH": firmware_path.search_path()}
+        environment = os.environ | {"PYTHONPATH": firmware_path.search_path()}
+        command = [sys.executable, str(SCRIPT)]
+        said = subprocess.run(
+            command, input=plan, env=environment, cwd=flash, capture_output=True, text=True, timeout=300, check=True
+        ).stdout
     else:
-        command, environment = unix_port.command("-X", "heapsize=8M", script), unix_port.environment()
-    plan = {"program": str(EXAMPLES / name), "until": until, "presses": presses}
-    done = subprocess.run(
-        command, input=json.dumps(plan), env=environment, cwd=flash, capture_output=True, text=True, timeout=300
-    )
-    assert done.returncode == 0 and "Traceback" not in done.stdout + done.stderr, done.stdout + done.stderr
-    printed, _, frames = done.stdout.rstrip("\n").rpartition("\n")
+        said = run_mpy(SCRIPT, heap="8M", stdin=plan, directory=flash)
+    printed, _, frames = said.rstrip("\n").rpartition("\n")
     return printed, json.loads(frames)
 
 

@@ -146,16 +146,6 @@ def test_a_fifo_that_does_not_start_is_tried_again_with_the_bus(board):
     assert chip.calls == [("connect", "bus"), "configure"] * 2
 
 
-def test_a_chip_that_starts_has_time_for_its_first_sample(board):
-    """It counts as silent 100 ms after its FIFO has started."""
-    sensor, chip = made(board)
-    chip.waiting = [0, 0, 0]
-    ended_ms = set_up(sensor, 0)
-    for after_ms, said in ((1, "starting"), (100, "starting"), (101, "sensor-silent")):
-        assert sensor.fetch(ended_ms + after_ms) == 0
-        assert code(sensor) == said
-
-
 def test_silence_is_a_fault_after_100_ms(board):
     sensor, chip, now_ms = running(board)
     chip.waiting = [0, 0, 3, 0, 0, 0]
@@ -225,12 +215,6 @@ def test_a_chip_at_fault_is_set_up_at_once(board):
     assert (sensor.restarts, code(sensor)) == (2, "sensor-frozen")
     assert sensor.fetch(now_ms + 300) == 1
     assert code(sensor) is None
-
-
-def test_a_chip_that_does_not_run_is_not_checked(board):
-    sensor, chip = made(board)
-    sensor.check(1000)
-    assert chip.calls == []
 
 
 def test_a_chip_that_has_reset_itself_is_set_up_again(board):

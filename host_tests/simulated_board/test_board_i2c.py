@@ -182,14 +182,6 @@ def test_a_classic_esp32_crashes_where_a_pin_of_its_flash_is_driven_and_some_pin
     check(read, machine="esp32")
 
 
-@firmware()
-def test_rp2_controllers_have_their_pins(board):
-    for number, sda, scl in ((0, 6, 7), (1, 4, 5), (0, 5, 4), (0, 4, 7)):
-        error = raised(I2C, number, Pin(scl), Pin(sda))
-        assert isinstance(error, ValueError), (number, sda, scl)
-    SoftI2C(sda=Pin(4), scl=Pin(5)).readfrom_mem(0x68, 0x75, 1)
-
-
 def test_a_bus_that_is_too_fast_for_the_display_is_seen():
     def at(freq):
         return lambda board: open_sensor(freq)

@@ -62,17 +62,6 @@ def test_two_lines_of_text():
     assert lcd.lost == 0 and lcd.backlight
 
 
-def test_before_4_bit_mode_the_open_pins_read_as_ones():
-    clock = Clock()
-    lcd = Lcd(clock)
-    clock.advance(POWER_UP_US)
-    nibble(lcd, 0x30)
-    assert lcd.two_lines
-    clock.advance(5000)
-    nibble(lcd, 0x40, RS)
-    assert lcd.codes()[0][0] == 0x4F
-
-
 def test_home_takes_long_and_what_comes_meanwhile_is_lost():
     lcd = ready()
     write(lcd, 0, "abc")
@@ -83,36 +72,6 @@ def test_home_takes_long_and_what_comes_meanwhile_is_lost():
     lcd.clock.advance(done_us - lcd.clock.now_us)
     send(lcd, ord("x"), RS)
     assert lcd.text()[0].startswith("xbc")
-
-
-def test_clear():
-    lcd = ready()
-    write(lcd, 1, "abc")
-    send(lcd, 0x04)  # right to left
-    send(lcd, 0x01)
-    lcd.clock.advance(CLEAR_US)
-    assert lcd.text() == [" " * 16] * 2
-    send(lcd, ord("x"), RS)
-    send(lcd, ord("y"), RS)
-    assert lcd.text()[0].startswith("xy"), "clear also sets left to right"
-
-
-def test_nibbles_out_of_step_garble_and_the_initialisation_heals():
-    lcd = ready()
-    write(lcd, 0, "hello")
-    lcd.slip()
-    write(lcd, 0, "hello")
-    assert lcd.text()[0] != "hello           "
-    lcd.clock.advance(2000)
-    for wait_us in (5000, 5000, 5000):
-        nibble(lcd, 0x30)
-        lcd.clock.advance(wait_us)
-    nibble(lcd, 0x20)
-    for command in (0x28, 0x0C, 0x06, 0x02):
-        send(lcd, command)
-        lcd.clock.advance(2000)
-    write(lcd, 0, "hello           ")
-    assert lcd.text()[0] == "hello           "
 
 
 def test_own_characters():

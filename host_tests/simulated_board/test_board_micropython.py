@@ -1,30 +1,11 @@
 """The models' own tests, which import nothing that MicroPython lacks, once more under MicroPython."""
 
-import ast
 from pathlib import Path
 
 import pytest
-from mpy import run_mpy
+from mpy import run_mpy, run_tests
 
-HERE = Path(__file__).resolve().parent
-
-RUNNER = """
-import sys
-sys.path.insert(0, sys.argv[3])
-module = __import__(sys.argv[1])
-getattr(module, sys.argv[2])()
-print("passed")
-"""
-
-
-def _tests():
-    for path in sorted(HERE.glob("test_board_*.py")):
-        if path.stem == "test_board_micropython":
-            continue
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.FunctionDef) and node.name.startswith("test_"):
-                yield path.stem, node.name
-
+MODULES = sorted(set(Path(__file__).parent.glob("test_board_*.py")) - {Path(__file__)})
 
 HEAP_LOCKED_READ = """
 from micropython import heap_lock, heap_unlock
@@ -58,6 +39,6 @@ def test_a_read_through_the_model_allocates_nothing() -> None:
     assert run_mpy(HEAP_LOCKED_READ).split()[-1] == "returned"
 
 
-@pytest.mark.parametrize("module, name", list(_tests()))
-def test_under_micropython(module: str, name: str) -> None:
-    assert run_mpy(RUNNER, module, name, str(HERE)) == "passed\n"
+@pytest.mark.parametrize("module", MODULES, ids=lambda module: module.stem)
+def test_under_micropython(module: Path) -> None:
+    run_tests(module)

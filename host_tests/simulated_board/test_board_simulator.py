@@ -4,7 +4,7 @@ import sys
 
 from board_access import firmware, level, on_board, raised
 from kickstand_tools.simulated_board.fakes import fake_machine, fake_time
-from kickstand_tools.simulated_board.fakes.fake_machine import WDT, Pin, Timer
+from kickstand_tools.simulated_board.fakes.fake_machine import WDT, Pin
 from kickstand_tools.simulated_board.simulator import Board
 
 
@@ -17,17 +17,6 @@ def test_the_three_ends_of_a_run():
     assert outcome == "off" and board.clock.now_us == 2_500_000
     assert on_board(lambda board: fake_time.sleep_ms(10))[0] == "returned"
     assert on_board(lambda board: fake_machine.reset())[0] == "reset"
-
-
-def test_firmware_that_catches_every_exception_is_still_switched_off():
-    def firmware(board):
-        while True:
-            try:
-                fake_time.sleep_ms(10)
-            except Exception:
-                pass
-
-    assert on_board(firmware, 1.0)[0] == "off"
 
 
 def test_power_is_lost_by_off_and_kept_by_reset():
@@ -127,18 +116,6 @@ def test_a_button_held_at_power_up():
     board.press(0.0, 2.0)
     with board:
         assert board.run(lambda: firmware(board), 1.0) == "returned"
-
-
-@firmware()
-def test_timers(board):
-    seen = []
-    Timer(-1, mode=Timer.ONE_SHOT, period=20, callback=lambda timer: seen.append(board.clock.now_us))
-    ticker = Timer()
-    ticker.init(period=50, callback=lambda timer: seen.append(board.clock.now_us))
-    fake_time.sleep_ms(160)
-    ticker.deinit()
-    fake_time.sleep_ms(200)
-    assert seen == [20_000, 50_000, 100_000, 150_000]
 
 
 def test_installed_and_gone_again():

@@ -1,5 +1,7 @@
 """The simulated MPU6050: the data sheet's delay, bandwidth, range, steps and errors."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from kickstand_tools.simulation.physics.chip import RATE_HZ, Chip
@@ -7,8 +9,8 @@ from kickstand_tools.simulation.physics.chip import RATE_HZ, Chip
 N = 10000
 
 
-def perfect() -> Chip:
-    return Chip(np.eye(3), np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3), np.zeros(3), gyro_walk=0.0)
+PERFECT = Chip(np.eye(3), np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3), np.zeros(3), gyro_walk=0.0)
+STILL = np.zeros((N, 3))
 
 
 def read(chip: Chip, force: np.ndarray, rates: np.ndarray, temp_c: float = 25.0, seed: int = 0) -> np.ndarray:
@@ -28,28 +30,28 @@ def size_and_phase(values: np.ndarray, hz: float) -> tuple[float, float]:
 
 
 def test_the_filter_is_4_9_ms_late():
-    readings = read(perfect(), wave(5.0, 1.0), np.zeros((N, 3)))
+    readings = read(PERFECT, wave(5.0, 1.0), STILL)
     _, phase = size_and_phase(readings[:, 0], 5.0)
     assert -phase / (2.0 * np.pi * 5.0) == pytest.approx(0.0049, abs=0.0003)
 
 
 def test_the_filter_halves_the_power_at_44_hz():
-    readings = read(perfect(), np.zeros((N, 3)), wave(44.0, 100.0))
+    readings = read(PERFECT, STILL, wave(44.0, 100.0))
     size, _ = size_and_phase(readings[:, 4], 44.0)
     assert size / 100.0 == pytest.approx(np.sqrt(0.5), abs=0.03)
 
 
 def test_vibration_above_100_hz_aliases():
-    readings = read(perfect(), wave(195.0, 1.0), np.zeros((N, 3)))
+    readings = read(PERFECT, wave(195.0, 1.0), STILL)
     size, _ = size_and_phase(readings[:, 0], 5.0)
     assert 0.05 < size < 0.15
 
 
 def test_readings_stop_at_the_range_and_come_in_counts():
-    readings = read(perfect(), np.full((N, 3), 9.0), np.full((N, 3), -700.0))
+    readings = read(PERFECT, np.full((N, 3), 9.0), np.full((N, 3), -700.0))
     assert np.all(readings[:, :3] <= 32767 / 4096.0)
     assert np.all(readings[:, 4:] >= -500.3)
-    still = read(perfect(), np.zeros((N, 3)), np.zeros((N, 3)))
+    still = read(PERFECT, STILL, STILL)
     for columns, lsb in ((still[:, :3], 4096.0), (still[:, 4:], 65.5)):
         assert np.allclose(columns * lsb, np.round(columns * lsb), atol=1e-6)
 
@@ -58,12 +60,12 @@ def test_the_range_ends_before_the_filter():
     """Shaken past 8 g on one side only: the mean that is read is not the true one."""
     shaken = np.zeros((N, 3))
     shaken[:, 0] = 7.0 + np.where(np.arange(N) % 4 < 2, 4.0, -4.0)
-    mean = read(perfect(), shaken, np.zeros((N, 3)))[100:, 0].mean()
+    mean = read(PERFECT, shaken, STILL)[100:, 0].mean()
     assert mean == pytest.approx((8.0 + 3.0) / 2.0, abs=0.05)
 
 
 def test_noise_is_the_sheets():
-    still = read(perfect(), np.zeros((N, 3)), np.zeros((N, 3)))
+    still = read(PERFECT, STILL, STILL)
     # behind a 44 Hz low-pass of this shape (equivalent bandwidth about 50 Hz)
     assert still[:, :3].std() == pytest.approx(400e-6 * np.sqrt(50.0), rel=0.1)
     assert still[:, 4:].std() == pytest.approx(0.005 * np.sqrt(50.0), rel=0.15)
@@ -83,10 +85,9 @@ def test_parts_stay_within_the_sheet_and_differ():
 
 
 def test_errors_and_temperature_reach_the_reading():
-    chip = Chip(
-        np.eye(3) * 1.02, np.array([0.05, 0.0, 0.0]), np.eye(3), np.array([0.0, 12.0, 0.0]),
-        np.array([0.0, 0.0, 0.001]), np.array([0.1, 0.0, 0.0]), gyro_walk=0.0,
-    )  # fmt: skip
+    accel = {"accel_matrix": np.eye(3) * 1.02, "accel_offset": np.array([0.05, 0.0, 0.0])}
+    per_c = {"accel_per_c": np.array([0.0, 0.0, 0.001]), "gyro_per_c": np.array([0.1, 0.0, 0.0])}
+    chip = replace(PERFECT, **accel, **per_c, gyro_bias=np.array([0.0, 12.0, 0.0]))
     force = np.tile([0.0, 0.0, 1.0], (N, 1))
     mean = read(chip, force, np.zeros((N, 3)), temp_c=35.0).mean(axis=0)
     assert mean[:3] == pytest.approx([0.05, 0.0, 1.03], abs=5e-4)
@@ -95,8 +96,9 @@ def test_errors_and_temperature_reach_the_reading():
 
 
 def test_bias_wanders():
-    chip = Chip(np.eye(3), np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3), np.zeros(3), gyro_walk=0.1)
     n = 100 * RATE_HZ
-    gyro = chip.read(np.random.default_rng(3), np.zeros((n, 3)), np.zeros((n, 3)), np.full(n, 25.0))[:, 4:]
+    gyro = replace(PERFECT, gyro_walk=0.1).read(
+        np.random.default_rng(3), np.zeros((n, 3)), np.zeros((n, 3)), np.full(n, 25.0)
+    )[:, 4:]
     late = np.abs(gyro[-200:].mean(axis=0))
     assert 0.2 < late.max() < 5.0

@@ -1,10 +1,13 @@
 """Whole simulated rides: the same again from the same seed, within their stated ranges, written as logs."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from command import refused, works
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.simulation.files import simulate
+from kickstand_tools.simulation.physics.chip import RATE_HZ
 from kickstand_tools.simulation.profiles import MAIN, PROFILES
 from kickstand_tools.simulation.ride import random_rotation, ride
 
@@ -16,7 +19,7 @@ def rides():
     return {name: ride(name, 5, SHORT_S) for name in PROFILES}
 
 
-def felt(made):
+def vehicle_readings(made):
     """Force (N, 3, g) and rates (N, 3, deg/s) in vehicle axes, the part's matrix and biases taken off."""
     chip, mounting = made.chip, made.vehicle_from_sensor
     force = (made.readings[:, :3] - chip.accel_offset) @ np.linalg.inv(chip.accel_matrix).T @ mounting.T
@@ -108,7 +111,7 @@ def test_a_rider_who_moves_about_does_not_tilt_a_bike_on_its_stand(rides, name):
 
 def test_the_sensor_feels_one_g_at_rest_and_the_rates_of_the_truth(rides):
     made = rides["street"]
-    force, rates = felt(made)
+    force, rates = vehicle_readings(made)
     rest = made.phase == "kickstand"
     assert np.linalg.norm(force[rest], axis=1).mean() == pytest.approx(1.0, abs=0.005)
     lean = np.degrees(np.arctan2(force[rest, 0], force[rest, 1])).mean()
@@ -134,9 +137,9 @@ def test_the_two_poses_are_what_was_asked_for():
 
 
 def test_a_creeping_mount_turns_by_some_degrees():
-    """The gravity felt at the end has moved against the truth's lean and pitch."""
+    """The gravity measured at the end has moved against the truth's lean and pitch."""
     made = ride("creep", 4, 60.0, share=0.0)
-    force, _ = felt(made)
+    force, _ = vehicle_readings(made)
     early, late = force[200:600].mean(axis=0), force[-600:-200].mean(axis=0)
     lean = np.radians(made.truth["lean_deg"])
     first = np.degrees(np.arctan2(early[0], early[1]) - lean[200:600].mean())
@@ -185,3 +188,19 @@ def test_the_calibration_of_the_ride_before_goes_with_it(tmp_path):
 
 def test_an_unknown_profile_is_refused(tmp_path):
     refused(tmp_path, "simulate", "--profile", "moon", "--out", tmp_path / "x", words="street")
+
+
+@pytest.mark.parametrize("profile", ["street", "creep"])
+def test_a_ride_takes_at_most_so_many_columns(profile):
+    """An hour has 3.6 million rows at the chip's 1 kHz. What it gives back keeps none of them alive."""
+    seconds = 400.0
+    column = seconds * RATE_HZ * 8  # bytes of one number a row
+    tracemalloc.start()
+    try:
+        made = ride(profile, seed=0, seconds=seconds)
+        left, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert made.rate_hz == 200.0
+    assert peak < 44 * column
+    assert left < 6 * column

@@ -5,11 +5,10 @@ import json
 import math
 import os
 import re
-import subprocess
 from pathlib import Path
 
 import device_runs
-from kickstand_tools import unix_port
+from mpy import run_mpy
 
 SCRIPT = Path(device_runs.__file__)
 
@@ -78,15 +77,6 @@ def run(engine, flash, plan, capsys=None):
             gc.unfreeze()
             os.chdir(before)
         return Record(answer, capsys.readouterr().out if capsys else "")
-    done = subprocess.run(
-        unix_port.command("-X", "heapsize=8M", str(SCRIPT)),
-        input=json.dumps(plan),
-        capture_output=True,
-        text=True,
-        cwd=flash,
-        env=unix_port.environment(),
-        timeout=300,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    console, _, answer = done.stdout.rstrip("\n").rpartition("\n")
+    said = run_mpy(SCRIPT, heap="8M", stdin=json.dumps(plan), directory=flash)
+    console, _, answer = said.rstrip("\n").rpartition("\n")
     return Record(json.loads(answer), console)

@@ -101,7 +101,6 @@ def drive(legs, mount, options):
     moved_at, other = options.get("moved", [1e9, mount])
     bias = options.get("gyro_bias", [0.0, 0.0, 0.0])
     states = []
-    ready_s = None
     made = samples(legs, vehicle, **options.get("samples", {}))
     for k, (force, rate, speed) in enumerate(made):
         m = mount if k < moved_at * RATE_HZ else other
@@ -112,18 +111,13 @@ def drive(legs, mount, options):
             alignment.measure_speed(value)
         if not states or alignment.state != states[-1]:
             states.append(alignment.state)
-        if ready_s is None and alignment.ready:
-            ready_s = k / RATE_HZ
     alignment.finish()
     result = {
         "ready": alignment.ready,
-        "ready_s": ready_s,
         "states": states,
         "counted": alignment.counted,
-        "turned": alignment.turned,
         "stops": alignment.standing.stops,
         "bias": list(alignment.standing.bias),
-        "quality": alignment.quality_deg,
     }
     if hasattr(alignment, "events"):
         result["lag"] = alignment.events.lag_s

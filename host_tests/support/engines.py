@@ -1,7 +1,6 @@
-"""Both ways to run the firmware's mathematics on the host, so that every test of it can ask both."""
+"""Both engines that run the firmware's mathematics on the host, so that every test of it can ask both."""
 
 import json
-import subprocess
 from pathlib import Path
 
 import firmware_calls
@@ -9,6 +8,7 @@ import pytest
 from kickstand.errors import Refusal
 from kickstand_tools import unix_port
 from kickstand_tools.refusals import sentence
+from mpy import run_mpy
 
 SCRIPT = Path(firmware_calls.__file__)
 
@@ -25,16 +25,7 @@ def run(engine, calls):
     """Results of [(name, arguments), ...] as JSON gives them back."""
     if engine == "cpython":
         return json.loads(json.dumps([firmware_calls.call(name, arguments) for name, arguments in calls]))
-    done = subprocess.run(
-        unix_port.command("-X", "heapsize=64M", str(SCRIPT)),
-        input=json.dumps(calls),
-        capture_output=True,
-        text=True,
-        env=unix_port.environment(),
-        timeout=300,
-    )
-    assert done.returncode == 0, done.stderr + done.stdout
-    return json.loads(done.stdout)
+    return json.loads(run_mpy(SCRIPT, stdin=json.dumps(calls)))
 
 
 def words(answer):

@@ -1,7 +1,12 @@
 """Logs broken in many ways, each by a number: the same number breaks the same log in the same way."""
 
+import contextlib
+import functools
 import gzip
 import random
+from collections.abc import Callable
+
+Rows = list[list[bytes]]  # the cells of each line
 
 WORDS = (
     *("nan", "NaN", "inf", "-inf", "1e308", "-1e308", "1e999", "1e-320", "5e15", "-0", "+-1", "1_0", "0x10", "1e", "."),
@@ -10,12 +15,33 @@ WORDS = (
 SIZES = (0.0, 1e-3, 1e-6, 9.80665, 57.29578, 1000.0, 1e6, 1e12, -1.0)
 
 
-def _cells(text: bytes) -> list[list[bytes]]:
-    return [line.split(b",") for line in text.split(b"\n")]
+def _of_lines(way):
+    """A way to break the lines of a text as one to break the text."""
+
+    @functools.wraps(way)
+    def of_text(text: bytes, chance: random.Random) -> bytes:
+        lines = text.split(b"\n")
+        return b"\n".join(way(lines, chance) or lines)
+
+    return of_text
 
 
-def _text(rows: list[list[bytes]]) -> bytes:
-    return b"\n".join(b",".join(row) for row in rows)
+def _of_cells(way):
+    """The same of lists of cells, which it changes."""
+
+    @functools.wraps(way)
+    def of_text(text: bytes, chance: random.Random) -> bytes:
+        rows = [line.split(b",") for line in text.split(b"\n")]
+        way(rows, chance)
+        return b"\n".join(b",".join(row) for row in rows)
+
+    return of_text
+
+
+def _renumber(rows: Rows, place: int, change: Callable[[float], bytes]) -> None:
+    for row in rows:
+        with contextlib.suppress(ValueError, IndexError):
+            row[place] = change(float(row[place]))
 
 
 def flip_bytes(text: bytes, chance: random.Random) -> bytes:
@@ -35,109 +61,92 @@ def cut_a_piece(text: bytes, chance: random.Random) -> bytes:
     return text[:begin] + text[begin + chance.choice((1, 5, 50, 2000)) :]
 
 
-def double_lines(text: bytes, chance: random.Random) -> bytes:
-    lines = text.split(b"\n")
+@_of_lines
+def double_lines(lines: list[bytes], chance: random.Random) -> list[bytes]:
     at = chance.randrange(len(lines))
     many = chance.choice((1, 1, 5, 60))
-    return b"\n".join(lines[:at] + lines[at : at + 1] * many + lines[at:])
+    return lines[:at] + lines[at : at + 1] * many + lines[at:]
 
 
-def exchange_lines(text: bytes, chance: random.Random) -> bytes:
-    lines = text.split(b"\n")
+@_of_lines
+def exchange_lines(lines: list[bytes], chance: random.Random) -> None:
     a, b = chance.randrange(len(lines)), chance.randrange(len(lines))
     lines[a], lines[b] = lines[b], lines[a]
-    return b"\n".join(lines)
 
 
-def shuffle_lines(text: bytes, chance: random.Random) -> bytes:
-    lines = text.split(b"\n")
+@_of_lines
+def shuffle_lines(lines: list[bytes], chance: random.Random) -> list[bytes]:
     rest = lines[1:]
     chance.shuffle(rest)
-    return b"\n".join(lines[:1] + rest)
+    return lines[:1] + rest
 
 
-def lose_a_column(text: bytes, chance: random.Random) -> bytes:
-    rows = _cells(text)
+@_of_cells
+def lose_a_column(rows: Rows, chance: random.Random) -> None:
     place = chance.randrange(max(1, len(rows[0])))
-    return _text([row[:place] + row[place + 1 :] for row in rows])
+    for row in rows:
+        del row[place : place + 1]
 
 
-def exchange_columns(text: bytes, chance: random.Random) -> bytes:
-    rows = _cells(text)
+@_of_cells
+def exchange_columns(rows: Rows, chance: random.Random) -> None:
     width = max(1, len(rows[0]))
     a, b = chance.randrange(width), chance.randrange(width)
     header = chance.random() < 0.5  # with their names, or without
     for row in rows[0 if header else 1 :]:
         if len(row) > max(a, b):
             row[a], row[b] = row[b], row[a]
-    return _text(rows)
 
 
-def rename_a_column(text: bytes, chance: random.Random) -> bytes:
-    rows = _cells(text)
+@_of_cells
+def rename_a_column(rows: Rows, chance: random.Random) -> None:
     rows[0][chance.randrange(len(rows[0]))] = chance.choice((b"", b"ax_g", b"speed_mps", b"time", b"lean_deg", b'"'))
-    return _text(rows)
 
 
-def put_a_word(text: bytes, chance: random.Random) -> bytes:
-    rows = _cells(text)
+@_of_cells
+def put_a_word(rows: Rows, chance: random.Random) -> None:
     for _ in range(chance.choice((1, 1, 4, 100))):
         row = chance.choice(rows)
         row[chance.randrange(len(row))] = chance.choice(WORDS).encode()
-    return _text(rows)
 
 
-def scale_a_column(text: bytes, chance: random.Random) -> bytes:
-    rows, size = _cells(text), chance.choice(SIZES)
+@_of_cells
+def scale_a_column(rows: Rows, chance: random.Random) -> None:
+    size = chance.choice(SIZES)
     places = chance.choice(([0], [1, 2, 3], [4, 5, 6], [7], [1], [5]))
     begin = chance.choice((1, len(rows) // 2))
-    for row in rows[begin:]:
-        for place in places:
-            if len(row) > place:
-                try:
-                    row[place] = b"%.9g" % (float(row[place]) * size)
-                except ValueError:
-                    continue
-    return _text(rows)
+    for place in places:
+        _renumber(rows[begin:], place, lambda value: b"%.9g" % (value * size))
 
 
-def shift_the_time(text: bytes, chance: random.Random) -> bytes:
-    rows, by = _cells(text), chance.choice((-1.0, -1e-3, 1e-7, 0.3, 60.0, 1e6, 1.7e9, 9.9e9))
-    for row in rows[chance.randrange(1, max(2, len(rows))) :]:
-        try:
-            row[0] = b"%.6f" % (float(row[0]) + by)
-        except ValueError:
-            continue
-    return _text(rows)
+@_of_cells
+def shift_the_time(rows: Rows, chance: random.Random) -> None:
+    by = chance.choice((-1.0, -1e-3, 1e-7, 0.3, 60.0, 1e6, 1.7e9, 9.9e9))
+    begin = chance.randrange(1, max(2, len(rows)))
+    _renumber(rows[begin:], 0, lambda value: b"%.6f" % (value + by))
 
 
-def round_the_time(text: bytes, chance: random.Random) -> bytes:
-    rows, digits = _cells(text), chance.choice((0, 1, 2))
-    for row in rows[1:]:
-        try:
-            row[0] = b"%.*f" % (digits, float(row[0]))
-        except ValueError:
-            continue
-    return _text(rows)
+@_of_cells
+def round_the_time(rows: Rows, chance: random.Random) -> None:
+    digits = chance.choice((0, 1, 2))
+    _renumber(rows[1:], 0, lambda value: b"%.*f" % (digits, value))
 
 
-def go_wild(text: bytes, chance: random.Random) -> bytes:
+@_of_cells
+def go_wild(rows: Rows, chance: random.Random) -> None:
     """Readings up to the ends of the widest ranges."""
-    rows = _cells(text)
     begin = chance.choice((1, len(rows) // 3))
     g, dps = chance.choice(((19.0, 2400.0), (4.0, 2400.0), (19.0, 10.0)))
     for row in rows[begin : begin + chance.choice((1, 20, 1000))]:
         if len(row) > 6:
             row[1:7] = [b"%.4f" % chance.uniform(-most, most) for most in (g, g, g, dps, dps, dps)]
-    return _text(rows)
 
 
-def freeze(text: bytes, chance: random.Random) -> bytes:
-    rows = _cells(text)
+@_of_cells
+def freeze(rows: Rows, chance: random.Random) -> None:
     at = chance.randrange(len(rows))
     for row in rows[at : at + chance.choice((10, 60, 10_000))]:
         row[1:] = rows[at][1:]
-    return _text(rows)
 
 
 def other_separators(text: bytes, chance: random.Random) -> bytes:
@@ -164,10 +173,9 @@ def quote(text: bytes, chance: random.Random) -> bytes:
     return text[:at] + b'"' + text[at:]
 
 
-def a_long_line(text: bytes, chance: random.Random) -> bytes:
-    lines = text.split(b"\n")
+@_of_lines
+def a_long_line(lines: list[bytes], chance: random.Random) -> None:
     lines[chance.randrange(len(lines))] += chance.choice((b"1", b",", b"x", b" ")) * 200_000
-    return b"\n".join(lines)
 
 
 def nearly_nothing(text: bytes, chance: random.Random) -> bytes:

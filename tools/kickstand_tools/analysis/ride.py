@@ -72,8 +72,8 @@ class Ride:
             yield seen
         if not some:
             raise InputError(f"{self.name}: all readings are frozen, so that nothing is known: check the sensor")
-        if notices is not None:
-            notices += [Notice("smooth-slow")] if slow else []
+        if notices is not None and slow:
+            notices.append(Notice("smooth-slow"))
 
     def _read(
         self, log: Source, progress: Progress | None, notices: list[Notice] | None

@@ -129,7 +129,7 @@ def _six_lines(found: SixPositions) -> Iterable[str]:
         axes = ", ".join(found.beyond_sheet)
         yield f"warning: {axes} is beyond the data sheet (50 mg, z 80 mg, slope 3 %): used anyway"
     if found.free_pose is None:
-        yield "warning: no free pose: six poses fit exactly whatever they were, only a seventh can tell"
+        yield "warning: no free pose: six poses fit exactly whatever they were, only a seventh can show an error"
     yield "not aligned yet: next is kickstand calibrate two"
 
 
@@ -212,7 +212,7 @@ def _ride_lines(found: RideFit) -> Iterable[str]:
     yield "gyro bias  " + _along_axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
     yield "offset     " + _along_axes(found.calibration.accel_offset_g, "%+.4f g")
     yield from _matrix_lines(found.calibration.vehicle_from_sensor)
-    yield "upright is where the bike is balanced on straights; a ride does not tell the accelerometer's slopes"
+    yield "upright is where the bike is balanced on straights; the accelerometer's slopes are not observable from a ride"
 
 
 def _matrix_lines(vehicle_from_sensor) -> Iterable[str]:

@@ -10,7 +10,7 @@ from rich.live import Live
 from .. import unix_port
 from ..errors import InputError
 from .device_process import Device
-from .keyboard import BIKE_KEYS, Keyboard
+from .keyboard import BIKE_KEYS, keyboard
 from .score import Score, table
 from .screen import lcd_lines, lean_text, screen
 
@@ -30,9 +30,9 @@ def _watch(device: Device, engine: str, by_hand: bool, score: Score) -> None:
     keys = _HAND_HELP if by_hand else _HELP
     known = _KEYS | BIKE_KEYS if by_hand else _KEYS
     state, paused = None, False
-    with Keyboard() as keyboard, Live(screen=True, auto_refresh=False) as live:
+    with keyboard() as pressed, Live(screen=True, auto_refresh=False) as live:
         while not device.ended:
-            for key in keyboard.keys(0.03):
+            for key in pressed(0.03):
                 command = known.get(key)
                 if command == "quit":
                     return

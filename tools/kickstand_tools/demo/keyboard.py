@@ -1,9 +1,10 @@
 """Single key presses from the terminal, without waiting for Enter: Linux, macOS and Windows."""
 
+import contextlib
 import os
 import sys
 import time
-from types import TracebackType
+from collections.abc import Callable, Iterator
 
 # Key of a bike that is steered by hand, and the command of hand_bike.HandBike
 BIKE_KEYS = {"a": "left", "left": "left", "d": "right", "right": "right", "k": "kickstand", "u": "upright"}
@@ -27,44 +28,36 @@ def split(text: str) -> list[str]:
 if sys.platform == "win32":
     import msvcrt
 
-    class Keyboard:
-        """with Keyboard() as keyboard: keyboard.keys(wait_s)"""
+    @contextlib.contextmanager
+    def keyboard() -> Iterator[Callable[[float], list[str]]]:
+        """Gives a function: the keys pressed so far; it waits for that many seconds."""
 
-        def __enter__(self) -> "Keyboard":
-            return self
-
-        def __exit__(self, *_: object) -> None:
-            pass
-
-        def keys(self, wait_s: float) -> list[str]:
-            """Keys pressed so far; waits for wait_s."""
+        def keys(wait_s: float) -> list[str]:
             time.sleep(wait_s)
             text = ""
             while msvcrt.kbhit():
                 text += msvcrt.getwch()
             return split(text)
 
+        yield keys
+
 else:
     import select
     import termios
     import tty
 
-    class Keyboard:
-        """with Keyboard() as keyboard: keyboard.keys(wait_s)"""
+    @contextlib.contextmanager
+    def keyboard() -> Iterator[Callable[[float], list[str]]]:
+        """Gives a function: the keys pressed so far; it waits for one up to that many seconds."""
+        terminal = sys.stdin.fileno()
 
-        def __enter__(self) -> "Keyboard":
-            self._fd = sys.stdin.fileno()
-            self._before = termios.tcgetattr(self._fd)
-            tty.setcbreak(self._fd)
-            return self
+        def keys(wait_s: float) -> list[str]:
+            pressed = select.select([terminal], [], [], wait_s)[0]
+            return split(os.read(terminal, 1024).decode(errors="replace")) if pressed else []
 
-        def __exit__(
-            self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-        ) -> None:
-            termios.tcsetattr(self._fd, termios.TCSADRAIN, self._before)
-
-        def keys(self, wait_s: float) -> list[str]:
-            """Keys pressed so far; waits for one up to wait_s."""
-            if not select.select([self._fd], [], [], wait_s)[0]:
-                return []
-            return split(os.read(self._fd, 1024).decode(errors="replace"))
+        before = termios.tcgetattr(terminal)
+        tty.setcbreak(terminal)
+        try:
+            yield keys
+        finally:
+            termios.tcsetattr(terminal, termios.TCSADRAIN, before)

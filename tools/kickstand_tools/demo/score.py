@@ -1,12 +1,11 @@
 """The lean on the LCD compared with the true one."""
 
-from dataclasses import dataclass
 from math import sqrt
-from typing import TypedDict
+from typing import NamedTuple, TypedDict
 
 from rich.table import Table
 
-from .shown_lean import shown_lean
+from ..simulated_board.lcd import shown_lean
 
 _ROLLING = ("roll in", "roll out", "roll")
 _STANDING = ("kickstand", "upright", "moving", "wait")
@@ -25,15 +24,14 @@ class State(TypedDict):
     pressed: bool
 
 
-@dataclass
-class Figures:
-    """Shown against true lean in one part of the ride. Errors: shown less true."""
+class Figures(NamedTuple):
+    """Shown against true lean in one part of the ride, degrees. Errors: shown less true."""
 
     samples: int
-    true_mean_deg: float
-    shown_mean_deg: float
-    rms_error_deg: float
-    worst_error_deg: float
+    true_mean: float
+    shown_mean: float
+    rms_error: float
+    worst: float
 
 
 class Score:
@@ -79,19 +77,12 @@ def table(figures: dict[str, Figures]) -> Table | str:
         "The README's figures are of the lean filter, sample by sample.",
     )
     table.add_column("")
-    for name in ("samples", "true mean", "shown mean", "rms error", "worst"):
-        table.add_column(name, justify="right")
+    for name in Figures._fields:
+        table.add_column(name.replace("_", " "), justify="right")
     for name, part in figures.items():
         if name == "all":
             table.add_section()
-        table.add_row(
-            name,
-            str(part.samples),
-            f"{part.true_mean_deg:.1f}",
-            f"{part.shown_mean_deg:.1f}",
-            f"{part.rms_error_deg:.1f}",
-            f"{part.worst_error_deg:+.1f}",
-        )
+        table.add_row(name, str(part.samples), *(f"{value:.1f}" for value in part[1:-1]), f"{part.worst:+.1f}")
     return table
 
 

@@ -11,8 +11,8 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from ..simulated_board.lcd import shown_lean
 from .score import State
-from .shown_lean import shown_lean
 
 WIDTH = 78
 _BIKE_COLUMNS, _BIKE_ROWS = 38, 11

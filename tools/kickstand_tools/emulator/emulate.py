@@ -9,7 +9,7 @@ from rich.live import Live
 
 from ..demo.device import KICKSTAND_PRESS_S, LONG_PRESS_S, PART_SEED, PART_SHARE, SCRIPT, UPRIGHT_PRESS_S
 from ..demo.hand_bike import HandBike
-from ..demo.keyboard import BIKE_KEYS, Keyboard
+from ..demo.keyboard import BIKE_KEYS, keyboard
 from ..demo.score import State
 from ..demo.screen import lcd_lines, screen
 from ..simulation.scripted.script import Ride
@@ -73,9 +73,9 @@ def _run(pico: Pico, server: ConsoleServer) -> None:
 
 
 def _watch(pico: Pico, server: ConsoleServer, bike: HandBike, address: str) -> None:
-    with Keyboard() as keyboard, Live(screen=True, auto_refresh=False) as live:
+    with keyboard() as pressed, Live(screen=True, auto_refresh=False) as live:
         while True:
-            for key in keyboard.keys(0.0):
+            for key in pressed(0.0):
                 if key == "q":
                     return
                 if key in _BUTTON:

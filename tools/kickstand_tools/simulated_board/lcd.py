@@ -4,6 +4,8 @@ Wiring of the usual backpack: P0 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7. 
 controller reads them as ones. What is sent while it is busy is lost, as on the chip.
 """
 
+import re
+
 from .glyphs import drawn, rom
 
 _RS, _RW, _E, _LIGHT = 0x01, 0x02, 0x04, 0x08
@@ -19,6 +21,14 @@ _LINE = 40  # characters of a line in display memory, of which 16 are visible
 # (address past the end of a line, address where the counter continues)
 _TWO_LINE_WRAPS = ((0x28, 0x40), (0x68, 0x00), (0x3F, 0x27), (-1, 0x67))
 _ONE_LINE_WRAPS = ((0x50, 0x00), (-1, 0x4F))
+
+_LEAN_PAGE = re.compile("Lean +([0-9]+)° (left|right)?[ *]*$")
+
+
+def shown_lean(lines):
+    """The lean on the firmware's lean page, degrees, > 0 to the right; None if the two lines show something else."""
+    found = _LEAN_PAGE.match(lines[0])
+    return found and float(found.group(1)) * (-1.0 if found.group(2) == "left" else 1.0)
 
 
 class Lcd:

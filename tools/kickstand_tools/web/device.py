@@ -10,9 +10,9 @@ MicroPython, in the browser and elsewhere, and for CPython.
 import json
 
 from ..demo.hand_bike import HandBike
-from ..demo.shown_lean import shown_lean
 from ..simulated_board.clock import PowerOff, Reset, to_us
 from ..simulated_board.fakes.fake_time import sleep_us, ticks_add, ticks_diff, ticks_us
+from ..simulated_board.lcd import shown_lean
 from ..simulated_board.simulator import Board
 from ..simulation.scripted.sensor_errors import Sensor
 

@@ -1,4 +1,4 @@
-"""Writes a fleet that is made up: logs, MANIFEST.csv, and TRUTH.csv, which tells what a run over it has to find."""
+"""Writes a fleet that is made up: logs, MANIFEST.csv, and TRUTH.csv, which says what a run over it has to find."""
 
 import gzip
 from collections.abc import Callable, Iterator
@@ -12,6 +12,7 @@ from ...logs.csv_lines import write_table
 from ...logs.log import Log
 from ...logs.table import Array
 from ...output import check_directory
+from ...signals.rotations import rotation_matrix
 from .route import random_route
 from .vehicle import HANDLING, Receiver, drive_log, random_sensor
 
@@ -157,10 +158,7 @@ def _vehicle(
 def _turn(chance: np.random.Generator, degrees: float) -> Array:
     """(3, 3): a turn about any axis."""
     axis = chance.standard_normal(3)
-    x, y, z = axis / np.linalg.norm(axis)
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    angle = np.radians(degrees)
-    return np.eye(3) + np.sin(angle) * cross + (1.0 - np.cos(angle)) * cross @ cross
+    return rotation_matrix(np.radians(degrees) * axis / np.linalg.norm(axis))
 
 
 def _writer(log: Log, broken: str) -> Callable[[Path], None]:

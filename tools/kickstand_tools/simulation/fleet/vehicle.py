@@ -7,6 +7,7 @@ from kickstand.units import STANDARD_GRAVITY
 
 from ...logs.log import Log
 from ...logs.table import Array
+from ...signals.rotations import rotation_vector
 from ..ride import random_rotation
 from .route import Handling, Route, balance_lean
 
@@ -58,7 +59,7 @@ def drive_log(
     name: str = "the log",
 ) -> Log:
     """The log of a drive. moved: at so many seconds the mount turns to another one (3, 3) within 0.3 s."""
-    force, rate = _felt(chance, kind, route)
+    force, rate = _readings(chance, kind, route)
     mount = np.broadcast_to(sensor.mount, (len(force), 3, 3))
     if moved is not None:
         at_s, other = moved
@@ -79,7 +80,7 @@ def drive_log(
     return Log(route.time, force, rate, speed, utc_s=utc_s, name=name)
 
 
-def _felt(chance: np.random.Generator, kind: str, route: Route) -> tuple[Array, Array]:
+def _readings(chance: np.random.Generator, kind: str, route: Route) -> tuple[Array, Array]:
     """(n, 3) specific force (m/s2) and (n, 3) rate (rad/s) along the vehicle's left, up, forward."""
     step_s = route.time[1]
     lateral = route.speed * route.yaw_rate
@@ -103,8 +104,5 @@ def _felt(chance: np.random.Generator, kind: str, route: Route) -> tuple[Array, 
 
 def _knock(time: Array, at_s: float, turn: Array, seconds: float = 0.3) -> Array:
     """(n, 3) rad/s along the vehicle's axes: the gyro sees the mount turn by the rotation `turn` (3, 3)."""
-    angle = np.arccos(np.clip((np.trace(turn) - 1.0) / 2.0, -1.0, 1.0))
-    axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
-    size = np.linalg.norm(axis)
     turning = (time >= at_s - seconds / 2) & (time < at_s + seconds / 2)
-    return np.outer(turning, axis / max(float(size), 1e-9) * angle / seconds)
+    return np.outer(turning, rotation_vector(turn) / seconds)

@@ -87,22 +87,22 @@ class Chip:
         np.cumsum(walk, axis=0, out=walk)
         walk *= self.gyro_walk
         walk /= np.sqrt(RATE_HZ)
-        felt = force @ self.accel_matrix.T
-        felt += self.accel_offset
-        felt += warm * self.accel_per_c
-        felt += _noise(chance, n, _ACCEL_NOISE_G)
-        accel = _sampled(felt, _ACCEL_RANGE_G, _ACCEL_LSB)
-        felt = rates @ self.gyro_matrix.T
-        felt += self.gyro_bias
-        felt += warm * self.gyro_per_c
-        felt += walk
+        values = force @ self.accel_matrix.T
+        values += self.accel_offset
+        values += warm * self.accel_per_c
+        values += _noise(chance, n, _ACCEL_NOISE_G)
+        accel = _sampled(values, _ACCEL_RANGE_G, _ACCEL_LSB)
+        values = rates @ self.gyro_matrix.T
+        values += self.gyro_bias
+        values += warm * self.gyro_per_c
+        values += walk
         del walk
         noise = _noise(chance, n, _GYRO_NOISE_DPS)
         noise += _GYRO_DPS_PER_G * force
-        felt += noise
+        values += noise
         del noise
         temp = np.round(temp_c[::DIVIDER] * 340.0) / 340.0
-        return np.column_stack((accel, temp, _sampled(felt, _GYRO_RANGE_DPS, _GYRO_LSB)))
+        return np.column_stack((accel, temp, _sampled(values, _GYRO_RANGE_DPS, _GYRO_LSB)))
 
 
 def _noise(chance: np.random.Generator, n: int, rms: float) -> NDArray[np.float64]:

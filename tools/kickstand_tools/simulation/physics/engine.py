@@ -42,7 +42,7 @@ class Engine:
         size = np.minimum(self.rms_g * growth, _MAX_G) * running
         weights = chance.dirichlet(np.full(len(_ORDERS), 2.0), size=6) ** 0.5
         phases = chance.uniform(0.0, 2.0 * np.pi, size=(6, len(_ORDERS)))
-        felt = np.zeros((len(speed), 6))
+        shaken = np.zeros((len(speed), 6))
         for start in range(0, len(speed), _BLOCK):
             part = slice(start, start + _BLOCK)
             for k, order in enumerate(_ORDERS):
@@ -50,8 +50,8 @@ class Engine:
                 sine, cosine = np.sin(angle), np.cos(angle)
                 for axis in range(6):
                     phase = phases[axis, k]
-                    felt[part, axis] += weights[axis, k] * (sine * np.cos(phase) + cosine * np.sin(phase))
-        felt *= np.sqrt(2.0) * size[:, None]
-        felt[:, :3] *= STANDARD_GRAVITY
-        felt[:, 3:] *= np.radians(_DPS_PER_G)
-        return felt[:, :3], felt[:, 3:]
+                    shaken[part, axis] += weights[axis, k] * (sine * np.cos(phase) + cosine * np.sin(phase))
+        shaken *= np.sqrt(2.0) * size[:, None]
+        shaken[:, :3] *= STANDARD_GRAVITY
+        shaken[:, 3:] *= np.radians(_DPS_PER_G)
+        return shaken[:, :3], shaken[:, 3:]

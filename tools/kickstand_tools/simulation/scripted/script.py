@@ -218,12 +218,12 @@ def shaken(motion, t_s, vibration_g, speed_mps, distance_m, engine):
         return motion
     peak = sqrt(2.0 / len(_ROAD_HZ))  # of each of the equal sines that add up to an rms of 1
     turns = 2.0 * pi * (_IDLE_HZ * t_s + _ENGINE_CYCLES_PER_M * distance_m)
-    felt = []
+    sums = []
     for axis in range(6):
         wave = 0.0
         for k in range(len(_ROAD_HZ)):
             wave += sin(2.0 * pi * _ROAD_HZ[k] * t_s + 2.4 * (5 * axis + k))
         shake = road * peak * wave + firing * sqrt(2.0) * sin(turns + 2.4 * axis)
         share = _ROAD_G[axis] if axis < 3 else _ROAD_DPS[axis - 3]
-        felt.append(motion[axis] + share * shake)
-    return tuple(felt)
+        sums.append(motion[axis] + share * shake)
+    return tuple(sums)

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable
 
+from kickstand_tools.simulated_board.lcd import shown_lean
 from kickstand_tools.simulated_board.simulator import Board
 
 from .trip import QUIET_S, SENSOR, Trip
@@ -13,13 +14,6 @@ LAG_S = 0.6  # the display may show the lean of any instant since then
 STILL_S = 2.0  # without a transfer to the sensor: the program hangs
 STALE_S = 0.7  # of a lean that no reading has renewed: half a second, a page and a look
 SAYS_WHY = re.compile("No sensor|Sensor |Readings lost|Kickstand|Lean  --")
-_LEAN = re.compile(r"Lean +(\d+)° (right|left |     )[ *]$")
-
-
-def shown_lean(line: str) -> float | None:
-    """Degrees, > 0 to the right; None if the line shows no lean, or one that is half written."""
-    match = _LEAN.match(line)
-    return match and float(match[1]) * (-1 if match[2] == "left " else 1)
 
 
 class Watch:
@@ -58,7 +52,7 @@ class Watch:
             self._say("the program has failed")
         busy = self._during_fault(t_s, 0.0)
         self._alive(t_s, busy)
-        lean = shown_lean(text[0])
+        lean = shown_lean(text)
         self._accurate(t_s, lean)
         self._fresh(t_s, lean)
         self._explained(t_s, text[0])
