@@ -5,6 +5,7 @@ wires them all, and nothing but start, which main.py runs, imports the app.
 """
 
 import ast
+from graphlib import TopologicalSorter
 
 from kickstand_tools import firmware_path
 
@@ -126,6 +127,14 @@ def test_no_arrow_is_left_over():
         for target in targets | LATE.get(room, set()):
             there = any(name == target or name.startswith(target + ".") for name in used.get(room, ()))
             assert there, f"{room} no longer imports {target}"
+
+
+def test_no_module_imports_itself_by_way_of_others():
+    """Not even within functions."""
+    package = firmware_path.PACKAGE
+    found = {".".join(path.relative_to(package).with_suffix("").parts): imports(path) for _, path in modules()}
+    graph = TopologicalSorter({name: {target or "__init__" for target, _ in seen} for name, seen in found.items()})
+    graph.prepare()  # raises CycleError
 
 
 def test_mathematics_knows_no_hardware():

@@ -4,7 +4,7 @@
 >>> kickstand.status()
 """
 
-__version__ = "0.4.0"
+from .units import __version__ as __version__
 
 
 def status():

@@ -3,9 +3,9 @@
 sensor -> calibration and alignment -> lean -> page -> display, in one direction. The chip samples at SAMPLE_HZ by
 itself, and a turn of the loop takes what has come in.
 
-The methods that last for most of a turn (turn, _take, LeanMeter.update_sum, Sensor.fetch) need at most eleven words for
-locals and stack. MicroPython puts a larger frame on the heap. Freeing it moves the start of the allocator's next search
-back, in front of all garbage since the last collection: up to 1 ms a turn.
+The methods that last for most of a turn (turn, _pass_on, LeanMeter.update_sum, Sensor.fetch) need at most eleven words
+for locals and stack. MicroPython puts a larger frame on the heap. Freeing it moves the start of the allocator's next
+search back, in front of all garbage since the last collection: up to 1 ms a turn.
 """
 
 import gc
@@ -15,9 +15,9 @@ from .board import port
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
 from .devices import open_button
-from .errors import attempt
 from .imu.sample_clock import SampleClock
 from .lean.meter import LeanMeter
+from .rides.recording import Recording
 from .ui.screen import Screen
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
@@ -43,10 +43,8 @@ def fill_gaps(n):
 class App:
     """The lean meter on a board.
 
-    settings: a Settings. lcd, sensor: of devices.open_lcd() and open_sensor(). keeper: where rides are recorded to (see
-    Recorder), None for flash or SD card; if one is given, recording begins with the first readings. Raises
-    SettingsError for pins that cannot be used. recorder: a Recorder, or None before prepare_recorder() has made it.
-    no_recorder: None, or a Notice why it cannot.
+    settings: a Settings. lcd, sensor: of devices.open_lcd() and open_sensor(). keeper: as for Recording. Raises
+    SettingsError for pins that cannot be used.
     """
 
     def __init__(self, settings, lcd, sensor, keeper=None):
@@ -54,31 +52,21 @@ class App:
         self.lcd = lcd
         self.button = open_button(settings)
         self.sensor = sensor
-        self.meter = LeanMeter(Calibration(), settings.VEHICLE == "motorcycle", sensor.chip.gyro_delay_s)
+        self.meter = LeanMeter(Calibration(), settings.leans, sensor.chip.gyro_delay_s)
         self.calibration = ActiveCalibration(self.meter, self._calibration_changed)
         self.drive = self._open_drive() if settings.SPEED else None
-        self.recorder = self.no_recorder = None
-        self._keeper = keeper
+        self.rides = Recording(settings, sensor.chip, self.meter, self.calibration, keeper)
         self.clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
-        self.screen = Screen(self)
+        self.screen = Screen(settings, sensor, self.clock, self.meter, self.calibration, self.drive, self.rides)
         self._restarts = 0
-        self._record_due = settings.RECORD or keeper is not None
-        self._on_card = settings.SD_SPI is not None and keeper is None
-        # Modules of rides/ that are still to be imported
-        self._recorder_parts = ["block", "recorder"] if keeper else ["block", "ride_paths", "flash_ring", "recorder"]
-        if self._on_card:
-            self._recorder_parts.append("card_trial")
-        if self._record_due or self._on_card:
-            self._make_recorder()
         self._page_ms = ticks_ms()
-        self.late = False  # the page that is due is to show no lean
 
     def _open_drive(self):
         # 30 KB of heap with all that they import: not for a board without a speed source
         from .drive_alignment.background import BackgroundAlignment
         from .speed.source import open_speed
 
-        return BackgroundAlignment(self.settings.VEHICLE, open_speed(self.settings), self.meter, self.calibration)
+        return BackgroundAlignment(self.settings.leans, open_speed(self.settings), self.meter, self.calibration)
 
     def run(self):
         """Loop until Ctrl-C, LOOP_US a turn."""
@@ -86,17 +74,14 @@ class App:
             self._loop()
         except KeyboardInterrupt:
             port.rest_watchdog()  # nothing feeds it from here on; first, for a second Ctrl-C may interrupt what follows
-            if self.recording:
-                self.recorder.stop()
+            self.rides.stop()
             raise
 
     def _loop(self):
-        if self._on_card and self.recorder:
-            from .rides import card_trial
-
+        if self.rides.on_card:
             self.lcd.show("SD card", "is being read")
             self.lcd.flush()
-            card_trial.prepare(self.recorder, self.settings)
+            self.rides.try_out_card()
         watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         gc.threshold(-1)
         due_us = ticks_us()
@@ -125,7 +110,7 @@ class App:
         n = self.sensor.fetch(now_ms)
         if n:
             dt_us = self.clock.step(n, now_us)
-            self._take(n, dt_us, now_ms)
+            self._pass_on(n, dt_us, now_ms)
         if self.drive:
             self._poll_speed(now_ms)
         if ticks_diff(now_ms, self._page_ms) >= 0:  # asked twice: a local would put this frame on the heap
@@ -141,75 +126,40 @@ class App:
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self._show(now_ms)
         self.lcd.tick(now_ms)
-        if self.recorder and self.recorder.active:  # recording() would cost 20 us
-            self.recorder.tick()
+        if self.rides.recorder.active:  # recording() would cost 20 us
+            self.rides.recorder.tick()
 
     @property
     def recording(self):
         """True while a ride is being recorded."""
-        return self.recorder is not None and self.recorder.active
-
-    def record(self):
-        """Begin to record a ride. Where the bike stands, the lean filter begins anew too, so that a replay shows the
-        same lean; it has to find the gyro's errors again in the first bends. A recording begun while riding is replayed
-        by a filter that knows less at its beginning than the one on the board."""
-        if self.meter.at_rest:
-            self.calibration.restart()
-        if not self._on_card:  # a card has to be tried out before the watchdog runs
-            self.no_recorder = None
-        self._make_recorder()
-        if self.recorder:
-            self.recorder.start(self.sensor.chip, self.calibration.value)
-        else:
-            self.screen.tell(self.no_recorder, ticks_ms())
-
-    def _make_recorder(self):
-        step = self._prepare if self._keeper else self.prepare_recorder  # a computer that waits is told by an exception
-        while self.recorder is None and self.no_recorder is None:
-            step()
-
-    def prepare_recorder(self):
-        """Import the next module that recording needs, and after the last make the recorder. The open menu calls this
-        again and again: the chip's FIFO bridges one import (0.1 s), not all of them. If that fails, record() tells
-        why."""
-        if self.recorder is None and self.no_recorder is None:
-            self.no_recorder = attempt(self._prepare)
-
-    def _prepare(self):
-        gc.collect()  # as before each import while the loop runs: what stays must not lie behind garbage
-        if self._recorder_parts:
-            __import__("kickstand.rides." + self._recorder_parts[0])
-            self._recorder_parts.pop(0)
-            return
-        from .rides.recorder import Recorder
-
-        keeper = self._keeper
-        if keeper is None:
-            from .rides.flash_ring import RideRing
-
-            keeper = RideRing(self.settings)
-        self.recorder = Recorder(keeper, self.settings.SAMPLE_HZ)
+        return self.rides.recorder.active
 
     def _poll_speed(self, now_ms):
-        if self.recorder and self.recorder.stalled:  # also by what began or ended a ride
-            self.recorder.stalled = False
+        recorder = self.rides.recorder
+        if recorder.stalled:  # also by what began or ended a ride
+            recorder.stalled = False
             self.drive.speed.after_stall(now_ms)
         speed = self.drive.poll(now_ms)
-        if self.recorder and self.recorder.active:
-            self.recorder.add_fix(speed, self.drive.speed.place(now_ms))
+        if recorder.active:
+            recorder.add_fix(speed, self.drive.speed.place(now_ms))
 
     def _show(self, now_ms):
-        """Put the page as it is now onto the display. As often, and at standstill only, save the trim that riding has
-        found."""
+        """Put the page as it is now onto the display, and what recording or speed source have to report once. As often,
+        take a step of what the menu may need and, at standstill only, save the roll-misalignment correction."""
         waiting_ms = 1000 * self.sensor.chip.frames_left // self.settings.SAMPLE_HZ
-        self.late = ticks_diff(now_ms, self._page_ms) + waiting_ms > LATE_MS
+        self.screen.pages.late = ticks_diff(now_ms, self._page_ms) + waiting_ms > LATE_MS
         self._page_ms = ticks_add(now_ms, PAGE_MS)
+        if self.screen.menu:  # in which a recording can be begun, at once
+            self.rides.prepare()
+        problem = self.rides.recorder.take_problem() or (self.drive and self.drive.speed.take_problem())
+        if problem:
+            self.screen.notify(problem, now_ms)
         line1, line2 = self.screen.lines(now_ms)
         self.lcd.show(line1, line2)
         if not self.screen.wizard:
             self.calibration.keep_trim(now_ms)
 
-    def _take(self, n, dt_us, now_ms):
+    def _pass_on(self, n, dt_us, now_ms):
         """Pass on the n samples that came in, the last of them dt_us after the one before: the sum of them to the
         meter, each one to a wizard."""
         if self._restarts != self.sensor.restarts:
@@ -217,14 +167,14 @@ class App:
             self._sensor_started()
         chip = self.sensor.chip
         self.meter.update_sum(chip.sums, n, dt_us)
-        if self.recorder and self.recorder.active:
-            self.recorder.add(chip.sums, n, dt_us)
+        if self.rides.recorder.active:
+            self.rides.recorder.add(chip.sums, n, dt_us)
         if self.drive:
             self.drive.feed(chip.sums, n, dt_us, now_ms)
         if self.screen.wizard:
-            self._teach(n, now_ms)
+            self._pass_each(n, now_ms)
 
-    def _teach(self, n, now_ms):
+    def _pass_each(self, n, now_ms):
         chip, wizard = self.sensor.chip, self.screen.wizard
         for k in range(n):
             chip.take(k)
@@ -234,15 +184,16 @@ class App:
         """The chip has been set up, for the first time or again after a fault; it may be another chip."""
         self.meter.restart()
         if self.recording:
-            self.recorder.mark_gap()
-        if self.calibration.chip_started(self.sensor.chip) and self._record_due:
-            self._record_due = False
-            self.record()
-        self._page_ms = ticks_add(ticks_ms(), FIRST_PAGE_MS)  # no page that says no more than that there is no lean yet
+            self.rides.recorder.mark_gap()
+        if self.calibration.chip_started(self.sensor.chip):
+            problem = self.rides.start_due()
+            if problem:
+                self.screen.notify(problem, ticks_ms())
+        # the first page would only say that there is no lean yet
+        self._page_ms = ticks_add(ticks_ms(), FIRST_PAGE_MS)
 
     def _calibration_changed(self, replaced):
-        if self.recording:  # a ride has one calibration
-            self.recorder.start(self.sensor.chip, self.calibration.value)
+        self.rides.calibration_changed()
         if replaced:
             self.meter.reset_maxima()
             if self.drive:

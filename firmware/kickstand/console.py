@@ -4,7 +4,7 @@ Imported only when there is something to say: on most boards never.
 """
 
 SLOW_MS = 100  # a print takes a few ms, but 500 where the USB host sleeps: longer than the chip's FIFO lasts
-QUIET_MS = 60_000  # after a slow print no refusal is told for so long
+QUIET_MS = 60_000  # after a slow print no refusal is printed for so long
 
 _slow_ms = None  # when a print was slow
 
@@ -30,7 +30,7 @@ no-such-pin|config.py: {0} = {1} is no pin of this board ({2})
 i2c-pins|config.py: {1}_SDA = {2} and {1}_SCL = {3} do not belong to I2C {4} ({5})
 uart-pins|config.py: GPS_TX = {1} and GPS_RX = {2} do not belong to UART {3} ({4})
 """
-_RECORDING_STOPPED = "recording stopped: {0}"  # for all of its faults, which only the display tells apart
+_RECORDING_STOPPED = "recording stopped: {0}"  # for all of its faults, which only the display distinguishes
 
 
 def sentence(refusal):

@@ -17,15 +17,9 @@ def open_lcd(settings):
 
 def open_sensor(settings):
     """The chip, as a Sensor. Its fetch() raises SettingsError for pins that the I2C controller cannot use."""
-    chip = Mpu6050(
-        None,
-        settings.SENSOR_ADDRESS,
-        settings.ACCEL_RANGE_G,
-        settings.GYRO_RANGE_DPS,
-        settings.DLPF,
-        settings.SAMPLE_HZ,
-        settings.ACCEPT_WHO_AM_I,
-    )
+    ranges = settings.ACCEL_RANGE_G, settings.GYRO_RANGE_DPS
+    rates = settings.DLPF, settings.SAMPLE_HZ
+    chip = Mpu6050(None, settings.SENSOR_ADDRESS, *ranges, *rates, settings.ACCEPT_WHO_AM_I)
     return Sensor(chip, lambda: _open_bus(settings, "SENSOR"))
 
 

@@ -13,7 +13,7 @@ NO_MACHINE_CODE = (ImportError, NameError, SyntaxError, MemoryError, ValueError)
 
 
 class Notice:
-    """Something to be told. code: what; values: its numbers and names, in the order that the words for the code use
+    """Something to be reported. code: what; values: its numbers and names, in the order that the words for the code use
     them."""
 
     def __init__(self, code, *values):
@@ -31,7 +31,7 @@ class Notice:
 
 
 class Refusal(Exception):
-    """A request that cannot be carried out, told like a Notice."""
+    """A request that cannot be carried out; it is worded like a Notice."""
 
     def __init__(self, code, *values):
         super().__init__(code, *values)
@@ -83,11 +83,11 @@ class CaptureError(Refusal):
 
 
 class CalibrationError(Refusal):
-    """Six-position poses that give no believable calibration."""
+    """Six-position poses that give no plausible calibration."""
 
 
 class AlignmentError(Refusal):
-    """Two poses, or a drive, that do not tell how the sensor is mounted."""
+    """Two poses, or a drive, that do not show how the sensor is mounted."""
 
 
 class StoreError(Refusal):

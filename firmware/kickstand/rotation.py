@@ -13,9 +13,9 @@ def vector(x=0.0, y=0.0, z=0.0):
     return array("f", (x, y, z))
 
 
-def matrix():
-    """A new matrix, the identity."""
-    return array("f", (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0))
+def matrix(values=(1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)):
+    """A new matrix of 9 values, by default the identity."""
+    return array("f", values)
 
 
 def dot(a, b):

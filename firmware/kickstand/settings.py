@@ -1,6 +1,6 @@
 """The settings of config.py: each with its default, and checked.
 
-To add one: a line in _TABLE here, and one in config.py that says what it is for.
+To add one: a line in _TABLE or _PINS here, and one in config.py that says what it is for.
 """
 
 import sys
@@ -17,10 +17,8 @@ def _one_of(*choices):
 
 
 def _whole(low, high):
-    return lambda value: isinstance(value, int) and low <= value <= high, "a whole number from %d to %d" % (
-        low,
-        high,
-    )
+    words = "a whole number from %d to %d" % (low, high)
+    return lambda value: isinstance(value, int) and low <= value <= high, words
 
 
 def _sample_rate(value):
@@ -63,31 +61,35 @@ _TABLE = {
     "ACCEPT_WHO_AM_I": (None, (lambda v: v is None or isinstance(v, int), "None or a number as 0x75")),
     "SENSOR_ADDRESS": (0x68, _one_of(0x68, 0x69)),
     "SENSOR_I2C": (0, _one_of(0, 1)),
-    "SENSOR_SDA": (port.SENSOR_PINS[0], _PIN),
-    "SENSOR_SCL": (port.SENSOR_PINS[1], _PIN),
     "SENSOR_BUS_HZ": (400_000, _whole(100_000, 400_000)),
     "LCD_ADDRESSES": (ADDRESSES, (_addresses, "I2C addresses as (0x27, 0x3F)")),
     "LCD_I2C": (1, _one_of(0, 1)),
-    "LCD_SDA": (port.LCD_PINS[0], _PIN),
-    "LCD_SCL": (port.LCD_PINS[1], _PIN),
     "LCD_BUS_HZ": (100_000, _whole(100_000, 400_000)),
-    "BUTTON_PIN": (port.BUTTON_PIN, _PIN),
     "WATCHDOG": (True, _one_of(True, False)),
     "RECORD": (False, _one_of(True, False)),
     "SD_SPI": (None, _or_none(_one_of(*port.SD_SPI))),
+    "VEHICLE": ("motorcycle", _one_of("motorcycle", "car")),
+    "SPEED": (None, _one_of(None, "gps", "wheel")),
+    "GPS_UART": (port.GPS_UART, _whole(0, 2)),
+    "GPS_BAUD": (9600, _whole(4800, 115_200)),
+    "PULSES_PER_METRE": (0.5, (_pulses, "pulses along a metre of road, from 0.1 to 100")),
+}
+# Likewise of pins: where one is wrong none is used, for what is connected to the default one is not known
+_PINS = {
+    "SENSOR_SDA": (port.SENSOR_PINS[0], _PIN),
+    "SENSOR_SCL": (port.SENSOR_PINS[1], _PIN),
+    "LCD_SDA": (port.LCD_PINS[0], _PIN),
+    "LCD_SCL": (port.LCD_PINS[1], _PIN),
+    "BUTTON_PIN": (port.BUTTON_PIN, _PIN),
     "SD_SCK": (None, _or_none(_PIN)),
     "SD_MOSI": (None, _or_none(_PIN)),
     "SD_MISO": (None, _or_none(_INPUT)),
     "SD_CS": (None, _or_none(_PIN)),
-    "VEHICLE": ("motorcycle", _one_of("motorcycle", "car")),
-    "SPEED": (None, _one_of(None, "gps", "wheel")),
-    "GPS_UART": (port.GPS_UART, _whole(0, 2)),
     "GPS_TX": (port.GPS_PINS[0], _PIN),
     "GPS_RX": (port.GPS_PINS[1], _INPUT),
-    "GPS_BAUD": (9600, _whole(4800, 115_200)),
     "WHEEL_PIN": (port.WHEEL_PIN, _PIN),
-    "PULSES_PER_METRE": (0.5, (_pulses, "pulses along a metre of road, from 0.1 to 100")),
 }
+_NAMES = set(_TABLE) | set(_PINS)
 
 
 def load():
@@ -107,25 +109,27 @@ def _line_of(error):
     text = StringIO()
     # the stubs that check this know neither a StringIO's type nor its getvalue
     sys.print_exception(error, text)  # type: ignore[arg-type]
-    told = text.getvalue()  # type: ignore[attr-defined]
-    _, found, rest = told.rpartition('config.py", line ')
+    traceback = text.getvalue()  # type: ignore[attr-defined]
+    _, found, rest = traceback.rpartition('config.py", line ')
     return "line %s: " % rest.split("\n")[0].split(",")[0].strip() if found else ""
 
 
 class Settings:
-    """One attribute for each name in _TABLE. config: the module config, or None for the defaults. refusal: why there is
-    no config. Raises SettingsError.
+    """One attribute for each name in _TABLE and _PINS. config: the module config, or None for the defaults. refusal:
+    why there is no config. Raises SettingsError.
 
-    one_bus: sensor and display share one I2C bus.
+    one_bus: sensor and display share one I2C bus. leans: the vehicle does, a motorcycle.
     """
 
     def __init__(self, config=None, refusal=None):
-        for name, (default, (check, allowed)) in _TABLE.items():
-            value = getattr(config, name, default)
-            if value is not default and not check(value):
-                refusal = refusal or SettingsError("not-allowed", name, value, allowed)
-                value = None if check in (_pin, _whole_pin) else default
-            setattr(self, name, value)
+        for table in (_TABLE, _PINS):
+            for name, (default, (check, allowed)) in table.items():
+                value = getattr(config, name, default)
+                if value is not default and not check(value):
+                    refusal = refusal or SettingsError("not-allowed", name, value, allowed)
+                    value = default if table is _TABLE else None
+                setattr(self, name, value)
+        self.leans = self.VEHICLE == "motorcycle"
         self.one_bus = (self.SENSOR_SDA, self.SENSOR_SCL) == (self.LCD_SDA, self.LCD_SCL) != (None, None)
         if self.one_bus:  # the display's PCF8574 is made for 100 kHz, and sets the speed of a bus that it shares
             self.LCD_I2C = self.SENSOR_I2C
@@ -140,7 +144,7 @@ class Settings:
 
     def _check(self, config):
         for name in dir(config) if config else ():
-            if name not in _TABLE and (name.isupper() or name.upper() in _TABLE):
+            if name not in _NAMES and (name.isupper() or name.upper() in _NAMES):
                 raise SettingsError("no-setting", name)
         card = [getattr(self, name) for name in ("SD_SPI",) + SD_PINS]
         if None in card and card != [None] * 5:
@@ -155,7 +159,7 @@ class Settings:
             raise SettingsError("pin-twice", "", ", ".join(names))
         if port.I2C_NUMBERED and not self.one_bus and self.SENSOR_I2C == self.LCD_I2C:
             raise SettingsError("one-i2c", "LCD_I2C", self.LCD_I2C)
-        if self.VEHICLE == "car" and self.SPEED is None:
+        if not self.leans and self.SPEED is None:
             raise SettingsError("needs-speed", "SPEED")
         fitting = MIN_DLPF[self.SAMPLE_HZ]
         if self.DLPF < fitting:  # the engine's vibration would come out as a slow motion

@@ -9,36 +9,29 @@ from time import sleep_ms, ticks_ms
 
 import machine
 
-from . import __version__, settings
+from . import settings
 from .board import port
 from .devices import open_button, open_lcd, open_sensor
 from .errors import SettingsError
+from .units import __version__
 
 CHARGE_MS = 100
 
-# What the app imports, one module after the other: between two of them, display and chip are set up a step further
-STEPS = (
-    "calibration.parameters",
-    "calibration.store",
-    "calibration.active",
-    "calibration.transform",
-    "lean.bike_model",
-    "lean.kalman",
-    "lean.measurements",
-    "lean.rest",
-    "lean.upright_trim",
-    "lean.lean_filter",
-    "lean.meter",
-    "ui.messages",
-    "ui.pages",
-    "ui.views",
-    "ui.page_ring",
-    "ui.screen",
-    "app",
-)
+# What the app imports, one module after the other: between two of them, display and chip are set up a step further. The
+# imports say the same, but MicroPython has no hook between them; a test compares both.
+STEPS = [
+    folder + "." + name
+    for folder, names in (
+        ("calibration", "parameters store active transform"),
+        ("lean", "bike_model kalman measurements rest upright_trim lean_filter meter"),
+        ("ui", "messages pages page_ring screen"),
+        ("rides", "recording"),
+    )
+    for name in names.split()
+]
 
 
-def tell(lcd, line1, line2=""):
+def _show(lcd, line1, line2=""):
     """Show two lines on the display, at once."""
     lcd.show(line1, line2)
     lcd.flush()
@@ -60,7 +53,7 @@ def main():
         lcd = open_lcd(chosen)
         if machine.reset_cause() == machine.PWRON_RESET and _held(open_button(chosen)):
             print("Kickstand %s: safe mode, the button was held at power-up." % __version__)
-            tell(lcd, "Safe mode", "Ready for USB")
+            _show(lcd, "Safe mode", "Ready for USB")
             return
         lcd.show("Kickstand", "starting")  # a lean from before a reset must not pass for a reading
         run(chosen, lcd)
@@ -71,19 +64,19 @@ def main():
 
         print("Kickstand stopped. " + sentence(error))
         try:
-            tell(lcd or open_lcd(error.settings), *lines(error))
+            _show(lcd or open_lcd(error.settings), *lines(error))
         except SettingsError:  # the display's own pins are wrong, or not set, which Pin() refuses
             pass
     except KeyboardInterrupt:
         port.rest_watchdog()
-        print("Kickstand stopped. Ctrl-D starts it again; import kickstand; kickstand.status() tells how it is.")
+        print("Kickstand stopped. Ctrl-D starts it again; import kickstand; kickstand.status() reports how it is.")
 
 
 def run(chosen, lcd):
     """Run the app. An exception in it is reported on display and console, then the board restarts."""
     try:
         sensor = open_sensor(chosen)
-        for name in STEPS:
+        for name in STEPS + ["app"]:
             now_ms = ticks_ms()
             lcd.tick(now_ms)
             sensor.prepare(now_ms)
@@ -97,9 +90,9 @@ def run(chosen, lcd):
     except ImportError as error:  # after an update that was broken off: to restart would not help
         port.rest_watchdog()
         print("Kickstand stopped: incomplete firmware (%s). Run kickstand flash." % error)
-        tell(lcd, "Incomplete:", "flash it again")
+        _show(lcd, "Incomplete:", "flash it again")
     except Exception as error:
         sys.print_exception(error)
-        tell(lcd, "Error, restarts", type(error).__name__)
+        _show(lcd, "Error, restarts", type(error).__name__)
         sleep_ms(3000)
         machine.reset()

@@ -5,7 +5,6 @@ import os
 import sys
 from time import sleep_ms, ticks_diff, ticks_ms
 
-from . import __version__
 from .calibration.store import Store
 from .console import sentence
 from .devices import open_button, open_lcd, open_sensor
@@ -13,43 +12,40 @@ from .errors import SettingsError
 from .imu.mpu6050 import UnknownChip
 from .settings import load
 from .ui import messages
+from .units import __version__
 
 LISTEN_MS = 3500
 _TRIAL = "trial.tmp"  # written and removed
 
 
+def _print(label, words, *values):
+    print("%-13s" % label + words % values)
+
+
 def report():
     """Print all of it. Opens sensor and display itself: the app must not be running."""
+    release = ".".join(str(n) for n in sys.implementation.version[:3])
     machine_name = getattr(sys.implementation, "_machine", sys.platform)
-    print(
-        "Kickstand %s on %s, MicroPython %s"
-        % (__version__, machine_name, ".".join(str(n) for n in sys.implementation.version[:3]))
-    )
+    print("Kickstand %s on %s, MicroPython %s" % (__version__, machine_name, release))
     try:
         settings = load()
-        print(
-            "Settings     %s, kickstand side %s, %d samples a second"
-            % (settings.VEHICLE, settings.SIDE, settings.SAMPLE_HZ)
-        )
+        words = "%s, kickstand side %s, %d samples a second"
+        _print("Settings", words, settings.VEHICLE, settings.SIDE, settings.SAMPLE_HZ)
         sensor = open_sensor(settings)
         who_am_i = _sensor(sensor, settings)
         _display(open_lcd(settings))
-        print(
-            "Button       GPIO %d, %s"
-            % (settings.BUTTON_PIN, "pressed" if open_button(settings).held() else "not pressed")
-        )
+        pressed = "pressed" if open_button(settings).held() else "not pressed"
+        _print("Button", "GPIO %d, %s", settings.BUTTON_PIN, pressed)
         _speed(settings)
     except SettingsError as error:
-        print("Settings     " + sentence(error))
+        _print("Settings", "%s", sentence(error))
         return
     _calibration(who_am_i, settings)
     _machine_code()
     gc.collect()
     space = os.statvfs("/")
-    print(
-        "Memory       %d KB free; flash %d KB free, %d ms to write a block"
-        % (gc.mem_free() // 1024, space[0] * space[3] // 1024, _write_ms())
-    )
+    free_kb = gc.mem_free() // 1024, space[0] * space[3] // 1024
+    _print("Memory", "%d KB free; flash %d KB free, %d ms to write a block", *free_kb, _write_ms())
 
 
 def _write_ms():
@@ -69,49 +65,39 @@ def _sensor(sensor, settings):
         sensor.set_up()
         chip.read()
     except UnknownChip as error:
-        print("Sensor       unknown chip, WHO_AM_I %s: set ACCEPT_WHO_AM_I in config.py to try it" % hex(error.args[0]))
+        words = "unknown chip, WHO_AM_I %s: set ACCEPT_WHO_AM_I in config.py to try it"
+        _print("Sensor", words, hex(error.args[0]))
         return 0
     except OSError as error:
-        print(
-            "Sensor       none answers on SDA %d, SCL %d: check the wiring (%s)"
-            % (settings.SENSOR_SDA, settings.SENSOR_SCL, error)
-        )
+        words = "none answers on SDA %d, SCL %d: check the wiring (%s)"
+        _print("Sensor", words, settings.SENSOR_SDA, settings.SENSOR_SCL, error)
         return 0
-    print(
-        "Sensor       %s (%s), +-%d g, +-%d deg/s, %.1f C"
-        % (
-            chip.name,
-            hex(chip.who_am_i),
-            settings.ACCEL_RANGE_G,
-            settings.GYRO_RANGE_DPS,
-            chip.temperature_c(chip.counts[3]),
-        )
-    )
-    print("Reading      %s g" % " ".join("%.3f" % (chip.counts[i] / chip.accel_lsb_per_g) for i in range(3)))
+    ranges = settings.ACCEL_RANGE_G, settings.GYRO_RANGE_DPS
+    temperature_c = chip.temperature_c(chip.counts[3])
+    _print("Sensor", "%s (%s), +-%d g, +-%d deg/s, %.1f C", chip.name, hex(chip.who_am_i), *ranges, temperature_c)
+    _print("Reading", "%.3f %.3f %.3f g", *[chip.counts[i] / chip.accel_lsb_per_g for i in range(3)])
     return chip.who_am_i
 
 
 def _display(lcd):
     lcd.show("Kickstand", "status: console")
     lcd.flush()
-    print(
-        "Display      "
-        + ("at %s" % hex(lcd.address) if lcd.address else "none answers: check wiring and LCD_ADDRESSES")
-    )
+    found = "at %s" % hex(lcd.address) if lcd.address else "none answers: check wiring and LCD_ADDRESSES"
+    _print("Display", "%s", found)
 
 
 def _speed(settings):
-    """Print what the speed source says within LISTEN_MS: long enough to tell what is wrong with it."""
+    """Print what the speed source says within LISTEN_MS: long enough to find out what is wrong with it."""
     if settings.SPEED is None:
-        print("Speed        no source: SPEED is not set, alignment by driving is off")
+        _print("Speed", "no source: SPEED is not set, alignment by driving is off")
         return
     from .speed.source import open_speed
 
     speed = open_speed(settings)
     if settings.SPEED == "gps":
-        print("Speed        GPS on UART %d, RX %d, %d baud:" % (settings.GPS_UART, settings.GPS_RX, settings.GPS_BAUD))
+        _print("Speed", "GPS on UART %d, RX %d, %d baud:", settings.GPS_UART, settings.GPS_RX, settings.GPS_BAUD)
     else:
-        print("Speed        wheel on GPIO %d, %.2f pulses a metre:" % (settings.WHEEL_PIN, settings.PULSES_PER_METRE))
+        _print("Speed", "wheel on GPIO %d, %.2f pulses a metre:", settings.WHEEL_PIN, settings.PULSES_PER_METRE)
     heard = None
     for _ in range(LISTEN_MS // 10):
         new = speed.poll(ticks_ms())
@@ -132,25 +118,19 @@ def _machine_code():
     used = (decode, add_up, products, encode)
     plain = (decode_python, add_up_python, products_python, encode_python)
     slow = [b.__name__ for a, b in zip(used, plain) if a is b]
-    print("Machine code " + ("not used for %s: slower code runs instead" % ", ".join(slow) if slow else "used"))
-
-
-def _aligned(calibration):
-    if not calibration.aligned:
-        return "no"
-    return "yes, by driving" if calibration.by_drive else "yes"
+    words = "not used for %s: slower code runs instead" % ", ".join(slow) if slow else "used"
+    _print("Machine code", "%s", words)
 
 
 def _calibration(who_am_i, settings):
     if not who_am_i:
-        print("Calibration  not looked at: it belongs to a sensor")
+        _print("Calibration", "not looked at: it belongs to a sensor")
         return
     store = Store(who_am_i, settings.ACCEL_RANGE_G)
     calibration = store.load()
-    print(
-        "Calibration  six positions: %s, aligned: %s; %s"
-        % ("yes" if calibration.six_done else "no", _aligned(calibration), store.message)
-    )
+    six = "yes" if calibration.six_done else "no"
+    aligned = ("yes, by driving" if calibration.by_drive else "yes") if calibration.aligned else "no"
+    _print("Calibration", "six positions: %s, aligned: %s; %s", six, aligned, store.message)
     for name, values in (
         ("offset, g", calibration.accel_offset),
         ("slope", calibration.accel_slope),

@@ -1,4 +1,4 @@
-"""What is vectorised is what the firmware says, step by step; thinning and envelopes keep what they should."""
+"""What is vectorised is what the firmware says, step by step; thinning keeps what it should."""
 
 from dataclasses import fields
 
@@ -8,12 +8,11 @@ import pytest
 from kickstand.lean import formula
 from kickstand_tools.analysis.channels import Channels
 from kickstand_tools.analysis.downsample import downsampled, joined
-from kickstand_tools.analysis.plot.envelope import envelope
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.summary import Summary
 from kickstand_tools.logs import reader
 from kickstand_tools.replay import replay_engine
-from kickstand_tools.replay.formula import formula_lean_deg
+from kickstand_tools.replay.meter_along import formula_lean_deg
 
 
 @pytest.fixture(scope="module")
@@ -113,29 +112,6 @@ def test_a_slow_log_is_not_downsampled(course):
     thin = joined(list(downsampled([slow], 0.02)))
     for field in fields(Channels):
         assert np.array_equal(getattr(thin, field.name), getattr(slow, field.name), equal_nan=True)
-
-
-def test_an_envelope_keeps_every_peak():
-    time = np.arange(100_003.0)
-    values = np.sin(time / 50.0)
-    values[[17, 55_555, 100_002]] = 9.0, -8.0, 7.0
-    values[30:40] = np.nan
-    x, y = envelope(time, values, 2000)
-    assert 1000 < len(x) <= 2002
-    assert np.all(np.diff(x) > 0)
-    assert {9.0, -8.0, 7.0} <= set(y)
-    assert np.array_equal(envelope(time[:100], values[:100], 2000)[1], values[:100][~np.isnan(values[:100])])
-
-
-def test_a_line_is_broken_where_there_is_nothing():
-    """Readings are missing from 40 to 60 s, and the lean is not shown from 70 to 75."""
-    time = np.concatenate((np.arange(0.0, 40.0, 0.02), np.arange(60.0, 100.0, 0.02)))
-    values = np.where((time > 70.0) & (time < 75.0), np.nan, 5.0)
-    for points in 10_000, 500:
-        x, y = envelope(time, values, points, 1.0)
-        assert x[np.isnan(y)] == pytest.approx([50.0, 72.5], abs=0.05)
-        assert np.all(np.diff(x) > 0.0)
-        assert not np.any(np.isnan(envelope(time, values, points)[1]))
 
 
 def part(n=100, **changed) -> Channels:

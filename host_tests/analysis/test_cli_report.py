@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from kickstand_tools.analysis import report
 from kickstand_tools.analysis.overview import overview
-from kickstand_tools.analysis.plot import charts, picture, plot, traces
+from kickstand_tools.analysis.plot import plot
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.stops.brake_test import Stop
 from kickstand_tools.analysis.summary import Peak
@@ -47,7 +47,6 @@ def test_a_report_has_the_ride_in_figures(ride):
 
 
 def test_what_is_not_known_is_no_figure(ride, tmp_path):
-    """In the words, and in what is drawn; nor is the alignment, which another mount's calibration cannot have."""
     (tmp_path / "cal.json").write_text(
         json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": [[1, 0, 0], [0, 0, 1], [0, -1, 0]]})
     )
@@ -58,12 +57,6 @@ def test_what_is_not_known_is_no_figure(ride, tmp_path):
     rows = {name: value for name, value, _ in report.words(seen).ride}
     names = "Max left", "Max right", "Over 30°", "Over 40°", "Max braking", "Max acceleration"
     assert [rows[name] for name in names] == ["--"] * 6
-    assert traces.title(seen).endswith("lean as displayed -- left, -- right  ·  braking --, acceleration --")
-    assert traces.quality_lines(seen) == ["not judged"]
-    seen.quality.yaw_deg = 58.7  # as a longer ride would have it
-    lines = len(charts.figure(seen)["data"])
-    seen.notices.clear()
-    assert len(charts.figure(seen)["data"]) == lines + 1  # the yaw that was found
 
 
 def test_time_without_readings_is_said(ride, tmp_path):
@@ -210,29 +203,6 @@ def test_pictures(ride, tmp_path):
     assert "Plotly.newPlot" in html
     assert not re.search(r"<(script|link)[^>]*(src|href)=", html)  # all of it is inside
     assert sorted(path.name for path in out.iterdir()) == ["RIDE.html", "RIDE.png"]
-
-
-@pytest.mark.parametrize(("car", "speed_hz"), [(False, 1), (False, 0), (True, 1), (True, 0)])
-def test_a_speed_is_drawn_where_there_is_one(tmp_path, car, speed_hz):
-    straight = [script.upright(4), script.accelerate(15, 5), script.straight(4), script.brake(0, 3), script.wait(4)]
-    ride = analysis_rides.write(tmp_path, straight, speed_hz=speed_hz)  # the bends of a motorcycle are none of a car
-    cal = tmp_path / "RIDE.cal.json"
-    cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle": "car" if car else "motorcycle"}))
-    seen = overview(open_ride(ride, cal))
-    figure = charts.figure(seen)
-    row = {trace.get("name"): trace["yaxis"] for trace in figure["data"]}
-    assert ("lean" in row) is not car
-    assert ("speed" in row) is bool(speed_hz)
-    above = {"lean", "speed"} & set(row)
-    assert len({row[name] for name in (*above, "forward")}) == len(above) + 1
-    assert row["forward"] == row["to the left"] == ("y", "y2", "y3")[len(above)]
-    assert {shape["xref"] for shape in figure["layout"]["shapes"]} == {row["forward"].replace("y", "x")}
-    if speed_hz:
-        (drawn,) = (trace for trace in figure["data"] if trace.get("name") == "speed")
-        assert max(drawn["y"]) == pytest.approx(54.0, abs=0.5)  # km/h
-    picture.draw(tmp_path / "ride.png", seen)
-    height = struct.unpack(">2I", (tmp_path / "ride.png").read_bytes()[16:24])[1]
-    assert height == 550 + 250 * (not car) + 150 * bool(speed_hz)
 
 
 @pytest.mark.parametrize("name", ["report", "plot"])

@@ -190,5 +190,5 @@ def test_the_command_writes_a_track_or_says_why_not(tmp_path, monkeypatch):
     write_log(bare, api.Log(log().t_s, log().accel_g, log().gyro_dps))
     arguments = ("export", bare, "--calibration", calibration, "--to", "gpx", "--out", out)
     command.refused(tmp_path, *arguments, words="has no positions (lat_deg, lon_deg), so there is no track to write")
-    monkeypatch.setattr(export_gpx, "find_spec", lambda name: None)
+    monkeypatch.setattr("kickstand_tools.analysis.export.export.find_spec", lambda name: None)
     command.refused(tmp_path, *arguments, words="GPX needs gpxpy")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from kickstand_tools import api
 from kickstand_tools.analysis.overview import Overview, overview
-from kickstand_tools.analysis.plot import page, page_with_map, track_map
+from kickstand_tools.analysis.plot import page, track_map
 
 pytest.importorskip("plotly")
 EARTH_M = 6_371_000.0
@@ -115,11 +115,11 @@ def test_without_positions_there_is_no_map(tmp_path, positions):
 def test_a_page_asks_for_nothing_unless_tiles_are_wanted(tmp_path):
     html = page_of(tmp_path, seen())
     assert not re.search(r"<(script|link|img)[^>]*(src|href)=", html)
-    assert page_with_map.TILES_URL not in html
+    assert page.TILES_URL not in html
     assert '"tiles": null' in html
     assert "OpenStreetMap contributors" not in html.rpartition("<p id=")[2]
     html = page_of(tmp_path, seen(), tiles=True)
-    assert page_with_map.TILES_URL in html
+    assert page.TILES_URL in html
     assert "openstreetmap.org/copyright" in html.rpartition('<p id="tiles">')[2]
 
 
@@ -127,7 +127,7 @@ def test_a_page_asks_for_nothing_unless_tiles_are_wanted(tmp_path):
 def test_tiles_lie_where_the_track_is(place):
     """The number of the start's tile by the map's metres, and by the formula of slippy maps."""
     found = points_of(*place)
-    tiles = page_with_map._tiles(found)
+    tiles = page.tiles_at(found)
     size = tiles["world_m"] / 2**15
     lat, lon = np.radians(found.lat_deg), found.lon_deg
     column = (lon + 180.0) / 360.0 * 2**15

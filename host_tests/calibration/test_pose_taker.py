@@ -20,10 +20,6 @@ def moving(k):
     return row
 
 
-def test_the_states_can_be_told_apart():
-    assert len({SETTLING, SETTLED, TAKING, DONE, SPOILT}) == 5
-
-
 def test_half_a_second_of_stillness_then_three_seconds_are_taken():
     taking = taker()
     assert taking.progress() == (0, 300)

@@ -1,11 +1,10 @@
-"""Limits of a still pose, each axis by itself, just within and just beyond. 8192 counts per g, 65.5 per deg/s."""
+"""A still pose, each axis by itself: 8192 counts per g, 65.5 per deg/s. What else spoils one: test_calibration.py."""
 
 import pytest
 from kickstand.calibration.still_pose import StillPose
 from kickstand.errors import CaptureError
 
 LEVEL: tuple[int, ...] = (100, -200, 8192, -521, 65, -131, 655)
-WITHIN, BEYOND = 0.98, 1.02
 
 
 def samples(count=100):
@@ -31,11 +30,11 @@ def problem_of(rows, **settings):
 
 @pytest.mark.parametrize("axis", [0, 1, 2, 4, 5, 6])
 @pytest.mark.parametrize("sign", [-1, 1])
-def test_a_knock_is_more_than_80_mg_or_5_degrees_per_second(axis, sign):
+def test_a_knock_about_or_along_any_axis_spoils_the_pose(axis, sign):
     """From the first sample; it may come with any sample. One shock alone does not move the mean past other limits."""
     peak = 0.08 * 8192 if axis < 3 else 5.0 * 65.5
     for at in (1, 50, 99):
-        for share, code in ((WITHIN, None), (BEYOND, "moved")):
+        for share, code in ((0.8, None), (1.2, "moved")):
             rows = samples()
             rows[at][axis] = rows[0][axis] + sign * round(share * peak)
             assert problem_of(rows) == code
@@ -45,48 +44,6 @@ def test_the_temperature_may_change():
     rows = samples()
     rows[60][3] += 5000
     assert problem_of(rows) is None
-
-
-@pytest.mark.parametrize("axis", [0, 1, 2])
-@pytest.mark.parametrize("sign", [-1, 1])
-def test_an_axis_at_the_end_of_its_range_is_saturated(axis, sign):
-    for count, code in ((32699, None), (32700, "saturated"), (32767, "saturated")):
-        rows = samples()
-        for row in rows:
-            row[axis] = sign * count
-        assert problem_of(rows) == code
-        assert StillPose(8192, 65.5, 32700, 100).add(rows[0]) is (code is None)
-
-
-@pytest.mark.parametrize("axis", [4, 5, 6])
-def test_the_gyro_has_a_limit_of_its_own(axis):
-    """Of 45 deg/s in the mean: 20 of offset by the data sheet, as much over temperature, and some."""
-    refused = "gyro-offset"
-    for rate, code in ((44.9, None), (45.1, refused), (-44.9, None), (-45.1, refused), (499, refused)):
-        rows = samples()
-        for k, row in enumerate(rows):
-            row[axis] = round(rate * 65.5) + k % 2
-        assert problem_of(rows) == code
-
-
-@pytest.mark.parametrize("axis", [0, 1, 2])
-def test_vibration_is_a_standard_deviation_over_20_mg(axis):
-    for share, code in ((WITHIN, None), (BEYOND, "vibration")):
-        rows = samples()
-        for k, row in enumerate(rows):
-            row[axis] = LEVEL[axis] + round((-1) ** k * share * 0.02 * 8192)
-        assert problem_of(rows) == code
-
-
-@pytest.mark.parametrize("axis", [0, 1, 2])
-@pytest.mark.parametrize("sign", [-1, 1])
-@pytest.mark.parametrize("count", [100, 101])
-def test_tilting_is_7_mg_between_the_halves(axis, sign, count):
-    for share, code in ((0.95, None), (1.05, "tilting")):
-        rows = samples(count)
-        for row in rows[count // 2 :]:
-            row[axis] += sign * round(share * 0.007 * 8192)
-        assert problem_of(rows) == code
 
 
 def test_a_pose_has_at_least_20_samples():

@@ -61,7 +61,8 @@ def test_flash_onto_the_emulated_pico(monkeypatch):
         address = re.search(r"socket://\S+?:\d+", emulating.said.get())
         assert address
         clock = types.SimpleNamespace(monotonic=emulating.time_s, sleep=lambda seconds: time.sleep(seconds / 10))
-        monkeypatch.setattr(transport_serial, "time", clock)
+        for module in (transport_serial, connection):
+            monkeypatch.setattr(module, "time", clock)
         result = command.works("flash", "--port", address[0])
         assert "and verified them" in result.out
         emulating.end_s = emulating.time_s() + 30.0

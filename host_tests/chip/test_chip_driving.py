@@ -44,7 +44,7 @@ out = matrix()
 drive.matrix(out)
 result = {"matrix": list(out), "longest": longest, "updates": updates, "memory": memory, "counted": drive.counted}
 """
-_ONE_PIECE = "from kickstand.drive_alignment import alignment\nalignment.PIECE_US = 10**9\n"
+_ONE_PIECE = "from kickstand.drive_alignment import alignment\nalignment.STEP_US = 10**9\n"
 _ON_CHIP = """
 import gc, json
 from time import ticks_diff, ticks_us as clock
@@ -61,7 +61,7 @@ def test_alignment_by_driving_on_the_chip(monkeypatch):
     samples."""
     mount = random_mounting(4)
     host = {"mount": mount, "clock": time.monotonic_ns, "elapsed": lambda began: 0, "allocated": lambda: 0}
-    monkeypatch.setattr(alignment, "PIECE_US", 10**9)
+    monkeypatch.setattr(alignment, "STEP_US", 10**9)
     exec(_DRIVE, host)
     with pico(files=modules()) as board:
         code = f"{_ONE_PIECE}{_ON_CHIP}mount = {mount!r}\n{_DRIVE}print(json.dumps(result))"

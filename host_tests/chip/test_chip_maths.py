@@ -46,7 +46,7 @@ def test_composed_rotations_agree_with_numpy():
 def test_the_same_log_gives_the_same_lean(tmp_path):
     """Through the whole LeanMeter, on chip, unix port and CPython: within 0.05 degrees in every sample."""
     pico()  # or skip
-    from kickstand_tools.replay import emulated
+    from kickstand_tools.replay.replay import rp2040
 
     world = PART.world(Ride([accelerate(15.0, 1.0), turn(-30.0, 1.0, 0.5)]).motion)
     offsets = [-o / s for o, s in zip(PART.accel_offset_g, PART.accel_scale, strict=True)]
@@ -57,10 +57,11 @@ def test_the_same_log_gives_the_same_lean(tmp_path):
         fx, fy, fz, wx, wy, wz, temperature = world(i / 100)
         reading = (fx, fy, fz, temperature, wx, wy, wz)
         records += struct.pack(replay_engine.RECORD, i * 10_000, *reading, replay_engine.NO_SPEED)
-    on_host, on_chip = io.BytesIO(), bytearray()
+    on_host = io.BytesIO()
     replay_engine.run(io.BytesIO(records), on_host)
-    emulated.run(records, on_chip.extend)
-    results = [on_host.getvalue(), bytes(on_chip)]
+    with rp2040(iter([records]), None) as results_of_chip:
+        on_chip = results_of_chip.read()
+    results = [on_host.getvalue(), on_chip]
     if unix_port.available():
         (tmp_path / "records").write_bytes(records)
         command = unix_port.command(replay_engine.__file__, str(tmp_path / "records"))

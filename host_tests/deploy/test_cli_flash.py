@@ -11,11 +11,11 @@ import command
 import fake_board
 import pytest
 import serial
-from kickstand_tools.deploy import bytecode, connection, firmware_files, ports
+from kickstand_tools.deploy import bytecode, connection, firmware_files
 from mpremote import transport_serial
 from serial.tools import list_ports
 
-PICO = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
+PICO = fake_board.PICO_PORT
 ESP32 = types.SimpleNamespace(device="/dev/ttyUSB0", vid=0x10C4, pid=0xEA60)
 PROBE = types.SimpleNamespace(device="/dev/ttyACM1", vid=0x2E8A, pid=0x000C)
 MODEM = types.SimpleNamespace(device="/dev/ttyACM2", vid=0x12D1, pid=0x1001)
@@ -28,9 +28,8 @@ def board(tmp_path, monkeypatch):
     (tmp_path / "flash").mkdir()
     board = fake_board.FakeBoard(tmp_path / "flash")
     board.path("boot.py").write_text("# boot\n")
+    fake_board.plug_in(monkeypatch, board)
     monkeypatch.setattr(list_ports, "comports", lambda: [MODEM, PICO, BUILT_IN, PROBE])
-    monkeypatch.setattr(connection, "Board", lambda name, timeout: board)
-    monkeypatch.setattr(connection, "_RESTART_S", 0)
     return board
 
 
@@ -48,6 +47,14 @@ def refused(board, *arguments, words):
     line = command.refused(board.root, *arguments, words=words)
     assert board.closed
     return line
+
+
+def broken_off(board, words):
+    """The board is refused in one line, half-way."""
+    result = command.run("flash")
+    assert (result.status, result.err.count("\n")) == (2, 1)
+    assert words in result.err
+    assert board.closed
 
 
 def test_an_empty_board_gets_everything_and_starts(board):
@@ -95,14 +102,7 @@ def test_an_edited_config_stays_until_told_otherwise(board):
 
 def test_the_rider_s_files_stay(board):
     """Calibration, own files, other directories: nothing is touched but code of an older version."""
-    own = (
-        "kickstand_a.cal",
-        "kickstand_b.cal",
-        "kickstand/kickstand_a.cal",
-        "kickstand/notes.txt",
-        "lib/x.py",
-        "y.py",
-    )
+    own = ("kickstand_a.cal", "kickstand/kickstand_a.cal", "kickstand/notes.txt", "lib/x.py", "y.py")
     board.path("kickstand").mkdir()
     board.path("lib").mkdir()
     for name in own:
@@ -153,8 +153,7 @@ def sources():
 )
 def test_a_board_that_takes_other_bytecode_gets_the_sources(board, monkeypatch, mpy, words):
     command.works("flash")
-    other = fake_board.FakeBoard(board.root, mpy=mpy)
-    monkeypatch.setattr(connection, "Board", lambda name, timeout: other)
+    fake_board.plug_in(monkeypatch, fake_board.FakeBoard(board.root, mpy=mpy))
     result = command.works("flash")
     assert fake_board.files(board.root) == sources() | {"/boot.py": b"# boot\n"}
     assert re.search(f"note: .*{words}.*: it gets the sources", result.out)
@@ -169,8 +168,7 @@ def test_without_mpy_cross_it_gets_the_sources(board, monkeypatch):
 
 def test_machine_code_is_for_the_board(board, monkeypatch):
     """Of an ESP32 here: what has machine code in it differs from a Pico's, bytecode does not."""
-    other = fake_board.FakeBoard(board.root, mpy=0x2B06)
-    monkeypatch.setattr(connection, "Board", lambda name, timeout: other)
+    fake_board.plug_in(monkeypatch, fake_board.FakeBoard(board.root, mpy=0x2B06))
     command.works("flash")
     found = fake_board.files(board.root)
     assert {path for path, data in wanted().items() if found[path] != data} == {
@@ -183,12 +181,9 @@ def test_machine_code_is_for_the_board(board, monkeypatch):
 
 def test_what_reads_back_differently_is_told(board):
     board.on_write = lambda path, data: data[:-1] + b"?" if path == "/kickstand/calibration/store.mpy" else data
-    result = command.run("flash")
-    assert (result.status, result.err.count("\n")) == (2, 1)
-    assert "kickstand/calibration/store.mpy reads back differently" in result.err
+    broken_off(board, "kickstand/calibration/store.mpy reads back differently")
     assert not board.path("main.py").exists()
     assert board.resets == 0
-    assert board.closed
 
 
 def test_too_little_room_is_seen_before_anything_is_touched(board):
@@ -198,51 +193,42 @@ def test_too_little_room_is_seen_before_anything_is_touched(board):
     refused(board, "flash", words="not enough room on the board")
 
 
-def test_a_flash_that_fills_up_all_the_same(board):
-    def full(path, data):
-        raise OSError(errno.ENOSPC, "full")
+@pytest.mark.parametrize(
+    ("error", "words"),
+    [(OSError(errno.ENOSPC, "full"), "is full"), (ConnectionError("device disconnected"), "connection lost")],
+)
+def test_a_flash_that_fills_up_all_the_same_and_a_cable_pulled_while_copying(board, error, words):
+    def fail(path, data):
+        raise error
 
-    board.on_write = full
-    result = command.run("flash")
-    assert (result.status, result.err.count("\n")) == (2, 1)
-    assert "is full" in result.err
-
-
-def test_a_cable_pulled_while_copying(board):
-    def pulled(path, data):
-        raise ConnectionError("device disconnected")
-
-    board.on_write = pulled
-    result = command.run("flash")
-    assert (result.status, result.err.count("\n")) == (2, 1)
-    assert "connection lost" in result.err
-    assert board.closed
+    board.on_write = fail
+    broken_off(board, words)
 
 
 @pytest.mark.parametrize("verb", ["flash", "status"])
-def test_another_python_is_refused(board, monkeypatch, verb):
-    other = fake_board.FakeBoard(board.root, python="circuitpython")
-    monkeypatch.setattr(connection, "Board", lambda name, timeout: other)
-    refused(other, verb, words="runs circuitpython: put MicroPython on the board")
+@pytest.mark.parametrize(
+    ("board_is", "words"),
+    [
+        ({"python": "circuitpython"}, "runs circuitpython: put MicroPython on the board"),
+        ({"answers": False}, "no MicroPython answers on /dev/ttyACM0"),
+    ],
+)
+def test_what_is_no_micropython_is_refused(board, monkeypatch, verb, board_is, words):
+    refused(fake_board.plug_in(monkeypatch, fake_board.FakeBoard(board.root, **board_is)), verb, words=words)
 
 
 @pytest.mark.parametrize("verb", ["flash", "status"])
-def test_something_that_does_not_answer_is_refused(board, verb):
-    board.answers = False
-    refused(board, verb, words="no MicroPython answers on /dev/ttyACM0")
-
-
-@pytest.mark.parametrize("verb", ["flash", "status"])
-@pytest.mark.parametrize("found", [[], [MODEM, BUILT_IN, PROBE]])
-def test_no_board(tmp_path, monkeypatch, verb, found):
+@pytest.mark.parametrize(
+    ("found", "words"),
+    [
+        ([], "no board found: plug it in"),
+        ([MODEM, BUILT_IN, PROBE], "no board found: plug it in"),
+        ([ESP32, PICO], "/dev/ttyACM0 (Raspberry Pi), /dev/ttyUSB0 (Silicon Labs CP210x): name one with --port"),
+    ],
+)
+def test_no_board_and_several(tmp_path, monkeypatch, verb, found, words):
     monkeypatch.setattr(list_ports, "comports", lambda: found)
-    command.refused(tmp_path, verb, words="no board found: plug it in")
-
-
-def test_several_boards(tmp_path, monkeypatch):
-    monkeypatch.setattr(list_ports, "comports", lambda: [ESP32, PICO])
-    line = command.refused(tmp_path, "flash", words="name one with --port")
-    assert "/dev/ttyACM0 (Raspberry Pi), /dev/ttyUSB0 (Silicon Labs CP210x)" in line
+    command.refused(tmp_path, verb, words=words)
 
 
 def test_a_named_port_is_taken_as_it_is(board, monkeypatch):
@@ -281,7 +267,7 @@ def test_an_emulated_board_is_given_longer_to_answer(port, limit_s, tmp_path, mo
 
     monkeypatch.setattr(transport_serial.serial, "serial_for_url", open_port)
     clock = types.SimpleNamespace(monotonic=lambda: waited_s[0], sleep=sleep)
-    monkeypatch.setattr(transport_serial, "time", clock)
+    monkeypatch.setattr(connection, "time", clock)
     command.refused(tmp_path, "status", "--port", port, words=f"no MicroPython answers on {port}")
     assert waited_s[0] == pytest.approx(2 * limit_s, abs=0.1)
 
@@ -316,7 +302,7 @@ def test_why_a_port_does_not_open(tmp_path, monkeypatch, error, words):
     monkeypatch.setattr(serial, "serial_for_url", fail)
     monkeypatch.setattr(list_ports, "comports", lambda: [PICO])
     command.refused(tmp_path, "flash", words=words)
-    assert words in str(ports.why_closed("/dev/ttyACM0"))
+    assert words in str(connection.why_closed("/dev/ttyACM0"))
 
 
 def test_status_prints_what_the_board_says_and_restarts_it(board):
@@ -327,13 +313,13 @@ def test_status_prints_what_the_board_says_and_restarts_it(board):
     assert (board.resets, board.closed) == (1, True)
 
 
-def test_status_of_a_board_without_kickstand(board):
-    refused(board, "status", words="kickstand flash puts it there")
-    assert board.resets == 1
-
-
-def test_status_of_a_version_that_has_none(board):
-    board.path("kickstand").mkdir()
-    board.path("kickstand/__init__.py").write_text("")
-    refused(board, "status", words="bring it up to date with kickstand flash")
+@pytest.mark.parametrize(
+    ("there", "words"),
+    [(False, "kickstand flash puts it there"), (True, "bring it up to date with kickstand flash")],
+)
+def test_status_of_a_board_without_kickstand_or_with_one_that_has_no_status(board, there, words):
+    if there:
+        board.path("kickstand").mkdir()
+        board.path("kickstand/__init__.py").write_text("")
+    refused(board, "status", words=words)
     assert board.resets == 1

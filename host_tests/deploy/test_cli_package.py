@@ -29,7 +29,7 @@ def test_mip_installs_every_module_and_nothing_else():
 
 def test_one_version_everywhere():
     listed = json.loads((ROOT / "firmware" / "package.json").read_text())["version"]
-    text = (ROOT / "firmware" / "kickstand" / "__init__.py").read_text()
+    text = (ROOT / "firmware" / "kickstand" / "units.py").read_text()
     project = re.search(r'^version = "(.*)"', (ROOT / "pyproject.toml").read_text(), re.MULTILINE)
     assert project
     assert f'__version__ = "{listed}"' in text
@@ -236,6 +236,8 @@ def test_each_check_is_run_and_any_failure_counts(dev, monkeypatch, failing):
         return int(failing in command)
 
     monkeypatch.setattr(dev, "run", run)
+    monkeypatch.setattr(dev, "PYTHON", sys.executable)
+    monkeypatch.setattr(dev, "COMPILE", "")
     assert dev.test(["-k", "lean"]) == 1
     assert [command[1] for command in ran] == ["ruff", "ruff", "pyright", "pytest"]
     assert ran[3][-2:] == ("-k", "lean")

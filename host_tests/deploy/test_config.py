@@ -3,16 +3,13 @@
 import os
 import subprocess
 import sys
-import types
 
 import command
 import fake_board
 import mpy
 import pytest
 from kickstand_tools import errors, firmware_path
-from kickstand_tools.deploy import connection
 from kickstand_tools.simulated_board.fakes import chips
-from serial.tools import list_ports
 
 
 @pytest.fixture
@@ -21,11 +18,7 @@ def board(tmp_path, monkeypatch):
     (tmp_path / "flash").mkdir()
     board = fake_board.FakeBoard(tmp_path / "flash")
     board.path("config.py").write_text("# on the board\n")
-    pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
-    monkeypatch.setattr(list_ports, "comports", lambda: [pico])
-    monkeypatch.setattr(connection, "Board", lambda name, timeout: board)
-    monkeypatch.setattr(connection, "_RESTART_S", 0)
-    return board
+    return fake_board.plug_in(monkeypatch, board)
 
 
 @pytest.fixture

@@ -1,6 +1,6 @@
 """Boards that talk nonsense: each command that asks one says a line, whatever comes, and writes nothing outside."""
 
-import types
+import binascii
 
 import command
 import fake_board
@@ -11,7 +11,6 @@ from kickstand_tools.deploy import connection
 from kickstand_tools.errors import InputError
 from kickstand_tools.rides.block_reader import BadBlock, parse, read
 from mpremote.transport import TransportError
-from serial.tools import list_ports
 
 NONSENSE = {
     "nothing": b"",
@@ -60,10 +59,9 @@ class Nonsense(fake_board.FakeBoard):
 def plug_in(tmp_path, monkeypatch):
     """A function that makes a board the only one that is plugged in."""
     monkeypatch.chdir(tmp_path)
-    pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
-    monkeypatch.setattr(list_ports, "comports", lambda: [pico])
-    monkeypatch.setattr(connection, "_RESTART_S", 0)
-    return lambda board: monkeypatch.setattr(connection, "Board", lambda name, timeout: board)
+    (tmp_path / "flash").mkdir()
+    (tmp_path / "out").mkdir()
+    return lambda board: fake_board.plug_in(monkeypatch, board)
 
 
 def one_line(result):
@@ -78,8 +76,6 @@ def one_line(result):
 @pytest.mark.parametrize("content", NONSENSE.values(), ids=NONSENSE)
 @pytest.mark.parametrize("name", COMMANDS)
 def test_nonsense_is_one_line_and_writes_nothing(tmp_path, plug_in, name, content):
-    (tmp_path / "flash").mkdir()
-    (tmp_path / "out").mkdir()
     for first in (0, 1, 2, 3):
         plug_in(Nonsense(tmp_path / "flash", content, first))
         one_line(command.run(*COMMANDS[name]))
@@ -90,8 +86,6 @@ def test_nonsense_is_one_line_and_writes_nothing(tmp_path, plug_in, name, conten
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_mutated_answer_is_one_line(tmp_path, plug_in, name):
     good = b"('/rides', 'motorcycle')\n(1, 0, 700, '/rides/000/01/00000.rid')\n('micropython', '1.26.1', 'Pico')\n"
-    (tmp_path / "flash").mkdir()
-    (tmp_path / "out").mkdir()
     for number in range(60):
         plug_in(Nonsense(tmp_path / "flash", mutations.broken([good], number)[1], number % 3))
         one_line(command.run(*COMMANDS[name]))
@@ -134,9 +128,7 @@ def test_a_ride_that_is_longer_than_announced_is_given_up(tmp_path, plug_in, mon
         def exec_raw_no_follow(self, command):
             self.serial.data += b"AAAA\n" * 100_000
 
-    (tmp_path / "flash").mkdir()
     plug_in(Long(tmp_path / "flash"))
-    (tmp_path / "out").mkdir()
     line = command.refused(tmp_path / "out", "pull", "--out", tmp_path / "out", words="did not come over whole")
     assert "does not come to an end" in line
 
@@ -150,13 +142,9 @@ def test_a_link_in_the_directory_is_not_followed(tmp_path, plug_in):
             return f"('/rides', 'car')\n(1, 0, {len(content)}, '/rides/1.rid')\n".encode(), b""
 
         def exec_raw_no_follow(self, command):
-            if "PATH" not in command and "open(" in command:
-                import binascii
-
+            if "open(" in command:
                 self.serial.data += binascii.b2a_base64(content) + b"\x04\x04>"
 
-    (tmp_path / "flash").mkdir()
-    (tmp_path / "out").mkdir()
     plug_in(Board(tmp_path / "flash"))
     command.works("pull", "--out", tmp_path / "out")
     (log,) = (tmp_path / "out").glob("*.csv.gz")

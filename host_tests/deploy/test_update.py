@@ -1,18 +1,17 @@
 """Updates of a board with an older version: what goes, broken off at any step, and the room that is needed."""
 
 import functools
-import types
 from pathlib import PurePosixPath
 from typing import Any
 
 import command
+import fake_board
 import pytest
 from kickstand.rides import flash_ring
-from kickstand_tools.deploy import bytecode, connection, firmware_files, flash, room
+from kickstand_tools.deploy import bytecode, firmware_files, flash, update
 from kickstand_tools.deploy.board_files import BoardFiles, fingerprint, survey
 from kickstand_tools.deploy.update import needed_blocks, plan, refuse_without_room
 from littlefs_board import BLOCK, PORTS, LittlefsBoard
-from serial.tools import list_ports
 
 # The modules of version 0.2.0, all in one folder.
 FLAT = """
@@ -55,12 +54,8 @@ def plugged(monkeypatch):
     """plugged(board): the only board that there is."""
 
     def plug(board):
-        pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
-        monkeypatch.setattr(list_ports, "comports", lambda: [pico])
-        monkeypatch.setattr(connection, "Board", lambda name, timeout: board)
-        monkeypatch.setattr(connection, "_RESTART_S", 0)
-        monkeypatch.setattr(flash, "contents", lambda mpy: dict(contents(mpy or None)))
-        return board
+        monkeypatch.setattr(flash, "contents", lambda mpy, _compiler: dict(contents(mpy or None)))
+        return fake_board.plug_in(monkeypatch, board)
 
     return plug
 
@@ -205,7 +200,7 @@ def test_a_board_full_of_rides_has_room_for_an_update(which):
 def test_sources_in_place_of_compiled_firmware_may_have_to_wait_for_the_rides():
     """They take twice the room, and are for computers without mpy-cross: the rider is told what to do."""
     board = on_board(before("nested .mpy"), flash_ring.RESERVE // BLOCK)
-    with pytest.raises(room.NoRoom, match="kickstand pull --delete, then flash again"):
+    with pytest.raises(update.NoRoom, match="kickstand pull --delete, then flash again"):
         refuse_without_room(plan(wanted(".py"), board, True), board)
 
 
@@ -219,7 +214,7 @@ def test_the_ring_of_rides_knows_what_the_firmware_takes():
 
 def test_plain_mpremote_needs_the_room_that_the_readme_says():
     """It puts each .py beside the .mpy, which stays."""
-    blocks = sum(room.most(len(data), BLOCK) for data in wanted(".py").values())
+    blocks = sum(update.most(len(data), BLOCK) for data in wanted(".py").values())
     assert 0.9 * 460 < blocks * BLOCK / 1024 <= 460
 
 
@@ -230,5 +225,5 @@ def test_a_file_takes_between_least_and_most(port, size):
     board.put({"/other": b""})
     free = board.free
     board.put({"/file": bytes(size)})
-    assert room.least(size, BLOCK) <= free - board.free <= room.most(size, BLOCK)
-    assert room.most(size, BLOCK) - room.least(size, BLOCK) == (size <= BLOCK // 8)
+    assert update.least(size, BLOCK) <= free - board.free <= update.most(size, BLOCK)
+    assert update.most(size, BLOCK) - update.least(size, BLOCK) == (size <= BLOCK // 8)

@@ -1,9 +1,11 @@
 """The three READMEs: every link leads somewhere, and what they list is what there is."""
 
+import ast
 import re
 from pathlib import Path
 
 import pytest
+from kickstand_tools.cli.main import kickstand
 
 ROOT = Path(__file__).resolve().parents[2]
 READMES = [ROOT / "README.md", ROOT / "firmware" / "README.md", ROOT / "tools" / "README.md"]
@@ -57,3 +59,26 @@ def test_the_map_has_every_folder_and_no_other(package):
     mapped = set(re.findall(r"\b(\w+)/(?=,| )", drawn.split("\n", 1)[1]))
     folders = {path.parent for path in (ROOT / package).rglob("*.py")} - {ROOT / package}
     assert mapped == {folder.relative_to(ROOT / package).parts[0] for folder in folders}
+
+
+def test_every_file_that_is_pointed_to_is_there():
+    for name in re.findall(r"`((?:firmware|tools|host_tests)/[\w/]+\.py)`", "".join(map(text_of, READMES))):
+        assert (ROOT / name).is_file(), name
+
+
+def test_every_command_is_described():
+    text = text_of(READMES[2])
+    for name in kickstand.list_commands(None):
+        command = kickstand.get_command(None, name)
+        for words in [f"{name} {sub}" for sub in getattr(command, "commands", {})] or [name]:
+            assert f"`{words}`" in text, words
+
+
+def test_every_menu_entry_is_described():
+    screen = ast.parse(text_of(ROOT / "firmware" / "kickstand" / "ui" / "screen.py"))
+    (listed,) = [node for node in ast.walk(screen) if isinstance(node, ast.FunctionDef) and node.name == "_entries"]
+    tuples = [node for node in ast.walk(listed) if isinstance(node, ast.Tuple) and node.elts]
+    entries = {tuple_.elts[0].value for tuple_ in tuples if isinstance(tuple_.elts[0], ast.Constant)}
+    assert len(entries) == 7
+    text = text_of(READMES[1])
+    assert not [entry for entry in entries if f"`{entry}`" not in text]

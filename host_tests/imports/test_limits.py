@@ -12,9 +12,9 @@ from pathlib import Path
 import command
 import pytest
 from kickstand_tools.errors import InputError
-from kickstand_tools.imports import cells, files
+from kickstand_tools.imports import files
 from kickstand_tools.joining.track_files import read_track
-from kickstand_tools.logs import reader
+from kickstand_tools.logs import csv_reader, reader
 
 NAMES = "t=t,ax=ax,ay=ay,az=az,gx=gx,gy=gy,gz=gz"
 UNITS = "t=ms,a=m/s2,g=rad/s"
@@ -79,7 +79,7 @@ def test_a_line_without_end_and_a_table_of_very_many_cells(tmp_path, monkeypatch
     (tmp_path / "wide.csv").write_text(f"{names}\n{names}\n")
     out = ("--out", tmp_path / "x.csv")
     command.refused(tmp_path, "import", tmp_path / "wide.csv", *out, words="a line of over 1,000,000 characters")
-    monkeypatch.setattr(cells, "MOST_CELLS", 5_000)
+    monkeypatch.setattr(csv_reader, "MOST_CELLS", 5_000)
     command.refused(tmp_path, *imported(tmp_path, table(range(0, 90_000, 10))), words="the table is too large")
 
 

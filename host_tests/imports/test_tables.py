@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from app_exports import riding
 from kickstand_tools import api
-from kickstand_tools.imports import cells, times, units
+from kickstand_tools.imports import times, units
+from kickstand_tools.logs import csv_reader
 
 NAMES = {
     "t": "Millis",
@@ -122,7 +123,7 @@ TIMES = {
 
 def column(texts):
     """These cells, as they are read."""
-    return cells.columns_of([[text] for text in texts], 1)[0]
+    return csv_reader.columns_of([[text] for text in texts], 1)[0]
 
 
 @pytest.mark.parametrize("name", TIMES)
@@ -226,20 +227,21 @@ def test_a_mistake_in_the_options(tmp_path, name):
 
 def test_columns_are_whole_numbers_floats_or_text():
     text = '1,0.5,start,7\n2, 1.5 ,,\n\n3,NA,"a, ""b""",9\n4,x,1_0,1\n'
-    (whole, floats, words, few), _ = cells.columns_of_text(text, ",", 4)
+    (whole, floats, words, few), left_out = csv_reader.columns_of_text(text, ",", 4)
     assert whole.dtype.kind == "i" and whole.tolist() == [1, 2, 3, 4]
-    assert floats.tolist() == ["0.5", " 1.5 ".lstrip(), "", "x"]
-    assert np.allclose(cells.numbers_of(floats), [0.5, 1.5, np.nan, np.nan], equal_nan=True)
+    assert floats.tolist() == ["0.5", " 1.5 ", "", "x"]
+    assert np.allclose(csv_reader.numbers_of(floats), [0.5, 1.5, np.nan, np.nan], equal_nan=True)
     assert words.tolist() == ["start", "", 'a, "b"', "1_0"]
-    assert np.all(np.isnan(cells.numbers_of(words)))  # 1_0 is no number
-    assert few.dtype.kind == "f" and np.isnan(few[1]) and cells.filled(few).tolist() == [True, False, True, True]
+    assert np.all(np.isnan(csv_reader.numbers_of(words)))  # 1_0 is no number
+    assert left_out == 0
+    assert few.dtype.kind == "f" and np.isnan(few[1]) and csv_reader.filled(few).tolist() == [True, False, True, True]
 
 
 def test_a_damaged_row_costs_itself(monkeypatch):
-    """A quotation mark that is not closed, cells too many or too few; a block that is text after one of numbers."""
-    monkeypatch.setattr(cells, "ROWS", 2)
+    """A quotation mark that is not closed, cells too many or too few, a line too long; text after numbers."""
+    monkeypatch.setattr(csv_reader, "ROWS", 2)
     rows = ['"1","2","3"', '"4","5,"6"', "7,8,9,10", "11", f"12,13,{14:0200000d}", "15,stop,16"]
-    (first, second, third), _ = cells.columns_of_text("\n".join(rows), ",", 3)
-    assert first.tolist() == [1, 4, 11, 12, 15]
-    assert second.tolist() == ["2", "5", "", "13.0", "stop"]
-    assert np.allclose(cells.numbers_of(third), [3, 6, np.nan, 14, 16], equal_nan=True)
+    (first, second, third), left_out = csv_reader.columns_of_text("\n".join(rows), ",", 3)
+    assert (first.tolist(), left_out) == ([1, 4, 11, 15], 2)
+    assert second.tolist() == ["2", "5", "", "stop"]
+    assert np.allclose(csv_reader.numbers_of(third), [3, 6, np.nan, 16], equal_nan=True)

@@ -41,31 +41,6 @@ def test_samples_are_a_period_apart():
     assert own.step(1, 105_000) == PERIOD_US
 
 
-def test_before_the_first_sample_there_is_nothing_to_correct():
-    own = clock()
-    own.emptied(1000)
-    assert own.step(1, 2000) == 0
-    own.emptied(50_000)  # a long gap
-    own.restart()  # and it is forgotten
-    assert own.step(1, 60_000) == 0
-    assert own.step(1, 65_000) == PERIOD_US
-
-
-def test_the_last_of_the_first_samples_is_the_newest():
-    """Four of them at once: emptied at the same time, the clock is half a period early; 1/16 of that is put right."""
-    own = clock()
-    own.step(4, 100_000)
-    own.emptied(100_000)
-    assert own.step(1, 105_000) == PERIOD_US + (-PERIOD_US // 2 >> 4)
-
-
-def test_a_correction_is_made_once():
-    own = clock()
-    own.step(1, 0)
-    own.emptied(PERIOD_US // 2 + 1600)
-    assert [own.step(1, 0) for _ in range(2)] == [PERIOD_US + 100, PERIOD_US]
-
-
 @pytest.mark.parametrize("error", [0.01, 0.0, -0.01])
 def test_a_chip_that_is_1_percent_off_keeps_the_boards_time(error):
     """Over 20 s, looked at at random moments, up to 10 ms apart."""

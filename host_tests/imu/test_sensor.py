@@ -227,13 +227,6 @@ def test_a_chip_at_fault_is_set_up_at_once(board):
     assert code(sensor) is None
 
 
-def test_samples_before_a_frozen_one_count(board):
-    sensor, chip, now_ms = running(board)
-    chip.waiting, chip.bad = [5], 2
-    assert sensor.fetch(now_ms) == 3
-    assert code(sensor) == "sensor-frozen"
-
-
 def test_a_chip_that_does_not_run_is_not_checked(board):
     sensor, chip = made(board)
     sensor.check(1000)
@@ -259,24 +252,3 @@ def test_a_check_that_is_lost_counts_as_a_lost_transfer(board):
         assert code(sensor) is None
         sensor.check(now_ms + 100 * k)
     assert code(sensor) == "sensor-lost"
-
-
-def test_failures_before_a_set_up_do_not_count_after_it(board):
-    sensor, chip, now_ms = running(board)
-    chip.waiting = [OSError(5)] * 3
-    for k in range(3):
-        sensor.fetch(now_ms + k)
-    now_ms = set_up(sensor, now_ms + 100)
-    chip.waiting = [1, OSError(5), 1]
-    del chip.calls[:]
-    for k in range(3):
-        sensor.fetch(now_ms + k)
-        assert code(sensor) is None
-    assert chip.calls == ["fetch", "fetch", "restart_fifo", "fetch"]
-
-
-def test_it_tells_whether_samples_were_left(board):
-    sensor, chip, _ = running(board)
-    assert sensor.emptied is True
-    chip.frames_left = 2
-    assert sensor.emptied is False

@@ -88,17 +88,6 @@ def test_every_partial_derivative_is_that_of_the_equations(seed, monkeypatch):
     np.testing.assert_allclose(jacobian + left_out(x, rates), numerical(x, force, rate), rtol=0, atol=TOLERANCE)
 
 
-def test_a_gyro_with_errors_of_scale_changes_the_derivatives_little(monkeypatch):
-    """2 % of each: they are left out of the derivatives, which stay right to a few per cent of the largest."""
-    monkeypatch.setattr(bike_model, "turn_rates", lambda *arguments: arguments[-2:])
-    for seed in range(20):
-        chance = np.random.default_rng(seed)
-        x, force, rate = random_state(chance)
-        x[SCALE_LEFT:] = chance.choice([-0.02, 0.02], STATES - SCALE_LEFT)
-        jacobian, rates = linearised(x, force, rate)
-        np.testing.assert_allclose(jacobian + left_out(x, rates), numerical(x, force, rate), rtol=0, atol=0.15)
-
-
 def rates_at(lean, speed, left=0.0, up=0.0):
     return bike_model.turn_rates(speed, math.sin(lean), math.cos(lean), 1.0, left, up)
 
@@ -153,18 +142,6 @@ def test_the_sums_of_a_sample(seed):
     assert state[LEAN] == pytest.approx(t + STEP_S * (wz - math.tan(q) * turning))
     assert state[PITCH] == pytest.approx(q + STEP_S * (wy * math.sin(t) - wx * math.cos(t)))
     assert state[SPEED] == pytest.approx(v + STEP_S * acceleration)
-
-
-def test_the_terms_that_measurements_take_from_the_model():
-    x, force, rate = random_state(np.random.default_rng(4))
-    model = Linearisation(list(x), list(rate), force[2])
-    t, q, v = x[:3]
-    assert (model.sin_lean, model.cos_lean) == pytest.approx((math.sin(t), math.cos(t)))
-    assert (model.sin_pitch, model.cos_pitch) == pytest.approx((math.sin(q), math.cos(q)))
-    assert model.speed == v
-    assert model.yaw_rate == pytest.approx(rate[0] * math.sin(t) + rate[1] * math.cos(t))
-    assert model.sideways == pytest.approx(v * rate[1])
-    assert model.acceleration == pytest.approx(force[2] - math.sin(q) + v * rate[1] * x[YAW_ERROR])
 
 
 @pytest.mark.parametrize("lean", [-0.6, 0.0, 0.6])

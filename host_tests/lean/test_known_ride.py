@@ -85,7 +85,7 @@ def figures():
             estimator.restart()
         for lost_s, seconds in LOST:
             if abs(t_s - lost_s) < 1e-6:
-                estimator.doubt(seconds)
+                estimator.inflate_covariance(seconds)
         lean = estimator.update(*sensed(t_s, values, rates), int((t_s - before_s) * 1e6 + 0.5))
         before_s = t_s
         if k % 100 == 0 and k:

@@ -214,5 +214,5 @@ def test_the_work_on_a_window_has_as_many_pieces_as_are_counted_on():
         taken = taken + 1 if working else 0
         if working and estimator._work is None:
             pieces[estimator.at_rest].add(taken)
-    assert pieces[False] == {lean_filter.PIECES}
-    assert max(pieces[True]) < lean_filter.PIECES
+    assert pieces[False] == {lean_filter.WORK_STEPS}
+    assert max(pieces[True]) < lean_filter.WORK_STEPS

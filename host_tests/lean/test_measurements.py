@@ -93,11 +93,11 @@ def test_on_a_straight_the_bike_is_upright_and_elsewhere_its_speed_is_the_usual_
 
 
 def test_a_measured_speed_is_less_certain_while_it_changes():
-    row, innovation, steady = measurements.given_speed(12.0 / GRAVITY_MPS2, 10.0 / GRAVITY_MPS2, 0.0)
+    row, innovation, steady = measurements.measured_speed(12.0 / GRAVITY_MPS2, 10.0 / GRAVITY_MPS2, 0.0)
     assert row == ((SPEED, 1.0),)
     near(innovation * GRAVITY_MPS2, 2.0, 1e-6)
     for change in (0.6, -0.6):
-        assert measurements.given_speed(1.0, 1.0, change)[2] > 2.0 * steady
+        assert measurements.measured_speed(1.0, 1.0, change)[2] > 2.0 * steady
 
 
 def test_at_rest_there_is_no_speed_the_rates_are_bias_and_the_force_is_the_vertical():

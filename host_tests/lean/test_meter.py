@@ -113,13 +113,13 @@ def test_maxima_are_the_largest_of_each_side_until_they_are_reset():
 def test_the_lean_is_distrusted_for_a_reason_and_is_no_maximum_until_it_is_trusted_again():
     shown = ride(meter(), 3.0)
     shown.distrust("mount has moved")
-    assert shown.doubt == "mount has moved"
+    assert shown.suppressed_reason == "mount has moved"
     roll(shown, 0.0, 30.0)
     assert not shown.trusted
     near(shown.lean_deg, 30.0, 0.5)
     assert shown.max_right_deg < 0.1
     shown.trust()
-    assert shown.doubt is None
+    assert shown.suppressed_reason is None
     assert ride(shown, 0.2, lean_deg=30.0).trusted
     near(shown.max_right_deg, 30.0, 0.2)
 
@@ -128,9 +128,9 @@ def test_a_reason_for_distrust_belongs_to_one_calibration():
     shown = ride(meter(), 3.0)
     shown.distrust("side was wrong?")
     shown.use(shown.calibration)
-    assert shown.doubt == "side was wrong?"
+    assert shown.suppressed_reason == "side was wrong?"
     shown.use(Calibration())
-    assert shown.doubt is None
+    assert shown.suppressed_reason is None
 
 
 def test_a_car_has_no_lean_to_distrust():

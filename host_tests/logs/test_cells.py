@@ -1,5 +1,6 @@
 """The largest values that a log may have: a little more is refused with its unit, read quickly or cell by cell."""
 
+import contextlib
 import io
 
 import command
@@ -9,7 +10,7 @@ from kickstand_tools.errors import InputError
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_blocks, read_log
 
-HEADER = command.HEADER + ",speed_mps,temp_c"
+HEADER = command.HEADER + ",speed_mps,temp_c,lat_deg,lon_deg,utc_s"
 # The widest ranges of the chips are 16 g and 2000 deg/s, of which more is another unit; their data sheets end at 85 C.
 LIMITS = {
     "t_s": (1e10, "seconds"),
@@ -21,10 +22,13 @@ LIMITS = {
     "gz_dps": (2500.0, "deg/s"),
     "speed_mps": (200.0, "m/s"),
     "temp_c": (200.0, "degrees Celsius"),
+    "lat_deg": (90.0, "degrees"),
+    "lon_deg": (180.0, "degrees"),
+    "utc_s": (1e10, "seconds since 1970"),
 }
 
 
-@pytest.mark.parametrize("quoted", [False, True])  # numpy reads the one, Python the other
+@pytest.mark.parametrize("quoted", [False, True])  # columns at once, or cell by cell
 @pytest.mark.parametrize("name", LIMITS)
 def test_past_any_reading(name, quoted):
     limit, unit = LIMITS[name]
@@ -61,24 +65,14 @@ def test_a_firmware_that_is_told_no_temperature_is_told_25():
     )
 
 
-@pytest.mark.parametrize(("size_g", "refused"), [(4.9, False), (5.1, True), (19.9, True), (20.1, False)])
-def test_accelerations_that_look_like_m_per_s2(size_g, refused):
-    """By their size, not by an axis, and by the usual one: 5 to 20."""
+@pytest.mark.parametrize(
+    ("size_g", "step_s", "words"),
+    [(9.81, 0.01, "look like m/s2"), (1.0, 10.0, "is t_s in milliseconds"), (4.5, 0.01, ""), (1.0, 2.0, "")],
+)
+def test_units_that_are_easily_mistaken(size_g, step_s, words):
+    """Forces by their usual size, not by an axis."""
     force = np.tile([size_g * 0.6, 0.0, size_g * 0.8], (9, 1))
     force[:4] = [0.0, 1.0, 0.0]
-    log = Log(np.arange(9) / 100.0, force, np.zeros((9, 3)))
-    if refused:
-        with pytest.raises(InputError, match="look like m/s2"):
-            read_log(log)
-    else:
-        read_log(log)
-
-
-@pytest.mark.parametrize(("step_s", "refused"), [(3.9, False), (4.0, True)])
-def test_times_that_look_like_milliseconds(step_s, refused):
-    log = Log(np.arange(4) * step_s, np.tile([0.0, 1.0, 0.0], (4, 1)), np.zeros((4, 3)))
-    if refused:
-        with pytest.raises(InputError, match="is t_s in milliseconds"):
-            read_log(log)
-    else:
+    log = Log(np.arange(9) * step_s, force, np.zeros((9, 3)))
+    with pytest.raises(InputError, match=words) if words else contextlib.nullcontext():
         read_log(log)

@@ -38,6 +38,9 @@ BAD = {
         text(ROW + ",fast", header=command.HEADER + ",speed_mps"),
         "line 2: speed_mps is 'fast'",
     ),
+    "m per s2.csv, all": (text(*[g.replace("1.01", "9.81") for g in GOOD]), "look like m/s2"),
+    "milliseconds.csv": (text(*[f"{10 * k}{g[4:]}" for k, g in enumerate(GOOD)]), "milliseconds"),
+    "semicolons.csv": (text(ROW).replace(b",", b";"), "commas"),
     "open quote.csv": (text(*GOOD[:3], '0.03,"0,0,1,0,0,0', *GOOD[4:]), "column names: is the line cut?"),
     "binary.csv": (bytes(range(256)), "line 2: not text"),
     "zeros.csv": (bytes(100), "is empty"),
@@ -75,16 +78,10 @@ def test_calibration_names_the_bad_one_of_its_captures(tmp_path, order):
     assert f"pose{order}.csv" in line
 
 
-def test_a_directory_is_no_log(tmp_path):
-    cal = command.write_cal(tmp_path / "CAL.json")
-    out = tmp_path / "LEAN.csv"
-    command.refused(tmp_path, "replay", tmp_path, "--calibration", cal, "--out", out, words="is a directory")
-
-
-def test_a_log_that_is_not_there(tmp_path):
-    cal, log = command.write_cal(tmp_path / "CAL.json"), tmp_path / "none.csv"
-    out = tmp_path / "LEAN.csv"
-    command.refused(tmp_path, "replay", log, "--calibration", cal, "--out", out, words="there is no such file")
+@pytest.mark.parametrize(("name", "words"), [(".", "is a directory"), ("none.csv", "there is no such file")])
+def test_a_directory_and_a_log_that_is_not_there(tmp_path, name, words):
+    cal, out = command.write_cal(tmp_path / "CAL.json"), tmp_path / "LEAN.csv"
+    command.refused(tmp_path, "replay", tmp_path / name, "--calibration", cal, "--out", out, words=words)
 
 
 PLAIN = text(*GOOD)
@@ -120,23 +117,3 @@ def test_a_packed_result_is_packed(tmp_path):
     for name in "LEAN.csv", "LEAN.csv.gz":
         command.works("replay", log, "--calibration", cal, "--out", tmp_path / name)
     assert gzip.decompress((tmp_path / "LEAN.csv.gz").read_bytes()) == (tmp_path / "LEAN.csv").read_bytes()
-
-
-@pytest.mark.parametrize(
-    ("row", "step_s", "words"),
-    [
-        ((0.0, 9.81, 0.1, 0.0, 0.0, 0.0), 0.01, "look like m/s2"),
-        ((0.0, 1.0, 0.1, 0.0, 0.0, 0.0), 10.0, "milliseconds"),
-    ],
-)
-def test_units_that_are_easily_mistaken(tmp_path, row, step_s, words):
-    cal = command.write_cal(tmp_path / "CAL.json")
-    path = command.write(tmp_path / "log.csv", [(n * step_s, *row) for n in range(50)])
-    command.refused(tmp_path, "replay", path, "--calibration", cal, "--out", tmp_path / "LEAN.csv", words=words)
-
-
-def test_a_log_saved_with_semicolons(tmp_path):
-    cal = command.write_cal(tmp_path / "CAL.json")
-    path = tmp_path / "log.csv"
-    path.write_text(command.HEADER.replace(",", ";") + "\n0;0;1;0;0;0;0\n")
-    command.refused(tmp_path, "replay", path, "--calibration", cal, "--out", tmp_path / "LEAN.csv", words="commas")

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from kickstand_tools.logs.csv_lines import csv_lines, joined_cells, number_cells, numbers_in, text_cells
+from kickstand_tools.logs.csv_lines import csv_lines, joined_cells, number_cells, text_cells
+from kickstand_tools.logs.csv_reader import numbers_in
 
 AWKWARD = [0.0, -0.0, -1e-9, 5e-324, 0.5, 1.5, 2.5, -0.5, 9.9999999, 99999.5, 2.0**53, -(2.0**60), 1e300]
 

@@ -10,7 +10,7 @@ from kickstand_tools.api import Log, fit_two_positions, open_ride, overview, rep
 from kickstand_tools.calibration import drive
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs import reader
-from kickstand_tools.logs.mended.frozen import FrozenReadings, believed
+from kickstand_tools.logs.frozen import FrozenReadings, without_frozen
 from kickstand_tools.logs.reader import read_blocks
 from kickstand_tools.refusals import sentence
 
@@ -75,7 +75,7 @@ def test_at_each_end_and_twice():
 
 @pytest.mark.parametrize("digits", [5, 4, 3, 2, 1])
 @pytest.mark.parametrize("noise", [1.0, 0.3])
-def test_a_vehicle_at_rest_is_believed(digits, noise):
+def test_a_vehicle_at_rest_is_not_frozen(digits, noise):
     """A quiet sensor, the engine off, in logs with fewer and fewer digits: with one, most readings are the same."""
     idling = resting(1, 5, 30.0, digits)  # its engine shakes it
     readings = np.vstack((riding(5, 1, digits), idling, resting(20, 2, noise, digits), idling, riding(5, 3, digits)))
@@ -100,16 +100,16 @@ def test_what_never_changes_is_not_judged():
 def test_a_log_without_what_froze():
     readings = riding(8)
     whole = log_of(readings)
-    assert believed(whole) is whole
+    assert without_frozen(whole) is whole
     readings[300:500] = readings[300]
-    left = believed(log_of(readings))
+    left = without_frozen(log_of(readings))
     assert len(left.t_s) == 601
     assert np.max(np.diff(left.t_s)) == pytest.approx(2.0)
 
 
 @pytest.mark.parametrize("profile", ["street", "track"])
 def test_a_freeze_is_no_standstill(profile):
-    """20 s in the middle of a ride: believed, it leaves the lean wrong by up to 50 degrees, and long after it."""
+    """Of 20 s in the middle of a ride. Taken for a standstill, it leaves the lean wrong by up to 50 degrees."""
     ride = simulate_ride(profile, seed=1, seconds=100.0)
     hz = round(ride.rate_hz)
     kickstand, upright = (Log.from_readings(pose, hz) for pose in (ride.kickstand, ride.upright))
@@ -168,7 +168,7 @@ def test_every_engine_is_told_of_a_gap(engine):
     readings[200:400] = readings[200]
     found = replay(log_of(readings), CalibrationFile(aligned=True), engine)
     assert np.flatnonzero(np.isnan(found.lean_deg)).tolist() == list(range(201, 400))
-    gap = replay(believed(log_of(readings)), CalibrationFile(aligned=True))
+    gap = replay(without_frozen(log_of(readings)), CalibrationFile(aligned=True))
     assert np.array_equal(found.lean_deg[400:], gap.lean_deg[201:])
 
 
@@ -189,11 +189,11 @@ def test_blocks_are_marked_once():
     assert marks.notices()[0].values[0] == 1
 
 
-def test_real_logs_are_believed_and_a_freeze_in_one_is_not(shared_data):
+def test_no_real_log_is_frozen_and_a_freeze_in_one_is_found(shared_data):
     for path in sorted(shared_data.glob("*.csv.gz")):
         log = reader.read_log(path)
         assert log.notices == []
-        assert believed(log) is log
+        assert without_frozen(log) is log
     log = reader.read_log(shared_data / "motorcycle-ride.csv.gz")
     begin, end = np.searchsorted(log.t_s, [40.0, 60.0])
     log.accel_g[begin:end], log.gyro_dps[begin:end] = log.accel_g[begin], log.gyro_dps[begin]

@@ -1,6 +1,5 @@
 """A log in memory and its blocks: times, orders of columns, and what does not fit."""
 
-import gzip
 import io
 from typing import Any
 
@@ -96,42 +95,6 @@ def test_a_log_in_memory_comes_in_blocks(monkeypatch):
 
 def text_of(n: int, header: str = command.HEADER, row: str = "{t:.2f},0.1,0.2,0.9,1,2,3") -> str:
     return "\n".join([header, *[row.format(t=k / 100) for k in range(n)]]) + "\n"
-
-
-def test_a_file_comes_in_blocks_of_whole_lines(tmp_path, monkeypatch):
-    monkeypatch.setattr(reader, "BLOCK_BYTES", 100)
-    path, packed = tmp_path / "log.csv", tmp_path / "log.csv.gz"
-    path.write_text(text_of(40))
-    packed.write_bytes(gzip.compress(path.read_bytes()))
-    for source in path, packed, str(path):
-        done = []
-        blocks = list(read_blocks(source, progress=lambda *both: done.append(both)))  # noqa: B023
-        size = path.stat().st_size if source is not packed else packed.stat().st_size
-        assert len(blocks) > 5
-        assert done[-1] == (size, size)
-        assert [total for _, total in done] == [size] * len(blocks)
-        assert [read for read, _ in done] == sorted(read for read, _ in done)
-        assert [text for block in blocks for text in block.time_text] == [f"{k / 100:.2f}" for k in range(40)]
-        assert np.concatenate([block.time_us for block in blocks]).tolist() == [k * 10_000 for k in range(40)]
-    whole = read_log(path)
-    assert whole.readings[5][[0, 1, 2, 4, 5, 6]].tolist() == FORCE + RATE
-    assert whole.name == str(path)
-
-
-def test_mistakes_are_told_by_their_line_in_any_block(tmp_path, monkeypatch):
-    monkeypatch.setattr(reader, "BLOCK_BYTES", 100)
-    path = tmp_path / "log.csv"
-    rows = text_of(40).split("\n")
-    for line in 3, 20, 41:
-        path.write_text("\n".join([*rows[: line - 1], "x" + rows[line - 1], *rows[line:]]))
-        with pytest.raises(InputError, match=f", line {line}: t_s is 'x"):
-            read_log(path)
-        path.write_text("\n".join([*rows[: line - 1], rows[line - 1], "-1" + rows[line - 1], *rows[line:]]))
-        with pytest.raises(InputError, match=f", line {line + 1}: time goes back from "):
-            read_log(path)
-        path.write_bytes("\n".join([*rows[: line - 1], "\xff" + rows[line - 1], *rows[line:]]).encode("latin-1"))
-        with pytest.raises(InputError, match=f", line {line}: not text"):
-            read_log(path)
 
 
 def test_the_time_may_stand_in_any_column():

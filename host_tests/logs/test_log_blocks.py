@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from kickstand_tools.errors import InputError
 from kickstand_tools.logs import reader
-from kickstand_tools.logs.csv_lines import numbers_in
+from kickstand_tools.logs.csv_reader import numbers_in
 
 HEADER = command.HEADER + ",temp_c,speed_mps"
 
@@ -30,23 +30,23 @@ def write(path, lines):
 @pytest.mark.parametrize("block_bytes", [200, 5000, 1 << 22])
 def test_blocks_add_up_to_the_log(tmp_path, monkeypatch, name, block_bytes):
     path = write(tmp_path / name, [HEADER, *rows(1500)])
-    whole = reader.read_log(path)
+    whole, done, size = reader.read_log(path), [], path.stat().st_size
     monkeypatch.setattr(reader, "BLOCK_BYTES", block_bytes)
-    blocks = list(reader.read_blocks(path))
+    blocks = list(reader.read_blocks(str(path), progress=lambda *both: done.append(both)))
+    assert done == [(block.done, size) for block in blocks] and done == sorted(done) and done[-1] == (size, size)
+    assert whole.name == str(path)
     assert len(blocks) >= min(10, 80_000 // block_bytes)
     assert [t for block in blocks for t in block.time_text] == [row.partition(",")[0] for row in rows(1500)]
     assert [t for block in blocks for t in block.time_us] == whole.time_us.tolist() == [5000 * k for k in range(1500)]
     assert np.array_equal(np.concatenate([block.readings for block in blocks]), whole.readings)
     assert np.flatnonzero(~np.isnan(whole.speed_mps)).tolist() == list(range(0, 1500, 200))
-    assert blocks[-1].done == path.stat().st_size
 
 
-def test_the_three_readers_of_numbers_agree(tmp_path):
-    """A number with an exponent leaves its block to numpy, a text column to the cell reader; the numbers are the same
-    to the last bit."""
+def test_the_readers_of_numbers_agree(tmp_path):
+    """A number with an exponent, or a text column, leaves a block to the reader of cells: the numbers are the same."""
     quick = write(tmp_path / "quick.csv", [HEADER, *[row.replace("1e0", "1") for row in rows(800)]])
     plain = write(tmp_path / "plain.csv", [HEADER, *rows(800)])
-    noted = write(tmp_path / "noted.csv", [HEADER + ",note", *[row + ",hello" for row in rows(800)]])
+    noted = write(tmp_path / "noted.csv", [HEADER + ",note", *[row + ',"a, ""b"""' for row in rows(800)]])
     assert numbers_in(quick.read_bytes().partition(b"\n")[2], 9) is not None
     assert numbers_in(plain.read_bytes().partition(b"\n")[2], 9) is None
     one = reader.read_log(quick)
@@ -82,15 +82,6 @@ def test_a_mistake_far_down_is_named(tmp_path, monkeypatch, row, block_bytes):
     with pytest.raises(InputError) as error:
         list(reader.read_blocks(path))
     assert MISTAKES[row] in str(error.value)
-
-
-def test_time_starts_at_zero(tmp_path):
-    lines = [f"{1_700_000_000 + k / 200:.6f},0,0,1,0,0,0,," for k in range(100)]
-    log = reader.read_log(write(tmp_path / "ride.csv", [HEADER, *lines]))
-    assert log.time_us.tolist() == [5000 * k for k in range(100)]
-    assert log.start_s == 1_700_000_000.0
-    (block,) = reader.read_blocks(tmp_path / "ride.csv")
-    assert block.time_text[1] == "1700000000.005000"
 
 
 def test_a_damaged_gzip_file_is_refused_after_its_good_part(tmp_path, monkeypatch):

@@ -13,15 +13,15 @@ import pytest
 from kickstand_tools.analysis import report
 from kickstand_tools.analysis.export.export import export
 from kickstand_tools.analysis.overview import overview
-from kickstand_tools.analysis.plot import traces
+from kickstand_tools.analysis.plot.charts import charts
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.calibration.drive import fit_drive
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.calibration.poses import read_pose
-from kickstand_tools.calibration.ride.fit import fit_ride
 from kickstand_tools.errors import InputError
+from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.imports.importing import import_recording, write_imported
-from kickstand_tools.logs.cut import cut_log
+from kickstand_tools.logs.csv_lines import cut_log
 from kickstand_tools.replay.replay import replay_to_csv
 from kickstand_tools.simulation.scripted import script
 from rich.console import Console
@@ -35,8 +35,7 @@ def _report(log: Path, out: Path) -> None:
     seen = overview(open_ride(log, CALIBRATION))
     json.dumps(report.as_data(seen), allow_nan=False)
     Console(file=io.StringIO(), width=80).print(report.page(seen))
-    seen.summary.samples += len(traces.traces(seen).time_s)
-    traces.title(seen)
+    charts(seen)
 
 
 def _export(form: str):

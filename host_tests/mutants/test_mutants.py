@@ -44,17 +44,12 @@ def changed(tmp_path):
 @pytest.mark.parametrize(
     ("line", "others"),
     [
-        ("x = a < b", ["x = a <= b", "x = a >= b"]),
-        ("x = a + b", ["x = a - b"]),
-        ("x = -a", ["x = a"]),
+        ("x = a < b", ["x = a <= b"]),
         ("x = 5", ["x = 6", "x = 4"]),
         ("x = 200", ["x = 400", "x = 100"]),
-        ("x = 0x40", ["x = 128", "x = 32"]),
         ("x = 0.25", ["x = 0.5", "x = 0.125"]),
-        ("x = 0", ["x = 1"]),
         ("x = 1", ["x = 2", "x = 0"]),
         ("x = a and b", ["x = a or b"]),
-        ("x = True", ["x = False"]),
         ("x[0] = a", ["x[1] = a", "pass"]),
         ("x += a", ["pass"]),
         ("f(a)", ["pass"]),

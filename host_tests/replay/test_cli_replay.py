@@ -21,6 +21,18 @@ def read(path):
     return np.genfromtxt(path, delimiter=",", names=True)
 
 
+def replayed(log, cal, engine="cpython"):
+    """The table that `replay` writes, and what it says."""
+    out = cal.with_name("LEAN.csv")
+    said = command.works("replay", log, "--calibration", cal, "--out", out, "--engine", engine)
+    return read(out), said.err
+
+
+def refused(log, cal, words, *more):
+    out = cal.with_name("LEAN.csv")
+    return command.refused(cal.parent, "replay", log, "--calibration", cal, "--out", out, *more, words=words)
+
+
 def ride(path, seconds=20.0, rate_hz=100, seed=0):
     """A log that leans, turns, brakes and shakes, with gaps in time, in the sensor's axes."""
     rng = np.random.default_rng(seed)
@@ -35,13 +47,11 @@ def ride(path, seconds=20.0, rate_hz=100, seed=0):
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_forces_and_rates_are_the_calibrated_and_turned_readings(tmp_path, engine):
     log, cal = ride(tmp_path / "log.csv"), command.write_cal(tmp_path / "CAL.json")
-    out = tmp_path / "LEAN.csv"
-    result = command.works("replay", log, "--calibration", cal, "--out", out, "--engine", engine)
-    assert result.err == ""
-    header = out.read_text().split("\n")[0]
-    assert header.startswith("t_s,lean_deg,lean_formula_deg,left_g,up_g,forward_g")
+    got, said = replayed(log, cal, engine)
+    assert said == ""
+    assert (got.dtype.names or ())[:6] == ("t_s", "lean_deg", "lean_formula_deg", "left_g", "up_g", "forward_g")
 
-    given, got, parameters = read(log), read(out), json.loads(cal.read_text())
+    given, parameters = read(log), json.loads(cal.read_text())
     matrix = np.array(parameters["vehicle_from_sensor"])
     sensor = np.column_stack([given[name] for name in ("ax_g", "ay_g", "az_g")])
     force = (sensor * parameters["accel_slope"] + parameters["accel_offset_g"]) @ matrix.T
@@ -58,33 +68,25 @@ def test_forces_and_rates_are_the_calibrated_and_turned_readings(tmp_path, engin
 def test_the_formula_is_the_corrected_25_and_26(tmp_path, engine):
     """Against numpy in doubles, over its own forces; 0.01 degrees."""
     log, cal = ride(tmp_path / "log.csv", seed=1), command.write_cal(tmp_path / "CAL.json")
-    out = tmp_path / "LEAN.csv"
-    command.works("replay", log, "--calibration", cal, "--out", out, "--engine", engine)
-    calibration = replay_input(cal)
+    got, _ = replayed(log, cal, engine)
+    calibration = {key: np.array(value) for key, value in json.loads(cal.read_text()).items()}
+    matrix = calibration["vehicle_from_sensor"]
     readings = np.column_stack([read(log)[n] for n in ("ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")])
-    force = (readings[:, :3] * calibration["accel_slope"] + calibration["accel_offset_g"]) @ calibration["matrix"].T
-    yaw = ((readings[:, 3:] - calibration["gyro_bias_dps"]) @ calibration["matrix"].T)[:, 1]
+    force = (readings[:, :3] * calibration["accel_slope"] + calibration["accel_offset_g"]) @ matrix.T
+    yaw = ((readings[:, 3:] - calibration["gyro_bias_dps"]) @ matrix.T)[:, 1]
     x, y = force[:, 0], force[:, 1]
     s = np.sign(yaw) * np.sqrt(np.maximum(0.0, x * x + y * y - 1.0))
     want = np.degrees(np.arcsin(np.clip((x - s * y) / (x * x + y * y), -1, 1)))
     steep = np.abs(x * x + y * y - 1.0) < 1e-4  # there float32 itself moves the square root by more
-    error = np.abs(read(out)["lean_formula_deg"] - want)
+    error = np.abs(got["lean_formula_deg"] - want)
     assert np.max(error[~steep]) < 0.01
     assert np.sum(steep) < 0.02 * len(error)
-
-
-def replay_input(cal):
-    data = json.loads(cal.read_text())
-    return {key: np.array(value) for key, value in data.items()} | {"matrix": np.array(data["vehicle_from_sensor"])}
 
 
 @pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
 def test_the_engines_agree(tmp_path):
     log, cal = ride(tmp_path / "log.csv", seconds=60), command.write_cal(tmp_path / "CAL.json")
-    results = []
-    for engine in "cpython", "micropython":
-        command.works("replay", log, "--calibration", cal, "--out", tmp_path / f"{engine}.csv", "--engine", engine)
-        results.append(read(tmp_path / f"{engine}.csv"))
+    results = [replayed(log, cal, engine)[0] for engine in ("cpython", "micropython")]
     for name in replay_engine.COLUMNS:
         assert np.array_equal(np.isnan(results[0][name]), np.isnan(results[1][name])), name
         assert np.nanmax(np.abs(results[0][name] - results[1][name])) < 0.002, name
@@ -101,8 +103,7 @@ def test_how_sure_the_firmware_was_of_its_lean(tmp_path, engine):
     rows = np.column_stack((t, force, rate))[kept]
     log, cal = command.write(tmp_path / "log.csv", rows), tmp_path / "CAL.json"
     cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": np.eye(3).tolist()}))
-    command.works("replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv", "--engine", engine)
-    got, meter = read(tmp_path / "LEAN.csv"), replay_engine.Replay(read_calibration(cal).to_firmware())
+    (got, _), meter = replayed(log, cal, engine), replay_engine.Replay(read_calibration(cal).to_firmware())
     shown, sigma = [], []
     for row in read_log(log).rows():
         meter.take(*row)
@@ -128,7 +129,6 @@ def test_a_speed_in_the_log_reaches_the_meter(tmp_path, engine, mps):
     log, cal = ride(tmp_path / "log.csv", seconds=10), command.write_cal(tmp_path / "CAL.json")
     told = {second * 100 for second in range(10)}
     speed = with_speed(log, [mps if k in told else "" for k in range(1000)])
-    out = tmp_path / "LEAN.csv"
     parameters = read_calibration(cal).to_firmware()
     leans = {}
     for name, path in ("without", log), ("with", speed):
@@ -140,8 +140,8 @@ def test_a_speed_in_the_log_reaches_the_meter(tmp_path, engine, mps):
             meter.update(reading, 0 if before is None else time_us - before)
             before = time_us
             leans[name].append(meter.lean_deg)
-        command.works("replay", path, "--calibration", cal, "--out", out, "--engine", engine)
-        assert np.max(np.abs(read(out)["lean_deg"] - leans[name])) < (1e-5 if engine == "cpython" else 0.01), name
+        lean_deg = replayed(path, cal, engine)[0]["lean_deg"]
+        assert np.max(np.abs(lean_deg - leans[name])) < (1e-5 if engine == "cpython" else 0.01), name
     assert np.max(np.abs(np.subtract(leans["with"], leans["without"]))) > 1.0  # it tells the meter something
 
 
@@ -154,28 +154,21 @@ def test_forward_and_backward_exchanged_are_remarked_on(tmp_path, engine):
         matrix = [[turned, 0, 0], [0, 1, 0], [0, 0, turned]]
         data = analysis_rides.CALIBRATION | {"vehicle_from_sensor": matrix, "kickstand_side": "right"}
         cal.write_text(json.dumps(data))
-        said = command.works("replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv", "--engine", engine)
-        assert said.err.count("\n") == bool(remark)
-        assert said.err.startswith(remark)
+        _, said = replayed(log, cal, engine)
+        assert said.count("\n") == bool(remark)
+        assert said.startswith(remark)
 
 
 def test_without_an_emulator_the_engine_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(image.importlib.util, "find_spec", lambda name: None)
     log, cal = ride(tmp_path / "log.csv", seconds=1), command.write_cal(tmp_path / "CAL.json")
-    command.refused(
-        *(tmp_path, "replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv", "--engine", "rp2040"),
-        words="-m pip install -e ",
-    )
+    refused(log, cal, "-m pip install -e ", "--engine", "rp2040")
 
 
 def test_without_a_unix_port_the_engine_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(unix_port, "available", lambda: False)
     log, cal = ride(tmp_path / "log.csv", seconds=1), command.write_cal(tmp_path / "CAL.json")
-    command.refused(
-        *(tmp_path, "replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv"),
-        *("--engine", "micropython"),
-        words="use --engine cpython",
-    )
+    refused(log, cal, "use --engine cpython", "--engine", "micropython")
 
 
 @pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
@@ -184,60 +177,50 @@ def test_a_fault_inside_micropython_is_told_in_one_line(tmp_path, monkeypatch):
     broken.write_text("raise ValueError('no such luck')\n")
     monkeypatch.setattr(replay.replay_engine, "__file__", str(broken))
     log, cal = ride(tmp_path / "log.csv", seconds=1), command.write_cal(tmp_path / "CAL.json")
-    command.refused(
-        *(tmp_path, "replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv"),
-        *("--engine", "micropython"),
-        words="ValueError: no such luck",
-    )
+    refused(log, cal, "ValueError: no such luck", "--engine", "micropython")
 
 
 def test_an_unaligned_calibration_works_with_a_warning(tmp_path):
     log = ride(tmp_path / "log.csv", seconds=1)
     cal = command.write_cal(tmp_path / "CAL.json", vehicle_from_sensor=[[1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    result = command.works("replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv")
-    assert result.err.startswith("warning: ")
-    assert "is not aligned" in result.err
-    assert result.err.count("\n") == 1
-    assert len(read(tmp_path / "LEAN.csv")) == 100
+    lean, said = replayed(log, cal)
+    assert said.startswith("warning: ")
+    assert "is not aligned" in said
+    assert said.count("\n") == 1
+    assert len(lean) == 100
 
 
 def test_no_lean_of_a_car_is_one_that_the_display_showed(tmp_path):
     log, cal = ride(tmp_path / "log.csv", 5.0), command.write_cal(tmp_path / "CAL.json", vehicle="car")
-    out = tmp_path / "LEAN.csv"
-    told = command.works("replay", log, "--calibration", cal, "--out", out).err
-    assert told.count("\n") == 1 and "a car's, whose display shows no lean" in told
-    assert np.all(np.isnan(read(out)["lean_sigma_deg"]))
-    assert not np.any(np.isnan(read(out)["forward_g"]))
+    lean, said = replayed(log, cal)
+    assert said.count("\n") == 1 and "a car's, whose display shows no lean" in said
+    assert np.all(np.isnan(lean["lean_sigma_deg"]))
+    assert not np.any(np.isnan(lean["forward_g"]))
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_the_trim_that_riding_found_is_used(tmp_path, engine):
     """Standing still, the lean is what the accelerometer says less what upright was off; without one it is 0."""
-    log, out = command.still(tmp_path / "log.csv", (0.0, 0.0, 1.0), seconds=8.0), tmp_path / "LEAN.csv"
+    log = command.still(tmp_path / "log.csv", (0.0, 0.0, 1.0), seconds=8.0)
     leans = []
     for changed in ({}, {"trim_deg": 2.0}):
         cal = command.write_cal(tmp_path / "CAL.json", accel_offset_g=[0, 0, 0], gyro_bias_dps=[0, 0, 0], **changed)
-        command.works("replay", log, "--calibration", cal, "--out", out, "--engine", engine)
-        leans.append(read(out)["lean_deg"][-100:].mean())
+        leans.append(replayed(log, cal, engine)[0]["lean_deg"][-100:].mean())
     assert abs(leans[0]) < 0.2
     assert abs(leans[1] - leans[0]) == pytest.approx(2.0, abs=0.3)
 
 
 def test_times_are_those_of_the_log_to_the_letter(tmp_path):
     """A log that starts at a Unix time keeps it, and its microseconds are not lost on the way."""
-    t0 = 1_700_000_000.0
-    rows = [f"{t0 + k / 100:.6f},0.0,1.0,0.1,0,0,0" for k in range(50)]
-    (tmp_path / "log.csv").write_text("\n".join([command.HEADER, *rows]) + "\n")
-    (tmp_path / "zero.csv").write_text(
-        "\n".join([command.HEADER, *[f"{k / 100:.6f},0.0,1.0,0.1,0,0,0" for k in range(50)]]) + "\n"
-    )
     cal = command.write_cal(tmp_path / "CAL.json")
     tables = []
-    for name in "log", "zero":
-        out = tmp_path / f"{name}.out.csv"
-        command.works("replay", tmp_path / f"{name}.csv", "--calibration", cal, "--out", out)
-        tables.append(list(csv.reader(out.open())))
-    assert [row[0] for row in tables[0][1:]] == [row.split(",")[0] for row in rows]
+    for start_s in 1_700_000_000.0, 0.0:
+        times = [f"{start_s + k / 100:.6f}" for k in range(50)]
+        text = "\n".join([command.HEADER, *[f"{time},0.0,1.0,0.1,0,0,0" for time in times]]) + "\n"
+        (tmp_path / "log.csv").write_text(text)
+        replayed(tmp_path / "log.csv", cal)
+        tables.append(list(csv.reader((tmp_path / "LEAN.csv").open())))
+        assert [row[0] for row in tables[-1][1:]] == times
     assert [row[1:] for row in tables[0]] == [row[1:] for row in tables[1]]
 
 
@@ -262,10 +245,7 @@ def test_a_real_recording_leans_as_gravity_says(tmp_path, shared_data, engine):
         gyro_bias_dps=[0, 0, 0],
         vehicle_from_sensor=rows.tolist(),
     )
-    out = tmp_path / "LEAN.csv"
-    log = shared_data / "hand-leaning.csv.gz"
-    command.works("replay", log, "--calibration", cal, "--out", out, "--engine", engine)
-    got = read(out)
+    got, _ = replayed(shared_data / "hand-leaning.csv.gz", cal, engine)
     for held, (begin_s, end_s) in ((first, (5.0, 6.0)), (second, (7.4, 7.9))):
         left, up, _ = rows @ held
         true_lean = np.degrees(np.arctan2(left, up))

@@ -39,17 +39,17 @@ def by_steps(log, calibration):
     rows = []
     for block in read_blocks(log):
         rows.append(np.full((len(block.time_us), len(replay_engine.COLUMNS)), np.nan))
-        rows[-1][~block.frozen] = [engine.step(*row) for row in block.believed.rows()]
+        rows[-1][~block.frozen] = [engine.step(*row) for row in block.measured.rows()]
     return np.concatenate(rows)
 
 
 def test_it_is_the_meter_sample_by_sample(known):
     log, calibration = known
     (block,) = read_blocks(log)
-    believed, along = block.believed, MeterAlong(calibration)
-    assert 0 < len(believed.time_us) < len(block.time_us)
-    cuts = [0, 1, 1, 700, 5000, len(believed.time_us)]  # in blocks, an empty one too
-    parts = [along.columns(believed.part(slice(a, b))) for a, b in pairwise(cuts)]
+    measured, along = block.measured, MeterAlong(calibration)
+    assert 0 < len(measured.time_us) < len(block.time_us)
+    cuts = [0, 1, 1, 700, 5000, len(measured.time_us)]  # in blocks, an empty one too
+    parts = [along.columns(measured.part(slice(a, b))) for a, b in pairwise(cuts)]
     got, want = np.concatenate(parts), by_steps(log, calibration)[~block.frozen]
     shown = got[:, -1] != replay_engine.NOT_SHOWN
     assert 0.2 < np.mean(shown) < 0.999

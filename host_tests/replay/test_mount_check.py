@@ -9,7 +9,7 @@ import command
 import numpy as np
 import pytest
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.calibration.ride.fit import fit_ride
+from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.refusals import RefusedInput, sentence

@@ -7,7 +7,6 @@ import pytest
 import ride_writer
 from kickstand.rides import block as block_format
 from kickstand.rides.block import RideBlock, block_length
-from kickstand_tools.rides import block_reader
 
 
 def some_turns(count):
@@ -44,10 +43,8 @@ def test_the_bytes_of_a_block_are_those_of_format_1(monkeypatch):
 
 def test_a_block_takes_what_fits_and_the_worst_turn_always_does():
     """A turn and a speed of the longest codes: 12 ones and 31 bits for each of the ten numbers, 54 bytes."""
-    body = bytes(80)
     for length in (512, 700):
-        block = RideBlock(5000)
-        block.begin(length, 1, 0, 0, ride_writer.CHIP, 200, body)
+        block = ride_writer.begun(length)
         assert not block.full()
         sign = 1
         written = 0
@@ -56,35 +53,78 @@ def test_a_block_takes_what_fits_and_the_worst_turn_always_does():
             block.add_speed((1 << 24) * (sign > 0))
             block.add([sign * 8 * 32767] * 7, 8, (1 << 29) if sign > 0 else 0)
             written += 1
-        block.close()
-        found = block_reader.parse(bytes(block.buffer[:length]))
+        found = ride_writer.ended(block)
         assert len(found.turns) == written > 3
         assert found.turns[-1].sums == (sign * 8 * 32767,) * 6
         data = bytes(block.buffer[: length - 6])
         assert len(data) - len(data.rstrip(b"\0")) < 60
 
 
+def places(block):
+    return sum(turn.place is not None for turn in block.turns)
+
+
+@pytest.mark.parametrize("length", range(700, 720))
+def test_however_full_a_block_is_the_worst_turn_and_a_position_fit(length):
+    """After quiet turns, each of few bits, every number of a violent one takes the longest code."""
+    quiet = [800] * 7, 8, 40_000
+    count = 0
+    for violent in (False, True):  # first to see how many quiet ones there are, then with the last one violent
+        block = None
+        for sequence in range(2):  # in the first block room was not kept from the beginning
+            block = ride_writer.begun(length, sequence, block)
+            block.add_place(ride_writer.place(0))
+            while not block.full() and (not violent or not sequence or block.count < count - 1):
+                block.add(*quiet)
+        if violent:
+            block.add_speed(1 << 24)
+            block.add_place(ride_writer.place(1))
+            block.add([-32768] * 7, 1, 1 << 29)
+        count = block.count
+        read = ride_writer.ended(block)
+        assert places(read) == 1 + violent
+    assert read.turns[-1].sums == (-32768,) * 6
+    assert {turn.sums for turn in read.turns[:-1]} == {(800,) * 6}
+    assert len(read.turns) == count - 1 > 90
+
+
+def test_the_first_position_of_all_is_left_out_where_no_room_was_kept_for_it():
+    """From then on there is room in each block, however full it is."""
+    block = None
+    for sequence in range(3):
+        block = ride_writer.begun(512, sequence, block)
+        sign = 1
+        while not block.full():
+            sign = -sign
+            block.add_speed((1 << 24) * (sign > 0))
+            if sequence:
+                block.add_place(ride_writer.place(sequence))
+            block.add([sign * 8 * 32767] * 7, 8, (1 << 29) if sign > 0 else 0)
+            if block.full() and not sequence:
+                block.add_place(ride_writer.place(0))
+        read = ride_writer.ended(block)
+        assert places(read) == (len(read.turns) if sequence else 0)
+        assert read.turns[-1].sums == (sign * 8 * 32767,) * 6
+
+
 @pytest.mark.parametrize("count", range(1, 17))
 def test_a_block_may_end_within_any_byte(count):
-    block = RideBlock(5000)
-    block.begin(1024, 1, 0, 0, ride_writer.CHIP, 200, bytes(80))
+    block = ride_writer.begun(1024)
     for turn in some_turns(count):
         block.add(*turn)
-    block.close()
-    found = block_reader.parse(bytes(block.buffer[:1024])).turns
+    found = ride_writer.ended(block).turns
     assert [(turn.sums, turn.n) for turn in found] == [((*s[:3], *s[4:]), n) for s, n, _ in some_turns(count)]
 
 
 def test_a_block_begins_without_anything_of_the_one_before():
     """Each can be read without the others. What is left of a longer one is overwritten with zeros."""
-    first, again = RideBlock(5000), RideBlock(5000)
-    first.begin(4096, 1, 0, 0, ride_writer.CHIP, 200, bytes(80))
+    first, again = ride_writer.begun(4096), RideBlock(5000)
     for turn in some_turns(150):
         first.add_speed(900)
         first.add(*turn)
     first.close()
     for block in (first, again):
-        block.begin(1024, 1, 1, 55, ride_writer.CHIP, 200, bytes(80))
+        ride_writer.begun(1024, 1, block)
         for turn in some_turns(5):
             block.add(*turn)
         block.close()
@@ -99,8 +139,7 @@ def test_the_temperature_is_that_of_the_last_turns_mean():
     block.begin(1024, 1, 0, 0, chip, 200, bytes(80))
     block.add([0, 0, 0, 900, 0, 0, 0], 3, 15_000)
     block.add([0, 0, 0, -303, 0, 0, 0], 3, 15_000)
-    block.close()
-    found = block_reader.parse(bytes(block.buffer[:1024]))
+    found = ride_writer.ended(block)
     assert found.centidegrees == -2525
     assert found.gyro_lsb_tenths == 164
     assert found.delay_tenths_ms == 186

@@ -10,9 +10,7 @@ import pytest
 import ride_writer
 from kickstand import __version__
 from kickstand.rides import ride_paths
-from kickstand_tools.deploy import connection
 from kickstand_tools.logs.reader import read_log
-from serial.tools import list_ports
 
 
 @pytest.fixture
@@ -20,11 +18,7 @@ def board(tmp_path, monkeypatch):
     """A board with the firmware, and no rides yet."""
     (tmp_path / "flash").mkdir()
     (tmp_path / "out").mkdir()
-    board = fake_board.FakeBoard(tmp_path / "flash")
-    pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
-    monkeypatch.setattr(list_ports, "comports", lambda: [pico])
-    monkeypatch.setattr(connection, "Board", lambda name, timeout: board)
-    monkeypatch.setattr(connection, "_RESTART_S", 0)
+    board = fake_board.plug_in(monkeypatch, fake_board.FakeBoard(tmp_path / "flash"))
     monkeypatch.setattr(ride_paths, "directory", lambda _settings: "rides")
     monkeypatch.setattr(ride_paths, "os", board.modules["os"])
     settings = types.SimpleNamespace(VEHICLE="motorcycle")

@@ -15,10 +15,9 @@ import command
 import fake_board
 import pytest
 import ride_writer
-from kickstand_tools.deploy import board_console, connection
+from kickstand_tools.deploy import board_console
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.rides import stream
-from serial.tools import list_ports
 from watched import Watched, watched
 
 
@@ -93,12 +92,8 @@ def streaming(tmp_path, monkeypatch):
     def fit(blocks, end, last=b""):
         board = Streaming(tmp_path)
         board.serial = Stream(blocks, end, last)
-        pico = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
-        monkeypatch.setattr(list_ports, "comports", lambda: [pico])
-        monkeypatch.setattr(connection, "Board", lambda name, timeout: board)
-        monkeypatch.setattr(connection, "_RESTART_S", 0)
         monkeypatch.setattr(board_console, "time", Clocks)
-        return board
+        return fake_board.plug_in(monkeypatch, board)
 
     return fit
 
@@ -230,12 +225,16 @@ def test_an_earlier_recording_is_not_overwritten(name, streaming, tmp_path):
     assert not board.resets
 
 
+def fails(board, error):
+    """The board's next program ends with this."""
+    board.serial.data = b"\x04Traceback (most recent call last):\r\n" + error + b"\r\n\x04>"
+
+
 @pytest.mark.parametrize("arguments", [["record", "--out", "ride.csv"], ["pull"], ["status"]])
 def test_a_board_without_the_firmware_is_told_alike(arguments, streaming, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     board = streaming([], None)
-    absent = b"Traceback (most recent call last):\r\nImportError: no module named 'kickstand'\r\n"
-    board.serial.data = b"\x04" + absent + b"\x04>"
+    fails(board, b"ImportError: no module named 'kickstand'")
     words = "kickstand: Kickstand is not on the board at /dev/ttyACM0: kickstand flash puts it there\n"
     assert command.refused(tmp_path, *arguments) == words
 
@@ -246,11 +245,9 @@ def test_a_board_with_an_older_version_is_told_to_update(arguments, streaming, t
     monkeypatch.chdir(tmp_path)
     board = streaming([], None)
     board.modules["kickstand"] = types.SimpleNamespace(settings=types.SimpleNamespace(load=lambda: None))
-    old = b"Traceback (most recent call last):\r\nImportError: no module named 'kickstand.rides'\r\n"
-    board.serial.data = b"\x04" + old + b"\x04>"
-    command.refused(tmp_path, *arguments, words="of another version or not whole (no module named 'kick")
-    board.serial.data = b"\x04" + old + b"\x04>"
-    command.refused(tmp_path, *arguments, words="kickstand flash brings it up to date")
+    fails(board, b"ImportError: no module named 'kickstand.rides'")
+    words = "of another version or not whole (no module named 'kickstand.rides'): kickstand flash brings it up to date"
+    command.refused(tmp_path, *arguments, words=words)
 
 
 @pytest.mark.parametrize(

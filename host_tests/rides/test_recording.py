@@ -326,6 +326,12 @@ def test_whatever_fails_ends_the_ride_once_with_one_notice(step, error, recorder
     assert isinstance(recorder.problem, Notice)
     assert recorder.take_problem().values == (str(error),)
     assert recorder.take_problem() is None
+    keeper.fails = ""  # the next ride is recorded when it works again
+    start(recorder)
+    add(recorder, 3)
+    recorder.stop()
+    assert recorder.problem is None
+    assert len(blocks(keeper)[-1].turns) == 3
 
 
 def test_a_card_that_is_refused_says_so_itself(recorder, keeper):

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import ride_writer
 from kickstand.rides import block as block_format
-from kickstand.rides.block import RideBlock
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.rides import block_reader, ride_log
 from mpy import run_mpy
@@ -63,75 +62,21 @@ def test_an_older_reader_finds_all_but_the_positions():
         assert [(t.time_us, t.sums, t.n) for t in old] == [(t.time_us, t.sums, t.n) for t in block.turns]
 
 
-def test_a_ride_of_an_older_firmware_has_no_positions():
-    """There the byte was the last one of the version's name, and always 0."""
-    content = ride_writer.blocks(1)[0][0]
-    assert content[42] == 0
-    assert found([block_reader.parse(content)]) == []
-
-
-def changed(k: int, *values: int) -> list:
-    """What a block says whose only position is number k of `values`: date, ms, latitude, longitude."""
-    block = RideBlock(5000)
-    block.begin(1024, 7, 3, 5, ride_writer.CHIP, 200, bytes(80))
+def said(*values: int) -> list:
+    """What a block says whose only position is these: date, ms, latitude, longitude."""
+    block = ride_writer.begun(1024)
     block.add_place(values)
     block.add([0, 0, 8192, 0, 0, 0, 0], 2, 10_000)
-    block.close()
-    return found([block_reader.parse(bytes(block.buffer[:1024]))])
+    return found([ride_writer.ended(block)])
 
 
 def test_a_date_that_is_none_leaves_the_position_and_no_place_on_earth_is_left_out():
     for date in (0, 5, 26 << 9 | 13 << 5 | 1, 26 << 9 | 2 << 5 | 30, 0xFFFF):
-        ((_, (lat, lon, utc_s)),) = changed(0, date, 1000, 6_000_000, -6_000_000)
+        ((_, (lat, lon, utc_s)),) = said(date, 1000, 6_000_000, -6_000_000)
         assert (lat, lon, utc_s) == (1.0, -1.0, None), date
-    assert changed(0, 0, 0, 90 * DEGREE + 1, 0) == []
-    assert changed(0, 0, 0, 0, -180 * DEGREE - 1) == []
-    assert len(changed(0, 0, 0, 90 * DEGREE, -180 * DEGREE)) == 1
-
-
-@pytest.mark.parametrize("length", range(700, 720))
-def test_however_full_a_block_is_the_worst_turn_and_a_position_fit(length):
-    """After quiet turns, each of few bits, every number of a violent one takes the longest code."""
-    quiet = [800] * 7, 8, 40_000
-    count = 0
-    for violent in (False, True):  # first to see how many quiet ones there are, then with the last one violent
-        block = RideBlock(5000)
-        for sequence in range(2):  # in the first block room was not kept from the beginning
-            block.begin(length, 1, sequence, 0, ride_writer.CHIP, 200, bytes(80))
-            block.add_place(ride_writer.place(0))
-            while not block.full() and (not violent or not sequence or block.count < count - 1):
-                block.add(*quiet)
-        if violent:
-            block.add_speed(1 << 24)
-            block.add_place(ride_writer.place(1))
-            block.add([-32768] * 7, 1, 1 << 29)
-        count = block.count
-        block.close()
-        read = block_reader.parse(bytes(block.buffer[:length]))
-        assert len(found([read])) == 1 + violent
-    assert read.turns[-1].sums == (-32768,) * 6
-    assert {turn.sums for turn in read.turns[:-1]} == {(800,) * 6}
-    assert len(read.turns) == count - 1 > 90
-
-
-def test_the_first_position_of_all_is_left_out_where_no_room_was_kept_for_it():
-    """From then on there is room in each block, however full it is."""
-    block = RideBlock(5000)
-    for sequence in range(3):
-        block.begin(512, 1, sequence, 0, ride_writer.CHIP, 200, bytes(80))
-        sign = 1
-        while not block.full():
-            sign = -sign
-            block.add_speed((1 << 24) * (sign > 0))
-            if sequence:
-                block.add_place(ride_writer.place(sequence))
-            block.add([sign * 8 * 32767] * 7, 8, (1 << 29) if sign > 0 else 0)
-            if block.full() and not sequence:
-                block.add_place(ride_writer.place(0))
-        block.close()
-        read = block_reader.parse(bytes(block.buffer[:512]))
-        assert len(found([read])) == (len(read.turns) if sequence else 0)
-        assert read.turns[-1].sums == (sign * 8 * 32767,) * 6
+    assert said(0, 0, 90 * DEGREE + 1, 0) == []
+    assert said(0, 0, 0, -180 * DEGREE - 1) == []
+    assert len(said(0, 0, 90 * DEGREE, -180 * DEGREE)) == 1
 
 
 # A block with positions by MicroPython, in hexadecimal. Lengths of arrays and packing differ between the two.
@@ -158,7 +103,7 @@ def test_both_engines_write_the_same_bytes(capsys):
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
-def test_a_recorded_ride_tells_where_it_was(engine, tmp_path):
+def test_a_recorded_ride_says_where_it_was(engine, tmp_path):
     """From the receiver's wire to the log, ten times a second; the speed of a motorcycle is not even confirmed yet."""
     place = [-33.5, -70.5, -1e-4, 2e-4]
     plan = {

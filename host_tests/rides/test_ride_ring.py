@@ -4,7 +4,6 @@ without an exception."""
 import contextlib
 import io
 import os
-import sys
 import types
 
 import pytest
@@ -13,8 +12,7 @@ from kickstand.rides import flash_ring
 from kickstand.rides.flash_ring import RideRing
 from kickstand.ui import messages
 from kickstand_tools.rides import block_reader
-from kickstand_tools.simulated_board.fakes import fake_machine, fake_os
-from kickstand_tools.simulated_board.simulator import Board
+from kickstand_tools.simulated_board.fakes import fake_os
 
 SETTINGS = types.SimpleNamespace(SD_SPI=None)
 PART = 4  # blocks, so that little has to be recorded
@@ -143,71 +141,3 @@ def test_a_flash_that_is_full_of_other_things_refuses_in_one_line(recorder, flas
     assert messages.lines(recorder.problem) == ("Rec. stopped", "no room")
     assert said.getvalue().count("\n") == 1
     assert found(flash) == {}
-
-
-class Worn:
-    """Files that can be used so many times; then each use fails."""
-
-    def __init__(self, uses):
-        self.uses = uses
-        self.flushed = 0
-
-    def use(self):
-        self.uses -= 1
-        if self.uses < 0:
-            raise OSError(5)
-
-    def open(self, path, mode):
-        self.use()
-        return WornFile(self, open(path, mode))
-
-
-class WornFile:
-    def __init__(self, worn, file):
-        self._worn, self._file = worn, file
-
-    def write(self, data):
-        self._worn.use()
-        return self._file.write(data)
-
-    def flush(self):
-        self._worn.use()
-        self._file.flush()
-        self._worn.flushed += 1
-
-    def close(self):
-        self._file.close()
-        self._worn.use()
-
-
-@pytest.mark.parametrize("uses", [0, 1, 2, 18, 35, 52])
-def test_a_file_system_that_fails_ends_the_ride_and_keeps_what_was_written(recorder, flash, uses, monkeypatch):
-    """Whenever it fails there is one notice and no exception, and the next ride is recorded when it works again."""
-    recorder.keeper, flash.size = RideRing(SETTINGS), 1 << 20
-    worn = Worn(uses)
-    with monkeypatch.context() as patch, contextlib.redirect_stdout(io.StringIO()) as said:
-        patch.setattr(flash_ring, "open", worn.open, raising=False)
-        ride(recorder, flash, 1000)
-    assert said.getvalue().count("\n") == 1
-    assert said.getvalue().startswith("recording stopped")
-    assert messages.lines(recorder.problem) == ("Rec. stopped", "flash fault")
-    assert not recorder.active
-    assert recorder.take_problem() and recorder.take_problem() is None
-    ride(recorder, flash, 2000, seed=1)
-    assert recorder.problem is None
-    parts = {path.parent.name: block_reader.read(path.read_bytes())[0] for path in flash.root.glob("rides/*/*/*.rid")}
-    if uses:  # the ride's directory could be made
-        assert len(parts.pop("01")) >= worn.flushed == (uses - 1) // 17
-    assert [len(blocks) for blocks in parts.values()] == [5]
-
-
-def test_a_card_without_its_driver_is_said_in_one_line(recorder, monkeypatch):
-    monkeypatch.setitem(sys.modules, "machine", fake_machine)
-    monkeypatch.setattr(fake_machine, "board", Board(lambda t_s: (0, 0, 1, 0, 0, 0)), raising=False)  # it has the pins
-    recorder.keeper = RideRing(types.SimpleNamespace(SD_SPI=0, SD_SCK=18, SD_MOSI=19, SD_MISO=16, SD_CS=17))
-    with contextlib.redirect_stdout(io.StringIO()) as said:
-        recorder.start(ride_writer.CHIP, ride_writer.calibration())
-    assert said.getvalue().endswith("its driver is not on the board: mpremote mip install sdcard\n")
-    assert said.getvalue().count("\n") == 1
-    assert messages.lines(recorder.problem) == ("SD card:", "no driver")
-    assert not recorder.active

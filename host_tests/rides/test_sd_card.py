@@ -57,28 +57,28 @@ def test_without_a_card_nothing_waits_for_one(tmp_path):
 
 def test_a_card_that_is_busy_as_cards_may_be_loses_nothing(tmp_path):
     """For 250 ms at each block, which is written every eight seconds: the chip's FIFO lasts longer."""
-    record = run(tmp_path, **{"card faults": [[5.0 + 8.0 * i, "busy_next_s", 0.25] for i in range(4)]})
+    record = run(tmp_path, {"faults": [[5.0 + 8.0 * i, "busy_next_s", 0.25] for i in range(4)]})
     assert len(blocks(record)) >= 3
     assert missing_s(record) == []
     assert leans_on(record, 9)
 
 
-def test_what_a_card_loses_that_is_busy_after_each_sector_is_told(tmp_path):
-    record = run(tmp_path, **{"card faults": [[3.0, "busy_s", 0.25]]})
+def test_what_a_card_loses_that_is_busy_after_each_sector_is_said(tmp_path):
+    record = run(tmp_path, {"faults": [[3.0, "busy_s", 0.25]]})
     assert len(blocks(record)) >= 2
     assert len(missing_s(record)) >= 2
     assert leans_on(record, 12)
 
 
-def test_data_that_the_card_rejects_end_the_ride_and_are_told(tmp_path):
-    record = run(tmp_path, **{"card faults": [[10.0, "rejects", 1]]})
+def test_data_that_the_card_rejects_end_the_ride_and_are_said(tmp_path):
+    record = run(tmp_path, {"faults": [[10.0, "rejects", 1]]})
     assert 10 < record.first("card fault") < 18
     assert blocks(record)
     assert leans_on(record, 20)
 
 
 def test_a_card_that_stays_busy_ends_the_ride_and_nothing_restarts(tmp_path):
-    record = run(tmp_path, **{"card faults": [[10.0, "stuck", True]]})
+    record = run(tmp_path, {"faults": [[10.0, "stuck", True]]})
     assert 10 < record.first("card fault") < 19
     assert leans_on(record, 20)
     assert blocks(record)
@@ -86,8 +86,7 @@ def test_a_card_that_stays_busy_ends_the_ride_and_nothing_restarts(tmp_path):
 
 def test_a_card_whose_room_must_be_counted_is_counted_before_the_watchdog_runs(tmp_path):
     """Its FSINFO is not valid, and reading its whole FAT takes longer than the watchdog waits."""
-    card = {"sectors": 1 << 24, "read_s": 0.006}
-    record = run(tmp_path, card, fsinfo=False, until=45)
+    record = run(tmp_path, {"sectors": 1 << 24, "read_s": 0.006, "fsinfo": False}, until=45)
     assert record.first("SD card") < 1.0
     assert record.first("Raw   20°") < 30
     assert record.ends == ["off"]
@@ -95,25 +94,26 @@ def test_a_card_whose_room_must_be_counted_is_counted_before_the_watchdog_runs(t
 
 
 @pytest.mark.parametrize(
-    ("card", "plan"),
+    "card",
     [
-        ({"init_s": None}, {}),  # the driver waits 5 s for it
-        ({"init_s": 4.5}, {"formatted": False}),
-        ({"driver": False}, {}),
-        ({}, {"card faults": [[0.0, "rejects", 1000]]}),
+        {"init_s": None},  # the driver waits 5 s for it
+        {"init_s": 4.5, "formatted": False},
+        {"driver": False},
+        {"faults": [[0.0, "rejects", 1000]]},
     ],
     ids=["never ready", "no file system", "no driver", "rejects all"],
 )
-def test_a_card_that_cannot_be_used_is_told_and_nothing_restarts(card, plan, tmp_path):
-    record = run(tmp_path, card, **plan)
+def test_a_card_that_cannot_be_used_is_said_and_nothing_restarts(card, tmp_path):
+    record = run(tmp_path, card)
     assert record.first("No SD card|SD card:") < 12
     assert leans_on(record, 20)
     assert record.console.count("SD card: ") in (1, 2)
+    assert ("its driver is not on the board: mpremote mip install sdcard" in record.console) is ("driver" in card)
     assert not blocks(record)
 
 
 def test_a_card_that_failed_at_the_start_is_not_waited_for_again(tmp_path):
-    """The driver waits for seconds, in which the lean would stand. So it is told, also for a press that asks for it."""
+    """The driver waits for seconds, in which the lean would stand. So it is said, also for a press that asks for it."""
     menu = [[14, 1.2], *([16 + i, 0.15] for i in range(4)), [21, 1.2]]
     plan = {"config": {**PINS, "RECORD": False}, "presses": menu, "lean": [[0, 0], [23, 20]]}
     record = run(tmp_path, {"init_s": None}, **plan)

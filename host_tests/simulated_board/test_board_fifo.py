@@ -60,16 +60,6 @@ def test_the_frame_is_what_fifo_en_says():
     assert frame == read(chip, 0x3B, 14)
 
 
-def test_an_mpu6886_puts_the_temperature_in():
-    clock, chip = filling(0x19)
-    clock.advance(5000)
-    assert waiting(chip) == 5 * 14
-    assert read(chip, 0x74, 14)[4:6] == [0x40, 0x00]
-    clock, chip = filling(0x19, fifo_en=0x08)
-    clock.advance(5000)
-    assert waiting(chip) == 5 * 8
-
-
 def test_the_count_is_latched_by_its_high_byte():
     clock, chip = filling()
     clock.advance(30_000)

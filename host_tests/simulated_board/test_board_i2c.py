@@ -240,18 +240,3 @@ def test_a_reset_in_the_middle_of_a_read_hangs_the_bus():
     assert outcome == "reset"
     assert board.sensor_bus.sda_level() == 0 and board.lcd_bus.sda_level() == 1
     assert board.clock.now_us == 1000
-
-
-@firmware()
-def test_the_button_pin_and_plain_pins(board):
-    button = Pin(15, Pin.IN, Pin.PULL_UP)
-    assert button.value() == 1 and button() == 1
-    board.button.closed = True
-    assert button.value() == 0
-    assert Pin(20, Pin.IN).value() == 0
-    led = Pin(25, Pin.OUT, value=1)
-    assert led.value() == 1
-    led.off()
-    assert led() == 0
-    led(1)
-    assert Pin(25).value() == 1

@@ -2,9 +2,9 @@
 
 from kickstand_tools.simulated_board import glyphs
 from kickstand_tools.simulated_board.clock import Clock
-from kickstand_tools.simulated_board.lcd import CLEAR_US, COMMAND_US, DATA_US, POWER_UP_US, Lcd
+from kickstand_tools.simulated_board.lcd import CLEAR_US, POWER_UP_US, Lcd
 
-RS, RW, E, LIGHT = 0x01, 0x02, 0x04, 0x08
+RS, E, LIGHT = 0x01, 0x04, 0x08
 PORT_US = 90  # a byte at 100 kHz
 
 
@@ -97,30 +97,6 @@ def test_clear():
     assert lcd.text()[0].startswith("xy"), "clear also sets left to right"
 
 
-def test_data_and_commands_keep_it_busy():
-    lcd = ready()
-    for value, rs, busy_us in ((0x80, 0, COMMAND_US), (ord("a"), RS, DATA_US)):
-        lcd.clock.advance(1000)
-        nibble(lcd, value, rs)
-        lcd.write_byte(value << 4 & 0xF0 | rs | E)
-        lcd.write_byte(value << 4 & 0xF0 | rs)
-        lcd.clock.advance(busy_us - 1)
-        assert busy(lcd)
-        lcd.clock.advance(1)
-        assert not busy(lcd)
-
-
-def busy(lcd):
-    """The busy flag as a driver reads it, without time passing."""
-    lcd.write_byte(0xF0 | RW)
-    lcd.write_byte(0xF0 | RW | E)
-    flag = lcd.read_byte() & 0x80
-    lcd.write_byte(0xF0 | RW)
-    lcd.write_byte(0xF0 | RW | E)
-    lcd.write_byte(0xF0 | RW)
-    return bool(flag)
-
-
 def test_nibbles_out_of_step_garble_and_the_initialisation_heals():
     lcd = ready()
     write(lcd, 0, "hello")
@@ -152,18 +128,6 @@ def test_own_characters():
     assert lcd.glyphs[2] == "\u258d"
 
 
-def test_changes_count_what_can_be_seen():
-    lcd = ready()
-    write(lcd, 0, "abc")
-    before = lcd.changes
-    write(lcd, 0, "abc")
-    assert lcd.changes == before
-    write(lcd, 0, "abd")
-    assert lcd.changes == before + 1
-    lcd.write_byte(0)
-    assert lcd.changes == before + 2 and not lcd.backlight
-
-
 def test_patterns_as_text():
     def column(bits):
         return [bits] * 8
@@ -177,9 +141,3 @@ def test_patterns_as_text():
     assert glyphs.drawn([0] + [0x1C] * 6 + [0]) == "\u258b"
     assert glyphs.drawn(column(0x04)) == "|"
     assert glyphs.drawn([0x04, 0x0E, 0x15, 0x04, 0x04, 0x04, 0x04, 0x00]) == "?"
-
-
-def test_rom_a00():
-    assert [glyphs.rom(c) for c in (0xDF, 0x7E, 0x7F, 0xFF, 0x41, 0x20, 0x5C)] == [
-        "\u00b0", "\u2192", "\u2190", "\u2588", "A", " ", "\u00a5",
-    ]  # fmt: skip

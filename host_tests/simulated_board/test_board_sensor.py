@@ -50,23 +50,6 @@ def test_asleep_after_power_on():
     assert counts(chip) == [0] * 7
 
 
-def test_writes_during_start_up_are_lost():
-    clock = Clock()
-    chip = Mpu6050(clock, level)
-    clock.advance(START_UP_US - 1)
-    write(chip, 0x6B, 0x01)
-    assert read(chip, 0x6B)[0] & 0x40
-    clock.advance(1)
-    write(chip, 0x6B, 0x01)
-    assert read(chip, 0x6B) == [0x01]
-    clock.advance(WAKE_US - 1)
-    write(chip, 0x1B, 0x08)
-    assert read(chip, 0x1B) == [0]
-    clock.advance(1)
-    write(chip, 0x1B, 0x08)
-    assert read(chip, 0x1B) == [0x08]
-
-
 def test_reset_takes_time_and_forgets_everything():
     clock, chip = awake()
     write(chip, 0x1B, 0x18)
@@ -101,17 +84,6 @@ def test_ranges_and_saturation():
     assert counts(chip)[6] == -32768
 
 
-def test_temperature_formula_of_each_family():
-    for who_am_i, slope, zero in (
-        (0x68, 340.0, 36.53),
-        (0x70, 333.87, 21.0),
-        (0x98, 326.8, 25.0),
-        (0x19, 326.8, 25.0),
-    ):
-        _, chip = awake(lambda t_s: (0, 0, 1, 0, 0, 0, 40.0), who_am_i)
-        assert abs(counts(chip)[3] / slope + zero - 40.0) < 0.002
-
-
 def test_sample_rate():
     for div, dlpf, period_us in (
         (0, 3, 1000),
@@ -132,19 +104,6 @@ def test_sample_rate():
                 times.append(clock.now_us)
         assert len(times) == 4, (div, dlpf, times)
         assert times[3] - times[0] == 3 * period_us
-
-
-def test_data_hold_between_samples():
-    clock, chip = awake(ramp, div=19)
-    clock.advance(20_000)
-    first = counts(chip)
-    changes = 0
-    for _ in range(40):  # 80 ms: four samples of 20 ms
-        clock.advance(2000)
-        now = counts(chip)
-        changes += now != first
-        first = now
-    assert changes == 4
 
 
 def test_a_clock_error_moves_the_samples():
@@ -180,31 +139,3 @@ def test_the_low_pass_delays():
         clock.advance(1_000_000)
         sampled_us = clock.now_us - clock.now_us % 1000  # START_UP_US and WAKE_US are whole milliseconds
         assert abs(counts(chip)[0] - (sampled_us - delay_us) * 16384 / 1e6) <= 0.5
-
-
-def test_auto_increment_writes_and_read_only_registers():
-    _, chip = awake()
-    write(chip, 0x19, 1, 2, 0x08, 0x10)
-    assert read(chip, 0x19, 5) == [1, 2, 0x08, 0x10, 0]
-    for register in (0x3A, 0x72, 0x73, 0x75):
-        before = read(chip, register)
-        write(chip, register, 0xA5)
-        assert read(chip, register) == before
-    write(chip, 0x3B, 0xA5)
-    assert read(chip, 0x3B) == [0]
-
-
-def test_register_1d_only_where_the_family_has_it():
-    for who_am_i in VARIANTS:
-        _, chip = awake(who_am_i=who_am_i)
-        write(chip, 0x1D, 0x03)
-        assert read(chip, 0x1D) == [0 if who_am_i == 0x68 else 3]
-
-
-def test_frozen_data_are_the_last_before_the_dip():
-    clock, chip = awake(ramp, div=0)
-    clock.advance(1_000_000)
-    dip_s = clock.now_us / 1e6
-    chip.supply_dip("frozen")
-    clock.advance(500_000)
-    assert abs(counts(chip)[0] / 16384 - dip_s) < 0.01

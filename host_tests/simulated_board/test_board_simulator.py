@@ -82,15 +82,6 @@ def test_the_watchdog_can_be_stopped_by_its_register_and_ends_with_the_run():
     board.clock.advance(5_000_000)
 
 
-def test_the_watchdog_of_rp2_has_a_limit():
-    def firmware(board):
-        WDT(timeout=8388)
-        assert isinstance(raised(lambda: WDT(timeout=8389)), ValueError)
-
-    assert on_board(firmware)[0] == "returned"
-    assert on_board(lambda board: WDT(timeout=3_600_000), port="esp32")[0] == "returned"
-
-
 def test_the_watchdog_of_an_esp32_counts_in_32_bits():
     def wait(days):
         WDT(timeout=days * 86_400_000)
@@ -127,23 +118,6 @@ def test_a_press_bounces_and_then_holds(board):
     assert levels(board, 510_000)[0][1] == 0
 
 
-def test_a_capacitor_at_the_button_is_charged_by_the_pull_up():
-    seen = []
-
-    def firmware(board):
-        fake_time.sleep_ms(20)
-        pin = Pin(15, Pin.IN, Pin.PULL_UP)
-        for _ in range(3):
-            seen.append(pin())
-            fake_time.sleep_ms(4)
-            pin = Pin(15, Pin.IN, Pin.PULL_UP)
-
-    with Board(level) as board:
-        board.button.charge_us = 7000
-        board.run(lambda: firmware(board), 1.0)
-    assert seen == [0, 0, 1]
-
-
 def test_a_button_held_at_power_up():
     def firmware(board):
         fake_time.sleep_ms(10)
@@ -153,15 +127,6 @@ def test_a_button_held_at_power_up():
     board.press(0.0, 2.0)
     with board:
         assert board.run(lambda: firmware(board), 1.0) == "returned"
-
-
-@firmware()
-def test_at_and_every(board):
-    seen = []
-    board.at(0.25, lambda: seen.append("at"))
-    board.every(0.1, lambda: seen.append(board.clock.now_us))
-    fake_time.sleep_ms(350)
-    assert seen == [100_000, 200_000, "at", 300_000]
 
 
 @firmware()
@@ -192,29 +157,6 @@ def test_installed_and_gone_again():
     after = __import__("time")
     assert after.time() > 1_000_000_000, "the host's own time is back"
     assert sys.implementation.name == "micropython" or not hasattr(after, "ticks_us")
-
-
-def test_the_world_is_asked_once_a_sample():
-    times = []
-
-    def world(t_s):
-        times.append(t_s)
-        return (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-
-    def firmware(board):
-        i2c = fake_machine.I2C(0, sda=4, scl=5)
-        fake_time.sleep_ms(100)
-        i2c.writeto_mem(0x68, 0x6B, b"\x01")
-        fake_time.sleep_ms(60)
-        i2c.writeto_mem(0x68, 0x19, b"\x09\x03")
-        del times[:]
-        start = board.clock.now_us
-        while board.clock.now_us < start + 1_000_000:
-            i2c.readfrom_mem_into(0x68, 0x3B, bytearray(14))
-
-    on_board(firmware, 10.0, world=world)
-    assert 100 <= len(times) <= 102
-    assert times == sorted(times)
 
 
 def test_a_press_during_a_long_press_comes_after_it():

@@ -10,17 +10,13 @@ MOUNT = "/sd"
 READER = "/reader"  # as a computer has it
 
 
-def format_card(board, plan):
-    """With a FAT file system; with "fsinfo" False in the plan nothing says how much of it is free."""
-    card = board.card
-    os.VfsFat.mkfs(card)
-    if not plan.get("fsinfo", True):
+def format_card(card, formatted=True, fsinfo=True):
+    """With a FAT file system; without fsinfo nothing says how much of it is free."""
+    if formatted:
+        os.VfsFat.mkfs(card)
+    if not fsinfo:
         for number in [number for number, content in card.data.items() if content.startswith(b"RRaA")]:
             del card.data[number]
-    if plan.get("formatted") is False:
-        card.data.clear()
-    for at_s, attribute, value in plan.get("card faults", []):
-        board.at(at_s, lambda attribute=attribute, value=value: setattr(card, attribute, value))
 
 
 def eject():

@@ -57,112 +57,134 @@ def remounted(world, motion, seed, at_s, mounting_seed):
     return lambda t_s: world(t_s) if t_s < at_s else later(t_s)
 
 
+class Device:
+    """The whole device on a simulated board. What will happen to it is said first, by the board's own methods and
+    those below; then it runs."""
+
+    def __init__(self, world, **fitted):
+        """world(t_s): what the sensor measures. fitted: arguments of Board."""
+        self.board = Board(world, **fitted)
+        self.frames, self.ends = [], []
+
+    def fit_speed(self, source, ride, place=None, **model):
+        """A "gps" or "wheel" that measures the speed of the ride. place: [latitude, longitude, degrees north a second,
+        degrees east a second]."""
+        if place:
+            model["place"] = lambda t_s: (place[0] + place[2] * t_s, place[1] + place[3] * t_s)
+        getattr(self.board, "fit_" + source)(lambda t_s: ride.truth(t_s)[1], **model)
+
+    def fit_card(self, formatted=True, fsinfo=True, faults=(), **model):
+        """An SD card, as cards.format_card() leaves it. faults: [[at_s, attribute, value], ...]."""
+        self.board.fit_card(**model)
+        cards.format_card(self.board.card, formatted, fsinfo)
+        for at_s, attribute, value in faults:
+            self.board.at(at_s, lambda attribute=attribute, value=value: setattr(self.board.card, attribute, value))
+
+    def run(self, config, off_s, streams=False):
+        """Run the firmware with these settings; after each of the times off_s its power is switched off and on again.
+        streams: as `kickstand record` starts it."""
+        self.board.every(FRAME_S, self._watch)
+        self.board.install()
+        before = take_firmware() if self.board.poses else {}  # it needs firmware that is imported on it
+        try:
+            from kickstand import settings, start
+
+            load = settings.load
+            settings.load = lambda: settings.Settings(_config(config))
+            for until_s in off_s:
+                self._run_until(until_s, _stream if streams else start.main)
+            settings.load = load
+            if self.ends[-1] == "returned":  # with power on: what it leaves on the display
+                self._watch()
+        finally:
+            self.board.uninstall()
+            if self.board.poses:
+                take_firmware()
+                sys.modules.update(before)
+
+    def record(self):
+        """What was seen, as JSON can hold it."""
+        board = self.board
+        seen = {"frames": self.frames, "ends": self.ends, "last": self.frames[-1][1:], "too_fast": board.too_fast}
+        seen["touched"] = sorted(board.touched)
+        if board.card:
+            seen["rides"], seen["card_hz"] = cards.rides(board), board.card.most_hz
+        return seen
+
+    def _run_until(self, until_s, main):
+        end = "reset"
+        while end == "reset":
+            cards.eject()
+            end = self.board.run(main, until_s)
+            self.ends.append(end)
+
+    def _watch(self):
+        text = list(self.board.lcd.text())
+        if not self.frames or self.frames[-1][1:] != text:
+            self.frames.append([self.board.clock.now_us / 1e6] + text)
+
+
+def _config(settings):
+    """A module config.py with these settings; JSON has no tuples."""
+    values = {name: tuple(value) if isinstance(value, list) else value for name, value in settings.items()}
+    return type("Config", (), values)
+
+
+def _stream():
+    from kickstand import devices, settings
+    from kickstand.app import App
+    from kickstand.rides.usb_stream import RideStream
+
+    chosen = settings.load()
+    App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen), RideStream()).run()
+
+
 def take_firmware():
     """Forget the firmware's modules that are imported, and return them by name."""
     names = [name for name in sys.modules if name.split(".")[0] == "kickstand"]
     return {name: sys.modules.pop(name) for name in names}
 
 
+def _world(plan):
+    """world(t_s) of a plan, and its ride, if it has one."""
+    seed = plan.get("seed")
+    if "poses" in plan:
+        return poses_of(seed, plan["poses"]), None
+    ride, motion = None, standing(plan.get("lean", [[0, 0]]))
+    if "ride" in plan:
+        kind = script.CarRide if plan.get("config", {}).get("VEHICLE") == "car" else script.Ride
+        ride = kind([getattr(script, name)(*more) for name, *more in plan["ride"]])
+        motion = ride.motion
+    part = sensor_errors.Sensor(seed=seed)
+    part.temp_c = plan.get("temp_c", 25.0)
+    world = part.world(motion)
+    if "remount" in plan:
+        world = remounted(world, motion, seed, *plan["remount"])
+    return world, ride
+
+
 def run_device(plan):
-    """Run a plan. Returns the display's frames [[t_s, line1, line2], ...] as they changed, the last of them, and how
-    each boot ended.
+    """Device.record() of a run that is described as data, so that it can be sent to another process.
 
     plan: "until" (s); "lean" as for standing(), or "ride" [[name of a function in rides, arguments...], ...],
     or "poses" as for poses_of; "seed" of the part (None: perfect); its "temp_c"; "presses" [[at_s, for_s], ...];
     "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...];
-    "gps" or "wheel" arguments of the models, which are told the speed of the ride, the first also its "place":
-    [latitude, longitude, degrees north a second, degrees east a second]; config "VEHICLE" "car": the ride
-    is a car's; "remount" [at_s, seed of the mounting from then on]; "stream" True: as `kickstand record` starts it;
-    "card" arguments of the model of an SD card, which is formatted, and whose content is returned as "rides"; "card
-    faults" [[at_s, attribute, value], ...].
+    "gps", "wheel" and "card": arguments of Device's methods; config "VEHICLE" "car": the ride is a car's; "remount"
+    [at_s, seed of the mounting from then on]; "stream" True: as `kickstand record` starts it.
     """
-    seed = plan.get("seed")
-    ride = None
-    if "poses" in plan:
-        world = poses_of(seed, plan["poses"])
-    else:
-        if "ride" in plan:
-            kind = script.CarRide if plan.get("config", {}).get("VEHICLE") == "car" else script.Ride
-            ride = kind([getattr(script, name)(*more) for name, *more in plan["ride"]])
-            motion = ride.motion
-        else:
-            motion = standing(plan.get("lean", [[0, 0]]))
-        part = sensor_errors.Sensor(seed=seed)
-        part.temp_c = plan.get("temp_c", 25.0)
-        world = part.world(motion)
-        if "remount" in plan:
-            world = remounted(world, motion, seed, *plan["remount"])
-    board = Board(world, **plan.get("board", {}))
+    world, ride = _world(plan)
+    device = Device(world, **plan.get("board", {}))
     for source in ("gps", "wheel"):
         if ride and source in plan:
-            more = dict(plan[source])
-            if "place" in more:
-                more["place"] = lambda t_s, p=more["place"]: (p[0] + p[2] * t_s, p[1] + p[3] * t_s)
-            getattr(board, "fit_" + source)(lambda t_s, ride=ride: ride.truth(t_s)[1], **more)
+            device.fit_speed(source, ride, **plan[source])
     if "card" in plan:
-        board.fit_card(**plan["card"])
-        cards.format_card(board, plan)
+        device.fit_card(**plan["card"])
     for at_s, for_s in plan.get("presses", []):
-        board.press(at_s, for_s)
+        device.board.press(at_s, for_s)
     for method, arguments in plan.get("faults", []):
-        getattr(board.faults, method)(*arguments)
-    frames = []
-
-    def watch():
-        text = board.lcd.text()
-        if not frames or frames[-1][1:] != list(text):
-            frames.append([board.clock.now_us / 1e6] + list(text))
-
-    board.every(FRAME_S, watch)
-    board.install()
-    ends = []
-    before = take_firmware() if board.poses else {}  # it needs firmware that is imported on it
-    try:
-        from kickstand import devices, settings, start
-        from kickstand.app import App
-        from kickstand.rides.usb_stream import RideStream
-        from kickstand.settings import Settings
-
-        class Config:
-            pass
-
-        for name, value in plan.get("config", {}).items():
-            setattr(Config, name, tuple(value) if isinstance(value, list) else value)
-
-        def stream():
-            chosen = settings.load()
-            App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen), RideStream()).run()
-
-        main = stream if "stream" in plan else start.main
-        load = settings.load
-        settings.load = lambda: Settings(Config)
-        for until_s in plan.get("power", []) + [plan["until"]]:
-            end = "reset"
-            while end == "reset":
-                cards.eject()
-                end = board.run(main, until_s)
-                ends.append(end)
-        if ends[-1] == "returned":  # with power on: what stays on the display
-            watch()
-        settings.load = load
-        if ends[-1] == "returned":  # what it leaves on the display
-            watch()
-    finally:
-        board.uninstall()
-        if board.poses:
-            take_firmware()
-            sys.modules.update(before)
-    answer = {
-        "frames": frames,
-        "ends": ends,
-        "last": frames[-1][1:],
-        "too_fast": board.too_fast,
-        "touched": sorted(board.touched),
-    }
-    if board.card:
-        answer["rides"] = cards.rides(board)
-        answer["card_hz"] = board.card.most_hz
-    return answer
+        getattr(device.board.faults, method)(*arguments)
+    device.run(plan.get("config", {}), plan.get("power", []) + [plan["until"]], "stream" in plan)
+    return device.record()
 
 
 if __name__ == "__main__":

@@ -9,8 +9,21 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import pytest
+from kickstand_tools.deploy import board_console, connection
 from kickstand_tools.deploy.bytecode import PICO
 from mpremote.transport import Transport, TransportError, TransportExecError
+from serial.tools import list_ports
+
+PICO_PORT = types.SimpleNamespace(device="/dev/ttyACM0", vid=0x2E8A, pid=0x0005)
+
+
+def plug_in(monkeypatch: pytest.MonkeyPatch, board: Any) -> Any:
+    """Make a board, which is returned, the only one that is plugged in, and let it restart at once."""
+    monkeypatch.setattr(list_ports, "comports", lambda: [PICO_PORT])
+    monkeypatch.setattr(connection, "Board", lambda name, timeout: board)
+    monkeypatch.setattr(connection, "_RESTART_S", 0)
+    return board
 
 
 class FakeBoard(Transport):
@@ -46,6 +59,10 @@ class FakeBoard(Transport):
             return __import__(name, *rest)
 
         self._globals = {"__builtins__": vars(builtins) | {"__import__": imports, "open": self._open}}
+
+    def wait(self, seconds: float) -> None:
+        """By the clock that a test may have given the tools."""
+        board_console.time.sleep(seconds)
 
     def enter_raw_repl(self, soft_reset: bool = True, timeout_overall: int = 10) -> None:
         if not self.answers:

@@ -173,12 +173,11 @@ def test_the_sensor_page_counts_gaps_starts_and_lost_samples():
     calibration = types.SimpleNamespace(six_done=True, aligned=False)
     shown = meter(reading=[1, 2, 3, 285, 5, 6, 7], calibration=calibration)
     sensor = types.SimpleNamespace(chip=chip, restarts=1)
-    app = types.SimpleNamespace(sensor=sensor, meter=shown, clock=types.SimpleNamespace(lost=0))
-    seen = [pages.sensor_info(app, seconds) for seconds in range(7)]
+    seen = [pages.sensor_info(sensor, 0, shown, seconds) for seconds in range(7)]
     assert {line1 for line1, _ in seen} == {f"MPU6050   28.5{DEGREE}C"}
     words = ["6pos yes ali no", "3 gaps 1 starts", "samples lost   0"]
     assert [line2 for _, line2 in seen] == [words[seconds // 2 % 3] for seconds in range(7)]
-    chip.overflows, sensor.restarts, app.clock.lost, chip.name = 12345, 678, 123456, "MPU6050 clone"
-    assert pages.sensor_info(app, 2)[1] == "99 gaps 9 starts"
-    assert pages.sensor_info(app, 4)[1] == "samples lost9999"
-    assert pages.sensor_info(app, 0)[0] == f"MPU6050 c 28.5{DEGREE}C"
+    chip.overflows, sensor.restarts, chip.name = 12345, 678, "MPU6050 clone"
+    assert pages.sensor_info(sensor, 123456, shown, 2)[1] == "99 gaps 9 starts"
+    assert pages.sensor_info(sensor, 123456, shown, 4)[1] == "samples lost9999"
+    assert pages.sensor_info(sensor, 123456, shown, 0)[0] == f"MPU6050 c 28.5{DEGREE}C"

@@ -9,22 +9,10 @@ from kickstand_tools.simulated_board.simulator import Board
 SHORT, LONG = 1, 2  # as in board/button.py
 
 
-class Recorder:
-    """Records nothing."""
-
-    active = False
-    problem = None
-
-    def take_problem(self):
-        problem, self.problem = self.problem, None
-        return problem
-
-
 class Drive:
     """Alignment by driving that has a question, until it is answered."""
 
     shown = False
-    speed = types.SimpleNamespace(take_problem=lambda: None)
 
     def __init__(self):
         self.message = None
@@ -36,32 +24,28 @@ class Drive:
 
 
 @pytest.fixture
-def app():
-    """An aligned motorcycle's App, as far as the screen asks it."""
-    settings = types.SimpleNamespace(VEHICLE="motorcycle", SAMPLE_HZ=200, SIDE="left")
-    chip = types.SimpleNamespace(accel_lsb_per_g=4096, gyro_lsb_per_dps=65.5, SATURATED=32700)
-    meter = types.SimpleNamespace(fallen=False, trusted=True, lean_deg=12.0, doubt=None, reset_maxima=lambda: None)
-    meter.max_left_deg = meter.max_right_deg = 0.0
-    return types.SimpleNamespace(
-        settings=settings,
-        sensor=types.SimpleNamespace(chip=chip, fault=None),
-        meter=meter,
-        calibration=types.SimpleNamespace(aligned=True, value=None),
-        drive=Drive(),
-        late=False,
-        recorder=Recorder(),
-        recording=False,
-        prepare_recorder=lambda: None,
-    )
+def drive():
+    return Drive()
 
 
 @pytest.fixture
-def screen(app):
-    """Its Screen, on a simulated board, for MicroPython's clock."""
+def sensor():
+    chip = types.SimpleNamespace(accel_lsb_per_g=4096, gyro_lsb_per_dps=65.5, SATURATED=32700)
+    return types.SimpleNamespace(chip=chip, fault=None)
+
+
+@pytest.fixture
+def screen(sensor, drive):
+    """An aligned motorcycle's Screen, on a simulated board, for MicroPython's clock."""
+    meter = types.SimpleNamespace(fallen=False, trusted=True, lean_deg=12.0, suppressed_reason=None)
+    meter.max_left_deg = meter.max_right_deg = 0.0
+    calibration = types.SimpleNamespace(aligned=True, value=None)
+    rides = types.SimpleNamespace(recorder=types.SimpleNamespace(active=False))
+    settings = types.SimpleNamespace(leans=True, SAMPLE_HZ=200, SIDE="left")
     with Board(lambda t_s: (0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 25.0)):
         from kickstand.ui.screen import Screen
 
-        yield Screen(app)
+        yield Screen(settings, sensor, None, meter, calibration, drive, rides)
 
 
 def first_line(screen, now_ms):
@@ -88,26 +72,26 @@ def test_a_menu_that_is_left_is_gone_at_once(screen):
     assert first_line(screen, 700).startswith("Lean")
 
 
-def test_a_press_is_for_what_a_notice_covers(app, screen):
-    app.recorder.problem = Notice("out-of-room", "28")
+def test_a_press_is_for_what_a_notice_covers(screen):
+    screen.notify(Notice("out-of-room", "28"), 0)
     assert screen.lines(0) == ("Rec. stopped", "no room")
     screen.press(SHORT, 100)
     assert first_line(screen, 100).startswith("Max left")
 
 
-def test_a_question_under_a_notice_is_not_answered_unread(app, screen):
-    app.recorder.problem = Notice("out-of-room", "28")
-    app.drive.message = Notice("other-side")
+def test_a_question_under_a_notice_is_not_answered_unread(drive, screen):
+    screen.notify(Notice("out-of-room", "28"), 0)
+    drive.message = Notice("other-side")
     assert screen.lines(0)[0] == "Rec. stopped"
     screen.press(LONG, 100)
-    assert app.drive.answers == []
+    assert drive.answers == []
     assert first_line(screen, 100) == "Side was wrong?"
     screen.press(LONG, 200)
-    assert app.drive.answers == [True]
+    assert drive.answers == [True]
 
 
-def test_a_fault_is_before_the_pages_and_the_menu_before_the_fault(app, screen):
-    app.sensor.fault = Notice("sensor-lost")
+def test_a_fault_is_before_the_pages_and_the_menu_before_the_fault(sensor, screen):
+    sensor.fault = Notice("sensor-lost")
     assert screen.lines(0) == ("Sensor lost", "check wiring")
     screen.press(SHORT, 100)
     screen.press(LONG, 200)
@@ -115,5 +99,5 @@ def test_a_fault_is_before_the_pages_and_the_menu_before_the_fault(app, screen):
     screen.press(LONG, 300)
     assert screen.wizard is None
     assert screen.lines(300) == ("Sensor lost", "check wiring")
-    app.sensor.fault = None
+    sensor.fault = None
     assert first_line(screen, 2400).startswith("Lean")

@@ -4,6 +4,7 @@ steered as a person would, and what was to be seen is shown to the page's own gu
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 from kickstand.errors import Refusal
@@ -52,21 +53,7 @@ print("\\n" + json.dumps(told))
 """
 
 # As tell() in main.mjs
-LOOK = """async (ticks) => {
-  const { Guide } = await import("./guide.mjs");
-  const { shows } = await import("./shows.mjs");
-  const guide = new Guide();
-  let display = { text: ["", ""], shown_deg: null }, words = null, step = null, dark = false;
-  return ticks.map((tick) => {
-    display = tick.display ?? display;
-    words = shows(display.text)?.words ?? words;
-    if (!tick.powered && !dark) guide.dark(tick.cut);
-    dark = !tick.powered;
-    const standing = tick.phase === tick.pose;
-    step = guide.next(display.text, display.shown_deg, tick.pose, standing, { ...tick, time: tick.t_s }) ?? step;
-    return [tick.stage, words, step.number, step.text, step.action?.[1] ?? ""];
-  });
-}"""
+LOOK = Path(__file__).with_name("guide_steps.js").read_text()
 
 SHORT, LONG = ("press", 0.15), ("press", 1.2)
 STAND, UPRIGHT, RIDE = ("pose", "kickstand"), ("pose", "upright"), ("pose", 15.0)

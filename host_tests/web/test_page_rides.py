@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from command import works
 from kickstand_tools.analysis.overview import overview
-from kickstand_tools.analysis.plot import charts
+from kickstand_tools.analysis.plot import charts, interactive
 from kickstand_tools.analysis.ride import open_ride
 from rider import LAPTOP, MISSING, PHONE, Rider
 from rides_page import WAIT_MS, Rides, assert_near, near
@@ -40,7 +40,7 @@ def test_the_report_is_that_of_the_command(page, ride, calibration):
 
 def test_the_charts_are_those_of_the_command(page, ride, calibration):
     page.give(calibration, ride)
-    drawn = charts.figure(overview(open_ride(ride, calibration, smoothed=True)))["data"]
+    drawn = interactive.figure(charts.charts(overview(open_ride(ride, calibration, smoothed=True))))["data"]
     inside = page.page.frame_locator("#plot")
     inside.locator("#chart .main-svg").first.wait_for()
     shown = json.loads(inside.locator("#chart").evaluate("() => JSON.stringify(CHART.data)"))

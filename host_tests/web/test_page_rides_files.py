@@ -4,6 +4,7 @@ import base64
 import gzip
 import json
 import zipfile
+from pathlib import Path
 
 import analysis_rides
 import app_exports
@@ -12,25 +13,8 @@ from command import works
 from rider import LAPTOP, Rider
 from rides_page import PHONE_MOUNTED, WAIT_MS, assert_near, near
 
-DROP = """([selector, files]) => {
-  const data = new DataTransfer();
-  for (const [name, bytes] of files) {
-    data.items.add(new File([Uint8Array.from(atob(bytes), (letter) => letter.charCodeAt(0))], name));
-  }
-  for (const kind of ["dragover", "drop"]) {
-    document.querySelector(selector).dispatchEvent(new DragEvent(kind, { dataTransfer: data, bubbles: true }));
-  }
-}"""
-PULLED = """(files) => new Promise((done) => {
-  const opening = indexedDB.open("kickstand", 1);
-  opening.onupgradeneeded = () => opening.result.createObjectStore("files");
-  opening.onsuccess = () => {
-    const work = opening.result.transaction("files", "readwrite");
-    const all = files.map(([name, text]) => ({ name, data: new TextEncoder().encode(text).buffer }));
-    work.objectStore("files").put(all, "pulled");
-    work.oncomplete = () => { opening.result.close(); done(); };
-  };
-})"""
+DROP = Path(__file__).with_name("drop.js").read_text()
+PULLED = Path(__file__).with_name("keep_pulled.js").read_text()
 
 
 def test_dropped_on_the_page_packed_and_cut_off(page, ride, calibration, tmp_path):

@@ -24,10 +24,11 @@ from .analysis.summary import Summary, summary
 from .calibration.drive import DriveFit, fit_drive
 from .calibration.drive_events import DriveEvent
 from .calibration.file import CalibrationFile, read_calibration, write_calibration
-from .calibration.ride.fit import RideFit, fit_ride
 from .calibration.six import SixPositions, fit_six_positions
 from .calibration.two import TwoPositions, fit_two_positions
 from .errors import InputError
+from .estimation.alignment import RideFit, fit_ride
+from .estimation.smooth import SmoothedRide, smooth
 from .fleet.brake_tests import brake_tests
 from .fleet.manifest import Period, by_pattern, read_manifest
 from .fleet.period import PeriodResult, work_on_period
@@ -36,8 +37,7 @@ from .imports.importing import Imported, import_recording, write_imported
 from .joining.joined import Joined, join_track, write_joined
 from .joining.track import Track
 from .joining.track_files import read_track
-from .logs.csv_lines import write_log
-from .logs.cut import cut_log
+from .logs.csv_lines import cut_log, write_log
 from .logs.log import Log
 from .logs.reader import read_log
 from .logs.stretch import Stretch
@@ -46,7 +46,6 @@ from .refusals import RefusedInput, sentence
 from .replay.replay import LeanTable, replay
 from .simulation.ride import Ride as SimulatedRide
 from .simulation.ride import ride as simulate_ride
-from .smoothing.smooth import SmoothedRide, smooth
 from .web.site import site_files, write_site
 
 __all__ = [

@@ -26,7 +26,7 @@ COLUMNS = 16
 _DASHES = b"-" * COLUMNS
 _NO_TEXT = "\n"
 _NEVER = b"\xfe" * COLUMNS  # a character code that no text uses: marks a line as not yet written
-REINIT_MS = 10_000  # initialise again so often: noise can put the nibbles out of step, and nothing else mends that
+REINIT_MS = 10_000  # initialise again so often: noise can put the nibbles out of step, and nothing else repairs that
 PROBE_MS = 200  # how often to see whether a display is there, or still there
 REOPEN_PROBES = 5  # while there is no display the bus is freed once in so many probes
 STEP_MS = 5  # from step to step: the longest wait that the initialisation asks for is 4.1 ms
@@ -89,7 +89,7 @@ class Lcd:
         self._put(1, line2)
 
     def tick(self, now_ms):
-        """Do the next piece of work: at most one line. Call it about every 10 ms. now_ms: ticks_ms().
+        """Do the next step of the work: at most one line. Call it about every 10 ms. now_ms: ticks_ms().
 
         Raises SettingsError for pins that cannot be used, and nothing else."""
         if self._acted_ms is not None and ticks_diff(now_ms, self._acted_ms) < (STEP_MS if self.address else PROBE_MS):

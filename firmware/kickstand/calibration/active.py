@@ -5,7 +5,7 @@ from time import ticks_add, ticks_diff, ticks_ms
 from ..errors import StoreError, report
 from .store import Store
 
-TRIM_MS = 60_000  # flash wears: the trim is saved no more often
+TRIM_MS = 60_000  # flash wears: the roll-misalignment correction is saved no more often
 
 
 class ActiveCalibration:
@@ -13,7 +13,7 @@ class ActiveCalibration:
     replaced: True for another alignment, so that maxima and what driving has shown are discarded; False for a small
     correction.
 
-    The trim is a correction of the upright pose, in degrees, which riding finds (see Calibration).
+    The trim, short for the roll-misalignment correction, is in degrees, and riding finds it (see Calibration).
     """
 
     def __init__(self, meter, changed):
@@ -47,7 +47,7 @@ class ActiveCalibration:
         self._use(calibration, True)
 
     def refine(self, calibration):
-        """Like save(), but the alignment came from driving; what was learned stays valid. Raises StoreError."""
+        """Like save(), but the alignment came from driving; what was estimated stays valid. Raises StoreError."""
         self._store.save(calibration)
         self._use(calibration, False)
 

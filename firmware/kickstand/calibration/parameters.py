@@ -15,8 +15,8 @@ class Calibration:
 
     accel_offset (3, g) and accel_slope (3): calibrated = slope * reading + offset, Nicolae's equations 18-20.
     gyro_bias (3, deg/s): what the gyro reads at rest. vehicle_from_sensor (9, row-major, rows left, up, forward): the
-    alignment, a rotation matrix. trim_deg: the trim, a correction of the upright pose that riding has found: degrees by
-    which the lean would read too far to the right. six_done: offset and slope were measured. aligned:
+    alignment, a rotation matrix. trim_deg: the roll-misalignment correction, which riding has found: degrees by which
+    the lean would read too far to the right. six_done: offset and slope were measured. aligned:
     vehicle_from_sensor was measured. by_drive: it was measured or refined by driving.
     """
 
@@ -29,9 +29,6 @@ class Calibration:
         self.six_done = False
         self.aligned = False
         self.by_drive = False
-        self._scale = vector()
-        self._gyro_scale = 1.0
-        self._accel_lsb = 1.0
         self.set_scale(1.0, 1.0)
 
     def with_alignment(self, vehicle_from_sensor, gyro_bias, trim_deg=0.0, by_drive=False):
@@ -42,10 +39,8 @@ class Calibration:
         new.aligned = True
         new.by_drive = by_drive
         new.trim_deg = trim_deg
-        for i in range(9):
-            new.vehicle_from_sensor[i] = vehicle_from_sensor[i]
-        for i in range(3):
-            new.gyro_bias[i] = gyro_bias[i]
+        new.vehicle_from_sensor = matrix(vehicle_from_sensor)
+        new.gyro_bias = vector(*gyro_bias)
         return new
 
     def set_scale(self, accel_lsb_per_g, gyro_lsb_per_dps):
@@ -56,10 +51,8 @@ class Calibration:
 
     def set_accel(self, offset, slope):
         """Set offset (3, g) and slope (3)."""
-        for i in range(3):
-            self.accel_offset[i] = offset[i]
-            self.accel_slope[i] = slope[i]
-            self._scale[i] = slope[i] / self._accel_lsb
+        self.accel_offset, self.accel_slope = vector(*offset), vector(*slope)
+        self._scale = vector(*[value / self._accel_lsb for value in slope])
 
     def parameters(self):
         """The 19 numbers that were measured: offset (3), slope (3), gyro bias (3), matrix (9), trim."""
@@ -69,10 +62,8 @@ class Calibration:
     def set_parameters(self, values):
         """Set the 19 numbers, in the order of parameters()."""
         self.set_accel(values[0:3], values[3:6])
-        for i in range(3):
-            self.gyro_bias[i] = values[6 + i]
-        for i in range(9):
-            self.vehicle_from_sensor[i] = values[9 + i]
+        self.gyro_bias = vector(*values[6:9])
+        self.vehicle_from_sensor = matrix(values[9:18])
         self.trim_deg = values[18]
 
     def correct(self, accel):
@@ -80,7 +71,7 @@ class Calibration:
         return array("f", [self.accel_slope[i] * accel[i] + self.accel_offset[i] for i in range(3)])
 
     def scales(self):
-        """What a count is worth: g for each accelerometer axis (3), and deg/s for the gyro."""
+        """The scale factors of the counts: g a count for each accelerometer axis (3), and deg/s for the gyro."""
         return self._scale, self._gyro_scale
 
     def apply(self, reading, force, rate):
@@ -103,6 +94,5 @@ def six_position_calibration(offset, slope, gyro_bias):
     new = Calibration()
     new.set_accel(offset, slope)
     new.six_done = True
-    for i in range(3):
-        new.gyro_bias[i] = gyro_bias[i]
+    new.gyro_bias = vector(*gyro_bias)
     return new

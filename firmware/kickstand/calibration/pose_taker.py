@@ -43,7 +43,7 @@ class PoseTaker:
         if self._state == SETTLING:
             return self._settle(counts)
         if self._state == TAKING:
-            return self._take(counts)
+            return self._average(counts)
         return _ENDED
 
     @property
@@ -76,7 +76,7 @@ class PoseTaker:
         self.pose = self._new(self._take_count)
         return SETTLED
 
-    def _take(self, counts):
+    def _average(self, counts):
         if self.pose.add(counts) and self.pose.count < self._take_count:
             return TAKING
         try:

@@ -38,8 +38,7 @@ def two_position(out, kickstand, upright, side="left", tolerance_g=UNCALIBRATED_
     """
     check_one_g(kickstand, tolerance_g, "kickstand")
     check_one_g(upright, tolerance_g, "upright")
-    y = vector(upright[0], upright[1], upright[2])
-    tilted = vector(kickstand[0], kickstand[1], kickstand[2])
+    y, tilted = vector(*upright), vector(*kickstand)
     normalize(y)
     normalize(tilted)
     z = vector()

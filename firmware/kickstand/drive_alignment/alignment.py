@@ -1,6 +1,6 @@
 """Sensor to vehicle from driving: the vertical from standing and driving straight, forward from braking (ViriCiti).
 
-This is the published method with its weaknesses mended. Forward comes from a regression of force on change of speed,
+This is the published method without its weaknesses. Forward comes from a regression of force on change of speed,
 whose intercept takes up what is not braking; turns are left out; the lag of the speed is estimated; and the result has
 a standard error.
 
@@ -10,9 +10,9 @@ a standard error.
     if drive.ready: drive.matrix(out)
 
 What to show follows from `state`, from `counted` of `needed` and, when REFUSED, from `problem`. A problem is a fault of
-the speed or of the mount, which driving on does not mend; missing() is what driving on brings; `reason` is the
-problem, or else what is missing. Whether an alignment
-from before still fits: verdict.compare(). Memory is fixed, and each call does a short piece of the work.
+the speed or of the mount, which more driving cannot resolve; missing() is what more driving brings; `reason` is the
+problem, or else what is missing. Whether an alignment from before still fits: verdict.compare(). Memory is fixed, and
+each call does a short step of the work.
 """
 
 from ..errors import AlignmentError
@@ -36,7 +36,7 @@ READY = 5  # matrix() can be taken; it gets better with more events
 REFUSED = 6  # matrix() cannot be had, problem says why
 
 STALE_US = 5_000_000
-PIECE_US = 12_000  # an update does one piece of work, and one more for each whole PIECE_US since the update before
+STEP_US = 12_000  # an update does one step of work, and one more for each whole STEP_US since the update before
 
 
 class DriveAlignment:
@@ -50,10 +50,10 @@ class DriveAlignment:
     """
 
     def __init__(self, vehicle, up=None, bias=None):
-        self.vehicle = vehicle
+        self._leans = vehicle == MOTORCYCLE
         self.needed = MIN_EVENTS
         self.standing = StandingVertical(bias or (0.0, 0.0, 0.0))
-        self.vertical = Vertical(vehicle == CAR, up, self.standing)
+        self.vertical = Vertical(not self._leans, up, self.standing)
         self._history = ForceHistory()
         self.events = DrivingEvents(self._history)
         self.quality = DrivingQuality(self.events, self.vertical)
@@ -92,7 +92,7 @@ class DriveAlignment:
             return READY
         if self._speed_mps < 0.0 or self._silent_us > STALE_US:
             return WAITING_FOR_SPEED
-        if self.vehicle == CAR and not self.standing.stops:
+        if not (self._leans or self.standing.stops):
             return WAITING_FOR_STOP
         if not self.events.braking:
             return WAITING_FOR_BRAKING
@@ -105,8 +105,8 @@ class DriveAlignment:
 
     @property
     def problem(self):
-        """What is wrong with the speed or with the mount, and driving on does not mend: an AlignmentError, or None."""
-        if self._speed_check.problem is None and self.standing.moved and self.vehicle == CAR:
+        """What is wrong with speed or mount, and more driving cannot resolve: an AlignmentError or None."""
+        if self._speed_check.problem is None and self.standing.moved and not self._leans:
             return AlignmentError("mount-moved", "between-stops", MAX_CHANGE_DEG)
         if self.counted < self.needed:
             return self._speed_check.problem
@@ -124,7 +124,7 @@ class DriveAlignment:
             return AlignmentError("no-speed")
         if self._top_mps < MOVED_MPS:
             return AlignmentError("not-driven", needed)
-        if self.vehicle == CAR and not self.standing.stops:
+        if not (self._leans or self.standing.stops):
             return AlignmentError("not-stopped", SETTLE_S + COUNTS_S)
         if counted < needed:
             return AlignmentError("few-events", counted, needed, turned)
@@ -150,8 +150,8 @@ class DriveAlignment:
         if self._sums_us >= BIN_US:
             self._end_bin()
             return
-        for _ in range(1 + dt_us // PIECE_US):
-            self._do_piece()
+        for _ in range(1 + dt_us // STEP_US):
+            self._do_step()
 
     def interrupt(self):
         """Samples are missing: what follows does not join what came before."""
@@ -164,7 +164,7 @@ class DriveAlignment:
     def finish(self):
         """No more samples will come: do at once what work is left."""
         while self._means is not None or self._work is not None:
-            self._do_piece()
+            self._do_step()
 
     def measure_speed(self, speed_mps, age_us=0):
         """A new value of the speed source. age_us: how old it is known to be; what it is late beyond that is estimated
@@ -192,8 +192,8 @@ class DriveAlignment:
             for i in range(3):
                 out[3 * row + i] = axis[i]
 
-    def _do_piece(self):
-        """One short piece of work, if there is any."""
+    def _do_step(self):
+        """One short step of work, if there is any."""
         if self._means is not None:
             force, rate, seconds = self._means
             self._means = None
@@ -207,7 +207,7 @@ class DriveAlignment:
 
     def _end_bin(self):
         if self._means is not None:
-            self._do_piece()
+            self._do_step()
         sums, n = self._sums, self._sums_us
         seconds = n * 1e-6
         means = [total / n for total in sums]
@@ -225,7 +225,7 @@ class DriveAlignment:
             sums[i] = 0.0
 
     def _follow(self):
-        """Work on the last interval between two speeds; a generator of short pieces."""
+        """Work on the last interval between two speeds; a generator of short steps."""
         yield from self.events.follow(self._bias_given or self.standing.stops)
         judged = (self.events.straight_count, self.standing.stops)
         if judged != self._judged:

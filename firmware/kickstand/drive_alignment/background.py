@@ -8,7 +8,7 @@ from time import ticks_add, ticks_diff
 
 from ..errors import Notice, StoreError
 from ..rotation import matrix
-from .alignment import BRAKING, MOTORCYCLE, TURNING, DriveAlignment
+from .alignment import BRAKING, CAR, MOTORCYCLE, TURNING, DriveAlignment
 from .quality import MIN_EVENTS_TO_CHECK_SPEED
 from .verdict import MOVED, REFINED, REVERSED, SAME, compare, turn_round
 
@@ -20,11 +20,12 @@ AWAY_MPS = 2.0  # the vehicle has driven off
 
 _KNOWN_BIAS = (0.0, 0.0, 0.0)  # the gyro's bias was measured with the alignment, and is subtracted already
 STAND_SIDE, MOUNT_MOVED = "other-side", "mount-moved"
-_DOUBTS = (STAND_SIDE, MOUNT_MOVED)  # codes of messages: the lean is not to be trusted until they are answered
+_QUESTIONS = (STAND_SIDE, MOUNT_MOVED)  # codes of messages: the lean is not to be trusted until they are answered
 
 
 class BackgroundAlignment:
-    """vehicle: "motorcycle" or "car".  speed: a Speed.  meter: a LeanMeter.  calibration: the ActiveCalibration.
+    """leans: True for a motorcycle, False for a car.  speed: a Speed.  meter: a LeanMeter.  calibration: the
+    ActiveCalibration.
 
     The loop calls poll() and feed() each turn, begin() with another calibration; the menu ask(); a press answer().
 
@@ -34,8 +35,8 @@ class BackgroundAlignment:
     everything else, until answer() or until the vehicle drives off; or None.
     """
 
-    def __init__(self, vehicle, speed, meter, calibration):
-        self.vehicle = vehicle
+    def __init__(self, leans, speed, meter, calibration):
+        self._leans = leans
         self.speed = speed
         self._meter = meter
         self._active = calibration
@@ -57,10 +58,10 @@ class BackgroundAlignment:
     def _restart(self):
         old = self._meter.calibration
         self._calibration = old  # is applied to all that is fed to this drive, whatever is saved meanwhile
-        trusted = self.vehicle == MOTORCYCLE and old.aligned and not self._asked
+        trusted = self._leans and old.aligned and not self._asked
         up = old.vehicle_from_sensor[3:6] if trusted else None
-        self.drive = DriveAlignment(self.vehicle, up, _KNOWN_BIAS if old.aligned else None)
-        self.shown = self.shown or (self.vehicle != MOTORCYCLE and not old.aligned)
+        self.drive = DriveAlignment(MOTORCYCLE if self._leans else CAR, up, _KNOWN_BIAS if old.aligned else None)
+        self.shown = self.shown or not (self._leans or old.aligned)
         self.result = None
         self._clear_sums()
 
@@ -82,20 +83,20 @@ class BackgroundAlignment:
             self._speed_mps = speed
             self._speed_ms = now_ms
             self.drive.measure_speed(speed, self.speed.age_us)
-            speed = self._pass_on(speed)
+            speed = self._share(speed)
         if self._look_ms is None or ticks_diff(now_ms, self._look_ms) >= 0:
             self._look_ms = ticks_add(now_ms, LOOK_MS)
             self._look(now_ms)
         return speed
 
-    def _pass_on(self, speed):
+    def _share(self, speed):
         """Give the lean filter a speed (m/s) that it can rely on. Returns that speed, rounded as a recording keeps it,
         or None if it was not given.
 
         A speed that no braking event has confirmed is not given, because a wheel may have two magnets. Neither is zero,
         which a broken wire gives too: the filter sees a standstill by itself.
         """
-        if self.vehicle != MOTORCYCLE:
+        if not self._leans:
             return speed
         drive = self.drive
         confirmed = drive.counted >= MIN_EVENTS_TO_CHECK_SPEED and drive.quality.speed_problem is None
@@ -138,25 +139,25 @@ class BackgroundAlignment:
             self._refuse(drive.problem, aligned)
         elif self._asked or not aligned:
             if drive.ready:
-                self._take(True)
+                self._adopt(True)
         else:
             verdict = compare(drive, self._meter.calibration.vehicle_from_sensor)
-            if self.vehicle != MOTORCYCLE:
+            if not self._leans:
                 if drive.ready and verdict in (REFINED, MOVED, REVERSED):
-                    self._take(verdict != REFINED)
+                    self._adopt(verdict != REFINED)
             elif verdict == REVERSED:
                 self._say(Notice(STAND_SIDE))
             elif verdict == MOVED:
                 self._say(Notice(MOUNT_MOVED, "since-alignment"))
             elif verdict == REFINED and drive.ready:
-                self._take(False)
+                self._adopt(False)
             elif verdict == SAME:
                 self._meter.trust()
 
     def _away(self):
         """True while the vehicle drives. A faulty speed source may say zero for ever: then the lean filter's own
         estimate of the speed decides too."""
-        faulty = self.drive.problem is not None or (self.message is not None and self.message.code not in _DOUBTS)
+        faulty = self.drive.problem is not None or (self.message is not None and self.message.code not in _QUESTIONS)
         return self._speed_mps > AWAY_MPS or (faulty and self._meter.speed_mps > AWAY_MPS)
 
     def _refuse(self, problem, aligned):
@@ -170,26 +171,24 @@ class BackgroundAlignment:
     def _say(self, message):
         if message.code not in self._answered:
             self.message = message
-            if self.vehicle == MOTORCYCLE and message.code in _DOUBTS:
+            if self._leans and message.code in _QUESTIONS:
                 self._meter.distrust(message.code)
 
     def answer(self, agreed):
         """The rider has read the message. agreed: and wants what it offers, with STAND_SIDE to turn forward round."""
         code, self.message = self.message.code, None
         self._answered.append(code)
-        if code in _DOUBTS:
+        if code in _QUESTIONS:
             self._meter.trust()
         if agreed and code == STAND_SIDE:
             old = self._meter.calibration
-            turned = matrix()
-            for i in range(9):
-                turned[i] = old.vehicle_from_sensor[i]
+            turned = matrix(old.vehicle_from_sensor)
             turn_round(turned)
             if self._save(turned, -self._meter.trim_deg):
                 self.message = Notice("side-fixed")
                 self._meter.reset_maxima()
 
-    def _take(self, anew):
+    def _adopt(self, anew):
         """Save the drive's alignment. anew: the sensor sits differently now, so that trim and maxima start again."""
         found = matrix()
         self.drive.matrix(found)
@@ -215,6 +214,6 @@ class BackgroundAlignment:
 
     @property
     def state(self):
-        """The drive's state, but at walking pace, where a turn cannot be told, a braking event stays BRAKING."""
+        """The drive's state, but at walking pace, where a turn cannot be recognised, a braking event stays BRAKING."""
         state = self.drive.state
         return BRAKING if state == TURNING and self._speed_mps < AWAY_MPS else state

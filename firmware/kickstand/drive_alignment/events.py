@@ -14,7 +14,7 @@ from .regression import LAG_STEP_US, LAGS, Fit, ForwardRegression
 BEGIN_MPS2, END_MPS2 = 0.8, 0.4
 CHANGE_MPS = 1.5
 MAX_ACCELERATION_EVENTS = 2  # more than these do not count, because braking shows forward better
-MIN_INTERVAL_US = 400_000  # a GPS at 10 Hz tells no more than one at 2 Hz, and its differences are noisier
+MIN_INTERVAL_US = 400_000  # a GPS at 10 Hz adds nothing to one at 2 Hz, and its differences are noisier
 MAX_INTERVAL_US = 2_200_000  # one value of a GPS at 1 Hz may be missing
 MAX_WAITING = 4  # intervals that wait while an earlier one is worked on
 # A larger yaw rate is a turn. At 10 m/s this one makes 0.036 g sideways, a fifth of the force of braking; the
@@ -162,8 +162,8 @@ class DrivingEvents:
         return bool(self._waiting) and difference(self._history.now, self._waiting[0][1]) >= 0
 
     def follow(self, use):
-        """Work on the interval that is due; a generator of short pieces. use: the gyro's bias is known, so that
-        straight driving can be told from turning."""
+        """Work on the interval that is due; a generator of short steps. use: the gyro's bias is known, so that
+        straight driving and turning can be distinguished."""
         before, before_us = self._before
         speed, time_us = self._before = self._waiting.pop(0)
         length_us = difference(time_us, before_us)

@@ -1,4 +1,4 @@
-"""Force and yaw rate of the last seconds, so that a speed that arrives late can be compared with what was felt then.
+"""Force and yaw rate of the last seconds, so that a speed that arrives late is compared with what was measured then.
 
 Kept are running integrals, as integers that wrap round. The difference of two is exact however long the drive lasts,
 while float32 sums lose digits as they grow; and integers need no heap.

@@ -3,7 +3,7 @@
 Nobody knows when it moved, so the drive is split in two after each of its blocks in turn. How far two parts may differ
 by chance follows from the scatter of forward between the blocks within each part: the variance of a part's forward
 falls with the part's weight, but not below what the road's camber and the wind do to a single long stretch of road. Few
-blocks give a poor sample variance: a prior worth PRIOR_FREEDOM degrees of freedom is blended in.
+blocks give a poor sample variance: a prior of PRIOR_FREEDOM degrees of freedom is blended in.
 """
 
 from array import array
@@ -56,7 +56,7 @@ class DriveParts:
         block[4], block[5] = weight, seconds
 
     def compare(self):
-        """Look at all splits; a generator of short pieces of work."""
+        """Look at all splits; a generator of short steps."""
         one, two = [0.0] * 7, [0.0] * 7
         for split in range(1, self.count):
             self._sum(one, 0, split)

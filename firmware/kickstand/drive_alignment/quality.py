@@ -16,7 +16,7 @@ from .vertical import MAX_CHANGE_DEG
 
 MIN_EVENTS = 5  # straight braking and acceleration events, for an alignment
 MIN_EVENTS_TO_CHECK_SPEED = 2
-# Limits come in pairs with a hysteresis: to become ready, and to stay so. What flickers at a threshold helps nobody.
+# Limits come in pairs with a hysteresis: to become ready, and to stay so. That avoids flicker.
 READY_DEG, STAY_READY_DEG = 1.5, 2.5  # standard error of forward; one drive in ten is off by twice as much
 AGREE_DEG, STAY_AGREE_DEG = 4.0, 6.0  # largest difference of forward between halves, and between parts
 AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0  # between parts a larger difference is accepted if it is within these
@@ -52,7 +52,7 @@ class DrivingQuality:
         self._scratch_fit = Fit()
 
     def judge(self):
-        """After another event or stop: find all the attributes anew. A generator of short pieces of work."""
+        """After another event or stop: find all the attributes anew. A generator of short steps."""
         regression, lag, part = self._events.regression, self._events.lag, self._scratch_fit
         up = vector()
         if not (yield from regression.fitting(self.fit, lag)):

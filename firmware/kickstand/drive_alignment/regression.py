@@ -65,7 +65,7 @@ class ForwardRegression:
             sums[k + CF + i] += curve_g * f
 
     def end_event(self):
-        """An event has ended: begin the next block if this one is full. A generator of short pieces of work."""
+        """An event has ended: begin the next block if this one is full. A generator of short steps."""
         self._events_in_last += 1
         if self._events_in_last < self._events_per_block:
             return
@@ -94,7 +94,7 @@ class ForwardRegression:
         return out.found
 
     def fitting(self, out, lag, first=0, last=BLOCKS, without=-1):
-        """As fit(), but a generator of short pieces of work, which returns True or False. without: a block to leave
+        """As fit(), but a generator of short steps, which returns True or False. without: a block to leave
         out."""
         sums, total = self._sums[lag], out.total
         out.found = False

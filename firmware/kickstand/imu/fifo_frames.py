@@ -6,18 +6,18 @@ elsewhere they are decode_python() and add_up_python(), which give the same resu
 """
 
 from array import array
+from struct import unpack_from
 
 from ..errors import NO_MACHINE_CODE, checked
 
 FRAME = 14  # bytes
+_WORDS = ">7h"
 
 
 def decode_python(frames, at, counts):
     """Put the frame that begins at byte `at` of frames into counts, array('h', 7)."""
-    for i in range(7):
-        value = frames[at] << 8 | frames[at + 1]
-        counts[i] = value - 65536 if value > 32767 else value
-        at += 2
+    for i, value in enumerate(unpack_from(_WORDS, frames, at)):
+        counts[i] = value
 
 
 def add_up_python(frames, n, sums, watch):
@@ -29,8 +29,8 @@ def add_up_python(frames, n, sums, watch):
     """
     for i in range(7):
         sums[i] = 0
-    at = 0
     for k in range(n):
+        at = k * FRAME
         first = frames[at]
         same = 0  # bytes of the force that are like the first
         mark = 0  # the hash
@@ -46,10 +46,8 @@ def add_up_python(frames, n, sums, watch):
         watch[0] = mark
         if watch[1] >= watch[2]:
             return k
-        for i in range(7):
-            value = frames[at] << 8 | frames[at + 1]
-            sums[i] += value - 65536 if value > 32767 else value
-            at += 2
+        for i, value in enumerate(unpack_from(_WORDS, frames, at)):
+            sums[i] += value
     return n
 
 

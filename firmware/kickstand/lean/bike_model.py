@@ -12,8 +12,8 @@ State                                       Measured (a vector with [3] has the 
     s_x, c_xy        SCALE_LEFT, CROSS_LEFT_UP: scale error of the gyro's left axis, and its reading of a rate about up
     c_zx, c_zy, s_z  CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD: the same of its forward axis
 The data sheet allows 3 % of scale error and 2 % of cross-axis sensitivity. In a long turn they are mistaken for bias,
-in a quick roll for lean. The up axis has no such states: without a measured speed its scale cannot be told from the
-speed.
+in a quick roll for lean. The up axis has no such states: without a measured speed its scale and
+the speed are not separately observable.
 
 Equations, with ' for the derivative by time
     rates, corrected         w = w_m - b,  then  w_z -= c_zx w_x + c_zy w_y + s_z w_z,  w_x -= s_x w_x + c_xy w_y
@@ -40,27 +40,19 @@ from math import cos, radians, sin, sqrt
 from ..units import STANDARD_GRAVITY
 
 STATES = 12
-(
-    LEAN,
-    PITCH,
-    SPEED,
-    BIAS_LEFT,
-    BIAS_UP,
-    BIAS_FORWARD,
-    YAW_ERROR,
-    SCALE_LEFT,
-    CROSS_LEFT_UP,
-    CROSS_FORWARD_LEFT,
-    CROSS_FORWARD_UP,
-    SCALE_FORWARD,
-) = range(STATES)
+LEAN, PITCH, SPEED = 0, 1, 2
+BIAS_LEFT, BIAS_UP, BIAS_FORWARD = 3, 4, 5
+YAW_ERROR = 6
+SCALE_LEFT, CROSS_LEFT_UP = 7, 8
+CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD = 9, 10, 11
 
 MAX_PITCH = 1.2  # rad. No motorcycle reaches it, a sensor in the hand may; at 90 degrees lean has no meaning.
 
 # Where the turn rate of a bike in balance replaces the measured one. In the form of measurements.py.
 BALANCE_MIN_SPEED = 4.0 / STANDARD_GRAVITY  # g s. Larger: the balanced rate is not used in slow turns.
-BALANCE_SHARE = 0.5  # of 1: the two may differ by SHARE x balanced rate + RATE. Larger: as for RATE.
-BALANCE_RATE = 0.1  # rad/s: see SHARE. Larger: the balanced rate is also used where lean or speed are wrong.
+# The balanced rate is used where the measured one is within BALANCE_RATE + BALANCE_SHARE x |balanced rate| of it.
+BALANCE_RATE = 0.1  # rad/s: of that tolerance, the fixed part. Larger: used too where lean or speed are wrong.
+BALANCE_SHARE = 0.5  # of 1: of that tolerance, the part of the rate. Larger: used too where lean or speed are wrong.
 BALANCE_SIGMA = radians(20.0)  # rad: of the lean. Larger: the balanced rate is used with a lean that is hardly known.
 BALANCE_MIN_COS = 0.3  # of 1: lower bound of cos(lean). Larger: too little rate about left in deep leans.
 
@@ -129,7 +121,7 @@ def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
 
 class Linearisation:
     """(1) to (6) about the state x, at a window's means of the corrected rates (3 values) and of the forward force.
-    lean_variance: rad^2, of the lean, which tells the turn rate of a bike in balance only where it is known.
+    lean_variance: rad^2, of the lean, above BALANCE_SIGMA^2 it does not give the turn rate of a bike in balance.
 
     Each ..._row of the Jacobians is ((state, partial derivative), ...): lean, pitch and speed of the rates of change
     (1) to (3), left and up of the forces (4) and (5), level of (6). Derivatives that are zero are left out, and terms

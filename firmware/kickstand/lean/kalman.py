@@ -1,4 +1,4 @@
-"""The covariance of a Kalman filter, in pieces of work short enough for the time of one sample.
+"""The covariance of a Kalman filter, in steps short enough for the time of one sample.
 
 Matrices are lists of lists of floats, not arrays: on a board reading an array's element takes heap, reading a list's
 does not. The methods that take long are generators, which yield where the work may be interrupted. Rows of Jacobians
@@ -7,8 +7,8 @@ are given as ((state, value), ...), because most of their values are zero.
 
 MIN_VARIANCE = 1e-10  # rounding in 32-bit floats could make a variance negative
 # How much is done between two yields: about a millisecond on an RP2040
-TERMS_PER_PIECE = 3  # of a Jacobian's row
-ROWS_PER_PIECE = 8  # of the covariance, of twelve: its triangle's first eight rows are half of the work
+TERMS_PER_STEP = 3  # of a Jacobian's row
+ROWS_PER_STEP = 8  # of the covariance, of twelve: its triangle's first eight rows are half of the work
 GATE = 25.0  # 5 sigma, squared. An innovation beyond it is not dropped, because the state may be what is wrong.
 
 
@@ -45,7 +45,7 @@ class Covariance:
         rows = self.rows
         row = rows[i]
         for m, (j, a) in enumerate(derivatives):
-            if m == TERMS_PER_PIECE:
+            if m == TERMS_PER_STEP:
                 yield
             a *= seconds
             source = rows[j]
@@ -72,7 +72,7 @@ class Covariance:
         for i in range(n):
             column[i] = h * rows[j][i]
         for m in range(1, len(derivatives)):
-            if m == TERMS_PER_PIECE:
+            if m == TERMS_PER_STEP:
                 yield
             j, h = derivatives[m]
             row = rows[j]
@@ -95,7 +95,7 @@ class Covariance:
                 rows[j][i] = row[j] = row[j] - gain * column[j]
             if row[i] < MIN_VARIANCE:
                 row[i] = MIN_VARIANCE
-            if i == ROWS_PER_PIECE - 1:
+            if i == ROWS_PER_STEP - 1:
                 yield
         yield
 

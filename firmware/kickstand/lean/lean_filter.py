@@ -21,8 +21,8 @@ from .upright_trim import UprightTrim
 
 WINDOW_US = 200_000
 FIRST_WINDOW_US = 50_000
-PIECES = 21  # of the work on a window; a test counts them
-SLOW_STEP_US = 12_000  # samples that are further apart leave time for all pieces at once
+WORK_STEPS = 21  # of the work on a window; a test counts them
+SLOW_STEP_US = 12_000  # samples that are further apart leave time for all steps at once
 DELAY_S = 0.0048  # of the MPU6050's gyro at DLPF 3
 MAX_SPEED = 250.0 / STANDARD_GRAVITY  # g s: of a board that lies on its nose, before its rest is seen, under it
 
@@ -52,17 +52,17 @@ class LeanFilter:
         self._p = None
         self._upright = self.trim.angle  # LEAN of a bike that is upright
         self._rest = RestDetector(not self._kept)
-        self._given_speed = self._told_speed = None  # the latest, until a window takes it; the one before
-        self._told_s = 0.0  # since the one before
+        self._speed = self._last_speed = None  # the latest measured one, until a window takes it; the one before
+        self._speed_s = 0.0  # since the one before
         self._work = None
-        self._pieces = 1  # of the work, in each sample
+        self._steps = 1  # of the work, in each sample
         self._sums = [0.0] * 9  # see predict()
         self._count = self._window_us = 0
         self._axis = 0  # of the gyro, whose bias is measured next at rest
         self._roll_rate = self._last_roll_rate = 0.0
 
-    def doubt(self, seconds):
-        """The readings of so many seconds are lost: what the bike did meanwhile is not known."""
+    def inflate_covariance(self, seconds):
+        """The readings of so many seconds are lost: what the bike did meanwhile adds to the variances."""
         p = self._p
         if p is None:
             return
@@ -85,7 +85,7 @@ class LeanFilter:
 
     def measure_speed(self, speed_mps):
         """The vehicle's speed, from whatever measures it; never required."""
-        self._given_speed = speed_mps / STANDARD_GRAVITY
+        self._speed = speed_mps / STANDARD_GRAVITY
 
     @property
     def variance(self):
@@ -111,7 +111,7 @@ class LeanFilter:
         self._count += 1
         self._window_us += dt_us
         if self._work is not None:
-            for _ in range(self._pieces):
+            for _ in range(self._steps):
                 if next(self._work, True):  # a yield gives None, the end gives True
                     self._work = None
                     break
@@ -128,7 +128,7 @@ class LeanFilter:
         seconds = self._window_us * 1e-6
         for i in range(9):
             self._sums[i] = 0.0
-        self._pieces = PIECES if self._window_us > n * SLOW_STEP_US else 1
+        self._steps = WORK_STEPS if self._window_us > n * SLOW_STEP_US else 1
         self._count = self._window_us = 0
         x = self._x
         if self._p is None:
@@ -153,7 +153,7 @@ class LeanFilter:
     def _start(self, means):
         """The first state, from the means of the first window."""
         wx, wy, wz, fx, fy, fz = means[2:8]
-        # A long turn is as calm as standing, and gives no force to the side: only the yaw rate tells them apart.
+        # A long turn is as calm as standing, and gives no force to the side: only the yaw rate separates them.
         turning = max(abs(wx), abs(wy), abs(wz)) > measurements.START_MAX_RATE
         moving = turning or abs(sqrt(fx * fx + fy * fy + fz * fz) - 1.0) > measurements.START_MAX_FORCE
         variances = [sigma * sigma for sigma in measurements.SIGMA_START]
@@ -185,7 +185,7 @@ class LeanFilter:
                 p.set_variance(BIAS_LEFT + i, measurements.SIGMA_START[BIAS_LEFT] ** 2)
 
     def _process(self, means, seconds, roll_acceleration):
-        """Linearise, update and inject for one window; a generator of short pieces."""
+        """Linearise, update and inject for one window; a generator of short steps."""
         p = self._p
         model = Linearisation(self._x, means[2:5], means[7], p.rows[LEAN][LEAN])
         yield
@@ -206,18 +206,18 @@ class LeanFilter:
         self._inject(model)
 
     def _update_ride(self, model, means, seconds, roll_acceleration):
-        """By the forces, the road, the speed or a straight; and the trim of upright."""
+        """By the forces, the road, the speed or a straight; and the trim."""
         p, x = self._p, self._x
         for measurement in measurements.forces(model, means, roll_acceleration, self._force_error):
             yield from p.update(*measurement)
         yield from p.update(*measurements.level_road(model, x, seconds))
-        lean, speed, given = x[LEAN] - self._upright, x[SPEED], self._given_speed
-        self._told_s += seconds
-        if given is not None:
-            # By the given speeds alone: an acceleration that a wrong pitch feigns must not make them count for less.
-            acceleration = 0.0 if self._told_speed is None else (given - self._told_speed) / self._told_s
-            self._given_speed, self._told_speed, self._told_s = None, given, 0.0
-            yield from p.update(*measurements.given_speed(given, speed, acceleration))
+        lean, speed, measured = x[LEAN] - self._upright, x[SPEED], self._speed
+        self._speed_s += seconds
+        if measured is not None:
+            # From the measured speeds alone: a pitch error would bias the estimated acceleration.
+            acceleration = 0.0 if self._last_speed is None else (measured - self._last_speed) / self._speed_s
+            self._speed, self._last_speed, self._speed_s = None, measured, 0.0
+            yield from p.update(*measurements.measured_speed(measured, speed, acceleration))
         else:
             yield from p.update(*measurements.straight_or_usual_speed(lean, speed, model.yaw_rate, seconds))
         certain = p.rows[SPEED][SPEED] < measurements.SIGMA_TRIM_SPEED**2
@@ -237,7 +237,9 @@ class LeanFilter:
             x[i] += p.take_correction(i)
         x[SPEED] = max(0.0, x[SPEED])
         x[PITCH] = _possible_pitch(x[PITCH])
-        if not self._rest.resting:  # there the force tells: of a sensor in the hand any yaw error may be believed
+        if (
+            not self._rest.resting
+        ):  # at rest the force shows the lean, and the estimated yaw error of a sensor in the hand may be anything
             self._upright = self.trim.angle + model.lean_by_pitch(x)
         if x[LEAN] > pi:
             x[LEAN] -= 2 * pi

@@ -5,8 +5,8 @@ expected) and the variance of its noise. model: a Linearisation. x: the state. m
 
 SIGMA_... are standard deviations (1 sigma). A disturbance that lasts tau seconds, measured once in each window of T
 seconds, gets the variance sigma^2 2 tau / T, because measurements that share an error must not count as independent.
-Speeds are written in m/s and divided by standard gravity, as the model has them (g s). Standing still and the trim of
-upright have their own parameters in rest.py and upright_trim.py, in the same form.
+Speeds are written in m/s and divided by standard gravity, as the model has them (g s). Standing still and the
+trim have their own parameters in rest.py and upright_trim.py, in the same form.
 """
 
 from math import radians
@@ -34,7 +34,9 @@ SIGMA_START = (  # Larger, each: found sooner, but the other states' errors are 
     0.014,  # of 1: scale of the forward axis
 )
 SIGMA_START_LEAN_MOVING = radians(30.0)  # rad: lean under way. Larger: lean is shown later, and follows forces more.
-USUAL_SPEED = 15.0 / STANDARD_GRAVITY  # g s: where nothing tells it. Larger: leans begun before the start are larger.
+USUAL_SPEED = (
+    15.0 / STANDARD_GRAVITY
+)  # g s: where nothing measures it. Larger: leans begun before the start are larger.
 
 # Process noise, per square root of a second
 NOISE_ANGLE = radians(0.2)  # rad: vibration of the gyro. Larger: lean follows the forces more and the gyro less.
@@ -51,11 +53,13 @@ PITCHING_SHARE = 2.0  # of 1: of the pitch rate that springs may be to blame for
 SHAKEN_SHARE = 0.1  # of 1: of vibration's variance that a mean keeps. Larger: forces count less on rough roads.
 ROLL_HEIGHT_M = 0.4  # m: h, of the sensor above the roll axis. Larger: rolling explains more of the force.
 SIGMA_ROLL_HEIGHT_M = 0.4  # m. Larger: forces count less while the bike rolls quickly.
-SIGMA_GIVEN_SPEED = 1.0 / STANDARD_GRAVITY  # g s: of a receiver or a wheel sensor. Larger: it counts for less.
-GIVEN_SPEED_LATE_S = 1.0  # s: how late it may be. Larger: it counts for less while speeding up and braking.
+SIGMA_MEASURED_SPEED = 1.0 / STANDARD_GRAVITY  # g s: of a receiver or a wheel sensor. Larger: it counts for less.
+MEASURED_SPEED_LATE_S = 1.0  # s: how late it may be. Larger: it counts for less while speeding up and braking.
 
 # Assumptions that take the place of measurements
-SIGMA_SLOPE = radians(1.6)  # rad: of roads' slopes. Larger: slopes are followed better, turns told from them worse.
+SIGMA_SLOPE = radians(
+    1.6
+)  # rad: of roads' slopes. Larger: slopes are followed better, turns and slopes separate less well.
 SLOPE_S = 3.0  # s: how long a slope lasts; fitted, real ones last longer. Larger: as for SIGMA_SLOPE.
 STEEP = radians(6.0)  # rad: such a slope counts half as much, twice it a fifth. Larger: wheelies pass for slopes.
 # Riding straight is all three: less lean than this, less yaw rate than this, more speed than this.
@@ -89,11 +93,11 @@ def forces(model, means, roll_acceleration, force_error):
     shaken = max(0.0, means[8] - left * left)
     left_variance = SIGMA_LEFT**2 + SHAKEN_SHARE * shaken + uncertain**2
     left += ROLL_HEIGHT_M * roll_acceleration * model.cos_lean
-    # In a held turn a force up of 1 / cos(lean) tells the lean, whatever the gyro's scale: a window says little, a
-    # minute much, if nothing in it is always wrong to the same side.
+    # In a held turn the force up, 1 / cos(lean), makes the lean observable, whatever the gyro's scale: little by one
+    # window, well over a minute, if no error in it keeps its sign.
     square = means[4] * means[4] / STANDARD_GRAVITY
     up = means[1] + ROLL_HEIGHT_M * square - force_error * means[6]
-    # Where the springs pitch the bike its wheels do not rise, though v w_x says so.
+    # Where the springs pitch the bike its wheels do not rise: v w_x is no acceleration then.
     pitching = PITCHING_SHARE * model.speed * model.pitch_rate
     up_variance = (
         SIGMA_UP**2 + pitching * pitching + SIGMA_ROLL_HEIGHT_M**2 * square * square + (uncertain * model.sin_lean) ** 2
@@ -115,10 +119,10 @@ def straight_or_usual_speed(lean, speed, yaw_rate, seconds):
     return ((SPEED, 1.0),), USUAL_SPEED - speed, SIGMA_USUAL_SPEED**2 * 2 * USUAL_SPEED_S / seconds
 
 
-def given_speed(given, speed, acceleration):
-    """The speed as something else measures it: given."""
-    late = GIVEN_SPEED_LATE_S * acceleration
-    return ((SPEED, 1.0),), given - speed, SIGMA_GIVEN_SPEED**2 + late * late
+def measured_speed(measured, speed, acceleration):
+    """The speed as a receiver or a wheel sensor measures it."""
+    late = MEASURED_SPEED_LATE_S * acceleration
+    return ((SPEED, 1.0),), measured - speed, SIGMA_MEASURED_SPEED**2 + late * late
 
 
 def at_rest(model, means, speed, axis):

@@ -9,7 +9,7 @@ from .lean_filter import DELAY_S, LeanFilter
 SMOOTH_US = 300_000  # time constant of the g shown
 MAX_VARIANCE = radians(3.0) ** 2  # a lean less certain than this is not shown
 TRIM_MAX_VARIANCE = radians(0.5) ** 2  # a trim less certain than this is not kept
-TRIM_STEP_DEG = 0.3  # a smaller change of the trim is not worth wearing the flash
+TRIM_STEP_DEG = 0.3  # a smaller change of the trim is not saved: flash wears
 FALLEN_DEG = 65.0
 FALLEN_US = 1_000_000
 HELD_US = 75_000  # a maximum lasts twice as long: a pothole jerks the sensor for less
@@ -22,7 +22,7 @@ class LeanMeter:
 
     After update() or update_sum(): force (left, up, forward in g), rate (about them in rad/s), lean_deg (the
     filter's, > 0 right), smooth_force (g, for display; of an aligned motorcycle forward alone), fallen, and the maxima
-    since reset_maxima().
+    since reset_maxima(). suppressed_reason: why the lean is not shown, as given to distrust(), or None.
     """
 
     def __init__(self, calibration, leans=True, delay_s=DELAY_S):
@@ -34,14 +34,14 @@ class LeanMeter:
         self.smooth_force = [0.0] * 3
         self._reading, self._n = (0,) * 7, 1
         self.reset_maxima()
-        self.calibration = self._doubt = None
+        self.calibration = self.suppressed_reason = None
         self.use(calibration)
 
     def use(self, calibration):
-        """Take a calibration, its scale set, and forget what was estimated with the one before. A doubt stays with
-        the calibration that it was about."""
+        """Take a calibration, its scale set, and forget what was estimated with the one before. A reason to distrust
+        the lean stays with the calibration that it is about."""
         if calibration is not self.calibration:
-            self._doubt = None
+            self.suppressed_reason = None
         self.calibration = calibration
         self._smooth_all = not (calibration.aligned and self._leans)  # pages then show left and up as well
         self._transform = Transform(calibration)
@@ -66,16 +66,11 @@ class LeanMeter:
 
     def distrust(self, reason):
         """The lean is not to be shown, for a reason that stands in its place: until trust(), or another calibration."""
-        self._doubt = reason
+        self.suppressed_reason = reason
 
     def trust(self):
         """The reason to distrust the lean is gone."""
-        self._doubt = None
-
-    @property
-    def doubt(self):
-        """The reason given to distrust(), or None."""
-        return self._doubt
+        self.suppressed_reason = None
 
     @property
     def at_rest(self):
@@ -84,7 +79,7 @@ class LeanMeter:
 
     @property
     def speed_mps(self):
-        """Estimated speed, by the sensor and what measure_speed() was told."""
+        """Estimated speed, from the sensor and what measure_speed() was given."""
         return self.filter.speed_mps
 
     @property
@@ -97,7 +92,7 @@ class LeanMeter:
         """True while lean_deg is certain enough to be shown."""
         if not self._leans:
             return True
-        if self._doubt:
+        if self.suppressed_reason:
             return False
         lean = self.filter
         return 0.0 <= lean.variance <= MAX_VARIANCE and abs(lean.pitch_deg) < WHEELIE_DEG
@@ -123,7 +118,7 @@ class LeanMeter:
         return formula_lean_deg(self.force, self.rate[1])
 
     def measure_speed(self, speed_mps):
-        """Tell the speed, where something measures it: it helps the lean, and is never required. Below 0: no news."""
+        """Give the speed, where something measures it: it helps the lean, and is never required. Below 0: no news."""
         if speed_mps >= 0.0:
             self.filter.measure_speed(speed_mps)
 
@@ -146,7 +141,7 @@ class LeanMeter:
             if dt_us > GAP_US:
                 self.restart()
             else:
-                self.filter.doubt(dt_us * 1e-6)
+                self.filter.inflate_covariance(dt_us * 1e-6)
         if self._fresh:
             self._fresh = False
             dt_us, gain = 0, 1.0  # nothing was before: the same on the board and in a replay

@@ -1,4 +1,5 @@
-"""Does the bike stand still? Told from means over a fifth of a second, in which an idling engine averages out."""
+"""Standstill detector for zero-velocity updates, on means over a fifth of a second, in which an idling engine averages
+out."""
 
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
 MAX_FORCE_G = 0.010  # g: deviation of a mean from the recent average. Larger: smooth roads are mistaken for rest.
@@ -26,17 +27,17 @@ class RestDetector:
 
     def update(self, rates, force, bias, seconds, rolling=False):
         """Means of the last seconds: rates (rad/s) with the estimated bias taken off, that bias, and force (g).
-        rolling: there is good reason to believe that the bike moves."""
-        felt = [rates[i] + bias[i] for i in range(3)] + force
+        rolling: other evidence says that the bike moves."""
+        readings = [rates[i] + bias[i] for i in range(3)] + force
         if self._average is None:
-            self._average = felt
+            self._average = readings
         average = self._average
         gain = min(1.0, seconds / AVERAGE_S)
         # The average rate must be small with the estimated bias taken off, or with the calibrated one alone: else an
         # estimate that went astray, as in the hand, would never be put right.
         still = near_estimate = near_calibration = True
         for i in range(6):
-            deviation = felt[i] - average[i]
+            deviation = readings[i] - average[i]
             average[i] += gain * deviation
             if i < 3:
                 still = still and abs(deviation) < MAX_RATE_RADPS

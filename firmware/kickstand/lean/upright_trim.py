@@ -1,9 +1,8 @@
-"""The lean at which the bike is balanced, where the upright pose of the alignment was not quite upright.
+"""The roll-misalignment correction, in short the trim: the upright pose of the alignment was not quite upright.
 
-A bike in balance feels no force to the side. What it feels on straights, on average, is the angle between the
-alignment's upright and the balance, plus the accelerometer's drift. Both are to be taken off the lean. In turns it
-also feels that its tyres are wide and its rider hangs off; what turns to the left and to the right have in common is
-again the trim.
+On a bike in balance there is no specific force to the side. What is measured on straights, on average, is the roll
+misalignment plus the accelerometer's drift. Both are taken off the lean. In turns wide tyres and a rider who hangs off
+add to it; what turns to the left and to the right have in common is again the trim.
 """
 
 from math import radians, sin
@@ -37,8 +36,8 @@ class UprightTrim:
         self._covariance = 0.0
 
     def update(self, sideways, lean, yaw_rate, seconds):
-        """sideways: force to the left over force up while riding. lean (rad) and yaw_rate (rad/s) tell turns from
-        straights. seconds: since the update before."""
+        """sideways: force to the left over force up while riding. lean (rad) and yaw_rate (rad/s) show how much
+        of a turn it is. seconds: since the update before."""
         sine = sin(lean - self.angle)
         innovation = sideways - self.angle - sine * self._lean_share
         if not -MAX_SIDEWAYS < innovation < MAX_SIDEWAYS:

@@ -24,9 +24,9 @@ import struct
 from array import array
 from binascii import crc32
 
-from .. import __version__
 from ..calibration.store import BODY_LENGTH
 from ..errors import NO_MACHINE_CODE, checked
+from ..units import __version__
 
 MAGIC = b"KRID"
 VERSION = 1
@@ -150,25 +150,11 @@ class RideBlock:
         state[0] = 1  # the prediction divides by the n of the turn before
         state[_PENDING] = state[_BITS] = 0
         state[_AT] = _HEAD_LENGTH
-        version = __version__.encode()[:10]
-        struct.pack_into(
-            HEAD,
-            self.buffer,
-            0,
-            MAGIC,
-            VERSION,
-            length,
-            ride,
-            sequence,
-            time_us,
-            0,  # the temperature is written by close()
-            chip.accel_lsb_per_g,
-            int(10 * chip.gyro_lsb_per_dps + 0.5),
-            sample_hz,
-            version,
-            0,  # the number of positions is written by close()
-            int(10_000 * chip.gyro_delay_s + 0.5),
-        )
+        # the zeros, temperature and number of positions, are written by close()
+        numbers = MAGIC, VERSION, length, ride, sequence, time_us, 0
+        rates = chip.accel_lsb_per_g, int(10 * chip.gyro_lsb_per_dps + 0.5), sample_hz
+        version, delay = __version__.encode()[:10], int(10_000 * chip.gyro_delay_s + 0.5)
+        struct.pack_into(HEAD, self.buffer, 0, *numbers, *rates, version, 0, delay)
         self.buffer[_HEAD_LENGTH - BODY_LENGTH : _HEAD_LENGTH] = body
         self._chip = chip
         self.length = length

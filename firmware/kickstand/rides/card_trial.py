@@ -1,4 +1,4 @@
-"""The SD card is mounted, its free room counted, and a file written to it, once and before the watchdog runs.
+"""The SD card is mounted, its free space counted, and a file written to it, once and before the watchdog runs.
 
 That takes a fifth of a second. Where the card does not say how much of it is free, all its FAT is read, in half a
 minute; where it does not get ready, the driver waits 5 s. During a ride the lean would stand for as long, and the
@@ -15,7 +15,7 @@ _CONTENT = b"Kickstand"
 
 
 def prepare(recorder, settings):
-    """Raises nothing: what is wrong with the card is told, as the recorder's problem and whenever a ride is begun."""
+    """Raises nothing: what is wrong with the card is reported, as the recorder's problem and when a ride is begun."""
     try:
         _try_out(ride_paths.directory(settings))
         return
@@ -32,7 +32,7 @@ def _try_out(directory):
     flash_ring.make(directory)
     flash_ring.free_bytes(directory)
     path = directory + "/probe"
-    with open(path, "wb") as file:  # the first file looks for free room, which may read the FAT as well
+    with open(path, "wb") as file:  # the first file looks for free space, which may read the FAT as well
         file.write(_CONTENT)
     with open(path, "rb") as file:
         if file.read() != _CONTENT:

@@ -148,9 +148,9 @@ class RideRing:
             self._passed = size * (group + 1) - 1
         return oldest
 
-    def write(self, piece):
-        """Write the next piece of the block, bytes. Raises OSError."""
-        if self._file.write(piece) != len(piece):
+    def write(self, data):
+        """Write the next bytes of the block. Raises OSError."""
+        if self._file.write(data) != len(data):
             raise OSError(ENOSPC)
 
     def end_block(self):

@@ -1,6 +1,6 @@
 """Records a ride: puts each turn of the loop into a block, and writes full blocks to flash, a little in each turn.
 
-A block takes four seconds or more to fill. Meanwhile the one before is written. In one turn of the loop a piece is
+A block takes four seconds or more to fill. Meanwhile the one before is written. In one turn of the loop a page is
 written, a file is flushed, or an old file is removed, so that no turn waits for more than one erase of the flash
 (45 ms). The chip's FIFO keeps the samples that come during that time.
 """
@@ -12,7 +12,7 @@ from ..errors import CardError, Notice, report
 from ..units import GAP_US
 from .block import MAX_DT_US, RideBlock
 
-PIECE = 256  # bytes, a page of the flash
+PAGE = 256  # bytes, a page of the flash
 STALL_MS = 10  # a write that took longer was an erase of the flash: to write a page takes 1 ms
 
 
@@ -22,8 +22,8 @@ class Recorder:
 
     active: True while a ride is being recorded.
     problem: None, or a CardError or Notice: why the recording ended by itself; take_problem() clears it.
-    stalled: True if interrupts were off for longer than STALL_MS, so that what they measured is not right. Who has been
-    told clears it.
+    stalled: True if interrupts were off for longer than STALL_MS, so that what they measured is not right. Who deals
+    with that clears it.
     """
 
     def __init__(self, keeper, sample_hz):
@@ -150,7 +150,7 @@ class Recorder:
             if not self.keeper.ready():
                 return
             if self._at < waiting.length:
-                end = min(self._at + PIECE, waiting.length)
+                end = min(self._at + PAGE, waiting.length)
                 self.keeper.write(memoryview(waiting.buffer)[self._at : end])
                 self._at = end
             else:
@@ -175,15 +175,8 @@ class Recorder:
 
     def _begin_block(self):
         """Let the turns to come fill an empty block."""
-        self._block.begin(
-            self.keeper.next_length(),
-            self._ride,
-            self._sequence,
-            self._time_us,
-            self._chip,
-            self._sample_hz,
-            self._body,
-        )
+        length, number = self.keeper.next_length(), (self._ride, self._sequence)
+        self._block.begin(length, *number, self._time_us, self._chip, self._sample_hz, self._body)
         self._sequence += 1
 
     def _end_block(self):

@@ -28,15 +28,15 @@ class RideStream:
         return LENGTH
 
     def room(self):
-        """Nothing to return, because there is no limit."""
+        """None: unlimited."""
 
     def ready(self):
         """True: a block can be written at any time."""
         return True
 
-    def write(self, piece):
-        """Write the next piece of the block, bytes, as a line. Raises OSError."""
-        self._say(b2a_base64(piece).decode())
+    def write(self, data):
+        """Write the next bytes of the block, as a line. Raises OSError."""
+        self._say(b2a_base64(data).decode())
 
     def end_block(self):
         """End a block. Raises OSError."""

@@ -16,7 +16,7 @@ from ..errors import Notice
 
 MAX_SENTENCE = 100  # bytes: the standard says 82, but receivers with many decimals exceed it
 MAX_CHUNK = 64  # bytes read in one turn of the loop: in turns of 10 ms, twice what 10 fixes a second need
-SILENT_MS = 3000  # without any byte, without a whole sentence, or without a fix: then fault() tells which
+SILENT_MS = 3000  # without any byte, without a whole sentence, or without a fix: then fault() says which
 LATE_MS = 2000  # a fix that waited in the receiver for longer than this says nothing about now
 TIME_JUMP_MS = 5000  # a fix that seems later than this is not: the receiver has corrected its clock
 # The delay of a fix is counted from a fix that was not late, the reference. When at least so many fixes over more than
@@ -32,7 +32,7 @@ class Gps:
     """uart: a machine.UART with a time-out of 0. After poll() has returned a speed: age_ms, by how much its sentence
     came later than the receiver's sentences usually do."""
 
-    problem = None  # as a Wheel has it; whatever is wrong here, fault() tells
+    problem = None  # as a Wheel has it; whatever is wrong here, fault() says
 
     def __init__(self, uart):
         self._uart = uart
@@ -90,7 +90,7 @@ class Gps:
 
         An array that the next position overwrites: date, (year since 2000) << 9 | month << 5 | day, or 0 if the
         receiver does not know it yet; time of day in ms; latitude (north > 0) and longitude (east > 0) in 0.00001
-        minutes. All are integers: floats of 32 bits cannot tell places that are a metre apart."""
+        minutes. All are integers: 32-bit floats do not resolve a metre."""
         fields = self._fix
         if fields is None or now_ms != self._fix_ms:
             return None

@@ -1,21 +1,14 @@
 """The page of alignment by driving: what it waits for, how far it is, what came of it."""
 
-from ..drive_alignment.alignment import (
-    BRAKING,
-    READY,
-    TURNING,
-    WAITING_FOR_BRAKING,
-    WAITING_FOR_SPEED,
-    WAITING_FOR_STOP,
-)
+from ..drive_alignment import alignment
 from . import messages
 
 _WAITS = {
-    WAITING_FOR_SPEED: "waiting: speed",
-    WAITING_FOR_STOP: "stop needed",
-    WAITING_FOR_BRAKING: "brake straight",
-    BRAKING: "braking...",
-    TURNING: "turn not counted",
+    alignment.WAITING_FOR_SPEED: "waiting: speed",
+    alignment.WAITING_FOR_STOP: "stop needed",
+    alignment.WAITING_FOR_BRAKING: "brake straight",
+    alignment.BRAKING: "braking...",
+    alignment.TURNING: "turn not counted",
 }
 
 
@@ -28,9 +21,9 @@ def lines(background, now_ms):
     if background.result and (drive.ready or not drive.counted):
         return messages.lines(background.result)
     state = background.state
-    if state == READY:
+    if state == alignment.READY:
         return "Ready:", "stop to save it"
-    if state == WAITING_FOR_SPEED:
+    if state == alignment.WAITING_FOR_SPEED:
         fault = background.speed.fault(now_ms)
         return messages.lines(fault) if fault else ("Align by drive", _WAITS[state])
     if drive.counted < drive.needed:

@@ -76,9 +76,9 @@ mount-moved|Mount has moved|Align again
 side-fixed|Side corrected|Set SIDE too
 aligned|Aligned by drive|error about {0:.1f}\xdf
 """
-# In place of the lean while there is a doubt about the alignment
-_DOUBTS = {"other-side": "side was wrong?", "mount-moved": "mount has moved"}
-_OTHER_SETTING = "config.py: wrong|{0}"  # the display names it, the console tells what is wrong with it
+# In place of the lean while the alignment is in question
+_NO_LEAN = {"other-side": "side was wrong?", "mount-moved": "mount has moved"}
+_OTHER_SETTING = "config.py: wrong|{0}"  # the display names it, the console says what is wrong with it
 
 
 def lines(refusal):
@@ -86,6 +86,6 @@ def lines(refusal):
     return tuple(refusal.words(_LINES, _OTHER_SETTING).split("|"))
 
 
-def doubt(code):
-    """Why there is no lean to show, in one line. code: of a doubt about the alignment, or None."""
-    return _DOUBTS.get(code, "not sure yet")
+def no_lean(reason):
+    """Why there is no lean to show, in one line. reason: LeanMeter.suppressed_reason."""
+    return _NO_LEAN.get(reason, "not sure yet")

@@ -10,18 +10,22 @@ CAR = (pages.acceleration, pages.cornering, pages.raw)
 
 
 class PageRing:
-    """The page that is shown, as a view (see views.py). app: the App. align: called for a short press while there is no
-    alignment: it means that the bike is on its kickstand."""
+    """The page that is shown, as a view (see screen.py). leans: False for a car. meter, calibration, drive, rides: the
+    LeanMeter, the ActiveCalibration, the BackgroundAlignment or None, and the Recording, all to be read only. align:
+    called for a short press while there is no alignment: it means that the bike is on its kickstand.
 
-    def __init__(self, app, align):
-        self._app = app
-        self._meter = app.meter
-        self._calibration = app.calibration
-        self._drive = app.drive
-        self._app = app
+    late: the page that is due is to show no lean.
+    """
+
+    def __init__(self, leans, meter, calibration, drive, rides, align):
+        self._meter = meter
+        self._calibration = calibration
+        self._drive = drive
+        self._rides = rides
         self._align = align
-        self._pages = CAR if app.settings.VEHICLE == "car" else MOTORCYCLE
+        self._pages = MOTORCYCLE if leans else CAR
         self._at = 0
+        self.late = False
 
     def add(self, page):
         """Add a page behind the others."""
@@ -61,22 +65,22 @@ class PageRing:
             if self._at % 2 == 0:
                 return self._drive_lines(now_ms)
             return pages.not_aligned(self._meter, now_ms // 1000, "drive and brake")
-        count = len(self._pages) + self._driving + self._app.recording
+        count = len(self._pages) + self._driving + self._rides.recorder.active
         if self._at >= count:  # the last page has gone; checked here, so that the other pages keep their places
             self._at = 0
         if self._at == len(self._pages) and self._driving:
             return self._drive_lines(now_ms)
         if self._at >= len(self._pages):
-            return pages.recording(self._app.recorder)
+            return pages.recording(self._rides.recorder)
         return self._page(self._pages[self._at])
 
     def _page(self, page):
         meter = self._meter
         if meter.fallen:
             return pages.FALLEN
-        if self._app.late or not meter.trusted or abs(meter.lean_deg) > FALLEN_DEG:
-            return pages.unsure(meter.doubt)
+        if self.late or not meter.trusted or abs(meter.lean_deg) > FALLEN_DEG:
+            return pages.unsure(meter.suppressed_reason)
         line1, line2 = page(meter)
-        if self._at == 0 and self._app.recording:
+        if self._at == 0 and self._rides.recorder.active:
             line1 = pages.recorded(line1)
         return line1, line2

@@ -18,9 +18,9 @@ FALLEN = ("Fallen over?", "Lean over 65" + DEGREE)
 _bar = bytearray(16)
 
 
-def unsure(doubt):
-    """In place of a lean that cannot be trusted. doubt: the code of the reason, or None."""
-    return "Lean  --", messages.doubt(doubt)
+def unsure(reason):
+    """In place of a lean that cannot be trusted. reason: its code, or None."""
+    return "Lean  --", messages.no_lean(reason)
 
 
 def lean_bar(lean_deg):
@@ -66,7 +66,7 @@ def recorded(line):
 
 
 def recording(recorder):
-    """For how long the ride has been recorded, and for how much longer there is room before its beginning is erased."""
+    """For how long the ride has been recorded, and how much longer it may last before its beginning is erased."""
     seconds, room_s = recorder.seconds(), recorder.room_s()
     if room_s is None:
         room = "to USB"
@@ -129,10 +129,9 @@ def not_aligned(meter, seconds, todo="On stand: press"):
     return "Raw %4d%s %+.2fg" % (round(tilt), DEGREE, meter.smooth_force[2]), hint
 
 
-def sensor_info(app, seconds):
+def sensor_info(sensor, lost, meter, seconds):
     """Which chip it is and how warm; below that in turn what is calibrated, how often the chip's FIFO overflowed and
-    the chip was set up, and how many samples the overflows have cost."""
-    sensor, meter = app.sensor, app.meter
+    the chip was set up, and how many samples the overflows have cost (lost)."""
     chip, calibration = sensor.chip, meter.calibration
     line1 = "%-9s%5.1f%sC" % (chip.name[:9], chip.temperature_c(meter.reading[3]), DEGREE)
     turn = seconds // 2 % 3
@@ -140,7 +139,7 @@ def sensor_info(app, seconds):
         return line1, "6pos %-3s ali %s" % (_yes(calibration.six_done), _yes(calibration.aligned))
     if turn == 1:
         return line1, "%d gaps %d starts" % (min(chip.overflows, 99), min(sensor.restarts, 9))
-    return line1, "samples lost%4d" % min(app.clock.lost, 9999)
+    return line1, "samples lost%4d" % min(lost, 9999)
 
 
 def _yes(flag):

@@ -1,38 +1,122 @@
-"""What the rider sees and what a press does: a stack of views. The one in front is shown, and a press is for it."""
+"""What the rider sees and what a press does: a stack of views. The one in front is shown, and a press is for it.
+
+A view has lines(now_ms), which gives two lines of 16 characters, or None while it has nothing to show, and
+press(event, now_ms), which gives True if the press was for it.
+"""
 
 import gc
+from time import ticks_add, ticks_diff
 
-from ..board.button import LONG
+from ..board.button import LONG, SHORT
 from ..errors import attempt
 from . import messages, pages
 from .page_ring import PageRing
-from .views import FaultView, InfoView, NoticeView, QuestionView
+
+NOTICE_MS = 2000
+
+
+class NoticeView:
+    """Two lines for two seconds, or until a press, which is then for what they covered."""
+
+    def __init__(self):
+        self._lines = None
+        self._until_ms = 0
+
+    def show(self, lines, now_ms):
+        """lines: two, for NOTICE_MS from now on."""
+        self._lines = lines
+        self._until_ms = ticks_add(now_ms, NOTICE_MS)
+
+    def lines(self, now_ms):
+        if self._lines and ticks_diff(now_ms, self._until_ms) >= 0:
+            self._lines = None
+        return self._lines
+
+    def press(self, event, now_ms):
+        self._lines = None
+        return False
+
+
+class FaultView:
+    """Why there are no readings."""
+
+    def __init__(self, sensor):
+        self._sensor = sensor
+
+    def lines(self, now_ms):
+        fault = self._sensor.fault
+        return None if fault is None else messages.lines(fault)
+
+    def press(self, event, now_ms):
+        return False
+
+
+class InfoView:
+    """Which chip it is, how warm, what is calibrated; until a short press."""
+
+    def __init__(self, sensor, clock, meter):
+        self._sensor = sensor
+        self._clock = clock
+        self._meter = meter
+        self.open = False
+
+    def show(self, now_ms):
+        """From now on."""
+        self.open = True
+
+    def lines(self, now_ms):
+        if not self.open:
+            return None
+        return pages.sensor_info(self._sensor, self._clock.lost, self._meter, now_ms // 1000)
+
+    def press(self, event, now_ms):
+        if event == SHORT:
+            self.open = False
+        return event == SHORT
+
+
+class QuestionView:
+    """What alignment by driving has to report or to ask. drive: a BackgroundAlignment, or None."""
+
+    def __init__(self, drive):
+        self._drive = drive
+
+    def lines(self, now_ms):
+        if self._drive is None or self._drive.message is None:
+            return None
+        return messages.lines(self._drive.message)
+
+    def press(self, event, now_ms):
+        self._drive.answer(event == LONG)
+        return True
 
 
 class Screen:
-    """app: the App, whose sensor, clock, meter, calibration, drive and recorder it shows.
+    """settings: a Settings. sensor, clock, meter: the Sensor, its SampleClock and the LeanMeter, which it shows.
+    calibration, drive, rides: the ActiveCalibration, the BackgroundAlignment or None, and the Recording, which the menu
+    starts as well.
 
-    wizard: the AlignWizard or SixWizard under way, which takes every sample, or None.
+    wizard: the AlignWizard or SixWizard under way, which takes every sample, or None. menu: the open Menu, or None.
+    pages: the PageRing.
     """
 
-    def __init__(self, app):
-        self._app = app
+    def __init__(self, settings, sensor, clock, meter, calibration, drive, rides):
+        self._settings = settings
+        self._sensor = sensor
+        self._meter = meter
+        self._calibration = calibration
+        self._drive = drive
+        self._rides = rides
         self.wizard = None
-        self._menu = None
+        self.menu = None
         self._notice = NoticeView()
-        self._fault = FaultView(app.sensor)
-        self._info = InfoView(app)
-        self._question = QuestionView(app.drive)
-        self._pages = PageRing(app, self._align_now)
+        self._fault = FaultView(sensor)
+        self._info = InfoView(sensor, clock, meter)
+        self._question = QuestionView(drive)
+        self.pages = PageRing(settings.leans, meter, calibration, drive, rides, self._align_now)
 
     def lines(self, now_ms):
         """What the display should say now. Call it about every 100 ms."""
-        app = self._app
-        if self._menu:  # in which a recording can be begun, at once
-            app.prepare_recorder()
-        problem = (app.recorder and app.recorder.take_problem()) or (app.drive and app.drive.speed.take_problem())
-        if problem:
-            self.tell(problem, now_ms)
         return self._update_front(now_ms)[1]
 
     def press(self, event, now_ms):
@@ -40,9 +124,9 @@ class Screen:
         missing, or have no memory: that must not end the ride."""
         problem = attempt(self._press, event, now_ms)
         if problem:
-            self.tell(problem, now_ms)
+            self.notify(problem, now_ms)
 
-    def tell(self, notice, now_ms):
+    def notify(self, notice, now_ms):
         """Show a Notice for two seconds."""
         self._notice.show(messages.lines(notice), now_ms)
 
@@ -59,7 +143,7 @@ class Screen:
 
     def add_page(self, page):
         """Add a page behind the others. page: a function of the meter that gives two lines of 16 characters."""
-        self._pages.add(page)
+        self.pages.add(page)
 
     def interrupt(self, now_ms):
         """The sensor has failed: a calibration under way is cancelled."""
@@ -70,54 +154,42 @@ class Screen:
     def _update_front(self, now_ms):
         """Return the view in front and its two lines: the first in this order that has something to show. Drop a
         wizard or menu that has ended, and go back to the first page when a question is shown."""
-        for view in (
-            self._notice,
-            self.wizard,
-            self._menu,
-            self._fault,
-            self._info,
-            self._question,
-            self._pages,
-        ):
+        for view in (self._notice, self.wizard, self.menu, self._fault, self._info, self._question, self.pages):
             lines = view.lines(now_ms) if view else None
             if lines:
                 break
         self._drop_ended()
         if view is self._question:
-            self._pages.first()  # where the answer leads to
+            self.pages.first()  # where the answer leads to
         return view, lines
 
     def _drop_ended(self):
         """What has ended gets no more samples and no more presses."""
         if self.wizard and self.wizard.ended:
             self.wizard = None
-        if self._menu and self._menu.ended:
-            self._menu = None
+        if self.menu and self.menu.ended:
+            self.menu = None
 
     def _open_menu(self, now_ms):
         from .menu import Menu  # with the first long press
 
-        self._menu = Menu(self._entries(), now_ms)
+        self.menu = Menu(self._entries(), now_ms)
 
     def _entries(self):
         """The entries of the menu: (name, what to call with now_ms)."""
         align = (("Align the bike", self._align),)
-        six = (("Six positions", self._six),)
-        rest = (("Reset maxima", self._reset), ("Sensor info", self._info.show))
-        drive = (("Align by drive", self._drive),) if self._app.drive else ()
-        if self._app.recording:
-            record = (("Stop recording", self._stop),)
-        else:
-            record = (("Record ride", self._record),)
-        if self._app.settings.VEHICLE == "car":
-            return drive + six + rest + record
-        return align + six + rest + drive + record
+        drive = (("Align by drive", self._align_by_drive),) if self._drive else ()
+        rest = (("Six positions", self._six), ("Reset maxima", self._reset), ("Sensor info", self._info.show))
+        record = ("Stop recording", self._stop) if self._rides.recorder.active else ("Record ride", self._record)
+        if self._settings.leans:
+            return align + rest + drive + (record,)
+        return drive + rest + (record,)
 
     def _ready(self, now_ms):
-        """True if there are readings; if not, the rider is told why."""
-        fault = self._app.sensor.fault
+        """True if there are readings; if not, the rider is shown why."""
+        fault = self._sensor.fault
         if fault is not None:
-            self.tell(fault, now_ms)
+            self.notify(fault, now_ms)
         return fault is None
 
     def _align(self, now_ms):
@@ -135,34 +207,34 @@ class Screen:
         gc.collect()
         from .align_wizard import AlignWizard
 
-        app = self._app
-        self._pages.first()
-        settings, calibration = app.settings, app.calibration
-        self.wizard = AlignWizard(app.sensor.chip, settings.SAMPLE_HZ, calibration, settings.SIDE, pressed)
+        self.pages.first()
+        settings = self._settings
+        self.wizard = AlignWizard(self._sensor.chip, settings.SAMPLE_HZ, self._calibration, settings.SIDE, pressed)
 
     def _six(self, now_ms):
         if self._ready(now_ms):
             gc.collect()
             from .six_wizard import SixWizard
 
-            app = self._app
-            self.wizard = SixWizard(app.sensor.chip, app.settings.SAMPLE_HZ, app.calibration)
+            self.wizard = SixWizard(self._sensor.chip, self._settings.SAMPLE_HZ, self._calibration)
 
     def _reset(self, now_ms):
-        self._app.meter.reset_maxima()
+        self._meter.reset_maxima()
         self._notice.show(("Maxima reset", ""), now_ms)
 
-    def _drive(self, now_ms):
+    def _align_by_drive(self, now_ms):
         if self._ready(now_ms):
-            self._app.drive.ask()
-            self._pages.drive()
+            self._drive.ask()
+            self.pages.drive()
 
     def _record(self, now_ms):
         if self._ready(now_ms):
-            self._app.record()
-            if self._app.recording:
-                self._notice.show(pages.recording(self._app.recorder), now_ms)
+            problem = self._rides.start()
+            if problem:
+                self.notify(problem, now_ms)
+            elif self._rides.recorder.active:
+                self._notice.show(pages.recording(self._rides.recorder), now_ms)
 
     def _stop(self, now_ms):
-        self._app.recorder.stop()
+        self._rides.stop()
         self._notice.show(("Recording ended", ""), now_ms)

@@ -7,7 +7,7 @@ import functools
 import io
 import math
 import zipfile
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -105,45 +105,31 @@ def into(target: Path, files: dict[str, str]) -> Path:
     return target
 
 
-def phyphox(
-    ride: Riding,
-    separator: str = ",",
-    comma: bool = False,
-    gravity: bool = True,
-    gps: bool = True,
-    number: Callable[[float], str] = "{:.9E}".format,
-) -> dict[str, str]:
+def phyphox(ride: Riding, separator: str = ",", comma: bool = False) -> dict[str, str]:
     """Names and columns of the app's own template; a gyro of half the rate and a bit later, GPS once a second."""
 
-    def table(names: list[str], rows: np.ndarray) -> str:
+    def number(value: float, digits: int = 9) -> str:
+        return f"{value:.{digits}E}".replace(".", "," if comma else ".")
+
+    def table(names: list[str], *columns: np.ndarray) -> str:
         text = [separator.join(f'"{name}"' for name in names)]
-        for row in rows.tolist():
-            cells = [number(value) for value in row]
-            text.append(separator.join(cell.replace(".", ",") if comma else cell for cell in cells))
+        text += [separator.join(map(number, row)) for row in np.column_stack(columns).tolist()]
         return "\n".join(text)  # no line feed at the end
 
-    utc = f"{START_UTC_S:.15E}".replace(".", "," if comma else ".")
-    gyro = ride.every(2, 1)
-    linear = ride.phone_g - ride.gravity_g
-    metres = [f"{axis} (m/s^2)" for axis in "XYZ"]
-    files = {
-        "Gyroscope.csv": table(
-            ["Time (s)", *[f"{axis} (rad/s)" for axis in "XYZ"]], np.column_stack((gyro.t_s, gyro.phone_rad))
-        ),
-        "Linear Accelerometer.csv": table(["Time (s)", *metres], np.column_stack((ride.t_s, 9.81 * linear))),
+    gyro, fixes = ride.every(2, 1), ride.each_second()
+    metres = ["Time (s)", *[f"{axis} (m/s^2)" for axis in "XYZ"]]
+    place = ["Time (s)", "Latitude (°)", "Longitude (°)", "Height (m)", "Velocity (m/s)", "Direction (°)"]
+    none = np.zeros(len(fixes.t_s))
+    start = separator.join(['"START"', number(0.0), number(START_UTC_S, 15), '"2024"'])
+    return {
+        "Gyroscope.csv": table(["Time (s)", *[f"{axis} (rad/s)" for axis in "XYZ"]], gyro.t_s, gyro.phone_rad),
+        "Linear Accelerometer.csv": table(metres, ride.t_s, 9.81 * (ride.phone_g - ride.gravity_g)),
+        "Accelerometer.csv": table(metres, ride.t_s, 9.81 * ride.phone_g),
+        "Location.csv": table(place, fixes.t_s, fixes.lat_deg, fixes.lon_deg, none, fixes.speed_mps, none),
         "meta/device.csv": f'"property"{separator}"value"\n"deviceModel"{separator}"Pixel"\n',
         "meta/time.csv": separator.join(f'"{name}"' for name in ("event", "experiment time", "system time", "text"))
-        + f'\n"START"{separator}{number(0.0)}{separator}{utc}{separator}"2024"\n',
+        + f"\n{start}\n",
     }
-    if gravity:
-        files["Accelerometer.csv"] = table(["Time (s)", *metres], np.column_stack((ride.t_s, 9.81 * ride.phone_g)))
-    if gps:
-        fixes = ride.each_second()
-        names = ["Time (s)", "Latitude (°)", "Longitude (°)", "Height (m)", "Velocity (m/s)", "Direction (°)"]
-        none = np.zeros(len(fixes.t_s))
-        rows = np.column_stack((fixes.t_s, fixes.lat_deg, fixes.lon_deg, none, fixes.speed_mps, none))
-        files["Location.csv"] = table(names, rows)
-    return files
 
 
 def sensor_logger(ride: Riding, platform: str = "android", standard: bool = False) -> dict[str, str]:

@@ -15,6 +15,7 @@ G = 9.80665
 FINE_HZ, RATE_HZ = 800, 200
 UP_ERROR_DEG, PITCH_ERROR_DEG, STAND_DEG = 1.5, 1.0, 11.0  # of the two poses, and the tilt between them
 VIBRATION_G, VIBRATION_DPS = 0.12, 1.5  # rms of white noise in each sample
+RIDER_DEG = 2.0  # rms by which the rider, moving about, makes the bike's lean differ from the one of balance
 
 
 @dataclass
@@ -54,32 +55,19 @@ def track(chance):
     return [*legs, (6.0, 0.0, 20.0)]
 
 
-def town(chance):
-    """Slow turns, and stops."""
-    legs = [(6.0, 0.0, 0.0)]
-    for _ in range(22):
-        legs += [(6.0, 0.0, chance.uniform(7.0, 13.0))]
-        lean = chance.choice((-1.0, 1.0)) * chance.uniform(8.0, 25.0)
-        legs += [(chance.uniform(2.5, 5.0), lean, chance.uniform(4.5, 8.0))]
-        if chance.random() < 0.3:
-            legs += [(5.0, 0.0, 0.0), (chance.uniform(4.0, 12.0), 0.0, 0.0)]
-    return [*legs, (6.0, 0.0, 8.0)]
+KINDS = {"sweepers": sweepers, "held": held, "track": track}
 
 
-KINDS = {"sweepers": sweepers, "held": held, "track": track, "town": town}
-
-
-def other_ride(kind, seed, height_m=0.0, seconds=1000.0, rider_deg=2.0, speed=False):
-    """height_m: of the sensor above the roll axis. seconds: no longer than this, to whole legs. rider_deg: rms by which
-    the rider, moving about, makes the bike's lean differ from the one of balance. speed: give it once a second, 0.4 s
-    late."""
+def other_ride(kind, seed, seconds, height_m=0.0, speed=False):
+    """seconds: no longer than this, to whole legs. height_m: of the sensor above the roll axis. speed: give it once a
+    second, 0.4 s late."""
     chance = np.random.default_rng([seed, *kind.encode()])
     legs = KINDS[kind](chance)
     legs = [leg for leg, end in zip(legs, np.cumsum([leg[0] for leg in legs])) if end <= seconds]
     time, lean, v = _course(legs)
     n = len(time)
     riding = np.clip((v - 1.0) / 3.0, 0.0, 1.0)
-    chassis = np.radians(lean + rider_deg * riding * _noise(chance, n, 0.7))
+    chassis = np.radians(lean + RIDER_DEG * riding * _noise(chance, n, 0.7))
     yaw_rate = np.where(v > 0.5, -G * np.tan(np.radians(lean)) / np.maximum(v, 3.0), 0.0)
     slope = np.radians(0.8) * _noise(chance, n, 4.0) * riding
     dive = np.radians(0.25) * _smooth(np.gradient(v) * FINE_HZ, 0.2)
@@ -104,10 +92,10 @@ def other_ride(kind, seed, height_m=0.0, seconds=1000.0, rider_deg=2.0, speed=Fa
     mounting, _ = np.linalg.qr(chance.standard_normal((3, 3)))
     mounting *= np.linalg.det(mounting)
     middle = (np.arange(count) + 0.5) / RATE_HZ
-    told = np.full(count, np.nan)
+    given = np.full(count, np.nan)
     if speed:
-        told[::RATE_HZ] = np.interp(middle[::RATE_HZ] - 0.4, time, v)
-    log = Log(middle, force @ mounting, rates @ mounting, told)
+        given[::RATE_HZ] = np.interp(middle[::RATE_HZ] - 0.4, time, v)
+    log = Log(middle, force @ mounting, rates @ mounting, given)
     calibration = CalibrationFile(vehicle_from_sensor=wrong @ mounting, aligned=True, six_done=True, gyro_delay_s=0.0)
     return OtherRide(log, calibration, np.degrees(np.interp(middle, time, chassis)), np.interp(middle, time, v))
 
@@ -125,14 +113,8 @@ def _course(legs):
 def _readings(v, yaw_rate, slope, lean, pitch, height_m):
     """Specific force (g) and rates (rad/s) along left, up, forward, by differences of place and attitude."""
     heading = np.cumsum(yaw_rate) / FINE_HZ
-    along = v / FINE_HZ
-    place = np.column_stack(
-        (
-            np.cumsum(along * np.cos(slope) * np.cos(heading)),
-            np.cumsum(along * np.cos(slope) * np.sin(heading)),
-            np.cumsum(along * np.sin(slope)),
-        )
-    )
+    direction = np.cos(slope) * np.cos(heading), np.cos(slope) * np.sin(heading), np.sin(slope)
+    place = np.cumsum(np.column_stack(direction) * v[:, None] / FINE_HZ, axis=0)
     c, s = np.cos(heading), np.sin(heading)
     nothing = np.zeros_like(c)
     ahead = np.stack((c * np.cos(pitch), s * np.cos(pitch), np.sin(pitch)), axis=1)
@@ -145,13 +127,8 @@ def _readings(v, yaw_rate, slope, lean, pitch, height_m):
     body = np.stack((left, up, ahead), axis=1)  # rows are the vehicle's axes in the world
     change = np.gradient(body, axis=0) * FINE_HZ
     force = np.einsum("nij,nj->ni", body, acceleration) / G
-    rates = np.column_stack(
-        (
-            np.einsum("ni,ni->n", change[:, 1], ahead),
-            np.einsum("ni,ni->n", change[:, 2], left),
-            np.einsum("ni,ni->n", change[:, 0], up),
-        )
-    )
+    turning = (change[:, 1] * ahead, change[:, 2] * left, change[:, 0] * up)
+    rates = np.column_stack([product.sum(axis=1) for product in turning])
     return force, rates
 
 

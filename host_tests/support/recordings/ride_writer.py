@@ -8,6 +8,7 @@ from array import array
 from kickstand.calibration.parameters import Calibration
 from kickstand.calibration.store import pack
 from kickstand.rides.block import RideBlock, block_length
+from kickstand_tools.rides import block_reader
 
 CHIP = types.SimpleNamespace(
     who_am_i=0x68,
@@ -75,3 +76,16 @@ def blocks(
         block.close()
         written.append(bytes(block.buffer[: block.length]))
     return written, held
+
+
+def begun(length, sequence=0, block=None):
+    """A block of ride 1 with nothing in it yet; of the same RideBlock as before, if one is given."""
+    block = block or RideBlock(5000)
+    block.begin(length, 1, sequence, 0, CHIP, 200, bytes(80))
+    return block
+
+
+def ended(block):
+    """What the tools read of it."""
+    block.close()
+    return block_reader.parse(bytes(block.buffer[: block.length]))

@@ -11,39 +11,10 @@ LAPTOP: dict[str, Any] = {"viewport": {"width": 1440, "height": 900}}
 READ_S = 30  # at most, until the display says something: a busy machine starts the page late
 
 # Keeps what the board's worker sends, for tests to look at and to repeat
-KEEP = """
-const Real = Worker;
-window.seen = { displays: [], orders: [], rates: [], shifts: [], last: null };
-window.Worker = class extends Real {
-  constructor(...given) {
-    super(...given);
-    this.addEventListener("message", ({ data }) => {
-      for (const tick of data.ticks ?? []) {
-        seen.last = tick;
-        if (tick.display) seen.displays.push([tick.t_s, tick.display]);
-      }
-      seen.orders.push(...(data.orders ?? []));
-      if (data.rate !== undefined) seen.rates.push(data.rate);
-    });
-  }
-};
-new PerformanceObserver((list) => {
-  for (const entry of list.getEntries()) {
-    const moved = entry.sources.map((one) => [
-      one.node?.id || one.node?.className || one.node?.nodeName, one.previousRect.toJSON(), one.currentRect.toJSON(),
-    ]);
-    seen.shifts.push([entry.value, entry.startTime, ...moved]);
-  }
-}).observe({ type: "layout-shift", buffered: true });
-"""
+KEEP = Path(__file__).with_name("keep.js").read_text()
 
 # The site has no file whose address ends so; window.given() again fetches all. The service worker is passed by.
-MISSING = """(end) => {
-  const fetched = window.fetch;
-  window.fetch = (url, ...more) =>
-    String(url).endsWith(end) ? Promise.resolve(new Response("not here", { status: 404 })) : fetched(url, ...more);
-  window.given = () => (window.fetch = fetched);
-}"""
+MISSING = Path(__file__).with_name("missing.js").read_text()
 
 
 class Rider:

@@ -14,7 +14,7 @@ from ..calibration.file import CalibrationFile
 from ..logs.block import Block
 from ..logs.log import ROOM_TEMP_C
 from ..logs.table import Array, Table
-from ..replay.formula import formula_lean_deg
+from ..replay.meter_along import formula_lean_deg
 
 
 @dataclass(eq=False)

@@ -10,6 +10,7 @@ from kickstand.lean.meter import MAX_VARIANCE
 
 from ..calibration.file import CalibrationFile, calibration_beside, read_calibration
 from ..errors import InputError
+from ..estimation.smooth import smooth_blocks
 from ..logs.block import Block
 from ..logs.reader import Source, apart, read_blocks
 from ..logs.source import File, Progress, log_stem, name_of
@@ -17,7 +18,6 @@ from ..logs.stretch import Stretch
 from ..logs.table import Array
 from ..replay.meter_along import MeterAlong
 from ..replay.mount_check import MountCheck
-from ..smoothing.smooth import smooth_blocks
 from .channels import Channels, channels
 
 
@@ -48,17 +48,19 @@ class Ride:
     def blocks(
         self, progress: Progress | None = None, notices: list[Notice] | None = None, mount: MountCheck | None = None
     ) -> Iterator[Channels]:
-        """The ride without the readings that froze: they are a gap. progress, notices: of read_blocks(). mount: is
-        given all of the log, also where the ride is a stretch of it. Raises InputError."""
-        lean, told, slow, some = _Lean(self.calibration), False, False, False
+        """The ride without the readings that froze: they are a gap. progress, notices: of read_blocks(); of what
+        contradicts the calibration, too, unless there is a mount, which is given all of the log, also where the ride is
+        a stretch of it. Raises InputError."""
+        lean, absurd, slow, some = _Lean(self.calibration), False, False, False
+        check = mount or MountCheck(self.calibration)
         log, stretch = apart(self.log)
         for whole, found in self._read(log, progress, notices):
-            block = whole.believed
+            block = whole.measured
             if not len(block.time_us):
                 continue
             rows = lean.follow(block, shown=found is None)
-            if notices is not None and not told and np.any(rows[:, 2] < 0.0):
-                told = True
+            if notices is not None and not absurd and np.any(rows[:, 2] < 0.0):
+                absurd = True
                 notices.append(_absurd(block, int(np.argmax(rows[:, 2] < 0.0))))
             slow |= self.smoothed and found is None
             if found is not None:
@@ -66,8 +68,8 @@ class Ride:
                 rows[:, 0], rows[:, 2] = shown[:, 0], np.radians(shown[:, 1]) ** 2
                 rows[:, 5] = rows[:, 2] <= MAX_VARIANCE  # NaN is not
             seen = channels(block, self.calibration, rows, self.car)
-            if mount is not None:
-                mount.add(seen.t_s, seen.force_g, seen.rate_dps, seen.speed_mps)
+            if mount is not None or notices is not None:
+                check.add(seen.t_s, seen.force_g, seen.rate_dps, seen.speed_mps)
             if stretch is not None:
                 which = stretch.holds(block)
                 if not which.any():
@@ -77,8 +79,10 @@ class Ride:
             yield seen
         if not some:
             raise InputError(f"{self.name}: all readings are frozen, so that nothing is known: check the sensor")
-        if slow and notices is not None:
-            notices.append(Notice("smooth-slow"))
+        if notices is not None:
+            notices += [Notice("smooth-slow")] if slow else []
+            contradiction = None if mount else check.notice()
+            notices += [contradiction] if contradiction else []
 
     def _read(
         self, log: Source, progress: Progress | None, notices: list[Notice] | None

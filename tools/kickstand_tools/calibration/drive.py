@@ -10,7 +10,7 @@ from kickstand.drive_alignment.alignment import CAR, MOTORCYCLE, DriveAlignment
 from kickstand.errors import AlignmentError, Notice
 
 from ..errors import InputError
-from ..logs.mended.frozen import believed
+from ..logs.frozen import without_frozen
 from ..logs.reader import Log, Source, read_log
 from ..logs.source import Progress
 from ..logs.table import Array
@@ -170,7 +170,7 @@ def fit_logs(
 def usable(log: Log, others: bool) -> Log:
     """The log without frozen readings, where it has a speed and enough samples. others: there are other logs, so that
     this one can be left out. Raises InputError."""
-    log = believed(log)
+    log = without_frozen(log)
     if np.all(np.isnan(log.speed_mps)):
         instead = ", or leave this log out" if others else ""
         raise InputError(f"{log.name}: no speed: record a column speed_mps, from a GPS or a wheel{instead}")

@@ -1,19 +1,17 @@
 """The commands of `kickstand` that talk to a board: flash, status, pull, record."""
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import click
 
 from .. import firmware_path
-from ..deploy.connection import Progress
+from ..deploy.connection import Progress, status
 from ..deploy.flash import flash
-from ..deploy.status import status
 from ..progress import Bar
-from ..rides.live_line import LiveLine
 from ..rides.pull import PulledRide, pull
-from ..rides.record import record
+from ..rides.record import live_line, record
 from ..rides.stream import LiveReading
 from .common import OUT, PATH, PORT, warning
 
@@ -87,13 +85,13 @@ def pull_command(port: str | None, out: Path, delete: bool) -> None:
 def record_command(port: str | None, out: Path) -> None:
     """Write a log live over USB until Ctrl-C; the board's display goes on."""
     with contextlib.ExitStack() as stack:
-        line: list[LiveLine] = []
+        show: list[Callable[[str], None]] = []
 
         def begin(name: str) -> None:
             click.echo(f"recording from {name}: Ctrl-C ends it")
-            line.append(stack.enter_context(LiveLine()))
+            show.append(stack.enter_context(live_line()))
 
-        result = record(port, out, begin, lambda reading: line[0].show(_live_text(reading)))
+        result = record(port, out, begin, lambda reading: show[0](_live_text(reading)))
     for note in result.notes:
         warning(note)
     click.echo(
@@ -104,7 +102,7 @@ def record_command(port: str | None, out: Path) -> None:
 def _live_text(reading: LiveReading) -> str:
     """The lean as a bar to the left or right, in a car the forces, and how long the recording is."""
     how_long = f"{reading.rate_hz:3.0f} readings/s  {reading.seconds // 60:.0f}:{reading.seconds % 60:04.1f}"
-    lean, forward_g, left_g = reading.lean_deg, reading.forward_g, reading.left_g
+    lean, forward_g, left_g = reading.moments[-1][1:] if reading.moments else (None, None, None)
     if left_g is not None:  # a car, and aligned
         side = "left " if left_g > 0.0 else "right"
         return f"forward {forward_g:+.2f} g  {side} {abs(left_g):.2f} g  {how_long}"

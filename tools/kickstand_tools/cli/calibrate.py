@@ -15,9 +15,9 @@ from ..calibration.drive import DriveFit, fit_drive
 from ..calibration.file import CalibrationFile, read_calibration, write_calibration
 from ..calibration.poses import refuse_same_file
 from ..calibration.remarks import remarks
-from ..calibration.ride.fit import RideFit, fit_ride
 from ..calibration.six import GOOD_FREE_POSE_G, SixPositions, fit_six_positions
 from ..calibration.two import TwoPositions, fit_two_positions
+from ..estimation.alignment import RideFit, fit_ride
 from ..logs.reader import read_log
 from ..output import check_output
 from ..progress import Bar
@@ -213,7 +213,7 @@ def _ride_lines(found: RideFit) -> Iterable[str]:
     yield "gyro bias  " + _along_axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
     yield "offset     " + _along_axes(found.calibration.accel_offset_g, "%+.4f g")
     yield from _matrix_lines(found.calibration.vehicle_from_sensor)
-    yield "upright is where the bike is balanced on straights; the accelerometer's slopes are not observable from a ride"
+    yield "upright is where the bike is balanced on straights; a ride does not show the accelerometer's slopes"
 
 
 def _matrix_lines(vehicle_from_sensor) -> Iterable[str]:

@@ -18,17 +18,17 @@ from ..analysis.report import as_data, page
 from ..analysis.ride import open_ride
 from ..calibration.file import calibration_beside, calibration_path, read_calibration
 from ..errors import InputError
+from ..estimation.smooth import smooth_to_csv
 from ..imports.importing import Imported, import_recording, write_imported
 from ..joining.joined import Joined, join_track, write_joined
 from ..joining.track_files import read_track
-from ..logs.cut import cut_log
+from ..logs.csv_lines import cut_log
 from ..logs.reader import Source
 from ..logs.stretch import Stretch
 from ..output import check_output
 from ..overlay.overlay import overlay
 from ..progress import Bar, spinner
 from ..replay.replay import replay_to_csv
-from ..smoothing.smooth import smooth_to_csv
 from .common import (
     CALIBRATION,
     JSON,

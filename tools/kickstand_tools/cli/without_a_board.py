@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from ..demo.demo import DeviceStopped, demo
-from ..emulator import image
+from ..emulator import image, native
 from ..output import check_directory
 from ..progress import spinner
 from ..web import serve, site
@@ -52,6 +52,8 @@ def web_command(out: Path | None) -> None:
 def emulate_command(port: int) -> None:
     """An emulated Pico on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
     image.find()  # before anything else of the emulator is imported
+    with spinner("compiling the emulator, once"):
+        native.build()
     from ..emulator.emulate import emulate
 
     emulate(port, click.echo)

@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterator
 from typing import Any
 
-from mpremote.transport_serial import SerialTransport
+from .connection import Board
 
 _CTRL_A, _CTRL_C = b"\x01", b"\x03"
 _END = b"\x04"  # of the program's output, and of its error
@@ -23,7 +23,7 @@ class BrokenOff(Exception):
 
 
 def lines(
-    transport: SerialTransport,
+    transport: Board,
     code: str,
     silent_s: float,
     stopped: threading.Event | None = None,
@@ -58,7 +58,7 @@ def lines(
         elif asked_s is not None and time.monotonic() - asked_s > _LAST_S:
             return
         else:
-            time.sleep(_POLL_S)
+            transport.wait(_POLL_S)
         output, end, error = said.partition(_END)
         *whole, output = output.split(b"\n")
         said = output + end + error

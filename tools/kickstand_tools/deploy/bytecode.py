@@ -5,11 +5,16 @@ A board says what it takes as sys.implementation._mpy: bits 0..7 the version of 
 """
 
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 PICO = 0x1306  # of the images 1.23 to 1.29
 # mpy-cross's names of the machine codes 1, 2, ...
 _ARCHITECTURES = "x86 x64 armv6 armv6m armv7m armv7em armv7emsp armv7emdp xtensa xtensawin rv32imc rv64imc".split()
+
+
+# A module and an architecture, as architecture() names it -> .mpy. Raises CannotCompile.
+Compiler = Callable[[Path, str], bytes]
 
 
 class CannotCompile(Exception):
@@ -24,14 +29,15 @@ def architecture(mpy: int) -> str:
     return _ARCHITECTURES[number - 1]
 
 
-def compiled(files: dict[str, Path], mpy: int) -> dict[str, bytes]:
+def compiled(files: dict[str, Path], mpy: int, compiler: Compiler | None = None) -> dict[str, bytes]:
     """Modules by their path on the board, as .mpy for a board with this sys.implementation._mpy.
 
-    Raises CannotCompile unless every one of them is made in the board's format.
+    compiler: what makes one, None for cross_compiled(). Raises CannotCompile unless every one of them is made in the
+    board's format.
     """
     made = {}
     for path, source in files.items():
-        data = cross_compiled(source, architecture(mpy))
+        data = (compiler or cross_compiled)(source, architecture(mpy))
         if data[1] != mpy & 0xFF or (data[2] and data[2] != mpy >> 8 & 0x3F):
             raise CannotCompile("mpy-cross makes another format than this MicroPython takes")
         made[path.removesuffix(".py") + ".mpy"] = data

@@ -4,24 +4,39 @@ import ast
 import contextlib
 import errno
 import io
+import math
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, cast
 
+import serial
 from mpremote.transport import TransportError, TransportExecError
 from mpremote.transport_serial import SerialTransport
+from serial.tools import list_ports
 
 from ..errors import InputError, cause
-from .ports import find_port, why_closed
 
 # Called with what is being done, the bytes that are done and the bytes in all.
 Progress = Callable[[str, int, int], None]
 
 MOST_BYTES = 1_000_000  # of an answer; the longest, the list of a board's files, has a hundredth of that
-_ANSWER_S = 10
+ANSWER_S = 10
+_POLL_S = 0.01
+_PROGRAM_S = 60  # an emulated board takes a while to compile the modules
 _EMULATED = "socket:"  # begins the name of an emulated board's port
 _SLOWER = 12  # how much longer than a board an emulated one may take: its seconds last longer where the host is busy
 _RESTART_S = 2  # until the board's USB port is back: the next command may follow at once
+
+# USB vendors of the boards themselves and of the serial chips on ESP32 boards
+VENDORS = {
+    0x2E8A: "Raspberry Pi",
+    0x303A: "Espressif",
+    0xF055: "MicroPython",
+    0x10C4: "Silicon Labs CP210x",
+    0x1A86: "WCH CH340",
+    0x0403: "FTDI",
+}
+_DEBUG_PROBE = (0x2E8A, 0x000C)  # of the same vendor, but no board
 
 
 class NoFirmware(InputError):
@@ -38,42 +53,51 @@ class Board(SerialTransport):
 
     slower = 1
 
+    def wait(self, seconds: float) -> None:
+        """Do nothing for so long. Where a program must not sleep, a board of its own does something else."""
+        time.sleep(seconds)
+
     def read_until(self, min_num_bytes, ending, timeout=10, data_consumer=None, timeout_overall=None):
         """See SerialTransport. Raises TransportError for an answer of over MOST_BYTES."""
-        limits: list[Any] = [limit and limit * self.slower for limit in (timeout, timeout_overall)]
-        said = bytearray()
-
-        def take(piece: bytes) -> None:
-            said.extend(piece)
-            if len(said) > MOST_BYTES:
-                raise TransportError("the answer does not end")
-            if data_consumer:
-                data_consumer(piece)
-
-        while True:  # until the last byte of ending comes, again and again
-            before = len(said)
-            super().read_until(min_num_bytes, ending[-1:], limits[0], take, limits[1])
-            if len(said) == before or said.endswith(ending) or not said.endswith(ending[-1:]):
-                return bytes(said)
+        said, serial = bytearray(), cast(Any, self.serial)
+        began_s = heard_s = time.monotonic()
+        limits: list[Any] = [math.inf if limit is None else limit * self.slower for limit in (timeout, timeout_overall)]
+        while not said.endswith(ending):
+            now_s = time.monotonic()
+            # An emulator's pseudo-terminal may not say what waits. Of mpremote the older ones know nothing of those.
+            if piece := serial.read(1) if getattr(self, "is_pty", False) or serial.inWaiting() > 0 else b"":
+                said += piece
+                heard_s = now_s
+                if len(said) > MOST_BYTES:
+                    raise TransportError("the answer does not end")
+                if data_consumer:
+                    data_consumer(piece)
+            elif now_s >= heard_s + limits[0] or now_s >= began_s + limits[1]:
+                break
+            else:
+                self.wait(_POLL_S)
+        return bytes(said)
 
 
 class _EmulatedBoard(Board):
     slower = _SLOWER
 
 
+# The name of a board's port, a board at a port that is open, or None for the only board that is plugged in
+Port = str | Board | None
+
+
 @contextlib.contextmanager
-def connected(port: str | None) -> Iterator[tuple[SerialTransport, str]]:
+def connected(port: Port) -> Iterator[tuple[Board, str]]:
     """A board at its raw prompt, its program interrupted, and the name of its port.
 
-    port: None takes the only board that is plugged in.  Raises InputError, also for errors of the connection inside
-    the with block.
+    Raises InputError, also for errors of the connection inside the with block.
     """
-    name = port or find_port()
-    try:
-        kind = _EmulatedBoard if name.startswith(_EMULATED) else Board
-        transport = kind(name, timeout=_ANSWER_S * (_SLOWER if kind is _EmulatedBoard else 1))
-    except (TransportError, ValueError):
-        raise why_closed(name) from None
+    if port is None or isinstance(port, str):
+        name = port or find_port()
+        transport = _opened(name)
+    else:
+        transport, name = port, port.device_name
     try:
         _enter(transport, name)
         yield transport, name
@@ -90,10 +114,52 @@ def connected(port: str | None) -> Iterator[tuple[SerialTransport, str]]:
             transport.close()  # its port may be gone, or just restarting
 
 
-def restart(transport: SerialTransport) -> None:
+def _opened(name: str) -> Board:
+    kind = _EmulatedBoard if name.startswith(_EMULATED) else Board
+    try:
+        return kind(name, timeout=ANSWER_S * (_SLOWER if kind is _EmulatedBoard else 1))
+    except (TransportError, ValueError):
+        raise why_closed(name) from None
+
+
+def find_port() -> str:
+    """The port of the only board that is plugged in. Raises InputError for none, or more than one."""
+    found = [p for p in list_ports.comports() if p.vid in VENDORS and (p.vid, p.pid) != _DEBUG_PROBE]
+    if not found:
+        raise InputError(
+            "no board found: plug it in with a USB cable that carries data, put MicroPython on it if it is "
+            "new, or name its port with --port"
+        )
+    if len(found) > 1:
+        names = ", ".join(f"{p.device} ({VENDORS[p.vid]})" for p in sorted(found, key=lambda p: p.device))
+        raise InputError(f"several boards found: {names}: name one with --port")
+    return found[0].device
+
+
+def why_closed(port: str) -> InputError:
+    """What is in the way of opening a port, by trying once more."""
+    try:
+        serial.serial_for_url(port, timeout=1, exclusive=True).close()
+    except ValueError as error:
+        return InputError(f"{port} is no port: {cause(error)}")
+    except OSError as error:
+        text = str(error)
+        if error.errno in (errno.EBUSY, errno.EAGAIN) or "PermissionError" in text:  # the latter on Windows
+            return InputError(f"{port} is in use: close the other program that has it open")
+        if error.errno in (errno.EACCES, errno.EPERM):
+            return InputError(f"no permission for {port}: on Linux join the group dialout and log in again")
+        if error.errno == errno.ENOENT or "FileNotFoundError" in text:
+            return InputError(f"there is no port {port}: plug the board in, or leave --port out to have it found")
+        if port.startswith("socket:") and "refused" in text:
+            return InputError(f"nothing listens at {port}: is kickstand emulate running?")
+        return InputError(f"{port} cannot be opened: {text}: check the name and the cable")
+    return InputError(f"{port} could not be opened at first, and now can: try again")
+
+
+def restart(transport: Board) -> None:
     """Reset the board, so that it starts as after power-on. Its USB port goes away for a moment."""
     transport.exec_raw_no_follow("import time, machine\ntime.sleep_ms(100)\nmachine.reset()")
-    time.sleep(_RESTART_S)
+    transport.wait(_RESTART_S)
 
 
 def ask(transport: SerialTransport, expression: str, *shapes: Any) -> Any:
@@ -137,6 +203,33 @@ def describe(transport: SerialTransport, name: str) -> str:
     if implementation != "micropython":
         raise InputError(f"{name} runs {implementation}: put MicroPython on the board first")
     return f"{machine}, MicroPython {version}"
+
+
+def printed(transport: SerialTransport, name: str, code: str, what: str) -> bytes:
+    """What a program of the firmware's prints. name: of the port.  what: it is asked for.  Raises InputError,
+    NoFirmware, OutdatedFirmware."""
+    output, error = transport.exec_raw(code, timeout=_PROGRAM_S)
+    if error:
+        reason = last_line(error.decode(errors="replace"))
+        if "CardError" in reason or "SettingsError" in reason:
+            raise InputError(f"{name}: {reason.partition(': ')[2]}")
+        refuse_unfit_firmware(reason, name)
+        raise InputError(f"the board at {name} cannot give {what} ({reason}): bring it up to date with kickstand flash")
+    return output
+
+
+def status(port: str | None) -> str:
+    """What kickstand.status() prints on the board, which is restarted then.
+
+    port: None takes the only board that is plugged in.  Raises InputError, NoFirmware.
+    """
+    with connected(port) as (transport, name):
+        describe(transport, name)
+        try:
+            text = printed(transport, name, "import kickstand\nkickstand.status()", "its status")
+        finally:
+            restart(transport)
+    return text.decode(errors="replace").replace("\r\n", "\n").rstrip()
 
 
 def refuse_unfit_firmware(reason: str, name: str) -> None:

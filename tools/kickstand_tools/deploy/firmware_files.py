@@ -25,19 +25,19 @@ def firmware_files() -> dict[str, Path]:
     return files | {CONFIG: root / "config.py", MAIN: root / "main.py"}
 
 
-def contents(mpy: int | None) -> dict[str, bytes]:
+def contents(mpy: int | None, compiler: bytecode.Compiler | None = None) -> dict[str, bytes]:
     """Path on the board -> content, in the order of firmware_files().
 
     mpy: the board's sys.implementation._mpy: the package is compiled to .mpy files for it. None: the package stays .py.
     main.py and config.py are always .py: MicroPython starts no main.mpy, and the rider edits config.py.
-    Raises CannotCompile.
+    compiler: see bytecode.compiled(). Raises CannotCompile.
     """
     files = firmware_files()
     package = {path: source for path, source in files.items() if path.startswith(PACKAGE + "/")}
     rest = {path: source.read_bytes() for path, source in files.items() if path not in package}
     if mpy is None:
         return {path: source.read_bytes() for path, source in package.items()} | rest
-    return bytecode.compiled(package, mpy) | rest
+    return bytecode.compiled(package, mpy, compiler) | rest
 
 
 def unfinished(path: str) -> str:

@@ -1,5 +1,6 @@
 """The firmware onto a board: what differs is copied and verified, what is no longer part is removed."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -9,7 +10,7 @@ from .. import firmware_path
 from ..errors import InputError
 from . import bytecode, config_check
 from .board_files import fingerprint, survey
-from .connection import Progress, ask, connected, describe, restart
+from .connection import Board, Port, Progress, ask, connected, describe, restart
 from .firmware_files import CONFIG, contents, unfinished
 from .update import Update, plan, refuse_without_room
 
@@ -45,11 +46,19 @@ class FlashResult:
     installed: InstallResult
 
 
-def flash(port: str | None, replace_config: bool = False, progress: Progress | None = None) -> FlashResult:
+def flash(
+    port: Port,
+    replace_config: bool = False,
+    progress: Progress | None = None,
+    describe: Callable[[Board, str], str] = describe,
+    compiler: bytecode.Compiler | None = None,
+    judge: Callable[[Path, str, str], config_check.Judged] | None = None,
+) -> FlashResult:
     """Bring a board's files up to date, verify them and restart it.
 
-    port: None takes the only board that is plugged in.  replace_config: the rider's config.py too.  Raises InputError,
-    and NoRoom before anything is touched.
+    replace_config: the rider's config.py too.  describe: what says which board it is, and refuses another.  compiler,
+    judge: for where mpy-cross, and a process of its own, are not to be had; None: bytecode.cross_compiled() and
+    config_check.judge().  Raises InputError, and NoRoom before anything is touched.
     """
     with connected(port) as (transport, name):
         board = describe(transport, name)
@@ -58,10 +67,10 @@ def flash(port: str | None, replace_config: bool = False, progress: Progress | N
         config = source if replace_config or CONFIG[1:] not in there else None
         try:
             names = "(lambda s: (s.platform, getattr(s.implementation, '_machine', '')))(__import__('sys'))"
-            judged = config_check.judge(source, *ask(transport, names, (str, str)))
+            judged = (judge or config_check.judge)(source, *ask(transport, names, (str, str)))
             if config and judged.fault:
                 raise InputError(judged.fault)
-            wanted, why_sources = _contents(transport)
+            wanted, why_sources = _contents(transport, compiler)
             wanted[CONFIG] = source.read_bytes()
             update = prepare(transport, wanted, replace_config)
         except InputError:
@@ -108,11 +117,11 @@ def install(transport: SerialTransport, update: Update, progress: Progress | Non
     return InstallResult(list(update.copy), total, update.keep, update.obsolete, update.config_differs)
 
 
-def _contents(transport: SerialTransport) -> tuple[dict[str, bytes], str | None]:
+def _contents(transport: SerialTransport, compiler: bytecode.Compiler | None) -> tuple[dict[str, bytes], str | None]:
     """The firmware for this board, and why it is not compiled."""
     mpy = ask(transport, "getattr(__import__('sys').implementation, '_mpy', 0)", int)  # 0: takes no compiled files
     try:
-        return contents(mpy), None
+        return contents(mpy, compiler), None
     except bytecode.CannotCompile as reason:
         return contents(None), str(reason)
 

@@ -1,12 +1,38 @@
-"""What an update changes on a board: which files and folders go, which are made, and whether they fit."""
+"""What an update changes on a board: which files and folders go, which are made, and whether they fit.
+
+A file takes whole blocks, which are freed when it is removed, or when its replacement is closed. Each block after the
+first begins with pointers of 4 bytes to blocks before it (littlefs, DESIGN.md, "CTZ skip-lists"). A small file may be
+kept within its folder instead: up to an eighth of a block, less on some boards. A folder takes two blocks, and two more
+when its entries outgrow them.
+"""
 
 from dataclasses import dataclass
 from pathlib import PurePosixPath
 
 from ..errors import InputError
-from . import room
 from .board_files import BoardFiles, fingerprint
 from .firmware_files import CONFIG, MAIN, MODULE_ENDINGS, PACKAGE, unfinished
+
+FOLDER = 2
+SPARE = 4  # a folder outgrows its two blocks; a block is written anew before the worn one is freed
+_POINTER = 4
+
+
+class NoRoom(InputError):
+    """An update does not fit, even with all removed that it replaces."""
+
+
+def most(size: int, block: int) -> int:
+    """Blocks that a file of this many bytes may take."""
+    count = 1
+    while size > block * count - _POINTER * (2 * (count - 1) - (count - 1).bit_count()):
+        count += 1
+    return count
+
+
+def least(size: int, block: int) -> int:
+    """Blocks that are freed for certain when a file of this many bytes is removed."""
+    return most(size, block) if size > block // 8 else 0
 
 
 @dataclass(frozen=True)
@@ -62,10 +88,10 @@ def needed_blocks(update: Update, board: BoardFiles) -> int:
     """How many blocks have to be free for it."""
     if not update.copy:
         return 0
-    takes = sum(room.most(len(data), board.block) for data in update.copy.values())
-    frees = sum(room.least(board.files[path][0], board.block) for path in update.remove)
+    takes = sum(most(len(data), board.block) for data in update.copy.values())
+    frees = sum(least(board.files[path][0], board.block) for path in update.remove)
     folders = len(update.make_folders) - len(update.remove_folders)
-    return max(0, takes - frees + room.FOLDER * folders) + room.SPARE
+    return max(0, takes - frees + FOLDER * folders) + SPARE
 
 
 def refuse_without_room(update: Update, board: BoardFiles) -> None:
@@ -75,7 +101,7 @@ def refuse_without_room(update: Update, board: BoardFiles) -> None:
         return
     # Firmware with its modules still in one folder has to be updated before its rides can be pulled.
     pull = board.has_rides and f"{PACKAGE}/rides" in board.folders
-    raise room.NoRoom(
+    raise NoRoom(
         f"not enough room on the board: {blocks * board.block // 1000} kB needed, "
         f"{board.free_blocks * board.block // 1000} kB free: "
         + (

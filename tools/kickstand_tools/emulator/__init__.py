@@ -6,3 +6,7 @@ with Pico(world, files=flash_image.firmware()) as pico:
     pico.run(2.0)
     pico.lcd()
 """
+
+from . import native
+
+native.install()  # before anything imports rp2040py

@@ -36,7 +36,7 @@ def car_channels(log: Source, calibration: CalibrationFile) -> list[Channels]:
     """A log in the vehicle's axes without a lean, block by block."""
     found = []
     for whole in read_blocks(log):
-        block = whole.believed
+        block = whole.measured
         if len(block.time_us):
             found.append(channels(block, calibration, np.zeros((len(block.time_us), _LEAN_COLUMNS)), car=True))
     return found

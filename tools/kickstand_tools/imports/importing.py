@@ -16,7 +16,7 @@ from ..logs.reader import read_log
 from . import mapped
 from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo
 from .files import Piece, read_pieces
-from .join import GAP_NS, Joined, join
+from .join import GAP_NS, join
 from .recording import Array, Recording, Taken
 from .units import ACCELERATIONS, SPEEDS, factor, unit
 
@@ -78,32 +78,14 @@ def import_recording(
     """
     name = str(source)
     recording = _recording(read_pieces(source), name, columns, dict(units or {}))
-    joined = join(recording, name)
-    _check_force(joined, name)
-    _check_sign(recording, joined)
-    if joined.damaged:
-        recording.notices.append(Notice("import-damaged", joined.damaged))
-    rows = _stretch(joined, start_s, end_s, name)
-    log = read_log(
-        Log(
-            _seconds(joined)[rows],
-            joined.accel_g[rows],
-            joined.gyro_dps[rows],
-            joined.speed_mps[rows],
-            joined.temp_c[rows],
-            name=name,
-            lat_deg=joined.lat_deg[rows],
-            lon_deg=joined.lon_deg[rows],
-            utc_s=joined.utc_s[rows],
-        )
-    )
-    return Imported(
-        recording.app,
-        log,
-        recording.taken,
-        [*recording.notices, *log.notices],
-        recording.vehicle_axes,
-    )
+    log, damaged = join(recording, name)
+    _check_force(log)
+    _check_sign(recording, log)
+    if damaged:
+        recording.notices.append(Notice("import-damaged", damaged))
+    log = read_log(_stretch(log, start_s, end_s))
+    notices = [*recording.notices, *log.notices]
+    return Imported(recording.app, log, recording.taken, notices, recording.vehicle_axes)
 
 
 def write_imported(path: Path | str, imported: Imported) -> None:
@@ -160,54 +142,48 @@ def recordings(pieces: list[Piece]) -> list[tuple[Any, list[Piece]]]:
     return found
 
 
-def _check_force(joined: Joined, name: str) -> None:
+def _check_force(log: Log) -> None:
     """Raise InputError where the acceleration has no gravity in it, or is in another unit than it says."""
-    usual = float(np.median(np.linalg.norm(joined.accel_g, axis=1)))
+    usual = float(np.median(np.linalg.norm(log.accel_g, axis=1)))
+    said = f"{log.name}: its acceleration is {usual:.{2 if usual < 1.0 else 1}f} g as a rule, where gravity makes it 1"
     if usual < WITHOUT_GRAVITY_G:
         raise InputError(
-            f"{name}: its acceleration is {usual:.2f} g as a rule, where gravity makes it 1: gravity has been taken "
-            "off, and without it there is no lean; record the acceleration with gravity"
+            f"{said}: gravity has been taken off, and without it there is no lean; record the acceleration with gravity"
         )
     if usual > WRONG_UNIT_G:
-        raise InputError(
-            f"{name}: its acceleration is {usual:.1f} g as a rule, where gravity makes it 1: check its unit"
-        )
+        raise InputError(f"{said}: check its unit")
 
 
-def _check_sign(recording: Recording, joined: Joined) -> None:
+def _check_sign(recording: Recording, log: Log) -> None:
     """Turn an accelerometer whose sign was only likely where the track shows that it is mirrored.
 
     One whose sign is known is left as it is: reading the log remarks on it.
     """
     if recording.sign_known:
         return
-    agrees = course_agrees(_seconds(joined), joined.accel_g, joined.gyro_dps, joined.lat_deg, joined.lon_deg)
+    agrees = course_agrees(log.t_s, log.accel_g, log.gyro_dps, log.lat_deg, log.lon_deg)
     if agrees is None:
         recording.notices.append(Notice("import-sign", recording.app))
     elif agrees:
         _say_sign(recording, "+1 g up, by the turns of the track")
     else:
-        joined.accel_g = -joined.accel_g
+        log.accel_g = -log.accel_g
         _say_sign(recording, "-1 g up, by the turns of the track: sign turned")
 
 
 def _say_sign(recording: Recording, sign: str) -> None:
-    for taken in recording.taken:
-        if taken.quantity == "accelerometer":
-            taken.sign = sign
+    for taken in recording.accel.taken:
+        taken.sign = sign if taken.quantity == "accelerometer" else taken.sign
 
 
-def _seconds(joined: Joined) -> Array:
-    """(n) from the recording's own start."""
-    return np.asarray((joined.time_ns - joined.start_ns) * 1e-9, dtype=float)
-
-
-def _stretch(joined: Joined, start_s: float | None, end_s: float | None, name: str) -> slice:
-    since_s = _seconds(joined)
-    start_s, end_s = (s if s is None or s >= 0.0 else max(0.0, s + float(since_s[-1])) for s in (start_s, end_s))
-    begin = int(np.searchsorted(since_s, start_s)) if start_s is not None else 0
-    end = int(np.searchsorted(since_s, end_s, side="right")) if end_s is not None else len(since_s)
-    if end - begin < 2:
-        asked = f"from {start_s or 0.0:g} s on" if end_s is None else f"from {start_s or 0.0:g} to {end_s:g} s"
-        raise InputError(f"{name} lasts {since_s[-1]:.1f} s: there is nothing {asked}")
-    return slice(begin, end)
+def _stretch(log: Log, start_s: float | None, end_s: float | None) -> Log:
+    """From start_s to end_s since the recording's own start; negative: before its end."""
+    since_us = np.rint((log.start_s + log.t_s) * 1e6)
+    last_s = float(since_us[-1]) / 1e6
+    start_s, end_s = (s if s is None or s >= 0.0 else max(0.0, s + last_s) for s in (start_s, end_s))
+    begin_s = start_s or 0.0
+    wanted = (since_us >= round(begin_s * 1e6)) & (since_us <= (np.inf if end_s is None else round(end_s * 1e6)))
+    if np.count_nonzero(wanted) < 2:
+        asked = f"from {begin_s:g} s on" if end_s is None else f"from {begin_s:g} to {end_s:g} s"
+        raise InputError(f"{log.name} lasts {last_s:.1f} s: there is nothing {asked}")
+    return log.part(wanted)

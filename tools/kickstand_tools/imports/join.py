@@ -1,14 +1,17 @@
 """The sensors of a recording, each on its own clock and at its own rate, joined on the accelerometer's."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Container
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from kickstand.units import LOST_US
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..logs.cells import MOST_DPS, MOST_G
+from ..logs.cells import MOST_DPS, MOST_G, TRACK
 from ..logs.even_times import even_times
+from ..logs.log import Log
 from .recording import Array, Recording, Sensor, Track
 
 MOST_MPS = 200.0  # no speed, and no degrees of a position, are more
@@ -20,25 +23,11 @@ LATE_STEPS, MOST_LATE = 4.0, 0.02  # of which no larger share is later by more t
 MOST_HZ = 10_000.0  # of an inertial sensor; the fastest have 8,000
 
 
-@dataclass
-class Joined:
-    """n rows on the accelerometer's clock: time_ns; accel_g, gyro_dps (n, 3); speed, position, UTC and temperature (n),
-    NaN where there is no new value. start_ns: the accelerometer's first sample, from which the recording counts."""
+def join(recording: Recording, name: str) -> tuple[Log, int]:
+    """The log on the accelerometer's clock, from its first sample, and how many rows are left out as damaged.
 
-    time_ns: NDArray[np.int64]
-    start_ns: int
-    accel_g: Array
-    gyro_dps: Array
-    speed_mps: Array
-    lat_deg: Array
-    lon_deg: Array
-    utc_s: Array
-    temp_c: Array
-    damaged: int  # rows that were left out
-
-
-def join(recording: Recording, name: str) -> Joined:
-    """Raises InputError where the sensors have no time in common. name: of the recording, for messages."""
+    name: of the recording, for messages. Raises InputError where the sensors have no time in common.
+    """
     accel = in_order(recording.accel, name)
     gyro = in_order(recording.gyro, name)
     rates = on_clock(gyro, accel.time_ns, _period_ns(accel))
@@ -51,12 +40,14 @@ def join(recording: Recording, name: str) -> Joined:
     lost += max(recording.accel.damaged, recording.gyro.damaged)  # both may stand in the same rows
     if np.count_nonzero(there) < 2:
         raise InputError(f"{name}: accelerometer and gyro have no time in common: were they recorded together?")
-    temp_c = np.full(len(there), np.nan) if recording.temp_c is None else recording.temp_c
-    if len(temp_c) != len(there):
+    temp_c = recording.temp_c
+    if temp_c is None or len(temp_c) != len(there):
         temp_c = np.full(len(there), np.nan)
     time_ns = accel.time_ns[there]
+    since_s = (time_ns - accel.time_ns[0]) * 1e-9
     track = _on_rows(recording.track, time_ns, recording.utc_ns)
-    return Joined(time_ns, int(accel.time_ns[0]), accel.values[there], rates[there], *track, temp_c[there], lost)
+    log = Log(since_s, accel.values[there], rates[there], temperature_c=temp_c[there], name=name, **track)
+    return log, lost
 
 
 def in_order(sensor: Sensor, name: str) -> Sensor:
@@ -87,7 +78,7 @@ def in_order(sensor: Sensor, name: str) -> Sensor:
             f"{name}: {sensor.name} has {hz:.0f} samples a second, and no sensor has over {MOST_HZ:.0f}: are the times "
             "times, and is their unit right?"
         )
-    return Sensor(sensor.name, even_ns, values, sensor.damaged)
+    return replace(sensor, time_ns=even_ns, values=values)
 
 
 def _damaged(time_ns: NDArray[np.int64]) -> NDArray[np.bool_]:
@@ -139,11 +130,25 @@ def _averaged(sensor: Sensor, over_ns: float) -> Array:
     return np.where(count > 0.0, found / np.maximum(count, 1.0), np.nan)
 
 
-def added(first: Sensor, second: Sensor, name: str) -> Sensor:
-    """The sum of two sensors on the first one's clock, where there are both: what moves the phone, and gravity."""
-    first, second = in_order(first, name), in_order(second, name)
-    values = first.values + on_clock(second, first.time_ns, _period_ns(first))
-    return Sensor("accelerometer", first.time_ns, values, max(first.damaged, second.damaged))
+def with_gravity(
+    there: Container[str], sensor: Callable[[str], Sensor], name: str, whose: str, remedy: str, none: str
+) -> Sensor:
+    """The accelerometer. there: which there are of "total", with gravity in it, "user", without, and "gravity".
+
+    sensor: called with one of these. Raises InputError where gravity was taken off (whose: acceleration; remedy: what
+    to do) and where there is no acceleration (none: says so).
+    """
+    if "total" in there:
+        return sensor("total")
+    if "user" not in there:
+        raise InputError(f"{name}: {none}")
+    if "gravity" not in there:
+        raise InputError(f"{name}: gravity has been taken off its {whose}, and without it there is no lean: {remedy}")
+    user, gravity = (in_order(sensor(which), name) for which in ("user", "gravity"))
+    user.taken[0].sign = "without gravity: gravity added"
+    values = user.values + on_clock(gravity, user.time_ns, _period_ns(user))
+    taken = [*user.taken, *gravity.taken]
+    return Sensor(user.name, user.time_ns, values, max(user.damaged, gravity.damaged), taken)
 
 
 def _most(accel_g: Array, rates_dps: Array) -> str:
@@ -154,19 +159,20 @@ def _period_ns(sensor: Sensor) -> float:
     return float(np.median(np.diff(sensor.time_ns)))
 
 
-def _on_rows(track: Track | None, time_ns: NDArray[np.int64], utc_ns: int | None) -> tuple[Array, Array, Array, Array]:
+def _on_rows(track: Track | None, time_ns: NDArray[np.int64], utc_ns: int | None) -> dict[str, Any]:
     """Speed, latitude, longitude and UTC (n each): each of the track's values in the row nearest to it in time."""
-    speed, lat, lon, utc = (np.full(len(time_ns), np.nan) for _ in range(4))
+    found = {name: np.full(len(time_ns), np.nan) for name in TRACK}
     if utc_ns is not None:
-        utc[0] = (time_ns[0] + utc_ns) * 1e-9
+        found["utc_s"][0] = (time_ns[0] + utc_ns) * 1e-9
     if track is None or not len(track.time_ns):
-        return speed, lat, lon, utc
+        return found
     after = np.clip(np.searchsorted(time_ns, track.time_ns), 1, len(time_ns) - 1)
     row = after - (track.time_ns - time_ns[after - 1] < time_ns[after] - track.time_ns)
     near = np.abs(time_ns[row] - track.time_ns) <= GAP_NS
-    for values, found in ((speed, track.speed_mps), (lat, track.lat_deg), (lon, track.lon_deg)):
-        good = near & np.isfinite(found) & (np.abs(found) < MOST_MPS)
-        values[row[good]] = found[good]
+    for name in ("speed_mps", "lat_deg", "lon_deg"):
+        values = getattr(track, name)
+        good = near & np.isfinite(values) & (np.abs(values) < MOST_MPS)
+        found[name][row[good]] = values[good]
     if utc_ns is not None:
-        utc[row[near]] = (time_ns[row[near]] + utc_ns) * 1e-9
-    return speed, lat, lon, utc
+        found["utc_s"][row[near]] = (time_ns[row[near]] + utc_ns) * 1e-9
+    return found

@@ -10,8 +10,8 @@ import numpy as np
 from ..errors import InputError
 from .files import Piece
 from .recording import Recording, Sensor, Taken, rate_hz, track_of
-from .sheets import Sheet, cells_of, plain, read_sheet, unit_in
-from .times import EPOCH_NS, Nanoseconds, time_unit, times_ns
+from .sheets import Sheet, names_in, plain, read_sheet, unit_in
+from .times import EPOCH_NS, Nanoseconds, time_unit
 from .units import ACCELERATIONS, ANGLES, RATES, SPEEDS, TIMES, factor, unit
 
 NAME = "a table"
@@ -45,21 +45,18 @@ def read_mapped(piece: Piece, columns: Mapping[str, str], units: Mapping[str, st
     _check_units(sheet, places, units)
     t_unit = units.get("t") or unit_in(sheet.columns[places["t"]])
     t_unit = time_unit(sheet.cells[places["t"]], t_unit if unit(t_unit) in TIMES else "")
-    time_ns = times_ns(sheet.cells[places["t"]], t_unit, sheet.name)
-    accel, first = _sensor(sheet, time_ns, places, units, "accelerometer")
-    gyro, second = _sensor(sheet, time_ns, places, units, "gyro")
-    for key in ("lat", "lon"):
-        if key in places:
-            scale = factor(units.get(key, "deg"), ANGLES, key)
-            sheet.cells[places[key]] = scale * sheet.numbers(places[key])
+    time_ns = sheet.times(places["t"], t_unit)
+    accel = _sensor(sheet, time_ns, places, units, "accelerometer")
+    accel.taken.insert(0, Taken("time", sheet.named([places["t"]]), t_unit))
+    gyro = _sensor(sheet, time_ns, places, units, "gyro")
+    lat, lon = (factor(units.get(key, "deg"), ANGLES, key) for key in ("lat", "lon"))
     speed_unit = "m/s"
     if "speed" in places:
         speed_unit = unit(_unit(units, ("speed",), sheet.columns[places["speed"]]))
-    track, more = track_of(sheet, time_ns, places.get("speed"), places.get("lat"), places.get("lon"), speed_unit)
+    track = track_of(sheet, time_ns, places.get("speed"), places.get("lat"), places.get("lon"), speed_unit, (lat, lon))
     temp_c = sheet.numbers(places["temp"]) if "temp" in places else None
     utc_ns = 0 if len(time_ns) and int(np.median(time_ns)) > EPOCH_NS else None
-    taken = [Taken("time", sheet.named([places["t"]]), t_unit), first, second, *more]
-    return Recording(NAME, accel, gyro, track, temp_c, taken, utc_ns=utc_ns, sign_known=_turned(units))
+    return Recording(NAME, accel, gyro, track, temp_c, utc_ns=utc_ns, sign_known=_turned(units))
 
 
 @dataclass
@@ -91,9 +88,9 @@ def table_in(pieces: list[Piece]) -> Table | None:
     piece = max(pieces, key=lambda piece: len(piece.text))
     number = header_line(piece, {})
     lines = [line for line in piece.text.split("\n", _HEADER_LINES + 3)[number:] if line.strip()]
-    columns = cells_of(lines[0])
+    columns = names_in(lines[0])
     found = guessed(columns)
-    numbers = max((_numbers(cells_of(line)) for line in lines[1:3]), default=0)
+    numbers = max((_numbers(names_in(line)) for line in lines[1:3]), default=0)
     if numbers < (FEWEST_NUMBERS if found else len(REQUIRED)):
         return None
     units = {"a": _seems_in(found.get("ax", ""), ACCELERATIONS, "m/s2")}
@@ -138,7 +135,7 @@ def header_line(piece: Piece, columns: Mapping[str, str]) -> int:
     wanted = {name.strip() for name in columns.values() if not name.strip().startswith("#")}
     widest, width = 0, 0
     for number, line in enumerate(piece.text.split("\n", _HEADER_LINES)[:_HEADER_LINES]):
-        cells = cells_of(line)
+        cells = names_in(line)
         if wanted and wanted <= set(cells):
             return number
         numbers = _numbers(cells)
@@ -202,7 +199,7 @@ def _place(sheet: Sheet, key: str, wanted: str) -> int:
 
 def _sensor(
     sheet: Sheet, time_ns: Nanoseconds, places: dict[str, int], units: Mapping[str, str], quantity: str
-) -> tuple[Sensor, Taken]:
+) -> Sensor:
     axes, all_of, kinds = (ACCEL, "a", ACCELERATIONS) if quantity == "accelerometer" else (GYRO, "g", RATES)
     names = [_unit(units, (axis, all_of), sheet.columns[places[axis]]) for axis in axes]
     scale = np.array([factor(text, kinds, axis) for text, axis in zip(names, axes)])
@@ -210,7 +207,7 @@ def _sensor(
     source = sheet.named([places[axis] for axis in axes])
     sign = "as it is" if np.all(scale > 0.0) else "turned" if np.all(scale < 0.0) else "turned in part"
     shown = ", ".join(dict.fromkeys(text.lstrip("-") for text in names))
-    return Sensor(quantity, time_ns, values, sheet.left_out), Taken(quantity, source, shown, rate_hz(time_ns), sign)
+    return Sensor(quantity, time_ns, values, sheet.left_out, [Taken(quantity, source, shown, rate_hz(time_ns), sign)])
 
 
 def _check_units(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, str]) -> None:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from ..logs.table import Array
 from .sheets import Sheet
 from .times import NO_TIME, REPEATED, Nanoseconds
-from .units import SPEEDS, factor
+from .units import ACCELERATIONS, RATES, SPEEDS, factor
 
 SECOND_NS = 10**9
 _ABSURD = 1e6  # g or deg/s: a damaged cell
@@ -42,12 +42,13 @@ def rate_hz(time_ns: Nanoseconds) -> float:
 class Sensor:
     """n samples: time_ns (n) of the recorder's clock, values (n, 3): g, +1 where the axis points up at rest, or deg/s,
     right-handed. name: for messages. damaged: rows of its file that are left out, because they have too many
-    cells or their time or a value cannot be read; a row without any value is another sensor's."""
+    cells or their time or a value cannot be read; a row without any value is another sensor's. taken: from where."""
 
     name: str
     time_ns: Nanoseconds
     values: Array
     damaged: int = 0
+    taken: list[Taken] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         without = (self.time_ns == REPEATED) | np.all(np.isnan(self.values), axis=1)
@@ -57,13 +58,19 @@ class Sensor:
 
 
 def sensor_of(
-    sheet: Sheet, time_ns: Nanoseconds, places: list[int], scale: float | Array, what: tuple[str, str, str]
-) -> tuple[Sensor, Taken]:
-    """Three columns of a sheet, times scale, one number or one an axis. what: quantity, unit, what its sign was."""
-    quantity, unit, sign = what
-    source = sheet.named(places)
-    values = sheet.table(places) * scale
-    return Sensor(quantity, time_ns, values, sheet.left_out), Taken(quantity, source, unit, rate_hz(time_ns), sign)
+    sheet: Sheet,
+    time_ns: Nanoseconds,
+    places: list[int],
+    quantity: str,
+    unit: str,
+    sign: str,
+    turn: float | Array = 1.0,
+) -> Sensor:
+    """Three columns of a sheet. quantity: "accelerometer" or "gyro"; sign: what theirs is; turn: -1 where a log has the
+    opposite one, one number or one an axis. Raises InputError for an unknown unit."""
+    scale = turn * factor(unit, ACCELERATIONS if quantity == "accelerometer" else RATES, sheet.name)
+    taken = Taken(quantity, sheet.named(places), unit, rate_hz(time_ns), sign)
+    return Sensor(quantity, time_ns, sheet.table(places) * scale, sheet.left_out, [taken])
 
 
 @dataclass
@@ -74,6 +81,7 @@ class Track:
     speed_mps: Array
     lat_deg: Array
     lon_deg: Array
+    taken: list[Taken] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         """Only rows that say something new stay, and no speed below 0: a phone's mark for a speed it does not know."""
@@ -95,19 +103,28 @@ class Track:
 
 
 def track_of(
-    sheet: Sheet, time_ns: Nanoseconds, speed: int | None, lat: int | None, lon: int | None, speed_unit: str = "m/s"
-) -> tuple[Track | None, list[Taken]]:
-    """Speed and position of a sheet, by the numbers of their columns; None where there is neither."""
+    sheet: Sheet,
+    time_ns: Nanoseconds,
+    speed: int | None,
+    lat: int | None,
+    lon: int | None,
+    speed_unit: str = "m/s",
+    per_degree: tuple[float, float] = (1.0, 1.0),
+) -> Track | None:
+    """Speed and position of a sheet, by the numbers of their columns; None where there is neither.
+
+    per_degree: what latitude and longitude are multiplied by.
+    """
     if speed is None and (lat is None or lon is None):
-        return None, []
-    scale = factor(speed_unit, SPEEDS, "speed")
-    track = Track(time_ns, sheet.numbers(speed) * scale, sheet.numbers(lat), sheet.numbers(lon))
-    taken, hz = [], rate_hz(track.time_ns)
+        return None
+    speed_mps = sheet.numbers(speed) * factor(speed_unit, SPEEDS, "speed")
+    track = Track(time_ns, speed_mps, sheet.numbers(lat) * per_degree[0], sheet.numbers(lon) * per_degree[1])
+    hz = rate_hz(track.time_ns)
     if speed is not None:
-        taken.append(Taken("speed", sheet.named([speed]), speed_unit, hz))
+        track.taken.append(Taken("speed", sheet.named([speed]), speed_unit, hz))
     if lat is not None and lon is not None:
-        taken.append(Taken("position", sheet.named([lat, lon]), "degrees", hz))
-    return track, taken
+        track.taken.append(Taken("position", sheet.named([lat, lon]), "degrees", hz))
+    return track
 
 
 @dataclass
@@ -123,8 +140,12 @@ class Recording:
     gyro: Sensor
     track: Track | None = None
     temp_c: Array | None = None
-    taken: list[Taken] = field(default_factory=list)
     notices: list[Notice] = field(default_factory=list)
     utc_ns: int | None = None
     vehicle_axes: bool = False
     sign_known: bool = True
+
+    @property
+    def taken(self) -> list[Taken]:
+        """What was taken for what."""
+        return [*self.accel.taken, *self.gyro.taken, *(self.track.taken if self.track else [])]

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..logs.csv_reader import Cells, cells_of, columns_of_text, numbers_of, separator_of
 from ..logs.table import Array
-from .cells import Cells, columns_of_text, numbers_of
 from .files import Piece
+from .times import Nanoseconds, times_ns
 
 LONG = 6  # letters that several names begin with are too many to repeat
 _DECIMAL_COMMA = re.compile(r"(?:^|[;\t\"])\s*[+-]?\d+,\d")
@@ -31,6 +32,17 @@ class Sheet:
         wanted = [plain(name) for name in names]
         found = [plain(column) for column in self.columns]
         return next((found.index(name) for name in wanted if name in found), None)
+
+    def axes(self, *names: str | tuple[str, ...]) -> tuple[list[int], list[str]]:
+        """place() of each name, or of one of several names, and the first names of those that are not there."""
+        each = [name if isinstance(name, tuple) else (name,) for name in names]
+        found = {one[0]: self.place(*one) for one in each}
+        places = [place for place in found.values() if place is not None]
+        return places, [name for name, place in found.items() if place is None]
+
+    def times(self, place: int, unit: str = "s") -> Nanoseconds:
+        """A column as times (n). unit: of numbers, "" if it is to be found from them. Raises InputError."""
+        return times_ns(self.cells[place], unit, self.name)
 
     def named(self, places: list[int]) -> str:
         """The file and some columns of it, for people: without units, and what several begin with said once."""
@@ -62,18 +74,12 @@ def unit_in(name: str) -> str:
     return found[1].strip() if found else ""
 
 
-def separator_of(line: str) -> str:
-    """The one of , ; and tab that parts the cells of a line, by what stands outside quotation marks."""
-    bare = re.sub(r'"[^"]*"', "", line)
-    return max(",;\t", key=bare.count)
-
-
-def cells_of(line: str) -> list[str]:
-    """The cells of one line."""
+def names_in(line: str) -> list[str]:
+    """The cells of a line of names, none of one that is no CSV."""
     try:
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator_of(line)), [])]
+        return [cell.strip() for cell in cells_of(line, separator_of(line))]
     except csv.Error:
-        return [cell.strip() for cell in line.split(separator_of(line))]
+        return []
 
 
 def read_sheet(piece: Piece, header: int = 0, skipped: int = 0) -> Sheet:
@@ -84,7 +90,7 @@ def read_sheet(piece: Piece, header: int = 0, skipped: int = 0) -> Sheet:
     lines = piece.text.split("\n", header + skipped + 1)
     if len(lines) < header + skipped + 2 or not lines[-1].strip():
         raise InputError(f"{piece.name}: no rows under the names of the columns: was anything recorded?")
-    columns = cells_of(lines[header])
+    columns = names_in(lines[header])
     while columns and not columns[-1]:
         columns.pop()  # lines that end in a separator
     text, separator = lines[-1], separator_of(lines[header])

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .cells import Cells, as_text, filled, numbers_of
+from ..logs.csv_reader import Cells, as_text, filled, numbers_of
 from .units import TIMES, unit
 
 Nanoseconds = NDArray[np.int64]

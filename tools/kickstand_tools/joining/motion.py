@@ -59,7 +59,7 @@ def motion(ride: Source, progress: Progress | None = None, notices: list[Notice]
     for block in read_blocks(ride, 2, progress, notices):
         speed |= bool(np.any(np.isfinite(block.speed_mps)))
         positions |= bool(np.any(np.isfinite(block.lat_deg)))
-        good = block.believed
+        good = block.measured
         if len(good.time_us):
             if good.t_s[-1] > _LONGEST_S:
                 raise InputError(f"{name_of(ride)} is longer than {_LONGEST_S / 3600:.0f} hours: cut it first")

@@ -1,6 +1,5 @@
 """Some rows of a log, one after the other."""
 
-import csv
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
@@ -8,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cells import TRACK
+from .csv_reader import cells_of
 from .log import FirmwareRow, firmware_rows
 from .table import Array
 
@@ -20,8 +20,8 @@ class Block:
 
     time_us (n): since the log's first sample. readings (n, 7): acceleration (3, g), temperature (C), rate (3, deg/s),
     the chip's order. speed_mps, lat_deg, lon_deg, utc_s (n): as in a Log. What the log does not have is NaN. start_s:
-    the recorder's own time at the log's first sample. frozen (n): True where the readings are not believed, see
-    mended.frozen.
+    the recorder's own time at the log's first sample. frozen (n): True where the readings are repeated ones, see
+    frozen.py.
     """
 
     time_us: NDArray[np.int64]
@@ -61,8 +61,7 @@ class Block:
         if not self.lines or not self.own_times:
             return [f"{self.start_s + t:.6f}" for t in self.t_s.tolist()]
         place = self.names.index("t_s")
-        rows = (next(csv.reader([line])) if '"' in line else line.split(",", place + 1) for line in self.lines)
-        return [cells[place].strip() for cells in rows]
+        return [cells_of(line)[place].strip() for line in self.lines]
 
     def part(self, which: slice | NDArray[np.bool_]) -> "Block":
         """The rows of a slice, or those where an array of n is True."""
@@ -73,7 +72,7 @@ class Block:
         return replace(self, lines=lines, **{name: getattr(self, name)[which] for name in _ROWS})
 
     @property
-    def believed(self) -> "Block":
+    def measured(self) -> "Block":
         """The rows that are not frozen."""
         return self.part(~self.frozen) if np.any(self.frozen) else self
 

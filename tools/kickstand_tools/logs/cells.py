@@ -1,7 +1,6 @@
 """The cells of a CSV log: which values they may have, and the line in which one has another."""
 
 import csv
-import io
 import math
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .csv_reader import cells_of
 
 COLUMNS = ("t_s", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")
 TRACK = ("speed_mps", "lat_deg", "lon_deg", "utc_s")  # what a satellite receiver tells, now and then
@@ -38,7 +38,7 @@ def check_text(log: str, content: bytes, lines_before: int) -> None:
 def header(log: str, line: str) -> list[str]:
     """The names of the columns. Raises InputError where one is missing or there twice."""
     try:
-        names = [name.strip() for name in next(csv.reader([line]), [])]
+        names = [name.strip() for name in cells_of(line)]
     except csv.Error as error:
         raise InputError(f"{log}, line 1: not CSV ({error}): is it a log?") from error
     missing = [name for name in COLUMNS if name not in names]
@@ -80,47 +80,53 @@ def plausible(table: NDArray[np.float64], names: list[str], before_us: int | Non
 
 def read(
     log: str, text: str, width: int, places: dict[str, int], lines_before: int, before_us: int | None
-) -> tuple[NDArray[np.float64], str]:
-    """(n, columns in the order of places), NaN for an empty optional cell, and the rows as CSV.
+) -> NDArray[np.float64]:
+    """(n, columns in the order of places), NaN for an empty optional cell.
 
     Raises InputError for the first mistake, naming its line.
     """
-    rows, values, kept = csv.reader(io.StringIO(text, newline="")), [], io.StringIO()
-    writer = csv.writer(kept, lineterminator="\n")
-    try:
-        for cells in rows:
-            if not "".join(cells).strip() and len(cells) < 2:
-                continue  # a blank line, often the last
-            where = f"{log}, line {lines_before + rows.line_num}"
+    columns = [(place, name, _LIMITS[name]) for name, place in places.items()]
+    values = []
+    for number, line in enumerate(text.split("\n"), lines_before + 1):
+        if not line.strip():
+            continue  # often the last
+        try:
+            cells = cells_of(line)
             if len(cells) != width:
-                raise InputError(f"{where}: {len(cells)} values under {width} column names: is the line cut?")
-            value = [_number(cells[place], name, where) for name, place in places.items()]
+                raise _Mistake(f"{len(cells)} values under {width} column names: is the line cut?")
+            value = [_number(cells[place], name, limit) for place, name, limit in columns]
             now = round(value[0] * 1e6)
             if before_us is not None and now < before_us:
                 at = cells[places["t_s"]].strip()
-                raise InputError(f"{where}: time goes back from {before_us / 1e6:.6f} at {at} s: it has to increase")
-            before_us = now
-            values.append(value)
-            writer.writerow([cell.replace("\n", " ") for cell in cells])
-    except csv.Error as error:
-        line = lines_before + rows.line_num
-        raise InputError(f"{log}, line {line}: not CSV ({error}): is it a log?") from error
-    return np.reshape(np.array(values, dtype=float), (-1, len(places))), kept.getvalue()
+                raise _Mistake(f"time goes back from {before_us / 1e6:.6f} at {at} s: it has to increase")
+        except csv.Error as error:
+            raise InputError(f"{log}, line {number}: not CSV ({error}): is it a log?") from error
+        except _Mistake as mistake:
+            raise InputError(f"{log}, line {number}: {mistake}") from None
+        before_us = now
+        values.append(value)
+    return np.reshape(np.array(values, dtype=float), (-1, len(places)))
 
 
-def _number(cell: str, name: str, where: str) -> float:
-    """The value of a cell; NaN for an empty one in a column of OPTIONAL."""
+class _Mistake(Exception):
+    """What is wrong with a row."""
+
+
+def _number(cell: str, name: str, limit: float) -> float:
+    """The value of a cell; NaN for an empty one in a column of OPTIONAL. Raises _Mistake."""
+    try:
+        value = float(cell)
+        if abs(value) <= limit and "_" not in cell:  # Python would read 1_0 as 10
+            return value
+    except ValueError:
+        value = None
     if name in OPTIONAL and not cell.strip():
         return math.nan
-    try:
-        value = float(cell.replace("_", "?"))  # Python would read 1_0 as 10
-    except ValueError:
-        raise InputError(f"{where}: {name} is {_shown(cell)}, not a number") from None
+    if value is None or "_" in cell:
+        raise _Mistake(f"{name} is {_shown(cell)}, not a number")
     if not math.isfinite(value):
-        raise InputError(f"{where}: {name} is {_shown(cell)}: a number is needed")
-    if abs(value) > _LIMITS[name]:
-        raise InputError(f"{where}: {name} is {_shown(cell)}, past any reading: its unit is {_UNITS[name]}")
-    return value
+        raise _Mistake(f"{name} is {_shown(cell)}: a number is needed")
+    raise _Mistake(f"{name} is {_shown(cell)}, past any reading: its unit is {_UNITS[name]}")
 
 
 def _shown(cell: str) -> str:

@@ -1,6 +1,5 @@
 """Recorded logs: CSV with the columns of COLUMNS, plain or gzipped, read block by block."""
 
-import io
 import itertools
 from collections.abc import Iterator
 from dataclasses import replace
@@ -18,11 +17,10 @@ from .axes.course import Course
 from .axes.handedness import Handedness
 from .block import Block
 from .cells import COLUMNS, OPTIONAL, TRACK
-from .csv_lines import numbers_in
+from .csv_reader import numbers_in
+from .even_times import even_blocks
+from .frozen import FrozenReadings
 from .log import Log
-from .mended.even_blocks import even_blocks
-from .mended.frozen import FrozenReadings
-from .mended.last_line import last_marked, without_cut_line
 from .source import File, Progress, chunks, name_of, total_bytes
 from .speed_unit import SpeedUnit
 from .stretch import Stretch
@@ -32,7 +30,6 @@ from .units_check import check_units
 BLOCK_BYTES = 1 << 20  # of text, some 15000 samples
 BLOCK_SAMPLES = 60_000  # of a log in memory
 MOST_SAMPLES = 10_000_000  # fourteen hours at 200 Hz, which as a whole take some 1 GB of memory
-_NUMERIC = b"0123456789+-.eE, \n"  # where nothing else stands, numpy may read it
 
 Source = File | Log | Stretch  # what can be read as a log
 
@@ -194,41 +191,28 @@ def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], rema
     """The blocks with their times as they stand in the file, which may repeat."""
     places = {column: names.index(column) for column in COLUMNS + OPTIONAL if column in names}
     line, start_us, last_us = 1, None, None
-    for text, done, is_last in last_marked(pieces):
+    for text, done, is_last in _last_marked(pieces):
         cut = b""
         if is_last:
-            text, cut = without_cut_line(text, names, places)
+            text, cut = _without_cut_line(text, names, places)
             remarks += [Notice("cut-line", line + text.count(b"\n") + 1)] if cut else []
-        table, rows = _numbers(name, text, names, places, line, last_us)
+        table = _numbers(name, text, names, places, line, last_us)
         line += text.count(b"\n")
         if not len(table):
             continue
         time_us = np.rint(table[:, 0] * 1e6).astype(np.int64)
         start_us = int(time_us[0]) if start_us is None else start_us
         last_us = int(time_us[-1])
-        yield _block(table, time_us - start_us, places, start_us / 1e6, rows, names, done)
+        yield _block(table, time_us - start_us, places, start_us / 1e6, text.decode(), names, done)
 
 
 def _numbers(
     name: str, text: bytes, names: list[str], places: dict[str, int], line: int, before_us: int | None
-) -> tuple[Array, str]:
-    """(n, columns in the order of places) and the rows as CSV. line: how many lines came before this text.
-
-    numbers_in() reads what Kickstand writes, numpy other plain numbers, three times slower. Any other text, and values
-    that look wrong, are read cell by cell, which tells the line of a mistake and is sixty times slower.
-    """
-    if text.strip() and not text.translate(None, _NUMERIC):
-        table = numbers_in(text, len(names))
-        if table is None:
-            plain = text.replace(b",,", b",nan,").replace(b",,", b",nan,").replace(b",\n", b",nan\n")
-            try:
-                table = np.loadtxt(io.BytesIO(plain), delimiter=",", comments=None, ndmin=2)
-            except ValueError:
-                table = np.empty((0, 0))
-        if table.shape[1] == len(names):
-            table = table[:, list(places.values())]
-            if cells.plausible(table, list(places), before_us):
-                return table, text.decode()
+) -> Array:
+    """(n, columns in the order of places). line: how many lines came before this text."""
+    table = numbers_in(text, len(names))
+    if table is not None and cells.plausible(table[:, list(places.values())], list(places), before_us):
+        return table[:, list(places.values())]
     cells.check_text(name, text, line)
     return cells.read(name, text.decode(), len(names), places, line, before_us)
 
@@ -252,7 +236,49 @@ def _block(
         has_speed="speed_mps" in places,
         start_s=start_s,
         done=done,
-        lines=[line for line in text.split("\n") if line],
+        lines=[line for line in text.split("\n") if line.strip()],
         names=tuple(names),
         **{name: column[name] for name in TRACK},
     )
+
+
+def _last_marked(parts: Iterator[tuple[bytes, int]]) -> Iterator[tuple[bytes, int, bool]]:
+    """Each part, and whether it is the last one."""
+    before = next(parts, None)
+    for part in parts:
+        if before:
+            yield *before, False
+        before = part
+    if before:
+        yield *before, True
+
+
+def _without_cut_line(text: bytes, names: list[str], places: dict[str, int]) -> tuple[bytes, bytes]:
+    """The end of a log without its last line if that was cut, and the cut line: empty if it was not.
+
+    text: whole lines, of which the last one may have no end. It was cut if it has fewer cells than there are columns;
+    without an end also if it cannot be read, or if its last number has fewer digits after the point than the line
+    before it: half a number is a number too.
+    """
+    kept = text.rstrip()
+    before, _, last = kept.rpartition(b"\n")
+    if not last or last.count(b'"'):
+        return text, b""
+    cut = last.count(b",") + 1 < len(names)
+    if not cut and not text.endswith(b"\n"):
+        above = before.rpartition(b"\n")[2]
+        half = not last.endswith(b",") and _digits(last) < _digits(above)
+        cut = half or not _readable(last, names, places)
+    return (before + b"\n" if before else b"", last) if cut else (text, b"")
+
+
+def _readable(line: bytes, names: list[str], places: dict[str, int]) -> bool:
+    try:
+        return len(cells.read("", line.decode(), len(names), places, 0, None)) == 1
+    except (InputError, UnicodeDecodeError):
+        return False
+
+
+def _digits(line: bytes) -> int:
+    """After the point of the last cell; 0 for an empty one."""
+    return len(line.rpartition(b",")[2].strip().partition(b".")[2])

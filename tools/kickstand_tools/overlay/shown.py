@@ -10,7 +10,6 @@ from ..analysis.ride import Ride
 from ..analysis.summary import HELD_S
 from ..logs.source import Progress
 from ..logs.table import Array
-from ..replay.mount_check import MountCheck
 from ..signals.averages import smoothed
 
 _FORCE_S = 0.3  # over which forces are averaged: engine and road shake them
@@ -62,17 +61,11 @@ class Shown:
 
 
 def shown(ride: Ride, progress: Progress | None = None, notices: list[Notice] | None = None) -> Shown:
-    """Of a whole ride (see open_ride), with the lean that it was opened with. progress, notices: of Ride.blocks(); what
-    contradicts the calibration is among the latter. Raises InputError.
-    """
+    """Of a whole ride (see open_ride), with the lean that it was opened with. progress, notices: of Ride.blocks(). Raises InputError."""
     columns: list[NDArray[np.float64]] = []
-    mount = MountCheck(ride.calibration)
-    for block in ride.blocks(progress, notices, mount):
+    for block in ride.blocks(progress, notices):
         lean = np.where(block.trusted, block.lean_deg, np.nan)
         columns.append(np.array([block.t_s, lean, block.forward_g, block.lateral_g, block.speed_mps]))
-    contradiction = mount.notice()
-    if notices is not None and contradiction:
-        notices.append(contradiction)
     t_s, lean, forward, left, speed = np.hstack(columns)
     forward, left = (smoothed(values, t_s, _FORCE_S) for values in (forward, left))
     return Shown(t_s, lean, forward, left, speed, _maximum(t_s, -lean), _maximum(t_s, lean))

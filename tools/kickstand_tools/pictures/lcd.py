@@ -1,5 +1,6 @@
 """A 16x2 character display drawn dot by dot as SVG, from what its controller holds in its memories."""
 
+from ..svg import drawing, element
 from .lcd_font import ROM
 
 # In units of 0.1 mm, as on the usual module of 80 x 36 mm
@@ -24,24 +25,22 @@ def draw(codes: list[list[int]], cgram: bytes) -> str:
         if row & 0x10 >> x
     ]
     unlit = [_dot(x * _PITCH[0], y * _PITCH[1]) for y in range(8) for x in range(5)]
-    origin = _FRAME + _MARGIN
-    return f"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_SIZE[0]} {_SIZE[1]}">
-<defs>
-<linearGradient id="glass" x1="0" y1="0" x2="0" y2="1">
-<stop offset="0" stop-color="#2f6bea"/><stop offset="1" stop-color="#1b47b8"/>
-</linearGradient>
-<pattern id="cell" width="{_CELL[0]}" height="{_CELL[1]}" patternUnits="userSpaceOnUse">
-<path d="{"".join(unlit)}" fill="#0d2f8c" fill-opacity="0.28"/>
-</pattern>
-</defs>
-<rect width="{_SIZE[0]}" height="{_SIZE[1]}" rx="18" fill="#16181d"/>
-<rect x="{_FRAME}" y="{_FRAME}" width="{_GLASS[0]}" height="{_GLASS[1]}" rx="8" fill="url(#glass)"/>
-<g transform="translate({origin} {origin})">
-<rect width="{_COLUMNS * _CELL[0]}" height="{_LINES * _CELL[1]}" fill="url(#cell)"/>
-<path d="{"".join(lit)}" fill="#f4f8ff"/>
-</g>
-</svg>
-"""
+    cell = element("path", d="".join(unlit), fill="#0d2f8c", fill_opacity=0.28)
+    shade = [element("stop", offset=at, stop_color=colour) for at, colour in enumerate(("#2f6bea", "#1b47b8"))]
+    size = {"width": _CELL[0], "height": _CELL[1], "patternUnits": "userSpaceOnUse"}
+    dots = [
+        element("rect", width=_COLUMNS * _CELL[0], height=_LINES * _CELL[1], fill="url(#cell)"),
+        element("path", d="".join(lit), fill="#f4f8ff"),
+    ]
+    glass = {"x": _FRAME, "y": _FRAME, "width": _GLASS[0], "height": _GLASS[1], "rx": 8}
+    return drawing(
+        _SIZE,
+        element("linearGradient", *shade, id="glass", x1=0, y1=0, x2=0, y2=1),
+        element("pattern", cell, id="cell", **size),
+        element("rect", width=_SIZE[0], height=_SIZE[1], rx=18, fill="#16181d"),
+        element("rect", **glass, fill="url(#glass)"),
+        element("g", *dots, transform=f"translate({_FRAME + _MARGIN} {_FRAME + _MARGIN})"),
+    )
 
 
 def _rows(code: int, cgram: bytes) -> bytes:

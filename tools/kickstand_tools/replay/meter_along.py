@@ -1,7 +1,7 @@
-"""The firmware's meter run along a log on this Python, block by block.
+"""The replay's loop over blocks of a log on this Python, and Nicolae's formula on arrays.
 
-It is replay_engine.py's loop, faster: what does not depend on the past is computed by numpy, for a block at once. The
-filter is the firmware's own, sample by sample. A test holds both loops equal.
+What does not depend on the past is computed by numpy for a block at once: with Replay.step() the meter takes 7.2 s for
+an hour at 200 Hz, with this 4.0 s. A test holds both equal.
 """
 
 from collections.abc import Iterator
@@ -12,37 +12,28 @@ from kickstand.lean.meter import LeanMeter
 from ..calibration.file import CalibrationFile
 from ..logs.block import Block
 from ..logs.table import Array
-from .formula import formula_lean_deg, static_lean_deg
-from .replay_engine import NOT_SHOWN, ReplayMeter
+from .replay_engine import NOT_SHOWN, Replay
+
+TOO_SMALL = 0.01  # g2, as in kickstand.lean: in free fall the force has no direction
 
 
-class MeterAlong:
+class MeterAlong(Replay):
     """columns() or after_each() takes a ride's blocks one after the other."""
 
     def __init__(self, calibration: CalibrationFile) -> None:
-        self._meter = ReplayMeter(calibration.to_firmware(), delay_s=calibration.delay_s())
-        self._last_us: int | None = None
+        super().__init__(calibration.to_firmware(), delay_s=calibration.delay_s())
 
     def in_vehicle(self, block: Block) -> tuple[list[Array], list[Array]]:
         """Force (g) and rate (rad/s) along left, up, forward: three arrays of n each."""
         force, rate = [np.zeros(0)] * 3, [np.zeros(0)] * 3
-        self._meter.in_vehicle(block.readings.T, force, rate)
+        self.meter.in_vehicle(block.readings.T, force, rate)
         return force, rate
 
     def after_each(self, block: Block, force: list[Array], rate: list[Array]) -> Iterator[LeanMeter]:
         """The meter after each sample of the block. force, rate: from in_vehicle()."""
-        if not len(block.time_us):
-            return
-        meter = self._meter
-        first_us = int(block.time_us[0]) if self._last_us is None else self._last_us
-        steps_us, self._last_us = np.diff(block.time_us, prepend=first_us), int(block.time_us[-1])
         # Tuples that live for a sample: of lists of lists Python's garbage collector would keep account.
         forces, rates = (zip(*(axis.tolist() for axis in vector)) for vector in (force, rate))
-        for forces_g, rates_radps, step_us, speed in zip(forces, rates, steps_us.tolist(), block.speed_mps.tolist()):
-            if speed >= 0.0:  # NaN is not
-                meter.measure_speed(speed)
-            meter.follow(forces_g, rates_radps, step_us)
-            yield meter
+        return self.follow(zip(block.time_us.tolist(), forces, rates, block.speed_mps.tolist()))
 
     def columns(self, block: Block) -> Array:
         """(n, replay_engine.COLUMNS): what Replay.step() returns for the samples of the block."""
@@ -63,3 +54,16 @@ class MeterAlong:
                 np.where(variance >= 0.0, np.degrees(np.sqrt(np.maximum(variance, 0.0))), NOT_SHOWN),
             )
         )
+
+
+def static_lean_deg(left: Array, up: Array) -> Array:
+    """(21) with a sign: of a standing bike, degrees, > 0 to the right."""
+    return np.degrees(np.arctan2(left, up))
+
+
+def formula_lean_deg(left: Array, up: Array, yaw_rate: Array) -> Array:
+    """(25)-(26), Nicolae's lean of each reading alone, degrees, > 0 to the right; as kickstand.lean.formula."""
+    square = left * left + up * up
+    size = np.sqrt(np.maximum(0.0, square - 1.0))
+    sine = (left - np.sign(yaw_rate) * size * up) / np.maximum(square, TOO_SMALL)
+    return np.where(square < TOO_SMALL, 0.0, np.degrees(np.arcsin(np.clip(sine, -1.0, 1.0))))

@@ -1,12 +1,15 @@
 """A recorded log through the firmware's own LeanMeter, by one of several engines, block by block."""
 
+import contextlib
 import io
 import struct
 import subprocess
 import tempfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from kickstand.errors import Notice
@@ -26,11 +29,15 @@ from .mount_check import MountCheck
 
 _CHUNK = 500  # samples between two calls of progress while an emulated Pico works
 
-_LONG_BYTES = 20 << 20  # of the file: a log of some seconds' work, for which a second process is worth its start
+_LONG_BYTES = 20 << 20  # of the file: a quarter of an hour at 200 Hz: of less a second process is not worth its start
+
+_RESULT_BYTES = struct.calcsize(replay_engine.RESULT)
+_EMULATED_S = 1e6  # a log is as long as it is
 
 _SIGMA = replay_engine.COLUMNS.index("lean_sigma_deg")
 
-Replayed = tuple[Block, Array]  # (n, replay_engine.COLUMNS) of the rows that are believed
+Replayed = tuple[Block, Array]  # (n, replay_engine.COLUMNS) of the rows that are not frozen
+Engine = Callable[[Iterator[bytes], Progress | None], contextlib.AbstractContextManager[IO[bytes]]]
 
 
 @dataclass(eq=False)
@@ -41,7 +48,7 @@ class LeanTable(Table):
     which is shown where lean_sigma_deg is not NaN.
     lean_formula_deg: Nicolae's (25)-(26) as it stands.
     left_g, up_g, forward_g: specific force. static_lean_deg: the lean of a vehicle at rest with this force.
-    lean_sigma_deg: the standard deviation of the lean that the firmware believed in, NaN where the display shows no
+    lean_sigma_deg: the standard deviation of the lean that the firmware estimates, NaN where the display shows no
     lean. notices: what is remarkable in the ride (kickstand_tools.refusals.sentence puts a notice into words).
     """
 
@@ -113,8 +120,8 @@ def replay_blocks(
     mount, car = MountCheck(calibration), calibration.vehicle == "car"
     whole, stretch = apart(log)
     for block, results in _RUN[engine](whole, calibration, progress, notices):
-        believed = block.believed
-        mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
+        measured = block.measured
+        mount.add(measured.t_s, *calibration.in_vehicle(measured.readings), measured.speed_mps)
         found = _with_frozen(block, results)
         if car:
             found[:, _SIGMA] = np.nan
@@ -143,7 +150,7 @@ def _cpython(
 ) -> Iterator[Replayed]:
     meter = MeterAlong(calibration)
     for block in read_blocks(log, 2, progress, notices):
-        yield block, meter.columns(block.believed)
+        yield block, meter.columns(block.measured)
 
 
 def _two_processes(
@@ -154,63 +161,83 @@ def _two_processes(
     return second_process.columns_of(read_blocks(log, 2, progress, notices), calibration)
 
 
-def _micropython(
-    log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
+def _by_records(
+    engine: Engine, log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
 ) -> Iterator[Replayed]:
+    """By replay_engine.run() on another Python, which reads records and writes results."""
+    log = read_twice(log)
+    with engine(_records(read_blocks(log), calibration), progress) as results:
+        for block in read_blocks(log, 2, None if engine is rp2040 else progress, notices):
+            wanted = _RESULT_BYTES * int(np.count_nonzero(~block.frozen))
+            found = results.read(wanted)
+            if len(found) < wanted:
+                raise InputError(f"MicroPython stopped ({_last_words(found + results.read())}): use --engine cpython")
+            yield block, _table(found)
+
+
+@contextlib.contextmanager
+def micropython(records: Iterator[bytes], _progress: Progress | None) -> Iterator[IO[bytes]]:
+    """The results of MicroPython's unix port. Raises InputError where there is none."""
     if not unix_port.available():
         raise InputError("engine micropython has no package for this system: use --engine cpython")
-    log, size = read_twice(log), struct.calcsize(replay_engine.RESULT)
     with tempfile.TemporaryDirectory() as directory:
-        records = Path(directory) / "records"
-        with records.open("wb") as file:
-            file.writelines(_records(read_blocks(log), calibration))
-        command = unix_port.command(replay_engine.__file__, str(records))
+        path = Path(directory) / "records"
+        with path.open("wb") as file:
+            file.writelines(records)
+        command = unix_port.command(replay_engine.__file__, str(path))
         with subprocess.Popen(command, env=unix_port.environment(), stdout=subprocess.PIPE) as process:
             assert process.stdout is not None
-            results = b""
-            for block in read_blocks(log, 2, progress, notices):
-                wanted = size * int(np.count_nonzero(~block.frozen))
-                results = process.stdout.read(wanted)
-                if len(results) < wanted:
-                    break
-                yield block, _table(results)
-            results += process.stdout.read()
-        if process.returncode != 0:  # its traceback came over standard output
-            reason = results.decode(errors="replace").strip().rpartition("\n")[2]
-            raise InputError(f"MicroPython stopped ({reason}): use --engine cpython")
+            yield process.stdout
 
 
-def _rp2040(
-    log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
-) -> Iterator[Replayed]:
-    from ..emulator import image
+@contextlib.contextmanager
+def rp2040(records: Iterator[bytes], progress: Progress | None) -> Iterator[IO[bytes]]:
+    """The results of an emulated Pico: 32-bit floats and the board's own interpreter. Raises InputError, GuestError."""
+    from ..emulator import image, native
 
-    image.find()  # says what is not installed, before the import below fails for want of it
-    from . import emulated as emulated
+    image.find()  # says what is not installed, before an import below fails for want of it
+    native.build()
+    from ..deploy.bytecode import cross_compiled
+    from ..emulator import flash_image
+    from ..emulator.host_link import GUEST, HostLink
+    from ..emulator.pico import Pico
 
-    log, size = read_twice(log), struct.calcsize(replay_engine.RESULT)
-    records = b"".join(_records(read_blocks(log), calibration))
-    results, total = io.BytesIO(), len(records) // struct.calcsize(replay_engine.RECORD)
+    content = b"".join(records)
+    results, total = io.BytesIO(), len(content) // struct.calcsize(replay_engine.RECORD)
 
     def sink(result: bytes) -> None:
         results.write(result)
-        if progress and results.tell() % (_CHUNK * size) == 0:
-            progress(results.tell() // size, total)
+        if progress and results.tell() % (_CHUNK * _RESULT_BYTES) == 0:
+            progress(results.tell() // _RESULT_BYTES, total)
 
-    emulated.run(records, sink)
+    files = flash_image.firmware(compiled=True)
+    del files["/main.py"]
+    files["replay_engine.mpy"] = cross_compiled(Path(replay_engine.__file__))
+    with Pico(files=files) as pico:
+        HostLink(pico.chip, content, sink)
+        pico.exec(GUEST + "import replay_engine\nreplay_engine.run(Source(), Sink())\n", _EMULATED_S)
     results.seek(0)
-    for block in read_blocks(log, notices=notices):
-        wanted = size * int(np.count_nonzero(~block.frozen))
-        yield block, _table(results.read(wanted))
+    yield results
 
 
-_RUN = {"cpython": _cpython, "two processes": _two_processes, "micropython": _micropython, "rp2040": _rp2040}
+# MicroPython: the board's interpreter; an RP2040: its floats of 32 bits too. Two processes: see second_process.py.
+_RUN = {
+    "cpython": _cpython,
+    "two processes": _two_processes,
+    "micropython": partial(_by_records, micropython),
+    "rp2040": partial(_by_records, rp2040),
+}
+
+
+def _last_words(traceback: bytes) -> str:
+    """MicroPython's traceback comes over standard output."""
+    return traceback.decode(errors="replace").strip().rpartition("\n")[2]
 
 
 def _records(blocks: Iterable[Block], calibration: CalibrationFile) -> Iterator[bytes]:
     """The bytes that replay_engine.run reads."""
     yield struct.pack(replay_engine.CALIBRATION, *calibration.parameters(), calibration.delay_s())
     for block in blocks:
-        for time_us, reading, speed in block.believed.rows():
+        for time_us, reading, speed in block.measured.rows():
             given = speed if speed >= 0.0 else replay_engine.NO_SPEED  # NaN is not >= 0
             yield struct.pack(replay_engine.RECORD, time_us, *reading, given)

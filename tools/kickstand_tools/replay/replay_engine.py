@@ -54,9 +54,9 @@ class ReplayMeter(LeanMeter):
     def update(self, reading, dt_us):
         """reading: 7 numbers in the chip's order (g, C, deg/s); dt_us: microseconds since the one before, 0 for the
         first."""
-        self._reading, self._n = reading, 1
-        self.in_vehicle(reading, self.force, self.rate)
-        self._follow(dt_us)
+        force, rate = [0.0] * 3, [0.0] * 3
+        self.in_vehicle(reading, force, rate)
+        self.follow(force, rate, dt_us)
 
     def in_vehicle(self, reading, force, rate):
         """Put the force (g) and the rate (rad/s) of a reading into force (3) and rate (3). A reading may also be seven
@@ -79,24 +79,36 @@ class ReplayMeter(LeanMeter):
 
 
 class Replay:
-    """The meter over one recording. calibration: the firmware's own, for readings in g and deg/s.  delay_s: by how much
-    the gyro's low-pass is late."""
+    """The meter over one recording: the only loop that steps it, for every engine, and for a ride as it is streamed.
 
-    def __init__(self, calibration, delay_s=DELAY_S):
-        self.meter = ReplayMeter(calibration, delay_s=delay_s)
-        self._before = None
+    calibration: the firmware's own, for readings in g and deg/s.  delay_s: by how much the gyro's low-pass is late.
+    leans: False for a car.  since_us: time of the sample before the first, if there was one.
+    """
+
+    def __init__(self, calibration, delay_s=DELAY_S, leans=True, since_us=None):
+        self.meter = ReplayMeter(calibration, leans, delay_s)
+        self._before_us = since_us
+
+    def follow(self, samples):
+        """Yield the meter after each sample: time_us, force and rate from in_vehicle() (3 each), speed in m/s, which
+        is NaN or negative where there is no new one."""
+        meter = self.meter
+        for time_us, force, rate, speed_mps in samples:
+            if speed_mps >= 0.0:
+                meter.measure_speed(speed_mps)
+            meter.follow(force, rate, 0 if self._before_us is None else time_us - self._before_us)
+            self._before_us = time_us
+            yield meter
 
     def take(self, time_us, reading, speed_mps=NO_SPEED):
-        """Give the meter a sample (7, the chip's order; g, C, deg/s) and the speed if there is a new one."""
-        if speed_mps >= 0.0:
-            self.meter.measure_speed(speed_mps)
-        self.meter.update(reading, 0 if self._before is None else time_us - self._before)
-        self._before = time_us
+        """The meter after one sample: a reading of 7 in the chip's order (g, C, deg/s)."""
+        force, rate = [0.0] * 3, [0.0] * 3
+        self.meter.in_vehicle(reading, force, rate)
+        return next(self.follow(((time_us, force, rate, speed_mps),)))
 
     def step(self, time_us, reading, speed_mps=NO_SPEED):
-        """take() the sample and return the values of COLUMNS after it."""
-        self.take(time_us, reading, speed_mps)
-        meter = self.meter
+        """The values of COLUMNS after a sample, as take() has it."""
+        meter = self.take(time_us, reading, speed_mps)
         force, rate = meter.force, meter.rate
         return (
             meter.lean_deg,
@@ -116,7 +128,7 @@ def run(source, sink):
     calibration = Calibration()
     *parameters, delay_s = struct.unpack(CALIBRATION, source.read(struct.calcsize(CALIBRATION)))
     calibration.set_parameters(parameters)
-    replay = Replay(calibration, delay_s)
+    replay = Replay(calibration, delay_s=delay_s)
     size = struct.calcsize(RECORD)
     while True:
         record = source.read(size)

@@ -1,4 +1,5 @@
-"""MeterAlong in a process of its own. The meter is two thirds of replay's work: it runs beside reading and writing."""
+"""MeterAlong in a process of its own. For an hour at 200 Hz it takes 4.0 s of a
+processor beside the 2.2 s of reading and writing, instead of 6.3 s one after the other."""
 
 import multiprocessing
 import signal
@@ -20,14 +21,14 @@ _along: MeterAlong  # of the second process
 
 
 def columns_of(blocks: Iterator[Block], calibration: CalibrationFile) -> Iterator[tuple[Block, Array]]:
-    """Each block with MeterAlong.columns() of its rows that are believed. Raises InputError, also where the second
+    """Each block with MeterAlong.columns() of its rows that are measured. Raises InputError, also where the second
     process comes to an end."""
     spawn = multiprocessing.get_context("spawn")  # a process with threads, as of a progress bar, must not be forked
     waiting: deque[tuple[Block, Future[Array]]] = deque()
     try:
         with ProcessPoolExecutor(1, spawn, _begin, (calibration,)) as pool:
             for block in blocks:
-                waiting.append((block, pool.submit(_columns, replace(block.believed, lines=[]))))
+                waiting.append((block, pool.submit(_columns, replace(block.measured, lines=[]))))
                 if len(waiting) > _AHEAD:
                     yield _result(*waiting.popleft())
             while waiting:

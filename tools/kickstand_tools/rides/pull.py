@@ -9,10 +9,9 @@ from pathlib import Path, PurePosixPath
 from typing import NamedTuple
 
 from mpremote.transport import TransportExecError
-from mpremote.transport_serial import SerialTransport
 
 from ..deploy.board_console import BrokenOff, lines
-from ..deploy.connection import Progress, connected, last_line, literal, refuse_unfit_firmware, restart
+from ..deploy.connection import Board, Port, Progress, connected, literal, printed, restart
 from ..errors import InputError
 from ..output import check_directory
 from . import ride_log
@@ -45,6 +44,9 @@ with open(PATH, "rb") as file:
             break
         print(b2a_base64(piece).decode(), end="")
 """
+
+
+_Came = Callable[[str, int], None]  # called with what comes over, and how many bytes more of it have
 
 
 class _Part(NamedTuple):
@@ -80,7 +82,7 @@ class PullResult:
 
 
 def pull(
-    port: str | None,
+    port: Port,
     out: Path,
     delete: bool = False,
     progress: Progress | None = None,
@@ -88,7 +90,7 @@ def pull(
 ) -> PullResult:
     """Write every ride on the board to a log in the directory out, then restart the board.
 
-    port: None takes the only board that is plugged in.  delete: remove from the board each ride that came over whole.
+    delete: remove from the board each ride that came over whole.
     pulled: called with each ride once it is done.  Raises InputError, NoFirmware, OutdatedFirmware.
     """
     check_directory(out)
@@ -100,9 +102,16 @@ def pull(
             if rides:
                 out.mkdir(exist_ok=True)
             result = PullResult(name, [])
-            sofar = _SoFar(sum(part.size for parts in rides.values() for part in parts), progress)
+            total, done = sum(part.size for parts in rides.values() for part in parts), 0
+
+            def came(what: str, count: int) -> None:
+                nonlocal done
+                done += count
+                if progress:
+                    progress(what, done, total)
+
             for number, parts in rides.items():
-                ride = _pull_ride(transport, number, parts, vehicle, out, sofar)
+                ride = _pull_ride(transport, number, parts, vehicle, out, came)
                 if delete and ride.whole:
                     _delete(transport, directory, parts)
                     ride.deleted = True
@@ -114,28 +123,9 @@ def pull(
     return result
 
 
-class _SoFar:
-    """Bytes that have come over, of total, told to progress."""
-
-    def __init__(self, total: int, progress: Progress | None) -> None:
-        self._done, self._total, self._progress = 0, total, progress
-
-    def add(self, what: str, count: int) -> None:
-        self._done += count
-        if self._progress:
-            self._progress(what, self._done, self._total)
-
-
-def _list(transport: SerialTransport, name: str) -> tuple[str, str, dict[int, list[_Part]]]:
+def _list(transport: Board, name: str) -> tuple[str, str, dict[int, list[_Part]]]:
     """Where the rides are, the vehicle in the board's config.py, and the parts of each."""
-    listed, error = transport.exec_raw(_LIST, timeout=_SILENT_S)
-    if error:
-        reason = last_line(error.decode(errors="replace"))
-        if "CardError" in reason or "SettingsError" in reason:
-            raise InputError(f"{name}: {reason.partition(': ')[2]}")
-        refuse_unfit_firmware(reason, name)
-        raise InputError(f"the board at {name} cannot tell its rides ({reason}): kickstand flash brings it up to date")
-    first, *lines = listed.splitlines() or [b""]
+    first, *lines = printed(transport, name, _LIST, "its rides").splitlines() or [b""]
     directory, vehicle = literal(first, (str, str))
     in_order = sorted(_Part(*literal(line, (int, int, int, str))) for line in lines)
     if not all(part.path.startswith(f"{directory}/") and part.ride < 100_000 for part in in_order):
@@ -144,15 +134,13 @@ def _list(transport: SerialTransport, name: str) -> tuple[str, str, dict[int, li
     return directory, vehicle, {ride: list(group) for ride, group in by_ride}
 
 
-def _pull_ride(
-    transport: SerialTransport, number: int, parts: list[_Part], vehicle: str, out: Path, sofar: _SoFar
-) -> PulledRide:
+def _pull_ride(transport: Board, number: int, parts: list[_Part], vehicle: str, out: Path, came: _Came) -> PulledRide:
     """Write its log. vehicle: in the board's config.py; a ride that two poses have aligned was a motorcycle's."""
     ride = PulledRide(number)
     blocks: list[Block] = []
     for part in parts:
         title = f"ride {number}, part {part.part}"
-        found, problems = read(_read(transport, part, title, sofar))
+        found, problems = read(_read(transport, part, title, came))
         blocks += found
         for problem in problems:
             if problem == CUT_SHORT:
@@ -183,7 +171,7 @@ def _pull_ride(
     return ride
 
 
-def _delete(transport: SerialTransport, directory: str, parts: list[_Part]) -> None:
+def _delete(transport: Board, directory: str, parts: list[_Part]) -> None:
     """Parts of one ride, and the directories that are empty then."""
     for part in parts:
         transport.fs_rmfile(part.path)
@@ -194,10 +182,10 @@ def _delete(transport: SerialTransport, directory: str, parts: list[_Part]) -> N
             emptied = emptied.parent
 
 
-def _read(transport: SerialTransport, part: _Part, title: str, sofar: _SoFar) -> bytes:
+def _read(transport: Board, part: _Part, title: str, came: _Came) -> bytes:
     """A file of the board."""
     content = bytearray()
-    sofar.add(f"pulling {title}", 0)
+    came(f"pulling {title}", 0)
     try:
         # four characters are three bytes, and a line ends in two more; the ride that is recorded now may have grown
         for line in lines(
@@ -205,7 +193,7 @@ def _read(transport: SerialTransport, part: _Part, title: str, sofar: _SoFar) ->
         ):
             piece = binascii.a2b_base64(line)
             content += piece
-            sofar.add(f"pulling {title}", len(piece))
+            came(f"pulling {title}", len(piece))
     except (BrokenOff, binascii.Error) as error:
         raise InputError(f"{part.path} did not come over whole ({error}): try again, with another cable") from error
     return bytes(content)

@@ -3,10 +3,14 @@
 import contextlib
 import gzip
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+
+from rich.console import Console
+from rich.live import Live
 
 from ..calibration.file import write_calibration
 from ..deploy.connection import connected, restart
@@ -67,6 +71,27 @@ def record(
             with contextlib.suppress(Exception):  # the cable may be out
                 restart(transport)
     return RecordResult(out, beside, recorded.seconds, recorded.count, notes)
+
+
+@contextlib.contextmanager
+def live_line() -> Iterator[Callable[[str], None]]:
+    """A function that draws a line on standard error, again and again, if that is a terminal.
+
+    A terminal that is closed meanwhile is no error: the work goes on.
+    """
+    console = Console(stderr=True) if sys.stderr.isatty() else Console(quiet=True)
+    line = Live(console=console, auto_refresh=False, transient=True)
+
+    def show(text: str) -> None:
+        with contextlib.suppress(OSError):
+            line.update(text, refresh=True)
+
+    line.start()
+    try:
+        yield show
+    finally:
+        with contextlib.suppress(OSError):
+            line.stop()
 
 
 @contextlib.contextmanager

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 from typing import IO
 
 from kickstand.lean.meter import FALLEN_DEG
-from mpremote.transport_serial import SerialTransport
 
 from ..calibration.file import CalibrationFile
 from ..deploy.board_console import BrokenOff, lines
-from ..deploy.connection import refuse_unfit_firmware
+from ..deploy.connection import Board, refuse_unfit_firmware
 from ..errors import InputError, cause
 from ..logs.cells import TRACK
-from ..replay.replay_engine import NO_SPEED, ReplayMeter
+from ..replay.replay_engine import NO_SPEED, Replay
 from . import ride_log
 from .block_reader import BadBlock, Block, missing_note, parse
 
@@ -59,21 +58,6 @@ class LiveReading:
     rate_hz: float
     seconds: float
 
-    @property
-    def lean_deg(self) -> float | None:
-        """At the end."""
-        return self.moments[-1][1] if self.moments else None
-
-    @property
-    def forward_g(self) -> float | None:
-        """At the end."""
-        return self.moments[-1][2] if self.moments else None
-
-    @property
-    def left_g(self) -> float | None:
-        """At the end."""
-        return self.moments[-1][3] if self.moments else None
-
 
 class Recording:
     """Blocks into a file. stopped: set where the log has to end, so that the blocks end too.  live: called for each.
@@ -90,9 +74,9 @@ class Recording:
     def write(self, file: IO[str], blocks: Iterator[Block], notes: list[str]) -> None:
         """All of them as they come. notes: gets a line for each thing that is missing. Raises InputError if there is
         none."""
-        missing, expected, before = 0, 0, 0
+        missing, expected = 0, 0
         missing_s: list[float] = []
-        meter = ReplayMeter(CalibrationFile().to_firmware())
+        replay = Replay(CalibrationFile().to_firmware())
         aligned = car = changed = False
         file.write(",".join(ride_log.header(TRACK)) + "\n")
         for block in blocks:
@@ -107,32 +91,32 @@ class Recording:
                 self.first = block
                 calibration = ride_log.calibration(block)
                 car = calibration.vehicle == "car"
-                meter = ReplayMeter(calibration.to_firmware(), not car, calibration.delay_s())
+                replay = Replay(calibration.to_firmware(), calibration.delay_s(), not car, block.time_us)
                 aligned = calibration.aligned
-                before = block.time_us
             missing += block.sequence - expected
             expected = block.sequence + 1
             missing_s += block.missing_s()
             moments = []
             for row, turn in zip(ride_log.rows([block], TRACK, self.first.time_us), block.turns, strict=True):
                 file.write(",".join(row) + "\n")
-                reading = [float(cell) for cell in row[1:7]]
-                meter.measure_speed(NO_SPEED if turn.speed_mps is None else turn.speed_mps)
-                meter.update((*reading[:3], 0.0, *reading[3:]), turn.time_us - before)
-                before = turn.time_us
+                force, rate = ([float(cell) for cell in cells] for cells in (row[1:4], row[4:7]))
+                speed = NO_SPEED if turn.speed_mps is None else turn.speed_mps
+                meter = replay.take(turn.time_us, (*force, 0.0, *rate), speed)
                 trusted = meter.trusted and not meter.fallen and abs(meter.lean_deg) <= FALLEN_DEG
                 moments.append(
                     (
-                        (before - self.first.time_us) / 1e6,
+                        (turn.time_us - self.first.time_us) / 1e6,
                         meter.lean_deg if aligned and trusted and not car else None,
                         meter.smooth_force[2] if aligned else None,
                         meter.smooth_force[0] if aligned and car else None,
                     )
                 )
             self.count += len(block.turns)
-            self.seconds = (before - self.first.time_us) / 1e6
+            last_us = block.turns[-1].time_us if block.turns else block.time_us
+            self.seconds = (last_us - self.first.time_us) / 1e6
             if self._live:
-                rate_hz = len(block.turns) * 1e6 / max(1, before - block.time_us)
+                meter = replay.meter
+                rate_hz = len(block.turns) * 1e6 / max(1, last_us - block.time_us)
                 most = meter.max_left_deg, meter.max_right_deg, meter.max_accel_g, meter.max_brake_g
                 most = most if aligned else (0.0, 0.0, 0.0, 0.0)
                 self._live(LiveReading(aligned, car, moments, *most, rate_hz, self.seconds))
@@ -144,7 +128,7 @@ class Recording:
             notes.append(missing_note(missing_s))
 
 
-def blocks(transport: SerialTransport, name: str, notes: list[str], stopped: threading.Event) -> Iterator[Block]:
+def blocks(transport: Board, name: str, notes: list[str], stopped: threading.Event) -> Iterator[Block]:
     """Whole blocks as the board says them, until `stopped` is set or the connection is lost. name: the port's, for
     notes, which get a line for what has ended it. Raises NoFirmware, OutdatedFirmware."""
     parts: list[bytes] = []
@@ -163,7 +147,7 @@ def blocks(transport: SerialTransport, name: str, notes: list[str], stopped: thr
         parts = []
 
 
-def _lines(transport: SerialTransport, name: str, notes: list[str], stopped: threading.Event) -> Iterator[bytes]:
+def _lines(transport: Board, name: str, notes: list[str], stopped: threading.Event) -> Iterator[bytes]:
     """What the app on the board prints, line by line."""
     try:
         yield from lines(transport, _START, _SILENT_S, stopped)

@@ -10,7 +10,12 @@ import threading
 from datetime import datetime
 from pathlib import Path
 
-from .serial_guest import take_place_of_pyserial
+from ..calibration.file import calibration_path, write_calibration
+from ..deploy.connection import connected, describe, restart
+from ..errors import InputError
+from ..rides import pull as pulling
+from ..rides import ride_log, stream
+from .serial_guest import BrowserBoard
 
 
 class Live:
@@ -22,22 +27,17 @@ class Live:
         self._recording = None
         self._began = datetime.now()
 
-    def run(self, line, name, told):
+    def run(self, line, name, tell):
         """Listen to the board at a SerialLine until stop(), or until nothing more comes. name: of its port.
-        told(reading): called every half second with a LiveReading's fields as JSON.
+        tell(reading): called every half second with a LiveReading's fields as JSON.
 
         Returns JSON: {"notes": lines on what is missing, "changed": the log ended because of another calibration} or
         {"refused": why}. What came until then is in files().
         """
-        take_place_of_pyserial(line)
-        from ..deploy.connection import connected, describe, restart
-        from ..errors import InputError
-        from ..rides import stream
-
-        self._recording = stream.Recording(self._stopped, lambda reading: told(json.dumps(vars(reading))))
+        self._recording = stream.Recording(self._stopped, lambda reading: tell(json.dumps(vars(reading))))
         notes = []
         try:
-            with connected(name) as (transport, _):
+            with connected(BrowserBoard(line, name)) as (transport, _):
                 try:
                     describe(transport, name)
                     blocks = stream.blocks(transport, name, notes, self._stopped)
@@ -59,9 +59,6 @@ class Live:
         first = self._recording and self._recording.first
         if not first:
             return []
-        from ..calibration.file import write_calibration
-        from ..rides import ride_log
-
         calibration = io.StringIO()
         write_calibration(calibration, ride_log.calibration(first))
         stem = f"live-{self._began:%Y%m%d-%H%M%S}-{first.crc & 0xFFFF:04x}"
@@ -76,20 +73,15 @@ def pull(line, name, tell):
     "seconds", "readings", "problems"}]} and [(name, content)], the logs with their calibrations as `kickstand pull`
     writes them.
     """
-    take_place_of_pyserial(line)
-    from ..calibration.file import calibration_path
-    from ..errors import InputError
-    from ..rides import pull
-
     refused, rides = None, []
     with tempfile.TemporaryDirectory() as directory:
         try:
-            pull.pull(name, Path(directory), progress=tell, pulled=rides.append)
+            pulling.pull(BrowserBoard(line, name), Path(directory), progress=tell, pulled=rides.append)
         except InputError as error:
             refused = str(error)
         written = [path for ride in rides if ride.log for path in (ride.log, calibration_path(ride.log))]
         files = [(path.name, path.read_bytes()) for path in written]
-    told = [
+    found = [
         {
             "number": ride.number,
             "log": ride.log and ride.log.name,
@@ -99,4 +91,4 @@ def pull(line, name, tell):
         }
         for ride in rides
     ]
-    return json.dumps({"refused": refused, "rides": told}), files
+    return json.dumps({"refused": refused, "rides": found}), files

@@ -10,27 +10,26 @@ import mpremote
 from .. import firmware_path
 from ..deploy import bytecode
 from ..deploy.firmware_files import firmware_files
-from .zipped import zipped
+from .zipped import tools, zipped
 
 # Of Pico; of Pico 2; of ESP32-C3, C6 and H2 and of a Pico 2's other processor; of all other ESP32
 ARCHITECTURES = ("armv6m", "armv7emsp", "rv32imc", "xtensawin")
-_TOOLS = (
-    *("__init__.py", "deploy", "errors.py", "firmware_path.py", "remedies.py", "simulated_board"),
-    *("calibration/__init__.py", "calibration/file.py", "logs", "output.py", "refusals.py", "replay", "rides"),
-    *("web/__init__.py", "web/cable_guest.py", "web/install_guest.py", "web/serial_guest.py"),
-)
+# In place of pyserial, and of a module for terminals: what mpremote asks of them as it is imported
+_STANDS_IN = {
+    "serial/__init__.py": b"SerialException = OSError\n",
+    "serial/tools/__init__.py": b"",
+    "serial/tools/list_ports.py": b"",
+    "mpremote/console.py": b"VT_ENABLED = False\n",
+}
 _MPREMOTE = ("__init__.py", "mp_errno.py", "transport.py", "transport_serial.py")
 
 
 def archive() -> bytes:
-    """The archive, a ZIP file: tools/ and firmware/ as in a checkout, mpremote/, compiled/."""
-    tools = firmware_path.TOOLS / "kickstand_tools"
+    """The archive, a ZIP file: tools/ and firmware/ as in a checkout, mpremote/, serial/, compiled/."""
     files = {f"mpremote/{name}": Path(mpremote.__file__).parent / name for name in _MPREMOTE}
-    for name in _TOOLS:
-        for path in sorted((tools / name).rglob("*.py")) if (tools / name).is_dir() else [tools / name]:
-            files[f"tools/{path.relative_to(firmware_path.TOOLS).as_posix()}"] = path
+    files |= {f"tools/{name}": path for name, path in tools("web/cable_guest.py", "web/install_guest.py").items()}
     files |= {f"firmware{path}": source for path, source in firmware_files().items()}
-    return zipped({name: path.read_bytes() for name, path in files.items()} | _compiled())
+    return zipped({name: path.read_bytes() for name, path in files.items()} | _STANDS_IN | _compiled())
 
 
 def _compiled() -> dict[str, bytes]:

@@ -7,10 +7,15 @@ import re
 import sys
 from pathlib import Path
 
-from .serial_guest import ROOT, take_place_of_pyserial
+from .. import firmware_path
+from ..deploy import bytecode, config_check, config_text, connection, flash
+from ..deploy.firmware_files import CONFIG
+from ..errors import InputError
+from .serial_guest import BrowserBoard
 
 OLDEST = (1, 23)  # MicroPython
 PLATFORMS = ("rp2", "esp32")
+ROOT = Path("/packages")  # where page/python.mjs unpacks install_archive.archive()
 COMMON = "armv6m"  # the first of install_archive.ARCHITECTURES
 _VERSION = "(lambda s: (tuple(s.implementation.version[:2]), s.platform))(__import__('sys'))"
 _POSE = "(lambda s: (s.platform, getattr(s.implementation, '_machine', '')))(__import__('sys'))"
@@ -26,13 +31,8 @@ class Installation:
         Returns {"refused": why} or {"board", "settings": {name: its value in config.py}, "usual": {name: the value that
         is taken without one}, "by_hand": why a form cannot change this config.py, or null}.
         """
-        take_place_of_pyserial(line)
-        from ..deploy import config_check, config_text, connection
-        from ..deploy.firmware_files import CONFIG
-        from ..errors import InputError
-
         try:
-            with connection.connected(name) as (transport, name):
+            with connection.connected(BrowserBoard(line, name)) as (transport, name):
                 try:
                     board = _describe(transport, name)
                     self._pose = transport.eval(_POSE)
@@ -42,7 +42,7 @@ class Installation:
                     connection.restart(transport)
         except InputError as error:
             return json.dumps({"refused": str(error)})
-        self._path = _config()
+        self._path = firmware_path.config()
         self._template = self._path.read_text(encoding="utf-8")
         for module in [module for module in sys.modules if module.startswith("kickstand.")]:
             del sys.modules[module]  # of a board before: the firmware asks what it runs on as it is imported
@@ -54,17 +54,13 @@ class Installation:
             self._by_hand = str(error)
         with config_check.posed(*self._pose):
             usual = {name: _written(value) for name, value in vars(config_check.usual()).items() if name.isupper()}
-        told = {"board": board, "settings": settings, "usual": usual, "by_hand": self._by_hand}
-        return json.dumps(told)
+        return json.dumps({"board": board, "settings": settings, "usual": usual, "by_hand": self._by_hand})
 
     def check(self, wanted):
         """The config.py with these settings, {name: value or null for the usual one}, by the firmware's own rules.
 
         Returns {"text", "fault": [name of the setting or null, what is wrong] or null}.
         """
-        from ..deploy import config_check, config_text
-        from ..errors import InputError
-
         text = self._template if self._own is None else self._own
         values = json.loads(wanted)
         for name, value in values.items():  # one by one, so that a fault can be put beside its field
@@ -88,20 +84,12 @@ class Installation:
 
         Returns {"board", "copied": how many files, "kept": likewise, "config_kept"} or {"refused": why}.
         """
-        take_place_of_pyserial(line)
-        from ..deploy import bytecode, config_check, flash
-        from ..deploy.firmware_files import CONFIG
-        from ..errors import InputError
-
-        def judged(path, platform, machine):
-            with config_check.posed(platform, machine):
-                return config_check.in_words(path, config_check.fault(path), config_check.unused(path, platform))
-
-        flash.describe, bytecode.cross_compiled, config_check.judge = _describe, _compiled, judged
         self._path.write_text(self._template, encoding="utf-8")
         text = None if self._by_hand else json.loads(self.check(wanted))["text"]
         try:
-            done = flash.flash(name, replace_config=text is not None and text != self._own, progress=tell)
+            replaces = text is not None and text != self._own
+            board = BrowserBoard(line, name)
+            done = flash.flash(board, replaces, tell, describe=_describe, compiler=_compiled, judge=_judged)
         except InputError as error:
             return json.dumps({"refused": str(error)})
         installed = done.installed
@@ -111,9 +99,6 @@ class Installation:
 
 def _describe(transport, name):
     """connection.describe(), and a look at whether the board is one that Kickstand runs on."""
-    from ..deploy import connection
-    from ..errors import InputError
-
     text = connection.describe(transport, name)
     version, platform = transport.eval(_VERSION)
     if version < OLDEST:
@@ -130,17 +115,14 @@ def _written(value):
 
 def _compiled(source, architecture):
     """bytecode.cross_compiled() from the archive. All but machine code is the same for every board."""
-    from .. import firmware_path
-    from ..deploy import bytecode
-
-    folders = [Path(ROOT) / "compiled" / one for one in (architecture, COMMON)]
+    folders = [ROOT / "compiled" / one for one in (architecture, COMMON)]
     path = source.relative_to(firmware_path.PACKAGE).with_suffix(".mpy")
     if not folders[0].is_dir():
         raise bytecode.CannotCompile("this page has nothing compiled for this board")
     return next(folder / path for folder in folders if (folder / path).is_file()).read_bytes()
 
 
-def _config():
-    from .. import firmware_path
-
-    return firmware_path.config()
+def _judged(path, platform, machine):
+    """config_check.judge() in this process."""
+    with config_check.posed(platform, machine):
+        return config_check.in_words(path, config_check.fault(path), config_check.unused(path, platform))

@@ -1,19 +1,16 @@
 """What rides_guest.py needs to look at a ride: the tools that `kickstand report` and `plot` consist of, the firmware's
-mathematics, and numpy."""
+mathematics, Jinja, and numpy."""
 
 import io
 import tarfile
 from pathlib import Path
 
-from .. import firmware_path
-from .zipped import zipped
+import jinja2
+import markupsafe
 
-# The tools' modules and folders that rides_guest.py imports
-MODULES = (
-    *("__init__.py", "errors.py", "firmware_path.py", "output.py", "refusals.py", "remedies.py"),
-    *("analysis", "calibration", "imports", "logs", "replay", "smoothing"),
-    *("web/__init__.py", "web/rides_given.py", "web/rides_guest.py"),
-)
+from .. import firmware_path
+from .zipped import tools, zipped
+
 _NUMPY = "lib/python3.12/site-packages/"  # in the package of conda
 # A third of numpy, which is for its developers, for other compilers, and for random numbers
 _LEFT_OUT = ("/tests/", "/f2py/", "/random/", "/distutils/", "/testing/", "/include/", "/_pyinstaller/")
@@ -21,11 +18,12 @@ _LICENCES = "info/licenses/"
 
 
 def archive() -> bytes:
-    """A ZIP file of packages to import: kickstand_tools and kickstand."""
-    tools = firmware_path.TOOLS / "kickstand_tools"
-    found = [(path, firmware_path.TOOLS) for name in MODULES for path in _sources(tools / name)]
-    found += [(path, firmware_path.PACKAGE.parent) for path in _sources(firmware_path.PACKAGE)]
-    return zipped({path.relative_to(top).as_posix(): path.read_bytes() for path, top in found})
+    """A ZIP file of packages to import: kickstand_tools, kickstand, jinja2 and markupsafe, the latter without what is
+    compiled: it has all of that in Python, too."""
+    found = tools("web/rides_guest.py")
+    for package in (firmware_path.PACKAGE, Path(jinja2.__path__[0]), Path(markupsafe.__path__[0])):
+        found |= {path.relative_to(package.parent).as_posix(): path for path in package.rglob("*.py")}
+    return zipped({name: path.read_bytes() for name, path in found.items()})
 
 
 def numpy_archive(conda: bytes) -> tuple[bytes, bytes]:
@@ -45,8 +43,3 @@ def numpy_archive(conda: bytes) -> tuple[bytes, bytes]:
 
 def _wanted(name: str) -> bool:
     return name.endswith((".py", ".so")) and not any(part in name for part in _LEFT_OUT)
-
-
-def _sources(place: Path) -> list[Path]:
-    """What is in a folder and below it, or the one file that `place` is."""
-    return sorted(path for path in place.rglob("*") if path.suffix in (".py", ".js")) if place.is_dir() else [place]

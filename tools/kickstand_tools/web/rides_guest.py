@@ -21,13 +21,13 @@ from ..analysis.overview import overview
 from ..analysis.plot.page import page
 from ..analysis.ride import open_ride
 from ..calibration.file import calibration_path, write_calibration
-from ..calibration.ride.fit import fit_ride
 from ..errors import InputError
+from ..estimation.alignment import fit_ride
+from ..estimation.smooth import smooth_to_csv
 from ..imports import mapped
 from ..imports.importing import import_recording, write_imported
 from ..refusals import sentence
 from ..remedies import PAGE
-from ..smoothing.smooth import smooth_to_csv
 from .rides_given import sorted_out
 
 PLOTLY = "./plotly/plotly.min.js"  # the page of a ride loads it from the site

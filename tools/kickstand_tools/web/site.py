@@ -3,43 +3,32 @@
 import hashlib
 import json
 from pathlib import Path
+from typing import Any
 
 from .. import firmware_path
-from ..analysis.plot import page, page_with_map
-from ..analysis.plot.in_script import source_hash
+from ..analysis.plot import page
 from ..output import check_directory, new_directory, write_whole
 from ..pictures.lcd_font import ROM
+from ..templates import filled, source_hash
 from . import install_archive, npm_packages, rides_archive, wiring_files
+from .zipped import tools
 
 PAGE = Path(__file__).resolve().parent / "page"
-# The tools' modules and folders that device.py imports
-MODULES = (
-    "__init__.py",
-    "demo/__init__.py",
-    "demo/hand_bike.py",
-    "simulated_board",
-    "simulation/__init__.py",
-    "simulation/scripted",
-    "web/__init__.py",
-    "web/device.py",
-)
 # Large, and only for those who have a board or a ride: fetched when they ask for it
 LATER = ("esptool/", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip")
 _NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first by itself, the second as "./"
-_LISTED = "__FILES__", "__VERSION__"  # in service_worker.js
 
 
 def python_files() -> dict[str, str]:
     """{path as imported: source} of the firmware's package, and of the tools' modules that the page runs."""
-    tools = firmware_path.TOOLS / "kickstand_tools"
-    found = [(path, firmware_path.PACKAGE.parent) for path in _modules(firmware_path.PACKAGE)]
-    found += [(path, firmware_path.TOOLS) for name in MODULES for path in _modules(tools / name)]
-    return {path.relative_to(top).as_posix(): path.read_text(encoding="utf-8") for path, top in found}
+    package = firmware_path.PACKAGE
+    found = {path.relative_to(package.parent).as_posix(): path for path in sorted(package.rglob("*.py"))}
+    return {name: path.read_text(encoding="utf-8") for name, path in (found | tools("web/device.py")).items()}
 
 
-def _chart_scripts(library: bytes) -> bytes:
+def _chart_scripts(library: bytes) -> str:
     """The scripts of the charts of a ride as the policy of the page that frames them names them, the library first."""
-    return " ".join(map(source_hash, (library.decode(), page.SCRIPT, page_with_map.SCRIPT))).encode()
+    return " ".join(map(source_hash, (library.decode(), *page.SCRIPTS)))
 
 
 def site_files() -> dict[str, bytes]:
@@ -52,8 +41,8 @@ def site_files() -> dict[str, bytes]:
     files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in sorted(PAGE.rglob("*.*"))}
     files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # as a text a browser shows
     files |= wiring_files.wiring_files()
-    files["install.html"] = wiring_files.with_tables(files["install.html"].decode()).encode()
-    files["rides.html"] = files["rides.html"].replace(b"__CHARTS__", _chart_scripts(files["plotly/plotly.min.js"]))
+    files["install.html"] = _filled("install.html", boards=wiring_files.tables())
+    files["rides.html"] = _filled("rides.html", charts=_chart_scripts(files["plotly/plotly.min.js"]))
     files["python.json"] = json.dumps(python_files()).encode()
     files["install.zip"] = install_archive.archive()
     files["rides.zip"] = rides_archive.archive()
@@ -61,12 +50,13 @@ def site_files() -> dict[str, bytes]:
     files["numpy/numpy.zip"], files["numpy/licence.txt"] = rides_archive.numpy_archive(files.pop(package))
     files["font.json"] = json.dumps({code: list(rows) for code, rows in ROM.items()}).encode()
     version = hashlib.sha256(b"".join(name.encode() + data for name, data in sorted(files.items()))).hexdigest()[:12]
-    worker = files["service_worker.js"].decode()
     kept = sorted(["./", *(name for name in files if name not in _NOT_KEPT and not name.startswith(LATER))])
-    for mark, text in zip(_LISTED, (json.dumps(kept), version)):
-        worker = worker.replace(f'"{mark}"', text if text.startswith("[") else f'"{text}"')
-    files["service_worker.js"] = worker.encode()
+    files["service_worker.js"] = _filled("service_worker.js", files=kept, version=version)
     return files
+
+
+def _filled(name: str, **values: Any) -> bytes:
+    return filled(PAGE / name, **values).encode()
 
 
 def write_site(files: dict[str, bytes], out: Path) -> None:
@@ -88,8 +78,3 @@ def write_site(files: dict[str, bytes], out: Path) -> None:
 
 def _write(path: Path, data: bytes) -> None:
     path.write_bytes(data)
-
-
-def _modules(place: Path) -> list[Path]:
-    """The modules in a folder and below it, or the one module that `place` is."""
-    return sorted(place.rglob("*.py")) if place.is_dir() else [place]

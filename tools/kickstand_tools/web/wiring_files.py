@@ -1,7 +1,5 @@
 """How the parts are wired, for the page Install: the drawings that the README has too, and each as a table."""
 
-from html import escape
-
 from ..pictures import lcd, wiring
 
 _BOARDS = {"pico": wiring.PICO, "esp32": wiring.ESP32}
@@ -14,18 +12,9 @@ def wiring_files() -> dict[str, bytes]:
     return {f"wiring_{name}.svg": wiring.draw(board, display).encode() for name, board in _BOARDS.items()}
 
 
-def with_tables(page: str) -> str:
-    """The HTML of a page with the tables in the place of their marks, as <!-- table wiring_pico -->."""
-    for name, board in _BOARDS.items():
-        page = page.replace(f"<!-- table wiring_{name} -->", _table(board))
-    return page
-
-
-def _table(board: wiring.Board) -> str:
-    rows = [
-        f"<tr><th scope=row>{module}</th><td>{escape(one)}</td><td>{escape(other)}</td></tr>"
-        for module, pins in wiring.connections(board)
-        for one, other in pins.items()
-    ]
-    head = f"<tr><th scope=col>Part</th><th scope=col>its pin</th><th scope=col>{board.title}</th></tr>"
-    return f"<table><thead>{head}</thead><tbody>{''.join(rows)}</tbody></table>"
+def tables() -> dict[str, tuple[str, list[tuple[str, str, str]]]]:
+    """{board: (its title, rows of part, its pin and the board's)} of what is drawn."""
+    return {
+        name: (board.title, [(part, *both) for part, pins in wiring.connections(board) for both in pins.items()])
+        for name, board in _BOARDS.items()
+    }

@@ -8,10 +8,10 @@ from typing import Any
 import click
 from kickstand_tools.cli.common import JSON, PATH, warn
 from kickstand_tools.cli.simulated import LINES_S, PROFILE_NAMES, pose_options, seconds_option
-from kickstand_tools.emulator import image
+from kickstand_tools.emulator import image, native
 from kickstand_tools.errors import extra
 from kickstand_tools.output import check_directory, new_directory
-from kickstand_tools.progress import Bar
+from kickstand_tools.progress import Bar, spinner
 from kickstand_tools.simulation.profiles import MAIN
 from rich.console import Console
 
@@ -69,6 +69,8 @@ def evaluate_command(
 def bench_command(seconds: int, as_json: bool) -> None:
     """What the firmware costs on an emulated Pico: time, memory, flash."""
     image.find()  # before anything else of the emulator is imported
+    with spinner("compiling the emulator, once"):
+        native.build()
     from .bench.bench import bench, tables
 
     result = bench(seconds)

@@ -3,18 +3,18 @@
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
 from kickstand.errors import Notice
 
-from ...errors import InputError
+from ...errors import InputError, extra
 from ...logs.reader import Source, read_blocks, read_twice
 from ...logs.source import Progress
 from ...logs.stretch import Stretch
 from ...logs.table import Array
 from ...output import write_whole
-from ...replay.mount_check import MountCheck
 from ..channels import Channels
 from ..downsample import downsampled
 from ..ride import Ride
@@ -29,7 +29,7 @@ _WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
     "racechrono": export_racechrono.write,
     "vbo": export_vbo.write,
 }
-_CHECK = {"gpx": export_gpx.check, "parquet": export_parquet.check}  # is the library that writes it there?
+_NEEDS = {"gpx": ("GPX", "gpxpy"), "parquet": ("Parquet", "pyarrow")}  # its name, and the library that writes it
 _DATED = ("gpx", "racechrono", "vbo")
 _CLOCK_S = 1e8  # March 1973: a log that starts later has Unix time in it
 
@@ -58,8 +58,9 @@ def export(
     ...     export(open_ride(log, CalibrationFile(aligned=True)), "csv", f"{directory}/ride.csv")
     300
     """
-    if form in _CHECK:
-        _CHECK[form]()
+    name, library = _NEEDS.get(form, ("", ""))
+    if library and not find_spec(library):
+        raise InputError(f"{name} needs {library}: " + extra("rides"))
     ride = replace(ride, log=read_twice(ride.log))
     log = ride.log.source if isinstance(ride.log, Stretch) else ride.log
     whole = _first_pass(log)
@@ -71,11 +72,11 @@ def export(
     elif form in _DATED and start_s < _CLOCK_S:
         written_s = Path(log).stat().st_mtime if isinstance(log, (Path, str)) else time.time()
         start_s = float(max(0, int(written_s - whole.seconds)))
-    count, mount = 0, MountCheck(ride.calibration)
+    count = 0
 
     def rows() -> Iterator[Channels]:
         nonlocal count
-        blocks = ride.blocks(progress, notices, mount)
+        blocks = ride.blocks(progress, notices)
         for block in downsampled(blocks, STEP_S[form]) if STEP_S[form] else blocks:
             if form == "gpx":
                 block = block.part(np.isfinite(block.lat_deg) & np.isfinite(block.lon_deg))
@@ -89,17 +90,14 @@ def export(
             yield block
 
     write_whole(Path(out), lambda temporary: _WRITE[form](temporary, rows(), start_s))
-    contradiction = mount.notice()
-    if notices is not None and contradiction:
-        notices.append(contradiction)
     return count
 
 
 @dataclass
 class _Whole:
     """A whole log. start_s: its own time at the first sample. seconds: its length. speeds (n, 2): s from there and m/s.
-    places: its positions. utc_s: Universal Time at the first sample, the median of what its rows tell, because some
-    come later than others; None where none tells it."""
+    places: its positions. utc_s: Universal Time at the first sample, the median of what its rows say, because some
+    come later than others; None where none says it."""
 
     start_s: float
     seconds: float
@@ -116,6 +114,6 @@ def _first_pass(log: Source) -> _Whole:
         speeds.append(np.column_stack((block.t_s[there], block.speed_mps[there])))
         places.append(track(block))
         starts_utc_s.append((block.utc_s - block.t_s)[np.isfinite(block.utc_s)])
-    told = np.concatenate(starts_utc_s)
-    utc_s = float(np.median(told)) if len(told) else None
+    found = np.concatenate(starts_utc_s)
+    utc_s = float(np.median(found)) if len(found) else None
     return _Whole(start_s, seconds, np.concatenate(speeds), joined(places), utc_s)

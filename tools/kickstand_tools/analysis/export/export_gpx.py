@@ -7,14 +7,12 @@ of Kickstand's, where the meter trusts it.
 
 from collections.abc import Iterator
 from datetime import UTC, datetime
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from ...errors import InputError, extra
 from ..channels import Channels
 from ..track import GAP_S
 
@@ -23,12 +21,6 @@ if TYPE_CHECKING:
 
 GARMIN = "http://www.garmin.com/xmlschemas/TrackPointExtension/v2"
 KICKSTAND = "urn:kickstand"
-
-
-def check() -> None:
-    """Raise InputError where GPX cannot be written."""
-    if not find_spec("gpxpy"):
-        raise InputError("GPX needs gpxpy: " + extra("rides"))
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:

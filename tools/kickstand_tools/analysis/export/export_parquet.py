@@ -4,20 +4,12 @@ https://arrow.apache.org/docs/python/parquet.html; pandas.read_parquet and other
 """
 
 from collections.abc import Iterator
-from importlib.util import find_spec
 from pathlib import Path
 
-from ...errors import InputError, extra
 from ..channels import Channels
 from .export_csv import COLUMNS
 
 _FINE = ("t_s", "lat_deg", "lon_deg", "utc_s")  # a float of 32 bits tells positions that are 1 m apart
-
-
-def check() -> None:
-    """Raise InputError where Parquet cannot be written."""
-    if not find_spec("pyarrow"):
-        raise InputError("Parquet needs pyarrow: " + extra("rides"))
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:

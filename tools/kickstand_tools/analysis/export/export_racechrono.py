@@ -17,24 +17,24 @@ from ...logs.csv_lines import csv_lines
 from ..channels import Channels
 
 _NOTE = "Made by Kickstand. lean_angle > 0 to the right; x left, y up, z forward"
-# name, unit, source, digits
+# name, unit, source, digits, what stands there: time_s, and the channels; "" for nothing
 COLUMNS = (
-    ("timestamp", "unix time", "", 3),
-    ("fragment_id", "", "", 0),
-    ("lap_number", "", "", 0),
-    ("elapsed_time", "s", "", 3),
-    ("latitude", "deg", "100: gps", 7),
-    ("longitude", "deg", "100: gps", 7),
-    ("speed", "m/s", "100: gps", 3),
-    ("lateral_acc", "G", "calc", 4),
-    ("lean_angle", "deg", "calc", 2),
-    ("longitudinal_acc", "G", "calc", 4),
-    ("x_acc", "G", "101: acc", 4),
-    ("y_acc", "G", "101: acc", 4),
-    ("z_acc", "G", "101: acc", 4),
-    ("x_rate_of_rotation", "deg/s", "102: gyro", 3),
-    ("y_rate_of_rotation", "deg/s", "102: gyro", 3),
-    ("z_rate_of_rotation", "deg/s", "102: gyro", 3),
+    ("timestamp", "unix time", "", 3, "time_s"),
+    ("fragment_id", "", "", 0, "zero"),
+    ("lap_number", "", "", 0, ""),
+    ("elapsed_time", "s", "", 3, "t_s"),
+    ("latitude", "deg", "100: gps", 7, "lat_deg"),
+    ("longitude", "deg", "100: gps", 7, "lon_deg"),
+    ("speed", "m/s", "100: gps", 3, "speed_mps"),
+    ("lateral_acc", "G", "calc", 4, "lateral_g"),
+    ("lean_angle", "deg", "calc", 2, "lean_deg"),
+    ("longitudinal_acc", "G", "calc", 4, "forward_g"),
+    ("x_acc", "G", "101: acc", 4, "left_g"),
+    ("y_acc", "G", "101: acc", 4, "up_g"),
+    ("z_acc", "G", "101: acc", 4, "forward_g"),
+    ("x_rate_of_rotation", "deg/s", "102: gyro", 3, "left_dps"),
+    ("y_rate_of_rotation", "deg/s", "102: gyro", 3, "yaw_rate_dps"),
+    ("z_rate_of_rotation", "deg/s", "102: gyro", 3, "roll_rate_dps"),
 )
 
 
@@ -55,25 +55,8 @@ def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
     with open(path, "wb") as file:
         file.write(("\n".join(head) + "\n").encode())
         for block in blocks:
-            none = np.full(len(block.t_s), np.nan)
-            table = np.column_stack(
-                (
-                    block.t_s + start_s,
-                    np.zeros(len(none)),
-                    none,
-                    block.t_s,
-                    block.lat_deg,
-                    block.lon_deg,
-                    block.speed_mps,
-                    block.lateral_g,
-                    block.lean_deg,
-                    block.forward_g,
-                    block.left_g,
-                    block.up_g,
-                    block.forward_g,
-                    -block.pitch_rate_dps,
-                    block.yaw_rate_dps,
-                    block.roll_rate_dps,
-                )
-            )
+            count = len(block.t_s)
+            values = vars(block) | {"zero": np.zeros(count), "": np.full(count, np.nan)}
+            values |= {"time_s": block.t_s + start_s, "left_dps": -block.pitch_rate_dps}
+            table = np.column_stack([values[column[4]] for column in COLUMNS])
             file.writelines(csv_lines(table, [column[3] for column in COLUMNS]))

@@ -1,143 +1,273 @@
-"""The charts of a ride as plotly.js takes them: {"data": traces, "layout": of a wide window, "narrow": of a phone}."""
+"""What is drawn of a ride, as data: charts with their traces, units, colours and ranges.
 
-import html
-from typing import Any
+picture.py draws them by matplotlib, interactive.py hands them to plotly: both show the same.
+"""
+
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from ...logs.table import Array
+from ...signals.averages import smoothed
+from ..downsample import spacing_s
 from ..overview import Overview
-from ..report import clock, judged
-from ..stops.brake_test import Stop
-from .envelope import GAP_S, SPEED_GAP_S, envelope
-from .in_script import plain
-from .layout import AXIS, PAPER, arranged
-from .traces import (
-    BRAKE_COLOUR,
-    LATERAL_COLOUR,
-    LEFT_COLOUR,
-    RIGHT_COLOUR,
-    SPEED_COLOUR,
-    Traces,
-    histogram,
-    lean_limit,
-    maxima,
-    quality_lines,
-    tick_s,
-    title,
-    traces,
-)
+from ..report import angles, clock, judged, peak_words
+from ..summary import BIN_DEG, BINS_DEG, Peak
 
-POINTS = 40_000  # of a line: with more, a browser no longer zooms smoothly
-_HIGH, _LOW, _SQUARE = 210, 125, 280  # heights of charts, pixels
+LEFT_COLOUR, RIGHT_COLOUR = "#2563a8", "#c2571a"
+BRAKE_COLOUR, LATERAL_COLOUR = "#9b2335", "#3d7f6b"
+SPEED_COLOUR = "#5b4b8a"
+GUIDE_COLOUR = "#bbbbbb"
+SMOOTH_S = 0.3
+GG_BIN_G = 0.025
+GAP_S = 1.0  # a line is not drawn over a longer time without a value,
+SPEED_GAP_S = 5.0  # that of the speed, which comes seldom
+_HIGH, _LOW, _SQUARE = 2.5, 1.5, 3.0  # heights of charts, inches of the picture
+_UPRIGHT_DEG = 5.0  # the share of smaller leans may be cut off: it would hide the others
 
 
-def figure(seen: Overview) -> dict[str, Any]:
-    """All that is drawn, in plain numbers, lists and None for NaN."""
-    drawn = traces(seen)
-    over_time = [] if seen.ride.car else ["lean"]
-    over_time += ["speed"] if seen.has_speed else []
-    forces = len(over_time) + 1  # number of the acceleration's axes; after it g against g, share and straights
-    made = {"data": _data(seen, drawn, over_time, forces)}
-    for kind in ("layout", "narrow"):
-        made[kind] = _layout(seen, drawn, over_time, forces, kind == "narrow")
-    return made
+@dataclass
+class Line:
+    """From point to point (n), broken at NaN that last longer than gap_s. name: none for what only guides the eye."""
+
+    x: Array
+    y: Array
+    colour: str
+    name: str = ""
+    gap_s: float = np.inf
+    dotted: bool = False
 
 
-def _data(seen: Overview, drawn: Traces, over_time: list[str], forces: int) -> Any:
-    made = []
-    for k, name in enumerate(over_time, 1):
-        lean = name == "lean"
-        values, colour = (drawn.lean_deg, RIGHT_COLOUR) if lean else (drawn.speed_kmh, SPEED_COLOUR)
-        made.append(_line(name, drawn.time_s, values, colour, k, GAP_S if lean else SPEED_GAP_S))
-    made.append(_line("to the left", drawn.time_s, drawn.lateral_g, LATERAL_COLOUR, forces, GAP_S))
-    made.append(_line("forward", drawn.time_s, drawn.forward_g, BRAKE_COLOUR, forces, GAP_S))
-    centres = (drawn.gg_edges_g[1:] + drawn.gg_edges_g[:-1]) / 2.0
-    logs = np.log10(np.where(drawn.gg_s > 0.0, drawn.gg_s, np.nan))
-    seconds = {"type": "heatmap", "name": "seconds, log10", "colorscale": "YlGnBu", "showscale": False}
-    seconds |= {"reversescale": True, "x": plain(-centres), "y": plain(centres), "z": [plain(row) for row in logs]}
-    middle, share = histogram(seen)
-    sides = np.where(middle < 0.0, LEFT_COLOUR, RIGHT_COLOUR).tolist()
-    bars = {"type": "bar", "name": "share", "x": plain(middle), "y": plain(share)}
-    bars |= {"marker": {"color": sides, "line": {"width": 0.5, "color": "white"}}}
-    straights = {"type": "scattergl", "name": "straights", "mode": "markers", "marker": {"size": 3, "color": "grey"}}
-    straights |= {"x": plain(-seen.quality.lateral_g, 5), "y": plain(seen.quality.forward_g, 5)}
-    made += [one | _axes(forces + k) for k, one in enumerate((seconds, bars, straights), 1)]
-    if seen.quality.yaw_deg is not None and judged(seen):
-        reach = np.array([-1.0, 1.0]) * float(np.max(np.abs(seen.quality.forward_g)))
-        across = -np.tan(np.radians(seen.quality.yaw_deg)) * reach
-        line = {"type": "scatter", "mode": "lines", "line": {"width": 1.5, "color": BRAKE_COLOUR}}
-        made.append(line | {"x": plain(across, 5), "y": plain(reach, 5)} | _axes(forces + 3))
-    return made
+@dataclass
+class Sides:
+    """A lean (n), filled from zero to it in the colours of both sides; else as a Line."""
+
+    x: Array
+    y: Array
+    gap_s: float
 
 
-def _layout(seen: Overview, drawn: Traces, over_time: list[str], forces: int, narrow: bool) -> dict[str, Any]:
-    titles = {"lean": "Lean, degrees (right > 0)", "speed": "Speed, km/h"}
-    said = (
-        f"Acceleration, g: <span style='color:{BRAKE_COLOUR}'>forward</span> and "
-        f"<span style='color:{LATERAL_COLOUR}'>to the left</span>; grey: stops and their MFDD, m/s²"
-    )
-    names = [*(titles[name] for name in over_time), said, "g against g"]
-    names += ["" if seen.ride.car else "How long at which lean, %", "Alignment: g on the straights"]
-    rows = [*(_HIGH if name == "lean" else _LOW for name in over_time), _HIGH, _SQUARE]
-    made = arranged(rows, names, html.escape(title(seen)), narrow)  # plotly takes < for the beginning of a tag
-    begin, end = float(drawn.time_s[0]), float(drawn.time_s[-1])
-    step = tick_s(end - begin) * (2 if narrow else 1)
-    ticks = np.arange(step * np.ceil(begin / step), end, step)
-    at_times = {"tickvals": ticks.tolist(), "ticktext": [clock(tick) for tick in ticks]}
-    for k in range(1, forces + 1):
-        made[f"xaxis{_number(k)}"] |= at_times | ({"matches": "x"} if k > 1 else {})
-    limit = lean_limit(seen)
+@dataclass
+class Dots:
+    """n points."""
+
+    x: Array
+    y: Array
+    colour: str
+    name: str
+
+
+@dataclass
+class Bars:
+    """n bars as wide as `width` around x, from zero to y, in the colours of both sides."""
+
+    x: Array
+    y: Array
+    width: float
+    name: str
+
+
+@dataclass
+class Cells:
+    """A map of n x n cells between the edges (n + 1) of both axes: the darker the more. values (n, n): rows along y,
+    0 where there is nothing."""
+
+    edges: Array
+    values: Array
+    name: str
+
+
+Trace = Line | Sides | Dots | Bars | Cells
+
+
+@dataclass
+class Note:
+    """Words at a point. side: where of it they stand, "above", "below", "left" or "right"."""
+
+    x: float
+    y: float
+    text: str
+    side: str
+
+
+@dataclass
+class Chart:
+    """One pair of axes. height: inches of the picture. ticks: of the x axis with their words, None for the usual ones.
+    square: a unit is as long on both axes. spans: (from, to, words) in x, grey behind the traces. left, right: words in
+    the upper corners."""
+
+    title: str
+    traces: list[Trace]
+    height: float
+    x_range: tuple[float, float]
+    y_range: tuple[float, float]
+    x_title: str = ""
+    y_title: str = ""
+    ticks: dict[float, str] | None = None
+    square: bool = False
+    notes: list[Note] = field(default_factory=list)
+    spans: list[tuple[float, float, str]] = field(default_factory=list)
+    left: str = ""
+    right: str = ""
+
+
+@dataclass
+class Charts:
+    """All of a ride. over_time: below each other with one axis of time, s; below: beside each other."""
+
+    title: str
+    over_time: list[Chart]
+    below: list[Chart]
+
+
+def charts(seen: Overview) -> Charts:
+    """The charts of a ride. A car has none of lean, and without a speed there is none of it."""
+    course, car = seen.course, seen.ride.car
+    lateral, forward = (smoothed(values, course.t_s, SMOOTH_S) for values in (course.lateral_g, course.forward_g))
+    over_time = [] if car else [_lean(seen)]
+    over_time += [_speed(seen)] if seen.has_speed else []
+    over_time.append(_forces(seen, lateral, forward))
+    below = [_g_against_g(seen, lateral, forward), *([] if car else [_shares(seen)]), _alignment(seen)]
+    return Charts(title(seen), over_time, below)
+
+
+def shown_lean_deg(seen: Overview) -> Array:
+    """(n) lean at each sample of the course, NaN where the display shows none."""
+    return np.where(seen.course.trusted, seen.course.lean_deg, np.nan)
+
+
+def title(seen: Overview) -> str:
+    """One line: name and length of the ride, and its maxima."""
+    total = seen.summary
+    said = [seen.ride.stem, clock(total.duration_s)]
     if not seen.ride.car:
-        made["yaxis"]["range"] = [-1.2 * limit, 1.2 * limit]  # with room for what stands at the maxima
-    middle, share = histogram(seen)
-    leaning = float(np.max(share[np.abs(middle) > 5.0], initial=0.0))
-    gg, lean, straights = forces + 1, forces + 2, forces + 3
-    below = {
-        f"xaxis{gg}": {"title": {"text": "left turn  ·  right turn"}},
-        f"yaxis{gg}": {"title": {"text": "braking  ·  acceleration"}, "scaleanchor": f"x{gg}"},
-        f"xaxis{lean}": {"title": {"text": "left  ·  degrees  ·  right"}, "range": [-limit, limit]},
-        f"yaxis{lean}": {"range": [0.0, max(1.0, 1.5 * leaning)]},
-        f"xaxis{straights}": {"title": {"text": "left  ·  g  ·  right"}},
-        f"yaxis{straights}": {"scaleanchor": f"x{straights}"},
-    }
-    for name in [name for name in made if name[1:].startswith("axis")]:
-        one = AXIS | made[name] | below.get(name, {})
-        made[name] = one | {"title": AXIS["title"] | one["title"]}
-    for peak, sign in maxima(seen):
-        text = f"{peak.value:.0f}° {'left' if sign < 0 else 'right'}"
-        place = {"x": peak.time_s, "y": sign * peak.value, "xref": "x", "yref": "y"}
-        made["annotations"].append(place | {"text": text, "ax": 0, "ay": -20 * sign, "arrowhead": 0, "arrowwidth": 1})
-    corner = {"xref": f"x{straights} domain", "yref": f"y{straights} domain", "xanchor": "left", "yanchor": "top"}
-    box = {"text": "<br>".join(quality_lines(seen)), "showarrow": False, "align": "left", "font": {"size": 12}}
-    made["annotations"] += [corner | box | {"x": 0.02, "y": 0.98}, *[_label(stop, forces) for stop in seen.stops]]
-    return PAPER | made | {"hovermode": "closest", "shapes": [_shade(stop, forces) for stop in seen.stops]}
+        how = "smoothed lean" if seen.ride.smoothed else "lean as displayed"
+        left, right = peak_words(total.left_deg, "{:.0f}°")[0], peak_words(total.right_deg, "{:.0f}°")[0]
+        said.append(f"{how} {left} left, {right} right")
+    brake, accel = peak_words(total.brake_g, "{:.2f} g")[0], peak_words(total.accel_g, "{:.2f} g")[0]
+    said.append(f"braking {brake}, acceleration {accel}")
+    return "  ·  ".join(said)
 
 
-def _line(name: str, time: Array, values: Array, colour: str, axes: int, gap_s: float) -> dict[str, Any]:
-    x, y = envelope(time, values, POINTS, gap_s)
-    made = {"type": "scatter", "mode": "lines", "name": name, "line": {"width": 1, "color": colour}}
-    return made | {"x": plain(x), "y": plain(y)} | _axes(axes)
+def lean_limit(seen: Overview) -> float:
+    """Degrees to each side that the lean's axis shows."""
+    return max(20.0, 1.2 * max(seen.summary.left_deg.value, seen.summary.right_deg.value))
 
 
-def _axes(k: int) -> dict[str, str]:
-    return {"xaxis": f"x{_number(k)}", "yaxis": f"y{_number(k)}"}
+def tick_s(seconds: float) -> float:
+    """A round time between ticks, so that there are 6 to 12 of them."""
+    return next((tick for tick in (1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800) if seconds < 12 * tick), 3600)
 
 
-def _number(k: int) -> str:
-    """As plotly counts axes."""
-    return str(k) if k > 1 else ""
+def envelope(time: Array, values: Array, points: int, gap_s: float = np.inf) -> tuple[Array, Array]:
+    """A long line drawn with few points that look the same: the smallest and the largest value of each stretch.
+
+    At most about this many of the samples, in their order; all of them if they are no more. Leaves out NaN, except for
+    one in the middle of each time of over gap_s without a value, which breaks the line.
+    """
+    there = ~np.isnan(values)
+    time, values = time[there], values[there]
+    before = np.flatnonzero(np.diff(time) > gap_s)
+    middles = (time[before] + time[before + 1]) / 2.0
+    if len(values) > points:
+        starts = np.arange(0, len(values), -(-len(values) * 2 // points))
+        order = np.lexsort((values, np.repeat(np.arange(len(starts)), np.diff(starts, append=len(values)))))
+        kept = np.unique(order[np.concatenate((starts, np.append(starts[1:], len(values)) - 1))])
+        time, values = time[kept], values[kept]
+    place = np.searchsorted(time, middles)
+    return np.insert(time, place, middles), np.insert(values, place, np.nan)
 
 
-def _shade(stop: Stop, axes: int) -> dict[str, Any]:
-    """A grey field behind the acceleration."""
-    place = {"x0": stop.start_s, "x1": stop.stop_s, "y0": 0, "y1": 1}
-    place |= {"xref": f"x{_number(axes)}", "yref": f"y{_number(axes)} domain"}
-    return place | {"type": "rect", "fillcolor": "grey", "opacity": 0.2, "line": {"width": 0}}
+def _maxima(seen: Overview) -> list[tuple[Peak, float]]:
+    """The largest lean to each side, and its sign in the drawing."""
+    peaks = ((seen.summary.left_deg, -1.0), (seen.summary.right_deg, 1.0))
+    return [(peak, sign) for peak, sign in peaks if peak.time_s is not None]
 
 
-def _label(stop: Stop, axes: int) -> dict[str, Any]:
-    """Its MFDD."""
-    place = {"x": (stop.start_s + stop.stop_s) / 2.0, "y": 1, "yanchor": "top", "font": {"size": 12}}
-    place |= {"xref": f"x{_number(axes)}", "yref": f"y{_number(axes)} domain"}
-    return place | {"text": f"{stop.mfdd_mps2:.1f}", "showarrow": False}
+def _over_time(seen: Overview, words: str, traces: list[Trace], height: float, y_range: tuple[float, float]) -> Chart:
+    begin, end = float(seen.course.t_s[0]), float(seen.course.t_s[-1])
+    step = tick_s(end - begin)
+    ticks = {tick: clock(tick) for tick in np.arange(step * np.ceil(begin / step), end, step).tolist()}
+    return Chart(words, traces, height, (begin, max(end, begin + 1e-3)), y_range, ticks=ticks)
+
+
+def _lean(seen: Overview) -> Chart:
+    limit = lean_limit(seen)
+    lean = Sides(seen.course.t_s, shown_lean_deg(seen), GAP_S)
+    made = _over_time(seen, "Lean, degrees (right up, left down)", [lean], _HIGH, (-limit, limit))
+    for peak, sign in _maxima(seen):
+        word, side = ("left", "below") if sign < 0 else ("right", "above")
+        made.notes.append(Note(peak.time_s or 0.0, sign * peak.value, f"{peak.value:.0f}° {word}", side))
+    return made
+
+
+def _speed(seen: Overview) -> Chart:
+    speed = Line(seen.course.t_s, 3.6 * seen.course.speed_mps, SPEED_COLOUR, "speed", SPEED_GAP_S)
+    return _over_time(seen, "Speed, km/h", [speed], _LOW, (0.0, 1.05 * float(np.nanmax(speed.y))))
+
+
+def _forces(seen: Overview, lateral: Array, forward: Array) -> Chart:
+    words = "Acceleration, g" + (" (grey: stops and their MFDD, m/s²)" if seen.stops else "")
+    left = Line(seen.course.t_s, lateral, LATERAL_COLOUR, "to the left", GAP_S)
+    ahead = Line(seen.course.t_s, forward, BRAKE_COLOUR, "forward", GAP_S)
+    both = np.concatenate((lateral, forward))
+    lowest, highest = float(np.min(both)), float(np.max(both))
+    room = max(0.05 * (highest - lowest), 0.01)
+    made = _over_time(seen, words, [left, ahead], _HIGH, (lowest - room, highest + room))
+    made.spans = [(stop.start_s, stop.stop_s, f"{stop.mfdd_mps2:.1f}") for stop in seen.stops]
+    return made
+
+
+def _g_against_g(seen: Overview, lateral: Array, forward: Array) -> Chart:
+    """Left turns on the left, as the rider sees them."""
+    reach = max(0.5, float(np.percentile(np.abs(np.concatenate((lateral, forward))), 99.99)))
+    bins = int(np.ceil(reach / GG_BIN_G)) + 2
+    edges = np.arange(-bins, bins + 1, dtype=float) * GG_BIN_G
+    moving = seen.course.resting < 0.5
+    counts = np.histogram2d(forward[moving], -lateral[moving], bins=(edges, edges))[0]
+    cells = Cells(edges, counts * spacing_s(seen.course), "seconds")
+    angle = np.linspace(0.0, 2.0 * np.pi, 100)
+    rings = [Line(r * np.cos(angle), r * np.sin(angle), GUIDE_COLOUR) for r in np.arange(0.5, edges[-1] + 0.01, 0.5)]
+    span = (float(edges[0]), float(edges[-1]))
+    made = Chart("g against g", [cells, *rings], _SQUARE, span, span, square=True)
+    made.x_title, made.y_title = "left turn  ·  right turn", "braking  ·  acceleration"
+    return made
+
+
+def _shares(seen: Overview) -> Chart:
+    """How long at which lean. What stands upright is cut off where it is by far the most."""
+    middle, seconds = (BINS_DEG[:-1] + BINS_DEG[1:]) / 2.0, seen.summary.histogram_s
+    share = 100.0 * seconds / max(float(np.sum(seconds)), 1e-9)
+    leaning = np.abs(middle) > _UPRIGHT_DEG
+    most = 1.05 * float(np.max(share))
+    top = min(most, max(1.5 * float(np.max(share[leaning], initial=0.0)), 1.0))
+    limit = lean_limit(seen)
+    bars = Bars(middle, share, BIN_DEG, "share")
+    made = Chart("How long at which lean, %", [bars], _SQUARE, (-limit, limit), (0.0, max(top, 1e-3)))
+    made.right = f"{np.sum(share[~leaning]):.0f} % upright" if top < most else ""
+    for peak, sign in _maxima(seen):
+        at = sign * peak.value
+        made.traces.append(Line(np.array([at, at]), np.array([0.0, top]), "#555555", dotted=True))
+        # outwards of its line and below the words in the corner, so that small leans do not stand on one another
+        made.notes.append(Note(at, 0.82 * top, f"{peak.value:.0f}°", "left" if sign < 0 else "right"))
+    made.x_title = "left  ·  degrees  ·  right"
+    made.ticks = {tick: f"{abs(tick):.0f}" for tick in np.arange(-180.0, 181.0, 20.0).tolist() if abs(tick) <= limit}
+    return made
+
+
+def _alignment(seen: Overview) -> Chart:
+    """Forces on the straights, and the line on which they would lie by the yaw that was found."""
+    found, fits = seen.quality, judged(seen)
+    most = float(np.max(np.abs(found.forward_g), initial=0.0))
+    reach = max(0.5, 1.1 * most)
+    traces: list[Trace] = [Line(np.zeros(2), np.array([-reach, reach]), GUIDE_COLOUR)]
+    traces.append(Dots(-found.lateral_g, found.forward_g, LATERAL_COLOUR, "straights"))
+    if found.yaw_deg is not None and fits:
+        ends = np.array([-most, most])
+        traces.append(Line(-np.tan(np.radians(found.yaw_deg)) * ends, ends, BRAKE_COLOUR))
+    words = (angles(found) or ["not enough straight riding"]) if fits else ["not judged"]
+    words += [f"at rest {found.gravity_g:.3f} g"] if fits and found.gravity_g is not None else []
+    span = (-reach, reach)
+    made = Chart("Alignment: g on the straights", traces, _SQUARE, span, span, square=True, left="\n".join(words))
+    made.x_title, made.y_title = "left  ·  g  ·  right", "braking  ·  acceleration"
+    return made

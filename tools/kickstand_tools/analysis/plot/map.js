@@ -1,5 +1,8 @@
-// Links the map of a ride with its charts. Both are plotly's; the page gives CHART_AXES, the names of the time axes of the
-// charts, and TILES: null, or where tiles of a map come from and what the map's origin is.
+// The map of a ride, linked with its charts. Both are plotly's; the page gives CHART_AXES, the names of the time axes of
+// the charts, and TILES: null, or where tiles of a map come from and what the map's origin is.
+const { map: MAP, axes: CHART_AXES, tiles: TILES } = JSON.parse(document.getElementById("map-data").textContent);
+if (finger) MAP.layout.dragmode = false;
+Plotly.newPlot("map", MAP.data, MAP.layout, { responsive: true, scrollZoom: true });
 (function () {
   const map = document.getElementById("map"), chart = document.getElementById("chart"), text = document.getElementById("here");
   const x = map.data[0].x, y = map.data[0].y, rows = map.data[0].customdata;

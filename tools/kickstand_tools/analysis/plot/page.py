@@ -1,52 +1,27 @@
-"""The ride as one HTML page to zoom into. Written to a file it needs no other file."""
+"""The ride as one HTML page to zoom into. Written to a file it needs no other file.
 
-import html
+Where the log has positions a map is beside the charts: pointing at one shows the same moment in the other.
+"""
+
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from ...logs.axes.course import EARTH_M
+from ...templates import filled, source_hash
 from ..overview import Overview
-from . import page_with_map, track_map
-from .charts import figure
-from .in_script import as_script, source_hash
+from . import interactive, track_map
+from .charts import charts
 
-# Its data stand apart from it, so that it is the same on every page
-SCRIPT = """
-const CHART = JSON.parse(document.getElementById("charts").textContent);
-const finger = matchMedia("(pointer: coarse)").matches, narrow = matchMedia("(max-width: 600px)").matches;
-const layout = narrow ? CHART.narrow : CHART.layout;
-if (finger) layout.dragmode = false; // a finger moves the page
-Plotly.newPlot("chart", CHART.data, layout, { responsive: true });
-if (parent !== window) {
-  const tell = () => parent.postMessage({ height: document.body.scrollHeight }, "*"); // of the frame that it is in
-  new ResizeObserver(tell).observe(document.body);
-}
-"""
-_PAGE = """<!DOCTYPE html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta http-equiv="Content-Security-Policy" content="{policy}">
-<title>{title}</title>
-{library}
-<style>
-:root {{ color-scheme: light dark; --paper: #fff; --ink: #222; --quiet: #555; }}
-body {{ margin: 0; font-family: sans-serif; color: var(--ink); background: var(--paper); }}
-@media (prefers-color-scheme: dark) {{
-  :root {{ --paper: #1a1a1a; --ink: #eee; --quiet: #bbb; }}
-  .drawn {{ filter: invert(0.9) hue-rotate(180deg); }} /* white paper gets dark, and each colour keeps its hue */
-}}
-{style}
-</style>
-</head>
-<body>
-<main><div id="chart" class="drawn"></div></main>
-<script type="application/json" id="charts">{charts}</script>
-<script>{script}</script>
-{beside}
-</body>
-</html>
-"""
+_HERE = Path(__file__).parent
+# Of the charts, and of the map. Their data stand apart from them, so that they are the same on every page.
+SCRIPTS = tuple((_HERE / name).read_text(encoding="utf-8") for name in ("page.js", "map.js"))
+# OpenStreetMap's own server refuses a page that was opened as a file: it wants to know the page's address.
+TILES_HOST = "https://basemaps.cartocdn.com"
+TILES_URL = TILES_HOST + "/rastertiles/voyager/{z}/{x}/{y}.png"
+MOST_ZOOM = 19
 
 
 def draw(path: Path, seen: Overview, tiles: bool = False) -> None:
@@ -62,20 +37,35 @@ def page(seen: Overview, library: str, allowed: str, tiles: bool = False) -> str
     The policy lets the page's own scripts run, and nothing be loaded but the map's tiles. plotly.js makes functions of
     text for its charts of many points, and sets styles.
     """
-    charts, points = figure(seen), track_map.map_points(seen)
+    drawn, points = charts(seen), track_map.map_points(seen)
+    beside = None
     if points is not None:
-        for kind in ("layout", "narrow"):
-            charts[kind]["hovermode"] = "x"  # anywhere over a chart, not on a line alone
-            for name in page_with_map.time_axes(charts):
-                charts[kind][name]["hoverformat"] = ".1f"
-    return _PAGE.format(
-        policy="default-src 'none'; base-uri 'none'; form-action 'none'; style-src 'unsafe-inline'; "
-        f"img-src data: blob:{' ' + page_with_map.TILES_HOST if tiles else ''}; "
-        f"script-src {allowed} {source_hash(SCRIPT)} {source_hash(page_with_map.SCRIPT)} 'unsafe-eval'",
-        title=html.escape(seen.ride.stem),
-        library=library,
-        style="" if points is None else page_with_map.STYLE,
-        charts=as_script(charts),
-        script=SCRIPT,
-        beside="" if points is None else page_with_map.beside(charts, points, seen, tiles),
+        beside = {"map": track_map.figure(points, seen), "axes": interactive.time_axes(drawn)}
+        beside["tiles"] = tiles_at(points) if tiles else None
+    policy = (
+        "default-src 'none'; base-uri 'none'; form-action 'none'; style-src 'unsafe-inline'; "
+        f"img-src data: blob:{' ' + TILES_HOST if tiles else ''}; "
+        f"script-src {' '.join((allowed, *map(source_hash, SCRIPTS)))} 'unsafe-eval'"
     )
+    return filled(
+        _HERE / "page.html",
+        policy=policy,
+        title=seen.ride.stem,
+        library=library,
+        charts=interactive.figure(drawn, linked=points is not None),
+        map=beside,
+        scripts=SCRIPTS,
+    )
+
+
+def tiles_at(points: track_map.MapPoints) -> dict[str, Any]:
+    """Where tiles come from, and where their world lies in the map's metres."""
+    lat, lon = np.radians(points.lat_deg), np.radians(points.lon_deg)
+    scale_m = EARTH_M * float(np.cos(lat))
+    return {
+        "url": TILES_URL,
+        "most": MOST_ZOOM,
+        "world_m": 2.0 * np.pi * scale_m,
+        "west_m": scale_m * (np.pi + float(lon)),
+        "north_m": scale_m * (np.pi - float(np.arcsinh(np.tan(lat)))),
+    }

@@ -14,16 +14,15 @@ from ...logs.axes.course import EARTH_M
 from ...logs.table import Array
 from ..overview import Overview
 from ..track import Track, track
-from .in_script import plain
-from .layout import PAPER
-from .traces import LEFT_COLOUR, RIGHT_COLOUR, SPEED_COLOUR, lean_limit, traces
+from .charts import LEFT_COLOUR, RIGHT_COLOUR, SPEED_COLOUR, lean_limit, shown_lean_deg
+from .interactive import PAPER, plain
 
 POINTS = 20_000
 SHORTEST_S = 0.2  # between points
 SAME_M = 0.5  # points that are no further from the one before are left out: a bike that stands is one point
 MOST_LAT_DEG = 85.0  # beyond it Mercator has no map
 LEAST_LEAN_DEG = 30.0  # the lean that has the full colour is this at least
-# From left to right: blue and orange are told apart by the colour-blind too; upright is grey
+# From left to right: blue and orange can be told apart by the colour-blind too; upright is grey
 _COLOURS = [[0.0, "#0d3a73"], [0.25, LEFT_COLOUR], [0.5, "#c9c9c9"], [0.75, RIGHT_COLOUR], [1.0, "#7a2c05"]]
 
 
@@ -49,8 +48,8 @@ def map_points(seen: Overview) -> MapPoints | None:
     places = track(seen.course)
     if len(places.t_s) < 2:
         return None
-    drawn = traces(seen)
-    t_s = _times(places, float(drawn.time_s[-1]))
+    time_s, speed_kmh = seen.course.t_s, 3.6 * seen.course.speed_mps
+    t_s = _times(places, float(time_s[-1]))
     lat, lon = places.at(t_s)
     lat = np.clip(lat, -MOST_LAT_DEG, MOST_LAT_DEG)
     lat_deg, lon_deg = float(np.nanmedian(lat)), float(lon[0])
@@ -60,11 +59,11 @@ def map_points(seen: Overview) -> MapPoints | None:
     north = scale_m * (_mercator(lat) - _mercator(np.array([lat_deg])))
     kept = _moved(east, north)
     t_s, east, north = t_s[kept], east[kept], north[kept]
-    row = np.minimum(np.searchsorted(drawn.time_s, t_s), len(drawn.time_s) - 1)
-    told = ~np.isnan(drawn.speed_kmh)
+    row = np.minimum(np.searchsorted(time_s, t_s), len(time_s) - 1)
+    known = ~np.isnan(speed_kmh)
     none = np.full(len(t_s), np.nan)
-    speed = np.interp(t_s, drawn.time_s[told], drawn.speed_kmh[told]) if np.any(told) else none
-    return MapPoints(t_s, east, north, drawn.lean_deg[row], speed, lat_deg, lon_deg)
+    speed = np.interp(t_s, time_s[known], speed_kmh[known]) if np.any(known) else none
+    return MapPoints(t_s, east, north, shown_lean_deg(seen)[row], speed, lat_deg, lon_deg)
 
 
 def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
@@ -75,7 +74,7 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
     is the bar of the scale, and the first annotation that bar's length: map.js moves them.
     """
     x, y = plain(points.east_m, 1), plain(points.north_m, 1)
-    told = [plain(row, 1) for row in np.column_stack((points.t_s, points.lean_deg, points.speed_kmh))]
+    rows = [plain(row, 1) for row in np.column_stack((points.t_s, points.lean_deg, points.speed_kmh))]
     line = {"type": "scattergl", "mode": "lines", "line": {"width": 1.5, "color": "#8a8a8a"}, "hoverinfo": "skip"}
     dots: dict[str, Any] = {"size": 6, "color": SPEED_COLOUR}
     known = np.isfinite(points.east_m)
@@ -114,7 +113,7 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
             thin | {"x": x[-1], "y": y[-1], "text": "end", "ax": 25, "ay": 25},
         ],
     }
-    track_line = line | {"x": x, "y": y, "customdata": told}
+    track_line = line | {"x": x, "y": y, "customdata": rows}
     return {"data": [track_line, {"type": "scattergl", "mode": "markers", "hoverinfo": "none"} | at], "layout": layout}
 
 

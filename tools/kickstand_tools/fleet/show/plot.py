@@ -1,14 +1,13 @@
-"""The picture of one vehicle: do the aligned axes fit what was driven, and how does it brake over time?
-
-SVG by hand: a fleet has thousands of them, and each takes a millisecond.
-"""
+"""The picture of one vehicle: do the aligned axes fit what was driven, and how does it brake over time?"""
 
 from collections.abc import Sequence
-from html import escape
 
+from markupsafe import Markup
+
+from ...svg import drawing, element
 from ..files import file_stem, write_bytes
 from ..period import PeriodResult
-from .svg import Panel, date_text
+from .panel import Panel, date_text
 
 _WIDTH, _HEIGHT = 960, 380
 
@@ -32,34 +31,31 @@ def draw(result: PeriodResult) -> str:
         f"speed {row['speed_lag_s']:.1f} s late"
     )
     points = result.picture
-    ahead = _agreement("forward: felt against dv/dt", "dv/dt, g", [(p[0], p[1]) for p in points], 20)
     parts = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {_HEIGHT}" width="{_WIDTH}" '
-        f'font-family="system-ui, sans-serif" font-size="12">',
-        f'<rect width="{_WIDTH}" height="{_HEIGHT}" fill="#fff"/>',
-        f'<text x="20" y="26" font-size="16" font-weight="600">{escape(name)}</text>',
-        f'<text x="20" y="45" fill="#555">{escape(said)}</text>',
-        ahead,
+        element("rect", width=_WIDTH, height=_HEIGHT, fill="#fff"),
+        element("text", name, x=20, y=26, font_size=16, font_weight=600),
+        element("text", said, x=20, y=45, fill="#555"),
+        _agreement("forward: measured against dv/dt", "dv/dt, g", [(p[0], p[1]) for p in points], 20),
     ]
-    if row["kind"] == "motorcycle":  # it leans into turns: nothing is felt to the left
+    if row["kind"] == "motorcycle":  # it leans into turns: there is no force to the left
         side = [(p[0], p[3]) for p in points]
-        parts.append(_agreement("left: felt against dv/dt, should be flat", "dv/dt, g", side, 335, flat=True))
+        parts.append(_agreement("left: measured against dv/dt, should be flat", "dv/dt, g", side, 335, flat=True))
     else:
         side = [(p[2], p[3]) for p in points]
-        parts.append(_agreement("left: felt against v times yaw rate", "v times yaw rate, g", side, 335))
+        parts.append(_agreement("left: measured against v times yaw rate", "v times yaw rate, g", side, 335))
     parts.append(_braking(result, 650))
-    return "".join([*parts, "</svg>\n"])
+    return drawing((_WIDTH, _HEIGHT), *parts, width=_WIDTH, font_family="system-ui, sans-serif", font_size=12)
 
 
-def _agreement(title: str, unit: str, points: Sequence[tuple[float, float]], x: float, flat: bool = False) -> str:
+def _agreement(title: str, unit: str, points: Sequence[tuple[float, float]], x: float, flat: bool = False) -> Markup:
     reach = max([0.2, *(abs(value) for point in points for value in point)]) * 1.05
-    panel = Panel(x, 60, 290, 300, (-reach, reach), (-reach, reach), title, unit, "felt, g")
+    panel = Panel(x, 60, 290, 300, (-reach, reach), (-reach, reach), title, unit, "measured, g")
     panel.line([(-reach, 0.0 if flat else -reach), (reach, 0.0 if flat else reach)], "#bbb")
     panel.dots(points, "#2563eb")
     return panel.svg()
 
 
-def _braking(result: PeriodResult, x: float) -> str:
+def _braking(result: PeriodResult, x: float) -> Markup:
     tests = result.brake_tests
     dated = bool(tests) and all(test["utc_s"] is not None for test in tests)
     times = [test["utc_s"] if dated else float(k + 1) for k, test in enumerate(tests)]
@@ -67,17 +63,8 @@ def _braking(result: PeriodResult, x: float) -> str:
     first, last = (min(times), max(times)) if times else (0.0, 1.0)
     margin = 0.05 * max(last - first, 3600.0 if dated else 1.0)
     span = (first - margin, last + margin)
-    panel = Panel(
-        x,
-        60,
-        290,
-        300,
-        span,
-        (0.0, hardest),
-        f"{len(tests)} brake tests",
-        "day" if dated else "test",
-        "MFDD, m/s²",
-        date_text if dated else None,
-    )
+    title, unit = f"{len(tests)} brake tests", "day" if dated else "test"
+    panel = Panel(x, 60, 290, 300, span, (0.0, hardest), title, unit, "MFDD, m/s²")
+    panel.words = date_text if dated else panel.words
     panel.dots(list(zip(times, (test["mfdd_mps2"] for test in tests))), "#c2410c", 3.0)
     return panel.svg()

@@ -10,11 +10,11 @@ import numpy as np
 
 from ...errors import InputError, extra
 from ...logs.cells import COLUMNS
-from ..cells import MOST_CELLS
+from ...logs.csv_reader import MOST_CELLS
 from ..files import Piece
 from ..recording import Recording, sensor_of, track_of
-from ..sheets import Sheet, cells_of, read_sheet
-from ..times import Nanoseconds, times_ns
+from ..sheets import Sheet, names_in, read_sheet
+from ..times import EPOCH_NS, Nanoseconds
 
 NAME = "Kickstand"
 _FORCES = ("left_g", "up_g", "forward_g")
@@ -30,36 +30,27 @@ def finds(pieces: list[Piece]) -> list[list[Piece]]:
 def read(pieces: list[Piece], name: str) -> Recording:
     """Raises InputError for a replay's output, which does not hold all that was measured."""
     sheet = _sheet(pieces[0])
-    log = [sheet.columns.index(column) for column in COLUMNS[1:] if column in sheet.columns]
-    exported = [sheet.columns.index(column) for column in (*_FORCES, *_RATES) if column in sheet.columns]
-    time_ns = times_ns(sheet.cells[sheet.columns.index("t_s")], "s", sheet.name)
-    if len(log) == 6:
-        accel, first = sensor_of(sheet, time_ns, log[:3], 1.0, ("accelerometer", "g", "+1 g up"))
-        gyro, second = sensor_of(sheet, time_ns, log[3:], 1.0, ("gyro", "deg/s", "right-handed"))
-    elif len(exported) == 6:
-        said = "left, up, forward"
-        accel, first = sensor_of(sheet, time_ns, exported[:3], 1.0, ("accelerometer", "g", said))
-        gyro, second = sensor_of(sheet, time_ns, exported[3:], _RATE_SIGNS, ("gyro", "deg/s", said))
+    time_ns = sheet.times(sheet.columns.index("t_s"))
+    log, no_log = sheet.axes(*COLUMNS[1:])
+    exported, no_export = sheet.axes(*_FORCES, *_RATES)
+    if not no_log:
+        accel = sensor_of(sheet, time_ns, log[:3], "accelerometer", "g", "+1 g up")
+        gyro = sensor_of(sheet, time_ns, log[3:], "gyro", "deg/s", "right-handed")
+    elif not no_export:
+        accel = sensor_of(sheet, time_ns, exported[:3], "accelerometer", "g", "left, up, forward")
+        gyro = sensor_of(sheet, time_ns, exported[3:], "gyro", "deg/s", "left, up, forward", _RATE_SIGNS)
     else:
         raise InputError(f"{name} holds a lean, no readings: give the log that it was made from")
     speed, lat, lon = (sheet.place(column) for column in ("speed_mps", "lat_deg", "lon_deg"))
-    track, places = track_of(sheet, time_ns, speed, lat, lon)
+    track = track_of(sheet, time_ns, speed, lat, lon)
     temp_c = sheet.numbers(sheet.place("temp_c"))
-    from_1970 = bool(len(time_ns)) and float(np.median(time_ns)) > 1e17
-    return Recording(
-        NAME,
-        accel,
-        gyro,
-        track,
-        temp_c,
-        [first, second, *places],
-        utc_ns=0 if from_1970 else _utc_ns(sheet, time_ns),
-        vehicle_axes=len(log) < 6,
-    )
+    from_1970 = bool(len(time_ns)) and float(np.median(time_ns)) > EPOCH_NS
+    utc_ns = 0 if from_1970 else _utc_ns(sheet, time_ns)
+    return Recording(NAME, accel, gyro, track, temp_c, utc_ns=utc_ns, vehicle_axes=bool(no_log))
 
 
 def _utc_ns(sheet: Sheet, time_ns: Nanoseconds) -> int | None:
-    """What makes UTC of the log's own time, in ns since 1970; None where the log does not tell."""
+    """What makes UTC of the log's own time, in ns since 1970; None where the log has none."""
     utc_s = sheet.numbers(sheet.place("utc_s"))
     there = np.isfinite(utc_s)
     return int(np.median(utc_s[there] * 1e9 - time_ns[there])) if np.any(there) else None
@@ -68,7 +59,7 @@ def _utc_ns(sheet: Sheet, time_ns: Nanoseconds) -> int | None:
 def _is_ours(piece: Piece) -> bool:
     if piece.content.startswith(b"PAR1"):
         return True
-    head = cells_of(next(iter(piece.first_lines(1)), ""))
+    head = names_in(next(iter(piece.first_lines(1)), ""))
     return "t_s" in head and (set(COLUMNS) <= set(head) or set(_FORCES) <= set(head))
 
 

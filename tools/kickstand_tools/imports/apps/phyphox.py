@@ -6,17 +6,18 @@ iPhone the app multiplies Core Motion's acceleration and gravity by -9.81 (Exper
 """
 
 import re
+from collections.abc import Iterator
 
 import numpy as np
 
 from ...errors import InputError
-from ..cells import as_text
+from ...logs.csv_reader import as_text
 from ..files import Piece
-from ..join import added
-from ..recording import Recording, Sensor, Taken, Track, sensor_of, track_of
-from ..sheets import Sheet, cells_of, plain, read_sheet, unit_in
-from ..times import EPOCH_NS, Nanoseconds, of_seconds, times_ns
-from ..units import ACCELERATIONS, RATES, factor, unit
+from ..join import with_gravity
+from ..recording import Recording, Sensor, Track, sensor_of, track_of
+from ..sheets import Sheet, names_in, plain, read_sheet, unit_in
+from ..times import EPOCH_NS, Nanoseconds, of_seconds
+from ..units import ACCELERATIONS, RATES, unit
 
 NAME = "phyphox"
 _AXIS = re.compile(r"^(?:(.*\S)\s+)?([xyz])\s*\(([^)]*)\)$", re.IGNORECASE)
@@ -35,23 +36,22 @@ def finds(pieces: list[Piece]) -> list[list[Piece]]:
 
 def read(pieces: list[Piece], name: str) -> Recording:
     """Raises InputError for what is missing."""
-    found: dict[str, tuple[Sensor, Taken]] = {}
+    found: dict[str, Sensor] = {}
     track: Track | None = None
-    places: list[Taken] = []
     pauses = _Pauses(pieces)
     for piece in pieces:
-        if _is_meta(piece) or not _is_ours(piece):
+        if not _is_ours(piece):
             continue
         sheet = read_sheet(piece)
-        for kind, sensor, taken in _sensors(sheet, piece.stem, pauses):
-            found.setdefault(kind, (sensor, taken))
-        if track is None:
-            track, places = _location(sheet, pauses)
-    accel = _accelerometer(found, name)
+        for kind, sensor in _sensors(sheet, piece.stem, pauses):
+            found.setdefault(kind, sensor)
+        track = track or _location(sheet, pauses)
+    remedy = "record Acceleration (with g), or Gravity beside it"
+    none = "no acceleration: add the accelerometer, and give all files of the export"
+    accel = with_gravity(found, found.__getitem__, name, "acceleration", remedy, none)
     if "gyro" not in found:
         raise InputError(f"{name}: no gyroscope: add it to the experiment, and give all files of the export")
-    gyro, gyro_taken = found["gyro"]
-    return Recording(NAME, accel[0], gyro, track, None, [*accel[1], gyro_taken, *places], utc_ns=pauses.utc_ns)
+    return Recording(NAME, accel, found["gyro"], track, utc_ns=pauses.utc_ns)
 
 
 def _is_meta(piece: Piece) -> bool:
@@ -60,15 +60,15 @@ def _is_meta(piece: Piece) -> bool:
 
 def _is_ours(piece: Piece) -> bool:
     """Does its first line name a time in s and then quantities with their units in brackets?"""
-    first = cells_of(next(iter(piece.first_lines(1)), ""))
+    first = names_in(next(iter(piece.first_lines(1)), ""))
     if _is_meta(piece) or len(first) < 2 or not re.fullmatch(r"(.*\s)?time \(s\)", first[0], re.IGNORECASE):
         return False
     known = [_AXIS.match(column) for column in first]
     return any(match and unit(match[3]) in ACCELERATIONS | RATES for match in known) or "latitude" in map(plain, first)
 
 
-def _sensors(sheet: Sheet, stem: str, pauses: "_Pauses") -> list[tuple[str, Sensor, Taken]]:
-    """The sensors of one file; each has the time that stands before it."""
+def _sensors(sheet: Sheet, stem: str, pauses: "_Pauses") -> Iterator[tuple[str, Sensor]]:
+    """The sensors of one file, each with its kind; each has the time that stands before it."""
     groups: dict[tuple[int, str, str], dict[str, int]] = {}
     time_place = 0
     for place, column in enumerate(sheet.columns):
@@ -76,21 +76,15 @@ def _sensors(sheet: Sheet, stem: str, pauses: "_Pauses") -> list[tuple[str, Sens
         if plain(column).endswith("time"):
             time_place = place
         elif match:
-            key = time_place, (match[1] or stem).lower(), match[3]
+            key = time_place, (match[1] or stem).lower(), unit(match[3])
             groups.setdefault(key, {}).setdefault(match[2].lower(), place)
-    sensors = []
     for (time, what, unit_name), axes in groups.items():
-        if len(axes) < 3 or unit(unit_name) not in ACCELERATIONS | RATES:
+        if len(axes) < 3 or unit_name not in ACCELERATIONS | RATES:
             continue
-        places = [axes[axis] for axis in "xyz"]
-        kind = "gyro" if unit(unit_name) in RATES else _kind(what)
-        time_ns = pauses.after(times_ns(sheet.cells[time], "s", sheet.name))
-        kinds = RATES if kind == "gyro" else ACCELERATIONS
-        scale = factor(unit_name, kinds, sheet.name)
-        quantity = "gyro" if kind == "gyro" else "accelerometer"
-        sign = "right-handed" if kind == "gyro" else _SIGN
-        sensors.append((kind, *sensor_of(sheet, time_ns, places, scale, (quantity, unit(unit_name), sign))))
-    return sensors
+        time_ns = pauses.after(sheet.times(time))
+        of_gyro = unit_name in RATES
+        said = ("gyro", unit_name, "right-handed") if of_gyro else ("accelerometer", unit_name, _SIGN)
+        yield "gyro" if of_gyro else _kind(what), sensor_of(sheet, time_ns, [axes[axis] for axis in "xyz"], *said)
 
 
 def _kind(what: str) -> str:
@@ -99,30 +93,14 @@ def _kind(what: str) -> str:
     return "user" if _WITHOUT_GRAVITY in what or "without g" in what else "total"
 
 
-def _accelerometer(found: dict[str, tuple[Sensor, Taken]], name: str) -> tuple[Sensor, list[Taken]]:
-    if "total" in found:
-        return found["total"][0], [found["total"][1]]
-    if "user" in found and "gravity" in found:
-        taken = [found["user"][1], found["gravity"][1]]
-        taken[0].sign = "without gravity: gravity added"
-        return added(found["user"][0], found["gravity"][0], name), taken
-    if "user" in found:
-        raise InputError(
-            f"{name}: gravity has been taken off its acceleration, and without it there is no lean: record "
-            "Acceleration (with g), or Gravity beside it"
-        )
-    raise InputError(f"{name}: no acceleration: add the accelerometer, and give all files of the export")
-
-
-def _location(sheet: Sheet, pauses: "_Pauses") -> tuple[Track | None, list[Taken]]:
+def _location(sheet: Sheet, pauses: "_Pauses") -> Track | None:
     lat, lon = sheet.place("Latitude"), sheet.place("Longitude")
     speed = sheet.place("Velocity", "Speed")
-    time = next((place for place, column in enumerate(sheet.columns) if plain(column).endswith("time")), 0)
     if lat is None and speed is None:
-        return None, []
-    time_ns = pauses.after(times_ns(sheet.cells[time], "s", sheet.name))
-    unit_name = unit(unit_in(sheet.columns[speed])) if speed is not None else "m/s"
-    return track_of(sheet, time_ns, speed, lat, lon, unit_name or "m/s")
+        return None
+    time = next((place for place, column in enumerate(sheet.columns) if plain(column).endswith("time")), 0)
+    unit_name = unit(unit_in(sheet.columns[speed])) if speed is not None else ""
+    return track_of(sheet, pauses.after(sheet.times(time)), speed, lat, lon, unit_name or "m/s")
 
 
 class _Pauses:

@@ -12,12 +12,12 @@ from ...errors import InputError
 from ...logs.axes.course import distance_m
 from ..files import Piece
 from ..recording import SECOND_NS, Array, Recording, sensor_of, track_of
-from ..sheets import Sheet, cells_of, plain, read_sheet, unit_in
-from ..times import Nanoseconds, times_ns
+from ..sheets import Sheet, names_in, plain, read_sheet, unit_in
+from ..times import Nanoseconds
 from ..units import SPEEDS, factor, unit
 
 NAME = "RaceBox"
-_WHERE = np.array([1, 2, 0])  # left, up, forward among x, y, z
+_AXES = [f"{sensor}{axis}" for sensor in ("GForce", "Gyro") for axis in "YZX"]  # left, up, forward
 _NEAR = 1.25  # times another unit's speed: the units are a factor of 1.6 and more apart
 
 
@@ -27,35 +27,32 @@ def finds(pieces: list[Piece]) -> list[list[Piece]]:
 
 
 def read(pieces: list[Piece], name: str, speed_unit: str = "") -> Recording:
-    """Raises InputError for what is missing. speed_unit: of the column Speed, "" if the positions are to tell it."""
+    """Raises InputError for what is missing. speed_unit: of the column Speed, "" to find it from the positions."""
     sheet = read_sheet(pieces[0], _header(pieces[0]) or 0)
-    accel = [sheet.place(f"GForce{axis}") for axis in "XYZ"]
-    gyro = [sheet.place(f"Gyro{axis}") for axis in "XYZ"]
-    if accel[1] is None or accel[2] is None:
+    places, missing = sheet.axes(*_AXES)
+    if {"GForceY", "GForceZ"} & set(missing):
         raise InputError(f"{name}: no GForceY or GForceZ, as in its motorcycle mode: export it with that mode off")
-    if None in gyro:
+    if missing:
         raise InputError(f"{name}: no GyroX to GyroZ: export it from RaceBox's app on the phone, which writes them")
-    time_ns = times_ns(sheet.cells[sheet.place("Time") or 0], "", sheet.name)
-    order = [[places[k] for k in _WHERE] for places in (accel, gyro)]
-    there = [[place for place in places if place is not None] for places in order]
+    time_ns = sheet.times(sheet.place("Time") or 0, "")
     box = "box's x forward, y left, z up; +1 g up"
-    accel_sensor, accel_taken = sensor_of(sheet, time_ns, there[0], 1.0, ("accelerometer", "g", box))
-    gyro_sensor, gyro_taken = sensor_of(sheet, time_ns, there[1], 1.0, ("gyro", "deg/s", "right-handed"))
+    accel = sensor_of(sheet, time_ns, places[:3], "accelerometer", "g", box)
+    gyro = sensor_of(sheet, time_ns, places[3:], "gyro", "deg/s", "right-handed")
     lat, lon, speed = sheet.place("Latitude"), sheet.place("Longitude"), sheet.place("Speed", "KPH")
     notices: list[Notice] = []
     if speed is not None:
-        speed_unit = speed_unit or _said_unit(sheet.columns[speed]) or _told_unit(sheet, time_ns, speed, lat, lon)
+        speed_unit = speed_unit or _said_unit(sheet.columns[speed]) or _measured_unit(sheet, time_ns, speed, lat, lon)
         if not speed_unit:
             notices.append(Notice("import-speed-unit", sheet.columns[speed]))
             speed = None
-    track, places = track_of(sheet, time_ns, speed, lat, lon, speed_unit or "m/s")
-    return Recording(NAME, accel_sensor, gyro_sensor, track, None, [accel_taken, gyro_taken, *places], notices, 0, True)
+    track = track_of(sheet, time_ns, speed, lat, lon, speed_unit or "m/s")
+    return Recording(NAME, accel, gyro, track, notices=notices, utc_ns=0, vehicle_axes=True)
 
 
 def _header(piece: Piece) -> int | None:
     """The number of the line of names: there may be lines about the laps before it."""
     for number, line in enumerate(piece.text.split("\n", 200)[:200]):
-        names = {plain(cell) for cell in cells_of(line)}
+        names = {plain(cell) for cell in names_in(line)}
         if {"gforcex", "gforcez", "time"} <= names:
             return number
     return None
@@ -66,8 +63,8 @@ def _said_unit(column: str) -> str:
     return said if said in SPEEDS else ""
 
 
-def _told_unit(sheet: Sheet, time_ns: Nanoseconds, speed: int, lat: int | None, lon: int | None) -> str:
-    """The unit in which the speeds are those with which the positions change; "" where that does not tell."""
+def _measured_unit(sheet: Sheet, time_ns: Nanoseconds, speed: int, lat: int | None, lon: int | None) -> str:
+    """The unit in which the speeds are those with which the positions change; "" where that is not clear."""
     if lat is None or lon is None:
         return ""
     moved = _moved_mps(time_ns, sheet.numbers(lat), sheet.numbers(lon))

@@ -10,9 +10,7 @@ that measured. Kickstand's own export has this form, too.
 from ...errors import InputError
 from ..files import Piece
 from ..recording import Recording, sensor_of, track_of
-from ..sheets import Sheet, cells_of, plain, read_sheet
-from ..times import times_ns
-from ..units import ACCELERATIONS, RATES, factor
+from ..sheets import names_in, plain, read_sheet
 
 NAME = "RaceChrono"
 _FIRST = "This file is created using RaceChrono"
@@ -26,66 +24,51 @@ def finds(pieces: list[Piece]) -> list[list[Piece]]:
 
 def read(pieces: list[Piece], name: str) -> Recording:
     """Raises InputError for what is missing."""
-    lines = piece_lines(pieces[0])
+    lines = pieces[0].text.split("\n", 60)[:60]  # blank ones among them: their numbers count
     header = next((k for k, line in enumerate(lines) if _is_header(line)), None)
     if header is None:
         raise InputError(f"{name}: no line with the names of its columns: export it again as CSV v3")
     units, more = _units(lines, header)
     sheet = read_sheet(pieces[0], header, more)
-    accel = [sheet.place(f"{axis}_acc", f"{axis} acceleration", f"{axis}-acceleration") for axis in "xyz"]
-    gyro = [sheet.place(f"{axis}_rate_of_rotation", f"{axis} rate of rotation", f"gyro {axis}") for axis in "xyz"]
-    if None in accel or None in gyro:
+    accel, no_accel = sheet.axes(*((f"{axis}_acc", f"{axis} acceleration", f"{axis}-acceleration") for axis in "xyz"))
+    rates = ((f"{axis}_rate_of_rotation", f"{axis} rate of rotation", f"gyro {axis}") for axis in "xyz")
+    gyro, no_gyro = sheet.axes(*rates)
+    if no_accel or no_gyro:
         raise InputError(
             f"{name}: no x_acc to z_acc and x_rate_of_rotation to z_rate_of_rotation in it; its lateral_acc is "
             "calculated from positions, without gravity: record an accelerometer and a gyro, and export all channels"
         )
     by_kickstand = "by Kickstand" in lines[0]
-    axes = "left, up, forward" if by_kickstand else "+1 g up"
     time_place = next(place for place, column in enumerate(sheet.columns) if plain(column) in _TIMES)
-    time_ns = times_ns(sheet.cells[time_place], "s", sheet.name)
-    found = []
-    for places, kinds, what in ((accel, ACCELERATIONS, "accelerometer"), (gyro, RATES, "gyro")):
-        there = [place for place in places if place is not None]
-        unit_name = units.get(there[0]) or ("G" if what == "accelerometer" else "deg/s")
-        sign = axes if what == "accelerometer" else "right-handed"
-        scale = factor(unit_name, kinds, sheet.name)
-        found.append(sensor_of(sheet, time_ns, there, scale, (what, unit_name.lower(), sign)))
-    speed, speed_unit = _speed(sheet)
-    track, places = track_of(sheet, time_ns, speed, sheet.place("latitude"), sheet.place("longitude"), speed_unit)
+    time_ns = sheet.times(time_place)
+    accel_unit, rate_unit = units.get(accel[0], "g").lower(), units.get(gyro[0], "deg/s").lower()
+    up = "left, up, forward" if by_kickstand else "+1 g up"
+    speed = next((place for place, column in enumerate(sheet.columns) if _is_speed(column)), None)
     return Recording(
         NAME,
-        found[0][0],
-        found[1][0],
-        track,
-        taken=[found[0][1], found[1][1], *places],
+        sensor_of(sheet, time_ns, accel, "accelerometer", accel_unit, up),
+        sensor_of(sheet, time_ns, gyro, "gyro", rate_unit, "right-handed"),
+        track_of(sheet, time_ns, speed, sheet.place("latitude"), sheet.place("longitude")),
         utc_ns=0 if plain(sheet.columns[time_place]) == "timestamp" else None,
         vehicle_axes=by_kickstand,
         sign_known=by_kickstand,
     )
 
 
-def piece_lines(piece: Piece) -> list[str]:
-    """The first 60 lines, blank ones among them: their numbers count."""
-    return piece.text.split("\n", 60)[:60]
-
-
 def _is_header(line: str) -> bool:
-    first = [plain(cell) for cell in cells_of(line)]
+    first = [plain(cell) for cell in names_in(line)]
     return len(first) > 4 and any(name in first[:5] for name in _TIMES)
 
 
 def _units(lines: list[str], header: int) -> tuple[dict[int, str], int]:
     """The units by the numbers of their columns, and how many lines of heads follow the first."""
-    following = [cells_of(line) for line in lines[header + 1 : header + 3]]
+    following = [names_in(line) for line in lines[header + 1 : header + 3]]
     if len(following) == 2 and following[0] and following[0][0] == "unix time":
         return {place: cell for place, cell in enumerate(following[0]) if cell}, 2
-    names = cells_of(lines[header])
+    names = names_in(lines[header])
     return {place: name.rpartition("(")[2].rstrip(")") for place, name in enumerate(names) if name.endswith(")")}, 0
 
 
-def _speed(sheet: Sheet) -> tuple[int | None, str]:
+def _is_speed(column: str) -> bool:
     """Version 2 has the speed in three units; version 3 in m/s."""
-    for place, column in enumerate(sheet.columns):
-        if plain(column) == "speed" and ("(" not in column or "m/s" in column):
-            return place, "m/s"
-    return None, "m/s"
+    return plain(column) == "speed" and ("(" not in column or "m/s" in column)

@@ -9,14 +9,14 @@ import re
 
 from ...errors import InputError
 from ..files import Piece
-from ..join import added
-from ..recording import Recording, Sensor, Taken, sensor_of
-from ..sheets import cells_of, read_sheet
-from ..times import times_ns
-from ..units import ACCELERATIONS, RATES
+from ..join import with_gravity
+from ..recording import Recording, Sensor, sensor_of
+from ..sheets import names_in, read_sheet
 
 NAME = "Sensor Kinetics"
 _HEAD = ["time", "x_value", "y_value", "z_value"]
+_UP = "+1 g up, as on Android"
+_KINDS = {"acc": "total", "lac": "user", "grv": "gravity", "gyr": "gyro"}
 _SENSOR = re.compile(r"^(.*?)[_.]?(acc|gyr|grv|lac|mag|rot)m?$")  # the end of a file's name
 
 
@@ -24,7 +24,7 @@ def finds(pieces: list[Piece]) -> list[list[Piece]]:
     """The recordings among these files: those whose names are alike but for the sensor's."""
     alike: dict[str, list[Piece]] = {}
     for piece in pieces:
-        head = [cell.lower() for cell in cells_of(next(iter(piece.first_lines(1)), ""))]
+        head = [cell.lower() for cell in names_in(next(iter(piece.first_lines(1)), ""))]
         if head == _HEAD:
             alike.setdefault(f"{piece.folder}/{_parts(piece)[0]}", []).append(piece)
     return list(alike.values())
@@ -32,37 +32,22 @@ def finds(pieces: list[Piece]) -> list[list[Piece]]:
 
 def read(pieces: list[Piece], name: str) -> Recording:
     """Raises InputError for what is missing."""
-    files = {_parts(piece)[1]: piece for piece in pieces}
-    up = "+1 g up, as on Android"
-    taken: list[Taken]
-    if "acc" in files:
-        accel, first = _sensor(files["acc"], "accelerometer", ACCELERATIONS["m/s2"], "m/s2", up)
-        taken = [first]
-    elif "lac" in files and "grv" in files:
-        user, first = _sensor(
-            files["lac"], "accelerometer", ACCELERATIONS["m/s2"], "m/s2", "without gravity: gravity added"
-        )
-        gravity, second = _sensor(files["grv"], "accelerometer", ACCELERATIONS["m/s2"], "m/s2", up)
-        accel, taken = added(user, gravity, name), [first, second]
-    elif "lac" in files:
-        raise InputError(
-            f"{name}: gravity has been taken off its linear acceleration, and without it there is no lean: give the "
-            "file of the accelerometer (_accm), or of gravity (_grvm), too"
-        )
-    else:
-        raise InputError(f"{name}: no accelerometer: give the folder or the zip with NAME_accm.csv and NAME_gyrm.csv")
-    if "gyr" not in files:
-        raise InputError(f"{name}: no gyroscope: give the folder or the zip with NAME_accm.csv and NAME_gyrm.csv")
-    gyro, gyro_taken = _sensor(files["gyr"], "gyro", RATES["rad/s"], "rad/s", "right-handed")
-    return Recording(NAME, accel, gyro, taken=[*taken, gyro_taken], sign_known=False)
+    files = {_KINDS.get(_parts(piece)[1], ""): piece for piece in pieces}
+
+    def sensor(kind: str) -> Sensor:
+        sheet = read_sheet(files[kind])
+        what = ("gyro", "rad/s", "right-handed") if kind == "gyro" else ("accelerometer", "m/s2", _UP)
+        return sensor_of(sheet, sheet.times(0), [1, 2, 3], *what)
+
+    give = "give the folder or the zip with NAME_accm.csv and NAME_gyrm.csv"
+    remedy = "give the file of the accelerometer (_accm), or of gravity (_grvm), too"
+    accel = with_gravity(files, sensor, name, "linear acceleration", remedy, f"no accelerometer: {give}")
+    if "gyro" not in files:
+        raise InputError(f"{name}: no gyroscope: {give}")
+    return Recording(NAME, accel, sensor("gyro"), sign_known=False)
 
 
 def _parts(piece: Piece) -> tuple[str, str]:
     """What the names of a recording's files have in common, and the sensor."""
     match = _SENSOR.match(piece.stem)
     return (match[1], match[2]) if match else (piece.stem, "")
-
-
-def _sensor(piece: Piece, quantity: str, scale: float, unit: str, sign: str) -> tuple[Sensor, Taken]:
-    sheet = read_sheet(piece)
-    return sensor_of(sheet, times_ns(sheet.cells[0], "s", sheet.name), [1, 2, 3], scale, (quantity, unit, sign))

@@ -9,10 +9,10 @@ import numpy as np
 
 from ...errors import InputError
 from ..files import Piece
-from ..recording import Recording, Sensor, Taken, Track, sensor_of, track_of
-from ..sheets import Sheet, cells_of, plain, read_sheet
-from ..times import NO_TIME, REPEATED, Nanoseconds, times_ns
-from ..units import RATES
+from ..join import with_gravity
+from ..recording import Recording, Sensor, Track, sensor_of, track_of
+from ..sheets import Sheet, names_in, plain, read_sheet
+from ..times import NO_TIME, REPEATED, Nanoseconds
 
 NAME = "SensorLog"
 _UP = "Core Motion, -1 g up: sign turned"
@@ -20,6 +20,7 @@ _ACCEL = [f"accelerometerAcceleration{axis}" for axis in "XYZ"]
 _GYRO = [f"gyroRotation{axis}" for axis in "XYZ"]
 _USER = [f"motionUserAcceleration{axis}" for axis in "XYZ"]
 _GRAVITY = [f"motionGravity{axis}" for axis in "XYZ"]
+_KINDS = {"total": ("accelerometer", _ACCEL), "user": ("motion", _USER), "gravity": ("motion", _GRAVITY)}
 _RATE = [f"motionRotationRate{axis}" for axis in "XYZ"]
 
 
@@ -31,23 +32,26 @@ def finds(pieces: list[Piece]) -> list[list[Piece]]:
 def read(pieces: list[Piece], name: str) -> Recording:
     """Raises InputError for what is missing."""
     sheet = read_sheet(pieces[0])
-    accel, accel_taken = _accelerometer(sheet, name)
-    gyro, gyro_taken = _gyro(sheet, name)
-    utc_ns = _utc_ns(sheet)
-    track, places = _location(sheet)
-    return Recording(NAME, accel, gyro, track, None, [*accel_taken, gyro_taken, *places], utc_ns=utc_ns)
+    places = {kind: _places(sheet, names) for kind, (_, names) in _KINDS.items()}
+
+    def acceleration(kind: str) -> Sensor:
+        return sensor_of(sheet, _clock(sheet, _KINDS[kind][0]), places[kind], "accelerometer", "g", _UP, -1.0)
+
+    there = [kind for kind, columns in places.items() if columns]
+    remedy = "log the accelerometer, or gravity beside the user's acceleration"
+    accel = with_gravity(there, acceleration, name, "acceleration", remedy, f"no acceleration: {remedy}")
+    return Recording(NAME, accel, _gyro(sheet, name), _location(sheet), utc_ns=_utc_ns(sheet))
 
 
 def _is_ours(piece: Piece) -> bool:
-    head = {plain(cell) for cell in cells_of(next(iter(piece.first_lines(1)), ""))}
+    head = {plain(cell) for cell in names_in(next(iter(piece.first_lines(1)), ""))}
     return bool(head & {plain(_ACCEL[0]), plain(_USER[0])})
 
 
 def _places(sheet: Sheet, names: list[str]) -> list[int]:
     """The columns of three axes, none where one is missing or holds nothing."""
-    found = [place for place in (sheet.place(name) for name in names) if place is not None]
-    full = len(found) == 3 and np.any(np.isfinite(sheet.table(found)).all(axis=1))
-    return found if full else []
+    found, missing = sheet.axes(*names)
+    return found if not missing and np.any(np.isfinite(sheet.table(found)).all(axis=1)) else []
 
 
 def _clock(sheet: Sheet, sensor: str) -> Nanoseconds:
@@ -60,32 +64,14 @@ def _times(sheet: Sheet, sensor: str) -> Nanoseconds:
     place = sheet.place(f"{sensor}Timestamp_sinceReboot", "accelerometerTimestamp_sinceReboot", "loggingTime")
     if place is None:
         raise InputError(f"{sheet.name}: no column {sensor}Timestamp_sinceReboot(s): export it with the timestamps")
-    return times_ns(sheet.cells[place], "s", sheet.name)
+    return sheet.times(place)
 
 
-def _accelerometer(sheet: Sheet, name: str) -> tuple[Sensor, list[Taken]]:
-    places = _places(sheet, _ACCEL)
-    if places:
-        sensor, taken = sensor_of(sheet, _clock(sheet, "accelerometer"), places, -1.0, ("accelerometer", "g", _UP))
-        return sensor, [taken]
-    user, gravity = _places(sheet, _USER), _places(sheet, _GRAVITY)
-    if not user or not gravity:
-        raise InputError(
-            f"{name}: gravity has been taken off its acceleration, and without it there is no lean: log the "
-            "accelerometer, or gravity beside the user's acceleration"
-        )
-    time_ns = _clock(sheet, "motion")
-    _, first = sensor_of(sheet, time_ns, user, -1.0, ("accelerometer", "g", "without gravity: gravity added"))
-    _, second = sensor_of(sheet, time_ns, gravity, -1.0, ("accelerometer", "g", _UP))
-    total = Sensor("accelerometer", time_ns, -sheet.table(user) - sheet.table(gravity), sheet.left_out)
-    return total, [first, second]
-
-
-def _gyro(sheet: Sheet, name: str) -> tuple[Sensor, Taken]:
+def _gyro(sheet: Sheet, name: str) -> Sensor:
     for sensor, names in (("gyro", _GYRO), ("motion", _RATE)):
         places = _places(sheet, names)
         if places:
-            return sensor_of(sheet, _clock(sheet, sensor), places, RATES["rad/s"], ("gyro", "rad/s", "right-handed"))
+            return sensor_of(sheet, _clock(sheet, sensor), places, "gyro", "rad/s", "right-handed")
     raise InputError(f"{name}: no gyroRotation or motionRotationRate in it: log the gyro, too")
 
 
@@ -95,7 +81,7 @@ def _utc_ns(sheet: Sheet) -> int | None:
     if logged is None:
         return None
     try:
-        written = times_ns(sheet.cells[logged], "", sheet.name)
+        written = sheet.times(logged, "")
     except InputError:
         return None
     own = _times(sheet, "accelerometer" if _places(sheet, _ACCEL) else "motion")
@@ -103,7 +89,7 @@ def _utc_ns(sheet: Sheet) -> int | None:
     return int(np.median(written[both] - own[both])) if np.any(both) else None
 
 
-def _location(sheet: Sheet) -> tuple[Track | None, list[Taken]]:
+def _location(sheet: Sheet) -> Track | None:
     """A fix is new in the row in which its own time has changed."""
     row_ns = _times(sheet, "accelerometer" if _places(sheet, _ACCEL) else "motion")
     fix = sheet.place("locationTimestamp_since1970")

@@ -12,21 +12,29 @@ from datetime import UTC, datetime
 import numpy as np
 
 from ...errors import InputError
-from ..cells import columns_of
+from ...logs.csv_reader import columns_of
 from ..files import Piece
-from ..recording import Recording, Taken, sensor_of, track_of
+from ..recording import Recording, sensor_of, track_of
 from ..sheets import Sheet, plain
 from ..times import of_day
-from ..units import ACCELERATIONS, RATES, SPEEDS, factor, unit
+from ..units import ACCELERATIONS, RATES, SPEEDS, unit
 
 NAME = "VBO"
-_ACCEL = {"forward": ("xaccel", "xacceleration", "imuxaccel"), "left": ("yaccel", "yacceleration", "imuyaccel")}
-_ACCEL |= {"up": ("zaccel", "zacceleration", "imuzaccel")}
-_RATES = {"forward": ("rollrate", "imurollrate"), "left": ("pitchrate", "imupitchrate")}
-_RATES |= {"up": ("yawrate", "imuyawrate")}
-_AXES = ("left", "up", "forward")
-_SIGNS = {"left": -1.0, "up": -1.0, "forward": 1.0}  # of the rates
-_DEVICE = [[f"{axis}{what}" for axis in "xyz"] for what in ("acc", "rateofrotation")]  # as RaceChrono writes them
+_CHANNELS = {  # of the vehicle: along and about left, up, forward
+    "Y_Accel": ("yaccel", "yacceleration", "imuyaccel"),
+    "Z_Accel": ("zaccel", "zacceleration", "imuzaccel"),
+    "X_Accel": ("xaccel", "xacceleration", "imuxaccel"),
+    "PitchRate": ("pitchrate", "imupitchrate"),
+    "YawRate": ("yawrate", "imuyawrate"),
+    "RollRate": ("rollrate", "imurollrate"),
+}
+_RATE_SIGNS = np.array([-1.0, -1.0, 1.0])
+_VEHICLE = "x forward, y left, z up; +1 g up"
+_DEVICE = [f"{axis}{what}" for what in ("acc", "rateofrotation") for axis in "xyz"]  # as RaceChrono writes them
+_LACKING = (
+    "without three accelerations, gravity in them, and three rates there is no lean; log an inertial unit, too (of "
+    "Kickstand's own export take the log that it was made from)"
+)
 _SECTION = re.compile(r"^\[([^\]]+)\]\s*$")
 
 
@@ -44,34 +52,35 @@ def read(pieces: list[Piece], name: str) -> Recording:
     if clock is None:
         raise InputError(f"{name}: no column time in it")
     time_ns = of_day(sheet.numbers(clock))
-    vehicle = _places(sheet, _ACCEL), _places(sheet, _RATES)
-    device = [[_first(sheet, axis) for axis in axes] for axes in _DEVICE]
-    taken: list[Taken]
-    if all(place is not None for places in device for place in places):
-        accel, gyro = ([place for place in places if place is not None] for places in device)
-        signs, text = np.ones(3), ("+1 g up", "right-handed")
-    elif None not in vehicle[0] and None not in vehicle[1]:
-        accel, gyro = ([place for place in places if place is not None] for places in vehicle)
-        signs = np.array([_SIGNS[axis] for axis in _AXES])
-        text = ("x forward, y left, z up; +1 g up", "yaw clockwise, pitch nose up: turned")
-    else:
-        raise InputError(f"{name}: {_lacking(vehicle)}")
-    accel_unit, rate_unit = units.get(accel[0]) or "g", units.get(gyro[0]) or "deg/s"
-    scale = factor(accel_unit, ACCELERATIONS, name)
-    accel_sensor, first = sensor_of(sheet, time_ns, accel, scale, ("accelerometer", accel_unit, text[0]))
-    scale = factor(rate_unit, RATES, name)
-    gyro_sensor, second = sensor_of(sheet, time_ns, gyro, signs * scale, ("gyro", rate_unit, text[1]))
-    lat, lon = sheet.place("lat", "latitude"), sheet.place("long", "longitude", "lon")
-    for place, sign in ((lat, 1.0), (lon, -1.0)):
-        if place is not None:
-            sheet.cells[place] = sign * sheet.numbers(place) / 60.0
-    track, places = track_of(sheet, time_ns, sheet.place("velocity"), lat, lon, _speed_unit(sections))
-    taken = [first, second, *places]
-    for one in taken:
-        one.unit = "minutes, west positive" if one.quantity == "position" else one.unit
-    known = text[0] != "+1 g up"
-    utc_ns = _midnight_ns(sections)
-    return Recording(NAME, accel_sensor, gyro_sensor, track, None, taken, [], utc_ns, known, known)
+    device = [place for place in (_first(sheet, axis) for axis in _DEVICE) if place is not None]
+    of_device = len(device) == len(_DEVICE)
+    places, missing = (device, []) if of_device else sheet.axes(*_CHANNELS.values())
+    if missing:
+        named = ", ".join(name for name, names in _CHANNELS.items() if names[0] in missing)
+        raise InputError(f"{name}: no channel {named}: {_LACKING}")
+    up, turned = ("+1 g up", "right-handed") if of_device else (_VEHICLE, "yaw clockwise, pitch nose up: turned")
+    accel_unit, rate_unit = units.get(places[0]) or "g", units.get(places[3]) or "deg/s"
+    turn = 1.0 if of_device else _RATE_SIGNS
+    track = track_of(
+        sheet,
+        time_ns,
+        sheet.place("velocity"),
+        sheet.place("lat", "latitude"),
+        sheet.place("long", "longitude", "lon"),
+        _speed_unit(sections),
+        (1.0 / 60.0, -1.0 / 60.0),
+    )
+    for taken in track.taken if track else []:
+        taken.unit = "minutes, west positive" if taken.quantity == "position" else taken.unit
+    return Recording(
+        NAME,
+        sensor_of(sheet, time_ns, places[:3], "accelerometer", accel_unit, up),
+        sensor_of(sheet, time_ns, places[3:], "gyro", rate_unit, turned, turn),
+        track,
+        utc_ns=_midnight_ns(sections),
+        vehicle_axes=not of_device,
+        sign_known=not of_device,
+    )
 
 
 def _sections(piece: Piece) -> dict[str, list[str]]:
@@ -111,20 +120,6 @@ def _first(sheet: Sheet, name: str) -> int | None:
     """The column of a name, also with its source after a hyphen: x_acc-acc."""
     found = [plain(column.partition("-")[0]) for column in sheet.columns]
     return found.index(name) if name in found else None
-
-
-def _places(sheet: Sheet, names: dict[str, tuple[str, ...]]) -> list[int | None]:
-    return [sheet.place(*names[axis]) for axis in _AXES]
-
-
-def _lacking(vehicle: tuple[list[int | None], list[int | None]]) -> str:
-    wanted = [_ACCEL[axis][0] for axis in _AXES] + [_RATES[axis][0] for axis in _AXES]
-    named = dict(zip(wanted, ("Y_Accel", "Z_Accel", "X_Accel", "PitchRate", "YawRate", "RollRate")))
-    missing = [named[name] for name, place in zip(wanted, [*vehicle[0], *vehicle[1]]) if place is None]
-    return (
-        f"no channel {', '.join(missing)}: without three accelerations, gravity in them, and three rates there is no "
-        "lean; log an inertial unit, too (of Kickstand's own export take the log that it was made from)"
-    )
 
 
 def _speed_unit(sections: dict[str, list[str]]) -> str:

@@ -1,8 +1,8 @@
 // Keeps the whole site in the browser, so that it opens without a network. The two texts below are filled in when the
 // site is put together (web/site.py). A new version is fetched in the background and shown at the next visit.
 
-const FILES = "__FILES__";
-const VERSION = "__VERSION__";
+const FILES = {{ files | tojson }};
+const VERSION = {{ version | tojson }};
 const CACHE = `kickstand-${VERSION}`;
 
 addEventListener("install", (event) => {

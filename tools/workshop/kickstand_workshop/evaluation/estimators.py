@@ -12,9 +12,9 @@ from importlib.util import find_spec
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.estimation.smooth import smooth
 from kickstand_tools.logs.reader import Log
 from kickstand_tools.replay import replay_engine
-from kickstand_tools.smoothing.smooth import smooth
 from numpy.typing import NDArray
 
 from .samples import Samples, calibrated

@@ -13,8 +13,8 @@ import numpy as np
 from kickstand.errors import Notice
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.calibration.file import CalibrationFile
-from kickstand_tools.calibration.ride.fit import fit_ride
 from kickstand_tools.errors import InputError
+from kickstand_tools.estimation.alignment import fit_ride
 from kickstand_tools.logs.reader import Log, read_log
 from kickstand_tools.replay.mount_check import contradiction
 from kickstand_tools.signals.averages import moving_mean

@@ -10,32 +10,20 @@ from typing import NamedTuple
 import parso.python.tree
 from cosmic_ray.ast import ast_nodes, get_ast, is_number
 from cosmic_ray.mutating import mutate_code
-from cosmic_ray.operators import (
-    binary_operator_replacement as binary,
-)
-from cosmic_ray.operators import (
-    boolean_replacer,
-    break_continue,
-    exception_replacer,
-    zero_iteration_for_loop,
-)
-from cosmic_ray.operators import (
-    comparison_operator_replacement as comparison,
-)
-from cosmic_ray.operators import (
-    unary_operator_replacement as unary,
-)
 from cosmic_ray.operators.operator import Operator
+from cosmic_ray.plugins import get_operator
 
-BINARY = (
-    ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "FloorDiv_Mul", "Mod_FloorDiv", "Pow_Mul")
-    + ("RShift_LShift", "LShift_RShift", "BitOr_BitAnd", "BitAnd_BitOr", "BitXor_BitOr")
-)  # fmt: skip
-COMPARISON = (
-    ("Lt_LtE", "LtE_Lt", "Gt_GtE", "GtE_Gt")  # the neighbour
-    + ("Lt_GtE", "GtE_Lt", "Gt_LtE", "LtE_Gt", "Eq_NotEq", "NotEq_Eq", "Is_IsNot", "IsNot_Is")  # the opposite
+OPERATORS = (
+    *["ReplaceBinaryOperator_" + name for name in ("Add_Sub", "Sub_Add", "Mul_Div", "Div_Mul", "FloorDiv_Mul")],
+    *["ReplaceBinaryOperator_" + name for name in ("Mod_FloorDiv", "Pow_Mul", "RShift_LShift", "LShift_RShift")],
+    *["ReplaceBinaryOperator_" + name for name in ("BitOr_BitAnd", "BitAnd_BitOr", "BitXor_BitOr")],
+    *["ReplaceComparisonOperator_" + name for name in ("Lt_LtE", "LtE_Lt", "Gt_GtE", "GtE_Gt")],
+    *["ReplaceComparisonOperator_" + name for name in ("Eq_NotEq", "NotEq_Eq", "Is_IsNot", "IsNot_Is")],
+    *["ReplaceUnaryOperator_Delete_" + name for name in ("USub", "Not", "Invert")],
+    *("ReplaceTrueWithFalse", "ReplaceFalseWithTrue", "ReplaceAndWithOr", "ReplaceOrWithAnd"),
+    *("ReplaceBreakWithContinue", "ReplaceContinueWithBreak", "ExceptionReplacer", "ZeroIterationForLoop"),
+    "AddNot",  # the opposite of a condition
 )
-UNARY = ("USub", "Not", "Invert")  # left out
 SMALL = 16  # whole numbers up to this are counts and indices: one more and one less. Others: the double and the half
 
 
@@ -54,15 +42,6 @@ class Change(NamedTuple):
         except AttributeError:  # cosmic-ray replaces exceptions that have a plain name, not gzip.BadGzipFile
             return None
         return None if text is None or _bare(text) in (None, _bare(source)) else text
-
-
-class Negate(boolean_replacer.AddNot):
-    """Conditions that are no comparison: those have opposites of their own."""
-
-    def mutation_positions(self, node):
-        for position in super().mutation_positions(node):
-            if node.children[2 if node.type == "test" else 1].type != "comparison":
-                yield position
 
 
 class Number(Operator):
@@ -122,22 +101,7 @@ class Drop(Operator):
 
 def operators() -> list[Operator]:
     """One of each kind of change."""
-    return [
-        *[getattr(binary, "ReplaceBinaryOperator_" + name)() for name in BINARY],
-        *[getattr(comparison, "ReplaceComparisonOperator_" + name)() for name in COMPARISON],
-        *[getattr(unary, "ReplaceUnaryOperator_Delete_" + name)() for name in UNARY],
-        boolean_replacer.ReplaceTrueWithFalse(),
-        boolean_replacer.ReplaceFalseWithTrue(),
-        boolean_replacer.ReplaceAndWithOr(),
-        boolean_replacer.ReplaceOrWithAnd(),
-        break_continue.ReplaceBreakWithContinue(),
-        break_continue.ReplaceContinueWithBreak(),
-        exception_replacer.ExceptionReplacer(),
-        zero_iteration_for_loop.ZeroIterationForLoop(),
-        Negate(),
-        Number(),
-        Drop(),
-    ]
+    return [*[get_operator("core/" + name)() for name in OPERATORS], Number(), Drop()]
 
 
 def changes(path: Path, root: Path) -> list[Change]:

@@ -3,128 +3,54 @@
 from pathlib import Path
 from typing import NamedTuple
 
-FIRMWARE, TOOLS, TESTS = "firmware/kickstand/", "tools/kickstand_tools/", "host_tests/"
+UNTESTABLE = ("_viper.py", "_guest.py")  # they run on a board or on MicroPython only
 
 
 class Room(NamedTuple):
-    """sources, tests: patterns of files, from the project's root; the tests in the order in which they run, so those
-    that notice most in least time first; before them all that of the same name as the code."""
+    """sources: patterns of files, from the project's root. tests: patterns in host_tests, in the order in which they
+    run, so those that notice most in least time first; before them all those of the same name as the code."""
 
     sources: tuple[str, ...]
     tests: tuple[str, ...]
 
 
+def _room(sources: str, tests: str) -> Room:
+    return Room(tuple(sources.split()), tuple(f"host_tests/{name}.py" for name in tests.split()))
+
+
+_STOPS = "stops_closed_form speed_fit quiet analysis_standstill analysis_brake_test"
 ROOMS = {
-    "imu": Room(
-        (FIRMWARE + "imu/*.py",),
-        (
-            TESTS + "imu/test_batches.py",
-            TESTS + "imu/test_sensor.py",
-            TESTS + "imu/test_sample_clock.py",
-            TESTS + "imu/test_registers.py",
-        ),
+    "imu": _room("firmware/kickstand/imu/*.py", "imu/test_batches imu/test_sensor imu/test_[!d]*"),
+    "calibration": _room(
+        "firmware/kickstand/calibration/*.py firmware/kickstand/rotation.py",
+        "calibration/test_rotation calibration/test_calibration calibration/test_still_pose calibration/test_pose_taker"
+        " calibration/test_active calibration/test_two_position imu/test_batches calibration/test_store",
     ),
-    "calibration": Room(
-        (FIRMWARE + "calibration/*.py", FIRMWARE + "rotation.py"),
-        (
-            TESTS + "calibration/test_rotation.py",
-            TESTS + "calibration/test_calibration.py",
-            TESTS + "calibration/test_still_pose.py",
-            TESTS + "calibration/test_pose_taker.py",
-            TESTS + "calibration/test_active.py",
-            TESTS + "calibration/test_two_position.py",
-            TESTS + "imu/test_batches.py",
-            TESTS + "calibration/test_store.py",
-        ),
+    "lean": _room(
+        "firmware/kickstand/lean/*.py",
+        "lean/test_known_ride lean/test_filter_states lean/test_[bkmru]* lean/test_formula lean/test_lean_filter",
     ),
-    "board": Room(
-        (FIRMWARE + "board/*.py",),
-        (TESTS + "imu/test_drivers.py", TESTS + "simulated_board/test_board_lcd.py", TESTS + "device/*.py"),
+    "drive_alignment": _room(
+        "firmware/kickstand/drive_alignment/*.py",
+        "drive_alignment/test_parts drive_alignment/test_drive*",
     ),
-    "lean": Room(
-        (FIRMWARE + "lean/*.py",),
-        (
-            TESTS + "lean/test_known_ride.py",
-            TESTS + "lean/test_filter_states.py",
-            TESTS + "lean/test_[bkmru]*.py",
-            TESTS + "lean/test_formula.py",
-            TESTS + "lean/test_lean_filter.py",
-        ),
+    "speed": _room(
+        "firmware/kickstand/speed/*.py", "simulated_board/test_board_speed simulated_board/test_board_place"
     ),
-    "drive_alignment": Room(
-        (FIRMWARE + "drive_alignment/*.py",),
-        (TESTS + "drive_alignment/test_parts.py", TESTS + "drive_alignment/*.py"),
+    "ui": _room("firmware/kickstand/ui/*.py", "ui/*"),
+    "rides": _room(
+        "firmware/kickstand/rides/*.py",
+        "rides/test_block rides/test_recording rides/test_ring rides/test_stream rides/test_card_trial",
     ),
-    "speed": Room(
-        (FIRMWARE + "speed/*.py",),
-        (TESTS + "simulated_board/test_board_speed.py", TESTS + "simulated_board/test_board_place.py"),
+    "replay": _room("tools/kickstand_tools/replay/*.py", "replay/test_forward_sign replay/test_cli_replay"),
+    "export": _room(
+        "tools/kickstand_tools/analysis/export/*.py", "analysis/test_export_formats analysis/test_cli_export"
     ),
-    "ui": Room(
-        (FIRMWARE + "ui/*.py",),
-        (TESTS + "ui/*.py",),
-    ),
-    "rides": Room(
-        (FIRMWARE + "rides/*.py",),
-        tuple(TESTS + f"rides/test_{name}.py" for name in ("block", "recording", "ring", "stream", "card_trial")),
-    ),
-    "pull": Room(
-        (TOOLS + "rides/*.py",),
-        (TESTS + "rides/test_ride_file.py", TESTS + "rides/test_cli_*.py"),
-    ),
-    "calibrate": Room(
-        (TOOLS + "calibration/*.py",),
-        (TESTS + "calibration/test_cli*.py", TESTS + "drive_alignment/test_cli_drive.py"),
-    ),
-    "broken logs": Room(
-        (TOOLS + "logs/mended/*.py", *(TOOLS + f"logs/{name}.py" for name in ("even_times", "stretch", "cut"))),
-        tuple(TESTS + f"logs/{name}.py" for name in ("test_ends", "test_even_times", "test_frozen", "test_stretch")),
-    ),
-    "logs": Room(
-        tuple(TOOLS + f"logs/{name}.py" for name in ("block", "cells", "log", "reader", "source", "table")),
-        tuple(TESTS + f"logs/{name}.py" for name in ("test_log", "test_cells", "test_cli_logs", "test_log_blocks")),
-    ),
-    "units": Room(
-        (TOOLS + "logs/*_unit.py",),
-        (TESTS + "logs/test_unit_limits.py", TESTS + "logs/axes/test_bends.py", TESTS + "logs/test_speed_unit.py"),
-    ),
-    "replay": Room(
-        (TOOLS + "replay/*.py",),
-        (TESTS + "replay/test_forward_sign.py", TESTS + "replay/test_cli_replay.py"),
-    ),
-    "analysis": Room(
-        (TOOLS + "analysis/*.py", TOOLS + "analysis/plot/*.py"),
-        (TESTS + "analysis/*.py", TESTS + "analysis/stops/*.py"),
-    ),
-    "export": Room(
-        (TOOLS + "analysis/export/*.py",),
-        (TESTS + "analysis/test_export_formats.py", TESTS + "analysis/test_cli_export.py"),
-    ),
-    "stops": Room(
-        (TOOLS + "analysis/stops/*.py",),
-        (
-            TESTS + "analysis/stops/test_stops_closed_form.py",
-            TESTS + "analysis/stops/test_speed_fit.py",
-            TESTS + "analysis/stops/test_quiet.py",
-            TESTS + "analysis/stops/test_analysis_standstill.py",
-            TESTS + "analysis/stops/test_analysis_brake_test.py",
-        ),
-    ),
-    "fleet": Room(
-        tuple(
-            TOOLS + f"fleet/{name}.py"
-            for name in ("evidence", "files", "forward", "journal", "manifest", "moved", "period", "run", "tables")
-        ),
-        tuple(  # not test_cluster.py, which takes longer than all of them
-            TESTS + f"fleet/test_{name}.py"
-            for name in ("evidence", "moved", "forward", "period", "full_disk", "s3_store", "manifest")
-        ),
-    ),
-    "simulation": Room(
-        (TOOLS + "simulation/*.py", TOOLS + "simulation/physics/*.py", TOOLS + "simulation/scripted/*.py"),
-        (TESTS + "simulation/*.py",),
+    "stops": _room(
+        "tools/kickstand_tools/analysis/stops/*.py",
+        " ".join(f"analysis/stops/test_{name}" for name in _STOPS.split()),
     ),
 }
-UNTESTABLE = ("_viper.py", "_guest.py")  # they run on a board or on MicroPython only
 
 
 def sources(room: Room, root: Path) -> list[Path]:

@@ -1,59 +1,33 @@
-"""The demo as a terminal shows it, as SVG. Lines, blocks and Braille dots are drawn: not every font has them."""
+"""The demo as a terminal shows it, as SVG."""
 
 import io
-from html import escape
-from itertools import groupby
+import re
 
 from kickstand_tools.demo.demo import Device
 from kickstand_tools.demo.score import State
 from kickstand_tools.demo.screen import WIDTH, screen
+from rich._export_format import CONSOLE_SVG_FORMAT
 from rich.console import Console
-from rich.segment import Segment
-from rich.style import Style
 from rich.terminal_theme import TerminalTheme
 
 MOMENT_S = 36.0  # in the right turn of the demo's script
 _KEYS = "b button  B long press  p pause  q quit"
 
-_CELL = (10, 21)  # width, height
-_MARGIN, _TITLE_HEIGHT = 16, 34
 _FONT = "DejaVu Sans Mono, Menlo, Consolas, monospace"
 _COLOURS = [(24, 26, 31), (224, 82, 78), (90, 180, 110), (242, 201, 76), (31, 79, 200), (200, 120, 220), (90, 200, 230)]
 _THEME = TerminalTheme((24, 26, 31), (220, 223, 228), [*_COLOURS, (220, 223, 228)], [*_COLOURS, (255, 255, 255)])
-
-# How far each box-drawing character goes from the middle of its cell: left, right, up, down; and its strength
-_LINES = {
-    **{c: (arms, 3) for c, arms in zip("━┃┏┓┗┛╸╺", ("lr", "ud", "rd", "ld", "ru", "lu", "l", "r"))},
-    **{c: (arms, 1) for c, arms in zip("─│╭╮╰╯", ("lr", "ud", "rd", "ld", "ru", "lu"))},
-}
-_ARMS = {"l": (-0.5, 0.0), "r": (0.5, 0.0), "u": (0.0, -0.5), "d": (0.0, 0.5)}  # in cells
-# Which part of its cell each block fills: from, to
-_BLOCKS = {c: (0.0, 1.0 - k / 8) for k, c in enumerate("█▉▊▋▌▍▎▏")} | {"▐": (0.5, 1.0), "▕": (0.875, 1.0)}
-_BRAILLE = ((0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2), (0, 3), (1, 3))  # column and row of each bit
+# Rich's, without its fonts, which come from elsewhere, and its comment
+_FORMAT = re.sub(r"@font-face \{\{.*?\}\}\s*|<!--.*?-->\s*", "", CONSOLE_SVG_FORMAT, flags=re.DOTALL)
 
 
 def draw() -> str:
     """The demo's screen in the middle of a turn, from a run of the demo's own device."""
-    console = Console(width=WIDTH, file=io.StringIO(), force_terminal=True, color_system="truecolor")
-    picture = screen(_state(), "Kickstand on a simulated board", _KEYS, paused=False)
-    lines = console.render_lines(picture, console.options, pad=False)
-    width = WIDTH * _CELL[0] + 2 * _MARGIN
-    height = len(lines) * _CELL[1] + _TITLE_HEIGHT + _MARGIN
-    cells = "\n".join(element for row, line in enumerate(lines) for element in _line(line, row))
-    lights = "".join(
-        f'<circle cx="{22 + 20 * i}" cy="17" r="6" fill="{c}"/>'
-        for i, c in enumerate(("#e0524e", "#f2c94c", "#5ab46e"))
+    console = Console(width=WIDTH, file=io.StringIO(), force_terminal=True, color_system="truecolor", record=True)
+    console.print(screen(_state(), "Kickstand on a simulated board", _KEYS, paused=False))
+    drawn = _FORMAT.replace("Fira Code, monospace", _FONT)
+    return console.export_svg(
+        title="python3 tools/dev.py demo", theme=_THEME, code_format=drawn, font_aspect_ratio=0.602
     )
-    title = f'<text x="{width / 2}" y="22" text-anchor="middle" fill="#dcdfe4">python3 tools/dev.py demo</text>'
-    font = f'font-family="{_FONT}" font-size="16"'
-    return f"""<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" {font}>
-<rect width="{width}" height="{height}" rx="10" fill="#181a1f"/>
-{lights}{title}
-<g transform="translate({_MARGIN} {_TITLE_HEIGHT})">
-{cells}
-</g>
-</svg>
-"""
 
 
 def _state() -> State:
@@ -64,61 +38,3 @@ def _state() -> State:
                 if state["t_s"] >= MOMENT_S:
                     return state
     raise RuntimeError("the demo ended early: " + "\n".join(device.console))
-
-
-def _line(segments: list[Segment], row: int) -> list[str]:
-    """The elements of one line, background first."""
-    elements = []
-    y = row * _CELL[1]
-    column = 0
-    for segment in segments:
-        style = segment.style or Style()
-        if style.bgcolor:
-            place = f'x="{column * _CELL[0]}" y="{y}" width="{_CELL[0] * len(segment.text)}" height="{_CELL[1]}"'
-            colour = style.bgcolor.get_truecolor(_THEME, foreground=False).hex
-            elements.append(f'<rect {place} fill="{colour}" shape-rendering="crispEdges"/>')
-        colour = style.color.get_truecolor(_THEME).hex if style.color else "#dcdfe4"
-        for drawn, group in groupby(segment.text, key=_is_drawn):
-            text = "".join(group)
-            if drawn:
-                elements.append(_shapes(text, column * _CELL[0], y, colour))
-            elif text.strip():
-                elements.append(_words(text, column * _CELL[0], y, colour, bool(style.bold)))
-            column += len(text)
-    return elements
-
-
-def _is_drawn(character: str) -> bool:
-    return character in _LINES or character in _BLOCKS or 0x2800 <= ord(character) < 0x2900
-
-
-def _words(text: str, x: int, y: int, colour: str, bold: bool) -> str:
-    """Text with a place for every character, whatever the width of the font."""
-    places = " ".join(str(x + i * _CELL[0]) for i in range(len(text)))
-    weight = ' font-weight="bold"' if bold else ""
-    return f'<text x="{places}" y="{y + 16}"{weight} fill="{colour}" xml:space="preserve">{escape(text)}</text>'
-
-
-def _shapes(text: str, x: int, y: int, colour: str) -> str:
-    """A run of lines, blocks or Braille as one path each."""
-    strokes: dict[int, str] = {}
-    filled = ""
-    for character in text:
-        if character in _LINES:
-            arms, strength = _LINES[character]
-            middle = f"M{x + _CELL[0] / 2:g} {y + _CELL[1] / 2:g}"
-            path = "".join(f"{middle}l{_ARMS[a][0] * _CELL[0]:g} {_ARMS[a][1] * _CELL[1]:g}" for a in arms)
-            strokes[strength] = strokes.get(strength, "") + path
-        elif character in _BLOCKS:
-            start, end = (part * _CELL[0] for part in _BLOCKS[character])
-            filled += f"M{x + start:g} {y}h{end - start:g}v{_CELL[1]}h{start - end:g}z"
-        else:
-            for bit, (dx, dy) in enumerate(_BRAILLE):
-                if (ord(character) - 0x2800) >> bit & 1:
-                    filled += f"M{x + 1 + 5 * dx} {y + 1.2 + 5.25 * dy:g}h3v3h-3z"
-        x += _CELL[0]
-    lines = "".join(
-        f'<path d="{path}" stroke="{colour}" stroke-width="{strength}" stroke-linecap="square"/>'
-        for strength, path in strokes.items()
-    )
-    return lines + (f'<path d="{filled}" fill="{colour}"/>' if filled else "")

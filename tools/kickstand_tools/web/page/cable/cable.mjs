@@ -107,7 +107,7 @@ export async function python(withNumpy = false) {
   await keptOffline(); // so that what is fetched now is kept too
   const { PACKAGES, loadPython } = await import("../python.mjs");
   const made = await loadPython(["install.zip", ...(withNumpy ? ["numpy/numpy.zip"] : [])]);
-  made.runPython(`import sys; sys.path.insert(0, "${PACKAGES}/tools")`);
+  made.runPython(`import sys; sys.path[:0] = ["${PACKAGES}/tools", "${PACKAGES}/firmware"]`);
   return made;
 }
 

@@ -1,0 +1,110 @@
+"""The life of recordings: what they need is imported step by step, a card is tried out, rides begin and end."""
+
+import gc
+
+from ..errors import attempt
+
+
+class NoRecorder:
+    """Stands where the Recorder will be, until one is made."""
+
+    active = stalled = False
+
+    def take_problem(self):
+        """None: nothing has been recorded."""
+
+
+class Recording:
+    """Begins and ends the recording of rides.
+
+    settings: a Settings. chip: the Mpu6050. meter, calibration: the LeanMeter and its ActiveCalibration. keeper: where
+    rides are recorded to (see Recorder), None for flash or SD card; if one is given, recording begins with the first
+    readings.
+
+    recorder: a Recorder, or a NoRecorder before there is one. on_card: rides are kept on an SD card.
+    """
+
+    def __init__(self, settings, chip, meter, calibration, keeper=None):
+        self._settings = settings
+        self._chip = chip
+        self._meter = meter
+        self._calibration = calibration
+        self._keeper = keeper
+        self.recorder = NoRecorder()
+        self.on_card = settings.SD_SPI is not None and keeper is None
+        self._due = settings.RECORD or keeper is not None  # to begin with the first readings
+        self._steps = self._make()
+        self._refused = None  # a Notice why there is no Recorder
+        if self._due or self.on_card:
+            self._finish()
+
+    def _make(self):
+        """Make the Recorder; a generator of short steps. Modules that only recording needs are imported one in each
+        step."""
+        names = ["block", "recorder"] if self._keeper else ["block", "ride_paths", "flash_ring", "recorder"]
+        for name in names + ["card_trial"] * self.on_card:
+            gc.collect()  # as before each import while the loop runs: what stays must not lie behind garbage
+            __import__("kickstand.rides." + name)
+            yield
+        from .recorder import Recorder
+
+        keeper = self._keeper
+        if keeper is None:
+            from .flash_ring import RideRing
+
+            keeper = RideRing(self._settings)
+        self.recorder = Recorder(keeper, self._settings.SAMPLE_HZ)
+
+    def _finish(self):
+        """Take all the steps that are left."""
+        while self._steps and not self._refused:
+            if self._keeper:
+                self._step()  # a computer waits for the ride: it gets the exception
+            else:
+                self.prepare()
+
+    def _step(self):
+        if next(self._steps, True):
+            self._steps = None
+
+    def prepare(self):
+        """Take one step of making the Recorder. The open menu calls this again and again: the chip's FIFO bridges one
+        import (0.1 s), not all of them. If a step fails, start() says why."""
+        if self._steps and not self._refused:
+            self._refused = attempt(self._step)
+
+    def try_out_card(self):
+        """Try the SD card out, before the watchdog runs. Raises nothing."""
+        if not self._refused:
+            from . import card_trial
+
+            card_trial.prepare(self.recorder, self._settings)
+
+    def start(self):
+        """Begin to record a ride; return None, or a Notice why that cannot be. Where the bike stands, the lean filter
+        begins anew too, so that a replay shows the same lean; it has to find the gyro's errors again in the first
+        bends. A recording begun while riding is replayed by a filter that knows less at its beginning than the one on
+        the board."""
+        if self._meter.at_rest:
+            self._calibration.restart()
+        if self._refused and not self.on_card:  # a card has to be tried out before the watchdog runs
+            self._refused, self._steps = None, self._make()
+        self._finish()
+        if not self._refused:
+            self.recorder.start(self._chip, self._calibration.value)
+        return self._refused
+
+    def start_due(self):
+        """The first readings have come: begin to record, if that was asked for. Returns as start() does."""
+        due, self._due = self._due, False
+        return self.start() if due else None
+
+    def calibration_changed(self):
+        """A ride has one calibration: begin another."""
+        if self.recorder.active:
+            self.recorder.start(self._chip, self._calibration.value)
+
+    def stop(self):
+        """End the ride, if there is one."""
+        if self.recorder.active:
+            self.recorder.stop()

@@ -1,0 +1,164 @@
+"""How far off the ride shows the alignment to be, what a report says that this costs, and what to do about it: where
+it is known how far off it is."""
+
+import dataclasses
+import json
+import re
+
+import analysis_rides
+import command
+import numpy as np
+import pytest
+from kickstand_tools.analysis.alignment_quality import Quality, lean_cost, yaw_cost_deg
+from kickstand_tools.analysis.report import angles
+from kickstand_tools.api import Log, fit_drive, fit_two_positions, open_ride, overview, simulate_ride, vehicle_channels
+from kickstand_tools.simulation.scripted import script
+
+NONE = np.zeros(1)
+# "up" leans to the right of the bike's own; "forward" points up; "forward" points to the right
+AXES = {"roll": (1, 0), "pitch": (1, 2), "yaw": (2, 0)}
+
+
+def turn(name, degrees):
+    """(3, 3): two axes turned into one another, so that this angle of the alignment is off by so much."""
+    a, b = AXES[name]
+    made = np.eye(3)
+    made[a, a] = made[b, b] = np.cos(np.radians(degrees))
+    made[b, a] = np.sin(np.radians(degrees))
+    made[a, b] = -made[b, a]
+    return made
+
+
+def turned(calibration, name, degrees):
+    """The calibration with that angle off."""
+    matrix = turn(name, degrees) @ calibration.vehicle_from_sensor
+    return dataclasses.replace(calibration, vehicle_from_sensor=matrix)
+
+
+@pytest.fixture(scope="module", params=["street", "track", "city"])
+def ride(request):
+    """Log of 100 samples a second with a speed, its true calibration and true lean."""
+    made = simulate_ride(request.param, seed=2, seconds=150.0)
+    n = round(made.rate_hz / 100.0)
+    readings = made.readings[: len(made.readings) // n * n].reshape(-1, n, 7).mean(axis=1)
+    log = Log.from_readings(readings, made.rate_hz / n)
+    log.speed_mps[::100] = made.truth["speed_mps"][n - 1 :: n][: len(readings)][::100]
+    kickstand, upright = (Log.from_readings(pose, made.rate_hz) for pose in (made.kickstand, made.upright))
+    calibration = fit_drive([log], fit_two_positions(kickstand, upright).calibration, "motorcycle").calibration
+    return log, calibration, made.truth["lean_deg"][n - 1 :: n][: len(readings)], request.param
+
+
+def error_deg(ride, calibration, from_share=0.0):
+    """rms of the shown lean where it is trusted and the bike moves."""
+    log, _, true, _ = ride
+    shown = vehicle_channels(log, calibration)
+    there = shown.trusted & (shown.resting < 0.5)
+    there[: round(from_share * len(there))] = False
+    return float(np.sqrt(np.mean((shown.lean_deg - true)[there] ** 2)))
+
+
+@pytest.mark.parametrize(("name", "degrees"), [("yaw", 6.0), ("yaw", 15.0), ("pitch", 6.0), ("pitch", 12.0)])
+def test_yaw_and_pitch_cost_what_is_said(ride, name, degrees):
+    """Both ways round: an error may also make up for another one."""
+    usual = error_deg(ride, ride[1])
+    more = [error_deg(ride, turned(ride[1], name, angle)) for angle in (degrees, -degrees)]
+    cost = np.sqrt(max(0.0, np.mean(np.square(more)) - usual**2))
+    angles = {"roll_deg": 0.0, "pitch_deg": 0.0, "yaw_deg": 0.0} | {f"{name}_deg": degrees}
+    said = vars(lean_cost(Quality(**angles, gravity_g=1.0, straight_s=60.0, lateral_g=NONE, forward_g=NONE)))
+    most = said.pop(f"{name}_deg")
+    assert cost < 1.75 * most + 0.15
+    if ride[3] != "city":  # slow rides lose less
+        assert cost > 0.3 * most
+    assert set(said.values()) == {0.0}
+
+
+def test_riding_takes_roll_out_up_to_a_limit(ride):
+    usual = error_deg(ride, ride[1], 0.5)
+    assert error_deg(ride, turned(ride[1], "roll", 3.0), 0.5) < usual + 0.3
+    assert error_deg(ride, turned(ride[1], "roll", 12.0), 0.5) > 8.0
+
+
+def test_calibrate_drive_takes_yaw_out(ride):
+    log, calibration, *_ = ride
+    found = fit_drive([log], turned(calibration, "yaw", 9.0), "motorcycle").calibration
+    before, after = (overview(open_ride(log, one)).quality.yaw_deg for one in (turned(calibration, "yaw", 9.0), found))
+    assert before is not None
+    assert after is not None
+    assert abs(abs(before) - 9.0) < 2.5
+    assert abs(after) < 2.0
+    assert found.vehicle_from_sensor == pytest.approx(calibration.vehicle_from_sensor, abs=0.02)
+
+
+def with_calibration(ride, name, degrees, **changed):
+    """The path of a CAL.json in which that is wrong."""
+    path = ride.with_name(f"{name}.json")
+    matrix = turn(name, degrees).tolist()
+    path.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": matrix} | changed))
+    return path
+
+
+@pytest.fixture(scope="module")
+def scripted(tmp_path_factory):
+    """Straights and turns between standstills, with a speed each second."""
+    segments = [script.upright(4)]
+    for lean in 25, -30, 20:
+        segments += [script.accelerate(16, 5), script.straight(6), script.turn(lean, 4), script.straight(5)]
+        segments += [script.brake(0, 4), script.wait(4)]
+    return analysis_rides.write(tmp_path_factory.mktemp("ride"), segments, speed_hz=1)
+
+
+@pytest.mark.parametrize("axis", AXES)
+@pytest.mark.parametrize("angle_deg", [-3.0, 0.0, 2.0])
+def test_an_error_of_the_alignment_is_seen(scripted, axis, angle_deg):
+    quality = overview(open_ride(scripted, with_calibration(scripted, axis, angle_deg))).quality
+    assert quality.straight_s > 30.0
+    for name in AXES:
+        value = getattr(quality, f"{name}_deg")
+        assert value == pytest.approx(angle_deg if name == axis else 0.0, abs=0.4), name
+    assert quality.gravity_g == pytest.approx(1.0, abs=0.002)
+
+
+def test_a_ride_without_straights_does_not_show_it(tmp_path):
+    path = analysis_rides.write(tmp_path, [script.upright(8)])
+    quality = overview(open_ride(path, None)).quality
+    assert (quality.roll_deg, quality.pitch_deg, quality.yaw_deg) == (None, None, None)
+    said = command.works("report", path).out
+    assert "Alignment: not enough straight riding to tell how far it is off." in said
+
+
+def test_nothing_is_a_negative_nothing():
+    assert angles(Quality(-0.04, None, 2.04, None, 60.0, NONE, NONE)) == ["roll +0.0°", "yaw +2.0°"]
+
+
+@pytest.mark.parametrize(
+    ("name", "degrees", "words"),
+    [
+        ("yaw", 5.0, r"yaw [+-]5\.\d°\. Yaw usually costs about 0\.3° of lean; calibrate ride or drive takes it out\."),
+        ("yaw", 1.0, r"yaw [+-]1\.0°\. That costs less than 0\.1° of lean: nothing to do\."),
+        ("roll", 3.0, r"roll [+-]3\.0°.*\. That costs less than 0\.1° of lean: nothing to do\."),
+        ("roll", 9.0, r"roll [+-]9\.0°.*: was it held upright\? Roll usually costs about 5\.5° of lean; cal"),
+        ("pitch", 4.0, r"pitch [+-]3\.\d°.* Pitch usually costs about 0\.3° of lean; calibrate ride takes it out, or"),
+    ],
+)
+def test_a_report_says_what_it_costs_and_what_to_do(scripted, name, degrees, words):
+    cal = with_calibration(scripted, name, degrees)
+    said = " ".join(command.works("report", scripted, "--calibration", cal).out.split())
+    assert re.search(words, said), said
+    data = json.loads(command.works("report", scripted, "--calibration", cal, "--json").out)
+    cost = data["lean_cost"][f"{name}_deg"]
+    most = {"yaw": yaw_cost_deg(degrees), "roll": max(0.0, degrees - 3.5), "pitch": 0.33}[name]
+    assert cost == pytest.approx(most, abs=0.05)
+
+
+def test_without_a_speed_calibrate_drive_is_no_help(scripted, tmp_path):
+    log = tmp_path / "RIDE.csv"
+    log.write_text("\n".join(row.rpartition(",")[0] for row in scripted.read_text().splitlines()) + "\n")
+    said = " ".join(command.works("report", log, "--calibration", with_calibration(scripted, "yaw", 5.0)).out.split())
+    assert "calibrate ride takes it out" in said
+    assert "calibrate drive" not in said
+
+
+def test_a_car_has_no_lean_to_lose(scripted):
+    cal = with_calibration(scripted, "yaw", 0.0, vehicle="car")
+    assert "of lean" not in command.works("report", scripted, "--calibration", cal).out
+    assert "lean_cost" not in json.loads(command.works("report", scripted, "--calibration", cal, "--json").out)

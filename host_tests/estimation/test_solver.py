@@ -1,0 +1,97 @@
+"""Chains of blocks solved by elimination, against the same least squares solved at once."""
+
+import numpy as np
+import pytest
+from kickstand_tools.estimation.solver import (
+    RandomWalks,
+    back,
+    covariances,
+    minus_two_log_likelihood,
+    posterior_covariance,
+    reduce_windows,
+    solve,
+)
+
+S, M, ROWS = 3, 2, 6
+
+
+class Problem:
+    """Random residuals of blocks of windows, and random walks of the parameters with G variances of their steps."""
+
+    def __init__(self, blocks, length, variances=([0.01, 0.1],)):
+        rng = np.random.default_rng(0)
+        self.jacobian = rng.normal(size=(blocks, length, ROWS, 2 * S + M + 1))
+        prior = np.column_stack((np.diag([2.0, 3.0]), [0.5, -0.3]))
+        steps = np.repeat(np.array(variances)[:, None], blocks - 1, axis=1)
+        self.walks = RandomWalks(np.stack([prior] * len(variances)), steps, rng.normal(size=(blocks - 1, M)))
+        self.blocks = reduce_windows(self.jacobian, S)
+
+    def at_once(self, g=0):
+        """All states in a row, then the parameters of each block: solution, covariance, -2 log(likelihood)."""
+        blocks, length = self.jacobian.shape[:2]
+        states = blocks * length + 1
+        n = states * S + blocks * M
+        parameters = [np.arange(M) + states * S + b * M for b in range(blocks)]
+        rows = []
+        for b in range(blocks):
+            for k in range(length):
+                first = (b * length + k) * S
+                row = np.zeros((ROWS, n + 1))
+                row[:, [*range(first, first + 2 * S), *parameters[b], n]] = self.jacobian[b, k]
+                rows.append(row)
+        prior, variance = self.walks.prior[g], self.walks.variance[g]
+        root = np.linalg.cholesky(prior[:, :M]).T
+        row = np.zeros((M, n + 1))
+        row[:, parameters[0]], row[:, n] = root, np.linalg.solve(root.T, prior[:, M])
+        rows.append(row)
+        for b in range(blocks - 1):
+            row = np.zeros((M, n + 1))
+            row[:, parameters[b]], row[:, parameters[b + 1]] = -np.eye(M), np.eye(M)
+            row[:, n] = self.walks.between[b]
+            rows.append(row / np.sqrt(variance[b])[:, None])
+        a = np.concatenate(rows)
+        normal = a[:, :n].T @ a[:, :n]
+        found = -np.linalg.solve(normal, a[:, :n].T @ a[:, n])
+        misfit = np.sum((a[:, :n] @ found + a[:, n]) ** 2)
+        prior_and_walks = np.linalg.slogdet(prior[:, :M])[1] - np.sum(np.log(variance))
+        likelihood = misfit + np.linalg.slogdet(normal)[1] - prior_and_walks
+        return found, np.linalg.inv(normal), likelihood
+
+
+@pytest.mark.parametrize(("blocks", "length"), [(1, 1), (1, 5), (2, 1), (4, 3), (3, 7)])
+def test_blocks_give_the_solution_of_the_whole_chain(blocks, length):
+    problem = Problem(blocks, length)
+    want, covariance, _ = problem.at_once()
+    states, parameters = solve(problem.blocks, problem.walks, np.ones(1))
+    joint = posterior_covariance(problem.blocks, problem.walks, np.ones(1))
+    spread = covariances(problem.blocks, joint)
+    for b in range(blocks):
+        own = slice(len(want) - (blocks - b) * M, len(want) - (blocks - b - 1) * M)
+        assert np.allclose(parameters[b], want[own])
+        assert np.allclose(joint[b, 2 * S :, 2 * S :], covariance[own, own])
+        for k in range(length):
+            both = slice((b * length + k) * S, (b * length + k + 2) * S)
+            assert np.allclose(states[b, k : k + 2].ravel(), want[both])
+            assert np.allclose(spread[b, k, :, : 2 * S], covariance[both, both])
+            assert np.allclose(spread[b, k, :, 2 * S :], covariance[both, own])
+
+
+def test_the_likelihood_is_that_of_the_parameters_as_a_whole():
+    problem = Problem(3, 2, ([0.01, 0.1], [0.09, 0.025]))
+    found = minus_two_log_likelihood(problem.blocks, problem.walks)
+    assert found[1] - found[0] == pytest.approx(problem.at_once(1)[2] - problem.at_once(0)[2])
+
+
+def test_the_mean_of_hypotheses_is_as_uncertain_as_they_are_and_differ():
+    variances = [0.01, 0.1], [1.0, 10.0]
+    one, two = (Problem(3, 4, (each,)) for each in variances)
+    both, weight = Problem(3, 4, variances), np.array([0.75, 0.25])
+    (first, _), (second, _) = (solve(each.blocks, each.walks, np.ones(1)) for each in (one, two))
+    mean, parameters = solve(both.blocks, both.walks, weight)
+    assert np.allclose(mean, 0.75 * first + 0.25 * second)
+    assert np.allclose(back(both.blocks, mean[:, [0, -1]], parameters), mean)
+    within = [posterior_covariance(each.blocks, each.walks, np.ones(1)) for each in (one, two)]
+    apart = np.concatenate((second - first)[:, [0, -1]].transpose(1, 0, 2), axis=1)
+    found = posterior_covariance(both.blocks, both.walks, weight)[:, : 2 * S, : 2 * S]
+    between = 0.75 * 0.25 * apart[:, :, None] * apart[:, None, :]
+    assert np.allclose(found, 0.75 * within[0][:, : 2 * S, : 2 * S] + 0.25 * within[1][:, : 2 * S, : 2 * S] + between)

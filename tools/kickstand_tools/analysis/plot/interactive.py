@@ -1,0 +1,168 @@
+"""The charts of a ride as plotly.js takes them, to zoom into: {"data": traces, "layout": of a wide window, "narrow": of
+a phone}. In a wide window the last charts stand beside each other below those over time."""
+
+import html
+from typing import Any
+
+import numpy as np
+
+from ...logs.table import Array
+from .charts import LEFT_COLOUR, RIGHT_COLOUR, Bars, Chart, Charts, Dots, Line, Note, Sides, Trace, envelope
+
+POINTS = 40_000  # of a line: with more, a browser no longer zooms smoothly
+_INCH = 86  # of a chart's height, pixels, as what follows
+_GAP, _NARROW_GAP = 62, 96  # between rows; in a narrow window with the names of axes
+_MARGIN = {"l": 80, "r": 80, "t": 100, "b": 80}
+_NARROW_MARGIN = {"l": 52, "r": 12, "t": 160, "b": 60}
+_ASIDE = 0.085  # between charts beside each other, of the width
+_SMALL = {"font": {"size": 12}}
+_INK = "rgb(36,36,36)"
+_AXIS = {
+    "automargin": True,
+    "linecolor": _INK,
+    "showgrid": False,
+    "showline": True,
+    "ticks": "outside",
+    "zeroline": False,
+}
+PAPER = {
+    "autotypenumbers": "strict",
+    "bargap": 0,
+    "font": {"color": _INK},
+    "paper_bgcolor": "white",
+    "plot_bgcolor": "white",
+    "showlegend": False,
+}
+_SIDES: dict[str, Any] = {  # of a point: where its words stand
+    "above": {"yanchor": "bottom"},
+    "below": {"yanchor": "top"},
+    "left": {"xanchor": "right", "xshift": -2},
+    "right": {"xanchor": "left", "xshift": 2},
+}
+
+
+def plain(values: Array, digits: int = 3) -> list[float | None]:
+    """Numbers as JSON can hold them: None for NaN, and a page need not hold sixteen digits."""
+    return [None if value != value else value for value in np.round(values, digits).tolist()]
+
+
+def figure(charts: Charts, linked: bool = False) -> dict[str, Any]:
+    """All that is drawn, in plain numbers, lists and None for NaN. linked: pointing anywhere over a chart over time,
+    not at a line alone, is pointing at its moment."""
+    each = [*charts.over_time, *charts.below]
+    data = [drawn | _axes(k) for k, chart in enumerate(each) for trace in chart.traces for drawn in _traces(trace)]
+    layouts = {kind: _layout(charts, kind == "narrow", linked) for kind in ("layout", "narrow")}
+    return {"data": data} | layouts
+
+
+def time_axes(charts: Charts) -> list[str]:
+    """The axes of time, as plotly calls them."""
+    return [_axes(k)["xaxis"] for k in range(len(charts.over_time))]
+
+
+def _axes(k: int) -> dict[str, str]:
+    """Those of chart k, as plotly counts them."""
+    return {"xaxis": f"x{k + 1 if k else ''}", "yaxis": f"y{k + 1 if k else ''}"}
+
+
+def _traces(trace: Trace) -> list[dict[str, Any]]:
+    if isinstance(trace, Line):
+        x, y = envelope(trace.x, trace.y, POINTS, trace.gap_s)
+        line = {"color": trace.colour, "width": 1.2, "dash": "dot" if trace.dotted else "solid"}
+        named = {"type": "scattergl", "name": trace.name} if trace.name else {"type": "scatter", "hoverinfo": "skip"}
+        return [{"mode": "lines", "line": line, "x": plain(x), "y": plain(y)} | named]
+    if isinstance(trace, Sides):
+        x, y = envelope(trace.x, trace.y, POINTS, trace.gap_s)
+        gaps = np.flatnonzero(np.isnan(y))  # at both ends of one it is 0: plotly would fill from one end to the other
+        x = np.insert(x, np.concatenate((gaps, gaps + 1)), np.concatenate((x[gaps - 1], x[gaps + 1])))
+        y = np.insert(y, np.concatenate((gaps, gaps + 1)), 0.0)
+        left = _filled("left", x, np.minimum(y, 0.0), LEFT_COLOUR)
+        return [left, _filled("right", x, np.maximum(y, 0.0), RIGHT_COLOUR)]
+    if isinstance(trace, Dots):
+        drawn = {"type": "scattergl", "mode": "markers", "marker": {"size": 3, "color": trace.colour}}
+        return [drawn | {"name": trace.name, "x": plain(trace.x, 5), "y": plain(trace.y, 5)}]
+    if isinstance(trace, Bars):
+        colours = np.where(trace.x < 0.0, LEFT_COLOUR, RIGHT_COLOUR).tolist()
+        drawn = {"type": "bar", "marker": {"color": colours, "line": {"width": 0}}, "width": trace.width}
+        return [drawn | {"name": trace.name, "x": plain(trace.x), "y": plain(trace.y)}]
+    centres = plain((trace.edges[1:] + trace.edges[:-1]) / 2.0, 4)
+    there = trace.values > 0.0
+    logs = np.log10(np.where(there, trace.values, np.nan))
+    drawn = {"type": "heatmap", "colorscale": "YlGnBu", "reversescale": True, "showscale": False}
+    if np.any(there):
+        drawn |= {"zmin": float(np.nanmin(logs)) - 0.7, "zmax": float(np.nanmax(logs))}  # the rarest is not white
+    return [drawn | {"name": f"{trace.name}, log10", "x": centres, "y": centres, "z": [plain(row) for row in logs]}]
+
+
+def _filled(name: str, x: Array, y: Array, colour: str) -> dict[str, Any]:
+    """From zero to y (n), of whose zeros the ends are enough."""
+    leans = y != 0.0
+    kept = leans.copy()
+    kept[1:] |= leans[:-1]
+    kept[:-1] |= leans[1:]
+    drawn = {"type": "scattergl", "mode": "lines", "line": {"color": colour, "width": 1.2}, "fill": "tozeroy"}
+    return drawn | {"name": name, "x": plain(x[kept]), "y": plain(y[kept])}
+
+
+def _layout(charts: Charts, narrow: bool, linked: bool) -> dict[str, Any]:
+    each, rows = [*charts.over_time, *charts.below], len(charts.over_time)
+    heights = [round(_INCH * chart.height) for chart in (each if narrow else each[: rows + 1])]
+    gap, margin = (_NARROW_GAP, _NARROW_MARGIN) if narrow else (_GAP, _MARGIN)
+    inner = sum(heights) + gap * (len(heights) - 1)
+    words = html.escape(charts.title)  # plotly takes < for the beginning of a tag
+    made: dict[str, Any] = PAPER | {"height": inner + margin["t"] + margin["b"], "margin": margin}
+    made["title"] = {"text": words.replace("  ·  ", "<br>") if narrow else words, "x": 0.05}
+    made |= {"annotations": [], "shapes": []} | ({"hovermode": "x"} if linked else {})
+    made["title"] |= {"font": {"size": 14}} if narrow else {}
+    wide = (1.0 - _ASIDE * (len(charts.below) - 1)) / len(charts.below)
+    for k, chart in enumerate(each):
+        row, column = (k, 0) if narrow else (min(k, rows), max(0, k - rows))
+        left, right = (0.0, 1.0) if narrow or k < rows else (column * (wide + _ASIDE), column * (wide + _ASIDE) + wide)
+        top = (inner - sum(heights[:row]) - gap * row) / inner
+        x, y = _axes(k).values()
+        across = {"domain": [left, right], "anchor": y, "range": chart.x_range}
+        across |= {"title": {"text": chart.x_title, "standoff": 15} | _SMALL}
+        along = {"domain": [top - heights[row] / inner, top], "anchor": x}
+        along |= {"title": {"text": chart.y_title, "standoff": 5} | _SMALL, "range": chart.y_range}
+        if chart.ticks is not None:
+            ticks = dict(list(chart.ticks.items())[:: 2 if narrow and k < rows else 1])
+            across |= {"tickvals": list(ticks), "ticktext": list(ticks.values())}
+        if k < rows:
+            across |= {"matches": "x"} if k else {}
+            across |= {"hoverformat": ".1f"} if linked else {}
+        along |= {"scaleanchor": x} if chart.square else {}
+        made[x.replace("x", "xaxis")], made[y.replace("y", "yaxis")] = _AXIS | across, _AXIS | along
+        made["annotations"] += _annotations(chart, x, y, narrow)
+        made["shapes"] += [
+            {"type": "rect", "x0": begin, "x1": end, "y0": 0, "y1": 1, "xref": x, "yref": f"{y} domain"}
+            | {"fillcolor": "grey", "opacity": 0.2, "line": {"width": 0}}
+            for begin, end, _ in chart.spans
+        ]
+    return made
+
+
+def _annotations(chart: Chart, x: str, y: str, narrow: bool) -> list[dict[str, Any]]:
+    """All words on a chart: its title with its traces in their colours, in its corners, at points, of its spans."""
+    within = {"xref": f"{x} domain", "yref": f"{y} domain"}
+    names = [
+        f"<span style='color:{trace.colour}'>{trace.name}</span>"
+        for trace in chart.traces
+        if isinstance(trace, Line) and trace.name
+    ]
+    said = chart.title + (f":{'<br>' if narrow else ' '}{', '.join(names)}" if len(names) > 1 else "")
+    words = [
+        within | _note(Note(0.0, 1.0, said, "above")) | {"xanchor": "left", "align": "left"},
+        within
+        | _note(Note(0.0, 1.0, chart.left.replace("\n", "<br>"), "below"))
+        | {"xanchor": "left", "align": "left"},
+        within | _note(Note(1.0, 1.0, chart.right, "below")) | {"xanchor": "right"},
+    ]
+    words += [{"xref": x, "yref": y} | _note(note) for note in chart.notes]
+    spans = (Note((begin + end) / 2.0, 1.0, text, "below") for begin, end, text in chart.spans)
+    words += [within | {"xref": x} | _note(span) for span in spans]
+    return [one for one in words if one["text"]]
+
+
+def _note(note: Note) -> dict[str, Any]:
+    where = {"x": note.x, "y": note.y, "text": note.text, "showarrow": False} | _SMALL
+    return where | _SIDES[note.side]

@@ -1,0 +1,234 @@
+"""The alignment of a motorcycle's sensor with its covariance, from an ordinary ride without poses.
+
+The readings are turned by a first guess of the axes (first_guess.py). Then the misalignment is estimated together with
+the motion, the gyro's bias and the errors of sensor and bike, with a prior so wide that it says nothing of the
+misalignment. The lean follows the gyro through the bends; its mean on straights is the bike's own up, because the bike
+is balanced there, and what force is then left across the bike is the bias of the accelerometer. A lateral offset of the
+centre of mass and a roll misalignment are not separately observable. Nor are an error of the sensor's axes against each
+other and the misalignment: these errors are the larger part of its standard deviation.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from kickstand.errors import Notice, Refusal
+from numpy.typing import NDArray
+
+from ..calibration.file import CalibrationFile
+from ..errors import InputError
+from ..logs.cells import MOST_DPS, MOST_G
+from ..logs.frozen import without_frozen
+from ..logs.log import Log
+from ..logs.reader import Source, read_log
+from ..logs.source import Progress
+from ..logs.table import Array
+from ..refusals import RefusedInput
+from ..signals.cells import stretches
+from ..signals.leaning import averaged
+from ..signals.rotations import rotation_vector
+from .first_guess import MIN_RIDING_S, MOUNTED_DEG, MOUNTED_S, Axes, axes, standing
+from .hypotheses import Hypotheses
+from .least_squares import Estimate
+from .unknowns import ACCEL, BESIDE, BIAS, BIAS_PER_C, DELAY, LEAN, MEAN, OFFSET, OFFSET_PER_C, ROTATION, SENSOR, Prior
+from .windows import WINDOW_S, Windows, windows_of
+
+SLOWEST_HZ = 20.0
+LONGEST_S = 1800.0  # more than half an hour of a ride adds nothing
+ROTATION_SIGMA = 10.0  # rad: nothing is known of the misalignment
+AXES_SIGMA = 0.012  # of 1: scale and cross-axis errors of the accelerometer
+BESIDE_SIGMA_G = 0.005  # force to the side on straights, of luggage or camber
+UNSETTLED = np.radians(0.5)  # a last step of more has not converged
+ODD_SIGMAS, ABSURD_SIGMAS = 4.0, 20.0  # of the sensor's errors that are found: beyond, its quality is worse
+MAX_DEG = np.array([5.0, 5.0, 3.5])  # pitch, yaw, roll: known less exactly, an alignment is not given
+MOVED_DEG = 8.0
+CONSTANT = Hypotheses(*np.array([[1e-5], [1e-5], [1e-4], [0.0], [1.0]]))  # nothing changes in the ride
+
+# How a phone may be mounted, as its user says it: a check of what the ride says, and a hint where that says little. A
+# phone's axes, seen by who looks at its screen: x to the right, y to the top, z out of the screen (W3C Device
+# Orientation; Android and iOS have the same).
+X, Y, Z = np.eye(3)
+
+# Rows left, up, forward. A screen that faces the rider looks backward; landscape: turned to either side.
+PHONES = {
+    "portrait": [np.array([-X, Y, -Z])],
+    "landscape": [np.array([Y, X, -Z]), np.array([-Y, -X, -Z])],
+    "flat": [np.array([-X, Z, Y])],
+}
+PHONE_SIGMA_DEG = 20.0  # of a holder that is tilted towards the rider's eyes
+PHONE_MAX_DEG = 45.0  # the mountings are at least 90 degrees apart
+
+
+@dataclass
+class RideFit:
+    """What a ride gives. Angles in degrees.
+
+    roll_deg, pitch_deg, yaw_deg: standard errors of the alignment about forward, left and up. The larger part of them
+    are errors of the sensor that a ride does not tell. Upright is where the bike is balanced on straights. halves_deg:
+    by how much two halves of the ride differ in these three. offset_g (3): of the accelerometer along left, up and
+    forward, which the calibration takes off; offset_sigma_g (3): standard errors. used_s: from and to which second of
+    the log the sensor was mounted. riding_s, standing_s: seconds of it. lean_deg: rms of the ride's lean. lag_s: by how
+    much the log's speed is late, None without a speed. phone_deg: by how much the phone is turned against the way that
+    was said, None if nothing was. notices: what is remarkable in the log.
+    """
+
+    calibration: CalibrationFile
+    roll_deg: float
+    pitch_deg: float
+    yaw_deg: float
+    halves_deg: tuple[float, float, float]
+    offset_g: Array
+    offset_sigma_g: Array
+    used_s: tuple[float, float]
+    riding_s: float
+    standing_s: float
+    lean_deg: float
+    lag_s: float | None
+    phone_deg: float | None
+    notices: list[Notice]
+
+
+def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = None) -> RideFit:
+    """How the sensor sits on a motorcycle, from a ride with bends, in which no pose was held.
+
+    log: see read_log; a speed helps and is not needed. phone: None, or how it was mounted: "portrait", "landscape" or
+    "flat" (see phone.py). progress: called with what is done of all there is. Up is where the bike is balanced on
+    straights, forward is the axis about which it leans into its bends and along which it speeds up, left and right are
+    told by leaning into bends. Scale errors of the accelerometer are not told by a ride. Raises InputError;
+    RefusedInput, a subclass with code and values, where the ride does not tell how the sensor sits.
+
+    >>> from kickstand_tools.api import Log, simulate_ride
+    >>> ride = simulate_ride("city", seed=3, seconds=240.0)
+    >>> found = fit_ride(Log.from_readings(ride.readings, ride.rate_hz))
+    >>> found.yaw_deg < 2.0, found.roll_deg < 2.0, found.calibration.vehicle_from_sensor.shape
+    (True, True, (3, 3))
+    """
+    if phone is not None and phone not in PHONES:
+        raise InputError(f"no phone is mounted {phone}: there are {', '.join(PHONES)}")
+    log = without_frozen(read_log(log))
+    step_s = float(log.t_s[-1]) / (len(log.t_s) - 1)
+    if step_s * SLOWEST_HZ > 1.0:
+        raise InputError(f"{log.name}: a sample every {step_s:.2f} s: at least {SLOWEST_HZ:.0f} a second are needed")
+    try:
+        windows = mounted_windows(log)
+        guess = axes(windows)
+        if progress:
+            progress(1, 2)
+        expected = _mounting(phone, guess.matrix) if phone else None
+        found = _checked(windows, guess, estimate_alignment(windows, guess, expected), expected, log.notices)
+    except Refusal as refusal:
+        raise RefusedInput(refusal, log.name) from refusal
+    if progress:
+        progress(2, 2)
+    return found
+
+
+def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) -> Estimate:
+    """windows: along the sensor's axes. expected: the matrix (3, 3) as the user says it, None if unknown.
+
+    The matrix of the result is to be multiplied with that of the guess, its parameters are the same in each block.
+    Raises Refusal if no alignment fits.
+    """
+    sigma, mean = Prior.of_pose(six_done=False).sigma, MEAN.copy()
+    sigma[ROTATION], sigma[ACCEL], sigma[BESIDE] = ROTATION_SIGMA, AXES_SIGMA, BESIDE_SIGMA_G
+    sigma[OFFSET_PER_C] = sigma[BIAS_PER_C] = 0.0
+    if expected is not None:
+        mean[ROTATION], sigma[ROTATION] = rotation_vector(expected @ guess.matrix.T), np.radians(PHONE_SIGMA_DEG)
+    try:
+        found = Estimate(windows.turned(guess.matrix, guess.bias), Prior(mean, sigma, posed=False), CONSTANT)
+    except np.linalg.LinAlgError as error:
+        raise Refusal("ride-contradicts") from error
+    if not found.change < UNSETTLED:
+        raise Refusal("ride-contradicts")
+    return found
+
+
+def mounted_windows(log: Log) -> Windows:
+    """The longest stretch of a log in which the mean force keeps its direction: before and after, a hand held the
+    sensor. Readings that no ride gives are left out."""
+    log = log.part(np.all(np.abs(log.accel_g) < MOST_G, axis=1) & np.all(np.abs(log.gyro_dps) < MOST_DPS, axis=1))
+    windows = _windows(log)
+    mean = averaged(windows.force, MOUNTED_S)
+    mean /= np.maximum(np.linalg.norm(mean, axis=1), 1e-9)[:, None]
+    usual = np.median(mean, axis=0)
+    near = mean @ usual > np.cos(np.radians(MOUNTED_DEG)) * np.linalg.norm(usual)
+    mounted = stretches(near)
+    if not len(mounted):
+        raise Refusal("ride-short", 0.0, MIN_RIDING_S)
+    begin, end = mounted[np.argmax(np.diff(mounted, axis=1))]
+    margin = round(MOUNTED_S / WINDOW_S)  # until the mean is of the ride alone
+    first = windows.edges[begin + margin * (begin > 0)]
+    last = windows.edges[end - margin * (end < len(windows))]
+    return _windows(log, (log.t_s >= first) & (log.t_s < min(last, first + LONGEST_S)))
+
+
+def _windows(log: Log, part: NDArray[np.bool_] | slice = slice(None)) -> Windows:
+    """Along the sensor's axes."""
+    t_s, rate = log.t_s[part], np.radians(log.gyro_dps[part])
+    if len(t_s) < 2:
+        raise Refusal("ride-short", 0.0, MIN_RIDING_S)
+    return windows_of(t_s, log.accel_g[part], rate, log.speed_mps[part], np.zeros(len(t_s)))
+
+
+def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | None, notices: list[Notice]) -> RideFit:
+    """The result with its quality. Raises Refusal where that is too low."""
+    halves = np.degrees(found.split())
+    if np.max(np.abs(halves)) > MOVED_DEG:
+        raise Refusal("ride-halves", float(np.max(np.abs(halves))))
+    prior, parameters, sigma = found.prior, np.mean(found.parameters, axis=0), found.parameter_sigma()
+    odd = float(np.max(np.abs(parameters[SENSOR] / prior.sigma[SENSOR])))
+    if odd > ABSURD_SIGMAS:
+        raise Refusal("ride-contradicts")
+    # where a half differs by more than its error, something that the model does not know was at work
+    error = np.hypot(np.degrees(sigma[ROTATION]), 0.5 * halves) * max(1.0, odd / ODD_SIGMAS)
+    if np.any(error > MAX_DEG):
+        raise Refusal("ride-uncertain", *(float(error[i]) for i in (2, 0, 1)))
+    pitch, yaw, roll = (float(angle) for angle in error)
+    # so that the calibrated force on a level, upright bike is 1 g up, whatever the scale errors are
+    offset = parameters[OFFSET] + parameters[ACCEL].reshape(3, 3)[:, 1]
+    matrix, states = found.matrix @ guess.matrix, found.states[: len(windows) + 1]
+    bias = guess.bias + np.median(states[:, BIAS], axis=0) @ matrix
+    still = standing(windows.turned(matrix, guess.bias))
+    lean = (0.5 * (states[1:, LEAN] + states[:-1, LEAN]))[~still]
+    has_speed = not np.all(np.isnan(windows.speed))
+    off = None if expected is None else _off_deg(matrix, expected)
+    notes = {"ride_quality_deg": {"roll": round(roll, 2), "pitch": round(pitch, 2), "yaw": round(yaw, 2)}}
+    calibration = CalibrationFile(
+        accel_offset_g=offset @ matrix,
+        gyro_bias_dps=np.degrees(bias),
+        vehicle_from_sensor=matrix,
+        aligned=True,
+        vehicle="motorcycle",
+        notes=notes,
+    )
+    return RideFit(
+        calibration,
+        roll,
+        pitch,
+        yaw,
+        (float(halves[2]), float(halves[0]), float(halves[1])),
+        offset,
+        sigma[OFFSET],
+        (float(windows.edges[0]), float(windows.edges[-1])),
+        float(np.sum(windows.covered[~still])),
+        float(np.sum(windows.covered[still])),
+        float(np.degrees(np.sqrt(np.mean(lean**2)))),
+        float(parameters[DELAY]) if has_speed else None,
+        off,
+        notices,
+    )
+
+
+def _mounting(phone: str, found: Array) -> Array:
+    """The matrix (3, 3) that the user means, of those that phone allows the one next to found. Raises Refusal where
+    found is another one."""
+    off, nearest = min(((_off_deg(found, matrix), i) for i, matrix in enumerate(PHONES[phone])))
+    if off > PHONE_MAX_DEG:
+        mirrored = found * [[1.0], [-1.0], [-1.0]]  # what accelerations of the opposite sign make of it
+        if min(_off_deg(mirrored, matrix) for matrix in PHONES[phone]) < PHONE_MAX_DEG:
+            raise Refusal("phone-upside-down", phone)
+        raise Refusal("phone-otherwise", phone, off)
+    return PHONES[phone][nearest]
+
+
+def _off_deg(found: Array, matrix: Array) -> float:
+    return float(np.degrees(np.linalg.norm(rotation_vector(found @ matrix.T))))

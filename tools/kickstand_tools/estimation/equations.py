@@ -1,0 +1,106 @@
+"""The process model and the measurement model of a motorcycle, and their Jacobian.
+
+Lean t, pitch q, velocity of the sensor to the left, up and forward (l, u, v), in level axes that turn with the bike at
+the yaw rate p. Rates w and forces f are the readings without the sensor's errors:
+
+    w = w_m + rotation x w_m + GYRO w_m - bias        f = f_m + rotation x f_m + ACCEL f_m + offset
+    p = (w_x sin t + w_y cos t) / cos q        t' = w_z - p sin q        q' = w_y sin t - w_x cos t
+    l' = a_l - p v        v' = a_f + p l        u' = a_u        a: the force in level axes, less 1 g upwards
+
+These are the firmware's kickstand.lean.bike_model without its assumption that there is no motion sideways or up. That
+is measured here, with an error: a velocity may err for a moment only, while accelerations err with every bump. The
+wheels' velocity is the sensor's less what turning adds at its place. Measured are differences that should be 0:
+
+    SLIDING      the wheels' velocity sideways: they do not slide
+    CLIMBING     their velocity up less that along the chassis: it points along the road, but for its dive in braking
+    SLOPING      their velocity up: roads are level on average
+    BALANCED     the force to the side, less those by the tyres' width and by what lasts: a bike that rides is balanced
+    ANY_SPEED    the speed less a usual one        MEASURED_SPEED    the same less the log's, which is late
+    RESTING      the velocity, and RESTING_RATE the rates, of a bike that stands (zero-velocity update)
+    BACKWARD     the speed where it is under 0
+"""
+
+import numpy as np
+from kickstand.units import STANDARD_GRAVITY
+from numpy.typing import NDArray
+
+from ..logs.table import Array
+from . import unknowns as of
+from .unknowns import BIAS, FORWARD, LEAN, LEFT, PITCH, STATES, UP
+from .windows import Windows
+
+# Rows of the measurements, after those of the process model
+SLIDING, CLIMBING, SLOPING, BALANCED, ANY_SPEED, MEASURED_SPEED = range(STATES, STATES + 6)
+RESTING, RESTING_RATE, BACKWARD = slice(14, 17), slice(17, 20), 20
+ROWS = 21
+USUAL_MPS = 15.0  # where nothing else shows the speed
+STRAIGHT = 0.1  # rad: of lean. Up to about this a road is cambered, above it is banked, like the turn itself.
+STEP = 1e-6  # of finite differences, in the unknowns' units
+
+
+def process_and_measurements(windows: Windows, x: Array) -> Array:
+    """(ROWS, n): the rates of change of the states, and the measurements.
+
+    x (STATES + PARAMETERS, n): states in the middle of each window, and parameters.
+    """
+    t, q, left, up, forward = x[: BIAS.start]
+    p = x[STATES:]
+    wx, wy, wz = corrected_rates(windows.rate.T, x, windows.warm)
+    fx, fy, fz = _corrected(windows.force.T, p, of.ACCEL) + p[of.OFFSET] + p[of.OFFSET_PER_C] * windows.warm
+    st, ct, sq, cq = np.sin(t), np.cos(t), np.sin(q), np.cos(q)
+    yaw = (wx * st + wy * ct) / cq
+    upright = fx * st + fy * ct  # force up after the lean is taken off
+    ahead = (fz * cq - upright * sq) * STANDARD_GRAVITY
+    found = np.zeros((ROWS, len(t)))
+    found[LEAN] = wz - yaw * sq
+    found[PITCH] = wy * st - wx * ct
+    found[LEFT] = (fx * ct - fy * st) * STANDARD_GRAVITY - yaw * forward
+    found[UP] = (upright * cq + fz * sq - 1.0) * STANDARD_GRAVITY
+    found[FORWARD] = ahead + yaw * left
+    height, place = p[of.HEIGHT], p[of.AHEAD]
+    turn_x, turn_y, turn_z = wy * place - wz * height, -wx * place, wx * height  # rates x place
+    raised = turn_x * st + turn_y * ct
+    wheel_up = up - (raised * cq + turn_z * sq)
+    wheel = forward - (turn_z * cq - raised * sq)
+    found[SLIDING] = left - (turn_x * ct - turn_y * st)
+    found[CLIMBING] = wheel_up - wheel * (q - p[of.DIVE] * ahead)
+    found[SLOPING] = wheel_up
+    found[BALANCED] = fx - p[of.TYRES] * st - p[of.BESIDE] * ct - p[of.CAMBER] / (1.0 + (t / STRAIGHT) ** 4)
+    found[ANY_SPEED] = wheel - USUAL_MPS
+    found[MEASURED_SPEED] = wheel - p[of.DELAY] * ahead - np.nan_to_num(windows.speed)
+    found[RESTING] = left, up, forward
+    found[RESTING_RATE] = wx, wy, wz
+    found[BACKWARD] = np.minimum(wheel, 0.0)
+    return found
+
+
+def jacobian(windows: Windows, x: Array, unknown: NDArray[np.intp]) -> Array:
+    """(len(unknown), ROWS, n): derivatives of process_and_measurements() by the rows `unknown` of x, by differences."""
+    found, moved = np.empty((len(unknown), ROWS, x.shape[1])), x.copy()
+    here = process_and_measurements(windows, x)
+    for slot, row in zip(found, unknown, strict=True):
+        moved[row] += STEP
+        slot[:] = process_and_measurements(windows, moved) - here
+        moved[row] = x[row]
+    found /= STEP
+    return found
+
+
+def corrected_rates(rate: Array, x: Array, warm: Array) -> Array:
+    """(3, n): rates about left, up, forward (rad/s) without the gyro's errors. rate (3, n), x (STATES + PARAMETERS, n),
+    warm (n): of Windows."""
+    return _corrected(rate, x[STATES:], of.GYRO) - x[BIAS] - x[STATES:][of.BIAS_PER_C] * warm
+
+
+def _corrected(readings: Array, p: Array, errors: slice) -> Array:
+    """readings (3, n) + rotation x readings + errors readings."""
+    x, y, z = readings
+    a, b, c = p[of.ROTATION]
+    e = p[errors]
+    return np.array(
+        (
+            x + b * z - c * y + e[0] * x + e[1] * y + e[2] * z,
+            y + c * x - a * z + e[3] * x + e[4] * y + e[5] * z,
+            z + a * y - b * x + e[6] * x + e[7] * y + e[8] * z,
+        )
+    )

@@ -1,0 +1,96 @@
+"""What may change in the course of a ride beside the motion: hypotheses, and their posterior weights.
+
+On its straights a bike seems to lean when its mount has yielded, and when something pushes it to the side for minutes,
+such as wind. Each of these, alone or together, is a hypothesis. Its posterior weight follows from the likelihood of the
+readings and from how usual it is. Where the readings do not separate two hypotheses, the result lies between both, and
+its standard deviation is as large as the difference.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..logs.table import Array
+from .solver import RandomWalks, Reduced, minus_two_log_likelihood
+from .unknowns import BESIDE, OFFSET, PARAMETERS, ROTATION, Prior
+
+ROLL = ROTATION.stop - 1
+BLOCK_S = 10.0  # of the random walk's steps
+# Standard deviations. The mount's are those of its rotation from block to block.
+FIRM, YIELDING = np.radians([0.05, 0.11])  # rad
+CALM_G, WIND_G, STORM_G = 0.00052, 0.01047, 0.03142  # force to the side that lasts for minutes
+PUSHED_S = 120.0  # for how long
+# The other parameters', as a share of those of the prior: a sensor warms up.
+DRIFT = np.full(PARAMETERS, 1e-4)
+DRIFT[OFFSET] = 0.15, 0.05, 0.05
+# Minus twice the logarithm of how often a ride is so. A light wind that lasts is usual, but a mount that yields looks
+# the same, and is further from the truth if it is taken for wind.
+YIELDS, WINDY, STORMY = 1.0, 8.0, 5.0
+WEIGHT = 0.25  # of the likelihood: errors that no model has last, so that readings are not independent
+LEAST_SHARE = 0.02  # a hypothesis of less weight is left out
+
+
+@dataclass
+class Hypotheses:
+    """G hypotheses.
+
+    turning, rolling (G, rad): by which a mount turns within a block about left and up, and about forward. pushed (G):
+    g, to the side. unusual (G): see above. weight (G): posterior weights, whose sum is 1.
+    """
+
+    turning: Array
+    rolling: Array
+    pushed: Array
+    unusual: Array
+    weight: Array
+
+    def select(self, index: NDArray[np.intp], weight: Array) -> "Hypotheses":
+        """Those with these indices, with other weights."""
+        return Hypotheses(self.turning[index], self.rolling[index], self.pushed[index], self.unusual[index], weight)
+
+    def usual(self) -> "Hypotheses":
+        """The first one alone."""
+        return self.select(np.zeros(1, dtype=np.intp), np.ones(1))
+
+    def weighted(self, blocks: Reduced, prior: Prior, parameters: Array, unbalance: float) -> "Hypotheses":
+        """Those that count, with their posterior weights.
+
+        blocks: of the windows. parameters (B, PARAMETERS): about which the equations are linear. unbalance: of
+        Circumstances; errors that are so much larger than usual let the readings say less.
+        """
+        minus_two_log = minus_two_log_likelihood(blocks, self.random_walks(prior, parameters))
+        minus_two_log = minus_two_log * WEIGHT / max(1.0, unbalance) ** 2 + self.unusual
+        weight = np.exp(-0.5 * (minus_two_log - np.min(minus_two_log)))
+        kept = np.flatnonzero(weight > LEAST_SHARE * np.sum(weight))
+        return self.select(kept, weight[kept] / np.sum(weight[kept]))
+
+    def random_walks(self, prior: Prior, parameters: Array) -> RandomWalks:
+        """Of the unknown parameters. parameters: see weighted()."""
+        unknown = prior.unknown
+        sigma = np.tile(prior.sigma, (len(self.weight), 1))
+        sigma[:, BESIDE] = np.hypot(sigma[:, BESIDE], self.pushed)
+        information = np.stack([prior.information(one) for one in sigma])
+        pull = information @ (parameters[0] - prior.mean)[unknown]
+        variance = (DRIFT * sigma) ** 2
+        variance[:, ROTATION] = self.turning[:, None] ** 2
+        variance[:, ROLL] = self.rolling**2
+        variance[:, BESIDE] = self.pushed**2 * 2.0 * BLOCK_S / PUSHED_S
+        steps = np.repeat(variance[:, None, unknown], len(parameters) - 1, axis=1)
+        return RandomWalks(
+            np.concatenate((information, pull[..., None]), axis=2), steps, np.diff(parameters[:, unknown], axis=0)
+        )
+
+
+def _all() -> Hypotheses:
+    mounts = (FIRM, FIRM, 0.0), (FIRM, YIELDING, YIELDS), (YIELDING, YIELDING, YIELDS)
+    pushes = (CALM_G, 0.0), (WIND_G, WINDY), (STORM_G, STORMY)
+    rows = [
+        (turning, rolling, pushed, yields + windy, 1.0 / 9.0)
+        for turning, rolling, yields in mounts
+        for pushed, windy in pushes
+    ]
+    return Hypotheses(*np.array(rows).T)
+
+
+ALL = _all()

@@ -1,0 +1,166 @@
+"""The states and parameters for which the readings of a stretch of a ride fit together best: Gauss-Newton steps.
+
+Residuals are the steps of the states less those of the process model, and the measurements, each over its standard
+deviation. Outliers of both have less weight (Cauchy).
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..logs.table import Array
+from ..signals.rotations import rotation_matrix
+from .equations import BALANCED, ROWS, jacobian, process_and_measurements
+from .first_guess import lean_and_speed, standing
+from .hypotheses import Hypotheses
+from .noise import BRIEF_S, LONG_S, Noise
+from .solver import RandomWalks, Reduced, covariances, posterior_covariance, reduce_windows, solve
+from .unknowns import BIAS, FORWARD, LEAN, LEFT, PARAMETERS, PITCH, ROTATION, STATES, UP, Prior
+from .windows import Windows
+
+BLOCK = 50  # windows of a block; see solver.py
+ROUNDS, PLAIN_ROUNDS = 10, 2  # at most; the first ones without regard to outliers
+NEAR, CONVERGED = np.radians([3.0, 0.02])  # changes of an angle: from NEAR on residuals show the ride's errors
+WEIGHING_ROUNDS = 2
+MAX_LEAN = 0.5  # rad: of one step. The equations are linear no further.
+MAX_PITCH = 1.2  # rad: as in the firmware
+START = np.array([1.0, 0.3, 1.0, 1.0, 20.0, 0.03, 0.03, 0.03])  # 1 sigma of the first state of all
+DRAWN = [PITCH, LEFT, UP, *range(STATES)[BIAS]]  # of it, what is drawn towards 0
+
+
+class Estimate:
+    """The motion at the edges of n windows, and the errors of sensor and bike.
+
+    states (n + 1, STATES). parameters (B, PARAMETERS): of each block of BLOCK windows. matrix (3, 3): the rotation by
+    which the windows' axes were turned, where the prior is not that of a pose. change: the last step's largest change
+    of an angle, rad.
+    """
+
+    def __init__(self, windows: Windows, prior: Prior, hypotheses: Hypotheses) -> None:
+        """hypotheses: among which the ride decides, the usual one first. Raises LinAlgError where nothing is found."""
+        self._length = min(BLOCK, len(windows))
+        self._windows = windows = windows.padded(self._length)
+        self.prior, self._hypotheses, self._likely = prior, hypotheses, hypotheses.usual()
+        still = standing(windows)
+        self._noise = Noise(windows, still)
+        lean, speed = lean_and_speed(windows, still)
+        self.states = np.zeros((len(windows) + 1, STATES))
+        self.states[:, LEAN], self.states[:, FORWARD] = _at_edges(lean), _at_edges(speed)
+        self.parameters = np.tile(prior.mean, (len(windows) // self._length, 1))
+        self.matrix, self.change = np.eye(3), np.inf
+        self._converge()
+        self._use_own_noise()
+
+    def unknowns(self, number: NDArray[np.intp], states: Array) -> Array:
+        """(STATES + PARAMETERS, k): as equations.py takes them. states (k, STATES): in windows of these numbers (k)."""
+        return np.concatenate((states.T, self.parameters[number // self._length].T))
+
+    def sigma(self) -> Array:
+        """(n + 1, STATES): standard deviations of the states."""
+        blocks = self._reduced(robust=True)
+        s = STATES
+        found = np.diagonal(
+            covariances(blocks, posterior_covariance(*self._problem(blocks)))[..., : 2 * s], axis1=2, axis2=3
+        )
+        edges = np.concatenate((found[:, :, :s].reshape(-1, s), found[-1, -1:, s:]))
+        return np.sqrt(np.maximum(edges, 0.0))
+
+    def parameter_sigma(self) -> Array:
+        """(PARAMETERS): standard deviations of the first block's parameters."""
+        joint = posterior_covariance(*self._problem(self._reduced(robust=True)))[0]
+        found = np.zeros(PARAMETERS)
+        found[self.prior.unknown] = np.sqrt(np.maximum(np.diagonal(joint)[2 * STATES :], 0.0))
+        return found
+
+    def split(self) -> Array:
+        """(3, rad): by how much the misalignment of the second half of the ride differs from that of the first."""
+        walks = self._likely.random_walks(self.prior, self.parameters)
+        middle = len(self.parameters) // 2
+        walks.variance[:, middle - 1 : middle, ROTATION] = 1.0
+        found = solve(self._reduced(robust=True), walks, self._likely.weight)[1][:, ROTATION]
+        return found[-1] - found[0]
+
+    def _converge(self) -> None:
+        weighing_rounds = 0
+        for k in range(ROUNDS):
+            near = k > PLAIN_ROUNDS and self.change < NEAR
+            if near:
+                self._noise.estimate_unbalance(self._residuals()[:, BALANCED], BRIEF_S)
+            self._step(k >= PLAIN_ROUNDS, near and weighing_rounds < WEIGHING_ROUNDS)
+            weighing_rounds += near
+            if self.change < CONVERGED and weighing_rounds >= WEIGHING_ROUNDS:
+                break
+
+    def _use_own_noise(self) -> None:
+        """Errors are from now on as large as this ride's residuals.
+
+        The states are those by the sigmas of a rough ride, because errors that no model has last for long, and weigh
+        less then.
+        """
+        off = self._residuals()
+        self._noise.estimate_roughness(off / self._noise.robust(self._noise.sigma(), off))
+        self._noise.estimate_unbalance(off[:, BALANCED], LONG_S)
+
+    def _step(self, robust: bool, weigh: bool) -> None:
+        """weigh: the hypotheses."""
+        blocks = self._reduced(robust)
+        if weigh:
+            self._likely = self._hypotheses.weighted(blocks, self.prior, self.parameters, self._noise.unbalance)
+        change, parameters = solve(*self._problem(blocks))
+        change = np.concatenate((change[:, :-1].reshape(-1, STATES), change[-1, -1:]))
+        self.change = float(np.max(np.abs(change[:, LEAN])))
+        if not self.prior.posed:
+            self.change = max(self.change, float(np.max(np.abs(parameters[:, ROTATION]))))
+        if not np.isfinite(self.change):
+            raise np.linalg.LinAlgError
+        share = min(1.0, MAX_LEAN / max(self.change, 1e-9))
+        self.states += share * change
+        self.states[:, PITCH] = np.clip(self.states[:, PITCH], -MAX_PITCH, MAX_PITCH)
+        self.parameters[:, self.prior.unknown] += share * parameters
+        if not self.prior.posed:
+            self._turn_axes()
+
+    def _turn_axes(self) -> None:
+        """A rotation that may be large is taken off the readings, because equations.py has only small ones."""
+        rotation = self.parameters[0, ROTATION].copy()
+        self.parameters[:, ROTATION] -= rotation
+        self.prior.mean[ROTATION] -= rotation
+        turn = rotation_matrix(rotation)
+        self.matrix, self._windows = turn @ self.matrix, self._windows.turned(turn)
+
+    def _middle(self) -> Array:
+        """Unknowns in the middle of each window."""
+        return self.unknowns(np.arange(len(self._windows)), 0.5 * (self.states[1:] + self.states[:-1]))
+
+    def _residuals(self) -> Array:
+        """(n, ROWS): steps of the states less those of the process model, and measurements."""
+        x = self._middle()
+        self._noise.lean, self._noise.speed = x[LEAN], x[FORWARD]
+        found = process_and_measurements(self._windows, x).T
+        found[:, :STATES] = np.diff(self.states, axis=0) - self._windows.covered[:, None] * found[:, :STATES]
+        return found
+
+    def _reduced(self, robust: bool) -> Reduced:
+        windows, s, unknown = self._windows, STATES, self.prior.unknown
+        off, sigma = self._residuals(), self._noise.sigma()
+        sigma = self._noise.robust(sigma, off) if robust else sigma
+        slope = jacobian(windows, self._middle(), np.concatenate((np.arange(s), s + unknown)))
+        slope[:, :s] *= -windows.covered
+        slope = slope.transpose(2, 1, 0) / sigma[..., None]
+        found = np.empty((len(windows), ROWS, 2 * s + len(unknown) + 1))
+        found[..., :s] = found[..., s : 2 * s] = 0.5 * slope[..., :s]  # the middle moves by half
+        step = np.arange(s)
+        found[:, step, step] -= 1.0 / sigma[:, :s]
+        found[:, step, s + step] += 1.0 / sigma[:, :s]
+        found[..., 2 * s : -1], found[..., -1] = slope[..., s:], off / sigma
+        blocks = reduce_windows(found.reshape(-1, self._length, *found.shape[1:]), s)
+        blocks.left[0, step, step] += 1.0 / START**2
+        blocks.left[0, DRAWN, -1] += self.states[0, DRAWN] / START[DRAWN] ** 2
+        return blocks
+
+    def _problem(self, blocks: Reduced) -> tuple[Reduced, RandomWalks, Array]:
+        return blocks, self._likely.random_walks(self.prior, self.parameters), self._likely.weight
+
+
+def _at_edges(values: Array) -> Array:
+    inner = 0.5 * (values[1:] + values[:-1])
+    return np.concatenate((values[:1], inner, values[-1:]))

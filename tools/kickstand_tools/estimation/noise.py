@@ -1,0 +1,141 @@
+"""How large the errors of the motion and of the measurements of equations.py are, and every parameter of that.
+
+Symbol = default  # unit: what it is. Standard deviations are 1 sigma. A disturbance that lasts tau seconds, measured in
+each window of T seconds, gets the variance sigma^2 2 tau / T, because measurements that share an error must not count
+as independent.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..logs.table import Array
+from ..signals.leaning import WINDOW_S, averaged
+from . import equations as eq
+from .first_guess import in_hand
+from .unknowns import BIAS, FORWARD, LEAN, LEFT, PITCH, UP
+from .windows import Windows
+
+# Noise of the motion, per square root of a second
+ANGLE_ROOT = np.radians(0.2)  # rad: of lean and pitch, by vibration of the gyro
+VELOCITY_ROOT = (0.05, 0.05, 0.10)  # m/s: left, up, forward, by vibration of the accelerometer
+BIAS_ROOT = np.radians(0.005)  # rad/s
+WARMING_ROOT = np.radians(0.01)  # the same where no temperature tells: 0.6 deg/s in five minutes of warming up
+# Where readings are missing, and in the hand: lean, pitch, velocity; per root of a second, and at most
+LOST_ROOT = np.array([np.radians(30.0), np.radians(5.0), 3.0, 1.0, 4.0])
+LOST_MOST = np.array([np.radians(60.0), np.radians(8.0), 20.0, 2.0, 20.0])
+JOLTED_RADPS, JOLTED_S = np.radians(150.0), 0.06  # a rate that is so far from its window's mean errs, for so long
+JOLT = 4.0  # sigmas of the motion within a window: what is more is a jolt to the sensor, and counts less and less
+
+# Errors of the measurements, and how long they last
+SLIDE_MPS, SLIDE_SHARE, SLIDE_S = 0.15, 0.01, 0.5  # m/s sideways, and as a share of speed x tan(lean)
+DIVE_MPS, DIVE_RAD, DIVE_S = 0.1, np.radians(2.5), 0.5  # m/s up, and as an angle: of the chassis against the road
+SLOPE_MPS, SLOPE_RAD, SLOPE_S = 0.1, np.radians(2.0), 4.0  # the same, of the road against the horizontal
+BALANCE_G, BALANCE_S = 0.011, 3.0  # force to the side, by wind, camber and the rider
+BALANCE_LEANED_G, BALANCE_ROLLING = 0.045, 0.05  # the same over sin(lean), and over the roll acceleration (g s2/rad)
+BALANCE_MIN_MPS = 4.0  # below, steering and feet count
+ANY_MPS, ANY_S = 20.0, 60.0  # of a speed from USUAL_MPS, where nothing else shows it
+SPEED_MPS = 1.0  # of the log's speed, in each second: a receiver errs for some seconds together
+REST_MPS, REST_RADPS = 0.05, np.radians(0.15)  # of a bike that stands
+HAND_MPS = 0.5  # of a sensor that is moved about, over a window
+BACKWARD_MPS = 0.3  # of a bike that rides backwards
+OUTLIER = 2.0  # sigmas: what is further off counts less and less
+LASTING_S = {eq.SLIDING: SLIDE_S, eq.CLIMBING: DIVE_S, eq.SLOPING: SLOPE_S, eq.BALANCED: BALANCE_S, eq.ANY_SPEED: ANY_S}
+
+# How rough a ride is, is estimated from the rms of these residuals over those that are expected of a rough ride
+ROUGH = [LEAN, PITCH, LEFT, UP, FORWARD, eq.SLIDING, eq.CLIMBING]
+EXPECTED = np.array([0.38, 0.38, 0.38, 0.38, 0.38, 0.5, 0.5])
+ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
+# How far from balance a ride is, likewise: by the rms of BALANCED in means over some seconds, less what lasts longer
+# (unknowns.BESIDE), over its standard deviation. The longer these means, the more an error has gone that changes
+# sides, as a rider's corrections do: over BRIEF_S the balance is judged with care, over LONG_S as it is.
+BRIEF_S, LONG_S, LASTS_S = 3.0, 10.0, 40.0
+LEAST_UNBALANCE, MOST_UNBALANCE = 0.25, 6.0
+LEAST_WINDOWS = 50  # from which the balance is judged
+
+
+class Noise:
+    """Of n windows. still (n): the bike stands.
+
+    riding (n): the bike rides, or may. lean (n, rad), speed (n, m/s): roughly, to be set before anything is asked.
+    roughness (n): 1 for a rough ride. unbalance: 1 for a ride that is as far from balance as usual.
+    """
+
+    def __init__(self, windows: Windows, still: NDArray[np.bool_]) -> None:
+        self._windows, self._still = windows, still & ~windows.gap
+        self._in_hand, self._not_riding = (held & ~still for held in in_hand(windows))
+        self._rolling = np.gradient(windows.rate[:, 2]) / WINDOW_S if len(windows) > 1 else np.zeros(1)
+        self._riding = ~windows.gap & ~still & ~self._not_riding
+        self.lean = self.speed = np.zeros(len(windows))
+        self.roughness, self.unbalance = np.ones(len(windows)), 1.0
+        seconds = np.maximum(windows.seconds, 1e-4)
+        self._root = np.sqrt(seconds)[:, None]
+        self._lasting = np.ones((len(windows), eq.ROWS))  # what an error that lasts is multiplied by in each window
+        for row, over_s in LASTING_S.items():
+            self._lasting[:, row] = np.sqrt(np.maximum(1.0, 2.0 * over_s / seconds))
+
+    def sigma(self) -> Array:
+        """(n, ROWS): standard deviations of the process noise over a window, and of the measurements; infinite where
+        there is no measurement."""
+        w, riding, balanced = self._windows, self._riding, self._balanced
+        speed, roughness = np.maximum(self.speed, 0.0), self.roughness
+        found = np.full((len(w), eq.ROWS), np.inf)
+        found[:, :LEFT] = ANGLE_ROOT
+        found[:, LEFT : BIAS.start] = VELOCITY_ROOT
+        found[:, : BIAS.start] *= self._root * roughness[:, None]
+        found[:, :LEFT] = np.hypot(found[:, :LEFT], jolted(w)[:, None])
+        found[:, BIAS] = (BIAS_ROOT if np.any(w.warm) else WARMING_ROOT) * self._root
+        lost, free = np.minimum(LOST_ROOT * self._root, LOST_MOST), w.gap | self._in_hand
+        found[free, : BIAS.start] = lost[free]
+        found[self._not_riding, LEFT : BIAS.start] = lost[self._not_riding, LEFT:]
+        sideways = SLIDE_SHARE * speed * np.tan(np.clip(self.lean, -1.0, 1.0))
+        found[riding, eq.SLIDING] = (roughness * np.hypot(SLIDE_MPS, sideways))[riding]
+        found[riding, eq.CLIMBING] = (roughness * np.hypot(DIVE_MPS, DIVE_RAD * speed))[riding]
+        found[riding, eq.SLOPING] = np.hypot(SLOPE_MPS, SLOPE_RAD * speed)[riding]
+        found[balanced, eq.BALANCED] = (self.unbalance * self._of_balance())[balanced]
+        found[riding, eq.ANY_SPEED] = ANY_MPS
+        found *= self._lasting
+        found[balanced, eq.BALANCED] = np.hypot(found[:, eq.BALANCED], BALANCE_ROLLING * self._rolling)[balanced]
+        found[~np.isnan(w.speed) & ~w.gap, eq.MEASURED_SPEED] = SPEED_MPS
+        found[self._still, eq.RESTING], found[self._still, eq.RESTING_RATE] = REST_MPS, REST_RADPS
+        found[self._not_riding & ~w.gap, eq.RESTING] = HAND_MPS
+        found[riding, eq.BACKWARD] = BACKWARD_MPS
+        return found
+
+    def robust(self, sigma: Array, off: Array) -> Array:
+        """The standard deviations (n, ROWS), larger where the residual off (n, ROWS) is an outlier (Cauchy)."""
+        limit = OUTLIER / self._lasting  # what holds for long is judged by its own sigma, not by its share of a window
+        limit[:, : BIAS.start], limit[:, BIAS] = JOLT, np.inf
+        return sigma * np.hypot(1.0, off / sigma / limit)
+
+    def estimate_roughness(self, residual: Array) -> None:
+        """From the residuals over their standard deviations (n, ROWS), around each window."""
+        squares = np.mean((residual[:, ROUGH] / EXPECTED) ** 2, axis=1) * self.roughness**2
+        share = averaged(self._riding.astype(float), ROUGHNESS_S)
+        found = averaged(np.where(self._riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
+        self.roughness = np.where(share > 0.02, np.clip(np.sqrt(found), LEAST_ROUGHNESS, MOST_ROUGHNESS), 1.0)
+
+    def estimate_unbalance(self, force: Array, over_s: float) -> None:
+        """From the measurement BALANCED (n, g). over_s: BRIEF_S or LONG_S."""
+        counted = self._balanced
+        share, whole = averaged(counted.astype(float), LASTS_S), averaged(counted.astype(float), over_s) > 0.97
+        self.unbalance = 1.0
+        if np.count_nonzero(whole) < LEAST_WINDOWS:
+            return
+        off = force - averaged(np.where(counted, force, 0.0), LASTS_S) / np.maximum(share, 1e-9)
+        mean = averaged(np.where(counted, off / self._of_balance(), 0.0), over_s)[whole]
+        ratio = over_s / BALANCE_S  # left in a mean is this share of the variance of an error that lasts BALANCE_S
+        left = 2.0 * (ratio - 1.0 + np.exp(-ratio)) / ratio**2
+        self.unbalance = float(np.clip(np.sqrt(np.mean(mean**2) / left), LEAST_UNBALANCE, MOST_UNBALANCE))
+
+    @property
+    def _balanced(self) -> NDArray[np.bool_]:
+        return self._riding & (self.speed > BALANCE_MIN_MPS)
+
+    def _of_balance(self) -> Array:
+        """(n) g: of a ride that is as far from balance as usual."""
+        return np.hypot(BALANCE_G, BALANCE_LEANED_G * np.sin(self.lean))
+
+
+def jolted(windows: Windows) -> Array:
+    """(n) rad: by how much a jolt, or a gyro at the end of its range, may have falsified the angles in each window."""
+    return JOLTED_S * np.maximum(windows.jolt - JOLTED_RADPS, 0.0)

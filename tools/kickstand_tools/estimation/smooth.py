@@ -1,0 +1,227 @@
+"""The lean of a recorded ride looked back over: from all of its readings, those before and those after."""
+
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from kickstand.errors import Notice
+
+from ..calibration.file import CalibrationFile
+from ..errors import InputError
+from ..logs.block import Block
+from ..logs.csv_lines import joined_cells, number_cells, text_cells, write_lines
+from ..logs.reader import Source, apart, read_blocks
+from ..logs.source import Progress, name_of
+from ..logs.stretch import within
+from ..logs.table import Array, Table
+from ..replay.mount_check import MountCheck
+from .equations import corrected_rates
+from .hypotheses import ALL
+from .least_squares import Estimate
+from .noise import jolted
+from .unknowns import FORWARD, LEAN, PITCH, Prior
+from .windows import Windows, windows_of
+
+SLOWEST_HZ = 10.0
+PIECE_S = 120.0  # a log is cut into pieces
+CHAPTER = 8  # of which so many are adjusted together, with one before and one after them
+LEANED_SHARE = 0.004  # of the lean: what the model leaves out, such as a gyro that measures forces, grows with it
+TIMING_S = 0.004  # s: of what the delay of the gyro's low-pass, and the times of samples, are off
+COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps")
+
+
+@dataclass(eq=False)
+class SmoothedRide(Table):
+    """The motion of a motorcycle on a ride: n samples, NaN where the readings froze.
+
+    t_s: seconds since the log's first sample. lean_deg: > 0 to the right. lean_sigma_deg: its standard deviation.
+    pitch_deg: of road and suspension, > 0 nose up. speed_mps: of the sensor, forward. notices: what is remarkable in
+    the ride (kickstand_tools.refusals.sentence puts a notice into words).
+    """
+
+    t_s: Array
+    lean_deg: Array
+    lean_sigma_deg: Array
+    pitch_deg: Array
+    speed_mps: Array
+    notices: list[Notice] = field(default_factory=list)
+
+
+def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None = None) -> SmoothedRide:
+    """The lean of a motorcycle from all readings of its ride, with a standard deviation for each sample.
+
+    log: see read_log; a speed helps and is not needed. calibration: aligned, of a motorcycle. progress: called with how
+    much of the log is done of how much. Least squares over the whole ride: see equations.py. Raises InputError.
+
+    >>> from kickstand_tools.api import CalibrationFile, Log, simulate_ride
+    >>> ride = simulate_ride("street", seed=1, seconds=60.0)
+    >>> calibration = CalibrationFile(vehicle_from_sensor=ride.vehicle_from_sensor, aligned=True)
+    >>> found = smooth(Log.from_readings(ride.readings, ride.rate_hz), calibration)
+    >>> float(abs(found.lean_deg - ride.truth["lean_deg"]).max()) < 10.0
+    True
+    """
+    notices: list[Notice] = []
+    blocks = list(_checked_blocks(log, calibration, progress, notices))
+    time_s = np.concatenate([block.t_s for block, _ in blocks])
+    return SmoothedRide(time_s, *np.concatenate([found for _, found in blocks]).T, notices=notices)
+
+
+def smooth_to_csv(
+    log: Source, calibration: CalibrationFile, out: Path, progress: Progress | None = None
+) -> tuple[int, list[Notice]]:
+    """Write LEAN.csv: the log's own times, then COLUMNS. Returns the number of samples and the notices.
+
+    Memory does not grow with the log. Raises InputError.
+    """
+    count, notices = 0, []
+
+    def lines() -> Iterator[bytes]:
+        nonlocal count
+        for block, found in _checked_blocks(log, calibration, progress, notices):
+            count += len(found)
+            yield joined_cells([text_cells(block.time_text), *(number_cells(column, 3) for column in found.T)])
+
+    write_lines(out, ("t_s", *COLUMNS), lines())
+    return count, notices
+
+
+def _checked_blocks(
+    log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
+) -> Iterator[tuple[Block, Array]]:
+    """smooth_blocks(), and what contradicts the calibration."""
+    mount = MountCheck(calibration)
+    whole, stretch = apart(log)
+    for block, found in smooth_blocks(whole, calibration, progress, notices):
+        if found is None:
+            raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples a second: too few to look back over")
+        believed = block.measured
+        mount.add(believed.t_s, *calibration.in_vehicle(believed.readings), believed.speed_mps)
+        yield from within(stretch, block, found)
+    contradiction = mount.notice()
+    notices += [contradiction] if contradiction else []
+
+
+def smooth_blocks(
+    log: Source,
+    calibration: CalibrationFile,
+    progress: Progress | None = None,
+    notices: list[Notice] | None = None,
+    lines: bool = True,
+) -> Iterator[tuple[Block, Array | None]]:
+    """Each piece of the log with its values (n, COLUMNS), None where there are too few samples a second. notices,
+    lines: of read_blocks(). Raises InputError."""
+    _check(log, calibration)
+    past: deque[Block] = deque(maxlen=CHAPTER)
+    waiting: list[Block] = []
+    start_c = np.nan
+    for piece in _pieces(read_blocks(log, 2, progress, notices, lines=lines)):
+        waiting.append(piece)
+        known = piece.readings[~np.isnan(piece.readings[:, 3]), 3]
+        start_c = float(known[0]) if np.isnan(start_c) and len(known) else start_c
+        if len(waiting) > CHAPTER:
+            yield from _chapter([*past][-1:], waiting[:CHAPTER], waiting[CHAPTER:], calibration, start_c)
+            past.extend(waiting[:CHAPTER])
+            del waiting[:CHAPTER]
+    # the end of a ride may be short: as much of what was before it is adjusted with it
+    yield from _chapter([*past][-max(1, CHAPTER - len(waiting)) :], waiting, [], calibration, start_c)
+
+
+def _check(log: Source, calibration: CalibrationFile) -> None:
+    if calibration.vehicle == "car":
+        raise InputError(f"{name_of(log)}: a car does not lean, and its calibration is a car's")
+    if not calibration.aligned:
+        raise InputError("the calibration is not aligned, so the lean is unknown", "align")
+
+
+def _pieces(blocks: Iterator[Block]) -> Iterator[Block]:
+    """The blocks cut into pieces of PIECE_S, none over that."""
+    for block in blocks:
+        number = np.floor(block.t_s / PIECE_S)
+        cuts = np.flatnonzero(np.diff(number)) + 1
+        for begin, end in zip([0, *cuts.tolist()], [*cuts.tolist(), len(number)]):
+            yield block.part(slice(begin, end))
+
+
+def _chapter(
+    before: list[Block], own: list[Block], after: list[Block], calibration: CalibrationFile, start_c: float
+) -> Iterator[tuple[Block, Array | None]]:
+    """The values of the pieces `own`, adjusted together with those before and after them."""
+    believed = [piece.measured for piece in (*before, *own, *after)]
+    values = _adjusted(believed, calibration, start_c)
+    first = sum(len(piece.time_us) for piece in believed[: len(before)])
+    for piece in own:
+        if values is None:
+            yield piece, None
+            continue
+        found = np.full((len(piece.time_us), len(COLUMNS)), np.nan)
+        there = ~piece.frozen
+        count = int(np.count_nonzero(there))
+        found[there] = values[first : first + count]
+        first += count
+        yield piece, found
+
+
+def _warm(t_s: Array, temperature_c: Array, start_c: float) -> Array:
+    """(n): how much warmer it is than start_c; 0 where the log does not tell."""
+    there = np.flatnonzero(~np.isnan(temperature_c))
+    if not len(there) or np.isnan(start_c):
+        return np.zeros(len(t_s))
+    return np.interp(t_s, t_s[there], temperature_c[there]) - start_c
+
+
+def _adjusted(pieces: list[Block], calibration: CalibrationFile, start_c: float) -> Array | None:
+    """(samples, COLUMNS); None where there are too few samples a second."""
+    t_s = np.concatenate([piece.t_s for piece in pieces])
+    readings = np.concatenate([piece.readings for piece in pieces])
+    speed = np.concatenate([piece.speed_mps for piece in pieces])
+    nothing = np.full((len(t_s), len(COLUMNS)), np.nan)
+    if len(t_s) < 2:
+        return nothing
+    warm = _warm(t_s, readings[:, 3], start_c)
+    step_s = float(np.median(np.diff(t_s)))
+    if step_s * SLOWEST_HZ > 1.0:
+        return None
+    force, rate = calibration.in_vehicle(readings)
+    rate = np.radians(rate)
+    windows = windows_of(t_s, force, rate, speed, warm)
+    try:
+        estimate = Estimate(windows, Prior.of_pose(calibration.six_done), ALL)
+    except np.linalg.LinAlgError:
+        return nothing  # readings that are no ride's: the lean is not known
+    found = at_samples(windows, rate, estimate, calibration.delay_s())
+    found[:, :3] = np.degrees(found[:, :3])
+    return found
+
+
+def at_samples(windows: Windows, rate: Array, found: Estimate, delay_s: float) -> Array:
+    """(samples, 4): lean, its standard deviation, pitch (rad) and speed (m/s). Between the edges of the windows the
+    corrected gyro gives the lean.
+
+    rate (samples, 3): rad/s, as windows_of() took it. delay_s: by how much the gyro's low-pass is late.
+    """
+    number, sigma = windows.number, found.sigma()[:, LEAN]
+    duration = windows.before + windows.after
+    last = np.append(np.diff(number) > 0, True)  # sample of its window
+    window = np.cumsum(last) - last
+
+    def integral(rate: Array) -> tuple[Array, Array]:
+        """From the begin of its window to each sample, and over the whole window."""
+        until = np.cumsum(rate * duration)
+        edges = np.concatenate(([0.0], until[last]))
+        return until - rate * windows.after - edges[window], np.diff(edges)[window]
+
+    since, seconds = integral(np.ones(len(number)))
+    share = since / seconds
+    before, after = found.states[number], found.states[number + 1]
+    lean, pitch, speed = (before + share[:, None] * (after - before))[:, [LEAN, PITCH, FORWARD]].T
+    wx, wy, wz = corrected_rates(rate.T, found.unknowns(number, 0.5 * (before + after)), windows.warm[number])
+    roll_rate = wz - np.tan(pitch) * (wx * np.sin(lean) + wy * np.cos(lean))
+    rolled, whole = integral(roll_rate)
+    lean = before[:, LEAN] + rolled + share * ((after - before)[:, LEAN] - whole)
+    spread = sigma[number] + share * (sigma[number + 1] - sigma[number])
+    jolt = 2.0 * np.sqrt(np.clip(share * (1.0 - share), 0.0, 1.0)) * jolted(windows)[number]
+    for more in (TIMING_S * roll_rate, LEANED_SHARE * lean, jolt):
+        spread = np.hypot(spread, more)
+    return np.column_stack((lean + delay_s * roll_rate, spread, pitch, speed))

@@ -1,0 +1,122 @@
+"""A stretch of a ride as means over a fifth of a second, in which the vibration of the engine averages out."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..logs.table import Array
+from ..signals.calibrated import rotated
+from ..signals.cells import cell_numbers
+from ..signals.leaning import WINDOW_S
+
+GAP_S = 0.17  # a longer step between two samples: readings are missing
+
+
+@dataclass
+class Windows:
+    """n windows, one following on the other; where readings are missing a window without readings lies between two.
+
+    edges (n + 1, s): their times. rate (n, 3, rad/s), force (n, 3, g): means, along the vehicle's axes. jolt (n): by
+    how much the rate differs from its mean at most, rad/s. speed (n): m/s, NaN where there is none. warm (n): how much
+    warmer than at the begin of the log, C, 0 where that is not known. gap (n): True where there are no readings. Of
+    each sample: number, in which window it lies; before and after (s): the time that it stands for.
+    """
+
+    edges: Array
+    rate: Array
+    force: Array
+    jolt: Array
+    speed: Array
+    warm: Array
+    gap: NDArray[np.bool_]
+    number: NDArray[np.intp]
+    before: Array
+    after: Array
+
+    def __len__(self) -> int:
+        return len(self.gap)
+
+    @property
+    def seconds(self) -> Array:
+        """(n) how long each is."""
+        return np.diff(self.edges)
+
+    @property
+    def covered(self) -> Array:
+        """(n) seconds of readings in each."""
+        return np.where(self.gap, 0.0, self.seconds)
+
+    @property
+    def known_speed(self) -> Array:
+        """(n) m/s, interpolated between the logged values; NaN everywhere if there are fewer than two."""
+        there, middle = ~np.isnan(self.speed), 0.5 * (self.edges[1:] + self.edges[:-1])
+        if np.count_nonzero(there) < 2:
+            return np.full(len(self), np.nan)
+        return np.interp(middle, middle[there], self.speed[there])
+
+    def turned(self, matrix: Array, bias: Array | float = 0.0) -> "Windows":
+        """Along the axes of the rows of matrix (3, 3); with rates less bias (3, rad/s)."""
+        rate, force = rotated(matrix, self.rate - bias, self.force)
+        return replace(self, rate=rate, force=force)
+
+    def padded(self, length: int) -> "Windows":
+        """With windows without readings and without duration at the end, to a multiple of `length` windows."""
+        more = -len(self) % length
+
+        def longer(values: Array, fill: float = 0.0) -> Array:
+            return np.concatenate((values, np.full((more, *values.shape[1:]), fill)))
+
+        return replace(
+            self,
+            edges=longer(self.edges, self.edges[-1]),
+            rate=longer(self.rate),
+            force=longer(self.force),
+            jolt=longer(self.jolt),
+            speed=longer(self.speed, np.nan),
+            warm=longer(self.warm),
+            gap=np.append(self.gap, np.ones(more, dtype=bool)),
+        )
+
+
+def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array) -> Windows:
+    """Of samples: t_s (s), force (samples, 3, g), rate (samples, 3, rad/s), speed (m/s, NaN where there is no new one),
+    warm (C, see Windows).
+
+    Each sample stands for the time until half way to its neighbours, so that the sum over a window is the integral.
+    """
+    step = np.diff(t_s)
+    usual = float(np.median(step)) if len(step) else WINDOW_S
+    lost = step > max(GAP_S, 1.5 * usual)
+    half = np.where(lost, 0.5 * usual, 0.5 * step)
+    before, after = np.append(0.5 * usual, half), np.append(half, 0.5 * usual)
+    begins = np.append(True, lost)  # of a stretch without missing readings
+    since = t_s - t_s[begins][np.cumsum(begins) - 1]
+    starts = np.flatnonzero(np.append(True, (np.diff(cell_numbers(since, WINDOW_S)) != 0) | lost))
+    weight = before + after
+    length = np.add.reduceat(weight, starts)
+
+    def mean(values: Array) -> Array:
+        return np.add.reduceat(values * weight[:, None], starts, axis=0) / length[:, None]
+
+    there = np.flatnonzero(~np.isnan(speed))
+    place = np.searchsorted(starts, np.arange(len(t_s)), side="right") - 1
+    in_window = np.full(len(starts), np.nan)
+    in_window[place[there]] = speed[there]
+    mean_rate = mean(rate)
+    jolt = np.maximum.reduceat(np.linalg.norm(rate - mean_rate[place], axis=1), starts)
+    at = np.flatnonzero(begins[starts])[1:]  # before these windows readings are missing
+    ends = np.append(starts[1:], len(t_s)) - 1
+    edges = np.insert((t_s - before)[starts], at, (t_s + after)[ends[at - 1]])
+    return Windows(
+        np.append(edges, t_s[-1] + after[-1]),
+        np.insert(mean_rate, at, 0.0, axis=0),
+        np.insert(mean(force), at, 0.0, axis=0),
+        np.insert(jolt, at, 0.0),
+        np.insert(in_window, at, np.nan),
+        np.insert(warm[starts], at, 0.0),
+        np.insert(np.zeros(len(starts), dtype=bool), at, True),
+        place + np.searchsorted(at, place, side="right"),
+        before,
+        after,
+    )

@@ -1,0 +1,211 @@
+"""The one reader of CSV, for logs and for the tables of other apps.
+
+Each line is a row by itself: a quotation mark that is not closed does not swallow the lines after it. In a log the
+first mistake is an error with its line (cells.read()); of another app's table damaged rows are left out and counted
+(columns_of_text()). Memory is bounded: a log comes in blocks (source.chunks()), a table has so many cells at most.
+
+A log whose numbers are all plainly written, as Kickstand writes them, is read by numbers_in(), a column at once: 0.5 s
+for an hour at 200 Hz. numpy.loadtxt takes 1.4 s for it; cells.read(), which reads every other log, 3 s.
+"""
+
+import csv
+import itertools
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import InputError
+from .table import Array
+
+Cells = NDArray[Any]  # (n): int64; float64, NaN where there is no number; or str as objects, "" where there is nothing
+
+ROWS = 50_000  # at once: text takes ten times the memory of numbers
+LONGEST = 40  # characters of a number
+LONGEST_LINE = 100_000  # characters: Python's csv refuses cells that are not much longer
+# Of a table: seven hours of twelve columns at 100 Hz. Numbers take 8 bytes each, and as many while they are joined,
+# texts 60.
+MOST_CELLS, MOST_TEXTS = 30_000_000, 3_000_000
+_NOTHING = {"", "-", "na", "n/a", "nan", "nil", "none", "null", "#n/a"}
+_POINT, _MINUS, _ZERO, _COMMA, _END = b".-0,\n"
+_PLAIN = b"0123456789.-,\n"
+_MOST_DIGITS = 15  # of a number that a double holds as an integer
+
+
+def separator_of(line: str) -> str:
+    """The one of , ; and tab that parts the cells of a line, by what stands outside quotation marks."""
+    bare = re.sub(r'"[^"]*"', "", line)
+    return max(",;\t", key=bare.count)
+
+
+def cells_of(line: str, separator: str = ",") -> list[str]:
+    """The cells of one line. Raises csv.Error for a line of over LONGEST_LINE characters."""
+    if len(line) > LONGEST_LINE:
+        raise csv.Error(f"a line of over {LONGEST_LINE} characters")
+    if '"' not in line:  # half the time
+        return line.split(separator)
+    return next(csv.reader((line,), delimiter=separator, skipinitialspace=True), [])
+
+
+def numbers_in(text: bytes, count: int) -> Array | None:
+    """(n, count) the numbers in n lines of `count` cells, NaN for an empty one; float() would read the same.
+
+    None, for another reader, where the text is anything else than n lines of `count` plain numbers, and where a column
+    has different numbers of digits after the point, as in "1.5" and "2".
+    """
+    if text.translate(None, _PLAIN):
+        return None
+    letters = np.frombuffer(text if text.endswith(b"\n") else text + b"\n", dtype=np.uint8)
+    ends = np.flatnonzero(letters <= _COMMA)  # a comma or a line feed: all others have larger codes
+    if len(ends) % count or np.count_nonzero(letters == _END) * count != len(ends):
+        return None
+    ends = ends.reshape(-1, count)
+    if not np.all(letters[ends[:, -1]] == _END):
+        return None
+    lengths = np.diff(ends.ravel(), prepend=-1).reshape(ends.shape) - 1
+    found = np.full(ends.shape, np.nan)
+    for k in range(count):
+        there = np.flatnonzero(lengths[:, k])
+        if len(there):
+            values = _numbers(letters, ends[there, k], lengths[there, k])
+            if values is None:
+                return None
+            found[there, k] = values
+    return found
+
+
+def _numbers(letters: NDArray[np.uint8], end: NDArray[np.intp], length: NDArray[np.intp]) -> Array | None:
+    """The numbers (n) that stand before places (n) in letters, each of so many letters; None as in numbers_in()."""
+    first = letters[end[0] - length[0] : end[0]].tobytes()
+    digits = len(first.partition(b".")[2])
+    has_point = b"." in first
+    minus = letters[end - length] == _MINUS
+    length = length - minus  # a copy: the minus sign is left out
+    most = int(np.max(length))
+    if most - has_point > _MOST_DIGITS or np.min(length) <= max(digits, has_point):
+        return None
+    back = np.arange(most)[:, None]  # of each digit from the end
+    figures = letters.take(end - 1 - back, mode="clip") - np.uint8(_ZERO)
+    if has_point:
+        if not np.all(figures[digits] == np.uint8(_POINT - _ZERO + 256)):
+            return None
+        figures[digits] = 0
+    figures[back >= length] = 0
+    if np.max(figures) > 9:
+        return None
+    tens = 10.0 ** np.maximum(0, np.arange(most) - (has_point & (np.arange(most) > digits)))
+    # Both are integers that a double holds, so that the quotient is the double next to the decimal number.
+    values = (tens @ figures) / 10.0**digits
+    return np.where(minus, -values, values)
+
+
+def columns_of_text(text: str, separator: str, width: int) -> tuple[list[Cells], int]:
+    """The columns of CSV without a header, and how many rows were left out.
+
+    Rows with more cells than names or than the first row has, and lines that are too long, are damaged; the ends of
+    short ones are empty. Raises InputError for a table that is too large.
+    """
+    most, left_out = 0, 0
+
+    def whole() -> Iterator[list[str]]:
+        nonlocal most, left_out
+        for line in _lines(text):
+            try:
+                row = cells_of(line.replace('"', "") if line.count('"') % 2 else line, separator)
+            except csv.Error:
+                row = None
+            most = most or max(width, len(row or ()))
+            if row is None or len(row) > most:
+                left_out += 1
+            else:
+                yield row
+
+    return columns_of(whole(), width), left_out
+
+
+def _lines(text: str) -> Iterator[str]:
+    """Those that are not blank, one after the other: a list of all takes several times the memory of the text."""
+    begin = 0
+    while begin < len(text):
+        end = text.find("\n", begin)
+        end = len(text) if end < 0 else end
+        if line := text[begin:end].strip():
+            yield line
+        begin = end + 1
+
+
+def columns_of(rows: Iterable[Sequence[str]], width: int) -> list[Cells]:
+    """The columns of rows of cells."""
+    parts: list[list[Cells]] = [[np.empty(0, dtype=np.int64)] for _ in range(width)]
+    rows, cells_read, texts = iter(rows), 0, 0
+    while block := list(itertools.islice(rows, max(1, min(ROWS, 20 * ROWS // max(1, width))))):
+        cells_read += width * len(block)
+        if cells_read > MOST_CELLS or texts > MOST_TEXTS:
+            raise InputError(
+                f"the table is too large: over {MOST_CELLS / 1e6:.0f} million cells, or {MOST_TEXTS / 1e6:.0f} million "
+                "of text: give a part of it"
+            )
+        short = any(len(row) < width for row in block)
+        filled = [[*row, *[""] * (width - len(row))] for row in block] if short else block
+        for part, cells in zip(parts, zip(*filled)):
+            part.append(_typed(cells))
+            texts += len(cells) if part[-1].dtype.kind == "O" else 0
+    return [_joined(part) for part in parts]
+
+
+def numbers_of(cells: Cells) -> NDArray[Any]:
+    """Cells (n) as whole numbers where all of them are, else as floats, NaN for what is no number."""
+    if cells.dtype.kind in "iuf":
+        return cells
+    numbers = [_number(str(cell)) for cell in cells.tolist()]
+    return np.array([np.nan if number is None else number for number in numbers], dtype=float)
+
+
+def filled(cells: Cells) -> NDArray[np.bool_]:
+    """(n) True where there is something in the cell."""
+    if cells.dtype.kind in "iuf":
+        return ~np.isnan(cells.astype(float))
+    return np.array([cell != "" for cell in cells.tolist()], dtype=bool)
+
+
+def as_text(cells: Cells) -> list[str]:
+    """The cells as text, "" where there is nothing."""
+    return ["" if cell != cell else str(cell) for cell in cells.tolist()]
+
+
+def _typed(cells: Sequence[str]) -> Cells:
+    if max(map(len, cells)) <= LONGEST and not any("_" in cell for cell in cells):  # Python reads 1_0 as 10
+        text = np.array(cells)
+        for kind in (np.int64, np.float64):
+            try:
+                return text.astype(kind)
+            except (ValueError, OverflowError):
+                continue
+    numbers = [_number(cell) for cell in cells]
+    if None not in numbers:
+        return np.array(numbers, dtype=float)
+    return _text("" if number is not None and number != number else cell for number, cell in zip(numbers, cells))
+
+
+def _joined(parts: list[Cells]) -> Cells:
+    parts = [part for part in parts if len(part)] or parts[:1]
+    if all(part.dtype.kind != "O" for part in parts):
+        return np.concatenate(parts)
+    return _text(itertools.chain.from_iterable(map(as_text, parts)))
+
+
+def _text(cells: Iterable[str]) -> Cells:
+    return np.array(list(cells), dtype=object)
+
+
+def _number(cell: str) -> float | None:
+    """NaN where there is nothing; None for text."""
+    cell = cell.strip()
+    if cell.lower() in _NOTHING:
+        return np.nan
+    try:
+        return None if "_" in cell else float(cell)
+    except ValueError:
+        return None

@@ -1,0 +1,95 @@
+"""Stretches of a log in which the readings froze: a sensor that hangs, or a phone that writes its last reading again.
+
+Noise changes the readings of a working sensor from sample to sample, at rest too. Six that stay the same to the last
+digit for half a second were not measured. Only in a log with few digits rounding may hide the noise of a vehicle at
+rest: there the readings count where those before or after go on at the same values, and are left out where they jump.
+"""
+
+import numpy as np
+from kickstand.errors import Notice
+from numpy.typing import NDArray
+
+from .block import Block
+from .log import Log
+from .table import Array
+
+FROZEN_S, FROZEN_SAMPLES = 0.5, 10  # the same for at least so long, in so many samples
+COARSE_G, COARSE_DPS = 0.002, 0.05  # steps in which rounding may hide the noise of a phone's sensor
+BESIDE_S = 0.5  # before and after a stretch
+NEAR_G, NEAR_DPS = 0.02, 0.5  # the mean beside it of a vehicle that stands still
+
+_MOTION = [0, 1, 2, 4, 5, 6]  # of the chip's order: without the temperature
+
+
+class FrozenReadings:
+    """mark() takes a log's blocks one after the other."""
+
+    def __init__(self) -> None:
+        self._last = np.zeros((0, 6))  # reading at the end of the block before
+        self._last_s = 0.0
+        self._since_s = 0.0  # time from which it has been the same
+        self._since_samples = 1
+        self._was_frozen = False
+        self._step = np.full(6, np.inf)  # smallest change seen on each axis: the last digit
+        self._stretches: list[tuple[float, float]] = []
+
+    def mark(self, block: Block) -> NDArray[np.bool_]:
+        """(n) True where the block's readings are frozen. The first of them is a reading still."""
+        n = len(block.time_us)
+        values, time_s = np.vstack((self._last, block.readings[:, _MOTION])), block.t_s
+        time_s = np.concatenate(([self._last_s], time_s)) if len(self._last) else time_s
+        change = np.abs(np.diff(values, axis=0))
+        self._step = np.minimum(self._step, np.min(np.where(change > 1e-9, change, np.inf), axis=0, initial=np.inf))
+        same = np.concatenate(([False], ~np.any(change > 0.0, axis=1)))
+        frozen = np.zeros(len(same), dtype=bool)
+        begins = np.flatnonzero(~same)  # each run of equal readings
+        ends = np.append(begins[1:], len(same))
+        long = ends > begins + 1
+        for begin, end in zip(begins[long].tolist(), ends[long].tolist()):
+            goes_on = begin == 0 and len(self._last) > 0
+            since_s = self._since_s if goes_on else float(time_s[begin])
+            samples = end - begin + (self._since_samples - 1 if goes_on else 0)
+            if time_s[end - 1] - since_s < FROZEN_S or samples < FROZEN_SAMPLES:
+                continue
+            if (goes_on and self._was_frozen) or self._doubtful(values, time_s, begin, end):
+                frozen[begin + 1 : end] = True
+                self._add(float(time_s[begin]), float(time_s[end - 1]))
+        last = int(begins[-1])
+        if not (last == 0 and len(self._last)):
+            self._since_s, self._since_samples = float(time_s[last]), 1
+        self._since_samples += len(same) - 1 - last
+        self._was_frozen = bool(frozen[-1])
+        self._last, self._last_s = values[-1:], float(time_s[-1])
+        return frozen[-n:]
+
+    def notices(self) -> list[Notice]:
+        """What there is to say of the log so far."""
+        if not self._stretches:
+            return []
+        first, last = self._stretches[0]
+        seconds = sum(end - begin for begin, end in self._stretches)
+        return [Notice("frozen-readings", len(self._stretches), seconds, first, last)]
+
+    def _doubtful(self, values: Array, time_s: Array, begin: int, end: int) -> bool:
+        """The readings from begin to end are the same: does anything speak against a standstill?"""
+        if not np.any(np.isfinite(self._step)):
+            return False  # nothing ever changed: nothing to compare with
+        if np.any(self._step[:3] < COARSE_G) or np.any(self._step[3:] < COARSE_DPS):
+            return True
+        near = 0.5 * np.where(np.isfinite(self._step), self._step, 0.0) + np.repeat([NEAR_G, NEAR_DPS], 3)
+        before = (time_s[:begin] > time_s[begin] - BESIDE_S).nonzero()[0]
+        after = end + (time_s[end:] < time_s[end - 1] + BESIDE_S).nonzero()[0]
+        means = [np.mean(values[rows], axis=0) for rows in (before, after) if len(rows)]
+        return not any(np.all(np.abs(mean - values[begin]) <= near) for mean in means)
+
+    def _add(self, begin_s: float, end_s: float) -> None:
+        if self._stretches and self._stretches[-1][1] == begin_s:  # it went on from the block before
+            begin_s = self._stretches.pop()[0]
+        self._stretches.append((begin_s, end_s))
+
+
+def without_frozen(log: Log) -> Log:
+    """The log without frozen readings: where they were is a gap. The log itself where there are none."""
+    block = Block(log.time_us, log.readings, log.speed_mps, True, True, log.start_s, 0)
+    kept = ~FrozenReadings().mark(block)
+    return log if np.all(kept) else log.part(kept)

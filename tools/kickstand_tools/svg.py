@@ -1,0 +1,40 @@
+"""Drawings as SVG, the pages' and the READMEs': elements written by hand, because a fleet has thousands of pictures and
+each takes a millisecond."""
+
+from markupsafe import Markup, escape
+
+
+def element(name: str, *inside: str, **attributes: object) -> Markup:
+    """An element of SVG. inside: other elements, and text, which is escaped. attributes: with _ for -, and one at the
+    end of what Python reserves; numbers are rounded to hundredths, None is left out.
+
+    >>> print(element("text", "1 < 2", x=1.25, text_anchor="end", class_="small"))
+    <text x="1.25" text-anchor="end" class="small">1 &lt; 2</text>
+    """
+    given = "".join(
+        f' {key.rstrip("_").replace("_", "-")}="{_written(value)}"'
+        for key, value in attributes.items()
+        if value is not None
+    )
+    body = "".join(map(escape, inside))
+    return Markup(f"<{name}{given}>{body}</{name}>" if inside else f"<{name}{given}/>")
+
+
+def drawing(size: tuple[float, float], *inside: str, **attributes: object) -> Markup:
+    """A whole SVG file. size: width and height, in pixels or other units."""
+    box = f"0 0 {_written(size[0])} {_written(size[1])}"
+    lines = (Markup("\n") + part for part in inside)
+    return element("svg", *lines, Markup("\n"), xmlns="http://www.w3.org/2000/svg", viewBox=box, **attributes) + "\n"
+
+
+def path(points: list[tuple[float, float]]) -> str:
+    """The attribute d of a path from point to point.
+
+    >>> path([(0, 0), (1.5, 2)])
+    'M0 0L1.5 2'
+    """
+    return "M" + "L".join(f"{_written(x)} {_written(y)}" for x, y in points)
+
+
+def _written(value: object) -> str:
+    return f"{round(value, 2):.10g}" if isinstance(value, (int, float)) else str(escape(value))
