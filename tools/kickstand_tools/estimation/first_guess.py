@@ -8,9 +8,8 @@ from kickstand.errors import Refusal
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from ..checks.bends import speed_in_radians
 from ..logs.table import Array
-from ..signals.leaning import WINDOW_S, Leaning, averaged, leaning_of, without_drift
+from ..signals.leaning import WINDOW_S, Leaning, averaged, leaning_of, speed_in_radians, without_drift
 from ..signals.standstill import motionless
 from .windows import Windows
 
