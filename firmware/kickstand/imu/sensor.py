@@ -3,6 +3,7 @@
 from time import ticks_add, ticks_diff, ticks_ms
 
 from ..errors import Notice
+from ..lean import meter
 from .mpu6050 import UnknownChip
 
 RETRY_MS = 50  # from one attempt to set the chip up to the next
