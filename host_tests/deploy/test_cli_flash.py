@@ -89,7 +89,7 @@ def test_only_what_differs_is_copied(board, change):
     assert path.read_bytes() == wanted()["/kickstand/lean/formula.mpy"]
 
 
-def test_an_edited_config_stays_until_told_otherwise(board):
+def test_an_edited_config_stays_unless_asked_otherwise(board):
     command.works("flash")
     board.path("config.py").write_text('SIDE = "right"\n')
     result = command.works("flash")
@@ -179,7 +179,7 @@ def test_machine_code_is_for_the_board(board, monkeypatch):
     assert found["/kickstand/imu/fifo_frames_viper.mpy"][2] == 0x2B
 
 
-def test_what_reads_back_differently_is_told(board):
+def test_what_reads_back_differently_is_an_error(board):
     board.on_write = lambda path, data: data[:-1] + b"?" if path == "/kickstand/calibration/store.mpy" else data
     broken_off(board, "kickstand/calibration/store.mpy reads back differently")
     assert not board.path("main.py").exists()

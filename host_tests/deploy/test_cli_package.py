@@ -67,9 +67,9 @@ def test_an_installation_stays_that_of_the_checkout():
     """Without -e `flash --config` would copy a config.py that the rider has never edited."""
     readmes = [ROOT / "README.md", ROOT / "firmware" / "README.md", ROOT / "tools" / "README.md"]
     text = "\n".join(path.read_text(encoding="utf-8") for path in readmes)
-    told = re.findall(r"pip install\b(?! esptool).*", text) + [extra("rides")]
-    assert len(told) >= 4
-    assert all("pip install -e " in line for line in told)
+    lines = re.findall(r"pip install\b(?! esptool).*", text) + [extra("rides")]
+    assert len(lines) >= 4
+    assert all("pip install -e " in line for line in lines)
 
 
 def test_an_installed_wheel_finds_its_firmware(tmp_path, monkeypatch):
@@ -110,28 +110,13 @@ def steps(dev, monkeypatch):
     return done
 
 
-def test_it_installs_once(dev, steps):
-    for _ in range(2):
-        dev.prepare("")
-    assert steps == ["venv", "install "]
-
-
-def test_the_tests_need_more_than_the_demo_and_the_demo_nothing_more(dev, steps):
-    dev.prepare("")
-    dev.prepare("test")
-    dev.prepare("")
-    assert steps == ["venv", "install ", "install test"]
-    dev.prepare("mutants")
-    dev.prepare("test")
-    dev.prepare("")
+def test_it_installs_once_and_again_where_more_is_needed_or_the_project_has_changed(dev, steps, tmp_path):
+    for extra_name in ("", "", "test", "", "mutants", "test", ""):
+        dev.prepare(extra_name)
     assert steps == ["venv", "install ", "install test", "install mutants"]
-
-
-def test_it_installs_again_when_the_project_has_changed(dev, steps, tmp_path):
-    dev.prepare("test")
     (tmp_path / "pyproject.toml").write_text('[project]\nname = "two"\n')
     dev.prepare("test")
-    assert steps == ["venv", "install test", "install test"]
+    assert steps[4:] == ["install test"]
 
 
 def test_a_broken_off_installation_is_begun_again(dev, steps, monkeypatch):
@@ -200,10 +185,7 @@ needs_sh = pytest.mark.skipif(os.name == "nt", reason="the stand-in for Python i
 @pytest.mark.parametrize(
     ("script", "words"),
     [
-        (
-            "echo 'The virtual environment was not created: ensurepip is not available.'; exit 1",
-            "python3-venv",
-        ),
+        ("echo 'The virtual environment was not created: ensurepip is not available.'; exit 1", "python3-venv"),
         ("echo 'python3: No module named venv'; exit 1", "python3-venv"),
         ("echo 'Error: [Errno 13] Permission denied'; exit 1", "Permission denied"),
         ("exit 0", "no pip"),

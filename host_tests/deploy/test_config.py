@@ -1,4 +1,4 @@
-"""A config.py of the rider's own: which one is flashed, and how a slip in it is told on the host and by the board."""
+"""A config.py of the rider's own: which one is flashed, and how the host and the board name a slip in it."""
 
 import os
 import subprocess
@@ -83,7 +83,7 @@ SLIPS = {
     "low-pass": (
         "# one\nSAMPLE_HZ = 50\nDLPF = 3\n",
         3,
-        "DLPF = 3 lets vibration alias at SAMPLE_HZ = 50: set DLPF = 4 or higher",
+        "DLPF = 3 lets vibration alias at SAMPLE_HZ = 50: set DLPF = 4",
     ),
     "capitals": ('Side = "right"\n', 1, "Side is not a setting"),
     "no line of its own": ("BUTTON_PIN = 4\n", None, "a pin is used twice"),

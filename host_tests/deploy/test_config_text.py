@@ -20,7 +20,7 @@ BUTTON_PIN = 14  # é
 '''
 
 
-def told(text):
+def settings_of(text):
     made = {}
     exec(text, made)
     return {name: value for name, value in made.items() if name.isupper()}
@@ -31,27 +31,24 @@ def test_each_setting_of_the_firmware_s_own_file_can_be_set_and_unset():
     names = re.findall(r"(?m)^# ([A-Z_0-9]+) = ", text)
     assert len(names) > 30 and config_text.values(text) == {}
     whole = config_text.with_values(text, {name: f"({i}, 'x')" for i, name in enumerate(names)})
-    assert told(whole) == {name: (i, "x") for i, name in enumerate(names)}
+    assert settings_of(whole) == {name: (i, "x") for i, name in enumerate(names)}
     assert whole.count("\n") == text.count("\n")  # each in the place that the file has for it
     assert '# or "right"\n' in whole
-    assert told(config_text.with_values(whole, dict.fromkeys(names))) == {}
+    assert settings_of(config_text.with_values(whole, dict.fromkeys(names))) == {}
 
 
 def test_what_a_rider_has_set_stays():
     assert config_text.values(OWN)["SIDE"] == '"right"'
     changed = config_text.with_values(OWN, {"BUTTON_PIN": "2", "LCD_ADDRESSES": "(0x27,)"})
     changed = config_text.with_values(changed, {"RECORD": "True", "DLPF": "4"})
-    assert told(changed) == {
-        "SIDE": "right",
-        "PINS": 3,
-        "LCD_ADDRESSES": (0x27,),
-        "BUTTON_PIN": 2,
-        "RECORD": True,
-        "DLPF": 4,
-    }
+    wanted = {"SIDE": "right", "PINS": 3, "LCD_ADDRESSES": (0x27,), "BUTTON_PIN": 2, "RECORD": True, "DLPF": 4}
+    assert settings_of(changed) == wanted
     assert 'SIDE = "right"   # as it stands\n' in changed
     assert "BUTTON_PIN = 2  # é\n" in changed
-    assert told(config_text.with_values(OWN, {"LCD_ADDRESSES": None, "SIDE": None})) == {"PINS": 3, "BUTTON_PIN": 14}
+    assert settings_of(config_text.with_values(OWN, {"LCD_ADDRESSES": None, "SIDE": None})) == {
+        "PINS": 3,
+        "BUTTON_PIN": 14,
+    }
     assert config_text.with_values(OWN, {"SIDE": '"right"', "RECORD": None}) == OWN
 
 
@@ -94,4 +91,4 @@ def test_only_a_value_is_written(value):
 
 def test_every_value_is_read_back():
     for value in ('"left"', "0x68", "400_000", "(0x27, 0x3F)", "None", "True", "0.5"):
-        assert told(config_text.with_values("", {"X": value})) == {"X": ast.literal_eval(value)}
+        assert settings_of(config_text.with_values("", {"X": value})) == {"X": ast.literal_eval(value)}

@@ -25,9 +25,9 @@ BOARDS = {"Pico": bytecode.PICO, "Pico 2": 0x1F06, "ESP32": 0x2B06, "ESP32-C3": 
 # 16 and up: instructions that some RISC-V have besides (MicroPython, py/persistentcode.h, ports/esp32/mpconfigport.h).
 ESP32S = {0x2B06: "xtensawin", 0x2F06: "rv32imc", 0x12F06: "rv32imc"}
 
-# Complaints about what has no types on a board: names that start as None, the settings, which setattr() makes, viper's
-# pointers, and ticks, which are numbers
-UNTYPED = '"None"', 'for class "Settings', 'of type "ptr', "Variable not allowed in type expression", '"_Ticks'
+# Complaints about what has no types on a board: names that start as None or as NoRecorder, the settings, which
+# setattr() makes, viper's pointers, and ticks, which are numbers
+UNTYPED = '"None"', 'for class "NoRec', 'for class "Settings', 'of type "ptr', "Variable not allowed in", '"_Ticks'
 
 
 @pytest.fixture(scope="module", params=["rp2", "esp32"])

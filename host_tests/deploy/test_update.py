@@ -198,7 +198,7 @@ def test_a_board_full_of_rides_has_room_for_an_update(which):
 
 
 def test_sources_in_place_of_compiled_firmware_may_have_to_wait_for_the_rides():
-    """They take twice the room, and are for computers without mpy-cross: the rider is told what to do."""
+    """They take twice the room, and are for computers without mpy-cross: the message says what to do."""
     board = on_board(before("nested .mpy"), flash_ring.RESERVE // BLOCK)
     with pytest.raises(update.NoRoom, match="kickstand pull --delete, then flash again"):
         refuse_without_room(plan(wanted(".py"), board, True), board)

@@ -103,22 +103,24 @@ def test_pins_6_to_11_are_free_on_other_chips(machine, tmp_path):
     assert record.last[0].startswith("Raw   25°")
 
 
-@pytest.mark.parametrize("wrong", [{"LCD_SDA": "6"}, {"LCD_SDA": 18}, {"LCD_SCL": 12}])
-def test_a_display_with_wrong_pins_leaves_the_others_alone(wrong, tmp_path, capsys):
-    plan = {"board": {"machine": "c3", **WIRED}, "config": {**PINS, **wrong}, "until": 3}
+_USUAL = {"LCD_SDA": 2, "LCD_SCL": 3}
+
+
+@pytest.mark.parametrize(
+    ("machine", "config", "wrong", "touched"),
+    [
+        *[("c3", PINS, {name: pin}, {6, 7, 10}) for name, pin in (("LCD_SDA", "6"), ("LCD_SDA", 18), ("LCD_SCL", 12))],
+        *[(m, _USUAL, {n: "GP2"}, {2, 3}) for m in ("pico", "esp32", "xiao rp2040") for n in ("LCD_SDA", "LCD_SCL")],
+    ],
+)
+def test_a_display_with_wrong_pins_leaves_the_usual_and_all_others_alone(
+    machine, config, wrong, touched, tmp_path, capsys
+):
+    plan = {"board": {"machine": machine, **WIRED}, "config": {**config, **wrong}, "until": 3}
     record = devices.run("cpython", tmp_path, plan, capsys)
     assert record.ends == ["returned"]
     assert "Kickstand stopped. config.py: LCD_S" in record.console
-    assert set(record.touched) <= {6, 7, 10}
-
-
-@pytest.mark.parametrize("machine", ["pico", "esp32", "xiao rp2040"])
-@pytest.mark.parametrize("wrong", ["LCD_SDA", "LCD_SCL"])
-def test_a_wrong_pin_is_not_replaced_by_the_usual_one(machine, wrong, tmp_path, capsys):
-    config = {"LCD_SDA": 2, "LCD_SCL": 3, wrong: "GP2"}
-    record = devices.run("cpython", tmp_path, {"board": {"machine": machine}, "config": config, "until": 3}, capsys)
-    assert f"Kickstand stopped. config.py: {wrong} = 'GP2'" in record.console
-    assert set(record.touched) <= {2, 3}
+    assert set(record.touched) <= touched
 
 
 def test_a_refusal_is_shown_on_a_board_with_usual_pins(tmp_path, capsys):
@@ -203,17 +205,14 @@ def test_a_watchdog_at_rest_lets_the_console_be_open_for_days(machine):
 
 
 def test_status_says_which_pins_are_missing(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
-    for name in [name for name in sys.modules if name.split(".")[0] == "kickstand"]:
-        monkeypatch.delitem(sys.modules, name)
-    board = Board(lambda t_s: (0, 0, 1, 0, 0, 0), machine="s3")
-    with board:
+    def report(board):
         from kickstand import status_report
 
-        assert board.run(status_report.report, 5.0) == "returned"
-    loaded = [name for name in sys.modules if name.split(".")[0] == "kickstand"]
-    for name in loaded:
-        sys.modules.pop(name)
+        status_report.report()
+
+    monkeypatch.chdir(tmp_path)
+    outcome, board = on("s3", report, 5.0)
+    assert outcome == "returned"
     names = "BUTTON_PIN, SENSOR_SDA, SENSOR_SCL, LCD_SDA, LCD_SCL"
     said = capsys.readouterr().out
     assert f"Settings     config.py: no usual pins are known for this board ({board.machine}): set {names}" in said

@@ -7,7 +7,6 @@ import devices
 import engines
 import pytest
 from devices import ALIGNED, LEFT_S, PRESSES, RIDE, RIGHT_S, STRAIGHT_S
-from kickstand_tools.simulated_board.simulator import Board
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
@@ -27,15 +26,11 @@ def test_press_press_ride(engine, seed, tmp_path):
         assert record.lean_at(t_s) == pytest.approx(lean, abs=tolerance)
     assert record.ends == ["off"]
     assert not record.too_fast
-
-
-@pytest.mark.parametrize("engine", engines.ENGINES)
-def test_every_line_fits_and_the_bar_points_to_the_lean(engine, tmp_path):
-    record = devices.run(engine, tmp_path, ALIGNED)
     assert all(len(line) == 16 for frame in record.frames for line in frame[1:])
-    left, right = record.at(LEFT_S)[1], record.at(RIGHT_S)[1]
-    assert left[8:].rstrip() == "▎" and left[4:8] == "████" and left[:3] == "   "
-    assert right[:8].lstrip() == "▕" and right[8:13] == "█████" and right[14:] == "  "
+    if seed is None:
+        left, right = record.at(LEFT_S)[1], record.at(RIGHT_S)[1]  # the bar points to the lean
+        assert left[8:].rstrip() == "▎" and left[4:8] == "████" and left[:3] == "   "
+        assert right[:8].lstrip() == "▕" and right[8:13] == "█████" and right[14:] == "  "
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
@@ -94,24 +89,8 @@ def test_a_refused_alignment_leaves_the_old_one(tmp_path):
 
 
 def test_pages_and_menu(tmp_path):
-    short, long = 0.15, 1.2
-    presses = [
-        *PRESSES,
-        *([t_s, short] for t_s in (46, 47, 48, 49, 50)),
-        [51, long],
-        [53, short],
-        [54, short],
-    ]
-    presses += [
-        [55, long],
-        [58.5, short],
-        [60, long],
-        [62, short],
-        [63, short],
-        [64, short],
-        [65, long],
-        [70, short],
-    ]
+    short = [[t_s, 0.15] for t_s in (46, 47, 48, 49, 50, 53, 54, 58.5, 62, 63, 64, 70)]
+    presses = [*PRESSES, *short, *([t_s, 1.2] for t_s in (51, 55, 60, 65))]
     record = devices.run("cpython", tmp_path, {**ALIGNED, "presses": presses, "until": 72})
     assert record.first("Max left +(29|3[0-3])°") == pytest.approx(46.3, abs=0.2)  # the plan rolls in no time
     assert record.first("Max right +(39|4[0-3])°") == pytest.approx(46.3, abs=0.2)
@@ -160,34 +139,6 @@ def test_six_positions_says_what_it_wants(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_safe_mode_starts_nothing(tmp_path, capsys):
-    record = devices.run("cpython", tmp_path, {"presses": [[0, 2]], "until": 5}, capsys)
-    assert record.ends == ["returned"]
-    assert record.last[0] == "Safe mode       "
-    assert "safe mode" in record.console
-
-
-@pytest.mark.parametrize(
-    ("config", "named"),
-    [
-        ({"SIDE": "lefft"}, "SIDE"),
-        ({"SAMPLE_HZ": 300}, "SAMPLE_HZ"),
-        ({"SIDDE": "left"}, "SIDDE"),
-        ({"ACCEL_RANGE_G": 3}, "ACCEL_RANGE_G"),
-        ({"LCD_I2C": 0}, "LCD_I2C"),
-        ({"BUTTON_PIN": "GP15"}, "BUTTON_PIN"),
-    ],
-)
-def test_a_wrong_setting_is_named(config, named, tmp_path, capsys):
-    Board(lambda t: (0, 0, 1, 0, 0, 0, 25)).install()  # for machine
-    from kickstand.errors import SettingsError
-    from kickstand.settings import Settings
-
-    with pytest.raises(SettingsError, match=named) as refusal:
-        Settings(type("Config", (), config))
-    assert refusal.value.values[0] == named
-
-
 def test_an_upright_pose_that_was_not_upright_is_trimmed_on_the_road_and_stays_so(tmp_path):
     """Two degrees to the right when pressed upright; after a ride it shows the true lean, after power-off too."""
     ride = [["kickstand", 8.0], ["upright", 14.0, 2.0], ["accelerate", 15.0, 6.0]]
@@ -195,7 +146,7 @@ def test_an_upright_pose_that_was_not_upright_is_trimmed_on_the_road_and_stays_s
         ride += [["turn", -25.0, 3.0], ["straight", 25.0], ["turn", 25.0, 3.0], ["straight", 25.0]]
     plan = {**ALIGNED, "ride": [*ride, ["brake", 0.0, 6.0], ["wait", 10.0]], "until": 426}
     record = devices.run("cpython", tmp_path, plan)
-    assert record.lean_at(20.2) == 0  # of a bike that leans by 2 degrees: so it was told
+    assert record.lean_at(20.2) == 0  # of a bike that leans by 2 degrees: so it was aligned
     assert record.last[0].startswith("Lean   0°")
     again = devices.run("cpython", tmp_path, {"ride": [["upright", 5.0]], "until": 4})
     assert again.lean_at(3.5) == 0

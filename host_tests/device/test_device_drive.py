@@ -81,11 +81,6 @@ def test_a_car_finds_its_alignment_and_says_what_it_waits_for(engine, tmp_path):
     assert again.at(2.0)[0].startswith(("Accel", "Brake")) and again.at(25.0)[0].startswith("Brake    0.")
 
 
-def test_nothing_is_stored_before_it_is_ready(tmp_path):
-    devices.run("cpython", tmp_path, car("wheel", 2))
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_a_car_by_its_wheel_stores_at_standstill_only(tmp_path):
     """It becomes ready in a braking event that ends at a slower speed, not at a stop."""
     plan = car("wheel", 2, wheel={"bounce_us": 2000})
@@ -252,6 +247,12 @@ def test_without_a_speed_source_the_menu_has_no_alignment_by_driving(tmp_path):
 @pytest.mark.parametrize(
     ("config", "named"),
     [
+        ({"SIDE": "lefft"}, "SIDE"),
+        ({"SAMPLE_HZ": 300}, "SAMPLE_HZ"),
+        ({"SIDDE": "left"}, "SIDDE"),
+        ({"ACCEL_RANGE_G": 3}, "ACCEL_RANGE_G"),
+        ({"LCD_I2C": 0}, "LCD_I2C"),
+        ({"BUTTON_PIN": "GP15"}, "BUTTON_PIN"),
         ({"VEHICLE": "car"}, "car needs SPEED"),
         ({"VEHICLE": "bus", "SPEED": "gps"}, "VEHICLE"),
         ({"SPEED": "radar"}, "SPEED"),
@@ -263,10 +264,8 @@ def test_without_a_speed_source_the_menu_has_no_alignment_by_driving(tmp_path):
         ({"SPEED": "gps", "GPS_RX": 11}, "GPS_TX / GPS_RX"),
     ],
 )
-def test_a_wrong_setting_of_the_speed_is_named(config, named):
-    board = Board(level)
-    board.install()
-    try:
+def test_a_wrong_setting_is_named(config, named):
+    with Board(level):
         from kickstand.errors import SettingsError
         from kickstand.settings import Settings
         from kickstand.speed.source import open_speed
@@ -275,8 +274,6 @@ def test_a_wrong_setting_of_the_speed_is_named(config, named):
         with pytest.raises(SettingsError) as refusal:
             open_speed(Settings(type("Config", (), config)))
         assert named in (refusal.value.values[0], messages.lines(refusal.value)[1])
-    finally:
-        board.uninstall()
 
 
 def test_pins_of_a_speed_source_that_is_not_used_are_free_for_others(tmp_path):
@@ -295,17 +292,13 @@ def test_pins_of_a_speed_source_that_is_not_used_are_free_for_others(tmp_path):
 )
 def test_status_shows_the_speed(config, fitted, said, capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    board = Board(level)
-    for source, kind in fitted.items():
-        getattr(board, "fit_" + source)(lambda t_s: 15.0, **kind)
-    board.install()
-    try:
+    with Board(level) as board:
+        for source, kind in fitted.items():
+            getattr(board, "fit_" + source)(lambda t_s: 15.0, **kind)
         from kickstand import settings, status_report
 
         monkeypatch.setattr(status_report, "load", lambda: settings.Settings(type("Config", (), config)))
         monkeypatch.setattr(status_report.gc, "mem_free", lambda: 0, raising=False)
         assert board.run(status_report.report, 20.0) == "returned"
-    finally:
-        board.uninstall()
     printed = capsys.readouterr().out
     assert said in printed and "aligned: no" in printed

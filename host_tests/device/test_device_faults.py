@@ -2,6 +2,7 @@
 nothing wrong shown as good."""
 
 import math
+import time
 
 import devices
 import engines
@@ -152,18 +153,25 @@ def test_a_sagging_supply_while_the_calibration_is_read(fault, aligned):
     assert devices.run("cpython", aligned, standing([], until=3)).lean_at(2.5) == STATIC
 
 
-def test_an_exception_is_said_and_the_board_restarts(aligned, monkeypatch, capsys):
+@pytest.fixture
+def in_turn_300(monkeypatch):
+    """Call it with a function that takes the place of this turn of the app's loop, once."""
     from kickstand import app
 
     original, calls = app.App.turn, []
 
-    def failing(self):
-        calls.append(1)
-        if len(calls) == 300:
-            raise ZeroDivisionError("divide by zero")
-        original(self)
+    def replace(function):
+        def turn(self):
+            calls.append(1)
+            function() if len(calls) == 300 else original(self)
 
-    monkeypatch.setattr(app.App, "turn", failing)
+        monkeypatch.setattr(app.App, "turn", turn)
+
+    return replace
+
+
+def test_an_exception_is_said_and_the_board_restarts(aligned, in_turn_300, capsys):
+    in_turn_300(lambda: 1 / 0)
     held = {"presses": [[3.0, 5.0]]}  # the button, all that time: no safe mode, which is for power-up
     record = devices.run("cpython", aligned, standing([], until=12, **held), capsys)
     assert record.first("Error, restarts") < math.inf
@@ -172,20 +180,12 @@ def test_an_exception_is_said_and_the_board_restarts(aligned, monkeypatch, capsy
     assert record.lean_at(11) == STATIC
 
 
-def test_a_loop_that_hangs_is_restarted_by_the_watchdog(aligned, monkeypatch):
-    import time
-
-    from kickstand import app
-
-    original, calls = app.App.turn, []
-
-    def hanging(self):
-        calls.append(1)
-        while len(calls) == 300:
+def test_a_loop_that_hangs_is_restarted_by_the_watchdog(aligned, in_turn_300):
+    def hang():
+        while True:
             time.sleep_ms(10)  # pyright: ignore[reportAttributeAccessIssue]
-        original(self)
 
-    monkeypatch.setattr(app.App, "turn", hanging)
+    in_turn_300(hang)
     record = devices.run("cpython", aligned, standing([], until=16))
     assert record.ends == ["reset", "off"]
     assert record.lean_at(15) == STATIC
@@ -204,42 +204,44 @@ def test_a_sensor_lost_in_a_turn(lean, off_s, tmp_path):
     assert record.lean_at(51) == pytest.approx(lean, abs=3)
 
 
-@pytest.mark.parametrize("byte", [1, 2, 5])
-def test_a_fifo_out_of_step_is_noticed(byte, aligned, monkeypatch):
-    """Stray bytes in the FIFO: frames out of step would be read as readings for ever."""
+@pytest.fixture
+def at_fault(monkeypatch):
+    """Call it with a function of the board, which is called at FAULT_S. Returns a list that will hold the board."""
     from kickstand_tools.simulated_board import simulator
 
-    original = simulator.Board.install
+    original, boards = simulator.Board.install, []
 
-    def install(board):
-        board.at(FAULT_S, lambda: [board.sensor.fifo.push(0x55) for _ in range(byte)])
-        original(board)
+    def arrange(function):
+        def install(board):
+            boards.append(board)
+            board.at(FAULT_S, lambda: function(board))
+            original(board)
 
-    monkeypatch.setattr(simulator.Board, "install", install)
+        monkeypatch.setattr(simulator.Board, "install", install)
+        return boards
+
+    return arrange
+
+
+@pytest.mark.parametrize("byte", [1, 2, 5])
+def test_a_fifo_out_of_step_is_noticed(byte, aligned, at_fault):
+    """Stray bytes in the FIFO: frames out of step would be read as readings for ever."""
+    at_fault(lambda board: [board.sensor.fifo.push(0x55) for _ in range(byte)])
     record = devices.run("cpython", aligned, standing([], until=8))
     assert record.lean_at(FAULT_S + 0.3) == STATIC
     assert record.last[0].startswith("Lean  25° right")
 
 
 @pytest.mark.parametrize(("register", "value"), [(0x1B, 0x18), (0x1C, 0x00), (0x1A, 0x06)])
-def test_a_setting_that_changed_by_itself_is_put_right(register, value, aligned, monkeypatch):
-    """Ranges and low-pass: the readings still come and look like readings, so that only a look at the registers
-    tells."""
-    from kickstand_tools.simulated_board import simulator
+def test_a_setting_that_changed_by_itself_is_put_right(register, value, aligned, at_fault):
+    """Ranges and low-pass: the readings still come and look like readings, so that only the registers show it."""
 
-    original, boards = simulator.Board.install, []
+    def spike(board):
+        board.sensor.start(0x68, False)
+        board.sensor.write_byte(register)
+        board.sensor.write_byte(value)
 
-    def install(board):
-        def spike():
-            board.sensor.start(0x68, False)
-            board.sensor.write_byte(register)
-            board.sensor.write_byte(value)
-
-        boards.append(board)
-        board.at(FAULT_S, spike)
-        original(board)
-
-    monkeypatch.setattr(simulator.Board, "install", install)
+    boards = at_fault(spike)
     record = devices.run("cpython", aligned, standing([], until=8))
     assert record.first("Sensor", FAULT_S) < FAULT_S + 0.3
     assert boards[0].sensor.peek(register) != value

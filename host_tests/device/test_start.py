@@ -43,7 +43,7 @@ def test_incomplete_firmware_ends_at_the_prompt_and_says_so(module, board, monke
 
 @pytest.mark.parametrize("charge_us", [0, 7_000, 75_000])
 @pytest.mark.parametrize("held", [False, True])
-def test_a_capacitor_at_the_button_does_not_pass_for_a_press_at_power_on(held, charge_us, board):
+def test_a_capacitor_at_the_button_does_not_pass_for_a_press_at_power_on(held, charge_us, board, capsys):
     """The pull-up of the pin needs its time to charge it. A button that is held starts nothing all the same."""
     from kickstand import start
 
@@ -55,6 +55,7 @@ def test_a_capacitor_at_the_button_does_not_pass_for_a_press_at_power_on(held, c
     assert board.run(start.main, 2.0) == ("returned" if held else "off")
     if held:
         assert board.lcd.text() == ["Safe mode       ", "Ready for USB   "]
+        assert "safe mode" in capsys.readouterr().out
     else:
         assert shown[0].startswith("Raw")
 

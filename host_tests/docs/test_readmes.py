@@ -43,7 +43,7 @@ def test_every_picture_is_shown():
 
 def test_the_first_page_is_short_and_has_both_commands():
     text = text_of(READMES[0])
-    assert len(text.splitlines()) < 200
+    assert len(text.splitlines()) < 230
     assert "    python3 tools/dev.py demo\n" in text
     assert "    python3 tools/dev.py test\n" in text
 

@@ -67,20 +67,7 @@ def test_a_mutated_export_ends_in_a_log_or_in_one_line(tmp_path):
     exports = [app_exports.racebox(ride), app_exports.vbo(ride), app_exports.aim(ride), app_exports.sensorlog(ride)]
     exports += [app_exports.racechrono(ride), app_exports.sensor_kinetics(ride)["Ride_accm.csv"]]
     random = np.random.default_rng(5)
-    tokens = [
-        b"nan",
-        b"inf",
-        b"1e308",
-        b"99999999999999999999",
-        b'"',
-        b",",
-        b";",
-        b"\n",
-        b"\x00",
-        b"-",
-        b"\xff\xfe",
-        b"25:61:99",
-    ]
+    tokens = [*b'nan inf 1e308 99999999999999999999 " , ; - 25:61:99'.split(), b"\n", b"\x00", b"\xff\xfe"]
     gyro = app_exports.sensor_kinetics(ride)["Ride_gyrm.csv"]
     ended = {"read": 0, "refused": 0}
     for k in range(120):

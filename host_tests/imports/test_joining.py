@@ -101,8 +101,8 @@ def test_samples_that_come_late_are_put_in_order(tmp_path):
     lines = app_exports.any_table(ride).splitlines()
     lines[101], lines[103] = lines[103], lines[101]
     (tmp_path / "log.csv").write_text("\n".join(lines))
-    names = {"t": "Millis", "ax": "Acc_X", "ay": "Acc_Y", "az": "Acc_Z", "gx": "Gyro_X", "gy": "Gyro_Y", "gz": "Gyro_Z"}
-    found = api.import_recording(tmp_path / "log.csv", names, {"a": "m/s2", "g": "rad/s"})
+    units = {"a": "m/s2", "g": "rad/s", "speed": "km/h"}
+    found = api.import_recording(tmp_path / "log.csv", app_exports.ANY_NAMES, units)
     assert np.allclose(found.log.accel_g, ride.phone_g, atol=1e-5)
 
 
@@ -129,8 +129,8 @@ def test_from_and_to_count_from_the_recordings_own_start(tmp_path):
     assert table["t_s"][[0, -1]] == pytest.approx([5.0, 12.5])
     whole = api.import_recording(source)
     assert table["ax_g"][0] == pytest.approx(whole.log.accel_g[np.searchsorted(whole.log.t_s + 0.01, 5.0), 0], abs=1e-5)
-    told = np.flatnonzero(np.isfinite(table["utc_s"]))
-    assert table["utc_s"][told[0]] - table["t_s"][told[0]] == pytest.approx(app_exports.START_UTC_S, abs=0.02)
+    known = np.flatnonzero(np.isfinite(table["utc_s"]))
+    assert table["utc_s"][known[0]] - table["t_s"][known[0]] == pytest.approx(app_exports.START_UTC_S, abs=0.02)
     late = ["--from", 100]
     command.refused(
         tmp_path, "import", source, "--out", out, *late, words="lasts 28.0 s: there is nothing from 100 s on"

@@ -11,16 +11,7 @@ from kickstand_tools import api
 from kickstand_tools.imports import times, units
 from kickstand_tools.logs import csv_reader
 
-NAMES = {
-    "t": "Millis",
-    "ax": "Acc_X",
-    "ay": "Acc_Y",
-    "az": "Acc_Z",
-    "gx": "Gyro_X",
-    "gy": "Gyro_Y",
-    "gz": "Gyro_Z",
-    "speed": "Speed_kmh",
-}
+NAMES = app_exports.ANY_NAMES
 UNITS = {"a": "m/s2", "g": "rad/s", "speed": "km/h"}
 COLUMNS = ",".join(f"{key}={name}" for key, name in NAMES.items())
 DRESSES = {

@@ -14,7 +14,7 @@ from kickstand_tools.logs.stretch import Stretch
 
 TRACK = ("lat_deg", "lon_deg", "utc_s")
 HEADER = "t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps,lat_deg,lon_deg,utc_s\n"
-TOLD = range(3, 400, 20)  # rows that have a position
+PLACED = range(3, 400, 20)  # rows that have a position
 
 
 def place(k: int) -> tuple[float, float, float]:
@@ -24,12 +24,12 @@ def place(k: int) -> tuple[float, float, float]:
 def text(n: int = 400, t: str = "{:.2f}") -> str:
     rows = []
     for k in range(n):
-        cells = "{:.7f},{:.7f},{:.3f}".format(*place(k)) if k in TOLD else ",,"
+        cells = "{:.7f},{:.7f},{:.3f}".format(*place(k)) if k in PLACED else ",,"
         rows.append(f"{t.format(k / 100)},0.0{k % 7},1.0,0.0{k % 3},0.{k % 9},0.5,0.1,{cells}\n")
     return HEADER + "".join(rows)
 
 
-def told(log: Log) -> list[tuple[int, tuple[float, ...]]]:
+def placed(log: Log) -> list[tuple[int, tuple[float, ...]]]:
     """(hundredths of a second by the recorder's clock, position and time) of each row that has one."""
     assert np.array_equal(np.isfinite(log.lat_deg), np.isfinite(log.utc_s))
     rows = np.flatnonzero(np.isfinite(log.lat_deg) & np.isfinite(log.lon_deg))
@@ -39,7 +39,7 @@ def told(log: Log) -> list[tuple[int, tuple[float, ...]]]:
     ]
 
 
-def expected(rows: Iterable[int] = TOLD) -> list:
+def expected(rows: Iterable[int] = PLACED) -> list:
     return [(k, pytest.approx(place(k), rel=0, abs=1e-8)) for k in rows]
 
 
@@ -48,16 +48,16 @@ def test_they_are_read_in_any_block_and_cut_like_all_else(monkeypatch, block_byt
     monkeypatch.setattr(reader, "BLOCK_BYTES", block_bytes)
     monkeypatch.setattr(reader, "BLOCK_SAMPLES", 55)
     log = read_log(io.StringIO(text()))
-    assert told(log) == expected()
-    assert told(read_log(log)) == expected()
-    assert told(read_log(Stretch(log, 1.0, 2.0))) == expected(range(103, 200, 20))
-    assert told(read_log(Stretch(io.StringIO(text()), 1.0, 2.0))) == expected(range(103, 200, 20))
+    assert placed(log) == expected()
+    assert placed(read_log(log)) == expected()
+    assert placed(read_log(Stretch(log, 1.0, 2.0))) == expected(range(103, 200, 20))
+    assert placed(read_log(Stretch(io.StringIO(text()), 1.0, 2.0))) == expected(range(103, 200, 20))
 
 
 def test_times_that_are_spread_keep_them_in_their_rows():
     """Times in tenths of a second: ten rows share one."""
     log = read_log(io.StringIO(text(t="{:.1f}")))
-    assert np.flatnonzero(np.isfinite(log.lat_deg)).tolist() == list(TOLD)
+    assert np.flatnonzero(np.isfinite(log.lat_deg)).tolist() == list(PLACED)
     assert log.lon_deg[23] == pytest.approx(place(23)[1], abs=1e-8)
 
 
@@ -68,19 +68,19 @@ def test_those_of_frozen_readings_go_with_them():
     whole.gyro_dps[100:200] = whole.gyro_dps[100]
     kept = without_frozen(whole)
     assert len(kept.t_s) < 310
-    assert told(kept) == expected([k for k in TOLD if not 100 < k < 200])
+    assert placed(kept) == expected([k for k in PLACED if not 100 < k < 200])
     (block,) = read_blocks(whole)
-    assert np.count_nonzero(np.isfinite(block.measured.lat_deg)) == len(told(kept))
+    assert np.count_nonzero(np.isfinite(block.measured.lat_deg)) == len(placed(kept))
 
 
 def test_a_cut_and_a_written_log_have_them_and_one_without_has_no_columns(tmp_path):
     path = tmp_path / "log.csv"
     path.write_text(text())
     cut_log(path, tmp_path / "cut.csv.gz", 1.0, 2.0)
-    assert told(read_log(tmp_path / "cut.csv.gz")) == expected(range(103, 200, 20))
+    assert placed(read_log(tmp_path / "cut.csv.gz")) == expected(range(103, 200, 20))
     write_log(tmp_path / "again.csv", read_log(path))
     assert (tmp_path / "again.csv").read_text().splitlines()[0] == HEADER.strip()
-    assert told(read_log(tmp_path / "again.csv")) == expected()
+    assert placed(read_log(tmp_path / "again.csv")) == expected()
     bare = Log(np.array([0.0, 0.01]), np.tile([0.0, 1.0, 0.0], (2, 1)), np.zeros((2, 3)))
     write_log(tmp_path / "bare.csv", bare)
     assert (tmp_path / "bare.csv").read_text().splitlines()[0] == "t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps"

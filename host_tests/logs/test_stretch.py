@@ -119,7 +119,7 @@ def test_replay_report_and_plot_take_a_stretch(tmp_path):
 
 @pytest.mark.parametrize("name", ["replay", "smooth", "export"])
 def test_the_lean_of_a_stretch_is_that_of_the_whole_ride_there(tmp_path, name):
-    """What was before tells where upright is, and what comes after too; begun anew it would be off, or not known."""
+    """What was before shows where upright is, and what comes after too; begun anew it would be off, or not known."""
     ride = analysis_rides.short(tmp_path, rate_hz=50)
     whole, part = tmp_path / "whole.csv", tmp_path / "part.csv"
     form = ("--to", "csv") if name == "export" else ()

@@ -125,24 +125,24 @@ def with_speed(log, speed):
 @pytest.mark.parametrize("engine", engines.ENGINES)
 @pytest.mark.parametrize("mps", ["14.0", "0", "0.0"])
 def test_a_speed_in_the_log_reaches_the_meter(tmp_path, engine, mps):
-    """Once a second, a 0 too, and none where a cell is empty: the lean is that of the firmware told the same."""
+    """Once a second, a 0 too, and none where a cell is empty: the lean is that of the firmware with the same speed."""
     log, cal = ride(tmp_path / "log.csv", seconds=10), command.write_cal(tmp_path / "CAL.json")
-    told = {second * 100 for second in range(10)}
-    speed = with_speed(log, [mps if k in told else "" for k in range(1000)])
+    given = {second * 100 for second in range(10)}
+    speed = with_speed(log, [mps if k in given else "" for k in range(1000)])
     parameters = read_calibration(cal).to_firmware()
     leans = {}
     for name, path in ("without", log), ("with", speed):
         meter = replay_engine.ReplayMeter(parameters)
         before, leans[name] = None, []
         for k, (time_us, reading, _) in enumerate(read_log(path).rows()):
-            if name == "with" and k in told:
+            if name == "with" and k in given:
                 meter.measure_speed(float(mps))
             meter.update(reading, 0 if before is None else time_us - before)
             before = time_us
             leans[name].append(meter.lean_deg)
         lean_deg = replayed(path, cal, engine)[0]["lean_deg"]
         assert np.max(np.abs(lean_deg - leans[name])) < (1e-5 if engine == "cpython" else 0.01), name
-    assert np.max(np.abs(np.subtract(leans["with"], leans["without"]))) > 1.0  # it tells the meter something
+    assert np.max(np.abs(np.subtract(leans["with"], leans["without"]))) > 1.0  # it has a say
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)

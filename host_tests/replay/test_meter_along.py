@@ -1,4 +1,4 @@
-"""The fast loop of replay, report and plot gives what the firmware's meter gives sample by sample, and LEAN.csv tells
+"""The fast loop of replay, report and plot gives what the firmware's meter gives sample by sample, and LEAN.csv has
 it to the letter."""
 
 import multiprocessing
@@ -75,7 +75,7 @@ def test_the_file_has_the_values_as_python_writes_them(known, tmp_path):
 
 
 def test_two_processes_write_the_same(known, tmp_path, monkeypatch):
-    """As for a long log, with more blocks than are read ahead; and a second process that ends is told of."""
+    """As for a long log, with more blocks than are read ahead; and a second process that ends is an error."""
     log, calibration = known
     write_log(tmp_path / "log.csv", log)
     monkeypatch.setattr(reader, "BLOCK_BYTES", 50_000)

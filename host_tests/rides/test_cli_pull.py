@@ -69,9 +69,9 @@ def test_rides_become_logs_with_their_calibration(board, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("vehicle", "by_drive", "told"), [("car", True, "car"), ("car", False, None), ("motorcycle", True, None)]
+    ("vehicle", "by_drive", "said"), [("car", True, "car"), ("car", False, None), ("motorcycle", True, None)]
 )
-def test_the_drive_of_a_car_is_known_as_one(vehicle, by_drive, told, board, tmp_path, monkeypatch):
+def test_the_drive_of_a_car_is_known_as_one(vehicle, by_drive, said, board, tmp_path, monkeypatch):
     """Its log then shows no lean. What two poses have aligned was ridden before the board came into the car."""
     made = ride_writer.calibration()
     made.by_drive = by_drive
@@ -80,7 +80,7 @@ def test_the_drive_of_a_car_is_known_as_one(vehicle, by_drive, told, board, tmp_
     put(board, "000/03/00000.rid", ride_writer.blocks(1, ride=3)[0])
     command.works("pull", "--out", tmp_path / "out")
     (path,) = tmp_path.glob("out/*.cal.json")
-    assert json.loads(path.read_text()).get("vehicle") == told
+    assert json.loads(path.read_text()).get("vehicle") == said
 
 
 def test_another_ride_of_the_same_number_gets_a_file_of_its_own(board, tmp_path):

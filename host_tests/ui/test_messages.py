@@ -11,21 +11,11 @@ from kickstand_tools import firmware_path, refusals
 
 CLASSES = {name for name in vars(errors) if name[0].isupper()}
 # Codes that a name or a call gives, not a text beside the class
-INDIRECT = {
-    "other-side",
-    "mount-moved",
-    "sensor-lost",
-    "sensor-frozen",
-    "sensor-silent",
-    "sensor-reset",
-    "out-of-memory",
-    "out-of-room",
-    "flash-fault",
-    "card-fault",
-    "usb-fault",
-    "incomplete",
-    "no-memory",
-}
+INDIRECT = {"other-side", "mount-moved", "incomplete", "no-memory", "out-of-memory", "out-of-room"}
+INDIRECT |= {"sensor-lost", "sensor-frozen", "sensor-silent", "sensor-reset", "flash-fault", "card-fault", "usb-fault"}
+# Of these the display names the setting
+OTHER_SETTINGS = {"not-allowed", "card-pins", "one-i2c", "no-such-pin", "i2c-pins", "uart-pins", "aliasing"}
+CONSOLE_ONLY = {"wrong-code"}  # found while modules are imported, before there is a display
 # Values that fit the words of any code: numbers, names, and long ones of both
 VALUES = {"dead-axis": ("x", 0.1), "odd-axis": ("x", 0.1, 1.0), "side-tilted": ("+x", 25.0, 20.0)}
 VALUES |= {"not-one-g": ("kickstand", 1.23), "mount-moved": ("between-stops", 12.0), "few-events": (4, 5, 12)}
@@ -56,14 +46,6 @@ def worded(table):
 
 def test_each_code_has_words_for_the_display():
     assert worded(messages._LINES) == set(codes()) - OTHER_SETTINGS - CONSOLE_ONLY | INDIRECT
-
-
-# Of these the display names the setting
-OTHER_SETTINGS = {"not-allowed", "card-pins", "one-i2c", "no-such-pin", "i2c-pins", "uart-pins", "aliasing"}
-
-
-# Told while modules are imported, before there is a display
-CONSOLE_ONLY = {"wrong-code"}
 
 
 def test_other_settings_are_named():

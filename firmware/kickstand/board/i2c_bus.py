@@ -12,6 +12,11 @@ _HALF_PERIOD_US = 5  # of SCL while a bus is freed: 100 kHz
 _TIMEOUT_BITS = 2000
 
 
+def _set(pin, value):
+    pin.value(value)
+    sleep_us(_HALF_PERIOD_US)
+
+
 def free(sda_pin, scl_pin):
     """Make a device that holds SDA low let go of it; True if SDA is high afterwards. Pins: GPIO numbers.
 
@@ -24,16 +29,12 @@ def free(sda_pin, scl_pin):
         sleep_us(_HALF_PERIOD_US)
         if sda.value():
             break
-        scl.value(0)
-        sleep_us(_HALF_PERIOD_US)
+        _set(scl, 0)
         scl.value(1)
     scl.value(0)
-    sda.value(0)
-    sleep_us(_HALF_PERIOD_US)
-    scl.value(1)
-    sleep_us(_HALF_PERIOD_US)
-    sda.value(1)
-    sleep_us(_HALF_PERIOD_US)
+    _set(sda, 0)
+    _set(scl, 1)
+    _set(sda, 1)
     return bool(sda.value())
 
 

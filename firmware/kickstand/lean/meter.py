@@ -101,11 +101,8 @@ class LeanMeter:
         """Take the trim found so far into the calibration, if the bike stands, the trim is certain enough and it
         has changed: True then."""
         angle = self.trim_deg
-        if (
-            not self.at_rest
-            or self.filter.trim.variance > TRIM_MAX_VARIANCE
-            or abs(angle - self.calibration.trim_deg) < TRIM_STEP_DEG
-        ):
+        certain = self.at_rest and self.filter.trim.variance <= TRIM_MAX_VARIANCE
+        if not certain or abs(angle - self.calibration.trim_deg) < TRIM_STEP_DEG:
             return False
         self.calibration.trim_deg = angle
         return True

@@ -74,18 +74,11 @@ def open_speed(settings):
 
 
 def _open_uart(settings):
-    try:
-        return UART(
-            settings.GPS_UART,
-            settings.GPS_BAUD,
-            # Nothing is sent, but a UART takes two pins: on rp2 its default is a pin of the sensor.
-            tx=Pin(settings.GPS_TX),
-            rx=Pin(settings.GPS_RX),
-            rxbuf=RX_BUFFER,
-            timeout=0,
-        )
+    pins = settings.GPS_TX, settings.GPS_RX
+    try:  # nothing is sent, but a UART takes two pins: on rp2 its default is a pin of the sensor
+        tx, rx = Pin(pins[0]), Pin(pins[1])
+        return UART(settings.GPS_UART, settings.GPS_BAUD, tx=tx, rx=rx, rxbuf=RX_BUFFER, timeout=0)
     except ValueError as error:
-        pins = settings.GPS_TX, settings.GPS_RX
         raise SettingsError("uart-pins", "GPS_TX / GPS_RX", *pins, settings.GPS_UART, str(error))
 
 

@@ -79,10 +79,8 @@ def recording(recorder):
 
 def maxima(meter):
     """The largest lean to each side since the last reset of the maxima."""
-    return (
-        "Max left   %3d%s" % (int(meter.max_left_deg + 0.5), DEGREE),
-        "Max right  %3d%s" % (int(meter.max_right_deg + 0.5), DEGREE),
-    )
+    left, right = int(meter.max_left_deg + 0.5), int(meter.max_right_deg + 0.5)
+    return "Max left   %3d%s" % (left, DEGREE), "Max right  %3d%s" % (right, DEGREE)
 
 
 def acceleration(meter):
@@ -95,28 +93,22 @@ def acceleration(meter):
 def cornering(meter):
     """Lateral and vertical g of a car."""
     left = meter.smooth_force[0]
-    return (
-        "%-5s   %5.2f g" % ("Left" if left > 0.005 else "Right", abs(left)),
-        "Up      %5.2f g" % meter.smooth_force[1],
-    )
+    side = "Left" if left > 0.005 else "Right"
+    return "%-5s   %5.2f g" % (side, abs(left)), "Up      %5.2f g" % meter.smooth_force[1]
 
 
 def formula(meter):
     """Nicolae's formula as published beside the filter's lean: this shows why there is a filter."""
-    return (
-        "Formula   %4d%s" % (round(meter.lean_formula_deg), DEGREE),
-        "Filter    %4d%s" % (round(meter.lean_deg), DEGREE),
-    )
+    leans = round(meter.lean_formula_deg), round(meter.lean_deg)
+    return "Formula   %4d%s" % (leans[0], DEGREE), "Filter    %4d%s" % (leans[1], DEGREE)
 
 
 def raw(meter):
     """Calibrated readings in the sensor's own axes."""
     force, rate = vector(), vector()
     meter.calibration.apply(meter.reading, force, rate)
-    return (
-        "%5.2f%5.2f%5.2fg" % (force[0], force[1], force[2]),
-        "%4d%4d%4d %s/s" % (int(rate[0]), int(rate[1]), int(rate[2]), DEGREE),
-    )
+    rates = "%4d%4d%4d %s/s" % (int(rate[0]), int(rate[1]), int(rate[2]), DEGREE)
+    return "%5.2f%5.2f%5.2fg" % tuple(force), rates
 
 
 def not_aligned(meter, seconds, todo="On stand: press"):

@@ -19,9 +19,8 @@ ENDED = 5
 class Wizard:
     """A view (see screen.py) that also takes each sample, until it has ended.
 
-    chip, rate_hz, seconds: as for PoseTaker. calibration: the ActiveCalibration. A subclass has _start(), which asks
-    for the first pose; _next_pose(), which begins one; and, for what is taken, _settled(accel, now_ms),
-    _progress(done, total), _spoilt(problem, now_ms) and _pose_done(pose, now_ms), which may raise a Refusal.
+    chip, rate_hz, seconds: as for PoseTaker. calibration: the ActiveCalibration. A subclass says what is asked for, and
+    what is done with what was taken.
     """
 
     def __init__(self, chip, rate_hz, seconds, calibration):
@@ -51,8 +50,23 @@ class Wizard:
         else:
             self._progress(*self._taker.progress())
 
+    def _start(self):
+        """Ask for the first pose."""
+
+    def _next_pose(self):
+        """Begin the next pose."""
+
     def _settled(self, accel, now_ms):
-        """It has lain still for half a second. accel: the mean reading (3, g)."""
+        """The sensor has been still for half a second. accel: the mean reading (3, g)."""
+
+    def _progress(self, done, total):
+        """done of total samples of the pose are taken."""
+
+    def _spoilt(self, problem, now_ms):
+        """The pose was refused. problem: a CaptureError."""
+
+    def _pose_done(self, pose, now_ms):
+        """A StillPose is complete. May raise a Refusal, which is shown."""
 
     def lines(self, now_ms):
         if self._state in (NOTICE, RESULT) and ticks_diff(now_ms, self._until_ms) >= 0:

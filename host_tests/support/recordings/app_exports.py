@@ -312,6 +312,11 @@ def aim(ride: Riding, quoted: bool = True, up_sign: float = -1.0) -> str:
     return "\n".join(",".join(row + [""] * (len(names) - len(row))) for row in table) + "\n"
 
 
+_AXES = [f"{sensor}_{axis}" for sensor in ("Acc", "Gyro") for axis in "XYZ"]
+# the columns of any_table()
+ANY_NAMES = dict(zip(("t", "ax", "ay", "az", "gx", "gy", "gz", "speed"), ("Millis", *_AXES, "Speed_kmh")))
+
+
 def any_table(ride: Riding, separator: str = ",", comma: bool = False) -> str:
     """A logger that nobody knows: ms, m/s2, rad/s, km/h."""
     names = ["Millis", "Acc_X", "Acc_Y", "Acc_Z", "Gyro_X", "Gyro_Y", "Gyro_Z", "Speed_kmh", "Note"]

@@ -4,14 +4,13 @@ import gzip
 import itertools
 import struct
 import zipfile
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from typing import IO
 
-from ..errors import InputError, cause
-from ..logs.source import open_input
+from ..errors import InputError
+from ..logs.source import errors_of, open_input
 
 _EXCEL = b"\xd0\xcf\x11\xe0"  # its older files begin so; the newer are zips
 SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # what is looked at in a folder or a zip
@@ -54,15 +53,9 @@ def read_pieces(source: Path | str) -> list[Piece]:
     Raises InputError for what is not there, is damaged, empty, no text, or over MOST_BYTES when unpacked.
     """
     path = Path(source)
-    try:
+    with errors_of(str(path)):
         pieces = [_piece(name, content) for name, content in _bounded(path)]
         pieces = [piece for piece in pieces if piece is not None] or _no_text(path)
-    except gzip.BadGzipFile as error:
-        raise InputError(f"{path} is not a gzip file: unpacked recordings have names without .gz") from error
-    except (zipfile.BadZipFile, NotImplementedError, zlib.error, EOFError) as error:
-        raise InputError(f"{path} is damaged or cut short: copy it again") from error
-    except (OSError, ValueError) as error:
-        raise InputError(f"{path} cannot be read: {cause(error)}") from error
     pieces = [piece for piece in pieces if piece.text.strip() or piece.name.endswith(".parquet")]
     if not pieces:
         raise InputError(f"{path} holds no recording: give the file, the folder or the zip that an app has exported")
@@ -80,7 +73,7 @@ def _bounded(path: Path) -> Iterator[tuple[str, bytes]]:
 
 
 def _read(file: IO[bytes]) -> bytes:
-    """No more than tells that it is too much."""
+    """At most a byte more than is allowed, which shows that it is too much."""
     return file.read(MOST_BYTES + 1)
 
 

@@ -30,7 +30,7 @@ class Taken:
 
 
 def rate_hz(time_ns: Nanoseconds) -> float:
-    """Samples in a second, without gaps; 0 where there are too few to tell."""
+    """Samples in a second, without gaps; 0 where there are too few."""
     steps = np.diff(time_ns[time_ns > REPEATED])
     if not np.any(steps > 0):
         return 0.0

@@ -75,9 +75,9 @@ def unit_in(name: str) -> str:
 
 
 def names_in(line: str) -> list[str]:
-    """The cells of a line of names, none of one that is no CSV."""
+    """The cells of a line of names, none of one that is blank or no CSV."""
     try:
-        return [cell.strip() for cell in cells_of(line, separator_of(line))]
+        return [] if not line.strip() else [cell.strip() for cell in cells_of(line, separator_of(line))]
     except csv.Error:
         return []
 

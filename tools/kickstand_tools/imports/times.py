@@ -26,7 +26,7 @@ _CLOCK = re.compile(r"^\s*(?:(\d+):)?(\d{1,2}):(\d{1,2}(?:\.\d+)?)\s*$")
 def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") -> Nanoseconds:
     """Times (n) in ns, NO_TIME for a cell that holds none.
 
-    unit_name: of numbers, "" if it is to be told from their size and steps. Raises InputError where few cells are
+    unit_name: of numbers, "" to find it from their size and steps. Raises InputError where few cells are
     times. where: what messages call them.
     """
     numbers = numbers_of(cells)
@@ -57,7 +57,7 @@ def _date_ns(text: str) -> int:
 
 
 def time_unit(cells: Cells, given: str = "") -> str:
-    """The unit of times, told from their size and steps where it is not given; "date or clock" where they are these."""
+    """The unit of times, by their size and steps where it is not given; "date or clock" where they are these."""
     numbers = numbers_of(cells)
     if np.count_nonzero(np.isfinite(numbers)) <= np.count_nonzero(filled(cells)) // 2:
         return DATES

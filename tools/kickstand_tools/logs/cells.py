@@ -11,7 +11,7 @@ from ..errors import InputError
 from .csv_reader import cells_of
 
 COLUMNS = ("t_s", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")
-TRACK = ("speed_mps", "lat_deg", "lon_deg", "utc_s")  # what a satellite receiver tells, now and then
+TRACK = ("speed_mps", "lat_deg", "lon_deg", "utc_s")  # what a satellite receiver measures, now and then
 OPTIONAL = (*TRACK, "temp_c")  # may be empty in a row
 
 # A larger value is in another unit (m/s2, counts): the sensor's widest ranges are 16 g and 2000 deg/s.

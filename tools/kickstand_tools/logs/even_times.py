@@ -27,7 +27,7 @@ CROWD = 50  # samples: so many of one time are a clock that stood still
 ALLOWED = 0.6  # of a tick, from the recorded time: half of it, and some more for the ends, where the mean is less sure
 SHORTEST_S = 2e-6  # step: times are handed on in whole microseconds
 CONTEXT = 2000  # samples before and after a block that have a say in its times
-SAID_S = 0.002  # a shift of the times that is worth a remark
+SAID_S = 0.002  # a larger shift of the times is remarked on
 
 
 def even_times(t_s: ArrayLike, name: str = "the log") -> Array:

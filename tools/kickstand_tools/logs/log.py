@@ -12,7 +12,7 @@ from ..errors import InputError
 from .cells import TRACK
 from .table import Array, Table
 
-ROOM_TEMP_C = 25.0  # what the firmware's modules are told where a log has no temperature
+ROOM_TEMP_C = 25.0  # what the firmware's modules get where a log has no temperature
 
 FirmwareRow = tuple[int, list[float], float]
 

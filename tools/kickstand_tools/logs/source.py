@@ -1,8 +1,10 @@
 """What a log is read from: a file by its path, gzipped if its name ends in .gz, or an open file of text or bytes."""
 
+import contextlib
 import gzip
 import os
 import stat
+import zipfile
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -56,7 +58,7 @@ def chunks(source: File, size: int, remarks: list[Notice] | None = None) -> Iter
     name = name_of(source)
     if isinstance(source, (Path, str)) and Path(source).is_dir():
         raise InputError(f"{name} is a directory: give the name of a log in it")
-    try:
+    with errors_of(name):
         if isinstance(source, (Path, str)):
             with (
                 open_input(source) as packed,
@@ -65,14 +67,19 @@ def chunks(source: File, size: int, remarks: list[Notice] | None = None) -> Iter
                 yield from _pieces(name, file, packed, size, remarks)
         else:
             yield from _pieces(name, source, source, size, remarks)
+
+
+@contextlib.contextmanager
+def errors_of(name: str) -> Iterator[None]:
+    """What goes wrong while a file of this name is read and unpacked becomes an InputError."""
+    try:
+        yield
     except gzip.BadGzipFile as error:
         if "Not a gzipped" in str(error):
-            raise InputError(f"{name} is not a gzip file: unpacked logs have names without .gz") from error
+            raise InputError(f"{name} is not a gzip file: unpacked files have names without .gz") from error
         raise InputError(f"{name} is damaged: copy it again") from error
-    except (EOFError, zlib.error) as error:
+    except (EOFError, zlib.error, zipfile.BadZipFile, NotImplementedError) as error:
         raise InputError(f"{name} is damaged or cut short: copy it again") from error
-    except FileNotFoundError as error:
-        raise InputError(f"{name}: there is no such file") from error
     except (OSError, ValueError) as error:
         raise InputError(f"{name} cannot be read: {cause(error)}") from error
 

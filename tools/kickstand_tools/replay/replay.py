@@ -28,7 +28,7 @@ from .meter_along import MeterAlong
 
 _CHUNK = 500  # samples between two calls of progress while an emulated Pico works
 
-_LONG_BYTES = 20 << 20  # of the file: a quarter of an hour at 200 Hz: of less a second process is not worth its start
+_LONG_BYTES = 20 << 20  # of the file: a quarter of an hour at 200 Hz: of less a second process costs more than it saves
 
 _RESULT_BYTES = struct.calcsize(replay_engine.RESULT)
 _EMULATED_S = 1e6  # a log is as long as it is
@@ -114,7 +114,7 @@ def replay_blocks(
     log: Source, calibration: CalibrationFile, engine: str, progress: Progress | None, notices: list[Notice]
 ) -> Iterator[tuple[Block, Array]]:
     """Each block of the log with the engine's results for it (n, COLUMNS), NaN where the readings froze: there the
-    engine is told of a gap. A car's display shows no lean, so lean_sigma_deg is NaN throughout. notices is appended to
+    engine gets a gap. A car's display shows no lean, so lean_sigma_deg is NaN throughout. notices is appended to
     at the end."""
     car = calibration.vehicle == "car"
     whole, stretch = apart(log)

@@ -50,7 +50,7 @@ class Turn:
 class Block:
     """One block: the fields of its head, and its turns. time_us: of the last sample before it, since power-on.
     centidegrees: the temperature. delay_tenths_ms: of the gyro's low-pass, 0 where the firmware did not store it. body:
-    the calibration's bytes. vehicle: what the board's config.py names, "" where it was not asked: no block tells."""
+    the calibration's bytes. vehicle: what the board's config.py names, "" where it was not asked: it is in no block."""
 
     ride: int
     sequence: int

@@ -19,8 +19,8 @@ def header(track: Sequence[str]) -> tuple[str, ...]:
 def rows(blocks: Iterable[Block], track: Sequence[str], from_us: int = 0) -> Iterator[list[str]]:
     """One row a turn of the board's loop: the mean of its samples at the time of the last, in s since from_us.
 
-    Values have enough digits to tell one count of the chip from the next. The temperature stands in the first row of
-    each block. track: as header() takes it.
+    Values have enough digits to separate one count of the chip from the next. The temperature stands in the first row
+    of each block. track: as header() takes it.
     """
     for block in blocks:
         lsb, gyro_lsb = block.accel_lsb_per_g, block.gyro_lsb_tenths / 10
@@ -30,14 +30,14 @@ def rows(blocks: Iterable[Block], track: Sequence[str], from_us: int = 0) -> Ite
             row += [f"{total / turn.n / lsb:.7f}" for total in turn.sums[:3]]
             row += [f"{total / turn.n / gyro_lsb:.6f}" for total in turn.sums[3:]]
             if track:
-                told = _told(turn)
-                row += [told[name] for name in track]
+                cells = _track_cells(turn)
+                row += [cells[name] for name in track]
             row.append(temperature)
             yield row
             temperature = ""
 
 
-def _told(turn: Turn) -> dict[str, str]:
+def _track_cells(turn: Turn) -> dict[str, str]:
     """What came from the speed source with a turn: the cells of TRACK."""
     cells: dict[str, str] = dict.fromkeys(TRACK, "")
     if turn.speed_mps is not None:

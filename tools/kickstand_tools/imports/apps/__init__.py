@@ -1,1 +1,1 @@
-"""The formats that are known, one module each: finds() tells its files apart, read() makes a Recording of them."""
+"""The formats that are known, one module each: finds() picks its files, read() makes a Recording of them."""
