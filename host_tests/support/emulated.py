@@ -11,7 +11,6 @@ import pytest
 from kickstand_tools.errors import InputError
 from kickstand_tools.simulation.scripted.script import Ride, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
-from kickstand_workshop.soak import watch
 
 PART = Sensor(seed=1, share=0.5)  # an ordinary part, stuck on at some angle
 
@@ -77,7 +76,8 @@ def leaning(lean_deg: float) -> Callable[[float], tuple]:
 
 def shown_lean(lines: list[str]) -> float | None:
     """Degrees on the display, > 0 to the right; None where it shows no lean, or one that is only half written."""
-    return watch.shown_lean(lines[0])
+    match = re.fullmatch(r"Lean +(\d+)° (right|left |     )[ *]", lines[0])  # *: it records, or is listened to
+    return match and float(match[1]) * (-1 if match[2] == "left " else 1)
 
 
 def shows(device, pattern: str, limit_s: float) -> re.Match:
