@@ -3,7 +3,7 @@
 
     python3 tools/dev.py demo         the firmware on a simulated board, live in the terminal
     python3 tools/dev.py test         ruff, pyright and every test; further arguments go to pytest
-    python3 tools/dev.py mutants imu  which single changes of a room's code its tests do not notice
+    python3 tools/dev.py mutants imu  which single changes of a package's code its tests do not notice
 
 They make .venv beside pyproject.toml and install into it, again only when pyproject.toml has changed.
 """

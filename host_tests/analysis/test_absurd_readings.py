@@ -30,9 +30,9 @@ def test_a_lean_filter_that_has_lost_itself(seed):
     said = [sentence(notice) for notice in notices if notice.code == "absurd-readings"]
     assert len(said) == np.any(lost)
     if said:
-        told = re.match(r"readings that no vehicle gives, at (\S+) s up to 2\d\d\d deg/s and 1.0 g", said[0])
-        assert told
-        assert float(told[1]) == pytest.approx(ride.t_s[np.argmax(lost)], abs=0.06)
+        found = re.match(r"readings that no vehicle gives, at (\S+) s up to 2\d\d\d deg/s and 1.0 g", said[0])
+        assert found
+        assert float(found[1]) == pytest.approx(ride.t_s[np.argmax(lost)], abs=0.06)
 
 
 def test_some_of_them_do():

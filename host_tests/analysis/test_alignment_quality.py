@@ -123,7 +123,7 @@ def test_a_ride_without_straights_does_not_show_it(tmp_path):
     quality = overview(open_ride(path, None)).quality
     assert (quality.roll_deg, quality.pitch_deg, quality.yaw_deg) == (None, None, None)
     said = command.works("report", path).out
-    assert "Alignment: not enough straight riding to tell how far it is off." in said
+    assert "Alignment: not enough straight riding to know how far it is off." in said
 
 
 def test_nothing_is_a_negative_nothing():

@@ -16,6 +16,7 @@ from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.stops.brake_test import Stop
 from kickstand_tools.analysis.summary import Peak
 from kickstand_tools.simulation.scripted import script
+from rich.console import Console
 
 pytest.importorskip("matplotlib")
 pytest.importorskip("plotly")
@@ -24,6 +25,20 @@ pytest.importorskip("plotly")
 @pytest.fixture(scope="module")
 def ride(tmp_path_factory):
     return analysis_rides.short(tmp_path_factory.mktemp("ride"), speed_hz=1)
+
+
+def calibration(directory, **changed):
+    """The path of a CAL.json with these changes."""
+    path = directory / "changed.json"
+    path.write_text(json.dumps(analysis_rides.CALIBRATION | changed))
+    return path
+
+
+def printed(seen):
+    """The lines of the report in a terminal of 80 columns."""
+    console = Console(width=80, record=True, file=io.StringIO())
+    console.print(report.page(seen))
+    return console.export_text().split("\n")
 
 
 def test_a_report_has_the_ride_in_figures(ride):
@@ -47,10 +62,8 @@ def test_a_report_has_the_ride_in_figures(ride):
 
 
 def test_what_is_not_known_is_no_figure(ride, tmp_path):
-    (tmp_path / "cal.json").write_text(
-        json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": [[1, 0, 0], [0, 0, 1], [0, -1, 0]]})
-    )
-    seen = overview(open_ride(ride, tmp_path / "cal.json"))
+    up_is_back = calibration(tmp_path, vehicle_from_sensor=[[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+    seen = overview(open_ride(ride, up_is_back))
     assert [notice.code for notice in seen.notices] == ["up-off"]
     total = seen.summary
     total.left_deg = total.right_deg = total.brake_g = total.accel_g = Peak()  # as where nothing was sure enough
@@ -65,12 +78,11 @@ def test_time_without_readings_is_said(ride, tmp_path):
     header, *rows = ride.read_text().splitlines()
     log = tmp_path / "gap.csv"
     log.write_text("\n".join([header, *rows[:1200], *rows[1240:]]) + "\n")
-    beside = ride.with_name(ride.name.replace(".csv", ".cal.json"))
-    (tmp_path / "gap.cal.json").write_bytes(beside.read_bytes())
+    given = (log, "--calibration", calibration(tmp_path))
     step_s = float(rows[1].split(",")[0]) - float(rows[0].split(",")[0])
-    data = json.loads(command.works("report", log, "--json").out)
+    data = json.loads(command.works("report", *given, "--json").out)
     assert data["missing_s"] == pytest.approx(41 * step_s, abs=0.06)
-    assert "No readings" in command.works("report", log).out
+    assert "No readings" in command.works("report", *given).out
 
 
 def test_the_page_says_the_same(ride, monkeypatch):
@@ -86,25 +98,17 @@ def test_the_page_says_the_same(ride, monkeypatch):
 @pytest.mark.parametrize(("unsure_s", "line"), [(0.9, ""), (1.0, "0:01"), (65.4, "1:05")])
 def test_how_long_the_lean_was_not_sure(ride, unsure_s, line):
     """On the page from a second on, and always in the JSON."""
-    from rich.console import Console
-
     seen = overview(open_ride(ride, None))
     seen.summary.not_sure_s = unsure_s
-    console = Console(width=80, record=True, file=io.StringIO())
-    console.print(report.page(seen))
-    said = re.findall(r"^Lean not sure +(\S+) *$", console.export_text(), re.M)
-    assert said == ([line] if line else [])
+    said = [row.split()[3:] for row in printed(seen) if row.startswith("Lean not sure")]
+    assert said == ([[line]] if line else [])
     assert report.as_data(seen)["lean_unsure_s"] == unsure_s
 
 
 def test_the_longest_of_stops_fits_a_line(ride):
-    from rich.console import Console
-
     seen = overview(open_ride(ride, None))
     seen.stops = [Stop(36000.0, 36030.0, 69.4, 1000.0, 10.5, 20.5, 100.0, -12.5, 9.0, "integrated")]
-    console = Console(width=80, record=True, file=io.StringIO())
-    console.print(report.page(seen))
-    (line,) = [line for line in console.export_text().split("\n") if line.startswith("10:00:00")]
+    (line,) = [line for line in printed(seen) if line.startswith("10:00:00")]
     assert line.rstrip().endswith("12.5 right")
 
 
@@ -114,42 +118,37 @@ def test_without_a_speed_stops_are_marked(tmp_path):
     assert "* no speed in the log: integrated" in said
 
 
-def test_without_a_speed_it_may_be_that_nothing_can_be_told(tmp_path):
-    moving = analysis_rides.write(tmp_path, [script.upright(4), script.accelerate(15, 5), script.straight(20)])
-    assert "Stops: not told, the log has no speed." in command.works("report", moving).out
-    ride = [script.upright(4), script.accelerate(15, 5), script.straight(20)]
-    moving = analysis_rides.write(tmp_path, ride, speed_hz=1)
-    assert "No stop from over 10 km/h found." in command.works("report", moving).out
+def test_without_a_speed_it_may_be_that_nothing_is_known(tmp_path):
+    moving = [script.upright(4), script.accelerate(15, 5), script.straight(20)]
+    for speed_hz, words in ((0, "Stops: not known, the log has no speed."), (1, "No stop from over 10 km/h found.")):
+        ride = analysis_rides.write(tmp_path, moving, speed_hz=speed_hz)
+        assert words in command.works("report", ride).out
 
 
-def turned_round(directory, tilt_deg=0.0):
+def turned_round(directory, tilt_deg=0.0, **changed):
     """CAL.json with forward and left the wrong way; tilt_deg: and up that far off, as with swapped poses."""
     s, c = np.sin(np.radians(tilt_deg)), np.cos(np.radians(tilt_deg))
-    cal = directory / "wrong.json"
     matrix = [[-c, s, 0], [s, c, 0], [0, 0, -1]]
-    data = analysis_rides.CALIBRATION | {"vehicle_from_sensor": matrix, "kickstand_side": "left"}
-    cal.write_text(json.dumps(data))
-    return cal
+    return calibration(directory, vehicle_from_sensor=matrix, kickstand_side="left", **changed)
 
 
-def test_a_kickstand_on_the_other_side_is_told(ride, tmp_path):
+def test_a_kickstand_on_the_other_side_is_noticed(ride, tmp_path):
     cal = turned_round(tmp_path)
     line = "forward and backward are exchanged: calibrate two --side right?"
     said = command.works("report", ride, "--calibration", cal)
     assert line in said.err
     assert "do all accelerations have the opposite sign?" in said.err
-    assert "Stops: not told" in said.out
+    assert "Stops: not known" in said.out
     assert "MFDD" not in said.out  # of the wrong way round, no figure is right
     data = json.loads(command.works("report", ride, "--calibration", cal, "--json").out)
     assert data["remark"].startswith(line)
     assert data["stops"] == []
     assert line in command.works("plot", ride, "--calibration", cal, "--out", tmp_path / "pictures").err
-    car = tmp_path / "car.json"
-    car.write_text(json.dumps(json.loads(cal.read_text()) | {"vehicle": "car"}))
+    car = turned_round(tmp_path, vehicle="car")
     assert "exchanged: calibrate drive again?" in command.works("report", ride, "--calibration", car).err
 
 
-def test_swapped_poses_are_told(tmp_path):
+def test_swapped_poses_are_noticed(tmp_path):
     segments = [script.upright(4)]
     for _ in range(2):
         segments += [script.accelerate(16, 5), script.straight(8), script.brake(0, 4), script.wait(4)]
@@ -159,10 +158,8 @@ def test_swapped_poses_are_told(tmp_path):
     said = " ".join((shown.out + shown.err).split())
     assert re.search(r"roll [+-]1[01]\.\d°.*: were the poses swapped\?", said)
     assert "forward and backward are exchanged: were the poses swapped?" in said
-    right = json.loads(cal.read_text())
     s, c = np.sin(np.radians(6.0)), np.cos(np.radians(6.0))
-    right["vehicle_from_sensor"] = [[c, s, 0], [-s, c, 0], [0, 0, 1]]
-    cal.write_text(json.dumps(right))
+    cal = calibration(tmp_path, vehicle_from_sensor=[[c, s, 0], [-s, c, 0], [0, 0, 1]])
     said = " ".join(command.works("report", ride, "--calibration", cal).out.split())
     assert ": was it held upright?" in said
     assert "swapped" not in said
@@ -170,9 +167,7 @@ def test_swapped_poses_are_told(tmp_path):
 
 def test_a_stop_that_only_the_speed_knows(ride, tmp_path):
     """Forward is across: neither right nor exchanged."""
-    cal = tmp_path / "across.json"
-    across = {"vehicle_from_sensor": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]]}
-    cal.write_text(json.dumps(analysis_rides.CALIBRATION | across))
+    cal = calibration(tmp_path, vehicle_from_sensor=[[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
     said = command.works("report", ride, "--calibration", cal).out
     assert "No stop" not in said
     assert "The speed falls to a stop, the force says otherwise" in " ".join(said.split())
@@ -185,8 +180,7 @@ def test_a_ride_without_stops(tmp_path):
 
 
 def test_a_car_has_no_lean(ride, tmp_path):
-    cal = tmp_path / "car.json"
-    cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle": "car"}))
+    cal = calibration(tmp_path, vehicle="car")
     said = command.works("report", ride, "--calibration", cal).out
     assert "Max left" not in said
     assert "Max braking" in said
@@ -205,25 +199,25 @@ def test_pictures(ride, tmp_path):
     assert sorted(path.name for path in out.iterdir()) == ["RIDE.html", "RIDE.png"]
 
 
-@pytest.mark.parametrize("name", ["report", "plot"])
 @pytest.mark.parametrize(
-    ("content", "words"),
+    ("name", "content", "words"),
     [
-        (b"", "is empty"),
-        (b"\x7fELF\x00\xff\xfe", "not text"),
-        (b"PK\x03\x04\x00\xff\xfe", "is a zip: if an app has exported it, kickstand import makes a log of it"),
-        (b"lat,lon\n1,2\n", "no column t_s"),
-        ((command.HEADER + "\n0,0,0,1,0,0\n1,0,0,1,0,0,0\n").encode(), "is the line cut?"),
-        ((command.HEADER + "\n0,0,0,1,0,0\n").encode(), "too short: 0 samples"),
-        ((command.HEADER + "\n0,0,0,1,0,0,0\n").encode(), "too short"),
+        (
+            "report",
+            b"PK\x03\x04\x00\xff\xfe",
+            "is a zip: if an app has exported it, kickstand import makes a log of it",
+        ),
+        ("plot", b"\x7fELF\x00\xff\xfe", "not text"),
+        ("report", (command.HEADER + "\n0,0,0,1,0,0\n1,0,0,1,0,0,0\n").encode(), "is the line cut?"),
+        ("plot", (command.HEADER + "\n0,0,0,1,0,0\n").encode(), "too short: 0 samples"),
     ],
 )
 def test_files_that_are_no_rides(tmp_path, name, content, words):
+    """All others: host_tests/logs."""
     log = tmp_path / "log.csv"
     log.write_bytes(content)
-    (tmp_path / "log.cal.json").write_text(json.dumps(analysis_rides.CALIBRATION))
     more = ["--out", tmp_path / "pictures"] if name == "plot" else []
-    command.refused(tmp_path, name, log, *more, words=words)
+    command.refused(tmp_path, name, log, "--calibration", calibration(tmp_path), *more, words=words)
 
 
 @pytest.mark.parametrize("samples", [2, 3, 30])
@@ -263,8 +257,7 @@ def test_a_real_ride(shared_data, tmp_path):
     forward = np.cross(np.cross(up, [0.31, 0.5, 0.2]), up)
     forward /= np.linalg.norm(forward)
     matrix = [np.cross(up, forward).tolist(), up.tolist(), forward.tolist()]
-    cal = tmp_path / "cal.json"
-    cal.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": matrix}))
+    cal = calibration(tmp_path, vehicle_from_sensor=matrix)
     data = json.loads(command.works("report", log, "--calibration", cal, "--json").out)
     assert data["duration_s"] == pytest.approx(105, abs=2)
     assert data["max_speed_mps"]["value"] == pytest.approx(8.6, abs=0.2)

@@ -29,8 +29,8 @@ def log(start_s: float = 0.0) -> api.Log:
     10 to 20 s; a speed each second. start_s: by the log's own clock."""
     ride = app_exports.riding().every(2)  # 100 a second
     row = np.arange(len(ride.t_s))
-    told = (row % (100 // HZ) == 7) & (ride.t_s > 1.0) & ~((ride.t_s > 10.0) & (ride.t_s < 20.0))
-    track = [np.where(told, v, np.nan) for v in (ride.lat_deg, ride.lon_deg, START_S + ride.t_s)]
+    known = (row % (100 // HZ) == 7) & (ride.t_s > 1.0) & ~((ride.t_s > 10.0) & (ride.t_s < 20.0))
+    track = [np.where(known, v, np.nan) for v in (ride.lat_deg, ride.lon_deg, START_S + ride.t_s)]
     speed = np.where(row % 100 == 7, ride.speed_mps, np.nan)
     names = ("lat_deg", "lon_deg", "utc_s")
     return api.Log(start_s + ride.t_s, ride.force_g, ride.rates_dps, speed, **dict(zip(names, track)))
@@ -104,8 +104,8 @@ def test_every_row_of_a_vbo_has_the_place_on_the_line_between_positions(tmp_path
     placed = rows["sats"] == 4
     assert set(rows["sats"]) == {0.0, 4.0}
     assert t_s[0] == pytest.approx(0.0, abs=0.006)
-    told_s = log().t_s[np.isfinite(log().lat_deg)]
-    ends_s = [told_s[0], np.max(told_s[told_s < 15.0]), np.min(told_s[told_s > 15.0]), told_s[-1]]
+    known_s = log().t_s[np.isfinite(log().lat_deg)]
+    ends_s = [known_s[0], np.max(known_s[known_s < 15.0]), np.min(known_s[known_s > 15.0]), known_s[-1]]
     within = [(t_s > begin - 0.005) & (t_s < end + 0.005) for begin, end in zip(ends_s[::2], ends_s[1::2])]
     assert np.array_equal(placed, within[0] | within[1])
     assert np.max(away_m(rows["lat"] / 60, -rows["long"] / 60, t_s)[placed]) < 0.2  # rows have hundredths of a second
@@ -130,11 +130,11 @@ def test_data_frames_have_the_positions_to_the_centimetre(tmp_path, form):
 def test_racechrono_has_places_and_the_time_of_the_satellites(tmp_path):
     lines = exported("racechrono", tmp_path).read_text().split("\n")
     rows = list(csv.DictReader(lines[lines.index("") + 1 :]))[2:]
-    told = [row for row in rows if row["latitude"]]
-    assert len(told) == np.count_nonzero(np.isfinite(log().lat_deg))
-    t_s = np.array([float(row["elapsed_time"]) for row in told])
-    assert [float(row["timestamp"]) for row in told] == pytest.approx(t_s + START_S, abs=2e-3)
-    lat, lon = ([float(row[name]) for row in told] for name in ("latitude", "longitude"))
+    known = [row for row in rows if row["latitude"]]
+    assert len(known) == np.count_nonzero(np.isfinite(log().lat_deg))
+    t_s = np.array([float(row["elapsed_time"]) for row in known])
+    assert [float(row["timestamp"]) for row in known] == pytest.approx(t_s + START_S, abs=2e-3)
+    lat, lon = ([float(row[name]) for row in known] for name in ("latitude", "longitude"))
     assert np.max(away_m(lat, lon, t_s)) < 0.05
 
 
@@ -145,8 +145,8 @@ def test_the_time_of_the_satellites_goes_before_any_other(tmp_path, form):
         out = exported(form, tmp_path, ride)
         if form == "gpx":
             point = gpxpy.parse(out.read_text()).tracks[0].segments[-1].points[-1]
-            told = np.isfinite(log().utc_s) & (log().t_s <= (40.0 if isinstance(ride, api.Log) else 25.0))
-            assert point.time.timestamp() == pytest.approx(np.max(log().utc_s[told]), abs=1e-3)
+            known = np.isfinite(log().utc_s) & (log().t_s <= (40.0 if isinstance(ride, api.Log) else 25.0))
+            assert point.time.timestamp() == pytest.approx(np.max(log().utc_s[known]), abs=1e-3)
             continue
         clock = datetime.fromtimestamp(START_S + (0.0 if isinstance(ride, api.Log) else 12.5), UTC)
         assert f"{clock:%d/%m/%Y}" in out.read_text()

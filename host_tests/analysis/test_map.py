@@ -22,13 +22,13 @@ MOTORCYCLE = api.CalibrationFile(aligned=True)
 def seen(lat_deg: float = 52.5, lon_deg: float = 13.4, gap: bool = False, car: bool = False) -> Overview:
     """Half a minute from this place on, with a position each half second; gap: none from 10 to 16 s."""
     ride = app_exports.riding().every(2)
-    told = np.arange(len(ride.t_s)) % 50 == 3
+    known = np.arange(len(ride.t_s)) % 50 == 3
     if gap:
-        told &= (ride.t_s < 10.0) | (ride.t_s > 16.0)
+        known &= (ride.t_s < 10.0) | (ride.t_s > 16.0)
     narrow = np.cos(np.radians(52.5)) / np.cos(np.radians(lat_deg))
-    lat = np.where(told, ride.lat_deg - 52.5 + lat_deg, np.nan)
-    lon = np.where(told, ((ride.lon_deg - 13.4) * narrow + lon_deg + 180.0) % 360.0 - 180.0, np.nan)
-    speed = np.where(told, ride.speed_mps, np.nan)
+    lat = np.where(known, ride.lat_deg - 52.5 + lat_deg, np.nan)
+    lon = np.where(known, ((ride.lon_deg - 13.4) * narrow + lon_deg + 180.0) % 360.0 - 180.0, np.nan)
+    speed = np.where(known, ride.speed_mps, np.nan)
     log = api.Log(ride.t_s, ride.force_g, ride.rates_dps, speed, lat_deg=lat, lon_deg=lon, name="RIDE.csv")
     return overview(api.open_ride(log, replace(MOTORCYCLE, vehicle="car") if car else MOTORCYCLE))
 
@@ -145,6 +145,7 @@ _POINT = """() => {
 def test_in_a_browser_chart_and_map_show_the_same_moment(tmp_path, chromium):
     page_of(tmp_path, seen())
     view = chromium.new_page(viewport={"width": 1300, "height": 800})
+    view.set_default_timeout(120_000)  # a busy machine draws late
     asked, errors = [], []
     view.on("request", lambda request: asked.append(request.url))
     view.on("pageerror", lambda error: errors.append(str(error)))

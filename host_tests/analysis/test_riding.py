@@ -65,7 +65,7 @@ def test_a_speed_that_is_always_0_hides_no_ride(tmp_path):
     log.speed_mps[::20] = 0.0
     said = words_of(log)
     assert (said.ride[0], said.too_little) == (without.ride[0], "")
-    assert said.stops or said.remark == "Stops: not told, the log has no speed."
+    assert said.stops or said.remark == "Stops: not known, the log has no speed."
 
 
 def test_a_stretch_without_speed_that_goes_straight_on_is_ridden():

@@ -218,7 +218,8 @@ def test_few_and_small_changes_of_speed_show_nothing():
 
 def test_only_the_last_hour_counts():
     """What was the other way round before it, as with a sensor that was turned over."""
-    before, after = jerky(sign=-1.0, seconds=3600), jerky(seconds=3600)
+    before, after = jerky(sign=-1.0, seconds=3600, mps2=8.0), jerky(seconds=3600)
+    after.speed_mps += before.speed_mps[-10] - after.speed_mps[0]
     force, speed = (np.concatenate((getattr(before, name), getattr(after, name))) for name in ("accel_g", "speed_mps"))
     time = np.arange(0.0, 7200.0, 0.1)
     assert not exchanged(Log(time, force, np.zeros(force.shape), speed))

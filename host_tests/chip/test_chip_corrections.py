@@ -1,5 +1,10 @@
 """The corrections of the emulated Pico: bus and flash take time, errors are the chip's, the console is quiet."""
 
+import os
+import subprocess
+import sys
+
+import emulated
 import pytest
 from emulated import pico, reset_in_a_read
 
@@ -47,6 +52,23 @@ def test_quicker_division_is_rp2040pys_own():
                         seen += [chip.read_uint32(0xD0000000 + r) for r in (0x60, 0x64, 0x78, 0x74, 0x70, 0x78, 0)]
         results.append((seen, chip.core.cycles - began))
     assert results[0] == results[1]
+
+
+# Without the finder that looks for the modules compiled for this Python
+_WHEELS_OWN = """
+import sys, kickstand_tools.emulator
+del sys.meta_path[0]
+import emulated
+print(emulated.begun(0.003))
+"""
+
+
+def test_a_chip_does_the_same_on_every_host():
+    """Compiled for this Python or as it comes in the wheel, and on a slow host: the same cycles, the same memory."""
+    pico()  # or skip
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    other = subprocess.run([sys.executable, "-c", _WHEELS_OWN], env=environment, capture_output=True, text=True)
+    assert other.stdout == f"{emulated.begun(0.0)}\n", other.stderr
 
 
 def ask(board, expression):

@@ -5,14 +5,13 @@ import time
 
 import numpy as np
 import pytest
-from emulated import modules, pico
 from kickstand.drive_alignment import alignment
 from kickstand.drive_alignment.quality import MIN_EVENTS
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
 pytestmark = pytest.mark.chip
 
-# mount, clock, elapsed and allocated are given; each update does one piece of the work, so that all are timed alike
+# mount, clock, elapsed and allocated are given; each update does one step of the work, so that all are timed alike
 _DRIVE = """
 from kickstand.drive_alignment import alignment
 from kickstand.rotation import matrix
@@ -56,16 +55,15 @@ def allocated():
 """
 
 
-def test_alignment_by_driving_on_the_chip(monkeypatch):
+def test_alignment_by_driving_on_the_chip(at_prompt, monkeypatch):
     """Five acceleration events, a braking event between each two. An update takes at most 2 ms of the 10 ms between
     samples."""
     mount = random_mounting(4)
     host = {"mount": mount, "clock": time.monotonic_ns, "elapsed": lambda began: 0, "allocated": lambda: 0}
     monkeypatch.setattr(alignment, "STEP_US", 10**9)
     exec(_DRIVE, host)
-    with pico(files=modules()) as board:
-        code = f"{_ONE_PIECE}{_ON_CHIP}mount = {mount!r}\n{_DRIVE}print(json.dumps(result))"
-        chip = json.loads(board.exec(code, 120).splitlines()[-1])
+    code = f"{_ONE_PIECE}{_ON_CHIP}mount = {mount!r}\n{_DRIVE}print(json.dumps(result))"
+    chip = json.loads(at_prompt.exec(code, 120).splitlines()[-1])
     assert chip["counted"] == host["result"]["counted"] >= MIN_EVENTS
     assert chip["updates"] == host["result"]["updates"] > 300
     between = np.reshape(chip["matrix"], (3, 3)) @ np.reshape(host["result"]["matrix"], (3, 3)).T

@@ -1,4 +1,5 @@
-"""The firmware's mathematics in the chip's 32-bit floats, against numpy and the other engines."""
+"""The firmware's mathematics in the chip's 32-bit floats and small integers of 31 bits, against numpy and the other
+engines."""
 
 import io
 import json
@@ -7,9 +8,11 @@ import subprocess
 
 import numpy as np
 import pytest
-from emulated import PART, modules, pico
+from emulated import PART, pico
 from kickstand_tools import unix_port
 from kickstand_tools.replay import replay_engine
+from kickstand_tools.rides import block_reader
+from kickstand_tools.simulated_board.gps import sentence
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
@@ -30,12 +33,11 @@ print(json.dumps([turned[0:3], turned[3]]))
 """
 
 
-def test_composed_rotations_agree_with_numpy():
+def test_composed_rotations_agree_with_numpy(at_prompt):
     """Six rotations one after the other, of the three axes and of a vector: to 1e-6, a few units of the last place."""
     matrices = [random_mounting(seed) for seed in range(6)]
     v = (0.3, -0.5, 0.81)
-    with pico(files=modules()) as board:
-        axes, out = json.loads(board.exec(f"matrices = {matrices!r}\nv = {v!r}\n{_COMPOSED}"))
+    axes, out = json.loads(at_prompt.exec(f"matrices = {matrices!r}\nv = {v!r}\n{_COMPOSED}"))
     expected = np.eye(3)
     for m in matrices:
         expected = np.reshape(m, (3, 3)) @ expected
@@ -73,3 +75,47 @@ def test_the_same_log_gives_the_same_lean(tmp_path):
         assert len(other) == 300
         assert np.abs(host - other)[:, :2].max() < 0.05
         assert np.abs(host - other)[:, 2:5].max() < 1e-5
+
+
+_SENTENCE = sentence("GPRMC,235959.97,A,8959.99999,S,17959.99998,W,19.438,084.4,311226,,,A")
+
+_PLACE = """
+import gc
+from time import ticks_diff, ticks_ms, ticks_us
+from kickstand.rides.block import RideBlock
+from kickstand.speed.gps import Gps
+class Uart:
+    data = %r
+    def any(self):
+        return len(self.data)
+    def read(self, n):
+        data, self.data = self.data[:n], self.data[n:]
+        return data
+class Chip:
+    accel_lsb_per_g, gyro_lsb_per_dps, gyro_delay_s = 4096, 65.5, 0.0134
+    def temperature_c(self, counts):
+        return 31.25
+gps = Gps(Uart())
+block = RideBlock(5000)
+block.begin(512, 7, 3, 5, Chip(), 200, bytes(80))
+gps.poll(990)
+gps.poll(1000)
+gc.collect()
+before, begun_us = gc.mem_alloc(), ticks_us()
+place = gps.place(1000)
+took_us, heap = ticks_diff(ticks_us(), begun_us), gc.mem_alloc() - before
+block.add_place(place)
+block.add([200] * 7, 2, 10000)
+block.close()
+print(took_us, heap)
+print("".join("%%02x" %% byte for byte in block.buffer[:512]))
+"""
+
+
+def test_a_position_is_exact_on_the_chip_quick_and_takes_little_heap(at_prompt):
+    costs, block = at_prompt.exec(_PLACE % _SENTENCE.encode(), 20.0).split("\n")[:2]
+    turn = block_reader.parse(bytes.fromhex(block.strip())).turns[0]
+    assert turn.place == block_reader.Place(-89.0 - 59.99999 / 60, -179.0 - 59.99998 / 60, 1_798_761_599.97)
+    took_us, heap = map(int, costs.split())
+    assert took_us < 2000
+    assert heap < 200

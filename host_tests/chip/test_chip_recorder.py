@@ -1,7 +1,6 @@
 """The recorder on the emulated Pico: its own littlefs, flash that stalls, 32-bit floats, power cuts, mpremote."""
 
 import ast
-import binascii
 import re
 import signal
 from itertools import pairwise
@@ -9,12 +8,13 @@ from itertools import pairwise
 import command
 import emulated_port
 import pytest
-from emulated import PART, calibrated, firmware, modules, pico
+from emulated import PART, calibrated, firmware, pico
 from kickstand_tools.calibration.file import read_calibration
 from kickstand_tools.logs.reader import read_blocks, read_log
 from kickstand_tools.replay import replay_engine
 from kickstand_tools.rides import block_reader, ride_log
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, wait
+from kickstand_workshop.bench.sample_count import SampleCount
 from test_chip_power_cut import torn
 
 pytestmark = pytest.mark.chip
@@ -90,20 +90,19 @@ def rides(files):
 
 
 @pytest.mark.long
-def test_a_recorded_ride_replays_as_it_was_shown(tmp_path):
+def test_a_recorded_ride_replays_as_it_was_shown(at_prompt, tmp_path):
     """While it is recorded no sample is lost, and the display goes on."""
-    from kickstand_workshop.bench.sample_count import SampleCount
-
-    with pico(PART.world(RIDE.motion), modules() | calibrated()) as device:
-        samples = SampleCount(device.board.sensor)
-        shown = set()
-        device.board.at(3.0, samples.begin)
-        lost = []
-        device.board.at(6.5, lambda: lost.append(samples.lost()))
-        for i in range(35):
-            device.board.at(3.0 + i / 10, lambda: shown.add(tuple(device.lcd())))
-        leans = ast.literal_eval(device.exec(_RUN.replace("SECONDS", "7"), 20.0))
-        found = rides(device.files())
+    begun_s, world = at_prompt.time_s, PART.world(RIDE.motion)
+    at_prompt.board.sensor.world = lambda t_s: world(t_s - begun_s)
+    samples = SampleCount(at_prompt.board.sensor)
+    shown = set()
+    at_prompt.board.at(begun_s + 3.0, samples.begin)
+    lost = []
+    at_prompt.board.at(begun_s + 6.5, lambda: lost.append(samples.lost()))
+    for i in range(35):
+        at_prompt.board.at(begun_s + 3.0 + i / 10, lambda: shown.add(tuple(at_prompt.lcd())))
+    leans = ast.literal_eval(at_prompt.exec(_RUN.replace("SECONDS", "7"), 20.0))
+    found = rides(at_prompt.files())
     assert lost == [0]
     assert len(shown) > 10
     assert all(lines[0].endswith("*") for lines in shown if "°" in lines[0])
@@ -117,20 +116,19 @@ def test_a_recorded_ride_replays_as_it_was_shown(tmp_path):
     assert max(leans) - min(leans) > 10
 
 
-def test_wherever_the_power_goes_all_but_the_last_block_is_kept():
+def test_wherever_the_power_goes_all_but_the_last_block_is_kept(at_prompt):
     """Before, within and after each operation on the flash; the calibration stays whatever happens."""
-    with pico(files=modules() | calibrated()) as device:
-        device.exec(_FEED)
-        states = []
-        device.chip.flash.before_operation = lambda: states.append((device.file_system, None))
-        device.exec("recorder.start(Chip(), Calibration())")
-        written = 0
-        for blocks in range(1, 5):
-            device.exec(f"feed({blocks})")
-            states.append((device.file_system, written))
-            written = blocks
-        device.exec("recorder.stop()")
-        states.append((device.file_system, 4))
+    at_prompt.exec(_FEED)
+    states = []
+    at_prompt.chip.flash.before_operation = lambda: states.append((at_prompt.file_system, None))
+    at_prompt.exec("recorder.start(Chip(), Calibration())")
+    written = 0
+    for blocks in range(1, 5):
+        at_prompt.exec(f"feed({blocks})")
+        states.append((at_prompt.file_system, written))
+        written = blocks
+    at_prompt.exec("recorder.stop()")
+    states.append((at_prompt.file_system, 4))
     from kickstand_tools.emulator import flash_image
 
     kept = calibrated()
@@ -151,55 +149,17 @@ def test_wherever_the_power_goes_all_but_the_last_block_is_kept():
     assert len(rides(flash_image.read(states[-1][0]))[1]) >= 4
 
 
-@pytest.mark.parametrize("operation", [2, 20, 37])
-def test_a_board_records_again_after_a_cut(operation):
-    with pico(files=modules() | calibrated()) as device:
-        device.exec(_FEED)
-        device.chip.flash.cut_power(operation, 0.5)
-        device.console.send(b"recorder.start(Chip(), Calibration())\nfeed(6)\x04")
-        device.run(6.0)
-        assert not device.powered
-        device.power_on()
-        device.exec(_FEED + "recorder.start(Chip(), Calibration())\nfeed(2)\nrecorder.stop()\n", 20.0)
-        found = rides(device.files())
+@pytest.mark.parametrize("operation", [2, 37])
+def test_a_board_records_again_after_a_cut(at_prompt, operation):
+    at_prompt.exec(_FEED)
+    at_prompt.chip.flash.cut_power(operation, 0.5)
+    at_prompt.console.send(b"recorder.start(Chip(), Calibration())\nfeed(6)\x04")
+    at_prompt.run(6.0)
+    assert not at_prompt.powered
+    at_prompt.power_on()
+    at_prompt.exec(_FEED + "recorder.start(Chip(), Calibration())\nfeed(2)\nrecorder.stop()\n", 20.0)
+    found = rides(at_prompt.files())
     assert [len(blocks) for blocks in found.values()][-1] >= 2
-
-
-# A driver of an SD card that is a dictionary in RAM
-_SDCARD = b"""
-import os
-class SDCard:
-    blocks = {}
-    def __init__(self, spi, cs, baudrate=1_320_000):
-        if not self.blocks:
-            os.VfsFat.mkfs(self)
-    def readblocks(self, n, buf, offset=0):
-        for i in range(len(buf) // 512):
-            buf[i * 512 : i * 512 + 512] = self.blocks.get(n + i, bytes(512))
-    def writeblocks(self, n, buf, offset=0):
-        for i in range(len(buf) // 512):
-            self.blocks[n + i] = bytes(buf[i * 512 : i * 512 + 512])
-    def ioctl(self, op, arg):
-        return {4: 4096, 5: 512}.get(op, 0)
-"""
-
-
-def test_rides_go_to_an_sd_card_where_config_names_one():
-    """The card's driver is a fake, its FAT file system is MicroPython's."""
-    with pico(files=modules() | calibrated() | {"sdcard.py": _SDCARD}) as device:
-        card = "SD_SPI, SD_SCK, SD_MOSI, SD_MISO, SD_CS = 0, 18, 19, 16, 17"
-        device.exec(_FEED.replace("SD_SPI = None", card))
-        device.exec("recorder.start(Chip(), Calibration())\nfeed(3)\nrecorder.stop()\n", 30.0)
-        assert "rides" not in {name.partition("/")[0] for name in device.files()}
-        listed = ast.literal_eval(device.exec("import os\nprint(os.listdir('/sd/rides/000/01'))"))
-        assert listed == ["00000.rid"]
-        text = device.exec(
-            "from binascii import b2a_base64\nf = open('/sd/rides/000/01/00000.rid', 'rb')\n"
-            "while d := f.read(768):\n    print(b2a_base64(d).decode(), end='')\n"
-        )
-    content = b"".join(binascii.a2b_base64(line) for line in text.split())
-    blocks, problems = block_reader.read(content)
-    assert (len(blocks), problems) == (3, [])
 
 
 @pytest.mark.long
@@ -221,7 +181,7 @@ def test_pull_and_record_through_mpremote(tmp_path, monkeypatch):
         pulled = next(tmp_path.glob("ride-00001-*.csv.gz"))
         assert len(read_log(pulled).time_us) > 150
 
-        ends.append(device.time_s + 6.0)
+        ends.append(device.time_s + 3.0)
         result = command.works("record", "--port", emulated_port.NAME, "--out", tmp_path / "live.csv")
         assert result.err == ""
         assert result.out.startswith("recording from ")

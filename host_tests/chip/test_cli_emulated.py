@@ -1,29 +1,26 @@
-"""flash and status by mpremote against MicroPython's own image for the Pico, in an emulated RP2040."""
+"""`kickstand emulate`, and flash and status by mpremote onto the board that it emulates."""
 
+import math
+import queue
+import re
 import socket
 import sys
+import threading
+import time
+import types
 
 import command
-import emulated_port
 import pytest
-from emulated import pico
-from kickstand_tools import firmware_path
-from kickstand_tools.deploy import config_check, connection
+from emulated import calibrated, firmware, pico
+from kickstand_tools.deploy import bytecode, connection
 from kickstand_tools.emulator import image
 from kickstand_tools.errors import InputError
+from mpremote import transport_serial
 from terminal import Terminal
 
-
-@pytest.fixture
-def device(monkeypatch):
-    """A freshly booted Pico, at emulated_port.NAME."""
-    with pico() as device:
-        emulated_port.plug_in(monkeypatch, device)
-        device.run(0.5)
-        yield device
+pytestmark = pytest.mark.chip
 
 
-@pytest.mark.chip
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
 def test_emulate_in_a_terminal():
     """The bike is drawn, the button and the end follow the keys."""
@@ -43,66 +40,77 @@ def test_emulate_in_a_terminal():
         assert at.end() == 0
 
 
-FIRMWARE = {
-    "main.py": "import time\nwhile True:\n    print('running')\n    time.sleep_ms(100)\n",
-    "config.py": "# settings\n",
-    "kickstand/__init__.py": "def status():\n    import config\n    print('all is well,', config.SIDE)\n",
-    "kickstand/lean.py": "# " + "x" * 5000 + "\n",
-    "kickstand/errors.py": "# errors\n",
-}
+class Emulating(threading.Thread):
+    """`kickstand emulate` beside the test, with these files on its board. It ends at end_s of its own time."""
+
+    def __init__(self, patch, files):
+        super().__init__(daemon=True)
+        from kickstand_tools.emulator import emulate
+        from kickstand_tools.emulator.pico import Pico
+
+        emulating = self
+
+        class Limited(Pico):
+            def __init__(self, world):
+                super().__init__(world, files)
+                emulating.pico = self
+
+            def run(self, seconds, between=None):
+                if self.time_s > emulating.end_s:
+                    raise KeyboardInterrupt
+                super().run(seconds, between)
+
+        self.pico: Pico | None = None
+        self.end_s = math.inf
+        self.said = queue.Queue()
+        patch.setattr(emulate, "Pico", Limited)
+        self._emulate = emulate.emulate
+
+    def run(self):
+        try:
+            self._emulate(0, self.said.put)
+        finally:
+            self.said.put(None)
+
+    def time_s(self):
+        """The emulated board's."""
+        return self.pico.time_s if self.pico else 0.0
 
 
-@pytest.fixture
-def firmware(tmp_path, monkeypatch):
-    """A small firmware: copying the real one takes an emulated Pico long."""
-    (tmp_path / "kickstand").mkdir()
-    for name, text in FIRMWARE.items():
-        (tmp_path / name).write_bytes(text.encode())
-    monkeypatch.setattr(firmware_path, "directory", lambda: tmp_path)
-    monkeypatch.setattr(firmware_path, "PACKAGE", tmp_path / "kickstand")
-    judged = config_check.Judged(None, [])
-    monkeypatch.setattr(config_check, "judge", lambda *_: judged)  # there is no settings.py to do that with
+def test_flash_and_status_on_the_emulated_pico(monkeypatch):
+    """Onto an older version with an edited config; then the bike's ride begins, and the display says what is to be
+    done."""
+    pico()  # or skip
+    kept = calibrated() | {"config.py": b'SIDE = "right"\n'}
+    older = {"/kickstand/lean/formula.mpy": b"old", "/kickstand/lean/old_idea.py": b"pass"}
+    emulating = Emulating(monkeypatch, firmware() | kept | older)
+    emulating.start()
+    try:
+        address = re.search(r"socket://\S+?:\d+", emulating.said.get())
+        assert address
+        clock = types.SimpleNamespace(monotonic=emulating.time_s, sleep=lambda seconds: time.sleep(seconds / 10))
+        for module in (transport_serial, connection):
+            monkeypatch.setattr(module, "time", clock)
+        flashed = command.works("flash", "--port", address[0]).out
+        assert f"Raspberry Pi Pico with RP2040, MicroPython 1.26.1 on {address[0]}" in flashed
+        assert "kept: config.py" in flashed
+        assert "removed: kickstand/lean/old_idea.py" in flashed
+        assert "copied 2 files" in flashed
+        assert "and verified them" in flashed
+        assert "right" in command.works("status", "--port", address[0]).out
+        emulating.end_s = emulating.time_s() + 30.0
+        shown = ""
+        while "Lean" not in shown:
+            text = emulating.said.get()
+            assert text is not None, f"the display never showed a lean: {shown}"
+            shown += text
+    finally:
+        emulating.end_s = 0.0
+        emulating.join()
+    assert emulating.pico
+    wanted = {path.lstrip("/"): content for path, content in (firmware() | kept).items()}
+    assert emulating.pico.files() == wanted
 
 
-def running(device):
-    """True if main.py is heard of within two seconds."""
-    del device.said[:]
-    return device.run_until(lambda: b"running" in device.said, 2.0)
-
-
-@pytest.mark.usefixtures("firmware")
-def test_flash_and_status_on_a_pico(device):
-    """Onto a chip with an older version, an edited config and a calibration; then its app runs."""
-    port = emulated_port.NAME
-    with connection.connected(port) as (board, _):
-        board.fs_mkdir("/kickstand")
-        board.fs_writefile("/kickstand/old_idea.py", b"pass")
-        board.fs_writefile("/kickstand/errors.py", FIRMWARE["kickstand/errors.py"].encode())
-        board.fs_writefile("/config.py", b'SIDE = "right"\n')
-        board.fs_writefile("/kickstand_a.cal", b"calibration")
-
-    result = command.works("flash", "--port", port)
-    assert f"Raspberry Pi Pico with RP2040, MicroPython 1.26.1 on {port}" in result.out
-    assert "kept: config.py" in result.out
-    assert "removed: kickstand/old_idea.py" in result.out
-    assert "copied 4 files" in result.out
-    assert "1 left as they were" in result.out
-
-    assert running(device)
-    result = command.works("status", "--port", port)
-    assert result.out == "all is well, right\n"
-    assert running(device)
-
-    with connection.connected(port) as (board, _):
-        assert board.fs_exists("/kickstand/lean.mpy")
-        assert board.fs_readfile("/config.py") == b'SIDE = "right"\n'
-        assert board.fs_readfile("/kickstand_a.cal") == b"calibration"
-        assert not board.fs_exists("/kickstand/old_idea.py")
-
-
-def test_a_board_that_hears_nothing_is_given_up_by_its_own_time(device, monkeypatch):
-    """Refused after two tries of ten seconds of the board's time, however long those take here."""
-    monkeypatch.setattr(device.console, "send", lambda _data: None)
-    began_s = device.time_s
-    assert "no MicroPython answers" in command.run("status", "--port", emulated_port.NAME).err
-    assert 20.0 <= device.time_s - began_s < 21.0
+def test_which_compiled_files_the_image_takes(at_prompt):
+    assert at_prompt.exec("import sys\nprint(sys.implementation._mpy)") == f"{bytecode.PICO}\n"

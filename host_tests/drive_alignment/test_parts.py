@@ -258,7 +258,7 @@ def test_a_change_of_speed_begins_the_count_again():
 @pytest.mark.parametrize(("ratio", "factor"), [(0.25, 4.0), (-1.0, 99.9)])
 def test_a_wrong_unit_is_said_as_what_the_speed_is_multiplied_by(ratio, factor):
     problem = fit_problem(0.0, ratio)
-    assert (problem.code, problem.values) == ("speed-unit", (factor,))
+    assert problem and (problem.code, problem.values) == ("speed-unit", (factor,))
 
 
 def test_only_two_acceleration_events_count():

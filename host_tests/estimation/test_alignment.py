@@ -81,7 +81,7 @@ def test_the_display_shows_the_lean_with_this_alignment(profile):
 
 
 def test_it_is_no_worse_than_two_poses_of_a_sensor_without_six_positions():
-    """In yaw, which a kickstand pose hardly tells, and in roll, which an offset of the accelerometer falsifies."""
+    """In yaw, which a kickstand pose hardly determines, and in roll, which an offset of the accelerometer falsifies."""
     made = simulated("hills", 22)
     kickstand, upright = (api.Log.from_readings(pose, RATE_HZ) for pose in (made.kickstand, made.upright))
     two = errors_deg(api.fit_two_positions(kickstand, upright), made.vehicle_from_sensor)
@@ -104,7 +104,7 @@ def test_the_offset_across_the_bike_is_found():
 
 
 def test_axes_of_the_wrong_hand_are_refused():
-    """Of the 48 ways to exchange and reverse axes the 24 right-handed ones are only another mounting."""
+    """Of the 48 exchanges and reversals of axes the 24 right-handed ones are only another mounting."""
     log = log_of(simulated("city", 21), speed=False)
     want = first_guess.axes(mounted_windows(log)).matrix
     for order in itertools.permutations(range(3)):

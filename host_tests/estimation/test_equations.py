@@ -90,10 +90,10 @@ def test_the_jacobian_is_that_of_the_equations():
     x = 0.3 * rng.normal(size=(STATES + PARAMETERS, n))
     x[FORWARD] *= 10.0
     unknown = np.arange(len(x))
-    for row, slopes in zip(unknown, jacobian(windows, x, unknown), strict=True):
+    for row, derivative in zip(unknown, jacobian(windows, x, unknown), strict=True):
         step = 1e-5 * (unknown == row)[:, None]
         after, before = (process_and_measurements(windows, x + sign * step) for sign in (1.0, -1.0))
-        assert np.allclose(slopes, (after - before) / 2e-5, rtol=1e-4, atol=1e-4), row
+        assert np.allclose(derivative, (after - before) / 2e-5, rtol=1e-4, atol=1e-4), row
 
 
 def test_the_upright_pose_determines_the_sum_of_rotation_and_offset():

@@ -1,9 +1,9 @@
-"""The lean looked back over: against the truth of rides of two simulators, and what rides may hold beside riding."""
+"""The smoothed lean: against the truth of rides of two simulators, and what rides may hold beside riding."""
 
 import numpy as np
 import pytest
 from kickstand_tools.api import CalibrationFile, InputError, Log, smooth
-from kickstand_tools.estimation import smooth as room
+from kickstand_tools.estimation import smooth as module
 from smoothed_rides import Known, other, rms, simulated
 
 RIDES = {
@@ -63,7 +63,7 @@ def mean_error(known):
 
 
 def test_a_mount_that_slips_in_mid_ride_spoils_little_of_what_follows(street):
-    """By 1.5 degrees about forward, within 0.3 s: the gyro feels it, and from then on straights seem to lean."""
+    """By 1.5 degrees about forward, within 0.3 s: the gyro measures it, and from then on straights seem to lean."""
     log, calibration = street.log, street.calibration
     angle = np.radians(1.5) * np.clip((log.t_s - 65.0) / 0.3, 0.0, 1.0)
     about = calibration.vehicle_from_sensor
@@ -97,7 +97,7 @@ def test_a_mount_that_yields_makes_the_lean_less_sure():
 
 
 def test_a_wind_that_turns_makes_the_lean_less_sure():
-    """It cannot be told from an upright pose that was not upright."""
+    """It looks like an upright pose that was not upright."""
     windy = simulated("crosswind", 5, 120.0)
     calm = simulated("street", 5, 120.0)
     assert mean_error(windy)[1] > 2.0 * mean_error(calm)[1]
@@ -192,19 +192,19 @@ def test_a_short_log_has_a_lean_and_says_how_unsure_it_is(street, seconds):
     assert np.all(np.abs(found.lean_deg - part.lean_deg) < 3.0 * found.lean_sigma_deg)
 
 
-def test_a_long_ride_is_adjusted_in_chapters(street, monkeypatch):
+def test_a_long_ride_is_estimated_part_by_part(street, monkeypatch):
     """So that time grows with the length of the ride, and memory does not."""
     whole = smooth(street.log, street.calibration)
     sizes = []
-    adjusted = room._adjusted
+    estimated = module._estimated
 
-    def counted(pieces, *more):
-        sizes.append(sum(len(piece.time_us) for piece in pieces))
-        return adjusted(pieces, *more)
+    def counted(segments, *more):
+        sizes.append(sum(len(segment.time_us) for segment in segments))
+        return estimated(segments, *more)
 
-    monkeypatch.setattr(room, "_adjusted", counted)
-    monkeypatch.setattr(room, "PIECE_S", 10.0)
-    monkeypatch.setattr(room, "CHAPTER", 5)
+    monkeypatch.setattr(module, "_estimated", counted)
+    monkeypatch.setattr(module, "SEGMENT_S", 10.0)
+    monkeypatch.setattr(module, "TOGETHER", 5)
     parts = smooth(street.log, street.calibration)
     assert len(sizes) > 2
     assert max(sizes) <= 7 * 2000

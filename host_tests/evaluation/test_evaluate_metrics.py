@@ -6,12 +6,11 @@ import math
 import numpy as np
 import pytest
 from kickstand_workshop.evaluation.estimators import trailing_mean
-from kickstand_workshop.evaluation.evaluate import Evaluation
 from kickstand_workshop.evaluation.metrics import Score, lag_ms, score, slope, straights
 from kickstand_workshop.evaluation.picture import ZOOM_S, zoom_start
 from kickstand_workshop.evaluation.real_ride import RealScore
 from kickstand_workshop.evaluation.report import document, pooled, real_table, table
-from kickstand_workshop.evaluation.runs import Job, Result
+from kickstand_workshop.evaluation.runs import Evaluation, Job, Result
 from rich.console import Console
 
 RATE = 200.0
@@ -109,7 +108,7 @@ def test_a_ride_without_a_corner_does_not_hide_the_others():
         assert (found["lag_ms"], found["straight_bias"]) == (5.0, 0.1)
 
 
-def test_what_no_ride_tells_is_two_dashes():
+def test_what_is_not_observable_is_two_dashes():
     nothing = float("nan")
     printed = io.StringIO()
     console = Console(width=80, file=printed)
@@ -121,7 +120,7 @@ def test_what_no_ride_tells_is_two_dashes():
     simulated, recorded = (line.split()[1:] for line in said.split("\n") if "kickstand" in line)
     assert simulated == ["1.00", "1.00", "2.00", "3.0", "--", "--", "--", "--"]
     assert recorded == ["1.00", "--"]
-    assert "--: nothing in these rides tells it" in " ".join(said.split())
+    assert "--: not observable in these rides" in " ".join(said.split())
 
 
 def test_the_document_has_no_nan():

@@ -2,7 +2,6 @@
 
 import json
 import math
-from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -13,20 +12,13 @@ from kickstand_tools.errors import InputError
 from kickstand_tools.logs.log import Log
 from kickstand_tools.simulation.ride import ride
 from kickstand_workshop.evaluation import estimators, real_ride, runs
-from kickstand_workshop.evaluation.samples import Samples
+from kickstand_workshop.evaluation.estimators import Samples
 
-FILTERS = ["complementary", "mahony", "madgwick", "vqf"]
-_PACKAGE = {"mahony": "ahrs", "madgwick": "ahrs", "vqf": "vqf"}
-
-
-def needed(name: str) -> None:
-    package = _PACKAGE.get(name)
-    if package and not find_spec(package):
-        pytest.skip(f"{package} is not installed")
+THERE = [name for name in estimators.OTHERS if estimators.PACKAGES.get(name) not in estimators.missing()]
 
 
 def leaned(lean_deg: float, roll_s: float = 1.5) -> Samples:
-    """A bike at rest leaned slowly from upright to lean_deg, then held as long: no turn, no doubt."""
+    """A bike at rest leaned slowly from upright to lean_deg, then held as long: no turn."""
     n = int(roll_s * 200)
     lean = np.radians(np.concatenate((np.linspace(0.0, lean_deg, n), np.full(n, lean_deg))))
     rate = np.zeros((2 * n, 3))
@@ -35,10 +27,9 @@ def leaned(lean_deg: float, roll_s: float = 1.5) -> Samples:
     return Samples(np.arange(2 * n) / 200.0, force, rate)
 
 
-@pytest.mark.parametrize("name", FILTERS)
+@pytest.mark.parametrize("name", THERE)
 @pytest.mark.parametrize("lean_deg", [30.0, -25.0])
 def test_every_filter_has_the_signs_right(name, lean_deg):
-    needed(name)
     shown = estimators.OTHERS[name](leaned(lean_deg))
     assert shown[-1] == pytest.approx(lean_deg, abs=2.0)
     assert shown[150] == pytest.approx(lean_deg / 2.0, abs=3.0)
@@ -51,8 +42,7 @@ def swept():
 
 def test_every_estimator_is_scored(swept):
     assert swept.refusal is None
-    there = {name for name in estimators.OTHERS if _PACKAGE.get(name) not in estimators.missing()}
-    assert set(swept.scores) == {"kickstand", "smoothed", "formula", "formula 0.3 s"} | there
+    assert set(swept.scores) == {"kickstand", "smoothed", "formula", "formula 0.3 s", *THERE}
     for lean in swept.traces.values():
         assert lean.shape == swept.traces["time"].shape
         assert np.all(np.isfinite(lean))
@@ -168,12 +158,10 @@ def test_the_command_prints_a_table_and_writes_json_and_picture(tmp_path):
 
 
 def test_json_on_standard_output_is_the_same_for_the_same_seed():
-    first, second = (
-        json.loads(works("evaluate", "--profiles", "city", "--seeds", 1, "--seconds", 60, "--json").out)
-        for _ in range(2)
-    )
+    arguments = ["evaluate", "--profiles", "parked", "--seeds", 1, "--seconds", 60, "--json"]
+    first, second = (json.loads(works(*arguments).out) for _ in range(2))
     assert first == second
-    assert math.isfinite(first["profiles"]["city"]["formula"]["rms"])
+    assert math.isfinite(first["profiles"]["parked"]["formula"]["rms"])
 
 
 def test_an_unknown_profile_is_refused(tmp_path):

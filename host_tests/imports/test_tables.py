@@ -54,7 +54,7 @@ def test_units_in_brackets_need_no_others(tmp_path):
     head = ["Time [ms]", "X (m/s^2)", "Y (m/s²)", "Z (m/s2)", "P (°/s)", "Q (dps)", "R (deg/s)", "v (km/h)"]
     columns = (1000 * ride.t_s, app_exports.G * ride.phone_g, np.degrees(ride.phone_rad), 3.6 * ride.speed_mps)
     (tmp_path / "log.csv").write_text(app_exports.lines(head, np.column_stack(columns).tolist()), encoding="utf-8")
-    names = dict(zip((*list(NAMES),), ("Time", "X", "Y", "Z", "P", "Q", "R", "v")))
+    names = dict(zip(NAMES, ("Time", "X", "Y", "Z", "P", "Q", "R", "v")))
     found = api.import_recording(tmp_path / "log.csv", names)
     assert np.allclose(found.log.accel_g, ride.phone_g, atol=1e-5)
     assert np.allclose(found.log.gyro_dps, np.degrees(ride.phone_rad), atol=1e-4)

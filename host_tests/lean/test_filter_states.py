@@ -87,6 +87,7 @@ def speed_sigma_mps(forward_g, before_mps, now_mps):
         hold(estimator, 1.0, force)
         estimator.measure_speed(speed_mps)
     hold(estimator, 0.5, force)
+    assert estimator._p
     return sqrt(estimator._p.rows[SPEED][SPEED]) * GRAVITY_MPS2
 
 

@@ -200,6 +200,7 @@ def test_a_trim_is_kept_if_it_is_certain_and_has_changed():
     ):
         shown = trimmed(angle_deg, sigma_deg, kept_deg)
         assert shown.keep_trim() is keeps, (angle_deg, sigma_deg, kept_deg)
+        assert shown.calibration
         near(shown.calibration.trim_deg, angle_deg if keeps else kept_deg, 1e-5)
         assert not shown.keep_trim()  # once is enough
 
@@ -209,6 +210,7 @@ def test_no_trim_is_kept_while_it_rides():
     speed_up(shown, 0.0, 15.0, 5.0)
     assert not shown.at_rest
     assert not shown.keep_trim()
+    assert shown.calibration
     assert shown.calibration.trim_deg == 0.0
 
 

@@ -1,4 +1,4 @@
-"""The gauge by its pixels: the side of the lean, the maxima, what is not known, and what is clear; what it is told."""
+"""The gauge by its pixels: the side of the lean, the maxima, what is not known, and what is clear; what it is given."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""What the gauge is told of a ride."""
+"""What the gauge shows of a ride."""
 
 from dataclasses import replace
 

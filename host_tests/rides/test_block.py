@@ -70,9 +70,9 @@ def test_however_full_a_block_is_the_worst_turn_and_a_position_fit(length):
     quiet = [800] * 7, 8, 40_000
     count = 0
     for violent in (False, True):  # first to see how many quiet ones there are, then with the last one violent
-        block = None
+        block = RideBlock(5000)
         for sequence in range(2):  # in the first block room was not kept from the beginning
-            block = ride_writer.begun(length, sequence, block)
+            ride_writer.begun(length, sequence, block)
             block.add_place(ride_writer.place(0))
             while not block.full() and (not violent or not sequence or block.count < count - 1):
                 block.add(*quiet)
@@ -90,9 +90,9 @@ def test_however_full_a_block_is_the_worst_turn_and_a_position_fit(length):
 
 def test_the_first_position_of_all_is_left_out_where_no_room_was_kept_for_it():
     """From then on there is room in each block, however full it is."""
-    block = None
+    block = RideBlock(5000)
     for sequence in range(3):
-        block = ride_writer.begun(512, sequence, block)
+        ride_writer.begun(512, sequence, block)
         sign = 1
         while not block.full():
             sign = -sign

@@ -1,7 +1,9 @@
 """Short ways to the emulated Pico for its tests."""
 
 import functools
+import hashlib
 import re
+import time
 from collections.abc import Callable
 from typing import Any
 
@@ -9,6 +11,7 @@ import pytest
 from kickstand_tools.errors import InputError
 from kickstand_tools.simulation.scripted.script import Ride, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
+from kickstand_workshop.soak import watch
 
 PART = Sensor(seed=1, share=0.5)  # an ordinary part, stuck on at some angle
 
@@ -59,15 +62,22 @@ def calibrated(who_am_i: int = 0x68) -> dict[str, bytes]:
     return flash_image.stored(calibration, who_am_i)
 
 
+def begun(pause_s: float) -> tuple[int, str]:
+    """Cycles, and a digest of the memory, 0.15 s after a Pico without files was switched on. pause_s: the host's, every
+    now and then."""
+    with pico() as device:
+        device.run(0.15, lambda: time.sleep(pause_s))
+        return device.chip.rp2040.core.cycles, hashlib.sha256(bytes(device.chip.rp2040.sram)).hexdigest()
+
+
 def leaning(lean_deg: float) -> Callable[[float], tuple]:
-    """What PART feels on a bike that is held at this lean."""
+    """What PART reads on a bike that is held at this lean."""
     return PART.world(Ride([upright(1e6, lean_deg=lean_deg)]).motion)
 
 
 def shown_lean(lines: list[str]) -> float | None:
     """Degrees on the display, > 0 to the right; None where it shows no lean, or one that is only half written."""
-    match = re.fullmatch(r"Lean +(\d+)° (right|left |     )[ *]", lines[0])
-    return match and float(match[1]) * (-1 if match[2] == "left " else 1)
+    return watch.shown_lean(lines[0])
 
 
 def shows(device, pattern: str, limit_s: float) -> re.Match:

@@ -34,10 +34,10 @@ def first_minute(rider):
     rider.align()
     rider.reads("Aligned!")
     rider.click("#do")  # ride
-    rider.told("Lean it")
+    rider.guide_says("Lean it")
     rider.slow(SLOWED)
     rider.keys("ArrowRight", LEAN_DEG // 5)
-    rider.told("That is all")
+    rider.guide_says("That is all")
     true_deg, shown_deg = rider.leans()
     assert true_deg > LEAN_DEG - 4
     assert shown_deg == pytest.approx(true_deg, abs=2.0)
@@ -56,7 +56,7 @@ def first_minute(rider):
 
 def pull_the_wire(rider):
     rider.click("#wire")
-    rider.told("wire is out")
+    rider.guide_says("wire is out")
     rider.reads("No sensor")
     assert rider.text("#shown-lean") == "a fault"
     rider.click("#do")  # plug it in
@@ -69,26 +69,26 @@ def cut_the_power_in_a_save(rider):
     for armed in "true", "false", "true":
         rider.click("#cut")
         rider.page.wait_for_selector(f"#cut[aria-pressed={armed}]")
-    rider.told("next save")
+    rider.guide_says("next save")
     rider.click("#do")  # put it on its stand
-    rider.told("Hold the button for a second")
+    rider.guide_says("Hold the button for a second")
     rider.wait(7)  # until it stands there
     rider.hold(1.2)
-    rider.told("Hold the button once more")
+    rider.guide_says("Hold the button once more")
     rider.hold(1.2)
     rider.reads("On the stand")
     rider.align()
-    rider.told("when 40 bytes")
+    rider.guide_says("when 40 bytes")
     rider.reads("blank")
     rider.click("#do")  # switch it on
     rider.reads("Lean")
-    rider.told("The old alignment is still there")
+    rider.guide_says("The old alignment is still there")
     rider.click("#press")
     rider.reads("Max left")
 
 
 def is_what_the_firmware_shows(rider, flash):
-    """The display's memories, frame by frame, with the same told at the same instants to kickstand.start.main() on
+    """The display's memories, frame by frame, with the same orders at the same instants to kickstand.start.main() on
     MicroPython for Linux, or on CPython."""
     displays, orders = rider.seen("displays"), rider.seen("orders")
     on_unix = unix_port.available()

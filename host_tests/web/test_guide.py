@@ -1,4 +1,4 @@
-"""The guide's next step, told from what the firmware really shows: the page's device runs here as fast as it can, is
+"""The guide's next step, from what the firmware really shows: the page's device runs here as fast as it can, is
 steered as a person would, and what was to be seen is shown to the page's own guide, step by step."""
 
 import json
@@ -18,7 +18,7 @@ from kickstand_tools.simulated_board.fakes import cpython
 cpython.supplement()
 from kickstand_tools.web.device import PageDevice
 
-device, now, told = PageDevice(), 0.0, []
+device, now, said = PageDevice(), 0.0, []
 state = {"powered": True, "plugged": True, "armed": False, "pose": "kickstand", "stage": -1}
 
 def run(seconds):
@@ -28,7 +28,7 @@ def run(seconds):
     for tick in json.loads(device.take()):
         cut = state["armed"] and not tick["powered"]
         state["armed"] = state["armed"] and tick["powered"]
-        told.append({**state, **tick, "cut": cut})
+        said.append({**state, **tick, "cut": cut})
 
 def press(seconds):
     device.order("button", True)
@@ -49,7 +49,7 @@ for stage, orders in enumerate(json.load(sys.stdin)):
     state["stage"] = stage
     for order in orders:
         do(*order)
-print("\\n" + json.dumps(told))
+print("\\n" + json.dumps(said))
 """
 
 # As tell() in main.mjs
@@ -72,11 +72,10 @@ def guide(chromium, address):
 
 
 @pytest.fixture
-def stages(guide, tmp_path):
-    """By stage of a drive: what was last told in it (words beside the true lean, number, text, action), and all the
-    texts that were."""
+def drive(guide, tmp_path):
+    """By stage of a drive: what was last said in it (words beside the true lean, number, text, action)."""
 
-    def drive(*orders):
+    def drive(orders):
         done = subprocess.run(
             [sys.executable, "-c", DRIVE],
             input=json.dumps(orders),
@@ -86,139 +85,95 @@ def stages(guide, tmp_path):
             cwd=tmp_path,
             check=True,
         )
-        last, texts = {}, {}
-        for stage, *told in guide(json.loads(done.stdout.splitlines()[-1])):
-            last[stage] = told
-            texts.setdefault(stage, set()).add(told[2])
-        return last, texts
+        return {stage: said for stage, *said in guide(json.loads(done.stdout.splitlines()[-1]))}
 
     return drive
 
 
-def expect(told, *table):
-    """table: for each stage its (words, number, part of the text, action)."""
-    last, _ = told
-    for stage, (words, number, text, action) in enumerate(table):
-        told_words, told_number, told_text, told_action = last[stage]
-        assert text in told_text, (stage, told_text)
-        assert (told_words, told_number, told_action) == (words, number, action), (stage, told_text)
+@pytest.fixture
+def stages(drive):
+    """Each with its orders, and at its end words, number, part of the text, and action."""
+
+    def check(*table):
+        last = drive([orders for orders, *_ in table])
+        for stage, (_, words, number, text, action) in enumerate(table):
+            said_words, said_number, said_text, said_action = last[stage]
+            assert text in said_text, (stage, said_text)
+            assert (said_words, said_number, said_action) == (words, number, action), (stage, said_text)
+
+    return check
 
 
 def test_a_press_while_riding_is_taken_for_the_stand(stages):
-    told = stages(
-        [RIDE, ("wait", 8)],
-        [SHORT, ("wait", 3)],
-        [("wait", 9)],
-        [STAND, ("wait", 9)],
-        [SHORT, ("wait", 4.5)],
-        [UPRIGHT, ("wait", 4)],
-    )
-    expect(
-        told,
-        ("not aligned", 1, "Put the motorcycle on its stand first", "kickstand"),
-        ("aligning", 1, "that the motorcycle is on its stand", "kickstand"),
-        ("refused", 1, "why it has not taken this pose", "kickstand"),
-        ("refused", 1, "Press the button: once more", ""),
-        ("aligning", 2, "Now hold the motorcycle upright", "upright"),
-        ("aligning", 2, "Press the button once more", ""),
+    stages(
+        ([RIDE, ("wait", 8)], "not aligned", 1, "Put the motorcycle on its stand first", "kickstand"),
+        ([SHORT, ("wait", 3)], "aligning", 1, "that the motorcycle is on its stand", "kickstand"),
+        ([("wait", 9)], "refused", 1, "why it has not taken this pose", "kickstand"),
+        ([STAND, ("wait", 9)], "refused", 1, "Press the button: once more", ""),
+        ([SHORT, ("wait", 4.5)], "aligning", 2, "Now hold the motorcycle upright", "upright"),
+        ([UPRIGHT, ("wait", 4)], "aligning", 2, "Press the button once more", ""),
     )
 
 
 def test_the_same_pose_twice(stages):
-    told = stages(
-        [("wait", 2), SHORT, ("wait", 4.5)],
-        [SHORT, ("wait", 1)],
-        [("wait", 3.5)],
-        [SHORT],
-        [UPRIGHT, ("wait", 4)],
-        [SHORT, ("wait", 0.5)],
-    )
-    expect(
-        told,
-        ("aligning", 2, "Now hold the motorcycle upright", "upright"),
-        ("aligning", 2, "that the motorcycle is upright", "upright"),
-        ("refused", 1, "Both poses were the same", ""),
-        ("aligning", 1, "Press the button", ""),
-        ("aligning", 1, "on its stand first", "kickstand"),
-        ("aligning", 1, "that the motorcycle is on its stand", "kickstand"),
+    stages(
+        ([("wait", 2), SHORT, ("wait", 4.5)], "aligning", 2, "Now hold the motorcycle upright", "upright"),
+        ([SHORT, ("wait", 1)], "aligning", 2, "that the motorcycle is upright", "upright"),
+        ([("wait", 3.5)], "refused", 1, "Both poses were the same", ""),
+        ([SHORT], "aligning", 1, "Press the button", ""),
+        ([UPRIGHT, ("wait", 4)], "aligning", 1, "on its stand first", "kickstand"),
+        ([SHORT, ("wait", 0.5)], "aligning", 1, "that the motorcycle is on its stand", "kickstand"),
     )
 
 
 def test_the_wire_is_pulled_while_the_menu_is_open(stages):
-    told = stages(
-        RIDING,
-        [LONG],
-        [PULL, ("wait", 2)],
-        [SHORT, ("wait", 21)],
-        [PLUG, ("wait", 0.1)],
-        [("wait", 6)],
-        [STAND, ("wait", 9), LONG, LONG, SHORT, PULL, ("wait", 1)],
-        [("wait", 3)],
-    )
-    expect(
-        told,
-        ("not sure", 5, "That is all", ""),
-        ("the menu", 0, "The menu", ""),
-        ("the menu", 0, "The menu lies over the message", "wire"),
-        ("a fault", 0, "shows no lean", "wire"),
-        ("a fault", 0, "sets it up anew", ""),
-        ("not sure", 5, "That is all", ""),
-        ("a fault", 0, "stops the alignment", "wire"),
-        ("a fault", 0, "shows no lean", "wire"),
+    stages(
+        (RIDING, "not sure", 5, "That is all", ""),
+        ([LONG], "the menu", 0, "The menu", ""),
+        ([PULL, ("wait", 2)], "the menu", 0, "The menu lies over the message", "wire"),
+        ([SHORT, ("wait", 21)], "a fault", 0, "shows no lean", "wire"),
+        ([PLUG, ("wait", 0.1)], "a fault", 0, "sets it up anew", ""),
+        ([("wait", 6)], "not sure", 5, "That is all", ""),
+        ([STAND, ("wait", 9), LONG, LONG, SHORT, PULL, ("wait", 1)], "a fault", 0, "stops the alignment", "wire"),
+        ([("wait", 3)], "a fault", 0, "shows no lean", "wire"),
     )
 
 
 def test_each_page_is_named(stages):
-    told = stages(RIDING, *[[SHORT] for _ in range(5)], [LONG, *[SHORT] * 3], [LONG], [SHORT], [LONG, SHORT, LONG])
-    expect(
-        told,
-        ("not sure", 5, "That is all", ""),
-        ("maxima", 5, "the largest lean", ""),
-        ("g", 5, "acceleration and braking", ""),
-        ("formula", 5, "formula", ""),
-        ("readings", 5, "the sensor itself", ""),
-        ("not sure", 5, "That is all", ""),
-        ("the menu", 0, "The menu", ""),
-        ("sensor info", 0, "the sensor, and what is calibrated", ""),
-        ("not sure", 5, "That is all", ""),
-        ("positions", 0, "turned by hand", ""),
+    stages(
+        (RIDING, "not sure", 5, "That is all", ""),
+        ([SHORT], "maxima", 5, "the largest lean", ""),
+        ([SHORT], "g", 5, "acceleration and braking", ""),
+        ([SHORT], "formula", 5, "formula", ""),
+        ([SHORT], "readings", 5, "the sensor itself", ""),
+        ([SHORT], "not sure", 5, "That is all", ""),
+        ([LONG, *[SHORT] * 3], "the menu", 0, "The menu", ""),
+        ([LONG], "sensor info", 0, "the sensor, and what is calibrated", ""),
+        ([SHORT], "not sure", 5, "That is all", ""),
+        ([LONG, SHORT, LONG], "positions", 0, "turned by hand", ""),
     )
 
 
 def test_the_power_goes_in_a_save_or_by_its_switch(stages):
     arm, on = ("cut_save", True), ("power", True)
-    told = stages(
-        [*RIDING, arm, ("wait", 0.1)],
-        [("cut_save", False), ("wait", 0.1)],
-        [arm, STAND, ("wait", 9)],
-        [LONG, SHORT],
-        [*[SHORT] * 5],
-        [LONG, *ALIGN],
-        [on, ("wait", 0.1)],
-        [("wait", 4)],
-        [RIDE, ("wait", 6)],
-        [("power", False), ("wait", 0.2)],
-        [("button", True), on, ("wait", 2), ("button", False), ("wait", 0.2)],
-    )
-    expect(
-        told,
-        ("not sure", 0, "Stop for a new alignment", "kickstand"),
-        ("not sure", 5, "That is all", ""),
-        ("not sure", 0, "Hold the button for a second", ""),
-        ("the menu", 0, "Press until the menu says", ""),
-        ("the menu", 0, "Hold the button once more", ""),
-        ("nothing", 0, "when 40 bytes", "power"),
-        ("nothing", 0, "The board starts", ""),
-        ("not sure", 5, "The old alignment is still there", "ride"),
-        ("not sure", 5, "", ""),
-        ("nothing", 0, "The board has no power", "power"),
-        ("safe mode", 0, "Safe mode", "power"),
+    stages(
+        ([*RIDING, arm, ("wait", 0.1)], "not sure", 0, "Stop for a new alignment", "kickstand"),
+        ([("cut_save", False), ("wait", 0.1)], "not sure", 5, "That is all", ""),
+        ([arm, STAND, ("wait", 9)], "not sure", 0, "Hold the button for a second", ""),
+        ([LONG, SHORT], "the menu", 0, "Press until the menu says", ""),
+        ([*[SHORT] * 5], "the menu", 0, "Hold the button once more", ""),
+        ([LONG, *ALIGN], "nothing", 0, "when 40 bytes", "power"),
+        ([on, ("wait", 0.1)], "nothing", 0, "The board starts", ""),
+        ([("wait", 4)], "not sure", 5, "The old alignment is still there", "ride"),
+        ([RIDE, ("wait", 6)], "not sure", 5, "", ""),
+        ([("power", False), ("wait", 0.2)], "nothing", 0, "The board has no power", "power"),
+        ([("button", True), on, ("wait", 2), ("button", False), ("wait", 0.2)], "safe mode", 0, "Safe mode", "power"),
     )
 
 
-def test_a_disarmed_save_is_whole(stages):
-    last, _ = stages([("cut_save", True), ("wait", 1), ("cut_save", False), *ALIGN])
-    assert last[0][2].startswith("Done")
+def test_a_disarmed_save_is_whole(drive):
+    said = drive([[("cut_save", True), ("wait", 1), ("cut_save", False), *ALIGN]])
+    assert said[0][2].startswith("Done")
 
 
 FIRST_MINUTE = (
@@ -234,13 +189,13 @@ def test_each_refusal_and_fault_of_the_first_minute_has_its_step(guide, code):
     """Also those that the simulated board does not come to by itself."""
     text = [line.replace("\xdf", "°") for line in messages.lines(Refusal(code, 1, 2))]
     tick = {"powered": True, "plugged": True, "pose": "kickstand", "phase": "kickstand", "t_s": 1.0, "stage": 0}
-    ((_, words, _, told, _),) = guide([{**tick, "display": {"text": text, "shown_deg": None}}])
+    ((_, words, _, said, _),) = guide([{**tick, "display": {"text": text, "shown_deg": None}}])
     kind = {"starting": "board starts", "a fault": "there again", "refused": "Press the button"}[words]
-    assert kind in told
+    assert kind in said
 
 
 def test_a_lean_that_is_not_sure_is_no_other_page(guide):
     tick = {"powered": True, "plugged": True, "pose": "ride", "phase": "straight", "t_s": 1.0, "stage": 0}
     for text in pages.unsure(None), pages.unsure("mount-moved"):
-        ((_, words, number, told, _),) = guide([{**tick, "display": {"text": text, "shown_deg": None}}])
-        assert (words, number) == ("not sure", 4) and "not sure yet" in told
+        ((_, words, number, said, _),) = guide([{**tick, "display": {"text": text, "shown_deg": None}}])
+        assert (words, number) == ("not sure", 4) and "not sure yet" in said

@@ -48,7 +48,7 @@ def choose(line, name, value):
 
 
 def test_a_new_board_gets_the_firmware_and_its_settings(line, board):
-    """What is wrong is told beside the field, by the firmware's own rules, and nothing is copied until it is right."""
+    """What is wrong is said beside the field, by the firmware's own rules, and nothing is copied until it is right."""
     line.plug_in(RawPrompt(board))
     assert line.look().startswith("Imagined Pico with RP2040, MicroPython 1.26.1 is there.")
     page = line.rider.page

@@ -51,7 +51,7 @@ def board(tmp_path):
 
 
 def test_a_cable_that_is_pulled_leaves_the_log(line, rider, board, tmp_path):
-    """And no lean on the gauge. What swayed too much to tell its lean was "--" all along."""
+    """And no lean on the gauge. What swayed too much for its lean to be known was "--" all along."""
     blocks, _ = half_seconds(3)
     line.plug_in(RawPrompt(board, blocks))
     rider.page.click("#start")
@@ -102,7 +102,7 @@ def test_tools_that_cannot_be_loaded_can_be_asked_for_again(chromium, address, b
     rider.page.reload()
     line = SerialLine(rider)
     line.plug_in(RawPrompt(board, half_seconds(3)[0]))
-    for name in ("python.mjs", "pyodide.asm.wasm"):  # that the second is missing Pyodide itself does not tell
+    for name in ("python.mjs", "pyodide.asm.wasm"):  # that the second is missing Pyodide itself does not say
         rider.page.route(f"**/{name}", lambda route: route.abort())
         rider.page.click("#start")
         rider.page.wait_for_selector("#live-said:has-text('Is there a network? Press the button again')")
@@ -149,10 +149,10 @@ def test_the_rides_of_a_board_are_what_the_command_pulls(line, rider, board, tmp
     line.plug_in(RawPrompt(board))
     rider.page.click("#pull")
     rider.page.wait_for_selector("#files li")
-    told = rider.text("#pull-said")
-    assert told.startswith("2 rides are here")
+    said = rider.text("#pull-said")
+    assert said.startswith("2 rides are here")
     assert rider.axe() == []
-    assert "Ride 4, part 0: damaged at byte 4096: left out" in told
+    assert "Ride 4, part 0: damaged at byte 4096: left out" in said
     files = saved(rider, tmp_path)
     assert board.resets == 1
     monkeypatch.setattr(connection, "Board", lambda name, timeout: board)
@@ -175,7 +175,7 @@ def unpacked(data):
 
 
 def has_firmware(board, monkeypatch):
-    """The modules that tell the rides, on this board's flash."""
+    """The modules that list the rides, on this board's flash."""
     monkeypatch.setattr(ride_paths, "directory", lambda _settings: "rides")
     monkeypatch.setattr(ride_paths, "os", board.modules["os"])
     settings = types.SimpleNamespace(VEHICLE="motorcycle")
@@ -184,7 +184,7 @@ def has_firmware(board, monkeypatch):
 
 
 def test_a_port_that_takes_no_signals_is_closed_again(line):
-    told = """async () => {
+    script = """async () => {
       const said = [];
       const port = {
         open: async () => said.push("open"),
@@ -195,12 +195,12 @@ def test_a_port_that_takes_no_signals_is_closed_again(line):
       return said;
     }"""
     said = "The port cannot be opened: no signals. Does another program have it?"
-    assert line.rider.page.evaluate(told) == ["open", "closed", said]
+    assert line.rider.page.evaluate(script) == ["open", "closed", said]
 
 
 def test_a_port_whose_stream_refuses_to_end_is_closed_all_the_same(line):
     """Else it could not be opened again."""
-    told = """async () => {
+    script = """async () => {
       const { SerialLine } = await import("./cable/cable.mjs");
       const said = [];
       const line = new SerialLine({
@@ -212,12 +212,12 @@ def test_a_port_whose_stream_refuses_to_end_is_closed_all_the_same(line):
       await line.close();
       return said;
     }"""
-    assert line.rider.page.evaluate(told) == ["closed"]
+    assert line.rider.page.evaluate(script) == ["closed"]
 
 
 def test_after_a_disturbed_byte_the_line_goes_on(line):
     """As Web Serial does it: the stream fails, and the port has another until the cable is pulled."""
-    told = """async () => {
+    script = """async () => {
       const { SerialLine } = await import("./cable/cable.mjs");
       const streams = [1, 2].map((byte) => {
         const given = [Uint8Array.of(byte)];
@@ -234,7 +234,7 @@ def test_after_a_disturbed_byte_the_line_goes_on(line):
       for (let i = 0; i < 100 && !line.lost; i += 1) await line.sleep(10);
       return [[...line.take()], line.lost];
     }"""
-    assert line.rider.page.evaluate(told) == [[1, 2], True]
+    assert line.rider.page.evaluate(script) == [[1, 2], True]
 
 
 @pytest.mark.parametrize(("press", "says"), [("#start", "#live-said"), ("#pull", "#pull-said")])

@@ -27,13 +27,13 @@ def test_on_a_phone_everything_for_the_first_minute_is_on_its_first_screen(chrom
     rider.page.tap("#press")
     rider.reads("Stand: hold")
     rider.page.tap("#wire")
-    rider.told("wire is out")
+    rider.guide_says("wire is out")
     rider.reads("No sensor")
     assert rider.page.locator("#display").bounding_box()["y"] >= 0, "what the fault does is not in sight"
     device, guide = (rider.page.locator(one).bounding_box() for one in (".device", ".guide"))
     assert guide["y"] >= device["y"] + device["height"], "what the guide says of it is not in sight"
     rider.page.tap("#power")
-    rider.told("display is dark")
+    rider.guide_says("display is dark")
     assert rider.seen("shifts") == []
     rider.context.close()
 

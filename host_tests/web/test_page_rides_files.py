@@ -27,8 +27,8 @@ def test_dropped_on_the_page_packed_and_cut_off(page, ride, calibration, tmp_pat
     assert "the file was cut" in page.warnings()
     (tmp_path / "RIDE.csv.gz").write_bytes(files[0][1])
     (tmp_path / "RIDE.cal.json").write_bytes(files[1][1])
-    told = json.loads(works("report", tmp_path / "RIDE.csv.gz", "--json").out)
-    assert page.report()[0][0] == "Duration" and told["samples"] == json.loads(page.saved("#save-json"))["samples"]
+    reported = json.loads(works("report", tmp_path / "RIDE.csv.gz", "--json").out)
+    assert page.report()[0][0] == "Duration" and reported["samples"] == json.loads(page.saved("#save-json"))["samples"]
 
 
 def test_a_log_alone_asks_for_its_calibration(page, ride, calibration):
@@ -52,9 +52,9 @@ def test_the_export_of_a_phone_becomes_a_log(page, tmp_path):
     now.write_bytes(page.saved("#save-log"))
     for name in analysis_rides.table(was).dtype.names or ():
         assert near(analysis_rides.table(now)[name], analysis_rides.table(was)[name], 2e-6), name
-    told = json.loads(works("report", was, "--calibration", tmp_path / "phone.cal.json", "--json").out)
+    reported = json.loads(works("report", was, "--calibration", tmp_path / "phone.cal.json", "--json").out)
     shown = json.loads(page.saved("#save-json"))
-    assert_near({**shown, "ride": ""}, {**told, "ride": ""})
+    assert_near({**shown, "ride": ""}, {**reported, "ride": ""})
     with zipfile.ZipFile(path) as archive:
         archive.extractall(tmp_path / "unpacked")
     assert page.give(*(tmp_path / "unpacked").glob("*.csv"), tmp_path / "phone.cal.json") == ""
@@ -162,8 +162,8 @@ def test_the_columns_of_a_table_can_be_named(page, tmp_path):
     columns = "t=Millis,ax=Quantity 1,ay=Acc_Y,az=Acc_Z,gx=Gyro_X,gy=Gyro_Y,gz=Gyro_Z,speed=Speed_kmh"
     named = ["--columns", columns, "--units", "a=m/s2,g=deg/s,speed=km/h"]
     works("import", log, "--out", tmp_path / "R.csv", *named)
-    told = json.loads(works("report", tmp_path / "R.csv", "--calibration", tmp_path / "phone.json", "--json").out)
-    assert_near({**json.loads(page.saved("#save-json")), "ride": ""}, {**told, "ride": ""})
+    reported = json.loads(works("report", tmp_path / "R.csv", "--calibration", tmp_path / "phone.json", "--json").out)
+    assert_near({**json.loads(page.saved("#save-json")), "ride": ""}, {**reported, "ride": ""})
 
 
 def test_a_browser_that_keeps_nothing_says_so(chromium, address):

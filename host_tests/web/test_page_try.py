@@ -37,7 +37,7 @@ def test_by_the_keyboard_alone(chromium, address):
     says(rider, "#speed-out", "64 km/h")
     says(rider, "#lean-out", "10° right")
     assert rider.page.get_attribute("#pose [value=ride]", "aria-pressed") == "true"
-    rider.told("Put the motorcycle on its stand first")
+    rider.guide_says("Put the motorcycle on its stand first")
     rider.page.focus("#do")
     rider.page.eval_on_selector("#pose [value=kickstand]", "button => button.click()")
     rider.page.wait_for_selector("#do", state="hidden")
@@ -48,7 +48,7 @@ def test_by_the_keyboard_alone(chromium, address):
     rider.keys("Enter", 1)
     says(rider, "#speed-out", "64 km/h")
     assert rider.page.get_attribute("#speed", "min") == "20"
-    rider.told("Put the motorcycle on its stand first")
+    rider.guide_says("Put the motorcycle on its stand first")
     rider.keys("Space", 1)
     rider.reads("Stand: hold")
     rider.page.focus("#do")

@@ -57,7 +57,7 @@ def test_a_file_may_have_the_name_of_the_folder_of_recordings(tmp_path, monkeypa
 
 
 def test_a_ride_past_the_memory_is_told():
-    @rides_guest.told
+    @rides_guest.in_json
     def too_much():
         raise MemoryError
 

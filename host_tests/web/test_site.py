@@ -33,8 +33,8 @@ print("Raw" in device.take())
 
 def test_it_is_written_to_a_folder(files, tmp_path):
     out = tmp_path / "made" / "site"
-    told = works("web", "--out", out)
-    assert f"written: {out}" in told.out
+    done = works("web", "--out", out)
+    assert f"written: {out}" in done.out
     written = {path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("*") if path.is_file()}
     assert written == files
 
@@ -147,8 +147,8 @@ def no_cache(monkeypatch, tmp_path):
 
 def test_without_npm_it_says_what_to_install(no_cache, monkeypatch):
     monkeypatch.setattr(npm_packages.importlib.util, "find_spec", lambda name: None)
-    told = refused(no_cache, "web", "--out", no_cache / "site", words="is not installed")
-    assert "web]" in told
+    said = refused(no_cache, "web", "--out", no_cache / "site", words="is not installed")
+    assert "web]" in said
 
 
 def test_without_a_network_it_says_so(no_cache, monkeypatch):

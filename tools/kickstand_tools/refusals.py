@@ -3,6 +3,7 @@ by code (see kickstand.errors)."""
 
 from kickstand import console
 from kickstand.errors import Notice, Refusal
+from kickstand.units import AXES
 
 from .errors import InputError
 from .remedies import COMMANDS, Remedies
@@ -75,8 +76,6 @@ _SENTENCES = {
     "turned? " + _AT_REST.capitalize(),
     "left-handed": "the rates turn the force the wrong way, so the lean is wrong: are the axes left-handed (reverse "
     "one in both sensors) or the gyro of the opposite sign (reverse all its rates)? " + _AT_REST.capitalize(),
-    "rates-misfit": "the rates do not belong to the accelerations, so the lean is wrong: the rates {0}; instead of "
-    "gx, gy, gz right would be {1}",
     "upside-down": "the sensor's {0} points down: if it is not mounted upside down, all accelerations are of the "
     "opposite sign, and left and right get exchanged: reverse them (" + _AT_REST + ")",
     "car-replayed": "the calibration is a car's, whose display shows no lean: lean_deg is that of a motorcycle which "
@@ -130,6 +129,8 @@ def sentence(refusal: Refusal | Notice, remedies: Remedies = COMMANDS) -> str:
         return _frozen(*refusal.values)
     if refusal.code == "speed-unit":
         return _speed_unit(*refusal.values)
+    if refusal.code == "rates-misfit":
+        return _rates_misfit(*refusal.values)
     if refusal.code == "forward-exchanged":
         return _forward_exchanged(remedies, *refusal.values)
     if refusal.code == "up-off":
@@ -156,6 +157,32 @@ def _speed_unit(factor: float) -> str:
     elif 1.8 < factor < 2.5:
         guess = "it is in mph or knots, m/s are needed"
     return f"the speed changes {factor:.1f} times as much as the force says: {guess}"
+
+
+def _rates_misfit(*exchange: list[int]) -> str:
+    """exchange (3 rows of 3): a signed permutation; times the rates of the log it is those about x, y and z.
+
+    A reversed axis of the accelerometer is the same as the two others reversed in the gyro, because accelerations of
+    the opposite sign are as good as the right ones; likewise with two that are exchanged.
+    """
+    kept = [axis for k, axis in enumerate(AXES) if exchange[k][k] == 1]
+    off = [axis for k, axis in enumerate(AXES) if exchange[k][k] != 1]
+    moved = [axis for k, axis in enumerate(AXES) if exchange[k][k] == 0]
+    signs = [sum(row) for row in exchange]
+    what = "are in another order or of another sign"
+    if len(kept) == 2:
+        what = f"are reversed about {off[0]}"
+    elif not moved:
+        what = f"are reversed about {off[0]} and {off[1]}, or accelerations along {kept[0]}"
+    elif len(moved) == 2 and signs == [1, 1, 1]:
+        what = f"about {moved[0]} and {moved[1]} are exchanged"
+    elif len(moved) == 2 and signs == [-1, -1, -1]:
+        what = f"fit if the accelerations along {moved[0]} and {moved[1]} are exchanged"
+    right = ", ".join(("-" if sum(row) < 0 else "") + "g" + AXES[[abs(x) for x in row].index(1)] for row in exchange)
+    return (
+        f"the rates do not belong to the accelerations, so the lean is wrong: the rates {what}; instead of gx, gy, gz "
+        f"right would be {right}"
+    )
 
 
 def _forward_exchanged(remedies: Remedies, car: bool, side: str, roll_deg: float | None) -> str:

@@ -314,7 +314,9 @@ def aim(ride: Riding, quoted: bool = True, up_sign: float = -1.0) -> str:
 
 _AXES = [f"{sensor}_{axis}" for sensor in ("Acc", "Gyro") for axis in "XYZ"]
 # the columns of any_table()
-ANY_NAMES = dict(zip(("t", "ax", "ay", "az", "gx", "gy", "gz", "speed"), ("Millis", *_AXES, "Speed_kmh")))
+ANY_NAMES: dict[str, str] = dict(
+    zip(("t", "ax", "ay", "az", "gx", "gy", "gz", "speed"), ("Millis", *_AXES, "Speed_kmh"))
+)
 
 
 def any_table(ride: Riding, separator: str = ",", comma: bool = False) -> str:

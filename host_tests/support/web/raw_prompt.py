@@ -55,8 +55,8 @@ class RawPrompt:
             self.heard(b"OK")
         elif "RideStream" in code and self._streams:
             self._streaming = True
-            told = self._vehicle if "chosen.VEHICLE" in code else b""
-            self.heard(b"OK" + told + self._streams.pop(0))
+            vehicle = self._vehicle if "chosen.VEHICLE" in code else b""
+            self.heard(b"OK" + vehicle + self._streams.pop(0))
         else:
             out, error = self.board.exec_raw(code)
             self.heard(b"OK" + out + b"\x04" + error + b"\x04>")

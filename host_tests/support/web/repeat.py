@@ -1,4 +1,4 @@
-"""The board of the page, and the same board with the firmware's own loop, told the same. CPython and MicroPython.
+"""The board of the page, and the same board with the firmware's own loop, with the same orders. CPython, MicroPython.
 
 As a script, with "page" or "loop" as its argument: reads {"until_s": s, "orders": [[s, name, value], ...]} as JSON from
 standard input, runs that in the current directory (the board's flash) and prints as JSON on the last line:
@@ -46,7 +46,7 @@ def loop(orders, until_s):
 
 
 if __name__ == "__main__":
-    told = json.load(sys.stdin)
-    orders, ticks = (page if sys.argv[1] == "page" else loop)(told["orders"], told["until_s"])
+    given = json.load(sys.stdin)
+    orders, ticks = (page if sys.argv[1] == "page" else loop)(given["orders"], given["until_s"])
     displays = [[tick["t_s"], tick["display"]] for tick in ticks if "display" in tick]
     print("\n" + json.dumps({"orders": orders, "displays": displays}))

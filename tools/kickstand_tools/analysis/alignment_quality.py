@@ -30,7 +30,7 @@ ENOUGH_G = 0.05  # rms of braking and speeding up in it
 
 @dataclass
 class Quality:
-    """Angles in degrees by which the aligned axes seem to be off, None where the ride does not tell.
+    """Angles in degrees by which the aligned axes seem to be off, None where the ride does not show it.
 
     roll > 0: "up" leans to the right of the bike's own. pitch > 0: "forward" points up. yaw > 0: "forward" points
     to the right of the direction in which the bike speeds up. gravity_g: mean force at rest. straight_s: seconds of

@@ -4,7 +4,7 @@ The lean is the firmware's own, sample by sample, or the smoothed one. Everythin
 computed by numpy; a test holds it equal to the firmware.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 from kickstand.lean.meter import FALLEN_DEG
@@ -65,10 +65,6 @@ class Channels(Table):
     def rate_dps(self) -> Array:
         """(n, 3): about left, up, forward."""
         return np.column_stack((-self.pitch_rate_dps, self.yaw_rate_dps, self.roll_rate_dps))
-
-    def part(self, which: slice | NDArray[np.bool_]) -> "Channels":
-        """The samples of a slice, or those where an array of n is True."""
-        return Channels(*(getattr(self, field.name)[which] for field in fields(self)))
 
 
 def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool = False) -> Channels:

@@ -72,7 +72,7 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     if total.speed_mps.time_s is None:  # always 0, as of a torn wheel contact: it must not say that the bike stood
         course = replace(course, speed_mps=np.broadcast_to(np.nan, len(course.t_s)))
     frozen_s = sum(float(notice.values[1]) for notice in notices if notice.code == "frozen-readings")
-    # Of a stretch the notice tells more than its own.
+    # The notice is of the whole log, also of a stretch of it.
     total.frozen_s = min(frozen_s, total.missing_s) if isinstance(ride.log, Stretch) else frozen_s
     still = standing(course)
     found = quality(course, still)

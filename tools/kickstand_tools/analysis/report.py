@@ -130,9 +130,9 @@ def _remark(seen: Overview) -> str:
 
 def _no_stops(seen: Overview) -> str:
     if seen.exchanged:
-        return "Stops: not told, see the warning."
+        return "Stops: not known, see the warning."
     if not seen.has_speed and seen.riding_s > RIDDEN_S:
-        return "Stops: not told, the log has no speed."  # there may have been some: none was sure enough
+        return "Stops: not known, the log has no speed."  # there may have been some: none was sure enough
     if stops_by_speed(seen.course):
         return "The speed falls to a stop, the force says otherwise: is the calibration this ride's?"
     return "No stop from over 10 km/h found."
@@ -167,7 +167,7 @@ def _alignment(seen: Overview, remedies: Remedies) -> str:
     quality = seen.quality
     if not judged(seen):
         return "Alignment: not judged, see the warning."
-    said = "Alignment: not enough straight riding to tell how far it is off."
+    said = "Alignment: not enough straight riding to know how far it is off."
     known = angles(quality)
     if known:
         said = f"Alignment: it seems off by {', '.join(known)}"

@@ -36,8 +36,8 @@ class PoseCheck:
 
 @dataclass
 class DriveFit:
-    """What drives give. refusal: why they do not tell how the sensor sits, None where they do; calibration is then the
-    one from before.
+    """What drives give. refusal: why they do not determine how the sensor sits, None where they do; calibration is
+    then the one from before.
 
     vehicle: "car" or "motorcycle". used, turned: braking events that were counted, and those in turns that were not.
     quality_deg: standard error of forward about the vertical. ready_s: seconds of all logs until the alignment was
@@ -88,7 +88,7 @@ def fit_drive(
     car. method: "improved", or "published", ViriCiti's as it was published. progress: called with the samples done and
     all there are (each is gone through twice). on_event: called with each DriveEvent as it happens, also when the
     drive is refused in the end. Raises InputError; RefusedInput, a subclass with code and values, where the drive does
-    not tell how the sensor sits.
+    not determine how the sensor sits.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("city", seed=3, seconds=240.0)

@@ -41,7 +41,7 @@ def feed(
     steps: "Steps",
     watch: DriveWatch,
 ) -> None:
-    """Run the logs through an alignment; watch is told each time that something may have happened."""
+    """Run the logs through an alignment; watch looks each time that something may have happened."""
     length_us = BIN_US if isinstance(alignment, DriveAlignment) else 0  # the published one looks at single samples
     for log in logs:
         watch.begin(log.name)

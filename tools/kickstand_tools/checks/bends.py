@@ -11,16 +11,12 @@ import numpy as np
 from kickstand.errors import Notice
 
 from ..signals import Array
-from ..signals.leaning import WINDOW_S, Leaning, leaning_of, unrest
+from ..signals.leaning import LIKENESS, WINDOW_S, leaning_of, leans, speed_in_radians, unrest
 from .cells import CELL_S, LogCells
 
 KEPT_S, RIDING_S = 1800.0, 15.0  # the last half hour is judged; less riding shows nothing
 MOVES_S, MOVES = 1.6, 0.1  # within so long a ride changes the rates by over so much of their liveliest changes
-# Simulated rides and recordings in deg/s have a share of 1.0 to 1.6 and in rad/s of 57 to 92, of over 5 sigmas; cars
-# have a likeness under 0.6.
-SHARE, SIGMAS, LIKENESS = 15.0, 4.5, 0.65
 AGAINST, SURE = -0.5, 5.0  # share and sigmas of rates that are of the opposite sign; it is -1.6 to -1.0 then
-LEAST_LEAN = np.radians(2.0 / 57.3)  # rms: less is nearly straight
 CALMEST, LEAST, CALM_G = 0.2, 3, 0.02  # of the seconds, and at least so many; force changes so little in them
 
 
@@ -43,7 +39,7 @@ def bends(cells: LogCells) -> Notice | None:
     if speed is not None:
         return Notice("rates-in-radians", speed)
     against = found.share < AGAINST and found.sigmas > SURE and found.likeness > LIKENESS
-    return Notice("left-handed") if against and _leans(found) else None
+    return Notice("left-handed") if against and leans(found) else None
 
 
 def calm_rates(force: Array, rate: Array, calm_rate: float) -> Array:
@@ -51,13 +47,3 @@ def calm_rates(force: Array, rate: Array, calm_rate: float) -> Array:
     (m, cells, 3). calm_rate: what counts in the rates' changes as much as CALM_G in the force's."""
     changes = np.sum(np.std(force, axis=1), axis=1) / CALM_G + np.sum(np.std(rate, axis=1), axis=1) / calm_rate
     return np.mean(rate, axis=1)[np.argsort(changes)[: max(LEAST, round(CALMEST * len(changes)))]]
-
-
-def speed_in_radians(found: Leaning) -> float | None:
-    """The speed of the bends, m/s, if the rates, which are 57 times too small, are deg/s; None where they may be."""
-    wrong = found.share > SHARE and found.sigmas > SIGMAS and found.likeness > LIKENESS
-    return float(np.degrees(found.speed)) if wrong and _leans(found) else None
-
-
-def _leans(found: Leaning) -> bool:
-    return float(np.sqrt(np.mean(found.rolled**2))) > LEAST_LEAN

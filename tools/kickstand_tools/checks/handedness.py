@@ -15,7 +15,6 @@ import itertools
 
 import numpy as np
 from kickstand.errors import Notice
-from kickstand.units import AXES
 from numpy.typing import NDArray
 
 from ..signals import Array
@@ -58,7 +57,11 @@ def handedness(cells: LogCells) -> Notice | None:
     """What is wrong with the axes; None if nothing is, or if the log does not show it."""
     turning = liveliest(cells)
     found = None if turning is None else better_exchange(turning)
-    return None if found is None else _notice(EXCHANGES[found])
+    if found is None:
+        return None
+    exchange = EXCHANGES[found]
+    reversed_all = np.array_equal(exchange, -np.eye(3))
+    return Notice("left-handed") if reversed_all else Notice("rates-misfit", *exchange.astype(int).tolist())
 
 
 def better_exchange(turning: Turning) -> int | None:
@@ -119,27 +122,3 @@ def _penalty(exchange: Array) -> float:
     if np.array_equal(np.abs(exchange), np.eye(3)):
         return PENALTY[0] if np.trace(exchange) in (3.0, -3.0) else PENALTY[1]
     return PENALTY[2]
-
-
-def _notice(exchange: Array) -> Notice:
-    """What is wrong, if the rates about x, y and z are exchange @ those of the log.
-
-    A reversed axis of the accelerometer is the same as the two others reversed in the gyro, because accelerations of
-    the opposite sign are as good as the right ones; likewise with two that are exchanged.
-    """
-    if np.array_equal(exchange, -np.eye(3)):
-        return Notice("left-handed")
-    columns = [("-" if np.min(row) < 0.0 else "") + "g" + AXES[int(np.argmax(np.abs(row)))] for row in exchange]
-    kept = [AXES[k] for k in range(3) if exchange[k, k] == 1.0]
-    off = [AXES[k] for k in range(3) if exchange[k, k] != 1.0]
-    what = "are in another order or of another sign"
-    if len(kept) == 2:
-        what = f"are reversed about {off[0]}"
-    elif np.all(np.diag(exchange) != 0.0):
-        what = f"are reversed about {off[0]} and {off[1]}, or accelerations along {kept[0]}"
-    elif len(kept) == 1 and np.all(exchange >= 0.0):
-        what = f"about {off[0]} and {off[1]} are exchanged"
-    elif np.all(exchange <= 0.0) and np.trace(exchange) != 0.0:
-        one, other = (AXES[k] for k in range(3) if exchange[k, k] == 0.0)
-        what = f"fit if the accelerations along {one} and {other} are exchanged"
-    return Notice("rates-misfit", what, ", ".join(columns))

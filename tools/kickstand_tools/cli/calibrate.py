@@ -212,7 +212,7 @@ def _ride_lines(found: RideFit) -> Iterable[str]:
     yield "gyro bias  " + _along_axes(found.calibration.gyro_bias_dps, "%+.2f deg/s")
     yield "offset     " + _along_axes(found.calibration.accel_offset_g, "%+.4f g")
     yield from _matrix_lines(found.calibration.vehicle_from_sensor)
-    yield "upright is where the bike is balanced on straights; the accelerometer's slopes are not observable from a ride"
+    yield "upright is where the bike is balanced on straights; a ride does not show the accelerometer's slopes"
 
 
 def _matrix_lines(vehicle_from_sensor) -> Iterable[str]:

@@ -14,7 +14,7 @@ from ..demo.score import State
 from ..demo.screen import lcd_lines, screen
 from ..simulation.scripted.script import Ride
 from ..simulation.scripted.sensor_errors import Sensor
-from .console_server import ConsoleServer
+from .console import ConsoleServer
 from .pico import Pico
 
 _STEP_S = 0.02

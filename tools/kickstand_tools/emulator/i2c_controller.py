@@ -45,11 +45,6 @@ class TimedI2C(RPI2C):
         self.on_read_byte = lambda ack: self._after(9, self._received)
         self.on_stop = lambda: self._after(1, self._stopped)
 
-    @property
-    def hz(self) -> float:
-        """The frequency of SCL."""
-        return 1e9 / (_CYCLE_NS * max(1, self.scl_low_period + self.scl_high_period))
-
     def reading(self) -> bool:
         """True while a device sends a byte."""
         return self._then == self._received

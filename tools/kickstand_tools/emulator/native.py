@@ -38,12 +38,12 @@ class _Finder:
     def __init__(self, directory: str | Path | None) -> None:
         self._directory = directory
 
-    def find_spec(self, name: str, *_: object) -> ModuleSpec | None:
+    def find_spec(self, name: str, path: object = None, target: object = None) -> ModuleSpec | None:
         package, _, module = name.rpartition(".")
         if package != _PACKAGE or module not in _MODULES:
             return None
-        path = Path(self._directory or folder(), module + EXTENSION_SUFFIXES[0])
-        return importlib.util.spec_from_file_location(name, path) if path.is_file() else None
+        file = Path(self._directory or folder(), module + EXTENSION_SUFFIXES[0])
+        return importlib.util.spec_from_file_location(name, file) if file.is_file() else None
 
 
 def build() -> bool:
@@ -58,7 +58,7 @@ def build() -> bool:
         return True
     if sys.platform != "linux" or not compiler or not Path(sysconfig.get_path("include"), "Python.h").is_file():
         return False
-    with contextlib.suppress(OSError):  # no room, no such folder, or another process was first
+    with contextlib.suppress(OSError):  # a full disk, a read-only home, or another process was first
         wanted.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryDirectory(dir=wanted.parent) as made:
             if _compile(compiler, Path(made)):

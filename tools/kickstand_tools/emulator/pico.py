@@ -4,12 +4,11 @@ from collections.abc import Callable
 from typing import Any
 
 from . import flash_image, image
-from .board import EmulatedBoard
+from .board import EmulatedBoard, EmulatedClock
 from .chip import Chip
-from .clock import EmulatedClock
+from .console import QuietConsole
 from .flash_memory import PowerCut
 from .i2c_wires import Wires
-from .quiet_usb import QuietConsole
 
 _LEVEL = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 _CTRL_A, _CTRL_C, _CTRL_D = b"\x01", b"\x03", b"\x04"
@@ -44,7 +43,7 @@ class Pico:
         self.board.button.changed = self._button_changed
         self.console = QuietConsole(self.chip.rp2040.usb_ctrl, self._received)
         self.said = bytearray()  # what the board printed
-        self.heard: Callable[[bytes], None] | None = None  # called with each piece of it
+        self.heard: Callable[[bytes], None] | None = None  # called with each part of it
         self.powered = False
         self._awaited = b""
         self._raw = False  # True while its console is in the raw REPL

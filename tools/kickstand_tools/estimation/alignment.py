@@ -63,12 +63,12 @@ class RideFit:
     """What a ride gives. Angles in degrees.
 
     roll_deg, pitch_deg, yaw_deg: standard errors of the alignment about forward, left and up. The larger part of them
-    are errors of the sensor that a ride does not tell. Upright is where the bike is balanced on straights. halves_deg:
-    by how much two halves of the ride differ in these three. offset_g (3): of the accelerometer along left, up and
-    forward, which the calibration takes off; offset_sigma_g (3): standard errors. used_s: from and to which second of
-    the log the sensor was mounted. riding_s, standing_s: seconds of it. lean_deg: rms of the ride's lean. lag_s: by how
-    much the log's speed is late, None without a speed. phone_deg: by how much the phone is turned against the way that
-    was said, None if nothing was. notices: what is remarkable in the log.
+    are errors of the sensor that are not observable from a ride. Upright is where the bike is balanced on straights.
+    halves_deg: by how much two halves of the ride differ in these three. offset_g (3): of the accelerometer along left,
+    up and forward, which the calibration takes off; offset_sigma_g (3): standard errors. used_s: from and to which
+    second of the log the sensor was mounted. riding_s, standing_s: seconds of it. lean_deg: rms of the ride's lean.
+    lag_s: by how much the log's speed is late, None without a speed. phone_deg: by how much the phone is turned against
+    the mounting that was said, None if none was. notices: what is remarkable in the log.
     """
 
     calibration: CalibrationFile
@@ -91,10 +91,10 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
     """How the sensor sits on a motorcycle, from a ride with bends, in which no pose was held.
 
     log: see read_log; a speed helps and is not needed. phone: None, or how it was mounted: "portrait", "landscape" or
-    "flat" (see phone.py). progress: called with what is done of all there is. Up is where the bike is balanced on
-    straights, forward is the axis about which it leans into its bends and along which it speeds up, left and right are
-    told by leaning into bends. Scale errors of the accelerometer are not told by a ride. Raises InputError;
-    RefusedInput, a subclass with code and values, where the ride does not tell how the sensor sits.
+    "flat" (see PHONES). progress: called with what is done of all there is. Up is where the bike is balanced on
+    straights, forward is the axis about which it leans into its bends and along which it speeds up; leaning into bends
+    separates left from right. Scale errors of the accelerometer are not observable from a ride. Raises InputError;
+    RefusedInput, a subclass with code and values, where the ride does not determine how the sensor sits.
 
     >>> from kickstand_tools.api import Log, simulate_ride
     >>> ride = simulate_ride("city", seed=3, seconds=240.0)

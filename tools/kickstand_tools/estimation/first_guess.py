@@ -1,4 +1,4 @@
-"""Where a bike stands, and its lean and speed, roughly: where the adjustment begins."""
+"""Where a bike stands, and its lean and speed, roughly, where the estimation begins. For an alignment also its axes."""
 
 import itertools
 from dataclasses import dataclass, replace
@@ -8,20 +8,19 @@ from kickstand.errors import Refusal
 from kickstand.units import STANDARD_GRAVITY
 from numpy.typing import NDArray
 
-from ..checks.bends import speed_in_radians
 from ..logs.table import Array
-from ..signals.leaning import WINDOW_S, Leaning, averaged, leaning_of, without_drift
+from ..signals.leaning import WINDOW_S, Leaning, averaged, leaning_of, speed_in_radians, without_drift
 from ..signals.standstill import motionless
 from .windows import Windows
 
-STILL_S = 1.6  # shorter standstills are not told from smooth riding
+STILL_S = 1.6  # shorter standstills look like smooth riding
 STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # rms of the means of windows, over STILL_S
 BIAS_RADPS = np.radians(4.0)  # of the gyro, since its calibration: a rate above is a turn
 MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # the mean force of a ride over so long keeps within this of up
 BETWEEN_S = 20.0
 SURELY_S = 4.0  # at both ends of this it may still ride, or fall
 SLOW_S = 4.0  # changes of lean that take longer follow from turning, quicker ones from the roll rate
-TURNS_S = 40.0  # over which turns tell a speed
+TURNS_S = 40.0  # over which turns give a speed
 CALM_S = 1.0
 MIN_RIDING_S = 30.0
 MIN_LEAN = np.radians(3.0)  # rms: riding straight on shows nothing
@@ -49,7 +48,7 @@ def in_hand(w: Windows) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """(n) True where the sensor is surely moved about in a hand, or lies with the bike: up is far from where it was.
     And the same with the seconds before and after, which may not be riding either.
 
-    A bike in balance feels the force along its own up, however far it leans.
+    On a bike in balance the force is along its own up, however far it leans.
     """
     there = ~w.gap
     mean = averaged(w.force * there[:, None], MOUNTED_S)

@@ -19,7 +19,7 @@ from .windows import Windows
 ANGLE_ROOT = np.radians(0.2)  # rad: of lean and pitch, by vibration of the gyro
 VELOCITY_ROOT = (0.05, 0.05, 0.10)  # m/s: left, up, forward, by vibration of the accelerometer
 BIAS_ROOT = np.radians(0.005)  # rad/s
-WARMING_ROOT = np.radians(0.01)  # the same where no temperature tells: 0.6 deg/s in five minutes of warming up
+WARMING_ROOT = np.radians(0.01)  # the same where no temperature is known: 0.6 deg/s in five minutes of warming up
 # Where readings are missing, and in the hand: lean, pitch, velocity; per root of a second, and at most
 LOST_ROOT = np.array([np.radians(30.0), np.radians(5.0), 3.0, 1.0, 4.0])
 LOST_MOST = np.array([np.radians(60.0), np.radians(8.0), 20.0, 2.0, 20.0])

@@ -1,6 +1,5 @@
-"""The lean of a recorded ride looked back over: from all of its readings, those before and those after."""
+"""The smoothed lean of a recorded ride: from all of its readings, those before and those after."""
 
-from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,8 +23,8 @@ from .unknowns import FORWARD, LEAN, PITCH, Prior
 from .windows import Windows, windows_of
 
 SLOWEST_HZ = 10.0
-PIECE_S = 120.0  # a log is cut into pieces
-CHAPTER = 8  # of which so many are adjusted together, with one before and one after them
+SEGMENT_S = 120.0  # a log is cut into segments
+TOGETHER = 8  # of which so many are estimated together, with one before and one after them
 LEANED_SHARE = 0.004  # of the lean: what the model leaves out, such as a gyro that measures forces, grows with it
 TIMING_S = 0.004  # s: of what the delay of the gyro's low-pass, and the times of samples, are off
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps")
@@ -104,79 +103,67 @@ def smooth_blocks(
     notices: list[Notice] | None = None,
     lines: bool = True,
 ) -> Iterator[tuple[Block, Array | None]]:
-    """Each piece of the log with its values (n, COLUMNS), None where there are too few samples a second. notices,
+    """Each segment of the log with its values (n, COLUMNS), None where there are too few samples a second. notices,
     lines: of read_blocks(). Raises InputError."""
-    _check(log, calibration)
-    past: deque[Block] = deque(maxlen=CHAPTER)
-    waiting: list[Block] = []
-    start_c = np.nan
-    for piece in _pieces(read_blocks(log, 2, progress, notices, lines=lines, calibration=calibration)):
-        waiting.append(piece)
-        known = piece.readings[~np.isnan(piece.readings[:, 3]), 3]
-        start_c = float(known[0]) if np.isnan(start_c) and len(known) else start_c
-        if len(waiting) > CHAPTER:
-            yield from _chapter([*past][-1:], waiting[:CHAPTER], waiting[CHAPTER:], calibration, start_c)
-            past.extend(waiting[:CHAPTER])
-            del waiting[:CHAPTER]
-    # the end of a ride may be short: as much of what was before it is adjusted with it
-    yield from _chapter([*past][-max(1, CHAPTER - len(waiting)) :], waiting, [], calibration, start_c)
-
-
-def _check(log: Source, calibration: CalibrationFile) -> None:
     if calibration.vehicle == "car":
         raise InputError(f"{name_of(log)}: a car does not lean, and its calibration is a car's")
     if not calibration.aligned:
         raise InputError("the calibration is not aligned, so the lean is unknown", "align")
+    past: list[Block] = []
+    waiting: list[Block] = []
+    start_c = np.nan
+    for segment in _segments(read_blocks(log, 2, progress, notices, lines=lines, calibration=calibration)):
+        waiting.append(segment)
+        known = segment.readings[~np.isnan(segment.readings[:, 3]), 3]
+        start_c = float(known[0]) if np.isnan(start_c) and len(known) else start_c
+        if len(waiting) > TOGETHER:
+            past, waiting, before = waiting[:TOGETHER], waiting[TOGETHER:], past[-1:]
+            yield from _together(before, past, waiting, calibration, start_c)
+    # the end of a ride may be short: as much of what was before it is estimated with it
+    yield from _together(past[-max(1, TOGETHER - len(waiting)) :], waiting, [], calibration, start_c)
 
 
-def _pieces(blocks: Iterator[Block]) -> Iterator[Block]:
-    """The blocks cut into pieces of PIECE_S, none over that."""
+def _segments(blocks: Iterator[Block]) -> Iterator[Block]:
+    """The blocks cut into segments, none over SEGMENT_S."""
     for block in blocks:
-        number = np.floor(block.t_s / PIECE_S)
+        number = np.floor(block.t_s / SEGMENT_S)
         cuts = np.flatnonzero(np.diff(number)) + 1
         for begin, end in zip([0, *cuts.tolist()], [*cuts.tolist(), len(number)]):
             yield block.part(slice(begin, end))
 
 
-def _chapter(
+def _together(
     before: list[Block], own: list[Block], after: list[Block], calibration: CalibrationFile, start_c: float
 ) -> Iterator[tuple[Block, Array | None]]:
-    """The values of the pieces `own`, adjusted together with those before and after them."""
-    believed = [piece.measured for piece in (*before, *own, *after)]
-    values = _adjusted(believed, calibration, start_c)
-    first = sum(len(piece.time_us) for piece in believed[: len(before)])
-    for piece in own:
+    """The values of the segments `own`, estimated together with those before and after them."""
+    measured = [segment.measured for segment in (*before, *own, *after)]
+    values = _estimated(measured, calibration, start_c)
+    first = sum(len(segment.time_us) for segment in measured[: len(before)])
+    for segment in own:
         if values is None:
-            yield piece, None
+            yield segment, None
             continue
-        found = np.full((len(piece.time_us), len(COLUMNS)), np.nan)
-        there = ~piece.frozen
+        found = np.full((len(segment.time_us), len(COLUMNS)), np.nan)
+        there = ~segment.frozen
         count = int(np.count_nonzero(there))
         found[there] = values[first : first + count]
         first += count
-        yield piece, found
+        yield segment, found
 
 
-def _warm(t_s: Array, temperature_c: Array, start_c: float) -> Array:
-    """(n): how much warmer it is than start_c; 0 where the log does not tell."""
-    there = np.flatnonzero(~np.isnan(temperature_c))
-    if not len(there) or np.isnan(start_c):
-        return np.zeros(len(t_s))
-    return np.interp(t_s, t_s[there], temperature_c[there]) - start_c
-
-
-def _adjusted(pieces: list[Block], calibration: CalibrationFile, start_c: float) -> Array | None:
+def _estimated(segments: list[Block], calibration: CalibrationFile, start_c: float) -> Array | None:
     """(samples, COLUMNS); None where there are too few samples a second."""
-    t_s = np.concatenate([piece.t_s for piece in pieces])
-    readings = np.concatenate([piece.readings for piece in pieces])
-    speed = np.concatenate([piece.speed_mps for piece in pieces])
+    t_s = np.concatenate([segment.t_s for segment in segments])
+    readings = np.concatenate([segment.readings for segment in segments])
+    speed = np.concatenate([segment.speed_mps for segment in segments])
     nothing = np.full((len(t_s), len(COLUMNS)), np.nan)
     if len(t_s) < 2:
         return nothing
-    warm = _warm(t_s, readings[:, 3], start_c)
-    step_s = float(np.median(np.diff(t_s)))
-    if step_s * SLOWEST_HZ > 1.0:
+    if float(np.median(np.diff(t_s))) * SLOWEST_HZ > 1.0:
         return None
+    there, warm = ~np.isnan(readings[:, 3]), np.zeros(len(t_s))
+    if np.any(there) and not np.isnan(start_c):
+        warm = np.interp(t_s, t_s[there], readings[there, 3]) - start_c
     force, rate = calibration.in_vehicle(readings)
     rate = np.radians(rate)
     windows = windows_of(t_s, force, rate, speed, warm)

@@ -26,7 +26,7 @@ from kickstand.drive_alignment.events import MAX_INTERVAL_US
 from kickstand.units import GAP_US, STANDARD_GRAVITY
 
 from ..logs.log import Log
-from ..logs.table import Array
+from ..logs.table import Array, Table
 from ..signals.averages import moving_mean
 from ..signals.cells import runs
 from ..signals.standstill import STANDING_MPS
@@ -58,7 +58,7 @@ class Intervals:
 
 
 @dataclass
-class Blocks:
+class Blocks(Table):
     """m blocks of intervals that follow one another in one or several logs.
 
     square (m, 4, 4), product (m, 4, 3): sums of terms x terms and of terms x force, the road taken off. sway (m, 3, 3):
@@ -72,10 +72,6 @@ class Blocks:
     log: Array
     t_s: Array
     end_s: Array
-
-    def part(self, which: slice) -> "Blocks":
-        """Some of them."""
-        return Blocks(*(getattr(self, name)[which] for name in ("square", "product", "sway", "log", "t_s", "end_s")))
 
 
 def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:

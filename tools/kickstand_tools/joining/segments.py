@@ -7,9 +7,8 @@ in which the ride began and the hills do not matter then.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..logs.table import Array
+from ..logs.table import Array, Table
 from .course import Course
 
 STEPS = 30  # of a segment at most
@@ -17,7 +16,7 @@ _FEWEST = 8  # a segment of fewer steps shows little
 
 
 @dataclass
-class Segments:
+class Segments(Table):
     """p segments of up to STEPS good steps in a row, all (p, STEPS); weights are 0 where a segment is shorter.
 
     begin_s, end_s: of each step, s since the track's first point. turned_deg: by how much the course of each step is to
@@ -36,11 +35,6 @@ class Segments:
     def middle_s(self) -> Array:
         """(p, STEPS) of each step."""
         return (self.begin_s + self.end_s) / 2.0
-
-    def part(self, which: NDArray[np.bool_]) -> "Segments":
-        """The segments for which an array of p is True."""
-        arrays = self.begin_s, self.end_s, self.turned_deg, self.course_weight, self.speed_mps, self.speed_weight
-        return Segments(*(array[which] for array in arrays))
 
 
 def segments(course: Course) -> Segments:

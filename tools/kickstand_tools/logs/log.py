@@ -1,7 +1,7 @@
 """A recorded log in memory."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from kickstand.errors import Notice
@@ -100,11 +100,6 @@ class Log(Table):
         named |= {f"a{axis}_g": values for axis, values in zip(AXES, self.accel_g.T)}
         named |= {f"g{axis}_dps": values for axis, values in zip(AXES, self.gyro_dps.T)}
         return named | {name: getattr(self, name) for name in TRACK} | {"temp_c": self.temperature_c}
-
-    def part(self, which: NDArray[np.bool_]) -> "Log":
-        """The samples where an array of n is True."""
-        arrays = [field.name for field in fields(self) if isinstance(getattr(self, field.name), np.ndarray)]
-        return replace(self, **{name: getattr(self, name)[which] for name in arrays})
 
     def _optional(self, values: ArrayLike) -> Array:
         array = np.asarray(values, dtype=float)

@@ -1,7 +1,7 @@
 """What the results that are tables have in common."""
 
-from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,10 @@ class Table:
         """The arrays (n,) by the names of their fields."""
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+
+    def part(self, which: slice | NDArray[np.bool_]) -> Self:
+        """The samples of a slice, or those where an array of n is True."""
+        return replace(self, **{name: values[which] for name, values in Table.columns(self).items()})
 
     def to_pandas(self) -> "DataFrame":
         """A data frame of columns(). Raises InputError if pandas is not installed."""

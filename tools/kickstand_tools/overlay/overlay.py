@@ -111,7 +111,7 @@ def overlay(
         arguments = _over(filmed, begin_s - offset_s, end_s - begin_s, fps, given, round(MARGIN * size))
 
     def written(temporary: Path) -> None:
-        temporary.touch()  # where that fails the system's reason is told, which ffmpeg's words hide
+        temporary.touch()  # where that fails the system's reason is said, which ffmpeg's words hide
         write_video(temporary, arguments, pictures(), drawn)
 
     write_whole(out, written)
@@ -138,7 +138,7 @@ def _found_offset(log: Source, video: Video, progress: Progress | None) -> tuple
     todo = "give --offset, the ride's time in seconds at the video's first picture"
     measured = telemetry(video)
     if measured is None:
-        raise InputError(f"{video.path}: no readings of a GoPro's gyro in it tell when it was filmed: {todo}")
+        raise InputError(f"{video.path}: no readings of a GoPro's gyro in it show when it was filmed: {todo}")
     try:
         return camera_offset_s(motion(log, progress), measured)
     except InputError as error:

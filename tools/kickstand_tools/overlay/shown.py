@@ -62,7 +62,6 @@ class Shown:
 
 def shown(ride: Ride, progress: Progress | None = None, notices: list[Notice] | None = None) -> Shown:
     """Of a whole ride (see open_ride), with the lean that it was opened with. progress, notices: of Ride.blocks().
-
     Raises InputError."""
     columns: list[NDArray[np.float64]] = []
     for block in ride.blocks(progress, notices):

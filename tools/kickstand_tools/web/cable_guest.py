@@ -27,14 +27,14 @@ class Live:
         self._recording = None
         self._began = datetime.now()
 
-    def run(self, line, name, tell):
+    def run(self, line, name, live):
         """Listen to the board at a SerialLine until stop(), or until nothing more comes. name: of its port.
-        tell(reading): called every half second with a LiveReading's fields as JSON.
+        live(reading): called every half second with a LiveReading's fields as JSON.
 
         Returns JSON: {"notes": lines on what is missing, "changed": the log ended because of another calibration} or
         {"refused": why}. What came until then is in files().
         """
-        self._recording = stream.Recording(self._stopped, lambda reading: tell(json.dumps(vars(reading))))
+        self._recording = stream.Recording(self._stopped, lambda reading: live(json.dumps(vars(reading))))
         notes = []
         try:
             with connected(BrowserBoard(line, name)) as (transport, _):
@@ -66,8 +66,8 @@ class Live:
         return [(name, file.getvalue().encode("ascii")) for name, file in made.items()]
 
 
-def pull(line, name, tell):
-    """Fetch the rides from the board at a SerialLine. name: of its port.  tell(what, done, total): the progress, bytes.
+def pull(line, name, progress):
+    """Fetch the rides from the board at a SerialLine. name: of its port.  progress(what, done, total): in bytes.
 
     Returns (JSON, files): {"refused": why it ended early, or null, "rides": [{"number", "log": its name or null,
     "seconds", "readings", "problems"}]} and [(name, content)], the logs with their calibrations as `kickstand pull`
@@ -76,7 +76,7 @@ def pull(line, name, tell):
     refused, rides = None, []
     with tempfile.TemporaryDirectory() as directory:
         try:
-            pulling.pull(BrowserBoard(line, name), Path(directory), progress=tell, pulled=rides.append)
+            pulling.pull(BrowserBoard(line, name), Path(directory), progress=progress, pulled=rides.append)
         except InputError as error:
             refused = str(error)
         written = [path for ride in rides if ride.log for path in (ride.log, calibration_path(ride.log))]

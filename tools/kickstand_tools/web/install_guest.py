@@ -78,9 +78,9 @@ class Installation:
             found = [setting[0] if setting else mentioned, reason.partition(": correct it")[0]]
         return json.dumps({"text": text, "fault": found})
 
-    def install(self, line, name, wanted, tell):
+    def install(self, line, name, wanted, progress):
         """Put the firmware onto the board at a SerialLine, with the settings that check() has found right; a config.py
-        that a form cannot change stays. tell(what, done, total): the progress, bytes.
+        that a form cannot change stays. progress(what, done, total): the progress, bytes.
 
         Returns {"board", "copied": how many files, "kept": likewise, "config_kept"} or {"refused": why}.
         """
@@ -89,12 +89,12 @@ class Installation:
         try:
             replaces = text is not None and text != self._own
             board = BrowserBoard(line, name)
-            done = flash.flash(board, replaces, tell, describe=_describe, compiler=_compiled, judge=_judged)
+            done = flash.flash(board, replaces, progress, describe=_describe, compiler=_compiled, judge=_judged)
         except InputError as error:
             return json.dumps({"refused": str(error)})
         installed = done.installed
-        told = {"board": done.board, "copied": len(installed.copied), "kept": len(installed.kept)}
-        return json.dumps(told | {"config_kept": CONFIG not in installed.copied})
+        counts = {"copied": len(installed.copied), "kept": len(installed.kept)}
+        return json.dumps({"board": done.board, "config_kept": CONFIG not in installed.copied} | counts)
 
 
 def _describe(transport, name):

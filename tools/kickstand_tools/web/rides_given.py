@@ -101,7 +101,7 @@ def _add(found: Given, log: str, files: list[str], pieces: list[Piece]) -> None:
 
 
 def _is_log(name: str) -> bool:
-    """As far as its first line tells."""
+    """By its first line."""
     try:
         check_first_line(Path(name))
         return True

@@ -35,7 +35,7 @@ MADE = Path("../made")  # not where what was given is: that may have any name
 TOO_LONG = "this ride is too long for the memory of a browser: give a part of it"
 
 
-def told(function: Callable[..., Any]) -> Callable[..., str]:
+def in_json(function: Callable[..., Any]) -> Callable[..., str]:
     """With the result as JSON, or why there is none."""
 
     @functools.wraps(function)
@@ -50,7 +50,7 @@ def told(function: Callable[..., Any]) -> Callable[..., str]:
     return as_json
 
 
-@told
+@in_json
 def rides(given, names):
     """What the files of these names (JSON) in the folder `given` are, in the order in which they were given.
 
@@ -86,8 +86,8 @@ def asked_for(table: mapped.Table) -> dict[str, Any]:
     return {"columns": table.columns, "keys": keys, "units": units, "lacking": table.lacking}
 
 
-@told
-def take(log, is_log, columns, units, _tell):
+@in_json
+def take(log, is_log, columns, units, _progress):
     """{"log": log}; for a recording of an app {"log": the one that `import` makes of it, "path": likewise, "app": whose
     it is, "warnings": [...]}. columns, units: of a table, as JSON of what --columns and --units take, else "{}"."""
     if is_log:
@@ -99,13 +99,13 @@ def take(log, is_log, columns, units, _tell):
     return {"log": out, "path": out, "app": found.app, "warnings": warnings}
 
 
-@told
-def look(log, calibration, tell):
+@in_json
+def look(log, calibration, progress):
     """What `report` says and `plot` draws of a log with the calibration of a file: {"words": report.Words, "json":
     report.as_data(), "warnings": [...], "page": HTML, "plotly": the script that the page loads, "stem": the name
-    without suffixes}. tell(done, total): the progress."""
+    without suffixes}. progress(done, total): the progress."""
     ride = open_ride(Path(log), Path(calibration), smoothed=True)
-    seen = overview(ride, tell)
+    seen = overview(ride, progress)
     table = {"units": report.STOPS_UNITS, "title": report.STOPS_TITLE, "terms": report.STOPS_TERMS}
     return {
         "words": asdict(report.words(seen, PAGE)) | table,
@@ -117,19 +117,19 @@ def look(log, calibration, tell):
     }
 
 
-@told
-def smooth(log, calibration, tell):
+@in_json
+def smooth(log, calibration, progress):
     """{"path": of LEAN.csv as `smooth` writes it}."""
     ride = open_ride(Path(log), Path(calibration))
     out = _made(log, f"{ride.stem}.lean.csv")
-    smooth_to_csv(Path(log), ride.calibration, out, tell)
+    smooth_to_csv(Path(log), ride.calibration, out, progress)
     return {"path": str(out)}
 
 
-@told
-def align(log, tell):
+@in_json
+def align(log, progress):
     """{"path": of the calibration that `calibrate ride` finds, "roll_deg", "pitch_deg", "yaw_deg": how well}."""
-    found = fit_ride(Path(log), progress=tell)
+    found = fit_ride(Path(log), progress=progress)
     out = _made(log, calibration_path(Path(log)).name)
     write_calibration(out, found.calibration)
     known = {name: round(getattr(found, name), 1) for name in ("roll_deg", "pitch_deg", "yaw_deg")}

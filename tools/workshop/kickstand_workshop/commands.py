@@ -17,7 +17,6 @@ from rich.console import Console
 
 from .evaluation import picture, report, runs
 from .evaluation.estimators import missing
-from .evaluation.evaluate import evaluate
 
 _WIDTH = 110  # columns of a table that is not printed to a terminal
 
@@ -43,8 +42,8 @@ def evaluate_command(
     if absent:
         click.echo(f"left out, not installed: {', '.join(absent)}: {extra('evaluate')}", err=True)
     with new_directory(out) if out is not None else contextlib.nullcontext():
-        with Bar("riding", len(jobs) * runs.steps(), patience_s=0.0, lines_s=LINES_S) as bar:
-            found = evaluate(jobs, recording, lambda: bar.advance(1))
+        with Bar("riding", len(jobs), patience_s=0.0, lines_s=LINES_S) as bar:
+            found = runs.evaluate(jobs, recording, lambda: bar.advance(1))
         for result in found.results:
             if result.refusal is not None:
                 where = f"{result.job.profile}, seed {result.job.seed}"

@@ -9,7 +9,7 @@ from pathlib import Path
 from ..channels import Channels
 from .export_csv import COLUMNS
 
-_FINE = ("t_s", "lat_deg", "lon_deg", "utc_s")  # a float of 32 bits tells positions that are 1 m apart
+_FINE = ("t_s", "lat_deg", "lon_deg", "utc_s")  # a float of 32 bits has positions to 1 m only
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:

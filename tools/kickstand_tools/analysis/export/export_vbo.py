@@ -5,7 +5,7 @@ https://developers.racelogic.co.uk/Portal/Tutorials/tutorialVBOfilestructure.htm
 https://en.racelogic.support/VBOX_Automotive/Knowledge_Base/VBO_File_Format and the VBOX HD Lite's user guide:
 time HHMMSS.SS, velocity in km/h, latitude and longitude in minutes, north and west positive, heading in degrees
 clockwise from north, long accel > 0 forward, lat accel > 0 to the left, others with mantissa and exponent. A log does
-not tell the number of satellites: it is 4, the fewest that a position takes, where there is a position, else 0, as the
+not have the number of satellites: it is 4, the fewest that a position takes, where there is a position, else 0, as the
 position then is. Any other column that the log has no values for is left out, except velocity, which VBO requires: it
 is then 0, and a comment in the file says so.
 """

@@ -22,7 +22,7 @@ SHORTEST_S = 0.2  # between points
 SAME_M = 0.5  # points that are no further from the one before are left out: a bike that stands is one point
 MOST_LAT_DEG = 85.0  # beyond it Mercator has no map
 LEAST_LEAN_DEG = 30.0  # the lean that has the full colour is this at least
-# From left to right: blue and orange can be told apart by the colour-blind too; upright is grey
+# From left to right: the colour-blind can distinguish blue and orange, too; upright is grey
 _COLOURS = [[0.0, "#0d3a73"], [0.25, LEFT_COLOUR], [0.5, "#c9c9c9"], [0.75, RIGHT_COLOUR], [1.0, "#7a2c05"]]
 
 

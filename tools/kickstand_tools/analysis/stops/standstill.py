@@ -1,4 +1,9 @@
-"""When a vehicle stands still."""
+"""When a vehicle stands still, for the stops of a ride.
+
+Not by signals.standstill.motionless: limits that are shares of the ride's own shaking see all of the standing time of
+simulated rides on the road, those in deg/s and g 54 to 92 %. Only where an idling engine shakes as the road does they
+see less (17 to 41 % against 91 %).
+"""
 
 import numpy as np
 from numpy.typing import NDArray

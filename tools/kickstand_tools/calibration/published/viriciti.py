@@ -58,7 +58,7 @@ class PublishedAlignment:
         self.counted = self.turned = 0
         self._accepted = [0.0] * 3  # sum of their forces
         self._event = _Samples()  # of the braking event that goes on
-        self._interval = _Samples()  # since the last speed: the next one will tell whether it was braking
+        self._interval = _Samples()  # since the last speed: the next one will show whether it was braking
         self._means = CircularDispersion()  # one direction for each accepted braking event
         self._speed = -1.0
         self._loss = 0.0

@@ -22,9 +22,9 @@ from .sample_count import SampleCount
 SAMPLE_HZ = 200  # as bench_guest sets it
 _GUEST = ("bench_guest", "stages_guest")  # modules of this folder that run on the Pico
 _SENSOR = Sensor(seed=1, share=0.0)  # without errors, mounted at some angle
-_RIDE = [accelerate(15.0, 1.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 20
+_SPEED_MPS = 15.0
+_RIDE = [accelerate(_SPEED_MPS, 1.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 20
 _MODES: dict[str, dict[str, Any]] = {"aligning by driving": {"SPEED": "wheel"}, "recording": {"RECORD": True}}
-_WHEEL_PIN, _PULSE_S, _CLOSED_S = 14, 0.133, 0.02  # one magnet on a wheel of 2 m circumference, at 15 m/s
 
 
 def bench(seconds: int = 10) -> dict[str, Any]:
@@ -32,26 +32,15 @@ def bench(seconds: int = 10) -> dict[str, Any]:
 
     seconds: emulated time of each of four runs. Raises GuestError if the program on the Pico fails.
     """
-    plain = _run(seconds, detail=False)
-    detail = _run(seconds, detail=True)
-    modes = {name: _run(seconds, detail=False, chosen=chosen) for name, chosen in _MODES.items()}
-    figures = plain["figures"]
+    plain = _figures(_run(seconds))
+    modes = {name: _figures(_run(seconds, chosen=chosen)) for name, chosen in _MODES.items()}
+    for mode in modes.values():
+        mode["us_per_sample"] = (mode["cpu_share"] - plain["cpu_share"]) * 1e6 / SAMPLE_HZ
     return {
         "sample_hz": SAMPLE_HZ,
-        "seconds": figures["elapsed_us"] / 1e6,
-        "turn_us": _spread(plain["took"]),
-        "stage_us": {name: _spread(us) for name, us in _stages(detail).items()},
-        "cpu_share": _cpu_share(plain),
-        "turns": figures["turns"],
-        "samples_taken": plain["taken"],
-        "samples_lost": plain["lost"],
-        "heap_bytes_per_sample": round(figures["heap_bytes"] / max(1, plain["heap_samples"])),
-        "collections_by_app": figures["collections_by_app"],
-        "collections_automatic": figures["collections_automatic"],
-        "collection_pause_us": _spread(plain["pauses"]),
-        "free_heap_bytes": figures["free_before"],
-        "free_heap_at_end_bytes": figures["free_after"],
-        "modes": {name: _compared(mode, plain) for name, mode in modes.items()},
+        **plain,
+        "stage_us": {name: _spread(us) for name, us in _stages(_run(seconds, detail=True)).items()},
+        "modes": modes,
         "boot": {
             kind: asdict(boot.boot(_SENSOR.world(Ride([upright(100.0)]).motion), _calibration(), kind == "mpy"))
             for kind in ("py", "mpy")
@@ -96,38 +85,26 @@ def _mode_text(mode: dict[str, Any]) -> str:
     )
 
 
-def _cpu_share(run: dict[str, Any]) -> float:
-    return 1.0 - run["figures"]["slept_us"] / run["figures"]["elapsed_us"]
-
-
-def _compared(mode: dict[str, Any], plain: dict[str, Any]) -> dict[str, Any]:
-    """The figures of a run in a mode, and what it costs more than the plain run."""
-    figures = mode["figures"]
+def _figures(run: dict[str, Any]) -> dict[str, Any]:
+    """What bench() gives of a run."""
+    figures = run["figures"]
     return {
-        "cpu_share": _cpu_share(mode),
-        "us_per_sample": (_cpu_share(mode) - _cpu_share(plain)) * 1e6 / SAMPLE_HZ,
-        "turn_us": _spread(mode["took"]),
-        "samples_taken": mode["taken"],
-        "samples_lost": mode["lost"],
+        "seconds": figures["elapsed_us"] / 1e6,
+        "turn_us": _spread(run["took"]),
+        "cpu_share": 1.0 - figures["slept_us"] / figures["elapsed_us"],
+        "turns": figures["turns"],
+        "samples_taken": run["taken"],
+        "samples_lost": run["lost"],
+        "heap_bytes_per_sample": round(figures["heap_bytes"] / max(1, run["heap_samples"])),
+        "collections_by_app": figures["collections_by_app"],
         "collections_automatic": figures["collections_automatic"],
+        "collection_pause_us": _spread(run["pauses"]),
         "free_heap_bytes": figures["free_before"],
         "free_heap_at_end_bytes": figures["free_after"],
     }
 
 
-def _turn_wheel(pico: Pico) -> None:
-    """Let the wheel contact close and open from now on."""
-    pin = pico.chip.rp2040.gpio[_WHEEL_PIN]
-
-    def close() -> None:
-        pin.set_input_value(False)
-        pico.board.at(pico.time_s + _CLOSED_S, pin.release_input)
-        pico.board.at(pico.time_s + _PULSE_S, close)
-
-    close()
-
-
-def _run(seconds: int, detail: bool, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
+def _run(seconds: int, detail: bool = False, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
     """Run the app's loop for so many emulated seconds. chosen: settings by name.
 
     Returns the figures and arrays of bench_guest, and how many samples were taken and lost.
@@ -156,17 +133,13 @@ def _run(seconds: int, detail: bool, chosen: dict[str, Any] | None = None) -> di
 
         HostLink(pico.chip, b"", take)
         if chosen.get("SPEED") == "wheel":
-            _turn_wheel(pico)
+            pico.fit_wheel(lambda t_s: _SPEED_MPS)
         code = f"{GUEST}import bench_guest\nbench_guest.run({detail}, {seconds}, Sink(), {chosen})\n"
         result["figures"] = ast.literal_eval(pico.exec(code, limit_s=2.0 * seconds + 30.0))
     turns = result["figures"]["turns"]
     result["took"] = arrays[0][:turns]
-    figures = result["figures"]
-    result["pauses"] = (
-        arrays[1][: figures["collections_by_app"]]
-        if figures["collections_by_app"]
-        else np.array([figures["collect_us"]])
-    )
+    asked_for = arrays[1][: result["figures"]["collections_by_app"]]
+    result["pauses"] = asked_for if len(asked_for) else np.array([result["figures"]["collect_us"]])
     if detail:
         result["stages"] = np.array(stages).astype(int)
     return result

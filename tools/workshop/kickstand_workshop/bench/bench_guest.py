@@ -30,7 +30,7 @@ class Done(Exception):
 class Canary:
     """A piece of heap without a reference: once a collection has freed it, it is soon overwritten.
 
-    So it tells that a collection has run. gc.mem_alloc() would tell as well, but takes 7 ms.
+    So it shows that a collection has run. gc.mem_alloc() would show it as well, but takes 7 ms.
     """
 
     MARK = 0x5AC3

@@ -6,25 +6,42 @@ Each takes Samples and returns the lean in degrees of every sample, > 0 to the r
 """
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.estimation.smooth import smooth
-from kickstand_tools.logs.reader import Log
+from kickstand_tools.logs.log import Log
 from kickstand_tools.replay import replay_engine
 from numpy.typing import NDArray
-
-from .samples import Samples, calibrated
 
 AVERAGE_S = 0.3  # of the formula's lean
 COMPLEMENTARY = 0.98  # weight of the integrated lean at each sample; the direction of the force has the rest
 
 _SHOWN, _FORMULA = (replay_engine.COLUMNS.index(name) for name in ("lean_deg", "lean_formula_deg"))
 _TO_XYZ = [2, 0, 1]  # left, up, forward to forward, left, up: the body frame of ahrs and vqf
-_PACKAGES = {"mahony": "ahrs", "madgwick": "ahrs", "vqf": "vqf"}
+PACKAGES = {"mahony": "ahrs", "madgwick": "ahrs", "vqf": "vqf"}
+
+
+@dataclass
+class Samples:
+    """A calibrated log: time (N,) in s, evenly spaced; force (N, 3) in g and rate (N, 3) in deg/s along left, up,
+    forward."""
+
+    time: NDArray[np.float64]
+    force: NDArray[np.float64]
+    rate: NDArray[np.float64]
+
+    @property
+    def rate_hz(self) -> float:
+        return float((len(self.time) - 1) / (self.time[-1] - self.time[0]))
+
+
+def calibrated(log: Log, calibration: CalibrationFile) -> Samples:
+    """All estimators use the same calibrated samples."""
+    return Samples(log.t_s, *calibration.in_vehicle(log.readings))
 
 
 def trailing_mean(x: NDArray, seconds: float, rate_hz: float) -> NDArray[np.float64]:
@@ -79,43 +96,25 @@ OTHERS: dict[str, Callable[[Samples], NDArray[np.float64]]] = {
 
 def missing() -> list[str]:
     """The packages that are not installed. estimate() leaves their filters out."""
-    return sorted({package for package in _PACKAGES.values() if find_spec(package) is None})
+    return sorted({package for package in PACKAGES.values() if find_spec(package) is None})
 
 
-def estimate(
-    log: Log, calibration: CalibrationFile, done: Callable[[], None] = lambda: None
-) -> dict[str, NDArray[np.float64]]:
-    """Lean in degrees, > 0 to the right, by the name of each estimator that is installed. The log's speed is not used.
-
-    done(): called after each of steps().
-    """
+def estimate(log: Log, calibration: CalibrationFile) -> dict[str, NDArray[np.float64]]:
+    """Lean in degrees, > 0 to the right, by the name of each estimator that is installed; without the log's speed."""
     engine = replay_engine.Replay(calibration.to_firmware())
     shown, formula = np.empty(len(log.t_s)), np.empty(len(log.t_s))
     for i, (time_us, reading, _) in enumerate(log.rows()):
         values = engine.step(time_us, reading)
         shown[i], formula[i] = values[_SHOWN], values[_FORMULA]
     samples = calibrated(log, calibration)
-    result = {
+    absent = missing()
+    return {
         "kickstand": shown,
         "smoothed": smooth(replace(log, speed_mps=np.zeros(0)), calibration).lean_deg,
         "formula": formula,
         "formula 0.3 s": trailing_mean(formula, AVERAGE_S, samples.rate_hz),
+        **{name: lean(samples) for name, lean in OTHERS.items() if PACKAGES.get(name) not in absent},
     }
-    done()
-    for name in _others():
-        result[name] = OTHERS[name](samples)
-        done()
-    return result
-
-
-def steps() -> int:
-    """How often estimate() calls done(): once for the firmware's lean and once for each other filter."""
-    return 1 + len(_others())
-
-
-def _others() -> list[str]:
-    absent = missing()
-    return [name for name in OTHERS if _PACKAGES.get(name) not in absent]
 
 
 def _xyz(samples: Samples) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

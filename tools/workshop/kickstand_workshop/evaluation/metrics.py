@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand_tools.signals.lag import peak_offset
 from numpy.typing import NDArray
 
 LEANED_DEG = 10.0  # the slope is fitted where the true lean is larger: most of a ride is nearly upright
@@ -15,7 +16,7 @@ _STRAIGHT_DPS, _STRAIGHT_DEG, _STRAIGHT_MPS, _STRAIGHT_S = 2.0, 6.0, 5.0, 1.0
 
 @dataclass
 class Score:
-    """Errors in degrees. slope: shown over true lean. lag: > 0 if shown late. NaN where the ride does not tell."""
+    """Errors in degrees. slope: shown over true lean. lag: > 0 if shown late. NaN where not observable."""
 
     rms_deg: float
     p95_deg: float  # 95 % of the absolute errors are smaller
@@ -51,9 +52,7 @@ def lag_ms(shown: NDArray, true: NDArray, rate_hz: float) -> float:
     best = int(np.argmax(match))
     if not 0 < best < len(shifts) - 1:
         return float("nan")
-    before, peak, after = match[best - 1 : best + 2]
-    between = 0.5 * (before - after) / (before - 2.0 * peak + after)
-    return float((shifts[best] + between) / rate_hz * 1000.0)
+    return float((shifts[best] + peak_offset(match[best - 1 : best + 2])) / rate_hz * 1000.0)
 
 
 def straights(truth: dict[str, NDArray], rate_hz: float) -> NDArray[np.bool_]:

@@ -20,9 +20,8 @@ from kickstand_tools.logs.reader import Log, read_log
 from kickstand_tools.signals.averages import moving_mean
 from numpy.typing import NDArray
 
-from .estimators import estimate
+from .estimators import calibrated, estimate
 from .metrics import rms, slope
-from .samples import calibrated
 
 AVERAGE_S = 1.0
 _RIDING_MPS = 2.0  # scored where the speed is higher
@@ -71,7 +70,8 @@ def reference_lean(log: Log, calibration: CalibrationFile) -> NDArray[np.float64
     """atan(v * yaw rate / g) in degrees, > 0 to the right, averaged over 1 s."""
     samples = calibrated(log, calibration)
     centripetal = _speed(log) * np.radians(samples.rate[:, 1])
-    return _averaged(-np.degrees(np.arctan(centripetal / STANDARD_GRAVITY)), samples.rate_hz)
+    lean = -np.degrees(np.arctan(centripetal / STANDARD_GRAVITY))
+    return moving_mean(lean, round(AVERAGE_S * samples.rate_hz))
 
 
 def _speed(log: Log) -> NDArray[np.float64]:
@@ -80,8 +80,3 @@ def _speed(log: Log) -> NDArray[np.float64]:
     if np.count_nonzero(there) < 2:
         raise InputError(f"{log.name} has no speed: without it there is no reference")
     return np.interp(log.t_s, log.t_s[there], log.speed_mps[there])
-
-
-def _averaged(x: NDArray, rate_hz: float) -> NDArray[np.float64]:
-    """The mean over 1 s around each sample."""
-    return moving_mean(x, round(AVERAGE_S * rate_hz))

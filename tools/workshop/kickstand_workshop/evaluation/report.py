@@ -11,22 +11,21 @@ from rich import box
 from rich.table import Table
 
 from . import picture
-from .evaluate import Evaluation
 from .metrics import Score
 from .real_ride import RealScore
-from .runs import Result
+from .runs import Evaluation, Result
 
 CAPTION = (
     "rms: over all rides; worst ride: rms of the worst; 95 %: mean over rides; worst: of all; "
     "slope: shown over true beyond 10 deg, mean, then lowest to highest; lag: mean; "
-    "bias: the largest on straights in the last tenth; --: nothing in these rides tells it"
+    "bias: the largest on straights in the last tenth; --: not observable in these rides"
 )
 
 _UNKNOWN = "--"
 
 
 def pooled(scores: list[Score]) -> dict[str, float]:
-    """One estimator's scores on one profile, pooled over the seeds: degrees, lag in ms. NaN where no ride tells."""
+    """One estimator's scores on one profile, pooled over the seeds: degrees, lag in ms. NaN where not observable."""
     rms = np.array([s.rms_deg for s in scores])
     slopes, lags, biases = (
         [value for s in scores if not np.isnan(value := getattr(s, name))]
@@ -103,7 +102,7 @@ def _table(title: str, caption: str) -> Table:
 
 
 def document(evaluation: Evaluation) -> dict[str, Any]:
-    """All figures for a JSON file; null where no ride tells."""
+    """All figures for a JSON file; null where not observable."""
     rides = [
         {
             "profile": r.job.profile,

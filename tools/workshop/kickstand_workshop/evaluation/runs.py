@@ -1,12 +1,12 @@
-"""Simulates rides, calibrates them with the firmware's own code and scores every estimator, on all processors."""
+"""Simulates rides, calibrates them with the firmware's own code and scores every estimator, on all processors: what
+`kickstand evaluate` computes."""
 
-import contextlib
 import multiprocessing
 import os
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from multiprocessing.queues import SimpleQueue
+from pathlib import Path
 
 import numpy as np
 from kickstand_tools.calibration.file import CalibrationFile
@@ -18,11 +18,8 @@ from kickstand_tools.simulation.profiles import check_profile
 from kickstand_tools.simulation.ride import Ride, ride
 from numpy.typing import NDArray
 
-from . import estimators
+from . import estimators, real_ride
 from .metrics import Score, score
-
-_POLL_S = 0.2  # the workers' progress is read this often
-_steps_done: SimpleQueue  # in a worker process: what it tells its progress by
 
 
 @dataclass(frozen=True)
@@ -68,13 +65,30 @@ def jobs(
     ]
 
 
-def steps() -> int:
-    """How often a job calls done(): once for the ride, then for each estimator."""
-    return 1 + estimators.steps()
+@dataclass
+class Evaluation:
+    """results: of the simulated rides, by profile, then by seed. recorded: of the recorded ride, None without one."""
+
+    results: list[Result]
+    recorded: real_ride.Comparison | None
 
 
-def run(job: Job, done: Callable[[], None] = lambda: None) -> Result:
-    """Simulate, calibrate from the poses alone, estimate and score. done(): called after each of steps()."""
+def evaluate(jobs: list[Job], recording: Path | None = None, done: Callable[[], None] = lambda: None) -> Evaluation:
+    """Simulate and score every ride, on all processors; score the estimators on the recording if one is given.
+
+    done(): called after each ride. Raises InputError if the recording cannot be used.
+    """
+    profiles = list(dict.fromkeys(job.profile for job in jobs))
+    recorded = real_ride.compare(recording) if recording else None
+    results = []
+    for result in run_all(jobs):
+        results.append(result)
+        done()
+    return Evaluation(sorted(results, key=lambda r: (profiles.index(r.job.profile), r.job.seed)), recorded)
+
+
+def run(job: Job) -> Result:
+    """Simulate, calibrate from the poses alone, estimate and score."""
     upright_sign, pitch_sign = (1, -1)[job.seed % 2], (1, -1)[job.seed // 2 % 2]
     made = ride(
         job.profile,
@@ -83,33 +97,20 @@ def run(job: Job, done: Callable[[], None] = lambda: None) -> Result:
         upright_sign * job.upright_error_deg,
         pitch_sign * job.pitch_change_deg,
     )
-    done()
     try:
         calibration = calibrated_by_poses(made)
     except InputError as error:
-        for _ in range(estimators.steps()):
-            done()
         return Result(job, refusal=str(error))
-    shown = estimators.estimate(as_log(made), calibration, done)
+    shown = estimators.estimate(as_log(made), calibration)
     scores = {name: score(lean, made.truth, made.rate_hz) for name, lean in shown.items()}
     traces = {"time": made.time, "true": made.truth["lean_deg"], **shown} if job.traces else {}
     return Result(job, scores, traces)
 
 
-def run_all(jobs: list[Job], done: Callable[[], None] = lambda: None) -> Iterator[Result]:
-    """Yield the result of run() for each job as it is ready. done(): called soon after each of a job's steps()."""
-    steps_done = multiprocessing.SimpleQueue()
-    with multiprocessing.Pool(min(len(jobs), os.cpu_count() or 1), _begin_worker, (steps_done,)) as pool:
-        results = pool.imap_unordered(_work, jobs)
-        for _ in jobs:
-            result = None
-            while result is None:
-                with contextlib.suppress(multiprocessing.TimeoutError):
-                    result = results.next(_POLL_S)
-                while not steps_done.empty():
-                    steps_done.get()
-                    done()
-            yield result
+def run_all(jobs: list[Job]) -> Iterator[Result]:
+    """Yield the result of run() for each job as it is ready."""
+    with multiprocessing.Pool(min(len(jobs), os.cpu_count() or 1), _begin_worker) as pool:
+        yield from pool.imap_unordered(run, jobs)
 
 
 def calibrated_by_poses(made: Ride) -> CalibrationFile:
@@ -126,12 +127,6 @@ def as_log(made: Ride) -> Log:
     return Log(made.time, readings[:, :3], readings[:, 4:], temperature_c=readings[:, 3], name="RIDE.csv")
 
 
-def _begin_worker(steps_done: SimpleQueue) -> None:
+def _begin_worker() -> None:
     """Without standard error: after Ctrl-C every worker would print a traceback."""
-    global _steps_done
-    _steps_done = steps_done
     sys.stderr = open(os.devnull, "w", encoding="utf-8")
-
-
-def _work(job: Job) -> Result:
-    return run(job, lambda: _steps_done.put(None))

@@ -50,7 +50,7 @@ class Figures:
 
 
 class Bike:
-    """A board with its sensor and what it is told by config.py. flash: the directory that stands for its flash."""
+    """A board with its sensor and its config.py. flash: the directory that stands for its flash."""
 
     def __init__(self, chance: random.Random, flash: Path) -> None:
         self.flash = flash
@@ -85,11 +85,11 @@ class Bike:
 
 def soak(hours: float, seed: int = 1, enough: int = 10**6, say: Callable[[str], None] = lambda line: None) -> Figures:
     """Run trips until they add up to so many hours of the board's time, or until so much was found that is enough.
-    say: is told how far it is.
+    say: called with its progress, each hour of the board's time.
 
     The same seed gives the same trips. It works in a directory of its own, which is gone afterwards."""
     figures = Figures(seed)
-    begun, told = time.monotonic(), 0.0
+    begun, said_h = time.monotonic(), 0.0
     chance = random.Random(seed)
     bike: Bike | None = None
     before = os.getcwd()
@@ -106,9 +106,9 @@ def soak(hours: float, seed: int = 1, enough: int = 10**6, say: Callable[[str], 
                 assert bike
                 _run(bike, make_trip(chance, bike.speed, bike.aligned), figures)
                 figures.host_s = time.monotonic() - begun
-                if figures.hours >= told + 1.0:
-                    told = figures.hours
-                    say(f"{told:.1f} h in {figures.host_s:.0f} s, {len(figures.found)} findings")
+                if figures.hours >= said_h + 1.0:
+                    said_h = figures.hours
+                    say(f"{said_h:.1f} h in {figures.host_s:.0f} s, {len(figures.found)} findings")
         finally:
             os.chdir(before)
     return figures

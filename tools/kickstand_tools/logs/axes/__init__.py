@@ -1,1 +1,0 @@
-"""Do axes and signs of a log belong together?"""
