@@ -15,7 +15,7 @@ from .board import port
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
 from .devices import open_button
-from .imu.sample_clock import SampleClock
+from .imu.sensor import SampleClock
 from .lean.meter import LeanMeter
 from .rides.recording import Recording
 from .ui.screen import Screen

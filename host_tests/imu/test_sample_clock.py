@@ -14,7 +14,7 @@ def board():
 
 
 def clock():
-    from kickstand.imu.sample_clock import SampleClock
+    from kickstand.imu.sensor import SampleClock
 
     return SampleClock(PERIOD_US)
 

@@ -1,15 +1,16 @@
-"""Keeps the chip working: finds it, sets it up, watches it, and sets it up again after a fault."""
+"""Keeps the chip working: finds it, sets it up, watches it, and sets it up again after a fault. And says when each
+sample was taken."""
 
 from time import ticks_add, ticks_diff, ticks_ms
 
 from ..errors import Notice
-from ..lean import meter
 from .mpu6050 import UnknownChip
 
 RETRY_MS = 50  # from one attempt to set the chip up to the next
 FAILURES = 3  # transfers that fail in a row make a fault; a NACK or two are tolerated
 SILENT_MS = 100  # a fault after this long without a sample
 STALE_MS = 500  # likewise where each was lost in an overflow, because the board had no time to read
+CORRECTION_SHIFT = 4  # SampleClock.emptied() corrects by 1/16 of the difference between the two clocks
 
 
 class Sensor:
@@ -144,3 +145,48 @@ class Sensor:
         self.restarts += 1
         self._failures = 0
         self._sample_ms = now_ms
+
+
+class SampleClock:
+    """When each sample was taken: the chip samples at a steady rate, whatever the program does, but its clock may be
+    off by 1 %, which is corrected by the board's. Times are integers of microseconds: a 32-bit float could no longer
+    hold them after 17 seconds.
+
+    period_us: nominal time from one sample to the next.  lost: samples lost in overflows, since power-on."""
+
+    def __init__(self, period_us):
+        self._period_us = period_us
+        self.lost = 0
+        self._pending_us = 0  # correction that the next step() adds
+        self._sample_us = None  # when the last sample was taken, in ticks_us(); None: no sample yet
+
+    def restart(self):
+        """Forget the samples so far: those to come do not follow on from them."""
+        self._sample_us = None
+        self._pending_us = 0
+
+    def step(self, n, now_us):
+        """Count n new samples; return the microseconds from the last sample before them to the last of them.
+
+        After a restart() there is none before them: then from the first of them. now_us: ticks_us().
+        """
+        if self._sample_us is None:
+            n -= 1
+            self._sample_us = ticks_add(now_us, -n * self._period_us)
+        dt_us = max(0, n * self._period_us + self._pending_us)
+        self._pending_us = 0
+        self._sample_us = ticks_add(self._sample_us, dt_us)
+        return dt_us
+
+    def emptied(self, now_us):
+        """Correct the clock: at now_us, ticks_us(), the chip's FIFO was empty and all its samples were counted.
+
+        So the last sample was then half a period old on average."""
+        if self._sample_us is None:
+            return
+        late_us = ticks_diff(now_us, self._sample_us) - self._period_us // 2
+        if late_us > 2 * self._period_us:  # samples were lost in an overflow: the next step() spans the gap
+            self.lost += (late_us - self._pending_us) // self._period_us
+            self._pending_us = late_us
+        else:
+            self._pending_us = late_us >> CORRECTION_SHIFT

@@ -26,7 +26,7 @@ from binascii import crc32
 
 from ..calibration.store import BODY_LENGTH
 from ..errors import NO_MACHINE_CODE, checked
-from .. import __version__
+from ..units import __version__
 
 MAGIC = b"KRID"
 VERSION = 1
