@@ -11,7 +11,6 @@ import pytest
 from kickstand_tools.errors import InputError
 from kickstand_tools.simulation.scripted.script import Ride, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
-from kickstand_workshop.soak import watch
 
 PART = Sensor(seed=1, share=0.5)  # an ordinary part, stuck on at some angle
 
@@ -73,11 +72,6 @@ def begun(pause_s: float) -> tuple[int, str]:
 def leaning(lean_deg: float) -> Callable[[float], tuple]:
     """What PART reads on a bike that is held at this lean."""
     return PART.world(Ride([upright(1e6, lean_deg=lean_deg)]).motion)
-
-
-def shown_lean(lines: list[str]) -> float | None:
-    """Degrees on the display, > 0 to the right; None where it shows no lean, or one that is only half written."""
-    return watch.shown_lean(lines[0])
 
 
 def shows(device, pattern: str, limit_s: float) -> re.Match:
