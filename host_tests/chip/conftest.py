@@ -4,7 +4,8 @@ import os
 import traceback
 
 import pytest
-from emulated import calibrated, firmware, leaning, modules, pico, shown_lean
+from emulated import calibrated, firmware, leaning, modules, pico
+from kickstand_tools.simulated_board.lcd import shown_lean
 
 COPIED = {"riding", "at_prompt"}
 

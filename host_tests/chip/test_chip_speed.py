@@ -3,7 +3,8 @@
 import json
 
 import pytest
-from emulated import calibrated, firmware, leaning, pico, shown_lean, shows
+from emulated import calibrated, firmware, leaning, pico, shows
+from kickstand_tools.simulated_board.lcd import shown_lean
 from kickstand_workshop.bench.sample_count import SampleCount
 
 pytestmark = pytest.mark.chip

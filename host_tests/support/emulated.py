@@ -74,12 +74,6 @@ def leaning(lean_deg: float) -> Callable[[float], tuple]:
     return PART.world(Ride([upright(1e6, lean_deg=lean_deg)]).motion)
 
 
-def shown_lean(lines: list[str]) -> float | None:
-    """Degrees on the display, > 0 to the right; None where it shows no lean, or one that is only half written."""
-    match = re.fullmatch(r"Lean +(\d+)° (right|left |     )[ *]", lines[0])  # *: it records, or is listened to
-    return match and float(match[1]) * (-1 if match[2] == "left " else 1)
-
-
 def shows(device, pattern: str, limit_s: float) -> re.Match:
     """Let time pass until the display's two lines, as one text with a bar between, match; the match."""
     return device.run_until(lambda: re.search(pattern, "|".join(device.lcd())), limit_s)

@@ -2,8 +2,9 @@
 
 import pytest
 import serial_line
-from emulated import calibrated, firmware, leaning, pico, shown_lean, shows
+from emulated import calibrated, firmware, leaning, pico, shows
 from kept import recorded, saved, streamed
+from kickstand_tools.simulated_board.lcd import shown_lean
 from kickstand_tools.simulation.scripted.script import Ride, kickstand, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from rider import Rider
