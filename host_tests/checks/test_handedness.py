@@ -43,10 +43,10 @@ def judged(log, accel=None, gyro=None, speed=True):
 @pytest.mark.parametrize(("profile", "speed"), [("street", False), ("city", True)])
 def test_all_48_ways_to_exchange_and_reverse_axes(rides, profile, speed):
     """Put on both sensors alike: the left-handed ones are remarked on, the right-handed ones are not."""
-    told = [judged(rides[profile], exchange, exchange, speed) for exchange in SIGNED]
-    for exchange, said in zip(SIGNED, told, strict=True):
+    remarks = [judged(rides[profile], exchange, exchange, speed) for exchange in SIGNED]
+    for exchange, said in zip(SIGNED, remarks, strict=True):
         assert (WRONG_WAY in said) == bool(said) == (np.linalg.det(exchange) < 0.0), (exchange, said)
-    assert sum(map(bool, told)) == 24
+    assert sum(map(bool, remarks)) == 24
 
 
 @pytest.mark.parametrize("profile", PROFILES)

@@ -6,18 +6,16 @@ elsewhere they are decode_python() and add_up_python(), which give the same resu
 """
 
 from array import array
-from struct import unpack_from
 
 from ..errors import NO_MACHINE_CODE, checked
 
 FRAME = 14  # bytes
-_WORDS = ">7h"
 
 
 def decode_python(frames, at, counts):
     """Put the frame that begins at byte `at` of frames into counts, array('h', 7)."""
-    for i, value in enumerate(unpack_from(_WORDS, frames, at)):
-        counts[i] = value
+    for i in range(7):
+        counts[i] = _int16(frames, at + 2 * i)
 
 
 def add_up_python(frames, n, sums, watch):
@@ -46,9 +44,15 @@ def add_up_python(frames, n, sums, watch):
         watch[0] = mark
         if watch[1] >= watch[2]:
             return k
-        for i, value in enumerate(unpack_from(_WORDS, frames, at)):
-            sums[i] += value
+        for i in range(7):
+            sums[i] += _int16(frames, at + 2 * i)
     return n
+
+
+def _int16(frames, at):
+    """The big-endian int16 at byte `at`. struct.unpack_from() would put a tuple on the heap for each frame."""
+    value = frames[at] << 8 | frames[at + 1]
+    return value - 65536 if value > 32767 else value
 
 
 try:

@@ -121,7 +121,7 @@ def turn_rates(speed, sin_lean, cos_lean, cos_pitch, rate_left, rate_up):
 
 class Linearisation:
     """(1) to (6) about the state x, at a window's means of the corrected rates (3 values) and of the forward force.
-    lean_variance: rad^2, of the lean, above BALANCE_SIGMA^2 it does not give the turn rate of a bike in balance.
+    lean_variance: rad^2. Over BALANCE_SIGMA^2 the lean is not used for the turn rate of a bike in balance.
 
     Each ..._row of the Jacobians is ((state, partial derivative), ...): lean, pitch and speed of the rates of change
     (1) to (3), left and up of the forces (4) and (5), level of (6). Derivatives that are zero are left out, and terms

@@ -237,9 +237,8 @@ class LeanFilter:
             x[i] += p.take_correction(i)
         x[SPEED] = max(0.0, x[SPEED])
         x[PITCH] = _possible_pitch(x[PITCH])
-        if (
-            not self._rest.resting
-        ):  # at rest the force shows the lean, and the estimated yaw error of a sensor in the hand may be anything
+        # At rest the force shows the lean, and the estimated yaw error of a sensor in the hand may be anything
+        if not self._rest.resting:
             self._upright = self.trim.angle + model.lean_by_pitch(x)
         if x[LEAN] > pi:
             x[LEAN] -= 2 * pi

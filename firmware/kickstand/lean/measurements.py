@@ -34,9 +34,7 @@ SIGMA_START = (  # Larger, each: found sooner, but the other states' errors are 
     0.014,  # of 1: scale of the forward axis
 )
 SIGMA_START_LEAN_MOVING = radians(30.0)  # rad: lean under way. Larger: lean is shown later, and follows forces more.
-USUAL_SPEED = (
-    15.0 / STANDARD_GRAVITY
-)  # g s: where nothing measures it. Larger: leans begun before the start are larger.
+USUAL_SPEED = 15.0 / STANDARD_GRAVITY  # g s: if nothing measures it. Larger: leans begun before the start are larger.
 
 # Process noise, per square root of a second
 NOISE_ANGLE = radians(0.2)  # rad: vibration of the gyro. Larger: lean follows the forces more and the gyro less.
@@ -57,9 +55,7 @@ SIGMA_MEASURED_SPEED = 1.0 / STANDARD_GRAVITY  # g s: of a receiver or a wheel s
 MEASURED_SPEED_LATE_S = 1.0  # s: how late it may be. Larger: it counts for less while speeding up and braking.
 
 # Assumptions that take the place of measurements
-SIGMA_SLOPE = radians(
-    1.6
-)  # rad: of roads' slopes. Larger: slopes are followed better, turns and slopes separate less well.
+SIGMA_SLOPE = radians(1.6)  # rad: of roads' slopes. Larger: they are followed better, turns are found less well.
 SLOPE_S = 3.0  # s: how long a slope lasts; fitted, real ones last longer. Larger: as for SIGMA_SLOPE.
 STEEP = radians(6.0)  # rad: such a slope counts half as much, twice it a fifth. Larger: wheelies pass for slopes.
 # Riding straight is all three: less lean than this, less yaw rate than this, more speed than this.

@@ -34,11 +34,8 @@ TRIED = 6  # of the 48 exchanges are looked at closely
 CLEARLY, LIKELY, SIGMAS = 2.0, 1.25, 3.0  # so many times; or so many, if the windows agree by so many sigmas
 FEW_WINDOWS, FEW_CLEARLY = 3, 5.0  # with so few windows, so many times, and a bias near 0, as a phone's is
 LEAST_G2 = 0.001  # at least: a parked vehicle's drift is under 0.0002
-PENALTY = (
-    1.0,
-    1.3,
-    1.6,
-)  # of exchanges that explain about as well: all reversed, some reversed, others; times what is left
+# Of exchanges that explain about as well, times what is left: all axes reversed, some reversed, others
+PENALTY = 1.0, 1.3, 1.6
 
 
 def _exchanges() -> Array:

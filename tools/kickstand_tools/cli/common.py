@@ -60,7 +60,7 @@ RIDE = file_argument("ride", "RIDE.csv")
 CALIBRATION = click.option("--calibration", type=PATH, help="A CAL.json; if not given, the one beside the ride.")
 
 
-def from_to(start: str, end: str, **names: str) -> Command:
+def from_to(start: str, end: str) -> Command:
     """The options --from and --to with these words, as from_s and to_s."""
 
     def add(command: Command) -> Command:

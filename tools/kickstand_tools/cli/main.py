@@ -1,5 +1,6 @@
 """The `kickstand` command. What it refuses: one line on standard error, status 2, nothing written."""
 
+import functools
 import importlib
 import pkgutil
 import sys
@@ -33,6 +34,7 @@ COMMANDS = {
 }
 
 
+@functools.cache
 def _commands() -> dict[str, tuple[str, str]]:
     """COMMANDS, and those that other packages named kickstand_... add: their COMMANDS, in the same form."""
     found = dict(COMMANDS)

@@ -57,7 +57,7 @@ class Hypotheses:
         """Those that count, with their posterior weights.
 
         blocks: of the windows. parameters (B, PARAMETERS): about which the equations are linear. unbalance: of
-        Circumstances; errors that are so much larger than usual let the readings say less.
+        Noise; errors that are so much larger than usual let the readings say less.
         """
         minus_two_log = minus_two_log_likelihood(blocks, self.random_walks(prior, parameters))
         minus_two_log = minus_two_log * WEIGHT / max(1.0, unbalance) ** 2 + self.unusual

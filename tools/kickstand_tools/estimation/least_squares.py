@@ -143,15 +143,15 @@ class Estimate:
         windows, s, unknown = self._windows, STATES, self.prior.unknown
         off, sigma = self._residuals(), self._noise.sigma()
         sigma = self._noise.robust(sigma, off) if robust else sigma
-        slope = jacobian(windows, self._middle(), np.concatenate((np.arange(s), s + unknown)))
-        slope[:, :s] *= -windows.covered
-        slope = slope.transpose(2, 1, 0) / sigma[..., None]
+        derivatives = jacobian(windows, self._middle(), np.concatenate((np.arange(s), s + unknown)))
+        derivatives[:, :s] *= -windows.covered
+        derivatives = derivatives.transpose(2, 1, 0) / sigma[..., None]
         found = np.empty((len(windows), ROWS, 2 * s + len(unknown) + 1))
-        found[..., :s] = found[..., s : 2 * s] = 0.5 * slope[..., :s]  # the middle moves by half
+        found[..., :s] = found[..., s : 2 * s] = 0.5 * derivatives[..., :s]  # the middle moves by half
         step = np.arange(s)
         found[:, step, step] -= 1.0 / sigma[:, :s]
         found[:, step, s + step] += 1.0 / sigma[:, :s]
-        found[..., 2 * s : -1], found[..., -1] = slope[..., s:], off / sigma
+        found[..., 2 * s : -1], found[..., -1] = derivatives[..., s:], off / sigma
         blocks = reduce_windows(found.reshape(-1, self._length, *found.shape[1:]), s)
         blocks.left[0, step, step] += 1.0 / START**2
         blocks.left[0, DRAWN, -1] += self.states[0, DRAWN] / START[DRAWN] ** 2

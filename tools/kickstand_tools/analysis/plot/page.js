@@ -5,6 +5,6 @@ const layout = narrow ? CHART.narrow : CHART.layout;
 if (finger) layout.dragmode = false; // a finger moves the page
 Plotly.newPlot("chart", CHART.data, layout, { responsive: true });
 if (parent !== window) {
-  const tell = () => parent.postMessage({ height: document.body.scrollHeight }, "*"); // of the frame that it is in
-  new ResizeObserver(tell).observe(document.body);
+  const postHeight = () => parent.postMessage({ height: document.body.scrollHeight }, "*"); // of the frame that it is in
+  new ResizeObserver(postHeight).observe(document.body);
 }
