@@ -217,7 +217,28 @@ def test_ctrl_c_while_workers_start_is_heard_when_they_have(tmp_path, after_s):
     assert trouble.endswith("KeyboardInterrupt\n")
 
 
-def test_no_scheduler_is_told(monkeypatch):
+CONNECTING = """
+import os, signal, threading
+from distributed import Client
+register = Client.register_plugin
+def interrupted(client, plugin):
+    threading.Timer({after_s}, os.kill, (os.getpid(), signal.SIGINT)).start()
+    return register(client, plugin)
+Client.register_plugin = interrupted
+"""
+
+
+@pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="Ctrl-C comes at once on this system")
+def test_ctrl_c_while_this_process_connects_is_heard_when_it_has(tmp_path):
+    for after_s in (0.01, 0.04):
+        program = tmp_path / "program.py"
+        program.write_text(CONNECTING.format(after_s=after_s) + PROGRAM)
+        trouble = subprocess.run([sys.executable, str(program)], capture_output=True, text=True, timeout=120).stderr
+        assert trouble.count("Traceback") == 1, after_s
+        assert trouble.endswith("KeyboardInterrupt\n")
+
+
+def test_no_scheduler_is_reported(monkeypatch):
     monkeypatch.setattr("kickstand_tools.fleet.cluster._REMOTE_PATIENCE_S", 0.5)
     with pytest.raises(InputError, match=r"no workers at tcp://127\.0\.0\.1:9"):
         list(run.run_tasks(task, [(1,)], "tcp://127.0.0.1:9"))

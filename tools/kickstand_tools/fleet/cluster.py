@@ -97,8 +97,8 @@ class Cluster:
                         dashboard_address="127.0.0.1:0",
                     )
                     self._stack.callback(lambda: cluster.close(timeout=5))
-                self._client = Client(cluster)
-                self._client.register_plugin(Undisturbed())
+                    self._client = Client(cluster)
+                    self._client.register_plugin(Undisturbed())
             else:
                 self._client = Client(self._address, timeout=_REMOTE_PATIENCE_S)
             self._stack.callback(lambda: self._client.close(timeout=2))
@@ -190,7 +190,7 @@ class Cluster:
 
 @contextlib.contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Ctrl-C waits until the end of the `with`: processes that are stopped while they start print pages of what failed.
+    """Ctrl-C waits until the end of the `with`: what is stopped while it starts or connects prints pages of what failed.
     Those that are started within never hear of it."""
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
