@@ -190,8 +190,10 @@ class Cluster:
 
 @contextlib.contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Ctrl-C waits until the end of the `with`: what is stopped while it starts or connects prints pages of what failed.
-    Those that are started within never hear of it."""
+    """Ctrl-C waits until the end of the `with`: stopped while it starts or connects, Dask prints pages of what failed.
+
+    Processes that are started within never hear of it.
+    """
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
