@@ -15,16 +15,17 @@ from ..signals import Array
 from ..signals.lag import best_lag
 from .cells import LogCells
 
-MOST = 1.5  # times the change that the force explains: knots give 1.94, recorded speeds in m/s never over 1.1
-PUSH_G = 0.15  # a stronger force is no slope of an ordinary road
-ENOUGH = 10  # seconds of such forces: two or three braking events
-SIGMAS = 5.0  # by which the correlation of force and change of speed has to be more than chance
-LAGS_S = np.arange(0.0, 2.1, 0.25)  # by which a satellite receiver's speed may be late
-SHORTEST_S, LONGEST_S = 0.5, 2.2  # between two speeds
+MOST = 1.5  # largest change of speed over the one that the force explains: knots give 1.94, m/s never over 1.1
+PUSH_G = 0.15  # strong forces: stronger ones than those by the slopes of ordinary roads
+ENOUGH = 10  # least number of seconds with strong forces: two or three braking events
+SIGMAS = 5.0  # least correlation of force and change of speed, over its standard deviation by chance
+LAGS_S = np.arange(0.0, 2.1, 0.25)  # delays of a satellite receiver's speed that are tried
+SHORTEST_S, LONGEST_S = 0.5, 2.2  # times between two speeds that are compared
 
 
 def speed_unit(cells: LogCells) -> Refusal | None:
-    """That the speed changes too much at most of the strong forces; None if not, or if the log cannot show it."""
+    """A refusal if the speed changes too much at most of the strong forces; None if not, or if the log cannot show
+    it."""
     time_s, mps = cells.speeds.T
     seconds = np.diff(time_s)
     good = (seconds > SHORTEST_S) & (seconds < LONGEST_S)

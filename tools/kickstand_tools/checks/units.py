@@ -1,4 +1,4 @@
-"""Units that are easily taken for a log's own, seen in its beginning."""
+"""Refuses logs whose first samples show that they are in other units than g and seconds."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..signals import Array
 
-LEAST_G = 0.3  # median force; less is usual where gravity was taken off, a ride's is over 0.9
+LEAST_G = 0.3  # least median force: a ride's is over 0.9, one without gravity has less
 
 
 def check_units(name: str, time_us: NDArray[np.int64], accel_g: Array) -> None:
