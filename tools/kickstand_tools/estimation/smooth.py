@@ -96,7 +96,7 @@ def _checked_blocks(
     whole, stretch = apart(log)
     for block, found in smooth_blocks(whole, calibration, progress, notices):
         if found is None:
-            raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples a second: too few to look back over")
+            raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples a second: too few to smooth the lean")
         yield from within(stretch, block, found)
 
 

@@ -15,7 +15,7 @@ RATE_HZ = 1000
 DIVIDER = 5  # 200 Hz
 _ACCEL_RANGE_G, _ACCEL_LSB = 8.0, 4096.0
 _GYRO_RANGE_DPS, _GYRO_LSB = 500.0, 65.5
-_ACCEL_NOISE_G = 400e-6 * np.sqrt(RATE_HZ / 2)  # rms of a conversion, from 400 ug/sqrt(Hz)
+_ACCEL_NOISE_G = 400e-6 * np.sqrt(RATE_HZ / 2)  # rms noise of a conversion, from 400 ug/sqrt(Hz)
 _GYRO_NOISE_DPS = 0.005 * np.sqrt(RATE_HZ / 2)
 _CROSS_AXIS = 0.02  # sensitivity of an axis to its neighbours
 _GYRO_DPS_PER_G = 0.1  # sensitivity to linear acceleration
@@ -40,7 +40,7 @@ _DLPF = _dlpf()
 class Chip:
     """One sensor: its errors at 25 C, and how they change with temperature. Axes x, y, z; g, deg/s."""
 
-    accel_matrix: NDArray[np.float64]  # (3, 3) reading over true: scale on the diagonal, cross-axis beside it
+    accel_matrix: NDArray[np.float64]  # (3, 3) reading over true value: scale factors on the diagonal, else cross-axis
     accel_offset: NDArray[np.float64]
     gyro_matrix: NDArray[np.float64]
     gyro_bias: NDArray[np.float64]
@@ -50,7 +50,8 @@ class Chip:
 
     @staticmethod
     def random(chance: np.random.Generator, share: float = 1.0, drift: float = 1.0) -> "Chip":
-        """A random sensor. share: of the data sheet's tolerances; drift: of an ordinary sensor's over temperature.
+        """A random sensor. share: factor on the data sheet's tolerances; drift: factor on an ordinary sensor's drift
+        with temperature.
 
         Offsets and biases are uniformly distributed within the sheet's limits; scale and cross-axis sensitivity
         normally, with the limit at two standard deviations. Over temperature the sheet allows 35..60 mg and 20 deg/s
@@ -77,7 +78,7 @@ class Chip:
         rates: NDArray[np.float64],
         temp_c: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Readings (n / 5, 7) at 200 Hz in the chip's order: g, C, deg/s. The first is of the first row.
+        """Readings (n / 5, 7) at 200 Hz in the chip's order: g, C, deg/s. The first one is made of the first row.
 
         force (n, 3) in g and rates (n, 3) in deg/s: true values along the sensor's axes at 1 kHz. temp_c (n,).
         """
@@ -112,7 +113,7 @@ def _noise(chance: np.random.Generator, n: int, rms: float) -> NDArray[np.float6
 
 
 def _sampled(values: NDArray[np.float64], limit: float, lsb: float) -> NDArray[np.float64]:
-    """Clip at the range, filter, take every fifth value, round to whole counts."""
+    """values as the chip reads them: clipped at its range, filtered, every fifth one, rounded to counts of `lsb`."""
     columns = []
     for column in values.T:
         column = np.clip(column, -limit, limit)
