@@ -1,4 +1,4 @@
-"""How long a vehicle was on the move."""
+"""Measures for how long a vehicle was on the move."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,8 +16,9 @@ MOVES_MPS = 1.0
 
 
 def riding_s(ride: Channels, standing: NDArray[np.bool_], whole: bool = True) -> float:
-    """Seconds. ride: with evenly spaced samples (see downsampled()); standing (n): True where it stands still. whole:
-    not a stretch of a ride, in which a vehicle may go straight on, or keep to one turn, from beginning to end."""
+    """Seconds on the move. ride: with evenly spaced samples (see downsampled()); standing (n): True where it stands
+    still. whole: False for a stretch of a ride, in which a vehicle may go straight on, or stay in one bend, from
+    beginning to end."""
     if whole and not _has_moved(ride):
         return 0.0
     return float(np.count_nonzero(~standing)) * spacing_s(ride)
@@ -35,5 +36,5 @@ def _has_moved(ride: Channels) -> bool:
 
 
 def _changes(means: Array) -> float:
-    """By how much they differ from the usual one, at most: that is a gyro's bias, or the slope of the ground."""
+    """The largest difference of means from their median: that is a gyro's bias, or the slope of the ground."""
     return float(np.max(np.abs(means - np.median(means))))

@@ -31,7 +31,7 @@ COLUMNS = {
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """Gzipped if the name ends in .gz."""
+    """Write the file, gzipped if its name ends in .gz."""
     opened = gzip.open if path.suffix == ".gz" else open
     digits = [digit for digit, _ in COLUMNS.values()]
     with opened(path, "wb") as file:

@@ -13,8 +13,8 @@ _FINE = ("t_s", "lat_deg", "lon_deg", "utc_s")  # a float of 32 bits has positio
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """One row group a block; times and positions in 64-bit floats, the rest in 32-bit floats. NaN where there is no
-    value."""
+    """Write the file: one row group per block; times and positions in 64-bit floats, the rest in 32-bit floats. NaN
+    where there is no value."""
     import pyarrow
     from pyarrow.parquet import ParquetWriter
 
