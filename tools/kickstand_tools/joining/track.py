@@ -1,4 +1,4 @@
-"""The track of a phone or a watch: where it was, and when."""
+"""The track of a phone or a watch: positions with their times."""
 
 from dataclasses import dataclass
 
@@ -7,11 +7,11 @@ import numpy as np
 from ..logs.table import Array, Table
 from ..signals.geography import distance_m
 
-LONGEST_S = 6.0  # between two points of one course: watches write one so rarely on straights
-SLOWEST_MPS = 2.5  # of a step that is more than the positions' errors
-FASTEST_MPS = 100.0  # a quicker step is a jump of the receiver
+LONGEST_S = 6.0  # longest time between two points of one course: watches write points so rarely on straights
+SLOWEST_MPS = 2.5  # a slower step is within the positions' errors
+FASTEST_MPS = 100.0  # a faster step is a jump of the receiver
 _OFTEN_S = 0.7
-_AROUND = 2  # points before and after, from which a speed is taken
+_AROUND = 2  # number of points before and after from which a speed is computed
 
 
 @dataclass(eq=False)
@@ -29,8 +29,8 @@ class Track(Table):
     name: str
 
     def speeds_mps(self) -> Array:
-        """(n) those of the file. Where it has none: by how far the points around are apart, as far as that is more than
-        their errors."""
+        """(n) the file's speeds; where it has none, the distance of the points around over its time, less the part that
+        may be by their errors."""
         if np.any(np.isfinite(self.speed_mps)):
             return self.speed_mps
         speed = np.full(len(self.utc_s), np.nan)
@@ -44,12 +44,13 @@ class Track(Table):
         return speed
 
     def once_a_second(self) -> "Track":
-        """A point a second of a track that has more: closer ones show less of the course than they err."""
+        """The track with at most one point a second: between closer points the error is larger than the change of the
+        course."""
         if len(self.utc_s) < 2 or np.median(np.diff(self.utc_s)) > _OFTEN_S:
             return self
         first = np.unique(np.floor(self.utc_s - self.utc_s[0]), return_index=True)[1]
         return Track(*(values[first] for values in self.columns().values()), name=self.name)
 
     def steps_m(self) -> tuple[Array, Array]:
-        """(n - 1) each: how far east and north every point is of the one before."""
+        """(n - 1) metres east and (n - 1) metres north of each point from the one before."""
         return distance_m(self.lat_deg[:-1], self.lon_deg[:-1], self.lat_deg[1:], self.lon_deg[1:])

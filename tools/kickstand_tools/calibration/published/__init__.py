@@ -1,1 +1,1 @@
-"""The alignment by driving as the article published it, to compare the firmware's own with."""
+"""The alignment by driving as the article published it, for comparison with the firmware's own."""

@@ -1,4 +1,4 @@
-"""How much a set of directions in a plane spreads: circular dispersion (N. I. Fisher, 1993, section 2.3).
+"""The spread of directions in a plane: circular dispersion (N. I. Fisher, 1993, section 2.3).
 
     d = (1 - rho2) / (2 R^2),  R = |mean of e^(i a)|,  rho2 = the mean cosine of 2 (a - mean direction)
 
@@ -6,11 +6,11 @@ For small spreads d is about the variance in rad^2: 0.02 is 8 degrees, 0.005 is 
 needs no second pass over the directions.
 """
 
-NONE = 9.9  # where there is no mean direction, as of opposite ones; also the largest value given
+NONE = 9.9  # the value without a mean direction, such as for opposite directions; also the largest value
 
 
 class CircularDispersion:
-    """Directions of vectors in a plane, all of equal weight whatever the vectors' lengths. count: how many."""
+    """Directions of vectors in a plane, all of equal weight whatever the vectors' lengths. count: their number."""
 
     def __init__(self):
         self.clear()
