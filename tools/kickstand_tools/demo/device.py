@@ -18,7 +18,7 @@ from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 
 TICK_S = 0.05
 PART_SEED = 1
-PART_SHARE = 0.5  # errors of up to half of the data sheet's limits: an ordinary sensor
+PART_SHARE = 0.5  # the sensor's errors over the data sheet's limits: an ordinary sensor
 HAND_LIMIT_S = 3600.0
 LONG_PRESS_S = 1.2
 
@@ -80,7 +80,7 @@ class Commands:
 
 
 class Demo:
-    """Bike and board, and the exchange with the process that draws."""
+    """Bike and board, and the communication with the process that draws."""
 
     def __init__(self, by_hand, speed):
         self._commands = Commands()

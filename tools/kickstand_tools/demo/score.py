@@ -12,8 +12,8 @@ _STANDING = ("kickstand", "upright", "moving", "wait")
 
 
 class State(TypedDict):
-    """One tick of the device. of_s: how long the run will take, None if steered by hand; lcd: both lines;
-    lean_deg: the true lean, > 0 to the right; phase: what the bike does; pressed: True while the button is."""
+    """One tick of the device. of_s: duration of the whole run, None if steered by hand; lcd: both lines; lean_deg: the
+    true lean, > 0 to the right; phase: the part of the ride; pressed: True while the button is."""
 
     t_s: float
     of_s: float | None

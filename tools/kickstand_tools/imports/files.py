@@ -12,20 +12,20 @@ from typing import IO
 from ..errors import InputError
 from ..logs.source import errors_of, open_input
 
-_EXCEL = b"\xd0\xcf\x11\xe0"  # its older files begin so; the newer are zips
-SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # what is looked at in a folder or a zip
-# A recording as text: some hours at 100 Hz. Reading it takes at most ten times its memory.
+_EXCEL = b"\xd0\xcf\x11\xe0"  # first bytes of Excel's older files; the newer are zips
+SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # other files in a folder or a zip are ignored
+# Largest recording as text: some hours at 100 Hz. Reading it takes at most ten times its memory.
 MOST_BYTES = 250_000_000
-MOST_FILES = 10_000  # in a folder or a zip
-LONGEST_LINE = 1_000_000  # characters; a table of a thousand columns has a tenth of that
+MOST_FILES = 10_000  # most files in a folder or a zip
+LONGEST_LINE = 1_000_000  # characters of the longest line; a table of a thousand columns has a tenth of that
 _BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 
 
 @dataclass
 class Piece:
-    """One file of a recording. name: with its folders below what was given, parted by /. content: its bytes, unpacked.
+    """One file of a recording. name: its path within the recording, separated by /. content: its bytes, unpacked.
 
-    text: the same decoded; lines end in a line feed.
+    text: the decoded content; lines end in a line feed.
     """
 
     name: str
@@ -48,9 +48,10 @@ class Piece:
 
 
 def read_pieces(source: Path | str) -> list[Piece]:
-    """What a file, a folder or a zip holds; in the last two only files of SUFFIXES, and one zip that is all they hold.
+    """The content of a file, a folder or a zip; of the latter two the files with SUFFIXES, or the content of a zip that
+    is the only file in it.
 
-    Raises InputError for what is not there, is damaged, empty, no text, or over MOST_BYTES when unpacked.
+    Raises InputError for a source that is missing, damaged, empty, no text, or over MOST_BYTES when unpacked.
     """
     path = Path(source)
     with errors_of(str(path)):
@@ -63,7 +64,7 @@ def read_pieces(source: Path | str) -> list[Piece]:
 
 
 def _bounded(path: Path) -> Iterator[tuple[str, bytes]]:
-    """_contents(), as long as they are not too large."""
+    """Yield _contents(). Raises InputError if they are too large."""
     size = 0
     for name, content in _contents(path):
         size += len(content)
@@ -73,7 +74,7 @@ def _bounded(path: Path) -> Iterator[tuple[str, bytes]]:
 
 
 def _read(file: IO[bytes]) -> bytes:
-    """At most a byte more than is allowed, which shows that it is too much."""
+    """The content of a file, cut one byte after the limit, which shows that it is too large."""
     return file.read(MOST_BYTES + 1)
 
 
@@ -161,7 +162,7 @@ def _no_text(path: Path) -> list[Piece]:
 
 
 def _piece(name: str, content: bytes) -> Piece | None:
-    """None for what is no text."""
+    """The Piece of a file; None if it is no text."""
     if content.startswith(b"PAR1"):
         return Piece(name, content, "")
     text = _decoded(content)

@@ -1,4 +1,4 @@
-"""Any other table: its columns named by whoever knows them, or guessed for the line that is to be typed."""
+"""Reads any other table: its columns are named by the user, or guessed for the command line that is suggested."""
 
 import re
 import shlex
@@ -28,8 +28,8 @@ _ACCEL_NAME = re.compile(r"acc|gforce|^a_?[xyz]\b")
 _GYRO_NAME = re.compile(r"gyr|rotation|omega|angular|^[gw]_?[xyz]\b")
 _UNIT_END = re.compile(r"_(g|mps2|ms2|dps|rads?|rps)$")
 _NUMBER = re.compile(r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?")
-_HEADER_LINES = 60  # among which the line of names is looked for
-FEWEST_NUMBERS = 4  # in a row, a time and three axes: text with commas in it has none
+_HEADER_LINES = 60  # number of lines in which the line of names is searched
+FEWEST_NUMBERS = 4  # least numbers in a row, a time and three axes: text with commas in it has none
 
 
 def read_mapped(piece: Piece, columns: Mapping[str, str], units: Mapping[str, str], name: str) -> Recording:
@@ -61,8 +61,8 @@ def read_mapped(piece: Piece, columns: Mapping[str, str], units: Mapping[str, st
 
 @dataclass
 class Table:
-    """A table of sensors that no app is known for. columns: as they are called in it; found: those of them that seem to
-    be the ones of REQUIRED and OPTIONAL; units: what seems to be theirs, by UNIT_KEYS."""
+    """A table of sensors of an unknown app. columns: their names in it; found: the columns that seem to be those of
+    REQUIRED and OPTIONAL; units: their probable units, by UNIT_KEYS."""
 
     name: str
     columns: list[str]
@@ -71,12 +71,12 @@ class Table:
 
     @property
     def missing(self) -> list[str]:
-        """The ones of REQUIRED that are not found."""
+        """The columns of REQUIRED that are not found."""
         return [key for key in REQUIRED if key not in self.found]
 
     @property
     def lacking(self) -> str:
-        """The same in words, "" for none."""
+        """The missing columns in words, "" for none."""
         missing = self.missing
         lacking = ["time"] if "t" in missing else []
         lacking += [word for word, axes in (("acceleration", ACCEL), ("gyro", GYRO)) if set(axes) & set(missing)]
@@ -101,13 +101,13 @@ def table_in(pieces: list[Piece]) -> Table | None:
 
 
 def _seems_in(column: str, kinds: Mapping[str, float], usual: str) -> str:
-    """The one of kinds that stands in brackets or behind the last _ of a column's name, else the usual one."""
+    """The unit, one of kinds, in brackets or behind the last _ of a column's name, else `usual`."""
     stated = (unit(unit_in(column)), unit(column.rpartition("_")[2]))
     return next((name for name in stated if name in kinds), usual)
 
 
 def unknown(pieces: list[Piece], source: str) -> InputError:
-    """For a file that no app is known for: what is missing in it, its columns, and the line to type."""
+    """The error for a file of an unknown app: missing columns, its columns, and the command line to type."""
     table = table_in(pieces)
     if table is None:
         shown = next((line for piece in pieces for line in piece.first_lines(1)), "")[:60]
@@ -149,7 +149,7 @@ def _numbers(cells: list[str]) -> int:
 
 
 def guessed(columns: list[str]) -> dict[str, str]:
-    """Columns that seem to be the ones asked for."""
+    """The columns that seem to be those of REQUIRED and OPTIONAL, by these."""
     found: dict[str, str] = {}
     for column in columns:
         low, bare = _UNIT_END.sub("", column.lower()), plain(column)
@@ -226,10 +226,10 @@ def _check_units(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, st
 
 
 def _unit(units: Mapping[str, str], keys: tuple[str, ...], column: str) -> str:
-    """What is given for one of the keys, else what stands in brackets in the column's name."""
+    """The unit that is given for one of the keys, else the one in brackets in the column's name."""
     return next((units[key] for key in keys if key in units), unit_in(column))
 
 
 def _turned(units: Mapping[str, str]) -> bool:
-    """A sign that was asked for is meant."""
+    """True if the user has asked for a change of sign, which is then not judged."""
     return any(units.get(key, "").startswith("-") for key in ("a", *ACCEL))

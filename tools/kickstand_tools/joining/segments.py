@@ -20,8 +20,8 @@ class Segments(Table):
     """p segments of up to STEPS good steps in a row, all (p, STEPS); weights are 0 where a segment is shorter.
 
     begin_s, end_s: times of each step, s since the track's first point. turned_deg: course of each step less that of
-    the segment's first one, > 0 to the left. course_weight: 1/deg2. speed_mps; speed_weight: 1 or 0. turned_deg and
-    speed_mps have no mean and no trend.
+    the segment's first one, > 0 to the left. course_weight: 1/deg2. speed_mps; speed_weight: 1 or 0. Mean and trend of
+    turned_deg and speed_mps are subtracted.
     """
 
     begin_s: Array

@@ -29,8 +29,8 @@ class Track(Table):
     name: str
 
     def speeds_mps(self) -> Array:
-        """(n) the file's speeds; where it has none, the distance of the points around over its time, less the part that
-        may be by their errors."""
+        """(n) the file's speeds; if it has none, the mean speed over the points around, NaN where that is within the
+        positions' errors, is a jump's, or is over a gap."""
         if np.any(np.isfinite(self.speed_mps)):
             return self.speed_mps
         speed = np.full(len(self.utc_s), np.nan)

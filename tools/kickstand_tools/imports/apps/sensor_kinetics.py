@@ -31,7 +31,7 @@ def finds(pieces: list[Piece]) -> list[list[Piece]]:
 
 
 def read(pieces: list[Piece], name: str) -> Recording:
-    """Raises InputError for what is missing."""
+    """Read a recording. Raises InputError for a missing column or sensor."""
     files = {_KINDS.get(_parts(piece)[1], ""): piece for piece in pieces}
 
     def sensor(kind: str) -> Sensor:
@@ -48,6 +48,6 @@ def read(pieces: list[Piece], name: str) -> Recording:
 
 
 def _parts(piece: Piece) -> tuple[str, str]:
-    """What the names of a recording's files have in common, and the sensor."""
+    """The common part of the names of a recording's files, and the sensor of this one."""
     match = _SENSOR.match(piece.stem)
     return (match[1], match[2]) if match else (piece.stem, "")

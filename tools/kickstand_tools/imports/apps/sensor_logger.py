@@ -24,7 +24,7 @@ def finds(pieces: list[Piece]) -> list[list[Piece]]:
 
 
 def read(pieces: list[Piece], name: str) -> Recording:
-    """Raises InputError for what is missing."""
+    """Read a recording. Raises InputError for a missing column or sensor."""
     files = {piece.stem: piece for piece in pieces}
     apple, standard = _platform(files)
     turned = apple is not False and not standard
@@ -62,7 +62,7 @@ def _is_ours(piece: Piece) -> bool:
 
 
 def _platform(files: dict[str, Piece]) -> tuple[bool | None, bool]:
-    """Was it an iPhone (None: not known), and were its units and signs standardised?"""
+    """True for an iPhone (None: unknown), and True if units and signs were standardised."""
     if "metadata" in files and len(files["metadata"].first_lines(2)) > 1:
         names, values = (names_in(line) for line in files["metadata"].first_lines(2))
         said = {name.lower(): value.lower() for name, value in zip(names, values)}

@@ -44,7 +44,7 @@ def finds(pieces: list[Piece]) -> list[list[Piece]]:
 
 
 def read(pieces: list[Piece], name: str) -> Recording:
-    """Raises InputError for what is missing."""
+    """Read a recording. Raises InputError for a missing section or column."""
     sections = _sections(pieces[0])
     sheet = _sheet(pieces[0].name, sections)
     units = _units(sections, sheet)
