@@ -1,10 +1,11 @@
-"""The page of `kickstand web` as Chromium shows it: the two presses, then a bend to either side, as a moving picture."""
+"""The page of `kickstand web` as Chromium shows it: two presses, then a bend to either side, as a moving picture."""
 
 import hashlib
 import io
 import threading
 import time
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -96,7 +97,7 @@ def _animated(shots: list[tuple[float, bytes]]) -> bytes:
     size = (_WIDTH, _WIDTH * _SIZE[1] // _SIZE[0])
     pictures = [Image.open(io.BytesIO(shot)).convert("RGB").resize(size, Image.Resampling.LANCZOS) for _, shot in shots]
     times = [at for at, _ in shots]
-    lasting = [round(1000 * (after - at) / _QUICKER) for at, after in zip(times, times[1:])] + [round(1000 * _LAST_S)]
+    lasting = [round(1000 * (after - at) / _QUICKER) for at, after in pairwise(times)] + [round(1000 * _LAST_S)]
     made = io.BytesIO()
     style = {"quality": _QUALITY, "method": 6, "loop": 0, "minimize_size": True}
     pictures[0].save(
