@@ -26,12 +26,12 @@ COLUMNS = 16
 _DASHES = b"-" * COLUMNS
 _NO_TEXT = "\n"
 _NEVER = b"\xfe" * COLUMNS  # a character code that no text uses: marks a line as not yet written
-REINIT_MS = 10_000  # initialise again so often: noise can put the nibbles out of step, and nothing else repairs that
-PROBE_MS = 200  # how often to see whether a display is there, or still there
-REOPEN_PROBES = 5  # while there is no display the bus is freed once in so many probes
-STEP_MS = 5  # from step to step: the longest wait that the initialisation asks for is 4.1 ms
-_POWER_UP_MS = const(40)  # for so long after power-up the display does not listen
-_POWER_UP = const(-8)  # the step to begin with then
+REINIT_MS = 10_000  # time between initialisations: noise can put the nibbles out of step, and nothing else repairs that
+PROBE_MS = 200  # time between two checks whether a display is connected
+REOPEN_PROBES = 5  # while there is no display the bus is freed once in so many checks
+STEP_MS = 5  # time between two steps: the longest wait that the initialisation requires is 4.1 ms
+_POWER_UP_MS = const(40)  # time after power-up in which the display takes no instruction
+_POWER_UP = const(-8)  # the step that the initialisation then begins with
 
 # Initialisation by instruction (data sheet, figure 24), one step a tick, STEP_MS apart, so that the loop never waits.
 # First single nibbles, which bring the display into 4-bit mode from whatever state it was in. Then whole bytes:
@@ -67,15 +67,15 @@ class Lcd:
         self._addresses = addresses
         self._wanted = [bytearray(b" " * COLUMNS), bytearray(b" " * COLUMNS)]
         self._shown = [bytearray(COLUMNS), bytearray(COLUMNS)]
-        self._texts = [_NO_TEXT, _NO_TEXT]  # of each line, what was shown last, if it was a str
+        self._texts = [_NO_TEXT, _NO_TEXT]  # the text that each line showed last, if it was a str
         self._changed = True  # a line may have to be sent
         self._packed = bytearray(4 * (COLUMNS + 1))
         self._port = bytearray(1)
         self._glyphs = _bar_glyphs()
         self.address = None
-        # of the initialisation; negative: waiting for the display's own power-up, which came with the board's
+        # the step of the initialisation; negative while the display, powered with the board, does not listen yet
         self._step = _POWER_UP if ticks_ms() < _POWER_UP_MS else 0
-        self._probes = 0  # in a row that found nothing
+        self._probes = 0  # successive probes that found nothing
         self._acted_ms = None  # when something was last sent
         self._seen_ms = 0  # when the display last answered
         self._init_ms = 0  # when the initialisation last ended
@@ -106,7 +106,7 @@ class Lcd:
                     self._initialise(self._step)
                 self._step += 1
                 self._init_ms = self._seen_ms = now_ms
-            elif self._changed and self._refresh():  # first: what is shown may be too old to stay
+            elif self._changed and self._refresh():  # comes first: the text on the display may be too old
                 self._seen_ms = self._acted_ms = now_ms
             elif ticks_diff(now_ms, self._seen_ms) >= PROBE_MS:
                 self._seen_ms = self._acted_ms = now_ms
@@ -130,7 +130,7 @@ class Lcd:
     def _put(self, number, text):
         line = self._wanted[number]
         if isinstance(text, str):
-            if text == self._texts[number]:  # as mostly: to convert it takes 0.2 ms
+            if text == self._texts[number]:  # mostly so; converting it would take 0.2 ms
                 return
             self._texts[number] = text
             for i in range(COLUMNS):
@@ -193,7 +193,7 @@ class Lcd:
                 while shown[last] == wanted[last]:
                     last -= 1
                 at = _LINE_ADDRESSES[i] + first
-                if last > first:  # if this breaks off, half a number or another side must not look like a reading
+                if last > first:  # a transfer that breaks off must not leave half a number or the wrong side
                     self._send(at, memoryview(_DASHES)[first : last + 1])
                 self._send(at, memoryview(wanted)[first : last + 1])
                 shown[:] = wanted

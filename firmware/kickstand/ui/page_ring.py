@@ -14,7 +14,8 @@ class PageRing:
     LeanMeter, the ActiveCalibration, the BackgroundAlignment or None, and the Recording, all to be read only. align:
     called for a short press while there is no alignment: it means that the bike is on its kickstand.
 
-    late: the page that is due is to show no lean. live: a Live, which has a page then, or None.
+    late: True if the next page must not show a lean, because it comes too late. live: a Live, which has a page then, or
+    None.
     """
 
     def __init__(self, leans, meter, calibration, drive, rides, align):
@@ -33,11 +34,11 @@ class PageRing:
         self._pages += (page,)
 
     def first(self):
-        """Back to the first page."""
+        """Go back to the first page."""
         self._at = 0
 
     def drive(self):
-        """To the page of alignment by driving."""
+        """Go to the page of alignment by driving."""
         self._at = len(self._pages) if self._calibration.aligned else 0
 
     def press(self, event, now_ms):
@@ -51,7 +52,7 @@ class PageRing:
 
     @property
     def _driving(self):
-        """True while alignment by driving has a page: the first one until there is an alignment, then the last."""
+        """True while alignment by driving has a page: the first page until there is an alignment, then the last."""
         return self._drive is not None and self._drive.shown
 
     def _drive_lines(self, now_ms):
