@@ -1,7 +1,5 @@
 """Rates in rad/s are remarked on, those in deg/s never are."""
 
-import analysis_rides
-import command
 import numpy as np
 import pytest
 from checked import cells_of, words
@@ -11,7 +9,6 @@ from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.simulation.files import simulate
 from kickstand_tools.simulation.profiles import PROFILES
-from kickstand_tools.simulation.scripted import script
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
 
@@ -51,23 +48,6 @@ def test_braking_and_dips_are_no_bends(slope):
     time = np.arange(0.0, 300.0, 0.02)
     brake = np.where(time % 20.0 < 5.0, -0.9, 0.0)
     assert straight_on(time, slope + brake, 1.0 + 0.1 * np.sin(time)) == ""
-
-
-@pytest.mark.parametrize("name", ["replay", "report", "plot", "export"])
-def test_the_commands_say_so_in_one_line(tmp_path, name):
-    """The work is done all the same."""
-    bends = [bend for side in (-1, 1, -1) for bend in (script.turn(35 * side, 5), script.straight(2))]
-    ride = analysis_rides.write(tmp_path, [script.upright(4), script.accelerate(15, 5), *bends, script.straight(20)])
-    table = np.loadtxt(ride, delimiter=",", skiprows=1)
-    more = {"replay": ("--calibration", tmp_path / "RIDE.cal.json", "--out", tmp_path / "LEAN.csv")}
-    more |= {"plot": ("--out", tmp_path), "export": ("--to", "csv", "--out", tmp_path / "ride.csv")}
-    assert command.works(name, ride, *more.get(name, ())).err == ""
-    table[:, 4:] = np.radians(table[:, 4:])
-    command.write(ride, table)
-    said = command.works(name, ride, *more.get(name, ())).err
-    assert said.startswith(f"warning: {ride}: in bends the rates are those of ")
-    assert said.count("\n") == 1
-    assert said.endswith(" m/s: are they in rad/s? deg/s are needed\n")
 
 
 def weaving(scale=57.0, noise_dps=0.0, unlike=0.0, seconds=40.0, rest_s=8.0):

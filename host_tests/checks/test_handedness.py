@@ -2,7 +2,6 @@
 
 import itertools
 
-import command
 import numpy as np
 import pytest
 from checked import cells_of, words
@@ -160,15 +159,6 @@ def test_recordings(shared_data):
         assert judged(log, turned, turned) == "", path
         assert WRONG_WAY in judged(log, turned, -turned), path
         assert WRONG_WAY in judged(log, -turned, -turned), path
-
-
-def test_the_commands_say_so_in_one_line(tmp_path, rides):
-    log = rides["street"]
-    rows = np.column_stack((log.t_s, log.accel_g, -log.gyro_dps))
-    path, cal = command.write(tmp_path / "log.csv", rows), command.write_cal(tmp_path / "CAL.json")
-    said = command.works("replay", path, "--calibration", cal, "--out", tmp_path / "LEAN.csv").err.splitlines()
-    line = f"warning: {path}: the rates turn the force the wrong way, so the lean is wrong: "
-    assert sum(each.startswith(line) for each in said) == 1
 
 
 def test_a_bias_is_found_while_fitting():
