@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from checked import cells_of, words
+from checked import cells_of, simulated, words
 from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.checks.bends import bends
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.simulation.files import simulate
 from kickstand_tools.simulation.profiles import PROFILES
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
@@ -18,16 +17,14 @@ def judged(log, scale=1.0):
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_simulated_rides(tmp_path, profile):
-    simulate(profile, 5, tmp_path, 300.0)
-    log = read_log(tmp_path / "RIDE.csv")
+def test_simulated_rides(profile):
+    log = simulated(profile, 5, 300.0)
     assert judged(log) == ""
     assert ("are they in rad/s?" in judged(log, np.radians(1.0))) is (profile != "parked")
 
 
-def test_a_short_ride_tells_it_too(tmp_path):
-    simulate("city", 9, tmp_path, 120.0)
-    log = read_log(tmp_path / "RIDE.csv")
+def test_a_short_ride_shows_it_too():
+    log = simulated("city", 9, 120.0)
     assert "are they in rad/s?" in judged(log, np.radians(1.0))
     assert "the gyro of the opposite sign" in judged(log, -1.0)
 

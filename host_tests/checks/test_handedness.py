@@ -4,12 +4,12 @@ import itertools
 
 import numpy as np
 import pytest
-from checked import cells_of, words
+from checked import cells_of, simulated, words
 from kickstand_tools.checks.handedness import EXCHANGES, better_exchange, handedness, liveliest
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.simulation.profiles import MAIN, PROFILES
-from kickstand_tools.simulation.ride import random_rotation, ride
+from kickstand_tools.simulation.ride import random_rotation
 
 SIGNED = [
     np.eye(3)[list(order)] * np.array(signs)
@@ -18,15 +18,6 @@ SIGNED = [
 ]
 MINUS = -np.eye(3)
 WRONG_WAY = "are the axes left-handed (reverse one in both sensors) or the gyro of the opposite sign"
-
-
-def simulated(profile, seed=1, seconds=150.0, speed=True, every=4):
-    """A ride at 50 Hz by an MPU6050 with the errors that its data sheet allows."""
-    made = ride(profile, seed, seconds)
-    readings, mps = made.readings[::every], np.full(len(made.time[::every]), np.nan)
-    if speed:
-        mps[:: 200 // every] = made.truth["speed_mps"][::200]
-    return Log(made.time[::every], readings[:, :3], readings[:, 4:], mps)
 
 
 @pytest.fixture(scope="module")
