@@ -163,8 +163,7 @@ def test_thirty_megabytes_leave_the_page_awake(chromium, address, calibration, t
     assert rider.page.inner_text("#said") == ""
     assert rider.page.inner_text("#figures td").startswith("35:00")
     assert rider.page.evaluate("longestMs") < 1500.0
-    print("RSS", max(rss_mb(process) for process in rider.processes()))
-    assert max(rss_mb(process) for process in rider.processes()) < 1000.0
+    assert max(rss_mb(process) for process in rider.processes()) < 750.0
     rider.context.close()
 
 
