@@ -34,6 +34,7 @@ from .fleet.manifest import Period, by_pattern, read_manifest
 from .fleet.period import PeriodResult, work_on_period
 from .fleet.run import FleetRun, run_fleet
 from .imports.importing import Imported, import_recording, write_imported
+from .joining.agreement import Agreement, compare_rides
 from .joining.joined import Joined, join_track, write_joined
 from .joining.track import Track
 from .joining.track_files import read_track
@@ -49,6 +50,7 @@ from .simulation.ride import ride as simulate_ride
 from .web.site import site_files, write_site
 
 __all__ = [
+    "Agreement",
     "CalibrationFile",
     "Channels",
     "DriveEvent",
@@ -76,6 +78,7 @@ __all__ = [
     "TwoPositions",
     "brake_tests",
     "by_pattern",
+    "compare_rides",
     "cut_log",
     "export",
     "find_stops",
