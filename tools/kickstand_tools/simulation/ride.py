@@ -50,11 +50,13 @@ def ride(
     upright_error_deg: float = 0.0,
     pitch_change_deg: float | None = None,
     share: float = 1.0,
+    exact: bool = False,
 ) -> Ride:
     """Simulate a ride of about this length; a profile and a seed always give the same one.
 
     upright_error_deg: how far the bike leaned to the right in the upright pose. pitch_change_deg: how much higher the
     nose was on the kickstand than upright; random within 1 degree if None. share: of the sensor's tolerances.
+    exact: of this length, if that is enough for setting off and stopping.
 
     >>> made = ride("parked", seed=1, seconds=20.0)
     >>> made.rate_hz, len(made.poses), made.readings.shape == (len(made.time), 7)
@@ -63,6 +65,8 @@ def ride(
     chance = np.random.default_rng([seed, *profile.encode()])
     plan = Plan(chance, seconds)
     conditions = PROFILES[profile](plan)
+    if exact:
+        plan.fit(seconds)
     bike, chip = Bike.random(chance), Chip.random(chance, share, conditions.drift)
     mounting = random_rotation(chance)
     command = commands(plan.legs, RATE_HZ)
