@@ -1,6 +1,7 @@
 """Builds a ride of what riders do: set off, ride straight on, turn, stop."""
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from math import atan, degrees, radians, tan
 
 import numpy as np
@@ -9,6 +10,7 @@ from kickstand.units import STANDARD_GRAVITY
 from .commands import Leg
 from .physics.road import CLASS_B
 
+_SHORTEST_S = 3.0  # least duration of a leg that is shortened
 _CLOSING_S = 45.0  # time for the straight and the stop at the end of every ride
 
 
@@ -55,6 +57,17 @@ class Plan:
     def seconds(self) -> float:
         """Duration of the legs so far."""
         return self._seconds
+
+    def fit(self, seconds: float) -> None:
+        """Make the ride so long, by the longest of the legs at one speed; each of them keeps _SHORTEST_S, which may
+        leave a ride that is longer."""
+        steady = [leg for before, leg in pairwise(self.legs) if leg.speed_mps in (None, before.speed_mps)]
+        while steady and (over := sum(leg.seconds for leg in self.legs) - seconds):
+            longest = max(steady, key=lambda leg: leg.seconds)
+            cut = min(over, longest.seconds - _SHORTEST_S)
+            longest.seconds -= cut
+            if abs(over - cut) < 1e-6 or longest.seconds <= _SHORTEST_S:
+                break
 
     def uniform(self, low: float, high: float) -> float:
         return float(self.chance.uniform(low, high))

@@ -54,13 +54,15 @@ def ride(
     share: float = 1.0,
     road: str | None = None,
     mount: str | None = None,
+    exact: bool = False,
 ) -> Ride:
     """Simulate a ride of about this length; a profile and a seed always give the same one.
 
     upright_error_deg: lean of the bike to the right in the upright pose. pitch_change_deg: pitch on the kickstand less
     that in the upright pose; random within 1 degree if None. share: factor on the sensor's tolerances.
     road: a class of ISO 8608 in place of the profile's own road; it is cambered, the rider moves about and the bike
-    slips a little. mount: one of MOUNTS in place of a firm one.
+    slips a little. mount: one of MOUNTS in place of a firm one. exact: exactly this length, where it is enough for
+    setting off and stopping.
 
     >>> made = ride("parked", seed=1, seconds=20.0)
     >>> made.rate_hz, len(made.poses), made.readings.shape == (len(made.time), 7)
@@ -69,6 +71,8 @@ def ride(
     chance = np.random.default_rng([seed, *profile.encode()])
     plan = Plan(chance, seconds)
     conditions = PROFILES[profile](plan)
+    if exact:
+        plan.fit(seconds)
     bike, chip = Bike.random(chance), Chip.random(chance, share, conditions.drift)
     mounting = random_rotation(chance)
     # From a source of its own: without them a profile and a seed give the ride that they always gave
