@@ -72,7 +72,7 @@ class Radio:
             self.inbox = []
             self.changed = True
         elif event == _PASSKEY:
-            self._ble.gap_passkey(data[0], data[1], self._pin)
+            getattr(self._ble, "gap_passkey")(data[0], data[1], self._pin)  # noqa: B009 the stubs of rp2 know it not
         elif self._bonds and event == _GET_SECRET:
             return self._bonds.get(*data)
         elif self._bonds and event == _SET_SECRET:
