@@ -28,6 +28,8 @@ def simulate(
     pitch_change_deg: float | None = None,
     share: float = 1.0,
     speed: bool = False,
+    road: str | None = None,
+    mount: str | None = None,
 ) -> Ride:
     """Simulate a ride (see ride.ride) and write it to out_dir. Raises InputError.
 
@@ -38,7 +40,7 @@ def simulate(
     check_profile(profile)
     directory = Path(out_dir)
     check_directory(directory)
-    made = ride(profile, seed, seconds, upright_error_deg, pitch_change_deg, share)
+    made = ride(profile, seed, seconds, upright_error_deg, pitch_change_deg, share, road, mount)
     try:
         directory.mkdir(parents=True, exist_ok=True)
         # It belongs to an earlier ride and another sensor, but report, plot and export would use it for this one

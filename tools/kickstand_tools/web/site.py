@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -41,8 +42,9 @@ def site_files() -> dict[str, bytes]:
     files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in sorted(PAGE.rglob("*.*"))}
     files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # as a text a browser shows
     files |= wiring_files.wiring_files()
-    files["install.html"] = _filled("install.html", boards=wiring_files.tables())
-    files["rides.html"] = _filled("rides.html", charts=_chart_scripts(files["plotly/plotly.min.js"]))
+    values = {"home": home(), "boards": wiring_files.tables()}
+    values["charts"] = _chart_scripts(files["plotly/plotly.min.js"])
+    files |= {name: _filled(name, **values) for name in files if name.endswith(".html")}
     files["python.json"] = json.dumps(python_files()).encode()
     files["install.zip"] = install_archive.archive()
     files["rides.zip"] = rides_archive.archive()
@@ -53,6 +55,15 @@ def site_files() -> dict[str, bytes]:
     kept = sorted(["./", *(name for name in files if name not in _NOT_KEPT and not name.startswith(LATER))])
     files["service_worker.js"] = _filled("service_worker.js", files=kept, version=version)
     return files
+
+
+def home() -> str:
+    """The address of the project, "" where what is installed does not know it: see hatch_build.py."""
+    try:
+        named = metadata.metadata("kickstand").get_all("Project-URL") or []
+    except metadata.PackageNotFoundError:
+        named = []
+    return dict(one.split(", ", 1) for one in named).get("Homepage", "")
 
 
 def _filled(name: str, **values: Any) -> bytes:
