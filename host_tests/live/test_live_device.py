@@ -137,7 +137,9 @@ def test_out_of_reach_the_loop_goes_on(run):
 def test_the_menu_ends_it(run):
     """Reset maxima, and the entries behind it, to the last but one."""
     presses = devices.PRESSES + [[22.0, 1.0]] + [[23.5 + 0.4 * k, 0.15] for k in range(5)] + [[26.0, 1.0]]
-    record = run({**devices.ALIGNED, **LIVE, "phones": [ASK + [[40.0, "found"], [41.0, "connect"]]], "presses": presses})
+    record = run(
+        {**devices.ALIGNED, **LIVE, "phones": [ASK + [[40.0, "found"], [41.0, "connect"]]], "presses": presses}
+    )
     (phone,) = record.phones
     assert record.first("Bluetooth is off") < 28
     assert [did for _, did, _ in phone["said"]].count("dropped") == 1

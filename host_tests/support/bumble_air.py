@@ -138,7 +138,9 @@ class Air:
             self.radio.paired = self.radio.paired or bool(connection.authenticated)
             self.radio.write(handle, data)
 
-        made = Characteristic(uuid_of(kind), Characteristic.Properties(flags & 0x1A), allowed, CharacteristicValue(read, write))
+        made = Characteristic(
+            uuid_of(kind), Characteristic.Properties(flags & 0x1A), allowed, CharacteristicValue(read, write)
+        )
         self._characteristics[handle] = made
         return made
 
@@ -201,8 +203,10 @@ class Central:
             kinds = core.AdvertisingData
             listed = [
                 core.UUID.from_bytes(data[at : at + size])
-                for kind, size in ((kinds.COMPLETE_LIST_OF_16_BIT_SERVICE_CLASS_UUIDS, 2),
-                                   (kinds.COMPLETE_LIST_OF_128_BIT_SERVICE_CLASS_UUIDS, 16))
+                for kind, size in (
+                    (kinds.COMPLETE_LIST_OF_16_BIT_SERVICE_CLASS_UUIDS, 2),
+                    (kinds.COMPLETE_LIST_OF_128_BIT_SERVICE_CLASS_UUIDS, 16),
+                )
                 for data in advertisement.data.get_all(kind, raw=True)
                 for at in range(0, len(data), size)
             ]
