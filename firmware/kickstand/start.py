@@ -12,7 +12,7 @@ import machine
 from . import settings
 from .board import port
 from .devices import open_button, open_lcd, open_sensor
-from .errors import SettingsError, report
+from .errors import LiveError, SettingsError, report
 from .units import __version__
 
 CHARGE_MS = 100
@@ -75,7 +75,7 @@ def main():
 def _open_radio(pin):
     """The Radio for a phone, or the LiveError why there is none, which does not stop the lean. Before the app is
     imported: an ESP32-C3 may crash in switching its radio on once 40 KB are allocated."""
-    from .live.radio import LiveError, Radio
+    from .live.radio import Radio
 
     try:
         return Radio(pin)
