@@ -148,14 +148,14 @@ class App:
         take a step of what the menu may need and, at standstill only, save the roll-misalignment correction."""
         waiting_ms = 1000 * self.sensor.chip.frames_left // self.settings.SAMPLE_HZ
         self.screen.pages.late = ticks_diff(now_ms, self._page_ms) + waiting_ms > LATE_MS
+        self.screen.pages.draws = self.lcd.draws
         self._page_ms = ticks_add(now_ms, PAGE_MS)
         if self.screen.menu:  # in which a recording can be begun, at once
             self.rides.prepare()
         problem = self.rides.recorder.take_problem() or (self.drive and self.drive.speed.take_problem())
         if problem:
             self.screen.notify(problem, now_ms)
-        line1, line2 = self.screen.lines(now_ms)
-        self.lcd.show(line1, line2)
+        self.lcd.show(*self.screen.lines(now_ms))
         if not self.screen.wizard:
             self.calibration.keep_trim(now_ms)
 

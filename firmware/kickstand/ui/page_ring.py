@@ -14,7 +14,7 @@ class PageRing:
     LeanMeter, the ActiveCalibration, the BackgroundAlignment or None, and the Recording, all to be read only. align:
     called for a short press while there is no alignment: it means that the bike is on its kickstand.
 
-    late: the page that is due is to show no lean.
+    late: the page that is due is to show no lean. draws: the display shows pictures.
     """
 
     def __init__(self, leans, meter, calibration, drive, rides, align):
@@ -25,7 +25,7 @@ class PageRing:
         self._align = align
         self._pages = MOTORCYCLE if leans else CAR
         self._at = 0
-        self.late = False
+        self.late = self.draws = False
 
     def add(self, page):
         """Add a page behind the others."""
@@ -76,11 +76,20 @@ class PageRing:
 
     def _page(self, page):
         meter = self._meter
+        recording = self._at == 0 and self._rides.recorder.active
         if meter.fallen:
             return pages.FALLEN
         if self.late or not meter.trusted or abs(meter.lean_deg) > FALLEN_DEG:
-            return pages.unsure(meter.suppressed_reason)
+            lines = pages.unsure(meter.suppressed_reason)
+            return lines + (self._glance().unsure(*lines),) if self.draws else lines
         line1, line2 = page(meter)
-        if self._at == 0 and self._rides.recorder.active:
+        if recording:
             line1 = pages.recorded(line1)
+        if self.draws and page in self._glance().PICTURES:
+            return line1, line2, self._glance().PICTURES[page](meter, recording)
         return line1, line2
+
+    def _glance(self):
+        from . import glance  # only with a display that draws
+
+        return glance

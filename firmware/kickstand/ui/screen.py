@@ -116,7 +116,7 @@ class Screen:
         self.pages = PageRing(settings.leans, meter, calibration, drive, rides, self._align_now)
 
     def lines(self, now_ms):
-        """What the display should say now. Call it about every 100 ms."""
+        """What the display should show now: two lines and, where it draws, a picture. Call it about every 100 ms."""
         return self._update_front(now_ms)[1]
 
     def press(self, event, now_ms):

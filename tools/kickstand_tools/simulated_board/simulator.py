@@ -1,4 +1,4 @@
-"""The simulated board: microcontroller pins, MPU6050, LCD and button, wired together on one clock.
+"""The simulated board: microcontroller pins, MPU6050, display and button, wired together on one clock.
 
     with Board(world) as board:
         board.press(2.0)
@@ -17,6 +17,7 @@ from .gps import Gps
 from .i2c import Bus
 from .lcd import Lcd
 from .mpu6050 import Mpu6050
+from .oled import Oled
 from .sd_card import SdCard
 from .wheel import Wheel
 
@@ -30,7 +31,8 @@ class Board:
     """A board with its supply off; run() switches it on.
 
     world(t_s): (fx, fy, fz, wx, wy, wz[, temp_c]) in g and deg/s along the chip's own axes, with the chip's errors.
-    who_am_i: which chip is fitted.  sensor_address, lcd_address: None if it is not fitted.
+    who_am_i: which chip is fitted.  display: "lcd", "ssd1306" or "sh1106".  sensor_address, lcd_address: None if it is
+    not fitted; 0 for the display's usual one.
     one_bus: the display is on the sensor's wires.  port: "rp2" or "esp32".  pace: see Clock.
     machine: a name in chips.MACHINES, which gives the port. Firmware that is imported first after install() takes it
     for the board it runs on; without one the firmware runs on what it was imported for, a Pico as a rule.
@@ -44,7 +46,7 @@ class Board:
         world,
         who_am_i=0x68,
         sensor_address=0x68,
-        lcd_address=0x27,
+        lcd_address=0,
         one_bus=False,
         port="rp2",
         seed=1,
@@ -54,6 +56,7 @@ class Board:
         sensor_pins=None,
         lcd_pins=None,
         button_pin=None,
+        display="lcd",
     ):
         self.poses = machine is not None
         self.machine = chips.MACHINES[machine or ("pico" if port == "rp2" else "esp32")]
@@ -64,7 +67,10 @@ class Board:
         self.seed = seed
         self.clock = Clock(pace)
         self.sensor = Mpu6050(self.clock, world, who_am_i, sensor_address or 0x68)
-        self.lcd = Lcd(self.clock, lcd_address or 0x27)
+        if display == "lcd":
+            self.lcd = Lcd(self.clock, lcd_address or 0x27)
+        else:
+            self.lcd = Oled(self.clock, lcd_address or 0x3C, display)
         self.button = Button(self.clock, seed)
         self.watchdog = Watchdog(self.clock)
         usual_sensor, usual_lcd, usual_button, self._gps_pin, self.wheel_pin = WIRING[port]
