@@ -9,6 +9,7 @@ search back, in front of all garbage since the last collection: up to 1 ms a tur
 """
 
 import gc
+import os
 from time import sleep_us, ticks_add, ticks_diff, ticks_ms, ticks_us
 
 from .board import port
@@ -60,6 +61,18 @@ class App:
         self.screen = Screen(settings, sensor, self.clock, self.meter, self.calibration, self.drive, self.rides)
         self._restarts = 0
         self._page_ms = ticks_ms()
+        self.user = self._open_user()
+
+    def _open_user(self):
+        try:
+            os.stat("user.py")
+        except OSError:
+            return None
+        from .user_code import UserCode  # 3 KB of heap
+
+        user = UserCode(self)
+        self.screen.pages.own = user.pages
+        return user
 
     def _open_drive(self):
         # 30 KB of heap with all that they import: not for a board without a speed source
@@ -94,6 +107,8 @@ class App:
                 gc.collect()
                 fill_gaps(SINGLE_GAPS)
                 turns = port.turns_to_collect(most)
+                if self.user:
+                    self.user.check_memory()
             if watchdog:
                 watchdog.feed()
             due_us = ticks_add(due_us, LOOP_US)
@@ -122,12 +137,17 @@ class App:
             self.clock.emptied(now_us)
         event = self.button.poll(now_ms)
         if event:
-            self.screen.press(event, now_ms)
+            self._press(event, now_ms)
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self._show(now_ms)
         self.lcd.tick(now_ms)
         if self.rides.recorder.active:  # recording() would cost 20 us
             self.rides.recorder.tick()
+
+    def _press(self, event, now_ms):
+        self.screen.press(event, now_ms)
+        if self.user:
+            self.user.press(event)
 
     @property
     def recording(self):
@@ -153,6 +173,9 @@ class App:
         if self.screen.menu:  # in which a recording can be begun, at once
             self.rides.prepare()
         problem = self.rides.recorder.take_problem() or (self.drive and self.drive.speed.take_problem())
+        if self.user:
+            self.user.lean(self.sensor.fault is None and self.screen.pages.trusted)
+            problem = problem or self.user.take_problem()
         if problem:
             self.screen.notify(problem, now_ms)
         self.lcd.show(*self.screen.lines(now_ms))

@@ -14,7 +14,8 @@ class PageRing:
     LeanMeter, the ActiveCalibration, the BackgroundAlignment or None, and the Recording, all to be read only. align:
     called for a short press while there is no alignment: it means that the bike is on its kickstand.
 
-    late: the page that is due is to show no lean. draws: the display shows pictures.
+    late: the page that is due is to show no lean. draws: the display shows pictures. own: of the owner's pages, a
+    function each that gives the lines.
     """
 
     def __init__(self, leans, meter, calibration, drive, rides, align):
@@ -26,14 +27,17 @@ class PageRing:
         self._pages = MOTORCYCLE if leans else CAR
         self._at = 0
         self.late = self.draws = False
+        self.own = ()
+        self._own_at = None  # which of them is shown
 
-    def add(self, page):
-        """Add a page behind the others."""
-        self._pages += (page,)
+    def show_own(self, now_ms):
+        """To the first of the owner's pages: before there is an alignment the menu is the way there."""
+        self._own_at = 0
 
     def first(self):
         """Back to the first page."""
         self._at = 0
+        self._own_at = None
 
     def drive(self):
         """To the page of alignment by driving."""
@@ -42,7 +46,11 @@ class PageRing:
     def press(self, event, now_ms):
         if event != SHORT:
             return False
-        if self._driving or self._calibration.aligned:
+        if self._own_at is not None:
+            self._own_at += 1
+            if self._own_at >= len(self.own):
+                self.first()
+        elif self._driving or self._calibration.aligned:
             self._at += 1
         else:
             self._align()
@@ -59,6 +67,8 @@ class PageRing:
         return drive_page.lines(self._drive, now_ms)
 
     def lines(self, now_ms):
+        if self._own_at is not None:
+            return self.own[self._own_at]()
         if not self._calibration.aligned:
             if not self._driving:
                 return pages.not_aligned(self._meter, now_ms // 1000)
@@ -68,18 +78,28 @@ class PageRing:
         count = len(self._pages) + self._driving + self._rides.recorder.active
         if self._at >= count:  # the last page has gone; checked here, so that the other pages keep their places
             self._at = 0
+            if self.own:
+                self._own_at = 0
+                return self.own[0]()
         if self._at == len(self._pages) and self._driving:
             return self._drive_lines(now_ms)
         if self._at >= len(self._pages):
             return pages.recording(self._rides.recorder)
         return self._page(self._pages[self._at])
 
+    @property
+    def trusted(self):
+        """True if there is a lean that may be shown."""
+        meter = self._meter
+        shown = meter.trusted and not meter.fallen and abs(meter.lean_deg) <= FALLEN_DEG
+        return shown and self._calibration.aligned and not self.late
+
     def _page(self, page):
         meter = self._meter
         recording = self._at == 0 and self._rides.recorder.active
         if meter.fallen:
             return pages.FALLEN
-        if self.late or not meter.trusted or abs(meter.lean_deg) > FALLEN_DEG:
+        if not self.trusted:
             lines = pages.unsure(meter.suppressed_reason)
             return lines + (self._glance().unsure(*lines),) if self.draws else lines
         line1, line2 = page(meter)

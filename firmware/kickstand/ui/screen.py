@@ -141,10 +141,6 @@ class Screen:
             self._open_menu(now_ms)
         self._drop_ended()
 
-    def add_page(self, page):
-        """Add a page behind the others. page: a function of the meter that gives two lines of 16 characters."""
-        self.pages.add(page)
-
     def interrupt(self, now_ms):
         """The sensor has failed: a calibration under way is cancelled."""
         if self.wizard:
@@ -181,9 +177,10 @@ class Screen:
         drive = (("Align by drive", self._align_by_drive),) if self._drive else ()
         rest = (("Six positions", self._six), ("Reset maxima", self._reset), ("Sensor info", self._info.show))
         record = ("Stop recording", self._stop) if self._rides.recorder.active else ("Record ride", self._record)
+        last = (record,) + ((("Own pages", self.pages.show_own),) if self.pages.own else ())
         if self._settings.leans:
-            return align + rest + drive + (record,)
-        return drive + rest + (record,)
+            return align + rest + drive + last
+        return drive + rest + last
 
     def _ready(self, now_ms):
         """True if there are readings; if not, the rider is shown why."""

@@ -37,7 +37,8 @@ class Board:
     machine: a name in chips.MACHINES, which gives the port. Firmware that is imported first after install() takes it
     for the board it runs on; without one the firmware runs on what it was imported for, a Pico as a rule.
     i2c_driver: of MicroPython on an ESP32, "new" or (up to 1.28) "legacy".  sensor_pins, lcd_pins: (SDA, SCL), if not
-    those of WIRING.  touched: the pins that the firmware has used since the board was made.
+    those of WIRING.  touched: the pins that the firmware has used since the board was made.  volts: at the pins of an
+    ADC, by number.  sent: what was written to any UART.
     Times in seconds are those of the board's clock, which continues through resets and power cycles.
     """
 
@@ -64,6 +65,8 @@ class Board:
         self.i2c_driver = i2c_driver
         self.pins = chips.pins_of(self.machine)
         self.touched = set()
+        self.volts = {}
+        self.sent = b""
         self.seed = seed
         self.clock = Clock(pace)
         self.sensor = Mpu6050(self.clock, world, who_am_i, sensor_address or 0x68)
