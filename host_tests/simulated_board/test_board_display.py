@@ -206,16 +206,11 @@ def test_the_kind_that_is_set_is_the_kind_that_is_used():
 
 def test_another_display_in_its_place_is_taken():
     def test(board, display):
-        from kickstand_tools.simulated_board.lcd import Lcd
-        from kickstand_tools.simulated_board.oled import Oled
-
-        board.remove_lcd()
-        turns(board, display, 40)
-        board.lcd = Oled(board.clock) if isinstance(board.lcd, Lcd) else Lcd(board.clock)
-        board.fit_lcd()
-        display.show(*NEW)
-        turns(board, display, 200)
-        assert board.lcd.text() == as_text(NEW)
+        for kind in OLEDS + ("lcd", "lcd", "sh1106"):
+            board.change_display(kind)
+            display.show(*NEW)
+            turns(board, display, 200)
+            assert board.lcd.text() == as_text(NEW), kind
 
     for_each(test, (None,))
 

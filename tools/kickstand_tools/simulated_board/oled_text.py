@@ -49,8 +49,8 @@ def _cells(line):
 
 def _small(pages, page):
     """The letters of 8x8 pixels in a page, or None."""
-    letters = [_LETTERS.get(cell) for cell in _cells(pages[page])]
-    return None if None in letters else "".join(letters)
+    letters = [_LETTERS.get(cell, "") for cell in _cells(pages[page])]
+    return "".join(letters) if all(letters) else None
 
 
 def _tall(pages, page, inverted=0):
@@ -58,8 +58,8 @@ def _tall(pages, page, inverted=0):
     letters = []
     for i in range(16):
         halves = [pages[page + k][8 * i + x] ^ inverted for x in range(8) for k in (0, 1)]
-        letters.append(_TALL.get(bytes(halves)))
-    return None if None in letters else "".join(letters)
+        letters.append(_TALL.get(bytes(halves), ""))
+    return "".join(letters) if all(letters) else None
 
 
 def _digit(pages, page, x):

@@ -70,10 +70,7 @@ class Board:
         self.seed = seed
         self.clock = Clock(pace)
         self.sensor = Mpu6050(self.clock, world, who_am_i, sensor_address or 0x68)
-        if display == "lcd":
-            self.lcd = Lcd(self.clock, lcd_address or 0x27)
-        else:
-            self.lcd = Oled(self.clock, lcd_address or 0x3C, display)
+        self.lcd = self._display(display, lcd_address)
         self.button = Button(self.clock, seed)
         self.watchdog = Watchdog(self.clock)
         usual_sensor, usual_lcd, usual_button, self._gps_pin, self.wheel_pin = WIRING[port]
@@ -176,6 +173,17 @@ class Board:
         """Connect it; its supply comes up now."""
         self.lcd.power_on()
         self.lcd_bus.attach(self.lcd)
+
+    def _display(self, kind, address=0):
+        if kind == "lcd":
+            return Lcd(self.clock, address or 0x27)
+        return Oled(self.clock, address or 0x3C, kind)
+
+    def change_display(self, kind):
+        """Connect another one in its place: "lcd", "ssd1306" or "sh1106"."""
+        self.remove_lcd()
+        self.lcd = self._display(kind)
+        self.fit_lcd()
 
     def remove_lcd(self):
         """Disconnect it; it goes dark."""
