@@ -9,6 +9,7 @@ search back, in front of all garbage since the last collection: up to 1 ms a tur
 """
 
 import gc
+import os
 from time import sleep_us, ticks_add, ticks_diff, ticks_ms, ticks_us
 
 from .board import port
@@ -67,6 +68,18 @@ class App:
         self.live = None
         if radio:
             self._open_live(radio)
+        self.user = self._open_user()
+
+    def _open_user(self):
+        try:
+            os.stat("user.py")
+        except OSError:
+            return None
+        from .user_code import UserCode  # 3 KB of heap
+
+        user = UserCode(self)
+        self.screen.pages.own = user.pages
+        return user
 
     def _open_drive(self):
         # takes 30 KB of heap with its own imports: not imported without a speed source
@@ -116,6 +129,8 @@ class App:
                 gc.collect()
                 fill_gaps(SINGLE_GAPS)
                 turns = port.turns_to_collect(most)
+                if self.user:
+                    self.user.check_memory()
             if watchdog:
                 watchdog.feed()
             due_us = ticks_add(due_us, LOOP_US)
@@ -144,7 +159,7 @@ class App:
             self.clock.emptied(now_us)
         event = self.button.poll(now_ms)
         if event:
-            self.screen.press(event, now_ms)
+            self._press(event, now_ms)
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self._show(now_ms)
         self.lcd.tick(now_ms)
@@ -152,6 +167,11 @@ class App:
             self.rides.recorder.tick()
         if self.live:
             self.live.poll(now_ms)
+
+    def _press(self, event, now_ms):
+        self.screen.press(event, now_ms)
+        if self.user:
+            self.user.press(event)
 
     @property
     def recording(self):
@@ -173,14 +193,17 @@ class App:
         correction."""
         waiting_ms = 1000 * self.sensor.chip.frames_left // self.settings.SAMPLE_HZ
         self.screen.pages.late = ticks_diff(now_ms, self._page_ms) + waiting_ms > LATE_MS
+        self.screen.pages.draws = self.lcd.draws
         self._page_ms = ticks_add(now_ms, PAGE_MS)
         if self.screen.menu:  # a recording that is started there should begin at once
             self.rides.prepare()
         problem = self.rides.recorder.take_problem() or (self.drive and self.drive.speed.take_problem())
+        if self.user:
+            self.user.lean(self.sensor.fault is None and self.screen.pages.trusted)
+            problem = problem or self.user.take_problem()
         if problem:
             self.screen.notify(problem, now_ms)
-        line1, line2 = self.screen.lines(now_ms)
-        self.lcd.show(line1, line2)
+        self.lcd.show(*self.screen.lines(now_ms))
         if not self.screen.wizard:
             self.calibration.keep_trim(now_ms)
 

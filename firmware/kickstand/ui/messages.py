@@ -58,6 +58,10 @@ flash-fault|Rec. stopped|flash fault
 card-fault|Rec. stopped|card fault
 usb-fault|Rec. stopped|USB not read
 
+user-failed|user.py {0}|{1}
+user-slow|user.py {0}|slow: {1} ms
+user-memory|user.py left out|no memory
+
 unreadable|config.py:|cannot be read
 no-setting|config.py: what?|{0}
 no-pins|config.py: set|{0}
