@@ -9,12 +9,14 @@ search back, in front of all garbage since the last collection: up to 1 ms a tur
 """
 
 import gc
+import os
 from time import sleep_us, ticks_add, ticks_diff, ticks_ms, ticks_us
 
 from .board import port
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
 from .devices import open_button
+from .errors import Refusal
 from .imu.sensor import SampleClock
 from .lean.meter import LeanMeter
 from .rides.recording import Recording
@@ -45,11 +47,12 @@ def fill_gaps(n):
 class App:
     """The lean meter on a board.
 
-    settings: a Settings. lcd, sensor: from devices.open_lcd() and open_sensor(). keeper: see Recording. Raises
-    SettingsError for pins that cannot be used.
+    settings: a Settings. lcd, sensor: from devices.open_lcd() and open_sensor(). keeper: see Recording. radio: a Radio
+    for a phone, or None; a LiveError if there should be one and is none. Raises SettingsError for pins that cannot be
+    used.
     """
 
-    def __init__(self, settings, lcd, sensor, keeper=None):
+    def __init__(self, settings, lcd, sensor, keeper=None, radio=None):
         self.settings = settings
         self.lcd = lcd
         self.button = open_button(settings)
@@ -62,6 +65,21 @@ class App:
         self.screen = Screen(settings, sensor, self.clock, self.meter, self.calibration, self.drive, self.rides)
         self._restarts = 0
         self._page_ms = ticks_ms()
+        self.live = None
+        if radio:
+            self._open_live(radio)
+        self.user = self._open_user()
+
+    def _open_user(self):
+        try:
+            os.stat("user.py")
+        except OSError:
+            return None
+        from .user_code import UserCode  # 3 KB of heap
+
+        user = UserCode(self)
+        self.screen.pages.own = user.pages
+        return user
 
     def _open_drive(self):
         # takes 30 KB of heap with its own imports: not imported without a speed source
@@ -70,6 +88,19 @@ class App:
 
         return BackgroundAlignment(self.settings.leans, open_speed(self.settings), self.meter, self.calibration)
 
+    def _open_live(self, radio):
+        if isinstance(radio, Refusal):
+            self.screen.notify(radio, ticks_ms())
+            return
+        from .live.live import Live
+
+        self.live = Live(radio, self, self.settings.leans)
+        self.screen.add_live(self.live, self._end_live)
+
+    def _end_live(self):
+        self.live.stop()
+        self.live = None
+
     def run(self):
         """Loop until Ctrl-C, LOOP_US a turn."""
         try:
@@ -77,6 +108,8 @@ class App:
         except KeyboardInterrupt:
             port.rest_watchdog()  # not fed from here on; comes first, because a second Ctrl-C may interrupt the rest
             self.rides.stop()
+            if self.live:
+                self._end_live()
             raise
 
     def _loop(self):
@@ -96,6 +129,8 @@ class App:
                 gc.collect()
                 fill_gaps(SINGLE_GAPS)
                 turns = port.turns_to_collect(most)
+                if self.user:
+                    self.user.check_memory()
             if watchdog:
                 watchdog.feed()
             due_us = ticks_add(due_us, LOOP_US)
@@ -124,12 +159,19 @@ class App:
             self.clock.emptied(now_us)
         event = self.button.poll(now_ms)
         if event:
-            self.screen.press(event, now_ms)
+            self._press(event, now_ms)
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self._show(now_ms)
         self.lcd.tick(now_ms)
         if self.rides.recorder.active:  # recording() would cost 20 us
             self.rides.recorder.tick()
+        if self.live:
+            self.live.poll(now_ms)
+
+    def _press(self, event, now_ms):
+        self.screen.press(event, now_ms)
+        if self.user:
+            self.user.press(event)
 
     @property
     def recording(self):
@@ -151,14 +193,17 @@ class App:
         correction."""
         waiting_ms = 1000 * self.sensor.chip.frames_left // self.settings.SAMPLE_HZ
         self.screen.pages.late = ticks_diff(now_ms, self._page_ms) + waiting_ms > LATE_MS
+        self.screen.pages.draws = self.lcd.draws
         self._page_ms = ticks_add(now_ms, PAGE_MS)
         if self.screen.menu:  # a recording that is started there should begin at once
             self.rides.prepare()
         problem = self.rides.recorder.take_problem() or (self.drive and self.drive.speed.take_problem())
+        if self.user:
+            self.user.lean(self.sensor.fault is None and self.screen.pages.trusted)
+            problem = problem or self.user.take_problem()
         if problem:
             self.screen.notify(problem, now_ms)
-        line1, line2 = self.screen.lines(now_ms)
-        self.lcd.show(line1, line2)
+        self.lcd.show(*self.screen.lines(now_ms))
         if not self.screen.wizard:
             self.calibration.keep_trim(now_ms)
 
@@ -174,6 +219,8 @@ class App:
             self.rides.recorder.add(chip.sums, n, dt_us)
         if self.drive:
             self.drive.feed(chip.sums, n, dt_us, now_ms)
+        if self.live and self.live.period_ms:
+            self.live.feed(chip.sums, n)
         if self.screen.wizard:
             self._pass_each(n, now_ms)
 

@@ -16,6 +16,9 @@ incomplete|incomplete firmware ({0}): run kickstand flash
 no-memory|no memory for that ({0}): restart the board
 no-driver|SD card: its driver is not on the board: mpremote mip install sdcard
 no-card|SD card: none that can be used ({0}): check wiring and card, which has to be FAT32; then restart the board
+user-failed|user.py: {0} is left out: {1}
+user-slow|user.py: {0} took {1} ms: samples are lost when it takes 300, and then it is left out
+user-memory|user.py is left out: it leaves too little memory ({0})
 unreadable|config.py cannot be read ({1}{2}): correct it, then kickstand flash --config
 not-allowed|config.py: {0} = {1!r}, but it must be {2}
 no-setting|config.py: {0} is not a setting; see the list in that file
@@ -26,6 +29,9 @@ pin-twice|config.py: a pin is used twice among {1}
 one-i2c|config.py: SENSOR_I2C and LCD_I2C are both {1} on different pins; give each its own
 wrong-code|the machine code for {0}() gives wrong results on this board: slower code runs instead
 needs-speed|config.py: VEHICLE = "car" needs a speed source to be aligned: SPEED = "gps" or "wheel"
+no-radio|LIVE: this board has no Bluetooth in its MicroPython: nothing goes to a phone, the lean goes on
+no-pairing|LIVE_PIN: this board's MicroPython cannot ask for a PIN: nothing goes to a phone; LIVE_PIN = None lets every phone in
+radio-fault|LIVE: the radio does not start ({0}): nothing goes to a phone, the lean goes on
 no-such-pin|config.py: {0} = {1} is no pin of this board ({2})
 i2c-pins|config.py: {1}_SDA = {2} and {1}_SCL = {3} do not belong to I2C {4} ({5})
 uart-pins|config.py: GPS_TX = {1} and GPS_RX = {2} do not belong to UART {3} ({4})

@@ -98,6 +98,10 @@ class CardError(Refusal):
     """No SD card that can be written, or no driver for it."""
 
 
+class LiveError(Refusal):
+    """Why nothing goes to a phone."""
+
+
 class SettingsError(Refusal):
     """A value in config.py that cannot be used. values[0]: the name of the setting.
 

@@ -7,7 +7,7 @@ import sys
 from io import StringIO
 
 from .board import port
-from .board.hd44780 import ADDRESSES
+from .board.display import ADDRESSES, KINDS, LCD_HZ, OLED_HZ
 from .errors import SettingsError
 from .imu.mpu6050 import ACCEL_LSB_PER_G, GYRO_LSB_PER_DPS, MIN_DLPF
 
@@ -62,11 +62,16 @@ _TABLE = {
     "SENSOR_ADDRESS": (0x68, _one_of(0x68, 0x69)),
     "SENSOR_I2C": (0, _one_of(0, 1)),
     "SENSOR_BUS_HZ": (400_000, _whole(100_000, 400_000)),
+    "DISPLAY": ("auto", _one_of(*KINDS)),
+    "OLED_CONTRAST": (255, _whole(0, 255)),
+    "OLED_INVERTED": (False, _one_of(True, False)),
     "LCD_ADDRESSES": (ADDRESSES, (_addresses, "I2C addresses as (0x27, 0x3F)")),
     "LCD_I2C": (1, _one_of(0, 1)),
-    "LCD_BUS_HZ": (100_000, _whole(100_000, 400_000)),
+    "LCD_BUS_HZ": (None, _or_none(_whole(100_000, 400_000))),
     "WATCHDOG": (True, _one_of(True, False)),
     "RECORD": (False, _one_of(True, False)),
+    "LIVE": (False, _one_of(True, False)),
+    "LIVE_PIN": (None, _or_none(_whole(100_000, 999_999))),
     "SD_SPI": (None, _or_none(_one_of(*port.SD_SPI))),
     "VEHICLE": ("motorcycle", _one_of("motorcycle", "car")),
     "SPEED": (None, _one_of(None, "gps", "wheel")),
@@ -131,9 +136,10 @@ class Settings:
                 setattr(self, name, value)
         self.leans = self.VEHICLE == "motorcycle"
         self.one_bus = (self.SENSOR_SDA, self.SENSOR_SCL) == (self.LCD_SDA, self.LCD_SCL) != (None, None)
-        if self.one_bus:  # the display's PCF8574 is made for 100 kHz, and sets the speed of a bus that it shares
+        if self.one_bus:  # a PCF8574 is made for 100 kHz, and sets the speed of a bus that it shares
             self.LCD_I2C = self.SENSOR_I2C
-            self.SENSOR_BUS_HZ = self.LCD_BUS_HZ = min(self.SENSOR_BUS_HZ, self.LCD_BUS_HZ)
+            lcd_hz = self.LCD_BUS_HZ or (OLED_HZ if self.DISPLAY in ("ssd1306", "sh1106") else LCD_HZ)
+            self.SENSOR_BUS_HZ = self.LCD_BUS_HZ = min(self.SENSOR_BUS_HZ, lcd_hz)
         try:
             if refusal:
                 raise refusal

@@ -83,7 +83,11 @@ def _sensor(sensor, settings):
 def _display(lcd):
     lcd.show("Kickstand", "status: console")
     lcd.flush()
-    found = "at %s" % hex(lcd.address) if lcd.address else "none answers: check wiring and LCD_ADDRESSES"
+    found = (
+        "%s at %s" % ("OLED" if lcd.draws else "LCD", hex(lcd.address))
+        if lcd.address
+        else "none answers: check wiring and LCD_ADDRESSES"
+    )
     _print("Display", "%s", found)
 
 

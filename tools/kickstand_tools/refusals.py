@@ -67,7 +67,7 @@ _SENTENCES = {
     "{phone_otherwise}",
     "phone-upside-down": "for a phone mounted {0} all accelerations have the opposite sign: " + _AT_REST,
     "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
-    "import-speed-unit": "{0} has no unit, and the positions do not tell it, so the speed is left out: {speed_unit}",
+    "import-speed-unit": "{0} has no unit, and the positions do not show it, so the speed is left out: {speed_unit}",
     "import-sign": "which sign accelerations have in {0} is not certain, and no track with turns shows it: "
     + _AT_REST
     + ", else the ride is mirrored and {sign}",
@@ -147,7 +147,7 @@ def _frozen(stretches: int, seconds: float, begin_s: float, end_s: float) -> str
     line = f"the readings froze from {begin_s:.1f} to {end_s:.1f} s"
     if stretches > 1:
         line += f" and {stretches - 1} times more, {seconds:.1f} s in all"
-    return line + ": they are not believed, and the lean begins anew after each"
+    return line + ": they are left out, and the lean begins anew after each"
 
 
 def _speed_unit(factor: float) -> str:

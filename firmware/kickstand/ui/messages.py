@@ -39,6 +39,10 @@ sensor-silent|Sensor silent|starting again
 sensor-reset|Sensor reset|starting again
 readings-lost|Readings lost|board too busy
 
+no-radio|No Bluetooth|on this board
+no-pairing|LIVE_PIN: not|on this board
+radio-fault|Bluetooth fault|restart it
+
 gps-silent|GPS silent|check wiring
 gps-garbled|GPS garbled|check GPS_BAUD
 gps-no-fix|GPS: no fix|needs open sky
@@ -53,6 +57,10 @@ out-of-room|Rec. stopped|no room
 flash-fault|Rec. stopped|flash fault
 card-fault|Rec. stopped|card fault
 usb-fault|Rec. stopped|USB not read
+
+user-failed|user.py {0}|{1}
+user-slow|user.py {0}|slow: {1} ms
+user-memory|user.py left out|no memory
 
 unreadable|config.py:|cannot be read
 no-setting|config.py: what?|{0}

@@ -116,7 +116,7 @@ class Screen:
         self.pages = PageRing(settings.leans, meter, calibration, drive, rides, self._align_now)
 
     def lines(self, now_ms):
-        """The two lines for the display. Call it about every 100 ms."""
+        """What the display should show now: two lines and, where it draws, a picture. Call it about every 100 ms."""
         return self._update_front(now_ms)[1]
 
     def press(self, event, now_ms):
@@ -141,9 +141,10 @@ class Screen:
             self._open_menu(now_ms)
         self._drop_ended()
 
-    def add_page(self, page):
-        """Add a page behind the others. page: a function of the meter that returns two lines of 16 characters."""
-        self.pages.add(page)
+    def add_live(self, live, end):
+        """Show a Live on a page, and let the menu end it by calling end()."""
+        self.pages.live = live
+        self._end_live = end
 
     def interrupt(self, now_ms):
         """Cancel a calibration under way, because the sensor has failed."""
@@ -181,9 +182,11 @@ class Screen:
         drive = (("Align by drive", self._align_by_drive),) if self._drive else ()
         rest = (("Six positions", self._six), ("Reset maxima", self._reset), ("Sensor info", self._info.show))
         record = ("Stop recording", self._stop) if self._rides.recorder.active else ("Record ride", self._record)
+        last = (record,) + ((("Own pages", self.pages.show_own),) if self.pages.own else ())
+        last += (("Stop Bluetooth", self._stop_live),) if self.pages.live else ()
         if self._settings.leans:
-            return align + rest + drive + (record,)
-        return drive + rest + (record,)
+            return align + rest + drive + last
+        return drive + rest + last
 
     def _ready(self, now_ms):
         """True if there are readings; if not, show a notice that says why."""
@@ -234,6 +237,11 @@ class Screen:
                 self.notify(problem, now_ms)
             elif self._rides.recorder.active:
                 self._notice.show(pages.recording(self._rides.recorder), now_ms)
+
+    def _stop_live(self, now_ms):
+        self.pages.live = None
+        self._end_live()
+        self._notice.show(("Bluetooth is off", "until restart"), now_ms)
 
     def _stop(self, now_ms):
         self._rides.stop()

@@ -22,8 +22,8 @@ from .channels import Channels, channels
 
 @dataclass
 class Ride:
-    """A log and its calibration. smoothed: the lean is the smoothed one (see estimation/smooth.py), not the one that
-    the display showed."""
+    """A log and the calibration it is read with. smoothed: its lean is the smoothed one, and not the one that the
+    display showed."""
 
     log: Source
     calibration: CalibrationFile

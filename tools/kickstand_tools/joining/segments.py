@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..logs.table import Array, Table
-from .course import Course
+from .track import Course
 
 STEPS = 30  # most steps of a segment
 _FEWEST = 8  # least number of steps of a segment

@@ -1,6 +1,7 @@
 """Builds a ride of what riders do: set off, ride straight on, turn, stop."""
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from math import atan, degrees, radians, tan
 
 import numpy as np
@@ -9,6 +10,7 @@ from kickstand.units import STANDARD_GRAVITY
 from .commands import Leg
 from .physics.road import CLASS_B
 
+_SHORTEST_S = 3.0  # least duration of a leg that is shortened
 _CLOSING_S = 45.0  # time for the straight and the stop at the end of every ride
 
 
@@ -16,7 +18,8 @@ _CLOSING_S = 45.0  # time for the straight and the stop at the end of every ride
 class Conditions:
     """Road, engine, weather and sensor of a ride. The defaults are those of an ordinary day.
 
-    bumps: (phase, spacing m, height m, length m): bumps in the road wherever the ride is in that phase.
+    slip_deg: rms of the angle between where the bike points and where it goes. bumps: (phase, spacing m, height m,
+    length m): bumps in the road wherever the ride is in that phase.
     """
 
     roughness: float = CLASS_B  # see road.CLASS_A, m3
@@ -25,6 +28,7 @@ class Conditions:
     unrest_deg: float = 0.4  # rms of the lean's random changes at speed
     gust_mps2: float = 0.0  # rms of the crosswind's changes
     sway_m: float = 0.0  # rms of the centre of mass moving from side to side
+    slip_deg: float = 0.0  # rms of the tyres' side slip
     start_c: float = 22.0  # temperature of the chip at power-on
     rise_c: float = 7.0  # how far it warms up, most of it within 10 to 15 minutes
     drift: float = 1.0  # factor on an ordinary sensor's change of the biases with temperature
@@ -53,6 +57,17 @@ class Plan:
     def seconds(self) -> float:
         """Duration of the legs so far."""
         return self._seconds
+
+    def fit(self, seconds: float) -> None:
+        """Make the ride so long, by the longest of the legs at one speed; each of them keeps _SHORTEST_S, which may
+        leave a ride that is longer."""
+        steady = [leg for before, leg in pairwise(self.legs) if leg.speed_mps in (None, before.speed_mps)]
+        while steady and (over := sum(leg.seconds for leg in self.legs) - seconds):
+            longest = max(steady, key=lambda leg: leg.seconds)
+            cut = min(over, longest.seconds - _SHORTEST_S)
+            longest.seconds -= cut
+            if abs(over - cut) < 1e-6 or longest.seconds <= _SHORTEST_S:
+                break
 
     def uniform(self, low: float, high: float) -> float:
         return float(self.chance.uniform(low, high))
