@@ -113,5 +113,5 @@ def _has_moved(ride: Channels) -> bool:
 
 
 def _changes(means: Array) -> float:
-    """By how much they differ from the usual one, at most: that is a gyro's bias, or the slope of the ground."""
+    """The largest difference of means from their median: that is a gyro's bias, or the slope of the ground."""
     return float(np.max(np.abs(means - np.median(means))))

@@ -161,7 +161,7 @@ def _no_text(path: Path) -> list[RecordingFile]:
 
 
 def _recording_file(name: str, content: bytes) -> RecordingFile | None:
-    """None for what is no text."""
+    """The Piece of a file; None if it is no text."""
     if content.startswith(b"PAR1"):
         return RecordingFile(name, content, "")
     text = _decoded(content)

@@ -137,7 +137,7 @@ def _recording(
 
 
 def recordings(files: list[RecordingFile]) -> list[tuple[Any, list[RecordingFile]]]:
-    """The recordings among some files: each with its module in apps/, whose NAME is the app's."""
+    """The recordings among some files: (module in apps/, its files) of each; the module's NAME is the app's."""
     found, left = [], files
     for app in _APPS:
         for group in app.finds(left):

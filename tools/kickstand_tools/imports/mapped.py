@@ -107,7 +107,7 @@ def _seems_in(column: str, kinds: Mapping[str, float], usual: str) -> str:
 
 
 def unknown(files: list[RecordingFile], source: str) -> InputError:
-    """For a file that no app is known for: what is missing in it, its columns, and the line to type."""
+    """The error for a file of an unknown app: missing columns, its columns, and the command line to type."""
     table = table_in(files)
     if table is None:
         shown = next((line for file in files for line in file.first_lines(1)), "")[:60]

@@ -11,8 +11,8 @@ from ..signals.geography import distance_m
 LONGEST_S = 6.0  # between two points of one course: watches write one so rarely on straights
 SLOWEST_MPS = 2.5  # of a step that is more than the positions' errors
 FASTEST_MPS = 100.0  # a quicker step is a jump of the receiver
-STEP_ERROR_M = 1.0  # of a step's length across it (1 sigma), as phones' receivers err from one second to the next
-COURSE_ERROR_DEG = 4.0  # of the rest: yaw by a gyro whose scale factor is off, and how positions are smoothed
+STEP_ERROR_M = 1.0  # 1 sigma of a step across its direction: phones' receivers err so from one second to the next
+COURSE_ERROR_DEG = 4.0  # 1 sigma of other errors: the gyro's scale factor, and how positions are smoothed
 _OFTEN_S = 0.7
 _AROUND = 2  # number of points before and after from which a speed is computed
 
@@ -63,9 +63,10 @@ class Track(Table):
 class Course:
     """m steps between the m + 1 points of a track.
 
-    begin_s, end_s (m): of each step, s since the track's first point. course_deg (m): to the left of east, of a step
-    that is good. sigma_deg (m): its standard deviation. speed_mps (m): length by time. good (m): neither too slow, nor
-    a gap or a jump. turn_deg (m): to the left against the step before; 0 unless both are good.
+    begin_s, end_s (m): times of each step, s since the track's first point. course_deg (m): its direction, > 0 to the
+    left of east, if it is good. sigma_deg (m): standard deviation of that. speed_mps (m): its length over its duration.
+    good (m): True if it is neither too slow, nor a gap or a jump. turn_deg (m): change of the course against the step
+    before, > 0 to the left; 0 unless both are good.
     """
 
     begin_s: Array
@@ -78,7 +79,7 @@ class Course:
 
 
 def course(track: Track) -> Course:
-    """Of a track of at least two points."""
+    """The Course of a track of at least two points."""
     since_s = track.utc_s - track.utc_s[0]
     east, north = track.steps_m()
     step_s, length_m = np.diff(since_s), np.hypot(east, north)

@@ -44,7 +44,7 @@ class TransferFault:
         return None
 
     def on_read(self, value):
-        """What arrives of a byte that a device sends."""
+        """The byte that arrives when a device sends value."""
         number = self._count
         self._count += 1
         return value ^ self.mask if self.kind == "corrupt" and number == self._byte else value

@@ -28,7 +28,7 @@ def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 
 def read(files: list[RecordingFile], name: str) -> Recording:
-    """Raises InputError for a replay's output, which does not hold all that was measured."""
+    """Read a recording. Raises InputError for a replay's output, which does not contain all readings."""
     sheet = _sheet(files[0])
     time_ns = sheet.times(sheet.columns.index("t_s"))
     log, no_log = sheet.axes(*COLUMNS[1:])

@@ -27,7 +27,8 @@ def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 
 def read(files: list[RecordingFile], name: str, speed_unit: str = "") -> Recording:
-    """Raises InputError for what is missing. speed_unit: of the column Speed, "" to find it from the positions."""
+    """Read a recording. Raises InputError for a missing column. speed_unit: unit of the column Speed, "" to find it by
+    the positions."""
     sheet = read_sheet(files[0], _header(files[0]) or 0)
     places, missing = sheet.axes(*_AXES)
     if {"GForceY", "GForceZ"} & set(missing):

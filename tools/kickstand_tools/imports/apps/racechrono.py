@@ -23,7 +23,7 @@ def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 
 def read(files: list[RecordingFile], name: str) -> Recording:
-    """Raises InputError for what is missing."""
+    """Read a recording. Raises InputError for a missing column or sensor."""
     lines = files[0].text.split("\n", 60)[:60]  # blank ones among them: their numbers count
     header = next((k for k, line in enumerate(lines) if _is_header(line)), None)
     if header is None:

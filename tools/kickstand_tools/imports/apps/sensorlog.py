@@ -30,7 +30,7 @@ def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 
 def read(files: list[RecordingFile], name: str) -> Recording:
-    """Raises InputError for what is missing."""
+    """Read a recording. Raises InputError for a missing column or sensor."""
     sheet = read_sheet(files[0])
     places = {kind: _places(sheet, names) for kind, (_, names) in _KINDS.items()}
 
