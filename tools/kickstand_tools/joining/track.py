@@ -62,14 +62,13 @@ class Track(Table):
 class Course:
     """m steps between the m + 1 points of a track.
 
-    begin_s, end_s (m): of each step, s since the track's first point. course_deg (m): to the left of east, of a step
-    that is good. sigma_deg (m): its standard deviation. speed_mps (m): length by time. good (m): neither too slow, nor
-    a gap or a jump. turn_deg (m): to the left against the step before; 0 unless both are good.
+    begin_s, end_s (m): of each step, s since the track's first point. sigma_deg (m): standard deviation of the course of
+    a step that is good. speed_mps (m): length by time. good (m): neither too slow, nor a gap or a jump. turn_deg (m):
+    to the left against the step before; 0 unless both are good.
     """
 
     begin_s: Array
     end_s: Array
-    course_deg: Array
     sigma_deg: Array
     speed_mps: Array
     good: NDArray[np.bool_]
@@ -87,4 +86,4 @@ def course(track: Track) -> Course:
     turn = (np.diff(direction, prepend=direction[:1]) + 180.0) % 360.0 - 180.0
     both = good & np.append(False, good[:-1])
     sigma = np.hypot(np.degrees(STEP_ERROR_M / np.maximum(length_m, 0.1)), COURSE_ERROR_DEG)
-    return Course(since_s[:-1], since_s[1:], direction, sigma, speed, good, np.where(both, turn, 0.0))
+    return Course(since_s[:-1], since_s[1:], sigma, speed, good, np.where(both, turn, 0.0))

@@ -28,7 +28,6 @@ class Block:
     readings: Array
     speed_mps: Array
     has_temp: bool
-    has_speed: bool
     start_s: float
     done: int  # bytes of the file so far, as it is packed; of a log in memory, samples
     lines: list[str] = field(default_factory=list)  # the rows as CSV, none for a log in memory
