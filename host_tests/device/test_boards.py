@@ -11,7 +11,7 @@ from kickstand_tools.simulated_board.simulator import Board
 
 PINS = {"SENSOR_SDA": 4, "SENSOR_SCL": 5, "LCD_SDA": 6, "LCD_SCL": 7, "BUTTON_PIN": 10}
 WIRED = {"sensor_pins": [4, 5], "lcd_pins": [6, 7], "button_pin": 10}
-WITH_PINS = ["pico", "pico w", "pico 2", "pico lipo", "esp32", "esp32 spiram", "esp32 unicore"]
+WITH_PINS = ["pico", "pico w", "pico 2", "pico 2 w", "pico lipo", "esp32", "esp32 spiram", "esp32 unicore"]
 WITHOUT = sorted(set(chips.MACHINES) - set(WITH_PINS))
 LEANING = [[0, 25]]
 SENSOR, LCD = 0x68, 0x27

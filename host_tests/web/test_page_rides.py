@@ -1,6 +1,7 @@
 """Rides given to the page: what it shows is what the commands say, and no file leaves it."""
 
 import json
+import re
 from pathlib import Path
 
 import analysis_rides
@@ -93,12 +94,29 @@ def test_too_little_of_a_ride_is_said_at_its_top(page, calibration, tmp_path):
 def test_the_charts_follow_the_dark(page, ride, calibration):
     page.give(ride, calibration)
     chart = page.page.frame_locator("#plot").locator("#chart")
-    for scheme, filtered, paper in (("dark", True, "rgb(26, 26, 26)"), ("light", False, "rgb(255, 255, 255)")):
+    for scheme, filtered, paper in (("dark", True, "rgb(26, 29, 36)"), ("light", False, "rgb(255, 255, 255)")):
         page.page.emulate_media(color_scheme=scheme)
         shown = chart.evaluate(
             "(chart) => [getComputedStyle(chart).filter, getComputedStyle(chart.ownerDocument.body).backgroundColor]"
         )
         assert (shown[0] != "none", shown[1]) == (filtered, paper)
+
+
+def test_what_is_pointed_at_is_said_in_one_line(page, ride, calibration):
+    """And of the many buttons of the charts' library two are left."""
+    page.give(ride, calibration)
+    inside = page.page.frame_locator("#plot")
+    inside.locator("#chart .main-svg").first.wait_for()
+    assert inside.locator("#chart .modebar-btn").count() == 2
+    page.page.locator("#plot").scroll_into_view_if_needed()
+    lean = inside.locator("#chart .nsewdrag").first.bounding_box()
+    for share in (0.3, 0.5, 0.7):
+        for height in (0.3, 0.4, 0.5, 0.6, 0.7):
+            page.page.mouse.move(lean["x"] + share * lean["width"], lean["y"] + height * lean["height"])
+            page.page.wait_for_timeout(60)
+            if re.fullmatch(r"0:\d\d, \d+°( left| right)?", inside.locator("#tip").text_content() or ""):
+                return
+    raise AssertionError("nothing is said")
 
 
 def test_once_used_it_works_without_a_network(chromium, address, ride, calibration):

@@ -52,7 +52,8 @@ _SENTENCES = {
     "cut-line": "line {0}, the last one, was cut: it is left out",
     "times-spread": "the times are rounded ({0} of {1} repeat the one before): they are spread evenly, by up to "
     "{2:.3f} s",
-    "smooth-slow": "too few samples a second to look back over: where the log has under 10, the lean is the display's",
+    "smooth-slow": "the smoothed lean needs 10 samples a second: where the log has fewer, the lean is the one that the "
+    "display showed",
     "ride-short": "only {0:.0f} s of riding: at least {1:.0f} s with bends are needed",
     "no-bends": "it hardly leans ({0:.1f} degrees rms): a motorcycle's ride with bends to both sides is needed",
     "not-leaning": "in bends it is pushed aside and does not lean, as a car: {align_car}",

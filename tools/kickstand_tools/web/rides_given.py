@@ -1,4 +1,4 @@
-"""What the files that were given to the page Rides are: logs, recordings of an app, tables, calibrations."""
+"""What the files that were given to the page Rides are: logs, recordings of an app, tables, calibrations, tracks."""
 
 import re
 import zipfile
@@ -11,17 +11,19 @@ from ..errors import InputError
 from ..imports import mapped
 from ..imports.files import RecordingFile, read_files
 from ..imports.importing import recordings
+from ..joining.track_files import read_track
 from ..logs.reader import check_first_line
 
 
 @dataclass
 class GivenRide:
     """log: a file, or a folder of files that are one recording. files: all that belong to it. table: what is to be
-    asked about it, None if it is known."""
+    asked about it, None if it is known. track: a .gpx to be joined with it, or ""."""
 
     log: str
     files: list[str]
     calibration: str = ""
+    track: str = ""
     table: mapped.Table | None = None
 
 
@@ -37,9 +39,10 @@ class Given:
 def sorted_out(names: list[str]) -> Given:
     """What these files of the working directory are; they are named in the order in which they were given.
 
-    A ride has the calibration beside it, or else the last one given that is beside no other ride.
+    A ride has the calibration beside it, or else the last one given that is beside no other ride; and the last track.
     """
     found, loose = Given(), []
+    track = ""
     calibrations = []
     for name in names:
         try:
@@ -47,6 +50,9 @@ def sorted_out(names: list[str]) -> Given:
                 read_calibration(Path(name))
                 calibrations.append(name)
                 found.kinds[name] = "calibration"
+            elif name.lower().endswith(".gpx"):
+                read_track(Path(name))
+                track, found.kinds[name] = name, "track"
             elif _is_log(name):
                 found.rides.append(GivenRide(name, [name]))
                 found.kinds[name] = "log"
@@ -67,6 +73,7 @@ def sorted_out(names: list[str]) -> Given:
     free = [name for name in calibrations if name not in beside.values()]
     for ride in found.rides:
         ride.calibration = beside[ride.log] if beside[ride.log] in calibrations else next(reversed(free), "")
+        ride.track = track
     return found
 
 
