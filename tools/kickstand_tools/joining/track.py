@@ -62,9 +62,9 @@ class Track(Table):
 class Course:
     """m steps between the m + 1 points of a track.
 
-    begin_s, end_s (m): of each step, s since the track's first point. sigma_deg (m): standard deviation of the course of
-    a step that is good. speed_mps (m): length by time. good (m): neither too slow, nor a gap or a jump. turn_deg (m):
-    to the left against the step before; 0 unless both are good.
+    begin_s, end_s (m): of each step, s since the track's first point. sigma_deg (m): standard deviation of the course
+    of a step that is good. speed_mps (m): length by time. good (m): neither too slow, nor a gap or a jump.
+    turn_deg (m): to the left against the step before; 0 unless both are good.
     """
 
     begin_s: Array
