@@ -15,6 +15,7 @@ from .board import port
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
 from .devices import open_button
+from .errors import Refusal
 from .imu.sensor import SampleClock
 from .lean.meter import LeanMeter
 from .rides.recording import Recording
@@ -43,11 +44,12 @@ def fill_gaps(n):
 class App:
     """The lean meter on a board.
 
-    settings: a Settings. lcd, sensor: of devices.open_lcd() and open_sensor(). keeper: as for Recording. Raises
-    SettingsError for pins that cannot be used.
+    settings: a Settings. lcd, sensor: of devices.open_lcd() and open_sensor(). keeper: as for Recording. radio: a Radio
+    for a phone, or None; a LiveError if there should be one and is none. Raises SettingsError for pins that cannot be
+    used.
     """
 
-    def __init__(self, settings, lcd, sensor, keeper=None):
+    def __init__(self, settings, lcd, sensor, keeper=None, radio=None):
         self.settings = settings
         self.lcd = lcd
         self.button = open_button(settings)
@@ -60,6 +62,9 @@ class App:
         self.screen = Screen(settings, sensor, self.clock, self.meter, self.calibration, self.drive, self.rides)
         self._restarts = 0
         self._page_ms = ticks_ms()
+        self.live = None
+        if radio:
+            self._open_live(radio)
 
     def _open_drive(self):
         # 30 KB of heap with all that they import: not for a board without a speed source
@@ -68,6 +73,19 @@ class App:
 
         return BackgroundAlignment(self.settings.leans, open_speed(self.settings), self.meter, self.calibration)
 
+    def _open_live(self, radio):
+        if isinstance(radio, Refusal):
+            self.screen.notify(radio, ticks_ms())
+            return
+        from .live.live import Live
+
+        self.live = Live(radio, self, self.settings.leans)
+        self.screen.add_live(self.live, self._end_live)
+
+    def _end_live(self):
+        self.live.stop()
+        self.live = None
+
     def run(self):
         """Loop until Ctrl-C, LOOP_US a turn."""
         try:
@@ -75,6 +93,8 @@ class App:
         except KeyboardInterrupt:
             port.rest_watchdog()  # nothing feeds it from here on; first, for a second Ctrl-C may interrupt what follows
             self.rides.stop()
+            if self.live:
+                self._end_live()
             raise
 
     def _loop(self):
@@ -128,6 +148,8 @@ class App:
         self.lcd.tick(now_ms)
         if self.rides.recorder.active:  # recording() would cost 20 us
             self.rides.recorder.tick()
+        if self.live:
+            self.live.poll(now_ms)
 
     @property
     def recording(self):
@@ -171,6 +193,8 @@ class App:
             self.rides.recorder.add(chip.sums, n, dt_us)
         if self.drive:
             self.drive.feed(chip.sums, n, dt_us, now_ms)
+        if self.live and self.live.period_ms:
+            self.live.feed(chip.sums, n)
         if self.screen.wizard:
             self._pass_each(n, now_ms)
 

@@ -26,6 +26,9 @@ pin-twice|config.py: a pin is used twice among {1}
 one-i2c|config.py: SENSOR_I2C and LCD_I2C are both {1} on different pins; give each its own
 wrong-code|the machine code for {0}() gives wrong results on this board: slower code runs instead
 needs-speed|config.py: VEHICLE = "car" needs a speed source to be aligned: SPEED = "gps" or "wheel"
+no-radio|LIVE: this board has no Bluetooth in its MicroPython: nothing goes to a phone, the lean goes on
+no-pairing|LIVE_PIN: this board's MicroPython cannot ask for a PIN: nothing goes to a phone; LIVE_PIN = None lets every phone in
+radio-fault|LIVE: the radio does not start ({0}): nothing goes to a phone, the lean goes on
 no-such-pin|config.py: {0} = {1} is no pin of this board ({2})
 i2c-pins|config.py: {1}_SDA = {2} and {1}_SCL = {3} do not belong to I2C {4} ({5})
 uart-pins|config.py: GPS_TX = {1} and GPS_RX = {2} do not belong to UART {3} ({4})

@@ -67,6 +67,8 @@ _TABLE = {
     "LCD_BUS_HZ": (100_000, _whole(100_000, 400_000)),
     "WATCHDOG": (True, _one_of(True, False)),
     "RECORD": (False, _one_of(True, False)),
+    "LIVE": (False, _one_of(True, False)),
+    "LIVE_PIN": (None, _or_none(_whole(100_000, 999_999))),
     "SD_SPI": (None, _or_none(_one_of(*port.SD_SPI))),
     "VEHICLE": ("motorcycle", _one_of("motorcycle", "car")),
     "SPEED": (None, _one_of(None, "gps", "wheel")),

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from checked import cells_of, words
 from kickstand.units import STANDARD_GRAVITY
-from kickstand_tools.checks.speed import speed_unit
+from kickstand_tools.checks.units import speed_unit
 from kickstand_tools.errors import InputError
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.log import Log

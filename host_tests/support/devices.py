@@ -37,6 +37,7 @@ class Record:
         self.touched = answer["touched"]
         self.rides = answer.get("rides")  # on the SD card: {path: content}
         self.card_hz = answer.get("card_hz")
+        self.phones = answer.get("phones", [])
         self.console = console
 
     def at(self, t_s):

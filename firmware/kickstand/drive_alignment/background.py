@@ -89,6 +89,11 @@ class BackgroundAlignment:
             self._look(now_ms)
         return speed
 
+    def fresh_speed(self, now_ms):
+        """The speed measured last (m/s), or None if that was long ago."""
+        fresh = self._speed_ms is not None and ticks_diff(now_ms, self._speed_ms) < FRESH_MS
+        return self._speed_mps if fresh else None
+
     def _share(self, speed):
         """Give the lean filter a speed (m/s) that it can rely on. Returns that speed, rounded as a recording keeps it,
         or None if it was not given.
@@ -131,8 +136,7 @@ class BackgroundAlignment:
         if self._away():
             self.message = None
             return
-        fresh = self._speed_ms is not None and ticks_diff(now_ms, self._speed_ms) < FRESH_MS
-        if not (fresh and self.drive.standing.standing) or self.message:
+        if self.fresh_speed(now_ms) is None or not self.drive.standing.standing or self.message:
             return
         drive, aligned = self.drive, self._meter.calibration.aligned
         if drive.problem is not None:

@@ -39,6 +39,10 @@ sensor-silent|Sensor silent|starting again
 sensor-reset|Sensor reset|starting again
 readings-lost|Readings lost|board too busy
 
+no-radio|No Bluetooth|on this board
+no-pairing|LIVE_PIN: not|on this board
+radio-fault|Bluetooth fault|restart it
+
 gps-silent|GPS silent|check wiring
 gps-garbled|GPS garbled|check GPS_BAUD
 gps-no-fix|GPS: no fix|needs open sky

@@ -14,7 +14,7 @@ class PageRing:
     LeanMeter, the ActiveCalibration, the BackgroundAlignment or None, and the Recording, all to be read only. align:
     called for a short press while there is no alignment: it means that the bike is on its kickstand.
 
-    late: the page that is due is to show no lean.
+    late: the page that is due is to show no lean. live: a Live, which has a page then, or None.
     """
 
     def __init__(self, leans, meter, calibration, drive, rides, align):
@@ -26,6 +26,7 @@ class PageRing:
         self._pages = MOTORCYCLE if leans else CAR
         self._at = 0
         self.late = False
+        self.live = None
 
     def add(self, page):
         """Add a page behind the others."""
@@ -65,12 +66,15 @@ class PageRing:
             if self._at % 2 == 0:
                 return self._drive_lines(now_ms)
             return pages.not_aligned(self._meter, now_ms // 1000, "drive and brake")
-        count = len(self._pages) + self._driving + self._rides.recorder.active
+        more = len(self._pages) + self._driving
+        count = more + (self.live is not None) + self._rides.recorder.active
         if self._at >= count:  # the last page has gone; checked here, so that the other pages keep their places
             self._at = 0
         if self._at == len(self._pages) and self._driving:
             return self._drive_lines(now_ms)
-        if self._at >= len(self._pages):
+        if self._at == more and self.live:
+            return pages.live(self.live)
+        if self._at >= more:
             return pages.recording(self._rides.recorder)
         return self._page(self._pages[self._at])
 

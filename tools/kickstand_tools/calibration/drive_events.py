@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from kickstand.drive_alignment.alignment import DriveAlignment
 from kickstand.errors import Refusal
 
-from .published.viriciti import PublishedAlignment
+from .published import PublishedAlignment
 
 # DriveEvent.what
 LOG_BEGINS = "log-begins"

@@ -10,7 +10,7 @@ from .bends import bends
 from .cells import CellTable, LogCells
 from .course import course_agrees
 from .handedness import handedness
-from .speed import speed_unit
+from .units import speed_unit
 
 if TYPE_CHECKING:
     from ..calibration.file import CalibrationFile

@@ -260,9 +260,8 @@ def _stop_row(stop: Stop, log: Log) -> Row:
 
 
 def _utc_s(log: Log, at_s: float) -> float | None:
-    """Universal Time at at_s in the log: the median of what its rows say, because some come late."""
-    starts = (log.utc_s - log.t_s)[np.isfinite(log.utc_s)]
-    return float(np.median(starts)) + at_s if len(starts) else None
+    """Universal Time at at_s in the log; None where it has none."""
+    return None if log.start_utc_s is None else log.start_utc_s + at_s
 
 
 def _picture(drive: _Drive) -> list[list[float]]:

@@ -4,8 +4,6 @@ The texts are those of Python's own formatting, made of a column at once instead
 seventh of the time.
 """
 
-import csv
-import gzip
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -14,7 +12,7 @@ import numpy as np
 from kickstand.errors import Notice
 from numpy.typing import NDArray
 
-from ..output import write_whole
+from ..output import write_packed
 from .cells import COLUMNS, OPTIONAL
 from .log import Log
 from .reader import read_blocks
@@ -87,18 +85,9 @@ def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, room: 
     return letters
 
 
-def write_lines(path: Path, names: Sequence[str], pieces: Iterable[bytes]) -> None:
-    """Write a CSV file from its columns' names and its lines, gzipped if its name ends in .gz, whole or not at all.
-
-    Raises InputError."""
-
-    def write(temporary: Path) -> None:
-        opened = gzip.open if path.suffix == ".gz" else open
-        with opened(temporary, "wb") as file:
-            file.write((",".join(names) + "\n").encode())
-            file.writelines(pieces)
-
-    write_whole(path, write)
+def write_lines(path: Path, names: Sequence[str], lines: Iterable[bytes]) -> None:
+    """Write a CSV file from its columns' names and its lines, as write_packed() does. Raises InputError."""
+    write_packed(path, itertools.chain([(",".join(names) + "\n").encode()], lines))
 
 
 def write_log(path: Path | str, log: Log) -> None:
@@ -155,13 +144,5 @@ def cut_log(
 
 
 def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Write a CSV file, gzipped if its name ends in .gz, whole or not at all."""
-
-    def write(temporary: Path) -> None:
-        opened = gzip.open if path.suffix == ".gz" else open
-        with opened(temporary, "wt", encoding="ascii", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(columns)
-            writer.writerows(rows)
-
-    write_whole(path, write)
+    """Write a CSV file of texts and numbers that need no quotation marks, as write_lines() does. Raises InputError."""
+    write_lines(path, columns, (",".join(map(str, row)).encode("ascii") + b"\n" for row in rows))

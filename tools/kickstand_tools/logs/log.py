@@ -90,6 +90,12 @@ class Log(Table):
         """(n, 7) as from_readings() takes them."""
         return np.column_stack((self.accel_g, self.temperature_c, self.gyro_dps))
 
+    @property
+    def start_utc_s(self) -> float | None:
+        """Universal Time at the first sample: the median of what the rows say, because some come late; None without."""
+        starts = (self.utc_s - self.t_s)[np.isfinite(self.utc_s)]
+        return float(np.median(starts)) if len(starts) else None
+
     def rows(self) -> Iterator[FirmwareRow]:
         """The samples as the firmware takes them."""
         return firmware_rows(self.time_us, self.readings, self.speed_mps)

@@ -29,6 +29,8 @@ def simulate(
     pitch_change_deg: float | None = None,
     share: float = 1.0,
     speed: bool = False,
+    road: str | None = None,
+    mount: str | None = None,
 ) -> Ride:
     """Simulate a ride (see ride.ride) of exactly this length and write it to out_dir. Raises InputError.
 
@@ -39,7 +41,8 @@ def simulate(
     check_profile(profile)
     directory = Path(out_dir)
     check_directory(directory)
-    made = _cut(ride(profile, seed, seconds, upright_error_deg, pitch_change_deg, share, exact=True), seconds)
+    made = ride(profile, seed, seconds, upright_error_deg, pitch_change_deg, share, road, mount, exact=True)
+    made = _cut(made, seconds)
     try:
         directory.mkdir(parents=True, exist_ok=True)
         # It belongs to an earlier ride and another sensor, but report, plot and export would use it for this one

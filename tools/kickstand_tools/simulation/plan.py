@@ -18,7 +18,8 @@ _CLOSING_S = 45.0  # for the straight and the stop at the end of every ride
 class Conditions:
     """Road, engine, weather and sensor of a ride. The defaults are those of an ordinary day.
 
-    bumps: (phase, spacing m, height m, length m): bumps in the road wherever the ride is in that phase.
+    slip_deg: rms of the angle between where the bike points and where it goes. bumps: (phase, spacing m, height m,
+    length m): bumps in the road wherever the ride is in that phase.
     """
 
     roughness: float = CLASS_B  # see road.CLASS_A, m3
@@ -27,6 +28,7 @@ class Conditions:
     unrest_deg: float = 0.4  # rms of the lean's wavering at speed
     gust_mps2: float = 0.0  # rms of the crosswind's changes
     sway_m: float = 0.0  # rms of the centre of mass moving from side to side
+    slip_deg: float = 0.0
     start_c: float = 22.0  # of the chip at power-on
     rise_c: float = 7.0  # how far it warms up, most of it within 10 to 15 minutes
     drift: float = 1.0  # how far the biases change with temperature; an ordinary sensor's is 1

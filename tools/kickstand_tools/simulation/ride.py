@@ -12,12 +12,14 @@ from .physics.bike import Bike, roll, weave
 from .physics.chip import DIVIDER, RATE_HZ, Chip
 from .physics.engine import Engine
 from .physics.kinematics import Motion, body_rates, specific_force
-from .physics.road import Shaking, add_bumps, profile_slope, shaking
+from .physics.mount import MOUNTS, Mount
+from .physics.road import CLASSES, Shaking, add_bumps, profile_slope, shaking
 from .physics.signals import band_noise, second_order, smoothed, smoothstep
 from .plan import Conditions, Plan
 from .profiles import PROFILES
 
 _WARMING_S = 300.0  # time constant of the chip's temperature
+_SLIP_DEG, _CAMBER_DEG, _SWAY_M = 0.3, 1.5, 0.006  # rms, of a ride on a road of --road
 _IMPACT_G = 4.0  # at the end of a fall
 
 
@@ -50,13 +52,17 @@ def ride(
     upright_error_deg: float = 0.0,
     pitch_change_deg: float | None = None,
     share: float = 1.0,
+    road: str | None = None,
+    mount: str | None = None,
     exact: bool = False,
 ) -> Ride:
     """Simulate a ride of about this length; a profile and a seed always give the same one.
 
     upright_error_deg: how far the bike leaned to the right in the upright pose. pitch_change_deg: how much higher the
     nose was on the kickstand than upright; random within 1 degree if None. share: of the sensor's tolerances.
-    exact: of this length, if that is enough for setting off and stopping.
+    road: a class of ISO 8608 in place of the profile's own road; it is cambered, the rider moves about and the bike
+    slips a little. mount: one of MOUNTS in place of a firm one. exact: of this length, if that is enough for setting
+    off and stopping.
 
     >>> made = ride("parked", seed=1, seconds=20.0)
     >>> made.rate_hz, len(made.poses), made.readings.shape == (len(made.time), 7)
@@ -69,7 +75,16 @@ def ride(
         plan.fit(seconds)
     bike, chip = Bike.random(chance), Chip.random(chance, share, conditions.drift)
     mounting = random_rotation(chance)
+    # From a source of its own: without them a profile and a seed give the ride that they always gave
+    more = np.random.default_rng([seed, *profile.encode(), 1])
+    if road is not None:
+        _rough(more, plan, conditions, CLASSES[road])
+    mounted = MOUNTS[mount](more, chip) if mount is not None else Mount(chip)
+    if mounted.rise_c is not None:
+        conditions.rise_c = mounted.rise_c
+    chip = mounted.chip
     command = commands(plan.legs, RATE_HZ)
+    slip = _slip(more, command, conditions)
     motion, extra = _motion(chance, command, bike, conditions)
     # An hour is 29 MB in each column at 1 kHz: what is no longer needed goes, and nothing is a view of it.
     temp = conditions.start_c + conditions.rise_c * (1.0 - np.exp(-command.time / _WARMING_S))
@@ -77,12 +92,16 @@ def ride(
     del command
     force = specific_force(motion, bike)
     force += extra.force
+    force += _sideways(motion.lean, slip)
+    del slip
     force /= STANDARD_GRAVITY
     rates = body_rates(motion)
     rates += extra.rates
     np.degrees(rates, out=rates)
     truth = _truth(motion)
     del motion, extra
+    if mounted.holder is not None:
+        force, rates = mounted.holder.shaken(force, rates, RATE_HZ)
     turned = _creep(chance, len(force), conditions.creep_deg)
     force, rates = _to_sensor(force, mounting, turned), _to_sensor(rates, mounting, turned)
     del turned
@@ -155,6 +174,27 @@ def _motion(
     shaken.force += force + _impact(chance, command)
     shaken.rates += rates
     return motion, shaken
+
+
+def _rough(chance: np.random.Generator, plan: Plan, conditions: Conditions, roughness: float) -> None:
+    """A road as it is: cambered or tilted to either side from leg to leg, ridden by a rider who moves about."""
+    conditions.roughness, conditions.slip_deg = roughness, _SLIP_DEG
+    conditions.sway_m = max(conditions.sway_m, _SWAY_M)
+    for leg in plan.legs:
+        leg.bank_deg = (leg.bank_deg or 0.0) + float(chance.normal(0.0, _CAMBER_DEG))
+
+
+def _slip(chance: np.random.Generator, command: Commands, conditions: Conditions) -> NDArray[np.float64]:
+    """(n) m/s^2 to the left: the tyres give way and grip again, so that the bike does not go quite where it points."""
+    if not conditions.slip_deg:
+        return np.zeros(len(command.time))
+    angle = np.radians(conditions.slip_deg) * band_noise(chance, len(command.time), 0.05, 1.0, command.rate_hz)
+    return np.gradient(angle * command.speed, 1.0 / command.rate_hz)
+
+
+def _sideways(lean: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 3) along left, up, forward of a bike that leans, by level accelerations to the left."""
+    return np.column_stack((left * np.cos(lean), -left * np.sin(lean), np.zeros_like(left)))
 
 
 def _places(command: Commands, phase: str, spacing_m: float) -> list[float]:

@@ -70,7 +70,11 @@ def _traces(trace: Trace) -> list[dict[str, Any]]:
     if isinstance(trace, Line):
         x, y = envelope(trace.x, trace.y, POINTS, trace.gap_s)
         line = {"color": trace.colour, "width": 1.2, "dash": "dot" if trace.dotted else "solid"}
-        named = {"type": "scattergl", "name": trace.name, **_OWN_WORDS} if trace.name else {"type": "scatter", "hoverinfo": "skip"}
+        named = (
+            {"type": "scattergl", "name": trace.name, **_OWN_WORDS}
+            if trace.name
+            else {"type": "scatter", "hoverinfo": "skip"}
+        )
         return [{"mode": "lines", "line": line, "x": plain(x), "y": plain(y)} | named]
     if isinstance(trace, Sides):
         x, y = envelope(trace.x, trace.y, POINTS, trace.gap_s)
@@ -89,7 +93,12 @@ def _traces(trace: Trace) -> list[dict[str, Any]]:
     centres = plain((trace.edges[1:] + trace.edges[:-1]) / 2.0, 4)
     there = trace.values > 0.0
     logs = np.log10(np.where(there, trace.values, np.nan))
-    drawn: dict[str, Any] = _OWN_WORDS | {"type": "heatmap", "colorscale": "YlGnBu", "reversescale": True, "showscale": False}
+    drawn: dict[str, Any] = _OWN_WORDS | {
+        "type": "heatmap",
+        "colorscale": "YlGnBu",
+        "reversescale": True,
+        "showscale": False,
+    }
     if np.any(there):
         drawn |= {"zmin": float(np.nanmin(logs)) - 0.7, "zmax": float(np.nanmax(logs))}  # the rarest is not white
     return [drawn | {"name": f"{trace.name}, log10", "x": centres, "y": centres, "z": [plain(row) for row in logs]}]

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from .bike import Bike
 from .signals import Signal, band_noise, smoothed, through
 
-CLASS_A, CLASS_B, CLASS_C = 16e-6, 64e-6, 256e-6  # roughness: PSD of displacement at 0.1 cycles/m, m3 (ISO 8608)
+# Roughness: PSD of displacement at 0.1 cycles/m, m3, in the middle of the classes of ISO 8608
+CLASSES = {"A": 16e-6, "B": 64e-6, "C": 256e-6, "D": 1024e-6}
+CLASS_A, CLASS_B, CLASS_C, _ = CLASSES.values()
 _STEP_M = 0.02
 _CONTACT_M = 0.10  # length of a tyre's contact patch, which averages shorter waves
 

@@ -8,6 +8,7 @@ import { busy, offer } from "./files.mjs";
 import { Gauge } from "./gauge.mjs";
 import { LEAN, SIDEWAYS, sideOf, written } from "./measures.mjs";
 import { Player } from "./player.mjs";
+import { SimulatedRide } from "./simulated.mjs";
 
 const byId = (id) => document.getElementById(id);
 const gauge = new Gauge(byId("gauge"));
@@ -63,6 +64,29 @@ function heard(text) {
   player.take(reading.moments, performance.now());
   const lacking = aligned ? "" : `; the board is not aligned yet, so there is ${measure.none}`;
   if (!stopped) tell(`Recording${lacking}: ${clock(reading.seconds)}`);
+}
+
+let simulated = null; // the SimulatedRide that runs
+
+function simulate() {
+  player.restart();
+  document.documentElement.dataset.simulated = "yes";
+  byId("simulated-stop").focus();
+  show(LEAN);
+  const shown = {
+    moment: (moment) => player.take([moment], performance.now()),
+    furthest: (most) => (furthest = LEAN.most(most)),
+  };
+  simulated = new SimulatedRide(shown, (text) => put("pretend-said", text));
+  simulated.start();
+}
+
+function endSimulated() {
+  simulated.stop();
+  player.restart();
+  furthest = [0, 0];
+  delete document.documentElement.dataset.simulated;
+  byId("simulated").focus();
 }
 
 function stop() {
@@ -173,6 +197,8 @@ show(LEAN);
 byId("start").addEventListener("click", start);
 byId("stop").addEventListener("click", stop);
 byId("pull").addEventListener("click", pull);
+byId("simulated").addEventListener("click", simulate);
+byId("simulated-stop").addEventListener("click", endSimulated);
 document.addEventListener("visibilitychange", () => live && !document.hidden && stayAwake());
 requestAnimationFrame(draw);
 keepOffline();
