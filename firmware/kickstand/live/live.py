@@ -67,6 +67,7 @@ class Live:
         radio = self.radio
         if radio.changed:
             self._begin()
+            self._look_ms = now_ms
         while radio.inbox:
             self._hear(*radio.inbox.pop(0))
         if self.period_ms and ticks_diff(now_ms, self._due_ms) >= 0:

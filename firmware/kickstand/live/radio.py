@@ -3,7 +3,7 @@ on it."""
 
 from binascii import unhexlify
 
-from ..errors import Refusal
+from ..errors import LiveError
 from ..units import __version__
 from . import packets
 
@@ -15,10 +15,6 @@ _CONNECTED, _DISCONNECTED, _WRITTEN, _GET_SECRET, _SET_SECRET, _PASSKEY = 1, 2, 
 _READ, _WRITE, _NOTIFY = 0x02, 0x08, 0x10
 _READ_PAIRED, _WRITE_PAIRED = 0x0600, 0x3000  # only over an encrypted line, to a phone that gave the PIN
 _DISPLAY_ONLY = 0  # this side shows the PIN, as a sticker or config.py does, and the phone asks for it
-
-
-class LiveError(Refusal):
-    """Why nothing goes to a phone."""
 
 
 class Radio:
@@ -76,7 +72,7 @@ class Radio:
             self.inbox = []
             self.changed = True
         elif event == _PASSKEY:
-            self._ble.gap_passkey(data[0], data[1], self._pin)
+            getattr(self._ble, "gap_passkey")(data[0], data[1], self._pin)  # noqa: B009 the stubs of rp2 know it not
         elif self._bonds and event == _GET_SECRET:
             return self._bonds.get(*data)
         elif self._bonds and event == _SET_SECRET:

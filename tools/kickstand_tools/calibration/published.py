@@ -140,8 +140,8 @@ class PublishedAlignment:
         self.needed = MIN_EVENTS
         self.counted = self.turned = 0
         self._accepted = [0.0] * 3  # sum of their forces
-        self._event = _Samples()  # of the braking event that goes on
-        self._interval = _Samples()  # since the last speed: the next one will show whether it was braking
+        self._event = _Samples()  # samples of the braking event under way
+        self._interval = _Samples()  # samples since the last speed: the next speed shows whether they were braking
         self._means = CircularDispersion()  # one direction for each accepted braking event
         self._speed = -1.0
         self._loss = 0.0
@@ -154,28 +154,28 @@ class PublishedAlignment:
 
     @property
     def problem(self):
-        """What is wrong with the speed or with the mount: an AlignmentError, or None."""
+        """The fault of the speed or of the mount: an AlignmentError, or None."""
         return self._improved.problem
 
     @property
     def ready(self):
-        """True once matrix() can be taken."""
+        """True once matrix() gives an alignment."""
         return self.problem is None and self.counted >= self.needed
 
     @property
     def quality_deg(self):
-        """Standard error of the mean direction of the accepted braking events, 180 until there are two. The leaked tilt
-        is not in it."""
+        """Standard error of the mean direction of the accepted braking events, 180 until there are two. It does not
+        contain the error by a wrong vertical."""
         n = self.counted
         return degrees(sqrt(self._means.value() / n)) if n > 1 else 180.0
 
     @property
     def reason(self):
-        """Why matrix() cannot be had yet: an AlignmentError."""
+        """Why matrix() gives no alignment yet: an AlignmentError."""
         return self.problem or self._improved.missing(self.counted, self.needed, self.turned)
 
     def update(self, force, rate, dt_us):
-        """As DriveAlignment.update()."""
+        """Take a sample: see DriveAlignment.update()."""
         if dt_us > GAP_US:
             self.interrupt()
             return
@@ -193,12 +193,12 @@ class PublishedAlignment:
                 self._sample(list(self._levelled))
 
     def interrupt(self):
-        """As DriveAlignment.interrupt()."""
+        """Samples are missing: drop the braking event under way. Accepted events stay."""
         self._improved.interrupt()
         self._forget()
 
     def finish(self):
-        """As DriveAlignment.finish()."""
+        """Do all pending work at once: see DriveAlignment.finish()."""
         self._improved.finish()
 
     def _forget(self):

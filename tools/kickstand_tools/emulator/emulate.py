@@ -12,6 +12,7 @@ from ..demo.hand_bike import HandBike
 from ..demo.keyboard import BIKE_KEYS, keyboard
 from ..demo.score import State
 from ..demo.screen import lcd_lines, screen
+from ..simulated_board.oled import Oled
 from ..simulation.scripted.script import Ride
 from ..simulation.scripted.sensor_errors import Sensor
 from .console import ConsoleServer
@@ -42,15 +43,15 @@ class ScriptedBike:
                 pico.press(self.begun_s + press_s)
 
 
-def emulate(port: int, say: Callable[[str], None]) -> None:
+def emulate(port: int, say: Callable[[str], None], display: str = "lcd") -> None:
     """Serve the Pico's console on socket://127.0.0.1:port until the user quits. Raises InputError.
 
     In a terminal the bike is steered with keys. Elsewhere say() gets each new text of the display, and the bike goes
-    on the demo's ride once the firmware runs.
+    on the demo's ride once the firmware runs. display: "lcd", "ssd1306" or "sh1106".
     """
     watched = sys.stdin.isatty() and sys.stdout.isatty()
     bike = HandBike() if watched else ScriptedBike()
-    pico = Pico(Sensor(seed=PART_SEED, share=PART_SHARE).world(bike.motion))
+    pico = Pico(Sensor(seed=PART_SEED, share=PART_SHARE).world(bike.motion), display=display)
     server = ConsoleServer(pico.console, port)
     pico.heard = server.say
     address = f"socket://127.0.0.1:{server.port}"
@@ -93,6 +94,8 @@ def _watch(pico: Pico, server: ConsoleServer, bike: HandBike, address: str) -> N
                 "phase": phase,
                 "pressed": pico.board.button.closed,
             }
+            if isinstance(pico.board.lcd, Oled):
+                state["pixels"] = pico.board.lcd.pixels().hex()
             title = f"Kickstand on an emulated Pico, {address}"
             live.update(screen(state, title, below(pico.board.lcd.on, address), False), refresh=True)
 

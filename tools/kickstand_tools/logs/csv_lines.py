@@ -68,11 +68,10 @@ def number_cells(values: Array, digits: int, nan: str = "nan") -> Letters:
     return letters
 
 
-def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, room: int) -> Letters:
-    """Of integers (n) of up to `most` digits with a point before the last `digits` ones, and a free row in front. room:
-    rows at least."""
+def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, least_rows: int) -> Letters:
+    """Of integers (n) of up to `most` digits with a point before the last `digits` ones, and a free row in front."""
     places = max(most, digits + 1)
-    letters = np.zeros((max(places + 2, room), len(number)), dtype=np.uint8)
+    letters = np.zeros((max(places + 2, least_rows), len(number)), dtype=np.uint8)
     row = len(letters) - 1
     for place in range(places):
         if place == digits > 0:

@@ -17,7 +17,7 @@ _FORMATS = ["%.3f", *["%.6f"] * 6, "%.2f"]
 START = 47.6, 8.0  # degrees north and east, heading east
 START_UTC_S = 1_779_008_400.0  # 09:00 on 17 May 2026
 _DEGREE_M = np.radians(6_371_000.0)
-_TRACK_S = 1  # between two fixes, as of a GPS receiver
+_TRACK_S = 1  # time between two fixes, as from a GPS receiver
 
 
 def simulate(
@@ -35,8 +35,8 @@ def simulate(
     """Simulate a ride (see ride.ride) of exactly this length and write it to out_dir. Raises InputError.
 
     Logs: POSE_1.csv to POSE_7.csv (the last one slanted), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv. TRUTH.csv has one row
-    for each row of RIDE.csv. A RIDE.cal.json that is there is removed. speed: RIDE.csv gets a speed and a
-    position once a second.
+    for each row of RIDE.csv. A RIDE.cal.json in out_dir is removed. speed: RIDE.csv gets a speed and a position once a
+    second.
     """
     check_profile(profile)
     directory = Path(out_dir)
@@ -63,7 +63,7 @@ def _cut(made: Ride, seconds: float) -> Ride:
 
 
 def write_poses(directory: Path, made: Ride) -> tuple[list[Path], Path, Path]:
-    """Write the seven poses, kickstand and upright; return their paths."""
+    """Write the seven poses, the kickstand pose and the upright one. Returns their paths in this order."""
     seven = [directory / f"POSE_{k}.csv" for k in range(1, 8)]
     pair = directory / "KICKSTAND.csv", directory / "UPRIGHT.csv"
     for path, readings in zip([*seven, *pair], [*made.poses, made.kickstand, made.upright]):
@@ -72,11 +72,9 @@ def write_poses(directory: Path, made: Ride) -> tuple[list[Path], Path, Path]:
 
 
 def positions(made: Ride) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Where and when it goes: its true speed and yaw rate, integrated.
-
-    Latitude, longitude (degrees north and east) and Universal Time (s since 1970) of each reading.
-    """
-    course = np.cumsum(np.radians(made.truth["yaw_rate_dps"])) / made.rate_hz  # to the left of east
+    """Latitude, longitude (degrees north and east) and Universal Time (s since 1970) of each reading, by integrating
+    the true speed and yaw rate."""
+    course = np.cumsum(np.radians(made.truth["yaw_rate_dps"])) / made.rate_hz  # rad from east, > 0 to the left
     speed = made.truth["speed_mps"] / made.rate_hz
     lat = START[0] + np.cumsum(speed * np.sin(course)) / _DEGREE_M
     lon = START[1] + np.cumsum(speed * np.cos(course)) / (_DEGREE_M * np.cos(np.radians(START[0])))

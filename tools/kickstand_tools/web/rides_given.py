@@ -9,7 +9,7 @@ from pathlib import Path
 from ..calibration.file import calibration_path, read_calibration
 from ..errors import InputError
 from ..imports import mapped
-from ..imports.files import Piece, read_pieces
+from ..imports.files import RecordingFile, read_files
 from ..imports.importing import recordings
 from ..joining.track_files import read_track
 from ..logs.reader import check_first_line
@@ -57,17 +57,17 @@ def sorted_out(names: list[str]) -> Given:
                 found.rides.append(GivenRide(name, [name]))
                 found.kinds[name] = "log"
             else:
-                pieces = read_pieces(Path(name))
-                if any(piece.name.endswith(".parquet") for piece in pieces):
+                files = read_files(Path(name))
+                if any(file.name.endswith(".parquet") for file in files):
                     raise InputError(f"{name} is Parquet, which this page cannot read: give the ride as CSV")
                 if zipfile.is_zipfile(name):
-                    _add(found, name, [name], pieces)
+                    _add(found, name, [name], files)
                 else:
-                    loose += pieces
+                    loose += files
         except InputError as error:
             found.refused[name] = error
-    for name, pieces in _together(loose):
-        _add(found, name, [piece.name for piece in pieces], pieces)
+    for name, files in _together(loose):
+        _add(found, name, [file.name for file in files], files)
     found.rides.sort(key=lambda ride: _by_number(ride.log))
     beside = {ride.log: calibration_path(Path(ride.log)).name for ride in found.rides}
     free = [name for name in calibrations if name not in beside.values()]
@@ -77,10 +77,10 @@ def sorted_out(names: list[str]) -> Given:
     return found
 
 
-def _together(pieces: list[Piece]) -> Iterator[tuple[str, list[Piece]]]:
-    """(name, its pieces) of each recording among single files: the name is that of a folder where they are several."""
-    found = recordings(pieces)
-    used = {id(piece) for _, group in found for piece in group}
+def _together(files: list[RecordingFile]) -> Iterator[tuple[str, list[RecordingFile]]]:
+    """(name, its files) of each recording among single files: the name is that of a folder where they are several."""
+    found = recordings(files)
+    used = {id(file) for _, group in found for file in group}
     for app, group in found:
         name = group[0].name
         if len(group) > 1:
@@ -88,23 +88,21 @@ def _together(pieces: list[Piece]) -> Iterator[tuple[str, list[Piece]]]:
             while Path(name).exists():
                 name += "_"
             Path(name).mkdir()
-            for piece in group:
-                Path(name, piece.name).write_bytes(
-                    piece.content
-                )  # not a link: an import leaves out those that lead out
+            for file in group:
+                Path(name, file.name).write_bytes(file.content)  # not a link: an import leaves out those that lead out
         yield name, group
-    yield from ((piece.name, [piece]) for piece in pieces if id(piece) not in used)
+    yield from ((file.name, [file]) for file in files if id(file) not in used)
 
 
-def _add(found: Given, log: str, files: list[str], pieces: list[Piece]) -> None:
-    """A ride, or why these pieces are none."""
-    known = recordings(pieces)
-    table = None if known else mapped.table_in(pieces)
-    if not known and (table is None or len(table.columns) < len(mapped.REQUIRED) or len(pieces) > 1):
-        found.refused |= dict.fromkeys(files, mapped.unknown(pieces, log))
+def _add(found: Given, log: str, names: list[str], files: list[RecordingFile]) -> None:
+    """A ride, or why these files are none."""
+    known = recordings(files)
+    table = None if known else mapped.table_in(files)
+    if not known and (table is None or len(table.columns) < len(mapped.REQUIRED) or len(files) > 1):
+        found.refused |= dict.fromkeys(names, mapped.unknown(files, log))
         return
-    found.rides.append(GivenRide(log, files, table=table))
-    found.kinds |= dict.fromkeys(files, f"of {known[0][0].NAME}" if known else "table")
+    found.rides.append(GivenRide(log, names, table=table))
+    found.kinds |= dict.fromkeys(names, f"of {known[0][0].NAME}" if known else "table")
 
 
 def _is_log(name: str) -> bool:

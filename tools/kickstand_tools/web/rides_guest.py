@@ -190,9 +190,9 @@ def _one_line(text):
 
 
 def raising(function):
-    """A function of numpy.linalg that again raises LinAlgError for a singular matrix.
+    """A decorator for functions of numpy.linalg: they then raise LinAlgError for a singular matrix, as elsewhere.
 
-    numpy learns of it from the processor's flags of floating-point errors. WebAssembly has none: the result is NaN.
+    numpy detects it by the processor's flags of floating-point errors. WebAssembly has none: the result is NaN.
     """
 
     @functools.wraps(function)

@@ -24,13 +24,17 @@ _GUEST = ("bench_guest", "stages_guest")  # modules of this folder that run on t
 _SENSOR = Sensor(seed=1, share=0.0)  # without errors, mounted at some angle
 _SPEED_MPS = 15.0
 _RIDE = [accelerate(_SPEED_MPS, 1.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 20
-_MODES: dict[str, dict[str, Any]] = {"aligning by driving": {"SPEED": "wheel"}, "recording": {"RECORD": True}}
+_MODES: dict[str, dict[str, Any]] = {
+    "aligning by driving": {"SPEED": "wheel"},
+    "recording": {"RECORD": True},
+    "with an OLED": {"DISPLAY": "ssd1306"},
+}
 
 
 def bench(seconds: int = 10) -> dict[str, Any]:
     """Measure everything, which takes minutes. The figures' names end with their units.
 
-    seconds: emulated time of each of four runs. Raises GuestError if the program on the Pico fails.
+    seconds: emulated time of each of five runs. Raises GuestError if the program on the Pico fails.
     """
     plain = _figures(_run(seconds))
     modes = {name: _figures(_run(seconds, chosen=chosen)) for name, chosen in _MODES.items()}
@@ -116,7 +120,7 @@ def _run(seconds: int, detail: bool = False, chosen: dict[str, Any] | None = Non
     arrays: list[np.ndarray] = []
     stages: list[np.ndarray] = []
     result: dict[str, Any] = {}
-    with Pico(_SENSOR.world(Ride(_RIDE).motion), files) as pico:
+    with Pico(_SENSOR.world(Ride(_RIDE).motion), files, display=chosen.get("DISPLAY", "lcd")) as pico:
         samples = SampleCount(pico.board.sensor)
 
         def take(data: bytes) -> None:

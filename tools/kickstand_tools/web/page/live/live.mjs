@@ -3,6 +3,7 @@
 
 import { choosePort, inPages, loadOnce, overCable, python } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
+import { Riding } from "./bluetooth/riding.mjs";
 import { Chart } from "./chart.mjs";
 import { busy, offer } from "./files.mjs";
 import { Gauge } from "./gauge.mjs";
@@ -21,6 +22,7 @@ let awake = null; // a WakeLockSentinel
 let aligned = false;
 let measure = null; // LEAN or SIDEWAYS
 let furthest = [0, 0];
+let riding = null; // the Riding that runs, or null
 
 const tell = (text) => (byId("live-said").textContent = text);
 
@@ -66,25 +68,39 @@ function heard(text) {
   if (!stopped) tell(`Recording${lacking}: ${clock(reading.seconds)}`);
 }
 
+/** What a Riding shows here. */
+const shown = {
+  begin() {
+    player.restart();
+    furthest = [0, 0];
+  },
+  measure: show,
+  moment: (moment) => player.take([moment], performance.now()),
+  furthest: (ride) => (furthest = measure.most(ride)),
+};
+
+async function ride() {
+  await stayAwake(); // while the press still counts
+  riding = new Riding(shown);
+  await riding.run();
+  riding = null;
+  awake?.release();
+}
+
 let simulated = null; // the SimulatedRide that runs
 
 function simulate() {
-  player.restart();
+  shown.begin();
   document.documentElement.dataset.simulated = "yes";
   byId("simulated-stop").focus();
-  show(LEAN);
-  const shown = {
-    moment: (moment) => player.take([moment], performance.now()),
-    furthest: (most) => (furthest = LEAN.most(most)),
-  };
+  shown.measure(LEAN);
   simulated = new SimulatedRide(shown, (text) => put("pretend-said", text));
   simulated.start();
 }
 
 function endSimulated() {
   simulated.stop();
-  player.restart();
-  furthest = [0, 0];
+  shown.begin();
   delete document.documentElement.dataset.simulated;
   byId("simulated").focus();
 }
@@ -199,6 +215,8 @@ byId("stop").addEventListener("click", stop);
 byId("pull").addEventListener("click", pull);
 byId("simulated").addEventListener("click", simulate);
 byId("simulated-stop").addEventListener("click", endSimulated);
-document.addEventListener("visibilitychange", () => live && !document.hidden && stayAwake());
+byId("ride").addEventListener("click", ride);
+byId("ride-stop").addEventListener("click", () => riding?.stop());
+document.addEventListener("visibilitychange", () => (live || riding) && !document.hidden && stayAwake());
 requestAnimationFrame(draw);
 keepOffline();
