@@ -24,13 +24,17 @@ _GUEST = ("bench_guest", "stages_guest")  # modules of this folder that run on t
 _SENSOR = Sensor(seed=1, share=0.0)  # without errors, mounted at some angle
 _SPEED_MPS = 15.0
 _RIDE = [accelerate(_SPEED_MPS, 1.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 20
-_MODES: dict[str, dict[str, Any]] = {"aligning by driving": {"SPEED": "wheel"}, "recording": {"RECORD": True}}
+_MODES: dict[str, dict[str, Any]] = {
+    "aligning by driving": {"SPEED": "wheel"},
+    "recording": {"RECORD": True},
+    "live to a phone": {"LIVE": True},
+}
 
 
 def bench(seconds: int = 10) -> dict[str, Any]:
     """Measure everything, which takes minutes. The figures' names end with their units.
 
-    seconds: emulated time of each of four runs. Raises GuestError if the program on the Pico fails.
+    seconds: emulated time of each of five runs. Raises GuestError if the program on the Pico fails.
     """
     plain = _figures(_run(seconds))
     modes = {name: _figures(_run(seconds, chosen=chosen)) for name, chosen in _MODES.items()}
@@ -113,6 +117,8 @@ def _run(seconds: int, detail: bool = False, chosen: dict[str, Any] | None = Non
     files = flash_image.firmware(compiled=True) | _calibration()
     del files["/main.py"]
     files |= {f"{name}.mpy": cross_compiled(Path(__file__).with_name(f"{name}.py")) for name in _GUEST}
+    if chosen.get("LIVE"):
+        files |= {"bluetooth.mpy": cross_compiled(Path(__file__).with_name("bluetooth_guest.py"))}
     arrays: list[np.ndarray] = []
     stages: list[np.ndarray] = []
     result: dict[str, Any] = {}
