@@ -2,9 +2,11 @@
 
 import collections
 import itertools
+import sys
 
 import devices
 import pytest
+from device_runs import Device, _world
 from engines import ENGINES
 from published import channels, own
 
@@ -197,3 +199,12 @@ def test_a_pin_keeps_strangers_out_and_is_asked_for_once(run):
     assert of(inside, "now", 24, 28) and of(inside, "now", 40.2)
     later = run({**plan, "power": [], "until": 22, "config": {"LIVE": True, "LIVE_PIN": 141421}, "phones": [ASK]})
     assert answers(later.phones[0], "write") == [False]
+
+
+def test_switched_off_nothing_more_is_imported(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    device = Device(_world(devices.ALIGNED)[0], machine="pico w")
+    seen = set()
+    device.board.at(8.0, lambda: seen.update(sys.modules))
+    device.run({}, [9.0])
+    assert "kickstand.app" in seen and not [name for name in seen if name.startswith("kickstand.live")]
