@@ -28,6 +28,7 @@ _MODES: dict[str, dict[str, Any]] = {
     "aligning by driving": {"SPEED": "wheel"},
     "recording": {"RECORD": True},
     "with an OLED": {"DISPLAY": "ssd1306"},
+    "live to a phone": {"LIVE": True},
 }
 
 
@@ -117,6 +118,8 @@ def _run(seconds: int, detail: bool = False, chosen: dict[str, Any] | None = Non
     files = flash_image.firmware(compiled=True) | _calibration()
     del files["/main.py"]
     files |= {f"{name}.mpy": cross_compiled(Path(__file__).with_name(f"{name}.py")) for name in _GUEST}
+    if chosen.get("LIVE"):
+        files |= {"bluetooth.mpy": cross_compiled(Path(__file__).with_name("bluetooth_guest.py"))}
     arrays: list[np.ndarray] = []
     stages: list[np.ndarray] = []
     result: dict[str, Any] = {}
