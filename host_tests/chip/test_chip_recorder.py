@@ -129,8 +129,6 @@ def test_wherever_the_power_goes_all_but_the_last_block_is_kept(at_prompt):
         written = blocks
     at_prompt.exec("recorder.stop()")
     states.append((at_prompt.file_system, 4))
-    from kickstand_tools.emulator import flash_image
-
     kept = calibrated()
     at_least = 0
     checked = 0
@@ -139,21 +137,21 @@ def test_wherever_the_power_goes_all_but_the_last_block_is_kept(at_prompt):
         if before == after:
             continue
         for state in (before, *(torn(before, after, share) for share in (0.05, 0.5, 0.95))):
-            files = flash_image.read(state)
+            files = at_prompt.FLASH.read(state)
             assert files.items() >= kept.items()
             sequences = [block.sequence for block in rides(files).get(1, [])]
             assert sequences == list(range(len(sequences)))
             assert len(sequences) >= at_least - 1
             checked += 1
     assert checked > 4 * 60
-    assert len(rides(flash_image.read(states[-1][0]))[1]) >= 4
+    assert len(rides(at_prompt.FLASH.read(states[-1][0]))[1]) >= 4
 
 
 @pytest.mark.parametrize("operation", [2, 37])
 def test_a_board_records_again_after_a_cut(at_prompt, operation):
     at_prompt.exec(_FEED)
     at_prompt.chip.flash.cut_power(operation, 0.5)
-    at_prompt.console.send(b"recorder.start(Chip(), Calibration())\nfeed(6)\x04")
+    at_prompt.send(b"recorder.start(Chip(), Calibration())\nfeed(6)\x04")
     at_prompt.run(6.0)
     assert not at_prompt.powered
     at_prompt.power_on()

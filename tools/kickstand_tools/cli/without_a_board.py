@@ -8,11 +8,11 @@ from pathlib import Path
 import click
 
 from ..demo.demo import DeviceStopped, demo
-from ..emulator import image, native
+from ..emulator import esp32_library, image, native
 from ..output import check_directory
 from ..progress import spinner
 from ..web import serve, site
-from .common import PATH
+from .common import CHIP, PATH
 
 
 @click.command()
@@ -49,11 +49,15 @@ def web_command(out: Path | None) -> None:
 
 @click.command()
 @click.option("--port", type=click.IntRange(1024, 65535), default=2040, help="On which mpremote finds it.")
-def emulate_command(port: int) -> None:
-    """An emulated Pico on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
+@CHIP
+def emulate_command(port: int, chip: str) -> None:
+    """An emulated board on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
     image.find()  # before anything else of the emulator is imported
-    with spinner("compiling the emulator, once"):
-        native.build()
+    if chip == "esp32":
+        esp32_library.find()
+    else:
+        with spinner("compiling the emulator, once"):
+            native.build()
     from ..emulator.emulate import emulate
 
-    emulate(port, click.echo)
+    emulate(port, click.echo, chip)
