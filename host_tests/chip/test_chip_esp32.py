@@ -7,10 +7,12 @@ import json
 import re
 import time
 
+import device_runs
 import pytest
 from emulated import calibrated, esp32, firmware, leaning, modules, shows
 from kickstand.calibration.store import Store
 from kickstand_tools.simulated_board.lcd import shown_lean
+from test_chip_recorder import FEED, rides
 
 pytestmark = [pytest.mark.chip, pytest.mark.esp32]
 
@@ -179,3 +181,40 @@ def test_old_or_new_wherever_a_save_is_cut(tmp_path):
         assert bias in (3.0, 4.0)
         device.exec("save(9)")
         assert float(device.exec("print(store.load().gyro_bias[0])")) == 9.0
+
+
+_SIDES = [[1, 0, 0], [0, 0, -1], [0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, -1, 0], [0.5, 0.6, -0.7]]
+
+
+@pytest.mark.nightly
+def test_six_positions_by_the_button():
+    """From the menu to a calibration that is stored, the last position a free one."""
+    steps = [[0, None]]
+    for i, up in enumerate(_SIDES):
+        steps += [[8.0 + 6.0 * i, up], [13.0 + 6.0 * i, None]]
+    with esp32(device_runs.poses_of(3, steps), firmware("esp32")) as device:
+        for at_s, for_s in ((4, 1.2), (6, 0.15), (7, 1.2)):
+            device.press(at_s, for_s)
+        shows(device, "any of the six", 9.0)
+        shows(device, r"Side \+x done", 8.0)
+        shows(device, "Saved, err", 50.0)
+        files = device.files()
+    assert {"kickstand_a.cal", "kickstand_b.cal"} & set(files)
+
+
+@pytest.mark.nightly
+def test_wherever_the_power_goes_all_but_the_last_block_of_a_ride_is_kept():
+    """After each write to the flash; the calibration stays whatever happens."""
+    with board(files=modules("esp32")) as device:
+        device.exec(FEED + "recorder.start(Chip(), Calibration())")
+        states = states_of_flash(device, "feed(3)\nrecorder.stop()")
+    assert len(states) > 10
+    seen = 0
+    for state in states:
+        files = device.FLASH.read(state)
+        assert files.items() >= FILES.items()
+        blocks = [block.sequence for block in rides(files).get(1, [])]
+        assert blocks == list(range(len(blocks)))
+        assert len(blocks) >= seen - 1
+        seen = max(seen, len(blocks))
+    assert seen >= 3

@@ -14,7 +14,7 @@ import command
 import pytest
 from emulated import CHIPS, calibrated, firmware
 from kickstand_tools.deploy import bytecode, connection
-from kickstand_tools.emulator import image
+from kickstand_tools.emulator import esp32_library, image
 from kickstand_tools.errors import InputError
 from mpremote import transport_serial
 from terminal import Terminal
@@ -39,6 +39,15 @@ def test_emulate_in_a_terminal():
         at.wait_for("pressed")
         at.press("q")
         assert at.end() == 0
+
+
+@pytest.mark.parametrize("words", [("emulate", "--chip", "esp32"), ("bench", "--chip", "esp32")])
+def test_without_its_library_an_esp32_is_refused(words, tmp_path, monkeypatch):
+    monkeypatch.setenv(esp32_library.VARIABLE, str(tmp_path))
+    said = command.refused(
+        tmp_path, *words, words="no emulated ESP32, its tests do not run: libqemu-xtensa.so is missing"
+    )
+    assert str(tmp_path) in said
 
 
 class Emulating(threading.Thread):

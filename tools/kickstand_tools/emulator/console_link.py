@@ -13,7 +13,10 @@ GUEST = """
 from binascii import hexlify
 class Sink:
     def write(self, data):
-        print("\\x01%s\\x02" % hexlify(data).decode(), end="")
+        print("\\x01", end="")
+        for i in range(0, len(data), 64):
+            print(hexlify(data[i : i + 64]).decode(), end="")
+        print("\\x02", end="")
 """
 
 

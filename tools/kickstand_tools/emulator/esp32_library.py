@@ -26,7 +26,7 @@ def find() -> Path:
     missing = [name for name in FILES if not (folder / name).is_file()]
     if missing or sys.platform != "linux":
         raise InputError(
-            f"no emulated ESP32, its tests do not run: {missing[0] if missing else 'Linux'} is missing in {folder}; "
+            f"no emulated ESP32: {missing[0] if missing else 'Linux'} is missing in {folder}; "
             f"{VARIABLE} names a folder with {', '.join(FILES)} (the library and the ROM from PICSimLab's QEMU, "
             "github.com/lcgamboa/qemu, the image from micropython.org)"
         )
