@@ -192,7 +192,8 @@ def test_six_positions_by_the_button():
     steps = [[0, None]]
     for i, up in enumerate(_SIDES):
         steps += [[8.0 + 6.0 * i, up], [13.0 + 6.0 * i, None]]
-    with esp32(device_runs.poses_of(3, steps), firmware("esp32")) as device:
+    world = device_runs.poses_of(3, steps)
+    with esp32(lambda t_s: tuple(world(t_s)), firmware("esp32")) as device:
         for at_s, for_s in ((4, 1.2), (6, 0.15), (7, 1.2)):
             device.press(at_s, for_s)
         shows(device, "any of the six", 9.0)

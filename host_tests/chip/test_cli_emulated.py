@@ -44,9 +44,7 @@ def test_emulate_in_a_terminal():
 @pytest.mark.parametrize("words", [("emulate", "--chip", "esp32"), ("bench", "--chip", "esp32")])
 def test_without_its_library_an_esp32_is_refused(words, tmp_path, monkeypatch):
     monkeypatch.setenv(esp32_library.VARIABLE, str(tmp_path))
-    said = command.refused(
-        tmp_path, *words, words="no emulated ESP32, its tests do not run: libqemu-xtensa.so is missing"
-    )
+    said = command.refused(tmp_path, *words, words="no emulated ESP32: libqemu-xtensa.so is missing")
     assert str(tmp_path) in said
 
 

@@ -12,6 +12,7 @@ from ..demo.hand_bike import HandBike
 from ..demo.keyboard import BIKE_KEYS, keyboard
 from ..demo.score import State
 from ..demo.screen import lcd_lines, screen
+from ..simulated_board.oled import Oled
 from ..simulation.scripted.script import Ride
 from ..simulation.scripted.sensor_errors import Sensor
 from .console import ConsoleServer
@@ -45,15 +46,15 @@ class ScriptedBike:
                 device.press(self.begun_s + press_s)
 
 
-def emulate(port: int, say: Callable[[str], None], chip: str = "rp2040") -> None:
+def emulate(port: int, say: Callable[[str], None], chip: str = "rp2040", display: str = "lcd") -> None:
     """Serve an emulated board's console on socket://127.0.0.1:port until the user quits. Raises InputError.
 
     In a terminal the bike is steered with keys. Elsewhere say() gets each new text of the display, and the bike goes
-    on the demo's ride once the firmware runs.
+    on the demo's ride once the firmware runs. display: "lcd", "ssd1306" or "sh1106".
     """
     watched = sys.stdin.isatty() and sys.stdout.isatty()
     bike = HandBike() if watched else ScriptedBike()
-    device = CHIPS[chip](Sensor(seed=PART_SEED, share=PART_SHARE).world(bike.motion))
+    device = CHIPS[chip](Sensor(seed=PART_SEED, share=PART_SHARE).world(bike.motion), display=display)
     server = ConsoleServer(device.send, port)
     device.heard = server.say
     address = f"socket://127.0.0.1:{server.port}"
@@ -96,6 +97,8 @@ def _watch(device: Device, server: ConsoleServer, bike: HandBike, address: str) 
                 "phase": phase,
                 "pressed": device.board.button.closed,
             }
+            if isinstance(device.board.lcd, Oled):
+                state["pixels"] = device.board.lcd.pixels().hex()
             title = f"Kickstand on an emulated {device.NAME}, {address}"
             live.update(screen(state, title, below(device.board.lcd.on, address), False), refresh=True)
 

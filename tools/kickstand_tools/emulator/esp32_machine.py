@@ -317,7 +317,14 @@ class Machine:
         os._exit(1)
 
 
+def _end(unraisable) -> None:
+    """An exception in a call from QEMU, which goes on otherwise."""
+    sys.__unraisablehook__(unraisable)
+    os._exit(1)
+
+
 def main() -> None:
+    sys.unraisablehook = _end  # also where the other process is gone
     number, folder, flash, *wires = sys.argv[1:]
     link = socket.socket(fileno=int(number))
     pairs = [(int(sda), int(scl)) for sda, scl in (pair.split(",") for pair in wires)]

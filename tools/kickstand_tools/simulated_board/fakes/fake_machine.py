@@ -322,8 +322,19 @@ class I2C(_Controller):
         return self._timeout_us // 1000 // _TICK_MS
 
 
+class ADC:
+    """machine.ADC: measures what the board's volts say of the pin."""
+
+    def __init__(self, pin):
+        self._number = pin.id if isinstance(pin, Pin) else pin
+
+    def read_u16(self):
+        board.clock.advance(CALL_US)
+        return min(65535, int(board.volts.get(self._number, 0.0) / 3.3 * 65535))
+
+
 class UART:
-    """machine.UART, receiving only. Bytes that do not fit into rxbuf are lost, as on the boards."""
+    """machine.UART. Bytes that do not fit into rxbuf are lost, as on the boards."""
 
     def __init__(self, id, baudrate=115200, tx=None, rx=None, rxbuf=256, timeout=0):
         if board.port == "rp2":
@@ -342,6 +353,10 @@ class UART:
     def any(self):
         board.clock.advance(CALL_US)
         return len(self._received)
+
+    def write(self, data):
+        board.clock.advance(CALL_US)
+        board.sent += data.encode() if isinstance(data, str) else data
 
     def read(self, nbytes):
         data = self._received[:nbytes]

@@ -24,13 +24,17 @@ _GUEST = ("bench_guest", "stages_guest")  # modules of this folder that run on t
 _SENSOR = Sensor(seed=1, share=0.0)  # without errors, mounted at some angle
 _SPEED_MPS = 15.0
 _RIDE = [accelerate(_SPEED_MPS, 1.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 20
-_MODES: dict[str, dict[str, Any]] = {"aligning by driving": {"SPEED": "wheel"}, "recording": {"RECORD": True}}
+_MODES: dict[str, dict[str, Any]] = {
+    "aligning by driving": {"SPEED": "wheel"},
+    "recording": {"RECORD": True},
+    "with an OLED": {"DISPLAY": "ssd1306"},
+}
 
 
 def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
     """Measure everything, which takes minutes. The figures' names end with their units.
 
-    seconds: emulated time of each of four runs; three on an ESP32, of which the stages are not known. Raises GuestError
+    seconds: emulated time of each of five runs; four on an ESP32, of which the stages are not known. Raises GuestError
     if the program on the board fails.
     """
     kind = CHIPS[chip]
@@ -124,7 +128,7 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
     arrays: list[np.ndarray] = []
     stages: list[np.ndarray] = []
     result: dict[str, Any] = {}
-    with CHIPS[chip](_SENSOR.world(Ride(_RIDE).motion), files) as device:
+    with CHIPS[chip](_SENSOR.world(Ride(_RIDE).motion), files, display=chosen.get("DISPLAY", "lcd")) as device:
         samples = SampleCount(device.board.sensor)
 
         def take(data: bytes) -> None:
