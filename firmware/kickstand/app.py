@@ -44,6 +44,11 @@ def fill_gaps(n):
         value = -value  # each float is boxed: one block of the heap
 
 
+# Of the last run, once Ctrl-C has ended it: microseconds of its longest turn, and the fewest places that were left in
+# the chip's FIFO. kickstand.status() prints them
+worst = None
+
+
 class App:
     """The lean meter on a board.
 
@@ -64,6 +69,7 @@ class App:
         self.clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self.screen = Screen(settings, sensor, self.clock, self.meter, self.calibration, self.drive, self.rides)
         self._restarts = 0
+        self._least_wait_us = LOOP_US
         self._page_ms = ticks_ms()
         self.live = None
         if radio:
@@ -107,6 +113,8 @@ class App:
             self._loop()
         except KeyboardInterrupt:
             port.rest_watchdog()  # not fed from here on; comes first, because a second Ctrl-C may interrupt the rest
+            global worst
+            worst = LOOP_US - self._least_wait_us, self.sensor.chip.places_left()
             self.rides.stop()
             if self.live:
                 self._end_live()
@@ -135,6 +143,8 @@ class App:
                 watchdog.feed()
             due_us = ticks_add(due_us, LOOP_US)
             wait_us = ticks_diff(due_us, ticks_us())
+            if wait_us < self._least_wait_us:
+                self._least_wait_us = wait_us
             if wait_us > 0:
                 sleep_us(wait_us)
             else:  # late, as after writing to flash: count from here instead of racing to catch up

@@ -108,7 +108,7 @@ def unused(path: Path, port: str) -> list[tuple[int, str]]:
     found = []
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
         match = re.match(r"#\s*([A-Z_0-9]+) = (.*)", line)
-        if not match or (port != "rp2" and re.search(r"# \(\d+\)", line)):  # its default depends on the board
+        if not match or (port != "rp2" and re.search(r"# \(\d+[;)]", line)):  # its default depends on the board
             continue
         name, value = match[1], match[2].split("#")[0].strip()
         with contextlib.suppress(ValueError, SyntaxError, AttributeError):

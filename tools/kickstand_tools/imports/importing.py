@@ -112,7 +112,7 @@ def _recording(
     if columns is not None:
         if len(files) > 1:
             raise InputError(f"{name} holds {len(files)} files: give --columns with one, such as {files[0].name}")
-        return mapped.read_mapped(files[0], columns, units, name)
+        return mapped.read_mapped(files[0], columns, units)
     found = recordings(files)
     if not found:
         raise mapped.unknown(files, name)

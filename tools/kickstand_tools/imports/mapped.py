@@ -32,7 +32,7 @@ _HEADER_LINES = 60  # number of lines in which the line of names is searched
 FEWEST_NUMBERS = 4  # least numbers in a row, a time and three axes: text with commas in it has none
 
 
-def read_mapped(file: RecordingFile, columns: Mapping[str, str], units: Mapping[str, str], name: str) -> Recording:
+def read_mapped(file: RecordingFile, columns: Mapping[str, str], units: Mapping[str, str]) -> Recording:
     """A table with the columns named for t, ax to az, gx to gz and, as there are, speed, lat, lon and temp.
 
     columns: by these, the name of each in the file, or #1, #2 ... for its number. units: of t, a (all of ax to az) or

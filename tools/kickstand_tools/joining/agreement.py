@@ -91,9 +91,9 @@ def compare_rides(
     """
     a, b = read_twice(a), read_twice(b)
     notices: dict[str, list[Notice]] = {"a": [], "b": []}
-    turned = [motion(one, progress, said) for one, said in zip((a, b), notices.values())]
+    motion_a, motion_b = (motion(one, progress, said) for one, said in zip((a, b), notices.values()))
     try:
-        found = clocks(*turned, calibration_a, calibration_b)
+        found = clocks(motion_a, motion_b, calibration_a, calibration_b)
     except InputError as error:
         raise InputError(f"{name_of(a)}, {name_of(b)}: {error}") from error
     rides = [smooth(one, calibration) for one, calibration in ((a, calibration_a), (b, calibration_b))]
@@ -111,7 +111,7 @@ def compare_rides(
     if difference is None:
         raise InputError(f"{name_of(a)}, {name_of(b)}: under {_LEAST_S:.0f} s of riding in common")
     names = ("live A", "live B", "smoothed A", "smoothed B")
-    leans = dict(zip(names, (lean for lean, _ in (*live, *smoothed))))
+    leans: dict[str, Array] = dict(zip(names, (lean for lean, _ in (*live, *smoothed))))
     return Agreement(found, _difference(*live), difference, t_s, leans, notices)
 
 

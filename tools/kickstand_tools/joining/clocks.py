@@ -59,7 +59,8 @@ def clocks(a: Motion, b: Motion, axes_a: CalibrationFile, axes_b: CalibrationFil
     for place in places:
         shift_s = (place - (len(b.there) - 1)) * STEP_S
         alike = _alike(a, b, _along(a, np.eye(3)), _along(b, _rotation(a, b, shift_s)), shift_s)
-        tried.append((float(log_likelihood_ratio(alike, count[place], STEP_S / _INDEPENDENT_S)), alike, shift_s))
+        ratio = log_likelihood_ratio(np.array(alike), count[place], STEP_S / _INDEPENDENT_S)
+        tried.append((float(ratio), alike, shift_s))
     tried.sort(reverse=True)
     if not tried or tried[0][0] < _LEAST_EVIDENCE or tried[0][1] < _LEAST_CORRELATION:
         raise InputError("nowhere do they turn alike for half a minute: are they of one ride, and both on the bike?")

@@ -63,15 +63,14 @@ class Track(Table):
 class Course:
     """m steps between the m + 1 points of a track.
 
-    begin_s, end_s (m): times of each step, s since the track's first point. course_deg (m): its direction, > 0 to the
-    left of east, if it is good. sigma_deg (m): standard deviation of that. speed_mps (m): its length over its duration.
-    good (m): True if it is neither too slow, nor a gap or a jump. turn_deg (m): change of the course against the step
-    before, > 0 to the left; 0 unless both are good.
+    begin_s, end_s (m): times of each step, s since the track's first point. sigma_deg (m): standard deviation of the
+    course of a step that is good. speed_mps (m): its length over its duration. good (m): True if it is neither too slow,
+    nor a gap or a jump. turn_deg (m): change of the course against the step before, > 0 to the left; 0 unless both are
+    good.
     """
 
     begin_s: Array
     end_s: Array
-    course_deg: Array
     sigma_deg: Array
     speed_mps: Array
     good: NDArray[np.bool_]
@@ -89,4 +88,4 @@ def course(track: Track) -> Course:
     turn = (np.diff(direction, prepend=direction[:1]) + 180.0) % 360.0 - 180.0
     both = good & np.append(False, good[:-1])
     sigma = np.hypot(np.degrees(STEP_ERROR_M / np.maximum(length_m, 0.1)), COURSE_ERROR_DEG)
-    return Course(since_s[:-1], since_s[1:], direction, sigma, speed, good, np.where(both, turn, 0.0))
+    return Course(since_s[:-1], since_s[1:], sigma, speed, good, np.where(both, turn, 0.0))

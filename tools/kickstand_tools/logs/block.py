@@ -28,7 +28,6 @@ class Block:
     readings: Array
     speed_mps: Array
     has_temp: bool
-    has_speed: bool
     start_s: float
     done: int  # bytes of the (packed) file that have been read; samples of a log in memory
     lines: list[str] = field(default_factory=list)  # the rows as CSV, none for a log in memory

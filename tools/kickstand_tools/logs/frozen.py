@@ -91,6 +91,6 @@ class FrozenReadings:
 
 def without_frozen(log: Log) -> Log:
     """The log without frozen readings: where they were is a gap. The log itself where there are none."""
-    block = Block(log.time_us, log.readings, log.speed_mps, True, True, log.start_s, 0)
+    block = Block(log.time_us, log.readings, log.speed_mps, True, log.start_s, 0)
     kept = ~FrozenReadings().mark(block)
     return log if np.all(kept) else log.part(kept)

@@ -152,14 +152,13 @@ def _unchecked(source: Source, remarks: list[Notice]) -> Iterator[Block]:
 
 def _blocks_of(log: Log) -> Iterator[Block]:
     time_us, readings = log.time_us, log.readings
-    has_temp, has_speed = (not np.all(np.isnan(values)) for values in (log.temperature_c, log.speed_mps))
+    has_temp = not np.all(np.isnan(log.temperature_c))
     for start in range(0, len(time_us), BLOCK_SAMPLES):
         part = slice(start, start + BLOCK_SAMPLES)
         yield Block(
             time_us[part],
             readings[part],
             has_temp=has_temp,
-            has_speed=has_speed,
             start_s=log.start_s,
             done=min(start + BLOCK_SAMPLES, len(time_us)),
             **{name: getattr(log, name)[part] for name in TRACK},
@@ -228,7 +227,6 @@ def _block(
         time_us,
         np.column_stack([column[name] for name in order]),
         has_temp="temp_c" in places,
-        has_speed="speed_mps" in places,
         start_s=start_s,
         done=done,
         lines=[line for line in text.split("\n") if line.strip()],

@@ -45,6 +45,11 @@ class Clock:
         self._host_lead_us = 0
         self.set_pace(pace)
 
+    @property
+    def next_us(self):
+        """When advance() next does more than let time pass."""
+        return self._next_us
+
     def advance(self, us):
         """Let time pass and run the events that are due. Raises PowerOff at the deadline, and what events raise."""
         target = self.now_us + us
