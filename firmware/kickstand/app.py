@@ -23,7 +23,7 @@ from .ui.screen import Screen
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
 COLLECT_TURNS = 42  # in which 90 KB of heap are used, of 120 that are free while recording
-COLLECT_TURNS_DRIVING = 25  # while aligning by driving: 85 KB of heap are free
+COLLECT_TURNS_DRIVING = 25  # while aligning by driving, where 85 KB of heap are free, and with an OLED
 SINGLE_GAPS = 300  # single free blocks that a collection leaves
 PAGE_MS = 100
 LATE_MS = 400  # by which page and readings together may be late: with a page's time a lean is then half a second old
@@ -98,15 +98,14 @@ class App:
         watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         gc.threshold(-1)
         due_us = ticks_us()
-        most = COLLECT_TURNS_DRIVING if self.drive else COLLECT_TURNS
-        turns = port.turns_to_collect(most)
+        turns = self._turns_to_collect()
         while True:
             self.turn()
             turns -= 1
             if turns <= 0:  # here, not in the middle of a sample: meanwhile the FIFO keeps what comes
                 gc.collect()
                 fill_gaps(SINGLE_GAPS)
-                turns = port.turns_to_collect(most)
+                turns = self._turns_to_collect()
                 if self.user:
                     self.user.check_memory()
             if watchdog:
@@ -117,6 +116,10 @@ class App:
                 sleep_us(wait_us)
             else:  # late, as after writing to flash: count from here instead of racing to catch up
                 due_us = ticks_us()
+
+    def _turns_to_collect(self):
+        few = self.drive or self.lcd.draws
+        return port.turns_to_collect(COLLECT_TURNS_DRIVING if few else COLLECT_TURNS)
 
     def turn(self):
         """One turn of the loop: the samples that wait, one press, at most one transfer to the display. It waits for
