@@ -64,7 +64,7 @@ class Course:
     """m steps between the m + 1 points of a track.
 
     begin_s, end_s (m): times of each step, s since the track's first point. sigma_deg (m): standard deviation of the
-    course of a step that is good. speed_mps (m): its length over its duration. good (m): True if it is neither too slow,
+    course of a good step. speed_mps (m): its length over its duration. good (m): True if it is neither too slow,
     nor a gap or a jump. turn_deg (m): change of the course against the step before, > 0 to the left; 0 unless both are
     good.
     """
