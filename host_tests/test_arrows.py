@@ -30,7 +30,7 @@ ARROWS = {
     "devices": {"board", "imu"},
     "status_report": {"imu", "calibration", "speed", "ui.messages", "console", "devices", "settings"},
     "app": {"board", "imu", "calibration", "lean", "drive_alignment", "speed", "rides", "live", "ui", "devices"},
-    "user_code": {"board"},
+    "user_code": set(),
     "start": {"board", "devices", "settings"},
     "__init__": {"status_report"},
 }
