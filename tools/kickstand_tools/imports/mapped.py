@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 
 from ..errors import InputError
 from .files import RecordingFile
@@ -28,6 +29,9 @@ _ACCEL_NAME = re.compile(r"acc|gforce|^a_?[xyz]\b")
 _GYRO_NAME = re.compile(r"gyr|rotation|omega|angular|^[gw]_?[xyz]\b")
 _UNIT_END = re.compile(r"_(g|mps2|ms2|dps|rads?|rps)$")
 _NUMBER = re.compile(r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?")
+# Nine tenths of a ride's readings are below these: 4 g, and 172 deg/s in rad/s
+_FORCES = {"g": 4.0, "m/s2": 4.0 * STANDARD_GRAVITY, "mg": np.inf}
+_TURNS = {"rad/s": 3.0, "deg/s": 500.0, "mdeg/s": np.inf}
 _HEADER_LINES = 60  # number of lines in which the line of names is searched
 FEWEST_NUMBERS = 4  # least numbers in a row, a time and three axes: text with commas in it has none
 
@@ -93,8 +97,10 @@ def table_in(files: list[RecordingFile]) -> Table | None:
     numbers = max((_numbers(names_in(line)) for line in lines[1:3]), default=0)
     if numbers < (FEWEST_NUMBERS if found else len(REQUIRED)):
         return None
-    units = {"a": _seems_in(found.get("ax", ""), ACCELERATIONS, "m/s2")}
-    units["g"] = _seems_in(found.get("gx", ""), RATES, "rad/s")
+    units = {
+        "a": _seems_in(found.get("ax", ""), ACCELERATIONS, _by_size(file, number, found, ACCEL, _FORCES) or "m/s2")
+    }
+    units["g"] = _seems_in(found.get("gx", ""), RATES, _by_size(file, number, found, GYRO, _TURNS) or "rad/s")
     if "speed" in found:
         units["speed"] = _seems_in(found["speed"], SPEEDS, "km/h")
     return Table(file.name, columns, found, units)
@@ -104,6 +110,22 @@ def _seems_in(column: str, kinds: Mapping[str, float], usual: str) -> str:
     """The unit, one of kinds, in brackets or behind the last _ of a column's name, else `usual`."""
     stated = (unit(unit_in(column)), unit(column.rpartition("_")[2]))
     return next((name for name in stated if name in kinds), usual)
+
+
+def _by_size(
+    file: RecordingFile, header: int, found: Mapping[str, str], axes: tuple[str, ...], limits: Mapping[str, float]
+) -> str:
+    """The unit in which nine tenths of the readings of three axes are below its limit, "" where an axis is missing."""
+    if not set(axes) <= set(found):
+        return ""
+    try:
+        sheet = read_sheet(file, header)
+        sizes = np.sqrt(sum(sheet.numbers(sheet.columns.index(found[axis])) ** 2 for axis in axes))
+    except (InputError, ValueError):
+        return ""
+    sizes = sizes[np.isfinite(sizes)]
+    most = float(np.percentile(sizes, 90.0)) if len(sizes) else np.nan
+    return next((name for name, limit in limits.items() if most < limit), "")
 
 
 def unknown(files: list[RecordingFile], source: str) -> InputError:
