@@ -59,8 +59,8 @@ class Emulating(threading.Thread):
         kind: Any = emulate.CHIPS[chip]
 
         class Limited(kind):
-            def __init__(self, world):
-                super().__init__(world, files)
+            def __init__(self, world, **fitted):
+                super().__init__(world, files, **fitted)
                 emulating.device = self
 
             def run(self, seconds, between=None):

@@ -2,6 +2,7 @@
 refined, and speed sources that cannot be used."""
 
 import math
+import re
 
 import devices
 import engines
@@ -307,3 +308,33 @@ def test_status_shows_the_speed(config, fitted, said, capsys, monkeypatch, tmp_p
         assert board.run(status_report.report, 20.0) == "returned"
     printed = capsys.readouterr().out
     assert said in printed and "aligned: no" in printed
+
+
+def test_ctrl_c_keeps_the_worst_for_the_status(tmp_path, monkeypatch, capsys):
+    """Half a second in which something else took the processor: the FIFO was full, and a turn was that long."""
+    monkeypatch.chdir(tmp_path)
+
+    def interrupt():
+        raise KeyboardInterrupt
+
+    with Board(level) as board:
+        from kickstand import app, devices, settings, status_report
+
+        monkeypatch.setattr(app, "worst", None)
+        monkeypatch.setattr(status_report.gc, "mem_free", lambda: 0, raising=False)
+        chosen = settings.Settings(None)
+        monkeypatch.setattr(status_report, "load", lambda: chosen)
+        board.faults.busy(2.0, 0.25)
+        board.at(3.0, interrupt)
+
+        def run():
+            app.App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen)).run()
+
+        with pytest.raises(KeyboardInterrupt):
+            board.run(run, 10.0)
+        board.run(status_report.report, 20.0)
+    words = r"Since start  longest turn ([\d.]+) ms; places left in the FIFO, at the fewest: (\d+)"
+    found = re.search(words, capsys.readouterr().out)
+    assert found
+    assert 245.0 < float(found[1]) < 275.0
+    assert 15 <= int(found[2]) <= 25
