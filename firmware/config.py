@@ -47,6 +47,10 @@
 # Record every ride from power-on; without it the menu starts a recording
 # RECORD = False
 
+# Live to a phone over Bluetooth LE: Pico W, Pico 2 W, ESP32 (not S2)
+# LIVE = False
+# LIVE_PIN = None           # six digits, as 271828, that a phone has to give once; ESP32 only
+
 # SD card for the rides, on SPI; without it they are kept in the board's flash. All five, and on a Pico its driver:
 # mpremote mip install sdcard
 # No defaults: these are for a Pico. ESP32: SD_SPI = 2 (the slot of machine.SDCard; 3 too on a classic one, S2 and S3)

@@ -70,6 +70,8 @@ _TABLE = {
     "LCD_BUS_HZ": (None, _or_none(_whole(100_000, 400_000))),
     "WATCHDOG": (True, _one_of(True, False)),
     "RECORD": (False, _one_of(True, False)),
+    "LIVE": (False, _one_of(True, False)),
+    "LIVE_PIN": (None, _or_none(_whole(100_000, 999_999))),
     "SD_SPI": (None, _or_none(_one_of(*port.SD_SPI))),
     "VEHICLE": ("motorcycle", _one_of("motorcycle", "car")),
     "SPEED": (None, _one_of(None, "gps", "wheel")),
@@ -77,7 +79,7 @@ _TABLE = {
     "GPS_BAUD": (9600, _whole(4800, 115_200)),
     "PULSES_PER_METRE": (0.5, (_pulses, "pulses along a metre of road, from 0.1 to 100")),
 }
-# Likewise of pins: where one is wrong none is used, for what is connected to the default one is not known
+# The same for pins: where one is wrong none is used, because the default pin may be connected to something else
 _PINS = {
     "SENSOR_SDA": (port.SENSOR_PINS[0], _PIN),
     "SENSOR_SCL": (port.SENSOR_PINS[1], _PIN),
@@ -102,13 +104,13 @@ def load():
         import config
     except ImportError:
         pass
-    except Exception as error:  # a slip in the rider's file, of whatever kind
+    except Exception as error:  # config.py is the rider's: it may raise anything
         refusal = SettingsError("unreadable", "config.py", _line_of(error), str(error))
     return Settings(config, refusal)
 
 
 def _line_of(error):
-    """Where in config.py the error is: "line 3: ", or "" if the traceback does not say."""
+    """The place of an error in config.py: "line 3: ", or "" if the traceback does not have it."""
     text = StringIO()
     # the stubs that check this know neither a StringIO's type nor its getvalue
     sys.print_exception(error, text)  # type: ignore[arg-type]
@@ -121,7 +123,7 @@ class Settings:
     """One attribute for each name in _TABLE and _PINS. config: the module config, or None for the defaults. refusal:
     why there is no config. Raises SettingsError.
 
-    one_bus: sensor and display share one I2C bus. leans: the vehicle does, a motorcycle.
+    one_bus: True if sensor and display share one I2C bus. leans: True if the vehicle leans (a motorcycle).
     """
 
     def __init__(self, config=None, refusal=None):
@@ -166,5 +168,5 @@ class Settings:
         if not self.leans and self.SPEED is None:
             raise SettingsError("needs-speed", "SPEED")
         fitting = MIN_DLPF[self.SAMPLE_HZ]
-        if self.DLPF < fitting:  # the engine's vibration would come out as a slow motion
+        if self.DLPF < fitting:  # the engine's vibration would alias to a slow motion
             raise SettingsError("aliasing", "DLPF", self.DLPF, self.SAMPLE_HZ, fitting)

@@ -15,7 +15,7 @@ from .ui import messages
 from .units import __version__
 
 LISTEN_MS = 3500
-_TRIAL = "trial.tmp"  # written and removed
+_TRIAL = "trial.tmp"  # a file that is written to measure the flash, then removed
 
 
 def _print(label, words, *values):
@@ -23,7 +23,7 @@ def _print(label, words, *values):
 
 
 def report():
-    """Print all of it. Opens sensor and display itself: the app must not be running."""
+    """Print the whole report. Opens sensor and display itself: the app must not be running."""
     release = ".".join(str(n) for n in sys.implementation.version[:3])
     machine_name = getattr(sys.implementation, "_machine", sys.platform)
     print("Kickstand %s on %s, MicroPython %s" % (__version__, machine_name, release))
@@ -49,7 +49,8 @@ def report():
 
 
 def _write_ms():
-    """How long it takes to erase and write a block of the flash. Longer than the chip's FIFO lasts loses readings."""
+    """The time in ms to erase and write a flash block. If that is longer than the chip's FIFO lasts, readings get
+    lost."""
     begun_ms = ticks_ms()
     with open(_TRIAL, "wb") as file:
         file.write(bytes(4096))
@@ -91,7 +92,7 @@ def _display(lcd):
 
 
 def _speed(settings):
-    """Print what the speed source says within LISTEN_MS: long enough to find out what is wrong with it."""
+    """Print the speed or the fault of the speed source after LISTEN_MS, in which it can detect each of its faults."""
     if settings.SPEED is None:
         _print("Speed", "no source: SPEED is not set, alignment by driving is off")
         return

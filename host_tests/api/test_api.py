@@ -13,7 +13,7 @@ import pytest
 from kickstand_tools import api
 from kickstand_tools.simulation.files import simulate
 
-FUNCTIONS = [name for name in api.__all__ if inspect.isfunction(getattr(api, name))]
+FUNCTIONS = [name for name, public in vars(api).items() if inspect.isfunction(public)]
 
 
 @pytest.mark.parametrize("name", FUNCTIONS + ["Log", "Stretch", "CalibrationFile"])

@@ -3,7 +3,6 @@
 import functools
 from dataclasses import replace
 
-import command
 import numpy as np
 import pytest
 from checked import cells_of
@@ -94,16 +93,3 @@ def test_without_enough_positions_nothing_is_said():
     assert codes(replace(log, lat_deg=np.zeros(0), lon_deg=np.zeros(0))) == []
     few = np.where(log.t_s < 7.0, log.lat_deg, np.nan)
     assert codes(replace(log, lat_deg=few)) == []
-
-
-def test_the_commands_remark_on_it(tmp_path):
-    """Report and the calibration of the ride itself, of which the latter makes a mirror image without a word."""
-    log = tmp_path / "ride.csv"
-    api.write_log(log, mirrored(simulated()))
-    words = f"warning: {log}: the sensor turns against the track, so left and right are exchanged"
-    result = command.works("calibrate", "ride", log, "--out", tmp_path / "ride.cal.json")
-    assert words in result.err
-    assert words in command.works("report", log).err
-    api.write_log(log, simulated())
-    result = command.works("calibrate", "ride", log, "--out", tmp_path / "ride.cal.json")
-    assert "track" not in result.err + command.works("report", log).err

@@ -2,15 +2,14 @@
 
 import itertools
 
-import command
 import numpy as np
 import pytest
-from checked import cells_of, words
+from checked import cells_of, simulated, words
 from kickstand_tools.checks.handedness import EXCHANGES, better_exchange, handedness, liveliest
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.simulation.profiles import MAIN, PROFILES
-from kickstand_tools.simulation.ride import random_rotation, ride
+from kickstand_tools.simulation.ride import random_rotation
 
 SIGNED = [
     np.eye(3)[list(order)] * np.array(signs)
@@ -19,15 +18,6 @@ SIGNED = [
 ]
 MINUS = -np.eye(3)
 WRONG_WAY = "are the axes left-handed (reverse one in both sensors) or the gyro of the opposite sign"
-
-
-def simulated(profile, seed=1, seconds=150.0, speed=True, every=4):
-    """A ride at 50 Hz by an MPU6050 with the errors that its data sheet allows."""
-    made = ride(profile, seed, seconds)
-    readings, mps = made.readings[::every], np.full(len(made.time[::every]), np.nan)
-    if speed:
-        mps[:: 200 // every] = made.truth["speed_mps"][::200]
-    return Log(made.time[::every], readings[:, :3], readings[:, 4:], mps)
 
 
 @pytest.fixture(scope="module")
@@ -160,15 +150,6 @@ def test_recordings(shared_data):
         assert judged(log, turned, turned) == "", path
         assert WRONG_WAY in judged(log, turned, -turned), path
         assert WRONG_WAY in judged(log, -turned, -turned), path
-
-
-def test_the_commands_say_so_in_one_line(tmp_path, rides):
-    log = rides["street"]
-    rows = np.column_stack((log.t_s, log.accel_g, -log.gyro_dps))
-    path, cal = command.write(tmp_path / "log.csv", rows), command.write_cal(tmp_path / "CAL.json")
-    said = command.works("replay", path, "--calibration", cal, "--out", tmp_path / "LEAN.csv").err.splitlines()
-    line = f"warning: {path}: the rates turn the force the wrong way, so the lean is wrong: "
-    assert sum(each.startswith(line) for each in said) == 1
 
 
 def test_a_bias_is_found_while_fitting():

@@ -204,18 +204,6 @@ def test_a_speed_up_to_two_seconds_late_shows_which_way_is_forward(late_s, shown
     assert not exchanged(jerky(late_s))
 
 
-def test_a_speed_that_is_unclear_accuses_only_of_what_is_sure():
-    """Hills add to the force: a correlation of -0.64 is sure enough, -0.55 is not."""
-    assert exchanged(jerky(sign=-1.0, noise_g=0.24))
-    assert not exchanged(jerky(sign=-1.0, noise_g=0.28))
-
-
-def test_few_and_small_changes_of_speed_show_nothing():
-    assert not exchanged(jerky(sign=-1.0, seconds=19))
-    assert not exchanged(jerky(sign=-1.0, mps2=0.4))
-    assert exchanged(jerky(sign=-1.0, seconds=24, mps2=0.7))
-
-
 def test_only_the_last_hour_counts():
     """What was the other way round before it, as with a sensor that was turned over."""
     before, after = jerky(sign=-1.0, seconds=3600, mps2=8.0), jerky(seconds=3600)

@@ -65,8 +65,8 @@ def test_what_is_shipped_knows_nothing_of_the_workshop():
 
 def test_an_installation_stays_that_of_the_checkout():
     """Without -e `flash --config` would copy a config.py that the rider has never edited."""
-    readmes = [ROOT / "README.md", ROOT / "firmware" / "README.md", ROOT / "tools" / "README.md"]
-    text = "\n".join(path.read_text(encoding="utf-8") for path in readmes)
+    pages = [*ROOT.glob("*.md"), *ROOT.glob("*/README.md"), ROOT / ".github" / "CONTRIBUTING.md"]
+    text = "\n".join(path.read_text(encoding="utf-8") for path in pages)
     lines = re.findall(r"pip install\b(?! esptool).*", text) + [extra("rides")]
     assert len(lines) >= 4
     assert all("pip install -e " in line for line in lines)

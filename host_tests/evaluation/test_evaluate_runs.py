@@ -166,3 +166,16 @@ def test_json_on_standard_output_is_the_same_for_the_same_seed():
 
 def test_an_unknown_profile_is_refused(tmp_path):
     refused(tmp_path, "evaluate", "--profiles", "street,moon", "--out", tmp_path / "x", words="no profile moon")
+
+
+def test_bands_of_simulated_rides_stand_beside_those_of_recordings(tmp_path):
+    works("simulate", "--profile", "street", "--seed", "4", "--seconds", "120", "--road", "C", "--out", tmp_path)
+    found = json.loads(works("bands", tmp_path / "RIDE.csv", "--seconds", 100, "--json").out)
+    assert list(found["rides"]) == ["RIDE.csv", "street", *(f"street, road {road}" for road in "ABCD")]
+    recorded, same = (found["rides"][name]["vertical, g"] for name in ("RIDE.csv", "street, road C"))
+    assert recorded[3] == pytest.approx(same[3], rel=0.3)
+
+
+def test_bands_of_a_recording_without_riding_are_refused(tmp_path):
+    works("simulate", "--profile", "parked", "--seconds", "100", "--out", tmp_path)
+    refused(tmp_path, "bands", tmp_path / "RIDE.csv", words="RIDE.csv")

@@ -170,7 +170,7 @@ def test_a_speed_whose_unit_nothing_tells_is_left_out_or_given(tmp_path, ride):
     (tmp_path / "r.csv").write_text(app_exports.racebox(ride))
     out = tmp_path / "RIDE.csv"
     result = command.works("import", tmp_path / "r.csv", "--out", out)
-    assert "Speed has no unit, and the positions do not tell it, so the speed is left out" in result.err
+    assert "Speed has no unit, and the positions do not show it, so the speed is left out" in result.err
     assert "speed_mps" not in out.read_text()[:200]
     result = command.works("import", tmp_path / "r.csv", "--out", out, "--units", "speed=km/h")
     assert result.err == ""

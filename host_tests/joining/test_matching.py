@@ -5,9 +5,9 @@ import phone_tracks
 import pytest
 from kickstand_tools import api
 from kickstand_tools.joining.compare import Comparison
-from kickstand_tools.joining.course import course
 from kickstand_tools.joining.motion import motion
 from kickstand_tools.joining.segments import segments
+from kickstand_tools.joining.track import course
 from kickstand_tools.signals.geography import EARTH_M
 from kickstand_tools.signals.lag import correlations
 

@@ -52,7 +52,8 @@ _SENTENCES = {
     "cut-line": "line {0}, the last one, was cut: it is left out",
     "times-spread": "the times are rounded ({0} of {1} repeat the one before): they are spread evenly, by up to "
     "{2:.3f} s",
-    "smooth-slow": "too few samples a second to look back over: where the log has under 10, the lean is the display's",
+    "smooth-slow": "the smoothed lean needs 10 samples a second: where the log has fewer, the lean is the one that the "
+    "display showed",
     "ride-short": "only {0:.0f} s of riding: at least {1:.0f} s with bends are needed",
     "no-bends": "it hardly leans ({0:.1f} degrees rms): a motorcycle's ride with bends to both sides is needed",
     "not-leaning": "in bends it is pushed aside and does not lean, as a car: {align_car}",
@@ -66,7 +67,7 @@ _SENTENCES = {
     "{phone_otherwise}",
     "phone-upside-down": "for a phone mounted {0} all accelerations have the opposite sign: " + _AT_REST,
     "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
-    "import-speed-unit": "{0} has no unit, and the positions do not tell it, so the speed is left out: {speed_unit}",
+    "import-speed-unit": "{0} has no unit, and the positions do not show it, so the speed is left out: {speed_unit}",
     "import-sign": "which sign accelerations have in {0} is not certain, and no track with turns shows it: "
     + _AT_REST
     + ", else the ride is mirrored and {sign}",
@@ -146,7 +147,7 @@ def _frozen(stretches: int, seconds: float, begin_s: float, end_s: float) -> str
     line = f"the readings froze from {begin_s:.1f} to {end_s:.1f} s"
     if stretches > 1:
         line += f" and {stretches - 1} times more, {seconds:.1f} s in all"
-    return line + ": they are not believed, and the lean begins anew after each"
+    return line + ": they are left out, and the lean begins anew after each"
 
 
 def _speed_unit(factor: float) -> str:

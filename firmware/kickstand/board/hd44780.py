@@ -20,10 +20,10 @@ COLUMNS = 16
 _DASHES = b"-" * COLUMNS
 _NO_TEXT = "\n"
 _NEVER = b"\xfe" * COLUMNS  # a character code that no text uses: marks a line as not yet written
-REINIT_MS = 10_000  # initialise again so often: noise can put the nibbles out of step, and nothing else repairs that
-PROBE_MS = 200  # how often to see whether it is still there
-STEP_MS = 5  # from step to step: the longest wait that the initialisation asks for is 4.1 ms
-_POWER_UP = const(-8)  # the step to begin with after power-up, for 40 ms of which the display does not listen
+REINIT_MS = 10_000  # time between initialisations: noise can put the nibbles out of step, and nothing else repairs that
+PROBE_MS = 200  # time between two checks whether the display is still connected
+STEP_MS = 5  # time between two steps: the longest wait that the initialisation requires is 4.1 ms
+_POWER_UP = const(-8)  # the first step after power-up, for 40 ms of which the display takes no instruction
 
 # Initialisation by instruction (data sheet, figure 24), one step a tick, STEP_MS apart, so that the loop never waits.
 # First single nibbles, which bring the display into 4-bit mode from whatever state it was in. Then whole bytes:
@@ -54,7 +54,7 @@ class Lcd:
     def __init__(self):
         self._wanted = [bytearray(b" " * COLUMNS), bytearray(b" " * COLUMNS)]
         self._shown = [bytearray(COLUMNS), bytearray(COLUMNS)]
-        self._texts = [_NO_TEXT, _NO_TEXT]  # of each line, what was shown last, if it was a str
+        self._texts = [_NO_TEXT, _NO_TEXT]  # the text that each line showed last, if it was a str
         self._changed = True  # a line may have to be sent
         self._packed = bytearray(4 * (COLUMNS + 1))
         self._port = bytearray(1)
@@ -103,7 +103,7 @@ class Lcd:
     def _put(self, number, text):
         line = self._wanted[number]
         if isinstance(text, str):
-            if text == self._texts[number]:  # as mostly: to convert it takes 0.2 ms
+            if text == self._texts[number]:  # mostly so; converting it would take 0.2 ms
                 return
             self._texts[number] = text
             for i in range(COLUMNS):
@@ -150,7 +150,7 @@ class Lcd:
                 while shown[last] == wanted[last]:
                     last -= 1
                 at = _LINE_ADDRESSES[i] + first
-                if last > first:  # if this breaks off, half a number or another side must not look like a reading
+                if last > first:  # a transfer that breaks off must not leave half a number or the wrong side
                     self._send(at, memoryview(_DASHES)[first : last + 1])
                 self._send(at, memoryview(wanted)[first : last + 1])
                 shown[:] = wanted

@@ -39,6 +39,10 @@ sensor-silent|Sensor silent|starting again
 sensor-reset|Sensor reset|starting again
 readings-lost|Readings lost|board too busy
 
+no-radio|No Bluetooth|on this board
+no-pairing|LIVE_PIN: not|on this board
+radio-fault|Bluetooth fault|restart it
+
 gps-silent|GPS silent|check wiring
 gps-garbled|GPS garbled|check GPS_BAUD
 gps-no-fix|GPS: no fix|needs open sky
@@ -82,7 +86,7 @@ aligned|Aligned by drive|error about {0:.1f}\xdf
 """
 # In place of the lean while the alignment is in question
 _NO_LEAN = {"other-side": "side was wrong?", "mount-moved": "mount has moved"}
-_OTHER_SETTING = "config.py: wrong|{0}"  # the display names it, the console says what is wrong with it
+_OTHER_SETTING = "config.py: wrong|{0}"  # {0}: the setting's name; the console says what is wrong with it
 
 
 def lines(refusal):
@@ -91,5 +95,5 @@ def lines(refusal):
 
 
 def no_lean(reason):
-    """Why there is no lean to show, in one line. reason: LeanMeter.suppressed_reason."""
+    """The line that says why no lean is shown. reason: LeanMeter.suppressed_reason."""
     return _NO_LEAN.get(reason, "not sure yet")

@@ -14,8 +14,8 @@ class PageRing:
     LeanMeter, the ActiveCalibration, the BackgroundAlignment or None, and the Recording, all to be read only. align:
     called for a short press while there is no alignment: it means that the bike is on its kickstand.
 
-    late: the page that is due is to show no lean. draws: the display shows pictures. own: of the owner's pages, a
-    function each that gives the lines.
+    late: True if the next page must not show a lean, because it comes too late. live: a Live, which has a page then, or
+    None. draws: True if the display shows pictures. own: the owner's pages, functions that return two lines each.
     """
 
     def __init__(self, leans, meter, calibration, drive, rides, align):
@@ -27,20 +27,21 @@ class PageRing:
         self._pages = MOTORCYCLE if leans else CAR
         self._at = 0
         self.late = self.draws = False
+        self.live = None
         self.own = ()
-        self._own_at = None  # which of them is shown
+        self._own_at = None  # index of the owner's page that is shown
 
     def show_own(self, now_ms):
         """To the first of the owner's pages: before there is an alignment the menu is the way there."""
         self._own_at = 0
 
     def first(self):
-        """Back to the first page."""
+        """Go back to the first page."""
         self._at = 0
         self._own_at = None
 
     def drive(self):
-        """To the page of alignment by driving."""
+        """Go to the page of alignment by driving."""
         self._at = len(self._pages) if self._calibration.aligned else 0
 
     def press(self, event, now_ms):
@@ -58,7 +59,7 @@ class PageRing:
 
     @property
     def _driving(self):
-        """True while alignment by driving has a page: the first one until there is an alignment, then the last."""
+        """True while alignment by driving has a page: the first page until there is an alignment, then the last."""
         return self._drive is not None and self._drive.shown
 
     def _drive_lines(self, now_ms):
@@ -75,7 +76,8 @@ class PageRing:
             if self._at % 2 == 0:
                 return self._drive_lines(now_ms)
             return pages.not_aligned(self._meter, now_ms // 1000, "drive and brake")
-        count = len(self._pages) + self._driving + self._rides.recorder.active
+        more = len(self._pages) + self._driving
+        count = more + (self.live is not None) + self._rides.recorder.active
         if self._at >= count:  # the last page has gone; checked here, so that the other pages keep their places
             self._at = 0
             if self.own:
@@ -83,7 +85,9 @@ class PageRing:
                 return self.own[0]()
         if self._at == len(self._pages) and self._driving:
             return self._drive_lines(now_ms)
-        if self._at >= len(self._pages):
+        if self._at == more and self.live:
+            return pages.live(self.live)
+        if self._at >= more:
             return pages.recording(self._rides.recorder)
         return self._page(self._pages[self._at])
 

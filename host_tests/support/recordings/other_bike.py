@@ -110,10 +110,14 @@ def _course(legs):
     return time, lean, _smooth(v, 0.4)
 
 
-def _readings(v, yaw_rate, slope, lean, pitch, height_m):
-    """Specific force (g) and rates (rad/s) along left, up, forward, by differences of place and attitude."""
+def _readings(v, yaw_rate, slope, lean, pitch, height_m, slip=0.0, heave_m=0.0, ahead_m=0.0):
+    """Specific force (g) and rates (rad/s) along left, up, forward, by differences of place and attitude.
+
+    slip: angle (rad, to the left) from where the bike points to where it goes. heave_m: of the roll axis at the rear
+    wheel. height_m, ahead_m: of the sensor above this axis, and in front of that wheel."""
     heading = np.cumsum(yaw_rate) / FINE_HZ
-    direction = np.cos(slope) * np.cos(heading), np.cos(slope) * np.sin(heading), np.sin(slope)
+    course = heading + slip
+    direction = np.cos(slope) * np.cos(course), np.cos(slope) * np.sin(course), np.sin(slope)
     place = np.cumsum(np.column_stack(direction) * v[:, None] / FINE_HZ, axis=0)
     c, s = np.cos(heading), np.sin(heading)
     nothing = np.zeros_like(c)
@@ -122,7 +126,8 @@ def _readings(v, yaw_rate, slope, lean, pitch, height_m):
     above = np.cross(ahead, level_left)
     ct, st = np.cos(lean)[:, None], np.sin(lean)[:, None]
     left, up = ct * level_left + st * above, ct * above - st * level_left
-    place = place + height_m * up
+    place = place + height_m * up + ahead_m * ahead
+    place[:, 2] += heave_m
     acceleration = np.gradient(np.gradient(place, axis=0), axis=0) * FINE_HZ**2 + [0.0, 0.0, G]
     body = np.stack((left, up, ahead), axis=1)  # rows are the vehicle's axes in the world
     change = np.gradient(body, axis=0) * FINE_HZ

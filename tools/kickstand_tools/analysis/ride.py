@@ -22,8 +22,8 @@ from .channels import Channels, channels
 
 @dataclass
 class Ride:
-    """A log and the calibration it is read with. smoothed: its lean is the one looked back over, and not the one that
-    the display showed."""
+    """A log and the calibration it is read with. smoothed: its lean is the smoothed one, and not the one that the
+    display showed."""
 
     log: Source
     calibration: CalibrationFile
@@ -78,7 +78,8 @@ class Ride:
     def _read(
         self, log: Source, progress: Progress | None, notices: list[Notice] | None
     ) -> Iterator[tuple[Block, Array | None]]:
-        """The blocks of the log, and what smooth_blocks() gives for each, None where it is not wanted or gives none."""
+        """The blocks of the log, each with its smoothed values (see smooth_blocks()); None in place of these if the
+        ride is not smoothed, and where the log has under 10 samples a second."""
         if self.smoothed:
             return smooth_blocks(log, self.calibration, progress, notices, lines=False)
         blocks = read_blocks(log, 2, progress, notices, lines=False, calibration=self.calibration)

@@ -19,7 +19,7 @@ from .drive_events import DriveEvent, DriveWatch
 from .drive_feed import Steps, feed, standing
 from .file import CalibrationFile
 from .poses import refuse_same_file
-from .published.viriciti import PublishedAlignment
+from .published import PublishedAlignment
 
 METHODS = {"improved": DriveAlignment, "published": PublishedAlignment}
 _SLOWEST_US = 50_000  # between samples

@@ -12,7 +12,7 @@ from ..logs.source import Progress
 from .drive_bins import drive_bins
 from .drive_events import DriveWatch
 from .file import CalibrationFile
-from .published.viriciti import PublishedAlignment
+from .published import PublishedAlignment
 
 _CHUNK = 1000  # samples between two calls of progress, at least
 

@@ -13,6 +13,7 @@ from ..errors import InputError, cause
 # numpy, which takes its time
 COMMANDS = {
     "calibrate": (".calibrate", "Compute a calibration from recorded poses or drives."),
+    "compare": (".ride", "Compare the leans of two devices on one bike."),
     "cut": (".ride", "Cut a stretch out of a log."),
     "demo": (".without_a_board", "The firmware on a simulated board, in the terminal."),
     "emulate": (".without_a_board", "An emulated Pico that flash can deploy to."),

@@ -9,6 +9,8 @@ from ..errors import InputError
 from ..progress import Bar, spinner
 from ..simulation.files import simulate
 from ..simulation.fleet.fleet import make_fleet
+from ..simulation.physics.mount import MOUNTS
+from ..simulation.physics.road import CLASSES
 from ..simulation.profiles import MAIN, PROFILES
 from .common import OUT_DIRECTORY, Command
 
@@ -35,8 +37,12 @@ def pose_options(pitch_change_deg: float | None, words: str) -> Command:
 @click.command()
 @click.option("--profile", help=PROFILE_NAMES)
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Another seed, another ride.")
-@seconds_option(20.0, "Of riding; start and stop come on top.")
+@seconds_option(20.0, "Length of the log, from the kickstand on.")
 @pose_options(None, "Between the poses, degrees; at random if not given.")
+@click.option(
+    "--road", type=click.Choice(list(CLASSES)), help="Roughness by ISO 8608, with camber; if not given, the profile's."
+)
+@click.option("--mount", type=click.Choice(list(MOUNTS)), help="What is wrong with the sensor's mount or its logger.")
 @click.option("--speed", is_flag=True, help="Write what a GPS receiver gives into the log: speed, position, time.")
 @click.option(
     "--fleet",

@@ -15,7 +15,7 @@ from ..logs.log import Log
 from ..logs.reader import read_log
 from . import mapped
 from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo
-from .files import Piece, read_pieces
+from .files import RecordingFile, read_files
 from .join import GAP_NS, join
 from .recording import Array, Recording, Taken
 from .units import ACCELERATIONS, SPEEDS, factor, unit
@@ -77,7 +77,7 @@ def import_recording(
     (100, [0.0, 1.0, 0.0], [0.0, 0.0, 5.73])
     """
     name = str(source)
-    recording = _recording(read_pieces(source), name, columns, dict(units or {}))
+    recording = _recording(read_files(source), name, columns, dict(units or {}))
     log, damaged = join(recording, name)
     _check_force(log)
     _check_sign(recording, log)
@@ -103,23 +103,25 @@ def write_imported(path: Path | str, imported: Imported) -> None:
     write_log(path, imported.log)
 
 
-def _recording(pieces: list[Piece], name: str, columns: Mapping[str, str] | None, units: dict[str, str]) -> Recording:
+def _recording(
+    files: list[RecordingFile], name: str, columns: Mapping[str, str] | None, units: dict[str, str]
+) -> Recording:
     if columns is not None:
-        if len(pieces) > 1:
-            raise InputError(f"{name} holds {len(pieces)} files: give --columns with one, such as {pieces[0].name}")
-        return mapped.read_mapped(pieces[0], columns, units, name)
-    found = recordings(pieces)
+        if len(files) > 1:
+            raise InputError(f"{name} holds {len(files)} files: give --columns with one, such as {files[0].name}")
+        return mapped.read_mapped(files[0], columns, units, name)
+    found = recordings(files)
     if not found:
-        raise mapped.unknown(pieces, name)
+        raise mapped.unknown(files, name)
     if len(found) > 1:
-        which = ", ".join(files[0].folder or files[0].name for _, files in found[:4])
+        which = ", ".join(group[0].folder or group[0].name for _, group in found[:4])
         more = ", ..." if len(found) > 4 else ""
         raise InputError(f"{name} holds {len(found)} recordings ({which}{more}): give one of them")
-    app, files = found[0]
+    app, group = found[0]
     said = units.get("speed", "") if app is racebox else ""
     if said:
         factor(said, SPEEDS, "speed")
-    recording = racebox.read(files, name, unit(said)) if app is racebox else app.read(files, name)
+    recording = racebox.read(group, name, unit(said)) if app is racebox else app.read(group, name)
     asked = {"speed"} if app is racebox else set() if recording.sign_known else {"a"}
     if not set(units) <= asked:
         raise InputError(f"{name} is {app.NAME}'s, whose units are known: leave --units out, or add --columns, too")
@@ -131,14 +133,14 @@ def _recording(pieces: list[Piece], name: str, columns: Mapping[str, str] | None
     return recording
 
 
-def recordings(pieces: list[Piece]) -> list[tuple[Any, list[Piece]]]:
+def recordings(files: list[RecordingFile]) -> list[tuple[Any, list[RecordingFile]]]:
     """The recordings among some files: each with its module in apps/, whose NAME is the app's."""
-    found, left = [], pieces
+    found, left = [], files
     for app in _APPS:
-        for files in app.finds(left):
-            found.append((app, files))
-        claimed = {id(piece) for _, files in found for piece in files}
-        left = [piece for piece in left if id(piece) not in claimed]
+        for group in app.finds(left):
+            found.append((app, group))
+        claimed = {id(file) for _, group in found for file in group}
+        left = [file for file in left if id(file) not in claimed]
     return found
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..logs.csv_reader import Cells, cells_of, columns_of_text, numbers_of, separator_of
 from ..logs.table import Array
-from .files import Piece
+from .files import RecordingFile
 from .times import Nanoseconds, times_ns
 
 LONG = 6  # letters that several names begin with are too many to repeat
@@ -82,18 +82,18 @@ def names_in(line: str) -> list[str]:
         return []
 
 
-def read_sheet(piece: Piece, header: int = 0, skipped: int = 0) -> Sheet:
-    """The table of a piece. header: number of the line of names; skipped: lines after it that are no data.
+def read_sheet(file: RecordingFile, header: int = 0, skipped: int = 0) -> Sheet:
+    """The table of a file. header: number of the line of names; skipped: lines after it that are no data.
 
     Raises InputError where there is none.
     """
-    lines = piece.text.split("\n", header + skipped + 1)
+    lines = file.text.split("\n", header + skipped + 1)
     if len(lines) < header + skipped + 2 or not lines[-1].strip():
-        raise InputError(f"{piece.name}: no rows under the names of the columns: was anything recorded?")
+        raise InputError(f"{file.name}: no rows under the names of the columns: was anything recorded?")
     columns = names_in(lines[header])
     while columns and not columns[-1]:
         columns.pop()  # lines that end in a separator
     text, separator = lines[-1], separator_of(lines[header])
     if separator != "," and _DECIMAL_COMMA.search(text[:20000]):
         text = text.replace(",", ".")
-    return Sheet(piece.name, columns, *columns_of_text(text, separator, max(len(columns), 1)))
+    return Sheet(file.name, columns, *columns_of_text(text, separator, max(len(columns), 1)))

@@ -5,9 +5,9 @@ from kickstand.units import STANDARD_GRAVITY
 
 from ..logs.table import Array
 from ..signals.averages import moving_mean
-from .course import Course
 from .motion import STEP_S, Motion
 from .segments import Segments, without_trend
+from .track import Course
 
 _MOST_SINE = 0.87  # of a lean; over 60 degrees the speed or the rate is wrong
 

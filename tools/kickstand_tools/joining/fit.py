@@ -10,9 +10,9 @@ import numpy as np
 
 from ..logs.table import Array
 from .compare import Comparison
-from .course import Course
 from .motion import Motion
 from .segments import Segments
+from .track import Course
 
 AROUND_S = 6.0  # how far from the rough shift the right one may be, with the drift at the ends of the ride
 _TRIED_S = 0.1  # apart

@@ -1,7 +1,7 @@
 """A ride with the positions of a track: matched, and written as a log."""
 
 import csv
-import gzip
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from ..logs.log import Log
 from ..logs.reader import Source, read_blocks, read_twice
 from ..logs.source import Progress, name_of
 from ..logs.table import Array
-from ..output import write_whole
+from ..output import write_packed
 from .match import Match, match
 from .motion import motion
 from .track import Track
@@ -101,26 +101,23 @@ def write_joined(out: Path | str, joined: Joined, progress: Progress | None = No
         return len(points)
     count = 0
 
-    def write(temporary: Path) -> None:
+    def lines() -> Iterator[bytes]:
         nonlocal count
-        opened = gzip.open if out.suffix == ".gz" else open
-        with opened(temporary, "wt", encoding="utf-8", newline="") as file:
-            first = True
-            for block in read_blocks(joined.ride, 2, progress):
+        kept: list[str] = []
+        for block in read_blocks(joined.ride, 2, progress):
+            if not kept:
                 kept = [name for name in block.names if name not in columns]
-                if first:
-                    file.write(",".join([*kept, *columns]) + "\n")
-                    first = False
-                rows, points = _nearest(block.time_us, at_us)
-                ends = ["," * len(columns)] * len(block.lines)
-                for row, values in zip(rows.tolist(), zip(*(column[points].tolist() for column in columns.values()))):
-                    cells = [_FORMAT[name] % value for name, value in zip(columns, values)]
-                    ends[row] = "," + ",".join(cells).replace("nan", "")
-                count += len(points)
-                lines = block.lines if len(kept) == len(block.names) else _only(block, kept)
-                file.write("".join([f"{line}{end}\n" for line, end in zip(lines, ends)]))
+                yield (",".join([*kept, *columns]) + "\n").encode()
+            rows, points = _nearest(block.time_us, at_us)
+            ends = ["," * len(columns)] * len(block.lines)
+            for row, values in zip(rows.tolist(), zip(*(column[points].tolist() for column in columns.values()))):
+                cells = [_FORMAT[name] % value for name, value in zip(columns, values)]
+                ends[row] = "," + ",".join(cells).replace("nan", "")
+            count += len(points)
+            own = block.lines if len(kept) == len(block.names) else _only(block, kept)
+            yield "".join([f"{line}{end}\n" for line, end in zip(own, ends)]).encode()
 
-    write_whole(out, write)
+    write_packed(out, lines())
     return count
 
 

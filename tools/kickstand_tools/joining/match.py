@@ -11,11 +11,10 @@ from ..logs.table import Array
 from ..refusals import OPPOSITE_SIGN
 from ..signals.averages import moving_mean
 from ..signals.lag import correlations, log_likelihood_ratio, peaks
-from .course import Course, course
 from .fit import AROUND_S, Fit, apart, fitted
 from .motion import STEP_S, Motion
 from .segments import STEPS, segments
-from .track import LONGEST_S, SLOWEST_MPS, Track
+from .track import LONGEST_S, SLOWEST_MPS, Course, Track, course
 
 _GRID_S = 0.5
 _SPAN_S = 4.0  # over which a change of course is compared first

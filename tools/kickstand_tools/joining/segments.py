@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..logs.table import Array, Table
-from .course import Course
+from .track import Course
 
 STEPS = 30  # of a segment at most
 _FEWEST = 8  # a segment of fewer steps shows little

@@ -1,8 +1,9 @@
-"""The track of a phone or a watch: where it was, and when."""
+"""The track of a phone or a watch: where it was, and when. Its course: the direction of each step, as far as known."""
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..logs.table import Array, Table
 from ..signals.geography import distance_m
@@ -10,6 +11,8 @@ from ..signals.geography import distance_m
 LONGEST_S = 6.0  # between two points of one course: watches write one so rarely on straights
 SLOWEST_MPS = 2.5  # of a step that is more than the positions' errors
 FASTEST_MPS = 100.0  # a quicker step is a jump of the receiver
+STEP_ERROR_M = 1.0  # of a step's length across it (1 sigma), as phones' receivers err from one second to the next
+COURSE_ERROR_DEG = 4.0  # of the rest: yaw by a gyro whose scale factor is off, and how positions are smoothed
 _OFTEN_S = 0.7
 _AROUND = 2  # points before and after, from which a speed is taken
 
@@ -53,3 +56,35 @@ class Track(Table):
     def steps_m(self) -> tuple[Array, Array]:
         """(n - 1) each: how far east and north every point is of the one before."""
         return distance_m(self.lat_deg[:-1], self.lon_deg[:-1], self.lat_deg[1:], self.lon_deg[1:])
+
+
+@dataclass
+class Course:
+    """m steps between the m + 1 points of a track.
+
+    begin_s, end_s (m): of each step, s since the track's first point. course_deg (m): to the left of east, of a step
+    that is good. sigma_deg (m): its standard deviation. speed_mps (m): length by time. good (m): neither too slow, nor
+    a gap or a jump. turn_deg (m): to the left against the step before; 0 unless both are good.
+    """
+
+    begin_s: Array
+    end_s: Array
+    course_deg: Array
+    sigma_deg: Array
+    speed_mps: Array
+    good: NDArray[np.bool_]
+    turn_deg: Array
+
+
+def course(track: Track) -> Course:
+    """Of a track of at least two points."""
+    since_s = track.utc_s - track.utc_s[0]
+    east, north = track.steps_m()
+    step_s, length_m = np.diff(since_s), np.hypot(east, north)
+    speed = length_m / step_s
+    good = (speed > SLOWEST_MPS) & (speed < FASTEST_MPS) & (step_s <= LONGEST_S)
+    direction = np.degrees(np.arctan2(north, east))
+    turn = (np.diff(direction, prepend=direction[:1]) + 180.0) % 360.0 - 180.0
+    both = good & np.append(False, good[:-1])
+    sigma = np.hypot(np.degrees(STEP_ERROR_M / np.maximum(length_m, 0.1)), COURSE_ERROR_DEG)
+    return Course(since_s[:-1], since_s[1:], direction, sigma, speed, good, np.where(both, turn, 0.0))

@@ -4,8 +4,6 @@ The texts are those of Python's own formatting, made of a column at once instead
 seventh of the time.
 """
 
-import csv
-import gzip
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -14,7 +12,7 @@ import numpy as np
 from kickstand.errors import Notice
 from numpy.typing import NDArray
 
-from ..output import write_whole
+from ..output import write_packed
 from .cells import COLUMNS, OPTIONAL
 from .log import Log
 from .reader import read_blocks
@@ -70,11 +68,10 @@ def number_cells(values: Array, digits: int, nan: str = "nan") -> Letters:
     return letters
 
 
-def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, room: int) -> Letters:
-    """Of integers (n) of up to `most` digits with a point before the last `digits` ones, and a free row in front. room:
-    rows at least."""
+def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, least_rows: int) -> Letters:
+    """Of integers (n) of up to `most` digits with a point before the last `digits` ones, and a free row in front."""
     places = max(most, digits + 1)
-    letters = np.zeros((max(places + 2, room), len(number)), dtype=np.uint8)
+    letters = np.zeros((max(places + 2, least_rows), len(number)), dtype=np.uint8)
     row = len(letters) - 1
     for place in range(places):
         if place == digits > 0:
@@ -87,18 +84,9 @@ def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, room: 
     return letters
 
 
-def write_lines(path: Path, names: Sequence[str], pieces: Iterable[bytes]) -> None:
-    """Write a CSV file from its columns' names and its lines, gzipped if its name ends in .gz, whole or not at all.
-
-    Raises InputError."""
-
-    def write(temporary: Path) -> None:
-        opened = gzip.open if path.suffix == ".gz" else open
-        with opened(temporary, "wb") as file:
-            file.write((",".join(names) + "\n").encode())
-            file.writelines(pieces)
-
-    write_whole(path, write)
+def write_lines(path: Path, names: Sequence[str], lines: Iterable[bytes]) -> None:
+    """Write a CSV file from its columns' names and its lines, as write_packed() does. Raises InputError."""
+    write_packed(path, itertools.chain([(",".join(names) + "\n").encode()], lines))
 
 
 def write_log(path: Path | str, log: Log) -> None:
@@ -155,13 +143,5 @@ def cut_log(
 
 
 def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Write a CSV file, gzipped if its name ends in .gz, whole or not at all."""
-
-    def write(temporary: Path) -> None:
-        opened = gzip.open if path.suffix == ".gz" else open
-        with opened(temporary, "wt", encoding="ascii", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(columns)
-            writer.writerows(rows)
-
-    write_whole(path, write)
+    """Write a CSV file of texts and numbers that need no quotation marks, as write_lines() does. Raises InputError."""
+    write_lines(path, columns, (",".join(map(str, row)).encode("ascii") + b"\n" for row in rows))

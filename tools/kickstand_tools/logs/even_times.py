@@ -84,9 +84,9 @@ def _one_step(between_us: NDArray[np.int64]) -> bool:
 def _apart(recorded: Array, starts: NDArray[np.intp], counts: NDArray[np.intp], period_s: float) -> Array:
     """Samples of the same time spread up to the next time, or over as long as they usually last."""
     until = np.append(recorded[starts[1:]], np.inf)
-    room = np.minimum((until - recorded[starts]) / counts, np.maximum(period_s, 0.0))
+    longest = np.minimum((until - recorded[starts]) / counts, np.maximum(period_s, 0.0))
     number = np.arange(len(recorded)) - np.repeat(starts, counts)
-    return recorded + number * np.repeat(room, counts)
+    return recorded + number * np.repeat(longest, counts)
 
 
 def _smooth(recorded: Array, times: Array, tick_s: float, period_s: float) -> Array:

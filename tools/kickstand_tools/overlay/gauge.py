@@ -18,15 +18,15 @@ LEGIBLE_PX, MOST_SHARE = 216.0, 0.45  # the least height at which its small word
 UPRIGHT_DEG = 0.5  # a smaller lean is to neither side
 _WIDTH = 1.72  # by the height
 _SPREAD = 1.5  # degrees of the picture for a degree of lean
-_MIDDLE, _SIDE = 60.0, 146.0  # of the dial, and of speed and forces, from the left
+_MIDDLE, _SIDE = 60.0, 146.0  # x of the middle of the dial, and of speed and forces
 _KMH, _MPH = 3.6, 3.6 / 1.609344
 
 
 class Gauge:
-    """Draws at one size. video_height: of the video that the gauge is for, pixels. mph: miles, not kilometres, an hour.
-    has_speed: there is room for a speed.
+    """Draws the gauge: shows lean, forces and, if has_speed, the speed. video_height: height of the video that it is
+    for, pixels. mph: the speed in miles, not kilometres, per hour.
 
-    width, height: of the pictures, even, as videos need it.
+    width, height: size of the pictures in pixels, even numbers, because videos need these.
     """
 
     def __init__(self, video_height: int, has_speed: bool = True, mph: bool = False) -> None:

@@ -42,18 +42,14 @@ class Faults:
         """Every transfer to address hangs until the controller gives up, for for_s."""
         self._during("timeout", address, at_s, for_s)
 
-    def corrupt(self, address, nth=1, byte=0, mask=0x01, read=True):
-        """In the nth transfer from now the bits of mask are inverted in one byte read (read=False: written)."""
-        self._transfers("corrupt", address, nth, 1, byte, mask, read)
-
-    def bit_slip(self, address, nth=1, byte=0):
-        """The device misses a clock in the nth transfer from now: what is read from that byte on comes one bit late."""
-        self._transfers("slip", address, nth, 1, byte)
+    def corrupt(self, address, nth=1, byte=0, mask=0x01):
+        """In the nth transfer from now the bits of mask are inverted in one byte that is read."""
+        self._transfers("corrupt", address, nth, 1, byte, mask)
 
     def cut(self, address, at_s, byte):
         """The first transfer to address after at_s that has so many bytes breaks off at byte `byte`."""
 
-        self._board.at(at_s, lambda: self._transfers("cut", address, 1, _FOREVER, byte, read=False))
+        self._board.at(at_s, lambda: self._transfers("cut", address, 1, _FOREVER, byte))
 
     def stuck_sda(self, at_s, bits=8, lcd=False):
         """A device on the sensor's bus (lcd: on the display's) holds SDA low until SCL was clocked `bits` times."""
@@ -186,10 +182,10 @@ class Faults:
             builtins.print = self._real_print
             self._real_print = None
 
-    def _transfers(self, kind, address, nth, count, byte=0, mask=0, read=True):
+    def _transfers(self, kind, address, nth, count, byte=0, mask=0):
         for bus in self._board.buses:
             first = bus.transfers.get(address, 0) + nth
-            bus.faults.append(TransferFault(kind, address, first, first + count - 1, byte=byte, mask=mask, read=read))
+            bus.faults.append(TransferFault(kind, address, first, first + count - 1, byte=byte, mask=mask))
 
     def _during(self, kind, address, at_s, for_s):
         for bus in self._board.buses:

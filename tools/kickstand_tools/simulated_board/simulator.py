@@ -18,6 +18,7 @@ from .i2c import Bus
 from .lcd import Lcd
 from .mpu6050 import Mpu6050
 from .oled import Oled
+from .radio import Radio
 from .sd_card import SdCard
 from .wheel import Wheel
 
@@ -75,6 +76,7 @@ class Board:
         self.watchdog = Watchdog(self.clock)
         usual_sensor, usual_lcd, usual_button, self._gps_pin, self.wheel_pin = WIRING[port]
         self._button_pin = usual_button if button_pin is None else button_pin
+        self.radio = Radio(self.clock, port == "esp32") if chips.has_bluetooth(self.machine) else None
         self.gps = self.wheel = self.card = None  # a Gps, a Wheel, an SdCard, if fitted
         self.sensor_bus = Bus(self.clock, *(sensor_pins or usual_sensor))
         self.lcd_bus = self.sensor_bus if one_bus else Bus(self.clock, *(lcd_pins or usual_lcd))
@@ -131,6 +133,8 @@ class Board:
             return "returned"
         except PowerOff:
             self._off = True
+            if self.radio:
+                self.radio.off()
             for bus in self.buses:
                 bus.power_off()
             self.lcd.power_off()

@@ -12,18 +12,20 @@ from .physics.bike import Bike, roll, weave
 from .physics.chip import DIVIDER, RATE_HZ, Chip
 from .physics.engine import Engine
 from .physics.kinematics import Motion, body_rates, specific_force
-from .physics.road import Shaking, add_bumps, profile_slope, shaking
+from .physics.mount import MOUNTS, Mount
+from .physics.road import CLASSES, Shaking, add_bumps, profile_slope, shaking
 from .physics.signals import band_noise, second_order, smoothed, smoothstep
 from .plan import Conditions, Plan
 from .profiles import PROFILES
 
 _WARMING_S = 300.0  # time constant of the chip's temperature
-_IMPACT_G = 4.0  # at the end of a fall
+_SLIP_DEG, _CAMBER_DEG, _SWAY_M = 0.3, 1.5, 0.006  # rms of side slip, camber and rider's sway on a road of --road
+_IMPACT_G = 4.0  # peak of the impact at the end of a fall
 
 
 @dataclass
 class Ride:
-    """What the sensor read, and the truth.
+    """A simulated ride: the sensor's readings and the truth.
 
     poses, kickstand, upright, readings: each (n, 7) at rate_hz, in the chip's order: force (g), temperature (C), rate
     (deg/s). poses: six sides in random order and a slanted one. time (s), truth (by name) and phase: (n,), an entry for
@@ -50,11 +52,17 @@ def ride(
     upright_error_deg: float = 0.0,
     pitch_change_deg: float | None = None,
     share: float = 1.0,
+    road: str | None = None,
+    mount: str | None = None,
+    exact: bool = False,
 ) -> Ride:
     """Simulate a ride of about this length; a profile and a seed always give the same one.
 
-    upright_error_deg: how far the bike leaned to the right in the upright pose. pitch_change_deg: how much higher the
-    nose was on the kickstand than upright; random within 1 degree if None. share: of the sensor's tolerances.
+    upright_error_deg: lean of the bike to the right in the upright pose. pitch_change_deg: pitch on the kickstand less
+    that in the upright pose; random within 1 degree if None. share: factor on the sensor's tolerances.
+    road: a class of ISO 8608 in place of the profile's own road; it is cambered, the rider moves about and the bike
+    slips a little. mount: one of MOUNTS in place of a firm one. exact: exactly this length, where it is enough for
+    setting off and stopping.
 
     >>> made = ride("parked", seed=1, seconds=20.0)
     >>> made.rate_hz, len(made.poses), made.readings.shape == (len(made.time), 7)
@@ -63,29 +71,44 @@ def ride(
     chance = np.random.default_rng([seed, *profile.encode()])
     plan = Plan(chance, seconds)
     conditions = PROFILES[profile](plan)
+    if exact:
+        plan.fit(seconds)
     bike, chip = Bike.random(chance), Chip.random(chance, share, conditions.drift)
     mounting = random_rotation(chance)
+    # From a source of its own: without them a profile and a seed give the ride that they always gave
+    more = np.random.default_rng([seed, *profile.encode(), 1])
+    if road is not None:
+        _rough(more, plan, conditions, CLASSES[road])
+    mounted = MOUNTS[mount](more, chip) if mount is not None else Mount(chip)
+    if mounted.rise_c is not None:
+        conditions.rise_c = mounted.rise_c
+    chip = mounted.chip
     command = commands(plan.legs, RATE_HZ)
+    slip = _slip(more, command, conditions)
     motion, extra = _motion(chance, command, bike, conditions)
-    # An hour is 29 MB in each column at 1 kHz: what is no longer needed goes, and nothing is a view of it.
+    # An hour is 29 MB in each column at 1 kHz: arrays are freed early, so none may be a view of another.
     temp = conditions.start_c + conditions.rise_c * (1.0 - np.exp(-command.time / _WARMING_S))
     time, phase = command.time[::DIVIDER].copy(), np.array(command.phases)[command.phase[::DIVIDER]]
     del command
     force = specific_force(motion, bike)
     force += extra.force
+    force += _sideways(motion.lean, slip)
+    del slip
     force /= STANDARD_GRAVITY
     rates = body_rates(motion)
     rates += extra.rates
     np.degrees(rates, out=rates)
     truth = _truth(motion)
     del motion, extra
+    if mounted.holder is not None:
+        force, rates = mounted.holder.shaken(force, rates, RATE_HZ)
     turned = _creep(chance, len(force), conditions.creep_deg)
     force, rates = _to_sensor(force, mounting, turned), _to_sensor(rates, mounting, turned)
     del turned
     readings = chip.read(chance, force, rates, temp)
     del force, rates, temp
     home_c = chance.uniform(18.0, 25.0)
-    nose = chance.uniform(-0.5, 0.5)  # slope in degrees of the ground where both poses were taken
+    nose = chance.uniform(-0.5, 0.5)  # slope, degrees, of the ground where both poses were taken
     change = chance.uniform(-1.0, 1.0) if pitch_change_deg is None else pitch_change_deg
     lean = -chance.uniform(8.0, 15.0)
     seven = poses.seven(chance, chip, home_c)
@@ -106,7 +129,7 @@ def ride(
 
 
 def _truth(motion: Motion) -> dict[str, NDArray[np.float64]]:
-    """Of each reading."""
+    """The truth, by name, for each reading."""
     return {
         "lean_deg": np.degrees(motion.lean[::DIVIDER]),
         "speed_mps": motion.speed[::DIVIDER].copy(),
@@ -117,7 +140,7 @@ def _truth(motion: Motion) -> dict[str, NDArray[np.float64]]:
 
 
 def random_rotation(chance: np.random.Generator) -> NDArray[np.float64]:
-    """A mounting: (3, 3) vehicle from sensor, rows left, up, forward. Every rotation is equally likely."""
+    """A random mounting: (3, 3) vehicle from sensor, rows left, up, forward. Every rotation is equally likely."""
     q, r = np.linalg.qr(chance.standard_normal((3, 3)))
     q = q * np.sign(np.diag(r))
     return q * np.linalg.det(q)
@@ -153,8 +176,29 @@ def _motion(
     return motion, shaken
 
 
+def _rough(chance: np.random.Generator, plan: Plan, conditions: Conditions, roughness: float) -> None:
+    """A road as it is: cambered or tilted to either side from leg to leg, ridden by a rider who moves about."""
+    conditions.roughness, conditions.slip_deg = roughness, _SLIP_DEG
+    conditions.sway_m = max(conditions.sway_m, _SWAY_M)
+    for leg in plan.legs:
+        leg.bank_deg = (leg.bank_deg or 0.0) + float(chance.normal(0.0, _CAMBER_DEG))
+
+
+def _slip(chance: np.random.Generator, command: Commands, conditions: Conditions) -> NDArray[np.float64]:
+    """(n) m/s^2 to the left: the tyres give way and grip again, so that the bike does not go quite where it points."""
+    if not conditions.slip_deg:
+        return np.zeros(len(command.time))
+    angle = np.radians(conditions.slip_deg) * band_noise(chance, len(command.time), 0.05, 1.0, command.rate_hz)
+    return np.gradient(angle * command.speed, 1.0 / command.rate_hz)
+
+
+def _sideways(lean: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n, 3) along left, up, forward of a bike that leans, by level accelerations to the left."""
+    return np.column_stack((left * np.cos(lean), -left * np.sin(lean), np.zeros_like(left)))
+
+
 def _places(command: Commands, phase: str, spacing_m: float) -> list[float]:
-    """Distances, multiples of spacing_m, at which the ride is in a phase."""
+    """The distances, multiples of spacing_m, at which the ride is in this phase."""
     if phase not in command.phases:
         return []
     met = command.distance[command.phase == command.phases.index(phase)]
@@ -174,7 +218,7 @@ def _impact(chance: np.random.Generator, command: Commands) -> NDArray[np.float6
 
 
 def _creep(chance: np.random.Generator, n: int, degrees: float) -> NDArray[np.float64]:
-    """How a mount has turned that yields: rotation vectors (n, 3), rad. Most of it slowly, the rest at one moment."""
+    """The rotation of a mount that yields: rotation vectors (n, 3), rad. Most of it is slow, the rest sudden."""
     axis = chance.standard_normal(3)
     at_once = np.zeros(n)
     at_once[int(n * chance.uniform(0.3, 0.7)) :] = 1.0
@@ -183,7 +227,8 @@ def _creep(chance: np.random.Generator, n: int, degrees: float) -> NDArray[np.fl
 
 
 def _to_sensor(vectors: NDArray, mounting: NDArray, turned: NDArray) -> NDArray[np.float64]:
-    """From the vehicle's to the sensor's axes, (n, 3). turned: small rotations of the mount, to second order."""
+    """vectors (n, 3) in the sensor's axes, from the vehicle's. turned: small rotations of the mount (n, 3), applied to
+    second order."""
     if turned.any():
         first = np.cross(turned, vectors)
         vectors = vectors + first + 0.5 * np.cross(turned, first)

@@ -6,6 +6,7 @@ pictures, mutants/ judges the tests.
 
 # As in kickstand_tools/cli/main.py
 COMMANDS = {
+    "bands": ("kickstand_workshop.commands", "How rough simulated roads are, beside recorded rides."),
     "bench": ("kickstand_workshop.commands", "Time, memory and flash of the firmware on an emulated Pico."),
     "evaluate": ("kickstand_workshop.commands", "Compare the shown lean with the truth of simulated rides."),
 }

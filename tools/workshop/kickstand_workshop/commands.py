@@ -1,4 +1,4 @@
-"""The commands that the workshop adds to `kickstand`: evaluate and bench."""
+"""The commands that the workshop adds to `kickstand`: evaluate, bands and bench."""
 
 import contextlib
 import json
@@ -12,10 +12,12 @@ from kickstand_tools.emulator import image, native
 from kickstand_tools.errors import extra
 from kickstand_tools.output import check_directory, new_directory
 from kickstand_tools.progress import Bar, spinner
-from kickstand_tools.simulation.profiles import MAIN
+from kickstand_tools.simulation.physics.mount import MOUNTS
+from kickstand_tools.simulation.physics.road import CLASSES
+from kickstand_tools.simulation.profiles import MAIN, check_profile
 from rich.console import Console
 
-from .evaluation import picture, report, runs
+from .evaluation import bands, picture, report, runs
 from .evaluation.estimators import missing
 
 _WIDTH = 110  # columns of a table that is not printed to a terminal
@@ -60,6 +62,36 @@ def evaluate_command(
         if out is not None:
             figures, drawing = report.write(found, out)
             click.echo(f"written: {figures} and {drawing}", err=True)
+
+
+@click.command()
+@click.argument("recordings", type=PATH, metavar="[RIDE.csv]...", nargs=-1)
+@click.option("--profile", default="street", help=PROFILE_NAMES)
+@click.option("--seed", type=click.IntRange(min=0), default=0, help="Another seed, another ride.")
+@seconds_option(100.0, "Of riding, each; start and stop come on top.")
+@click.option("--mount", type=click.Choice(list(MOUNTS)), help="What is wrong with the sensor's mount or its logger.")
+@JSON
+def bands_command(
+    recordings: tuple[Path, ...], profile: str, seed: int, seconds: float, mount: str | None, as_json: bool
+) -> None:
+    """How rough rides are, by band of frequency: recorded ones, and a profile on its own road and on roads A to D."""
+    check_profile(profile)
+    with Bar("measuring", len(recordings) + 1 + len(CLASSES), patience_s=0.0, lines_s=LINES_S) as bar:
+        found = {}
+        for path in recordings:
+            found[path.name] = bands.of_recording(path)
+            bar.advance(1)
+        for road in (None, *CLASSES):
+            name = profile if road is None else f"{profile}, road {road}"
+            found[name] = bands.of_simulated(profile, seed, seconds, road, mount)
+            bar.advance(1)
+    if as_json:
+        plain = {name: {key: rms.tolist() for key, rms in figures.items()} for name, figures in found.items()}
+        click.echo(json.dumps({"bands_hz": bands.BANDS_HZ, "rides": plain}))
+    else:
+        console = Console()
+        console = console if console.is_terminal else Console(width=_WIDTH)
+        console.print(bands.table(found))
 
 
 @click.command()

@@ -212,8 +212,8 @@ def _forces(seen: Overview, lateral: Array, forward: Array) -> Chart:
     ahead = Line(seen.course.t_s, forward, BRAKE_COLOUR, "forward", GAP_S)
     both = np.concatenate((lateral, forward))
     lowest, highest = float(np.min(both)), float(np.max(both))
-    room = max(0.05 * (highest - lowest), 0.01)
-    made = _over_time(seen, words, [left, ahead], _HIGH, (lowest - room, highest + room))
+    margin = max(0.05 * (highest - lowest), 0.01)
+    made = _over_time(seen, words, [left, ahead], _HIGH, (lowest - margin, highest + margin))
     made.spans = [(stop.start_s, stop.stop_s, f"{stop.mfdd_mps2:.1f}") for stop in seen.stops]
     return made
 

@@ -10,7 +10,7 @@ from kickstand.errors import Notice
 
 from ...errors import InputError
 from ...signals.geography import distance_m
-from ..files import Piece
+from ..files import RecordingFile
 from ..recording import SECOND_NS, Array, Recording, sensor_of, track_of
 from ..sheets import Sheet, names_in, plain, read_sheet, unit_in
 from ..times import Nanoseconds
@@ -21,14 +21,14 @@ _AXES = [f"{sensor}{axis}" for sensor in ("GForce", "Gyro") for axis in "YZX"]  
 _NEAR = 1.25  # times another unit's speed: the units are a factor of 1.6 and more apart
 
 
-def finds(pieces: list[Piece]) -> list[list[Piece]]:
+def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """Each file that has RaceBox's columns is a recording."""
-    return [[piece] for piece in pieces if _header(piece) is not None]
+    return [[file] for file in files if _header(file) is not None]
 
 
-def read(pieces: list[Piece], name: str, speed_unit: str = "") -> Recording:
+def read(files: list[RecordingFile], name: str, speed_unit: str = "") -> Recording:
     """Raises InputError for what is missing. speed_unit: of the column Speed, "" to find it from the positions."""
-    sheet = read_sheet(pieces[0], _header(pieces[0]) or 0)
+    sheet = read_sheet(files[0], _header(files[0]) or 0)
     places, missing = sheet.axes(*_AXES)
     if {"GForceY", "GForceZ"} & set(missing):
         raise InputError(f"{name}: no GForceY or GForceZ, as in its motorcycle mode: export it with that mode off")
@@ -49,9 +49,9 @@ def read(pieces: list[Piece], name: str, speed_unit: str = "") -> Recording:
     return Recording(NAME, accel, gyro, track, notices=notices, utc_ns=0, vehicle_axes=True)
 
 
-def _header(piece: Piece) -> int | None:
+def _header(file: RecordingFile) -> int | None:
     """The number of the line of names: there may be lines about the laps before it."""
-    for number, line in enumerate(piece.text.split("\n", 200)[:200]):
+    for number, line in enumerate(file.text.split("\n", 200)[:200]):
         names = {plain(cell) for cell in names_in(line)}
         if {"gforcex", "gforcez", "time"} <= names:
             return number

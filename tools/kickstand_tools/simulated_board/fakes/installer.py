@@ -5,7 +5,7 @@ import os
 import sys
 import time
 
-from . import fake_machine, fake_os, fake_time
+from . import fake_bluetooth, fake_machine, fake_os, fake_time
 
 _ADDED_TO = ((time, fake_time), (os, fake_os))  # under CPython
 
@@ -23,6 +23,8 @@ class Installer:
         self._replace("machine", fake_machine)
         if board.port == "esp32":
             self._replace("esp32", _Esp32)
+        if board.radio:
+            self._replace("bluetooth", fake_bluetooth)
         if board.poses:
             self._replace("sys", _posing(board.port, board.machine))
         if board.card and board.card.driver:

@@ -13,8 +13,8 @@ from ..scripted.sensor_errors import MAX_GYRO_BIAS_DPS, MAX_OFFSET_G, MAX_SCALE_
 
 RATE_HZ = 1000
 DIVIDER = 5  # 200 Hz
-_ACCEL_RANGE_G, _ACCEL_LSB = 8.0, 4096.0
-_GYRO_RANGE_DPS, _GYRO_LSB = 500.0, 65.5
+_COUNTS = 32768.0
+_GYRO_COUNTS = 32750.0  # of a range: the sheet has 65.5 counts per deg/s at 500
 _ACCEL_NOISE_G = 400e-6 * np.sqrt(RATE_HZ / 2)  # rms of a conversion, from 400 ug/sqrt(Hz)
 _GYRO_NOISE_DPS = 0.005 * np.sqrt(RATE_HZ / 2)
 _CROSS_AXIS = 0.02  # sensitivity of an axis to its neighbours
@@ -38,19 +38,26 @@ _DLPF = _dlpf()
 
 @dataclass(frozen=True)
 class Chip:
-    """One sensor: its errors at 25 C, and how they change with temperature. Axes x, y, z; g, deg/s."""
+    """One sensor: its errors at 25 C, and how they change with temperature. Axes x, y, z; g, deg/s.
 
-    accel_matrix: NDArray[np.float64]  # (3, 3) reading over true: scale on the diagonal, cross-axis beside it
+    low_pass: False where nothing filters before the sampling.
+    """
+
+    accel_matrix: NDArray[np.float64]  # (3, 3) reading over true value: scale factors on the diagonal, else cross-axis
     accel_offset: NDArray[np.float64]
     gyro_matrix: NDArray[np.float64]
     gyro_bias: NDArray[np.float64]
     accel_per_c: NDArray[np.float64]
     gyro_per_c: NDArray[np.float64]
     gyro_walk: float = 0.004  # deg/s per sqrt(s): random walk of the bias
+    accel_range_g: float = 8.0
+    gyro_range_dps: float = 500.0
+    low_pass: bool = True
 
     @staticmethod
     def random(chance: np.random.Generator, share: float = 1.0, drift: float = 1.0) -> "Chip":
-        """A random sensor. share: of the data sheet's tolerances; drift: of an ordinary sensor's over temperature.
+        """A random sensor. share: factor on the data sheet's tolerances; drift: factor on an ordinary sensor's drift
+        with temperature.
 
         Offsets and biases are uniformly distributed within the sheet's limits; scale and cross-axis sensitivity
         normally, with the limit at two standard deviations. Over temperature the sheet allows 35..60 mg and 20 deg/s
@@ -77,7 +84,7 @@ class Chip:
         rates: NDArray[np.float64],
         temp_c: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Readings (n / 5, 7) at 200 Hz in the chip's order: g, C, deg/s. The first is of the first row.
+        """Readings (n / 5, 7) at 200 Hz in the chip's order: g, C, deg/s. The first one is made of the first row.
 
         force (n, 3) in g and rates (n, 3) in deg/s: true values along the sensor's axes at 1 kHz. temp_c (n,).
         """
@@ -91,7 +98,7 @@ class Chip:
         values += self.accel_offset
         values += warm * self.accel_per_c
         values += _noise(chance, n, _ACCEL_NOISE_G)
-        accel = _sampled(values, _ACCEL_RANGE_G, _ACCEL_LSB)
+        accel = self._sampled(values, self.accel_range_g, _COUNTS / self.accel_range_g)
         values = rates @ self.gyro_matrix.T
         values += self.gyro_bias
         values += warm * self.gyro_per_c
@@ -102,21 +109,24 @@ class Chip:
         values += noise
         del noise
         temp = np.round(temp_c[::DIVIDER] * 340.0) / 340.0
-        return np.column_stack((accel, temp, _sampled(values, _GYRO_RANGE_DPS, _GYRO_LSB)))
+        rate = self._sampled(values, self.gyro_range_dps, _GYRO_COUNTS / self.gyro_range_dps)
+        return np.column_stack((accel, temp, rate))
+
+    def _sampled(self, values: NDArray[np.float64], limit: float, lsb: float) -> NDArray[np.float64]:
+        """Clip at the range, filter, take every fifth value, round to whole counts."""
+        columns = []
+        for column in values.T:
+            column = np.clip(column, -limit, limit)
+            if not self.low_pass:
+                columns.append(column[::DIVIDER].copy())
+                continue
+            led_in = np.concatenate((np.full(len(_DLPF) - 1, column[0]), column))
+            columns.append(np.convolve(led_in, _DLPF, mode="valid")[::DIVIDER].copy())
+        counts = np.round(np.column_stack(columns) * lsb)
+        return np.clip(counts, -32768, 32767) / lsb
 
 
 def _noise(chance: np.random.Generator, n: int, rms: float) -> NDArray[np.float64]:
     values = chance.standard_normal((n, 3))
     values *= rms
     return values
-
-
-def _sampled(values: NDArray[np.float64], limit: float, lsb: float) -> NDArray[np.float64]:
-    """Clip at the range, filter, take every fifth value, round to whole counts."""
-    columns = []
-    for column in values.T:
-        column = np.clip(column, -limit, limit)
-        led_in = np.concatenate((np.full(len(_DLPF) - 1, column[0]), column))
-        columns.append(np.convolve(led_in, _DLPF, mode="valid")[::DIVIDER].copy())
-    counts = np.round(np.column_stack(columns) * lsb)
-    return np.clip(counts, -32768, 32767) / lsb

@@ -24,7 +24,7 @@ const FAULTS = {
 const bike = new Bike(byId("bike"));
 const road = new Road(byId("road"));
 const guide = new Guide();
-const state = { powered: true, plugged: true, armed: false, stopped: false, time: 0 };
+const state = { powered: true, plugged: true, armed: false, stopped: false, time: 0, lean_deg: 0 };
 let display;
 let tick = { t_s: 0, lean_deg: -12, speed_mps: 0, yaw_rate_dps: 0, phase: "kickstand" };
 let screen = { text: ["", ""], shown_deg: null };
@@ -42,6 +42,7 @@ const board = new Board({
   tick(next) {
     tick = next;
     state.time = next.t_s;
+    state.lean_deg = next.lean_deg;
     if (next.powered !== state.powered) {
       state.powered = next.powered;
       if (!state.powered) guide.dark(state.armed);
@@ -73,6 +74,7 @@ const actions = {
   kickstand: () => steering.stand("kickstand"),
   upright: () => steering.stand("upright"),
   ride: () => steering.stand("ride"),
+  straight: () => steering.lean(0),
   wire() {
     state.plugged = !state.plugged;
     board.order("sensor", state.plugged);

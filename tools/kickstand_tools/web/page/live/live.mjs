@@ -3,6 +3,7 @@
 
 import { choosePort, inPages, loadOnce, overCable, python } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
+import { Riding } from "./bluetooth/riding.mjs";
 import { Chart } from "./chart.mjs";
 import { busy, offer } from "./files.mjs";
 import { Gauge } from "./gauge.mjs";
@@ -20,6 +21,7 @@ let awake = null; // a WakeLockSentinel
 let aligned = false;
 let measure = null; // LEAN or SIDEWAYS
 let furthest = [0, 0];
+let riding = null; // the Riding that runs, or null
 
 const tell = (text) => (byId("live-said").textContent = text);
 
@@ -63,6 +65,25 @@ function heard(text) {
   player.take(reading.moments, performance.now());
   const lacking = aligned ? "" : `; the board is not aligned yet, so there is ${measure.none}`;
   if (!stopped) tell(`Recording${lacking}: ${clock(reading.seconds)}`);
+}
+
+/** What a Riding shows here. */
+const shown = {
+  begin() {
+    player.restart();
+    furthest = [0, 0];
+  },
+  measure: show,
+  moment: (moment) => player.take([moment], performance.now()),
+  furthest: (ride) => (furthest = measure.most(ride)),
+};
+
+async function ride() {
+  await stayAwake(); // while the press still counts
+  riding = new Riding(shown);
+  await riding.run();
+  riding = null;
+  awake?.release();
 }
 
 function stop() {
@@ -173,6 +194,8 @@ show(LEAN);
 byId("start").addEventListener("click", start);
 byId("stop").addEventListener("click", stop);
 byId("pull").addEventListener("click", pull);
-document.addEventListener("visibilitychange", () => live && !document.hidden && stayAwake());
+byId("ride").addEventListener("click", ride);
+byId("ride-stop").addEventListener("click", () => riding?.stop());
+document.addEventListener("visibilitychange", () => (live || riding) && !document.hidden && stayAwake());
 requestAnimationFrame(draw);
 keepOffline();

@@ -1,0 +1,107 @@
+"""Roads of ISO 8608, and mounts and loggers as they are."""
+
+import numpy as np
+import pytest
+from kickstand_tools.simulation.physics.mount import MOUNTS, Holder
+from kickstand_tools.simulation.physics.road import CLASSES
+from kickstand_tools.simulation.ride import ride
+from kickstand_workshop.evaluation.bands import BANDS_HZ, QUANTITIES, bands_of, of_simulated
+
+
+@pytest.fixture(scope="module")
+def rides():
+    made = {}
+
+    def get(road=None, mount=None):
+        if (road, mount) not in made:
+            made[road, mount] = ride("street", 3, 40.0, road=road, mount=mount)
+        return made[road, mount]
+
+    return get
+
+
+def in_vehicle(made):
+    """Force (g) and rates (deg/s) of the ride while it rides."""
+    riding = made.truth["speed_mps"] > 5.0
+    return tuple((made.readings[:, part] @ made.vehicle_from_sensor.T)[riding] for part in (slice(3), slice(4, 7)))
+
+
+def test_each_class_is_twice_as_rough_as_the_one_before(rides):
+    """Four times its power; the quietest has the engine beside it."""
+    forces = [bands_of(*in_vehicle(rides(road)), 200.0)[QUANTITIES[0]] for road in CLASSES]
+    bands = np.array([force[3] for force in forces])  # 1 to 3 Hz: the springs' own
+    assert np.all((bands[1:] / bands[:-1] > 1.7) & (bands[1:] / bands[:-1] < 2.2))
+
+
+def test_the_ride_is_the_same_one_on_every_road_but_for_rider_and_camber(rides):
+    assert np.array_equal(rides("A").truth["speed_mps"], rides("D").truth["speed_mps"])
+    off = rides("C").truth["lean_deg"] - rides().truth["lean_deg"]
+    assert 0.1 < np.sqrt(np.mean(off**2)) < 2.0
+
+
+def test_heave_pitch_and_pitch_rate_belong_together(rides):
+    """What rises at the front first turns the bike's nose up: the pitch rate is the one of the pitch."""
+    made = rides("D")
+    _, rates = in_vehicle(made)
+    riding = made.truth["speed_mps"] > 5.0
+    straight = np.abs(made.truth["lean_deg"][riding]) < 5.0
+    rate = np.gradient(made.truth["pitch_deg"])[riding] * made.rate_hz
+    assert np.corrcoef(-rates[straight, 0], rate[straight])[0, 1] > 0.9
+
+
+def test_a_holder_sings_where_it_resonates():
+    """At its own frequency, by 1 over twice its damping; far below it follows."""
+    rate_hz, time = 1000.0, np.arange(20_000) / 1000.0
+    holder = Holder(np.full(3, 10.0), np.full(3, 0.05), np.zeros(3))
+    for hz, least, most in ((1.0, 0.99, 1.03), (10.0, 9.5, 10.5), (50.0, 0.0, 0.12)):
+        shaken = np.tile(np.sin(2.0 * np.pi * hz * time)[:, None], (1, 3))
+        force, rates = holder.shaken(shaken, shaken, rate_hz)
+        for found in (force, rates):
+            assert np.all(np.abs(found[5000:15000]).max(axis=0) > least)
+            assert np.all(np.abs(found[5000:15000]).max(axis=0) < most)
+
+
+def test_what_a_holder_sags_by_its_gyro_measures():
+    holder = Holder(np.full(3, 20.0), np.full(3, 0.5), np.radians([1.0, 0.0, 1.0]))
+    pushed = np.zeros((8000, 3))
+    pushed[:, 1] = 1.0
+    pushed[3000:5000, 2] = 0.5  # braked the other way: forward, for two seconds
+    force, rates = holder.shaken(pushed, np.zeros((8000, 3)), 1000.0)
+    assert np.sum(rates[2000:4000, 0]) / 1000.0 == pytest.approx(0.5, abs=0.02)
+    lean_of_force = np.degrees(np.arctan2(force[4000, 2] - 0.5, force[4000, 1]))
+    assert abs(lean_of_force) == pytest.approx(0.5, abs=0.02)
+
+
+@pytest.mark.parametrize("mount", MOUNTS)
+def test_a_bad_mount_reads_otherwise_and_leaves_the_ride_as_it_was(rides, mount):
+    firm, bad = rides("D"), rides("D", mount)
+    assert np.array_equal(firm.truth["lean_deg"], bad.truth["lean_deg"])
+    assert not np.allclose(firm.readings, bad.readings, atol=0.01)
+
+
+def test_what_clips_reads_no_more_than_its_range(rides):
+    assert np.max(np.abs(rides("D", "clipping").readings[:, :3])) <= 2.0
+    assert np.max(np.abs(rides("D").readings[:, :3])) > 2.0
+
+
+def test_what_aliases_is_the_engine_below_its_speed(rides):
+    """The road shakes below 25 Hz: more there is of frequencies over 100 Hz."""
+    plain, aliased = (bands_of(*in_vehicle(rides("A", mount)), 200.0)[QUANTITIES[1]] for mount in (None, "aliasing"))
+    assert aliased[4] > 1.05 * plain[4]
+
+
+def test_bands_are_those_of_a_sine():
+    time = np.arange(20_000) / 100.0
+    force, rates = np.zeros((20_000, 3)), np.zeros((20_000, 3))
+    force[:, 1] = 1.0 + 0.2 * np.sin(2.0 * np.pi * 2.0 * time)
+    rates[:, 2] = 3.0 * np.sin(2.0 * np.pi * 0.2 * time)
+    found = bands_of(force, rates, 100.0)
+    assert found[QUANTITIES[0]] == pytest.approx([0.0, 0.0, 0.0, 0.2 / np.sqrt(2.0), 0.0], abs=0.003)
+    assert found[QUANTITIES[4]] == pytest.approx([0.0, 3.0 / np.sqrt(2.0), 0.0, 0.0, 0.0], abs=0.05)
+
+
+def test_simulated_roads_reach_what_a_real_motorcycle_meets():
+    """Through town (see the README): vertical 0.078 g from 1 to 3 Hz and 0.151 g from 3 to 10, between C and D."""
+    calm, rough = (of_simulated("street", 0, 100.0, road, None)[QUANTITIES[0]] for road in "CD")
+    assert len(calm) == len(BANDS_HZ)
+    assert calm[3] < 0.151 and rough[3] > 0.078

@@ -1,0 +1,283 @@
+"""Rides whose road, bike, rider, mount and sensor are drawn at random, each from what is real: a second opinion.
+
+On the second simulator (other_bike.py), so that nothing is shared with kickstand_tools.simulation. Parameters of the
+estimators are fitted with even seeds only, and figures are reported of odd ones:
+
+    python host_tests/support/recordings/drawn_rides.py odd 40 > FIGURES
+"""
+
+import sys
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.estimation.smooth import smooth
+from kickstand_tools.logs.log import Log
+from kickstand_tools.replay.replay import replay
+from other_bike import FINE_HZ, KINDS, G, _about, _course, _noise, _readings
+
+# And how often. "foreign": accelerations that are not the bike's, of whatever shakes or bends the mount
+MOUNTS = {"firm": 0.5, "holder": 0.1, "aliasing": 0.1, "clipping": 0.1, "drifting": 0.1, "foreign": 0.1}
+ROUGH = {"track": (4e-6, 32e-6)}  # m^3 at 0.1 cycles/m, of ISO 8608; others from a new motorway to a patched lane
+USUALLY_ROUGH = 8e-6, 512e-6
+WAVES_PER_M = 0.03, 4.0
+
+
+@dataclass
+class DrawnRide:
+    """logs: of each device on the bike (n samples each, on its own clock); calibrations likewise. Truth (m): time_s,
+    lean_deg, speed_mps. kind, mounts: what was drawn."""
+
+    logs: list
+    calibrations: list
+    time_s: np.ndarray
+    lean_deg: np.ndarray
+    speed_mps: np.ndarray
+    kind: str
+    mounts: list
+
+    def true_lean(self, k):
+        """At the samples of device k."""
+        return np.interp(self.logs[k].t_s, self.time_s, self.lean_deg)
+
+    def riding(self, k):
+        """(n) True from setting off on."""
+        return self.logs[k].t_s > self.time_s[np.argmax(self.speed_mps > 0.5)]
+
+
+def street(chance):
+    """Bends to either side, straights, some traffic lights."""
+    legs = [(6.0, 0.0, 0.0), (6.0, 0.0, 15.0)]
+    for _ in range(60):
+        speed, kind = chance.uniform(11.0, 26.0), chance.random()
+        if kind < 0.08:
+            legs += [(7.0, 0.0, 0.0), (chance.uniform(4.0, 12.0), 0.0, 0.0), (7.0, 0.0, 16.0)]
+        elif kind < 0.5:
+            legs += [(chance.uniform(2.0, 9.0), 0.0, speed)]
+        else:
+            legs += [(chance.uniform(2.0, 7.0), chance.choice((-1.0, 1.0)) * chance.uniform(8.0, 38.0), speed)]
+    return legs
+
+
+def city(chance):
+    """Junctions and roundabouts at 4 to 13 m/s, and stops."""
+    legs = [(6.0, 0.0, 0.0), (5.0, 0.0, 9.0)]
+    for _ in range(60):
+        speed, kind = chance.uniform(4.0, 8.0), chance.random()
+        if kind < 0.2:
+            legs += [(4.0, 0.0, 0.0), (chance.uniform(3.0, 20.0), 0.0, 0.0), (5.0, 0.0, 9.0)]
+        elif kind < 0.5:
+            legs += [(chance.uniform(3.0, 8.0), 0.0, chance.uniform(7.0, 13.0))]
+        else:
+            legs += [(chance.uniform(1.5, 4.0), chance.choice((-1.0, 1.0)) * chance.uniform(8.0, 28.0), speed)]
+    return legs
+
+
+def hills(chance):
+    """As street, slower; slopes come by the ride's conditions."""
+    return [(s, lean, 0.7 * v) for s, lean, v in street(chance)]
+
+
+DRAWN = {**KINDS, "street": street, "city": city, "hills": hills}
+
+
+def drawn_ride(seed, seconds=150.0, mounts=None, kind=None):
+    """mounts: of each device on the bike, drawn for one if None. kind: drawn if None."""
+    chance = np.random.default_rng([seed, 24])
+    drawn = str(chance.choice(list(DRAWN)))
+    kind = kind or drawn
+    legs, total = DRAWN[kind](chance), 0.0
+    kept = []
+    for leg in legs:
+        total += leg[0]
+        if total > seconds - 8.0 and len(kept) > 3:
+            break
+        kept.append(leg)
+    time, lean, v = _course([*kept, (8.0, 0.0, 15.0)])
+    n = len(time)
+    riding = np.clip((v - 1.0) / 3.0, 0.0, 1.0)
+    # The balance, and how the chassis leans beside it: wide tyres on a road with a tilt, and a rider who moves
+    wander = chance.uniform(0.2, 0.8) * _noise(chance, n, chance.uniform(0.5, 1.5)) * riding
+    balance = np.radians(lean + wander)
+    tilt = np.radians(chance.uniform(-2.5, 2.5) + chance.uniform(0.3, 1.0) * _noise(chance, n, 8.0))
+    tyre, height = chance.uniform(0.03, 0.08), chance.uniform(0.55, 0.7)
+    met = balance - tilt
+    flank = np.arctan2(tyre * np.sin(met), height - tyre + tyre * np.cos(met))
+    rider = np.radians(np.exp(chance.uniform(np.log(0.3), np.log(1.5))) * _noise(chance, n, chance.uniform(0.7, 3.0)))
+    hung = chance.uniform(-0.02, 0.06)
+    chassis = balance + (flank + rider - hung * balance) * riding
+    # The roll balance: falling into a lean takes turning the other way first
+    falling = chance.uniform(0.6, 0.75) * _twice(balance) / np.cos(balance)
+    yaw_rate = np.where(v > 0.5, (falling - G * np.tan(balance)) / np.maximum(v, 3.0), 0.0)
+    steep = chance.uniform(1.5, 4.0) if kind == "hills" else chance.uniform(0.3, 1.5)
+    slope = np.radians(steep) * _noise(chance, n, chance.uniform(4.0, 10.0)) * riding
+    dive = np.radians(chance.uniform(0.15, 0.4)) * np.gradient(v) * FINE_HZ
+    dive = _through(dive, *_spring(chance.uniform(1.4, 2.2), chance.uniform(0.35, 0.6)))
+    low, high = ROUGH.get(kind, USUALLY_ROUGH)
+    wheelbase = chance.uniform(1.3, 1.55)
+    rear, front = _road(chance, v, wheelbase, np.exp(chance.uniform(np.log(low), np.log(high))))
+    slip = np.radians(chance.uniform(0.1, 0.5)) * _noise(chance, n, chance.uniform(0.5, 3.0))
+    pitch = slope + dive + (front - rear) / wheelbase
+    engine = np.exp(chance.uniform(np.log(0.03), np.log(0.2))) * np.clip(v / 10.0, 0.3, 1.5)
+    turns = np.cumsum(np.clip(35.0 + 6.0 * (v % 9.0), 20.0, 150.0)) / FINE_HZ
+    used = mounts or [str(chance.choice(list(MOUNTS), p=list(MOUNTS.values())))]
+    logs, calibrations = [], []
+    for mount in used:
+        place = chance.uniform(0.2, 0.8), chance.uniform(0.1, 1.0)
+        force, rates = _readings(v, yaw_rate, slope, chassis, pitch, place[0], slip, rear, place[1])
+        log, calibration = _device(chance, mount, force, np.degrees(rates), v, engine, turns)
+        logs.append(log)
+        calibrations.append(calibration)
+    step = FINE_HZ // 200
+    return DrawnRide(logs, calibrations, time[::step], np.degrees(chassis[::step]), v[::step], kind, used)
+
+
+def _device(chance, mount, force, rates, v, engine, turns):
+    """What a sensor on the bike reads, and its calibration by six positions and two poses that were not quite right."""
+    n, rough = len(v), np.clip(v / 5.0, 0.1, 1.0)[:, None]
+    for order in (1.0, 2.0):
+        phases, weights = chance.uniform(0.0, 2.0 * np.pi, 6), chance.uniform(0.2, 1.0, 6)
+        shaken = engine[:, None] * weights * np.sin(2.0 * np.pi * order * turns[:, None] + phases)
+        force, rates = force + shaken[:, :3], rates + 10.0 * shaken[:, 3:]
+    if mount == "holder":
+        hz, damping = (np.exp(chance.uniform(*np.log(limits), 3)) for limits in ((5.0, 40.0), (0.02, 0.1)))
+        springs = [_spring(f, z, True) for f, z in zip(hz, damping)]
+        force, rates = (
+            np.column_stack([_through(column, *spring) for column, spring in zip(values.T, springs)])
+            for values in (force, rates)
+        )
+        # It sags by the forces, which the gyro sees
+        sagged = np.radians(chance.uniform(0.1, 0.3)) * (10.0 / hz[0]) ** 2 * np.clip(force[:, 0], -2.0, 2.0)
+        rates[:, 2] -= np.degrees(np.gradient(sagged) * FINE_HZ)
+        force[:, 0] -= sagged * force[:, 1]
+    if mount == "foreign":
+        for axis, most_g, over_s in ((0, 0.06, 0.2), (1, 0.05, 1.5), (1, 0.2, 0.05), (2, 0.06, 0.2)):
+            size, over_s = most_g * chance.uniform(0.3, 1.0), over_s * np.exp(chance.uniform(-0.7, 0.7))
+            force[:, axis] += size * _noise(chance, n, over_s) * np.clip(v / 5.0, 0.0, 1.0)
+    if mount == "clipping":
+        force, rates = np.clip(force, -1.6, 1.6), np.clip(rates, -125.0, 125.0)
+    step = FINE_HZ // (100 if mount == "aliasing" else 200)
+    count = n // step
+    if mount == "aliasing":
+        force, rates = (values[: count * step : step] for values in (force, rates))
+    else:
+        force, rates = (values[: count * step].reshape(-1, step, 3).mean(axis=1) for values in (force, rates))
+    rough = rough[: count * step : step]
+    force = force + chance.uniform(0.02, 0.08) * rough * chance.standard_normal((count, 3))
+    rates = rates + chance.uniform(0.3, 1.5) * rough * chance.standard_normal((count, 3))
+    gyro, accel = (
+        np.eye(3) + chance.uniform(-1.0, 1.0, (3, 3)) * np.where(np.eye(3) > 0, scale, cross)
+        for scale, cross in ((0.03, 0.02), (0.004, 0.01))
+    )
+    rate_hz = FINE_HZ / step
+    middle = (np.arange(count) + 0.5) / rate_hz
+    drift = np.cumsum(chance.standard_normal((count, 3)), axis=0) * 0.004 / np.sqrt(rate_hz)
+    rates = rates @ gyro.T + chance.uniform(-0.3, 0.3, 3) + drift
+    force = force @ accel.T + chance.normal(0.0, 0.002, 3)
+    if mount == "drifting":
+        force = force + chance.uniform(-0.03, 0.03, 3) * (1.0 - np.exp(-middle / 120.0))[:, None]
+    roll = np.radians(chance.uniform(-1.5, 1.5))
+    yaw = np.radians(chance.uniform(-1.0, 1.0)) / np.tan(np.radians(chance.uniform(8.0, 14.0)))
+    mounting, _ = np.linalg.qr(chance.standard_normal((3, 3)))
+    mounting *= np.linalg.det(mounting)
+    calibration = CalibrationFile(
+        vehicle_from_sensor=_about(2, roll) @ _about(1, yaw) @ mounting, aligned=True, six_done=True, gyro_delay_s=0.0
+    )
+    return Log(middle, force @ mounting, rates @ mounting), calibration
+
+
+def _road(chance, v, wheelbase, roughness):
+    """Height (m) of the chassis over each wheel: waves of the road by ISO 8608, met at v, through tyre and spring."""
+    at = np.cumsum(v) / FINE_HZ
+    edges = np.exp(np.linspace(*np.log(WAVES_PER_M), 241))
+    waves = np.sqrt(edges[1:] * edges[:-1]) * np.exp(chance.normal(0.0, 0.003, 240))
+    sizes = np.sqrt(2.0 * roughness * (0.1 / waves) ** 2 * np.diff(edges))
+    phases = chance.uniform(0.0, 2.0 * np.pi, len(waves))
+    grid = np.arange(0.0, at[-1] + wheelbase + 1.0, 0.04)
+    height = np.zeros_like(grid)
+    for wave, size, phase in zip(waves, sizes, phases):
+        height += size * np.sin(2.0 * np.pi * wave * grid + phase)
+    body, wheel = (chance.uniform(1.5, 2.5), chance.uniform(0.3, 0.5)), (chance.uniform(12.0, 15.0), 0.3)
+    found = []
+    for begin in (0.0, wheelbase):
+        met = np.interp(at + begin, grid, height)
+        met -= met[0]
+        found.append(_through(_through(met, *_spring(*body, True)), *_spring(*wheel)))
+    return found
+
+
+def _spring(hz, damping, by_its_foot=False):
+    """Coefficients of (1 + b s) / (1 + a s + s^2) with s in units of the natural frequency."""
+    return hz, 2.0 * damping, 2.0 * damping if by_its_foot else 0.0
+
+
+def _through(x, hz, a, b):
+    """x through a mass on a spring: the exact gain at each frequency; the ends are held."""
+    pad = 4 * FINE_HZ
+    size = 1 << int(np.ceil(np.log2(len(x) + 2 * pad)))
+    padded = np.pad(x, (pad, size - len(x) - pad), mode="edge")
+    end = np.linspace(0.0, 1.0, size) * (padded[-1] - padded[0])
+    s = 1j * np.fft.rfftfreq(size, 1.0 / FINE_HZ) / hz
+    passed = np.fft.irfft(np.fft.rfft(padded - end) * (1.0 + b * s) / (1.0 + a * s + s * s), size) + end
+    return passed[pad : pad + len(x)]
+
+
+def _twice(x):
+    return np.gradient(np.gradient(x)) * FINE_HZ**2
+
+
+def judged(ride, k=0):
+    """Errors (n, riding) of device k in degrees: live (NaN where not shown), smoothed, its standard deviation."""
+    log, calibration, riding = ride.logs[k], ride.calibrations[k], ride.riding(k)
+    true = ride.true_lean(k)
+    shown, found = replay(log, calibration), smooth(log, calibration)
+    live = np.where(np.isnan(shown.lean_sigma_deg), np.nan, shown.lean_deg - true)
+    return live[riding], (found.lean_deg - true)[riding], found.lean_sigma_deg[riding]
+
+
+def figures(seed):
+    """seed, kind, mount; live: rms, worst, share shown; smoothed: rms, worst, share within 1 and 2 sigma, mean
+    sigma."""
+    ride = drawn_ride(seed)
+    live, off, sigma = judged(ride)
+    seen = ~np.isnan(live)
+    ratio = np.abs(off) / sigma
+
+    def rms(values):
+        return float(np.sqrt(np.mean(values**2)))
+
+    return (
+        seed,
+        ride.kind,
+        ride.mounts[0],
+        *(rms(live[seen]), float(np.max(np.abs(live[seen]))), float(np.mean(seen))),
+        *(rms(off), float(np.max(np.abs(off))), float(np.mean(ratio < 1.0)), float(np.mean(ratio < 2.0))),
+        float(np.mean(sigma)),
+    )
+
+
+FORM = "%5d %-9s %-9s %5.2f %5.1f %4.0f%%  %5.2f %5.1f %4.0f%% %4.0f%% %5.2f"
+
+
+def main(which, count):
+    """Print the figures of so many seeds, and those of all, by mount."""
+    seeds = range(which == "odd", 2 * int(count), 2)
+    print(" seed kind      mount      live worst shown  smooth worst  1 s  2 s sigma")
+    with ProcessPoolExecutor(2) as pool:
+        rows = sorted(pool.map(figures, seeds), key=lambda row: list(MOUNTS).index(row[2]))
+    for row in rows:
+        shares = (100.0 * row[5], *row[6:8], *(100.0 * share for share in row[8:10]), row[10])
+        print(FORM % (*row[:5], *shares), "" if row[6] <= row[3] else "worse than live")
+    for mount in MOUNTS:
+        some = np.array([row[3:] for row in rows if row[2] == mount])
+        if len(some):
+            live, smoothed = np.sqrt(np.mean(some[:, [0, 3]] ** 2, axis=0))
+            worse = np.count_nonzero(some[:, 3] > some[:, 0])
+            print(f"{mount:9} {len(some):3} rides: live {live:.2f}, worst {some[:, 1].max():.1f};", end=" ")
+            print(f"smoothed {smoothed:.2f}, worst {some[:, 4].max():.1f},", end=" ")
+            print(f"within 1 and 2 sigma {some[:, 5].mean():.0%} {some[:, 6].mean():.0%}; worse than live {worse}")
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,92 @@
+"""Mounts and loggers as they are: a holder that sings, a logger that aliases, readings that clip, a sensor that warms.
+
+Each is drawn at random within what such devices have.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .chip import Chip
+from .signals import Signal, derivative, through
+
+_SAG_LIMIT = np.radians(3.0)  # of a holder's sagging: a spring is linear no further
+
+
+@dataclass(frozen=True)
+class Holder:
+    """A soft holder: sensor and holder are a mass on springs, along and about each axis.
+
+    hz, damping (3): along left, up, forward; the same springs turn it. sag (3): rad per g, about left by the force
+    forward, about up by none, about forward by the force to the left.
+    """
+
+    hz: NDArray[np.float64]
+    damping: NDArray[np.float64]
+    sag: NDArray[np.float64]
+
+    @staticmethod
+    def random(chance: np.random.Generator) -> "Holder":
+        hz = np.exp(chance.uniform(np.log(5.0), np.log(40.0), 3))
+        sag = chance.uniform(0.1, 0.3, 3) * np.array([1.0, 0.0, 1.0]) * (10.0 / hz) ** 2
+        return Holder(hz, np.exp(chance.uniform(np.log(0.02), np.log(0.1), 3)), np.radians(sag))
+
+    def shaken(
+        self, force: NDArray[np.float64], rates: NDArray[np.float64], rate_hz: float
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Force (n, 3, g) and rates (n, 3, deg/s) of what is held, by those of the bike, along left, up, forward."""
+        held = np.column_stack([self._passed(column, k, rate_hz) for k, column in enumerate(force.T)])
+        turned = np.zeros_like(held)
+        turned[:, 0] = (self.sag[0] * held[:, 2]).clip(-_SAG_LIMIT, _SAG_LIMIT)
+        turned[:, 2] = (-self.sag[2] * held[:, 0]).clip(-_SAG_LIMIT, _SAG_LIMIT)
+        turning = np.column_stack([derivative(column, rate_hz) for column in turned.T])
+        turning = np.column_stack([self._passed(column, k, rate_hz) for k, column in enumerate(rates.T)]) + np.degrees(
+            turning
+        )
+        return held - np.cross(turned, held), turning
+
+    def _passed(self, x: Signal, axis: int, rate_hz: float) -> Signal:
+        """Through a mass on a spring that is shaken at its foot."""
+
+        def transfer(f: Signal) -> NDArray:
+            damped = 2j * self.damping[axis] * f / self.hz[axis]
+            return (1.0 + damped) / (1.0 + damped - (f / self.hz[axis]) ** 2)
+
+        return through(x, transfer, rate_hz)
+
+
+@dataclass(frozen=True)
+class Mount:
+    """How the sensor sits on the bike, and what reads it. rise_c: as in Conditions, None: as there."""
+
+    chip: Chip
+    holder: Holder | None = None
+    rise_c: float | None = None
+
+
+def holder(chance: np.random.Generator, chip: Chip) -> Mount:
+    """5 to 40 Hz, a damping of 0.02 to 0.1, and it sags by about a fifth of a degree per g, a softer one by more."""
+    return Mount(chip, Holder.random(chance))
+
+
+def aliasing(chance: np.random.Generator, chip: Chip) -> Mount:
+    """No low-pass before the sampling: what the engine shakes appears at other frequencies."""
+    return Mount(replace(chip, low_pass=False))
+
+
+def clipping(chance: np.random.Generator, chip: Chip) -> Mount:
+    """Ranges of 2 g and 250 deg/s, which bumps and the engine exceed."""
+    return Mount(replace(chip, accel_range_g=2.0, gyro_range_dps=250.0))
+
+
+def warming(chance: np.random.Generator, chip: Chip) -> Mount:
+    """The accelerometer's offset drifts by up to 1.5 mg per C, and the sensor gets 15 to 25 C warmer."""
+    drift = chance.uniform(-0.0015, 0.0015, 3)
+    return Mount(replace(chip, accel_per_c=drift), rise_c=chance.uniform(15.0, 25.0))
+
+
+MOUNTS: dict[str, Callable[[np.random.Generator, Chip], Mount]] = {
+    mount.__name__: mount for mount in (holder, aliasing, clipping, warming)
+}

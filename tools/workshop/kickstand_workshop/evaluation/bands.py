@@ -1,0 +1,84 @@
+"""How rough rides are: rms by band of frequency, of simulated rides beside recorded ones."""
+
+from pathlib import Path
+
+import numpy as np
+from kickstand_tools.calibration.file import CalibrationFile
+from kickstand_tools.errors import InputError
+from kickstand_tools.estimation.alignment import fit_ride
+from kickstand_tools.logs.reader import Log, read_log
+from kickstand_tools.simulation.ride import ride
+from numpy.typing import NDArray
+from rich import box
+from rich.table import Table
+
+BANDS_HZ = ((0.03, 0.1), (0.1, 0.3), (0.3, 1.0), (1.0, 3.0), (3.0, 10.0))
+QUANTITIES = ("vertical, g", "sideways, g", "pitch rate, deg/s", "yaw rate, deg/s", "roll rate, deg/s")
+_GRID_HZ = 50.0
+_LEAST_S = 2.0 / BANDS_HZ[0][0]
+_RIDING_DPS = 5.0  # a bike that stands does not turn so fast
+
+Figures = dict[str, NDArray[np.float64]]
+
+
+def bands_of(force_g: NDArray[np.float64], rate_dps: NDArray[np.float64], rate_hz: float) -> Figures:
+    """rms (len(BANDS_HZ)) of each of QUANTITIES, of evenly spaced force and rate (n, 3) along left, up, forward."""
+    columns = force_g[:, 1], force_g[:, 0], *rate_dps.T
+    window = np.hanning(len(force_g))
+    frequency = np.fft.rfftfreq(len(force_g), 1.0 / rate_hz)
+    found = {}
+    for name, values in zip(QUANTITIES, columns, strict=True):
+        power = np.abs(np.fft.rfft((values - values.mean()) * window)) ** 2 * 2.0 / len(values) / np.sum(window**2)
+        inside = [power[(frequency >= low) & (frequency < high)].sum() for low, high in BANDS_HZ]
+        found[name] = np.sqrt(np.array(inside))
+    return found
+
+
+def bands_of_log(log: Log, calibration: CalibrationFile) -> Figures:
+    """Of the log from where it first rides to where it last does. Raises InputError."""
+    step = 1.0 / _GRID_HZ
+    time = np.arange(log.t_s[0], log.t_s[-1], step)
+    force, rate = calibration.in_vehicle(log.readings)
+    number = np.searchsorted(time, log.t_s, side="right") - 1
+
+    def mean(values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Of the samples in each step, so that nothing aliases; between them a straight line."""
+        count = np.bincount(number, minlength=len(time))
+        there = count > 0
+        total = np.bincount(number, values, minlength=len(time))
+        return np.interp(time, time[there], total[there] / count[there])
+
+    force, rate = (np.column_stack([mean(column) for column in values.T]) for values in (force, rate))
+    busy = np.flatnonzero(np.linalg.norm(rate - np.median(rate, axis=0), axis=1) > _RIDING_DPS)
+    if not len(busy) or (busy[-1] - busy[0]) * step < _LEAST_S:
+        raise InputError(f"{log.name}: less than {_LEAST_S:.0f} s of riding: too short for the lowest band")
+    riding = slice(busy[0], busy[-1] + 1)
+    return bands_of(force[riding], rate[riding], _GRID_HZ)
+
+
+def of_recording(path: Path) -> Figures:
+    """Of a recorded ride, aligned by itself. Raises InputError."""
+    log = read_log(path)
+    return bands_of_log(log, fit_ride(log).calibration)
+
+
+def of_simulated(profile: str, seed: int, seconds: float, road: str | None, mount: str | None) -> Figures:
+    """Of a simulated ride, with its true alignment."""
+    made = ride(profile, seed, seconds, road=road, mount=mount)
+    calibration = CalibrationFile(vehicle_from_sensor=made.vehicle_from_sensor, aligned=True)
+    return bands_of_log(Log.from_readings(made.readings, made.rate_hz, "RIDE.csv"), calibration)
+
+
+def table(found: dict[str, Figures]) -> Table:
+    """A block of lines for each quantity. found: by the name of the ride."""
+    made = Table(title="rms by band of frequency, Hz", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    made.add_column("ride", overflow="fold")
+    for low, high in BANDS_HZ:
+        made.add_column(f"{low:g}-{high:g}", justify="right")
+    for quantity in QUANTITIES:
+        made.add_row(quantity, style="cyan")
+        digits = 3 if quantity.endswith(" g") else 2
+        for k, (name, figures) in enumerate(found.items()):
+            cells = [f"{value:.{digits}f}" for value in figures[quantity]]
+            made.add_row("  " + name, *cells, end_section=k == len(found) - 1)
+    return made
