@@ -18,7 +18,7 @@ from .unknowns import BIAS, FORWARD, LEAN, LEFT, PARAMETERS, PITCH, ROTATION, ST
 from .windows import Windows
 
 BLOCK = 50  # windows of a block; see solver.py
-ROUNDS, PLAIN_ROUNDS = 10, 2  # at most; the first ones without regard to outliers
+ROUNDS, PLAIN_ROUNDS = 20, 2  # at most; the first ones without regard to outliers
 NEAR, CONVERGED = np.radians([3.0, 0.02])  # changes of an angle: from NEAR on residuals show the ride's errors
 WEIGHING_ROUNDS = 2
 MAX_LEAN = 0.5  # rad: of one step. The equations are linear no further.
@@ -48,6 +48,8 @@ class Estimate:
         self.parameters = np.tile(prior.mean, (len(windows) // self._length, 1))
         self.matrix, self.change = np.eye(3), np.inf
         self._converge()
+        if self._learn_misfit():
+            self._converge()
         self._use_own_noise()
 
     def unknowns(self, number: NDArray[np.intp], states: Array) -> Array:
@@ -89,6 +91,12 @@ class Estimate:
             weighing_rounds += near
             if self.change < CONVERGED and weighing_rounds >= WEIGHING_ROUNDS:
                 break
+
+    def _learn_misfit(self) -> bool:
+        """Are accelerations somewhere in the ride not the bike's?"""
+        off = self._residuals()
+        self._noise.estimate_misfit(off / self._noise.robust(self._noise.sigma(), off))
+        return bool(np.max(self._noise.misfit) > 1.0)
 
     def _use_own_noise(self) -> None:
         """Errors are from now on as large as this ride's residuals.

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..logs.table import Array
+from ..signals.averages import moving_mean
 from ..signals.leaning import WINDOW_S, averaged
 from . import equations as eq
 from .first_guess import in_hand
@@ -45,6 +46,11 @@ LASTING_S = {eq.SLIDING: SLIDE_S, eq.CLIMBING: DIVE_S, eq.SLOPING: SLOPE_S, eq.B
 ROUGH = [LEAN, PITCH, LEFT, UP, FORWARD, eq.SLIDING, eq.CLIMBING]
 EXPECTED = np.array([0.38, 0.38, 0.38, 0.38, 0.38, 0.5, 0.5])
 ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
+# Accelerations that are not the bike's, as of a mount that sings, are white noise only as far as they do not last.
+# Their size and how long they last show in CLIMBING: the velocity up by integrated forces and that by pitch and speed
+# part for seconds. The velocities' noise grows with the square of this residual's rms, in means over LASTING_MISFIT_S
+# and times the root of their number of windows, over the usual one.
+LASTING_MISFIT_S, USUAL_MISFIT, MOST_MISFIT = 2.0, 0.3, 4.0
 # How far from balance a ride is, likewise: by the rms of BALANCED in means over some seconds, less what lasts longer
 # (unknowns.BESIDE), over its standard deviation. The longer these means, the more an error has gone that changes
 # sides, as a rider's corrections do: over BRIEF_S the balance is judged with care, over LONG_S as it is.
@@ -57,7 +63,8 @@ class Noise:
     """Of n windows. still (n): the bike stands.
 
     riding (n): the bike rides, or may. lean (n, rad), speed (n, m/s): roughly, to be set before anything is asked.
-    roughness (n): 1 for a rough ride. unbalance: 1 for a ride that is as far from balance as usual.
+    roughness (n): 1 for a rough ride. misfit (n): by which the velocities' noise is enlarged, 1 where accelerations are
+    the bike's. unbalance: 1 for a ride that is as far from balance as usual.
     """
 
     def __init__(self, windows: Windows, still: NDArray[np.bool_]) -> None:
@@ -66,7 +73,7 @@ class Noise:
         self._rolling = np.gradient(windows.rate[:, 2]) / WINDOW_S if len(windows) > 1 else np.zeros(1)
         self._riding = ~windows.gap & ~still & ~self._not_riding
         self.lean = self.speed = np.zeros(len(windows))
-        self.roughness, self.unbalance = np.ones(len(windows)), 1.0
+        self.roughness, self.misfit, self.unbalance = np.ones(len(windows)), np.ones(len(windows)), 1.0
         seconds = np.maximum(windows.seconds, 1e-4)
         self._root = np.sqrt(seconds)[:, None]
         self._lasting = np.ones((len(windows), eq.ROWS))  # what an error that lasts is multiplied by in each window
@@ -82,6 +89,7 @@ class Noise:
         found[:, :LEFT] = ANGLE_ROOT
         found[:, LEFT : BIAS.start] = VELOCITY_ROOT
         found[:, : BIAS.start] *= self._root * roughness[:, None]
+        found[:, LEFT : BIAS.start] *= self.misfit[:, None]
         found[:, :LEFT] = np.hypot(found[:, :LEFT], jolted(w)[:, None])
         found[:, BIAS] = (BIAS_ROOT if np.any(w.warm) else WARMING_ROOT) * self._root
         lost, free = np.minimum(LOST_ROOT * self._root, LOST_MOST), w.gap | self._in_hand
@@ -113,6 +121,16 @@ class Noise:
         share = averaged(self._riding.astype(float), ROUGHNESS_S)
         found = averaged(np.where(self._riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
         self.roughness = np.where(share > 0.02, np.clip(np.sqrt(found), LEAST_ROUGHNESS, MOST_ROUGHNESS), 1.0)
+
+    def estimate_misfit(self, residual: Array) -> None:
+        """How far accelerations are from the bike's, from the residuals over their standard deviations (n, ROWS)."""
+        count = round(LASTING_MISFIT_S / WINDOW_S)
+        lasting = np.where(self._riding, residual[:, eq.CLIMBING], 0.0)
+        squares = count * moving_mean(lasting, count) ** 2
+        share = averaged(self._riding.astype(float), ROUGHNESS_S)
+        mean = averaged(np.where(self._riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
+        found = np.where(share > 0.02, mean / USUAL_MISFIT**2, 1.0)
+        self.misfit = np.clip(found, 1.0, MOST_MISFIT)
 
     def estimate_unbalance(self, force: Array, over_s: float) -> None:
         """From the measurement BALANCED (n, g). over_s: BRIEF_S or LONG_S."""
