@@ -139,9 +139,10 @@ def words(found: Agreement) -> Iterator[str]:
                 f"    B's lean is {one.slope:.3f} times A's, and {abs(one.delay_s) * 1e3:.0f} ms "
                 f"{'later' if one.delay_s >= 0.0 else 'earlier'}"
             )
+        shares = f"{100.0 * one.within_1:.0f} % of the differences are within one of it, {100.0 * one.within_2:.0f} %"
         yield (
-            f"    both expect {one.expected_deg:.2f} rms by their own standard deviations: {one.within_1:.0%} of the "
-            f"differences are within one of it, {one.within_2:.0%} within two (if both are right: 68 and 95 %)"
+            f"    both expect {one.expected_deg:.2f} rms by their own standard deviations: {shares} within two (if "
+            "both are right: 68 and 95 %)"
         )
     yield (
         "the constant part is an upright pose or a mount that was not straight; which of the two is right, a "

@@ -21,7 +21,7 @@ _SMOOTH = 5  # cells over which rates are averaged, so that their derivatives ar
 _MOST_DPS = 60.0  # higher rates, by jolts, are cut to this
 _APART_S, _CANDIDATES = 3.0, 6
 _INDEPENDENT_S = 1.0  # rates that are further apart are taken as independent
-_LEAST_S = 30.0  # least time of riding that both have
+_LEAST_S = 60.0  # least time of riding that both have
 _LEAST_EVIDENCE, _LEAST_LEAD = 15.0, 6.0  # as in match.py
 _LEAST_CORRELATION = 0.8  # least correlation of the rates: two sensors on one bike have over 0.9
 _MOST_DRIFT, _USUAL_DRIFT = 400e-6, 100e-6  # as in match.py and in fit.py
@@ -63,7 +63,7 @@ def clocks(a: Motion, b: Motion, axes_a: CalibrationFile, axes_b: CalibrationFil
         tried.append((float(ratio), alike, shift_s))
     tried.sort(reverse=True)
     if not tried or tried[0][0] < _LEAST_EVIDENCE or tried[0][1] < _LEAST_CORRELATION:
-        raise InputError("nowhere do they turn alike for half a minute: are they of one ride, and both on the bike?")
+        raise InputError("nowhere do they turn alike for a minute: are they of one ride, and both on the bike?")
     if len(tried) > 1 and tried[1][0] > tried[0][0] - _LEAST_LEAD:
         raise InputError("they fit at two times: a longer ride with more bends is needed")
     turn = _rotation(a, b, tried[0][2])
