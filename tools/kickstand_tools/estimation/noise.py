@@ -51,7 +51,7 @@ EXPECTED = np.array([0.38, 0.38, 0.38, 0.38, 0.38, 0.5, 0.5])
 ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
 # Accelerations that are not the bike's, as of a mount that resonates, are white noise only as far as they do not last.
 # Their size and correlation time show in CLIMBING: the upward velocity by integrated forces and that by pitch and speed
-# differ for seconds. The variance of the velocities' noise grows with the rms of this residual, in means over
+# differ for seconds. The velocities' standard deviation grows with the square of this residual's rms, in means over
 # LASTING_MISFIT_S and times the root of their number of windows, over that of an ordinary ride, USUAL_MISFIT.
 LASTING_MISFIT_S, USUAL_MISFIT, MOST_MISFIT = 2.0, 0.3, 4.0
 # How far from balance a ride is, likewise: by the rms of BALANCED in means over some seconds, less its mean over
