@@ -24,7 +24,7 @@ from .ui.screen import Screen
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
 COLLECT_TURNS = 42  # turns between two garbage collections: they use 90 KB of heap, of 120 free while recording
-COLLECT_TURNS_DRIVING = 25  # the same while aligning by driving, where 85 KB of heap are free, and with an OLED
+COLLECT_TURNS_DRIVING = 25  # the same while aligning by driving and with an OLED: 85 KB of heap are free
 SINGLE_GAPS = 300  # single free heap blocks that a collection leaves
 PAGE_MS = 100
 # A page shows no lean if its own delay and the age of the readings still in the FIFO add up to more: so a lean on the
@@ -42,6 +42,11 @@ def fill_gaps(n):
     value = 0.5
     for _ in range(n):
         value = -value  # each float is boxed: one block of the heap
+
+
+# Of the last run, once Ctrl-C has ended it: microseconds of its longest turn, and the fewest places that were left in
+# the chip's FIFO. kickstand.status() prints them
+worst = None
 
 
 class App:
@@ -64,6 +69,7 @@ class App:
         self.clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self.screen = Screen(settings, sensor, self.clock, self.meter, self.calibration, self.drive, self.rides)
         self._restarts = 0
+        self._least_wait_us = LOOP_US
         self._page_ms = ticks_ms()
         self.live = None
         if radio:
@@ -107,6 +113,8 @@ class App:
             self._loop()
         except KeyboardInterrupt:
             port.rest_watchdog()  # not fed from here on; comes first, because a second Ctrl-C may interrupt the rest
+            global worst
+            worst = LOOP_US - self._least_wait_us, self.sensor.chip.places_left()
             self.rides.stop()
             if self.live:
                 self._end_live()
@@ -134,6 +142,8 @@ class App:
                 watchdog.feed()
             due_us = ticks_add(due_us, LOOP_US)
             wait_us = ticks_diff(due_us, ticks_us())
+            if wait_us < self._least_wait_us:
+                self._least_wait_us = wait_us
             if wait_us > 0:
                 sleep_us(wait_us)
             else:  # late, as after writing to flash: count from here instead of racing to catch up

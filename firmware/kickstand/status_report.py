@@ -42,6 +42,7 @@ def report():
         return
     _calibration(who_am_i, settings)
     _machine_code()
+    _worst()
     gc.collect()
     space = os.statvfs("/")
     free_kb = gc.mem_free() // 1024, space[0] * space[3] // 1024
@@ -113,6 +114,14 @@ def _speed(settings):
         print("  " + ", ".join(messages.lines(fault)))
     else:
         print("  nothing yet" if heard is None else "  %.1f m/s" % heard)
+
+
+def _worst():
+    """Print what the app has noted, if it has run since the board was started."""
+    app = sys.modules.get("kickstand.app")
+    if app and app.worst:
+        words = "longest turn %.1f ms; places left in the FIFO, at the fewest: %d"
+        _print("Since start", words, app.worst[0] / 1000, app.worst[1])
 
 
 def _machine_code():

@@ -109,6 +109,7 @@ class Mpu6050:
         # The first n frames, for each n: made once, because each slice takes heap.
         self._some_frames = [memoryview(self._frames)[: FRAME * n] for n in range(MAX_FRAMES + 1)]
         self.frames_left = self.overflows = 0
+        self._most = 0  # bytes that have waited in the FIFO
         self._odd = False  # the last fetch() found a frame that was not complete
         self._started = False  # setup() has run to its end: the FIFO is filling
         self._full = 0  # with so many bytes in it the FIFO may have overflowed
@@ -189,6 +190,8 @@ class Mpu6050:
         """
         self._i2c.readfrom_mem_into(self._address, _FIFO_COUNT_H, self._two)
         waiting = self._two[0] << 8 | self._two[1]
+        if waiting > self._most:
+            self._most = waiting
         odd = waiting % FRAME != 0
         if waiting > self._full or (odd and self._odd):
             self.overflows += 1
@@ -205,6 +208,10 @@ class Mpu6050:
         if taken:
             self._i2c.readfrom_mem_into(self._address, _FIFO_R_W, self._some_frames[taken])
         return taken
+
+    def places_left(self):
+        """How many samples the FIFO had at least place for, at each fetch()."""
+        return max(0, self._full + FRAME - self._most) // FRAME
 
     def take(self, k):
         """Put sample k of the last fetch() into counts; 0 is the oldest. Takes no heap."""

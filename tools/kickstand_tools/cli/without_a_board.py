@@ -9,11 +9,11 @@ from typing import Any
 import click
 
 from ..demo.demo import DeviceStopped, demo
-from ..emulator import image, native
+from ..emulator import esp32_library, image, native
 from ..output import check_directory
 from ..progress import spinner
 from ..web import serve, site
-from .common import PATH, file_argument
+from .common import CHIP, PATH, file_argument
 
 _HAND = click.option("--hand", is_flag=True, help="Lean the bike and press the button yourself, with keys.")
 _CPYTHON = click.option("--cpython", is_flag=True, help="Run the firmware on CPython, not on MicroPython.")
@@ -71,12 +71,16 @@ def web_command(out: Path | None) -> None:
 
 @click.command()
 @click.option("--port", type=click.IntRange(1024, 65535), default=2040, help="On which mpremote finds it.")
+@CHIP
 @_DISPLAY
-def emulate_command(port: int, display: str) -> None:
-    """An emulated Pico on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
+def emulate_command(port: int, chip: str, display: str) -> None:
+    """An emulated board on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
     image.find()  # before anything else of the emulator is imported
-    with spinner("compiling the emulator, once"):
-        native.build()
+    if chip == "esp32":
+        esp32_library.find()
+    else:
+        with spinner("compiling the emulator, once"):
+            native.build()
     from ..emulator.emulate import emulate
 
-    emulate(port, click.echo, display)
+    emulate(port, click.echo, chip, display)
