@@ -15,7 +15,6 @@ from .board import port
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
 from .devices import open_button
-from .errors import Refusal
 from .imu.sensor import SampleClock
 from .lean.meter import LeanMeter
 from .rides.recording import Recording
@@ -44,12 +43,13 @@ def fill_gaps(n):
 class App:
     """The lean meter on a board.
 
-    settings: a Settings. lcd, sensor: of devices.open_lcd() and open_sensor(). keeper: as for Recording. radio: a Radio
-    for a phone, or None; a LiveError if there should be one and is none. Raises SettingsError for pins that cannot be
-    used.
+    settings: a Settings. lcd, sensor: of devices.open_lcd() and open_sensor(). keeper: as for Recording. Raises
+    SettingsError for pins that cannot be used.
+
+    live: a Live, once one is attached (see live/live.py), or None.
     """
 
-    def __init__(self, settings, lcd, sensor, keeper=None, radio=None):
+    def __init__(self, settings, lcd, sensor, keeper=None):
         self.settings = settings
         self.lcd = lcd
         self.button = open_button(settings)
@@ -63,8 +63,6 @@ class App:
         self._restarts = 0
         self._page_ms = ticks_ms()
         self.live = None
-        if radio:
-            self._open_live(radio)
 
     def _open_drive(self):
         # 30 KB of heap with all that they import: not for a board without a speed source
@@ -72,19 +70,6 @@ class App:
         from .speed.source import open_speed
 
         return BackgroundAlignment(self.settings.leans, open_speed(self.settings), self.meter, self.calibration)
-
-    def _open_live(self, radio):
-        if isinstance(radio, Refusal):
-            self.screen.notify(radio, ticks_ms())
-            return
-        from .live.live import Live
-
-        self.live = Live(radio, self, self.settings.leans)
-        self.screen.add_live(self.live, self._end_live)
-
-    def _end_live(self):
-        self.live.stop()
-        self.live = None
 
     def run(self):
         """Loop until Ctrl-C, LOOP_US a turn."""
@@ -94,7 +79,7 @@ class App:
             port.rest_watchdog()  # nothing feeds it from here on; first, for a second Ctrl-C may interrupt what follows
             self.rides.stop()
             if self.live:
-                self._end_live()
+                self.live.stop()
             raise
 
     def _loop(self):

@@ -80,6 +80,7 @@ def test_a_thousand_random_acts():
 def run(board):
     from kickstand import devices
     from kickstand.app import App
+    from kickstand.live import live
     from kickstand.live import radio as live_radio
     from kickstand.settings import Settings
 
@@ -93,7 +94,8 @@ def run(board):
 
     def go():
         chosen = Settings(type("Config", (), {"LIVE": True}))
-        app = App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen), radio=live_radio.Radio())
+        app = App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen))
+        live.attach(live_radio.open_radio(None), app)
         phone = Forgetful(board)
         for count in range(WARM + ACTS):
             if count in (WARM, WARM + ACTS // 2):

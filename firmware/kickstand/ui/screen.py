@@ -145,11 +145,6 @@ class Screen:
         """Add a page behind the others. page: a function of the meter that gives two lines of 16 characters."""
         self.pages.add(page)
 
-    def add_live(self, live, end):
-        """Show a Live on a page, and let the menu end it by calling end()."""
-        self.pages.live = live
-        self._end_live = end
-
     def interrupt(self, now_ms):
         """The sensor has failed: a calibration under way is cancelled."""
         if self.wizard:
@@ -186,7 +181,7 @@ class Screen:
         drive = (("Align by drive", self._align_by_drive),) if self._drive else ()
         rest = (("Six positions", self._six), ("Reset maxima", self._reset), ("Sensor info", self._info.show))
         record = ("Stop recording", self._stop) if self._rides.recorder.active else ("Record ride", self._record)
-        last = (record,) + ((("Stop Bluetooth", self._stop_live),) if self.pages.live else ())
+        last = (record, ("Stop Bluetooth", self.pages.live.stop)) if self.pages.live else (record,)
         if self._settings.leans:
             return align + rest + drive + last
         return drive + rest + last
@@ -240,11 +235,6 @@ class Screen:
                 self.notify(problem, now_ms)
             elif self._rides.recorder.active:
                 self._notice.show(pages.recording(self._rides.recorder), now_ms)
-
-    def _stop_live(self, now_ms):
-        self.pages.live = None
-        self._end_live()
-        self._notice.show(("Bluetooth is off", "until restart"), now_ms)
 
     def _stop(self, now_ms):
         self._rides.stop()
