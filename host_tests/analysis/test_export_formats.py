@@ -255,11 +255,11 @@ def test_parquet_has_the_same_columns_with_their_units(tmp_path):
     export_columns.write_parquet(tmp_path / "x", iter([block(0.25), block(0.5, 0.75, speed_mps=np.nan)]), EVENING_S)
     file = ParquetFile(tmp_path / "x")
     assert file.num_row_groups == 2
-    units = "s deg deg g g g g deg/s deg/s deg/s m/s Cel deg deg deg s".split()
+    units = "s deg deg g g g g deg/s deg/s deg/s m/s Cel g deg deg deg s".split()
     assert {field.name: field.metadata[b"unit"].decode() for field in file.schema_arrow} == dict(
         zip(export_columns.COLUMNS, units, strict=True)
     )
-    assert [str(field.type) for field in file.schema_arrow] == ["double", *["float"] * 12, *["double"] * 3]
+    assert [str(field.type) for field in file.schema_arrow] == ["double", *["float"] * 13, *["double"] * 3]
     assert file.schema_arrow.metadata[b"axes"] == b"left, up, forward; lean > 0 to the right"
     table = file.read()
     assert table["t_s"].to_pylist() == [EVENING_S + 0.25, EVENING_S + 0.5, EVENING_S + 0.75]

@@ -96,7 +96,7 @@ def test_every_file_is_kept_for_a_time_without_network(files):
     worker = files["service_worker.js"].decode()
     listed = re.search(r"const FILES = (\[.*?\]);", worker)
     assert listed
-    large = "esptool/", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip"
+    large = "esptool/", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip", "sample/"
     later = {name for name in files if name.startswith(large)}
     assert set(json.loads(listed[1])) == {"./", *files} - {"service_worker.js", "index.html"} - later
     assert "{{" not in worker

@@ -52,6 +52,8 @@ from .fleet.run import run_fleet as run_fleet
 from .imports.importing import Imported as Imported
 from .imports.importing import import_recording as import_recording
 from .imports.importing import write_imported as write_imported
+from .joining.agreement import Agreement as Agreement
+from .joining.agreement import compare_rides as compare_rides
 from .joining.joined import Joined as Joined
 from .joining.joined import join_track as join_track
 from .joining.joined import write_joined as write_joined

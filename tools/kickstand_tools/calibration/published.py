@@ -1,9 +1,9 @@
 """Alignment by driving as ViriCiti published it: R = R2 R1, each a rotation by Rodrigues' formula.
 
-R1 turns the mean direction of gravity at the stops upwards. R2 turns the mean force of the braking events, levelled by
-R1, backwards. A braking event counts if the directions of its levelled force spread little. A tilt left over from the
-stops leaks into forward, a yaw error of some 3 to 4 degrees that more braking events do not take away. The firmware's
-DriveAlignment does not have this error; the published method is here to be compared with it.
+R1 rotates the mean direction of gravity at the stops to up. R2 rotates the mean force of the braking events, levelled
+by R1, to backward. A braking event counts if the directions of its levelled force spread little. A remaining tilt of
+the vertical by the stops makes a yaw error of some 3 to 4 degrees, which more braking events do not reduce. The
+firmware's DriveAlignment does not have this error; the published method is here for comparison.
 """
 
 from math import degrees, sqrt
@@ -17,7 +17,7 @@ MAX_DISPERSION = 0.02  # 8 degrees
 MIN_LEVEL_G = 0.03  # a smaller levelled force points anywhere
 BRAKING_MPS2 = -1.0  # an interval with more deceleration belongs to a braking event
 MEAN_US = 100_000
-LOSS_MPS = 1.5  # a braking event that takes off less speed is noise
+LOSS_MPS = 1.5  # a braking event that reduces the speed by less is noise
 MIN_EVENTS = 3
 UP = (0.0, 1.0, 0.0)
 BACKWARD = (0.0, 0.0, -1.0)
@@ -129,7 +129,7 @@ class _Samples:
 
 
 class PublishedAlignment:
-    """Used like a DriveAlignment. One runs beside it, which checks speed and mount and finds the vertical.
+    """Has the methods of a DriveAlignment. Runs one beside it, which checks speed and mount and finds the vertical.
 
     counted, turned: braking events accepted, and refused for their dispersion; needed: how many must be accepted.
     """
@@ -140,8 +140,8 @@ class PublishedAlignment:
         self.needed = MIN_EVENTS
         self.counted = self.turned = 0
         self._accepted = [0.0] * 3  # sum of their forces
-        self._event = _Samples()  # of the braking event that goes on
-        self._interval = _Samples()  # since the last speed: the next one will show whether it was braking
+        self._event = _Samples()  # samples of the braking event under way
+        self._interval = _Samples()  # samples since the last speed: the next speed shows whether they were braking
         self._means = CircularDispersion()  # one direction for each accepted braking event
         self._speed = -1.0
         self._loss = 0.0
@@ -154,28 +154,28 @@ class PublishedAlignment:
 
     @property
     def problem(self):
-        """What is wrong with the speed or with the mount: an AlignmentError, or None."""
+        """The fault of the speed or of the mount: an AlignmentError, or None."""
         return self._improved.problem
 
     @property
     def ready(self):
-        """True once matrix() can be taken."""
+        """True once matrix() gives an alignment."""
         return self.problem is None and self.counted >= self.needed
 
     @property
     def quality_deg(self):
-        """Standard error of the mean direction of the accepted braking events, 180 until there are two. The leaked tilt
-        is not in it."""
+        """Standard error of the mean direction of the accepted braking events, 180 until there are two. It does not
+        contain the error by a wrong vertical."""
         n = self.counted
         return degrees(sqrt(self._means.value() / n)) if n > 1 else 180.0
 
     @property
     def reason(self):
-        """Why matrix() cannot be had yet: an AlignmentError."""
+        """Why matrix() gives no alignment yet: an AlignmentError."""
         return self.problem or self._improved.missing(self.counted, self.needed, self.turned)
 
     def update(self, force, rate, dt_us):
-        """As DriveAlignment.update()."""
+        """Take a sample: see DriveAlignment.update()."""
         if dt_us > GAP_US:
             self.interrupt()
             return
@@ -193,12 +193,12 @@ class PublishedAlignment:
                 self._sample(list(self._levelled))
 
     def interrupt(self):
-        """As DriveAlignment.interrupt()."""
+        """Samples are missing: drop the braking event under way. Accepted events stay."""
         self._improved.interrupt()
         self._forget()
 
     def finish(self):
-        """As DriveAlignment.finish()."""
+        """Do all pending work at once: see DriveAlignment.finish()."""
         self._improved.finish()
 
     def _forget(self):
@@ -222,7 +222,7 @@ class PublishedAlignment:
                 self._interval.force[i] += force[i]
 
     def measure_speed(self, speed_mps, age_us=0):
-        """As DriveAlignment.measure_speed(), but without an estimate of the lag."""
+        """Take a new speed: see DriveAlignment.measure_speed(), but the lag is not estimated."""
         self._improved.measure_speed(speed_mps, age_us)
         seconds = self._interval_us * 1e-6
         if self._interval_us < MIN_INTERVAL_US:

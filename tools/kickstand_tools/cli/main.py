@@ -13,6 +13,7 @@ from ..errors import InputError, cause
 # numpy, which takes its time
 COMMANDS = {
     "calibrate": (".calibrate", "Compute a calibration from recorded poses or drives."),
+    "compare": (".ride", "Compare the leans of two devices on one bike."),
     "cut": (".ride", "Cut a stretch out of a log."),
     "demo": (".without_a_board", "The firmware on a simulated board, in the terminal."),
     "emulate": (".without_a_board", "An emulated Pico that flash can deploy to."),
@@ -30,6 +31,7 @@ COMMANDS = {
     "simulate": (".simulated", "Make up a ride with its true lean, or drives of a fleet."),
     "smooth": (".ride", "Find the lean afterwards, from the whole ride."),
     "status": (".board", "Ask a board for versions, settings, sensor and calibration."),
+    "try": (".without_a_board", "Your own code, as user.py on the simulated board."),
     "web": (".without_a_board", "Open the lean meter's pages in the browser."),
 }
 

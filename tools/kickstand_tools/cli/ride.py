@@ -1,4 +1,4 @@
-"""The commands that read a recorded ride: import, join, replay, smooth, report, plot, export, cut, overlay."""
+"""The commands that read a recorded ride: import, join, compare, replay, smooth, report, plot, export, cut, overlay."""
 
 import json
 from collections.abc import Iterator
@@ -20,12 +20,13 @@ from ..calibration.file import calibration_beside, calibration_path, read_calibr
 from ..errors import InputError
 from ..estimation.smooth import smooth_to_csv
 from ..imports.importing import Imported, import_recording, write_imported
+from ..joining import agreement
 from ..joining.joined import Joined, join_track, write_joined
 from ..joining.track_files import read_track
 from ..logs.csv_lines import cut_log
 from ..logs.reader import Source
 from ..logs.stretch import Stretch
-from ..output import check_output
+from ..output import check_output, write_whole
 from ..overlay.overlay import overlay
 from ..progress import Bar, spinner
 from ..replay.replay import replay_to_csv
@@ -118,6 +119,39 @@ def join_command(ride: Path, track: Path, out: Path) -> None:
     click.echo(f"written: {out}, {count} positions")
     if calibration_path(ride).is_file() and not calibration_path(out).exists():
         click.echo(f"next: kickstand report {out} --calibration {calibration_path(ride)}")
+
+
+@click.command()
+@file_argument("a", "A.csv")
+@file_argument("b", "B.csv")
+@click.option("--calibration-a", type=PATH, help="A's CAL.json; if not given, the one beside it.")
+@click.option("--calibration-b", type=PATH, help="B's CAL.json; if not given, the one beside it.")
+@click.option("--plot", "picture", type=PATH, metavar="FILE.png", help="Draw both leans and their difference.")
+@JSON
+@RIGHT_HANDED
+def compare_command(
+    a: Path, b: Path, calibration_a: Path | None, calibration_b: Path | None, picture: Path | None, as_json: bool
+) -> None:
+    """How the leans of two devices on one bike agree: two recordings of one ride.
+
+    By two phones, or by a phone and the board. When the one was in the other is found out by how both turn.
+    """
+    paths = [given or calibration_beside(log) for log, given in ((a, calibration_a), (b, calibration_b))]
+    if picture is not None:
+        agreement.check_picture(picture)
+        check_output(picture, [a, b, *paths])
+    of_a, of_b = (read_calibration(path) for path in paths)
+    with Bar("comparing") as bar:
+        found = agreement.compare_rides(a, b, of_a, of_b, bar.reach)
+    for log, notices in zip((a, b), found.notices.values()):
+        warn(log, notices)
+    if picture is not None:
+        write_whole(picture, lambda path: agreement.draw(path, found))
+    if as_json:
+        click.echo(json.dumps(found.as_data()))
+    else:
+        print_lines(agreement.words(found))
+        print_lines([f"written: {picture}"] if picture is not None else [])
 
 
 @click.command()

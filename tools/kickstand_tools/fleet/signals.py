@@ -13,7 +13,7 @@ from .files import file_stem, folder_value, printable, write_bytes
 from .manifest import Period
 
 UNKNOWN_DAY = "unknown"
-_FINE = ("t_s", "utc_s")  # 32-bit floats are too coarse for these
+_FINE = ("t_s", "utc_s")  # columns for which 32-bit floats are too coarse
 # column: unit
 COLUMNS = {
     "t_s": "s since the log's first sample",

@@ -28,6 +28,7 @@ COLUMNS = {
     "roll_rate_dps": (4, "deg/s"),
     "speed_mps": (3, "m/s"),
     "temp_c": (2, "Cel"),
+    "shown_g": (5, "g"),
     "lean_sigma_deg": (3, "deg"),
     "lat_deg": (7, "deg"),
     "lon_deg": (7, "deg"),

@@ -36,6 +36,7 @@ const board = new Board({
   ready() {
     byId("pose").disabled = false;
     for (const id in FAULTS) byId(id).disabled = false;
+    byId("kind").disabled = false;
     keepOffline().then((kept) => byId("offline").classList.toggle("away", !kept));
   },
   tick(next) {
@@ -99,6 +100,11 @@ for (const id in FAULTS) {
     actions[id]();
   });
 }
+byId("kind").value = "lcd"; // a browser keeps what was chosen before the page was loaded again
+byId("kind").addEventListener("change", (event) => {
+  board.order("display", event.target.value);
+  focusPress();
+});
 // After a click with the mouse the space bar is the board's button again
 addEventListener("click", (event) => {
   if (event.detail && event.target.closest("button:not(#press, #do)")) document.activeElement.blur();
@@ -160,7 +166,7 @@ function put(id, text) {
 
 try {
   display = new Display(byId("display"), byId("display-said"), await (await fetched("./font.json")).json());
-  if (screen.codes) display.show(screen);
+  if (screen.codes || screen.pixels) display.show(screen);
   draw();
 } catch (error) {
   stop(`The display cannot be drawn: ${error.message}. Load the page again.`);

@@ -1,0 +1,235 @@
+"""Compares the leans of two devices on one bike: the test of a lean meter that needs no truth.
+
+It does not show errors that both have in common, such as those of the bike's model. It shows those of each device
+alone: of its sensor, its mount, its calibration. Of two equally good devices each has the difference over the square
+root of two as its error.
+"""
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from kickstand.errors import Notice
+from numpy.typing import NDArray
+
+from ..calibration.file import CalibrationFile
+from ..errors import InputError, extra
+from ..estimation.smooth import SmoothedRide, smooth
+from ..logs.reader import Source, read_twice
+from ..logs.source import Progress, name_of
+from ..logs.table import Array
+from ..replay.replay import replay
+from .clocks import Clocks, clocks
+from .motion import motion
+
+STEP_S = 0.02
+_RIDING_MPS = 3.0
+_GAP_S = 0.2  # in a longer time between two samples the lean is not known
+_LEAST_S = 20.0  # least time of riding that is compared
+_LEANED_DEG = 3.0  # with a smaller rms of the lean neither delay nor slope is computed
+
+
+@dataclass
+class Difference:
+    """B's lean less A's, in degrees. constant_deg: its mean, by poses and mounts. moving_deg: rms of the difference
+    less that mean, of which 95 % are under p95_deg and all under worst_deg. slope: B's lean over A's. delay_s: delay of
+    B's lean. The last two are None where the ride leans too little. expected_deg: the rms that the standard deviations
+    of both predict; within_1, within_2: shares of the differences within one and two of these. Parts of seconds."""
+
+    seconds: float
+    rms_deg: float
+    constant_deg: float
+    moving_deg: float
+    p95_deg: float
+    worst_deg: float
+    slope: float | None
+    delay_s: float | None
+    expected_deg: float
+    within_1: float
+    within_2: float
+
+
+@dataclass
+class Agreement:
+    """Of rides A and B. live: of the leans as displayed, where both show one; None if that is nowhere. smoothed: of
+    those afterwards. t_s (n): s since A's first sample; the leans (n, degrees) at these times, NaN where not known."""
+
+    clocks: Clocks
+    live: Difference | None
+    smoothed: Difference
+    t_s: Array
+    leans: dict[str, Array]
+    notices: dict[str, list[Notice]] = field(default_factory=dict)
+
+    def as_data(self) -> dict[str, Any]:
+        """All but the leans, for JSON."""
+        live = None if self.live is None else asdict(self.live)
+        return {"clocks": asdict(self.clocks), "live": live, "smoothed": asdict(self.smoothed)}
+
+
+def compare_rides(
+    a: Source,
+    b: Source,
+    calibration_a: CalibrationFile,
+    calibration_b: CalibrationFile,
+    progress: Progress | None = None,
+) -> Agreement:
+    """Two recordings of one ride by two devices: how their leans agree. Their clocks may differ by any time.
+
+    a, b: see read_log. progress: called with how much of the first reading is done. Raises InputError, also where they
+    are not of one ride.
+
+    >>> from kickstand_tools.api import Log, simulate_ride
+    >>> made = simulate_ride("street", seed=1, seconds=90.0)
+    >>> axes, log = made.vehicle_from_sensor, Log.from_readings(made.readings, made.rate_hz)
+    >>> calibration = CalibrationFile(vehicle_from_sensor=axes, aligned=True)
+    >>> compare_rides(log, log, calibration, calibration).smoothed.rms_deg
+    0.0
+    """
+    a, b = read_twice(a), read_twice(b)
+    notices: dict[str, list[Notice]] = {"a": [], "b": []}
+    motion_a, motion_b = (motion(one, progress, said) for one, said in zip((a, b), notices.values()))
+    try:
+        found = clocks(motion_a, motion_b, calibration_a, calibration_b)
+    except InputError as error:
+        raise InputError(f"{name_of(a)}, {name_of(b)}: {error}") from error
+    rides = [smooth(one, calibration) for one, calibration in ((a, calibration_a), (b, calibration_b))]
+    shown = [replay(one, calibration) for one, calibration in ((a, calibration_a), (b, calibration_b))]
+    for said, ride in zip(notices.values(), rides):
+        said.extend(notice for notice in ride.notices if notice not in said)
+    t_s = np.arange(0.0, rides[0].t_s[-1], STEP_S)
+    at = t_s, found.of_b(t_s)
+    riding = np.ones(len(t_s), dtype=bool)
+    for ride, when in zip(rides, at):
+        riding &= _interpolated(ride.t_s, ride.speed_mps, when) > _RIDING_MPS  # also not-a-number
+    smoothed = [_known(ride, when, riding) for ride, when in zip(rides, at)]
+    live = [_known(ride, when, riding) for ride, when in zip(shown, at)]
+    difference = _difference(*smoothed)
+    if difference is None:
+        raise InputError(f"{name_of(a)}, {name_of(b)}: under {_LEAST_S:.0f} s of riding in common")
+    names = ("live A", "live B", "smoothed A", "smoothed B")
+    leans: dict[str, Array] = dict(zip(names, (lean for lean, _ in (*live, *smoothed))))
+    return Agreement(found, _difference(*live), difference, t_s, leans, notices)
+
+
+def words(found: Agreement) -> Iterator[str]:
+    """Yield the result in words, line by line."""
+    of = found.clocks
+    side = "after" if of.later_s >= 0.0 else "before"
+    yield (
+        f"B begins {abs(of.later_s):.2f} s {side} A; they have {of.common_s / 60.0:.1f} minutes in common (correlation "
+        f"of the rates {of.correlation:.2f}, B's clock {abs(of.drift) * 1e6:.0f} ppm "
+        f"{'slow' if of.drift > 0.0 else 'fast'})"
+    )
+    for name, one in (("live", found.live), ("smoothed", found.smoothed)):
+        if one is None:
+            yield f"{name}: hardly anywhere is a lean shown by both"
+            continue
+        yield (
+            f"{name}: they differ by {one.rms_deg:.2f} degrees rms over {one.seconds / 60.0:.1f} minutes of riding: B "
+            f"leans {abs(one.constant_deg):.2f} more to the {'right' if one.constant_deg > 0.0 else 'left'} all the "
+            f"time, and the rest moves by {one.moving_deg:.2f} rms (95 % under {one.p95_deg:.1f}, worst "
+            f"{one.worst_deg:.1f})"
+        )
+        if one.slope is not None and one.delay_s is not None:
+            yield (
+                f"    B's lean is {one.slope:.3f} times A's, and {abs(one.delay_s) * 1e3:.0f} ms "
+                f"{'later' if one.delay_s >= 0.0 else 'earlier'}"
+            )
+        yield (
+            f"    both expect {one.expected_deg:.2f} rms by their own standard deviations: {one.within_1:.0%} of the "
+            f"differences are within one of it, {one.within_2:.0%} within two (if both are right: 68 and 95 %)"
+        )
+    yield (
+        "the constant part is an upright pose or a mount that was not straight; which of the two is right, a "
+        "comparison cannot say"
+    )
+
+
+def check_picture(path: Path) -> None:
+    """Raise InputError if no picture can be drawn."""
+    if not find_spec("matplotlib"):
+        raise InputError(f"a picture needs matplotlib: {extra('rides')}")
+    if path.suffix != ".png":
+        raise InputError(f"{path}: the picture is a .png")
+
+
+def draw(path: Path, found: Agreement) -> None:
+    """Write a PNG with the leans of both over time, and their difference."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(14, 7), layout="constrained")
+    FigureCanvasAgg(figure)
+    above, below = figure.subplots(2, 1, sharex=True)
+    for name, width in (("smoothed A", 1.6), ("smoothed B", 0.9)):
+        above.plot(found.t_s, found.leans[name], linewidth=width, label=name)
+    above.set(ylabel="lean, deg (> 0 right)")
+    for kind, width in (("live", 0.6), ("smoothed", 1.2)):
+        difference = found.leans[f"{kind} B"] - found.leans[f"{kind} A"]
+        below.plot(found.t_s, difference, linewidth=width, label=f"{kind}, B less A")
+    below.set(xlabel="s since A's first sample", ylabel="difference, deg")
+    for axis in (above, below):
+        axis.margins(x=0.0)
+        axis.grid(alpha=0.3)
+        axis.legend(loc="upper right")
+    figure.savefig(path, dpi=100)
+
+
+def _interpolated(t_s: Array, values: Array, at_s: Array) -> Array:
+    """values at other times, interpolated; NaN outside, in gaps, and beside values that are NaN."""
+    after = np.clip(np.searchsorted(t_s, at_s), 1, len(t_s) - 1)
+    near = (at_s >= t_s[0]) & (at_s <= t_s[-1]) & (t_s[after] - t_s[after - 1] < _GAP_S)
+    return np.where(near, np.interp(at_s, t_s, values), np.nan)
+
+
+def _known(ride: SmoothedRide | Any, at_s: Array, riding: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Lean and its standard deviation (n, degrees), NaN where one is not known or the bike does not ride."""
+    lean, sigma = (_interpolated(ride.t_s, values, at_s) for values in (ride.lean_deg, ride.lean_sigma_deg))
+    known = riding & ~np.isnan(sigma)
+    return np.where(known, lean, np.nan), np.where(known, sigma, np.nan)
+
+
+def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | None:
+    """The Difference of two leans with their standard deviations; None if they have under _LEAST_S in common."""
+    both = ~np.isnan(a[0]) & ~np.isnan(b[0])
+    if np.count_nonzero(both) * STEP_S < _LEAST_S:
+        return None
+    one, other = a[0][both], b[0][both]
+    off, expected = other - one, np.hypot(a[1][both], b[1][both])
+    constant = float(off.mean())
+    rest, share = off - constant, np.abs(off) / np.maximum(expected, 1e-9)
+    slope, delay_s = _slope_and_delay(a[0], b[0], both)
+    return Difference(
+        float(len(off) * STEP_S),
+        _rms(off),
+        constant,
+        _rms(rest),
+        float(np.percentile(np.abs(rest), 95.0)),
+        float(np.max(np.abs(rest))),
+        slope,
+        delay_s,
+        _rms(expected),
+        float(np.mean(share <= 1.0)),
+        float(np.mean(share <= 2.0)),
+    )
+
+
+def _slope_and_delay(a: Array, b: Array, both: NDArray[np.bool_]) -> tuple[float | None, float | None]:
+    """Slope and delay of B's lean against A's. Both are taken as equally exact: the slope is that of the principal
+    axis, and the delay is fitted to the mean of both roll rates."""
+    one, other = a[both] - a[both].mean(), b[both] - b[both].mean()
+    if _rms(one) < _LEANED_DEG or _rms(other) < _LEANED_DEG:
+        return None, None
+    axis = np.linalg.eigh(np.cov(one, other))[1][:, -1]
+    rate = np.gradient(0.5 * (a + b), STEP_S)
+    known = both & ~np.isnan(rate)
+    off = b - a - np.mean((b - a)[both])
+    return float(axis[1] / axis[0]), float(-(rate[known] @ off[known]) / max(float(rate[known] @ rate[known]), 1e-9))
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

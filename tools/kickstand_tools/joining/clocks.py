@@ -1,0 +1,154 @@
+"""Finds the shift and the drift between the clocks of two sensors on one bike.
+
+First every shift is tried on the magnitude of the rates, which does not depend on the sensors' mounting. Then shift and
+drift are fitted by least squares to the rates about A's axes; the rotation of B against A follows from the rates, too.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..calibration.file import CalibrationFile
+from ..errors import InputError
+from ..logs.table import Array
+from ..signals.averages import moving_mean
+from ..signals.lag import correlations, log_likelihood_ratio, peaks
+from ..signals.rotations import rotation_vector
+from .motion import STEP_S, Motion
+
+_SMOOTH = 5  # cells over which rates are averaged, so that their derivatives are known
+_MOST_DPS = 60.0  # higher rates, by jolts, are cut to this
+_APART_S, _CANDIDATES = 3.0, 6
+_INDEPENDENT_S = 1.0  # rates that are further apart are taken as independent
+_LEAST_S = 30.0  # least time of riding that both have
+_LEAST_EVIDENCE, _LEAST_LEAD = 15.0, 6.0  # as in match.py
+_LEAST_CORRELATION = 0.8  # least correlation of the rates: two sensors on one bike have over 0.9
+_MOST_DRIFT, _USUAL_DRIFT = 400e-6, 100e-6  # as in match.py and in fit.py
+_MOST_APART_DEG = 15.0  # largest contradiction by the calibrations: each is good to a few degrees
+_ROUNDS = 8
+_DRIFTING_S = 60.0  # in a shorter ride no drift is fitted
+
+
+@dataclass
+class Clocks:
+    """later_s: time of B's first sample less that of A's. drift: seconds per second that B's clock loses. correlation:
+    that of the rates. common_s: time that is in both. apart_deg: angle between the rotation of B against A by both
+    calibrations and that by the rates."""
+
+    later_s: float
+    drift: float
+    correlation: float
+    common_s: float
+    apart_deg: float = 0.0
+
+    def of_b(self, a_s: Array) -> Array:
+        """Seconds since B's first sample at seconds since A's."""
+        return (a_s - self.later_s) * (1.0 - self.drift)
+
+
+def clocks(a: Motion, b: Motion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
+    """The Clocks of two rides. Raises InputError where they are not of one ride, or where that cannot be shown; callers
+    put the names of both in front."""
+    size = [_size(one) for one in (a, b)]
+    found, count = correlations(size[0], a.there, size[1], b.there)
+    found = np.where(count * STEP_S >= _LEAST_S, found, 0.0)
+    likely = log_likelihood_ratio(found, count, STEP_S / _INDEPENDENT_S)
+    places = peaks(likely, round(_APART_S / STEP_S), _CANDIDATES)
+    tried = []
+    for place in places:
+        shift_s = (place - (len(b.there) - 1)) * STEP_S
+        alike = _alike(a, b, _along(a, np.eye(3)), _along(b, _rotation(a, b, shift_s)), shift_s)
+        ratio = log_likelihood_ratio(np.array(alike), count[place], STEP_S / _INDEPENDENT_S)
+        tried.append((float(ratio), alike, shift_s))
+    tried.sort(reverse=True)
+    if not tried or tried[0][0] < _LEAST_EVIDENCE or tried[0][1] < _LEAST_CORRELATION:
+        raise InputError("nowhere do they turn alike for half a minute: are they of one ride, and both on the bike?")
+    if len(tried) > 1 and tried[1][0] > tried[0][0] - _LEAST_LEAD:
+        raise InputError("they fit at two times: a longer ride with more bends is needed")
+    turn = _rotation(a, b, tried[0][2])
+    made = _fitted(a, b, _along(a, np.eye(3)), _along(b, turn), tried[0][2])
+    # B's axes in A's, once by the rates and once by both calibrations
+    turn = _rotation(a, b, made.later_s)
+    said = np.asarray(axes_a.vehicle_from_sensor).T @ np.asarray(axes_b.vehicle_from_sensor)
+    apart = float(np.degrees(np.linalg.norm(rotation_vector(said @ turn.T))))
+    if apart > _MOST_APART_DEG:
+        raise InputError(
+            f"they turn alike, but by their calibrations about axes that are {apart:.0f} degrees apart: is one of "
+            "another mount?"
+        )
+    made.apart_deg = apart
+    return made
+
+
+def _size(motion: Motion) -> Array:
+    """(n) the magnitude of the rates, deg/s, less its mean."""
+    size = moving_mean(np.minimum(np.linalg.norm(motion.rate_dps, axis=1), _MOST_DPS), _SMOOTH)
+    return size - np.mean(size[motion.there])
+
+
+def _along(motion: Motion, axes: Array) -> Array:
+    """(n, 3) rates about the rows of axes (3, 3), smoothed."""
+    return moving_mean(np.clip(motion.rate_dps @ axes.T, -_MOST_DPS, _MOST_DPS), _SMOOTH)
+
+
+def _rotation(a: Motion, b: Motion, later_s: float) -> Array:
+    """(3, 3): A's axes from B's, by which B's rates are nearest to A's (Kabsch's algorithm)."""
+    both = _there(b, a.t_s - later_s) & a.there
+    one, other = _along(a, np.eye(3))[both], _at(b.t_s, _along(b, np.eye(3)), a.t_s[both] - later_s)
+    left, _, right = np.linalg.svd((one - one.mean(axis=0)).T @ (other - other.mean(axis=0)))
+    return left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+
+
+def _fitted(a: Motion, b: Motion, of_a: Array, of_b: Array, later_s: float) -> Clocks:
+    """The Clocks by Gauss-Newton steps from a rough shift."""
+    at_s, drift = a.t_s, 0.0
+    slope = np.gradient(of_b, STEP_S, axis=0)
+    error = np.zeros(0)
+    for k in range(_ROUNDS):
+        on_b = (at_s - later_s) * (1.0 - drift)
+        both = _there(b, on_b) & a.there
+        if np.count_nonzero(both) * STEP_S < _LEAST_S:
+            raise InputError(f"they have less than {_LEAST_S:.0f} s of riding in common")
+        when = at_s[both] - at_s[both].mean()
+        model, changes = (_at(b.t_s, values, on_b[both]) for values in (of_b, slope))
+        error = of_a[both] - model
+        drifting = both.sum() * STEP_S > _DRIFTING_S and k > 0
+        weight = 1.0 / (1.0 + np.sum(error**2, axis=1) / (4.0 * np.median(np.sum(error**2, axis=1)) + 1e-9))
+        by_shift = -changes
+        by_drift = -changes * when[:, None]
+        normal = np.array([[_dot(p, q, weight) for q in (by_shift, by_drift)] for p in (by_shift, by_drift)])
+        pull = np.array([_dot(p, error, weight) for p in (by_shift, by_drift)])
+        normal[1, 1] += float(np.mean(weight @ error**2)) / len(error) / _USUAL_DRIFT**2
+        step = np.linalg.solve(normal, pull) if drifting else np.array([pull[0] / max(normal[0, 0], 1e-9), 0.0])
+        step[0] = np.clip(step[0], -0.5, 0.5)
+        # The shift in the middle of what is compared moves; that at the start follows
+        drift, middle = drift + step[1], at_s[both].mean()
+        later_s += step[0] - step[1] * (middle - later_s)
+    if abs(drift) > _MOST_DRIFT:
+        raise InputError("they turn alike, but their clocks drift apart by more than clocks do: one has gaps")
+    common_s = float(np.count_nonzero(_there(b, (at_s - later_s) * (1.0 - drift)) & a.there) * STEP_S)
+    return Clocks(float(later_s), float(drift), _alike(a, b, of_a, of_b, later_s, drift), common_s)
+
+
+def _alike(a: Motion, b: Motion, of_a: Array, of_b: Array, later_s: float, drift: float = 0.0) -> float:
+    """The correlation of rates (n, 3) and (m, 3) about the same axes."""
+    on_b = (a.t_s - later_s) * (1.0 - drift)
+    both = _there(b, on_b) & a.there
+    one, other = of_a[both], _at(b.t_s, of_b, on_b[both])
+    one, other = one - one.mean(axis=0), other - other.mean(axis=0)
+    return float(np.sum(one * other) / max(np.sqrt(np.sum(one**2) * np.sum(other**2)), 1e-9))
+
+
+def _there(motion: Motion, at_s: Array) -> NDArray[np.bool_]:
+    place = np.rint(at_s / STEP_S - 0.5).astype(np.int64)
+    inside = (place >= 0) & (place < len(motion.there))
+    return inside & motion.there[np.clip(place, 0, len(motion.there) - 1)]
+
+
+def _at(t_s: Array, values: Array, at_s: Array) -> Array:
+    return np.column_stack([np.interp(at_s, t_s, column) for column in values.T])
+
+
+def _dot(p: Array, q: Array, weight: Array) -> float:
+    return float(weight @ np.sum(p * q, axis=1))
