@@ -29,7 +29,7 @@ ARROWS = {
     "settings": {"board", "imu.mpu6050"},  # ranges and pins that can be chosen
     "devices": {"board", "imu"},
     "status_report": {"imu", "calibration", "speed", "ui.messages", "console", "devices", "settings"},
-    "app": {"board", "imu", "calibration", "lean", "drive_alignment", "speed", "rides", "live", "ui", "devices"},
+    "app": {"board", "imu", "calibration", "lean", "drive_alignment", "speed", "rides", "ui", "devices"},
     "user_code": set(),
     "start": {"board", "devices", "settings"},
     "__init__": {"status_report"},
@@ -39,7 +39,7 @@ LATE = {
     "errors": {"console"},  # report() prints a refusal in words
     "status_report": {"rides"},  # is its machine code used?
     "app": {"user_code"},
-    "start": {"app", "console", "ui.messages", "live.radio"},  # the display says "starting" meanwhile
+    "start": {"app", "console", "ui.messages", "live"},  # the display says "starting" meanwhile
 }
 # What only drivers may import: modules of MicroPython that speak to hardware
 HARDWARE = {"machine", "micropython", "esp32", "rp2", "neopixel", "network", "bluetooth"}

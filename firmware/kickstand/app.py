@@ -16,7 +16,6 @@ from .board import port
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
 from .devices import open_button
-from .errors import Refusal
 from .imu.sensor import SampleClock
 from .lean.meter import LeanMeter
 from .rides.recording import Recording
@@ -52,12 +51,13 @@ worst = None
 class App:
     """The lean meter on a board.
 
-    settings: a Settings. lcd, sensor: from devices.open_lcd() and open_sensor(). keeper: see Recording. radio: a Radio
-    for a phone, or None; a LiveError if there should be one and is none. Raises SettingsError for pins that cannot be
-    used.
+    settings: a Settings. lcd, sensor: from devices.open_lcd() and open_sensor(). keeper: see Recording. Raises
+    SettingsError for pins that cannot be used.
+
+    live: a Live, once one is attached (see live/live.py), or None.
     """
 
-    def __init__(self, settings, lcd, sensor, keeper=None, radio=None):
+    def __init__(self, settings, lcd, sensor, keeper=None):
         self.settings = settings
         self.lcd = lcd
         self.button = open_button(settings)
@@ -72,8 +72,6 @@ class App:
         self._least_wait_us = LOOP_US
         self._page_ms = ticks_ms()
         self.live = None
-        if radio:
-            self._open_live(radio)
         self.user = self._open_user()
 
     def _open_user(self):
@@ -94,19 +92,6 @@ class App:
 
         return BackgroundAlignment(self.settings.leans, open_speed(self.settings), self.meter, self.calibration)
 
-    def _open_live(self, radio):
-        if isinstance(radio, Refusal):
-            self.screen.notify(radio, ticks_ms())
-            return
-        from .live.live import Live
-
-        self.live = Live(radio, self, self.settings.leans)
-        self.screen.add_live(self.live, self._end_live)
-
-    def _end_live(self):
-        self.live.stop()
-        self.live = None
-
     def run(self):
         """Loop until Ctrl-C, LOOP_US a turn."""
         try:
@@ -117,7 +102,7 @@ class App:
             worst = LOOP_US - self._least_wait_us, self.sensor.chip.places_left()
             self.rides.stop()
             if self.live:
-                self._end_live()
+                self.live.stop()
             raise
 
     def _loop(self):

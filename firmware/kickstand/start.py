@@ -12,7 +12,7 @@ import machine
 from . import settings
 from .board import port
 from .devices import open_button, open_lcd, open_sensor
-from .errors import LiveError, SettingsError, report
+from .errors import SettingsError
 from .units import __version__
 
 CHARGE_MS = 100
@@ -72,22 +72,13 @@ def main():
         print("Kickstand stopped. Ctrl-D starts it again; import kickstand; kickstand.status() reports how it is.")
 
 
-def _open_radio(pin):
-    """The Radio for a phone, or the LiveError why there is none, which does not stop the lean. Before the app is
-    imported: an ESP32-C3 may crash in switching its radio on once 40 KB are allocated."""
-    from .live.radio import Radio
-
-    try:
-        return Radio(pin)
-    except LiveError as problem:
-        report(problem)
-        return problem
-
-
 def run(chosen, lcd):
     """Run the app. An exception in it is reported on display and console, then the board restarts."""
     try:
-        radio = _open_radio(chosen.LIVE_PIN) if chosen.LIVE else None
+        if chosen.LIVE:  # first: an ESP32-C3 may crash in switching its radio on once 40 KB are allocated
+            from .live.radio import open_radio
+
+            radio = open_radio(chosen.LIVE_PIN)
         sensor = open_sensor(chosen)
         for name in STEPS + ["app"]:
             now_ms = ticks_ms()
@@ -97,7 +88,12 @@ def run(chosen, lcd):
         from .app import App
 
         print("Kickstand %s. Ctrl-C stops it." % __version__)
-        App(chosen, lcd, sensor, radio=radio).run()
+        app = App(chosen, lcd, sensor)
+        if chosen.LIVE:
+            from .live.live import attach
+
+            attach(radio, app)
+        app.run()
     except SettingsError:
         raise
     except ImportError as error:  # an update was broken off: a restart would not help

@@ -3,6 +3,7 @@ stack on either side. Their time is that of the board's clock, and they run when
 
 import asyncio
 import contextlib
+from typing import Any
 
 from bumble import att, core, hci, link, pairing
 from bumble.controller import Controller
@@ -63,9 +64,9 @@ class Air:
         self.loop = BoardLoop(board.clock)
         self._link = link.LocalLink()
         self._made = 0
-        self._connection = None
+        self._connection: Any = None
         self._characteristics = {}
-        self.peripheral = None
+        self.peripheral: Any = None
         self._advertised = None
         board.every(PUMP_S, self.pump)
 
@@ -86,7 +87,7 @@ class Air:
         self.loop.pump()
         self.loop.close()
 
-    def _make(self, name):
+    def _make(self, name) -> Any:
         async def make():
             address = ADDRESSES[self._made % 2][:-1] + str(self._made)
             controller = Controller(name, link=self._link, public_address=hci.Address(address + "/P"))
@@ -181,7 +182,7 @@ class Central:
         self.device = air.central(pin)
         self.heard = []
         self.characteristics = {}
-        self.connection = None
+        self.connection: Any = None
 
     def at(self, at_s, visit):
         """Run the coroutine visit(self) from at_s on. Its result, or what it raised, is in done."""

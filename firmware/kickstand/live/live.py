@@ -2,9 +2,10 @@
 
 from array import array
 from math import degrees, sqrt
-from time import ticks_add, ticks_diff
+from time import ticks_add, ticks_diff, ticks_ms
 
 from ..calibration.transform import Transform
+from ..errors import LiveError
 from ..lean.meter import FALLEN_DEG
 from . import packets
 from .packets import LEAN, MOTION, OWN, SPEED
@@ -12,6 +13,14 @@ from .packets import LEAN, MOTION, OWN, SPEED
 LOOK_MS = 1000
 IDLE_S = 60  # a phone that has asked for nothing for so long makes room for the next; typing a PIN takes half of it
 _SAMPLES = 8  # as many as Transform takes at most
+
+
+def attach(radio, app):
+    """Let an App send to phones. radio: of open_radio()."""
+    if isinstance(radio, LiveError):
+        app.screen.notify(radio, ticks_ms())
+    else:
+        app.live = app.screen.pages.live = Live(radio, app, app.settings.leans)
 
 
 class Live:
@@ -164,6 +173,12 @@ class Live:
         elif packet == SPEED and speed is not None:
             self._put(radio.chrono, packets.speed(buffer, speed))
 
-    def stop(self):
-        """End it, until power-on."""
+    def lines(self):
+        """Its page: who gets the lean, and how many packets a second."""
+        who = self.asked or ("a phone" if self.radio.phone is not None else "no phone")
+        return "BLE %12s" % who, "%4d packets/s" % self.per_second
+
+    def stop(self, now_ms=0):
+        """End it, until power-on: also an entry of the menu."""
         self.radio.stop()
+        self._app.live = self._app.screen.pages.live = None

@@ -86,7 +86,7 @@ class PageRing:
         if self._at == len(self._pages) and self._driving:
             return self._drive_lines(now_ms)
         if self._at == more and self.live:
-            return pages.live(self.live)
+            return self.live.lines()
         if self._at >= more:
             return pages.recording(self._rides.recorder)
         return self._page(self._pages[self._at])

@@ -77,12 +77,6 @@ def recording(recorder):
     return "Rec %9d:%02d" % (seconds // 60, seconds % 60), room
 
 
-def live(live):
-    """Who gets the lean over Bluetooth, and how many packets a second."""
-    who = live.asked or ("a phone" if live.radio.phone is not None else "no phone")
-    return "BLE %12s" % who, "%4d packets/s" % live.per_second
-
-
 def maxima(meter):
     """The largest lean to each side since the last reset of the maxima."""
     left, right = int(meter.max_left_deg + 0.5), int(meter.max_right_deg + 0.5)

@@ -141,11 +141,6 @@ class Screen:
             self._open_menu(now_ms)
         self._drop_ended()
 
-    def add_live(self, live, end):
-        """Show a Live on a page, and let the menu end it by calling end()."""
-        self.pages.live = live
-        self._end_live = end
-
     def interrupt(self, now_ms):
         """Cancel a calibration under way, because the sensor has failed."""
         if self.wizard:
@@ -183,7 +178,7 @@ class Screen:
         rest = (("Six positions", self._six), ("Reset maxima", self._reset), ("Sensor info", self._info.show))
         record = ("Stop recording", self._stop) if self._rides.recorder.active else ("Record ride", self._record)
         last = (record,) + ((("Own pages", self.pages.show_own),) if self.pages.own else ())
-        last += (("Stop Bluetooth", self._stop_live),) if self.pages.live else ()
+        last += (("Stop Bluetooth", self.pages.live.stop),) if self.pages.live else ()
         if self._settings.leans:
             return align + rest + drive + last
         return drive + rest + last
@@ -237,11 +232,6 @@ class Screen:
                 self.notify(problem, now_ms)
             elif self._rides.recorder.active:
                 self._notice.show(pages.recording(self._rides.recorder), now_ms)
-
-    def _stop_live(self, now_ms):
-        self.pages.live = None
-        self._end_live()
-        self._notice.show(("Bluetooth is off", "until restart"), now_ms)
 
     def _stop(self, now_ms):
         self._rides.stop()

@@ -72,7 +72,8 @@ class Radio:
         """End the connection from this side."""
         phone = self.phone
         self.disconnect()
-        phone.dropped()
+        if phone is not None:
+            phone.dropped()
 
     def _event_later(self, connection):
         def event():
@@ -85,9 +86,11 @@ class Radio:
         self._clock.at(self._clock.now_us + to_us(EVENT_S), event)
 
     def _send(self):
-        waiting, self._waiting = self._waiting, []
+        phone, waiting = self.phone, self._waiting
+        self._waiting = []
         for handle, data in waiting:
-            self.phone.heard(handle, data)
+            if phone is not None:
+                phone.heard(handle, data)
 
     def _tell(self, event, *data):
         return self.irq(event, data) if self.irq else None

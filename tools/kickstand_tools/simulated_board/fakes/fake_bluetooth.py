@@ -58,7 +58,7 @@ class Ble:
         self._radio.config.update(settings)
         return None
 
-    def gap_advertise(self, interval_us, adv_data=None, *, resp_data=None, connectable=True):
+    def gap_advertise(self, interval_us, adv_data=b"", *, resp_data=b"", connectable=True):
         assert len(adv_data) <= 31 and len(resp_data) <= 31
         if self._on().phone is not None:
             raise OSError(errno.ENOMEM)  # btstack has room for one connection
@@ -79,7 +79,7 @@ class Ble:
     def gatts_write(self, handle, data, send_update=False):
         self._on().values[handle] = bytes(data)
 
-    def gatts_notify(self, conn_handle, handle, data=None):
+    def gatts_notify(self, conn_handle, handle, data=b""):
         if conn_handle is None:
             raise TypeError("can't convert NoneType to int")
         fake_machine.board.clock.advance(NOTIFY_US)

@@ -134,10 +134,13 @@ class MeasuredApp(app_module.App):
                 self._spent[i] = 0
 
 
-def _radio():
+def _attach(app):
+    """A phone that wants everything."""
+    from kickstand.live.live import attach
     from kickstand.live.radio import Radio
 
-    return Radio()
+    attach(Radio(), app)
+    app.live.radio._ble.connect()
 
 
 def run(detail, seconds, out, chosen):
@@ -150,10 +153,9 @@ def run(detail, seconds, out, chosen):
     for name in chosen:
         setattr(Config, name, chosen[name])
     settings = Settings(Config)
-    radio = _radio() if settings.LIVE else None
-    app = MeasuredApp(settings, open_lcd(settings), open_sensor(settings), radio=radio)
-    if radio:
-        radio._ble.connect()
+    app = MeasuredApp(settings, open_lcd(settings), open_sensor(settings))
+    if settings.LIVE:
+        _attach(app)
     spent = None
     if detail:
         import stages_guest
@@ -191,8 +193,8 @@ def run(detail, seconds, out, chosen):
         "collections_by_app": app.n_pauses,
         "collections_automatic": app.automatic,
     }
-    if radio:
-        figures["sent"] = radio._ble.sent
+    if app.live:
+        figures["sent"] = app.live.radio._ble.sent
     if detail:
         figures["stopwatch_us"] = stages_guest.stopwatch_us(spent)
         figures["stages"] = [stage[0] for stage in stages_guest.STAGES] + ["read"]
