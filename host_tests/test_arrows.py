@@ -30,6 +30,7 @@ ARROWS = {
     "devices": {"board", "imu"},
     "status_report": {"imu", "calibration", "speed", "ui.messages", "console", "devices", "settings"},
     "app": {"board", "imu", "calibration", "lean", "drive_alignment", "speed", "rides", "live", "ui", "devices"},
+    "user_code": set(),
     "start": {"board", "devices", "settings"},
     "__init__": {"status_report"},
 }
@@ -37,6 +38,7 @@ ARROWS = {
 LATE = {
     "errors": {"console"},  # report() prints a refusal in words
     "status_report": {"rides"},  # is its machine code used?
+    "app": {"user_code"},
     "start": {"app", "console", "ui.messages", "live.radio"},  # the display says "starting" meanwhile
 }
 # What only drivers may import: modules of MicroPython that speak to hardware

@@ -24,7 +24,7 @@ from .ui.screen import Screen
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
 COLLECT_TURNS = 42  # turns between two garbage collections: they use 90 KB of heap, of 120 free while recording
-COLLECT_TURNS_DRIVING = 25  # the same while aligning by driving: 85 KB of heap are free
+COLLECT_TURNS_DRIVING = 25  # the same while aligning by driving and with an OLED: 85 KB of heap are free
 SINGLE_GAPS = 300  # single free heap blocks that a collection leaves
 PAGE_MS = 100
 # A page shows no lean if its own delay and the age of the readings still in the FIFO add up to more: so a lean on the
@@ -128,15 +128,14 @@ class App:
         watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         gc.threshold(-1)
         due_us = ticks_us()
-        most = COLLECT_TURNS_DRIVING if self.drive else COLLECT_TURNS
-        turns = port.turns_to_collect(most)
+        turns = self._turns_to_collect()
         while True:
             self.turn()
             turns -= 1
             if turns <= 0:  # here, not in the middle of a sample: the FIFO keeps the samples meanwhile
                 gc.collect()
                 fill_gaps(SINGLE_GAPS)
-                turns = port.turns_to_collect(most)
+                turns = self._turns_to_collect()
                 if self.user:
                     self.user.check_memory()
             if watchdog:
@@ -149,6 +148,10 @@ class App:
                 sleep_us(wait_us)
             else:  # late, as after writing to flash: count from here instead of racing to catch up
                 due_us = ticks_us()
+
+    def _turns_to_collect(self):
+        few = self.drive or self.lcd.draws
+        return port.turns_to_collect(COLLECT_TURNS_DRIVING if few else COLLECT_TURNS)
 
     def turn(self):
         """One pass of the loop: process the samples in the FIFO and one press, and do at most one transfer to the

@@ -30,7 +30,7 @@ one-i2c|config.py: SENSOR_I2C and LCD_I2C are both {1} on different pins; give e
 wrong-code|the machine code for {0}() gives wrong results on this board: slower code runs instead
 needs-speed|config.py: VEHICLE = "car" needs a speed source to be aligned: SPEED = "gps" or "wheel"
 no-radio|LIVE: this board has no Bluetooth in its MicroPython: nothing goes to a phone, the lean goes on
-no-pairing|LIVE_PIN: this board's MicroPython cannot ask for a PIN: nothing goes to a phone; LIVE_PIN = None lets every phone in
+no-pairing|LIVE_PIN: this board cannot ask for a PIN: nothing goes to a phone; LIVE_PIN = None lets every phone in
 radio-fault|LIVE: the radio does not start ({0}): nothing goes to a phone, the lean goes on
 no-such-pin|config.py: {0} = {1} is no pin of this board ({2})
 i2c-pins|config.py: {1}_SDA = {2} and {1}_SCL = {3} do not belong to I2C {4} ({5})

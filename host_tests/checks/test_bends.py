@@ -47,7 +47,7 @@ def test_braking_and_dips_are_no_bends(slope):
 
 
 def test_recordings(shared_data):
-    """Those of cars do not tell it, the motorcycle's does."""
+    """Those of cars do not show it, the motorcycle's does."""
     for path in shared_data.glob("*.csv.gz"):
         log = read_log(path)
         assert judged(log) == "", path

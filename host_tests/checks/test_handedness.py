@@ -41,7 +41,7 @@ def test_all_48_ways_to_exchange_and_reverse_axes(rides, profile, speed):
 
 @pytest.mark.parametrize("profile", PROFILES)
 def test_simulated_rides(profile):
-    """Two minutes each. Without a speed not all of them tell, but none is accused."""
+    """Two minutes each. Without a speed not all of them show it, but none is accused."""
     log = simulated(profile, seed=9, seconds=120.0)
     assert judged(log) == judged(log, speed=False) == ""
     assert (WRONG_WAY in judged(log, gyro=MINUS)) is (profile != "parked")
@@ -76,7 +76,7 @@ def test_the_remark_names_what_fits(rides):
             "are in another order or of another sign; instead of gx, gy, gz right would be gz, gx, gy",
         ),
         (MINUS, None, WRONG_WAY),
-        (None, MINUS, None),  # the mirror image: motion cannot tell it
+        (None, MINUS, None),  # the mirror image: motion cannot show it
     ):
         said = judged(log, accel, gyro)
         assert (line in said) if line else said == "", said
@@ -153,7 +153,7 @@ def test_recordings(shared_data):
 
 
 def test_a_bias_is_found_while_fitting():
-    """The hand is never calm, so nothing else tells it."""
+    """The hand is never calm, so nothing else shows it."""
     log = hand(seed=0)
     turning = {}
     for bias in 0.0, 2.5:

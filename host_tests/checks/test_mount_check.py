@@ -141,8 +141,8 @@ def test_recordings(shared_data):
     log = read_log(path)
     calibration = fit_ride(log).calibration
     assert said(log, calibration) == ""
-    told = said(log, other(calibration, up=90.0))
-    found = re.search(r"by the bends of this ride forward is (\d+) degrees to the left", told)
+    found_by_bends = said(log, other(calibration, up=90.0))
+    found = re.search(r"by the bends of this ride forward is (\d+) degrees to the left", found_by_bends)
     assert found and abs(int(found[1]) - 90) < 6
     assert "forward and backward are exchanged" in said(log, other(calibration, up=180.0))
     name = "car-urban-medium-turn-loop-nominal-001.csv.gz"
@@ -163,7 +163,7 @@ def exchanged_line(car, side, roll_deg=None):
     return sentence(Notice("forward-exchanged", car, side, roll_deg))
 
 
-def test_what_is_said():
+def test_what_is_reported():
     """The sign of the log is always named as the other cause: the other side of the kickstand would make a clean report
     of it, mirrored."""
     assert exchanged_line(False, "left", 0.0).endswith("exchanged: calibrate two --side right?" + SIGN)

@@ -4,7 +4,7 @@ fault does to its I2C, its FIFO's backlog, watchdog and reset. host_tests/device
 import re
 
 import pytest
-from emulated import CHIPS, firmware, reset_in_a_read, shows
+from emulated import CHIPS, calibrated, firmware, leaning, pico, reset_in_a_read, shows
 from kickstand_tools.simulated_board.lcd import shown_lean
 from kickstand_tools.simulation.scripted.script import Ride, kickstand, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
@@ -127,3 +127,12 @@ def test_a_reset_in_mid_read_frees_the_bus(riding):
     assert riding.resets == resets + 1
     assert riding.board.sensor_bus.sda_level() == 0
     starts_again(riding)
+
+
+@pytest.mark.parametrize("display", ["ssd1306", "sh1106"])
+def test_an_oled_is_found_and_shows_the_lean_in_large_digits(display):
+    """With MicroPython's own framebuf, over the chip's own I2C."""
+    device = pico(leaning(LEAN_DEG), firmware() | calibrated(), display=display)
+    device.power_on()
+    device.run_until(lambda: shown_lean(device.lcd()) == LEAN_DEG, 3.0)
+    assert device.board.lcd.unknown == 0 and not device.board.too_fast

@@ -102,7 +102,7 @@ def test_an_edited_config_stays_unless_asked_otherwise(board):
 
 def test_the_rider_s_files_stay(board):
     """Calibration, own files, other directories: nothing is touched but code of an older version."""
-    own = ("kickstand_a.cal", "kickstand/kickstand_a.cal", "kickstand/notes.txt", "lib/x.py", "y.py")
+    own = ("kickstand_a.cal", "kickstand/kickstand_a.cal", "kickstand/notes.txt", "lib/x.py", "y.py", "user.py")
     board.path("kickstand").mkdir()
     board.path("lib").mkdir()
     for name in own:

@@ -191,7 +191,7 @@ needs_sh = pytest.mark.skipif(os.name == "nt", reason="the stand-in for Python i
         ("exit 0", "no pip"),
     ],
 )
-def test_a_venv_that_cannot_be_made_is_told_in_one_line(dev, monkeypatch, tmp_path, script, words):
+def test_a_venv_that_cannot_be_made_is_reported_in_one_line(dev, monkeypatch, tmp_path, script, words):
     monkeypatch.setattr(sys, "executable", fake_python(tmp_path, script))
     with pytest.raises(dev.Stop, match=words) as stopped:
         dev.make_venv()

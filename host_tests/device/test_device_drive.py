@@ -146,9 +146,9 @@ def test_a_wheel_that_misleads_does_not_spoil_the_lean(model, config, tmp_path):
     for town_round in range(8):
         shown = record.lean_at(POSES_S + 30.0 * town_round + 9.0)
         assert shown == pytest.approx(-25 if town_round % 2 else 20, abs=4)
-    told = record.first("Speed (stuck at|2.0 times)")
-    assert stops(told, POSES_S)
-    assert record.at(told + 2.0) == record.at(told)  # until it is answered, or the ride goes on
+    shown_s = record.first("Speed (stuck at|2.0 times)")
+    assert stops(shown_s, POSES_S)
+    assert record.at(shown_s + 2.0) == record.at(shown_s)  # until it is answered, or the ride goes on
 
 
 def test_a_press_for_another_page_does_not_answer_a_hidden_question(asked, tmp_path):
@@ -187,8 +187,8 @@ def test_pitch_on_the_kickstand_is_found_while_riding(tmp_path):
 
 def test_the_display_says_that_the_mount_has_moved(tmp_path):
     record = devices.run("cpython", tmp_path, bike("wheel", 6, remount=[POSES_S + 100.0, 8]))
-    told = record.first("Mount has moved", POSES_S + 100.0)
-    assert told < math.inf and stops(told, POSES_S)
+    shown_s = record.first("Mount has moved", POSES_S + 100.0)
+    assert shown_s < math.inf and stops(shown_s, POSES_S)
 
 
 def test_another_message_does_not_bring_the_lean_back_after_the_mount_has_moved(tmp_path):

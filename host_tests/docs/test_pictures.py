@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from kickstand_tools.pictures import lcd
 from kickstand_workshop.pictures import drawn, page, ride
-from PIL import Image
+from PIL import Image, ImageSequence
 
 ROOT = Path(__file__).resolve().parents[2]
 PICTURES = ROOT / "tools" / "pictures"
@@ -44,7 +44,7 @@ def test_the_picture_of_the_page_is_not_stale():
     """By the files that decide how the page looks: riding there again would take a minute."""
     with Image.open(PICTURES / page.NAME) as moving:
         assert moving.info["xmp"].decode() == page.looks(), STALE
-        assert moving.n_frames > 50
+        assert sum(1 for _ in ImageSequence.Iterator(moving)) > 50
     assert (PICTURES / page.NAME).stat().st_size < 700_000
 
 

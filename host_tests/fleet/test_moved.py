@@ -43,7 +43,7 @@ def bus():
     return drive(7, "bus", 200.0)
 
 
-def test_the_sway_tells_yaw_where_there_is_little_braking(bus):
+def test_the_sway_shows_yaw_where_there_is_little_braking(bus):
     log, sensor = bus
     _, without = halves(log)
     turn, sigma = halves(swaying(log, sensor))
@@ -94,11 +94,11 @@ def test_a_road_counts_once_however_many_intervals_are_on_it():
         np.zeros(count),
         np.zeros((count, 3, 3)),
     )
-    told = float(np.sum(evidence.blocks([standing]).square[:, 0, 0]))
-    assert told == pytest.approx(1.0 / (evidence.ROAD_SHARE + 1.0 / count), rel=1e-6)
+    weight = float(np.sum(evidence.blocks([standing]).square[:, 0, 0]))
+    assert weight == pytest.approx(1.0 / (evidence.ROAD_SHARE + 1.0 / count), rel=1e-6)
     standing.speed += 1000.0  # another road each time
-    told = float(np.sum(evidence.blocks([standing]).square[:, 0, 0]))
-    assert told == pytest.approx(count / (evidence.ROAD_SHARE + 1.0), rel=0.01)
+    weight = float(np.sum(evidence.blocks([standing]).square[:, 0, 0]))
+    assert weight == pytest.approx(count / (evidence.ROAD_SHARE + 1.0), rel=0.01)
 
 
 def pitched(log, sensor, degrees):

@@ -279,7 +279,7 @@ def test_a_second_ctrl_c_while_the_ride_is_being_ended_leaves_the_watchdog_at_re
     assert ended
 
 
-def test_status_tells_how_the_board_is(board, monkeypatch, capsys, tmp_path):
+def test_status_shows_how_the_board_is(board, monkeypatch, capsys, tmp_path):
     import gc
     import os
 

@@ -1,5 +1,5 @@
-"""The whole device on a virtual radio: bumble's Bluetooth LE stack on both sides, and a central that knows the published
-texts only."""
+"""The whole device on a virtual radio: bumble's Bluetooth LE stack on both sides, and a central that knows the
+published texts only."""
 
 import asyncio
 import collections
@@ -114,7 +114,7 @@ async def just_write(central):
 def test_a_pin_is_asked_for(on_air):
     """By the stack itself: neither a phone that does not pair nor one with a wrong PIN gets a packet."""
     visits = [(20, just_write, None), (26, press_in, 314159), (34, press_in, 271828)]
-    (silent, wrong, right), record = on_air(44, visits, machine="esp32", LIVE_PIN=271828)
+    (silent, wrong, right), _ = on_air(44, visits, machine="esp32", LIVE_PIN=271828)
     assert "INSUFFICIENT_" in str(silent.done.exception())
     assert wrong.done.exception() and not silent.heard and not wrong.heard
     assert right.done.exception() is None

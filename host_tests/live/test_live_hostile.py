@@ -99,6 +99,7 @@ def run(board):
             if count in (WARM, WARM + ACTS // 2):
                 marks.append(used())
             act(dice, phone, board.radio)
+            assert len(app.live.radio.inbox) <= live_radio.MOST_WRITES
             for _ in range(dice.randrange(1, 12)):
                 app.turn()
                 board.clock.advance(10_000)

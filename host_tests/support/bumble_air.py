@@ -1,11 +1,10 @@
-"""The simulated board's radio as a peripheral of bumble's virtual radio, and a central there: a whole Bluetooth LE stack
-on either side. Their time is that of the board's clock, and they run when it passes."""
+"""The simulated board's radio as a peripheral of bumble's virtual radio, and a central there: a whole Bluetooth LE
+stack on either side. Their time is that of the board's clock, and they run when it passes."""
 
 import asyncio
 import contextlib
-import inspect
 
-from bumble import att, core, gatt, hci, link, pairing
+from bumble import att, core, hci, link, pairing
 from bumble.controller import Controller
 from bumble.device import Device, Peer
 from bumble.gatt import Characteristic, CharacteristicValue, Service

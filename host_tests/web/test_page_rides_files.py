@@ -182,7 +182,7 @@ def test_the_columns_of_a_table_can_be_named(page, tmp_path):
 
 
 def test_a_track_joins_a_ride_without_gps(page, tmp_path):
-    """As `join` does it: the page then has a map, and the log with the positions can be saved. Another ride's is not."""
+    """As `join` does it: the page then has a map, and the log with positions can be saved. Another ride's not."""
     made = simulate_ride("hills", seed=1, seconds=120.0)
     log = Log.from_readings(made.readings, made.rate_hz)
     write_log(tmp_path / "bare.csv", log)

@@ -95,7 +95,7 @@ _MOVED = {
 
 
 class RefusedInput(InputError):
-    """Data that the firmware's own modules refuse. code, values: of the refusal, as in kickstand.errors.
+    """Data that the firmware's own modules refuse. code, values: those of the refusal, as in kickstand.errors.
 
     where: put before the sentence, the file as a rule; advice: after it.
     """
@@ -143,7 +143,7 @@ def sentence(refusal: Refusal | Notice, remedies: Remedies = COMMANDS) -> str:
 
 
 def _frozen(stretches: int, seconds: float, begin_s: float, end_s: float) -> str:
-    """begin_s, end_s: of the first of the stretches."""
+    """The sentence for frozen readings. begin_s, end_s: times of the first stretch."""
     line = f"the readings froze from {begin_s:.1f} to {end_s:.1f} s"
     if stretches > 1:
         line += f" and {stretches - 1} times more, {seconds:.1f} s in all"
@@ -151,7 +151,7 @@ def _frozen(stretches: int, seconds: float, begin_s: float, end_s: float) -> str
 
 
 def _speed_unit(factor: float) -> str:
-    """factor: by which the speed changes more than the force says."""
+    """The sentence for a speed in another unit. factor: change of the speed over the one that the force explains."""
     guess = "is it in m/s, and the right vehicle's?"
     if 3.0 < factor < 4.4:
         guess = "it is in km/h, m/s are needed"
@@ -187,8 +187,8 @@ def _rates_misfit(*exchange: list[int]) -> str:
 
 
 def _forward_exchanged(remedies: Remedies, car: bool, side: str, roll_deg: float | None) -> str:
-    """side: the one that two poses were calibrated for, "" if not known. roll_deg: by how much up is off, None if it is
-    not known."""
+    """The sentence for forward and backward exchanged. side: the kickstand's side in the calibration by two poses, ""
+    if unknown. roll_deg: error of up, None if unknown."""
     line = "forward and backward are exchanged: "
     if car:
         line += remedies["align_driving"]
@@ -208,7 +208,7 @@ def _up_off(remedies: Remedies, angle_deg: float, car: bool) -> str:
 
 
 def _forward_off(remedies: Remedies, angle_deg: float, by: str, car: bool) -> str:
-    """angle_deg: from the calibration's forward to the ride's, > 0 to the left."""
+    """The sentence for a yaw error. angle_deg: from the calibration's forward to the ride's, > 0 to the left."""
     side = "left" if angle_deg > 0.0 else "right"
     wrong = "braking and cornering are" if car else "lean, braking and cornering are"
     return (

@@ -81,11 +81,12 @@ class Oled:
         self._address = address
         self._most = _PARTS_SLOW if hz < _SLOW_HZ else _PARTS
         self._due_ms = ticks_add(ticks_ms(), _POWER_UP_MS if fresh else 0)
-        self._sh1106 = self._kind == "sh1106" or (self._kind == "auto" and self._state() & 0x0F == _SH1106_STATUS)
         self._refreshes = 0
         self._restart()
 
     def _restart(self):
+        # asked each time: it may be another one that was plugged in
+        self._sh1106 = self._kind == "sh1106" or (self._kind == "auto" and self._state() & 0x0F == _SH1106_STATUS)
         self._set_up = self._lit = False
         self._send_all()
 

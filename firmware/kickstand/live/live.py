@@ -126,13 +126,16 @@ class Live:
         if not self._n:
             return
         self._mean()
+        lean, drive = self._lean(), self._app.drive
+        self._sigma = degrees(sqrt(self._app.meter.filter.variance)) if lean is not None else None
+        self._speed = drive.fresh_speed(now_ms) if drive else None
         intervals, dues = self._intervals, self._dues
         for packet in range(4):
             interval = intervals[packet]
             late_ms = ticks_diff(now_ms, dues[packet])
             if interval and 2 * late_ms >= -period_ms:  # the nearest of the times at which something is sent
                 dues[packet] = ticks_add(now_ms, interval - (late_ms if late_ms < period_ms else 0))
-                self._send_one(packet, now_ms)
+                self._send_one(packet, lean, now_ms)
 
     def _mean(self):
         """Force and rate of the samples since the last time: their mean is the low-pass that this rate needs."""
@@ -147,12 +150,9 @@ class Live:
         for i in range(3):
             self._rate[i] = degrees(self._rate[i])
 
-    def _send_one(self, packet, now_ms):
-        meter, radio, buffer = self._app.meter, self.radio, self._buffer
-        lean = self._lean()
-        aligned, drive = meter.calibration.aligned, self._app.drive
-        speed = drive.fresh_speed(now_ms) if drive else None
-        sigma = degrees(sqrt(meter.filter.variance)) if lean is not None else None
+    def _send_one(self, packet, lean, now_ms):
+        radio, buffer, sigma, speed = self.radio, self._buffer, self._sigma, self._speed
+        aligned = self._app.meter.calibration.aligned
         if packet == OWN:
             force = self._force if aligned else None  # of no use in the sensor's own axes
             state = self._state(lean)

@@ -43,6 +43,18 @@ _GLYPHS = [
 _ARC = bytes(2 + _ARC_RADIUS - int((_ARC_RADIUS**2 - x * x) ** 0.5 + 0.5) for x in range(_ARC_DEG + 1))
 
 
+def _scale():
+    """The arc without a lean: drawing it anew for each page would take 6 ms."""
+    scale = framebuf.FrameBuffer(bytearray(128 * 4), 128, 32, framebuf.MONO_VLSB)
+    for x in range(_ARC_DEG + 1):
+        for column in (64 + x, 64 - x):
+            scale.vline(column, _ARC[x], 1 if x % 30 else _ARC_WIDTH, 1)
+    return scale
+
+
+_SCALE = _scale()
+
+
 def _number(canvas, value, x, y, digits=0):
     """A number, with at least so many digits; return where it ends."""
     for character in "%0*d" % (digits, value):
@@ -65,12 +77,9 @@ def lean(meter, recording):
 
 
 def _lean(canvas, number, side, deg, recording):
-    deg = max(-_ARC_DEG, min(_ARC_DEG, deg))
-    for x in range(_ARC_DEG + 1):
-        y = _ARC[x]
-        for column in (x, -x):
-            lit = 0 <= column <= deg or deg <= column <= 0
-            canvas.vline(64 + column, y, _ARC_WIDTH if lit or x % 30 == 0 else 1, 1)
+    canvas.blit(_SCALE, 0, 0)
+    for x in range(min(_ARC_DEG, abs(deg)) + 1):
+        canvas.vline(64 + x if deg > 0 else 64 - x, _ARC[x], _ARC_WIDTH, 1)
     x = _number(canvas, number, 52 if number < 10 else 38, 16)
     for side_x in (0, 5):  # of the degree sign
         canvas.vline(x - 3 + side_x, 17, 4, 1)

@@ -1,4 +1,4 @@
-"""One pass over a ride: all that its report and its pictures show."""
+"""Reads a ride once and keeps what its report and its pictures need."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -32,8 +32,8 @@ class Overview:
     """A ride: the summary of every sample, and its course in means over RATE_S, in which the columns that neither
     report nor pictures need are NaN (vehicle_channels() has them).
 
-    riding_s: time on the move, s. notices: what is remarkable in the log, and contradicts the calibration. stops: none
-    where forward is backward.
+    riding_s: time on the move, s. notices: what is remarkable in the log, and what contradicts the calibration. stops:
+    empty if forward and backward are exchanged.
     """
 
     ride: Ride
@@ -46,12 +46,12 @@ class Overview:
 
     @property
     def exchanged(self) -> Notice | None:
-        """Of notices the one that forward is backward."""
+        """The notice that forward and backward are exchanged, or None."""
         return next((notice for notice in self.notices if notice.code == "forward-exchanged"), None)
 
     @property
     def has_speed(self) -> bool:
-        """The log has a speed that is not always 0."""
+        """True if the log has a speed that is not always 0."""
         return self.summary.speed_mps.time_s is not None
 
 
@@ -113,5 +113,5 @@ def _has_moved(ride: Channels) -> bool:
 
 
 def _changes(means: Array) -> float:
-    """By how much they differ from the usual one, at most: that is a gyro's bias, or the slope of the ground."""
+    """The largest difference of means from their median: that is a gyro's bias, or the slope of the ground."""
     return float(np.max(np.abs(means - np.median(means))))

@@ -1,4 +1,4 @@
-"""What happens while an alignment is found by driving, as a list of events."""
+"""The events in an alignment by driving: braking events used, readiness, problems."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

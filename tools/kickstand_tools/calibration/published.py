@@ -1,9 +1,9 @@
 """Alignment by driving as ViriCiti published it: R = R2 R1, each a rotation by Rodrigues' formula.
 
-R1 turns the mean direction of gravity at the stops upwards. R2 turns the mean force of the braking events, levelled by
-R1, backwards. A braking event counts if the directions of its levelled force spread little. A tilt left over from the
-stops leaks into forward, a yaw error of some 3 to 4 degrees that more braking events do not take away. The firmware's
-DriveAlignment does not have this error; the published method is here to be compared with it.
+R1 rotates the mean direction of gravity at the stops to up. R2 rotates the mean force of the braking events, levelled
+by R1, to backward. A braking event counts if the directions of its levelled force spread little. A remaining tilt of
+the vertical by the stops makes a yaw error of some 3 to 4 degrees, which more braking events do not reduce. The
+firmware's DriveAlignment does not have this error; the published method is here for comparison.
 """
 
 from math import degrees, sqrt
@@ -17,7 +17,7 @@ MAX_DISPERSION = 0.02  # 8 degrees
 MIN_LEVEL_G = 0.03  # a smaller levelled force points anywhere
 BRAKING_MPS2 = -1.0  # an interval with more deceleration belongs to a braking event
 MEAN_US = 100_000
-LOSS_MPS = 1.5  # a braking event that takes off less speed is noise
+LOSS_MPS = 1.5  # a braking event that reduces the speed by less is noise
 MIN_EVENTS = 3
 UP = (0.0, 1.0, 0.0)
 BACKWARD = (0.0, 0.0, -1.0)
@@ -129,7 +129,7 @@ class _Samples:
 
 
 class PublishedAlignment:
-    """Used like a DriveAlignment. One runs beside it, which checks speed and mount and finds the vertical.
+    """Has the methods of a DriveAlignment. Runs one beside it, which checks speed and mount and finds the vertical.
 
     counted, turned: braking events accepted, and refused for their dispersion; needed: how many must be accepted.
     """
@@ -222,7 +222,7 @@ class PublishedAlignment:
                 self._interval.force[i] += force[i]
 
     def measure_speed(self, speed_mps, age_us=0):
-        """As DriveAlignment.measure_speed(), but without an estimate of the lag."""
+        """Take a new speed: see DriveAlignment.measure_speed(), but the lag is not estimated."""
         self._improved.measure_speed(speed_mps, age_us)
         seconds = self._interval_us * 1e-6
         if self._interval_us < MIN_INTERVAL_US:

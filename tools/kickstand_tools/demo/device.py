@@ -20,7 +20,7 @@ from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 
 TICK_S = 0.05
 PART_SEED = 1
-PART_SHARE = 0.5  # errors of up to half of the data sheet's limits: an ordinary sensor
+PART_SHARE = 0.5  # the sensor's errors over the data sheet's limits: an ordinary sensor
 HAND_LIMIT_S = 3600.0
 BATTERY_V = 12.6 / 11  # at GPIO 26, behind the divider of firmware/examples/user_battery.py
 LONG_PRESS_S = 1.2
@@ -83,7 +83,7 @@ class Commands:
 
 
 class Demo:
-    """Bike and board, and the exchange with the process that draws."""
+    """Bike and board, and the communication with the process that draws."""
 
     def __init__(self, by_hand, speed, display):
         self._commands = Commands()

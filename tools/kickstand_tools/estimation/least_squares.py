@@ -18,14 +18,14 @@ from .unknowns import BIAS, FORWARD, LEAN, LEFT, PARAMETERS, PITCH, ROTATION, ST
 from .windows import Windows
 
 BLOCK = 50  # windows of a block; see solver.py
-ROUNDS, PLAIN_ROUNDS = 10, 2  # most steps; the first PLAIN_ROUNDS of them do not down-weight outliers
+ROUNDS, PLAIN_ROUNDS = 20, 2  # most steps; the first PLAIN_ROUNDS of them do not down-weight outliers
 # rad, a step's largest change of an angle: under NEAR the hypotheses are weighed, under CONVERGED it has converged
 NEAR, CONVERGED = np.radians([3.0, 0.02])
 WEIGHING_ROUNDS = 2  # steps that weigh the hypotheses anew
 MAX_LEAN = 0.5  # rad: largest change of an angle in one step. Beyond it the equations are not linear.
 MAX_PITCH = 1.2  # rad: as in the firmware
 START = np.array([1.0, 0.3, 1.0, 1.0, 20.0, 0.03, 0.03, 0.03])  # standard deviations of the first state's prior
-DRAWN = [PITCH, LEFT, UP, *range(STATES)[BIAS]]  # its components whose prior has the mean 0; others': current estimate
+DRAWN = [PITCH, LEFT, UP, *range(STATES)[BIAS]]  # its components whose prior has the mean 0
 
 
 class Estimate:
@@ -50,6 +50,8 @@ class Estimate:
         self.parameters = np.tile(prior.mean, (len(windows) // self._length, 1))
         self.matrix, self.change = np.eye(3), np.inf
         self._converge()
+        if self._learn_misfit():
+            self._converge()
         self._use_own_noise()
 
     def unknowns(self, number: NDArray[np.intp], states: Array) -> Array:
@@ -92,6 +94,12 @@ class Estimate:
             weighing_rounds += near
             if self.change < CONVERGED and weighing_rounds >= WEIGHING_ROUNDS:
                 break
+
+    def _learn_misfit(self) -> bool:
+        """Are accelerations somewhere in the ride not the bike's?"""
+        off = self._residuals()
+        self._noise.estimate_misfit(off / self._noise.robust(self._noise.sigma(), off))
+        return bool(np.max(self._noise.misfit) > 1.0)
 
     def _use_own_noise(self) -> None:
         """Set the noise to that of this ride's residuals.

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..logs.table import Array
+from ..signals.averages import moving_mean
 from ..signals.leaning import WINDOW_S, averaged
 from . import equations as eq
 from .first_guess import in_hand
@@ -48,6 +49,11 @@ LASTING_S = {eq.SLIDING: SLIDE_S, eq.CLIMBING: DIVE_S, eq.SLOPING: SLOPE_S, eq.B
 ROUGH = [LEAN, PITCH, LEFT, UP, FORWARD, eq.SLIDING, eq.CLIMBING]
 EXPECTED = np.array([0.38, 0.38, 0.38, 0.38, 0.38, 0.5, 0.5])
 ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
+# Accelerations that are not the bike's, as of a mount that resonates, are white noise only as far as they do not last.
+# Their size and correlation time show in CLIMBING: the upward velocity by integrated forces and that by pitch and speed
+# differ for seconds. The velocities' standard deviation grows with the square of this residual's rms, in means over
+# LASTING_MISFIT_S and times the root of their number of windows, over that of an ordinary ride, USUAL_MISFIT.
+LASTING_MISFIT_S, USUAL_MISFIT, MOST_MISFIT = 2.0, 0.3, 4.0
 # How far from balance a ride is, likewise: by the rms of BALANCED in means over some seconds, less its mean over
 # LASTS_S (that is unknowns.BESIDE), over its standard deviation. Longer means average out errors that change sign, such
 # as a rider's corrections: BRIEF_S overestimates the noise to be cautious, LONG_S does not.
@@ -59,8 +65,9 @@ LEAST_WINDOWS = 50  # with fewer windows of balanced riding unbalance stays 1
 class Noise:
     """The standard deviations of n windows. still (n): True where the bike stands.
 
-    lean (n, rad), speed (n, m/s): estimates, to be set before sigma(). roughness (n): 1 for a rough ride; multiplies
-    the noise of vibration. unbalance: 1 for an average ride; multiplies the noise of BALANCED.
+    lean (n, rad), speed (n, m/s): estimates, to be set before sigma(). riding (n): True where the bike rides, or may.
+    roughness (n): 1 for a rough ride; multiplies the noise of vibration. misfit (n): factor on the velocities' noise, 1
+    where the accelerations are the bike's. unbalance: 1 for an average ride; multiplies the noise of BALANCED.
     """
 
     def __init__(self, windows: Windows, still: NDArray[np.bool_]) -> None:
@@ -69,7 +76,7 @@ class Noise:
         self._rolling = np.gradient(windows.rate[:, 2]) / WINDOW_S if len(windows) > 1 else np.zeros(1)
         self._riding = ~windows.gap & ~still & ~self._not_riding
         self.lean = self.speed = np.zeros(len(windows))
-        self.roughness, self.unbalance = np.ones(len(windows)), 1.0
+        self.roughness, self.misfit, self.unbalance = np.ones(len(windows)), np.ones(len(windows)), 1.0
         seconds = np.maximum(windows.seconds, 1e-4)
         self._root = np.sqrt(seconds)[:, None]
         self._lasting = np.ones((len(windows), eq.ROWS))  # factor on a window's sigma because its error lasts longer
@@ -85,6 +92,7 @@ class Noise:
         found[:, :LEFT] = ANGLE_ROOT
         found[:, LEFT : BIAS.start] = VELOCITY_ROOT
         found[:, : BIAS.start] *= self._root * roughness[:, None]
+        found[:, LEFT : BIAS.start] *= self.misfit[:, None]
         found[:, :LEFT] = np.hypot(found[:, :LEFT], jolted(w)[:, None])
         found[:, BIAS] = (BIAS_ROOT if np.any(w.warm) else WARMING_ROOT) * self._root
         lost, free = np.minimum(LOST_ROOT * self._root, LOST_MOST), w.gap | self._in_hand
@@ -117,6 +125,16 @@ class Noise:
         share = averaged(self._riding.astype(float), ROUGHNESS_S)
         found = averaged(np.where(self._riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
         self.roughness = np.where(share > 0.02, np.clip(np.sqrt(found), LEAST_ROUGHNESS, MOST_ROUGHNESS), 1.0)
+
+    def estimate_misfit(self, residual: Array) -> None:
+        """How far accelerations are from the bike's, from the residuals over their standard deviations (n, ROWS)."""
+        count = round(LASTING_MISFIT_S / WINDOW_S)
+        lasting = np.where(self._riding, residual[:, eq.CLIMBING], 0.0)
+        squares = count * moving_mean(lasting, count) ** 2
+        share = averaged(self._riding.astype(float), ROUGHNESS_S)
+        mean = averaged(np.where(self._riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
+        found = np.where(share > 0.02, mean / USUAL_MISFIT**2, 1.0)
+        self.misfit = np.clip(found, 1.0, MOST_MISFIT)
 
     def estimate_unbalance(self, force: Array, over_s: float) -> None:
         """Set unbalance from the measurement BALANCED (n, g). over_s: BRIEF_S or LONG_S."""

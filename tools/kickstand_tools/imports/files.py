@@ -12,12 +12,12 @@ from typing import IO
 from ..errors import InputError
 from ..logs.source import errors_of, open_input
 
-_EXCEL = b"\xd0\xcf\x11\xe0"  # its older files begin so; the newer are zips
-SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # what is looked at in a folder or a zip
-# A recording as text: some hours at 100 Hz. Reading it takes at most ten times its memory.
+_EXCEL = b"\xd0\xcf\x11\xe0"  # first bytes of Excel's older files; the newer are zips
+SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # other files in a folder or a zip are ignored
+# Largest recording as text: some hours at 100 Hz. Reading it takes at most ten times its memory.
 MOST_BYTES = 250_000_000
-MOST_FILES = 10_000  # in a folder or a zip
-LONGEST_LINE = 1_000_000  # characters; a table of a thousand columns has a tenth of that
+MOST_FILES = 10_000  # most files in a folder or a zip
+LONGEST_LINE = 1_000_000  # characters of the longest line; a table of a thousand columns has a tenth of that
 _BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 
 
@@ -25,7 +25,7 @@ _BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", 
 class RecordingFile:
     """One file of a recording. name: with its folders below what was given, parted by /. content: its bytes, unpacked.
 
-    text: the same decoded; lines end in a line feed.
+    text: the decoded content; lines end in a line feed.
     """
 
     name: str
@@ -50,7 +50,7 @@ class RecordingFile:
 def read_files(source: Path | str) -> list[RecordingFile]:
     """What a file, a folder or a zip holds; in the last two only files of SUFFIXES, and one zip that is all they hold.
 
-    Raises InputError for what is not there, is damaged, empty, no text, or over MOST_BYTES when unpacked.
+    Raises InputError for a source that is missing, damaged, empty, no text, or over MOST_BYTES when unpacked.
     """
     path = Path(source)
     with errors_of(str(path)):
@@ -63,7 +63,7 @@ def read_files(source: Path | str) -> list[RecordingFile]:
 
 
 def _bounded(path: Path) -> Iterator[tuple[str, bytes]]:
-    """_contents(), as long as they are not too large."""
+    """Yield _contents(). Raises InputError if they are too large."""
     size = 0
     for name, content in _contents(path):
         size += len(content)
@@ -73,7 +73,7 @@ def _bounded(path: Path) -> Iterator[tuple[str, bytes]]:
 
 
 def _read(file: IO[bytes]) -> bytes:
-    """At most a byte more than is allowed, which shows that it is too much."""
+    """The content of a file, cut one byte after the limit, which shows that it is too large."""
     return file.read(MOST_BYTES + 1)
 
 
@@ -161,7 +161,7 @@ def _no_text(path: Path) -> list[RecordingFile]:
 
 
 def _recording_file(name: str, content: bytes) -> RecordingFile | None:
-    """None for what is no text."""
+    """The Piece of a file; None if it is no text."""
     if content.startswith(b"PAR1"):
         return RecordingFile(name, content, "")
     text = _decoded(content)

@@ -1,4 +1,5 @@
-"""A recording of another app or logger as a log: what it is, joined on one clock, checked, written."""
+"""Imports a recording of another app or logger: finds its format, joins its sensors on one clock, checks and writes
+it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -21,16 +22,18 @@ from .recording import Array, Recording, Taken
 from .units import ACCELERATIONS, SPEEDS, factor, unit
 
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
-WITHOUT_GRAVITY_G = 0.4  # median force: of an app's whole ride, which a pose with an offset of 0.6 g is not
-WRONG_UNIT_G = 3.0  # median force: m/s2 taken for g give 9.8
+WITHOUT_GRAVITY_G = 0.4  # a smaller median force is without gravity; even a pose with an offset of 0.6 g has more
+WRONG_UNIT_G = 3.0  # a larger median force is in m/s2, where it is 9.8
 
 
 @dataclass(eq=False)
 class Imported:
-    """app: whose recording it was. log: from the recording's own start. taken: what was taken for what. notices: what
-    is remarkable (kickstand_tools.refusals.sentence puts a notice into words). gaps_s: how long each gap lasts.
+    """app: name of the app. log: times from the recording's own start. taken: the file, columns and unit of each
+    quantity. notices: what is remarkable (kickstand_tools.refusals.sentence puts a notice into words). gaps_s: duration
+    of each gap.
 
-    vehicle_axes: x points left, y up, z forward on the vehicle already, as far as its logger was mounted so.
+    vehicle_axes: True if x points left, y up, z forward on the vehicle already, provided that its logger was mounted
+    so.
     """
 
     app: str
@@ -41,12 +44,12 @@ class Imported:
 
     @property
     def rate_hz(self) -> float:
-        """Samples in a second, without the gaps."""
+        """Samples per second, gaps not counted."""
         return 1.0 / float(np.median(np.diff(self.log.t_s)))
 
     @property
     def gaps_s(self) -> Array:
-        """How long each gap lasts, s."""
+        """Duration of each gap, s."""
         steps = np.diff(self.log.t_s)
         return steps[steps * 1e9 > GAP_NS]
 
@@ -109,7 +112,7 @@ def _recording(
     if columns is not None:
         if len(files) > 1:
             raise InputError(f"{name} holds {len(files)} files: give --columns with one, such as {files[0].name}")
-        return mapped.read_mapped(files[0], columns, units, name)
+        return mapped.read_mapped(files[0], columns, units)
     found = recordings(files)
     if not found:
         raise mapped.unknown(files, name)
@@ -134,7 +137,7 @@ def _recording(
 
 
 def recordings(files: list[RecordingFile]) -> list[tuple[Any, list[RecordingFile]]]:
-    """The recordings among some files: each with its module in apps/, whose NAME is the app's."""
+    """The recordings among some files: (module in apps/, its files) of each; the module's NAME is the app's."""
     found, left = [], files
     for app in _APPS:
         for group in app.finds(left):
@@ -157,9 +160,9 @@ def _check_force(log: Log) -> None:
 
 
 def _check_sign(recording: Recording, log: Log) -> None:
-    """Turn an accelerometer whose sign was only likely where the track shows that it is mirrored.
+    """Change the sign of an accelerometer if that was only likely and the track shows that it is mirrored.
 
-    One whose sign is known is left as it is: reading the log remarks on it.
+    One whose sign is known stays: reading the log gives a remark about it.
     """
     if recording.sign_known:
         return

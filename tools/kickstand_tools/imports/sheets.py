@@ -1,4 +1,4 @@
-"""A table of text as columns of numbers: which separator, which decimal mark, under which names."""
+"""Reads a table of text as columns of numbers: finds its separator, its decimal mark and its names."""
 
 import csv
 import os
@@ -13,14 +13,14 @@ from ..logs.table import Array
 from .files import RecordingFile
 from .times import Nanoseconds, times_ns
 
-LONG = 6  # letters that several names begin with are too many to repeat
+LONG = 6  # a common beginning of several names with so many letters is not repeated
 _DECIMAL_COMMA = re.compile(r"(?:^|[;\t\"])\s*[+-]?\d+,\d")
 
 
 @dataclass
 class Sheet:
-    """name: of the file, for messages. columns: as they are called in it, some perhaps twice. cells: of each column.
-    left_out: rows that were damaged."""
+    """name: the file's, for messages. columns: their names in the file, some perhaps twice. cells: those of each
+    column. left_out: number of damaged rows."""
 
     name: str
     columns: list[str]
@@ -34,7 +34,7 @@ class Sheet:
         return next((found.index(name) for name in wanted if name in found), None)
 
     def axes(self, *names: str | tuple[str, ...]) -> tuple[list[int], list[str]]:
-        """place() of each name, or of one of several names, and the first names of those that are not there."""
+        """place() of each name, or of one of several names; and the (first) names of those that are missing."""
         each = [name if isinstance(name, tuple) else (name,) for name in names]
         found = {one[0]: self.place(*one) for one in each}
         places = [place for place in found.values() if place is not None]
@@ -45,7 +45,7 @@ class Sheet:
         return times_ns(self.cells[place], unit, self.name)
 
     def named(self, places: list[int]) -> str:
-        """The file and some columns of it, for people: without units, and what several begin with said once."""
+        """The file's name and those of some columns, for messages: without units, a common beginning only once."""
         names = [re.sub(r"[(\[].*?[)\]]", "", self.columns[place]).strip(" ,;") for place in places]
         same = len(os.path.commonprefix(names)) if len(names) > 2 else 0  # noqa: RUF071 - letters, no path
         if same > LONG:

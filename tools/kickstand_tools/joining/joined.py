@@ -1,4 +1,4 @@
-"""A ride with the positions of a track: matched, and written as a log."""
+"""Joins a track's positions to a ride, and writes the result as a log."""
 
 import csv
 from collections.abc import Iterator
@@ -30,7 +30,7 @@ _FORMAT = {SPEED: "%.3f", "lat_deg": "%.7f", "lon_deg": "%.7f", "utc_s": "%.3f"}
 
 @dataclass
 class Joined:
-    """A ride, the track that belongs to it, and where. own_speed: the log has a speed, which stays."""
+    """A ride, the track that belongs to it, and their Match. own_speed: the log has a speed, which stays."""
 
     ride: Source
     track: Track
@@ -47,7 +47,7 @@ class Joined:
 
 
 def join_track(ride: Source, track: Path | str | Track, progress: Progress | None = None) -> Joined:
-    """Find where a phone's or watch's track belongs in a ride, by how both turn and speed up.
+    """Find the place of a phone's or watch's track in a ride, by the yaw and the acceleration of both.
 
     ride: see read_log; it needs neither a calibration nor a speed. track: a .gpx or .fit file. Their clocks may differ
     by any time and drift. progress: called with how much of the ride has been read. Raises InputError where the track
@@ -122,7 +122,8 @@ def write_joined(out: Path | str, joined: Joined, progress: Progress | None = No
 
 
 def _nearest(time_us: Integers, at_us: Integers) -> tuple[Integers, Integers]:
-    """Rows, and which points belong into them: those within the rows' time and not in a gap of the log."""
+    """Rows, and the indices of the points that belong to them: points within the rows' time and not in a gap of the
+    log."""
     points = np.flatnonzero((at_us >= time_us[0]) & (at_us <= time_us[-1]))
     after = np.clip(np.searchsorted(time_us, at_us[points]), 1, max(len(time_us) - 1, 1))
     if len(time_us) < 2:

@@ -1,4 +1,4 @@
-"""What the results that are tables have in common."""
+"""The base of results that are tables."""
 
 from collections.abc import Container, Mapping
 from dataclasses import dataclass, fields, replace
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @dataclass
 class Table:
-    """A dataclass whose arrays have one row a sample; its other fields say something of the whole."""
+    """A dataclass whose arrays have one row per sample; its other fields belong to the whole table."""
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """The arrays (n,) by the names of their fields."""

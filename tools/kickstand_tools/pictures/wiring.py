@@ -112,9 +112,9 @@ def draw(board: Board, display: str) -> str:
     _draw_board(page, board, used_near, used_far)
     _draw_module(page, 68, 122, "Sensor: MPU6050 (GY-521)", [*sensor, "GND"], _SENSOR_PINS_Y, _SENSOR_SUPPLY_Y)
     page.text(_MODULE_MIDDLE, _SENSOR_SUPPLY_Y, "XDA, XCL, AD0, INT: open", 12, "middle", "#d7e4ff")
-    title = "Display for 3.3 V, I2C backpack"
+    title = "Display: OLED, or LCD for 3.3 V"
     _draw_module(page, 248, 130, title, ["GND", *screen], _DISPLAY_PINS_Y, _DISPLAY_SUPPLY_Y)
-    page.picture(_MODULE_MIDDLE - 85, _DISPLAY_SUPPLY_Y - 30, 176, 62, display)
+    page.picture(_MODULE_MIDDLE - 62, _DISPLAY_SUPPLY_Y - 32, 124, 70, display)
     _draw_module(page, 432, 96, "Push button", ["", ""], _BUTTON_PINS_Y)
     page.box(_MODULE_MIDDLE - 24, 464, 48, 48, "#c9ccd2", 6)
     page.disc(_MODULE_MIDDLE, 488, 16, "#2b2f38")

@@ -1,4 +1,4 @@
-"""The fault script: what goes wrong on the simulated board, and when.
+"""The fault script: the faults on the simulated board, with their times.
 
 Times are in seconds of the board's clock, I2C addresses have 7 bits.
 """
@@ -12,7 +12,7 @@ from .i2c import TransferFault
 
 _FOREVER = 1 << 60  # a number of transfers
 _BLOCK = 4096  # bytes of flash that are erased at once
-_STALL_S = 0.5  # that a print waits for a host which takes nothing (shared/tinyusb/mp_usbd_cdc.h of MicroPython)
+_STALL_S = 0.5  # a print waits so long for a host that reads nothing (shared/tinyusb/mp_usbd_cdc.h of MicroPython)
 
 
 class Faults:
@@ -151,7 +151,7 @@ class Faults:
             self._real_open = None
 
     def _replace_open(self, opened):
-        """From now on files are opened by opened(the real open(), its arguments)."""
+        """Open files by opened(the real open(), its arguments) from now on."""
         self.restore_files()
         self._real_open = real = builtins.open
         builtins.open = lambda *arguments, **named: opened(real, *arguments, **named)
@@ -168,7 +168,7 @@ class Faults:
     # On USB
 
     def usb_asleep(self, at_s, for_s):
-        """The host takes nothing: what is printed waits, and is lost."""
+        """The host reads nothing: each print waits, and its text is lost."""
 
         def begin():
             self._real_print = builtins.print
@@ -214,7 +214,7 @@ class Faults:
 
 
 class _Wrapped:
-    """What the two below leave to the file itself."""
+    """The base of the two classes below: passes all else on to the file."""
 
     def __init__(self, file):
         self._file = file
@@ -235,7 +235,7 @@ class _ErasedFile(_Wrapped):
     def __init__(self, file, erase):
         super().__init__(file)
         self._erase = erase
-        self._room = 0  # bytes that are left in the block
+        self._room = 0  # free bytes in the flash block
 
     def write(self, data):
         self._room -= len(data)

@@ -1,4 +1,4 @@
-"""A pair of I2C wires with devices on them: who answers, and what faults of the wires do.
+"""A pair of I2C wires with devices on them, and faults of the wires.
 
 A controller (the fake machine.I2C or that of an emulated chip) calls start, write_byte, read_byte and stop, and lets
 the time pass that the bits take. Pins that drive the wires directly call set_scl and set_sda.
@@ -35,7 +35,7 @@ class TransferFault:
         return {"nack": False, "timeout": None}.get(self.kind, True)
 
     def on_write(self, value):
-        """What arrives of a byte that the controller sends, None if it is not acknowledged. Byte 0 is the first,
+        """The byte that arrives when the controller sends value, None if it is not acknowledged. Byte 0 is the first,
         usually the register address."""
         self._count += 1
         if self.kind != "cut" or self._count <= self._byte:
@@ -44,7 +44,7 @@ class TransferFault:
         return None
 
     def on_read(self, value):
-        """What arrives of a byte that a device sends."""
+        """The byte that arrives when a device sends value."""
         number = self._count
         self._count += 1
         return value ^ self.mask if self.kind == "corrupt" and number == self._byte else value
@@ -58,9 +58,9 @@ class Bus:
         self.sda = sda
         self.scl = scl
         self.devices = {}  # by address
-        self.transfers = {}  # by address: how many were begun
-        self.faults = []  # of TransferFault
-        self._fault = None  # of the transfer under way
+        self.transfers = {}  # by address: number of transfers that were begun
+        self.faults = []  # a list of TransferFault
+        self._fault = None  # the fault of the transfer under way
         self._device = None
         self.open = False
         self._driven_scl = 1

@@ -84,7 +84,7 @@ class Board:
         self.too_fast = False  # True once a bus was clocked faster than a device on it allows
         self.faults = Faults(self)
         self.boots = 0
-        self.ticks_at_boot_us = 0  # what ticks_us() starts at; a value near 1 << 30 makes ticks wrap soon
+        self.ticks_at_boot_us = 0  # first value of ticks_us(); one near 1 << 30 makes ticks wrap soon
         self.reset_cause = fake_machine.PWRON_RESET
         self._off = True
         self._pins = {}  # number: [mode, pull, level driven, since when it is in use]
@@ -95,7 +95,7 @@ class Board:
             self.fit_lcd()
 
     def install(self):
-        """From now on `machine`, `time` and `os` are this board's for all code that is imported."""
+        """Make `machine`, `time` and `os` this board's for all code that is imported."""
         self._fakes.install(self)
 
     def uninstall(self):
@@ -165,7 +165,7 @@ class Board:
     # Parts that are connected and disconnected
 
     def fit_sensor(self):
-        """Connect it; its supply comes up now."""
+        """Connect it and switch its supply on."""
         self.sensor.power_on()
         self.sensor_bus.attach(self.sensor)
 
@@ -174,7 +174,7 @@ class Board:
         self.sensor_bus.detach(self.sensor)
 
     def fit_lcd(self):
-        """Connect it; its supply comes up now."""
+        """Connect it and switch its supply on."""
         self.lcd.power_on()
         self.lcd_bus.attach(self.lcd)
 

@@ -106,10 +106,17 @@ class Device:
             "phase": phase,
             "powered": self.powered,
         }
+        meter = self.meter()
+        if meter:
+            tick["meter"] = meter
         if board.lcd.changes != self._seen:
             self._seen = board.lcd.changes
             tick["display"] = self._display()
         self._ticks.append(tick)
+
+    def meter(self):
+        """What the lean meter knows: lean_deg, None where it would not be shown, and forward_g, both None before the
+        alignment. None without a meter."""
 
     def _display(self):
         """display(), but while an OLED gets a new picture its text stays that of the old one."""
@@ -121,7 +128,8 @@ class Device:
 
     def take(self):
         """What was to be seen every TICK_S since the last call, as JSON: a list of objects with the time t_s, the
-        bike's true lean_deg, speed_mps, yaw_rate_dps and phase, powered, and the display, where it has changed."""
+        bike's true lean_deg, speed_mps, yaw_rate_dps and phase, powered, the meter, if there is one, and the display,
+        where it has changed."""
         ticks, self._ticks = self._ticks, []
         return json.dumps(ticks)
 
@@ -173,6 +181,13 @@ class PageDevice(Device):
                 self._ended(self.resume(self.rest))
             else:
                 self._start()
+
+    def meter(self):
+        if not self._app:
+            return None
+        meter = self._app.meter
+        aligned, lean = meter.calibration.aligned, round(meter.lean_deg, 1)
+        return [lean if aligned and meter.trusted else None, round(meter.smooth_force[2], 3) if aligned else None]
 
     def _hand_over(self, app):
         """In place of App.run()."""

@@ -19,8 +19,8 @@ _LICENCES = "info/licenses/"
 
 
 def archive() -> bytes:
-    """A ZIP file of packages to import: kickstand_tools, kickstand, gpxpy, jinja2 and markupsafe, the latter without what is
-    compiled: it has all of that in Python, too."""
+    """A ZIP file of packages to import: kickstand_tools, kickstand, gpxpy, jinja2 and markupsafe, the latter without
+    what is compiled: it has all of that in Python, too."""
     found = tools("web/rides_guest.py")
     for package in (firmware_path.PACKAGE, *(Path(one.__path__[0]) for one in (gpxpy, jinja2, markupsafe))):
         found |= {path.relative_to(package.parent).as_posix(): path for path in package.rglob("*.py")}

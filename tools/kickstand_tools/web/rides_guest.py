@@ -1,5 +1,5 @@
-"""`kickstand report`, `plot`, `smooth`, `import`, `join` and `calibrate ride` in the browser: their own code on CPython for
-WebAssembly. page/rides/worker.mjs runs it, in a folder of its own.
+"""`kickstand report`, `plot`, `smooth`, `import`, `join` and `calibrate ride` in the browser: their own code on CPython
+for WebAssembly. page/rides/worker.mjs runs it, in a folder of its own.
 
 Each function returns JSON: what its docstring says, or {"refused": why}, what the command would say in the words of
 a page.
@@ -59,8 +59,8 @@ def rides(given, names):
     """What the files of these names (JSON) in the folder `given` are, in the order in which they were given.
 
     {"rides": [{"log", "isLog": no app's recording, "calibration" and "track": name or "", "files": [names], "table":
-    asked_for() of one that nobody knows}, ...], in the order of their names; "kinds": {name: what it is}; "why": {name: why it cannot
-    be used}}.
+    asked_for() of one that nobody knows}, ...], in the order of their names; "kinds": {name: what it is};
+    "why": {name: why it cannot be used}}.
     """
     _smoothed.clear()
     for old in Path().iterdir():

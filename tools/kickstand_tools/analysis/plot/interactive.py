@@ -9,12 +9,12 @@ import numpy as np
 from ...logs.table import Array
 from .charts import LEFT_COLOUR, RIGHT_COLOUR, Bars, Chart, Charts, Dots, Line, Note, Sides, Trace, envelope
 
-POINTS = 40_000  # of a line: with more, a browser no longer zooms smoothly
-_INCH = 86  # of a chart's height, pixels, as what follows
-_GAP, _NARROW_GAP = 62, 96  # between rows; in a narrow window with the names of axes
+POINTS = 40_000  # most points of a line: with more, a browser no longer zooms smoothly
+_INCH = 86  # pixels per inch of a chart's height
+_GAP, _NARROW_GAP = 62, 96  # pixels between rows of charts; in a narrow window axes have names there
 _MARGIN = {"l": 80, "r": 80, "t": 100, "b": 80}
 _NARROW_MARGIN = {"l": 52, "r": 12, "t": 160, "b": 60}
-_ASIDE = 0.085  # between charts beside each other, of the width
+_ASIDE = 0.085  # space between charts side by side, over the width of the window
 _SMALL = {"font": {"size": 12}}
 _OWN_WORDS: dict[str, Any] = {"hoverinfo": "none"}  # page.js has them, by the name of a trace
 _INK = "rgb(36,36,36)"
@@ -48,8 +48,8 @@ def plain(values: Array, digits: int = 3) -> list[float | None]:
 
 
 def figure(charts: Charts, linked: bool = False) -> dict[str, Any]:
-    """All that is drawn, in plain numbers, lists and None for NaN. linked: pointing anywhere over a chart over time,
-    not at a line alone, is pointing at its moment."""
+    """The figure for plotly.js, in plain numbers, lists and None for NaN. linked: the mouse selects a moment anywhere
+    in a chart over time, not at its lines alone."""
     each = [*charts.over_time, *charts.below]
     data = [drawn | _axes(k) for k, chart in enumerate(each) for trace in chart.traces for drawn in _traces(trace)]
     layouts = {kind: _layout(charts, kind == "narrow", linked) for kind in ("layout", "narrow")}
@@ -57,12 +57,12 @@ def figure(charts: Charts, linked: bool = False) -> dict[str, Any]:
 
 
 def time_axes(charts: Charts) -> list[str]:
-    """The axes of time, as plotly calls them."""
+    """plotly's names of the axes of time."""
     return [_axes(k)["xaxis"] for k in range(len(charts.over_time))]
 
 
 def _axes(k: int) -> dict[str, str]:
-    """Those of chart k, as plotly counts them."""
+    """plotly's names of the axes of chart k."""
     return {"xaxis": f"x{k + 1 if k else ''}", "yaxis": f"y{k + 1 if k else ''}"}
 
 
@@ -105,7 +105,7 @@ def _traces(trace: Trace) -> list[dict[str, Any]]:
 
 
 def _filled(name: str, x: Array, y: Array, colour: str) -> dict[str, Any]:
-    """From zero to y (n), of whose zeros the ends are enough."""
+    """A trace filled from zero to y (n); of runs of zeros it keeps both ends."""
     leans = y != 0.0
     kept = leans.copy()
     kept[1:] |= leans[:-1]

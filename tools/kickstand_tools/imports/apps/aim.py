@@ -24,7 +24,7 @@ def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 
 def read(files: list[RecordingFile], name: str) -> Recording:
-    """Raises InputError for what is missing."""
+    """Read a recording. Raises InputError for a missing column or sensor."""
     lines = [names_in(line) for line in files[0].text.split("\n", 60)[:60]]
     header = next(
         (k for k, cells in enumerate(lines) if cells and cells[0] == "Time" and sum(map(bool, cells)) > 3), None

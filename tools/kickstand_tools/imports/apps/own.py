@@ -28,7 +28,7 @@ def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 
 def read(files: list[RecordingFile], name: str) -> Recording:
-    """Raises InputError for a replay's output, which does not hold all that was measured."""
+    """Read a recording. Raises InputError for a replay's output, which does not contain all readings."""
     sheet = _sheet(files[0])
     time_ns = sheet.times(sheet.columns.index("t_s"))
     log, no_log = sheet.axes(*COLUMNS[1:])
@@ -50,7 +50,7 @@ def read(files: list[RecordingFile], name: str) -> Recording:
 
 
 def _utc_ns(sheet: Sheet, time_ns: Nanoseconds) -> int | None:
-    """What makes UTC of the log's own time, in ns since 1970; None where the log has none."""
+    """UTC less the log's own time, ns since 1970; None where the log has no UTC."""
     utc_s = sheet.numbers(sheet.place("utc_s"))
     there = np.isfinite(utc_s)
     return int(np.median(utc_s[there] * 1e9 - time_ns[there])) if np.any(there) else None

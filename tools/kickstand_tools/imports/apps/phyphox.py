@@ -35,7 +35,7 @@ def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 
 def read(files: list[RecordingFile], name: str) -> Recording:
-    """Raises InputError for what is missing."""
+    """Read a recording. Raises InputError for a missing column or sensor."""
     found: dict[str, Sensor] = {}
     track: Track | None = None
     pauses = _Pauses(files)
@@ -59,7 +59,7 @@ def _is_meta(file: RecordingFile) -> bool:
 
 
 def _is_ours(file: RecordingFile) -> bool:
-    """Does its first line name a time in s and then quantities with their units in brackets?"""
+    """True if its first line names a time in s and then quantities with their units in brackets."""
     first = names_in(next(iter(file.first_lines(1)), ""))
     if _is_meta(file) or len(first) < 2 or not re.fullmatch(r"(.*\s)?time \(s\)", first[0], re.IGNORECASE):
         return False
@@ -108,7 +108,7 @@ class _Pauses:
 
     def __init__(self, files: list[RecordingFile]) -> None:
         self.utc_ns: int | None = None
-        self._resumed: list[tuple[int, int]] = []  # the experiment's time, and how long it had been paused, ns
+        self._resumed: list[tuple[int, int]] = []  # (the experiment's time, duration of all pauses until then), ns
         file = next((file for file in files if _is_meta(file) and file.stem == "time"), None)
         if file is None or len(file.first_lines(2)) < 2:
             return
@@ -126,7 +126,7 @@ class _Pauses:
             self._resumed = [(at[k], max(0, clock[k] - clock[starts[0]] - (at[k] - at[starts[0]]))) for k in starts[1:]]
 
     def after(self, time_ns: Nanoseconds) -> Nanoseconds:
-        """The experiment's times with its pauses in them."""
+        """The experiment's times plus the pauses before them."""
         moved = time_ns.copy()
         for at, paused in self._resumed:
             moved = np.where(time_ns >= at, time_ns + paused, moved)

@@ -18,7 +18,7 @@ from ..units import SPEEDS, factor, unit
 
 NAME = "RaceBox"
 _AXES = [f"{sensor}{axis}" for sensor in ("GForce", "Gyro") for axis in "YZX"]  # left, up, forward
-_NEAR = 1.25  # times another unit's speed: the units are a factor of 1.6 and more apart
+_NEAR = 1.25  # largest factor between the speed and that by positions: the units differ by 1.6 and more
 
 
 def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
@@ -27,7 +27,8 @@ def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 
 def read(files: list[RecordingFile], name: str, speed_unit: str = "") -> Recording:
-    """Raises InputError for what is missing. speed_unit: of the column Speed, "" to find it from the positions."""
+    """Read a recording. Raises InputError for a missing column. speed_unit: unit of the column Speed, "" to find it by
+    the positions."""
     sheet = read_sheet(files[0], _header(files[0]) or 0)
     places, missing = sheet.axes(*_AXES)
     if {"GForceY", "GForceZ"} & set(missing):
@@ -64,7 +65,7 @@ def _said_unit(column: str) -> str:
 
 
 def _measured_unit(sheet: Sheet, time_ns: Nanoseconds, speed: int, lat: int | None, lon: int | None) -> str:
-    """The unit in which the speeds are those with which the positions change; "" where that is not clear."""
+    """The unit in which the speeds fit the changes of position; "" where that is not clear."""
     if lat is None or lon is None:
         return ""
     moved = _moved_mps(time_ns, sheet.numbers(lat), sheet.numbers(lon))
@@ -79,7 +80,7 @@ def _measured_unit(sheet: Sheet, time_ns: Nanoseconds, speed: int, lat: int | No
 
 
 def _moved_mps(time_ns: Nanoseconds, lat: Array, lon: Array) -> Array:
-    """(n) speed from about a second before each row, NaN where it is not known."""
+    """(n) mean speed by the positions over about a second before each row, NaN where unknown."""
     steps = np.diff(time_ns)
     back = max(1, round(SECOND_NS / max(float(np.median(steps)), 1.0))) if len(steps) else 1
     apart_s = np.full(len(time_ns), np.nan)

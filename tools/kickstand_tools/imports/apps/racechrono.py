@@ -23,7 +23,7 @@ def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 
 def read(files: list[RecordingFile], name: str) -> Recording:
-    """Raises InputError for what is missing."""
+    """Read a recording. Raises InputError for a missing column or sensor."""
     lines = files[0].text.split("\n", 60)[:60]  # blank ones among them: their numbers count
     header = next((k for k, line in enumerate(lines) if _is_header(line)), None)
     if header is None:
@@ -61,7 +61,7 @@ def _is_header(line: str) -> bool:
 
 
 def _units(lines: list[str], header: int) -> tuple[dict[int, str], int]:
-    """The units by the numbers of their columns, and how many lines of heads follow the first."""
+    """The units by the numbers of their columns, and the number of header lines after the first."""
     following = [names_in(line) for line in lines[header + 1 : header + 3]]
     if len(following) == 2 and following[0] and following[0][0] == "unix time":
         return {place: cell for place, cell in enumerate(following[0]) if cell}, 2

@@ -31,7 +31,7 @@ def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 
 def read(files: list[RecordingFile], name: str) -> Recording:
-    """Raises InputError for what is missing."""
+    """Read a recording. Raises InputError for a missing column or sensor."""
     by_kind = {_KINDS.get(_parts(file)[1], ""): file for file in files}
 
     def sensor(kind: str) -> Sensor:
@@ -48,6 +48,6 @@ def read(files: list[RecordingFile], name: str) -> Recording:
 
 
 def _parts(file: RecordingFile) -> tuple[str, str]:
-    """What the names of a recording's files have in common, and the sensor."""
+    """The common part of the names of a recording's files, and the sensor of this one."""
     match = _SENSOR.match(file.stem)
     return (match[1], match[2]) if match else (file.stem, "")

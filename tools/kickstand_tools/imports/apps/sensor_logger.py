@@ -24,7 +24,7 @@ def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 
 def read(files: list[RecordingFile], name: str) -> Recording:
-    """Raises InputError for what is missing."""
+    """Read a recording. Raises InputError for a missing column or sensor."""
     by_stem = {file.stem: file for file in files}
     apple, standard = _platform(by_stem)
     turned = apple is not False and not standard
@@ -62,7 +62,7 @@ def _is_ours(file: RecordingFile) -> bool:
 
 
 def _platform(by_stem: dict[str, RecordingFile]) -> tuple[bool | None, bool]:
-    """Was it an iPhone (None: not known), and were its units and signs standardised?"""
+    """True for an iPhone (None: unknown), and True if units and signs were standardised."""
     if "metadata" in by_stem and len(by_stem["metadata"].first_lines(2)) > 1:
         names, values = (names_in(line) for line in by_stem["metadata"].first_lines(2))
         said = {name.lower(): value.lower() for name, value in zip(names, values)}

@@ -30,7 +30,7 @@ def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 
 def read(files: list[RecordingFile], name: str) -> Recording:
-    """Raises InputError for what is missing."""
+    """Read a recording. Raises InputError for a missing column or sensor."""
     sheet = read_sheet(files[0])
     places = {kind: _places(sheet, names) for kind, (_, names) in _KINDS.items()}
 
@@ -76,7 +76,7 @@ def _gyro(sheet: Sheet, name: str) -> Sensor:
 
 
 def _utc_ns(sheet: Sheet) -> int | None:
-    """What makes UTC of the time since the start of iOS: by when the rows were logged."""
+    """UTC less the time since the start of iOS, by the times at which the rows were logged."""
     logged = sheet.place("loggingTime")
     if logged is None:
         return None
@@ -90,7 +90,7 @@ def _utc_ns(sheet: Sheet) -> int | None:
 
 
 def _location(sheet: Sheet) -> Track | None:
-    """A fix is new in the row in which its own time has changed."""
+    """The positions and speeds; a fix is new in the row in which its own time has changed."""
     row_ns = _times(sheet, "accelerometer" if _places(sheet, _ACCEL) else "motion")
     fix = sheet.place("locationTimestamp_since1970")
     if fix is not None:

@@ -44,7 +44,7 @@ def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
 
 
 def read(files: list[RecordingFile], name: str) -> Recording:
-    """Raises InputError for what is missing."""
+    """Read a recording. Raises InputError for a missing section or column."""
     sections = _sections(files[0])
     sheet = _sheet(files[0].name, sections)
     units = _units(sections, sheet)

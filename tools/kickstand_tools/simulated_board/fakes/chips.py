@@ -39,7 +39,7 @@ def pins_of(machine):
 
 
 def flash_pins(machine):
-    """The pins of the flash that it runs from, of those that pins_of() gives."""
+    """The pins, among those of pins_of(), that are connected to the flash with the program."""
     return frozenset(range(6, 12)) if _is_classic(machine) else frozenset()
 
 
@@ -49,7 +49,7 @@ def inputs_only(machine):
 
 
 def i2c_controllers(machine):
-    """How many machine.I2C can drive."""
+    """Number of I2C controllers that machine.I2C can use."""
     return 1 if _chip(machine)[:7] in ("ESP32C3", "ESP32C6") else 2  # the second of a C6 is its low-power one
 
 

@@ -17,7 +17,7 @@ class Installer:
         self._real = {}  # the modules that were replaced; None where there was none
 
     def install(self, board):
-        """From now on `machine`, `time` and `os` are those of this simulator.Board."""
+        """Replace `machine`, `time` and `os` by those of this simulator.Board."""
         fake_machine.use(board)
         fake_time.use(board.clock, board.clock.now_us)
         self._replace("machine", fake_machine)
@@ -63,7 +63,7 @@ class Installer:
 
 
 class _Namespace:
-    """What MicroPython takes for a module."""
+    """An object that MicroPython accepts as a module."""
 
 
 class _Esp32:

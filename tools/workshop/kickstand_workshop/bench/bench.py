@@ -28,6 +28,7 @@ _MODES: dict[str, dict[str, Any]] = {
     "aligning by driving": {"SPEED": "wheel"},
     "recording": {"RECORD": True},
     "with an OLED": {"DISPLAY": "ssd1306"},
+    "live to a phone": {"LIVE": True},
 }
 
 
@@ -122,9 +123,11 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
     mpy = CHIPS[chip].MPY
     files = flash_image.firmware(True, mpy) | _calibration()
     del files["/main.py"]
-    files |= {
-        f"{name}.mpy": cross_compiled(Path(__file__).with_name(f"{name}.py"), architecture(mpy)) for name in _GUEST
-    }
+    guests = {f"{name}.mpy": f"{name}.py" for name in _GUEST}
+    if chosen.get("LIVE"):
+        guests["bluetooth.mpy"] = "bluetooth_guest.py"
+    here = Path(__file__).parent
+    files |= {name: cross_compiled(here / source, architecture(mpy)) for name, source in guests.items()}
     arrays: list[np.ndarray] = []
     stages: list[np.ndarray] = []
     result: dict[str, Any] = {}

@@ -134,6 +134,12 @@ class MeasuredApp(app_module.App):
                 self._spent[i] = 0
 
 
+def _radio():
+    from kickstand.live.radio import Radio
+
+    return Radio()
+
+
 def run(detail, seconds, out, chosen):
     """Run the app for so many seconds and print one line, a dictionary of figures.
 
@@ -144,7 +150,10 @@ def run(detail, seconds, out, chosen):
     for name in chosen:
         setattr(Config, name, chosen[name])
     settings = Settings(Config)
-    app = MeasuredApp(settings, open_lcd(settings), open_sensor(settings))
+    radio = _radio() if settings.LIVE else None
+    app = MeasuredApp(settings, open_lcd(settings), open_sensor(settings), radio=radio)
+    if radio:
+        radio._ble.connect()
     spent = None
     if detail:
         import stages_guest
@@ -182,6 +191,8 @@ def run(detail, seconds, out, chosen):
         "collections_by_app": app.n_pauses,
         "collections_automatic": app.automatic,
     }
+    if radio:
+        figures["sent"] = radio._ble.sent
     if detail:
         figures["stopwatch_us"] = stages_guest.stopwatch_us(spent)
         figures["stages"] = [stage[0] for stage in stages_guest.STAGES] + ["read"]

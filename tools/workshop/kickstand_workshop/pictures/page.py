@@ -99,7 +99,7 @@ def _animated(shots: list[tuple[float, bytes]]) -> bytes:
     times = [at for at, _ in shots]
     lasting = [round(1000 * (after - at) / _QUICKER) for at, after in pairwise(times)] + [round(1000 * _LAST_S)]
     made = io.BytesIO()
-    style = {"quality": _QUALITY, "method": 6, "loop": 0, "minimize_size": True}
+    style = {"quality": _QUALITY, "method": 4, "loop": 0}
     pictures[0].save(
         made, "WEBP", save_all=True, append_images=pictures[1:], duration=lasting, xmp=looks().encode(), **style
     )

@@ -9,6 +9,7 @@ import { busy, offer } from "./files.mjs";
 import { Gauge } from "./gauge.mjs";
 import { LEAN, SIDEWAYS, sideOf, written } from "./measures.mjs";
 import { Player } from "./player.mjs";
+import { SimulatedRide } from "./simulated.mjs";
 
 const byId = (id) => document.getElementById(id);
 const gauge = new Gauge(byId("gauge"));
@@ -84,6 +85,24 @@ async function ride() {
   await riding.run();
   riding = null;
   awake?.release();
+}
+
+let simulated = null; // the SimulatedRide that runs
+
+function simulate() {
+  shown.begin();
+  document.documentElement.dataset.simulated = "yes";
+  byId("simulated-stop").focus();
+  shown.measure(LEAN);
+  simulated = new SimulatedRide(shown, (text) => put("pretend-said", text));
+  simulated.start();
+}
+
+function endSimulated() {
+  simulated.stop();
+  shown.begin();
+  delete document.documentElement.dataset.simulated;
+  byId("simulated").focus();
 }
 
 function stop() {
@@ -194,6 +213,8 @@ show(LEAN);
 byId("start").addEventListener("click", start);
 byId("stop").addEventListener("click", stop);
 byId("pull").addEventListener("click", pull);
+byId("simulated").addEventListener("click", simulate);
+byId("simulated-stop").addEventListener("click", endSimulated);
 byId("ride").addEventListener("click", ride);
 byId("ride-stop").addEventListener("click", () => riding?.stop());
 document.addEventListener("visibilitychange", () => (live || riding) && !document.hidden && stayAwake());

@@ -176,8 +176,7 @@ const library = () => fetched(PLOTLY).then((answer) => answer.text());
 function showReady(done, of) {
   loaded = of === 1;
   if (loaded) byId("work-bar").removeAttribute("value");
-  const percent = Math.floor((100 * done) / of);
-  byId("ready").textContent = loaded ? "" : `What reads rides is being loaded: ${percent} % of ${(of / 1e6).toFixed(0)} MB.`;
+  byId("ready").textContent = loaded ? "" : `What reads rides is being loaded: ${Math.floor((100 * done) / of)} %.`;
 }
 
 /** Fetch while the visitor reads, unless the browser is set to save data. */
