@@ -2,6 +2,7 @@
 fault does to its I2C, its FIFO's backlog, watchdog and reset. host_tests/device has every fault of the fault script."""
 
 import re
+from typing import Any
 
 import pytest
 from emulated import CHIPS, calibrated, firmware, leaning, pico, reset_in_a_read, shows
@@ -135,4 +136,5 @@ def test_an_oled_is_found_and_shows_the_lean_in_large_digits(display):
     device = pico(leaning(LEAN_DEG), firmware() | calibrated(), display=display)
     device.power_on()
     device.run_until(lambda: shown_lean(device.lcd()) == LEAN_DEG, 3.0)
-    assert device.board.lcd.unknown == 0 and not device.board.too_fast
+    oled: Any = device.board.lcd
+    assert oled.unknown == 0 and not device.board.too_fast
