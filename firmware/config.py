@@ -21,9 +21,14 @@
 # LCD_I2C = 1               # (not used)
 # LCD_SDA = 6               # (18) the same two pins as the sensor's put both on one bus, at the slower speed
 # LCD_SCL = 7               # (19)
-# LCD_BUS_HZ = 100_000
-# LCD_ADDRESSES = (0x27, 0x3F)
+# LCD_BUS_HZ = None         # None: 100_000 for a character display, 400_000 for an OLED
+# LCD_ADDRESSES = (0x27, 0x3F, 0x3C, 0x3D)
 # BUTTON_PIN = 15           # (4) between the pin and ground
+
+# Display
+# DISPLAY = "auto"          # what answers at 0x3C or 0x3D is an OLED; or "lcd" (HD44780), "ssd1306", "sh1106" (OLEDs)
+# OLED_CONTRAST = 255       # 0 (dim) to 255
+# OLED_INVERTED = False     # True: dark on bright
 
 # Speed source and vehicle, to align by driving: a car, bus or trailer needs a source, a motorcycle may have one
 # VEHICLE = "motorcycle"    # or "car": anything that does not lean
@@ -41,6 +46,10 @@
 
 # Record every ride from power-on; without it the menu starts a recording
 # RECORD = False
+
+# Live to a phone over Bluetooth LE: Pico W, Pico 2 W, ESP32 (not S2)
+# LIVE = False
+# LIVE_PIN = None           # six digits, as 271828, that a phone has to give once; ESP32 only
 
 # SD card for the rides, on SPI; without it they are kept in the board's flash. All five, and on a Pico its driver:
 # mpremote mip install sdcard

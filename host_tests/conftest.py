@@ -43,11 +43,21 @@ ROOT = Path(__file__).resolve().parent.parent
 
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "chip: runs the firmware on the emulated Pico, which takes its time")
+    config.addinivalue_line("markers", "esp32: on the emulated ESP32, where its library is")
+    config.addinivalue_line("markers", "nightly: takes so long that it runs only with --nightly")
     config.addinivalue_line("markers", "long: for over half a minute")
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--nightly", action="store_true", help="Run the longest tests of the emulated ESP32 too.")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Long tests first: begun last, one of them would keep one processor busy while the others idle."""
+    if not config.getoption("--nightly"):
+        nightly = [item for item in items if item.get_closest_marker("nightly")]
+        items[:] = [item for item in items if item not in nightly]
+        config.hook.pytest_deselected(items=nightly)
     items.sort(key=lambda item: (item.get_closest_marker("long") is None, item.get_closest_marker("chip") is None))
 
 

@@ -6,7 +6,7 @@ The firmware must be on the board (`kickstand flash`), and the bike aligned with
 
 and you see the lean, positive to the right, and the acceleration along the bike:
 
-    lean  +23.4 deg   forward -0.12 g
+    lean  +23.4 deg   forward -0.12 g     or, while the lean is not to be trusted, "not sure yet"
 
 Ctrl-C ends mpremote; the program runs on until `mpremote reset`, which starts the lean meter again.
 """
@@ -36,4 +36,5 @@ while True:
         n = chip.add_up(chip.fetch())
         if n:
             meter.update_sum(chip.sums, n, n * 1_000_000 // config.SAMPLE_HZ)
-    print("lean %+6.1f deg   forward %+.2f g" % (meter.lean_deg, meter.smooth_force[2]))
+    lean = "lean %+6.1f deg" % meter.lean_deg if meter.trusted else "not sure yet   "
+    print("%s   forward %+.2f g" % (lean, meter.smooth_force[2]))

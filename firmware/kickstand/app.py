@@ -1,7 +1,7 @@
 """The device: wires sensor, mathematics, button, flash and display, and owns the loop.
 
 sensor -> calibration and alignment -> lean -> page -> display, in one direction. The chip samples at SAMPLE_HZ by
-itself, and a turn of the loop takes what has come in.
+itself, and one pass of the loop ("a turn", App.turn()) takes the samples that have come in.
 
 The methods that last for most of a turn (turn, _pass_on, LeanMeter.update_sum, Sensor.fetch) need at most eleven words
 for locals and stack. MicroPython puts a larger frame on the heap. Freeing it moves the start of the allocator's next
@@ -9,24 +9,28 @@ search back, in front of all garbage since the last collection: up to 1 ms a tur
 """
 
 import gc
+import os
 from time import sleep_us, ticks_add, ticks_diff, ticks_ms, ticks_us
 
 from .board import port
 from .calibration.active import ActiveCalibration
 from .calibration.parameters import Calibration
 from .devices import open_button
+from .errors import Refusal
 from .imu.sensor import SampleClock
 from .lean.meter import LeanMeter
 from .rides.recording import Recording
 from .ui.screen import Screen
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
-COLLECT_TURNS = 42  # in which 90 KB of heap are used, of 120 that are free while recording
-COLLECT_TURNS_DRIVING = 25  # while aligning by driving: 85 KB of heap are free
-SINGLE_GAPS = 300  # single free blocks that a collection leaves
+COLLECT_TURNS = 42  # turns between two garbage collections: they use 90 KB of heap, of 120 free while recording
+COLLECT_TURNS_DRIVING = 25  # the same while aligning by driving and with an OLED: 85 KB of heap are free
+SINGLE_GAPS = 300  # single free heap blocks that a collection leaves
 PAGE_MS = 100
-LATE_MS = 400  # by which page and readings together may be late: with a page's time a lean is then half a second old
-FIRST_PAGE_MS = 60  # from the start of the sensor: then the lean filter's first window is over
+# A page shows no lean if its own delay and the age of the readings still in the FIFO add up to more: so a lean on the
+# display is at most half a second old
+LATE_MS = 400
+FIRST_PAGE_MS = 60  # time from the start of the sensor to the first page: the lean filter's first window is over then
 
 
 def fill_gaps(n):
@@ -40,14 +44,20 @@ def fill_gaps(n):
         value = -value  # each float is boxed: one block of the heap
 
 
+# Of the last run, once Ctrl-C has ended it: microseconds of its longest turn, and the fewest places that were left in
+# the chip's FIFO. kickstand.status() prints them
+worst = None
+
+
 class App:
     """The lean meter on a board.
 
-    settings: a Settings. lcd, sensor: of devices.open_lcd() and open_sensor(). keeper: as for Recording. Raises
-    SettingsError for pins that cannot be used.
+    settings: a Settings. lcd, sensor: from devices.open_lcd() and open_sensor(). keeper: see Recording. radio: a Radio
+    for a phone, or None; a LiveError if there should be one and is none. Raises SettingsError for pins that cannot be
+    used.
     """
 
-    def __init__(self, settings, lcd, sensor, keeper=None):
+    def __init__(self, settings, lcd, sensor, keeper=None, radio=None):
         self.settings = settings
         self.lcd = lcd
         self.button = open_button(settings)
@@ -59,22 +69,55 @@ class App:
         self.clock = SampleClock(1_000_000 // settings.SAMPLE_HZ)
         self.screen = Screen(settings, sensor, self.clock, self.meter, self.calibration, self.drive, self.rides)
         self._restarts = 0
+        self._least_wait_us = LOOP_US
         self._page_ms = ticks_ms()
+        self.live = None
+        if radio:
+            self._open_live(radio)
+        self.user = self._open_user()
+
+    def _open_user(self):
+        try:
+            os.stat("user.py")
+        except OSError:
+            return None
+        from .user_code import UserCode  # 3 KB of heap
+
+        user = UserCode(self)
+        self.screen.pages.own = user.pages
+        return user
 
     def _open_drive(self):
-        # 30 KB of heap with all that they import: not for a board without a speed source
+        # takes 30 KB of heap with its own imports: not imported without a speed source
         from .drive_alignment.background import BackgroundAlignment
         from .speed.source import open_speed
 
         return BackgroundAlignment(self.settings.leans, open_speed(self.settings), self.meter, self.calibration)
+
+    def _open_live(self, radio):
+        if isinstance(radio, Refusal):
+            self.screen.notify(radio, ticks_ms())
+            return
+        from .live.live import Live
+
+        self.live = Live(radio, self, self.settings.leans)
+        self.screen.add_live(self.live, self._end_live)
+
+    def _end_live(self):
+        self.live.stop()
+        self.live = None
 
     def run(self):
         """Loop until Ctrl-C, LOOP_US a turn."""
         try:
             self._loop()
         except KeyboardInterrupt:
-            port.rest_watchdog()  # nothing feeds it from here on; first, for a second Ctrl-C may interrupt what follows
+            port.rest_watchdog()  # not fed from here on; comes first, because a second Ctrl-C may interrupt the rest
+            global worst
+            worst = LOOP_US - self._least_wait_us, self.sensor.chip.places_left()
             self.rides.stop()
+            if self.live:
+                self._end_live()
             raise
 
     def _loop(self):
@@ -85,27 +128,34 @@ class App:
         watchdog = port.start_watchdog() if self.settings.WATCHDOG else None
         gc.threshold(-1)
         due_us = ticks_us()
-        most = COLLECT_TURNS_DRIVING if self.drive else COLLECT_TURNS
-        turns = port.turns_to_collect(most)
+        turns = self._turns_to_collect()
         while True:
             self.turn()
             turns -= 1
-            if turns <= 0:  # here, not in the middle of a sample: meanwhile the FIFO keeps what comes
+            if turns <= 0:  # here, not in the middle of a sample: the FIFO keeps the samples meanwhile
                 gc.collect()
                 fill_gaps(SINGLE_GAPS)
-                turns = port.turns_to_collect(most)
+                turns = self._turns_to_collect()
+                if self.user:
+                    self.user.check_memory()
             if watchdog:
                 watchdog.feed()
             due_us = ticks_add(due_us, LOOP_US)
             wait_us = ticks_diff(due_us, ticks_us())
+            if wait_us < self._least_wait_us:
+                self._least_wait_us = wait_us
             if wait_us > 0:
                 sleep_us(wait_us)
             else:  # late, as after writing to flash: count from here instead of racing to catch up
                 due_us = ticks_us()
 
+    def _turns_to_collect(self):
+        few = self.drive or self.lcd.draws
+        return port.turns_to_collect(COLLECT_TURNS_DRIVING if few else COLLECT_TURNS)
+
     def turn(self):
-        """One turn of the loop: the samples that wait, one press, at most one transfer to the display. It waits for
-        nothing."""
+        """One pass of the loop: process the samples in the FIFO and one press, and do at most one transfer to the
+        display. It waits for nothing."""
         now_us, now_ms = ticks_us(), ticks_ms()
         n = self.sensor.fetch(now_ms)
         if n:
@@ -122,12 +172,19 @@ class App:
             self.clock.emptied(now_us)
         event = self.button.poll(now_ms)
         if event:
-            self.screen.press(event, now_ms)
+            self._press(event, now_ms)
         if ticks_diff(now_ms, self._page_ms) >= 0:
             self._show(now_ms)
         self.lcd.tick(now_ms)
         if self.rides.recorder.active:  # recording() would cost 20 us
             self.rides.recorder.tick()
+        if self.live:
+            self.live.poll(now_ms)
+
+    def _press(self, event, now_ms):
+        self.screen.press(event, now_ms)
+        if self.user:
+            self.user.press(event)
 
     @property
     def recording(self):
@@ -136,7 +193,7 @@ class App:
 
     def _poll_speed(self, now_ms):
         recorder = self.rides.recorder
-        if recorder.stalled:  # also by what began or ended a ride
+        if recorder.stalled:  # by a write, or by the begin or end of a ride
             recorder.stalled = False
             self.drive.speed.after_stall(now_ms)
         speed = self.drive.poll(now_ms)
@@ -144,24 +201,28 @@ class App:
             recorder.add_fix(speed, self.drive.speed.place(now_ms))
 
     def _show(self, now_ms):
-        """Put the page as it is now onto the display, and what recording or speed source have to report once. As often,
-        take a step of what the menu may need and, at standstill only, save the roll-misalignment correction."""
+        """Put the page onto the display, or a notice from recording or speed source. Also do what is due as often: a
+        step of preparing a recording while the menu is open, and, at standstill only, saving the roll-misalignment
+        correction."""
         waiting_ms = 1000 * self.sensor.chip.frames_left // self.settings.SAMPLE_HZ
         self.screen.pages.late = ticks_diff(now_ms, self._page_ms) + waiting_ms > LATE_MS
+        self.screen.pages.draws = self.lcd.draws
         self._page_ms = ticks_add(now_ms, PAGE_MS)
-        if self.screen.menu:  # in which a recording can be begun, at once
+        if self.screen.menu:  # a recording that is started there should begin at once
             self.rides.prepare()
         problem = self.rides.recorder.take_problem() or (self.drive and self.drive.speed.take_problem())
+        if self.user:
+            self.user.lean(self.sensor.fault is None and self.screen.pages.trusted)
+            problem = problem or self.user.take_problem()
         if problem:
             self.screen.notify(problem, now_ms)
-        line1, line2 = self.screen.lines(now_ms)
-        self.lcd.show(line1, line2)
+        self.lcd.show(*self.screen.lines(now_ms))
         if not self.screen.wizard:
             self.calibration.keep_trim(now_ms)
 
     def _pass_on(self, n, dt_us, now_ms):
-        """Pass on the n samples that came in, the last of them dt_us after the one before: the sum of them to the
-        meter, each one to a wizard."""
+        """Pass on n new samples: their sum to the meter, each one to a wizard. dt_us: from the last sample before them
+        to the last of them."""
         if self._restarts != self.sensor.restarts:
             self._restarts = self.sensor.restarts
             self._sensor_started()
@@ -171,6 +232,8 @@ class App:
             self.rides.recorder.add(chip.sums, n, dt_us)
         if self.drive:
             self.drive.feed(chip.sums, n, dt_us, now_ms)
+        if self.live and self.live.period_ms:
+            self.live.feed(chip.sums, n)
         if self.screen.wizard:
             self._pass_each(n, now_ms)
 
@@ -181,7 +244,7 @@ class App:
             wizard.sample(chip.counts, now_ms)
 
     def _sensor_started(self):
-        """The chip has been set up, for the first time or again after a fault; it may be another chip."""
+        """React to a chip that was set up, for the first time or again after a fault; it may be another chip."""
         self.meter.restart()
         if self.recording:
             self.rides.recorder.mark_gap()

@@ -1,14 +1,14 @@
-"""The words of the USB console, in whole sentences: for what a board itself reports there. By code, see errors.py.
+"""The sentences that a board prints on its USB console, by code (see errors.py).
 
 Imported only when there is something to say: on most boards never.
 """
 
-SLOW_MS = 100  # a print takes a few ms, but 500 where the USB host sleeps: longer than the chip's FIFO lasts
-QUIET_MS = 60_000  # after a slow print no refusal is printed for so long
+SLOW_MS = 100  # a longer print is slow. Most take a few ms, but 500 if the USB host sleeps: the chip's FIFO overflows
+QUIET_MS = 60_000  # after a slow print no refusal is printed for this time
 
-_slow_ms = None  # when a print was slow
+_slow_ms = None  # ticks_ms() of the last slow print
 
-# code|sentence; {0}, {1} ... are the refusal's values, of a setting first its name
+# code|sentence; {0}, {1} ... are the refusal's values; {0} of a SettingsError is the setting's name
 _SENTENCES = """
 not-written|calibration not saved: {0}; the old one is kept
 read-back|calibration not saved: it reads back differently; the old one is kept
@@ -16,6 +16,9 @@ incomplete|incomplete firmware ({0}): run kickstand flash
 no-memory|no memory for that ({0}): restart the board
 no-driver|SD card: its driver is not on the board: mpremote mip install sdcard
 no-card|SD card: none that can be used ({0}): check wiring and card, which has to be FAT32; then restart the board
+user-failed|user.py: {0} is left out: {1}
+user-slow|user.py: {0} took {1} ms: samples are lost when it takes 300, and then it is left out
+user-memory|user.py is left out: it leaves too little memory ({0})
 unreadable|config.py cannot be read ({1}{2}): correct it, then kickstand flash --config
 not-allowed|config.py: {0} = {1!r}, but it must be {2}
 no-setting|config.py: {0} is not a setting; see the list in that file
@@ -26,20 +29,23 @@ pin-twice|config.py: a pin is used twice among {1}
 one-i2c|config.py: SENSOR_I2C and LCD_I2C are both {1} on different pins; give each its own
 wrong-code|the machine code for {0}() gives wrong results on this board: slower code runs instead
 needs-speed|config.py: VEHICLE = "car" needs a speed source to be aligned: SPEED = "gps" or "wheel"
+no-radio|LIVE: this board has no Bluetooth in its MicroPython: nothing goes to a phone, the lean goes on
+no-pairing|LIVE_PIN: this board cannot ask for a PIN: nothing goes to a phone; LIVE_PIN = None lets every phone in
+radio-fault|LIVE: the radio does not start ({0}): nothing goes to a phone, the lean goes on
 no-such-pin|config.py: {0} = {1} is no pin of this board ({2})
 i2c-pins|config.py: {1}_SDA = {2} and {1}_SCL = {3} do not belong to I2C {4} ({5})
 uart-pins|config.py: GPS_TX = {1} and GPS_RX = {2} do not belong to UART {3} ({4})
 """
-_RECORDING_STOPPED = "recording stopped: {0}"  # for all of its faults, which only the display distinguishes
+_RECORDING_STOPPED = "recording stopped: {0}"  # for all faults of a recording: only the display distinguishes them
 
 
 def sentence(refusal):
-    """One line for a Refusal."""
+    """The sentence for a Refusal, one line."""
     return refusal.words(_SENTENCES, _RECORDING_STOPPED)
 
 
 def say(text, end="\n"):
-    """Print text; return True if that was slow."""
+    """Print text; return True if that took over SLOW_MS."""
     from time import ticks_diff, ticks_ms  # here, because the host's tools need the words only
 
     global _slow_ms
@@ -52,7 +58,7 @@ def say(text, end="\n"):
 
 
 def tell(refusal):
-    """Print its sentence, unless printing was slow lately."""
+    """Print a Refusal's sentence, unless a print was slow in the last QUIET_MS."""
     from time import ticks_diff, ticks_ms
 
     if _slow_ms is None or ticks_diff(ticks_ms(), _slow_ms) >= QUIET_MS:

@@ -4,15 +4,22 @@ from machine import Pin
 
 from .board import i2c_bus
 from .board.button import Button
-from .board.hd44780 import Lcd
+from .board.display import Display
 from .errors import SettingsError
 from .imu.mpu6050 import Mpu6050
 from .imu.sensor import Sensor
 
 
 def open_lcd(settings):
-    """The display, an Lcd. Its tick() raises SettingsError for pins that the I2C controller cannot use."""
-    return Lcd(lambda: _open_bus(settings, "LCD"), settings.LCD_ADDRESSES)
+    """The Display. Its tick() raises SettingsError for pins that the I2C controller cannot use."""
+    return Display(
+        lambda hz: _open_bus(settings, "LCD", hz),
+        settings.LCD_BUS_HZ,
+        settings.DISPLAY,
+        settings.LCD_ADDRESSES,
+        settings.OLED_CONTRAST,
+        settings.OLED_INVERTED,
+    )
 
 
 def open_sensor(settings):
@@ -20,7 +27,7 @@ def open_sensor(settings):
     ranges = settings.ACCEL_RANGE_G, settings.GYRO_RANGE_DPS
     rates = settings.DLPF, settings.SAMPLE_HZ
     chip = Mpu6050(None, settings.SENSOR_ADDRESS, *ranges, *rates, settings.ACCEPT_WHO_AM_I)
-    return Sensor(chip, lambda: _open_bus(settings, "SENSOR"))
+    return Sensor(chip, lambda: _open_bus(settings, "SENSOR", settings.SENSOR_BUS_HZ))
 
 
 def open_button(settings):
@@ -31,11 +38,11 @@ def open_button(settings):
         raise SettingsError("no-such-pin", "BUTTON_PIN", settings.BUTTON_PIN, str(error))
 
 
-def _open_bus(settings, name):
+def _open_bus(settings, name, hz):
     """A machine.I2C. name: "SENSOR" or "LCD", with which the names of its settings begin."""
     controller = getattr(settings, name + "_I2C")
     sda, scl = getattr(settings, name + "_SDA"), getattr(settings, name + "_SCL")
     try:
-        return i2c_bus.open_i2c(controller, sda, scl, getattr(settings, name + "_BUS_HZ"))
+        return i2c_bus.open_i2c(controller, sda, scl, hz)
     except (ValueError, TypeError) as error:  # a Pico's Pin(None), where no pin is set, is a TypeError
         raise SettingsError("i2c-pins", name + "_SDA / SCL", name, sda, scl, controller, str(error))

@@ -13,16 +13,16 @@ NO_MACHINE_CODE = (ImportError, NameError, SyntaxError, MemoryError, ValueError)
 
 
 class Notice:
-    """Something to be reported. code: what; values: its numbers and names, in the order that the words for the code use
-    them."""
+    """Something to be reported. code: see above; values: its numbers and names, in the order in which the sentences for
+    this code use them."""
 
     def __init__(self, code, *values):
         self.code = code
         self.values = values
 
     def words(self, table, other=""):
-        """What a table says for this code, with the values in it. table: text, a line code|words for each code.
-        other: the words for a code that is not in the table."""
+        """The words for this code from a table, with the values filled in. table: text, a line code|words for each
+        code. other: the words for a code that is not in the table."""
         start = table.find("\n%s|" % self.code)
         if start >= 0:
             start += len(self.code) + 2
@@ -31,7 +31,7 @@ class Notice:
 
 
 class Refusal(Exception):
-    """A request that cannot be carried out; it is worded like a Notice."""
+    """A request that cannot be carried out, with a code and values like a Notice."""
 
     def __init__(self, code, *values):
         super().__init__(code, *values)
@@ -42,8 +42,8 @@ class Refusal(Exception):
 
 
 def report(refusal):
-    """Print it on the console, unless that was slow lately: in words, unless a flash or a heap that has failed does not
-    give these any more."""
+    """Print a refusal on the console, unless a print was slow lately: its sentence, or only its code where the module
+    with the sentences cannot be loaded (flash or heap has failed)."""
     try:
         from .console import tell
 
@@ -53,8 +53,8 @@ def report(refusal):
 
 
 def attempt(function, *arguments):
-    """Call function, which may import modules that nothing has needed before. Return None, or a Notice if there is no
-    memory or the firmware is incomplete. What it imported is forgotten then: MicroPython would keep half a module."""
+    """Call function, which may import modules for the first time. Return None, or a Notice if there is no memory or the
+    firmware is incomplete. The modules that it began to import are then removed: MicroPython would keep half of one."""
     before = tuple(sys.modules)
     try:
         function(*arguments)
@@ -69,8 +69,8 @@ def attempt(function, *arguments):
 
 
 def checked(machine_code, plain, *arguments):
-    """machine_code, if it does with these arguments what plain does with copies of them; else plain, and the console
-    says so: MicroPython's compilers had errors on some boards."""
+    """Return the function machine_code, if it gives the same results as the function plain for copies of these
+    arguments; else return plain and print that on the console. MicroPython's compilers had errors on some boards."""
     copies = [a if isinstance(a, (int, bytes)) else a[:] for a in arguments]
     if machine_code(*arguments) == plain(*copies) and list(arguments) == copies:
         return machine_code
@@ -98,9 +98,13 @@ class CardError(Refusal):
     """No SD card that can be written, or no driver for it."""
 
 
+class LiveError(Refusal):
+    """Why nothing goes to a phone."""
+
+
 class SettingsError(Refusal):
     """A value in config.py that cannot be used. values[0]: the name of the setting.
 
-    settings: of an error that settings.load() raises, the Settings with what is right, to open the display with."""
+    settings: where settings.load() raises it, a Settings with the values that are right, to open the display with."""
 
     settings = None

@@ -12,13 +12,13 @@ import machine
 from . import settings
 from .board import port
 from .devices import open_button, open_lcd, open_sensor
-from .errors import SettingsError
+from .errors import LiveError, SettingsError, report
 from .units import __version__
 
 CHARGE_MS = 100
 
-# What the app imports, one module after the other: between two of them, display and chip are set up a step further. The
-# imports say the same, but MicroPython has no hook between them; a test compares both.
+# The modules that the app imports, in this order: between two of them, display and chip are set up a step further. The
+# list repeats the import statements, because MicroPython has no hook between imports; a test compares both.
 STEPS = [
     folder + "." + name
     for folder, names in (
@@ -38,8 +38,8 @@ def _show(lcd, line1, line2=""):
 
 
 def _held(button):
-    """True if it is pressed, now and a moment later: the pin's weak pull-up first has to charge what is between it and
-    ground, as a capacitor against bouncing (with 1 uF and 80 kOhm in 75 ms)."""
+    """True if the button is pressed, now and a moment later: the pin's weak pull-up first has to charge any capacitor
+    between pin and ground, such as one against bouncing (1 uF through 80 kOhm takes 75 ms)."""
     if button.held():
         sleep_ms(CHARGE_MS)
     return button.held()
@@ -55,7 +55,7 @@ def main():
             print("Kickstand %s: safe mode, the button was held at power-up." % __version__)
             _show(lcd, "Safe mode", "Ready for USB")
             return
-        lcd.show("Kickstand", "starting")  # a lean from before a reset must not pass for a reading
+        lcd.show("Kickstand", "starting")  # replaces a lean from before a reset
         run(chosen, lcd)
     except SettingsError as error:
         port.rest_watchdog()  # it may run: wrong pins show only when the app opens them
@@ -72,9 +72,22 @@ def main():
         print("Kickstand stopped. Ctrl-D starts it again; import kickstand; kickstand.status() reports how it is.")
 
 
+def _open_radio(pin):
+    """The Radio for a phone, or the LiveError why there is none, which does not stop the lean. Before the app is
+    imported: an ESP32-C3 may crash in switching its radio on once 40 KB are allocated."""
+    from .live.radio import Radio
+
+    try:
+        return Radio(pin)
+    except LiveError as problem:
+        report(problem)
+        return problem
+
+
 def run(chosen, lcd):
     """Run the app. An exception in it is reported on display and console, then the board restarts."""
     try:
+        radio = _open_radio(chosen.LIVE_PIN) if chosen.LIVE else None
         sensor = open_sensor(chosen)
         for name in STEPS + ["app"]:
             now_ms = ticks_ms()
@@ -84,10 +97,10 @@ def run(chosen, lcd):
         from .app import App
 
         print("Kickstand %s. Ctrl-C stops it." % __version__)
-        App(chosen, lcd, sensor).run()
+        App(chosen, lcd, sensor, radio=radio).run()
     except SettingsError:
         raise
-    except ImportError as error:  # after an update that was broken off: to restart would not help
+    except ImportError as error:  # an update was broken off: a restart would not help
         port.rest_watchdog()
         print("Kickstand stopped: incomplete firmware (%s). Run kickstand flash." % error)
         _show(lcd, "Incomplete:", "flash it again")

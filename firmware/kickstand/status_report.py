@@ -15,7 +15,7 @@ from .ui import messages
 from .units import __version__
 
 LISTEN_MS = 3500
-_TRIAL = "trial.tmp"  # written and removed
+_TRIAL = "trial.tmp"  # a file that is written to measure the flash, then removed
 
 
 def _print(label, words, *values):
@@ -23,7 +23,7 @@ def _print(label, words, *values):
 
 
 def report():
-    """Print all of it. Opens sensor and display itself: the app must not be running."""
+    """Print the whole report. Opens sensor and display itself: the app must not be running."""
     release = ".".join(str(n) for n in sys.implementation.version[:3])
     machine_name = getattr(sys.implementation, "_machine", sys.platform)
     print("Kickstand %s on %s, MicroPython %s" % (__version__, machine_name, release))
@@ -42,6 +42,7 @@ def report():
         return
     _calibration(who_am_i, settings)
     _machine_code()
+    _worst()
     gc.collect()
     space = os.statvfs("/")
     free_kb = gc.mem_free() // 1024, space[0] * space[3] // 1024
@@ -49,7 +50,8 @@ def report():
 
 
 def _write_ms():
-    """How long it takes to erase and write a block of the flash. Longer than the chip's FIFO lasts loses readings."""
+    """The time in ms to erase and write a flash block. If that is longer than the chip's FIFO lasts, readings get
+    lost."""
     begun_ms = ticks_ms()
     with open(_TRIAL, "wb") as file:
         file.write(bytes(4096))
@@ -82,12 +84,16 @@ def _sensor(sensor, settings):
 def _display(lcd):
     lcd.show("Kickstand", "status: console")
     lcd.flush()
-    found = "at %s" % hex(lcd.address) if lcd.address else "none answers: check wiring and LCD_ADDRESSES"
+    found = (
+        "%s at %s" % ("OLED" if lcd.draws else "LCD", hex(lcd.address))
+        if lcd.address
+        else "none answers: check wiring and LCD_ADDRESSES"
+    )
     _print("Display", "%s", found)
 
 
 def _speed(settings):
-    """Print what the speed source says within LISTEN_MS: long enough to find out what is wrong with it."""
+    """Print the speed or the fault of the speed source after LISTEN_MS, in which it can detect each of its faults."""
     if settings.SPEED is None:
         _print("Speed", "no source: SPEED is not set, alignment by driving is off")
         return
@@ -108,6 +114,14 @@ def _speed(settings):
         print("  " + ", ".join(messages.lines(fault)))
     else:
         print("  nothing yet" if heard is None else "  %.1f m/s" % heard)
+
+
+def _worst():
+    """Print what the app has noted, if it has run since the board was started."""
+    app = sys.modules.get("kickstand.app")
+    if app and app.worst:
+        words = "longest turn %.1f ms; places left in the FIFO, at the fewest: %d"
+        _print("Since start", words, app.worst[0] / 1000, app.worst[1])
 
 
 def _machine_code():

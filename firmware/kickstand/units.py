@@ -1,11 +1,12 @@
-"""Constants that several packages share: the version, standard gravity, names of axes, and when readings no longer
-follow on.
+"""Constants that several packages share: the version, standard gravity, names of axes, limits of gaps in the readings.
 
 The sensor's axes are x, y, z as printed on the chip. The vehicle's are left, up, forward (A. Nicolae's x, y, z).
 """
 
 __version__ = "0.4.0"
 STANDARD_GRAVITY = 9.80665  # m/s^2 in 1 g
-AXES = ("x", "y", "z")  # of the sensor
-GAP_US = 500_000  # without a reading for longer, the past says nothing about the present
-LOST_US = 170_000  # a longer step spans lost readings: the loop takes at most eight at once, 160 ms at 50 a second
+AXES = ("x", "y", "z")  # names of the sensor's axes
+GAP_US = 500_000  # after a longer time without a reading the estimators restart
+# A longer time between two readings means that some were lost: the loop takes at most eight at once, 160 ms at 50 a
+# second
+LOST_US = 170_000

@@ -9,6 +9,7 @@ import analysis_rides
 import command
 import numpy as np
 import pytest
+from kickstand_tools.analysis import report
 from kickstand_tools.analysis.alignment_quality import Quality, lean_cost, yaw_cost_deg
 from kickstand_tools.analysis.report import angles
 from kickstand_tools.api import Log, fit_drive, fit_two_positions, open_ride, overview, simulate_ride, vehicle_channels
@@ -141,11 +142,9 @@ def test_nothing_is_a_negative_nothing():
     ],
 )
 def test_a_report_says_what_it_costs_and_what_to_do(scripted, name, degrees, words):
-    cal = with_calibration(scripted, name, degrees)
-    said = " ".join(command.works("report", scripted, "--calibration", cal).out.split())
-    assert re.search(words, said), said
-    data = json.loads(command.works("report", scripted, "--calibration", cal, "--json").out)
-    cost = data["lean_cost"][f"{name}_deg"]
+    seen = overview(open_ride(scripted, with_calibration(scripted, name, degrees)))
+    assert re.search(words, report.words(seen).alignment)
+    cost = report.as_data(seen)["lean_cost"][f"{name}_deg"]
     most = {"yaw": yaw_cost_deg(degrees), "roll": max(0.0, degrees - 3.5), "pitch": 0.33}[name]
     assert cost == pytest.approx(most, abs=0.05)
 
@@ -153,7 +152,7 @@ def test_a_report_says_what_it_costs_and_what_to_do(scripted, name, degrees, wor
 def test_without_a_speed_calibrate_drive_is_no_help(scripted, tmp_path):
     log = tmp_path / "RIDE.csv"
     log.write_text("\n".join(row.rpartition(",")[0] for row in scripted.read_text().splitlines()) + "\n")
-    said = " ".join(command.works("report", log, "--calibration", with_calibration(scripted, "yaw", 5.0)).out.split())
+    said = report.words(overview(open_ride(log, with_calibration(scripted, "yaw", 5.0)))).alignment
     assert "calibrate ride takes it out" in said
     assert "calibrate drive" not in said
 

@@ -73,12 +73,12 @@ def test_what_is_not_known_is_no_figure(ride, tmp_path):
 
 
 def test_time_without_readings_is_said(ride, tmp_path):
-    assert json.loads(command.works("report", ride, "--json").out)["missing_s"] == 0.0
+    assert json.loads(command.works("report", ride, "--live", "--json").out)["missing_s"] == 0.0
     assert "No readings" not in command.works("report", ride).out
     header, *rows = ride.read_text().splitlines()
     log = tmp_path / "gap.csv"
     log.write_text("\n".join([header, *rows[:1200], *rows[1240:]]) + "\n")
-    given = (log, "--calibration", calibration(tmp_path))
+    given = (log, "--calibration", calibration(tmp_path), "--live")
     step_s = float(rows[1].split(",")[0]) - float(rows[0].split(",")[0])
     data = json.loads(command.works("report", *given, "--json").out)
     assert data["missing_s"] == pytest.approx(41 * step_s, abs=0.06)
@@ -135,17 +135,17 @@ def turned_round(directory, tilt_deg=0.0, **changed):
 def test_a_kickstand_on_the_other_side_is_noticed(ride, tmp_path):
     cal = turned_round(tmp_path)
     line = "forward and backward are exchanged: calibrate two --side right?"
-    said = command.works("report", ride, "--calibration", cal)
+    said = command.works("report", ride, "--calibration", cal, "--live")
     assert line in said.err
     assert "do all accelerations have the opposite sign?" in said.err
     assert "Stops: not known" in said.out
     assert "MFDD" not in said.out  # of the wrong way round, no figure is right
-    data = json.loads(command.works("report", ride, "--calibration", cal, "--json").out)
+    data = json.loads(command.works("report", ride, "--calibration", cal, "--live", "--json").out)
     assert data["remark"].startswith(line)
     assert data["stops"] == []
     assert line in command.works("plot", ride, "--calibration", cal, "--out", tmp_path / "pictures").err
     car = turned_round(tmp_path, vehicle="car")
-    assert "exchanged: calibrate drive again?" in command.works("report", ride, "--calibration", car).err
+    assert "exchanged: calibrate drive again?" in command.works("report", ride, "--calibration", car, "--live").err
 
 
 def test_swapped_poses_are_noticed(tmp_path):
@@ -154,13 +154,13 @@ def test_swapped_poses_are_noticed(tmp_path):
         segments += [script.accelerate(16, 5), script.straight(8), script.brake(0, 4), script.wait(4)]
     ride = analysis_rides.write(tmp_path, segments, speed_hz=1)
     cal = turned_round(tmp_path, 11.0)
-    shown = command.works("report", ride, "--calibration", cal)
+    shown = command.works("report", ride, "--calibration", cal, "--live")
     said = " ".join((shown.out + shown.err).split())
     assert re.search(r"roll [+-]1[01]\.\d°.*: were the poses swapped\?", said)
     assert "forward and backward are exchanged: were the poses swapped?" in said
     s, c = np.sin(np.radians(6.0)), np.cos(np.radians(6.0))
     cal = calibration(tmp_path, vehicle_from_sensor=[[c, s, 0], [-s, c, 0], [0, 0, 1]])
-    said = " ".join(command.works("report", ride, "--calibration", cal).out.split())
+    said = " ".join(command.works("report", ride, "--calibration", cal, "--live").out.split())
     assert ": was it held upright?" in said
     assert "swapped" not in said
 
@@ -168,7 +168,7 @@ def test_swapped_poses_are_noticed(tmp_path):
 def test_a_stop_that_only_the_speed_knows(ride, tmp_path):
     """Forward is across: neither right nor exchanged."""
     cal = calibration(tmp_path, vehicle_from_sensor=[[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
-    said = command.works("report", ride, "--calibration", cal).out
+    said = command.works("report", ride, "--calibration", cal, "--live").out
     assert "No stop" not in said
     assert "The speed falls to a stop, the force says otherwise" in " ".join(said.split())
 
@@ -181,7 +181,7 @@ def test_a_ride_without_stops(tmp_path):
 
 def test_a_car_has_no_lean(ride, tmp_path):
     cal = calibration(tmp_path, vehicle="car")
-    said = command.works("report", ride, "--calibration", cal).out
+    said = command.works("report", ride, "--calibration", cal, "--live").out
     assert "Max left" not in said
     assert "Max braking" in said
     command.works("plot", ride, "--calibration", cal, "--out", tmp_path)

@@ -13,7 +13,7 @@ import command
 import numpy as np
 import pytest
 from kickstand_tools.analysis.channels import Channels
-from kickstand_tools.analysis.export import export_csv, export_racechrono, export_vbo
+from kickstand_tools.analysis.export import export_columns, export_racechrono, export_vbo
 from kickstand_tools.analysis.export.export import export
 from kickstand_tools.analysis.ride import open_ride, vehicle_channels
 from kickstand_tools.calibration.file import CalibrationFile
@@ -63,7 +63,7 @@ def expected(name: str) -> str:
 
 def test_csv_to_the_letter(tmp_path):
     none = block(0.5, 1.25, speed_mps=np.nan, temp_c=np.nan, lean_formula_deg=np.nan, **NOWHERE)
-    text = written(export_csv.write, tmp_path / "x.csv", block(0.25), none, start_s=100.0)
+    text = written(export_columns.write_csv, tmp_path / "x.csv", block(0.25), none, start_s=100.0)
     assert text == expected("ride.csv")
 
 
@@ -146,7 +146,7 @@ def test_a_left_turn_under_braking_has_the_signs_of_each_format(tmp_path):
     assert cells[7:9] == [-0.4, 0.2]  # long accel > 0 forward, lat accel > 0 in a left turn
     assert cells[9:] == pytest.approx([7.0, 9.0])  # yaw > 0 in a left turn, roll > 0 to the right
     export(ride, "csv", out)
-    row = dict(zip(export_csv.COLUMNS, out.read_text().split("\n")[-2].split(",")))
+    row = dict(zip(export_columns.COLUMNS, out.read_text().split("\n")[-2].split(",")))
     assert [float(row[f"{name}_rate_dps"]) for name in ("pitch", "yaw", "roll")] == pytest.approx([-5.0, 7.0, 9.0])
 
 
@@ -250,20 +250,19 @@ def test_progress_and_notices_are_passed_on(tmp_path):
 
 def test_parquet_has_the_same_columns_with_their_units(tmp_path):
     pytest.importorskip("pyarrow")
-    from kickstand_tools.analysis.export import export_parquet
     from pyarrow.parquet import ParquetFile
 
-    export_parquet.write(tmp_path / "x", iter([block(0.25), block(0.5, 0.75, speed_mps=np.nan)]), EVENING_S)
+    export_columns.write_parquet(tmp_path / "x", iter([block(0.25), block(0.5, 0.75, speed_mps=np.nan)]), EVENING_S)
     file = ParquetFile(tmp_path / "x")
     assert file.num_row_groups == 2
-    units = "s deg deg g g g g deg/s deg/s deg/s m/s Cel deg deg deg s".split()
+    units = "s deg deg g g g g deg/s deg/s deg/s m/s Cel g deg deg deg s".split()
     assert {field.name: field.metadata[b"unit"].decode() for field in file.schema_arrow} == dict(
-        zip(export_csv.COLUMNS, units, strict=True)
+        zip(export_columns.COLUMNS, units, strict=True)
     )
-    assert [str(field.type) for field in file.schema_arrow] == ["double", *["float"] * 12, *["double"] * 3]
+    assert [str(field.type) for field in file.schema_arrow] == ["double", *["float"] * 13, *["double"] * 3]
     assert file.schema_arrow.metadata[b"axes"] == b"left, up, forward; lean > 0 to the right"
     table = file.read()
     assert table["t_s"].to_pylist() == [EVENING_S + 0.25, EVENING_S + 0.5, EVENING_S + 0.75]
     assert np.isnan(table["speed_mps"].to_pylist()[1:]).all()
-    for name in list(export_csv.COLUMNS)[1:]:
+    for name in list(export_columns.COLUMNS)[1:]:
         assert table[name][0].as_py() == pytest.approx(VALUES[name], rel=1e-6), name

@@ -13,7 +13,7 @@ import pytest
 from kickstand_tools import api
 from kickstand_tools.simulation.files import simulate
 
-FUNCTIONS = [name for name in api.__all__ if inspect.isfunction(getattr(api, name))]
+FUNCTIONS = [name for name, public in vars(api).items() if inspect.isfunction(public)]
 
 
 @pytest.mark.parametrize("name", FUNCTIONS + ["Log", "Stretch", "CalibrationFile"])
@@ -114,7 +114,7 @@ def test_a_refusal_has_its_code_and_values(directory):
     assert str(raised.value).startswith(f"{pose} and {pose}: both poses are the same")
 
 
-def test_what_is_wrong_with_arrays_is_said():
+def test_what_is_wrong_with_arrays_is_reported():
     time, still = np.arange(100) / 100.0, np.tile([0.0, 1.0, 0.0], (100, 1))
     with pytest.raises(api.InputError, match=r"gyro_dps has the shape \(99, 3\), it has to be \(100, 3\)"):
         api.Log(time, still, still[1:])
@@ -135,7 +135,7 @@ def test_an_open_file_with_a_mistake_is_refused_by_its_name(tmp_path):
         api.read_log(io.StringIO(path.read_text()))
 
 
-def test_the_events_of_a_refused_drive_are_told(directory):
+def test_the_events_of_a_refused_drive_are_reported(directory):
     events = []
     with pytest.raises(api.RefusedInput) as raised:
         api.fit_drive([directory / "RIDE.csv"], vehicle="car", on_event=events.append)

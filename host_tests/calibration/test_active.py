@@ -33,7 +33,7 @@ class Chip:
 
 @pytest.fixture
 def made(tmp_path, monkeypatch):
-    """An ActiveCalibration that was made at 0 ms, its meter, and what changed() was told."""
+    """An ActiveCalibration that was made at 0 ms, its meter, and what changed() was given."""
     monkeypatch.chdir(tmp_path)
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0)):
         from kickstand.calibration.active import ActiveCalibration
@@ -115,11 +115,11 @@ def test_a_restart_saves_the_trim_and_begins_with_what_is_stored(made):
     active, meter, changes = made
     active.chip_started(Chip())
     active.save(aligned())
-    used, told = meter.used, len(changes)
+    used, changed = meter.used, len(changes)
     meter.new_trim = 1.25
     active.restart()
     assert stored().trim_deg == active.value.trim_deg == 1.25
-    assert (meter.used, len(changes)) == (used + 1, told)
+    assert (meter.used, len(changes)) == (used + 1, changed)
     active.restart()
     assert meter.used == used + 2
 

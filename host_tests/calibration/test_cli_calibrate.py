@@ -140,12 +140,6 @@ def test_the_bias_of_the_six_positions_is_the_median(tmp_path, six_poses):
     assert json.loads((tmp_path / "CAL.json").read_text())["gyro_bias_dps"] == pytest.approx(BIAS, abs=0.05)
 
 
-def test_the_bias_of_the_two_poses_is_that_of_the_kickstand(tmp_path):
-    """It holds the bike stiller than a rider does."""
-    data, _ = aligned(two_poses(tmp_path, leaned(-10), bias=BIAS, upright_bias=np.array(BIAS) + 2.0))
-    assert data["gyro_bias_dps"] == pytest.approx(BIAS, abs=0.02)
-
-
 def six_refused(tmp_path, poses, words):
     return command.refused(tmp_path, "calibrate", "six", *poses, "--out", tmp_path / "CAL.json", words=words)
 
@@ -183,25 +177,10 @@ def test_the_same_file_twice(tmp_path, six_poses):
     six_refused(tmp_path, [*six_poses[:5], six_poses[0]], "is given twice")
 
 
-def test_a_pose_25_degrees_off_its_side(tmp_path, six_poses):
-    rng = np.random.default_rng(3)
-    command.still(six_poses[4], reads(tipped(command.AXES["+z"], 25, rng)), BIAS)
-    line = six_refused(tmp_path, six_poses, "side +z was 25 degrees off")
-    assert "side+z.csv" in line
-
-
 def test_a_free_pose_that_is_not_1_g(tmp_path, six_poses):
     wrong = command.still(tmp_path / "free.csv", reads(1.03 * np.array([1, 1, 1]) / np.sqrt(3)), BIAS)
     line = six_refused(tmp_path, [*six_poses, wrong], "the free pose reads 1.0")
     assert "free.csv" in line
-
-
-def test_no_real_sensor_has_such_an_offset(tmp_path):
-    poses = [
-        command.still(tmp_path / f"{k}.csv", np.asarray(axis) - np.array([0.6, 0, 0]))
-        for k, axis in enumerate(command.AXES.values())
-    ]
-    six_refused(tmp_path, poses, "axis x: offset 0.600 g")
 
 
 def spoil(path, change):
@@ -217,10 +196,6 @@ def plus(rows, column, more):
 
 SPOILT = {
     "moved": (lambda rows: plus(rows, 1, 0.3 * (np.arange(len(rows)) >= 150)), "moved or knocked"),
-    "slow tilt": (lambda rows: plus(rows, 2, np.linspace(0, 0.03, len(rows))), "slowly tilting"),
-    "knock": (lambda rows: plus(rows, 3, 0.5 * (np.arange(len(rows)) == 100)), "moved or knocked"),
-    "saturated": (lambda rows: plus(rows, 3, 2.0 - rows[:, 3]), "saturated"),
-    "turning": (lambda rows: plus(rows, 6, 60.0), "turning"),
     "frozen": (lambda rows: np.column_stack((rows[:, 0], np.tile(rows[0, 1:], (len(rows), 1)))), "frozen"),
     "short": (lambda rows: rows[:15], "too short"),
 }
@@ -250,10 +225,6 @@ def two_refused(poses, words, *more):
     ("stand", "words"),
     [
         (leaned(-0.3), "both poses are the same"),
-        (leaned(-4), "only 4.0 degrees between the poses"),
-        (leaned(-65), "65 degrees between the poses"),
-        (leaned(-180), "180 degrees between the poses"),
-        (leaned(-12) * 1.2, "is 1.200 g, not 1 g"),
         (leaned(-12) * 0.8, "is 0.800 g, not 1 g"),
     ],
 )
@@ -261,18 +232,6 @@ def test_poses_that_do_not_fix_the_mounting(tmp_path, stand, words):
     line = two_refused(two_poses(tmp_path, stand), words)
     assert "stand.csv" in line
     assert "upright.csv" in line
-
-
-def test_no_force_at_all(tmp_path):
-    two_refused(two_poses(tmp_path, leaned(-12), (0, 0, 0)), "not 1 g")
-
-
-def test_calibrated_poses_are_held_to_tighter_bounds(tmp_path):
-    """6 % off passes for an uncalibrated sensor, not for one whose offset and slope are known."""
-    poses = two_poses(tmp_path, leaned(-12) * 1.06)
-    aligned(poses)
-    cal = command.write_cal(tmp_path / "SIX.json", accel_offset_g=[0.001, 0, 0], accel_slope=[1, 1, 1])
-    two_refused(poses, "not 1 g", "--calibration", cal)
 
 
 def test_a_bad_calibration_to_build_on(tmp_path):

@@ -13,7 +13,7 @@ from kickstand.lean.upright_trim import MAX_TRIM
 
 
 def calibration(mark):
-    """A plausible calibration that can be told from others."""
+    """A plausible calibration that can be distinguished from others."""
     new = Calibration()
     new.set_accel((mark / 100, 0, 0), (1.0, 1.01, 0.99))
     new.gyro_bias[2] = -3.5
@@ -89,7 +89,7 @@ def test_records_are_read_and_written_as_by_the_first_release(store, tmp_path, s
     ],
     ids=lambda value: value if isinstance(value, str) else "",
 )
-def test_what_is_wrong_with_a_record_is_said(store, tmp_path, content, problem):
+def test_what_is_wrong_with_a_record_is_reported(store, tmp_path, content, problem):
     (tmp_path / FILES[1]).write_bytes(content)
     assert not store.load().aligned
     assert store.message == f"not calibrated: {FILES[1]} {problem}"

@@ -4,6 +4,7 @@ import numpy as np
 from kickstand_tools.checks.cells import CellTable, LogCells
 from kickstand_tools.logs.log import Log
 from kickstand_tools.refusals import sentence
+from kickstand_tools.simulation.ride import ride
 
 
 def cells_of(log: Log, accel=None, gyro=None, speed=True, block=1_000_000) -> LogCells:
@@ -23,3 +24,11 @@ def cells_of(log: Log, accel=None, gyro=None, speed=True, block=1_000_000) -> Lo
 def words(notice) -> str:
     """In words, "" for nothing."""
     return sentence(notice) if notice else ""
+
+
+def simulated(profile: str, seed: int = 1, seconds: float = 150.0) -> Log:
+    """A ride at 50 Hz by an MPU6050 with the errors that its data sheet allows, with a speed once a second."""
+    made = ride(profile, seed, seconds)
+    readings, mps = made.readings[::4], np.full(len(made.time[::4]), np.nan)
+    mps[::50] = made.truth["speed_mps"][::200]
+    return Log(made.time[::4], readings[:, :3], readings[:, 4:], mps)

@@ -1,17 +1,12 @@
 """Rates in rad/s are remarked on, those in deg/s never are."""
 
-import analysis_rides
-import command
 import numpy as np
 import pytest
-from checked import cells_of, words
-from kickstand.units import STANDARD_GRAVITY
+from checked import cells_of, simulated, words
 from kickstand_tools.checks.bends import bends
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.simulation.files import simulate
 from kickstand_tools.simulation.profiles import PROFILES
-from kickstand_tools.simulation.scripted import script
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
 
@@ -21,16 +16,14 @@ def judged(log, scale=1.0):
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_simulated_rides(tmp_path, profile):
-    simulate(profile, 5, tmp_path, 300.0)
-    log = read_log(tmp_path / "RIDE.csv")
+def test_simulated_rides(profile):
+    log = simulated(profile, 5, 300.0)
     assert judged(log) == ""
     assert ("are they in rad/s?" in judged(log, np.radians(1.0))) is (profile != "parked")
 
 
-def test_a_short_ride_tells_it_too(tmp_path):
-    simulate("city", 9, tmp_path, 120.0)
-    log = read_log(tmp_path / "RIDE.csv")
+def test_a_short_ride_shows_it_too():
+    log = simulated("city", 9, 120.0)
     assert "are they in rad/s?" in judged(log, np.radians(1.0))
     assert "the gyro of the opposite sign" in judged(log, -1.0)
 
@@ -53,60 +46,8 @@ def test_braking_and_dips_are_no_bends(slope):
     assert straight_on(time, slope + brake, 1.0 + 0.1 * np.sin(time)) == ""
 
 
-@pytest.mark.parametrize("name", ["replay", "report", "plot", "export"])
-def test_the_commands_say_so_in_one_line(tmp_path, name):
-    """The work is done all the same."""
-    bends = [bend for side in (-1, 1, -1) for bend in (script.turn(35 * side, 5), script.straight(2))]
-    ride = analysis_rides.write(tmp_path, [script.upright(4), script.accelerate(15, 5), *bends, script.straight(20)])
-    table = np.loadtxt(ride, delimiter=",", skiprows=1)
-    more = {"replay": ("--calibration", tmp_path / "RIDE.cal.json", "--out", tmp_path / "LEAN.csv")}
-    more |= {"plot": ("--out", tmp_path), "export": ("--to", "csv", "--out", tmp_path / "ride.csv")}
-    assert command.works(name, ride, *more.get(name, ())).err == ""
-    table[:, 4:] = np.radians(table[:, 4:])
-    command.write(ride, table)
-    said = command.works(name, ride, *more.get(name, ())).err
-    assert said.startswith(f"warning: {ride}: in bends the rates are those of ")
-    assert said.count("\n") == 1
-    assert said.endswith(" m/s: are they in rad/s? deg/s are needed\n")
-
-
-def weaving(scale=57.0, noise_dps=0.0, unlike=0.0, seconds=40.0, rest_s=8.0):
-    """A ride of bends to both sides at 15 m/s, its rates so many times too small; noise in that about left.
-
-    unlike: part of the rolling that has nothing to do with turning. rest_s: at rest, after the ride.
-    """
-    chance = np.random.default_rng(7)
-    time = np.arange(0.0, seconds + rest_s, 0.02)
-    moving = np.where(time < seconds, 1.0, 0.0)
-    lean = 0.4 * np.sin(1.1 * time) * moving
-    yaw = -STANDARD_GRAVITY * np.tan(lean) / 15.0
-    rolling = (0.44 * np.cos(1.1 * time) + unlike * np.cos(2.3 * time)) * moving
-    about_left = yaw * np.sin(lean) + np.radians(noise_dps) * chance.normal(size=len(time)) * moving
-    rate = np.degrees(np.column_stack((about_left, yaw * np.cos(lean), rolling))) / scale
-    force = np.column_stack((0.0 * time, 1.0 / np.cos(lean), 0.3 * np.sin(2.0 * time) * moving))
-    return bends(cells_of(Log(time, force @ TURN, rate @ TURN)))
-
-
-@pytest.mark.parametrize(
-    ("wrong", "right"),
-    [
-        ({"scale": 16.0}, {"scale": 13.0}),  # a share of 15
-        ({"noise_dps": 15.0}, {"noise_dps": 60.0}),  # by under 4.5 sigmas it is chance
-        ({"unlike": 0.3}, {"unlike": 1.0}),  # a bike's rolling goes with its turning
-        ({"seconds": 16.0}, {"seconds": 12.0}),  # a quarter of a minute of riding
-        ({"rest_s": 1770.0}, {"rest_s": 1800.0}),  # half an hour is kept
-    ],
-)
-def test_what_it_takes_to_be_sure_of_rates_in_radians(wrong, right):
-    notice = weaving(**wrong)
-    assert notice
-    assert notice.code == "rates-in-radians"
-    assert notice.values[0] == pytest.approx(15.0 * 57.3, rel=0.2)
-    assert weaving(**right) is None
-
-
 def test_recordings(shared_data):
-    """Those of cars do not tell it, the motorcycle's does."""
+    """Those of cars do not show it, the motorcycle's does."""
     for path in shared_data.glob("*.csv.gz"):
         log = read_log(path)
         assert judged(log) == "", path

@@ -1,9 +1,8 @@
-"""Positions tell a log that is a mirror image, whose accelerations are all of the opposite sign."""
+"""Positions show a log that is a mirror image, whose accelerations are all of the opposite sign."""
 
 import functools
 from dataclasses import replace
 
-import command
 import numpy as np
 import pytest
 from checked import cells_of
@@ -22,8 +21,8 @@ def simulated(profile: str = "street", late_s: float = 0.6) -> Log:
     made = ride(profile, 3, 150.0)
     here = slice(None, None, 4)
     times, readings = made.time[here], made.readings[here]
-    told = np.arange(len(times)) % 50 == 10
-    track = [np.where(told, np.interp(times - late_s, made.time, column), np.nan) for column in positions(made)]
+    known = np.arange(len(times)) % 50 == 10
+    track = [np.where(known, np.interp(times - late_s, made.time, column), np.nan) for column in positions(made)]
     assert np.max(np.abs(np.mean(readings[:50, 4:], axis=0))) > 3.0
     return Log(times, readings[:, :3], readings[:, 4:], **dict(zip(("lat_deg", "lon_deg", "utc_s"), track)))
 
@@ -37,7 +36,7 @@ def mirrored(log: Log) -> Log:
 
 
 @pytest.mark.parametrize("profile", ["street", "track", "city", "hills", "sweeper"])
-def test_a_mirrored_log_is_told_and_a_right_one_is_not(profile):
+def test_a_mirrored_log_is_reported_and_a_right_one_is_not(profile):
     assert codes(simulated(profile)) == []
     assert codes(mirrored(simulated(profile))) == ["mirrored"]
     assert "left and right are exchanged" in api.sentence(read_log(mirrored(simulated(profile))).notices[0])
@@ -60,14 +59,14 @@ def circling(both_sides: bool, bias_dps: float, wavering_dps: float = 0.0) -> bo
     yaw_dps = turning_dps + wave_dps
     way = np.cumsum(np.radians(yaw_dps)) * 0.02
     lat, lon = (np.cumsum(10.0 * wave(way)) * 0.02 * 9e-6 for wave in (np.sin, np.cos))
-    told = np.arange(len(t_s)) % 50 == 0
+    known = np.arange(len(t_s)) % 50 == 0
     rates = np.column_stack((0 * t_s, turning_dps - wave_dps + bias_dps, 0 * t_s))
-    places = [np.where(told, place, np.nan) for place in (lat, lon)]
+    places = [np.where(known, place, np.nan) for place in (lat, lon)]
     up = np.tile([0.0, 1.0, 0.0], (len(t_s), 1))
     return course_agrees(cells_of(Log(t_s, up, rates, lat_deg=places[0], lon_deg=places[1])))
 
 
-def test_turns_to_one_side_might_be_a_bias_and_tell_nothing():
+def test_turns_to_one_side_might_be_a_bias_and_show_nothing():
     assert circling(False, -20.0) is None
     assert circling(False, 0.0) is None
     assert circling(False, 0.0, wavering_dps=3.0) is None
@@ -75,7 +74,7 @@ def test_turns_to_one_side_might_be_a_bias_and_tell_nothing():
         assert circling(True, bias_dps) is True
 
 
-def test_a_gyro_of_the_opposite_sign_is_told_as_that_alone():
+def test_a_gyro_of_the_opposite_sign_is_reported_as_that_alone():
     log = simulated()
     assert codes(replace(log, gyro_dps=-log.gyro_dps)) == ["left-handed"]
 
@@ -89,21 +88,8 @@ def test_blocks_and_gaps_change_nothing(monkeypatch):
     assert codes(mirrored(log.part(kept))) == ["mirrored"]
 
 
-def test_without_enough_positions_nothing_is_said():
+def test_without_enough_positions_nothing_is_reported():
     log = mirrored(simulated())
     assert codes(replace(log, lat_deg=np.zeros(0), lon_deg=np.zeros(0))) == []
     few = np.where(log.t_s < 7.0, log.lat_deg, np.nan)
     assert codes(replace(log, lat_deg=few)) == []
-
-
-def test_the_commands_remark_on_it(tmp_path):
-    """Report and the calibration of the ride itself, of which the latter makes a mirror image without a word."""
-    log = tmp_path / "ride.csv"
-    api.write_log(log, mirrored(simulated()))
-    words = f"warning: {log}: the sensor turns against the track, so left and right are exchanged"
-    result = command.works("calibrate", "ride", log, "--out", tmp_path / "ride.cal.json")
-    assert words in result.err
-    assert words in command.works("report", log).err
-    api.write_log(log, simulated())
-    result = command.works("calibrate", "ride", log, "--out", tmp_path / "ride.cal.json")
-    assert "track" not in result.err + command.works("report", log).err

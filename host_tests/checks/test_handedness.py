@@ -2,15 +2,14 @@
 
 import itertools
 
-import command
 import numpy as np
 import pytest
-from checked import cells_of, words
+from checked import cells_of, simulated, words
 from kickstand_tools.checks.handedness import EXCHANGES, better_exchange, handedness, liveliest
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.simulation.profiles import MAIN, PROFILES
-from kickstand_tools.simulation.ride import random_rotation, ride
+from kickstand_tools.simulation.ride import random_rotation
 
 SIGNED = [
     np.eye(3)[list(order)] * np.array(signs)
@@ -19,15 +18,6 @@ SIGNED = [
 ]
 MINUS = -np.eye(3)
 WRONG_WAY = "are the axes left-handed (reverse one in both sensors) or the gyro of the opposite sign"
-
-
-def simulated(profile, seed=1, seconds=150.0, speed=True, every=4):
-    """A ride at 50 Hz by an MPU6050 with the errors that its data sheet allows."""
-    made = ride(profile, seed, seconds)
-    readings, mps = made.readings[::every], np.full(len(made.time[::every]), np.nan)
-    if speed:
-        mps[:: 200 // every] = made.truth["speed_mps"][::200]
-    return Log(made.time[::every], readings[:, :3], readings[:, 4:], mps)
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +41,7 @@ def test_all_48_ways_to_exchange_and_reverse_axes(rides, profile, speed):
 
 @pytest.mark.parametrize("profile", PROFILES)
 def test_simulated_rides(profile):
-    """Two minutes each. Without a speed not all of them tell, but none is accused."""
+    """Two minutes each. Without a speed not all of them show it, but none is accused."""
     log = simulated(profile, seed=9, seconds=120.0)
     assert judged(log) == judged(log, speed=False) == ""
     assert (WRONG_WAY in judged(log, gyro=MINUS)) is (profile != "parked")
@@ -86,7 +76,7 @@ def test_the_remark_names_what_fits(rides):
             "are in another order or of another sign; instead of gx, gy, gz right would be gz, gx, gy",
         ),
         (MINUS, None, WRONG_WAY),
-        (None, MINUS, None),  # the mirror image: motion cannot tell it
+        (None, MINUS, None),  # the mirror image: motion cannot show it
     ):
         said = judged(log, accel, gyro)
         assert (line in said) if line else said == "", said
@@ -162,17 +152,8 @@ def test_recordings(shared_data):
         assert WRONG_WAY in judged(log, -turned, -turned), path
 
 
-def test_the_commands_say_so_in_one_line(tmp_path, rides):
-    log = rides["street"]
-    rows = np.column_stack((log.t_s, log.accel_g, -log.gyro_dps))
-    path, cal = command.write(tmp_path / "log.csv", rows), command.write_cal(tmp_path / "CAL.json")
-    said = command.works("replay", path, "--calibration", cal, "--out", tmp_path / "LEAN.csv").err.splitlines()
-    line = f"warning: {path}: the rates turn the force the wrong way, so the lean is wrong: "
-    assert sum(each.startswith(line) for each in said) == 1
-
-
 def test_a_bias_is_found_while_fitting():
-    """The hand is never calm, so nothing else tells it."""
+    """The hand is never calm, so nothing else shows it."""
     log = hand(seed=0)
     turning = {}
     for bias in 0.0, 2.5:

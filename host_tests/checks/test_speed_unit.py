@@ -7,8 +7,7 @@ import driving_runs
 import numpy as np
 import pytest
 from checked import cells_of, words
-from kickstand.units import STANDARD_GRAVITY
-from kickstand_tools.checks.speed import speed_unit
+from kickstand_tools.checks.units import speed_unit
 from kickstand_tools.errors import InputError
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.log import Log
@@ -74,64 +73,6 @@ def test_it_takes_no_whole_log(tmp_path, monkeypatch, block_bytes):
         for block in reader.read_blocks(log):
             before = block.time_us[-1]
     assert 20e6 < before < 90e6
-
-
-@pytest.mark.parametrize("aligned", [True, False])
-@pytest.mark.parametrize("name", ["replay", "report", "plot", "export"])
-def test_every_command_refuses_them(tmp_path, name, aligned):
-    """However the calibration says that the sensor sits."""
-    log = record(tmp_path / "drive.csv", scale=KMH)
-    turned = {} if aligned else {"vehicle_from_sensor": [[0, 0, 1], [1, 0, 0], [0, 1, 0]]}
-    cal = command.write_cal(tmp_path / "CAL.json", **turned)
-    more = {
-        "replay": ("--out", tmp_path / "LEAN.csv"),
-        "plot": ("--out", tmp_path),
-        "export": ("--to", "csv", "--out", tmp_path / "ride.csv"),
-    }
-    command.refused(tmp_path, name, log, "--calibration", cal, *more.get(name, ()), words="it is in km/h, m/s are")
-
-
-def jerky(scale=KMH, late_s=0.0, every_s=1.0, step_s=0.1, seconds=60, size_g=0.3, pushed=None, noise_g=0.0) -> str:
-    """What is said of a log with another push each second, +size_g or -size_g by chance, along (0.6, 0, 0.8).
-
-    pushed: only so many of the seconds are. noise_g: of the force in each second.
-    """
-    chance = np.random.default_rng(7)
-    push = size_g * np.sign(chance.normal(size=seconds))
-    if pushed is not None:
-        push[np.argsort(chance.random(seconds))[pushed:]] = 0.0
-        push[np.flatnonzero(push)] *= np.resize([1.0, -1.0], np.count_nonzero(push)) * np.sign(push[push != 0.0])
-    time = np.arange(0.0, seconds, step_s)
-    second = np.clip(np.ceil(time - 1e-9).astype(int) - 1, 0, seconds - 1)  # a force lasts from the sample before
-    force = np.outer((push + noise_g * chance.normal(size=seconds))[second], [0.6, 0.0, 0.8]) + [0.0, 1.0, 0.0]
-    mps = 50.0 + STANDARD_GRAVITY * np.concatenate(([0.0], np.cumsum(push)))
-    speed = np.full(len(time), np.nan)
-    given = np.arange(0.0, seconds - every_s / 2.0, every_s)
-    speed[np.searchsorted(time, given - 1e-9)] = scale * np.interp(given - late_s, np.arange(seconds + 1.0), mps)
-    return said(time, force, speed)
-
-
-@pytest.mark.parametrize(
-    ("refused", "not_refused"),
-    [
-        ({"scale": 1.52}, {"scale": 1.48}),  # 1.5 times as much as the force explains; knots are 1.94
-        ({"size_g": 0.175}, {"size_g": 0.125}),  # 0.15 g is no slope of an ordinary road
-        ({"seconds": 300, "pushed": 11}, {"seconds": 300, "pushed": 8}),  # ten seconds of it
-        ({"seconds": 31}, {"seconds": 24}),  # 25 seconds: five sigmas of the correlation cannot be reached before
-        ({"late_s": 2.0}, {"late_s": 3.0}),  # a satellite receiver's delay
-        ({"every_s": 2.1, "seconds": 120, "late_s": 0.1}, {"every_s": 2.3, "seconds": 120, "late_s": 0.1}),
-        ({"step_s": 0.19}, {"step_s": 0.45, "seconds": 120}),  # a gap: the force in it is unknown
-    ],
-)
-def test_what_it_takes_to_be_sure_of_another_unit_of_speed(refused, not_refused):
-    assert "the speed changes" in jerky(**refused)
-    assert jerky(**not_refused) == ""
-
-
-def test_what_could_be_chance():
-    """Over 100 s five sigmas are a correlation of 0.5."""
-    assert jerky(scale=20.0, noise_g=0.7, seconds=101, size_g=0.5)
-    assert not jerky(scale=20.0, noise_g=1.6, seconds=101, size_g=0.5)
 
 
 @pytest.mark.parametrize("profile", PROFILES)

@@ -1,22 +1,24 @@
-"""A Pico is started once for all tests of a process that begin alike: each runs in a fork, with a copy of it."""
+"""A board is started once for all tests of a process that begin alike: each runs in a fork, with a copy of a Pico. QEMU
+cannot be copied: tests of the ESP32 leave it as it was, or take one of their own."""
 
 import os
 import traceback
 
 import pytest
-from emulated import calibrated, firmware, leaning, modules, pico
+from emulated import CHIPS, calibrated, firmware, leaning, modules, pico
 from kickstand_tools.simulated_board.lcd import shown_lean
 
 COPIED = {"riding", "at_prompt"}
 
 
-@pytest.fixture(scope="session")
-def riding():
+@pytest.fixture(scope="session", params=["pico", pytest.param("esp32", marks=pytest.mark.esp32)])
+def riding(request):
     """A calibrated board that shows the lean of a bike held at 20 degrees to the right."""
-    device = pico(leaning(20.0), firmware() | calibrated())
+    device = CHIPS[request.param](leaning(20.0), firmware(request.param) | calibrated())
     device.power_on()
-    device.run_until(lambda: shown_lean(device.lcd()) == 20.0, 2.0)
-    return device
+    device.run_until(lambda: shown_lean(device.lcd()) == 20.0, 4.0)
+    yield device
+    device.power_off()
 
 
 @pytest.fixture(scope="session")
@@ -31,7 +33,8 @@ def at_prompt():
 @pytest.hookimpl(tryfirst=True)
 def pytest_pyfunc_call(pyfuncitem):
     """Whatever such a test does to the board, the next one has it as it was."""
-    if not COPIED & set(pyfuncitem.fixturenames):
+    devices = [pyfuncitem.funcargs[name] for name in COPIED & set(pyfuncitem.fixturenames)]
+    if not devices or devices[0].NAME == "ESP32":
         return None
     if not hasattr(os, "fork"):
         pytest.skip("needs os.fork")

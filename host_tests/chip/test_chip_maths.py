@@ -5,11 +5,13 @@ import io
 import json
 import struct
 import subprocess
+from pathlib import Path
 
 import numpy as np
 import pytest
-from emulated import PART, pico
+from emulated import PART, esp32, modules, pico
 from kickstand_tools import unix_port
+from kickstand_tools.deploy import bytecode
 from kickstand_tools.replay import replay_engine
 from kickstand_tools.rides import block_reader
 from kickstand_tools.simulated_board.gps import sentence
@@ -45,36 +47,58 @@ def test_composed_rotations_agree_with_numpy(at_prompt):
     assert np.abs(np.array(out) - expected @ v).max() < 1e-6
 
 
-def test_the_same_log_gives_the_same_lean(tmp_path):
-    """Through the whole LeanMeter, on chip, unix port and CPython: within 0.05 degrees in every sample."""
-    pico()  # or skip
-    from kickstand_tools.replay.replay import rp2040
-
+def records():
+    """Three seconds of a ride, as replay_engine.run() takes them."""
     world = PART.world(Ride([accelerate(15.0, 1.0), turn(-30.0, 1.0, 0.5)]).motion)
     offsets = [-o / s for o, s in zip(PART.accel_offset_g, PART.accel_scale, strict=True)]
     slopes = [1.0 / s for s in PART.accel_scale]
     calibration = (*offsets, *slopes, *PART.gyro_bias_dps, *PART.vehicle_from_sensor, 0.0, 0.0048)
-    records = struct.pack(replay_engine.CALIBRATION, *calibration)
+    made = struct.pack(replay_engine.CALIBRATION, *calibration)
     for i in range(300):
         fx, fy, fz, wx, wy, wz, temperature = world(i / 100)
         reading = (fx, fy, fz, temperature, wx, wy, wz)
-        records += struct.pack(replay_engine.RECORD, i * 10_000, *reading, replay_engine.NO_SPEED)
-    on_host = io.BytesIO()
-    replay_engine.run(io.BytesIO(records), on_host)
-    with rp2040(iter([records]), None) as results_of_chip:
-        on_chip = results_of_chip.read()
-    results = [on_host.getvalue(), on_chip]
-    if unix_port.available():
-        (tmp_path / "records").write_bytes(records)
-        command = unix_port.command(replay_engine.__file__, str(tmp_path / "records"))
-        results.append(subprocess.run(command, env=unix_port.environment(), capture_output=True, check=True).stdout)
+        made += struct.pack(replay_engine.RECORD, i * 10_000, *reading, replay_engine.NO_SPEED)
+    return made
+
+
+def agree(results):
+    """Through the whole LeanMeter: within 0.01 degrees in every sample."""
     host, *others = (np.frombuffer(result).reshape(-1, len(replay_engine.COLUMNS)) for result in results)
     assert abs(host[:, 0]).max() > 25.0
     for other in others:
         assert host.shape == other.shape
         assert len(other) == 300
-        assert np.abs(host - other)[:, :2].max() < 0.05
+        assert np.abs(host - other)[:, :2].max() < 0.01
         assert np.abs(host - other)[:, 2:5].max() < 1e-5
+
+
+def on_host():
+    out = io.BytesIO()
+    replay_engine.run(io.BytesIO(records()), out)
+    return out.getvalue()
+
+
+def test_the_same_log_gives_the_same_lean(tmp_path):
+    """On a Pico, on the unix port and on CPython."""
+    pico()  # or skip
+    from kickstand_tools.replay.replay import rp2040
+
+    with rp2040(iter([records()]), None) as results_of_chip:
+        results = [on_host(), results_of_chip.read()]
+    if unix_port.available():
+        (tmp_path / "records").write_bytes(records())
+        command = unix_port.command(replay_engine.__file__, str(tmp_path / "records"))
+        results.append(subprocess.run(command, env=unix_port.environment(), capture_output=True, check=True).stdout)
+    agree(results)
+
+
+@pytest.mark.esp32
+def test_the_same_log_gives_the_same_lean_on_an_esp32():
+    engine = bytecode.cross_compiled(Path(replay_engine.__file__), "xtensawin")
+    with esp32(files=modules("esp32") | {"replay_engine.mpy": engine, "records": records()}) as device:
+        code = "import replay_engine\nout = open('out', 'wb')\n"
+        device.exec(code + "replay_engine.run(open('records', 'rb'), out)\nout.close()", 60.0)
+        agree([on_host(), device.files()["out"]])
 
 
 _SENTENCE = sentence("GPRMC,235959.97,A,8959.99999,S,17959.99998,W,19.438,084.4,311226,,,A")

@@ -34,11 +34,9 @@ def torn(before, after, share):
     return before[:first] + after[first:middle] + before[middle:]
 
 
-def loaded(image, directory):
+def loaded(system, image, directory):
     """The gyro bias that the firmware loads with this flash: it can be mounted, and the store finds a whole record."""
-    from kickstand_tools.emulator import flash_image
-
-    for name, content in flash_image.read(image).items():
+    for name, content in system.read(image).items():
         if name.endswith(".cal"):
             (directory / name).write_bytes(content)
     return Store(0x68, 8, str(directory)).load().gyro_bias[0]
@@ -56,7 +54,7 @@ def test_old_or_new_wherever_a_save_is_cut(at_prompt, tmp_path):
         states.append(at_prompt.file_system)
         operations += len(states) - 1
         halves = [torn(*pair, share) for pair in pairwise(states) for share in (0.05, 0.5, 0.95)]
-        found = [loaded(state, tmp_path) for state in states + halves]
+        found = [loaded(at_prompt.FLASH, state, tmp_path) for state in states + halves]
         assert set(found) == {value - 1, value}
         assert found[0] == value - 1
         assert found[len(states) - 1] == value
@@ -69,7 +67,7 @@ def test_a_board_starts_and_saves_after_a_cut(at_prompt, operation):
     at_prompt.exec(_TOOLS)
     at_prompt.chip.flash.cut_power(operation, 0.5)
     del at_prompt.said[:]
-    at_prompt.console.send(b"for i in range(1, 20):\n    save(i)\n    print(i)\n\x04")
+    at_prompt.send(b"for i in range(1, 20):\n    save(i)\n    print(i)\n\x04")
     at_prompt.run(2.0)
     assert not at_prompt.powered
     saved = int((at_prompt.said.decode().split() or ["0"])[-1].removeprefix("OK") or 0)

@@ -8,7 +8,7 @@ from itertools import pairwise
 import command
 import emulated_port
 import pytest
-from emulated import PART, calibrated, firmware, pico
+from emulated import CHIPS, PART, calibrated, firmware
 from kickstand_tools.calibration.file import read_calibration
 from kickstand_tools.logs.reader import read_blocks, read_log
 from kickstand_tools.replay import replay_engine
@@ -53,7 +53,7 @@ print(list(leans[:count]))
 """
 
 # Turns of a made-up ride as fast as they can be written
-_FEED = """
+FEED = """
 import random
 from kickstand.rides.recorder import Recorder
 from kickstand.rides.flash_ring import RideRing
@@ -118,7 +118,7 @@ def test_a_recorded_ride_replays_as_it_was_shown(at_prompt, tmp_path):
 
 def test_wherever_the_power_goes_all_but_the_last_block_is_kept(at_prompt):
     """Before, within and after each operation on the flash; the calibration stays whatever happens."""
-    at_prompt.exec(_FEED)
+    at_prompt.exec(FEED)
     states = []
     at_prompt.chip.flash.before_operation = lambda: states.append((at_prompt.file_system, None))
     at_prompt.exec("recorder.start(Chip(), Calibration())")
@@ -129,8 +129,6 @@ def test_wherever_the_power_goes_all_but_the_last_block_is_kept(at_prompt):
         written = blocks
     at_prompt.exec("recorder.stop()")
     states.append((at_prompt.file_system, 4))
-    from kickstand_tools.emulator import flash_image
-
     kept = calibrated()
     at_least = 0
     checked = 0
@@ -139,33 +137,35 @@ def test_wherever_the_power_goes_all_but_the_last_block_is_kept(at_prompt):
         if before == after:
             continue
         for state in (before, *(torn(before, after, share) for share in (0.05, 0.5, 0.95))):
-            files = flash_image.read(state)
+            files = at_prompt.FLASH.read(state)
             assert files.items() >= kept.items()
             sequences = [block.sequence for block in rides(files).get(1, [])]
             assert sequences == list(range(len(sequences)))
             assert len(sequences) >= at_least - 1
             checked += 1
     assert checked > 4 * 60
-    assert len(rides(flash_image.read(states[-1][0]))[1]) >= 4
+    assert len(rides(at_prompt.FLASH.read(states[-1][0]))[1]) >= 4
 
 
 @pytest.mark.parametrize("operation", [2, 37])
 def test_a_board_records_again_after_a_cut(at_prompt, operation):
-    at_prompt.exec(_FEED)
+    at_prompt.exec(FEED)
     at_prompt.chip.flash.cut_power(operation, 0.5)
-    at_prompt.console.send(b"recorder.start(Chip(), Calibration())\nfeed(6)\x04")
+    at_prompt.send(b"recorder.start(Chip(), Calibration())\nfeed(6)\x04")
     at_prompt.run(6.0)
     assert not at_prompt.powered
     at_prompt.power_on()
-    at_prompt.exec(_FEED + "recorder.start(Chip(), Calibration())\nfeed(2)\nrecorder.stop()\n", 20.0)
+    at_prompt.exec(FEED + "recorder.start(Chip(), Calibration())\nfeed(2)\nrecorder.stop()\n", 20.0)
     found = rides(at_prompt.files())
     assert [len(blocks) for blocks in found.values()][-1] >= 2
 
 
 @pytest.mark.long
-def test_pull_and_record_through_mpremote(tmp_path, monkeypatch):
-    """A ride that is being recorded is ended and pulled; then a log is streamed. Both replay."""
-    with pico(PART.world(RIDE.motion), firmware() | calibrated() | {"config.py": b"RECORD = True\n"}) as device:
+@pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])])
+def test_pull_and_record_through_mpremote(tmp_path, monkeypatch, chip):
+    """A ride that is being recorded is ended and pulled; then, from a Pico, a log is streamed. Both replay."""
+    files = firmware(chip) | calibrated() | {"config.py": b"RECORD = True\n"}
+    with CHIPS[chip](PART.world(RIDE.motion), files) as device:
         ends = []  # when Ctrl-C is pressed here, seconds
 
         def ctrl_c():
@@ -174,18 +174,21 @@ def test_pull_and_record_through_mpremote(tmp_path, monkeypatch):
                 signal.raise_signal(signal.SIGINT)
 
         emulated_port.plug_in(monkeypatch, device, ctrl_c)
-        device.run(4.5)
+        device.run({"pico": 4.5, "esp32": 5.5}[chip])
         result = command.works("pull", "--port", emulated_port.NAME, "--out", tmp_path, "--delete")
         assert result.err == ""
         assert "deleted from the board: ride 1" in result.out
         pulled = next(tmp_path.glob("ride-00001-*.csv.gz"))
         assert len(read_log(pulled).time_us) > 150
 
-        ends.append(device.time_s + 3.0)
-        result = command.works("record", "--port", emulated_port.NAME, "--out", tmp_path / "live.csv")
-        assert result.err == ""
-        assert result.out.startswith("recording from ")
-        assert re.search(r"written: .*live\.csv, [\d.]+ s, \d+ readings", result.out)
-    for log in (pulled, tmp_path / "live.csv"):
+        logs = [pulled]
+        if chip == "pico":
+            logs.append(tmp_path / "live.csv")
+            ends.append(device.time_s + 3.0)
+            result = command.works("record", "--port", emulated_port.NAME, "--out", tmp_path / "live.csv")
+            assert result.err == ""
+            assert result.out.startswith("recording from ")
+            assert re.search(r"written: .*live\.csv, [\d.]+ s, \d+ readings", result.out)
+    for log in logs:
         cal = ride_log.calibration_path(log)
         command.works("replay", log, "--calibration", cal, "--out", tmp_path / "lean.csv")

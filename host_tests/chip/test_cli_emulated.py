@@ -8,12 +8,13 @@ import sys
 import threading
 import time
 import types
+from typing import Any
 
 import command
 import pytest
-from emulated import calibrated, firmware, pico
+from emulated import CHIPS, calibrated, firmware
 from kickstand_tools.deploy import bytecode, connection
-from kickstand_tools.emulator import image
+from kickstand_tools.emulator import esp32_library, image
 from kickstand_tools.errors import InputError
 from mpremote import transport_serial
 from terminal import Terminal
@@ -40,50 +41,61 @@ def test_emulate_in_a_terminal():
         assert at.end() == 0
 
 
+@pytest.mark.parametrize("words", [("emulate", "--chip", "esp32"), ("bench", "--chip", "esp32")])
+def test_without_its_library_an_esp32_is_refused(words, tmp_path, monkeypatch):
+    monkeypatch.setenv(esp32_library.VARIABLE, str(tmp_path))
+    said = command.refused(tmp_path, *words, words="no emulated ESP32: libqemu-xtensa.so is missing")
+    assert str(tmp_path) in said
+
+
 class Emulating(threading.Thread):
     """`kickstand emulate` beside the test, with these files on its board. It ends at end_s of its own time."""
 
-    def __init__(self, patch, files):
+    def __init__(self, patch, files, chip):
         super().__init__(daemon=True)
         from kickstand_tools.emulator import emulate
-        from kickstand_tools.emulator.pico import Pico
 
         emulating = self
+        kind: Any = emulate.CHIPS[chip]
 
-        class Limited(Pico):
-            def __init__(self, world):
-                super().__init__(world, files)
-                emulating.pico = self
+        class Limited(kind):
+            def __init__(self, world, **fitted):
+                super().__init__(world, files, **fitted)
+                emulating.device = self
 
             def run(self, seconds, between=None):
                 if self.time_s > emulating.end_s:
                     raise KeyboardInterrupt
                 super().run(seconds, between)
 
-        self.pico: Pico | None = None
+        self.device: Any = None
         self.end_s = math.inf
         self.said = queue.Queue()
-        patch.setattr(emulate, "Pico", Limited)
-        self._emulate = emulate.emulate
+        patch.setitem(emulate.CHIPS, chip, Limited)
+        self._emulate, self._chip = emulate.emulate, chip
 
     def run(self):
         try:
-            self._emulate(0, self.said.put)
+            self._emulate(0, self.said.put, self._chip)
         finally:
             self.said.put(None)
 
     def time_s(self):
         """The emulated board's."""
-        return self.pico.time_s if self.pico else 0.0
+        return self.device.time_s if self.device else 0.0
 
 
-def test_flash_and_status_on_the_emulated_pico(monkeypatch):
+@pytest.mark.parametrize("chip", ["rp2040", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])])
+def test_flash_and_status_on_the_emulated_board(monkeypatch, chip):
     """Onto an older version with an edited config; then the bike's ride begins, and the display says what is to be
     done."""
-    pico()  # or skip
+    name = "esp32" if chip == "esp32" else "pico"
+    names = {"rp2040": "Raspberry Pi Pico with RP2040", "esp32": "Generic ESP32 module with ESP32"}
+    CHIPS[name]()  # or skip
     kept = calibrated() | {"config.py": b'SIDE = "right"\n'}
+    ours = firmware(name)
     older = {"/kickstand/lean/formula.mpy": b"old", "/kickstand/lean/old_idea.py": b"pass"}
-    emulating = Emulating(monkeypatch, firmware() | kept | older)
+    emulating = Emulating(monkeypatch, ours | kept | older, chip)
     emulating.start()
     try:
         address = re.search(r"socket://\S+?:\d+", emulating.said.get())
@@ -92,7 +104,7 @@ def test_flash_and_status_on_the_emulated_pico(monkeypatch):
         for module in (transport_serial, connection):
             monkeypatch.setattr(module, "time", clock)
         flashed = command.works("flash", "--port", address[0]).out
-        assert f"Raspberry Pi Pico with RP2040, MicroPython 1.26.1 on {address[0]}" in flashed
+        assert f"{names[chip]}, MicroPython 1.26.1 on {address[0]}" in flashed
         assert "kept: config.py" in flashed
         assert "removed: kickstand/lean/old_idea.py" in flashed
         assert "copied 2 files" in flashed
@@ -107,9 +119,9 @@ def test_flash_and_status_on_the_emulated_pico(monkeypatch):
     finally:
         emulating.end_s = 0.0
         emulating.join()
-    assert emulating.pico
-    wanted = {path.lstrip("/"): content for path, content in (firmware() | kept).items()}
-    assert emulating.pico.files() == wanted
+    assert emulating.device
+    wanted = {path.lstrip("/"): content for path, content in (ours | kept).items()}
+    assert emulating.device.files() == wanted
 
 
 def test_which_compiled_files_the_image_takes(at_prompt):

@@ -65,8 +65,8 @@ def test_what_is_shipped_knows_nothing_of_the_workshop():
 
 def test_an_installation_stays_that_of_the_checkout():
     """Without -e `flash --config` would copy a config.py that the rider has never edited."""
-    readmes = [ROOT / "README.md", ROOT / "firmware" / "README.md", ROOT / "tools" / "README.md"]
-    text = "\n".join(path.read_text(encoding="utf-8") for path in readmes)
+    pages = [*ROOT.glob("*.md"), *ROOT.glob("*/README.md"), ROOT / ".github" / "CONTRIBUTING.md"]
+    text = "\n".join(path.read_text(encoding="utf-8") for path in pages)
     lines = re.findall(r"pip install\b(?! esptool).*", text) + [extra("rides")]
     assert len(lines) >= 4
     assert all("pip install -e " in line for line in lines)
@@ -191,7 +191,7 @@ needs_sh = pytest.mark.skipif(os.name == "nt", reason="the stand-in for Python i
         ("exit 0", "no pip"),
     ],
 )
-def test_a_venv_that_cannot_be_made_is_told_in_one_line(dev, monkeypatch, tmp_path, script, words):
+def test_a_venv_that_cannot_be_made_is_reported_in_one_line(dev, monkeypatch, tmp_path, script, words):
     monkeypatch.setattr(sys, "executable", fake_python(tmp_path, script))
     with pytest.raises(dev.Stop, match=words) as stopped:
         dev.make_venv()

@@ -9,6 +9,7 @@ import fake_board
 import mpy
 import pytest
 from kickstand_tools import errors, firmware_path
+from kickstand_tools.deploy import config_check
 from kickstand_tools.simulated_board.fakes import chips
 
 
@@ -73,6 +74,12 @@ def test_a_setting_behind_a_mark_is_pointed_at(arguments, board, config):
     assert result.out.count("note: ") == 1
     config.write_text(shipped)
     assert "note: " not in command.works(*arguments).out
+
+
+@pytest.mark.parametrize("machine", ["Generic ESP32 module with ESP32", "Raspberry Pi Pico with RP2040"])
+def test_nothing_in_the_shipped_file_is_pointed_at(machine):
+    port = "esp32" if "ESP32" in machine else "rp2"
+    assert config_check.judge(firmware_path.directory() / "config.py", port, machine) == config_check.Judged(None, [])
 
 
 SLIPS = {

@@ -80,7 +80,7 @@ def test_of_the_modules_in_one_folder_nothing_is_left(plugged, ending):
 
 
 @pytest.mark.parametrize("name", ["/kickstand/lean", "/kickstand/errors/notes.txt"])
-def test_a_file_in_the_way_is_told_before_anything_is_touched(plugged, name):
+def test_a_file_in_the_way_is_reported_before_anything_is_touched(plugged, name):
     board = plugged(fresh())
     files = before("flat .mpy") | {name: b"mine"}
     board.put(files)
@@ -158,7 +158,7 @@ def test_broken_off_before_any_change_of_the_flash_it_starts_nothing_and_can_be_
 @pytest.mark.parametrize("port", PORTS)
 @pytest.mark.parametrize("ending", [".mpy", ".py"])
 @pytest.mark.parametrize("which", ["nothing", "flat .mpy", "flat .py", "nested .mpy", "nested .py"])
-def test_the_room_that_is_said_to_be_needed_is_enough(plugged, port, ending, which):
+def test_the_room_that_is_reported_to_be_needed_is_enough(plugged, port, ending, which):
     """With one block less it is refused with nothing touched; full of rides, it says what to do."""
     board = plugged(fresh(port, ending))
     board.put(before(which) | {"/rides/000/01/00000.rid": b"ride" * 4096})
@@ -215,7 +215,7 @@ def test_the_ring_of_rides_knows_what_the_firmware_takes():
 def test_plain_mpremote_needs_the_room_that_the_readme_says():
     """It puts each .py beside the .mpy, which stays."""
     blocks = sum(update.most(len(data), BLOCK) for data in wanted(".py").values())
-    assert 0.9 * 470 < blocks * BLOCK / 1024 <= 470
+    assert 0.9 * 500 < blocks * BLOCK / 1024 <= 500
 
 
 @pytest.mark.parametrize("size", [0, 1, 512, 513, 4096, 4097, 8188, 8189, 12276, 100_000, 400_001])

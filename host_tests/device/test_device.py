@@ -79,7 +79,7 @@ def test_a_knock_during_the_pose(tmp_path):
 
 
 def test_a_refused_alignment_leaves_the_old_one(tmp_path):
-    devices.run("cpython", tmp_path, ALIGNED)
+    devices.align(tmp_path)
     files = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
     menu_align = [[2, 1.2], [4, 1.2], [6, 0.15], [11, 0.15]]
     record = devices.run("cpython", tmp_path, {"lean": [[0, 20]], "presses": [*menu_align, [17, 1.2]], "until": 20})

@@ -18,8 +18,7 @@ LCD_REINIT_S = 11.0
 @pytest.fixture
 def aligned(tmp_path):
     """A flash with an alignment in it, of the part with seed None."""
-    ride = {"lean": [[0, -12], [8, 0]], "presses": [[2, 0.15], [9, 0.15]], "until": 14}
-    devices.run("cpython", tmp_path, ride)
+    devices.align(tmp_path)
     return tmp_path
 
 

@@ -7,7 +7,7 @@ import pytest
 from kickstand_tools.simulation.scripted import script
 
 FROM_S = 32.0
-# From FROM_S on the bike rolls from side to side, so quickly that the lean that is shown tells how old it is
+# From FROM_S on the bike rolls from side to side, so quickly that the lean that is shown shows how old it is
 RIDE = [
     *devices.RIDE[:3],
     ["turn", -30.0, 2.0],
@@ -16,7 +16,7 @@ RIDE = [
 ]
 TRUE = script.Ride([getattr(script, name)(*more) for name, *more in RIDE])
 OLDEST_S = 0.5 + 0.1 + 0.1  # half a second, a page, and the time between two looks at the display
-HANG_S = 1.46  # the first page after it, which tells why, then stands when the next frame is taken
+HANG_S = 1.46  # the first page after it, which says why, then stands when the next frame is taken
 NEAR_DEG = 10.0  # readings lost while the bike rolls cost up to 8 degrees until the filter has made up for them
 
 STARVED = {
@@ -61,7 +61,7 @@ def test_no_lean_stands_that_is_too_old(engine, name, tmp_path):
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
-def test_a_storm_of_wheel_pulses_is_told_and_leaves_the_lean(engine, tmp_path):
+def test_a_storm_of_wheel_pulses_is_reported_and_leaves_the_lean(engine, tmp_path):
     """50,000 a second leave the loop no time at all, until the interrupt turns itself off."""
     storm = [["wheel_storm", [FROM_S, 3.0, 50_000]]]
     record = run(engine, tmp_path, storm, {"SPEED": "wheel"}, wheel={})

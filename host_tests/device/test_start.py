@@ -108,7 +108,7 @@ def choose(board, at_s, place):
     ("module", "place"),
     [("align_wizard", ALIGN), ("six_wizard", SIX), ("pose_taker", SIX), ("flash_ring", RECORD), ("recorder", RECORD)],
 )
-def test_what_a_menu_entry_cannot_import_is_said_and_the_meter_goes_on(module, place, without, board, capsys):
+def test_what_a_menu_entry_cannot_import_is_reported_and_the_meter_goes_on(module, place, without, board, capsys):
     """Each time that it is chosen, and never before."""
     from kickstand import start
 
@@ -119,15 +119,15 @@ def test_what_a_menu_entry_cannot_import_is_said_and_the_meter_goes_on(module, p
     for at_s in (3, 15):
         choose(board, at_s, place)
     assert board.run(start.main, 28.0) == "off"
-    told = [t_s for t_s, lines in seen if lines == said]
-    for t_s in told:  # it is in front for two seconds; a look may catch a line half written
+    shown_s = [t_s for t_s, lines in seen if lines == said]
+    for t_s in shown_s:  # it is in front for two seconds; a look may catch a line half written
         assert min(abs(t_s - (at_s + 4 + place)) for at_s in (3, 15)) < 2
-    assert min(told) < 12 < max(told)
+    assert min(shown_s) < 12 < max(shown_s)
     assert seen[-1][1][0].startswith("Raw")
     assert ("run kickstand flash" if said is INCOMPLETE else "no memory for that") in capsys.readouterr().out
 
 
-def test_a_menu_that_cannot_be_imported_is_said_and_the_meter_goes_on(without, board):
+def test_a_menu_that_cannot_be_imported_is_reported_and_the_meter_goes_on(without, board):
     from kickstand import start
 
     said, seen = without("menu"), watch(board)

@@ -1,4 +1,4 @@
-"""The three READMEs: every link leads somewhere, and what they list is what there is."""
+"""The pages of text: every link leads somewhere, and what they list is what there is."""
 
 import ast
 import re
@@ -8,7 +8,11 @@ import pytest
 from kickstand_tools.cli.main import kickstand
 
 ROOT = Path(__file__).resolve().parents[2]
-READMES = [ROOT / "README.md", ROOT / "firmware" / "README.md", ROOT / "tools" / "README.md"]
+FIRST, DEVICE, TOOLS, CONTRIBUTING = (
+    ROOT / name for name in ("README.md", "firmware/README.md", "tools/README.md", ".github/CONTRIBUTING.md")
+)
+PAGES = [FIRST, DEVICE, TOOLS, CONTRIBUTING, ROOT / "FAQ.md", ROOT / "CHANGELOG.md"]
+OF_THE_REPOSITORY = "../../"  # in PAGES of its root: issues, releases, the site, wherever it is hosted
 LINK = re.compile(r'\]\(([^)\s]+)\)|src="([^"]+)"')
 
 
@@ -25,27 +29,45 @@ def anchors(path):
     return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("readme", READMES, ids=lambda path: path.relative_to(ROOT).as_posix())
-def test_every_link_leads_somewhere(readme):
-    found = [link for link in links(readme) if not link.startswith("https://")]
-    assert found
+@pytest.mark.parametrize("page", PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_every_link_leads_somewhere(page):
+    found = [link for link in links(page) if not link.startswith(("https://", OF_THE_REPOSITORY))]
+    assert found or page.name == "CHANGELOG.md"
     for link in found:
         name, _, anchor = link.partition("#")
-        target = readme.parent / name if name else readme
+        target = page.parent / name if name else page
         assert target.exists(), link
         assert not anchor or anchor in anchors(target), link
 
 
+def test_every_page_is_linked_from_the_first():
+    assert {(ROOT / link.partition("#")[0]).resolve() for link in links(FIRST)} >= set(PAGES) - {FIRST}
+
+
 def test_every_picture_is_shown():
-    shown = {(readme.parent / link).resolve() for readme in READMES for link in links(readme) if "pictures/" in link}
+    shown = {(page.parent / link).resolve() for page in PAGES for link in links(page) if "pictures/" in link}
     assert shown == {path.resolve() for path in (ROOT / "tools" / "pictures").iterdir()}
 
 
-def test_the_first_page_is_short_and_has_both_commands():
-    text = text_of(READMES[0])
-    assert len(text.splitlines()) < 230
+def test_the_first_page_is_short_and_begins_with_a_moving_picture():
+    text = text_of(FIRST)
+    assert len(text.splitlines()) < 150
+    assert re.findall(r'src="([^"]+)"', text)[0].endswith(".webp")
     assert "    python3 tools/dev.py demo\n" in text
-    assert "    python3 tools/dev.py test\n" in text
+    assert "    python3 tools/dev.py test\n" in text_of(CONTRIBUTING)
+
+
+def test_how_right_it_is_stands_in_both_places_alike():
+    """The first page's table is a part of the device's."""
+    heads, *rows = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in text_of(DEVICE).partition("| profile | shown")[2].partition("\n\n")[0].splitlines()
+    ]
+    whole = [[row[1], row[3], row[4], row[6]] for row in rows[1:]]
+    assert "complementary" in heads[5]
+    section = text_of(FIRST).partition("## How right it is")[2]
+    shown = [line.strip("|").split("|")[1:] for line in section.splitlines() if "**" in line]
+    assert [[cell.strip() for cell in row] for row in shown] == whole
 
 
 PACKAGES = "firmware/kickstand", "tools/kickstand_tools", "tools/workshop/kickstand_workshop"
@@ -54,7 +76,7 @@ PACKAGES = "firmware/kickstand", "tools/kickstand_tools", "tools/workshop/kickst
 @pytest.mark.parametrize("package", PACKAGES)
 def test_the_map_has_every_folder_and_no_other(package):
     name = package.rpartition("/")[2]
-    drawn = re.split(rf"^ .*\b{name}/(?=\s)", text_of(READMES[0]), maxsplit=1, flags=re.MULTILINE)[1]
+    drawn = re.split(rf"^ .*\b{name}/(?=\s)", text_of(CONTRIBUTING), maxsplit=1, flags=re.MULTILINE)[1]
     drawn = re.split(r"\n {4}\w", drawn)[0]  # until the next top folder
     mapped = set(re.findall(r"\b(\w+)/(?=,| )", drawn.split("\n", 1)[1]))
     folders = {path.parent for path in (ROOT / package).rglob("*.py")} - {ROOT / package}
@@ -62,12 +84,12 @@ def test_the_map_has_every_folder_and_no_other(package):
 
 
 def test_every_file_that_is_pointed_to_is_there():
-    for name in re.findall(r"`((?:firmware|tools|host_tests)/[\w/]+\.py)`", "".join(map(text_of, READMES))):
+    for name in re.findall(r"`((?:firmware|tools|host_tests)/[\w/]+\.py)`", "".join(map(text_of, PAGES))):
         assert (ROOT / name).is_file(), name
 
 
 def test_every_command_is_described():
-    text = text_of(READMES[2])
+    text = text_of(TOOLS)
     for name in kickstand.list_commands(None):
         command = kickstand.get_command(None, name)
         for words in [f"{name} {sub}" for sub in getattr(command, "commands", {})] or [name]:
@@ -79,6 +101,6 @@ def test_every_menu_entry_is_described():
     (listed,) = [node for node in ast.walk(screen) if isinstance(node, ast.FunctionDef) and node.name == "_entries"]
     tuples = [node for node in ast.walk(listed) if isinstance(node, ast.Tuple) and node.elts]
     entries = {tuple_.elts[0].value for tuple_ in tuples if isinstance(tuple_.elts[0], ast.Constant)}
-    assert len(entries) == 7
-    text = text_of(READMES[1])
+    assert len(entries) == 9
+    text = text_of(DEVICE)
     assert not [entry for entry in entries if f"`{entry}`" not in text]

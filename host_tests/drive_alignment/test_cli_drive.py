@@ -122,7 +122,7 @@ def test_several_logs_of_one_mount_are_put_together(tmp_path):
     assert max(errors(matrix_in(tmp_path / "CAL.json"), MOUNT)) < 0.3
 
 
-def test_what_is_used_of_several_logs_is_told_by_file_and_its_own_time(tmp_path):
+def test_what_is_used_of_several_logs_is_reported_by_file_and_its_own_time(tmp_path):
     legs = {"a": around(3), "b": [[30.0, 0.0, 0.0]], "c": around(4)}
     logs = [record(tmp_path / f"{name}.csv", of, MOUNT) for name, of in legs.items()]
     said = command.works("calibrate", "drive", *logs, "--out", tmp_path / "CAL.json").out
@@ -239,7 +239,7 @@ UPSIDE_DOWN = [0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0]  # rows left, up, 
 
 
 def test_a_log_of_the_opposite_sign_looks_like_a_sensor_upside_down(tmp_path):
-    """Nothing else in a car's log tells it: without the remark its mirror image would pass."""
+    """Nothing else in a car's log shows it: without the remark its mirror image would pass."""
     log, out = record(tmp_path / "drive.csv", around(8), UPSIDE_DOWN), tmp_path / "CAL.json"
     said = command.works("calibrate", "drive", log, "--out", out)
     assert "the sensor's z points down: if it is not mounted upside down, all accelerations are of the" in said.err

@@ -107,12 +107,12 @@ def test_a_report_has_the_smoothed_lean_and_the_live_one_if_wanted(ride):
 
 
 def test_a_log_of_few_samples_a_second_is_reported_as_the_display_had_it(tmp_path):
-    """There is nothing to look back over; smooth itself refuses it."""
+    """Its lean is the one that the display showed; smooth itself refuses such a log."""
     t_s = np.arange(0.0, 60.0, 0.2)
     noise = np.random.default_rng(1).normal(0.0, 0.01, (len(t_s), 6))
     table = np.column_stack((t_s, noise + [0.0, 1.0, 0.0, 0.0, 0.0, 0.0]))
     ride, cal = tmp_path / "RIDE.csv", tmp_path / "RIDE.cal.json"
     command.write(ride, table)
     write_calibration(cal, CalibrationFile(aligned=True))
-    assert "too few samples a second to look back over" in command.works("report", ride).err
+    assert "the smoothed lean needs 10 samples a second" in command.works("report", ride).err
     command.refused(tmp_path, "smooth", ride, "--out", tmp_path / "LEAN.csv", words="under 10 samples a second")

@@ -1,8 +1,9 @@
 """Runs one program of firmware/examples on the simulated board, under CPython or MicroPython.
 
 As a script: reads {"program", "until", "presses"} as JSON from standard input and runs it in the current directory (the
-board's flash), on a bike that is aligned and rides a long right turn. What the program prints comes first, then on the
-last line, as JSON, what the display said every second.
+board's flash), on a bike that is aligned and rides a long right turn. Without a program the lean meter is run, with
+what is in flash. What the program prints comes first, then on the last line, as JSON, {"frames": what the display said
+every second, "sent": what went to a UART, "lamp": the level of GPIO 16 every second}.
 """
 
 import json
@@ -29,19 +30,23 @@ def save_calibration(part, directory=""):
 
 
 def run(program, until_s, presses):
-    """The display's two lines at each full second of until_s; presses: when the button is pressed, in seconds."""
+    """See above. until_s: s. presses: when the button is pressed, in seconds."""
     part = Sensor(seed=3)
     board = Board(part.world(Ride(RIDE).motion))
     board.install()
     save_calibration(part)
     for at_s in presses:
         board.press(at_s)
-    frames = []
+    board.volts[26] = 12.6 / 11
+    frames, lamp = [], []
     board.every(1.0, lambda: frames.append(board.lcd.text()))
-    with open(program, encoding="utf-8") as file:
-        source = file.read()
+    board.every(1.0, lambda: lamp.append(board.pin_level(16)))
+    source = "from kickstand.start import main; main()"
+    if program:
+        with open(program, encoding="utf-8") as file:
+            source = file.read()
     board.run(lambda: exec(source, {"__name__": "__main__"}), until_s)
-    return frames
+    return {"frames": frames, "lamp": lamp, "sent": board.sent.decode()}
 
 
 if __name__ == "__main__":

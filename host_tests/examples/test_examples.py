@@ -18,10 +18,20 @@ TURN_DEG = 35.0  # of example_run.py's ride
 
 
 def run(engine, flash, name, until, presses=()):
-    """What the program printed, and the display's two lines each second."""
-    plan = json.dumps({"program": str(EXAMPLES / name), "until": until, "presses": presses})
+    """What the program printed, and the display's two lines each second. One that is a user.py runs as such."""
+    printed, seen = run_all(engine, flash, name, until, presses)
+    return printed, seen["frames"]
+
+
+def run_all(engine, flash, name, until, presses=()):
+    """What the program printed, and what example_run.py says of it. name: None for the user.py that is in flash."""
+    program = name and str(EXAMPLES / name)
+    if name and name.startswith("user_"):
+        (flash / "user.py").write_bytes((EXAMPLES / name).read_bytes())
+        program = None
+    plan = json.dumps({"program": program, "until": until, "presses": presses})
     if engine == "cpython":
-        environment = os.environ | {"PYTHONPATH": firmware_path.search_path()}
+        environment = os.environ | {"PYTHONPATH": firmware_path.search_path() + os.pathsep + str(flash)}
         command = [sys.executable, str(SCRIPT)]
         said = subprocess.run(
             command, input=plan, env=environment, cwd=flash, capture_output=True, text=True, timeout=300, check=True
@@ -65,25 +75,52 @@ def test_print_lean(engine, tmp_path):
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
-def test_own_page(engine, tmp_path):
+def test_user_page(engine, tmp_path):
     """Five usual pages before it, and the first again behind it."""
-    _, frames = run(engine, tmp_path, "own_page.py", 12.0, presses=[4, 5, 6, 7, 8])
+    _, frames = run(engine, tmp_path, "user_page.py", 12.0, presses=[4, 5, 6, 7, 8])
     shown = re.fullmatch(r"Load     (\d\.\d\d) x", frames[-1][0].rstrip())
     assert shown and float(shown[1]) == pytest.approx(1.22, abs=0.05)  # 1 / cos(35 degrees)
-    assert re.fullmatch(r"Lean  3\d° right *", frames[-1][1])
-    _, frames = run(engine, tmp_path, "own_page.py", 10.0, presses=[4, 5, 6, 7, 8, 9])
+    assert re.fullmatch(r"Lean  3\d deg *", frames[-1][1])
+    _, frames = run(engine, tmp_path, "user_page.py", 10.0, presses=[4, 5, 6, 7, 8, 9])
     assert frames[-1][0].startswith("Lean")
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_user_light(engine, tmp_path):
+    """It stays off at 35 degrees, and comes on there when its limit is lower."""
+    _, seen = run_all(engine, tmp_path, "user_light.py", 12.0)
+    assert not any(seen["lamp"])
+    lower = (tmp_path / "user.py").read_text().replace("LIMIT_DEG = 45", "LIMIT_DEG = 30")
+    (tmp_path / "user.py").write_text(lower)
+    _, seen = run_all(engine, tmp_path, None, 12.0)
+    assert not any(seen["lamp"][:4]) and all(seen["lamp"][-3:])
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_user_uart(engine, tmp_path):
+    _, seen = run_all(engine, tmp_path, "user_uart.py", 12.0)
+    lines = seen["sent"].splitlines()
+    assert 100 <= len(lines) <= 121
+    assert lines[0] == "?"
+    assert float(lines[-1]) == pytest.approx(TURN_DEG, abs=3.0)
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_user_battery(engine, tmp_path):
+    _, frames = run(engine, tmp_path, "user_battery.py", 12.0, presses=[4, 5, 6, 7, 8])
+    assert frames[-1] == ["Battery  12.6 V ", "ok              "]
 
 
 @pytest.mark.parametrize("path", sorted(EXAMPLES.glob("*.py")), ids=lambda path: path.name)
 def test_it_can_be_read_by_a_beginner(path):
     source = path.read_text(encoding="utf-8")
     assert len(source.split("\n")) <= 40
-    assert f"mpremote run firmware/examples/{path.name}" in source
+    command = "cp firmware/examples/{} :user.py" if path.name.startswith("user_") else "run firmware/examples/{}"
+    assert "mpremote " + command.format(path.name) in source
 
 
 def test_each_has_its_test():
     source = Path(__file__).read_text(encoding="utf-8")
     names = {path.name for path in EXAMPLES.glob("*.py")}
-    assert len(names) == 4
+    assert len(names) == 7
     assert all(f'"{name}"' in source for name in names)

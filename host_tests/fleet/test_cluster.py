@@ -191,9 +191,10 @@ def test_a_damaged_line_of_a_journal_costs_that_line_and_is_counted_once(tmp_pat
 
 
 PROGRAM = """
-import time
+import signal, time
 from kickstand_tools.fleet.cluster import Cluster
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell ignores it for what runs in the background
     print("starting", flush=True)
     with Cluster(None, 2, 60.0):
         time.sleep(60.0)
@@ -222,7 +223,7 @@ import os, signal, threading
 from distributed import Client
 register = Client.register_plugin
 def interrupted(client, plugin):
-    threading.Timer({after_s}, os.kill, (os.getpid(), signal.SIGINT)).start()
+    threading.Timer(0.02, os.kill, (os.getpid(), signal.SIGINT)).start()
     return register(client, plugin)
 Client.register_plugin = interrupted
 """
@@ -230,12 +231,11 @@ Client.register_plugin = interrupted
 
 @pytest.mark.skipif(not hasattr(signal, "pthread_sigmask"), reason="Ctrl-C comes at once on this system")
 def test_ctrl_c_while_this_process_connects_is_heard_when_it_has(tmp_path):
-    for after_s in (0.01, 0.04):
-        program = tmp_path / "program.py"
-        program.write_text(CONNECTING.format(after_s=after_s) + PROGRAM)
-        trouble = subprocess.run([sys.executable, str(program)], capture_output=True, text=True, timeout=120).stderr
-        assert trouble.count("Traceback") == 1, after_s
-        assert trouble.endswith("KeyboardInterrupt\n")
+    program = tmp_path / "program.py"
+    program.write_text(CONNECTING + PROGRAM)
+    trouble = subprocess.run([sys.executable, str(program)], capture_output=True, text=True, timeout=120).stderr
+    assert trouble.count("Traceback") == 1
+    assert trouble.endswith("KeyboardInterrupt\n")
 
 
 def test_no_scheduler_is_reported(monkeypatch):

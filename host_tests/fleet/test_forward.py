@@ -19,7 +19,7 @@ SEEDS = (101, 102, 106, 109)  # on which the device is off by about a degree
 
 @pytest.fixture(scope="module")
 def buses():
-    """(the device's fit, what the whole log tells, the mount) of buses that brake some ten times, gently."""
+    """(the device's fit, what the whole log shows, the mount) of buses that brake some ten times, gently."""
     found = []
     for seed in SEEDS:
         log, sensor = drive(seed, "bus", 150.0)
@@ -65,7 +65,7 @@ def test_what_the_device_doubts_is_aligned_where_the_whole_log_is_sure(tmp_path,
 
 
 @pytest.mark.parametrize("limit", ["READY_DEG", "AGREE_DEG"])
-def test_forward_that_is_not_sure_is_told_and_not_given(tmp_path, monkeypatch, limit):
+def test_forward_that_is_not_sure_is_reported_and_not_given(tmp_path, monkeypatch, limit):
     monkeypatch.setattr(forward, limit, 0.1)
     found = worked_on(tmp_path, drive(4)[0])
     assert (found.alignment["status"], found.alignment["reason"]) == ("refused", "uncertain")
@@ -73,7 +73,7 @@ def test_forward_that_is_not_sure_is_told_and_not_given(tmp_path, monkeypatch, l
     assert found.alignment["vehicle_from_sensor"] is None and not found.brake_tests
 
 
-def test_a_late_speed_that_looks_like_a_moved_mount_is_told_as_late(tmp_path, monkeypatch):
+def test_a_late_speed_that_looks_like_a_moved_mount_is_reported_as_late(tmp_path, monkeypatch):
     log, _ = drive(4)
     moved = RefusedInput(AlignmentError("mount-moved", "between-stops", 8.0))
     fit = dataclasses.replace(fit_logs([log], None, "car"), refusal=moved)
@@ -99,7 +99,7 @@ def test_forward_of_recorded_drives(shared_data, name):
     assert known and known.sure and abs(yaw_deg(known.frame, REFERENCES[name])) < 1.0
 
 
-def test_logs_that_tell_nothing_have_no_forward():
+def test_logs_that_show_nothing_have_no_forward():
     log, _ = drive(4, seconds=60.0)
     driven = evidence.intervals(log, "car", 0.0, np.zeros(3))
     short = evidence.Intervals(*(getattr(driven, name)[:20] for name in evidence.Intervals.__dataclass_fields__))

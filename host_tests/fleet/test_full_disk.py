@@ -109,7 +109,7 @@ def test_signals_that_do_not_fit_stop_the_run_and_are_written_by_the_next(result
     assert (whole.new, whole.seen.errors) == (2, 0) and list(tmp_path.glob("signals/**/*.parquet"))
 
 
-def test_a_journal_that_cannot_reach_the_disk_is_told(tmp_path, monkeypatch):
+def test_a_journal_that_cannot_reach_the_disk_is_reported(tmp_path, monkeypatch):
     def full(_):
         raise FULL
 

@@ -79,8 +79,8 @@ def test_the_fleet_that_is_made_up_is_as_its_truth_says(fleet, tmp_path):
     for made in fleet.vehicles:
         assert periods[made.name].paths == tuple(str(path) for path in made.paths)
         assert periods[made.name].kind == ("motorcycle" if made.kind == "motorcycle" else "car")
-    told = command.works("simulate", "--fleet", 1, "--seed", 5, "--out", tmp_path / "made").out
-    assert "1 vehicles, " in told and (tmp_path / "made" / "TRUTH.csv").is_file()
+    said = command.works("simulate", "--fleet", 1, "--seed", 5, "--out", tmp_path / "made").out
+    assert "1 vehicles, " in said and (tmp_path / "made" / "TRUTH.csv").is_file()
     again = command.works("simulate", "--fleet", 1, "--seed", 5, "--out", tmp_path / "again")
     assert again.status == 0
     for path in sorted((tmp_path / "made" / "drives").iterdir()):

@@ -98,7 +98,7 @@ def test_a_run_into_s3_that_is_stopped_goes_on(s3, monkeypatch):
     assert (whole.new, whole.seen.reasons[("error", "unreadable")]) == (4, 5)
 
 
-def test_a_store_that_refuses_is_told_in_one_line(s3):
+def test_a_store_that_refuses_is_reported_in_one_line(s3):
     with pytest.raises(InputError, match=r"^s3://nobody/results/.* cannot be written: [^\n]+$"):
         run_fleet([run.Period("v", "", "car", ("none.csv",))], "s3://nobody/results")
     with pytest.raises(InputError, match=r"^s3://nobody/MANIFEST.csv"):

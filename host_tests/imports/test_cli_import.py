@@ -21,7 +21,7 @@ def test_it_says_what_it_took_for_what(tmp_path):
     assert result.err == ""
 
 
-def test_gaps_are_told(tmp_path):
+def test_gaps_are_reported(tmp_path):
     ride = riding().every(2).without(10.0, 12.0)
     result = command.works(
         "import", app_exports.into(tmp_path / "p", app_exports.phyphox(ride)), "--out", tmp_path / "R.csv"
@@ -46,7 +46,7 @@ def test_the_log_is_read_by_every_other_command(tmp_path):
         command.works("export", log, "--to", form, "--out", tmp_path / f"out.{form}")
 
 
-def test_vehicle_axes_are_said_and_need_no_other_alignment(tmp_path):
+def test_vehicle_axes_are_reported_and_need_no_other_alignment(tmp_path):
     (tmp_path / "v.vbo").write_text(app_exports.vbo(riding().every(2)))
     result = command.works("import", tmp_path / "v.vbo", "--out", tmp_path / "RIDE.csv")
     assert "x is left, y up, z forward, as far as the logger was mounted so" in result.out

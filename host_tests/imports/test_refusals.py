@@ -133,7 +133,7 @@ LACKING = {
 
 
 @pytest.mark.parametrize("name", LACKING)
-def test_what_a_recording_lacks_is_said(tmp_path, ride, name):
+def test_what_a_recording_lacks_is_reported(tmp_path, ride, name):
     files, words = LACKING[name]
     refused(tmp_path, app_exports.into(tmp_path / "in.zip", files(ride)), words)
 
@@ -165,12 +165,12 @@ def test_units_that_are_known_are_not_asked_for(tmp_path, ride):
     refused(tmp_path, source, "holds 6 files: give --columns with one, such as", "--columns", "t=a")
 
 
-def test_a_speed_whose_unit_nothing_tells_is_left_out_or_given(tmp_path, ride):
+def test_a_speed_whose_unit_nothing_shows_is_left_out_or_given(tmp_path, ride):
     ride.lat_deg = ride.lon_deg = np.zeros(len(ride.t_s))
     (tmp_path / "r.csv").write_text(app_exports.racebox(ride))
     out = tmp_path / "RIDE.csv"
     result = command.works("import", tmp_path / "r.csv", "--out", out)
-    assert "Speed has no unit, and the positions do not tell it, so the speed is left out" in result.err
+    assert "Speed has no unit, and the positions do not show it, so the speed is left out" in result.err
     assert "speed_mps" not in out.read_text()[:200]
     result = command.works("import", tmp_path / "r.csv", "--out", out, "--units", "speed=km/h")
     assert result.err == ""

@@ -86,7 +86,7 @@ def test_a_unit_that_is_wrong_is_noticed(tmp_path):
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_the_turns_of_the_track_tell_the_sign_where_no_maker_does(tmp_path, sign):
+def test_the_turns_of_the_track_show_the_sign_where_no_maker_does(tmp_path, sign):
     (tmp_path / "r.csv").write_text(app_exports.racechrono(riding().every(2), sign))
     found = api.import_recording(tmp_path / "r.csv")
     assert up_at_rest(found) == pytest.approx(UP, abs=0.02)
@@ -104,7 +104,7 @@ def test_a_mirrored_export_of_a_known_app_is_remarked_on(tmp_path):
     assert up_at_rest(found) == pytest.approx(-UP, abs=0.02)
 
 
-def test_without_a_track_an_uncertain_sign_is_said_and_can_be_turned(tmp_path):
+def test_without_a_track_an_uncertain_sign_is_reported_and_can_be_turned(tmp_path):
     ride = riding().every(2)
     ride.force_g = -ride.force_g  # as an iPhone might
     folder = app_exports.into(tmp_path / "k", app_exports.sensor_kinetics(ride))
@@ -116,7 +116,7 @@ def test_without_a_track_an_uncertain_sign_is_said_and_can_be_turned(tmp_path):
     assert not found.notices
 
 
-def test_no_turns_tell_no_sign(tmp_path):
+def test_no_turns_show_no_sign(tmp_path):
     """Straight on: the same warning as without a track."""
     ride = riding().every(2)
     ride.lat_deg, ride.lon_deg = 52.5 + 1e-5 * ride.t_s, np.full(len(ride.t_s), 13.4)

@@ -164,9 +164,9 @@ def test_a_table_that_nobody_knows_is_met_with_the_line_to_type(tmp_path, monkey
     ("names", "units"),
     [
         ("time,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps,speed_mps", "a=g,g=deg/s,speed=m/s"),
-        ("time,ax,ay,az,gx_rads,gy_rads,gz_rads,speed_kmh", "a=m/s2,g=rad/s,speed=km/h"),
+        ("time,ax,ay,az,gx_rads,gy_rads,gz_rads,speed_kmh", "a=g,g=rad/s,speed=km/h"),
         ("t,a_x (m/s^2),a_y,a_z,g_x (deg/s),g_y,g_z,Speed (mph)", "a=m/s2,g=deg/s,speed=mph"),
-        ("t,ax,ay,az,gx,gy,gz,speed", "a=m/s2,g=rad/s,speed=km/h"),
+        ("t,ax,ay,az,gx,gy,gz,speed", "a=g,g=rad/s,speed=km/h"),
     ],
 )
 def test_the_line_to_type_has_the_units_that_stand_in_the_names(tmp_path, names, units):
@@ -174,6 +174,16 @@ def test_the_line_to_type_has_the_units_that_stand_in_the_names(tmp_path, names,
     path = tmp_path / "log.csv"
     path.write_text(names + "\n" + "0,0,1,0,0,0,0,3\n" * 3)
     line = command.refused(tmp_path, "import", path, "--out", tmp_path / "R.csv", words="not a file of an app")
+    assert line.rstrip().endswith(f"--units {units}")
+
+
+@pytest.mark.parametrize(
+    ("row", "units"),
+    [("0.1,0.2,9.7,0.3,0.4,0.1", "a=m/s2,g=rad/s"), ("12,-30,1002,40,10,5", "a=mg,g=deg/s")],
+)
+def test_units_that_no_name_states_are_told_by_size(tmp_path, row, units):
+    (tmp_path / "log.csv").write_text("t,ax,ay,az,gx,gy,gz\n" + "".join(f"{k},{row}\n" for k in range(20)))
+    line = command.refused(tmp_path, "import", tmp_path / "log.csv", "--out", tmp_path / "R.csv", words="not a file of")
     assert line.rstrip().endswith(f"--units {units}")
 
 

@@ -88,9 +88,9 @@ def test_a_stuck_bus_is_freed_and_a_dead_one_is_reported(board):
 def display(line1=None):
     """A display; with a first line that it shows already."""
     from kickstand.board import i2c_bus
-    from kickstand.board.hd44780 import Lcd
+    from kickstand.board.display import Display
 
-    lcd = Lcd(lambda: i2c_bus.open_i2c(1, 6, 7, 100_000))
+    lcd = Display(lambda hz: i2c_bus.open_i2c(1, 6, 7, hz))
     if line1 is not None:
         lcd.show(line1.replace("°", "\xdf"), "")
         lcd.flush()
@@ -279,7 +279,7 @@ def test_a_second_ctrl_c_while_the_ride_is_being_ended_leaves_the_watchdog_at_re
     assert ended
 
 
-def test_status_tells_how_the_board_is(board, monkeypatch, capsys, tmp_path):
+def test_status_shows_how_the_board_is(board, monkeypatch, capsys, tmp_path):
     import gc
     import os
 

@@ -5,9 +5,9 @@ import phone_tracks
 import pytest
 from kickstand_tools import api
 from kickstand_tools.joining.compare import Comparison
-from kickstand_tools.joining.course import course
 from kickstand_tools.joining.motion import motion
 from kickstand_tools.joining.segments import segments
+from kickstand_tools.joining.track import course
 from kickstand_tools.signals.geography import EARTH_M
 from kickstand_tools.signals.lag import correlations
 
@@ -130,7 +130,7 @@ def test_bends_that_are_alike_are_not_taken_for_one_another(rides):
         api.join_track(log, slalom)
 
 
-def test_mirrored_accelerations_are_told(rides):
+def test_mirrored_accelerations_are_reported(rides):
     log = log_of(rides["track"])
     mirrored = api.Log(log.t_s, -log.accel_g, log.gyro_dps)
     with pytest.raises(api.InputError, match="turns left where the track turns right: do all accelerations"):
@@ -151,7 +151,7 @@ def test_frozen_readings_and_gaps_are_left_out(rides):
     assert joined.match.correlation > 0.97  # as if the frozen readings had turned on it would be 0.8
 
 
-def test_a_leaning_bikes_gyro_tells_how_the_course_turns():
+def test_a_leaning_bikes_gyro_shows_how_the_course_turns():
     """At 45 degrees of lean the rate about the bike's up is 0.7 of the yaw rate."""
     log, track = winding(300.0)
     steps = course(track.once_a_second())

@@ -53,7 +53,7 @@ def test_past_any_reading(name, quoted):
                     read_log(log)
 
 
-def test_a_firmware_that_is_told_no_temperature_is_told_25():
+def test_a_firmware_without_a_temperature_gets_25():
     n = 3
     log = Log(np.arange(n) / 100.0, np.tile([0.1, 0.2, 0.9], (n, 1)), np.tile([1.0, 2.0, 3.0], (n, 1)))
     log.temperature_c[1] = 31.5

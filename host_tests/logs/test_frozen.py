@@ -53,7 +53,7 @@ def test_a_freeze_is_marked_to_the_sample(monkeypatch, blocks_of):
     list(read_blocks(log_of(readings), notices=notices))
     (notice,) = notices
     assert sentence(notice).startswith("the readings froze from 3.")
-    assert sentence(notice).endswith("to 5.0 s: they are not believed, and the lean begins anew after each")
+    assert sentence(notice).endswith("to 5.0 s: they are left out, and the lean begins anew after each")
 
 
 @pytest.mark.parametrize(("samples", "is_one"), [(50, False), (52, True)])
@@ -137,7 +137,7 @@ def test_the_commands_say_it(tmp_path):
         rows[k] = rows[k].partition(",")[0] + "," + ",".join(rows[1300].split(",")[1:7]) + ","
     ride.write_text("\n".join([header, *rows]) + "\n")
     out = tmp_path / "LEAN.csv"
-    words = f"warning: {ride}: the readings froze from 13.0 to 15.0 s: they are not believed"
+    words = f"warning: {ride}: the readings froze from 13.0 to 15.0 s: they are left out"
     assert words in command.works("replay", ride, "--out", out).err
     lean = analysis_rides.table(out)
     assert len(lean) == len(rows)
@@ -159,7 +159,7 @@ def test_the_commands_say_it(tmp_path):
 
 
 @pytest.mark.parametrize("engine", ["cpython", "micropython"])
-def test_every_engine_is_told_of_a_gap(engine):
+def test_every_engine_is_given_the_gap(engine):
     from kickstand_tools import unix_port
 
     if engine == "micropython" and not unix_port.available():

@@ -141,7 +141,7 @@ class Xtensa(Processor):
     entry = bytes((0xE0, 0x08, 0x00))  # callx8 a8
     entry_length = 3
     identity = bytes((0x36, 0x41, 0x00, 0x1D, 0xF0))  # entry a1, 32; retw.n: its a2 is argument and result
-    # Places in the list of registers. a0 to a15 are a window into the first of these, and are told twice.
+    # Places in the list of registers. a0 to a15 are a window into the first of these, and are named twice.
     _PHYSICAL, _WINDOW_BASE, _WINDOW_START, _PS, _A = 1, 38, 39, 42, 104
     _WOE, _CALLINC = 0x40000, 0x30000  # bits of PS: windows are in use; what the last call has moved by
 

@@ -1,4 +1,4 @@
-"""kickstand_workshop.mutants: the table of rooms, the changes it makes, and what it takes for noticed."""
+"""kickstand_workshop.mutants: the table of packages, the changes it makes, and what it takes for noticed."""
 
 import os
 import subprocess
@@ -6,18 +6,18 @@ import sys
 from pathlib import Path
 
 import pytest
-from kickstand_workshop.mutants import rooms
+from kickstand_workshop.mutants import packages
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 
 
-@pytest.mark.parametrize("name", rooms.ROOMS)
+@pytest.mark.parametrize("name", packages.PACKAGES)
 def test_every_pattern_of_the_table_has_files(name):
-    room = rooms.ROOMS[name]
-    for pattern in (*room.sources, *room.tests):
+    package = packages.PACKAGES[name]
+    for pattern in (*package.sources, *package.tests):
         assert list(ROOT.glob(pattern)), pattern
-    assert rooms.sources(room, ROOT)
-    assert rooms.tests(room, ROOT)
+    assert packages.sources(package, ROOT)
+    assert packages.tests(package, ROOT)
 
 
 @pytest.fixture

@@ -193,7 +193,7 @@ def test_when_it_is_stopped_nothing_is_left(tmp_path, ride):
     assert not [line for line in os.popen("ps -o ppid=,comm=").read().splitlines() if f"{os.getpid()} ffmpeg" in line]
 
 
-def test_a_disk_that_is_full_is_told(tmp_path, ride, monkeypatch):
+def test_a_disk_that_is_full_is_reported(tmp_path, ride, monkeypatch):
     """What ffmpeg says when it stops stands in the line."""
     from kickstand_tools.overlay import overlay
 

@@ -50,7 +50,7 @@ def test_a_potholes_lean_is_no_maximum_and_a_lean_that_is_not_trusted_neither(ri
     assert np.isnan(seen.at(np.array([3.2])).lean_deg[0])
 
 
-def test_a_calibration_that_the_ride_contradicts_is_told(ride):
+def test_a_calibration_that_the_ride_contradicts_is_reported(ride):
     """As by every command that takes one."""
     calibration = api.read_calibration(ride.with_name("RIDE.cal.json"))
     backward = replace(calibration, vehicle_from_sensor=np.diag([-1.0, 1.0, -1.0]))

@@ -172,7 +172,7 @@ def test_without_a_unix_port_the_engine_is_refused(tmp_path, monkeypatch):
 
 
 @pytest.mark.skipif(not unix_port.available(), reason="no MicroPython unix port for this system")
-def test_a_fault_inside_micropython_is_told_in_one_line(tmp_path, monkeypatch):
+def test_a_fault_inside_micropython_is_reported_in_one_line(tmp_path, monkeypatch):
     broken = tmp_path / "broken.py"
     broken.write_text("raise ValueError('no such luck')\n")
     monkeypatch.setattr(replay.replay_engine, "__file__", str(broken))

@@ -139,7 +139,7 @@ def test_a_ride_whose_beginning_is_gone(board, tmp_path):
     assert 0.0 <= read_log(logs(tmp_path)[0]).start_s < 1.0
 
 
-def test_readings_that_are_missing_in_a_ride_are_told(board, tmp_path, monkeypatch):
+def test_readings_that_are_missing_in_a_ride_are_reported(board, tmp_path, monkeypatch):
     turns = ride_writer.turns
 
     def with_gaps(count, seed=0):

@@ -231,7 +231,7 @@ def fails(board, error):
 
 
 @pytest.mark.parametrize("arguments", [["record", "--out", "ride.csv"], ["pull"], ["status"]])
-def test_a_board_without_the_firmware_is_told_alike(arguments, streaming, tmp_path, monkeypatch):
+def test_a_board_without_the_firmware_is_reported_alike(arguments, streaming, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     board = streaming([], None)
     fails(board, b"ImportError: no module named 'kickstand'")
@@ -240,7 +240,7 @@ def test_a_board_without_the_firmware_is_told_alike(arguments, streaming, tmp_pa
 
 
 @pytest.mark.parametrize("arguments", [["record", "--out", "ride.csv"], ["pull"]])
-def test_a_board_with_an_older_version_is_told_to_update(arguments, streaming, tmp_path, monkeypatch):
+def test_a_board_with_an_older_version_has_to_be_updated(arguments, streaming, tmp_path, monkeypatch):
     """As 0.2.0, whose modules are all in one folder."""
     monkeypatch.chdir(tmp_path)
     board = streaming([], None)
@@ -268,7 +268,7 @@ def test_what_came_until_the_stream_broke_off_is_kept(end, words, streaming, tmp
     assert len(gzip.decompress((tmp_path / "ride.csv.gz").read_bytes()).splitlines()) == len(turns) + 1
 
 
-def test_a_computer_that_slept_is_told(streaming, tmp_path, monkeypatch):
+def test_a_computer_that_slept_is_reported(streaming, tmp_path, monkeypatch):
     """The board has stopped streaming by itself. That is not waited for as long as a sensor that is off."""
     monkeypatch.setattr(board_console, "_AWAY_SILENT_S", 0.1)
     data, turns = half_seconds(3)
@@ -280,7 +280,7 @@ def test_a_computer_that_slept_is_told(streaming, tmp_path, monkeypatch):
     assert len(read_log(tmp_path / "ride.csv").time_us) == len(turns)
 
 
-def test_after_a_new_alignment_the_log_ends_and_the_board_is_told(streaming, tmp_path):
+def test_after_a_new_alignment_the_log_ends_and_the_board_stops(streaming, tmp_path):
     data, turns = half_seconds(3)
     board = streaming([*data, *ride_writer.blocks(2, trim_deg=1.0, length=lambda _: 512)[0]], "silence", b"")
     result = command.works("record", "--out", tmp_path / "ride.csv")

@@ -94,7 +94,7 @@ def test_a_recorded_ride_replays_as_the_display_showed(engine, tmp_path, compute
 
 def test_a_fault_of_the_sensor_in_a_ride_is_replayed(tmp_path, computed):
     """The sensor is set up again, the filter starts again, and the ride goes on in the same file."""
-    devices.run("cpython", tmp_path, ALIGNED)
+    devices.align(tmp_path)
     plan = {
         "ride": [["upright", 4.0], ["accelerate", 15.0, 6.0], ["turn", -30.0, 5.0], ["turn", 40.0, 5.0]],
         "faults": [["supply_dip", [16.0]]],
@@ -158,7 +158,7 @@ def test_a_wheel_is_not_misread_while_flash_is_erased(tmp_path, monkeypatch):
 
 
 def test_the_menu_starts_and_ends_a_ride(tmp_path):
-    devices.run("cpython", tmp_path, ALIGNED)
+    devices.align(tmp_path)
     pages = [[16 + i, SHORT] for i in range(6)]
     plan = {"lean": [[0, 0], [20, 10]], "presses": [*menu(8), *pages, *menu(30)], "until": 40}
     record = devices.run("cpython", tmp_path, plan)

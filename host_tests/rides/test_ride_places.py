@@ -116,15 +116,15 @@ def test_a_recorded_ride_says_where_it_was(engine, tmp_path):
     (blocks,) = rides(tmp_path)[0].values()
     ride_log.write(tmp_path / "ride.csv", blocks)
     log = read_log(tmp_path / "ride.csv")
-    told = np.isfinite(log.lat_deg)
+    placed = np.isfinite(log.lat_deg)
     seconds = log.t_s[-1] - log.t_s[0]
-    assert np.count_nonzero(told) > 9.5 * seconds - 10
+    assert np.count_nonzero(placed) > 9.5 * seconds - 10
     noon_s = 1_795_262_400.0  # 21 November 2026; the clock of the model is 0 at 20 s before
-    fix_s = log.utc_s[told] - (noon_s - 20.0)
-    at_s = log.t_s[told] + blocks[0].time_us * 1e-6
+    fix_s = log.utc_s[placed] - (noon_s - 20.0)
+    at_s = log.t_s[placed] + blocks[0].time_us * 1e-6
     assert np.all((at_s - fix_s > 0.09) & (at_s - fix_s < 0.2))
-    assert np.max(np.abs(log.lat_deg[told] - (place[0] + place[2] * fix_s))) < 2e-6
-    assert np.max(np.abs(log.lon_deg[told] - (place[1] + place[3] * fix_s))) < 3e-6
+    assert np.max(np.abs(log.lat_deg[placed] - (place[0] + place[2] * fix_s))) < 2e-6
+    assert np.max(np.abs(log.lon_deg[placed] - (place[1] + place[3] * fix_s))) < 3e-6
 
 
 def test_a_log_has_the_columns_that_there_is_something_in(tmp_path):

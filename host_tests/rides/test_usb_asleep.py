@@ -33,7 +33,7 @@ def blocks(said):
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
 def test_the_stream_ends_itself_and_the_lean_goes_on(engine, tmp_path, capsys):
-    devices.run(engine, tmp_path, devices.ALIGNED)
+    devices.align(tmp_path)
     capsys.readouterr()
     plan = {
         "stream": True,

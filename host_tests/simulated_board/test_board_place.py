@@ -98,7 +98,7 @@ def test_an_old_position_is_not_taken_for_new():
         assert gps.place(20000) is None
 
 
-def test_the_model_of_a_receiver_goes_where_it_is_told():
+def test_the_model_of_a_receiver_goes_where_it_is_sent():
     for hz, baud in ((1, 9600), (10, 38400)):
         board = Board(level)
         board.fit_gps(constant, hz=hz, baud=baud, place=lambda t_s: (-33.5 - 1e-4 * t_s, -70.25 + 2e-4 * t_s))

@@ -178,6 +178,16 @@ def test_the_speed_is_written_once_a_second_where_asked(tmp_path):
     assert np.all(np.isnan(read_log(tmp_path / "RIDE.csv").speed_mps))
 
 
+@pytest.mark.parametrize(("profile", "seed"), [("hills", 3), ("fall", 1)])
+def test_the_log_is_as_long_as_asked(tmp_path, profile, seed):
+    """Also of a ride that would go on to the end of its bend, and of one that a fall ends."""
+    works("simulate", "--profile", profile, "--seed", seed, "--seconds", 200, "--out", tmp_path)
+    rows = (tmp_path / "RIDE.csv").read_text().splitlines()[1:]
+    assert len(rows) == 200 * 200
+    assert float(rows[-1].split(",")[0]) == pytest.approx(200.0, abs=0.006)
+    assert len((tmp_path / "TRUTH.csv").read_text().splitlines()) == len(rows) + 1
+
+
 def test_the_calibration_of_the_ride_before_goes_with_it(tmp_path):
     """`report` looks there for the calibration of RIDE.csv, but it is of a sensor that was mounted otherwise."""
     works("simulate", "--profile", "street", "--seconds", 30, "--out", tmp_path)

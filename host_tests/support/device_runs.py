@@ -10,6 +10,7 @@ import math
 import sys
 
 import cards
+import phones
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted import script, sensor_errors
 
@@ -65,6 +66,7 @@ class Device:
         """world(t_s): what the sensor measures. fitted: arguments of Board."""
         self.board = Board(world, **fitted)
         self.frames, self.ends = [], []
+        self.phones = []
 
     def fit_speed(self, source, ride, place=None, **model):
         """A "gps" or "wheel" that measures the speed of the ride. place: [latitude, longitude, degrees north a second,
@@ -107,6 +109,8 @@ class Device:
         board = self.board
         seen = {"frames": self.frames, "ends": self.ends, "last": self.frames[-1][1:], "too_fast": board.too_fast}
         seen["touched"] = sorted(board.touched)
+        if self.phones:
+            seen["phones"] = [phone.record() for phone in self.phones]
         if board.card:
             seen["rides"], seen["card_hz"] = cards.rides(board), board.card.most_hz
         return seen
@@ -170,7 +174,8 @@ def run_device(plan):
     or "poses" as for poses_of; "seed" of the part (None: perfect); its "temp_c"; "presses" [[at_s, for_s], ...];
     "faults" [[method, arguments], ...]; "board" arguments of Board; "config" settings; "power" [off_s, ...];
     "gps", "wheel" and "card": arguments of Device's methods; config "VEHICLE" "car": the ride is a car's; "remount"
-    [at_s, seed of the mounting from then on]; "stream" True: as `kickstand record` starts it.
+    [at_s, seed of the mounting from then on]; "phones": [[[at_s, what a Phone of phones.py does, arguments...], ...],
+    ...], one after the other; "stream" True: as `kickstand record` starts it.
     """
     world, ride = _world(plan)
     device = Device(world, **plan.get("board", {}))
@@ -179,6 +184,8 @@ def run_device(plan):
             device.fit_speed(source, ride, **plan[source])
     if "card" in plan:
         device.fit_card(**plan["card"])
+    for acts in plan.get("phones", []):
+        device.phones.append(phones.Phone(device.board, acts))
     for at_s, for_s in plan.get("presses", []):
         device.board.press(at_s, for_s)
     for method, arguments in plan.get("faults", []):

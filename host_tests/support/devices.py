@@ -1,10 +1,13 @@
 """Runs a device plan on either engine, in a directory that stands for the board's flash."""
 
+import functools
 import gc
 import json
 import math
 import os
 import re
+import shutil
+import tempfile
 from pathlib import Path
 
 import device_runs
@@ -37,6 +40,7 @@ class Record:
         self.touched = answer["touched"]
         self.rides = answer.get("rides")  # on the SD card: {path: content}
         self.card_hz = answer.get("card_hz")
+        self.phones = answer.get("phones", [])
         self.console = console
 
     def at(self, t_s):
@@ -80,3 +84,16 @@ def run(engine, flash, plan, capsys=None):
     said = run_mpy(SCRIPT, heap="8M", stdin=json.dumps(plan), directory=flash)
     console, _, answer = said.rstrip("\n").rpartition("\n")
     return Record(json.loads(answer), console)
+
+
+@functools.cache
+def _aligned_once():
+    """A directory that is kept as long as this process: the flash after a ride of ALIGNED."""
+    directory = tempfile.TemporaryDirectory()
+    run("cpython", directory.name, ALIGNED)
+    return directory
+
+
+def align(flash):
+    """Put the alignment of a ride of ALIGNED into a directory that is a board's flash."""
+    shutil.copytree(_aligned_once().name, flash, dirs_exist_ok=True)

@@ -13,7 +13,7 @@ from kickstand.drive_alignment.regression import Fit, ForwardRegression
 from kickstand.errors import Refusal
 from kickstand.rotation import matrix
 from kickstand.ui import messages
-from kickstand_tools.calibration.published.viriciti import PublishedAlignment
+from kickstand_tools.calibration.published import PublishedAlignment
 
 STAND = [6.0, 0.0, 0.0]
 G = 9.80665
@@ -109,7 +109,7 @@ def drive(legs, mount, options):
         value = source.step_to(speed)
         if value is not None:
             alignment.measure_speed(value)
-        if not states or alignment.state != states[-1]:
+        if isinstance(alignment, DriveAlignment) and alignment.state not in states[-1:]:
             states.append(alignment.state)
     alignment.finish()
     result = {

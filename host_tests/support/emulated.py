@@ -1,4 +1,4 @@
-"""Short ways to the emulated Pico for its tests."""
+"""Short ways to the emulated boards for their tests."""
 
 import functools
 import hashlib
@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from kickstand_tools.deploy import bytecode
 from kickstand_tools.errors import InputError
 from kickstand_tools.simulation.scripted.script import Ride, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
@@ -29,17 +30,34 @@ def pico(world: Callable[[float], tuple] | None = None, files: dict[str, bytes] 
     return Pico(world, files, **fitted)
 
 
+def esp32(world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any):
+    """An emulator.esp32.Esp32, without power yet. Skips where QEMU's library cannot be had."""
+    from kickstand_tools.emulator import esp32_library
+
+    try:
+        esp32_library.find()
+    except InputError as reason:
+        pytest.skip(str(reason))
+    from kickstand_tools.emulator.esp32 import Esp32
+
+    return Esp32(world, files, **fitted)
+
+
+CHIPS = {"pico": pico, "esp32": esp32}
+MPY = {"pico": bytecode.PICO, "esp32": bytecode.ESP32}
+
+
 @functools.cache
-def firmware() -> dict[str, bytes]:
+def firmware(chip: str = "pico") -> dict[str, bytes]:
     """The firmware's files, compiled: they start in half the time."""
     from kickstand_tools.emulator import flash_image
 
-    return flash_image.firmware(compiled=True)
+    return flash_image.firmware(True, MPY[chip])
 
 
-def modules() -> dict[str, bytes]:
+def modules(chip: str = "pico") -> dict[str, bytes]:
     """The firmware without main.py: the board waits at its prompt."""
-    return {path: content for path, content in firmware().items() if path != "/main.py"}
+    return {path: content for path, content in firmware(chip).items() if path != "/main.py"}
 
 
 @functools.cache
@@ -83,8 +101,8 @@ def reset_in_a_read(device, at_s: float) -> None:
     """Reset the processor at at_s or soon after, while the sensor is sending."""
 
     def act() -> None:
-        if device.chip.controllers[0].reading():
-            device.chip.reset()
+        if device.reading:
+            device.reset()
         else:
             device.board.at(device.time_s + 5e-6, act)
 

@@ -38,7 +38,7 @@ class EmulatedPort:
 
     def write(self, data):
         self._check()
-        self._device.console.send(bytes(data))
+        self._device.send(bytes(data))
         return len(data)
 
     def close(self):
@@ -60,7 +60,7 @@ class EmulatedPort:
     def _hear(self, data):
         self._heard += data
         if self._awaited and len(self._heard) >= self._awaited:
-            self._device.chip.stop()
+            self._device.stop()
 
     def _check(self):
         if not self._device.powered:

@@ -18,7 +18,7 @@ from kickstand.errors import Refusal
 from kickstand.imu import fifo_frames
 from kickstand.lean import formula
 from kickstand.ui import messages
-from kickstand_tools.calibration.published import dispersion, rodrigues
+from kickstand_tools.calibration import published
 from kickstand_tools.replay.replay_engine import ReplayMeter
 
 
@@ -126,7 +126,7 @@ def meter(matrix, readings, dt_us):
 
 
 def circular_dispersion(directions):
-    spread = dispersion.CircularDispersion()
+    spread = published.CircularDispersion()
     for x, y in directions:
         spread.add(x, y, (x * x + y * y) ** 0.5)
     return spread.value()
@@ -137,10 +137,10 @@ CALLS = {
     "drive": driving_runs.drive,
     "parts": driving_runs.parts,
     "regression": driving_runs.regression,
-    "rotation_between": lambda a, b, axis: _into(9, rodrigues.rotation_between, a, b, axis),
+    "rotation_between": lambda a, b, axis: _into(9, published.rotation_between, a, b, axis),
     "cross": lambda a, b: _into(3, rotation.cross, a, b),
     "rotate": lambda m, a: _into(3, rotation.rotate, matrix_of(m), a),
-    "multiply": lambda a, b: _into(9, rodrigues.multiply, matrix_of(a), matrix_of(b)),
+    "multiply": lambda a, b: _into(9, published.multiply, matrix_of(a), matrix_of(b)),
     "angle": rotation.angle_deg,
     "is_rotation": rotation.is_rotation,
     "two_position": align_two_position,

@@ -37,7 +37,7 @@ def run_mpy(
     if not unix_port.available():
         pytest.skip("no MicroPython unix port for this system")
     environment = unix_port.environment()
-    environment["MICROPYPATH"] = f"{HERE}:{environment['MICROPYPATH']}"
+    environment["MICROPYPATH"] = f"{HERE}:{environment['MICROPYPATH']}:{directory or ''}"  # as a board's flash is
     with tempfile.TemporaryDirectory() as scratch:
         if isinstance(script, str):
             file = Path(scratch) / "script.py"

@@ -59,7 +59,7 @@ SHORT, LONG = ("press", 0.15), ("press", 1.2)
 STAND, UPRIGHT, RIDE = ("pose", "kickstand"), ("pose", "upright"), ("pose", 15.0)
 PULL, PLUG = ("sensor", False), ("sensor", True)
 ALIGN = [("wait", 1.5), SHORT, ("wait", 4), UPRIGHT, ("wait", 3), SHORT, ("wait", 4)]
-RIDING = [*ALIGN, RIDE, ("wait", 8), ("lean", 30), ("wait", 6)]
+RIDING = [*ALIGN, RIDE, ("wait", 12), ("lean", 30), ("wait", 6)]
 
 
 @pytest.fixture(scope="module")
@@ -168,6 +168,16 @@ def test_the_power_goes_in_a_save_or_by_its_switch(stages):
         ([RIDE, ("wait", 6)], "not sure", 5, "", ""),
         ([("power", False), ("wait", 0.2)], "nothing", 0, "The board has no power", "power"),
         ([("button", True), on, ("wait", 2), ("button", False), ("wait", 0.2)], "safe mode", 0, "Safe mode", "power"),
+    )
+
+
+def test_it_rides_straight_until_the_meter_is_sure(stages):
+    """Leaned too early it says what is missing; as late as it says, no bend makes the lean go."""
+    stages(
+        ([*ALIGN, RIDE, ("wait", 5)], "not sure", 4, "It rides straight for ten seconds", ""),
+        ([("lean", 30), ("wait", 2)], "not sure", 4, "needs ten seconds straight on", "straight"),
+        ([("lean", 0), ("wait", 18)], "not sure", 4, "Lean it", ""),
+        ([("lean", 40), ("wait", 4)], "not sure", 5, "That is all", ""),
     )
 
 

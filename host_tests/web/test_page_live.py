@@ -14,7 +14,7 @@ from kickstand.rides import ride_paths
 from kickstand_tools.deploy import connection
 from kickstand_tools.rides.pull import pull
 from raw_prompt import RawPrompt
-from rider import MISSING, Rider
+from rider import LAPTOP, MISSING, PHONE, Rider
 from serial_line import SerialLine
 
 PLAYED = """async () => {
@@ -244,3 +244,24 @@ def test_a_board_without_the_firmware_is_told_of_the_page_install(line, rider, b
     rider.page.wait_for_selector(f"{press}:enabled:visible")
     assert rider.text(says) == "Kickstand is not on the board at this port: the page Install puts it there."
     assert board.resets == 1
+
+
+@pytest.mark.parametrize("kind", [LAPTOP, PHONE], ids=["laptop", "phone"])
+def test_without_a_board_a_simulated_one_is_watched(chromium, address, kind):
+    """Also in a browser that cannot speak to a board, as a phone's: a lean to either side, said to be simulated."""
+    rider = Rider(chromium, address + "live.html", **kind)
+    if kind == PHONE:
+        rider.page.evaluate("document.documentElement.dataset.serial = 'no'")
+    rider.page.click("#simulated")
+    for side in "right", "left":
+        rider.page.wait_for_function("side => document.querySelector('#side').textContent === side", arg=side)
+        assert rider.page.is_visible("#gauge") and not rider.page.is_visible("#start")
+    assert rider.text("#pretend-said").startswith("A simulated ride, which nobody has ridden: 0:")
+    assert rider.text("#max-right") != "--"
+    assert rider.axe() == []
+    assert rider.fits()
+    rider.page.click("#simulated-stop")
+    assert rider.text("#pretend-said") == "Stopped."
+    rider.page.wait_for_function("document.querySelector('#lean').textContent === '--'")
+    assert rider.errors == [] and rider.strangers() == []
+    rider.context.close()

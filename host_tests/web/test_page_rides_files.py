@@ -4,12 +4,17 @@ import base64
 import gzip
 import json
 import zipfile
+from datetime import UTC, datetime
 from pathlib import Path
 
 import analysis_rides
 import app_exports
 import pytest
 from command import works
+from kickstand_tools.api import CalibrationFile, Log, simulate_ride
+from kickstand_tools.calibration.file import write_calibration
+from kickstand_tools.logs.csv_lines import write_log
+from kickstand_tools.simulation.files import positions
 from rider import LAPTOP, Rider
 from rides_page import PHONE_MOUNTED, WAIT_MS, assert_near, near
 
@@ -82,15 +87,16 @@ def test_one_of_several_rides_is_chosen(page, ride, calibration, tmp_path):
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
-        ("picture.png", b"\x89PNG\r\n\x1a\n" + bytes(8), "picture.png: not text: give what an app has exported"),
-        ("table.csv", b"lat,lon\n1,2\n", "table.csv: not a file of an app that is known, and no table of sensors"),
-        ("made", b"as what was made is called", "made: not a file of an app that is known"),
-        ("note.txt", b"Time flies, so speed,\nand more of it\n", "note.txt: not a file of an app that is known"),
-        ("empty.csv", b"", "empty.csv holds no recording: give the file, the folder or the zip"),
+        ("picture.png", b"\x89PNG\r\n\x1a\n" + bytes(8), "not text: give what an app has exported"),
+        ("table.csv", b"lat,lon\n1,2\n", "not a file of an app that is known, and no table of sensors"),
+        ("made", b"as what was made is called", "not a file of an app that is known"),
+        ("note.txt", b"Time flies, so speed,\nand more of it\n", "not a file of an app that is known"),
+        ("track.gpx", b"<gpx><trk><trkpt lat='1' lon='2'></trk>", "is no GPX file, or its copy is not whole"),
+        ("empty.csv", b"", "holds no recording: give the file, the folder or the zip"),
         ("slow.csv", b"t_s,ax_g,ay_g,az_g\n0,0,1,0\n", "and no gyro found in it: needed are a time, the acceleration"),
-        ("damaged.zip", b"PK\x03\x04\xff" + bytes(40), "damaged.zip is damaged or cut short: copy it again"),
-        ("ride.parquet", b"PAR1" + bytes(40), "ride.parquet is Parquet, which this page cannot read: give the ride as"),
-        ("report.json", b'{"ride": "A"}', "report.json is no calibration: version is missing: give the"),
+        ("damaged.zip", b"PK\x03\x04\xff" + bytes(40), "is damaged or cut short: copy it again"),
+        ("ride.parquet", b"PAR1" + bytes(40), "is Parquet, which this page cannot read: give the ride as"),
+        ("report.json", b'{"ride": "A"}', "is no calibration: version is missing: give the"),
     ],
 )
 def test_what_is_no_ride_is_told_in_one_line_and_does_not_spoil_the_next(
@@ -98,17 +104,25 @@ def test_what_is_no_ride_is_told_in_one_line_and_does_not_spoil_the_next(
 ):
     path = tmp_path / name
     path.write_bytes(content)
-    said = page.give(path)
-    assert words in said and "\n" not in said and "kickstand" not in said and "--" not in said
+    assert page.give(path) == f"{name} cannot be used: the list says why."
     assert page.page.is_hidden("#report") and page.page.is_hidden("#charts")
-    assert words in page.held()[name]
+    said = page.held()[name]
+    assert said.startswith(words) or words in said
+    assert (
+        "\n" not in said
+        and not said.startswith(name)
+        and "kickstand" not in said
+        and "--" not in said
+        and "<" not in said
+    )
     if name == "ride.parquet":
         assert page.add(ride, calibration) == ""
         assert page.page.inner_text("#report-title") == "RIDE.csv"
-        assert words in page.add(path)
+        assert page.add(path) == ""
         assert page.page.is_visible("#report")
+        assert page.page.inner_text("#given-wrong") == f"{name} cannot be used: the list says why."
         page.give(ride)
-        assert words in page.add(path)
+        assert "has no calibration with it" in page.add(path)
         assert page.page.is_visible("#align")  # the ride still waits for its calibration
 
 
@@ -120,8 +134,9 @@ def test_a_file_that_cannot_be_read_does_not_spoil_the_others(page, ride, calibr
     path.write_text("anew, and of another length")
     assert page.add(ride, calibration) == ""
     assert page.page.inner_text("#report-title") == "RIDE.csv"
-    assert "written.csv cannot be read: it is a folder, or was changed" in page.held()["written.csv"]
-    assert "not a file of an app" in page.add(path)
+    assert page.held()["written.csv"].startswith("cannot be read: it is a folder, or was changed")
+    page.add(path)
+    assert "not a file of an app" in page.held()["written.csv"]
 
 
 def test_files_come_in_any_order_one_by_one_and_go(page, ride, calibration, tmp_path):
@@ -164,6 +179,45 @@ def test_the_columns_of_a_table_can_be_named(page, tmp_path):
     works("import", log, "--out", tmp_path / "R.csv", *named)
     reported = json.loads(works("report", tmp_path / "R.csv", "--calibration", tmp_path / "phone.json", "--json").out)
     assert_near({**json.loads(page.saved("#save-json")), "ride": ""}, {**reported, "ride": ""})
+
+
+def test_a_track_joins_a_ride_without_gps(page, tmp_path):
+    """As `join` does it: the page then has a map, and the log with positions can be saved. Another ride's not."""
+    made = simulate_ride("hills", seed=1, seconds=120.0)
+    log = Log.from_readings(made.readings, made.rate_hz)
+    write_log(tmp_path / "bare.csv", log)
+    calibration = CalibrationFile(vehicle_from_sensor=made.vehicle_from_sensor, aligned=True)
+    write_calibration(tmp_path / "bare.cal.json", calibration)
+    (tmp_path / "ride.gpx").write_text(gpx(*positions(made)))
+    page.give(tmp_path / "bare.csv", tmp_path / "bare.cal.json")
+    assert page.page.frame_locator("#plot").locator("#map").count() == 0
+    assert "ride.gpx is joined: correlation " in page.add(tmp_path / "ride.gpx")
+    page.page.frame_locator("#plot").locator("#map .main-svg").first.wait_for()
+    works("join", tmp_path / "bare.csv", tmp_path / "ride.gpx", "--out", tmp_path / "joined.csv")
+    assert page.saved("#save-log") == (tmp_path / "joined.csv").read_bytes()
+    lat, lon, utc_s = positions(made)
+    (tmp_path / "ride.gpx").write_text(gpx(lat[::-1], lon, utc_s))
+    page.add(tmp_path / "ride.gpx")
+    assert "ride.gpx is not joined" in page.warnings()
+
+
+def gpx(lat, lon, utc_s):
+    """A point a second."""
+    points = "".join(
+        f'<trkpt lat="{a:.7f}" lon="{o:.7f}"><time>{datetime.fromtimestamp(s, UTC).isoformat()}</time></trkpt>'
+        for a, o, s in zip(lat[::200], lon[::200], utc_s[::200])
+    )
+    return f'<gpx version="1.1" creator="a phone"><trk><trkseg>{points}</trkseg></trk></gpx>'
+
+
+def test_a_sample_ride_is_shown_and_said_to_be_simulated(page):
+    page.give()
+    page.page.click("#sample")
+    page.page.wait_for_selector("#report", timeout=WAIT_MS)
+    assert page.said() == "This ride is simulated: nobody has ridden it."
+    assert page.page.inner_text("#report-title") == "simulated-ride.csv.gz"
+    page.page.frame_locator("#plot").locator("#map .main-svg").first.wait_for()
+    assert page.warnings() == ""
 
 
 def test_a_browser_that_keeps_nothing_says_so(chromium, address):

@@ -18,6 +18,7 @@ from kickstand_tools.deploy.firmware_files import firmware_files
 from kickstand_tools.web import install_archive, npm_packages, serve, site
 from mpy import run_mpy
 
+ROOT = Path(__file__).resolve().parents[2]
 FIRMWARE = [path.lstrip("/") for path in firmware_files()]
 ARCHITECTURES = install_archive.ARCHITECTURES
 OURS = (".html", ".mjs", ".js", ".css", ".webmanifest")
@@ -37,6 +38,22 @@ def test_it_is_written_to_a_folder(files, tmp_path):
     assert f"written: {out}" in done.out
     written = {path.relative_to(out).as_posix(): path.read_bytes() for path in out.rglob("*") if path.is_file()}
     assert written == files
+
+
+def test_what_github_builds_knows_its_home(monkeypatch):
+    """And what is built elsewhere names none."""
+    core = pytest.importorskip("hatchling.metadata.core")
+    manager = pytest.importorskip("hatchling.plugin.manager")
+
+    def urls():
+        return core.ProjectMetadata(str(ROOT), manager.PluginManager()).core.urls
+
+    monkeypatch.delenv("GITHUB_REPOSITORY", raising=False)
+    assert urls() == {}
+    monkeypatch.setenv("GITHUB_SERVER_URL", "https://an.example")
+    monkeypatch.setenv("GITHUB_REPOSITORY", "rider/kickstand")
+    assert urls()["Homepage"] == "https://an.example/rider/kickstand"
+    assert urls()["Issues"].endswith("/kickstand/issues")
 
 
 def test_it_is_served_and_opened(files, monkeypatch):
@@ -66,11 +83,20 @@ def test_it_may_lie_anywhere(files):
             assert not re.search(r"""(src|href|url|fetch)["'=(: ]+/""", text), name
 
 
+def test_every_page_leads_home(files, monkeypatch):
+    """To the first page, and to the project, where what is installed knows its address."""
+    home = "https://an.example/kickstand"
+    monkeypatch.setattr(site, "home", lambda: home)
+    pages = {name: data.decode() for name, data in site.site_files().items() if name.endswith(".html")}
+    assert all('<h1><a href="./">' in text and text.count(f'href="{home}"') == 1 for text in pages.values())
+    assert home not in "".join(data.decode() for name, data in files.items() if name.endswith(".html"))
+
+
 def test_every_file_is_kept_for_a_time_without_network(files):
     worker = files["service_worker.js"].decode()
     listed = re.search(r"const FILES = (\[.*?\]);", worker)
     assert listed
-    large = "esptool/", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip"
+    large = "esptool/", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip", "sample/"
     later = {name for name in files if name.startswith(large)}
     assert set(json.loads(listed[1])) == {"./", *files} - {"service_worker.js", "index.html"} - later
     assert "{{" not in worker

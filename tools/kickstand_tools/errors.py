@@ -1,4 +1,4 @@
-"""The error for input that cannot be used, and pieces of its text."""
+"""The error for input that cannot be used, and parts of its text."""
 
 import sys
 

@@ -1,8 +1,9 @@
 """Writes files completely or not at all, and makes the directories for them."""
 
 import contextlib
+import gzip
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 from .errors import InputError, cause
@@ -58,3 +59,14 @@ def write_whole(path: Path, write: Callable[[Path], None]) -> None:
     finally:
         with contextlib.suppress(OSError):  # on a read-only file system it would hide the reason
             temporary.unlink(missing_ok=True)
+
+
+def write_packed(path: Path, parts: Iterable[bytes]) -> None:
+    """Write a file of these parts, gzipped if its name ends in .gz, whole or not at all. Raises InputError."""
+
+    def write(temporary: Path) -> None:
+        opened = gzip.open if path.suffix == ".gz" else open
+        with opened(temporary, "wb") as file:
+            file.writelines(parts)
+
+    write_whole(path, write)

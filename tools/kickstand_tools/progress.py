@@ -1,6 +1,6 @@
 """A progress bar or a spinner on standard error for work that takes over a second; only if that is a terminal.
 
-Work of minutes says its progress in lines elsewhere: Bar's lines_s.
+Elsewhere work that takes minutes prints its progress in lines: Bar's lines_s.
 """
 
 import contextlib
@@ -26,8 +26,8 @@ PATIENCE_S = 1.0
 class Bar:
     """with Bar("replaying", total) as bar: bar.advance(n). It appears after patience_s.
 
-    Without a total: bar.reach is the `progress` callback of a function that tells it.
-    lines_s: where standard error is no terminal, print a line so often; None for never.
+    Without a total: bar.reach is the `progress` callback of a function that knows it.
+    lines_s: where standard error is no terminal, time between two lines; None for none.
     """
 
     def __init__(

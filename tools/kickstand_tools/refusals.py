@@ -52,7 +52,8 @@ _SENTENCES = {
     "cut-line": "line {0}, the last one, was cut: it is left out",
     "times-spread": "the times are rounded ({0} of {1} repeat the one before): they are spread evenly, by up to "
     "{2:.3f} s",
-    "smooth-slow": "too few samples a second to look back over: where the log has under 10, the lean is the display's",
+    "smooth-slow": "the smoothed lean needs 10 samples a second: where the log has fewer, the lean is the one that the "
+    "display showed",
     "ride-short": "only {0:.0f} s of riding: at least {1:.0f} s with bends are needed",
     "no-bends": "it hardly leans ({0:.1f} degrees rms): a motorcycle's ride with bends to both sides is needed",
     "not-leaning": "in bends it is pushed aside and does not lean, as a car: {align_car}",
@@ -66,7 +67,7 @@ _SENTENCES = {
     "{phone_otherwise}",
     "phone-upside-down": "for a phone mounted {0} all accelerations have the opposite sign: " + _AT_REST,
     "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
-    "import-speed-unit": "{0} has no unit, and the positions do not tell it, so the speed is left out: {speed_unit}",
+    "import-speed-unit": "{0} has no unit, and the positions do not show it, so the speed is left out: {speed_unit}",
     "import-sign": "which sign accelerations have in {0} is not certain, and no track with turns shows it: "
     + _AT_REST
     + ", else the ride is mirrored and {sign}",
@@ -94,7 +95,7 @@ _MOVED = {
 
 
 class RefusedInput(InputError):
-    """Data that the firmware's own modules refuse. code, values: of the refusal, as in kickstand.errors.
+    """Data that the firmware's own modules refuse. code, values: those of the refusal, as in kickstand.errors.
 
     where: put before the sentence, the file as a rule; advice: after it.
     """
@@ -142,15 +143,15 @@ def sentence(refusal: Refusal | Notice, remedies: Remedies = COMMANDS) -> str:
 
 
 def _frozen(stretches: int, seconds: float, begin_s: float, end_s: float) -> str:
-    """begin_s, end_s: of the first of the stretches."""
+    """The sentence for frozen readings. begin_s, end_s: times of the first stretch."""
     line = f"the readings froze from {begin_s:.1f} to {end_s:.1f} s"
     if stretches > 1:
         line += f" and {stretches - 1} times more, {seconds:.1f} s in all"
-    return line + ": they are not believed, and the lean begins anew after each"
+    return line + ": they are left out, and the lean begins anew after each"
 
 
 def _speed_unit(factor: float) -> str:
-    """factor: by which the speed changes more than the force says."""
+    """The sentence for a speed in another unit. factor: change of the speed over the one that the force explains."""
     guess = "is it in m/s, and the right vehicle's?"
     if 3.0 < factor < 4.4:
         guess = "it is in km/h, m/s are needed"
@@ -186,8 +187,8 @@ def _rates_misfit(*exchange: list[int]) -> str:
 
 
 def _forward_exchanged(remedies: Remedies, car: bool, side: str, roll_deg: float | None) -> str:
-    """side: the one that two poses were calibrated for, "" if not known. roll_deg: by how much up is off, None if it is
-    not known."""
+    """The sentence for forward and backward exchanged. side: the kickstand's side in the calibration by two poses, ""
+    if unknown. roll_deg: error of up, None if unknown."""
     line = "forward and backward are exchanged: "
     if car:
         line += remedies["align_driving"]
@@ -207,7 +208,7 @@ def _up_off(remedies: Remedies, angle_deg: float, car: bool) -> str:
 
 
 def _forward_off(remedies: Remedies, angle_deg: float, by: str, car: bool) -> str:
-    """angle_deg: from the calibration's forward to the ride's, > 0 to the left."""
+    """The sentence for a yaw error. angle_deg: from the calibration's forward to the ride's, > 0 to the left."""
     side = "left" if angle_deg > 0.0 else "right"
     wrong = "braking and cornering are" if car else "lean, braking and cornering are"
     return (

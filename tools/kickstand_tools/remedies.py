@@ -26,12 +26,12 @@ COMMANDS = {
     "speed_unit": "add --units speed=km/h, mph or m/s",
 }
 
-_BY_RIDE = "remove the calibration and let the ride tell how the sensor sits"
+_BY_RIDE = "remove the calibration and let the ride show how the sensor sits"
 
 # The page Rides has neither commands nor options
 PAGE = {
     "align": _BY_RIDE,
-    "align_again": "Remove the calibration and let the ride tell how the sensor sits, or align the bike again",
+    "align_again": "Remove the calibration and let the ride show how the sensor sits, or align the bike again",
     "align_again_car": "Give the calibration of this mount",
     "align_car": "this page aligns motorcycles only",
     "align_driving": "was it aligned while driving backwards?",

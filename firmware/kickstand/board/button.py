@@ -9,7 +9,7 @@ from time import ticks_diff
 SHORT = 1
 LONG = 2
 
-DEBOUNCE_MS = 20  # the contact counts once it has kept its state for so long
+DEBOUNCE_MS = 20  # a change of the contact counts once it has lasted for this time
 LONG_MS = 800  # a press that lasts longer is a long one
 
 
@@ -21,7 +21,7 @@ class Button:
         self._pressed = self._raw = self.held()
         self._changed_ms = None
         self._pressed_ms = 0
-        self._long_sent = True  # the press has been reported; also one that began before this object was made
+        self._long_sent = True  # the press was reported as long; True also for one that began before this object
 
     def held(self):
         """True if the button is pressed now, not debounced."""

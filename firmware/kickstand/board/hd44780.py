@@ -1,17 +1,12 @@
-"""Driver for an HD44780 character display, 16x2, behind a PCF8574 port expander (the usual I2C backpack).
-
-    lcd = Lcd(lambda: machine.I2C(1, sda=machine.Pin(6), scl=machine.Pin(7), freq=100_000))
-    lcd.show("Hello", "world")
-    while True:
-        lcd.tick(time.ticks_ms())  # sends at most one changed line, or does one step of the initialisation
-        time.sleep_ms(10)
+"""Driver for an HD44780 character display, 16x2, behind a PCF8574 port expander (the usual I2C backpack). display.py
+finds it, and says what its methods do.
 
 Sources: data sheets Hitachi HD44780U (ADE-207-272) and NXP PCF8574. The display is driven in 4-bit mode. The part of a
 line that has changed is sent in one transfer, which takes 6 ms for a whole line at 100 kHz. Wiring of the backpack: P0
 RS, P1 R/W, P2 E, P3 backlight, P4..P7 D4..D7.
 """
 
-from time import sleep_ms, ticks_diff, ticks_ms
+from time import ticks_diff, ticks_ms
 
 from micropython import const
 
@@ -21,17 +16,14 @@ _LIGHT = const(0x08)
 _LINE_ADDRESSES = (0x80, 0xC0)  # instruction "set DDRAM address" for the beginning of each line (table 6)
 _CGRAM_ADDRESS = const(0x40)  # instruction "set CGRAM address" (table 6)
 
-ADDRESSES = (0x27, 0x3F)  # PCF8574 and PCF8574A with all address jumpers open
 COLUMNS = 16
 _DASHES = b"-" * COLUMNS
 _NO_TEXT = "\n"
 _NEVER = b"\xfe" * COLUMNS  # a character code that no text uses: marks a line as not yet written
-REINIT_MS = 10_000  # initialise again so often: noise can put the nibbles out of step, and nothing else repairs that
-PROBE_MS = 200  # how often to see whether a display is there, or still there
-REOPEN_PROBES = 5  # while there is no display the bus is freed once in so many probes
-STEP_MS = 5  # from step to step: the longest wait that the initialisation asks for is 4.1 ms
-_POWER_UP_MS = const(40)  # for so long after power-up the display does not listen
-_POWER_UP = const(-8)  # the step to begin with then
+REINIT_MS = 10_000  # time between initialisations: noise can put the nibbles out of step, and nothing else repairs that
+PROBE_MS = 200  # time between two checks whether the display is still connected
+STEP_MS = 5  # time between two steps: the longest wait that the initialisation requires is 4.1 ms
+_POWER_UP = const(-8)  # the first step after power-up, for 40 ms of which the display takes no instruction
 
 # Initialisation by instruction (data sheet, figure 24), one step a tick, STEP_MS apart, so that the loop never waits.
 # First single nibbles, which bring the display into 4-bit mode from whatever state it was in. Then whole bytes:
@@ -55,82 +47,63 @@ def _bar_glyphs():
 
 
 class Lcd:
-    """A display that may be absent, or come and go.
+    """The driver; display.py says what its methods do, and finds it."""
 
-    reopen: called to free the bus, returns it as a machine.I2C.  addresses: I2C addresses to look for it at.
-    address: where it was found, or None while no display answers.
-    """
+    draws = False
 
-    def __init__(self, reopen, addresses=ADDRESSES):
-        self._reopen = reopen
-        self._i2c = None
-        self._addresses = addresses
+    def __init__(self):
         self._wanted = [bytearray(b" " * COLUMNS), bytearray(b" " * COLUMNS)]
         self._shown = [bytearray(COLUMNS), bytearray(COLUMNS)]
-        self._texts = [_NO_TEXT, _NO_TEXT]  # of each line, what was shown last, if it was a str
+        self._texts = [_NO_TEXT, _NO_TEXT]  # the text that each line showed last, if it was a str
         self._changed = True  # a line may have to be sent
         self._packed = bytearray(4 * (COLUMNS + 1))
         self._port = bytearray(1)
         self._glyphs = _bar_glyphs()
-        self.address = None
-        # of the initialisation; negative: waiting for the display's own power-up, which came with the board's
-        self._step = _POWER_UP if ticks_ms() < _POWER_UP_MS else 0
-        self._probes = 0  # in a row that found nothing
-        self._acted_ms = None  # when something was last sent
+
+    def begin(self, i2c, address, hz, fresh):
+        self._i2c = i2c
+        self._address = address
+        # of the initialisation; negative: waiting for the display's own power-up
+        self._step = _POWER_UP if fresh else 0
+        self._acted_ms = ticks_ms()  # when something was last sent
         self._seen_ms = 0  # when the display last answered
         self._init_ms = 0  # when the initialisation last ended
 
-    def show(self, line1, line2):
-        """Set the text of the two lines, to be sent by tick(). Each is padded or cut to 16 characters.
+    @property
+    def busy(self):
+        return self._changed or self._step < _STEPS
 
-        A str of characters below 256, or bytes. Codes 0 to 7 are the patterns of _bar_glyphs(), the others those of
-        the display's ROM."""
+    def show(self, line1, line2, picture=None):
+        """Each line is padded or cut to 16 characters. Codes 0 to 7 are the patterns of _bar_glyphs(), the others those
+        of the display's ROM."""
         self._put(0, line1)
         self._put(1, line2)
 
     def tick(self, now_ms):
-        """Do the next step of the work: at most one line. Call it about every 10 ms. now_ms: ticks_ms().
-
-        Raises SettingsError for pins that cannot be used, and nothing else."""
-        if self._acted_ms is not None and ticks_diff(now_ms, self._acted_ms) < (STEP_MS if self.address else PROBE_MS):
+        """At most one line, or one step of the initialisation."""
+        if ticks_diff(now_ms, self._acted_ms) < STEP_MS:
             return
-        try:
-            if self.address is None:
-                self._acted_ms = now_ms
-                self._probe()
-            elif self._step < _STEPS:
-                self._acted_ms = now_ms
-                if self._step > 0 and not self._kept_power():
-                    self._step = _POWER_UP
-                if self._step >= 0:
-                    self._initialise(self._step)
-                self._step += 1
-                self._init_ms = self._seen_ms = now_ms
-            elif self._changed and self._refresh():  # first: what is shown may be too old to stay
-                self._seen_ms = self._acted_ms = now_ms
-            elif ticks_diff(now_ms, self._seen_ms) >= PROBE_MS:
-                self._seen_ms = self._acted_ms = now_ms
-                if not self._kept_power():
-                    self._step = _POWER_UP
-            elif ticks_diff(now_ms, self._init_ms) >= REINIT_MS:
-                self._step = 0
-        except OSError:
-            self.address = None
-            self._step = _POWER_UP
-
-    def flush(self):
-        """Send everything now, in about 0.1 s: for texts shown before the loop runs or after it has failed."""
-        self._acted_ms = None
-        for _ in range(_STEPS - _POWER_UP + 4):
-            self.tick(ticks_ms())
-            if self.address is None:
-                return
-            sleep_ms(STEP_MS)
+        if self._step < _STEPS:
+            self._acted_ms = now_ms
+            if self._step > 0 and not self._kept_power():
+                self._step = _POWER_UP
+            if self._step >= 0:
+                self._initialise(self._step)
+            self._step += 1
+            self._init_ms = self._seen_ms = now_ms
+        elif self._changed and self._refresh():  # first: what is shown may be too old to stay
+            self._seen_ms = self._acted_ms = now_ms
+        elif ticks_diff(now_ms, self._seen_ms) >= PROBE_MS:
+            self._seen_ms = self._acted_ms = now_ms
+            if not self._kept_power():
+                self._step = _POWER_UP
+        elif ticks_diff(now_ms, self._init_ms) >= REINIT_MS:
+            self._step = 0
 
     def _put(self, number, text):
         line = self._wanted[number]
         if isinstance(text, str):
-            if text == self._texts[number]:  # as mostly: to convert it takes 0.2 ms
+            if text == self._texts[number]:  # mostly so; converting it would take 0.2 ms
                 return
             self._texts[number] = text
             for i in range(COLUMNS):
@@ -141,26 +114,10 @@ class Lcd:
                 line[i] = text[i] if i < len(text) else 0x20
         self._changed = True
 
-    def _probe(self):
-        """Look for the display at each address."""
-        if self._probes % REOPEN_PROBES == 0:  # a stuck bus has to be freed, but to do so each time would take too long
-            self._i2c = self._reopen()
-        self._probes += 1
-        for address in self._addresses:
-            try:
-                self._i2c.readfrom_into(address, self._port)
-            except OSError:
-                continue
-            self.address = address
-            self._probes = 0
-            return
-        # Not found: if it answers later it was just powered, so it is given its 40 ms.
-        self._step = _POWER_UP
-
     def _initialise(self, step):
         if step < len(_NIBBLES):
             nibble = _NIBBLES[step] | _LIGHT
-            self._i2c.writeto(self.address, bytes((nibble | _E, nibble)))
+            self._i2c.writeto(self._address, bytes((nibble | _E, nibble)))
         elif step == len(_NIBBLES):
             for command in _COMMANDS:
                 self._send(command, b"")
@@ -176,7 +133,7 @@ class Lcd:
 
         The PCF8574's pins are high after power-up, but every transfer leaves E low. So it must be asked before
         anything is sent."""
-        self._i2c.readfrom_into(self.address, self._port)
+        self._i2c.readfrom_into(self._address, self._port)
         return not self._port[0] & _E
 
     def _refresh(self):
@@ -193,7 +150,7 @@ class Lcd:
                 while shown[last] == wanted[last]:
                     last -= 1
                 at = _LINE_ADDRESSES[i] + first
-                if last > first:  # if this breaks off, half a number or another side must not look like a reading
+                if last > first:  # a transfer that breaks off must not leave half a number or the wrong side
                     self._send(at, memoryview(_DASHES)[first : last + 1])
                 self._send(at, memoryview(wanted)[first : last + 1])
                 shown[:] = wanted
@@ -207,7 +164,7 @@ class Lcd:
         self._pack(0, command, _LIGHT)
         for i in range(len(data)):
             self._pack(4 * (i + 1), data[i], _LIGHT | _RS)
-        self._i2c.writeto(self.address, memoryview(packed)[: 4 * (len(data) + 1)])
+        self._i2c.writeto(self._address, memoryview(packed)[: 4 * (len(data) + 1)])
 
     def _pack(self, at, value, control):
         """Put a byte into _packed as two nibbles, each with E high and then low: the falling edge latches it.

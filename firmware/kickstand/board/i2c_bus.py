@@ -6,8 +6,8 @@ from machine import Pin
 
 from . import port
 
-_HALF_PERIOD_US = 5  # of SCL while a bus is freed: 100 kHz
-# Time-out in bit times. On rp2 it is that of a whole transfer, which has 112 bytes at most, on an ESP32 that of a bit.
+_HALF_PERIOD_US = 5  # half a period of SCL while a bus is freed: 100 kHz
+# Time-out in bit times. On rp2 it is for a whole transfer, which has 136 bytes at most, on an ESP32 for a bit.
 # The default of 50 ms would stop the loop for too long.
 _TIMEOUT_BITS = 2000
 

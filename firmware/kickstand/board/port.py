@@ -26,8 +26,8 @@ if IS_ESP32:
     PIN_IRQ = {}  # further arguments of Pin.irq(): this port has soft interrupts only, which SoftI2C keeps waiting
     I2C_NUMBERED = False  # see open_i2c()
     SD_SPI = (2, 3)  # the slots of machine.SDCard that are SPI
-    # Pins that the chip itself needs. Those of its own USB: driving one cuts the board off from the computer until BOOT
-    # is held. Those of a classic chip's flash (6 to 11): driving one crashes the board, at each start. Its console's.
+    # Pins that the chip itself needs: those of its own USB (driving one cuts the board off from the computer until BOOT
+    # is held), those of a classic chip's flash (6 to 11; driving one crashes the board at each start) and its console's
     _CHIP = MACHINE.split(" with ESP32")[-1].lstrip("-")[:2]  # "S2", "C3", ...; of a classic one "", "UN", "D2" or "PI"
     _CLASSIC = not (_CHIP[:1] in ("S", "C", "H", "P") and _CHIP[1:].isdigit())
     TAKEN_PINS = {"S2": (19, 20), "S3": (19, 20), "C3": (18, 19), "C6": (12, 13), "H2": (26, 27)}.get(
@@ -42,18 +42,18 @@ else:  # Raspberry Pi Pico and Pico 2, and boards of other makers that have its 
     I2C_NUMBERED = True  # two buses need two numbers
     SD_SPI = (0, 1)  # the numbers of machine.SPI
     TAKEN_PINS = INPUT_PINS = ()
-if not _KNOWN:  # these pins may be missing, or belong to what else is on the board
+if not _KNOWN:  # these pins may be missing, or connected to something else on the board
     SENSOR_PINS = LCD_PINS = GPS_PINS = None, None
     BUTTON_PIN = WHEEL_PIN = None
     GPS_UART = 1
 
 
 _SOFT_I2C_HZ = 250_000  # half a period of 2 us: at 400 kHz SoftI2C's would be 1 us, and the MPU6050 needs 1.3
-_TURN_BYTES = 2800  # of heap that a turn of the app's loop uses
+_TURN_BYTES = 2800  # bytes of heap that one pass of the app's loop uses
 _FEWEST_TURNS = 3
 
 _WATCHDOG_MS = 8000  # rp2 allows 8388 at most
-_WEEK_MS = 604_800_000  # an ESP32 counts it in 32 bits, four to a millisecond: twelve days at most
+_WEEK_MS = 604_800_000  # a time-out of a week: an ESP32 counts it in 32 bits, four to a millisecond, so 12 days at most
 
 _watchdog = None
 
@@ -70,10 +70,10 @@ def open_i2c(controller, sda, scl, frequency, timeout_us):
 
 
 def turns_to_collect(most):
-    """After how many turns of the app's loop the garbage is to be collected: most, or fewer where the heap is small.
+    """The number of passes of the app's loop between two garbage collections: `most`, or fewer where the heap is small.
 
     An ESP32's heap starts with 64 KB and grows only when a collection has not helped. It would be collected again and
-    again in the middle of a turn."""
+    again in the middle of a pass."""
     if not IS_ESP32:
         return most
     import esp32  # type: ignore[import-not-found]

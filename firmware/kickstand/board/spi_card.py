@@ -1,7 +1,7 @@
-"""micropython-lib's driver of an SD card on SPI, with what its writing lacks.
+"""micropython-lib's driver of an SD card on SPI, with its faults in writing corrected.
 
-It returns silently when the card rejects the data, waits without limit while the card is busy, and takes heap for each
-byte that it waits.
+The original returns silently when the card rejects the data, waits without limit while the card is busy, and takes heap
+for each byte that it waits.
 """
 
 from errno import EIO, ETIMEDOUT
@@ -9,7 +9,7 @@ from time import ticks_diff, ticks_ms
 
 from sdcard import SDCard  # type: ignore[import-not-found]
 
-CLOCK_HZ = 10_000_000  # by default 1.32 MHz, at which a block takes 25 ms
+CLOCK_HZ = 10_000_000  # at the driver's default of 1.32 MHz a block of a ride takes 25 ms
 BUSY_MS = 1000  # cards may take 250 to 500 ms (SD Physical Layer Simplified Specification, section 4.6.2.2)
 _ACCEPTED = 0x05  # data response, section 7.3.3.1
 
@@ -23,7 +23,7 @@ class CheckedCard(SDCard):
         super().__init__(spi, cs, baudrate=CLOCK_HZ)
 
     def writeblocks(self, block_num, buf):
-        """For the file system. Raises OSError, also for data that the card rejects."""
+        """Write sectors for the file system. Raises OSError, also for data that the card rejects."""
         self._fault = 0
         super().writeblocks(block_num, buf)
         if self._fault:

@@ -5,12 +5,12 @@ from time import ticks_add, ticks_diff, ticks_ms
 from ..errors import StoreError, report
 from .store import Store
 
-TRIM_MS = 60_000  # flash wears: the roll-misalignment correction is saved no more often
+TRIM_MS = 60_000  # least time between two saves of the roll-misalignment correction, because flash wears
 
 
 class ActiveCalibration:
     """meter: the LeanMeter that works with it. changed: called as changed(replaced) after each change.
-    replaced: True for another alignment, so that maxima and what driving has shown are discarded; False for a small
+    replaced: True for another alignment, so that maxima and the results of driving are discarded; False for a small
     correction.
 
     The trim, short for the roll-misalignment correction, is in degrees, and riding finds it (see Calibration).
@@ -33,7 +33,7 @@ class ActiveCalibration:
         return self.value.aligned
 
     def chip_started(self, chip):
-        """Load the stored calibration of chip (an Mpu6050 that runs) unless it is in use. True if it was loaded."""
+        """Load the stored calibration of `chip` (an Mpu6050 that runs), unless it is in use: return True if loaded."""
         if self._store and self._store.who_am_i == chip.who_am_i:
             return False
         self._chip = chip
@@ -42,27 +42,27 @@ class ActiveCalibration:
         return True
 
     def save(self, calibration):
-        """Put a calibration that the rider made into flash, then into use. Raises StoreError."""
+        """Save a calibration that the rider made to flash, then use it. Raises StoreError."""
         self._store.save(calibration)
         self._use(calibration, True)
 
     def refine(self, calibration):
-        """Like save(), but the alignment came from driving; what was estimated stays valid. Raises StoreError."""
+        """Like save(), for an alignment from driving: maxima and the results of driving are kept. Raises StoreError."""
         self._store.save(calibration)
         self._use(calibration, False)
 
     def restart(self):
-        """Begin with the values in flash, as a replay of a ride will: the trim found so far is saved first."""
+        """Save the trim found so far, then restart the meter with the values in flash, as a replay of a ride will."""
         self._save_trim()
         self._meter.use(self.value)
 
     def keep_trim(self, now_ms):
-        """Save the trim that riding has found, when the bike stands. Call it about every 100 ms."""
+        """Save the trim that riding has found, if the bike stands and TRIM_MS are over. Call it about every 100 ms."""
         if self.value.aligned and ticks_diff(now_ms, self._trim_due_ms) >= 0 and self._save_trim():
             self._trim_due_ms = ticks_add(now_ms, TRIM_MS)
 
     def _save_trim(self):
-        """True if there was something to save."""
+        """Save the trim if it has changed enough; return True if so."""
         if not self._meter.keep_trim() or not self._store.unchanged():
             return False
         try:

@@ -5,13 +5,13 @@ from array import array
 
 from ..rotation import matrix, vector
 
-# What a real accelerometer may have. The data sheet allows 50 to 80 mg and 3 %; boards that are sold go beyond it.
+# Limits of plausible parameters. The data sheet allows 50 to 80 mg and 3 %; boards that are sold exceed that.
 MAX_OFFSET_G = 0.5
 MIN_SLOPE, MAX_SLOPE = 0.8, 1.2
 
 
 class Calibration:
-    """The parameters of one mounted sensor. A new one changes nothing: offset 0, slope 1, bias 0, the identity.
+    """The parameters of one mounted sensor. By default they change nothing: offset 0, slope 1, bias 0, the identity.
 
     accel_offset (3, g) and accel_slope (3): calibrated = slope * reading + offset, Nicolae's equations 18-20.
     gyro_bias (3, deg/s): what the gyro reads at rest. vehicle_from_sensor (9, row-major, rows left, up, forward): the
@@ -32,7 +32,8 @@ class Calibration:
         self.set_scale(1.0, 1.0)
 
     def with_alignment(self, vehicle_from_sensor, gyro_bias, trim_deg=0.0, by_drive=False):
-        """A new Calibration: offset and slope of this one, aligned by vehicle_from_sensor (9). gyro_bias (3, deg/s)."""
+        """A new Calibration with offset and slope of this one, aligned by vehicle_from_sensor (9). gyro_bias: 3,
+        deg/s."""
         new = Calibration()
         new.set_accel(self.accel_offset, self.accel_slope)
         new.six_done = self.six_done
@@ -44,7 +45,7 @@ class Calibration:
         return new
 
     def set_scale(self, accel_lsb_per_g, gyro_lsb_per_dps):
-        """Set the scale of the readings to come. Of a new Calibration it is 1 and 1: readings in g and deg/s."""
+        """Set the counts per unit of the readings to come. By default they are 1: readings in g and deg/s."""
         self._accel_lsb = accel_lsb_per_g
         self.set_accel(self.accel_offset, self.accel_slope)
         self._gyro_scale = 1.0 / gyro_lsb_per_dps
@@ -67,11 +68,11 @@ class Calibration:
         self.trim_deg = values[18]
 
     def correct(self, accel):
-        """A mean accelerometer reading (3, g), calibrated: a new array."""
+        """Return a mean accelerometer reading (3, g) calibrated, as a new array."""
         return array("f", [self.accel_slope[i] * accel[i] + self.accel_offset[i] for i in range(3)])
 
     def scales(self):
-        """The scale factors of the counts: g a count for each accelerometer axis (3), and deg/s for the gyro."""
+        """(3) g per count of each accelerometer axis, slope included; and deg/s per count of the gyro."""
         return self._scale, self._gyro_scale
 
     def apply(self, reading, force, rate):

@@ -4,7 +4,7 @@ from ..errors import CaptureError
 from .still_pose import StillPose
 
 SETTLE_MS = 500
-GIVE_UP_MS = 10_000  # of waiting for stillness
+GIVE_UP_MS = 10_000  # longest time to wait for stillness
 
 # What step() returns
 SETTLING = 0  # waiting for stillness
@@ -48,11 +48,11 @@ class PoseTaker:
 
     @property
     def restless(self):
-        """True when it has waited for stillness for longer than a sensor at rest would need."""
+        """True after waiting for stillness for longer than a sensor at rest needs."""
         return self._state == SETTLING and self._waited > 2 * self._settle_count
 
     def progress(self):
-        """How many samples are averaged by now, and how many are wanted."""
+        """The number of samples averaged so far, and the number of all that are to be."""
         return (self.pose.count, self._take_count) if self._state == TAKING else (0, self._take_count)
 
     def _new(self, expected):

@@ -14,12 +14,12 @@ from .parameters import MAX_OFFSET_G, MAX_SLOPE, MIN_SLOPE
 
 SIDES = ("+x", "-x", "+y", "-y", "+z", "-z")  # which axis points up, in the order of the six poses
 MAX_TILT_DEG = 20.0  # largest angle between a side's axis and the vertical
-FREE_TILT_DEG = 20.0  # a free pose that is nearer to one of the sides says little new
+FREE_TILT_DEG = 20.0  # a free pose nearer to one of the sides than this adds little information
 FREE_MAX_G = 0.020  # largest error of a free pose: 2 % of cross-axis sensitivity, which six numbers cannot describe
 
 
 def side_of(accel):
-    """Index into SIDES: which side is up in a mean reading (3, g)."""
+    """Index into SIDES of the side that is up in a mean reading (3, g)."""
     axis = 0
     for i in (1, 2):
         if abs(accel[i]) > abs(accel[axis]):
@@ -86,8 +86,8 @@ def check_plausible(offset, slope, poses):
 
 
 def check_free_pose(offset, slope, accel):
-    """How far the calibrated reading of a seventh, slanted pose is from 1 g. accel: its mean reading (3, g). Raises
-    CalibrationError beyond FREE_MAX_G."""
+    """Return by how many g the calibrated reading of a seventh, slanted pose differs from 1 g. accel: its mean reading
+    (3, g). Raises CalibrationError beyond FREE_MAX_G."""
     force = [slope[i] * accel[i] + offset[i] for i in range(3)]
     error = sum(f * f for f in force) ** 0.5 - 1.0
     if not abs(error) <= FREE_MAX_G:

@@ -5,7 +5,7 @@ Sums are kept as integers until the end: 32-bit floats would lose the digits tha
 
 from ..errors import CaptureError
 
-# No sample may be further from the first: beyond is a knock. Ten times the chip's noise with its widest filter.
+# Largest difference of a sample from the first one: more is a knock. Ten times the chip's noise with its widest filter.
 PEAK_G = 0.08
 PEAK_DPS = 5.0
 SPREAD_G = 0.02  # largest standard deviation: being still matters more than the exact angle of a pose
@@ -20,7 +20,7 @@ class StillPose:
     """Averages the samples of one pose.
 
     accel_lsb_per_g, gyro_lsb_per_dps: counts per unit. accel_limit: |counts| from which on an axis is saturated.
-    expected: how many samples are to come; the check for drift compares the halves.
+    expected: number of samples to come; the check for drift compares their halves.
     count: samples taken. problem: a CaptureError once the pose is spoilt, or None.
     After finish(): accel (3, g, sensor's axes, uncalibrated), gyro (3, deg/s).
     """
@@ -34,7 +34,7 @@ class StillPose:
         gyro_peak = int(PEAK_DPS * gyro_lsb_per_dps)
         self._peaks = (accel_peak, accel_peak, accel_peak, 0, gyro_peak, gyro_peak, gyro_peak)
         self._first = [0] * 7
-        self._sums = [0] * 7  # of the deviations from the first sample, so that they stay small integers
+        self._sums = [0] * 7  # sums of the deviations from the first sample, so that they stay small integers
         self._early = [0] * 7  # the sums at half time
         self._squares = [0] * 7
         self.count = 0

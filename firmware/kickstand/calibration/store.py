@@ -22,14 +22,14 @@ _NOT_ALIGNED, _BY_POSES, _BY_DRIVE = 0, 1, 2  # how aligned
 BODY_LENGTH = struct.calcsize(_BODY)
 _LENGTH = struct.calcsize(_HEAD) + BODY_LENGTH + 4
 MAX_BIAS_DPS = 60.0  # deg/s of the gyro
-MAX_TRIM_DEG = 3.6  # degrees: what lean/upright_trim.py finds at most, and room for rounding to 32 bits
+MAX_TRIM_DEG = 3.6  # the limit in lean/upright_trim.py plus a margin for rounding to 32 bits
 
 
 class Store:
     """Calibration records of one chip.
 
-    who_am_i, accel_range_g: of the chip in use; records of another chip or range are not valid.  directory: where the
-    files are, "" for the current one.  message: after load(), in a few words, which record is in use or why none is.
+    who_am_i, accel_range_g: those of the chip in use; records of another chip or range are not valid.  directory: that
+    of the files, "" for the current one.  message: after load(), in a few words, which record is in use or why none is.
     """
 
     def __init__(self, who_am_i, accel_range_g, directory=""):
@@ -38,7 +38,7 @@ class Store:
         self._directory = directory
         self.message = ""
         self._sequence = 0  # number of the record in use, 0 for none
-        self._problems = []  # what is wrong with the others, in words
+        self._problems = []  # what is wrong with the other records, in words
 
     def load(self):
         """The newest valid Calibration, or a new one if there is none. Raises nothing and writes nothing."""
@@ -51,14 +51,14 @@ class Store:
         return calibration
 
     def unchanged(self):
-        """True if both files still read as they did in load() or save(). If not, one had misread, as in a voltage sag,
-        and the older record was loaded: then the newer one must not be written over."""
+        """True if both files still read as they did in load() or save(). If not, one was misread, as in a voltage sag,
+        and the older record may have been loaded: then the newer one must not be overwritten."""
         sequence, _, problems = self._newest()
         return sequence == self._sequence and problems == self._problems
 
     def save(self, calibration):
-        """Write calibration over the older record and read it back. Raises StoreError; then the record in use is still
-        whole."""
+        """Write calibration over the older record and read it back. Raises StoreError; the record in use stays whole in
+        any case."""
         sequence, _, _ = self._newest()
         record = self._pack(calibration, sequence + 1)
         path = self._path(FILES[(sequence + 1) % 2])

@@ -1,8 +1,8 @@
 """Alignment from two still poses, on the kickstand and upright (A. Nicolae, section 2).
 
-Where it departs from the paper: (4) is the cross product of the upright and the tilted reading, which as printed is
-zero. (5) takes y from the upright reading and divides by its own length. Where the kickstand leans the bike to the
-right, x and z come out pointing right and backward, and both are turned round.
+Differences from the paper: (4) is the cross product of the upright and the tilted reading, which as printed is zero.
+(5) takes y from the upright reading and divides by its own length. Where the kickstand leans the bike to the right, x
+and z come out pointing right and backward, and both signs are changed.
 """
 
 from math import atan2, degrees
@@ -10,13 +10,13 @@ from math import atan2, degrees
 from ..errors import AlignmentError
 from ..rotation import cross, dot, matrix, norm, normalize, vector
 
-# Between the poses. At 5 degrees, one degree of pitch between them turns forward by 11 degrees; at 8, by 7.
+# Least tilt between the poses. At 5 degrees, one degree of pitch between them makes a yaw error of 11 degrees; at 8, 7.
 MIN_TILT_DEG = 5.0
 WARN_TILT_DEG = 8.0
 MAX_TILT_DEG = 60.0
 SAME_POSE_DEG = 1.0
-# How far a reading at rest may be from 1 g. The data sheet allows 80 mg of offset and 3 % of scale, plus drift; after
-# the six positions only 35 mg of drift over temperature is left.
+# Largest difference of a reading at rest from 1 g. The data sheet allows 80 mg of offset and 3 % of scale, plus drift;
+# after the six positions there remain 35 mg of drift over temperature.
 UNCALIBRATED_TOLERANCE_G = 0.15
 CALIBRATED_TOLERANCE_G = 0.05
 
@@ -33,8 +33,8 @@ def two_position(out, kickstand, upright, side="left", tolerance_g=UNCALIBRATED_
     """Fill out (9, rows left, up, forward) with the rotation from sensor to vehicle axes; return the tilt between the
     poses in degrees. Equations 3-8.
 
-    kickstand, upright: mean specific force of each pose (3, g, sensor's axes). side: where the kickstand leans the bike
-    to, "left" or "right". Raises AlignmentError.
+    kickstand, upright: mean specific force of each pose (3, g, sensor's axes). side: "left" or "right", to which the
+    kickstand leans the bike. Raises AlignmentError.
     """
     check_one_g(kickstand, tolerance_g, "kickstand")
     check_one_g(upright, tolerance_g, "upright")
@@ -66,8 +66,8 @@ def two_position(out, kickstand, upright, side="left", tolerance_g=UNCALIBRATED_
 def align(calibration, kickstand, upright, side):
     """A new Calibration, aligned by two finished poses (StillPose each), and the tilt between them in degrees.
 
-    calibration: gives offset and slope. side: where the kickstand leans the bike to, "left" or "right". The gyro's bias
-    is that of the kickstand pose: a stand holds the bike stiller than a rider does. Raises AlignmentError.
+    calibration: that with offset and slope. side: "left" or "right", to which the kickstand leans the bike. The gyro's
+    bias is that of the kickstand pose: a stand holds the bike stiller than a rider does. Raises AlignmentError.
     """
     vehicle_from_sensor = matrix()
     tilt = two_position(

@@ -1,17 +1,17 @@
 """Sensor to vehicle from driving: the vertical from standing and driving straight, forward from braking (ViriCiti).
 
-This is the published method without its weaknesses. Forward comes from a regression of force on change of speed,
-whose intercept takes up what is not braking; turns are left out; the lag of the speed is estimated; and the result has
-a standard error.
+This is the published method without its weaknesses. Forward comes from a regression of force on change of speed, whose
+intercept takes up forces that are not braking; driving in bends is left out; the lag of the speed is estimated; and the
+result has a standard error.
 
     drive = DriveAlignment("car")                  # or ("motorcycle", up), up from two poses
     drive.update(force, rate, dt_us)               # some 100 times a second, sensor's axes
     drive.measure_speed(speed_mps, age_us)         # each new value of the speed source, 1 to 10 a second
     if drive.ready: drive.matrix(out)
 
-What to show follows from `state`, from `counted` of `needed` and, when REFUSED, from `problem`. A problem is a fault of
-the speed or of the mount, which more driving cannot resolve; missing() is what more driving brings; `reason` is the
-problem, or else what is missing. Whether an alignment from before still fits: verdict.compare(). Memory is fixed, and
+To show the progress, use `state`, `counted` of `needed` and, when REFUSED, `problem`. A problem is a fault of the speed
+or of the mount, which more driving cannot resolve; missing() says what more driving will bring; `reason` is the problem
+or, without one, what is missing. verdict.compare() says whether an earlier alignment still fits. Memory is fixed, and
 each call does a short step of the work.
 """
 
@@ -27,26 +27,26 @@ from .vertical import COUNTS_S, MAX_CHANGE_DEG, MOVED_MPS, SETTLE_S, StandingVer
 CAR, MOTORCYCLE = "car", "motorcycle"
 
 # state
-WAITING_FOR_SPEED = 0  # none has come yet, or none for STALE_US
+WAITING_FOR_SPEED = 0  # no speed has come yet, or none for STALE_US
 WAITING_FOR_STOP = 1  # a car only: the vertical and the gyro's bias come from standing
 WAITING_FOR_BRAKING = 2  # in a straight line
 BRAKING = 3  # a braking event goes on
-TURNING = 4  # a braking event goes on in a turn: it will not count
-READY = 5  # matrix() can be taken; it gets better with more events
-REFUSED = 6  # matrix() cannot be had, problem says why
+TURNING = 4  # a braking event goes on in a bend: it will not count
+READY = 5  # matrix() gives the alignment; it gets better with more events
+REFUSED = 6  # matrix() raises `problem`
 
 STALE_US = 5_000_000
 STEP_US = 12_000  # an update does one step of work, and one more for each whole STEP_US since the update before
 
 
 class DriveAlignment:
-    """vehicle: CAR or MOTORCYCLE. up: the vertical in the sensor's axes (unit vector) if two poses have shown it, for a
-    motorcycle; without it the vertical comes from riding straight. bias: the gyro's (3 values, deg/s), subtracted until
-    a stop shows a newer one. Give zeros for rates that are corrected already. Without a bias no braking event counts
-    before the first stop.
+    """vehicle: CAR or MOTORCYCLE. up: the vertical in the sensor's axes (unit vector) from two poses, for a motorcycle;
+    without it the vertical comes from riding straight. bias: the gyro's (3 values, deg/s), subtracted until a stop
+    shows a newer one; zeros for rates that are corrected already. Without a bias no braking event counts before the
+    first stop.
 
     standing: the StandingVertical, which has the gyro's bias too; vertical: the Vertical; events: the DrivingEvents;
-    quality: the DrivingQuality; needed: how many events must have counted.
+    quality: the DrivingQuality; needed: number of events that must have counted.
     """
 
     def __init__(self, vehicle, up=None, bias=None):
@@ -64,18 +64,18 @@ class DriveAlignment:
         self._sums_us = 0
         self._speed_mps = -1.0  # none yet
         self._top_mps = 0.0
-        self._silent_us = 0  # since the last speed
-        self._means = None  # of the last bin, if nothing has been done with them yet
-        self._work = None  # a generator that is not at its end yet
+        self._silent_us = 0  # time since the last speed
+        self._means = None  # means of the last bin, until they are processed
+        self._work = None  # the generator _follow() while it is not finished
 
     @property
     def counted(self):
-        """How many events have counted, of those needed."""
+        """Number of events that have counted, at most `needed`."""
         return self.events.counted
 
     @property
     def turned(self):
-        """Braking events that did not count because of a turn."""
+        """Number of braking events that did not count because the vehicle was in a bend."""
         return self.events.turning_count
 
     @property
@@ -100,12 +100,12 @@ class DriveAlignment:
 
     @property
     def ready(self):
-        """True while matrix() can be taken."""
+        """True while matrix() gives an alignment."""
         return self.quality.good and self.problem is None
 
     @property
     def problem(self):
-        """What is wrong with speed or mount, and more driving cannot resolve: an AlignmentError or None."""
+        """The fault of speed or mount that more driving cannot resolve: an AlignmentError, or None."""
         if self._speed_check.problem is None and self.standing.moved and not self._leans:
             return AlignmentError("mount-moved", "between-stops", MAX_CHANGE_DEG)
         if self.counted < self.needed:
@@ -114,12 +114,12 @@ class DriveAlignment:
 
     @property
     def reason(self):
-        """Why matrix() cannot be had: the problem or, without one, what is missing. An AlignmentError."""
+        """Why matrix() gives no alignment: the problem or, without one, what is missing. An AlignmentError."""
         return self.problem or self.missing(self.counted, self.needed, self.turned)
 
     def missing(self, counted, needed, turned):
-        """What a drive without a problem still waits for: an AlignmentError. counted, needed, turned: braking events
-        that counted, that are needed, and that did not count because of a turn."""
+        """What a drive without a problem still waits for: an AlignmentError. counted, needed, turned: numbers of events
+        that counted, that are needed, and of braking events that did not count because of a bend."""
         if self._speed_mps < 0.0:
             return AlignmentError("no-speed")
         if self._top_mps < MOVED_MPS:
@@ -134,8 +134,8 @@ class DriveAlignment:
         return AlignmentError("uncertain", min(quality.quality_deg, 180.0), self.events.braking_count)
 
     def update(self, force, rate, dt_us):
-        """force (3, g), rate (3, deg/s): calibrated, sensor's axes; dt_us: microseconds since those before (an
-        integer)."""
+        """Take a sample and do a step of the work. force (3, g), rate (3, deg/s): calibrated, sensor's axes; dt_us:
+        microseconds since the sample before (an integer)."""
         if dt_us > GAP_US:
             self.interrupt()
             return
@@ -154,7 +154,7 @@ class DriveAlignment:
             self._do_step()
 
     def interrupt(self):
-        """Samples are missing: what follows does not join what came before."""
+        """Samples are missing: drop the braking event under way and the history. Events that have counted stay."""
         self._sums = [0.0] * 6
         self._sums_us = 0
         self._history.clear()
@@ -162,13 +162,12 @@ class DriveAlignment:
         self.events.interrupt()
 
     def finish(self):
-        """No more samples will come: do at once what work is left."""
+        """Do all pending work at once, because no more samples will come."""
         while self._means is not None or self._work is not None:
             self._do_step()
 
     def measure_speed(self, speed_mps, age_us=0):
-        """A new value of the speed source. age_us: how old it is known to be; what it is late beyond that is estimated
-        from the drive."""
+        """Take a new value of the speed source. age_us: its known age; a further delay is estimated from the drive."""
         self._speed_check.measure(speed_mps)
         if not speed_mps >= 0.0:
             speed_mps = 0.0
@@ -197,7 +196,7 @@ class DriveAlignment:
         if self._means is not None:
             force, rate, seconds = self._means
             self._means = None
-            if self._speed_mps >= 0.0 and self._silent_us <= STALE_US:  # a last speed of 0 is no standstill for ever
+            if self._speed_mps >= 0.0 and self._silent_us <= STALE_US:  # an old speed of 0 is no standstill
                 self.standing.update(force, rate, self._speed_mps, seconds)
         elif self._work is not None:
             if next(self._work, True):
@@ -225,7 +224,7 @@ class DriveAlignment:
             sums[i] = 0.0
 
     def _follow(self):
-        """Work on the last interval between two speeds; a generator of short steps."""
+        """Process the last interval between two speeds; a generator of short steps."""
         yield from self.events.follow(self._bias_given or self.standing.stops)
         judged = (self.events.straight_count, self.standing.stops)
         if judged != self._judged:

@@ -1,7 +1,7 @@
-"""Alignment by driving while the device does everything else: feeds a DriveAlignment, and saves what it finds.
+"""Alignment by driving in the background: feeds a DriveAlignment, and saves its alignment.
 
 With a speed source it always runs. Where there is no alignment yet, or where the menu asked for a new one, the drive's
-is taken as soon as it is ready; an alignment from before is checked and refined. Flash is written at standstill only.
+is used as soon as it is ready; an earlier alignment is checked and refined. Flash is written at standstill only.
 """
 
 from time import ticks_add, ticks_diff
@@ -12,15 +12,15 @@ from .alignment import BRAKING, CAR, MOTORCYCLE, TURNING, DriveAlignment
 from .quality import MIN_EVENTS_TO_CHECK_SPEED
 from .verdict import MOVED, REFINED, REVERSED, SAME, compare, turn_round
 
-FEED_TURNS = 2  # turns of the loop whose counts are summed as integers, because floats take time in each turn
-GAP_MS = 300  # after more without readings, some are missing
+FEED_TURNS = 2  # passes of the loop whose counts are summed as integers, because floats take time
+GAP_MS = 300  # a longer time between two readings means that some are missing
 LOOK_MS = 1000
 FRESH_MS = 3000  # an older speed does not show that the vehicle stands
-AWAY_MPS = 2.0  # the vehicle has driven off
+AWAY_MPS = 2.0  # at a higher speed the vehicle has driven off
 
 _KNOWN_BIAS = (0.0, 0.0, 0.0)  # the gyro's bias was measured with the alignment, and is subtracted already
 STAND_SIDE, MOUNT_MOVED = "other-side", "mount-moved"
-_QUESTIONS = (STAND_SIDE, MOUNT_MOVED)  # codes of messages: the lean is not to be trusted until they are answered
+_QUESTIONS = (STAND_SIDE, MOUNT_MOVED)  # codes of messages: no lean is shown until they are answered
 
 
 class BackgroundAlignment:
@@ -29,10 +29,10 @@ class BackgroundAlignment:
 
     The loop calls poll() and feed() each turn, begin() with another calibration; the menu ask(); a press answer().
 
-    speed: as given.  drive: the DriveAlignment of now, to be read only.  state: which of the states of alignment.py to
-    show.  shown: True if the progress has a page of its own (ui/drive_page.py).  result: the Notice or AlignmentError
-    that the last drive ended with, or None.  message: an AlignmentError, StoreError or Notice to be shown before
-    everything else, until answer() or until the vehicle drives off; or None.
+    speed: the Speed.  drive: the current DriveAlignment, read only.  state: the state (see alignment.py) to show.
+    shown: True if the progress has a page of its own (ui/drive_page.py).  result: the Notice or AlignmentError that the
+    last drive ended with, or None.  message: an AlignmentError, StoreError or Notice to be shown before everything
+    else, until answer() or until the vehicle drives off; or None.
     """
 
     def __init__(self, leans, speed, meter, calibration):
@@ -48,8 +48,8 @@ class BackgroundAlignment:
         self.begin()
 
     def begin(self, asked=False):
-        """Another calibration is in use, from flash or from a wizard: check its alignment in a new drive. asked: do
-        not check the alignment, replace it."""
+        """Start a new drive, because another calibration is in use, from flash or from a wizard. The drive checks its
+        alignment or, if `asked`, replaces it."""
         self._asked = asked
         self._answered = []  # codes of messages that are not shown again
         self.message = None
@@ -57,7 +57,7 @@ class BackgroundAlignment:
 
     def _restart(self):
         old = self._meter.calibration
-        self._calibration = old  # is applied to all that is fed to this drive, whatever is saved meanwhile
+        self._calibration = old  # applied to all samples of this drive, even if another one is saved meanwhile
         trusted = self._leans and old.aligned and not self._asked
         up = old.vehicle_from_sensor[3:6] if trusted else None
         self.drive = DriveAlignment(MOTORCYCLE if self._leans else CAR, up, _KNOWN_BIAS if old.aligned else None)
@@ -66,7 +66,8 @@ class BackgroundAlignment:
         self._clear_sums()
 
     def ask(self):
-        """The rider asks for a new alignment, for a sensor that has been mounted anew: forget the drive so far."""
+        """Start a drive that replaces the alignment, because the rider asks for a new one (the sensor was mounted
+        anew). The drive so far is lost."""
         self.shown = True
         self.begin(True)
 
@@ -76,8 +77,8 @@ class BackgroundAlignment:
             self._total[i] = 0
 
     def poll(self, now_ms):
-        """Once each turn of the loop: read the speed source, and once a second see what there is to do. Returns a new
-        speed (m/s) that a recording may keep, or None."""
+        """Read the speed source, and once a second act on the drive's result. Call it once in each pass of the loop.
+        Returns a new speed (m/s) for a recording, or None."""
         speed = self.speed.poll(now_ms)
         if speed is not None:
             self._speed_mps = speed
@@ -89,12 +90,17 @@ class BackgroundAlignment:
             self._look(now_ms)
         return speed
 
-    def _share(self, speed):
-        """Give the lean filter a speed (m/s) that it can rely on. Returns that speed, rounded as a recording keeps it,
-        or None if it was not given.
+    def fresh_speed(self, now_ms):
+        """The speed measured last (m/s), or None if that was long ago."""
+        fresh = self._speed_ms is not None and ticks_diff(now_ms, self._speed_ms) < FRESH_MS
+        return self._speed_mps if fresh else None
 
-        A speed that no braking event has confirmed is not given, because a wheel may have two magnets. Neither is zero,
-        which a broken wire gives too: the filter sees a standstill by itself.
+    def _share(self, speed):
+        """Pass a speed (m/s) on to the lean filter if it is reliable. Returns that speed, rounded as a recording keeps
+        it, or None if it was not passed on.
+
+        A speed that no braking event has confirmed is not passed on, because a wheel may have two magnets. Nor is zero,
+        which a broken wire gives too: the filter detects a standstill by itself.
         """
         if not self._leans:
             return speed
@@ -107,8 +113,8 @@ class BackgroundAlignment:
         return speed
 
     def feed(self, sums, n, dt_us, now_ms):
-        """Once each turn of the loop that has samples. sums (7, counts in the chip's order): of its n samples, which
-        cover dt_us."""
+        """Take the n samples of a pass of the loop. sums: 7, their sums in counts, in the chip's order. dt_us: the time
+        that they cover. Call it once in each pass that has samples."""
         if self._fed_ms is not None and ticks_diff(now_ms, self._fed_ms) > GAP_MS:
             self._clear_sums()
             self.drive.interrupt()
@@ -126,13 +132,12 @@ class BackgroundAlignment:
             self._clear_sums()
 
     def _look(self, now_ms):
-        """Once a second: act on what the drive has found, but only while speed and sensor say that the vehicle
-        stands."""
+        """Act on the drive's result, but only while speed and sensor say that the vehicle stands. Called once a
+        second."""
         if self._away():
             self.message = None
             return
-        fresh = self._speed_ms is not None and ticks_diff(now_ms, self._speed_ms) < FRESH_MS
-        if not (fresh and self.drive.standing.standing) or self.message:
+        if self.fresh_speed(now_ms) is None or not self.drive.standing.standing or self.message:
             return
         drive, aligned = self.drive, self._meter.calibration.aligned
         if drive.problem is not None:
@@ -161,8 +166,8 @@ class BackgroundAlignment:
         return self._speed_mps > AWAY_MPS or (faulty and self._meter.speed_mps > AWAY_MPS)
 
     def _refuse(self, problem, aligned):
-        """Begin a new drive, because the problem may be over by then. Until an event has counted in it, the page shows
-        the problem as the result."""
+        """Report a problem and begin a new drive, which may not have it any more. Until an event has counted in that,
+        the page shows the problem as the result."""
         if aligned:
             self._say(problem)
         self._restart()
@@ -175,7 +180,7 @@ class BackgroundAlignment:
                 self._meter.distrust(message.code)
 
     def answer(self, agreed):
-        """The rider has read the message. agreed: and wants what it offers, with STAND_SIDE to turn forward round."""
+        """Clear the message, which the rider has read. agreed: do what it offers, for STAND_SIDE reverse forward."""
         code, self.message = self.message.code, None
         self._answered.append(code)
         if code in _QUESTIONS:
@@ -189,7 +194,7 @@ class BackgroundAlignment:
                 self._meter.reset_maxima()
 
     def _adopt(self, anew):
-        """Save the drive's alignment. anew: the sensor sits differently now, so that trim and maxima start again."""
+        """Save the drive's alignment. anew: the sensor sits differently now, so trim and maxima are reset."""
         found = matrix()
         self.drive.matrix(found)
         if not self._save(found, 0.0 if anew else self._meter.trim_deg):
@@ -201,9 +206,10 @@ class BackgroundAlignment:
             self._meter.reset_maxima()
 
     def _save(self, vehicle_from_sensor, trim_deg):
-        """True if it is in flash now, else say why not."""
+        """Save this alignment; return True, or False with the reason in `message`."""
         old, used = self._meter.calibration, self._calibration
-        # rates fed to the drive had the bias of used subtracted: what a gyro still reads at a stop is added to it
+        # the drive was fed rates less the bias of `used`, so the bias that it found at a stop is the remainder: add
+        # both
         bias = [used.gyro_bias[i] + self.drive.standing.bias[i] for i in range(3)]
         try:
             self._active.refine(old.with_alignment(vehicle_from_sensor, bias, trim_deg, True))
@@ -214,6 +220,6 @@ class BackgroundAlignment:
 
     @property
     def state(self):
-        """The drive's state, but at walking pace, where a turn cannot be recognised, a braking event stays BRAKING."""
+        """The drive's state, but never TURNING at walking pace, where a bend cannot be recognised: BRAKING instead."""
         state = self.drive.state
         return BRAKING if state == TURNING and self._speed_mps < AWAY_MPS else state

@@ -1,6 +1,6 @@
 """Braking and acceleration events, and which of them were in a straight line.
 
-Each change of speed is set against the force and yaw rate of the same interval, for each lag that the speed may have.
+Each change of speed is compared with the force and yaw rate of the same interval, for each lag that the speed may have.
 """
 
 from math import pi
@@ -10,25 +10,25 @@ from ..units import STANDARD_GRAVITY
 from .history import COLUMNS, difference
 from .regression import LAG_STEP_US, LAGS, Fit, ForwardRegression
 
-# An event begins at the one acceleration, ends at the other, and changes the speed by at least this much.
+# An event begins above BEGIN_MPS2, ends below END_MPS2, and changes the speed by at least CHANGE_MPS.
 BEGIN_MPS2, END_MPS2 = 0.8, 0.4
 CHANGE_MPS = 1.5
 MAX_ACCELERATION_EVENTS = 2  # more than these do not count, because braking shows forward better
 MIN_INTERVAL_US = 400_000  # a GPS at 10 Hz adds nothing to one at 2 Hz, and its differences are noisier
 MAX_INTERVAL_US = 2_200_000  # one value of a GPS at 1 Hz may be missing
-MAX_WAITING = 4  # intervals that wait while an earlier one is worked on
-# A larger yaw rate is a turn. At 10 m/s this one makes 0.036 g sideways, a fifth of the force of braking; the
-# regression takes most of it off.
+MAX_WAITING = 4  # intervals that wait while an earlier one is processed
+# A larger yaw rate is a bend. At 10 m/s this one makes 0.036 g sideways, a fifth of the force of braking; the
+# regression removes most of it.
 STRAIGHT_DPS = 2.0
-MIN_SPEED_MPS = 1.0  # slower, steering angles are large and a stop ends with a jerk
-MAX_FORCE_G = 3.0  # a mean over an interval beyond this is a knock
+MIN_SPEED_MPS = 1.0  # at lower speeds steering angles are large, and a stop ends with a jerk
+MAX_FORCE_G = 3.0  # an interval with a larger mean force has a knock
 
 
 class EventFinder:
     """Finds braking and acceleration events from the speed alone.
 
-    going_on: an event is under way; change: of the speed in it, or in the one that ended last (m/s, < 0: braking).
-    Whether it was straight depends on the lag of the speed, so it is answered for each of them.
+    going_on: an event is under way; change: the change of speed in it, or in the one that ended last (m/s, < 0:
+    braking). Whether an event was straight depends on the lag of the speed, so that is kept for each lag.
     """
 
     def __init__(self, lags):
@@ -36,15 +36,15 @@ class EventFinder:
         self.interrupt()
 
     def interrupt(self):
-        """Speeds are missing: forget the event that was under way."""
+        """Speeds are missing: drop the event under way."""
         self.going_on = False
         self.change = 0.0
         for lag in range(len(self._straight_change)):
             self._straight_change[lag] = 0.0
 
     def update(self, change_mps, seconds, straight):
-        """One change of speed. straight: for each lag, whether the vehicle did not turn meanwhile. True if an event
-        has just ended."""
+        """Take one change of speed. straight: for each lag, True if the vehicle drove straight meanwhile. Returns True
+        if an event has just ended."""
         acceleration = change_mps / seconds
         if self.going_on and (acceleration if self.change > 0.0 else -acceleration) < END_MPS2:
             self.going_on = False
@@ -61,7 +61,7 @@ class EventFinder:
         return False
 
     def was_straight(self, lag):
-        """Of the event that ended last: was its straight part alone long enough for an event?"""
+        """True if the straight part of the event that ended last is large enough for an event."""
         return abs(self._straight_change[lag]) >= CHANGE_MPS
 
 
@@ -73,13 +73,13 @@ class LastEvent:
         self.clear()
 
     def clear(self):
-        """A new event begins."""
+        """Drop the sums, because a new event begins."""
         self._weight = self._change = 0.0
         for i in range(3):
             self._force[i] = 0.0
 
     def add(self, seconds, change_g, force):
-        """One straight interval of it, as for ForwardRegression.add()."""
+        """Add a straight interval of the event; arguments as for ForwardRegression.add()."""
         a = change_g / seconds
         self._weight += a * change_g
         self._change += change_g
@@ -87,7 +87,7 @@ class LastEvent:
             self._force[i] += a * force[i]
 
     def forward(self, out, level):
-        """Fill out (3, g per g). level (3, g): the vertical. Returns the weight (g^2 s)."""
+        """Fill out (3, g per g) with forward. level (3, g): the vertical. Returns forward's weight (g^2 s)."""
         for i in range(3):
             out[i] = (self._force[i] - self._change * level[i]) / max(self._weight, 1e-6)
         return self._weight
@@ -96,9 +96,9 @@ class LastEvent:
 class DrivingEvents:
     """history: the ForceHistory of the same drive.
 
-    braking_count, acceleration_count: of straight events so far; turning_count: of braking events that were not
-    straight; lag_s: lag of the speed; lag: the nearest of the regression's lags; regression: the ForwardRegression of
-    all straight driving; last: the LastEvent.
+    braking_count, acceleration_count: numbers of straight events so far; turning_count: number of braking events that
+    were not straight; lag_s: lag of the speed; lag: index of the nearest of the regression's lags; regression: the
+    ForwardRegression of all straight driving; last: the LastEvent.
     """
 
     def __init__(self, history):
@@ -117,16 +117,16 @@ class DrivingEvents:
         self._straight = [False] * LAGS
         self._end = [0] * COLUMNS
         self._before = (0.0, 0)  # speed and time at the end of the last interval
-        self._waiting = []  # speed and time at the ends of those to be worked on
+        self._waiting = []  # speed and time at the ends of the intervals to be processed
 
     @property
     def straight_count(self):
-        """All straight events."""
+        """Number of all straight events."""
         return self.braking_count + self.acceleration_count
 
     @property
     def counted(self):
-        """The straight events that count towards an alignment: all for braking, only the first few for acceleration."""
+        """Number of events that count towards an alignment: all straight braking, and the first few accelerations."""
         return self.braking_count + min(self.acceleration_count, MAX_ACCELERATION_EVENTS)
 
     @property
@@ -136,11 +136,11 @@ class DrivingEvents:
 
     @property
     def straight(self):
-        """True if the vehicle did not turn in the last interval."""
+        """True if the vehicle drove straight in the last interval."""
         return self._straight[self.lag]
 
     def interrupt(self):
-        """Samples are missing: no interval may reach across the gap."""
+        """Samples are missing: drop the event under way and the waiting intervals. Events that have counted stay."""
         self._waiting.clear()
         self._before = (0.0, self._history.now - MIN_INTERVAL_US)
         self._forget_interval()
@@ -151,7 +151,7 @@ class DrivingEvents:
         self._finder.interrupt()
 
     def measure_speed(self, speed_mps, time_us):
-        """A new speed, and its time on the history's clock."""
+        """Take a new speed, and its time on the history's clock."""
         before = self._waiting[-1] if self._waiting else self._before
         if len(self._waiting) < MAX_WAITING and difference(time_us, before[1]) >= MIN_INTERVAL_US:
             self._waiting.append((speed_mps, time_us))
@@ -162,8 +162,8 @@ class DrivingEvents:
         return bool(self._waiting) and difference(self._history.now, self._waiting[0][1]) >= 0
 
     def follow(self, use):
-        """Work on the interval that is due; a generator of short steps. use: the gyro's bias is known, so that
-        straight driving and turning can be distinguished."""
+        """Process the interval that is due; a generator of short steps. use: the gyro's bias is known, so that straight
+        driving and bends can be distinguished."""
         before, before_us = self._before
         speed, time_us = self._before = self._waiting.pop(0)
         length_us = difference(time_us, before_us)
@@ -204,7 +204,7 @@ class DrivingEvents:
                 self.last.add(seconds, change_g, best_force)
 
     def _end_event(self):
-        """An event has ended: find the lag that fits best by now, and count the event if it was straight."""
+        """Find the lag that fits best after the event that has ended, and count the event if it was straight."""
         fit = self._fit
         explained = [0.0] * LAGS
         for lag in range(LAGS):
@@ -226,7 +226,8 @@ class DrivingEvents:
 
 
 def _peak(values, i):
-    """Where the peak of a parabola through values[i], the largest, and its neighbours is: -0.5 to 0.5 from i."""
+    """The position, -0.5 to 0.5 from i, of the peak of a parabola through values[i], the largest, and its
+    neighbours."""
     if i == 0 or i == len(values) - 1:
         return 0.0
     before, at, after = values[i - 1], values[i], values[i + 1]

@@ -1,6 +1,6 @@
 """Force and yaw rate of the last seconds, so that a speed that arrives late is compared with what was measured then.
 
-Kept are running integrals, as integers that wrap round. The difference of two is exact however long the drive lasts,
+It keeps running integrals, as integers that wrap round. The difference of two is exact however long the drive lasts,
 while float32 sums lose digits as they grow; and integers need no heap.
 """
 
@@ -26,15 +26,15 @@ class ForceHistory:
         self._columns = [array("i", [0] * SIZE) for _ in range(COLUMNS)]
         self._total = [0] * COLUMNS
         self._newest = 0
-        self._count = 1  # of entries that can be looked up
+        self._count = 1  # number of entries that can be looked up
         self.now = 0
 
     def clear(self):
-        """Samples are missing: no difference may be taken across the gap."""
+        """Drop all entries, because samples are missing: no difference may be taken across the gap."""
         self._count = 1
 
     def add(self, force_us, yaw, dt_us):
-        """One more bin of length dt_us: the integrals of force (3, g us) and of the yaw rate (1e-5 degrees) over it."""
+        """Add a bin of length dt_us: the integrals of force (3, g us) and of the yaw rate (1e-5 degrees) over it."""
         self.now = (self.now + dt_us) & MASK
         total = self._total
         total[0] = (total[0] + round(force_us[0])) & MASK

@@ -11,23 +11,23 @@ from math import atan2, degrees, pi, sqrt
 
 from .regression import BLOCKS
 
-PRIOR_DEG = 1.0  # standard deviation of forward that is usual, at a weight of 1 g^2 s
+PRIOR_DEG = 1.0  # prior of the standard deviation of forward, at a weight of 1 g^2 s
 PRIOR_FREEDOM = 4
 STRETCH_DEG = 1.5  # standard deviation of forward due to camber and wind on one stretch of road, whatever its weight
-MIN_WEIGHT = 0.1  # g^2 s: a part of less says too little about forward
-MIN_S = 20.0  # of straight driving: a part of less says too little about the vertical
-MIN_BLOCKS = 4  # of the whole drive, to compare forward
+MIN_WEIGHT = 0.1  # g^2 s: least weight of a part whose forward is compared
+MIN_S = 20.0  # least straight driving in a part whose vertical is compared
+MIN_BLOCKS = 4  # least number of blocks in the drive for a comparison of forward
 
 
 def angle_between(a, b):
-    """Between two directions given as angles: 0 to pi."""
+    """The angle between two directions given as angles: 0 to pi."""
     angle = abs(a - b)
     return min(angle, 2 * pi - angle)
 
 
 def blend_prior(variance, weight, freedom):
-    """Variance (deg^2) of forward: the sample variance, of so many degrees of freedom, averaged with the prior's.
-    weight (g^2 s): of what the forward was found from."""
+    """Variance (deg^2) of forward: the sample variance, with `freedom` degrees of freedom, averaged with the prior's.
+    weight (g^2 s): that of the events from which forward was found."""
     return (freedom * variance + PRIOR_FREEDOM * PRIOR_DEG * PRIOR_DEG / weight) / (freedom + PRIOR_FREEDOM)
 
 
@@ -42,13 +42,13 @@ class DriveParts:
         self.clear()
 
     def clear(self):
-        """Before the first add()."""
+        """Drop all blocks. To be called before the first add()."""
         self.count = 0
         self.forward_deg = self.sigmas = self.roll_deg = self.pitch_deg = 0.0
 
     def add(self, across, along, roll_g, pitch_g, weight, seconds):
-        """One block. across, along: its forward, resolved to the left of and along the whole drive's forward; roll_g,
-        pitch_g: its vertical, resolved the same way; weight (g^2 s), seconds: as in its Fit."""
+        """Add one block of events. across, along: components of its forward to the left of and along the whole drive's
+        forward; roll_g, pitch_g: the same components of its vertical; weight (g^2 s), seconds: see Fit."""
         block = self._blocks[self.count]
         self.count += 1
         block[0], block[1] = weight * across, weight * along
@@ -56,7 +56,7 @@ class DriveParts:
         block[4], block[5] = weight, seconds
 
     def compare(self):
-        """Look at all splits; a generator of short steps."""
+        """Compare the two parts of each split; a generator of short steps."""
         one, two = [0.0] * 7, [0.0] * 7
         for split in range(1, self.count):
             self._sum(one, 0, split)
@@ -85,7 +85,7 @@ class DriveParts:
             yield
 
     def _sum(self, sums, first, last):
-        """Fill sums (7) with those of add()'s values over blocks first to last - 1, and of the weight squared."""
+        """Fill sums (7) with the sums of add()'s values over blocks first to last - 1, and of the squared weights."""
         for i in range(7):
             sums[i] = 0.0
         for k in range(first, last):

@@ -1,8 +1,8 @@
-"""How well a drive knows forward, whether that is enough, and what is wrong with the speed or with the mount.
+"""The standard error of forward, whether it is good enough, and faults of the speed or of the mount.
 
-A block is the sums of a few braking and acceleration events (see regression.py). The halves of a drive are the
-first and the second half of its blocks. The parts of a drive are all that comes before, and all that comes after, one
-boundary between blocks; parts.py tries every boundary.
+A block is the sums of a few braking and acceleration events (a regression block, see regression.py). The halves of a
+drive are the first and the second half of its blocks. The parts of a drive are the blocks before, and the blocks after,
+one boundary between two blocks; parts.py tries every boundary.
 """
 
 from math import atan2, degrees, sqrt
@@ -19,14 +19,14 @@ MIN_EVENTS_TO_CHECK_SPEED = 2
 # Limits come in pairs with a hysteresis: to become ready, and to stay so. That avoids flicker.
 READY_DEG, STAY_READY_DEG = 1.5, 2.5  # standard error of forward; one drive in ten is off by twice as much
 AGREE_DEG, STAY_AGREE_DEG = 4.0, 6.0  # largest difference of forward between halves, and between parts
-AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0  # between parts a larger difference is accepted if it is within these
+AGREE_SIGMAS, STAY_AGREE_SIGMAS = 3.0, 4.0  # or, between parts, its largest number of standard deviations
 # A larger difference between two parts means that the mount moved
 MOVED_DEG = 30.0  # forward; a motorway's long banked curve, taken for straight, made 15
 PITCH_DEG = 7.0  # 6 % uphill, then downhill, is within this
 ROLL_DEG = 7.0  # that banked curve made 6. Not used on a motorcycle, which leans
-# An event that points over EVENT_OFF_DEG from the overall forward means that the mount moved. Only events of at least
-# MIN_EVENT_WEIGHT, whose force is at least MIN_EVENT_FORWARD of what the change of speed asks for, are judged: on
-# recorded drives none of these was ever off by more than 40 degrees.
+# An event whose forward differs by over EVENT_OFF_DEG from the overall one means that the mount moved. Only events of
+# at least MIN_EVENT_WEIGHT are judged, whose force is at least MIN_EVENT_FORWARD times the one that the change of speed
+# requires: on recorded drives none of these ever differed by more than 40 degrees.
 EVENT_OFF_DEG = 80.0
 MIN_EVENT_WEIGHT = 0.012  # g^2 s
 MIN_EVENT_FORWARD = 0.5  # g per g
@@ -36,8 +36,8 @@ class DrivingQuality:
     """events: the DrivingEvents of the drive; vertical: its Vertical.
 
     fit: the Fit of all straight driving so far; quality_deg: standard error of its forward, 180 until there is one;
-    halves_deg: between the forwards of two halves of the drive; parts: the DriveParts; agree: halves and parts agree
-    about forward; good: enough for an alignment; speed_problem, mount_problem: an AlignmentError, or None.
+    halves_deg: angle between the forwards of the two halves of the drive; parts: the DriveParts; agree: halves and
+    parts agree about forward; good: enough for an alignment; speed_problem, mount_problem: an AlignmentError, or None.
     """
 
     def __init__(self, events, vertical):
@@ -52,7 +52,7 @@ class DrivingQuality:
         self._scratch_fit = Fit()
 
     def judge(self):
-        """After another event or stop: find all the attributes anew. A generator of short steps."""
+        """Update all attributes after another event or stop. A generator of short steps."""
         regression, lag, part = self._events.regression, self._events.lag, self._scratch_fit
         up = vector()
         if not (yield from regression.fitting(self.fit, lag)):
@@ -102,7 +102,8 @@ class DrivingQuality:
                 self._decide(ratios / weights, angle_deg(level, part.level))
 
     def _decide(self, force_ratio, level_change_deg):
-        """force_ratio: change of force per change of speed; level_change_deg: between the verticals of two halves."""
+        """Set agree, good and the problems. force_ratio: change of force per change of speed; level_change_deg: angle
+        between the verticals of the two halves."""
         self.speed_problem = self.mount_problem = None
         self.good = False
         counted = self._events.counted
@@ -133,7 +134,7 @@ class DrivingQuality:
         return None
 
     def _is_last_event_off(self):
-        """True if the latest of the events that can be judged points away from the overall forward."""
+        """True if forward by the latest event that can be judged differs from the overall one by over EVENT_OFF_DEG."""
         forward, last = vector(), self._events.last
         if last.forward(forward, self.fit.level) > MIN_EVENT_WEIGHT and norm(forward) > MIN_EVENT_FORWARD:
             self._event_off = angle_deg(forward, self.fit.forward) > EVENT_OFF_DEG

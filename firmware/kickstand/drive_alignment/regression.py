@@ -3,13 +3,13 @@
     f = level + forward a + left c        a = dv/dt / g, c = v (yaw rate) / g
 
 in the sensor's own axes, each interval weighted by its length. The intercept, level, is the vertical of straight
-driving: it takes up what a wrong vertical would leak sideways. c takes up what is left of curves. On a motorcycle,
-which leans into them, its coefficient is about zero. |forward| is 1 if the speed is in m/s, 1/3.6 if it is in km/h.
-The right lag is the one at which the regression explains most.
+driving; as it is fitted too, no error of the vertical gets into forward. c takes up the lateral force of slight bends.
+On a motorcycle, which leans into them, its coefficient is about zero. |forward| is 1 if the speed is in m/s, 1/3.6 if
+it is in km/h. The right lag is the one at which the regression explains most.
 
-The sums of each few events (braking or acceleration) are kept in a block of their own, so that parts of the drive can
-be compared. When all blocks are in use, they are joined in pairs. So memory is fixed, and never less than half of the
-blocks are in use from then on.
+The sums of each few events (braking or acceleration) are kept in a regression block of their own, so that parts of the
+drive can be compared. When all blocks are in use, they are joined in pairs. So memory is fixed, and at least half of
+the blocks are in use from then on.
 """
 
 from array import array
@@ -17,16 +17,16 @@ from array import array
 BLOCKS = 8
 LAG_STEP_US = 250_000
 LAGS = 11
-# The sums of one block: time in s, and the integrals of a, c, a a, a c, c c, f (3), a f (3), c f (3) over it
+# The sums of one regression block: time in s, and integrals of a, c, a a, a c, c c, f (3), a f (3), c f (3) over it
 TERMS = 15
 SECONDS, A, C, AA, AC, CC, F, AF, CF = 0, 1, 2, 3, 4, 5, 6, 9, 12
 RIDGE = 1e-6  # g^2: keeps the coefficient of c at zero where the drive had no curve at all
 
 
 class Fit:
-    """A result of the regression. forward (3, g per g), level (3, g); weight (g^2 s): how much the speed changed, the
-    information about forward; seconds: of straight driving; explained (g^2 s): the part of the force's variation that
-    forward explains; found: False if there was nothing to fit.
+    """A result of the regression. forward (3, g per g), level (3, g); weight (g^2 s): variation of the speed's change,
+    which is the information about forward; seconds: duration of the straight driving in it; explained (g^2 s): the part
+    of the force's variation that forward explains; found: False if there was nothing to fit.
     """
 
     def __init__(self):
@@ -38,7 +38,7 @@ class Fit:
 
 
 class ForwardRegression:
-    """blocks: how many are in use; the last of them is still being filled."""
+    """blocks: number of regression blocks in use; the last one is still being filled."""
 
     def __init__(self):
         self._sums = [array("f", [0.0] * (BLOCKS * TERMS)) for _ in range(LAGS)]
@@ -47,8 +47,8 @@ class ForwardRegression:
         self.blocks = 1
 
     def add(self, lag, seconds, change_g, curve_g, force):
-        """One interval for one lag. seconds: its length; change_g: change of speed over it (g s); curve_g: its mean c;
-        force: its integral over the interval (3, g s)."""
+        """Add one interval for one lag. seconds: its length; change_g: change of speed over it (g s); curve_g: its mean
+        c; force: integral of the force over it (3, g s)."""
         sums = self._sums[lag]
         k = (self.blocks - 1) * TERMS
         a = change_g / seconds
@@ -65,7 +65,7 @@ class ForwardRegression:
             sums[k + CF + i] += curve_g * f
 
     def end_event(self):
-        """An event has ended: begin the next block if this one is full. A generator of short steps."""
+        """Begin the next block if this one is full, because an event has ended. A generator of short steps."""
         self._events_in_last += 1
         if self._events_in_last < self._events_per_block:
             return
@@ -84,7 +84,7 @@ class ForwardRegression:
 
     @property
     def filled(self):
-        """How many blocks have at least one event that has ended."""
+        """Number of blocks with at least one event that has ended."""
         return self.blocks if self._events_in_last else self.blocks - 1
 
     def fit(self, out, lag, first=0, last=BLOCKS):
@@ -94,8 +94,8 @@ class ForwardRegression:
         return out.found
 
     def fitting(self, out, lag, first=0, last=BLOCKS, without=-1):
-        """As fit(), but a generator of short steps, which returns True or False. without: a block to leave
-        out."""
+        """Like fit(), but a generator of short steps, which returns True or False. without: index of a block that is
+        left out."""
         sums, total = self._sums[lag], out.total
         out.found = False
         for k in range(TERMS):
@@ -114,7 +114,7 @@ class ForwardRegression:
         n = total[SECONDS]
         if n <= 0.0:
             return False
-        # the normal equations, with the means of a and c taken off
+        # the normal equations, with the means of a and c subtracted
         a, c = total[A] / n, total[C] / n
         aa = total[AA] - n * a * a
         cc = total[CC] - n * c * c + RIDGE * n

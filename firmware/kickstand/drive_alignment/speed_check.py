@@ -5,28 +5,28 @@ from math import sqrt
 from ..errors import AlignmentError
 
 NEGATIVE_MPS = -0.5  # noise around zero does not count as negative
-# A second is lively if its mean force differs from that of the second before by this much. While standing no second
-# is; while driving most are.
+# A second is lively if its mean force differs from that of the second before by this much. At standstill no second is
+# lively, while driving most are.
 LIVELY_G = 0.03
-TURNING_DPS = 5.0  # seconds in a turn are left out: at a steady speed they are lively too
-# The speed is stuck if it has been the very same for this many lively seconds, the beginnings and ends of four braking
-# events, and these are at least this share of all seconds since it changed last.
+TURNING_DPS = 5.0  # seconds in a bend are left out: they are lively at a constant speed too
+# The speed is stuck if it has not changed during at least STUCK_S lively seconds (as many as four braking events have
+# at their beginnings and ends), and these are at least STUCK_SHARE of all seconds since its last change.
 STUCK_S = 8
 STUCK_SHARE = 0.15
-# Change of force per change of speed, 1 if all is well. The pitch of a braking vehicle and a coarse speed shift it by
-# 0.2.
+# Limits of the change of force per change of speed, which should be 1. The pitch of a braking vehicle and a coarsely
+# rounded speed shift it by 0.2.
 MIN_FORCE_RATIO, MAX_FORCE_RATIO = 0.75, 1.35
 MAX_LAG_S = 1.9
 
 
 def speed_unit_problem(force_ratio):
-    """The AlignmentError for a speed that does not change as the force says. force_ratio: change of force per change
-    of speed."""
+    """The AlignmentError for a speed whose changes do not fit the force. force_ratio: change of force per change of
+    speed."""
     return AlignmentError("speed-unit", min(1.0 / max(force_ratio, 0.01), 99.9))
 
 
 def fit_problem(lag_s, force_ratio):
-    """What the fit of force on changes of speed says is wrong with the speed: an AlignmentError, or None."""
+    """The fault of the speed that the fit of force on changes of speed shows: an AlignmentError, or None."""
     if lag_s >= MAX_LAG_S:
         return AlignmentError("speed-late", lag_s)
     if not MIN_FORCE_RATIO < force_ratio < MAX_FORCE_RATIO:
@@ -35,8 +35,7 @@ def fit_problem(lag_s, force_ratio):
 
 
 class SpeedCheck:
-    """Finds a negative or stuck speed, before anybody knows which way is forward. problem: an AlignmentError, or
-    None."""
+    """Finds a negative or stuck speed, without knowing forward. problem: an AlignmentError, or None."""
 
     def __init__(self):
         self.problem = None
@@ -48,11 +47,11 @@ class SpeedCheck:
         self._sums_us = 0
 
     def _start_count(self):
-        """The speed has changed."""
+        """Count the lively seconds from here on, because the speed has changed."""
         self._seconds = self._lively_seconds = 0
 
     def measure(self, speed_mps):
-        """A new value of the speed source."""
+        """Take a new value of the speed source."""
         if not speed_mps >= NEGATIVE_MPS:  # also not-a-number
             self.problem = AlignmentError("speed-negative", speed_mps)
         if speed_mps != self._speed:
@@ -60,7 +59,7 @@ class SpeedCheck:
             self._start_count()
 
     def update(self, force, yaw_dps, dt_us):
-        """Mean force (3, g) and yaw rate (deg/s) over the last dt_us."""
+        """Take mean force (3, g) and yaw rate (deg/s) over the last dt_us."""
         sums = self._force_us
         for i in range(3):
             sums[i] += force[i] * dt_us
@@ -74,7 +73,7 @@ class SpeedCheck:
                 sums[i] = 0.0
 
     def update_second(self, force, yaw_dps=0.0):
-        """Mean force (3, g) and mean absolute yaw rate (deg/s) over the last second."""
+        """Take mean force (3, g) and mean absolute yaw rate (deg/s) over the last second."""
         before, self._force_before = self._force_before, list(force)
         turning = max(yaw_dps, self._yaw_dps_before) > TURNING_DPS
         self._yaw_dps_before = yaw_dps

@@ -1,8 +1,8 @@
-"""Does an alignment from before, that of two poses or of another drive, fit what this drive shows?
+"""Does an earlier alignment, from two poses or from another drive, fit this drive?
 
-A kickstand on the other side than the setting says turns forward into backward. The poses cannot show that, the first
-braking events do. A change of pitch between the poses turns forward by some degrees, which enough braking events
-correct. Anything else is a mount that has moved.
+A kickstand on the other side than the setting says exchanges forward and backward. The poses cannot show that, the
+first braking events do. A change of pitch between the poses makes a yaw error of some degrees, which enough braking
+events correct. Any other difference is a mount that has moved.
 """
 
 from math import atan2, degrees
@@ -12,15 +12,15 @@ from .regression import Fit
 
 UNKNOWN = 0  # not enough events yet
 SAME = 1
-REFINED = 2  # some degrees off: take the DriveAlignment's matrix()
+REFINED = 2  # a yaw error of some degrees: use the DriveAlignment's matrix()
 REVERSED = 3  # forward is backward: turn_round()
 MOVED = 4  # the mount has moved: align again
 
-MIN_EVENTS_TO_REVERSE = 2  # straight ones, which have to agree
+MIN_EVENTS_TO_REVERSE = 2  # least number of straight events, which have to agree
 SAME_DEG = 1.0
-REFINED_DEG = 30.0  # 2 degrees of pitch at the smallest tilt that two poses may have make 22
+REFINED_DEG = 30.0  # largest yaw error: 2 degrees of pitch at the smallest allowed tilt between two poses make 22
 REVERSED_DEG = 135.0
-UPRIGHT_DEG = 8.0  # an upright pose that was not quite upright, and the road's camber
+UPRIGHT_DEG = 8.0  # largest difference of up, by an inexact upright pose and the road's camber
 
 
 def compare(drive, matrix):
@@ -43,7 +43,8 @@ def compare(drive, matrix):
 
 
 def yaw_deg(fit, matrix):
-    """The yaw error of the matrix: from its forward to that of a Fit, about the matrix's up; > 0 to the left."""
+    """The yaw error of the matrix: the angle from its forward to that of a Fit, about the matrix's up; > 0 to the
+    left."""
     return degrees(atan2(dot(matrix[0:3], fit.forward), dot(matrix[6:9], fit.forward)))
 
 
@@ -57,6 +58,6 @@ def _all_backward(events, matrix):
 
 
 def turn_round(matrix):
-    """Turn forward and left round, in place: what the poses would have given with the other side set."""
+    """Reverse forward and left, in place: the result that the poses would have given with the other side set."""
     for i in (0, 1, 2, 6, 7, 8):
         matrix[i] = -matrix[i]

@@ -11,29 +11,30 @@ the road's camber and slope tilt both alike.
 from ..errors import AlignmentError
 from ..rotation import angle_deg, norm, normalize, vector
 
-STANDING_MPS = 0.5  # a GPS at rest shows up to this
+STANDING_MPS = 0.5  # a lower speed is standing: a GPS at rest shows up to this
 MOVED_MPS = 2.0  # a vehicle that was faster than this has driven: its next stop is another one
 SETTLE_S = 1.0  # a vehicle rocks back after braking
 COUNTS_S = 2.0  # after settling, a stop has to last this long to count
-# At a stop a mean over 0.1 s is this near to a mean with the time constant AVERAGE_S. A diesel at idle, wind and
-# passengers are within it.
+# Largest difference at a stop of a mean over 0.1 s from a mean with the time constant AVERAGE_S. A diesel at idle, wind
+# and passengers make less.
 STILL_G = 0.06
 STILL_DPS = 3.0
 AVERAGE_S = 0.5
 SAME_STOP_DEG = 1.5  # doors and passengers tilt a standing vehicle by less
-TURNED_S = 6.0  # longer than a speed may be late: what is still for so long at another angle was turned, not driven off
-# A rate that differs by more from the bias at the last stop is a turn, and a speed of zero in it is wrong. Warming up
+TURNED_S = 6.0  # a sensor still for so long at another angle was rotated: a late speed of zero would be over by then
+# A rate that differs by more from the bias at the last stop is a bend, and a speed of zero in it is wrong. Warming up
 # changes the bias by less.
 TURNING_DPS = 10.0
 MEAN_S = 60.0  # time constant of the mean force, which serves as the vertical until there is a better one
-MAX_CHANGE_DEG = 8.0  # 14 %: two verticals that differ by more are not two slopes of the road: the mount has moved
+MAX_CHANGE_DEG = 8.0  # largest difference of two verticals by slopes of the road (14 %): beyond, the mount has moved
 
 
 class StandingVertical:
     """update() with each mean over about 0.1 s.
 
-    stops: how many; up: the vertical in the sensor's axes (unit vector) once there was a stop; bias: the gyro's (3,
-    deg/s) at the last stop; standing: at a stop now; moved: the mount must have moved, as two stops are so far apart.
+    stops: their number; up: the vertical in the sensor's axes (unit vector) once there was a stop; bias: the gyro's (3,
+    deg/s) at the last stop; standing: True during a stop; moved: True if the verticals of two stops differ so much that
+    the mount must have moved.
     """
 
     def __init__(self, bias=(0.0, 0.0, 0.0)):
@@ -42,11 +43,11 @@ class StandingVertical:
         self.bias = list(bias)
         self.standing = False
         self.moved = False
-        self._sum = [0.0] * 3  # of the directions of the stops before this one
+        self._sum = [0.0] * 3  # sum of the directions of the stops before this one
         self._begin_stop()
 
     def _begin_stop(self):
-        """The vehicle has driven: what follows belongs to another stop."""
+        """Begin the means of another stop, because the vehicle has driven."""
         self._stop_force = [0.0] * 3  # means of this stop
         self._stop_bias = [0.0] * 3
         self._averaged_s = 0.0
@@ -55,7 +56,7 @@ class StandingVertical:
         self._still_s = 0.0
 
     def update(self, force, rate, speed_mps, seconds):
-        """force (3, g), rate (3, deg/s): means over the last seconds; speed_mps: the last value of the source."""
+        """Take force (3, g) and rate (3, deg/s): means over the last `seconds`; speed_mps: the source's last value."""
         if speed_mps > MOVED_MPS and self._force is not None:
             if self._counted:
                 for i in range(3):
@@ -71,7 +72,7 @@ class StandingVertical:
         if self._counted:
             apart_deg = angle_deg(self._force, self._stop_force)
             if apart_deg > SAME_STOP_DEG:
-                # Either the vehicle drives again while a late speed still says zero, or the sensor has been turned.
+                # Either the vehicle drives again while a late speed still says zero, or the sensor was rotated.
                 self.moved = self.moved or (apart_deg > MAX_CHANGE_DEG and self._still_s > TURNED_S)
                 return
         self.standing = True
@@ -117,19 +118,19 @@ class StandingVertical:
 
 
 class Vertical:
-    """The best vertical so far. is_car: stops show it. from_pose: unit vector of the upright pose (a motorcycle's), or
-    None. standing: the StandingVertical of the same drive.
+    """The best vertical so far. is_car: True to use stops. from_pose: unit vector of the upright pose (a motorcycle's),
+    or None. standing: the StandingVertical of the same drive.
     """
 
     def __init__(self, is_car, from_pose, standing):
         self.is_car = is_car
         self._from_pose = vector(from_pose[0], from_pose[1], from_pose[2]) if from_pose is not None else None
         self._standing = standing
-        self._mean = None  # force (3, g)
+        self._mean = None  # mean force (3, g) with the time constant MEAN_S
         self._mean_s = 0.0
 
     def update(self, force, seconds):
-        """force (3, g): the mean over the last seconds."""
+        """Take force (3, g): the mean over the last `seconds`."""
         self._mean = self._mean or vector()
         self._mean_s = min(MEAN_S, self._mean_s + seconds)
         gain = seconds / self._mean_s
@@ -142,7 +143,8 @@ class Vertical:
         return self._standing.up if self.is_car and self._standing.stops else self._from_pose or self._mean
 
     def known(self, out, fit=None):
-        """Fill out (unit vector) with the vertical. False if it is not known yet, as a car's before its first stop.
+        """Fill out (unit vector) with the vertical. Returns False if it is not known yet (a car's before its first
+        stop).
 
         fit: the Fit of all straight driving, None if there is none yet.
         """
@@ -165,7 +167,7 @@ class Vertical:
 
     def problem(self, level):
         """An AlignmentError if straight driving's vertical is far from that of the stops or of the upright pose, else
-        None. level (3): of the Fit of all straight driving."""
+        None. level (3): the vertical of straight driving, from the Fit of all of it."""
         before = self._standing.up if self.is_car else self._from_pose
         change_deg = 0.0 if before is None else angle_deg(before, level)
         if change_deg > MAX_CHANGE_DEG:

@@ -1,4 +1,4 @@
-"""Frames of the chip's FIFO: what their bytes mean, and their sum.
+"""Decodes frames of the chip's FIFO and sums them up.
 
 A frame is one sample: 14 bytes, seven big-endian int16 in the order ax ay az temperature gx gy gz (register map
 RM-MPU-6000A rev 4.2, pp. 29 to 31). On the board decode() and add_up() are the machine code of fifo_frames_viper.py;
@@ -30,13 +30,13 @@ def add_up_python(frames, n, sums, watch):
     for k in range(n):
         at = k * FRAME
         first = frames[at]
-        same = 0  # bytes of the force that are like the first
+        same = 0  # number of bytes of the force that equal the first one
         mark = 0  # the hash
         for i in range(FRAME):
             byte = frames[at + i]
             if i < 6 and byte == first:
                 same += 1
-            if i < 6 or i > 7:  # without the temperature, which may stay the same in a working chip
+            if i < 6 or i > 7:  # without the temperature: a working chip may repeat it
                 mark = (mark * 31 + byte) & 0xFFFFFF
         if same == 6 and (first == 0 or first == 255):
             return k
@@ -62,5 +62,5 @@ except NO_MACHINE_CODE:
 else:
     _ENDS = b"\x7f\xff\x80\x00\xff\xff\x00\x80\x80\xff\x01\x00\xab\xcd"
     decode = checked(decode, decode_python, _ENDS, 0, array("h", range(7)))
-    # The watch: a frame with this hash came before
+    # array("i", (12493472, 3, 9)): a watch whose last frame has the same hash as this one
     add_up = checked(add_up, add_up_python, _ENDS, 1, array("i", range(7)), array("i", (12493472, 3, 9)))

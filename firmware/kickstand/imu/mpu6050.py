@@ -35,16 +35,16 @@ _FIFO_COUNT_H = const(0x72)  # p. 43: reading it latches the low byte, which fol
 _FIFO_R_W = const(0x74)  # p. 44
 _WHO_AM_I = const(0x75)  # p. 45
 
-_RESET = const(0x80)  # in PWR_MGMT_1
+_RESET = const(0x80)  # bit of PWR_MGMT_1
 _CLOCK_PLL_GYRO_X = const(0x01)  # in PWR_MGMT_1: 1 % accurate; the oscillator used after a reset is off by up to 5 %
 _FIFO_ALL = const(0xF8)  # in FIFO_EN: temperature, gyro and accelerometer, the same fourteen bytes as one burst
-_FIFO_ENABLE = const(0x40)  # in USER_CTRL
-_FIFO_RESET = const(0x04)  # in USER_CTRL
+_FIFO_ENABLE = const(0x40)  # bit of USER_CTRL
+_FIFO_RESET = const(0x04)  # bit of USER_CTRL
 
 ACCEL_LSB_PER_G = {2: 16384, 4: 8192, 8: 4096, 16: 2048}  # counts per g for each range in g (p. 29)
 GYRO_LSB_PER_DPS = {250: 131.0, 500: 65.5, 1000: 32.8, 2000: 16.4}  # counts per deg/s for each range in deg/s (p. 31)
-MIN_DLPF = {50: 4, 100: 3, 125: 3, 200: 2}  # by rate_hz: passes less than half of it, 98, 44 or 21 Hz (p. 13)
-GYRO_DELAY_S = {1: 0.0019, 2: 0.0028, 3: 0.0048, 4: 0.0083, 5: 0.0134, 6: 0.0186}  # by dlpf (p. 13)
+MIN_DLPF = {50: 4, 100: 3, 125: 3, 200: 2}  # by rate_hz: the widest low-pass (98, 44 or 21 Hz) under half of it (p. 13)
+GYRO_DELAY_S = {1: 0.0019, 2: 0.0028, 3: 0.0048, 4: 0.0083, 5: 0.0134, 6: 0.0186}  # delay by dlpf (p. 13)
 
 # The chips known to work, by WHO_AM_I: a name of at most 12 characters; temperature counts per degree C; degrees C at 0
 # counts; True if it has ACCEL_CONFIG2 (0x1D); bytes in its FIFO, or fewer; the bits of FIFO_EN that must read back.
@@ -67,9 +67,9 @@ _ZERO_C = const(2)
 _HAS_ACCEL_CONFIG2 = const(3)
 _FIFO_EN_BITS = const(5)
 
-MAX_FRAMES = 8  # read in one transfer, to catch up: 3 ms at 400 kHz
-FEW_FRAMES = 3  # read while fewer than MAX_FRAMES wait, so that one slow turn of the loop does not slow the next one
-FROZEN_MS = 100  # how long readings may repeat: noise changes those of a working chip in every sample
+MAX_FRAMES = 8  # most frames in one transfer, to catch up: 3 ms at 400 kHz
+FEW_FRAMES = 3  # most while fewer than MAX_FRAMES wait, so that one slow pass of the loop does not slow the next one
+FROZEN_MS = 100  # readings repeated for longer are a fault: noise changes those of a working chip in every sample
 
 
 class UnknownChip(Exception):
@@ -85,8 +85,8 @@ class Mpu6050:
 
     who_am_i: what the chip answered, 0 before setup().  counts: array('h', 7) of the last read() or take(), ax ay az
     temperature gx gy gz.  sums: array('i', 7) of the last add_up(), in the same order.  accel_lsb_per_g and
-    gyro_lsb_per_dps: counts per g and per deg/s.  gyro_delay_s: how late the low-pass makes the gyro.  overflows: how
-    often the FIFO had to be emptied, samples lost.  frames_left: samples that the last fetch() left in the FIFO.
+    gyro_lsb_per_dps: counts per g and per deg/s.  gyro_delay_s: delay of the gyro by the low-pass.  overflows: number
+    of times that the FIFO had to be emptied, losing samples.  frames_left: samples that the last fetch() left in it.
     """
 
     SATURATED = 32700  # |counts|: from here on a reading is at the end of its range
@@ -102,16 +102,17 @@ class Mpu6050:
         self.gyro_delay_s = GYRO_DELAY_S[dlpf]
         accel_bits = (2, 4, 8, 16).index(accel_range_g) << 3
         gyro_bits = (250, 500, 1000, 2000).index(gyro_range_dps) << 3
-        self._configuration = bytes((1000 // rate_hz - 1, dlpf, gyro_bits, accel_bits, dlpf))  # from SMPLRT_DIV on
+        self._configuration = bytes((1000 // rate_hz - 1, dlpf, gyro_bits, accel_bits, dlpf))  # SMPLRT_DIV and on
         self._one, self._two = bytearray(1), bytearray(2)
         self._readback = bytearray(_FIFO_EN - _SMPLRT_DIV + 1)
         self._frames = bytearray(FRAME * MAX_FRAMES)
         # The first n frames, for each n: made once, because each slice takes heap.
         self._some_frames = [memoryview(self._frames)[: FRAME * n] for n in range(MAX_FRAMES + 1)]
         self.frames_left = self.overflows = 0
+        self._most = 0  # bytes that have waited in the FIFO
         self._odd = False  # the last fetch() found a frame that was not complete
         self._started = False  # setup() has run to its end: the FIFO is filling
-        self._full = 0  # bytes in the FIFO from which on it may have overflowed
+        self._full = 0  # with so many bytes in it the FIFO may have overflowed
         self.counts, self.sums = array("h", [0] * 7), array("i", [0] * 7)
         self._watch = array("i", (0, 0, rate_hz * FROZEN_MS // 1000))
 
@@ -121,7 +122,7 @@ class Mpu6050:
         return self._chip()[_NAME] if self.who_am_i in CHIPS else "WHO 0x%02X" % self.who_am_i
 
     def connect(self, i2c):
-        """Use this machine.I2C from now on: the bus was opened again."""
+        """Use this machine.I2C from now on, because the bus was opened again."""
         self._i2c = i2c
 
     def identify(self):
@@ -159,7 +160,7 @@ class Mpu6050:
         yield 20  # until the low-pass has settled
 
     def start(self):
-        """Let the FIFO of a chip that is configured fill from now on. Raises OSError as restart_fifo() does."""
+        """Start the FIFO of a chip that is configured. Raises OSError as restart_fifo() does."""
         self.restart_fifo()
         self._started = True
         self._watch[1] = 0
@@ -182,13 +183,15 @@ class Mpu6050:
         self.take(0)
 
     def fetch(self):
-        """Read samples that wait in the FIFO, at most MAX_FRAMES; return how many. Raises OSError from the bus.
+        """Read waiting samples from the FIFO, at most MAX_FRAMES; return their number. Raises OSError from the bus.
 
         After an overflow the frames no longer begin at multiples of 14 bytes. Then the FIFO is emptied, overflows
         is one higher, and 0 is returned.
         """
         self._i2c.readfrom_mem_into(self._address, _FIFO_COUNT_H, self._two)
         waiting = self._two[0] << 8 | self._two[1]
+        if waiting > self._most:
+            self._most = waiting
         odd = waiting % FRAME != 0
         if waiting > self._full or (odd and self._odd):
             self.overflows += 1
@@ -197,7 +200,7 @@ class Mpu6050:
             return 0
         self._odd = odd
         n = waiting // FRAME
-        if odd:  # the chip is just writing a frame; if the next count is odd as well, an overflow cut one short
+        if odd:  # the chip may be writing a frame; if the next count is odd as well, an overflow has cut one
             self.frames_left = n + 1
             return 0
         taken = MAX_FRAMES if n >= MAX_FRAMES else FEW_FRAMES if n > FEW_FRAMES else n
@@ -206,19 +209,23 @@ class Mpu6050:
             self._i2c.readfrom_mem_into(self._address, _FIFO_R_W, self._some_frames[taken])
         return taken
 
+    def places_left(self):
+        """How many samples the FIFO had at least place for, at each fetch()."""
+        return max(0, self._full + FRAME - self._most) // FRAME
+
     def take(self, k):
         """Put sample k of the last fetch() into counts; 0 is the oldest. Takes no heap."""
         decode(self._frames, k * FRAME, self.counts)
 
     def add_up(self, n):
-        """Add the first n samples of the last fetch() into sums; return how many were added. Takes no heap.
+        """Sum the first n samples of the last fetch() into sums; return the number of those. Takes no heap.
 
         It stops at a sample that only a dead chip sends: a force of all zeros or all ones, or the same reading as
         for FROZEN_MS before it."""
         return add_up(self._frames, n, self.sums, self._watch)
 
     def restart_fifo(self):
-        """Empty the FIFO and let it fill again, after an overflow or a transfer that broke off. Raises OSError from the
+        """Empty the FIFO and start it again, after an overflow or a transfer that broke off. Raises OSError from the
         bus, or when the FIFO's registers do not read back."""
         self._write(_FIFO_EN, 0)
         self._write(_USER_CTRL, _FIFO_RESET)  # works only while the FIFO is disabled (p. 38)

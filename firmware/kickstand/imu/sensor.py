@@ -1,15 +1,15 @@
-"""Keeps the chip working: finds it, sets it up, watches it, and sets it up again after a fault. And says when each
-sample was taken."""
+"""Keeps the chip working: finds it, sets it up, watches it, and sets it up again after a fault. SampleClock gives the
+samples' times."""
 
 from time import ticks_add, ticks_diff, ticks_ms
 
 from ..errors import Notice
 from .mpu6050 import UnknownChip
 
-RETRY_MS = 50  # from one attempt to set the chip up to the next
-FAILURES = 3  # transfers that fail in a row make a fault; a NACK or two are tolerated
-SILENT_MS = 100  # a fault after this long without a sample
-STALE_MS = 500  # likewise where each was lost in an overflow, because the board had no time to read
+RETRY_MS = 50  # time between two attempts to set the chip up
+FAILURES = 3  # so many failed transfers in a row are a fault; a NACK or two are tolerated
+SILENT_MS = 100  # this long without a sample is a fault
+STALE_MS = 500  # and this long if all samples were lost in overflows, because the board had no time to read
 CORRECTION_SHIFT = 4  # SampleClock.emptied() corrects by 1/16 of the difference between the two clocks
 
 
@@ -17,20 +17,21 @@ class Sensor:
     """Samples of one chip that may fail at any time. A transfer that fails, by NACK or time-out, ends in _missed().
 
     chip: an Mpu6050.  reopen: called to free the bus, returns it as a machine.I2C.
-    fault: None, or a Notice: what is wrong.  restarts: how often the chip was set up or, without that, no sample could
-    be read for STALE_MS: samples do not follow on from those before.
+    fault: None, or a Notice: what is wrong.  restarts: number of times that the chip was set up, or that no sample
+    could be read for STALE_MS. After each, samples do not follow on from those before.
     """
 
     def __init__(self, chip, reopen):
         self.chip = chip
         self.reopen = reopen
         self._failures = 0  # transfers that failed in a row
-        self._overflows = 0  # of the chip's FIFO, those that are dealt with
-        self._due_ms = ticks_ms()  # while the chip does not run: when the next step to that is due
-        self._steps = None  # of setting the chip up, a generator
+        self._overflows = 0  # the chip's overflows that have been dealt with
+        self._due_ms = ticks_ms()  # when the next step of setting the chip up is due
+        self._steps = None  # these steps, a generator
         self._ready = False  # the chip is set up, but its FIFO does not fill yet
         self._sample_ms = 0  # when the last sample was read, or the FIFO was emptied after an overflow
-        self._emptied_ms = self._read_ms = 0  # of the last overflow; of the last sample that was read before it
+        # _emptied_ms: when the FIFO last overflowed; _read_ms: when the last sample before that overflow was read
+        self._emptied_ms = self._read_ms = 0
         self.restarts = 0
         self.fault = Notice("starting")
         self._running = False
@@ -46,7 +47,7 @@ class Sensor:
         self.chip.setup()
 
     def fetch(self, now_ms):
-        """Read the samples that have come in; return how many, at most MAX_FRAMES. now_ms: ticks_ms().
+        """Read the samples that have come in; return their number, at most MAX_FRAMES. now_ms: ticks_ms().
 
         Their sum is in chip.sums; chip.take(k) gives each of them. A chip that does not run is set up first, which
         takes 0.2 s of calls. Raises SettingsError for pins that cannot be used, and nothing else."""
@@ -75,7 +76,8 @@ class Sensor:
         return good
 
     def _no_sample(self, now_ms):
-        """The FIFO held no sample. After an overflow that is no fault, because the FIFO was just emptied."""
+        """Report a fault if the FIFO has held no sample for too long. After an overflow it was just emptied, so that
+        this takes longer."""
         if self._overflows != self.chip.overflows:
             self._overflows = self.chip.overflows
             if self._sample_ms != self._emptied_ms:  # there were samples since the last overflow
@@ -100,7 +102,7 @@ class Sensor:
             self._missed(now_ms)
 
     def _missed(self, now_ms):
-        """A transfer failed: FAILURES of them in a row are a fault."""
+        """Count a failed transfer: FAILURES of them in a row are a fault."""
         self._failures += 1
         if self._failures >= FAILURES:
             self._fail("sensor-lost", now_ms)
@@ -111,8 +113,8 @@ class Sensor:
         self._due_ms = now_ms
 
     def prepare(self, now_ms):
-        """Do the next step of setting the chip up, if it is time for it; none is left to do once fetch() only has to
-        start the FIFO. Raises SettingsError for pins that cannot be used, and nothing else. now_ms: ticks_ms()."""
+        """Do the next step of setting the chip up, if it is due. The last one, to start the FIFO, is left to fetch().
+        Raises SettingsError for pins that cannot be used, and nothing else. now_ms: ticks_ms()."""
         if self._ready or ticks_diff(now_ms, self._due_ms) < 0:
             return
         wait_ms = RETRY_MS
@@ -129,13 +131,13 @@ class Sensor:
         self._due_ms = ticks_add(now_ms, wait_ms)
 
     def _not_set_up(self, error):
-        """An attempt to set the chip up ended with this error: the next one begins with the bus."""
+        """Set the fault after an attempt to set the chip up failed; the next attempt begins with the bus."""
         self._ready = False
         self._steps = None
         self.fault = Notice("unknown-chip", error.args[0]) if isinstance(error, UnknownChip) else Notice("no-sensor")
 
     def _start(self, now_ms):
-        """The chip is set up: let its FIFO fill."""
+        """Start the FIFO of the chip, which is set up."""
         try:
             self.chip.start()
         except OSError as error:
@@ -148,9 +150,9 @@ class Sensor:
 
 
 class SampleClock:
-    """When each sample was taken: the chip samples at a steady rate, whatever the program does, but its clock may be
-    off by 1 %, which is corrected by the board's. Times are integers of microseconds: a 32-bit float could no longer
-    hold them after 17 seconds.
+    """The times of the samples: the chip samples at a steady rate, whatever the program does, but its clock may be off
+    by 1 %, which is corrected by the board's. Times are integers of microseconds: a 32-bit float could no longer hold
+    them after 17 seconds.
 
     period_us: nominal time from one sample to the next.  lost: samples lost in overflows, since power-on."""
 
@@ -161,14 +163,14 @@ class SampleClock:
         self._sample_us = None  # when the last sample was taken, in ticks_us(); None: no sample yet
 
     def restart(self):
-        """Forget the samples so far: those to come do not follow on from them."""
+        """Drop the time of the last sample: the next ones do not follow on from it."""
         self._sample_us = None
         self._pending_us = 0
 
     def step(self, n, now_us):
         """Count n new samples; return the microseconds from the last sample before them to the last of them.
 
-        After a restart() there is none before them: then from the first of them. now_us: ticks_us().
+        After a restart() there is none before them: the time then begins at the first of them. now_us: ticks_us().
         """
         if self._sample_us is None:
             n -= 1

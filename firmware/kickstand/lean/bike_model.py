@@ -48,17 +48,18 @@ CROSS_FORWARD_LEFT, CROSS_FORWARD_UP, SCALE_FORWARD = 9, 10, 11
 
 MAX_PITCH = 1.2  # rad. No motorcycle reaches it, a sensor in the hand may; at 90 degrees lean has no meaning.
 
-# Where the turn rate of a bike in balance replaces the measured one. In the form of measurements.py.
+# Where the yaw rate of a bike in balance replaces the measured one. Comments in the form of measurements.py.
 BALANCE_MIN_SPEED = 4.0 / STANDARD_GRAVITY  # g s. Larger: the balanced rate is not used in slow turns.
 # The balanced rate is used where the measured one is within BALANCE_RATE + BALANCE_SHARE x |balanced rate| of it.
-BALANCE_RATE = 0.1  # rad/s: of that tolerance, the fixed part. Larger: used too where lean or speed are wrong.
-BALANCE_SHARE = 0.5  # of 1: of that tolerance, the part of the rate. Larger: used too where lean or speed are wrong.
-BALANCE_SIGMA = radians(20.0)  # rad: of the lean. Larger: the balanced rate is used with a lean that is hardly known.
-BALANCE_MIN_COS = 0.3  # of 1: lower bound of cos(lean). Larger: too little rate about left in deep leans.
+BALANCE_RATE = 0.1  # rad/s: constant part of that tolerance. Larger: used too where lean or speed are wrong.
+BALANCE_SHARE = 0.5  # ratio: part of that tolerance that grows with the rate. Larger: as above.
+# rad: the lean's standard deviation has to be smaller. Larger: the balanced rate is used with a lean that is uncertain.
+BALANCE_SIGMA = radians(20.0)
+BALANCE_MIN_COS = 0.3  # ratio: lower bound of cos(lean). Larger: too little rate about left in deep leans.
 
 
 def predict(x, force, rate, seconds, sums):
-    """Move the state x (STATES values) on by one sample of force (3 values, g) and rate (3, rad/s) with (1) to (3).
+    """Integrate (1) to (3) in the state x (STATES values) over one sample of force (3 values, g) and rate (3, rad/s).
 
     sums (9 values) grows by the sample's values. Divided by the number of samples at the end of a window (the samples
     of a fifth of a second, which make one update of the filter) they are the window's means:
@@ -180,5 +181,5 @@ class Linearisation:
         self.pitch_rate = wy * st - wx * ct
 
     def lean_by_pitch(self, x):
-        """(7): what of the state's lean, rad, is the bike's own pitch, which the yaw error shows as lean."""
+        """(7): the part of the state's lean, rad, that is the bike's own pitch, which the yaw error shows as lean."""
         return x[YAW_ERROR] * self.cos_lean * (x[PITCH] + x[YAW_ERROR] * self.sin_lean)

@@ -29,11 +29,10 @@ def centripetal_g(left_g, up_g, yaw_rate):
 
 
 def formula_lean_deg(force, yaw_rate):
-    """Nicolae's lean (25)-(26) in degrees, > 0 to the right. force: left, up, forward in g; yaw rate in any
-    unit.
+    """Nicolae's lean (25)-(26) in degrees, > 0 to the right; 0 in free fall (under 0.1 g). force: left, up, forward
+    in g. yaw_rate: in any unit, only its sign counts.
 
-    Right on average and noisy near upright, where 1 % of vibration makes an error of 8 degrees. 0 in free fall (under
-    0.1 g).
+    Right on average and noisy near upright, where 1 % of vibration makes an error of 8 degrees.
     """
     left, up = force[0], force[1]
     square = left * left + up * up

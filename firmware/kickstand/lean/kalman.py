@@ -7,8 +7,8 @@ are given as ((state, value), ...), because most of their values are zero.
 
 MIN_VARIANCE = 1e-10  # rounding in 32-bit floats could make a variance negative
 # How much is done between two yields: about a millisecond on an RP2040
-TERMS_PER_STEP = 3  # of a Jacobian's row
-ROWS_PER_STEP = 8  # of the covariance, of twelve: its triangle's first eight rows are half of the work
+TERMS_PER_STEP = 3  # terms of a Jacobian's row
+ROWS_PER_STEP = 8  # rows of the covariance's triangle: the first eight of twelve are half of the work
 GATE = 25.0  # 5 sigma, squared. An innovation beyond it is not dropped, because the state may be what is wrong.
 
 
@@ -27,20 +27,20 @@ class Covariance:
         self._column = [0.0] * self.n
 
     def set_variance(self, i, variance):
-        """State i was set to a known value: its variance, and no correlation with the other states."""
+        """Set the variance of state i, and its covariances with the other states to 0."""
         for k in range(self.n):
             self.rows[i][k] = self.rows[k][i] = 0.0
         self.rows[i][i] = variance
 
     def add_noise(self, i, variance):
-        """Process noise of a state that no other one changes."""
+        """Add process noise to the variance of state i. For states that no other one changes."""
         self.rows[i][i] += variance
 
     def propagate_row(self, i, derivatives, seconds, noise):
         """P = F P F^T for one row of F, plus process noise. A generator.
 
-        derivatives: of state i's rate of change, ((j, d rate_i / d state_j), ...) with j other than i, over seconds.
-        noise: variance that is added to state i's.
+        derivatives: of state i's rate of change, ((j, d rate_i / d state_j), ...) with j other than i. seconds: length
+        of the step. noise: variance that is added to state i's.
         """
         rows = self.rows
         row = rows[i]
@@ -100,7 +100,7 @@ class Covariance:
         yield
 
     def take_correction(self, i):
-        """The correction of state i, which is set back to 0."""
+        """Return the correction of state i and set it to 0."""
         value = self.correction[i]
         self.correction[i] = 0.0
         return value

@@ -21,10 +21,12 @@ from .upright_trim import UprightTrim
 
 WINDOW_US = 200_000
 FIRST_WINDOW_US = 50_000
-WORK_STEPS = 21  # of the work on a window; a test counts them
+WORK_STEPS = 21  # steps of the work on a window; a test counts them
 SLOW_STEP_US = 12_000  # samples that are further apart leave time for all steps at once
-DELAY_S = 0.0048  # of the MPU6050's gyro at DLPF 3
-MAX_SPEED = 250.0 / STANDARD_GRAVITY  # g s: of a board that lies on its nose, before its rest is seen, under it
+DELAY_S = 0.0048  # delay of the MPU6050's gyro at DLPF 3
+# g s: the filter restarts above it. A board that lies on its nose seems to accelerate, but its standstill is detected
+# before it gets there.
+MAX_SPEED = 250.0 / STANDARD_GRAVITY
 
 
 class LeanFilter:
@@ -37,13 +39,15 @@ class LeanFilter:
         self.trim = UprightTrim(trim)
         self._delay_s = delay_s
         self._p = None
-        self._force_error = 0.0  # of the accelerometer at rest, where the force is 1 g; as a share of it
+        # error of the accelerometer's magnitude (bias and scale factor together), as a share of the force: found at
+        # rest, where it should read 1 g
+        self._force_error = 0.0
         self.restart()
 
     def restart(self):
         """Forget the ride: lean, pitch and speed, because readings were missing. The sensor's errors are kept."""
         x = [0.0] * STATES
-        self._kept = []  # state, its variance
+        self._kept = []  # (state, variance) of the sensor's errors
         if self._p is not None:
             for i in range(BIAS_LEFT, STATES):
                 x[i] = self._x[i]
@@ -52,17 +56,19 @@ class LeanFilter:
         self._p = None
         self._upright = self.trim.angle  # LEAN of a bike that is upright
         self._rest = RestDetector(not self._kept)
-        self._speed = self._last_speed = None  # the latest measured one, until a window takes it; the one before
-        self._speed_s = 0.0  # since the one before
-        self._work = None
-        self._steps = 1  # of the work, in each sample
+        # _speed: the latest measured speed, until a window takes it; _last_speed: the one before; _speed_s: seconds
+        # since that
+        self._speed = self._last_speed = None
+        self._speed_s = 0.0
+        self._work = None  # the generator of _process() while it is not finished
+        self._steps = 1  # steps of it that each sample runs
         self._sums = [0.0] * 9  # see predict()
         self._count = self._window_us = 0
-        self._axis = 0  # of the gyro, whose bias is measured next at rest
+        self._axis = 0  # the axis of the gyro whose bias the next window at rest measures
         self._roll_rate = self._last_roll_rate = 0.0
 
     def inflate_covariance(self, seconds):
-        """The readings of so many seconds are lost: what the bike did meanwhile adds to the variances."""
+        """Add the process noise of so many seconds of lost readings to the variances of lean, pitch and speed."""
         p = self._p
         if p is None:
             return
@@ -84,12 +90,12 @@ class LeanFilter:
         return degrees(self._x[PITCH])
 
     def measure_speed(self, speed_mps):
-        """The vehicle's speed, from whatever measures it; never required."""
+        """Keep a measured speed for the next window. Optional."""
         self._speed = speed_mps / STANDARD_GRAVITY
 
     @property
     def variance(self):
-        """Of the lean, rad^2."""
+        """Variance of the lean, rad^2; that of no knowledge (pi^2) before the first window has ended."""
         return self._p.rows[LEAN][LEAN] + self.trim.variance if self._p is not None else pi * pi
 
     @property
@@ -122,7 +128,8 @@ class LeanFilter:
         return degrees(x[LEAN] + self._delay_s * self._roll_rate - self._upright)
 
     def _end_window(self):
-        """The work on the window before is done: begin with the means of this one."""
+        """Start the work on the window that ends, unless it is the first one, the bike comes to rest or the filter has
+        to restart. The work on the window before it is finished."""
         n = self._count
         means = [total / n for total in self._sums]
         seconds = self._window_us * 1e-6
@@ -147,11 +154,11 @@ class LeanFilter:
         self._rest.update(means[2:5], means[5:8], bias, seconds, self.rolling or pushed)
         if self._rest.resting and not rested:
             self._stand(means)
-            return  # these innovations were measured against the state before
+            return  # this window's innovations belong to the state before _stand()
         self._work = self._process(means, seconds, roll_acceleration)
 
     def _start(self, means):
-        """The first state, from the means of the first window."""
+        """Set the first state and its covariance from the means of the first window."""
         wx, wy, wz, fx, fy, fz = means[2:8]
         # A long turn is as calm as standing, and gives no force to the side: only the yaw rate separates them.
         turning = max(abs(wx), abs(wy), abs(wz)) > measurements.START_MAX_RATE
@@ -168,8 +175,8 @@ class LeanFilter:
         x[SPEED] = measurements.USUAL_SPEED if moving else 0.0  # most rides begin at rest
 
     def _stand(self, means):
-        """Coming to rest, the force is the vertical, whatever was estimated before. The bias is kept, unless it is far
-        off, as after moving the sensor about in the hand."""
+        """The bike comes to rest: set lean and pitch by the force, which is vertical now, and the speed to 0. A bias
+        stays unless it is far off, as after the sensor was moved about in a hand."""
         fx, fy, fz = means[5:8]
         x, p = self._x, self._p
         x[LEAN] = atan2(fx, fy)
@@ -206,7 +213,8 @@ class LeanFilter:
         self._inject(model)
 
     def _update_ride(self, model, means, seconds, roll_acceleration):
-        """By the forces, the road, the speed or a straight; and the trim."""
+        """A generator: update with the window's forces, the level road, and the measured speed; without one with
+        straight_or_usual_speed(). Update the trim where speed and lean are certain enough."""
         p, x = self._p, self._x
         for measurement in measurements.forces(model, means, roll_acceleration, self._force_error):
             yield from p.update(*measurement)
@@ -227,7 +235,7 @@ class LeanFilter:
             self.trim.update(sideways, x[LEAN], model.yaw_rate, seconds)
 
     def _inject(self, model):
-        """Put the corrections into the state, and into the innovations summed up meanwhile against the old state."""
+        """Add the corrections to the state, and adapt the sums of innovations, which were taken against the old one."""
         p, x, sums = self._p, self._x, self._sums
         for j, h in model.left_row:
             sums[0] -= self._count * h * p.correction[j]
@@ -247,5 +255,5 @@ class LeanFilter:
 
 
 def _possible_pitch(pitch):
-    """The pitch within its limits: at a right angle, as of a board that lies flat, predict() would divide by zero."""
+    """pitch within +-MAX_PITCH: at a right angle predict() would divide by zero, as with a board that lies flat."""
     return max(-MAX_PITCH, min(MAX_PITCH, pitch))

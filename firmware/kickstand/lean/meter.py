@@ -6,19 +6,19 @@ from ..calibration.transform import Transform
 from ..units import GAP_US, LOST_US
 from .lean_filter import DELAY_S, LeanFilter
 
-SMOOTH_US = 300_000  # time constant of the g shown
+SMOOTH_US = 300_000  # time constant of smooth_force
 MAX_VARIANCE = radians(3.0) ** 2  # a lean less certain than this is not shown
 TRIM_MAX_VARIANCE = radians(0.5) ** 2  # a trim less certain than this is not kept
 TRIM_STEP_DEG = 0.3  # a smaller change of the trim is not saved: flash wears
-FALLEN_DEG = 65.0
+FALLEN_DEG = 65.0  # the bike has fallen after FALLEN_US of at least this lean
 FALLEN_US = 1_000_000
 HELD_US = 75_000  # a maximum lasts twice as long: a pothole jerks the sensor for less
-WHEELIE_DEG = 20.0  # of pitch: no road is as steep, and with a wheel in the air the filter's equations do not hold
+WHEELIE_DEG = 20.0  # pitch: no road is as steep, and with a wheel in the air the filter's equations do not hold
 
 
 class LeanMeter:
-    """Lean and acceleration of the vehicle. leans: False for a car, whose lean stays 0. delay_s: by how much the gyro's
-    low-pass is late.
+    """Lean and acceleration of the vehicle. leans: False for a car, whose lean stays 0. delay_s: delay of the gyro's
+    low-pass.
 
     After update() or update_sum(): force (left, up, forward in g), rate (about them in rad/s), lean_deg (the
     filter's, > 0 right), smooth_force (g, for display; of an aligned motorcycle forward alone), fallen, and the maxima
@@ -38,8 +38,8 @@ class LeanMeter:
         self.use(calibration)
 
     def use(self, calibration):
-        """Take a calibration, its scale set, and forget what was estimated with the one before. A reason to distrust
-        the lean stays with the calibration that it is about."""
+        """Take a calibration, its scale set, and restart the filter. suppressed_reason is cleared unless it is the same
+        calibration as before."""
         if calibration is not self.calibration:
             self.suppressed_reason = None
         self.calibration = calibration
@@ -49,7 +49,7 @@ class LeanMeter:
         self.restart()
 
     def restart(self):
-        """Forget the past, because readings were missing."""
+        """Restart filter and smoothing, because readings were missing. The maxima and the sensor's errors stay."""
         self.filter.restart()
         self._fresh = True
         self._flat_us = 0
@@ -57,7 +57,7 @@ class LeanMeter:
         self.lean_deg = 0.0
 
     def reset_maxima(self):
-        """Start the held maxima again."""
+        """Set the maxima of lean, acceleration and braking to 0."""
         self.max_left_deg = 0.0
         self.max_right_deg = 0.0
         self.max_accel_g = 0.0
@@ -65,11 +65,11 @@ class LeanMeter:
         self._hold_again()
 
     def distrust(self, reason):
-        """The lean is not to be shown, for a reason that stands in its place: until trust(), or another calibration."""
+        """Set suppressed_reason: the lean is not shown until trust() or another calibration."""
         self.suppressed_reason = reason
 
     def trust(self):
-        """The reason to distrust the lean is gone."""
+        """Clear suppressed_reason."""
         self.suppressed_reason = None
 
     @property
@@ -79,12 +79,12 @@ class LeanMeter:
 
     @property
     def speed_mps(self):
-        """Estimated speed, from the sensor and what measure_speed() was given."""
+        """Estimated speed, from the sensor and the speeds that measure_speed() took."""
         return self.filter.speed_mps
 
     @property
     def trim_deg(self):
-        """The lean of upright that riding has found by now, > 0 right; in the calibration or not."""
+        """The roll-misalignment correction estimated so far, > 0 right; see keep_trim() for the calibration's."""
         return degrees(self.filter.trim.angle)
 
     @property
@@ -98,8 +98,8 @@ class LeanMeter:
         return 0.0 <= lean.variance <= MAX_VARIANCE and abs(lean.pitch_deg) < WHEELIE_DEG
 
     def keep_trim(self):
-        """Take the trim found so far into the calibration, if the bike stands, the trim is certain enough and it
-        has changed: True then."""
+        """If the bike stands and the trim is certain enough and has changed, copy it to the calibration and return
+        True."""
         angle = self.trim_deg
         certain = self.at_rest and self.filter.trim.variance <= TRIM_MAX_VARIANCE
         if not certain or abs(angle - self.calibration.trim_deg) < TRIM_STEP_DEG:
@@ -115,7 +115,7 @@ class LeanMeter:
         return formula_lean_deg(self.force, self.rate[1])
 
     def measure_speed(self, speed_mps):
-        """Give the speed, where something measures it: it helps the lean, and is never required. Below 0: no news."""
+        """Take a measured speed: it improves the lean, and is optional. Below 0: there is none, ignored."""
         if speed_mps >= 0.0:
             self.filter.measure_speed(speed_mps)
 
@@ -126,14 +126,14 @@ class LeanMeter:
 
     def update_sum(self, sums, n, dt_us):
         """Take the mean of n samples. sums: array('i', 7), their sum in counts, in the chip's order; dt_us: integer
-        microseconds since the samples before (0 for the first). These are the samples of one turn of the loop, because
-        floats cost too much to do it for each sample."""
+        microseconds since the samples before (0 for the first). These are the samples of one pass of the main loop,
+        because floats cost too much to do it for each sample."""
         self._reading, self._n = sums, n
         self._transform.apply_sum(sums, n, self.force, self.rate)
         self._follow(dt_us)
 
     def _follow(self, dt_us):
-        """Bring everything that is shown up to the new force and rate."""
+        """Update filter, smoothed force, fallen and maxima with the new force and rate, dt_us after those before."""
         if dt_us > LOST_US:
             if dt_us > GAP_US:
                 self.restart()
@@ -165,9 +165,12 @@ class LeanMeter:
             self._hold_again()
 
     def _hold_again(self):
-        """The lean was within its maxima."""
-        self._over_us = 0  # since the lean exceeds one, or since HELD_US of that
-        self._least = 180.0  # lean in that time, and in the HELD_US before; 0 if it did not exceed it then
+        """Begin again to time how long the lean exceeds a maximum, because it is within its maxima or not trusted."""
+        # _over_us: time for which the lean has exceeded a maximum; starts again from 0 after each HELD_US.
+        # _least: smallest lean in that time. _least_before: the same in the HELD_US before, 0 if the lean was within
+        # its maxima then.
+        self._over_us = 0
+        self._least = 180.0
         self._least_before = 0.0
 
     def _hold_maxima(self, lean, forward, dt_us):

@@ -9,15 +9,20 @@ from math import radians, sin
 
 MAX_TRIM = radians(3.5)  # rad: a pose off by 2 degrees, and the rest of the accelerometer's errors
 # Symbol = default  # unit: what it is. "Larger:" says what raising it does.
-SIGMA_START = radians(2.5)  # rad: of a new pose. Larger: trim is found sooner, and less steady.
-SIGMA_KEPT = radians(0.7)  # rad: of a trim kept from an earlier, colder or hotter ride. Larger: as above.
-SIGMA_STRAIGHT = radians(1.5)  # rad: of the balance, by rider, camber and wind. Larger: found later, steadier.
-SIGMA_LEAN_SHARE = 0.15  # of sin(lean): of a bike's force to the side in turns. Larger: turns to one side count less.
-SIGMA_TURN = 0.1  # of sin(lean): by which turns differ in it, as a rider hangs off or not. Larger: turns count less.
-SIGMA_YAW_S = 0.1  # rad per rad/s of yaw rate. Larger: turns count less.
-MAX_SIDEWAYS = 0.1  # of the force up, from what is expected. Larger: a sensor in a hand counts as balanced.
-DISTURBANCE_S = 2.0  # s: how long such a disturbance lasts. Larger: found later, steadier.
-NOISE = radians(0.01)  # rad per square root of a second. Larger: a change during the ride is followed sooner.
+SIGMA_START = radians(2.5)  # rad: prior of a new pose's trim. Larger: the trim is found sooner, and less steady.
+SIGMA_KEPT = radians(0.7)  # rad: prior of a trim kept from an earlier, colder or hotter ride. Larger: as above.
+SIGMA_STRAIGHT = radians(1.5)  # rad: force to the side over up on straights: rider, camber, wind. Larger: found later.
+# times sin(lean): prior of the bike's own force to the side in turns, by its tyres and rider. Larger: turns to one side
+# count less.
+SIGMA_LEAN_SHARE = 0.15
+# times sin(lean): how much that force differs from turn to turn, because the rider hangs off or does not. Larger: turns
+# count less.
+SIGMA_TURN = 0.1
+SIGMA_YAW_S = 0.1  # rad per rad/s: further measurement noise, times the yaw rate. Larger: turns count less.
+# times the upward force: largest innovation. Larger: a sensor in a hand counts as a balanced bike.
+MAX_SIDEWAYS = 0.1
+DISTURBANCE_S = 2.0  # s: how long such a disturbance lasts. Larger: the trim is found later, and steadier.
+NOISE = radians(0.01)  # rad per square root of a second: process noise. Larger: changes are followed sooner.
 
 
 class UprightTrim:
@@ -31,13 +36,13 @@ class UprightTrim:
         self.angle = angle
         self.variance = (SIGMA_START if angle == 0.0 else SIGMA_KEPT) ** 2
         # The second state: wide tyres and riders lean a bike more or less than balance would, alike to both sides
-        self._lean_share = 0.0  # of sin(lean)
+        self._lean_share = 0.0  # times sin(lean)
         self._share_variance = SIGMA_LEAN_SHARE**2
         self._covariance = 0.0
 
     def update(self, sideways, lean, yaw_rate, seconds):
-        """sideways: force to the left over force up while riding. lean (rad) and yaw_rate (rad/s) show how much
-        of a turn it is. seconds: since the update before."""
+        """Take one measurement while riding. sideways: force to the left over force up. lean (rad) and yaw_rate (rad/s)
+        make its noise larger in bends. seconds: since the update before."""
         sine = sin(lean - self.angle)
         innovation = sideways - self.angle - sine * self._lean_share
         if not -MAX_SIDEWAYS < innovation < MAX_SIDEWAYS:

@@ -1,4 +1,4 @@
-"""The format of a recorded ride: blocks of a few thousand bytes, each of which can be read without the others.
+"""The format of a recorded ride: ride blocks of a few thousand bytes, each readable without the others.
 
 A block is: a head (magic, format version, length, ride, sequence, time in us since power-on, temperature at its end in
 hundredths of a degree Celsius, counts per g, ten times the counts per deg/s, samples per second, firmware version,
@@ -6,15 +6,15 @@ number of positions, how late the gyro's low-pass is in tenths of a millisecond,
 before); the calibration as store.pack() writes it; the entries; zeros; the positions, the last one first; a tail
 (number of entries, CRC32 of everything before it).
 
-An entry is one turn of the loop: how many samples came in (n), the microseconds since the turn before, and the sums of
-the samples' six counts (ax ay az gx gy gz). So the mean that the lean was computed from is kept exactly. Or an entry is
-a speed: n = 0, then centimetres per second.
+An entry is one pass of the main loop, App.turn(), called "a turn" here: the number of samples in it (n), the
+microseconds since the turn before, and the sums of the samples' six counts (ax ay az gx gy gz). So the mean from which
+the lean was computed is kept exactly. Or an entry is a speed: n = 0, then centimetres per second.
 
-A position is the number of the entry, a turn, that it belongs to, and the four numbers of Gps.place(). A reader of
-version 0.4.0 and before, which knows no positions, takes their bytes for the zeros and reads all else.
+A position is the number of the entry (a turn) that it belongs to, and the four numbers of Gps.place(). Readers of
+version 0.4.0 and before, which know no positions, take their bytes for the zeros and read the rest.
 
 Each number is kept as its difference from a prediction: n sample periods for the time, the values of the turn before
-for the others. An adaptive Rice code holds the difference (R. F. Rice, JPL publication 79-22), most significant bit
+for the others. The difference is in an adaptive Rice code (R. F. Rice, JPL publication 79-22), most significant bit
 first. The difference becomes a size >= 0 by zigzag coding: 0, -1, 1, -2, ... become 0, 1, 2, 3, ... k is log2 of the
 mean of the last sizes. The code is size >> k as that many ones, a zero, and the low k bits of the size. Where that
 would take LIMIT ones or more, it is LIMIT ones and then the size in RAW_BITS bits.
@@ -35,9 +35,9 @@ _TEMPERATURE_AT = struct.calcsize("<4sHHIIq")
 _PLACES_AT = struct.calcsize("<4sHHIIqhHHH10s")
 PLACE = "<HHIii"
 TAIL = "<HI"
-BLOCK = 4096  # bytes in a block of the flash
-FIELDS = 9  # of an entry: n, dt_us, sums of ax ay az gx gy gz, speed
-_SPEED = 8  # the place of the speed among them
+BLOCK = 4096  # bytes in a flash block, the unit of erasing
+FIELDS = 9  # values of an entry: n, dt_us, sums of ax ay az gx gy gz, speed
+_SPEED = 8  # the index of the speed among them
 LIMIT = 12
 RAW_BITS = 31
 MEAN_SHIFT = 4  # a mean is that of about the last 16 sizes, and is kept times 16
@@ -48,14 +48,14 @@ _HEAD_LENGTH = struct.calcsize(HEAD) + BODY_LENGTH
 _TAIL_LENGTH = struct.calcsize(TAIL)
 _PLACE_LENGTH = struct.calcsize(PLACE)
 _WORST = (FIELDS + 1) * (LIMIT + RAW_BITS) // 8 + 2  # the most bytes that a turn and a speed can take
-# Where the coder's state, array('i', 22), keeps what. From 0 on, FIELDS values: the entry before. From _MEANS on,
-# FIELDS values: the mean size of each field. Then: bits that do not yet make a byte, how many those are, the place of
-# the next byte in the buffer, and the sample period in us.
+# Indices in the coder's state, array('i', 22). From 0 on, FIELDS values: the entry before. From _MEANS on, FIELDS
+# values: the mean size of each field. Then: bits that do not yet make a byte, the number of these, the index of the
+# next byte in the buffer, and the sample period in us.
 _MEANS, _PENDING, _BITS, _AT, _PERIOD = 9, 18, 19, 20, 21
 
 
 def block_length(index):
-    """Bytes in block number `index` of a file: as many as littlefs keeps in its own block of that number.
+    """Bytes in ride block number `index` of a file: as many as littlefs keeps in its own block of that number.
 
     Each of those but the first begins with 4-byte pointers to earlier blocks: one, and another for each time that its
     number can be halved (littlefs, SPEC.md, CTZ skip-lists). A block of a ride that ends where one of littlefs does
@@ -122,7 +122,7 @@ else:
 
 
 class RideBlock:
-    """A block being filled: begin(), add() until full(), close(). Then buffer[:length] is the block.
+    """A ride block being filled: begin(), add() until full(), close(). Then buffer[:length] is the block.
 
     period_us: nominal time from one sample to the next.  count: entries so far.
     """
@@ -132,10 +132,10 @@ class RideBlock:
         self._state = array("i", [0] * (_PERIOD + 1))
         self._state[_PERIOD] = period_us
         self._entry = array("i", [0] * FIELDS)
-        self._temperature = 0  # of the last turn, in counts
+        self._temperature = 0  # temperature in the last turn, in counts
         self._places = 0
         self._end = 0  # where the positions begin
-        self._reserved = 0  # bytes that are kept free for a position; none before the first one
+        self._reserved = 0  # bytes kept free for the next position; 0 before the first one
         self.length = 0
         self.count = 0
 
@@ -189,13 +189,13 @@ class RideBlock:
         if not self._reserved:
             self._reserved = _PLACE_LENGTH
             if self._state[_AT] + _WORST > end:
-                return  # no room was kept for the first one of all
+                return  # the first position is dropped, because no room was kept for it
         struct.pack_into(PLACE, self.buffer, end, self.count, place[0], place[1], place[2], place[3])
         self._end = end
         self._places += 1
 
     def full(self):
-        """True when the longest possible turn and speed, and a position, might not fit any more."""
+        """True if the longest possible turn and speed, and a position, might not fit any more."""
         return self._state[_AT] + _WORST + self._reserved > self._end
 
     def close(self):

@@ -1,8 +1,8 @@
-"""The SD card is mounted, its free space counted, and a file written to it, once and before the watchdog runs.
+"""Tries the SD card out, once and before the watchdog runs: mounts it, counts its free space, writes a file.
 
-That takes a fifth of a second. Where the card does not say how much of it is free, all its FAT is read, in half a
-minute; where it does not get ready, the driver waits 5 s. During a ride the lean would stand for as long, and the
-watchdog would restart the board, again and again.
+That takes a fifth of a second. For a card without a count of its free space all of its FAT is read, in half a minute;
+for one that does not get ready the driver waits 5 s. During a ride the lean would freeze for as long, and the watchdog
+would restart the board again and again.
 """
 
 import os
@@ -15,20 +15,21 @@ _CONTENT = b"Kickstand"
 
 
 def prepare(recorder, settings):
-    """Raises nothing: what is wrong with the card is reported, as the recorder's problem and when a ride is begun."""
+    """Try the card out. Raises nothing: a fault becomes the recorder's problem, and is reported when a ride is
+    begun."""
     try:
         _try_out(ride_paths.directory(settings))
         return
     except CardError as error:
         problem = error
-    except Exception as error:  # whatever a driver or a file system raises: the board must not restart for it
+    except Exception as error:  # whatever a driver or a file system raises: the board must not restart because of it
         problem = CardError("no-card", str(error))
     recorder.problem = recorder.keeper.refused = problem
     report(problem)
 
 
 def _try_out(directory):
-    """Raises CardError, OSError."""
+    """Write and remove a file on the card. Raises CardError, OSError."""
     flash_ring.make(directory)
     flash_ring.free_bytes(directory)
     path = directory + "/probe"

@@ -1,7 +1,7 @@
 """Writes rides to the board's flash or an SD card, and removes the oldest to make room.
 
-A ride is written in parts, files of about a minute in flash and of a quarter of an hour on a card. Some of the flash is
-always left free, for the calibration and for new firmware.
+A ride is written in parts, files of about a minute in flash and of a quarter of an hour on a card. RESERVE bytes of the
+flash always stay free, for the calibration and for new firmware.
 """
 
 import os
@@ -11,10 +11,10 @@ from . import ride_paths
 from .block import BLOCK, block_length
 
 ENOSPC = 28  # MicroPython's errno does not have it
-PART_BLOCKS = 16  # in a part in flash
-CARD_PART_BLOCKS = 256  # in a part on a card: a day's ride is 85 files, not 1300
-FIRMWARE = 80 * BLOCK  # compiled: each of its files takes whole blocks, each folder two
-RESERVE = 40 * BLOCK  # what an update of compiled firmware needs at most, with some to spare
+PART_BLOCKS = 16  # ride blocks in a part in flash
+CARD_PART_BLOCKS = 256  # ride blocks in a part on a card: a day's ride is 85 files, not 1300
+FIRMWARE = 87 * BLOCK  # compiled: each of its files takes whole blocks, each folder two
+RESERVE = 45 * BLOCK  # what an update of compiled firmware needs at most, with some to spare
 
 
 def free_bytes(path):
@@ -24,13 +24,13 @@ def free_bytes(path):
 
 
 def all_bytes(path):
-    """All bytes, free or not, of the file system that path is on. Raises OSError."""
+    """Size in bytes of the file system that path is on. Raises OSError."""
     space = os.statvfs(path)
     return space[1] * space[2]
 
 
 def make(path):
-    """Make a directory, unless it is there. Raises OSError."""
+    """Make a directory, unless it exists. Raises OSError."""
     try:
         os.mkdir(path)
     except OSError as error:
@@ -39,7 +39,7 @@ def make(path):
 
 
 def _remove_emptied(path):
-    """Remove a directory, unless the board's owner has put something into it."""
+    """Remove a directory if it is empty: the board's owner may have put something into it."""
     try:
         os.rmdir(path)
     except OSError:
@@ -71,12 +71,12 @@ class RideRing:
         self._directory = ride_paths.directory(self._settings)
         make(self._directory)
         self._use(ride_paths.newest_ride(self._directory) or 1)
-        if ride_paths.first_part(self._path):  # else the power went before its first block: use its number again
+        if ride_paths.first_part(self._path):  # else power was lost before its first block: use its number again
             self._use(self._ride + 1)
         self._part = 0
-        self._block = 0  # number of the block in its part
+        self._block = 0  # number of the ride block in its part
         self._free = free_bytes(self._directory)
-        # About the bytes of the earlier rides: to add up hundreds of them would take too long.
+        # roughly the bytes of the earlier rides: adding up hundreds of files would take too long
         self._others = max(0, all_bytes(self._directory) - self._free - FIRMWARE)
         self._wrapped = False  # the first parts of this ride itself have been removed
         self._oldest = None  # the ride whose parts are removed next; None: still to be found
@@ -91,17 +91,17 @@ class RideRing:
         make(self._path)
 
     def next_length(self):
-        """How many bytes the next block of the ride has to have. The block before it may still be being written."""
+        """Length in bytes that the ride's next block has to have. The block before it may not be written yet."""
         length = block_length(self._block)
         self._block = (self._block + 1) % self._part_blocks
         return length
 
     def room(self):
-        """How many more bytes can be recorded before the beginning of this ride itself is removed."""
+        """Bytes that can still be recorded before the beginning of this ride itself is removed."""
         return 0 if self._wrapped else max(0, self._free + self._others - self.needed)
 
     def ready(self):
-        """True if a block can be written now; else take one step towards that. Raises OSError."""
+        """True if a block can be written now; else take one step of making room and return False. Raises OSError."""
         if self._file:
             return True
         if self._free < self.needed:
@@ -136,7 +136,7 @@ class RideRing:
             self._oldest, self._passed = None, ride
 
     def _find_oldest(self):
-        """The oldest ride that may have parts. None: not found in this step. Raises OSError."""
+        """The number of the oldest ride that may have parts; None if this step has not found it. Raises OSError."""
         passed, size = self._passed, ride_paths.RIDES_IN_GROUP
         groups = ride_paths.groups(self._directory)
         group = min((group for group in groups if size * (group + 1) - 1 > passed), default=None)
@@ -154,7 +154,7 @@ class RideRing:
             raise OSError(ENOSPC)
 
     def end_block(self):
-        """End a block: from here on a power cut does not lose it. Raises OSError."""
+        """End a block and flush the file: from here on a power cut does not lose the block. Raises OSError."""
         self._free -= BLOCK
         self._left -= 1
         if self._left:
@@ -163,20 +163,21 @@ class RideRing:
             self.end()
 
     def end(self):
-        """End the ride, or a part of it. Raises OSError."""
+        """Close the file of the part that is being written. Raises OSError."""
         if self._file:
             file, self._file = self._file, None
             file.close()
 
     def abandon(self):
-        """End the ride after an error, whatever else fails. Raises nothing."""
+        """Close the ride's open file after an error, and ignore an OSError in doing so. Blocks that were ended before
+        are kept."""
         try:
             self.end()
         except OSError:
             pass
 
     def fault_code(self, error):
-        """The code of the Notice for an OSError or MemoryError that came from here."""
+        """The code of the Notice for an OSError or MemoryError that this object raised."""
         if isinstance(error, MemoryError):
             return "out-of-memory"
         if error.args and error.args[0] == ENOSPC:

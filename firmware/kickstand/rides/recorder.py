@@ -1,7 +1,8 @@
-"""Records a ride: puts each turn of the loop into a block, and writes full blocks to flash, a little in each turn.
+"""Records a ride: puts the samples of each pass of the loop into a ride block, and writes full blocks to flash step by
+step.
 
-A block takes four seconds or more to fill. Meanwhile the one before is written. In one turn of the loop a page is
-written, a file is flushed, or an old file is removed, so that no turn waits for more than one erase of the flash
+A block takes four seconds or more to fill. Meanwhile the one before is written. In one pass of the loop a page is
+written, a file is flushed, or an old file is removed, so that no pass waits for more than one erase of the flash
 (45 ms). The chip's FIFO keeps the samples that come during that time.
 """
 
@@ -12,18 +13,18 @@ from ..errors import CardError, Notice, report
 from ..units import GAP_US
 from .block import MAX_DT_US, RideBlock
 
-PAGE = 256  # bytes, a page of the flash
-STALL_MS = 10  # a write that took longer was an erase of the flash: to write a page takes 1 ms
+PAGE = 256  # bytes in a page of the flash, the unit of writing
+STALL_MS = 10  # a write that took longer included an erase of the flash: a page alone takes 1 ms
 
 
 class Recorder:
-    """keeper: where blocks are written, a RideRing (flash or SD card) or a RideStream (USB).  sample_hz: the chip's
+    """keeper: a RideRing (flash or SD card) or a RideStream (USB), which writes the blocks.  sample_hz: the chip's
     samples a second.
 
     active: True while a ride is being recorded.
     problem: None, or a CardError or Notice: why the recording ended by itself; take_problem() clears it.
-    stalled: True if interrupts were off for longer than STALL_MS, so that what they measured is not right. Who deals
-    with that clears it.
+    stalled: True if interrupts were off for longer than STALL_MS, so that GPS bytes or wheel pulses may be lost. The
+    caller informs the speed source (after_stall()) and sets it to False.
     """
 
     def __init__(self, keeper, sample_hz):
@@ -65,13 +66,13 @@ class Recorder:
         # The last speed since the turn before, in cm/s, and the last position; _has_fix: there is one or the other
         self._speed = self._place = None
         self._has_fix = False
-        self._waiting = None  # the block that is being written, and how many of its bytes are written
+        self._waiting = None  # the block that is being written; _at: number of its bytes that are written
         self._at = 0
         self.active = True
         self._begin_block()
 
     def stop(self):
-        """End the ride, if there is one. All that was added is written first, in at most 0.1 s."""
+        """Write all entries that were added, in at most 0.1 s, and end the ride, if there is one."""
         if not self.active:
             return
         if self._block.count:
@@ -92,11 +93,12 @@ class Recorder:
         return problem
 
     def mark_gap(self):
-        """Say that the chip was started again: the next turn does not follow on from the one before."""
+        """Mark a gap before the next turn, because the chip was started again."""
         self._interrupted = True
 
     def add(self, sums, n, dt_us):
-        """Add a turn of the loop. sums: of the seven counts of n samples.  dt_us: microseconds since the turn before.
+        """Add a turn of the loop. sums: sums of the seven counts of n samples.  dt_us: microseconds since the turn
+        before.
 
         Only while active."""
         now_ms = ticks_ms()
@@ -121,8 +123,8 @@ class Recorder:
                 self._begin_block()
 
     def add_fix(self, speed_mps, place):
-        """Add to the turn that is added next what is new, else None: a speed, and a position as Gps.place() has it. Of
-        several the last one counts."""
+        """Keep a speed and a position (see Gps.place(); None if there is no new one) for the turn that is added next.
+        They replace those kept since the turn before."""
         if speed_mps is not None:
             self._speed = int(100 * speed_mps + 0.5)
             self._has_fix = True
@@ -140,7 +142,7 @@ class Recorder:
         self._note_stall(begun_ms)
 
     def _note_stall(self, begun_ms):
-        """What was begun then may have erased flash."""
+        """Set stalled if the write that began at begun_ms took so long that it erased flash."""
         if ticks_diff(ticks_ms(), begun_ms) > STALL_MS and self.keeper.stops_interrupts:
             self.stalled = True
 
@@ -161,11 +163,11 @@ class Recorder:
             self._fail(error)
 
     def seconds(self):
-        """How long this ride has been recorded, in seconds."""
+        """Duration of this recording so far, in seconds."""
         return (self._time_us - self._start_us) // 1_000_000
 
     def room_s(self):
-        """For how many more seconds there is room; None if there is no limit."""
+        """Seconds for which there is still room; None if there is no limit."""
         room = self.keeper.room()
         if room is None:
             return None
@@ -174,13 +176,13 @@ class Recorder:
         return room * self.seconds() // self._bytes
 
     def _begin_block(self):
-        """Let the turns to come fill an empty block."""
+        """Begin an empty block for the turns to come."""
         length, number = self.keeper.next_length(), (self._ride, self._sequence)
         self._block.begin(length, *number, self._time_us, self._chip, self._sample_hz, self._body)
         self._sequence += 1
 
     def _end_block(self):
-        """Close the block that was filled, and let it be written."""
+        """Close the full block, to be written by tick()."""
         while self._waiting and self.active:  # the block before is not yet written: flash was slower than the ride
             self.tick()
         self._block.close()
@@ -188,7 +190,7 @@ class Recorder:
         self._waiting, self._at = self._spare, 0
 
     def _fail(self, error):
-        """End the ride after an error; the loop goes on."""
+        """End the ride after an error, which becomes `problem`. Blocks that are not yet written are lost."""
         self.active = False
         self.keeper.abandon()
         self._end(Notice(self.keeper.fault_code(error), str(error)))

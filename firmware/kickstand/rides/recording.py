@@ -1,4 +1,4 @@
-"""The life of recordings: what they need is imported step by step, a card is tried out, rides begin and end."""
+"""Begins and ends recordings: imports their modules step by step, and tries an SD card out before."""
 
 import gc
 
@@ -6,7 +6,7 @@ from ..errors import attempt
 
 
 class NoRecorder:
-    """Stands where the Recorder will be, until one is made."""
+    """Takes the place of the Recorder until one is made."""
 
     active = stalled = False
 
@@ -17,9 +17,8 @@ class NoRecorder:
 class Recording:
     """Begins and ends the recording of rides.
 
-    settings: a Settings. chip: the Mpu6050. meter, calibration: the LeanMeter and its ActiveCalibration. keeper: where
-    rides are recorded to (see Recorder), None for flash or SD card; if one is given, recording begins with the first
-    readings.
+    settings: a Settings. chip: the Mpu6050. meter, calibration: the LeanMeter and its ActiveCalibration. keeper: see
+    Recorder; None for flash or SD card. If one is given, recording begins with the first readings.
 
     recorder: a Recorder, or a NoRecorder before there is one. on_card: rides are kept on an SD card.
     """
@@ -43,7 +42,7 @@ class Recording:
         step."""
         names = ["block", "recorder"] if self._keeper else ["block", "ride_paths", "flash_ring", "recorder"]
         for name in names + ["card_trial"] * self.on_card:
-            gc.collect()  # as before each import while the loop runs: what stays must not lie behind garbage
+            gc.collect()  # as before each import while the loop runs: lasting objects must not lie behind garbage
             __import__("kickstand.rides." + name)
             yield
         from .recorder import Recorder
@@ -56,10 +55,10 @@ class Recording:
         self.recorder = Recorder(keeper, self._settings.SAMPLE_HZ)
 
     def _finish(self):
-        """Take all the steps that are left."""
+        """Do all remaining steps of _make()."""
         while self._steps and not self._refused:
             if self._keeper:
-                self._step()  # a computer waits for the ride: it gets the exception
+                self._step()  # an exception is for the computer that waits for the ride
             else:
                 self.prepare()
 
@@ -74,17 +73,17 @@ class Recording:
             self._refused = attempt(self._step)
 
     def try_out_card(self):
-        """Try the SD card out, before the watchdog runs. Raises nothing."""
+        """Try the SD card out (see card_trial.py), before the watchdog runs. Raises nothing."""
         if not self._refused:
             from . import card_trial
 
             card_trial.prepare(self.recorder, self._settings)
 
     def start(self):
-        """Begin to record a ride; return None, or a Notice why that cannot be. Where the bike stands, the lean filter
-        begins anew too, so that a replay shows the same lean; it has to find the gyro's errors again in the first
-        bends. A recording begun while riding is replayed by a filter that knows less at its beginning than the one on
-        the board."""
+        """Begin to record a ride; return None, or a Notice that says why it failed. If the bike stands, the lean filter
+        restarts too, so that a replay shows the same lean; it then has to estimate the gyro's errors again in the first
+        bends. A recording begun while riding is replayed by a filter with less certain errors at its beginning than
+        those of the one on the board."""
         if self._meter.at_rest:
             self._calibration.restart()
         if self._refused and not self.on_card:  # a card has to be tried out before the watchdog runs
@@ -95,12 +94,13 @@ class Recording:
         return self._refused
 
     def start_due(self):
-        """The first readings have come: begin to record, if that was asked for. Returns as start() does."""
+        """Begin to record with the first readings, if the settings or the keeper ask for it. Returns as start()
+        does."""
         due, self._due = self._due, False
         return self.start() if due else None
 
     def calibration_changed(self):
-        """A ride has one calibration: begin another."""
+        """End the ride and begin another, because a ride has one calibration."""
         if self.recorder.active:
             self.recorder.start(self._chip, self._calibration.value)
 

@@ -1,7 +1,7 @@
-"""Where rides are kept: part 2 of ride 345 is the file 003/45/00002.rid in the directory of the rides.
+"""The files of rides: part 2 of ride 345 is the file 003/45/00002.rid in the directory of the rides.
 
 To find a name, FAT reads a directory from its beginning. So each directory is kept small: 100 rides make a group, and
-each ride has its own directory. The names have the form 8.3, of which each takes one directory entry.
+each ride has its own directory. The names have the form 8.3, which takes one directory entry each.
 """
 
 import os
@@ -39,13 +39,13 @@ def part_path(directory, ride, part):
 
 
 def groups(directory):
-    """The number of each group, in no order. Raises OSError."""
+    """The numbers of all groups, in any order. Raises OSError."""
     for group, _ in _numbers(directory, _GROUP_DIGITS):
         yield group
 
 
 def rides(directory, group):
-    """The number of each ride in a group, in no order. Raises OSError."""
+    """The numbers of all rides in a group, in any order. Raises OSError."""
     for ride, _ in _numbers(group_path(directory, group), _RIDE_DIGITS):
         yield RIDES_IN_GROUP * group + ride
 
@@ -62,7 +62,7 @@ def newest_ride(directory):
 
 
 def parts(directory):
-    """(ride, part, bytes) of every part, in no order. Takes 5 ms a ride in flash, 20 ms on a card. Raises OSError."""
+    """(ride, part, bytes) of every part, in any order. Takes 5 ms a ride in flash, 20 ms on a card. Raises OSError."""
     for group in groups(directory):
         for ride in rides(directory, group):
             for part, size in _numbers(ride_path(directory, ride), _PART_DIGITS, _ENDING):
@@ -70,8 +70,8 @@ def parts(directory):
 
 
 def _numbers(path, digits, ending=""):
-    """(number, bytes) of each file in path whose name is so many digits and the ending; without an ending, of each
-    such directory. All else belongs to somebody else and is left alone."""
+    """(number, bytes) of each file in path whose name consists of so many digits and the ending; without an ending, of
+    each such directory. Other files are the board owner's and are left alone."""
     kind = _FILE if ending else _DIRECTORY
     for entry in os.ilistdir(path):
         name = entry[0]

@@ -1,6 +1,6 @@
 """Writes a ride to the console instead of flash, for `kickstand record`: lines of base64, a '.' after each block.
 
-A host that sleeps takes nothing, and each print waits half a second for it. Then the second slow one ends the ride.
+A host that sleeps reads nothing, and each print waits half a second for it. The second slow print ends the ride.
 """
 
 from binascii import b2a_base64
@@ -9,8 +9,8 @@ from time import ticks_diff, ticks_ms
 
 from ..console import say
 
-LENGTH = 512  # bytes in a block: half a second
-SLOW_APART_MS = 60_000  # a slow print after a longer time does not count as the second
+LENGTH = 512  # bytes in a ride block: half a second
+SLOW_APART_MS = 60_000  # a slow print after a longer time counts as the first one again
 
 
 class RideStream:
@@ -24,7 +24,7 @@ class RideStream:
         return 0
 
     def next_length(self):
-        """How many bytes the next block has to have."""
+        """Length in bytes that the next block has to have."""
         return LENGTH
 
     def room(self):
@@ -39,7 +39,7 @@ class RideStream:
         self._say(b2a_base64(data).decode())
 
     def end_block(self):
-        """End a block. Raises OSError."""
+        """End a block: print the mark. Raises OSError."""
         self._say(".\n")
 
     def _say(self, text):
@@ -50,10 +50,10 @@ class RideStream:
             raise OSError(ETIMEDOUT)
 
     def end(self):
-        """End the ride: there is nothing to close."""
+        """Do nothing: there is no file to close."""
 
     def abandon(self):
-        """End the ride after an error: there is nothing to close."""
+        """Do nothing: there is no file to close."""
 
     def fault_code(self, error):
         return "out-of-memory" if isinstance(error, MemoryError) else "usb-fault"

@@ -15,24 +15,24 @@ from time import ticks_diff
 from ..errors import Notice
 
 MAX_SENTENCE = 100  # bytes: the standard says 82, but receivers with many decimals exceed it
-MAX_CHUNK = 64  # bytes read in one turn of the loop: in turns of 10 ms, twice what 10 fixes a second need
-SILENT_MS = 3000  # without any byte, without a whole sentence, or without a fix: then fault() says which
-LATE_MS = 2000  # a fix that waited in the receiver for longer than this says nothing about now
-TIME_JUMP_MS = 5000  # a fix that seems later than this is not: the receiver has corrected its clock
+MAX_CHUNK = 64  # bytes read in one pass of the loop: at 10 ms a pass, twice what 10 fixes a second need
+SILENT_MS = 3000  # after so long without a byte, a whole sentence or a fix, fault() reports which
+LATE_MS = 2000  # a fix that waited in the receiver for longer is dropped
+TIME_JUMP_MS = 5000  # a larger delay is none: the receiver has corrected its clock
 # The delay of a fix is counted from a fix that was not late, the reference. When at least so many fixes over more than
 # TIME_JUMP_MS all came late, the smallest delay becomes the new zero: the receiver set its clock back.
 MIN_FIXES_FOR_NEW_REFERENCE = 4
 KNOT_MPS = 1852.0 / 3600.0  # one knot in m/s
 KMH_MPS = 1.0 / 3.6  # one km/h in m/s
-_DAY_MS = 86_401_000  # of a day with a leap second
-_DIGITS = 5  # of a minute of arc, after its point: 2 cm
+_DAY_MS = 86_401_000  # a day with a leap second
+_DIGITS = 5  # decimals of a minute of arc: 2 cm
 
 
 class Gps:
-    """uart: a machine.UART with a time-out of 0. After poll() has returned a speed: age_ms, by how much its sentence
-    came later than the receiver's sentences usually do."""
+    """uart: a machine.UART with a time-out of 0. After poll() has returned a speed: age_ms, the delay of its sentence
+    against the receiver's earliest ones."""
 
-    problem = None  # as a Wheel has it; whatever is wrong here, fault() says
+    problem = None  # the interface of a Wheel; a receiver's faults are those of fault()
 
     def __init__(self, uart):
         self._uart = uart
@@ -41,7 +41,7 @@ class Gps:
         self._heard_ms = None
         self._sentence_ms = self._fix_ms = 0
         self._rmc_ms = None
-        self._time = b""  # of day, in the last RMC
+        self._time = b""  # time of day in the last RMC
         # A fix is remembered as (ticks_ms() when it came, its time of day in ms).
         self._reference = None  # the fix that delays are counted from
         self._earliest = None  # the fix with the smallest delay since then, and that delay
@@ -81,7 +81,7 @@ class Gps:
         return speed
 
     def _begin(self, now_ms):
-        """From now on there is time for a whole sentence and for a fix, before their absence is a fault."""
+        """Start the times after which a missing sentence or fix is a fault."""
         self._heard_ms = self._sentence_ms = self._fix_ms = now_ms
         self._fix = None
 
@@ -105,7 +105,7 @@ class Gps:
         return place
 
     def after_stall(self, now_ms):
-        """Interrupts were off until now. Nothing to do: if bytes were lost, the checksum of their sentence is wrong."""
+        """Do nothing: if bytes were lost while interrupts were off, the checksum of their sentence is wrong."""
 
     def fault(self, now_ms):
         """None, or a Notice: why there is no speed."""
@@ -131,7 +131,7 @@ class Gps:
                 return None
             fields = line[start:star].split(b",")
             speed = self._rmc(fields, now_ms) if kind == b"RMC" else self._vtg(fields, now_ms)
-        except (ValueError, IndexError, OverflowError):  # the last: of a number beyond all bounds, as 1e999
+        except (ValueError, IndexError, OverflowError):  # OverflowError: a number such as 1e999
             return None
         self._sentence_ms = now_ms
         if speed is not None:
@@ -189,10 +189,10 @@ class Gps:
 
 
 def _minutes(field, degrees, negative):
-    """An angle as NMEA writes it, (d)ddmm.mmmm, in 0.00001 minutes; None if it is none, or more than so many degrees.
-    Further digits are left out."""
+    """An angle as NMEA writes it, (d)ddmm.mmmm, in 0.00001 minutes; None if it is none, or over `degrees` degrees.
+    Further decimals are cut off."""
     whole = part = 0
-    digits = -1  # read after the point
+    digits = -1  # number of decimals so far, -1 before the point
     for byte in field:
         if byte == 46 and digits < 0:  # the point
             digits = 0
@@ -213,7 +213,7 @@ def _minutes(field, degrees, negative):
 
 
 def _date(field):
-    """The date ddmmyy as place() has it, 0 if it is none."""
+    """The date ddmmyy in the form of place(), 0 if it is none."""
     try:
         date = int(field)
     except ValueError:

@@ -13,8 +13,8 @@ from ..errors import SettingsError
 
 MAX_MPS = 100.0
 MAX_CHANGE_MPS2 = 15.0  # no tyre has more grip
-NOISE_MPS = 2.0  # how much a speed may jump beyond that
-GIVE_UP_MS = 3000  # when speeds have been refused for so long, the last accepted one was wrong
+NOISE_MPS = 2.0  # a speed may jump beyond that by so much
+GIVE_UP_MS = 3000  # after refusing speeds for so long, the last accepted one is taken as wrong
 RX_BUFFER = 512  # bytes, half a second at 9600 baud: the loop may write flash or set up the sensor meanwhile
 
 
@@ -44,12 +44,12 @@ class Speed:
         return speed
 
     def place(self, now_ms):
-        """Where the vehicle was when the speed was measured that poll(now_ms) has found, also one that it has refused:
-        as Gps.place() returns it, or None."""
+        """The position that belongs to the speed that poll(now_ms) has found, even if it has refused that speed: see
+        Gps.place(); or None."""
         return self._source.place(now_ms)
 
     def after_stall(self, now_ms):
-        """Say that interrupts were off until now, while flash was erased. now_ms: ticks_ms()."""
+        """Pass on to the source that interrupts were off until now, while flash was erased. now_ms: ticks_ms()."""
         self._source.after_stall(now_ms)
 
     def fault(self, now_ms):
@@ -57,7 +57,7 @@ class Speed:
         return self._source.fault(now_ms)
 
     def take_problem(self):
-        """Return what the source has to say once, a Notice or None, and clear it."""
+        """Return the source's problem, a Notice or None, and clear it."""
         problem, self._source.problem = self._source.problem, None
         return problem
 

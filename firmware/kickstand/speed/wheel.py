@@ -14,28 +14,29 @@ from machine import Pin
 
 from ..errors import Notice
 
-MAX_MPS = 100.0  # pulses that would mean more than this are disturbances
-BOUNCE_US = 3000  # a contact that was open for less than this, or a quarter of the shortest period, is bouncing
+MAX_MPS = 100.0  # pulses that would mean a higher speed are disturbances
+BOUNCE_US = 3000  # a contact that was open for less than this, or than a quarter of the shortest period, is bouncing
 STOPPED_MPS = 0.5  # a wheel slower than this counts as standing
 MIN_STOP_MS, MAX_STOP_MS = 500, 1800  # limits of the time without a pulse that means standing
-REPORT_MS = 100  # poll() returns a speed at most so often
-STANDING_MS = 200  # and a speed of zero at most so often
+REPORT_MS = 100  # least time between two speeds that poll() returns
+STANDING_MS = 200  # the same between two speeds of zero
 # So many edges in less than STORM_US are a storm: over 8,000 a second. The interrupt takes 33 us on a Pico, so that at
 # 30,000 a second nothing else would run: for 2 ms before this ends it, less than the time-out of a transfer. 50 pulses
 # a metre at 70 m/s are allowed.
 STORM_EDGES, STORM_US = 64, 8_000
-STORM_PAUSE_MS = 5000  # the interrupt is off for so long after a storm, and again if it lasts
-SOFT_PERIOD_US = 3333  # of pulses that are closer together, soft interrupts, as an ESP32's, lose over 2 in 100
+STORM_PAUSE_MS = 5000  # the interrupt is off for so long after a storm, and again if the storm lasts
+SOFT_PERIOD_US = 3333  # at shorter periods soft interrupts, such as an ESP32's, lose over 2 % of the pulses
 # Counts and times wrap at 30 bits. The interrupt subtracts times with this mask and not by ticks_diff(), which would
 # give a negative time after nine minutes of standing.
 _TICKS = _COUNT = 0x3FFFFFFF
 
 
 class Wheel:
-    """pin: a machine.Pin with pull-up.  pulses_per_metre: of road.  irq: dict of further arguments of Pin.irq().
+    """pin: a machine.Pin with pull-up.  pulses_per_metre: pulses per metre of road.  irq: dict of further arguments of
+    Pin.irq().
 
-    After poll() has returned a speed: age_ms, how old it is.  problem: None, or a Notice to be shown once; who shows it
-    clears it.
+    After poll() has returned a speed: age_ms, its age.  problem: None, or a Notice to be shown once; the caller that
+    shows it sets it to None.
     """
 
     def __init__(self, pin, pulses_per_metre, irq):
@@ -44,10 +45,11 @@ class Wheel:
         self._open_us = min(BOUNCE_US, shortest_us // 4)
         self._metre_us = 1e6 / pulses_per_metre  # the speed in m/s is this divided by the period in us
         self._stop_ms = min(MAX_STOP_MS, max(MIN_STOP_MS, int(1000.0 / (pulses_per_metre * STOPPED_MPS))))
-        self.count = 0  # pulses, counted by the interrupt, and when the last one came
+        self.count = 0  # pulses, counted by the interrupt; _pulse_us: when the last one came
         self._pulse_us = ticks_us()
         self._opened_us = ticks_us()  # when the contact last opened
-        self._seen = 0  # the count at the last report, and the time of its last pulse: None, no period begins there
+        # _seen: the count at the last report; _seen_us: the time of its last pulse, None if no period begins there
+        self._seen = 0
         self._seen_us = None
         self._report_ms = None  # when poll() last returned a speed
         self._moved_ms = None  # when it last saw a pulse
@@ -62,12 +64,12 @@ class Wheel:
 
     def _listen(self):
         """Turn the interrupt on."""
-        self._off = False  # the interrupt has turned itself off, and when poll() found that
+        self._off = False  # True after the interrupt has turned itself off; _off_ms: when poll() found that
         self._off_ms = None
-        self._edges = STORM_EDGES  # left of those that are timed together, since _edges_us
+        self._edges = STORM_EDGES  # edges to come before the time since _edges_us is compared with STORM_US
         self._edges_us = ticks_us()
-        # For soft interrupts: the level at the last one; True if that was the first to find it the same again; the
-        # usual time from pulse to pulse, 0 if that is not known
+        # For soft interrupts: _level: the pin's level at the last one. _same: True if that was the first of two that
+        # found the level unchanged. _usual_us: the usual time from pulse to pulse, 0 if it is not known
         self._level = None
         self._same = False
         self._usual_us = 0
@@ -89,9 +91,9 @@ class Wheel:
             self.count = (self.count + 1) & _COUNT
 
     def _soft_edge(self, pin):
-        """A soft interrupt waits while sensor or display are read or written. Of a contact that closes and opens again
-        meanwhile only the last level is seen, twice: that is a pulse too, unless it comes so early that the contact is
-        bouncing."""
+        """The handler of soft interrupts, which wait during transfers to sensor or display. If a contact closes and
+        opens meanwhile, two of them find the level unchanged. That is counted as a pulse too, unless it comes so early
+        that the contact is bouncing."""
         level = pin.value()
         if level != self._level or self._edges == 1:
             self._level, self._same = level, False
@@ -131,7 +133,7 @@ class Wheel:
         return 0.0
 
     def _wait(self, now_ms):
-        """The interrupt is off: turn it on when STORM_PAUSE_MS are over. What it counted in the storm is no speed."""
+        """Turn the interrupt on again when STORM_PAUSE_MS are over. The pulses counted in the storm make no speed."""
         if self._off_ms is None:
             self._off_ms = now_ms
             if not self._noisy:
@@ -162,17 +164,17 @@ class Wheel:
         return pulses * self._metre_us / period_us
 
     def place(self, now_ms):
-        """None: a wheel does not know where it is."""
+        """None: a wheel has no position."""
 
     def after_stall(self, now_ms):
-        """Interrupts were off until now, and pulses may be lost or late: the next period begins with the next pulse."""
+        """Begin the next period with the next pulse, because interrupts were off: pulses may be lost or late."""
         if self._seen_us is not None or self._seen != self.count:
             self._moved_ms = now_ms
         self._seen = self.count
         self._seen_us = None
 
     def fault(self, now_ms):
-        """None, or a Notice: a wheel that has never turned may be a wire that is loose."""
+        """None, or a Notice if no pulse has ever come: a wire may be loose."""
         if self._noisy:
             return Notice("wheel-storm")
         if self._too_quick:

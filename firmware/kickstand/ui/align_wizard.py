@@ -11,7 +11,7 @@ _TAKING = ("Stand: hold", "Upright: hold")
 
 
 class AlignWizard(Wizard):
-    """chip, rate_hz, calibration: as for Wizard. side: where the kickstand leans the bike to, "left" or "right".
+    """chip, rate_hz, calibration: as for Wizard. side: "left" or "right", to which the kickstand leans the bike.
     pressed: the rider has already pressed the button for the pose on the kickstand.
     """
 
@@ -36,7 +36,8 @@ class AlignWizard(Wizard):
         self._show(ASKING, messages.lines(problem))  # the next press takes the pose again
 
     def _pose_done(self, pose, now_ms):
-        """Raises AlignmentError for poses that do not fit together, StoreError."""
+        """Keep the first pose; with the second one compute and save the alignment. Raises AlignmentError for poses that
+        do not fit together, StoreError."""
         if self._kickstand is None:
             self._kickstand = pose
             self._show(ASKING, _ASK[1])

@@ -1,4 +1,4 @@
-"""The page of alignment by driving: what it waits for, how far it is, what came of it."""
+"""The page of alignment by driving: its state, its progress, its result."""
 
 from ..drive_alignment import alignment
 from . import messages

@@ -39,6 +39,10 @@ sensor-silent|Sensor silent|starting again
 sensor-reset|Sensor reset|starting again
 readings-lost|Readings lost|board too busy
 
+no-radio|No Bluetooth|on this board
+no-pairing|LIVE_PIN: not|on this board
+radio-fault|Bluetooth fault|restart it
+
 gps-silent|GPS silent|check wiring
 gps-garbled|GPS garbled|check GPS_BAUD
 gps-no-fix|GPS: no fix|needs open sky
@@ -53,6 +57,10 @@ out-of-room|Rec. stopped|no room
 flash-fault|Rec. stopped|flash fault
 card-fault|Rec. stopped|card fault
 usb-fault|Rec. stopped|USB not read
+
+user-failed|user.py {0}|{1}
+user-slow|user.py {0}|slow: {1} ms
+user-memory|user.py left out|no memory
 
 unreadable|config.py:|cannot be read
 no-setting|config.py: what?|{0}
@@ -78,7 +86,7 @@ aligned|Aligned by drive|error about {0:.1f}\xdf
 """
 # In place of the lean while the alignment is in question
 _NO_LEAN = {"other-side": "side was wrong?", "mount-moved": "mount has moved"}
-_OTHER_SETTING = "config.py: wrong|{0}"  # the display names it, the console says what is wrong with it
+_OTHER_SETTING = "config.py: wrong|{0}"  # {0}: the setting's name; the console says what is wrong with it
 
 
 def lines(refusal):
@@ -87,5 +95,5 @@ def lines(refusal):
 
 
 def no_lean(reason):
-    """Why there is no lean to show, in one line. reason: LeanMeter.suppressed_reason."""
+    """The line that says why no lean is shown. reason: LeanMeter.suppressed_reason."""
     return _NO_LEAN.get(reason, "not sure yet")

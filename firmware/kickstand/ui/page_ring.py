@@ -14,7 +14,8 @@ class PageRing:
     LeanMeter, the ActiveCalibration, the BackgroundAlignment or None, and the Recording, all to be read only. align:
     called for a short press while there is no alignment: it means that the bike is on its kickstand.
 
-    late: the page that is due is to show no lean.
+    late: True if the next page must not show a lean, because it comes too late. live: a Live, which has a page then, or
+    None. draws: True if the display shows pictures. own: the owner's pages, functions that return two lines each.
     """
 
     def __init__(self, leans, meter, calibration, drive, rides, align):
@@ -25,24 +26,32 @@ class PageRing:
         self._align = align
         self._pages = MOTORCYCLE if leans else CAR
         self._at = 0
-        self.late = False
+        self.late = self.draws = False
+        self.live = None
+        self.own = ()
+        self._own_at = None  # index of the owner's page that is shown
 
-    def add(self, page):
-        """Add a page behind the others."""
-        self._pages += (page,)
+    def show_own(self, now_ms):
+        """To the first of the owner's pages: before there is an alignment the menu is the way there."""
+        self._own_at = 0
 
     def first(self):
-        """Back to the first page."""
+        """Go back to the first page."""
         self._at = 0
+        self._own_at = None
 
     def drive(self):
-        """To the page of alignment by driving."""
+        """Go to the page of alignment by driving."""
         self._at = len(self._pages) if self._calibration.aligned else 0
 
     def press(self, event, now_ms):
         if event != SHORT:
             return False
-        if self._driving or self._calibration.aligned:
+        if self._own_at is not None:
+            self._own_at += 1
+            if self._own_at >= len(self.own):
+                self.first()
+        elif self._driving or self._calibration.aligned:
             self._at += 1
         else:
             self._align()
@@ -50,7 +59,7 @@ class PageRing:
 
     @property
     def _driving(self):
-        """True while alignment by driving has a page: the first one until there is an alignment, then the last."""
+        """True while alignment by driving has a page: the first page until there is an alignment, then the last."""
         return self._drive is not None and self._drive.shown
 
     def _drive_lines(self, now_ms):
@@ -59,28 +68,52 @@ class PageRing:
         return drive_page.lines(self._drive, now_ms)
 
     def lines(self, now_ms):
+        if self._own_at is not None:
+            return self.own[self._own_at]()
         if not self._calibration.aligned:
             if not self._driving:
                 return pages.not_aligned(self._meter, now_ms // 1000)
             if self._at % 2 == 0:
                 return self._drive_lines(now_ms)
             return pages.not_aligned(self._meter, now_ms // 1000, "drive and brake")
-        count = len(self._pages) + self._driving + self._rides.recorder.active
+        more = len(self._pages) + self._driving
+        count = more + (self.live is not None) + self._rides.recorder.active
         if self._at >= count:  # the last page has gone; checked here, so that the other pages keep their places
             self._at = 0
+            if self.own:
+                self._own_at = 0
+                return self.own[0]()
         if self._at == len(self._pages) and self._driving:
             return self._drive_lines(now_ms)
-        if self._at >= len(self._pages):
+        if self._at == more and self.live:
+            return pages.live(self.live)
+        if self._at >= more:
             return pages.recording(self._rides.recorder)
         return self._page(self._pages[self._at])
 
+    @property
+    def trusted(self):
+        """True if there is a lean that may be shown."""
+        meter = self._meter
+        shown = meter.trusted and not meter.fallen and abs(meter.lean_deg) <= FALLEN_DEG
+        return shown and self._calibration.aligned and not self.late
+
     def _page(self, page):
         meter = self._meter
+        recording = self._at == 0 and self._rides.recorder.active
         if meter.fallen:
             return pages.FALLEN
-        if self.late or not meter.trusted or abs(meter.lean_deg) > FALLEN_DEG:
-            return pages.unsure(meter.suppressed_reason)
+        if not self.trusted:
+            lines = pages.unsure(meter.suppressed_reason)
+            return lines + (self._glance().unsure(*lines),) if self.draws else lines
         line1, line2 = page(meter)
-        if self._at == 0 and self._rides.recorder.active:
+        if recording:
             line1 = pages.recorded(line1)
+        if self.draws and page in self._glance().PICTURES:
+            return line1, line2, self._glance().PICTURES[page](meter, recording)
         return line1, line2
+
+    def _glance(self):
+        from . import glance  # only with a display that draws
+
+        return glance

@@ -19,7 +19,7 @@ _bar = bytearray(16)
 
 
 def unsure(reason):
-    """In place of a lean that cannot be trusted. reason: its code, or None."""
+    """The two lines in place of a lean that is not trusted. reason: its code, or None."""
     return "Lean  --", messages.no_lean(reason)
 
 
@@ -49,7 +49,7 @@ def progress_bar(done, total):
 
 
 def side_name(lean_deg):
-    """left or right; nothing within half a degree of upright."""
+    """ "left" or "right"; "" within half a degree of upright."""
     return "right" if lean_deg >= 0.5 else "left" if lean_deg <= -0.5 else ""
 
 
@@ -60,13 +60,13 @@ def lean(meter):
 
 
 def recorded(line):
-    """The line with the mark in its last column that says that a ride is being recorded."""
+    """The line with the mark for a recording in its last column."""
     # by hand: MicroPython's %-15s counts the bytes of a degree sign, which are two
     return line + " " * (15 - len(line)) + RECORDING
 
 
 def recording(recorder):
-    """For how long the ride has been recorded, and how much longer it may last before its beginning is erased."""
+    """Duration of the recording, and the time that is left before its beginning is erased."""
     seconds, room_s = recorder.seconds(), recorder.room_s()
     if room_s is None:
         room = "to USB"
@@ -75,6 +75,12 @@ def recording(recorder):
     else:
         room = "room %d min" % (room_s // 60) if room_s < 36_000 else "room %d h" % (room_s // 3600)
     return "Rec %9d:%02d" % (seconds // 60, seconds % 60), room
+
+
+def live(live):
+    """Who gets the lean over Bluetooth, and how many packets a second."""
+    who = live.asked or ("a phone" if live.radio.phone is not None else "no phone")
+    return "BLE %12s" % who, "%4d packets/s" % live.per_second
 
 
 def maxima(meter):
@@ -98,7 +104,7 @@ def cornering(meter):
 
 
 def formula(meter):
-    """Nicolae's formula as published beside the filter's lean: this shows why there is a filter."""
+    """The lean by Nicolae's formula as published, and the filter's lean for comparison."""
     leans = round(meter.lean_formula_deg), round(meter.lean_deg)
     return "Formula   %4d%s" % (leans[0], DEGREE), "Filter    %4d%s" % (leans[1], DEGREE)
 
@@ -122,8 +128,8 @@ def not_aligned(meter, seconds, todo="On stand: press"):
 
 
 def sensor_info(sensor, lost, meter, seconds):
-    """Which chip it is and how warm; below that in turn what is calibrated, how often the chip's FIFO overflowed and
-    the chip was set up, and how many samples the overflows have cost (lost)."""
+    """The chip's name and temperature; below that alternately what is calibrated, the numbers of FIFO overflows and of
+    set-ups of the chip, and the number of samples that overflows have lost (lost)."""
     chip, calibration = sensor.chip, meter.calibration
     line1 = "%-9s%5.1f%sC" % (chip.name[:9], chip.temperature_c(meter.reading[3]), DEGREE)
     turn = seconds // 2 % 3

@@ -1,7 +1,7 @@
-"""What the rider sees and what a press does: a stack of views. The one in front is shown, and a press is for it.
+"""A stack of views: the one in front is shown on the display and takes presses of the button.
 
-A view has lines(now_ms), which gives two lines of 16 characters, or None while it has nothing to show, and
-press(event, now_ms), which gives True if the press was for it.
+A view has lines(now_ms), which returns two lines of 16 characters, or None while it has nothing to show, and
+press(event, now_ms), which returns True if it used the press.
 """
 
 import gc
@@ -16,14 +16,14 @@ NOTICE_MS = 2000
 
 
 class NoticeView:
-    """Two lines for two seconds, or until a press, which is then for what they covered."""
+    """Shows two lines for two seconds. A press ends this early and is passed on to the view below."""
 
     def __init__(self):
         self._lines = None
         self._until_ms = 0
 
     def show(self, lines, now_ms):
-        """lines: two, for NOTICE_MS from now on."""
+        """Show two lines for NOTICE_MS from now on."""
         self._lines = lines
         self._until_ms = ticks_add(now_ms, NOTICE_MS)
 
@@ -38,7 +38,7 @@ class NoticeView:
 
 
 class FaultView:
-    """Why there are no readings."""
+    """Shows why there are no readings."""
 
     def __init__(self, sensor):
         self._sensor = sensor
@@ -52,7 +52,7 @@ class FaultView:
 
 
 class InfoView:
-    """Which chip it is, how warm, what is calibrated; until a short press."""
+    """Shows the chip's name, its temperature and what is calibrated, until a short press."""
 
     def __init__(self, sensor, clock, meter):
         self._sensor = sensor
@@ -61,7 +61,7 @@ class InfoView:
         self.open = False
 
     def show(self, now_ms):
-        """From now on."""
+        """Show this view from now on."""
         self.open = True
 
     def lines(self, now_ms):
@@ -76,7 +76,7 @@ class InfoView:
 
 
 class QuestionView:
-    """What alignment by driving has to report or to ask. drive: a BackgroundAlignment, or None."""
+    """Shows a report or a question of alignment by driving. drive: a BackgroundAlignment, or None."""
 
     def __init__(self, drive):
         self._drive = drive
@@ -116,12 +116,12 @@ class Screen:
         self.pages = PageRing(settings.leans, meter, calibration, drive, rides, self._align_now)
 
     def lines(self, now_ms):
-        """What the display should say now. Call it about every 100 ms."""
+        """What the display should show now: two lines and, where it draws, a picture. Call it about every 100 ms."""
         return self._update_front(now_ms)[1]
 
     def press(self, event, now_ms):
-        """event: SHORT or LONG. A long press that the view in front has no use for opens the menu. What it wants may be
-        missing, or have no memory: that must not end the ride."""
+        """React to a press. event: SHORT or LONG. A long press that the view in front does not use opens the menu. The
+        modules for it may be missing, or memory too small: the rider gets a notice, and the ride goes on."""
         problem = attempt(self._press, event, now_ms)
         if problem:
             self.notify(problem, now_ms)
@@ -141,12 +141,13 @@ class Screen:
             self._open_menu(now_ms)
         self._drop_ended()
 
-    def add_page(self, page):
-        """Add a page behind the others. page: a function of the meter that gives two lines of 16 characters."""
-        self.pages.add(page)
+    def add_live(self, live, end):
+        """Show a Live on a page, and let the menu end it by calling end()."""
+        self.pages.live = live
+        self._end_live = end
 
     def interrupt(self, now_ms):
-        """The sensor has failed: a calibration under way is cancelled."""
+        """Cancel a calibration under way, because the sensor has failed."""
         if self.wizard:
             self.wizard = None
             self._notice.show(("Calibration", "stopped: fault"), now_ms)
@@ -160,11 +161,11 @@ class Screen:
                 break
         self._drop_ended()
         if view is self._question:
-            self.pages.first()  # where the answer leads to
+            self.pages.first()  # the page to be shown after the answer
         return view, lines
 
     def _drop_ended(self):
-        """What has ended gets no more samples and no more presses."""
+        """Drop a wizard or a menu that has ended."""
         if self.wizard and self.wizard.ended:
             self.wizard = None
         if self.menu and self.menu.ended:
@@ -181,12 +182,14 @@ class Screen:
         drive = (("Align by drive", self._align_by_drive),) if self._drive else ()
         rest = (("Six positions", self._six), ("Reset maxima", self._reset), ("Sensor info", self._info.show))
         record = ("Stop recording", self._stop) if self._rides.recorder.active else ("Record ride", self._record)
+        last = (record,) + ((("Own pages", self.pages.show_own),) if self.pages.own else ())
+        last += (("Stop Bluetooth", self._stop_live),) if self.pages.live else ()
         if self._settings.leans:
-            return align + rest + drive + (record,)
-        return drive + rest + (record,)
+            return align + rest + drive + last
+        return drive + rest + last
 
     def _ready(self, now_ms):
-        """True if there are readings; if not, the rider is shown why."""
+        """True if there are readings; if not, show a notice that says why."""
         fault = self._sensor.fault
         if fault is not None:
             self.notify(fault, now_ms)
@@ -197,11 +200,11 @@ class Screen:
             self._begin_align(False)
 
     def _align_now(self):
-        """This press is already that for the pose on the kickstand."""
+        """Start the AlignWizard as if the button had been pressed for the pose on the kickstand."""
         self._begin_align(True)
 
-    # The wizards are imported when they are wanted: with what they need they take 12 KB of heap. After a collection, or
-    # what stays for good would lie at the far end of the heap and make every later collection longer.
+    # The wizards are imported when they are needed, because with their own imports they take 12 KB of heap. This is
+    # done after a collection: else lasting objects would lie at the far end of the heap and make each later one longer.
 
     def _begin_align(self, pressed):
         gc.collect()
@@ -234,6 +237,11 @@ class Screen:
                 self.notify(problem, now_ms)
             elif self._rides.recorder.active:
                 self._notice.show(pages.recording(self._rides.recorder), now_ms)
+
+    def _stop_live(self, now_ms):
+        self.pages.live = None
+        self._end_live()
+        self._notice.show(("Bluetooth is off", "until restart"), now_ms)
 
     def _stop(self, now_ms):
         self._rides.stop()

@@ -1,4 +1,4 @@
-"""Guides the rider through the six positions, each side up once in any order, and a slanted pose as the proof."""
+"""Guides the rider through the six positions, each side up once in any order, and a slanted pose that verifies them."""
 
 from ..calibration import six_position
 from ..calibration.parameters import six_position_calibration
@@ -8,7 +8,7 @@ from .wizard import NOTICE, RESULT, Wizard
 POSE_SECONDS = 2
 NOTICE_MS = 1500
 RESULT_MS = 6000
-ROUGH_TILT_DEG = 30.0  # largest tilt of a side before it is calibrated; the fit checks it more strictly
+ROUGH_TILT_DEG = 30.0  # largest tilt of a side in uncalibrated readings; the fit has a stricter limit
 
 
 class SixWizard(Wizard):
@@ -40,7 +40,7 @@ class SixWizard(Wizard):
         self._notice(now_ms, *messages.lines(problem))
 
     def _settled(self, accel, now_ms):
-        """It has lain still for half a second: is this a pose that is still missing?"""
+        """Check, after half a second of stillness, that this is a pose that is still missing; else tell the rider."""
         if self._fitted:
             offset, slope = self._fitted
             tilt = six_position.tilt_deg([slope[i] * accel[i] + offset[i] for i in range(3)])
@@ -55,7 +55,7 @@ class SixWizard(Wizard):
             self._side_done(now_ms, "Side %s is done")
 
     def _pose_done(self, pose, now_ms):
-        """Raises CalibrationError, StoreError."""
+        """Keep the pose; after the sixth one fit the calibration. Raises CalibrationError, StoreError."""
         if self._fitted:
             self._prove(pose, now_ms)
             return
@@ -71,8 +71,7 @@ class SixWizard(Wizard):
         self._notice(now_ms, words % six_position.SIDES[self._side], "%d/6, turn it" % done)
 
     def _prove(self, pose, now_ms):
-        """The seventh pose: the calibration is saved only if this pose confirms it. Raises CalibrationError,
-        StoreError."""
+        """Save the calibration if the seventh pose confirms it. Raises CalibrationError, StoreError."""
         offset, slope = self._fitted
         error = six_position.check_free_pose(offset, slope, pose.accel)
         self._calibration.save(six_position_calibration(offset, slope, self._gyro))

@@ -1,4 +1,4 @@
-"""What both wizards are: views that take poses, one after the other, in one of a few named states."""
+"""The base of both wizards: a view that takes poses, one after the other, in one of a few named states."""
 
 from time import ticks_add, ticks_diff
 
@@ -7,20 +7,20 @@ from ..calibration.pose_taker import DONE, SETTLED, SPOILT, PoseTaker
 from ..errors import Refusal
 from . import messages
 
-# What a wizard does now
+# The states of a wizard
 ASKING = 0  # waiting for the press that begins a pose
 TAKING = 1  # each sample goes to the PoseTaker
-NOTICE = 2  # something is shown for a moment, then comes the next pose
-REFUSED = 3  # the reason is shown until a press, then it begins anew
-RESULT = 4  # what came of it is shown for some seconds, then it ends
+NOTICE = 2  # shows a notice for a moment, then asks for the next pose
+REFUSED = 3  # shows the reason until a press, then starts again
+RESULT = 4  # shows the result for some seconds, then ends
 ENDED = 5
 
 
 class Wizard:
     """A view (see screen.py) that also takes each sample, until it has ended.
 
-    chip, rate_hz, seconds: as for PoseTaker. calibration: the ActiveCalibration. A subclass says what is asked for, and
-    what is done with what was taken.
+    chip, rate_hz, seconds: as for PoseTaker. calibration: the ActiveCalibration. A subclass says which poses it asks
+    for, and what it does with each.
     """
 
     def __init__(self, chip, rate_hz, seconds, calibration):
@@ -30,7 +30,7 @@ class Wizard:
 
     @property
     def ended(self):
-        """True once it is over."""
+        """True once the wizard is over."""
         return self._state == ENDED
 
     def sample(self, counts, now_ms):
@@ -57,16 +57,16 @@ class Wizard:
         """Begin the next pose."""
 
     def _settled(self, accel, now_ms):
-        """The sensor has been still for half a second. accel: the mean reading (3, g)."""
+        """Called when the sensor has been still for half a second. accel: the mean reading (3, g)."""
 
     def _progress(self, done, total):
-        """done of total samples of the pose are taken."""
+        """Show that `done` of `total` samples of the pose are taken."""
 
     def _spoilt(self, problem, now_ms):
-        """The pose was refused. problem: a CaptureError."""
+        """Called when the pose was refused. problem: a CaptureError."""
 
     def _pose_done(self, pose, now_ms):
-        """A StillPose is complete. May raise a Refusal, which is shown."""
+        """Called with each complete StillPose. May raise a Refusal, which is shown."""
 
     def lines(self, now_ms):
         if self._state in (NOTICE, RESULT) and ticks_diff(now_ms, self._until_ms) >= 0:
@@ -86,12 +86,12 @@ class Wizard:
         return True
 
     def _show(self, state, lines):
-        """Go into a state. lines: two."""
+        """Go into a state and show two lines."""
         self._state = state
         self._lines = lines
 
     def _show_for(self, ms, state, now_ms, *lines):
-        """Go into NOTICE or RESULT for so long."""
+        """Go into NOTICE or RESULT for so long, and show two lines."""
         self._until_ms = ticks_add(now_ms, ms)
         self._show(state, lines)
 

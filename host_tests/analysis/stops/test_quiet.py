@@ -1,4 +1,4 @@
-"""A standstill told by how little the vehicle shakes: each condition on its own, a little to either side of its limit.
+"""A standstill seen by how little the vehicle shakes: each condition on its own, a little to either side of its limit.
 
 Ten seconds of riding, four of what may be a standstill, ten of riding; no speed in the log.
 """
@@ -65,7 +65,7 @@ def share(ride: Channels) -> float:
         ({"rolling": 4.0}, {"rolling": 6.0}),  # the filter knows: half of a second
         ({"heavier": 0.115}, {"heavier": 0.125}),  # 0.12 g, of a sensor without six positions
         ({"heavier": -0.115}, {"heavier": -0.125}),
-        ({"heavier": 0.145, "rested": 1.1}, {"heavier": 0.155, "rested": 1.1}),  # 0.05 g, where a rest tells more
+        ({"heavier": 0.145, "rested": 1.1}, {"heavier": 0.155, "rested": 1.1}),  # 0.05 g, where a rest shows more
         ({"heavier": 0.055, "rested": 1.1}, {"heavier": 0.045, "rested": 1.1}),
     ],
 )

@@ -1,4 +1,4 @@
-"""The speed of a log, fitted to what was felt: against the same estimate made in another way, and its delay."""
+"""The speed of a log, fitted to the measured force: against the same estimate made in another way, and its delay."""
 
 import numpy as np
 import pytest
@@ -39,12 +39,12 @@ def conditioned(part, speed, acceleration, delay_s):
     slopes = np.array(slopes).T
     full = np.zeros((len(time), count + 2))
     full[:, 0], full[:, 1:-1] = speed, slopes
-    told = full[wanted]
+    design = full[wanted]
     n = 5  # samples on each side of 0.2 s
-    told[:, -1] = [-np.mean(np.pad(acceleration, n, mode="edge")[k : k + 2 * n + 1]) for k in wanted]
+    design[:, -1] = [-np.mean(np.pad(acceleration, n, mode="edge")[k : k + 2 * n + 1]) for k in wanted]
     prior = np.zeros((count + 2, count + 2))
     prior[0, 0], prior[-1, -1], prior[1:-1, 1:-1] = 0.01**2, 0.05**2, covariance
-    gain = prior @ told.T @ np.linalg.inv(told @ prior @ told.T + 0.05**2 * np.eye(len(told)))
+    gain = prior @ design.T @ np.linalg.inv(design @ prior @ design.T + 0.05**2 * np.eye(len(design)))
     return speed + full @ (gain @ (part.speed_mps[values] - speed[wanted]))
 
 
@@ -106,20 +106,20 @@ def test_how_late_a_speed_is(late_s, every_s):
 
 
 @pytest.mark.parametrize("late_s", [-0.7, 1.7])
-def test_a_speed_that_is_later_than_any_receivers_tells_no_delay(late_s):
+def test_a_speed_that_is_later_than_any_receivers_shows_no_delay(late_s):
     assert speed_delay_s(waves(late_s=late_s)) == 0.0
 
 
 @pytest.mark.parametrize(
-    ("tells", "does_not"),
+    ("shows", "does_not"),
     [
         ({"seconds": 30.0}, {"seconds": 29.0}),  # thirty speeds
         ({"seconds": 30.0, "every_s": 0.5}, {"seconds": 29.0, "every_s": 0.5}),  # one a second of them
         ({"size_mps2": 0.80}, {"size_mps2": 0.70}),  # that change by 0.5 m/s rms: 0.66 of the acceleration's size
     ],
 )
-def test_what_it_takes_to_tell_a_delay(tells, does_not):
-    assert speed_delay_s(waves(late_s=0.4, **tells)) == pytest.approx(0.4, abs=0.02)
+def test_what_it_takes_to_show_a_delay(shows, does_not):
+    assert speed_delay_s(waves(late_s=0.4, **shows)) == pytest.approx(0.4, abs=0.02)
     assert speed_delay_s(waves(late_s=0.4, **does_not)) == 0.0
 
 

@@ -1,4 +1,4 @@
-"""Stops without any noise, against their closed form: what counts as a stop, and each figure that is told of it.
+"""Stops without any noise, against their closed form: what counts as a stop, and each figure of it.
 
 Nothing shakes, so a standstill is where the lean filter says that the vehicle rests, or where the log's speed is 0.
 """
@@ -134,7 +134,7 @@ def test_after_a_gap_only_what_is_whole_is_integrated():
 
 
 class TestStandstill:
-    """What the rest after the stop tells: the slope, and what the gyro reads at rest."""
+    """What the rest after the stop shows: the slope, and what the gyro reads at rest."""
 
     def disturbed(self, begin_s: float, end_s: float, off_g: float = 0.1) -> float:
         """Deceleration found where the force is off from begin_s to end_s after the standstill at 18 s."""
@@ -235,7 +235,7 @@ def test_each_stop_begins_after_the_standstill_before():
 
 @pytest.mark.parametrize(("off_g", "counts"), [(0.11, True), (0.15, False)])
 def test_a_speed_that_does_not_close(off_g, counts):
-    """0.15 g felt in excess for 8.8 s of riding on would be 13 m/s at the standstill before: over 3 + 0.7 m/s a s."""
+    """0.15 g too much for 8.8 s of riding on would be 13 m/s at the standstill before: over 3 + 0.7 m/s a s."""
     road = braking(20.0, 5.0, before_s=4.0)
     ride = road.channels()
     ride.forward_g[(road.t_s > 5.0) & (road.t_s < 14.0)] -= off_g
@@ -268,7 +268,7 @@ def test_a_stop_that_the_speed_alone_shows(mps2, counts):
 
 
 @pytest.mark.parametrize(("age_s", "stands"), [(2.9, True), (3.1, False)])
-def test_an_old_speed_tells_nothing(age_s, stands):
+def test_an_old_speed_shows_nothing(age_s, stands):
     """0 m/s, and then nothing: three seconds later the vehicle may ride again."""
     road = Road((10.0, 0.0), (20.0, 0.5))
     road.rests[:] = False
@@ -280,7 +280,7 @@ def test_an_old_speed_tells_nothing(age_s, stands):
 
 
 def test_a_log_that_begins_on_the_move():
-    """No standstill before tells that the speed there was 0."""
+    """No standstill before shows that the speed there was 0."""
     ride = braking(20.0, 5.0).channels()
     (stop,) = find_stops(ride.part(ride.t_s >= 11.0))
     assert stop.initial_speed_mps == pytest.approx(20.0, rel=0.003)

@@ -37,7 +37,7 @@ class SerialLine:
     def _hear(self, data):
         self._said += data
         self.said += data
-        self._device.chip.stop()
+        self._device.stop()
 
     def _says(self):
         if not self.connected:
@@ -53,7 +53,7 @@ class SerialLine:
         if self.cut_after is not None and self.sent > self.cut_after:
             self.connected = False
         if self.connected:
-            self._device.console.send(data)
+            self._device.send(data)
         return self.connected
 
     def look(self):

@@ -1,4 +1,4 @@
-"""How well the aligned axes are those of the bike, judged by the ride itself.
+"""Errors of the aligned axes against those of the bike, estimated from the ride itself.
 
 On a straight a balanced bike is upright, so the force across it has the direction of its own up: `roll`. Braking
 and speeding up on a straight push along its own forward: `yaw`. From one standstill to another on level ground
@@ -15,17 +15,17 @@ from ..logs.table import Array
 from .channels import Channels
 from .downsample import spacing_s
 
-# What a degree of each costs the shown lean, measured with simulated rides whose calibrations were turned on purpose.
-# Forward turned by yaw takes pitching for rolling: roll rate' = roll rate cos(yaw) + pitch rate sin(yaw), and the lean
-# is off by the bike's pitching times sin(yaw). Forward turned by pitch takes turning for rolling likewise, of which the
-# filter corrects most. Roll adds to the lean as it is, but riding takes MAX_TRIM of it out.
-YAW_COSTS_DEG, PITCH_COSTS_DEG = 3.0, 5.0  # times the sine
+# The rms error of the shown lean by each error, measured with simulated rides whose calibrations were rotated on
+# purpose. With a yaw error, pitching looks like rolling: roll rate' = roll rate cos(yaw) + pitch rate sin(yaw), and the
+# lean's error is the bike's pitching times sin(yaw). With a pitch error, yawing looks like rolling likewise, most of
+# which the filter corrects. A roll error adds to the lean, but riding corrects up to MAX_TRIM of it.
+YAW_COSTS_DEG, PITCH_COSTS_DEG = 3.0, 5.0  # rms error of the lean, over the sine of that error
 
 SMOOTH_S = 0.5
-STRAIGHT_DPS, STRAIGHT_DEG = 2.0, 8.0  # riding straight on: turning and leaning by less
-ENOUGH_S = 10.0  # of such riding
-LEVEL_S = 60.0  # of riding, for hills to even out
-ENOUGH_G = 0.05  # rms of braking and speeding up in it
+STRAIGHT_DPS, STRAIGHT_DEG = 2.0, 8.0  # riding straight: yaw rate and lean are smaller
+ENOUGH_S = 10.0  # least time of riding straight
+LEVEL_S = 60.0  # least time of riding in which hills even out
+ENOUGH_G = 0.05  # least rms of braking and speeding up on straights
 
 
 @dataclass
@@ -48,7 +48,7 @@ class Quality:
 
 @dataclass
 class LeanCost:
-    """By about how much each angle puts the shown lean off, rms in degrees, None where that is unknown."""
+    """The rms error of the shown lean by each angle, degrees, roughly; None where the angle is unknown."""
 
     roll_deg: float | None
     pitch_deg: float | None
@@ -56,7 +56,7 @@ class LeanCost:
 
 
 def lean_cost(found: Quality) -> LeanCost:
-    """What the angles by which the axes are off cost the shown lean of a motorcycle.
+    """The errors of a motorcycle's shown lean that these errors of the axes cause.
 
     >>> cost = lean_cost(Quality(0.2, None, 5.1, 1.0, 60.0, np.zeros(1), np.zeros(1)))
     >>> cost.roll_deg, cost.pitch_deg, round(cost.yaw_deg, 2)
@@ -72,12 +72,13 @@ def lean_cost(found: Quality) -> LeanCost:
 
 
 def yaw_cost_deg(yaw_deg: float) -> float:
-    """What a forward that is turned by so much about the vertical usually costs the shown lean: rms, degrees."""
+    """The rms error of the shown lean, degrees, that a yaw error of the alignment causes on average."""
     return YAW_COSTS_DEG * abs(float(np.sin(np.radians(yaw_deg))))
 
 
 def quality(ride: Channels, standing: NDArray[np.bool_]) -> Quality:
-    """ride: a whole ride with evenly spaced samples (see downsampled()); standing (n): True where it stands still."""
+    """The Quality by a whole ride with evenly spaced samples (see downsampled()). standing (n): True where the vehicle
+    stands still."""
     step_s = spacing_s(ride)
     n = min(max(1, round(SMOOTH_S / step_s)), len(ride.t_s))
     count = len(ride.t_s) // n

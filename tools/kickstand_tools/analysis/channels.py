@@ -1,4 +1,4 @@
-"""A ride in the vehicle's axes: what plot, report and export work on.
+"""A ride in the vehicle's axes, for plot, report and export.
 
 The lean is the firmware's own, sample by sample, or the smoothed one. Everything that does not depend on the past is
 computed by numpy; a test holds it equal to the firmware.
@@ -24,9 +24,9 @@ class Channels(Table):
     t_s: seconds since the log's first sample. lean_deg: > 0 to the right; lean_formula_deg: by Nicolae's (25)-(26)
     alone. left_g, up_g, forward_g: specific force; lateral_g: acceleration to the left in the road's plane, (23).
     pitch_rate_dps: > 0 nose up; yaw_rate_dps: > 0 in a left turn; roll_rate_dps: > 0 to the right. shown_g: the forward
-    force, smoothed as on the display. lean_sigma_deg: standard deviation of the lean. As 1 or 0: resting: the meter
-    knows that the bike stands still; rolling: it knows from leaning and turning that it does not; sure: it trusts its
-    lean. lat_deg, lon_deg: degrees north and east, and utc_s: s since 1970, both only where there is a new value.
+    force, smoothed as on the display. lean_sigma_deg: standard deviation of the lean. 1 or 0: resting: the meter has
+    detected a standstill; rolling: its estimated speed is surely not 0; sure: it trusts its lean. lat_deg, lon_deg:
+    degrees north and east, and utc_s: s since 1970, both only where there is a new value.
     """
 
     t_s: Array
@@ -58,17 +58,17 @@ class Channels(Table):
 
     @property
     def force_g(self) -> Array:
-        """(n, 3): left, up, forward."""
+        """(n, 3) specific force, g: left, up, forward."""
         return np.column_stack((self.left_g, self.up_g, self.forward_g))
 
     @property
     def rate_dps(self) -> Array:
-        """(n, 3): about left, up, forward."""
+        """(n, 3) rates, deg/s: about left, up, forward."""
         return np.column_stack((-self.pitch_rate_dps, self.yaw_rate_dps, self.roll_rate_dps))
 
 
 def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool = False) -> Channels:
-    """The block in the vehicle's axes. lean: what _Lean.follow() returned for it.
+    """The block in the vehicle's axes. lean: the result of _Lean.follow() for it.
 
     Forces by Nicolae's (18)-(20) and the matrix, then (25)-(26) and (23). A car has no lean, and its lateral
     acceleration is the force to the left.

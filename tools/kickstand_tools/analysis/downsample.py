@@ -12,8 +12,8 @@ _LAST = ("lat_deg", "lon_deg", "utc_s")
 
 
 def joined(parts: Iterable[Channels]) -> Channels:
-    """The parts of a ride, one after the other, as one. Of parts that are made one by one the memory holds but one, and
-    a column without any value takes none: it is read only."""
+    """The parts of a ride joined to one. Takes them one by one, to limit memory; a column without any value takes none,
+    and is read only."""
     columns: list[Array | None] = [None for _ in fields(Channels)]
     length = 0
     for part in parts:
@@ -37,7 +37,7 @@ def joined(parts: Iterable[Channels]) -> Channels:
 
 
 def thinned(course: Channels, step_s: float) -> Channels:
-    """A whole ride in means over step_s; itself if it has no more samples than that."""
+    """A whole ride in means over step_s; unchanged if it has no more samples than that."""
     if np.all(np.diff(_stretches(course.t_s, step_s)) > 0.0):
         return course
     return joined(downsampled([course], step_s))
@@ -49,10 +49,10 @@ def spacing_s(course: Channels) -> float:
 
 
 def downsampled(blocks: Iterable[Channels], step_s: float) -> Iterator[Channels]:
-    """Means over each stretch of step_s in which there are samples; a channel's NaNs do not count. Of positions, and of
-    their time, the last one: there is no mean of longitudes on both sides of 180 degrees.
+    """The means over each stretch of step_s in which there are samples; a channel's NaNs do not count. For positions
+    and their time it is the last value: there is no mean of longitudes on both sides of 180 degrees.
 
-    A ride with a sample or less in each stretch comes through unchanged. A stretch may go on from block to block.
+    A ride with at most one sample per stretch is not changed. A stretch may extend over several blocks.
     """
     rest: Channels | None = None
     for block in blocks:

@@ -1,23 +1,30 @@
-"""One pass over a ride: all that its report and its pictures show."""
+"""Reads a ride once and keeps what its report and its pictures need."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from kickstand.errors import Notice
+from numpy.typing import NDArray
 
 from ..logs.source import Progress
 from ..logs.stretch import Stretch
+from ..logs.table import Array
+from ..signals.averages import smoothed
 from .alignment_quality import Quality, quality
 from .channels import Channels
-from .downsample import downsampled, joined
+from .downsample import downsampled, joined, spacing_s
 from .ride import Ride
-from .riding import riding_s
 from .stops.brake_test import RATE_S, Stop, stops_of
 from .stops.standstill import standing
 from .summary import Summary
 
 _NOT_KEPT = ("lean_formula_deg", "temp_c", "shown_g", "lean_sigma_deg", "utc_s")  # a quarter of a long ride's memory
+# A vehicle that has gone anywhere has turned, sped up or braked by this much for a second. An engine that idles at
+# standstill shakes as much as a road, but its mean over a second hardly changes.
+OVER_S = 1.0
+TURNS_DPS, PUSHES_G = 3.0, 0.05
+MOVES_MPS = 1.0
 
 
 @dataclass
@@ -25,8 +32,8 @@ class Overview:
     """A ride: the summary of every sample, and its course in means over RATE_S, in which the columns that neither
     report nor pictures need are NaN (vehicle_channels() has them).
 
-    riding_s: time on the move, s. notices: what is remarkable in the log, and contradicts the calibration. stops: none
-    where forward is backward.
+    riding_s: time on the move, s. notices: what is remarkable in the log, and what contradicts the calibration. stops:
+    empty if forward and backward are exchanged.
     """
 
     ride: Ride
@@ -39,12 +46,12 @@ class Overview:
 
     @property
     def exchanged(self) -> Notice | None:
-        """Of notices the one that forward is backward."""
+        """The notice that forward and backward are exchanged, or None."""
         return next((notice for notice in self.notices if notice.code == "forward-exchanged"), None)
 
     @property
     def has_speed(self) -> bool:
-        """The log has a speed that is not always 0."""
+        """True if the log has a speed that is not always 0."""
         return self.summary.speed_mps.time_s is not None
 
 
@@ -76,10 +83,35 @@ def overview(ride: Ride, progress: Progress | None = None) -> Overview:
     total.frozen_s = min(frozen_s, total.missing_s) if isinstance(ride.log, Stretch) else frozen_s
     still = standing(course)
     found = quality(course, still)
-    moved_s = min(total.riding_s, riding_s(course, still, whole=not isinstance(ride.log, Stretch)))
+    moved_s = min(total.riding_s, _riding_s(course, still, whole=not isinstance(ride.log, Stretch)))
     seen = Overview(ride, total, course, [], found, moved_s, notices)
     if seen.exchanged:
         seen.exchanged.values = (*seen.exchanged.values[:2], found.roll_deg)
     else:
         seen.stops = stops_of(course, still)
     return seen
+
+
+def _riding_s(ride: Channels, standing: NDArray[np.bool_], whole: bool = True) -> float:
+    """How long a vehicle was on the move, s. ride: with evenly spaced samples (see downsampled()). standing (n): True
+    where it stands still. whole: not a stretch of a ride, in which a vehicle may go straight on, or keep to one turn,
+    from beginning to end."""
+    if whole and not _has_moved(ride):
+        return 0.0
+    return float(np.count_nonzero(~standing)) * spacing_s(ride)
+
+
+def _has_moved(ride: Channels) -> bool:
+    if np.any(~np.isnan(ride.speed_mps)):
+        return bool(np.nanmax(ride.speed_mps) > MOVES_MPS)
+    half = round(0.5 * OVER_S / spacing_s(ride))
+    if len(ride.t_s) <= 2 * half:
+        return False
+    inner = slice(half, len(ride.t_s) - half)  # at its ends a mean is mostly that of the first or the last sample
+    turns, pushes = (smoothed(values, ride.t_s, OVER_S)[inner] for values in (ride.yaw_rate_dps, ride.forward_g))
+    return _changes(turns) > TURNS_DPS or _changes(pushes) > PUSHES_G
+
+
+def _changes(means: Array) -> float:
+    """The largest difference of means from their median: that is a gyro's bias, or the slope of the ground."""
+    return float(np.max(np.abs(means - np.median(means))))

@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from rich.console import Group
 
 CONTRADICTED = ("up-off", "forward-off", "left-handed", "rates-misfit", "rates-in-radians")  # by the ride
-COSTS_DEG = 0.1  # of lean: less is not worth a word
-RIDDEN_S = 10.0  # a shorter ride is pushing the bike about
+COSTS_DEG = 0.1  # smaller errors of the lean are not reported
+RIDDEN_S = 10.0  # least riding: in a shorter one the bike was only pushed about
 STOPS_TITLE = "Stops"
 STOPS_UNITS = {"at": "", "from": "km/h", "time": "s", "distance": "m", "MFDD": "m/s²", "peak": "m/s²", "jerk": "m/s³"}
 STOPS_UNITS |= {"pulls": "m"}  # one line a stop in 80 columns: no units in it
@@ -28,9 +28,9 @@ STOPS_TERMS = (
 
 @dataclass
 class Words:
-    """What a report says. name: of the log. too_little: that the log holds too little of a ride, or "". ride: rows of
-    what, how much, and when it was or "". alignment: a paragraph. stops: a row for each, the columns of STOPS_UNITS, of
-    which STOPS_TERMS explains some. remark: on the stops or why there are none, or ""."""
+    """The texts of a report. name: the log's. too_little: sentence that the log holds too little of a ride, or "".
+    ride: rows of (quantity, value, time or ""). alignment: a paragraph. stops: a row per stop with the columns of
+    STOPS_UNITS, some of which STOPS_TERMS explains. remark: about the stops, or why there are none, or ""."""
 
     name: str
     too_little: str
@@ -41,7 +41,7 @@ class Words:
 
 
 def as_data(seen: Overview) -> dict[str, Any]:
-    """What the page says, as JSON has it; None where there is no value."""
+    """The values of the report for JSON; None where there is no value."""
     total, quality = seen.summary, seen.quality
     data: dict[str, Any] = {
         "ride": seen.ride.name,
@@ -183,12 +183,12 @@ def _alignment(seen: Overview, remedies: Remedies) -> str:
 
 
 def judged(seen: Overview) -> bool:
-    """Whether the ride says how well the sensor is aligned: not where it contradicts the calibration altogether."""
+    """True if the ride shows how well the sensor is aligned: not if it contradicts the calibration altogether."""
     return not any(notice.code in CONTRADICTED for notice in seen.notices)
 
 
 def _cost(cost: LeanCost, speed: bool, remedies: Remedies) -> str:
-    """What the angles cost, and what to do against it. speed: the log has one."""
+    """The sentence about the errors of the lean by these angles, and the remedy. speed: the log has one."""
     costs = {
         "Roll": (cost.roll_deg, remedies["less_roll"]),
         "Pitch": (cost.pitch_deg, remedies["less_pitch"]),
@@ -219,7 +219,7 @@ def _stops(stops: list[Stop]) -> list[tuple[str, ...]]:
 
 
 def peak_words(peak: Peak, form: str) -> tuple[str, str]:
-    """Its value, and when it was; "--" where nothing was sure enough to be one."""
+    """A peak's value and its time; "--" for none, because no lean was certain enough."""
     if peak.time_s is None:
         return "--", ""
     return form.format(peak.value), f"at {clock(peak.time_s)}"

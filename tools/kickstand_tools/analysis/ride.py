@@ -1,4 +1,4 @@
-"""A recorded ride, to be gone through block by block: a log, its calibration, and whose lean is wanted."""
+"""A recorded ride, read block by block: a log, its calibration, and which lean to use."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -22,8 +22,8 @@ from .channels import Channels, channels
 
 @dataclass
 class Ride:
-    """A log and the calibration it is read with. smoothed: its lean is the one looked back over, and not the one that
-    the display showed."""
+    """A log and the calibration it is read with. smoothed: its lean is the smoothed one, and not the one that the
+    display showed."""
 
     log: Source
     calibration: CalibrationFile
@@ -45,8 +45,8 @@ class Ride:
         return self.calibration.vehicle == "car"
 
     def blocks(self, progress: Progress | None = None, notices: list[Notice] | None = None) -> Iterator[Channels]:
-        """The ride without the readings that froze: they are a gap. progress, notices: of read_blocks(), of all of the
-        log, also where the ride is a stretch of it. Raises InputError."""
+        """The channels of the ride, block by block, without frozen readings: these are a gap. progress, notices: see
+        read_blocks(); for the whole log, even if the ride is a stretch of it. Raises InputError."""
         lean, absurd, slow, some = _Lean(self.calibration), False, False, False
         log, stretch = apart(self.log)
         for whole, found in self._read(log, progress, notices):
@@ -78,7 +78,8 @@ class Ride:
     def _read(
         self, log: Source, progress: Progress | None, notices: list[Notice] | None
     ) -> Iterator[tuple[Block, Array | None]]:
-        """The blocks of the log, and what smooth_blocks() gives for each, None where it is not wanted or gives none."""
+        """The blocks of the log, each with its smoothed values (see smooth_blocks()); None in place of these if the
+        ride is not smoothed, and where the log has under 10 samples a second."""
         if self.smoothed:
             return smooth_blocks(log, self.calibration, progress, notices, lines=False)
         blocks = read_blocks(log, 2, progress, notices, lines=False, calibration=self.calibration)
@@ -86,7 +87,7 @@ class Ride:
 
 
 def open_ride(log: Source, calibration: CalibrationFile | File | None = None, smoothed: bool = False) -> Ride:
-    """A ride to look at: a log (see read_log) with a calibration, or the file of one; None: NAME.cal.json beside it.
+    """Open a ride: a log (see read_log) with a calibration, or the file of one; None: NAME.cal.json beside the log.
 
     smoothed: with the lean of smooth() in the place of the firmware's; a car has none. Raises InputError, also for a
     calibration that is not aligned: lean and braking are then unknown.
@@ -130,7 +131,7 @@ def vehicle_channels(
 
 
 def _absurd(block: Block, at: int) -> Notice:
-    """The lean filter has lost itself at this row: what the readings of the second before it were."""
+    """The notice that the lean filter diverged at this row, with the readings of the second before it."""
     before = slice(int(np.searchsorted(block.time_us, block.time_us[at] - 1_000_000)), at + 1)
     most = np.max(np.abs(block.readings[before]), axis=0)
     return Notice("absurd-readings", block.time_us[at] / 1e6, float(np.max(most[4:])), float(np.max(most[:3])))
@@ -145,7 +146,7 @@ class _Lean:
     def follow(self, block: Block, shown: bool) -> Array:
         """(n, 6): lean (degrees), displayed forward force (g), variance of the lean (rad2), resting, rolling, sure.
 
-        shown: the lean is wanted as it was shown; else it and sure are 0, which saves a tenth of the time.
+        shown: compute the lean that was shown; else it and sure are 0, which saves a tenth of the time.
         """
         n = len(block.time_us)
         columns: list[list[float]] = [[] for _ in range(6)]

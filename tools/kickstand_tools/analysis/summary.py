@@ -23,7 +23,7 @@ class Peak:
     time_s: float | None = None
 
     def add(self, t_s: Array, values: Array) -> None:
-        """values: NaN where they do not count."""
+        """Take values (n) at the times t_s (n); NaN where they do not count."""
         if len(values) and np.nanmax(values, initial=-np.inf) > self.value:
             at = int(np.nanargmax(values))
             self.value, self.time_s = float(values[at]), float(t_s[at])
@@ -83,7 +83,7 @@ class Summary:
         self.histogram_s += np.histogram(block.lean_deg[held], BINS_DEG, weights=step[held])[0]
 
     def _hold(self, t_s: Array, lean: Array) -> None:
-        """lean: NaN where it is not trusted."""
+        """Update the maxima of the lean that last for HELD_S. lean: NaN where it is not trusted."""
         if not len(t_s):
             return
         step_s = float(np.median(np.diff(t_s))) if len(t_s) > 1 else HELD_S

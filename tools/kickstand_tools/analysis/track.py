@@ -1,4 +1,4 @@
-"""Where a ride was: the positions of a log, one after the other, and what lies between them."""
+"""The track of a ride: the positions of a log, and those interpolated between them."""
 
 from dataclasses import dataclass, fields
 
@@ -8,7 +8,7 @@ from ..logs.block import Block
 from ..logs.table import Array
 from .channels import Channels
 
-GAP_S = 5.0  # without a position: where the ride was meanwhile is not known
+GAP_S = 5.0  # in a longer time without a position the place is not known
 
 
 @dataclass
@@ -35,12 +35,12 @@ class Track:
 
 
 def track(part: Channels | Block) -> Track:
-    """Of a block of a ride or of a log, or of a whole course."""
+    """The track of a block of a ride or of a log, or of a whole course."""
     there = np.isfinite(part.lat_deg) & np.isfinite(part.lon_deg)
     return Track(part.t_s[there], part.lat_deg[there], part.lon_deg[there])
 
 
 def joined(tracks: list[Track]) -> Track:
-    """Those of blocks that follow on as one."""
+    """The tracks of successive blocks as one."""
     columns = ([getattr(one, field.name) for one in tracks] for field in fields(Track))
     return Track(*(np.concatenate(column) for column in columns))

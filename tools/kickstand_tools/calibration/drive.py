@@ -19,16 +19,16 @@ from .drive_events import DriveEvent, DriveWatch
 from .drive_feed import Steps, feed, standing
 from .file import CalibrationFile
 from .poses import refuse_same_file
-from .published.viriciti import PublishedAlignment
+from .published import PublishedAlignment
 
 METHODS = {"improved": DriveAlignment, "published": PublishedAlignment}
-_SLOWEST_US = 50_000  # between samples
+_SLOWEST_US = 50_000  # longest time between samples
 
 
 @dataclass
 class PoseCheck:
     """An alignment of two poses, compared with the drive. verdict: a constant of kickstand.drive_alignment.verdict;
-    yaw_deg: by how much the poses had forward turned about the vertical."""
+    yaw_deg: yaw error of the alignment by the poses."""
 
     verdict: int
     yaw_deg: float
@@ -36,14 +36,14 @@ class PoseCheck:
 
 @dataclass
 class DriveFit:
-    """What drives give. refusal: why they do not determine how the sensor sits, None where they do; calibration is
-    then the one from before.
+    """The alignment by drives. refusal: why they do not determine it, None where they do. With a refusal calibration is
+    the earlier one.
 
-    vehicle: "car" or "motorcycle". used, turned: braking events that were counted, and those in turns that were not.
+    vehicle: "car" or "motorcycle". used, turned: braking events that were counted, and those in bends that were not.
     quality_deg: standard error of forward about the vertical. ready_s: seconds of all logs until the alignment was
-    ready. lag_s: by how much the speed is late; halves_deg: by how much two halves of the drive differ; None for the
-    published method. poses: for a motorcycle that two poses had aligned before. notices: what is remarkable in the
-    logs, with the log's name. bias_dps (3): the gyro's.
+    ready. lag_s: delay of the speed; halves_deg: difference of two halves of the drive; None for the published method.
+    poses: for a motorcycle with an earlier alignment by two poses. notices: what is remarkable in the logs, with the
+    log's name. bias_dps (3): the gyro's.
     """
 
     calibration: CalibrationFile
@@ -81,9 +81,9 @@ def fit_drive(
     progress: Progress | None = None,
     on_event: Callable[[DriveEvent], None] | None = None,
 ) -> DriveFit:
-    """How the sensor sits on the vehicle, from logs of driving with speed: stops, and braking in straight lines.
+    """The alignment of a sensor on a vehicle, from logs of driving with speed: stops, and braking in straight lines.
 
-    logs: of one mount in time order (see read_log). calibration: what is known already: offset and slope, and the two
+    logs: of one mount in time order (see read_log). calibration: the earlier one, with offset and slope, and the two
     poses of a motorcycle. vehicle: "motorcycle" or "car"; if None, a motorcycle where calibration has two poses, else a
     car. method: "improved", or "published", ViriCiti's as it was published. progress: called with the samples done and
     all there are (each is gone through twice). on_event: called with each DriveEvent as it happens, also when the
@@ -115,13 +115,13 @@ def fit_logs(
     progress: Progress | None = None,
     on_event: Callable[[DriveEvent], None] | None = None,
 ) -> DriveFit:
-    """The same for logs that are usable(). A refusal is not raised but part of the result, beside what was counted."""
+    """fit_drive() for logs that are usable(). A refusal is not raised but part of the result, with the counts."""
     before = calibration or CalibrationFile()
     poses = before.aligned and before.vehicle != CAR
     kind = vehicle or (MOTORCYCLE if poses else CAR)
     up = before.vehicle_from_sensor[1].tolist() if kind == MOTORCYCLE and poses else None
     steps = Steps(progress, 2 * sum(len(log.t_s) for log in logs))
-    # the gyro's bias is found at a stop: a first pass looks for one, so that what came before it counts too
+    # the gyro's bias is found at a stop: a first pass looks for one, so that driving before it counts too
     stood = standing(logs, before, steps)
     known = stood.stops or calibration is not None
     alignment = METHODS[method](kind, up, list(stood.bias) if known else None)

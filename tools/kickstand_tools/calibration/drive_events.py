@@ -1,4 +1,4 @@
-"""What happens while an alignment is found by driving, as a list of events."""
+"""The events in an alignment by driving: braking events used, readiness, problems."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from kickstand.drive_alignment.alignment import DriveAlignment
 from kickstand.errors import Refusal
 
-from .published.viriciti import PublishedAlignment
+from .published import PublishedAlignment
 
 # DriveEvent.what
 LOG_BEGINS = "log-begins"
@@ -20,9 +20,9 @@ READY, NOT_READY = "ready", "not-ready"
 class DriveEvent:
     """Something that happened in a drive, t_s seconds from the first sample of the log of that name.
 
-    what: USED (a braking event in a straight line, or a start; counted of needed), TURNING (a braking event in a turn,
-    not counted), PROBLEM (refusal says which), READY (the alignment can be taken, with quality_deg), NOT_READY (it no
-    longer can; refusal says why where no PROBLEM does), LOG_BEGINS, LOG_WITHOUT_EVENTS.
+    what: USED (a braking event in a straight line, or a start; counted of needed), TURNING (a braking event in a bend,
+    not counted), PROBLEM (refusal says which), READY (the alignment is good enough, with quality_deg), NOT_READY (it is
+    not any more; refusal says why where no PROBLEM does), LOG_BEGINS, LOG_WITHOUT_EVENTS.
     """
 
     log: str
@@ -35,34 +35,34 @@ class DriveEvent:
 
 
 class DriveWatch:
-    """Makes DriveEvents of the changes in an alignment's state. events: all so far; on_event: called with each."""
+    """Emits DriveEvents for the changes of an alignment's state. events: all so far; on_event: called with each."""
 
     def __init__(
         self, alignment: DriveAlignment | PublishedAlignment, on_event: Callable[[DriveEvent], None] | None
     ) -> None:
         self.events: list[DriveEvent] = []
-        self.ready_s = 0.0  # of all logs
+        self.ready_s = 0.0  # seconds of all logs until the alignment was first READY, 0 if never
         self._alignment, self._on_event = alignment, on_event
         self._log = ""
         self._counts = (0, 0)  # used, turned
         self._ready = False
         self._problem: Refusal | None = None
-        self._elapsed_s = 0.0  # in the logs before this one
+        self._elapsed_s = 0.0  # duration of the logs before this one
 
     def begin(self, log: str) -> None:
-        """Before the first sample of a log."""
+        """Set the name of the log for the events to come, and emit LOG_BEGINS. Nothing is reset."""
         self._log = log
         self._add(0.0, LOG_BEGINS)
 
     def end(self, t_s: float) -> None:
-        """After its last one."""
+        """End a log after its last sample, at t_s: emit the pending events, or LOG_WITHOUT_EVENTS if it had none."""
         self.look(t_s)
         if self.events[-1].what == LOG_BEGINS:
             self._add(t_s, LOG_WITHOUT_EVENTS)
         self._elapsed_s += t_s
 
     def look(self, t_s: float) -> None:
-        """At t_s in this log: what has changed since the last call?"""
+        """Emit an event for each change of the alignment's state since the last call. t_s: the time in this log."""
         alignment = self._alignment
         counts = alignment.counted, alignment.turned
         if counts[0] > self._counts[0]:

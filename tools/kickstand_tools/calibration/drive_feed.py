@@ -12,13 +12,13 @@ from ..logs.source import Progress
 from .drive_bins import drive_bins
 from .drive_events import DriveWatch
 from .file import CalibrationFile
-from .published.viriciti import PublishedAlignment
+from .published import PublishedAlignment
 
-_CHUNK = 1000  # samples between two calls of progress, at least
+_CHUNK = 1000  # least number of samples between two calls of progress
 
 
 def standing(logs: Sequence[Log], calibration: CalibrationFile, steps: "Steps") -> StandingVertical:
-    """What the stops of all logs show. Looks at nothing else, so it is much faster than an alignment."""
+    """The StandingVertical of the stops in all logs. Uses nothing else, so it is much faster than an alignment."""
     standing = StandingVertical()
     speed_mps, silent_us = -1.0, 0  # none yet
     for log in logs:
@@ -41,7 +41,7 @@ def feed(
     steps: "Steps",
     watch: DriveWatch,
 ) -> None:
-    """Run the logs through an alignment; watch looks each time that something may have happened."""
+    """Run the logs through an alignment; watch.look() is called after each step that may change its state."""
     length_us = BIN_US if isinstance(alignment, DriveAlignment) else 0  # the published one looks at single samples
     for log in logs:
         watch.begin(log.name)
@@ -73,7 +73,7 @@ def feed(
 
 
 def _end_stop(standing: StandingVertical) -> None:
-    """Another log begins: where the vehicle stands now is another place, perhaps on another slope."""
+    """End a stop at the end of a log: at the beginning of the next one the vehicle stands elsewhere."""
     standing.update((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 2.0 * MOVED_MPS, 0.0)  # as if it had driven
 
 
@@ -91,7 +91,7 @@ class Steps:
         self._progress, self._done, self._said, self._total = progress, 0, 0, total
 
     def more(self, samples: int) -> None:
-        """So many more are done."""
+        """Count so many more samples."""
         self._done += samples
         if self._progress and (self._done - self._said >= _CHUNK or self._done == self._total):
             self._said = self._done

@@ -21,8 +21,8 @@ from ..output import write_whole
 from ..signals.calibrated import calibrated, rotated
 
 VERSION = 1
-MOST_BYTES = 1_000_000  # of a file; what kickstand writes has a thousandth of that
-MAX_DELAY_S = 0.05  # of a chip's low-pass: the slowest has 33 ms
+MOST_BYTES = 1_000_000  # largest file; those of kickstand have a thousandth of that
+MAX_DELAY_S = 0.05  # largest delay of a chip's low-pass: the slowest has 33 ms
 ROTATION_TOLERANCE = 2e-3  # a matrix copied with three or four decimals is still good to 0.1 degrees
 
 Array = NDArray[np.float64]
@@ -33,12 +33,12 @@ class CalibrationFile:
     """The parameters of one mounted sensor: calibrated = slope * reading + offset, Nicolae's (18)-(20).
 
     accel_offset_g (3), accel_slope (3), gyro_bias_dps (3); vehicle_from_sensor (3, 3): rows left, up, forward.
-    aligned: the matrix was measured; six_done: offset and slope were. trim_deg: by how much the upright pose of the
-    alignment was found to be off. vehicle: "car" or "motorcycle" if the matrix was measured by driving, "car" also if
-    the board was set to one, else "".
-    kickstand_side: "left" or "right", where the kickstand leaned the bike to in the two poses, else "". notes: further
-    entries to write to the file. gyro_delay_s: how late the low-pass DLPF of a recorded ride made the gyro, None if
-    that is not known.
+    aligned: the matrix was measured; six_done: offset and slope were. trim_deg: the roll-misalignment correction that
+    riding has found. vehicle: "car" or "motorcycle" if the matrix was measured by driving, "car" also if the board was
+    set to one, else "".
+    kickstand_side: "left" or "right", to which the kickstand leaned the bike in the two poses, else "". notes: further
+    entries to write to the file. gyro_delay_s: delay of the gyro by the low-pass DLPF in a recorded ride, None if
+    unknown.
 
     >>> calibration = CalibrationFile(gyro_bias_dps=[1.0, 0.0, 0.0])
     >>> calibration.vehicle_from_sensor @ [0.0, 1.0, 0.0]
@@ -64,7 +64,7 @@ class CalibrationFile:
         self.vehicle_from_sensor = np.reshape(np.array(self.vehicle_from_sensor, dtype=float), (3, 3))
 
     def __eq__(self, other: object) -> bool:
-        """True if both make the same file."""
+        """True if both give the same file."""
         return isinstance(other, CalibrationFile) and self.as_json() == other.as_json()
 
     def parameters(self) -> list[float]:
@@ -73,7 +73,7 @@ class CalibrationFile:
         return [*np.concatenate(measured).tolist(), self.trim_deg]
 
     def to_firmware(self) -> Calibration:
-        """The same as the firmware's own object, for readings in g and deg/s."""
+        """The firmware's Calibration with these parameters, for readings in g and deg/s."""
         calibration = Calibration()
         calibration.set_parameters(self.parameters())
         calibration.six_done, calibration.aligned = self.six_done, self.aligned
@@ -93,7 +93,7 @@ class CalibrationFile:
         return DELAY_S if self.gyro_delay_s is None else self.gyro_delay_s
 
     def as_json(self) -> dict[str, Any]:
-        """What a CAL.json holds, in plain numbers and lists."""
+        """The content of a CAL.json, in plain numbers and lists."""
         data = {
             "version": VERSION,
             "accel_offset_g": _rounded(self.accel_offset_g),
@@ -189,7 +189,7 @@ def calibration_path(log: Path) -> Path:
 
 
 def calibration_beside(log: Path) -> Path:
-    """The same where it is there. Raises InputError without it, without the log, and for a file that is no log."""
+    """calibration_path() of a file that exists. Raises InputError without it, without the log, and if log is no log."""
     if not log.is_file():
         what = "is a directory: give the name of a ride in it" if log.is_dir() else "there is no such file"
         raise InputError(f"{log}: {what}")
@@ -210,7 +210,7 @@ def _list(name: str, data: dict[str, Any], entry: str) -> list[Any]:
 
 
 def _numbers(name: str, entry: str, values: Any) -> list[float]:
-    """Three finite floats."""
+    """The values of an entry, three finite floats. Raises InputError for others."""
     if not isinstance(values, list) or len(values) != 3:
         raise InputError(f"{name}: {entry} has to be 3 numbers: calibrate again")
     for value in values:
@@ -220,7 +220,7 @@ def _numbers(name: str, entry: str, values: Any) -> list[float]:
 
 
 def _within(name: str, data: dict[str, Any], entry: str, limit: float) -> float:
-    """A number from -limit to limit; 0 where the file says nothing."""
+    """The number of an entry, from -limit to limit; 0 if it is missing. Raises InputError for others."""
     value = data.get(entry, 0.0)
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= limit:
         raise InputError(f"{name}: {entry} is {_shown(value)}, it is at most {limit:g}: calibrate again")
@@ -244,7 +244,7 @@ def _check_ranges(name: str, calibration: CalibrationFile) -> None:
 
 
 def _rounded(values: Any) -> list[float]:
-    """Nine significant digits: all that the firmware's 32-bit floats hold."""
+    """values rounded to nine significant digits: all that the firmware's 32-bit floats hold."""
     return [float(f"{value:.9g}") for value in values]
 
 

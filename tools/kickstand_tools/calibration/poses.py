@@ -1,4 +1,4 @@
-"""One recorded still pose, averaged by the firmware's own module."""
+"""Averages one recorded still pose with the firmware's own module."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ class Pose:
 
     @property
     def samples(self) -> int:
-        """How many were averaged."""
+        """Number of samples that were averaged."""
         return self.still.count
 
     @property

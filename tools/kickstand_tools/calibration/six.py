@@ -16,18 +16,18 @@ from .file import CalibrationFile
 from .poses import Pose, read_pose, refuse_same_file
 
 GOOD_FREE_POSE_G = 0.010  # a free pose that is nearer to 1 g than this confirms a good calibration
-_SHEET_OFFSET_G = (0.05, 0.05, 0.08)  # what the data sheet of the MPU6050 allows, for each axis
+_SHEET_OFFSET_G = (0.05, 0.05, 0.08)  # the data sheet's limit of the MPU6050's offset, for each axis
 _SHEET_SLOPE_ERROR = 0.03
-_EQUAL_TILT_DEG = 3.0  # by so much the free pose has to be further from its nearest axis than the side pose there
+_EQUAL_TILT_DEG = 3.0  # least tilt of the free pose from its nearest axis, beyond that of the side pose there
 
 
 @dataclass
 class SixPositions:
-    """What six or seven poses give.
+    """The calibration by six or seven poses.
 
     sides: the pose of each side in the order of kickstand.calibration.six_position.SIDES (+x -x +y -y +z -z up);
-    tilt_deg: how far each was from its axis. free_pose: the seventh, slanted one, and by how much its calibrated length
-    differs from 1 g; None without one. beyond_sheet: axes whose offset or slope is past the data sheet.
+    tilt_deg: the tilt of each from its axis. free_pose, free_pose_error_g: the seventh, slanted one, and its calibrated
+    length less 1 g; None without one. beyond_sheet: axes whose offset or slope exceeds the data sheet's limits.
     """
 
     calibration: CalibrationFile
@@ -114,7 +114,7 @@ def _with_file(error: CalibrationError, sides: list[Pose], free: Pose | None) ->
 
 
 def _beyond_sheet(offset: Sequence[float], slope: Sequence[float]) -> list[str]:
-    """The axes whose offset or slope is beyond what the data sheet allows: usable, but worth a warning."""
+    """The axes whose offset or slope exceeds the data sheet's limits: usable, but worth a warning."""
     return [
         axis
         for axis, o, s, most in zip(AXES, offset, slope, _SHEET_OFFSET_G, strict=True)

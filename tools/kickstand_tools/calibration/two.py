@@ -14,7 +14,7 @@ from .poses import Pose, read_pose, refuse_same_file
 
 @dataclass
 class TwoPositions:
-    """What two poses give. tilt_deg: the angle between them; under 8 degrees, forward is uncertain."""
+    """The alignment by two poses. tilt_deg: the angle between them; under 8 degrees, forward is uncertain."""
 
     calibration: CalibrationFile
     kickstand: Pose
@@ -25,11 +25,11 @@ class TwoPositions:
 def fit_two_positions(
     kickstand: Source, upright: Source, calibration: CalibrationFile | None = None, side: str = "left"
 ) -> TwoPositions:
-    """How the sensor sits on the bike, from a pose on the kickstand and one upright: rows left, up, forward.
+    """The alignment of a sensor on a bike, from a pose on the kickstand and one upright: rows left, up, forward.
 
-    kickstand, upright: logs (see read_log). calibration: with offset and slope, of fit_six_positions(); none is assumed
-    to be needed if not given. side: where the kickstand leans the bike to, "left" or "right". The gyro's bias is that
-    of the pose on the kickstand. Nicolae's paper, section 2, equations (3)-(8). Raises InputError; RefusedInput, a
+    kickstand, upright: logs (see read_log). calibration: that of fit_six_positions(), with offset and slope; None: the
+    readings are taken as calibrated. side: "left" or "right", to which the kickstand leans the bike. The gyro's bias is
+    that of the pose on the kickstand. Nicolae's paper, section 2, equations (3)-(8). Raises InputError; RefusedInput, a
     subclass with code and values, where the firmware refuses the poses.
 
     >>> from kickstand_tools.api import Log, simulate_ride

@@ -1,6 +1,6 @@
-"""What can be said about a log without knowing the vehicle, as data: notices, a code and numbers each.
+"""Remarks about a log, as data: notices with a code and numbers each. Nothing about the vehicle has to be known.
 
-cells.py: the log as a table of cells, which all others judge. units.py, speed.py: the units. handedness.py (with
-turning.py), bends.py, course.py: axes and signs. mount.py: a calibration. log.py: all of them, for whoever reads a log.
-The words are in refusals.py.
+cells.py: the log as a table of cells, which the other modules judge. units.py: units. handedness.py (with
+turning.py), bends.py, course.py: axes and signs. mount.py: a calibration against a log. log.py: all of these together,
+for whoever reads a log. The sentences are in refusals.py.
 """

@@ -1,10 +1,9 @@
 """Are the angular rates of a log in deg/s, and of the right sign? The bends of a motorcycle ride show it.
 
-Leaned, a turning bike also turns about its own left, by its yaw rate times the sine of its lean. All of these come from
-the rates. Where they are in rad/s, which is 57 times too small, the product is 57 x 57 times too small, but the rate
-about left only 57 times. Where all rates are of the opposite sign, or all axes left-handed, the product keeps its sign
-and the rate about left has the opposite one. A car does not lean and a parked vehicle does not turn: they are never
-judged.
+In a bend a leaning bike's rate about its own left is its yaw rate times the sine of its lean. All three come from the
+rates. Where they are in rad/s, which is 57 times too small, the product is 57 x 57 times too small, but the rate about
+left only 57 times. Where all rates have the opposite sign, or all axes are left-handed, the product keeps its sign and
+the rate about left has the opposite one. Logs of a car, which does not lean, and of a parked vehicle are never judged.
 """
 
 import numpy as np
@@ -15,20 +14,25 @@ from ..signals.leaning import LIKENESS, WINDOW_S, leaning_of, leans, speed_in_ra
 from .cells import CELL_S, LogCells
 
 KEPT_S, RIDING_S = 1800.0, 15.0  # the last half hour is judged; less riding shows nothing
-MOVES_S, MOVES = 1.6, 0.1  # within so long a ride changes the rates by over so much of their liveliest changes
-AGAINST, SURE = -0.5, 5.0  # share and sigmas of rates that are of the opposite sign; it is -1.6 to -1.0 then
-CALMEST, LEAST, CALM_G = 0.2, 3, 0.02  # of the seconds, and at least so many; force changes so little in them
+MOVES_S, MOVES = 1.6, 0.1  # it rides where the rates' deviation over MOVES_S is over MOVES times its 95th percentile
+# The gyro has the opposite sign if Leaning.share is under AGAINST (it is -1.6 to -1.0 then) and differs from 0 by over
+# SURE standard deviations
+AGAINST, SURE = -0.5, 5.0
+# The calmest seconds are a share of CALMEST of all, at least LEAST; CALM_G scales the force's standard deviation in
+# them
+CALMEST, LEAST, CALM_G = 0.2, 3, 0.02
 
 
 def bends(cells: LogCells) -> Notice | None:
-    """That the rates look like rad/s or of the opposite sign; None if not, or if the log does not show it."""
+    """A notice if the rates seem to be in rad/s or of the opposite sign; None if not, or if the log does not show
+    it."""
     force, rate, _ = cells.means(round(WINDOW_S / CELL_S))
     there = np.flatnonzero(~np.isnan(force[:, 0]))[-round(KEPT_S / WINDOW_S) :]
     force, rate = force[there], np.radians(rate[there])
     if len(rate) * WINDOW_S < RIDING_S:
         return None
     changes = unrest(rate, MOVES_S)
-    moves = MOVES * np.percentile(changes, 95)  # whatever the unit is
+    moves = MOVES * np.percentile(changes, 95)  # relative, because the unit is not known
     if np.count_nonzero(changes > moves) * WINDOW_S < RIDING_S:
         return None
     whole = len(rate) // 5 * 5  # seconds
@@ -43,7 +47,7 @@ def bends(cells: LogCells) -> Notice | None:
 
 
 def calm_rates(force: Array, rate: Array, calm_rate: float) -> Array:
-    """(k, 3) mean rates of the calmest of m seconds, which are straight as a rule: about the gyro's bias. force, rate
-    (m, cells, 3). calm_rate: what counts in the rates' changes as much as CALM_G in the force's."""
+    """(k, 3) mean rates of the calmest of m seconds: roughly the gyro's bias, because these are mostly straight. force,
+    rate (m, cells, 3). calm_rate: standard deviation of the rates that weighs as much as CALM_G of the force."""
     changes = np.sum(np.std(force, axis=1), axis=1) / CALM_G + np.sum(np.std(rate, axis=1), axis=1) / calm_rate
     return np.mean(rate, axis=1)[np.argsort(changes)[: max(LEAST, round(CALMEST * len(changes)))]]

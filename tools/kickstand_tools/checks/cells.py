@@ -9,16 +9,16 @@ from numpy.typing import NDArray
 from ..signals import Array
 from ..signals.cells import Cells, EvenCells, cell_numbers, runs, stretches
 
-CELL_S = 0.1  # what shakes faster is vibration
-KEPT = 36_000  # cells with samples: an hour
-GAP_CELLS = 3  # so many without samples: what happened meanwhile is unknown. Fewer are filled along straight lines
+CELL_S = 0.1  # length of a cell: faster changes are vibration
+KEPT = 36_000  # cells with samples that are kept: an hour
+GAP_CELLS = 3  # so many cells without samples in a row are unknown; fewer are interpolated
 
 
 @dataclass
 class LogCells:
-    """n cells of CELL_S in a row. first_s: the time at which the first begins. force (n, 3, g), rate (n, 3, deg/s):
-    means, in the sensor's axes; 0 where known (n) is False. speeds (m, 2: s, m/s), places (m, 3: s, degrees): the first
-    ones of each second."""
+    """n successive cells of CELL_S. first_s: begin of the first one. force (n, 3, g), rate (n, 3, deg/s): means, in the
+    sensor's axes; 0 where known (n) is False. speeds (m, 2: s, m/s), places (m, 3: s, degrees): the first value of each
+    second that has one."""
 
     even: EvenCells
     force: Array
@@ -32,7 +32,7 @@ class LogCells:
         return self.even.first * CELL_S
 
     def integrals(self, at_s: Array) -> Array:
-        """(k, 7) until the times at_s (k): of force (g s), of rate (degrees) and of the time that is known (s)."""
+        """(k, 7) integrals until the times at_s (k): force (g s, 3), rate (degrees, 3), duration of known cells (s)."""
         edges_s = self.first_s + np.arange(len(self.known) + 1) * CELL_S
         return np.column_stack([np.interp(at_s, edges_s, sums) for sums in self._sums])
 
@@ -44,27 +44,28 @@ class LogCells:
         return sums
 
     def means(self, over: int) -> tuple[Array, Array, Array]:
-        """Force (k, 3), rate (k, 3) and the first speed (k, m/s) over so many cells each; NaN where there is none."""
+        """Mean force (k, 3), mean rate (k, 3) and first speed (k, m/s) of each `over` cells; NaN where there is
+        none."""
         merged = self.even.merged(over)
         return merged.means[:, :3], merged.means[:, 3:], merged.latest[:, 1]
 
 
 class CellTable:
-    """add() takes a log's samples block by block."""
+    """Collects LogCells. add() takes a log's samples block by block."""
 
     def __init__(self) -> None:
         self._cells = Cells(CELL_S, KEPT)
 
     def add(self, time_s: Array, force: Array, rate: Array, speed_mps: Array, *place: Array) -> None:
-        """force (n, 3, g), rate (n, 3, deg/s), in the sensor's axes; speed_mps (n) and, if there are any, latitude and
-        longitude (n, degrees): NaN for no new value."""
+        """Take n samples. force (n, 3, g), rate (n, 3, deg/s): in the sensor's axes. speed_mps (n) and, if there are
+        any, latitude and longitude (n, degrees): NaN for no new value."""
         lat, lon = place or np.full((2, len(time_s)), np.nan)
         speed_s, place_s = (np.where(np.isnan(values), np.nan, time_s) for values in (speed_mps, lat))
         latest = np.column_stack((speed_s, speed_mps, place_s, lat, lon))
         self._cells.add(time_s, np.column_stack((force, rate)), latest)
 
     def cells(self) -> LogCells | None:
-        """What there is so far; None if that is nothing, or spread over so long a time that it is no ride."""
+        """The cells so far; None if there are none, or if gaps make them too long for a ride."""
         even = self._cells.evenly(10 * KEPT)
         if even is None:
             return None
@@ -85,6 +86,6 @@ class CellTable:
 
 
 def _once_a_second(values: Array) -> Array:
-    """The first row of each second that is known; the first column is the time."""
+    """The first known row of each second. values: the first column is the time."""
     values = values[np.all(np.isfinite(values), axis=1)]
     return values[runs(cell_numbers(values[:, 0], 1.0))] if len(values) else values

@@ -1,7 +1,7 @@
-"""Which side up an accelerometer reads, by a track: the gyro's rate about up has to turn as the course does.
+"""The sign of a log's accelerations, by its track: the gyro's rate about up has to have the sign of the course's.
 
-An accelerometer alone of the opposite sign gives an exact mirror image of the ride, left and right exchanged, and the
-motion of the sensor cannot show it. Positions can.
+Where only the accelerations have the opposite sign, the log is an exact mirror image of the ride, left and right
+exchanged, and the motion of the sensor cannot show it. Positions can.
 """
 
 import numpy as np
@@ -11,17 +11,18 @@ from ..signals.geography import distance_m
 from ..signals.lag import best_lag
 from .cells import CellTable, LogCells
 
-SLOWEST_MPS = 3.0  # of a course that positions show
-TURNING_DPS = 4.0  # a second that turns faster counts
-FASTEST_DPS = 90.0  # positions that jump
-ENOUGH = 8  # such seconds
-CLEAR = 0.6  # correlation of course and gyro, of either sign
-LAGS_S = np.arange(0.0, 2.1, 0.25)  # by which positions may be late
-LONGEST_S = 2.5  # between two positions
+SLOWEST_MPS = 3.0  # at a lower speed positions show no course
+TURNING_DPS = 4.0  # only seconds in which the course changes faster count
+FASTEST_DPS = 90.0  # a course that changes faster is a jump of the positions
+ENOUGH = 8  # least number of seconds that count
+CLEAR = 0.6  # least correlation of course and gyro, of either sign
+LAGS_S = np.arange(0.0, 2.1, 0.25)  # delays of the positions that are tried
+LONGEST_S = 2.5  # longest time between two positions
 
 
 def course_agrees(cells: LogCells) -> bool | None:
-    """Does the sensor turn about its up as the positions do? None where too few turns to both sides show it."""
+    """True where the rate about up has the sign of the course's, False for the opposite one, None where there are too
+    few bends to both sides to decide."""
     if len(cells.places) < ENOUGH:
         return None
     at_s, lat, lon = cells.places.T
@@ -32,7 +33,7 @@ def course_agrees(cells: LogCells) -> bool | None:
     course_dps = np.degrees(np.diff(np.unwrap(np.arctan2(north, east)))) / span_s
     counted = moving[1:] & moving[:-1] & (np.abs(course_dps) > TURNING_DPS) & (np.abs(course_dps) < FASTEST_DPS)
     course_dps, middle_s, span_s = course_dps[counted], middle_s[counted], span_s[counted]
-    if len(course_dps) < ENOUGH or np.std(course_dps) < TURNING_DPS:  # what the gyro reads always is no turning
+    if len(course_dps) < ENOUGH or np.std(course_dps) < TURNING_DPS:  # a gyro's bias does not vary with the course
         return None
     up = np.sum(cells.force * cells.even.count[:, None], axis=0)
 
@@ -45,7 +46,7 @@ def course_agrees(cells: LogCells) -> bool | None:
 
 
 def log_agrees(time_s: Array, accel_g: Array, gyro_dps: Array, lat_deg: Array, lon_deg: Array) -> bool | None:
-    """course_agrees() of samples: (n), (n, 3), (n, 3), and positions (n) that are NaN where there is no new one."""
+    """course_agrees() for n samples. accel_g, gyro_dps (n, 3); lat_deg, lon_deg (n): NaN where there is no new one."""
     table = CellTable()
     table.add(time_s, accel_g, gyro_dps, np.full(len(time_s), np.nan), lat_deg, lon_deg)
     cells = table.cells()

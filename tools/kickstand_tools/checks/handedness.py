@@ -1,4 +1,4 @@
-"""Do the angular rates of a log belong to its accelerations? What turns the sensor turns the direction of gravity.
+"""Do the angular rates of a log fit its accelerations? A rotation of the sensor rotates the direction of gravity in it.
 
 At rest the axis that points up reads +1 g; the axes are right-handed, and so are the rates about them. Then gravity's
 direction u turns in the sensor's axes as du/dt = -rate x u. Left-handed axes, a gyro of the opposite sign, and axes
@@ -7,8 +7,8 @@ sign, because a rate is an axial vector. Accelerations of the opposite sign are 
 motion shows them.
 
 A ride's force is hardly gravity's alone: in a balanced bend it keeps its direction along the bike. Therefore each
-window is judged as a whole (see turning.py), and of the 48 signed permutations of the gyro's axes, the hypotheses, the
-one is looked for that explains the forces best.
+window is judged as a whole (see turning.py). The hypotheses are the 48 signed permutations of the gyro's axes ("an
+exchange" below); the one that explains the forces best is reported if it is clearly better than none.
 """
 
 import itertools
@@ -23,23 +23,25 @@ from .bends import calm_rates
 from .cells import CELL_S, LogCells
 from .turning import Turning
 
-WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # the second one where the log has none of the first
-MOST_WINDOWS = 16  # judged: those in which the sensor turns most
-CALM_DPS = 2.0  # rates change so little in calm seconds
-KNOWN_DPS = 3.0  # a bias that is wrong by less is found while fitting
-TRIED = 6  # of the 48 exchanges are looked at closely
+WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # the short ones are used where the log has no stretch for a long one
+MOST_WINDOWS = 16  # windows that are judged: those with the largest rates
+CALM_DPS = 2.0  # scales the rates' standard deviation in calm seconds, as CALM_G the force's; see calm_rates()
+KNOWN_DPS = 3.0  # an error of the bias that is smaller is corrected by the fit
+TRIED = 6  # of the 48 exchanges so many are fitted, those that are best without velocity and bias
 
-# By how much an exchange has to explain the forces better than the log as it is: the mean square (g2) of what is
-# unexplained. Right logs, simulated and recorded, stay under 1.1 times; a gyro of the opposite sign gives 1.7 to 470.
-CLEARLY, LIKELY, SIGMAS = 2.0, 1.25, 3.0  # so many times; or so many, if the windows agree by so many sigmas
-FEW_WINDOWS, FEW_CLEARLY = 3, 5.0  # with so few windows, so many times, and a bias near 0, as a phone's is
-LEAST_G2 = 0.001  # at least: a parked vehicle's drift is under 0.0002
-# Of exchanges that explain about as well, times what is left: all axes reversed, some reversed, others
+# By which factor an exchange has to reduce the mean square (g2) of the residual force. In right logs, simulated and
+# recorded, none reduces it by more than 1.1; where the gyro has the opposite sign that factor is 1.7 to 470.
+CLEARLY = 2.0
+LIKELY, SIGMAS = 1.25, 3.0  # or by LIKELY, where the mean reduction in the windows is over SIGMAS standard errors
+FEW_WINDOWS, FEW_CLEARLY = 3, 5.0  # with so few windows by FEW_CLEARLY, and only for a bias near 0, such as a phone's
+LEAST_G2 = 0.001  # least reduction in any case: a parked vehicle's drift is under 0.0002
+# Factors on a hypothesis's residual, so that of hypotheses that fit about equally well the likelier mistake wins: all
+# axes reversed (or none), some reversed, axes exchanged
 PENALTY = 1.0, 1.3, 1.6
 
 
 def _exchanges() -> Array:
-    """(48, 3, 3) signed permutations: first none changed, then all reversed."""
+    """(48, 3, 3) signed permutations: the identity first, then all axes reversed."""
     found = []
     for order in itertools.permutations(range(3)):
         for signs in itertools.product((1.0, -1.0), repeat=3):
@@ -47,11 +49,11 @@ def _exchanges() -> Array:
     return np.array(sorted(found, key=lambda exchange: -abs(np.trace(exchange)) - 0.5 * (np.trace(exchange) == 3.0)))
 
 
-EXCHANGES = _exchanges()  # rate = exchange @ reading of the gyro; the first one: as it is
+EXCHANGES = _exchanges()  # rate = exchange @ reading of the gyro
 
 
 def handedness(cells: LogCells) -> Notice | None:
-    """What is wrong with the axes; None if nothing is, or if the log does not show it."""
+    """A notice that says what is wrong with the axes; None if nothing is, or if the log does not show it."""
     turning = liveliest(cells)
     found = None if turning is None else better_exchange(turning)
     if found is None:
@@ -62,9 +64,9 @@ def handedness(cells: LogCells) -> Notice | None:
 
 
 def better_exchange(turning: Turning) -> int | None:
-    """The place in EXCHANGES of one that is clearly better than the first, None if there is none."""
+    """The index in EXCHANGES of one that fits clearly better than the first; None if there is none."""
     near = np.argsort(turning.rough(EXCHANGES))[:TRIED]
-    # always as it is, and the likeliest mistake
+    # always the identity, and the likeliest mistake
     places = {0, 1, *(int(k) for k in near)}
     left = {k: turning.unexplained(EXCHANGES[k]) for k in places}
     best = min(left, key=lambda k: float(np.mean(left[k])) * _penalty(EXCHANGES[k]))
@@ -80,7 +82,7 @@ def better_exchange(turning: Turning) -> int | None:
 
 
 def liveliest(cells: LogCells) -> Turning | None:
-    """The windows in which the log turns most; None if there is none, or if the gyro's bias is not known."""
+    """The windows of the log with the largest rates; None if there is none, or if the gyro's bias is not known."""
     places = _windows(cells.known, WINDOW_S)
     places = places if len(places) else _windows(cells.known, SHORT_WINDOW_S)
     bias = _bias(cells)
@@ -95,15 +97,15 @@ def liveliest(cells: LogCells) -> Turning | None:
 
 
 def _windows(known: NDArray[np.bool_], seconds: float) -> NDArray[np.int64]:
-    """(windows, cells): places of known cells, one after the other."""
+    """(windows, cells): indices of cells, for windows of so many seconds without unknown cells."""
     length = round(seconds / CELL_S)
     starts = [k for begin, end in stretches(known) for k in range(begin, end - length + 1, length)]
     return np.array(starts, dtype=int).reshape(-1, 1) + np.arange(length)
 
 
 def _bias(cells: LogCells) -> Array | None:
-    """(3) deg/s: the gyro's mean reading in the calmest seconds, which are straight as a rule. Where these differ, 0 if
-    that can be, as of a phone, which knows its bias; else None."""
+    """(3) deg/s: the gyro's bias, its mean reading in the calmest seconds, which are mostly straight. Where these
+    differ: 0 if the log's mean rate allows it (a phone subtracts its bias itself), else None."""
     seconds = _windows(cells.known, 1.0)
     if not len(seconds):
         return None

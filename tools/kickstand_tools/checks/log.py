@@ -1,4 +1,4 @@
-"""All that is remarked on in a log, for whoever reads it: from one table of cells."""
+"""All remarks about a log, from one table of cells."""
 
 from typing import TYPE_CHECKING
 
@@ -10,18 +10,18 @@ from .bends import bends
 from .cells import CellTable, LogCells
 from .course import course_agrees
 from .handedness import handedness
-from .speed import speed_unit
+from .units import speed_unit
 
 if TYPE_CHECKING:
     from ..calibration.file import CalibrationFile
     from ..logs.block import Block
     from ..logs.log import Log
 
-_AGAIN_S = 20.0  # of a log, after which the unit of its speed is judged again
+_AGAIN_S = 20.0  # while a log is read, the unit of its speed is checked again after each such time of the log
 
 
 class Checks:
-    """add() takes a log part by part; remarks() judges all of it. name: the log's, for messages."""
+    """Collects a log, part by part, with add(); remarks() then judges all of it. name: the log's, for messages."""
 
     def __init__(self, name: str) -> None:
         self._name = name
@@ -29,7 +29,8 @@ class Checks:
         self._judged_s = 0.0
 
     def add(self, part: "Block | Log") -> None:
-        """Without frozen readings. Raises RefusedInput once it is sure that the speed is not in m/s."""
+        """Take a part of the log without frozen readings. Raises RefusedInput as soon as it is sure that the speed is
+        not in m/s."""
         readings = part.readings
         self._table.add(part.t_s, readings[:, :3], readings[:, 4:], part.speed_mps, part.lat_deg, part.lon_deg)
         if len(part.t_s) and part.t_s[-1] > self._judged_s + _AGAIN_S:
@@ -37,8 +38,8 @@ class Checks:
             self._judge_speed(self._table.cells())
 
     def remarks(self, axes: bool = True, calibration: "CalibrationFile | None" = None) -> list[Notice]:
-        """What is wrong with the axes of the log, one cause once, and what contradicts a calibration of it. axes: are
-        they to be judged? Raises RefusedInput."""
+        """The remarks: at most one about the log's axes (only if `axes`), and one if the log contradicts the
+        calibration. Raises RefusedInput if the speed is not in m/s."""
         cells = self._table.cells()
         if cells is None:
             return []
@@ -58,7 +59,7 @@ class Checks:
 
 
 def remarks(log: "Log", calibration: "CalibrationFile | None" = None, axes: bool = True) -> list[Notice]:
-    """The same of a log in memory. Raises RefusedInput.
+    """Checks.remarks() for a log in memory. Raises RefusedInput.
 
     >>> import numpy as np
     >>> from kickstand_tools.api import simulate_ride

@@ -1,9 +1,9 @@
-"""Is the calibration that of this ride's mount? Force, turning and speed show where up and forward are.
+"""Does a calibration fit the mount of this ride? Force, rates and speed show where up and forward are.
 
-Up: riding, a balanced bike's force has the direction of its own up, and a car's is hardly off it. Forward: braking and
+Up: while riding, a balanced bike's force has the direction of its own up, and a car's nearly so. Forward: braking and
 speeding up in a straight line change the force along it, so the changes of a log's speed show it. A motorcycle's bends
-show it without a speed too: leaning to the right goes with turning more to the right, so a falling yaw rate goes with a
-rate about forward.
+show it without a speed too: leaning to the right means yawing more to the right, so minus the change of the yaw rate
+correlates with the rate about forward.
 
 A kickstand on the other side than `calibrate two` was given exchanges forward with backward and left with right, and so
 do two poses that were swapped. The force alone does not show it, because braking then looks like speeding up.
@@ -26,24 +26,26 @@ from .cells import CELL_S, LogCells
 if TYPE_CHECKING:
     from ..calibration.file import CalibrationFile
 
-MEAN_S = 0.5  # means over it are judged
-UP_DEG, FORWARD_DEG = 15.0, 20.0  # further off the calibration is another mount's
-LEANED_DEG = 25.0  # an up that is no further off may be the pose on the kickstand, taken for the upright one
-BACKWARD_DEG = 150.0
-TURNING_DPS, TURNING_S = 5.0, 10.0  # up is judged where the vehicle turns: it moves there
-STRAIGHT_DPS = 8.0
-SPEEDS, SPEED_MPS = 20, 0.5  # changes from second to second, and their rms, at least
+MEAN_S = 0.5  # up and the bends are judged by means over this
+UP_DEG, FORWARD_DEG = 15.0, 20.0  # a calibration whose up or forward differs by more is another mount's
+LEANED_DEG = 25.0  # where the two poses were swapped, up is the kickstand pose's: it may differ by as much
+BACKWARD_DEG = 150.0  # forward and backward are exchanged where forward differs by more
+TURNING_DPS, TURNING_S = 5.0, 10.0  # up is judged where the rates are over TURNING_DPS, for at least TURNING_S
+STRAIGHT_DPS = 8.0  # forward is judged by the speed where the rates are lower
+SPEEDS, SPEED_MPS = 20, 0.5  # least number of changes of speed from second to second, and their standard deviation
 LATE_S = (0, 1, 2)  # delays of the speed that are tried
-BENDS, BENDS_DPS = 120, 1.0  # cells, and the rms of the changes of their yaw rate, at least
-# Correlations: of right calibrations over 0.85 and 0.6. Forward against all changes of speed: below it is surely
-# reversed; a right one has over 0.8, on slopes of 12 % too
-SURE_SPEED, SURE_BENDS, SURE_REVERSED = 0.8, 0.55, -0.6
-UPSIDE_DOWN = 0.87  # cosine: within 30 degrees
-ANOTHER_MOUNT_DEG = 10.0  # between two calibrations
+BENDS, BENDS_DPS = 120, 1.0  # least number of means, and the standard deviation of the changes of their yaw rate
+# Correlations from which forward is sure, by the speed and by the bends: right calibrations have over 0.85 and 0.6
+SURE_SPEED, SURE_BENDS = 0.8, 0.55
+# Correlation of the force along forward with all changes of speed below which forward is surely reversed: a right
+# calibration has over 0.8, on slopes of 12 % too
+SURE_REVERSED = -0.6
+UPSIDE_DOWN = 0.87  # cosine of the angle to straight down: within 30 degrees
+ANOTHER_MOUNT_DEG = 10.0  # two alignments that differ by more are of two mounts
 
 
 def contradiction(cells: LogCells, calibration: "CalibrationFile") -> Notice | None:
-    """What in a log contradicts a calibration; None where nothing does, or where that is not aligned."""
+    """A notice that says what in a log contradicts a calibration; None if nothing does or it is not aligned."""
     if not calibration.aligned:
         return None
     ride = _Ride(cells, calibration)
@@ -57,15 +59,15 @@ def contradiction(cells: LogCells, calibration: "CalibrationFile") -> Notice | N
     if up is not None and up > (LEANED_DEG if exchanged else UP_DEG):
         return Notice("up-off", up, car)
     if exchanged:
-        return Notice("forward-exchanged", car, calibration.kickstand_side, None)  # how far up is off is not known here
+        return Notice("forward-exchanged", car, calibration.kickstand_side, None)  # None: the error of up is not known
     return None if found is None or abs(found) < FORWARD_DEG else Notice("forward-off", found, by, car)
 
 
 def of_calibration(found: "CalibrationFile", before: "CalibrationFile | None" = None) -> list[Notice]:
-    """What is remarkable in an alignment that has been found, and in the one that was given to build on.
+    """Notices about a new alignment `found`, and about the calibration `before` that it was to build on.
 
-    upside-down: accelerations of the opposite sign look like a sensor upside down, and no log shows which it is. A
-    phone's x may point down: it lies on its side. another-mount: only offset and slope are taken from the one given.
+    upside-down: accelerations of the opposite sign look like a sensor upside down, and no log shows which it is. (A
+    phone's x may point down: it lies on its side.) another-mount: of `before` only offset and slope are used.
     """
     notices = []
     up = found.vehicle_from_sensor[1]
@@ -85,7 +87,8 @@ class _Ride:
 
     def __init__(self, cells: LogCells, calibration: "CalibrationFile") -> None:
         def along(over_s: float) -> tuple[Array, Array, Array]:
-            """Force (n, 3, g), rate (n, 3, deg/s) less what the gyro usually reads, and the first speed (n, m/s)."""
+            """Mean force (n, 3, g), mean rate (n, 3, deg/s) less its median, and first speed (n, m/s) of each
+            over_s."""
             accel, gyro, speed = cells.means(round(over_s / CELL_S))
             force, rate = rotated(calibration.vehicle_from_sensor, *calibration.in_sensor(accel, gyro))
             return force, rate - np.nanmedian(rate, axis=0), speed
@@ -95,7 +98,7 @@ class _Ride:
         self._change_g = np.diff(speed) / STANDARD_GRAVITY
 
     def up_deg(self) -> float | None:
-        """The angle between the calibration's up and the ride's, None where it hardly turns."""
+        """The angle between the calibration's up and the ride's; None where there are hardly any bends."""
         turning = np.linalg.norm(self._rate, axis=1) > TURNING_DPS
         if np.count_nonzero(turning) * MEAN_S < TURNING_S:
             return None
@@ -103,18 +106,19 @@ class _Ride:
         return float(np.degrees(np.arctan2(np.hypot(left, forward), up)))
 
     def forward_by_speed(self) -> float | None:
-        """Degrees from the calibration's forward to the ride's, > 0 to the left; None where no speed shows it."""
+        """Degrees from the calibration's forward to the ride's by the log's speed, > 0 to the left; None if
+        uncertain."""
         straight = np.linalg.norm(self._second_rate, axis=1) < STRAIGHT_DPS
         found = self._pushed(np.where(straight[:, None], self._second_force[:, [0, 2]], np.nan))
         return _angle_deg(found.direction) if found and found.value > SURE_SPEED else None
 
     def speed_correlation(self) -> float | None:
-        """Between the force along the calibration's forward and the change of speed, -1 to 1."""
+        """Correlation of the force along the calibration's forward with the changes of speed, -1 to 1; None without."""
         found = self._pushed(self._second_force[:, 2:])
         return found.value * float(found.direction[0]) if found else None
 
     def _pushed(self, force: Array) -> Lag | None:
-        """How the changes of speed follow from the force (n, k) in the same second, or some before; NaN for none."""
+        """The Lag of the changes of speed behind the force (n, k, NaN where it is not to be used); None for too few."""
 
         def earlier(by: float) -> tuple[Array, Array] | None:
             change = self._change_g[int(by) :]
@@ -126,7 +130,7 @@ class _Ride:
         return best_lag(LATE_S, earlier, whole=True)
 
     def forward_by_bends(self) -> float | None:
-        """The same by leaning into bends, which a motorcycle does; None where too few bends show it."""
+        """Like forward_by_speed(), but by how a motorcycle leans into bends; None if uncertain."""
         if len(self._rate) < BENDS:
             return None
         turned = _smooth(self._rate[2:, 1] - self._rate[:-2, 1])
@@ -139,7 +143,7 @@ class _Ride:
 
 
 def _angle_deg(direction: Array) -> float:
-    """From forward to a direction (2: left, forward), > 0 to the left."""
+    """The angle from forward to a direction (2: left, forward), > 0 to the left."""
     return float(np.degrees(np.arctan2(*direction)))
 
 

@@ -1,10 +1,10 @@
 """How well rates explain the forces of a log, window by window.
 
-The rates of a window are integrated to the turn C from the sensor's axes at each instant to those at its beginning.
-There the force (specific, in g) is up, a constant vector, and the change of a velocity V, which the sensor's axes turn
-round: C f = up + C (dV/dt + rate x V) / g. V is small except along the vehicle: it is what the log's speed says, times
-a direction, or where there is none a velocity that changes slowly. up, V and a bias of the gyro are fitted by least
-squares, with what is usual for V and the bias as a prior; what is left shows how well the rates belong to the forces.
+The rates of a window are integrated to the rotation C from the sensor's axes at each instant to those at its beginning.
+In these the specific force (g) is `up`, a constant vector, plus the change of a velocity V given in the sensor's
+rotating axes: C f = up + C (dV/dt + rate x V) / g. V is the log's speed times a constant direction, or without a speed
+a velocity that changes slowly. up, V and the gyro's bias are fitted by least squares, V and the bias with a prior; the
+residual shows how well the rates fit the forces.
 """
 
 from dataclasses import dataclass
@@ -17,23 +17,27 @@ from ..signals import Array
 from ..signals.rotations import cross_matrix, rotation_matrix
 from .cells import CELL_S
 
-KNOT_S = 5.0  # between two knots an unknown velocity changes evenly
-EVENED = 10  # cells: in means over so many, once they are turned into the same axes, vibration evens out
-FORCE_G = 0.1  # rms of what is left of them
-VELOCITY_MPS, DIRECTION, BIAS_DPS = 20.0, 1.0, 3.0  # usual: an unknown velocity, a direction's part, a change of bias
-BIAS_STEPS, MOST_DPS = 2, 5.0  # so often the bias is corrected, by at most so much at once
+KNOT_S = 5.0  # an unknown velocity is interpolated between knots of this distance
+EVENED = 10  # cells over which forces, once they are in the same axes, are averaged against vibration
+FORCE_G = 0.1  # standard deviation of these means: measurement noise
+# Standard deviations of the prior: an unknown velocity, a component of the direction of a known speed, the correction
+# of the gyro's bias
+VELOCITY_MPS, DIRECTION, BIAS_DPS = 20.0, 1.0, 3.0
+BIAS_STEPS, MOST_DPS = 2, 5.0  # steps that correct the bias, and the largest change in one
 LATE_S = (0.0, 0.5, 1.0, 1.5)  # delays of the speed that are tried: a satellite receiver's is late
 
 
 class Turning:
-    """force (w, n, 3, g), rate (w, n, 3, deg/s): w windows of n cells of CELL_S. bias (3, deg/s): of the gyro, about.
+    """The fit. force (w, n, 3, g), rate (w, n, 3, deg/s): w windows of n cells of CELL_S. bias (3, deg/s): a first
+    guess of the gyro's.
 
-    speed (m, 2): cell and m/s, or None; places (w, n): the windows' cells.
+    speed (m, 2): index of the cell and m/s, or None; places (w, n): the indices of the windows' cells.
     """
 
     def __init__(self, force: Array, rate: Array, bias: Array, speed: Array | None, places: NDArray[np.int64]) -> None:
         self._force, self._rate, self._bias = force, rate, bias
-        self._velocities = [_knots(*places.shape)]  # each: values and their changes per second, (kinds, w, n)
+        # each: k functions of time whose combination is the velocity, and their derivatives: (k, w, n), per second
+        self._velocities = [_knots(*places.shape)]
         self._usual = VELOCITY_MPS
         if speed is not None:
             self._velocities = [_given(speed, places, late_s) for late_s in LATE_S]
@@ -41,19 +45,19 @@ class Turning:
 
     @property
     def unbiased(self) -> bool:
-        """The gyro's bias is about 0."""
+        """True where the first guess of the gyro's bias is about 0."""
         return bool(np.max(np.abs(self._bias)) < BIAS_DPS)
 
     def rough(self, exchanges: Array) -> Array:
-        """exchanges (k, 3, 3): rate = exchange @ reading. (k): mean square, g2, of what the turn alone leaves of the
-        force."""
+        """Returns (k): mean square, g2, of the force that the integrated rates do not explain, with no velocity of the
+        vehicle fitted. exchanges (k, 3, 3): rate = exchange @ reading."""
         sizes = np.mean(np.sum(self._force**2, axis=2))
         left = np.empty(len(exchanges))
         for sign in 1.0, -1.0:
             turn = _turn(sign * np.radians(self._rate - self._bias))
             both = np.einsum("wnij,wnk->wijk", turn, self._force) / turn.shape[1]
             right = np.linalg.det(exchanges) * sign > 0.0
-            # turning the gyro's axes by a rotation is turning the force's by its inverse
+            # rotating the gyro's readings is the same as rotating the forces by the inverse
             up = np.einsum("wijk,qkj->qwi", both, sign * exchanges[right])
             left[right] = sizes - np.mean(np.sum(up**2, axis=2), axis=1)
         return left
@@ -61,7 +65,7 @@ class Turning:
     def unexplained(self, exchange: Array) -> Array:
         """(w): mean square in each window, g2, of the force that the rates exchange @ reading do not explain."""
         sign = np.linalg.det(exchange)
-        force = self._force @ (sign * exchange)  # in axes in which the gyro needs no more than this sign
+        force = self._force @ (sign * exchange)  # the force is permuted in place of the rates: these need only the sign
         bias, velocity = self._bias, self._velocities[0]
         if len(self._velocities) > 1:
             turned = self._turned(force, sign, bias)
@@ -72,14 +76,14 @@ class Turning:
         return self._fit(*self._turned(force, sign, bias), velocity).left
 
     def _turned(self, force: Array, sign: float, bias: Array) -> tuple[Array, Array, Array]:
-        """(w, n, 3) rate, rad/s; (w, n, 3, 3) its turn; (w, n, 3) the force, turned by it."""
+        """(w, n, 3) the rate, rad/s; (w, n, 3, 3) C, the rotation integrated from it; (w, n, 3) C times the force."""
         rate = sign * np.radians(self._rate - bias)
         turn = _turn(rate)
         return rate, turn, np.einsum("wnij,wnj->wni", turn, force)
 
     def _fit(self, rate: Array, turn: Array, turned: Array, velocity: tuple[Array, Array]) -> "_Fit":
         values, changes = (part[..., None, None] for part in velocity)
-        parts = turn @ (cross_matrix(rate) * values + np.eye(3) * changes)  # (kinds, w, n, 3, 3)
+        parts = turn @ (cross_matrix(rate) * values + np.eye(3) * changes)  # (k, w, n, 3, 3)
         along = _evened(np.concatenate(list(parts), axis=-1) / STANDARD_GRAVITY)
         moved = _evened(turned)
         square = np.einsum("wnij,wnik->wjk", along, along)
@@ -90,12 +94,13 @@ class Turning:
         return _Fit(along, moved, inverse, found, left)
 
     def _bias_change(self, sign: float, rate: Array, turn: Array, turned: Array, fit: "_Fit") -> Array:
-        """(3) deg/s. A change of the bias turns all that was integrated: linear about the middle of the window."""
+        """(3) deg/s: the correction of the bias by one linear least-squares step. A change of the bias rotates the
+        force by its integral, taken from the middle of the window."""
         angle = np.cumsum(turn, axis=1) * CELL_S
         angle -= angle[:, rate.shape[1] // 2, None]
         by_bias = _evened(-sign * np.radians(1.0) * cross_matrix(turned) @ angle)
         mixed = np.einsum("wnij,wnik->wjk", fit.along, by_bias)
-        # the velocities of the windows are eliminated from the normal equations
+        # the windows' velocities are eliminated from the normal equations (Schur complement)
         square = np.einsum("wnij,wnik->jk", by_bias, by_bias) - np.einsum("wji,wjk,wkl->il", mixed, fit.inverse, mixed)
         vector = np.einsum("wnij,wni->j", by_bias, fit.moved) - np.einsum("wji,wj->i", mixed, fit.found)
         change = np.linalg.solve(square + (FORCE_G / BIAS_DPS) ** 2 * np.eye(3), vector)
@@ -104,8 +109,9 @@ class Turning:
 
 @dataclass
 class _Fit:
-    """Of each window: along (w, m, 3, k), what k parts of the velocity do to the moved force (w, m, 3); found (w, k),
-    those parts; inverse (w, k, k) of their normal matrix; left (w), mean square of what is not explained."""
+    """The least squares of each window: along (w, m, 3, k), derivatives of the force `moved` (w, m, 3) by the
+    velocity's k coefficients; found (w, k), these coefficients; inverse (w, k, k), the inverse of their normal matrix;
+    left (w), the residual's mean square."""
 
     along: Array
     moved: Array
@@ -115,9 +121,10 @@ class _Fit:
 
 
 def _turn(rate: Array) -> Array:
-    """(w, n, 3, 3): from the axes in the middle of each cell to those at the window's beginning. rate: rad/s."""
+    """(w, n, 3, 3): the rotation from the axes in the middle of each cell to those at the window's beginning,
+    integrated from rate (w, n, 3, rad/s)."""
     half = rotation_matrix(rate * (CELL_S / 2.0))
-    after = half @ half  # then the product of twice as many cells each time
+    after = half @ half  # each pass below multiplies twice as many cells
     reach = 1
     while reach < rate.shape[1]:
         after[:, reach:] = after[:, :-reach] @ after[:, reach:]
@@ -126,13 +133,13 @@ def _turn(rate: Array) -> Array:
 
 
 def _evened(values: Array) -> Array:
-    """(w, n, ...) in means over EVENED cells, without each window's own mean: that takes up, which is constant, out."""
+    """values (w, n, ...) in means over EVENED cells, less each window's mean: this removes the constant vector `up`."""
     means = np.mean(values.reshape(len(values), -1, EVENED, *values.shape[2:]), axis=2)
     return means - np.mean(means, axis=1, keepdims=True)
 
 
 def _knots(windows: int, cells: int) -> tuple[Array, Array]:
-    """A velocity that is given at each knot and changes evenly between them."""
+    """The functions of an unknown velocity, one per knot: 1 at that knot, 0 at the others, linear between them."""
     time = (np.arange(cells) + 0.5) * CELL_S
     count = round(cells * CELL_S / KNOT_S) + 1
     knots = np.arange(count) * KNOT_S
@@ -143,9 +150,9 @@ def _knots(windows: int, cells: int) -> tuple[Array, Array]:
 
 
 def _given(speed: Array, places: NDArray[np.int64], late_s: float) -> tuple[Array, Array]:
-    """A velocity of this speed."""
+    """The function of a velocity that is the log's speed, delayed by late_s, times a constant direction."""
     second = round(1.0 / CELL_S)
     cells = np.arange(-second, places.max() + 1 + second)
     values = np.interp(cells + late_s / CELL_S, *speed.T)
-    changes = (values[second:] - values[:-second]) / (second * CELL_S)  # of the second around it
+    changes = (values[second:] - values[:-second]) / (second * CELL_S)  # over the second around each cell
     return values[places + second][None], changes[places + second // 2][None]

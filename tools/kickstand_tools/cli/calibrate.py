@@ -198,10 +198,9 @@ def _event_lines(event: events.DriveEvent, several: bool) -> Iterable[str]:
 
 def _ride_lines(found: RideFit) -> Iterable[str]:
     begin, end = found.used_s
-    yield (
-        f"used: {begin:.0f} to {end:.0f} s of the log, {found.riding_s:.0f} s of it riding, "
-        f"leaning {found.lean_deg:.0f} degrees rms"
-    )
+    stood = f"{found.standing_s:.0f} s of it certainly standing"
+    leaning = f"else leaning {found.lean_deg:.0f} degrees rms"
+    yield f"used: {max(begin, 0.0):.0f} to {end:.0f} s of the log, {stood}, {leaning}"
     yield f"known to: roll {found.roll_deg:.1f}, pitch {found.pitch_deg:.1f}, yaw {found.yaw_deg:.1f} degrees"
     roll, pitch, yaw = (abs(angle) for angle in found.halves_deg)
     yield f"two halves of the ride differ by: roll {roll:.1f}, pitch {pitch:.1f}, yaw {yaw:.1f} degrees"

@@ -39,6 +39,12 @@ PATH = click.Path(path_type=Path)
 PORT = click.option(
     "--port", help="Serial port of the board, as COM3 or /dev/ttyACM0; found by itself if only one is there."
 )
+CHIP = click.option(
+    "--chip",
+    type=click.Choice(["rp2040", "esp32"]),
+    default="rp2040",
+    help="rp2040, a Pico, or esp32: it needs QEMU's library, see tools/README.md.",
+)
 JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON.")
 VEHICLES = click.Choice(["motorcycle", "car"])
 

@@ -31,6 +31,7 @@ COMMANDS = {
     "simulate": (".simulated", "Make up a ride with its true lean, or drives of a fleet."),
     "smooth": (".ride", "Find the lean afterwards, from the whole ride."),
     "status": (".board", "Ask a board for versions, settings, sensor and calibration."),
+    "try": (".without_a_board", "Your own code, as user.py on the simulated board."),
     "web": (".without_a_board", "Open the lean meter's pages in the browser."),
 }
 

@@ -140,9 +140,9 @@ def compare_command(
     if picture is not None:
         agreement.check_picture(picture)
         check_output(picture, [a, b, *paths])
-    parameters = [read_calibration(path) for path in paths]
+    of_a, of_b = (read_calibration(path) for path in paths)
     with Bar("comparing") as bar:
-        found = agreement.compare_rides(a, b, *parameters, bar.reach)
+        found = agreement.compare_rides(a, b, of_a, of_b, bar.reach)
     for log, notices in zip((a, b), found.notices.values()):
         warn(log, notices)
     if picture is not None:

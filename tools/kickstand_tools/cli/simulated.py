@@ -37,7 +37,7 @@ def pose_options(pitch_change_deg: float | None, words: str) -> Command:
 @click.command()
 @click.option("--profile", help=PROFILE_NAMES)
 @click.option("--seed", type=click.IntRange(min=0), default=0, help="Another seed, another ride.")
-@seconds_option(20.0, "Of riding; start and stop come on top.")
+@seconds_option(20.0, "Length of the log, from the kickstand on.")
 @pose_options(None, "Between the poses, degrees; at random if not given.")
 @click.option(
     "--road", type=click.Choice(list(CLASSES)), help="Roughness by ISO 8608, with camber; if not given, the profile's."

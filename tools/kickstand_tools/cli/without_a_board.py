@@ -1,27 +1,49 @@
-"""The commands that run the firmware without a board: demo, web, emulate."""
+"""The commands that run the firmware without a board: demo, try, web, emulate."""
 
 import contextlib
 import sys
 import webbrowser
 from pathlib import Path
+from typing import Any
 
 import click
 
 from ..demo.demo import DeviceStopped, demo
-from ..emulator import image, native
+from ..emulator import esp32_library, image, native
 from ..output import check_directory
 from ..progress import spinner
 from ..web import serve, site
-from .common import PATH
+from .common import CHIP, PATH, file_argument
+
+_HAND = click.option("--hand", is_flag=True, help="Lean the bike and press the button yourself, with keys.")
+_CPYTHON = click.option("--cpython", is_flag=True, help="Run the firmware on CPython, not on MicroPython.")
+_DISPLAY = click.option(
+    "--display", type=click.Choice(["lcd", "ssd1306", "sh1106"]), default="lcd", help="Which display it has."
+)
 
 
 @click.command()
-@click.option("--hand", is_flag=True, help="Lean the bike and press the button yourself, with keys.")
-@click.option("--cpython", is_flag=True, help="Run the firmware on CPython, not on MicroPython.")
-def demo_command(hand: bool, cpython: bool) -> None:
+@_HAND
+@_CPYTHON
+@_DISPLAY
+def demo_command(**chosen: Any) -> None:
     """Watch the firmware on a simulated board: kickstand press, upright press, a ride."""
+    _demo(**chosen)
+
+
+@click.command()
+@file_argument("user", "FILE")
+@_HAND
+@_CPYTHON
+@_DISPLAY
+def try_command(**chosen: Any) -> None:
+    """Try your own code: FILE is the simulated board's user.py, in the demo's ride."""
+    _demo(**chosen)
+
+
+def _demo(**chosen: Any) -> None:
     try:
-        demo(hand, cpython)
+        demo(**chosen)
     except DeviceStopped as error:
         click.echo(str(error), err=True)
         sys.exit(1)
@@ -49,11 +71,16 @@ def web_command(out: Path | None) -> None:
 
 @click.command()
 @click.option("--port", type=click.IntRange(1024, 65535), default=2040, help="On which mpremote finds it.")
-def emulate_command(port: int) -> None:
-    """An emulated Pico on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
+@CHIP
+@_DISPLAY
+def emulate_command(port: int, chip: str, display: str) -> None:
+    """An emulated board on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
     image.find()  # before anything else of the emulator is imported
-    with spinner("compiling the emulator, once"):
-        native.build()
+    if chip == "esp32":
+        esp32_library.find()
+    else:
+        with spinner("compiling the emulator, once"):
+            native.build()
     from ..emulator.emulate import emulate
 
-    emulate(port, click.echo)
+    emulate(port, click.echo, chip, display)

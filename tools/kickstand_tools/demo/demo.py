@@ -3,6 +3,7 @@
 import contextlib
 import io
 import sys
+from pathlib import Path
 
 from rich.console import Console
 from rich.live import Live
@@ -12,7 +13,7 @@ from ..errors import InputError
 from .device_process import Device
 from .keyboard import BIKE_KEYS, keyboard
 from .score import Score, table
-from .screen import lcd_lines, lean_text, screen
+from .screen import lcd_lines, lean_text, oled_lines, screen
 
 SCRIPT_SPEED, HAND_SPEED = 1.5, 1.0  # simulated seconds per second when drawn in a terminal
 FRAME_S = 0.25  # when printed: the shortest time between two frames of the same page
@@ -45,24 +46,31 @@ def _watch(device: Device, engine: str, by_hand: bool, score: Score) -> None:
                 live.update(screen(state, f"Kickstand on a simulated board, {engine}", keys, paused), refresh=True)
 
 
-def _print(device: Device, score: Score) -> None:
-    """Print each frame of the LCD when it changes."""
+def _print(device: Device, score: Score, console: bool) -> None:
+    """Print each frame of the display when it changes. console: also what the board prints."""
     said, said_s = [""], 0.0
     while not device.ended:
-        for state in device.ticks(1.0):
+        ticks = device.ticks(1.0)
+        while console and device.console:
+            print(device.console.pop(0), flush=True)
+        for state in ticks:
             score.add(state)
             live_page = state["lcd"][0][:4] == said[0][:4]
             if state["lcd"] == said or (live_page and state["t_s"] - said_s < FRAME_S):
                 continue
+            between = state["lcd"][0].startswith("?")  # an OLED, perhaps in the middle of a new picture
+            if between and state["t_s"] - said_s < FRAME_S:
+                continue
             said, said_s = state["lcd"], state["t_s"]
             print(f"{said_s:6.2f} s  {state['phase']}, true lean {lean_text(state['lean_deg'])}")
-            print("\n".join(lcd_lines(said)), flush=True)
+            print("\n".join(oled_lines(state["pixels"]) if "pixels" in state else lcd_lines(said)), flush=True)
 
 
-def demo(hand: bool = False, cpython: bool = False) -> None:
+def demo(hand: bool = False, cpython: bool = False, display: str = "lcd", user: Path | None = None) -> None:
     """Run the demo until it ends or the user quits, then print the score.
 
-    hand: the bike is steered with keys. cpython: on CPython, not on MicroPython.
+    hand: the bike is steered with keys. cpython: on CPython, not on MicroPython. display: "lcd", "ssd1306" or "sh1106".
+    user: own code for the board; then its console is printed, too.
     Raises InputError where there is no terminal to steer in, DeviceStopped if the device ended early.
     """
     watched = sys.stdin.isatty() and sys.stdout.isatty()
@@ -75,12 +83,14 @@ def demo(hand: bool = False, cpython: bool = False) -> None:
         print("No MicroPython package for this system: the same firmware runs on CPython instead.")
     score = Score()
     speed = HAND_SPEED if hand else SCRIPT_SPEED if watched else 0.0
-    with Device(engine.lower(), "hand" if hand else "script", speed) as device:
+    with Device(engine.lower(), "hand" if hand else "script", speed, display, user) as device:
         with contextlib.suppress(KeyboardInterrupt):
             if watched:
                 _watch(device, engine, hand, score)
             else:
-                _print(device, score)
+                _print(device, score, user is not None)
+    if user and watched:
+        print("\n".join(device.console))
     Console().print(table(score.figures()))
     if device.failed:
         raise DeviceStopped("\n".join(device.console))

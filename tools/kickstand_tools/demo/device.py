@@ -1,10 +1,11 @@
 """The firmware on the simulated board, on a simulated bike. Runs under MicroPython's unix port or CPython.
 
-    device.py script|hand SPEED
+    device.py script|hand SPEED DISPLAY
 
-SPEED: simulated seconds per second, 0 for as fast as possible. Every 50 simulated ms a line of JSON goes to standard
-output (see score.State); other lines are the firmware's console. Commands come from standard input, one a line:
-short, long (presses of the button), left, right, kickstand, upright (if the bike is steered by hand), pause, quit.
+SPEED: simulated seconds per second, 0 for as fast as possible. DISPLAY: "lcd", "ssd1306" or "sh1106". Every 50
+simulated ms a line of JSON goes to standard output (see score.State); other lines are the firmware's console. Commands
+come from standard input, one a line: short, long (presses of the button), left, right, kickstand, upright (if the bike
+is steered by hand), pause, quit.
 """
 
 import json
@@ -12,14 +13,16 @@ import sys
 import time
 
 from kickstand_tools.demo.hand_bike import HandBike
+from kickstand_tools.simulated_board.oled import Oled
 from kickstand_tools.simulated_board.simulator import Board, PowerOff
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, brake, kickstand, straight, turn, upright, wait
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 
 TICK_S = 0.05
 PART_SEED = 1
-PART_SHARE = 0.5  # errors of up to half of the data sheet's limits: an ordinary sensor
+PART_SHARE = 0.5  # the sensor's errors over the data sheet's limits: an ordinary sensor
 HAND_LIMIT_S = 3600.0
+BATTERY_V = 12.6 / 11  # at GPIO 26, behind the divider of firmware/examples/user_battery.py
 LONG_PRESS_S = 1.2
 
 # The rider presses the button once on the kickstand and once upright, and turns to two other pages after the ride
@@ -80,9 +83,9 @@ class Commands:
 
 
 class Demo:
-    """Bike and board, and the exchange with the process that draws."""
+    """Bike and board, and the communication with the process that draws."""
 
-    def __init__(self, by_hand, speed):
+    def __init__(self, by_hand, speed, display):
         self._commands = Commands()
         self._paused = False
         self._steer = None
@@ -94,7 +97,9 @@ class Demo:
             self.bike = Ride(SCRIPT)
             self.of_s = self.seconds = self.bike.seconds
         sensor = Sensor(seed=PART_SEED, share=PART_SHARE)
-        self.board = Board(sensor.world(self.bike.motion), pace=speed)
+        self.board = Board(sensor.world(self.bike.motion), pace=speed, display=display)
+        self.board.volts[26] = BATTERY_V
+        self._pixels, self._seen = "", -1  # of an OLED, and its count of changes then
         if not by_hand:
             self.board.press(KICKSTAND_PRESS_S)
             self.board.press(UPRIGHT_PRESS_S)
@@ -115,21 +120,28 @@ class Demo:
     def _tick(self):
         t_s = self.board.clock.now_us / 1e6
         lean_deg, speed_mps, _, phase = self.bike.truth(t_s)
-        self._say(
-            {
-                "t_s": round(t_s, 3),
-                "of_s": self.of_s,
-                "lcd": self.board.lcd.text(),
-                "lean_deg": round(lean_deg, 2),
-                "speed_mps": round(speed_mps, 2),
-                "phase": phase,
-                "pressed": self.board.button.closed,
-            }
-        )
+        state = {
+            "t_s": round(t_s, 3),
+            "of_s": self.of_s,
+            "lcd": self.board.lcd.text(),
+            "lean_deg": round(lean_deg, 2),
+            "speed_mps": round(speed_mps, 2),
+            "phase": phase,
+            "pressed": self.board.button.closed,
+        }
+        if isinstance(self.board.lcd, Oled):
+            state["pixels"] = self._drawn(self.board.lcd)
+        self._say(state)
         self._listen()
         while self._paused:
             _real_sleep(0.02)
             self._listen()
+
+    def _drawn(self, oled):
+        if oled.changes != self._seen:
+            self._seen = oled.changes
+            self._pixels = "".join(["%02x" % byte for byte in oled.pixels()])
+        return self._pixels
 
     def _listen(self):
         command = self._commands.next()
@@ -150,10 +162,10 @@ class Demo:
             sys.stdout.flush()
 
 
-def run(kind, speed):
-    """Run the demo's device. kind: "script" or "hand"; speed: see above."""
-    Demo(kind == "hand", float(speed)).run()
+def run(kind, speed, display="lcd"):
+    """Run the demo's device. kind: "script" or "hand"; speed, display: see above."""
+    Demo(kind == "hand", float(speed), display).run()
 
 
 if __name__ == "__main__":
-    run(sys.argv[1], sys.argv[2])
+    run(*sys.argv[1:])

@@ -17,21 +17,26 @@ from .score import State
 class Device:
     """The firmware on the simulated board. Use it in a `with` statement and call ticks() until ended.
 
-    engine: "micropython" or "cpython". kind and speed: the arguments of device.py.
+    engine: "micropython" or "cpython". kind, speed, display: the arguments of device.py. user: its user.py.
     """
 
-    def __init__(self, engine: str, kind: str, speed: float) -> None:
+    def __init__(self, engine: str, kind: str, speed: float, display: str = "lcd", user: Path | None = None) -> None:
         self._lines: queue.Queue[str | None] = queue.Queue()
         self.ended = False
         self._outcome = ""
         self.console: list[str] = []  # lines of the device's console, without its ticks
         self._directory = tempfile.TemporaryDirectory()  # the board's flash
+        if user:
+            Path(self._directory.name, "user.py").write_bytes(user.read_bytes())
+        arguments = [kind, str(speed), display]
         if engine == "micropython":
             script = Path(__file__).resolve().parent / "device.py"
-            command, environment = unix_port.command(str(script), kind, str(speed)), unix_port.environment()
+            command, environment = unix_port.command(str(script), *arguments), unix_port.environment()
+            environment["MICROPYPATH"] += ":" + self._directory.name
         else:
-            command = [sys.executable, "-m", "kickstand_tools.demo.device", kind, str(speed)]
-            path = os.pathsep.join(filter(None, [firmware_path.search_path(), os.environ.get("PYTHONPATH")]))
+            command = [sys.executable, "-m", "kickstand_tools.demo.device", *arguments]
+            own = [firmware_path.search_path(), self._directory.name, os.environ.get("PYTHONPATH")]
+            path = os.pathsep.join(filter(None, own))
             environment = os.environ | {"PYTHONPATH": path}
         self._process = subprocess.Popen(
             command,

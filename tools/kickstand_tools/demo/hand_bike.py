@@ -22,8 +22,8 @@ LEAN_STEP_DEG = 5.0
 MAX_LEAN_DEG = 50.0
 
 _STEP_S = 0.005
-_ROLL_RATE = 4.0  # rad/s: natural frequency at which the lean follows the wanted one, critically damped
-_SPEED_RATE = 1.5  # 1/s: how quickly the speed follows the wanted one
+_ROLL_RATE = 4.0  # rad/s: natural frequency with which the lean follows the commanded one, critically damped
+_SPEED_RATE = 1.5  # 1/s: the speed approaches the commanded one at this rate
 _MAX_ACCELERATION, _MAX_BRAKING = 3.0, 5.0  # m/s2
 _SWAY_RADPS = 2.0 * pi * 0.4
 

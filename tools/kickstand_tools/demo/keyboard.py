@@ -30,7 +30,7 @@ if sys.platform == "win32":
 
     @contextlib.contextmanager
     def keyboard() -> Iterator[Callable[[float], list[str]]]:
-        """Gives a function: the keys pressed so far; it waits for that many seconds."""
+        """A context with a function that waits for that many seconds and returns the keys pressed."""
 
         def keys(wait_s: float) -> list[str]:
             time.sleep(wait_s)
@@ -48,7 +48,7 @@ else:
 
     @contextlib.contextmanager
     def keyboard() -> Iterator[Callable[[float], list[str]]]:
-        """Gives a function: the keys pressed so far; it waits for one up to that many seconds."""
+        """A context with a function that waits up to that many seconds for a key and returns the keys pressed."""
         terminal = sys.stdin.fileno()
 
         def keys(wait_s: float) -> list[str]:

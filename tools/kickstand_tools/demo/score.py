@@ -1,7 +1,7 @@
 """The lean on the LCD compared with the true one."""
 
 from math import sqrt
-from typing import NamedTuple, TypedDict
+from typing import NamedTuple, NotRequired, TypedDict
 
 from rich.table import Table
 
@@ -13,7 +13,8 @@ _STANDING = ("kickstand", "upright", "moving", "wait")
 
 class State(TypedDict):
     """One tick of the device. of_s: how long the run will take, None if steered by hand; lcd: both lines;
-    lean_deg: the true lean, > 0 to the right; phase: what the bike does; pressed: True while the button is."""
+    lean_deg: the true lean, > 0 to the right; phase: what the bike does; pressed: True while the button is. pixels:
+    of an OLED, 64 rows of 128, 8 pixels a byte, the leftmost in bit 7, as hex."""
 
     t_s: float
     of_s: float | None
@@ -22,6 +23,7 @@ class State(TypedDict):
     speed_mps: float
     phase: str
     pressed: bool
+    pixels: NotRequired[str]
 
 
 class Figures(NamedTuple):

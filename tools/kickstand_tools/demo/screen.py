@@ -42,6 +42,27 @@ def _lcd(lcd: list[str]) -> RenderableType:
     return Align.center(Panel(glass, box=box.HEAVY, width=20, padding=0, border_style="grey50"))
 
 
+def oled_lines(pixels: str) -> list[str]:
+    """An OLED's pixels as 16 lines of 64 braille characters. pixels: see score.State."""
+    data = bytes.fromhex(pixels)
+    return [
+        "".join(
+            chr(0x2800 + sum(_BRAILLE[y][x] for y in range(4) for x in range(2) if _lit(data, 2 * column + x, row + y)))
+            for column in range(64)
+        )
+        for row in range(0, 64, 4)
+    ]
+
+
+def _lit(data: bytes, x: int, y: int) -> int:
+    return data[(128 * y + x) >> 3] & 0x80 >> (x & 7)
+
+
+def _oled(pixels: str) -> RenderableType:
+    glass = Text("\n".join(oled_lines(pixels)), style="bright_white on black", no_wrap=True)
+    return Align.center(Panel(glass, box=box.HEAVY, width=66, padding=0, border_style="grey50"))
+
+
 def _on_bike(x: float, y: float) -> bool:
     """True if a point is on bike or rider seen from behind. x to the right of and y above the contact point, m."""
     return (
@@ -107,14 +128,9 @@ def screen(state: State, title: str, keys: str, paused: bool) -> RenderableType:
     head.add_column(justify="right", no_wrap=True)
     clock = f"{state['t_s']:.1f} s" if of_s is None else f"{state['t_s']:.1f} of {of_s:.0f} s"
     head.add_row(Text(title, style="bold"), "paused" if paused else clock)
-    body = Table.grid(padding=0)
-    body.add_column(width=_LEFT_COLUMNS)
-    body.add_column(width=WIDTH - _LEFT_COLUMNS)
-    picture = bike(state["lean_deg"], shown_lean(state["lcd"]))
-    body.add_row(
-        Group(_lcd(state["lcd"]), "", _figures(state)),
-        Panel(Align.center(picture), title="from behind", box=box.ROUNDED, border_style="grey50"),
-    )
+    body: RenderableType = _beside_the_bike(state)
+    if "pixels" in state:  # there is no room for the bike
+        body = Group(_oled(state["pixels"]), Align.center(_figures(state)))
     frame = Table.grid()
     frame.add_column(width=WIDTH)
     frame.add_row(head)
@@ -123,3 +139,15 @@ def screen(state: State, title: str, keys: str, paused: bool) -> RenderableType:
         frame.add_row(ProgressBar(total=of_s, completed=state["t_s"], width=WIDTH))
     frame.add_row(Text(keys, style="grey70", no_wrap=True))
     return frame
+
+
+def _beside_the_bike(state: State) -> RenderableType:
+    body = Table.grid(padding=0)
+    body.add_column(width=_LEFT_COLUMNS)
+    body.add_column(width=WIDTH - _LEFT_COLUMNS)
+    picture = bike(state["lean_deg"], shown_lean(state["lcd"]))
+    body.add_row(
+        Group(_lcd(state["lcd"]), "", _figures(state)),
+        Panel(Align.center(picture), title="from behind", box=box.ROUNDED, border_style="grey50"),
+    )
+    return body

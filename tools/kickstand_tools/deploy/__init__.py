@@ -1,1 +1,1 @@
-"""The firmware onto a board by mpremote, and questions to a board."""
+"""Copies the firmware to a board, and queries a board, by mpremote."""

@@ -1,4 +1,4 @@
-"""What a program on the board prints, line by line while it runs: mpremote reads byte by byte, or after its end."""
+"""Reads the output of a program on the board line by line while it runs: mpremote reads byte by byte, or at its end."""
 
 import math
 import threading
@@ -9,17 +9,17 @@ from typing import Any
 from .connection import Board
 
 _CTRL_A, _CTRL_C = b"\x01", b"\x03"
-_END = b"\x04"  # of the program's output, and of its error
-_PROMPT = b">"  # after both
-_LAST_S = 10.0  # for what the program still prints after Ctrl-C
+_END = b"\x04"  # ends the program's output, and its error
+_PROMPT = b">"  # follows both
+_LAST_S = 10.0  # longest time for the program's output after Ctrl-C
 _POLL_S = 0.01
-_LONGEST_LINE = 100_000  # bytes; those of rides have 2,000
-_AWAY_S = 1.0  # this computer slept, or was too busy to read: a board that streams stops itself then
-_AWAY_SILENT_S = 5.0  # after that, how long the board may print nothing
+_LONGEST_LINE = 100_000  # bytes of the longest line; those of rides have 2,000
+_AWAY_S = 1.0  # after a longer pause (this computer slept, or was too busy) a board that streams has stopped itself
+_AWAY_SILENT_S = 5.0  # longest silence of the board after such a pause
 
 
 class BrokenOff(Exception):
-    """The program has ended with an error, or prints nothing any more; the text says which."""
+    """The program has ended with an error, or has stopped printing; the text says which."""
 
 
 def lines(
@@ -29,10 +29,10 @@ def lines(
     stopped: threading.Event | None = None,
     most_bytes: float = math.inf,
 ) -> Iterator[bytes]:
-    """Run code on the board; each line that it prints, without the line's end. Raises BrokenOff, OSError.
+    """Run code on the board; yield each line that it prints, without the line's end. Raises BrokenOff, OSError.
 
-    silent_s: how long it may print nothing, seconds.  stopped: once set, the program gets a Ctrl-C.  most_bytes: how
-    much it may print.
+    silent_s: longest silence of the program.  stopped: once set, the program gets a Ctrl-C.  most_bytes: limit of its
+    output.
     """
     transport.exec_raw_no_follow(code)
     serial: Any = transport.serial

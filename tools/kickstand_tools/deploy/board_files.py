@@ -1,4 +1,4 @@
-"""What is on a board's flash: its files with their hashes, its folders, its free blocks."""
+"""Lists a board's flash: its files with their hashes, its folders, its free flash blocks."""
 
 import hashlib
 from dataclasses import dataclass
@@ -43,8 +43,8 @@ Fingerprint = tuple[int, bytes]
 
 @dataclass(frozen=True)
 class BoardFiles:
-    """files: (bytes, SHA-256) by path, of the root and of the package.  folders: the package's folder and those below
-    it.  block: bytes of a block of flash.  free_blocks: how many are free.  has_rides: some are in
+    """files: (bytes, SHA-256) by path, those in the root and in the package.  folders: the package's folder and those
+    below it.  block: bytes of a flash block.  free_blocks: number of free ones.  has_rides: True if rides are in
     flash."""
 
     files: dict[str, Fingerprint]
@@ -55,7 +55,7 @@ class BoardFiles:
 
 
 def survey(transport: SerialTransport) -> BoardFiles:
-    """Look at the board's flash."""
+    """List the board's flash."""
     code = _SURVEY.replace("{PACKAGE}", PACKAGE).replace("{RIDES}", _RIDES)
     *lines, last = transport.exec(code).splitlines() or [b""]
     has_rides = _RIDES.encode() in lines[-1:]
@@ -71,5 +71,5 @@ def survey(transport: SerialTransport) -> BoardFiles:
 
 
 def fingerprint(data: bytes) -> Fingerprint:
-    """Bytes and SHA-256, as survey() gives them."""
+    """Number of bytes and SHA-256, as in BoardFiles.files."""
     return len(data), hashlib.sha256(data).digest()

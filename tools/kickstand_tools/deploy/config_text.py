@@ -1,4 +1,4 @@
-"""A config.py as a form has it: the settings in it, and the same file with others."""
+"""Reads the settings in a config.py for a form, and writes the form's settings into the file."""
 
 import ast
 import re
@@ -15,7 +15,7 @@ def decoded(data: bytes) -> str:
 
 
 def lines(text: str) -> list[str]:
-    """As Python counts them: str.splitlines() would begin another line at a form feed or U+2028 too."""
+    """The lines as Python counts them: str.splitlines() would also split at a form feed or U+2028."""
     found = re.split(r"\r\n|\r|\n", text)
     return found if found[-1] else found[:-1]
 
@@ -75,7 +75,7 @@ def _assigned(text: str) -> dict[str, ast.Assign]:
     found = {}
     for i, node in enumerate(body):
         if i == 0 and isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
-            continue  # what the file is for, in words
+            continue  # the file's docstring
         target = node.targets[0] if isinstance(node, ast.Assign) and len(node.targets) == 1 else None
         if not (isinstance(node, ast.Assign) and isinstance(target, ast.Name)) or node.col_offset:
             raise InputError(f"config.py, line {node.lineno} is no setting NAME = VALUE: change this file by hand")

@@ -1,4 +1,4 @@
-"""A connection to a board at its raw prompt, by mpremote, and what its errors mean."""
+"""A connection to a board at its raw prompt, by mpremote, with its errors in words."""
 
 import ast
 import contextlib
@@ -19,13 +19,13 @@ from ..errors import InputError, cause
 # Called with what is being done, the bytes that are done and the bytes in all.
 Progress = Callable[[str, int, int], None]
 
-MOST_BYTES = 1_000_000  # of an answer; the longest, the list of a board's files, has a hundredth of that
+MOST_BYTES = 1_000_000  # longest answer; the list of a board's files has a hundredth of that
 ANSWER_S = 10
 _POLL_S = 0.01
-_PROGRAM_S = 60  # an emulated board takes a while to compile the modules
+_PROGRAM_S = 60  # longest time of a program: an emulated board takes a while to compile the modules
 _EMULATED = "socket:"  # begins the name of an emulated board's port
-_SLOWER = 12  # how much longer than a board an emulated one may take: its seconds last longer where the host is busy
-_RESTART_S = 2  # until the board's USB port is back: the next command may follow at once
+_SLOWER = 12  # factor on times for an emulated board, whose seconds last longer on a busy host
+_RESTART_S = 2  # time until the board's USB port is back: the next command may follow at once
 
 # USB vendors of the boards themselves and of the serial chips on ESP32 boards
 VENDORS = {
@@ -36,7 +36,7 @@ VENDORS = {
     0x1A86: "WCH CH340",
     0x0403: "FTDI",
 }
-_DEBUG_PROBE = (0x2E8A, 0x000C)  # of the same vendor, but no board
+_DEBUG_PROBE = (0x2E8A, 0x000C)  # a device of the same vendor that is no board
 
 
 class NoFirmware(InputError):
@@ -48,13 +48,13 @@ class OutdatedFirmware(InputError):
 
 
 class Board(SerialTransport):
-    """A board whose answers end: mpremote waits for as long as something comes. slower: how much longer than a real
-    board's its seconds last, by which mpremote's limits on silence are stretched."""
+    """A board, with a limit on the length of answers: mpremote reads for as long as bytes come. slower: factor on
+    mpremote's limits of silence, for a board whose seconds last longer than real ones."""
 
     slower = 1
 
     def wait(self, seconds: float) -> None:
-        """Do nothing for so long. Where a program must not sleep, a board of its own does something else."""
+        """Sleep for so long. A program that must not sleep overrides this in a class of its own."""
         time.sleep(seconds)
 
     def read_until(self, min_num_bytes, ending, timeout=10, data_consumer=None, timeout_overall=None):
@@ -137,7 +137,7 @@ def find_port() -> str:
 
 
 def why_closed(port: str) -> InputError:
-    """What is in the way of opening a port, by trying once more."""
+    """The error that says why a port cannot be opened, found by trying once more."""
     try:
         serial.serial_for_url(port, timeout=1, exclusive=True).close()
     except ValueError as error:
@@ -163,15 +163,15 @@ def restart(transport: Board) -> None:
 
 
 def ask(transport: SerialTransport, expression: str, *shapes: Any) -> Any:
-    """What an expression of Python is on the board. shapes: see literal(). Raises InputError."""
+    """The value of a Python expression on the board. shapes: see literal(). Raises InputError."""
     return literal(transport.exec(f"print(repr({expression}))"), *shapes)
 
 
 def literal(text: bytes, *shapes: Any) -> Any:
-    """What a line of a board's output stands for.
+    """The Python value that a line of a board's output represents.
 
-    shapes: what it may be: a type, or a tuple of the types of a tuple's values; numbers are whole and not negative, and
-    None stands for None. Raises InputError for everything else: the board may be another device.
+    shapes: the allowed types: a type, or a tuple of the types of a tuple's values; numbers are integers and not
+    negative, and None stands for None. Raises InputError for others: the board may be another device.
 
     >>> literal(b"('/rides', 3)", (str, int))
     ('/rides', 3)
@@ -193,7 +193,7 @@ def _fits(value: Any, shape: Any) -> bool:
 
 
 def describe(transport: SerialTransport, name: str) -> str:
-    """The board and its version of MicroPython. Raises InputError for another Python."""
+    """The board's name and its version of MicroPython. Raises InputError for another Python."""
     implementation, version, machine = ask(
         transport,
         "(lambda i: (i.name, '.'.join(str(n) for n in i.version[:3]), getattr(i, '_machine', 'board')))"
@@ -206,8 +206,8 @@ def describe(transport: SerialTransport, name: str) -> str:
 
 
 def printed(transport: SerialTransport, name: str, code: str, what: str) -> bytes:
-    """What a program of the firmware's prints. name: of the port.  what: it is asked for.  Raises InputError,
-    NoFirmware, OutdatedFirmware."""
+    """The output of a program that uses the firmware. name: the port's.  what: names the output in messages.  Raises
+    InputError, NoFirmware, OutdatedFirmware."""
     output, error = transport.exec_raw(code, timeout=_PROGRAM_S)
     if error:
         reason = last_line(error.decode(errors="replace"))
@@ -219,7 +219,7 @@ def printed(transport: SerialTransport, name: str, code: str, what: str) -> byte
 
 
 def status(port: str | None) -> str:
-    """What kickstand.status() prints on the board, which is restarted then.
+    """The output of kickstand.status() on the board, which is restarted afterwards.
 
     port: None takes the only board that is plugged in.  Raises InputError, NoFirmware.
     """

@@ -1,4 +1,4 @@
-"""Which files make up the firmware, as `kickstand flash` and mip put them onto a board.
+"""Lists the files of the firmware, for `kickstand flash` and mip.
 
 python -m kickstand_tools.deploy.firmware_files writes mip's list, firmware/package.json, anew.
 """
@@ -41,13 +41,13 @@ def contents(mpy: int | None, compiler: bytecode.Compiler | None = None) -> dict
 
 
 def unfinished(path: str) -> str:
-    """The name that a file is written under until it is verified. A main.py that is cut short must not be started, and
-    a config.py that is cut short must not be kept as the rider's own."""
+    """The name of a file until it is verified. A main.py that is cut short must not be started, and a config.py that is
+    cut short must not be kept as the rider's own."""
     return path.removesuffix(".py") + ".new" if path in (CONFIG, MAIN) else path
 
 
 def mip_package() -> dict[str, object]:
-    """What package.json has to say. The URLs are relative: mip takes the modules from where it found the list."""
+    """The content of package.json. The URLs are relative: mip loads the modules from the place of the list."""
     modules = [path.lstrip("/") for path in firmware_files() if path.startswith(PACKAGE + "/")]
     return {"urls": [[module, module] for module in modules], "deps": [], "version": __version__}
 

@@ -1,4 +1,4 @@
-"""The firmware onto a board: what differs is copied and verified, what is no longer part is removed."""
+"""Updates the firmware on a board: copies and verifies files that differ, removes files of older versions."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,15 +14,16 @@ from .connection import Board, Port, Progress, ask, connected, describe, restart
 from .firmware_files import CONFIG, contents, unfinished
 from .update import Update, plan, refuse_without_room
 
-_CHUNK = 2048  # bytes an exchange; with mpremote's 256 copying takes half as long again
+_CHUNK = 2048  # bytes per exchange; with mpremote's 256 copying takes half as long again
 
 
 @dataclass(frozen=True)
 class InstallResult:
     """Paths on the board.
 
-    copied: verified to read back as they were sent.  copied_bytes: of all these.  kept: left as they were.  removed: of
-    older versions.  config_differs: the rider's config.py, which is kept, is not this version's.
+    copied: files that were verified to read back as they were sent.  copied_bytes: their size.  kept: files that were
+    not changed.  removed: files of older versions.  config_differs: the rider's config.py, which is kept, is not this
+    version's.
     """
 
     copied: list[str]
@@ -34,9 +35,9 @@ class InstallResult:
 
 @dataclass(frozen=True)
 class FlashResult:
-    """board: its name and version of MicroPython.  port: its name.  config: which config.py was checked, because it
-    was due to be copied, or None.  unused: settings in the rider's config.py that are behind a '#'.  why_sources: why
-    the firmware was not compiled, or None.  installed: the rest."""
+    """board: its name and version of MicroPython.  port: its name.  config: the config.py that was checked to be
+    copied, or None.  unused: settings in the rider's config.py that are behind a '#'.  why_sources: why the firmware
+    was not compiled, or None.  installed: the files."""
 
     board: str
     port: str
@@ -56,9 +57,9 @@ def flash(
 ) -> FlashResult:
     """Bring a board's files up to date, verify them and restart it.
 
-    replace_config: the rider's config.py too.  describe: what says which board it is, and refuses another.  compiler,
-    judge: for where mpy-cross, and a process of its own, are not to be had; None: bytecode.cross_compiled() and
-    config_check.judge().  Raises InputError, and NoRoom before anything is touched.
+    replace_config: update the rider's config.py too.  describe: returns the board's name, and refuses other devices.
+    compiler, judge: replacements where mpy-cross, or another process, cannot be run; None: bytecode.cross_compiled()
+    and config_check.judge().  Raises InputError, and NoRoom before anything is changed.
     """
     with connected(port) as (transport, name):
         board = describe(transport, name)
@@ -74,7 +75,7 @@ def flash(
             wanted[CONFIG] = source.read_bytes()
             update = prepare(transport, wanted, replace_config)
         except InputError:
-            restart(transport)  # what is on the board goes on
+            restart(transport)  # the board's program goes on
             raise
         installed = install(transport, update, progress)
         restart(transport)
@@ -82,7 +83,8 @@ def flash(
 
 
 def prepare(transport: SerialTransport, wanted: dict[str, bytes], replace_config: bool = False) -> Update:
-    """What install() has to do, with nothing touched yet. wanted: see contents(). Raises InputError, NoRoom."""
+    """The Update that install() has to carry out. Changes nothing. wanted: see contents(). Raises InputError,
+    NoRoom."""
     present = survey(transport)
     update = plan(wanted, present, replace_config)
     refuse_without_room(update, present)

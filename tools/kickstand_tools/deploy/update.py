@@ -1,9 +1,9 @@
-"""What an update changes on a board: which files and folders go, which are made, and whether they fit.
+"""Plans an update of a board: the files and folders to remove and to make, and whether they fit.
 
-A file takes whole blocks, which are freed when it is removed, or when its replacement is closed. Each block after the
-first begins with pointers of 4 bytes to blocks before it (littlefs, DESIGN.md, "CTZ skip-lists"). A small file may be
-kept within its folder instead: up to an eighth of a block, less on some boards. A folder takes two blocks, and two more
-when its entries outgrow them.
+A file takes whole flash blocks, which are freed when it is removed, or when its replacement is closed. Each block after
+the first begins with pointers of 4 bytes to blocks before it (littlefs, DESIGN.md, "CTZ skip-lists"). A small file may
+be kept within its folder instead: up to an eighth of a block, less on some boards. A folder takes two blocks, and two
+more when its entries outgrow them.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from .board_files import BoardFiles, fingerprint
 from .firmware_files import CONFIG, MAIN, MODULE_ENDINGS, PACKAGE, unfinished
 
 FOLDER = 2
-SPARE = 4  # a folder outgrows its two blocks; a block is written anew before the worn one is freed
+SPARE = 4  # spare blocks: a folder may outgrow its two, and littlefs writes a new block before it frees a worn one
 _POINTER = 4
 
 
@@ -23,7 +23,7 @@ class NoRoom(InputError):
 
 
 def most(size: int, block: int) -> int:
-    """Blocks that a file of this many bytes may take."""
+    """Most flash blocks that a file of this many bytes may take."""
     count = 1
     while size > block * count - _POINTER * (2 * (count - 1) - (count - 1).bit_count()):
         count += 1
@@ -31,16 +31,16 @@ def most(size: int, block: int) -> int:
 
 
 def least(size: int, block: int) -> int:
-    """Blocks that are freed for certain when a file of this many bytes is removed."""
+    """Flash blocks that are freed for certain when a file of this many bytes is removed."""
     return most(size, block) if size > block // 8 else 0
 
 
 @dataclass(frozen=True)
 class Update:
-    """In the order in which it is carried out. Where the board is up to date there is nothing to remove, make or copy.
+    """The steps of an update, in this order. On a board that is up to date there is nothing to remove, make or copy.
 
-    remove: files, main.py the first.  remove_folders: emptied by then.  make_folders.  copy: contents by path, main.py
-    the last.  obsolete: those of remove that belong to no module of this version.  keep: files left as they are.
+    remove: files, main.py the first.  remove_folders: empty by then.  make_folders.  copy: contents by path, main.py
+    the last.  obsolete: files in `remove` that belong to no module of this version.  keep: files that stay unchanged.
     config_differs: the rider's config.py, which is kept, is not this version's.
     """
 
@@ -54,7 +54,7 @@ class Update:
 
 
 def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> Update:
-    """What makes the board's files those that are wanted. Files of the rider's own stay.
+    """The Update after which the board has the wanted files. The rider's own files stay.
 
     Whatever is replaced is removed first, which frees its blocks: nothing is lost, since the board starts nothing
     without main.py, and the firmware can be copied again. Raises InputError for a file in the way.
@@ -85,7 +85,7 @@ def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> U
 
 
 def needed_blocks(update: Update, board: BoardFiles) -> int:
-    """How many blocks have to be free for it."""
+    """Number of flash blocks that have to be free for an update."""
     if not update.copy:
         return 0
     takes = sum(most(len(data), board.block) for data in update.copy.values())
@@ -121,12 +121,13 @@ def _module(path: str) -> str:
 
 
 def _folders(path: str) -> list[str]:
-    """Every folder that path is in, but for the root."""
+    """All folders that contain path, except the root."""
     return [str(folder) for folder in PurePosixPath(path).parents[:-1]]
 
 
 def _refuse_in_the_way(wanted: dict[str, bytes], folders: set[str], kept: set[str]) -> None:
-    """MicroPython imports a folder lean/ in place of lean.py, and lean.py in place of lean.mpy."""
+    """Raise InputError for a rider's file that MicroPython would import in place of a wanted one: a folder lean/ in
+    place of lean.py, and lean.py in place of lean.mpy."""
     modules = {_module(path) for path in wanted}
     for path in sorted(kept):
         if path in folders or modules.intersection(_folders(path)):

@@ -38,7 +38,7 @@ class EmulatedClock:
 class WiredButton(Button):
     """A button that calls changed(closed) when its contacts touch and when they part."""
 
-    def __init__(self, clock: EmulatedClock, seed: int) -> None:
+    def __init__(self, clock: Any, seed: int) -> None:
         self.changed: Callable[[bool], None] | None = None
         super().__init__(clock, seed)
 
@@ -60,7 +60,7 @@ class EmulatedBoard(Board):
     fitted: the arguments of Board, except port and pace.
     """
 
-    def __init__(self, clock: EmulatedClock, world: Callable[[float], tuple], **fitted: Any) -> None:
+    def __init__(self, clock: Any, world: Callable[[float], tuple], **fitted: Any) -> None:
         super().__init__(world, **fitted)
         self.clock: Any = clock
         parts: list[Any] = [self.sensor, self.lcd, *self.buses]

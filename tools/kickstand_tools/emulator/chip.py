@@ -37,7 +37,6 @@ class Chip:
         self.flash = TimedFlash(self.rp2040, "SSI")
         self.rp2040.ssi = self.rp2040.peripherals[_SSI] = self.flash
         self.controllers: list[TimedI2C] = []
-        self.resets = 0
         self.on_reset: Callable[[], None] | None = None
         self.rp2040.watchdog.on_watchdog_trigger = self.reset
         self._pios = self.rp2040.pio
@@ -88,7 +87,6 @@ class Chip:
         """Reset the chip, as machine.reset() does and a watchdog that is not fed."""
         self.rp2040.psm.write_uint32(WDSEL, PSM_BITS_MASK & ~_OSCILLATORS)
         self.rp2040.watchdog._reason |= TIMER
-        self.resets += 1
         self._reset(from_watchdog=True)
         if self.on_reset:
             self.on_reset()

@@ -51,10 +51,13 @@ class QuietConsole(USBCDC):
 
 
 class ConsoleServer:
-    """Serves one client at a time, as a serial port does. Call poll() often. Port 0 takes a free one, see `port`."""
+    """Serves one client at a time, as a serial port does. Call poll() often. Port 0 takes a free one, see `port`.
 
-    def __init__(self, console: QuietConsole, port: int) -> None:
-        self._console = console
+    send: takes what the client sends.
+    """
+
+    def __init__(self, send: Callable[[bytes], None], port: int) -> None:
+        self._send = send
         self._client: socket.socket | None = None
         try:
             self._server = socket.create_server(("127.0.0.1", port))
@@ -83,7 +86,7 @@ class ConsoleServer:
         except OSError:
             data = b""
         if data:
-            self._console.send(data)
+            self._send(data)
         else:
             self._hang_up()
 

@@ -1,4 +1,4 @@
-"""kickstand emulate: an emulated Pico with sensor, display and button on a simulated bike, for `kickstand flash`."""
+"""kickstand emulate: an emulated board with sensor, display and button on a simulated bike, for `kickstand flash`."""
 
 import contextlib
 import sys
@@ -12,15 +12,19 @@ from ..demo.hand_bike import HandBike
 from ..demo.keyboard import BIKE_KEYS, keyboard
 from ..demo.score import State
 from ..demo.screen import lcd_lines, screen
+from ..simulated_board.oled import Oled
 from ..simulation.scripted.script import Ride
 from ..simulation.scripted.sensor_errors import Sensor
 from .console import ConsoleServer
+from .device import Device
+from .esp32 import Esp32
 from .pico import Pico
 
 _STEP_S = 0.02
 _BUTTON = {"b": 0.15, "B": LONG_PRESS_S, " ": LONG_PRESS_S}  # seconds of a press, by key
 _HELP = "b button   B long press   a/d lean   k kickstand   u upright   q quit"
 _NO_FIRMWARE = "No firmware on it yet, so the display is blank. In another terminal:\n  kickstand flash --port {}\n"
+CHIPS: dict[str, type[Pico] | type[Esp32]] = {"rp2040": Pico, "esp32": Esp32}
 
 
 class ScriptedBike:
@@ -34,67 +38,69 @@ class ScriptedBike:
         """See script.Ride.motion()."""
         return self._ride.motion(0.0 if self.begun_s is None else t_s - self.begun_s)
 
-    def follow(self, pico: Pico) -> None:
+    def follow(self, device: Device) -> None:
         """Begin the ride once the display is on, and have the button pressed where the script says."""
-        if self.begun_s is None and pico.board.lcd.on:
-            self.begun_s = pico.time_s
+        if self.begun_s is None and device.board.lcd.on:
+            self.begun_s = device.time_s
             for press_s in (KICKSTAND_PRESS_S, UPRIGHT_PRESS_S):
-                pico.press(self.begun_s + press_s)
+                device.press(self.begun_s + press_s)
 
 
-def emulate(port: int, say: Callable[[str], None]) -> None:
-    """Serve the Pico's console on socket://127.0.0.1:port until the user quits. Raises InputError.
+def emulate(port: int, say: Callable[[str], None], chip: str = "rp2040", display: str = "lcd") -> None:
+    """Serve an emulated board's console on socket://127.0.0.1:port until the user quits. Raises InputError.
 
     In a terminal the bike is steered with keys. Elsewhere say() gets each new text of the display, and the bike goes
-    on the demo's ride once the firmware runs.
+    on the demo's ride once the firmware runs. display: "lcd", "ssd1306" or "sh1106".
     """
     watched = sys.stdin.isatty() and sys.stdout.isatty()
     bike = HandBike() if watched else ScriptedBike()
-    pico = Pico(Sensor(seed=PART_SEED, share=PART_SHARE).world(bike.motion))
-    server = ConsoleServer(pico.console, port)
-    pico.heard = server.say
+    device = CHIPS[chip](Sensor(seed=PART_SEED, share=PART_SHARE).world(bike.motion), display=display)
+    server = ConsoleServer(device.send, port)
+    device.heard = server.say
     address = f"socket://127.0.0.1:{server.port}"
-    say(f"an emulated Pico without firmware on {address}: kickstand flash --port {address}")
+    say(f"an emulated {device.NAME} without firmware on {address}: kickstand flash --port {address}")
     try:
-        with contextlib.suppress(KeyboardInterrupt), pico:
+        with contextlib.suppress(KeyboardInterrupt), device:
             if isinstance(bike, HandBike):
-                _watch(pico, server, bike, address)
+                _watch(device, server, bike, address)
             else:
-                _print(pico, server, bike, say)
+                _print(device, server, bike, say)
     finally:
         server.close()
 
 
-def _run(pico: Pico, server: ConsoleServer) -> None:
+def _run(device: Device, server: ConsoleServer) -> None:
     """Let a step of time pass, not faster than real time: the time-outs of mpremote go by the host's clock."""
-    begun, before = time.monotonic(), pico.time_s
-    pico.run(_STEP_S, server.poll)
-    time.sleep(max(0.0, pico.time_s - before - (time.monotonic() - begun)))
+    begun, before = time.monotonic(), device.time_s
+    device.run(_STEP_S, server.poll)
+    time.sleep(max(0.0, device.time_s - before - (time.monotonic() - begun)))
 
 
-def _watch(pico: Pico, server: ConsoleServer, bike: HandBike, address: str) -> None:
+def _watch(device: Device, server: ConsoleServer, bike: HandBike, address: str) -> None:
     with keyboard() as pressed, Live(screen=True, auto_refresh=False) as live:
         while True:
             for key in pressed(0.0):
                 if key == "q":
                     return
                 if key in _BUTTON:
-                    pico.press(for_s=_BUTTON[key])
+                    device.press(for_s=_BUTTON[key])
                 elif key in BIKE_KEYS:
                     bike.command(BIKE_KEYS[key])
-            _run(pico, server)
-            lean_deg, speed_mps, _, phase = bike.truth(pico.time_s)
+            _run(device, server)
+            lean_deg, speed_mps, _, phase = bike.truth(device.time_s)
             state: State = {
-                "t_s": pico.time_s,
+                "t_s": device.time_s,
                 "of_s": None,
-                "lcd": pico.lcd(),
+                "lcd": device.lcd(),
                 "lean_deg": lean_deg,
                 "speed_mps": speed_mps,
                 "phase": phase,
-                "pressed": pico.board.button.closed,
+                "pressed": device.board.button.closed,
             }
-            title = f"Kickstand on an emulated Pico, {address}"
-            live.update(screen(state, title, below(pico.board.lcd.on, address), False), refresh=True)
+            if isinstance(device.board.lcd, Oled):
+                state["pixels"] = device.board.lcd.pixels().hex()
+            title = f"Kickstand on an emulated {device.NAME}, {address}"
+            live.update(screen(state, title, below(device.board.lcd.on, address), False), refresh=True)
 
 
 def below(on: bool, address: str) -> str:
@@ -102,12 +108,12 @@ def below(on: bool, address: str) -> str:
     return _HELP if on else _NO_FIRMWARE.format(address) + _HELP
 
 
-def _print(pico: Pico, server: ConsoleServer, bike: ScriptedBike, say: Callable[[str], None]) -> None:
-    shown: list[str] = pico.lcd()
+def _print(device: Device, server: ConsoleServer, bike: ScriptedBike, say: Callable[[str], None]) -> None:
+    shown: list[str] = device.lcd()
     while True:
-        _run(pico, server)
-        bike.follow(pico)
-        if pico.lcd() != shown:
-            shown = pico.lcd()
-            say(f"{pico.time_s:8.2f} s")
+        _run(device, server)
+        bike.follow(device)
+        if device.lcd() != shown:
+            shown = device.lcd()
+            say(f"{device.time_s:8.2f} s")
             say("\n".join(lcd_lines(shown)))

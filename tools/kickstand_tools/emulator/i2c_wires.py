@@ -1,10 +1,10 @@
-"""The I2C devices as GPIO pins see them, bit by bit: for I2C.scan(), SoftI2C and for freeing a stuck bus.
+"""The I2C devices as GPIO pins see them, bit by bit: for SoftI2C, I2C.scan() and for freeing a stuck bus.
 
 rp2040py emulates only the controllers. MicroPython drives the pins itself for writes of length 0, as in scan(), and
 the firmware does so to free a bus.
 """
 
-from rp2040py.gpio_pin import GPIOPin, GPIOPinState
+from collections.abc import Callable
 
 from ..simulated_board.i2c import Bus
 
@@ -14,18 +14,17 @@ _IDLE, _LISTENS, _SENDS = 0, 1, 2
 class Wires:
     """Follows the levels that the chip drives on two pins, answers as the devices do, and sets the pins' inputs.
 
-    The board has pull-ups: a wire that nobody pulls low is high.
+    set_sda(level), set_scl(level): called when the level of that wire changes. The board has pull-ups: a wire that
+    nobody pulls low is high.
     """
 
-    def __init__(self, bus: Bus, sda: GPIOPin, scl: GPIOPin) -> None:
-        self._bus, self._sda, self._scl = bus, sda, scl
-        self._shown = {sda: -1, scl: -1}
+    def __init__(self, bus: Bus, set_sda: Callable[[int], None], set_scl: Callable[[int], None]) -> None:
+        self._bus, self._set_sda, self._set_scl = bus, set_sda, set_scl
+        self._sda = self._scl = -1
         self.release()
-        sda.add_listener(self._changed)
-        scl.add_listener(self._changed)
 
     def release(self) -> None:
-        """The chip drives neither pin: to be called after its reset, at which rp2040py calls no listener."""
+        """The chip drives neither pin, as after its reset."""
         self._driven_sda = self._driven_scl = 1
         self._pull = 0  # 1 while a device pulls SDA low
         self._mode = _IDLE
@@ -33,11 +32,10 @@ class Wires:
         self._address = True
         self._bus.set_scl(1)
         self._bus.set_sda(1)
-        self._show()
+        self.show()
 
-    def _changed(self, _value: GPIOPinState, _before: GPIOPinState) -> None:
-        sda = 0 if self._sda.value == GPIOPinState.LOW else 1
-        scl = 0 if self._scl.value == GPIOPinState.LOW else 1
+    def driven(self, sda: int, scl: int) -> None:
+        """The chip pulls these wires low (0) or lets go of them (1)."""
         if scl != self._driven_scl:
             self._driven_scl = scl
             self._bus.set_scl(scl)
@@ -53,7 +51,7 @@ class Wires:
                 self._bus.stop()
             elif scl:
                 self._mode, self._address, self._bit, self._byte = _LISTENS, True, 0, 0
-        self._show()
+        self.show()
 
     def _clock_rises(self) -> None:
         self._bit += 1
@@ -84,11 +82,12 @@ class Wires:
         self._byte = self._bus.read_byte() if self._mode == _SENDS else 0
         self._pull = 1 if self._mode == _SENDS and not self._byte & 0x80 else 0
 
-    def _show(self) -> None:
-        self._level(self._scl, self._bus.scl_level())
-        self._level(self._sda, 0 if self._pull else self._bus.sda_level())
-
-    def _level(self, pin: GPIOPin, level: int) -> None:
-        if self._shown[pin] != level:  # rp2040py takes the same level again for an edge
-            self._shown[pin] = level
-            pin.set_input_value(bool(level))
+    def show(self) -> None:
+        """Set the inputs, where they have changed: rp2040py takes the same level again for an edge."""
+        scl, sda = self._bus.scl_level(), 0 if self._pull else self._bus.sda_level()
+        if scl != self._scl:
+            self._scl = scl
+            self._set_scl(scl)
+        if sda != self._sda:
+            self._sda = sda
+            self._set_sda(sda)

@@ -3,59 +3,41 @@
 from collections.abc import Callable
 from typing import Any
 
+from rp2040py.gpio_pin import GPIOPinState
+
+from ..deploy import bytecode
+from ..simulated_board.i2c import Bus
 from . import flash_image, image
 from .board import EmulatedBoard, EmulatedClock
 from .chip import Chip
 from .console import QuietConsole
+from .device import LEVEL, Device
 from .flash_memory import PowerCut
 from .i2c_wires import Wires
 
-_LEVEL = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-_CTRL_A, _CTRL_C, _CTRL_D = b"\x01", b"\x03", b"\x04"
-_PROMPT = b"raw REPL; CTRL-B to exit\r\n>"
 
+class Pico(Device):
+    """See Device.
 
-class NotReached(Exception):
-    """A condition was not met in time."""
-
-
-class GuestError(Exception):
-    """The code that was given to exec() raised an exception. The text is the board's traceback."""
-
-
-class Pico:
-    """Has no power until power_on(); `with Pico(...) as pico:` switches it on, and off at the end.
-
-    world: as for simulator.Board; level and at rest if None.  files: what its flash holds, see flash_image.build().
-    fitted: as for EmulatedBoard.  Times are emulated seconds; they continue through resets and power cycles.
+    world: as for simulator.Board; level and at rest if None.  files: what its flash holds, see flash_image.py.
+    fitted: as for EmulatedBoard.
     """
+
+    NAME, FLASH, MPY = "Pico", flash_image.PICO, bytecode.PICO
 
     def __init__(
         self, world: Callable[[float], tuple] | None = None, files: dict[str, bytes] | None = None, **fitted: Any
     ) -> None:
         self.chip = Chip(image.find())
-        self.board = EmulatedBoard(EmulatedClock(self.chip.clock), world or (lambda t_s: _LEVEL), **fitted)
-        pins = self.chip.rp2040.gpio
-        self._wires = [Wires(bus, pins[bus.sda], pins[bus.scl]) for bus in self.board.buses]
+        super().__init__(EmulatedBoard(EmulatedClock(self.chip.clock), world or (lambda t_s: LEVEL), **fitted))
+        self._wires = [self._wired(bus) for bus in self.board.buses]
         for bus in self.board.buses:
             self.chip.connect(bus.sda // 2 % 2, bus)
-        self._button = pins[self.board.button_pin]
+        self._button = self.chip.rp2040.gpio[self.board.button_pin]
         self.board.button.changed = self._button_changed
         self.console = QuietConsole(self.chip.rp2040.usb_ctrl, self._received)
-        self.said = bytearray()  # what the board printed
-        self.heard: Callable[[bytes], None] | None = None  # called with each part of it
-        self.powered = False
-        self._awaited = b""
-        self._raw = False  # True while its console is in the raw REPL
-        self.chip.on_reset = self._reset
+        self.chip.on_reset = self._chip_reset
         self.put_files(files or {})
-
-    def __enter__(self) -> "Pico":
-        self.power_on()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.power_off()
 
     # Power and time
 
@@ -78,12 +60,6 @@ class Pico:
         self.board.power_off()
         self._reset()
 
-    def power_cycle(self, off_s: float = 0.5) -> None:
-        """Switch it off, and on again after off_s."""
-        self.power_off()
-        self.run(off_s)
-        self.power_on()
-
     def run(self, seconds: float, between: Callable[[], None] | None = None) -> None:
         """Let time pass. A PowerCut ends it early; `powered` is then False."""
         if not self.powered:
@@ -93,6 +69,19 @@ class Pico:
             self.chip.run(seconds, between)
         except PowerCut:
             self.power_off()
+
+    @property
+    def reading(self) -> bool:
+        """True while the sensor is sending."""
+        return self.chip.controllers[0].reading()
+
+    def reset(self) -> None:
+        """Reset the chip, as a watchdog does."""
+        self.chip.reset()
+
+    def stop(self) -> None:
+        """End run() after this instruction."""
+        self.chip.stop()
 
     def stall(self, seconds: float) -> None:
         """Let time pass in which the processor stands still, as in a long flash operation.
@@ -109,25 +98,6 @@ class Pico:
     def _transferring(self) -> bool:
         return any(bus.open for bus in self.board.buses)
 
-    def run_until(self, condition: Callable[[], Any], limit_s: float, step_s: float = 0.005) -> Any:
-        """Let time pass until condition() is true; return its value. It is called every step_s. Raises NotReached."""
-        end_s = self.time_s + limit_s
-        while not (reached := condition()):
-            if self.time_s >= end_s:
-                raise NotReached(f"not within {limit_s} s; the display says {self.lcd()}")
-            self.run(step_s)
-        return reached
-
-    # What a rider sees and does
-
-    def lcd(self) -> list[str]:
-        """The two lines of the display."""
-        return self.board.lcd.text()
-
-    def press(self, at_s: float | None = None, for_s: float = 0.15) -> None:
-        """Press the button at at_s (now, if None)."""
-        self.board.press(at_s, for_s)
-
     # Parts that can be added
 
     def fit_wheel(self, speed: Callable[[float], float], **kind: Any) -> None:
@@ -140,56 +110,30 @@ class Pico:
     @property
     def file_system(self) -> bytes:
         """The part of the flash that holds the files. It can be assigned."""
-        return bytes(self.chip.rp2040.flash[flash_image.START : flash_image.START + flash_image.SIZE])
+        return bytes(self.chip.rp2040.flash[self.FLASH.start : self.FLASH.start + self.FLASH.size])
 
     @file_system.setter
     def file_system(self, system: bytes) -> None:
-        self.chip.rp2040.flash[flash_image.START : flash_image.START + flash_image.SIZE] = system
-
-    def put_files(self, files: dict[str, bytes]) -> None:
-        """Replace the content of the file system with these files."""
-        self.file_system = flash_image.build(files)
-
-    def files(self) -> dict[str, bytes]:
-        """Every file in flash, by path."""
-        return flash_image.read(self.file_system)
+        self.chip.rp2040.flash[self.FLASH.start : self.FLASH.start + self.FLASH.size] = system
 
     # The console
 
-    def exec(self, code: str, limit_s: float = 10.0) -> str:
-        """Interrupt what runs on the board, run code there as mpremote does, and return what it printed.
-
-        Raises GuestError with the board's traceback, and NotReached if it takes longer than limit_s.
-        """
-        if not self._raw:
-            self.run(0.1)  # until the board reads its console
-            self.console.send(_CTRL_C + _CTRL_C + _CTRL_A)
-            self._expect(_PROMPT, 2.0)
-            self._raw = True
-        del self.said[:]
-        self.console.send(code.encode() + _CTRL_D)
-        self._expect(_CTRL_D + b">", limit_s)
-        output, error = bytes(self.said).removeprefix(b"OK").split(_CTRL_D)[:2]
-        if error:
-            raise GuestError(error.decode(errors="replace"))
-        return output.decode(errors="replace").replace("\r\n", "\n")
-
-    def _expect(self, ending: bytes, limit_s: float) -> None:
-        self._awaited = ending
-        if not self.said.endswith(ending):
-            self.run(limit_s)
-        self._awaited = b""
-        if not self.said.endswith(ending):
-            raise NotReached(f"the board's console ends with {bytes(self.said[-80:])!r}")
-
-    def _received(self, data: bytes) -> None:
-        self.said += data
-        if self._awaited and self.said.endswith(self._awaited):
-            self.chip.stop()
-        if self.heard:
-            self.heard(data)
+    def send(self, data: bytes) -> None:
+        """Send data to the board's console as fast as it takes them."""
+        self.console.send(data)
 
     # The wires
+
+    def _wired(self, bus: Bus) -> Wires:
+        sda, scl = (self.chip.rp2040.gpio[pin] for pin in (bus.sda, bus.scl))
+        wires = Wires(bus, *(lambda level, pin=pin: pin.set_input_value(bool(level)) for pin in (sda, scl)))
+
+        def changed(*_: object) -> None:
+            wires.driven(*(0 if pin.value == GPIOPinState.LOW else 1 for pin in (sda, scl)))
+
+        sda.add_listener(changed)
+        scl.add_listener(changed)
+        return wires
 
     def _button_changed(self, closed: bool) -> None:
         if closed:
@@ -203,6 +147,10 @@ class Pico:
             pin.release_input()
         else:
             pin.set_input_value(False)
+
+    def _chip_reset(self) -> None:
+        self.resets += 1
+        self._reset()
 
     def _reset(self) -> None:
         self._raw = False

@@ -1,9 +1,9 @@
 """The alignment of a motorcycle's sensor with its covariance, from an ordinary ride without poses.
 
-The readings are turned by a first guess of the axes (first_guess.py). Then the misalignment is estimated together with
+The readings are rotated by a first guess of the axes (first_guess.py). Then the misalignment is estimated together with
 the motion, the gyro's bias and the errors of sensor and bike, with a prior so wide that it says nothing of the
 misalignment. The lean follows the gyro through the bends; its mean on straights is the bike's own up, because the bike
-is balanced there, and what force is then left across the bike is the bias of the accelerometer. A lateral offset of the
+is balanced there, and the residual force across the bike is then the bias of the accelerometer. A lateral offset of the
 centre of mass and a roll misalignment are not separately observable. Nor are an error of the sensor's axes against each
 other and the misalignment: these errors are the larger part of its standard deviation.
 """
@@ -34,13 +34,16 @@ from .windows import WINDOW_S, Windows, windows_of
 
 SLOWEST_HZ = 20.0
 LONGEST_S = 1800.0  # more than half an hour of a ride adds nothing
-ROTATION_SIGMA = 10.0  # rad: nothing is known of the misalignment
-AXES_SIGMA = 0.012  # of 1: scale and cross-axis errors of the accelerometer
-BESIDE_SIGMA_G = 0.005  # force to the side on straights, of luggage or camber
-UNSETTLED = np.radians(0.5)  # a last step of more has not converged
-ODD_SIGMAS, ABSURD_SIGMAS = 4.0, 20.0  # of the sensor's errors that are found: beyond, its quality is worse
-MAX_DEG = np.array([5.0, 5.0, 3.5])  # pitch, yaw, roll: known less exactly, an alignment is not given
-MOVED_DEG = 8.0
+# Standard deviations of the prior
+ROTATION_SIGMA = 10.0  # rad: misalignment, of which nothing is known
+AXES_SIGMA = 0.012  # ratio: scale and cross-axis errors of the accelerometer
+BESIDE_SIGMA_G = 0.005  # force to the side on straights, by luggage or camber
+UNSETTLED = np.radians(0.5)  # if the last step changed an angle by more, it has not converged
+# An error of the sensor that comes out at over ODD_SIGMAS of its prior enlarges the standard errors; one over
+# ABSURD_SIGMAS is refused
+ODD_SIGMAS, ABSURD_SIGMAS = 4.0, 20.0
+MAX_DEG = np.array([5.0, 5.0, 3.5])  # pitch, yaw, roll: an alignment with a larger standard error is refused
+MOVED_DEG = 8.0  # and one whose two halves of the ride differ by more
 CONSTANT = Hypotheses(*np.array([[1e-5], [1e-5], [1e-4], [0.0], [1.0]]))  # nothing changes in the ride
 
 # How a phone may be mounted, as its user says it: a check of what the ride says, and a hint where that says little. A
@@ -60,15 +63,15 @@ PHONE_MAX_DEG = 45.0  # the mountings are at least 90 degrees apart
 
 @dataclass
 class RideFit:
-    """What a ride gives. Angles in degrees.
+    """The alignment by a ride, with its quality. Angles in degrees.
 
     roll_deg, pitch_deg, yaw_deg: standard errors of the alignment about forward, left and up. The larger part of them
     are errors of the sensor that are not observable from a ride. Upright is where the bike is balanced on straights.
-    halves_deg: by how much two halves of the ride differ in these three. offset_g (3): of the accelerometer along left,
-    up and forward, which the calibration takes off; offset_sigma_g (3): standard errors. used_s: from and to which
-    second of the log the sensor was mounted. riding_s, standing_s: seconds of it. lean_deg: rms of the ride's lean.
-    lag_s: by how much the log's speed is late, None without a speed. phone_deg: by how much the phone is turned against
-    the mounting that was said, None if none was. notices: what is remarkable in the log.
+    halves_deg: second half of the ride less first, in these three. offset_g (3): bias of the accelerometer along left,
+    up and forward, which the calibration takes off; offset_sigma_g (3): standard errors. used_s: first and last second
+    of the log in which the sensor was mounted. riding_s, standing_s: seconds of that time. lean_deg: rms of the ride's
+    lean. lag_s: delay of the log's speed, None without a speed. phone_deg: angle between the mounting that was found
+    and the one named by `phone`, None if none was. notices: what is remarkable in the log.
     """
 
     calibration: CalibrationFile
@@ -88,10 +91,10 @@ class RideFit:
 
 
 def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = None) -> RideFit:
-    """How the sensor sits on a motorcycle, from a ride with bends, in which no pose was held.
+    """The alignment of a sensor on a motorcycle, from a ride with bends, in which no pose was held.
 
-    log: see read_log; a speed helps and is not needed. phone: None, or how it was mounted: "portrait", "landscape" or
-    "flat" (see PHONES). progress: called with what is done of all there is. Up is where the bike is balanced on
+    log: see read_log; a speed helps and is optional. phone: None, or how it was mounted: "portrait", "landscape" or
+    "flat" (see PHONES). progress: called with (steps done, all steps). Up is where the bike is balanced on
     straights, forward is the axis about which it leans into its bends and along which it speeds up; leaning into bends
     separates left from right. Scale errors of the accelerometer are not observable from a ride. Raises InputError;
     RefusedInput, a subclass with code and values, where the ride does not determine how the sensor sits.
@@ -123,9 +126,10 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
 
 
 def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) -> Estimate:
-    """windows: along the sensor's axes. expected: the matrix (3, 3) as the user says it, None if unknown.
+    """Estimate the misalignment against a first guess, with the motion.
 
-    The matrix of the result is to be multiplied with that of the guess, its parameters are the same in each block.
+    windows: along the sensor's axes. expected: vehicle from sensor (3, 3) as the user says it, None if unknown. The
+    alignment is the result's matrix times that of the guess; the result's parameters are the same in each block.
     Raises Refusal if no alignment fits.
     """
     sigma, mean = Prior.of_pose(six_done=False).sigma, MEAN.copy()
@@ -143,8 +147,9 @@ def estimate_alignment(windows: Windows, guess: Axes, expected: Array | None) ->
 
 
 def mounted_windows(log: Log) -> Windows:
-    """The longest stretch of a log in which the mean force keeps its direction: before and after, a hand held the
-    sensor. Readings that no ride gives are left out."""
+    """The windows, along the sensor's axes, of the longest stretch of a log in which the mean force keeps its
+    direction: before and after, a hand held the sensor. Readings beyond MOST_G and MOST_DPS are left out. Raises
+    Refusal."""
     log = log.part(np.all(np.abs(log.accel_g) < MOST_G, axis=1) & np.all(np.abs(log.gyro_dps) < MOST_DPS, axis=1))
     windows = _windows(log)
     mean = averaged(windows.force, MOUNTED_S)
@@ -155,14 +160,14 @@ def mounted_windows(log: Log) -> Windows:
     if not len(mounted):
         raise Refusal("ride-short", 0.0, MIN_RIDING_S)
     begin, end = mounted[np.argmax(np.diff(mounted, axis=1))]
-    margin = round(MOUNTED_S / WINDOW_S)  # until the mean is of the ride alone
+    margin = round(MOUNTED_S / WINDOW_S)  # windows after which the mean is of the ride alone
     first = windows.edges[begin + margin * (begin > 0)]
     last = windows.edges[end - margin * (end < len(windows))]
     return _windows(log, (log.t_s >= first) & (log.t_s < min(last, first + LONGEST_S)))
 
 
 def _windows(log: Log, part: NDArray[np.bool_] | slice = slice(None)) -> Windows:
-    """Along the sensor's axes."""
+    """The windows of a part of the log, along the sensor's axes. Raises Refusal."""
     t_s, rate = log.t_s[part], np.radians(log.gyro_dps[part])
     if len(t_s) < 2:
         raise Refusal("ride-short", 0.0, MIN_RIDING_S)
@@ -170,7 +175,7 @@ def _windows(log: Log, part: NDArray[np.bool_] | slice = slice(None)) -> Windows
 
 
 def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | None, notices: list[Notice]) -> RideFit:
-    """The result with its quality. Raises Refusal where that is too low."""
+    """The estimate as a RideFit. Raises Refusal where its quality is too low."""
     halves = np.degrees(found.split())
     if np.max(np.abs(halves)) > MOVED_DEG:
         raise Refusal("ride-halves", float(np.max(np.abs(halves))))
@@ -178,7 +183,7 @@ def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | N
     odd = float(np.max(np.abs(parameters[SENSOR] / prior.sigma[SENSOR])))
     if odd > ABSURD_SIGMAS:
         raise Refusal("ride-contradicts")
-    # where a half differs by more than its error, something that the model does not know was at work
+    # where the halves differ by more than the standard error, there was a disturbance that the model lacks
     error = np.hypot(np.degrees(sigma[ROTATION]), 0.5 * halves) * max(1.0, odd / ODD_SIGMAS)
     if np.any(error > MAX_DEG):
         raise Refusal("ride-uncertain", *(float(error[i]) for i in (2, 0, 1)))
@@ -219,11 +224,11 @@ def _checked(windows: Windows, guess: Axes, found: Estimate, expected: Array | N
 
 
 def _mounting(phone: str, found: Array) -> Array:
-    """The matrix (3, 3) that the user means, of those that phone allows the one next to found. Raises Refusal where
-    found is another one."""
+    """Of PHONES[phone] the matrix (3, 3) that is nearest to `found`. Raises Refusal where `found` is further than
+    PHONE_MAX_DEG from it."""
     off, nearest = min(((_off_deg(found, matrix), i) for i, matrix in enumerate(PHONES[phone])))
     if off > PHONE_MAX_DEG:
-        mirrored = found * [[1.0], [-1.0], [-1.0]]  # what accelerations of the opposite sign make of it
+        mirrored = found * [[1.0], [-1.0], [-1.0]]  # the result if the accelerations have the opposite sign
         if min(_off_deg(mirrored, matrix) for matrix in PHONES[phone]) < PHONE_MAX_DEG:
             raise Refusal("phone-upside-down", phone)
         raise Refusal("phone-otherwise", phone, off)

@@ -1,21 +1,21 @@
 """The process model and the measurement model of a motorcycle, and their Jacobian.
 
-Lean t, pitch q, velocity of the sensor to the left, up and forward (l, u, v), in level axes that turn with the bike at
-the yaw rate p. Rates w and forces f are the readings without the sensor's errors:
+Lean t, pitch q, velocity of the sensor to the left, up and forward (l, u, v), in level axes that yaw with the bike at
+the rate p. Rates w and forces f are the readings without the sensor's errors:
 
     w = w_m + rotation x w_m + GYRO w_m - bias        f = f_m + rotation x f_m + ACCEL f_m + offset
     p = (w_x sin t + w_y cos t) / cos q        t' = w_z - p sin q        q' = w_y sin t - w_x cos t
     l' = a_l - p v        v' = a_f + p l        u' = a_u        a: the force in level axes, less 1 g upwards
 
 These are the firmware's kickstand.lean.bike_model without its assumption that there is no motion sideways or up. That
-is measured here, with an error: a velocity may err for a moment only, while accelerations err with every bump. The
-wheels' velocity is the sensor's less what turning adds at its place. Measured are differences that should be 0:
+is a measurement here, with noise: an error of velocity is brief, while accelerations err with every bump. The wheels'
+velocity is the sensor's less the rates times its place (rigid body). The measurements are differences that should be 0:
 
     SLIDING      the wheels' velocity sideways: they do not slide
     CLIMBING     their velocity up less that along the chassis: it points along the road, but for its dive in braking
     SLOPING      their velocity up: roads are level on average
-    BALANCED     the force to the side, less those by the tyres' width and by what lasts: a bike that rides is balanced
-    ANY_SPEED    the speed less a usual one        MEASURED_SPEED    the same less the log's, which is late
+    BALANCED     the force to the side, less TYRES, CAMBER and BESIDE (see unknowns.py): a bike that rides is balanced
+    ANY_SPEED    the speed less USUAL_MPS        MEASURED_SPEED    the speed less the log's, which is late
     RESTING      the velocity, and RESTING_RATE the rates, of a bike that stands (zero-velocity update)
     BACKWARD     the speed where it is under 0
 """
@@ -33,13 +33,13 @@ from .windows import Windows
 SLIDING, CLIMBING, SLOPING, BALANCED, ANY_SPEED, MEASURED_SPEED = range(STATES, STATES + 6)
 RESTING, RESTING_RATE, BACKWARD = slice(14, 17), slice(17, 20), 20
 ROWS = 21
-USUAL_MPS = 15.0  # where nothing else shows the speed
-STRAIGHT = 0.1  # rad: of lean. Up to about this a road is cambered, above it is banked, like the turn itself.
+USUAL_MPS = 15.0  # mean of the speed's prior
+STRAIGHT = 0.1  # rad: lean up to which a road is cambered; in bends that lean more it is banked into the bend
 STEP = 1e-6  # of finite differences, in the unknowns' units
 
 
 def process_and_measurements(windows: Windows, x: Array) -> Array:
-    """(ROWS, n): the rates of change of the states, and the measurements.
+    """(ROWS, n): the rates of change of the states (first STATES rows), then the measurements.
 
     x (STATES + PARAMETERS, n): states in the middle of each window, and parameters.
     """
@@ -49,7 +49,7 @@ def process_and_measurements(windows: Windows, x: Array) -> Array:
     fx, fy, fz = _corrected(windows.force.T, p, of.ACCEL) + p[of.OFFSET] + p[of.OFFSET_PER_C] * windows.warm
     st, ct, sq, cq = np.sin(t), np.cos(t), np.sin(q), np.cos(q)
     yaw = (wx * st + wy * ct) / cq
-    upright = fx * st + fy * ct  # force up after the lean is taken off
+    upright = fx * st + fy * ct  # upward force in axes that pitch but do not lean
     ahead = (fz * cq - upright * sq) * STANDARD_GRAVITY
     found = np.zeros((ROWS, len(t)))
     found[LEAN] = wz - yaw * sq
@@ -75,7 +75,8 @@ def process_and_measurements(windows: Windows, x: Array) -> Array:
 
 
 def jacobian(windows: Windows, x: Array, unknown: NDArray[np.intp]) -> Array:
-    """(len(unknown), ROWS, n): derivatives of process_and_measurements() by the rows `unknown` of x, by differences."""
+    """(len(unknown), ROWS, n): derivatives of process_and_measurements() by the rows `unknown` of x, as finite
+    differences."""
     found, moved = np.empty((len(unknown), ROWS, x.shape[1])), x.copy()
     here = process_and_measurements(windows, x)
     for slot, row in zip(found, unknown, strict=True):
@@ -87,8 +88,8 @@ def jacobian(windows: Windows, x: Array, unknown: NDArray[np.intp]) -> Array:
 
 
 def corrected_rates(rate: Array, x: Array, warm: Array) -> Array:
-    """(3, n): rates about left, up, forward (rad/s) without the gyro's errors. rate (3, n), x (STATES + PARAMETERS, n),
-    warm (n): of Windows."""
+    """(3, n): rates about left, up, forward (rad/s) without the gyro's errors. rate (3, n): as measured. x (STATES +
+    PARAMETERS, n): states and parameters. warm (n): see Windows."""
     return _corrected(rate, x[STATES:], of.GYRO) - x[BIAS] - x[STATES:][of.BIAS_PER_C] * warm
 
 

@@ -1,4 +1,4 @@
-"""Where a bike stands, and its lean and speed, roughly, where the estimation begins. For an alignment also its axes."""
+"""The starting point of the estimation: where the bike stands, its lean and speed, and for an alignment its axes."""
 
 import itertools
 from dataclasses import dataclass, replace
@@ -14,27 +14,28 @@ from ..signals.standstill import motionless
 from .windows import Windows
 
 STILL_S = 1.6  # shorter standstills look like smooth riding
-STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # rms of the means of windows, over STILL_S
-BIAS_RADPS = np.radians(4.0)  # of the gyro, since its calibration: a rate above is a turn
-MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # the mean force of a ride over so long keeps within this of up
-BETWEEN_S = 20.0
-SURELY_S = 4.0  # at both ends of this it may still ride, or fall
-SLOW_S = 4.0  # changes of lean that take longer follow from turning, quicker ones from the roll rate
-TURNS_S = 40.0  # over which turns give a speed
-CALM_S = 1.0
+STILL_RADPS, STILL_G = np.radians(0.35), 0.010  # a standing bike's windows differ by less over STILL_S (1 sigma)
+BIAS_RADPS = np.radians(4.0)  # limit of the gyro's bias since its calibration: a higher mean rate is a bend
+MOUNTED_S, MOUNTED_DEG = 10.0, 35.0  # while the sensor is mounted, its mean force over MOUNTED_S is this close to up
+BETWEEN_S = 20.0  # a shorter time between two movements in a hand counts as in the hand too
+SURELY_S = 4.0  # the sensor is surely in a hand where it seems so for all of this: the bike may still ride, or fall
+SLOW_S = 4.0  # changes of lean that take longer are computed from the yaw rate, quicker ones from the roll rate
+TURNS_S = 40.0  # the speed is computed from the bends within this
+CALM_S = 1.0  # without a standstill the gyro's bias is the mean of stretches this long that are nearly as calm
 MIN_RIDING_S = 30.0
-MIN_LEAN = np.radians(3.0)  # rms: riding straight on shows nothing
+MIN_LEAN = np.radians(3.0)  # rms: a ride that leans less does not show forward
 MIN_LIKENESS = 0.5  # correlation between leaning and turning; bikes have over 0.75
 MAX_PUSHED = 0.5  # force to the side over the lean in bends; bikes have 0.1 to 0.2 by their tyres' width
 CAR_G, CAR_LEAN = 0.045, np.radians(5.0)  # a car's rms of the force to the side is above, of its lean below
-STUCK_MPS = 0.5
-MAX_SPEED_FACTOR = 1.8  # of the log's speed and that of the bends, in either direction
-USUAL_MPS, USUAL_RADPS = 10.0, 0.14  # where there are no turns; yaw rate of turns that count as much
+STUCK_MPS = 0.5  # a log's speed that changes by less is stuck
+MAX_SPEED_FACTOR = 1.8  # limit of the log's speed over that of the bends, and of the inverse
+# Prior of the speed by the bends: this speed, with the weight of bends of this yaw rate
+USUAL_MPS, USUAL_RADPS = 10.0, 0.14
 
 
 def standing(w: Windows) -> NDArray[np.bool_]:
-    """(n) True where the bike stands still: nothing changes, and no speed speaks against it. For zero-velocity updates.
-    The rates of w have at most a small bias."""
+    """(n) True where the bike stands still, for zero-velocity updates: rates and forces do not change, the mean rate is
+    under BIAS_RADPS, and the speed, if known, agrees."""
     return _calm(w, STILL_S) & (np.linalg.norm(averaged(w.rate, STILL_S), axis=1) < BIAS_RADPS)
 
 
@@ -45,8 +46,8 @@ def _calm(w: Windows, over_s: float) -> NDArray[np.bool_]:
 
 
 def in_hand(w: Windows) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """(n) True where the sensor is surely moved about in a hand, or lies with the bike: up is far from where it was.
-    And the same with the seconds before and after, which may not be riding either.
+    """Two (n): True where the sensor is surely moved about in a hand, or lies with the bike, because up is far from
+    where it was; and True in these windows and the seconds before and after, which may not be riding either.
 
     On a bike in balance the force is along its own up, however far it leans.
     """
@@ -64,10 +65,10 @@ def in_hand(w: Windows) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
 
 
 def lean_and_speed(w: Windows, still: NDArray[np.bool_]) -> tuple[Array, Array]:
-    """Lean (n, rad) and speed (n, m/s). still (n): of standing().
+    """Lean (n, rad) and speed (n, m/s), roughly. still (n): see standing().
 
-    Without a speed in the log it is the one at which turns have the forces that they have: in balance 1 / cos(lean) is
-    the force, and speed x yaw rate = g tan(lean).
+    Without a speed in the log it is computed from the force in bends: in balance that is 1 / cos(lean), and speed x yaw
+    rate = g tan(lean).
     """
     known, yaw = w.known_speed, w.rate[:, 1]
     force = averaged(np.linalg.norm(w.force[:, :2], axis=1), 2.0)
@@ -84,18 +85,18 @@ def lean_and_speed(w: Windows, still: NDArray[np.bool_]) -> tuple[Array, Array]:
 
 @dataclass
 class Axes:
-    """matrix (3, 3): vehicle from sensor, rows left, up, forward. bias (3): of the gyro, rad/s, sensor's axes."""
+    """matrix (3, 3): vehicle from sensor, rows left, up, forward. bias (3, rad/s): the gyro's, in the sensor's axes."""
 
     matrix: Array
     bias: Array
 
 
 def axes(w: Windows) -> Axes:
-    """Where up and forward are, within some degrees, and the gyro's bias, of windows along the sensor's axes.
+    """The vehicle's axes, within some degrees, and the gyro's bias. w: windows along the sensor's axes.
 
     In balance the specific force keeps the direction of the bike's own up, so that its mean over the riding is up. For
-    forward, and for the hand of the axes, see signals/leaning.py. Raises Refusal where the ride is none of a
-    motorcycle, or has too little leaning.
+    forward and the handedness see signals/leaning.py. Raises Refusal where the ride is not a motorcycle's, or leans too
+    little.
     """
     bias = _bias(w)
     w = replace(w, rate=w.rate - bias)
@@ -110,8 +111,8 @@ def axes(w: Windows) -> Axes:
 
 
 def _bias(w: Windows) -> Array:
-    """At rest the mean rate; without a standstill that of smooth riding, else the usual one, because most of a ride is
-    nearly straight."""
+    """(3, rad/s) the gyro's bias: the median rate at rest; without a standstill in calm riding; without that in the
+    whole ride, because most of a ride is nearly straight."""
     for over_s in (STILL_S, CALM_S):
         places = _calm(w, over_s)
         if np.any(places):
@@ -120,7 +121,8 @@ def _bias(w: Windows) -> Array:
 
 
 def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: NDArray[np.bool_]) -> None:
-    """sideways (n): force to the left, g, changes within some seconds only."""
+    """Raise Refusal unless the ride is a motorcycle's with enough leaning and right-handed rates. sideways (n): force
+    to the left, g, less what changes slowly."""
     in_radians_mps = speed_in_radians(found)
     if in_radians_mps is not None:
         raise Refusal("rates-in-radians", in_radians_mps)
@@ -139,7 +141,8 @@ def _refuse_no_motorcycle(found: Leaning, sideways: Array, riding: NDArray[np.bo
 
 
 def _refuse_wrong_speed(known: Array, rolled: Array, turned: Array) -> None:
-    """known: m/s, NaN if unknown. The speed of the bends is the one whose yaw rates go with the lean."""
+    """Raise Refusal if the log's speed is stuck or not in m/s, by the speed at which yaw rate and lean in the bends
+    balance. known: the log's speed, NaN if it has none."""
     if not len(known) or np.isnan(known[0]):
         return
     if np.ptp(known) < STUCK_MPS:

@@ -1,9 +1,9 @@
-"""What may change in the course of a ride beside the motion: hypotheses, and their posterior weights.
+"""Hypotheses on how the parameters change during a ride (their random walk), and posterior weights of these.
 
 On its straights a bike seems to lean when its mount has yielded, and when something pushes it to the side for minutes,
-such as wind. Each of these, alone or together, is a hypothesis. Its posterior weight follows from the likelihood of the
-readings and from how usual it is. Where the readings do not separate two hypotheses, the result lies between both, and
-its standard deviation is as large as the difference.
+such as wind. Each of these, alone or together, is a hypothesis. Its posterior weight follows from its prior probability
+and from the likelihood of the readings. Where the readings do not separate two hypotheses, the result lies between
+both, and its standard deviation is as large as the difference.
 """
 
 from dataclasses import dataclass
@@ -16,27 +16,28 @@ from .solver import RandomWalks, Reduced, minus_two_log_likelihood
 from .unknowns import BESIDE, OFFSET, PARAMETERS, ROTATION, Prior
 
 ROLL = ROTATION.stop - 1
-BLOCK_S = 10.0  # of the random walk's steps
-# Standard deviations. The mount's are those of its rotation from block to block.
-FIRM, YIELDING = np.radians([0.05, 0.11])  # rad
-CALM_G, WIND_G, STORM_G = 0.00052, 0.01047, 0.03142  # force to the side that lasts for minutes
-PUSHED_S = 120.0  # for how long
-# The other parameters', as a share of those of the prior: a sensor warms up.
+BLOCK_S = 10.0  # duration of a block of windows: the random walk's step
+# Process noise, 1 sigma
+FIRM, YIELDING = np.radians([0.05, 0.11])  # rad: rotation of the mount from block to block
+CALM_G, WIND_G, STORM_G = 0.00052, 0.01047, 0.03142  # force to the side that lasts for PUSHED_S
+PUSHED_S = 120.0
+# of the other parameters from block to block, as a share of their prior's standard deviation: a sensor warms up
 DRIFT = np.full(PARAMETERS, 1e-4)
 DRIFT[OFFSET] = 0.15, 0.05, 0.05
-# Minus twice the logarithm of how often a ride is so. A light wind that lasts is usual, but a mount that yields looks
-# the same, and is further from the truth if it is taken for wind.
+# Minus twice the logarithm of the prior probability. A light lasting wind is common, but its readings look like those
+# of a yielding mount, and taking that for wind costs more accuracy: so its prior is low.
 YIELDS, WINDY, STORMY = 1.0, 8.0, 5.0
-WEIGHT = 0.25  # of the likelihood: errors that no model has last, so that readings are not independent
-LEAST_SHARE = 0.02  # a hypothesis of less weight is left out
+WEIGHT = 0.25  # exponent of the likelihood: errors that no model has last, so that readings are not independent
+LEAST_SHARE = 0.02  # a hypothesis of less posterior weight is left out
 
 
 @dataclass
 class Hypotheses:
     """G hypotheses.
 
-    turning, rolling (G, rad): by which a mount turns within a block about left and up, and about forward. pushed (G):
-    g, to the side. unusual (G): see above. weight (G): posterior weights, whose sum is 1.
+    turning, rolling (G, rad): process noise per block of the mount's rotation about left and up, and about forward.
+    pushed (G, g): standard deviation of the lasting force to the side. unusual (G): minus twice the logarithm of the
+    prior probability. weight (G): posterior weights, whose sum is 1.
     """
 
     turning: Array
@@ -46,18 +47,18 @@ class Hypotheses:
     weight: Array
 
     def select(self, index: NDArray[np.intp], weight: Array) -> "Hypotheses":
-        """Those with these indices, with other weights."""
+        """The hypotheses with these indices (k), with the posterior weights `weight` (k)."""
         return Hypotheses(self.turning[index], self.rolling[index], self.pushed[index], self.unusual[index], weight)
 
     def usual(self) -> "Hypotheses":
-        """The first one alone."""
+        """The first hypothesis alone, with the weight 1."""
         return self.select(np.zeros(1, dtype=np.intp), np.ones(1))
 
     def weighted(self, blocks: Reduced, prior: Prior, parameters: Array, unbalance: float) -> "Hypotheses":
-        """Those that count, with their posterior weights.
+        """The hypotheses with their posterior weights, without those of negligible weight.
 
-        blocks: of the windows. parameters (B, PARAMETERS): about which the equations are linear. unbalance: of
-        Noise; errors that are so much larger than usual let the readings say less.
+        blocks: the windows' normal equations. parameters (B, PARAMETERS): the values at which they were linearised.
+        unbalance: see Noise; over 1, it reduces the weight of the likelihood.
         """
         minus_two_log = minus_two_log_likelihood(blocks, self.random_walks(prior, parameters))
         minus_two_log = minus_two_log * WEIGHT / max(1.0, unbalance) ** 2 + self.unusual
@@ -66,7 +67,7 @@ class Hypotheses:
         return self.select(kept, weight[kept] / np.sum(weight[kept]))
 
     def random_walks(self, prior: Prior, parameters: Array) -> RandomWalks:
-        """Of the unknown parameters. parameters: see weighted()."""
+        """Prior and process noise of the estimated parameters by each hypothesis. parameters: see weighted()."""
         unknown = prior.unknown
         sigma = np.tile(prior.sigma, (len(self.weight), 1))
         sigma[:, BESIDE] = np.hypot(sigma[:, BESIDE], self.pushed)

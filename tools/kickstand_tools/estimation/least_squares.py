@@ -1,7 +1,7 @@
-"""The states and parameters for which the readings of a stretch of a ride fit together best: Gauss-Newton steps.
+"""Robust nonlinear least squares for the states and parameters of a stretch of a ride, by Gauss-Newton steps.
 
-Residuals are the steps of the states less those of the process model, and the measurements, each over its standard
-deviation. Outliers of both have less weight (Cauchy).
+Residuals are the states' changes from window to window less those of the process model, and the measurements, each over
+its standard deviation. Outliers of both are down-weighted (Cauchy).
 """
 
 import numpy as np
@@ -18,25 +18,27 @@ from .unknowns import BIAS, FORWARD, LEAN, LEFT, PARAMETERS, PITCH, ROTATION, ST
 from .windows import Windows
 
 BLOCK = 50  # windows of a block; see solver.py
-ROUNDS, PLAIN_ROUNDS = 20, 2  # at most; the first ones without regard to outliers
-NEAR, CONVERGED = np.radians([3.0, 0.02])  # changes of an angle: from NEAR on residuals show the ride's errors
-WEIGHING_ROUNDS = 2
-MAX_LEAN = 0.5  # rad: of one step. The equations are linear no further.
+ROUNDS, PLAIN_ROUNDS = 20, 2  # most steps; the first PLAIN_ROUNDS of them do not down-weight outliers
+# rad, a step's largest change of an angle: under NEAR the hypotheses are weighed, under CONVERGED it has converged
+NEAR, CONVERGED = np.radians([3.0, 0.02])
+WEIGHING_ROUNDS = 2  # steps that weigh the hypotheses anew
+MAX_LEAN = 0.5  # rad: largest change of an angle in one step. Beyond it the equations are not linear.
 MAX_PITCH = 1.2  # rad: as in the firmware
-START = np.array([1.0, 0.3, 1.0, 1.0, 20.0, 0.03, 0.03, 0.03])  # 1 sigma of the first state of all
-DRAWN = [PITCH, LEFT, UP, *range(STATES)[BIAS]]  # of it, what is drawn towards 0
+START = np.array([1.0, 0.3, 1.0, 1.0, 20.0, 0.03, 0.03, 0.03])  # standard deviations of the first state's prior
+DRAWN = [PITCH, LEFT, UP, *range(STATES)[BIAS]]  # its components whose prior has the mean 0; others': current estimate
 
 
 class Estimate:
     """The motion at the edges of n windows, and the errors of sensor and bike.
 
-    states (n + 1, STATES). parameters (B, PARAMETERS): of each block of BLOCK windows. matrix (3, 3): the rotation by
-    which the windows' axes were turned, where the prior is not that of a pose. change: the last step's largest change
-    of an angle, rad.
+    states (n + 1, STATES). parameters (B, PARAMETERS): of each block of BLOCK windows. matrix (3, 3): the rotation that
+    was applied to the windows, where the prior is not that of a pose. change: the last step's largest change of an
+    angle, rad.
     """
 
     def __init__(self, windows: Windows, prior: Prior, hypotheses: Hypotheses) -> None:
-        """hypotheses: among which the ride decides, the usual one first. Raises LinAlgError where nothing is found."""
+        """Estimate. hypotheses: see hypotheses.py; the first steps use the first one alone. Raises LinAlgError where
+        the equations have no solution."""
         self._length = min(BLOCK, len(windows))
         self._windows = windows = windows.padded(self._length)
         self.prior, self._hypotheses, self._likely = prior, hypotheses, hypotheses.usual()
@@ -53,7 +55,8 @@ class Estimate:
         self._use_own_noise()
 
     def unknowns(self, number: NDArray[np.intp], states: Array) -> Array:
-        """(STATES + PARAMETERS, k): as equations.py takes them. states (k, STATES): in windows of these numbers (k)."""
+        """(STATES + PARAMETERS, k): states and parameters as equations.py takes them. number (k): index of the window
+        of each of states (k, STATES)."""
         return np.concatenate((states.T, self.parameters[number // self._length].T))
 
     def sigma(self) -> Array:
@@ -74,7 +77,7 @@ class Estimate:
         return found
 
     def split(self) -> Array:
-        """(3, rad): by how much the misalignment of the second half of the ride differs from that of the first."""
+        """(3, rad): misalignment in the second half of the ride less that in the first, if they may differ."""
         walks = self._likely.random_walks(self.prior, self.parameters)
         middle = len(self.parameters) // 2
         walks.variance[:, middle - 1 : middle, ROTATION] = 1.0
@@ -99,17 +102,18 @@ class Estimate:
         return bool(np.max(self._noise.misfit) > 1.0)
 
     def _use_own_noise(self) -> None:
-        """Errors are from now on as large as this ride's residuals.
+        """Set the noise to that of this ride's residuals.
 
-        The states are those by the sigmas of a rough ride, because errors that no model has last for long, and weigh
-        less then.
+        Only the covariance uses this. The states stay those found with the larger noise of a rough ride, which gives
+        less weight to errors that the model lacks and that last long.
         """
         off = self._residuals()
         self._noise.estimate_roughness(off / self._noise.robust(self._noise.sigma(), off))
         self._noise.estimate_unbalance(off[:, BALANCED], LONG_S)
 
     def _step(self, robust: bool, weigh: bool) -> None:
-        """weigh: the hypotheses."""
+        """One Gauss-Newton step. robust: down-weight outliers. weigh: compute the hypotheses' posterior weights before.
+        Raises LinAlgError."""
         blocks = self._reduced(robust)
         if weigh:
             self._likely = self._hypotheses.weighted(blocks, self.prior, self.parameters, self._noise.unbalance)
@@ -128,7 +132,7 @@ class Estimate:
             self._turn_axes()
 
     def _turn_axes(self) -> None:
-        """A rotation that may be large is taken off the readings, because equations.py has only small ones."""
+        """Apply the rotation found so far to the readings and set it to 0, because equations.py is linear in it."""
         rotation = self.parameters[0, ROTATION].copy()
         self.parameters[:, ROTATION] -= rotation
         self.prior.mean[ROTATION] -= rotation
@@ -136,11 +140,11 @@ class Estimate:
         self.matrix, self._windows = turn @ self.matrix, self._windows.turned(turn)
 
     def _middle(self) -> Array:
-        """Unknowns in the middle of each window."""
+        """unknowns() in the middle of each window."""
         return self.unknowns(np.arange(len(self._windows)), 0.5 * (self.states[1:] + self.states[:-1]))
 
     def _residuals(self) -> Array:
-        """(n, ROWS): steps of the states less those of the process model, and measurements."""
+        """(n, ROWS): the states' changes over each window less those of the process model, and the measurements."""
         x = self._middle()
         self._noise.lean, self._noise.speed = x[LEAN], x[FORWARD]
         found = process_and_measurements(self._windows, x).T
@@ -155,7 +159,7 @@ class Estimate:
         derivatives[:, :s] *= -windows.covered
         derivatives = derivatives.transpose(2, 1, 0) / sigma[..., None]
         found = np.empty((len(windows), ROWS, 2 * s + len(unknown) + 1))
-        found[..., :s] = found[..., s : 2 * s] = 0.5 * derivatives[..., :s]  # the middle moves by half
+        found[..., :s] = found[..., s : 2 * s] = 0.5 * derivatives[..., :s]  # the middle is the mean of both edges
         step = np.arange(s)
         found[:, step, step] -= 1.0 / sigma[:, :s]
         found[:, step, s + step] += 1.0 / sigma[:, :s]

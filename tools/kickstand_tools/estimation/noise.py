@@ -1,4 +1,4 @@
-"""How large the errors of the motion and of the measurements of equations.py are, and every parameter of that.
+"""Process noise and measurement noise for equations.py, with every parameter that sets them.
 
 Symbol = default  # unit: what it is. Standard deviations are 1 sigma. A disturbance that lasts tau seconds, measured in
 each window of T seconds, gets the variance sigma^2 2 tau / T, because measurements that share an error must not count
@@ -16,30 +16,33 @@ from .first_guess import in_hand
 from .unknowns import BIAS, FORWARD, LEAN, LEFT, PITCH, UP
 from .windows import Windows
 
-# Noise of the motion, per square root of a second
-ANGLE_ROOT = np.radians(0.2)  # rad: of lean and pitch, by vibration of the gyro
+# Process noise, per square root of a second
+ANGLE_ROOT = np.radians(0.2)  # rad: lean and pitch, by vibration of the gyro
 VELOCITY_ROOT = (0.05, 0.05, 0.10)  # m/s: left, up, forward, by vibration of the accelerometer
-BIAS_ROOT = np.radians(0.005)  # rad/s
-WARMING_ROOT = np.radians(0.01)  # the same where no temperature is known: 0.6 deg/s in five minutes of warming up
-# Where readings are missing, and in the hand: lean, pitch, velocity; per root of a second, and at most
+BIAS_ROOT = np.radians(0.005)  # rad/s: the gyro's bias where the log has a temperature
+WARMING_ROOT = np.radians(0.01)  # rad/s: the same without a temperature; 0.6 deg/s in five minutes of warming up
+# Where readings are missing, and in the hand: lean and pitch (rad), velocity left, up, forward (m/s); per square root
+# of a second, and the limit of that over a long time
 LOST_ROOT = np.array([np.radians(30.0), np.radians(5.0), 3.0, 1.0, 4.0])
 LOST_MOST = np.array([np.radians(60.0), np.radians(8.0), 20.0, 2.0, 20.0])
-JOLTED_RADPS, JOLTED_S = np.radians(150.0), 0.06  # a rate that is so far from its window's mean errs, for so long
-JOLT = 4.0  # sigmas of the motion within a window: what is more is a jolt to the sensor, and counts less and less
+# A jolt falsifies the angles by JOLTED_S times what a rate differs from its window's mean by more than JOLTED_RADPS
+JOLTED_RADPS, JOLTED_S = np.radians(150.0), 0.06
+JOLT = 4.0  # sigmas: a larger residual of the process model is a jolt to the sensor, and down-weighted (Cauchy)
 
-# Errors of the measurements, and how long they last
-SLIDE_MPS, SLIDE_SHARE, SLIDE_S = 0.15, 0.01, 0.5  # m/s sideways, and as a share of speed x tan(lean)
-DIVE_MPS, DIVE_RAD, DIVE_S = 0.1, np.radians(2.5), 0.5  # m/s up, and as an angle: of the chassis against the road
-SLOPE_MPS, SLOPE_RAD, SLOPE_S = 0.1, np.radians(2.0), 4.0  # the same, of the road against the horizontal
+# Measurement noise, 1 sigma, each with how long such an error lasts (..._S)
+SLIDE_MPS, SLIDE_SHARE, SLIDE_S = 0.15, 0.01, 0.5  # wheels' sideways velocity: m/s, and times speed x tan(lean)
+DIVE_MPS, DIVE_RAD, DIVE_S = 0.1, np.radians(2.5), 0.5  # their upward velocity: m/s, and chassis pitch against the road
+SLOPE_MPS, SLOPE_RAD, SLOPE_S = 0.1, np.radians(2.0), 4.0  # likewise for the road's slope against the horizontal
 BALANCE_G, BALANCE_S = 0.011, 3.0  # force to the side, by wind, camber and the rider
-BALANCE_LEANED_G, BALANCE_ROLLING = 0.045, 0.05  # the same over sin(lean), and over the roll acceleration (g s2/rad)
+# Further noise of that force: g, times sin(lean), and g s2/rad, times the roll acceleration
+BALANCE_LEANED_G, BALANCE_ROLLING = 0.045, 0.05
 BALANCE_MIN_MPS = 4.0  # below, steering and feet count
-ANY_MPS, ANY_S = 20.0, 60.0  # of a speed from USUAL_MPS, where nothing else shows it
-SPEED_MPS = 1.0  # of the log's speed, in each second: a receiver errs for some seconds together
-REST_MPS, REST_RADPS = 0.05, np.radians(0.15)  # of a bike that stands
-HAND_MPS = 0.5  # of a sensor that is moved about, over a window
-BACKWARD_MPS = 0.3  # of a bike that rides backwards
-OUTLIER = 2.0  # sigmas: what is further off counts less and less
+ANY_MPS, ANY_S = 20.0, 60.0  # speed less USUAL_MPS, where nothing else shows the speed
+SPEED_MPS = 1.0  # the log's speed, in each second: a receiver's error lasts for some seconds
+REST_MPS, REST_RADPS = 0.05, np.radians(0.15)  # velocity and rates of a bike that stands
+HAND_MPS = 0.5  # velocity of a sensor that is moved about by hand, over a window
+BACKWARD_MPS = 0.3  # speed below 0: bikes hardly roll backwards
+OUTLIER = 2.0  # sigmas: larger residuals of measurements are down-weighted (Cauchy)
 LASTING_S = {eq.SLIDING: SLIDE_S, eq.CLIMBING: DIVE_S, eq.SLOPING: SLOPE_S, eq.BALANCED: BALANCE_S, eq.ANY_SPEED: ANY_S}
 
 # How rough a ride is, is estimated from the rms of these residuals over those that are expected of a rough ride
@@ -51,20 +54,20 @@ ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
 # part for seconds. The velocities' noise grows with the square of this residual's rms, in means over LASTING_MISFIT_S
 # and times the root of their number of windows, over the usual one.
 LASTING_MISFIT_S, USUAL_MISFIT, MOST_MISFIT = 2.0, 0.3, 4.0
-# How far from balance a ride is, likewise: by the rms of BALANCED in means over some seconds, less what lasts longer
-# (unknowns.BESIDE), over its standard deviation. The longer these means, the more an error has gone that changes
-# sides, as a rider's corrections do: over BRIEF_S the balance is judged with care, over LONG_S as it is.
+# How far from balance a ride is, likewise: by the rms of BALANCED in means over some seconds, less its mean over
+# LASTS_S (that is unknowns.BESIDE), over its standard deviation. Longer means average out errors that change sign, such
+# as a rider's corrections: BRIEF_S overestimates the noise to be cautious, LONG_S does not.
 BRIEF_S, LONG_S, LASTS_S = 3.0, 10.0, 40.0
 LEAST_UNBALANCE, MOST_UNBALANCE = 0.25, 6.0
-LEAST_WINDOWS = 50  # from which the balance is judged
+LEAST_WINDOWS = 50  # with fewer windows of balanced riding unbalance stays 1
 
 
 class Noise:
-    """Of n windows. still (n): the bike stands.
+    """The standard deviations of n windows. still (n): True where the bike stands.
 
-    riding (n): the bike rides, or may. lean (n, rad), speed (n, m/s): roughly, to be set before anything is asked.
-    roughness (n): 1 for a rough ride. misfit (n): by which the velocities' noise is enlarged, 1 where accelerations are
-    the bike's. unbalance: 1 for a ride that is as far from balance as usual.
+    lean (n, rad), speed (n, m/s): estimates, to be set before sigma(). roughness (n): 1 for a rough ride; multiplies
+    the noise of vibration. misfit (n): multiplies that of the velocities, 1 where accelerations are the
+    bike's. unbalance: 1 for an average ride; multiplies the noise of BALANCED.
     """
 
     def __init__(self, windows: Windows, still: NDArray[np.bool_]) -> None:
@@ -76,7 +79,7 @@ class Noise:
         self.roughness, self.misfit, self.unbalance = np.ones(len(windows)), np.ones(len(windows)), 1.0
         seconds = np.maximum(windows.seconds, 1e-4)
         self._root = np.sqrt(seconds)[:, None]
-        self._lasting = np.ones((len(windows), eq.ROWS))  # what an error that lasts is multiplied by in each window
+        self._lasting = np.ones((len(windows), eq.ROWS))  # factor on a window's sigma because its error lasts longer
         for row, over_s in LASTING_S.items():
             self._lasting[:, row] = np.sqrt(np.maximum(1.0, 2.0 * over_s / seconds))
 
@@ -110,13 +113,14 @@ class Noise:
         return found
 
     def robust(self, sigma: Array, off: Array) -> Array:
-        """The standard deviations (n, ROWS), larger where the residual off (n, ROWS) is an outlier (Cauchy)."""
-        limit = OUTLIER / self._lasting  # what holds for long is judged by its own sigma, not by its share of a window
+        """sigma (n, ROWS), enlarged where the residual off (n, ROWS) is an outlier (Cauchy)."""
+        limit = OUTLIER / self._lasting  # in sigmas of the disturbance itself, not in those enlarged by its duration
         limit[:, : BIAS.start], limit[:, BIAS] = JOLT, np.inf
         return sigma * np.hypot(1.0, off / sigma / limit)
 
     def estimate_roughness(self, residual: Array) -> None:
-        """From the residuals over their standard deviations (n, ROWS), around each window."""
+        """Set roughness from the mean square, around each window, of the residuals over their standard deviations
+        (n, ROWS)."""
         squares = np.mean((residual[:, ROUGH] / EXPECTED) ** 2, axis=1) * self.roughness**2
         share = averaged(self._riding.astype(float), ROUGHNESS_S)
         found = averaged(np.where(self._riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
@@ -133,7 +137,7 @@ class Noise:
         self.misfit = np.clip(found, 1.0, MOST_MISFIT)
 
     def estimate_unbalance(self, force: Array, over_s: float) -> None:
-        """From the measurement BALANCED (n, g). over_s: BRIEF_S or LONG_S."""
+        """Set unbalance from the measurement BALANCED (n, g). over_s: BRIEF_S or LONG_S."""
         counted = self._balanced
         share, whole = averaged(counted.astype(float), LASTS_S), averaged(counted.astype(float), over_s) > 0.97
         self.unbalance = 1.0
@@ -141,7 +145,8 @@ class Noise:
             return
         off = force - averaged(np.where(counted, force, 0.0), LASTS_S) / np.maximum(share, 1e-9)
         mean = averaged(np.where(counted, off / self._of_balance(), 0.0), over_s)[whole]
-        ratio = over_s / BALANCE_S  # left in a mean is this share of the variance of an error that lasts BALANCE_S
+        # of an error that lasts BALANCE_S, a mean over over_s keeps this share of the variance
+        ratio = over_s / BALANCE_S
         left = 2.0 * (ratio - 1.0 + np.exp(-ratio)) / ratio**2
         self.unbalance = float(np.clip(np.sqrt(np.mean(mean**2) / left), LEAST_UNBALANCE, MOST_UNBALANCE))
 
@@ -150,7 +155,7 @@ class Noise:
         return self._riding & (self.speed > BALANCE_MIN_MPS)
 
     def _of_balance(self) -> Array:
-        """(n) g: of a ride that is as far from balance as usual."""
+        """(n) g: standard deviation of BALANCED in an average ride."""
         return np.hypot(BALANCE_G, BALANCE_LEANED_G * np.sin(self.lean))
 
 

@@ -1,4 +1,4 @@
-"""The smoothed lean of a recorded ride: from all of its readings, those before and those after."""
+"""The smoothed lean of a recorded ride: at each instant from all readings, earlier and later ones."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -23,10 +23,12 @@ from .unknowns import FORWARD, LEAN, PITCH, Prior
 from .windows import Windows, windows_of
 
 SLOWEST_HZ = 10.0
-SEGMENT_S = 120.0  # a log is cut into segments
-TOGETHER = 8  # of which so many are estimated together, with one before and one after them
-LEANED_SHARE = 0.004  # of the lean: what the model leaves out, such as a gyro that measures forces, grows with it
-TIMING_S = 0.004  # s: of what the delay of the gyro's low-pass, and the times of samples, are off
+SEGMENT_S = 120.0  # a log is cut into segments of this length
+TOGETHER = 8  # so many segments are estimated together, with one before and one after them
+# Further standard deviations of the lean: times the lean, for errors that the model leaves out, such as the gyro's
+# sensitivity to acceleration; times the roll rate, for the delay of the gyro's low-pass and the samples' times
+LEANED_SHARE = 0.004
+TIMING_S = 0.004  # s
 COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps")
 
 
@@ -50,8 +52,9 @@ class SmoothedRide(Table):
 def smooth(log: Source, calibration: CalibrationFile, progress: Progress | None = None) -> SmoothedRide:
     """The lean of a motorcycle from all readings of its ride, with a standard deviation for each sample.
 
-    log: see read_log; a speed helps and is not needed. calibration: aligned, of a motorcycle. progress: called with how
-    much of the log is done of how much. Least squares over the whole ride: see equations.py. Raises InputError.
+    log: see read_log; a speed helps and is optional. calibration: aligned, of a motorcycle. progress: called with how
+    much of the log is done and how much there is. Least squares over the whole ride: see equations.py. Raises
+    InputError.
 
     >>> from kickstand_tools.api import CalibrationFile, Log, simulate_ride
     >>> ride = simulate_ride("street", seed=1, seconds=60.0)
@@ -88,11 +91,12 @@ def smooth_to_csv(
 def _checked_blocks(
     log: Source, calibration: CalibrationFile, progress: Progress | None, notices: list[Notice]
 ) -> Iterator[tuple[Block, Array]]:
-    """smooth_blocks() of the stretch that is wanted."""
+    """smooth_blocks() of the stretch that `log` names. Raises InputError, also for under SLOWEST_HZ samples a
+    second."""
     whole, stretch = apart(log)
     for block, found in smooth_blocks(whole, calibration, progress, notices):
         if found is None:
-            raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples a second: too few to look back over")
+            raise InputError(f"{name_of(log)}: under {SLOWEST_HZ:.0f} samples a second: too few to smooth the lean")
         yield from within(stretch, block, found)
 
 
@@ -119,7 +123,7 @@ def smooth_blocks(
         if len(waiting) > TOGETHER:
             past, waiting, before = waiting[:TOGETHER], waiting[TOGETHER:], past[-1:]
             yield from _together(before, past, waiting, calibration, start_c)
-    # the end of a ride may be short: as much of what was before it is estimated with it
+    # the end of a ride may be short: segments before it are estimated with it, up to TOGETHER
     yield from _together(past[-max(1, TOGETHER - len(waiting)) :], waiting, [], calibration, start_c)
 
 
@@ -135,7 +139,7 @@ def _segments(blocks: Iterator[Block]) -> Iterator[Block]:
 def _together(
     before: list[Block], own: list[Block], after: list[Block], calibration: CalibrationFile, start_c: float
 ) -> Iterator[tuple[Block, Array | None]]:
-    """The values of the segments `own`, estimated together with those before and after them."""
+    """Each of the segments `own` with its values, estimated together with those before and after them."""
     measured = [segment.measured for segment in (*before, *own, *after)]
     values = _estimated(measured, calibration, start_c)
     first = sum(len(segment.time_us) for segment in measured[: len(before)])
@@ -152,7 +156,7 @@ def _together(
 
 
 def _estimated(segments: list[Block], calibration: CalibrationFile, start_c: float) -> Array | None:
-    """(samples, COLUMNS); None where there are too few samples a second."""
+    """(samples, COLUMNS), NaN where the readings are not a ride's; None for under SLOWEST_HZ samples a second."""
     t_s = np.concatenate([segment.t_s for segment in segments])
     readings = np.concatenate([segment.readings for segment in segments])
     speed = np.concatenate([segment.speed_mps for segment in segments])
@@ -170,7 +174,7 @@ def _estimated(segments: list[Block], calibration: CalibrationFile, start_c: flo
     try:
         estimate = Estimate(windows, Prior.of_pose(calibration.six_done), ALL)
     except np.linalg.LinAlgError:
-        return nothing  # readings that are no ride's: the lean is not known
+        return nothing  # readings that are not a ride's
     found = at_samples(windows, rate, estimate, calibration.delay_s())
     found[:, :3] = np.degrees(found[:, :3])
     return found
@@ -180,15 +184,15 @@ def at_samples(windows: Windows, rate: Array, found: Estimate, delay_s: float) -
     """(samples, 4): lean, its standard deviation, pitch (rad) and speed (m/s). Between the edges of the windows the
     corrected gyro gives the lean.
 
-    rate (samples, 3): rad/s, as windows_of() took it. delay_s: by how much the gyro's low-pass is late.
+    rate (samples, 3): rad/s, as windows_of() took it. delay_s: delay of the gyro's low-pass.
     """
     number, sigma = windows.number, found.sigma()[:, LEAN]
     duration = windows.before + windows.after
-    last = np.append(np.diff(number) > 0, True)  # sample of its window
+    last = np.append(np.diff(number) > 0, True)  # True for the last sample of each window
     window = np.cumsum(last) - last
 
     def integral(rate: Array) -> tuple[Array, Array]:
-        """From the begin of its window to each sample, and over the whole window."""
+        """The integral of rate (samples) from the begin of a sample's window to the sample, and over that window."""
         until = np.cumsum(rate * duration)
         edges = np.concatenate(([0.0], until[last]))
         return until - rate * windows.after - edges[window], np.diff(edges)[window]

@@ -17,13 +17,13 @@ from ..logs.table import Array
 
 @dataclass
 class Reduced:
-    """B chains of which the inner states are eliminated. s: values of a state; m: of the parameters of a chain.
+    """B chains whose inner states are eliminated. s: number of values of a state; m: number of a chain's parameters.
 
-    Of each level of the elimination, the first one first: gains (B, states, s, s + s + m + 1): a state's change is
-    minus this times (the state before, the state after, the parameters, 1); covariances (B, states, s, s): of a state,
-    given these. left (B, s + s + m, s + s + m + 1): the normal equations of the first state, the last one and the
-    parameters; the last column is the gradient. log_determinant (B): of the information about all states that were
-    eliminated. residual (B): the sum of squares at their optimum.
+    One array per level of the elimination, the first level first: gains (B, states, s, s + s + m + 1): a state's change
+    is minus this times (the state before, the state after, the parameters, 1); covariances (B, states, s, s): those of
+    a state, given these. left (B, s + s + m, s + s + m + 1): the normal equations of the first state, the last one and
+    the parameters; the last column is the gradient. log_determinant (B): that of the information matrix of the
+    eliminated states. residual (B): the sum of squares at their optimum.
     """
 
     s: int
@@ -35,16 +35,17 @@ class Reduced:
 
 
 def reduce_windows(jacobian: Array, states: int) -> Reduced:
-    """jacobian (B, K, r, s + s + m + 1): derivatives of the residuals of a window by the state at its begin, that at
-    its end and the parameters, and the residuals. states: s. Raises LinAlgError."""
+    """Eliminate the inner states of B blocks of K windows. jacobian (B, K, r, s + s + m + 1): derivatives of a window's
+    r residuals by the state at its begin, that at its end and the parameters, then the residuals themselves. states: s.
+    Raises LinAlgError."""
     links = np.matmul(jacobian[..., : 2 * states].transpose(0, 1, 3, 2), jacobian)
     common = _in_rows(jacobian[..., 2 * states :])
     return _reduced(links, np.matmul(common.transpose(0, 2, 1), common))
 
 
 def _reduced(links: Array, common: Array) -> Reduced:
-    """links (B, K, s + s, s + s + m + 1): normal equations of both states of each link. common (B, m + 1, m + 1): the
-    products of the parameters' columns and the residual."""
+    """Cyclic reduction. links (B, K, s + s, s + s + m + 1): normal equations of both states of each link. common
+    (B, m + 1, m + 1): those of the parameters, bordered by their gradient and the residual's sum of squares."""
     s = links.shape[2] // 2
     gains, covariances = [], []
     common, log_determinant = common.copy(), np.zeros(len(links))
@@ -76,8 +77,8 @@ def _in_rows(values: Array) -> Array:
 
 
 def back(reduced: Reduced, ends: Array, parameters: Array) -> Array:
-    """(B, K + 1, s): the changes of all states, by those of the first and the last one (B, 2, s) and of the parameters
-    (B, m)."""
+    """Back substitution. (B, K + 1, s): the changes of all states, from those of the first and the last state, `ends`
+    (B, 2, s), and of the parameters (B, m)."""
     states = ends
     for gain in reversed(reduced.gains):
         count = gain.shape[1]
@@ -92,7 +93,7 @@ def covariances(reduced: Reduced, joint: Array) -> Array:
     """(B, K, s + s, s + s + m): covariance of the states at both ends of each link, with each other and with the
     parameters. joint (B, s + s + m, s + s + m): that of the first state, the last one and the parameters."""
     s, width = reduced.s, joint.shape[1]
-    ends = np.r_[:s, 2 * s : 3 * s]  # of the three states of two links
+    ends = np.r_[:s, 2 * s : 3 * s]  # rows of the outer two of the three states of two links
     all_but_inner = np.r_[ends, 3 * s : width + s]
     found, common = joint[:, None, : 2 * s], joint[:, None, 2 * s :]
     for gain, own in zip(reversed(reduced.gains), reversed(reduced.covariances), strict=True):
@@ -100,7 +101,8 @@ def covariances(reduced: Reduced, joint: Array) -> Array:
         split = found[:, :count]
         below = np.repeat(common, count, axis=1)
         below[..., : 2 * s] = split[..., 2 * s :].transpose(0, 1, 3, 2)
-        inner = -np.matmul(gain[..., :-1], np.concatenate((split, below), axis=2))  # by the ends and the parameters
+        # covariance of the inner state with the ends and the parameters
+        inner = -np.matmul(gain[..., :-1], np.concatenate((split, below), axis=2))
         three = np.empty((len(found), count, 3 * s, width + s))
         three[:, :, ends[:, None], all_but_inner] = split
         three[:, :, s : 2 * s, all_but_inner] = inner
@@ -114,10 +116,11 @@ def covariances(reduced: Reduced, joint: Array) -> Array:
 
 @dataclass
 class RandomWalks:
-    """The parameters by G hypotheses.
+    """The parameters' random walk by each of G hypotheses.
 
-    prior (G, m, m + 1): normal equations of those of the first block. variance (G, B - 1, m): of their change from
-    block to block. between (B - 1, m): by how much those about which the equations were linearised change.
+    prior (G, m, m + 1): normal equations of the first block's parameters. variance (G, B - 1, m): process noise, the
+    variance of their change from block to block. between (B - 1, m): that change in the values at which the equations
+    were linearised.
     """
 
     prior: Array
@@ -129,8 +132,8 @@ def _chains(blocks: Reduced, walks: RandomWalks) -> tuple[Reduced, Array, Array]
     """G chains of blocks. The n = s + m values of a state are a block's first state and its parameters; those after the
     last block are a copy.
 
-    Returns the chains, the normal equations (G, 2 n, 2 n + 1) of both ends of each, and minus twice the logarithm of
-    the likelihood (G), but for what is common to all hypotheses.
+    Returns the chains, the normal equations (G, 2 n, 2 n + 1) of both ends of each, and minus twice the log-likelihood
+    (G), less a constant common to all hypotheses.
     """
     (count, width), s = blocks.left.shape[:2], blocks.s
     hypotheses, n = len(walks.prior), width - s
@@ -159,13 +162,13 @@ def _squared(information: Array, gradient: Array) -> Array:
 
 
 def minus_two_log_likelihood(blocks: Reduced, walks: RandomWalks) -> Array:
-    """(G): of the readings by each hypothesis, but for what is common to all."""
+    """(G): minus twice the log-likelihood of the readings by each hypothesis, less a constant common to all."""
     return _chains(blocks, walks)[2]
 
 
 def solve(blocks: Reduced, walks: RandomWalks, weight: Array) -> tuple[Array, Array]:
-    """The mean of the hypotheses by their posterior weights (G): changes of the states (B, K + 1, s), those at the ends
-    of a block twice, and of the parameters (B, m). Raises LinAlgError."""
+    """The posterior mean over the hypotheses with these weights (G): changes of the states (B, K + 1, s), in which the
+    state between two blocks appears twice, and of the parameters (B, m). Raises LinAlgError."""
     reduced, ends, _ = _chains(blocks, walks)
     mean = np.einsum("g,gbi->bi", weight, _first_states(reduced, ends))
     states, parameters = mean[:, : blocks.s], mean[:-1, blocks.s :]
@@ -173,8 +176,8 @@ def solve(blocks: Reduced, walks: RandomWalks, weight: Array) -> tuple[Array, Ar
 
 
 def posterior_covariance(blocks: Reduced, walks: RandomWalks, weight: Array) -> Array:
-    """(B, s + s + m, s + s + m): covariance of each block's first state, its last one and its parameters; that within
-    the hypotheses plus that between them."""
+    """(B, s + s + m, s + s + m): covariance of each block's first state, its last one and its parameters: the
+    covariance within the hypotheses plus that between their means."""
     reduced, ends, _ = _chains(blocks, walks)
     s, n = blocks.s, reduced.s
     states = _first_states(reduced, ends)
@@ -187,6 +190,6 @@ def posterior_covariance(blocks: Reduced, walks: RandomWalks, weight: Array) -> 
 
 
 def _first_states(reduced: Reduced, ends: Array) -> Array:
-    """(G, B + 1, n): changes of the chains' states."""
+    """(G, B + 1, n): the changes of all states of the chains, from the normal equations of their ends."""
     change = np.linalg.solve(ends[..., :-1], -ends[..., -1:]).astype(float)
     return back(reduced, change.reshape(len(ends), 2, reduced.s), np.zeros((len(ends), 0)))

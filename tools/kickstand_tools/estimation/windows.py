@@ -15,12 +15,12 @@ GAP_S = 0.17  # a longer step between two samples: readings are missing
 
 @dataclass
 class Windows:
-    """n windows, one following on the other; where readings are missing a window without readings lies between two.
+    """n windows without gaps between them: where readings are missing, one window with `gap` True spans that time.
 
-    edges (n + 1, s): their times. rate (n, 3, rad/s), force (n, 3, g): means, along the vehicle's axes. jolt (n): by
-    how much the rate differs from its mean at most, rad/s. speed (n): m/s, NaN where there is none. warm (n): how much
-    warmer than at the begin of the log, C, 0 where that is not known. gap (n): True where there are no readings. Of
-    each sample: number, in which window it lies; before and after (s): the time that it stands for.
+    edges (n + 1, s): times of their begins and ends. rate (n, 3, rad/s), force (n, 3, g): means, along the vehicle's
+    axes. jolt (n, rad/s): largest difference of a sample's rate from that mean. speed (n, m/s): NaN where there is
+    none. warm (n, C): temperature less that at the begin of the log, 0 where unknown. gap (n): True without readings.
+    Per sample: number, the index of its window; before and after (s): the time that it stands for.
     """
 
     edges: Array
@@ -39,12 +39,12 @@ class Windows:
 
     @property
     def seconds(self) -> Array:
-        """(n) how long each is."""
+        """(n) duration of each window, s."""
         return np.diff(self.edges)
 
     @property
     def covered(self) -> Array:
-        """(n) seconds of readings in each."""
+        """(n) duration of the readings in each window, s: 0 in gaps."""
         return np.where(self.gap, 0.0, self.seconds)
 
     @property
@@ -56,12 +56,13 @@ class Windows:
         return np.interp(middle, middle[there], self.speed[there])
 
     def turned(self, matrix: Array, bias: Array | float = 0.0) -> "Windows":
-        """Along the axes of the rows of matrix (3, 3); with rates less bias (3, rad/s)."""
+        """A copy with `bias` (3, rad/s) subtracted from the rates, then rates and forces along the rows of `matrix`
+        (3, 3)."""
         rate, force = rotated(matrix, self.rate - bias, self.force)
         return replace(self, rate=rate, force=force)
 
     def padded(self, length: int) -> "Windows":
-        """With windows without readings and without duration at the end, to a multiple of `length` windows."""
+        """A copy whose number of windows is a multiple of `length`: gaps of no duration are appended."""
         more = -len(self) % length
 
         def longer(values: Array, fill: float = 0.0) -> Array:
@@ -80,8 +81,8 @@ class Windows:
 
 
 def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array) -> Windows:
-    """Of samples: t_s (s), force (samples, 3, g), rate (samples, 3, rad/s), speed (m/s, NaN where there is no new one),
-    warm (C, see Windows).
+    """The Windows of samples: t_s (s), force (samples, 3, g), rate (samples, 3, rad/s), speed (m/s, NaN where there is
+    no new one), warm (C, see Windows).
 
     Each sample stands for the time until half way to its neighbours, so that the sum over a window is the integral.
     """
@@ -90,7 +91,7 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array)
     lost = step > max(GAP_S, 1.5 * usual)
     half = np.where(lost, 0.5 * usual, 0.5 * step)
     before, after = np.append(0.5 * usual, half), np.append(half, 0.5 * usual)
-    begins = np.append(True, lost)  # of a stretch without missing readings
+    begins = np.append(True, lost)  # True for the first sample of each stretch without missing readings
     since = t_s - t_s[begins][np.cumsum(begins) - 1]
     starts = np.flatnonzero(np.append(True, (np.diff(cell_numbers(since, WINDOW_S)) != 0) | lost))
     weight = before + after
@@ -105,7 +106,7 @@ def windows_of(t_s: Array, force: Array, rate: Array, speed: Array, warm: Array)
     in_window[place[there]] = speed[there]
     mean_rate = mean(rate)
     jolt = np.maximum.reduceat(np.linalg.norm(rate - mean_rate[place], axis=1), starts)
-    at = np.flatnonzero(begins[starts])[1:]  # before these windows readings are missing
+    at = np.flatnonzero(begins[starts])[1:]  # windows before which readings are missing
     ends = np.append(starts[1:], len(t_s)) - 1
     edges = np.insert((t_s - before)[starts], at, (t_s + after)[ends[at - 1]])
     return Windows(

@@ -9,7 +9,7 @@ from ..analysis.stops.brake_test import RATE_S, Stop, find_stops
 from ..calibration.file import CalibrationFile
 from ..logs.reader import Source, read_blocks
 
-_LEAN_COLUMNS = 6  # of what the firmware's meter says of a motorcycle
+_LEAN_COLUMNS = 6  # columns that the replay of a motorcycle's log gives
 
 
 def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
@@ -33,7 +33,7 @@ def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
 
 
 def car_channels(log: Source, calibration: CalibrationFile) -> list[Channels]:
-    """A log in the vehicle's axes without a lean, block by block."""
+    """The channels of a car's log, block by block: in the vehicle's axes, without a lean."""
     found = []
     for whole in read_blocks(log):
         block = whole.measured

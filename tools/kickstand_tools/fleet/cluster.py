@@ -1,14 +1,14 @@
-"""All that is Dask's: runs a function on many items, on this computer or on a cluster.
+"""Runs a function on many items with Dask, on this computer or on a cluster.
 
 Workers on this computer and their scheduler talk over 127.0.0.1 by TLS, with keys that are made for the run and known
 to its processes alone: another user of the computer can connect, but neither read nor run anything. Dask has no Unix
 sockets, and a process pool of our own would need the same care for crashes a second time. Dask's web pages are left
 out.
 
-A task that kills its worker must cost itself alone. Dask would give it to other workers, which it kills too, and
-compute again what these had finished. So no retries are allowed, only a few tasks are under way at a time, and their
-results are let go at once. What was on a worker that died is tried a second time, when everything else is done and one
-at a time: what kills its worker then has done so itself.
+A task that kills its worker must cost no other task. Dask would give it to other workers, which it kills too, and
+compute again what these had finished. So no retries are allowed, only a few tasks are under way at a time, and Dask
+keeps no results. Tasks whose worker died are tried a second time, after all others and one at a time: if the worker
+dies then, the task itself has killed it.
 """
 
 import contextlib
@@ -24,11 +24,11 @@ from typing import Any
 from ..errors import InputError, cause, extra
 
 CRASHED, TIMED_OUT = "crashed", "timed-out"
-_PER_WORKER = 2  # tasks under way: one runs, one waits
-_LOOK_S = 0.5  # between two looks for tasks that take too long
-_TOPIC = "kickstand-fleet"  # of the messages in which a worker says that it begins a task
+_PER_WORKER = 2  # tasks under way per worker: one runs, one waits
+_LOOK_S = 0.5  # time between two checks for tasks that take too long
+_TOPIC = "kickstand-fleet"  # topic of the messages by which a worker announces that it begins a task
 Outcome = tuple[int, Any | None, str, str]
-_LOCAL_PATIENCE_S, _REMOTE_PATIENCE_S = 60.0, 20.0  # for workers
+_LOCAL_PATIENCE_S, _REMOTE_PATIENCE_S = 60.0, 20.0  # longest time to wait for workers
 
 
 def run_tasks(
@@ -38,8 +38,8 @@ def run_tasks(
     workers: int | None = None,
     timeout_s: float = 600.0,
 ) -> Iterator[Outcome]:
-    """(index, result, "", "") of function(*item) for each item, in any order; (index, None, CRASHED or TIMED_OUT, what
-    happened) where there is none. Starts no workers where there are no items. See Cluster."""
+    """Yield (index, result, "", "") of function(*item) for each item, in any order; without a result (index, None,
+    CRASHED or TIMED_OUT, what happened). Starts no workers if there are no items. See Cluster."""
     if items:
         with Cluster(scheduler, workers, timeout_s) as cluster:
             yield from cluster.run(function, items)
@@ -48,8 +48,9 @@ def run_tasks(
 class Cluster:
     """with Cluster(scheduler, workers, timeout_s) as cluster: for index, outcome in cluster.run(function, items).
 
-    scheduler: the address of one, None for workers on this computer: so many, or one a processor. timeout_s: a task
-    that takes longer is ended. workers: how many there are. Raises InputError where there is no cluster.
+    scheduler: the address of a scheduler, None for workers on this computer. workers: their number there, None for one
+    per processor; then the number that there are. timeout_s: a task that takes longer is ended. Raises InputError where
+    there is no cluster.
     """
 
     def __init__(self, scheduler: str | None, workers: int | None, timeout_s: float) -> None:
@@ -67,7 +68,7 @@ class Cluster:
             raise InputError("a fleet needs Dask: " + extra("fleet")) from error
 
         class Undisturbed(WorkerPlugin):
-            """A terminal's Ctrl-C goes to the workers, too, which are ended by this process."""
+            """Makes workers ignore a terminal's Ctrl-C: this process ends them."""
 
             def setup(self, worker: Any) -> None:
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -120,7 +121,8 @@ class Cluster:
             self._stack.close()
 
     def run(self, function: Callable[..., Any], items: Sequence[tuple[Any, ...]]) -> Iterator[Outcome]:
-        """As run_tasks(). function and items have to be picklable. Raises InputError if the scheduler is lost."""
+        """Yield outcomes as run_tasks() does. function and items have to be picklable. Raises InputError if the
+        scheduler is lost."""
         self._ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self._under_way: dict[str, tuple[int, Any]] = {}
         suspects: list[int] = []
@@ -144,7 +146,7 @@ class Cluster:
         future.add_done_callback(self._ended.put)
 
     def _collect(self, suspects: list[int]) -> Iterator[Outcome]:
-        """Wait for a result, or a while. suspects: those whose worker died are appended to it."""
+        """Yield the results that come within _LOOK_S. suspects: tasks whose worker died are appended to it."""
         with contextlib.suppress(queue.Empty):
             future = self._ended.get(timeout=_LOOK_S)
             place = self._under_way.pop(future.key, None)
@@ -161,7 +163,7 @@ class Cluster:
                 else:
                     yield index, None, CRASHED, f"{type(error).__name__}: {error}"
             elif self._client.status == "running":
-                suspects.append(index)  # its result went with a worker that was ended for another's sake
+                suspects.append(index)  # its worker was ended because of another task
             else:
                 raise InputError(
                     f"the cluster{f' at {self._address}' if self._address else ''} was lost; what is finished is kept, "
@@ -190,14 +192,15 @@ class Cluster:
 
 @contextlib.contextmanager
 def _undisturbed() -> Iterator[None]:
-    """Ctrl-C waits until the end of the `with`: stopped while it starts or connects, Dask prints pages of what failed.
+    """A context in which Ctrl-C is deferred to its end: stopped while it starts or connects, Dask prints pages of
+    errors.
 
-    Processes that are started within never hear of it.
+    Processes that are started within never receive it.
     """
     if not hasattr(signal, "pthread_sigmask"):  # Windows
         yield
         return
-    resource_tracker.ensure_running()  # Python starts it with the first process, and lets Ctrl-C through again then
+    resource_tracker.ensure_running()  # else Python would start it with the first process, and unblock Ctrl-C then
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -206,14 +209,14 @@ def _undisturbed() -> Iterator[None]:
 
 
 def _silence() -> None:
-    """What happens to workers and to the scheduler is said by the results, and by InputErrors."""
+    """Turn Dask's log messages off: results and InputErrors report what happens to workers and scheduler."""
     for name in ("distributed", *logging.root.manager.loggerDict):
         if name.split(".")[0] == "distributed":
             logging.getLogger(name).setLevel(logging.CRITICAL)
 
 
 def _announced(key: str, function: Callable[..., Any], *arguments: Any) -> Any:
-    """In a worker: say that the task begins, then do it."""
+    """In a worker: announce that the task begins, then return function(*arguments)."""
     from distributed import get_worker
 
     worker = get_worker()

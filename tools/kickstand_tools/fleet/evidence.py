@@ -1,18 +1,18 @@
-"""What a drive shows of how the sensor sits, in blocks of some seconds whose sums can be compared.
+"""The normal equations of a drive for the sensor's alignment, in blocks of some seconds that can be compared.
 
 As in the firmware's ForwardRegression, the force of each interval between two speeds is explained by
 
     f = level + forward a + left c + arm w        a = dv/dt / g, c = v (yaw rate) / g, w = d(yaw rate)/dt
 
-in the sensor's own axes. Unlike there, turns are used too: in a car they show left as well as braking shows forward. A
-sensor ahead of the rear axle is swung sideways as a turn begins and ends, which is when drivers brake and speed up:
-arm, its distance from that axle, takes this up. A motorcycle leans into turns, so that its force stays along its own up
-and grows to sqrt(1 + c^2): there
+in the sensor's own axes. Unlike there, bends are used too: in a car they show left as well as braking shows forward. A
+sensor ahead of the rear axle is accelerated sideways as a bend begins and ends, which is when drivers brake and speed
+up: the coefficient arm, its distance from that axle, takes this up. A motorcycle leans into bends, so that its force
+stays along its own up and grows to sqrt(1 + c^2): there
 
     f = level sqrt(1 + c^2) + forward a
 
-Beside this, a car's body sways on its springs in directions of its own, mostly sideways. In which direction it does is
-the vehicle's own affair, but the same before and after a moment, as long as the mount is.
+Besides, a car's body sways on its springs, mostly sideways. The direction depends on the vehicle, but does not change:
+if it changes in the sensor's axes, the mount has moved.
 """
 
 import math
@@ -31,23 +31,23 @@ from ..signals.averages import moving_mean
 from ..signals.cells import runs
 from ..signals.standstill import STANDING_MPS
 
-INTERVAL_S = 0.9  # between two speeds that are used, at least
+INTERVAL_S = 0.9  # least time between two speeds that are used
 MOVING_MPS = 2.0
-STANDING_WEIGHT = 0.3  # of a second at a stop: a long stop shows one slope of the road, however long it was
-LEVEL_S = 20.0  # the mean force over so long is about vertical, which parts the yaw rate from the other rates
+STANDING_WEIGHT = 0.3  # weight of a second at a stop: a stop shows one slope of the road, however long it is
+LEVEL_S = 20.0  # the mean force over so long is about vertical: the rate about it is the yaw rate
 BLOCK_S = 8.0
-# The road: variance of its slope in parts of that of all other errors in a mean over 1 s, and how soon it changes
+# The road: variance of its slope over that of all other errors in a mean over 1 s, and its correlation length
 ROAD_SHARE, ROAD_M = 1.0, 150.0
-SWING_S = 0.2  # over which the yaw rate at both ends of an interval is averaged
-SWAY_S = 0.05, 0.3  # means over the one and over the other: what is between is sway, not driving and not noise
-TURN_WEIGHT = 0.3  # of turns against braking: tyres slip sideways in slow ones, and drivers brake and speed up in them
+SWING_S = 0.2  # the yaw rate at both ends of an interval is averaged over this
+SWAY_S = 0.05, 0.3  # sway is the force's mean over the first less that over the second: neither noise nor driving
+TURN_WEIGHT = 0.3  # weight of bends against braking: tyres slip sideways, and drivers brake and speed up in bends
 
 
 @dataclass
 class Intervals:
     """n intervals between two speeds of a log. t_s: their middles. force (n, 3, g): means, in the sensor's axes.
-    terms (n, 4): what is multiplied by level, forward, left and arm. weight (n): s. speed (n): m/s. sway (n, 3, 3,
-    g^2): the covariance of the force's quick changes; zeros where it shows nothing."""
+    terms (n, 4): the regressors of level, forward, left and arm. weight (n): s. speed (n): m/s. sway (n, 3, 3, g^2):
+    the covariance of the force's quick changes; zeros where it is not used."""
 
     t_s: Array
     force: Array
@@ -61,9 +61,9 @@ class Intervals:
 class Blocks(Table):
     """m blocks of intervals that follow one another in one or several logs.
 
-    square (m, 4, 4), product (m, 4, 3): sums of terms x terms and of terms x force, the road taken off. sway (m, 3, 3):
-    mean of the intervals' in parts of its trace, so that a rough road counts no more than another. log (m): index of
-    the log; t_s (m): begin in it; end_s (m).
+    square (m, 4, 4), product (m, 4, 3): sums of terms x terms and of terms x force, the road's slope filtered out (see
+    _without_road()). sway (m, 3, 3): mean of the intervals' divided by its trace, so that a rough road counts no more
+    than another. log (m): index of the log; t_s, end_s (m): begin and end in it.
     """
 
     square: Array
@@ -75,7 +75,7 @@ class Blocks(Table):
 
 
 def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
-    """The intervals of a log whose speed is late by lag_s. bias_dps (3): of the gyro."""
+    """The intervals of a log whose speed is delayed by lag_s. bias_dps (3): the gyro's."""
     step = np.diff(log.t_s, prepend=log.t_s[0])
     step = np.where(step * 1e6 > GAP_US, 0.0, step)
     rate = np.radians(log.gyro_dps - bias_dps)
@@ -98,8 +98,8 @@ def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
     standing = (mean_mps < STANDING_MPS) & (np.abs(a) < 0.01)
     if kind == MOTORCYCLE:
         terms = np.column_stack((np.sqrt(1.0 + c * c), a, np.zeros_like(a), np.zeros_like(a)))
-        weight = length * (mean_mps > MOVING_MPS)  # a foot is down below
-        shown = np.zeros_like(a)  # what it sways about is its wheels' contacts, and its rider
+        weight = length * (mean_mps > MOVING_MPS)  # at lower speeds a foot is down
+        shown = np.zeros_like(a)  # a motorcycle sways about its wheels' contacts and with its rider: not used
     else:
         later, sooner = (_integrals(rate.T, log.t_s, step, time + ahead) for ahead in (SWING_S / 2.0, -SWING_S / 2.0))
         swing = (later - sooner) / SWING_S
@@ -133,7 +133,8 @@ def blocks(logs: list[Intervals]) -> Blocks:
 
 
 def fits(square: Array, product: Array) -> tuple[Array, Array]:
-    """(k, t, 3) level, forward, left and so on of k sums of t terms, and (k, 2): how much a and c varied, in g^2 s."""
+    """Solve k normal equations of t terms. (k, t, 3): level, forward, left and so on; (k, 2): the variation of a and c,
+    g^2 s."""
     ridge = np.diag([1e-9] + [1e-6] * (square.shape[-1] - 1)) * np.maximum(square[..., :1, :1], 1e-3)
     found = np.asarray(np.linalg.solve(square + ridge, product), dtype=float)
     seconds = np.maximum(square[..., 0, 0], 1e-9)[..., None]
@@ -143,7 +144,7 @@ def fits(square: Array, product: Array) -> tuple[Array, Array]:
 
 
 def frames(found: Array, varied: Array) -> Array:
-    """(k, 3, 3) vehicle from sensor, rows left, up, forward, of what fits() returned."""
+    """(k, 3, 3) vehicle from sensor, rows left, up, forward, from the two results of fits()."""
     level, forward, left = found[..., 0, :], found[..., 1, :], found[..., 2, :]
     up = level / np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), 1e-9)
     ahead = varied[..., :1] * forward + TURN_WEIGHT * varied[..., 1:] * np.cross(left, up)
@@ -151,15 +152,15 @@ def frames(found: Array, varied: Array) -> Array:
 
 
 def frame_of(up: Array, ahead: Array) -> Array:
-    """(..., 3, 3) rows left, up, forward, of up (..., 3, unit vectors) and of what points about forward (..., 3)."""
+    """(..., 3, 3) rows left, up, forward, from up (..., 3, unit vectors) and vectors roughly forward (..., 3)."""
     side = np.cross(up, ahead)
     side /= np.maximum(np.linalg.norm(side, axis=-1, keepdims=True), 1e-9)
     return np.asarray(np.stack((side, up, np.cross(side, up)), axis=-2), dtype=float)
 
 
 def handedness(found: Array, varied: Array) -> float:
-    """The part of a turn's force that is on the side to which the vehicle turns: about 1, about -1 where the gyro's
-    signs or the axes are mirrored, 0 if there were no turns (or on a motorcycle, which leans into them)."""
+    """The lateral force in bends over the one that the yaw rate requires: about 1; about -1 where the gyro's signs or
+    the axes are mirrored; 0 without bends (or on a motorcycle, which leans into them)."""
     if varied[1] < 0.05:
         return 0.0
     level, forward, left = found[:3]
@@ -168,12 +169,12 @@ def handedness(found: Array, varied: Array) -> float:
 
 
 def _without_road(log: Intervals) -> tuple[Array, Array]:
-    """Terms and force, each less what the intervals before predict of it, in parts of its standard deviation.
+    """Terms and force, whitened: each less its prediction from the intervals before, over its standard deviation.
 
     Slope and camber of the road look like another level for some hundred metres: neighbouring intervals share their
-    errors, and a plain regression takes what a road does during one braking for forward. The innovations of a filter
-    that follows the road (a first-order Gauss-Markov process in distance) share none: the sums of these are those of
-    generalized least squares.
+    errors, and a plain regression would take the road's slope during a braking event for forward. The innovations of a
+    filter that follows the road (a first-order Gauss-Markov process in distance) are uncorrelated: their sums are those
+    of generalized least squares.
     """
     rows = np.hstack((log.terms, log.force))
     driven = log.speed * np.diff(log.t_s, prepend=log.t_s[0])
@@ -191,25 +192,26 @@ def _without_road(log: Intervals) -> tuple[Array, Array]:
 
 
 def sway_deg(sway: Array, frame: Array) -> Array:
-    """(k) where the vehicle sways most, degrees from forward towards left, -90 to 90. sway (k, 3, 3), frame (3, 3)."""
+    """(k) the direction of the largest sway, degrees from forward towards left, -90 to 90. sway (k, 3, 3), frame (3,
+    3)."""
     level = frame[[0, 2]] @ sway @ frame[[0, 2]].T
     return np.degrees(0.5 * np.arctan2(2.0 * level[..., 0, 1], level[..., 1, 1] - level[..., 0, 0]))
 
 
 def _sway(log: Log) -> Array:
-    """(samples, 3) the force's changes that take some tenths of a second, in g."""
+    """(samples, 3) the changes of force, g, that take some tenths of a second."""
     step_s = float(np.median(np.diff(log.t_s)))
     quick, slow = (moving_mean(log.accel_g, round(width_s / step_s)) for width_s in SWAY_S)
     return quick - slow
 
 
 def _integrals(columns: Iterable[Array], t_s: Array, step: Array, time: Array) -> Array:
-    """(len(time), k): of each of k columns (n), until these times. One after the other: logs of hours are large."""
+    """(len(time), k): the integral of each of k columns (n) until these times. Column by column, to limit memory."""
     return np.array([np.interp(time, t_s, np.cumsum(column * step)) for column in columns]).T
 
 
 def _spread(time: Array, speed: Array) -> tuple[Array, Array]:
-    """Of speeds that come faster, those that are INTERVAL_S apart."""
+    """The speeds, thinned to one per INTERVAL_S at most."""
     kept, last = [], -np.inf
     for k, now in enumerate(time.tolist()):
         if now - last >= INTERVAL_S:

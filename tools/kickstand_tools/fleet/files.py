@@ -17,8 +17,8 @@ from ..logs.reader import read_log
 from ..logs.source import open_input
 from ..output import write_whole
 
-MOST_BYTES = 300_000_000  # of a log in a store as it is packed there: ten hours at 200 Hz have 150 million
-_LONGEST = 100  # bytes of a name; a file system takes 255, with ending and temporary name
+MOST_BYTES = 300_000_000  # largest (packed) log in a store: ten hours at 200 Hz have 150 million
+_LONGEST = 100  # longest name in bytes; a file system takes 255, with ending and temporary name
 
 
 def file_stem(readable: str, *exact: str) -> str:
@@ -41,7 +41,7 @@ def folder_value(value: str) -> str:
 
 
 def printable(text: str) -> str:
-    """The same where it is text; what is no UTF-8 in a file's name as its code."""
+    """text with the bytes that are not UTF-8 (in a file's name) replaced by their codes."""
     return text.encode("utf-8", "backslashreplace").decode()
 
 
@@ -101,7 +101,7 @@ def matches(pattern: str) -> list[str]:
 
 
 def identities(paths: Iterable[str]) -> dict[str, str]:
-    """What shows that a file has changed, by path: its ETag, or its size and time; "" where there is no file.
+    """By path a mark that changes with the file: its ETag, or its size and time; "" where there is no file.
 
     Remote directories are listed once each.
     """
@@ -140,8 +140,8 @@ class _Named(io.BytesIO):
 
 
 def listed(parent: str) -> dict[str, str]:
-    """What shows that a file has changed, by path, of each in a directory of a store; none where there is no directory.
-    Raises InputError."""
+    """By path a mark that changes with the file (see identities()), for all files in a directory of a store; none where
+    there is no directory. Raises InputError."""
     marks: dict[str, str] = {}
     with _in_store(parent, "read") as (fs, place), contextlib.suppress(FileNotFoundError):
         fs.invalidate_cache(place)
@@ -153,8 +153,8 @@ def listed(parent: str) -> dict[str, str]:
 
 @contextlib.contextmanager
 def _in_store(path: str, what: str) -> Iterator[tuple[Any, str]]:
-    """(file system, place in it) of a remote path. Whatever goes wrong there, in libraries that raise errors of their
-    own, is an InputError: the path cannot be read, or written."""
+    """A context with (file system, path in it) of a remote path. Any error of the libraries within becomes an
+    InputError: the path cannot be read, or written."""
     try:
         yield _system(path)
     except InputError:

@@ -1,8 +1,8 @@
-"""Forward from all braking and all turns of a mount's logs, and how sure it is.
+"""Forward from all braking and all bends of a mount's logs, with its standard error.
 
-The device keeps eight blocks of sums, in which what the road does during a braking passes for forward. With the whole
-logs at hand the road is taken off (see evidence.py): on simulated buses, which brake gently and seldom, this halves the
-error. Up stays the device's, where it has one.
+The device keeps eight regression blocks, in which the slope of the road during a braking event passes for forward. From
+whole logs the road can be filtered out (see evidence.py): on simulated buses, which brake gently and seldom, this
+halves the error. Up stays the device's, where it has one.
 """
 
 from dataclasses import dataclass
@@ -15,8 +15,8 @@ from ..signals.rotations import rotation_vector
 from . import evidence
 from .evidence import Intervals
 
-SENSOR_DEG = 0.3  # standard deviation of what scale errors of 1 % between the sensor's axes do to forward
-# The arm is for comparing parts of a drive. Over a whole one it may stand for other things than being swung: of three
+SENSOR_DEG = 0.3  # standard deviation of forward by scale errors of 1 % between the sensor's axes
+# Without the arm, which is for comparing parts of a drive. Over a whole drive it takes up other effects too: of three
 # recorded drives one was 2 degrees off with it, and none over 0.6 without.
 _TERMS = 3
 _LEAST_BLOCKS = 4
@@ -25,7 +25,7 @@ _LEAST_BLOCKS = 4
 @dataclass
 class Forward:
     """frame (3, 3): vehicle from sensor, rows left, up, forward. sigma_deg: standard error of forward about up.
-    halves_deg: by how much forward differs between two halves of the driving."""
+    halves_deg: difference of forward between two halves of the driving."""
 
     frame: Array
     sigma_deg: float
@@ -33,13 +33,13 @@ class Forward:
 
     @property
     def sure(self) -> bool:
-        """By the limits that the device has."""
+        """True if forward is within the limits that the device has."""
         return self.sigma_deg <= READY_DEG and abs(self.halves_deg) <= AGREE_DEG
 
 
 def find_forward(logs: list[Intervals], up: Array | None = None) -> Forward | None:
-    """How the sensor sits. logs: the intervals of each. up (3): in the sensor's axes; None: as they show it. None if
-    they show nothing."""
+    """The alignment by these logs (the intervals of each); None if they do not determine it. up (3): the vertical in
+    the sensor's axes, None to estimate it too."""
     whole = evidence.blocks(logs)
     count = len(whole.log)
     if count < _LEAST_BLOCKS:
@@ -60,5 +60,5 @@ def find_forward(logs: list[Intervals], up: Array | None = None) -> Forward | No
 
 
 def _yaw_deg(frames: Array, before: Array) -> Array:
-    """By how much forward differs about up."""
+    """The angle about up between the forwards of frames and of `before`."""
     return np.degrees(rotation_vector(frames @ before.T)[..., 1])

@@ -1,8 +1,8 @@
-"""Each result as it comes: what a run that was stopped, or whose disk filled up, had finished.
+"""Keeps each result as it comes, so that a run that was stopped, or whose disk filled up, can be continued.
 
-In a directory of this computer a line of JSON each, in one file. In a store such as S3, whose files cannot grow, a file
-each. A check sum in each notices every change: a line that was cut, by a loss of power or a full disk, or that was
-damaged, is dropped when the journal is opened again, and its result is worked out again.
+In a directory of this computer the journal is one file with a line of JSON per result; in a store such as S3, whose
+files cannot grow, one file per result. Each has a check sum: lines that were cut, by a loss of power or a full disk, or
+that were damaged are dropped when the journal is opened again, and their results are computed again.
 """
 
 import contextlib
@@ -19,20 +19,20 @@ from . import files
 from .period import PeriodResult
 
 _AT_ONCE = 200  # results that are fetched from a store together
-_LONGEST = 1 << 26  # bytes of a line; one of a thousand logs has a hundredth of that
+_LONGEST = 1 << 26  # longest line in bytes; one of a thousand logs has a hundredth of that
 
 
 class Journal:
     """with Journal(path) as journal: journal.add(key, result); key in journal; journal.results(keys).
 
-    key: parts the result of these logs, with these options, from any other. Results are read from the file again when
-    they are wanted: memory holds where each of them is. damaged: lines that could not be used.
+    key: identifies the logs and the options of a result. Memory holds the place of each result in the file, which is
+    read again for results(). damaged: number of lines that could not be used.
     """
 
     def __init__(self, path: Path) -> None:
         self._path = path
         self._places: dict[str, int] = {}
-        self._again: set[str] = set()  # of results that another run may better
+        self._again: set[str] = set()  # keys of results that another run should compute again
         self.damaged = 0
 
     def __enter__(self) -> "Journal":
@@ -52,7 +52,7 @@ class Journal:
         return self
 
     def _lock(self) -> None:
-        """Two runs that write into one file would take each other's results for their own."""
+        """Lock the file against a second run that writes to it. Raises InputError."""
         with contextlib.suppress(ImportError):  # Windows
             import fcntl
 
@@ -69,11 +69,11 @@ class Journal:
                 self._path.unlink()
 
     def __contains__(self, key: str) -> bool:
-        """True if the result is there for good."""
+        """True if there is a final result for this key."""
         return key in self._places and key not in self._again
 
     def add(self, key: str, result: PeriodResult, again: bool = False) -> None:
-        """Keep a result. again: another run is to try for a better one. Raises InputError, and what was kept stays."""
+        """Keep a result. again: another run should compute it again. Raises InputError; earlier results stay."""
         line = _line(key, result, again) + b"\n"
         try:
             self._file.seek(self._end)
@@ -87,14 +87,14 @@ class Journal:
         self._end += len(line)
 
     def sync(self) -> None:
-        """What was added outlasts a loss of power from now on. Raises InputError."""
+        """Flush the results to the disk, so that they outlast a loss of power. Raises InputError."""
         try:
             os.fsync(self._file.fileno())
         except OSError as error:
             raise self._cannot(error) from error
 
     def results(self, keys: Iterable[str]) -> Iterator[PeriodResult]:
-        """Those of the keys that are there, the latest of each."""
+        """The latest result of each of these keys that has one."""
         with open(self._path, "rb") as file:
             for key in keys:
                 if key in self._places:
@@ -108,7 +108,7 @@ class Journal:
         )
 
     def _note(self, line: bytes) -> bool:
-        """False for a line that is damaged."""
+        """Note the place of a line's result; return False for a damaged line."""
         if not (line.endswith(b"\n") and (entry := _entry(line))):
             return False
         key, again, _ = entry
@@ -118,8 +118,8 @@ class Journal:
 
 
 class StoreJournal:
-    """The same, with a directory in a store: KEY.json is there for good, KEY.again.json may be bettered. All are
-    read when the journal is opened, and those that are damaged are worked out again."""
+    """A Journal in a directory of a store: KEY.json is final, KEY.again.json should be computed again. All are read
+    when the journal is opened; those that are damaged are computed again."""
 
     def __init__(self, directory: str) -> None:
         self._directory = directory
@@ -171,7 +171,7 @@ def _line(key: str, result: PeriodResult, again: bool) -> bytes:
 
 
 def _entry(line: bytes) -> tuple[str, bool, PeriodResult] | None:
-    """(key, again, result) of a line; None where it is not as it was written."""
+    """(key, again, result) of a line; None for a damaged one."""
     try:
         entry = json.loads(line)
         sum_then = entry.pop("crc32")

@@ -1,4 +1,4 @@
-"""Which logs are of which vehicle: MANIFEST.csv, or a pattern of paths."""
+"""Assigns logs to vehicles: by MANIFEST.csv, or by a pattern of paths."""
 
 import csv
 import io
@@ -12,15 +12,15 @@ from . import files
 
 COLUMNS = ("vehicle", "path", "kind")
 _KINDS = (MOTORCYCLE, CAR)
-_MOST_BYTES = 100_000_000  # of a manifest: a million logs
+_MOST_BYTES = 100_000_000  # largest manifest: a million logs
 
 
 @dataclass(frozen=True)
 class Period:
-    """Logs in which the sensor should have sat on a vehicle in one and the same way, in the order of time.
+    """Logs, in the order of time, in which the sensor should have had the same alignment on the same vehicle.
 
-    kind: "motorcycle" or "car" (anything that does not lean). mount: which of the vehicle's mountings it is, "" where
-    there is only one. paths: of the logs, as fsspec takes them.
+    kind: "motorcycle" or "car" (anything that does not lean). mount: name of the mounting, "" if the vehicle has only
+    one. paths: the logs' paths, as fsspec takes them.
     """
 
     vehicle: str
@@ -100,5 +100,5 @@ def is_pattern(path: str) -> bool:
 
 
 def _found(path: str) -> list[str]:
-    """A pattern's files; the path itself where nothing matches: the run says that it is missing."""
+    """The files that match a pattern; the path itself if none does: the run then reports it as missing."""
     return (files.matches(path) or [path]) if is_pattern(path) else [path]

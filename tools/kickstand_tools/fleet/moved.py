@@ -1,10 +1,10 @@
-"""Mounts that were turned, by a few degrees or by many, between two logs or during one.
+"""Finds mounts that were rotated, by a few degrees or by many, between two logs or during one.
 
-The firmware refuses a drive only where the mount surely moved, by some 7 to 30 degrees. Here all logs of a mount are
-compared with one another: for every moment, how the sensor sat before it with how it sits after it. A turn that tilts
-the sensor shows in gravity. One about the vertical shows in braking and in turns only, and in the direction in which
-the vehicle sways on its springs, which needs neither. The uncertainty comes from a jackknife over blocks of some
-seconds, to which is added what lasts longer: slopes of a road and, from one log to another, load and temperature.
+The firmware refuses a drive only where the mount surely moved, by some 7 to 30 degrees. Here, for every moment in all
+logs of a mount, the alignment before it is compared with the one after it. A rotation that tilts the sensor shows in
+gravity. One about the vertical shows in braking and in bends only, and in the direction in which the vehicle sways on
+its springs, which needs neither. The variance comes from a jackknife over blocks of some seconds; added to it are
+errors that last longer: slopes of a road and, from one log to another, load and temperature.
 """
 
 from dataclasses import dataclass
@@ -16,32 +16,34 @@ from ..signals.rotations import rotation_vector
 from . import evidence
 from .evidence import Blocks, Intervals, blocks, fits, frames
 
-LEAST_DEG = 3.2  # smaller turns are within what roads, load and temperature do
-BETWEEN_SIGMAS, WITHIN_SIGMAS = 3.3, 4.3  # within a log there are many moments to choose from
+LEAST_DEG = 3.2  # least rotation that is reported: smaller ones may be by roads, load and temperature
+# Least number of standard deviations: between two logs, and within one, where there are many moments to choose from
+BETWEEN_SIGMAS, WITHIN_SIGMAS = 3.3, 4.3
 SUDDEN_SIGMAS = 3.8  # within a log, where the vertical jumps at that moment
-SUSPECTED_SHARE = 0.7  # of these sigmas is enough where the firmware suspects the mount, too
-# What lasts on each side of the comparison, 1 sigma in degrees: pitch, yaw and roll (about left, up, forward), during a
-# log and from one log to another
+SUSPECTED_SHARE = 0.7  # factor on these limits where the firmware suspects the mount, too
+# Errors that last on each side of the comparison, 1 sigma in degrees: pitch, yaw and roll (about left, up, forward),
+# during a log (ROAD_DEG) and from one log to another (OTHER_ROAD_DEG)
 ROAD_DEG = np.array([0.5, 0.25, 0.35])
 OTHER_ROAD_DEG = np.array([0.75, 0.7, 0.5])
 REACH = 75  # blocks on each side that are compared: ten minutes
 LEAST_BLOCKS = 7
-LEAST_VARIED = 0.2  # g^2 s of braking, speeding up and turning on each side, for a forward
-# A few blocks that happen to agree make the jackknife optimistic: of yaw this is added, 1 sigma in degrees at 1 g^2 s
+LEAST_VARIED = 0.2  # g^2 s: least variation by braking, speeding up and bends on each side, for a forward
+# A few blocks that happen to agree make the jackknife optimistic: so this is added to yaw, 1 sigma in degrees at 1 g^2
+# s
 YAW_PRIOR_DEG = 0.4
-# The direction of sway: what roads do to it on each side, 1 sigma in degrees; where both sides together know it worse
-# than SWAY_WORST_DEG, or it contradicts the braking by more than SWAY_SIGMAS, it is not used
+# The direction of sway: its change by roads on each side, 1 sigma in degrees. It is not used where its standard
+# deviation over both sides is above SWAY_WORST_DEG, or where it contradicts the braking by more than SWAY_SIGMAS
 SWAY_DEG, SWAY_WORST_DEG, SWAY_SIGMAS = 0.7, 5.0, 3.0
-SURELY_DEG = 8.0  # no two slopes of a road differ by more; less has to happen at once if it is during a log
-TILT_DEG = 2.2  # a turn about the vertical has no more tilt than this
-STEP_S, STEP_GAP_S = 8.0, 1.0  # on each side of the moment, for the change at once
-STEP_SHARE = 0.7  # of the tilt that has to be in it
+SURELY_DEG = 8.0  # no two slopes of a road differ by more; during a log a smaller tilt has to be sudden
+TILT_DEG = 2.2  # a rotation with less tilt is one about the vertical
+STEP_S, STEP_GAP_S = 8.0, 1.0  # a sudden tilt is measured from STEP_GAP_S to STEP_S on each side of the moment
+STEP_SHARE = 0.7  # share of the tilt that has to be sudden
 
 
 @dataclass
 class Move:
-    """log: index of the log; at_s: seconds from its beginning, None where it happened before the log. turn_deg (3):
-    how the sensor turned, a rotation vector along the vehicle's left, up and forward; sigma_deg (3)."""
+    """A rotation of the mount. log: index of the log; at_s: seconds from its beginning, None if before it. turn_deg
+    (3): rotation vector along the vehicle's left, up and forward; sigma_deg (3): its standard deviations."""
 
     log: int
     at_s: float | None
@@ -59,7 +61,7 @@ class Move:
 
     @property
     def tilt_deg(self) -> float:
-        """By how much the vertical turned."""
+        """The angle by which the vertical changed."""
         return float(np.hypot(self.turn_deg[0], self.turn_deg[2]))
 
     @property
@@ -68,8 +70,8 @@ class Move:
 
 
 def find_moves(logs: list[Intervals], suspected: bool = False) -> list[Move]:
-    """Where the mount turned, in the order of time. logs: the intervals of each. suspected: the firmware found parts of
-    the drive that differ."""
+    """The rotations of the mount, in the order of time. logs: the intervals of each. suspected: the firmware found
+    parts of the drive that differ."""
     return _search(logs, blocks(logs), SUSPECTED_SHARE if suspected else 1.0)
 
 
@@ -100,7 +102,7 @@ def _search(logs: list[Intervals], whole: Blocks, share: float) -> list[Move]:
 
 
 def _sides(whole: Blocks, at: int, between: bool) -> tuple[Blocks, Blocks]:
-    """What is compared: two logs and those around them or, where it is during a log, nothing but this log."""
+    """The blocks before and after block number `at`: of all logs around if `between` logs, else of this log alone."""
     if between:
         return whole.part(slice(max(0, at - REACH), at)), whole.part(slice(at, at + REACH))
     first, last = np.searchsorted(whole.log, [whole.log[at], whole.log[at] + 1])
@@ -109,8 +111,8 @@ def _sides(whole: Blocks, at: int, between: bool) -> tuple[Blocks, Blocks]:
 
 
 def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
-    """How the mount turned from the one to the other, and its sigma (3 each, degrees along left, up, forward). None if
-    one of them shows too little."""
+    """The mount's rotation from `before` to `after`, and its standard deviations (3 each, degrees along left, up,
+    forward). None if one of them does not determine an alignment."""
     if min(len(before.log), len(after.log)) < LEAST_BLOCKS:
         return None
     one, other = _known(before), _known(after)
@@ -119,7 +121,8 @@ def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
     turn = np.degrees(rotation_vector(other.frame @ one.frame.T))
     road = ROAD_DEG if before.log[-1] == after.log[0] else OTHER_ROAD_DEG
     variance = one.variance + other.variance + 2.0 * road**2
-    # The frames' errors of yaw show in the direction of the sway, which does not know them: a second opinion
+    # The direction of the sway is an independent measurement of yaw: where the two frames differ by an error of yaw, it
+    # seems to turn by that error
     swayed = one.sway_variance + other.sway_variance + 2.0 * SWAY_DEG**2
     error = (other.sway_deg - one.sway_deg + 90.0) % 180.0 - 90.0
     if swayed < SWAY_WORST_DEG**2 and error**2 < SWAY_SIGMAS**2 * (swayed + variance[1]):
@@ -130,7 +133,7 @@ def compare(before: Blocks, after: Blocks) -> tuple[Array, Array] | None:
 
 @dataclass
 class _Known:
-    """How the sensor sits, frame (3, 3), with the variance (3, degrees^2) of that; the direction of the sway in it."""
+    """The alignment on one side: frame (3, 3), its variance (3, degrees^2), and the direction of the sway in it."""
 
     frame: Array
     variance: Array
@@ -139,7 +142,7 @@ class _Known:
 
 
 def _known(part: Blocks) -> _Known | None:
-    """Variances come from leaving out each block in turn."""
+    """The alignment by some blocks, with its variance by the jackknife; None if they do not determine it."""
     square, product = np.sum(part.square, axis=0), np.sum(part.product, axis=0)
     found, varied = fits(square, product)
     if np.sum(varied) < LEAST_VARIED:
@@ -157,7 +160,8 @@ def _known(part: Blocks) -> _Known | None:
 
 
 def _moment(log: Intervals, move: Move) -> float | None:
-    """When in the log the vertical jumped, in s. None if it did not, and a slope of the road may be the reason."""
+    """The time in the log, s, at which the vertical jumped; None if it did not, so that it may be a slope of the
+    road."""
     tilt = move.tilt_deg
     if move.at_s is None:
         return None
@@ -167,9 +171,9 @@ def _moment(log: Intervals, move: Move) -> float | None:
     if np.count_nonzero(near) < 10:
         return None
     found, varied = fits(terms[near].T @ terms[near], terms[near].T @ force[near])
-    level = (force - terms[:, 1:] @ found[1:]) / terms[:, :1]  # what is left is the vertical
+    level = (force - terms[:, 1:] @ found[1:]) / terms[:, :1]  # the vertical: the force less that by driving
     left, _, forward = frames(found, varied)
-    tips = (left * move.turn_deg[2] - forward * move.turn_deg[0]) / tilt  # where up goes as the sensor turns so
+    tips = (left * move.turn_deg[2] - forward * move.turn_deg[0]) / tilt  # the direction in which up moves
     best, moment = 0.0, move.at_s
     for now in time[np.abs(time - move.at_s) < 2.5 * STEP_S]:
         early = (time > now - STEP_GAP_S - STEP_S) & (time < now - STEP_GAP_S)

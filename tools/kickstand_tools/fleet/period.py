@@ -1,4 +1,4 @@
-"""One mount of one vehicle: its alignment, where it moved, its brake tests. A plain function on files."""
+"""One mount of one vehicle: its alignment, the moves of the mount, its brake tests. A plain function on files."""
 
 import errno
 import math
@@ -29,18 +29,18 @@ UNREADABLE, CHANGED, NO_MEMORY, FAULT = "unreadable", "changed", "no-memory", "f
 NO_SPEED, MOVED, LEFT_HANDED = "no-speed", "mount-moved", "left-handed"
 # The vehicle is aligned, but brake tests or signals of this log are missing; because the disk for signals is full
 AFTERWARDS, DISK_FULL = "not-finished", "disk-full"
-_LEFT_OUT = ("cut-line", "cut-gzip", "nul-end", "frozen-readings")  # notices of a log that say what of it is not used
-_SUSPECTS = (MOVED, "parts-differ", "uncertain")  # of the firmware: then it is worth while to look for a move
+_LEFT_OUT = ("cut-line", "cut-gzip", "nul-end", "frozen-readings")  # notices about parts of a log that are not used
+_SUSPECTS = (MOVED, "parts-differ", "uncertain")  # refusals of the firmware after which moves are looked for
 _PLOTTED = 160  # intervals in a picture
-_AGAINST = -0.5  # of a turn's force on the side of the turn: a gyro or axes that are mirrored
+_AGAINST = -0.5  # evidence.handedness() below this: the gyro or the axes are mirrored
 
 Row = dict[str, Any]
 
 
 @dataclass
 class PeriodResult:
-    """What schema.TABLES has of one mount of one vehicle, and its picture: for each of some intervals the changes of
-    speed, the force forward, the centripetal acceleration, the force to the left (4, g)."""
+    """The rows of one mount of one vehicle in schema.TABLES, and the points of its picture: for each of some intervals
+    the change of speed, the force forward, the centripetal acceleration, the force to the left (4, g)."""
 
     alignment: Row
     moved: list[Row] = field(default_factory=list)
@@ -73,14 +73,14 @@ def work_on_period(period: Period, signals_to: str | None = None) -> PeriodResul
 
 
 def _printable(result: PeriodResult) -> PeriodResult:
-    """The same, for files with names that are no UTF-8, which tables and pages cannot hold."""
+    """The result with names that are not UTF-8 made printable: tables and pages cannot hold them."""
     for row in chain([result.alignment], result.moved, result.brake_tests, result.errors):
         row |= {key: files.printable(value) for key, value in row.items() if isinstance(value, str)}
     return result
 
 
 def failed(period: Period, reason: str, message: str) -> PeriodResult:
-    """The result of a period that gave none."""
+    """The result for a period whose task failed."""
     message = files.printable(message)
     row = _alignment(period, "error", reason, message, [], len(period.paths))
     return PeriodResult(row, errors=[_error(period, "", reason, message)])
@@ -117,8 +117,8 @@ def _result(period: Period, signals_to: str | None) -> PeriodResult:
 
 @dataclass
 class _Drive:
-    """What the logs of a period show: by the firmware's own alignment and, where that is worth while, its intervals,
-    how the mount moved and where forward is."""
+    """The alignment by the logs of a period: the firmware's own and, where needed, the intervals, the moves of the
+    mount and forward by all of them."""
 
     fit: DriveFit
     intervals: list[evidence.Intervals] = field(default_factory=list)
@@ -137,7 +137,7 @@ def _drive(period: Period, logs: list[Log]) -> _Drive:
 
 
 def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
-    """Why there is no alignment, its code and its words; empty where there is one."""
+    """Why there is no alignment: code and sentence; two empty texts if there is one."""
     fit, found = drive.fit, drive.found
     if drive.moves:
         return MOVED, _moved_words(drive.moves, logs)
@@ -145,7 +145,7 @@ def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
     if _mirrored(drive.intervals):
         problem = AlignmentError(LEFT_HANDED)
     elif fit.reason == MOVED:
-        problem = fit_problem(fit.lag_s or 0.0, 1.0)  # a late speed takes braking for standing on another slope
+        problem = fit_problem(fit.lag_s or 0.0, 1.0)  # with a late speed braking looks like a stop on another slope
     elif found and found.sure:
         return "", ""
     elif found and not fit.reason:
@@ -175,7 +175,7 @@ def _error(period: Period, log: str, reason: str, message: str) -> Row:
 
 
 def _logs(period: Period) -> tuple[list[Log], list[Row]]:
-    """Those that can be used, and a row of errors for each other."""
+    """The logs that can be used, and a row of errors for each other one."""
     logs, errors = [], []
     for path in period.paths:
         reason = UNREADABLE
@@ -218,7 +218,7 @@ def _alignment(
 
 
 def _mirrored(driven: list[evidence.Intervals]) -> bool:
-    """Is the force of a turn on the other side than that to which the gyro says it goes?"""
+    """True if the force in bends is on the opposite side to the one that the gyro's yaw rate requires."""
     whole = evidence.blocks(driven)
     if not len(whole.log):
         return False
@@ -260,13 +260,12 @@ def _stop_row(stop: Stop, log: Log) -> Row:
 
 
 def _utc_s(log: Log, at_s: float) -> float | None:
-    """Universal Time at at_s in the log: the median of what its rows say, because some come late."""
-    starts = (log.utc_s - log.t_s)[np.isfinite(log.utc_s)]
-    return float(np.median(starts)) + at_s if len(starts) else None
+    """Universal Time at at_s in the log; None where it has none."""
+    return None if log.start_utc_s is None else log.start_utc_s + at_s
 
 
 def _picture(drive: _Drive) -> list[list[float]]:
-    """Where the mount moved the frame is a mean of what it was: the points show that it is none."""
+    """The points of the picture (see PeriodResult). If the mount moved, the frame is a mean, and the points scatter."""
     if not drive.found:
         return []
     used = [log.weight > 0.0 for log in drive.intervals]

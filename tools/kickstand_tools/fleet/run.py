@@ -1,4 +1,4 @@
-"""A whole fleet: what is new is worked on, everything is written to a directory, at any time and again at the end."""
+"""Processes a whole fleet: computes what is new, and writes all results to a directory, meanwhile and at the end."""
 
 import contextlib
 import hashlib
@@ -20,17 +20,20 @@ from .period import AFTERWARDS, CHANGED, DISK_FULL, PeriodResult, failed, work_o
 from .show import plot
 from .show.page import Glance, write_page
 
-RESULTS_VERSION = 3  # another one makes all results of before obsolete
+RESULTS_VERSION = 3  # a new number makes all earlier results obsolete
 PLOTS, SIGNALS = "plots", "signals"
-TIMEOUT_S = 600.0  # for one mount of one vehicle
-_WRITE_S, _SHARE = 15.0, 20.0  # tables are written so often, and at most every so many times what writing takes
+TIMEOUT_S = 600.0  # longest time for one mount of one vehicle
+_WRITE_S, _SHARE = (
+    15.0,
+    20.0,
+)  # least time between two writings of the tables: the longer of this and 20 times a writing
 
 
 @dataclass
 class FleetRun:
-    """vehicles: how many mounts of vehicles there are; new: how many of them were worked on now, the others were
-    finished before. damaged: how many results of before could not be read, and are worked out again. seen: what all
-    results show at one glance."""
+    """vehicles: number of mounts of vehicles; new: number of those computed in this run, the others were finished
+    before. damaged: number of earlier results that could not be read, and are computed again. seen: a summary of all
+    results."""
 
     vehicles: int
     new: int
@@ -50,7 +53,7 @@ def run_fleet(
     """Work on all periods (see read_manifest), and write tables (see schema.TABLES), pictures and index.html to out, a
     directory or a place in a store (s3://...).
 
-    scheduler: the address of a Dask cluster, None for workers on this computer: so many, or one a processor.
+    scheduler: the address of a Dask cluster, None for workers on this computer: `workers`, or one per processor.
     with_signals: also write each log's accelerations along the vehicle's axes, to out/signals. timeout_s: for one
     period. progress: called with (done, all). What an earlier run into the same directory has finished is not done
     again, as long as its logs have not changed. Raises InputError; what is finished is kept and shown then, too.
@@ -121,8 +124,8 @@ def write_results(directory: str, results: Iterable[PeriodResult], expected: int
 
 
 def _note_changed(period: Period, marks: dict[str, str], result: PeriodResult) -> bool:
-    """Whether a log of this computer was replaced since the run began, so that the result may be of either. Then result
-    gets a row of errors. In a store a file that is read is one whole version of it."""
+    """True if a log on this computer was replaced since the run began, so that the result may be from either version.
+    The result then gets a row of errors. (A file that is read from a store is always one whole version.)"""
     now = files.identities(path for path in period.paths if not files.is_remote(path))
     changed = [path for path, mark in now.items() if mark != marks[path]]
     for path in map(files.printable, changed):
@@ -132,7 +135,7 @@ def _note_changed(period: Period, marks: dict[str, str], result: PeriodResult) -
 
 
 def _keep(directory: str, journal: Journal | StoreJournal, key: str, kept: PeriodResult, again: bool) -> None:
-    """Keep a result before anything else can fail. again: another run is to try for a better one. Raises InputError."""
+    """Keep a result in the journal at once. again: another run should compute it again. Raises InputError."""
     missing = [row for row in kept.errors if row["reason"] in (AFTERWARDS, DISK_FULL)]
     unshown = None
     if kept.picture:

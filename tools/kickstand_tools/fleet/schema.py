@@ -16,7 +16,7 @@ TABLES: dict[str, dict[str, tuple[str, str, str]]] = {
     "alignments": _WHOSE
     | {
         "kind": (_TEXT, "", "motorcycle or car"),
-        "status": (_TEXT, "", "aligned; refused: the drives do not tell; error: no log could be used"),
+        "status": (_TEXT, "", "aligned; refused: the drives do not show it; error: no log could be used"),
         "reason": (_TEXT, "", "why not aligned, a code; empty if aligned"),
         "message": (_TEXT, "", "the reason in words"),
         "quality_deg": (_NUMBER, "deg", "standard error of forward about the vertical"),

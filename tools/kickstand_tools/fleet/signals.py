@@ -8,11 +8,12 @@ import numpy as np
 from ..calibration.file import CalibrationFile
 from ..logs.log import Log
 from ..logs.source import log_stem
+from ..logs.table import float_schema
 from .files import file_stem, folder_value, printable, write_bytes
 from .manifest import Period
 
 UNKNOWN_DAY = "unknown"
-_FINE = ("t_s", "utc_s")  # 32-bit floats are too coarse for these
+_FINE = ("t_s", "utc_s")  # columns for which 32-bit floats are too coarse
 # column: unit
 COLUMNS = {
     "t_s": "s since the log's first sample",
@@ -36,30 +37,18 @@ def write(directory: str, period: Period, log: Log, calibration: CalibrationFile
     from pyarrow import parquet
 
     force, rate = calibration.in_vehicle(log.readings)
-    timed = np.isfinite(log.utc_s)
-    start_s = float(np.median((log.utc_s - log.t_s)[timed])) if np.any(timed) else float("nan")
-    values = dict(
-        zip(COLUMNS, (log.t_s, log.t_s + start_s, *force.T, *rate.T, log.speed_mps), strict=True),
-    )
-    schema = pyarrow.schema(
-        [
-            pyarrow.field(name, pyarrow.float64() if name in _FINE else pyarrow.float32(), metadata={"unit": unit})
-            for name, unit in COLUMNS.items()
-        ],
-        metadata={
-            "made_by": "kickstand fleet",
-            "vehicle": period.vehicle,
-            "mount": period.mount,
-            "log": printable(log.name),
-            "axes": "left, up, forward of the vehicle",
-        },
+    utc_s = log.t_s + (np.nan if log.start_utc_s is None else log.start_utc_s)
+    values = dict(zip(COLUMNS, (log.t_s, utc_s, *force.T, *rate.T, log.speed_mps), strict=True))
+    whole = {"made_by": "kickstand fleet", "vehicle": period.vehicle, "mount": period.mount}
+    schema = float_schema(
+        COLUMNS, _FINE, whole | {"log": printable(log.name), "axes": "left, up, forward of the vehicle"}
     )
     readable = f"{period.mount} {log_stem(log.name)}".strip()
     name = file_stem(readable, period.vehicle, period.mount, log.name) + ".parquet"
-    days = np.floor(values["utc_s"] / 86_400.0) if np.any(timed) else np.zeros(len(log.t_s))
+    days = np.floor(utc_s / 86_400.0) if log.start_utc_s is not None else np.zeros(len(log.t_s))
     paths = []
     for day in np.unique(days):
-        date = _date(day) if np.any(timed) else UNKNOWN_DAY
+        date = _date(day) if log.start_utc_s is not None else UNKNOWN_DAY
         rows = days == day
         arrays = [pyarrow.array(values[f.name][rows], type=f.type, from_pandas=True) for f in schema]
         file = io.BytesIO()

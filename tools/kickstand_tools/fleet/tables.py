@@ -1,4 +1,4 @@
-"""The results as Parquet."""
+"""Writes the results as Parquet."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -47,7 +47,7 @@ def _open_next(directory: str, names: list[str], tables: dict[str, "_Table"], re
 
 
 class _Table:
-    """Rows on their way into a file."""
+    """Collects rows and writes them to a file in groups."""
 
     def __init__(self, writer: Any, columns: Any) -> None:
         self._writer, self._columns = writer, columns

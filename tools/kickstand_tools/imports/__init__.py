@@ -1,1 +1,1 @@
-"""Recordings of other apps and loggers as logs: what a file is, its units and signs, its sensors on one clock."""
+"""Converts recordings of other apps and loggers to logs: recognises the format, units and signs, joins the clocks."""

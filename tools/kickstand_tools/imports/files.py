@@ -12,20 +12,20 @@ from typing import IO
 from ..errors import InputError
 from ..logs.source import errors_of, open_input
 
-_EXCEL = b"\xd0\xcf\x11\xe0"  # its older files begin so; the newer are zips
-SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # what is looked at in a folder or a zip
-# A recording as text: some hours at 100 Hz. Reading it takes at most ten times its memory.
+_EXCEL = b"\xd0\xcf\x11\xe0"  # first bytes of Excel's older files; the newer are zips
+SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # other files in a folder or a zip are ignored
+# Largest recording as text: some hours at 100 Hz. Reading it takes at most ten times its memory.
 MOST_BYTES = 250_000_000
-MOST_FILES = 10_000  # in a folder or a zip
-LONGEST_LINE = 1_000_000  # characters; a table of a thousand columns has a tenth of that
+MOST_FILES = 10_000  # most files in a folder or a zip
+LONGEST_LINE = 1_000_000  # characters of the longest line; a table of a thousand columns has a tenth of that
 _BOMS = ((b"\xef\xbb\xbf", "utf-8-sig"), (b"\xff\xfe", "utf-16"), (b"\xfe\xff", "utf-16"))
 
 
 @dataclass
-class Piece:
+class RecordingFile:
     """One file of a recording. name: with its folders below what was given, parted by /. content: its bytes, unpacked.
 
-    text: the same decoded; lines end in a line feed.
+    text: the decoded content; lines end in a line feed.
     """
 
     name: str
@@ -47,23 +47,23 @@ class Piece:
         return [line for line in self.text[: 1 << 16].split("\n") if line.strip()][:count]
 
 
-def read_pieces(source: Path | str) -> list[Piece]:
+def read_files(source: Path | str) -> list[RecordingFile]:
     """What a file, a folder or a zip holds; in the last two only files of SUFFIXES, and one zip that is all they hold.
 
-    Raises InputError for what is not there, is damaged, empty, no text, or over MOST_BYTES when unpacked.
+    Raises InputError for a source that is missing, damaged, empty, no text, or over MOST_BYTES when unpacked.
     """
     path = Path(source)
     with errors_of(str(path)):
-        pieces = [_piece(name, content) for name, content in _bounded(path)]
-        pieces = [piece for piece in pieces if piece is not None] or _no_text(path)
-    pieces = [piece for piece in pieces if piece.text.strip() or piece.name.endswith(".parquet")]
-    if not pieces:
+        files = [_recording_file(name, content) for name, content in _bounded(path)]
+        files = [file for file in files if file is not None] or _no_text(path)
+    files = [file for file in files if file.text.strip() or file.name.endswith(".parquet")]
+    if not files:
         raise InputError(f"{path} holds no recording: give the file, the folder or the zip that an app has exported")
-    return pieces
+    return files
 
 
 def _bounded(path: Path) -> Iterator[tuple[str, bytes]]:
-    """_contents(), as long as they are not too large."""
+    """Yield _contents(). Raises InputError if they are too large."""
     size = 0
     for name, content in _contents(path):
         size += len(content)
@@ -73,7 +73,7 @@ def _bounded(path: Path) -> Iterator[tuple[str, bytes]]:
 
 
 def _read(file: IO[bytes]) -> bytes:
-    """At most a byte more than is allowed, which shows that it is too much."""
+    """The content of a file, cut one byte after the limit, which shows that it is too large."""
     return file.read(MOST_BYTES + 1)
 
 
@@ -152,7 +152,7 @@ def _wanted(name: str) -> bool:
     return not hidden and name.lower().removesuffix(".gz").endswith(SUFFIXES)
 
 
-def _no_text(path: Path) -> list[Piece]:
+def _no_text(path: Path) -> list[RecordingFile]:
     if path.is_file():
         with open_input(path) as file:
             excel = "a table of Excel: export it as CSV" if file.read(4) == _EXCEL else ""
@@ -160,16 +160,16 @@ def _no_text(path: Path) -> list[Piece]:
     return []
 
 
-def _piece(name: str, content: bytes) -> Piece | None:
-    """None for what is no text."""
+def _recording_file(name: str, content: bytes) -> RecordingFile | None:
+    """The Piece of a file; None if it is no text."""
     if content.startswith(b"PAR1"):
-        return Piece(name, content, "")
+        return RecordingFile(name, content, "")
     text = _decoded(content)
     if max(map(len, text[: 64 * LONGEST_LINE].split("\n", 64)[:64])) > LONGEST_LINE:
         raise InputError(f"{name}: a line of over {LONGEST_LINE:,} characters: it is no table of a recording")
     if sum(character < " " and character not in "\t\r\n" for character in text[:4000]) > 3:
         return None
-    return Piece(name, content, text.replace("\r\n", "\n").replace("\r", "\n"))
+    return RecordingFile(name, content, text.replace("\r\n", "\n").replace("\r", "\n"))
 
 
 def _decoded(content: bytes) -> str:

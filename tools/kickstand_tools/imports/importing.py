@@ -1,4 +1,5 @@
-"""A recording of another app or logger as a log: what it is, joined on one clock, checked, written."""
+"""Imports a recording of another app or logger: finds its format, joins its sensors on one clock, checks and writes
+it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -15,22 +16,24 @@ from ..logs.log import Log
 from ..logs.reader import read_log
 from . import mapped
 from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo
-from .files import Piece, read_pieces
+from .files import RecordingFile, read_files
 from .join import GAP_NS, join
 from .recording import Array, Recording, Taken
 from .units import ACCELERATIONS, SPEEDS, factor, unit
 
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
-WITHOUT_GRAVITY_G = 0.4  # median force: of an app's whole ride, which a pose with an offset of 0.6 g is not
-WRONG_UNIT_G = 3.0  # median force: m/s2 taken for g give 9.8
+WITHOUT_GRAVITY_G = 0.4  # a smaller median force is without gravity; even a pose with an offset of 0.6 g has more
+WRONG_UNIT_G = 3.0  # a larger median force is in m/s2, where it is 9.8
 
 
 @dataclass(eq=False)
 class Imported:
-    """app: whose recording it was. log: from the recording's own start. taken: what was taken for what. notices: what
-    is remarkable (kickstand_tools.refusals.sentence puts a notice into words). gaps_s: how long each gap lasts.
+    """app: name of the app. log: times from the recording's own start. taken: the file, columns and unit of each
+    quantity. notices: what is remarkable (kickstand_tools.refusals.sentence puts a notice into words). gaps_s: duration
+    of each gap.
 
-    vehicle_axes: x points left, y up, z forward on the vehicle already, as far as its logger was mounted so.
+    vehicle_axes: True if x points left, y up, z forward on the vehicle already, provided that its logger was mounted
+    so.
     """
 
     app: str
@@ -41,12 +44,12 @@ class Imported:
 
     @property
     def rate_hz(self) -> float:
-        """Samples in a second, without the gaps."""
+        """Samples per second, gaps not counted."""
         return 1.0 / float(np.median(np.diff(self.log.t_s)))
 
     @property
     def gaps_s(self) -> Array:
-        """How long each gap lasts, s."""
+        """Duration of each gap, s."""
         steps = np.diff(self.log.t_s)
         return steps[steps * 1e9 > GAP_NS]
 
@@ -77,7 +80,7 @@ def import_recording(
     (100, [0.0, 1.0, 0.0], [0.0, 0.0, 5.73])
     """
     name = str(source)
-    recording = _recording(read_pieces(source), name, columns, dict(units or {}))
+    recording = _recording(read_files(source), name, columns, dict(units or {}))
     log, damaged = join(recording, name)
     _check_force(log)
     _check_sign(recording, log)
@@ -103,23 +106,25 @@ def write_imported(path: Path | str, imported: Imported) -> None:
     write_log(path, imported.log)
 
 
-def _recording(pieces: list[Piece], name: str, columns: Mapping[str, str] | None, units: dict[str, str]) -> Recording:
+def _recording(
+    files: list[RecordingFile], name: str, columns: Mapping[str, str] | None, units: dict[str, str]
+) -> Recording:
     if columns is not None:
-        if len(pieces) > 1:
-            raise InputError(f"{name} holds {len(pieces)} files: give --columns with one, such as {pieces[0].name}")
-        return mapped.read_mapped(pieces[0], columns, units, name)
-    found = recordings(pieces)
+        if len(files) > 1:
+            raise InputError(f"{name} holds {len(files)} files: give --columns with one, such as {files[0].name}")
+        return mapped.read_mapped(files[0], columns, units)
+    found = recordings(files)
     if not found:
-        raise mapped.unknown(pieces, name)
+        raise mapped.unknown(files, name)
     if len(found) > 1:
-        which = ", ".join(files[0].folder or files[0].name for _, files in found[:4])
+        which = ", ".join(group[0].folder or group[0].name for _, group in found[:4])
         more = ", ..." if len(found) > 4 else ""
         raise InputError(f"{name} holds {len(found)} recordings ({which}{more}): give one of them")
-    app, files = found[0]
+    app, group = found[0]
     said = units.get("speed", "") if app is racebox else ""
     if said:
         factor(said, SPEEDS, "speed")
-    recording = racebox.read(files, name, unit(said)) if app is racebox else app.read(files, name)
+    recording = racebox.read(group, name, unit(said)) if app is racebox else app.read(group, name)
     asked = {"speed"} if app is racebox else set() if recording.sign_known else {"a"}
     if not set(units) <= asked:
         raise InputError(f"{name} is {app.NAME}'s, whose units are known: leave --units out, or add --columns, too")
@@ -131,14 +136,14 @@ def _recording(pieces: list[Piece], name: str, columns: Mapping[str, str] | None
     return recording
 
 
-def recordings(pieces: list[Piece]) -> list[tuple[Any, list[Piece]]]:
-    """The recordings among some files: each with its module in apps/, whose NAME is the app's."""
-    found, left = [], pieces
+def recordings(files: list[RecordingFile]) -> list[tuple[Any, list[RecordingFile]]]:
+    """The recordings among some files: (module in apps/, its files) of each; the module's NAME is the app's."""
+    found, left = [], files
     for app in _APPS:
-        for files in app.finds(left):
-            found.append((app, files))
-        claimed = {id(piece) for _, files in found for piece in files}
-        left = [piece for piece in left if id(piece) not in claimed]
+        for group in app.finds(left):
+            found.append((app, group))
+        claimed = {id(file) for _, group in found for file in group}
+        left = [file for file in left if id(file) not in claimed]
     return found
 
 
@@ -155,9 +160,9 @@ def _check_force(log: Log) -> None:
 
 
 def _check_sign(recording: Recording, log: Log) -> None:
-    """Turn an accelerometer whose sign was only likely where the track shows that it is mirrored.
+    """Change the sign of an accelerometer if that was only likely and the track shows that it is mirrored.
 
-    One whose sign is known is left as it is: reading the log remarks on it.
+    One whose sign is known stays: reading the log gives a remark about it.
     """
     if recording.sign_known:
         return

@@ -14,19 +14,19 @@ from ..logs.even_times import even_times
 from ..logs.log import Log
 from .recording import Array, Recording, Sensor, Track
 
-MOST_MPS = 200.0  # no speed, and no degrees of a position, are more
-GAP_NS = LOST_US * 1000  # between samples that are further apart nothing is interpolated
-FASTER = 1.5  # times the accelerometer's rate: a gyro so fast is averaged over each of its samples
-MANY = 0.02  # share of readings past MOST_G and MOST_DPS from which they are no damaged cells, but in another unit
-SHUFFLED_NS = 500_000_000  # samples that come later than younger ones by less are put in order
-LATE_STEPS, MOST_LATE = 4.0, 0.02  # of which no larger share is later by more than so many usual steps
-MOST_HZ = 10_000.0  # of an inertial sensor; the fastest have 8,000
+MOST_MPS = 200.0  # largest speed, and largest degrees of a position
+GAP_NS = LOST_US * 1000  # no interpolation between samples that are further apart
+FASTER = 1.5  # a gyro with over FASTER times the accelerometer's rate is averaged over each of its samples
+MANY = 0.02  # a larger share of readings over MOST_G and MOST_DPS is no damaged cells, but another unit
+SHUFFLED_NS = 500_000_000  # samples that come after younger ones are sorted if the delay is shorter
+LATE_STEPS, MOST_LATE = 4.0, 0.02  # and if at most a share of MOST_LATE is later by over LATE_STEPS median steps
+MOST_HZ = 10_000.0  # highest rate of an inertial sensor; the fastest have 8,000
 
 
 def join(recording: Recording, name: str) -> tuple[Log, int]:
-    """The log on the accelerometer's clock, from its first sample, and how many rows are left out as damaged.
+    """The log on the accelerometer's clock, from its first sample, and the number of rows left out as damaged.
 
-    name: of the recording, for messages. Raises InputError where the sensors have no time in common.
+    name: the recording's, for messages. Raises InputError where the sensors have no time in common.
     """
     accel = in_order(recording.accel, name)
     gyro = in_order(recording.gyro, name)
@@ -121,7 +121,7 @@ def _between(at: Array, since: Array, values: Array) -> Array:
 
 
 def _averaged(sensor: Sensor, over_ns: float) -> Array:
-    """A sensor's values (n, 3), each the mean over so long around it."""
+    """A sensor's values (n, 3) averaged over over_ns around each."""
     half = round(over_ns / 2.0)
     begin, end = (np.searchsorted(sensor.time_ns, sensor.time_ns + side, side="right") for side in (-half, half))
     sums = np.cumsum(np.vstack((np.zeros(3), np.nan_to_num(sensor.values))), axis=0)
@@ -133,10 +133,11 @@ def _averaged(sensor: Sensor, over_ns: float) -> Array:
 def with_gravity(
     there: Container[str], sensor: Callable[[str], Sensor], name: str, whose: str, remedy: str, none: str
 ) -> Sensor:
-    """The accelerometer. there: which there are of "total", with gravity in it, "user", without, and "gravity".
+    """The accelerometer, with gravity. there: those of "total" (with gravity), "user" (without) and "gravity" that
+    exist.
 
-    sensor: called with one of these. Raises InputError where gravity was taken off (whose: acceleration; remedy: what
-    to do) and where there is no acceleration (none: says so).
+    sensor: called with one of these, returns it. Raises InputError if there is only acceleration without gravity
+    (whose: its name; remedy: what to do), and if there is none (none: the message).
     """
     if "total" in there:
         return sensor("total")

@@ -1,4 +1,4 @@
-"""Any other table: its columns named by whoever knows them, or guessed for the line that is to be typed."""
+"""Reads any other table: its columns are named by the user, or guessed for the command line that is suggested."""
 
 import re
 import shlex
@@ -6,9 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand.units import STANDARD_GRAVITY
 
 from ..errors import InputError
-from .files import Piece
+from .files import RecordingFile
 from .recording import Recording, Sensor, Taken, rate_hz, track_of
 from .sheets import Sheet, names_in, plain, read_sheet, unit_in
 from .times import EPOCH_NS, Nanoseconds, time_unit
@@ -28,11 +29,14 @@ _ACCEL_NAME = re.compile(r"acc|gforce|^a_?[xyz]\b")
 _GYRO_NAME = re.compile(r"gyr|rotation|omega|angular|^[gw]_?[xyz]\b")
 _UNIT_END = re.compile(r"_(g|mps2|ms2|dps|rads?|rps)$")
 _NUMBER = re.compile(r"[+-]?[\d.,]+(?:[eE][+-]?\d+)?")
-_HEADER_LINES = 60  # among which the line of names is looked for
-FEWEST_NUMBERS = 4  # in a row, a time and three axes: text with commas in it has none
+# Nine tenths of a ride's readings are below these: 4 g, and 172 deg/s in rad/s
+_FORCES = {"g": 4.0, "m/s2": 4.0 * STANDARD_GRAVITY, "mg": np.inf}
+_TURNS = {"rad/s": 3.0, "deg/s": 500.0, "mdeg/s": np.inf}
+_HEADER_LINES = 60  # number of lines in which the line of names is searched
+FEWEST_NUMBERS = 4  # least numbers in a row, a time and three axes: text with commas in it has none
 
 
-def read_mapped(piece: Piece, columns: Mapping[str, str], units: Mapping[str, str], name: str) -> Recording:
+def read_mapped(file: RecordingFile, columns: Mapping[str, str], units: Mapping[str, str]) -> Recording:
     """A table with the columns named for t, ax to az, gx to gz and, as there are, speed, lat, lon and temp.
 
     columns: by these, the name of each in the file, or #1, #2 ... for its number. units: of t, a (all of ax to az) or
@@ -40,7 +44,7 @@ def read_mapped(piece: Piece, columns: Mapping[str, str], units: Mapping[str, st
     is the one in brackets in the column's name. Raises InputError.
     """
     _check_keys(columns, units)
-    sheet = read_sheet(piece, header_line(piece, columns))
+    sheet = read_sheet(file, header_line(file, columns))
     places = {key: _place(sheet, key, wanted) for key, wanted in columns.items()}
     _check_units(sheet, places, units)
     t_unit = units.get("t") or unit_in(sheet.columns[places["t"]])
@@ -61,8 +65,8 @@ def read_mapped(piece: Piece, columns: Mapping[str, str], units: Mapping[str, st
 
 @dataclass
 class Table:
-    """A table of sensors that no app is known for. columns: as they are called in it; found: those of them that seem to
-    be the ones of REQUIRED and OPTIONAL; units: what seems to be theirs, by UNIT_KEYS."""
+    """A table of sensors of an unknown app. columns: their names in it; found: the columns that seem to be those of
+    REQUIRED and OPTIONAL; units: their probable units, by UNIT_KEYS."""
 
     name: str
     columns: list[str]
@@ -71,56 +75,74 @@ class Table:
 
     @property
     def missing(self) -> list[str]:
-        """The ones of REQUIRED that are not found."""
+        """The columns of REQUIRED that are not found."""
         return [key for key in REQUIRED if key not in self.found]
 
     @property
     def lacking(self) -> str:
-        """The same in words, "" for none."""
+        """The missing columns in words, "" for none."""
         missing = self.missing
         lacking = ["time"] if "t" in missing else []
         lacking += [word for word, axes in (("acceleration", ACCEL), ("gyro", GYRO)) if set(axes) & set(missing)]
         return f", and no {', '.join(lacking)} found in it" if lacking else ""
 
 
-def table_in(pieces: list[Piece]) -> Table | None:
+def table_in(files: list[RecordingFile]) -> Table | None:
     """The largest of these files, None where that is no table of sensors."""
-    piece = max(pieces, key=lambda piece: len(piece.text))
-    number = header_line(piece, {})
-    lines = [line for line in piece.text.split("\n", _HEADER_LINES + 3)[number:] if line.strip()]
+    file = max(files, key=lambda file: len(file.text))
+    number = header_line(file, {})
+    lines = [line for line in file.text.split("\n", _HEADER_LINES + 3)[number:] if line.strip()]
     columns = names_in(lines[0])
     found = guessed(columns)
     numbers = max((_numbers(names_in(line)) for line in lines[1:3]), default=0)
     if numbers < (FEWEST_NUMBERS if found else len(REQUIRED)):
         return None
-    units = {"a": _seems_in(found.get("ax", ""), ACCELERATIONS, "m/s2")}
-    units["g"] = _seems_in(found.get("gx", ""), RATES, "rad/s")
+    units = {
+        "a": _seems_in(found.get("ax", ""), ACCELERATIONS, _by_size(file, number, found, ACCEL, _FORCES) or "m/s2")
+    }
+    units["g"] = _seems_in(found.get("gx", ""), RATES, _by_size(file, number, found, GYRO, _TURNS) or "rad/s")
     if "speed" in found:
         units["speed"] = _seems_in(found["speed"], SPEEDS, "km/h")
-    return Table(piece.name, columns, found, units)
+    return Table(file.name, columns, found, units)
 
 
 def _seems_in(column: str, kinds: Mapping[str, float], usual: str) -> str:
-    """The one of kinds that stands in brackets or behind the last _ of a column's name, else the usual one."""
+    """The unit, one of kinds, in brackets or behind the last _ of a column's name, else `usual`."""
     stated = (unit(unit_in(column)), unit(column.rpartition("_")[2]))
     return next((name for name in stated if name in kinds), usual)
 
 
-def unknown(pieces: list[Piece], source: str) -> InputError:
-    """For a file that no app is known for: what is missing in it, its columns, and the line to type."""
-    table = table_in(pieces)
+def _by_size(
+    file: RecordingFile, header: int, found: Mapping[str, str], axes: tuple[str, ...], limits: Mapping[str, float]
+) -> str:
+    """The unit in which nine tenths of the readings of three axes are below its limit, "" where an axis is missing."""
+    if not set(axes) <= set(found):
+        return ""
+    try:
+        sheet = read_sheet(file, header)
+        sizes = np.sqrt(sum(sheet.numbers(sheet.columns.index(found[axis])) ** 2 for axis in axes))
+    except (InputError, ValueError):
+        return ""
+    sizes = sizes[np.isfinite(sizes)]
+    most = float(np.percentile(sizes, 90.0)) if len(sizes) else np.nan
+    return next((name for name, limit in limits.items() if most < limit), "")
+
+
+def unknown(files: list[RecordingFile], source: str) -> InputError:
+    """The error for a file of an unknown app: missing columns, its columns, and the command line to type."""
+    table = table_in(files)
     if table is None:
-        shown = next((line for piece in pieces for line in piece.first_lines(1)), "")[:60]
+        shown = next((line for file in files for line in file.first_lines(1)), "")[:60]
         return InputError(
             f"{source}: not a file of an app that is known, and no table of sensors ({shown!a}): give the file, the "
             "folder or the zip that an app has exported as CSV"
         )
-    several = f" (of {len(pieces)} files, the largest is {table.name})" if len(pieces) > 1 else ""
+    several = f" (of {len(files)} files, the largest is {table.name})" if len(files) > 1 else ""
     shown = ", ".join(table.columns[:40]) + (", ..." if len(table.columns) > 40 else "")
     given = [f"{key}={table.found.get(key, '?')}" for key in REQUIRED]
     given += [f"{key}={table.found[key]}" for key in OPTIONAL if key in table.found]
     units = ",".join(f"{key}={name}" for key, name in table.units.items())
-    where = source if len(pieces) == 1 else f"{source}/{table.name}"
+    where = source if len(files) == 1 else f"{source}/{table.name}"
     ask = "Put in what the ? stand for" if table.missing else "Put in what is not right"
     return InputError(
         f"{source}: not a file of an app that is known{several}{table.lacking}",
@@ -130,11 +152,11 @@ def unknown(pieces: list[Piece], source: str) -> InputError:
     )
 
 
-def header_line(piece: Piece, columns: Mapping[str, str]) -> int:
+def header_line(file: RecordingFile, columns: Mapping[str, str]) -> int:
     """Number of the line of names: the first that holds all that are asked for, else the widest before the numbers."""
     wanted = {name.strip() for name in columns.values() if not name.strip().startswith("#")}
     widest, width = 0, 0
-    for number, line in enumerate(piece.text.split("\n", _HEADER_LINES)[:_HEADER_LINES]):
+    for number, line in enumerate(file.text.split("\n", _HEADER_LINES)[:_HEADER_LINES]):
         cells = names_in(line)
         if wanted and wanted <= set(cells):
             return number
@@ -149,7 +171,7 @@ def _numbers(cells: list[str]) -> int:
 
 
 def guessed(columns: list[str]) -> dict[str, str]:
-    """Columns that seem to be the ones asked for."""
+    """The columns that seem to be those of REQUIRED and OPTIONAL, by these."""
     found: dict[str, str] = {}
     for column in columns:
         low, bare = _UNIT_END.sub("", column.lower()), plain(column)
@@ -226,10 +248,10 @@ def _check_units(sheet: Sheet, places: Mapping[str, int], units: Mapping[str, st
 
 
 def _unit(units: Mapping[str, str], keys: tuple[str, ...], column: str) -> str:
-    """What is given for one of the keys, else what stands in brackets in the column's name."""
+    """The unit that is given for one of the keys, else the one in brackets in the column's name."""
     return next((units[key] for key in keys if key in units), unit_in(column))
 
 
 def _turned(units: Mapping[str, str]) -> bool:
-    """A sign that was asked for is meant."""
+    """True if the user has asked for a change of sign, which is then not judged."""
     return any(units.get(key, "").startswith("-") for key in ("a", *ACCEL))

@@ -1,4 +1,4 @@
-"""What a reader finds in an app's files: each sensor on its own clock, in a log's units and signs."""
+"""The result of reading an app's files: each sensor on its own clock, in a log's units and signs."""
 
 from dataclasses import dataclass, field
 
@@ -12,14 +12,14 @@ from .times import NO_TIME, REPEATED, Nanoseconds
 from .units import ACCELERATIONS, RATES, SPEEDS, factor
 
 SECOND_NS = 10**9
-_ABSURD = 1e6  # g or deg/s: a damaged cell
+_ABSURD = 1e6  # g or deg/s: a larger value is a damaged cell
 
 
 @dataclass
 class Taken:
-    """What was taken for what: a quantity, the file and the columns it stands in, their unit, and how it was turned.
+    """The source of a quantity: the file and the columns, their unit, and the change of sign.
 
-    rate_hz: samples in a second, 0 for none.
+    rate_hz: samples per second, 0 for none.
     """
 
     quantity: str
@@ -30,7 +30,7 @@ class Taken:
 
 
 def rate_hz(time_ns: Nanoseconds) -> float:
-    """Samples in a second, without gaps; 0 where there are too few."""
+    """Samples per second, gaps not counted; 0 if there are too few."""
     steps = np.diff(time_ns[time_ns > REPEATED])
     if not np.any(steps > 0):
         return 0.0
@@ -41,8 +41,8 @@ def rate_hz(time_ns: Nanoseconds) -> float:
 @dataclass
 class Sensor:
     """n samples: time_ns (n) of the recorder's clock, values (n, 3): g, +1 where the axis points up at rest, or deg/s,
-    right-handed. name: for messages. damaged: rows of its file that are left out, because they have too many
-    cells or their time or a value cannot be read; a row without any value is another sensor's. taken: from where."""
+    right-handed. name: for messages. damaged: number of rows of its file that are left out, because they have too many
+    cells or their time or a value cannot be read; a row without any value is another sensor's. taken: its source."""
 
     name: str
     time_ns: Nanoseconds
@@ -84,7 +84,7 @@ class Track:
     taken: list[Taken] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        """Only rows that say something new stay, and no speed below 0: a phone's mark for a speed it does not know."""
+        """Drop rows that repeat the values before, and speeds below 0, by which phones mark an unknown speed."""
         self.speed_mps = np.where(self.speed_mps >= 0.0, self.speed_mps, np.nan)
         nowhere = (self.lat_deg == 0.0) & (self.lon_deg == 0.0)
         nowhere |= ~((np.abs(self.lat_deg) <= 90.0) & (np.abs(self.lon_deg) <= 180.0))
@@ -93,7 +93,7 @@ class Track:
         there = (self.time_ns != NO_TIME) & ~np.all(np.isnan(rows), axis=1)
         self.keep(there)
         same = np.all((rows[there][1:] == rows[there][:-1]) | np.isnan(rows[there][1:]), axis=1)
-        same &= np.diff(self.time_ns // SECOND_NS) == 0  # a standstill is said once a second
+        same &= np.diff(self.time_ns // SECOND_NS) == 0  # repeated values of a standstill are kept once a second
         self.keep(np.concatenate(([True], ~same)) if len(self.time_ns) else np.zeros(0, dtype=bool))
 
     def keep(self, which: NDArray[np.bool_]) -> None:
@@ -113,7 +113,7 @@ def track_of(
 ) -> Track | None:
     """Speed and position of a sheet, by the numbers of their columns; None where there is neither.
 
-    per_degree: what latitude and longitude are multiplied by.
+    per_degree: factors on latitude and longitude.
     """
     if speed is None and (lat is None or lon is None):
         return None
@@ -129,10 +129,10 @@ def track_of(
 
 @dataclass
 class Recording:
-    """app: whose. utc_ns: what makes UTC of the recorder's clock, in ns since 1970; None if that is not known.
+    """app: the app's name. utc_ns: UTC less the recorder's clock, ns since 1970; None if unknown.
 
-    vehicle_axes: x points left, y up, z forward on the vehicle already, as far as its logger was mounted so.
-    sign_known: at rest up reads +1 g, by what the app's maker or its files say; else it is only likely.
+    vehicle_axes: True if x points left, y up, z forward on the vehicle already, provided that its logger was mounted
+    so. sign_known: True if at rest up reads +1 g according to the app's maker or its files; else that is only likely.
     """
 
     app: str
@@ -147,5 +147,5 @@ class Recording:
 
     @property
     def taken(self) -> list[Taken]:
-        """What was taken for what."""
+        """The sources of all quantities."""
         return [*self.accel.taken, *self.gyro.taken, *(self.track.taken if self.track else [])]

@@ -1,4 +1,4 @@
-"""A table of text as columns of numbers: which separator, which decimal mark, under which names."""
+"""Reads a table of text as columns of numbers: finds its separator, its decimal mark and its names."""
 
 import csv
 import os
@@ -10,17 +10,17 @@ import numpy as np
 from ..errors import InputError
 from ..logs.csv_reader import Cells, cells_of, columns_of_text, numbers_of, separator_of
 from ..logs.table import Array
-from .files import Piece
+from .files import RecordingFile
 from .times import Nanoseconds, times_ns
 
-LONG = 6  # letters that several names begin with are too many to repeat
+LONG = 6  # a common beginning of several names with so many letters is not repeated
 _DECIMAL_COMMA = re.compile(r"(?:^|[;\t\"])\s*[+-]?\d+,\d")
 
 
 @dataclass
 class Sheet:
-    """name: of the file, for messages. columns: as they are called in it, some perhaps twice. cells: of each column.
-    left_out: rows that were damaged."""
+    """name: the file's, for messages. columns: their names in the file, some perhaps twice. cells: those of each
+    column. left_out: number of damaged rows."""
 
     name: str
     columns: list[str]
@@ -34,7 +34,7 @@ class Sheet:
         return next((found.index(name) for name in wanted if name in found), None)
 
     def axes(self, *names: str | tuple[str, ...]) -> tuple[list[int], list[str]]:
-        """place() of each name, or of one of several names, and the first names of those that are not there."""
+        """place() of each name, or of one of several names; and the (first) names of those that are missing."""
         each = [name if isinstance(name, tuple) else (name,) for name in names]
         found = {one[0]: self.place(*one) for one in each}
         places = [place for place in found.values() if place is not None]
@@ -45,7 +45,7 @@ class Sheet:
         return times_ns(self.cells[place], unit, self.name)
 
     def named(self, places: list[int]) -> str:
-        """The file and some columns of it, for people: without units, and what several begin with said once."""
+        """The file's name and those of some columns, for messages: without units, a common beginning only once."""
         names = [re.sub(r"[(\[].*?[)\]]", "", self.columns[place]).strip(" ,;") for place in places]
         same = len(os.path.commonprefix(names)) if len(names) > 2 else 0  # noqa: RUF071 - letters, no path
         if same > LONG:
@@ -82,18 +82,18 @@ def names_in(line: str) -> list[str]:
         return []
 
 
-def read_sheet(piece: Piece, header: int = 0, skipped: int = 0) -> Sheet:
-    """The table of a piece. header: number of the line of names; skipped: lines after it that are no data.
+def read_sheet(file: RecordingFile, header: int = 0, skipped: int = 0) -> Sheet:
+    """The table of a file. header: number of the line of names; skipped: lines after it that are no data.
 
     Raises InputError where there is none.
     """
-    lines = piece.text.split("\n", header + skipped + 1)
+    lines = file.text.split("\n", header + skipped + 1)
     if len(lines) < header + skipped + 2 or not lines[-1].strip():
-        raise InputError(f"{piece.name}: no rows under the names of the columns: was anything recorded?")
+        raise InputError(f"{file.name}: no rows under the names of the columns: was anything recorded?")
     columns = names_in(lines[header])
     while columns and not columns[-1]:
         columns.pop()  # lines that end in a separator
     text, separator = lines[-1], separator_of(lines[header])
     if separator != "," and _DECIMAL_COMMA.search(text[:20000]):
         text = text.replace(",", ".")
-    return Sheet(piece.name, columns, *columns_of_text(text, separator, max(len(columns), 1)))
+    return Sheet(file.name, columns, *columns_of_text(text, separator, max(len(columns), 1)))

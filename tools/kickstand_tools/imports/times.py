@@ -1,4 +1,4 @@
-"""Times as apps write them, as nanoseconds: numbers in s, ms, us or ns, from any start or from 1970, dates, clocks."""
+"""Converts apps' times to nanoseconds: numbers in s, ms, us or ns, from any start or from 1970, dates, clocks."""
 
 import re
 from datetime import UTC, datetime, timedelta
@@ -13,8 +13,8 @@ from .units import TIMES, unit
 
 Nanoseconds = NDArray[np.int64]
 
-NO_TIME = np.iinfo(np.int64).min  # of a cell that holds none
-REPEATED = NO_TIME + 1  # of a row that repeats a sample of an earlier one
+NO_TIME = np.iinfo(np.int64).min  # value for a cell without a time
+REPEATED = NO_TIME + 1  # value for a row that repeats the sample of an earlier row
 DATES = "date or clock"
 EPOCH_NS = 10**17  # 1973: a later time counts from 1970
 DAY_NS = 86400 * 10**9
@@ -26,8 +26,8 @@ _CLOCK = re.compile(r"^\s*(?:(\d+):)?(\d{1,2}):(\d{1,2}(?:\.\d+)?)\s*$")
 def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") -> Nanoseconds:
     """Times (n) in ns, NO_TIME for a cell that holds none.
 
-    unit_name: of numbers, "" to find it from their size and steps. Raises InputError where few cells are
-    times. where: what messages call them.
+    unit_name: unit of numbers, "" to find it by their size and steps. where: their name in messages. Raises InputError
+    where few cells are times.
     """
     numbers = numbers_of(cells)
     count = int(np.count_nonzero(filled(cells)))
@@ -46,7 +46,7 @@ def times_ns(cells: Cells, unit_name: str = "", where: str = "the recording") ->
 
 
 def _date_ns(text: str) -> int:
-    """A date as ISO 8601 has it, in UTC where it names no zone; a blank before the zone is usual."""
+    """Nanoseconds since 1970 of a date in ISO 8601, in UTC if it has no zone; there may be a blank before the zone."""
     try:
         date = datetime.fromisoformat(_BLANK.sub("", text.strip()).replace(" UTC", "+00:00"))
     except ValueError:

@@ -1,4 +1,4 @@
-"""Units as apps write them, by what they make of a log's own: g, deg/s, m/s, seconds, degrees."""
+"""The units of apps, with their factors to a log's own: g, deg/s, m/s, seconds, degrees."""
 
 import math
 import re
@@ -54,7 +54,7 @@ def unit(text: str) -> str:
 
 
 def factor(text: str, kinds: dict[str, float], where: str) -> float:
-    """What a value in a unit is multiplied by; a - before the unit turns the sign. Raises InputError for another unit.
+    """The factor on a value in a unit; a - before the unit changes the sign. Raises InputError for another unit.
 
     >>> factor("-m/s^2", {"g": 1.0, "m/s2": 0.102}, "ax")
     -0.102

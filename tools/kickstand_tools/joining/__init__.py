@@ -1,1 +1,1 @@
-"""A phone's or watch's track put to a ride: matched by how both turn, at an unknown offset of their clocks."""
+"""Joins a phone's or watch's track to a ride: matched by the yaw of both, at an unknown offset of their clocks."""

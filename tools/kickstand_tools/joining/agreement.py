@@ -1,7 +1,8 @@
-"""How the leans of two devices on one bike agree: the test of a lean meter that needs no truth.
+"""Compares the leans of two devices on one bike: the test of a lean meter that needs no truth.
 
-What both have in common, as the model of the bike, does not show in it; what each has of its own does: its sensor, its
-mount, its calibration. Of two equally good devices each errs by the difference over the square root of two.
+It does not show errors that both have in common, such as those of the bike's model. It shows those of each device
+alone: of its sensor, its mount, its calibration. Of two equally good devices each has the difference over the square
+root of two as its error.
 """
 
 from collections.abc import Iterator
@@ -26,17 +27,17 @@ from .motion import motion
 
 STEP_S = 0.02
 _RIDING_MPS = 3.0
-_GAP_S = 0.2  # between two samples: no lean is known there
-_LEAST_S = 20.0  # of riding that is compared
-_LEANED_DEG = 3.0  # rms: of less there is no delay and no slope
+_GAP_S = 0.2  # in a longer time between two samples the lean is not known
+_LEAST_S = 20.0  # least time of riding that is compared
+_LEANED_DEG = 3.0  # with a smaller rms of the lean neither delay nor slope is computed
 
 
 @dataclass
 class Difference:
-    """B's lean less A's, in degrees. constant_deg: its mean, of poses and mounts. moving_deg: rms of what is left, of
-    which 95 % are under p95_deg and all under worst_deg. slope: B's lean over A's. delay_s: by how much B's lean is
-    later. The last two are None where the ride leans too little. expected_deg: rms, by the standard deviations that
-    both have said; within_1, within_2: shares of the differences within one and two of these. Parts of seconds."""
+    """B's lean less A's, in degrees. constant_deg: its mean, by poses and mounts. moving_deg: rms of the difference
+    less that mean, of which 95 % are under p95_deg and all under worst_deg. slope: B's lean over A's. delay_s: delay of
+    B's lean. The last two are None where the ride leans too little. expected_deg: the rms that the standard deviations
+    of both predict; within_1, within_2: shares of the differences within one and two of these. Parts of seconds."""
 
     seconds: float
     rms_deg: float
@@ -64,7 +65,7 @@ class Agreement:
     notices: dict[str, list[Notice]] = field(default_factory=dict)
 
     def as_data(self) -> dict[str, Any]:
-        """For JSON: all but the leans."""
+        """All but the leans, for JSON."""
         live = None if self.live is None else asdict(self.live)
         return {"clocks": asdict(self.clocks), "live": live, "smoothed": asdict(self.smoothed)}
 
@@ -90,9 +91,9 @@ def compare_rides(
     """
     a, b = read_twice(a), read_twice(b)
     notices: dict[str, list[Notice]] = {"a": [], "b": []}
-    turned = [motion(one, progress, said) for one, said in zip((a, b), notices.values())]
+    motion_a, motion_b = (motion(one, progress, said) for one, said in zip((a, b), notices.values()))
     try:
-        found = clocks(*turned, calibration_a, calibration_b)
+        found = clocks(motion_a, motion_b, calibration_a, calibration_b)
     except InputError as error:
         raise InputError(f"{name_of(a)}, {name_of(b)}: {error}") from error
     rides = [smooth(one, calibration) for one, calibration in ((a, calibration_a), (b, calibration_b))]
@@ -110,12 +111,12 @@ def compare_rides(
     if difference is None:
         raise InputError(f"{name_of(a)}, {name_of(b)}: under {_LEAST_S:.0f} s of riding in common")
     names = ("live A", "live B", "smoothed A", "smoothed B")
-    leans = dict(zip(names, (lean for lean, _ in (*live, *smoothed))))
+    leans: dict[str, Array] = dict(zip(names, (lean for lean, _ in (*live, *smoothed))))
     return Agreement(found, _difference(*live), difference, t_s, leans, notices)
 
 
 def words(found: Agreement) -> Iterator[str]:
-    """Line by line."""
+    """Yield the result in words, line by line."""
     of = found.clocks
     side = "after" if of.later_s >= 0.0 else "before"
     yield (
@@ -158,7 +159,7 @@ def check_picture(path: Path) -> None:
 
 
 def draw(path: Path, found: Agreement) -> None:
-    """A PNG: the leans of both over time, and their difference."""
+    """Write a PNG with the leans of both over time, and their difference."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -180,7 +181,7 @@ def draw(path: Path, found: Agreement) -> None:
 
 
 def _interpolated(t_s: Array, values: Array, at_s: Array) -> Array:
-    """NaN outside, in gaps, and beside values that are NaN."""
+    """values at other times, interpolated; NaN outside, in gaps, and beside values that are NaN."""
     after = np.clip(np.searchsorted(t_s, at_s), 1, len(t_s) - 1)
     near = (at_s >= t_s[0]) & (at_s <= t_s[-1]) & (t_s[after] - t_s[after - 1] < _GAP_S)
     return np.where(near, np.interp(at_s, t_s, values), np.nan)
@@ -194,7 +195,7 @@ def _known(ride: SmoothedRide | Any, at_s: Array, riding: NDArray[np.bool_]) -> 
 
 
 def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | None:
-    """None where they have less than _LEAST_S in common."""
+    """The Difference of two leans with their standard deviations; None if they have under _LEAST_S in common."""
     both = ~np.isnan(a[0]) & ~np.isnan(b[0])
     if np.count_nonzero(both) * STEP_S < _LEAST_S:
         return None
@@ -219,8 +220,8 @@ def _difference(a: tuple[Array, Array], b: tuple[Array, Array]) -> Difference | 
 
 
 def _slope_and_delay(a: Array, b: Array, both: NDArray[np.bool_]) -> tuple[float | None, float | None]:
-    """Of B's lean against A's. Neither errs more than the other: the slope is that of the principal axis, and the delay
-    is fitted to the mean of both roll rates."""
+    """Slope and delay of B's lean against A's. Both are taken as equally exact: the slope is that of the principal
+    axis, and the delay is fitted to the mean of both roll rates."""
     one, other = a[both] - a[both].mean(), b[both] - b[both].mean()
     if _rms(one) < _LEANED_DEG or _rms(other) < _LEANED_DEG:
         return None, None

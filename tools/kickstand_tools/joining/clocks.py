@@ -1,7 +1,7 @@
-"""Two sensors on one bike, put on one clock: where the recording of one belongs in that of the other.
+"""Finds the shift and the drift between the clocks of two sensors on one bike.
 
-First every shift is tried on the size of the rates of rotation, which is the same however a sensor sits. Then shift and
-drift are fitted by least squares to the rates about A's axes; how B sits against A follows from the rates, too.
+First every shift is tried on the magnitude of the rates, which does not depend on the sensors' mounting. Then shift and
+drift are fitted by least squares to the rates about A's axes; the rotation of B against A follows from the rates, too.
 """
 
 from dataclasses import dataclass
@@ -17,24 +17,24 @@ from ..signals.lag import correlations, log_likelihood_ratio, peaks
 from ..signals.rotations import rotation_vector
 from .motion import STEP_S, Motion
 
-_SMOOTH = 5  # cells: of rates that are compared, so that their slopes are known
-_MOST_DPS = 60.0  # a jolt weighs no more
+_SMOOTH = 5  # cells over which rates are averaged, so that their derivatives are known
+_MOST_DPS = 60.0  # higher rates, by jolts, are cut to this
 _APART_S, _CANDIDATES = 3.0, 6
-_INDEPENDENT_S = 1.0  # rates of one moment and so much later have little in common
-_LEAST_S = 60.0  # of riding that both have
+_INDEPENDENT_S = 1.0  # rates that are further apart are taken as independent
+_LEAST_S = 60.0  # least time of riding that both have
 _LEAST_EVIDENCE, _LEAST_LEAD = 15.0, 6.0  # as in match.py
-_LEAST_CORRELATION = 0.8  # two on one bike have over 0.9
+_LEAST_CORRELATION = 0.8  # least correlation of the rates: two sensors on one bike have over 0.9
 _MOST_DRIFT, _USUAL_DRIFT = 400e-6, 100e-6  # as in match.py and in fit.py
-_MOST_APART_DEG = 15.0  # of two calibrations: each is good to a few degrees
+_MOST_APART_DEG = 15.0  # largest contradiction by the calibrations: each is good to a few degrees
 _ROUNDS = 8
-_DRIFTING_S = 60.0  # a shorter ride shows no drift
+_DRIFTING_S = 60.0  # in a shorter ride no drift is fitted
 
 
 @dataclass
 class Clocks:
-    """later_s: by how much later B's first sample is than A's. drift: by how many seconds a second B's clock loses.
-    correlation: of the rates of rotation. common_s: how long both last together. apart_deg: by how much both
-    calibrations contradict what the rates say of how B sits against A."""
+    """later_s: time of B's first sample less that of A's. drift: seconds per second that B's clock loses. correlation:
+    that of the rates. common_s: time that is in both. apart_deg: angle between the rotation of B against A by both
+    calibrations and that by the rates."""
 
     later_s: float
     drift: float
@@ -48,8 +48,8 @@ class Clocks:
 
 
 def clocks(a: Motion, b: Motion, axes_a: CalibrationFile, axes_b: CalibrationFile) -> Clocks:
-    """Raises InputError where they are not of one ride, or where that cannot be shown. The names of both stand before
-    what it says."""
+    """The Clocks of two rides. Raises InputError where they are not of one ride, or where that cannot be shown; callers
+    put the names of both in front."""
     size = [_size(one) for one in (a, b)]
     found, count = correlations(size[0], a.there, size[1], b.there)
     found = np.where(count * STEP_S >= _LEAST_S, found, 0.0)
@@ -59,7 +59,8 @@ def clocks(a: Motion, b: Motion, axes_a: CalibrationFile, axes_b: CalibrationFil
     for place in places:
         shift_s = (place - (len(b.there) - 1)) * STEP_S
         alike = _alike(a, b, _along(a, np.eye(3)), _along(b, _rotation(a, b, shift_s)), shift_s)
-        tried.append((float(log_likelihood_ratio(alike, count[place], STEP_S / _INDEPENDENT_S)), alike, shift_s))
+        ratio = log_likelihood_ratio(np.array(alike), count[place], STEP_S / _INDEPENDENT_S)
+        tried.append((float(ratio), alike, shift_s))
     tried.sort(reverse=True)
     if not tried or tried[0][0] < _LEAST_EVIDENCE or tried[0][1] < _LEAST_CORRELATION:
         raise InputError("nowhere do they turn alike for a minute: are they of one ride, and both on the bike?")
@@ -81,7 +82,7 @@ def clocks(a: Motion, b: Motion, axes_a: CalibrationFile, axes_b: CalibrationFil
 
 
 def _size(motion: Motion) -> Array:
-    """(n) of the rates, deg/s, without its mean."""
+    """(n) the magnitude of the rates, deg/s, less its mean."""
     size = moving_mean(np.minimum(np.linalg.norm(motion.rate_dps, axis=1), _MOST_DPS), _SMOOTH)
     return size - np.mean(size[motion.there])
 
@@ -100,7 +101,7 @@ def _rotation(a: Motion, b: Motion, later_s: float) -> Array:
 
 
 def _fitted(a: Motion, b: Motion, of_a: Array, of_b: Array, later_s: float) -> Clocks:
-    """Gauss-Newton steps from a rough shift."""
+    """The Clocks by Gauss-Newton steps from a rough shift."""
     at_s, drift = a.t_s, 0.0
     slope = np.gradient(of_b, STEP_S, axis=0)
     error = np.zeros(0)

@@ -1,15 +1,15 @@
-"""What a ride's sensor says about the steps of a track, for any shift between their clocks."""
+"""A ride's yaw and forces over the steps of a track, for any shift between their clocks."""
 
 import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
 from ..logs.table import Array
 from ..signals.averages import moving_mean
-from .course import Course
 from .motion import STEP_S, Motion
 from .segments import Segments, without_trend
+from .track import Course
 
-_MOST_SINE = 0.87  # of a lean; over 60 degrees the speed or the rate is wrong
+_MOST_SINE = 0.87  # largest sine of the lean; over 60 degrees the speed or the rate is wrong
 
 
 class Comparison:
@@ -30,12 +30,12 @@ class Comparison:
         self._edges_s = np.arange(len(motion.there) + 1) * STEP_S
 
     def turned(self, shift_s: float, drift: float = 0.0, axes: int = 3) -> Array:
-        """(axes, p, STEPS): by how much the ride has turned about its up and two axes across it, in degrees, as
-        Segments.turned_deg. drift: by how many seconds a second the ride's clock loses against the track's."""
+        """(axes, p, STEPS): the ride's rotation about its up and two axes across it, degrees, comparable with
+        Segments.turned_deg. drift: seconds per second that the ride's clock loses against the track's."""
         return self._means(range(axes), shift_s, drift, self.given.course_weight)
 
     def sped_up(self, shift_s: float, drift: float = 0.0) -> Array:
-        """(3, p, STEPS): the integral of the force along the sensor's axes in m/s, as Segments.speed_mps."""
+        """(3, p, STEPS): the integral of the force along the sensor's axes, m/s, comparable with Segments.speed_mps."""
         return self._means(range(3, 6), shift_s, drift, self.given.speed_weight)
 
     def _means(self, columns: range, shift_s: float, drift: float, weight: Array) -> Array:
@@ -51,11 +51,11 @@ class Comparison:
 
 
 def _double_sums(motion: Motion, course: Course, shift_s: float) -> Array:
-    """(n + 1, 6): integrals over time of what the ride has turned (degrees; up and two axes across it) and of the
-    integrated force (m/s; the sensor's axes): their differences are means between two times.
+    """(n + 1, 6): integrals over time of the rotation (degrees; about up and two axes across it) and of the integrated
+    force (m/s; the sensor's axes): their differences are means between two times.
 
-    The rate about up is the yaw rate times the cosine of the lean. The track's speed shows the lean, because a bike
-    leans as its turn demands.
+    The rate about up is the yaw rate times the cosine of the lean, and the lean follows from the track's speed and the
+    yaw rate, by balance.
     """
     up = motion.up
     across = np.asarray(np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))]), dtype=float)
@@ -68,7 +68,7 @@ def _double_sums(motion: Motion, course: Course, shift_s: float) -> Array:
     cosine = np.asarray(np.sqrt(1.0 - sine * sine), dtype=float)
     turned = _sums(rates / cosine[:, None])
     sped_up = _sums(motion.force_g * STANDARD_GRAVITY)
-    sped_up -= np.linspace(0.0, 1.0, len(sped_up))[:, None] * sped_up[-1]  # of gravity: it would cost digits
+    sped_up -= np.linspace(0.0, 1.0, len(sped_up))[:, None] * sped_up[-1]  # without gravity, which would cost digits
     once = np.hstack((turned, sped_up))
     return _sums((once[1:] + once[:-1]) / 2.0)
 

@@ -1,7 +1,7 @@
-"""The shift between the clocks of a ride and a track, found to hundredths of a second, and how sure it is.
+"""The shift between the clocks of a ride and a track, found to hundredths of a second, with its standard deviation.
 
-First the shifts around a rough one are tried. Then all that is unknown is fitted at once by least squares: shift,
-drift, a tilt of the ride's up and the sensor's forward axis.
+First the shifts around a rough one are tried. Then all unknowns are fitted by least squares: shift, drift, a tilt of
+the ride's up and the sensor's forward axis.
 """
 
 from dataclasses import dataclass
@@ -10,33 +10,33 @@ import numpy as np
 
 from ..logs.table import Array
 from .compare import Comparison
-from .course import Course
 from .motion import Motion
 from .segments import Segments
+from .track import Course
 
-AROUND_S = 6.0  # how far from the rough shift the right one may be, with the drift at the ends of the ride
-_TRIED_S = 0.1  # apart
+AROUND_S = 6.0  # largest distance of the shift from the rough one, with the drift at the ends of the ride
+_TRIED_S = 0.1  # distance of the shifts that are tried
 _SHIFTS = np.arange(-AROUND_S, AROUND_S + _TRIED_S / 2.0, _TRIED_S)
 _DRIFTS = np.arange(-300e-6, 301e-6, 20e-6)
-_USUAL_DRIFT = 100e-6  # 1 sigma: two crystals, one of them hot
-_USUAL_TILT = 0.05  # 1 sigma, rad: of up by an accelerometer's offset
+_USUAL_DRIFT = 100e-6  # prior of the drift, 1 sigma: two crystals, one of them hot
+_USUAL_TILT = 0.05  # prior of the tilt of up by an accelerometer's offset, 1 sigma, rad
 _PRIOR = 1.0 / np.array([np.inf, _USUAL_DRIFT, _USUAL_TILT, _USUAL_TILT, np.inf, np.inf, np.inf]) ** 2
-_SAME_TRACK_S = 0.05  # 1 sigma, of what a receiver smooths more in bends than on straights
-_FREEDOM = 4.0  # degrees of freedom of Student's distribution, by which errors over two sigma count less
-_LEAST_ERROR = 0.5  # of its weight's: a better receiver does not make the gyro's scale factor and the lean exact
-_LEAST_COST = 0.5 * (_FREEDOM + 1.0) * np.log1p(_LEAST_ERROR**2 / _FREEDOM)  # of a step
+_SAME_TRACK_S = 0.05  # 1 sigma of the shift, because receivers smooth more in bends than on straights
+_FREEDOM = 4.0  # degrees of freedom of Student's distribution, which down-weights errors over two sigma
+_LEAST_ERROR = 0.5  # least error over its sigma: a better receiver does not make the gyro's scale factor exact
+_LEAST_COST = 0.5 * (_FREEDOM + 1.0) * np.log1p(_LEAST_ERROR**2 / _FREEDOM)  # least cost of a step
 _ROUNDS = 8
-_FEWEST = 2  # segments to compare
-_STEPS_ALIKE = 4.0  # neighbouring steps whose errors are alike, because courses are smooth
+_FEWEST = 2  # least number of segments to compare
+_STEPS_ALIKE = 4.0  # number of neighbouring steps with the same error, because courses are smooth
 
 
 @dataclass
 class Fit:
-    """shift_s: the track's time at the ride's first sample, s since the track's first point. drift: by how many seconds
-    a second the ride's clock loses. sigma_s: standard deviation of where a point of the track lies in the ride, at the
-    end of the ride where it is larger. correlation: of the courses' changes. evidence: natural logarithm of how much
-    likelier the courses are with the ride's turns than without. tilt (2): of the ride's up, rad. segments: how many
-    were compared."""
+    """shift_s: the track's time at the ride's first sample, s since the track's first point. drift: seconds per second
+    that the ride's clock loses. sigma_s: standard deviation of the time in the ride of a point of the track, at the end
+    of the ride where it is larger. correlation: that of the courses' changes. evidence: natural logarithm of the
+    likelihood ratio of the courses, with the ride's yaw over without. tilt (2): tilt of the ride's up, rad. segments:
+    number of segments that were compared."""
 
     shift_s: float
     drift: float
@@ -58,8 +58,7 @@ def fitted(motion: Motion, course: Course, segments: Segments, rough_s: float) -
 
 
 def apart(motion: Motion, course: Course, segments: Segments, fit: Fit) -> float:
-    """By how much better the segments fit if each has a shift of its own, in units of an error's cost and for each
-    segment.
+    """The reduction of the cost per segment if each has a shift of its own, in units of an error's cost.
 
     Under 2 where the track belongs to the ride. The same road at other times of the day is over 4.
     """
@@ -102,8 +101,8 @@ def _tried(compared: Comparison, rough_s: float) -> _Tried:
 
 
 def _costs(compared: Comparison, shift_s: float, drift: float, along: Array) -> Array:
-    """(shifts, p) the cost of each segment at each of _SHIFTS around a shift. along: what of the ride's turns
-    counts."""
+    """(shifts, p) the cost of each segment at each of _SHIFTS around a shift. along: coefficients of the ride's
+    rotations about the three axes."""
     given = compared.given
     return np.array(
         [
@@ -114,17 +113,17 @@ def _costs(compared: Comparison, shift_s: float, drift: float, along: Array) -> 
 
 
 def _cost(given: Segments, error_deg: Array) -> Array:
-    """(p) minus the log-likelihood of the errors (p, STEPS) of each segment are, by Student's distribution."""
+    """(p) minus the log-likelihood of the errors (p, STEPS) of each segment, by Student's distribution."""
     square = error_deg * error_deg * given.course_weight
     return 0.5 * (_FREEDOM + 1.0) * np.log1p(square / _FREEDOM).sum(axis=1)
 
 
 @dataclass
 class _Step:
-    """What is known at one state of the seven unknowns: shift, drift, tilt (2), the sensor's forward axis (3).
+    """The linearisation at one state of the seven unknowns: shift, drift, tilt (2), the sensor's forward axis (3).
 
-    model_deg (p, STEPS): the turned courses. pulls (p, 7): to where each segment pulls the unknowns. inverse (7, 7): of
-    the curvature.
+    model_deg (p, STEPS): the predicted courses. pulls (p, 7): the gradient of each segment's cost. inverse (7, 7): the
+    inverse of the normal matrix.
     """
 
     model_deg: Array
@@ -133,7 +132,7 @@ class _Step:
 
 
 def _polished(compared: Comparison, tried: _Tried) -> Fit:
-    """Gauss-Newton steps, in each of which an error counts by how usual it is."""
+    """The best fit by Gauss-Newton steps, in each of which outliers are down-weighted."""
     given = compared.given
     forward = _least(compared.sped_up(tried.shift_s, tried.drift), given.speed_mps, given.speed_weight)
     now = np.array([tried.shift_s, tried.drift, 0.0, 0.0, *forward])
@@ -170,8 +169,8 @@ def _step(compared: Comparison, now: Array) -> _Step:
 
 
 def _judged(compared: Comparison, evidence: float, now: Array, step: _Step) -> Fit:
-    """The errors within a segment may belong together: the variance comes from how much the segments pull at the
-    solution, each on its own."""
+    """The Fit with its standard deviation. Errors within a segment may be correlated, so the variance comes from the
+    scatter of the segments' gradients at the solution."""
     given, count, drift = compared.given, len(step.pulls), float(now[1])
     spread = step.pulls.T @ step.pulls * count / max(count - 2, 1) + np.diag(_PRIOR)
     covariance = (step.inverse @ spread @ step.inverse)[:2, :2]
@@ -191,14 +190,14 @@ def _judged(compared: Comparison, evidence: float, now: Array, step: _Step) -> F
 
 
 def _least(columns: Array, values: Array, weight: Array) -> Array:
-    """(k) the combination of columns (k, p, STEPS) that is nearest to values."""
+    """(k) the coefficients of columns (k, p, STEPS) that fit values best, by weighted least squares."""
     root = np.sqrt(weight)
     found = np.linalg.lstsq((columns * root).reshape(len(columns), -1).T, (values * root).ravel(), rcond=None)[0]
     return np.asarray(found, dtype=float)
 
 
 def _counts(error: Array, weight: Array) -> Array:
-    """(p, STEPS) the weight of each error: by its own variance, and less the more unusual it is."""
+    """(p, STEPS) the weight of each error: by its variance, reduced for outliers."""
     scaled = error * np.sqrt(weight)
     usual = max(float(np.median(np.abs(scaled[weight > 0.0]))) / 0.6745, _LEAST_ERROR)
     return weight / usual**2 * (1.0 + 1.0 / _FREEDOM) / (1.0 + (scaled / usual) ** 2 / _FREEDOM)

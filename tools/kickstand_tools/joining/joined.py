@@ -1,7 +1,7 @@
-"""A ride with the positions of a track: matched, and written as a log."""
+"""Joins a track's positions to a ride, and writes the result as a log."""
 
 import csv
-import gzip
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,7 +17,7 @@ from ..logs.log import Log
 from ..logs.reader import Source, read_blocks, read_twice
 from ..logs.source import Progress, name_of
 from ..logs.table import Array
-from ..output import write_whole
+from ..output import write_packed
 from .match import Match, match
 from .motion import motion
 from .track import Track
@@ -30,7 +30,7 @@ _FORMAT = {SPEED: "%.3f", "lat_deg": "%.7f", "lon_deg": "%.7f", "utc_s": "%.3f"}
 
 @dataclass
 class Joined:
-    """A ride, the track that belongs to it, and where. own_speed: the log has a speed, which stays."""
+    """A ride, the track that belongs to it, and their Match. own_speed: the log has a speed, which stays."""
 
     ride: Source
     track: Track
@@ -47,7 +47,7 @@ class Joined:
 
 
 def join_track(ride: Source, track: Path | str | Track, progress: Progress | None = None) -> Joined:
-    """Find where a phone's or watch's track belongs in a ride, by how both turn and speed up.
+    """Find the place of a phone's or watch's track in a ride, by the yaw and the acceleration of both.
 
     ride: see read_log; it needs neither a calibration nor a speed. track: a .gpx or .fit file. Their clocks may differ
     by any time and drift. progress: called with how much of the ride has been read. Raises InputError where the track
@@ -101,31 +101,29 @@ def write_joined(out: Path | str, joined: Joined, progress: Progress | None = No
         return len(points)
     count = 0
 
-    def write(temporary: Path) -> None:
+    def lines() -> Iterator[bytes]:
         nonlocal count
-        opened = gzip.open if out.suffix == ".gz" else open
-        with opened(temporary, "wt", encoding="utf-8", newline="") as file:
-            first = True
-            for block in read_blocks(joined.ride, 2, progress):
+        kept: list[str] = []
+        for block in read_blocks(joined.ride, 2, progress):
+            if not kept:
                 kept = [name for name in block.names if name not in columns]
-                if first:
-                    file.write(",".join([*kept, *columns]) + "\n")
-                    first = False
-                rows, points = _nearest(block.time_us, at_us)
-                ends = ["," * len(columns)] * len(block.lines)
-                for row, values in zip(rows.tolist(), zip(*(column[points].tolist() for column in columns.values()))):
-                    cells = [_FORMAT[name] % value for name, value in zip(columns, values)]
-                    ends[row] = "," + ",".join(cells).replace("nan", "")
-                count += len(points)
-                lines = block.lines if len(kept) == len(block.names) else _only(block, kept)
-                file.write("".join([f"{line}{end}\n" for line, end in zip(lines, ends)]))
+                yield (",".join([*kept, *columns]) + "\n").encode()
+            rows, points = _nearest(block.time_us, at_us)
+            ends = ["," * len(columns)] * len(block.lines)
+            for row, values in zip(rows.tolist(), zip(*(column[points].tolist() for column in columns.values()))):
+                cells = [_FORMAT[name] % value for name, value in zip(columns, values)]
+                ends[row] = "," + ",".join(cells).replace("nan", "")
+            count += len(points)
+            own = block.lines if len(kept) == len(block.names) else _only(block, kept)
+            yield "".join([f"{line}{end}\n" for line, end in zip(own, ends)]).encode()
 
-    write_whole(out, write)
+    write_packed(out, lines())
     return count
 
 
 def _nearest(time_us: Integers, at_us: Integers) -> tuple[Integers, Integers]:
-    """Rows, and which points belong into them: those within the rows' time and not in a gap of the log."""
+    """Rows, and the indices of the points that belong to them: points within the rows' time and not in a gap of the
+    log."""
     points = np.flatnonzero((at_us >= time_us[0]) & (at_us <= time_us[-1]))
     after = np.clip(np.searchsorted(time_us, at_us[points]), 1, max(len(time_us) - 1, 1))
     if len(time_us) < 2:

@@ -1,4 +1,4 @@
-"""Where a track belongs in a ride, if it does: the best of all shifts, or why none will do."""
+"""Finds the place of a track in a ride: the best of all shifts, or the reason for which none fits."""
 
 from dataclasses import dataclass
 
@@ -11,34 +11,33 @@ from ..logs.table import Array
 from ..refusals import OPPOSITE_SIGN
 from ..signals.averages import moving_mean
 from ..signals.lag import correlations, log_likelihood_ratio, peaks
-from .course import Course, course
 from .fit import AROUND_S, Fit, apart, fitted
 from .motion import STEP_S, Motion
 from .segments import STEPS, segments
-from .track import LONGEST_S, SLOWEST_MPS, Track
+from .track import LONGEST_S, SLOWEST_MPS, Course, Track, course
 
 _GRID_S = 0.5
-_SPAN_S = 4.0  # over which a change of course is compared first
-_APART_S = 10.0  # between two rough shifts
+_SPAN_S = 4.0  # rough shifts are found by changes of course over this time
+_APART_S = 10.0  # least distance of two rough shifts
 _CANDIDATES = 5
-_WORTH = 0.1  # of the likeliest one's evidence, for a rough shift to be tried
-_LEAST_S = 60.0  # of riding that both have
-_LEAST_TURN_DEG = 360.0  # in all
-_LEAST_EVIDENCE = 15.0  # other rides' tracks reach 9
-_LEAST_LEAD = 6.0  # of the best shift's evidence before another one's
+_WORTH = 0.1  # a rough shift is tried if its evidence is at least this share of the likeliest one's
+_LEAST_S = 60.0  # least time of riding that both have
+_LEAST_TURN_DEG = 360.0  # least sum of the changes of course
+_LEAST_EVIDENCE = 15.0  # least evidence of a match; other rides' tracks reach 9
+_LEAST_LEAD = 6.0  # least difference of the best shift's evidence from another one's
 _MOST_APART = 3.0
-_MOST_DRIFT = 400e-6  # of a crystal in the heat of an engine it is 100e-6
-_ALIKE = 0.9  # a higher correlation is no chance, but may be one bend like another
+_MOST_DRIFT = 400e-6  # largest drift; that of a crystal in the heat of an engine is 100e-6
+_ALIKE = 0.9  # a higher correlation is no chance, but may be of another, similar bend
 _LEAST_CORRELATION = 0.6
 _MOST_SIGMA_S = 0.3
 
 
 @dataclass
 class Match:
-    """start_utc_s: the track's time at the ride's first sample, s since 1970, from which positions are where the bike
-    was: what the receiver is late by is in it. drift: by how many seconds a second the ride's clock loses. sigma_s:
-    standard deviation of the match. correlation: of the changes of course, 0 to 1. common_s: how long the track and the
-    ride last together."""
+    """start_utc_s: the track's time at the ride's first sample, s since 1970, receiver's delay included: with it
+    positions are at the bike's place. drift: seconds per second that the ride's clock loses. sigma_s: standard
+    deviation of the match. correlation: that of the changes of course, 0 to 1. common_s: time that is in both, track
+    and ride."""
 
     start_utc_s: float
     drift: float
@@ -52,8 +51,8 @@ class Match:
 
 
 def match(motion: Motion, track: Track) -> Match:
-    """Raises InputError where the track does not belong to the ride, or where that cannot be shown. The names of both
-    stand before what it says."""
+    """The Match of a track with a ride. Raises InputError where the track does not belong to the ride, or where that
+    cannot be shown; callers put the names of both in front."""
     track = track.once_a_second()
     steps = course(track)
     parts = segments(steps)
@@ -113,7 +112,7 @@ def _check_turns(motion: Motion, steps: Course) -> None:
 
 
 def _rough_shifts(motion: Motion, steps: Course) -> tuple[bool, list[float]]:
-    """Would the ride fit better if it turned the other way? The shifts that fit best."""
+    """True if the ride would fit better with the opposite sign of yaw; and the shifts that fit best."""
     of_track, track_good = _changes_of_track(steps)
     of_ride, ride_good = _changes_of_ride(motion)
     found, count = correlations(of_track, track_good, of_ride, ride_good)
@@ -126,8 +125,8 @@ def _rough_shifts(motion: Motion, steps: Course) -> tuple[bool, list[float]]:
 
 
 def _changes_of_track(steps: Course) -> tuple[Array, NDArray[np.bool_]]:
-    """Every _GRID_S by how much the course changes within _SPAN_S, in degrees as a leaning bike's gyro sees it; and
-    whether that is known."""
+    """Every _GRID_S the change of course within _SPAN_S, degrees, as the gyro of a leaning bike measures it; and True
+    where it is known."""
     middle_s, at_s = (steps.begin_s + steps.end_s) / 2.0, np.arange(0.0, steps.end_s[-1], _GRID_S)
     half = _SPAN_S / 2.0
     heading = np.cumsum(steps.turn_deg)
@@ -140,7 +139,7 @@ def _changes_of_track(steps: Course) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def _changes_of_ride(motion: Motion) -> tuple[Array, NDArray[np.bool_]]:
-    """The same of the ride's sensor."""
+    """Likewise the ride's rotation about its up within _SPAN_S, degrees, and True where it is known."""
     at_s, half = np.arange(0.0, motion.seconds, _GRID_S), _SPAN_S / 2.0
     edges_s = np.arange(len(motion.there) + 1) * STEP_S
     turned = np.append(0.0, np.cumsum(motion.rate_dps @ motion.up)) * STEP_S

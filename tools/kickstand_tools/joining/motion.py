@@ -1,7 +1,7 @@
-"""How a ride turned, by its sensor alone: no calibration is needed, and the sensor may sit at any angle.
+"""The yaw of a ride by its sensor alone: no calibration is needed, and the sensor may sit at any angle.
 
-Up is where the force points on average while the bike turns: a motorcycle leans so that the force stays along its own
-up. The rate about it is the yaw rate times the cosine of the lean.
+Up is the mean direction of the force in bends: a motorcycle leans so that the force stays along its own up. The rate
+about it is the yaw rate times the cosine of the lean.
 """
 
 from dataclasses import dataclass
@@ -17,16 +17,16 @@ from ..logs.table import Array
 from ..signals.cells import Cells
 
 STEP_S = 0.05
-_MOST_DPS = 20.0  # a cell that turns faster weighs no more for the direction of up
-_LONGEST_S = 100 * 3600.0  # what fits into memory
+_MOST_DPS = 20.0  # cells with higher rates have no more weight in the direction of up
+_LONGEST_S = 100 * 3600.0  # longest ride, limited by memory
 
 
 @dataclass
 class Motion:
     """A ride in n cells of STEP_S from its first sample.
 
-    force_g, rate_dps (n, 3): means in the sensor's axes, the gyro's bias taken off. there (n): False where the log has
-    no sample, or readings that froze; force and rate are 0 there. speed, positions: does the log have any?
+    force_g, rate_dps (n, 3): means in the sensor's axes, rates less the gyro's bias. there (n): False where the log has
+    no sample, or frozen readings; force and rate are 0 there. speed, positions: True if the log has any.
     """
 
     force_g: Array
@@ -42,19 +42,19 @@ class Motion:
 
     @property
     def seconds(self) -> float:
-        """How long the ride lasts."""
+        """Duration of the ride."""
         return len(self.there) * STEP_S
 
     @property
     def up(self) -> Array:
-        """(3) the bike's up in the sensor's axes, to some degrees, as the accelerometer's offset has it."""
+        """(3) the bike's up in the sensor's axes, to some degrees, because the accelerometer's bias is in it."""
         turning = np.minimum(np.linalg.norm(self.rate_dps, axis=1), _MOST_DPS)
         up: Array = turning @ self.force_g
         return up / max(float(np.linalg.norm(up)), 1e-9)
 
 
 def motion(ride: Source, progress: Progress | None = None, notices: list[Notice] | None = None) -> Motion:
-    """Of a log (see read_log). progress, notices: of read_blocks(). Raises InputError."""
+    """The Motion of a log (see read_log). progress, notices: see read_blocks(). Raises InputError."""
     table, speed, positions = Cells(STEP_S), False, False
     for block in read_blocks(ride, 2, progress, notices):
         speed |= bool(np.any(np.isfinite(block.speed_mps)))

@@ -1,7 +1,7 @@
 """A track's course and speed in segments of half a minute, which are compared with a ride's one by one.
 
-Within a segment only changes count: its mean and its trend are taken off. What is left of a gyro's bias, the direction
-in which the ride began and the hills do not matter then.
+Within a segment only changes count: its mean and its trend are subtracted. This removes the gyro's residual bias, the
+direction in which the ride began, and hills.
 """
 
 from dataclasses import dataclass
@@ -9,19 +9,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..logs.table import Array, Table
-from .course import Course
+from .track import Course
 
-STEPS = 30  # of a segment at most
-_FEWEST = 8  # a segment of fewer steps shows little
+STEPS = 30  # most steps of a segment
+_FEWEST = 8  # least number of steps of a segment
 
 
 @dataclass
 class Segments(Table):
     """p segments of up to STEPS good steps in a row, all (p, STEPS); weights are 0 where a segment is shorter.
 
-    begin_s, end_s: of each step, s since the track's first point. turned_deg: by how much the course of each step is to
-    the left of the segment's first one. course_weight: 1/deg2. speed_mps; speed_weight: 1 or 0. The first and the last
-    of these have no mean and no trend.
+    begin_s, end_s: times of each step, s since the track's first point. turned_deg: course of each step less that of
+    the segment's first one, > 0 to the left. course_weight: 1/deg2. speed_mps; speed_weight: 1 or 0. Mean and trend of
+    turned_deg and speed_mps are subtracted.
     """
 
     begin_s: Array
@@ -33,12 +33,12 @@ class Segments(Table):
 
     @property
     def middle_s(self) -> Array:
-        """(p, STEPS) of each step."""
+        """(p, STEPS) time of the middle of each step."""
         return (self.begin_s + self.end_s) / 2.0
 
 
 def segments(course: Course) -> Segments:
-    """All of a course."""
+    """The segments of a course."""
     edges = np.diff(course.good.astype(int), prepend=0, append=0)
     rows = [
         np.arange(start, min(start + STEPS, end))

@@ -1,8 +1,9 @@
-"""The track of a phone or a watch: where it was, and when."""
+"""The track of a phone or a watch: where it was, and when. Its course: the direction of each step, as far as known."""
 
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..logs.table import Array, Table
 from ..signals.geography import distance_m
@@ -10,8 +11,10 @@ from ..signals.geography import distance_m
 LONGEST_S = 6.0  # between two points of one course: watches write one so rarely on straights
 SLOWEST_MPS = 2.5  # of a step that is more than the positions' errors
 FASTEST_MPS = 100.0  # a quicker step is a jump of the receiver
+STEP_ERROR_M = 1.0  # 1 sigma of a step across its direction: phones' receivers err so from one second to the next
+COURSE_ERROR_DEG = 4.0  # 1 sigma of other errors: the gyro's scale factor, and how positions are smoothed
 _OFTEN_S = 0.7
-_AROUND = 2  # points before and after, from which a speed is taken
+_AROUND = 2  # number of points before and after from which a speed is computed
 
 
 @dataclass(eq=False)
@@ -29,8 +32,8 @@ class Track(Table):
     name: str
 
     def speeds_mps(self) -> Array:
-        """(n) those of the file. Where it has none: by how far the points around are apart, as far as that is more than
-        their errors."""
+        """(n) the file's speeds; if it has none, the mean speed over the points around, NaN where that is within the
+        positions' errors, is a jump's, or is over a gap."""
         if np.any(np.isfinite(self.speed_mps)):
             return self.speed_mps
         speed = np.full(len(self.utc_s), np.nan)
@@ -44,12 +47,45 @@ class Track(Table):
         return speed
 
     def once_a_second(self) -> "Track":
-        """A point a second of a track that has more: closer ones show less of the course than they err."""
+        """The track with at most one point a second: between closer points the error is larger than the change of the
+        course."""
         if len(self.utc_s) < 2 or np.median(np.diff(self.utc_s)) > _OFTEN_S:
             return self
         first = np.unique(np.floor(self.utc_s - self.utc_s[0]), return_index=True)[1]
         return Track(*(values[first] for values in self.columns().values()), name=self.name)
 
     def steps_m(self) -> tuple[Array, Array]:
-        """(n - 1) each: how far east and north every point is of the one before."""
+        """(n - 1) metres east and (n - 1) metres north of each point from the one before."""
         return distance_m(self.lat_deg[:-1], self.lon_deg[:-1], self.lat_deg[1:], self.lon_deg[1:])
+
+
+@dataclass
+class Course:
+    """m steps between the m + 1 points of a track.
+
+    begin_s, end_s (m): times of each step, s since the track's first point. sigma_deg (m): standard deviation of the
+    course of a good step. speed_mps (m): its length over its duration. good (m): True if it is neither too slow,
+    nor a gap or a jump. turn_deg (m): change of the course against the step before, > 0 to the left; 0 unless both are
+    good.
+    """
+
+    begin_s: Array
+    end_s: Array
+    sigma_deg: Array
+    speed_mps: Array
+    good: NDArray[np.bool_]
+    turn_deg: Array
+
+
+def course(track: Track) -> Course:
+    """The Course of a track of at least two points."""
+    since_s = track.utc_s - track.utc_s[0]
+    east, north = track.steps_m()
+    step_s, length_m = np.diff(since_s), np.hypot(east, north)
+    speed = length_m / step_s
+    good = (speed > SLOWEST_MPS) & (speed < FASTEST_MPS) & (step_s <= LONGEST_S)
+    direction = np.degrees(np.arctan2(north, east))
+    turn = (np.diff(direction, prepend=direction[:1]) + 180.0) % 360.0 - 180.0
+    both = good & np.append(False, good[:-1])
+    sigma = np.hypot(np.degrees(STEP_ERROR_M / np.maximum(length_m, 0.1)), COURSE_ERROR_DEG)
+    return Course(since_s[:-1], since_s[1:], sigma, speed, good, np.where(both, turn, 0.0))

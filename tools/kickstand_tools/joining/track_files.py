@@ -1,4 +1,4 @@
-"""Tracks as phones and watches write them: GPX and FIT."""
+"""Reads tracks of phones and watches: GPX and FIT."""
 
 import warnings
 from collections.abc import Callable, Iterator
@@ -12,9 +12,9 @@ from ..errors import InputError, cause, extra
 from ..logs.source import Progress, open_input
 from .track import FASTEST_MPS, Track
 
-_DEGREES = 180.0 / 2**31  # of a FIT file's semicircle
-_FEWEST = 30  # points of a track
-_MOST_BYTES = 50_000_000  # a day at a fix a second has 20 million; as a document it takes ten times the memory
+_DEGREES = 180.0 / 2**31  # degrees of one unit ("semicircle") in a FIT file
+_FEWEST = 30  # least number of points of a track
+_MOST_BYTES = 50_000_000  # largest file: a day at a fix a second has 20 million; parsed it takes ten times the memory
 
 Point = tuple[float, float, float, float]  # s since 1970, latitude and longitude in degrees, m/s or NaN
 
@@ -85,7 +85,7 @@ def _gpx(path: Path, progress: Progress | None) -> Iterator[Point]:
 
 
 def _gpx_speed(point: Any) -> float:
-    """GPX 1.0 has an element for the speed; in GPX 1.1 it is an extension, of Garmin's name or of another, in m/s."""
+    """The speed of a point, m/s. GPX 1.0 has an element for it; in GPX 1.1 it is an extension, Garmin's or another."""
     if point.speed is not None:
         return float(point.speed)
     for extension in point.extensions:
@@ -121,7 +121,7 @@ def _fit(path: Path, progress: Progress | None) -> Iterator[Point]:
 
 
 def _words(error: Exception) -> str:
-    """The beginning of what a library says, which may quote all of a file."""
+    """The beginning of a library's message, which may quote a whole file."""
     return ascii(" ".join(str(error).split())[:60])[1:-1] or type(error).__name__
 
 
@@ -129,7 +129,7 @@ _FIT_FIELDS = ("timestamp", "position_lat", "position_long", "speed", "enhanced_
 
 
 def _utc_s(time: datetime) -> float:
-    """A time without a zone is UTC, as the formats have it."""
+    """Seconds since 1970. A time without a zone is UTC, as in both formats."""
     return (time if time.tzinfo else time.replace(tzinfo=UTC)).timestamp()
 
 

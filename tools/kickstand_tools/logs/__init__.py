@@ -1,1 +1,1 @@
-"""Recorded logs: what may stand in a CSV, how it is read, and whether its units are the right ones."""
+"""Recorded logs: the values that a CSV may have, reading, writing and cutting, uneven times and frozen readings."""

@@ -1,4 +1,4 @@
-"""Some rows of a log, one after the other."""
+"""Some successive rows of a log."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
@@ -16,7 +16,7 @@ _ROWS = ("time_us", "readings", *TRACK, "frozen")  # the arrays of n
 
 @dataclass
 class Block:
-    """Some rows of a log, one after the other, as the firmware's modules take them.
+    """Some successive rows of a log, in the units of the firmware's modules.
 
     time_us (n): since the log's first sample. readings (n, 7): acceleration (3, g), temperature (C), rate (3, deg/s),
     the chip's order. speed_mps, lat_deg, lon_deg, utc_s (n): as in a Log. What the log does not have is NaN. start_s:
@@ -28,12 +28,11 @@ class Block:
     readings: Array
     speed_mps: Array
     has_temp: bool
-    has_speed: bool
     start_s: float
-    done: int  # bytes of the file so far, as it is packed; of a log in memory, samples
+    done: int  # bytes of the (packed) file that have been read; samples of a log in memory
     lines: list[str] = field(default_factory=list)  # the rows as CSV, none for a log in memory
-    names: tuple[str, ...] = ()  # of the columns in lines
-    own_times: bool = True  # the times are those that stand in lines
+    names: tuple[str, ...] = ()  # names of the columns in lines
+    own_times: bool = True  # False if the times were changed (see even_times.py) and differ from those in lines
     frozen: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
     lat_deg: Array = field(default_factory=lambda: np.zeros(0))
     lon_deg: Array = field(default_factory=lambda: np.zeros(0))
@@ -47,7 +46,7 @@ class Block:
             self.frozen = np.zeros(len(self.time_us), dtype=bool)
 
     def rows(self) -> Iterator[FirmwareRow]:
-        """The samples as the firmware takes them."""
+        """The samples as firmware_rows() has them, for a replay by the firmware's modules."""
         return firmware_rows(self.time_us, self.readings, self.speed_mps)
 
     @property
@@ -57,7 +56,7 @@ class Block:
 
     @property
     def time_text(self) -> list[str]:
-        """The times as they stand in the file, or as they were spread."""
+        """The times as texts: those of the file, or the changed ones."""
         if not self.lines or not self.own_times:
             return [f"{self.start_s + t:.6f}" for t in self.t_s.tolist()]
         place = self.names.index("t_s")
@@ -78,7 +77,7 @@ class Block:
 
 
 def joined(first: Block, second: Block) -> Block:
-    """Two blocks that follow on as one."""
+    """Two successive blocks as one."""
     return replace(
         second,
         lines=first.lines + second.lines,

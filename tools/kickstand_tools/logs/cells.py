@@ -1,4 +1,4 @@
-"""The cells of a CSV log: which values they may have, and the line in which one has another."""
+"""Checks the cells of a CSV log, and finds the line of a mistake."""
 
 import csv
 import math
@@ -11,7 +11,7 @@ from ..errors import InputError
 from .csv_reader import cells_of
 
 COLUMNS = ("t_s", "ax_g", "ay_g", "az_g", "gx_dps", "gy_dps", "gz_dps")
-TRACK = ("speed_mps", "lat_deg", "lon_deg", "utc_s")  # what a satellite receiver measures, now and then
+TRACK = ("speed_mps", "lat_deg", "lon_deg", "utc_s")  # columns of a satellite receiver, with values now and then
 OPTIONAL = (*TRACK, "temp_c")  # may be empty in a row
 
 # A larger value is in another unit (m/s2, counts): the sensor's widest ranges are 16 g and 2000 deg/s.

@@ -1,11 +1,9 @@
-"""Tables of numbers as lines of CSV, quickly; a log in memory, or a stretch of one, as a file.
+"""Writes tables of numbers as CSV, quickly; writes a log in memory, or a stretch of a log, to a file.
 
 The texts are those of Python's own formatting, made of a column at once instead of number by number: that takes a
 seventh of the time.
 """
 
-import csv
-import gzip
 import itertools
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
@@ -14,7 +12,7 @@ import numpy as np
 from kickstand.errors import Notice
 from numpy.typing import NDArray
 
-from ..output import write_whole
+from ..output import write_packed
 from .cells import COLUMNS, OPTIONAL
 from .log import Log
 from .reader import read_blocks
@@ -23,15 +21,15 @@ from .stretch import Stretch
 from .table import Array
 
 _DIGITS = {"speed_mps": 3, "temp_c": 2, "lat_deg": 7, "lon_deg": 7, "utc_s": 3}
-_ROWS = 15_000  # written at a time: their letters fit a processor's cache
-_MOST = 2.0**53  # in units of the last digit: up to here doubles are no more than one unit apart
+_ROWS = 15_000  # rows written at a time: their letters fit a processor's cache
+_MOST = 2.0**53  # in units of the last digit: larger doubles are more than one unit apart
 _POINT, _MINUS, _ZERO, _COMMA, _END = b".-0,\n"
 
 Letters = NDArray[np.uint8]  # (m, n): the ASCII letters of n texts, one in each column; 0 is none
 
 
 def csv_lines(table: Array, digits: Sequence[int]) -> Iterator[bytes]:
-    """The lines of (n, m) with digits[k] after the point in column k, some at a time; NaN is an empty cell."""
+    """Yield the lines of table (n, m), some at a time, with digits[k] decimals in column k; NaN is an empty cell."""
     for begin in range(0, len(table), _ROWS):
         columns = table[begin : begin + _ROWS].T
         yield joined_cells([number_cells(column, digit, nan="") for column, digit in zip(columns, digits, strict=True)])
@@ -46,13 +44,13 @@ def joined_cells(columns: Sequence[Letters]) -> bytes:
 
 
 def text_cells(texts: Sequence[str]) -> Letters:
-    """Of ASCII texts. Raises UnicodeEncodeError for others."""
+    """The letters of ASCII texts. Raises UnicodeEncodeError for others."""
     packed = np.array(texts, dtype=np.bytes_)
     return np.ascontiguousarray(packed.view(np.uint8).reshape(len(texts), packed.itemsize).T)
 
 
 def number_cells(values: Array, digits: int, nan: str = "nan") -> Letters:
-    """f"{value:.{digits}f}" of each of values (n). nan: what stands for a value that is not a number."""
+    """The letters of f"{value:.{digits}f}" for each of values (n). nan: the text for a value that is not a number."""
     scaled = np.abs(values) * 10.0**digits
     missing = np.isnan(scaled)
     scaled = np.where(missing, 0.0, scaled)
@@ -70,11 +68,10 @@ def number_cells(values: Array, digits: int, nan: str = "nan") -> Letters:
     return letters
 
 
-def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, room: int) -> Letters:
-    """Of integers (n) of up to `most` digits with a point before the last `digits` ones, and a free row in front. room:
-    rows at least."""
+def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, least_rows: int) -> Letters:
+    """Of integers (n) of up to `most` digits with a point before the last `digits` ones, and a free row in front."""
     places = max(most, digits + 1)
-    letters = np.zeros((max(places + 2, room), len(number)), dtype=np.uint8)
+    letters = np.zeros((max(places + 2, least_rows), len(number)), dtype=np.uint8)
     row = len(letters) - 1
     for place in range(places):
         if place == digits > 0:
@@ -87,18 +84,9 @@ def _letters(number: NDArray[np.unsignedinteger], digits: int, most: int, room: 
     return letters
 
 
-def write_lines(path: Path, names: Sequence[str], pieces: Iterable[bytes]) -> None:
-    """Write a CSV file from its columns' names and its lines, gzipped if its name ends in .gz, whole or not at all.
-
-    Raises InputError."""
-
-    def write(temporary: Path) -> None:
-        opened = gzip.open if path.suffix == ".gz" else open
-        with opened(temporary, "wb") as file:
-            file.write((",".join(names) + "\n").encode())
-            file.writelines(pieces)
-
-    write_whole(path, write)
+def write_lines(path: Path, names: Sequence[str], lines: Iterable[bytes]) -> None:
+    """Write a CSV file from its columns' names and its lines, as write_packed() does. Raises InputError."""
+    write_packed(path, itertools.chain([(",".join(names) + "\n").encode()], lines))
 
 
 def write_log(path: Path | str, log: Log) -> None:
@@ -130,8 +118,8 @@ def cut_log(
 ) -> tuple[int, float]:
     """Write from from_s to to_s of a log to out, line for line, gzipped if its name ends in .gz, whole or not at all.
 
-    from_s, to_s: seconds since the log's first sample; negative: before its last one; None: to its end there. Returns
-    the number of samples and the seconds that they last. progress, notices: of read_blocks(). Raises InputError.
+    from_s, to_s: seconds since the log's first sample; negative: before its last one; None: the log's begin or end.
+    Returns the number of samples and their duration, s. progress, notices: see read_blocks(). Raises InputError.
 
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as directory:
@@ -155,13 +143,5 @@ def cut_log(
 
 
 def write_table(path: Path, columns: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-    """Write a CSV file, gzipped if its name ends in .gz, whole or not at all."""
-
-    def write(temporary: Path) -> None:
-        opened = gzip.open if path.suffix == ".gz" else open
-        with opened(temporary, "wt", encoding="ascii", newline="") as file:
-            writer = csv.writer(file, lineterminator="\n")
-            writer.writerow(columns)
-            writer.writerows(rows)
-
-    write_whole(path, write)
+    """Write a CSV file of texts and numbers that need no quotation marks, as write_lines() does. Raises InputError."""
+    write_lines(path, columns, (",".join(map(str, row)).encode("ascii") + b"\n" for row in rows))

@@ -22,11 +22,11 @@ from .table import Array
 
 Cells = NDArray[Any]  # (n): int64; float64, NaN where there is no number; or str as objects, "" where there is nothing
 
-ROWS = 50_000  # at once: text takes ten times the memory of numbers
-LONGEST = 40  # characters of a number
-LONGEST_LINE = 100_000  # characters: Python's csv refuses cells that are not much longer
-# Of a table: seven hours of twelve columns at 100 Hz. Numbers take 8 bytes each, and as many while they are joined,
-# texts 60.
+ROWS = 50_000  # rows converted at once: text takes ten times the memory of numbers
+LONGEST = 40  # characters of the longest number
+LONGEST_LINE = 100_000  # characters of the longest line: Python's csv refuses cells that are not much longer
+# Limits of a table: seven hours of twelve columns at 100 Hz. Numbers take 8 bytes each, and as many while they are
+# joined, texts 60.
 MOST_CELLS, MOST_TEXTS = 30_000_000, 3_000_000
 _NOTHING = {"", "-", "na", "n/a", "nan", "nil", "none", "null", "#n/a"}
 _POINT, _MINUS, _ZERO, _COMMA, _END = b".-0,\n"
@@ -35,7 +35,7 @@ _MOST_DIGITS = 15  # of a number that a double holds as an integer
 
 
 def separator_of(line: str) -> str:
-    """The one of , ; and tab that parts the cells of a line, by what stands outside quotation marks."""
+    """The separator of a line's cells, one of , ; and tab: the most frequent one outside quotation marks."""
     bare = re.sub(r'"[^"]*"', "", line)
     return max(",;\t", key=bare.count)
 
@@ -126,7 +126,7 @@ def columns_of_text(text: str, separator: str, width: int) -> tuple[list[Cells],
 
 
 def _lines(text: str) -> Iterator[str]:
-    """Those that are not blank, one after the other: a list of all takes several times the memory of the text."""
+    """Yield the lines that are not blank: a list of all takes several times the memory of the text."""
     begin = 0
     while begin < len(text):
         end = text.find("\n", begin)
@@ -156,7 +156,7 @@ def columns_of(rows: Iterable[Sequence[str]], width: int) -> list[Cells]:
 
 
 def numbers_of(cells: Cells) -> NDArray[Any]:
-    """Cells (n) as whole numbers where all of them are, else as floats, NaN for what is no number."""
+    """Cells (n) as integers if all of them are, else as floats, NaN for a cell that is no number."""
     if cells.dtype.kind in "iuf":
         return cells
     numbers = [_number(str(cell)) for cell in cells.tolist()]
@@ -164,7 +164,7 @@ def numbers_of(cells: Cells) -> NDArray[Any]:
 
 
 def filled(cells: Cells) -> NDArray[np.bool_]:
-    """(n) True where there is something in the cell."""
+    """(n) True for cells that are not empty."""
     if cells.dtype.kind in "iuf":
         return ~np.isnan(cells.astype(float))
     return np.array([cell != "" for cell in cells.tolist()], dtype=bool)
@@ -201,7 +201,7 @@ def _text(cells: Iterable[str]) -> Cells:
 
 
 def _number(cell: str) -> float | None:
-    """NaN where there is nothing; None for text."""
+    """The number in a cell; NaN for an empty one, None for text."""
     cell = cell.strip()
     if cell.lower() in _NOTHING:
         return np.nan

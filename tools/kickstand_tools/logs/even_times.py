@@ -16,18 +16,21 @@ from ..errors import InputError
 from .block import Block, joined
 from .table import Array
 
-COARSE = 0.05  # ticks of a smaller share of the time between samples are good enough as they are
-OFTEN = 0.05  # share of repeated times from which they are the recorder's habit: it stamps several samples at once
-EXACT = 0.98  # share of steps of one size in a log that is on its grid, with a sample lost here and there
-GAP = 1.5  # times the usual step, and a tick: samples are missing
-AROUND = 64  # samples at least over which the mean is taken, and
-TICKS = 8  # ticks at least
-CROWDED = 10.0  # times the usual number of samples in a tick, and
-CROWD = 50  # samples: so many of one time are a clock that stood still
-ALLOWED = 0.6  # of a tick, from the recorded time: half of it, and some more for the ends, where the mean is less sure
-SHORTEST_S = 2e-6  # step: times are handed on in whole microseconds
-CONTEXT = 2000  # samples before and after a block that have a say in its times
-SAID_S = 0.002  # a larger shift of the times is remarked on
+COARSE = 0.05  # times with ticks under this share of the time between samples stay as they are
+OFTEN = 0.05  # a larger share of repeated times means that the recorder stamps several samples at once
+EXACT = 0.98  # with a larger share of equal steps the times are a grid, with a sample lost here and there
+GAP = 1.5  # a step longer than so many median steps plus a tick is a gap
+# The mean is taken over at least AROUND samples and at least TICKS ticks
+AROUND = 64
+TICKS = 8
+# A clock stood still if over CROWD samples, and over CROWDED times the usual number per tick, have the same time
+CROWDED = 10.0
+CROWD = 50
+# Largest shift of a time, in ticks: half a tick, and a margin for the ends, where the mean is less exact
+ALLOWED = 0.6
+SHORTEST_S = 2e-6  # shortest step, because times are passed on in whole microseconds
+CONTEXT = 2000  # samples before and after a block that are used for its times
+SAID_S = 0.002  # a larger shift of the times is reported in a notice
 
 
 def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
@@ -82,11 +85,11 @@ def _one_step(between_us: NDArray[np.int64]) -> bool:
 
 
 def _apart(recorded: Array, starts: NDArray[np.intp], counts: NDArray[np.intp], period_s: float) -> Array:
-    """Samples of the same time spread up to the next time, or over as long as they usually last."""
+    """Times in which samples of the same time are spread up to the next time, or over their usual duration."""
     until = np.append(recorded[starts[1:]], np.inf)
-    room = np.minimum((until - recorded[starts]) / counts, np.maximum(period_s, 0.0))
+    longest = np.minimum((until - recorded[starts]) / counts, np.maximum(period_s, 0.0))
     number = np.arange(len(recorded)) - np.repeat(starts, counts)
-    return recorded + number * np.repeat(room, counts)
+    return recorded + number * np.repeat(longest, counts)
 
 
 def _smooth(recorded: Array, times: Array, tick_s: float, period_s: float) -> Array:
@@ -103,7 +106,7 @@ def _smooth(recorded: Array, times: Array, tick_s: float, period_s: float) -> Ar
 
 
 def _mean(values: Array, half: int) -> Array:
-    """Over half samples to each side; the ends go on along straight lines."""
+    """Moving mean over `half` samples to each side; beyond the ends values are extrapolated along straight lines."""
     n = len(values)
     span = min(n, 2 * half + 1)
     k = np.arange(n, dtype=float)
@@ -125,9 +128,10 @@ def _line(k: Array, values: Array) -> Callable[[Array], Array]:
 
 
 def even_blocks(blocks: Iterator[Block], name: str, remarks: list[Notice]) -> Iterator[Block]:
-    """The same blocks with times that increase, see even_times(). name: of the log; remarks: what was done is appended.
+    """The blocks with times that increase, see even_times(). name: the log's; remarks: a notice of the changes is
+    appended.
 
-    Blocks whose times are even or fine come as they are. Of others the last samples wait for the next block.
+    Blocks whose times are even or fine are not changed. The last samples of others come with the next block.
     """
     spread = _Spread(name)
     held: Block | None = None
@@ -168,12 +172,12 @@ class _Spread:
         return self._ready(block.part(slice(0, wait)), times[len(self._before_s) :][:wait]), held
 
     def rest(self, block: Block) -> Block:
-        """The last samples."""
+        """The last samples, with their times spread."""
         times = even_times(np.concatenate((self._before_s, block.t_s)), self._name)
         return self._ready(block, times[len(self._before_s) :])
 
     def notices(self) -> list[Notice]:
-        """What there is to say of the times."""
+        """The notices about the times."""
         if not self._repeated and self._shift_s < SAID_S:
             return []
         return [Notice("times-spread", self._repeated, self._samples, self._shift_s)]

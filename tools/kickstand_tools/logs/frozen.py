@@ -13,16 +13,16 @@ from .block import Block
 from .log import Log
 from .table import Array
 
-FROZEN_S, FROZEN_SAMPLES = 0.5, 10  # the same for at least so long, in so many samples
-COARSE_G, COARSE_DPS = 0.002, 0.05  # steps in which rounding may hide the noise of a phone's sensor
-BESIDE_S = 0.5  # before and after a stretch
-NEAR_G, NEAR_DPS = 0.02, 0.5  # the mean beside it of a vehicle that stands still
+FROZEN_S, FROZEN_SAMPLES = 0.5, 10  # least duration and number of equal readings
+COARSE_G, COARSE_DPS = 0.002, 0.05  # last digits from which on rounding may hide the noise of a phone's sensor
+BESIDE_S = 0.5  # time before and after a stretch that is compared with it
+NEAR_G, NEAR_DPS = 0.02, 0.5  # largest difference of these means from the stretch at standstill
 
 _MOTION = [0, 1, 2, 4, 5, 6]  # of the chip's order: without the temperature
 
 
 class FrozenReadings:
-    """mark() takes a log's blocks one after the other."""
+    """Finds frozen readings. mark() takes a log's blocks one after the other."""
 
     def __init__(self) -> None:
         self._last = np.zeros((0, 6))  # reading at the end of the block before
@@ -34,7 +34,7 @@ class FrozenReadings:
         self._stretches: list[tuple[float, float]] = []
 
     def mark(self, block: Block) -> NDArray[np.bool_]:
-        """(n) True where the block's readings are frozen. The first of them is a reading still."""
+        """(n) True where the block's readings are frozen. The first one of equal readings is not."""
         n = len(block.time_us)
         values, time_s = np.vstack((self._last, block.readings[:, _MOTION])), block.t_s
         time_s = np.concatenate(([self._last_s], time_s)) if len(self._last) else time_s
@@ -63,7 +63,7 @@ class FrozenReadings:
         return frozen[-n:]
 
     def notices(self) -> list[Notice]:
-        """What there is to say of the log so far."""
+        """The notices about the log so far."""
         if not self._stretches:
             return []
         first, last = self._stretches[0]
@@ -71,7 +71,8 @@ class FrozenReadings:
         return [Notice("frozen-readings", len(self._stretches), seconds, first, last)]
 
     def _doubtful(self, values: Array, time_s: Array, begin: int, end: int) -> bool:
-        """The readings from begin to end are the same: does anything speak against a standstill?"""
+        """True if the equal readings from begin to end are surely frozen: no standstill with noise hidden by
+        rounding."""
         if not np.any(np.isfinite(self._step)):
             return False  # nothing ever changed: nothing to compare with
         if np.any(self._step[:3] < COARSE_G) or np.any(self._step[3:] < COARSE_DPS):
@@ -90,6 +91,6 @@ class FrozenReadings:
 
 def without_frozen(log: Log) -> Log:
     """The log without frozen readings: where they were is a gap. The log itself where there are none."""
-    block = Block(log.time_us, log.readings, log.speed_mps, True, True, log.start_s, 0)
+    block = Block(log.time_us, log.readings, log.speed_mps, True, log.start_s, 0)
     kept = ~FrozenReadings().mark(block)
     return log if np.all(kept) else log.part(kept)

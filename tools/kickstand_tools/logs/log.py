@@ -12,13 +12,14 @@ from ..errors import InputError
 from .cells import TRACK
 from .table import Array, Table
 
-ROOM_TEMP_C = 25.0  # what the firmware's modules get where a log has no temperature
+ROOM_TEMP_C = 25.0  # temperature for the firmware's modules where a log has none
 
 FirmwareRow = tuple[int, list[float], float]
 
 
 def firmware_rows(time_us: NDArray[np.int64], readings: Array, speed_mps: Array) -> Iterator[FirmwareRow]:
-    """Time (microseconds), reading (7) and speed (m/s, NaN for none) of each sample, as the firmware takes them."""
+    """Each sample for a replay by the firmware's modules: time (us), reading (7, the chip's order: g, deg C, deg/s),
+    speed (m/s, NaN for none). Where a log has no temperature it is ROOM_TEMP_C."""
     readings = np.column_stack((readings[:, :3], np.nan_to_num(readings[:, 3], nan=ROOM_TEMP_C), readings[:, 4:]))
     return zip(time_us.tolist(), readings.tolist(), speed_mps.tolist())
 
@@ -90,12 +91,18 @@ class Log(Table):
         """(n, 7) as from_readings() takes them."""
         return np.column_stack((self.accel_g, self.temperature_c, self.gyro_dps))
 
+    @property
+    def start_utc_s(self) -> float | None:
+        """Universal Time at the first sample: the median of what the rows say, because some come late; None without."""
+        starts = (self.utc_s - self.t_s)[np.isfinite(self.utc_s)]
+        return float(np.median(starts)) if len(starts) else None
+
     def rows(self) -> Iterator[FirmwareRow]:
-        """The samples as the firmware takes them."""
+        """The samples as firmware_rows() has them, for a replay by the firmware's modules."""
         return firmware_rows(self.time_us, self.readings, self.speed_mps)
 
     def columns(self) -> dict[str, Array]:
-        """By the names that the columns have in a CSV."""
+        """The samples by the names that the columns have in a CSV."""
         named: dict[str, Array] = {"t_s": self.t_s}
         named |= {f"a{axis}_g": values for axis, values in zip(AXES, self.accel_g.T)}
         named |= {f"g{axis}_dps": values for axis, values in zip(AXES, self.gyro_dps.T)}

@@ -27,9 +27,9 @@ from .table import Array
 if TYPE_CHECKING:
     from ..calibration.file import CalibrationFile
 
-BLOCK_BYTES = 1 << 20  # of text, some 15000 samples
-BLOCK_SAMPLES = 60_000  # of a log in memory
-MOST_SAMPLES = 10_000_000  # fourteen hours at 200 Hz, which as a whole take some 1 GB of memory
+BLOCK_BYTES = 1 << 20  # bytes of text in a block, some 15000 samples
+BLOCK_SAMPLES = 60_000  # samples in a block of a log in memory
+MOST_SAMPLES = 10_000_000  # most samples of a log that is read as a whole: 14 hours at 200 Hz take 1 GB of memory
 
 Source = File | Log | Stretch  # what can be read as a log
 
@@ -75,9 +75,9 @@ def read_blocks(
     lines: bool = True,
     calibration: "CalibrationFile | None" = None,
 ) -> Iterator[Block]:
-    """The same block by block, however long the log is. Readings that froze are marked in each block. notices: what is
-    remarkable in the log is appended to it at the end, and what contradicts this calibration of it. lines: keep the
-    rows as CSV too, which take the most memory."""
+    """Read a log block by block, however long it is. Frozen readings are marked in each block. notices: at the end
+    notices about the log, and about contradictions to `calibration`, are appended. lines: keep the rows as CSV too,
+    which take the most memory. Else see read_log()."""
     name, count = name_of(source), 0
     remarks: list[Notice] = []
     checks, frozen = Checks(name), FrozenReadings()
@@ -105,22 +105,22 @@ def read_blocks(
 
 
 def check_first_line(log: Path) -> None:
-    """Raise InputError where a file does not begin as a log does."""
+    """Raise InputError if the first line of a file is not that of a log."""
     first = next(chunks(log, 1), (b"", 0))[0]
     cells.check_text(str(log), first, 0)
     cells.header(str(log), first.decode().removeprefix("\ufeff").partition("\n")[0])
 
 
 def read_twice(source: Source) -> Source:
-    """The same where it can be read again, else a Log: an open file can be read once."""
+    """A source that can be read twice: the same one, or a Log in place of an open file."""
     if isinstance(source, Stretch):
         return replace(source, source=_again(source.source))
     return _again(source)
 
 
 def apart(source: Source) -> tuple[File | Log, Stretch | None]:
-    """The whole log, and the stretch of it that is wanted, with times from the log's beginning; None: all of it. Raises
-    InputError where the stretch holds no sample."""
+    """The whole log of a source and, if the source is a Stretch, that stretch with times from the log's beginning, else
+    None. Raises InputError where the stretch holds no sample."""
     if not isinstance(source, Stretch):
         return source, None
     stretch = _from_beginning(replace(source, source=_again(source.source)))
@@ -141,7 +141,7 @@ def _again(source: File | Log) -> File | Log:
 
 
 def _unchecked(source: Source, remarks: list[Notice]) -> Iterator[Block]:
-    """The blocks; units and number of samples are not checked yet. remarks: on what is broken in the file."""
+    """The blocks, with units and number of samples not checked yet. remarks: notices about the file are appended."""
     if isinstance(source, Log):
         return _blocks_of(source)
     if not isinstance(source, Stretch):
@@ -152,14 +152,13 @@ def _unchecked(source: Source, remarks: list[Notice]) -> Iterator[Block]:
 
 def _blocks_of(log: Log) -> Iterator[Block]:
     time_us, readings = log.time_us, log.readings
-    has_temp, has_speed = (not np.all(np.isnan(values)) for values in (log.temperature_c, log.speed_mps))
+    has_temp = not np.all(np.isnan(log.temperature_c))
     for start in range(0, len(time_us), BLOCK_SAMPLES):
         part = slice(start, start + BLOCK_SAMPLES)
         yield Block(
             time_us[part],
             readings[part],
             has_temp=has_temp,
-            has_speed=has_speed,
             start_s=log.start_s,
             done=min(start + BLOCK_SAMPLES, len(time_us)),
             **{name: getattr(log, name)[part] for name in TRACK},
@@ -204,7 +203,7 @@ def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], rema
 def _numbers(
     name: str, text: bytes, names: list[str], places: dict[str, int], line: int, before_us: int | None
 ) -> Array:
-    """(n, columns in the order of places). line: how many lines came before this text."""
+    """(n, columns in the order of places) the numbers in a text. line: number of lines before it."""
     table = numbers_in(text, len(names))
     if table is not None and cells.plausible(table[:, list(places.values())], list(places), before_us):
         return table[:, list(places.values())]
@@ -228,7 +227,6 @@ def _block(
         time_us,
         np.column_stack([column[name] for name in order]),
         has_temp="temp_c" in places,
-        has_speed="speed_mps" in places,
         start_s=start_s,
         done=done,
         lines=[line for line in text.split("\n") if line.strip()],
@@ -275,5 +273,5 @@ def _readable(line: bytes, names: list[str], places: dict[str, int]) -> bool:
 
 
 def _digits(line: bytes) -> int:
-    """After the point of the last cell; 0 for an empty one."""
+    """Number of decimals in the last cell; 0 for an empty one."""
     return len(line.rpartition(b",")[2].strip().partition(b".")[2])

@@ -1,4 +1,4 @@
-"""What a log is read from: a file by its path, gzipped if its name ends in .gz, or an open file of text or bytes."""
+"""Reads the text of a log: from a path, gzipped if its name ends in .gz, or from an open file of text or bytes."""
 
 import contextlib
 import gzip
@@ -14,7 +14,7 @@ from kickstand.errors import Notice
 
 from ..errors import InputError, cause
 
-# Bytes of a line, or of NUL bytes at the end, which is what a file system leaves of a file that was not closed
+# Most bytes of a line, or of NUL bytes at the end, which a file system may leave in a file that was not closed
 LONGEST_LINE = 16_000_000
 File = Path | str | IO[bytes] | IO[str]
 Progress = Callable[[int, int], None]  # called with (done, total) in one unit; total is 0 where it is not known
@@ -36,7 +36,7 @@ def open_input(path: Path | str) -> IO[bytes]:
 
 
 def name_of(source: object) -> str:
-    """What a message calls it: its path, the name of the file or of the log, or "the log"."""
+    """The name of a source in messages: its path, the name of the file or of the log, or "the log"."""
     if isinstance(source, (Path, str)):
         return str(source)
     name = getattr(source, "name", None)
@@ -49,11 +49,12 @@ def log_stem(name: str) -> str:
 
 
 def chunks(source: File, size: int, remarks: list[Notice] | None = None) -> Iterator[tuple[bytes, int]]:
-    """The text, unpacked, in pieces of about `size` bytes that end at the end of a line, and the bytes read so far.
+    """Yield the text, unpacked, in chunks of about `size` bytes that end at the end of a line, and the bytes read so
+    far.
 
-    Lines end in a line feed, whatever they end in in the file; the last one of all may have no end. remarks: what is
-    broken at the end of the file is appended to it: NUL bytes, which are left out, and a gzip file that was cut. Where
-    it is not given, that one is refused. Raises InputError naming the file.
+    All lines end in a line feed, whatever they end in in the file; the last one may have no end. remarks: notices about
+    the end of the file are appended: NUL bytes, which are left out, and a gzip file that was cut. Without remarks a cut
+    file is refused. Raises InputError naming the file.
     """
     name = name_of(source)
     if isinstance(source, (Path, str)) and Path(source).is_dir():
@@ -71,7 +72,7 @@ def chunks(source: File, size: int, remarks: list[Notice] | None = None) -> Iter
 
 @contextlib.contextmanager
 def errors_of(name: str) -> Iterator[None]:
-    """What goes wrong while a file of this name is read and unpacked becomes an InputError."""
+    """A context in which errors of reading and unpacking a file of this name become InputErrors."""
     try:
         yield
     except gzip.BadGzipFile as error:
@@ -85,14 +86,14 @@ def errors_of(name: str) -> Iterator[None]:
 
 
 def total_bytes(source: object) -> int:
-    """How much chunks() will read, 0 where that is not known."""
+    """The number of bytes that chunks() will read, 0 if unknown."""
     if isinstance(source, (Path, str)):
         return os.path.getsize(source) if os.path.isfile(source) else 0
     return 0
 
 
 def _pieces(name: str, file: Any, packed: Any, size: int, remarks: list[Notice] | None) -> Iterator[tuple[bytes, int]]:
-    """packed: the file below `file`, whose position is the bytes read; the same one where nothing is packed."""
+    """See chunks(). packed: the file below `file`, whose position is the number of bytes read; `file` if not packed."""
     pending, read = b"", 0
     for data in _data(file, size, remarks):
         read += len(data)
@@ -113,11 +114,11 @@ def _pieces(name: str, file: Any, packed: Any, size: int, remarks: list[Notice] 
 
 
 def _data(file: Any, size: int, remarks: list[Notice] | None) -> Iterator[bytes]:
-    """What the file holds. A gzip file that was cut ends where it was cut, if anything could be unpacked."""
+    """Yield the content of the file. A gzip file that was cut ends there, if anything could be unpacked."""
     packed, there = isinstance(file, gzip.GzipFile), False
     while True:
         try:
-            # read() would keep to itself what came before the cut
+            # read() would not return the data before the cut
             data = file.read1(size) if packed else file.read(size)
         except EOFError:
             if remarks is None or not there:

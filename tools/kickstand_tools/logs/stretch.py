@@ -1,4 +1,4 @@
-"""A stretch of a log: what lies between two times."""
+"""A stretch of a log, between two times."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -17,8 +17,9 @@ from .table import Array
 class Stretch:
     """From from_s to to_s of a log, seconds since its first sample; negative: before its last one. None: its end there.
 
-    It can be given wherever a log can. Read as a log its times count from its own first sample. What finds the lean
-    works on the whole log, because the lean depends on what was before, and gives the stretch in the log's own times.
+    It can be used wherever a log can. Read as a log its times count from its own first sample. Functions that compute
+    the lean read the whole log, because the lean depends on earlier readings, and return the stretch in the log's
+    times.
 
     >>> import numpy as np
     >>> from kickstand_tools.api import Log, read_log
@@ -33,21 +34,22 @@ class Stretch:
 
     @property
     def name(self) -> str:
-        """The log's."""
+        """The log's name."""
         return name_of(self.source)
 
     @property
     def from_its_end(self) -> bool:
-        """One of the times is negative: the length of the log has to be known."""
+        """True if one of the times is negative, so that the length of the log has to be known."""
         return min(self.from_s or 0.0, self.to_s or 0.0) < 0.0
 
     def of_length(self, length_s: float) -> "Stretch":
-        """The same with times from the beginning. length_s: of the log."""
+        """The stretch with both times from the beginning. length_s: length of the log."""
         times = [None if t is None else t if t >= 0.0 else length_s + t for t in (self.from_s, self.to_s)]
         return Stretch(self.source, *times)
 
     def holds(self, block: Block) -> NDArray[np.bool_]:
-        """(n) which samples of a block of the whole log lie in it. Its times are from the beginning."""
+        """(n) True for the samples of a block of the whole log that lie in the stretch, whose times have to be from the
+        beginning."""
         begin_us, end_us = self._ends_us()
         return (block.time_us >= begin_us) & (block.time_us <= end_us)
 
@@ -55,7 +57,7 @@ class Stretch:
         return round(1e6 * (self.from_s or 0.0)), float("inf") if self.to_s is None else round(1e6 * self.to_s)
 
     def cut(self, blocks: Iterator[Block]) -> Iterator[Block]:
-        """The blocks of the whole log, cut. Raises InputError where nothing is left."""
+        """The blocks of the whole log, cut to the stretch. Raises InputError if it holds no sample."""
         begin_us, end_us = self._ends_us()
         if end_us <= begin_us:
             raise InputError(f"{self.name}: the stretch ends before it begins: give --from the smaller time")

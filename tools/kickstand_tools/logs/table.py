@@ -1,5 +1,6 @@
-"""What the results that are tables have in common."""
+"""The base of results that are tables."""
 
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Self
 
@@ -10,13 +11,14 @@ from ..errors import InputError, extra
 
 if TYPE_CHECKING:
     from pandas import DataFrame
+    from pyarrow import Schema
 
 Array = NDArray[np.float64]
 
 
 @dataclass
 class Table:
-    """A dataclass whose arrays have one row a sample; its other fields say something of the whole."""
+    """A dataclass whose arrays have one row per sample; its other fields belong to the whole table."""
 
     def columns(self) -> dict[str, NDArray[Any]]:
         """The arrays (n,) by the names of their fields."""
@@ -34,3 +36,17 @@ class Table:
         except ImportError as error:
             raise InputError("data frames need pandas: " + extra("rides")) from error
         return DataFrame(self.columns())
+
+
+def float_schema(units: Mapping[str, str], fine: Container[str], about: dict[str, str]) -> "Schema":
+    """Of a Parquet file: columns with their units, in 64-bit floats those of fine, the rest in 32-bit floats. about:
+    its metadata."""
+    import pyarrow
+
+    return pyarrow.schema(
+        [
+            pyarrow.field(name, pyarrow.float64() if name in fine else pyarrow.float32(), metadata={"unit": unit})
+            for name, unit in units.items()
+        ],
+        metadata=about,
+    )

@@ -1,1 +1,1 @@
-"""A ride's lean, forces and speed drawn over a video of it, or as a clip to lay over one."""
+"""Draws a ride's lean, forces and speed over a video of it, or as a transparent clip."""

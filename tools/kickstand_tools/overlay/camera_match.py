@@ -1,4 +1,4 @@
-"""When a ride was filmed: the camera turned as fast as the bike did, whichever way it points."""
+"""Finds the time of a video in a ride: the magnitude of the camera's rate is the bike's, whichever way it points."""
 
 import numpy as np
 
@@ -9,10 +9,10 @@ from ..signals.averages import moving_mean
 from ..signals.lag import correlations, log_likelihood_ratio, peak_offset, peaks
 from .gpmf import Telemetry
 
-_SLOW_S = 5.0  # what changes more slowly is left to the gyros' bias
-_QUICK_S = 0.2  # what changes more quickly is vibration, which is not the same at two places
-_ALIKE_S = 0.5  # readings that are nearer to each other are alike
-_LEAST_S = 8.0  # of the video within the ride
+_SLOW_S = 5.0  # slower changes are removed, because they may be the gyros' bias
+_QUICK_S = 0.2  # quicker changes are vibration, which differs between two places
+_ALIKE_S = 0.5  # readings closer to each other are not independent
+_LEAST_S = 8.0  # least time of the video within the ride
 _LEAST_EVIDENCE, _LEAST_LEAD, _LEAST_CORRELATION = 15.0, 6.0, 0.5
 _APART_S = 2.0
 
@@ -42,6 +42,6 @@ def camera_offset_s(ride: Motion, camera: Telemetry) -> tuple[float, float]:
 
 
 def _turning(rate_dps: Array) -> Array:
-    """(n) how fast it turns about any axis, less what changes slowly and quickly."""
+    """(n) the magnitude of the rate, without slow and quick changes."""
     size = moving_mean(np.linalg.norm(rate_dps, axis=1), round(_QUICK_S / STEP_S))
     return size - moving_mean(size, round(_SLOW_S / STEP_S))

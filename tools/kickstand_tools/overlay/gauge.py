@@ -13,20 +13,20 @@ from .parts import ACCENT, DIM, PANEL, WHITE
 
 MOST_DEG = 60.0  # end of the dial
 MOST_G = 1.2  # edge of the circle of forces
-SHARE = 0.3  # of the video's height
-LEGIBLE_PX, MOST_SHARE = 216.0, 0.45  # the least height at which its small words can be read; of small videos
+SHARE = 0.3  # height of the gauge over that of the video
+LEGIBLE_PX, MOST_SHARE = 216.0, 0.45  # least height for legible text, but in small videos at most this share of theirs
 UPRIGHT_DEG = 0.5  # a smaller lean is to neither side
-_WIDTH = 1.72  # by the height
+_WIDTH = 1.72  # width over height
 _SPREAD = 1.5  # degrees of the picture for a degree of lean
-_MIDDLE, _SIDE = 60.0, 146.0  # of the dial, and of speed and forces, from the left
+_MIDDLE, _SIDE = 60.0, 146.0  # x of the middle of the dial, and of speed and forces
 _KMH, _MPH = 3.6, 3.6 / 1.609344
 
 
 class Gauge:
-    """Draws at one size. video_height: of the video that the gauge is for, pixels. mph: miles, not kilometres, an hour.
-    has_speed: there is room for a speed.
+    """Draws the gauge: shows lean, forces and, if has_speed, the speed. video_height: height of the video that it is
+    for, pixels. mph: the speed in miles, not kilometres, per hour.
 
-    width, height: of the pictures, even, as videos need it.
+    width, height: size of the pictures in pixels, even numbers, because videos need these.
     """
 
     def __init__(self, video_height: int, has_speed: bool = True, mph: bool = False) -> None:
@@ -76,7 +76,7 @@ class Gauge:
         pen.ellipse([inner, inner, size - 1 - inner, size - 1 - inner], fill=0)
 
     def _still_picture(self) -> Image.Image:
-        """What is the same at all times."""
+        """The part of the picture that is the same at all times."""
         picture = Image.new("RGBA", (self.width, self.height), parts.CLEAR)
         panel = parts.smooth_mask(
             picture.size,
@@ -114,7 +114,7 @@ class Gauge:
         picture.paste(colour, mask=parts.smooth_mask(picture.size, draw))
 
     def _circle(self, picture: Image.Image) -> None:
-        """Of the forces, with rings at 0.5 and 1 g, and what its ends mean."""
+        """Draw the circle of forces, with rings at 0.5 and 1 g, and words at its ends."""
         (x, y), radius = self._forces, self._forces_radius
 
         def draw(pen: ImageDraw.ImageDraw, finer: int) -> None:
@@ -130,7 +130,7 @@ class Gauge:
         )
 
     def _fill(self, picture: Image.Image, lean_deg: float) -> None:
-        """The band from upright to the lean, on its side."""
+        """Fill the band from upright to the lean."""
         size = 2 * self._radius
         angle = _SPREAD * max(-MOST_DEG, min(MOST_DEG, lean_deg))
         begin, end = sorted((270.0, 270.0 + angle))
@@ -143,7 +143,7 @@ class Gauge:
         picture.paste(ACCENT, at, mask)
 
     def _marks(self, picture: Image.Image, left_deg: float, right_deg: float) -> None:
-        """The largest leans: a line across the dial, and in figures below its ends."""
+        """Mark the largest leans: a line across the dial, and figures below its ends."""
         pen = ImageDraw.Draw(picture)
         for sign, value in ((-1.0, left_deg), (1.0, right_deg)):
             if value > UPRIGHT_DEG:

@@ -1,4 +1,4 @@
-"""What a GoPro measures while it films: the accelerometer's and the gyro's readings in its video file.
+"""Reads the gyro of a GoPro from its video file.
 
 The format is GPMF, described at github.com/gopro/gpmf-parser: keys of four letters, a type, a size and a number of
 values, big-endian, one within another. A packet of it comes about every second.
@@ -27,7 +27,7 @@ class Telemetry:
 
 
 def telemetry(video: Video) -> Telemetry | None:
-    """None where the video has none that can be read."""
+    """The Telemetry of a video; None if it has none that can be read."""
     if video.telemetry is None:
         return None
     times, rates = [], []

@@ -1,4 +1,4 @@
-"""A ride's gauge over a video, or as a transparent clip."""
+"""Draws a ride's gauge over a video, or as a transparent clip."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ from .gpmf import telemetry
 from .shown import Shown, shown
 from .video import Video, ffmpeg, input_of, open_video, write_video
 
-MARGIN = 0.03  # of the video's height: from its edges to the gauge
-_BEYOND_S = 1.0  # by which a video may begin before the ride or end after it
+MARGIN = 0.03  # distance from the video's edges to the gauge, over the video's height
+_BEYOND_S = 1.0  # a video may begin before the ride, or end after it, by so much
 _FPS = 30.0
 _CLIP_HEIGHT = 1080
 _TRANSPARENT = {
@@ -35,9 +35,9 @@ _SOLID = ("-c:v", "libx264", "-preset", "fast", "-crf", "18", "-pix_fmt", "yuv42
 
 @dataclass
 class Overlaid:
-    """pictures, fps: how many there are, and a second. begin_s, end_s: of the ride. offset_s: the ride's time at the
-    video's first picture, None without a video. correlation: of camera and ride where that found the offset. notices:
-    what is remarkable in the ride."""
+    """pictures, fps: their number, and the number per second. begin_s, end_s: the part of the ride. offset_s: the
+    ride's time at the video's first picture, None without a video. correlation: that of camera and ride, by which the
+    offset was found, or None. notices: what is remarkable in the ride."""
 
     pictures: int
     fps: float
@@ -148,7 +148,7 @@ def _found_offset(log: Source, video: Video, progress: Progress | None) -> tuple
 def _part(
     seen: Shown, video: Video | None, offset_s: float | None, from_s: float | None, to_s: float | None, name: str
 ) -> tuple[float, float]:
-    """From when to when of the ride. Raises InputError where the ride does not have it."""
+    """Begin and end, in the ride, of the part to draw. Raises InputError where the ride does not have it."""
     last_s = float(seen.t_s[-1])
     begin_s, end_s = (s if s is None or s >= 0.0 else max(0.0, last_s + s) for s in (from_s, to_s))
     if video is not None and offset_s is not None:

@@ -14,7 +14,7 @@ ACCENT: Colour = (255, 176, 0, 255)  # amber: the colour-blind can distinguish i
 PANEL: Colour = (12, 14, 18, 120)
 CLEAR: Colour = (0, 0, 0, 0)
 _LAMP: Colour = (214, 40, 40, 255)
-_FINER = 4  # shapes are drawn so much larger and made smaller, which smooths their edges
+_FINER = 4  # shapes are drawn larger by this factor and then reduced, which smooths their edges
 
 
 def smooth_mask(size: tuple[int, int], draw, finer: int = _FINER) -> Image.Image:

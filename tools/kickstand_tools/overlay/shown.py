@@ -1,4 +1,4 @@
-"""What the gauge shows at each moment of a ride."""
+"""The values that the gauge shows at each moment of a ride."""
 
 from dataclasses import dataclass
 
@@ -12,9 +12,9 @@ from ..logs.source import Progress
 from ..logs.table import Array
 from ..signals.averages import smoothed
 
-_FORCE_S = 0.3  # over which forces are averaged: engine and road shake them
-_GAP_S = 0.2  # a reading that is older is not shown
-_SPEED_S = 3.0  # the same of a speed, which comes once a second as a rule
+_FORCE_S = 0.3  # forces are averaged over this, because engine and road shake them
+_GAP_S = 0.2  # older readings are not shown
+_SPEED_S = 3.0  # nor older speeds, which mostly come once a second
 
 
 @dataclass
@@ -35,16 +35,16 @@ class Shown:
 
     @property
     def has_speed(self) -> bool:
-        """There is a speed somewhere."""
+        """True if there is a speed at any moment."""
         return bool(np.any(np.isfinite(self.speed_mps)))
 
     @property
     def values(self) -> tuple[Array, ...]:
-        """All but the times, (n) each."""
+        """All values but the times, (n) each."""
         return self.lean_deg, self.forward_g, self.left_g, self.speed_mps, self.left_deg, self.right_deg
 
     def at(self, t_s: Array) -> "Shown":
-        """The same at other times (m); NaN before the ride, after it and in gaps."""
+        """The values at other times (m), interpolated; NaN before the ride, after it and in gaps."""
         before = np.clip(np.searchsorted(self.t_s, t_s, side="right") - 1, 0, len(self.t_s) - 2)
         lean, forward, left = (
             _between(self.t_s, value, before, t_s, _GAP_S) for value in (self.lean_deg, self.forward_g, self.left_g)
@@ -61,8 +61,8 @@ class Shown:
 
 
 def shown(ride: Ride, progress: Progress | None = None, notices: list[Notice] | None = None) -> Shown:
-    """Of a whole ride (see open_ride), with the lean that it was opened with. progress, notices: of Ride.blocks().
-    Raises InputError."""
+    """The values of a whole ride (see open_ride), with the lean that it was opened with. progress, notices: see
+    Ride.blocks(). Raises InputError."""
     columns: list[NDArray[np.float64]] = []
     for block in ride.blocks(progress, notices):
         lean = np.where(block.trusted, block.lean_deg, np.nan)

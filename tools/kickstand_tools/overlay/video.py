@@ -1,4 +1,4 @@
-"""Videos by ffmpeg, which the package imageio-ffmpeg carries: what is in one, and one written picture by picture."""
+"""Reads and writes videos by ffmpeg, which the package imageio-ffmpeg contains."""
 
 import re
 import subprocess
@@ -10,13 +10,13 @@ from pathlib import Path
 from ..errors import InputError, extra
 
 _QUIET = ("-hide_banner", "-loglevel", "error", "-nostdin", "-y")
-_LARGEST, _FASTEST = 16_384, 1000.0  # pixels of a side, pictures a second: more than any camera's
+_LARGEST, _FASTEST = 16_384, 1000.0  # limits of a side in pixels, and of pictures per second: beyond any camera's
 
 
 @dataclass
 class Video:
-    """width, height: as it is shown, pixels. fps: pictures a second. seconds: how long it lasts. telemetry: the number
-    of the stream of a GoPro's sensors, None if there is none."""
+    """width, height: as it is shown, pixels. fps: pictures per second. seconds: its duration. telemetry: the number of
+    the stream of a GoPro's sensors, None if there is none."""
 
     path: Path
     width: int
@@ -27,7 +27,7 @@ class Video:
 
 
 def ffmpeg() -> str:
-    """The program. Raises InputError where it is not installed."""
+    """The path of the program ffmpeg. Raises InputError where it is not installed."""
     try:
         import imageio_ffmpeg
         import PIL  # noqa: F401  the gauge needs it, too
@@ -46,7 +46,7 @@ def input_of(path: Path) -> list[str]:
 
 
 def open_video(path: Path) -> Video:
-    """What a video is. Raises InputError for a file that is none."""
+    """The Video in a file. Raises InputError for a file that is none."""
     if not path.is_file():
         raise InputError(f"{path}: there is no such file" if not path.is_dir() else f"{path} is a directory, no video")
     said = _run(["-hide_banner", "-nostdin", *input_of(path)]).stderr.decode(errors="replace")
@@ -80,7 +80,7 @@ def open_video(path: Path) -> Video:
 
 
 def packets(video: Video, stream: int) -> list[tuple[float, float, bytes]]:
-    """When each packet of a stream begins, how long it is for (s since the first picture), and what is in it."""
+    """(begin, s since the first picture; duration, s; content) of each packet of a stream."""
     chosen = [*input_of(video.path), "-map", f"0:{stream}", "-c", "copy"]
     listed = _run([*_QUIET, *chosen, "-f", "framecrc", "-"]).stdout.decode(errors="replace")
     data = _run([*_QUIET, *chosen, "-f", "data", "-"]).stdout

@@ -4,6 +4,7 @@ from markupsafe import Markup
 
 from ..svg import drawing, element, path
 
+RED, BLACK, BLUE, AMBER = "#d1302a", "#2b2b2b", "#2460d8", "#d99000"  # of wires: supply, ground, SDA, SCL
 _FONT = "DejaVu Sans, Verdana, Helvetica, Arial, sans-serif"
 _MIRRORED = {"start": "end", "end": "start", "middle": "middle"}
 
@@ -27,10 +28,14 @@ class Drawing:
         """A filled circle: a pin, a joint of wires, the cap of a button."""
         self._elements.append(element("circle", cx=self._x(x), cy=y, r=radius, fill=fill))
 
-    def wire(self, colour: str, *points: tuple[float, float]) -> None:
+    def shape(self, fill: str, *corners: tuple[float, float]) -> None:
+        """A filled polygon."""
+        self._elements.append(element("path", d=path([(self._x(x), y) for x, y in corners]) + "Z", fill=fill))
+
+    def wire(self, colour: str, *points: tuple[float, float], width: float = 4) -> None:
         """A line from point to point."""
         line = path([(self._x(x), y) for x, y in points])
-        style = {"stroke_width": 4, "stroke_linejoin": "round", "stroke_linecap": "round"}
+        style = {"stroke_width": width, "stroke_linejoin": "round", "stroke_linecap": "round"}
         self._elements.append(element("path", d=line, fill="none", stroke=colour, **style))
 
     def text(

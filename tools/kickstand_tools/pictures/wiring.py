@@ -8,7 +8,7 @@ from unittest import mock
 
 from .. import firmware_path
 from ..simulated_board.fakes import chips, cpython
-from .drawing import Drawing
+from .drawing import AMBER, BLACK, BLUE, RED, Drawing
 
 
 class Board(NamedTuple):
@@ -45,9 +45,9 @@ ESP32 = Board(
     False,
 )
 
-_RED, _BLACK, _BLUE, _AMBER, _GREEN = "#d1302a", "#2b2b2b", "#2460d8", "#d99000", "#2b8a4b"
+_GREEN = "#2b8a4b"
 _PAD = "#f2c94c"  # of a pin in use
-_COLOURS = {"SDA": _BLUE, "SCL": _AMBER, "signal": _GREEN}
+_COLOURS = {"SDA": BLUE, "SCL": AMBER, "signal": _GREEN}
 _WIDTH, _HEIGHT = 900, 570
 _LEFT, _RIGHT = 76, 256  # edges of the board
 _FIRST_PIN_Y, _PITCH = 120, 20
@@ -78,6 +78,11 @@ def connections(board: Board) -> list[tuple[str, dict[str, str]]]:
     ]
 
 
+def pin_names(board: Board) -> dict[str, str]:
+    """The names of the board's pins for SDA and SCL of a display, and of the one that has USB's 5 V."""
+    return _default_pins(board)["display"] | {"5V": board.far[0] if board.far[0] == "VBUS" else board.far[-1]}
+
+
 def draw(board: Board, display: str) -> str:
     """The drawing of a board with its modules. display: an SVG of a display, for decoration."""
     page = Drawing(_WIDTH, _HEIGHT, mirrored=board.near_is_left)
@@ -94,7 +99,7 @@ def draw(board: Board, display: str) -> str:
     screen = _draw_signals(page, board, pins["display"], _DISPLAY_PINS_Y[1:], _CHANNELS[::-1])
     if grounds[-1] > max(row["display"]):  # a ground near the button's pin, above it
         used_near.add(grounds[-1])
-        page.wire(_BLACK, (_RIGHT, _pin_y(grounds[-1])), (_MODULE_LEFT, _BUTTON_PINS_Y[0]))
+        page.wire(BLACK, (_RIGHT, _pin_y(grounds[-1])), (_MODULE_LEFT, _BUTTON_PINS_Y[0]))
         _draw_signals(page, board, pins["button"], _BUTTON_PINS_Y[1:], _CHANNELS)
     else:  # one on the other side, led around the board
         ground = board.far.index("GND")
@@ -102,14 +107,14 @@ def draw(board: Board, display: str) -> str:
         _draw_signals(page, board, pins["button"], _BUTTON_PINS_Y[:1], _CHANNELS)
         x, y, bottom = _CHANNELS[0], _BUTTON_PINS_Y[1], _HEIGHT - 24
         around = ((_OUTSIDE_X, _pin_y(ground)), (_OUTSIDE_X, bottom), (x, bottom), (x, y))
-        page.wire(_BLACK, (_LEFT, _pin_y(ground)), *around, (_MODULE_LEFT, y))
+        page.wire(BLACK, (_LEFT, _pin_y(ground)), *around, (_MODULE_LEFT, y))
 
     _draw_board(page, board, used_near, used_far)
     _draw_module(page, 68, 122, "Sensor: MPU6050 (GY-521)", [*sensor, "GND"], _SENSOR_PINS_Y, _SENSOR_SUPPLY_Y)
     page.text(_MODULE_MIDDLE, _SENSOR_SUPPLY_Y, "XDA, XCL, AD0, INT: open", 12, "middle", "#d7e4ff")
-    title = "Display for 3.3 V, I2C backpack"
+    title = "Display: OLED, or LCD for 3.3 V"
     _draw_module(page, 248, 130, title, ["GND", *screen], _DISPLAY_PINS_Y, _DISPLAY_SUPPLY_Y)
-    page.picture(_MODULE_MIDDLE - 85, _DISPLAY_SUPPLY_Y - 30, 176, 62, display)
+    page.picture(_MODULE_MIDDLE - 62, _DISPLAY_SUPPLY_Y - 32, 124, 70, display)
     _draw_module(page, 432, 96, "Push button", ["", ""], _BUTTON_PINS_Y)
     page.box(_MODULE_MIDDLE - 24, 464, 48, 48, "#c9ccd2", 6)
     page.disc(_MODULE_MIDDLE, 488, 16, "#2b2f38")
@@ -155,16 +160,16 @@ def _pin_y(row: int) -> int:
 def _draw_supply(page: Drawing, pin_y: int) -> None:
     """3.3 V around the outside to the far edge of both modules."""
     around = ((_OUTSIDE_X, pin_y), (_OUTSIDE_X, _TOP_Y), (_SUPPLY_X, _TOP_Y), (_SUPPLY_X, _DISPLAY_SUPPLY_Y))
-    page.wire(_RED, (_LEFT, pin_y), *around, (_MODULE_RIGHT, _DISPLAY_SUPPLY_Y))
-    page.wire(_RED, (_SUPPLY_X, _SENSOR_SUPPLY_Y), (_MODULE_RIGHT, _SENSOR_SUPPLY_Y))
-    page.disc(_SUPPLY_X, _SENSOR_SUPPLY_Y, 6, _RED)
+    page.wire(RED, (_LEFT, pin_y), *around, (_MODULE_RIGHT, _DISPLAY_SUPPLY_Y))
+    page.wire(RED, (_SUPPLY_X, _SENSOR_SUPPLY_Y), (_MODULE_RIGHT, _SENSOR_SUPPLY_Y))
+    page.disc(_SUPPLY_X, _SENSOR_SUPPLY_Y, 6, RED)
 
 
 def _draw_ground(page: Drawing, pin_y: int) -> None:
     """From one pin to the sensor above and the display below."""
     for y in (_SENSOR_PINS_Y[2], _DISPLAY_PINS_Y[0]):
-        page.wire(_BLACK, (_RIGHT, pin_y), (_GROUND_X, pin_y), (_GROUND_X, y), (_MODULE_LEFT, y))
-    page.disc(_GROUND_X, pin_y, 6, _BLACK)
+        page.wire(BLACK, (_RIGHT, pin_y), (_GROUND_X, pin_y), (_GROUND_X, y), (_MODULE_LEFT, y))
+    page.disc(_GROUND_X, pin_y, 6, BLACK)
 
 
 def _draw_board(page: Drawing, board: Board, used_near: set[int], used_far: set[int]) -> None:

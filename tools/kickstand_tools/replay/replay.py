@@ -1,4 +1,4 @@
-"""A recorded log through the firmware's own LeanMeter, by one of several engines, block by block."""
+"""Replays a recorded log with the firmware's own LeanMeter, by one of several engines, block by block."""
 
 import contextlib
 import io
@@ -28,10 +28,10 @@ from .meter_along import MeterAlong
 
 _CHUNK = 500  # samples between two calls of progress while an emulated Pico works
 
-_LONG_BYTES = 20 << 20  # of the file: a quarter of an hour at 200 Hz: of less a second process costs more than it saves
+_LONG_BYTES = 20 << 20  # a quarter of an hour at 200 Hz: for a smaller file a second process costs more than it saves
 
 _RESULT_BYTES = struct.calcsize(replay_engine.RESULT)
-_EMULATED_S = 1e6  # a log is as long as it is
+_EMULATED_S = 1e6  # limit of the emulated time: practically none, because logs may be long
 
 _SIGMA = replay_engine.COLUMNS.index("lean_sigma_deg")
 
@@ -41,7 +41,7 @@ Engine = Callable[[Iterator[bytes], Progress | None], contextlib.AbstractContext
 
 @dataclass(eq=False)
 class LeanTable(Table):
-    """What the board would have shown: n samples, axes left, up, forward; lean > 0 to the right.
+    """The board's results for a log: n samples, axes left, up, forward; lean > 0 to the right.
 
     t_s: seconds since the first sample; where the readings froze all else is NaN. lean_deg: the meter's lean,
     which is shown where lean_sigma_deg is not NaN.
@@ -97,7 +97,7 @@ def replay_to_csv(
     """
     count, notices = 0, []
     whole = log.source if isinstance(log, Stretch) else log
-    # for the command alone: a program that calls replay() may not be one that can be started once more
+    # for the command alone: a second process imports the main program again, which may not allow that
     run = "two processes" if engine == "cpython" and total_bytes(whole) > _LONG_BYTES else engine
 
     def lines() -> Iterator[bytes]:
@@ -191,7 +191,7 @@ def rp2040(records: Iterator[bytes], progress: Progress | None) -> Iterator[IO[b
     """The results of an emulated Pico: 32-bit floats and the board's own interpreter. Raises InputError, GuestError."""
     from ..emulator import image, native
 
-    image.find()  # says what is not installed, before an import below fails for want of it
+    image.find()  # raises InputError for what is not installed, before an import below fails because of it
     native.build()
     from ..deploy.bytecode import cross_compiled
     from ..emulator import flash_image
@@ -216,7 +216,7 @@ def rp2040(records: Iterator[bytes], progress: Progress | None) -> Iterator[IO[b
     yield results
 
 
-# MicroPython: the board's interpreter; an RP2040: its floats of 32 bits too. Two processes: see second_process.py.
+# micropython: the board's interpreter; rp2040: its 32-bit floats too; two processes: see second_process.py
 _RUN = {
     "cpython": _cpython,
     "two processes": _two_processes,
@@ -226,7 +226,7 @@ _RUN = {
 
 
 def _last_words(traceback: bytes) -> str:
-    """MicroPython's traceback comes over standard output."""
+    """The last line of MicroPython's traceback, which comes over standard output."""
     return traceback.decode(errors="replace").strip().rpartition("\n")[2]
 
 

@@ -38,10 +38,10 @@ NO_SPEED = -1.0  # not NaN, which a board's struct does not read as NaN
 
 
 class ReplayMeter(LeanMeter):
-    """The firmware's meter, for single readings in g and deg/s, where a board has sums of counts."""
+    """The firmware's meter for single readings in g and deg/s; on a board it takes sums of counts."""
 
     def use(self, calibration):
-        """As LeanMeter.use(). The calibration is multiplied out once, (18)-(20) and then (15): 18 products a
+        """Take a calibration: see LeanMeter.use(). (18)-(20) and (15) are multiplied out here: 18 products a
         reading."""
         LeanMeter.use(self, calibration)
         r, slope = calibration.vehicle_from_sensor, calibration.accel_slope
@@ -52,8 +52,8 @@ class ReplayMeter(LeanMeter):
         self._rate_matrix = [radians(value) for value in r]
 
     def update(self, reading, dt_us):
-        """reading: 7 numbers in the chip's order (g, C, deg/s); dt_us: microseconds since the one before, 0 for the
-        first."""
+        """Take a reading: 7 numbers in the chip's order (g, C, deg/s). dt_us: microseconds since the one before, 0 for
+        the first."""
         force, rate = [0.0] * 3, [0.0] * 3
         self.in_vehicle(reading, force, rate)
         self.follow(force, rate, dt_us)
@@ -73,7 +73,7 @@ class ReplayMeter(LeanMeter):
         rate[2] = m[6] * x + m[7] * y + m[8] * z + c[2]
 
     def follow(self, force, rate, dt_us):
-        """update() with what in_vehicle() made of the reading: three numbers each."""
+        """update() with force and rate from in_vehicle(), three numbers each."""
         self.force, self.rate = force, rate
         self._follow(dt_us)
 
@@ -81,7 +81,7 @@ class ReplayMeter(LeanMeter):
 class Replay:
     """The meter over one recording: the only loop that steps it, for every engine, and for a ride as it is streamed.
 
-    calibration: the firmware's own, for readings in g and deg/s.  delay_s: by how much the gyro's low-pass is late.
+    calibration: the firmware's own, for readings in g and deg/s.  delay_s: delay of the gyro's low-pass.
     leans: False for a car.  since_us: time of the sample before the first, if there was one.
     """
 
@@ -107,7 +107,7 @@ class Replay:
         return next(self.follow(((time_us, force, rate, speed_mps),)))
 
     def step(self, time_us, reading, speed_mps=NO_SPEED):
-        """The values of COLUMNS after a sample, as take() has it."""
+        """The values of COLUMNS after a sample; arguments as for take()."""
         meter = self.take(time_us, reading, speed_mps)
         force, rate = meter.force, meter.rate
         return (

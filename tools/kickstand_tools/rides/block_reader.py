@@ -1,4 +1,4 @@
-"""Blocks of a recorded ride read back. The format is firmware/kickstand/rides/block.py's."""
+"""Reads the blocks of a recorded ride. The format is firmware/kickstand/rides/block.py's."""
 
 import struct
 from binascii import crc32
@@ -15,9 +15,9 @@ _HEAD_LENGTH = struct.calcsize(block_format.HEAD)
 _TAIL_LENGTH = struct.calcsize(block_format.TAIL)
 _PLACE_LENGTH = struct.calcsize(block_format.PLACE)
 _START = _HEAD_LENGTH + store.BODY_LENGTH
-_LATE_PERIODS = 2  # sample periods, as in kickstand.imu.sensor: samples were lost
+_LATE_PERIODS = 2  # a turn that is later by so many sample periods has lost samples, as in kickstand.imu.sensor
 _DEGREE = 60 * 100_000  # in the unit of positions, 0.00001 minutes
-_MOST = 1e4  # of a parameter of a calibration, far beyond those that a board stores
+_MOST = 1e4  # largest parameter of a calibration, far beyond those that a board stores
 CUT_SHORT = "cut short"  # the last block of a ride often is: the power went off while it was written
 
 
@@ -27,8 +27,8 @@ class BadBlock(Exception):
 
 @dataclass
 class Place:
-    """A position that came with a turn, and when it was there. lat_deg, lon_deg: north and east; utc_s: Universal Time,
-    s since 1970, None where the receiver did not know the date."""
+    """A position that came with a turn of the loop. lat_deg, lon_deg: north and east; utc_s: its Universal Time, s
+    since 1970, None where the receiver did not know the date."""
 
     lat_deg: float
     lon_deg: float
@@ -48,9 +48,10 @@ class Turn:
 
 @dataclass
 class Block:
-    """One block: the fields of its head, and its turns. time_us: of the last sample before it, since power-on.
-    centidegrees: the temperature. delay_tenths_ms: of the gyro's low-pass, 0 where the firmware did not store it. body:
-    the calibration's bytes. vehicle: what the board's config.py names, "" where it was not asked: it is in no block."""
+    """One ride block: the fields of its head, and its turns. time_us: time of the last sample before it, since
+    power-on. centidegrees: the temperature. delay_tenths_ms: delay of the gyro's low-pass, 0 where the firmware did not
+    store it. body: the calibration's bytes. vehicle: that of the board's config.py, "" if unknown: it is in no
+    block."""
 
     ride: int
     sequence: int
@@ -76,7 +77,8 @@ class Block:
         return store.unpack(self.body, 0)[2]
 
     def missing_s(self) -> list[float]:
-        """Each time without readings, in seconds: turns of the loop that came later than their samples explain."""
+        """The durations of all gaps in the readings, s: turns of the loop that came later than their samples
+        explain."""
         period_us, before_us, found = 1_000_000 // self.sample_hz, self.time_us, []
         for turn in self.turns:
             late_us = turn.time_us - before_us - turn.n * period_us
@@ -87,9 +89,9 @@ class Block:
 
 
 def read(content: bytes) -> tuple[list[Block], list[str]]:
-    """The whole blocks of a file, and what is wrong at each place where there is no whole block.
+    """The whole blocks of a file, and a text about each place where there is no whole block.
 
-    That is CUT_SHORT alone where the last block is not complete, which is no damage.
+    Only CUT_SHORT, if just the last block is incomplete, is no damage.
     """
     blocks, problems = [], []
     at = 0
@@ -139,7 +141,7 @@ def _places(data: bytes) -> Iterator[tuple[int, Place]]:
     """The number of the entry that each position belongs to, and the position."""
     for entry, date, day_ms, lat, lon in struct.iter_unpack(block_format.PLACE, data):
         if abs(lat) > 90 * _DEGREE or abs(lon) > 180 * _DEGREE:
-            continue  # a receiver has said so, and a log with such a position would be refused
+            continue  # a receiver's error: a log with such a position would be refused
         try:
             midnight_s = datetime(2000 + (date >> 9), date >> 5 & 15, date & 31, tzinfo=UTC).timestamp()
         except ValueError:

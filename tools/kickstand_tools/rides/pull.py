@@ -17,7 +17,7 @@ from ..output import check_directory
 from . import ride_log
 from .block_reader import CUT_SHORT, Block, missing_note, read
 
-_SILENT_S = 60  # an emulated board takes a while
+_SILENT_S = 60  # longest wait for an answer: an emulated board takes a while
 
 # Prints the directory and the vehicle, and (ride, part, bytes, path) of each part in it
 _LIST = """
@@ -46,7 +46,7 @@ with open(PATH, "rb") as file:
 """
 
 
-_Came = Callable[[str, int], None]  # called with what comes over, and how many bytes more of it have
+_Came = Callable[[str, int], None]  # called with the name of what is copied, and the number of further bytes
 
 
 class _Part(NamedTuple):
@@ -60,9 +60,9 @@ class _Part(NamedTuple):
 
 @dataclass
 class PulledRide:
-    """log: the file it was written to, with its calibration beside it, or None: nothing in it can be read.  seconds,
-    readings: its length.  problems: a line for each thing that is wrong with it.  whole: all of it came over, but for
-    the end of a ride that a power cut has ended.  deleted: it is no longer on the board."""
+    """log: the file it was written to, with its calibration beside it, or None if nothing in it can be read.  seconds,
+    readings: its length.  problems: a line for each fault.  whole: True if all of it was copied, except for an end that
+    a power cut has lost.  deleted: True if it was removed from the board."""
 
     number: int
     log: Path | None = None
@@ -90,7 +90,7 @@ def pull(
 ) -> PullResult:
     """Write every ride on the board to a log in the directory out, then restart the board.
 
-    delete: remove from the board each ride that came over whole.
+    delete: remove from the board each ride that was copied completely.
     pulled: called with each ride once it is done.  Raises InputError, NoFirmware, OutdatedFirmware.
     """
     check_directory(out)
@@ -124,7 +124,7 @@ def pull(
 
 
 def _list(transport: Board, name: str) -> tuple[str, str, dict[int, list[_Part]]]:
-    """Where the rides are, the vehicle in the board's config.py, and the parts of each."""
+    """The directory of the rides, the vehicle in the board's config.py, and the parts of each ride by its number."""
     first, *lines = printed(transport, name, _LIST, "its rides").splitlines() or [b""]
     directory, vehicle = literal(first, (str, str))
     in_order = sorted(_Part(*literal(line, (int, int, int, str))) for line in lines)
@@ -135,7 +135,8 @@ def _list(transport: Board, name: str) -> tuple[str, str, dict[int, list[_Part]]
 
 
 def _pull_ride(transport: Board, number: int, parts: list[_Part], vehicle: str, out: Path, came: _Came) -> PulledRide:
-    """Write its log. vehicle: in the board's config.py; a ride that two poses have aligned was a motorcycle's."""
+    """Copy a ride and write its log. vehicle: that of the board's config.py; a ride whose alignment is by two poses was
+    a motorcycle's."""
     ride = PulledRide(number)
     blocks: list[Block] = []
     for part in parts:
@@ -172,7 +173,7 @@ def _pull_ride(transport: Board, number: int, parts: list[_Part], vehicle: str, 
 
 
 def _delete(transport: Board, directory: str, parts: list[_Part]) -> None:
-    """Parts of one ride, and the directories that are empty then."""
+    """Remove the parts of one ride, and the directories that are then empty."""
     for part in parts:
         transport.fs_rmfile(part.path)
     emptied = PurePosixPath(parts[0].path).parent

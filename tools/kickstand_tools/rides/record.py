@@ -22,8 +22,8 @@ from .stream import LiveReading, Recording, blocks
 
 @dataclass(frozen=True)
 class RecordResult:
-    """log, calibration: the files.  seconds, readings: how much there is.  notes: a line for each thing that the
-    recording lacks."""
+    """log, calibration: the files.  seconds, readings: length of the recording.  notes: a line for each gap or
+    fault."""
 
     log: Path
     calibration: Path
@@ -40,9 +40,9 @@ def record(
 ) -> RecordResult:
     """Write readings to the log `out`, and NAME.cal.json beside it, until Ctrl-C; then restart the board.
 
-    Neither takes the place of a file: what was ridden before cannot be ridden again. port: None takes the only board
-    that is plugged in.  begin: called with the port's name when readings are about to come.  live: called every half
-    second.  Raises InputError, NoFirmware, OutdatedFirmware.
+    Existing files are not overwritten: an earlier ride cannot be repeated. port: None for the only board that is
+    plugged in.  begin: called with the port's name when readings are about to come.  live: called every half second.
+    Raises InputError, NoFirmware, OutdatedFirmware.
     """
     if not out.name.endswith((".csv", ".csv.gz")):
         raise InputError(f"{out}: give --out a name that ends in .csv or .csv.gz")
@@ -96,7 +96,7 @@ def live_line() -> Iterator[Callable[[str], None]]:
 
 @contextlib.contextmanager
 def _signals(stopped: threading.Event) -> Iterator[None]:
-    """What would end this program ends the recording instead."""
+    """A context in which the signals that would end this program set `stopped` instead."""
     before = {number: signal.signal(number, lambda *_: stopped.set()) for number in _ends()}
     try:
         yield
@@ -106,7 +106,7 @@ def _signals(stopped: threading.Event) -> Iterator[None]:
 
 
 def _ends() -> list[signal.Signals]:
-    """What ends a recording: Ctrl-C, kill, a closed terminal (not of Windows; not after nohup)."""
+    """The signals that end a recording: Ctrl-C, kill, a closed terminal (not on Windows; not after nohup)."""
     ends = [signal.SIGINT, signal.SIGTERM]
     if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
         ends.append(signal.SIGHUP)

@@ -12,7 +12,7 @@ from .block_reader import Block, Turn
 
 
 def header(track: Sequence[str]) -> tuple[str, ...]:
-    """The log's column names. track: those of TRACK that it has."""
+    """The log's column names. track: the columns of TRACK that it has."""
     return (*COLUMNS, *track, "temp_c")
 
 
@@ -38,7 +38,7 @@ def rows(blocks: Iterable[Block], track: Sequence[str], from_us: int = 0) -> Ite
 
 
 def _track_cells(turn: Turn) -> dict[str, str]:
-    """What came from the speed source with a turn: the cells of TRACK."""
+    """The cells of TRACK: the values of the speed source in this turn."""
     cells: dict[str, str] = dict.fromkeys(TRACK, "")
     if turn.speed_mps is not None:
         cells["speed_mps"] = f"{turn.speed_mps:.2f}"

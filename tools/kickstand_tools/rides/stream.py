@@ -1,4 +1,4 @@
-"""A ride as a board streams it: its blocks as they come, into a log, and the lean of each moment."""
+"""Reads a ride that a board streams: writes its blocks to a log as they come, and computes the lean at each moment."""
 
 import binascii
 import contextlib
@@ -32,13 +32,14 @@ except KeyboardInterrupt:
     port.rest_watchdog()
 """
 _VEHICLE = b"vehicle "  # begins the line that _START prints; base64 has no space
-_SILENT_S = 60.0  # an emulated board takes a while to start; one without a sensor says nothing either
+_SILENT_S = 60.0  # longest wait: an emulated board takes a while to start; one without a sensor sends nothing either
 CHANGED = "the board's calibration has changed: the log ends here"
 
 
 @dataclass(frozen=True)
 class LiveReading:
-    """A block of half a second. aligned: the board's sensor is.  car: the board is set to a vehicle that does not lean.
+    """The readings of half a second. aligned: True if the sensor is.  car: the board is set to a vehicle that does not
+    lean.
 
     moments: at each turn of the board's loop (s since the recording began, lean in degrees > 0 to the right, specific
     force forward in g, and to the left in g). What is not known is None: all three before the sensor is aligned, and
@@ -60,9 +61,10 @@ class LiveReading:
 
 
 class Recording:
-    """Blocks into a file. stopped: set where the log has to end, so that the blocks end too.  live: called for each.
+    """Writes blocks to a log. stopped: an event that is set where the log has to end, which ends the stream.  live:
+    called with each block's LiveReading.
 
-    first: the first block; seconds, count: how much there is."""
+    first: the first block; seconds, count: duration and number of readings so far."""
 
     def __init__(self, stopped: threading.Event, live: Callable[[LiveReading], None] | None = None) -> None:
         self._stopped = stopped
@@ -72,8 +74,7 @@ class Recording:
         self._live = live
 
     def write(self, file: IO[str], blocks: Iterator[Block], notes: list[str]) -> None:
-        """All of them as they come. notes: gets a line for each thing that is missing. Raises InputError if there is
-        none."""
+        """Write all blocks as they come. notes: gets a line for each gap. Raises InputError if there is no block."""
         missing, expected = 0, 0
         missing_s: list[float] = []
         replay = Replay(CalibrationFile().to_firmware())
@@ -129,8 +130,8 @@ class Recording:
 
 
 def blocks(transport: Board, name: str, notes: list[str], stopped: threading.Event) -> Iterator[Block]:
-    """Whole blocks as the board says them, until `stopped` is set or the connection is lost. name: the port's, for
-    notes, which get a line for what has ended it. Raises NoFirmware, OutdatedFirmware."""
+    """Yield the whole blocks that the board sends, until `stopped` is set or the connection is lost. name: the port's.
+    notes: gets a line with the reason for the end. Raises NoFirmware, OutdatedFirmware."""
     parts: list[bytes] = []
     vehicle = ""
     for line in _lines(transport, name, notes, stopped):
@@ -148,7 +149,7 @@ def blocks(transport: Board, name: str, notes: list[str], stopped: threading.Eve
 
 
 def _lines(transport: Board, name: str, notes: list[str], stopped: threading.Event) -> Iterator[bytes]:
-    """What the app on the board prints, line by line."""
+    """Yield the lines that the app on the board prints."""
     try:
         yield from lines(transport, _START, _SILENT_S, stopped)
         if not stopped.is_set():

@@ -1,4 +1,4 @@
-"""Readings of a sensor, calibrated and along other axes."""
+"""Calibrates a sensor's readings, and rotates them to other axes."""
 
 from . import Array
 

@@ -9,24 +9,25 @@ from . import Array
 
 
 def cell_numbers(time_s: Array, cell_s: float) -> NDArray[np.int64]:
-    """(n) the cell that each time lies in; a time on the edge of two, but for rounding, in the later one."""
+    """(n) the number of the cell that each time lies in. A time on the edge of two cells, within rounding, is in the
+    later one."""
     return np.floor(time_s / cell_s + 1e-6).astype(np.int64)
 
 
 def runs(values: NDArray[np.generic]) -> NDArray[np.intp]:
-    """(m) the first index of each run of equal ones among n > 0 values."""
+    """(m) the first index of each run of equal values among n > 0 values."""
     return np.flatnonzero(np.append(True, values[1:] != values[:-1]))
 
 
 def stretches(true: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """(m, 2) the first index, and that after the last, of each stretch in which n values are True."""
+    """(m, 2) the first index, and that after the last, of each run of True among n values."""
     return np.flatnonzero(np.diff(np.concatenate(([False], true, [False])))).reshape(-1, 2)
 
 
 @dataclass
 class EvenCells:
-    """n cells in a row, some without samples. first: number of the first one. count (n): samples in each. means (n, k)
-    and latest (n, j): as given to Cells.add(), NaN where there is none."""
+    """n successive cells, some without samples. first: number of the first cell. count (n): samples in each. means
+    (n, k), latest (n, j): see Cells.add(); NaN where there is no value."""
 
     first: int
     count: Array
@@ -34,7 +35,8 @@ class EvenCells:
     latest: Array
 
     def merged(self, by: int) -> "EvenCells":
-        """Cells of `by` of these each, the first of which begins at a multiple of that. Of latest the first value."""
+        """Cells that are `by` times as long and begin at multiples of `by`. Their `latest` is the first value in
+        each."""
         before = self.first % by
         after = -(before + len(self.count)) % by
 
@@ -52,18 +54,19 @@ class EvenCells:
 
 
 class Cells:
-    """add() takes samples in the order of time, block by block.
+    """Averages samples over cells of time. add() takes them in the order of time, block by block.
 
-    cell_s: length of a cell, s. most: so many are kept, the last ones that have samples; 0: all.
+    cell_s: length of a cell, s. most: number of cells with samples that are kept, the last ones; 0: all.
     """
 
     def __init__(self, cell_s: float, most: int = 0) -> None:
         self.cell_s, self._most = cell_s, most
-        self._parts: list[Array] = []  # (m, 2 + k + j): number of the cell, count, sums, latest values
+        self._parts: list[Array] = []  # (m, 2 + k + j): number of the cell, count of samples, sums, latest values
         self._means = 0
 
     def add(self, time_s: Array, means: Array, latest: Array) -> None:
-        """n samples. means (n, k): averaged. latest (n, j): the last value in each cell that is not NaN is kept."""
+        """Take n samples. means (n, k): values that are averaged. latest (n, j): values of which each cell keeps the
+        last that is not NaN."""
         if not len(time_s):
             return
         number = cell_numbers(time_s, self.cell_s)
@@ -86,7 +89,7 @@ class Cells:
             self._parts = [np.vstack(self._parts)[-self._most :]]
 
     def evenly(self, longest: int) -> EvenCells | None:
-        """The cells from the first to the last with samples; None where there are none, or more than longest."""
+        """The cells from the first to the last one with samples; None if there are none, or more than `longest`."""
         table = np.vstack(self._parts) if self._parts else np.zeros((0, 2))
         place = (table[:, 0] - table[:1, 0]).astype(np.int64)
         if not len(place) or place[-1] >= longest:

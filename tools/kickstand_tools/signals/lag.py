@@ -1,7 +1,7 @@
-"""By how much one signal is later than another, as a satellite receiver's speed is later than the force.
+"""The lag of one signal behind another, such as that of a satellite receiver's speed behind the force.
 
-Either some lags are tried, and that of the largest correlation is taken (cross-correlation). Or, where nothing is known
-of the shift, all are tried at once by Fourier transforms.
+Either some lags are tried, and the one with the largest correlation is taken (cross-correlation). Or, where the shift
+may be anything, all are tried at once by Fourier transforms.
 """
 
 from collections.abc import Callable, Iterable
@@ -15,17 +15,18 @@ from . import Array
 
 @dataclass
 class Correlation:
-    """value: 0 to 1. direction (k): unit vector in which the cause goes with the effect most."""
+    """value: correlation, 0 to 1. direction (k): unit vector along which the cause's covariance with the effect is
+    largest."""
 
     value: float
     direction: Array
 
 
 def correlation(effect: Array, cause: Array, whole: bool = False) -> Correlation:
-    """Of effect (n) with cause (n, k) along the direction in which their covariance is largest.
+    """The correlation of effect (n) with the component of cause (n, k) along the direction of their largest covariance.
 
-    whole: in parts of all of the cause, not of what it does along that direction; this is less where it does much
-    across.
+    whole: normalise by the variance of all components of the cause, not only of the one along `direction`. The value is
+    then smaller where the cause also varies across that direction.
     """
     effect, cause = effect - np.mean(effect), cause - np.mean(cause, axis=0)
     both = effect @ cause
@@ -37,7 +38,7 @@ def correlation(effect: Array, cause: Array, whole: bool = False) -> Correlation
 
 @dataclass
 class Lag(Correlation):
-    """lag_s: by which the effect is later. inside: it is neither the first nor the last of those tried."""
+    """lag_s: delay of the effect against the cause. inside: it is neither the first nor the last of the lags tried."""
 
     lag_s: float
     inside: bool
@@ -46,10 +47,10 @@ class Lag(Correlation):
 def best_lag(
     lags_s: Iterable[float], pair_at: Callable[[float], tuple[Array, Array] | None], whole: bool = False
 ) -> Lag | None:
-    """The lag of the largest correlation, between those tried by a parabola through the squares beside it.
+    """The lag of the largest correlation, interpolated by a parabola through its square and the two beside it.
 
-    lags_s: evenly spaced, increasing. pair_at: the effect (n) and the cause (n, k) so much earlier, None where there is
-    too little to say. whole: see correlation(). None if pair_at gives None everywhere.
+    lags_s: evenly spaced, increasing. pair_at: called with a lag, returns the effect (n) and the cause (n, k) that much
+    earlier, or None if there are too few values. whole: see correlation(). Returns None if pair_at always does.
     """
     tried = [(lag_s, pair_at(lag_s)) for lag_s in lags_s]
     found = [(lag_s, correlation(*pair, whole)) for lag_s, pair in tried if pair is not None]
@@ -74,10 +75,10 @@ def peak_offset(three: Array) -> float:
 def correlations(
     first: Array, first_good: NDArray[np.bool_], second: Array, second_good: NDArray[np.bool_]
 ) -> tuple[Array, Array]:
-    """The correlation of two signals of zero mean, and how many samples it comes from, at each shift.
+    """The correlation of two signals of zero mean, and the number of samples in it, at each shift.
 
-    first (n), second (m) on one clock rate, good where they count. Returns two arrays (n + m - 1): entry j is for
-    second[i] beside first[i + j - (m - 1)].
+    first (n), second (m): at the same sample rate. first_good, second_good: True for samples that are used. Returns two
+    arrays (n + m - 1): entry j is for second[i] beside first[i + j - (m - 1)].
     """
     size = 1 << int(np.ceil(np.log2(len(first) + len(second))))
     a, b = np.where(first_good, first, 0.0), np.where(second_good, second, 0.0)
@@ -88,20 +89,20 @@ def correlations(
 
     there, other = first_good.astype(float), second_good.astype(float)
     count = np.maximum(np.rint(crossed(there, other)), 0.0)
-    # The squares' sums are differences of large numbers: below a share of the whole they are rounding
+    # The transforms' rounding errors are a share of the whole sums of squares: smaller results mean nothing
     square = np.maximum(crossed(a * a, other), 1e-9 * (a @ a)) * np.maximum(crossed(there, b * b), 1e-9 * (b @ b))
     return crossed(a, b) / np.sqrt(np.maximum(square, 1e-30)), count
 
 
 def log_likelihood_ratio(correlation: Array, count: Array, per_sample: float) -> Array:
-    """Natural logarithm of how much likelier two normal signals are with this correlation than without any; 0 for a
-    negative one. correlation, count: of correlations(). per_sample: independent samples in each."""
+    """Natural logarithm of the likelihood ratio of two normal signals: with this correlation over with none; 0 for a
+    negative correlation. correlation, count: see correlations(). per_sample: independent values per sample."""
     r = np.clip(correlation, 0.0, 0.999)
     return -0.5 * per_sample * count * np.log1p(-r * r)
 
 
 def peaks(values: Array, apart: int, most: int) -> list[int]:
-    """The places of the largest values over 0, the largest first, at least `apart` from each other."""
+    """Indices of the largest values over 0, at most `most`, the largest first, each over `apart` from the others."""
     left, found = values.copy(), []
     while len(found) < most and np.max(left) > 0.0:
         place = int(np.argmax(left))

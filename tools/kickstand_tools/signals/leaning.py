@@ -1,8 +1,8 @@
-"""A motorcycle's leaning against its turning, from its rates alone.
+"""How a motorcycle's lean and yaw rate go together, from its rates alone: shows forward, handedness, unit of the rates.
 
 A bike that begins to turn leans: tan(lean) = -speed x yaw rate / g. So the rate about forward, which changes the lean,
-goes with minus the change of the yaw rate, which also parts forward from backward. Leaned, it turns about its own left
-too, by yaw rate x sin(lean): as a product of two quantities, that shows handedness and the unit of the rates.
+correlates with minus the change of the yaw rate; the sign separates forward from backward. A leaning bike's rate about
+its own left is yaw rate x sin(lean): as a product of two quantities, that shows handedness and the unit of the rates.
 """
 
 from dataclasses import dataclass
@@ -14,22 +14,22 @@ from numpy.typing import NDArray
 from . import Array
 from .averages import moving_mean, moving_spread
 
-WINDOW_S = 0.2  # rates and forces are means over it
-SMOOTH_S = 0.6  # of the rates whose changes are compared
-SLOW_S = 12.0  # leans that last longer cannot be parted from the drift of the gyro
-# Simulated rides and recordings in deg/s have a share of 1.0 to 1.6 and in rad/s of 57 to 92, of over 5 sigmas; cars
-# have a likeness under 0.6.
+WINDOW_S = 0.2  # rates and forces are means over windows of this length
+SMOOTH_S = 0.6  # the rates whose changes are compared are moving means over this
+SLOW_S = 12.0  # changes of lean that take longer cannot be separated from the gyro's drift
+# Rates are in rad/s where a Leaning exceeds all three. Simulated rides and recordings in deg/s have a share of 1.0 to
+# 1.6, in rad/s of 57 to 92, at over 5 sigmas; cars have a likeness under 0.6.
 SHARE, SIGMAS, LIKENESS = 15.0, 4.5, 0.65
-LEAST_LEAN = np.radians(2.0 / 57.3)  # rms: less is nearly straight
+LEAST_LEAN = np.radians(2.0 / 57.3)  # rms: a ride that leans less is nearly straight; 2 degrees if rates are in rad/s
 
 
 @dataclass
 class Leaning:
-    """matrix (3, 3): vehicle from sensor, rows left, up, forward, about. rolled (n, rad): lean without what changes
-    slowly. yaw (n, rad/s): positive to the left; turned (n): the same without what changes slowly. likeness:
-    correlation of rolled and -turned while riding. speed: the usual one that goes with both, m/s. share: the rate about
-    left in parts of yaw x sin(lean): 1 where the axes are right-handed and the rates in their unit. sigmas: how far the
-    share is from 0.
+    """matrix (3, 3): vehicle from sensor, rows left, up, forward, roughly. rolled (n, rad): lean without its slow
+    changes (see without_drift()). yaw (n, rad/s): yaw rate, positive to the left; turned (n): the same without slow
+    changes. likeness: correlation of rolled and -turned while riding. speed (m/s): the one that balances yaw rate and
+    lean, by regression. share: rate about left over yaw x sin(lean), by regression: 1 where the axes are right-handed
+    and the rates in deg/s. sigmas: |share| over its standard deviation.
     """
 
     matrix: Array
@@ -43,7 +43,8 @@ class Leaning:
 
 
 def leaning_of(rate: Array, force: Array, riding: NDArray[np.bool_]) -> Leaning:
-    """n windows of WINDOW_S. rate (n, 3, rad/s) without bias, force (n, 3), riding (n): those that are compared."""
+    """The Leaning of n windows of WINDOW_S. rate (n, 3, rad/s): without bias. force (n, 3). riding (n): True for the
+    windows that are used."""
     up = _unit(force[riding].mean(axis=0))
     yaw = averaged(rate @ up, SMOOTH_S)
     level = averaged(rate - np.outer(rate @ up, up), SMOOTH_S)
@@ -74,39 +75,42 @@ def leaning_of(rate: Array, force: Array, riding: NDArray[np.bool_]) -> Leaning:
 
 
 def speed_in_radians(found: Leaning) -> float | None:
-    """The speed of the bends, m/s, if the rates, which are 57 times too small, are deg/s; None where they may be."""
+    """Where the rates are surely in rad/s, not in deg/s (so 57 times too small): the impossible speed in the bends,
+    m/s, that deg/s would mean. Else None."""
     wrong = found.share > SHARE and found.sigmas > SIGMAS and found.likeness > LIKENESS
     return float(np.degrees(found.speed)) if wrong and leans(found) else None
 
 
 def leans(found: Leaning) -> bool:
-    """Enough for its leaning to show anything."""
+    """True where the bike leans at all: the rms of the lean is over LEAST_LEAN."""
     return float(np.sqrt(np.mean(found.rolled**2))) > LEAST_LEAN
 
 
 def leaned(rolled: Array, yaw: Array, speed: Array | float) -> Array:
-    """(n, rad) the lean whose changes are rolled's, and which over long is that of a balanced bend at this speed."""
+    """(n, rad): lean whose quick changes are those of `rolled` and whose slow ones (slower than SLOW_S) are those of
+    the lean that balances the yaw rate at this speed."""
     balanced = np.arctan(-speed * yaw / STANDARD_GRAVITY)
     return rolled + balanced - without_drift(balanced)
 
 
 def averaged(values: Array, seconds: float) -> Array:
-    """Mean over so many seconds around each window; (n) or (n, k)."""
+    """Moving mean, over so many seconds, of windows' values (n) or (n, k)."""
     return moving_mean(values, _windows(seconds))
 
 
 def without_drift(values: Array) -> Array:
-    """(n) less what changes more slowly than SLOW_S."""
+    """values (n) without their slow changes: less their moving mean, taken twice, over SLOW_S."""
     return values - averaged(averaged(values, SLOW_S), SLOW_S)
 
 
 def unrest(values: Array, over_s: float) -> Array:
-    """(n): standard deviation within over_s, of the component that has the largest; values (n, 3)."""
+    """(n): for each window of values (n, 3) the standard deviation over over_s seconds, of the component with the
+    largest."""
     return moving_spread(values, _windows(over_s)).max(axis=1, initial=0.0)
 
 
 def _windows(seconds: float) -> int:
-    """An odd number of windows that are about so long."""
+    """The odd number of windows that last about so long."""
     return 2 * max(1, round(seconds / WINDOW_S / 2.0)) + 1
 
 

@@ -29,6 +29,6 @@ def rotation_matrix(vector: Array) -> Array:
 def rotation_vector(matrix: Array) -> Array:
     """(..., 3, rad) log: the rotation vector of matrices (..., 3, 3), each of under 180 degrees."""
     axis = np.stack([matrix[..., i, j] - matrix[..., j, i] for i, j in ((2, 1), (0, 2), (1, 0))], axis=-1)
-    sine = np.linalg.norm(axis, axis=-1, keepdims=True)  # twice
+    sine = np.linalg.norm(axis, axis=-1, keepdims=True)  # twice the sine of the angle
     angle = np.arctan2(sine, np.trace(matrix, axis1=-2, axis2=-1)[..., None] - 1.0)
     return axis / np.maximum(sine, 1e-12) * angle

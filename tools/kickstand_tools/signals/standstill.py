@@ -1,4 +1,4 @@
-"""When a vehicle stands still, by how little its readings change: for zero-velocity updates, for the gyro's bias."""
+"""Detects standstill by how little readings change: for zero-velocity updates and for the gyro's bias."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -6,8 +6,8 @@ from numpy.typing import NDArray
 from . import Array
 from .averages import moving_spread
 
-STANDING_MPS = 0.3  # a slower speed is standing: satellites never quite say 0
-STANDS = 4.0  # such a speed allows so many times the changes
+STANDING_MPS = 0.3  # a lower speed is standing: a receiver's is never quite 0
+STANDS = 4.0  # factor on the limits of the changes at such a speed
 
 
 def motionless(
@@ -16,8 +16,8 @@ def motionless(
     """(m) True where, over the n of m samples around each, no component of rate (m, 3) and of force (m, 3) has a
     standard deviation over most_rate and most_force, in their units.
 
-    Of means over a fifth of a second, in which an idling engine averages out. speed_mps (m): NaN where there is none.
-    A rate that stays the same is a bias or a steady turn: judge its mean beside this.
+    Samples: means over a fifth of a second, in which an idling engine averages out. speed_mps (m): NaN where there is
+    none. A constant rate passes, as bias or as a steady bend: check its mean in addition.
     """
     speed = np.full(len(rate), np.nan) if speed_mps is None else speed_mps
     allowed = np.where(speed < STANDING_MPS, STANDS, 1.0)

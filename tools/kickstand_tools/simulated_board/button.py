@@ -1,14 +1,14 @@
 """Model of a push button to ground whose contacts bounce."""
 
 BOUNCE_US = 4000
-RELEASED_US = 150_000  # at least so long between two presses
+RELEASED_US = 150_000  # least time between two presses
 _BOUNCES = 3  # short openings (or closings) after each edge
 
 
 class Button:
-    """closed: True while its contacts touch. seed: of the random moments at which they bounce.
+    """closed: True while its contacts touch. seed: determines the random moments at which they bounce.
 
-    charge_us: how long the pin's pull-up takes to charge a capacitor that is soldered to them, 0 for none.
+    charge_us: time in which the pin's pull-up charges a capacitor that is soldered to them, 0 for none.
     """
 
     def __init__(self, clock, seed=1):
@@ -19,7 +19,7 @@ class Button:
         self._random = seed & 0x7FFFFFFF or 1
 
     def low(self, pulled_us):
-        """True if its pin is low. pulled_us: since when the pin has a pull-up."""
+        """True if its pin is low. pulled_us: the time at which the pin got a pull-up."""
         return self.closed or self._clock.now_us < pulled_us + self.charge_us
 
     def press(self, at_us, for_us):

@@ -7,7 +7,7 @@ from heapq import heappop, heappush
 _host_ns, _host_sleep = _host_time.time_ns, _host_time.sleep
 
 NEVER_US = 1 << 60  # later than any run lasts
-_PACE_STEP_US = 5000  # how often a paced clock compares itself with the host's
+_PACE_STEP_US = 5000  # time between two comparisons of a paced clock with the host's
 
 
 def _host_us():
@@ -28,8 +28,8 @@ def to_us(seconds):
 
 
 class Clock:
-    """now_us: the time since the clock was made. Models read it and schedule calls with at(); what takes time calls
-    advance().
+    """now_us: the time since the clock was made. Models read it and schedule calls with at(); operations that take time
+    call advance().
 
     pace: simulated seconds per second of the host: 1.0 for real time, 0 for as fast as the host can.
     """
@@ -45,6 +45,11 @@ class Clock:
         self._host_lead_us = 0
         self.set_pace(pace)
 
+    @property
+    def next_us(self):
+        """When advance() next does more than let time pass."""
+        return self._next_us
+
     def advance(self, us):
         """Let time pass and run the events that are due. Raises PowerOff at the deadline, and what events raise."""
         target = self.now_us + us
@@ -54,7 +59,7 @@ class Clock:
             self._pass_to(target)
 
     def at(self, due_us, function):
-        """Call function() at due_us; if that time is over, as soon as time passes again."""
+        """Call function() at due_us; if that time has passed, at the next advance()."""
         self._number += 1
         heappush(self._events, (due_us, self._number, function))
         self._plan()
@@ -69,7 +74,7 @@ class Clock:
         self.at(self.now_us + period_us, again)
 
     def set_deadline(self, due_us):
-        """From due_us on advance() raises PowerOff, each time it is called. None: never."""
+        """Let advance() raise PowerOff at each call from due_us on. None: never."""
         self._deadline_us = NEVER_US if due_us is None else due_us
         self._plan()
 
@@ -124,14 +129,14 @@ class Watchdog:
         self._round = 0  # counts start() and stop(): checks that an earlier start() has scheduled do nothing
 
     def start(self, timeout_us):
-        """From now on feed() must be called within timeout_us."""
+        """Start the watchdog: from now on feed() must be called within each timeout_us."""
         self._timeout_us = timeout_us
         self._round += 1
         self.feed()
         self._check_later(self._round)
 
     def stop(self):
-        """Feeding is no longer needed."""
+        """Stop the watchdog."""
         self._round += 1
 
     def feed(self):

@@ -1,4 +1,4 @@
-"""The fault script: what goes wrong on the simulated board, and when.
+"""The fault script: the faults on the simulated board, with their times.
 
 Times are in seconds of the board's clock, I2C addresses have 7 bits.
 """
@@ -12,7 +12,7 @@ from .i2c import TransferFault
 
 _FOREVER = 1 << 60  # a number of transfers
 _BLOCK = 4096  # bytes of flash that are erased at once
-_STALL_S = 0.5  # that a print waits for a host which takes nothing (shared/tinyusb/mp_usbd_cdc.h of MicroPython)
+_STALL_S = 0.5  # a print waits so long for a host that reads nothing (shared/tinyusb/mp_usbd_cdc.h of MicroPython)
 
 
 class Faults:
@@ -42,18 +42,14 @@ class Faults:
         """Every transfer to address hangs until the controller gives up, for for_s."""
         self._during("timeout", address, at_s, for_s)
 
-    def corrupt(self, address, nth=1, byte=0, mask=0x01, read=True):
-        """In the nth transfer from now the bits of mask are inverted in one byte read (read=False: written)."""
-        self._transfers("corrupt", address, nth, 1, byte, mask, read)
-
-    def bit_slip(self, address, nth=1, byte=0):
-        """The device misses a clock in the nth transfer from now: what is read from that byte on comes one bit late."""
-        self._transfers("slip", address, nth, 1, byte)
+    def corrupt(self, address, nth=1, byte=0, mask=0x01):
+        """In the nth transfer from now the bits of mask are inverted in one byte that is read."""
+        self._transfers("corrupt", address, nth, 1, byte, mask)
 
     def cut(self, address, at_s, byte):
         """The first transfer to address after at_s that has so many bytes breaks off at byte `byte`."""
 
-        self._board.at(at_s, lambda: self._transfers("cut", address, 1, _FOREVER, byte, read=False))
+        self._board.at(at_s, lambda: self._transfers("cut", address, 1, _FOREVER, byte))
 
     def stuck_sda(self, at_s, bits=8, lcd=False):
         """A device on the sensor's bus (lcd: on the display's) holds SDA low until SCL was clocked `bits` times."""
@@ -155,7 +151,7 @@ class Faults:
             self._real_open = None
 
     def _replace_open(self, opened):
-        """From now on files are opened by opened(the real open(), its arguments)."""
+        """Open files by opened(the real open(), its arguments) from now on."""
         self.restore_files()
         self._real_open = real = builtins.open
         builtins.open = lambda *arguments, **named: opened(real, *arguments, **named)
@@ -172,7 +168,7 @@ class Faults:
     # On USB
 
     def usb_asleep(self, at_s, for_s):
-        """The host takes nothing: what is printed waits, and is lost."""
+        """The host reads nothing: each print waits, and its text is lost."""
 
         def begin():
             self._real_print = builtins.print
@@ -186,10 +182,10 @@ class Faults:
             builtins.print = self._real_print
             self._real_print = None
 
-    def _transfers(self, kind, address, nth, count, byte=0, mask=0, read=True):
+    def _transfers(self, kind, address, nth, count, byte=0, mask=0):
         for bus in self._board.buses:
             first = bus.transfers.get(address, 0) + nth
-            bus.faults.append(TransferFault(kind, address, first, first + count - 1, byte=byte, mask=mask, read=read))
+            bus.faults.append(TransferFault(kind, address, first, first + count - 1, byte=byte, mask=mask))
 
     def _during(self, kind, address, at_s, for_s):
         for bus in self._board.buses:
@@ -218,7 +214,7 @@ class Faults:
 
 
 class _Wrapped:
-    """What the two below leave to the file itself."""
+    """The base of the two classes below: passes all else on to the file."""
 
     def __init__(self, file):
         self._file = file
@@ -239,7 +235,7 @@ class _ErasedFile(_Wrapped):
     def __init__(self, file, erase):
         super().__init__(file)
         self._erase = erase
-        self._room = 0  # bytes that are left in the block
+        self._room = 0  # free bytes in the flash block
 
     def write(self, data):
         self._room -= len(data)

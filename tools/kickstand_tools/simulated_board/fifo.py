@@ -1,8 +1,8 @@
-"""The sensor's FIFO: a ring of bytes. Where a frame begins it does not know, as the chip's does not."""
+"""The sensor's FIFO: a ring of bytes. It does not know where frames begin, just as the chip's."""
 
 
 class Fifo:
-    """size: how many bytes it holds. count: how many wait to be read."""
+    """size: its capacity in bytes. count: number of bytes that wait to be read."""
 
     def __init__(self, size):
         self.size = size

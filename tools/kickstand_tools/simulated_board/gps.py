@@ -7,7 +7,7 @@ _HOME = 48.1173, 11.5166667  # degrees north and east
 
 
 def _angle(degrees, digits, sides):
-    """As NMEA writes it: degrees with so many digits, minutes, and the letter of its side."""
+    """An angle in the form of NMEA: degrees with so many digits, minutes, and the letter of its side."""
     parts = int(abs(degrees) * 6e6 + 0.5)  # 0.00001 minutes
     whole, rest = parts // 6_000_000, parts % 6_000_000
     side = sides[1] if degrees < 0.0 else sides[0]
@@ -48,11 +48,11 @@ class Gps:
         clock.every(1_000_000 // hz, self._fix)
 
     def connect(self, receive):
-        """From now on receive(bytes) is called with what is sent."""
+        """Call receive(bytes) with the bytes that are sent from now on."""
         self._receive = receive
 
     def disconnect(self):
-        """Nobody receives any more."""
+        """Stop calling receive()."""
         self._receive = None
 
     def _has(self, kind):

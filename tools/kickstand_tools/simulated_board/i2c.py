@@ -1,4 +1,4 @@
-"""A pair of I2C wires with devices on them: who answers, and what faults of the wires do.
+"""A pair of I2C wires with devices on them, and faults of the wires.
 
 A controller (the fake machine.I2C or that of an emulated chip) calls start, write_byte, read_byte and stop, and lets
 the time pass that the bits take. Pins that drive the wires directly call set_scl and set_sda.
@@ -11,20 +11,17 @@ class TransferFault:
     """A fault in the transfers number first to last to one address, if they begin between from_us and until_us.
 
     kind: "nack"; "timeout"; "cut" acknowledges no byte from the number byte on, once; "corrupt" inverts the bits of
-    mask in the data byte with the number byte; "slip" delays what is read by one bit from that byte on. read: the fault
-    is in what is read, else in what is written.
+    mask in the byte read with the number byte.
     """
 
-    def __init__(self, kind, address, first, last, from_us=0, until_us=NEVER_US, byte=0, mask=0, read=True):
+    def __init__(self, kind, address, first, last, from_us=0, until_us=NEVER_US, byte=0, mask=0):
         self.kind = kind
         self.mask = mask
         self._address = address
         self._numbers = (first, last)
         self._times = (from_us, until_us)
         self._byte = byte
-        self._read = read
         self._count = 0
-        self._carry = 0
 
     def applies(self, address, number, now_us):
         """Whether the transfer that begins now has this fault."""
@@ -38,31 +35,19 @@ class TransferFault:
         return {"nack": False, "timeout": None}.get(self.kind, True)
 
     def on_write(self, value):
-        """What arrives of a byte that the controller sends, None if it is not acknowledged. Byte 0 is the first,
+        """The byte that arrives when the controller sends value, None if it is not acknowledged. Byte 0 is the first,
         usually the register address."""
-        if self.kind == "cut":
-            self._count += 1
-            if self._count <= self._byte:
-                return value
-            self._numbers = (0, -1)
-            return None
-        return value if self._read else self._spoil(value)
+        self._count += 1
+        if self.kind != "cut" or self._count <= self._byte:
+            return value
+        self._numbers = (0, -1)
+        return None
 
     def on_read(self, value):
-        """What arrives of a byte that a device sends."""
-        return self._spoil(value) if self._read else value
-
-    def _spoil(self, value):
+        """The byte that arrives when a device sends value."""
         number = self._count
         self._count += 1
-        if self.kind == "corrupt":
-            return value ^ self.mask if number == self._byte else value
-        if number < self._byte:
-            return value
-        # The device missed a clock: one bit is read twice, and all later bits come one clock late
-        late = (value & 0x80 if number == self._byte else self._carry << 7) | value >> 1
-        self._carry = value & 1
-        return late
+        return value ^ self.mask if self.kind == "corrupt" and number == self._byte else value
 
 
 class Bus:
@@ -73,9 +58,9 @@ class Bus:
         self.sda = sda
         self.scl = scl
         self.devices = {}  # by address
-        self.transfers = {}  # by address: how many were begun
-        self.faults = []  # of TransferFault
-        self._fault = None  # of the transfer under way
+        self.transfers = {}  # by address: number of transfers that were begun
+        self.faults = []  # a list of TransferFault
+        self._fault = None  # the fault of the transfer under way
         self._device = None
         self.open = False
         self._driven_scl = 1

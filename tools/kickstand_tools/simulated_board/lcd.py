@@ -46,7 +46,7 @@ class Lcd:
         self.power_on()
 
     def power_on(self):
-        """As the internal reset leaves it: 8-bit mode, one line, off. Busy for POWER_UP_US."""
+        """Set the state after the internal reset: 8-bit mode, one line, off, busy for POWER_UP_US."""
         self.ddram = bytearray(b" " * 128)  # by address: lines at 0x00..0x27 and 0x40..0x67
         self.cgram = bytearray(64)
         self.glyphs = [" "] * 8  # the patterns in cgram as text

@@ -16,7 +16,7 @@ class Mpu6050:
     clock: a Clock, of which the model reads now_us.
     world(t_s): (fx, fy, fz in g, wx, wy, wz in deg/s[, temp_c]) along the chip's axes, its offset and scale errors
     included.
-    clock_error: how much faster than its nominal rate the chip samples, as a fraction (0.01 = 1 %).
+    clock_error: relative error of the chip's sample rate, > 0 for a faster one (0.01 = 1 %).
     """
 
     def __init__(self, clock, world, who_am_i=0x68, address=0x68):
@@ -34,7 +34,7 @@ class Mpu6050:
         self.power_on()
 
     def power_on(self):
-        """Every register as after power-on and after a reset; writes are lost for START_UP_US."""
+        """Set every register as after power-on and after a reset; writes are lost for START_UP_US."""
         regs = self._regs
         for i in range(128):
             regs[i] = 0
@@ -66,7 +66,7 @@ class Mpu6050:
             self._start_sampling(self._busy_us)
 
     def override(self, value):
-        """A fault from now on: "freeze" (no new data), or the value that every data byte reads as. None ends it."""
+        """Begin a fault: "freeze" (no new data), or the value that every data byte reads as. None ends it."""
         self._update()
         self._override = value
 

@@ -19,7 +19,7 @@ DATA_RDY, FIFO_OFLOW = 0x01, 0x10  # INT_STATUS
 START_UP_US = 90_000  # after power-on and reset: the sheet's worst case is 100 ms
 WAKE_US = 30_000  # from sleep to the first sample: gyro start-up time, PS 6.1
 GYRO_LSB_PER_DPS = (131.0, 65.5, 32.8, 16.4)  # by range, GYRO_CONFIG bits 4 and 3
-DLPF_DELAY_US = (980, 1900, 2800, 4800, 8300, 13400, 18600, 980)  # of the gyro's low-pass, by DLPF_CFG
+DLPF_DELAY_US = (980, 1900, 2800, 4800, 8300, 13400, 18600, 980)  # delay of the gyro's low-pass, by DLPF_CFG
 
 # temperature in degrees C = counts / counts_per_c + zero_c.
 # temperature_in_fifo: it goes into the FIFO with accelerometer and with gyro, whatever FIFO_EN says.

@@ -8,15 +8,15 @@ _DATA, _MULTIPLE, _STOP = 0xFE, 0xFC, 0xFD  # tokens
 
 
 class SdCard:
-    """sectors: how many.  cs: the pin that selects it.  init_s: how long it takes to get ready after CMD0; None: for
-    ever.  read_s: from the command to the data.  busy_s: for how long it is busy after each sector written.
+    """sectors: their number.  cs: the pin that selects it.  init_s: time to get ready after CMD0; None: for ever.
+    read_s: time from the command to the data.  busy_s: time for which it is busy after each sector written.
 
     driver: False if the board lacks the driver.
 
-    Faults, to be set at any time: rejects: how many of the next writes it rejects.  busy_next_s: for how long it is
-    busy after the next sector alone.  stuck: once busy, it stays so.  removed: nothing answers.
+    Faults, to be set at any time: rejects: number of the next writes that it rejects.  busy_next_s: time for which it
+    is busy after the next sector alone.  stuck: once busy, it stays so.  removed: nothing answers.
 
-    data: what is written, by sector, those of zeros left out.  most_hz: the quickest that it was clocked.
+    data: the written sectors, by number, without those of zeros.  most_hz: the highest clock rate so far.
     """
 
     def __init__(self, clock, sectors=1 << 20, cs=17, init_s=0.1, read_s=0.0005, busy_s=0.002, driver=True):
@@ -33,8 +33,8 @@ class SdCard:
         self._clock = clock
         self._init_s = init_s
         self._read_s = read_s
-        self._ready_us = None  # when it gets ready, once CMD0 was sent
-        self._busy_us = 0  # until when it is busy
+        self._ready_us = None  # the time at which it gets ready, once CMD0 was sent
+        self._busy_us = 0  # the time until which it is busy
         self._command = b""
         self._answer = b""
         self._at = 0
@@ -150,5 +150,5 @@ class SdCard:
             self._keep(number + i, bytes(buf[i * SECTOR : (i + 1) * SECTOR]))
 
     def ioctl(self, op, argument):
-        """How many sectors there are, and their size."""
+        """The number of sectors, and their size."""
         return {4: self._sectors, 5: SECTOR}.get(op, 0)

@@ -1,4 +1,4 @@
-"""The simulated board: microcontroller pins, MPU6050, LCD and button, wired together on one clock.
+"""The simulated board: microcontroller pins, MPU6050, display and button, wired together on one clock.
 
     with Board(world) as board:
         board.press(2.0)
@@ -17,6 +17,8 @@ from .gps import Gps
 from .i2c import Bus
 from .lcd import Lcd
 from .mpu6050 import Mpu6050
+from .oled import Oled
+from .radio import Radio
 from .sd_card import SdCard
 from .wheel import Wheel
 
@@ -30,12 +32,14 @@ class Board:
     """A board with its supply off; run() switches it on.
 
     world(t_s): (fx, fy, fz, wx, wy, wz[, temp_c]) in g and deg/s along the chip's own axes, with the chip's errors.
-    who_am_i: which chip is fitted.  sensor_address, lcd_address: None if it is not fitted.
+    who_am_i: which chip is fitted.  display: "lcd", "ssd1306" or "sh1106".  sensor_address, lcd_address: None if it is
+    not fitted; 0 for the display's usual one.
     one_bus: the display is on the sensor's wires.  port: "rp2" or "esp32".  pace: see Clock.
     machine: a name in chips.MACHINES, which gives the port. Firmware that is imported first after install() takes it
     for the board it runs on; without one the firmware runs on what it was imported for, a Pico as a rule.
     i2c_driver: of MicroPython on an ESP32, "new" or (up to 1.28) "legacy".  sensor_pins, lcd_pins: (SDA, SCL), if not
-    those of WIRING.  touched: the pins that the firmware has used since the board was made.
+    those of WIRING.  touched: the pins that the firmware has used since the board was made.  volts: at the pins of an
+    ADC, by number.  sent: what was written to any UART.
     Times in seconds are those of the board's clock, which continues through resets and power cycles.
     """
 
@@ -44,7 +48,7 @@ class Board:
         world,
         who_am_i=0x68,
         sensor_address=0x68,
-        lcd_address=0x27,
+        lcd_address=0,
         one_bus=False,
         port="rp2",
         seed=1,
@@ -54,6 +58,7 @@ class Board:
         sensor_pins=None,
         lcd_pins=None,
         button_pin=None,
+        display="lcd",
     ):
         self.poses = machine is not None
         self.machine = chips.MACHINES[machine or ("pico" if port == "rp2" else "esp32")]
@@ -61,14 +66,17 @@ class Board:
         self.i2c_driver = i2c_driver
         self.pins = chips.pins_of(self.machine)
         self.touched = set()
+        self.volts = {}
+        self.sent = b""
         self.seed = seed
         self.clock = Clock(pace)
         self.sensor = Mpu6050(self.clock, world, who_am_i, sensor_address or 0x68)
-        self.lcd = Lcd(self.clock, lcd_address or 0x27)
+        self.lcd = self._display(display, lcd_address)
         self.button = Button(self.clock, seed)
         self.watchdog = Watchdog(self.clock)
         usual_sensor, usual_lcd, usual_button, self._gps_pin, self.wheel_pin = WIRING[port]
         self._button_pin = usual_button if button_pin is None else button_pin
+        self.radio = Radio(self.clock, port == "esp32") if chips.has_bluetooth(self.machine) else None
         self.gps = self.wheel = self.card = None  # a Gps, a Wheel, an SdCard, if fitted
         self.sensor_bus = Bus(self.clock, *(sensor_pins or usual_sensor))
         self.lcd_bus = self.sensor_bus if one_bus else Bus(self.clock, *(lcd_pins or usual_lcd))
@@ -76,7 +84,7 @@ class Board:
         self.too_fast = False  # True once a bus was clocked faster than a device on it allows
         self.faults = Faults(self)
         self.boots = 0
-        self.ticks_at_boot_us = 0  # what ticks_us() starts at; a value near 1 << 30 makes ticks wrap soon
+        self.ticks_at_boot_us = 0  # first value of ticks_us(); one near 1 << 30 makes ticks wrap soon
         self.reset_cause = fake_machine.PWRON_RESET
         self._off = True
         self._pins = {}  # number: [mode, pull, level driven, since when it is in use]
@@ -87,7 +95,7 @@ class Board:
             self.fit_lcd()
 
     def install(self):
-        """From now on `machine`, `time` and `os` are this board's for all code that is imported."""
+        """Make `machine`, `time` and `os` this board's for all code that is imported."""
         self._fakes.install(self)
 
     def uninstall(self):
@@ -125,6 +133,8 @@ class Board:
             return "returned"
         except PowerOff:
             self._off = True
+            if self.radio:
+                self.radio.off()
             for bus in self.buses:
                 bus.power_off()
             self.lcd.power_off()
@@ -155,7 +165,7 @@ class Board:
     # Parts that are connected and disconnected
 
     def fit_sensor(self):
-        """Connect it; its supply comes up now."""
+        """Connect it and switch its supply on."""
         self.sensor.power_on()
         self.sensor_bus.attach(self.sensor)
 
@@ -164,9 +174,20 @@ class Board:
         self.sensor_bus.detach(self.sensor)
 
     def fit_lcd(self):
-        """Connect it; its supply comes up now."""
+        """Connect it and switch its supply on."""
         self.lcd.power_on()
         self.lcd_bus.attach(self.lcd)
+
+    def _display(self, kind, address=0):
+        if kind == "lcd":
+            return Lcd(self.clock, address or 0x27)
+        return Oled(self.clock, address or 0x3C, kind)
+
+    def change_display(self, kind):
+        """Connect another one in its place: "lcd", "ssd1306" or "sh1106"."""
+        self.remove_lcd()
+        self.lcd = self._display(kind)
+        self.fit_lcd()
 
     def remove_lcd(self):
         """Disconnect it; it goes dark."""

@@ -6,10 +6,10 @@ _CREEP_MPS = 0.02  # slower counts as standing
 
 
 class Wheel:
-    """speed(t_s): of the vehicle, m/s.  bounce_us: how long the contact bounces at each edge, 0 for not at all.
+    """speed(t_s): speed of the vehicle, m/s.  bounce_us: time for which the contact bounces at each edge, 0 for none.
 
-    closed: True while it connects the pin to ground.  until_s: when its wire breaks.  noise_hz: pulses a second that a
-    cable beside its own induces, in place of the wheel's; 0 for none.
+    closed: True while it connects the pin to ground.  until_s: time at which its wire breaks.  noise_hz: pulses per
+    second that a cable beside its own induces, in place of the wheel's; 0 for none.
     """
 
     def __init__(self, clock, speed, pulses_per_metre=0.5, bounce_us=0, until_s=1e9):
@@ -26,11 +26,11 @@ class Wheel:
         clock.at(clock.now_us, self._look)
 
     def connect(self, edge):
-        """From now on edge(level of the pin) is called at each change. None: nothing is."""
+        """Call edge(level of the pin) at each change from now on. None: call nothing."""
         self._edge = edge
 
     def disconnect(self):
-        """edge() is no longer called."""
+        """Stop calling edge()."""
         self._edge = None
 
     def _look(self):

@@ -1,4 +1,4 @@
-"""Turns what a rider does, leg by leg, into signals."""
+"""Converts what a rider does, given as legs, to signals over time."""
 
 from dataclasses import dataclass
 
@@ -14,9 +14,9 @@ class Leg:
     """A part of a ride. None: the value of the leg before.
 
     speed_mps: reached at the end, at constant acceleration. lean_deg: lean of the centre of mass, > 0 to the right,
-    reached within roll_s of the start, then held. slope_percent: of the road at the end of the leg. hang_m: how far
-    the centre of mass is to the right of the bike's plane. lift_deg: pitch of a wheelie. engine: 0 off, 1 running.
-    crosswind_mps2: push of the wind to the right. bank_deg: tilt of the road to the right.
+    reached within roll_s of the start, then held. slope_percent: slope of the road at the end of the leg. hang_m:
+    offset of the centre of mass to the right of the bike's plane. lift_deg: pitch of a wheelie. engine: 0 off, 1
+    running. crosswind_mps2: acceleration to the right by the wind. bank_deg: tilt of the road to the right.
     """
 
     phase: str
@@ -52,7 +52,7 @@ class Commands:
 
 
 def commands(legs: list[Leg], rate_hz: float) -> Commands:
-    """The legs one after the other from t = 0. At the start the values of the first leg are already reached."""
+    """The signals of these legs one after the other from t = 0. The first leg starts with its own values reached."""
     ends = np.cumsum([leg.seconds for leg in legs])
     starts = ends - [leg.seconds for leg in legs]
     time = np.arange(int(ends[-1] * rate_hz)) / rate_hz
@@ -63,7 +63,7 @@ def commands(legs: list[Leg], rate_hz: float) -> Commands:
     distance = integral(speed, rate_hz)
 
     def stepped(name: str, settle_s: float | None = 1.0) -> Signal:
-        """A leg's value is reached within settle_s of its start (None: its roll_s), then held."""
+        """The signal of a value that each leg reaches within settle_s of its start (None: its roll_s), then holds."""
         values = _kept(legs, name)
         result = np.full_like(time, values[0])
         for leg, start, before, after in zip(legs[1:], starts[1:], values, values[1:]):
@@ -93,7 +93,7 @@ def commands(legs: list[Leg], rate_hz: float) -> Commands:
 
 
 def _kept(legs: list[Leg], name: str) -> list[float]:
-    """A value of each leg: None is replaced by the value before it, or by 0 at the start."""
+    """One value per leg: None is replaced by that of the leg before, in the first leg by 0."""
     kept, now = [], 0.0
     for leg in legs:
         value = getattr(leg, name)
@@ -103,7 +103,8 @@ def _kept(legs: list[Leg], name: str) -> list[float]:
 
 
 def _slope(distance: Signal, ends: Signal, percent: list[float]) -> Signal:
-    """Slope in rad, smooth from each leg's to the next one's. A function of distance: constant at a stop."""
+    """The road's slope, rad, smooth from the end of each leg to that of the next. A function of distance, so that it is
+    constant at a stop."""
     knots, values = [0.0], [percent[0]]
     for end, value in zip(ends, percent):
         if end > knots[-1] + 1.0:

@@ -1,5 +1,6 @@
 """Simulates a ride and writes it as logs."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ _FORMATS = ["%.3f", *["%.6f"] * 6, "%.2f"]
 START = 47.6, 8.0  # degrees north and east, heading east
 START_UTC_S = 1_779_008_400.0  # 09:00 on 17 May 2026
 _DEGREE_M = np.radians(6_371_000.0)
-_TRACK_EVERY = 200  # samples: once a second, as a GPS receiver does
+_TRACK_S = 1  # time between two fixes, as from a GPS receiver
 
 
 def simulate(
@@ -31,30 +32,38 @@ def simulate(
     road: str | None = None,
     mount: str | None = None,
 ) -> Ride:
-    """Simulate a ride (see ride.ride) and write it to out_dir. Raises InputError.
+    """Simulate a ride (see ride.ride) of exactly this length and write it to out_dir. Raises InputError.
 
     Logs: POSE_1.csv to POSE_7.csv (the last one slanted), KICKSTAND.csv, UPRIGHT.csv, RIDE.csv. TRUTH.csv has one row
-    for each row of RIDE.csv. A RIDE.cal.json that is there is removed. speed: RIDE.csv gets a speed and a
-    position once a second.
+    for each row of RIDE.csv. A RIDE.cal.json in out_dir is removed. speed: RIDE.csv gets a speed and a position once a
+    second.
     """
     check_profile(profile)
     directory = Path(out_dir)
     check_directory(directory)
-    made = ride(profile, seed, seconds, upright_error_deg, pitch_change_deg, share, road, mount)
+    made = ride(profile, seed, seconds, upright_error_deg, pitch_change_deg, share, road, mount, exact=True)
+    made = _cut(made, seconds)
     try:
         directory.mkdir(parents=True, exist_ok=True)
         # It belongs to an earlier ride and another sensor, but report, plot and export would use it for this one
         (directory / "RIDE.cal.json").unlink(missing_ok=True)
         write_poses(directory, made)
-        _write_ride(directory / "RIDE.csv", made, speed)
+        write_ride(directory / "RIDE.csv", made, speed)
         _write_truth(directory / "TRUTH.csv", made)
     except OSError as error:
         raise InputError(f"{directory} cannot be written: {error.strerror}") from error
     return made
 
 
+def _cut(made: Ride, seconds: float) -> Ride:
+    """The beginning of a ride."""
+    n = min(len(made.time), round(seconds * made.rate_hz))
+    truth = {name: values[:n] for name, values in made.truth.items()}
+    return replace(made, time=made.time[:n], readings=made.readings[:n], truth=truth, phase=made.phase[:n])
+
+
 def write_poses(directory: Path, made: Ride) -> tuple[list[Path], Path, Path]:
-    """Write the seven poses, kickstand and upright; return their paths."""
+    """Write the seven poses, the kickstand pose and the upright one. Returns their paths in this order."""
     seven = [directory / f"POSE_{k}.csv" for k in range(1, 8)]
     pair = directory / "KICKSTAND.csv", directory / "UPRIGHT.csv"
     for path, readings in zip([*seven, *pair], [*made.poses, made.kickstand, made.upright]):
@@ -63,11 +72,9 @@ def write_poses(directory: Path, made: Ride) -> tuple[list[Path], Path, Path]:
 
 
 def positions(made: Ride) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Where and when it goes: its true speed and yaw rate, integrated.
-
-    Latitude, longitude (degrees north and east) and Universal Time (s since 1970) of each reading.
-    """
-    course = np.cumsum(np.radians(made.truth["yaw_rate_dps"])) / made.rate_hz  # to the left of east
+    """Latitude, longitude (degrees north and east) and Universal Time (s since 1970) of each reading, by integrating
+    the true speed and yaw rate."""
+    course = np.cumsum(np.radians(made.truth["yaw_rate_dps"])) / made.rate_hz  # rad from east, > 0 to the left
     speed = made.truth["speed_mps"] / made.rate_hz
     lat = START[0] + np.cumsum(speed * np.sin(course)) / _DEGREE_M
     lon = START[1] + np.cumsum(speed * np.cos(course)) / (_DEGREE_M * np.cos(np.radians(START[0])))
@@ -82,15 +89,16 @@ def _save(path: Path, table: NDArray, header: str, formats: list[str]) -> None:
     np.savetxt(path, table, formats, ",", header=header, comments="")
 
 
-def _write_ride(path: Path, made: Ride, speed: bool) -> None:
+def write_ride(path: Path, made: Ride, speed: bool) -> None:
+    """Write its log. speed: with a speed and a position once a second."""
     if not speed:
         _save(path, _log(made.time, made.readings), _LOG, _FORMATS)
         return
-    form = ",".join(_FORMATS)
+    form, every = ",".join(_FORMATS), round(_TRACK_S * made.rate_hz)
     lines = [",".join((_LOG, *TRACK))]
     track = np.column_stack((made.truth["speed_mps"], *positions(made)))
     for k, row in enumerate(_log(made.time, made.readings).tolist()):
-        cells = "{:.2f},{:.7f},{:.7f},{:.3f}".format(*track[k]) if k % _TRACK_EVERY == 0 else ",,,"
+        cells = "{:.2f},{:.7f},{:.7f},{:.3f}".format(*track[k]) if k % every == 0 else ",,,"
         lines.append(f"{form % tuple(row)},{cells}")
     path.write_text("\n".join(lines) + "\n", encoding="ascii")
 

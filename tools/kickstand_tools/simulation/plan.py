@@ -1,6 +1,7 @@
 """Builds a ride of what riders do: set off, ride straight on, turn, stop."""
 
 from dataclasses import dataclass, field
+from itertools import pairwise
 from math import atan, degrees, radians, tan
 
 import numpy as np
@@ -9,7 +10,8 @@ from kickstand.units import STANDARD_GRAVITY
 from .commands import Leg
 from .physics.road import CLASS_B
 
-_CLOSING_S = 45.0  # for the straight and the stop at the end of every ride
+_SHORTEST_S = 3.0  # least duration of a leg that is shortened
+_CLOSING_S = 45.0  # time for the straight and the stop at the end of every ride
 
 
 @dataclass
@@ -21,16 +23,16 @@ class Conditions:
     """
 
     roughness: float = CLASS_B  # see road.CLASS_A, m3
-    engine_rms_g: float = 0.1  # at 6000/min
-    shift_rpm: float = 5000.0  # where the rider changes up
-    unrest_deg: float = 0.4  # rms of the lean's wavering at speed
+    engine_rms_g: float = 0.1  # engine vibration at 6000/min
+    shift_rpm: float = 5000.0  # engine speed at which the rider changes up
+    unrest_deg: float = 0.4  # rms of the lean's random changes at speed
     gust_mps2: float = 0.0  # rms of the crosswind's changes
     sway_m: float = 0.0  # rms of the centre of mass moving from side to side
-    slip_deg: float = 0.0
-    start_c: float = 22.0  # of the chip at power-on
+    slip_deg: float = 0.0  # rms of the tyres' side slip
+    start_c: float = 22.0  # temperature of the chip at power-on
     rise_c: float = 7.0  # how far it warms up, most of it within 10 to 15 minutes
-    drift: float = 1.0  # how far the biases change with temperature; an ordinary sensor's is 1
-    creep_deg: float = 0.0  # how far the sensor's mount has turned by the end
+    drift: float = 1.0  # factor on an ordinary sensor's change of the biases with temperature
+    creep_deg: float = 0.0  # angle by which the sensor's mount has rotated by the end
     bumps: list[tuple[str, float, float, float]] = field(default_factory=list)
 
 
@@ -48,13 +50,24 @@ class Plan:
 
     @property
     def going_on(self) -> bool:
-        """True until only the end of the ride is missing."""
+        """True while the ride needs more legs before its end (see finish())."""
         return self._seconds < self._until
 
     @property
     def seconds(self) -> float:
-        """How long the legs so far last."""
+        """Duration of the legs so far."""
         return self._seconds
+
+    def fit(self, seconds: float) -> None:
+        """Make the ride so long, by the longest of the legs at one speed; each of them keeps _SHORTEST_S, which may
+        leave a ride that is longer."""
+        steady = [leg for before, leg in pairwise(self.legs) if leg.speed_mps in (None, before.speed_mps)]
+        while steady and (over := sum(leg.seconds for leg in self.legs) - seconds):
+            longest = max(steady, key=lambda leg: leg.seconds)
+            cut = min(over, longest.seconds - _SHORTEST_S)
+            longest.seconds -= cut
+            if abs(over - cut) < 1e-6 or longest.seconds <= _SHORTEST_S:
+                break
 
     def uniform(self, low: float, high: float) -> float:
         return float(self.chance.uniform(low, high))
@@ -69,7 +82,7 @@ class Plan:
         return self.uniform(-self.slope_percent, self.slope_percent)
 
     def add(self, phase: str, seconds: float, speed_mps: float | None = None, **more: float | None) -> None:
-        """Add a leg. The road ends in a random slope unless slope_percent is given."""
+        """Add a leg. Its slope at the end is random unless slope_percent is given."""
         if "slope_percent" not in more:
             more["slope_percent"] = self.random_slope()
         self.legs.append(Leg(phase, seconds, speed_mps, **more))  # type: ignore[arg-type]
@@ -105,10 +118,8 @@ class Plan:
         phase: str = "turn",
         **more: float | None,
     ) -> None:
-        """Roll to lean_deg within roll_s, but no faster than roll_dps, and hold it.
-
-        For how long: seconds, or until the heading has changed by about heading_deg.
-        """
+        """Roll to lean_deg within roll_s, but no faster than roll_dps, and hold it for `seconds`, or until the heading
+        has changed by about heading_deg."""
         roll_s = max(roll_s, abs(lean_deg - self._lean_now()) / self.roll_dps)
         if seconds is None:
             rate = degrees(STANDARD_GRAVITY * tan(radians(abs(lean_deg))) / max(speed_mps, 1.0))

@@ -7,20 +7,21 @@ from .physics.chip import RATE_HZ, Chip
 from .physics.signals import band_noise
 
 POSE_S = 4.0
-_ASKEW_DEG = 4.0  # how inexactly a box is put on its side by hand
+_ASKEW_DEG = 4.0  # largest error of a box that is put on its side by hand
 _UP_IN_VEHICLE = np.array([0.0, 1.0, 0.0])
 _MOVE_DEG = 0.05  # rms lean of a bike that is held upright by hand
 
 
 def still(chance: np.random.Generator, chip: Chip, up: NDArray, temp_c: float) -> NDArray[np.float64]:
-    """Readings with `up` (3, or (n, 3); unit vectors in sensor axes) upward."""
+    """Readings of a sensor at rest with `up` (3, or (n, 3); unit vectors in the sensor's axes) pointing up."""
     n = int(POSE_S * RATE_HZ)
     force = np.broadcast_to(up, (n, 3))
     return chip.read(chance, force, np.zeros((n, 3)), np.full(n, temp_c))
 
 
 def seven(chance: np.random.Generator, chip: Chip, temp_c: float) -> list[NDArray[np.float64]]:
-    """Each of the six sides up once, in random order and up to 4 degrees askew, then a slanted pose."""
+    """Readings of seven poses: each of the six sides up once, in random order and up to 4 degrees askew, then a slanted
+    pose."""
     found = []
     for side in chance.permutation(6):
         up = chance.standard_normal(3)

@@ -1,4 +1,4 @@
-"""The kinds of ride: main ones, and hard ones in each of which one condition is extreme.
+"""The profiles (kinds of ride): main ones, and hard ones in each of which one condition is extreme.
 
 A profile adds its legs to a plan and returns the conditions of the ride.
 """
@@ -141,7 +141,7 @@ def hills(plan: Plan) -> Conditions:
 
 
 def _bends(plan: Plan, lean_deg: float, speeds: tuple[float, float], linked: float, rolls: tuple[float, float]) -> None:
-    """A bend, perhaps followed by more to alternating sides. linked: chance of another one."""
+    """Add a bend, and with the probability `linked` another one to the other side, and so on."""
     lean, speed = plan.side() * lean_deg, plan.uniform(*speeds)
     if plan.speed > speed + 2.0:
         plan.into_turn(lean, speed, plan.uniform(2.0, 5.0))
@@ -236,7 +236,7 @@ def held(plan: Plan) -> Conditions:
     speed = plan.uniform(18.0, 25.0)
     plan.to_speed(speed, 2.5)
     plan.straight(5.0)
-    lean = plan.side() * 35.0  # of the centre of mass: the tyres' width adds 3 degrees to the bike's
+    lean = plan.side() * 35.0  # lean of the centre of mass: the chassis leans 3 degrees more by the tyres' width
     while plan.going_on:
         plan.turn(lean, speed, seconds=60.0, roll_s=2.0)
         lean = -lean

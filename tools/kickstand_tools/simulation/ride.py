@@ -19,13 +19,13 @@ from .plan import Conditions, Plan
 from .profiles import PROFILES
 
 _WARMING_S = 300.0  # time constant of the chip's temperature
-_SLIP_DEG, _CAMBER_DEG, _SWAY_M = 0.3, 1.5, 0.006  # rms, of a ride on a road of --road
-_IMPACT_G = 4.0  # at the end of a fall
+_SLIP_DEG, _CAMBER_DEG, _SWAY_M = 0.3, 1.5, 0.006  # rms of side slip, camber and rider's sway on a road of --road
+_IMPACT_G = 4.0  # peak of the impact at the end of a fall
 
 
 @dataclass
 class Ride:
-    """What the sensor read, and the truth.
+    """A simulated ride: the sensor's readings and the truth.
 
     poses, kickstand, upright, readings: each (n, 7) at rate_hz, in the chip's order: force (g), temperature (C), rate
     (deg/s). poses: six sides in random order and a slanted one. time (s), truth (by name) and phase: (n,), an entry for
@@ -54,13 +54,15 @@ def ride(
     share: float = 1.0,
     road: str | None = None,
     mount: str | None = None,
+    exact: bool = False,
 ) -> Ride:
     """Simulate a ride of about this length; a profile and a seed always give the same one.
 
-    upright_error_deg: how far the bike leaned to the right in the upright pose. pitch_change_deg: how much higher the
-    nose was on the kickstand than upright; random within 1 degree if None. share: of the sensor's tolerances.
+    upright_error_deg: lean of the bike to the right in the upright pose. pitch_change_deg: pitch on the kickstand less
+    that in the upright pose; random within 1 degree if None. share: factor on the sensor's tolerances.
     road: a class of ISO 8608 in place of the profile's own road; it is cambered, the rider moves about and the bike
-    slips a little. mount: one of MOUNTS in place of a firm one.
+    slips a little. mount: one of MOUNTS in place of a firm one. exact: exactly this length, where it is enough for
+    setting off and stopping.
 
     >>> made = ride("parked", seed=1, seconds=20.0)
     >>> made.rate_hz, len(made.poses), made.readings.shape == (len(made.time), 7)
@@ -69,6 +71,8 @@ def ride(
     chance = np.random.default_rng([seed, *profile.encode()])
     plan = Plan(chance, seconds)
     conditions = PROFILES[profile](plan)
+    if exact:
+        plan.fit(seconds)
     bike, chip = Bike.random(chance), Chip.random(chance, share, conditions.drift)
     mounting = random_rotation(chance)
     # From a source of its own: without them a profile and a seed give the ride that they always gave
@@ -82,7 +86,7 @@ def ride(
     command = commands(plan.legs, RATE_HZ)
     slip = _slip(more, command, conditions)
     motion, extra = _motion(chance, command, bike, conditions)
-    # An hour is 29 MB in each column at 1 kHz: what is no longer needed goes, and nothing is a view of it.
+    # An hour is 29 MB in each column at 1 kHz: arrays are freed early, so none may be a view of another.
     temp = conditions.start_c + conditions.rise_c * (1.0 - np.exp(-command.time / _WARMING_S))
     time, phase = command.time[::DIVIDER].copy(), np.array(command.phases)[command.phase[::DIVIDER]]
     del command
@@ -104,7 +108,7 @@ def ride(
     readings = chip.read(chance, force, rates, temp)
     del force, rates, temp
     home_c = chance.uniform(18.0, 25.0)
-    nose = chance.uniform(-0.5, 0.5)  # slope in degrees of the ground where both poses were taken
+    nose = chance.uniform(-0.5, 0.5)  # slope, degrees, of the ground where both poses were taken
     change = chance.uniform(-1.0, 1.0) if pitch_change_deg is None else pitch_change_deg
     lean = -chance.uniform(8.0, 15.0)
     seven = poses.seven(chance, chip, home_c)
@@ -125,7 +129,7 @@ def ride(
 
 
 def _truth(motion: Motion) -> dict[str, NDArray[np.float64]]:
-    """Of each reading."""
+    """The truth, by name, for each reading."""
     return {
         "lean_deg": np.degrees(motion.lean[::DIVIDER]),
         "speed_mps": motion.speed[::DIVIDER].copy(),
@@ -136,7 +140,7 @@ def _truth(motion: Motion) -> dict[str, NDArray[np.float64]]:
 
 
 def random_rotation(chance: np.random.Generator) -> NDArray[np.float64]:
-    """A mounting: (3, 3) vehicle from sensor, rows left, up, forward. Every rotation is equally likely."""
+    """A random mounting: (3, 3) vehicle from sensor, rows left, up, forward. Every rotation is equally likely."""
     q, r = np.linalg.qr(chance.standard_normal((3, 3)))
     q = q * np.sign(np.diag(r))
     return q * np.linalg.det(q)
@@ -194,7 +198,7 @@ def _sideways(lean: NDArray[np.float64], left: NDArray[np.float64]) -> NDArray[n
 
 
 def _places(command: Commands, phase: str, spacing_m: float) -> list[float]:
-    """Distances, multiples of spacing_m, at which the ride is in a phase."""
+    """The distances, multiples of spacing_m, at which the ride is in this phase."""
     if phase not in command.phases:
         return []
     met = command.distance[command.phase == command.phases.index(phase)]
@@ -214,7 +218,7 @@ def _impact(chance: np.random.Generator, command: Commands) -> NDArray[np.float6
 
 
 def _creep(chance: np.random.Generator, n: int, degrees: float) -> NDArray[np.float64]:
-    """How a mount has turned that yields: rotation vectors (n, 3), rad. Most of it slowly, the rest at one moment."""
+    """The rotation of a mount that yields: rotation vectors (n, 3), rad. Most of it is slow, the rest sudden."""
     axis = chance.standard_normal(3)
     at_once = np.zeros(n)
     at_once[int(n * chance.uniform(0.3, 0.7)) :] = 1.0
@@ -223,7 +227,8 @@ def _creep(chance: np.random.Generator, n: int, degrees: float) -> NDArray[np.fl
 
 
 def _to_sensor(vectors: NDArray, mounting: NDArray, turned: NDArray) -> NDArray[np.float64]:
-    """From the vehicle's to the sensor's axes, (n, 3). turned: small rotations of the mount, to second order."""
+    """vectors (n, 3) in the sensor's axes, from the vehicle's. turned: small rotations of the mount (n, 3), applied to
+    second order."""
     if turned.any():
         first = np.cross(turned, vectors)
         vectors = vectors + first + 0.5 * np.cross(turned, first)

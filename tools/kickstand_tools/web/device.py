@@ -13,6 +13,7 @@ from ..demo.hand_bike import HandBike
 from ..simulated_board.clock import PowerOff, Reset, to_us
 from ..simulated_board.fakes.fake_time import sleep_us, ticks_add, ticks_diff, ticks_us
 from ..simulated_board.lcd import shown_lean
+from ..simulated_board.oled import Oled
 from ..simulated_board.simulator import Board
 from ..simulation.scripted.sensor_errors import Sensor
 
@@ -37,6 +38,7 @@ class Device:
         self._ticks = []
         self._seen = -1  # the display's count of changes at the last tick
         self._plugged = True
+        self._text = {}
         self.board.every(TICK_S, self._tick)
         self.board.install()
 
@@ -44,8 +46,8 @@ class Device:
         """Do one of these, at this instant of the board's time:
 
         button True (down) or False; pose "kickstand", "upright" or a speed in m/s to ride at; lean degrees, > 0 to the
-        right; sensor False (its wire is pulled) or True; cut_save True: the supply is cut in the middle of the next
-        save of a calibration, False: it is not; power False or True.
+        right; sensor False (its wire is pulled) or True; display "lcd", "ssd1306" or "sh1106"; cut_save True: the
+        supply is cut in the middle of the next save of a calibration, False: it is not; power False or True.
         """
         board = self.board
         if name == "button":
@@ -63,6 +65,11 @@ class Device:
             elif self._plugged and not value:
                 board.remove_sensor()
             self._plugged = value
+        elif name == "display":
+            board.change_display(value)
+            if not self.powered:
+                board.lcd.power_off()
+            self._seen = -1
         elif name == "cut_save":
             if value:
                 board.faults.cut_file(".cal", CUT_AFTER_BYTES)
@@ -99,22 +106,41 @@ class Device:
             "phase": phase,
             "powered": self.powered,
         }
+        meter = self.meter()
+        if meter:
+            tick["meter"] = meter
         if board.lcd.changes != self._seen:
             self._seen = board.lcd.changes
-            tick["display"] = display(board.lcd)
+            tick["display"] = self._display()
         self._ticks.append(tick)
+
+    def meter(self):
+        """What the lean meter knows: lean_deg, None where it would not be shown, and forward_g, both None before the
+        alignment. None without a meter."""
+
+    def _display(self):
+        """display(), but while an OLED gets a new picture its text stays that of the old one."""
+        seen = display(self.board.lcd)
+        if not seen["text"][0].startswith("?"):
+            self._text = {name: seen[name] for name in ("text", "shown_deg")}
+        seen.update(self._text)
+        return seen
 
     def take(self):
         """What was to be seen every TICK_S since the last call, as JSON: a list of objects with the time t_s, the
-        bike's true lean_deg, speed_mps, yaw_rate_dps and phase, powered, and the display, where it has changed."""
+        bike's true lean_deg, speed_mps, yaw_rate_dps and phase, powered, the meter, if there is one, and the display,
+        where it has changed."""
         ticks, self._ticks = self._ticks, []
         return json.dumps(ticks)
 
 
 def display(lcd):
     """What a display shows: the codes of both lines, character memory (8 rows for each of 8 characters), whether it is
-    on and lit, its text, and the lean (deg) if that is what it shows."""
+    on and lit, its text, and the lean (deg) if that is what it shows. An OLED: pixels instead, 64 rows of 128, 8 pixels
+    a byte, the leftmost in bit 7."""
     text = lcd.text()
+    if isinstance(lcd, Oled):
+        return {"pixels": list(lcd.pixels()), "lit": lcd.backlight, "text": text, "shown_deg": shown_lean(text)}
     on = lcd.on and lcd.two_lines
     return {
         "codes": lcd.codes() if on else [[0x20] * 16, [0x20] * 16],
@@ -155,6 +181,13 @@ class PageDevice(Device):
                 self._ended(self.resume(self.rest))
             else:
                 self._start()
+
+    def meter(self):
+        if not self._app:
+            return None
+        meter = self._app.meter
+        aligned, lean = meter.calibration.aligned, round(meter.lean_deg, 1)
+        return [lean if aligned and meter.trusted else None, round(meter.smooth_force[2], 3) if aligned else None]
 
     def _hand_over(self, app):
         """In place of App.run()."""

@@ -1,10 +1,11 @@
 """What rides_guest.py needs to look at a ride: the tools that `kickstand report` and `plot` consist of, the firmware's
-mathematics, Jinja, and numpy."""
+mathematics, Jinja, what reads GPX files, and numpy."""
 
 import io
 import tarfile
 from pathlib import Path
 
+import gpxpy
 import jinja2
 import markupsafe
 
@@ -18,10 +19,10 @@ _LICENCES = "info/licenses/"
 
 
 def archive() -> bytes:
-    """A ZIP file of packages to import: kickstand_tools, kickstand, jinja2 and markupsafe, the latter without what is
-    compiled: it has all of that in Python, too."""
+    """A ZIP file of packages to import: kickstand_tools, kickstand, gpxpy, jinja2 and markupsafe, the latter without
+    what is compiled: it has all of that in Python, too."""
     found = tools("web/rides_guest.py")
-    for package in (firmware_path.PACKAGE, Path(jinja2.__path__[0]), Path(markupsafe.__path__[0])):
+    for package in (firmware_path.PACKAGE, *(Path(one.__path__[0]) for one in (gpxpy, jinja2, markupsafe))):
         found |= {path.relative_to(package.parent).as_posix(): path for path in package.rglob("*.py")}
     return zipped({name: path.read_bytes() for name, path in found.items()})
 

@@ -1,4 +1,4 @@
-"""What the files that were given to the page Rides are: logs, recordings of an app, tables, calibrations."""
+"""What the files that were given to the page Rides are: logs, recordings of an app, tables, calibrations, tracks."""
 
 import re
 import zipfile
@@ -9,19 +9,21 @@ from pathlib import Path
 from ..calibration.file import calibration_path, read_calibration
 from ..errors import InputError
 from ..imports import mapped
-from ..imports.files import Piece, read_pieces
+from ..imports.files import RecordingFile, read_files
 from ..imports.importing import recordings
+from ..joining.track_files import read_track
 from ..logs.reader import check_first_line
 
 
 @dataclass
 class GivenRide:
     """log: a file, or a folder of files that are one recording. files: all that belong to it. table: what is to be
-    asked about it, None if it is known."""
+    asked about it, None if it is known. track: a .gpx to be joined with it, or ""."""
 
     log: str
     files: list[str]
     calibration: str = ""
+    track: str = ""
     table: mapped.Table | None = None
 
 
@@ -37,9 +39,10 @@ class Given:
 def sorted_out(names: list[str]) -> Given:
     """What these files of the working directory are; they are named in the order in which they were given.
 
-    A ride has the calibration beside it, or else the last one given that is beside no other ride.
+    A ride has the calibration beside it, or else the last one given that is beside no other ride; and the last track.
     """
     found, loose = Given(), []
+    track = ""
     calibrations = []
     for name in names:
         try:
@@ -47,33 +50,37 @@ def sorted_out(names: list[str]) -> Given:
                 read_calibration(Path(name))
                 calibrations.append(name)
                 found.kinds[name] = "calibration"
+            elif name.lower().endswith(".gpx"):
+                read_track(Path(name))
+                track, found.kinds[name] = name, "track"
             elif _is_log(name):
                 found.rides.append(GivenRide(name, [name]))
                 found.kinds[name] = "log"
             else:
-                pieces = read_pieces(Path(name))
-                if any(piece.name.endswith(".parquet") for piece in pieces):
+                files = read_files(Path(name))
+                if any(file.name.endswith(".parquet") for file in files):
                     raise InputError(f"{name} is Parquet, which this page cannot read: give the ride as CSV")
                 if zipfile.is_zipfile(name):
-                    _add(found, name, [name], pieces)
+                    _add(found, name, [name], files)
                 else:
-                    loose += pieces
+                    loose += files
         except InputError as error:
             found.refused[name] = error
-    for name, pieces in _together(loose):
-        _add(found, name, [piece.name for piece in pieces], pieces)
+    for name, files in _together(loose):
+        _add(found, name, [file.name for file in files], files)
     found.rides.sort(key=lambda ride: _by_number(ride.log))
     beside = {ride.log: calibration_path(Path(ride.log)).name for ride in found.rides}
     free = [name for name in calibrations if name not in beside.values()]
     for ride in found.rides:
         ride.calibration = beside[ride.log] if beside[ride.log] in calibrations else next(reversed(free), "")
+        ride.track = track
     return found
 
 
-def _together(pieces: list[Piece]) -> Iterator[tuple[str, list[Piece]]]:
-    """(name, its pieces) of each recording among single files: the name is that of a folder where they are several."""
-    found = recordings(pieces)
-    used = {id(piece) for _, group in found for piece in group}
+def _together(files: list[RecordingFile]) -> Iterator[tuple[str, list[RecordingFile]]]:
+    """(name, its files) of each recording among single files: the name is that of a folder where they are several."""
+    found = recordings(files)
+    used = {id(file) for _, group in found for file in group}
     for app, group in found:
         name = group[0].name
         if len(group) > 1:
@@ -81,23 +88,21 @@ def _together(pieces: list[Piece]) -> Iterator[tuple[str, list[Piece]]]:
             while Path(name).exists():
                 name += "_"
             Path(name).mkdir()
-            for piece in group:
-                Path(name, piece.name).write_bytes(
-                    piece.content
-                )  # not a link: an import leaves out those that lead out
+            for file in group:
+                Path(name, file.name).write_bytes(file.content)  # not a link: an import leaves out those that lead out
         yield name, group
-    yield from ((piece.name, [piece]) for piece in pieces if id(piece) not in used)
+    yield from ((file.name, [file]) for file in files if id(file) not in used)
 
 
-def _add(found: Given, log: str, files: list[str], pieces: list[Piece]) -> None:
-    """A ride, or why these pieces are none."""
-    known = recordings(pieces)
-    table = None if known else mapped.table_in(pieces)
-    if not known and (table is None or len(table.columns) < len(mapped.REQUIRED) or len(pieces) > 1):
-        found.refused |= dict.fromkeys(files, mapped.unknown(pieces, log))
+def _add(found: Given, log: str, names: list[str], files: list[RecordingFile]) -> None:
+    """A ride, or why these files are none."""
+    known = recordings(files)
+    table = None if known else mapped.table_in(files)
+    if not known and (table is None or len(table.columns) < len(mapped.REQUIRED) or len(files) > 1):
+        found.refused |= dict.fromkeys(names, mapped.unknown(files, log))
         return
-    found.rides.append(GivenRide(log, files, table=table))
-    found.kinds |= dict.fromkeys(files, f"of {known[0][0].NAME}" if known else "table")
+    found.rides.append(GivenRide(log, names, table=table))
+    found.kinds |= dict.fromkeys(names, f"of {known[0][0].NAME}" if known else "table")
 
 
 def _is_log(name: str) -> bool:

@@ -1,5 +1,5 @@
-"""`kickstand report`, `plot`, `smooth`, `import` and `calibrate ride` in the browser: their own code on CPython for
-WebAssembly. page/rides/worker.mjs runs it, in a folder of its own.
+"""`kickstand report`, `plot`, `smooth`, `import`, `join` and `calibrate ride` in the browser: their own code on CPython
+for WebAssembly. page/rides/worker.mjs runs it, in a folder of its own.
 
 Each function returns JSON: what its docstring says, or {"refused": why}, what the command would say in the words of
 a page.
@@ -19,19 +19,23 @@ import numpy as np
 from ..analysis import report
 from ..analysis.overview import overview
 from ..analysis.plot.page import page
-from ..analysis.ride import open_ride
+from ..analysis.ride import Ride, open_ride
 from ..calibration.file import calibration_path, write_calibration
 from ..errors import InputError
 from ..estimation.alignment import fit_ride
-from ..estimation.smooth import smooth_to_csv
+from ..estimation.smooth import COLUMNS, smooth_to_csv
 from ..imports import mapped
 from ..imports.importing import import_recording, write_imported
+from ..joining.joined import join_track, write_joined
+from ..logs.csv_lines import joined_cells, number_cells, text_cells, write_lines
+from ..logs.reader import read_blocks
 from ..refusals import sentence
 from ..remedies import PAGE
 from .rides_given import sorted_out
 
 PLOTLY = "./plotly/plotly.min.js"  # the page of a ride loads it from the site
 MADE = Path("../made")  # not where what was given is: that may have any name
+_smoothed: dict[str, list] = {}  # of the ride that was looked at last: what smooth_blocks() gives, block by block
 TOO_LONG = "this ride is too long for the memory of a browser: give a part of it"
 
 
@@ -54,10 +58,11 @@ def in_json(function: Callable[..., Any]) -> Callable[..., str]:
 def rides(given, names):
     """What the files of these names (JSON) in the folder `given` are, in the order in which they were given.
 
-    {"rides": [{"log", "isLog": no app's recording, "calibration": name or "", "files": [names], "table": asked_for() of
-    one that nobody knows}, ...], in the order of their names; "kinds": {name: what it is}; "why": {name: why it cannot
-    be used}}.
+    {"rides": [{"log", "isLog": no app's recording, "calibration" and "track": name or "", "files": [names], "table":
+    asked_for() of one that nobody knows}, ...], in the order of their names; "kinds": {name: what it is};
+    "why": {name: why it cannot be used}}.
     """
+    _smoothed.clear()
     for old in Path().iterdir():
         shutil.rmtree(old) if old.is_dir() else old.unlink()
     names = json.loads(names)
@@ -66,7 +71,8 @@ def rides(given, names):
     found = sorted_out(names)
     rides = [
         {"log": one.log, "isLog": found.kinds.get(one.log) == "log"}
-        | {"calibration": one.calibration, "files": one.files, "table": one.table and asked_for(one.table)}
+        | {"calibration": one.calibration, "track": one.track, "files": one.files}
+        | {"table": one.table and asked_for(one.table)}
         for one in found.rides
     ]
     refused = {name: _one_line(error.said(PAGE)) for name, error in found.refused.items()}
@@ -87,16 +93,38 @@ def asked_for(table: mapped.Table) -> dict[str, Any]:
 
 
 @in_json
-def take(log, is_log, columns, units, _progress):
-    """{"log": log}; for a recording of an app {"log": the one that `import` makes of it, "path": likewise, "app": whose
-    it is, "warnings": [...]}. columns, units: of a table, as JSON of what --columns and --units take, else "{}"."""
-    if is_log:
+def take(log, is_log, columns, units, track, progress):
+    """{"log": log}; of what is made of it, by `import` from an app's recording or by `join` with a track, {"log": that,
+    "path": likewise, "warnings": [...], "words": how it was joined or ""}. columns, units: of a table, as JSON of what
+    --columns and --units take, else "{}"; track: a .gpx or ""."""
+    if is_log and not track:
         return {"log": log}
-    found = import_recording(log, json.loads(columns) or None, json.loads(units))
-    out = str(_made(log, f"{log.partition('.')[0]}.csv"))
-    write_imported(out, found)
-    warnings = [sentence(notice, PAGE) for notice in found.notices]
-    return {"log": out, "path": out, "app": found.app, "warnings": warnings}
+    out, warnings, words = log, [], ""
+    if not is_log:
+        found = import_recording(log, json.loads(columns) or None, json.loads(units))
+        out = str(_made(log, f"{log.partition('.')[0]}.csv"))
+        write_imported(out, found)
+        warnings = [sentence(notice, PAGE) for notice in found.notices]
+    if track:
+        try:
+            joined = join_track(Path(out), Path(track), progress)
+            out = str(_made(log, f"{log.partition('.')[0]}.joined.csv"))
+            write_joined(out, joined)
+            match = joined.match
+            words = f"{track} is joined: correlation {match.correlation:.2f}, known to {match.sigma_s:.2f} s."
+        except InputError as error:
+            warnings.append(f"{track} is not joined: {_one_line(error.said(PAGE))}")
+    made = {"path": out} if out != log else {}
+    return {"log": out, "warnings": warnings, "words": words} | made
+
+
+class _Keeping(Ride):
+    """Keeps the smoothed lean that it comes by: it takes as long again to find."""
+
+    def _read(self, log, progress, notices):
+        for block, found in super()._read(log, progress, notices):
+            _smoothed.setdefault(self.name, []).append(found)
+            yield block, found
 
 
 @in_json
@@ -104,7 +132,9 @@ def look(log, calibration, progress):
     """What `report` says and `plot` draws of a log with the calibration of a file: {"words": report.Words, "json":
     report.as_data(), "warnings": [...], "page": HTML, "plotly": the script that the page loads, "stem": the name
     without suffixes}. progress(done, total): the progress."""
-    ride = open_ride(Path(log), Path(calibration), smoothed=True)
+    opened = open_ride(Path(log), Path(calibration), smoothed=True)
+    _smoothed.clear()
+    ride = _Keeping(opened.log, opened.calibration, opened.smoothed)
     seen = overview(ride, progress)
     table = {"units": report.STOPS_UNITS, "title": report.STOPS_TITLE, "terms": report.STOPS_TERMS}
     return {
@@ -119,11 +149,22 @@ def look(log, calibration, progress):
 
 @in_json
 def smooth(log, calibration, progress):
-    """{"path": of LEAN.csv as `smooth` writes it}."""
+    """{"path": of LEAN.csv as `smooth` writes it}. What look() has found is not computed again."""
     ride = open_ride(Path(log), Path(calibration))
     out = _made(log, f"{ride.stem}.lean.csv")
-    smooth_to_csv(Path(log), ride.calibration, out, progress)
+    kept = _smoothed.get(ride.name, [None])
+    if any(found is None for found in kept):
+        smooth_to_csv(Path(log), ride.calibration, out, progress)
+    else:
+        write_lines(out, ("t_s", *COLUMNS), _lean_lines(ride, np.concatenate(kept), progress))
     return {"path": str(out)}
+
+
+def _lean_lines(ride, values, progress):
+    at = 0
+    for block in read_blocks(ride.log, 2, progress, calibration=ride.calibration):
+        at, begin = at + len(block.time_us), at
+        yield joined_cells([text_cells(block.time_text), *(number_cells(column, 3) for column in values[begin:at].T)])
 
 
 @in_json
@@ -149,9 +190,9 @@ def _one_line(text):
 
 
 def raising(function):
-    """A function of numpy.linalg that again raises LinAlgError for a singular matrix.
+    """A decorator for functions of numpy.linalg: they then raise LinAlgError for a singular matrix, as elsewhere.
 
-    numpy learns of it from the processor's flags of floating-point errors. WebAssembly has none: the result is NaN.
+    numpy detects it by the processor's flags of floating-point errors. WebAssembly has none: the result is NaN.
     """
 
     @functools.wraps(function)

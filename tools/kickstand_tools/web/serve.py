@@ -18,6 +18,7 @@ PORT = 8377  # the same each time, so that the browser finds what it has kept
 # Named here, because the registry of Windows may hold others, with which a browser runs no module
 TYPES = {
     ".css": "text/css; charset=utf-8",
+    ".gz": "application/gzip",
     ".html": "text/html; charset=utf-8",
     ".js": "text/javascript; charset=utf-8",
     ".json": "application/json",

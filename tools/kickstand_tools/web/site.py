@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +11,12 @@ from ..analysis.plot import page
 from ..output import check_directory, new_directory, write_whole
 from ..pictures.lcd_font import ROM
 from ..templates import filled, source_hash
-from . import install_archive, npm_packages, rides_archive, wiring_files
+from . import install_archive, npm_packages, rides_archive, sample_ride, wiring_files
 from .zipped import tools
 
 PAGE = Path(__file__).resolve().parent / "page"
 # Large, and only for those who have a board or a ride: fetched when they ask for it
-LATER = ("esptool/", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip")
+LATER = ("esptool/", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip", "sample/")
 _NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first by itself, the second as "./"
 
 
@@ -41,18 +42,32 @@ def site_files() -> dict[str, bytes]:
     files |= {path.relative_to(PAGE).as_posix(): path.read_bytes() for path in sorted(PAGE.rglob("*.*"))}
     files["esptool/licence.txt"] = files.pop("esptool/LICENSE")  # as a text a browser shows
     files |= wiring_files.wiring_files()
-    files["install.html"] = _filled("install.html", boards=wiring_files.tables())
-    files["rides.html"] = _filled("rides.html", charts=_chart_scripts(files["plotly/plotly.min.js"]))
+    values = {"home": home(), "boards": wiring_files.tables()}
+    values["charts"] = _chart_scripts(files["plotly/plotly.min.js"])
+    files |= {name: _filled(name, **values) for name in files if name.endswith(".html")}
+    files |= {f"sample/{name}": data for name, data in sample_ride.sample_ride().items()}
     files["python.json"] = json.dumps(python_files()).encode()
     files["install.zip"] = install_archive.archive()
     files["rides.zip"] = rides_archive.archive()
     (package,) = (name for name in files if name.startswith("numpy/"))
     files["numpy/numpy.zip"], files["numpy/licence.txt"] = rides_archive.numpy_archive(files.pop(package))
     files["font.json"] = json.dumps({code: list(rows) for code, rows in ROM.items()}).encode()
+    files["sizes.json"] = json.dumps(
+        {name: len(data) for name, data in files.items() if name.startswith(LATER)}
+    ).encode()
     version = hashlib.sha256(b"".join(name.encode() + data for name, data in sorted(files.items()))).hexdigest()[:12]
     kept = sorted(["./", *(name for name in files if name not in _NOT_KEPT and not name.startswith(LATER))])
     files["service_worker.js"] = _filled("service_worker.js", files=kept, version=version)
     return files
+
+
+def home() -> str:
+    """The address of the project, "" where what is installed does not know it: see hatch_build.py."""
+    try:
+        named = metadata.metadata("kickstand").get_all("Project-URL") or []
+    except metadata.PackageNotFoundError:
+        named = []
+    return dict(one.split(", ", 1) for one in named).get("Homepage", "")
 
 
 def _filled(name: str, **values: Any) -> bytes:

@@ -1,15 +1,18 @@
-"""How the parts are wired, for the page Install: the drawings that the README has too, and each as a table."""
+"""How the parts are wired, for the page Install: the drawings that firmware/README.md has too, and each as a table."""
 
-from ..pictures import lcd, wiring
+from ..pictures import building, lcd, wiring
 
 _BOARDS = {"pico": wiring.PICO, "esp32": wiring.ESP32}
 _SHOWN = ("Kickstand", "starting")  # on the drawn display
 
 
 def wiring_files() -> dict[str, bytes]:
-    """{name in the site: SVG}, wiring_pico.svg and wiring_esp32.svg."""
+    """{name in the site: SVG}: wiring_pico.svg, wiring_esp32.svg, and what is built."""
     display = lcd.draw([list(line.ljust(16).encode("ascii")) for line in _SHOWN], bytes(64))
-    return {f"wiring_{name}.svg": wiring.draw(board, display).encode() for name, board in _BOARDS.items()}
+    drawn = {f"wiring_{name}.svg": wiring.draw(board, display) for name, board in _BOARDS.items()}
+    drawn |= {"display_5v.svg": building.shifter(wiring.PICO, display), "six_positions.svg": building.six_positions()}
+    drawn |= {"supply.svg": building.supply(), "on_the_bike.svg": building.on_the_bike()}
+    return {name: svg.encode() for name, svg in drawn.items()}
 
 
 def tables() -> dict[str, tuple[str, list[tuple[str, str, str]]]]:

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 
 import click
-from kickstand_tools.cli.common import JSON, PATH, warn
+from kickstand_tools.cli.common import CHIP, JSON, PATH, warn
 from kickstand_tools.cli.simulated import LINES_S, PROFILE_NAMES, pose_options, seconds_option
-from kickstand_tools.emulator import image, native
+from kickstand_tools.emulator import esp32_library, image, native
 from kickstand_tools.errors import extra
 from kickstand_tools.output import check_directory, new_directory
 from kickstand_tools.progress import Bar, spinner
@@ -96,15 +96,19 @@ def bands_command(
 
 @click.command()
 @click.option("--seconds", type=click.IntRange(1, 600), default=10, help="Emulated, of each of four runs.")
+@CHIP
 @JSON
-def bench_command(seconds: int, as_json: bool) -> None:
-    """What the firmware costs on an emulated Pico: time, memory, flash."""
+def bench_command(seconds: int, chip: str, as_json: bool) -> None:
+    """What the firmware costs on an emulated board: time, memory, flash."""
     image.find()  # before anything else of the emulator is imported
-    with spinner("compiling the emulator, once"):
-        native.build()
+    if chip == "esp32":
+        esp32_library.find()
+    else:
+        with spinner("compiling the emulator, once"):
+            native.build()
     from .bench.bench import bench, tables
 
-    result = bench(seconds)
+    result = bench(seconds, chip)
     if as_json:
         click.echo(json.dumps(result))
     else:

@@ -19,13 +19,13 @@ from ..channels import Channels
 from ..downsample import downsampled
 from ..ride import Ride
 from ..track import Track, joined, track
-from . import export_csv, export_gpx, export_parquet, export_racechrono, export_vbo
+from . import export_columns, export_gpx, export_racechrono, export_vbo
 
 STEP_S = {"csv": 0.0, "gpx": 0.0, "parquet": 0.0, "racechrono": 0.01, "vbo": 0.01}  # two hold up to 100 a second
 _WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
-    "csv": export_csv.write,
+    "csv": export_columns.write_csv,
     "gpx": export_gpx.write,
-    "parquet": export_parquet.write,
+    "parquet": export_columns.write_parquet,
     "racechrono": export_racechrono.write,
     "vbo": export_vbo.write,
 }

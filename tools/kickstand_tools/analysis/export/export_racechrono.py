@@ -17,7 +17,7 @@ from ...logs.csv_lines import csv_lines
 from ..channels import Channels
 
 _NOTE = "Made by Kickstand. lean_angle > 0 to the right; x left, y up, z forward"
-# name, unit, source, digits, what stands there: time_s, and the channels; "" for nothing
+# name, unit, source, digits, value: time_s or a channel; "" for an empty cell
 COLUMNS = (
     ("timestamp", "unix time", "", 3, "time_s"),
     ("fragment_id", "", "", 0, "zero"),
@@ -39,7 +39,7 @@ COLUMNS = (
 
 
 def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
-    """start_s: Unix time of the first row."""
+    """Write the file. start_s: Unix time of the first row."""
     head = [
         "This file is created using RaceChrono CSV v3 by Kickstand.",
         "Format,3",

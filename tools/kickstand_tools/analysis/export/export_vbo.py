@@ -94,14 +94,14 @@ def write(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
 
 
 class _Heading:
-    """Where the positions go, block by block."""
+    """Computes headings from positions, block by block."""
 
     def __init__(self) -> None:
         self._last = np.full((3, 1), np.nan)  # latitude, longitude and heading of the last row of the block before
 
     def of(self, lat_deg: Array, lon_deg: Array) -> Array:
-        """(n) degrees clockwise from north, from the row before to each. Where both are one place it is that of the row
-        before. The first row with a position has that of the second."""
+        """(n) heading, degrees clockwise from north, from the row before to each. Where both have the same position it
+        is that of the row before; in the first row with a position it is that of the second."""
         lat, lon = (np.concatenate((last, now)) for last, now in zip(self._last, (lat_deg, lon_deg)))
         east, north = distance_m(lat[:-1], lon[:-1], lat[1:], lon[1:])
         found = np.concatenate((self._last[2], np.degrees(np.arctan2(east, north)) % 360.0))
@@ -114,7 +114,7 @@ class _Heading:
 
 
 def _clock(seconds: np.ndarray) -> np.ndarray:
-    """Since midnight, as the number HHMMSS.SS."""
+    """The time of day (s since midnight) as the number HHMMSS.SS."""
     hundredths = np.rint(seconds * 100.0).astype(np.int64) % (86400 * 100)
     whole, part = np.divmod(hundredths, 100)
     return (whole // 3600) * 10000 + (whole // 60 % 60) * 100 + whole % 60 + part / 100.0

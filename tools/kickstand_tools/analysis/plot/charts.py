@@ -20,15 +20,15 @@ SPEED_COLOUR = "#5b4b8a"
 GUIDE_COLOUR = "#bbbbbb"
 SMOOTH_S = 0.3
 GG_BIN_G = 0.025
-GAP_S = 1.0  # a line is not drawn over a longer time without a value,
-SPEED_GAP_S = 5.0  # that of the speed, which comes seldom
+GAP_S = 1.0  # lines are interrupted where there is no value for longer
+SPEED_GAP_S = 5.0  # the same for the line of the speed, which has few values
 _HIGH, _LOW, _SQUARE = 2.5, 1.5, 3.0  # heights of charts, inches of the picture
 _UPRIGHT_DEG = 5.0  # the share of smaller leans may be cut off: it would hide the others
 
 
 @dataclass
 class Line:
-    """From point to point (n), broken at NaN that last longer than gap_s. name: none for what only guides the eye."""
+    """A line through n points, interrupted at NaNs that last longer than gap_s. name: none for an auxiliary line."""
 
     x: Array
     y: Array
@@ -40,7 +40,7 @@ class Line:
 
 @dataclass
 class Sides:
-    """A lean (n), filled from zero to it in the colours of both sides; else as a Line."""
+    """A Line of a lean (n), with the area to zero filled in the colour of its side."""
 
     x: Array
     y: Array
@@ -113,7 +113,7 @@ class Chart:
 
 @dataclass
 class Charts:
-    """All of a ride. over_time: below each other with one axis of time, s; below: beside each other."""
+    """The charts of a ride. over_time: stacked, with one axis of time, s; below: the others, side by side."""
 
     title: str
     over_time: list[Chart]
@@ -212,14 +212,14 @@ def _forces(seen: Overview, lateral: Array, forward: Array) -> Chart:
     ahead = Line(seen.course.t_s, forward, BRAKE_COLOUR, "forward", GAP_S)
     both = np.concatenate((lateral, forward))
     lowest, highest = float(np.min(both)), float(np.max(both))
-    room = max(0.05 * (highest - lowest), 0.01)
-    made = _over_time(seen, words, [left, ahead], _HIGH, (lowest - room, highest + room))
+    margin = max(0.05 * (highest - lowest), 0.01)
+    made = _over_time(seen, words, [left, ahead], _HIGH, (lowest - margin, highest + margin))
     made.spans = [(stop.start_s, stop.stop_s, f"{stop.mfdd_mps2:.1f}") for stop in seen.stops]
     return made
 
 
 def _g_against_g(seen: Overview, lateral: Array, forward: Array) -> Chart:
-    """Left turns on the left, as the rider sees them."""
+    """Forward against lateral acceleration, with left bends on the left, as the rider sees them."""
     reach = max(0.5, float(np.percentile(np.abs(np.concatenate((lateral, forward))), 99.99)))
     bins = int(np.ceil(reach / GG_BIN_G)) + 2
     edges = np.arange(-bins, bins + 1, dtype=float) * GG_BIN_G
@@ -235,7 +235,7 @@ def _g_against_g(seen: Overview, lateral: Array, forward: Array) -> Chart:
 
 
 def _shares(seen: Overview) -> Chart:
-    """How long at which lean. What stands upright is cut off where it is by far the most."""
+    """Histogram of the time at each lean. The bars of small leans are cut off where they are by far the highest."""
     middle, seconds = (BINS_DEG[:-1] + BINS_DEG[1:]) / 2.0, seen.summary.histogram_s
     share = 100.0 * seconds / max(float(np.sum(seconds)), 1e-9)
     leaning = np.abs(middle) > _UPRIGHT_DEG

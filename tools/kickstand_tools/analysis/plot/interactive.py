@@ -9,13 +9,14 @@ import numpy as np
 from ...logs.table import Array
 from .charts import LEFT_COLOUR, RIGHT_COLOUR, Bars, Chart, Charts, Dots, Line, Note, Sides, Trace, envelope
 
-POINTS = 40_000  # of a line: with more, a browser no longer zooms smoothly
-_INCH = 86  # of a chart's height, pixels, as what follows
-_GAP, _NARROW_GAP = 62, 96  # between rows; in a narrow window with the names of axes
+POINTS = 40_000  # most points of a line: with more, a browser no longer zooms smoothly
+_INCH = 86  # pixels per inch of a chart's height
+_GAP, _NARROW_GAP = 62, 96  # pixels between rows of charts; in a narrow window axes have names there
 _MARGIN = {"l": 80, "r": 80, "t": 100, "b": 80}
 _NARROW_MARGIN = {"l": 52, "r": 12, "t": 160, "b": 60}
-_ASIDE = 0.085  # between charts beside each other, of the width
+_ASIDE = 0.085  # space between charts side by side, over the width of the window
 _SMALL = {"font": {"size": 12}}
+_OWN_WORDS: dict[str, Any] = {"hoverinfo": "none"}  # page.js has them, by the name of a trace
 _INK = "rgb(36,36,36)"
 _AXIS = {
     "automargin": True,
@@ -29,8 +30,8 @@ PAPER = {
     "autotypenumbers": "strict",
     "bargap": 0,
     "font": {"color": _INK},
-    "paper_bgcolor": "white",
-    "plot_bgcolor": "white",
+    "paper_bgcolor": "rgba(0,0,0,0)",  # the page's own
+    "plot_bgcolor": "rgba(0,0,0,0)",
     "showlegend": False,
 }
 _SIDES: dict[str, Any] = {  # of a point: where its words stand
@@ -47,8 +48,8 @@ def plain(values: Array, digits: int = 3) -> list[float | None]:
 
 
 def figure(charts: Charts, linked: bool = False) -> dict[str, Any]:
-    """All that is drawn, in plain numbers, lists and None for NaN. linked: pointing anywhere over a chart over time,
-    not at a line alone, is pointing at its moment."""
+    """The figure for plotly.js, in plain numbers, lists and None for NaN. linked: the mouse selects a moment anywhere
+    in a chart over time, not at its lines alone."""
     each = [*charts.over_time, *charts.below]
     data = [drawn | _axes(k) for k, chart in enumerate(each) for trace in chart.traces for drawn in _traces(trace)]
     layouts = {kind: _layout(charts, kind == "narrow", linked) for kind in ("layout", "narrow")}
@@ -56,12 +57,12 @@ def figure(charts: Charts, linked: bool = False) -> dict[str, Any]:
 
 
 def time_axes(charts: Charts) -> list[str]:
-    """The axes of time, as plotly calls them."""
+    """plotly's names of the axes of time."""
     return [_axes(k)["xaxis"] for k in range(len(charts.over_time))]
 
 
 def _axes(k: int) -> dict[str, str]:
-    """Those of chart k, as plotly counts them."""
+    """plotly's names of the axes of chart k."""
     return {"xaxis": f"x{k + 1 if k else ''}", "yaxis": f"y{k + 1 if k else ''}"}
 
 
@@ -69,7 +70,11 @@ def _traces(trace: Trace) -> list[dict[str, Any]]:
     if isinstance(trace, Line):
         x, y = envelope(trace.x, trace.y, POINTS, trace.gap_s)
         line = {"color": trace.colour, "width": 1.2, "dash": "dot" if trace.dotted else "solid"}
-        named = {"type": "scattergl", "name": trace.name} if trace.name else {"type": "scatter", "hoverinfo": "skip"}
+        named = (
+            {"type": "scattergl", "name": trace.name, **_OWN_WORDS}
+            if trace.name
+            else {"type": "scatter", "hoverinfo": "skip"}
+        )
         return [{"mode": "lines", "line": line, "x": plain(x), "y": plain(y)} | named]
     if isinstance(trace, Sides):
         x, y = envelope(trace.x, trace.y, POINTS, trace.gap_s)
@@ -79,28 +84,34 @@ def _traces(trace: Trace) -> list[dict[str, Any]]:
         left = _filled("left", x, np.minimum(y, 0.0), LEFT_COLOUR)
         return [left, _filled("right", x, np.maximum(y, 0.0), RIGHT_COLOUR)]
     if isinstance(trace, Dots):
-        drawn = {"type": "scattergl", "mode": "markers", "marker": {"size": 3, "color": trace.colour}}
+        drawn = _OWN_WORDS | {"type": "scattergl", "mode": "markers", "marker": {"size": 3, "color": trace.colour}}
         return [drawn | {"name": trace.name, "x": plain(trace.x, 5), "y": plain(trace.y, 5)}]
     if isinstance(trace, Bars):
         colours = np.where(trace.x < 0.0, LEFT_COLOUR, RIGHT_COLOUR).tolist()
-        drawn = {"type": "bar", "marker": {"color": colours, "line": {"width": 0}}, "width": trace.width}
+        drawn = _OWN_WORDS | {"type": "bar", "marker": {"color": colours, "line": {"width": 0}}, "width": trace.width}
         return [drawn | {"name": trace.name, "x": plain(trace.x), "y": plain(trace.y)}]
     centres = plain((trace.edges[1:] + trace.edges[:-1]) / 2.0, 4)
     there = trace.values > 0.0
     logs = np.log10(np.where(there, trace.values, np.nan))
-    drawn = {"type": "heatmap", "colorscale": "YlGnBu", "reversescale": True, "showscale": False}
+    drawn: dict[str, Any] = _OWN_WORDS | {
+        "type": "heatmap",
+        "colorscale": "YlGnBu",
+        "reversescale": True,
+        "showscale": False,
+    }
     if np.any(there):
         drawn |= {"zmin": float(np.nanmin(logs)) - 0.7, "zmax": float(np.nanmax(logs))}  # the rarest is not white
     return [drawn | {"name": f"{trace.name}, log10", "x": centres, "y": centres, "z": [plain(row) for row in logs]}]
 
 
 def _filled(name: str, x: Array, y: Array, colour: str) -> dict[str, Any]:
-    """From zero to y (n), of whose zeros the ends are enough."""
+    """A trace filled from zero to y (n); of runs of zeros it keeps both ends."""
     leans = y != 0.0
     kept = leans.copy()
     kept[1:] |= leans[:-1]
     kept[:-1] |= leans[1:]
-    drawn = {"type": "scattergl", "mode": "lines", "line": {"color": colour, "width": 1.2}, "fill": "tozeroy"}
+    drawn = _OWN_WORDS | {"type": "scattergl", "mode": "lines", "line": {"color": colour, "width": 1.2}}
+    drawn |= {"fill": "tozeroy"}
     return drawn | {"name": name, "x": plain(x[kept]), "y": plain(y[kept])}
 
 
@@ -154,7 +165,7 @@ def _annotations(chart: Chart, x: str, y: str, narrow: bool) -> list[dict[str, A
         within | _note(Note(0.0, 1.0, said, "above")) | {"xanchor": "left", "align": "left"},
         within
         | _note(Note(0.0, 1.0, chart.left.replace("\n", "<br>"), "below"))
-        | {"xanchor": "left", "align": "left"},
+        | {"xanchor": "left", "align": "left", "bgcolor": "rgba(255,255,255,0.75)"},
         within | _note(Note(1.0, 1.0, chart.right, "below")) | {"xanchor": "right"},
     ]
     words += [{"xref": x, "yref": y} | _note(note) for note in chart.notes]

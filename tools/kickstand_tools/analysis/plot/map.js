@@ -2,7 +2,7 @@
 // the charts, and TILES: null, or where tiles of a map come from and what the map's origin is.
 const { map: MAP, axes: CHART_AXES, tiles: TILES } = JSON.parse(document.getElementById("map-data").textContent);
 if (finger) MAP.layout.dragmode = false;
-Plotly.newPlot("map", MAP.data, MAP.layout, { responsive: true, scrollZoom: true });
+Plotly.newPlot("map", MAP.data, MAP.layout, { ...FEW, scrollZoom: true });
 (function () {
   const map = document.getElementById("map"), chart = document.getElementById("chart"), text = document.getElementById("here");
   const x = map.data[0].x, y = map.data[0].y, rows = map.data[0].customdata;
@@ -18,10 +18,8 @@ Plotly.newPlot("map", MAP.data, MAP.layout, { responsive: true, scrollZoom: true
   }
 
   function words(row) {
-    const s = Math.floor(row[0]), two = (n) => String(n).padStart(2, "0");
-    const clock = (s >= 3600 ? Math.floor(s / 3600) + ":" + two(Math.floor(s / 60) % 60) : Math.floor(s / 60)) + ":" + two(s % 60);
     const lean = row[1] === null ? "" : "  ·  lean " + Math.abs(row[1]).toFixed(0) + "°" + (row[1] >= 0.5 ? " right" : row[1] <= -0.5 ? " left" : "");
-    return clock + lean + (row[2] === null ? "" : "  ·  " + row[2].toFixed(0) + " km/h");
+    return clock(row[0]) + lean + (row[2] === null ? "" : "  ·  " + row[2].toFixed(0) + " km/h");
   }
 
   function show(k) {

@@ -3,8 +3,45 @@ const CHART = JSON.parse(document.getElementById("charts").textContent);
 const finger = matchMedia("(pointer: coarse)").matches, narrow = matchMedia("(max-width: 600px)").matches;
 const layout = narrow ? CHART.narrow : CHART.layout;
 if (finger) layout.dragmode = false; // a finger moves the page
-Plotly.newPlot("chart", CHART.data, layout, { responsive: true });
+const FEW = { responsive: true, displaylogo: false, modeBarButtons: [["resetScale2d", "toImage"]] };
+Plotly.newPlot("chart", CHART.data, layout, FEW);
 if (parent !== window) {
   const postHeight = () => parent.postMessage({ height: document.body.scrollHeight }, "*"); // of the frame that it is in
   new ResizeObserver(postHeight).observe(document.body);
 }
+
+// What is pointed at, in one line beside it: "0:55, 41° left"
+const two = (n) => String(n).padStart(2, "0");
+const clock = (t, s = Math.floor(t)) => (s >= 3600 ? `${Math.floor(s / 3600)}:${two(Math.floor(s / 60) % 60)}` : Math.floor(s / 60)) + ":" + two(s % 60);
+const sided = (value, digits, unit, less, more) => {
+  const size = Math.abs(value).toFixed(digits);
+  return `${size}${unit}${Number(size) ? ` ${value < 0 ? less : more}` : ""}`;
+};
+const both = (x, y) => `${sided(x, 2, " g", "left", "right")}, ${sided(y, 2, " g", "braking", "acceleration")}`;
+const lean = ({ x, y }) => [clock(x), sided(y, 0, "°", "left", "right")];
+const SAID = {
+  left: lean,
+  right: lean,
+  speed: ({ x, y }) => [clock(x), `${y.toFixed(0)} km/h`],
+  "to the left": ({ x, y }) => [clock(x), sided(y, 2, " g", "to the right", "to the left")],
+  forward: ({ x, y }) => [clock(x), sided(y, 2, " g", "braking", "acceleration")],
+  share: ({ x, y }) => [sided(x, 0, "°", "left", "right"), `${y.toFixed(1)} %`],
+  "seconds, log10": ({ x, y, z }) => [both(x, y), `${(10 ** z).toFixed(2)} s`],
+  straights: ({ x, y }) => [both(x, y)],
+};
+(function () {
+  const chart = document.getElementById("chart"), tip = document.getElementById("tip");
+  chart.on("plotly_hover", function ({ points, event }) {
+    if (!event) return; // it is the map that is pointed at, and the map says it
+    const empty = ({ y, data }) => y === null || !SAID[data.name] || (y === 0 && points.length > 1 && ["left", "right"].includes(data.name));
+    const said = points.flatMap((point) => (empty(point) ? [] : SAID[point.data.name](point)));
+    tip.textContent = [...new Set(said)].join(", ");
+    tip.hidden = !said.length;
+    const room = document.documentElement.clientWidth - tip.offsetWidth - 8;
+    tip.style.left = `${Math.max(0, Math.min(event.pageX + 14, room))}px`;
+    tip.style.top = `${event.pageY - 34}px`;
+  });
+  chart.on("plotly_unhover", function () {
+    tip.hidden = true;
+  });
+})();

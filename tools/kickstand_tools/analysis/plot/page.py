@@ -16,7 +16,7 @@ from . import interactive, track_map
 from .charts import charts
 
 _HERE = Path(__file__).parent
-# Of the charts, and of the map. Their data stand apart from them, so that they are the same on every page.
+# The scripts of the charts and of the map. They contain no data, so that they are the same on every page.
 SCRIPTS = tuple((_HERE / name).read_text(encoding="utf-8") for name in ("page.js", "map.js"))
 # OpenStreetMap's own server refuses a page that was opened as a file: it wants to know the page's address.
 TILES_HOST = "https://basemaps.cartocdn.com"
@@ -25,8 +25,8 @@ MOST_ZOOM = 19
 
 
 def draw(path: Path, seen: Overview, tiles: bool = False) -> None:
-    """Write it, with a map beside the charts where the log has positions. tiles: with streets in the map, which the
-    page then takes from a server."""
+    """Write the page, with a map beside the charts if the log has positions. tiles: the map has streets, which the page
+    loads from a server."""
     library = files("plotly").joinpath("package_data/plotly.min.js").read_text(encoding="utf-8")
     path.write_text(page(seen, f"<script>{library}</script>", source_hash(library), tiles), encoding="utf-8")
 
@@ -59,7 +59,7 @@ def page(seen: Overview, library: str, allowed: str, tiles: bool = False) -> str
 
 
 def tiles_at(points: track_map.MapPoints) -> dict[str, Any]:
-    """Where tiles come from, and where their world lies in the map's metres."""
+    """The tiles' server, and the position of their world in the map's metres."""
     lat, lon = np.radians(points.lat_deg), np.radians(points.lon_deg)
     scale_m = EARTH_M * float(np.cos(lat))
     return {

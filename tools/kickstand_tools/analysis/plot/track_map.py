@@ -118,7 +118,7 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
 
 
 def _times(places: Track, seconds: float) -> Array:
-    """Evenly over the ride, and no more than POINTS."""
+    """The times of the points: evenly over the ride, at most POINTS."""
     first, last = float(places.t_s[0]), min(seconds, float(places.t_s[-1]))
     count = int(np.clip((last - first) / SHORTEST_S, 1, POINTS)) + 1
     return np.linspace(first, last, count)

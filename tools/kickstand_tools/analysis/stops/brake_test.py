@@ -31,28 +31,28 @@ from ..downsample import thinned
 from .speed_fit import fitted_speed, speed_delay_s
 from .standstill import standing
 
-RATE_S = 0.02  # between the samples that stops are looked for in
+RATE_S = 0.02  # time between the samples in which stops are searched
 MIN_SPEED_MPS = 10.0 / 3.6
-MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0  # harder is a fall or a fault
+MIN_MFDD_MPS2, MAX_MFDD_MPS2 = 1.0, 30.0  # limits of a stop's deceleration: a harder one is a fall or a fault
 LONGEST_S = 60.0
-GAP_S = 0.5  # readings are missing: nothing can be integrated over a longer gap
-REST_S = 2.5  # how much of the standstill is used
-SETTLE_S = 0.5  # how much of its beginning is not, because the fork comes up again
-ONSET_SHARE, FAINT_SHARE = 0.15, 0.04  # of the full deceleration: braking has surely begun; it has not begun yet
-ONSET_S = 0.6  # at most, from the faint share to the other
+GAP_S = 0.5  # longest gap in the readings over which speed and pitch are integrated
+REST_S = 2.5  # duration of the standstill that is used
+SETTLE_S = 0.5  # duration of its beginning that is not used, because the fork comes up again
+ONSET_SHARE, FAINT_SHARE = 0.15, 0.04  # shares of the full deceleration: above, braking has begun; below, it has not
+ONSET_S = 0.6  # longest time between these two
 
 # Height of the sensor above the point about which a bike pitches, which is as high as the wheels' hubs. When the nose
 # goes down, a sensor under the seat moves forward.
 SENSOR_HEIGHT_M = 0.65
 
 MAX_SPEED_MPS = 250.0 / 3.6
-MAX_SIDE_M, MAX_HEADING_DEG = 15.0, 30.0  # off a straight line: more is a bend, not a stop
+MAX_SIDE_M, MAX_HEADING_DEG = 15.0, 30.0  # limits of the deviation from a straight line: more is a bend
 # How far the integrated speed may be from 0 at the standstill before: OPEN_MPS, and OPEN_MPS2 for each second between.
 # A degree of pitch makes 0.17 m/s2, and a gyro's drift adds to it: over more than SHOWING_S the speed shows nothing.
 OPEN_MPS, OPEN_MPS2, SHOWING_S = 3.0, 0.7, 30.0
-SPEED_S, SURELY = 15.0, 1.5  # a stop that the speed alone shows: at most so long, so many times MIN_MFDD_MPS2
+SPEED_S, SURELY = 15.0, 1.5  # a stop that only the speed shows takes at most SPEED_S, with SURELY x MIN_MFDD_MPS2
 
-SMOOTH_S = 0.2  # accelerations and jerks are means over it
+SMOOTH_S = 0.2  # accelerations and jerks are means over this time
 
 
 @dataclass
@@ -65,9 +65,9 @@ class Stop:
     distance_m: float
     mfdd_mps2: float
     peak_mps2: float
-    jerk_mps3: float  # largest, either way
-    side_m: float  # how far off the straight line
-    heading_deg: float  # turned to the left
+    jerk_mps3: float  # largest absolute value
+    side_m: float  # deviation from the straight line
+    heading_deg: float  # change of heading, > 0 to the left
     speed_from: str  # "log" or "integrated"
 
     @property
@@ -94,7 +94,7 @@ def find_stops(channels: Channels) -> list[Stop]:
 
 
 def stops_of(ride: Channels, still: NDArray[np.bool_]) -> list[Stop]:
-    """The same of a whole ride in means over RATE_S. still (n): True where it stands still."""
+    """find_stops() for a whole ride in means over RATE_S. still (n): True where it stands still."""
     edges = np.flatnonzero(np.diff(np.concatenate(([False], still, [False]))))
     delay_s = speed_delay_s(ride)
     found, after = [], 0
@@ -130,7 +130,7 @@ def closes(speed_mps: float, seconds: float) -> bool:
 
 
 def plausible(initial_speed_mps: float, side_m: float, heading_deg: float) -> bool:
-    """True for a stop that can be: from this speed, so far to the side, turned by so much."""
+    """True if initial speed, deviation from the straight line and change of heading are within the limits of a stop."""
     return initial_speed_mps < MAX_SPEED_MPS and abs(side_m) < MAX_SIDE_M and abs(heading_deg) < MAX_HEADING_DEG
 
 
@@ -148,7 +148,7 @@ def stops_by_speed(ride: Channels) -> bool:
 
 
 def _stop(part: Channels, rest: int, delay_s: float, from_rest: bool) -> Stop | None:
-    """The stop that ends in the standstill that begins at index rest, None if it is none.
+    """The stop that ends in the standstill that begins at index rest; None if that is no stop.
 
     part: the ride up to some time into that standstill. from_rest: part begins where the standstill before ends.
     """

@@ -12,8 +12,8 @@ from ...signals.averages import integral, smoothed
 from ...signals.lag import best_lag
 from ..channels import Channels
 
-SMOOTH_S = 0.2  # of the acceleration by which a late speed differs
-LEAD_S = 4.0  # how long before the braking the speed is used for the fit
+SMOOTH_S = 0.2  # smoothing of the acceleration, which times the delay is the error of a late speed
+LEAD_S = 4.0  # time before the braking in which the log's speed is used for the fit
 DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # delays of the speed that are tried
 ENOUGH_SPEEDS, ENOUGH_CHANGE_MPS = 30, 0.5
 
@@ -23,7 +23,7 @@ SIGMA_WALK_MPS2, KNOT_S = 0.1, 0.5  # per square root of a second
 
 
 def speed_delay_s(ride: Channels) -> float:
-    """How late the log's speed is, as a satellite receiver's is: the delay with which its changes fit the force best.
+    """The delay of the log's speed (such as a satellite receiver's), at which its changes fit the force best.
 
     0 if the ride does not show it.
     """
@@ -49,11 +49,11 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
     """The speed (n, m/s), corrected by the log's; None if the log has no speed there.
 
     part: the ride up to a standstill; speed, acceleration (n): integrated and measured, m/s and m/s2. begin: index at
-    which braking begins. delay_s: of the log's speed.
+    which braking begins. delay_s: delay of the log's speed.
 
-    Least squares with prior knowledge: log = (1 + scale) v + integral of slope to the end - delay dv/dt. The slope is
-    the part of the force that comes from hill and dive and that the gyro has not measured: a random walk back in time,
-    from nearly 0 at standstill.
+    Least squares with a prior: log = (1 + scale) v + integral of slope to the end - delay dv/dt. The slope is the part
+    of the force by hill and dive that the gyro has not measured: a random walk back in time, from nearly 0 at
+    standstill.
     """
     time = part.t_s
     values = np.flatnonzero(~np.isnan(part.speed_mps))

@@ -1,8 +1,8 @@
-"""When a vehicle stands still, for the stops of a ride.
+"""Detects standstills, for the stops of a ride.
 
-Not by signals.standstill.motionless: limits that are shares of the ride's own shaking see all of the standing time of
+Not by signals.standstill.motionless: limits relative to the ride's own shaking detect all of the standing time of
 simulated rides on the road, those in deg/s and g 54 to 92 %. Only where an idling engine shakes as the road does they
-see less (17 to 41 % against 91 %).
+detect less (17 to 41 % against 91 %).
 """
 
 import numpy as np
@@ -14,17 +14,17 @@ from ...signals.standstill import STANDING_MPS
 from ..channels import Channels
 from ..downsample import spacing_s
 
-STALE_S = 3.0  # an older speed shows nothing
+STALE_S = 3.0  # an older speed is not used
 
 # Without a speed: a vehicle stands still while it shakes, over QUIET_S, by less than a share of its shaking when moving
 QUIET_S = 1.0
-QUIET_SHARE = 0.15  # in pitch and yaw
-QUIET_UP_SHARE = 0.2  # up and down: a smooth road and an idling engine leave more than a fork that stands
-RIDING_PERCENTILE = 90.0  # of the shaking: even in a ride with long pauses it is one of the move
+QUIET_SHARE = 0.15  # that share for pitch and yaw
+QUIET_UP_SHARE = 0.2  # that share for up and down: smooth roads and an idling engine leave more than a standing fork
+RIDING_PERCENTILE = 90.0  # percentile of the shaking that is one of the move, even in a ride with long pauses
 ENGINE_S, BEND_S = 0.1, 0.5  # the road shakes slower than an idling engine, faster than bends and the fork's dive
-STILL_DPS, STILL_G = 1.0, 0.01  # at standstill: rate of turning, change of the forward force from beginning to end
-MAX_OFF_G = 0.05  # by which the force may differ from that at rest; smooth braking and bends differ by more
-UNCALIBRATED_G = 0.12  # the same from 1 g, for a ride without rest and a sensor without six positions
+STILL_DPS, STILL_G = 1.0, 0.01  # limits at standstill: rate, change of the forward force from beginning to end
+MAX_OFF_G = 0.05  # largest difference of the force from that at rest; in smooth braking and bends it is larger
+UNCALIBRATED_G = 0.12  # largest difference from 1 g, for a ride without rest and a sensor without six positions
 
 
 def standing(ride: Channels) -> NDArray[np.bool_]:
@@ -76,19 +76,19 @@ def _rested(ride: Channels) -> NDArray[np.bool_]:
 
 
 def _road(values: Array, time: Array) -> Array:
-    """The shaking by the road: without the engine's, and without bends and braking, which may be far larger."""
+    """The shaking by the road: values without that by the engine, and without bends and braking, which are larger."""
     slow = smoothed(values, time, ENGINE_S)
     return slow - smoothed(slow, time, BEND_S)
 
 
 def _calm(values: Array, n: int, share: float) -> NDArray[np.bool_]:
-    """Where n samples in a row spread by less than this share of what they do on the move."""
+    """True where the standard deviation of n successive samples is under this share of the one on the move."""
     spread = window_spreads(values, n)
     return spread < share * np.percentile(spread, RIDING_PERCENTILE)
 
 
 def _weight(ride: Channels, n: int) -> NDArray[np.bool_]:
-    """Where the force over n samples in a row is the weight alone, as far as the sensor is calibrated."""
+    """True where the force over n successive samples is that at rest, within the sensor's calibration errors."""
     size = np.sqrt(sum(window_means(axis, n) ** 2 for axis in (ride.left_g, ride.up_g, ride.forward_g)))
     rests = size[window_means(ride.resting, n) > 0.99]
     weight = float(np.median(rests)) if len(rests) else 1.0

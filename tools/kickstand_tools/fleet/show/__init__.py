@@ -1,1 +1,1 @@
-"""The results of a fleet to look at: index.html, and a picture of each vehicle."""
+"""Shows the results of a fleet: index.html, and a picture of each vehicle."""

@@ -41,11 +41,11 @@ _DAY_S = 86_400.0
 
 
 class Glance:
-    """What the page shows of many results; add() takes them one by one. Memory hardly grows with their number.
+    """A summary of many results for the page; add() takes them one by one. Memory hardly grows with their number.
 
-    statuses, reasons: how many have each; moved_count, errors: rows of these tables; first_errors: log or vehicle, and
-    message, of some of these. decelerations: (s since 1970 or NaN, m/s2) of each brake test. worst: the least certain;
-    moved: those that turned most, each with its picture.
+    statuses, reasons: numbers of results with each; moved_count, errors: numbers of rows in these tables; first_errors:
+    (log or vehicle, message) of some of these. decelerations: (s since 1970 or NaN, m/s2) of each brake test. worst:
+    the least certain alignments; moved: the largest rotations of mounts, each with its picture.
     """
 
     def __init__(self) -> None:
@@ -58,11 +58,11 @@ class Glance:
         self._qualities = array("d")
         self.worst: list[Row] = []
         self.moved: list[tuple[Row, str]] = []
-        # of the table of vehicles, each with its decelerations: not aligned, aligned
+        # rows of the table of vehicles, each with its decelerations; by aligned or not
         self._rows: dict[bool, list[tuple[Row, list[float]]]] = {False: [], True: []}
 
     def add(self, result: PeriodResult) -> None:
-        """The next one."""
+        """Add the next result."""
         row = result.alignment
         aligned = row["status"] == "aligned"
         self.count += 1
@@ -87,7 +87,7 @@ class Glance:
             self._rows[aligned].append((row, [test["mfdd_mps2"] for test in result.brake_tests]))
 
     def page(self, expected: int) -> str:
-        """The page as HTML. expected: how many results there will be in the end."""
+        """The page as HTML. expected: number of results in the end."""
         tests, hours = len(self.decelerations[1]), self.driven_s / 3600.0
         tiles = [
             (self.statuses["aligned"], f"aligned ({_share(self.statuses['aligned'], self.count)})", "good"),
@@ -130,7 +130,7 @@ def _share(part: int, whole: int) -> str:
 def _quality(values: Sequence[float]) -> Markup:
     if not values:
         return Markup()
-    top = 1.6  # what is aligned is within 1.5 degrees
+    top = 1.6  # standard errors of aligned vehicles are under 1.5 degrees
     title = f"Standard error of forward, median {statistics.median(values):.2f}°"
     return _histogram(values, top, 26, title, 230, "degrees", "vehicles", "#2563eb")
 

@@ -15,8 +15,8 @@ _QUIET, _RULE = "#777", "#8883"
 
 @dataclass
 class Panel:
-    """x, y, width, height: where it is in the picture. across, along: the values at its left and right edge, and at
-    its lower and upper one. unit, unit_along: their names. words: turns a value of the horizontal axis into text."""
+    """x, y, width, height: its place in the picture. across, along: the values at its left and right edge, and at its
+    lower and upper one. unit, unit_along: names of these. words: formats a value of the horizontal axis."""
 
     x: float
     y: float
@@ -35,20 +35,20 @@ class Panel:
         self._right, self._bottom = self.x + self.width - 8.0, self.y + self.height - 34.0
 
     def dots(self, points: Sequence[Point], colour: str, radius: float = 2.0) -> None:
-        """One for each point."""
+        """Draw a dot at each point."""
         d = "".join(f"M{x:.1f} {y:.1f}h0" for x, y in self._places(points))
         if d:
             style = {"stroke_opacity": 0.55, "stroke_width": 2.0 * radius, "stroke_linecap": "round"}
             self._parts.append(element("path", d=d, stroke=colour, **style))
 
     def line(self, points: Sequence[Point], colour: str, width: float = 1.5) -> None:
-        """From point to point."""
+        """Draw a line from point to point."""
         if len(points) > 1:
             d = path(self._places(points))
             self._parts.append(element("path", d=d, fill="none", stroke=colour, stroke_width=width))
 
     def bars(self, edges: Sequence[float], heights: Sequence[float], colour: str) -> None:
-        """A bar from edge to edge for each height."""
+        """Draw a bar from edge to edge for each height."""
         tops = self._places(list(zip(edges, heights)))
         ends = self._places([(edge, 0.0) for edge in edges[1:]])
         for (left, top), (right, bottom) in zip(tops, ends):
@@ -78,7 +78,7 @@ class Panel:
         return element("g", *axes, *self._parts)
 
     def _places(self, points: Sequence[Point]) -> list[Point]:
-        """Where these are in the picture."""
+        """The points in the picture's coordinates."""
         (x0, x1), (y0, y1) = self.across, self.along
         x_scale = (self._right - self._left) / ((x1 - x0) or 1.0)
         y_scale = (self._bottom - self._top) / ((y1 - y0) or 1.0)
@@ -86,7 +86,7 @@ class Panel:
 
 
 def ticks(first: float, last: float, count: int) -> list[float]:
-    """Round values between the two, about so many."""
+    """About `count` round values between first and last."""
     rough = (last - first) / count
     if not rough > 0.0:
         return [first]
@@ -97,5 +97,5 @@ def ticks(first: float, last: float, count: int) -> list[float]:
 
 
 def date_text(utc_s: float) -> str:
-    """The day of a time, as 2026-09-30."""
+    """The day of a time, in the form 2026-09-30."""
     return datetime.datetime.fromtimestamp(utc_s, datetime.UTC).strftime("%Y-%m-%d")

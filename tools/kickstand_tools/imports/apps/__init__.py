@@ -1,1 +1,4 @@
-"""The formats that are known, one module each: finds() picks its files, read() makes a Recording of them."""
+"""The known log formats, one module each: finds() selects its files, read() converts them to a Recording.
+
+A new log format is a new module here, and an entry in _APPS in ../importing.py.
+"""

@@ -8,7 +8,7 @@ forward, right and down. A logger whose VerticalAcc is +1 has its up turned alon
 import numpy as np
 
 from ...errors import InputError
-from ..files import Piece
+from ..files import RecordingFile
 from ..recording import Recording, sensor_of, track_of
 from ..sheets import names_in, plain, read_sheet, unit_in
 from ..units import SPEEDS, unit
@@ -18,14 +18,14 @@ _ACCEL = ("LateralAcc", "VerticalAcc", "InlineAcc")
 _RATES = ("PitchRate", "YawRate", "RollRate")
 
 
-def finds(pieces: list[Piece]) -> list[list[Piece]]:
+def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """Each file that says it is AiM's is a recording."""
-    return [[piece] for piece in pieces if "AiM CSV File" in piece.text[:200]]
+    return [[file] for file in files if "AiM CSV File" in file.text[:200]]
 
 
-def read(pieces: list[Piece], name: str) -> Recording:
-    """Raises InputError for what is missing."""
-    lines = [names_in(line) for line in pieces[0].text.split("\n", 60)[:60]]
+def read(files: list[RecordingFile], name: str) -> Recording:
+    """Read a recording. Raises InputError for a missing column or sensor."""
+    lines = [names_in(line) for line in files[0].text.split("\n", 60)[:60]]
     header = next(
         (k for k, cells in enumerate(lines) if cells and cells[0] == "Time" and sum(map(bool, cells)) > 3), None
     )
@@ -34,7 +34,7 @@ def read(pieces: list[Piece], name: str) -> Recording:
     following = lines[header + 1] if header + 1 < len(lines) else []
     has_units = bool(following) and unit(following[0]) in ("s", "ms")
     units = dict(enumerate(following)) if has_units else {}
-    sheet = read_sheet(pieces[0], header, 1 if has_units else 0)
+    sheet = read_sheet(files[0], header, 1 if has_units else 0)
     places, missing = sheet.axes(*_ACCEL, *_RATES)
     if missing:
         raise InputError(

@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import InputError, extra
 from ...logs.cells import COLUMNS
 from ...logs.csv_reader import MOST_CELLS
-from ..files import Piece
+from ..files import RecordingFile
 from ..recording import Recording, sensor_of, track_of
 from ..sheets import Sheet, names_in, read_sheet
 from ..times import EPOCH_NS, Nanoseconds
@@ -22,14 +22,14 @@ _RATES = ("pitch_rate_dps", "yaw_rate_dps", "roll_rate_dps")
 _RATE_SIGNS = np.array([-1.0, 1.0, 1.0])  # pitch is positive nose up, which is against the axis to the left
 
 
-def finds(pieces: list[Piece]) -> list[list[Piece]]:
+def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """Each of Kickstand's logs and exports is a recording."""
-    return [[piece] for piece in pieces if _is_ours(piece)]
+    return [[file] for file in files if _is_ours(file)]
 
 
-def read(pieces: list[Piece], name: str) -> Recording:
-    """Raises InputError for a replay's output, which does not hold all that was measured."""
-    sheet = _sheet(pieces[0])
+def read(files: list[RecordingFile], name: str) -> Recording:
+    """Read a recording. Raises InputError for a replay's output, which does not contain all readings."""
+    sheet = _sheet(files[0])
     time_ns = sheet.times(sheet.columns.index("t_s"))
     log, no_log = sheet.axes(*COLUMNS[1:])
     exported, no_export = sheet.axes(*_FORCES, *_RATES)
@@ -50,34 +50,34 @@ def read(pieces: list[Piece], name: str) -> Recording:
 
 
 def _utc_ns(sheet: Sheet, time_ns: Nanoseconds) -> int | None:
-    """What makes UTC of the log's own time, in ns since 1970; None where the log has none."""
+    """UTC less the log's own time, ns since 1970; None where the log has no UTC."""
     utc_s = sheet.numbers(sheet.place("utc_s"))
     there = np.isfinite(utc_s)
     return int(np.median(utc_s[there] * 1e9 - time_ns[there])) if np.any(there) else None
 
 
-def _is_ours(piece: Piece) -> bool:
-    if piece.content.startswith(b"PAR1"):
+def _is_ours(file: RecordingFile) -> bool:
+    if file.content.startswith(b"PAR1"):
         return True
-    head = names_in(next(iter(piece.first_lines(1)), ""))
+    head = names_in(next(iter(file.first_lines(1)), ""))
     return "t_s" in head and (set(COLUMNS) <= set(head) or set(_FORCES) <= set(head))
 
 
-def _sheet(piece: Piece) -> Sheet:
-    if not piece.content.startswith(b"PAR1"):
-        return read_sheet(piece)
+def _sheet(file: RecordingFile) -> Sheet:
+    if not file.content.startswith(b"PAR1"):
+        return read_sheet(file)
     try:
         from pyarrow import parquet
 
-        size = parquet.ParquetFile(io.BytesIO(piece.content)).metadata
+        size = parquet.ParquetFile(io.BytesIO(file.content)).metadata
         if size.num_rows * size.num_columns > MOST_CELLS:
-            raise InputError(f"{piece.name} is too large: over {MOST_CELLS / 1e6:.0f} million cells")
-        table = parquet.read_table(io.BytesIO(piece.content))
+            raise InputError(f"{file.name} is too large: over {MOST_CELLS / 1e6:.0f} million cells")
+        table = parquet.read_table(io.BytesIO(file.content))
     except ImportError as error:
         raise InputError("Parquet needs pyarrow: " + extra("rides")) from error
     except (ValueError, OSError, NotImplementedError, KeyError, TypeError) as error:
-        raise InputError(f"{piece.name} is damaged or cut short: copy it again") from error
+        raise InputError(f"{file.name} is damaged or cut short: copy it again") from error
     columns = [str(column) for column in table.column_names]
     if "t_s" not in columns:
-        raise InputError(f"{piece.name}: not a ride that kickstand has exported: its columns are {', '.join(columns)}")
-    return Sheet(piece.name, columns, [column.to_numpy() for column in table.columns])
+        raise InputError(f"{file.name}: not a ride that kickstand has exported: its columns are {', '.join(columns)}")
+    return Sheet(file.name, columns, [column.to_numpy() for column in table.columns])

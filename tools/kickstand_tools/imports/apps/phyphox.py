@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...logs.csv_reader import as_text
-from ..files import Piece
+from ..files import RecordingFile
 from ..join import with_gravity
 from ..recording import Recording, Sensor, Track, sensor_of, track_of
 from ..sheets import Sheet, names_in, plain, read_sheet, unit_in
@@ -25,25 +25,25 @@ _SIGN = "+1 g up, on every phone"
 _WITHOUT_GRAVITY = "linear"  # stands in the name of a sensor from which gravity has been taken
 
 
-def finds(pieces: list[Piece]) -> list[list[Piece]]:
+def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """The recordings among these files: one a folder; meta/ belongs to the folder that it is in."""
-    by_folder: dict[str, list[Piece]] = {}
-    for piece in pieces:
-        folder = piece.folder.removesuffix("meta").removesuffix("/") if _is_meta(piece) else piece.folder
-        by_folder.setdefault(folder, []).append(piece)
-    return [files for files in by_folder.values() if any(_is_ours(piece) for piece in files)]
+    by_folder: dict[str, list[RecordingFile]] = {}
+    for file in files:
+        folder = file.folder.removesuffix("meta").removesuffix("/") if _is_meta(file) else file.folder
+        by_folder.setdefault(folder, []).append(file)
+    return [group for group in by_folder.values() if any(_is_ours(file) for file in group)]
 
 
-def read(pieces: list[Piece], name: str) -> Recording:
-    """Raises InputError for what is missing."""
+def read(files: list[RecordingFile], name: str) -> Recording:
+    """Read a recording. Raises InputError for a missing column or sensor."""
     found: dict[str, Sensor] = {}
     track: Track | None = None
-    pauses = _Pauses(pieces)
-    for piece in pieces:
-        if not _is_ours(piece):
+    pauses = _Pauses(files)
+    for file in files:
+        if not _is_ours(file):
             continue
-        sheet = read_sheet(piece)
-        for kind, sensor in _sensors(sheet, piece.stem, pauses):
+        sheet = read_sheet(file)
+        for kind, sensor in _sensors(sheet, file.stem, pauses):
             found.setdefault(kind, sensor)
         track = track or _location(sheet, pauses)
     remedy = "record Acceleration (with g), or Gravity beside it"
@@ -54,14 +54,14 @@ def read(pieces: list[Piece], name: str) -> Recording:
     return Recording(NAME, accel, found["gyro"], track, utc_ns=pauses.utc_ns)
 
 
-def _is_meta(piece: Piece) -> bool:
-    return piece.folder == "meta" or piece.folder.endswith("/meta")
+def _is_meta(file: RecordingFile) -> bool:
+    return file.folder == "meta" or file.folder.endswith("/meta")
 
 
-def _is_ours(piece: Piece) -> bool:
-    """Does its first line name a time in s and then quantities with their units in brackets?"""
-    first = names_in(next(iter(piece.first_lines(1)), ""))
-    if _is_meta(piece) or len(first) < 2 or not re.fullmatch(r"(.*\s)?time \(s\)", first[0], re.IGNORECASE):
+def _is_ours(file: RecordingFile) -> bool:
+    """True if its first line names a time in s and then quantities with their units in brackets."""
+    first = names_in(next(iter(file.first_lines(1)), ""))
+    if _is_meta(file) or len(first) < 2 or not re.fullmatch(r"(.*\s)?time \(s\)", first[0], re.IGNORECASE):
         return False
     known = [_AXIS.match(column) for column in first]
     return any(match and unit(match[3]) in ACCELERATIONS | RATES for match in known) or "latitude" in map(plain, first)
@@ -106,13 +106,13 @@ def _location(sheet: Sheet, pauses: "_Pauses") -> Track | None:
 class _Pauses:
     """meta/time.csv: when the experiment was started and paused. Its own time stands still in a pause, UTC does not."""
 
-    def __init__(self, pieces: list[Piece]) -> None:
+    def __init__(self, files: list[RecordingFile]) -> None:
         self.utc_ns: int | None = None
-        self._resumed: list[tuple[int, int]] = []  # the experiment's time, and how long it had been paused, ns
-        piece = next((piece for piece in pieces if _is_meta(piece) and piece.stem == "time"), None)
-        if piece is None or len(piece.first_lines(2)) < 2:
+        self._resumed: list[tuple[int, int]] = []  # (the experiment's time, duration of all pauses until then), ns
+        file = next((file for file in files if _is_meta(file) and file.stem == "time"), None)
+        if file is None or len(file.first_lines(2)) < 2:
             return
-        sheet = read_sheet(piece)
+        sheet = read_sheet(file)
         own, utc = sheet.place("experiment time"), sheet.place("system time")
         if own is None or utc is None or sheet.columns[0].lower() != "event":
             return
@@ -126,7 +126,7 @@ class _Pauses:
             self._resumed = [(at[k], max(0, clock[k] - clock[starts[0]] - (at[k] - at[starts[0]]))) for k in starts[1:]]
 
     def after(self, time_ns: Nanoseconds) -> Nanoseconds:
-        """The experiment's times with its pauses in them."""
+        """The experiment's times plus the pauses before them."""
         moved = time_ns.copy()
         for at, paused in self._resumed:
             moved = np.where(time_ns >= at, time_ns + paused, moved)

@@ -10,7 +10,7 @@ from kickstand.errors import Notice
 
 from ...errors import InputError
 from ...signals.geography import distance_m
-from ..files import Piece
+from ..files import RecordingFile
 from ..recording import SECOND_NS, Array, Recording, sensor_of, track_of
 from ..sheets import Sheet, names_in, plain, read_sheet, unit_in
 from ..times import Nanoseconds
@@ -18,17 +18,18 @@ from ..units import SPEEDS, factor, unit
 
 NAME = "RaceBox"
 _AXES = [f"{sensor}{axis}" for sensor in ("GForce", "Gyro") for axis in "YZX"]  # left, up, forward
-_NEAR = 1.25  # times another unit's speed: the units are a factor of 1.6 and more apart
+_NEAR = 1.25  # largest factor between the speed and that by positions: the units differ by 1.6 and more
 
 
-def finds(pieces: list[Piece]) -> list[list[Piece]]:
+def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """Each file that has RaceBox's columns is a recording."""
-    return [[piece] for piece in pieces if _header(piece) is not None]
+    return [[file] for file in files if _header(file) is not None]
 
 
-def read(pieces: list[Piece], name: str, speed_unit: str = "") -> Recording:
-    """Raises InputError for what is missing. speed_unit: of the column Speed, "" to find it from the positions."""
-    sheet = read_sheet(pieces[0], _header(pieces[0]) or 0)
+def read(files: list[RecordingFile], name: str, speed_unit: str = "") -> Recording:
+    """Read a recording. Raises InputError for a missing column. speed_unit: unit of the column Speed, "" to find it by
+    the positions."""
+    sheet = read_sheet(files[0], _header(files[0]) or 0)
     places, missing = sheet.axes(*_AXES)
     if {"GForceY", "GForceZ"} & set(missing):
         raise InputError(f"{name}: no GForceY or GForceZ, as in its motorcycle mode: export it with that mode off")
@@ -49,9 +50,9 @@ def read(pieces: list[Piece], name: str, speed_unit: str = "") -> Recording:
     return Recording(NAME, accel, gyro, track, notices=notices, utc_ns=0, vehicle_axes=True)
 
 
-def _header(piece: Piece) -> int | None:
+def _header(file: RecordingFile) -> int | None:
     """The number of the line of names: there may be lines about the laps before it."""
-    for number, line in enumerate(piece.text.split("\n", 200)[:200]):
+    for number, line in enumerate(file.text.split("\n", 200)[:200]):
         names = {plain(cell) for cell in names_in(line)}
         if {"gforcex", "gforcez", "time"} <= names:
             return number
@@ -64,7 +65,7 @@ def _said_unit(column: str) -> str:
 
 
 def _measured_unit(sheet: Sheet, time_ns: Nanoseconds, speed: int, lat: int | None, lon: int | None) -> str:
-    """The unit in which the speeds are those with which the positions change; "" where that is not clear."""
+    """The unit in which the speeds fit the changes of position; "" where that is not clear."""
     if lat is None or lon is None:
         return ""
     moved = _moved_mps(time_ns, sheet.numbers(lat), sheet.numbers(lon))
@@ -79,7 +80,7 @@ def _measured_unit(sheet: Sheet, time_ns: Nanoseconds, speed: int, lat: int | No
 
 
 def _moved_mps(time_ns: Nanoseconds, lat: Array, lon: Array) -> Array:
-    """(n) speed from about a second before each row, NaN where it is not known."""
+    """(n) mean speed by the positions over about a second before each row, NaN where unknown."""
     steps = np.diff(time_ns)
     back = max(1, round(SECOND_NS / max(float(np.median(steps)), 1.0))) if len(steps) else 1
     apart_s = np.full(len(time_ns), np.nan)

@@ -8,7 +8,7 @@ that measured. Kickstand's own export has this form, too.
 """
 
 from ...errors import InputError
-from ..files import Piece
+from ..files import RecordingFile
 from ..recording import Recording, sensor_of, track_of
 from ..sheets import names_in, plain, read_sheet
 
@@ -17,19 +17,19 @@ _FIRST = "This file is created using RaceChrono"
 _TIMES = ("timestamp", "elapsedtime", "time")
 
 
-def finds(pieces: list[Piece]) -> list[list[Piece]]:
+def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """Each file that says that RaceChrono has made it is a recording."""
-    return [[piece] for piece in pieces if piece.text[:200].lstrip().startswith(_FIRST)]
+    return [[file] for file in files if file.text[:200].lstrip().startswith(_FIRST)]
 
 
-def read(pieces: list[Piece], name: str) -> Recording:
-    """Raises InputError for what is missing."""
-    lines = pieces[0].text.split("\n", 60)[:60]  # blank ones among them: their numbers count
+def read(files: list[RecordingFile], name: str) -> Recording:
+    """Read a recording. Raises InputError for a missing column or sensor."""
+    lines = files[0].text.split("\n", 60)[:60]  # blank ones among them: their numbers count
     header = next((k for k, line in enumerate(lines) if _is_header(line)), None)
     if header is None:
         raise InputError(f"{name}: no line with the names of its columns: export it again as CSV v3")
     units, more = _units(lines, header)
-    sheet = read_sheet(pieces[0], header, more)
+    sheet = read_sheet(files[0], header, more)
     accel, no_accel = sheet.axes(*((f"{axis}_acc", f"{axis} acceleration", f"{axis}-acceleration") for axis in "xyz"))
     rates = ((f"{axis}_rate_of_rotation", f"{axis} rate of rotation", f"gyro {axis}") for axis in "xyz")
     gyro, no_gyro = sheet.axes(*rates)
@@ -61,7 +61,7 @@ def _is_header(line: str) -> bool:
 
 
 def _units(lines: list[str], header: int) -> tuple[dict[int, str], int]:
-    """The units by the numbers of their columns, and how many lines of heads follow the first."""
+    """The units by the numbers of their columns, and the number of header lines after the first."""
     following = [names_in(line) for line in lines[header + 1 : header + 3]]
     if len(following) == 2 and following[0] and following[0][0] == "unix time":
         return {place: cell for place, cell in enumerate(following[0]) if cell}, 2

@@ -8,7 +8,7 @@ m/s2 and rad/s, at rest with the screen up +9.8 in z.
 import re
 
 from ...errors import InputError
-from ..files import Piece
+from ..files import RecordingFile
 from ..join import with_gravity
 from ..recording import Recording, Sensor, sensor_of
 from ..sheets import names_in, read_sheet
@@ -20,34 +20,34 @@ _KINDS = {"acc": "total", "lac": "user", "grv": "gravity", "gyr": "gyro"}
 _SENSOR = re.compile(r"^(.*?)[_.]?(acc|gyr|grv|lac|mag|rot)m?$")  # the end of a file's name
 
 
-def finds(pieces: list[Piece]) -> list[list[Piece]]:
+def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """The recordings among these files: those whose names are alike but for the sensor's."""
-    alike: dict[str, list[Piece]] = {}
-    for piece in pieces:
-        head = [cell.lower() for cell in names_in(next(iter(piece.first_lines(1)), ""))]
+    alike: dict[str, list[RecordingFile]] = {}
+    for file in files:
+        head = [cell.lower() for cell in names_in(next(iter(file.first_lines(1)), ""))]
         if head == _HEAD:
-            alike.setdefault(f"{piece.folder}/{_parts(piece)[0]}", []).append(piece)
+            alike.setdefault(f"{file.folder}/{_parts(file)[0]}", []).append(file)
     return list(alike.values())
 
 
-def read(pieces: list[Piece], name: str) -> Recording:
-    """Raises InputError for what is missing."""
-    files = {_KINDS.get(_parts(piece)[1], ""): piece for piece in pieces}
+def read(files: list[RecordingFile], name: str) -> Recording:
+    """Read a recording. Raises InputError for a missing column or sensor."""
+    by_kind = {_KINDS.get(_parts(file)[1], ""): file for file in files}
 
     def sensor(kind: str) -> Sensor:
-        sheet = read_sheet(files[kind])
+        sheet = read_sheet(by_kind[kind])
         what = ("gyro", "rad/s", "right-handed") if kind == "gyro" else ("accelerometer", "m/s2", _UP)
         return sensor_of(sheet, sheet.times(0), [1, 2, 3], *what)
 
     give = "give the folder or the zip with NAME_accm.csv and NAME_gyrm.csv"
     remedy = "give the file of the accelerometer (_accm), or of gravity (_grvm), too"
-    accel = with_gravity(files, sensor, name, "linear acceleration", remedy, f"no accelerometer: {give}")
-    if "gyro" not in files:
+    accel = with_gravity(by_kind, sensor, name, "linear acceleration", remedy, f"no accelerometer: {give}")
+    if "gyro" not in by_kind:
         raise InputError(f"{name}: no gyroscope: {give}")
     return Recording(NAME, accel, sensor("gyro"), sign_known=False)
 
 
-def _parts(piece: Piece) -> tuple[str, str]:
-    """What the names of a recording's files have in common, and the sensor."""
-    match = _SENSOR.match(piece.stem)
-    return (match[1], match[2]) if match else (piece.stem, "")
+def _parts(file: RecordingFile) -> tuple[str, str]:
+    """The common part of the names of a recording's files, and the sensor of this one."""
+    match = _SENSOR.match(file.stem)
+    return (match[1], match[2]) if match else (file.stem, "")

@@ -6,7 +6,7 @@ and gravity have the opposite sign, and AccelerometerUncalibrated is in g, unles
 """
 
 from ...errors import InputError
-from ..files import Piece
+from ..files import RecordingFile
 from ..join import with_gravity
 from ..recording import Recording, Sensor, sensor_of, track_of
 from ..sheets import names_in, read_sheet
@@ -17,18 +17,18 @@ _KINDS = {"total": (_TOTAL, _RAW), "user": (_USER,), "gravity": (_GRAVITY,)}  # 
 _GYROS = ("gyroscope", "gyroscopeuncalibrated")
 
 
-def finds(pieces: list[Piece]) -> list[list[Piece]]:
+def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """The recordings among these files, one a folder."""
-    folders = dict.fromkeys(piece.folder for piece in pieces if _is_ours(piece))
-    return [[piece for piece in pieces if piece.folder == folder] for folder in folders]
+    folders = dict.fromkeys(file.folder for file in files if _is_ours(file))
+    return [[file for file in files if file.folder == folder] for folder in folders]
 
 
-def read(pieces: list[Piece], name: str) -> Recording:
-    """Raises InputError for what is missing."""
-    files = {piece.stem: piece for piece in pieces}
-    apple, standard = _platform(files)
+def read(files: list[RecordingFile], name: str) -> Recording:
+    """Read a recording. Raises InputError for a missing column or sensor."""
+    by_stem = {file.stem: file for file in files}
+    apple, standard = _platform(by_stem)
     turned = apple is not False and not standard
-    if turned and apple is None and (_RAW in files or _GRAVITY in files):
+    if turned and apple is None and (_RAW in by_stem or _GRAVITY in by_stem):
         raise InputError(
             f"{name}: Metadata.csv is missing, which says whether an iPhone or an Android phone recorded this: their "
             "accelerations have opposite signs; give all files of the export"
@@ -36,43 +36,43 @@ def read(pieces: list[Piece], name: str) -> Recording:
     up = "iPhone, -1 g up: sign turned" if turned else "+1 g up, standardised" if apple else "Android, +1 g up"
 
     def acceleration(kind: str) -> Sensor:
-        stem = next(stem for stem in _KINDS[kind] if stem in files)
+        stem = next(stem for stem in _KINDS[kind] if stem in by_stem)
         raw = turned and stem == _RAW
-        return _sensor(files[stem], "accelerometer", "g" if raw else "m/s2", up, -1.0 if turned else 1.0)
+        return _sensor(by_stem[stem], "accelerometer", "g" if raw else "m/s2", up, -1.0 if turned else 1.0)
 
-    there = [kind for kind, stems in _KINDS.items() if any(stem in files for stem in stems)]
+    there = [kind for kind, stems in _KINDS.items() if any(stem in by_stem for stem in stems)]
     remedy = "record Gravity, or Total Acceleration, beside it"
     none = "no acceleration: switch Accelerometer and Gravity on, and give all files of the export"
     accel = with_gravity(there, acceleration, name, "Accelerometer.csv", remedy, none)
-    gyro_file = next((files[stem] for stem in _GYROS if stem in files), None)
+    gyro_file = next((by_stem[stem] for stem in _GYROS if stem in by_stem), None)
     if gyro_file is None:
         raise InputError(f"{name}: no Gyroscope.csv: switch the gyroscope on, and give all files of the export")
     track = None
-    if "location" in files and len(files["location"].first_lines(2)) > 1:
-        sheet = read_sheet(files["location"])
+    if "location" in by_stem and len(by_stem["location"].first_lines(2)) > 1:
+        sheet = read_sheet(by_stem["location"])
         time_ns = sheet.times(sheet.place("time") or 0, "ns")
         speed, lat, lon = (sheet.place(column) for column in ("speed", "latitude", "longitude"))
         track = track_of(sheet, time_ns, speed, lat, lon)
     return Recording(NAME, accel, _sensor(gyro_file, "gyro", "rad/s", "right-handed"), track, utc_ns=0)
 
 
-def _is_ours(piece: Piece) -> bool:
-    first = names_in(next(iter(piece.first_lines(1)), ""))
-    return first[:2] == ["time", "seconds_elapsed"] and piece.stem in (_TOTAL, _RAW, _USER, _GRAVITY, *_GYROS)
+def _is_ours(file: RecordingFile) -> bool:
+    first = names_in(next(iter(file.first_lines(1)), ""))
+    return first[:2] == ["time", "seconds_elapsed"] and file.stem in (_TOTAL, _RAW, _USER, _GRAVITY, *_GYROS)
 
 
-def _platform(files: dict[str, Piece]) -> tuple[bool | None, bool]:
-    """Was it an iPhone (None: not known), and were its units and signs standardised?"""
-    if "metadata" in files and len(files["metadata"].first_lines(2)) > 1:
-        names, values = (names_in(line) for line in files["metadata"].first_lines(2))
+def _platform(by_stem: dict[str, RecordingFile]) -> tuple[bool | None, bool]:
+    """True for an iPhone (None: unknown), and True if units and signs were standardised."""
+    if "metadata" in by_stem and len(by_stem["metadata"].first_lines(2)) > 1:
+        names, values = (names_in(line) for line in by_stem["metadata"].first_lines(2))
         said = {name.lower(): value.lower() for name, value in zip(names, values)}
         if said.get("platform"):
             return said["platform"] == "ios", said.get("standardisation") == "true"
-    return (False, False) if _TOTAL in files else (None, False)  # only Android has that file
+    return (False, False) if _TOTAL in by_stem else (None, False)  # only Android has that file
 
 
-def _sensor(piece: Piece, quantity: str, unit: str, sign: str, turn: float = 1.0) -> Sensor:
-    sheet = read_sheet(piece)
+def _sensor(file: RecordingFile, quantity: str, unit: str, sign: str, turn: float = 1.0) -> Sensor:
+    sheet = read_sheet(file)
     places, missing = sheet.axes("time", "x", "y", "z")
     if missing:
         raise InputError(f"{sheet.name}: no columns time, x, y and z: export it again")

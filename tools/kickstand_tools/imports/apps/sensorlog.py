@@ -8,7 +8,7 @@ gravity and the user's acceleration, whose sum they are; rates in rad/s, right-h
 import numpy as np
 
 from ...errors import InputError
-from ..files import Piece
+from ..files import RecordingFile
 from ..join import with_gravity
 from ..recording import Recording, Sensor, Track, sensor_of, track_of
 from ..sheets import Sheet, names_in, plain, read_sheet
@@ -24,14 +24,14 @@ _KINDS = {"total": ("accelerometer", _ACCEL), "user": ("motion", _USER), "gravit
 _RATE = [f"motionRotationRate{axis}" for axis in "XYZ"]
 
 
-def finds(pieces: list[Piece]) -> list[list[Piece]]:
+def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """Each file that has SensorLog's columns is a recording."""
-    return [[piece] for piece in pieces if _is_ours(piece)]
+    return [[file] for file in files if _is_ours(file)]
 
 
-def read(pieces: list[Piece], name: str) -> Recording:
-    """Raises InputError for what is missing."""
-    sheet = read_sheet(pieces[0])
+def read(files: list[RecordingFile], name: str) -> Recording:
+    """Read a recording. Raises InputError for a missing column or sensor."""
+    sheet = read_sheet(files[0])
     places = {kind: _places(sheet, names) for kind, (_, names) in _KINDS.items()}
 
     def acceleration(kind: str) -> Sensor:
@@ -43,8 +43,8 @@ def read(pieces: list[Piece], name: str) -> Recording:
     return Recording(NAME, accel, _gyro(sheet, name), _location(sheet), utc_ns=_utc_ns(sheet))
 
 
-def _is_ours(piece: Piece) -> bool:
-    head = {plain(cell) for cell in names_in(next(iter(piece.first_lines(1)), ""))}
+def _is_ours(file: RecordingFile) -> bool:
+    head = {plain(cell) for cell in names_in(next(iter(file.first_lines(1)), ""))}
     return bool(head & {plain(_ACCEL[0]), plain(_USER[0])})
 
 
@@ -76,7 +76,7 @@ def _gyro(sheet: Sheet, name: str) -> Sensor:
 
 
 def _utc_ns(sheet: Sheet) -> int | None:
-    """What makes UTC of the time since the start of iOS: by when the rows were logged."""
+    """UTC less the time since the start of iOS, by the times at which the rows were logged."""
     logged = sheet.place("loggingTime")
     if logged is None:
         return None
@@ -90,7 +90,7 @@ def _utc_ns(sheet: Sheet) -> int | None:
 
 
 def _location(sheet: Sheet) -> Track | None:
-    """A fix is new in the row in which its own time has changed."""
+    """The positions and speeds; a fix is new in the row in which its own time has changed."""
     row_ns = _times(sheet, "accelerometer" if _places(sheet, _ACCEL) else "motion")
     fix = sheet.place("locationTimestamp_since1970")
     if fix is not None:

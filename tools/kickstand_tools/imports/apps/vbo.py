@@ -13,7 +13,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...logs.csv_reader import columns_of
-from ..files import Piece
+from ..files import RecordingFile
 from ..recording import Recording, sensor_of, track_of
 from ..sheets import Sheet, plain
 from ..times import of_day
@@ -38,15 +38,15 @@ _LACKING = (
 _SECTION = re.compile(r"^\[([^\]]+)\]\s*$")
 
 
-def finds(pieces: list[Piece]) -> list[list[Piece]]:
+def finds(files: list[RecordingFile]) -> list[list[RecordingFile]]:
     """Each file with VBO's sections is a recording."""
-    return [[piece] for piece in pieces if "[column names]" in piece.text[:20000].lower() and "[data]" in piece.text]
+    return [[file] for file in files if "[column names]" in file.text[:20000].lower() and "[data]" in file.text]
 
 
-def read(pieces: list[Piece], name: str) -> Recording:
-    """Raises InputError for what is missing."""
-    sections = _sections(pieces[0])
-    sheet = _sheet(pieces[0].name, sections)
+def read(files: list[RecordingFile], name: str) -> Recording:
+    """Read a recording. Raises InputError for a missing section or column."""
+    sections = _sections(files[0])
+    sheet = _sheet(files[0].name, sections)
     units = _units(sections, sheet)
     clock = sheet.place("time")
     if clock is None:
@@ -83,11 +83,11 @@ def read(pieces: list[Piece], name: str) -> Recording:
     )
 
 
-def _sections(piece: Piece) -> dict[str, list[str]]:
+def _sections(file: RecordingFile) -> dict[str, list[str]]:
     """The lines of each section by its name in small letters; "" has those before the first."""
     sections: dict[str, list[str]] = {"": []}
     lines = sections[""]
-    for line in piece.text.split("\n"):
+    for line in file.text.split("\n"):
         match = _SECTION.match(line)
         if match:
             lines = sections.setdefault(match[1].strip().lower(), [])

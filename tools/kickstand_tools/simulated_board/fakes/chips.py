@@ -9,6 +9,7 @@ MACHINES = {
     "pico": "Raspberry Pi Pico with RP2040",
     "pico w": "Raspberry Pi Pico W with RP2040",
     "pico 2": "Raspberry Pi Pico2 with RP2350",
+    "pico 2 w": "Raspberry Pi Pico2 W with RP2350",
     "pico lipo": "Pimoroni Pico LiPo 4MB with RP2040",
     "xiao rp2040": "Seeed Studio XIAO RP2040 with RP2040",
     "esp32": "Generic ESP32 module with ESP32",
@@ -38,7 +39,7 @@ def pins_of(machine):
 
 
 def flash_pins(machine):
-    """The pins of the flash that it runs from, of those that pins_of() gives."""
+    """The pins, among those of pins_of(), that are connected to the flash with the program."""
     return frozenset(range(6, 12)) if _is_classic(machine) else frozenset()
 
 
@@ -48,8 +49,14 @@ def inputs_only(machine):
 
 
 def i2c_controllers(machine):
-    """How many machine.I2C can drive."""
+    """Number of I2C controllers that machine.I2C can use."""
     return 1 if _chip(machine)[:7] in ("ESP32C3", "ESP32C6") else 2  # the second of a C6 is its low-power one
+
+
+def has_bluetooth(machine):
+    """True if MicroPython on it has the module bluetooth."""
+    chip = _chip(machine)
+    return " W with " in machine if chip.startswith("RP2") else not chip.startswith("ESP32S2")
 
 
 def _is_classic(machine):

@@ -1,14 +1,18 @@
-"""Gives CPython what the firmware needs of MicroPython: module `micropython`, sys.print_exception, what gc has more."""
+"""Gives CPython what the firmware needs of MicroPython: modules `micropython` and `framebuf`, sys.print_exception, what
+gc has more."""
 
 import gc
 import sys
 import traceback
 import types
 
+from . import framebuf
+
 
 def supplement():
     """Add them, so that drivers and app can be imported. The firmware's mathematics runs without."""
     sys.modules.setdefault("micropython", _module())
+    sys.modules.setdefault("framebuf", framebuf)
     if not hasattr(sys, "print_exception"):
         setattr(sys, "print_exception", _print_exception)  # noqa: B010 type checkers know no such attribute
     if not hasattr(gc, "threshold"):

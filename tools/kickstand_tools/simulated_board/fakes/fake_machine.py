@@ -7,23 +7,23 @@ import errno
 from ..clock import Reset
 from . import chips
 
-CALL_US = 2  # what a call into `machine` takes, so that a loop that waits for a pin comes to an end
-IRQ_US = 26  # that an interrupt takes beside its calls into `machine` and `time`: 33 in all, as on a Pico
+CALL_US = 2  # duration of a call into `machine`, so that a loop that waits for a pin comes to an end
+IRQ_US = 26  # duration of an interrupt without its calls into `machine` and `time`: 33 in all, as on a Pico
 
 PWRON_RESET = 1
 WDT_RESET = 3  # the rp2 port reports this after machine.reset() too
 
-_TICK_MS = 10  # of FreeRTOS on an ESP32
-_LEGACY_MS = 100  # for each byte that the legacy driver of an ESP32 waits, and once more
-_SPI_CALL_US = 20  # what a call into machine.SPI takes, with the driver's Python around it
+_TICK_MS = 10  # tick of FreeRTOS on an ESP32
+_LEGACY_MS = 100  # time that an ESP32's legacy driver waits for each byte, and once more
+_SPI_CALL_US = 20  # duration of a call into machine.SPI, with the driver's Python around it
 _RP2_MAX_WATCHDOG_MS = 8388
-_ESP32_TICKS = 4  # of its watchdog's second stage in a millisecond, counted in 32 bits (ESP-IDF)
+_ESP32_TICKS = 4  # ticks of its watchdog's second stage per millisecond, counted in 32 bits (ESP-IDF)
 _WATCHDOG_CTRL_CLEAR = 0x40058000 + 0x3000  # RP2040: writing bit 30 here stops the watchdog
 _WATCHDOG_ENABLE = 1 << 30
 
 
 def use(installed):
-    """From now on everything here acts on this simulator.Board."""
+    """Make everything here act on this simulator.Board from now on."""
     global board, soft_irqs
     board = installed
     soft_irqs = Irqs(board.clock, Irqs.SCHEDULED)
@@ -76,7 +76,7 @@ class Pin:
         board.watch_pin(self.id, edge if handler else None)
 
     def handle(self):
-        """An interrupt: call the handler."""
+        """Call the interrupt's handler."""
         if self._handler:
             self._handler(self)
             board.clock.advance(IRQ_US)
@@ -109,13 +109,13 @@ class Irqs:
         self._running = False
 
     def add(self, pin):
-        """An edge has come."""
+        """Handle an edge, or keep it while a handler runs."""
         if len(self._queue) < self._depth:
             self._queue.append(pin)
         self._run()
 
     def release(self):
-        """A transfer is over."""
+        """Handle the waiting interrupts, because a transfer is over."""
         self.held = False
         self._clock.at(self._clock.now_us, self._run)
 
@@ -140,7 +140,7 @@ class _Controller:
         self._bit_ns = 1_000_000_000 // freq
         self._ns = 0  # less than a microsecond: time that has passed but is not on the clock yet
         self._timeout_us = timeout
-        self._bytes = 0  # of the transfer under way, without the address
+        self._bytes = 0  # number of bytes in the transfer under way, without the address
 
     def readfrom_mem_into(self, addr, memaddr, buf, addrsize=8):
         self._bytes = 1 + len(buf)
@@ -322,8 +322,19 @@ class I2C(_Controller):
         return self._timeout_us // 1000 // _TICK_MS
 
 
+class ADC:
+    """machine.ADC: measures what the board's volts say of the pin."""
+
+    def __init__(self, pin):
+        self._number = pin.id if isinstance(pin, Pin) else pin
+
+    def read_u16(self):
+        board.clock.advance(CALL_US)
+        return min(65535, int(board.volts.get(self._number, 0.0) / 3.3 * 65535))
+
+
 class UART:
-    """machine.UART, receiving only. Bytes that do not fit into rxbuf are lost, as on the boards."""
+    """machine.UART. Bytes that do not fit into rxbuf are lost, as on the boards."""
 
     def __init__(self, id, baudrate=115200, tx=None, rx=None, rxbuf=256, timeout=0):
         if board.port == "rp2":
@@ -342,6 +353,10 @@ class UART:
     def any(self):
         board.clock.advance(CALL_US)
         return len(self._received)
+
+    def write(self, data):
+        board.clock.advance(CALL_US)
+        board.sent += data.encode() if isinstance(data, str) else data
 
     def read(self, nbytes):
         data = self._received[:nbytes]

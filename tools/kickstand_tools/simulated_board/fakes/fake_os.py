@@ -32,8 +32,8 @@ def ilistdir(path="."):
 
 
 def statvfs(path):
-    """As os.statvfs(). For a folder in the current one: of a Pico's flash that holds the firmware and this folder. What
-    it really is on may have no end."""
+    """os.statvfs(). For a folder in the current one it returns the figures of a Pico's flash with the firmware and this
+    folder: the real file system may be very large."""
     if path.startswith("/"):
         return os.statvfs(path)
     free = FLASH_BLOCKS - FIRMWARE_BLOCKS - _taken(path)

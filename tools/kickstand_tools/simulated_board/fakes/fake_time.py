@@ -3,7 +3,7 @@
 Under MicroPython this module takes the place of `time`; under CPython the names in ADDED are added to the real one.
 """
 
-CALL_US = 5  # what reading the time takes, so that a loop that waits for a time comes to an end
+CALL_US = 5  # duration of reading the time, so that a loop that waits for a time comes to an end
 _PERIOD = 1 << 30  # where ticks_us() and ticks_ms() start again at 0, as on the boards
 _HALF = _PERIOD // 2
 
@@ -12,7 +12,7 @@ ADDED = ("ticks_us", "ticks_ms", "ticks_cpu", "ticks_add", "ticks_diff", "sleep_
 
 
 def use(board_clock, at_zero_us):
-    """From now on everything here reads this clock; ticks are 0 when it stands at at_zero_us."""
+    """Make everything here read this clock from now on; ticks are 0 when it stands at at_zero_us."""
     global clock, zero_us
     clock = board_clock
     zero_us = at_zero_us

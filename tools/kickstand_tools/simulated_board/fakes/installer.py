@@ -5,7 +5,7 @@ import os
 import sys
 import time
 
-from . import fake_machine, fake_os, fake_time
+from . import fake_bluetooth, fake_machine, fake_os, fake_time
 
 _ADDED_TO = ((time, fake_time), (os, fake_os))  # under CPython
 
@@ -17,12 +17,14 @@ class Installer:
         self._real = {}  # the modules that were replaced; None where there was none
 
     def install(self, board):
-        """From now on `machine`, `time` and `os` are those of this simulator.Board."""
+        """Replace `machine`, `time` and `os` by those of this simulator.Board."""
         fake_machine.use(board)
         fake_time.use(board.clock, board.clock.now_us)
         self._replace("machine", fake_machine)
         if board.port == "esp32":
             self._replace("esp32", _Esp32)
+        if board.radio:
+            self._replace("bluetooth", fake_bluetooth)
         if board.poses:
             self._replace("sys", _posing(board.port, board.machine))
         if board.card and board.card.driver:
@@ -61,7 +63,7 @@ class Installer:
 
 
 class _Namespace:
-    """What MicroPython takes for a module."""
+    """An object that MicroPython accepts as a module."""
 
 
 class _Esp32:

@@ -1,1 +1,1 @@
-"""A fleet that is made up, with its manifest and its truth, to try `kickstand fleet` on."""
+"""A simulated fleet with its manifest and its truth, to try `kickstand fleet` on."""

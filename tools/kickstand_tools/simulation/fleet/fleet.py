@@ -1,4 +1,4 @@
-"""Writes a fleet that is made up: logs, MANIFEST.csv, and TRUTH.csv, which says what a run over it has to find."""
+"""Writes a simulated fleet: logs, MANIFEST.csv, and TRUTH.csv, which says what a run over it has to find."""
 
 import gzip
 from collections.abc import Callable, Iterator
@@ -16,7 +16,7 @@ from ...signals.rotations import rotation_matrix
 from .route import random_route
 from .vehicle import HANDLING, Receiver, drive_log, random_sensor
 
-# What is wrong with a vehicle, and its share of the fleet; the rest has nothing
+# What is wrong with a vehicle, and in which share of the fleet; nothing is wrong with the others
 TROUBLES = {
     "moved-between": 0.06,  # the mount was turned between two logs
     "moved-within": 0.06,  # or during one
@@ -24,13 +24,13 @@ TROUBLES = {
     "dead": 0.03,  # there is no speed at all
     "dies": 0.02,  # the receiver dies in the second log
     "km/h": 0.03,
-    "circles": 0.02,  # it turns all the time: no straight braking
+    "circles": 0.02,  # it drives in circles: no straight braking
     "garbage": 0.02,  # the first log is no text
     "empty": 0.02,  # the first log has no byte
     "cut": 0.02,  # the end of the first log is missing
     "missing": 0.02,  # the first log is not there
 }
-# What a run has to say of a vehicle whose alignment cannot be known: the reasons that are right
+# The right reasons (codes) for refusing a vehicle whose alignment cannot be known
 _REASONS = {
     "moved-between": "mount-moved",
     "moved-within": "mount-moved",
@@ -47,8 +47,9 @@ MATRIX = tuple(f"{row}_{axis}" for row in ("left", "up", "forward") for axis in 
 
 @dataclass
 class MadeVehicle:
-    """One of the fleet. trouble: a key of TROUBLES, or "". mounts: vehicle from sensor (3, 3), one or two if it moved:
-    by moved_deg in or before the log of that index, moved_s from its beginning (NaN: before it)."""
+    """A vehicle of the fleet. trouble: a key of TROUBLES, or "". mounts: vehicle from sensor (3, 3): one, or two if the
+    mount moved. It then moved by moved_deg, moved_s after the begin of the log with the index moved_log (NaN: between
+    that log and the one before)."""
 
     name: str
     kind: str
@@ -62,7 +63,7 @@ class MadeVehicle:
 
     @property
     def reasons(self) -> str:
-        """Codes, one of which a refusal has to have; "" where it has to be aligned."""
+        """The codes, one of which the vehicle's refusal has to have; "" where it has to be aligned."""
         return _REASONS.get(self.trouble, "")
 
 
@@ -75,7 +76,7 @@ def make_fleet(
     troubles: list[str] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[MadeVehicle]:
-    """Make up a fleet and write it to a directory: drives/*.csv.gz, MANIFEST.csv, TRUTH.csv. Raises InputError.
+    """Simulate a fleet and write it to a directory: drives/*.csv.gz, MANIFEST.csv, TRUTH.csv. Raises InputError.
 
     A third each of cars, buses and motorcycles with one to three drives of about `seconds` each. troubles: one for each
     vehicle, "" for none; at random in the shares of TROUBLES if None. progress: called with (done, vehicles). A seed
@@ -105,7 +106,7 @@ def make_fleet(
 
 
 def _leans(kind: str) -> str:
-    """The manifest's kind: a bus is a car to it."""
+    """The manifest's kind of a kind of vehicle: "car" for a bus too."""
     return kind if kind == "motorcycle" else "car"
 
 
@@ -156,7 +157,7 @@ def _vehicle(
 
 
 def _turn(chance: np.random.Generator, degrees: float) -> Array:
-    """(3, 3): a turn about any axis."""
+    """(3, 3): a rotation by so many degrees about a random axis."""
     axis = chance.standard_normal(3)
     return rotation_matrix(np.radians(degrees) * axis / np.linalg.norm(axis))
 
@@ -178,7 +179,7 @@ def _writer(log: Log, broken: str) -> Callable[[Path], None]:
 
 
 def log_bytes(log: Log) -> bytes:
-    """A log as CSV."""
+    """The bytes of a log as a CSV file."""
     try:
         import pyarrow
         from pyarrow import csv

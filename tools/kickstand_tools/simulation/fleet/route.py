@@ -8,13 +8,13 @@ from kickstand.units import STANDARD_GRAVITY
 from ...logs.table import Array
 
 _SMOOTH_S = 0.6  # a driver changes the pedal and the steering wheel within about this
-_SLOPE_M, _SLOPE_DEG, _CAMBER_DEG = 120.0, 1.2, 0.7  # slope and camber change every so often, by so much (1 sigma)
+_SLOPE_M, _SLOPE_DEG, _CAMBER_DEG = 120.0, 1.2, 0.7  # slope and camber have new values each 120 m, with these 1 sigma
 _FASTEST_LATERAL_MPS2 = 3.0
 
 
 @dataclass
 class Handling:
-    """How a kind of vehicle is driven, m/s and m/s2: cruising speeds, speeding up, braking, lateral accelerations."""
+    """How a kind of vehicle is driven: (least, most) of cruising speed, speeding up, braking, lateral acceleration."""
 
     cruise_mps: tuple[float, float]
     speed_up_mps2: tuple[float, float]
@@ -38,8 +38,8 @@ class Route:
 def random_route(
     chance: np.random.Generator, handling: Handling, seconds: float, rate_hz: float, straight: bool = True
 ) -> Route:
-    """A route with stops, bends and braking in straight lines; with straight False it turns all the time, as in a car
-    park."""
+    """A route with stops, bends and braking in straight lines. straight False: in circles all the time, as in a car
+    park, so without straight braking."""
     legs = _Legs(chance, handling)
     legs.stand(chance.uniform(7.0, 14.0))
     while legs.seconds < seconds - 12.0:
@@ -53,7 +53,7 @@ def random_route(
     width = max(2, round(_SMOOTH_S * rate_hz))
     speed = _smoothed(np.interp(time, knots[:, 0], knots[:, 1]), width)
     place = np.searchsorted(knots[:, 0], time, side="right").clip(1, len(knots) - 1)
-    lateral = _smoothed(knots[place, 2], 2 * width)  # of the leg that ends at the next knot
+    lateral = _smoothed(knots[place, 2], 2 * width)  # a leg's lateral acceleration stands in the knot at its end
     yaw_rate = np.where(speed > 0.3, lateral / np.maximum(speed, 1.5), 0.0)
     distance = np.cumsum(speed) / rate_hz
     return Route(
@@ -67,7 +67,8 @@ def random_route(
 
 
 class _Legs:
-    """knots: (time, speed, lateral acceleration since the knot before), one at the end of each leg."""
+    """Collects the legs of a route. knots: (time, speed, lateral acceleration since the knot before), one at the end of
+    each leg."""
 
     def __init__(self, chance: np.random.Generator, handling: Handling) -> None:
         self.chance, self._handling = chance, handling
@@ -130,7 +131,7 @@ def _along(chance: np.random.Generator, distance: Array, mean: float, sigma: flo
 
 
 def _smoothed(values: Array, width: int) -> Array:
-    """The mean over `width` samples, as many as there are."""
+    """Moving mean over `width` samples, near the ends over those that there are."""
     sums = np.cumsum(np.concatenate(([0.0], values)))
     first = np.maximum(np.arange(len(values)) - width // 2, 0)
     last = np.minimum(np.arange(len(values)) + (width + 1) // 2, len(values))
@@ -138,5 +139,5 @@ def _smoothed(values: Array, width: int) -> Array:
 
 
 def balance_lean(route: Route) -> Array:
-    """(n) rad, > 0 to the right: how far a motorcycle leans on this route."""
+    """(n) rad, > 0 to the right: the lean of a motorcycle in balance on this route."""
     return -np.arctan(route.speed * route.yaw_rate / STANDARD_GRAVITY)

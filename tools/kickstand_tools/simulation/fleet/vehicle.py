@@ -16,7 +16,7 @@ HANDLING = {
     "bus": Handling((7.0, 14.0), (0.7, 1.3), (1.0, 2.0), (0.7, 1.6)),
     "motorcycle": Handling((9.0, 22.0), (1.5, 3.2), (1.6, 4.5), (1.5, 4.0)),
 }
-# degrees per g of lateral and of forward acceleration: how far the body rolls outwards and dives
+# degrees per g: how far the body rolls outwards by lateral acceleration, and how far it dives by braking
 _ROLL_DEG, _DIVE_DEG = {"car": 4.0, "bus": 5.5, "motorcycle": 0.0}, {"car": 2.5, "bus": 2.0, "motorcycle": 4.0}
 _COUNT_G, _COUNT_DPS = 1.0 / 16384.0, 1.0 / 131.0
 
@@ -33,8 +33,8 @@ class Sensor:
 
 @dataclass
 class Receiver:
-    """Where the speed comes from: a value each every_s, late by late_s, times factor (3.6 where it is in km/h). None
-    comes after until_s."""
+    """The speed source: a value every every_s seconds, delayed by late_s, multiplied by factor (3.6 for km/h). After
+    until_s there are no more values."""
 
     every_s: float = 1.0
     late_s: float = 0.3
@@ -43,7 +43,7 @@ class Receiver:
 
 
 def random_sensor(chance: np.random.Generator) -> Sensor:
-    """With the errors of a usual MPU6050 that six positions were not taken with."""
+    """A sensor at a random mounting, with random errors of an ordinary MPU6050 without calibration."""
     errors = (chance.normal(mean, sigma, 3) for mean, sigma in ((0.0, 0.01), (1.0, 0.01), (0.0, 1.0)))
     return Sensor(random_rotation(chance), *errors)
 
@@ -58,7 +58,8 @@ def drive_log(
     moved: tuple[float, Array] | None = None,
     name: str = "the log",
 ) -> Log:
-    """The log of a drive. moved: at so many seconds the mount turns to another one (3, 3) within 0.3 s."""
+    """The log of a drive. moved: (time in s, matrix (3, 3) of the new mount); the mount rotates to that within 0.3
+    s."""
     force, rate = _readings(chance, kind, route)
     mount = np.broadcast_to(sensor.mount, (len(force), 3, 3))
     if moved is not None:
@@ -103,6 +104,6 @@ def _readings(chance: np.random.Generator, kind: str, route: Route) -> tuple[Arr
 
 
 def _knock(time: Array, at_s: float, turn: Array, seconds: float = 0.3) -> Array:
-    """(n, 3) rad/s along the vehicle's axes: the gyro sees the mount turn by the rotation `turn` (3, 3)."""
+    """(n, 3) rad/s about the vehicle's axes: the rates of a mount that rotates by `turn` (3, 3) around at_s."""
     turning = (time >= at_s - seconds / 2) & (time < at_s + seconds / 2)
     return np.outer(turning, rotation_vector(turn) / seconds)

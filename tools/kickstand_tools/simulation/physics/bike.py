@@ -1,4 +1,4 @@
-"""A two-wheeler: its measures, where the sensor sits on it, and how it leans and turns.
+"""A two-wheeler: its dimensions, where the sensor sits on it, and how it leans and yaws.
 
 The roll balance is that of a bike whose rider wants a certain lean. Lean > 0 to the right, yaw rate > 0 in a left turn.
 The line from the contact point to the centre of mass leans by the balance lean b. The chassis leans more, because wide
@@ -13,9 +13,9 @@ from kickstand.units import STANDARD_GRAVITY
 from ..commands import Commands
 from .signals import Signal, band_noise, derivative, smoothed, smoothstep
 
-_STEERING_S = 0.04  # smoothing of the steering, which cannot turn at any speed
-_WANDER = 0.06  # rms of the lean's wandering in a turn, as a share of the lean
-_STANDS_MPS, _RIDES_MPS = 0.4, 1.5  # the feet hold the bike below, steering balances it above
+_STEERING_S = 0.04  # smoothing of the steering, because its rate is limited
+_WANDER = 0.06  # rms of the lean's changes in a bend, as a share of the lean
+_STANDS_MPS, _RIDES_MPS = 0.4, 1.5  # below the first the feet hold the bike, above the second steering balances it
 
 
 @dataclass(frozen=True)
@@ -25,15 +25,15 @@ class Bike:
     The defaults are an average naked bike with its rider; random() varies them as bikes on the road do.
     """
 
-    mass_height: float = 0.62  # of bike and rider together, above the ground
+    mass_height: float = 0.62  # centre of mass of bike and rider together, above the ground
     roll_gyration: float = 0.27  # radius of gyration about the roll axis through the centre of mass
-    tyre_radius: float = 0.06  # of the tyres' cross-section, mean of front and rear
+    tyre_radius: float = 0.06  # radius of the tyres' cross-section, mean of front and rear
     wheel_inertia: float = 0.024  # both wheels' I/r over mass * mass_height: their gyroscopic moment in a turn
     wheelbase: float = 1.43
     sensor_height: float = 0.70
-    sensor_forward: float = 0.75  # of the rear contact point
+    sensor_forward: float = 0.75  # distance of the sensor in front of the rear contact point
     sensor_left: float = 0.0
-    dive_deg_per_mps2: float = 0.3  # 3 degrees of nose down at 1 g of braking
+    dive_deg_per_mps2: float = 0.3  # the nose dives by 3 degrees at 1 g of braking
     dive_hz: float = 1.7
     dive_damping: float = 0.45
     max_curvature: float = 0.4  # 1/m: the steering lock
@@ -62,7 +62,7 @@ class Bike:
 
 @dataclass
 class Roll:
-    """lean: of the chassis, rad; balance: lean of the centre of mass, rad; yaw_rate: about the vertical, rad/s."""
+    """lean: the chassis' lean, rad; balance: lean of the centre of mass, rad; yaw_rate: about the vertical, rad/s."""
 
     lean: Signal
     balance: Signal
@@ -80,10 +80,10 @@ def chassis_lean(balance: Signal, bike: Bike, bank: Signal | float = 0.0, hang: 
 
 
 def weave(chance: np.random.Generator, command: Commands, riding_deg: float) -> Signal:
-    """How the lean wavers in a rider's hands, rad.
+    """Random changes of the lean by the rider, rad.
 
-    riding_deg: rms at speed. At walking pace it is more, with the feet down a little; in a turn the lean also follows
-    the rider's corrections of the line.
+    riding_deg: rms at speed. They are larger at walking pace and small with the feet down; in bends the rider's
+    corrections of the line are added.
     """
     n, rate = len(command.time), command.rate_hz
     v = command.speed
@@ -95,11 +95,11 @@ def weave(chance: np.random.Generator, command: Commands, riding_deg: float) -> 
 
 
 def roll(command: Commands, bike: Bike, unrest: Signal) -> Roll:
-    """Lean and yaw rate. The yaw rate p is the one that fulfils the roll equation of the pendulum:
+    """Lean and yaw rate for the commanded lean. The yaw rate p is the one that fulfils the pendulum's roll equation:
 
     pendulum * b'' = g_n sin b + ((1 + wheels) v p + wind) cos b
 
-    So a quick roll to the right begins with a yaw to the left: countersteering. unrest: see weave().
+    So a quick roll to the right begins with a yaw to the left: countersteering. unrest: as from weave().
     """
     rate, v = command.rate_hz, command.speed
     normal_g = STANDARD_GRAVITY * np.cos(command.slope) + v * derivative(command.slope, rate)

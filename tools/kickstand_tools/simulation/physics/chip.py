@@ -43,7 +43,7 @@ class Chip:
     low_pass: False where nothing filters before the sampling.
     """
 
-    accel_matrix: NDArray[np.float64]  # (3, 3) reading over true: scale on the diagonal, cross-axis beside it
+    accel_matrix: NDArray[np.float64]  # (3, 3) reading over true value: scale factors on the diagonal, else cross-axis
     accel_offset: NDArray[np.float64]
     gyro_matrix: NDArray[np.float64]
     gyro_bias: NDArray[np.float64]
@@ -56,7 +56,8 @@ class Chip:
 
     @staticmethod
     def random(chance: np.random.Generator, share: float = 1.0, drift: float = 1.0) -> "Chip":
-        """A random sensor. share: of the data sheet's tolerances; drift: of an ordinary sensor's over temperature.
+        """A random sensor. share: factor on the data sheet's tolerances; drift: factor on an ordinary sensor's drift
+        with temperature.
 
         Offsets and biases are uniformly distributed within the sheet's limits; scale and cross-axis sensitivity
         normally, with the limit at two standard deviations. Over temperature the sheet allows 35..60 mg and 20 deg/s
@@ -83,7 +84,7 @@ class Chip:
         rates: NDArray[np.float64],
         temp_c: NDArray[np.float64],
     ) -> NDArray[np.float64]:
-        """Readings (n / 5, 7) at 200 Hz in the chip's order: g, C, deg/s. The first is of the first row.
+        """Readings (n / 5, 7) at 200 Hz in the chip's order: g, C, deg/s. The first one is made of the first row.
 
         force (n, 3) in g and rates (n, 3) in deg/s: true values along the sensor's axes at 1 kHz. temp_c (n,).
         """

@@ -13,13 +13,14 @@ _ORDERS = (0.5, 1.0, 2.0)  # a four-stroke twin's multiples of the crankshaft's 
 _IDLE_SHARE = 0.25  # vibration at idle over that at _FULL_RPM
 _FULL_RPM = 6000.0
 _MAX_G = 0.5
-_BLOCK = 100_000  # rows at a time, for the sake of memory
-_DPS_PER_G = 15.0  # the sensor is shaken in rotation too
+_BLOCK = 100_000  # rows computed at a time, to limit memory
+_DPS_PER_G = 15.0  # rates (rms) per force (rms) of the vibration
 
 
 @dataclass(frozen=True)
 class Engine:
-    """rms_g: vibration along each axis at 6000/min, before the chip's filter. shift_rpm: where the rider changes up."""
+    """rms_g: vibration along each axis at 6000/min, before the chip's filter. shift_rpm: speed at which the rider
+    changes up."""
 
     rms_g: float = 0.1
     idle_rpm: float = 1250.0
@@ -35,7 +36,7 @@ class Engine:
     def vibration(
         self, chance: np.random.Generator, speed: Signal, running: Signal, rate_hz: float
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Specific force (n, 3) in m/s2 and rates (n, 3) in rad/s along left, up, forward."""
+        """The vibration: specific force (n, 3) in m/s2 and rates (n, 3) in rad/s along left, up, forward."""
         rpm = self.rpm(speed, rate_hz)
         turns = integral(rpm / 60.0, rate_hz)
         growth = _IDLE_SHARE + (1.0 - _IDLE_SHARE) * (rpm / _FULL_RPM) ** 2

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from .bike import Bike
 from .signals import Signal, derivative
 
-_BLOCK = 100_000  # rows
+_BLOCK = 100_000  # rows computed at a time, to limit memory
 
 
 @dataclass
@@ -40,7 +40,7 @@ def body_rates(motion: Motion) -> NDArray[np.float64]:
     level_yaw = motion.yaw_rate * np.cos(motion.pitch)
     return np.column_stack(
         (
-            level_yaw * s - pitch_rate * c,  # nose up turns forward towards up: negative about left
+            level_yaw * s - pitch_rate * c,  # nose up rotates forward towards up: negative about left
             level_yaw * c + pitch_rate * s,
             lean_rate + motion.yaw_rate * np.sin(motion.pitch),
         )
@@ -50,7 +50,7 @@ def body_rates(motion: Motion) -> NDArray[np.float64]:
 def specific_force(motion: Motion, bike: Bike) -> NDArray[np.float64]:
     """Specific force (n, 3) in m/s^2 along left, up, forward at the sensor: its acceleration less gravity's.
 
-    The body turns about the centre of the rear tyre's cross-section, a tyre radius above the road.
+    The body rotates about the centre of the rear tyre's cross-section, a tyre radius above the road.
     """
     rate, v, slope = motion.rate_hz, motion.speed, motion.slope
     left = v * motion.yaw_rate * np.cos(slope)

@@ -17,20 +17,20 @@ from .signals import Signal, band_noise, smoothed, through
 CLASSES = {"A": 16e-6, "B": 64e-6, "C": 256e-6, "D": 1024e-6}
 CLASS_A, CLASS_B, CLASS_C, _ = CLASSES.values()
 _STEP_M = 0.02
-_CONTACT_M = 0.10  # length of a tyre's contact patch, which averages shorter waves
+_CONTACT_M = 0.10  # length of a tyre's contact patch, which averages out shorter waves
 
 # One end of a motorcycle with half of its rider: kg, kg, N/m, Ns/m, N/m
 _SPRUNG, _UNSPRUNG, _SPRING, _DAMPER, _TYRE = 120.0, 15.0, 17e3, 1100.0, 150e3
 _LATERAL = 0.35  # rms along left and along forward over the vertical rms
-# Rates about left, up, forward, rms per 9.8 m/s^2 of vertical rms. That about left is 0 because the pitch is exact
+# Rates about left, up, forward, rms per 9.8 m/s^2 of vertical rms. 0 about left: there the pitch itself is simulated
 _RATE_DPS = np.array([0.0, 8.0, 14.0])
 
 
 @dataclass
 class Shaking:
-    """What the road does to the chassis. heave: vertical acceleration of the rear, m/s^2; pitch: rad.
+    """How the road moves the chassis. heave: vertical acceleration of the rear, m/s^2; pitch: rad.
 
-    force (n, 3) in m/s^2 and rates (n, 3) in rad/s: what is to be added along and about left, up, forward.
+    force (n, 3) in m/s^2 and rates (n, 3) in rad/s: to be added to those along and about left, up, forward.
     """
 
     heave: Signal
@@ -40,14 +40,15 @@ class Shaking:
 
 
 def transmitted(f: Signal) -> NDArray:
-    """Displacement of the chassis over that of the road in the quarter-car model, complex, at f in Hz."""
+    """Complex transfer function of the quarter-car model at frequencies f (Hz): displacement of the chassis over that
+    of the road."""
     w = 2.0 * np.pi * f
     strut = _SPRING + 1j * w * _DAMPER
     return _TYRE * strut / ((strut - _SPRUNG * w * w) * (strut + _TYRE - _UNSPRUNG * w * w) - strut * strut)
 
 
 def profile_slope(chance: np.random.Generator, length_m: float, roughness: float) -> Signal:
-    """Slope dz/ds every _STEP_M of a road. roughness: PSD as CLASS_A, m3."""
+    """The slope dz/ds of a random road, every _STEP_M. roughness: PSD like CLASS_A, m3."""
     density = (2.0 * np.pi * 0.1) ** 2 * roughness
     white = chance.standard_normal(int(length_m / _STEP_M) + 200) * np.sqrt(density / (2.0 * _STEP_M))
     taps = round(_CONTACT_M / _STEP_M)
@@ -67,7 +68,8 @@ def add_bumps(slope: Signal, places_m: list[float], height_m: float, length_m: f
 def shaking(
     chance: np.random.Generator, distance: Signal, speed: Signal, slope: Signal, bike: Bike, rate_hz: float
 ) -> Shaking:
-    """Drive over a profile. distance: of the rear wheel at each sample, m. slope: as profile_slope() gives it."""
+    """The Shaking by driving over a profile. distance: the rear wheel's at each sample, m. slope: see
+    profile_slope()."""
     height = np.cumsum(slope) * _STEP_M
     at = np.arange(len(slope)) * _STEP_M
     front = distance + bike.wheelbase

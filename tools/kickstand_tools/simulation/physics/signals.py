@@ -6,29 +6,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 Signal = NDArray[np.float64]
-_NOISE_MARGIN_S = 10.0  # made too long by this at both ends and cut off, because there through() pads
-_BLOCK = 100_000  # frequencies at a time
-_PAD_S = 4.0  # the first and the last value are held so long, because an FFT joins the end to the start
+_NOISE_MARGIN_S = 10.0  # noise is made longer by this at both ends and cut, because through() pads there
+_BLOCK = 100_000  # frequencies computed at a time, to limit memory
+_PAD_S = 4.0  # the first and the last value are held for this time, because an FFT joins the end to the start
 
 
 def smoothstep(u: Signal) -> Signal:
-    """0 to 1 for u from 0 to 1, constant outside. Value, first and second derivative have no jumps."""
+    """A step from 0 to 1 while u goes from 0 to 1, constant outside. Value, first and second derivative have no
+    jumps."""
     u = np.clip(u, 0.0, 1.0)
     return u * u * u * (10.0 + u * (6.0 * u - 15.0))
 
 
 def derivative(x: Signal, rate_hz: float) -> Signal:
-    """Central differences, per second."""
+    """The derivative of x per second, by central differences."""
     return np.gradient(x, 1.0 / rate_hz)
 
 
 def integral(x: Signal, rate_hz: float) -> Signal:
-    """Trapezoidal rule, 0 at the start."""
+    """The integral of x over time by the trapezoidal rule, 0 at the start."""
     return np.concatenate(([0.0], np.cumsum((x[1:] + x[:-1]) / (2.0 * rate_hz))))
 
 
 def through(x: Signal, transfer: Callable[[Signal], NDArray], rate_hz: float) -> Signal:
-    """Filter x. transfer: gives the complex gain at frequencies in Hz."""
+    """x filtered by FFT. transfer: called with frequencies in Hz, returns the complex gains."""
     pad = int(_PAD_S * rate_hz)
     size = -(-(len(x) + 2 * pad) // 16384) * 16384  # few small prime factors: a fast FFT
     padded = np.pad(x, (pad, size - len(x) - pad), mode="edge")
@@ -43,12 +44,12 @@ def through(x: Signal, transfer: Callable[[Signal], NDArray], rate_hz: float) ->
 
 
 def smoothed(x: Signal, seconds: float, rate_hz: float) -> Signal:
-    """Smooth with a Gaussian of this standard deviation, without delay."""
+    """x smoothed with a Gaussian of this standard deviation, without delay."""
     return through(x, lambda f: np.exp(-0.5 * (2.0 * np.pi * f * seconds) ** 2), rate_hz)
 
 
 def second_order(x: Signal, natural_hz: float, damping: float, rate_hz: float) -> Signal:
-    """A low-pass of second order with gain 1 at 0 Hz, and with its delay."""
+    """x through a low-pass of second order with gain 1 at 0 Hz, so with that filter's delay."""
 
     def transfer(f: Signal) -> NDArray:
         s = 1j * f / natural_hz

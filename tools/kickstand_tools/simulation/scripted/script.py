@@ -18,17 +18,17 @@ from kickstand.units import STANDARD_GRAVITY
 
 KICKSTAND_DEG = -12.0  # to the left, as most are
 MOVE_S = 2.0  # from the kickstand to upright, or back
-STANDING_SWAY_DEG = 0.1  # the same when the rider holds the bike upright
-RIDING_SWAY_DEG = 0.5  # amplitude with which a rider wavers at speed
+STANDING_SWAY_DEG = 0.1  # amplitude of the lean's changes while the rider holds the bike upright
+RIDING_SWAY_DEG = 0.5  # amplitude of the lean's changes at speed
 WALKING_MPS, RIDING_MPS = 1.0, 4.0  # below the first the feet balance the bike, above the second steering alone does
 
 _SWAY = ((0.31, 0.6, 0.0), (0.73, 0.4, 1.0))  # Hz, share, phase
 _ROAD_HZ = (2.3, 5.9, 11.7, 19.3, 31.1)
-_ROAD_G = (0.5, 1.0, 0.5)  # left, up, forward: shares of vibration_g
+_ROAD_G = (0.5, 1.0, 0.5)  # shares of vibration_g along left, up, forward
 _ROAD_DPS = (25.0, 10.0, 15.0)  # deg/s per g of vibration
 _IDLE_HZ = 20.0
 _ENGINE_CYCLES_PER_M = 3.7  # 20 Hz at idle, 75 Hz at 15 m/s
-_ENGINE_SHARE = 0.5  # of vibration_g
+_ENGINE_SHARE = 0.5  # the engine's share of vibration_g
 
 
 class Segment:
@@ -49,7 +49,7 @@ def kickstand(seconds, lean_deg=KICKSTAND_DEG, slope_deg=None):
 
 
 def upright(seconds, lean_deg=0.0, slope_deg=None):
-    """Move upright, then be held there by the rider, engine off. lean_deg: how far off upright."""
+    """Move upright, then be held there by the rider, engine off. lean_deg: error of that pose."""
     return (
         Segment("moving", MOVE_S, lean_deg, 0.0, slope_deg, STANDING_SWAY_DEG, 0.0),
         Segment("upright", seconds),
@@ -57,7 +57,7 @@ def upright(seconds, lean_deg=0.0, slope_deg=None):
 
 
 def wait(seconds):
-    """Keep everything as it is."""
+    """Keep all values for so many seconds."""
     return (Segment("wait", seconds),)
 
 
@@ -114,7 +114,7 @@ def body_motion(lean, lean_rate, speed, acceleration, yaw_rate, slope=0.0, slope
     left = speed * yaw_rate * cos(slope)
     up = STANDARD_GRAVITY * cos(slope) + speed * slope_rate
     forward = acceleration + STANDARD_GRAVITY * sin(slope)
-    w_left = -slope_rate  # nose up turns forward towards up: negative about left
+    w_left = -slope_rate  # nose up rotates forward towards up: negative about left
     w_up = yaw_rate * cos(slope)
     w_forward = yaw_rate * sin(slope) + lean_rate
     c, s = cos(lean), sin(lean)
@@ -129,7 +129,7 @@ def body_motion(lean, lean_rate, speed, acceleration, yaw_rate, slope=0.0, slope
 
 
 class Ride:
-    """segments: what the functions above return, in order from t = 0. The ride starts with the first one's values.
+    """segments: those of the functions above, in order from t = 0. The ride starts with the values of the first one.
 
     vibration_g: rms of road and engine together along the up axis at 10 m/s and more, before the chip's filter.
     """
@@ -146,7 +146,7 @@ class Ride:
                 targets = segment.targets
                 end = tuple([values[i] if targets[i] is None else targets[i] for i in range(5)])
                 if segment.phase == "moving" and end == values:
-                    continue  # the bike is there already
+                    continue  # the bike is in this pose already
                 self._segments.append((self.seconds, segment, values, end, distance))
                 self.seconds += segment.seconds
                 distance += segment.seconds * (values[1] + end[1]) / 2.0
@@ -201,7 +201,7 @@ class Ride:
 
 
 class CarRide(Ride):
-    """The same way in a car: it turns as a motorcycle at that lean does, and its body rolls a little outwards."""
+    """The same ride by car: its yaw rate is that of a motorcycle with this lean, its body rolls a little outwards."""
 
     ROLL_SHARE = -0.08  # of the lean that a motorcycle would have
 
@@ -211,12 +211,12 @@ class CarRide(Ride):
 
 
 def shaken(motion, t_s, vibration_g, speed_mps, distance_m, engine):
-    """motion with the vibration of road and engine added. engine: 0 (off) to 1 (running)."""
+    """motion plus the vibration of road and engine. engine: 0 (off) to 1 (running)."""
     road = vibration_g * min(1.0, speed_mps / 10.0) * sqrt(1.0 - _ENGINE_SHARE * _ENGINE_SHARE)
     firing = vibration_g * engine * _ENGINE_SHARE
     if road == 0.0 and firing == 0.0:
         return motion
-    peak = sqrt(2.0 / len(_ROAD_HZ))  # of each of the equal sines that add up to an rms of 1
+    peak = sqrt(2.0 / len(_ROAD_HZ))  # amplitude of each of the equal sines that add up to an rms of 1
     turns = 2.0 * pi * (_IDLE_HZ * t_s + _ENGINE_CYCLES_PER_M * distance_m)
     sums = []
     for axis in range(6):

@@ -1,7 +1,7 @@
 """What an MPU6050 with its factory errors, mounted at any angle, reads of a given motion.
 
-Plain Python for CPython and MicroPython. All random figures depend on the seed and on the time that is asked for: a
-seed gives the same reading at the same instant on both, whatever was asked before.
+Plain Python for CPython and MicroPython. All random figures depend on the seed and the time alone: a seed gives the
+same reading at the same instant on both, whatever readings were computed before.
 
     world = Sensor(seed=3).world(ride.motion)
     world(20.0)         # (fx, fy, fz, wx, wy, wz, temp_c): g and deg/s in the sensor's axes, errors included
@@ -10,14 +10,14 @@ seed gives the same reading at the same instant on both, whatever was asked befo
 from math import cos, pi, sin, sqrt
 
 # Tolerances, data sheet PS-MPU-6000A rev 3.4, sections 6.1 and 6.2
-MAX_OFFSET_G = (0.05, 0.05, 0.08)  # of the accelerometer, along x, y, z
-MAX_SCALE_ERROR = 0.03  # of accelerometer and gyro
+MAX_OFFSET_G = (0.05, 0.05, 0.08)  # bias of the accelerometer along x, y, z
+MAX_SCALE_ERROR = 0.03  # scale error of accelerometer and gyro
 MAX_GYRO_BIAS_DPS = 20.0
 ACCEL_NOISE_G = 0.0033  # rms: 400 ug/sqrt(Hz) behind the 44 Hz low-pass
 GYRO_NOISE_DPS = 0.041  # rms: 0.005 deg/s/sqrt(Hz) behind the 42 Hz one
 
 UNTURNED = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-_NOISE_STEP_S = 0.0001  # the noise changes so often
+_NOISE_STEP_S = 0.0001  # the noise is constant for this time
 
 
 def scrambled(number):
@@ -62,10 +62,11 @@ def random_mounting(seed):
 
 
 class Sensor:
-    """One sensor: its errors and its mounting. Without a seed it has no error but noise, and is not turned.
+    """One sensor: its errors and its mounting. Without a seed it has no error but noise, and its axes are the
+    vehicle's.
 
     reading = scale * true + offset for the accelerometer, scale * true + bias for the gyro, each with noise.
-    share: the limit of offsets, scale errors and biases over the data sheet's. noise: over the data sheet's.
+    share: factor on the data sheet's limits of offsets, scale errors and biases. noise: factor on its noise.
     """
 
     def __init__(self, seed=None, mounting=None, share=1.0, noise=1.0):
@@ -105,12 +106,13 @@ class Sensor:
         return tuple(values)
 
     def world(self, motion):
-        """world(t_s) for the simulated board; motion(t_s) as Ride.motion."""
+        """Returns the function world(t_s) for the simulated board. motion: a function of t_s, such as Ride.motion."""
         return lambda t_s: self.read(motion(t_s), t_s)
 
 
 def resting(sensor, up):
-    """world(t_s) of this sensor at rest with `up` (a vector of any length in its own axes) pointing up."""
+    """Returns the function world(t_s) of a sensor at rest with `up` (a vector of any length in its own axes) pointing
+    up."""
     m = sensor.vehicle_from_sensor
     size = sqrt(up[0] * up[0] + up[1] * up[1] + up[2] * up[2])
     force = [(m[3 * i] * up[0] + m[3 * i + 1] * up[1] + m[3 * i + 2] * up[2]) / size for i in range(3)]

@@ -27,6 +27,16 @@ export class Board {
     this.#worker.postMessage({ order: [name, value] });
   }
 
+  /** Orders at times of the board, [[s, name, value], ...], which it reaches as fast as it can. */
+  ahead(orders) {
+    this.#worker.postMessage({ ahead: orders });
+  }
+
+  /** The board is gone. */
+  end() {
+    this.#worker.terminate();
+  }
+
   /** Press the button (true) or let it go. */
   button(down) {
     if (down === this.#down) return;

@@ -8,7 +8,7 @@ const TAP_MS = 150;
 
 const byId = (id) => document.getElementById(id);
 // A pose that is chosen already has no use for the space bar
-const inControl = (target) => target.closest?.("button:not(#pose [aria-pressed=true]), a, summary");
+const inControl = (target) => target.closest?.("button:not(#pose [aria-pressed=true]), a, summary, select");
 
 /** The push button: mouse, touch, space bar, and the click of a screen reader. press(down) is called. */
 export function connectButton(press) {
@@ -119,7 +119,7 @@ export class Steering {
   }
 
   #key(event) {
-    if (event.altKey || event.ctrlKey || event.metaKey || event.target.matches?.("input")) return;
+    if (event.altKey || event.ctrlKey || event.metaKey || event.target.matches?.("input, select")) return;
     const steps = { ArrowLeft: [-STEP_DEG, 0], ArrowRight: [STEP_DEG, 0], ArrowUp: [0, 10], ArrowDown: [0, -10] }[event.key];
     if (!steps || this.pose !== "ride") return;
     event.preventDefault();

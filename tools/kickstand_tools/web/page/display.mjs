@@ -1,4 +1,4 @@
-// The 16x2 display, dot by dot from what its controller holds in its memories.
+// The display, dot by dot from what its controller holds in its memories: 16x2 characters, or an OLED's 128x64 pixels.
 
 // In units of 0.1 mm, as on the usual module
 const DOT = [5, 6];
@@ -10,6 +10,8 @@ const LINES = 2;
 
 const WIDTH = COLUMNS * CELL[0] + 2 * MARGIN;
 const HEIGHT = LINES * CELL[1] + 2 * MARGIN;
+const OLED = [128, 64];
+const OLED_MARGIN = 5; // in pixels of the OLED
 
 export class Display {
   #canvas;
@@ -42,8 +44,33 @@ export class Display {
   }
 
   #draw() {
-    const { codes, cgram, lit } = this.#last;
     const context = this.#canvas.getContext("2d");
+    this.#canvas.classList.toggle("oled", Boolean(this.#last.pixels));
+    if (this.#last.pixels) this.#drawOled(context, this.#last.pixels);
+    else this.#drawLcd(context, this.#last);
+  }
+
+  #drawOled(context, pixels) {
+    this.#canvas.width = Math.round(this.#canvas.clientWidth * devicePixelRatio);
+    this.#canvas.height = Math.round(this.#canvas.clientHeight * devicePixelRatio);
+    // Whole pixels of the screen for each of the OLED's
+    const room = Math.min(this.#canvas.width / (OLED[0] + 2 * OLED_MARGIN), this.#canvas.height / (OLED[1] + 2 * OLED_MARGIN));
+    const scale = Math.max(1, Math.floor(room));
+    context.fillStyle = "#05070a";
+    context.fillRect(0, 0, this.#canvas.width, this.#canvas.height);
+    context.fillStyle = "#e8f4ff";
+    const left = Math.floor((this.#canvas.width - scale * OLED[0]) / 2);
+    const top = Math.floor((this.#canvas.height - scale * OLED[1]) / 2);
+    const gap = scale > 3 ? 1 : 0;
+    for (let y = 0; y < OLED[1]; y++) {
+      for (let x = 0; x < OLED[0]; x++) {
+        if (!(pixels[(y * OLED[0] + x) >> 3] & (0x80 >> (x & 7)))) continue;
+        context.fillRect(left + x * scale, top + y * scale, scale - gap, scale - gap);
+      }
+    }
+  }
+
+  #drawLcd(context, { codes, cgram, lit }) {
     // As many pixels as the screen has there: a canvas that is scaled would show dots of different widths
     const scale = (this.#canvas.clientWidth * devicePixelRatio) / WIDTH;
     this.#canvas.width = Math.round(WIDTH * scale);

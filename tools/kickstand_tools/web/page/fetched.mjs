@@ -7,3 +7,24 @@ export async function fetched(url) {
   if (!answer.ok) throw new Error(`${url} cannot be loaded (HTTP ${answer.status})`);
   return answer;
 }
+
+/** The bytes of files of the site, in their order. tell(done, of): in bytes, as sizes.json has them, because a server may
+ * pack what it sends. */
+export async function fetchedAll(names, base, tell = () => {}) {
+  const sizes = await (await fetched(new URL("sizes.json", base))).json();
+  const of = names.reduce((sum, name) => sum + sizes[name], 0);
+  let done = 0;
+  return Promise.all(
+    names.map(async (name) => {
+      const { body } = await fetched(new URL(name, base));
+      const pieces = [];
+      for (const reader = body.getReader(); ; ) {
+        const { value, done: ended } = await reader.read();
+        if (ended) break;
+        pieces.push(value);
+        tell((done += value.length), of);
+      }
+      return new Blob(pieces).arrayBuffer();
+    }),
+  );
+}

@@ -4,6 +4,8 @@ import { shows } from "./shows.mjs";
 
 const RIDE_S = 3; // that the lean is held before the last step counts as done
 const WELL_DEG = 15;
+const SURE_S = 7; // that a lean is shown straight on, until a bend does not make the firmware doubt it again
+const STRAIGHT_DEG = 8;
 
 // The pose that the firmware wants; after a refusal it is still the one before
 const WANTED = {
@@ -26,6 +28,7 @@ const PAGES = {
 const ON_STAND = ["Put it on its stand", "kickstand"];
 const UPRIGHT = ["Hold it upright", "upright"];
 const RIDE = ["Ride", "ride"];
+const STRAIGHT = ["Ride straight", "straight"];
 
 /** A step: number (1 to 4, 5 when all are done, 0 for none), text, and its button's [label, action], or none. */
 const step = (number, text, action) => ({ number, text, action });
@@ -34,17 +37,20 @@ export class Guide {
   #wanted = "kickstand";
   #heldSince = null;
   #ridden = false;
+  #shownSince = null;
+  #sure = false; // since the power came on
   #cut = false; // the power has gone in a save, and since then nothing has been ridden or aligned
 
   /** The power has gone. inSave: in the middle of one. */
   dark(inSave) {
     this.#cut = inSave;
+    this.#sure = false;
   }
 
   /**
    * The step that fits, or null for the one before. lines: the display's two; shown: the lean that it shows, or null.
    * pose: "kickstand", "upright", "ride"; standing: it has come to rest in it. state: {powered, plugged, armed (a save
-   * will be cut), time (s)}.
+   * will be cut), time (s), lean_deg: the true one}.
    */
   next(lines, shown, pose, standing, state) {
     const { kind } = shows(lines) ?? {};
@@ -154,11 +160,26 @@ export class Guide {
   }
 
   #ride(shown, state) {
+    if (!this.#sure && !this.#ridden) return this.#straight(shown, state);
     if (shown === null) return step(4, "The meter is not sure yet. It says so, rather than show a wrong lean: ride on.");
     if (Math.abs(shown) < WELL_DEG) this.#heldSince = null;
     else this.#heldSince ??= state.time;
     if (this.#heldSince !== null && state.time - this.#heldSince > RIDE_S) this.#ridden = true;
     if (this.#ridden) return step(5, "That is all. A press turns the pages. Now break something, or build one: see Install.");
     return step(4, "Lean it: drag the motorcycle, use the slider or the arrow keys. Compare both figures.");
+  }
+
+  /** Until the firmware is sure of the lean. */
+  #straight(shown, state) {
+    if (shown === null) this.#shownSince = null;
+    else this.#shownSince ??= state.time;
+    this.#sure = this.#shownSince !== null && state.time - this.#shownSince > SURE_S;
+    if (Math.abs(state.lean_deg) > STRAIGHT_DEG) {
+      return step(4, "Not yet: the meter needs ten seconds straight on, to find the errors of its sensor.", STRAIGHT);
+    }
+    if (shown === null) {
+      return step(4, "It rides straight: the meter is not sure yet. It says so, rather than show a wrong lean.");
+    }
+    return step(4, "It rides straight for ten seconds, in which the meter finds the errors of its sensor.");
   }
 }

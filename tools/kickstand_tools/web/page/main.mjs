@@ -24,7 +24,7 @@ const FAULTS = {
 const bike = new Bike(byId("bike"));
 const road = new Road(byId("road"));
 const guide = new Guide();
-const state = { powered: true, plugged: true, armed: false, stopped: false, time: 0 };
+const state = { powered: true, plugged: true, armed: false, stopped: false, time: 0, lean_deg: 0 };
 let display;
 let tick = { t_s: 0, lean_deg: -12, speed_mps: 0, yaw_rate_dps: 0, phase: "kickstand" };
 let screen = { text: ["", ""], shown_deg: null };
@@ -36,11 +36,13 @@ const board = new Board({
   ready() {
     byId("pose").disabled = false;
     for (const id in FAULTS) byId(id).disabled = false;
+    byId("kind").disabled = false;
     keepOffline().then((kept) => byId("offline").classList.toggle("away", !kept));
   },
   tick(next) {
     tick = next;
     state.time = next.t_s;
+    state.lean_deg = next.lean_deg;
     if (next.powered !== state.powered) {
       state.powered = next.powered;
       if (!state.powered) guide.dark(state.armed);
@@ -72,6 +74,7 @@ const actions = {
   kickstand: () => steering.stand("kickstand"),
   upright: () => steering.stand("upright"),
   ride: () => steering.stand("ride"),
+  straight: () => steering.lean(0),
   wire() {
     state.plugged = !state.plugged;
     board.order("sensor", state.plugged);
@@ -97,6 +100,11 @@ for (const id in FAULTS) {
     actions[id]();
   });
 }
+byId("kind").value = "lcd"; // a browser keeps what was chosen before the page was loaded again
+byId("kind").addEventListener("change", (event) => {
+  board.order("display", event.target.value);
+  focusPress();
+});
 // After a click with the mouse the space bar is the board's button again
 addEventListener("click", (event) => {
   if (event.detail && event.target.closest("button:not(#press, #do)")) document.activeElement.blur();
@@ -158,7 +166,7 @@ function put(id, text) {
 
 try {
   display = new Display(byId("display"), byId("display-said"), await (await fetched("./font.json")).json());
-  if (screen.codes) display.show(screen);
+  if (screen.codes || screen.pixels) display.show(screen);
   draw();
 } catch (error) {
   stop(`The display cannot be drawn: ${error.message}. Load the page again.`);

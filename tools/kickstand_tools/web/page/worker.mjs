@@ -1,6 +1,7 @@
 // The board: firmware and models on MicroPython, kept to real time, away from the page's own thread.
 //
-// Takes {order: [name, value]}, see Device.act() in web/device.py, and {awake: boolean}.
+// Takes {order: [name, value]}, see Device.act() in web/device.py, {ahead: [[s, name, value], ...]}: orders that are
+// carried out at these times of the board, as fast as it can, and {awake: boolean}.
 // Sends {ready}, {ticks} as Device.take() gives them, {rate}: the board's seconds a second, if not all in time less than
 // 1, {orders} with the board's time of each, for whoever wants to repeat them, and {failed: text}.
 
@@ -81,6 +82,19 @@ function follow() {
   if (message.ticks.length || message.rate !== undefined) postMessage(message);
 }
 
+/** Let the board's time run ahead of ours, up to the last of these orders. */
+function runAhead(orders) {
+  for (const [atS, name, value] of orders) {
+    while (boardS < atS) {
+      boardS = Math.min(atS, boardS + SLICE_S);
+      device.run_to(boardS);
+    }
+    device.order(name, value);
+  }
+  waiting = JSON.parse(device.take()).slice(-1);
+  start();
+}
+
 function start() {
   beganMs = performance.now() - boardS * 1000;
   ratedMs = performance.now();
@@ -95,6 +109,7 @@ function stop(error) {
 onmessage = ({ data }) => {
   if (!device) return;
   if (data.order) postMessage({ orders: [[device.order(...data.order), ...data.order]] });
+  if (data.ahead) runAhead(data.ahead);
   if (data.awake !== undefined) {
     awake = data.awake;
     if (awake) start();

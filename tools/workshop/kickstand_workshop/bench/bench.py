@@ -1,4 +1,4 @@
-"""What the firmware costs on the emulated Pico in time, memory and flash: bench() measures, tables() lays it out."""
+"""What the firmware costs on an emulated board in time, memory and flash: bench() measures, tables() lays it out."""
 
 import ast
 from dataclasses import asdict
@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 from kickstand.calibration.parameters import Calibration
-from kickstand_tools.deploy.bytecode import cross_compiled
-from kickstand_tools.emulator import flash_image
-from kickstand_tools.emulator.host_link import GUEST, HostLink
+from kickstand_tools.deploy.bytecode import architecture, cross_compiled
+from kickstand_tools.emulator import console_link, flash_image, host_link
+from kickstand_tools.emulator.emulate import CHIPS
 from kickstand_tools.emulator.pico import Pico
 from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
@@ -20,38 +20,48 @@ from . import boot
 from .sample_count import SampleCount
 
 SAMPLE_HZ = 200  # as bench_guest sets it
-_GUEST = ("bench_guest", "stages_guest")  # modules of this folder that run on the Pico
+_GUEST = ("bench_guest", "stages_guest")  # modules of this folder that run on the board
 _SENSOR = Sensor(seed=1, share=0.0)  # without errors, mounted at some angle
 _SPEED_MPS = 15.0
 _RIDE = [accelerate(_SPEED_MPS, 1.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 20
-_MODES: dict[str, dict[str, Any]] = {"aligning by driving": {"SPEED": "wheel"}, "recording": {"RECORD": True}}
+_MODES: dict[str, dict[str, Any]] = {
+    "aligning by driving": {"SPEED": "wheel"},
+    "recording": {"RECORD": True},
+    "with an OLED": {"DISPLAY": "ssd1306"},
+    "live to a phone": {"LIVE": True},
+}
 
 
-def bench(seconds: int = 10) -> dict[str, Any]:
+def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
     """Measure everything, which takes minutes. The figures' names end with their units.
 
-    seconds: emulated time of each of four runs. Raises GuestError if the program on the Pico fails.
+    seconds: emulated time of each of five runs; four on an ESP32, of which the stages are not known. Raises GuestError
+    if the program on the board fails.
     """
-    plain = _figures(_run(seconds))
-    modes = {name: _figures(_run(seconds, chosen=chosen)) for name, chosen in _MODES.items()}
+    kind = CHIPS[chip]
+    plain = _figures(_run(chip, seconds))
+    modes = {name: _figures(_run(chip, seconds, chosen=chosen)) for name, chosen in _MODES.items()}
     for mode in modes.values():
         mode["us_per_sample"] = (mode["cpu_share"] - plain["cpu_share"]) * 1e6 / SAMPLE_HZ
     return {
         "sample_hz": SAMPLE_HZ,
         **plain,
-        "stage_us": {name: _spread(us) for name, us in _stages(_run(seconds, detail=True)).items()},
+        "chip": chip,
+        "stage_us": {name: _spread(us) for name, us in _stages(_run(chip, seconds, detail=True)).items()}
+        if chip == "rp2040"  # elsewhere each note of a stage would take longer than the stage
+        else {},
         "modes": modes,
         "boot": {
-            kind: asdict(boot.boot(_SENSOR.world(Ride([upright(100.0)]).motion), _calibration(), kind == "mpy"))
-            for kind in ("py", "mpy")
+            form: asdict(boot.boot(kind, _SENSOR.world(Ride([upright(100.0)]).motion), _calibration(), form == "mpy"))
+            for form in ("py", "mpy")
         },
-        "flash_bytes": {kind: _size(kind == "mpy") for kind in ("py", "mpy")},
+        "flash_bytes": {form: _size(form == "mpy", kind.MPY) for form in ("py", "mpy")},
     }
 
 
 def tables(result: dict[str, Any]) -> Group:
     """The result of bench() for a terminal."""
-    times = Table(title=f"A turn of the loop at {result['sample_hz']} samples a second: emulated us")
+    times = Table(title=f"A turn of the loop at {result['sample_hz']} samples a second: emulated us, {result['chip']}")
     times.add_column("stage")
     for name in ("median", "p99", "max"):
         times.add_column(name, justify="right")
@@ -104,20 +114,25 @@ def _figures(run: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def _run(seconds: int, detail: bool = False, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
+def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] | None = None) -> dict[str, Any]:
     """Run the app's loop for so many emulated seconds. chosen: settings by name.
 
     Returns the figures and arrays of bench_guest, and how many samples were taken and lost.
     """
     chosen = chosen or {}
-    files = flash_image.firmware(compiled=True) | _calibration()
+    mpy = CHIPS[chip].MPY
+    files = flash_image.firmware(True, mpy) | _calibration()
     del files["/main.py"]
-    files |= {f"{name}.mpy": cross_compiled(Path(__file__).with_name(f"{name}.py")) for name in _GUEST}
+    guests = {f"{name}.mpy": f"{name}.py" for name in _GUEST}
+    if chosen.get("LIVE"):
+        guests["bluetooth.mpy"] = "bluetooth_guest.py"
+    here = Path(__file__).parent
+    files |= {name: cross_compiled(here / source, architecture(mpy)) for name, source in guests.items()}
     arrays: list[np.ndarray] = []
     stages: list[np.ndarray] = []
     result: dict[str, Any] = {}
-    with Pico(_SENSOR.world(Ride(_RIDE).motion), files) as pico:
-        samples = SampleCount(pico.board.sensor)
+    with CHIPS[chip](_SENSOR.world(Ride(_RIDE).motion), files, display=chosen.get("DISPLAY", "lcd")) as device:
+        samples = SampleCount(device.board.sensor)
 
         def take(data: bytes) -> None:
             if data == b"begin":
@@ -131,11 +146,17 @@ def _run(seconds: int, detail: bool = False, chosen: dict[str, Any] | None = Non
             else:
                 arrays.append(np.frombuffer(data, np.uint16))
 
-        HostLink(pico.chip, b"", take)
+        guest = console_link.GUEST
+        if isinstance(device, Pico):
+            host_link.HostLink(device.chip, b"", take)
+            guest = host_link.GUEST
+        else:
+            console_link.ConsoleLink(device, take)
         if chosen.get("SPEED") == "wheel":
-            pico.fit_wheel(lambda t_s: _SPEED_MPS)
-        code = f"{GUEST}import bench_guest\nbench_guest.run({detail}, {seconds}, Sink(), {chosen})\n"
-        result["figures"] = ast.literal_eval(pico.exec(code, limit_s=2.0 * seconds + 30.0))
+            device.fit_wheel(lambda t_s: _SPEED_MPS)
+        code = f"{guest}import bench_guest\nbench_guest.run({detail}, {seconds}, Sink(), {chosen})\n"
+        said = console_link.plain(device.exec(code, limit_s=2.0 * seconds + 30.0))
+        result["figures"] = ast.literal_eval(said.strip())
     turns = result["figures"]["turns"]
     result["took"] = arrays[0][:turns]
     asked_for = arrays[1][: result["figures"]["collections_by_app"]]
@@ -180,5 +201,5 @@ def _calibration() -> dict[str, bytes]:
     return flash_image.stored(calibration)
 
 
-def _size(compiled: bool) -> int:
-    return sum(len(content) for content in flash_image.firmware(compiled).values())
+def _size(compiled: bool, mpy: int) -> int:
+    return sum(len(content) for content in flash_image.firmware(compiled, mpy).values())

@@ -1,4 +1,4 @@
-"""Where the time from reset to the first lean goes, on the emulated Pico: boot() measures, table() lays it out."""
+"""Where the time from reset to the first lean goes, on an emulated board: boot() measures, table() lays it out."""
 
 import ast
 from collections.abc import Callable, Iterator
@@ -7,11 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from kickstand_tools import firmware_path
-from kickstand_tools.emulator import flash_image
+from kickstand_tools.emulator import console_link, flash_image
+from kickstand_tools.emulator.esp32 import Esp32
 from kickstand_tools.emulator.host_link import GUEST, HostLink
 from kickstand_tools.emulator.pico import Pico
 from rich.table import Table
 
+Kind = type[Pico] | type[Esp32]
 _LIMIT_S = 10.0
 _ROWS = 10  # modules that the table names
 
@@ -40,18 +42,18 @@ class Boot:
     import_s: dict[str, float]
 
 
-def boot(world: Callable[[float], tuple], files: dict[str, bytes], compiled: bool = True) -> Boot:
-    """world: as for a Pico, upright and at rest.  files: the board's, besides the firmware: its calibration.  compiled:
-    the firmware as .mpy. Raises NotReached if there is no lean in 10 s."""
-    board_files = flash_image.firmware(compiled) | files
-    with Pico(world, board_files) as pico:
-        pico.run_until(lambda: pico.lcd()[1].startswith("starting"), _LIMIT_S, 0.001)
-        starting_s = pico.time_s
-        pico.run_until(lambda: pico.board.sensor.fifo.count, _LIMIT_S, 0.001)
-        sampling_s = pico.time_s
-        pico.run_until(lambda: pico.lcd()[0].startswith("Lean") and "°" in pico.lcd()[0], _LIMIT_S, 0.001)
-        lean_s = pico.time_s
-    return Boot(_micropython_s(board_files), starting_s, sampling_s, lean_s, _imports(world, board_files))
+def boot(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes], compiled: bool = True) -> Boot:
+    """kind: of board.  world: as for a Device, upright and at rest.  files: the board's, besides the firmware: its
+    calibration.  compiled: the firmware as .mpy. Raises NotReached if there is no lean in 10 s."""
+    board_files = flash_image.firmware(compiled, kind.MPY) | files
+    with kind(world, board_files) as device:
+        device.run_until(lambda: device.lcd()[1].startswith("starting"), _LIMIT_S, 0.001)
+        starting_s = device.time_s
+        device.run_until(lambda: device.board.sensor.fifo.count, _LIMIT_S, 0.001)
+        sampling_s = device.time_s
+        device.run_until(lambda: device.lcd()[0].startswith("Lean") and "°" in device.lcd()[0], _LIMIT_S, 0.001)
+        lean_s = device.time_s
+    return Boot(_micropython_s(kind, board_files), starting_s, sampling_s, lean_s, _imports(kind, world, board_files))
 
 
 def table(result: dict[str, Any]) -> Table:
@@ -72,21 +74,25 @@ def table(result: dict[str, Any]) -> Table:
     return rows
 
 
-def _micropython_s(files: dict[str, bytes]) -> float:
+def _micropython_s(kind: Kind, files: dict[str, bytes]) -> float:
     """Until MicroPython runs main.py."""
     begun: list[bytes] = []
-    with Pico(files={**files, "/main.py": f"{GUEST}Sink().write(b'main')\n".encode()}) as pico:
-        HostLink(pico.chip, b"", begun.append)
-        pico.run_until(lambda: begun, _LIMIT_S, 0.001)
-        return pico.time_s
+    guest = GUEST if issubclass(kind, Pico) else console_link.GUEST  # a Pico's USB begins later than its main.py
+    with kind(files={**files, "/main.py": f"{guest}Sink().write(b'main')\n".encode()}) as device:
+        if isinstance(device, Pico):
+            HostLink(device.chip, b"", begun.append)
+        else:
+            console_link.ConsoleLink(device, begun.append)
+        device.run_until(lambda: begun, _LIMIT_S, 0.001)
+        return device.time_s
 
 
-def _imports(world: Callable[[float], tuple], files: dict[str, bytes]) -> dict[str, float]:
+def _imports(kind: Kind, world: Callable[[float], tuple], files: dict[str, bytes]) -> dict[str, float]:
     names = ["kickstand.board.port", *in_order("kickstand.start", []), *in_order("kickstand.app", [])]
     names = list(dict.fromkeys(names))
     files = {path: content for path, content in files.items() if path.lstrip("/") != "main.py"}
-    with Pico(world, files) as pico:
-        said = pico.exec(_GUEST.format(names=names), _LIMIT_S)
+    with kind(world, files) as device:
+        said = device.exec(_GUEST.format(names=names), _LIMIT_S)
     took_us = ast.literal_eval(said.split("took ")[1])
     return {name: us / 1e6 for name, us in zip(names, took_us, strict=True)}
 

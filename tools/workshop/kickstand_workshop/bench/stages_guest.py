@@ -11,7 +11,7 @@ STAGES = (
     ("meter", "lean.meter", "LeanMeter", "update_sum(self, sums, n, dt_us)"),
     ("fetch", "imu.sensor", "Sensor", "fetch(self, now_ms)"),
     ("page", "ui.screen", "Screen", "lines(self, now_ms)"),
-    ("display", "board.hd44780", "Lcd", "tick(self, now_ms)"),
+    ("display", "board.display", "Display", "tick(self, now_ms)"),
 )
 WITHOUT_RESULT = ("apply_sum", "tick")  # methods that return nothing
 BUS = len(STAGES)  # one column more: the sensor's transfers

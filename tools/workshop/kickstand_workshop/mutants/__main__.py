@@ -1,6 +1,6 @@
-"""Changes the code of a room one place at a time and says which changes its tests do not notice.
+"""Changes the code of a package one place at a time and says which changes its tests do not notice.
 
-    python3 tools/dev.py mutants imu              all changes of the room
+    python3 tools/dev.py mutants imu              all changes of the package
     python3 tools/dev.py mutants imu --sample 50  a random sample of them, the same one each time for the same --seed
     python3 tools/dev.py mutants imu --file sensor.py --lines 60 90
 
@@ -21,7 +21,7 @@ from pathlib import Path
 
 from .changes import Change, changes
 from .fork import KILLED, SURVIVED, TIMED_OUT, Tests
-from .rooms import ROOMS, sources, tests
+from .packages import PACKAGES, sources, tests
 
 ROOT = Path(__file__).resolve().parents[4]
 
@@ -29,13 +29,13 @@ ROOT = Path(__file__).resolve().parents[4]
 def main() -> int:
     options = _options()
     signal.signal(signal.SIGTERM, lambda *_: sys.exit("stopped"))  # so that the copy goes
-    room = ROOMS[options.room]
+    package = PACKAGES[options.package]
     with tempfile.TemporaryDirectory(prefix="mutants-") as directory:
         copy = Path(directory) / "project"
         shutil.copytree(ROOT, copy, ignore=shutil.ignore_patterns(".*", "__pycache__"))
         wanted = [
             change
-            for path in sources(room, copy)
+            for path in sources(package, copy)
             if path.match(options.file)
             for change in changes(path, copy)
             if options.lines[0] <= change.line <= options.lines[1]
@@ -44,11 +44,11 @@ def main() -> int:
         if options.sample and options.sample < total:
             chosen = random.Random(options.seed).sample(range(total), options.sample)
             wanted = [wanted[k] for k in sorted(chosen)]
-        runner = Tests(copy, [str(path) for path in tests(room, copy)])
+        runner = Tests(copy, [str(path) for path in tests(package, copy)])
         if not runner.pass_unchanged():
             print(runner.output(), "The tests must pass before the code is changed.", sep="\n")
             return 2
-        print(f"{options.room}: {len(wanted)} of {total} changes; unchanged the tests take {runner.seconds:.0f} s")
+        print(f"{options.package}: {len(wanted)} of {total} changes; unchanged the tests take {runner.seconds:.0f} s")
         return _judge(wanted, runner)
 
 
@@ -82,7 +82,7 @@ def _diff(before: str, after: str) -> list[str]:
 
 def _options() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="dev.py mutants", description=(__doc__ or "").split("\n")[0])
-    parser.add_argument("room", choices=sorted(ROOMS))
+    parser.add_argument("package", choices=sorted(PACKAGES))
     parser.add_argument("--sample", type=int, help="how many changes to try; all without it")
     parser.add_argument("--seed", type=int, default=1, help="chooses the sample (default: 1)")
     parser.add_argument("--file", default="*.py", help="only files of this name or pattern")

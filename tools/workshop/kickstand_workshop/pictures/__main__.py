@@ -12,9 +12,9 @@ def main() -> None:
         (directory / name).write_text(svg, encoding="utf-8")
     (directory / "ride.png").write_bytes(ride.draw())
     if page.available():
-        (directory / "page.png").write_bytes(page.draw())
+        (directory / page.NAME).write_bytes(page.draw())
     else:
-        print("no Chromium: page.png stays as it is")
+        print(f"no Chromium: {page.NAME} stays as it is")
     print(f"written: {directory}")
 
 

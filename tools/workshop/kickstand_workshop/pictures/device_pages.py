@@ -1,7 +1,7 @@
 """What the display of a simulated device says at chosen moments of the demo's ride.
 
 In a process of its own, because the firmware sees the simulated board's clock and files: prints JSON,
-{name: [codes of both lines, character memory]}.
+{name: [codes of both lines, character memory]}, or of an OLED {name: pixels}.
 """
 
 import json
@@ -9,9 +9,11 @@ import os
 import subprocess
 import sys
 import tempfile
+from typing import Any
 
 from kickstand_tools import firmware_path
 from kickstand_tools.demo.device import KICKSTAND_PRESS_S, LONG_PRESS_S, PART_SEED, PART_SHARE, SCRIPT, UPRIGHT_PRESS_S
+from kickstand_tools.simulated_board.oled import Oled
 from kickstand_tools.simulated_board.simulator import Board
 from kickstand_tools.simulation.scripted.script import Ride
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
@@ -32,31 +34,56 @@ MOMENTS_S = {
 }
 
 
-def device_pages() -> dict[str, tuple[list[list[int]], bytes]]:
+UNPLUGGED_S = 44.0, 0.3  # of the sensor, before "unsure": at which time, for how long
+OLED_MOMENTS_S = {
+    "lean": 36.0,
+    "unsure": 44.9,
+    "maxima": 50.05,
+    "brake": 53.07,
+    "menu": 60.0,
+}
+
+
+def lcd_pages() -> dict[str, tuple[list[list[int]], bytes]]:
     """{name of a moment: (codes of both lines, the 64 bytes of character memory)}."""
+    return {name: (codes, bytes(cgram)) for name, (codes, cgram) in _device_pages("lcd").items()}
+
+
+def oled_pages() -> dict[str, bytes]:
+    """{name of a moment: pixels, see Oled.pixels()}."""
+    return {name: bytes(pixels) for name, pixels in _device_pages("ssd1306").items()}
+
+
+def _device_pages(display: str) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as flash:
         done = subprocess.run(
-            [sys.executable, "-m", __name__],
+            [sys.executable, "-m", __name__, display],
             env=os.environ | {"PYTHONPATH": firmware_path.search_path()},
             cwd=flash,
             stdout=subprocess.PIPE,
             text=True,
             check=True,
         )
-    seen = json.loads(done.stdout.splitlines()[-1])
-    return {name: (codes, bytes(cgram)) for name, (codes, cgram) in seen.items()}
+    return json.loads(done.stdout.splitlines()[-1])
 
 
-def _run() -> dict[str, tuple[list[list[int]], list[int]]]:
+def _run(display: str) -> dict[str, Any]:
     """Turns this process into a board's."""
     ride = Ride(SCRIPT)
-    board = Board(Sensor(seed=PART_SEED, share=PART_SHARE).world(ride.motion))
+    board = Board(Sensor(seed=PART_SEED, share=PART_SHARE).world(ride.motion), display=display)
     for at_s in PRESSES_S:
         board.press(at_s)
     board.press(LONG_PRESS_AT_S, LONG_PRESS_S)
+    if display != "lcd":
+        board.faults.unplug_sensor(*UNPLUGGED_S)
     seen = {}
-    for name, at_s in MOMENTS_S.items():
-        board.at(at_s, lambda name=name: seen.update({name: (board.lcd.codes(), list(board.lcd.cgram))}))
+
+    def look(name: str) -> None:
+        lcd = board.lcd
+        seen[name] = list(lcd.pixels()) if isinstance(lcd, Oled) else (lcd.codes(), list(lcd.cgram))
+
+    for name, at_s in (MOMENTS_S if display == "lcd" else OLED_MOMENTS_S).items():
+        board.at(at_s, lambda name=name: look(name))
     board.install()
     from kickstand.start import main  # after install(), which decides what `machine` and `time` are
 
@@ -65,4 +92,4 @@ def _run() -> dict[str, tuple[list[list[int]], list[int]]]:
 
 
 if __name__ == "__main__":
-    print("\n" + json.dumps(_run()))
+    print("\n" + json.dumps(_run(sys.argv[1])))

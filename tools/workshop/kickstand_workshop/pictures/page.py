@@ -1,19 +1,30 @@
-"""The page of `kickstand web` as Chromium shows it, riding through a bend."""
+"""The page of `kickstand web` as Chromium shows it: two presses, then a bend to either side, as a moving picture."""
 
 import hashlib
 import io
 import threading
+import time
+from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 from kickstand_tools.web import serve, site
 
+NAME = "first_minute.webp"
 _CHROMIUM = Path("/usr/bin/chromium")
-_LAPTOP, _PHONE = (1440, 900), (390, 844)
+_SIZE = (1000, 560)
+_WIDTH = 800  # of the picture, pixels
 _WAIT_MS = 60_000
-_COLOURS = 256  # of the file, so that it is small
-_DRAWN = ("index.html", "style.css", "bike.mjs", "road.mjs", "display.mjs")  # what decides how it looks
+_FRAME_S = 0.2
+_QUICKER = 1.5  # than it was
+_LAST_S = 2.5  # that the last picture stands
+_QUALITY = 50
+_LEANS = (("ArrowRight", 7), ("ArrowLeft", 14))  # keys of 5 degrees each
+_HELD_S = 3.0
+_DRAWN = ("index.html", "style.css", "bike.mjs", "road.mjs", "display.mjs", "guide.mjs")  # what decides how it looks
 _SAYS = "text => document.querySelector('#display').ariaLabel.includes(text)"
-_TOLD = "text => document.querySelector('#todo').textContent.includes(text)"
+_ASKS = "text => document.querySelector('#todo').textContent.includes(text)"
 
 
 def available() -> bool:
@@ -26,36 +37,70 @@ def looks() -> str:
     return hashlib.sha256(b"".join((site.PAGE / name).read_bytes() for name in _DRAWN)).hexdigest()
 
 
-def draw(size: tuple[int, int] = _LAPTOP, dark: bool = False) -> bytes:
-    """The page as a PNG file. size: in pixels."""
-    from PIL import Image, PngImagePlugin
+def draw() -> bytes:
+    """The first minute on the page as an animated WebP file."""
     from playwright.sync_api import sync_playwright
 
     with serve.server(site.site_files(), 0) as server, sync_playwright() as playwright:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         browser = playwright.chromium.launch(executable_path=_CHROMIUM, args=["--no-sandbox"])
-        page = browser.new_page(
-            viewport={"width": size[0], "height": size[1]},
-            color_scheme="dark" if dark else "light",
-            has_touch=size == _PHONE,
-            is_mobile=size == _PHONE,
-        )
+        page = browser.new_page(viewport={"width": _SIZE[0], "height": _SIZE[1]}, color_scheme="light")
         page.set_default_timeout(_WAIT_MS)
         page.goto(f"http://{serve.HOST}:{server.server_address[1]}/")
-        for says in "Now upright", "Aligned":
-            page.wait_for_function(_TOLD, arg="ress the button")
-            page.click("#press")
-            page.wait_for_function(_SAYS, arg=says)
-            page.click("#do")
-        page.wait_for_function(_TOLD, arg="Lean it")
-        for _ in range(7):
-            page.keyboard.press("ArrowRight")
-        page.wait_for_function(_TOLD, arg="That is all")
-        page.evaluate("document.activeElement.blur()")  # without the ring around the button that has the focus
-        shot = page.screenshot()
+        shots = _ride(page)
         browser.close()
         server.shutdown()
-    small, marked = io.BytesIO(), PngImagePlugin.PngInfo()
-    marked.add_text("looks", looks())
-    Image.open(io.BytesIO(shot)).convert("RGB").quantize(_COLOURS).save(small, "PNG", optimize=True, pnginfo=marked)
-    return small.getvalue()
+    return _animated(shots)
+
+
+def _ride(page: Any) -> list[tuple[float, bytes]]:
+    """[(s, PNG)] of the two presses and of a bend to either side."""
+    shots: list[tuple[float, bytes]] = []
+
+    def film(done: Callable[[], bool]) -> None:
+        due = time.monotonic()
+        end = due + _WAIT_MS / 1000
+        while not done():
+            if due > end:
+                raise TimeoutError("the page does not go on")
+            shots.append((time.monotonic(), page.screenshot()))
+            due = max(due + _FRAME_S, time.monotonic())
+            time.sleep(due - time.monotonic() if due > time.monotonic() else 0.0)
+
+    def says(question: str, text: str) -> Callable[[], bool]:
+        return lambda: page.evaluate(question, text)
+
+    def seconds(count: float) -> Callable[[], bool]:
+        end = time.monotonic() + count
+        return lambda: time.monotonic() > end
+
+    page.wait_for_function(_ASKS, arg="ress the button")
+    film(seconds(1.0))
+    for shown in "Now upright", "Aligned":
+        film(says(_ASKS, "ress the button"))
+        page.click("#press")
+        film(says(_SAYS, shown))
+        film(seconds(0.8))
+        page.click("#do")
+    film(says(_ASKS, "Lean it"))
+    for key, times in _LEANS:
+        for _ in range(times):
+            page.keyboard.press(key)
+        film(seconds(_HELD_S))
+    return shots
+
+
+def _animated(shots: list[tuple[float, bytes]]) -> bytes:
+    """One file of pictures taken at these times."""
+    from PIL import Image
+
+    size = (_WIDTH, _WIDTH * _SIZE[1] // _SIZE[0])
+    pictures = [Image.open(io.BytesIO(shot)).convert("RGB").resize(size, Image.Resampling.LANCZOS) for _, shot in shots]
+    times = [at for at, _ in shots]
+    lasting = [round(1000 * (after - at) / _QUICKER) for at, after in pairwise(times)] + [round(1000 * _LAST_S)]
+    made = io.BytesIO()
+    style = {"quality": _QUALITY, "method": 6, "loop": 0, "minimize_size": True}
+    pictures[0].save(
+        made, "WEBP", save_all=True, append_images=pictures[1:], duration=lasting, xmp=looks().encode(), **style
+    )
+    return made.getvalue()

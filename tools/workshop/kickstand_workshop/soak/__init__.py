@@ -2,5 +2,5 @@
 
     python -m kickstand_workshop.soak --hours 24 --seed 1
 
-trip.py makes a trip up, watch.py watches the display during it, soak.py runs trips and counts.
+trip.py makes a random trip, watch.py checks display and bus during it, soak.py runs trips and keeps tallies.
 """

@@ -1,4 +1,8 @@
-"""Runs trips on the simulated board one after another, and counts; __main__.py lays the figures out."""
+"""Runs trips on the simulated board, keeps tallies of them, and records broken invariants.
+
+Invariants: the calibration is not lost, memory does not grow, the program neither ends nor hangs, and those of
+watch.py. __main__.py prints the figures and fails where an invariant was broken.
+"""
 
 import gc
 import io
@@ -20,16 +24,16 @@ from kickstand_tools.simulation.scripted.sensor_errors import Sensor
 from .trip import Trip, make_trip
 from .watch import Watch
 
-TRIPS_WITH_A_BIKE = 8  # then another sensor, mounting and speed source, and an empty flash
-PART_SHARE = 0.5  # errors of up to half of the data sheet's limits; the six positions have found offset and scale
+TRIPS_WITH_A_BIKE = 8  # after so many trips: another sensor, mounting and speed source, and an empty flash
+PART_SHARE = 0.5  # the sensor's errors over the data sheet's limits; the six positions have found offset and scale
 WHO_AM_I, RANGE_G = 0x68, 8
-WARM_TRIPS = 3  # in the first ones modules are loaded that are wanted now and then
+WARM_TRIPS = 3  # in the first trips memory may grow: modules are imported when they are first needed
 MAX_GROWTH = 3000  # blocks of memory from the second minute of a trip to its end: a ride's recording takes some hundred
 
 
 @dataclass
 class Figures:
-    """What was tried and the worst that was seen. found: a line for each thing that must not be."""
+    """Tallies of what was tried, and the worst figures. found: a line for each broken invariant."""
 
     seed: int
     hours: float = 0.0

@@ -1,4 +1,4 @@
-"""Watches display and bus during a trip, and keeps what must not be: what was seen, and the worst figures."""
+"""Watches display and bus during a trip. Keeps the broken invariants, and the worst figures."""
 
 import re
 from collections.abc import Callable
@@ -82,7 +82,7 @@ class Watch:
             self._say("a wrong lean is shown as good")
 
     def _fresh(self, t_s: float, lean: float | None) -> None:
-        """A lean goes when no readings come any more. Not where the display cannot be reached."""
+        """Check that a lean disappears when no readings come any more, unless the display cannot be reached."""
         count = self._readings()
         # nothing that the program does can change a display that is not reached, or one while it gets no time at all
         excused = any(
@@ -98,7 +98,7 @@ class Watch:
             self._say("an old lean is shown")
 
     def _explained(self, t_s: float, line: str) -> None:
-        """What is shown in place of the lean goes again when the fault is over."""
+        """Check that the message in place of the lean disappears when the fault is over."""
         if self._trip.ride.truth(t_s)[1] < 4.0 or self._during_fault(t_s, 0.0) or not SAYS_WHY.match(line):
             self._why_since = None
             return

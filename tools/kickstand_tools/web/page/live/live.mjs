@@ -3,11 +3,13 @@
 
 import { choosePort, inPages, loadOnce, overCable, python } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
+import { Riding } from "./bluetooth/riding.mjs";
 import { Chart } from "./chart.mjs";
 import { busy, offer } from "./files.mjs";
 import { Gauge } from "./gauge.mjs";
 import { LEAN, SIDEWAYS, sideOf, written } from "./measures.mjs";
 import { Player } from "./player.mjs";
+import { SimulatedRide } from "./simulated.mjs";
 
 const byId = (id) => document.getElementById(id);
 const gauge = new Gauge(byId("gauge"));
@@ -20,6 +22,7 @@ let awake = null; // a WakeLockSentinel
 let aligned = false;
 let measure = null; // LEAN or SIDEWAYS
 let furthest = [0, 0];
+let riding = null; // the Riding that runs, or null
 
 const tell = (text) => (byId("live-said").textContent = text);
 
@@ -63,6 +66,43 @@ function heard(text) {
   player.take(reading.moments, performance.now());
   const lacking = aligned ? "" : `; the board is not aligned yet, so there is ${measure.none}`;
   if (!stopped) tell(`Recording${lacking}: ${clock(reading.seconds)}`);
+}
+
+/** What a Riding shows here. */
+const shown = {
+  begin() {
+    player.restart();
+    furthest = [0, 0];
+  },
+  measure: show,
+  moment: (moment) => player.take([moment], performance.now()),
+  furthest: (ride) => (furthest = measure.most(ride)),
+};
+
+async function ride() {
+  await stayAwake(); // while the press still counts
+  riding = new Riding(shown);
+  await riding.run();
+  riding = null;
+  awake?.release();
+}
+
+let simulated = null; // the SimulatedRide that runs
+
+function simulate() {
+  shown.begin();
+  document.documentElement.dataset.simulated = "yes";
+  byId("simulated-stop").focus();
+  shown.measure(LEAN);
+  simulated = new SimulatedRide(shown, (text) => put("pretend-said", text));
+  simulated.start();
+}
+
+function endSimulated() {
+  simulated.stop();
+  shown.begin();
+  delete document.documentElement.dataset.simulated;
+  byId("simulated").focus();
 }
 
 function stop() {
@@ -173,6 +213,10 @@ show(LEAN);
 byId("start").addEventListener("click", start);
 byId("stop").addEventListener("click", stop);
 byId("pull").addEventListener("click", pull);
-document.addEventListener("visibilitychange", () => live && !document.hidden && stayAwake());
+byId("simulated").addEventListener("click", simulate);
+byId("simulated-stop").addEventListener("click", endSimulated);
+byId("ride").addEventListener("click", ride);
+byId("ride-stop").addEventListener("click", () => riding?.stop());
+document.addEventListener("visibilitychange", () => (live || riding) && !document.hidden && stayAwake());
 requestAnimationFrame(draw);
 keepOffline();

@@ -47,7 +47,7 @@ export class Held {
     this.#place.querySelector("ul").replaceChildren(...rows.toReversed()); // the last given first
     const wrong = this.files.filter(({ name }) => why[name]).length;
     const count = rows.length === 1 ? "1 file" : `${rows.length} files`;
-    this.#place.querySelector("summary").textContent = wrong ? `${count}, ${wrong} of no use` : count;
+    this.#place.querySelector("summary").textContent = wrong ? `${count}, ${wrong} cannot be used` : count;
     if (wrong || rows.length <= MANY) this.#place.open = true;
     this.#place.hidden = !rows.length;
   }
@@ -65,11 +65,17 @@ export class Held {
     const name = document.createElement("strong");
     name.textContent = file.name;
     const words = document.createElement("span");
-    words.textContent = why ?? [kind, size(file.size)].filter(Boolean).join(", ");
+    words.textContent = why ? without(file.name, why) : [kind, size(file.size)].filter(Boolean).join(", ");
     row.classList.toggle("wrong", Boolean(why));
     row.append(name, words, remove);
     return row;
   }
+}
+
+/** The name stands beside it. */
+function without(name, why) {
+  const words = why.startsWith(name) ? why.slice(name.length).replace(/^:? /, "") : why;
+  return /[.?!]$/.test(words) ? words : `${words}.`;
 }
 
 export function size(bytes) {

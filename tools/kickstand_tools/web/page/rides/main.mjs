@@ -9,11 +9,17 @@ import { askColumns, askNothing } from "./table.mjs";
 import { Tools } from "./tools.mjs";
 
 const byId = (id) => document.getElementById(id);
-const tools = new Tools((done, of) => of && (byId("work-bar").value = done / of));
+const PLOTLY = "./plotly/plotly.min.js"; // as web/rides_guest.py names it
+const SAMPLE = ["simulated-ride.csv.gz", "simulated-ride.cal.json"];
+const tools = new Tools((done, of, loading) => {
+  if (of) byId("work-bar").value = done / of;
+  if (loading) showReady(done, of);
+});
 const held = new Held(byId("held"), () => sortOut([]));
 let rides = []; // as rides() of web/rides_guest.py says, with what became of each: see kept()
 let looked = null;
 let current = ""; // the ride that was chosen last
+let loaded = false; // Python, and what the tools need
 let turn = 0; // of the work that is wanted: what was begun for an earlier one is not shown
 
 /** Look at a ride. files: File objects, which join those of before. */
@@ -25,7 +31,7 @@ export async function openRide(files) {
 /** Find out what the files are that are held, and look at the ride that the new ones make. added: their names. */
 async function sortOut(added) {
   held.show();
-  await work("Loading Python, 8 MB the first time …", async () => {
+  await work(loaded ? "Looking through the files …" : "Loading what reads rides, 8 MB the first time …", async () => {
     const mine = turn;
     await keptOffline();
     const unreadable = {};
@@ -41,21 +47,25 @@ async function sortOut(added) {
     byId("which").hidden = rides.length < 2;
     const wrong = added.map((name) => found.why[name]).find(Boolean);
     const now = rides.find((one) => one.given === current);
-    const told = [now, ...rides].find((one) => one && added.includes(one.calibration));
+    const told = [now, ...rides].find((one) => one && (added.includes(one.calibration) || added.includes(one.track)));
     const meant = rides.find((one) => one.files.some((name) => added.includes(name))) ?? told;
-    const ride = meant ?? now ?? (wrong ? undefined : rides[0]);
+    const ride = meant ?? now ?? rides[0];
     byId("ride").selectedIndex = rides.indexOf(ride);
     const only = !rides.length && Object.values(found.kinds).includes("calibration");
     say(only ? "This is a calibration. Now add the ride that it belongs to." : "");
     if (!ride) hideRide();
-    else if (!isShown(ride)) await look(ride);
-    if (wrong && !meant && byId("work").hidden) say(ended(wrong), true);
+    else if (isShown(ride)) sayOf(ride);
+    else await look(ride);
+    const named = added.filter((name) => found.why[name]).join(", ");
+    if (wrong && !byId("work").hidden) return;
+    if (wrong && !ride) say(`${named} cannot be used: the list says why.`, true);
+    byId("given-wrong").textContent = wrong && ride ? `${named} cannot be used: the list says why.` : "";
   }, true);
 }
 
 /** A ride with what was made of it, if it has the same files as before. given: its name in what was given. */
 function kept(ride) {
-  const sources = ride.files.map((name) => held.file(name));
+  const sources = [...ride.files, ...(ride.track ? [ride.track] : [])].map((name) => held.file(name));
   const bytes = sources.reduce((sum, file) => sum + file.size, 0);
   const same = (old) => old.given === ride.log && old.sources.length === sources.length && old.sources.every((file, k) => file === sources[k]);
   const { log = ride.log, taken, fitted } = rides.find(same) ?? {};
@@ -67,7 +77,7 @@ const calibrationOf = (ride) => ride.calibration || ride.fitted?.path;
 /** Is this what the page shows already? */
 function isShown(ride) {
   const { given, sources } = looked?.ride ?? {};
-  const same = given === ride.given && sources.every((file, k) => file === ride.sources[k]);
+  const same = given === ride.given && sources.length === ride.sources.length && sources.every((file, k) => file === ride.sources[k]);
   if (!same || byId("report").hidden || looked.calibration !== calibrationOf(ride)) return false;
   looked.ride = ride;
   return looked.calibrationFile === held.file(ride.calibration);
@@ -83,7 +93,7 @@ async function look(ride) {
       return;
     }
     const { columns = {}, units = {} } = ride.asked ?? {};
-    const given = [ride.log, ride.isLog, JSON.stringify(columns), JSON.stringify(units)];
+    const given = [ride.log, ride.isLog, JSON.stringify(columns), JSON.stringify(units), ride.track];
     const done = await work(`Reading ${ride.given} …`, () => tools.call("take", ...given), async (found) => {
       Object.assign(ride, { taken: found, log: found.log });
       await look(ride);
@@ -92,24 +102,31 @@ async function look(ride) {
     return;
   }
   if (!calibrationOf(ride)) {
-    say(`${ride.given} has no calibration with it. Add its .cal.json, or let the ride tell how the sensor sits: that takes some minutes of riding with bends to both sides.`, true);
+    say(`${ride.given} has no calibration with it. Add its .cal.json, or find out from the ride itself how the sensor sits: that takes some minutes of riding with bends to both sides.`, true);
     hideRide();
     byId("align").hidden = false;
     return;
   }
   const calibration = calibrationOf(ride);
   await work(`Looking at ${ride.given} …`, async () => {
-    const found = await tools.call("look", ride.log, calibration);
-    return { ...found, charts: whole(found.page, found.plotly, await (await fetched(found.plotly)).text()) };
+    const [found, drawing] = await Promise.all([tools.call("look", ride.log, calibration), library()]);
+    return { ...found, charts: whole(found.page, found.plotly, drawing) };
   }, (found) => {
     const warnings = [...new Set([...(ride.taken.warnings ?? []), ...found.warnings])];
     looked = { ...found, ride, calibration, calibrationFile: held.file(ride.calibration) };
-    showReport({ ...found, warnings, name: ride.given, calibration: ride.calibration || "found from the ride" });
+    showReport({ ...found, warnings, name: ride.given, calibration: ride.calibration || "by this ride" });
     showCharts(found.charts);
     byId("save-calibration").hidden = Boolean(ride.calibration);
     byId("save-log").hidden = !ride.taken.made;
-    say(ride.calibration ? "" : ride.fitted.words);
+    sayOf(ride);
   });
+}
+
+/** What is to be known about a ride that is shown. */
+function sayOf(ride) {
+  const sample = ride.given === SAMPLE[0] ? "This ride is simulated: nobody has ridden it." : "";
+  const aligned = ride.calibration ? "" : ride.fitted?.words;
+  say([sample, ride.taken.words, aligned].filter(Boolean).join(" "));
 }
 
 function ask(ride) {
@@ -123,7 +140,7 @@ async function align() {
   const ride = chosen();
   await work(`Looking how the sensor sits in ${ride.given} …`, () => tools.call("align", ride.log), async (found) => {
     const [roll, pitch, yaw] = [found.roll_deg, found.pitch_deg, found.yaw_deg];
-    const words = `The ride tells how the sensor sits: roll within ${roll}°, pitch within ${pitch}°, yaw within ${yaw}°.`;
+    const words = `Aligned by this ride: roll is known within ${roll}°, pitch within ${pitch}°, yaw within ${yaw}°.`;
     ride.fitted = { path: found.path, words, bytes: found.made };
     await look(ride);
   });
@@ -147,10 +164,38 @@ function whole(page, plotly, library) {
 
 async function savePage() {
   const { page, plotly, stem } = looked;
-  await work("Loading what draws the charts …", () => fetched(plotly).then((answer) => answer.text()), (library) => {
-    save(`${stem}.html`, "text/html", whole(page, plotly, library));
+  await work("Loading what draws the charts …", library, (drawing) => {
+    save(`${stem}.html`, "text/html", whole(page, plotly, drawing));
     say("");
   }, true);
+}
+
+const library = () => fetched(PLOTLY).then((answer) => answer.text());
+
+/** How far what reads and draws rides has come, while nobody waits for it yet. */
+function showReady(done, of) {
+  loaded = of === 1;
+  if (loaded) byId("work-bar").removeAttribute("value");
+  byId("ready").textContent = loaded ? "" : `What reads rides is being loaded: ${Math.floor((100 * done) / of)} %.`;
+}
+
+/** Fetch while the visitor reads, unless the browser is set to save data. */
+async function fetchAhead() {
+  await keptOffline();
+  if (navigator.connection?.saveData) return;
+  tools.begin();
+  await library().catch(() => {});
+}
+
+async function sample() {
+  byId("sample").disabled = true;
+  try {
+    const files = SAMPLE.map(async (name) => new File([await (await fetched(`./sample/${name}`)).blob()], name));
+    await openRide(await Promise.all(files));
+  } catch (error) {
+    say(ended(error.message), true);
+  }
+  byId("sample").disabled = false;
 }
 
 const chosen = () => rides[Math.max(0, byId("ride").selectedIndex)];
@@ -173,7 +218,10 @@ async function work(text, begin, show, stays = false) {
   }
   if (mine !== turn) return true;
   byId("work").hidden = true;
-  if (!tools.open) forget();
+  if (!tools.open) {
+    loaded = false;
+    forget();
+  }
   if (wrong) say(ended(wrong), true);
   else await show(found);
   return !wrong;
@@ -187,6 +235,7 @@ function say(text, wrong = false) {
 }
 
 function stop() {
+  loaded = false;
   turn++;
   tools.stop();
   forget();
@@ -220,6 +269,7 @@ addEventListener("drop", (event) => {
 });
 byId("ride").addEventListener("change", () => look(chosen()));
 byId("align").addEventListener("click", align);
+byId("sample").addEventListener("click", sample);
 byId("again").addEventListener("click", () => sortOut([]));
 byId("stop").addEventListener("click", stop);
 byId("save-lean").addEventListener("click", saveLean);
@@ -229,6 +279,7 @@ byId("save-log").addEventListener("click", () => save(`${looked.stem}.csv`, "tex
 byId("save-calibration").addEventListener("click", () => save(`${looked.stem}.cal.json`, "application/json", looked.ride.fitted.bytes));
 
 keepOffline();
+fetchAhead();
 if (location.hash === "#pulled") {
   history.replaceState(null, "", "./rides.html");
   try {

@@ -6,7 +6,7 @@ export class Tools {
   #before = Promise.resolve(); // the calls are made one after the other
   #tell;
 
-  /** tell(done, of): the progress of what is worked on. */
+  /** tell(done, of, loading): the progress of what is worked on, or fetched for it; (1, 1, true) once all of it is. */
   constructor(tell) {
     this.#tell = tell;
   }
@@ -16,12 +16,17 @@ export class Tools {
     return this.#worker !== null;
   }
 
+  /** Fetch and start Python, if that is not done. */
+  begin() {
+    this.#worker ??= this.#start();
+  }
+
   /** Take these File objects in place of all before; what was being worked on is given up. True if all that was made of
    * files before is gone. */
   give(files) {
     if (this.#answer) this.stop();
     const begins = !this.open;
-    this.#worker ??= this.#start();
+    this.begin();
     this.#worker.postMessage({ files });
     return begins;
   }
@@ -52,7 +57,9 @@ export class Tools {
   #start() {
     const worker = new Worker(new URL("./worker.mjs", import.meta.url), { type: "module" });
     worker.onmessage = ({ data }) => {
-      if (data.of !== undefined) return this.#tell(data.done, data.of);
+      if (data.of !== undefined) return this.#tell(data.done, data.of, data.loading);
+      if (data.ready) return this.#tell(1, 1, true);
+      if (!this.#answer) return this.stop(); // what was fetched ahead is missing: the next call tries again, and says so
       const { resolve, reject } = this.#answer;
       this.#answer = null;
       if (data.failed || data.said.refused) reject(new Error(data.failed ?? data.said.refused));

@@ -1,7 +1,8 @@
 // The tools of the command line, away from the page's own thread.
 //
 // Takes {files}: what was given to the page, and {call: [name, ...arguments]}: a function of web/rides_guest.py.
-// Sends {done, of}: the progress of a call, {said}: its result, {failed: text}, and {made}: with the file that it made.
+// Sends {done, of}: the progress of a call, or with {loading} that of what is fetched first, {ready} once that is done,
+// {said}: a call's result, {failed: text}, and {made}: with the file that it made.
 
 import { loadPython } from "../python.mjs";
 
@@ -14,19 +15,20 @@ let python;
 let mounted = false;
 let saidMs = 0;
 
-function tell(done, total) {
+function tell(done, total, loading = false) {
   const nowMs = performance.now();
   if (nowMs - saidMs < OFTEN_MS) return;
   saidMs = nowMs;
-  postMessage({ done, of: total });
+  postMessage({ done, of: total, loading });
 }
 
 async function load() {
-  python = await loadPython(["./numpy/numpy.zip", "./rides.zip"]);
+  python = await loadPython(["numpy/numpy.zip", "rides.zip"], (done, of) => tell(done, of, true));
   for (const folder of [GIVEN, HERE]) python.FS.mkdir(folder);
   python.FS.chdir(HERE);
   guest = python.pyimport("kickstand_tools.web.rides_guest");
   guest.prepare();
+  postMessage({ ready: true });
 }
 
 /** The files are read where they lie, piece by piece: none is copied into Python's memory as a whole. */
@@ -43,13 +45,22 @@ function call([name, ...given]) {
 }
 
 const loaded = load();
+loaded.catch(failed);
+
+function failed(error) {
+  postMessage({ failed: String(error.message ?? error).trim().split("\n").at(-1) });
+}
 
 onmessage = async ({ data }) => {
   try {
     await loaded;
+  } catch {
+    return; // which has been said
+  }
+  try {
     if (data.files) give(data.files);
     else call(data.call);
   } catch (error) {
-    postMessage({ failed: String(error.message ?? error).trim().split("\n").at(-1) });
+    failed(error);
   }
 };

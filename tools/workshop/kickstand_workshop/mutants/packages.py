@@ -1,4 +1,4 @@
-"""The rooms whose tests are judged by mutants: the code of each and the tests that ought to notice a change in it."""
+"""The packages whose tests are judged by mutants: the code of each, and the tests that ought to notice its changes."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -6,7 +6,7 @@ from typing import NamedTuple
 UNTESTABLE = ("_viper.py", "_guest.py")  # they run on a board or on MicroPython only
 
 
-class Room(NamedTuple):
+class Package(NamedTuple):
     """sources: patterns of files, from the project's root. tests: patterns in host_tests, in the order in which they
     run, so those that notice most in least time first; before them all those of the same name as the code."""
 
@@ -14,55 +14,55 @@ class Room(NamedTuple):
     tests: tuple[str, ...]
 
 
-def _room(sources: str, tests: str) -> Room:
-    return Room(tuple(sources.split()), tuple(f"host_tests/{name}.py" for name in tests.split()))
+def _package(sources: str, tests: str) -> Package:
+    return Package(tuple(sources.split()), tuple(f"host_tests/{name}.py" for name in tests.split()))
 
 
 _STOPS = "stops_closed_form speed_fit quiet analysis_standstill analysis_brake_test"
-ROOMS = {
-    "imu": _room("firmware/kickstand/imu/*.py", "imu/test_batches imu/test_sensor imu/test_[!d]*"),
-    "calibration": _room(
+PACKAGES = {
+    "imu": _package("firmware/kickstand/imu/*.py", "imu/test_batches imu/test_sensor imu/test_[!d]*"),
+    "calibration": _package(
         "firmware/kickstand/calibration/*.py firmware/kickstand/rotation.py",
         "calibration/test_rotation calibration/test_calibration calibration/test_still_pose calibration/test_pose_taker"
         " calibration/test_active calibration/test_two_position imu/test_batches calibration/test_store",
     ),
-    "lean": _room(
+    "lean": _package(
         "firmware/kickstand/lean/*.py",
         "lean/test_known_ride lean/test_filter_states lean/test_[bkmru]* lean/test_formula",  # the other takes longer
     ),
-    "drive_alignment": _room(
+    "drive_alignment": _package(
         "firmware/kickstand/drive_alignment/*.py",
         "drive_alignment/test_parts drive_alignment/test_drive*",
     ),
-    "speed": _room(
+    "speed": _package(
         "firmware/kickstand/speed/*.py", "simulated_board/test_board_speed simulated_board/test_board_place"
     ),
-    "ui": _room("firmware/kickstand/ui/*.py", "ui/*"),
-    "rides": _room(
+    "ui": _package("firmware/kickstand/ui/*.py", "ui/*"),
+    "rides": _package(
         "firmware/kickstand/rides/*.py",
         "rides/test_block rides/test_recording rides/test_ring rides/test_stream rides/test_card_trial",
     ),
-    "signals": _room("tools/kickstand_tools/signals/*.py", "signals/*"),
-    "checks": _room("tools/kickstand_tools/checks/*.py", "checks/*"),
-    "replay": _room("tools/kickstand_tools/replay/*.py", "replay/test_cli_replay"),
-    "export": _room(
+    "signals": _package("tools/kickstand_tools/signals/*.py", "signals/*"),
+    "checks": _package("tools/kickstand_tools/checks/*.py", "checks/*"),
+    "replay": _package("tools/kickstand_tools/replay/*.py", "replay/test_cli_replay"),
+    "export": _package(
         "tools/kickstand_tools/analysis/export/*.py", "analysis/test_export_formats analysis/test_cli_export"
     ),
-    "stops": _room(
+    "stops": _package(
         "tools/kickstand_tools/analysis/stops/*.py",
         " ".join(f"analysis/stops/test_{name}" for name in _STOPS.split()),
     ),
 }
 
 
-def sources(room: Room, root: Path) -> list[Path]:
-    """The files of the room's code, relative to root."""
-    return [path for path in _files(room.sources, root) if not path.name.endswith(UNTESTABLE)]
+def sources(package: Package, root: Path) -> list[Path]:
+    """The files of the package's code, relative to root."""
+    return [path for path in _files(package.sources, root) if not path.name.endswith(UNTESTABLE)]
 
 
-def tests(room: Room, root: Path) -> list[Path]:
-    """The files of the room's tests, relative to root."""
-    return [path for path in _files(room.tests, root) if path.name.startswith("test_")]
+def tests(package: Package, root: Path) -> list[Path]:
+    """The files of the package's tests, relative to root."""
+    return [path for path in _files(package.tests, root) if path.name.startswith("test_")]
 
 
 def _files(patterns: tuple[str, ...], root: Path) -> list[Path]:

@@ -1,29 +1,113 @@
 """Alignment by driving as ViriCiti published it: R = R2 R1, each a rotation by Rodrigues' formula.
 
-R1 turns the mean direction of gravity at the stops upwards. R2 turns the mean force of the braking events, levelled by
-R1, backwards. A braking event counts if the directions of its levelled force spread little. A tilt left over from the
-stops leaks into forward, a yaw error of some 3 to 4 degrees that more braking events do not take away. The firmware's
-DriveAlignment does not have this error; the published method is here to be compared with it.
+R1 rotates the mean direction of gravity at the stops to up. R2 rotates the mean force of the braking events, levelled
+by R1, to backward. A braking event counts if the directions of its levelled force spread little. A remaining tilt of
+the vertical by the stops makes a yaw error of some 3 to 4 degrees, which more braking events do not reduce. The
+firmware's DriveAlignment does not have this error; the published method is here for comparison.
 """
 
 from math import degrees, sqrt
 
-from kickstand.drive_alignment.alignment import READY, WAITING_FOR_BRAKING, DriveAlignment
+from kickstand.drive_alignment.alignment import DriveAlignment
 from kickstand.drive_alignment.events import MAX_INTERVAL_US, MIN_INTERVAL_US
-from kickstand.rotation import matrix, normalize, rotate, vector
+from kickstand.rotation import dot, matrix, normalize, rotate, vector
 from kickstand.units import GAP_US
-
-from .dispersion import CircularDispersion
-from .rodrigues import multiply, rotation_between
 
 MAX_DISPERSION = 0.02  # 8 degrees
 MIN_LEVEL_G = 0.03  # a smaller levelled force points anywhere
 BRAKING_MPS2 = -1.0  # an interval with more deceleration belongs to a braking event
 MEAN_US = 100_000
-LOSS_MPS = 1.5  # a braking event that takes off less speed is noise
+LOSS_MPS = 1.5  # a braking event that reduces the speed by less is noise
 MIN_EVENTS = 3
 UP = (0.0, 1.0, 0.0)
 BACKWARD = (0.0, 0.0, -1.0)
+NO_MEAN = 9.9  # where there is no mean direction, as of opposite ones; also the largest value given
+
+
+def rotation_between(out, a, b, axis):
+    """Fill out (9, row-major) with the rotation that takes unit vector a to unit vector b (O. Rodrigues).
+
+        R = I + K + K^2 / (1 + c),  K the cross product matrix of a x b, c = a . b
+
+    In float32 this is 2 degrees off where a and b are 179.9 degrees apart, and fails nearer to 180. So where c < 0, a
+    half turn D about a coordinate axis comes first, after which c > 0: R = Rodrigues(D a, b) D. Its error is under 2e-7
+    everywhere.
+
+    axis: 0, 1 or 2, the coordinate axis of the half turn; it has to be perpendicular to b.
+    """
+    signs = [1.0, 1.0, 1.0]
+    if dot(a, b) < 0.0:
+        signs = [-1.0, -1.0, -1.0]
+        signs[axis] = 1.0
+    x, y, z = signs[0] * a[0], signs[1] * a[1], signs[2] * a[2]
+    p = y * b[2] - z * b[1]
+    q = z * b[0] - x * b[2]
+    r = x * b[1] - y * b[0]
+    k = 1.0 / (1.0 + x * b[0] + y * b[1] + z * b[2])
+    out[0] = (1.0 - k * (q * q + r * r)) * signs[0]
+    out[1] = (k * p * q - r) * signs[1]
+    out[2] = (k * p * r + q) * signs[2]
+    out[3] = (k * p * q + r) * signs[0]
+    out[4] = (1.0 - k * (p * p + r * r)) * signs[1]
+    out[5] = (k * q * r - p) * signs[2]
+    out[6] = (k * p * r - q) * signs[0]
+    out[7] = (k * q * r + p) * signs[1]
+    out[8] = (1.0 - k * (p * p + q * q)) * signs[2]
+
+
+def multiply(out, a, b):
+    """out (9) = A B, 3x3 matrices by rows: first the rotation B, then A. out must be neither of them."""
+    for row in (0, 3, 6):
+        for column in range(3):
+            out[row + column] = a[row] * b[column] + a[row + 1] * b[3 + column] + a[row + 2] * b[6 + column]
+
+
+class CircularDispersion:
+    """How much directions in a plane spread: circular dispersion (N. I. Fisher, 1993, section 2.3). All are of equal
+    weight, whatever the vectors' lengths. count: how many.
+
+        d = (1 - rho2) / (2 R^2),  R = |mean of e^(i a)|,  rho2 = the mean cosine of 2 (a - mean direction)
+
+    For small spreads d is about the variance in rad^2: 0.02 is 8 degrees, 0.005 is 4. Running sums are kept, so that
+    rho2 needs no second pass over the directions.
+    """
+
+    def __init__(self):
+        self.clear()
+
+    def clear(self):
+        """Forget all directions."""
+        self.count = 0
+        self._cos = self._sin = self._cos2 = self._sin2 = 0.0
+
+    def add(self, x, y, length):
+        """Add the direction of the vector (x, y). length: of that vector, > 0."""
+        c, s = x / length, y / length
+        self.count += 1
+        self._cos += c
+        self._sin += s
+        self._cos2 += c * c - s * s
+        self._sin2 += 2.0 * c * s
+
+    def join(self, other):
+        """Add all directions of another CircularDispersion."""
+        self.count += other.count
+        self._cos += other._cos
+        self._sin += other._sin
+        self._cos2 += other._cos2
+        self._sin2 += other._sin2
+
+    def value(self):
+        """d, at most NO_MEAN."""
+        r2 = self._cos * self._cos + self._sin * self._sin  # (count R)^2
+        n = self.count
+        if r2 <= 1e-6 * n * n:
+            return NO_MEAN
+        # cos 2(a - m) = cos 2a cos 2m + sin 2a sin 2m, and e^(2im) = (C + iS)^2 / r2
+        cos2m = (self._cos * self._cos - self._sin * self._sin) / r2
+        sin2m = 2.0 * self._cos * self._sin / r2
+        rho2 = (self._cos2 * cos2m + self._sin2 * sin2m) / n
+        return min(NO_MEAN, max(0.0, (1.0 - rho2) * n * n / (2.0 * r2)))
 
 
 class _Samples:
@@ -45,20 +129,19 @@ class _Samples:
 
 
 class PublishedAlignment:
-    """Used like a DriveAlignment. One runs beside it, which checks speed and mount and finds the vertical.
+    """Has the methods of a DriveAlignment. Runs one beside it, which checks speed and mount and finds the vertical.
 
     counted, turned: braking events accepted, and refused for their dispersion; needed: how many must be accepted.
     """
 
     def __init__(self, vehicle, up=None, bias=None):
         self._improved = DriveAlignment(vehicle, up, bias)
-        self.vehicle = vehicle
         self.standing = self._improved.standing
         self.needed = MIN_EVENTS
         self.counted = self.turned = 0
         self._accepted = [0.0] * 3  # sum of their forces
-        self._event = _Samples()  # of the braking event that goes on
-        self._interval = _Samples()  # since the last speed: the next one will show whether it was braking
+        self._event = _Samples()  # samples of the braking event under way
+        self._interval = _Samples()  # samples since the last speed: the next speed shows whether they were braking
         self._means = CircularDispersion()  # one direction for each accepted braking event
         self._speed = -1.0
         self._loss = 0.0
@@ -71,36 +154,28 @@ class PublishedAlignment:
 
     @property
     def problem(self):
-        """What is wrong with the speed or with the mount: an AlignmentError, or None."""
+        """The fault of the speed or of the mount: an AlignmentError, or None."""
         return self._improved.problem
 
     @property
-    def state(self):
-        """As DriveAlignment.state."""
-        if self.ready:
-            return READY
-        state = self._improved.state
-        return WAITING_FOR_BRAKING if state == READY else state
-
-    @property
     def ready(self):
-        """True once matrix() can be taken."""
+        """True once matrix() gives an alignment."""
         return self.problem is None and self.counted >= self.needed
 
     @property
     def quality_deg(self):
-        """Standard error of the mean direction of the accepted braking events, 180 until there are two. The leaked tilt
-        is not in it."""
+        """Standard error of the mean direction of the accepted braking events, 180 until there are two. It does not
+        contain the error by a wrong vertical."""
         n = self.counted
         return degrees(sqrt(self._means.value() / n)) if n > 1 else 180.0
 
     @property
     def reason(self):
-        """Why matrix() cannot be had yet: an AlignmentError."""
+        """Why matrix() gives no alignment yet: an AlignmentError."""
         return self.problem or self._improved.missing(self.counted, self.needed, self.turned)
 
     def update(self, force, rate, dt_us):
-        """As DriveAlignment.update()."""
+        """Take a sample: see DriveAlignment.update()."""
         if dt_us > GAP_US:
             self.interrupt()
             return
@@ -118,12 +193,12 @@ class PublishedAlignment:
                 self._sample(list(self._levelled))
 
     def interrupt(self):
-        """As DriveAlignment.interrupt()."""
+        """Samples are missing: drop the braking event under way. Accepted events stay."""
         self._improved.interrupt()
         self._forget()
 
     def finish(self):
-        """As DriveAlignment.finish()."""
+        """Do all pending work at once: see DriveAlignment.finish()."""
         self._improved.finish()
 
     def _forget(self):
@@ -147,7 +222,7 @@ class PublishedAlignment:
                 self._interval.force[i] += force[i]
 
     def measure_speed(self, speed_mps, age_us=0):
-        """As DriveAlignment.measure_speed(), but without an estimate of the lag."""
+        """Take a new speed: see DriveAlignment.measure_speed(), but the lag is not estimated."""
         self._improved.measure_speed(speed_mps, age_us)
         seconds = self._interval_us * 1e-6
         if self._interval_us < MIN_INTERVAL_US:

@@ -1,0 +1,20 @@
+"""A lamp that comes on when the bike leans more than 45 degrees to either side.
+
+Copy it to the board as user.py, and restart (the firmware must be on the board; an update leaves user.py alone):
+
+    mpremote cp firmware/examples/user_light.py :user.py
+    mpremote reset
+
+Wiring: an LED with 330 ohm from GPIO 16 of a Pico to ground; another pin on an ESP32. For more than 10 mA use a
+transistor. Without a board: kickstand try firmware/examples/user_light.py
+"""
+
+from machine import Pin
+
+LIMIT_DEG = 45
+lamp = Pin(16, Pin.OUT, value=0)
+
+
+def on_lean(lean_deg, trusted, meter):
+    """Ten times a second. While the lean is not sure the lamp stays off."""
+    lamp.value(1 if trusted and abs(lean_deg) > LIMIT_DEG else 0)

@@ -1,0 +1,30 @@
+"""A page of your own: how heavy the bike is on its tyres in this turn, as text and, on an OLED, as a bar.
+
+Copy it to the board as user.py, and restart (the firmware must be on the board; an update leaves user.py alone):
+
+    mpremote cp firmware/examples/user_page.py :user.py
+    mpremote reset
+
+Press the button until the page comes, after the last of the usual ones; before the bike is aligned choose Own pages in
+the menu. Without a board: kickstand try firmware/examples/user_page.py
+"""
+
+from math import cos, radians
+
+
+def page(app):
+    """Two lines of at most 16 characters, and a picture for a display that draws."""
+    if not app.screen.pages.trusted:  # there is no lean to be relied on
+        return "Load     --", "not sure yet"
+    meter = app.meter
+    times = 1.0 / cos(radians(meter.lean_deg))  # weight and cornering force together, of a turn in balance
+    line1, line2 = "Load    %5.2f x" % times, "Lean %3d deg" % round(abs(meter.lean_deg))
+    return line1, line2, (draw, line1, line2, min(128, round(64 * times)))
+
+
+def draw(canvas, line1, line2, length):
+    """canvas: a framebuf.FrameBuffer of 128x64 pixels, which also has tall(line, page) for letters of 8x16 pixels."""
+    canvas.tall(line1, 1)
+    canvas.text(line2, 0, 32, 1)
+    canvas.fill_rect(0, 48, length, 12, 1)
+    canvas.rect(0, 48, 128, 12, 1)

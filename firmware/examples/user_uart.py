@@ -1,0 +1,20 @@
+"""Sends the lean to another controller, ten lines a second over a wire: 23.4 to the right, -23.4 to the left, ? while
+it is not sure.
+
+Copy it to the board as user.py, and restart (the firmware must be on the board; an update leaves user.py alone):
+
+    mpremote cp firmware/examples/user_uart.py :user.py
+    mpremote reset
+
+Wiring: GPIO 0 of a Pico (TX of UART 0) to RX of the other controller, and ground to ground; both at 3.3 V. On an ESP32
+choose two free pins. Without a board: kickstand try firmware/examples/user_uart.py
+"""
+
+from machine import UART, Pin
+
+uart = UART(0, baudrate=115_200, tx=Pin(0), rx=Pin(1))
+
+
+def on_lean(lean_deg, trusted, meter):
+    """Ten times a second. Who receives a ? must not act on the number before it."""
+    uart.write("%.1f\n" % lean_deg if trusted else "?\n")

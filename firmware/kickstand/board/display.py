@@ -1,0 +1,134 @@
+"""The display: finds it on the bus, and takes the driver that belongs to what it is.
+
+    display = Display(lambda hz: machine.I2C(1, sda=machine.Pin(6), scl=machine.Pin(7), freq=hz))
+    display.show("Hello", "world")
+    while True:
+        display.tick(time.ticks_ms())  # one step of the work
+        time.sleep_ms(10)
+
+A driver (hd44780.Lcd, oled.Oled) has these, and host_tests/displays holds each one to them:
+
+begin(i2c, address, hz, fresh)  takes a display that has just answered. fresh: it may just have got its power.
+show(line1, line2, picture)     notes what to show. 16 characters a line, a str of codes below 256 or bytes.
+tick(now_ms)                    one step, which takes the bus for 3 ms at 400 kHz, 7 ms at 100 kHz. Raises OSError if
+                                the display does not answer.
+busy                            True while something is left to be sent
+draws                           True if it shows pictures. A picture is (draw, values...): draw(canvas, values...) is
+                                called with a blank framebuf.FrameBuffer of 128x64 pixels. Others show the two lines.
+
+A display that lost its power or whose transfer failed is set up again, and dark or crossed out until it is right.
+"""
+
+from time import sleep_ms, ticks_diff, ticks_ms
+
+from ..errors import attempt
+
+OLED_ADDRESSES = (0x3C, 0x3D)
+ADDRESSES = (0x27, 0x3F) + OLED_ADDRESSES  # the backpack's PCF8574 and PCF8574A with all jumpers open
+_FAMILY = tuple(range(0x20, 0x27)) + tuple(range(0x38, 0x3C)) + (0x3E,)  # a backpack's other addresses
+LCD_HZ, OLED_HZ = 100_000, 400_000  # what a PCF8574 and the OLEDs allow
+KINDS = ("auto", "lcd", "ssd1306", "sh1106")
+PROBE_MS = 200  # how often to see whether a display is there
+REOPEN_PROBES = 5  # while there is no display the bus is freed once in so many probes
+POWER_UP_MS = 40  # after power-up the display got its power with the board
+FLUSH_STEPS = 60
+STEP_MS = 5
+
+
+class Display:
+    """A display that may be absent, or come and go.
+
+    reopen(hz): called to free the bus, returns it as a machine.I2C.  bus_hz: its clock; None: as the display allows.
+    kind: of KINDS.  addresses: to look for it at.  contrast, inverted: of an OLED.
+
+    address: where it was found, or None while no display answers.  draws: see above.
+    """
+
+    def __init__(self, reopen, bus_hz=None, kind="auto", addresses=ADDRESSES, contrast=255, inverted=False):
+        self._reopen = reopen
+        self._bus_hz = bus_hz
+        self._kind = kind
+        self._addresses = addresses
+        self._look = contrast, inverted
+        self._i2c = self._driver = None
+        self._wanted = "", "", None
+        self._status = bytearray(1)
+        self.address = None
+        self.draws = False
+        self._probes = 0  # in a row that found nothing
+        self._probed_ms = None
+        self._fresh = ticks_ms() < POWER_UP_MS
+
+    def show(self, line1, line2, picture=None):
+        """Set what to show, to be sent by tick()."""
+        self._wanted = line1, line2, picture  # for the driver of what is plugged in next
+        if self._driver:
+            self._driver.show(line1, line2, picture)
+
+    def tick(self, now_ms):
+        """Do the next step of the work. Call it about every 10 ms. now_ms: ticks_ms().
+
+        Raises SettingsError for pins that cannot be used, and nothing else."""
+        try:
+            if self.address is not None:
+                self._driver.tick(now_ms)
+            elif self._probed_ms is None or ticks_diff(now_ms, self._probed_ms) >= PROBE_MS:
+                self._probed_ms = now_ms
+                self._probe()
+        except OSError:
+            self.address = None
+            self._probed_ms = now_ms
+            self._fresh = True
+
+    def flush(self):
+        """Send everything now, in about 0.1 s: for what is shown before the loop runs or after it has failed."""
+        self._probed_ms = None
+        for _ in range(FLUSH_STEPS):
+            self.tick(ticks_ms())
+            if self.address is None or not self._driver.busy:
+                return
+            sleep_ms(STEP_MS)
+
+    def _probe(self):
+        """Look for the display at each address."""
+        if self._probes % REOPEN_PROBES == 0:  # a stuck bus has to be freed, but to do so each time would take too long
+            self._i2c = self._reopen(self._bus_hz or LCD_HZ)
+        self._probes += 1
+        for address in self._addresses:
+            if self._answers(address):
+                return
+        other = _FAMILY[self._probes % len(_FAMILY)]
+        if self._addresses is ADDRESSES and self._kind in ("auto", "lcd") and self._answers(other):
+            return
+        # Not found: if it answers later it was just powered
+        self._fresh = True
+
+    def _answers(self, address):
+        try:
+            self._i2c.readfrom_into(address, self._status)
+        except OSError:
+            return False
+        self._probes = 0
+        if attempt(self._begin, address) is None:  # its driver may be missing
+            self.address = address
+        return True
+
+    def _begin(self, address):
+        oled = self._kind[0] == "s" or (self._kind == "auto" and address in OLED_ADDRESSES)
+        if self._driver is None or self.draws != oled:
+            self._driver = None
+            if oled:
+                from .oled import Oled
+
+                self._driver = Oled(self._kind, *self._look)
+            else:
+                from .hd44780 import Lcd
+
+                self._driver = Lcd()
+            self._driver.show(*self._wanted)
+            self.draws = oled
+        hz = self._bus_hz or (OLED_HZ if oled else LCD_HZ)
+        if hz != (self._bus_hz or LCD_HZ):
+            self._i2c = self._reopen(hz)
+        self._driver.begin(self._i2c, address, hz, self._fresh)
+        self._fresh = False

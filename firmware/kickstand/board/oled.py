@@ -1,0 +1,190 @@
+"""Driver for an OLED of 128x64 pixels with an SSD1306 or SH1106. display.py finds it, and says what its methods do.
+
+Sources: data sheets Solomon Systech SSD1306 rev 1.1 and Sino Wealth SH1106 V2.3. Both are addressed page by page, which
+is 8 rows, because an SH1106 knows no other way. It has 132 columns, of which the panel shows the middle ones.
+"""
+
+from time import ticks_add, ticks_diff, ticks_ms
+
+import framebuf
+
+WIDTH, HEIGHT = 128, 64
+# The picture is sent in parts of so many columns of a page, each if it has changed: mostly those of a digit. A part
+# takes 0.9 ms at 400 kHz, 3.5 ms at 100 kHz; so many are sent in a turn.
+_PART = 32
+_PARTS, _PARTS_SLOW, _SLOW_HZ = 3, 2, 200_000
+PROBE_MS = 200  # how often to see whether it has kept its power
+REFRESH_MS = 10_000  # send everything again so often: nothing else repairs what noise has changed
+_POWER_UP_MS = 40
+_OFF = 0x40  # bit of the status
+_SH1106_STATUS = 0x08  # low half of the status; of an SSD1306 it is 3 or 6
+_SH1106_OFFSET = 2  # its first visible column
+# Rows by which the picture is shifted, each for SHIFT_REFRESHES: the same pixels must not glow for ever. The rows that
+# leave at the top come back at the bottom, so pictures leave the first two blank.
+_SHIFTS = (0, 1, 2, 1)
+SHIFT_REFRESHES = 6
+# Control byte of a stream of commands, then: clock, 64 rows, no offset, columns and rows from the side opposite to the
+# cable, alternate COM pins, pre-charge, VCOMH, show the RAM
+_SET_UP = b"\x00\xd5\x80\xa8\x3f\xd3\x00\xa1\xc8\xda\x12\xd9\xf1\xdb\x40\xa4"
+_SUPPLY = (
+    b"\x8d\x14\x20\x02\x2e",
+    b"\xad\x8b",
+)  # charge pump, page addressing, no scrolling; an SH1106's DC-DC converter
+_SPREAD = bytes((i & 1) * 3 | (i & 2) * 6 | (i & 4) * 12 | (i & 8) * 24 for i in range(16))  # each bit twice
+
+
+class Canvas(framebuf.FrameBuffer):
+    """What pictures are drawn on: a FrameBuffer of 128x64 pixels, and letters of twice the height."""
+
+    def __init__(self, pixels):
+        super().__init__(pixels, WIDTH, HEIGHT, framebuf.MONO_VLSB)
+        self._pixels = pixels
+
+    def tall(self, line, page, inverted=False):
+        """Write up to 16 letters of 8x16 pixels across the display, from row 8 * page on. line: as for show()."""
+        for i in range(min(16, len(line))):
+            character(self, line[i] if isinstance(line[i], int) else ord(line[i]), 8 * i, 8 * page)
+        pixels = self._pixels
+        invert = 0xFF if inverted else 0
+        for at in range(page * WIDTH, (page + 1) * WIDTH):
+            column = pixels[at]
+            pixels[at] = _SPREAD[column & 15] ^ invert
+            pixels[at + WIDTH] = _SPREAD[column >> 4] ^ invert
+
+
+class Oled:
+    """kind: "ssd1306", "sh1106" or "auto".  contrast: 0 to 255.  inverted: dark on bright.
+
+    canvas: the Canvas on which pictures are drawn.
+    """
+
+    draws = True
+
+    def __init__(self, kind, contrast, inverted):
+        self._kind = kind
+        self._look = bytes((0x81, contrast, 0xA7 if inverted else 0xA6))
+        self._pixels = bytearray(WIDTH * HEIGHT // 8)
+        self._sent = bytearray(WIDTH * HEIGHT // 8)
+        self.canvas = Canvas(self._pixels)
+        # part by part, the pixels to show and those that were sent: a digit's parts, one below the other, in a row
+        starts = [page * WIDTH + x for x in range(0, WIDTH, _PART) for page in range(HEIGHT // 8)]
+        self._new, self._old = [
+            [memoryview(pixels)[at : at + _PART] for at in starts] for pixels in (self._pixels, self._sent)
+        ]
+        # a transfer: three commands, each behind a control byte, and then data
+        self._packet = bytearray(b"\x80\xb0\x80\x00\x80\x10\x40") + bytearray(_PART)
+        self._status = bytearray(1)
+        self._wanted = self._drawn = "", ""
+
+    def begin(self, i2c, address, hz, fresh):
+        self._i2c = i2c
+        self._address = address
+        self._most = _PARTS_SLOW if hz < _SLOW_HZ else _PARTS
+        self._due_ms = ticks_add(ticks_ms(), _POWER_UP_MS if fresh else 0)
+        self._sh1106 = self._kind == "sh1106" or (self._kind == "auto" and self._state() & 0x0F == _SH1106_STATUS)
+        self._refreshes = 0
+        self._restart()
+
+    def _restart(self):
+        self._set_up = self._lit = False
+        self._send_all()
+
+    def _send_all(self):
+        self._unsent = len(self._new)  # so many parts have to be sent, changed or not
+        self._changed = True
+
+    @property
+    def busy(self):
+        return not self._lit or self._changed or self._drawn is not self._wanted
+
+    def show(self, line1, line2, picture=None):
+        """Without a picture: the lines, in letters of twice their height. Codes as of an HD44780, see hd44780.py."""
+        wanted = picture or (line1, line2 if isinstance(line2, str) else bytes(line2))
+        if wanted != self._wanted:
+            self._wanted = wanted
+
+    def tick(self, now_ms):
+        """Draw, or send some parts that have changed, or ask whether it is still on. A picture that is being sent does
+        not change."""
+        if ticks_diff(now_ms, self._due_ms) < 0:
+            return
+        if not self._set_up:  # dark, until its RAM has been written
+            self._command(b"\x00\xae")
+            self._configure()
+            self._draw(self._wanted)
+            self._set_up = True
+            self._seen_ms = self._refresh_ms = now_ms
+        elif self._lit and ticks_diff(now_ms, self._seen_ms) >= PROBE_MS:
+            self._seen_ms = now_ms
+            if self._state() & _OFF and self._tells:  # it has lost its power
+                self._restart()
+        elif self._changed:
+            self._send()
+        elif not self._lit:
+            self._command(b"\x00\xaf")
+            self._lit = True
+            self._tells = not self._state() & _OFF  # some never tell
+        elif ticks_diff(now_ms, self._refresh_ms) >= REFRESH_MS:
+            self._refresh_ms = now_ms
+            self._refreshes += 1
+            self._configure()
+            self._lit = False
+            self._send_all()
+        elif self._drawn is not self._wanted:
+            self._draw(self._wanted)
+
+    def _state(self):
+        self._i2c.readfrom_into(self._address, self._status)
+        return self._status[0]
+
+    def _command(self, commands):
+        self._i2c.writeto(self._address, commands)
+
+    def _configure(self):
+        shift = _SHIFTS[self._refreshes // SHIFT_REFRESHES % len(_SHIFTS)]
+        self._command(_SET_UP + _SUPPLY[self._sh1106] + self._look + bytes((0x40 | shift,)))
+
+    def _send(self):
+        """Send the first parts that have changed, or have to be sent anyway."""
+        packet, left = self._packet, self._most
+        for k in range(len(self._new)):
+            new, old = self._new[k], self._old[k]
+            if k >= len(self._new) - self._unsent or new != old:
+                column = k // 8 * _PART + (_SH1106_OFFSET if self._sh1106 else 0)
+                packet[1] = 0xB0 | k % 8
+                packet[3] = column & 0x0F
+                packet[5] = 0x10 | column >> 4
+                packet[7:] = new
+                self._i2c.writeto(self._address, packet)
+                old[:] = new
+                self._unsent = min(self._unsent, len(self._new) - 1 - k)
+                left -= 1
+                if not left:
+                    return
+        self._changed = False
+
+    def _draw(self, wanted):
+        self._drawn = wanted
+        self._changed = True
+        self.canvas.fill(0)
+        if callable(wanted[0]):
+            wanted[0](self.canvas, *wanted[1:])
+        else:
+            self.canvas.tall(wanted[0], 1)
+            self.canvas.tall(wanted[1], 5)
+
+
+def character(canvas, code, x, y):
+    """One of 8x8 pixels. code: of an HD44780's ROM, or one of the patterns of hd44780.py."""
+    if code < 8:
+        columns = (code & 3) + 1
+        canvas.fill_rect(x if code < 4 else x + 8 - 2 * columns, y, 2 * columns, 8, 1)
+    elif code == 0xFF:
+        canvas.fill_rect(x, y, 8, 8, 1)
+    elif code == 0xDF:  # degree
+        canvas.rect(x + 1, y, 4, 4, 1)
+    elif code == 0x7E:  # arrow
+        for i in range(4):
+            canvas.vline(x + 2 + i, y + i, 7 - 2 * i, 1)
+    else:
+        canvas.text(chr(code), x, y, 1)

@@ -1,0 +1,169 @@
+"""Sends what the meter knows to a phone, from the loop, at the pace that the phone asks for."""
+
+from array import array
+from math import degrees, sqrt
+from time import ticks_add, ticks_diff
+
+from ..calibration.transform import Transform
+from ..lean.meter import FALLEN_DEG
+from . import packets
+from .packets import LEAN, MOTION, OWN, SPEED
+
+LOOK_MS = 1000
+IDLE_S = 60  # a phone that has asked for nothing for so long makes room for the next; typing a PIN takes half of it
+_SAMPLES = 8  # as many as Transform takes at most
+
+
+class Live:
+    """radio: a Radio. app: the App whose meter, drive, rides, screen, sensor and clock are read. leans: False for a
+    car.
+
+    asked: what the phone has asked for, "RaceChrono" or "our page", or None. per_second: packets in the last second.
+    """
+
+    def __init__(self, radio, app, leans):
+        self.radio = radio
+        self._app = app
+        self._leans = leans
+        self._intervals = [0] * 4
+        self._dues = [0] * 4
+        self._sums, self._n = [0] * 7, 0
+        self._scaled = array("i", [0] * 7)
+        self._force, self._rate = [0.0] * 3, [0.0] * 3
+        self._calibration = self._transform = None
+        self._buffer = bytearray(20)
+        self._views = {size: memoryview(self._buffer)[:size] for size in (6, 7, 14, 15, 20)}
+        self._look_ms = self._due_ms = 0
+        self._begin()
+
+    def _begin(self):
+        """Another phone is there, or none."""
+        self.radio.changed = False
+        self.asked = None
+        self.per_second = self._sent = self._idle_s = 0
+        self._advertised = False
+        self._intervals[:] = (0,) * 4
+        self._ask()
+
+    def _ask(self):
+        """The phone has asked for other packets. Start anew, for no mean may span a time without them."""
+        self.period_ms = min([ms for ms in self._intervals if ms] or [0])
+        self._clear()
+
+    def _clear(self):
+        self._n = 0
+        for i in range(7):
+            self._sums[i] = 0
+
+    def feed(self, sums, n):
+        """While period_ms is not 0, once each turn of the loop that has samples. sums (7): of n samples' counts."""
+        total = self._sums
+        for i in range(7):
+            total[i] += sums[i]
+        self._n += n
+
+    def poll(self, now_ms):
+        """Once each turn of the loop. Waits for nothing."""
+        radio = self.radio
+        if radio.changed:
+            self._begin()
+            self._look_ms = now_ms
+        while radio.inbox:
+            self._hear(*radio.inbox.pop(0))
+        if self.period_ms and ticks_diff(now_ms, self._due_ms) >= 0:
+            self._send(now_ms)
+        if ticks_diff(now_ms, self._look_ms) >= 0:
+            self._look(now_ms)
+
+    def _hear(self, handle, data):
+        if handle == self.radio.filter and packets.take_filter(data, self._intervals):
+            self.asked = "RaceChrono"
+        elif handle == self.radio.rate and packets.take_rate(data, self._intervals):
+            self.asked = "our page"
+        self._ask()
+
+    def _look(self, now_ms):
+        """Once a second: everything that is not of this moment."""
+        self._look_ms = ticks_add(now_ms, LOOK_MS)
+        self.per_second, self._sent = self._sent, 0
+        radio, app = self.radio, self._app
+        if radio.phone is None:
+            self._advertised = self._advertised or radio.advertise()
+            return
+        size = packets.ride(self._buffer, self._state(self._lean()), app.meter, app.clock.lost)
+        radio.keep(radio.ride, self._views[size])
+        if self._intervals[OWN]:
+            self._put(radio.ride, size)
+        self._idle_s = 0 if self.period_ms else self._idle_s + 1
+        if self._idle_s > IDLE_S:
+            radio.drop()
+        radio.save_bonds()
+
+    def _put(self, handle, size):
+        self._sent += self.radio.send(handle, self._views[size])
+
+    def _lean(self):
+        """The lean in degrees, or None where the display shows none either."""
+        app = self._app
+        meter = app.meter
+        shown = self._leans and meter.calibration.aligned and meter.trusted and app.sensor.fault is None
+        if not shown or app.screen.pages.late or meter.fallen or abs(meter.lean_deg) > FALLEN_DEG:
+            return None
+        return meter.lean_deg
+
+    def _state(self, lean):
+        meter = self._app.meter
+        state = packets.ALIGNED * meter.calibration.aligned + packets.TRUSTED * (lean is not None)
+        state += packets.AT_REST * meter.at_rest + packets.FALLEN * meter.fallen + packets.CAR * (not self._leans)
+        return state + packets.RECORDING * self._app.recording + packets.NO_READINGS * bool(self._app.sensor.fault)
+
+    def _send(self, now_ms):
+        """What is due of the samples since the last time: none where none have come."""
+        period_ms = self.period_ms
+        self._due_ms = ticks_add(self._due_ms, period_ms)
+        if ticks_diff(now_ms, self._due_ms) >= 0:  # late, or the first
+            self._due_ms = ticks_add(now_ms, period_ms)
+        if not self._n:
+            return
+        self._mean()
+        lean, drive = self._lean(), self._app.drive
+        self._sigma = degrees(sqrt(self._app.meter.filter.variance)) if lean is not None else None
+        self._speed = drive.fresh_speed(now_ms) if drive else None
+        intervals, dues = self._intervals, self._dues
+        for packet in range(4):
+            interval = intervals[packet]
+            late_ms = ticks_diff(now_ms, dues[packet])
+            if interval and 2 * late_ms >= -period_ms:  # the nearest of the times at which something is sent
+                dues[packet] = ticks_add(now_ms, interval - (late_ms if late_ms < period_ms else 0))
+                self._send_one(packet, lean, now_ms)
+
+    def _mean(self):
+        """Force and rate of the samples since the last time: their mean is the low-pass that this rate needs."""
+        calibration = self._app.meter.calibration
+        if calibration is not self._calibration:
+            self._calibration, self._transform = calibration, Transform(calibration)
+        n = self._n
+        for i in range(7):
+            self._scaled[i] = self._sums[i] * _SAMPLES // n
+        self._clear()
+        self._transform.apply_sum(self._scaled, _SAMPLES, self._force, self._rate)
+        for i in range(3):
+            self._rate[i] = degrees(self._rate[i])
+
+    def _send_one(self, packet, lean, now_ms):
+        radio, buffer, sigma, speed = self.radio, self._buffer, self._sigma, self._speed
+        aligned = self._app.meter.calibration.aligned
+        if packet == OWN:
+            force = self._force if aligned else None  # of no use in the sensor's own axes
+            state = self._state(lean)
+            self._put(radio.now, packets.now(buffer, now_ms, lean, sigma, force, self._rate, speed, state))
+        elif packet == LEAN and lean is not None:
+            self._put(radio.chrono, packets.lean(buffer, lean, sigma))
+        elif packet == MOTION and aligned:
+            self._put(radio.chrono, packets.motion(buffer, self._force, self._rate, lean is not None))
+        elif packet == SPEED and speed is not None:
+            self._put(radio.chrono, packets.speed(buffer, speed))
+
+    def stop(self):
+        """End it, until power-on."""
+        self.radio.stop()

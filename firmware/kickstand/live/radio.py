@@ -1,0 +1,113 @@
+"""The radio: a Bluetooth LE peripheral for one phone at a time. What happens is noted in the interrupt; the loop acts
+on it."""
+
+from binascii import unhexlify
+
+from ..errors import LiveError
+from ..units import __version__
+from . import packets
+
+SERVICE = "7b6f0000-3c1e-4d5a-9a55-6b69636b7374"  # our own; its characteristics have 1 to 4 in place of the 0
+ADVERTISE_US = 150_000
+MOST_WRITES = 16  # that wait for the loop; a phone that writes more in a turn is not heard
+
+_CONNECTED, _DISCONNECTED, _WRITTEN, _GET_SECRET, _SET_SECRET, _PASSKEY = 1, 2, 3, 29, 30, 31
+_READ, _WRITE, _NOTIFY = 0x02, 0x08, 0x10
+_READ_PAIRED, _WRITE_PAIRED = 0x0600, 0x3000  # only over an encrypted line, to a phone that gave the PIN
+_DISPLAY_ONLY = 0  # this side shows the PIN, as a sticker or config.py does, and the phone asks for it
+
+
+class Radio:
+    """phone: the handle of the phone that is connected, or None. changed: another phone, or none, since the loop looked
+    last. inbox: what it has written, [(filter or rate, bytes)]. filter, rate, chrono, now, ride: handles.
+
+    pin: six digits that a phone has to give, or None. Raises LiveError."""
+
+    def __init__(self, pin=None):
+        try:
+            from bluetooth import BLE, UUID
+        except ImportError:
+            raise LiveError("no-radio")
+        self._ble = ble = BLE()
+        self._pin = pin
+        self._bonds = None
+        if pin is not None:
+            if not hasattr(ble, "gap_passkey"):
+                raise LiveError("no-pairing")
+            from .bonds import Bonds
+
+            self._bonds = Bonds(pin)
+        self.phone, self.changed, self.inbox = None, True, []
+        try:
+            ble.irq(self._irq)
+            if pin is not None:
+                ble.config(bond=True, mitm=True, le_secure=True, io=_DISPLAY_ONLY)
+            ble.active(True)
+            self._register(UUID)
+        except (OSError, MemoryError) as error:
+            raise LiveError("radio-fault", str(error))
+
+    def _register(self, uuid):
+        ble, paired = self._ble, self._pin is not None
+        read, write = _READ | _READ_PAIRED * paired, _WRITE | _WRITE_PAIRED * paired
+        flags = read, write, _NOTIFY, read | _NOTIFY
+        own = tuple((uuid(SERVICE.replace("0000", "000%d" % (i + 1), 1)), flags[i]) for i in range(4))
+        chrono = (uuid(0x0001), read | _NOTIFY), (uuid(0x0002), write)
+        handles = ble.gatts_register_services(((uuid(0x1FF8), chrono), (uuid(SERVICE), own)))
+        (self.chrono, self.filter), (board, self.rate, self.now, self.ride) = handles
+        mac = ble.config("mac")[1]
+        self.name = "Kickstand %02X%02X" % (mac[4], mac[5])
+        ble.config(gap_name=self.name)
+        ble.gatts_write(board, bytes([packets.VERSION]) + ("%s, %s" % (self.name, __version__)).encode())
+        ours = bytes(reversed(unhexlify(SERVICE.replace("-", ""))))
+        self._found = b"\x02\x01\x06\x03\x03\xf8\x1f\x11\x07" + ours
+        self._named = bytes([1 + len(self.name), 9]) + self.name.encode()
+
+    def _irq(self, event, data):
+        if event == _WRITTEN:
+            if len(self.inbox) < MOST_WRITES:
+                self.inbox.append((data[1], self._ble.gatts_read(data[1])))
+        elif event == _CONNECTED or event == _DISCONNECTED:
+            self.phone = data[0] if event == _CONNECTED else None
+            self.inbox = []
+            self.changed = True
+        elif event == _PASSKEY:
+            getattr(self._ble, "gap_passkey")(data[0], data[1], self._pin)  # noqa: B009 the stubs of rp2 know it not
+        elif self._bonds and event == _GET_SECRET:
+            return self._bonds.get(*data)
+        elif self._bonds and event == _SET_SECRET:
+            return self._bonds.put(*data)
+        return None
+
+    def advertise(self):
+        """Let the next phone find the board. True if that works now."""
+        return self._attempt(self._ble.gap_advertise, ADVERTISE_US, self._found, resp_data=self._named)
+
+    def send(self, handle, data):
+        """Queue a notification. False: the radio has no room for it, or the phone has just gone."""
+        return self._attempt(self._ble.gatts_notify, self.phone, handle, data)
+
+    def keep(self, handle, data):
+        """For a phone that reads."""
+        self._attempt(self._ble.gatts_write, handle, data)
+
+    def drop(self):
+        """Let go of the phone, for the next one."""
+        self._attempt(self._ble.gap_disconnect, self.phone)
+
+    def save_bonds(self):
+        """Write what a pairing has changed to flash; in the loop, for that takes long."""
+        if self._bonds:
+            self._bonds.save()
+
+    def stop(self):
+        """Switch it off, until power-on."""
+        self._attempt(self._ble.active, False)
+
+    @staticmethod
+    def _attempt(function, *arguments, **named):
+        try:
+            function(*arguments, **named)
+            return True
+        except (OSError, TypeError):  # TypeError: the phone went between two steps of the loop, and its handle is None
+            return False

@@ -1,0 +1,145 @@
+"""The pages as pictures of 128x64 pixels, for a display that draws: what is read at a glance is large.
+
+page_ring.py takes the picture of a page from here, if it has one: a tuple, see board/display.py. Rows 0 and 1 stay
+blank, because an OLED shifts its picture.
+"""
+
+from binascii import a2b_base64
+
+import framebuf
+
+from . import pages
+
+DIGIT_WIDTH, DIGIT_HEIGHT = 24, 40
+_PITCH = 28  # from digit to digit
+_ARC_RADIUS, _ARC_DEG, _ARC_WIDTH = 100, 60, 7  # a degree is a column wide
+_G_PIXELS = 60  # length of the bar for 1 g
+_SMALL_Y = 56  # of the last line, in letters of 8x8
+
+# The ten digits, drawn for this display: each 5 times 24 bytes, of 8 rows with the topmost in bit 0
+DIGITS = a2b_base64(
+    b"AADA4PD4/Pz+/n5+fn7+/vz8+PDgwAAAAP///////wMAAAAAAAAAAAP///////8AAP///////wAAAAAAAAAAAAD///////8AAP//////"
+    b"/8AAAAAAAAAAAMD///////8AAAADBw8fPz9/f35+fn5/fz8/Hw8HAwAAAAAAAICAwODw+Pz8/v7+/PgAAAAAAAAAAAAEHx8/Hx8PB///"
+    b"//////8AAAAAAAAAAAAAAAAAAAAAAP////////8AAAAAAAAAAAAAAAAAAAAAAP////////8AAAAAAAAAAAAAAAAAAAAAAB8/f39/Px8A"
+    b"AAAAAAAAAADA4PD4/Pz+/n5+fn7+/vz8+PDgwAAAAB8/Pz8/HwMAAAAAAAAAAMP///////8AAAAAAAAAAAAAAMDg8Pj+//9/Px8HAwAA"
+    b"AAAAAMDg8Pz+//9/Px8HAwEAAAAAAAAAADx+f39/f39/f35+fn5+fn5+fn5+fjwAAIDg8Pj8/Pz+fn5+fn7+/Pz8+PDggAAAAAMHDw8H"
+    b"BwEAAAAAAICAwf///////wgAAAAAAAAAAAAEHj8/Pz9///////vxwAAAQPDw+PDwwIAAAAAAAAAAgMH//////38AAAEHDx8/Pz9/fn5+"
+    b"fn5/Pz8/Hw8HAQAAAAAAAAAAAAAAgOD4/P7+/v7+/AAAAAAAAAAAAAAAwPD8/////////////wAAAAAAAADA8Pz/////Pw8BAP//////"
+    b"/wAAAAAACB8/Pz8/Pz8/Pz8/P////////z8/Pz4eAAAAAAAAAAAAAAAAAD9/f39/PwAAAAAAAAD8/v7+/v5+fn5+fn5+fn5+fn5+PAAA"
+    b"AOD////////AwODg4MDAwICAAAAAAAAAAAcfHz8/Pz8fDw8PDw8fP3////788MAAAODw+Pjw4IAAAAAAAAAAgOD//////z8AAAADBw8f"
+    b"Pz9/fn5+fn5/Pz8fHw8DAQAAAAAAAIDg8Pj4/Pz8/P5+fn5+PhwAAAAAAADw/v/////fx8HAwMDAgIAAAAAAAAAAAP7//////38/Hw8P"
+    b"Dw8fP3////788MAAAH///////8CAAAAAAAAAgMD//////38AAAABBw8fPz9/f35+fn5/fz8/Hw8HAQAAADx+fn5+fn5+fn5+fn5+fv7+"
+    b"/v7+/nwAAAAAAAAAAAAAAAAAAIDw/v////8fAwAAAAAAAAAAAAAAAADA+P////9/DwAAAAAAAAAAAAAAAAAA8P7/////HwMAAAAAAAAA"
+    b"AAAAAAAAADh/f39/Pw8AAAAAAAAAAAAAAACA4PD4/Pz+/n5+fn7+/vz8+PDggAAAAAD////////BgICAgICAwf///////wAAAIDg8f//"
+    b"//9/Pz8/Pz8/f//////x4IAAAH///////8EAAAAAAAAAAMH//////38AAAADBw8fPz9/f35+fn5/fz8/Hw8HAwAAAACA4PD4/Pz+/n5+"
+    b"fn7+/vz8+PDggAAAAP7//////wMBAAAAAAAAAQP///////4AAAMPP3////78+PDw8PD4/P7//////38AAAAAAAAAAAEBAwMDA4Pj+///"
+    b"//9/DwAAAAAAADh8fn5+fn8/Pz8/Hx8PBwEAAAAA"
+)
+_GLYPHS = [
+    framebuf.FrameBuffer(bytearray(DIGITS[at : at + 120]), DIGIT_WIDTH, DIGIT_HEIGHT, framebuf.MONO_VLSB)
+    for at in range(0, 1200, 120)
+]
+# Row of the arc's upper edge, by columns from the middle
+_ARC = bytes(2 + _ARC_RADIUS - int((_ARC_RADIUS**2 - x * x) ** 0.5 + 0.5) for x in range(_ARC_DEG + 1))
+
+
+def _scale():
+    """The arc without a lean: drawing it anew for each page would take 6 ms."""
+    scale = framebuf.FrameBuffer(bytearray(128 * 4), 128, 32, framebuf.MONO_VLSB)
+    for x in range(_ARC_DEG + 1):
+        for column in (64 + x, 64 - x):
+            scale.vline(column, _ARC[x], 1 if x % 30 else _ARC_WIDTH, 1)
+    return scale
+
+
+_SCALE = _scale()
+
+
+def _number(canvas, value, x, y, digits=0):
+    """A number, with at least so many digits; return where it ends."""
+    for character in "%0*d" % (digits, value):
+        canvas.blit(_GLYPHS[ord(character) - 48], x, y)
+        x += _PITCH
+    return x
+
+
+def _triangle(canvas, x, y, direction):
+    """24 columns wide, its point at x. direction: -1 points to the left, 1 to the right."""
+    for i in range(24):
+        half = i * 14 // 23
+        canvas.vline(x - direction * i, y - half, 2 * half + 1, 1)
+
+
+def lean(meter, recording):
+    """The lean with its side, and an arc that ends at 60 degrees."""
+    deg = meter.lean_deg
+    return _lean, int(abs(deg) + 0.5), pages.side_name(deg), int(deg + (0.5 if deg > 0 else -0.5)), recording
+
+
+def _lean(canvas, number, side, deg, recording):
+    canvas.blit(_SCALE, 0, 0)
+    for x in range(min(_ARC_DEG, abs(deg)) + 1):
+        canvas.vline(64 + x if deg > 0 else 64 - x, _ARC[x], _ARC_WIDTH, 1)
+    x = _number(canvas, number, 52 if number < 10 else 38, 16)
+    for side_x in (0, 5):  # of the degree sign
+        canvas.vline(x - 3 + side_x, 17, 4, 1)
+        canvas.hline(x - 2, 16 + side_x, 4, 1)
+    if side == "left":
+        _triangle(canvas, 2, 40, -1)
+        canvas.text(side, 0, _SMALL_Y, 1)
+    elif side:
+        _triangle(canvas, 125, 40, 1)
+        canvas.text(side, 88, _SMALL_Y, 1)
+    if recording:
+        canvas.text("REC", 48, _SMALL_Y, 1)
+
+
+def unsure(line1, line2):
+    """In place of a lean: dashes, and the reason as dark letters in a bright band."""
+    return _unsure, line2
+
+
+def _unsure(canvas, reason):
+    for x in (38, 66):
+        canvas.fill_rect(x, 18, DIGIT_WIDTH, 8, 1)
+    canvas.tall(" " * ((17 - len(reason)) // 2) + reason, 5, True)
+    for y in (39, 56):  # so that the letters do not touch the edge of the band
+        canvas.hline(0, y, 128, 1)
+
+
+def maxima(meter, recording):
+    """The largest lean to each side."""
+    return _maxima, int(meter.max_left_deg + 0.5), int(meter.max_right_deg + 0.5)
+
+
+def _maxima(canvas, left, right):
+    _number(canvas, left, 2 if left > 9 else 30, 8)
+    _number(canvas, right, 74, 8)
+    canvas.vline(63, 8, 40, 1)
+    canvas.text("left  max  right", 0, _SMALL_Y, 1)
+
+
+def acceleration(meter, recording):
+    """Braking or acceleration in numbers and as a bar, and the peaks of both."""
+    peaks = pages.acceleration(meter)[1]
+    forward, most, least = meter.smooth_force[2], meter.max_accel_g, meter.max_brake_g
+    return _acceleration, round(100 * forward), round(_G_PIXELS * most), round(_G_PIXELS * least), peaks
+
+
+def _acceleration(canvas, hundredths, most, least, peaks):
+    number = abs(hundredths)
+    _number(canvas, number // 100 % 10, 0, 8)
+    canvas.fill_rect(25, 42, 6, 6, 1)
+    _number(canvas, number % 100, 34, 8, 2)
+    canvas.text("brake" if hundredths < 0 else "accel", 88, 8, 1)
+    canvas.text("g", 94, 40, 1)
+    canvas.hline(0, 51, 128, 1)
+    length = min(63, number * _G_PIXELS // 100)
+    canvas.fill_rect(64 - length if hundredths < 0 else 64, 49, length, 6, 1)
+    for x in (64, 64 + min(63, most), 64 - min(63, least)):
+        canvas.vline(x, 49, 6, 1)
+    canvas.text(peaks, 0, _SMALL_Y, 1)
+
+
+# A page, and what makes its picture of a LeanMeter and whether a ride is being recorded
+PICTURES = {pages.lean: lean, pages.maxima: maxima, pages.acceleration: acceleration}

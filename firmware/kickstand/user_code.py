@@ -1,0 +1,114 @@
+"""The owner's own code: the file user.py on the board, which no update touches. Its functions are called by name, where
+it has them:
+
+setup(app)                          once, before the lean meter runs
+page(app), page_battery(app) ...    for a page, while it is shown: two lines of 16 characters and, for a display that
+                                    draws, perhaps a picture, see board/display.py
+on_lean(lean_deg, trusted, meter)   ten times a second. trusted: False while the lean must not be used
+on_press(event)                     after each press: board.button.SHORT or LONG
+
+A function that raises, or that takes longer than TOO_SLOW_MS, is left out from then on; display and console say so.
+Imported only where there is a user.py.
+"""
+
+import gc
+import sys
+from time import ticks_diff, ticks_ms
+
+from .errors import Notice, report
+
+SLOW_MS = 50  # is reported once
+TOO_SLOW_MS = 300  # the sensor keeps its samples for no longer
+LEAST_FREE = 20_000  # bytes of heap: below, the lean meter's own work would fail next
+_CALLED = ("setup", "on_lean", "on_press")
+
+
+class UserCode:
+    """app: the App. pages: a function without arguments for each page, which gives its lines."""
+
+    def __init__(self, app):
+        self._app = app
+        self._functions = {"import": __import__}
+        self._slow = set()
+        self._problems = []
+        self._drawn = self._draw  # always the same object: a picture that has not changed is known by it
+        sys.modules.pop("user", None)
+        module = self._call("import", "user")
+        for name in dir(module) if module else ():
+            if name in _CALLED or name.startswith("page"):
+                self._functions[name] = getattr(module, name)
+        pages = sorted([name for name in self._functions if name.startswith("page")])
+        self.pages = [lambda name=name: self._page(name) for name in pages]
+        self._call("setup", app)
+
+    def take_problem(self):
+        """A Notice that has not been shown yet, or None."""
+        return self._problems.pop(0) if self._problems else None
+
+    def lean(self, trusted):
+        """Ten times a second. trusted: the lean is shown, too."""
+        meter = self._app.meter
+        self._call("on_lean", meter.lean_deg, trusted, meter)
+
+    def press(self, event):
+        """After each press."""
+        self._call("on_press", event)
+
+    def check_memory(self):
+        """Leave all of it out when it has used up the heap. After a collection."""
+        if self._functions and gc.mem_free() < LEAST_FREE:
+            self._forget("memory")
+
+    def _call(self, name, *arguments):
+        """What the function returns; None if it is missing, left out or fails."""
+        function = self._functions.get(name)
+        if function is None:
+            return None
+        begun_ms = ticks_ms()
+        try:
+            result = function(*arguments)
+        except MemoryError:
+            return self._forget(name)
+        except (Exception, SystemExit) as error:
+            sys.print_exception(error)
+            return self._leave_out(name, type(error).__name__)
+        took_ms = ticks_diff(ticks_ms(), begun_ms)
+        if took_ms > SLOW_MS and name not in self._slow and name not in ("import", "setup"):
+            if took_ms > TOO_SLOW_MS:
+                return self._leave_out(name, "%d ms" % took_ms)
+            self._slow.add(name)
+            self._report(Notice("user-slow", name, took_ms))
+        return result
+
+    def _leave_out(self, name, why):
+        self._functions.pop(name, None)
+        self._report(Notice("user-failed", name, why))
+
+    def _forget(self, name):
+        """Leave all of it out, and free what it holds."""
+        self._functions = {}
+        sys.modules.pop("user", None)
+        gc.collect()
+        self._report(Notice("user-memory", name))
+
+    def _report(self, notice):
+        report(notice)
+        self._problems.append(notice)
+
+    def _page(self, name):
+        shown = self._call(name, self._app)
+        if name not in self._functions:
+            return "user.py " + name, "left out"
+        try:
+            line1, line2 = [line if isinstance(line, (str, bytes, bytearray)) else str(line) for line in shown[:2]]
+            return (line1, line2) + ((self._drawn, name) + tuple(shown[2]) if len(shown) > 2 else None,)
+        except (TypeError, ValueError):
+            self._leave_out(name, "not two lines")
+            return "user.py " + name, "not two lines"
+
+    def _draw(self, canvas, name, draw, *values):
+        """In place of a page's own function, which may fail as well."""
+        self._functions["picture"] = draw
+        self._call("picture", canvas, *values)
+        if "picture" not in self._functions:
+            self._functions.pop(name, None)

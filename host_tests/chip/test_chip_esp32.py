@@ -1,0 +1,221 @@
+"""What is special about the emulated ESP32, and what it takes a board of its own for. What is tested on both chips is
+in test_chip_device.py.
+"""
+
+import hashlib
+import json
+import re
+import time
+
+import device_runs
+import pytest
+from emulated import calibrated, esp32, firmware, leaning, modules, shows
+from kickstand.calibration.store import Store
+from kickstand_tools.simulated_board.lcd import shown_lean
+from test_chip_recorder import FEED, rides
+
+pytestmark = [pytest.mark.chip, pytest.mark.esp32]
+
+LEAN_DEG = 20.0
+LEAN = r"Lean +20.*right"
+BOOT_S = 4.0
+FILES = calibrated()
+
+_SAVE = """
+from kickstand.calibration.store import Store
+store = Store(0x68, 8)
+calibration = store.load()
+def save(value):
+    calibration.gyro_bias[0] = value
+    store.save(calibration)
+save(0)
+save(0)
+"""
+
+
+def board(config="", world=None, files=None):
+    """A calibrated one that is held at LEAN_DEG, without power yet. config: of config.py."""
+    own = FILES | ({"/config.py": config.encode()} if config else {})
+    return esp32(world or leaning(LEAN_DEG), (files or firmware("esp32")) | own)
+
+
+def begun(pause_s):
+    """A digest of when the display showed what and the sensor was read. pause_s: the host's, every now and then."""
+    seen = []
+    with board() as device:
+        while device.time_s < 2.1:
+            device.run(0.05, lambda: time.sleep(pause_s))
+            seen.append((device.time_s, device.lcd(), dict(device.board.sensor_bus.transfers), bytes(device.said)))
+        seen.append((device.exec("import time\nprint(time.ticks_us())"), device.file_system))
+    assert shown_lean(device.board.lcd.text()) is None  # it has no supply any more
+    assert any(shown_lean(lines) == LEAN_DEG for _, lines, _, _ in seen[:-1])
+    return hashlib.sha256(repr(seen).encode()).hexdigest()
+
+
+def test_a_chip_does_the_same_on_every_host():
+    """To the microsecond, also where the host is slow."""
+    assert begun(0.0) == begun(0.002)
+
+
+def test_ctrl_c_unplugged_parts_and_a_soft_reset():
+    """What an owner does with a board that runs."""
+    with board() as device:
+        shows(device, LEAN, BOOT_S)
+        faults = device.board.faults
+        faults.unplug_sensor(device.time_s + 0.01, 0.3)
+        shows(device, r"No sensor|Sensor lost|Sensor silent", 0.8)
+        shows(device, LEAN, 2.0)
+        faults.unplug_lcd(device.time_s + 0.01, 0.3)
+        device.run(0.2)
+        assert not device.board.lcd.on
+        shows(device, LEAN, 4.0)
+        device.send(b"\x03")
+        device.run(9.0)  # longer than the watchdog would wait
+        assert device.resets == 0
+        assert b"Kickstand stopped." in device.said
+        status = device.exec("import kickstand\nkickstand.status()", 20.0)
+        assert re.search(r"Sensor +MPU6050 \(0x68\), \+-8 g", status)
+        assert re.search(r"Display +at 0x27", status)
+        assert re.search(r"Machine code +used\n", status)
+        assert re.search(r"aligned: yes", status)
+        worst = re.search(
+            r"Since start +longest turn (\d+\.\d) ms; places left in the FIFO, at the fewest: (\d+)", status
+        )
+        assert worst
+        assert 5.0 < float(worst[1]) < 600.0
+        assert 0 <= int(worst[2]) < 73
+        device.soft_reset()
+        device.board.lcd.power_on()
+        device.run(0.1)
+        shows(device, LEAN, BOOT_S)
+        assert device.resets == 0
+
+
+def test_safe_mode_and_refused_pins():
+    """The button held at power-on stops the app before it begins. A pin that the chip needs for its flash would crash
+    it at each start: it is refused."""
+    with board("SENSOR_SDA = 6\n") as device:
+        shows(device, r"SENSOR_SDA", BOOT_S)
+        assert device.resets == 0
+        device.power_off()
+        device.put_files(firmware("esp32"))
+        device.board.button.turn(True, device.clock.now_us)
+        device.run(0.1)
+        device.power_on()
+        device.run_until(lambda: b"safe mode" in device.said, BOOT_S)
+
+
+def test_one_bus_for_sensor_and_display():
+    pins = "LCD_SDA, LCD_SCL = 21, 22\n"
+    device = esp32(leaning(LEAN_DEG), firmware("esp32") | FILES | {"/config.py": pins.encode()}, one_bus=True)
+    with device:
+        shows(device, LEAN, BOOT_S)
+
+
+def test_wheel_and_gps():
+    """Pin interrupts, and the receiver's sentences on UART 2."""
+    with board(files=modules("esp32")) as device:
+        device.fit_wheel(lambda t_s: 15.0)
+        device.fit_gps(lambda t_s: 15.0)
+        for source in ("wheel", "gps"):
+            speeds = json.loads(device.exec(_LISTEN % source, 20.0).splitlines()[-1])
+            assert len(speeds) >= 2
+            assert speeds == pytest.approx([15.0] * len(speeds), abs=0.3)
+
+
+_LISTEN = """
+from time import sleep_ms, ticks_add, ticks_diff, ticks_ms
+from kickstand.settings import Settings
+from kickstand.speed.source import open_speed
+class Config:
+    SPEED = "%s"
+speed = open_speed(Settings(Config))
+got, end = [], ticks_add(ticks_ms(), 1800)
+while ticks_diff(end, ticks_ms()) > 0:
+    new = speed.poll(ticks_ms())
+    if new is not None:
+        got.append(new)
+    sleep_ms(10)
+print(got)
+"""
+
+
+def states_of_flash(device, code):
+    """The file system before, and after each write to the flash while code runs. QEMU's flash takes no time, but the
+    program needs tens of microseconds between two writes."""
+    device.exec("pass")
+    device.send(code.encode() + b"\x04")
+    del device.said[:]
+    states = [device.file_system]
+    while not device.said.endswith(b"\x04>"):
+        device.run(20e-6)
+        now = device.file_system
+        if now != states[-1]:
+            states.append(now)
+    return states
+
+
+def test_old_or_new_wherever_a_save_is_cut(tmp_path):
+    """The power goes after each write of four saves: a board that starts with that flash has a whole calibration."""
+    with board(files=modules("esp32")) as device:
+        device.exec(_SAVE)
+        states, writes = [], 0
+        for value in range(1, 5):
+            states = states_of_flash(device, f"save({value})")
+            writes += len(states) - 1
+            found = []
+            for state in states:
+                for name, content in device.FLASH.read(state).items():
+                    if name.endswith(".cal"):
+                        (tmp_path / name).write_bytes(content)
+                found.append(Store(0x68, 8, str(tmp_path)).load().gyro_bias[0])
+            assert set(found) == {value - 1, value}
+            assert found == sorted(found)
+        assert writes >= 8
+        torn = states[len(states) // 2]
+        device.power_off()
+        device.file_system = torn
+        device.power_on()
+        device.run(1.6)
+        bias = float(device.exec(_SAVE.replace("save(0)\n", "") + "print(calibration.gyro_bias[0])").splitlines()[-1])
+        assert bias in (3.0, 4.0)
+        device.exec("save(9)")
+        assert float(device.exec("print(store.load().gyro_bias[0])")) == 9.0
+
+
+_SIDES = [[1, 0, 0], [0, 0, -1], [0, 1, 0], [-1, 0, 0], [0, 0, 1], [0, -1, 0], [0.5, 0.6, -0.7]]
+
+
+@pytest.mark.nightly
+def test_six_positions_by_the_button():
+    """From the menu to a calibration that is stored, the last position a free one."""
+    steps = [[0, None]]
+    for i, up in enumerate(_SIDES):
+        steps += [[8.0 + 6.0 * i, up], [13.0 + 6.0 * i, None]]
+    world = device_runs.poses_of(3, steps)
+    with esp32(lambda t_s: tuple(world(t_s)), firmware("esp32")) as device:
+        for at_s, for_s in ((4, 1.2), (6, 0.15), (7, 1.2)):
+            device.press(at_s, for_s)
+        shows(device, "any of the six", 9.0)
+        shows(device, r"Side \+x done", 8.0)
+        shows(device, "Saved, err", 50.0)
+        files = device.files()
+    assert {"kickstand_a.cal", "kickstand_b.cal"} & set(files)
+
+
+@pytest.mark.nightly
+def test_wherever_the_power_goes_all_but_the_last_block_of_a_ride_is_kept():
+    """After each write to the flash; the calibration stays whatever happens."""
+    with board(files=modules("esp32")) as device:
+        device.exec(FEED + "recorder.start(Chip(), Calibration())")
+        states = states_of_flash(device, "feed(3)\nrecorder.stop()")
+    assert len(states) > 10
+    seen = 0
+    for state in states:
+        files = device.FLASH.read(state)
+        assert files.items() >= FILES.items()
+        blocks = [block.sequence for block in rides(files).get(1, [])]
+        assert blocks == list(range(len(blocks)))
+        assert len(blocks) >= seen - 1
+        seen = max(seen, len(blocks))
+    assert seen >= 3

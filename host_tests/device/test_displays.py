@@ -1,0 +1,59 @@
+"""The whole device with each display: the same lean, and whatever happens to the display, it comes back."""
+
+import random
+
+import devices
+import engines
+import pytest
+
+OLEDS = ("ssd1306", "sh1106")
+SHOTS = 1000
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+@pytest.mark.parametrize("display", OLEDS)
+@pytest.mark.parametrize("one_bus", [False, True])
+def test_the_lean_is_that_of_the_character_display(engine, display, one_bus, tmp_path, capsys):
+    plan = devices.ALIGNED | {"board": {"display": display, "one_bus": one_bus}}
+    plan["config"] = {"LCD_SDA": 4, "LCD_SCL": 5} if one_bus else {}
+    seen = devices.run(engine, tmp_path, plan, capsys)
+    assert not seen.too_fast and seen.ends == ["off"]
+    assert seen.first("Aligned!") < 17
+    for t_s, lean_deg in ((devices.LEFT_S, -30), (devices.RIGHT_S, 40)):
+        leans = seen.leans(t_s - 0.5, t_s)
+        assert leans and all(abs(lean - lean_deg) < 4 for lean in leans)
+
+
+@pytest.mark.parametrize("display", ["lcd", *OLEDS])
+def test_unplugged_shorted_and_cut_it_comes_back_within_two_seconds(display, tmp_path, capsys):
+    address = 0x27 if display == "lcd" else 0x3C
+    faults = [
+        ["unplug_lcd", [20.0, 0.5]],
+        ["stuck_sda", [23.0, 8, True]],
+        ["nack_for", [address, 25.0, 0.3]],
+        ["cut", [address, 27.0, 20]],
+        ["unplug_lcd", [28.0, 0.001]],
+    ]
+    seen = devices.run("cpython", tmp_path, devices.ALIGNED | {"board": {"display": display}, "faults": faults}, capsys)
+    for t_s in (22.5, 24.9, 26.9, 30.0):
+        assert seen.leans(t_s - 0.2, t_s + 0.1), t_s
+    assert all(abs(lean + 30) < 4 for lean in seen.leans(29.5, 30.5))
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES[1:])
+@pytest.mark.parametrize("display", ["lcd", "ssd1306"])
+def test_a_thousand_presses_and_unplugs(engine, display, tmp_path):
+    """At the end it shows a page as ever; MicroPython's heap is watched by the displays' own tests."""
+    chance = random.Random(3)
+    presses, faults = [[2, 0.15], [12, 0.15]], []
+    for k in range(SHOTS):
+        at_s = 18.0 + 0.2 * k
+        if chance.random() < 0.6:
+            presses.append([at_s, chance.choice((0.1, 0.15, 0.9))])
+        else:
+            faults.append(["unplug_lcd", [at_s, chance.choice((0.001, 0.05, 0.25))]])
+    until_s = 18.0 + 0.2 * SHOTS + 45.0  # so long that each menu and wizard has ended
+    plan = {"ride": devices.RIDE, "presses": presses, "until": until_s, "board": {"display": display}, "faults": faults}
+    seen = devices.run(engine, tmp_path, plan)
+    assert seen.ends == ["off"]
+    assert seen.last[0].strip() not in ("", "?")

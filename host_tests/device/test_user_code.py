@@ -1,0 +1,122 @@
+"""user.py, the owner's own code: called when it should be, and whatever it does the lean goes on."""
+
+import re
+
+import devices
+import engines
+import pytest
+
+PLAN = {"ride": devices.RIDE, "presses": devices.PRESSES, "until": 30.5}
+WHOLE = """
+import gc
+calls = []
+def setup(app):
+    print("setup", app.settings.SIDE)
+def on_lean(lean_deg, trusted, meter):
+    calls.append(trusted)
+    if len(calls) in (100, 280):
+        print("lean", len(calls), trusted, round(lean_deg), meter.trusted)
+def on_press(event):
+    print("press", event)
+def page(app):
+    return "My page", len(calls)
+def page_two(app):
+    return ("Page two", "")
+"""
+
+
+@pytest.fixture(params=engines.ENGINES)
+def run(request, tmp_path, monkeypatch, capsys):
+    """run(source of user.py, plan) -> Record."""
+
+    def run(source, plan=PLAN):
+        (tmp_path / "user.py").write_text(source)
+        monkeypatch.syspath_prepend(str(tmp_path))
+        return devices.run(request.param, tmp_path, plan, capsys)
+
+    return run
+
+
+def goes_on(record):
+    """The lean is right at the end of the left turn."""
+    lean = record.lean_at(30.0)
+    return lean is not None and abs(lean + 30) < 4
+
+
+def test_each_function_is_called(run):
+    record = run(WHOLE)
+    console = record.console
+    assert "setup left" in console and console.count("press 1") == 2
+    assert re.search(r"lean 100 False", console)  # not aligned yet
+    assert re.search(r"lean 280 True -\d\d? True", console)
+    assert goes_on(record)
+
+
+def test_its_pages_are_behind_the_others_and_before_alignment_in_the_menu(run):
+    # the menu: Own pages is its sixth entry
+    presses = [[2, 1.2]] + [[4 + 0.5 * k, 0.15] for k in range(5)] + [[8, 1.2], [10, 0.15], [11, 0.15]]
+    record = run(WHOLE, PLAN | {"presses": presses, "until": 13})
+    assert record.at(7.5)[0].startswith("→Own pages"), record.frames
+    assert record.at(9.8)[0].startswith("My page")
+    assert record.at(10.8)[0].startswith("Page two")
+    assert "press" in record.at(12.9)[1] or "Not aligned" in record.at(12.9)[1]
+    presses = [[t, 0.15] for t in (2, 12, 20, 21, 22, 23, 24, 25)]
+    record = run(WHOLE, PLAN | {"presses": presses, "until": 28})
+    assert record.at(24.8)[0].startswith("My page") and record.at(24.8)[1].strip().isdigit()
+    assert record.at(27)[0].startswith("Page two")
+
+
+@pytest.mark.parametrize(
+    ("source", "shown", "said"),
+    [
+        ("1 / 0", "user.py import", "import is left out: ZeroDivisionError"),
+        ("def on_lean(:", "user.py import", "import is left out: SyntaxError"),
+        ("def setup(app):\n    app.nothing", "user.py setup", "setup is left out: AttributeError"),
+        ("def on_lean(*a):\n    {}['x']", "user.py on_lean", "on_lean is left out: KeyError"),
+        ("def on_press():\n    pass", "user.py on_press", "on_press is left out: TypeError"),
+        ("def on_lean(*a):\n    raise SystemExit", "user.py on_lean", "on_lean is left out: SystemExit"),
+        ("import time\ndef on_lean(*a):\n    time.sleep_ms(1000)", "user.py on_lean", "on_lean is left out: 10"),
+        ("import time\ndef on_lean(*a):\n    time.sleep_ms(60)", "user.py on_lean", "on_lean took 6"),
+        ("def on_lean(*a):\n    raise MemoryError", "user.py left out", "it leaves too little memory (on_lean)"),
+    ],
+)
+def test_what_goes_wrong_is_said_once_and_the_lean_goes_on(run, source, shown, said):
+    record = run(source)
+    assert record.first(shown) < 12
+    assert record.console.count(said) == 1, record.console
+    assert goes_on(record)
+
+
+@pytest.mark.parametrize(
+    "body", ["return None", "return 5, 6, (lambda canvas: 1 / 0,)", "return ''", "return ('a', 'b', 5)", "1 / 0"]
+)
+@pytest.mark.parametrize("display", ["lcd", "ssd1306"])
+def test_a_page_that_is_none_is_left_out(run, body, display):
+    presses = [[t, 0.15] for t in (2, 12, 20, 21, 22, 23, 24, 27)]
+    plan = PLAN | {"presses": presses, "board": {"display": display}}
+    record = run(f"def page(app):\n    {body}", plan)
+    if "lambda" not in body or display != "lcd":  # such a one never draws
+        assert record.console.count("user.py: page is left out") + record.console.count("picture is left out") == 1
+    assert goes_on(record)
+
+
+def test_what_allocates_without_end_is_forgotten_before_the_lean_meter_runs_out(run, request):
+    if request.node.callspec.params["run"] == "cpython":
+        pytest.skip("only MicroPython's heap has an end")
+    record = run("kept = []\ndef on_lean(*a):\n    kept.append(bytearray(40000))")
+    assert record.first("user.py left out") < 30
+    assert record.console.count("it leaves too little memory") == 1
+    assert goes_on(record)
+
+
+def test_without_a_user_py_its_module_is_not_loaded(run, tmp_path):
+    """On a board it would take 3 KB of heap."""
+    import sys
+
+    sys.modules.pop("kickstand.user_code", None)
+    run("", PLAN | {"until": 1.0})
+    (tmp_path / "user.py").unlink()
+    sys.modules.pop("kickstand.user_code", None)
+    plan = PLAN | {"until": 1.0}
+    devices.run("cpython", tmp_path, plan)
+    assert "kickstand.user_code" not in sys.modules

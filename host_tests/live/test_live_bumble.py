@@ -1,0 +1,143 @@
+"""The whole device on a virtual radio: bumble's Bluetooth LE stack on both sides, and a central that knows the
+published texts only."""
+
+import asyncio
+import collections
+import itertools
+import random
+
+import devices
+import pytest
+from device_runs import Device, _world
+from published import SERVICE, channels, own
+
+bumble_air = pytest.importorskip("bumble_air", reason="no bumble", exc_type=ImportError)
+
+CHRONO = 0x1FF8
+RATE, NOW, RIDE, BOARD = (SERVICE.replace("0000", f"000{number}", 1) for number in (2, 3, 4, 1))
+
+
+@pytest.fixture
+def on_air(tmp_path, monkeypatch, capsys):
+    """run(until_s, [(at_s, visit, pin)], **config): the Centrals and the device's Record."""
+    monkeypatch.chdir(tmp_path)
+    made = []
+
+    def run(until_s, visits, machine="pico w", **config):
+        world, _ = _world(devices.ALIGNED)
+        device = Device(world, machine=machine)
+        for press in devices.PRESSES:
+            device.board.press(*press)
+        air = bumble_air.Air(device.board)
+        made.append(air)
+        centrals = [bumble_air.Central(air, pin).at(at_s, visit) for at_s, visit, pin in visits]
+        device.run({"LIVE": True, **config}, [until_s])
+        return centrals, devices.Record(device.record(), capsys.readouterr().out)
+
+    yield run
+    for air in made:
+        air.close()
+
+
+async def ask_racechrono(central):
+    """As the app: find, subscribe, deny all, allow two. Then all at once."""
+    await central.connect(await central.find(CHRONO))
+    await central.subscribe(CHRONO, 0x0001, "chrono")
+    await central.write(CHRONO, 0x0002, [0])
+    await asyncio.sleep(1)
+    begun = len(central.heard)
+    await central.write(CHRONO, 0x0002, [2, 0, 100, 0, 0, 0, 1])
+    await central.write(CHRONO, 0x0002, [2, 0, 40, 0, 0, 0, 2])
+    await asyncio.sleep(20)
+    await central.leave()
+    return begun
+
+
+def test_racechrono_finds_it_filters_and_decodes(on_air):
+    (central,), record = on_air(44, [(20, ask_racechrono, None)], RECORD=True)
+    assert central.done.result() == 0  # denied all, it sent nothing
+    counts = collections.Counter(data[0] for _, _, data in central.heard)
+    assert counts.keys() == {1, 2} and 198 <= counts[1] <= 202 and 496 <= counts[2] <= 503
+    for t_s in (devices.LEFT_S, devices.RIGHT_S):
+        leans = [channels(data) for sent_s, _, data in central.heard if data[0] == 1 and sent_s <= t_s]
+        assert abs(leans[-1]["lean angle"] - record.lean_at(t_s)) <= 1
+    assert record.ends == ["off"]
+
+
+async def ask_for_all(central):
+    """As our page, at the fastest."""
+    await central.connect(await central.find(SERVICE))
+    board = bytes(await central.read(SERVICE, BOARD))
+    await central.subscribe(SERVICE, NOW, "now")
+    await central.subscribe(SERVICE, RIDE, "ride")
+    await central.write(SERVICE, RATE, [40, 0])
+    await asyncio.sleep(20)
+    await central.leave()
+    return board
+
+
+def test_our_service_loses_no_sample_while_a_ride_is_recorded(on_air):
+    (central,), record = on_air(46, [(20, ask_for_all, None)], RECORD=True)
+    assert central.done.result()[0] == 1
+    now = [(t_s, own("now", data)) for t_s, name, data in central.heard if name == "now"]
+    assert 495 <= len(now) <= 502
+    steps = [(b["time of the board"] - a["time of the board"]) % 65536 for (_, a), (_, b) in itertools.pairwise(now)]
+    assert sum(steps) == pytest.approx(20_000, abs=200) and max(steps) <= 130
+    for t_s in (devices.LEFT_S, devices.RIGHT_S):
+        seen = [one for sent_s, one in now if sent_s <= t_s][-1]
+        assert abs(seen["lean"] / 100 - record.lean_at(t_s)) <= 1
+    rides = [own("ride", data) for _, name, data in central.heard if name == "ride"]
+    assert len(rides) in (19, 20, 21) and {one["samples lost"] for one in rides} == {0}
+
+
+async def press_in(central):
+    await central.connect(await central.find(CHRONO))
+    await central.subscribe(CHRONO, 0x0001, "chrono")
+    try:
+        await central.connection.pair()
+        await central.write(CHRONO, 0x0002, [1, 0, 100])
+    finally:
+        await asyncio.sleep(2)
+        await central.leave()
+
+
+async def just_write(central):
+    await central.connect(await central.find(CHRONO))
+    await central.subscribe(CHRONO, 0x0001, "chrono")
+    try:
+        await central.write(CHRONO, 0x0002, [1, 0, 100])
+    finally:
+        await asyncio.sleep(2)
+        await central.leave()
+
+
+def test_a_pin_is_asked_for(on_air):
+    """By the stack itself: neither a phone that does not pair nor one with a wrong PIN gets a packet."""
+    visits = [(20, just_write, None), (26, press_in, 314159), (34, press_in, 271828)]
+    (silent, wrong, right), _ = on_air(44, visits, machine="esp32", LIVE_PIN=271828)
+    assert "INSUFFICIENT_" in str(silent.done.exception())
+    assert wrong.done.exception() and not silent.heard and not wrong.heard
+    assert right.done.exception() is None
+    assert 15 <= len([data for _, _, data in right.heard if data[0] == 1]) <= 25
+
+
+async def annoy(central):
+    """Thirty visits: nonsense, some of it without an answer, and gone again."""
+    dice = random.Random(5)
+    for _ in range(30):
+        await central.connect(await central.find(CHRONO, 10))
+        for _ in range(dice.randrange(6)):
+            kind = dice.choice(((CHRONO, 2), (SERVICE, RATE)))
+            data = bytes(dice.randrange(256) for _ in range(dice.randrange(30)))
+            await central.write(*kind, data, response=bool(dice.randrange(2)) and len(data) <= 20)
+        await central.leave()
+        await asyncio.sleep(0.05)
+    return "still there"
+
+
+def test_thirty_rude_visits_over_the_air(on_air):
+    (central, after), record = on_air(115, [(20, annoy, None), (105, just_write, None)])
+    assert central.done.result() == "still there"
+    assert after.done.exception() is None and len(after.heard) > 30
+    assert record.ends == ["off"]
+    assert [line for line in record.at(114) if "Lean" in line]

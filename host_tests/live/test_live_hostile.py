@@ -1,0 +1,123 @@
+"""A thousand connects, writes and disconnects at random, most of them nonsense, leave the device running and its memory
+as it was. CPython and MicroPython: test_live_micropython.py runs this there."""
+
+import gc
+import random
+import sys
+
+from device_runs import standing
+from kickstand_tools.simulated_board.radio import Radio
+from kickstand_tools.simulated_board.simulator import Board
+from kickstand_tools.simulation.scripted.sensor_errors import Sensor
+from phones import PLACES, Phone
+
+ACTS = 1000
+WARM = 300  # acts until everything has been imported and every buffer has its size
+GROWTH = 2048  # bytes: what the collectors' accuracy may hide
+
+
+def used():
+    """Bytes of the heap in use."""
+    gc.collect()
+    if sys.implementation.name == "micropython":
+        gc.collect()
+        return gc.mem_alloc()
+    import tracemalloc
+
+    return tracemalloc.get_traced_memory()[0]
+
+
+class Forgetful(Phone):
+    """Keeps nothing of what it hears."""
+
+    def heard(self, handle, data):
+        self.packets = [data]
+
+    def dropped(self):
+        pass
+
+
+def nonsense(dice):
+    """What a phone may write: right commands, wrong lengths, unknown commands, long ones."""
+    kind = dice.randrange(6)
+    if kind == 0:
+        return bytes([1, 0, dice.randrange(256)])
+    if kind == 1:
+        return bytes([2, dice.randrange(256), dice.randrange(256), 0, 0, 0, dice.randrange(6)])
+    return bytes([dice.randrange(256) for _ in range(dice.randrange(30))])
+
+
+def act(dice, phone, radio):
+    """One of the thousand."""
+    kind = dice.randrange(12)
+    if radio.phone is None:
+        phone.connect(dice.randrange(256))
+    elif kind == 0:
+        phone.leave()
+    elif kind == 1:
+        phone.away(bool(dice.randrange(2)))
+    elif kind == 2:
+        phone.read(dice.choice(sorted(PLACES)))
+    elif kind == 3:  # more than the loop can have read meanwhile
+        for _ in range(40):
+            phone.write("filter", nonsense(dice))
+    elif kind == 4:  # gone and back between two turns of the loop
+        phone.leave()
+        radio.found = radio.found or b""
+        phone.connect(dice.randrange(256))
+    else:
+        phone.write(dice.choice(("filter", "rate", "now", "board")), nonsense(dice))
+
+
+def test_a_thousand_random_acts():
+    for drops in (True, False):  # what it cannot send, as an ESP32, or keeps it, as a Pico W
+        board = Board(Sensor(seed=3).world(standing([[0, 10]])))
+        board.radio = Radio(board.clock, drops)
+        with board:
+            run(board)
+
+
+def run(board):
+    from kickstand import devices
+    from kickstand.app import App
+    from kickstand.live import radio as live_radio
+    from kickstand.settings import Settings
+
+    if sys.implementation.name != "micropython":
+        import tracemalloc
+
+        tracemalloc.start()
+    dice = random
+    dice.seed(7)
+    marks = []
+
+    def go():
+        chosen = Settings(type("Config", (), {"LIVE": True}))
+        app = App(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen), radio=live_radio.Radio())
+        phone = Forgetful(board)
+        for count in range(WARM + ACTS):
+            if count in (WARM, WARM + ACTS // 2):
+                marks.append(used())
+            act(dice, phone, board.radio)
+            assert len(app.live.radio.inbox) <= live_radio.MOST_WRITES
+            for _ in range(dice.randrange(1, 12)):
+                app.turn()
+                board.clock.advance(10_000)
+        marks.append(used())
+        if board.radio.phone is not None:
+            phone.leave()
+        for _ in range(110):
+            app.turn()
+            board.clock.advance(10_000)
+        assert board.radio.found is not None  # the next phone can find it
+        assert phone.connect() and phone.write("rate", b"\x28\x00")
+        for _ in range(50):
+            app.turn()
+            board.clock.advance(10_000)
+        assert app.sensor.fault is None and len(phone.packets[0]) in (14, 20)
+
+    assert board.run(go, 10_000.0) == "returned"
+    assert marks[-1] - marks[0] < GROWTH, marks
+    if sys.implementation.name != "micropython":
+        tracemalloc.stop()
+    print("bytes in use after 300, 800 and 1300 acts:", marks)

@@ -1,0 +1,9 @@
+"""What needs no pytest, on MicroPython."""
+
+from pathlib import Path
+
+from mpy import run_tests
+
+
+def test_the_same_on_micropython():
+    run_tests(Path(__file__).with_name("test_live_hostile.py"))

@@ -1,0 +1,271 @@
+"""What every display has to do, whatever it is: the same tests for the driver of each, on the model of each. Also run
+under MicroPython."""
+
+import gc
+import sys
+
+from board_access import on_board
+
+OLEDS = ("ssd1306", "sh1106")
+KINDS = ("lcd",) + OLEDS
+BUS_HZ = (None, 100_000)
+TURN_MS = 10
+LONGEST_US = 7500  # of a turn's transfers, of 10 ms
+OLD, NEW = ("Lean  19\xdf right", "first"), ("Lean  28\xdf left", "second line")
+
+
+def as_text(lines):
+    # by hand: MicroPython's %-16s counts the bytes of a degree sign, which are two
+    return [line.replace("\xdf", "\xb0") + " " * (16 - len(line)) for line in lines]
+
+
+def open_display(board, hz=None, kind="auto"):
+    from kickstand.board import i2c_bus
+    from kickstand.board.display import Display
+
+    return Display(lambda rate: i2c_bus.open_i2c(1, 6, 7, rate), hz, kind)
+
+
+def turns(board, display, count, after=lambda: None):
+    """So many turns of the loop; return the longest, in us."""
+    from time import sleep_us, ticks_diff, ticks_ms, ticks_us
+
+    longest = 0
+    for _ in range(count):
+        begun_us = ticks_us()
+        display.tick(ticks_ms())
+        took_us = ticks_diff(ticks_us(), begun_us)
+        longest = max(longest, took_us)
+        sleep_us(max(0, 1000 * TURN_MS - took_us))
+        after()
+    return longest
+
+
+def for_each(test, hz=BUS_HZ, kinds=KINDS):
+    """Run test(board, display) on a board with each display, which shows OLD."""
+    for kind in kinds:
+        for rate in hz:
+
+            def run(board, kind=kind, rate=rate):
+                display = open_display(board, rate)
+                display.show(*OLD)
+                turns(board, display, 60)
+                assert board.lcd.text() == as_text(OLD), (kind, rate, board.lcd.text())
+                test(board, display)
+
+            outcome, board = on_board(run, 1e6, display=kind)
+            assert outcome == "returned" and not board.too_fast, (kind, rate)
+
+
+def test_it_shows_what_it_is_given_and_what_is_new():
+    def test(board, display):
+        for lines in (NEW, ("", ""), ("0123456789ABCDEFGHI", "\xff\xff\x7e"), OLD):
+            display.show(*lines)
+            turns(board, display, 40)
+            cut = [line[:16].replace("\xff", "\x01").replace("\x7e", "\x02") for line in as_text(lines)]
+            seen = [line.replace("\u2588", "\x01").replace("\u2590", "\x01") for line in board.lcd.text()]
+            assert [line.replace("\u2192", "\x02") for line in seen] == cut, (seen, cut)
+        assert board.lcd.backlight
+
+    for_each(test)
+
+
+def test_no_turn_keeps_the_loop_waiting():
+    def test(board, display):
+        for k in range(20):
+            display.show(f"{k * 1234567:016d}", f"{k * 7654321:016d}")
+            longest = turns(board, display, 10)
+            limit = LONGEST_US if not board.lcd.address == 0x27 else 12_800  # dashes first, and then the line
+            assert longest <= limit, longest
+
+    for_each(test)
+
+
+def test_nothing_is_sent_while_nothing_changes():
+    """But to ask whether it is there, five times a second."""
+
+    def test(board, display):
+        address = board.lcd.address
+        before = board.lcd_bus.transfers[address]
+        for _ in range(20):
+            display.show(*OLD)
+            turns(board, display, 10)
+        assert board.lcd_bus.transfers[address] - before <= 11
+
+    for_each(test)
+
+
+def test_unplugged_for_however_long_it_comes_back_and_shows_nothing_old():
+    def test(board, display):
+        for gap_turns, gone_ms in ((0, 1), (0, 50), (5, 1), (40, 1)):
+            display.show(*OLD)
+            turns(board, display, 40)
+            display.show(*NEW)
+            turns(board, display, gap_turns % 7)  # perhaps in the middle of a transfer of the new lines
+            board.remove_lcd()
+            board.clock.advance(1000 * gone_ms)
+            turns(board, display, gap_turns)
+            board.fit_lcd()
+            seen = set()
+
+            def see(seen=seen):
+                if board.lcd.backlight:
+                    seen.add(board.lcd.text()[0])
+
+            turns(board, display, 80, see)
+            assert board.lcd.text() == as_text(NEW), (gap_turns, board.lcd.text())
+            assert as_text(OLD)[0] not in seen, (gap_turns, seen)
+
+    for_each(test)
+
+
+def test_a_transfer_that_breaks_off_at_any_byte_is_made_good():
+    """And until then no lean is seen that is neither the old nor the new one."""
+
+    def test(board, display):
+        address = board.lcd.address
+        good = as_text(OLD)[0], as_text(NEW)[0]
+        for byte in range(1, 40, 3):
+            seen = set()
+            display.show(*OLD)
+            turns(board, display, 50)
+            board.faults.cut(address, 0.0, byte)
+            display.show(*NEW)
+            turns(board, display, 60, lambda seen=seen: seen.add(board.lcd.text()[0]))
+            assert board.lcd.text() == as_text(NEW), (byte, board.lcd.text())
+            assert all(line in good or "-" in line or line[:4] in ("?   ", "    ") for line in seen), seen
+
+    for_each(test, (None,))
+
+
+def test_a_stuck_bus_is_freed():
+    def test(board, display):
+        board.lcd_bus.hang(8)
+        display.show(*NEW)
+        turns(board, display, 200)
+        assert board.lcd.text() == as_text(NEW)
+
+    for_each(test, (None,))
+
+
+def test_the_processor_is_reset_in_the_middle_of_a_part():
+    """The display keeps its power and what it shows; the next start must replace it."""
+    for kind in KINDS:
+        for count in range(1, 12, 2):
+
+            def run(board, kind=kind, count=count):
+                display = open_display(board)
+                display.show(*OLD)
+                turns(board, display, 60)
+                display.show(*NEW)
+                turns(board, display, count)
+                board.lcd_bus.hang(5)
+                again = open_display(board)
+                again.show("Kickstand", "starting")
+                again.flush()
+                assert board.lcd.text() == as_text(("Kickstand", "starting")), (kind, count, board.lcd.text())
+
+            assert on_board(run, 1e6, display=kind)[0] == "returned"
+
+
+def test_a_wrong_address_and_no_display_do_not_stop_the_loop():
+    def run(board):
+        display = open_display(board)
+        display.show(*OLD)
+        assert turns(board, display, 200) < LONGEST_US and display.address is None
+        display.flush()
+
+    assert on_board(run, 1e6, lcd_address=None)[0] == "returned"
+    assert on_board(run, 1e6, lcd_address=0x50)[0] == "returned"
+
+
+def test_any_address_of_a_backpack_is_found():
+    for address in (0x20, 0x26, 0x38, 0x3B, 0x3E, 0x3F):
+
+        def run(board, address=address):
+            display = open_display(board)
+            display.show(*OLD)
+            turns(board, display, 400)
+            assert display.address == address and board.lcd.text() == as_text(OLD)
+
+        assert on_board(run, 1e6, lcd_address=address)[0] == "returned"
+
+
+def test_the_kind_that_is_set_is_the_kind_that_is_used():
+    """For controllers whose status says nothing, and displays at odd addresses."""
+    for kind in KINDS:
+
+        def run(board, kind=kind):
+            display = open_display(board, None, kind)
+            display.show(*OLD)
+            turns(board, display, 60)
+            assert board.lcd.text() == as_text(OLD) and display.draws == (kind != "lcd")
+
+        assert on_board(run, 1e6, display=kind)[0] == "returned"
+
+
+def test_another_display_in_its_place_is_taken():
+    def test(board, display):
+        for kind in OLEDS + ("lcd", "lcd", "sh1106"):
+            board.change_display(kind)
+            display.show(*NEW)
+            turns(board, display, 200)
+            assert board.lcd.text() == as_text(NEW), kind
+
+    for_each(test, (None,))
+
+
+def test_a_status_that_never_says_on_keeps_no_oled_dark():
+    def test(board, display):
+        board.lcd.read_byte = lambda: 0xFF
+        board.remove_lcd()
+        board.fit_lcd()
+        display.show(*NEW)
+        changes = set()
+        turns(board, display, 200, lambda: changes.add(board.lcd.on))
+        assert board.lcd.text() == as_text(NEW) and board.lcd.on
+
+    for_each(test, (None,), ("ssd1306",))
+
+
+def test_noise_in_an_oled_s_ram_is_gone_after_ten_seconds_and_its_picture_moves():
+    def test(board, display):
+        board.lcd.ram[200] ^= 0xFF
+        starts = set()
+        for _ in range(25):
+            turns(board, display, 1010)
+            starts.add(board.lcd.start_line)
+            assert board.lcd.on and board.lcd.text() == as_text(OLD), board.lcd.text()
+        assert starts == {0, 1, 2}
+
+    for_each(test, (None,), OLEDS)
+
+
+def test_an_oled_is_given_only_commands_that_it_has():
+    def test(board, display):
+        turns(board, display, 1100)
+        assert board.lcd.unknown == 0
+
+    for_each(test, (None,), OLEDS)
+
+
+def test_plugging_a_thousand_times_takes_no_memory():
+    """Only MicroPython says how much is in use."""
+    count = 1000 if sys.implementation.name == "micropython" else 20
+
+    def test(board, display):
+        used = []
+        for k in range(count):
+            board.remove_lcd()
+            turns(board, display, 2)
+            board.fit_lcd()
+            display.show(str(k), "")
+            turns(board, display, 3 + k % 30)
+            if k % 100 == 50 and hasattr(gc, "mem_alloc"):
+                gc.collect()
+                used.append(gc.mem_alloc())
+        turns(board, display, 100)
+        assert board.lcd.text()[0].strip() == str(count - 1)
+        assert not used or used[-1] - used[1] < 4000, used
+
+    for_each(test, (None,))

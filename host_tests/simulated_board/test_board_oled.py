@@ -1,0 +1,133 @@
+"""The models of the OLED controllers, and framebuf. Also run under MicroPython."""
+
+import sys
+
+from kickstand_tools.simulated_board.clock import Clock
+from kickstand_tools.simulated_board.fakes import framebuf as fake
+from kickstand_tools.simulated_board.oled import Oled
+
+KINDS = ("ssd1306", "sh1106")
+SUPPLY = {"ssd1306": (0x8D, 0x14), "sh1106": (0xAD, 0x8B)}
+FIRST = {"ssd1306": 0, "sh1106": 2}
+
+
+def send(oled, control, *values):
+    oled.start(oled.address, False)
+    assert oled.write_byte(control)
+    for value in values:
+        assert oled.write_byte(value)
+
+
+def ready(kind):
+    """On, seen the right way round, and blank."""
+    oled = Oled(Clock(), kind=kind)
+    send(oled, 0x00, *SUPPLY[kind], 0xA1, 0xC8, 0xAF)
+    for page in range(8):
+        send(oled, 0x00, 0xB0 | page, 0x00, 0x10)
+        send(oled, 0x40, *([0] * 132))
+        send(oled, 0x00, 0x00, 0x10)
+    return oled
+
+
+def lit(oled):
+    """(x, y) of every pixel that glows."""
+    pixels = oled.pixels()
+    return [(i % 128, i // 128) for i in range(8192) if pixels[i >> 3] & 0x80 >> (i & 7)]
+
+
+def test_it_comes_up_dark_with_anything_in_its_ram():
+    for kind in KINDS:
+        oled = Oled(Clock(), kind=kind)
+        assert not oled.backlight and not lit(oled) and len(set(oled.ram)) > 100
+        assert oled.read_byte() & 0x40
+        send(oled, 0x00, 0xAF)
+        assert not oled.read_byte() & 0x40
+        assert not oled.backlight  # without its charge pump
+
+
+def test_the_low_half_of_the_status_tells_them_apart():
+    assert [Oled(Clock(), kind=kind).read_byte() & 0x0F for kind in KINDS] == [3, 8]
+
+
+def test_a_byte_is_eight_rows_of_a_column():
+    for kind in KINDS:
+        oled = ready(kind)
+        send(oled, 0x00, 0xB2, FIRST[kind], 0x10)
+        send(oled, 0x40, 0x81, 0x01)
+        assert lit(oled) == [(0, 16), (1, 16), (0, 23)], (kind, lit(oled))
+        send(oled, 0x00, 0x42)
+        assert lit(oled) == [(0, 14), (1, 14), (0, 21)]
+
+
+def test_a_control_byte_before_each_command_and_then_data():
+    for kind in KINDS:
+        oled = ready(kind)
+        send(oled, 0x80, 0xB7, 0x80, 0x0F, 0x80, 0x17, 0x40, 0x80, 0x80)
+        x = 0x7F - FIRST[kind]
+        after = [] if kind == "ssd1306" else [(x + 1, 63)]
+        assert lit(oled)[-2:] == ([(x, 63)] + after if after else [(0, 63), (x, 63)]), (kind, lit(oled))
+
+
+def test_only_the_ssd1306_has_other_addressing_modes():
+    oled = ready("ssd1306")
+    send(oled, 0x00, 0x20, 0x00, 0x21, 126, 127, 0x22, 0, 1)
+    send(oled, 0x40, 1, 1, 1, 1)
+    assert lit(oled) == [(126, 0), (127, 0), (126, 8), (127, 8)]
+    send(oled, 0x00, 0x20, 0x01, 0x21, 0, 127, 0x22, 3, 4)
+    send(oled, 0x40, 2, 2, 2)
+    assert lit(oled)[4:] == [(0, 25), (1, 25), (0, 33)]
+    assert oled.unknown == 0
+    other = ready("sh1106")
+    send(other, 0x00, 0x8D)
+    assert other.unknown == 1
+
+
+def test_inverted_all_on_off_and_without_supply():
+    for kind in KINDS:
+        oled = ready(kind)
+        send(oled, 0x00, 0xA7)
+        assert len(lit(oled)) == 8192
+        send(oled, 0x00, 0xA6)
+        assert not lit(oled)
+        send(oled, 0x00, 0xA5)
+        assert len(lit(oled)) == 8192
+        send(oled, 0x00, 0xAE)
+        assert not lit(oled)
+        send(oled, 0x00, 0xAF)
+        oled.power_off()
+        assert not lit(oled)
+
+
+def test_an_argument_is_no_command_even_in_a_transfer_of_its_own():
+    oled = ready("ssd1306")
+    send(oled, 0x80, 0x81)
+    send(oled, 0x80, 0xAE)
+    assert oled.on and oled.contrast == 0xAE
+
+
+def test_the_fake_framebuf_draws_as_micropython_s_own():
+    """Where there is none, what it draws is at least what its name says."""
+    module = fake
+    if sys.implementation.name == "micropython":
+        import framebuf as module  # pyright: ignore[reportMissingImports]
+    drawn = []
+    for each in (module, fake):
+        pixels, stamp = bytearray(1024), bytearray(24 * 40 // 8)
+        canvas = each.FrameBuffer(pixels, 128, 64, each.MONO_VLSB)
+        picture = each.FrameBuffer(stamp, 24, 40, each.MONO_HLSB)
+        picture.rect(1, 2, 20, 30, 1)
+        picture.line(23, 0, 0, 39, 1)
+        canvas.text("Lean 23 \x7e\x7f~g", 3, 5, 1)
+        canvas.fill_rect(50, 40, 200, 10, 1)
+        canvas.rect(-3, 50, 20, 30, 1)
+        canvas.blit(picture, 30, 20, 0)
+        canvas.blit(picture, 110, 50)
+        canvas.vline(127, -5, 100, 1)
+        canvas.hline(100, 30, 5, 1)
+        canvas.text("dark", 60, 41, 0)
+        for end in ((0, 63), (127, 63), (127, 20), (64, 0), (0, 33), (90, 32)):
+            canvas.line(64, 32, *end, 1)
+        canvas.pixel(5, 45, 1)
+        assert canvas.pixel(5, 45) == 1 and canvas.pixel(5, 46) == 0 and canvas.pixel(500, 1) is None
+        drawn.append(bytes(pixels))
+    assert drawn[0] == drawn[1], [i for i in range(1024) if drawn[0][i] != drawn[1][i]]

@@ -1,0 +1,70 @@
+"""A phone beside the simulated board, without a radio stack: what it does is a plan, and what it hears is kept. CPython
+and MicroPython."""
+
+CHRONO, FILTER = (0x1FF8, 0x0001), (0x1FF8, 0x0002)
+_OWN = "7b6f000%d-3c1e-4d5a-9a55-6b69636b7374"
+BOARD, RATE, NOW, RIDE = ((_OWN % 0, _OWN % number) for number in (1, 2, 3, 4))
+PLACES = {"chrono": CHRONO, "filter": FILTER, "board": BOARD, "rate": RATE, "now": NOW, "ride": RIDE}
+
+
+class Phone:
+    """acts: [[at_s, method, arguments...], ...]. Bytes are lists of numbers, as JSON has them."""
+
+    def __init__(self, board, acts=()):
+        self._board = board
+        self.packets = []  # [s, name of the characteristic, bytes]
+        self.said = []  # [s, what happened, answer]
+        for at_s, name, *more in acts:
+            board.at(at_s, lambda name=name, more=more: self._do(name, more))
+
+    def _do(self, name, more):
+        self.said.append([self._now(), name, getattr(self, name)(*more)])
+
+    def _now(self):
+        return self._board.clock.now_us / 1e6
+
+    def record(self):
+        return {"packets": self.packets, "said": self.said}
+
+    def handle(self, name):
+        """Of a characteristic, by what the board has registered."""
+        service, kind = PLACES[name]
+        for uuid, made in self._board.radio.services:
+            for found, _, handle in made:
+                if (uuid, found) == (service, kind):
+                    return handle
+        return None
+
+    def connect(self, address=1):
+        return self._board.radio.connect(self, bytes([address] * 6))
+
+    def leave(self):
+        self._board.radio.disconnect()
+
+    def away(self, is_away):
+        self._board.radio.away = is_away
+
+    def write(self, name, data):
+        return self._board.radio.write(self.handle(name), bytes(data))
+
+    def read(self, name):
+        data = self._board.radio.read(self.handle(name))
+        return None if data is None else list(data)
+
+    def give_pin(self, pin):
+        return self._board.radio.give_pin(pin)
+
+    def found(self):
+        """What the board advertises."""
+        radio = self._board.radio
+        return None if radio.found is None else [list(radio.found), list(radio.named)]
+
+    # Called by the radio
+
+    def heard(self, handle, data):
+        for name in PLACES:
+            if self.handle(name) == handle:
+                self.packets.append([self._now(), name, list(data)])
+
+    def dropped(self):
+        self.said.append([self._now(), "dropped", None])

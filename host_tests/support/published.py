@@ -1,0 +1,52 @@
+"""Decodes what comes from the radio by firmware/README.md alone: its equations for RaceChrono, its tables of bytes."""
+
+import re
+from pathlib import Path
+
+README = Path(__file__).resolve().parents[2] / "firmware" / "README.md"
+_SECTION = README.read_text(encoding="utf-8").split("## Live on the phone")[1].split("\n## ")[0]
+SERVICE = re.findall(r"is `([0-9a-f-]{36})`", _SECTION)[0]
+
+# {channel, its words before the first comma: (packet, equation)}
+EQUATIONS = {
+    name.split(",")[0]: (int(packet), equation)
+    for name, packet, equation in re.findall(r"^\| ([^|]+) \| (\d) \| `(.+)` \|$", _SECTION, re.MULTILINE)
+}
+_FUNCTIONS = {
+    "bytesToIntLe": lambda raw, at, length: int.from_bytes(raw[at : at + length], "little", signed=True),
+    "bytesToUintLe": lambda raw, at, length: int.from_bytes(raw[at : at + length], "little"),
+}
+
+
+def channels(data):
+    """{channel: value} of a packet of RaceChrono's service."""
+    number, raw = int.from_bytes(data[:4], "little"), bytes(data[4:])
+    assert 1 <= len(raw) <= 16
+    return {
+        name: eval(equation, {"__builtins__": {}}, {**_FUNCTIONS, "raw": raw})
+        for name, (packet, equation) in EQUATIONS.items()
+        if packet == number
+    }
+
+
+def _rows(title):
+    """[(first byte, last byte, kind, words, value for unknown or None)] of a table."""
+    table = _SECTION.split(f"\n`{title}`, ")[1].split("\n\n")[1]
+    rows = []
+    for line in table.splitlines()[2:]:
+        place, kind, what, *unknown = (cell.strip() for cell in line.strip("|").split("|"))
+        first, _, last = place.partition("-")
+        lacking = int(unknown[0]) if unknown and unknown[0] else None
+        rows.append((int(first), int(last or first), kind, what, lacking))
+    return rows
+
+
+def own(title, data):
+    """{what: whole number in the table's unit, None for unknown} of a packet of our own."""
+    rows = _rows(title)
+    assert len(data) == rows[-1][1] + 1
+    found = {}
+    for first, last, kind, what, lacking in rows:
+        number = int.from_bytes(bytes(data[first : last + 1]), "little", signed=kind == "signed")
+        found[re.split("[,:]", what)[0]] = None if number == lacking else number
+    return found

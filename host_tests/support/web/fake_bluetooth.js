@@ -1,0 +1,58 @@
+// A navigator.bluetooth whose radio is that of a bumble central (bluetooth_bridge.py)
+class Device extends EventTarget {
+  name = "Kickstand 1A2B";
+  gatt = {
+    connect: async () => {
+      await radioDo("connect", "", "");
+      this.connected = true;
+      this.heard();
+      return { getPrimaryService: async (service) => ({ getCharacteristic: async (kind) => this.characteristic(service, kind) }) };
+    },
+    disconnect: () => {
+      if (this.connected) radioDo("disconnect", "", "");
+      this.connected = false;
+    },
+  };
+  known = {};
+
+  characteristic(service, kind) {
+    return (this.known[kind] ??= Object.assign(new EventTarget(), {
+      readValue: async () => view(await radioDo("read", kind, "")),
+      startNotifications: async () => radioDo("subscribe", kind, ""),
+      writeValueWithResponse: async (bytes) => radioDo("write", kind, btoa(String.fromCharCode(...bytes))),
+    }));
+  }
+
+  async heard() {
+    while (this.connected) {
+      const { lost, packets } = await radioHeard();
+      for (const [kind, data] of packets) {
+        this.known[kind].value = view(data);
+        this.known[kind].dispatchEvent(new Event("characteristicvaluechanged"));
+      }
+      if (lost) {
+        this.connected = false;
+        this.dispatchEvent(new Event("gattserverdisconnected"));
+      }
+      await new Promise((done) => setTimeout(done, 10));
+    }
+  }
+}
+const view = (text) => new DataView(Uint8Array.from(atob(text), (c) => c.charCodeAt(0)).buffer);
+window.asked = [];
+window.boardThere = true;
+Object.defineProperty(navigator, "bluetooth", {
+  configurable: true,
+  value: {
+    async requestDevice(options) {
+      asked.push(options);
+      if (!boardThere) throw new DOMException("User cancelled the requestDevice() chooser.", "NotFoundError");
+      return new Device();
+    },
+  },
+});
+window.awake = 0;
+Object.defineProperty(navigator, "wakeLock", {
+  configurable: true,
+  value: { request: async () => ((awake += 1), { release: () => (awake -= 1) }) },
+});

@@ -1,0 +1,65 @@
+"""Kickstand's own columns: the log calibrated and in the vehicle's axes, and the lean that the display shows.
+
+As CSV, and as Apache Parquet for data frames, each field with its unit in its metadata:
+https://arrow.apache.org/docs/python/parquet.html; pandas.read_parquet and others open it.
+"""
+
+import gzip
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from ...logs.csv_lines import csv_lines
+from ...logs.table import float_schema
+from ..channels import Channels
+
+# name: (digits, unit)
+COLUMNS = {
+    "t_s": (6, "s"),
+    "lean_deg": (3, "deg"),
+    "lean_formula_deg": (3, "deg"),
+    "left_g": (5, "g"),
+    "up_g": (5, "g"),
+    "forward_g": (5, "g"),
+    "lateral_g": (5, "g"),
+    "pitch_rate_dps": (4, "deg/s"),
+    "yaw_rate_dps": (4, "deg/s"),
+    "roll_rate_dps": (4, "deg/s"),
+    "speed_mps": (3, "m/s"),
+    "temp_c": (2, "Cel"),
+    "shown_g": (5, "g"),
+    "lean_sigma_deg": (3, "deg"),
+    "lat_deg": (7, "deg"),
+    "lon_deg": (7, "deg"),
+    "utc_s": (3, "s"),
+}
+
+
+_FINE = ("t_s", "lat_deg", "lon_deg", "utc_s")  # a float of 32 bits has positions to 1 m only
+
+
+def write_csv(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
+    """Gzipped if the name ends in .gz."""
+    opened = gzip.open if path.suffix == ".gz" else open
+    digits = [digit for digit, _ in COLUMNS.values()]
+    with opened(path, "wb") as file:
+        file.write((",".join(COLUMNS) + "\n").encode("ascii"))
+        for block in blocks:
+            block.t_s = block.t_s + start_s
+            file.writelines(csv_lines(np.column_stack([getattr(block, name) for name in COLUMNS]), digits))
+
+
+def write_parquet(path: Path, blocks: Iterator[Channels], start_s: float) -> None:
+    """One row group a block; times and positions in 64-bit floats, the rest in 32-bit floats. NaN where there is no
+    value."""
+    import pyarrow
+    from pyarrow.parquet import ParquetWriter
+
+    about = {"made_by": "kickstand", "axes": "left, up, forward; lean > 0 to the right"}
+    schema = float_schema({name: unit for name, (_, unit) in COLUMNS.items()}, _FINE, about)
+    with ParquetWriter(path, schema) as writer:
+        for block in blocks:
+            block.t_s = block.t_s + start_s
+            columns = [pyarrow.array(getattr(block, field.name), type=field.type) for field in schema]
+            writer.write_table(pyarrow.table(columns, schema=schema))

@@ -1,0 +1,101 @@
+"""MicroPython's `bluetooth` on the simulated board: as much of it as a peripheral needs, on the radio of the board that
+was installed last. The errors are those of the ports with NimBLE (ESP32) and btstack (Pico W).
+"""
+
+import errno
+
+from . import fake_machine
+
+NOTIFY_US = 150  # that a notification takes the processor; assumed, for no radio was measured
+
+
+class UUID:
+    """bluetooth.UUID of a number or a text."""
+
+    def __init__(self, value):
+        self.value = value
+
+
+def BLE():
+    """bluetooth.BLE(): on boards that cannot pair it has no gap_passkey()."""
+    radio = fake_machine.board.radio
+    return PairingBle(radio) if radio.pairs else Ble(radio)
+
+
+class Ble:
+    """The radio, as the firmware speaks to it."""
+
+    _PAIRING = ()
+
+    def __init__(self, radio):
+        self._radio = radio
+
+    def _on(self):
+        if not self._radio.active:
+            raise OSError(errno.ENODEV)
+        return self._radio
+
+    def active(self, on=None):
+        if on and self._radio.fails:
+            raise OSError(errno.ETIMEDOUT)
+        if on is not None:
+            if not on:
+                if self._radio.phone is not None:
+                    self._radio.drop()
+                self._radio.off()
+            self._radio.active = bool(on)
+        return self._radio.active
+
+    def irq(self, handler):
+        self._radio.irq = handler
+
+    def config(self, *asked, **settings):
+        if asked == ("mac",):
+            return 0, self._on().address
+        for name in settings:
+            if name not in ("gap_name",) + self._PAIRING:
+                raise ValueError("unknown config param")
+        self._radio.config.update(settings)
+        return None
+
+    def gap_advertise(self, interval_us, adv_data=None, *, resp_data=None, connectable=True):
+        assert len(adv_data) <= 31 and len(resp_data) <= 31
+        if self._on().phone is not None:
+            raise OSError(errno.ENOMEM)  # btstack has room for one connection
+        self._radio.found, self._radio.named = adv_data, resp_data
+
+    def gap_disconnect(self, conn_handle):
+        if self._on().phone is None:
+            return False
+        self._radio.drop()
+        return True
+
+    def gatts_register_services(self, services):
+        return self._on().register(services)
+
+    def gatts_read(self, handle):
+        return self._on().values[handle]
+
+    def gatts_write(self, handle, data, send_update=False):
+        self._on().values[handle] = bytes(data)
+
+    def gatts_notify(self, conn_handle, handle, data=None):
+        if conn_handle is None:
+            raise TypeError("can't convert NoneType to int")
+        fake_machine.board.clock.advance(NOTIFY_US)
+        if self._on().phone is None:
+            raise OSError(errno.ENOTCONN)
+        if not self._radio.notify(handle, bytes(data)):
+            raise OSError(errno.ENOMEM)
+
+
+class PairingBle(Ble):
+    """With what NimBLE can do and btstack's build for a Pico W cannot."""
+
+    _PAIRING = ("bond", "mitm", "io", "le_secure")
+
+    def gap_pair(self, conn_handle):
+        self._on()
+
+    def gap_passkey(self, conn_handle, action, passkey):
+        self._on().take_passkey(passkey)

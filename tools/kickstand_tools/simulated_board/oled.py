@@ -1,0 +1,205 @@
+"""Models of two OLED controllers on I2C with a panel of 128x64 pixels: Solomon Systech SSD1306 (data sheet rev 1.1) and
+Sino Wealth SH1106 (V2.3).
+
+A transfer begins with control bytes: Co (bit 7) says whether one byte follows or the rest is a stream, D/C (bit 6)
+whether they are data. The SSD1306 has 128 columns and three addressing modes, the SH1106 132 columns, of which the
+panel shows 2 to 129, and page addressing only.
+"""
+
+from . import oled_text
+
+WIDTH, HEIGHT = 128, 64
+PAGES = HEIGHT // 8
+# By kind: columns of RAM, first visible one, low half of the status (as found on chips: no data sheet gives it)
+_KINDS = {"ssd1306": (128, 0, 0x03), "sh1106": (132, 2, 0x08)}
+# Commands with arguments, and how many
+_ARGUMENTS = {0x81: 1, 0xA8: 1, 0xD3: 1, 0xD5: 1, 0xD9: 1, 0xDA: 1, 0xDB: 1}
+_OWN_ARGUMENTS = {
+    "ssd1306": {0x20: 1, 0x21: 2, 0x22: 2, 0x8D: 1, 0x26: 6, 0x27: 6, 0x29: 5, 0x2A: 5, 0xA3: 2},
+    "sh1106": {0xAD: 1},
+}
+_OFF = 0x40  # bit of the status
+
+
+class Oled:
+    """One display. kind: "ssd1306" or "sh1106".
+
+    on: switched on.  pumped: has the voltage that pixels glow with.  inverted, contrast, start_line: as set.
+    changes: counts visible changes.  unknown: counts commands that the controller does not have.
+    """
+
+    max_hz = 400_000
+
+    def __init__(self, clock, address=0x3C, kind="ssd1306"):
+        self.address = address
+        self.clock = clock
+        self.kind = kind
+        self._columns, self._first, self._identity = _KINDS[kind]
+        self._arguments = dict(_ARGUMENTS)
+        self._arguments.update(_OWN_ARGUMENTS[kind])
+        self.changes = 0
+        self._power = 0
+        self._read, self._lines = -1, []  # the text as of so many changes
+        self.power_on()
+
+    def power_on(self):
+        """As its reset leaves it: off, and its RAM holds anything."""
+        self._power += 1
+        self.ram = bytearray([(37 * i + 91 * self._power) & 0xFF for i in range(self._columns * PAGES)])
+        self.on = self.pumped = self.inverted = self._all_on = False
+        self.contrast = 0x7F if self.kind == "ssd1306" else 0x80
+        self.start_line = self._offset = 0
+        self._mux = 63
+        self._flipped_columns = self._flipped_rows = False
+        self._mode = 2  # of addressing: page by page
+        self._page = self._column = 0
+        self._window = [0, self._columns - 1, 0, PAGES - 1]
+        self._control = True  # the next byte is a control byte
+        self._one = self._data = False
+        self._command = []  # with its arguments, until these are complete
+        self.unknown = 0
+        self.changes += 1
+
+    def power_off(self):
+        """The supply is gone: nothing glows."""
+        self.on = False
+        self.changes += 1
+
+    @property
+    def backlight(self):
+        """True while pixels can glow."""
+        return self.on and self.pumped
+
+    def pixels(self):
+        """What the panel shows, row after row from the top: 8 pixels a byte, the leftmost in bit 7. Modules are mounted
+        with the cable's edge at the top, so that columns and rows are both reversed."""
+        seen = bytearray(WIDTH // 8 * HEIGHT)
+        if not self.backlight:
+            return seen
+        for y in range(HEIGHT):
+            at = y if self._flipped_rows else HEIGHT - 1 - y
+            row = (at + self.start_line + self._offset) % HEIGHT
+            for x in range(WIDTH):
+                column = self._first + (x if self._flipped_columns else WIDTH - 1 - x)
+                lit = self._all_on or self.ram[(row >> 3) * self._columns + column] >> (row & 7) & 1
+                if bool(lit) != self.inverted and y <= self._mux:
+                    seen[(y * WIDTH + x) >> 3] |= 0x80 >> (x & 7)
+        return seen
+
+    def pages(self):
+        """The visible part of the RAM: of each page 128 bytes."""
+        starts = [page * self._columns + self._first for page in range(PAGES)]
+        return [self.ram[start : start + WIDTH] for start in starts]
+
+    def text(self):
+        """The two lines that the picture stands for, see oled_text.py."""
+        if self._read != self.changes:
+            self._read = self.changes
+            self._lines = oled_text.lines(self)
+        return list(self._lines)
+
+    # The I2C side
+
+    def start(self, address, read):
+        """START and address. True: acknowledged."""
+        self._control = True
+        return True
+
+    def write_byte(self, value):
+        """A control byte, a command or one of its arguments, or eight pixels. True: ACK."""
+        if self._control:
+            self._one, self._data = bool(value & 0x80), bool(value & 0x40)
+            self._control = False
+            return True
+        if self._data:
+            self._store(value)
+        else:
+            self._take(value)
+        self._control = self._one
+        return True
+
+    def read_byte(self):
+        """The status."""
+        return self._identity | (0 if self.on else _OFF)
+
+    # The controller
+
+    def _store(self, value):
+        at = self._page * self._columns + self._column
+        if self.ram[at] != value:
+            self.ram[at] = value
+            self.changes += 1
+        first, last, top, bottom = self._window
+        if self._mode == 2:  # within the page; an SH1106 stays at its last column
+            if self._column < self._columns - 1:
+                self._column += 1
+            elif self.kind == "ssd1306":
+                self._column = 0
+        elif self._mode == 0:
+            self._column = first if self._column == last else self._column + 1
+            if self._column == first:
+                self._page = top if self._page == bottom else self._page + 1
+        else:
+            self._page = top if self._page == bottom else self._page + 1
+            if self._page == top:
+                self._column = first if self._column == last else self._column + 1
+
+    def _take(self, value):
+        self._command.append(value)
+        if len(self._command) > self._arguments.get(self._command[0], 0):
+            self._execute(self._command)
+            self._command = []
+            self.changes += 1
+
+    def _execute(self, command):
+        code, argument = command[0], command[-1]
+        if code < 0x20:
+            if self._mode == 2:
+                low, high = self._column & 0x0F, self._column & 0xF0
+                self._column = (high | code if code < 0x10 else (code & 0x0F) << 4 | low) % self._columns
+        elif 0x40 <= code < 0x80:
+            self.start_line = code & 0x3F
+        elif 0xB0 <= code < 0xB8:
+            self._page = code & 7
+        elif code in (0xA0, 0xA1):
+            self._flipped_columns = code == 0xA1
+        elif code in (0xA4, 0xA5):
+            self._all_on = code == 0xA5
+        elif code in (0xA6, 0xA7):
+            self.inverted = code == 0xA7
+        elif code in (0xAE, 0xAF):
+            self.on = code == 0xAF
+        elif code in (0xC0, 0xC8):
+            self._flipped_rows = code == 0xC8
+        elif code == 0x81:
+            self.contrast = argument
+        elif code == 0xA8:
+            self._mux = argument & 0x3F
+        elif code == 0xD3:
+            self._offset = argument & 0x3F
+        elif code in (0xD5, 0xD9, 0xDA, 0xDB, 0xE3):
+            pass
+        elif not (self._of_ssd1306(command) if self.kind == "ssd1306" else self._of_sh1106(command)):
+            self.unknown += 1
+
+    def _of_ssd1306(self, command):
+        code = command[0]
+        if code == 0x8D:  # the charge pump takes effect with the next switching on
+            self.pumped = bool(command[1] & 0x04)
+        elif code == 0x20:
+            self._mode = command[1] & 3
+        elif code == 0x21:
+            self._column = self._window[0] = command[1] & 0x7F
+            self._window[1] = command[2] & 0x7F
+        elif code == 0x22:
+            self._page = self._window[2] = command[1] & 7
+            self._window[3] = command[2] & 7
+        else:
+            return code in (0x26, 0x27, 0x29, 0x2A, 0x2E, 0x2F, 0xA3)
+        return True
+
+    def _of_sh1106(self, command):
+        if command[0] == 0xAD:  # its DC-DC converter
+            self.pumped = bool(command[1] & 1)
+            return True
+        return 0x30 <= command[0] < 0x34 or command[0] in (0xE0, 0xEE)

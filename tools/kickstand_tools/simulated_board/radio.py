@@ -1,0 +1,143 @@
+"""The board's Bluetooth LE radio, and one phone that may be connected to it. Plain Python, on the board's clock.
+
+A phone is anything with heard(handle, data) and dropped(). It comes and goes by connect() and disconnect(), and uses
+write(), read() and give_pin().
+"""
+
+from .clock import to_us
+
+EVENT_S = 0.03  # between two connection events, in which what waits is sent
+ROOM = 12  # notifications that NimBLE keeps on an ESP32; btstack on a Pico W keeps as many as come
+
+CONNECTED, DISCONNECTED, WRITTEN, GET_SECRET, SET_SECRET, PASSKEY = 1, 2, 3, 29, 30, 31
+READ, WRITE, NOTIFY = 0x02, 0x08, 0x10
+READ_PAIRED, WRITE_PAIRED = 0x0600, 0x3000
+_DISPLAY = 3
+_BOND = 2  # the kind of secret
+
+
+class Radio:
+    """pairs: its MicroPython can ask for a PIN, as on an ESP32; then it has little room for notifications too.
+
+    found, named: what it advertises while it does, else None. services: [(uuid, [(uuid, flags, handle), ...]), ...].
+    values: {handle: bytes}. phone: that which is connected, or None. away: the phone is out of reach, for now.
+    fails: active(True) raises OSError."""
+
+    def __init__(self, clock, pairs=False, address=b"\x28\xcd\xc1\x0a\x1a\x2b"):
+        self._clock = clock
+        self.pairs = pairs
+        self.address = address
+        self.fails = False
+        self.connections = 0
+        self.off()
+
+    def off(self):
+        """As after power-on."""
+        self.irq = None
+        self.active = False
+        self.config = {}
+        self.found = self.named = self.phone = None
+        self.services, self.values, self.flags = [], {}, {}
+        self._waiting = []
+        self._passkey = None
+        self.paired = self.away = False
+
+    # What the fake `bluetooth` does
+
+    def register(self, services):
+        """Give each characteristic its handle; return them by service."""
+        handle = 8
+        self.services = []
+        for uuid, characteristics in services:
+            made = []
+            for kind, flags in characteristics:
+                handle += 3
+                made.append((kind.value, flags, handle))
+                self.values[handle], self.flags[handle] = b"", flags
+            self.services.append((uuid.value, made))
+        return [[handle for _, _, handle in made] for _, made in self.services]
+
+    def notify(self, handle, data):
+        """Send it in the next connection event. False: there is no room."""
+        if self.pairs and len(self._waiting) >= ROOM:
+            return False
+        self._waiting.append((handle, data))
+        return True
+
+    def take_passkey(self, passkey):
+        """What gap_passkey() gives."""
+        self._passkey = passkey
+
+    def drop(self):
+        """End the connection from this side."""
+        phone = self.phone
+        self.disconnect()
+        phone.dropped()
+
+    def _event_later(self, connection):
+        def event():
+            if connection != self.connections or self.phone is None:
+                return
+            self._event_later(connection)
+            if not self.away:
+                self._send()
+
+        self._clock.at(self._clock.now_us + to_us(EVENT_S), event)
+
+    def _send(self):
+        waiting, self._waiting = self._waiting, []
+        for handle, data in waiting:
+            self.phone.heard(handle, data)
+
+    def _tell(self, event, *data):
+        return self.irq(event, data) if self.irq else None
+
+    # What a phone does
+
+    def connect(self, phone, address=b"\x01\x02\x03\x04\x05\x06"):
+        """False: it does not advertise. A phone that has paired before is known by its address."""
+        if self.found is None or self.phone is not None:
+            return False
+        self.found = self.named = None
+        self.phone, self.peer = phone, address
+        self.connections += 1
+        bonded = self.config.get("bond") and self._tell(GET_SECRET, _BOND, 0, address)
+        self.paired = bool(bonded)
+        self._event_later(self.connections)
+        self._tell(CONNECTED, 0, 0, address)
+        return True
+
+    def disconnect(self):
+        """The phone goes, or is gone."""
+        self.phone = None
+        self._waiting = []
+        self.paired = self.away = False
+        self._tell(DISCONNECTED, 0, 0, self.peer)
+
+    def give_pin(self, pin):
+        """Pair with what the rider typed into the phone. True: it was right."""
+        if not self.config.get("mitm"):
+            return False
+        self._tell(PASSKEY, 0, _DISPLAY, 0)
+        if pin == self._passkey:
+            self.pair()
+        return self.paired
+
+    def pair(self):
+        """The right PIN was given."""
+        self.paired = True
+        self._tell(SET_SECRET, _BOND, self.peer, b"\x00key")
+
+    def write(self, handle, data):
+        """False: only a phone that has paired may, or nobody may."""
+        flags = self.flags[handle]
+        if not flags & WRITE or (flags & WRITE_PAIRED and not self.paired):
+            return False
+        self.values[handle] = bytes(data[:20])  # as long a value as MicroPython keeps
+        self._tell(WRITTEN, 0, handle)
+        return True
+
+    def read(self, handle):
+        """The value, or None: only a phone that has paired may, or nobody may."""
+        flags = self.flags[handle]
+        return self.values[handle] if flags & READ and (self.paired or not flags & READ_PAIRED) else None
