@@ -68,12 +68,12 @@ def test_constant_part_slope_and_delay_are_parted():
     sigma = np.ones(len(t_s))
     one, late = 20.0 * np.sin(t_s), 20.0 * np.sin(t_s - 0.1)
     seen = agreement._difference((one, sigma), (1.03 * late - 1.5, sigma))
-    assert seen.constant_deg == pytest.approx(-1.5, abs=0.1)
+    assert seen is not None and seen.constant_deg == pytest.approx(-1.5, abs=0.1)
     assert seen.slope == pytest.approx(1.03, abs=0.005)
     assert seen.delay_s == pytest.approx(0.1, abs=0.01)
     assert seen.expected_deg == pytest.approx(np.sqrt(2.0))
     same = agreement._difference((one, sigma), (one, sigma))
-    assert (same.rms_deg, same.within_1) == (0.0, 1.0)
+    assert same is not None and (same.rms_deg, same.within_1) == (0.0, 1.0)
     assert agreement._difference((one[:500], sigma[:500]), (one[:500], sigma[:500])) is None
 
 

@@ -28,7 +28,7 @@ def open_display(board, hz=None, kind="auto"):
 
 def turns(board, display, count, after=lambda: None):
     """So many turns of the loop; return the longest, in us."""
-    from time import sleep_us, ticks_diff, ticks_ms, ticks_us
+    from time import sleep_us, ticks_diff, ticks_ms, ticks_us  # type: ignore[attr-defined]
 
     longest = 0
     for _ in range(count):
@@ -263,7 +263,7 @@ def test_plugging_a_thousand_times_takes_no_memory():
             turns(board, display, 3 + k % 30)
             if k % 100 == 50 and hasattr(gc, "mem_alloc"):
                 gc.collect()
-                used.append(gc.mem_alloc())
+                used.append(gc.mem_alloc())  # type: ignore[attr-defined]
         turns(board, display, 100)
         assert board.lcd.text()[0].strip() == str(count - 1)
         assert not used or used[-1] - used[1] < 4000, used

@@ -23,7 +23,8 @@ def rides():
 def in_vehicle(made):
     """Force (g) and rates (deg/s) of the ride while it rides."""
     riding = made.truth["speed_mps"] > 5.0
-    return tuple((made.readings[:, part] @ made.vehicle_from_sensor.T)[riding] for part in (slice(3), slice(4, 7)))
+    turned = made.vehicle_from_sensor.T
+    return (made.readings[:, :3] @ turned)[riding], (made.readings[:, 4:7] @ turned)[riding]
 
 
 def test_each_class_is_twice_as_rough_as_the_one_before(rides):

@@ -171,7 +171,7 @@ def _device(chance, mount, force, rates, v, engine, turns):
         for scale, cross in ((0.03, 0.02), (0.004, 0.01))
     )
     rate_hz = FINE_HZ / step
-    middle = (np.arange(count) + 0.5) / rate_hz
+    middle = np.asarray((np.arange(count) + 0.5) / rate_hz, dtype=np.float64)
     drift = np.cumsum(chance.standard_normal((count, 3)), axis=0) * 0.004 / np.sqrt(rate_hz)
     rates = rates @ gyro.T + chance.uniform(-0.3, 0.3, 3) + drift
     force = force @ accel.T + chance.normal(0.0, 0.002, 3)
@@ -190,7 +190,7 @@ def _device(chance, mount, force, rates, v, engine, turns):
 def _road(chance, v, wheelbase, roughness):
     """Height (m) of the chassis over each wheel: waves of the road by ISO 8608, met at v, through tyre and spring."""
     at = np.cumsum(v) / FINE_HZ
-    edges = np.exp(np.linspace(*np.log(WAVES_PER_M), 241))
+    edges = np.geomspace(WAVES_PER_M[0], WAVES_PER_M[1], 241)
     waves = np.sqrt(edges[1:] * edges[:-1]) * np.exp(chance.normal(0.0, 0.003, 240))
     sizes = np.sqrt(2.0 * roughness * (0.1 / waves) ** 2 * np.diff(edges))
     phases = chance.uniform(0.0, 2.0 * np.pi, len(waves))

@@ -117,6 +117,7 @@ class Device:
     def meter(self):
         """What the lean meter knows: lean_deg, None where it would not be shown, and forward_g, both None before the
         alignment. None without a meter."""
+        raise NotImplementedError
 
     def _display(self):
         """display(), but while an OLED gets a new picture its text stays that of the old one."""
