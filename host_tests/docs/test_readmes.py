@@ -66,7 +66,7 @@ def test_how_right_it_is_stands_in_both_places_alike():
     whole = [[row[1], row[3], row[4], row[6]] for row in rows[1:]]
     assert "complementary" in heads[5]
     section = text_of(FIRST).partition("## How right it is")[2]
-    shown = [line.strip("|").split("|")[1:] for line in section.splitlines() if "**" in line]
+    shown = [line.strip("|").split("|")[1:] for line in section.splitlines() if line.startswith("|") and "**" in line]
     assert [[cell.strip() for cell in row] for row in shown] == whole
 
 
