@@ -1,7 +1,7 @@
 """Prints the lean of the bike, ten times a second: the lean meter's mathematics in a program of your own.
 
 The firmware must be on the board (`kickstand flash`), and the bike aligned with it once. Then, on your computer,
-`mpremote run firmware/examples/print_lean.py`, and you see the lean, positive to the right, and the acceleration along the bike:
+`mpremote run firmware/examples/print_lean.py` shows the lean, positive to the right, and the forward acceleration:
 
     lean  +23.4 deg   forward -0.12 g     or, while the lean is not to be trusted, "not sure yet"
 

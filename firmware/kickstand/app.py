@@ -23,12 +23,13 @@ from .ui.screen import Screen
 
 LOOP_US = 10_000  # the chip's FIFO keeps the samples meanwhile, and much longer
 COLLECT_TURNS = 42  # turns between two garbage collections: they use 90 KB of heap, of 120 free while recording
-COLLECT_TURNS_DRIVING = 25  # the same while aligning by driving and with an OLED: 85 KB of heap are free
+COLLECT_TURNS_DRIVING = 25  # the same while aligning by driving, with an OLED, a phone or user.py: 85 KB are free
 SINGLE_GAPS = 300  # single free heap blocks that a collection leaves
 PAGE_MS = 100
 # A page shows no lean if its own delay and the age of the readings still in the FIFO add up to more: so a lean on the
-# display is at most half a second old
+# display is at most half a second old. A display that draws takes DRAWING_MS until the picture is there.
 LATE_MS = 400
+DRAWING_MS = 200
 FIRST_PAGE_MS = 60  # time from the start of the sensor to the first page: the lean filter's first window is over then
 
 
@@ -135,7 +136,7 @@ class App:
                 due_us = ticks_us()
 
     def _turns_to_collect(self):
-        few = self.drive or self.lcd.draws
+        few = self.drive or self.lcd.draws or self.live or self.user
         return port.turns_to_collect(COLLECT_TURNS_DRIVING if few else COLLECT_TURNS)
 
     def turn(self):
@@ -190,14 +191,14 @@ class App:
         step of preparing a recording while the menu is open, and, at standstill only, saving the roll-misalignment
         correction."""
         waiting_ms = 1000 * self.sensor.chip.frames_left // self.settings.SAMPLE_HZ
-        self.screen.pages.late = ticks_diff(now_ms, self._page_ms) + waiting_ms > LATE_MS
+        self.screen.pages.late = ticks_diff(now_ms, self._page_ms) + waiting_ms > LATE_MS - DRAWING_MS * self.lcd.draws
         self.screen.pages.draws = self.lcd.draws
         self._page_ms = ticks_add(now_ms, PAGE_MS)
         if self.screen.menu:  # a recording that is started there should begin at once
             self.rides.prepare()
         problem = self.rides.recorder.take_problem() or (self.drive and self.drive.speed.take_problem())
         if self.user:
-            self.user.lean(self.sensor.fault is None and self.screen.pages.trusted)
+            self.user.lean(self.settings.leans and self.sensor.fault is None and self.screen.pages.trusted)
             problem = problem or self.user.take_problem()
         if problem:
             self.screen.notify(problem, now_ms)

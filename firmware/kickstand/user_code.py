@@ -7,7 +7,8 @@ page(app), page_battery(app) ...    for a page, while it is shown: two lines of 
 on_lean(lean_deg, trusted, meter)   ten times a second. trusted: False while the lean must not be used
 on_press(event)                     after each press: board.button.SHORT or LONG
 
-A function that raises, or that takes longer than TOO_SLOW_MS, is left out from then on; display and console say so.
+A function that raises, that takes longer than TOO_SLOW_MS, or longer than SLOW_MS for MOST_SLOW times in a row, is left
+out from then on; display and console say so.
 Imported only where there is a user.py.
 """
 
@@ -19,6 +20,7 @@ from .errors import Notice, report
 
 SLOW_MS = 50  # is reported once
 TOO_SLOW_MS = 300  # the sensor keeps its samples for no longer
+MOST_SLOW = 5  # calls in a row that take longer than SLOW_MS: the loop would never catch up with the samples
 LEAST_FREE = 20_000  # bytes of heap: below, the lean meter's own work would fail next
 _CALLED = ("setup", "on_lean", "on_press")
 
@@ -29,14 +31,15 @@ class UserCode:
     def __init__(self, app):
         self._app = app
         self._functions = {"import": __import__}
-        self._slow = set()
+        self._slow = {}  # how often in a row a function has been slow, once it has been
         self._problems = []
         self._drawn = self._draw  # always the same object: a picture that has not changed is known by it
         sys.modules.pop("user", None)
         module = self._call("import", "user")
         for name in dir(module) if module else ():
-            if name in _CALLED or name.startswith("page"):
-                self._functions[name] = getattr(module, name)
+            function = getattr(module, name)
+            if (name in _CALLED or name.startswith("page")) and callable(function):
+                self._functions[name] = function
         pages = sorted([name for name in self._functions if name.startswith("page")])
         self.pages = [lambda name=name: self._page(name) for name in pages]
         self._call("setup", app)
@@ -73,11 +76,17 @@ class UserCode:
             sys.print_exception(error)
             return self._leave_out(name, type(error).__name__)
         took_ms = ticks_diff(ticks_ms(), begun_ms)
-        if took_ms > SLOW_MS and name not in self._slow and name not in ("import", "setup"):
-            if took_ms > TOO_SLOW_MS:
-                return self._leave_out(name, "%d ms" % took_ms)
-            self._slow.add(name)
+        if name in ("import", "setup"):
+            return result
+        if took_ms <= SLOW_MS:
+            if name in self._slow:
+                self._slow[name] = 0
+            return result
+        if name not in self._slow:
             self._report(Notice("user-slow", name, took_ms))
+        self._slow[name] = self._slow.get(name, 0) + 1
+        if took_ms > TOO_SLOW_MS or self._slow[name] >= MOST_SLOW:
+            return self._leave_out(name, "%d ms" % took_ms)
         return result
 
     def _leave_out(self, name, why):
@@ -101,8 +110,8 @@ class UserCode:
             return "user.py " + name, "left out"
         try:
             line1, line2 = [line if isinstance(line, (str, bytes, bytearray)) else str(line) for line in shown[:2]]
-            return (line1, line2) + ((self._drawn, name) + tuple(shown[2]) if len(shown) > 2 else None,)
-        except (TypeError, ValueError):
+            return (line1, line2) + ((self._drawn, name) + tuple(shown[2]) if len(shown) > 2 and shown[2] else None,)
+        except Exception:  # whatever its __str__ or __getitem__ raises
             self._leave_out(name, "not two lines")
             return "user.py " + name, "not two lines"
 

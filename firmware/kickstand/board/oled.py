@@ -100,7 +100,7 @@ class Oled:
 
     def show(self, line1, line2, picture=None):
         """Without a picture: the lines, in letters of twice their height. Codes as of an HD44780, see hd44780.py."""
-        wanted = picture or (line1, line2 if isinstance(line2, str) else bytes(line2))
+        wanted = picture or tuple([line if isinstance(line, str) else bytes(line) for line in (line1, line2)])
         if wanted != self._wanted:
             self._wanted = wanted
 

@@ -56,6 +56,8 @@ class Live:
 
     def _ask(self):
         """The phone has asked for other packets. Start anew, for no mean may span a time without them."""
+        self._due_ms = ticks_ms()
+        self._dues[:] = (self._due_ms,) * 4
         self.period_ms = min([ms for ms in self._intervals if ms] or [0])
         self._clear()
 
@@ -77,8 +79,9 @@ class Live:
         if radio.changed:
             self._begin()
             self._look_ms = now_ms
-        while radio.inbox:
-            self._hear(*radio.inbox.pop(0))
+        inbox = radio.inbox  # the interrupt may put another list in its place meanwhile
+        while inbox:
+            self._hear(*inbox.pop(0))
         if self.period_ms and ticks_diff(now_ms, self._due_ms) >= 0:
             self._send(now_ms)
         if ticks_diff(now_ms, self._look_ms) >= 0:

@@ -40,20 +40,21 @@ class Radio:
         self._ble = ble = BLE()
         self._pin = pin
         self._bonds = None
-        if pin is not None:
-            if not hasattr(ble, "gap_passkey"):
-                raise LiveError("no-pairing")
-            from .bonds import Bonds
-
-            self._bonds = Bonds(pin)
+        if pin is not None and not hasattr(ble, "gap_passkey"):
+            raise LiveError("no-pairing")
         self.phone, self.changed, self.inbox = None, True, []
         try:
+            if pin is not None:
+                from .bonds import Bonds
+
+                self._bonds = Bonds(pin)
             ble.irq(self._irq)
             if pin is not None:
                 ble.config(bond=True, mitm=True, le_secure=True, io=_DISPLAY_ONLY)
             ble.active(True)
             self._register(UUID)
         except (OSError, MemoryError) as error:
+            self.stop()
             raise LiveError("radio-fault", str(error))
 
     def _register(self, uuid):
@@ -78,8 +79,8 @@ class Radio:
                 self.inbox.append((data[1], self._ble.gatts_read(data[1])))
         elif event == _CONNECTED or event == _DISCONNECTED:
             self.phone = data[0] if event == _CONNECTED else None
+            self.changed = True  # before anything that may find no memory
             self.inbox = []
-            self.changed = True
         elif event == _PASSKEY:
             getattr(self._ble, "gap_passkey")(data[0], data[1], self._pin)  # noqa: B009 the stubs of rp2 know it not
         elif self._bonds and event == _GET_SECRET:
@@ -118,5 +119,6 @@ class Radio:
         try:
             function(*arguments, **named)
             return True
-        except (OSError, TypeError):  # TypeError: the phone went between two steps of the loop, and its handle is None
+        except (OSError, MemoryError, TypeError):
+            # MemoryError: the port keeps what the phone does not take. TypeError: the phone has just gone, handle None
             return False
