@@ -77,6 +77,7 @@ def test_its_pages_are_behind_the_others_and_before_alignment_in_the_menu(run):
         ("def on_lean(*a):\n    raise SystemExit", "user.py on_lean", "on_lean is left out: SystemExit"),
         ("import time\ndef on_lean(*a):\n    time.sleep_ms(1000)", "user.py on_lean", "on_lean is left out: 10"),
         ("import time\ndef on_lean(*a):\n    time.sleep_ms(60)", "user.py on_lean", "on_lean took 6"),
+        ("import time\ndef on_lean(*a):\n    time.sleep_ms(60)", "user.py on_lean", "on_lean is left out: 6"),
         ("def on_lean(*a):\n    raise MemoryError", "user.py left out", "it leaves too little memory (on_lean)"),
     ],
 )
@@ -84,6 +85,13 @@ def test_what_goes_wrong_is_said_once_and_the_lean_goes_on(run, source, shown, s
     record = run(source)
     assert record.first(shown) < 12
     assert record.console.count(said) == 1, record.console
+    assert goes_on(record)
+
+
+def test_one_that_is_slow_now_and_then_stays_and_a_number_is_no_page(run):
+    source = "import time\npage_number = 3\ncalls = []\ndef on_lean(*a):\n    calls.append(0)\n"
+    record = run(source + "    if len(calls) % 20 == 0:\n        time.sleep_ms(60)")
+    assert record.console.count("on_lean took 6") == 1 and "on_lean is left out" not in record.console
     assert goes_on(record)
 
 

@@ -128,6 +128,13 @@ def test_phones_in_turn(run):
     assert record.at(25.0)[1].split() == ["20", "packets/s"]
 
 
+def test_a_slow_pace_ends_with_the_phone_that_asked_for_it(run):
+    slow = [[22.0, "connect", 1], [22.1, "write", "filter", [1, 0xEA, 0x60]], [26.0, "leave"]]
+    quick = [[28.0, "connect", 2], [28.1, "write", "rate", [40, 0]]]
+    _, two = run({**devices.ALIGNED, **LIVE, "phones": [slow, quick], "until": 34}).phones
+    assert len(of(two, "now", until=33)) > 100
+
+
 def test_out_of_reach_the_loop_goes_on(run):
     """The queue of an ESP32 is full then, which costs packets and nothing else."""
     acts = ASK + [[25.0, "away", True], [29.0, "away", False]]
