@@ -55,12 +55,13 @@ def report(refusal):
 def attempt(function, *arguments):
     """Call function, which may import modules for the first time. Return None, or a Notice if there is no memory or the
     firmware is incomplete. The modules that it began to import are then removed: MicroPython would keep half of one."""
-    before = tuple(sys.modules)
+    before = None
     try:
+        before = tuple(sys.modules)
         function(*arguments)
         return None
     except (ImportError, MemoryError) as error:
-        for name in [name for name in sys.modules if name not in before]:
+        for name in [name for name in sys.modules if name not in before] if before else ():
             del sys.modules[name]
         gc.collect()
         problem = Notice("incomplete" if isinstance(error, ImportError) else "no-memory", str(error))

@@ -74,6 +74,7 @@ def main():
 
 def run(chosen, lcd):
     """Run the app. An exception in it is reported on display and console, then the board restarts."""
+    radio = None
     try:
         if chosen.LIVE:  # first: an ESP32-C3 may crash in switching its radio on once 40 KB are allocated
             from .live.radio import open_radio

@@ -30,7 +30,8 @@ class UserCode:
 
     def __init__(self, app):
         self._app = app
-        self._functions = {"import": __import__}
+        self._functions = {}
+        self._functions["import"] = __import__
         self._slow = {}  # how often in a row a function has been slow, once it has been
         self._problems = []
         self._drawn = self._draw  # always the same object: a picture that has not changed is known by it

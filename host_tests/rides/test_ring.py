@@ -16,7 +16,7 @@ def test_a_part_has_16_blocks_in_flash_and_256_on_a_card(settings, blocks, root)
     root.free = root.all = 2000 * KB_4
     ring = RideRing(settings)
     assert ring.stops_interrupts is (settings is FLASH)
-    assert ring.needed == (40 + blocks + 2) * KB_4
+    assert ring.needed == flash_ring.RESERVE + (blocks + 2) * KB_4
     ring.begin()
     lengths = []
     for _ in range(2 * blocks + 1):
@@ -29,7 +29,8 @@ def test_a_part_has_16_blocks_in_flash_and_256_on_a_card(settings, blocks, root)
 
 
 def test_room_is_made_exactly_when_a_part_does_not_fit(root):
-    for free, steps in ((58 * KB_4, 1), (58 * KB_4 - 1, 3)):
+    needed = flash_ring.RESERVE + 18 * KB_4
+    for free, steps in ((needed, 1), (needed - 1, 3)):
         old = old_ride(root, 1)
         root.free = free
         ring = RideRing(FLASH)
@@ -40,7 +41,7 @@ def test_room_is_made_exactly_when_a_part_does_not_fit(root):
 
 
 def test_its_own_first_parts_go_last_and_then_there_is_no_room(root):
-    root.free = 58 * KB_4
+    root.free = flash_ring.RESERVE + 18 * KB_4
     old_ride(root, 1)
     ring = RideRing(FLASH)
     assert ring.begin() == 2
@@ -49,7 +50,7 @@ def test_its_own_first_parts_go_last_and_then_there_is_no_room(root):
     assert sorted(ride_paths.parts("rides")) == [(1, 0, KB_4), (2, 0, 16 * KB_4)]
     rooms = [ring.room()]
     while not ring.ready():
-        root.free = 43 * KB_4
+        root.free = flash_ring.RESERVE + 3 * KB_4
         rooms.append(ring.room())
     # ride 1 is found, its part is removed, its directory too, ride 2 is found, its part is removed, the next is opened
     assert [room > 0 for room in rooms] == [True] * 5 + [False] * 2

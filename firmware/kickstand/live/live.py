@@ -35,7 +35,7 @@ class Live:
         self._app = app
         self._leans = leans
         self._intervals = [0] * 4
-        self._dues = [0] * 4
+        self._dues = [ticks_ms()] * 4
         self._sums, self._n = [0] * 7, 0
         self._scaled = array("i", [0] * 7)
         self._force, self._rate = [0.0] * 3, [0.0] * 3
@@ -57,7 +57,8 @@ class Live:
     def _ask(self):
         """The phone has asked for other packets. Start anew, for no mean may span a time without them."""
         self._due_ms = ticks_ms()
-        self._dues[:] = (self._due_ms,) * 4
+        for i in range(4):
+            self._dues[i] = self._due_ms
         self.period_ms = min([ms for ms in self._intervals if ms] or [0])
         self._clear()
 

@@ -28,7 +28,7 @@ class PageRing:
         self._at = 0
         self.late = self.draws = False
         self.live = None
-        self.own = ()
+        self.own = []
         self._own_at = None  # index of the owner's page that is shown
 
     def show_own(self, now_ms):

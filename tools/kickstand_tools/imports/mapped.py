@@ -120,7 +120,8 @@ def _by_size(
         return ""
     try:
         sheet = read_sheet(file, header)
-        sizes = np.sqrt(sum(sheet.numbers(sheet.columns.index(found[axis])) ** 2 for axis in axes))
+        with np.errstate(over="ignore"):
+            sizes = np.sqrt(sum(sheet.numbers(sheet.columns.index(found[axis])) ** 2 for axis in axes))
     except (InputError, ValueError):
         return ""
     sizes = sizes[np.isfinite(sizes)]
