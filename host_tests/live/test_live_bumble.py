@@ -22,6 +22,8 @@ def on_air(tmp_path, monkeypatch, capsys):
     """run(until_s, [(at_s, visit, pin)], **config): the Centrals and the device's Record."""
     monkeypatch.chdir(tmp_path)
     made = []
+    browsers = asyncio._get_running_loop()  # playwright's, where this process has tested a page before: it rests
+    asyncio._set_running_loop(None)
 
     def run(until_s, visits, machine="pico w", **config):
         world, _ = _world(devices.ALIGNED)
@@ -37,6 +39,7 @@ def on_air(tmp_path, monkeypatch, capsys):
     yield run
     for air in made:
         air.close()
+    asyncio._set_running_loop(browsers)
 
 
 async def ask_racechrono(central):
