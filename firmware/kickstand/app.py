@@ -27,7 +27,7 @@ COLLECT_TURNS_DRIVING = 25  # the same while aligning by driving, with an OLED, 
 SINGLE_GAPS = 300  # single free heap blocks that a collection leaves
 PAGE_MS = 100
 # A page shows no lean if its own delay and the age of the readings still in the FIFO add up to more: so a lean on the
-# display is at most half a second old. A display that draws takes DRAWING_MS until the picture is there.
+# display is at most half a second old. A display that draws needs about DRAWING_MS more to send a picture (estimated).
 LATE_MS = 400
 DRAWING_MS = 200
 FIRST_PAGE_MS = 60  # time from the start of the sensor to the first page: the lean filter's first window is over then

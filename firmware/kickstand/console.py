@@ -17,7 +17,7 @@ no-memory|no memory for that ({0}): restart the board
 no-driver|SD card: its driver is not on the board: mpremote mip install sdcard
 no-card|SD card: none that can be used ({0}): check wiring and card, which has to be FAT32; then restart the board
 user-failed|user.py: {0} is left out: {1}
-user-slow|user.py: {0} took {1} ms: samples are lost when it takes 300, and then it is left out
+user-slow|user.py: {0} took {1} ms: make it shorter; over 300 ms, or 5 times over 50 ms in a row, it is left out
 user-memory|user.py is left out: it leaves too little memory ({0})
 unreadable|config.py cannot be read ({1}{2}): correct it, then kickstand flash --config
 not-allowed|config.py: {0} = {1!r}, but it must be {2}

@@ -11,7 +11,7 @@ ROOT = Path(__file__).resolve().parents[2]
 FIRST, DEVICE, TOOLS, CONTRIBUTING = (
     ROOT / name for name in ("README.md", "firmware/README.md", "tools/README.md", ".github/CONTRIBUTING.md")
 )
-PAGES = [FIRST, DEVICE, TOOLS, CONTRIBUTING, ROOT / "FAQ.md", ROOT / "CHANGELOG.md"]
+PAGES = [FIRST, DEVICE, TOOLS, CONTRIBUTING, ROOT / "firmware/FAQ.md", ROOT / "CHANGELOG.md"]
 OF_THE_REPOSITORY = "../../"  # in PAGES of its root: issues, releases, the site, wherever it is hosted
 LINK = re.compile(r'\]\(([^)\s]+)\)|src="([^"]+)"')
 

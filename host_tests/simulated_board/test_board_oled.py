@@ -45,7 +45,7 @@ def test_it_comes_up_dark_with_anything_in_its_ram():
         assert not oled.backlight  # without its charge pump
 
 
-def test_the_low_half_of_the_status_tells_them_apart():
+def test_the_low_half_of_the_status_distinguishes_them():
     assert [Oled(Clock(), kind=kind).read_byte() & 0x0F for kind in KINDS] == [3, 8]
 
 

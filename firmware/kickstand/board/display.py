@@ -1,4 +1,4 @@
-"""The display: finds it on the bus, and takes the driver that belongs to what it is.
+"""Finds the display on the bus, and loads the driver for its kind.
 
     display = Display(lambda hz: machine.I2C(1, sda=machine.Pin(6), scl=machine.Pin(7), freq=hz))
     display.show("Hello", "world")
@@ -6,7 +6,7 @@
         display.tick(time.ticks_ms())  # one step of the work
         time.sleep_ms(10)
 
-A driver (hd44780.Lcd, oled.Oled) has these, and host_tests/displays holds each one to them:
+A driver (hd44780.Lcd, oled.Oled) has these; host_tests/simulated_board/test_board_display.py tests each driver:
 
 begin(i2c, address, hz, fresh)  takes a display that has just answered. fresh: it may just have got its power.
 show(line1, line2, picture)     notes what to show. 16 characters a line, a str of codes below 256 or bytes.
@@ -26,11 +26,11 @@ from ..errors import attempt
 OLED_ADDRESSES = (0x3C, 0x3D)
 ADDRESSES = (0x27, 0x3F) + OLED_ADDRESSES  # the backpack's PCF8574 and PCF8574A with all jumpers open
 _FAMILY = tuple(range(0x20, 0x27)) + tuple(range(0x38, 0x3C)) + (0x3E,)  # a backpack's other addresses
-LCD_HZ, OLED_HZ = 100_000, 400_000  # what a PCF8574 and the OLEDs allow
+LCD_HZ, OLED_HZ = 100_000, 400_000  # the fastest clocks that a PCF8574 and the OLEDs allow
 KINDS = ("auto", "lcd", "ssd1306", "sh1106")
-PROBE_MS = 200  # how often to see whether a display is there
+PROBE_MS = 200  # time between two searches for a display, while there is none
 REOPEN_PROBES = 5  # while there is no display the bus is freed once in so many probes
-POWER_UP_MS = 40  # after power-up the display got its power with the board
+POWER_UP_MS = 40  # a display that is found sooner after power-on may have got its power with the board
 FLUSH_STEPS = 60
 STEP_MS = 5
 
@@ -55,7 +55,7 @@ class Display:
         self._status = bytearray(1)
         self.address = None
         self.draws = False
-        self._probes = 0  # in a row that found nothing
+        self._probes = 0  # successive probes that found nothing
         self._probed_ms = None
         self._fresh = ticks_ms() < POWER_UP_MS
 

@@ -9,11 +9,11 @@ from time import ticks_add, ticks_diff, ticks_ms
 import framebuf
 
 WIDTH, HEIGHT = 128, 64
-# The picture is sent in parts of so many columns of a page, each if it has changed: mostly those of a digit. A part
-# takes 0.9 ms at 400 kHz, 3.5 ms at 100 kHz; so many are sent in a turn.
+# The picture is sent in parts of _PART columns of a page, each only if it has changed. A part takes 0.9 ms at 400 kHz,
+# 3.5 ms at 100 kHz; _PARTS of them are sent in one pass of the loop, _PARTS_SLOW on a bus slower than _SLOW_HZ.
 _PART = 32
 _PARTS, _PARTS_SLOW, _SLOW_HZ = 3, 2, 200_000
-PROBE_MS = 200  # how often to see whether it has kept its power
+PROBE_MS = 200  # time between two checks whether it has kept its power
 REFRESH_MS = 10_000  # send everything again so often: nothing else repairs what noise has changed
 _POWER_UP_MS = 40
 _OFF = 0x40  # bit of the status
@@ -117,14 +117,14 @@ class Oled:
             self._seen_ms = self._refresh_ms = now_ms
         elif self._lit and ticks_diff(now_ms, self._seen_ms) >= PROBE_MS:
             self._seen_ms = now_ms
-            if self._state() & _OFF and self._tells:  # it has lost its power
+            if self._state() & _OFF and self._reports_off:  # it has lost its power
                 self._restart()
         elif self._changed:
             self._send()
         elif not self._lit:
             self._command(b"\x00\xaf")
             self._lit = True
-            self._tells = not self._state() & _OFF  # some never tell
+            self._reports_off = not self._state() & _OFF  # some clones never report it
         elif ticks_diff(now_ms, self._refresh_ms) >= REFRESH_MS:
             self._refresh_ms = now_ms
             self._refreshes += 1

@@ -24,7 +24,10 @@ class Device(ABC):
     """Has no power until power_on(); `with` switches it on, and off at the end. Times are emulated seconds; they
     continue through resets and power cycles.
 
-    NAME: of the board.  FLASH: where its file system is.  MPY: what it takes, see bytecode.py.
+    Made with world: as for simulator.Board, level and at rest if None.  files: what its flash holds, see
+    flash_image.py.  fitted: as for EmulatedBoard.
+
+    NAME: of the board.  FLASH: where its file system is.  MPY: the bytecode it takes, see bytecode.py.
     """
 
     NAME: str

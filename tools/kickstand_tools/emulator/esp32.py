@@ -55,11 +55,7 @@ class Stopped(Exception):
 
 
 class Esp32(Device):
-    """See Device.
-
-    world: as for simulator.Board; level and at rest if None.  files: what its flash holds, see flash_image.py.
-    fitted: as for EmulatedBoard.
-    """
+    """See Device."""
 
     NAME, FLASH, MPY = "ESP32", flash_image.ESP32, bytecode.ESP32
 

@@ -17,11 +17,7 @@ from .i2c_wires import Wires
 
 
 class Pico(Device):
-    """See Device.
-
-    world: as for simulator.Board; level and at rest if None.  files: what its flash holds, see flash_image.py.
-    fitted: as for EmulatedBoard.
-    """
+    """See Device."""
 
     NAME, FLASH, MPY = "Pico", flash_image.PICO, bytecode.PICO
 

@@ -62,7 +62,7 @@ def site_files() -> dict[str, bytes]:
 
 
 def home() -> str:
-    """The address of the project, "" where what is installed does not know it: see hatch_build.py."""
+    """The address of the project, "" where what is installed does not know it: see tools/hatch_build.py."""
     try:
         named = metadata.metadata("kickstand").get_all("Project-URL") or []
     except metadata.PackageNotFoundError:
