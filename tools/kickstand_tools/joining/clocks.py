@@ -103,7 +103,7 @@ def _rotation(a: Motion, b: Motion, later_s: float) -> Array:
 def _fitted(a: Motion, b: Motion, of_a: Array, of_b: Array, later_s: float) -> Clocks:
     """The Clocks by Gauss-Newton steps from a rough shift."""
     at_s, drift = a.t_s, 0.0
-    slope = np.gradient(of_b, STEP_S, axis=0)
+    derivative = np.gradient(of_b, STEP_S, axis=0)
     error = np.zeros(0)
     for k in range(_ROUNDS):
         on_b = (at_s - later_s) * (1.0 - drift)
@@ -111,16 +111,16 @@ def _fitted(a: Motion, b: Motion, of_a: Array, of_b: Array, later_s: float) -> C
         if np.count_nonzero(both) * STEP_S < _LEAST_S:
             raise InputError(f"they have less than {_LEAST_S:.0f} s of riding in common")
         when = at_s[both] - at_s[both].mean()
-        model, changes = (_at(b.t_s, values, on_b[both]) for values in (of_b, slope))
+        model, changes = (_at(b.t_s, values, on_b[both]) for values in (of_b, derivative))
         error = of_a[both] - model
         drifting = both.sum() * STEP_S > _DRIFTING_S and k > 0
         weight = 1.0 / (1.0 + np.sum(error**2, axis=1) / (4.0 * np.median(np.sum(error**2, axis=1)) + 1e-9))
         by_shift = -changes
         by_drift = -changes * when[:, None]
         normal = np.array([[_dot(p, q, weight) for q in (by_shift, by_drift)] for p in (by_shift, by_drift)])
-        pull = np.array([_dot(p, error, weight) for p in (by_shift, by_drift)])
+        gradient = np.array([_dot(p, error, weight) for p in (by_shift, by_drift)])
         normal[1, 1] += float(np.mean(weight @ error**2)) / len(error) / _USUAL_DRIFT**2
-        step = np.linalg.solve(normal, pull) if drifting else np.array([pull[0] / max(normal[0, 0], 1e-9), 0.0])
+        step = np.linalg.solve(normal, gradient) if drifting else np.array([gradient[0] / max(normal[0, 0], 1e-9), 0.0])
         step[0] = np.clip(step[0], -0.5, 0.5)
         # The shift in the middle of what is compared moves; that at the start follows
         drift, middle = drift + step[1], at_s[both].mean()

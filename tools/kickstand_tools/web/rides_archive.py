@@ -5,11 +5,11 @@ import io
 import tarfile
 from pathlib import Path
 
-import gpxpy
 import jinja2
 import markupsafe
 
 from .. import firmware_path
+from ..errors import InputError, extra
 from .zipped import tools, zipped
 
 _NUMPY = "lib/python3.12/site-packages/"  # in the package of conda
@@ -20,7 +20,11 @@ _LICENCES = "info/licenses/"
 
 def archive() -> bytes:
     """A ZIP file of packages to import: kickstand_tools, kickstand, gpxpy, jinja2 and markupsafe, the latter without
-    what is compiled: it has all of that in Python, too."""
+    its compiled module, which it also has in Python. Raises InputError without gpxpy."""
+    try:
+        import gpxpy
+    except ImportError as error:
+        raise InputError("the page Rides needs gpxpy: " + extra("web")) from error
     found = tools("web/rides_guest.py")
     for package in (firmware_path.PACKAGE, *(Path(one.__path__[0]) for one in (gpxpy, jinja2, markupsafe))):
         found |= {path.relative_to(package.parent).as_posix(): path for path in package.rglob("*.py")}

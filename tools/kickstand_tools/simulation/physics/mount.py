@@ -1,4 +1,4 @@
-"""Mounts and loggers as they are: a holder that sings, a logger that aliases, readings that clip, a sensor that warms.
+"""Mounts and loggers as they are: a resonating holder, a logger that aliases, readings that clip, a sensor that warms.
 
 Each is drawn at random within what such devices have.
 """

