@@ -66,10 +66,7 @@ def time_unit(cells: Cells, given: str = "") -> str:
 
 def of_seconds(seconds: NDArray[np.float64]) -> Nanoseconds:
     """Seconds (n) as ns; NO_TIME for what is no number."""
-    good = np.abs(seconds) < _LATEST_NS * 1e-9
-    whole = np.floor(np.where(good, seconds, 0.0))
-    part = np.where(good, seconds, 0.0) - whole
-    return np.where(good, whole.astype(np.int64) * 10**9 + np.rint(part * 1e9).astype(np.int64), NO_TIME)
+    return _scaled(seconds, TIMES["s"])
 
 
 def of_day(clock: NDArray[np.float64]) -> Nanoseconds:
@@ -94,6 +91,10 @@ def _of_numbers(values: NDArray[Any], unit_name: str, where: str) -> Nanoseconds
     if values.dtype.kind in "iu":
         good = np.abs(values.astype(float)) < _LATEST_NS / scale
         return np.where(good, values.astype(np.int64) * scale, NO_TIME)
+    return _scaled(values, scale)
+
+
+def _scaled(values: NDArray[np.float64], scale: int) -> Nanoseconds:
     good = np.abs(values) < _LATEST_NS / scale
     whole = np.floor(np.where(good, values, 0.0))
     part = np.where(good, values, 0.0) - whole

@@ -12,39 +12,23 @@ RATES = {"deg/s": 1.0, "rad/s": math.degrees(1.0), "mdeg/s": 1e-3}
 SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704, "knots": 1852.0 / 3600.0}
 TIMES = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "ns": 1}  # in ns
 ANGLES = {"deg": 1.0, "min": 1.0 / 60.0}
-_SAME = {
-    "m/s/s": "m/s2",
-    "m/sec2": "m/s2",
-    "mps2": "m/s2",
-    "ms2": "m/s2",
-    "gs": "g",
-    "dps": "deg/s",
-    "°/s": "deg/s",
-    "deg/sec": "deg/s",
-    "degrees/s": "deg/s",
-    "mdps": "mdeg/s",
-    "radians/s": "rad/s",
-    "rad/sec": "rad/s",
-    "rps": "rad/s",
-    "rads": "rad/s",
-    "kmh": "km/h",
-    "kph": "km/h",
-    "km/hr": "km/h",
-    "mps": "m/s",
-    "mi/h": "mph",
-    "knot": "knots",
-    "kn": "knots",
-    "kt": "knots",
-    "kts": "knots",
-    "sec": "s",
-    "seconds": "s",
-    "msec": "ms",
-    "µs": "us",
-    "μs": "us",
-    "°": "deg",
-    "degrees": "deg",
-    "minutes": "min",
+_SPELLINGS = {
+    "m/s2": "m/s/s m/sec2 mps2 ms2",
+    "g": "gs",
+    "deg/s": "dps °/s deg/sec degrees/s",
+    "mdeg/s": "mdps",
+    "rad/s": "radians/s rad/sec rps rads",
+    "km/h": "kmh kph km/hr",
+    "m/s": "mps",
+    "mph": "mi/h",
+    "knots": "knot kn kt kts",
+    "s": "sec seconds",
+    "ms": "msec",
+    "us": "µs μs",
+    "deg": "° degrees",
+    "min": "minutes",
 }
+_SAME = {other: name for name, others in _SPELLINGS.items() for other in others.split()}
 
 
 def unit(text: str) -> str:

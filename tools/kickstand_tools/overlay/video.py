@@ -69,14 +69,7 @@ def open_video(path: Path) -> Video:
     if turned and round(float(turned[1])) % 180 == 90:
         width, height = height, width
     telemetry = re.search(r"Stream #0:(\d+)[^\n]*\(gpmd", said)
-    return Video(
-        path,
-        width,
-        height,
-        fps,
-        int(pictures[-1]) / fps,
-        int(telemetry[1]) if telemetry else None,
-    )
+    return Video(path, width, height, fps, int(pictures[-1]) / fps, int(telemetry[1]) if telemetry else None)
 
 
 def packets(video: Video, stream: int) -> list[tuple[float, float, bytes]]:

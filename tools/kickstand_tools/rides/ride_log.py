@@ -51,11 +51,7 @@ def _track_cells(turn: Turn) -> dict[str, str]:
 def calibration(block: Block) -> CalibrationFile:
     """The calibration that the lean on the display was computed with, with notes on board and chip."""
     c = block.calibration()
-    notes = {
-        "firmware": block.firmware,
-        "who_am_i": f"{block.who_am_i:#04x}",
-        "sample_hz": block.sample_hz,
-    }
+    notes = {"firmware": block.firmware, "who_am_i": f"{block.who_am_i:#04x}", "sample_hz": block.sample_hz}
     return CalibrationFile(
         np.array(c.accel_offset),
         np.array(c.accel_slope),

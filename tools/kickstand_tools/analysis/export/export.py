@@ -35,11 +35,7 @@ _CLOCK_S = 1e8  # March 1973: a log that starts later has Unix time in it
 
 
 def export(
-    ride: Ride,
-    form: str,
-    out: Path | str,
-    progress: Progress | None = None,
-    notices: list[Notice] | None = None,
+    ride: Ride, form: str, out: Path | str, progress: Progress | None = None, notices: list[Notice] | None = None
 ) -> int:
     """Write a ride of open_ride() to a file, whole or not at all. Returns the number of rows. Raises InputError.
 

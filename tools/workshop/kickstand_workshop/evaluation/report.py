@@ -104,12 +104,7 @@ def _table(title: str, caption: str) -> Table:
 def document(evaluation: Evaluation) -> dict[str, Any]:
     """All figures for a JSON file; null where not observable."""
     rides = [
-        {
-            "profile": r.job.profile,
-            "seed": r.job.seed,
-            "refusal": r.refusal,
-            "scores": _scores(r.scores),
-        }
+        {"profile": r.job.profile, "seed": r.job.seed, "refusal": r.refusal, "scores": _scores(r.scores)}
         for r in evaluation.results
     ]
     recorded = None if evaluation.recorded is None else _scores(evaluation.recorded.scores)

@@ -91,11 +91,7 @@ def run(job: Job) -> Result:
     """Simulate, calibrate from the poses alone, estimate and score."""
     upright_sign, pitch_sign = (1, -1)[job.seed % 2], (1, -1)[job.seed // 2 % 2]
     made = ride(
-        job.profile,
-        job.seed,
-        job.seconds,
-        upright_sign * job.upright_error_deg,
-        pitch_sign * job.pitch_change_deg,
+        job.profile, job.seed, job.seconds, upright_sign * job.upright_error_deg, pitch_sign * job.pitch_change_deg
     )
     try:
         calibration = calibrated_by_poses(made)

@@ -31,8 +31,7 @@ PACKAGES = {
         "lean/test_known_ride lean/test_filter_states lean/test_[bkmru]* lean/test_formula",  # the other takes longer
     ),
     "drive_alignment": _package(
-        "firmware/kickstand/drive_alignment/*.py",
-        "drive_alignment/test_parts drive_alignment/test_drive*",
+        "firmware/kickstand/drive_alignment/*.py", "drive_alignment/test_parts drive_alignment/test_drive*"
     ),
     "speed": _package(
         "firmware/kickstand/speed/*.py", "simulated_board/test_board_speed simulated_board/test_board_place"
@@ -49,8 +48,7 @@ PACKAGES = {
         "tools/kickstand_tools/analysis/export/*.py", "analysis/test_export_formats analysis/test_cli_export"
     ),
     "stops": _package(
-        "tools/kickstand_tools/analysis/stops/*.py",
-        " ".join(f"analysis/stops/test_{name}" for name in _STOPS.split()),
+        "tools/kickstand_tools/analysis/stops/*.py", " ".join(f"analysis/stops/test_{name}" for name in _STOPS.split())
     ),
 }
 

@@ -35,13 +35,7 @@ MOMENTS_S = {
 
 
 UNPLUGGED_S = 44.0, 0.3  # of the sensor, before "unsure": at which time, for how long
-OLED_MOMENTS_S = {
-    "lean": 36.0,
-    "unsure": 44.9,
-    "maxima": 50.05,
-    "brake": 53.07,
-    "menu": 60.0,
-}
+OLED_MOMENTS_S = {"lean": 36.0, "unsure": 44.9, "maxima": 50.05, "brake": 53.07, "menu": 60.0}
 
 
 def lcd_pages() -> dict[str, tuple[list[list[int]], bytes]]:
