@@ -92,10 +92,8 @@ def test_calibrate_drive_takes_yaw_out(ride):
 
 def with_calibration(ride, name, degrees, **changed):
     """The path of a CAL.json in which that is wrong."""
-    path = ride.with_name(f"{name}.json")
     matrix = turn(name, degrees).tolist()
-    path.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": matrix} | changed))
-    return path
+    return analysis_rides.calibration(ride.with_name(f"{name}.json"), vehicle_from_sensor=matrix, **changed)
 
 
 @pytest.fixture(scope="module")

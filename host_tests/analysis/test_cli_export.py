@@ -1,7 +1,5 @@
 """kickstand export: every sample is in the file, and what is refused. The rest: test_export_formats.py."""
 
-import json
-import os
 from pathlib import Path
 
 import analysis_rides
@@ -11,14 +9,11 @@ import pytest
 
 pandas = pytest.importorskip("pandas")
 pytest.importorskip("pyarrow")
-WRITTEN_S = 1_700_000_000.7  # 22:13:20 UTC on 14/11/2023
 
 
 @pytest.fixture(scope="module")
 def ride(tmp_path_factory) -> Path:
-    made = analysis_rides.short(tmp_path_factory.mktemp("ride"), rate_hz=200, speed_hz=1)
-    os.utime(made, (WRITTEN_S, WRITTEN_S))
-    return made
+    return analysis_rides.short(tmp_path_factory.mktemp("ride"), rate_hz=200, speed_hz=1)
 
 
 @pytest.fixture(scope="module")
@@ -49,12 +44,6 @@ def read(path: Path, form: str):
     return pandas.read_csv(path)
 
 
-def calibration_of(tmp_path, **changed) -> Path:
-    path = tmp_path / "other.json"
-    path.write_text(json.dumps(analysis_rides.CALIBRATION | changed))
-    return path
-
-
 @pytest.mark.parametrize("form", ["csv", "parquet", "csv.gz"])
 def test_csv_and_parquet_have_every_sample(ride, shown, tmp_path, form):
     """Vectorised forces, rates and formula are those of the firmware's own replay."""
@@ -75,7 +64,7 @@ def test_csv_and_parquet_have_every_sample(ride, shown, tmp_path, form):
 
 @pytest.mark.parametrize("form", ["csv", "racechrono", "parquet", "vbo"])
 def test_a_car_has_no_lean_as_in_replay(ride, tmp_path, form):
-    car = calibration_of(tmp_path, vehicle="car")
+    car = analysis_rides.calibration(tmp_path / "other.json", vehicle="car")
     got = read(export(ride, form, tmp_path / "out", "--calibration", car), form)
     lean = [name for name in got if name in ("lean_deg", "lean_formula_deg", "lean_angle", "lean-angle")]
     assert len(lean) == {"racechrono": 1, "vbo": 0}.get(form, 2)
@@ -98,7 +87,7 @@ def test_what_cannot_be_exported_is_refused(ride, tmp_path, monkeypatch):
     """Without a calibration beside it, or with one that is not aligned; without pyarrow."""
     alone = tmp_path / "alone.csv"
     alone.write_bytes(ride.read_bytes())
-    flat = calibration_of(tmp_path, aligned=False)
+    flat = analysis_rides.calibration(tmp_path / "other.json", aligned=False)
     out = ("--out", tmp_path / "out")
     for arguments, words in (
         ((alone, "--to", "csv"), "no calibration alone.cal.json beside it: give one with --calibration"),

@@ -27,13 +27,6 @@ def ride(tmp_path_factory):
     return analysis_rides.short(tmp_path_factory.mktemp("ride"), speed_hz=1)
 
 
-def calibration(directory, **changed):
-    """The path of a CAL.json with these changes."""
-    path = directory / "changed.json"
-    path.write_text(json.dumps(analysis_rides.CALIBRATION | changed))
-    return path
-
-
 def printed(seen):
     """The lines of the report in a terminal of 80 columns."""
     console = Console(width=80, record=True, file=io.StringIO())
@@ -62,7 +55,9 @@ def test_a_report_has_the_ride_in_figures(ride):
 
 
 def test_what_is_not_known_is_no_figure(ride, tmp_path):
-    up_is_back = calibration(tmp_path, vehicle_from_sensor=[[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+    up_is_back = analysis_rides.calibration(
+        tmp_path / "changed.json", vehicle_from_sensor=[[1, 0, 0], [0, 0, 1], [0, -1, 0]]
+    )
     seen = overview(open_ride(ride, up_is_back))
     assert [notice.code for notice in seen.notices] == ["up-off"]
     total = seen.summary
@@ -78,7 +73,7 @@ def test_time_without_readings_is_said(ride, tmp_path):
     header, *rows = ride.read_text().splitlines()
     log = tmp_path / "gap.csv"
     log.write_text("\n".join([header, *rows[:1200], *rows[1240:]]) + "\n")
-    given = (log, "--calibration", calibration(tmp_path), "--live")
+    given = (log, "--calibration", analysis_rides.calibration(tmp_path / "changed.json"), "--live")
     step_s = float(rows[1].split(",")[0]) - float(rows[0].split(",")[0])
     data = json.loads(command.works("report", *given, "--json").out)
     assert data["missing_s"] == pytest.approx(41 * step_s, abs=0.06)
@@ -129,7 +124,9 @@ def turned_round(directory, tilt_deg=0.0, **changed):
     """CAL.json with forward and left the wrong way; tilt_deg: and up that far off, as with swapped poses."""
     s, c = np.sin(np.radians(tilt_deg)), np.cos(np.radians(tilt_deg))
     matrix = [[-c, s, 0], [s, c, 0], [0, 0, -1]]
-    return calibration(directory, vehicle_from_sensor=matrix, kickstand_side="left", **changed)
+    return analysis_rides.calibration(
+        directory / "changed.json", vehicle_from_sensor=matrix, kickstand_side="left", **changed
+    )
 
 
 def test_a_kickstand_on_the_other_side_is_noticed(ride, tmp_path):
@@ -159,7 +156,7 @@ def test_swapped_poses_are_noticed(tmp_path):
     assert re.search(r"roll [+-]1[01]\.\d°.*: were the poses swapped\?", said)
     assert "forward and backward are exchanged: were the poses swapped?" in said
     s, c = np.sin(np.radians(6.0)), np.cos(np.radians(6.0))
-    cal = calibration(tmp_path, vehicle_from_sensor=[[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    cal = analysis_rides.calibration(tmp_path / "changed.json", vehicle_from_sensor=[[c, s, 0], [-s, c, 0], [0, 0, 1]])
     said = " ".join(command.works("report", ride, "--calibration", cal, "--live").out.split())
     assert ": was it held upright?" in said
     assert "swapped" not in said
@@ -167,7 +164,7 @@ def test_swapped_poses_are_noticed(tmp_path):
 
 def test_a_stop_that_only_the_speed_knows(ride, tmp_path):
     """Forward is across: neither right nor exchanged."""
-    cal = calibration(tmp_path, vehicle_from_sensor=[[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+    cal = analysis_rides.calibration(tmp_path / "changed.json", vehicle_from_sensor=[[0, 0, 1], [0, 1, 0], [-1, 0, 0]])
     said = command.works("report", ride, "--calibration", cal, "--live").out
     assert "No stop" not in said
     assert "The speed falls to a stop, the force says otherwise" in " ".join(said.split())
@@ -180,7 +177,7 @@ def test_a_ride_without_stops(tmp_path):
 
 
 def test_a_car_has_no_lean(ride, tmp_path):
-    cal = calibration(tmp_path, vehicle="car")
+    cal = analysis_rides.calibration(tmp_path / "changed.json", vehicle="car")
     said = command.works("report", ride, "--calibration", cal, "--live").out
     assert "Max left" not in said
     assert "Max braking" in said
@@ -217,13 +214,15 @@ def test_files_that_are_no_rides(tmp_path, name, content, words):
     log = tmp_path / "log.csv"
     log.write_bytes(content)
     more = ["--out", tmp_path / "pictures"] if name == "plot" else []
-    command.refused(tmp_path, name, log, "--calibration", calibration(tmp_path), *more, words=words)
+    command.refused(
+        tmp_path, name, log, "--calibration", analysis_rides.calibration(tmp_path / "changed.json"), *more, words=words
+    )
 
 
 @pytest.mark.parametrize("samples", [2, 3, 30])
 def test_the_shortest_of_logs(tmp_path, samples):
     log = command.still(tmp_path / "log.csv", (0, 1, 0), seconds=samples / 100)
-    (tmp_path / "log.cal.json").write_text(json.dumps(analysis_rides.CALIBRATION))
+    analysis_rides.calibration(tmp_path / "log.cal.json")
     command.works("report", log)
     command.works("plot", log, "--out", tmp_path / "pictures")
 
@@ -257,7 +256,7 @@ def test_a_real_ride(shared_data, tmp_path):
     forward = np.cross(np.cross(up, [0.31, 0.5, 0.2]), up)
     forward /= np.linalg.norm(forward)
     matrix = [np.cross(up, forward).tolist(), up.tolist(), forward.tolist()]
-    cal = calibration(tmp_path, vehicle_from_sensor=matrix)
+    cal = analysis_rides.calibration(tmp_path / "changed.json", vehicle_from_sensor=matrix)
     data = json.loads(command.works("report", log, "--calibration", cal, "--json").out)
     assert data["duration_s"] == pytest.approx(105, abs=2)
     assert data["max_speed_mps"]["value"] == pytest.approx(8.6, abs=0.2)

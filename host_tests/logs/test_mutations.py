@@ -120,7 +120,7 @@ def test_each_ends_in_a_result_or_in_one_line(bases, tmp_path):
 
 
 def test_the_command_says_one_line(bases, tmp_path):
-    (tmp_path / "RIDE.cal.json").write_text(json.dumps(analysis_rides.CALIBRATION))
+    analysis_rides.calibration(tmp_path / "RIDE.cal.json")
     out = tmp_path / "out"
     out.mkdir()
     for number in range(0, COUNT, OF_THE_COMMAND):

@@ -121,9 +121,8 @@ def test_the_lean_of_a_stretch_is_that_of_the_whole_ride_there(tmp_path, name):
 
 def test_a_stretch_is_warned_of_another_mounts_calibration_as_the_ride_is(tmp_path):
     ride = analysis_rides.short(tmp_path, speed_hz=1)
-    backward = tmp_path / "backward.json"
     turned = [[-1, 0, 0], [0, 1, 0], [0, 0, -1]]
-    backward.write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle_from_sensor": turned}))
+    backward = analysis_rides.calibration(tmp_path / "backward.json", vehicle_from_sensor=turned)
     for given in (("replay", "--out", tmp_path / "lean.csv"), ("report",)):
         said = command.works(given[0], ride, "--calibration", backward, "--from", "30", *given[1:])
         assert "forward" in said.err, given

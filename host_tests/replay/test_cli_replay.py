@@ -90,8 +90,7 @@ def test_forward_and_backward_exchanged_are_remarked_on(tmp_path, engine):
     line = f"warning: {log}: forward and backward are exchanged: calibrate two --side left?"
     for turned, remark in (1, ""), (-1, line):
         matrix = [[turned, 0, 0], [0, 1, 0], [0, 0, turned]]
-        data = analysis_rides.CALIBRATION | {"vehicle_from_sensor": matrix, "kickstand_side": "right"}
-        cal.write_text(json.dumps(data))
+        analysis_rides.calibration(cal, vehicle_from_sensor=matrix, kickstand_side="right")
         _, said = replayed(log, cal, engine)
         assert said.count("\n") == bool(remark)
         assert said.startswith(remark)
@@ -200,7 +199,7 @@ def test_the_calibration_beside_the_log_is_taken(tmp_path):
     beside.unlink(missing_ok=True)
     lean = tmp_path / "LEAN.csv"
     command.refused(tmp_path, "replay", log, "--out", lean, words=f"no calibration {beside.name} beside it")
-    beside.write_text(json.dumps(analysis_rides.CALIBRATION))
+    analysis_rides.calibration(beside)
     command.works("replay", log, "--out", lean)
     words = f"LEAN.csv holds a lean, no readings: give the log that it was made from, {log}\n"
     exported = tmp_path / "EXPORTED.csv"

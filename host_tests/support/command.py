@@ -11,14 +11,7 @@ import pytest
 from kickstand_tools.cli import main
 
 HEADER = "t_s,ax_g,ay_g,az_g,gx_dps,gy_dps,gz_dps"
-AXES = {
-    "+x": (1, 0, 0),
-    "-x": (-1, 0, 0),
-    "+y": (0, 1, 0),
-    "-y": (0, -1, 0),
-    "+z": (0, 0, 1),
-    "-z": (0, 0, -1),
-}
+AXES = {"+x": (1, 0, 0), "-x": (-1, 0, 0), "+y": (0, 1, 0), "-y": (0, -1, 0), "+z": (0, 0, 1), "-z": (0, 0, -1)}
 
 
 @dataclass
@@ -31,11 +24,7 @@ class Result:
 def run(*arguments: object, err: io.StringIO | None = None) -> Result:
     """The exit status of `kickstand arguments...` and what it printed. err: its standard error."""
     out, err = io.StringIO(), err or io.StringIO()
-    with (
-        pytest.raises(SystemExit) as leaving,
-        contextlib.redirect_stdout(out),
-        contextlib.redirect_stderr(err),
-    ):
+    with pytest.raises(SystemExit) as leaving, contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         main.main([str(argument) for argument in arguments])
     code = leaving.value.code
     assert code is None or isinstance(code, int)
@@ -70,13 +59,7 @@ def snapshot(directory: Path) -> dict[str, bytes]:
 
 
 def still(
-    path: Path,
-    force,
-    bias=(0.0, 0.0, 0.0),
-    seconds: float = 3.0,
-    rate_hz: int = 100,
-    noise: float = 1.0,
-    seed=0,
+    path: Path, force, bias=(0.0, 0.0, 0.0), seconds: float = 3.0, rate_hz: int = 100, noise: float = 1.0, seed=0
 ) -> Path:
     """Write a log of a sensor at rest that reads force (3, g) and bias (3, deg/s) with an MPU6050's noise."""
     rng = np.random.default_rng(seed)

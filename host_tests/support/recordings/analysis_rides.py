@@ -17,6 +17,12 @@ CALIBRATION = {
 }
 
 
+def calibration(path: Path, **changed) -> Path:
+    """Write CALIBRATION with these changes; return the path."""
+    path.write_text(json.dumps(CALIBRATION | changed))
+    return path
+
+
 def write(directory: Path, segments: list, rate_hz: int = 100, speed_hz: int = 0, vibration_g: float = 0.02) -> Path:
     """Write RIDE.csv and RIDE.cal.json of a ride of these script segments; return the path of the former.
 
@@ -33,7 +39,7 @@ def write(directory: Path, segments: list, rate_hz: int = 100, speed_hz: int = 0
         lines.append(line)
     path = directory / "RIDE.csv"
     path.write_text("\n".join(lines) + "\n")
-    (directory / "RIDE.cal.json").write_text(json.dumps(CALIBRATION))
+    calibration(directory / "RIDE.cal.json")
     return path
 
 
