@@ -34,10 +34,7 @@ BAD = {
     "time goes back.csv": (text(*GOOD[:3], GOOD[0]), "line 5: time goes back from 0.020000 at 0.00 s"),
     "short row.csv": (text(*GOOD[:3], "0.03,0,0", GOOD[4]), "line 5: 3 values under 7 column names"),
     "long row.csv": (text(*GOOD[:3], GOOD[3] + ",1"), "line 5: 8 values under 7 column names"),
-    "speed word.csv": (
-        text(ROW + ",fast", header=command.HEADER + ",speed_mps"),
-        "line 2: speed_mps is 'fast'",
-    ),
+    "speed word.csv": (text(ROW + ",fast", header=command.HEADER + ",speed_mps"), "line 2: speed_mps is 'fast'"),
     "m per s2.csv, all": (text(*[g.replace("1.01", "9.81") for g in GOOD]), "look like m/s2"),
     "milliseconds.csv": (text(*[f"{10 * k}{g[4:]}" for k, g in enumerate(GOOD)]), "milliseconds"),
     "semicolons.csv": (text(ROW).replace(b",", b";"), "commas"),
@@ -95,8 +92,7 @@ SAME = {
     "optional columns.csv": text(*[g + ",,12.5" for g in GOOD], header=command.HEADER + ",temp_c,speed_mps"),
     "another column.csv": text(*[g + ",hello" for g in GOOD], header=command.HEADER + ",note"),
     "another order.csv": text(
-        *[",".join(reversed(g.split(","))) for g in GOOD],
-        header=",".join(reversed(command.HEADER.split(","))),
+        *[",".join(reversed(g.split(","))) for g in GOOD], header=",".join(reversed(command.HEADER.split(",")))
     ),
 }
 

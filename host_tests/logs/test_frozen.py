@@ -6,11 +6,11 @@ import analysis_rides
 import command
 import numpy as np
 import pytest
-from kickstand_tools.api import Log, fit_two_positions, open_ride, overview, replay, simulate_ride, vehicle_channels
+from kickstand_tools.api import Log, open_ride, overview, replay
 from kickstand_tools.calibration import drive
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs import reader
-from kickstand_tools.logs.frozen import FrozenReadings, without_frozen
+from kickstand_tools.logs.frozen import without_frozen
 from kickstand_tools.logs.reader import read_blocks
 from kickstand_tools.refusals import sentence
 
@@ -107,29 +107,6 @@ def test_a_log_without_what_froze():
     assert np.max(np.diff(left.t_s)) == pytest.approx(2.0)
 
 
-@pytest.mark.parametrize("profile", ["street", "track"])
-def test_a_freeze_is_no_standstill(profile):
-    """Of 20 s in the middle of a ride. Taken for a standstill, it leaves the lean wrong by up to 50 degrees."""
-    ride = simulate_ride(profile, seed=1, seconds=100.0)
-    hz = round(ride.rate_hz)
-    kickstand, upright = (Log.from_readings(pose, hz) for pose in (ride.kickstand, ride.upright))
-    calibration = fit_two_positions(kickstand, upright).calibration
-    readings, begin, end = ride.readings.copy(), 50 * hz, 70 * hz
-    readings[begin:end] = readings[begin]
-    found = replay(Log.from_readings(readings, ride.rate_hz), calibration)
-    whole = replay(Log.from_readings(ride.readings, ride.rate_hz), calibration)
-    assert np.all(np.isnan(found.lean_deg[begin + 1 : end]))
-    assert np.all(np.isnan(found.forward_g[begin + 1 : end]))
-    shown = vehicle_channels(Log.from_readings(readings, ride.rate_hz), calibration)
-    there = np.searchsorted(shown.t_s, np.arange(end, end + 15 * hz) / ride.rate_hz - 1e-6)
-    sure = shown.trusted[there]
-    assert np.mean(sure) > 0.6
-    away = (found.lean_deg - ride.truth["lean_deg"])[end : end + 15 * hz][sure]
-    usual = (whole.lean_deg - ride.truth["lean_deg"])[end : end + 15 * hz][sure]
-    assert np.sqrt(np.mean(away**2)) < 1.3 * np.sqrt(np.mean(usual**2)) + 0.5
-    assert np.array_equal(found.lean_deg[:begin], whole.lean_deg[:begin])
-
-
 def test_the_commands_say_it(tmp_path):
     ride = analysis_rides.short(tmp_path, speed_hz=1)
     header, *rows = ride.read_text().splitlines()
@@ -178,15 +155,6 @@ def test_a_freeze_is_no_stop_for_calibrate_drive():
     log = log_of(readings)
     log.speed_mps[::100] = 12.0
     assert len(drive.usable(log, False).t_s) == 4001
-
-
-def test_blocks_are_marked_once():
-    marks = FrozenReadings()
-    readings = riding(4)
-    readings[100:300] = readings[100]
-    (block,) = read_blocks(log_of(readings))
-    assert np.count_nonzero(marks.mark(block)) == 199
-    assert marks.notices()[0].values[0] == 1
 
 
 def test_no_real_log_is_frozen_and_a_freeze_in_one_is_found(shared_data):
