@@ -75,17 +75,6 @@ def test_every_name_has_files_of_its_own_that_any_file_system_takes():
     assert plot.file_name(".hid", "")[0] != "."
 
 
-def test_a_long_name_among_good_ones_costs_nothing(fleet, tmp_path, alone):
-    paths = read_manifest(str(fleet.manifest))[0].paths
-    names = ["first", "v" * 300, 120 * "\u4e2d", "last"]
-    out = tmp_path / "out"
-    whole = run_fleet([Period(name, "", "car", paths) for name in names], out, with_signals=True)
-    assert whole.seen.statuses["aligned"] == len(names)
-    rows = parquet.read_table(out / "alignments.parquet").to_pylist()
-    assert [row["vehicle"] for row in rows] == names
-    assert all((out / row["plot"]).is_file() for row in rows)
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux has names that are no UTF-8")
 def test_a_file_name_that_is_no_utf8_costs_nothing(drive, tmp_path, alone):
     copied(drive, tmp_path / "good.csv")

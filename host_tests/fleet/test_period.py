@@ -1,8 +1,5 @@
 """What is found in the logs of one mount of one vehicle."""
 
-import gzip
-import pickle
-
 import numpy as np
 import pytest
 from kickstand_tools.fleet.brake_tests import brake_tests
@@ -81,11 +78,6 @@ def test_mirrored_axes_are_not_aligned(tmp_path):
     assert (found.alignment["status"], found.alignment["reason"]) == ("refused", "left-handed")
 
 
-def test_results_can_be_sent(results):
-    for found in results.values():
-        assert pickle.loads(pickle.dumps(found)) == found
-
-
 def test_brake_tests_of_a_car_without_the_lean_filter(fleet, results):
     made = fleet.vehicles[0]
     from kickstand_tools.analysis.ride import vehicle_channels
@@ -105,18 +97,6 @@ def test_brake_tests_of_a_car_without_the_lean_filter(fleet, results):
     for one, other in zip(quick, whole, strict=True):
         assert one.mfdd_mps2 == pytest.approx(other.mfdd_mps2, rel=0.02)
         assert one.initial_speed_mps == pytest.approx(other.initial_speed_mps, rel=0.02)
-
-
-def test_a_cut_log_is_used_as_far_as_it_goes(tmp_path):
-    log, sensor = drive(4)
-    path = tmp_path / "cut.csv.gz"
-    write_log(path, log)
-    path.write_bytes(path.read_bytes()[:-3000])
-    found = work_on_period(Period("v", "", "car", (str(path),)))
-    assert found.alignment["status"] == "aligned" and found.alignment["driven_s"] < log.t_s[-1] - 1.0
-    assert abs(yaw_deg(found.alignment["vehicle_from_sensor"], sensor.mount)) < 1.6
-    with pytest.raises(EOFError), gzip.open(path) as file:
-        file.read()
 
 
 @pytest.mark.parametrize(("degrees", "axis"), [(5.5, (1, 0.3, 0)), (6.0, (0, 0.2, 1)), (8.0, (0.2, 1, 0.3))])
