@@ -42,8 +42,7 @@ def test_a_cut_or_damaged_zip(tmp_path, ride, damage):
 def test_two_recordings_in_one_folder(tmp_path, ride):
     for name in "monday", "tuesday":
         app_exports.into(tmp_path / "all" / name, app_exports.phyphox(ride))
-    line = refused(tmp_path, tmp_path / "all", "holds 2 recordings (monday, tuesday): give one of them")
-    assert line.count("\n") == 1
+    refused(tmp_path, tmp_path / "all", "holds 2 recordings (monday, tuesday): give one of them")
     assert api.import_recording(tmp_path / "all" / "monday").app == "phyphox"
 
 
@@ -78,12 +77,6 @@ def without(files, *names):
     return {name: text for name, text in files.items() if name not in names}
 
 
-def column_cut(text, name):
-    """A CSV in which a column has another name."""
-    head, _, rest = text.partition("\n")
-    return head.replace(name, "Other") + "\n" + rest
-
-
 LACKING = {
     "phyphox gyro": (
         lambda r: without(app_exports.phyphox(r), "Gyroscope.csv"),
@@ -114,7 +107,7 @@ LACKING = {
         "no x_acc to z_acc and x_rate_of_rotation to z_rate_of_rotation in it",
     ),
     "RaceBox gyro": (
-        lambda r: {"r.csv": column_cut(app_exports.racebox(r), "GyroZ")},
+        lambda r: {"r.csv": app_exports.racebox(r).replace("GyroZ", "Other")},
         "no GyroX to GyroZ: export it from RaceBox's app on the phone",
     ),
     "RaceBox motorcycle mode": (
