@@ -198,11 +198,7 @@ def two_refused(poses, words, *more):
 
 
 @pytest.mark.parametrize(
-    ("stand", "words"),
-    [
-        (leaned(-0.3), "both poses are the same"),
-        (leaned(-12) * 0.8, "is 0.800 g, not 1 g"),
-    ],
+    ("stand", "words"), [(leaned(-0.3), "both poses are the same"), (leaned(-12) * 0.8, "is 0.800 g, not 1 g")]
 )
 def test_poses_that_do_not_fix_the_mounting(tmp_path, stand, words):
     line = two_refused(two_poses(tmp_path, stand), words)

@@ -132,13 +132,6 @@ def test_a_display_with_wrong_pins_leaves_the_usual_and_all_others_alone(
     assert set(record.touched) <= touched
 
 
-def test_a_refusal_is_shown_on_a_board_with_usual_pins(tmp_path, capsys):
-    plan = {"board": {"machine": "pico"}, "config": {"SENSOR_SDA": 5}, "until": 3}  # a pin that is used twice
-    record = devices.run("cpython", tmp_path, plan, capsys)
-    assert list(record.last) == ["config.py: wrong", "pin used twice  "]
-    assert record.touched == [6, 7]
-
-
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("driver", ["legacy", "new"])
 @pytest.mark.parametrize("machine", ["esp32", "s3", "c3"])

@@ -51,11 +51,7 @@ def test_a_kickstand_on_the_right(tmp_path):
 
 @pytest.mark.parametrize(
     ("lean", "complaint"),
-    [
-        ([[0, -3], [8, 0]], "Tilt only 3.0°"),
-        ([[0, -65], [8, 0]], "Tilt 65°: over"),
-        ([[0, 0]], "Same pose twice"),
-    ],
+    [([[0, -3], [8, 0]], "Tilt only 3.0°"), ([[0, -65], [8, 0]], "Tilt 65°: over"), ([[0, 0]], "Same pose twice")],
 )
 def test_poses_that_do_not_serve_are_refused_and_asked_for_again(lean, complaint, tmp_path):
     record = devices.run(
@@ -69,9 +65,7 @@ def test_poses_that_do_not_serve_are_refused_and_asked_for_again(lean, complaint
 def test_a_knock_during_the_pose(tmp_path):
     lean = [[0, -12], [4, -20], [4.1, -12], [16, 0]]
     record = devices.run(
-        "cpython",
-        tmp_path,
-        {"lean": lean, "presses": [[2, 0.15], [9, 0.15], [17, 0.15]], "until": 24},
+        "cpython", tmp_path, {"lean": lean, "presses": [[2, 0.15], [9, 0.15], [17, 0.15]], "until": 24}
     )
     assert record.at(7)[0].startswith("Moved!")
     assert record.at(9.6)[0].startswith("Stand: hold")

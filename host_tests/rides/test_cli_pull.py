@@ -121,15 +121,7 @@ def test_emptied_directories_go_too_unless_something_else_is_in_them(board, tmp_
     result = command.works("pull", "--out", tmp_path / "out", "--delete")
     assert result.err == ""
     assert result.out.count("deleted from the board: ride ") == 3
-    assert left(board) == [
-        "000",
-        "000/5",
-        "000/5/00000.rid",
-        "00007-0000.ride",
-        "002",
-        "002/00",
-        "002/00/notes.txt",
-    ]
+    assert left(board) == ["000", "000/5", "000/5/00000.rid", "00007-0000.ride", "002", "002/00", "002/00/notes.txt"]
 
 
 def test_a_ride_whose_beginning_is_gone(board, tmp_path):

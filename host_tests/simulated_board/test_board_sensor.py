@@ -66,12 +66,7 @@ def test_ranges_and_saturation():
     def world(t_s):
         return (1.5, -1.5, 0.5, 200.0, -200.0, 300.0)
 
-    for bits, lsb_per_g, lsb_per_dps in (
-        (0, 16384, 131.0),
-        (1, 8192, 65.5),
-        (2, 4096, 32.8),
-        (3, 2048, 16.4),
-    ):
+    for bits, lsb_per_g, lsb_per_dps in ((0, 16384, 131.0), (1, 8192, 65.5), (2, 4096, 32.8), (3, 2048, 16.4)):
         clock, chip = awake(world)
         write(chip, 0x1B, bits << 3, bits << 3)
         clock.advance(20_000)
