@@ -42,7 +42,7 @@ SIGMA_START_LEAN_MOVING = radians(30.0)
 USUAL_SPEED = 15.0 / STANDARD_GRAVITY
 
 # Process noise, per square root of a second
-NOISE_ANGLE = radians(0.2)  # rad: vibration of the gyro. Larger: lean follows the forces more and the gyro less.
+NOISE_ANGLE = radians(0.24)  # rad: vibration of the gyro. Larger: lean follows the forces more and the gyro less.
 NOISE_SPEED = 0.35 / STANDARD_GRAVITY  # g s. Larger: speed follows turns sooner, and is less steady on straights.
 NOISE_BIAS = radians(0.01)  # rad/s: 0.6 deg/s in five minutes of warming up. Larger: long turns are mistaken for bias.
 # Where readings are lost
