@@ -4,6 +4,7 @@ in test_chip_device.py.
 
 import hashlib
 import json
+import math
 import re
 import time
 
@@ -11,6 +12,9 @@ import device_runs
 import pytest
 from emulated import calibrated, esp32, firmware, leaning, modules, shows
 from kickstand.calibration.store import Store
+from kickstand.rides.block import BLOCK
+from kickstand.rides.flash_ring import PART_BLOCKS
+from kickstand.rides.ride_paths import part_path
 from kickstand_tools.simulated_board.lcd import shown_lean
 from test_chip_recorder import FEED, rides
 
@@ -43,7 +47,7 @@ def begun(pause_s):
     """A digest of when the display showed what and the sensor was read. pause_s: the host's, every now and then."""
     seen = []
     with board() as device:
-        while device.time_s < 2.1:
+        while device.time_s < 1.8:
             device.run(0.05, lambda: time.sleep(pause_s))
             seen.append((device.time_s, device.lcd(), dict(device.board.sensor_bus.transfers), bytes(device.said)))
         seen.append((device.exec("import time\nprint(time.ticks_us())"), device.file_system))
@@ -222,3 +226,20 @@ def test_wherever_the_power_goes_all_but_the_last_block_of_a_ride_is_kept():
         assert len(blocks) >= seen - 1
         seen = max(seen, len(blocks))
     assert seen >= 3
+
+
+def test_a_ride_makes_room_oldest_first():
+    """In a flash full of rides, so many of the first parts go as it takes, and not one more."""
+    parts = [part_path("rides", ride, number) for ride in (1, 2) for number in range(11)]
+    full = dict.fromkeys(parts, bytes(PART_BLOCKS * BLOCK))
+    with board(files=modules("esp32") | full) as device:
+        free = "print(flash_ring.free_bytes('/'), recorder.keeper.needed)"
+        before, needed = map(int, device.exec(FEED + "from kickstand.rides import flash_ring\n" + free).split())
+        device.exec("recorder.start(Chip(), Calibration())\nfeed(2)\nrecorder.stop()", 30.0)
+        files = device.files()
+    gone = [path for path in parts if path not in files]
+    short = needed - (before - 2 * BLOCK)  # of bytes, once the ride has its directory
+    assert short > 0
+    assert gone == parts[: math.ceil(short / (PART_BLOCKS * BLOCK))]
+    assert FILES.items() <= files.items()
+    assert [block.sequence for block in rides({"rides/3": files[part_path("rides", 3, 0)]})[3]] == [0, 1]

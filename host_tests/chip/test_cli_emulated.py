@@ -85,7 +85,7 @@ class Emulating(threading.Thread):
         return self.device.time_s if self.device else 0.0
 
 
-@pytest.mark.parametrize("chip", ["rp2040"])
+@pytest.mark.parametrize("chip", ["rp2040", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])])
 def test_flash_and_status_on_the_emulated_board(monkeypatch, chip):
     """Onto an older version with an edited config; then the bike's ride begins, and the display says what is to be
     done."""
