@@ -84,6 +84,12 @@ class Emulating(threading.Thread):
         """The emulated board's."""
         return self.device.time_s if self.device else 0.0
 
+    def sleep(self, seconds):
+        """By the board's time."""
+        end_s = self.time_s() + seconds
+        while self.time_s() < end_s and self.is_alive():
+            time.sleep(0.001)
+
 
 @pytest.mark.parametrize("chip", ["rp2040", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])])
 def test_flash_and_status_on_the_emulated_board(monkeypatch, chip):
@@ -100,9 +106,10 @@ def test_flash_and_status_on_the_emulated_board(monkeypatch, chip):
     try:
         address = re.search(r"socket://\S+?:\d+", emulating.said.get())
         assert address
-        clock = types.SimpleNamespace(monotonic=emulating.time_s, sleep=lambda seconds: time.sleep(seconds / 10))
+        clock = types.SimpleNamespace(monotonic=emulating.time_s, sleep=emulating.sleep)
         for module in (transport_serial, connection):
             monkeypatch.setattr(module, "time", clock)
+        emulating.sleep(2.0)  # an ESP32 that is starting does not hear its console
         flashed = command.works("flash", "--port", address[0]).out
         assert f"{names[chip]}, MicroPython 1.26.1 on {address[0]}" in flashed
         assert "kept: config.py" in flashed
