@@ -219,11 +219,8 @@ def printed(transport: SerialTransport, name: str, code: str, what: str) -> byte
     return output
 
 
-def status(port: str | None) -> str:
-    """The output of kickstand.status() on the board, which is restarted afterwards.
-
-    port: None takes the only board that is plugged in.  Raises InputError, NoFirmware.
-    """
+def status(port: Port) -> str:
+    """The output of kickstand.status() on the board, which is restarted afterwards. Raises InputError, NoFirmware."""
     with connected(port) as (transport, name):
         describe(transport, name)
         try:
