@@ -23,16 +23,24 @@ pytestmark = pytest.mark.chip
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
-def test_emulate_in_a_terminal():
+@pytest.mark.parametrize(
+    ("chip", "name", "library"),
+    [
+        ("rp2040", "Pico", image),
+        pytest.param("esp32", "ESP32", esp32_library, marks=pytest.mark.esp32),
+    ],
+    ids=["rp2040", "esp32"],
+)
+def test_emulate_in_a_terminal(chip, name, library):
     """The bike is drawn, the button and the end follow the keys."""
     try:
-        image.find()
+        library.find()
     except InputError as error:
         pytest.skip(str(error))
     with socket.create_server(("127.0.0.1", 0)) as found:
         free = found.getsockname()[1]
-    with Terminal([sys.executable, "-m", "kickstand_tools.cli", "emulate", "--port", str(free)]) as at:
-        at.wait_for("Kickstand on an emulated Pico, socket://")
+    with Terminal([sys.executable, "-m", "kickstand_tools.cli", "emulate", "--chip", chip, "--port", str(free)]) as at:
+        at.wait_for(f"Kickstand on an emulated {name}, socket://")
         at.wait_for("No firmware on it yet, so the display is blank. In another terminal:")
         at.wait_for(f"kickstand flash --port socket://127.0.0.1:{free}")
         at.press("B")
