@@ -24,8 +24,7 @@ FAULT_S = 0.6
 @pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_a_new_board_is_aligned_by_two_presses_and_keeps_it(chip):
     """Uncalibrated, kickstand, upright, power-cycle, leaned: the display reads the lean."""
-    pose_s = {"pico": 5.5, "esp32": 6.5}[chip]  # which starts later
-    ride = Ride([kickstand(pose_s), upright(5.5), upright(1e6, lean_deg=LEAN_DEG)])
+    ride = Ride([kickstand(5.5), upright(5.5), upright(1e6, lean_deg=LEAN_DEG)])
     part = Sensor(seed=1, share=0.1)  # its accelerometer is not calibrated here: that shall cost no degrees
     device = CHIPS[chip](part.world(ride.motion), firmware(chip))
     device.power_on()

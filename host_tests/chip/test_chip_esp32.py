@@ -117,24 +117,27 @@ def test_wheel_and_gps():
     with board(files=modules("esp32")) as device:
         device.fit_wheel(lambda t_s: 15.0)
         device.fit_gps(lambda t_s: 15.0)
-        for source in ("wheel", "gps"):
-            speeds = json.loads(device.exec(_LISTEN % source, 20.0).splitlines()[-1])
-            assert len(speeds) >= 2
-            assert speeds == pytest.approx([15.0] * len(speeds), abs=0.3)
+        wheel, gps = json.loads(device.exec(_LISTEN, 20.0).splitlines()[-1])
+    for speeds in (wheel, gps):
+        assert len(speeds) >= 2
+        assert speeds == pytest.approx([15.0] * len(speeds), abs=0.3)
 
 
 _LISTEN = """
 from time import sleep_ms, ticks_add, ticks_diff, ticks_ms
 from kickstand.settings import Settings
 from kickstand.speed.source import open_speed
-class Config:
-    SPEED = "%s"
-speed = open_speed(Settings(Config))
-got, end = [], ticks_add(ticks_ms(), 1800)
+def opened(source):
+    class Config:
+        SPEED = source
+    return open_speed(Settings(Config))
+speeds = opened("wheel"), opened("gps")
+got, end = [[], []], ticks_add(ticks_ms(), 1800)
 while ticks_diff(end, ticks_ms()) > 0:
-    new = speed.poll(ticks_ms())
-    if new is not None:
-        got.append(new)
+    for i in range(2):
+        new = speeds[i].poll(ticks_ms())
+        if new is not None:
+            got[i].append(new)
     sleep_ms(10)
 print(got)
 """

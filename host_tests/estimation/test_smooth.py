@@ -56,13 +56,19 @@ def test_the_standard_deviation_is_honest(known):
     assert np.mean(found.lean_sigma_deg) < 1.2
 
 
-@pytest.mark.parametrize(("seed", "mount", "most_deg"), [(2028, "foreign", 0.65), (2018, "drifting", 1.0)])
-def test_forces_that_are_not_the_bikes_count_less(seed, mount, most_deg):
-    """With the noise of a firm mount the errors were 0.80 and 2.31 degrees."""
-    live, off, sigma = judged(drawn_ride(seed, mounts=[mount]))
-    assert rms(off) < most_deg
-    assert rms(off) < 1.5 * rms(live)
+def test_forces_that_are_not_the_bikes_count_less():
+    """With the noise of a firm mount the error was 0.80 degrees."""
+    live, off, sigma = judged(drawn_ride(2028, mounts=["foreign"]))
+    assert rms(off) < min(0.65, rms(live))
     assert np.mean(np.abs(off) < 2.0 * sigma) > 0.85
+
+
+@pytest.mark.parametrize(("seed", "mount"), [(2018, "drifting"), (98, "holder")])
+def test_a_steady_ride_on_a_straight_is_no_standstill(seed, mount):
+    """For 2 s both hardly move, at 22 and at 12 m/s. Taken for a standstill it made the lean worse than the live one:
+    0.56 and 0.37 degrees."""
+    live, off, _ = judged(drawn_ride(seed, mounts=[mount]))
+    assert rms(off) < 0.8 * rms(live)
 
 
 def mean_error(known):

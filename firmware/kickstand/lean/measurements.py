@@ -34,6 +34,8 @@ SIGMA_START = (
     0.014,  # ratio: forward axis' reading of a rate about up
     0.014,  # ratio: scale error of the forward axis
 )
+# rad/s: the bias where the poses have just measured it. Larger: a bike that sets off at once shows its lean later.
+SIGMA_FRESH_BIAS = radians(0.2)
 # rad: the first lean's standard deviation where the bike moves. Larger: lean is shown later, and follows forces more.
 SIGMA_START_LEAN_MOVING = radians(30.0)
 # g s: mean of the speed's prior while nothing measures it. Larger: leans that began before power-on come out larger.

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..logs.table import Array
+from ..signals.cells import stretches
 from ..signals.rotations import rotation_matrix
-from .equations import BALANCED, ROWS, jacobian, process_and_measurements
+from .equations import BALANCED, RESTING, RESTING_RATE, ROWS, SLIDING, jacobian, process_and_measurements
 from .first_guess import lean_and_speed, standing
 from .hypotheses import Hypotheses
 from .noise import BRIEF_S, LONG_S, Noise
@@ -25,6 +26,10 @@ WEIGHING_ROUNDS = 2  # steps that weigh the hypotheses anew
 MAX_LEAN = 0.5  # rad: largest change of an angle in one step. Beyond it the equations are not linear.
 MAX_PITCH = 1.2  # rad: as in the firmware
 START = np.array([1.0, 0.3, 1.0, 1.0, 20.0, 0.03, 0.03, 0.03])  # standard deviations of the first state's prior
+# A steady ride on a straight may seem to stand for as long as BRIEF. Then a residual within AROUND windows is over
+# CONTRADICTED sigmas; at real standstills these are under 2.
+BRIEF, AROUND, CONTRADICTED = 15, 25, 4.0
+CONTRADICTING = [PITCH, LEFT, UP, FORWARD, SLIDING, *range(RESTING.start, RESTING_RATE.stop)]
 DRAWN = [PITCH, LEFT, UP, *range(STATES)[BIAS]]  # its components whose prior has the mean 0
 
 
@@ -41,15 +46,12 @@ class Estimate:
         the equations have no solution."""
         self._length = min(BLOCK, len(windows))
         self._windows = windows = windows.padded(self._length)
-        self.prior, self._hypotheses, self._likely = prior, hypotheses, hypotheses.usual()
+        self.prior, self._hypotheses, self.matrix = prior, hypotheses, np.eye(3)
         still = standing(windows)
-        self._noise = Noise(windows, still)
-        lean, speed = lean_and_speed(windows, still)
-        self.states = np.zeros((len(windows) + 1, STATES))
-        self.states[:, LEAN], self.states[:, FORWARD] = _at_edges(lean), _at_edges(speed)
-        self.parameters = np.tile(prior.mean, (len(windows) // self._length, 1))
-        self.matrix, self.change = np.eye(3), np.inf
-        self._converge()
+        self._start(still)
+        false = self._false_standstill(still)
+        if np.any(false):
+            self._start(still & ~false)
         if self._learn_misfit():
             self._converge()
         self._use_own_noise()
@@ -83,6 +85,26 @@ class Estimate:
         walks.variance[:, middle - 1 : middle, ROTATION] = 1.0
         found = solve(self._reduced(robust=True), walks, self._likely.weight)[1][:, ROTATION]
         return found[-1] - found[0]
+
+    def _start(self, still: NDArray[np.bool_]) -> None:
+        """Estimate from the beginning. still (n): True where the bike stands."""
+        self._likely = self._hypotheses.usual()
+        self._noise = Noise(self._windows, still)
+        lean, speed = lean_and_speed(self._windows, still)
+        self.states = np.zeros((len(self._windows) + 1, STATES))
+        self.states[:, LEAN], self.states[:, FORWARD] = _at_edges(lean), _at_edges(speed)
+        self.parameters = np.tile(self.prior.mean, (len(self._windows) // self._length, 1))
+        self.change = np.inf
+        self._converge()
+
+    def _false_standstill(self, still: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(n) True in the brief ones that the motion before and after contradicts."""
+        contradicted = np.max(np.abs(self._residuals() / self._noise.sigma())[:, CONTRADICTING], axis=1) > CONTRADICTED
+        false = np.zeros_like(still)
+        for begin, end in stretches(still):
+            near = contradicted[max(0, begin - AROUND) : end + AROUND]
+            false[begin:end] = end - begin < BRIEF and bool(np.any(near))
+        return false
 
     def _converge(self) -> None:
         weighing_rounds = 0
