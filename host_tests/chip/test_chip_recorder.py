@@ -4,6 +4,7 @@ import ast
 import re
 import signal
 from itertools import pairwise
+from typing import Any
 
 import command
 import emulated_port
@@ -167,7 +168,8 @@ def test_pull_and_record_through_mpremote(tmp_path, monkeypatch, chip):
     """A ride that is being recorded, with an ESP32's GPS, is ended and pulled; then a log is streamed. Both replay."""
     config = "RECORD = True\n" + {"pico": "", "esp32": 'SPEED = "gps"\n'}[chip]
     files = firmware(chip) | calibrated() | {"config.py": config.encode()}
-    with CHIPS[chip](PART.world(RIDE.motion), files) as device:
+    board: Any = CHIPS[chip](PART.world(RIDE.motion), files)
+    with board as device:
         if chip == "esp32":
             device.fit_gps(lambda t_s: RIDE.truth(t_s)[1])
         ends = []  # when Ctrl-C is pressed here, seconds
