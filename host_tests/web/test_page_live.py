@@ -248,7 +248,7 @@ def test_a_board_without_the_firmware_is_told_of_the_page_install(line, rider, b
 
 @pytest.mark.parametrize("kind", [LAPTOP, PHONE], ids=["laptop", "phone"])
 def test_without_a_board_a_simulated_one_is_watched(chromium, address, kind):
-    """Also in a browser that cannot speak to a board, as a phone's: a lean to either side, said to be simulated."""
+    """Also in a browser that cannot connect to a board, as a phone's: a lean to either side, said to be simulated."""
     rider = Rider(chromium, address + "live.html", **kind)
     if kind == PHONE:
         rider.page.evaluate("document.documentElement.dataset.serial = 'no'")

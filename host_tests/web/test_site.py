@@ -16,6 +16,7 @@ import pytest
 from command import refused, works
 from kickstand_tools.deploy.firmware_files import firmware_files
 from kickstand_tools.web import install_archive, npm_packages, serve, site
+from kickstand_workshop.bench import pages
 from mpy import run_mpy
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -30,6 +31,13 @@ device = PageDevice()
 device.run_to(1.0)
 print("Raw" in device.take())
 """
+
+
+@pytest.mark.parametrize(("name", "most"), [("", 450_000), ("install.html", 30_000), ("live.html", 35_000)])
+def test_a_page_asks_for_little_until_it_is_ready(chromium, address, files, name, most):
+    found = pages.measure(chromium, address, files, name)
+    assert 0.0 < found.paint_ms < found.ready_ms
+    assert most / 2 < found.size < most
 
 
 def test_it_is_written_to_a_folder(files, tmp_path):

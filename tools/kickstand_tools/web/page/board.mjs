@@ -7,17 +7,17 @@ export class Board {
   #pressedMs = 0;
   #down = false;
 
-  /** heard: an object with the functions ready(), tick(tick), pressed(down), rate(rate), failed(text). */
-  constructor(heard) {
+  /** handlers: an object with the functions ready(), tick(tick), pressed(down), rate(rate), failed(text). */
+  constructor(handlers) {
     this.#worker.onmessage = ({ data }) => {
-      if (data.ready) heard.ready();
-      if (data.failed) heard.failed(data.failed);
-      data.ticks?.forEach(heard.tick);
-      if (data.rate !== undefined) heard.rate(data.rate);
+      if (data.ready) handlers.ready();
+      if (data.failed) handlers.failed(data.failed);
+      data.ticks?.forEach(handlers.tick);
+      if (data.rate !== undefined) handlers.rate(data.rate);
     };
-    this.#worker.onerror = (event) => heard.failed(event.message || "a file of this page cannot be loaded");
+    this.#worker.onerror = (event) => handlers.failed(event.message || "a file of this page cannot be loaded");
     this.#worker.addEventListener("message", ({ data }) => {
-      for (const [, name, value] of data.orders ?? []) if (name === "button") heard.pressed(value);
+      for (const [, name, value] of data.orders ?? []) if (name === "button") handlers.pressed(value);
     });
     document.addEventListener("visibilitychange", () => this.#worker.postMessage({ awake: !document.hidden }));
   }

@@ -7,7 +7,7 @@ const DRAG_DEG = 75; // of lean for half the scene's width
 const TAP_MS = 150;
 
 const byId = (id) => document.getElementById(id);
-// A pose that is chosen already has no use for the space bar
+// On the button of the pose that is chosen already the space bar presses the push button
 const inControl = (target) => target.closest?.("button:not(#pose [aria-pressed=true]), a, summary, select");
 
 /** The push button: mouse, touch, space bar, and the click of a screen reader. press(down) is called. */

@@ -54,8 +54,8 @@ export class Display {
     this.#canvas.width = Math.round(this.#canvas.clientWidth * devicePixelRatio);
     this.#canvas.height = Math.round(this.#canvas.clientHeight * devicePixelRatio);
     // Whole pixels of the screen for each of the OLED's
-    const room = Math.min(this.#canvas.width / (OLED[0] + 2 * OLED_MARGIN), this.#canvas.height / (OLED[1] + 2 * OLED_MARGIN));
-    const scale = Math.max(1, Math.floor(room));
+    const fitting = Math.min(this.#canvas.width / (OLED[0] + 2 * OLED_MARGIN), this.#canvas.height / (OLED[1] + 2 * OLED_MARGIN));
+    const scale = Math.max(1, Math.floor(fitting));
     context.fillStyle = "#05070a";
     context.fillRect(0, 0, this.#canvas.width, this.#canvas.height);
     context.fillStyle = "#e8f4ff";

@@ -17,14 +17,14 @@ export async function fetchedAll(names, base, tell = () => {}) {
   return Promise.all(
     names.map(async (name) => {
       const { body } = await fetched(new URL(name, base));
-      const pieces = [];
+      const chunks = [];
       for (const reader = body.getReader(); ; ) {
         const { value, done: ended } = await reader.read();
         if (ended) break;
-        pieces.push(value);
+        chunks.push(value);
         tell((done += value.length), of);
       }
-      return new Blob(pieces).arrayBuffer();
+      return new Blob(chunks).arrayBuffer();
     }),
   );
 }

@@ -1,4 +1,4 @@
-// What to do next, told from what the display shows: the first minute, and what to look at after a fault.
+// What to do next, read from what the display shows: the first minute, and what to look at after a fault.
 
 import { shows } from "./shows.mjs";
 
@@ -110,10 +110,10 @@ export class Guide {
       case "take-stand":
       case "take-upright":
         if (!right) {
-          const told = stand
+          const said = stand
             ? "You have told the meter that the motorcycle is on its stand. Put it there."
             : "You have told the meter that the motorcycle is upright. Hold it so.";
-          return step(number, told, there);
+          return step(number, said, there);
         }
         if (!standing) return step(number, "The meter waits until the motorcycle is still.");
         if (!stand) return step(number, "Keep it still, until the bar is full.");

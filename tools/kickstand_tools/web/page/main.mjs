@@ -30,7 +30,7 @@ let tick = { t_s: 0, lean_deg: -12, speed_mps: 0, yaw_rate_dps: 0, phase: "kicks
 let screen = { text: ["", ""], shown_deg: null };
 let words = "–"; // in place of a lean that the display does not show
 let drawn = { t_s: -1 };
-let told = null;
+let shownStep = null;
 
 const board = new Board({
   ready() {
@@ -122,8 +122,8 @@ function tell() {
   toggle("wire", !state.plugged);
   toggle("cut", state.armed);
   toggle("power", !state.powered);
-  if (!step || state.stopped || JSON.stringify(step) === told) return;
-  told = JSON.stringify(step);
+  if (!step || state.stopped || JSON.stringify(step) === shownStep) return;
+  shownStep = JSON.stringify(step);
   byId("todo").textContent = step.text;
   if (!step.action && document.activeElement === byId("do")) focusPress();
   byId("do").hidden = !step.action;

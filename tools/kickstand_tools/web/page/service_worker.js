@@ -36,7 +36,7 @@ async function answer(request) {
   if (kept) return kept;
   const fetched = await fetch(request);
   if (fetched.ok) {
-    // What a page loads when it is used is kept from then on, where there is room: else it is fetched again each time
+    // What a page loads when it is used is kept from then on, where the browser has space: else it is fetched again each time
     await cache.put(request, fetched.clone()).catch(() => {});
   }
   return fetched;

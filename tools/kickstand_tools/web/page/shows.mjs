@@ -1,4 +1,4 @@
-// What the display shows, told from its two lines: the words of firmware/kickstand/ui and start.py.
+// What the display shows, read from its two lines: the words of firmware/kickstand/ui and start.py.
 
 // The lines as one text, joined by "|"; the kind; in few words, for beside the true lean. The first that fits counts.
 const KINDS = [

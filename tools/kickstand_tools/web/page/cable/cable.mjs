@@ -1,4 +1,4 @@
-// What the pages that speak to a board share: the browser's serial port, and the tools of the command line on CPython for
+// What the pages that connect to a board share: the browser's serial port, and the tools of the command line on CPython for
 // WebAssembly, which is fetched for this only.
 
 import { keptOffline } from "../offline.mjs";
@@ -12,7 +12,7 @@ const AGAIN_MS = 300;
 export class SerialLine {
   lost = false;
   #port;
-  #heard = [];
+  #received = [];
   #reader;
 
   constructor(port) {
@@ -54,7 +54,7 @@ export class SerialLine {
             this.lost = true; // closed from here
             break;
           }
-          this.#heard.push(value);
+          this.#received.push(value);
         }
       } catch {
         // a disturbance, or the cable was pulled, or the board has restarted
@@ -65,11 +65,11 @@ export class SerialLine {
 
   /** All that has come since the last call, a Uint8Array. */
   take() {
-    const all = new Uint8Array(this.#heard.reduce((length, piece) => length + piece.length, 0));
+    const all = new Uint8Array(this.#received.reduce((length, chunk) => length + chunk.length, 0));
     let at = 0;
-    for (const piece of this.#heard.splice(0)) {
-      all.set(piece, at);
-      at += piece.length;
+    for (const chunk of this.#received.splice(0)) {
+      all.set(chunk, at);
+      at += chunk.length;
     }
     return all;
   }
@@ -137,10 +137,10 @@ export async function choosePort(tell) {
 }
 
 /**
- * What speak(line, name) returns, with a SerialLine open meanwhile, and the port's name for messages. tell(text) is given
+ * What use(line, name) returns, with a SerialLine open meanwhile, and the port's name for messages. tell(text) is given
  * what goes wrong, and null is returned then.
  */
-export async function overCable(port, tell, speak, restarted = false) {
+export async function overCable(port, tell, use, restarted = false) {
   const line = new SerialLine(port);
   try {
     await line.open(restarted);
@@ -150,7 +150,7 @@ export async function overCable(port, tell, speak, restarted = false) {
   }
   try {
     // A line that is not USB, as a bridge to an emulated board is, is given time as `kickstand flash` gives it
-    return await speak(line, port.getInfo?.().usbVendorId ? "this port" : "socket:this port");
+    return await use(line, port.getInfo?.().usbVendorId ? "this port" : "socket:this port");
   } catch (error) {
     console.error(error);
     tell(`This went wrong: ${error.message.trim().split("\n").at(-1)}. Load the page again.`);

@@ -70,10 +70,10 @@ async function install() {
     true, // after the look
   );
   atWork(false);
-  if (said) told(JSON.parse(said));
+  if (said) showResult(JSON.parse(said));
 }
 
-function told({ refused, board: name, copied, kept, config_kept }) {
+function showResult({ refused, board: name, copied, kept, config_kept }) {
   if (refused) {
     tell(`Not installed: ${inPages(refused)}.`);
     return;

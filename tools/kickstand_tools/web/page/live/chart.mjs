@@ -57,19 +57,19 @@ export class Chart {
     pen.strokeStyle = style.getPropertyValue(color);
     pen.lineWidth = 2.5;
     pen.lineJoin = "round";
-    let piece = [];
+    let segment = [];
     for (const moment of moments) {
       const [s] = moment;
       if (s < until - SPAN_S || s > until) continue;
-      const broken = piece.length && s - piece.at(-1)[2] > 0.3;
+      const broken = segment.length && s - segment.at(-1)[2] > 0.3;
       const size = value(moment);
       if (size === null || broken) {
-        line(pen, piece);
-        piece = [];
+        line(pen, segment);
+        segment = [];
       }
-      if (size !== null) piece.push([x(s), y(size), s]);
+      if (size !== null) segment.push([x(s), y(size), s]);
     }
-    line(pen, piece);
+    line(pen, segment);
   }
 }
 

@@ -42,7 +42,7 @@ async function start() {
     furthest = [0, 0];
     tell("The board starts …");
     live = guest.Live();
-    said = JSON.parse(await overCable(port, tell, (line, name) => live.run.callPromising(line, name, heard), again));
+    said = JSON.parse(await overCable(port, tell, (line, name) => live.run.callPromising(line, name, received), again));
     keep(live);
     live = null;
     if (!said?.changed) break;
@@ -58,7 +58,7 @@ async function stayAwake() {
   awake = await navigator.wakeLock?.request("screen").catch(() => null);
 }
 
-function heard(text) {
+function received(text) {
   const reading = JSON.parse(text);
   aligned = reading.aligned;
   show(reading.car ? SIDEWAYS : LEAN);

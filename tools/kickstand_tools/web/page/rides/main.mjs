@@ -31,7 +31,7 @@ export async function openRide(files) {
 /** Find out what the files are that are held, and look at the ride that the new ones make. added: their names. */
 async function sortOut(added) {
   held.show();
-  await work(loaded ? "Looking through the files …" : "Loading what reads rides, 8 MB the first time …", async () => {
+  await work(loaded ? "Looking through the files …" : "Loading the tools, 8 MB the first time …", async () => {
     const mine = turn;
     await keptOffline();
     const unreadable = {};
@@ -47,9 +47,9 @@ async function sortOut(added) {
     byId("which").hidden = rides.length < 2;
     const wrong = added.map((name) => found.why[name]).find(Boolean);
     const now = rides.find((one) => one.given === current);
-    const told = [now, ...rides].find((one) => one && (added.includes(one.calibration) || added.includes(one.track)));
-    const meant = rides.find((one) => one.files.some((name) => added.includes(name))) ?? told;
-    const ride = meant ?? now ?? rides[0];
+    const concerned = [now, ...rides].find((one) => one && (added.includes(one.calibration) || added.includes(one.track)));
+    const matching = rides.find((one) => one.files.some((name) => added.includes(name))) ?? concerned;
+    const ride = matching ?? now ?? rides[0];
     byId("ride").selectedIndex = rides.indexOf(ride);
     const only = !rides.length && Object.values(found.kinds).includes("calibration");
     say(only ? "This is a calibration. Now add the ride that it belongs to." : "");
@@ -138,7 +138,7 @@ function ask(ride) {
 
 async function align() {
   const ride = chosen();
-  await work(`Looking how the sensor sits in ${ride.given} …`, () => tools.call("align", ride.log), async (found) => {
+  await work(`Finding how the sensor sits in ${ride.given} …`, () => tools.call("align", ride.log), async (found) => {
     const [roll, pitch, yaw] = [found.roll_deg, found.pitch_deg, found.yaw_deg];
     const words = `Aligned by this ride: roll is known within ${roll}°, pitch within ${pitch}°, yaw within ${yaw}°.`;
     ride.fitted = { path: found.path, words, bytes: found.made };
@@ -164,7 +164,7 @@ function whole(page, plotly, library) {
 
 async function savePage() {
   const { page, plotly, stem } = looked;
-  await work("Loading what draws the charts …", library, (drawing) => {
+  await work("Loading the charts …", library, (drawing) => {
     save(`${stem}.html`, "text/html", whole(page, plotly, drawing));
     say("");
   }, true);
@@ -176,7 +176,7 @@ const library = () => fetched(PLOTLY).then((answer) => answer.text());
 function showReady(done, of) {
   loaded = of === 1;
   if (loaded) byId("work-bar").removeAttribute("value");
-  byId("ready").textContent = loaded ? "" : `What reads rides is being loaded: ${Math.floor((100 * done) / of)} %.`;
+  byId("ready").textContent = loaded ? "" : `Loading the tools: ${Math.floor((100 * done) / of)} %.`;
 }
 
 /** Fetch while the visitor reads, unless the browser is set to save data. */

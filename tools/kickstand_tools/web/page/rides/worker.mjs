@@ -31,7 +31,7 @@ async function load() {
   postMessage({ ready: true });
 }
 
-/** The files are read where they lie, piece by piece: none is copied into Python's memory as a whole. */
+/** The files are read where they lie, part by part: none is copied into Python's memory as a whole. */
 function give(files) {
   if (mounted) python.FS.unmount(GIVEN);
   mounted = true;

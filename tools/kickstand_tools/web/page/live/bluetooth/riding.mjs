@@ -18,7 +18,7 @@ export class Riding {
   #time = new BoardTime();
   #stops = new Stops();
   #log = new BluetoothLog();
-  #told = "";
+  #said = "";
 
   constructor(shown) {
     this.#shown = shown;
@@ -31,8 +31,8 @@ export class Riding {
     const began = new Date();
     this.#look(true);
     this.#link = new Link(device, {
-      now: (view) => this.#heard(decodeNow(view)),
-      ride: (view) => this.#heardRide(decodeRide(view)),
+      now: (view) => this.#receive(decodeNow(view)),
+      ride: (view) => this.#receiveRide(decodeRide(view)),
       state: (text) => this.#tell(text),
       back: () => this.#time.reconnected(),
     });
@@ -57,7 +57,7 @@ export class Riding {
     if (!on) byId("ride").scrollIntoView({ block: "center" });
   }
 
-  #heard(now) {
+  #receive(now) {
     const { s, lateMs } = this.#time.take(now.ms, performance.now());
     this.#log.take(now, s);
     this.#shown.measure(now.state & CAR ? SIDEWAYS : LEAN);
@@ -69,14 +69,14 @@ export class Riding {
     this.#tell(said(now));
   }
 
-  #heardRide(ride) {
+  #receiveRide(ride) {
     this.#log.takeRide(ride);
     this.#shown.furthest(ride);
   }
 
   #tell(text) {
-    if (text === this.#told) return;
-    this.#told = byId("riding-now").textContent = text;
+    if (text === this.#said) return;
+    this.#said = byId("riding-now").textContent = text;
   }
 }
 

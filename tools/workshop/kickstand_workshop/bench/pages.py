@@ -1,0 +1,72 @@
+"""How soon the site's pages are there on a phone with a quarter of this computer's speed, and how large they are:
+
+.venv/bin/python -m kickstand_workshop.bench.pages
+"""
+
+import gzip
+import statistics
+import threading
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from kickstand_tools.web import serve, site
+
+CHROMIUM = Path("/usr/bin/chromium")
+PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
+READY = {  # by page: what can be used then
+    "": "#kind:enabled",  # the firmware has started
+    "install.html": ".python a:visible",
+    "live.html": "#simulated:enabled",
+    "rides.html": "#sample:enabled",
+}
+SLOWER = 4
+RUNS = 3
+_PAINT = "performance.getEntriesByName('first-contentful-paint')[0].startTime"
+
+
+class Figures(NamedTuple):
+    """Of a page that is opened for the first time. size: of the files that it has asked for until it is ready, as a
+    server compresses them, bytes."""
+
+    paint_ms: float
+    ready_ms: float
+    size: int
+
+
+def measure(browser: Any, address: str, files: dict[str, bytes], name: str) -> Figures:
+    """name: one of READY. address, files: of a server of the site."""
+    context = browser.new_context(service_workers="block", **PHONE)
+    asked: set[str] = set()
+    context.on("request", lambda request: asked.add(request.url.removeprefix(address)))
+    page = context.new_page()
+    context.new_cdp_session(page).send("Emulation.setCPUThrottlingRate", {"rate": SLOWER})
+    page.goto(address + name)
+    page.wait_for_selector(READY[name])
+    ready_ms = page.evaluate("performance.now()")
+    size = sum(len(gzip.compress(files[path or "index.html"])) for path in asked if (path or "index.html") in files)
+    found = Figures(page.evaluate(_PAINT), ready_ms, size)
+    context.close()
+    return found
+
+
+def main() -> None:
+    """Print the medians of RUNS."""
+    from playwright.sync_api import sync_playwright
+
+    files = site.site_files()
+    with serve.server(files, 0) as server, sync_playwright() as playwright:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        address = f"http://{serve.HOST}:{server.server_address[1]}/"
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
+        for name in READY:
+            runs = [measure(browser, address, files, name) for _ in range(RUNS)]
+            paint_ms, ready_ms, size = map(statistics.median, zip(*runs))
+            print(
+                f"{name or 'index.html':12} paint {paint_ms:5.0f} ms  ready {ready_ms:5.0f} ms  {size / 1000:5.0f} kB"
+            )
+        browser.close()
+        server.shutdown()
+
+
+if __name__ == "__main__":
+    main()
