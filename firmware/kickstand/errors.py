@@ -53,6 +53,14 @@ def report(refusal):
 
 
 def attempt(function, *arguments):
+    """tried(), whose Notice is reported."""
+    problem = tried(function, *arguments)
+    if problem:
+        report(problem)
+    return problem
+
+
+def tried(function, *arguments):
     """Call function, which may import modules for the first time. Return None, or a Notice if there is no memory or the
     firmware is incomplete. The modules that it began to import are then removed: MicroPython would keep half of one."""
     before = None
@@ -64,9 +72,7 @@ def attempt(function, *arguments):
         for name in [name for name in sys.modules if name not in before] if before else ():
             del sys.modules[name]
         gc.collect()
-        problem = Notice("incomplete" if isinstance(error, ImportError) else "no-memory", str(error))
-    report(problem)
-    return problem
+        return Notice("incomplete" if isinstance(error, ImportError) else "no-memory", str(error))
 
 
 def checked(machine_code, plain, *arguments):

@@ -12,7 +12,7 @@ import machine
 from . import settings
 from .board import port
 from .devices import open_button, open_lcd, open_sensor
-from .errors import SettingsError
+from .errors import LiveError, SettingsError, report, tried
 from .units import __version__
 
 CHARGE_MS = 100
@@ -72,14 +72,40 @@ def main():
         print("Kickstand stopped. Ctrl-D starts it again; import kickstand; kickstand.status() reports how it is.")
 
 
+def _live(function, *arguments):
+    """Do a step of LIVE. Return None, or what is reported of it: the lean goes on, and without a restart."""
+    problem = tried(function, *arguments)
+    if problem:
+        if problem.code == "no-memory":
+            problem = LiveError("live-memory", *problem.values)
+        report(problem)
+    return problem
+
+
+def _open_radio(opened, pin):
+    from .live.radio import open_radio
+
+    opened.append(open_radio(pin))
+
+
+def _attach(opened, app):
+    radio = opened[0]
+    try:
+        from .live.live import attach
+
+        attach(radio, app)
+    except (ImportError, MemoryError):
+        if not isinstance(radio, LiveError):
+            radio.stop()
+        raise
+
+
 def run(chosen, lcd):
     """Run the app. An exception in it is reported on display and console, then the board restarts."""
-    radio = None
+    radio = []
     try:
-        if chosen.LIVE:  # first: an ESP32-C3 may crash in switching its radio on once 40 KB are allocated
-            from .live.radio import open_radio
-
-            radio = open_radio(chosen.LIVE_PIN)
+        # First: an ESP32-C3 may crash in switching its radio on once 40 KB are allocated
+        problem = _live(_open_radio, radio, chosen.LIVE_PIN) if chosen.LIVE else None
         sensor = open_sensor(chosen)
         for name in STEPS + ["app"]:
             now_ms = ticks_ms()
@@ -91,9 +117,9 @@ def run(chosen, lcd):
         print("Kickstand %s. Ctrl-C stops it." % __version__)
         app = App(chosen, lcd, sensor)
         if chosen.LIVE:
-            from .live.live import attach
-
-            attach(radio, app)
+            problem = problem or _live(_attach, radio, app)
+            if problem:
+                app.screen.notify(problem, ticks_ms())
         app.run()
     except SettingsError:
         raise

@@ -14,8 +14,8 @@ class Meter:
         self.new_trim = None
         self.used = 0
 
-    def use(self, calibration):
-        self.calibration = calibration
+    def use(self, calibration, posed=False):
+        self.calibration, self.posed = calibration, posed
         self.used += 1
 
     def keep_trim(self):
@@ -75,8 +75,10 @@ def test_save_replaces_and_refine_corrects(made):
     active.chip_started(Chip())
     active.save(aligned(0.25))
     assert stored().accel_offset[0] == meter.calibration.accel_offset[0] == 0.25
+    assert meter.posed
     active.refine(aligned(0.5 - 1 / 64))
     assert stored().accel_offset[0] == meter.calibration.accel_offset[0] == 0.5 - 1 / 64
+    assert not meter.posed
     assert changes == [True, True, False]
     assert active.value.scales()[1] == 1 / 65.5
 

@@ -183,16 +183,3 @@ def test_a_trim_may_be_stored_beside_a_record_that_never_was_this_sensors(store,
     again.save(calibration(4))
     assert again.unchanged()
     assert mark_of(Store(0x68, 16, str(tmp_path)).load()) == 4
-
-
-def test_nothing_is_stored_over_a_record_that_misread_for_a_while(store, tmp_path):
-    """A voltage sag while loading: the older record is in use, but the newer one is whole."""
-    store.save(calibration(1))
-    store.save(calibration(2))
-    newest = newest_file(tmp_path, store)
-    whole = newest.read_bytes()
-    newest.write_bytes(b"")
-    again = Store(0x68, 8, str(tmp_path))
-    assert mark_of(again.load()) == 1
-    newest.write_bytes(whole)
-    assert not again.unchanged()

@@ -5,7 +5,7 @@ import re
 from typing import Any
 
 import pytest
-from emulated import CHIPS, calibrated, firmware, leaning, pico, reset_in_a_read, shows
+from emulated import CHIPS, calibrated, firmware, leaning, reset_in_a_read, shows
 from kickstand_tools.simulated_board.lcd import shown_lean
 from kickstand_tools.simulation.scripted.script import Ride, kickstand, upright
 from kickstand_tools.simulation.scripted.sensor_errors import Sensor
@@ -24,8 +24,7 @@ FAULT_S = 0.6
 @pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_a_new_board_is_aligned_by_two_presses_and_keeps_it(chip):
     """Uncalibrated, kickstand, upright, power-cycle, leaned: the display reads the lean."""
-    pose_s = {"pico": 5.5, "esp32": 6.5}[chip]  # which starts later
-    ride = Ride([kickstand(pose_s), upright(5.5), upright(1e6, lean_deg=LEAN_DEG)])
+    ride = Ride([kickstand(5.5), upright(5.5), upright(1e6, lean_deg=LEAN_DEG)])
     part = Sensor(seed=1, share=0.1)  # its accelerometer is not calibrated here: that shall cost no degrees
     device = CHIPS[chip](part.world(ride.motion), firmware(chip))
     device.power_on()
@@ -130,11 +129,13 @@ def test_a_reset_in_mid_read_frees_the_bus(riding):
     starts_again(riding)
 
 
-@pytest.mark.parametrize("display", ["ssd1306", "sh1106"])
-def test_an_oled_is_found_and_shows_the_lean_in_large_digits(display):
-    """With MicroPython's own framebuf, over the chip's own I2C."""
-    device = pico(leaning(LEAN_DEG), firmware() | calibrated(), display=display)
-    device.power_on()
-    device.run_until(lambda: shown_lean(device.lcd()) == LEAN_DEG, 3.0)
-    oled: Any = device.board.lcd
-    assert oled.unknown == 0 and not device.board.too_fast
+@pytest.mark.parametrize(
+    ("chip", "display"),
+    [("pico", "ssd1306"), ("pico", "sh1106"), pytest.param("esp32", "ssd1306", marks=pytest.mark.esp32)],
+)
+def test_an_oled_is_found_and_shows_the_lean_in_large_digits(chip, display):
+    """With MicroPython's own framebuf, over a Pico's own I2C and an ESP32's pins."""
+    with CHIPS[chip](leaning(LEAN_DEG), firmware(chip) | calibrated(), display=display) as device:
+        device.run_until(lambda: shown_lean(device.lcd()) == LEAN_DEG, 3.0)
+        oled: Any = device.board.lcd
+        assert oled.unknown == 0 and not device.board.too_fast

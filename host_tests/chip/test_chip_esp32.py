@@ -4,14 +4,19 @@ in test_chip_device.py.
 
 import hashlib
 import json
+import math
 import re
 import time
 
 import device_runs
 import pytest
-from emulated import calibrated, esp32, firmware, leaning, modules, shows
+from emulated import PART, calibrated, esp32, firmware, leaning, modules, shows
 from kickstand.calibration.store import Store
+from kickstand.rides.block import BLOCK
+from kickstand.rides.flash_ring import PART_BLOCKS
+from kickstand.rides.ride_paths import part_path
 from kickstand_tools.simulated_board.lcd import shown_lean
+from kickstand_tools.simulation.scripted.script import Ride, accelerate, turn, wait
 from test_chip_recorder import FEED, rides
 
 pytestmark = [pytest.mark.chip, pytest.mark.esp32]
@@ -43,7 +48,7 @@ def begun(pause_s):
     """A digest of when the display showed what and the sensor was read. pause_s: the host's, every now and then."""
     seen = []
     with board() as device:
-        while device.time_s < 2.1:
+        while device.time_s < 1.8:
             device.run(0.05, lambda: time.sleep(pause_s))
             seen.append((device.time_s, device.lcd(), dict(device.board.sensor_bus.transfers), bytes(device.said)))
         seen.append((device.exec("import time\nprint(time.ticks_us())"), device.file_system))
@@ -117,24 +122,27 @@ def test_wheel_and_gps():
     with board(files=modules("esp32")) as device:
         device.fit_wheel(lambda t_s: 15.0)
         device.fit_gps(lambda t_s: 15.0)
-        for source in ("wheel", "gps"):
-            speeds = json.loads(device.exec(_LISTEN % source, 20.0).splitlines()[-1])
-            assert len(speeds) >= 2
-            assert speeds == pytest.approx([15.0] * len(speeds), abs=0.3)
+        wheel, gps = json.loads(device.exec(_LISTEN, 20.0).splitlines()[-1])
+    for speeds in (wheel, gps):
+        assert len(speeds) >= 2
+        assert speeds == pytest.approx([15.0] * len(speeds), abs=0.3)
 
 
 _LISTEN = """
 from time import sleep_ms, ticks_add, ticks_diff, ticks_ms
 from kickstand.settings import Settings
 from kickstand.speed.source import open_speed
-class Config:
-    SPEED = "%s"
-speed = open_speed(Settings(Config))
-got, end = [], ticks_add(ticks_ms(), 1800)
+def opened(source):
+    class Config:
+        SPEED = source
+    return open_speed(Settings(Config))
+speeds = opened("wheel"), opened("gps")
+got, end = [[], []], ticks_add(ticks_ms(), 1800)
 while ticks_diff(end, ticks_ms()) > 0:
-    new = speed.poll(ticks_ms())
-    if new is not None:
-        got.append(new)
+    for i in range(2):
+        new = speeds[i].poll(ticks_ms())
+        if new is not None:
+            got[i].append(new)
     sleep_ms(10)
 print(got)
 """
@@ -219,3 +227,59 @@ def test_wherever_the_power_goes_all_but_the_last_block_of_a_ride_is_kept():
         assert len(blocks) >= seen - 1
         seen = max(seen, len(blocks))
     assert seen >= 3
+
+
+def test_a_ride_makes_room_oldest_first():
+    """In a flash full of rides, so many of the first parts go as it takes, and not one more."""
+    parts = [part_path("rides", ride, number) for ride in (1, 2) for number in range(11)]
+    full = dict.fromkeys(parts, bytes(PART_BLOCKS * BLOCK))
+    with board(files=modules("esp32") | full) as device:
+        free = "print(flash_ring.free_bytes('/'), recorder.keeper.needed)"
+        before, needed = map(int, device.exec(FEED + "from kickstand.rides import flash_ring\n" + free).split())
+        device.exec("recorder.start(Chip(), Calibration())\nfeed(2)\nrecorder.stop()", 30.0)
+        files = device.files()
+    gone = [path for path in parts if path not in files]
+    short = needed - (before - 2 * BLOCK)  # of bytes, once the ride has its directory
+    assert short > 0
+    assert gone == parts[: math.ceil(short / (PART_BLOCKS * BLOCK))]
+    assert FILES.items() <= files.items()
+    assert [block.sequence for block in rides({"rides/3": files[part_path("rides", 3, 0)]})[3]] == [0, 1]
+
+
+_MINUTES = 10
+_HEAP = """
+import gc
+from time import ticks_add, ticks_diff, ticks_ms
+from kickstand import app, devices, settings
+class Config:
+    RECORD = True
+    SPEED = "wheel"
+    WATCHDOG = False
+class Measured(app.App):
+    due_ms, left = ticks_add(ticks_ms(), 15000), 4 * MINUTES
+    def turn(self):
+        app.App.turn(self)
+        if ticks_diff(ticks_ms(), self.due_ms) >= 0:
+            gc.collect()
+            print(gc.mem_alloc())
+            if not self.left:
+                raise KeyboardInterrupt
+            self.due_ms, self.left = ticks_add(self.due_ms, 15000), self.left - 1
+chosen = settings.Settings(Config)
+try:
+    Measured(chosen, devices.open_lcd(chosen), devices.open_sensor(chosen)).run()
+except KeyboardInterrupt:
+    pass
+"""
+
+
+@pytest.mark.nightly
+def test_the_heap_does_not_grow():
+    """Minutes of bends, recorded, with a wheel's speed."""
+    ride = Ride([wait(2.0), accelerate(15.0, 3.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 10 * _MINUTES)
+    with board(world=PART.world(ride.motion), files=modules("esp32")) as device:
+        device.fit_wheel(lambda t_s: ride.truth(t_s)[1])
+        heap = [*map(int, device.exec(_HEAP.replace("MINUTES", str(_MINUTES)), 60.0 * _MINUTES + 30.0).split())]
+    print("bytes of heap in use every 15 s:", heap)
+    assert len(heap) == 4 * _MINUTES + 1
+    assert max(heap) - heap[0] < 2000

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import command
 import emulated_port
+import numpy as np
 import pytest
 from emulated import CHIPS, PART, calibrated, firmware
 from kickstand_tools.calibration.file import read_calibration
@@ -163,9 +164,12 @@ def test_a_board_records_again_after_a_cut(at_prompt, operation):
 @pytest.mark.long
 @pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])])
 def test_pull_and_record_through_mpremote(tmp_path, monkeypatch, chip):
-    """A ride that is being recorded is ended and pulled; then, from a Pico, a log is streamed. Both replay."""
-    files = firmware(chip) | calibrated() | {"config.py": b"RECORD = True\n"}
+    """A ride that is being recorded, with an ESP32's GPS, is ended and pulled; then a log is streamed. Both replay."""
+    config = "RECORD = True\n" + {"pico": "", "esp32": 'SPEED = "gps"\n'}[chip]
+    files = firmware(chip) | calibrated() | {"config.py": config.encode()}
     with CHIPS[chip](PART.world(RIDE.motion), files) as device:
+        if chip == "esp32":
+            device.fit_gps(lambda t_s: RIDE.truth(t_s)[1])
         ends = []  # when Ctrl-C is pressed here, seconds
 
         def ctrl_c():
@@ -174,21 +178,22 @@ def test_pull_and_record_through_mpremote(tmp_path, monkeypatch, chip):
                 signal.raise_signal(signal.SIGINT)
 
         emulated_port.plug_in(monkeypatch, device, ctrl_c)
-        device.run({"pico": 4.5, "esp32": 5.5}[chip])
+        device.run(6.5)
         result = command.works("pull", "--port", emulated_port.NAME, "--out", tmp_path, "--delete")
         assert result.err == ""
         assert "deleted from the board: ride 1" in result.out
         pulled = next(tmp_path.glob("ride-00001-*.csv.gz"))
-        assert len(read_log(pulled).time_us) > 150
+        log = read_log(pulled)
+        assert len(log.time_us) > 150
+        assert np.isfinite(log.lat_deg).any() == (chip == "esp32")
 
-        logs = [pulled]
-        if chip == "pico":
-            logs.append(tmp_path / "live.csv")
-            ends.append(device.time_s + 3.0)
-            result = command.works("record", "--port", emulated_port.NAME, "--out", tmp_path / "live.csv")
-            assert result.err == ""
-            assert result.out.startswith("recording from ")
-            assert re.search(r"written: .*live\.csv, [\d.]+ s, \d+ readings", result.out)
-    for log in logs:
-        cal = ride_log.calibration_path(log)
-        command.works("replay", log, "--calibration", cal, "--out", tmp_path / "lean.csv")
+        live = tmp_path / "live.csv"
+        device.run(2.0)  # an ESP32 that is starting does not hear its console, and would be asked again after 10 s
+        ends.append(device.time_s + 5.0)
+        result = command.works("record", "--port", emulated_port.NAME, "--out", live)
+        assert result.err == ""
+        assert result.out.startswith("recording from ")
+        assert re.search(r"written: .*live\.csv, [\d.]+ s, \d+ readings", result.out)
+    for path in (pulled, live):
+        cal = ride_log.calibration_path(path)
+        command.works("replay", path, "--calibration", cal, "--out", tmp_path / "lean.csv")

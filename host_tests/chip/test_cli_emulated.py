@@ -23,16 +23,24 @@ pytestmark = pytest.mark.chip
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a pseudo-terminal")
-def test_emulate_in_a_terminal():
+@pytest.mark.parametrize(
+    ("chip", "name", "library"),
+    [
+        ("rp2040", "Pico", image),
+        pytest.param("esp32", "ESP32", esp32_library, marks=pytest.mark.esp32),
+    ],
+    ids=["rp2040", "esp32"],
+)
+def test_emulate_in_a_terminal(chip, name, library):
     """The bike is drawn, the button and the end follow the keys."""
     try:
-        image.find()
+        library.find()
     except InputError as error:
         pytest.skip(str(error))
     with socket.create_server(("127.0.0.1", 0)) as found:
         free = found.getsockname()[1]
-    with Terminal([sys.executable, "-m", "kickstand_tools.cli", "emulate", "--port", str(free)]) as at:
-        at.wait_for("Kickstand on an emulated Pico, socket://")
+    with Terminal([sys.executable, "-m", "kickstand_tools.cli", "emulate", "--chip", chip, "--port", str(free)]) as at:
+        at.wait_for(f"Kickstand on an emulated {name}, socket://")
         at.wait_for("No firmware on it yet, so the display is blank. In another terminal:")
         at.wait_for(f"kickstand flash --port socket://127.0.0.1:{free}")
         at.press("B")
@@ -84,8 +92,14 @@ class Emulating(threading.Thread):
         """The emulated board's."""
         return self.device.time_s if self.device else 0.0
 
+    def sleep(self, seconds):
+        """By the board's time."""
+        end_s = self.time_s() + seconds
+        while self.time_s() < end_s and self.is_alive():
+            time.sleep(0.001)
 
-@pytest.mark.parametrize("chip", ["rp2040"])
+
+@pytest.mark.parametrize("chip", ["rp2040", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])])
 def test_flash_and_status_on_the_emulated_board(monkeypatch, chip):
     """Onto an older version with an edited config; then the bike's ride begins, and the display says what is to be
     done."""
@@ -100,9 +114,10 @@ def test_flash_and_status_on_the_emulated_board(monkeypatch, chip):
     try:
         address = re.search(r"socket://\S+?:\d+", emulating.said.get())
         assert address
-        clock = types.SimpleNamespace(monotonic=emulating.time_s, sleep=lambda seconds: time.sleep(seconds / 10))
+        clock = types.SimpleNamespace(monotonic=emulating.time_s, sleep=emulating.sleep)
         for module in (transport_serial, connection):
             monkeypatch.setattr(module, "time", clock)
+        emulating.sleep(2.0)  # an ESP32 that is starting does not hear its console
         flashed = command.works("flash", "--port", address[0]).out
         assert f"{names[chip]}, MicroPython 1.26.1 on {address[0]}" in flashed
         assert "kept: config.py" in flashed

@@ -83,13 +83,6 @@ def test_a_sample_that_a_supply_dip_has_torn_is_not_shown(aligned):
     assert record.first("Sensor reset", FAULT_S) < FAULT_S + 0.3
 
 
-def test_a_who_am_i_misread_is_read_again(aligned):
-    """Or it would look for the calibration of a chip that is not there."""
-    record = devices.run("cpython", aligned, standing([["corrupt", [0x68, 1, 0, 0x10]]], until=3))
-    assert record.first("Unknown|Not aligned") == math.inf
-    assert record.lean_at(2.5) == STATIC
-
-
 @pytest.mark.parametrize("mask", [0x01, 0x80])
 def test_a_flipped_bit_passes_in_a_moment(mask, aligned):
     record = devices.run("cpython", aligned, standing([["corrupt", [0x68, 400, 0, mask]]], until=10))

@@ -24,22 +24,6 @@ def test_the_lean_is_that_of_the_character_display(engine, display, one_bus, tmp
         assert leans and all(abs(lean - lean_deg) < 4 for lean in leans)
 
 
-@pytest.mark.parametrize("display", ["lcd", *OLEDS])
-def test_unplugged_shorted_and_cut_it_comes_back_within_two_seconds(display, tmp_path, capsys):
-    address = 0x27 if display == "lcd" else 0x3C
-    faults = [
-        ["unplug_lcd", [20.0, 0.5]],
-        ["stuck_sda", [23.0, 8, True]],
-        ["nack_for", [address, 25.0, 0.3]],
-        ["cut", [address, 27.0, 20]],
-        ["unplug_lcd", [28.0, 0.001]],
-    ]
-    seen = devices.run("cpython", tmp_path, devices.ALIGNED | {"board": {"display": display}, "faults": faults}, capsys)
-    for t_s in (22.5, 24.9, 26.9, 30.0):
-        assert seen.leans(t_s - 0.2, t_s + 0.1), t_s
-    assert all(abs(lean + 30) < 4 for lean in seen.leans(29.5, 30.5))
-
-
 @pytest.mark.parametrize("engine", engines.ENGINES[1:])
 @pytest.mark.parametrize("display", ["lcd", "ssd1306"])
 def test_a_thousand_presses_and_unplugs(engine, display, tmp_path):

@@ -15,10 +15,11 @@ from kickstand_workshop.bench.boot import in_order
 
 
 @pytest.fixture
-def board(tmp_path, monkeypatch):
-    """A board with nothing in its flash."""
+def board(request, tmp_path, monkeypatch):
+    """A board with nothing in its flash; an indirect parameter: arguments of Board."""
     monkeypatch.chdir(tmp_path)
-    made = Board(lambda t_s: (0.002 * math.sin(700 * t_s), 0.0, 1.0, 0.0, 0.0, 0.0, 25.0))
+    fitted = getattr(request, "param", {})
+    made = Board(lambda t_s: (0.002 * math.sin(700 * t_s), 0.0, 1.0, 0.0, 0.0, 0.0, 25.0), **fitted)
     with made:
         yield made
 
@@ -72,7 +73,7 @@ def without(request, monkeypatch):
         real = builtins.__import__
 
         def importing(name, globals=None, locals=None, fromlist=(), level=0):
-            if name == ending or name.endswith("." + ending):
+            if ending in (name.rpartition(".")[2], *(fromlist or ())):
                 if request.param == "missing":
                     raise ImportError(f"no module named '{name}'")
                 raise MemoryError("memory allocation failed")
@@ -147,6 +148,52 @@ def test_a_board_that_is_to_record_from_power_on_and_cannot_shows_the_lean(modul
     assert board.run(start.main, 8.0) == "off"
     assert [t_s for t_s, lines in seen if lines == said] == [pytest.approx(0.6, abs=0.5)]
     assert seen[-1][1][0].startswith("Raw")
+
+
+@pytest.mark.parametrize("module", ["radio", "live"])
+@pytest.mark.parametrize("board", [{"machine": "pico w"}], indirect=True)
+def test_without_what_live_needs_the_lean_goes_on(module, without, board, monkeypatch, capsys):
+    """Said once, and without a restart. The radio is off then."""
+    from kickstand import settings, start
+
+    monkeypatch.setattr(settings, "load", lambda: settings.Settings(type("Config", (), {"LIVE": True})))
+    said, seen = without(module), watch(board)
+    assert board.run(start.main, 30.0) == "off"
+    assert board.boots == 1 and seen[-1][1][0].startswith("Raw")
+    memory = ["No Bluetooth:   ", "no memory       "]
+    assert (memory if said == NO_MEMORY else INCOMPLETE) in [lines for _, lines in seen]
+    words = "LIVE: too little memory (memory allocation" if said == NO_MEMORY else "incomplete firmware (no module"
+    assert capsys.readouterr().out.count(words) == 1
+    assert not board.radio.active
+
+
+@pytest.mark.parametrize("board", [{"display": "ssd1306"}], indirect=True)
+def test_without_its_pictures_an_oled_shows_lines(without, board, monkeypatch, capsys):
+    from kickstand import start
+    from kickstand.board import display
+    from kickstand.ui import page_ring
+
+    shown = []
+    monkeypatch.setattr(display.Display, "show", lambda _, *lines: shown.append(lines))
+    monkeypatch.setattr(page_ring.PageRing, "lines", lambda ring, now_ms: ring._page(page_ring.pages.lean))
+    said = without("glance")
+    assert board.run(start.main, 5.0) == "off"
+    assert board.boots == 1 and ("Lean  --", "not sure yet") in shown
+    words = "no memory for that" if said == NO_MEMORY else "incomplete firmware"
+    assert capsys.readouterr().out.count(words) == 1
+
+
+@pytest.mark.parametrize("board", [{"display": "ssd1306"}], indirect=True)
+def test_a_display_without_its_driver_is_asked_for_ever_more_seldom(without, board, monkeypatch, capsys):
+    from kickstand import start
+    from kickstand.board import display
+
+    monkeypatch.setattr(display, "MOST_WAIT_MS", 6_400)
+    said = without("oled")
+    assert board.run(start.main, 31.0) == "off"
+    words = "no memory for that" if said == NO_MEMORY else "incomplete firmware"
+    times = capsys.readouterr().out.count(words)
+    assert 8 <= times <= 10 and board.boots == 1  # after 0.4, 0.8, 1.6, 3.2, 6.4 s, then every 6.4 s; once at the start
 
 
 def test_what_was_imported_in_vain_is_forgotten_and_can_be_tried_again(tmp_path):

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 
 import numpy as np
 import pytest
@@ -179,3 +180,17 @@ def test_bands_of_simulated_rides_stand_beside_those_of_recordings(tmp_path):
 def test_bands_of_a_recording_without_riding_are_refused(tmp_path):
     works("simulate", "--profile", "parked", "--seconds", "100", "--out", tmp_path)
     refused(tmp_path, "bands", tmp_path / "RIDE.csv", words="RIDE.csv")
+
+
+def test_simulate_states_both_leans_on_the_stand(tmp_path):
+    """The pose is not taken where the ride begins."""
+    arguments = "--profile", "street", "--seconds", "20", "--pitch-change", "0", "--out", tmp_path
+    said = works("simulate", *arguments).out.splitlines()[-1]
+    pose, begin = (float(number) for number in re.findall(r"-\d+\.\d", said))
+    made = [tmp_path / name for name in ("KICKSTAND.csv", "UPRIGHT.csv")]
+    found = works("calibrate", "two", *made, "--out", tmp_path / "C.json").out
+    tilt = re.search(r"([\d.]+) degrees from the kickstand", found)
+    assert tilt and float(tilt[1]) == pytest.approx(-pose, abs=0.8)  # without the six positions
+    truth = (tmp_path / "TRUTH.csv").read_text().splitlines()[1]
+    assert float(truth.split(",")[1]) == pytest.approx(begin, abs=0.05)
+    assert abs(pose - begin) > 1.0

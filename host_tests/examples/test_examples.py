@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import command
 import engines
 import pytest
 from kickstand_tools import firmware_path
@@ -83,6 +84,13 @@ def test_user_page(engine, tmp_path):
     assert re.fullmatch(r"Lean  3\d deg *", frames[-1][1])
     _, frames = run(engine, tmp_path, "user_page.py", 10.0, presses=[4, 5, 6, 7, 8, 9])
     assert frames[-1][0].startswith("Lean")
+
+
+@pytest.mark.parametrize("engine", engines.ENGINES)
+def test_tried_it_is_turned_to_after_the_first_turn(engine):
+    said = command.works("try", EXAMPLES / "user_page.py", *["--cpython"] * (engine == "cpython")).out
+    loads = [float(load) for load in re.findall(r"\|Load +(\d\.\d\d) x", said)]
+    assert max(loads) == pytest.approx(1.41, abs=0.08)  # 1 / cos(45 degrees), in the ride's last turn
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)

@@ -1,12 +1,10 @@
 """The command: what it took for what, and a log that every other command reads."""
 
-import json
-
 import app_exports
 import command
 import numpy as np
 import pytest
-from app_exports import PHONE, riding
+from app_exports import riding
 from kickstand_tools import api
 
 
@@ -27,23 +25,6 @@ def test_gaps_are_reported(tmp_path):
         "import", app_exports.into(tmp_path / "p", app_exports.phyphox(ride)), "--out", tmp_path / "R.csv"
     )
     assert "100 a second, 1 gap of 2.0 s in all\n" in result.out
-
-
-def test_the_log_is_read_by_every_other_command(tmp_path):
-    """Packed, too."""
-    source = app_exports.into(tmp_path / "s.zip", app_exports.sensor_logger(riding().every(2), "ios"))
-    log, cal = tmp_path / "RIDE.csv.gz", tmp_path / "RIDE.cal.json"
-    command.works("import", source, "--out", log)
-    api.write_calibration(cal, api.CalibrationFile(vehicle_from_sensor=PHONE.T, aligned=True))
-    command.works("replay", log, "--calibration", cal, "--out", tmp_path / "LEAN.csv")
-    lean = np.genfromtxt(tmp_path / "LEAN.csv", delimiter=",", names=True)
-    ride = riding()
-    wrong = lean["lean_deg"] - np.interp(lean["t_s"], ride.t_s, ride.lean_deg)
-    assert np.sqrt(np.mean(wrong**2)) < 0.5
-    report = json.loads(command.works("report", log, "--json").out)
-    assert report
-    for form in ("csv", "vbo", "racechrono"):
-        command.works("export", log, "--to", form, "--out", tmp_path / f"out.{form}")
 
 
 def test_vehicle_axes_are_reported_and_need_no_other_alignment(tmp_path):

@@ -4,7 +4,7 @@ import app_exports
 import command
 import numpy as np
 import pytest
-from app_exports import PHONE, riding
+from app_exports import riding
 from kickstand_tools import api
 from kickstand_tools.imports.join import join, on_clock
 from kickstand_tools.imports.recording import Recording, Sensor, Track
@@ -135,17 +135,3 @@ def test_from_and_to_count_from_the_recordings_own_start(tmp_path):
     command.refused(
         tmp_path, "import", source, "--out", out, *late, words="lasts 28.0 s: there is nothing from 100 s on"
     )
-
-
-def test_a_real_ride_as_a_phone_would_export_it(tmp_path, shared_data):
-    """The same readings from the log and from an iPhone's Sensor Logger export of it."""
-    log = api.read_log(shared_data / "motorcycle-ride.csv.gz")
-    none = np.zeros(len(log.t_s))
-    turned = app_exports.Riding(log.t_s, log.accel_g @ PHONE, log.gyro_dps @ PHONE, none, none, none, none)
-    files = app_exports.sensor_logger(turned, "ios")
-    found = api.import_recording(app_exports.into(tmp_path / "s.zip", files | {"Location.csv": ""}))
-    at_s = found.log.t_s + found.log.start_s
-    for axis in range(3):
-        assert np.max(np.abs(found.log.accel_g[:, axis] - np.interp(at_s, log.t_s, log.accel_g[:, axis]))) < 1e-4
-        between = np.abs(found.log.gyro_dps[:, axis] - np.interp(at_s, log.t_s, log.gyro_dps[:, axis]))
-        assert np.median(between) < 1.0  # its gyro has half the rate

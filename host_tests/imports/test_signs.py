@@ -17,14 +17,6 @@ def up_at_rest(found: api.Imported) -> np.ndarray:
 UP = PHONE @ [0.0, 1.0, 0.0]
 
 
-@pytest.mark.parametrize(("platform", "standard"), [("android", False), ("ios", False), ("ios", True)])
-def test_sensor_logger_says_whose_signs_it_has(tmp_path, platform, standard):
-    files = app_exports.sensor_logger(riding().every(4), platform, standard)
-    found = api.import_recording(app_exports.into(tmp_path / "s", files))
-    assert up_at_rest(found) == pytest.approx(UP, abs=0.02)
-    assert not found.notices
-
-
 def test_sensor_loggers_raw_accelerometer_is_in_g_on_an_iphone(tmp_path):
     ride = riding().every(4)
     files = app_exports.sensor_logger(ride, "ios")
@@ -122,15 +114,6 @@ def test_no_turns_show_no_sign(tmp_path):
     ride.lat_deg, ride.lon_deg = 52.5 + 1e-5 * ride.t_s, np.full(len(ride.t_s), 13.4)
     (tmp_path / "r.csv").write_text(app_exports.racechrono(ride))
     assert [notice.code for notice in api.import_recording(tmp_path / "r.csv").notices] == ["import-sign"]
-
-
-@pytest.mark.parametrize("late_s", [0.0, 1.0, 2.0])
-def test_the_track_may_be_late(tmp_path, late_s):
-    ride = riding().every(2)
-    for name in ("lat_deg", "lon_deg"):
-        setattr(ride, name, np.interp(ride.t_s - late_s, ride.t_s, getattr(ride, name)))
-    (tmp_path / "r.csv").write_text(app_exports.racechrono(ride, -1.0))
-    assert up_at_rest(api.import_recording(tmp_path / "r.csv")) == pytest.approx(UP, abs=0.02)
 
 
 @pytest.mark.parametrize("late_s", [0.0, 1.0, 1.5, 2.0])

@@ -1,6 +1,5 @@
 """Each driver alone: what it sends on the bus, what it takes of the heap, what the button makes of presses."""
 
-import itertools
 import re
 import struct
 import textwrap
@@ -83,118 +82,6 @@ def test_a_stuck_bus_is_freed_and_a_dead_one_is_reported(board):
     assert not on(board, lambda: freed(1000))
     with pytest.raises(OSError, match="SDA is held low"):
         on(board, sensor_i2c)
-
-
-def display(line1=None):
-    """A display; with a first line that it shows already."""
-    from kickstand.board import i2c_bus
-    from kickstand.board.display import Display
-
-    lcd = Display(lambda hz: i2c_bus.open_i2c(1, 6, 7, hz))
-    if line1 is not None:
-        lcd.show(line1.replace("°", "\xdf"), "")
-        lcd.flush()
-    return lcd
-
-
-def turns(lcd, count, ms=10, after=lambda: None):
-    """So many turns of the loop."""
-    from time import sleep_ms, ticks_ms  # pyright: ignore[reportAttributeAccessIssue]
-
-    for _ in range(count):
-        lcd.tick(ticks_ms())
-        sleep_ms(ms)
-        after()
-
-
-def test_only_changed_lines_are_sent(board):
-    """Each takes three transfers: one asks whether the display has kept its power, one writes dashes, one the line."""
-
-    def run():
-        lcd = display("first")
-        lcd.show("first", "second")
-        lcd.flush()
-        counts = [board.lcd_bus.transfers[0x27]]
-        for line1, line2 in (("first", "second"), ("first", "third"), ("a", "b")):
-            lcd.show(line1, line2)
-            turns(lcd, 8, 6)  # under 0.2 s in all: then it is asked whether it is still there
-            counts.append(board.lcd_bus.transfers[0x27])
-        return [after - before for before, after in itertools.pairwise(counts)]
-
-    assert on(board, run) == [0, 3, 6]
-    assert board.lcd.text() == ["a" + " " * 15, "b" + " " * 15]
-
-
-def test_only_what_has_changed_of_a_line_is_sent(board):
-    """That takes four bytes a character, and four for its place; twice, if it is more than one character."""
-    sent = []
-
-    def run():
-        lcd = display("Lean  23° right")
-        original = board.lcd.write_byte
-        board.lcd.write_byte = lambda value: sent.append(value) or original(value)
-        turns(lcd, 1, 6)
-        for line, count in (("Lean  24\xdf right", 4 * 2), ("Lean   4\xdf left", 2 * 4 * (1 + 9))):
-            del sent[:]
-            lcd.show(line, "")
-            turns(lcd, 1, 6)
-            assert len(sent) == count
-
-    on(board, run)
-    assert board.lcd.text()[0] == "Lean   4\xb0 left  "
-
-
-@pytest.mark.parametrize("gap_s", [0.001, 0.1])
-@pytest.mark.parametrize("ticks", [3, 8, 12, 20])  # during its initialisation, and after
-@pytest.mark.parametrize("then", ["Lean  12\xdf", "Lean  13\xdf"])
-def test_a_display_that_lost_its_power_for_a_moment_is_started_again(board, gap_s, ticks, then):
-    """Even if no transfer failed in that moment: the PCF8574's pins are high after power-up, where E had been low. Also
-    if what is sent next is a text or a step of the initialisation, which makes E low again."""
-
-    def run():
-        lcd = display()
-        lcd.show("Lean  12\xdf", "")
-        turns(lcd, ticks)
-        board.remove_lcd()
-        board.at(board.clock.now_us / 1e6 + gap_s, board.fit_lcd)
-        board.clock.advance(round(gap_s * 1e6) + 1000)
-        assert board.lcd.text()[0].strip() == ""
-        lcd.show(then, "")
-        turns(lcd, 50)
-
-    on(board, run)
-    assert board.lcd.text()[0] == then.replace("\xdf", "\xb0") + "       "
-
-
-@pytest.mark.parametrize("byte", range(1, 130, 9))
-def test_a_line_that_breaks_off_is_no_reading(board, byte):
-    """Half of the new lean beside half of the old one could pass for a third. It is written again within 0.4 s."""
-    old, new = "Lean  19° right ", "Lean  28° left  "
-    seen = set()
-
-    def run():
-        lcd = display(old)
-        board.faults.cut(0x27, 0.0, byte)
-        lcd.show(new.replace("°", "\xdf"), "")
-        turns(lcd, 40, after=lambda: seen.add(board.lcd.text()[0]))
-
-    on(board, run)
-    assert board.lcd.text()[0] == new
-    assert all(line in (old, new) or "-" in line[:14] for line in seen), seen
-
-
-def test_a_display_out_of_step_is_put_right_by_the_next_initialisation(board):
-    seen = set()
-
-    def run():
-        lcd = display("Lean  12°")
-        board.lcd.slip()
-        lcd.show("Lean  13\xdf", "")
-        turns(lcd, 1100, after=lambda: seen.add(board.lcd.text()[0][:8]))
-
-    on(board, run)
-    assert seen - {"Lean  12", "Lean  13"}
-    assert board.lcd.text()[0] == "Lean  13°       "
 
 
 @pytest.mark.parametrize(

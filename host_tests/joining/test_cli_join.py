@@ -122,14 +122,6 @@ def test_tracks_are_read_with_their_speed(tmp_path, track, kind):
         assert 0.5 < np.mean(known) < 0.95  # not where it stands
 
 
-def test_a_fit_file_is_joined(tmp_path, log, track):
-    """Its whole seconds only move the clock."""
-    fit = phone_tracks.write_fit(tmp_path / "track.fit", track)
-    command.works("join", log, fit, "--out", tmp_path / "JOINED.csv")
-    there = placed(tmp_path / "JOINED.csv")
-    assert np.allclose(there["utc_s"] - there["t_s"], phone_tracks.START_UTC_S - 0.3 + 0.5, atol=0.2)
-
-
 def test_what_is_no_track_of_this_ride_is_refused(tmp_path, log, track):
     other = phone_tracks.track(api.simulate_ride("hills", seed=2, seconds=200.0))
     for name, words, make in (

@@ -61,6 +61,23 @@ def test_with_the_nose_far_up_or_down_there_is_no_lean():
         assert nose_up(shown, sign * 25.0, 0.0).trusted
 
 
+def test_a_bike_that_sets_off_right_after_the_poses_shows_its_lean_in_the_first_bend():
+    """The poses have measured the gyro's bias, and it stood for them. After a power-on neither is known."""
+    for posed in (True, False):
+        shown = meter()
+        shown.use(shown.calibration, posed)
+        roll(speed_up(ride(shown, 0.5), 0.0, 15.0, 4.0), 0.0, 30.0, 15.0)
+        assert ride(shown, 4.0, 15.0, lean_deg=30.0).trusted == posed
+        near(shown.lean_deg, 30.0, 0.3 if posed else 8.0)
+
+
+def test_a_bike_that_moves_right_after_the_poses_is_not_taken_to_stand():
+    shown = meter()
+    shown.use(shown.calibration, True)
+    ride(shown, 1.0, 15.0, lean_deg=30.0)
+    assert not shown.trusted
+
+
 def test_a_car_shows_its_g_however_it_stands():
     shown = nose_up(ride(meter(leans=False), 1.0), 0.0, 25.0)
     assert shown.trusted

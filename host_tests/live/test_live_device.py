@@ -124,7 +124,7 @@ def test_phones_in_turn(run):
     dropped = [t_s for t_s, did, _ in three["said"] if did == "dropped"]
     assert len(dropped) == 1 and 95 < dropped[0] < 98
     shown = [record.at(t_s)[0] for t_s in (21.9, 25.0, 29.0, 32.0)]
-    assert shown == ["BLE     no phone", "BLE   RaceChrono", "BLE      a phone", "BLE     our page"]
+    assert shown == ["BLE     no phone", "BLE   RaceChrono", "BLE      a phone", "BLE      browser"]
     assert record.at(25.0)[1].split() == ["20", "packets/s"]
 
 

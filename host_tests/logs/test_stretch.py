@@ -6,7 +6,6 @@ import json
 
 import analysis_rides
 import command
-import numpy as np
 import pytest
 from kickstand_tools import api
 from kickstand_tools.errors import InputError
@@ -85,20 +84,6 @@ def test_what_cut_refuses(log, tmp_path):
     command.refused(tmp_path, "cut", log, "--from", "60", "--out", out, words="the log is 10.0 s long")
     command.refused(tmp_path, "cut", log, "--from", "1", "--out", log, words="is also an input")
     command.refused(tmp_path, "cut", log, "--from", "early", "--out", out, words="'early' is no time: give seconds")
-
-
-def test_poses_cut_out_of_one_log_align_the_sensor(tmp_path):
-    """Kickstand and upright, with the bike pushed about between them."""
-    chance = np.random.default_rng(4)
-    lean = np.interp(np.arange(1200) / 100.0, [0.0, 4.0, 6.0, 12.0], [-12.0, -12.0, 0.0, 0.0])
-    force = np.column_stack((np.sin(np.radians(lean)), np.cos(np.radians(lean)), np.zeros(1200)))
-    rates = np.column_stack((np.zeros((1200, 2)), np.gradient(lean, 0.01)))
-    values = np.hstack((force, rates)) + chance.normal(scale=[0.003] * 3 + [0.04] * 3, size=(1200, 6))
-    log = command.write(tmp_path / "log.csv", np.column_stack((np.arange(1200) / 100.0, values)))
-    stand, upright, cal = (tmp_path / name for name in ("STAND.csv", "UPRIGHT.csv", "CAL.json"))
-    command.works("cut", log, "--to", "3.5", "--out", stand)
-    command.works("cut", log, "--from", "-5", "--out", upright)
-    assert "12.0 degrees from the kickstand" in command.works("calibrate", "two", stand, upright, "--out", cal).out
 
 
 def test_replay_report_and_plot_take_a_stretch(tmp_path):

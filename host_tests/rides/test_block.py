@@ -41,25 +41,6 @@ def test_the_bytes_of_a_block_are_those_of_format_1(monkeypatch):
     assert crc32(data[:-4]) == int.from_bytes(data[-4:], "little") == FORMAT_1
 
 
-def test_a_block_takes_what_fits_and_the_worst_turn_always_does():
-    """A turn and a speed of the longest codes: 12 ones and 31 bits for each of the ten numbers, 54 bytes."""
-    for length in (512, 700):
-        block = ride_writer.begun(length)
-        assert not block.full()
-        sign = 1
-        written = 0
-        while not block.full():
-            sign = -sign
-            block.add_speed((1 << 24) * (sign > 0))
-            block.add([sign * 8 * 32767] * 7, 8, (1 << 29) if sign > 0 else 0)
-            written += 1
-        found = ride_writer.ended(block)
-        assert len(found.turns) == written > 3
-        assert found.turns[-1].sums == (sign * 8 * 32767,) * 6
-        data = bytes(block.buffer[: length - 6])
-        assert len(data) - len(data.rstrip(b"\0")) < 60
-
-
 def places(block):
     return sum(turn.place is not None for turn in block.turns)
 
@@ -105,15 +86,6 @@ def test_the_first_position_of_all_is_left_out_where_no_room_was_kept_for_it():
         read = ride_writer.ended(block)
         assert places(read) == (len(read.turns) if sequence else 0)
         assert read.turns[-1].sums == (sign * 8 * 32767,) * 6
-
-
-@pytest.mark.parametrize("count", range(1, 17))
-def test_a_block_may_end_within_any_byte(count):
-    block = ride_writer.begun(1024)
-    for turn in some_turns(count):
-        block.add(*turn)
-    found = ride_writer.ended(block).turns
-    assert [(turn.sums, turn.n) for turn in found] == [((*s[:3], *s[4:]), n) for s, n, _ in some_turns(count)]
 
 
 def test_a_block_begins_without_anything_of_the_one_before():

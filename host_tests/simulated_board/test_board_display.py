@@ -5,6 +5,7 @@ import gc
 import sys
 
 from board_access import on_board
+from kickstand_tools.simulated_board.lcd import Lcd
 
 OLEDS = ("ssd1306", "sh1106")
 KINDS = ("lcd",) + OLEDS
@@ -95,6 +96,21 @@ def test_nothing_is_sent_while_nothing_changes():
     for_each(test)
 
 
+def test_only_what_has_changed_of_a_line_is_sent():
+    """An LCD takes four bytes a character, and four for its place; twice, if it is more than one character."""
+
+    def test(board, display):
+        sent, original = [], board.lcd.write_byte
+        board.lcd.write_byte = lambda value: sent.append(value) or original(value)
+        for line, count in (("Lean  18\xdf right", 4 * 2), ("Lean   4\xdf left", 2 * 4 * (1 + 9))):
+            del sent[:]
+            display.show(line, OLD[1])
+            turns(board, display, 1)
+            assert len(sent) == count, (line, len(sent))
+
+    for_each(test, (None,), ("lcd",))
+
+
 def test_unplugged_for_however_long_it_comes_back_and_shows_nothing_old():
     def test(board, display):
         for gap_turns, gone_ms in ((0, 1), (0, 50), (5, 1), (40, 1)):
@@ -102,10 +118,12 @@ def test_unplugged_for_however_long_it_comes_back_and_shows_nothing_old():
             turns(board, display, 40)
             display.show(*NEW)
             turns(board, display, gap_turns % 7)  # perhaps in the middle of a transfer of the new lines
-            board.remove_lcd()
-            board.clock.advance(1000 * gone_ms)
-            turns(board, display, gap_turns)
-            board.fit_lcd()
+            for begun in (0, 12) if isinstance(board.lcd, Lcd) else (0,):  # once more while it is initialised
+                turns(board, display, begun)
+                board.remove_lcd()
+                board.clock.advance(1000 * gone_ms)
+                turns(board, display, gap_turns)
+                board.fit_lcd()
             seen = set()
 
             def see(seen=seen):
@@ -166,6 +184,17 @@ def test_the_processor_is_reset_in_the_middle_of_a_part():
                 assert board.lcd.text() == as_text(("Kickstand", "starting")), (kind, count, board.lcd.text())
 
             assert on_board(run, 1e6, display=kind)[0] == "returned"
+
+
+def test_an_lcd_out_of_step_is_put_right_by_the_next_initialisation():
+    def test(board, display):
+        seen = set()
+        board.lcd.slip()
+        display.show(*NEW)
+        turns(board, display, 1100, lambda: seen.add(board.lcd.text()[0]))
+        assert board.lcd.text() == as_text(NEW) and len(seen) > 2
+
+    for_each(test, (None,), ("lcd",))
 
 
 def test_a_wrong_address_and_no_display_do_not_stop_the_loop():

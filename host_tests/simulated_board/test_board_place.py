@@ -3,7 +3,7 @@
 from board_access import level
 from kickstand_tools.simulated_board.gps import sentence
 from kickstand_tools.simulated_board.simulator import Board
-from test_board_speed import Listing, constant
+from test_board_speed import Listing
 
 DAY = 26 << 9 | 11 << 5 | 21  # 21 November 2026
 NOON = 12 * 3600 * 1000
@@ -96,41 +96,6 @@ def test_an_old_position_is_not_taken_for_new():
         gps._uart = Listing(b"$GP")
         assert gps.poll(20000) is None
         assert gps.place(20000) is None
-
-
-def test_the_model_of_a_receiver_goes_where_it_is_sent():
-    for hz, baud in ((1, 9600), (10, 38400)):
-        board = Board(level)
-        board.fit_gps(constant, hz=hz, baud=baud, place=lambda t_s: (-33.5 - 1e-4 * t_s, -70.25 + 2e-4 * t_s))
-        got = []
-
-        def firmware(board=board, got=got, baud=baud):
-            from time import sleep_ms, ticks_ms  # type: ignore[attr-defined]
-
-            from kickstand.settings import Settings
-            from kickstand.speed import source
-
-            class Config:
-                SPEED = "gps"
-                GPS_BAUD = baud
-
-            speed = source.open_speed(Settings(Config))
-            while True:
-                now_ms = ticks_ms()
-                speed.poll(now_ms)
-                place = speed.place(now_ms)
-                if place is not None:
-                    got.append(list(place))
-                sleep_ms(10)
-
-        with board:
-            board.run(firmware, 10.5)
-        assert 9 * hz <= len(got) <= 11 * hz
-        for date, day_ms, lat, lon in got:
-            t_s = (day_ms - NOON) / 1000 + 20
-            assert date == DAY
-            assert abs(lat / 6e6 - (-33.5 - 1e-4 * t_s)) < 1e-6
-            assert abs(lon / 6e6 - (-70.25 + 2e-4 * t_s)) < 2e-6
 
 
 def test_a_wheel_has_no_place():

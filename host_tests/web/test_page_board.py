@@ -31,6 +31,9 @@ def test_a_board_is_brought_up_to_date_and_watched(chromium, address, tmp_path):
         assert said.startswith("Done: Raspberry Pi Pico with RP2040, MicroPython 1.26.1. 2 files copied and verified")
         assert "config.py stays" in said
         assert "/kickstand/gone.mpy" not in device.files()
+        line.plug_in(device)
+        status = line.status()
+        assert status.startswith("Kickstand ") and "0x68" in status, status
         rider.page.goto(address + "live.html")
         line.plug_in(device)
         rider.page.click("#start")

@@ -3,6 +3,7 @@
 import re
 import types
 
+import command
 import fake_board
 import pytest
 import serial_line
@@ -128,6 +129,22 @@ def test_a_cable_that_is_pulled_leaves_a_board_that_starts_nothing(line, board):
     line.look()
     assert "copied and verified" in line.install()
     assert board.path("main.py").exists()
+
+
+def test_the_status_is_what_the_command_prints(line, board, monkeypatch):
+    """And it can be copied into an issue."""
+    line.plug_in(RawPrompt(board))
+    assert line.status().startswith("Kickstand is not on the board at this port: the page Install puts it there")
+    report = "Kickstand 9.9.9\nSensor   MPU6050 at 0x68\n\nDisplay  none found"
+    board.path("kickstand/__init__.py").write_text(f"def status():\n    print({report!r})\n")
+    shown = line.status()
+    fake_board.plug_in(monkeypatch, board)
+    assert shown == command.works("status").out.rstrip() == report
+    line.rider.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    line.rider.page.click("#status-copy")
+    line.rider.page.wait_for_selector("#status-said:has-text('Copied')")
+    assert line.rider.page.evaluate("navigator.clipboard.readText()") == report
+    assert line.rider.axe() == []
 
 
 def other(board, **differs):

@@ -20,6 +20,8 @@ def test_axe_finds_nothing(chromium, address, kind, name):
 
 def test_on_a_phone_everything_for_the_first_minute_is_on_its_first_screen(chromium, address):
     rider = Rider(chromium, address, **PHONE)
+    tops = rider.page.eval_on_selector_all("main > section", "all => all.map((one) => one.getBoundingClientRect().top)")
+    assert tops == sorted(tops), "what arrives first is seen first, or the page moves while it loads"
     rider.reads("Raw")
     for selector in ("#display", "#press", "#todo", "#scene", "#shown-lean", "#pose"):
         box = rider.page.locator(selector).bounding_box()

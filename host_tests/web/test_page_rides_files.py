@@ -4,14 +4,14 @@ import base64
 import gzip
 import json
 import zipfile
-from datetime import UTC, datetime
 from pathlib import Path
 
 import analysis_rides
 import app_exports
+import phone_tracks
 import pytest
 from command import works
-from kickstand_tools.api import CalibrationFile, Log, simulate_ride
+from kickstand_tools.api import CalibrationFile, Log, Track, simulate_ride
 from kickstand_tools.calibration.file import write_calibration
 from kickstand_tools.logs.csv_lines import write_log
 from kickstand_tools.simulation.files import positions
@@ -181,33 +181,25 @@ def test_the_columns_of_a_table_can_be_named(page, tmp_path):
     assert_near({**json.loads(page.saved("#save-json")), "ride": ""}, {**reported, "ride": ""})
 
 
-def test_a_track_joins_a_ride_without_gps(page, tmp_path):
+@pytest.mark.parametrize("write", [phone_tracks.write_gpx, phone_tracks.write_fit])
+def test_a_track_joins_a_ride_without_gps(page, tmp_path, write):
     """As `join` does it: the page then has a map, and the log with positions can be saved. Another ride's not."""
     made = simulate_ride("hills", seed=1, seconds=120.0)
     log = Log.from_readings(made.readings, made.rate_hz)
     write_log(tmp_path / "bare.csv", log)
     calibration = CalibrationFile(vehicle_from_sensor=made.vehicle_from_sensor, aligned=True)
     write_calibration(tmp_path / "bare.cal.json", calibration)
-    (tmp_path / "ride.gpx").write_text(gpx(*positions(made)))
+    lat, lon, utc_s = (values[::200] for values in positions(made))
+    speed_mps = made.truth["speed_mps"][::200]
+    track = write(tmp_path / f"ride.{write.__name__[-3:]}", Track(utc_s, lat, lon, speed_mps, "track"))
     page.give(tmp_path / "bare.csv", tmp_path / "bare.cal.json")
     assert page.page.frame_locator("#plot").locator("#map").count() == 0
-    assert "ride.gpx is joined: correlation " in page.add(tmp_path / "ride.gpx")
+    assert f"{track.name} is joined: correlation " in page.add(track)
     page.page.frame_locator("#plot").locator("#map .main-svg").first.wait_for()
-    works("join", tmp_path / "bare.csv", tmp_path / "ride.gpx", "--out", tmp_path / "joined.csv")
+    works("join", tmp_path / "bare.csv", track, "--out", tmp_path / "joined.csv")
     assert page.saved("#save-log") == (tmp_path / "joined.csv").read_bytes()
-    lat, lon, utc_s = positions(made)
-    (tmp_path / "ride.gpx").write_text(gpx(lat[::-1], lon, utc_s))
-    page.add(tmp_path / "ride.gpx")
-    assert "ride.gpx is not joined" in page.warnings()
-
-
-def gpx(lat, lon, utc_s):
-    """A point a second."""
-    points = "".join(
-        f'<trkpt lat="{a:.7f}" lon="{o:.7f}"><time>{datetime.fromtimestamp(s, UTC).isoformat()}</time></trkpt>'
-        for a, o, s in zip(lat[::200], lon[::200], utc_s[::200])
-    )
-    return f'<gpx version="1.1" creator="a phone"><trk><trkseg>{points}</trkseg></trk></gpx>'
+    page.add(write(track, Track(utc_s, lat[::-1], lon, speed_mps[::-1], "track")))
+    assert f"{track.name} is not joined" in page.warnings()
 
 
 def test_a_sample_ride_is_shown_and_said_to_be_simulated(page):

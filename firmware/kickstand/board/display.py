@@ -29,6 +29,7 @@ _FAMILY = tuple(range(0x20, 0x27)) + tuple(range(0x38, 0x3C)) + (0x3E,)  # a bac
 LCD_HZ, OLED_HZ = 100_000, 400_000  # the fastest clocks that a PCF8574 and the OLEDs allow
 KINDS = ("auto", "lcd", "ssd1306", "sh1106")
 PROBE_MS = 200  # time between two searches for a display, while there is none
+MOST_WAIT_MS = 60_000  # the same at most, while its driver cannot be loaded: each time takes twice as long as the last
 REOPEN_PROBES = 5  # while there is no display the bus is freed once in so many probes
 POWER_UP_MS = 40  # a display that is found sooner after power-on may have got its power with the board
 FLUSH_STEPS = 60
@@ -57,6 +58,7 @@ class Display:
         self.draws = False
         self._probes = 0  # successive probes that found nothing
         self._probed_ms = None
+        self._wait_ms = PROBE_MS
         self._fresh = ticks_ms() < POWER_UP_MS
 
     def show(self, line1, line2, picture=None):
@@ -72,7 +74,7 @@ class Display:
         try:
             if self.address is not None:
                 self._driver.tick(now_ms)
-            elif self._probed_ms is None or ticks_diff(now_ms, self._probed_ms) >= PROBE_MS:
+            elif self._probed_ms is None or ticks_diff(now_ms, self._probed_ms) >= self._wait_ms:
                 self._probed_ms = now_ms
                 self._probe()
         except OSError:
@@ -109,8 +111,10 @@ class Display:
         except OSError:
             return False
         self._probes = 0
-        if attempt(self._begin, address) is None:  # its driver may be missing
-            self.address = address
+        if attempt(self._begin, address):  # its driver is missing, or has no memory
+            self._wait_ms = min(2 * self._wait_ms, MOST_WAIT_MS)
+        else:
+            self.address, self._wait_ms = address, PROBE_MS
         return True
 
     def _begin(self, address):

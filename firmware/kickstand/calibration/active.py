@@ -42,9 +42,9 @@ class ActiveCalibration:
         return True
 
     def save(self, calibration):
-        """Save a calibration that the rider made to flash, then use it. Raises StoreError."""
+        """Save a calibration that the rider's poses made to flash, then use it. Raises StoreError."""
         self._store.save(calibration)
-        self._use(calibration, True)
+        self._use(calibration, True, True)
 
     def refine(self, calibration):
         """Like save(), for an alignment from driving: maxima and the results of driving are kept. Raises StoreError."""
@@ -71,7 +71,7 @@ class ActiveCalibration:
             report(error)
         return True
 
-    def _use(self, calibration, replaced):
+    def _use(self, calibration, replaced, posed=False):
         calibration.set_scale(self._chip.accel_lsb_per_g, self._chip.gyro_lsb_per_dps)
-        self._meter.use(calibration)
+        self._meter.use(calibration, posed)
         self._changed(replaced)

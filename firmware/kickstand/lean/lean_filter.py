@@ -33,11 +33,13 @@ class LeanFilter:
     """Estimates lean from force and rate in the vehicle's axes. Fixed memory.
 
     delay_s: by how much the gyro's low-pass is late; lean is extrapolated to now. trim: rad, see UprightTrim.
+    posed: the bike has just stood for its poses, which measured the gyro's bias.
     """
 
-    def __init__(self, delay_s=DELAY_S, trim=0.0):
+    def __init__(self, delay_s=DELAY_S, trim=0.0, posed=False):
         self.trim = UprightTrim(trim)
         self._delay_s = delay_s
+        self._posed = posed
         self._p = None
         # error of the accelerometer's magnitude (bias and scale factor together), as a share of the force: found at
         # rest, where it should read 1 g
@@ -164,6 +166,9 @@ class LeanFilter:
         turning = max(abs(wx), abs(wy), abs(wz)) > measurements.START_MAX_RATE
         moving = turning or abs(sqrt(fx * fx + fy * fy + fz * fz) - 1.0) > measurements.START_MAX_FORCE
         variances = [sigma * sigma for sigma in measurements.SIGMA_START]
+        posed, self._posed = self._posed, False  # a later start with nothing kept may come much later
+        if posed:
+            variances[BIAS_LEFT : BIAS_LEFT + 3] = [measurements.SIGMA_FRESH_BIAS**2] * 3
         if moving:
             variances[LEAN] = measurements.SIGMA_START_LEAN_MOVING**2
         self._p = Covariance(variances)
@@ -173,6 +178,8 @@ class LeanFilter:
         x[LEAN] = atan2(fx, fy)
         x[PITCH] = 0.0
         x[SPEED] = measurements.USUAL_SPEED if moving else 0.0  # most rides begin at rest
+        if posed and not moving:
+            self._stand(means)
 
     def _stand(self, means):
         """The bike comes to rest: set lean and pitch by the force, which is vertical now, and the speed to 0. A bias

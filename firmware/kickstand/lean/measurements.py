@@ -28,19 +28,21 @@ SIGMA_START = (
     radians(1.0),  # rad/s: up
     radians(1.0),  # rad/s: forward
     radians(5.0),  # rad: yaw error of the kickstand pose
-    0.020,  # ratio: scale error of the gyro's left axis less that of its up axis; the data sheet allows 0.03 to each
+    0.025,  # ratio: scale error of the gyro's left axis less that of its up axis; the data sheet allows 0.03 to each
     0.014,  # ratio: left axis' reading of a rate about up, over that rate; the data sheet allows 0.02
     0.014,  # ratio: forward axis' reading of a rate about left
     0.014,  # ratio: forward axis' reading of a rate about up
-    0.014,  # ratio: scale error of the forward axis
+    0.018,  # ratio: scale error of the forward axis
 )
+# rad/s: the bias where the poses have just measured it. Larger: a bike that sets off at once shows its lean later.
+SIGMA_FRESH_BIAS = radians(0.2)
 # rad: the first lean's standard deviation where the bike moves. Larger: lean is shown later, and follows forces more.
 SIGMA_START_LEAN_MOVING = radians(30.0)
 # g s: mean of the speed's prior while nothing measures it. Larger: leans that began before power-on come out larger.
 USUAL_SPEED = 15.0 / STANDARD_GRAVITY
 
 # Process noise, per square root of a second
-NOISE_ANGLE = radians(0.2)  # rad: vibration of the gyro. Larger: lean follows the forces more and the gyro less.
+NOISE_ANGLE = radians(0.24)  # rad: vibration of the gyro. Larger: lean follows the forces more and the gyro less.
 NOISE_SPEED = 0.35 / STANDARD_GRAVITY  # g s. Larger: speed follows turns sooner, and is less steady on straights.
 NOISE_BIAS = radians(0.01)  # rad/s: 0.6 deg/s in five minutes of warming up. Larger: long turns are mistaken for bias.
 # Where readings are lost

@@ -37,15 +37,15 @@ class LeanMeter:
         self.calibration = self.suppressed_reason = None
         self.use(calibration)
 
-    def use(self, calibration):
+    def use(self, calibration, posed=False):
         """Take a calibration, its scale set, and restart the filter. suppressed_reason is cleared unless it is the same
-        calibration as before."""
+        calibration as before. posed: the bike has just stood for its poses."""
         if calibration is not self.calibration:
             self.suppressed_reason = None
         self.calibration = calibration
         self._smooth_all = not (calibration.aligned and self._leans)  # pages then show left and up as well
         self._transform = Transform(calibration)
-        self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg))
+        self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg), posed)
         self.restart()
 
     def restart(self):

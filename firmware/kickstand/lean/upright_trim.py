@@ -17,8 +17,8 @@ SIGMA_STRAIGHT = radians(1.5)  # rad: force to the side over up on straights: ri
 SIGMA_LEAN_SHARE = 0.15
 # times sin(lean): how much that force differs from turn to turn, because the rider hangs off or does not. Larger: turns
 # count less.
-SIGMA_TURN = 0.1
-SIGMA_YAW_S = 0.1  # rad per rad/s: further measurement noise, times the yaw rate. Larger: turns count less.
+SIGMA_TURN = 0.04
+SIGMA_YAW_S = 0.03  # rad per rad/s: further measurement noise, times the yaw rate. Larger: turns count less.
 # times the upward force: largest innovation. Larger: a sensor in a hand counts as a balanced bike.
 MAX_SIDEWAYS = 0.1
 DISTURBANCE_S = 2.0  # s: how long such a disturbance lasts. Larger: the trim is found later, and steadier.

@@ -27,7 +27,7 @@ class Live:
     """radio: a Radio. app: the App whose meter, drive, rides, screen, sensor and clock are read. leans: False for a
     car.
 
-    asked: what the phone has asked for, "RaceChrono" or "our page", or None. per_second: packets in the last second.
+    asked: what the phone has asked for, "RaceChrono" or "browser", or None. per_second: packets in the last second.
     """
 
     def __init__(self, radio, app, leans):
@@ -92,7 +92,7 @@ class Live:
         if handle == self.radio.filter and packets.take_filter(data, self._intervals):
             self.asked = "RaceChrono"
         elif handle == self.radio.rate and packets.take_rate(data, self._intervals):
-            self.asked = "our page"
+            self.asked = "browser"
         self._ask()
 
     def _look(self, now_ms):
@@ -167,7 +167,7 @@ class Live:
         radio, buffer, sigma, speed = self.radio, self._buffer, self._sigma, self._speed
         aligned = self._app.meter.calibration.aligned
         if packet == OWN:
-            force = self._force if aligned else None  # of no use in the sensor's own axes
+            force = self._force if aligned else None  # not in the sensor's own axes
             state = self._state(lean)
             self._put(radio.now, packets.now(buffer, now_ms, lean, sigma, force, self._rate, speed, state))
         elif packet == LEAN and lean is not None:

@@ -36,6 +36,11 @@ class Recording:
         self._refused = None  # a Notice why there is no Recorder
         if self._due or self.on_card:
             self._finish()
+        if self._due and not (keeper or self.on_card or self._refused):
+            try:  # twice is once: later the ride finds its directory. An ESP32 would lose the first readings meanwhile
+                self.recorder.keeper.begin()
+            except (OSError, MemoryError):
+                pass  # start() says why
 
     def _make(self):
         """Make the Recorder; a generator of short steps. Modules that only recording needs are imported one in each

@@ -42,6 +42,7 @@ readings-lost|Readings lost|board too busy
 no-radio|No Bluetooth|on this board
 no-pairing|LIVE_PIN: not|on this board
 radio-fault|Bluetooth fault|restart it
+live-memory|No Bluetooth:|no memory
 
 gps-silent|GPS silent|check wiring
 gps-garbled|GPS garbled|check GPS_BAUD

@@ -2,6 +2,7 @@
 pages.load to MOTORCYCLE or CAR, and a row to the table of pages in firmware/README.md."""
 
 from ..board.button import SHORT
+from ..errors import attempt
 from ..lean.meter import FALLEN_DEG
 from . import pages
 
@@ -27,6 +28,7 @@ class PageRing:
         self._pages = MOTORCYCLE if leans else CAR
         self._at = 0
         self.late = self.draws = False
+        self._glance = None  # the module; False where it cannot be loaded
         self.live = None
         self.own = []
         self._own_at = None  # index of the owner's page that is shown
@@ -105,15 +107,23 @@ class PageRing:
             return pages.FALLEN
         if not self.trusted:
             lines = pages.unsure(meter.suppressed_reason)
-            return lines + (self._glance().unsure(*lines),) if self.draws else lines
+            return lines + (self._pictures.unsure(*lines),) if self._pictures else lines
         line1, line2 = page(meter)
         if recording:
             line1 = pages.recorded(line1)
-        if self.draws and page in self._glance().PICTURES:
-            return line1, line2, self._glance().PICTURES[page](meter, recording)
+        if self._pictures and page in self._pictures.PICTURES:
+            return line1, line2, self._pictures.PICTURES[page](meter, recording)
         return line1, line2
 
-    def _glance(self):
-        from . import glance  # only with a display that draws
+    @property
+    def _pictures(self):
+        """The module glance, only for a display that draws. Where it cannot be loaded, lines are shown."""
+        if self.draws and self._glance is None:
+            self._glance = False
+            attempt(self._load)
+        return self.draws and self._glance
 
-        return glance
+    def _load(self):
+        from . import glance
+
+        self._glance = glance

@@ -1,26 +1,19 @@
 """Stops of simulated rides against their truth: mean fully developed deceleration within 1 %."""
 
-import json
 from pathlib import Path
 
-import analysis_rides
-import command
 import numpy as np
 import pytest
-from kickstand.units import STANDARD_GRAVITY
 from kickstand_tools.analysis.channels import Channels
 from kickstand_tools.analysis.downsample import downsampled, joined
 from kickstand_tools.analysis.ride import open_ride
 from kickstand_tools.analysis.stops.brake_test import RATE_S, Stop, find_stops, mfdd_mps2
-from kickstand_tools.analysis.stops.speed_fit import speed_delay_s
-from kickstand_tools.analysis.stops.standstill import standing
 from kickstand_tools.calibration.file import read_calibration, write_calibration
 from kickstand_tools.calibration.six import fit_six_positions
 from kickstand_tools.calibration.two import fit_two_positions
 from kickstand_tools.simulation import profiles
 from kickstand_tools.simulation.files import simulate
 from kickstand_tools.simulation.plan import Conditions, Plan
-from kickstand_tools.simulation.scripted import script
 
 # Speed in the log: how often, how late, how noisy (m/s)
 PERFECT_1HZ, PERFECT_10HZ = (1, 0.0, 0.0), (10, 0.0, 0.0)
@@ -129,21 +122,6 @@ def test_without_a_speed(ride):
     assert np.sqrt(np.mean(np.square(errors))) < 1.2
 
 
-def test_standing_is_seen_without_a_speed(ride):
-    whole, time, speed = ride
-    still = standing(whole)
-    true = np.interp(whole.t_s, time, speed)
-    assert np.max(true[still]) < 0.5
-    assert np.mean(still[true == 0.0]) > 0.6  # not while the bike is leaned onto a foot
-
-
-def test_the_speed_of_satellites_is_late(ride):
-    for hz in 1, 10:
-        assert speed_delay_s(with_speed(ride, hz, 0.0, 0.0)) == pytest.approx(0.0, abs=0.04)
-        assert speed_delay_s(with_speed(ride, hz, 0.4, 0.05)) == pytest.approx(0.4, abs=0.04)
-    assert speed_delay_s(ride[0]) == 0.0
-
-
 def test_the_definition():
     """Constant deceleration gives just that; before 0.8 v0 and after 0.1 v0 nothing counts."""
     v = np.linspace(20.0, 0.0, 2001)
@@ -156,98 +134,6 @@ def test_the_definition():
     want = (16.0**2 - 2.0**2) / (2 * (distance[3] - distance[1]))
     assert mfdd_mps2(v, bent) == pytest.approx(want, rel=1e-6)
     assert mfdd_mps2(np.array([9.0, 0.0]), np.zeros(2)) == float("inf")  # from one sample to the next
-
-
-def test_a_smooth_road_is_no_standstill(ride):
-    """A stretch without any turning, but with the jolts of riding."""
-    whole, time, speed = ride
-    course = whole.part(slice(None))
-    for name in "pitch_rate_dps", "yaw_rate_dps", "forward_g":
-        setattr(course, name, getattr(course, name).copy())
-    cruising = np.flatnonzero(np.interp(course.t_s, time, speed) > 15.0)
-    smooth = slice(int(cruising[0]) + 50, int(cruising[0]) + 200)
-    course.pitch_rate_dps[smooth] = course.yaw_rate_dps[smooth] = course.forward_g[smooth] = 0.0
-    assert not np.any(standing(course)[smooth])
-    course.up_g, course.left_g, course.rolling = course.up_g.copy(), course.left_g.copy(), course.rolling.copy()
-    course.up_g[smooth] = 1.0
-    course.left_g[smooth] = 0.0
-    assert not np.any(standing(course)[smooth])  # the filter knows that it rolls
-    course.rolling[smooth] = 0.0
-    assert np.mean(standing(course)[smooth]) > 0.9
-    course.forward_g[smooth] = -0.4
-    assert not np.any(standing(course)[smooth])  # the force is more than the weight
-
-
-@pytest.mark.parametrize("slope_deg", [-4.0, 0.0, 4.0])
-@pytest.mark.parametrize("speed_hz", [0, 1])
-def test_a_perfect_sensor_on_a_slope(tmp_path, slope_deg, speed_hz):
-    """The stop of rides.py, whose deceleration is a bell, against its closed form."""
-    path = analysis_rides.write(
-        tmp_path,
-        [
-            script.upright(4),
-            script.accelerate(22, 6),
-            script.straight(8, slope_deg=slope_deg),
-            script.straight(3),
-            script.brake(0, 5),
-            script.wait(5),
-        ],
-        speed_hz=speed_hz,
-        vibration_g=0.01,
-    )
-    (stop,) = find_stops(course(path))
-    u = np.linspace(0.0, 1.0, 5001)
-    v = 22.0 * (1.0 - u**3 * (10.0 + u * (6.0 * u - 15.0)))
-    want = mfdd_mps2(v, np.concatenate(([0.0], np.cumsum((v[1:] + v[:-1]) / 2.0 * 0.001))))
-    assert stop.mfdd_mps2 == pytest.approx(want, rel=0.01 if speed_hz else 0.02)
-    assert stop.speed_from == ("log" if speed_hz else "integrated")
-    assert stop.peak_mps2 == pytest.approx(22.0 / 5.0 * 1.875, rel=0.03)
-    assert stop.jerk_mps3 == pytest.approx(22.0 / 25.0 * 5.77, rel=0.15)
-
-
-def test_a_road_without_any_vibration(tmp_path):
-    """Nothing shakes, riding or standing, and there is no speed: the filter's rests are the standstills."""
-    rows = [command.HEADER]
-    for seconds, acceleration in ((5, 0.0), (8, 2.5), (6, 0.0), (20 / 6, -6.0), (8, 0.0)):
-        for _ in range(round(100 * seconds)):
-            last_digit = 1e-5 * (len(rows) % 2)  # readings that stay the same are those of a sensor that froze
-            rows.append(f"{len(rows) / 100:.2f},{last_digit:.5f},1,{acceleration / STANDARD_GRAVITY:.5f},0,0,0")
-    path = tmp_path / "RIDE.csv"
-    path.write_text("\n".join(rows) + "\n")
-    (tmp_path / "RIDE.cal.json").write_text(json.dumps(analysis_rides.CALIBRATION))
-    (stop,) = find_stops(course(path))
-    assert stop.mfdd_mps2 == pytest.approx(6.0, rel=0.01)
-    assert stop.initial_speed_mps == pytest.approx(20.0, rel=0.01)
-
-
-def test_a_pull_to_the_side(tmp_path):
-    """A car that turns by 2 degrees to the left while it brakes, 20 m/s in 4 s."""
-    n = 200
-    t = np.arange(0, 24.0, 1 / n)
-    v = np.clip(20.0 * np.minimum(t - 3.0, 4.0) / 4.0, 0.0, None) - np.clip(5.0 * (t - 12.0), 0.0, 20.0)
-    acceleration = np.gradient(v, t) / STANDARD_GRAVITY
-    yaw = np.where((t > 12.0) & (t < 16.0), 0.5, 0.0)
-    left = v * np.radians(yaw) / STANDARD_GRAVITY
-    shake = np.random.default_rng(0).normal(size=(6, len(t))) * np.where(v > 0, 1.0, 0.05)
-    path = command.write(
-        tmp_path / "RIDE.csv",
-        np.column_stack(
-            (
-                t,
-                left + 0.02 * shake[0],
-                1.0 + 0.02 * shake[1],
-                acceleration + 0.02 * shake[2],
-                shake[3],
-                yaw + shake[4],
-                shake[5],
-            )
-        ),
-    )
-    path.with_name("RIDE.cal.json").write_text(json.dumps(analysis_rides.CALIBRATION | {"vehicle": "car"}))
-    (stop,) = find_stops(course(path))
-    assert stop.mfdd_mps2 == pytest.approx(5.0, rel=0.02)
-    assert stop.heading_deg == pytest.approx(2.0, abs=0.3)
-    assert stop.side_m == pytest.approx(20.0 * np.radians(0.5) * 16 / 2 - 5.0 * np.radians(0.5) * 64 / 3, abs=0.15)
 
 
 def test_slowing_down_is_no_stop(ride):

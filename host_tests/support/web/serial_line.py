@@ -66,6 +66,12 @@ class SerialLine:
         self.rider.page.click("#install")
         return self._said_by("#look")
 
-    def _said_by(self, button):
+    def status(self):
+        """Click, and the status that the page shows, or why it shows none."""
+        self.rider.page.click("#status")
+        why = self._said_by("#status", "#status-said")
+        return self.rider.text("#status-text") if self.rider.page.is_visible("#status-text") else why
+
+    def _said_by(self, button, where="#install-said"):
         self.rider.page.wait_for_selector(f"{button}:enabled", timeout=600_000)
-        return self.rider.text("#install-said")
+        return self.rider.text(where)

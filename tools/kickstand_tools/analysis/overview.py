@@ -32,8 +32,8 @@ class Overview:
     """A ride: the summary of every sample, and its course in means over RATE_S, in which the columns that neither
     report nor pictures need are NaN (vehicle_channels() has them).
 
-    riding_s: time on the move, s. notices: what is remarkable in the log, and what contradicts the calibration. stops:
-    empty if forward and backward are exchanged.
+    riding_s: time without the standstills of standing(), s, as `report` states it. notices: what is remarkable in the
+    log, and what contradicts the calibration. stops: empty if forward and backward are exchanged.
     """
 
     ride: Ride

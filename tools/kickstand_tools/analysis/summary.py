@@ -34,10 +34,11 @@ class Summary:
     """A ride in figures; add() takes it block by block.
 
     left_deg, right_deg: the largest lean to each side that lasted HELD_S. brake_g, accel_g: the largest forces,
-    smoothed as on the display. These four count where the display would show the lean. riding_s: time not at rest.
-    beyond_s: time at a lean of at least so many degrees, by degrees. histogram_s: time on the move in each bin of
-    BINS_DEG. not_sure_s: time in which the meter does not trust its lean.  missing_s: time without readings, longer
-    than LOST_US each. frozen_s: of that, the time in which there were readings, but frozen ones.
+    smoothed as on the display. These four count where the display would show the lean. riding_s: time in which the lean
+    filter finds no rest; a stop with a shaking engine counts as riding, unlike in Overview.riding_s. beyond_s: time at
+    a lean of at least so many degrees, by degrees. histogram_s: time, of riding_s, in each bin of BINS_DEG.
+    not_sure_s: time in which the meter does not trust its lean.  missing_s: time without readings, longer than LOST_US
+    each. frozen_s: of that, the time in which there were readings, but frozen ones.
     """
 
     samples: int = 0

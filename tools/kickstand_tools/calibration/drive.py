@@ -1,5 +1,6 @@
 """Alignment from recorded drives, by the firmware's own module."""
 
+import math
 from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -23,6 +24,8 @@ from .published import PublishedAlignment
 
 METHODS = {"improved": DriveAlignment, "published": PublishedAlignment}
 _SLOWEST_US = 50_000  # longest time between samples
+# Standard error of up, pitch and roll together: slopes and camber that a whole drive has in common, or a pose
+UP_DEG = 1.1
 
 
 @dataclass
@@ -66,6 +69,11 @@ class DriveFit:
     def status(self) -> str:
         """ "aligned" or "refused"."""
         return "refused" if self.refusal else "aligned"
+
+    @property
+    def attitude_deg(self) -> float:
+        """Standard error of the whole alignment, up included."""
+        return math.hypot(self.quality_deg, UP_DEG)
 
     @property
     def reason(self) -> str:

@@ -157,7 +157,7 @@ def _drive_lines(found: DriveFit, several: bool) -> Iterable[str]:
     yield f"{found.vehicle}, method {found.method}: {found.used} used, {found.turned} in turns not used"
     yield f"stops: {found.stops}"
     ready = f"ready after {found.ready_s:.0f} s" + (" of all logs" if several else "")
-    yield f"quality: {found.quality_deg:.1f} degrees about the vertical; {ready}"
+    yield f"quality: {found.quality_deg:.1f} degrees about the vertical, {found.attitude_deg:.1f} in all; {ready}"
     if found.lag_s is not None:
         yield f"speed: {found.lag_s:.1f} s late; two halves of the drive differ by {found.halves_deg:.1f} degrees"
     if found.poses:

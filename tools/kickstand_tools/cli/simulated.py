@@ -68,6 +68,8 @@ def simulate_command(profile: str | None, seed: int, vehicles: int | None, out: 
     with spinner("making up a ride"):
         made = simulate(profile, seed, out, **of_a_ride)
     click.echo(f"written: {out / 'RIDE.csv'}, {len(made.time)} samples, with its poses and TRUTH.csv")
+    begin = made.truth["lean_deg"][0]
+    click.echo(f"lean, > 0 to the right: {made.stand_deg:.1f} degrees in KICKSTAND.csv; RIDE.csv begins at {begin:.1f}")
 
 
 def _check_fleet(out: Path) -> None:

@@ -9,6 +9,7 @@ is steered by hand), pause, quit.
 """
 
 import json
+import os
 import sys
 import time
 
@@ -25,7 +26,8 @@ HAND_LIMIT_S = 3600.0
 BATTERY_V = 12.6 / 11  # at GPIO 26, behind the divider of firmware/examples/user_battery.py
 LONG_PRESS_S = 1.2
 
-# The rider presses the button once on the kickstand and once upright, and turns to two other pages after the ride
+# The rider presses the button once on the kickstand and once upright, and turns to two other pages after the ride; with
+# a user.py also to its first page, after the first turn
 SCRIPT = (
     kickstand(8.0),
     upright(7.5),
@@ -41,6 +43,7 @@ SCRIPT = (
 )
 KICKSTAND_PRESS_S, UPRIGHT_PRESS_S = 3.5, 11.5
 PAGES_BEFORE_END_S = (5.0, 2.5)
+OWN_PAGE_S, BETWEEN_PRESSES_S = 28.0, 0.5
 
 _real_sleep = time.sleep  # kept before Board.install() replaces `time`
 
@@ -111,7 +114,11 @@ class Demo:
         """Power on, and start again after every reset, until time is up or "quit" comes."""
         self.board.install()
         from kickstand.start import main  # after install(), which replaces `machine` and `time`
+        from kickstand.ui.page_ring import MOTORCYCLE  # the owner's pages are behind these
 
+        if not self._steer and "user.py" in os.listdir():
+            for k in range(len(MOTORCYCLE)):
+                self.board.press(OWN_PAGE_S + BETWEEN_PRESSES_S * k)
         ended = "reset"
         while ended == "reset":
             ended = self.board.run(main, self.seconds)

@@ -21,6 +21,7 @@ Progress = Callable[[str, int, int], None]
 
 MOST_BYTES = 1_000_000  # longest answer; the list of a board's files has a hundredth of that
 ANSWER_S = 10
+_STARTING_S = 3  # longest time in which a board that starts does not hear what is sent to it
 _POLL_S = 0.01
 _PROGRAM_S = 60  # longest time of a program: an emulated board takes a while to compile the modules
 _EMULATED = "socket:"  # begins the name of an emulated board's port
@@ -218,11 +219,8 @@ def printed(transport: SerialTransport, name: str, code: str, what: str) -> byte
     return output
 
 
-def status(port: str | None) -> str:
-    """The output of kickstand.status() on the board, which is restarted afterwards.
-
-    port: None takes the only board that is plugged in.  Raises InputError, NoFirmware.
-    """
+def status(port: Port) -> str:
+    """The output of kickstand.status() on the board, which is restarted afterwards. Raises InputError, NoFirmware."""
     with connected(port) as (transport, name):
         describe(transport, name)
         try:
@@ -254,13 +252,13 @@ def last_line(text: str) -> str:
 
 def _enter(transport: SerialTransport, name: str) -> None:
     """Ctrl-C, then a soft reset into the raw prompt, which does not start main.py."""
-    for last in (False, True):  # a board that resets when its port is opened is still starting the first time
+    for limit_s in (_STARTING_S, ANSWER_S):  # a board that resets when its port is opened is starting the first time
         try:
             with contextlib.redirect_stdout(io.StringIO()):  # mpremote prints what it did not understand
-                transport.enter_raw_repl()
+                transport.enter_raw_repl(timeout_overall=limit_s)
             return
         except TransportError:
-            if last:
+            if limit_s == ANSWER_S:
                 raise InputError(
                     f"no MicroPython answers on {name}: check that this is the board's port, hold its button "
                     "while plugging it in, or put MicroPython on it"

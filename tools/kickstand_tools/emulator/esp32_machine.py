@@ -7,8 +7,9 @@ turned into bytes here, because a message for each of them would take too long.
 Time is counted in instructions, and passes only after a GO. Three things of QEMU would still make it depend on the
 host. Its main loop may run timers between the turns of the two processors, or set the clock forward before the last of
 them has fallen asleep: it has to wait until both sleep (_hold_main_loop). A timer of its scheduler begins at one of two
-moments: it is put off for ever (_silence_scheduler). And a reset, even of one processor, is done by the main loop,
-while the other processor goes on: it waits for the next full millisecond, and the processors wait for it (_guard).
+moments: it is put off for ever (_calm_timers). And a reset, even of one processor, is done by the main loop,
+while the other processor goes on: it waits for the next full millisecond, and the processors wait for it (_guard), and
+it for their thread (_on_reset).
 """
 
 import ctypes as c
@@ -122,6 +123,7 @@ class Machine:
         self._driven = [1] * _PINS
         self._stale: list[int] = []  # wires whose input QEMU has set to what the chip drives
         self._may_reset = self._resetting = False  # the processors wait for a reset; the main loop does it
+        self._fuses: _Timer | None = None
         self._state = -1  # file that says whether the thread of the processors sleeps
         self._buses = [_RemoteBus(self, i, *pins) for i, pins in enumerate(wires)]
         self._wires = [Wires(bus, self._setter(bus.sda), self._setter(bus.scl)) for bus in self._buses]
@@ -209,8 +211,11 @@ class Machine:
             self._qemu.timer_mod_ns(c.addressof(self._stop), self._qemu.qemu_clock_get_ns(_VIRTUAL))
 
     def _on_reset(self, _: object) -> None:
-        """In the main loop, with the processors stopped."""
+        """In the main loop, with the processors stopped. Whether their thread has fallen asleep by then decides which
+        of them goes on first."""
         if self._state >= 0:
+            while not self._sleeps(_SHORTEST_S):
+                pass
             self._may_reset = self._resetting = False
             self._stale = list(self._inputs)
             self._guard_later()
@@ -221,20 +226,24 @@ class Machine:
         """In the processors' thread, at its first instruction."""
         c.pythonapi.PyGILState_Ensure()  # or each call from this thread would make a new state of it, which takes long
         self._state = os.open(f"/proc/self/task/{threading.get_native_id()}/stat", os.O_RDONLY)
-        self._silence_scheduler()
+        self._calm_timers()
         self._guard_later()
         self._stale = list(self._inputs)
 
-    def _silence_scheduler(self) -> None:
-        """The timer that has no owner and is due after a tenth of a second: with a scale of its own it never is."""
+    def _calm_timers(self) -> None:
+        """Of the timers that are due after a tenth of a second, the one without owner is the scheduler's: with a scale
+        of its own it never is. The other ends a read of the eFuses, see _guard()."""
         self._qemu.timer_mod_ns(c.addressof(self._stop), 0)
-        timer = self._stop.next
-        while timer:
-            if not timer.contents.opaque and timer.contents.scale == 1 and timer.contents.expires >= 99_999_000:
-                timer.contents.scale = 1_000_000
-                self._qemu.timer_mod_ns(c.addressof(timer.contents), _NEVER)
-                break
-            timer = timer.contents.next
+        following = self._stop.next
+        while following:
+            timer = following.contents
+            following = timer.next
+            if timer.scale == 1 and timer.expires >= 99_999_000:
+                if timer.opaque:
+                    self._fuses = timer
+                else:
+                    timer.scale = 1_000_000
+                    self._qemu.timer_mod_ns(c.addressof(timer), _NEVER)
         self._qemu.timer_del(c.addressof(self._stop))
 
     def _hold_main_loop(self, _: object, poll) -> None:
@@ -248,23 +257,30 @@ class Machine:
                 qemu.qemu_clock_enable(_VIRTUAL, False)  # or it would be set forward; the reset enables it
                 return
             idle = qemu.all_cpu_threads_idle()
-            qemu.qemu_mutex_unlock_iothread()
-            if idle:
-                os.lseek(self._state, 0, os.SEEK_SET)
-                idle = os.read(self._state, 256).rpartition(b")")[2][1:2] == b"S"
-            if not idle:
-                time.sleep(wait_s)
-                wait_s = min(2 * wait_s, _LONGEST_S)
-            qemu.qemu_mutex_lock_iothread_impl(b"kickstand", 1)
-            if idle and qemu.all_cpu_threads_idle():
+            if self._sleeps(0.0 if idle else wait_s) and idle and qemu.all_cpu_threads_idle():
                 return
+            wait_s = min(2 * wait_s, _LONGEST_S)
+
+    def _sleeps(self, wait_s: float) -> bool:
+        """Does the processors' thread sleep, after wait_s in which QEMU's lock is free? The lock is held before and
+        after that."""
+        self._qemu.qemu_mutex_unlock_iothread()
+        time.sleep(wait_s)
+        os.lseek(self._state, 0, os.SEEK_SET)
+        sleeps = os.read(self._state, 256).rpartition(b")")[2][1:2] == b"S"
+        self._qemu.qemu_mutex_lock_iothread_impl(b"kickstand", 1)
+        return sleeps
 
     def _guard_later(self) -> None:
         now_ns = self._qemu.qemu_clock_get_ns(_VIRTUAL)
         self._qemu.timer_mod_ns(c.addressof(self._guard_timer), (now_ns // _GUARD_NS + 1) * _GUARD_NS)
 
     def _guard(self, _: object) -> None:
-        """Every millisecond, and between two turns of the processors: is one of them to be reset?"""
+        """Every millisecond, and between two turns of the processors: is one of them to be reset? And the ROM waits for
+        the eFuses three times, with a real chip microseconds, here 100 ms and as long as the rest of the start."""
+        now_ns = self._qemu.qemu_clock_get_ns(_VIRTUAL)
+        if self._fuses and self._fuses.expires > now_ns:
+            self._qemu.timer_mod_ns(c.addressof(self._fuses), now_ns)
         if not self._qemu.qemu_reset_requested_get():
             self._guard_later()
             return

@@ -40,7 +40,9 @@ BLOCK_S = 8.0
 ROAD_SHARE, ROAD_M = 1.0, 150.0
 SWING_S = 0.2  # the yaw rate at both ends of an interval is averaged over this
 SWAY_S = 0.05, 0.3  # sway is the force's mean over the first less that over the second: neither noise nor driving
-TURN_WEIGHT = 0.3  # weight of bends against braking: tyres slip sideways, and drivers brake and speed up in bends
+# deg/s: at this yaw rate an interval of a car counts half. In a tight turn a sensor ahead of the rear axle moves aside
+# of where the vehicle points, by its distance from that axle over the turn's radius.
+TIGHT_DPS = 20.0
 
 
 @dataclass
@@ -106,6 +108,8 @@ def intervals(log: Log, kind: str, lag_s: float, bias_dps: Array) -> Intervals:
         w = np.sum(np.diff(swing, axis=0)[good] * up, axis=1) / length
         terms = np.column_stack((np.ones_like(a), a, c, w))
         weight = length * np.where(standing, STANDING_WEIGHT, mean_mps > STANDING_MPS)
+        turning_dps = np.degrees(c * STANDARD_GRAVITY / np.maximum(mean_mps, MOVING_MPS))
+        weight /= 1.0 + (turning_dps / TIGHT_DPS) ** 2
         shown = (mean_mps > MOVING_MPS).astype(float)
     sway = (means[:, 6:] * shown[:, None]).reshape(-1, 3, 3)
     return Intervals(middle, means[:, :3], terms, weight, mean_mps, sway)
@@ -147,7 +151,7 @@ def frames(found: Array, varied: Array) -> Array:
     """(k, 3, 3) vehicle from sensor, rows left, up, forward, from the two results of fits()."""
     level, forward, left = found[..., 0, :], found[..., 1, :], found[..., 2, :]
     up = level / np.maximum(np.linalg.norm(level, axis=-1, keepdims=True), 1e-9)
-    ahead = varied[..., :1] * forward + TURN_WEIGHT * varied[..., 1:] * np.cross(left, up)
+    ahead = varied[..., :1] * forward + varied[..., 1:] * np.cross(left, up)
     return frame_of(up, np.asarray(ahead, dtype=float))
 
 

@@ -132,8 +132,7 @@ def _drive(period: Period, logs: list[Log]) -> _Drive:
         return _Drive(fit)
     driven = [evidence.intervals(log, period.kind, fit.lag_s or 0.0, fit.bias_dps) for log in logs]
     suspected = fit.reason in (MOVED, "parts-differ") or (fit.halves_deg or 0.0) > AGREE_DEG
-    up = None if fit.refusal else fit.calibration.vehicle_from_sensor[1]
-    return _Drive(fit, driven, find_moves(driven, suspected), find_forward(driven, up))
+    return _Drive(fit, driven, find_moves(driven, suspected), find_forward(driven, None if fit.refusal else fit))
 
 
 def _refusal(drive: _Drive, logs: list[Log]) -> tuple[str, str]:
@@ -202,6 +201,7 @@ def _alignment(
         "reason": reason,
         "message": message,
         "quality_deg": found.sigma_deg if found else None,
+        "attitude_deg": found.attitude_deg if found else None,
         "halves_deg": found.halves_deg if found else None,
         "vehicle_from_sensor": known.frame.ravel().tolist() if known else None,
         "gyro_bias_dps": fit.bias_dps.tolist() if fit and known else None,

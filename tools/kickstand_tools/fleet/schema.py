@@ -20,6 +20,7 @@ TABLES: dict[str, dict[str, tuple[str, str, str]]] = {
         "reason": (_TEXT, "", "why not aligned, a code; empty if aligned"),
         "message": (_TEXT, "", "the reason in words"),
         "quality_deg": (_NUMBER, "deg", "standard error of forward about the vertical"),
+        "attitude_deg": (_NUMBER, "deg", "standard error of the whole alignment, up included"),
         "halves_deg": (_NUMBER, "deg", "forward of the first half of the driving against the second"),
         "vehicle_from_sensor": (_LIST, "", "9 numbers, rows left, up, forward; null if not aligned"),
         "gyro_bias_dps": (_LIST, "deg/s", "3 numbers, along the sensor's axes"),

@@ -40,10 +40,10 @@ NO_SPEED = -1.0  # not NaN, which a board's struct does not read as NaN
 class ReplayMeter(LeanMeter):
     """The firmware's meter for single readings in g and deg/s; on a board it takes sums of counts."""
 
-    def use(self, calibration):
+    def use(self, calibration, posed=False):
         """Take a calibration: see LeanMeter.use(). (18)-(20) and (15) are multiplied out here: 18 products a
         reading."""
-        LeanMeter.use(self, calibration)
+        LeanMeter.use(self, calibration, posed)
         r, slope = calibration.vehicle_from_sensor, calibration.accel_slope
         self._force_offset, self._rate_offset = [0.0] * 3, [0.0] * 3
         rotate(self._force_offset, r, calibration.accel_offset)

@@ -29,7 +29,8 @@ class Ride:
 
     poses, kickstand, upright, readings: each (n, 7) at rate_hz, in the chip's order: force (g), temperature (C), rate
     (deg/s). poses: six sides in random order and a slanted one. time (s), truth (by name) and phase: (n,), an entry for
-    each row of readings. vehicle_from_sensor: (3, 3), rows left, up, forward.
+    each row of readings. vehicle_from_sensor: (3, 3), rows left, up, forward. stand_deg: lean of the pose kickstand; on
+    the stand where the ride begins it is another.
     """
 
     rate_hz: float
@@ -43,6 +44,7 @@ class Ride:
     vehicle_from_sensor: NDArray[np.float64]
     chip: Chip
     bike: Bike
+    stand_deg: float
 
 
 def ride(
@@ -125,6 +127,7 @@ def ride(
         mounting,
         chip,
         bike,
+        lean,
     )
 
 

@@ -1,5 +1,5 @@
-"""`kickstand flash` in the browser: its own code on CPython for WebAssembly. page/install/install.mjs runs it. What
-goes to it is JSON.
+"""`kickstand flash` and `kickstand status` in the browser: their own code on CPython for WebAssembly.
+page/install/install.mjs runs it. What goes to it is JSON.
 """
 
 import json
@@ -95,6 +95,14 @@ class Installation:
         installed = done.installed
         counts = {"copied": len(installed.copied), "kept": len(installed.kept)}
         return json.dumps({"board": done.board, "config_kept": CONFIG not in installed.copied} | counts)
+
+
+def status(line, name):
+    """What `kickstand status` prints of the board at a SerialLine: {"text"} or {"refused": why}."""
+    try:
+        return json.dumps({"text": connection.status(BrowserBoard(line, name))})
+    except InputError as error:
+        return json.dumps({"refused": str(error)})
 
 
 def _describe(transport, name):

@@ -1,5 +1,5 @@
 """What rides_guest.py needs to look at a ride: the tools that `kickstand report` and `plot` consist of, the firmware's
-mathematics, Jinja, what reads GPX files, and numpy."""
+mathematics, Jinja, what reads GPX and FIT files, and numpy."""
 
 import io
 import tarfile
@@ -19,14 +19,15 @@ _LICENCES = "info/licenses/"
 
 
 def archive() -> bytes:
-    """A ZIP file of packages to import: kickstand_tools, kickstand, gpxpy, jinja2 and markupsafe, the latter without
-    its compiled module, which it also has in Python. Raises InputError without gpxpy."""
+    """A ZIP file of packages to import: kickstand_tools, kickstand, fitdecode, gpxpy, jinja2 and markupsafe, the latter
+    without its compiled module, which it also has in Python. Raises InputError without fitdecode or gpxpy."""
     try:
+        import fitdecode
         import gpxpy
     except ImportError as error:
-        raise InputError("the page Rides needs gpxpy: " + extra("web")) from error
+        raise InputError("the page Rides needs fitdecode and gpxpy: " + extra("web")) from error
     found = tools("web/rides_guest.py")
-    for package in (firmware_path.PACKAGE, *(Path(one.__path__[0]) for one in (gpxpy, jinja2, markupsafe))):
+    for package in (firmware_path.PACKAGE, *(Path(one.__path__[0]) for one in (fitdecode, gpxpy, jinja2, markupsafe))):
         found |= {path.relative_to(package.parent).as_posix(): path for path in package.rglob("*.py")}
     return zipped({name: path.read_bytes() for name, path in found.items()})
 

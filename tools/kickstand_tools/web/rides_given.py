@@ -18,7 +18,7 @@ from ..logs.reader import check_first_line
 @dataclass
 class GivenRide:
     """log: a file, or a folder of files that are one recording. files: all that belong to it. table: what is to be
-    asked about it, None if it is known. track: a .gpx to be joined with it, or ""."""
+    asked about it, None if it is known. track: a .gpx or .fit to be joined with it, or ""."""
 
     log: str
     files: list[str]
@@ -50,7 +50,7 @@ def sorted_out(names: list[str]) -> Given:
                 read_calibration(Path(name))
                 calibrations.append(name)
                 found.kinds[name] = "calibration"
-            elif name.lower().endswith(".gpx"):
+            elif name.lower().endswith((".gpx", ".fit")):
                 read_track(Path(name))
                 track, found.kinds[name] = name, "track"
             elif _is_log(name):

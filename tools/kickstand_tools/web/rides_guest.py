@@ -96,7 +96,7 @@ def asked_for(table: mapped.Table) -> dict[str, Any]:
 def take(log, is_log, columns, units, track, progress):
     """{"log": log}; of what is made of it, by `import` from an app's recording or by `join` with a track, {"log": that,
     "path": likewise, "warnings": [...], "words": how it was joined or ""}. columns, units: of a table, as JSON of what
-    --columns and --units take, else "{}"; track: a .gpx or ""."""
+    --columns and --units take, else "{}"; track: a .gpx, a .fit or ""."""
     if is_log and not track:
         return {"log": log}
     out, warnings, words = log, [], ""

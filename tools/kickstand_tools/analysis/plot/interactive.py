@@ -30,6 +30,7 @@ PAPER = {
     "autotypenumbers": "strict",
     "bargap": 0,
     "font": {"color": _INK},
+    "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": "rgb(120,120,120)", "activecolor": _INK},
     "paper_bgcolor": "rgba(0,0,0,0)",  # the page's own
     "plot_bgcolor": "rgba(0,0,0,0)",
     "showlegend": False,
@@ -120,11 +121,11 @@ def _layout(charts: Charts, narrow: bool, linked: bool) -> dict[str, Any]:
     heights = [round(_INCH * chart.height) for chart in (each if narrow else each[: rows + 1])]
     gap, margin = (_NARROW_GAP, _NARROW_MARGIN) if narrow else (_GAP, _MARGIN)
     inner = sum(heights) + gap * (len(heights) - 1)
-    words = html.escape(charts.title)  # plotly takes < for the beginning of a tag
+    words = html.escape(charts.title).split("  ·  ")  # plotly takes < for the beginning of a tag
+    lines = words if narrow else ["  ·  ".join(words[:2]), "  ·  ".join(words[2:])]
     made: dict[str, Any] = PAPER | {"height": inner + margin["t"] + margin["b"], "margin": margin}
-    made["title"] = {"text": words.replace("  ·  ", "<br>") if narrow else words, "x": 0.05}
+    made["title"] = {"text": "<br>".join(filter(None, lines)), "x": 0.05, "font": {"size": 14}}
     made |= {"annotations": [], "shapes": []} | ({"hovermode": "x"} if linked else {})
-    made["title"] |= {"font": {"size": 14}} if narrow else {}
     wide = (1.0 - _ASIDE * (len(charts.below) - 1)) / len(charts.below)
     for k, chart in enumerate(each):
         row, column = (k, 0) if narrow else (min(k, rows), max(0, k - rows))

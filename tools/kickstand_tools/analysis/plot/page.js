@@ -7,6 +7,7 @@ const FEW = { responsive: true, displaylogo: false, modeBarButtons: [["resetScal
 Plotly.newPlot("chart", CHART.data, layout, FEW);
 if (parent !== window) {
   const postHeight = () => parent.postMessage({ height: document.body.scrollHeight }, "*"); // of the frame that it is in
+  postHeight(); // a frame that is not in sight yet observes nothing
   new ResizeObserver(postHeight).observe(document.body);
 }
 

@@ -27,8 +27,8 @@ def draw(result: PeriodResult) -> str:
     row = result.alignment
     name = row["vehicle"] + (f", mount {row['mount']}" if row["mount"] else "")
     said = row["message"] or (
-        f"forward known to {row['quality_deg']:.1f}°, {row['events_used']} events, {row['stops']} stops, "
-        f"speed {row['speed_lag_s']:.1f} s late"
+        f"forward known to {row['quality_deg']:.1f}°, the whole alignment to {row['attitude_deg']:.1f}°, "
+        f"{row['events_used']} events, {row['stops']} stops, speed {row['speed_lag_s']:.1f} s late"
     )
     points = result.picture
     parts = [

@@ -20,7 +20,7 @@ from . import boot
 from .sample_count import SampleCount
 
 SAMPLE_HZ = 200  # as bench_guest sets it
-_GUEST = ("bench_guest", "stages_guest")  # modules of this folder that run on the board
+_GUEST = ("bench_guest", "stages_guest", "bluetooth_guest")  # modules of this folder that run on the board
 _SENSOR = Sensor(seed=1, share=0.0)  # without errors, mounted at some angle
 _SPEED_MPS = 15.0
 _RIDE = [accelerate(_SPEED_MPS, 1.0)] + [turn(-30.0, 3.0), turn(35.0, 3.0)] * 20
@@ -123,11 +123,8 @@ def _run(chip: str, seconds: int, detail: bool = False, chosen: dict[str, Any] |
     mpy = CHIPS[chip].MPY
     files = flash_image.firmware(True, mpy) | _calibration()
     del files["/main.py"]
-    guests = {f"{name}.mpy": f"{name}.py" for name in _GUEST}
-    if chosen.get("LIVE"):
-        guests["bluetooth.mpy"] = "bluetooth_guest.py"
     here = Path(__file__).parent
-    files |= {name: cross_compiled(here / source, architecture(mpy)) for name, source in guests.items()}
+    files |= {f"{name}.mpy": cross_compiled(here / f"{name}.py", architecture(mpy)) for name in _GUEST}
     arrays: list[np.ndarray] = []
     stages: list[np.ndarray] = []
     result: dict[str, Any] = {}

@@ -135,7 +135,8 @@ class MeasuredApp(app_module.App):
 
 
 def _attach(app):
-    """A phone that wants everything."""
+    """A phone that wants everything, and no radio: a Pico has none, that of an emulated ESP32 does not start."""
+    sys.modules["bluetooth"] = __import__("bluetooth_guest")
     from kickstand.live.live import attach
     from kickstand.live.radio import Radio
 

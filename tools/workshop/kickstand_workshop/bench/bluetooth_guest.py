@@ -1,5 +1,5 @@
-"""Runs on the emulated Pico as its module bluetooth, which that has not: what is sent goes nowhere. A phone is always
-connected, and wants everything as often as it can have it."""
+"""Runs on the emulated board in place of its module bluetooth: what is sent goes nowhere. A phone is always connected,
+and wants everything as often as it can have it."""
 
 FASTEST_MS = 40
 

@@ -1,5 +1,5 @@
-// Puts the firmware and its config.py onto a board at the browser's serial port: `kickstand flash` itself, on CPython for
-// WebAssembly (web/install_guest.py).
+// Puts the firmware and its config.py onto a board at the browser's serial port: `kickstand flash` itself, and what
+// `kickstand status` prints, on CPython for WebAssembly (web/install_guest.py).
 
 import { choosePort, inPages, loadOnce, overCable, python } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
@@ -8,7 +8,7 @@ import { Fields } from "./fields.mjs";
 
 const byId = (id) => document.getElementById(id);
 const fields = new Fields(byId("fields"), check);
-const load = loadOnce(python);
+const guests = loadOnce(async () => (await python()).pyimport("kickstand_tools.web.install_guest"));
 let board = null; // {port, guest}: an Installation of install_guest.py
 let byHand = null;
 
@@ -25,9 +25,9 @@ async function look() {
   atWork(true);
   byId("config").hidden = true;
   tell("Loading the tools, 6 MB the first time …", 0);
-  const tools = await load(tell);
+  const tools = await guests(tell);
   if (!tools) return atWork(false);
-  const guest = tools.pyimport("kickstand_tools.web.install_guest").Installation();
+  const guest = tools.Installation();
   const said = await overCable(port, tell, (line, name) => {
     tell("Asking the board …", 0);
     return guest.look.callPromising(line, name);
@@ -87,11 +87,41 @@ function told({ refused, board: name, copied, kept, config_kept }) {
   tell(`Done: ${name}. ${files}.${config} The board starts now. ${next}`);
 }
 
+/** What `kickstand status` prints, to read and to copy into an issue. */
+async function status() {
+  const say = (text) => (byId("status-said").textContent = text);
+  const port = await choosePort(say);
+  if (!port) return;
+  atWork(true);
+  byId("status-shown").hidden = true;
+  say("Loading the tools, 6 MB the first time …");
+  const tools = await guests(say);
+  const said =
+    tools &&
+    (await overCable(port, say, (line, name) => {
+      say("Asking the board …");
+      return tools.status.callPromising(line, name);
+    }));
+  atWork(false);
+  if (!said) return;
+  const { text, refused } = JSON.parse(said);
+  say(refused ? `${inPages(refused)}.` : "The board has restarted.");
+  byId("status-text").textContent = text ?? "";
+  byId("status-shown").hidden = !text;
+}
+
+async function copyStatus() {
+  await navigator.clipboard.writeText(byId("status-text").textContent);
+  byId("status-said").textContent = "Copied.";
+}
+
 function atWork(on) {
-  for (const id of ["look", "install", "fields", "image", "image-file"]) byId(id).disabled = on;
+  for (const id of ["look", "install", "fields", "image", "image-file", "status"]) byId(id).disabled = on;
 }
 
 byId("look").addEventListener("click", look);
 byId("install").addEventListener("click", install);
+byId("status").addEventListener("click", status);
+byId("status-copy").addEventListener("click", copyStatus);
 connectImage(atWork);
 keepOffline();

@@ -7,7 +7,7 @@ import { Riding } from "./bluetooth/riding.mjs";
 import { Chart } from "./chart.mjs";
 import { busy, offer } from "./files.mjs";
 import { Gauge } from "./gauge.mjs";
-import { LEAN, SIDEWAYS, sideOf, written } from "./measures.mjs";
+import { LEAN, SIDEWAYS, sideOf, signed, written } from "./measures.mjs";
 import { Player } from "./player.mjs";
 import { SimulatedRide } from "./simulated.mjs";
 
@@ -198,7 +198,7 @@ function draw(nowMs) {
     chart.draw(player.moments, until, measure);
     put("lean", value === null ? "--" : written(measure, value));
     put("side", (value !== null && sideOf(measure, value)) || "\u00a0");
-    put("forward", forward === null ? "--" : `${forward < 0 ? "−" : "+"}${Math.abs(forward).toFixed(2)} g`);
+    put("forward", forward === null ? "--" : `${signed(forward)} g`);
     put("max-left", furthest[0] ? written(measure, furthest[0]) : "--");
     put("max-right", furthest[1] ? written(measure, furthest[1]) : "--");
   }

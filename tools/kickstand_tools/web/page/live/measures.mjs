@@ -37,6 +37,12 @@ export function written({ digits, unit }, value) {
   return `${Math.abs(value).toFixed(digits)}${unit}`;
 }
 
+/** With its sign, which 0 has not. */
+export function signed(value) {
+  const size = Math.abs(value).toFixed(2);
+  return Number(size) === 0 ? size : `${value < 0 ? "−" : "+"}${size}`;
+}
+
 /** "left" or "right", "" where the size would be written as 0. */
 export function sideOf({ digits }, value) {
   if (Number(value.toFixed(digits)) === 0) return "";

@@ -38,10 +38,14 @@ export function showReport({ words, warnings, name, calibration }) {
   byId("report").hidden = false;
 }
 
-/** page: the HTML of the charts, which is as high as it is wide enough for. */
+/** page: the HTML of the charts, which is as high as it is wide enough for. Its frame is a new one, and seen before it
+ * loads: a frame that was hidden until then may believe that it still is, and draw nothing. */
 export function showCharts(page) {
   byId("charts").hidden = false;
-  byId("plot").srcdoc = page;
+  const frame = byId("plot").cloneNode();
+  frame.removeAttribute("style");
+  frame.srcdoc = page;
+  byId("plot").replaceWith(frame);
 }
 
 // The frame may run scripts, but not reach this page: it says how high it is
