@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 from checked import cells_of, simulated, words
+from drawn_rides import drawn_ride
 from kickstand_tools.checks.bends import bends
+from kickstand_tools.checks.handedness import handedness
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
 from kickstand_tools.simulation.profiles import PROFILES
@@ -26,6 +28,15 @@ def test_a_short_ride_shows_it_too():
     log = simulated("city", 9, 120.0)
     assert "are they in rad/s?" in judged(log, np.radians(1.0))
     assert "the gyro of the opposite sign" in judged(log, -1.0)
+
+
+@pytest.mark.parametrize("seed", [1036, 2018, 1060])
+def test_one_long_steady_bend_is_not_the_gyros_bias(seed):
+    """It lasts for 60 of 92 s, so most of the calmest seconds are in it."""
+    log = drawn_ride(seed, mounts=["firm"], kind="sweepers").logs[0]
+    assert words(handedness(cells_of(log)) or bends(cells_of(log))) == ""
+    log.gyro_dps = -log.gyro_dps
+    assert "the gyro of the opposite sign" in words(handedness(cells_of(log)) or bends(cells_of(log)))
 
 
 TURN = np.reshape(random_mounting(3), (3, 3))

@@ -6,6 +6,7 @@ import command
 import numpy as np
 import pytest
 from command import refused, works
+from drawn_rides import drawn_ride
 from kickstand_tools.calibration.file import CalibrationFile, write_calibration
 from kickstand_tools.logs.csv_lines import write_table
 from smoothed_rides import simulated
@@ -32,11 +33,28 @@ def test_a_row_for_each_sample_with_the_logs_own_time(ride, tmp_path):
     result = works("smooth", directory / "RIDE.csv", "--out", out)
     assert result.err == ""
     assert result.out == f"written: {out}, {len(lean)} samples\n"
-    assert out.read_text().startswith("t_s,lean_deg,lean_sigma_deg,pitch_deg,speed_mps\n7.25,")
+    assert out.read_text().startswith("t_s,lean_deg,lean_sigma_deg,pitch_deg,speed_mps,doubtful\n7.25,")
     got = read(out)
     assert np.array_equal(got["t_s"], read(directory / "RIDE.csv")["t_s"])
     assert np.max(np.abs(got["lean_deg"] - lean)[riding]) < 3.0
     assert np.all(got["lean_sigma_deg"] > 0.0)
+
+
+def test_accelerations_that_are_not_the_bikes_are_said_in_the_file_in_words_and_in_json(tmp_path):
+    drawn = drawn_ride(3028, 90.0, ["foreign"])
+    log = drawn.logs[0]
+    rows = np.column_stack((log.t_s, log.accel_g, log.gyro_dps))
+    write_table(tmp_path / "RIDE.csv", command.HEADER.split(","), rows.round(5).tolist())
+    write_calibration(tmp_path / "RIDE.cal.json", drawn.calibrations[0])
+    result = works("smooth", tmp_path / "RIDE.csv", "--out", tmp_path / "LEAN.csv")
+    assert "% of the riding the accelerations are not those of a bike on its wheels" in result.err
+    found = read(tmp_path / "LEAN.csv")["doubtful"]
+    assert set(found) == {0.0, 1.0}
+    assert np.mean(found[drawn.riding(0)]) > 0.5
+    remarks = json.loads(works("report", tmp_path / "RIDE.csv", "--json").out)["remarks"]
+    (remark,) = (remark for remark in remarks if remark["code"] == "not-the-bikes")
+    assert remark["values"][0] > 50.0
+    assert remark["words"] in result.err.replace("\n", " ")
 
 
 def test_a_stretch_of_a_ride(ride, tmp_path):

@@ -1,10 +1,14 @@
 """The smoothed lean: against the truth of rides of two simulators, and what rides may hold beside riding."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from drawn_rides import drawn_ride, judged
 from kickstand_tools.api import CalibrationFile, InputError, Log, smooth
 from kickstand_tools.estimation import smooth as module
+from kickstand_tools.refusals import sentence
+from kickstand_tools.signals.rotations import rotation_matrix
 from smoothed_rides import Known, other, rms, simulated
 
 RIDES = {
@@ -69,6 +73,32 @@ def test_a_steady_ride_on_a_straight_is_no_standstill(seed, mount):
     0.56 and 0.37 degrees."""
     live, off, _ = judged(drawn_ride(seed, mounts=[mount]))
     assert rms(off) < 0.8 * rms(live)
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_good_mounts_and_roads_are_not_doubted(seed):
+    drawn = drawn_ride(seed, 90.0, ["firm"])
+    found = smooth(drawn.logs[0], drawn.calibrations[0])
+    assert not np.any(found.doubtful)
+    assert "not-the-bikes" not in [notice.code for notice in found.notices]
+
+
+def test_wheelies_are_not_taken_for_a_soft_mount():
+    """They were, and the error was 0.4 degrees."""
+    known = simulated("wheelie", 1, 120.0)
+    found = smooth(known.log, known.calibration)
+    assert not np.any(found.doubtful)
+    assert rms((found.lean_deg - known.lean_deg)[known.riding]) < 0.25
+
+
+@pytest.mark.parametrize("wrong_deg", [-4.0, 4.0])
+def test_a_pose_that_was_not_upright_is_said(street, wrong_deg):
+    turned = rotation_matrix(np.radians([0.0, 0.0, -wrong_deg])) @ street.calibration.vehicle_from_sensor
+    calibration = replace(street.calibration, vehicle_from_sensor=turned)
+    (notice,) = (n for n in smooth(street.log, calibration).notices if n.code == "pose-off")
+    assert np.sign(notice.values[0]) == np.sign(wrong_deg)
+    assert abs(abs(notice.values[0]) - 4.0) < 2.1  # the ride's own pose is 1.5 off
+    assert ("right" if wrong_deg > 0.0 else "left") in sentence(notice)
 
 
 def mean_error(known):
@@ -156,7 +186,7 @@ def test_frozen_readings_have_no_lean_and_do_not_harm_the_rest(street):
     assert np.array_equal(np.flatnonzero(nothing), np.flatnonzero(froze)[1:])
     assert np.array_equal(np.isnan(found.lean_sigma_deg), nothing)
     assert rms((found.lean_deg - street.lean_deg)[street.riding & ~nothing]) < 0.4
-    assert [notice.code for notice in found.notices] == ["frozen-readings"]
+    assert "frozen-readings" in [notice.code for notice in found.notices]
 
 
 def test_a_pothole_leaves_no_lean_behind(street):

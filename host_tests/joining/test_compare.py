@@ -91,7 +91,7 @@ def test_words_json_and_a_picture(files):
     assert "B begins 0.0" in said and "smoothed: they differ by" in said and "live: they differ by" in said
     assert (files / "C.png").read_bytes().startswith(b"\x89PNG")
     data = json.loads(command.works("compare", files / "A.csv", files / "B.csv", "--json").out)
-    assert set(data) == {"clocks", "live", "smoothed"}
+    assert set(data) == {"clocks", "live", "smoothed", "remarks"}
     assert 0.0 < data["smoothed"]["moving_deg"] < 2.0
 
 

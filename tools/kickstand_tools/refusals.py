@@ -1,6 +1,9 @@
 """The words of a terminal for what the firmware's own modules refuse and for what is remarkable in a log: one line,
 by code (see kickstand.errors)."""
 
+from collections.abc import Iterable
+from math import isfinite
+
 from kickstand import console
 from kickstand.errors import Notice, Refusal
 from kickstand.units import AXES
@@ -48,6 +51,8 @@ _SENTENCES = {
     ),
     "uncertain": "forward is known to {0:.1f} degrees only, after {1} braking events: drive on",
     "nul-end": "its end is {0} NUL bytes, as after a loss of power: they are left out",
+    "not-the-bikes": "in {0:.0f} % of the riding the accelerations are not those of a bike on its wheels, so the "
+    "smoothed lean is less exact there: is the sensor in a soft mount or in a pocket? Fix it firmly",
     "cut-gzip": "the file was cut: what is missing at its end is lost, copy it again if you can",
     "cut-line": "line {0}, the last one, was cut: it is left out",
     "times-spread": "the times are rounded ({0} of {1} repeat the one before): they are spread evenly, by up to "
@@ -138,8 +143,22 @@ def sentence(refusal: Refusal | Notice, remedies: Remedies = COMMANDS) -> str:
         return _up_off(remedies, *refusal.values)
     if refusal.code == "forward-off":
         return _forward_off(remedies, *refusal.values)
+    if refusal.code == "pose-off":
+        return _pose_off(*refusal.values)
     words = _SENTENCES.get(refusal.code)
     return words.format(*refusal.values, **remedies) if words else console.sentence(refusal)
+
+
+def as_data(notices: Iterable[Notice]) -> list[dict[str, object]]:
+    """Code, values and words of each, for JSON; None for a value that is not finite."""
+
+    def plain(value: object) -> object:
+        return (round(value, 3) if isfinite(value) else None) if isinstance(value, float) else value
+
+    return [
+        {"code": notice.code, "values": [plain(value) for value in notice.values], "words": sentence(notice)}
+        for notice in notices
+    ]
 
 
 def _frozen(stretches: int, seconds: float, begin_s: float, end_s: float) -> str:
@@ -205,6 +224,16 @@ def _up_off(remedies: Remedies, angle_deg: float, car: bool) -> str:
     if angle_deg > UPSIDE_DOWN_DEG:
         return line + f"is it another mount's? {_again(remedies, car)}. Or {OPPOSITE_SIGN}"
     return line + f"is it another mount's? {_again(remedies, car)}"
+
+
+def _pose_off(angle_deg: float) -> str:
+    """angle_deg: > 0 to the right."""
+    side = "right" if angle_deg > 0.0 else "left"
+    return (
+        f"on straights the bike is in balance {abs(angle_deg):.1f} degrees to the {side} of its upright pose, and the "
+        "smoothed lean counts from there: was the pose not upright? If luggage sits on one side, the lean is that "
+        "much off"
+    )
 
 
 def _forward_off(remedies: Remedies, angle_deg: float, by: str, car: bool) -> str:

@@ -3,11 +3,10 @@
 On the second simulator (other_bike.py), so that nothing is shared with kickstand_tools.simulation. Parameters of the
 estimators are fitted with even seeds only, and figures are reported of odd ones:
 
-    python host_tests/support/recordings/drawn_rides.py odd 40 > FIGURES
+    OMP_NUM_THREADS=1 python host_tests/support/recordings/drawn_rides.py odd 100
 """
 
 import sys
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -261,14 +260,13 @@ FORM = "%5d %-9s %-9s %5.2f %5.1f %4.0f%%  %5.2f %5.1f %4.0f%% %4.0f%% %5.2f"
 
 
 def main(which, count):
-    """Print the figures of so many seeds, and those of all, by mount."""
-    seeds = range(which == "odd", 2 * int(count), 2)
+    """Print the figures of so many seeds as they come, then those of all, by mount."""
+    seeds, rows = range(which == "odd", 2 * int(count), 2), []
     print(" seed kind      mount      live worst shown  smooth worst  1 s  2 s sigma")
-    with ProcessPoolExecutor(2) as pool:
-        rows = sorted(pool.map(figures, seeds), key=lambda row: list(MOUNTS).index(row[2]))
-    for row in rows:
+    for row in map(figures, seeds):
         shares = (100.0 * row[5], *row[6:8], *(100.0 * share for share in row[8:10]), row[10])
-        print(FORM % (*row[:5], *shares), "" if row[6] <= row[3] else "worse than live")
+        print(FORM % (*row[:5], *shares), "" if row[6] <= row[3] else "worse than live", flush=True)
+        rows.append(row)
     for mount in MOUNTS:
         some = np.array([row[3:] for row in rows if row[2] == mount])
         if len(some):

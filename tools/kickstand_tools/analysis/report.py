@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..refusals import SWAPPED_DEG, sentence
+from ..refusals import as_data as remarks_as_data
 from ..remedies import COMMANDS, Remedies
 from .alignment_quality import LeanCost, Quality, lean_cost
 from .overview import Overview
@@ -73,6 +74,7 @@ def as_data(seen: Overview) -> dict[str, Any]:
         data["lean_cost"] = {
             name: round(value, 2) if known and value is not None else None for name, value in costs.items()
         }
+    data["remarks"] = remarks_as_data(seen.notices)
     data["remark"] = sentence(seen.exchanged) if seen.exchanged else ""
     data["stops"] = [
         {name: value if isinstance(value, str) else round(value, 3) for name, value in vars(stop).items()}

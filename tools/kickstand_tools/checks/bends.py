@@ -21,6 +21,9 @@ AGAINST, SURE = -0.5, 5.0
 # The calmest seconds are a share of CALMEST of all, at least LEAST; CALM_G scales the force's standard deviation in
 # them
 CALMEST, LEAST, CALM_G = 0.2, 3, 0.02
+# The bias is known where AGREE of these seconds, or else of the FEW calmest, are within KNOWN_DPS: a ride may be mostly
+# one long steady bend, but what is calmest is then a standstill
+AGREE, FEW, KNOWN_DPS = 0.8, 5, 3.0
 
 
 def bends(cells: LogCells) -> Notice | None:
@@ -37,7 +40,10 @@ def bends(cells: LogCells) -> Notice | None:
         return None
     whole = len(rate) // 5 * 5  # seconds
     calm = calm_rates(force[:whole].reshape(-1, 5, 3), rate[:whole].reshape(-1, 5, 3), moves)
-    rate -= np.median(calm, axis=0)
+    bias = calm_bias(np.degrees(calm))
+    if bias is None:
+        return None
+    rate -= np.radians(bias)
     found = leaning_of(rate, force, changes > moves)
     speed = speed_in_radians(found)
     if speed is not None:
@@ -46,8 +52,17 @@ def bends(cells: LogCells) -> Notice | None:
     return Notice("left-handed") if against and leans(found) else None
 
 
+def calm_bias(calm: Array) -> Array | None:
+    """(3) deg/s: the gyro's bias, from calm_rates() in deg/s; None where these differ."""
+    for some in (calm, calm[:FEW]):
+        bias = np.median(some, axis=0)
+        if np.mean(np.linalg.norm(some - bias, axis=1) < KNOWN_DPS) > AGREE:
+            return bias
+    return None
+
+
 def calm_rates(force: Array, rate: Array, calm_rate: float) -> Array:
-    """(k, 3) mean rates of the calmest of m seconds: roughly the gyro's bias, because these are mostly straight. force,
-    rate (m, cells, 3). calm_rate: standard deviation of the rates that weighs as much as CALM_G of the force."""
+    """(k, 3) mean rates of the calmest of m seconds, the calmest first. force, rate (m, cells, 3). calm_rate: standard
+    deviation of the rates that weighs as much as CALM_G of the force."""
     changes = np.sum(np.std(force, axis=1), axis=1) / CALM_G + np.sum(np.std(rate, axis=1), axis=1) / calm_rate
     return np.mean(rate, axis=1)[np.argsort(changes)[: max(LEAST, round(CALMEST * len(changes)))]]

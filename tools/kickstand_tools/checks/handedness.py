@@ -19,14 +19,13 @@ from numpy.typing import NDArray
 
 from ..signals import Array
 from ..signals.cells import stretches
-from .bends import calm_rates
+from .bends import KNOWN_DPS, calm_bias, calm_rates
 from .cells import CELL_S, LogCells
 from .turning import Turning
 
 WINDOW_S, SHORT_WINDOW_S = 20.0, 10.0  # the short ones are used where the log has no stretch for a long one
 MOST_WINDOWS = 16  # windows that are judged: those with the largest rates
 CALM_DPS = 2.0  # scales the rates' standard deviation in calm seconds, as CALM_G the force's; see calm_rates()
-KNOWN_DPS = 3.0  # an error of the bias that is smaller is corrected by the fit
 TRIED = 6  # of the 48 exchanges so many are fitted, those that are best without velocity and bias
 
 # By which factor an exchange has to reduce the mean square (g2) of the residual force. In right logs, simulated and
@@ -110,9 +109,8 @@ def _bias(cells: LogCells) -> Array | None:
     if not len(seconds):
         return None
     rates = cells.rate[seconds]
-    calmest = calm_rates(cells.force[seconds], rates, CALM_DPS)
-    bias = np.median(calmest, axis=0)
-    if np.median(np.linalg.norm(calmest - bias, axis=1)) < KNOWN_DPS:
+    bias = calm_bias(calm_rates(cells.force[seconds], rates, CALM_DPS))
+    if bias is not None:
         return bias
     return np.zeros(3) if np.max(np.abs(np.mean(rates, axis=(0, 1)))) < KNOWN_DPS else None
 

@@ -37,8 +37,8 @@ class Estimate:
     """The motion at the edges of n windows, and the errors of sensor and bike.
 
     states (n + 1, STATES). parameters (B, PARAMETERS): of each block of BLOCK windows. matrix (3, 3): the rotation that
-    was applied to the windows, where the prior is not that of a pose. change: the last step's largest change of an
-    angle, rad.
+    was applied to the windows, where the prior is not that of a pose. noise: of these windows. change: the last step's
+    largest change of an angle, rad.
     """
 
     def __init__(self, windows: Windows, prior: Prior, hypotheses: Hypotheses) -> None:
@@ -89,7 +89,7 @@ class Estimate:
     def _start(self, still: NDArray[np.bool_]) -> None:
         """Estimate from the beginning. still (n): True where the bike stands."""
         self._likely = self._hypotheses.usual()
-        self._noise = Noise(self._windows, still)
+        self.noise = Noise(self._windows, still)
         lean, speed = lean_and_speed(self._windows, still)
         self.states = np.zeros((len(self._windows) + 1, STATES))
         self.states[:, LEAN], self.states[:, FORWARD] = _at_edges(lean), _at_edges(speed)
@@ -99,7 +99,7 @@ class Estimate:
 
     def _false_standstill(self, still: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(n) True in the brief ones that the motion before and after contradicts."""
-        contradicted = np.max(np.abs(self._residuals() / self._noise.sigma())[:, CONTRADICTING], axis=1) > CONTRADICTED
+        contradicted = np.max(np.abs(self._residuals() / self.noise.sigma())[:, CONTRADICTING], axis=1) > CONTRADICTED
         false = np.zeros_like(still)
         for begin, end in stretches(still):
             near = contradicted[max(0, begin - AROUND) : end + AROUND]
@@ -111,7 +111,7 @@ class Estimate:
         for k in range(ROUNDS):
             near = k > PLAIN_ROUNDS and self.change < NEAR
             if near:
-                self._noise.estimate_unbalance(self._residuals()[:, BALANCED], BRIEF_S)
+                self.noise.estimate_unbalance(self._residuals()[:, BALANCED], BRIEF_S)
             self._step(k >= PLAIN_ROUNDS, near and weighing_rounds < WEIGHING_ROUNDS)
             weighing_rounds += near
             if self.change < CONVERGED and weighing_rounds >= WEIGHING_ROUNDS:
@@ -120,8 +120,8 @@ class Estimate:
     def _learn_misfit(self) -> bool:
         """Are accelerations somewhere in the ride not the bike's?"""
         off = self._residuals()
-        self._noise.estimate_misfit(off / self._noise.robust(self._noise.sigma(), off))
-        return bool(np.max(self._noise.misfit) > 1.0)
+        self.noise.estimate_misfit(off / self.noise.robust(self.noise.sigma(), off))
+        return bool(np.max(self.noise.misfit) > 1.0)
 
     def _use_own_noise(self) -> None:
         """Set the noise to that of this ride's residuals.
@@ -130,15 +130,15 @@ class Estimate:
         less weight to errors that the model lacks and that last long.
         """
         off = self._residuals()
-        self._noise.estimate_roughness(off / self._noise.robust(self._noise.sigma(), off))
-        self._noise.estimate_unbalance(off[:, BALANCED], LONG_S)
+        self.noise.estimate_roughness(off / self.noise.robust(self.noise.sigma(), off))
+        self.noise.estimate_unbalance(off[:, BALANCED], LONG_S)
 
     def _step(self, robust: bool, weigh: bool) -> None:
         """One Gauss-Newton step. robust: down-weight outliers. weigh: compute the hypotheses' posterior weights before.
         Raises LinAlgError."""
         blocks = self._reduced(robust)
         if weigh:
-            self._likely = self._hypotheses.weighted(blocks, self.prior, self.parameters, self._noise.unbalance)
+            self._likely = self._hypotheses.weighted(blocks, self.prior, self.parameters, self.noise.unbalance)
         change, parameters = solve(*self._problem(blocks))
         change = np.concatenate((change[:, :-1].reshape(-1, STATES), change[-1, -1:]))
         self.change = float(np.max(np.abs(change[:, LEAN])))
@@ -168,15 +168,15 @@ class Estimate:
     def _residuals(self) -> Array:
         """(n, ROWS): the states' changes over each window less those of the process model, and the measurements."""
         x = self._middle()
-        self._noise.lean, self._noise.speed = x[LEAN], x[FORWARD]
+        self.noise.lean, self.noise.speed = x[LEAN], x[FORWARD]
         found = process_and_measurements(self._windows, x).T
         found[:, :STATES] = np.diff(self.states, axis=0) - self._windows.covered[:, None] * found[:, :STATES]
         return found
 
     def _reduced(self, robust: bool) -> Reduced:
         windows, s, unknown = self._windows, STATES, self.prior.unknown
-        off, sigma = self._residuals(), self._noise.sigma()
-        sigma = self._noise.robust(sigma, off) if robust else sigma
+        off, sigma = self._residuals(), self.noise.sigma()
+        sigma = self.noise.robust(sigma, off) if robust else sigma
         derivatives = jacobian(windows, self._middle(), np.concatenate((np.arange(s), s + unknown)))
         derivatives[:, :s] *= -windows.covered
         derivatives = derivatives.transpose(2, 1, 0) / sigma[..., None]

@@ -53,7 +53,8 @@ ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
 # Their size and correlation time show in CLIMBING: the upward velocity by integrated forces and that by pitch and speed
 # differ for seconds. The velocities' standard deviation grows with the square of this residual's rms, in means over
 # LASTING_MISFIT_S and times the root of their number of windows, over that of an ordinary ride, USUAL_MISFIT.
-LASTING_MISFIT_S, USUAL_MISFIT, MOST_MISFIT = 2.0, 0.3, 4.0
+LASTING_MISFIT_S, USUAL_MISFIT, MOST_MISFIT = 2.0, 0.3, 6.0
+MISFIT_ROUGHNESS = 0.14  # least roughness there, times the misfit: such errors last, and residuals show less than all
 # How far from balance a ride is, likewise: by the rms of BALANCED in means over some seconds, less its mean over
 # LASTS_S (that is unknowns.BESIDE), over its standard deviation. Longer means average out errors that change sign, such
 # as a rider's corrections: BRIEF_S overestimates the noise to be cautious, LONG_S does not.
@@ -74,7 +75,7 @@ class Noise:
         self._windows, self._still = windows, still & ~windows.gap
         self._in_hand, self._not_riding = (held & ~still for held in in_hand(windows))
         self._rolling = np.gradient(windows.rate[:, 2]) / WINDOW_S if len(windows) > 1 else np.zeros(1)
-        self._riding = ~windows.gap & ~still & ~self._not_riding
+        self.riding = ~windows.gap & ~still & ~self._not_riding
         self.lean = self.speed = np.zeros(len(windows))
         self.roughness, self.misfit, self.unbalance = np.ones(len(windows)), np.ones(len(windows)), 1.0
         seconds = np.maximum(windows.seconds, 1e-4)
@@ -86,7 +87,7 @@ class Noise:
     def sigma(self) -> Array:
         """(n, ROWS): standard deviations of the process noise over a window, and of the measurements; infinite where
         there is no measurement."""
-        w, riding, balanced = self._windows, self._riding, self._balanced
+        w, riding, balanced = self._windows, self.riding, self._balanced
         speed, roughness = np.maximum(self.speed, 0.0), self.roughness
         found = np.full((len(w), eq.ROWS), np.inf)
         found[:, :LEFT] = ANGLE_ROOT
@@ -122,17 +123,19 @@ class Noise:
         """Set roughness from the mean square, around each window, of the residuals over their standard deviations
         (n, ROWS)."""
         squares = np.mean((residual[:, ROUGH] / EXPECTED) ** 2, axis=1) * self.roughness**2
-        share = averaged(self._riding.astype(float), ROUGHNESS_S)
-        found = averaged(np.where(self._riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
-        self.roughness = np.where(share > 0.02, np.clip(np.sqrt(found), LEAST_ROUGHNESS, MOST_ROUGHNESS), 1.0)
+        share = averaged(self.riding.astype(float), ROUGHNESS_S)
+        found = averaged(np.where(self.riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
+        least = np.where(self.misfit > 1.0, MISFIT_ROUGHNESS * self.misfit, LEAST_ROUGHNESS)
+        self.roughness = np.where(share > 0.02, np.clip(np.sqrt(found), least, MOST_ROUGHNESS), 1.0)
 
     def estimate_misfit(self, residual: Array) -> None:
         """How far accelerations are from the bike's, from the residuals over their standard deviations (n, ROWS)."""
         count = round(LASTING_MISFIT_S / WINDOW_S)
-        lasting = np.where(self._riding, residual[:, eq.CLIMBING], 0.0)
-        squares = count * moving_mean(lasting, count) ** 2
-        share = averaged(self._riding.astype(float), ROUGHNESS_S)
-        mean = averaged(np.where(self._riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
+        lasting = np.where(self.riding, residual[:, eq.CLIMBING], 0.0)
+        # a wheelie is far from a bike on its wheels, and brief
+        squares = np.minimum(count * moving_mean(lasting, count) ** 2, 2.0 * MOST_MISFIT * USUAL_MISFIT**2)
+        share = averaged(self.riding.astype(float), ROUGHNESS_S)
+        mean = averaged(np.where(self.riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)
         found = np.where(share > 0.02, mean / USUAL_MISFIT**2, 1.0)
         self.misfit = np.clip(found, 1.0, MOST_MISFIT)
 
@@ -151,8 +154,13 @@ class Noise:
         self.unbalance = float(np.clip(np.sqrt(np.mean(mean**2) / left), LEAST_UNBALANCE, MOST_UNBALANCE))
 
     @property
+    def doubtful(self) -> NDArray[np.bool_]:
+        """(n) True where the bike rides and its accelerations are so far from a bike's that the misfit is bounded."""
+        return self.riding & (self.misfit >= MOST_MISFIT)
+
+    @property
     def _balanced(self) -> NDArray[np.bool_]:
-        return self._riding & (self.speed > BALANCE_MIN_MPS)
+        return self.riding & (self.speed > BALANCE_MIN_MPS)
 
     def _of_balance(self) -> Array:
         """(n) g: standard deviation of BALANCED in an average ride."""

@@ -8,6 +8,7 @@ import numpy as np
 from kickstand.errors import Notice
 
 from ..calibration.file import CalibrationFile
+from ..checks.smoothed import SmoothedChecks
 from ..errors import InputError
 from ..logs.block import Block
 from ..logs.csv_lines import joined_cells, number_cells, text_cells, write_lines
@@ -16,7 +17,7 @@ from ..logs.source import Progress, name_of
 from ..logs.stretch import within
 from ..logs.table import Array, Table
 from .equations import corrected_rates
-from .hypotheses import ALL
+from .hypotheses import ALL, ROLL
 from .least_squares import Estimate
 from .noise import jolted
 from .unknowns import FORWARD, LEAN, PITCH, Prior
@@ -29,7 +30,8 @@ TOGETHER = 8  # so many segments are estimated together, with one before and one
 # sensitivity to acceleration; times the roll rate, for the delay of the gyro's low-pass and the samples' times
 LEANED_SHARE = 0.004
 TIMING_S = 0.004  # s
-COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps")
+COLUMNS = ("lean_deg", "lean_sigma_deg", "pitch_deg", "speed_mps", "doubtful")
+DIGITS = 3, 3, 3, 3, 0
 
 
 @dataclass(eq=False)
@@ -37,8 +39,9 @@ class SmoothedRide(Table):
     """The motion of a motorcycle on a ride: n samples, NaN where the readings froze.
 
     t_s: seconds since the log's first sample. lean_deg: > 0 to the right. lean_sigma_deg: its standard deviation.
-    pitch_deg: of road and suspension, > 0 nose up. speed_mps: of the sensor, forward. notices: what is remarkable in
-    the ride (kickstand_tools.refusals.sentence puts a notice into words).
+    pitch_deg: of road and suspension, > 0 nose up. speed_mps: of the sensor, forward. doubtful: 1 where accelerations
+    are so far from a bike's that the lean is less exact, else 0. notices: what is remarkable in the ride
+    (kickstand_tools.refusals.sentence puts a notice into words).
     """
 
     t_s: Array
@@ -46,6 +49,7 @@ class SmoothedRide(Table):
     lean_sigma_deg: Array
     pitch_deg: Array
     speed_mps: Array
+    doubtful: Array
     notices: list[Notice] = field(default_factory=list)
 
 
@@ -82,10 +86,16 @@ def smooth_to_csv(
         nonlocal count
         for block, found in _checked_blocks(log, calibration, progress, notices):
             count += len(found)
-            yield joined_cells([text_cells(block.time_text), *(number_cells(column, 3) for column in found.T)])
+            yield cells_of(block, found)
 
     write_lines(out, ("t_s", *COLUMNS), lines())
     return count, notices
+
+
+def cells_of(block: Block, found: Array) -> bytes:
+    """Lines of LEAN.csv."""
+    columns = (number_cells(column, digits) for column, digits in zip(found.T, DIGITS, strict=True))
+    return joined_cells([text_cells(block.time_text), *columns])
 
 
 def _checked_blocks(
@@ -115,16 +125,18 @@ def smooth_blocks(
         raise InputError("the calibration is not aligned, so the lean is unknown", "align")
     past: list[Block] = []
     waiting: list[Block] = []
-    start_c = np.nan
+    start_c, checks = np.nan, SmoothedChecks()
     for segment in _segments(read_blocks(log, 2, progress, notices, lines=lines, calibration=calibration)):
         waiting.append(segment)
         known = segment.readings[~np.isnan(segment.readings[:, 3]), 3]
         start_c = float(known[0]) if np.isnan(start_c) and len(known) else start_c
         if len(waiting) > TOGETHER:
             past, waiting, before = waiting[:TOGETHER], waiting[TOGETHER:], past[-1:]
-            yield from _together(before, past, waiting, calibration, start_c)
+            yield from _together(before, past, waiting, calibration, start_c, checks)
     # the end of a ride may be short: segments before it are estimated with it, up to TOGETHER
-    yield from _together(past[-max(1, TOGETHER - len(waiting)) :], waiting, [], calibration, start_c)
+    yield from _together(past[-max(1, TOGETHER - len(waiting)) :], waiting, [], calibration, start_c, checks)
+    if notices is not None:
+        notices.extend(checks.remarks())
 
 
 def _segments(blocks: Iterator[Block]) -> Iterator[Block]:
@@ -137,11 +149,16 @@ def _segments(blocks: Iterator[Block]) -> Iterator[Block]:
 
 
 def _together(
-    before: list[Block], own: list[Block], after: list[Block], calibration: CalibrationFile, start_c: float
+    before: list[Block],
+    own: list[Block],
+    after: list[Block],
+    calibration: CalibrationFile,
+    start_c: float,
+    checks: SmoothedChecks,
 ) -> Iterator[tuple[Block, Array | None]]:
     """Each of the segments `own` with its values, estimated together with those before and after them."""
     measured = [segment.measured for segment in (*before, *own, *after)]
-    values = _estimated(measured, calibration, start_c)
+    values = _estimated(measured, calibration, start_c, checks)
     first = sum(len(segment.time_us) for segment in measured[: len(before)])
     for segment in own:
         if values is None:
@@ -155,7 +172,9 @@ def _together(
         yield segment, found
 
 
-def _estimated(segments: list[Block], calibration: CalibrationFile, start_c: float) -> Array | None:
+def _estimated(
+    segments: list[Block], calibration: CalibrationFile, start_c: float, checks: SmoothedChecks
+) -> Array | None:
     """(samples, COLUMNS), NaN where the readings are not a ride's; None for under SLOWEST_HZ samples a second."""
     t_s = np.concatenate([segment.t_s for segment in segments])
     readings = np.concatenate([segment.readings for segment in segments])
@@ -175,7 +194,11 @@ def _estimated(segments: list[Block], calibration: CalibrationFile, start_c: flo
         estimate = Estimate(windows, Prior.of_pose(calibration.six_done), ALL)
     except np.linalg.LinAlgError:
         return nothing  # readings that are not a ride's
-    found = at_samples(windows, rate, estimate, calibration.delay_s())
+    n, noise = len(windows), estimate.noise
+    checks.add(windows.seconds, noise.riding[:n], noise.doubtful[:n], float(np.mean(estimate.parameters[:, ROLL])))
+    found = np.column_stack(
+        (at_samples(windows, rate, estimate, calibration.delay_s()), noise.doubtful[windows.number])
+    )
     found[:, :3] = np.degrees(found[:, :3])
     return found
 

@@ -21,6 +21,7 @@ from ..estimation.smooth import SmoothedRide, smooth
 from ..logs.reader import Source, read_twice
 from ..logs.source import Progress, name_of
 from ..logs.table import Array
+from ..refusals import as_data
 from ..replay.replay import replay
 from .clocks import Clocks, clocks
 from .motion import motion
@@ -67,7 +68,8 @@ class Agreement:
     def as_data(self) -> dict[str, Any]:
         """All but the leans, for JSON."""
         live = None if self.live is None else asdict(self.live)
-        return {"clocks": asdict(self.clocks), "live": live, "smoothed": asdict(self.smoothed)}
+        remarks = {name: as_data(said) for name, said in self.notices.items()}
+        return {"clocks": asdict(self.clocks), "live": live, "smoothed": asdict(self.smoothed), "remarks": remarks}
 
 
 def compare_rides(

@@ -23,11 +23,11 @@ from ..analysis.ride import Ride, open_ride
 from ..calibration.file import calibration_path, write_calibration
 from ..errors import InputError
 from ..estimation.alignment import fit_ride
-from ..estimation.smooth import COLUMNS, smooth_to_csv
+from ..estimation.smooth import COLUMNS, cells_of, smooth_to_csv
 from ..imports import mapped
 from ..imports.importing import import_recording, write_imported
 from ..joining.joined import join_track, write_joined
-from ..logs.csv_lines import joined_cells, number_cells, text_cells, write_lines
+from ..logs.csv_lines import write_lines
 from ..logs.reader import read_blocks
 from ..refusals import sentence
 from ..remedies import PAGE
@@ -164,7 +164,7 @@ def _lean_lines(ride, values, progress):
     at = 0
     for block in read_blocks(ride.log, 2, progress, calibration=ride.calibration):
         at, begin = at + len(block.time_us), at
-        yield joined_cells([text_cells(block.time_text), *(number_cells(column, 3) for column in values[begin:at].T)])
+        yield cells_of(block, values[begin:at])
 
 
 @in_json

@@ -1,0 +1,34 @@
+"""What is to be said about a smoothed lean that its standard deviation does not know, or knows only in part."""
+
+import numpy as np
+from kickstand.errors import Notice
+from numpy.typing import NDArray
+
+from ..signals import Array
+
+DOUBTFUL = 0.2  # least share of the riding
+# Where bikes lean in balance differs from the upright pose by less, if the pose was right and nothing sits on one side
+POSE_DEG = 1.8
+
+
+class SmoothedChecks:
+    """Collects a smoothed ride, part by part, with add()."""
+
+    def __init__(self) -> None:
+        self._doubtful_s = self._riding_s = self._leaned = 0.0
+
+    def add(self, seconds: Array, riding: NDArray[np.bool_], doubtful: NDArray[np.bool_], pose_rad: float) -> None:
+        """Take n windows of so many seconds. doubtful: True where accelerations are not the bike's. pose_rad: lean to
+        the right, by the upright pose, in which the bike is in balance on straights."""
+        riding_s = float(np.sum(seconds[riding]))
+        self._riding_s += riding_s
+        self._doubtful_s += float(np.sum(seconds[riding & doubtful]))
+        self._leaned += riding_s * float(np.degrees(pose_rad))
+
+    def remarks(self) -> list[Notice]:
+        """Those about the whole ride."""
+        if not self._riding_s:
+            return []
+        share, pose_deg = self._doubtful_s / self._riding_s, self._leaned / self._riding_s
+        found = [Notice("not-the-bikes", 100.0 * share)] if share > DOUBTFUL else []
+        return [*found, Notice("pose-off", pose_deg)] if abs(pose_deg) > POSE_DEG else found
