@@ -197,7 +197,7 @@ def _estimated(
     n, noise = len(windows), estimate.noise
     checks.add(windows.seconds, noise.riding[:n], noise.doubtful[:n], float(np.mean(estimate.parameters[:, ROLL])))
     found = np.column_stack(
-        (at_samples(windows, rate, estimate, calibration.delay_s()), noise.doubtful[windows.number])
+        (at_samples(windows, rate, estimate, calibration.delay_s()), noise.doubtful[windows.number].astype(float))
     )
     found[:, :3] = np.degrees(found[:, :3])
     return found
