@@ -4,6 +4,7 @@ import functools
 import gc
 import importlib.util
 import itertools
+import os
 import sys
 from pathlib import Path
 
@@ -13,6 +14,10 @@ from kickstand_tools.deploy import bytecode
 from kickstand_tools.simulated_board.fakes import cpython
 
 cpython.supplement()
+
+# Before numpy is imported. The matrices are small: threads of its library would only wait for each other, several times
+# as long where every processor has a test to run.
+os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 # How long an example takes depends on how busy the machine is.
 hypothesis.settings.register_profile(

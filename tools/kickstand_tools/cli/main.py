@@ -2,6 +2,7 @@
 
 import functools
 import importlib
+import os
 import pkgutil
 import sys
 
@@ -76,6 +77,8 @@ def kickstand(context: click.Context) -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """The console script: runs a command and leaves with its exit status."""
+    # Before a command imports numpy. The matrices are small: more threads would take twice the processor for nothing
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         sys.exit(kickstand.main(arguments, prog_name="kickstand", standalone_mode=False))
     except InputError as error:
