@@ -177,7 +177,7 @@ class LeanFilter:
         x = self._x
         x[LEAN] = atan2(fx, fy)
         x[PITCH] = 0.0
-        x[SPEED] = measurements.USUAL_SPEED if moving else 0.0  # most rides begin at rest
+        x[SPEED] = measurements.PRIOR_SPEED if moving else 0.0  # most rides begin at rest
         if posed and not moving:
             self._stand(means)
 

@@ -39,7 +39,7 @@ SIGMA_FRESH_BIAS = radians(0.2)
 # rad: the first lean's standard deviation where the bike moves. Larger: lean is shown later, and follows forces more.
 SIGMA_START_LEAN_MOVING = radians(30.0)
 # g s: mean of the speed's prior while nothing measures it. Larger: leans that began before power-on come out larger.
-USUAL_SPEED = 15.0 / STANDARD_GRAVITY
+PRIOR_SPEED = 15.0 / STANDARD_GRAVITY
 
 # Process noise, per square root of a second
 NOISE_ANGLE = radians(0.24)  # rad: vibration of the gyro. Larger: lean follows the forces more and the gyro less.
@@ -77,8 +77,8 @@ STRAIGHT_MAX_RATE = radians(2.5)  # rad/s, about the vertical. Larger: the lean 
 STRAIGHT_MIN_SPEED = 4.0 / STANDARD_GRAVITY  # g s. Larger: drift on slow straights is not taken off.
 SIGMA_STRAIGHT = radians(0.8)  # rad: lean on straights, by wind and camber. Larger: drift is taken off later.
 STRAIGHT_S = 3.0  # s: how long such a lean lasts. Larger: drift is taken off later.
-SIGMA_USUAL_SPEED = 20.0 / STANDARD_GRAVITY  # g s: speed less USUAL_SPEED. Larger: less pull towards USUAL_SPEED.
-USUAL_SPEED_S = 60.0  # s: how long a speed lasts. Larger: less pull towards USUAL_SPEED.
+SIGMA_PRIOR_SPEED = 20.0 / STANDARD_GRAVITY  # g s: speed less PRIOR_SPEED. Larger: less pull towards PRIOR_SPEED.
+PRIOR_SPEED_S = 60.0  # s: how long a speed lasts. Larger: less pull towards PRIOR_SPEED.
 
 # Standing still
 SIGMA_STAND = radians(0.5)  # rad: lean and pitch by the force on coming to rest. Larger: later forces count more.
@@ -128,10 +128,10 @@ def level_road(model, x, seconds):
 
 
 def straight_or_usual_speed(lean, speed, yaw_rate, seconds):
-    """The measurement of a lean of 0 where the bike rides straight, of USUAL_SPEED elsewhere."""
+    """The measurement of a lean of 0 where the bike rides straight, of PRIOR_SPEED elsewhere."""
     if abs(lean) < STRAIGHT_MAX_LEAN and abs(yaw_rate) < STRAIGHT_MAX_RATE and speed > STRAIGHT_MIN_SPEED:
         return ((LEAN, 1.0),), -lean, SIGMA_STRAIGHT**2 * 2 * STRAIGHT_S / seconds
-    return ((SPEED, 1.0),), USUAL_SPEED - speed, SIGMA_USUAL_SPEED**2 * 2 * USUAL_SPEED_S / seconds
+    return ((SPEED, 1.0),), PRIOR_SPEED - speed, SIGMA_PRIOR_SPEED**2 * 2 * PRIOR_SPEED_S / seconds
 
 
 def measured_speed(measured, speed, acceleration):

@@ -90,7 +90,7 @@ def fault(path: Path) -> tuple[int | None, str] | None:
     return None
 
 
-def usual() -> "Settings":
+def default_settings() -> "Settings":
     """The default settings, within posed(). Pins are None on a board without default pins."""
     from kickstand.errors import SettingsError
     from kickstand.settings import Settings
@@ -104,7 +104,7 @@ def usual() -> "Settings":
 
 def unused(path: Path, port: str) -> list[tuple[int, str]]:
     """Lines "# NAME = value" whose value is not the default: the '#' was forgotten there; while posed()."""
-    defaults = usual()
+    defaults = default_settings()
     found = []
     for number, line in enumerate(path.read_text(encoding="utf-8", errors="replace").splitlines(), 1):
         match = re.match(r"#\s*([A-Z_0-9]+) = (.*)", line)

@@ -36,21 +36,23 @@ class Hypotheses:
     """G hypotheses.
 
     turning, rolling (G, rad): process noise per block of the mount's rotation about left and up, and about forward.
-    pushed (G, g): standard deviation of the lasting force to the side. unusual (G): minus twice the logarithm of the
-    prior probability. weight (G): posterior weights, whose sum is 1.
+    pushed (G, g): standard deviation of the lasting force to the side. minus_two_log_prior (G): of the prior
+    probability. weight (G): posterior weights, whose sum is 1.
     """
 
     turning: Array
     rolling: Array
     pushed: Array
-    unusual: Array
+    minus_two_log_prior: Array
     weight: Array
 
     def select(self, index: NDArray[np.intp], weight: Array) -> "Hypotheses":
         """The hypotheses with these indices (k), with the posterior weights `weight` (k)."""
-        return Hypotheses(self.turning[index], self.rolling[index], self.pushed[index], self.unusual[index], weight)
+        return Hypotheses(
+            self.turning[index], self.rolling[index], self.pushed[index], self.minus_two_log_prior[index], weight
+        )
 
-    def usual(self) -> "Hypotheses":
+    def first(self) -> "Hypotheses":
         """The first hypothesis alone, with the weight 1."""
         return self.select(np.zeros(1, dtype=np.intp), np.ones(1))
 
@@ -61,7 +63,7 @@ class Hypotheses:
         unbalance: see Noise; over 1, it reduces the weight of the likelihood.
         """
         minus_two_log = minus_two_log_likelihood(blocks, self.random_walks(prior, parameters))
-        minus_two_log = minus_two_log * WEIGHT / max(1.0, unbalance) ** 2 + self.unusual
+        minus_two_log = minus_two_log * WEIGHT / max(1.0, unbalance) ** 2 + self.minus_two_log_prior
         weight = np.exp(-0.5 * (minus_two_log - np.min(minus_two_log)))
         kept = np.flatnonzero(weight > LEAST_SHARE * np.sum(weight))
         return self.select(kept, weight[kept] / np.sum(weight[kept]))

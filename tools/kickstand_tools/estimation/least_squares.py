@@ -88,7 +88,7 @@ class Estimate:
 
     def _start(self, still: NDArray[np.bool_]) -> None:
         """Estimate from the beginning. still (n): True where the bike stands."""
-        self._likely = self._hypotheses.usual()
+        self._likely = self._hypotheses.first()
         self.noise = Noise(self._windows, still)
         lean, speed = lean_and_speed(self._windows, still)
         self.states = np.zeros((len(self._windows) + 1, STATES))

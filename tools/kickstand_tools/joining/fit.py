@@ -159,12 +159,12 @@ def _step(compared: Comparison, now: Array) -> _Step:
     none = np.zeros_like(since_s)
     by_course = np.array([course_slope, course_slope * since_s, turned[1], turned[2], none, none, none])
     by_speed = np.array([speed_slope, speed_slope * since_s, none, none, *sped_up])
-    course_counts = _counts(course_error, given.course_weight)
-    speed_counts = _counts(speed_error, given.speed_weight)
-    curvature = np.einsum("ips,jps,ps->ij", by_course, by_course, course_counts)
-    curvature += np.einsum("ips,jps,ps->ij", by_speed, by_speed, speed_counts) + np.diag(_PRIOR + 1e-9)
-    pulls = np.einsum("ips,ps->pi", by_course, course_counts * course_error)
-    pulls += np.einsum("ips,ps->pi", by_speed, speed_counts * speed_error)
+    course_weights = _robust_weights(course_error, given.course_weight)
+    speed_weights = _robust_weights(speed_error, given.speed_weight)
+    curvature = np.einsum("ips,jps,ps->ij", by_course, by_course, course_weights)
+    curvature += np.einsum("ips,jps,ps->ij", by_speed, by_speed, speed_weights) + np.diag(_PRIOR + 1e-9)
+    pulls = np.einsum("ips,ps->pi", by_course, course_weights * course_error)
+    pulls += np.einsum("ips,ps->pi", by_speed, speed_weights * speed_error)
     return _Step(model_deg, pulls, np.asarray(np.linalg.inv(curvature), dtype=float))
 
 
@@ -196,7 +196,7 @@ def _least(columns: Array, values: Array, weight: Array) -> Array:
     return np.asarray(found, dtype=float)
 
 
-def _counts(error: Array, weight: Array) -> Array:
+def _robust_weights(error: Array, weight: Array) -> Array:
     """(p, STEPS) the weight of each error: by its variance, reduced for outliers."""
     scaled = error * np.sqrt(weight)
     usual = max(float(np.median(np.abs(scaled[weight > 0.0]))) / 0.6745, _LEAST_ERROR)

@@ -30,7 +30,7 @@ CROWD = 50
 ALLOWED = 0.6
 SHORTEST_S = 2e-6  # shortest step, because times are passed on in whole microseconds
 CONTEXT = 2000  # samples before and after a block that are used for its times
-SAID_S = 0.002  # a larger shift of the times is reported in a notice
+REPORTED_S = 0.002  # a larger shift of the times is reported in a notice
 
 
 def even_times(t_s: ArrayLike, name: str = "the log") -> Array:
@@ -178,7 +178,7 @@ class _Spread:
 
     def notices(self) -> list[Notice]:
         """The notices about the times."""
-        if not self._repeated and self._shift_s < SAID_S:
+        if not self._repeated and self._shift_s < REPORTED_S:
             return []
         return [Notice("times-spread", self._repeated, self._samples, self._shift_s)]
 

@@ -53,7 +53,9 @@ class Installation:
         except InputError as error:
             self._by_hand = str(error)
         with config_check.posed(*self._pose):
-            usual = {name: _written(value) for name, value in vars(config_check.usual()).items() if name.isupper()}
+            usual = {
+                name: _written(value) for name, value in vars(config_check.default_settings()).items() if name.isupper()
+            }
         return json.dumps({"board": board, "settings": settings, "usual": usual, "by_hand": self._by_hand})
 
     def check(self, wanted):
