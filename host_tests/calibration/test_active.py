@@ -73,7 +73,7 @@ def test_what_is_stored_for_the_chip_is_loaded_once(made):
 def test_save_replaces_and_refine_corrects(made):
     active, meter, changes = made
     active.chip_started(Chip())
-    active.save(aligned(0.25))
+    active.save(aligned(0.25), True)
     assert stored().accel_offset[0] == meter.calibration.accel_offset[0] == 0.25
     assert meter.posed
     active.refine(aligned(0.5 - 1 / 64))

@@ -101,6 +101,16 @@ def test_a_pose_that_was_not_upright_is_said(street, wrong_deg):
     assert ("right" if wrong_deg > 0.0 else "left") in sentence(notice)
 
 
+def test_remarks_count_each_second_once(monkeypatch):
+    """Though parts of a long ride are estimated twice, because their ends are known only with what follows."""
+    added = []
+    monkeypatch.setattr(module, "SEGMENT_S", 20.0)
+    monkeypatch.setattr(module.SmoothedRemarks, "add", lambda _, seconds, *more: added.append(np.sum(seconds)))
+    known = simulated("street", 1, 250.0)
+    smooth(known.log, known.calibration)
+    assert len(added) > 1 and sum(added) == pytest.approx(known.log.t_s[-1], abs=0.3 * len(added))
+
+
 def mean_error(known):
     """Of the last 50 s, and the mean standard deviation there, in degrees."""
     found = smooth(known.log, known.calibration)

@@ -95,6 +95,15 @@ def test_words_json_and_a_picture(files):
     assert 0.0 < data["smoothed"]["moving_deg"] < 2.0
 
 
+def test_a_remark_is_said_once(ride):
+    log, calibration = ride.logs[0], ride.calibrations[0]
+    stuck = np.where(np.abs(log.t_s - 80.0) < 3.0, np.argmax(log.t_s > 80.0), np.arange(len(log.t_s)))
+    frozen = api.Log(log.t_s, log.accel_g[stuck], log.gyro_dps[stuck])
+    for said in api.compare_rides(frozen, frozen, calibration, calibration).notices.values():
+        known = [(notice.code, notice.values) for notice in said]
+        assert known and len(known) == len(set(known))
+
+
 def test_another_ride_is_refused_in_one_line(files, ride):
     other = drawn_ride(7, 120.0, ["firm"], "city")
     api.write_log(files / "O.csv", other.logs[0])

@@ -85,7 +85,7 @@ def test_on_a_straight_the_bike_is_upright_and_elsewhere_its_speed_is_the_usual_
         (0.0, 15.0, -10.0, False),
         (0.0, 2.0, 0.0, False),
     ):
-        ((state, factor),), innovation, _ = measurements.straight_or_usual_speed(
+        ((state, factor),), innovation, _ = measurements.straight_or_prior_speed(
             radians(lean_deg), mps / GRAVITY_MPS2, radians(yaw_dps), WINDOW_S
         )
         assert (state, factor) == (LEAN if straight else SPEED, 1.0)

@@ -3,6 +3,7 @@
 import contextlib
 import io
 from itertools import pairwise
+from types import SimpleNamespace
 
 import pytest
 import ride_writer
@@ -105,6 +106,26 @@ def blocks(keeper):
 
 def times(keeper):
     return [turn.time_us for block in blocks(keeper) for turn in block.turns]
+
+
+def test_a_ride_that_an_alignment_begins_begins_as_its_replay_will(keeper):
+    """A replay does not know that the bike has just been posed: the meter starts again without that."""
+    from kickstand.rides.recording import Recording
+
+    settings = SimpleNamespace(SD_SPI=None, RECORD=True, SAMPLE_HZ=200)
+
+    class Calibration:
+        value = ride_writer.calibration()
+
+        def restart(self):
+            keeper.steps.append("restart")
+
+    recording = Recording(settings, ride_writer.CHIP, None, Calibration(), keeper)
+    recording.calibration_changed()
+    assert keeper.steps == []  # nothing is being recorded
+    start(recording.recorder)
+    recording.calibration_changed()
+    assert keeper.steps == ["begin", "restart", "end", "begin"]
 
 
 def test_a_block_is_written_by_pieces_of_256_bytes_one_a_turn(recorder, keeper):

@@ -230,9 +230,9 @@ def _pose_off(angle_deg: float) -> str:
     """angle_deg: > 0 to the right."""
     side = "right" if angle_deg > 0.0 else "left"
     return (
-        f"on straights the bike is in balance {abs(angle_deg):.1f} degrees to the {side} of its upright pose, and the "
-        "smoothed lean counts from there: was the pose not upright? If luggage sits on one side, the lean is that "
-        "much off"
+        f"on straights the bike is in balance {abs(angle_deg):.1f} degrees to the {side} of what the "
+        "calibration takes for upright, and the smoothed lean counts from there: a pose that was not upright does "
+        "that, and a sensor without its six positions; if it is luggage on one side, the lean is that much off"
     )
 
 

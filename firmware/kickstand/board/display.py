@@ -102,8 +102,9 @@ class Display:
         other = _FAMILY[self._probes % len(_FAMILY)]
         if self._addresses is ADDRESSES and self._kind in ("auto", "lcd") and self._answers(other):
             return
-        # Not found: if it answers later it was just powered
+        # Not found: if it answers later it was just powered, and may be another one
         self._fresh = True
+        self._wait_ms = PROBE_MS
 
     def _answers(self, address):
         try:

@@ -41,10 +41,11 @@ class ActiveCalibration:
         self._use(self._store.load(), True)
         return True
 
-    def save(self, calibration):
-        """Save a calibration that the rider's poses made to flash, then use it. Raises StoreError."""
+    def save(self, calibration, posed=False):
+        """Save a calibration that the rider's poses made to flash, then use it. posed: see LeanMeter.use(). Raises
+        StoreError."""
         self._store.save(calibration)
-        self._use(calibration, True, True)
+        self._use(calibration, True, posed)
 
     def refine(self, calibration):
         """Like save(), for an alignment from driving: maxima and the results of driving are kept. Raises StoreError."""

@@ -33,7 +33,7 @@ class LeanFilter:
     """Estimates lean from force and rate in the vehicle's axes. Fixed memory.
 
     delay_s: by how much the gyro's low-pass is late; lean is extrapolated to now. trim: rad, see UprightTrim.
-    posed: the bike has just stood for its poses, which measured the gyro's bias.
+    posed: see LeanMeter.use().
     """
 
     def __init__(self, delay_s=DELAY_S, trim=0.0, posed=False):
@@ -221,7 +221,7 @@ class LeanFilter:
 
     def _update_ride(self, model, means, seconds, roll_acceleration):
         """A generator: update with the window's forces, the level road, and the measured speed; without one with
-        straight_or_usual_speed(). Update the trim where speed and lean are certain enough."""
+        straight_or_prior_speed(). Update the trim where speed and lean are certain enough."""
         p, x = self._p, self._x
         for measurement in measurements.forces(model, means, roll_acceleration, self._force_error):
             yield from p.update(*measurement)
@@ -234,7 +234,7 @@ class LeanFilter:
             self._speed, self._last_speed, self._speed_s = None, measured, 0.0
             yield from p.update(*measurements.measured_speed(measured, speed, acceleration))
         else:
-            yield from p.update(*measurements.straight_or_usual_speed(lean, speed, model.yaw_rate, seconds))
+            yield from p.update(*measurements.straight_or_prior_speed(lean, speed, model.yaw_rate, seconds))
         certain = p.rows[SPEED][SPEED] < measurements.SIGMA_TRIM_SPEED**2
         certain = certain and p.rows[LEAN][LEAN] < measurements.SIGMA_TRIM_LEAN**2
         if certain and model.speed > measurements.STRAIGHT_MIN_SPEED:

@@ -34,7 +34,7 @@ SIGMA_START = (
     0.014,  # ratio: forward axis' reading of a rate about up
     0.014,  # ratio: scale error of the forward axis
 )
-# rad/s: the bias where the poses have just measured it. Larger: a bike that sets off at once shows its lean later.
+# rad/s: the bias where the pose on the kickstand has just measured it. Larger: after it the lean is shown later.
 SIGMA_FRESH_BIAS = radians(0.2)
 # rad: the first lean's standard deviation where the bike moves. Larger: lean is shown later, and follows forces more.
 SIGMA_START_LEAN_MOVING = radians(30.0)
@@ -127,7 +127,7 @@ def level_road(model, x, seconds):
     return model.level_row, innovation, SIGMA_SLOPE**2 * (1.0 + steep * steep) * 2 * SLOPE_S / seconds
 
 
-def straight_or_usual_speed(lean, speed, yaw_rate, seconds):
+def straight_or_prior_speed(lean, speed, yaw_rate, seconds):
     """The measurement of a lean of 0 where the bike rides straight, of PRIOR_SPEED elsewhere."""
     if abs(lean) < STRAIGHT_MAX_LEAN and abs(yaw_rate) < STRAIGHT_MAX_RATE and speed > STRAIGHT_MIN_SPEED:
         return ((LEAN, 1.0),), -lean, SIGMA_STRAIGHT**2 * 2 * STRAIGHT_S / seconds

@@ -39,7 +39,8 @@ class LeanMeter:
 
     def use(self, calibration, posed=False):
         """Take a calibration, its scale set, and restart the filter. suppressed_reason is cleared unless it is the same
-        calibration as before. posed: the bike has just stood for its poses."""
+        calibration as before. posed: the bike has stood for its poses, and the one on the kickstand has just measured
+        the gyro's bias."""
         if calibration is not self.calibration:
             self.suppressed_reason = None
         self.calibration = calibration

@@ -53,7 +53,10 @@ class Radio:
                 ble.config(bond=True, mitm=True, le_secure=True, io=_DISPLAY_ONLY)
             ble.active(True)
             self._register(UUID)
-        except (OSError, MemoryError) as error:
+        except MemoryError:
+            self.stop()
+            raise
+        except OSError as error:
             self.stop()
             raise LiveError("radio-fault", str(error))
 

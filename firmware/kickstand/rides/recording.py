@@ -107,6 +107,7 @@ class Recording:
     def calibration_changed(self):
         """End the ride and begin another, because a ride has one calibration."""
         if self.recorder.active:
+            self._calibration.restart()
             self.recorder.start(self._chip, self._calibration.value)
 
     def stop(self):

@@ -1,11 +1,14 @@
 """Guides the rider through the two poses, first on the kickstand, then upright, and saves the alignment."""
 
+from time import ticks_diff
+
 from ..calibration.two_position import WARN_TILT_DEG, align
 from . import messages, pages
 from .wizard import ASKING, RESULT, Wizard
 
 POSE_SECONDS = 3
 RESULT_MS = 4000
+FRESH_MS = 90_000  # so long after the pose on the kickstand the gyro's bias is as that pose has measured it
 _ASK = (("On the stand,", "press button"), ("Now upright:", "hold it, press"))
 _TAKING = ("Stand: hold", "Upright: hold")
 
@@ -39,10 +42,10 @@ class AlignWizard(Wizard):
         """Keep the first pose; with the second one compute and save the alignment. Raises AlignmentError for poses that
         do not fit together, StoreError."""
         if self._kickstand is None:
-            self._kickstand = pose
+            self._kickstand, self._kickstand_ms = pose, now_ms
             self._show(ASKING, _ASK[1])
             return
         new, tilt = align(self._calibration.value, self._kickstand, pose, self._side)
-        self._calibration.save(new)
+        self._calibration.save(new, ticks_diff(now_ms, self._kickstand_ms) < FRESH_MS)
         warning = "Little, 8%s best" % messages.DEGREE if tilt < WARN_TILT_DEG else "Ride safely"
         self._show_for(RESULT_MS, RESULT, now_ms, "Aligned! %5.1f%s" % (tilt, messages.DEGREE), warning)

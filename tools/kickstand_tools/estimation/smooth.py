@@ -8,7 +8,6 @@ import numpy as np
 from kickstand.errors import Notice
 
 from ..calibration.file import CalibrationFile
-from ..checks.smoothed import SmoothedChecks
 from ..errors import InputError
 from ..logs.block import Block
 from ..logs.csv_lines import joined_cells, number_cells, text_cells, write_lines
@@ -20,6 +19,7 @@ from .equations import corrected_rates
 from .hypotheses import ALL, ROLL
 from .least_squares import Estimate
 from .noise import jolted
+from .remarks import SmoothedRemarks
 from .unknowns import FORWARD, LEAN, PITCH, Prior
 from .windows import Windows, windows_of
 
@@ -125,7 +125,7 @@ def smooth_blocks(
         raise InputError("the calibration is not aligned, so the lean is unknown", "align")
     past: list[Block] = []
     waiting: list[Block] = []
-    start_c, checks = np.nan, SmoothedChecks()
+    start_c, checks = np.nan, SmoothedRemarks()
     for segment in _segments(read_blocks(log, 2, progress, notices, lines=lines, calibration=calibration)):
         waiting.append(segment)
         known = segment.readings[~np.isnan(segment.readings[:, 3]), 3]
@@ -154,12 +154,13 @@ def _together(
     after: list[Block],
     calibration: CalibrationFile,
     start_c: float,
-    checks: SmoothedChecks,
+    checks: SmoothedRemarks,
 ) -> Iterator[tuple[Block, Array | None]]:
     """Each of the segments `own` with its values, estimated together with those before and after them."""
     measured = [segment.measured for segment in (*before, *own, *after)]
-    values = _estimated(measured, calibration, start_c, checks)
-    first = sum(len(segment.time_us) for segment in measured[: len(before)])
+    ends = np.cumsum([0, *(len(segment.time_us) for segment in measured)])
+    first = int(ends[len(before)])
+    values = _estimated(measured, calibration, start_c, checks, slice(first, int(ends[len(before) + len(own)])))
     for segment in own:
         if values is None:
             yield segment, None
@@ -173,9 +174,10 @@ def _together(
 
 
 def _estimated(
-    segments: list[Block], calibration: CalibrationFile, start_c: float, checks: SmoothedChecks
+    segments: list[Block], calibration: CalibrationFile, start_c: float, checks: SmoothedRemarks, own: slice
 ) -> Array | None:
-    """(samples, COLUMNS), NaN where the readings are not a ride's; None for under SLOWEST_HZ samples a second."""
+    """(samples, COLUMNS), NaN where the readings are not a ride's; None for under SLOWEST_HZ samples a second. own: the
+    samples that no other call estimates for good, which are those that the remarks are about."""
     t_s = np.concatenate([segment.t_s for segment in segments])
     readings = np.concatenate([segment.readings for segment in segments])
     speed = np.concatenate([segment.speed_mps for segment in segments])
@@ -194,8 +196,9 @@ def _estimated(
         estimate = Estimate(windows, Prior.of_pose(calibration.six_done), ALL)
     except np.linalg.LinAlgError:
         return nothing  # readings that are not a ride's
-    n, noise = len(windows), estimate.noise
-    checks.add(windows.seconds, noise.riding[:n], noise.doubtful[:n], float(np.mean(estimate.parameters[:, ROLL])))
+    noise, mine = estimate.noise, np.unique(windows.number[own])
+    roll = float(np.mean(estimate.parameters[:, ROLL]))
+    checks.add(windows.seconds[mine], noise.riding[mine], noise.doubtful[mine], roll)
     found = np.column_stack(
         (at_samples(windows, rate, estimate, calibration.delay_s()), noise.doubtful[windows.number].astype(float))
     )

@@ -20,7 +20,7 @@ from .period import AFTERWARDS, CHANGED, DISK_FULL, PeriodResult, failed, work_o
 from .show import plot
 from .show.page import Glance, write_page
 
-RESULTS_VERSION = 3  # a new number makes all earlier results obsolete
+RESULTS_VERSION = 4  # a new number makes all earlier results obsolete
 PLOTS, SIGNALS = "plots", "signals"
 TIMEOUT_S = 600.0  # longest time for one mount of one vehicle
 _WRITE_S, _SHARE = 15.0, 20.0  # the tables are written again after the longer of 15 s and 20 times a writing

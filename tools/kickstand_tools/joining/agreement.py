@@ -101,7 +101,8 @@ def compare_rides(
     rides = [smooth(one, calibration) for one, calibration in ((a, calibration_a), (b, calibration_b))]
     shown = [replay(one, calibration) for one, calibration in ((a, calibration_a), (b, calibration_b))]
     for said, ride in zip(notices.values(), rides):
-        said.extend(notice for notice in ride.notices if notice not in said)
+        known = {(notice.code, notice.values) for notice in said}
+        said.extend(notice for notice in ride.notices if (notice.code, notice.values) not in known)
     t_s = np.arange(0.0, rides[0].t_s[-1], STEP_S)
     at = t_s, found.of_b(t_s)
     riding = np.ones(len(t_s), dtype=bool)

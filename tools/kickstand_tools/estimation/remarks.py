@@ -11,7 +11,7 @@ DOUBTFUL = 0.2  # least share of the riding
 POSE_DEG = 1.8
 
 
-class SmoothedChecks:
+class SmoothedRemarks:
     """Collects a smoothed ride, part by part, with add()."""
 
     def __init__(self) -> None:
