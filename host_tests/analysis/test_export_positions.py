@@ -80,7 +80,7 @@ def test_gpx_has_each_position_with_time_speed_and_lean(tmp_path):
 
 def test_a_lean_that_is_not_sure_is_not_in_a_track(tmp_path):
     """A log that begins in a turn: the lean is unknown for some seconds. The positions are there."""
-    later = log().part(log().t_s > 7.0)
+    later = log().part(log().t_s > 7.5)
     gpx = gpxpy.parse(exported("gpx", tmp_path, later).read_text())
     points = [point for segment in gpx.tracks[0].segments for point in segment.points]
     channels = api.vehicle_channels(later, ALIGNED)

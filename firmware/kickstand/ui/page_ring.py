@@ -28,7 +28,8 @@ class PageRing:
         self._pages = MOTORCYCLE if leans else CAR
         self._at = 0
         self.late = self.draws = False
-        self._glance = None  # the module; False where it cannot be loaded
+        self._glance = None  # the module, once a display draws
+        self._glance_tried = False
         self.live = None
         self.own = []
         self._own_at = None  # index of the owner's page that is shown
@@ -101,27 +102,27 @@ class PageRing:
         return shown and self._calibration.aligned and not self.late
 
     def _page(self, page):
-        meter = self._meter
+        meter, pictures = self._meter, self._pictures
         recording = self._at == 0 and self._rides.recorder.active
         if meter.fallen:
             return pages.FALLEN
         if not self.trusted:
             lines = pages.unsure(meter.suppressed_reason)
-            return lines + (self._pictures.unsure(*lines),) if self._pictures else lines
+            return lines + (pictures.unsure(*lines),) if pictures else lines
         line1, line2 = page(meter)
         if recording:
             line1 = pages.recorded(line1)
-        if self._pictures and page in self._pictures.PICTURES:
-            return line1, line2, self._pictures.PICTURES[page](meter, recording)
+        if pictures and page in pictures.PICTURES:
+            return line1, line2, pictures.PICTURES[page](meter, recording)
         return line1, line2
 
     @property
     def _pictures(self):
         """The module glance, only for a display that draws. Where it cannot be loaded, lines are shown."""
-        if self.draws and self._glance is None:
-            self._glance = False
+        if self.draws and not self._glance_tried:
+            self._glance_tried = True
             attempt(self._load)
-        return self.draws and self._glance
+        return self._glance if self.draws else None
 
     def _load(self):
         from . import glance

@@ -1,5 +1,7 @@
 """What is to be said about a smoothed lean that its standard deviation does not know, or knows only in part."""
 
+from collections.abc import Iterable
+
 import numpy as np
 from kickstand.errors import Notice
 from numpy.typing import NDArray
@@ -9,6 +11,9 @@ from ..signals import Array
 DOUBTFUL = 0.2  # least share of the riding
 # Where bikes lean in balance differs from the upright pose by less, if the pose was right and nothing sits on one side
 POSE_DEG = 1.8
+# Where one of these is remarked, accelerations are not the bike's because of it
+CAUSES = {"up-off", "forward-off", "forward-exchanged", "another-mount", "upside-down"}
+CAUSES |= {"left-handed", "mirrored", "rates-misfit", "rates-in-radians"}
 
 
 class SmoothedRemarks:
@@ -25,9 +30,9 @@ class SmoothedRemarks:
         self._doubtful_s += float(np.sum(seconds[riding & doubtful]))
         self._leaned += riding_s * float(np.degrees(pose_rad))
 
-    def remarks(self) -> list[Notice]:
-        """Those about the whole ride."""
-        if not self._riding_s:
+    def remarks(self, known: Iterable[Notice]) -> list[Notice]:
+        """Those about the whole ride. known: what is remarked of it already."""
+        if not self._riding_s or any(notice.code in CAUSES for notice in known):
             return []
         share, pose_deg = self._doubtful_s / self._riding_s, self._leaned / self._riding_s
         found = [Notice("not-the-bikes", 100.0 * share)] if share > DOUBTFUL else []

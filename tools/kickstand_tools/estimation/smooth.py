@@ -136,7 +136,7 @@ def smooth_blocks(
     # the end of a ride may be short: segments before it are estimated with it, up to TOGETHER
     yield from _together(past[-max(1, TOGETHER - len(waiting)) :], waiting, [], calibration, start_c, checks)
     if notices is not None:
-        notices.extend(checks.remarks())
+        notices.extend(checks.remarks(notices))
 
 
 def _segments(blocks: Iterator[Block]) -> Iterator[Block]:
