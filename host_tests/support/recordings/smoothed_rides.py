@@ -1,8 +1,10 @@
-"""Rides of both simulators with sloppy calibrations, with what the display shows of them."""
+"""Rides of both simulators with sloppy calibrations, with what the display shows of them. As a program: the table of
+tools/README.md, errors of the shown and of the smoothed lean."""
 
 from dataclasses import dataclass
 
 import numpy as np
+from kickstand_tools.api import replay, smooth
 from kickstand_tools.calibration.file import CalibrationFile
 from kickstand_tools.logs.log import Log
 from kickstand_tools.replay import replay_engine
@@ -47,3 +49,32 @@ def other(kind, seed, **more):
 
 def rms(values):
     return float(np.sqrt(np.mean(np.square(values))))
+
+
+ROWS = ("street", "track", "sweeper", "city", "hills", "held", "corners", "wheelie", "banked", "crosswind", "creep")
+ROWS += ("temperature", "other held", "other sweepers", "other track")
+
+
+def figures(row):
+    """Shown: rms, worst; smoothed: rms, worst, share within 1 and 2 standard deviations. Over all rides, in degrees."""
+    kind, is_other = row.split()[-1], " " in row
+    rides = [
+        other(kind, seed, seconds=300.0) if is_other else simulated(kind, seed, 300.0) for seed in (201, 202, 203, 204)
+    ]
+    shown, off, sigma = [], [], []
+    for known in rides:
+        live, found = replay(known.log, known.calibration), smooth(known.log, known.calibration)
+        seen = known.riding & ~np.isnan(live.lean_sigma_deg)
+        shown.append((live.lean_deg - known.lean_deg)[seen])
+        off.append((found.lean_deg - known.lean_deg)[known.riding])
+        sigma.append(found.lean_sigma_deg[known.riding])
+    shown, off, sigma = (np.concatenate(values) for values in (shown, off, sigma))
+    within = [np.mean(np.abs(off) < times * sigma) for times in (1.0, 2.0)]
+    return rms(shown), np.max(np.abs(shown)), rms(off), np.max(np.abs(off)), *within
+
+
+if __name__ == "__main__":
+    for row in ROWS:
+        found = figures(row)
+        within = "{:.0f}, {:.0f} %".format(*(100.0 * share for share in found[4:]))
+        print("| {} | {:.2f} ({:.1f}) | {:.2f} ({:.1f}) | {} |".format(row, *found[:4], within), flush=True)
