@@ -37,3 +37,9 @@ def test_the_page_turns_the_loop_as_the_firmware_does(tmp_path):
     shown = {display["text"][0].rstrip() for _, display in page["displays"]}
     assert {"", "Kickstand", "Stand: hold", "Now upright:", "Calibration", "Safe mode"} <= shown
     assert page["displays"] == loop["displays"]
+
+
+def test_a_press_that_comes_with_its_release_counts(tmp_path):
+    """As after a stall of the browser, which lasted longer than the press."""
+    page = run("page", [[1.0, "button", True], [1.0, "button", False]], tmp_path / "page")
+    assert any(display["text"][0].startswith("Stand: hold") for _, display in page["displays"])

@@ -23,6 +23,7 @@ TICK_S = 0.02
 REST_US = 10_000  # steps of the time in which no firmware runs
 CUT_AFTER_BYTES = 40  # of a calibration's record
 FOREVER_S = 1e9
+SHORTEST_PRESS_US = 100_000  # of the board's time
 
 
 class Device:
@@ -38,6 +39,7 @@ class Device:
         self._ticks = []
         self._seen = -1  # the display's count of changes at the last tick
         self._plugged = True
+        self._pressed_us = 0
         self._text = {}
         self.board.every(TICK_S, self._tick)
         self.board.install()
@@ -51,7 +53,11 @@ class Device:
         """
         board = self.board
         if name == "button":
-            board.button.turn(value, board.clock.now_us)
+            now_us = board.clock.now_us
+            if value:
+                self._pressed_us = now_us
+            # a browser that was busy may bring both at once, and contacts bounce for longer than nothing
+            board.button.turn(value, now_us if value else max(now_us, self._pressed_us + SHORTEST_PRESS_US))
         elif name == "pose":
             if value in ("kickstand", "upright"):
                 self.bike.stand(value)
