@@ -167,7 +167,7 @@ class Live:
         radio, buffer, sigma, speed = self.radio, self._buffer, self._sigma, self._speed
         aligned = self._app.meter.calibration.aligned
         if packet == OWN:
-            force = self._force if aligned else None  # not in the sensor's own axes
+            force = self._force if aligned else None  # it is along the sensor's axes
             state = self._state(lean)
             self._put(radio.now, packets.now(buffer, now_ms, lean, sigma, force, self._rate, speed, state))
         elif packet == LEAN and lean is not None:

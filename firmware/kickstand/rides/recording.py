@@ -37,7 +37,7 @@ class Recording:
         if self._due or self.on_card:
             self._finish()
         if self._due and not (keeper or self.on_card or self._refused):
-            try:  # twice is once: later the ride finds its directory. An ESP32 would lose the first readings meanwhile
+            try:  # make its directory now: an ESP32 takes so long that it would lose the first readings
                 self.recorder.keeper.begin()
             except (OSError, MemoryError):
                 pass  # start() says why
@@ -105,7 +105,8 @@ class Recording:
         return self.start() if due else None
 
     def calibration_changed(self):
-        """End the ride and begin another, because a ride has one calibration."""
+        """End the ride and begin another, because a ride has one calibration. The meter restarts: a replay of the ride,
+        which does not know of poses just taken, begins like that too."""
         if self.recorder.active:
             self._calibration.restart()
             self.recorder.start(self._chip, self._calibration.value)

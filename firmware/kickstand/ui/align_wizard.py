@@ -8,7 +8,9 @@ from .wizard import ASKING, RESULT, Wizard
 
 POSE_SECONDS = 3
 RESULT_MS = 4000
-FRESH_MS = 90_000  # so long after the pose on the kickstand the gyro's bias is as that pose has measured it
+FRESH_MS = (
+    90_000  # the gyro's bias that the pose on the kickstand has measured holds for so long; then it may have drifted
+)
 _ASK = (("On the stand,", "press button"), ("Now upright:", "hold it, press"))
 _TAKING = ("Stand: hold", "Upright: hold")
 

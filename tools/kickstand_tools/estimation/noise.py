@@ -54,7 +54,9 @@ ROUGHNESS_S, LEAST_ROUGHNESS, MOST_ROUGHNESS = 60.0, 0.1, 4.0
 # differ for seconds. The velocities' standard deviation grows with the square of this residual's rms, in means over
 # LASTING_MISFIT_S and times the root of their number of windows, over that of an ordinary ride, USUAL_MISFIT.
 LASTING_MISFIT_S, USUAL_MISFIT, MOST_MISFIT = 2.0, 0.3, 6.0
-MISFIT_ROUGHNESS = 0.14  # least roughness there, times the misfit: such errors last, and residuals show less than all
+MISFIT_ROUGHNESS = (
+    0.14  # times the misfit, the least roughness where there is one: residuals of lasting errors are small
+)
 # How far from balance a ride is, likewise: by the rms of BALANCED in means over some seconds, less its mean over
 # LASTS_S (that is unknowns.BESIDE), over its standard deviation. Longer means average out errors that change sign, such
 # as a rider's corrections: BRIEF_S overestimates the noise to be cautious, LONG_S does not.
@@ -132,7 +134,7 @@ class Noise:
         """How far accelerations are from the bike's, from the residuals over their standard deviations (n, ROWS)."""
         count = round(LASTING_MISFIT_S / WINDOW_S)
         lasting = np.where(self.riding, residual[:, eq.CLIMBING], 0.0)
-        # a wheelie is far from a bike on its wheels, and brief
+        # limited: on a wheelie the residual is large, but brief
         squares = np.minimum(count * moving_mean(lasting, count) ** 2, 2.0 * MOST_MISFIT * USUAL_MISFIT**2)
         share = averaged(self.riding.astype(float), ROUGHNESS_S)
         mean = averaged(np.where(self.riding, squares, 0.0), ROUGHNESS_S) / np.maximum(share, 1e-9)

@@ -1,4 +1,4 @@
-"""What is to be said about a smoothed lean that its standard deviation does not know, or knows only in part."""
+"""Remarks on a smoothed lean: errors that its standard deviation does not contain, or only in part."""
 
 from collections.abc import Iterable
 
@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from ..signals import Array
 
-DOUBTFUL = 0.2  # least share of the riding
-# Where bikes lean in balance differs from the upright pose by less, if the pose was right and nothing sits on one side
+DOUBTFUL = 0.2  # share of the riding; more is remarked
+# Largest lean in which a bike is in balance on straights, if the upright pose was right and no luggage sits on one side
 POSE_DEG = 1.8
-# Where one of these is remarked, accelerations are not the bike's because of it
+# Each of these remarks is a reason why accelerations do not fit a bike: then nothing is said of the mount or the pose
 CAUSES = {"up-off", "forward-off", "forward-exchanged", "another-mount", "upside-down"}
 CAUSES |= {"left-handed", "mirrored", "rates-misfit", "rates-in-radians"}
 

@@ -125,18 +125,18 @@ def smooth_blocks(
         raise InputError("the calibration is not aligned, so the lean is unknown", "align")
     past: list[Block] = []
     waiting: list[Block] = []
-    start_c, checks = np.nan, SmoothedRemarks()
+    start_c, remarks = np.nan, SmoothedRemarks()
     for segment in _segments(read_blocks(log, 2, progress, notices, lines=lines, calibration=calibration)):
         waiting.append(segment)
         known = segment.readings[~np.isnan(segment.readings[:, 3]), 3]
         start_c = float(known[0]) if np.isnan(start_c) and len(known) else start_c
         if len(waiting) > TOGETHER:
             past, waiting, before = waiting[:TOGETHER], waiting[TOGETHER:], past[-1:]
-            yield from _together(before, past, waiting, calibration, start_c, checks)
+            yield from _together(before, past, waiting, calibration, start_c, remarks)
     # the end of a ride may be short: segments before it are estimated with it, up to TOGETHER
-    yield from _together(past[-max(1, TOGETHER - len(waiting)) :], waiting, [], calibration, start_c, checks)
+    yield from _together(past[-max(1, TOGETHER - len(waiting)) :], waiting, [], calibration, start_c, remarks)
     if notices is not None:
-        notices.extend(checks.remarks(notices))
+        notices.extend(remarks.remarks(notices))
 
 
 def _segments(blocks: Iterator[Block]) -> Iterator[Block]:
@@ -154,13 +154,13 @@ def _together(
     after: list[Block],
     calibration: CalibrationFile,
     start_c: float,
-    checks: SmoothedRemarks,
+    remarks: SmoothedRemarks,
 ) -> Iterator[tuple[Block, Array | None]]:
     """Each of the segments `own` with its values, estimated together with those before and after them."""
     measured = [segment.measured for segment in (*before, *own, *after)]
     ends = np.cumsum([0, *(len(segment.time_us) for segment in measured)])
     first = int(ends[len(before)])
-    values = _estimated(measured, calibration, start_c, checks, slice(first, int(ends[len(before) + len(own)])))
+    values = _estimated(measured, calibration, start_c, remarks, slice(first, int(ends[len(before) + len(own)])))
     for segment in own:
         if values is None:
             yield segment, None
@@ -174,10 +174,10 @@ def _together(
 
 
 def _estimated(
-    segments: list[Block], calibration: CalibrationFile, start_c: float, checks: SmoothedRemarks, own: slice
+    segments: list[Block], calibration: CalibrationFile, start_c: float, remarks: SmoothedRemarks, own: slice
 ) -> Array | None:
-    """(samples, COLUMNS), NaN where the readings are not a ride's; None for under SLOWEST_HZ samples a second. own: the
-    samples that no other call estimates for good, which are those that the remarks are about."""
+    """(samples, COLUMNS), NaN where the readings are not a ride's; None for under SLOWEST_HZ samples a second. own:
+    the samples whose lean this call is for, between those that only help to find it; remarks count these alone."""
     t_s = np.concatenate([segment.t_s for segment in segments])
     readings = np.concatenate([segment.readings for segment in segments])
     speed = np.concatenate([segment.speed_mps for segment in segments])
@@ -198,7 +198,7 @@ def _estimated(
         return nothing  # readings that are not a ride's
     noise, mine = estimate.noise, np.unique(windows.number[own])
     roll = float(np.mean(estimate.parameters[:, ROLL]))
-    checks.add(windows.seconds[mine], noise.riding[mine], noise.doubtful[mine], roll)
+    remarks.add(windows.seconds[mine], noise.riding[mine], noise.doubtful[mine], roll)
     found = np.column_stack(
         (at_samples(windows, rate, estimate, calibration.delay_s()), noise.doubtful[windows.number].astype(float))
     )

@@ -12,6 +12,19 @@ _BOARD, _MODULE, _SHIFTER, _METAL, _QUIET = "#1f6b45", "#2a4f9e", "#b3312b", "#b
 _WHITE, _PAD = "#ffffff", "#f2c94c"
 
 
+def drawings(display: str, shifted: str) -> dict[str, str]:
+    """{file name: SVG}: wiring of both boards, and what is built. display, shifted: SVGs of the display at a
+    board, and of the one behind the level shifter."""
+    return {
+        "wiring_pico.svg": wiring.draw(wiring.PICO, display),
+        "wiring_esp32.svg": wiring.draw(wiring.ESP32, display),
+        "display_5v.svg": shifter(wiring.PICO, shifted),
+        "supply.svg": supply(),
+        "six_positions.svg": six_positions(),
+        "on_the_bike.svg": on_the_bike(),
+    }
+
+
 def shifter(board: wiring.Board, display: str) -> str:
     """A 5 V display at a board: the level shifter in SDA and SCL, VCC at 5 V. display: an SVG of one."""
     pins = wiring.pin_names(board)

@@ -23,7 +23,7 @@ TICK_S = 0.02
 REST_US = 10_000  # steps of the time in which no firmware runs
 CUT_AFTER_BYTES = 40  # of a calibration's record
 FOREVER_S = 1e9
-SHORTEST_PRESS_US = 100_000  # of the board's time
+SHORTEST_PRESS_US = 100_000  # by the board's clock
 
 
 class Device:
@@ -56,7 +56,8 @@ class Device:
             now_us = board.clock.now_us
             if value:
                 self._pressed_us = now_us
-            # a browser that was busy may bring both at once, and contacts bounce for longer than nothing
+            # board.mjs makes a press last by the page's clock. After a stall both orders come at one instant of the
+            # board's, and no press would be seen
             board.button.turn(value, now_us if value else max(now_us, self._pressed_us + SHORTEST_PRESS_US))
         elif name == "pose":
             if value in ("kickstand", "upright"):

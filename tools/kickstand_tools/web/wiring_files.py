@@ -9,10 +9,7 @@ _SHOWN = ("Kickstand", "starting")  # on the drawn display
 def wiring_files() -> dict[str, bytes]:
     """{name in the site: SVG}: wiring_pico.svg, wiring_esp32.svg, and what is built."""
     display = lcd.draw([list(line.ljust(16).encode("ascii")) for line in _SHOWN], bytes(64))
-    drawn = {f"wiring_{name}.svg": wiring.draw(board, display) for name, board in _BOARDS.items()}
-    drawn |= {"display_5v.svg": building.shifter(wiring.PICO, display), "six_positions.svg": building.six_positions()}
-    drawn |= {"supply.svg": building.supply(), "on_the_bike.svg": building.on_the_bike()}
-    return {name: svg.encode() for name, svg in drawn.items()}
+    return {name: svg.encode() for name, svg in building.drawings(display, display).items()}
 
 
 def tables() -> dict[str, tuple[str, list[tuple[str, str, str]]]]:

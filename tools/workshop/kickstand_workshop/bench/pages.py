@@ -5,13 +5,14 @@
 
 import gzip
 import statistics
+import sys
 import threading
-from pathlib import Path
 from typing import Any, NamedTuple
 
 from kickstand_tools.web import serve, site
 
-CHROMIUM = Path("/usr/bin/chromium")
+from ..pictures.page import CHROMIUM, available
+
 PHONE: dict[str, Any] = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
 READY = {  # by page: what can be used then
     "": "#kind:enabled",  # the firmware has started
@@ -51,6 +52,8 @@ def measure(browser: Any, address: str, files: dict[str, bytes], name: str) -> F
 
 def main() -> None:
     """Print the medians of RUNS."""
+    if not available():
+        sys.exit(f"no {CHROMIUM}: on Debian the package chromium")
     from playwright.sync_api import sync_playwright
 
     files = site.site_files()

@@ -12,7 +12,7 @@ from typing import Any
 from kickstand_tools.web import serve, site
 
 NAME = "first_minute.webp"
-_CHROMIUM = Path("/usr/bin/chromium")
+CHROMIUM = Path("/usr/bin/chromium")
 _SIZE = (1000, 560)
 _WIDTH = 720  # of the picture, pixels
 _WAIT_MS = 60_000
@@ -30,7 +30,7 @@ _ASKS = "text => document.querySelector('#todo').textContent.includes(text)"
 
 def available() -> bool:
     """True if there is a Chromium to take the picture with."""
-    return _CHROMIUM.exists()
+    return CHROMIUM.exists()
 
 
 def looks() -> str:
@@ -44,7 +44,7 @@ def draw() -> bytes:
 
     with serve.server(site.site_files(), 0) as server, sync_playwright() as playwright:
         threading.Thread(target=server.serve_forever, daemon=True).start()
-        browser = playwright.chromium.launch(executable_path=_CHROMIUM, args=["--no-sandbox"])
+        browser = playwright.chromium.launch(executable_path=CHROMIUM, args=["--no-sandbox"])
         page = browser.new_page(viewport={"width": _SIZE[0], "height": _SIZE[1]}, color_scheme="light")
         page.set_default_timeout(_WAIT_MS)
         page.goto(f"http://{serve.HOST}:{server.server_address[1]}/")
