@@ -49,12 +49,12 @@ ROOT = Path(__file__).resolve().parent.parent
 def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", "chip: runs the firmware on the emulated Pico, which takes its time")
     config.addinivalue_line("markers", "esp32: on the emulated ESP32, where its library is")
-    config.addinivalue_line("markers", "nightly: takes so long that it runs only with --nightly")
+    config.addinivalue_line("markers", "nightly: takes long and is much like another test: runs only with --nightly")
     config.addinivalue_line("markers", "long: for over half a minute")
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--nightly", action="store_true", help="Run the longest tests of the emulated ESP32 too.")
+    parser.addoption("--nightly", action="store_true", help="Run the longest tests too.")
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

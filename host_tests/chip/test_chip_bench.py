@@ -9,12 +9,13 @@ pytestmark = pytest.mark.chip
 
 
 @pytest.mark.long
-def test_bench(monkeypatch):
+@pytest.mark.parametrize("modes", [{}, pytest.param({"recording": {"RECORD": True}}, marks=pytest.mark.nightly)])
+def test_bench(monkeypatch, modes):
     """A short run: stages add up, nothing is lost, the heap does not shrink."""
     pico()  # or skip
     from kickstand_workshop.bench import bench
 
-    monkeypatch.setattr(bench, "_MODES", {"recording": {"RECORD": True}})
+    monkeypatch.setattr(bench, "_MODES", modes)
     result = json.loads(json.dumps(bench.bench(1)))
     stages = {name: spread["median"] for name, spread in result["stage_us"].items()}
     parts = ("read", "decode and sum", "check", "calibrate and rotate", "filter", "rest of the meter")

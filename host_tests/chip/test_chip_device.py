@@ -131,7 +131,11 @@ def test_a_reset_in_mid_read_frees_the_bus(riding):
 
 @pytest.mark.parametrize(
     ("chip", "display"),
-    [("pico", "ssd1306"), ("pico", "sh1106"), pytest.param("esp32", "ssd1306", marks=pytest.mark.esp32)],
+    [
+        ("pico", "ssd1306"),
+        pytest.param("pico", "sh1106", marks=pytest.mark.nightly),
+        pytest.param("esp32", "ssd1306", marks=pytest.mark.esp32),
+    ],
 )
 def test_an_oled_is_found_and_shows_the_lean_in_large_digits(chip, display):
     """With MicroPython's own framebuf, over a Pico's own I2C and an ESP32's pins."""

@@ -57,6 +57,7 @@ def begun(pause_s):
     return hashlib.sha256(repr(seen).encode()).hexdigest()
 
 
+@pytest.mark.nightly
 def test_a_chip_does_the_same_on_every_host():
     """To the microsecond, also where the host is slow."""
     assert begun(0.0) == begun(0.002)

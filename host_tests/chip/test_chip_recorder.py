@@ -149,7 +149,7 @@ def test_wherever_the_power_goes_all_but_the_last_block_is_kept(at_prompt):
     assert len(rides(at_prompt.FLASH.read(states[-1][0]))[1]) >= 4
 
 
-@pytest.mark.parametrize("operation", [2, 37])
+@pytest.mark.parametrize("operation", [2, pytest.param(37, marks=pytest.mark.nightly)])
 def test_a_board_records_again_after_a_cut(at_prompt, operation):
     at_prompt.exec(FEED)
     at_prompt.chip.flash.cut_power(operation, 0.5)
@@ -162,8 +162,8 @@ def test_a_board_records_again_after_a_cut(at_prompt, operation):
     assert [len(blocks) for blocks in found.values()][-1] >= 2
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])])
+@pytest.mark.nightly
+@pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=pytest.mark.esp32)])
 def test_pull_and_record_through_mpremote(tmp_path, monkeypatch, chip):
     """A ride that is being recorded, with an ESP32's GPS, is ended and pulled; then a log is streamed. Both replay."""
     config = "RECORD = True\n" + {"pico": "", "esp32": 'SPEED = "gps"\n'}[chip]

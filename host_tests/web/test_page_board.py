@@ -51,7 +51,7 @@ def test_a_board_is_brought_up_to_date_and_watched(chromium, address, tmp_path):
     rider.context.close()
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 @pytest.mark.chip
 def test_from_a_broken_off_installation_to_the_lean(chromium, address):
     """All that a rider does: install, unplug, press on the stand and upright. The display shows the lean. Most files

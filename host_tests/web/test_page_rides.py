@@ -119,6 +119,7 @@ def test_what_is_pointed_at_is_said_in_one_line(page, ride, calibration):
     raise AssertionError("nothing is said")
 
 
+@pytest.mark.nightly  # the page Install, which is made in the same way, is tried each time
 def test_once_used_it_works_without_a_network(chromium, address, ride, calibration):
     rider = Rider(chromium, address + "rides.html", **LAPTOP)
     page = Rides(rider)
@@ -163,7 +164,7 @@ def test_axe_finds_nothing(page, ride, calibration, kind):
     page.page.set_viewport_size(LAPTOP["viewport"])
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_thirty_megabytes_leave_the_page_awake(chromium, address, calibration, tmp_path):
     """Over half an hour at 200 samples a second: the page answers meanwhile, and its memory hardly grows."""
     short = app_exports.riding()

@@ -181,7 +181,9 @@ def test_the_columns_of_a_table_can_be_named(page, tmp_path):
     assert_near({**json.loads(page.saved("#save-json")), "ride": ""}, {**reported, "ride": ""})
 
 
-@pytest.mark.parametrize("write", [phone_tracks.write_gpx, phone_tracks.write_fit])
+@pytest.mark.parametrize(
+    "write", [phone_tracks.write_gpx, pytest.param(phone_tracks.write_fit, marks=pytest.mark.nightly)]
+)
 def test_a_track_joins_a_ride_without_gps(page, tmp_path, write):
     """As `join` does it: the page then has a map, and the log with positions can be saved. Another ride's not."""
     made = simulate_ride("hills", seed=1, seconds=120.0)
