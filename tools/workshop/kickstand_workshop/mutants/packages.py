@@ -45,7 +45,8 @@ PACKAGES = {
     "checks": _package("tools/kickstand_tools/checks/*.py", "checks/*"),
     "replay": _package("tools/kickstand_tools/replay/*.py", "replay/test_cli_replay"),
     "export": _package(
-        "tools/kickstand_tools/analysis/export/*.py", "analysis/test_export_formats analysis/test_export_positions analysis/test_cli_export"
+        "tools/kickstand_tools/analysis/export/*.py",
+        "analysis/test_export_formats analysis/test_export_positions analysis/test_cli_export",
     ),
     "stops": _package(
         "tools/kickstand_tools/analysis/stops/*.py", " ".join(f"analysis/stops/test_{name}" for name in _STOPS.split())
