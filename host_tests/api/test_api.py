@@ -4,6 +4,8 @@ import doctest
 import gzip
 import inspect
 import io
+import pydoc
+import re
 import sys
 
 import analysis_rides
@@ -24,6 +26,14 @@ def test_the_example_of_a_function_runs(name):
     assert found, f"{name} has no example"
     for test in found:
         assert doctest.DocTestRunner().run(test).failed == 0
+
+
+def test_pydoc_has_what_is_promised():
+    """It leaves out what a module without __all__ has only imported."""
+    shown = pydoc.render_doc(api, renderer=pydoc.plaintext)
+    for name in ("import_recording", "fit_ride", "open_ride", "export", "simulate_ride"):
+        assert re.search(rf"^ +{name}(\(| = )", shown, re.M), name
+    assert "_simulation" not in api.__all__
 
 
 @pytest.fixture(scope="module")

@@ -17,6 +17,7 @@ SIGNED = [
     for signs in itertools.product((1.0, -1.0), repeat=3)
 ]
 MINUS = -np.eye(3)
+EITHER, INSTEAD = "either the accelerations", "and instead of gx, gy, gz right would be"
 WRONG_WAY = "are the axes left-handed (reverse one in both sensors) or the gyro of the opposite sign"
 
 
@@ -66,15 +67,15 @@ def test_the_remark_names_what_fits(rides):
     log = rides["sweeper"]
     swap = np.eye(3)[[1, 0, 2]]
     for gyro, accel, line in (
-        (np.diag([1, 1, -1]), None, "the rates are reversed about z; instead of gx, gy, gz right would be gx, gy, -gz"),
-        (swap, None, "the rates about x and y are exchanged; instead of gx, gy, gz right would be gy, gx, gz"),
-        (None, np.diag([1, -1, 1]), "reversed about x and z, or accelerations along y; "),
-        (None, swap, "fit if the accelerations along x and y are exchanged; "),
+        (np.diag([1, 1, -1]), None, f": the rates are reversed about z, {INSTEAD} gx, gy, -gz"),
+        (swap, None, f": the rates about x and y are exchanged, {INSTEAD} gy, gx, gz"),
         (
-            np.eye(3)[[1, 2, 0]],
             None,
-            "are in another order or of another sign; instead of gx, gy, gz right would be gz, gx, gy",
+            np.diag([1, -1, 1]),
+            f"{EITHER} along y are reversed, or the rates are reversed about x and z, {INSTEAD}",
         ),
+        (None, swap, f"{EITHER} along x and y are exchanged, or the rates are in another order or of another sign"),
+        (np.eye(3)[[1, 2, 0]], None, f": the rates are in another order or of another sign, {INSTEAD} gz, gx, gy"),
         (MINUS, None, WRONG_WAY),
         (None, MINUS, None),  # the mirror image: motion cannot show it
     ):

@@ -230,6 +230,7 @@ WRONG = {
     "gyro of the opposite sign": (lambda log: changed(log, gyro=-log.gyro_dps), ("left-handed",)),
     "nothing but absurd readings": (lambda log: changed(log, log.accel_g * 1e4), ("ride-short",)),
     "axes exchanged": (lambda log: changed(log, gyro=log.gyro_dps[:, [1, 2, 0]]), None),
+    "accelerations exchanged": (lambda log: changed(log, log.accel_g[:, [0, 2, 1]]), ("rates-misfit",)),
 }
 
 

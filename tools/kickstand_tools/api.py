@@ -75,3 +75,6 @@ from .web.site import site_files as site_files
 from .web.site import write_site as write_site
 
 SimulatedRide, simulate_ride = _simulation.Ride, _simulation.ride
+
+# All of the above: without it pydoc leaves out what is imported
+__all__ = [name for name in dir() if not name.startswith("_")]  # pyright: ignore[reportUnsupportedDunderAll]

@@ -89,7 +89,7 @@ _SENTENCES = {
     "another-mount": "the calibration given is of a mount {0:.0f} degrees from this one: its offset and slope are used",
 }
 _MOVED = {
-    "between-stops": "two stops differ by over {0:.0f} degrees",
+    "between-stops": "two stops differ by over {0:.0f} degrees; those of a motorcycle on its kickstand do: is it one?",
     "vertical": "the vertical changed by {0:.0f} degrees during the drive",
     "parts": "the vertical is no longer where it was",
     "since-standing": "standing and driving differ by {0:.0f} degrees",
@@ -189,19 +189,20 @@ def _rates_misfit(*exchange: list[int]) -> str:
     off = [axis for k, axis in enumerate(AXES) if exchange[k][k] != 1]
     moved = [axis for k, axis in enumerate(AXES) if exchange[k][k] == 0]
     signs = [sum(row) for row in exchange]
-    what = "are in another order or of another sign"
+    what, or_else = "are in another order or of another sign", ""
     if len(kept) == 2:
         what = f"are reversed about {off[0]}"
     elif not moved:
-        what = f"are reversed about {off[0]} and {off[1]}, or accelerations along {kept[0]}"
+        what, or_else = f"are reversed about {off[0]} and {off[1]}", f"along {kept[0]} are reversed"
     elif len(moved) == 2 and signs == [1, 1, 1]:
         what = f"about {moved[0]} and {moved[1]} are exchanged"
     elif len(moved) == 2 and signs == [-1, -1, -1]:
-        what = f"fit if the accelerations along {moved[0]} and {moved[1]} are exchanged"
+        or_else = f"along {moved[0]} and {moved[1]} are exchanged"
     right = ", ".join(("-" if sum(row) < 0 else "") + "g" + AXES[[abs(x) for x in row].index(1)] for row in exchange)
     return (
-        f"the rates do not belong to the accelerations, so the lean is wrong: the rates {what}; instead of gx, gy, gz "
-        f"right would be {right}"
+        "the rates do not belong to the accelerations, so the lean is wrong: "
+        + (f"either the accelerations {or_else}, or " if or_else else "")
+        + f"the rates {what}, and instead of gx, gy, gz right would be {right}"
     )
 
 

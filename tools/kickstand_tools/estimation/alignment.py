@@ -108,6 +108,9 @@ def fit_ride(log: Source, phone: str | None = None, progress: Progress | None = 
     if phone is not None and phone not in PHONES:
         raise InputError(f"no phone is mounted {phone}: there are {', '.join(PHONES)}")
     log = without_frozen(read_log(log))
+    misfit = next((notice for notice in log.notices if notice.code == "rates-misfit"), None)
+    if misfit:
+        raise RefusedInput(Refusal(misfit.code, *misfit.values), log.name)
     step_s = float(log.t_s[-1]) / (len(log.t_s) - 1)
     if step_s * SLOWEST_HZ > 1.0:
         raise InputError(f"{log.name}: a sample every {step_s:.2f} s: at least {SLOWEST_HZ:.0f} a second are needed")
