@@ -87,10 +87,14 @@ def test_what_cannot_be_exported_is_refused(ride, tmp_path, monkeypatch):
     """Without a calibration beside it, or with one that is not aligned; without pyarrow."""
     alone = tmp_path / "alone.csv"
     alone.write_bytes(ride.read_bytes())
+    empty = tmp_path / "empty.csv"
+    empty.write_text(command.HEADER + "\n")
     flat = analysis_rides.calibration(tmp_path / "other.json", aligned=False)
     out = ("--out", tmp_path / "out")
     for arguments, words in (
-        ((alone, "--to", "csv"), "no calibration alone.cal.json beside it: give one with --calibration"),
+        ((alone, "--to", "csv"), "no calibration alone.cal.json beside it: give one with --calibration, or make it"),
+        ((alone, "--to", "csv"), f"kickstand calibrate ride {alone} --out {tmp_path / 'alone.cal.json'}"),
+        ((empty, "--to", "csv"), "is empty: there are no readings below the names of its columns"),
         ((tmp_path / "none.csv", "--to", "csv"), "there is no such file"),
         ((ride, "--calibration", flat, "--to", "csv"), "is not aligned"),
     ):

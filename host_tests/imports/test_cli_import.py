@@ -1,5 +1,7 @@
 """The command: what it took for what, and a log that every other command reads."""
 
+import json
+
 import app_exports
 import command
 import numpy as np
@@ -17,6 +19,46 @@ def test_it_says_what_it_took_for_what(tmp_path):
         assert part in words
     assert f"written: {tmp_path / 'RIDE.csv'}, 2799 samples in 28.0 s, 100 a second" in result.out
     assert result.err == ""
+
+
+def test_what_to_do_next(tmp_path):
+    source = app_exports.into(tmp_path / "p.zip", app_exports.phyphox(riding().every(4)))
+    out = tmp_path / "RIDE.csv"
+    said = command.works("import", source, "--out", out).out
+    assert f"next: kickstand calibrate ride {out} --out {tmp_path / 'RIDE.cal.json'}\n" in said
+    assert f"kickstand report {out}\n" in said and f"kickstand plot {out} --out plots\n" in said
+
+
+@pytest.mark.parametrize("name", ["EXPORT.zip", "EXPORT"])
+def test_a_report_needs_no_other_command(tmp_path, name):
+    """Imported and aligned on the way, and a line says so; with a calibration beside it, by that."""
+    ride = riding().every(4)
+    again = app_exports.Riding(*(np.concatenate([column] * 3) for column in vars(ride).values()))
+    again.t_s = np.arange(len(again.t_s)) / 50.0
+    files = {n: text for n, text in app_exports.phyphox(again).items() if n in ("Accelerometer.csv", "Gyroscope.csv")}
+    source = app_exports.into(tmp_path / name, files)
+    before = command.snapshot(tmp_path)
+    result = command.works("report", source, "--json")
+    assert command.snapshot(tmp_path) == before
+    assert result.err.startswith(f"{source}: imported from phyphox, 4199 samples, 50 a second; aligned by its bends")
+    data = json.loads(result.out)
+    assert data["max_left_deg"]["value"] == pytest.approx(25.0, abs=1.5)
+    assert data["max_right_deg"]["value"] == pytest.approx(35.0, abs=1.5)
+    api.write_calibration(
+        tmp_path / "EXPORT.cal.json", api.CalibrationFile(vehicle_from_sensor=app_exports.PHONE.T, aligned=True)
+    )
+    assert "aligned" not in command.works("report", source, "--json", "--live").err
+
+
+def test_an_export_that_is_one_file(tmp_path):
+    """RaceChrono's CSV is one, too; what nobody knows is refused as a log."""
+    (tmp_path / "r.csv").write_text(app_exports.racechrono(riding().every(4)))
+    words = "s of riding: at least 30 s with bends are needed"
+    assert "r.csv: only" in command.refused(tmp_path, "report", tmp_path / "r.csv", words=words)
+    (tmp_path / "any.csv").write_text(app_exports.any_table(riding().every(4)))
+    command.refused(tmp_path, "report", tmp_path / "any.csv", words="has to go through kickstand import first")
+    (tmp_path / "any").mkdir()
+    command.refused(tmp_path, "report", tmp_path / "any", words="any holds no recording")
 
 
 def test_gaps_are_reported(tmp_path):

@@ -219,4 +219,4 @@ def test_a_workbook_of_excel(tmp_path):
 
 def test_other_commands_name_import_for_a_zip(tmp_path):
     source = app_exports.into(tmp_path / "p.zip", app_exports.phyphox(riding().every(8)))
-    command.refused(tmp_path, "report", source, words="kickstand import makes a log of it")
+    command.refused(tmp_path, "replay", source, "--out", tmp_path / "L.csv", words="kickstand import makes a log of it")

@@ -137,7 +137,7 @@ def test_an_open_file_is_read_once_and_kept():
 
 def test_names():
     assert log_stem("rides/monday.csv.gz") == "monday"
-    assert log_stem("monday.csv") == log_stem("monday") == "monday"
+    assert log_stem("monday.csv") == log_stem("monday") == log_stem("monday.zip") == "monday"
     assert name_of(io.StringIO()) == "the log"
     assert name_of(log_of(2, name="mine")) == "mine"
     assert total_bytes(io.StringIO("abc")) == total_bytes("there is none") == 0

@@ -196,7 +196,10 @@ def calibration_beside(log: Path) -> Path:
     beside = calibration_path(log)
     if not beside.exists():
         check_first_line(log)
-        raise InputError(f"{log}: no calibration {beside.name} beside it: give one with --calibration")
+        raise InputError(
+            f"{log}: no calibration {beside.name} beside it: give one with --calibration, or make it from a "
+            f"motorcycle's ride: kickstand calibrate ride {log} --out {beside}"
+        )
     return beside
 
 

@@ -23,7 +23,7 @@ from ..logs.reader import read_log
 from ..output import check_output
 from ..progress import Bar
 from ..refusals import OPPOSITE_SIGN, sentence
-from .common import OUT, PATH, RIGHT_HANDED, VEHICLES, file_argument, print_lines, warn
+from .common import OUT, PATH, RIGHT_HANDED, VEHICLES, file_argument, known_to, print_lines, warn
 
 
 @click.group(no_args_is_help=False)
@@ -201,7 +201,7 @@ def _ride_lines(found: RideFit) -> Iterable[str]:
     stood = f"{found.standing_s:.0f} s of it certainly standing"
     leaning = f"else leaning {found.lean_deg:.0f} degrees rms"
     yield f"used: {max(begin, 0.0):.0f} to {end:.0f} s of the log, {stood}, {leaning}"
-    yield f"known to: roll {found.roll_deg:.1f}, pitch {found.pitch_deg:.1f}, yaw {found.yaw_deg:.1f} degrees"
+    yield known_to(found)
     roll, pitch, yaw = (abs(angle) for angle in found.halves_deg)
     yield f"two halves of the ride differ by: roll {roll:.1f}, pitch {pitch:.1f}, yaw {yaw:.1f} degrees"
     if found.lag_s is not None:

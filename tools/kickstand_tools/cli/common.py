@@ -3,12 +3,15 @@
 from collections.abc import Callable, Iterable
 from inspect import cleandoc
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from kickstand.errors import Notice
 
 from ..refusals import sentence
+
+if TYPE_CHECKING:
+    from ..estimation.alignment import RideFit
 
 Command = Callable[..., Any]
 
@@ -92,6 +95,12 @@ def help_adds(text: str) -> Command:
     return add
 
 
+def ride_or_export(command: Command) -> Command:
+    """The argument ride, a log or what import reads."""
+    words = "What a phone's app has exported (file, folder or zip) is imported and aligned on the way."
+    return file_argument("ride", "RIDE.csv|EXPORT")(help_adds(words)(command))
+
+
 RIGHT_HANDED = help_adds(
     "The axes of the log have to be right-handed. At rest the axis that points up reads +1 g, and a rate is positive "
     "right-handed about its axis."
@@ -107,10 +116,15 @@ def live(command: Command) -> Command:
     return option(help_adds(smoothed)(command))
 
 
+def known_to(found: "RideFit") -> str:
+    """The standard errors of an alignment by a ride."""
+    return f"known to: roll {found.roll_deg:.1f}, pitch {found.pitch_deg:.1f}, yaw {found.yaw_deg:.1f} degrees"
+
+
 def warn(log: Path | str, notices: Iterable[Notice]) -> None:
-    """A warning for each notice. log: what they are about."""
-    for notice in notices:
-        warning(f"{log}: {sentence(notice)}")
+    """A warning for each notice, once. log: what they are about."""
+    for words in dict.fromkeys(map(sentence, notices)):
+        warning(f"{log}: {words}")
 
 
 def warning(text: str) -> None:

@@ -15,11 +15,12 @@ from ..analysis.export.export import export
 from ..analysis.overview import overview
 from ..analysis.plot import plot
 from ..analysis.report import as_data, page
-from ..analysis.ride import open_ride
+from ..analysis.ride import Ride, open_ride
 from ..calibration.file import calibration_beside, calibration_path, read_calibration
 from ..errors import InputError
+from ..estimation.alignment import fit_ride
 from ..estimation.smooth import smooth_to_csv
-from ..imports.importing import Imported, import_recording, write_imported
+from ..imports.importing import Imported, import_recording, is_of_an_app, write_imported
 from ..joining import agreement
 from ..joining.joined import Joined, join_track, write_joined
 from ..joining.track_files import read_track
@@ -43,9 +44,11 @@ from .common import (
     TIME,
     file_argument,
     from_to,
+    known_to,
     live,
     out_option,
     print_lines,
+    ride_or_export,
     warn,
     warning,
 )
@@ -95,6 +98,7 @@ def import_command(
     elif not any(notice.code in _WRONG_AXES for notice in found.notices):
         click.echo(f"next: kickstand calibrate ride {out} --out {beside}")
         click.echo(f"      kickstand report {out}")
+        click.echo(f"      kickstand plot {out} --out plots")
 
 
 @click.command()
@@ -191,7 +195,7 @@ def smooth_command(ride: Path, calibration: Path | None, from_s: float | None, t
 
 
 @click.command()
-@RIDE
+@ride_or_export
 @CALIBRATION
 @click.option("--to", "form", required=True, type=click.Choice(["csv", "gpx", "vbo", "racechrono", "parquet"]))
 @live
@@ -199,16 +203,16 @@ def smooth_command(ride: Path, calibration: Path | None, from_s: float | None, t
 @RIGHT_HANDED
 def export_command(ride: Path, form: str, calibration: Path | None, live: bool, out: Path) -> None:
     """Write a ride as maps (gpx), Circuit Tools (vbo), RaceChrono or data frames (parquet, csv) open it."""
-    calibration = _given_or_beside(ride, calibration, out)
-    notices: list[Notice] = []
+    check_output(out, [ride, calibration or calibration_path(ride)])
+    opened, notices = _opened(ride, calibration, live)
     with Bar("exporting") as bar:
-        count = export(open_ride(ride, calibration, smoothed=not live), form, out, bar.reach, notices)
+        count = export(opened, form, out, bar.reach, notices)
     warn(ride, notices)
     click.echo(f"written: {out}, {count} rows")
 
 
 @click.command()
-@RIDE
+@ride_or_export
 @CALIBRATION
 @STRETCH
 @live
@@ -218,9 +222,10 @@ def report_command(
     ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, live: bool, as_json: bool
 ) -> None:
     """A ride in a page: maxima, time at large leans, and each stop as a brake test has it."""
+    opened, notices = _opened(ride, calibration, live, from_s, to_s)
     with Bar("reading") as bar:
-        seen = overview(open_ride(_part(ride, from_s, to_s), calibration, smoothed=not live), bar.reach)
-    warn(ride, seen.notices)
+        seen = overview(opened, bar.reach)
+    warn(ride, notices + seen.notices)
     if as_json:
         click.echo(json.dumps(as_data(seen)))
     else:
@@ -228,7 +233,7 @@ def report_command(
 
 
 @click.command()
-@RIDE
+@ride_or_export
 @CALIBRATION
 @STRETCH
 @click.option("--tiles", is_flag=True, help="Streets below the track: the page asks a server for them when it is open.")
@@ -246,9 +251,10 @@ def plot_command(
 ) -> None:
     """Draw a ride: a picture (PNG) and a page to zoom into (HTML)."""
     plot.check(out)
+    opened, notices = _opened(ride, calibration, live, from_s, to_s)
     with Bar("reading") as bar:
-        seen = overview(open_ride(_part(ride, from_s, to_s), calibration, smoothed=not live), bar.reach)
-    warn(ride, seen.notices)
+        seen = overview(opened, bar.reach)
+    warn(ride, notices + seen.notices)
     with spinner("drawing"):
         written = list(plot.draw(seen, out, tiles))
     print_lines(f"written: {path}" for path in written)
@@ -310,7 +316,28 @@ def overlay_command(
     click.echo(f"written: {out}, {made.pictures} pictures, {made.end_s - made.begin_s:.1f} s, {made.fps:g} a second")
 
 
-def _part(log: Path, from_s: float | None, to_s: float | None) -> Source:
+def _opened(
+    source: Path, calibration: Path | None, live: bool, from_s: float | None = None, to_s: float | None = None
+) -> tuple[Ride, list[Notice]]:
+    """A ride, and notices about its import. What an app has exported is imported and, where no calibration is given or
+    beside it, aligned by itself; a line says so."""
+    if not is_of_an_app(source):
+        return open_ride(_part(source, from_s, to_s), calibration, smoothed=not live), []
+    with spinner("importing"):
+        found = import_recording(source)
+    said = f"{source}: imported from {found.app}, {len(found.log.t_s)} samples, {found.rate_hz:.0f} a second"
+    beside = calibration_path(source)
+    known = calibration or (beside if beside.exists() else None)
+    if known is None:
+        with Bar("aligning") as bar:
+            fit = fit_ride(found.log, None, bar.reach)
+        known = fit.calibration
+        said += f"; aligned by its bends, {known_to(fit)}"
+    click.echo(said, err=True)
+    return open_ride(_part(found.log, from_s, to_s), known, smoothed=not live), found.notices
+
+
+def _part(log: Source, from_s: float | None, to_s: float | None) -> Source:
     return log if from_s is None and to_s is None else Stretch(log, from_s, to_s)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from zipfile import is_zipfile
 
 import numpy as np
 from kickstand.errors import Notice
@@ -13,7 +14,7 @@ from ..checks.course import log_agrees
 from ..errors import InputError
 from ..logs.csv_lines import write_log
 from ..logs.log import Log
-from ..logs.reader import read_log
+from ..logs.reader import check_first_line, read_log
 from . import mapped
 from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo
 from .files import RecordingFile, read_files
@@ -145,6 +146,23 @@ def recordings(files: list[RecordingFile]) -> list[tuple[Any, list[RecordingFile
         claimed = {id(file) for _, group in found for file in group}
         left = [file for file in left if id(file) not in claimed]
     return found
+
+
+def is_of_an_app(source: Path) -> bool:
+    """True for a recording of another app; False for a log, and for what is neither. Raises InputError for a folder or
+    a zip that cannot be read."""
+    try:
+        if source.is_file():
+            check_first_line(source)
+            return False
+    except InputError:
+        pass  # it is no log
+    try:
+        return any(app is not own for app, _ in recordings(read_files(source)))
+    except InputError:
+        if source.is_dir() or is_zipfile(source):
+            raise
+        return False
 
 
 def _check_force(log: Log) -> None:

@@ -105,10 +105,12 @@ def read_blocks(
 
 
 def check_first_line(log: Path) -> None:
-    """Raise InputError if the first line of a file is not that of a log."""
-    first = next(chunks(log, 1), (b"", 0))[0]
+    """Raise InputError if the first line of a file is not that of a log, or is the only one."""
+    first, *more = itertools.islice(itertools.chain((text for text, _ in chunks(log, 1)), [b""]), 2)
     cells.check_text(str(log), first, 0)
     cells.header(str(log), first.decode().removeprefix("\ufeff").partition("\n")[0])
+    if not first.partition(b"\n")[2].strip() and not b"".join(more).strip():
+        raise InputError(f"{log} is empty: there are no readings below the names of its columns")
 
 
 def read_twice(source: Source) -> Source:

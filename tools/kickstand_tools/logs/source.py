@@ -44,8 +44,8 @@ def name_of(source: object) -> str:
 
 
 def log_stem(name: str) -> str:
-    """The name of a log without path and suffixes."""
-    return Path(name).name.removesuffix(".gz").removesuffix(".csv")
+    """The name of a log, or of the zip of an export, without path and suffixes."""
+    return Path(name).name.removesuffix(".gz").removesuffix(".csv").removesuffix(".zip")
 
 
 def chunks(source: File, size: int, remarks: list[Notice] | None = None) -> Iterator[tuple[bytes, int]]:
