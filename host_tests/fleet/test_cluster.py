@@ -126,7 +126,7 @@ def test_a_run_that_is_stopped_keeps_what_it_has(tmp_path, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         run_fleet(periods, tmp_path)
     assert parquet.read_table(tmp_path / "alignments.parquet")["vehicle"].to_pylist() == ["v0", "v1", "v2"]
-    assert "3 of 5 so far" in (tmp_path / "index.html").read_text()
+    assert "3 of 5 mounted sensors so far" in (tmp_path / "index.html").read_text()
     with Journal(tmp_path / "journal.jsonl") as journal:
         keys = run._keys(periods, run._marks(periods), False)
         assert [key in journal for key in keys] == [True, True, True, False, False]

@@ -13,13 +13,15 @@ import mutations
 import psutil
 import pyarrow.parquet as parquet
 import pytest
+from kickstand.errors import AlignmentError
 from kickstand_tools.errors import InputError
 from kickstand_tools.fleet import files, run
 from kickstand_tools.fleet.manifest import Period, by_pattern, read_manifest
-from kickstand_tools.fleet.period import work_on_period
+from kickstand_tools.fleet.period import failed, work_on_period
 from kickstand_tools.fleet.run import run_fleet
 from kickstand_tools.fleet.show import plot
 from kickstand_tools.output import write_whole
+from kickstand_tools.refusals import sentence
 from made_fleet import in_this_process
 
 
@@ -146,8 +148,9 @@ def test_only_this_computer_can_connect_and_nobody_but_the_run_can_run_code(tmp_
 
     program = tmp_path / "program.py"
     program.write_text(PROGRAM)
-    with subprocess.Popen([sys.executable, str(program)], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
-        assert process.stdout is not None and process.stdin is not None
+    piped = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.PIPE)
+    with subprocess.Popen([sys.executable, str(program)], **piped) as process:
+        assert process.stdout is not None and process.stdin is not None and process.stderr is not None
         address = process.stdout.readline().decode().strip()
         assert address.startswith("tls://127.0.0.1:")
         family = [psutil.Process(process.pid), *psutil.Process(process.pid).children(recursive=True)]
@@ -166,6 +169,7 @@ def test_only_this_computer_can_connect_and_nobody_but_the_run_can_run_code(tmp_
             except http.client.HTTPException:
                 pass  # no web server
         process.stdin.close()
+        assert process.stderr.read() == b""  # Dask would tell of each door that stayed closed
 
 
 @pytest.mark.parametrize(
@@ -190,6 +194,26 @@ def test_an_error_names_the_log_once(tmp_path, alone):
     result = command.works("fleet", tmp_path / "MANIFEST.csv", "--out", tmp_path / "out")
     line = next(line for line in result.out.splitlines() if line.startswith("error:"))
     assert line.count("none.csv") == 1
+
+
+def test_a_mount_that_seems_to_have_moved_counts_though_nobody_knows_when(tmp_path, monkeypatch):
+    """As a motorcycle's does that is taken for a car: it leans on its stand. Names are short, and the kind is said."""
+
+    def moved(_, items, *__):
+        for index, (period, _) in enumerate(items):
+            found = failed(period, "mount-moved", sentence(AlignmentError("mount-moved", "between-stops", 8.0)))
+            found.alignment["status"] = "refused"
+            yield index, found, "", ""
+
+    monkeypatch.setattr(run, "run_tasks", moved)
+    for name in "a.csv", "b.csv":
+        (tmp_path / name).touch()
+    result = command.works("fleet", tmp_path / "*.csv", "--vehicle", "motorcycle", "--out", tmp_path / "out")
+    assert "mounted sensors: 2\n" in result.out and "mounts that seem to have moved: 2;" in result.out
+    assert "of a motorcycle on its kickstand do: is it one?" in result.out
+    page = (tmp_path / "out" / "index.html").read_text()
+    assert "None is known to have moved" not in page and "<b>2</b><span>whose mount seems to have moved" in page
+    assert "<td>a.csv</td><td>motorcycle</td>" in page and f"Names are those below {tmp_path}/" in page
 
 
 def test_what_is_left_out_of_a_log_is_reported_and_the_log_still_counts(fleet, tmp_path):

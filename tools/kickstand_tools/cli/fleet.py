@@ -47,7 +47,7 @@ def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **how: Any
         raise
     before = found.vehicles - found.new
     done = f", {before} of them finished before" if before else ""
-    click.echo(f"{found.vehicles} vehicles and mounts{done}")
+    click.echo(f"mounted sensors: {found.vehicles}{done}")
     if found.damaged:
         click.echo(f"{found.damaged} results of before were damaged, and are worked out again", err=True)
     seen = found.seen
@@ -56,7 +56,9 @@ def fleet_command(manifests: tuple[str, ...], out: str, vehicle: str, **how: Any
     for (status, reason), count in seen.reasons.most_common():
         click.echo(f"{count:7}  {status}: {reason}")
     tests = len(seen.decelerations[1])
-    click.echo(f"mounts that moved: {seen.moved_count}; brake tests: {tests}; rows of errors: {seen.errors}")
+    click.echo(
+        f"mounts that seem to have moved: {seen.moved_vehicles}; brake tests: {tests}; rows of errors: {seen.errors}"
+    )
     for path, message in seen.first_errors:
         click.echo(f"error: {message if path in message else f'{path}: {message}'}")
     if seen.errors > len(seen.first_errors):

@@ -72,7 +72,6 @@ class Cluster:
 
             def setup(self, worker: Any) -> None:
                 signal.signal(signal.SIGINT, signal.SIG_IGN)
-                _silence()
 
         _silence()
         self._stack = contextlib.ExitStack()
@@ -84,6 +83,11 @@ class Cluster:
                     "distributed.comm.timeouts.connect": "10s",
                     "distributed.scheduler.http.routes": [],
                     "distributed.worker.http.routes": [],
+                    # What _silence() is here: in workers, from their start on
+                    "distributed.nanny.pre-spawn-environ": {
+                        **config.get("distributed.nanny.pre-spawn-environ"),
+                        "DASK_LOGGING__DISTRIBUTED": "critical",
+                    },
                 }
             )
         )

@@ -1,6 +1,7 @@
 """index.html: a fleet at one glance. It needs no network and no server."""
 
 import math
+import os
 import statistics
 from array import array
 from collections import Counter, defaultdict
@@ -14,12 +15,12 @@ from markupsafe import Markup
 from ...svg import drawing, element
 from ...templates import filled, source_hash
 from ..files import write_bytes
-from ..period import PeriodResult, Row
+from ..period import MOVED, PeriodResult, Row
 from .panel import Panel, date_text
 
 _WORST, _MOST_MOVED, _MOST_ROWS, _MOST_DOTS, _SAID = 25, 200, 2000, 3000, 3
 _WORDS = {
-    "mount-moved": "the mount was turned",
+    "mount-moved": "the mount seems to have moved",
     "speed-unit": "the speed is not in m/s",
     "speed-late": "the speed is over 2 s late",
     "speed-stuck": "the speed is stuck",
@@ -45,7 +46,8 @@ class Glance:
 
     statuses, reasons: numbers of results with each; moved_count, errors: numbers of rows in these tables; first_errors:
     (log or vehicle, message) of some of these. decelerations: (s since 1970 or NaN, m/s2) of each brake test. worst:
-    the least certain alignments; moved: the largest rotations of mounts, each with its picture.
+    the least certain alignments; moved: the largest rotations of mounts, each with its picture. moved_vehicles: number
+    of those and of the mounts that seem to have moved without it being known when.
     """
 
     def __init__(self) -> None:
@@ -56,6 +58,7 @@ class Glance:
         self.reasons: Counter[tuple[str, str]] = Counter()
         self.decelerations: tuple[array[float], array[float]] = array("d"), array("d")
         self._qualities = array("d")
+        self.below: str | None = None  # the folder that all names have in common, with its /
         self.worst: list[Row] = []
         self.moved: list[tuple[Row, str]] = []
         # rows of the table of vehicles, each with its decelerations; by aligned or not
@@ -64,6 +67,9 @@ class Glance:
     def add(self, result: PeriodResult) -> None:
         """Add the next result."""
         row = result.alignment
+        folder = row["vehicle"][: row["vehicle"].rfind("/") + 1]
+        common = folder if self.below is None else os.path.commonprefix([self.below, folder])  # noqa: RUF071
+        self.below = common[: common.rfind("/") + 1]
         aligned = row["status"] == "aligned"
         self.count += 1
         self.driven_s += row["driven_s"]
@@ -71,7 +77,7 @@ class Glance:
         if row["reason"]:
             self.reasons[row["status"], row["reason"]] += 1
         self.moved_count += len(result.moved)
-        self.moved_vehicles += bool(result.moved)
+        self.moved_vehicles += bool(result.moved) or row["reason"] == MOVED
         self.errors += len(result.errors)
         said = [(row["log"] or row["vehicle"], row["message"]) for row in result.errors]
         self.first_errors = (self.first_errors + said)[:_SAID]
@@ -93,7 +99,7 @@ class Glance:
             (self.statuses["aligned"], f"aligned ({_share(self.statuses['aligned'], self.count)})", "good"),
             (self.statuses["refused"], "refused: the drives do not show it", "warn"),
             (self.statuses["error"], "errors: no log could be used", "bad" if self.statuses["error"] else ""),
-            (self.moved_vehicles, "with a mount that moved", "warn"),
+            (self.moved_vehicles, "whose mount seems to have moved", "warn"),
             (tests, "brake tests", ""),
             (round(hours, 1) if hours < 10.0 else round(hours), "hours of driving", ""),
         ]
