@@ -136,7 +136,7 @@ def test_in_a_narrow_window_the_charts_stand_below_each_other(seen):
 
 def test_what_is_not_known_is_not_drawn(seen):
     """As where nothing was sure enough; nor is an alignment that another mount's calibration cannot have."""
-    made = replace(seen, notices=[Notice("up-off")], summary=replace(seen.summary))
+    made = replace(seen, notices=[Notice("up-off", 20.0, False)], summary=replace(seen.summary))
     made.summary.left_deg = made.summary.right_deg = made.summary.brake_g = made.summary.accel_g = Peak()
     assert title(made).endswith("lean as displayed -- left, -- right  ·  braking --, acceleration --")
     assert chart(made, "Lean").notes == []
@@ -162,7 +162,30 @@ def test_labels_of_the_share_of_each_lean_do_not_stand_on_one_another(seen, most
     boxes = [text.get_window_extent() for text in axes.texts if text.get_text()]
     assert len(boxes) == 3
     assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
-    assert max(box.x1 for box in boxes) < axes.get_window_extent().x1 + 15
+    inside = axes.get_window_extent()
+    assert max(box.x1 for box in boxes) < inside.x1 + 15
+    if max(most) > 6.0:  # smaller ones are in the middle
+        assert min(box.x0 for box in boxes) > inside.x0
+    (corner,) = (text.get_window_extent() for text in axes.texts if "upright" in text.get_text())
+    tops = [line.get_window_extent().y1 for line in axes.lines]
+    assert len(tops) == 2 and max(tops) < corner.y0  # no line through the words
+
+
+def test_where_the_lean_is_doubtful_is_marked_and_warnings_are_drawn(seen, tmp_path):
+    doubtful = ((seen.course.t_s > 5.0) & (seen.course.t_s < 9.0)).astype(float)
+    made = replace(seen, course=replace(seen.course, doubtful=doubtful), notices=[Notice("not-the-bikes", 80.0)])
+    lean = chart(made, "Lean")
+    assert "yellow: less exact" in lean.title and "yellow" not in chart(seen, "Lean").title
+    _, line = lean.traces
+    assert isinstance(line, Line)
+    there = line.x[~np.isnan(line.y)]
+    assert (there[0], there[-1]) == pytest.approx((5.0, 9.0), abs=0.1)
+    assert lean.y_range[0] < np.nanmin(line.y) < -max(abs(note.y) for note in lean.notes)
+    words = "Warning: in 80 % of the riding the accelerations are not those of a bike"
+    assert picture.figure_of(made).get_supxlabel().startswith(words)
+    assert picture.figure_of(seen).get_supxlabel() == ""
+    page.draw(tmp_path / "ride.html", made)
+    assert f'<p class="warning">{words}' in (tmp_path / "ride.html").read_text(encoding="utf-8")
 
 
 def test_the_name_of_a_ride_is_text_in_its_page(seen):

@@ -62,6 +62,20 @@ def test_csv_and_parquet_have_every_sample(ride, shown, tmp_path, form):
     assert got["temp_c"].isna().all()  # the log has none
 
 
+def test_a_clock_that_jitters_costs_no_rows_or_they_are_counted(tmp_path):
+    """A phone's: RaceChrono's times have milliseconds, VBO's hundredths."""
+    ride = analysis_rides.short(tmp_path)
+    header, *rows = ride.read_text().splitlines()
+    t_s = np.round(np.arange(len(rows)) / 100.0 + np.random.default_rng(1).uniform(0.0, 0.009, len(rows)), 3)
+    t_s -= t_s[0]
+    ride.write_text("\n".join([header, *(f"{t:.3f},{row.partition(',')[2]}" for t, row in zip(t_s, rows))]) + "\n")
+    assert len(read(export(ride, "racechrono", tmp_path / "r", "--live"), "racechrono")) == len(rows)
+    result = command.works("export", ride, "--to", "vbo", "--out", tmp_path / "v", "--live")
+    count = len(read(tmp_path / "v", "vbo"))
+    assert count < len(rows)
+    assert f"holds times to 0.01 s, which {len(rows)} samples share in {count} rows" in result.err
+
+
 @pytest.mark.parametrize("form", ["csv", "racechrono", "parquet", "vbo"])
 def test_a_car_has_no_lean_as_in_replay(ride, tmp_path, form):
     car = analysis_rides.calibration(tmp_path / "other.json", vehicle="car")

@@ -12,6 +12,7 @@ import pytest
 from kickstand_tools import api
 from kickstand_tools.analysis.overview import Overview, overview
 from kickstand_tools.analysis.plot import page, track_map
+from kickstand_tools.analysis.summary import Peak
 
 pytest.importorskip("plotly")
 EARTH_M = 6_371_000.0
@@ -80,6 +81,9 @@ def test_left_is_blue_and_right_is_orange_on_an_equal_scale_with_north_up():
     _, dots = made["data"]
     scale = dict(dots["marker"]["colorscale"])
     assert dots["marker"]["cmin"] == -dots["marker"]["cmax"] < 0.0
+    steeper = replace(seen(), summary=replace(seen().summary, right_deg=Peak(43.6, 1.0)))  # 44 in the title
+    bar = track_map.figure(points_of(), steeper)["data"][1]["marker"]["colorbar"]
+    assert bar["ticktext"] == ["44", "0", "44"]
     for place, colour in scale.items():
         red, blue = int(colour[1:3], 16), int(colour[5:7], 16)
         assert np.sign(blue - red) == np.sign(0.5 - place)

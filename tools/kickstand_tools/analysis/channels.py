@@ -25,8 +25,9 @@ class Channels(Table):
     alone. left_g, up_g, forward_g: specific force; lateral_g: acceleration to the left in the road's plane, (23).
     pitch_rate_dps: > 0 nose up; yaw_rate_dps: > 0 in a left turn; roll_rate_dps: > 0 to the right. shown_g: the forward
     force, smoothed as on the display. lean_sigma_deg: standard deviation of the lean. 1 or 0: resting: the meter has
-    detected a standstill; rolling: its estimated speed is surely not 0; sure: it trusts its lean. lat_deg, lon_deg:
-    degrees north and east, and utc_s: s since 1970, both only where there is a new value.
+    detected a standstill; rolling: its estimated speed is surely not 0; sure: it trusts its lean; doubtful: that of
+    smooth(), 0 where the lean is not smoothed. lat_deg, lon_deg: degrees north and east, and utc_s: s since 1970, both
+    only where there is a new value.
     """
 
     t_s: Array
@@ -46,6 +47,7 @@ class Channels(Table):
     resting: Array
     rolling: Array
     sure: Array
+    doubtful: Array
     lat_deg: Array
     lon_deg: Array
     utc_s: Array
@@ -74,7 +76,7 @@ def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool 
     acceleration is the force to the left.
     """
     if car:
-        lean = lean * [0.0, 1.0, 0.0, 1.0, 0.0, 1.0] + [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0]
+        lean = lean * [0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0] + [np.nan, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]
     force, rate = calibration.in_vehicle(block.readings)
     left, up, forward = force.T
     angle = np.radians(np.nan_to_num(lean[:, 0]))
@@ -99,6 +101,7 @@ def channels(block: Block, calibration: CalibrationFile, lean: Array, car: bool 
         lean[:, 3],
         lean[:, 4],
         lean[:, 5],
+        lean[:, 6],
         block.lat_deg,
         block.lon_deg,
         block.utc_s,

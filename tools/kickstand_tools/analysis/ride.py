@@ -62,6 +62,7 @@ class Ride:
                 shown = found[~whole.frozen]
                 rows[:, 0], rows[:, 2] = shown[:, 0], np.radians(shown[:, 1]) ** 2
                 rows[:, 5] = rows[:, 2] <= MAX_VARIANCE  # NaN is not
+                rows[:, 6] = shown[:, 4]
             seen = channels(block, self.calibration, rows, self.car)
             if stretch is not None:
                 which = stretch.holds(block)
@@ -144,13 +145,13 @@ class _Lean:
         self._along = MeterAlong(calibration)
 
     def follow(self, block: Block, shown: bool) -> Array:
-        """(n, 6): lean (degrees), displayed forward force (g), variance of the lean (rad2), resting, rolling, sure.
+        """(n, 7): lean (degrees), displayed forward force (g), variance of the lean (rad2), resting, rolling, sure, 0.
 
         shown: compute the lean that was shown; else it and sure are 0, which saves a tenth of the time.
         """
         n = len(block.time_us)
-        columns: list[list[float]] = [[] for _ in range(6)]
-        lean_deg, forward, variance, resting, rolling, sure = (column.append for column in columns)
+        columns: list[list[float]] = [[] for _ in range(7)]
+        lean_deg, forward, variance, resting, rolling, sure, _ = (column.append for column in columns)
         for meter in self._along.after_each(block, *self._along.in_vehicle(block)):
             lean = meter.filter
             forward(meter.smooth_force[2])

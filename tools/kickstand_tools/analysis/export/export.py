@@ -21,7 +21,7 @@ from ..ride import Ride
 from ..track import Track, joined, track
 from . import export_columns, export_gpx, export_racechrono, export_vbo
 
-STEP_S = {"csv": 0.0, "gpx": 0.0, "parquet": 0.0, "racechrono": 0.01, "vbo": 0.01}  # two hold up to 100 a second
+STEP_S = {"csv": 0.0, "gpx": 0.0, "parquet": 0.0, "racechrono": 0.001, "vbo": 0.01}  # the finest time that two hold
 _WRITE: dict[str, Callable[[Path, Iterator[Channels], float], None]] = {
     "csv": export_columns.write_csv,
     "gpx": export_gpx.write,
@@ -68,12 +68,17 @@ def export(
     elif form in _DATED and start_s < _CLOCK_S:
         written_s = Path(log).stat().st_mtime if isinstance(log, (Path, str)) else time.time()
         start_s = float(max(0, int(written_s - whole.seconds)))
-    count = 0
+    count = given = 0
+
+    def measured() -> Iterator[Channels]:
+        nonlocal given
+        for block in ride.blocks(progress, notices):
+            given += len(block.t_s)
+            yield block
 
     def rows() -> Iterator[Channels]:
         nonlocal count
-        blocks = ride.blocks(progress, notices)
-        for block in downsampled(blocks, STEP_S[form]) if STEP_S[form] else blocks:
+        for block in downsampled(measured(), STEP_S[form]) if STEP_S[form] else measured():
             if form == "gpx":
                 block = block.part(np.isfinite(block.lat_deg) & np.isfinite(block.lon_deg))
             if form in ("gpx", "vbo") and len(whole.speeds):
@@ -86,6 +91,8 @@ def export(
             yield block
 
     write_whole(Path(out), lambda temporary: _WRITE[form](temporary, rows(), start_s))
+    if notices is not None and STEP_S[form] and count < given:
+        notices.append(Notice("rows-share", given, count, STEP_S[form]))
     return count
 
 

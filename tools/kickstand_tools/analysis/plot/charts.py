@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...logs.table import Array
+from ...refusals import sentence
 from ...signals.averages import smoothed
 from ..downsample import spacing_s
 from ..overview import Overview
@@ -18,17 +19,20 @@ LEFT_COLOUR, RIGHT_COLOUR = "#2563a8", "#c2571a"
 BRAKE_COLOUR, LATERAL_COLOUR = "#9b2335", "#3d7f6b"
 SPEED_COLOUR = "#5b4b8a"
 GUIDE_COLOUR = "#bbbbbb"
+DOUBT_COLOUR, DOUBT_WIDTH = "#d99a00", 4.0
 SMOOTH_S = 0.3
 GG_BIN_G = 0.025
 GAP_S = 1.0  # lines are interrupted where there is no value for longer
 SPEED_GAP_S = 5.0  # the same for the line of the speed, which has few values
 _HIGH, _LOW, _SQUARE = 2.5, 1.5, 3.0  # heights of charts, inches of the picture
+_MARKED = 0.82  # of a chart's height: the lines of the maxima, which so end below the words in the corner
 _UPRIGHT_DEG = 5.0  # the share of smaller leans may be cut off: it would hide the others
 
 
 @dataclass
 class Line:
-    """A line through n points, interrupted at NaNs that last longer than gap_s. name: none for an auxiliary line."""
+    """A line through n points, interrupted at NaNs that last longer than gap_s. name: none for an auxiliary line.
+    width: times the usual one."""
 
     x: Array
     y: Array
@@ -36,6 +40,7 @@ class Line:
     name: str = ""
     gap_s: float = np.inf
     dotted: bool = False
+    width: float = 1.0
 
 
 @dataclass
@@ -113,11 +118,13 @@ class Chart:
 
 @dataclass
 class Charts:
-    """The charts of a ride. over_time: stacked, with one axis of time, s; below: the others, side by side."""
+    """The charts of a ride. over_time: stacked, with one axis of time, s; below: the others, side by side. warnings: a
+    sentence each."""
 
     title: str
     over_time: list[Chart]
     below: list[Chart]
+    warnings: list[str]
 
 
 def charts(seen: Overview) -> Charts:
@@ -128,7 +135,7 @@ def charts(seen: Overview) -> Charts:
     over_time += [_speed(seen)] if seen.has_speed else []
     over_time.append(_forces(seen, lateral, forward))
     below = [_g_against_g(seen, lateral, forward), *([] if car else [_shares(seen)]), _alignment(seen)]
-    return Charts(title(seen), over_time, below)
+    return Charts(title(seen), over_time, below, [f"Warning: {sentence(notice)}." for notice in seen.notices])
 
 
 def shown_lean_deg(seen: Overview) -> Array:
@@ -194,7 +201,14 @@ def _over_time(seen: Overview, words: str, traces: list[Trace], height: float, y
 def _lean(seen: Overview) -> Chart:
     limit = lean_limit(seen)
     lean = Sides(seen.course.t_s, shown_lean_deg(seen), GAP_S)
-    made = _over_time(seen, "Lean, degrees (right up, left down)", [lean], _HIGH, (-limit, limit))
+    words = "Lean, degrees (right up, left down)"
+    traces: list[Trace] = [lean]
+    doubtful = seen.course.doubtful >= 0.5
+    if np.any(doubtful):
+        words = "Lean, degrees (right up; yellow: less exact)"  # a phone has room for so many
+        along = np.where(doubtful, -1.05 * limit, np.nan)
+        traces.append(Line(seen.course.t_s, along, DOUBT_COLOUR, gap_s=GAP_S, width=DOUBT_WIDTH))
+    made = _over_time(seen, words, traces, _HIGH, ((-1.1 if np.any(doubtful) else -1.0) * limit, limit))
     for peak, sign in _maxima(seen):
         word, side = ("left", "below") if sign < 0 else ("right", "above")
         made.notes.append(Note(peak.time_s or 0.0, sign * peak.value, f"{peak.value:.0f}° {word}", side))
@@ -247,9 +261,11 @@ def _shares(seen: Overview) -> Chart:
     made.right = f"{np.sum(share[~leaning]):.0f} % upright" if top < most else ""
     for peak, sign in _maxima(seen):
         at = sign * peak.value
-        made.traces.append(Line(np.array([at, at]), np.array([0.0, top]), "#555555", dotted=True))
-        # outwards of its line and below the words in the corner, so that small leans do not stand on one another
-        made.notes.append(Note(at, 0.82 * top, f"{peak.value:.0f}°", "left" if sign < 0 else "right"))
+        made.traces.append(Line(np.array([at, at]), np.array([0.0, _MARKED * top]), "#555555", dotted=True))
+        beside = "left" if sign < 0 else "right"  # of small leans, so that they do not stand on one another
+        made.notes.append(
+            Note(at, _MARKED * top, f"{peak.value:.0f}°", "above" if peak.value > 0.3 * limit else beside)
+        )
     made.x_title = "left  ·  degrees  ·  right"
     made.ticks = {tick: f"{abs(tick):.0f}" for tick in np.arange(-180.0, 181.0, 20.0).tolist() if abs(tick) <= limit}
     return made
@@ -266,7 +282,7 @@ def _alignment(seen: Overview) -> Chart:
         ends = np.array([-most, most])
         traces.append(Line(-np.tan(np.radians(found.yaw_deg)) * ends, ends, BRAKE_COLOUR))
     words = (angles(found) or ["not enough straight riding"]) if fits else ["not judged"]
-    words += [f"at rest {found.gravity_g:.3f} g"] if fits and found.gravity_g is not None else []
+    words += ["at rest", f"{found.gravity_g:.3f} g"] if fits and found.gravity_g is not None else []
     span = (-reach, reach)
     made = Chart("Alignment: g on the straights", traces, _SQUARE, span, span, square=True, left="\n".join(words))
     made.x_title, made.y_title = "left  ·  g  ·  right", "braking  ·  acceleration"

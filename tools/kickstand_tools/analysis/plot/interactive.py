@@ -70,7 +70,7 @@ def _axes(k: int) -> dict[str, str]:
 def _traces(trace: Trace) -> list[dict[str, Any]]:
     if isinstance(trace, Line):
         x, y = envelope(trace.x, trace.y, POINTS, trace.gap_s)
-        line = {"color": trace.colour, "width": 1.2, "dash": "dot" if trace.dotted else "solid"}
+        line = {"color": trace.colour, "width": 1.2 * trace.width, "dash": "dot" if trace.dotted else "solid"}
         named = (
             {"type": "scattergl", "name": trace.name, **_OWN_WORDS}
             if trace.name

@@ -28,11 +28,14 @@ def draw(path: Path, seen: Overview, tiles: bool = False) -> None:
     """Write the page, with a map beside the charts if the log has positions. tiles: the map has streets, which the page
     loads from a server."""
     library = files("plotly").joinpath("package_data/plotly.min.js").read_text(encoding="utf-8")
-    path.write_text(page(seen, f"<script>{library}</script>", source_hash(library), tiles), encoding="utf-8")
+    path.write_text(
+        page(seen, f"<script>{library}</script>", source_hash(library), tiles, warnings=True), encoding="utf-8"
+    )
 
 
-def page(seen: Overview, library: str, allowed: str, tiles: bool = False) -> str:
+def page(seen: Overview, library: str, allowed: str, tiles: bool = False, warnings: bool = False) -> str:
     """The page's HTML. library: the element that loads plotly.js; allowed: how the policy names that; tiles: of draw().
+    warnings: those of the charts stand above them.
 
     The policy lets the page's own scripts run, and nothing be loaded but the map's tiles. plotly.js makes functions of
     text for its charts of many points, and sets styles.
@@ -52,6 +55,7 @@ def page(seen: Overview, library: str, allowed: str, tiles: bool = False) -> str
         policy=policy,
         title=seen.ride.stem,
         library=library,
+        warnings=drawn.warnings if warnings else [],
         charts=interactive.figure(drawn, linked=points is not None),
         map=beside,
         scripts=SCRIPTS,

@@ -1,14 +1,29 @@
 """The charts of a ride as one picture, by matplotlib."""
 
+import textwrap
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..overview import Overview
-from .charts import LEFT_COLOUR, RIGHT_COLOUR, Bars, Chart, Dots, Line, Note, Sides, Trace, charts, envelope
+from .charts import (
+    BRAKE_COLOUR,
+    LEFT_COLOUR,
+    RIGHT_COLOUR,
+    Bars,
+    Chart,
+    Dots,
+    Line,
+    Note,
+    Sides,
+    Trace,
+    charts,
+    envelope,
+)
 
 POINTS = 6000
+_CHARACTERS, _LINE = 180, 0.16  # of a line of warnings, and its height in inches
 _STYLE: Any = {
     "font.size": 9,
     "axes.spines.top": False,
@@ -42,11 +57,14 @@ def figure_of(seen: Overview) -> Any:
     from matplotlib.figure import Figure
 
     wanted = charts(seen)
+    said = [line for words in wanted.warnings for line in textwrap.wrap(words, _CHARACTERS)]
     heights = [chart.height for chart in wanted.over_time] + [wanted.below[0].height]
     with rc_context(_STYLE):
-        figure = Figure(figsize=(11, sum(heights)), layout="constrained")
+        figure = Figure(figsize=(11, sum(heights) + _LINE * len(said)), layout="constrained")
         FigureCanvasAgg(figure)
         figure.suptitle(wanted.title, fontsize=12, x=0.01, ha="left", parse_math=False)  # a name may have $ in it
+        if said:
+            figure.supxlabel("\n".join(said), fontsize=8, x=0.01, ha="left", color=BRAKE_COLOUR, parse_math=False)
         rows = figure.add_gridspec(len(heights), len(wanted.below), height_ratios=heights)
         first = None
         for k, chart in enumerate(wanted.over_time):
@@ -91,7 +109,9 @@ def _draw_trace(axes: Any, trace: Trace) -> None:
 
     if isinstance(trace, Line):
         style = {"label": trace.name or None, "linestyle": ":" if trace.dotted else "-"}
-        axes.plot(*envelope(trace.x, trace.y, POINTS, trace.gap_s), color=trace.colour, linewidth=0.9, **style)
+        axes.plot(
+            *envelope(trace.x, trace.y, POINTS, trace.gap_s), color=trace.colour, linewidth=0.9 * trace.width, **style
+        )
     elif isinstance(trace, Sides):
         x, y = envelope(trace.x, trace.y, POINTS, trace.gap_s)
         for clip, colour in ((np.minimum, LEFT_COLOUR), (np.maximum, RIGHT_COLOUR)):

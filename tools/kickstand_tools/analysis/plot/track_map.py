@@ -79,7 +79,7 @@ def figure(points: MapPoints, seen: Overview) -> dict[str, Any]:
     dots: dict[str, Any] = {"size": 6, "color": SPEED_COLOUR}
     known = np.isfinite(points.east_m)
     if not seen.ride.car:
-        limit = max(LEAST_LEAN_DEG, float(np.floor(lean_limit(seen) / 1.2)))
+        limit = max(LEAST_LEAN_DEG, float(round(lean_limit(seen) / 1.2)))
         known &= np.isfinite(points.lean_deg)
         lean = plain(points.lean_deg[known], 1)
         dots |= {"color": lean, "colorscale": _COLOURS, "cmin": -limit, "cmax": limit}
