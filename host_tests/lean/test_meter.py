@@ -32,6 +32,20 @@ def test_the_first_g_is_shown_at_once_also_after_a_gap():
     near(shown.smooth_force[2], -0.3, 1e-12)
 
 
+def test_a_smoothed_force_that_is_not_kept_up_is_no_number():
+    """Left and up of an aligned motorcycle; they are back with a calibration that is not aligned."""
+    aligned, other = Calibration(), Calibration()
+    aligned.aligned = True
+    shown = meter(aligned)
+    shown.update(STILL, 0)
+    left, up, forward = shown.smooth_force
+    assert left != left and up != up
+    near(forward, 0.0, 1e-6)
+    shown.use(other)
+    shown.update(STILL, 0)
+    near(shown.smooth_force[1], 1.0, 1e-6)
+
+
 def test_a_standing_bike_is_at_rest_and_upright():
     shown = ride(meter(), 3.0)
     assert shown.at_rest

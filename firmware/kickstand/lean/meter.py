@@ -21,8 +21,8 @@ class LeanMeter:
     low-pass.
 
     After update() or update_sum(): force (left, up, forward in g), rate (about them in rad/s), lean_deg (the
-    filter's, > 0 right), smooth_force (g, for display; of an aligned motorcycle forward alone), fallen, and the maxima
-    since reset_maxima(). suppressed_reason: why the lean is not shown, as given to distrust(), or None.
+    filter's, > 0 right), smooth_force (g, for display; of an aligned motorcycle left and up are NaN), fallen, and the
+    maxima since reset_maxima(). suppressed_reason: why the lean is not shown, as given to distrust(), or None.
     """
 
     def __init__(self, calibration, leans=True, delay_s=DELAY_S):
@@ -45,6 +45,7 @@ class LeanMeter:
             self.suppressed_reason = None
         self.calibration = calibration
         self._smooth_all = not (calibration.aligned and self._leans)  # pages then show left and up as well
+        self.smooth_force[0] = self.smooth_force[1] = 0.0 if self._smooth_all else float("nan")
         self._transform = Transform(calibration)
         self.filter = LeanFilter(self._delay_s, radians(calibration.trim_deg), posed)
         self.restart()
