@@ -12,6 +12,7 @@ import hashlib
 import os
 import subprocess
 import sys
+import textwrap
 import time
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
@@ -52,7 +53,7 @@ def test(arguments):
     for tool, command in (
         ("ruff", ("-m", "ruff", "check", ".")),
         ("ruff format", ("-m", "ruff", "format", "--check", ".")),
-        ("pyright", ("-m", "pyright", "--pythonpath", PYTHON)),
+        ("pyright", ("-m", "pyright")),
         ("pytest", ("-m", "pytest", "-n", "auto", "--dist", "worksteal", "--durations", "10", *arguments)),
     ):
         say(tool)
@@ -129,7 +130,10 @@ def install(extra):
                 status = pip.wait(REPORT_S)
                 break
             except subprocess.TimeoutExpired:
-                say("  %3.0f s  %s" % (time.time() - begin, last_line(read(LOG))[:70]))
+                say(
+                    "  %3.0f s  %s"
+                    % (time.time() - begin, textwrap.shorten(last_line(read(LOG)), 70, placeholder=" ..."))
+                )
     if status != 0:
         errors = [line[6:].strip() for line in read(LOG).split("\n") if line.startswith("ERROR:")]
         why = errors[-1] if errors else last_line(read(LOG))

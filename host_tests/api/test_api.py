@@ -30,7 +30,7 @@ def test_the_example_of_a_function_runs(name):
 
 def test_pydoc_has_what_is_promised():
     """It leaves out what a module without __all__ has only imported."""
-    shown = pydoc.render_doc(api, renderer=pydoc.plaintext)
+    shown = pydoc.plain(pydoc.render_doc(api))
     for name in ("import_recording", "fit_ride", "open_ride", "export", "simulate_ride"):
         assert re.search(rf"^ +{name}(\(| = )", shown, re.M), name
     assert "_simulation" not in api.__all__

@@ -2,11 +2,13 @@
 cannot go wrong."""
 
 import math
+import re
 
 import devices
 import engines
 import pytest
 from devices import ALIGNED, LEFT_S, PRESSES, RIDE, RIGHT_S, STRAIGHT_S
+from kickstand_tools import firmware_path
 
 
 @pytest.mark.parametrize("engine", engines.ENGINES)
@@ -83,21 +85,30 @@ def test_a_refused_alignment_leaves_the_old_one(tmp_path):
 
 
 def test_pages_and_menu(tmp_path):
-    short = [[t_s, 0.15] for t_s in (46, 47, 48, 49, 50, 53, 54, 58.5, 62, 63, 64, 70)]
-    presses = [*PRESSES, *short, *([t_s, 1.2] for t_s in (51, 55, 60, 65))]
-    record = devices.run("cpython", tmp_path, {**ALIGNED, "presses": presses, "until": 72})
+    source = (firmware_path.PACKAGE / "ui" / "page_ring.py").read_text(encoding="utf-8")  # to import it takes a board
+    ring = re.findall(r"pages\.(\w+)", source.partition("MOTORCYCLE = (")[2].partition(")")[0])
+    turns_s = [46.0 + k for k in range(len(ring))]  # through all pages, back to the first
+    menu_s = turns_s[-1] + 1.0
+    short = [*turns_s, *(menu_s + after_s for after_s in (2, 3, 7.5, 11, 12, 13, 19))]
+    long = [menu_s + after_s for after_s in (0, 4, 9, 14)]
+    presses = [*PRESSES, *([t_s, 0.15] for t_s in short), *([t_s, 1.2] for t_s in long)]
+    record = devices.run("cpython", tmp_path, {**ALIGNED, "presses": presses, "until": menu_s + 21})
+
+    def shows(page):
+        return record.at(45.7 + ring.index(page))
+
     assert record.first("Max left +(29|3[0-3])°") == pytest.approx(46.3, abs=0.2)  # the plan rolls in no time
     assert record.first("Max right +(39|4[0-3])°") == pytest.approx(46.3, abs=0.2)
-    assert record.at(47.7)[0].startswith(("Accel", "Brake")) and record.at(47.7)[1].startswith("pk +0.")
-    assert record.at(48.7)[0].startswith("Formula") and record.at(48.7)[1].startswith("Filter")
-    assert record.at(49.7)[0][5:7] in (" 1", " 0") and record.at(49.7)[1].endswith("°/s")
-    assert record.at(50.7)[0].startswith("Lean")
-    assert record.at(52.5)[0] == "→Align the bike "
-    assert record.at(54.7)[0] == "→Reset maxima   "
-    assert record.at(56.5)[0] == "Maxima reset    "
-    assert record.first("Max left +[01]°", 59) < math.inf
-    assert record.at(66.5)[0] == "MPU6050   25.0°C"
-    assert {record.at(t_s)[1] for t_s in (66.5, 68.5)} == {"6pos no  ali yes", "0 gaps 1 starts "}
+    assert shows("acceleration")[0].startswith(("Accel", "Brake")) and shows("acceleration")[1].startswith("pk +0.")
+    assert shows("formula")[0].startswith("Formula") and shows("formula")[1].startswith("Filter")
+    assert shows("raw")[0][5:7] in (" 1", " 0") and shows("raw")[1].endswith("°/s")
+    assert record.at(menu_s - 0.3)[0].startswith("Lean")
+    assert record.at(menu_s + 1.5)[0] == "→Align the bike "
+    assert record.at(menu_s + 3.7)[0] == "→Reset maxima   "
+    assert record.at(menu_s + 5.5)[0] == "Maxima reset    "
+    assert record.first("Max left +[01]°", menu_s + 8) < math.inf
+    assert record.at(menu_s + 15.5)[0] == "MPU6050   25.0°C"
+    assert {record.at(menu_s + after_s)[1] for after_s in (15.5, 17.5)} == {"6pos no  ali yes", "0 gaps 1 starts "}
     assert record.last[0].startswith("Max left")
 
 

@@ -20,7 +20,9 @@ import numpy as np
 import pytest
 from app_exports import PHONE, START_UTC_S, Riding
 from kickstand_tools import api
+from kickstand_tools.imports.importing import NAMES
 
+README = Path(__file__).resolve().parents[2] / "tools" / "README.md"
 ON_PHONE = api.CalibrationFile(vehicle_from_sensor=PHONE.T, aligned=True)
 ON_BIKE = api.CalibrationFile(aligned=True)
 # rms of a replay against the true lean; the ride itself, not exported, has 0.28 at 100 samples a second
@@ -61,6 +63,12 @@ EXPORTS = {
     "AiM": (one("a.csv", app_exports.aim), 4),
     "AiM saved by a spreadsheet, vertical +1": (one("a.csv", app_exports.aim, quoted=False, up_sign=1.0), 4),
 }
+
+
+def test_each_app_is_tried_and_described():
+    assert {name for name in NAMES if not any(key.startswith(name) for key in EXPORTS)} == {"Kickstand"}
+    table = README.read_text(encoding="utf-8")
+    assert [name for name in NAMES if f"\n| {name}" not in table] == []
 
 
 @pytest.mark.parametrize("name", EXPORTS)

@@ -57,6 +57,12 @@ def test_an_export_that_is_one_file(tmp_path):
     assert "r.csv: only" in command.refused(tmp_path, "report", tmp_path / "r.csv", words=words)
     (tmp_path / "any.csv").write_text(app_exports.any_table(riding().every(4)))
     command.refused(tmp_path, "report", tmp_path / "any.csv", words="has to go through kickstand import first")
+    (tmp_path / "t.gpx").write_text("<?xml version='1.0'?>\n")
+    command.refused(tmp_path, "report", tmp_path / "t.gpx", words="t.gpx is a track: kickstand join puts it to a ride")
+    command.write_cal(tmp_path / "A.cal.json")
+    command.refused(
+        tmp_path, "report", tmp_path / "A.cal.json", words="is no log: give the ride, and a calibration with"
+    )
     (tmp_path / "any").mkdir()
     command.refused(tmp_path, "report", tmp_path / "any", words="any holds no recording")
 

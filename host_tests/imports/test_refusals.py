@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from app_exports import riding
 from kickstand_tools import api
+from kickstand_tools.imports.importing import NAMES
 
 
 @pytest.fixture
@@ -123,6 +124,10 @@ LACKING = {
         "no channel YawRate: export the accelerometer's and the gyro's three channels each",
     ),
 }
+
+
+def test_of_each_app_it_is_tried_what_lacks():
+    assert {name for name in NAMES if not any(key.startswith(name) for key in LACKING)} == {"Kickstand"}
 
 
 @pytest.mark.parametrize("name", LACKING)

@@ -20,11 +20,12 @@ from ..calibration.file import calibration_beside, calibration_path, read_calibr
 from ..errors import InputError
 from ..estimation.alignment import fit_ride
 from ..estimation.smooth import smooth_to_csv
-from ..imports.importing import Imported, import_recording, is_of_an_app, write_imported
+from ..imports.importing import NAMES, Imported, import_recording, is_of_an_app, write_imported
 from ..joining import agreement
 from ..joining.joined import Joined, join_track, write_joined
 from ..joining.track_files import read_track
 from ..logs.csv_lines import cut_log
+from ..logs.log import Log
 from ..logs.reader import Source
 from ..logs.stretch import Stretch
 from ..output import check_output, write_whole
@@ -44,6 +45,7 @@ from .common import (
     TIME,
     file_argument,
     from_to,
+    help_adds,
     known_to,
     live,
     out_option,
@@ -71,14 +73,14 @@ _WRONG_AXES = ("mirrored", "left-handed", "rates-misfit", "rates-in-radians")  #
 )
 @from_to("Seconds from the start; negative: from the end.", "The same, for the end.")
 @RIGHT_HANDED
+@help_adds(
+    f"Known: {', '.join(NAMES)}. Any other table of accelerations (with gravity) and rates of rotation needs --columns "
+    "and --units."
+)
 def import_command(
     source: Path, out: Path, columns: str | None, units: str | None, from_s: float | None, to_s: float | None
 ) -> None:
-    """Make a log of a recording of another app or logger.
-
-    Known: phyphox, Sensor Logger, SensorLog, Sensor Kinetics, RaceChrono (CSV), RaceBox, VBO, AiM, and Kickstand's own
-    exports. Any other table of accelerations (with gravity) and rates of rotation needs --columns and --units.
-    """
+    """Make a log of a recording of another app or logger."""
     check_output(out, [source] if source.is_file() else sorted(source.rglob("*")) if source.is_dir() else [])
     named = _pairs(columns, "--columns") if columns is not None else None
     with spinner("importing"):
@@ -337,7 +339,7 @@ def _opened(
     return open_ride(_part(found.log, from_s, to_s), known, smoothed=not live), found.notices
 
 
-def _part(log: Source, from_s: float | None, to_s: float | None) -> Source:
+def _part(log: Path | Log, from_s: float | None, to_s: float | None) -> Source:
     return log if from_s is None and to_s is None else Stretch(log, from_s, to_s)
 
 

@@ -22,7 +22,9 @@ from .join import GAP_NS, join
 from .recording import Array, Recording, Taken
 from .units import ACCELERATIONS, SPEEDS, factor, unit
 
+# Each is asked about the files that none before it has claimed: phyphox, which goes by names of columns, is last
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
+NAMES = [app.NAME for app in reversed(_APPS)]
 WITHOUT_GRAVITY_G = 0.4  # a smaller median force is without gravity; even a pose with an offset of 0.6 g has more
 WRONG_UNIT_G = 3.0  # a larger median force is in m/s2, where it is 9.8
 
@@ -64,11 +66,10 @@ def import_recording(
 ) -> Imported:
     """Read a recording of another app or logger: a file, a folder or a zip.
 
-    Known are phyphox, Sensor Logger, SensorLog, Sensor Kinetics, RaceChrono (CSV), RaceBox, VBO, AiM and Kickstand's
-    own files. Of any other table columns says which is which ({"t": "time", "ax": "accX", ...}: t, ax, ay, az, gx, gy,
-    gz, and speed, lat, lon, temp where there are), and units in which unit ({"a": "m/s2", "g": "rad/s", "speed":
-    "km/h"}; a - before a unit turns the sign). start_s, end_s: the stretch to take, from the recording's own start.
-    Raises InputError.
+    Known are the exports of the apps that `kickstand import --help` names. Of any other table columns says which is
+    which ({"t": "time", "ax": "accX", ...}: t, ax, ay, az, gx, gy, gz, and speed, lat, lon, temp where there are), and
+    units in which unit ({"a": "m/s2", "g": "rad/s", "speed": "km/h"}; a - before a unit turns the sign). start_s,
+    end_s: the stretch to take, from the recording's own start. Raises InputError.
 
     >>> import pathlib, tempfile
     >>> rows = [f"{10 * k},0.0,9.81,0.0,0.0,0.0,0.1" for k in range(300)]

@@ -15,6 +15,8 @@ import numpy as np
 from kickstand.errors import Notice
 from numpy.typing import NDArray
 
+from ..analysis.plot.charts import tick_s
+from ..analysis.report import clock
 from ..calibration.file import CalibrationFile
 from ..errors import InputError, extra
 from ..estimation.smooth import SmoothedRide, smooth
@@ -56,7 +58,8 @@ class Difference:
 @dataclass
 class Agreement:
     """Of rides A and B. live: of the leans as displayed, where both show one; None if that is nowhere. smoothed: of
-    those afterwards. t_s (n): s since A's first sample; the leans (n, degrees) at these times, NaN where not known."""
+    those afterwards. t_s (n): s since A's first sample; the leans (n, degrees) at these times, NaN where not known.
+    names: of A's and B's logs."""
 
     clocks: Clocks
     live: Difference | None
@@ -64,6 +67,7 @@ class Agreement:
     t_s: Array
     leans: dict[str, Array]
     notices: dict[str, list[Notice]] = field(default_factory=dict)
+    names: tuple[str, str] = ("", "")
 
     def as_data(self) -> dict[str, Any]:
         """All but the leans, for JSON."""
@@ -115,7 +119,7 @@ def compare_rides(
         raise InputError(f"{name_of(a)}, {name_of(b)}: under {_LEAST_S:.0f} s of riding in common")
     names = ("live A", "live B", "smoothed A", "smoothed B")
     leans: dict[str, Array] = dict(zip(names, (lean for lean, _ in (*live, *smoothed))))
-    return Agreement(found, _difference(*live), difference, t_s, leans, notices)
+    return Agreement(found, _difference(*live), difference, t_s, leans, notices, (name_of(a), name_of(b)))
 
 
 def words(found: Agreement) -> Iterator[str]:
@@ -165,17 +169,20 @@ def draw(path: Path, found: Agreement) -> None:
     """Write a PNG with the leans of both over time, and their difference."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.ticker import MultipleLocator
 
     figure = Figure(figsize=(14, 7), layout="constrained")
     FigureCanvasAgg(figure)
     above, below = figure.subplots(2, 1, sharex=True)
-    for name, width in (("smoothed A", 1.6), ("smoothed B", 0.9)):
-        above.plot(found.t_s, found.leans[name], linewidth=width, label=name)
+    for name, log, width in zip(("smoothed A", "smoothed B"), found.names, (1.6, 0.9)):
+        above.plot(found.t_s, found.leans[name], linewidth=width, label=f"{name}: {Path(log).name}")
     above.set(ylabel="lean, deg (> 0 right)")
     for kind, width in (("live", 0.6), ("smoothed", 1.2)):
         difference = found.leans[f"{kind} B"] - found.leans[f"{kind} A"]
         below.plot(found.t_s, difference, linewidth=width, label=f"{kind}, B less A")
-    below.set(xlabel="s since A's first sample", ylabel="difference, deg")
+    below.set(xlabel="minutes:seconds since A's first sample", ylabel="difference, deg")
+    below.xaxis.set_major_locator(MultipleLocator(tick_s(float(found.t_s[-1]))))
+    below.xaxis.set_major_formatter(lambda seconds, _: clock(seconds))
     for axis in (above, below):
         axis.margins(x=0.0)
         axis.grid(alpha=0.3)

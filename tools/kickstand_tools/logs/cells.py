@@ -42,6 +42,10 @@ def header(log: str, line: str) -> list[str]:
     except csv.Error as error:
         raise InputError(f"{log}, line 1: not CSV ({error}): is it a log?") from error
     missing = [name for name in COLUMNS if name not in names]
+    if missing and log.lower().endswith((".gpx", ".fit")):
+        raise InputError(f"{log} is a track: kickstand join puts it to a ride")
+    if missing and log.lower().endswith(".json"):
+        raise InputError(f"{log} is no log: give the ride, and a calibration with --calibration")
     if missing and "lean_deg" in names:
         what = f"{log} holds a lean, no readings"
         raise InputError(f"{what}: give the log that it was made from{_made_from(log)}")
