@@ -17,7 +17,7 @@ from ..logs.source import File, Progress, log_stem, name_of
 from ..logs.stretch import Stretch
 from ..logs.table import Array
 from ..replay.meter_along import MeterAlong
-from .channels import Channels, channels
+from .channels import LEAN_COLUMNS, Channels, channels
 
 
 @dataclass
@@ -150,7 +150,7 @@ class _Lean:
         shown: compute the lean that was shown; else it and sure are 0, which saves a tenth of the time.
         """
         n = len(block.time_us)
-        columns: list[list[float]] = [[] for _ in range(7)]
+        columns: list[list[float]] = [[] for _ in range(LEAN_COLUMNS)]
         lean_deg, forward, variance, resting, rolling, sure, _ = (column.append for column in columns)
         for meter in self._along.after_each(block, *self._along.in_vehicle(block)):
             lean = meter.filter

@@ -2,14 +2,12 @@
 
 import numpy as np
 
-from ..analysis.channels import Channels, channels
+from ..analysis.channels import LEAN_COLUMNS, Channels, channels
 from ..analysis.downsample import downsampled, joined
 from ..analysis.ride import Ride
 from ..analysis.stops.brake_test import RATE_S, Stop, find_stops
 from ..calibration.file import CalibrationFile
 from ..logs.reader import Source, read_blocks
-
-_LEAN_COLUMNS = 6  # columns that the replay of a motorcycle's log gives
 
 
 def brake_tests(log: Source, calibration: CalibrationFile) -> list[Stop]:
@@ -38,5 +36,5 @@ def car_channels(log: Source, calibration: CalibrationFile) -> list[Channels]:
     for whole in read_blocks(log):
         block = whole.measured
         if len(block.time_us):
-            found.append(channels(block, calibration, np.zeros((len(block.time_us), _LEAN_COLUMNS)), car=True))
+            found.append(channels(block, calibration, np.zeros((len(block.time_us), LEAN_COLUMNS)), car=True))
     return found
