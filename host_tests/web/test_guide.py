@@ -181,6 +181,26 @@ def test_it_rides_straight_until_the_meter_is_sure(stages):
     )
 
 
+def test_after_power_on_in_a_steady_bend_it_says_what_ends_the_doubt(stages):
+    """Riding on does not: nothing in such a bend tells the lean from an error of the sensor."""
+    power = [("power", False), ("wait", 0.5), ("power", True)]
+    stages(
+        ([*RIDING, ("lean", -8), ("wait", 4)], "not sure", 5, "That is all", ""),
+        ([*power, ("wait", 25)], "not sure", 4, "ride straight, or lean the other way", "straight"),
+        ([("lean", 0), ("wait", 12)], "not sure", 5, "That is all", ""),
+        ([("lean", -8), ("wait", 4), *power, ("wait", 12)], "not sure", 4, "in a steady bend it stays so", "straight"),
+        ([("lean", 20), ("wait", 6)], "not sure", 5, "That is all", ""),
+    )
+
+
+def test_it_rides_straight_is_not_said_of_a_bike_that_leans(guide):
+    """Neither before the first lean, nor after it."""
+    tick = {"powered": True, "plugged": True, "pose": "ride", "phase": "ride", "stage": 0}
+    unsure, sure = {"text": pages.unsure(None), "shown_deg": None}, {"text": ["Lean   30° right", ""], "shown_deg": 30}
+    said = [guide([{**tick, "t_s": 1.0, "lean_deg": -7.5, "display": one}])[0][3] for one in (unsure, sure)]
+    assert all("needs ten seconds straight on" in one for one in said)
+
+
 def test_a_disarmed_save_is_whole(drive):
     said = drive([[("cut_save", True), ("wait", 1), ("cut_save", False), *ALIGN]])
     assert said[0][2].startswith("Done")

@@ -5,7 +5,7 @@ import { shows } from "./shows.mjs";
 const RIDE_S = 3; // that the lean is held before the last step counts as done
 const WELL_DEG = 15;
 const SURE_S = 7; // that a lean is shown straight on, until a bend does not make the firmware doubt it again
-const STRAIGHT_DEG = 8;
+const STRAIGHT_DEG = 3; // a smaller lean is seen as none
 
 // The pose that the firmware wants; after a refusal it is still the one before
 const WANTED = {
@@ -161,12 +161,18 @@ export class Guide {
 
   #ride(shown, state) {
     if (!this.#sure && !this.#ridden) return this.#straight(shown, state);
-    if (shown === null) return step(4, "The meter is not sure yet. It says so, rather than show a wrong lean: ride on.");
+    if (shown === null) {
+      // In a bend that never changes no reading tells a lean from an error of the sensor: riding on is no help there
+      if (Math.abs(state.lean_deg) > STRAIGHT_DEG) {
+        return step(4, "The meter is not sure yet, and in a steady bend it stays so: ride straight, or lean the other way.", STRAIGHT);
+      }
+      return step(4, "The meter is not sure yet. It says so, rather than show a wrong lean: ride straight for some seconds.");
+    }
     if (Math.abs(shown) < WELL_DEG) this.#heldSince = null;
     else this.#heldSince ??= state.time;
     if (this.#heldSince !== null && state.time - this.#heldSince > RIDE_S) this.#ridden = true;
     if (this.#ridden) return step(5, "That is all. A press turns the pages. Now break something, or build one: see Install.");
-    return step(4, "Lean it: drag the motorcycle, use the slider or the arrow keys. Compare both figures.");
+    return step(4, "Lean it: drag the motorcycle or the slider. Compare both figures.");
   }
 
   /** Until the firmware is sure of the lean. */

@@ -125,6 +125,7 @@ function tell() {
   if (!step || state.stopped || JSON.stringify(step) === shownStep) return;
   shownStep = JSON.stringify(step);
   byId("todo").textContent = step.text;
+  put("guide-title", step.number ? "Your first minute" : "What happens now");
   if (!step.action && document.activeElement === byId("do")) focusPress();
   byId("do").hidden = !step.action;
   byId("do").textContent = step.action?.[0] ?? "";
