@@ -9,6 +9,7 @@ import analysis_rides
 import command
 import numpy as np
 import pytest
+from kickstand_tools import remedies
 from kickstand_tools.analysis import report
 from kickstand_tools.analysis.alignment_quality import Quality, lean_cost, yaw_cost_deg
 from kickstand_tools.analysis.report import angles
@@ -133,8 +134,12 @@ def test_nothing_is_a_negative_nothing():
     ("name", "degrees", "words"),
     [
         ("yaw", 5.0, r"yaw [+-]5\.\d°\. Yaw usually costs about 0\.3° of lean; calibrate ride or drive takes it out\."),
-        ("yaw", 1.0, r"yaw [+-]1\.0°\. That costs less than 0\.1° of lean: nothing to do\."),
-        ("roll", 3.0, r"roll [+-]3\.0°.*\. That costs less than 0\.1° of lean: nothing to do\."),
+        (
+            "yaw",
+            2.6,
+            r"^Alignment: good\..*yaw [+-]2\.[67]°, which costs less than 0\.25° of lean\. At rest .*, as good as 1\.$",
+        ),
+        ("roll", 3.0, r"^Alignment: good\..*roll [+-]3\.0°.*, which costs less than 0\.25° of lean\."),
         ("roll", 9.0, r"roll [+-]9\.0°.*: was it held upright\? Roll usually costs about 5\.5° of lean; cal"),
         ("pitch", 4.0, r"pitch [+-]3\.\d°.* Pitch usually costs about 0\.3° of lean; calibrate ride takes it out, or"),
     ],
@@ -145,6 +150,12 @@ def test_a_report_says_what_it_costs_and_what_to_do(scripted, name, degrees, wor
     cost = report.as_data(seen)["lean_cost"][f"{name}_deg"]
     most = {"yaw": yaw_cost_deg(degrees), "roll": max(0.0, degrees - 3.5), "pitch": 0.33}[name]
     assert cost == pytest.approx(most, abs=0.05)
+
+
+def test_a_force_at_rest_that_is_not_1_g_asks_for_the_six_positions(scripted):
+    cal = with_calibration(scripted, "yaw", 0.0, accel_slope=[1.05] * 3)
+    said = report.words(overview(open_ride(scripted, cal)), remedies.PAGE).alignment
+    assert said.endswith("At rest the force is 1.051 g and not 1: the six positions of the sensor take that out.")
 
 
 def test_without_a_speed_calibrate_drive_is_no_help(scripted, tmp_path):

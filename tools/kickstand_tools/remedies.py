@@ -22,6 +22,7 @@ COMMANDS = {
     "name_units": "add --units {0} ({1})",
     "other_side": "calibrate two {0}?",
     "phone_otherwise": "Then leave out --phone",
+    "six_positions": "kickstand calibrate six takes that out",
     "sign": "--units a=-g or a=-m/s2 puts it right",
     "speed_unit": "add --units speed=km/h, mph or m/s",
 }
@@ -46,6 +47,7 @@ PAGE = {
     "name_units": "choose them",
     "other_side": "does the kickstand lean the bike to the other side than SIDE in config.py says?",
     "phone_otherwise": "",
+    "six_positions": "the six positions of the sensor take that out",
     "sign": "left is shown as right",
     "speed_unit": "write it in brackets behind that name, as in Speed (km/h)",
 }

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
     from rich.console import Group
 
 CONTRADICTED = ("up-off", "forward-off", "left-handed", "rates-misfit", "rates-in-radians")  # by the ride
-COSTS_DEG = 0.1  # smaller errors of the lean are not reported
+COSTS_DEG = 0.25  # smaller errors of the lean, which nobody sees on the display, ask for nothing
+GRAVITY_G = 0.02  # by so much the force at rest may differ from 1 g, as in the proof of the six positions
 RIDDEN_S = 10.0  # least riding: in a shorter one the bike was only pushed about
 STOPS_TITLE = "Stops"
 STOPS_UNITS = {"at": "", "from": "km/h", "time": "s", "distance": "m", "MFDD": "m/s²", "peak": "m/s²", "jerk": "m/s³"}
@@ -172,16 +173,25 @@ def _alignment(seen: Overview, remedies: Remedies) -> str:
     said = "Alignment: not enough straight riding to know how far it is off."
     known = angles(quality)
     if known:
-        said = f"Alignment: it seems off by {', '.join(known)}"
         far = abs(quality.roll_deg or 0.0) > SWAPPED_DEG and not seen.ride.car
         # swapped poses exchange forward and backward too
         swapped = far and (seen.exchanged or not seen.has_speed)
-        said += ": were the poses swapped?" if swapped else ": was it held upright?" if far else "."
-        if not seen.ride.car and not seen.exchanged:
-            said += _cost(lean_cost(quality), seen.has_speed, remedies)
-    if quality.gravity_g is not None:
-        said += f" At rest the force is {quality.gravity_g:.3f} g."
-    return said
+        costs = "" if seen.ride.car or seen.exchanged else _costs(lean_cost(quality), seen.has_speed, remedies)
+        if costs or far or seen.ride.car or seen.exchanged:
+            said = f"Alignment: it seems off by {', '.join(known)}"
+            said += ": were the poses swapped?" if swapped else ": was it held upright?" if far else "."
+            said += costs
+        else:
+            said = f"Alignment: good. It seems off by {', '.join(known)}, which costs less than {COSTS_DEG}° of lean."
+    return said + _gravity(quality.gravity_g, remedies)
+
+
+def _gravity(found_g: float | None, remedies: Remedies) -> str:
+    if found_g is None:
+        return ""
+    if abs(found_g - 1.0) <= GRAVITY_G:
+        return f" At rest the force is {found_g:.3f} g, as good as 1."
+    return f" At rest the force is {found_g:.3f} g and not 1: {remedies['six_positions']}."
 
 
 def judged(seen: Overview) -> bool:
@@ -189,8 +199,8 @@ def judged(seen: Overview) -> bool:
     return not any(notice.code in CONTRADICTED for notice in seen.notices)
 
 
-def _cost(cost: LeanCost, speed: bool, remedies: Remedies) -> str:
-    """The sentence about the errors of the lean by these angles, and the remedy. speed: the log has one."""
+def _costs(cost: LeanCost, speed: bool, remedies: Remedies) -> str:
+    """A sentence for each of these angles that costs lean, and the remedy; "" where none does. speed: in the log."""
     costs = {
         "Roll": (cost.roll_deg, remedies["less_roll"]),
         "Pitch": (cost.pitch_deg, remedies["less_pitch"]),
@@ -201,7 +211,7 @@ def _cost(cost: LeanCost, speed: bool, remedies: Remedies) -> str:
         for name, (value, remedy) in costs.items()
         if value is not None and value >= COSTS_DEG
     ]
-    return "".join(said) or f" That costs less than {COSTS_DEG}° of lean: nothing to do."
+    return "".join(said)
 
 
 def _stops(stops: list[Stop]) -> list[tuple[str, ...]]:
