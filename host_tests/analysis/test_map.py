@@ -165,14 +165,15 @@ def test_in_a_browser_chart_and_map_show_the_same_moment(tmp_path, chromium):
     view.mouse.move(chart["x"] + 0.6 * chart["width"], chart["y"] + 180)
     view.wait_for_timeout(300)
     there = view.evaluate("[map.layout.shapes[0].xanchor, map.layout.shapes[0].yanchor]")
-    later = view.locator("#here").text_content()
+    later, tip = (view.locator(one).text_content() for one in ("#here", "#tip"))
     view.close()
     assert errors == []
     assert [url for url in asked if not url.startswith(("file:", "data:", "blob:"))] == []
     metres, (west, east) = float(bar[0].split()[0]), bar[2]
     assert bar[0].endswith(" m")
     assert (bar[1] - 0.02) * (east - west) == pytest.approx(metres, rel=1e-6)
-    assert said.split()[0] == f"0:{int(at[2]):02}"
+    assert said.split()[0] == f"0:{round(at[2]):02}"
+    assert tip.split(",")[0] == later.split()[0], "one moment has two times"
     points = points_of()
     minutes, seconds = later.split()[0].split(":")
     k = np.argmin(np.hypot(points.east_m - there[0], points.north_m - there[1]))

@@ -17,15 +17,15 @@ Plotly.newPlot("map", MAP.data, MAP.layout, { ...FEW, scrollZoom: true });
     return low > 0 && t - rows[low - 1][0] < rows[low][0] - t ? low - 1 : low;
   }
 
-  function words(row) {
+  function words(row, t) {
     const lean = row[1] === null ? "" : "  ·  lean " + Math.abs(row[1]).toFixed(0) + "°" + (row[1] >= 0.5 ? " right" : row[1] <= -0.5 ? " left" : "");
-    return clock(row[0]) + lean + (row[2] === null ? "" : "  ·  " + row[2].toFixed(0) + " km/h");
+    return clock(t) + lean + (row[2] === null ? "" : "  ·  " + row[2].toFixed(0) + " km/h");
   }
 
-  function show(k) {
+  function show(k, t) {
+    text.textContent = words(rows[k], t);
     if (k === shown) return;
     shown = k;
-    text.textContent = words(rows[k]);
     if (waiting) return;
     waiting = true; // one change of the map in each frame of the screen is enough
     requestAnimationFrame(function () {
@@ -37,11 +37,12 @@ Plotly.newPlot("map", MAP.data, MAP.layout, { ...FEW, scrollZoom: true });
 
   chart.on("plotly_hover", function (event) {
     const point = event.points.find((one) => CHART_AXES.includes(one.xaxis._id));
-    if (point) show(nearest(event.xvals ? event.xvals[0] : point.x));
+    const t = event.xvals ? event.xvals[0] : point?.x;
+    if (point) show(nearest(t), t);
   });
   map.on("plotly_hover", function (event) {
     const k = nearest(event.points[0].customdata);
-    show(k);
+    show(k, rows[k][0]);
     Plotly.Fx.hover(chart, { xval: rows[k][0] }, CHART_AXES.map((name) => name + name.replace("x", "y")));
   });
 
@@ -77,5 +78,5 @@ Plotly.newPlot("map", MAP.data, MAP.layout, { ...FEW, scrollZoom: true });
 
   map.on("plotly_afterplot", scale);
   Plotly.Plots.resize(map); // it was drawn before there was anything below it
-  text.textContent = words(rows[0]);
+  text.textContent = words(rows[0], rows[0][0]);
 })();
