@@ -211,6 +211,7 @@ def test_a_flash_that_fills_up_all_the_same_and_a_cable_pulled_while_copying(boa
     [
         ({"python": "circuitpython"}, "runs circuitpython: put MicroPython on the board"),
         ({"answers": False}, "no MicroPython answers on /dev/ttyACM0"),
+        ({"answers": False}, "hold the push button that is wired to it (not BOOTSEL or BOOT)"),
     ],
 )
 def test_what_is_no_micropython_is_refused(board, monkeypatch, verb, board_is, words):

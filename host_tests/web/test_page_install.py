@@ -226,7 +226,21 @@ def test_a_browser_without_serial_ports_says_so(chromium, address):
         rider.page.goto(address + name)
         first = rider.page.locator("main section:visible").first
         assert first.get_attribute("id") == "unable"
-        assert "Firefox, Safari" in first.inner_text()
+        assert "in Chrome or Edge on a computer" in first.inner_text() and "Firefox, Safari" in first.inner_text()
+        if name == "install.html":  # each step is there, with what a terminal does in its place
+            steps = rider.page.locator("main h2:visible").all_inner_texts()[1:]
+            assert [one.partition(".")[0] for one in steps] == ["1", "2", "3", "4", "5"]
+            assert rider.text("#here") == address + name
+            rider.page.click("text=ESP32: a file that ends in .bin")
+            said = rider.text("main")
+            assert all(
+                f"python3 -m {one}" in said for one in ("esptool write-flash", "mpremote cp -r", "mpremote exec")
+            )
+            assert "README" not in said and "project" not in said, "nothing leads there from here"
+            rider.page.set_viewport_size({"width": 390, "height": 844})
+            wide = "all => all.filter((one) => one.checkVisibility() && one.scrollWidth > one.clientWidth).length"
+            assert rider.page.eval_on_selector_all("main pre, main a:has(img)", wide) == 0, "cut at the right edge"
+            assert rider.fits()
         for button in rider.page.locator("main button:not(#simulated, #simulated-stop)").all():
             assert button.is_hidden()
     assert rider.axe() == []
@@ -269,7 +283,7 @@ def test_the_wiring_is_that_of_the_boards_own_pins(line):
 def test_each_board_has_its_own_page_for_micropython(line):
     """A link that leaves the page only when it is clicked, into a tab of its own."""
     links = line.rider.page.locator("a[href^='https:']")
-    assert links.evaluate_all("links => links.map((one) => [one.target, one.rel])") == 9 * [["_blank", "noopener"]]
+    assert links.evaluate_all("links => links.map((one) => [one.target, one.rel])") == 10 * [["_blank", "noopener"]]
     names = links.evaluate_all("links => links.map((one) => one.href)")
     assert names[:2] == [f"https://micropython.org/download/{board}/" for board in ("RPI_PICO", "RPI_PICO_W")]
-    assert len(set(names)) == 9
+    assert len(set(names)) == 10

@@ -59,6 +59,17 @@ def test_a_phone_leans_the_motorcycle(chromium, address):
     rider.context.close()
 
 
+def test_a_tablet_without_motion_data_says_so_and_what_the_page_is(chromium, address):
+    rider = Rider(chromium, address, **PHONE)
+    rider.page.set_viewport_size({"width": 820, "height": 1180})
+    rider.reads("Raw")
+    assert rider.page.is_visible("header p")
+    rider.page.tap("#tilt")
+    rider.page.wait_for_selector("#tilt-said:has-text('does not say how it is held')")
+    assert rider.page.get_attribute("#tilt", "aria-pressed") == "false"
+    rider.context.close()
+
+
 def test_a_screen_reader_presses_the_button_too(chromium, address):
     """It sends a click that no pointer has made."""
     rider = Rider(chromium, address, **LAPTOP)

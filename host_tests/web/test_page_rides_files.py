@@ -210,7 +210,10 @@ def test_a_sample_ride_is_shown_and_said_to_be_simulated(page):
     page.page.wait_for_selector("#report", timeout=WAIT_MS)
     assert page.said() == "This ride is simulated: nobody has ridden it."
     assert page.page.inner_text("#report-title") == "simulated-ride.csv.gz"
+    assert page.page.inner_text("#alignment").startswith("Alignment: good.")
+    assert page.page.is_visible("#drawing") or page.page.locator("#plot[style]").count()
     page.page.frame_locator("#plot").locator("#map .main-svg").first.wait_for()
+    page.page.wait_for_selector("#drawing", state="hidden")
     assert page.warnings() == ""
 
 

@@ -97,6 +97,7 @@ def test_every_page_leads_home(files, monkeypatch):
     monkeypatch.setattr(site, "home", lambda: home)
     pages = {name: data.decode() for name, data in site.site_files().items() if name.endswith(".html")}
     assert all('<h1><a href="./">' in text and text.count(f'href="{home}"') == 1 for text in pages.values())
+    assert f'href="{home}/issues/new/choose"' in pages["install.html"]
     assert home not in "".join(data.decode() for name, data in files.items() if name.endswith(".html"))
 
 
@@ -104,7 +105,7 @@ def test_every_file_is_kept_for_a_time_without_network(files):
     worker = files["service_worker.js"].decode()
     listed = re.search(r"const FILES = (\[.*?\]);", worker)
     assert listed
-    large = "esptool/", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip", "sample/"
+    large = "esptool/", "firmware.zip", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip", "sample/"
     later = {name for name in files if name.startswith(large)}
     assert set(json.loads(listed[1])) == {"./", *files} - {"service_worker.js", "index.html"} - later
     assert "{{" not in worker
@@ -126,6 +127,13 @@ def test_the_python_of_the_page_is_complete(files, tmp_path):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text, encoding="utf-8")
     assert run_mpy(RUN, str(tmp_path)).split()[-1] == "True"
+
+
+def test_a_browser_without_serial_ports_offers_the_firmware_itself(files):
+    """As a folder that mpremote copies."""
+    archive = zipfile.ZipFile(io.BytesIO(files["firmware.zip"]))
+    there = {name.removeprefix("kickstand-firmware/"): archive.read(name) for name in archive.namelist()}
+    assert there == {name.lstrip("/"): path.read_bytes() for name, path in firmware_files().items()}
 
 
 def test_each_board_gets_its_own_machine_code(files):

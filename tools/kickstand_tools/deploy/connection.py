@@ -260,6 +260,6 @@ def _enter(transport: SerialTransport, name: str) -> None:
         except TransportError:
             if limit_s == ANSWER_S:
                 raise InputError(
-                    f"no MicroPython answers on {name}: check that this is the board's port, hold its button "
-                    "while plugging it in, or put MicroPython on it"
+                    f"no MicroPython answers on {name}: check that this is the board's port, put MicroPython on it, or "
+                    "hold the push button that is wired to it (not BOOTSEL or BOOT) while plugging it in"
                 ) from None

@@ -102,17 +102,19 @@ _SAYS = {"+z": "face up", "-z": "face down", "+x": "X up", "-x": "X down", "+y":
 _HALF = (44.0, 34.0, 6.0)  # of the board along its axes, pixels
 
 
-def six_positions() -> str:
-    """The six sides on which the sensor is laid, as the display calls them, and the slanted pose that proves them."""
-    page = Drawing(980, 215)
-    for k, (name, axes) in enumerate([*_POSITIONS.items(), ("", _SLANTED)]):
-        middle = 70 + 140 * k
+def six_positions(columns: int = 7) -> str:
+    """The six sides on which the sensor is laid, as the display calls them, and the slanted pose that proves them: so
+    many beside each other."""
+    poses = [*_POSITIONS.items(), ("", _SLANTED)]
+    page = Drawing(140 * columns, 215 * -(-len(poses) // columns))
+    for k, (name, axes) in enumerate(poses):
+        middle, top = 70 + 140 * (k % columns), 215 * (k // columns)
         page.shape(
-            "#e4dfd0", *(_seen(middle, 128, (x, -50, z)) for x, z in ((-47, -47), (47, -47), (47, 47), (-47, 47)))
+            "#e4dfd0", *(_seen(middle, top + 128, (x, -50, z)) for x, z in ((-47, -47), (47, -47), (47, 47), (-47, 47)))
         )
-        _lay(page, middle, 128, axes)
-        page.text(middle, 20, name or "then slanted", 17 if name else 14, "middle", bold=True)
-        page.text(middle, 42, _SAYS.get(name, "the proof"), 12, "middle", _QUIET)
+        _lay(page, middle, top + 128, axes)
+        page.text(middle, top + 20, name or "then slanted", 17 if name else 14, "middle", bold=True)
+        page.text(middle, top + 42, _SAYS.get(name, "the proof"), 15, "middle", _QUIET)
     return page.svg()
 
 
@@ -187,7 +189,7 @@ def on_the_bike() -> str:
     _label(
         page,
         (556, 198),
-        (636, 56),
+        (610, 56),
         "Board and sensor, in a dry box",
         "firm on frame or tail, at any angle,",
         "away from the exhaust's heat",

@@ -111,7 +111,7 @@ def draw(board: Board, display: str) -> str:
 
     _draw_board(page, board, used_near, used_far)
     _draw_module(page, 68, 122, "Sensor: MPU6050 (GY-521)", [*sensor, "GND"], _SENSOR_PINS_Y, _SENSOR_SUPPLY_Y)
-    page.text(_MODULE_MIDDLE, _SENSOR_SUPPLY_Y, "XDA, XCL, AD0, INT: open", 12, "middle", "#d7e4ff")
+    page.text(_MODULE_MIDDLE, _SENSOR_SUPPLY_Y, "XDA, XCL, AD0, INT: open", 13, "middle", "#d7e4ff")
     title = "Display: OLED, or LCD for 3.3 V"
     _draw_module(page, 248, 130, title, ["GND", *screen], _DISPLAY_PINS_Y, _DISPLAY_SUPPLY_Y)
     page.picture(_MODULE_MIDDLE - 62, _DISPLAY_SUPPLY_Y - 32, 124, 70, display)
@@ -188,7 +188,7 @@ def _draw_board(page: Drawing, board: Board, used_near: set[int], used_far: set[
                 words = name
             else:  # the number at the edge
                 words = f"{row + 1}  {name}" if side == "near" else f"{name}  {2 * rows - row}"
-            size, colour = (13, "#ffffff") if taken else (10, "#9db3a7")
+            size, colour = (14, "#ffffff") if taken else (13, "#b9cbc1")
             page.text(edge + 14 * inwards, _pin_y(row), words, size, anchor, colour, taken)
 
 

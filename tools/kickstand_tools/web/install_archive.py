@@ -32,6 +32,11 @@ def archive() -> bytes:
     return zipped({name: path.read_bytes() for name, path in files.items()} | _STANDS_IN | _compiled())
 
 
+def firmware() -> bytes:
+    """The firmware as a ZIP file, for a browser that cannot connect to a board: its rider takes mpremote."""
+    return zipped({f"kickstand-firmware{path}": source.read_bytes() for path, source in firmware_files().items()})
+
+
 def _compiled() -> dict[str, bytes]:
     """compiled/ARCHITECTURE/... .mpy: of all but the first only what contains machine code. Nothing where there is no
     compiler: then the sources are copied."""

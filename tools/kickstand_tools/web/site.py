@@ -16,7 +16,7 @@ from .zipped import tools
 
 PAGE = Path(__file__).resolve().parent / "page"
 # Large, and only for those who have a board or a ride: fetched when they ask for it
-LATER = ("esptool/", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip", "sample/")
+LATER = ("esptool/", "firmware.zip", "install.zip", "numpy/", "plotly/", "pyodide/", "rides.zip", "sample/")
 _NOT_KEPT = ("service_worker.js", "index.html")  # the browser keeps the first by itself, the second as "./"
 
 
@@ -48,6 +48,7 @@ def site_files() -> dict[str, bytes]:
     files |= {f"sample/{name}": data for name, data in sample_ride.sample_ride().items()}
     files["python.json"] = json.dumps(python_files()).encode()
     files["install.zip"] = install_archive.archive()
+    files["firmware.zip"] = install_archive.firmware()
     files["rides.zip"] = rides_archive.archive()
     (package,) = (name for name in files if name.startswith("numpy/"))
     files["numpy/numpy.zip"], files["numpy/licence.txt"] = rides_archive.numpy_archive(files.pop(package))

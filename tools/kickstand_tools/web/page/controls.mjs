@@ -5,6 +5,7 @@ const SLOWEST_KMH = 20; // to ride at
 const CRUISE_KMH = 54; // at first
 const DRAG_DEG = 75; // of lean for half the scene's width
 const TAP_MS = 150;
+const MOTION_MS = 1500; // in which a device that knows how it is held has said so
 
 const byId = (id) => document.getElementById(id);
 // On the button of the pose that is chosen already the space bar presses the push button
@@ -145,6 +146,7 @@ export class Steering {
     if (!("DeviceOrientationEvent" in window) || !isSecureContext || !matchMedia("(pointer: coarse)").matches) return;
     button.hidden = false;
     let zero = null;
+    let late;
     const follow = (event) => {
       const turned = screen.orientation?.angle ?? 0;
       const tilt = { 0: event.gamma, 90: event.beta, 180: -event.gamma, 270: -event.beta }[turned];
@@ -152,17 +154,24 @@ export class Steering {
       zero ??= tilt;
       this.lean(tilt - zero);
     };
+    const end = (text) => {
+      removeEventListener("deviceorientation", follow);
+      button.setAttribute("aria-pressed", "false");
+      byId("tilt-said").textContent = text;
+    };
     button.addEventListener("click", async () => {
       const on = button.getAttribute("aria-pressed") !== "true";
       // iOS asks its user, and only after a click
       const may = on && DeviceOrientationEvent.requestPermission ? await DeviceOrientationEvent.requestPermission() : "granted";
-      if (may !== "granted") return;
-      button.setAttribute("aria-pressed", String(on));
+      clearTimeout(late);
+      if (may !== "granted") return end("The browser does not tell this page how the device is held.");
+      end("");
+      if (!on) return;
       zero = null;
-      if (on) {
-        if (this.pose !== "ride") this.stand("ride");
-        addEventListener("deviceorientation", follow);
-      } else removeEventListener("deviceorientation", follow);
+      button.setAttribute("aria-pressed", "true");
+      if (this.pose !== "ride") this.stand("ride");
+      addEventListener("deviceorientation", follow);
+      late = setTimeout(() => zero === null && end("This device does not say how it is held: take the slider."), MOTION_MS);
     });
   }
 }

@@ -7,6 +7,14 @@ const BAUD = 115200;
 const BUFFER = 65_536; // bytes that may come while the page is busy
 const BACK_MS = 10_000; // until a board that has restarted is there again, at most
 const AGAIN_MS = 300;
+export const ASKING = "Asking the board, which takes up to 15 seconds …"; // until one that is silent is given up
+
+/** share: of the work that is done; NaN while nobody knows, null to hide it. */
+export function showShare(bar, share) {
+  bar.hidden = share === null;
+  if (share >= 0) bar.value = share;
+  else bar.removeAttribute("value");
+}
 
 /** The bytes of a serial port, for web/serial_guest.py. lost: nothing more can come. */
 export class SerialLine {
@@ -131,7 +139,7 @@ export async function choosePort(tell) {
   try {
     return await navigator.serial.requestPort();
   } catch {
-    tell("No port was chosen. Is the board on a cable that carries data?");
+    tell("No port was chosen. Is the board on a cable that carries data? On Windows it may need a driver: that of its chip CP2102 or CH340.");
     return null;
   }
 }
@@ -145,7 +153,8 @@ export async function overCable(port, tell, use, restarted = false) {
   try {
     await line.open(restarted);
   } catch (error) {
-    tell(`The port cannot be opened: ${error.message}. Does another program have it?`);
+    const why = error.message.replace(/\.+$/, "");
+    tell(`The port cannot be opened: ${why}. Does another program have it? On Linux: are you in the group dialout?`);
     return null;
   }
   try {

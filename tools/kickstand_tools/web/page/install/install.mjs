@@ -1,7 +1,7 @@
 // Puts the firmware and its config.py onto a board at the browser's serial port: `kickstand flash` itself, and what
 // `kickstand status` prints, on CPython for WebAssembly (web/install_guest.py).
 
-import { choosePort, inPages, loadOnce, overCable, python } from "../cable/cable.mjs";
+import { ASKING, choosePort, inPages, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
 import { connectImage } from "./image.mjs";
 import { Fields } from "./fields.mjs";
@@ -14,8 +14,7 @@ let byHand = null;
 
 function tell(text, share = null) {
   byId("install-said").textContent = text;
-  byId("install-bar").hidden = share === null;
-  byId("install-bar").value = share ?? 0;
+  showShare(byId("install-bar"), share);
 }
 
 /** What board is there, and what does its config.py say? */
@@ -29,7 +28,7 @@ async function look() {
   if (!tools) return atWork(false);
   const guest = tools.Installation();
   const said = await overCable(port, tell, (line, name) => {
-    tell("Asking the board …", 0);
+    tell(ASKING, NaN);
     return guest.look.callPromising(line, name);
   });
   atWork(false);
@@ -62,7 +61,7 @@ async function install() {
   const { port, guest } = board;
   const wanted = JSON.stringify(byHand ? {} : fields.values());
   atWork(true);
-  tell("Asking the board …", 0);
+  tell(ASKING, NaN);
   const said = await overCable(
     port,
     tell,
@@ -83,7 +82,7 @@ function showResult({ refused, board: name, copied, kept, config_kept }) {
   const files = copied ? `${copied} files copied and verified${there}` : "it was up to date";
   const config = config_kept ? " Its own config.py stays." : "";
   const next =
-    "With the sensor fixed to the bike’s frame, press the board’s button once on the kickstand, and once upright.";
+    "With the sensor fixed to the bike’s frame, press the push button once on the kickstand, and once upright.";
   tell(`Done: ${name}. ${files}.${config} The board starts now. ${next}`);
 }
 
@@ -99,7 +98,7 @@ async function status() {
   const said =
     tools &&
     (await overCable(port, say, (line, name) => {
-      say("Asking the board …");
+      say(ASKING);
       return tools.status.callPromising(line, name);
     }));
   atWork(false);
@@ -123,5 +122,6 @@ byId("look").addEventListener("click", look);
 byId("install").addEventListener("click", install);
 byId("status").addEventListener("click", status);
 byId("status-copy").addEventListener("click", copyStatus);
+byId("here").textContent = location.href;
 connectImage(atWork);
 keepOffline();

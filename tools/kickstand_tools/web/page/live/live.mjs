@@ -1,7 +1,7 @@
 // Shows what a board streams, keeps it as a log, and fetches the rides that the board has recorded: `kickstand record` and
 // `kickstand pull` on CPython for WebAssembly (web/cable_guest.py).
 
-import { choosePort, inPages, loadOnce, overCable, python } from "../cable/cable.mjs";
+import { ASKING, choosePort, inPages, loadOnce, overCable, python, showShare } from "../cable/cable.mjs";
 import { keepOffline } from "../offline.mjs";
 import { Riding } from "./bluetooth/riding.mjs";
 import { Chart } from "./chart.mjs";
@@ -119,8 +119,7 @@ function keep(live) {
 async function pull() {
   const say = (text, share = null) => {
     byId("pull-said").textContent = text;
-    byId("pull-bar").hidden = share === null;
-    byId("pull-bar").value = share ?? 0;
+    showShare(byId("pull-bar"), share);
   };
   const port = await choosePort(say);
   if (!port) return;
@@ -129,7 +128,7 @@ async function pull() {
   const guest = await guests(say);
   if (!guest) return atWork(false);
   const result = await overCable(port, say, (line, name) => {
-    say("Asking the board …", 0);
+    say(ASKING, NaN);
     return guest.pull.callPromising(line, name, (what, done, total) => say(what, total ? done / total : 0));
   });
   atWork(false);

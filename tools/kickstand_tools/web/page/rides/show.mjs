@@ -41,16 +41,18 @@ export function showReport({ words, warnings, name, calibration }) {
 /** page: the HTML of the charts, which is as high as it is wide enough for. Its frame is a new one, and seen before it
  * loads: a frame that was hidden until then may believe that it still is, and draw nothing. */
 export function showCharts(page) {
-  byId("charts").hidden = false;
+  byId("charts").hidden = byId("drawing").hidden = false;
   const frame = byId("plot").cloneNode();
   frame.removeAttribute("style");
   frame.srcdoc = page;
   byId("plot").replaceWith(frame);
 }
 
-// The frame may run scripts, but not reach this page: it says how high it is
+// The frame may run scripts, but not reach this page: it says how high it is, and when it has drawn
 addEventListener("message", ({ source, data }) => {
-  if (source === byId("plot").contentWindow && Number.isFinite(data?.height)) byId("plot").style.height = `${data.height}px`;
+  if (source !== byId("plot").contentWindow) return;
+  if (Number.isFinite(data?.height)) byId("plot").style.height = `${data.height}px`;
+  if (data?.drawn) byId("drawing").hidden = true;
 });
 
 export function hideRide() {
