@@ -188,8 +188,8 @@ def test_after_power_on_in_a_steady_bend_it_says_what_ends_the_doubt(stages):
         ([*RIDING, ("lean", -8), ("wait", 4)], "not sure", 5, "That is all", ""),
         ([*power, ("wait", 25)], "not sure", 4, "ride straight, or lean the other way", "straight"),
         ([("lean", 0), ("wait", 12)], "not sure", 5, "That is all", ""),
-        ([("lean", -8), ("wait", 4), *power, ("wait", 12)], "not sure", 4, "in a steady bend it stays so", "straight"),
-        ([("lean", 20), ("wait", 6)], "not sure", 5, "That is all", ""),
+        ([("lean", -8), ("wait", 4), *power, ("wait", 20)], "not sure", 4, "not in a steady bend", "straight"),
+        ([("lean", 20), ("wait", 12)], "not sure", 5, "That is all", ""),
     )
 
 

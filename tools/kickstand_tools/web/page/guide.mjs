@@ -164,9 +164,9 @@ export class Guide {
     if (shown === null) {
       // In a bend that never changes no reading tells a lean from an error of the sensor: riding on is no help there
       if (Math.abs(state.lean_deg) > STRAIGHT_DEG) {
-        return step(4, "The meter is not sure yet, and in a steady bend it stays so: ride straight, or lean the other way.", STRAIGHT);
+        return step(4, "Not sure yet, and not in a steady bend: ride straight, or lean the other way.", STRAIGHT);
       }
-      return step(4, "The meter is not sure yet. It says so, rather than show a wrong lean: ride straight for some seconds.");
+      return step(4, "Not sure yet, and rather no lean than a wrong one: ride straight for some seconds.");
     }
     if (Math.abs(shown) < WELL_DEG) this.#heldSince = null;
     else this.#heldSince ??= state.time;
