@@ -83,12 +83,19 @@ def test_good_mounts_and_roads_are_not_doubted(seed):
     assert "not-the-bikes" not in [notice.code for notice in found.notices]
 
 
+def test_tyres_push_to_the_side_in_proportion_to_the_force_up():
+    """Taken for a share of gravity alone, bends of unequal lean shifted the whole lean: 0.44 degrees, and more than the
+    display's."""
+    known = simulated("sweeper", 304, 200.0)
+    assert rms(error(known)[known.riding]) < 0.2
+
+
 def test_wheelies_are_not_taken_for_a_soft_mount():
-    """They were, and the error was 0.4 degrees."""
+    """They were, and the error was 0.4 degrees. Taken for slopes they made it 0.16."""
     known = simulated("wheelie", 1, 120.0)
     found = smooth(known.log, known.calibration)
     assert not np.any(found.doubtful)
-    assert rms((found.lean_deg - known.lean_deg)[known.riding]) < 0.25
+    assert rms((found.lean_deg - known.lean_deg)[known.riding]) < 0.13
 
 
 @pytest.mark.parametrize("wrong_deg", [-4.0, 4.0])

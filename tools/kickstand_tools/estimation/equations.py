@@ -65,7 +65,7 @@ def process_and_measurements(windows: Windows, x: Array) -> Array:
     found[SLIDING] = left - (turn_x * ct - turn_y * st)
     found[CLIMBING] = wheel_up - wheel * (q - p[of.DIVE] * ahead)
     found[SLOPING] = wheel_up
-    found[BALANCED] = fx - p[of.TYRES] * st - p[of.BESIDE] * ct - p[of.CAMBER] / (1.0 + (t / STRAIGHT) ** 4)
+    found[BALANCED] = fx - p[of.TYRES] * st * fy - p[of.BESIDE] * ct - p[of.CAMBER] / (1.0 + (t / STRAIGHT) ** 4)
     found[ANY_SPEED] = wheel - USUAL_MPS
     found[MEASURED_SPEED] = wheel - p[of.DELAY] * ahead - np.nan_to_num(windows.speed)
     found[RESTING] = left, up, forward

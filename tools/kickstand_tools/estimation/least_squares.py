@@ -169,7 +169,7 @@ class Estimate:
     def _residuals(self) -> Array:
         """(n, ROWS): the states' changes over each window less those of the process model, and the measurements."""
         x = self._middle()
-        self.noise.lean, self.noise.speed = x[LEAN], x[FORWARD]
+        self.noise.lean, self.noise.pitch, self.noise.speed = x[LEAN], x[PITCH], x[FORWARD]
         found = process_and_measurements(self._windows, x).T
         found[:, :STATES] = np.diff(self.states, axis=0) - self._windows.covered[:, None] * found[:, :STATES]
         return found

@@ -33,6 +33,7 @@ JOLT = 4.0  # sigmas: a larger residual of the process model is a jolt to the se
 SLIDE_MPS, SLIDE_SHARE, SLIDE_S = 0.15, 0.01, 0.5  # wheels' sideways velocity: m/s, and times speed x tan(lean)
 DIVE_MPS, DIVE_RAD, DIVE_S = 0.1, np.radians(2.5), 0.5  # their upward velocity: m/s, and chassis pitch against the road
 SLOPE_MPS, SLOPE_RAD, SLOPE_S = 0.1, np.radians(2.0), 4.0  # likewise for the road's slope against the horizontal
+STEEP = np.radians(10.0)  # pitch at which both standard deviations double: roads are less steep, wheelies steeper
 BALANCE_G, BALANCE_S = 0.011, 3.0  # force to the side, by wind, camber and the rider
 # Further noise of that force: g, times sin(lean), and g s2/rad, times the roll acceleration
 BALANCE_LEANED_G, BALANCE_ROLLING = 0.045, 0.05
@@ -68,9 +69,9 @@ LEAST_WINDOWS = 50  # with fewer windows of balanced riding unbalance stays 1
 class Noise:
     """The standard deviations of n windows. still (n): True where the bike stands.
 
-    lean (n, rad), speed (n, m/s): estimates, to be set before sigma(). riding (n): True where the bike rides, or may.
-    roughness (n): 1 for a rough ride; multiplies the noise of vibration. misfit (n): factor on the velocities' noise, 1
-    where the accelerations are the bike's. unbalance: 1 for an average ride; multiplies the noise of BALANCED.
+    lean, pitch (n, rad), speed (n, m/s): estimates, to be set before sigma(). riding (n): True where the bike rides, or
+    may. roughness (n): 1 for a rough ride; multiplies the noise of vibration. misfit (n): factor on the velocities'
+    noise, 1 where the accelerations are the bike's. unbalance: 1 for an average ride; multiplies the noise of BALANCED.
     """
 
     def __init__(self, windows: Windows, still: NDArray[np.bool_]) -> None:
@@ -78,7 +79,7 @@ class Noise:
         self._in_hand, self._not_riding = (held & ~still for held in in_hand(windows))
         self._rolling = np.gradient(windows.rate[:, 2]) / WINDOW_S if len(windows) > 1 else np.zeros(1)
         self.riding = ~windows.gap & ~still & ~self._not_riding
-        self.lean = self.speed = np.zeros(len(windows))
+        self.lean = self.pitch = self.speed = np.zeros(len(windows))
         self.roughness, self.misfit, self.unbalance = np.ones(len(windows)), np.ones(len(windows)), 1.0
         seconds = np.maximum(windows.seconds, 1e-4)
         self._root = np.sqrt(seconds)[:, None]
@@ -106,6 +107,7 @@ class Noise:
         found[riding, eq.CLIMBING] = (roughness * np.hypot(DIVE_MPS, DIVE_RAD * speed))[riding]
         found[riding, eq.SLOPING] = np.hypot(SLOPE_MPS, SLOPE_RAD * speed)[riding]
         found[balanced, eq.BALANCED] = (self.unbalance * self._of_balance())[balanced]
+        found[:, eq.CLIMBING : eq.SLOPING + 1] *= (1.0 + (self.pitch / STEEP) ** 4)[:, None]
         found[riding, eq.ANY_SPEED] = ANY_MPS
         found *= self._lasting
         found[balanced, eq.BALANCED] = np.hypot(found[:, eq.BALANCED], BALANCE_ROLLING * self._rolling)[balanced]
