@@ -9,6 +9,7 @@ import analysis_rides
 import command
 import numpy as np
 import pytest
+from kickstand.errors import Notice
 from kickstand_tools import remedies
 from kickstand_tools.analysis import report
 from kickstand_tools.analysis.alignment_quality import Quality, lean_cost, yaw_cost_deg
@@ -124,6 +125,15 @@ def test_a_ride_without_straights_does_not_show_it(tmp_path):
     assert (quality.roll_deg, quality.pitch_deg, quality.yaw_deg) == (None, None, None)
     said = command.works("report", path).out
     assert "Alignment: not enough straight riding to know how far it is off." in said
+
+
+@pytest.mark.parametrize(("code", "fits"), [("mirrored", False), ("left-handed", False), ("forward-exchanged", True)])
+def test_a_log_that_contradicts_its_calibration_is_not_judged(scripted, code, fits):
+    """The angles of a mirrored one look right, but left and right are exchanged."""
+    seen = overview(open_ride(scripted, with_calibration(scripted, "yaw", 0.0)))
+    seen.notices.append(Notice(code, False, "left", 0.0))
+    assert ("not judged" not in report.words(seen).alignment) == fits
+    assert (report.as_data(seen)["alignment"]["roll_deg"] is not None) == fits
 
 
 def test_nothing_is_a_negative_nothing():

@@ -1,6 +1,7 @@
 """Every reason that the firmware can give has words for the display and for a terminal, and no words are left over."""
 
 import ast
+import re
 from pathlib import Path
 
 import pytest
@@ -8,6 +9,7 @@ from kickstand import console, errors
 from kickstand.errors import AlignmentError, Notice, Refusal, SettingsError
 from kickstand.ui import messages
 from kickstand_tools import firmware_path, refusals
+from kickstand_tools.estimation import remarks
 
 CLASSES = {name for name in vars(errors) if name[0].isupper()}
 # Codes that a name or a call gives, not a text beside the class
@@ -77,10 +79,27 @@ def test_a_mount_that_moved(how):
     assert f'"{how}"' in "".join(path.read_text() for path in (firmware_path.PACKAGE / "drive_alignment").glob("*.py"))
 
 
+def test_each_code_of_the_tools_has_a_sentence_in_one_table():
+    tables = refusals._AXES, refusals._MOUNT, refusals._OTHERS
+    assert len(refusals._WORDS) == sum(len(table) for table in tables)
+    assert set(codes(with_tools=True)) - set(codes()) - worded(console._SENTENCES) <= set(refusals._WORDS)
+
+
+def test_what_keeps_the_smoother_from_remarks_is_of_these_kinds():
+    assert remarks.CAUSES == refusals.WRONG_AXES | refusals.WRONG_MOUNT
+
+
 def test_no_sentence_is_left_over():
     known = set(codes(with_tools=True)) | INDIRECT
-    assert set(refusals._SENTENCES) <= known
+    assert set(refusals._WORDS) <= known
     assert worded(console._SENTENCES) <= known
+
+
+def test_the_limits_of_user_code_are_said_as_they_are():
+    source = (firmware_path.PACKAGE / "user_code.py").read_text(encoding="utf-8")
+    limits = dict(re.findall(r"^([A-Z_]+) = (\d+)", source, re.MULTILINE))
+    words = "over {TOO_SLOW_MS} ms, or {MOST_SLOW} times over {SLOW_MS} ms in a row".format(**limits)
+    assert words in refusals.sentence(Refusal("user-slow", "page", 60))
 
 
 def test_a_notice_is_worded_like_a_refusal():

@@ -1,7 +1,11 @@
 """The words of a terminal for what the firmware's own modules refuse and for what is remarkable in a log: one line,
-by code (see kickstand.errors)."""
+by code (see kickstand.errors). Words that are the board's own, too, are in kickstand/console.py.
 
-from collections.abc import Iterable
+A new code of the tools goes into one of the tables below: _AXES or _MOUNT if it is a remark of that kind, else _OTHERS.
+Callers ask for the kind (code in WRONG_AXES, WRONG_MOUNT or CONTRADICTING) and have no lists of codes of their own.
+"""
+
+from collections.abc import Callable, Iterable
 from math import isfinite
 
 from kickstand import console
@@ -12,13 +16,135 @@ from .errors import InputError
 from .remedies import COMMANDS, Remedies
 
 SWAPPED_DEG = 4.0  # an upright pose is hardly ever so far off; a pose on the kickstand taken for it is
-
 UPSIDE_DOWN_DEG = 150.0
 _AT_REST = "at rest up reads +1 g"
 OPPOSITE_SIGN = f"do all accelerations have the opposite sign? {_AT_REST.capitalize()}"
+_MOVED = {
+    "between-stops": "two stops differ by over {0:.0f} degrees; those of a motorcycle on its kickstand do: is it one?",
+    "vertical": "the vertical changed by {0:.0f} degrees during the drive",
+    "parts": "the vertical is no longer where it was",
+    "since-standing": "standing and driving differ by {0:.0f} degrees",
+    "since-upright": "the upright pose and driving differ by {0:.0f} degrees",
+    "forward": "forward is no longer where it was",
+    "since-alignment": "it is no longer as it was aligned",
+}
 
-# {0}, {1} ... are the refusal's values; what stands there by name is what to do (remedies.py)
-_SENTENCES = {
+
+def _mount_moved(_: Remedies, how: str, *numbers: float) -> str:
+    return "the mount has moved: " + _MOVED[how].format(*numbers)
+
+
+def _frozen(_: Remedies, stretches: int, seconds: float, begin_s: float, end_s: float) -> str:
+    """The sentence for frozen readings. begin_s, end_s: times of the first stretch."""
+    line = f"the readings froze from {begin_s:.1f} to {end_s:.1f} s"
+    if stretches > 1:
+        line += f" and {stretches - 1} times more, {seconds:.1f} s in all"
+    return line + ": they are left out, and the lean begins anew after each"
+
+
+def _speed_unit(_: Remedies, factor: float) -> str:
+    """The sentence for a speed in another unit. factor: change of the speed over the one that the force explains."""
+    guess = "is it in m/s, and the right vehicle's?"
+    if 3.0 < factor < 4.4:
+        guess = "it is in km/h, m/s are needed"
+    elif 1.8 < factor < 2.5:
+        guess = "it is in mph or knots, m/s are needed"
+    return f"the speed changes {factor:.1f} times as much as the force says: {guess}"
+
+
+def _rates_misfit(_: Remedies, *exchange: list[int]) -> str:
+    """exchange (3 rows of 3): a signed permutation; times the rates of the log it is those about x, y and z.
+
+    A reversed axis of the accelerometer is the same as the two others reversed in the gyro, because accelerations of
+    the opposite sign are as good as the right ones; likewise with two that are exchanged.
+    """
+    kept = [axis for k, axis in enumerate(AXES) if exchange[k][k] == 1]
+    off = [axis for k, axis in enumerate(AXES) if exchange[k][k] != 1]
+    moved = [axis for k, axis in enumerate(AXES) if exchange[k][k] == 0]
+    signs = [sum(row) for row in exchange]
+    what, or_else = "are in another order or of another sign", ""
+    if len(kept) == 2:
+        what = f"are reversed about {off[0]}"
+    elif not moved:
+        what, or_else = f"are reversed about {off[0]} and {off[1]}", f"along {kept[0]} are reversed"
+    elif len(moved) == 2 and signs == [1, 1, 1]:
+        what = f"about {moved[0]} and {moved[1]} are exchanged"
+    elif len(moved) == 2 and signs == [-1, -1, -1]:
+        or_else = f"along {moved[0]} and {moved[1]} are exchanged"
+    right = ", ".join(("-" if sum(row) < 0 else "") + "g" + AXES[[abs(x) for x in row].index(1)] for row in exchange)
+    return (
+        "the rates do not belong to the accelerations, so the lean is wrong: "
+        + (f"either the accelerations {or_else}, or " if or_else else "")
+        + f"the rates {what}, and instead of gx, gy, gz right would be {right}"
+    )
+
+
+def _forward_exchanged(remedies: Remedies, car: bool, side: str, roll_deg: float | None) -> str:
+    """The sentence for forward and backward exchanged. side: the kickstand's side in the calibration by two poses, ""
+    if unknown. roll_deg: error of up, None if unknown."""
+    line = "forward and backward are exchanged: "
+    if car:
+        line += remedies["align_driving"]
+    elif roll_deg is not None and abs(roll_deg) > SWAPPED_DEG:
+        line += "were the poses swapped?"
+    else:
+        other = {"left": "--side right", "right": "--side left"}.get(side, "with the other --side")
+        line += remedies["other_side"].format(other) + ("" if roll_deg is not None else " Or were the poses swapped?")
+    return line + " Or, if no board wrote this log, " + OPPOSITE_SIGN
+
+
+def _up_off(remedies: Remedies, angle_deg: float, car: bool) -> str:
+    line = f"the calibration's up is {angle_deg:.0f} degrees off, so nothing computed with it is right: "
+    line += f"is it another mount's? {_again(remedies, car)}"
+    return f"{line}. Or {OPPOSITE_SIGN}" if angle_deg > UPSIDE_DOWN_DEG else line
+
+
+def _pose_off(_: Remedies, angle_deg: float) -> str:
+    """angle_deg: > 0 to the right."""
+    side = "right" if angle_deg > 0.0 else "left"
+    return (
+        f"on straights the bike is in balance {abs(angle_deg):.1f} degrees to the {side} of what the "
+        "calibration takes for upright, and the smoothed lean counts from there: a pose that was not upright does "
+        "that, and a sensor without its six positions; if it is luggage on one side, the lean is that much off"
+    )
+
+
+def _forward_off(remedies: Remedies, angle_deg: float, by: str, car: bool) -> str:
+    """The sentence for a yaw error. angle_deg: from the calibration's forward to the ride's, > 0 to the left."""
+    side = "left" if angle_deg > 0.0 else "right"
+    wrong = "braking and cornering are" if car else "lean, braking and cornering are"
+    return (
+        f"by the {by} of this ride forward is {abs(angle_deg):.0f} degrees to the {side} of the calibration's, so "
+        f"{wrong} wrong: is it another mount's? {_again(remedies, car)}"
+    )
+
+
+def _again(remedies: Remedies, car: bool) -> str:
+    return remedies["align_again_car" if car else "align_again"]
+
+
+# Words by code: {0}, {1} ... are the refusal's values, a name is what to do (remedies.py). Where a text is not enough,
+# a function makes the words of the remedies and the values.
+_Table = dict[str, str | Callable[..., str]]
+# The log's axes, their signs or the unit of the rates are wrong: to be mended in the log before anything is made of it
+_AXES: _Table = {
+    "mirrored": "the sensor turns against the track, so left and right are exchanged: were all accelerations "
+    "turned? " + _AT_REST.capitalize(),
+    "left-handed": "the rates turn the force the wrong way, so the lean is wrong: are the axes left-handed (reverse "
+    "one in both sensors) or the gyro of the opposite sign (reverse all its rates)? " + _AT_REST.capitalize(),
+    "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
+    "rates-misfit": _rates_misfit,
+}
+# The calibration is not of this mount
+_MOUNT: _Table = {
+    "up-off": _up_off,
+    "forward-off": _forward_off,
+    "forward-exchanged": _forward_exchanged,
+    "upside-down": "the sensor's {0} points down: if it is not mounted upside down, all accelerations are of the "
+    "opposite sign, and left and right get exchanged: reverse them (" + _AT_REST + ")",
+    "another-mount": "the calibration given is of a mount {0:.0f} degrees from this one: its offset and slope are used",
+}
+_OTHERS: _Table = {
     "absurd-readings": "readings that no vehicle gives, at {0:.1f} s up to {1:.0f} deg/s and {2:.1f} g, where the lean "
     "is not known: check the sensor, and the units in the log",
     "moved": "moved or knocked",
@@ -73,32 +199,24 @@ _SENTENCES = {
     "phone-otherwise": "by the ride the phone is turned by {1:.0f} degrees against {0}: mounted another way? "
     "{phone_otherwise}",
     "phone-upside-down": "for a phone mounted {0} all accelerations have the opposite sign: " + _AT_REST,
-    "rates-in-radians": "in bends the rates are those of {0:.0f} m/s: are they in rad/s? deg/s are needed",
     "import-speed-unit": "{0} has no unit, and the positions do not show it, so the speed is left out: {speed_unit}",
     "import-sign": "which sign accelerations have in {0} is not certain, and no track with turns shows it: "
     + _AT_REST
     + ", else the ride is mirrored and {sign}",
     "import-damaged": "damaged rows that are left out: {0}; a cell or a time is no number, a time is out of order, "
     "a row has too many cells, or a reading is past any sensor's",
-    "mirrored": "the sensor turns against the track, so left and right are exchanged: were all accelerations "
-    "turned? " + _AT_REST.capitalize(),
-    "left-handed": "the rates turn the force the wrong way, so the lean is wrong: are the axes left-handed (reverse "
-    "one in both sensors) or the gyro of the opposite sign (reverse all its rates)? " + _AT_REST.capitalize(),
-    "upside-down": "the sensor's {0} points down: if it is not mounted upside down, all accelerations are of the "
-    "opposite sign, and left and right get exchanged: reverse them (" + _AT_REST + ")",
     "car-replayed": "the calibration is a car's, whose display shows no lean: lean_deg is that of a motorcycle which "
     "would feel the same, and lean_sigma_deg is nan",
-    "another-mount": "the calibration given is of a mount {0:.0f} degrees from this one: its offset and slope are used",
+    "mount-moved": _mount_moved,
+    "frozen-readings": _frozen,
+    "speed-unit": _speed_unit,
+    "pose-off": _pose_off,
 }
-_MOVED = {
-    "between-stops": "two stops differ by over {0:.0f} degrees; those of a motorcycle on its kickstand do: is it one?",
-    "vertical": "the vertical changed by {0:.0f} degrees during the drive",
-    "parts": "the vertical is no longer where it was",
-    "since-standing": "standing and driving differ by {0:.0f} degrees",
-    "since-upright": "the upright pose and driving differ by {0:.0f} degrees",
-    "forward": "forward is no longer where it was",
-    "since-alignment": "it is no longer as it was aligned",
-}
+_WORDS = _AXES | _MOUNT | _OTHERS
+WRONG_AXES, WRONG_MOUNT = frozenset(_AXES), frozenset(_MOUNT)
+# The log contradicts its calibration so that it cannot show how exact that is. Where forward and backward are exchanged
+# it can: the error of roll then shows whether the poses were swapped.
+CONTRADICTING = WRONG_AXES | WRONG_MOUNT - {"forward-exchanged"}
 
 
 class RefusedInput(InputError):
@@ -130,25 +248,10 @@ def sentence(refusal: Refusal | Notice, remedies: Remedies = COMMANDS) -> str:
     >>> sentence(Notice("same-pose", 0.4))
     'both poses are the same (0.4 degrees apart): one on the kickstand, one upright'
     """
-    if refusal.code == "mount-moved":
-        how, *numbers = refusal.values
-        return "the mount has moved: " + _MOVED[how].format(*numbers)
-    if refusal.code == "frozen-readings":
-        return _frozen(*refusal.values)
-    if refusal.code == "speed-unit":
-        return _speed_unit(*refusal.values)
-    if refusal.code == "rates-misfit":
-        return _rates_misfit(*refusal.values)
-    if refusal.code == "forward-exchanged":
-        return _forward_exchanged(remedies, *refusal.values)
-    if refusal.code == "up-off":
-        return _up_off(remedies, *refusal.values)
-    if refusal.code == "forward-off":
-        return _forward_off(remedies, *refusal.values)
-    if refusal.code == "pose-off":
-        return _pose_off(*refusal.values)
-    words = _SENTENCES.get(refusal.code)
-    return words.format(*refusal.values, **remedies) if words else console.sentence(refusal)
+    words = _WORDS.get(refusal.code, "")
+    if callable(words):
+        return words(remedies, *refusal.values)
+    return words.format(*refusal.values, **remedies) or console.sentence(refusal)
 
 
 def as_data(notices: Iterable[Notice]) -> list[dict[str, object]]:
@@ -161,93 +264,3 @@ def as_data(notices: Iterable[Notice]) -> list[dict[str, object]]:
         {"code": notice.code, "values": [plain(value) for value in notice.values], "words": sentence(notice)}
         for notice in notices
     ]
-
-
-def _frozen(stretches: int, seconds: float, begin_s: float, end_s: float) -> str:
-    """The sentence for frozen readings. begin_s, end_s: times of the first stretch."""
-    line = f"the readings froze from {begin_s:.1f} to {end_s:.1f} s"
-    if stretches > 1:
-        line += f" and {stretches - 1} times more, {seconds:.1f} s in all"
-    return line + ": they are left out, and the lean begins anew after each"
-
-
-def _speed_unit(factor: float) -> str:
-    """The sentence for a speed in another unit. factor: change of the speed over the one that the force explains."""
-    guess = "is it in m/s, and the right vehicle's?"
-    if 3.0 < factor < 4.4:
-        guess = "it is in km/h, m/s are needed"
-    elif 1.8 < factor < 2.5:
-        guess = "it is in mph or knots, m/s are needed"
-    return f"the speed changes {factor:.1f} times as much as the force says: {guess}"
-
-
-def _rates_misfit(*exchange: list[int]) -> str:
-    """exchange (3 rows of 3): a signed permutation; times the rates of the log it is those about x, y and z.
-
-    A reversed axis of the accelerometer is the same as the two others reversed in the gyro, because accelerations of
-    the opposite sign are as good as the right ones; likewise with two that are exchanged.
-    """
-    kept = [axis for k, axis in enumerate(AXES) if exchange[k][k] == 1]
-    off = [axis for k, axis in enumerate(AXES) if exchange[k][k] != 1]
-    moved = [axis for k, axis in enumerate(AXES) if exchange[k][k] == 0]
-    signs = [sum(row) for row in exchange]
-    what, or_else = "are in another order or of another sign", ""
-    if len(kept) == 2:
-        what = f"are reversed about {off[0]}"
-    elif not moved:
-        what, or_else = f"are reversed about {off[0]} and {off[1]}", f"along {kept[0]} are reversed"
-    elif len(moved) == 2 and signs == [1, 1, 1]:
-        what = f"about {moved[0]} and {moved[1]} are exchanged"
-    elif len(moved) == 2 and signs == [-1, -1, -1]:
-        or_else = f"along {moved[0]} and {moved[1]} are exchanged"
-    right = ", ".join(("-" if sum(row) < 0 else "") + "g" + AXES[[abs(x) for x in row].index(1)] for row in exchange)
-    return (
-        "the rates do not belong to the accelerations, so the lean is wrong: "
-        + (f"either the accelerations {or_else}, or " if or_else else "")
-        + f"the rates {what}, and instead of gx, gy, gz right would be {right}"
-    )
-
-
-def _forward_exchanged(remedies: Remedies, car: bool, side: str, roll_deg: float | None) -> str:
-    """The sentence for forward and backward exchanged. side: the kickstand's side in the calibration by two poses, ""
-    if unknown. roll_deg: error of up, None if unknown."""
-    line = "forward and backward are exchanged: "
-    if car:
-        line += remedies["align_driving"]
-    elif roll_deg is not None and abs(roll_deg) > SWAPPED_DEG:
-        line += "were the poses swapped?"
-    else:
-        other = {"left": "--side right", "right": "--side left"}.get(side, "with the other --side")
-        line += remedies["other_side"].format(other) + ("" if roll_deg is not None else " Or were the poses swapped?")
-    return line + " Or, if no board wrote this log, " + OPPOSITE_SIGN
-
-
-def _up_off(remedies: Remedies, angle_deg: float, car: bool) -> str:
-    line = f"the calibration's up is {angle_deg:.0f} degrees off, so nothing computed with it is right: "
-    if angle_deg > UPSIDE_DOWN_DEG:
-        return line + f"is it another mount's? {_again(remedies, car)}. Or {OPPOSITE_SIGN}"
-    return line + f"is it another mount's? {_again(remedies, car)}"
-
-
-def _pose_off(angle_deg: float) -> str:
-    """angle_deg: > 0 to the right."""
-    side = "right" if angle_deg > 0.0 else "left"
-    return (
-        f"on straights the bike is in balance {abs(angle_deg):.1f} degrees to the {side} of what the "
-        "calibration takes for upright, and the smoothed lean counts from there: a pose that was not upright does "
-        "that, and a sensor without its six positions; if it is luggage on one side, the lean is that much off"
-    )
-
-
-def _forward_off(remedies: Remedies, angle_deg: float, by: str, car: bool) -> str:
-    """The sentence for a yaw error. angle_deg: from the calibration's forward to the ride's, > 0 to the left."""
-    side = "left" if angle_deg > 0.0 else "right"
-    wrong = "braking and cornering are" if car else "lean, braking and cornering are"
-    return (
-        f"by the {by} of this ride forward is {abs(angle_deg):.0f} degrees to the {side} of the calibration's, so "
-        f"{wrong} wrong: is it another mount's? {_again(remedies, car)}"
-    )
-
-
-def _again(remedies: Remedies, car: bool) -> str:
-    return remedies["align_again_car" if car else "align_again"]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..refusals import SWAPPED_DEG, sentence
+from ..refusals import CONTRADICTING, SWAPPED_DEG, sentence
 from ..refusals import as_data as remarks_as_data
 from ..remedies import COMMANDS, Remedies
 from .alignment_quality import LeanCost, Quality, lean_cost
@@ -15,7 +15,6 @@ from .summary import Peak
 if TYPE_CHECKING:
     from rich.console import Group
 
-CONTRADICTED = ("up-off", "forward-off", "left-handed", "rates-misfit", "rates-in-radians")  # by the ride
 COSTS_DEG = 0.25  # smaller errors of the lean, which nobody sees on the display, ask for nothing
 GRAVITY_G = 0.02  # by so much the force at rest may differ from 1 g, as in the proof of the six positions
 RIDDEN_S = 10.0  # least riding: in a shorter one the bike was only pushed about
@@ -196,7 +195,7 @@ def _gravity(found_g: float | None, remedies: Remedies) -> str:
 
 def judged(seen: Overview) -> bool:
     """True if the ride shows how well the sensor is aligned: not if it contradicts the calibration altogether."""
-    return not any(notice.code in CONTRADICTED for notice in seen.notices)
+    return not any(notice.code in CONTRADICTING for notice in seen.notices)
 
 
 def _costs(cost: LeanCost, speed: bool, remedies: Remedies) -> str:
