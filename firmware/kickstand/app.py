@@ -100,7 +100,7 @@ class App:
         except KeyboardInterrupt:
             port.rest_watchdog()  # not fed from here on; comes first, because a second Ctrl-C may interrupt the rest
             global worst
-            worst = LOOP_US - self._least_wait_us, self.sensor.chip.places_left()
+            worst = LOOP_US - self._least_wait_us, self.sensor.chip.least_free_samples()
             self.rides.stop()
             if self.live:
                 self.live.stop()

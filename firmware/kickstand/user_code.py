@@ -2,13 +2,14 @@
 it has them:
 
 setup(app)                          once, before the lean meter runs
-page(app), page_battery(app) ...    for a page, while it is shown: two lines of 16 characters and, for a display that
-                                    draws, perhaps a picture, see board/display.py
+page(app), page_battery(app) ...    while this page is shown: two lines of 16 characters and, for a display that draws,
+                                    perhaps a picture, see board/display.py. Each name that begins with page is one
 on_lean(lean_deg, trusted, meter)   ten times a second. trusted: False while the lean must not be used
 on_press(event)                     after each press: board.button.SHORT or LONG
 
 A function that raises, that takes longer than TOO_SLOW_MS, or longer than SLOW_MS for MOST_SLOW times in a row, is left
-out from then on; display and console say so.
+out from then on; display and console say so. Importing user.py and setup() may take any time. A MemoryError anywhere
+leaves out all of it.
 Imported only where there is a user.py.
 """
 
@@ -18,7 +19,7 @@ from time import ticks_diff, ticks_ms
 
 from .errors import Notice, report
 
-SLOW_MS = 50  # is reported once
+SLOW_MS = 50  # a slower call is reported, once per function
 TOO_SLOW_MS = 300  # the sensor keeps its samples for no longer
 MOST_SLOW = 5  # calls in a row that take longer than SLOW_MS: the loop would never catch up with the samples
 LEAST_FREE = 20_000  # bytes of heap: below, the lean meter's own work would fail next
@@ -31,10 +32,10 @@ class UserCode:
     def __init__(self, app):
         self._app = app
         self._functions = {}
-        self._functions["import"] = __import__
+        self._functions["import"] = __import__  # _call() also guards the import
         self._slow = {}  # how often in a row a function has been slow, once it has been
         self._problems = []
-        self._drawn = self._draw  # always the same object: a picture that has not changed is known by it
+        self._drawn = self._draw  # kept: each access makes a new bound method, and the display compares pictures by it
         sys.modules.pop("user", None)
         module = self._call("import", "user")
         for name in dir(module) if module else ():
@@ -50,16 +51,16 @@ class UserCode:
         return self._problems.pop(0) if self._problems else None
 
     def lean(self, trusted):
-        """Ten times a second. trusted: the lean is shown, too."""
+        """Call on_lean. trusted: the lean is shown, too. To be called ten times a second."""
         meter = self._app.meter
         self._call("on_lean", meter.lean_deg, trusted, meter)
 
     def press(self, event):
-        """After each press."""
+        """Call on_press. To be called after each press."""
         self._call("on_press", event)
 
     def check_memory(self):
-        """Leave all of it out when it has used up the heap. After a collection."""
+        """Leave all of it out when it has used up the heap. To be called after gc.collect()."""
         if self._functions and gc.mem_free() < LEAST_FREE:
             self._forget("memory")
 
@@ -111,7 +112,8 @@ class UserCode:
             return "user.py " + name, "left out"
         try:
             line1, line2 = [line if isinstance(line, (str, bytes, bytearray)) else str(line) for line in shown[:2]]
-            return (line1, line2) + ((self._drawn, name) + tuple(shown[2]) if len(shown) > 2 and shown[2] else None,)
+            picture = (self._drawn, name) + tuple(shown[2]) if len(shown) > 2 and shown[2] else None
+            return line1, line2, picture
         except Exception:  # whatever its __str__ or __getitem__ raises
             self._leave_out(name, "not two lines")
             return "user.py " + name, "not two lines"

@@ -1,7 +1,7 @@
 """How the device waits for a still pose and takes it. 8192 counts per g, 65.5 per deg/s."""
 
 import pytest
-from kickstand.calibration.pose_taker import DONE, SETTLED, SETTLING, SPOILT, TAKING, PoseTaker
+from kickstand.calibration.pose_taker import AVERAGING, DONE, SETTLED, SETTLING, SPOILT, PoseTaker
 from test_still_pose import LEVEL, samples
 
 
@@ -30,8 +30,8 @@ def test_half_a_second_of_stillness_then_three_seconds_are_taken():
         assert not taking.restless
         if k == 60:
             assert taking.progress() == (11, 300)
-    assert states[:350] == [SETTLING] * 49 + [SETTLED] + [TAKING] * 299 + [DONE]
-    assert states[350] not in (SETTLING, SETTLED, TAKING, DONE, SPOILT)
+    assert states[:350] == [SETTLING] * 49 + [SETTLED] + [AVERAGING] * 299 + [DONE]
+    assert states[350] not in (SETTLING, SETTLED, AVERAGING, DONE, SPOILT)
     assert taking.settled == pytest.approx([LEVEL[i] / 8192 for i in range(3)])
     assert taking.pose.count == 300
     assert taking.pose.gyro == pytest.approx([LEVEL[i] / 65.5 for i in (4, 5, 6)])
@@ -48,7 +48,7 @@ def test_stillness_is_waited_for_and_said_to_be_missing_after_a_second():
         assert taking.restless
     states = [taking.step(row) for row in samples(60)]
     assert states.count(SETTLED) == 1
-    assert states[-1] == TAKING
+    assert states[-1] == AVERAGING
     assert not taking.restless
 
 
@@ -69,7 +69,7 @@ def test_a_knock_while_averaging_spoils_the_pose_and_it_can_be_taken_again():
     rows = samples(100)
     rows[80][1] += 1000
     states = [taking.step(row) for row in rows]
-    assert states[79:81] == [TAKING, SPOILT]
+    assert states[79:81] == [AVERAGING, SPOILT]
     assert SPOILT not in states[81:]
     assert taking.problem and taking.problem.code == "moved"
     assert taking.progress() == (0, 300)

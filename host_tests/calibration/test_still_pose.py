@@ -16,7 +16,10 @@ def finished(rows, expected=None, limit=32700):
     pose = StillPose(8192, 65.5, limit, expected or len(rows))
     for row in rows:
         pose.add(row)
-    pose.finish()
+    try:
+        pose.finish()
+    finally:
+        assert (pose.problem is None) == (pose.accel is not None)
     return pose
 
 
@@ -63,6 +66,13 @@ def test_readings_that_never_change_are_frozen_and_one_that_does_is_enough():
     assert problem_of(rows) == "frozen-pose"
     rows[50][5] += 1
     assert problem_of(rows) is None
+
+
+@pytest.mark.parametrize("axis", [4, 5, 6])
+@pytest.mark.parametrize(("rate_dps", "code"), [(-46, "gyro-offset"), (-44, None), (44, None), (46, "gyro-offset")])
+def test_a_large_gyro_offset_spoils_the_pose(axis, rate_dps, code):
+    rows = [[*row[:axis], round(rate_dps * 65.5), *row[axis + 1 :]] for row in samples()]
+    assert problem_of(rows) == code
 
 
 def test_a_spoilt_pose_stays_spoilt():

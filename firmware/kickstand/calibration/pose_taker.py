@@ -9,7 +9,7 @@ GIVE_UP_MS = 10_000  # longest time to wait for stillness
 # What step() returns
 SETTLING = 0  # waiting for stillness
 SETTLED = 1  # for one sample: it has been still for SETTLE_MS, and averaging begins
-TAKING = 2  # averaging
+AVERAGING = 2
 DONE = 3  # for one sample: the pose is complete
 SPOILT = 4  # for one sample: see problem
 _ENDED = 5
@@ -42,7 +42,7 @@ class PoseTaker:
         """Take one sample (7 counts, the chip's order); return one of the states above."""
         if self._state == SETTLING:
             return self._settle(counts)
-        if self._state == TAKING:
+        if self._state == AVERAGING:
             return self._average(counts)
         return _ENDED
 
@@ -53,7 +53,7 @@ class PoseTaker:
 
     def progress(self):
         """The number of samples averaged so far, and the number of all that are to be."""
-        return (self.pose.count, self._take_count) if self._state == TAKING else (0, self._take_count)
+        return (self.pose.count, self._take_count) if self._state == AVERAGING else (0, self._take_count)
 
     def _new(self, expected):
         chip = self._chip
@@ -72,13 +72,13 @@ class PoseTaker:
                 return SETTLING
             return self._spoil(problem)
         self.settled = self.pose.accel
-        self._state = TAKING
+        self._state = AVERAGING
         self.pose = self._new(self._take_count)
         return SETTLED
 
     def _average(self, counts):
         if self.pose.add(counts) and self.pose.count < self._take_count:
-            return TAKING
+            return AVERAGING
         try:
             self.pose.finish()
         except CaptureError as problem:

@@ -75,8 +75,6 @@ class StillPose:
         mean = [self._first[i] + self._sums[i] / n for i in range(7)]
         self.accel = [mean[i] / self._accel_lsb for i in range(3)]
         self.gyro = [mean[i] / self._gyro_lsb for i in range(4, 7)]
-        if max(abs(rate) for rate in self.gyro) > MAX_REST_RATE_DPS:
-            raise CaptureError("gyro-offset", MAX_REST_RATE_DPS)
 
     def _judge(self):
         n = self.count
@@ -92,4 +90,7 @@ class StillPose:
             drift = (self._sums[i] - self._early[i]) / late - self._early[i] / self._half
             if abs(drift) > DRIFT_G * self._accel_lsb:
                 return CaptureError("tilting")
+        for i in range(4, 7):
+            if abs(self._first[i] + self._sums[i] / n) > MAX_REST_RATE_DPS * self._gyro_lsb:
+                return CaptureError("gyro-offset", MAX_REST_RATE_DPS)
         return None

@@ -133,7 +133,7 @@ class Mpu6050:
             raise OSError("MPU6050 WHO_AM_I reads differently each time")
         if self.who_am_i not in CHIPS and self.who_am_i != self._accept:
             raise UnknownChip(self.who_am_i)
-        _, _, _, _, fifo_bytes, _ = self._chip()
+        _, _, _, _, fifo_bytes, _ = self._chip()  # unpacked: a type checker then knows that it is a number
         self._full = fifo_bytes - FRAME
         return self.who_am_i
 
@@ -183,10 +183,11 @@ class Mpu6050:
         self.take(0)
 
     def fetch(self):
-        """Read waiting samples from the FIFO, at most MAX_FRAMES; return their number. Raises OSError from the bus.
+        """Read waiting samples from the FIFO and return their number: MAX_FRAMES if as many wait, else at most
+        FEW_FRAMES. Sets frames_left. Raises OSError from the bus, or as restart_fifo() does.
 
-        After an overflow the frames no longer begin at multiples of 14 bytes. Then the FIFO is emptied, overflows
-        is one higher, and 0 is returned.
+        After an overflow the frames no longer begin at multiples of 14 bytes. Then the FIFO is emptied, overflows is
+        incremented, and 0 is returned. 0 is also returned while the chip is writing a frame: see below.
         """
         self._i2c.readfrom_mem_into(self._address, _FIFO_COUNT_H, self._two)
         waiting = self._two[0] << 8 | self._two[1]
@@ -209,8 +210,8 @@ class Mpu6050:
             self._i2c.readfrom_mem_into(self._address, _FIFO_R_W, self._some_frames[taken])
         return taken
 
-    def places_left(self):
-        """How many samples the FIFO had at least place for, at each fetch()."""
+    def least_free_samples(self):
+        """Smallest free space in the FIFO that a fetch() has found so far, in samples."""
         return max(0, self._full + FRAME - self._most) // FRAME
 
     def take(self, k):

@@ -50,10 +50,10 @@ class RideStream:
             raise OSError(ETIMEDOUT)
 
     def end(self):
-        """Do nothing: there is no file to close."""
+        """The ride is over. Nothing to close: there is no file."""
 
     def abandon(self):
-        """Do nothing: there is no file to close."""
+        """The ride ends after an error. Nothing to close, where a RideRing closes its file."""
 
     def fault_code(self, error):
         return "out-of-memory" if isinstance(error, MemoryError) else "usb-fault"

@@ -18,9 +18,9 @@ MAX_SENTENCE = 100  # bytes: the standard says 82, but receivers with many decim
 MAX_CHUNK = 64  # bytes read in one pass of the loop: at 10 ms a pass, twice what 10 fixes a second need
 SILENT_MS = 3000  # after so long without a byte, a whole sentence or a fix, fault() reports which
 LATE_MS = 2000  # a fix that waited in the receiver for longer is dropped
-TIME_JUMP_MS = 5000  # a larger delay is none: the receiver has corrected its clock
+TIME_JUMP_MS = 5000  # a larger difference is not a delay: the receiver has corrected its clock
 # The delay of a fix is counted from a fix that was not late, the reference. When at least so many fixes over more than
-# TIME_JUMP_MS all came late, the smallest delay becomes the new zero: the receiver set its clock back.
+# TIME_JUMP_MS all came late, the one with the smallest delay becomes the reference: the receiver set its clock back.
 MIN_FIXES_FOR_NEW_REFERENCE = 4
 KNOT_MPS = 1852.0 / 3600.0  # one knot in m/s
 KMH_MPS = 1.0 / 3.6  # one km/h in m/s
@@ -30,9 +30,9 @@ _DIGITS = 5  # decimals of a minute of arc: 2 cm
 
 class Gps:
     """uart: a machine.UART with a time-out of 0. After poll() has returned a speed: age_ms, the delay of its sentence
-    against the receiver's earliest ones."""
+    relative to the earliest-arriving one."""
 
-    problem = None  # the interface of a Wheel; a receiver's faults are those of fault()
+    problem = None  # always None here, a Wheel uses it: see fault()
 
     def __init__(self, uart):
         self._uart = uart
@@ -44,7 +44,7 @@ class Gps:
         self._time = b""  # time of day in the last RMC
         # A fix is remembered as (ticks_ms() when it came, its time of day in ms).
         self._reference = None  # the fix that delays are counted from
-        self._earliest = None  # the fix with the smallest delay since then, and that delay
+        self._earliest = None  # the fix with the smallest delay since the reference was set, and that delay
         self._earliest_delay_ms = 0
         self._fixes = 0  # fixes with a delay since the reference was set, and when that was
         self._since_ms = 0
@@ -81,7 +81,7 @@ class Gps:
         return speed
 
     def _begin(self, now_ms):
-        """Start the times after which a missing sentence or fix is a fault."""
+        """Restart the time-outs."""
         self._heard_ms = self._sentence_ms = self._fix_ms = now_ms
         self._fix = None
 
@@ -145,7 +145,7 @@ class Gps:
         self._time = fields[1]
         # mode E: estimated from the last fix (dead reckoning); N: not valid
         valid = fields[2] == b"A" and not (len(fields) > 12 and fields[12] in (b"E", b"N"))
-        if not valid or repeated or self._late(fields[1], now_ms):
+        if not valid or repeated or self._set_age(fields[1], now_ms) > LATE_MS:
             return None
         speed = float(fields[7]) * KNOT_MPS
         self._fix = fields
@@ -163,11 +163,12 @@ class Gps:
             return float(fields[5]) * KNOT_MPS
         return float(fields[7]) * KMH_MPS if fields[8] == b"K" and fields[7] else None
 
-    def _late(self, time, now_ms):
-        """True if a fix with this time of day, hhmmss.ss, comes more than LATE_MS later than the reference did. Sets
-        age_ms and _day_ms.
+    def _set_age(self, time, now_ms):
+        """Set age_ms and _day_ms by a fix with this time of day, hhmmss.ss, and the reference if this shows a new one;
+        return age_ms.
 
-        Clocks do go back: a NEO-6M's by 3 s when it learns of the leap seconds. Raises ValueError for no time."""
+        Clocks do go back: a NEO-6M's by 3 s when it learns of the leap seconds. Raises ValueError if the field is no
+        time of day."""
         day_ms = (int(time[0:2]) * 60 + int(time[2:4])) * 60_000 + int(float(time[4:]) * 1000.0 + 0.5)
         if not 0 <= day_ms <= _DAY_MS:
             raise ValueError
@@ -183,9 +184,9 @@ class Gps:
                 self._fixes += 1
                 if self._fixes >= MIN_FIXES_FOR_NEW_REFERENCE and ticks_diff(now_ms, self._since_ms) > TIME_JUMP_MS:
                     self._reference, self._fixes, self._since_ms = self._earliest, 0, now_ms
-                return delay_ms > LATE_MS
+                return delay_ms
         self._reference, self._fixes, self._since_ms = (now_ms, day_ms), 0, now_ms
-        return False
+        return 0
 
 
 def _minutes(field, degrees, negative):
@@ -213,7 +214,7 @@ def _minutes(field, degrees, negative):
 
 
 def _date(field):
-    """The date ddmmyy in the form of place(), 0 if it is none."""
+    """The date ddmmyy in the form of place(), 0 if it is invalid."""
     try:
         date = int(field)
     except ValueError:

@@ -28,8 +28,9 @@ class Speed:
         self.age_us = 0
 
     def poll(self, now_ms):
-        """Return a new speed in m/s, or None: none has come, or no vehicle could have reached it from the last one.
-        Call it in each turn of the loop. now_ms: ticks_ms()."""
+        """Return a new speed in m/s and set age_us, or return None: none has come, or it is refused. Refused is what is
+        not within 0 to MAX_MPS, and what no vehicle could have reached from the last accepted speed, but the latter for
+        GIVE_UP_MS only. Call it in each turn of the loop. now_ms: ticks_ms()."""
         speed = self._source.poll(now_ms)
         if speed is None or not 0.0 <= speed <= MAX_MPS:
             return None

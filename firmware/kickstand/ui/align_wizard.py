@@ -8,9 +8,8 @@ from .wizard import ASKING, RESULT, Wizard
 
 POSE_SECONDS = 3
 RESULT_MS = 4000
-FRESH_MS = (
-    90_000  # the gyro's bias that the pose on the kickstand has measured holds for so long; then it may have drifted
-)
+# So long the gyro's bias holds that the pose on the kickstand has measured; then it may have drifted
+FRESH_MS = 90_000
 _ASK = (("On the stand,", "press button"), ("Now upright:", "hold it, press"))
 _TAKING = ("Stand: hold", "Upright: hold")
 
