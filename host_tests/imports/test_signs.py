@@ -73,7 +73,7 @@ def test_a_table_without_gravity_is_refused(tmp_path):
 
 def test_a_unit_that_is_wrong_is_noticed(tmp_path):
     (tmp_path / "log.csv").write_text(app_exports.any_table(riding().every(4)))
-    with pytest.raises(api.InputError, match=r"its acceleration is 1\d\.\d g as a rule, where gravity makes it 1"):
+    with pytest.raises(api.InputError, match=r"usually 1\d\.\d\d g, where gravity makes it 1: they look like m/s2"):
         api.import_recording(tmp_path / "log.csv", app_exports.ANY_NAMES, {"a": "g", "g": "rad/s", "speed": "km/h"})
 
 

@@ -205,8 +205,8 @@ MISTAKES = {
         "the unit is not known of Gyro_X, Gyro_Y, Gyro_Z, Speed_kmh: add --units g=deg/s,speed=m/s (g is one of deg/s, "
         "rad/s, mdeg/s; speed is one of m/s, km/h, mph, knots)",
     ),
-    "no pair": (COLUMNS, "m/s2", "--units: 'm/s2' is not NAME=VALUE; commas part the pairs"),
-    "twice": ("t=Millis,t=Millis", "a=g", "--columns: 't' is there twice"),
+    "no pair": (COLUMNS, "m/s2", "--units: 'm/s2' is not NAME=VALUE; separate the pairs with commas"),
+    "twice": ("t=Millis,t=Millis", "a=g", "--columns: 't' is given twice"),
     "no time in it": (COLUMNS.replace("t=Millis", "t=Note"), "a=g,g=deg/s,speed=m/s", "no time"),
 }
 

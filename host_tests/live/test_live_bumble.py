@@ -3,6 +3,7 @@ published texts only."""
 
 import asyncio
 import collections
+import functools
 import itertools
 import random
 
@@ -93,25 +94,19 @@ def test_our_service_loses_no_sample_while_a_ride_is_recorded(on_air):
     assert len(rides) in (19, 20, 21) and {one["samples lost"] for one in rides} == {0}
 
 
-async def press_in(central):
+async def press_in(central, pair=True):
     await central.connect(await central.find(CHRONO))
     await central.subscribe(CHRONO, 0x0001, "chrono")
     try:
-        await central.connection.pair()
+        if pair:
+            await central.connection.pair()
         await central.write(CHRONO, 0x0002, [1, 0, 100])
     finally:
         await asyncio.sleep(2)
         await central.leave()
 
 
-async def just_write(central):
-    await central.connect(await central.find(CHRONO))
-    await central.subscribe(CHRONO, 0x0001, "chrono")
-    try:
-        await central.write(CHRONO, 0x0002, [1, 0, 100])
-    finally:
-        await asyncio.sleep(2)
-        await central.leave()
+just_write = functools.partial(press_in, pair=False)
 
 
 def test_a_pin_is_asked_for(on_air):

@@ -279,18 +279,8 @@ def vbo(ride: Riding, speed: str = "kmh", inertial: bool = True) -> str:
             measured = (forward, left, up, -about_up, -about_left, about_forward)
             row += "".join(f" {value:+.6E}" for value in measured)
         rows.append(row)
-    head = [
-        "File created on 17/05/2024 at 09:31:00",
-        "",
-        "[header]",
-        *titles,
-        *extra,
-        "",
-        "[channel units]",
-        *units,
-        "",
-    ]
-    head += ["[comments]", "(c) nobody", "", "[column names]", " ".join(names + extra), "", "[data]"]
+    head = ["File created on 17/05/2024 at 09:31:00", "", "[header]", *titles, *extra, "", "[channel units]", *units]
+    head += ["", "[comments]", "(c) nobody", "", "[column names]", " ".join(names + extra), "", "[data]"]
     return "\r\n".join([*head, *rows]) + "\r\n"
 
 

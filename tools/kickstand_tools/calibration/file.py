@@ -12,20 +12,18 @@ from kickstand.calibration.store import MAX_BIAS_DPS, MAX_TRIM_DEG
 from kickstand.lean.lean_filter import DELAY_S
 from kickstand.rotation import is_rotation
 from kickstand.units import AXES
-from numpy.typing import NDArray
 
 from ..errors import InputError, cause
 from ..logs.reader import check_first_line
 from ..logs.source import File, log_stem, name_of, open_input
 from ..output import write_whole
+from ..signals import Array
 from ..signals.calibrated import calibrated, rotated
 
 VERSION = 1
 MOST_BYTES = 1_000_000  # largest file; those of kickstand have a thousandth of that
 MAX_DELAY_S = 0.05  # largest delay of a chip's low-pass: the slowest has 33 ms
 ROTATION_TOLERANCE = 2e-3  # a matrix copied with three or four decimals is still good to 0.1 degrees
-
-Array = NDArray[np.float64]
 
 
 @dataclass(eq=False)

@@ -1,4 +1,5 @@
-"""Are a log's values in the units that they should be in? What is easily taken for them shows in its beginning.
+"""Are a log's values in the units that they should be in? Usual mix-ups (m/s2 for g, ms for s) show in its first
+samples.
 
 Whether the speed is in m/s shows later: its changes are compared with the specific force that caused them. From one
 second to the next a speed changes by the acceleration along the vehicle. How the sensor is mounted does not matter: the
@@ -17,11 +18,14 @@ from ..signals import Array
 from ..signals.lag import best_lag
 from .cells import LogCells
 
-LEAST_G = 0.3  # median force; less is usual where gravity was taken off, a ride's is over 0.9
-MOST = 1.5  # times the change that the force explains: knots give 1.94, recorded speeds in m/s never over 1.1
-PUSH_G = 0.15  # a stronger force is no slope of an ordinary road
+# Usual forces, g: smaller ones are without gravity (even a pose with an offset of 0.6 g has more), larger ones in m/s2
+LEAST_G, MOST_G = 0.4, 5.0
+MILLISECONDS_US = 4e6  # samples that far apart have times in ms that were read as s: 250 a second, or fewer
+# Largest ratio of the observed change of speed to what the force explains: knots give 1.94, speeds in m/s at most 1.1
+MOST_RATIO = 1.5
+PUSH_G = 0.15  # a stronger force cannot come from the slope of an ordinary road
 ENOUGH = 10  # seconds of such forces: two or three braking events
-SIGMAS = 5.0  # by which the correlation of force and change of speed has to be more than chance
+SIGMAS = 5.0  # standard deviations by which the correlation of force and change of speed has to exceed chance
 LAGS_S = np.arange(0.0, 2.1, 0.25)  # by which a satellite receiver's speed may be late
 SHORTEST_S, LONGEST_S = 0.5, 2.2  # between two speeds
 
@@ -30,18 +34,20 @@ def check_units(name: str, time_us: NDArray[np.int64], accel_g: Array) -> None:
     """Raise InputError for accelerations without gravity or in m/s2, and for times in ms. time_us (n), accel_g (n, 3):
     of the first samples of the log."""
     usual_g = np.median(np.linalg.norm(accel_g, axis=1))
+    said = f"{name}: accelerations are usually {usual_g:.2f} g, where gravity makes it 1"
     if usual_g < LEAST_G:
         raise InputError(
-            f"{name}: accelerations are usually {usual_g:.2f} g, not 1 g: was gravity taken off? It has to be in them"
+            f"{said}: gravity has been taken off, and without it there is no lean; record the acceleration with gravity"
         )
-    if 5.0 < usual_g < 20.0:
-        raise InputError(f"{name}: accelerations look like m/s2: divide them by 9.80665, their unit is g")
-    if len(time_us) > 1 and (time_us[-1] - time_us[0]) / (len(time_us) - 1) >= 4e6:
+    if usual_g > MOST_G:
+        raise InputError(f"{said}: they look like m/s2, their unit has to be g (9.80665 m/s2)")
+    if len(time_us) > 1 and (time_us[-1] - time_us[0]) / (len(time_us) - 1) >= MILLISECONDS_US:
         raise InputError(f"{name}: seconds between samples: is t_s in milliseconds?")
 
 
 def speed_unit(cells: LogCells) -> Refusal | None:
-    """That the speed changes too much at most of the strong forces; None if not, or if the log cannot show it."""
+    """A Refusal if the speed changes too much at most of the strong forces; None if not, or if the log does not show
+    it."""
     time_s, mps = cells.speeds.T
     seconds = np.diff(time_s)
     good = (seconds > SHORTEST_S) & (seconds < LONGEST_S)
@@ -60,6 +66,6 @@ def speed_unit(cells: LogCells) -> Refusal | None:
     push = earlier(best.lag_s)[1] @ best.direction
     push, change = push - np.mean(push), change - np.mean(change)
     strong = np.abs(push) > PUSH_G
-    if np.count_nonzero(strong) < ENOUGH or np.median(change[strong] / push[strong]) <= MOST:
+    if np.count_nonzero(strong) < ENOUGH or np.median(change[strong] / push[strong]) <= MOST_RATIO:
         return None
-    return speed_unit_problem(float(change @ push / (change @ change)))  # as the board's own regression has it
+    return speed_unit_problem(float(change @ push / (change @ change)))  # the same regression as on the board

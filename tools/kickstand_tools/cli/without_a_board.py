@@ -75,12 +75,18 @@ def web_command(out: Path | None) -> None:
 @_DISPLAY
 def emulate_command(port: int, chip: str, display: str) -> None:
     """An emulated board on socket://127.0.0.1:PORT, with sensor, display and button on a simulated bike."""
-    image.find()  # before anything else of the emulator is imported
+    ready_emulator(chip)
+    from ..emulator.emulate import emulate
+
+    emulate(port, click.echo, chip, display)
+
+
+def ready_emulator(chip: str) -> None:
+    """Find what the emulator of this chip needs, and compile it. To be called before anything of it is imported. Raises
+    InputError where something is missing."""
+    image.find()
     if chip == "esp32":
         esp32_library.find()
     else:
         with spinner("compiling the emulator, once"):
             native.build()
-    from ..emulator.emulate import emulate
-
-    emulate(port, click.echo, chip, display)

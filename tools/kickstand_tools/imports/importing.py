@@ -22,11 +22,11 @@ from .join import GAP_NS, join
 from .recording import Array, Recording, Taken
 from .units import ACCELERATIONS, SPEEDS, factor, unit
 
-# Each is asked about the files that none before it has claimed: phyphox, which goes by names of columns, is last
+# Each is a module with NAME, the app's; finds(files): the files of each of its recordings among these; and
+# read(files, name): that Recording (see recording.py), or InputError. Each is asked about the files that none before it
+# has claimed: phyphox, which goes by names of columns, is last.
 _APPS = (own, vbo, aim, racechrono, racebox, sensorlog, sensor_logger, sensor_kinetics, phyphox)
 NAMES = [app.NAME for app in reversed(_APPS)]
-WITHOUT_GRAVITY_G = 0.4  # a smaller median force is without gravity; even a pose with an offset of 0.6 g has more
-WRONG_UNIT_G = 3.0  # a larger median force is in m/s2, where it is 9.8
 
 
 @dataclass(eq=False)
@@ -84,7 +84,6 @@ def import_recording(
     name = str(source)
     recording = _recording(read_files(source), name, columns, dict(units or {}))
     log, damaged = join(recording, name)
-    _check_force(log)
     _check_sign(recording, log)
     if damaged:
         recording.notices.append(Notice("import-damaged", damaged))
@@ -164,18 +163,6 @@ def is_of_an_app(source: Path) -> bool:
         if source.is_dir() or is_zipfile(source):
             raise
         return False
-
-
-def _check_force(log: Log) -> None:
-    """Raise InputError where the acceleration has no gravity in it, or is in another unit than it says."""
-    usual = float(np.median(np.linalg.norm(log.accel_g, axis=1)))
-    said = f"{log.name}: its acceleration is {usual:.{2 if usual < 1.0 else 1}f} g as a rule, where gravity makes it 1"
-    if usual < WITHOUT_GRAVITY_G:
-        raise InputError(
-            f"{said}: gravity has been taken off, and without it there is no lean; record the acceleration with gravity"
-        )
-    if usual > WRONG_UNIT_G:
-        raise InputError(f"{said}: check its unit")
 
 
 def _check_sign(recording: Recording, log: Log) -> None:

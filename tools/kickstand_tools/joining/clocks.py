@@ -2,6 +2,7 @@
 
 First every shift is tried on the magnitude of the rates, which does not depend on the sensors' mounting. Then shift and
 drift are fitted by least squares to the rates about A's axes; the rotation of B against A follows from the rates, too.
+A is the one in whose time and axes everything is given, B the other.
 """
 
 from dataclasses import dataclass
@@ -15,26 +16,24 @@ from ..logs.table import Array
 from ..signals.averages import moving_mean
 from ..signals.lag import correlations, log_likelihood_ratio, peaks
 from ..signals.rotations import rotation_vector
+from .fit import USUAL_DRIFT
+from .match import LEAST_EVIDENCE, LEAST_LEAD, LEAST_S, MOST_DRIFT
 from .motion import STEP_S, Motion
 
 _SMOOTH = 5  # cells over which rates are averaged, so that their derivatives are known
 _MOST_DPS = 60.0  # higher rates, by jolts, are cut to this
 _APART_S, _CANDIDATES = 3.0, 6
 _INDEPENDENT_S = 1.0  # rates that are further apart are taken as independent
-_LEAST_S = 60.0  # least time of riding that both have
-_LEAST_EVIDENCE, _LEAST_LEAD = 15.0, 6.0  # as in match.py
 _LEAST_CORRELATION = 0.8  # least correlation of the rates: two sensors on one bike have over 0.9
-_MOST_DRIFT, _USUAL_DRIFT = 400e-6, 100e-6  # as in match.py and in fit.py
 _MOST_APART_DEG = 15.0  # largest contradiction by the calibrations: each is good to a few degrees
 _ROUNDS = 8
-_DRIFTING_S = 60.0  # in a shorter ride no drift is fitted
 
 
 @dataclass
 class Clocks:
-    """later_s: time of B's first sample less that of A's. drift: seconds per second that B's clock loses. correlation:
-    that of the rates. common_s: time that is in both. apart_deg: angle between the rotation of B against A by both
-    calibrations and that by the rates."""
+    """later_s: time of B's first sample less that of A's, s. drift: seconds per second that B's clock loses against
+    A's. correlation: that of the rates. common_s: time for which both have samples, without gaps and frozen readings,
+    s. apart_deg: angle between B's rotation relative to A as the calibrations give it and as the gyros give it."""
 
     later_s: float
     drift: float
@@ -52,7 +51,7 @@ def clocks(a: Motion, b: Motion, axes_a: CalibrationFile, axes_b: CalibrationFil
     put the names of both in front."""
     size = [_size(one) for one in (a, b)]
     found, count = correlations(size[0], a.there, size[1], b.there)
-    found = np.where(count * STEP_S >= _LEAST_S, found, 0.0)
+    found = np.where(count * STEP_S >= LEAST_S, found, 0.0)
     likely = log_likelihood_ratio(found, count, STEP_S / _INDEPENDENT_S)
     places = peaks(likely, round(_APART_S / STEP_S), _CANDIDATES)
     tried = []
@@ -62,9 +61,9 @@ def clocks(a: Motion, b: Motion, axes_a: CalibrationFile, axes_b: CalibrationFil
         ratio = log_likelihood_ratio(np.array(alike), count[place], STEP_S / _INDEPENDENT_S)
         tried.append((float(ratio), alike, shift_s))
     tried.sort(reverse=True)
-    if not tried or tried[0][0] < _LEAST_EVIDENCE or tried[0][1] < _LEAST_CORRELATION:
+    if not tried or tried[0][0] < LEAST_EVIDENCE or tried[0][1] < _LEAST_CORRELATION:
         raise InputError("nowhere do they turn alike for a minute: are they of one ride, and both on the bike?")
-    if len(tried) > 1 and tried[1][0] > tried[0][0] - _LEAST_LEAD:
+    if len(tried) > 1 and tried[1][0] > tried[0][0] - LEAST_LEAD:
         raise InputError("they fit at two times: a longer ride with more bends is needed")
     turn = _rotation(a, b, tried[0][2])
     made = _fitted(a, b, _along(a, np.eye(3)), _along(b, turn), tried[0][2])
@@ -108,24 +107,23 @@ def _fitted(a: Motion, b: Motion, of_a: Array, of_b: Array, later_s: float) -> C
     for k in range(_ROUNDS):
         on_b = (at_s - later_s) * (1.0 - drift)
         both = _there(b, on_b) & a.there
-        if np.count_nonzero(both) * STEP_S < _LEAST_S:
-            raise InputError(f"they have less than {_LEAST_S:.0f} s of riding in common")
+        if np.count_nonzero(both) * STEP_S < LEAST_S:
+            raise InputError(f"they have less than {LEAST_S:.0f} s of riding in common")
         when = at_s[both] - at_s[both].mean()
         model, changes = (_at(b.t_s, values, on_b[both]) for values in (of_b, derivative))
         error = of_a[both] - model
-        drifting = both.sum() * STEP_S > _DRIFTING_S and k > 0
         weight = 1.0 / (1.0 + np.sum(error**2, axis=1) / (4.0 * np.median(np.sum(error**2, axis=1)) + 1e-9))
         by_shift = -changes
         by_drift = -changes * when[:, None]
         normal = np.array([[_dot(p, q, weight) for q in (by_shift, by_drift)] for p in (by_shift, by_drift)])
         gradient = np.array([_dot(p, error, weight) for p in (by_shift, by_drift)])
-        normal[1, 1] += float(np.mean(weight @ error**2)) / len(error) / _USUAL_DRIFT**2
-        step = np.linalg.solve(normal, gradient) if drifting else np.array([gradient[0] / max(normal[0, 0], 1e-9), 0.0])
+        normal[1, 1] += float(np.mean(weight @ error**2)) / len(error) / USUAL_DRIFT**2
+        step = np.linalg.solve(normal, gradient) if k > 0 else np.array([gradient[0] / max(normal[0, 0], 1e-9), 0.0])
         step[0] = np.clip(step[0], -0.5, 0.5)
         # The shift in the middle of what is compared moves; that at the start follows
         drift, middle = drift + step[1], at_s[both].mean()
         later_s += step[0] - step[1] * (middle - later_s)
-    if abs(drift) > _MOST_DRIFT:
+    if abs(drift) > MOST_DRIFT:
         raise InputError("they turn alike, but their clocks drift apart by more than clocks do: one has gaps")
     common_s = float(np.count_nonzero(_there(b, (at_s - later_s) * (1.0 - drift)) & a.there) * STEP_S)
     return Clocks(float(later_s), float(drift), _alike(a, b, of_a, of_b, later_s, drift), common_s)

@@ -18,9 +18,9 @@ AROUND_S = 6.0  # largest distance of the shift from the rough one, with the dri
 _TRIED_S = 0.1  # distance of the shifts that are tried
 _SHIFTS = np.arange(-AROUND_S, AROUND_S + _TRIED_S / 2.0, _TRIED_S)
 _DRIFTS = np.arange(-300e-6, 301e-6, 20e-6)
-_USUAL_DRIFT = 100e-6  # prior of the drift, 1 sigma: two crystals, one of them hot
+USUAL_DRIFT = 100e-6  # prior of the drift, 1 sigma: two crystals, one of them hot
 _USUAL_TILT = 0.05  # prior of the tilt of up by an accelerometer's offset, 1 sigma, rad
-_PRIOR = 1.0 / np.array([np.inf, _USUAL_DRIFT, _USUAL_TILT, _USUAL_TILT, np.inf, np.inf, np.inf]) ** 2
+_PRIOR = 1.0 / np.array([np.inf, USUAL_DRIFT, _USUAL_TILT, _USUAL_TILT, np.inf, np.inf, np.inf]) ** 2
 _SAME_TRACK_S = 0.05  # 1 sigma of the shift, because receivers smooth more in bends than on straights
 _FREEDOM = 4.0  # degrees of freedom of Student's distribution, which down-weights errors over two sigma
 _LEAST_ERROR = 0.5  # least error over its sigma: a better receiver does not make the gyro's scale factor exact
@@ -91,7 +91,7 @@ def _tried(compared: Comparison, rough_s: float) -> _Tried:
         low = at.astype(int)
         column = np.arange(len(since_s))
         there = costs[low, column] * (low + 1 - at) + costs[low + 1, column] * (at - low)
-        total = there.sum(axis=1) + 0.5 * (drift / _USUAL_DRIFT) ** 2
+        total = there.sum(axis=1) + 0.5 * (drift / USUAL_DRIFT) ** 2
         best = min(best, (float(total.min()), float(_SHIFTS[np.argmin(total)]), float(drift)))
     cost, shift, drift = best
     steps = np.count_nonzero(given.course_weight)

@@ -21,12 +21,12 @@ _SPAN_S = 4.0  # rough shifts are found by changes of course over this time
 _APART_S = 10.0  # least distance of two rough shifts
 _CANDIDATES = 5
 _WORTH = 0.1  # a rough shift is tried if its evidence is at least this share of the likeliest one's
-_LEAST_S = 60.0  # least time of riding that both have
+LEAST_S = 60.0  # least time of riding that both have
 _LEAST_TURN_DEG = 360.0  # least sum of the changes of course
-_LEAST_EVIDENCE = 15.0  # least evidence of a match; other rides' tracks reach 9
-_LEAST_LEAD = 6.0  # least difference of the best shift's evidence from another one's
+LEAST_EVIDENCE = 15.0  # least evidence of a match; other rides' tracks reach 9
+LEAST_LEAD = 6.0  # least difference of the best shift's evidence from another one's
 _MOST_APART = 3.0
-_MOST_DRIFT = 400e-6  # largest drift; that of a crystal in the heat of an engine is 100e-6
+MOST_DRIFT = 400e-6  # largest drift; that of a crystal in the heat of an engine is 100e-6
 _ALIKE = 0.9  # a higher correlation is no chance, but may be of another, similar bend
 _LEAST_CORRELATION = 0.6
 _MOST_SIGMA_S = 0.3
@@ -64,10 +64,10 @@ def match(motion: Motion, track: Track) -> Match:
         if fit is not None:
             found.append(fit)
     if not found:
-        raise InputError(f"they have less than {_LEAST_S:.0f} s of riding in common: {_OTHER}")
+        raise InputError(f"they have less than {LEAST_S:.0f} s of riding in common: {_OTHER}")
     found.sort(key=lambda fit: -fit.evidence)
     best = found[0]
-    if best.evidence < _LEAST_EVIDENCE or best.correlation < _LEAST_CORRELATION:
+    if best.evidence < LEAST_EVIDENCE or best.correlation < _LEAST_CORRELATION:
         if mirrored:
             raise InputError("the ride turns left where the track turns right: " + OPPOSITE_SIGN)
         if best.correlation > _ALIKE:
@@ -75,10 +75,10 @@ def match(motion: Motion, track: Track) -> Match:
             raise InputError(f"they have {common_s} s with too few bends in common to be sure: {_LONGER}")
         raise InputError(f"nowhere does the ride turn as the track does: {_OTHER}")
     others = [fit for fit in found if abs(fit.shift_s - best.shift_s) > AROUND_S]
-    if others and others[0].evidence > best.evidence - _LEAST_LEAD:
+    if others and others[0].evidence > best.evidence - LEAST_LEAD:
         far_s = abs(others[0].shift_s - best.shift_s)
         raise InputError(f"the track fits at two times, {far_s:.0f} s apart, as its bends are alike: {_LONGER}")
-    if abs(best.drift) > _MOST_DRIFT or apart(motion, steps, parts, best) > _MOST_APART:
+    if abs(best.drift) > MOST_DRIFT or apart(motion, steps, parts, best) > _MOST_APART:
         raise InputError(
             "the ride turns as the track does, but at other times: it is the same road on another day, or other bends "
             "that are alike"
@@ -97,13 +97,13 @@ _OTHER = "is it the track of another ride or another day?"
 
 
 def _check_turns(motion: Motion, steps: Course) -> None:
-    if motion.seconds < _LEAST_S:
-        raise InputError(f"the ride lasts {motion.seconds:.0f} s: at least {_LEAST_S:.0f} s with bends are needed")
+    if motion.seconds < LEAST_S:
+        raise InputError(f"the ride lasts {motion.seconds:.0f} s: at least {LEAST_S:.0f} s with bends are needed")
     moving_s = float((steps.end_s - steps.begin_s)[steps.good].sum())
-    if moving_s < _LEAST_S:
+    if moving_s < LEAST_S:
         raise InputError(
             f"the track moves for {moving_s:.0f} s only, faster than {SLOWEST_MPS} m/s and with a point at least every "
-            f"{LONGEST_S:.0f} s: {_LEAST_S:.0f} s are needed"
+            f"{LONGEST_S:.0f} s: {LEAST_S:.0f} s are needed"
         )
     yaw_dps = moving_mean(motion.rate_dps @ motion.up, round(1.0 / STEP_S))
     turned_deg = float(np.abs(yaw_dps[np.abs(yaw_dps) > 3.0]).sum()) * STEP_S
@@ -116,12 +116,12 @@ def _rough_shifts(motion: Motion, steps: Course) -> tuple[bool, list[float]]:
     of_track, track_good = _changes_of_track(steps)
     of_ride, ride_good = _changes_of_ride(motion)
     found, count = correlations(of_track, track_good, of_ride, ride_good)
-    found = np.where(count * _GRID_S >= _LEAST_S / 2.0, found, 0.0)
+    found = np.where(count * _GRID_S >= LEAST_S / 2.0, found, 0.0)
     likely = log_likelihood_ratio(found, count, _GRID_S / _SPAN_S)
     other = log_likelihood_ratio(-found, count, _GRID_S / _SPAN_S)
     found_at = [p for p in peaks(likely, round(_APART_S / _GRID_S), _CANDIDATES) if likely[p] > _WORTH * likely.max()]
     shifts = [(place - (len(of_ride) - 1)) * _GRID_S for place in found_at]
-    return bool(other.max() > _LEAST_EVIDENCE and other.max() > 2.0 * likely.max()), shifts
+    return bool(other.max() > LEAST_EVIDENCE and other.max() > 2.0 * likely.max()), shifts
 
 
 def _changes_of_track(steps: Course) -> tuple[Array, NDArray[np.bool_]]:

@@ -9,13 +9,11 @@ from numpy.typing import NDArray
 from .cells import TRACK
 from .csv_reader import cells_of
 from .log import FirmwareRow, firmware_rows
-from .table import Array
-
-_ROWS = ("time_us", "readings", *TRACK, "frozen")  # the arrays of n
+from .table import Array, Table
 
 
 @dataclass
-class Block:
+class Block(Table):
     """Some successive rows of a log, in the units of the firmware's modules.
 
     time_us (n): since the log's first sample. readings (n, 7): acceleration (3, g), temperature (C), rate (3, deg/s),
@@ -68,7 +66,7 @@ class Block:
             lines = self.lines[which]
         else:
             lines = [line for line, wanted in zip(self.lines, which.tolist()) if wanted]
-        return replace(self, lines=lines, **{name: getattr(self, name)[which] for name in _ROWS})
+        return replace(super().part(which), lines=lines)
 
     @property
     def measured(self) -> "Block":
@@ -82,5 +80,5 @@ def joined(first: Block, second: Block) -> Block:
         second,
         lines=first.lines + second.lines,
         own_times=first.own_times and second.own_times,
-        **{name: np.concatenate((getattr(first, name), getattr(second, name))) for name in _ROWS},
+        **{name: np.concatenate((rows, getattr(second, name))) for name, rows in first.columns().items()},
     )

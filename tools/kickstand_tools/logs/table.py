@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError, extra
+from ..signals import Array as Array
 
 if TYPE_CHECKING:
     from pandas import DataFrame
     from pyarrow import Schema
-
-Array = NDArray[np.float64]
 
 
 @dataclass
@@ -26,7 +25,9 @@ class Table:
         return {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
 
     def part(self, which: slice | NDArray[np.bool_]) -> Self:
-        """The samples of a slice, or those where an array of n is True."""
+        """The samples of a slice, or those where an array of n is True. The arrays of a slice are views of this
+        table's; what is no array belongs to both."""
+        # Table's columns are the fields; a Log's are named as in a CSV
         return replace(self, **{name: values[which] for name, values in Table.columns(self).items()})
 
     def to_pandas(self) -> "DataFrame":

@@ -8,7 +8,6 @@ from .physics.signals import band_noise
 
 POSE_S = 4.0
 _ASKEW_DEG = 4.0  # largest error of a box that is put on its side by hand
-_UP_IN_VEHICLE = np.array([0.0, 1.0, 0.0])
 _MOVE_DEG = 0.05  # rms lean of a bike that is held upright by hand
 
 

@@ -8,10 +8,10 @@ from typing import Any
 import click
 from kickstand_tools.cli.common import CHIP, JSON, PATH, warn
 from kickstand_tools.cli.simulated import LINES_S, PROFILE_NAMES, pose_options, seconds_option
-from kickstand_tools.emulator import esp32_library, image, native
+from kickstand_tools.cli.without_a_board import ready_emulator
 from kickstand_tools.errors import extra
 from kickstand_tools.output import check_directory, new_directory
-from kickstand_tools.progress import Bar, spinner
+from kickstand_tools.progress import Bar
 from kickstand_tools.simulation.physics.mount import MOUNTS
 from kickstand_tools.simulation.physics.road import CLASSES
 from kickstand_tools.simulation.profiles import MAIN, check_profile
@@ -100,12 +100,7 @@ def bands_command(
 @JSON
 def bench_command(seconds: int, chip: str, as_json: bool) -> None:
     """What the firmware costs on an emulated board: time, memory, flash."""
-    image.find()  # before anything else of the emulator is imported
-    if chip == "esp32":
-        esp32_library.find()
-    else:
-        with spinner("compiling the emulator, once"):
-            native.build()
+    ready_emulator(chip)
     from .bench.bench import bench, tables
 
     result = bench(seconds, chip)

@@ -19,18 +19,18 @@ from .vehicle import HANDLING, Receiver, drive_log, random_sensor
 # What is wrong with a vehicle, and in which share of the fleet; nothing is wrong with the others
 TROUBLES = {
     "moved-between": 0.06,  # the mount was turned between two logs
-    "moved-within": 0.06,  # or during one
+    "moved-within": 0.06,  # the mount was turned during a log
     "late": 0.03,  # the speed comes 2.6 s late
     "dead": 0.03,  # there is no speed at all
     "dies": 0.02,  # the receiver dies in the second log
     "km/h": 0.03,
     "circles": 0.02,  # it drives in circles: no straight braking
-    "garbage": 0.02,  # the first log is no text
+    "garbage": 0.02,  # the first log is not text
     "empty": 0.02,  # the first log has no byte
     "cut": 0.02,  # the end of the first log is missing
     "missing": 0.02,  # the first log is not there
 }
-# The right reasons (codes) for refusing a vehicle whose alignment cannot be known
+# The expected codes of the refusal where the alignment cannot be known; any one of them is right
 _REASONS = {
     "moved-between": "mount-moved",
     "moved-within": "mount-moved",
@@ -47,9 +47,9 @@ MATRIX = tuple(f"{row}_{axis}" for row in ("left", "up", "forward") for axis in 
 
 @dataclass
 class MadeVehicle:
-    """A vehicle of the fleet. trouble: a key of TROUBLES, or "". mounts: vehicle from sensor (3, 3): one, or two if the
-    mount moved. It then moved by moved_deg, moved_s after the begin of the log with the index moved_log (NaN: between
-    that log and the one before)."""
+    """A vehicle of the fleet. trouble: a key of TROUBLES, or "". mounts: rotation from sensor to vehicle axes (3, 3):
+    one, or two if the mount moved. It then moved by moved_deg, moved_s after the start of the log with the index
+    moved_log (NaN: between that log and the one before)."""
 
     name: str
     kind: str
@@ -63,7 +63,7 @@ class MadeVehicle:
 
     @property
     def reasons(self) -> str:
-        """The codes, one of which the vehicle's refusal has to have; "" where it has to be aligned."""
+        """Codes, separated by spaces, of which the refusal has to carry one; "" where it has to be aligned."""
         return _REASONS.get(self.trouble, "")
 
 
@@ -97,7 +97,7 @@ def make_fleet(
             vehicle.writers = []
             if progress:
                 progress(k + 1, len(troubles))
-        rows = [(v.name, path.relative_to(directory), _leans(v.kind)) for v in made for path in v.paths]
+        rows = [(v.name, path.relative_to(directory), _manifest_kind(v.kind)) for v in made for path in v.paths]
         write_table(directory / "MANIFEST.csv", ("vehicle", "path", "kind"), rows)
         write_table(directory / "TRUTH.csv", (*_COLUMNS, *MATRIX), (list(_truth(v)) for v in made))
     except OSError as error:
@@ -105,8 +105,8 @@ def make_fleet(
     return made
 
 
-def _leans(kind: str) -> str:
-    """The manifest's kind of a kind of vehicle: "car" for a bus too."""
+def _manifest_kind(kind: str) -> str:
+    """The kind written to the manifest: a bus counts as a car."""
     return kind if kind == "motorcycle" else "car"
 
 
@@ -170,9 +170,12 @@ def _writer(log: Log, broken: str) -> Callable[[Path], None]:
         if broken == "missing":
             path.unlink(missing_ok=True)
             return
-        content = {"empty": b"", "garbage": bytes(range(128, 256)) * 20, "cut": content[: len(content) * 9 // 10]}.get(
-            broken, content
-        )
+        if broken == "empty":
+            content = b""
+        elif broken == "garbage":
+            content = bytes(range(128, 256)) * 20
+        elif broken == "cut":
+            content = content[: len(content) * 9 // 10]
         path.write_bytes(content)
 
     return write

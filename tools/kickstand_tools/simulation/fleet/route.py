@@ -6,6 +6,7 @@ import numpy as np
 from kickstand.units import STANDARD_GRAVITY
 
 from ...logs.table import Array
+from ...signals.averages import moving_mean
 
 _SMOOTH_S = 0.6  # a driver changes the pedal and the steering wheel within about this
 _SLOPE_M, _SLOPE_DEG, _CAMBER_DEG = 120.0, 1.2, 0.7  # slope and camber have new values each 120 m, with these 1 sigma
@@ -51,16 +52,16 @@ def random_route(
     knots = np.array(legs.knots)
     time = np.arange(round(knots[-1, 0] * rate_hz)) / rate_hz
     width = max(2, round(_SMOOTH_S * rate_hz))
-    speed = _smoothed(np.interp(time, knots[:, 0], knots[:, 1]), width)
+    speed = moving_mean(np.interp(time, knots[:, 0], knots[:, 1]), width)
     place = np.searchsorted(knots[:, 0], time, side="right").clip(1, len(knots) - 1)
-    lateral = _smoothed(knots[place, 2], 2 * width)  # a leg's lateral acceleration stands in the knot at its end
+    lateral = moving_mean(knots[place, 2], 2 * width)  # a leg's lateral acceleration stands in the knot at its end
     yaw_rate = np.where(speed > 0.3, lateral / np.maximum(speed, 1.5), 0.0)
     distance = np.cumsum(speed) / rate_hz
     return Route(
         time,
         speed,
         np.gradient(speed, 1.0 / rate_hz),
-        _smoothed(yaw_rate, width),
+        moving_mean(yaw_rate, width),
         np.radians(_along(chance, distance, 0.0, _SLOPE_DEG, width)),
         np.radians(_along(chance, distance, chance.uniform(0.0, 1.5), _CAMBER_DEG, width)),
     )
@@ -127,15 +128,7 @@ class _Legs:
 
 def _along(chance: np.random.Generator, distance: Array, mean: float, sigma: float, width: int) -> Array:
     knots = np.arange(0.0, distance[-1] + 2.0 * _SLOPE_M, _SLOPE_M)
-    return _smoothed(np.interp(distance, knots, chance.normal(mean, sigma, len(knots))), width)
-
-
-def _smoothed(values: Array, width: int) -> Array:
-    """Moving mean over `width` samples, near the ends over those that there are."""
-    sums = np.cumsum(np.concatenate(([0.0], values)))
-    first = np.maximum(np.arange(len(values)) - width // 2, 0)
-    last = np.minimum(np.arange(len(values)) + (width + 1) // 2, len(values))
-    return (sums[last] - sums[first]) / (last - first)
+    return moving_mean(np.interp(distance, knots, chance.normal(mean, sigma, len(knots))), width)
 
 
 def balance_lean(route: Route) -> Array:

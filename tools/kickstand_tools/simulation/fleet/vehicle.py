@@ -82,7 +82,11 @@ def drive_log(
 
 
 def _readings(chance: np.random.Generator, kind: str, route: Route) -> tuple[Array, Array]:
-    """(n, 3) specific force (m/s2) and (n, 3) rate (rad/s) along the vehicle's left, up, forward."""
+    """(n, 3) specific force (m/s2) and (n, 3) rate (rad/s) along the vehicle's left, up, forward.
+
+    To first order in pitch and slope, which are under 5 degrees, and for a sensor on the axis about which the body
+    rolls: hundreds of vehicles are simulated in the time that physics/ takes for one.
+    """
     step_s = route.time[1]
     lateral = route.speed * route.yaw_rate
     if kind == "motorcycle":

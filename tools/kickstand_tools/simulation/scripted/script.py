@@ -96,7 +96,11 @@ def _glide(start, end, u, seconds):
 
 
 def yaw_rate_in_balance(lean, lift_mps2, speed_mps):
-    """Yaw rate in rad/s that balances a lean (rad) at this speed. lift_mps2: specific force away from the road."""
+    """Yaw rate about the road's normal, rad/s, that balances a lean (rad, > 0 to the right): negative in a right turn.
+    lift_mps2: specific force perpendicular to the road, m/s2.
+
+    The feet help below RIDING_MPS: there it is less than what balances the lean, and from WALKING_MPS down it is 0.
+    """
     if speed_mps <= WALKING_MPS:
         return 0.0
     share = 1.0
@@ -185,7 +189,7 @@ class Ride:
         if t_s > self.seconds:
             distance += after[1] * (t_s - self.seconds)
         lift = STANDARD_GRAVITY * cos(slope) + speed * slope_rate
-        yaw = yaw_rate_in_balance(lean, lift, speed) / cos(slope)
+        yaw = yaw_rate_in_balance(lean, lift, speed) / cos(slope)  # about the vertical
         return segment.phase, lean, lean_rate, speed, acceleration, yaw, slope, slope_rate, distance, engine
 
     def truth(self, t_s):
@@ -198,16 +202,6 @@ class Ride:
         state = self.state(t_s)
         speed, distance, engine = state[3], state[8], state[9]
         return shaken(body_motion(*state[1:8]), t_s, self.vibration_g, speed, distance, engine)
-
-
-class CarRide(Ride):
-    """The same ride by car: its yaw rate is that of a motorcycle with this lean, its body rolls a little outwards."""
-
-    ROLL_SHARE = -0.08  # of the lean that a motorcycle would have
-
-    def state(self, t_s):
-        state = super().state(t_s)
-        return state[:1] + (self.ROLL_SHARE * state[1], self.ROLL_SHARE * state[2]) + state[3:]
 
 
 def shaken(motion, t_s, vibration_g, speed_mps, distance_m, engine):

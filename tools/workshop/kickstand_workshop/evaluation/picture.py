@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from kickstand_tools.errors import InputError, extra
+from kickstand_tools.signals.averages import window_spreads
 from numpy.typing import NDArray
 
 ZOOM_S = 60.0
@@ -51,9 +52,7 @@ def zoom_start(time: NDArray, true: NDArray) -> float:
     n = max(int(np.searchsorted(time, time[0] + ZOOM_S)), 1)
     if n >= len(time):
         return float(time[0])
-    first, second = (np.cumsum(np.concatenate(([0.0], x))) for x in (true, true * true))
-    variance = (second[n:] - second[:-n]) / n - ((first[n:] - first[:-n]) / n) ** 2
-    return float(time[int(np.argmax(variance))])
+    return float(time[int(np.argmax(window_spreads(true, n)))])
 
 
 def _lines(axis, title: str, leans: dict[str, NDArray], whole: bool) -> None:
