@@ -214,7 +214,7 @@ def test_the_ring_of_rides_knows_what_the_firmware_takes():
 
 def test_plain_mpremote_needs_the_room_that_the_readme_says():
     """It puts each .py beside the .mpy, which stays."""
-    blocks = sum(update.most(len(data), BLOCK) for data in wanted(".py").values())
+    blocks = sum(update.most_blocks(len(data), BLOCK) for data in wanted(".py").values())
     assert 0.9 * 540 < blocks * BLOCK / 1024 <= 540
 
 
@@ -225,5 +225,5 @@ def test_a_file_takes_between_least_and_most(port, size):
     board.put({"/other": b""})
     free = board.free
     board.put({"/file": bytes(size)})
-    assert update.least(size, BLOCK) <= free - board.free <= update.most(size, BLOCK)
-    assert update.most(size, BLOCK) - update.least(size, BLOCK) == (size <= BLOCK // 8)
+    assert update.least_blocks(size, BLOCK) <= free - board.free <= update.most_blocks(size, BLOCK)
+    assert update.most_blocks(size, BLOCK) - update.least_blocks(size, BLOCK) == (size <= BLOCK // 8)

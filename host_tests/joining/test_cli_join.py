@@ -87,7 +87,7 @@ def test_the_logs_own_speed_stays(tmp_path, ride, track):
     api.write_log(tmp_path / "RIDE.csv", made)
     gpx = phone_tracks.write_gpx(tmp_path / "track.gpx", track)
     said = command.works("join", tmp_path / "RIDE.csv", gpx, "--out", tmp_path / "JOINED.csv").out
-    assert "the log's own speed stays" in said
+    assert "the log's own speed is kept" in said
     written = api.read_log(tmp_path / "JOINED.csv")
     assert np.array_equal(written.speed_mps, made.speed_mps, equal_nan=True)
     assert np.count_nonzero(np.isfinite(written.lat_deg)) > 150

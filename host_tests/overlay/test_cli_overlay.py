@@ -54,7 +54,7 @@ def test_a_transparent_clip(tmp_path, ride, lean, left_s, form, fps):
     begin = round(left_s, 2)
     arguments = "--from", begin, "--to", begin + 8.0, "--fps", fps, "--height", 480
     said = command.works("overlay", ride, *arguments, "--out", out).out
-    assert said == f"written: {out}, {8 * fps} pictures, 8.0 s, {fps} a second\n"
+    assert said == f"written: {out}, {8 * fps} frames, 8.0 s, {fps} per second\n"
     pictures = gopro.frames(out, "rgba")
     gauge = Gauge(480)
     assert pictures.shape == (8 * fps, gauge.height, gauge.width, 4)
@@ -75,7 +75,7 @@ def test_over_a_video(tmp_path, ride, left_s, fps):
     more = ("--fps", fps) if fps else ()
     said = command.works("overlay", ride, "--video", film, "--offset", offset, *more, "--out", out).out
     rate = fps or 10
-    assert f"{4 * rate} pictures, 4.0 s, {rate} a second" in said
+    assert f"{4 * rate} frames, 4.0 s, {rate} per second" in said
     pictures, before = gopro.frames(out), gopro.frames(film)
     assert len(pictures) == pytest.approx(4 * rate, abs=1)
     gauge, margin = Gauge(240), round(MARGIN * 240)

@@ -35,7 +35,7 @@ class Track:
 
 
 def track(part: Channels | Block) -> Track:
-    """The track of a block of a ride or of a log, or of a whole course."""
+    """The positions in one block of a ride or of a log, or in a whole course."""
     there = np.isfinite(part.lat_deg) & np.isfinite(part.lon_deg)
     return Track(part.t_s[there], part.lat_deg[there], part.lon_deg[there])
 

@@ -31,6 +31,7 @@ from ..logs.stretch import Stretch
 from ..output import check_output, write_whole
 from ..overlay.overlay import overlay
 from ..progress import Bar, spinner
+from ..refusals import WRONG_AXES
 from ..replay.replay import replay_to_csv
 from .common import (
     CALIBRATION,
@@ -55,8 +56,6 @@ from .common import (
     warning,
 )
 
-_WRONG_AXES = ("mirrored", "left-handed", "rates-misfit", "rates-in-radians")  # these are to be put right first
-
 
 @click.command()
 @file_argument("source", "FILE|DIR|ZIP")
@@ -64,12 +63,13 @@ _WRONG_AXES = ("mirrored", "left-handed", "rates-misfit", "rates-in-radians")  #
 @click.option(
     "--columns",
     metavar="t=NAME,ax=NAME,...",
-    help="Of another table: t, ax, ay, az, gx, gy, gz; also speed, lat, lon, temp. #3 is the third column.",
+    help="For a table of an unknown format: which column is t, ax, ay, az, gx, gy, gz; also speed, lat, lon, temp. "
+    "#3 means the third column.",
 )
 @click.option(
     "--units",
     metavar="a=UNIT,g=UNIT,...",
-    help="Of t, a (or ax, ay, az), g (or gx, gy, gz), speed; -UNIT turns the sign.",
+    help="Of t, a (or ax, ay, az), g (or gx, gy, gz), speed; a - before the unit reverses the sign.",
 )
 @from_to("Seconds from the start; negative: from the end.", "The same, for the end.")
 @RIGHT_HANDED
@@ -96,8 +96,9 @@ def import_command(
         click.echo("x is left, y up, z forward, as far as the logger was mounted so")
     beside = calibration_path(out)
     if beside.exists():
-        click.echo(f"{beside} is of an earlier ride: after the mount has moved, kickstand calibrate ride makes it anew")
-    elif not any(notice.code in _WRONG_AXES for notice in found.notices):
+        click.echo(f"{beside} belongs to an earlier ride.")
+        click.echo("If the sensor has been moved since, recalibrate: kickstand calibrate ride")
+    elif not any(notice.code in WRONG_AXES for notice in found.notices):
         click.echo(f"next: kickstand calibrate ride {out} --out {beside}")
         click.echo(f"      kickstand report {out}")
         click.echo(f"      kickstand plot {out} --out plots")
@@ -110,8 +111,8 @@ def import_command(
 def join_command(ride: Path, track: Path, out: Path) -> None:
     """Put the track of a phone or a watch to a ride of a board without GPS.
 
-    When the ride was is found out by how ride and track turn and speed up. The written log has the track's positions,
-    times and speeds. A track of another ride is refused.
+    The time offset is found by matching the turns and accelerations of ride and track. The written log has the track's
+    positions, times and speeds. A track of another ride is refused.
     """
     check_output(out, [ride, track])
     with spinner("reading the track"):
@@ -140,7 +141,7 @@ def compare_command(
 ) -> None:
     """How the leans of two devices on one bike agree: two recordings of one ride.
 
-    By two phones, or by a phone and the board. When the one was in the other is found out by how both turn.
+    For example two phones, or a phone and the board. Their clocks are aligned by matching their rates of rotation.
     """
     paths = [given or calibration_beside(log) for log, given in ((a, calibration_a), (b, calibration_b))]
     if picture is not None:
@@ -174,7 +175,7 @@ def replay_command(
     calibration = _given_or_beside(ride, calibration, out)
     parameters = read_calibration(calibration)
     with Bar("replaying") as bar:
-        count, notices = replay_to_csv(_part(ride, from_s, to_s), parameters, engine, out, bar.reach)
+        count, notices = replay_to_csv(_stretch(ride, from_s, to_s), parameters, engine, out, bar.reach)
     warn(ride, notices)
     if not parameters.aligned:
         warning(f"{calibration} is not aligned: this is the lean of the sensor, not of the bike")
@@ -191,7 +192,7 @@ def smooth_command(ride: Path, calibration: Path | None, from_s: float | None, t
     """Find the lean afterwards, from the whole ride, each sample with its standard deviation."""
     parameters = read_calibration(_given_or_beside(ride, calibration, out))
     with Bar("smoothing") as bar:
-        count, notices = smooth_to_csv(_part(ride, from_s, to_s), parameters, out, bar.reach)
+        count, notices = smooth_to_csv(_stretch(ride, from_s, to_s), parameters, out, bar.reach)
     warn(ride, notices)
     click.echo(f"written: {out}, {count} samples")
 
@@ -204,7 +205,7 @@ def smooth_command(ride: Path, calibration: Path | None, from_s: float | None, t
 @OUT
 @RIGHT_HANDED
 def export_command(ride: Path, form: str, calibration: Path | None, live: bool, out: Path) -> None:
-    """Write a ride as maps (gpx), Circuit Tools (vbo), RaceChrono or data frames (parquet, csv) open it."""
+    """Export a ride for maps (gpx), Circuit Tools (vbo), RaceChrono, or data frames (parquet, csv)."""
     check_output(out, [ride, calibration or calibration_path(ride)])
     opened, notices = _opened(ride, calibration, live)
     with Bar("exporting") as bar:
@@ -223,7 +224,7 @@ def export_command(ride: Path, form: str, calibration: Path | None, live: bool, 
 def report_command(
     ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, live: bool, as_json: bool
 ) -> None:
-    """A ride in a page: maxima, time at large leans, and each stop as a brake test has it."""
+    """Summarise a ride on one page: maxima, time at large leans, and each stop evaluated as a brake test."""
     opened, notices = _opened(ride, calibration, live, from_s, to_s)
     with Bar("reading") as bar:
         seen = overview(opened, bar.reach)
@@ -290,10 +291,12 @@ def cut_command(log: Path, from_s: float | None, to_s: float | None, out: Path) 
     help="The ride's time at the video's first picture: 12.5 if the video begins 12.5 s after the ride, -3 if 3 s "
     "before it. Not needed for a GoPro on the bike.",
 )
-@click.option("--fps", type=click.Choice(["30", "60"]), help="Pictures a second; if not given, the video's, or 30.")
+@click.option("--fps", type=click.Choice(["30", "60"]), help="Frames per second; if not given, the video's, or 30.")
 @from_to("Only from this time of the ride on: 90 or 1:30.", "Only up to there; negative: from the end.")
 @click.option(
-    "--height", type=click.IntRange(240, 4320), help="Of the video that a clip is for, pixels; if not given, 1080."
+    "--height",
+    type=click.IntRange(240, 4320),
+    help="Height in pixels of the video that the clip is meant for; if not given, 1080.",
 )
 @click.option("--mph", is_flag=True, help="Miles an hour instead of kilometres.")
 @live
@@ -315,7 +318,7 @@ def overlay_command(
             f"the video begins at {made.offset_s:.2f} s of the ride, as the camera's gyro has it (correlation "
             f"{made.correlation:.2f}): --offset {made.offset_s:.2f}"
         )
-    click.echo(f"written: {out}, {made.pictures} pictures, {made.end_s - made.begin_s:.1f} s, {made.fps:g} a second")
+    click.echo(f"written: {out}, {made.pictures} frames, {made.end_s - made.begin_s:.1f} s, {made.fps:g} per second")
 
 
 def _opened(
@@ -324,7 +327,7 @@ def _opened(
     """A ride, and notices about its import. What an app has exported is imported and, where no calibration is given or
     beside it, aligned by itself; a line says so."""
     if not is_of_an_app(source):
-        return open_ride(_part(source, from_s, to_s), calibration, smoothed=not live), []
+        return open_ride(_stretch(source, from_s, to_s), calibration, smoothed=not live), []
     with spinner("importing"):
         found = import_recording(source)
     said = f"{source}: imported from {found.app}, {len(found.log.t_s)} samples, {found.rate_hz:.0f} a second"
@@ -336,10 +339,10 @@ def _opened(
         known = fit.calibration
         said += f"; aligned by its bends, {known_to(fit)}"
     click.echo(said, err=True)
-    return open_ride(_part(found.log, from_s, to_s), known, smoothed=not live), found.notices
+    return open_ride(_stretch(found.log, from_s, to_s), known, smoothed=not live), found.notices
 
 
-def _part(log: Path | Log, from_s: float | None, to_s: float | None) -> Source:
+def _stretch(log: Path | Log, from_s: float | None, to_s: float | None) -> Source:
     return log if from_s is None and to_s is None else Stretch(log, from_s, to_s)
 
 
@@ -356,9 +359,9 @@ def _pairs(text: str, option: str) -> dict[str, str]:
     for part in text.split(",") if text.strip() else []:
         key, equals, value = (word.strip() for word in part.partition("="))
         if not key or not equals or not value:
-            raise InputError(f"{option}: {part!a} is not NAME=VALUE; commas part the pairs")
+            raise InputError(f"{option}: {part!a} is not NAME=VALUE; separate the pairs with commas")
         if key in pairs:
-            raise InputError(f"{option}: {key!a} is there twice")
+            raise InputError(f"{option}: {key!a} is given twice")
         pairs[key] = value
     return pairs
 
@@ -386,4 +389,4 @@ def _joined_lines(joined: Joined) -> Iterator[str]:
     if abs(found.drift) * found.common_s > 3.0 * found.sigma_s:  # less is not known from a ride of this length
         yield f"the ride's clock is {abs(found.drift) * 1e6:.0f} ppm {'slow' if found.drift > 0.0 else 'fast'}"
     if joined.own_speed:
-        yield "the log's own speed stays"
+        yield "the log's own speed is kept"

@@ -13,16 +13,16 @@ from ..errors import InputError
 from .board_files import BoardFiles, fingerprint
 from .firmware_files import CONFIG, MAIN, MODULE_ENDINGS, PACKAGE, unfinished
 
-FOLDER = 2
-SPARE = 4  # spare blocks: a folder may outgrow its two, and littlefs writes a new block before it frees a worn one
+FOLDER_BLOCKS = 2
+SPARE_BLOCKS = 4  # a folder may outgrow its two, and littlefs writes a new block before it frees a worn one
 _POINTER = 4
 
 
 class NoRoom(InputError):
-    """An update does not fit, even with all removed that it replaces."""
+    """An update does not fit, even after removing everything that it replaces."""
 
 
-def most(size: int, block: int) -> int:
+def most_blocks(size: int, block: int) -> int:
     """Most flash blocks that a file of this many bytes may take."""
     count = 1
     while size > block * count - _POINTER * (2 * (count - 1) - (count - 1).bit_count()):
@@ -30,18 +30,18 @@ def most(size: int, block: int) -> int:
     return count
 
 
-def least(size: int, block: int) -> int:
+def least_blocks(size: int, block: int) -> int:
     """Flash blocks that are freed for certain when a file of this many bytes is removed."""
-    return most(size, block) if size > block // 8 else 0
+    return most_blocks(size, block) if size > block // 8 else 0
 
 
 @dataclass(frozen=True)
 class Update:
     """The steps of an update, in this order. On a board that is up to date there is nothing to remove, make or copy.
 
-    remove: files, main.py the first.  remove_folders: empty by then.  make_folders.  copy: contents by path, main.py
-    the last.  obsolete: files in `remove` that belong to no module of this version.  keep: files that stay unchanged.
-    config_differs: the rider's config.py, which is kept, is not this version's.
+    remove: files, main.py first.  remove_folders: already empty by then.  make_folders: folders to create.
+    copy: contents by path, main.py last.  obsolete: files in `remove` that belong to no module of this version.
+    keep: files that stay unchanged.  config_differs: the rider's config.py, which is kept, is not this version's.
     """
 
     remove: list[str]
@@ -74,7 +74,7 @@ def plan(wanted: dict[str, bytes], board: BoardFiles, replace_config: bool) -> U
     in_order = dict.fromkeys([MAIN, *stale, *copy] if copy else [])
     modules = {_module(path) for path in wanted}
     return Update(
-        remove=[path for path in in_order if path in board.files and path != CONFIG],  # it is the rider's own
+        remove=[path for path in in_order if path in board.files and path != CONFIG],  # the config is the rider's own
         remove_folders=sorted(empty, reverse=True),  # the inner ones first
         make_folders=sorted(folders - board.folders),
         copy=copy,
@@ -88,10 +88,10 @@ def needed_blocks(update: Update, board: BoardFiles) -> int:
     """Number of flash blocks that have to be free for an update."""
     if not update.copy:
         return 0
-    takes = sum(most(len(data), board.block) for data in update.copy.values())
-    frees = sum(least(board.files[path][0], board.block) for path in update.remove)
+    takes = sum(most_blocks(len(data), board.block) for data in update.copy.values())
+    frees = sum(least_blocks(board.files[path][0], board.block) for path in update.remove)
     folders = len(update.make_folders) - len(update.remove_folders)
-    return max(0, takes - frees + FOLDER * folders) + SPARE
+    return max(0, takes - frees + FOLDER_BLOCKS * folders) + SPARE_BLOCKS
 
 
 def refuse_without_room(update: Update, board: BoardFiles) -> None:
@@ -99,17 +99,11 @@ def refuse_without_room(update: Update, board: BoardFiles) -> None:
     blocks = needed_blocks(update, board)
     if blocks <= board.free_blocks:
         return
-    # Firmware with its modules still in one folder has to be updated before its rides can be pulled.
-    pull = board.has_rides and f"{PACKAGE}/rides" in board.folders
-    raise NoRoom(
-        f"not enough room on the board: {blocks * board.block // 1000} kB needed, "
-        f"{board.free_blocks * board.block // 1000} kB free: "
-        + (
-            "pull the rides with kickstand pull --delete, then flash again"
-            if pull
-            else "remove files of your own from it"
-        )
-    )
+    remedy = "remove files of your own from it"
+    if board.has_rides and f"{PACKAGE}/rides" in board.folders:  # firmware up to 0.4 has to be updated before that
+        remedy = "pull the rides with kickstand pull --delete, then flash again"
+    needed_kb, free_kb = (count * board.block // 1000 for count in (blocks, board.free_blocks))
+    raise NoRoom(f"not enough room on the board: {needed_kb} kB needed, {free_kb} kB free: {remedy}")
 
 
 def _is_module(path: str) -> bool:

@@ -9,6 +9,7 @@ from rp2040py.peripherals.ssi import (
     CMD_BLOCK_ERASE,
     CMD_PAGE_PROGRAM,
     CMD_SECTOR_ERASE,
+    FLASH_BLOCK_SIZE,
     FLASH_PAGE_SIZE,
     FLASH_SECTOR_SIZE,
     RPSSI,
@@ -20,7 +21,7 @@ PROGRAM_MS = 0.5  # for a page of 256 bytes
 
 
 class PowerCut(Exception):
-    """The supply is gone."""
+    """The supply is gone. Raised by TimedFlash in the operation that cut_power() has chosen; Pico.run() catches it."""
 
 
 class TimedFlash(RPSSI):
@@ -61,5 +62,5 @@ class TimedFlash(RPSSI):
             for i in range(round(len(page) * self._cut_share)):
                 flash[address + i] &= page[i]
         else:
-            count = round(FLASH_SECTOR_SIZE * self._cut_share)
+            count = round((FLASH_SECTOR_SIZE if opcode == CMD_SECTOR_ERASE else FLASH_BLOCK_SIZE) * self._cut_share)
             flash[address : address + count] = b"\xff" * count

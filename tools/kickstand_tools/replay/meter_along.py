@@ -30,7 +30,7 @@ class MeterAlong(Replay):
         return force, rate
 
     def after_each(self, block: Block, force: list[Array], rate: list[Array]) -> Iterator[LeanMeter]:
-        """The meter after each sample of the block. force, rate: from in_vehicle()."""
+        """The meter, always the same one, after each sample of the block. force, rate: from in_vehicle()."""
         # Tuples that live for one sample: Python's garbage collector would track lists of lists.
         forces, rates = (zip(*(axis.tolist() for axis in vector)) for vector in (force, rate))
         return self.follow(zip(block.time_us.tolist(), forces, rates, block.speed_mps.tolist()))
@@ -57,12 +57,13 @@ class MeterAlong(Replay):
 
 
 def static_lean_deg(left: Array, up: Array) -> Array:
-    """The lean of a standing bike by (21) with a sign, degrees, > 0 to the right."""
+    """The lean of a standing bike by Nicolae's equation (21) with a sign, degrees, > 0 to the right."""
     return np.degrees(np.arctan2(left, up))
 
 
 def formula_lean_deg(left: Array, up: Array, yaw_rate: Array) -> Array:
-    """(25)-(26), Nicolae's lean of each reading alone, degrees, > 0 to the right; as kickstand.lean.formula."""
+    """Nicolae's equations (25)-(26), the lean of each reading alone, degrees, > 0 to the right; as
+    kickstand.lean.formula."""
     square = left * left + up * up
     size = np.sqrt(np.maximum(0.0, square - 1.0))
     sine = (left - np.sign(yaw_rate) * size * up) / np.maximum(square, TOO_SMALL)

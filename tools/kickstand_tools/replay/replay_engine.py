@@ -41,8 +41,8 @@ class ReplayMeter(LeanMeter):
     """The firmware's meter for single readings in g and deg/s; on a board it takes sums of counts."""
 
     def use(self, calibration, posed=False):
-        """Take a calibration: see LeanMeter.use(). (18)-(20) and (15) are multiplied out here: 18 products a
-        reading."""
+        """Take a calibration: see LeanMeter.use(). Nicolae's equations (18)-(20) and (15) are multiplied out here: 18
+        products a reading."""
         LeanMeter.use(self, calibration, posed)
         r, slope = calibration.vehicle_from_sensor, calibration.accel_slope
         self._force_offset, self._rate_offset = [0.0] * 3, [0.0] * 3
@@ -56,7 +56,7 @@ class ReplayMeter(LeanMeter):
         the first."""
         force, rate = [0.0] * 3, [0.0] * 3
         self.in_vehicle(reading, force, rate)
-        self.follow(force, rate, dt_us)
+        self.update_in_vehicle(force, rate, dt_us)
 
     def in_vehicle(self, reading, force, rate):
         """Put the force (g) and the rate (rad/s) of a reading into force (3) and rate (3). A reading may also be seven
@@ -72,7 +72,7 @@ class ReplayMeter(LeanMeter):
         rate[1] = m[3] * x + m[4] * y + m[5] * z + c[1]
         rate[2] = m[6] * x + m[7] * y + m[8] * z + c[2]
 
-    def follow(self, force, rate, dt_us):
+    def update_in_vehicle(self, force, rate, dt_us):
         """update() with force and rate from in_vehicle(), three numbers each."""
         self.force, self.rate = force, rate
         self._follow(dt_us)
@@ -90,18 +90,18 @@ class Replay:
         self._before_us = since_us
 
     def follow(self, samples):
-        """Yield the meter after each sample: time_us, force and rate from in_vehicle() (3 each), speed in m/s, which
-        is NaN or negative where there is no new one."""
+        """Yield the meter after each sample, always the same one. samples: tuples (time_us, force, rate, speed_mps),
+        force and rate from in_vehicle(), 3 each; the speed is NaN or negative where there is no new one."""
         meter = self.meter
         for time_us, force, rate, speed_mps in samples:
             if speed_mps >= 0.0:
                 meter.measure_speed(speed_mps)
-            meter.follow(force, rate, 0 if self._before_us is None else time_us - self._before_us)
+            meter.update_in_vehicle(force, rate, 0 if self._before_us is None else time_us - self._before_us)
             self._before_us = time_us
             yield meter
 
     def take(self, time_us, reading, speed_mps=NO_SPEED):
-        """The meter after one sample: a reading of 7 in the chip's order (g, C, deg/s)."""
+        """The meter, always the same one, after a sample: a reading of 7 in the chip's order (g, C, deg/s)."""
         force, rate = [0.0] * 3, [0.0] * 3
         self.meter.in_vehicle(reading, force, rate)
         return next(self.follow(((time_us, force, rate, speed_mps),)))

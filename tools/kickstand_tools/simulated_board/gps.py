@@ -23,7 +23,9 @@ def sentence(body):
 
 
 class Gps:
-    """speed(t_s): of the vehicle, m/s.  hz: fixes a second.  latency_s: from a fix to its first byte.  place(t_s):
+    """It sends by itself, as an event of the clock.
+
+    speed(t_s): of the vehicle, m/s.  hz: fixes a second.  latency_s: from a fix to its first byte.  place(t_s):
     latitude and longitude, degrees north and east; None: it stays where it is.
 
     kinds: which sentences with a speed it sends.  talker: their first letters, the satellite system.
@@ -52,7 +54,7 @@ class Gps:
         self._receive = receive
 
     def disconnect(self):
-        """Stop calling receive()."""
+        """Stop calling receive(): fixes go on, and their bytes are lost."""
         self._receive = None
 
     def _has(self, kind):

@@ -12,9 +12,10 @@ from ...signals.averages import integral, smoothed
 from ...signals.lag import best_lag
 from ..channels import Channels
 
-SMOOTH_S = 0.2  # smoothing of the acceleration, which times the delay is the error of a late speed
+SMOOTH_S = 0.2  # smoothing of the acceleration: delay x acceleration is the error of a late speed
 LEAD_S = 4.0  # time before the braking in which the log's speed is used for the fit
 DELAYS_S = np.arange(-0.5, 1.51, 0.05)  # delays of the speed that are tried
+# A delay is looked for in at least so many speeds, a second apart, whose changes have at least this standard deviation
 ENOUGH_SPEEDS, ENOUGH_CHANGE_MPS = 30, 0.5
 
 # One standard deviation of each fitted parameter and of a speed
@@ -23,7 +24,7 @@ SIGMA_WALK_MPS2, KNOT_S = 0.1, 0.5  # per square root of a second
 
 
 def speed_delay_s(ride: Channels) -> float:
-    """The delay of the log's speed (such as a satellite receiver's), at which its changes fit the force best.
+    """The delay at which the changes of the log's speed best match the integrated longitudinal force, s.
 
     0 if the ride does not show it.
     """
@@ -51,9 +52,13 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
     part: the ride up to a standstill; speed, acceleration (n): integrated and measured, m/s and m/s2. begin: index at
     which braking begins. delay_s: delay of the log's speed.
 
-    Least squares with a prior: log = (1 + scale) v + integral of slope to the end - delay dv/dt. The slope is the part
-    of the force by hill and dive that the gyro has not measured: a random walk back in time, from nearly 0 at
-    standstill.
+    Least squares with a prior. The log's speed at the time t is
+
+        u(t) = (1 + k) v(t) + integral of b from t to the end - d a(t)
+
+    with the speed v and the acceleration a as given, the error of scale k, the error b of the acceleration, m/s2, and
+    the error d of the delay, s. b comes from hill and dive that the gyro has not measured: a random walk back in time,
+    from nearly 0 at standstill, linear between knots (hat functions, the linear B-splines, are its basis).
     """
     time = part.t_s
     values = np.flatnonzero(~np.isnan(part.speed_mps))
@@ -67,13 +72,19 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
     pushed = pushed[-1] - pushed  # from each sample to the end
     terms = np.column_stack((speed, pushed, -smoothed(acceleration, time, SMOOTH_S)))[wanted]
     error = part.speed_mps[values] - speed[wanted]
-    prior = np.zeros((len(knots) + 2, len(knots) + 2))
-    prior[0, 0], prior[-1, -1] = 1.0 / SIGMA_SCALE, 1.0 / SIGMA_DELAY_S
-    prior[1, 1] = 1.0 / SIGMA_SLOPE_MPS2
-    for k in range(2, len(knots) + 1):
-        prior[k, k], prior[k, k - 1] = np.array([1.0, -1.0]) / (SIGMA_WALK_MPS2 * KNOT_S**0.5)
+    prior = _prior(len(knots))
     weighted = np.vstack((terms / SIGMA_SPEED_MPS, prior))
     known = np.concatenate((error / SIGMA_SPEED_MPS, np.zeros(len(prior))))
     found = np.linalg.lstsq(weighted, known, rcond=None)[0]
     scale, slope = 1.0 + found[0], found[1:-1]
     return scale * speed + pushed @ slope
+
+
+def _prior(knots: int) -> Array:
+    """(knots + 2, knots + 2): times the unknowns k, b at each knot from the end on, d it is expected to be 0 +- 1."""
+    prior = np.zeros((knots + 2, knots + 2))
+    prior[0, 0], prior[-1, -1] = 1.0 / SIGMA_SCALE, 1.0 / SIGMA_DELAY_S
+    prior[1, 1] = 1.0 / SIGMA_SLOPE_MPS2
+    for k in range(2, knots + 1):
+        prior[k, k], prior[k, k - 1] = np.array([1.0, -1.0]) / (SIGMA_WALK_MPS2 * KNOT_S**0.5)
+    return prior

@@ -4,7 +4,7 @@ Sources: data sheets of the chips; mpconfigboard.h of each board in ports/rp2/bo
 MicroPython.
 """
 
-# sys.implementation._machine, by a short name
+# By a short name, what sys.implementation._machine says
 MACHINES = {
     "pico": "Raspberry Pi Pico with RP2040",
     "pico w": "Raspberry Pi Pico W with RP2040",
@@ -19,22 +19,26 @@ MACHINES = {
     "s2": "Generic ESP32S2 module with ESP32-S2",
     "s2 mini": "LOLIN_S2_MINI with ESP32-S2FN4R2",
     "s3": "Generic ESP32S3 module with ESP32-S3",
-    "s3 of 1.25": "Generic ESP32S3 module with ESP32S3",
+    "s3 of 1.25": "Generic ESP32S3 module with ESP32S3",  # as MicroPython 1.25 says it
     "c3": "ESP32C3 module with ESP32-C3",
     "c6": "ESP32C6 module with ESP32-C6",
     "h2": "ESP32H2 module with ESP32-H2",
 }
+# (first, last) GPIO numbers that machine.Pin accepts, of the classic ESP32 ("") and of the others by their names' ends
+_ESP32_PINS = {
+    "": ((0, 23), (25, 27), (32, 39)),
+    "S2": ((0, 21), (33, 46)),
+    "S3": ((0, 21), (33, 48)),
+    "C3": ((0, 10), (18, 21)),
+    "C6": ((0, 23),),
+    "H2": ((0, 5), (8, 14), (22, 27)),
+}
 
 
 def pins_of(machine):
-    """The GPIO numbers that MicroPython on this machine has a Pin for: on a classic ESP32 also those of its flash."""
-    chip = _chip(machine)
-    if chip.startswith("RP2"):
-        return frozenset(range(30))
-    for kind, ranges in _ESP32_PINS.items():
-        if chip.startswith("ESP32" + kind):
-            return frozenset(pin for first, last in ranges for pin in range(first, last + 1))
-    pins = frozenset(pin for first, last in _CLASSIC_PINS for pin in range(first, last + 1))
+    """The GPIO numbers that machine.Pin accepts on this board: on a classic ESP32 also those of its flash."""
+    ranges = ((0, 29),) if _chip(machine).startswith("RP2") else _ESP32_PINS[_kind(machine)]
+    pins = frozenset(pin for first, last in ranges for pin in range(first, last + 1))
     return pins - {16, 17} if "SPIRAM" in machine else pins
 
 
@@ -60,19 +64,14 @@ def has_bluetooth(machine):
 
 
 def _is_classic(machine):
-    chip = _chip(machine)
-    return chip.startswith("ESP32") and not any(chip.startswith("ESP32" + kind) for kind in _ESP32_PINS)
+    return _chip(machine).startswith("ESP32") and not _kind(machine)
+
+
+def _kind(machine):
+    """The key in _ESP32_PINS."""
+    kind = _chip(machine)[5:7]
+    return kind if kind in _ESP32_PINS else ""
 
 
 def _chip(machine):
     return machine[machine.rindex(" with ") + 6 :].replace("-", "")
-
-
-_CLASSIC_PINS = ((0, 23), (25, 27), (32, 39))
-_ESP32_PINS = {
-    "S2": ((0, 21), (33, 46)),
-    "S3": ((0, 21), (33, 48)),
-    "C3": ((0, 10), (18, 21)),
-    "C6": ((0, 23),),
-    "H2": ((0, 5), (8, 14), (22, 27)),
-}
