@@ -18,8 +18,8 @@ from ..signals import Array
 from ..signals.lag import best_lag
 from .cells import LogCells
 
-# Usual forces, g: smaller ones are without gravity (even a pose with an offset of 0.6 g has more), larger ones in m/s2
-LEAST_G, MOST_G = 0.4, 5.0
+LEAST_G = 0.4  # a smaller median force is without gravity; even a pose with an offset of 0.6 g has more
+MPS2_G = 5.0, 20.0  # a median force between these is in m/s2; larger ones are no readings, and are left out later
 MILLISECONDS_US = 4e6  # samples that far apart have times in ms that were read as s: 250 a second, or fewer
 # Largest ratio of the observed change of speed to what the force explains: knots give 1.94, speeds in m/s at most 1.1
 MOST_RATIO = 1.5
@@ -39,7 +39,7 @@ def check_units(name: str, time_us: NDArray[np.int64], accel_g: Array) -> None:
         raise InputError(
             f"{said}: gravity has been taken off, and without it there is no lean; record the acceleration with gravity"
         )
-    if usual_g > MOST_G:
+    if MPS2_G[0] < usual_g < MPS2_G[1]:
         raise InputError(f"{said}: they look like m/s2, their unit has to be g (9.80665 m/s2)")
     if len(time_us) > 1 and (time_us[-1] - time_us[0]) / (len(time_us) - 1) >= MILLISECONDS_US:
         raise InputError(f"{name}: seconds between samples: is t_s in milliseconds?")
