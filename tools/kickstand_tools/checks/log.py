@@ -2,8 +2,10 @@
 
 from typing import TYPE_CHECKING
 
+import numpy as np
 from kickstand.errors import Notice
 
+from ..logs.cells import MOST_DPS, MOST_G
 from ..refusals import RefusedInput
 from . import mount
 from .bends import bends
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
     from ..logs.block import Block
     from ..logs.log import Log
 
+_LIMITS = np.array(3 * [MOST_G] + [np.inf] + 3 * [MOST_DPS])  # of readings; a log made in Python may have larger ones
 _AGAIN_S = 20.0  # while a log is read, the unit of its speed is checked again after each such time of the log
 
 
@@ -31,6 +34,8 @@ class Checks:
     def add(self, part: "Block | Log") -> None:
         """Take a part of the log without frozen readings. Raises RefusedInput as soon as it is sure that the speed is
         not in m/s."""
+        there = ~np.any(np.abs(part.readings) > _LIMITS, axis=1)
+        part = part if np.all(there) else part.part(there)  # one such reading would outweigh a ride
         readings = part.readings
         self._table.add(part.t_s, readings[:, :3], readings[:, 4:], part.speed_mps, part.lat_deg, part.lon_deg)
         if len(part.t_s) and part.t_s[-1] > self._judged_s + _AGAIN_S:
