@@ -162,6 +162,17 @@ def test_a_report_says_what_it_costs_and_what_to_do(scripted, name, degrees, wor
     assert cost == pytest.approx(most, abs=0.05)
 
 
+def test_an_alignment_is_good_where_all_of_it_is_known_and_cheap(scripted):
+    seen = overview(open_ride(scripted, with_calibration(scripted, "yaw", 2.6)))
+    assert report.words(seen).alignment.startswith("Alignment: good.")
+    dear = dataclasses.replace(seen.quality, pitch_deg=2.0)  # 0.14 and 0.17 degrees of lean
+    for quality in (dataclasses.replace(seen.quality, yaw_deg=None), dear):
+        said = report.words(dataclasses.replace(seen, quality=quality)).alignment
+        assert said.startswith("Alignment: it seems off by ")
+    off = dataclasses.replace(seen, notices=[*seen.notices, Notice("pose-off", 2.0)])
+    assert not report.words(off).alignment.startswith("Alignment: good")
+
+
 def test_a_force_at_rest_that_is_not_1_g_asks_for_the_six_positions(scripted):
     cal = with_calibration(scripted, "yaw", 0.0, accel_slope=[1.05] * 3)
     said = report.words(overview(open_ride(scripted, cal)), remedies.PAGE).alignment

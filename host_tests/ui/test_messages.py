@@ -9,7 +9,6 @@ from kickstand import console, errors
 from kickstand.errors import AlignmentError, Notice, Refusal, SettingsError
 from kickstand.ui import messages
 from kickstand_tools import firmware_path, refusals
-from kickstand_tools.estimation import remarks
 
 CLASSES = {name for name in vars(errors) if name[0].isupper()}
 # Codes that a name or a call gives, not a text beside the class
@@ -83,10 +82,6 @@ def test_each_code_of_the_tools_has_a_sentence_in_one_table():
     tables = refusals._AXES, refusals._MOUNT, refusals._OTHERS
     assert len(refusals._WORDS) == sum(len(table) for table in tables)
     assert set(codes(with_tools=True)) - set(codes()) - worded(console._SENTENCES) <= set(refusals._WORDS)
-
-
-def test_what_keeps_the_smoother_from_remarks_is_of_these_kinds():
-    assert remarks.CAUSES == refusals.WRONG_AXES | refusals.WRONG_MOUNT
 
 
 def test_no_sentence_is_left_over():

@@ -176,13 +176,23 @@ def _alignment(seen: Overview, remedies: Remedies) -> str:
         # swapped poses exchange forward and backward too
         swapped = far and (seen.exchanged or not seen.has_speed)
         costs = "" if seen.ride.car or seen.exchanged else _costs(lean_cost(quality), seen.has_speed, remedies)
-        if costs or far or seen.ride.car or seen.exchanged:
-            said = f"Alignment: it seems off by {', '.join(known)}"
-            said += ": were the poses swapped?" if swapped else ": was it held upright?" if far else "."
-            said += costs
-        else:
+        said = f"Alignment: it seems off by {', '.join(known)}"
+        if _good(seen):
             said = f"Alignment: good. It seems off by {', '.join(known)}, which costs less than {COSTS_DEG}° of lean."
+        else:
+            said += ": were the poses swapped?" if swapped else ": was it held upright?" if far else "."
+        said += costs
     return said + _gravity(quality.gravity_g, remedies)
+
+
+def _good(seen: Overview) -> bool:
+    """True if the ride shows that the errors of a motorcycle's alignment together cost less than COSTS_DEG of lean."""
+    cost = lean_cost(seen.quality)
+    if seen.ride.car or seen.exchanged or cost.roll_deg is None or cost.yaw_deg is None:
+        return False
+    together = cost.roll_deg + cost.yaw_deg + (cost.pitch_deg or 0.0)
+    upright = abs(seen.quality.roll_deg or 0.0) <= SWAPPED_DEG
+    return together < COSTS_DEG and upright and all(notice.code != "pose-off" for notice in seen.notices)
 
 
 def _gravity(found_g: float | None, remedies: Remedies) -> str:

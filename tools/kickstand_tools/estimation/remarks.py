@@ -6,14 +6,13 @@ import numpy as np
 from kickstand.errors import Notice
 from numpy.typing import NDArray
 
+from ..refusals import WRONG_AXES, WRONG_MOUNT
 from ..signals import Array
 
 DOUBTFUL = 0.2  # share of the riding; more is remarked
 # Largest lean in which a bike is in balance on straights, if the upright pose was right and no luggage sits on one side
 POSE_DEG = 1.8
-# Each of these remarks is a reason why accelerations do not fit a bike: then nothing is said of the mount or the pose
-CAUSES = {"up-off", "forward-off", "forward-exchanged", "another-mount", "upside-down"}
-CAUSES |= {"left-handed", "mirrored", "rates-misfit", "rates-in-radians"}
+CAUSES = WRONG_AXES | WRONG_MOUNT  # reasons why accelerations do not fit a bike: then nothing is said of the pose
 
 
 class SmoothedRemarks:

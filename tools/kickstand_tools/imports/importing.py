@@ -68,7 +68,7 @@ def import_recording(
 
     Known are the exports of the apps that `kickstand import --help` names. Of any other table columns says which is
     which ({"t": "time", "ax": "accX", ...}: t, ax, ay, az, gx, gy, gz, and speed, lat, lon, temp where there are), and
-    units in which unit ({"a": "m/s2", "g": "rad/s", "speed": "km/h"}; a - before a unit turns the sign). start_s,
+    units in which unit ({"a": "m/s2", "g": "rad/s", "speed": "km/h"}; a - before a unit reverses the sign). start_s,
     end_s: the stretch to take, from the recording's own start. Raises InputError.
 
     >>> import pathlib, tempfile

@@ -81,7 +81,8 @@ def fitted_speed(part: Channels, begin: int, speed: Array, acceleration: Array, 
 
 
 def _prior(knots: int) -> Array:
-    """(knots + 2, knots + 2): times the unknowns k, b at each knot from the end on, d it is expected to be 0 +- 1."""
+    """(knots + 2, knots + 2): its product with the unknowns (k, b at each knot from the end on, d) is expected to be 0,
+    with a standard deviation of 1."""
     prior = np.zeros((knots + 2, knots + 2))
     prior[0, 0], prior[-1, -1] = 1.0 / SIGMA_SCALE, 1.0 / SIGMA_DELAY_S
     prior[1, 1] = 1.0 / SIGMA_SLOPE_MPS2

@@ -12,7 +12,7 @@ export const GROUPS = [
     ["VEHICLE", "Vehicle", [['"motorcycle"', "motorcycle"], ['"car"', "car: anything that does not lean"]]],
     ["SPEED", "Speed comes from", [["None", "nothing"], ['"gps"', "a GPS receiver that sends NMEA"], ['"wheel"', "a contact at a wheel"]]],
     ["RECORD", "Record every ride from power-on", SWITCH],
-    ["LIVE", "Send the lean to a phone over Bluetooth (Pico W, Pico 2 W, ESP32)", SWITCH],
+    ["LIVE", "Send the lean to a phone over Bluetooth (Pico W, Pico 2 W, ESP32 but for an S2)", SWITCH],
     ["LIVE_PIN", "Six digits that a phone has to give (ESP32)"],
   ]],
   ["Wiring, where it is not that of step 1", false, [
