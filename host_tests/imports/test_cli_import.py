@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from app_exports import riding
 from kickstand_tools import api
+from kickstand_tools.imports import importing
 
 
 def test_it_says_what_it_took_for_what(tmp_path):
@@ -118,3 +119,52 @@ def test_a_mutated_export_ends_in_a_log_or_in_one_line(tmp_path):
             api.read_log(tmp_path / "R.csv")
             ended["read"] += 1
     assert min(ended.values()) > 20
+
+
+def test_an_export_that_is_one_file_has_its_calibration_beside_it_too(tmp_path):
+    (tmp_path / "RIDE.vbo").write_text(app_exports.vbo(riding().every(2)))
+    api.write_calibration(tmp_path / "RIDE.cal.json", api.CalibrationFile(aligned=True))
+    assert "aligned" not in command.works("report", tmp_path / "RIDE.vbo", "--json", "--live").err
+
+
+def aligned_export(target, files):
+    """An export with a calibration beside it."""
+    api.write_calibration(
+        target.with_name("EXPORT.cal.json"), api.CalibrationFile(vehicle_from_sensor=app_exports.PHONE.T, aligned=True)
+    )
+    return app_exports.into(target, files)
+
+
+@pytest.mark.parametrize("name", ["import", "export"])
+def test_no_output_destroys_a_file_of_the_export(tmp_path, name):
+    source = aligned_export(tmp_path / "EXPORT", app_exports.phyphox(riding().every(4)))
+    more = ["--to", "csv"] if name == "export" else []
+    out = source / "Accelerometer.csv"
+    command.refused(tmp_path, name, source, *more, "--out", out, words="Accelerometer.csv is also an input")
+
+
+def test_an_export_is_the_folder_that_one_is_in(tmp_path, monkeypatch):
+    source = aligned_export(tmp_path / "EXPORT", app_exports.phyphox(riding().every(4)))
+    monkeypatch.chdir(source)
+    assert "aligned" not in command.works("report", ".", "--json", "--live").err
+    command.works("export", ".", "--to", "csv", "--live", "--out", tmp_path / "out.csv")
+
+
+def test_what_an_import_remarks_is_in_the_report_and_on_the_page(tmp_path):
+    """Once, though the imported log is checked again."""
+    source = aligned_export(tmp_path / "EXPORT", app_exports.sensor_kinetics(riding().every(4)))
+    result = command.works("report", source, "--json", "--live")
+    assert [remark["code"] for remark in json.loads(result.out)["remarks"]].count("import-sign") == 1
+    assert result.err.count("is not certain") == 1
+    pytest.importorskip("matplotlib")
+    pytest.importorskip("plotly")
+    command.works("plot", source, "--live", "--out", tmp_path / "plots")
+    assert "is not certain" in (tmp_path / "plots" / "EXPORT.html").read_text()
+
+
+def test_an_export_is_unpacked_once(tmp_path, monkeypatch):
+    source = aligned_export(tmp_path / "EXPORT.zip", app_exports.phyphox(riding().every(4)))
+    given, read_files = [], importing.read_files
+    monkeypatch.setattr(importing, "read_files", lambda path: given.append(path) or read_files(path))
+    command.works("report", source, "--json", "--live")
+    assert given == [source]

@@ -1,15 +1,18 @@
 """A log in memory and its blocks: times, orders of columns, and what does not fit."""
 
 import io
+import time
+from pathlib import Path
 from typing import Any
 
 import command
 import numpy as np
 import pytest
+from kickstand_tools.calibration.file import calibration_path
 from kickstand_tools.errors import InputError
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.log import Log
-from kickstand_tools.logs.reader import read_blocks, read_log, read_twice
+from kickstand_tools.logs.reader import is_log, read_blocks, read_log, read_twice
 from kickstand_tools.logs.source import log_stem, name_of, total_bytes
 
 FORCE, RATE = [0.1, 0.2, 0.9], [1.0, 2.0, 3.0]
@@ -141,3 +144,33 @@ def test_names():
     assert name_of(io.StringIO()) == "the log"
     assert name_of(log_of(2, name="mine")) == "mine"
     assert total_bytes(io.StringIO("abc")) == total_bytes("there is none") == 0
+
+
+@pytest.mark.parametrize("name", ["monday.vbo", "monday.VBO", "monday.txt.gz", "monday.parquet"])
+def test_the_name_of_an_export_has_no_ending_either(name):
+    assert log_stem(name) == "monday"
+
+
+def test_a_folder_may_be_the_one_that_one_is_in(tmp_path, monkeypatch):
+    (tmp_path / "EXPORT" / "in").mkdir(parents=True)
+    monkeypatch.chdir(tmp_path / "EXPORT" / "in")
+    assert log_stem(".") == "in" and log_stem("..") == "EXPORT"
+    assert calibration_path(Path(".")) == tmp_path / "EXPORT" / "in.cal.json"
+    assert calibration_path(Path("..")) == tmp_path / "EXPORT.cal.json"
+    assert calibration_path(Path("RIDE.csv")) == Path("RIDE.cal.json")
+
+
+def test_a_long_line_is_known_as_no_log_at_once(tmp_path):
+    """1 MB without the end of a line: read byte by byte, its time grows with the square of its length."""
+    (tmp_path / "long.csv").write_text("[" + "0.12345," * 125_000)
+    begin_s = time.process_time()
+    assert not is_log(tmp_path / "long.csv")
+    assert time.process_time() - begin_s < 1.0
+
+
+@pytest.mark.parametrize(("blank", "rows"), [("\n", 2), ("\n" * 2_000_000, 2), ("\n", 0), ("\n" * 2_000_000, 0)])
+def test_blank_lines_below_the_header_are_no_end(tmp_path, blank, rows):
+    """Also over more than a block."""
+    header, *given = text_of(2).splitlines(keepends=True)
+    (tmp_path / "log.csv").write_text(header + blank + "".join(given[:rows]))
+    assert is_log(tmp_path / "log.csv") == (rows > 0)

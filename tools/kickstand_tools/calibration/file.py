@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import IO, Any
@@ -182,8 +183,10 @@ def write_calibration(target: Path | str | IO[str], calibration: CalibrationFile
 
 
 def calibration_path(log: Path) -> Path:
-    """NAME.cal.json beside NAME.csv or NAME.csv.gz: the calibration of a recorded ride."""
-    return log.with_name(log_stem(log.name) + ".cal.json")
+    """NAME.cal.json beside NAME.csv or NAME.csv.gz, or beside another app's export: the calibration of a ride."""
+    if log.name in ("", ".."):  # the folder that one is in, or the one above: it lies beside that
+        log = Path(os.path.abspath(log))
+    return log.parent / f"{log_stem(log.name)}.cal.json"
 
 
 def calibration_beside(log: Path) -> Path:

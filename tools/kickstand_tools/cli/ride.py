@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 from ..analysis.export.export import export
-from ..analysis.overview import overview
+from ..analysis.overview import Overview, overview
 from ..analysis.plot import plot
 from ..analysis.report import as_data, page
 from ..analysis.ride import Ride, open_ride
@@ -20,18 +20,18 @@ from ..calibration.file import calibration_beside, calibration_path, read_calibr
 from ..errors import InputError
 from ..estimation.alignment import fit_ride
 from ..estimation.smooth import smooth_to_csv
-from ..imports.importing import NAMES, Imported, import_recording, is_of_an_app, write_imported
+from ..imports.importing import NAMES, Imported, import_of_app, import_recording, write_imported
 from ..joining import agreement
 from ..joining.joined import Joined, join_track, write_joined
 from ..joining.track_files import read_track
 from ..logs.csv_lines import cut_log
 from ..logs.log import Log
-from ..logs.reader import Source
+from ..logs.reader import Source, is_log
 from ..logs.stretch import Stretch
 from ..output import check_output, write_whole
 from ..overlay.overlay import overlay
 from ..progress import Bar, spinner
-from ..refusals import WRONG_AXES
+from ..refusals import WRONG_AXES, sentence
 from ..replay.replay import replay_to_csv
 from .common import (
     CALIBRATION,
@@ -81,7 +81,7 @@ def import_command(
     source: Path, out: Path, columns: str | None, units: str | None, from_s: float | None, to_s: float | None
 ) -> None:
     """Make a log of a recording of another app or logger."""
-    check_output(out, [source] if source.is_file() else sorted(source.rglob("*")) if source.is_dir() else [])
+    check_output(out, _inputs(source))
     named = _pairs(columns, "--columns") if columns is not None else None
     with spinner("importing"):
         found = import_recording(source, named, _pairs(units or "", "--units"), from_s, to_s)
@@ -206,7 +206,7 @@ def smooth_command(ride: Path, calibration: Path | None, from_s: float | None, t
 @RIGHT_HANDED
 def export_command(ride: Path, form: str, calibration: Path | None, live: bool, out: Path) -> None:
     """Export a ride for maps (gpx), Circuit Tools (vbo), RaceChrono, or data frames (parquet, csv)."""
-    check_output(out, [ride, calibration or calibration_path(ride)])
+    check_output(out, [*_inputs(ride), calibration or calibration_path(ride)])
     opened, notices = _opened(ride, calibration, live)
     with Bar("exporting") as bar:
         count = export(opened, form, out, bar.reach, notices)
@@ -225,10 +225,7 @@ def report_command(
     ride: Path, calibration: Path | None, from_s: float | None, to_s: float | None, live: bool, as_json: bool
 ) -> None:
     """Summarise a ride on one page: maxima, time at large leans, and each stop evaluated as a brake test."""
-    opened, notices = _opened(ride, calibration, live, from_s, to_s)
-    with Bar("reading") as bar:
-        seen = overview(opened, bar.reach)
-    warn(ride, notices + seen.notices)
+    seen = _overview(ride, calibration, live, from_s, to_s)
     if as_json:
         click.echo(json.dumps(as_data(seen)))
     else:
@@ -254,10 +251,7 @@ def plot_command(
 ) -> None:
     """Draw a ride: a picture (PNG) and a page to zoom into (HTML)."""
     plot.check(out)
-    opened, notices = _opened(ride, calibration, live, from_s, to_s)
-    with Bar("reading") as bar:
-        seen = overview(opened, bar.reach)
-    warn(ride, notices + seen.notices)
+    seen = _overview(ride, calibration, live, from_s, to_s)
     with spinner("drawing"):
         written = list(plot.draw(seen, out, tiles))
     print_lines(f"written: {path}" for path in written)
@@ -326,10 +320,12 @@ def _opened(
 ) -> tuple[Ride, list[Notice]]:
     """A ride, and notices about its import. What an app has exported is imported and, where no calibration is given or
     beside it, aligned by itself; a line says so."""
-    if not is_of_an_app(source):
+    found = None
+    if not is_log(source):
+        with spinner("importing"):
+            found = import_of_app(source)
+    if found is None:
         return open_ride(_stretch(source, from_s, to_s), calibration, smoothed=not live), []
-    with spinner("importing"):
-        found = import_recording(source)
     said = f"{source}: imported from {found.app}, {len(found.log.t_s)} samples, {found.rate_hz:.0f} a second"
     beside = calibration_path(source)
     known = calibration or (beside if beside.exists() else None)
@@ -340,6 +336,22 @@ def _opened(
         said += f"; aligned by its bends, {known_to(fit)}"
     click.echo(said, err=True)
     return open_ride(_stretch(found.log, from_s, to_s), known, smoothed=not live), found.notices
+
+
+def _overview(source: Path, calibration: Path | None, live: bool, from_s: float | None, to_s: float | None) -> Overview:
+    """The overview of a ride of _opened(), in front of its notices those of the import; all are printed."""
+    opened, imported = _opened(source, calibration, live, from_s, to_s)
+    with Bar("reading") as bar:
+        seen = overview(opened, bar.reach)
+    known = {sentence(notice) for notice in seen.notices}  # the log that was imported is checked again
+    seen.notices[:0] = [notice for notice in imported if sentence(notice) not in known]
+    warn(source, seen.notices)
+    return seen
+
+
+def _inputs(source: Path) -> list[Path]:
+    """The files that writing must not destroy: the source, or what is in it."""
+    return sorted(source.rglob("*")) if source.is_dir() else [source]
 
 
 def _stretch(log: Path | Log, from_s: float | None, to_s: float | None) -> Source:

@@ -10,10 +10,9 @@ from pathlib import Path, PurePosixPath
 from typing import IO
 
 from ..errors import InputError
-from ..logs.source import errors_of, open_input
+from ..logs.source import SUFFIXES, errors_of, open_input
 
 _EXCEL = b"\xd0\xcf\x11\xe0"  # first bytes of Excel's older files; the newer are zips
-SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # other files in a folder or a zip are ignored
 # Largest recording as text: some hours at 100 Hz. Reading it takes at most ten times its memory.
 MOST_BYTES = 250_000_000
 MOST_FILES = 10_000  # most files in a folder or a zip

@@ -14,7 +14,7 @@ from ..checks.course import log_agrees
 from ..errors import InputError
 from ..logs.csv_lines import write_log
 from ..logs.log import Log
-from ..logs.reader import check_first_line, read_log
+from ..logs.reader import read_log
 from . import mapped
 from .apps import aim, own, phyphox, racebox, racechrono, sensor_kinetics, sensor_logger, sensorlog, vbo
 from .files import RecordingFile, read_files
@@ -81,8 +81,31 @@ def import_recording(
     >>> round(found.rate_hz), found.log.accel_g[0].round(3).tolist(), found.log.gyro_dps[0].round(2).tolist()
     (100, [0.0, 1.0, 0.0], [0.0, 0.0, 5.73])
     """
-    name = str(source)
-    recording = _recording(read_files(source), name, columns, dict(units or {}))
+    return _imported(read_files(source), str(source), columns, dict(units or {}), start_s, end_s)
+
+
+def import_of_app(source: Path) -> Imported | None:
+    """A recording of another app, imported; None for what is none. Raises InputError for a folder or a zip that cannot
+    be read, and as import_recording()."""
+    try:
+        files = read_files(source)
+        known = any(app is not own for app, _ in recordings(files))
+    except InputError:
+        if source.is_dir() or is_zipfile(source):
+            raise
+        return None
+    return _imported(files, str(source), None, {}, None, None) if known else None
+
+
+def _imported(
+    files: list[RecordingFile],
+    name: str,
+    columns: Mapping[str, str] | None,
+    units: dict[str, str],
+    start_s: float | None,
+    end_s: float | None,
+) -> Imported:
+    recording = _recording(files, name, columns, units)
     log, damaged = join(recording, name)
     _check_sign(recording, log)
     if damaged:
@@ -146,23 +169,6 @@ def recordings(files: list[RecordingFile]) -> list[tuple[Any, list[RecordingFile
         claimed = {id(file) for _, group in found for file in group}
         left = [file for file in left if id(file) not in claimed]
     return found
-
-
-def is_of_an_app(source: Path) -> bool:
-    """True for a recording of another app; False for a log, and for what is neither. Raises InputError for a folder or
-    a zip that cannot be read."""
-    try:
-        if source.is_file():
-            check_first_line(source)
-            return False
-    except InputError:
-        pass  # it is no log
-    try:
-        return any(app is not own for app, _ in recordings(read_files(source)))
-    except InputError:
-        if source.is_dir() or is_zipfile(source):
-            raise
-        return False
 
 
 def _check_sign(recording: Recording, log: Log) -> None:

@@ -106,11 +106,19 @@ def read_blocks(
 
 def check_first_line(log: Path) -> None:
     """Raise InputError if the first line of a file is not that of a log, or is the only one."""
-    first, *more = itertools.islice(itertools.chain((text for text, _ in chunks(log, 1)), [b""]), 2)
-    cells.check_text(str(log), first, 0)
-    cells.header(str(log), first.decode().removeprefix("\ufeff").partition("\n")[0])
-    if not first.partition(b"\n")[2].strip() and not b"".join(more).strip():
+    pieces = (text for text, _ in chunks(log, BLOCK_BYTES, []))
+    _, rest = _header(str(log), next(pieces, b""))
+    if not rest.strip() and not any(text.strip() for text in pieces):
         raise InputError(f"{log} is empty: there are no readings below the names of its columns")
+
+
+def is_log(path: Path) -> bool:
+    """By its first line."""
+    try:
+        check_first_line(path)
+        return True
+    except InputError:
+        return False
 
 
 def read_twice(source: Source) -> Source:
@@ -170,17 +178,22 @@ def _blocks_of(log: Log) -> Iterator[Block]:
 def _parsed(source: File, name: str, remarks: list[Notice]) -> Iterator[Block]:
     pieces = chunks(source, BLOCK_BYTES, remarks)
     first, packed = next(pieces, (b"", 0))
+    names, rest = _header(name, first)
+    return even_blocks(_rows(itertools.chain([(rest, packed)], pieces), name, names, remarks), name, remarks)
+
+
+def _header(name: str, first: bytes) -> tuple[list[str], bytes]:
+    """The names of a log's columns, and what is below them in its first chunk."""
     first = first.removeprefix(b"\xef\xbb\xbf")
     if not first.strip():
         raise InputError(f"{name} is empty: a log starts with the line {','.join(COLUMNS)}")
     header, _, rest = first.partition(b"\n")
     cells.check_text(name, header, 0)
     try:
-        names = cells.header(name, header.decode())
+        return cells.header(name, header.decode()), rest
     except InputError:
         cells.check_text(name, first, 0)
         raise
-    return even_blocks(_rows(itertools.chain([(rest, packed)], pieces), name, names, remarks), name, remarks)
 
 
 def _rows(pieces: Iterator[tuple[bytes, int]], name: str, names: list[str], remarks: list[Notice]) -> Iterator[Block]:

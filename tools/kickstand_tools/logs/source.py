@@ -16,6 +16,7 @@ from ..errors import InputError, cause
 
 # Most bytes of a line, or of NUL bytes at the end, which a file system may leave in a file that was not closed
 LONGEST_LINE = 16_000_000
+SUFFIXES = (".csv", ".txt", ".tsv", ".vbo", ".parquet")  # of logs, and of the tables of other apps
 File = Path | str | IO[bytes] | IO[str]
 Progress = Callable[[int, int], None]  # called with (done, total) in one unit; total is 0 where it is not known
 
@@ -44,8 +45,10 @@ def name_of(source: object) -> str:
 
 
 def log_stem(name: str) -> str:
-    """The name of a log, or of the zip of an export, without path and suffixes."""
-    return Path(name).name.removesuffix(".gz").removesuffix(".csv").removesuffix(".zip")
+    """The name of a log, or of an export, without path and suffixes."""
+    name = Path(os.path.abspath(name)).name.removesuffix(".gz")  # that of the folder if it is "."
+    ending = next((suffix for suffix in (*SUFFIXES, ".zip") if name.lower().endswith(suffix)), "")
+    return name[: len(name) - len(ending)]
 
 
 def chunks(source: File, size: int, remarks: list[Notice] | None = None) -> Iterator[tuple[bytes, int]]:

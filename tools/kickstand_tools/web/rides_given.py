@@ -12,7 +12,7 @@ from ..imports import mapped
 from ..imports.files import RecordingFile, read_files
 from ..imports.importing import recordings
 from ..joining.track_files import read_track
-from ..logs.reader import check_first_line
+from ..logs.reader import is_log
 
 
 @dataclass
@@ -53,7 +53,7 @@ def sorted_out(names: list[str]) -> Given:
             elif name.lower().endswith((".gpx", ".fit")):
                 read_track(Path(name))
                 track, found.kinds[name] = name, "track"
-            elif _is_log(name):
+            elif is_log(Path(name)):
                 found.rides.append(GivenRide(name, [name]))
                 found.kinds[name] = "log"
             else:
@@ -103,15 +103,6 @@ def _add(found: Given, log: str, names: list[str], files: list[RecordingFile]) -
         return
     found.rides.append(GivenRide(log, names, table=table))
     found.kinds |= dict.fromkeys(names, f"of {known[0][0].NAME}" if known else "table")
-
-
-def _is_log(name: str) -> bool:
-    """By its first line."""
-    try:
-        check_first_line(Path(name))
-        return True
-    except InputError:
-        return False
 
 
 def _by_number(name: str) -> list[tuple[int, str]]:
