@@ -132,6 +132,14 @@ def test_no_module_imports_itself_by_way_of_others():
     graph.prepare()  # raises CycleError
 
 
+def test_joining_knows_no_analysis():
+    """Of the tools: both are results of the same rooms."""
+    tools = firmware_path.TOOLS / "kickstand_tools"
+    for path in sorted((tools / "joining").rglob("*.py")):
+        for target, _ in imports(path, tools):
+            assert target.partition(".")[0] != "analysis", f"{path.name} imports {target}"
+
+
 def test_mathematics_knows_no_hardware():
     for folder, path in modules():
         if not {folder, f"{folder}.{path.stem}"} & DRIVERS and not path.stem.endswith("_viper"):

@@ -1,6 +1,7 @@
 """kickstand compare: two devices on one bike, on one clock, and how their leans agree."""
 
 import json
+from dataclasses import replace
 
 import command
 import numpy as np
@@ -93,6 +94,12 @@ def test_words_json_and_a_picture(files):
     data = json.loads(command.works("compare", files / "A.csv", files / "B.csv", "--json").out)
     assert set(data) == {"clocks", "live", "smoothed", "remarks"}
     assert 0.0 < data["smoothed"]["moving_deg"] < 2.0
+
+
+def test_a_name_is_no_formula(found, tmp_path):
+    """Between two $ matplotlib sees one."""
+    agreement.draw(tmp_path / "C.png", replace(found, names=("A$_$.csv", "B$x$.csv")))
+    assert (tmp_path / "C.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_remark_is_said_once(ride):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from ..refusals import CONTRADICTING, SWAPPED_DEG, sentence
 from ..refusals import as_data as remarks_as_data
 from ..remedies import COMMANDS, Remedies
+from ..times import clock
 from .alignment_quality import LeanCost, Quality, lean_cost
 from .overview import Overview
 from .stops.brake_test import Stop, stops_by_speed
@@ -250,10 +251,3 @@ def angles(quality: Quality) -> list[str]:
     """The angles that are known, in words."""
     named = {"roll": quality.roll_deg, "pitch": quality.pitch_deg, "yaw": quality.yaw_deg}
     return [f"{name} {value:+z.1f}°" for name, value in named.items() if value is not None]
-
-
-def clock(seconds: float) -> str:
-    """1:02:03 or 2:03."""
-    whole = round(seconds)
-    hours, minutes = whole // 3600, whole // 60 % 60
-    return f"{hours}:{minutes:02d}:{whole % 60:02d}" if hours else f"{minutes}:{whole % 60:02d}"

@@ -15,8 +15,6 @@ import numpy as np
 from kickstand.errors import Notice
 from numpy.typing import NDArray
 
-from ..analysis.plot.charts import tick_s
-from ..analysis.report import clock
 from ..calibration.file import CalibrationFile
 from ..errors import InputError, extra
 from ..estimation.smooth import SmoothedRide, smooth
@@ -25,6 +23,7 @@ from ..logs.source import Progress, name_of
 from ..logs.table import Array
 from ..refusals import as_data
 from ..replay.replay import replay
+from ..times import clock, tick_s
 from .clocks import Clocks, clocks
 from .motion import motion
 
@@ -186,7 +185,8 @@ def draw(path: Path, found: Agreement) -> None:
     for axis in (above, below):
         axis.margins(x=0.0)
         axis.grid(alpha=0.3)
-        axis.legend(loc="upper right")
+        for label in axis.legend(loc="upper right").get_texts():
+            label.set_parse_math(False)  # a name may have $ in it
     figure.savefig(path, dpi=100)
 
 

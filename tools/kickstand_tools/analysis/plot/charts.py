@@ -10,9 +10,10 @@ import numpy as np
 from ...logs.table import Array
 from ...refusals import sentence
 from ...signals.averages import smoothed
+from ...times import clock, tick_s
 from ..downsample import spacing_s
 from ..overview import Overview
-from ..report import angles, clock, judged, peak_words
+from ..report import angles, judged, peak_words
 from ..summary import BIN_DEG, BINS_DEG, Peak
 
 LEFT_COLOUR, RIGHT_COLOUR = "#2563a8", "#c2571a"
@@ -159,11 +160,6 @@ def title(seen: Overview) -> str:
 def lean_limit(seen: Overview) -> float:
     """Degrees to each side that the lean's axis shows."""
     return max(20.0, 1.2 * max(seen.summary.left_deg.value, seen.summary.right_deg.value))
-
-
-def tick_s(seconds: float) -> float:
-    """A round time between ticks, so that there are 6 to 12 of them."""
-    return next((tick for tick in (1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800) if seconds < 12 * tick), 3600)
 
 
 def envelope(time: Array, values: Array, points: int, gap_s: float = np.inf) -> tuple[Array, Array]:

@@ -1,0 +1,13 @@
+"""Times as they are read on a page or an axis."""
+
+
+def clock(seconds: float) -> str:
+    """1:02:03 or 2:03."""
+    whole = round(seconds)
+    hours, minutes = whole // 3600, whole // 60 % 60
+    return f"{hours}:{minutes:02d}:{whole % 60:02d}" if hours else f"{minutes}:{whole % 60:02d}"
+
+
+def tick_s(seconds: float) -> float:
+    """A round time between ticks, so that there are 6 to 12 of them."""
+    return next((tick for tick in (1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800) if seconds < 12 * tick), 3600)
