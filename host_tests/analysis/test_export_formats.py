@@ -224,7 +224,7 @@ def test_every_row_of_a_vbo_has_a_speed(tmp_path):
     assert [(k, cell) for k, cell in enumerate(cells) if cell] == [(50, "10.000"), (150, "20.000")]
 
 
-@pytest.mark.parametrize(("form", "rows"), [("csv", 400), ("parquet", 400), ("racechrono", 400), ("vbo", 200)])
+@pytest.mark.parametrize(("form", "rows"), [("csv", 400), ("parquet", 400), ("racechrono", 400), ("vbo", 201)])
 def test_vbo_holds_a_hundred_a_second(tmp_path, form, rows):
     """Counted are the rows that were written, in whatever blocks the log comes."""
     if form == "parquet":
@@ -235,6 +235,21 @@ def test_vbo_holds_a_hundred_a_second(tmp_path, form, rows):
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(reader, "BLOCK_SAMPLES", size)
             assert export(open_ride(log, SQUARE), form, tmp_path / "out") == rows
+
+
+@pytest.mark.parametrize("start_s", [1e8, 1e8 + 0.0043, 1e8 + 0.00065])
+@pytest.mark.parametrize(("form", "step_s", "columns"), [("racechrono", 0.001, (0, 3)), ("vbo", 0.01, (1,))])
+def test_no_time_is_written_twice(tmp_path, form, step_s, columns, start_s):
+    """Under one step apart, also on both sides of a step, and in the middle between two; every sample is counted."""
+    t_s = step_s * np.array([0.0, 0.96, 1.04, 2.5, 3.5, 4.5, 5.49, 5.51, 6.4, 7.0, 8.0, 9.96, 10.04, 10.5])
+    log = Log(t_s, np.tile([0.0, 1.0, 0.0], (len(t_s), 1)), np.zeros((len(t_s), 3)), start_s=start_s)
+    notices = []
+    count = export(open_ride(log, SQUARE), form, tmp_path / "out", notices=notices)
+    lines = (tmp_path / "out").read_text().strip().split("\n")
+    rows = [line.replace(" ", ",").split(",") for line in lines[-count:]]
+    for column in columns:
+        assert np.all(np.diff([float(row[column]) for row in rows]) > 0.0)
+    assert [notice.values for notice in notices if notice.code == "rows-share"] == [(len(t_s), count, step_s)]
 
 
 def test_progress_and_notices_are_passed_on(tmp_path):

@@ -183,8 +183,8 @@ _OTHERS: _Table = {
     "cut-line": "line {0}, the last one, was cut: it is left out",
     "times-spread": "the times are rounded ({0} of {1} repeat the one before): they are spread evenly, by up to "
     "{2:.3f} s",
-    "rows-share": "this format holds times to {2:g} s, which {0} samples share in {1} rows: a row is the mean of its "
-    "samples",
+    "rows-share": "this format holds times to {2:g} s: {0} samples became {1} rows, those with the same time "
+    "their mean",
     "smooth-slow": "the smoothed lean needs 10 samples a second: where the log has fewer, the lean is the one that the "
     "display showed",
     "ride-short": "only {0:.0f} s of riding: at least {1:.0f} s with bends are needed",

@@ -48,16 +48,17 @@ def spacing_s(course: Channels) -> float:
     return float(np.median(np.diff(course.t_s))) if len(course.t_s) > 1 else 1.0
 
 
-def downsampled(blocks: Iterable[Channels], step_s: float) -> Iterator[Channels]:
+def downsampled(blocks: Iterable[Channels], step_s: float, rounded: bool = False) -> Iterator[Channels]:
     """The means over each stretch of step_s in which there are samples; a channel's NaNs do not count. For positions
     and their time it is the last value: there is no mean of longitudes on both sides of 180 degrees.
 
-    A ride with at most one sample per stretch is not changed. A stretch may extend over several blocks.
+    A ride with at most one sample per stretch is not changed. A stretch may extend over several blocks. rounded: each
+    stretch is of the times that round to the same multiple of step_s.
     """
     rest: Channels | None = None
     for block in blocks:
         block = block if rest is None else joined([rest, block])
-        step = _stretches(block.t_s, step_s)
+        step = _stretches(block.t_s, step_s, rounded)
         last = int(np.searchsorted(step, step[-1]))  # the last stretch may go on in the next block
         rest = block.part(slice(last, None))
         if last:
@@ -66,9 +67,14 @@ def downsampled(blocks: Iterable[Channels], step_s: float) -> Iterator[Channels]
         yield _means(rest, np.zeros(len(rest.t_s)))
 
 
-def _stretches(t_s: Array, step_s: float) -> Array:
+def rounded_to(t_s: Array, step_s: float) -> Array:
+    """Times as multiples of step_s: of stretches that are rounded no two are the same."""
+    return _stretches(t_s, step_s, True) * step_s
+
+
+def _stretches(t_s: Array, step_s: float, rounded: bool = False) -> Array:
     """The number of the stretch that each sample lies in."""
-    return np.floor(t_s / step_s + 1e-6)
+    return np.floor(t_s / step_s + 0.5 * rounded + 1e-6)
 
 
 def _means(block: Channels, step: Array) -> Channels:

@@ -16,7 +16,7 @@ from ...logs.stretch import Stretch
 from ...logs.table import Array
 from ...output import write_whole
 from ..channels import Channels
-from ..downsample import downsampled
+from ..downsample import downsampled, rounded_to
 from ..ride import Ride
 from ..track import Track, joined, track
 from . import export_columns, export_gpx, export_racechrono, export_vbo
@@ -68,6 +68,9 @@ def export(
     elif form in _DATED and start_s < _CLOCK_S:
         written_s = Path(log).stat().st_mtime if isinstance(log, (Path, str)) else time.time()
         start_s = float(max(0, int(written_s - whole.seconds)))
+    step_s = STEP_S[form]
+    if step_s:  # times that differ stay so when the start is added
+        start_s = round(start_s / step_s) * step_s
     count = given = 0
 
     def measured() -> Iterator[Channels]:
@@ -78,7 +81,7 @@ def export(
 
     def rows() -> Iterator[Channels]:
         nonlocal count
-        for block in downsampled(measured(), STEP_S[form]) if STEP_S[form] else measured():
+        for block in downsampled(measured(), step_s, rounded=True) if step_s else measured():
             if form == "gpx":
                 block = block.part(np.isfinite(block.lat_deg) & np.isfinite(block.lon_deg))
             if form in ("gpx", "vbo") and len(whole.speeds):
@@ -87,12 +90,14 @@ def export(
             if form == "vbo":
                 block.lat_deg, block.lon_deg = whole.places.at(block.t_s)
             block.lean_sigma_deg = np.where(block.trusted, block.lean_sigma_deg, np.nan)  # as in a replay
+            if step_s:
+                block.t_s = rounded_to(block.t_s, step_s)
             count += len(block.t_s)
             yield block
 
     write_whole(Path(out), lambda temporary: _WRITE[form](temporary, rows(), start_s))
-    if notices is not None and STEP_S[form] and count < given:
-        notices.append(Notice("rows-share", given, count, STEP_S[form]))
+    if notices is not None and step_s and count < given:
+        notices.append(Notice("rows-share", given, count, step_s))
     return count
 
 
