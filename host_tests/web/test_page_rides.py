@@ -24,6 +24,13 @@ AWAKE = """() => {
     last = performance.now();
   }, 50);
 }"""
+# A library of the charts that does not run; window.given() gives the real one again
+UNABLE = """() => {
+  const fetched = window.fetch;
+  window.fetch = (url, ...more) =>
+    String(url).endsWith("plotly.min.js") ? Promise.resolve(new Response("?")) : fetched(url, ...more);
+  window.given = () => (window.fetch = fetched);
+}"""
 
 
 def test_the_report_is_that_of_the_command(page, ride, calibration):
@@ -74,6 +81,16 @@ def test_what_the_site_does_not_give_is_not_saved(page, ride, calibration):
     assert "plotly.min.js cannot be loaded (HTTP 404)" in page.said()
     page.page.evaluate("given()")
     assert b"Plotly.newPlot" in page.saved("#save-page")
+
+
+def test_charts_that_a_browser_cannot_draw_are_not_waited_for(page, ride, calibration):
+    page.page.evaluate(UNABLE)
+    page.give(ride, calibration)
+    page.page.wait_for_function("document.querySelector('#drawing').textContent.includes('could not draw')")
+    page.page.evaluate("given()")
+    page.give(ride, calibration)
+    page.page.wait_for_function("document.querySelector('#drawing').hidden")
+    page.rider.errors.clear()  # of the frame without a library
 
 
 def test_too_little_of_a_ride_is_said_at_its_top(page, calibration, tmp_path):

@@ -4,12 +4,13 @@ const finger = matchMedia("(pointer: coarse)").matches, narrow = matchMedia("(ma
 const layout = narrow ? CHART.narrow : CHART.layout;
 if (finger) layout.dragmode = false; // a finger moves the page
 const FEW = { responsive: true, displaylogo: false, modeBarButtons: [["resetScale2d", "toImage"]] };
-const drawn = Plotly.newPlot("chart", CHART.data, layout, FEW);
+const drawn = (async () => Plotly.newPlot("chart", CHART.data, layout, FEW))(); // what it throws rejects the promise
 if (parent !== window) {
-  const postHeight = () => parent.postMessage({ height: document.body.scrollHeight }, "*"); // of the frame that it is in
+  const post = (message) => parent.postMessage(message, "*"); // to the page whose frame it is in
+  const postHeight = () => post({ height: document.body.scrollHeight });
   postHeight(); // a frame that is not in sight yet observes nothing
   new ResizeObserver(postHeight).observe(document.body);
-  drawn.then(() => parent.postMessage({ drawn: true }, "*"));
+  drawn.then(() => post({ drawn: true }), () => post({ failed: true }));
 }
 
 // What is pointed at, in one line beside it: "0:55, 41° left"

@@ -42,17 +42,22 @@ export function showReport({ words, warnings, name, calibration }) {
  * loads: a frame that was hidden until then may believe that it still is, and draw nothing. */
 export function showCharts(page) {
   byId("charts").hidden = byId("drawing").hidden = false;
+  byId("drawing").textContent = "Drawing the charts …";
   const frame = byId("plot").cloneNode();
   frame.removeAttribute("style");
   frame.srcdoc = page;
   byId("plot").replaceWith(frame);
 }
 
-// The frame may run scripts, but not reach this page: it says how high it is, and when it has drawn
+// The frame may run scripts, but not reach this page: it says how high it is, and when it has drawn, or that it cannot
 addEventListener("message", ({ source, data }) => {
   if (source !== byId("plot").contentWindow) return;
   if (Number.isFinite(data?.height)) byId("plot").style.height = `${data.height}px`;
   if (data?.drawn) byId("drawing").hidden = true;
+  if (data?.failed) {
+    byId("drawing").textContent =
+      "This browser could not draw the charts. Save them with “Charts (HTML)” and open that file in another browser.";
+  }
 });
 
 export function hideRide() {
