@@ -50,12 +50,11 @@ def test(arguments):
     """Run ruff, ruff format, pyright and pytest, each even if one before it has failed; 0 if all succeed, else 1."""
     compiling = subprocess.Popen([PYTHON, "-c", COMPILE], cwd=ROOT)  # beside ruff and pyright
     failed = []
-    workers = str((os.cpu_count() or 1) + 1)  # one more than processors, because some tests wait for a page
     for tool, command in (
         ("ruff", ("-m", "ruff", "check", ".")),
         ("ruff format", ("-m", "ruff", "format", "--check", ".")),
         ("pyright", ("-m", "pyright")),
-        ("pytest", ("-m", "pytest", "-n", workers, "--dist", "worksteal", "--durations", "10", *arguments)),
+        ("pytest", ("-m", "pytest", "-n", "auto", "--dist", "worksteal", "--durations", "10", *arguments)),
     ):
         say(tool)
         if tool == "pytest":
