@@ -169,7 +169,7 @@ def test_only_this_computer_can_connect_and_nobody_but_the_run_can_run_code(tmp_
             except http.client.HTTPException:
                 pass  # no web server
         process.stdin.close()
-        assert process.stderr.read() == b""  # Dask would tell of each door that stayed closed
+        assert process.stderr.read() == b""  # Dask would print each connection that it refused
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""What the two presses tell the meter of the gyro's bias."""
+"""What is known of the gyro's bias after the two presses."""
 
 from types import SimpleNamespace
 

@@ -182,7 +182,7 @@ def test_it_rides_straight_until_the_meter_is_sure(stages):
 
 
 def test_after_power_on_in_a_steady_bend_it_says_what_ends_the_doubt(stages):
-    """Riding on does not: nothing in such a bend tells the lean from an error of the sensor."""
+    """Riding on does not: nothing in such a bend separates the lean from an error of the sensor."""
     power = [("power", False), ("wait", 0.5), ("power", True)]
     stages(
         ([*RIDING, ("lean", -8), ("wait", 4)], "not sure", 5, "That is all", ""),

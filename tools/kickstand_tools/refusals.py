@@ -126,7 +126,7 @@ def _again(remedies: Remedies, car: bool) -> str:
 # Words by code: {0}, {1} ... are the refusal's values, a name is what to do (remedies.py). Where a text is not enough,
 # a function makes the words of the remedies and the values.
 _Table = dict[str, str | Callable[..., str]]
-# The log's axes, their signs or the unit of the rates are wrong: to be mended in the log before anything is made of it
+# The log's axes, their signs or the unit of the rates are wrong: to be corrected before anything is made of the log
 _AXES: _Table = {
     "mirrored": "the sensor turns against the track, so left and right are exchanged: were all accelerations "
     "turned? " + _AT_REST.capitalize(),
