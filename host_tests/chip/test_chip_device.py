@@ -21,7 +21,7 @@ FAULT_S = 0.6
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=pytest.mark.esp32)])
+@pytest.mark.parametrize("chip", ["pico", pytest.param("esp32", marks=[pytest.mark.esp32, pytest.mark.nightly])])
 def test_a_new_board_is_aligned_by_two_presses_and_keeps_it(chip):
     """Uncalibrated, kickstand, upright, power-cycle, leaned: the display reads the lean."""
     ride = Ride([kickstand(5.5), upright(5.5), upright(1e6, lean_deg=LEAN_DEG)])

@@ -21,7 +21,7 @@ from test_chip_power_cut import torn
 
 pytestmark = pytest.mark.chip
 
-RIDE = Ride([wait(2.0), accelerate(15.0, 3.0), turn(-30.0, 3.0), turn(35.0, 3.0)])
+RIDE = Ride([wait(1.0), accelerate(15.0, 2.0), turn(-30.0, 3.0), turn(35.0, 3.0)])
 
 # The app as it is, its lean of each turn kept: seconds of it, then the ride is ended
 _RUN = """
@@ -98,12 +98,12 @@ def test_a_recorded_ride_replays_as_it_was_shown(at_prompt, tmp_path):
     at_prompt.board.sensor.world = lambda t_s: world(t_s - begun_s)
     samples = SampleCount(at_prompt.board.sensor)
     shown = set()
-    at_prompt.board.at(begun_s + 3.0, samples.begin)
+    at_prompt.board.at(begun_s + 2.0, samples.begin)
     lost = []
-    at_prompt.board.at(begun_s + 6.5, lambda: lost.append(samples.lost()))
-    for i in range(35):
-        at_prompt.board.at(begun_s + 3.0 + i / 10, lambda: shown.add(tuple(at_prompt.lcd())))
-    leans = ast.literal_eval(at_prompt.exec(_RUN.replace("SECONDS", "7"), 20.0))
+    at_prompt.board.at(begun_s + 4.7, lambda: lost.append(samples.lost()))
+    for i in range(27):
+        at_prompt.board.at(begun_s + 2.0 + i / 10, lambda: shown.add(tuple(at_prompt.lcd())))
+    leans = ast.literal_eval(at_prompt.exec(_RUN.replace("SECONDS", "6"), 20.0))
     found = rides(at_prompt.files())
     assert lost == [0]
     assert len(shown) > 10

@@ -15,12 +15,14 @@ SLOWED = 4  # times
 
 
 @pytest.mark.long
-def test_a_first_visit(chromium, address, tmp_path):
-    """One test, because the page runs in real time."""
+@pytest.mark.parametrize("cut", [False, pytest.param(True, marks=pytest.mark.nightly)], ids=["", "power cut"])
+def test_a_first_visit(chromium, address, tmp_path, cut):
+    """In real time, so all in one. What the guide says of a power cut, test_guide.py shows each time."""
     rider = Rider(chromium, address, viewport={"width": 1440, "height": 900})
     first_minute(rider)
     pull_the_wire(rider)
-    cut_the_power_in_a_save(rider)
+    if cut:
+        cut_the_power_in_a_save(rider)
     is_what_the_firmware_shows(rider, tmp_path)
     assert rider.seen("shifts") == [], "the layout moved"
     works_without_a_network(rider, address)

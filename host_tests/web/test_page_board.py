@@ -13,7 +13,7 @@ from serial_line import SerialLine
 LEAN_DEG = 20.0
 
 
-@pytest.mark.long
+@pytest.mark.nightly  # `flash` onto the same board, and the page with an imagined one, are tried each time
 @pytest.mark.chip
 def test_a_board_is_brought_up_to_date_and_watched(chromium, address, tmp_path):
     """Its calibration stays. Its lean on the page is the one on its own display, and the log is the one that `kickstand

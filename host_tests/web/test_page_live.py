@@ -247,20 +247,20 @@ def test_a_board_without_the_firmware_is_told_of_the_page_install(line, rider, b
     assert board.resets == 1
 
 
-@pytest.mark.parametrize("kind", [LAPTOP, PHONE], ids=["laptop", "phone"])
-def test_without_a_board_a_simulated_one_is_watched(chromium, address, kind):
+def test_without_a_board_a_simulated_one_is_watched(chromium, address):
     """Also in a browser that cannot connect to a board, as a phone's: a lean to either side, said to be simulated."""
-    rider = Rider(chromium, address + "live.html", **kind)
-    if kind == PHONE:
-        rider.page.evaluate("document.documentElement.dataset.serial = 'no'")
+    rider = Rider(chromium, address + "live.html", **PHONE)
+    rider.page.evaluate("document.documentElement.dataset.serial = 'no'")
     rider.page.click("#simulated")
     for side in "right", "left":
         rider.page.wait_for_function("side => document.querySelector('#side').textContent === side", arg=side)
         assert rider.page.is_visible("#gauge") and not rider.page.is_visible("#start")
     assert rider.text("#pretend-said").startswith("A simulated ride, which nobody has ridden: 0:")
     assert rider.text("#max-right") != "--"
-    assert rider.axe() == []
-    assert rider.fits()
+    for kind in PHONE, LAPTOP:
+        rider.page.set_viewport_size(kind["viewport"])
+        assert rider.axe() == []
+        assert rider.fits()
     rider.page.click("#simulated-stop")
     assert rider.text("#pretend-said") == "Stopped."
     rider.page.wait_for_function("document.querySelector('#lean').textContent === '--'")

@@ -1,8 +1,10 @@
 """The pages under their own content security policy, which the other tests switch off: nothing they need is stopped."""
 
-import pytest
+import re
+
 from rider import LAPTOP, Rider
 
+BOARD_PAGES = ("live.html", "install.html")
 PYTHON = "() => import('./python.mjs').then((m) => m.loadPython([])).then((python) => python.runPython('6 * 7'))"
 
 FOREIGN = """() => {
@@ -28,9 +30,10 @@ def test_try_runs_and_a_foreign_script_does_not(chromium, address):
     rider.context.close()
 
 
-@pytest.mark.parametrize("name", ["install.html", "live.html"])
-def test_python_runs_in_the_pages_that_speak_to_a_board(chromium, address, name):
-    rider = within(chromium, address, name)
+def test_python_runs_in_the_pages_that_speak_to_a_board(chromium, address, files):
+    policies = [re.findall(rb'Content-Security-Policy" content="([^"]+)', files[name]) for name in BOARD_PAGES]
+    assert len(policies[0]) == 1 and policies[0] == policies[1]
+    rider = within(chromium, address, BOARD_PAGES[0])
     assert rider.page.evaluate(PYTHON) == 42
     assert rider.errors == []
     rider.context.close()

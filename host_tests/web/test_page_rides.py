@@ -34,7 +34,7 @@ UNABLE = """() => {
 
 
 def test_the_report_is_that_of_the_command(page, ride, calibration):
-    assert page.give(ride, calibration) == ""
+    page.show(ride, calibration)
     reported = json.loads(works("report", ride, "--json").out)
     shown = json.loads(page.saved("#save-json"))
     assert shown.pop("ride") == Path(reported.pop("ride")).name
@@ -47,7 +47,7 @@ def test_the_report_is_that_of_the_command(page, ride, calibration):
 
 
 def test_the_charts_are_those_of_the_command(page, ride, calibration):
-    page.give(calibration, ride)
+    page.show(ride, calibration)
     drawn = interactive.figure(charts.charts(overview(open_ride(ride, calibration, smoothed=True))))["data"]
     inside = page.page.frame_locator("#plot")
     inside.locator("#chart .main-svg").first.wait_for()
@@ -64,7 +64,7 @@ def test_the_charts_are_those_of_the_command(page, ride, calibration):
 
 
 def test_the_lean_of_each_sample_is_that_of_the_command(page, ride, calibration, tmp_path):
-    page.give(ride, calibration)
+    page.show(ride, calibration)
     works("smooth", ride, "--out", tmp_path / "lean.csv")
     (tmp_path / "shown.csv").write_bytes(page.saved("#save-lean"))
     was, now = (analysis_rides.table(tmp_path / name) for name in ("lean.csv", "shown.csv"))
@@ -75,7 +75,7 @@ def test_the_lean_of_each_sample_is_that_of_the_command(page, ride, calibration,
 
 
 def test_what_the_site_does_not_give_is_not_saved(page, ride, calibration):
-    page.give(ride, calibration)
+    page.show(ride, calibration)
     page.page.evaluate(MISSING, "plotly.min.js")
     page.page.click("#save-page")
     assert "plotly.min.js cannot be loaded (HTTP 404)" in page.said()
@@ -109,7 +109,7 @@ def test_too_little_of_a_ride_is_said_at_its_top(page, calibration, tmp_path):
 
 
 def test_the_charts_follow_the_dark(page, ride, calibration):
-    page.give(ride, calibration)
+    page.show(ride, calibration)
     chart = page.page.frame_locator("#plot").locator("#chart")
     for scheme, filtered, paper in (("dark", True, "rgb(26, 29, 36)"), ("light", False, "rgb(255, 255, 255)")):
         page.page.emulate_media(color_scheme=scheme)
@@ -121,7 +121,7 @@ def test_the_charts_follow_the_dark(page, ride, calibration):
 
 def test_what_is_pointed_at_is_said_in_one_line(page, ride, calibration):
     """And of the many buttons of the charts' library two are left."""
-    page.give(ride, calibration)
+    page.show(ride, calibration)
     inside = page.page.frame_locator("#plot")
     inside.locator("#chart .main-svg").first.wait_for()
     assert inside.locator("#chart .modebar-btn").count() == 2
@@ -166,7 +166,7 @@ def test_what_takes_too_long_can_be_stopped(page, ride, calibration):
 
 
 def test_what_was_stopped_leaves_no_report_whose_buttons_do_nothing(page, ride, calibration):
-    page.give(ride, calibration)
+    page.show(ride, calibration)
     page.page.evaluate("['#save-lean', '#stop'].forEach((button) => document.querySelector(button).click())")
     assert page.said() == "Stopped."
     assert page.page.is_hidden("#report") and page.page.is_hidden("#charts")
@@ -175,7 +175,7 @@ def test_what_was_stopped_leaves_no_report_whose_buttons_do_nothing(page, ride, 
 @pytest.mark.parametrize("kind", [LAPTOP, PHONE], ids=["laptop", "phone"])
 def test_axe_finds_nothing(page, ride, calibration, kind):
     page.page.set_viewport_size(kind["viewport"])
-    page.give(ride, calibration)
+    page.show(ride, calibration)
     assert page.rider.axe() == []
     assert page.rider.fits()
     page.page.set_viewport_size(LAPTOP["viewport"])

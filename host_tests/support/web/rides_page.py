@@ -24,6 +24,11 @@ class Rides:
             self.said()
         return self.add(*files)
 
+    def show(self, *files):
+        """Give them, unless their report is there already."""
+        if set(self.held()) != {file.name for file in files} or self.page.is_hidden("#report"):
+            assert self.give(*files) == ""
+
     def add(self, *files):
         """Choose files; what the page says in the end."""
         self.page.set_input_files("#files", files)

@@ -38,9 +38,8 @@ def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
     seconds: emulated time of each of five runs; four on an ESP32, of which the stages are not known. Raises GuestError
     if the program on the board fails.
     """
-    kind = CHIPS[chip]
-    plain = _figures(_run(chip, seconds))
-    modes = {name: _figures(_run(chip, seconds, chosen=chosen)) for name, chosen in _MODES.items()}
+    plain = loop(seconds, chip)
+    modes = {name: loop(seconds, chip, chosen) for name, chosen in _MODES.items()}
     for mode in modes.values():
         mode["us_per_sample"] = (mode["cpu_share"] - plain["cpu_share"]) * 1e6 / SAMPLE_HZ
     return {
@@ -51,11 +50,8 @@ def bench(seconds: int = 10, chip: str = "rp2040") -> dict[str, Any]:
         if chip == "rp2040"  # elsewhere each note of a stage would take longer than the stage
         else {},
         "modes": modes,
-        "boot": {
-            form: asdict(boot.boot(kind, _SENSOR.world(Ride([upright(100.0)]).motion), _calibration(), form == "mpy"))
-            for form in ("py", "mpy")
-        },
-        "flash_bytes": {form: _size(form == "mpy", kind.MPY) for form in ("py", "mpy")},
+        "boot": {form: asdict(start(chip, form == "mpy")) for form in ("py", "mpy")},
+        "flash_bytes": {form: _size(form == "mpy", CHIPS[chip].MPY) for form in ("py", "mpy")},
     }
 
 
@@ -95,8 +91,15 @@ def _mode_text(mode: dict[str, Any]) -> str:
     )
 
 
-def _figures(run: dict[str, Any]) -> dict[str, Any]:
-    """What bench() gives of a run."""
+def start(chip: str, compiled: bool = True) -> boot.Boot:
+    """From power to the first lean, upright and at rest. compiled: the firmware as .mpy."""
+    return boot.boot(CHIPS[chip], _SENSOR.world(Ride([upright(100.0)]).motion), _calibration(), compiled)
+
+
+def loop(seconds: int, chip: str = "rp2040", chosen: dict[str, Any] | None = None) -> dict[str, Any]:
+    """What the app's loop costs in a run of so many emulated seconds; the names of the figures end with their units.
+    chosen: settings by name."""
+    run = _run(chip, seconds, chosen=chosen)
     figures = run["figures"]
     return {
         "seconds": figures["elapsed_us"] / 1e6,
