@@ -172,7 +172,7 @@ def test_what_was_stopped_leaves_no_report_whose_buttons_do_nothing(page, ride, 
     assert page.page.is_hidden("#report") and page.page.is_hidden("#charts")
 
 
-@pytest.mark.parametrize("kind", [LAPTOP, PHONE], ids=["laptop", "phone"])
+@pytest.mark.parametrize("kind", [LAPTOP, pytest.param(PHONE, marks=pytest.mark.nightly)], ids=["laptop", "phone"])
 def test_axe_finds_nothing(page, ride, calibration, kind):
     page.page.set_viewport_size(kind["viewport"])
     page.show(ride, calibration)
