@@ -19,18 +19,19 @@ def judged(log, scale=1.0):
 
 @pytest.mark.parametrize("profile", PROFILES)
 def test_simulated_rides(profile):
-    log = simulated(profile, 5, 300.0)
+    log = simulated(profile)
     assert judged(log) == ""
     assert ("are they in rad/s?" in judged(log, np.radians(1.0))) is (profile != "parked")
 
 
 def test_a_short_ride_shows_it_too():
-    log = simulated("city", 9, 120.0)
+    log = simulated("city")
+    log = log.part(log.t_s < 120.0)
     assert "are they in rad/s?" in judged(log, np.radians(1.0))
     assert "the gyro of the opposite sign" in judged(log, -1.0)
 
 
-@pytest.mark.parametrize("seed", [1036, 2018, 1060])
+@pytest.mark.parametrize("seed", [1036, 1060])
 def test_one_long_steady_bend_is_not_the_gyros_bias(seed):
     """It lasts for 60 of 92 s, so most of the calmest seconds are in it."""
     log = drawn_ride(seed, mounts=["firm"], kind="sweepers").logs[0]

@@ -21,20 +21,17 @@ EITHER, INSTEAD = "either the accelerations", "and instead of gx, gy, gz right w
 WRONG_WAY = "are the axes left-handed (reverse one in both sensors) or the gyro of the opposite sign"
 
 
-@pytest.fixture(scope="module")
-def rides():
-    return {name: simulated(name) for name in MAIN}
-
-
 def judged(log, accel=None, gyro=None, speed=True):
     """What is said of a log whose sensors' axes are exchanged and reversed by these matrices; "" for nothing."""
     return words(handedness(cells_of(log, accel, gyro, speed)))
 
 
-@pytest.mark.parametrize(("profile", "speed"), [("street", False), ("city", True)])
-def test_all_48_ways_to_exchange_and_reverse_axes(rides, profile, speed):
+@pytest.mark.parametrize(
+    ("profile", "speed"), [("street", False), pytest.param("city", True, marks=pytest.mark.nightly)]
+)
+def test_all_48_ways_to_exchange_and_reverse_axes(profile, speed):
     """Put on both sensors alike: the left-handed ones are remarked on, the right-handed ones are not."""
-    remarks = [judged(rides[profile], exchange, exchange, speed) for exchange in SIGNED]
+    remarks = [judged(simulated(profile), exchange, exchange, speed) for exchange in SIGNED]
     for exchange, said in zip(SIGNED, remarks, strict=True):
         assert (WRONG_WAY in said) == bool(said) == (np.linalg.det(exchange) < 0.0), (exchange, said)
     assert sum(map(bool, remarks)) == 24
@@ -42,8 +39,8 @@ def test_all_48_ways_to_exchange_and_reverse_axes(rides, profile, speed):
 
 @pytest.mark.parametrize("profile", PROFILES)
 def test_simulated_rides(profile):
-    """Two minutes each. Without a speed not all of them show it, but none is accused."""
-    log = simulated(profile, seed=9, seconds=120.0)
+    """Without a speed not all of them show it, but none is accused."""
+    log = simulated(profile)
     assert judged(log) == judged(log, speed=False) == ""
     assert (WRONG_WAY in judged(log, gyro=MINUS)) is (profile != "parked")
     if profile not in ("parked", "city"):
@@ -52,9 +49,9 @@ def test_simulated_rides(profile):
 
 
 @pytest.mark.parametrize("profile", MAIN)
-def test_other_rates_biases_and_lengths_do_not_accuse(rides, profile):
+def test_other_rates_biases_and_lengths_do_not_accuse(profile):
     chance = np.random.default_rng(3)
-    log = rides[profile]
+    log = simulated(profile)
     for every, begin, seconds in ((1, 0, 100), (2, 40, 30), (2, 5, 15), (2, 60, 60)):
         part = slice(50 * begin, 50 * (begin + seconds), every)
         rate = log.gyro_dps[part] + chance.uniform(-5.0, 5.0, 3)
@@ -63,8 +60,8 @@ def test_other_rates_biases_and_lengths_do_not_accuse(rides, profile):
         assert judged(cut) == "", (every, begin, seconds)
 
 
-def test_the_remark_names_what_fits(rides):
-    log = rides["sweeper"]
+def test_the_remark_names_what_fits():
+    log = simulated("sweeper")
     swap = np.eye(3)[[1, 0, 2]]
     for gyro, accel, line in (
         (np.diag([1, 1, -1]), None, f": the rates are reversed about z, {INSTEAD} gx, gy, -gz"),
@@ -83,10 +80,10 @@ def test_the_remark_names_what_fits(rides):
         assert (line in said) if line else said == "", said
 
 
-def test_axes_exchanged_in_one_sensor(rides):
+def test_axes_exchanged_in_one_sensor():
     """With a speed nearly all exchanges are seen (24 of the 47 are tried), and those that are have the right name."""
     seen = 0
-    log = rides["street"]
+    log = simulated("street")
     for exchange in EXCHANGES[1::2]:
         turning = liveliest(cells_of(log, gyro=exchange.T))  # exchange undoes it
         assert turning is not None
@@ -123,10 +120,10 @@ def test_a_phone_in_the_hand(seed):
     assert WRONG_WAY in judged(log, gyro=MINUS)
 
 
-def test_gaps_and_frozen_readings(rides):
-    log = rides["street"]
+def test_gaps_and_frozen_readings():
+    log = simulated("street")
     kept = (log.t_s % 30.0) < 25.0  # every half minute five seconds are missing
-    gaps = Log(log.t_s[kept], log.accel_g[kept], log.gyro_dps[kept], log.speed_mps[kept])
+    gaps = log.part(kept)
     assert judged(gaps) == ""
     assert WRONG_WAY in judged(gaps, gyro=MINUS)
     force, rate = log.accel_g.copy(), log.gyro_dps.copy()

@@ -1,18 +1,16 @@
 """A speed that is not in m/s is refused by whatever reads a log, and one that is never is."""
 
-import csv
+import functools
 
-import command
 import driving_runs
 import numpy as np
 import pytest
-from checked import cells_of, words
+from checked import cells_of, simulated, words
 from kickstand_tools.checks.units import speed_unit
 from kickstand_tools.errors import InputError
 from kickstand_tools.logs import reader
 from kickstand_tools.logs.log import Log
 from kickstand_tools.logs.reader import read_log
-from kickstand_tools.simulation.files import simulate
 from kickstand_tools.simulation.profiles import PROFILES
 from kickstand_tools.simulation.scripted.sensor_errors import random_mounting
 
@@ -27,22 +25,23 @@ def said(time, force, speed) -> str:
 KMH, MPH, KNOTS = 3.6, 2.2369, 1.9438
 
 
-def record(path, brakings=7, vehicle="motorcycle", **source):
-    """A made-up drive; source: of driving_runs.SpeedSource."""
-    legs = driving_runs.around(brakings)
+@functools.cache
+def driven(brakings):
+    """Force, rate and speed of a made-up ride."""
+    made = list(driving_runs.samples(driving_runs.around(brakings), "motorcycle"))
+    force, rate = (np.array([driving_runs.mounted(MOUNT, row[k]) for row in made]) for k in (0, 1))
+    return force, rate, [row[2] for row in made]
+
+
+def record(brakings=7, **source):
+    """A log of it; source: of driving_runs.SpeedSource."""
+    force, rate, mps = driven(brakings)
     gps = driving_runs.SpeedSource(**{"every_s": 1.0} | source)
-    with path.open("w", newline="") as file:
-        rows = csv.writer(file)
-        rows.writerow([*command.HEADER.split(","), "speed_mps"])
-        for k, (force, rate, mps) in enumerate(driving_runs.samples(legs, vehicle)):
-            value = gps.step_to(mps)
-            row = (k / driving_runs.RATE_HZ, *driving_runs.mounted(MOUNT, force), *driving_runs.mounted(MOUNT, rate))
-            rows.writerow([*(f"{v:.5f}" for v in row), "" if value is None else f"{value:.3f}"])
-    return path
+    speed = np.array([gps.step_to(value) for value in mps], dtype=float)
+    return Log(np.arange(len(mps)) / driving_runs.RATE_HZ, force, rate, speed, name="drive.csv")
 
 
-@pytest.mark.parametrize("late_s", [0.0, 1.0])
-@pytest.mark.parametrize("every_s", [0.1, 0.5, 1.0])
+@pytest.mark.parametrize(("every_s", "late_s"), [(0.1, 1.0), (1.0, 0.0)])
 @pytest.mark.parametrize(
     ("scale", "words"),
     [
@@ -51,23 +50,21 @@ def record(path, brakings=7, vehicle="motorcycle", **source):
         (KNOTS, r"changes (1\.9|2\.0) times .*: it is in mph or knots, m/s are needed"),
     ],
 )
-def test_other_units_are_refused(tmp_path, scale, words, every_s, late_s):
-    log = record(tmp_path / "drive.csv", scale=scale, every_s=every_s, late_s=late_s)
+def test_other_units_are_refused(scale, words, every_s, late_s):
     with pytest.raises(InputError, match=words):
-        read_log(log)
+        read_log(record(scale=scale, every_s=every_s, late_s=late_s))
 
 
-@pytest.mark.parametrize("late_s", [0.0, 1.0, 3.0])
-@pytest.mark.parametrize("every_s", [0.1, 0.5, 1.0, 2.0])
-def test_what_is_right_is_read(tmp_path, every_s, late_s):
-    read_log(record(tmp_path / "drive.csv", every_s=every_s, late_s=late_s, step=1 / 3.6))
+@pytest.mark.parametrize(("every_s", "late_s"), [(0.1, 0.0), (0.1, 3.0), (0.5, 1.0), (2.0, 0.0), (2.0, 3.0)])
+def test_what_is_right_is_read(every_s, late_s):
+    read_log(record(every_s=every_s, late_s=late_s, step=1 / 3.6))
 
 
-@pytest.mark.parametrize("block_bytes", [2000, 100_000])
-def test_it_takes_no_whole_log(tmp_path, monkeypatch, block_bytes):
+@pytest.mark.parametrize("samples", [30, 1500])
+def test_it_takes_no_whole_log(monkeypatch, samples):
     """What a block knows goes on in the next, and the refusal comes as soon as it is sure."""
-    log = record(tmp_path / "drive.csv", 20, scale=KMH)
-    monkeypatch.setattr(reader, "BLOCK_BYTES", block_bytes)
+    log = record(20, scale=KMH)
+    monkeypatch.setattr(reader, "BLOCK_SAMPLES", samples)
     before = 0
     with pytest.raises(InputError, match="km/h"):
         for block in reader.read_blocks(log):
@@ -76,9 +73,8 @@ def test_it_takes_no_whole_log(tmp_path, monkeypatch, block_bytes):
 
 
 @pytest.mark.parametrize("profile", PROFILES)
-def test_no_simulated_ride_is_refused(tmp_path, profile):
-    simulate(profile, 7, tmp_path, 150.0, speed=True)
-    log = read_log(tmp_path / "RIDE.csv")
+def test_no_simulated_ride_is_refused(profile):
+    log = read_log(simulated(profile))
     time, force, speed = log.t_s, log.accel_g, log.speed_mps
     rng = np.random.default_rng(1)
     noisy = np.abs(speed + rng.normal(scale=0.5, size=len(speed)))
@@ -108,7 +104,7 @@ def test_a_speed_that_has_nothing_to_do_with_the_ride():
         assert said(time, force, speed) == ""
 
 
-def test_recordings(shared_data, tmp_path):
+def test_recordings(shared_data):
     for log in sorted(shared_data.glob("*.csv.gz")):
         whole = read_log(log)
         time, force, speed = whole.t_s, whole.accel_g, whole.speed_mps
